@@ -1,0 +1,66 @@
+//! A machine's program as blocks. The text of a dialect is made outside.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// How a control wants its words spelled.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Dialect {
+    /// Fanuc G-code system A lathe with G90/G95 as here printed (system B): X is a diameter by default.
+    #[default]
+    Fanuc,
+    /// Siemens: `DIAMON` switches X to diameters.
+    Siemens,
+    /// LinuxCNC: `G7` switches X to diameters.
+    #[serde(rename = "linuxcnc")]
+    LinuxCnc,
+}
+
+/// A program for a turning centre, in diameters, absolute, feed per revolution.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Program {
+    /// Spelling.
+    pub dialect: Dialect,
+    /// Smallest step of X on the diameter and of Z, mm: how many decimals are written.
+    pub increment_mm: f64,
+    /// In the order of execution.
+    pub blocks: Vec<Block>,
+}
+
+/// One step of a program. Coordinates are already rounded to the machine's increment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Block {
+    /// Metric, XZ plane, no cutter radius compensation, absolute, feed per revolution, diameters.
+    Modes,
+    /// Constant spindle speed, spindle on.
+    SpindleSpeed {
+        /// rev/min.
+        rpm: f64,
+    },
+    /// Constant surface speed with its limit of spindle speed, spindle on.
+    SurfaceSpeed {
+        /// m/min.
+        speed_m_per_min: f64,
+        /// rev/min.
+        limit_rpm: f64,
+    },
+    /// Rapid motion; an axis left out stands still.
+    Rapid {
+        /// Diameter, mm.
+        x_diameter_mm: Option<f64>,
+        /// mm from program zero.
+        z_mm: Option<f64>,
+    },
+    /// Cutting motion in a straight line; a feed left out stays as it was.
+    Cut {
+        /// Diameter, mm.
+        x_diameter_mm: f64,
+        /// mm from program zero.
+        z_mm: f64,
+        /// mm/rev.
+        feed_mm_per_rev: Option<f64>,
+    },
+    /// Spindle off, end of program.
+    End,
+}

@@ -1,0 +1,1 @@
+//! Numerics with no machining words in them.

@@ -1,0 +1,3 @@
+//! The `precut` command.
+
+fn main() {}
