@@ -1,0 +1,258 @@
+//! Compliance, coupling and sag at many stations.
+
+use super::contact::{Contacts, REGULARISATION};
+use super::form::{Raised, Span, sample};
+use super::matrix::Symmetric;
+use super::plane::Plane;
+use super::station::{Rows, Works};
+use super::{Beam, Steady};
+
+/// What a profile is asked for besides the radial compliance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Wanted {
+    /// Compliance in the tangential plane.
+    pub tangential: bool,
+    /// Coupling to the couple of the axial force.
+    pub couple: bool,
+    /// Sag in both planes.
+    pub weight: bool,
+}
+
+/// Values at the stations; what was not asked for is empty.
+#[derive(Debug, Clone, Default)]
+pub struct Profile {
+    /// `W`: radial displacement of the work at the tool per unit radial force there, mm/N; one-sided rests open.
+    pub radial_mm_per_n: Vec<f64>,
+    /// `G_vt`: the same per unit couple there, mm/(N mm) = 1/N.
+    pub couple_per_n: Vec<f64>,
+    /// `W` in the tangential plane, mm/N; one-sided rests hold both ways.
+    pub tangential_mm_per_n: Vec<f64>,
+    /// Radial displacement, mm, by the full weight acting in the positive radial direction; one-sided rests open.
+    pub sag_radial_mm: Vec<f64>,
+    /// Tangential displacement, mm, by the full weight acting in the positive tangential direction.
+    pub sag_tangential_mm: Vec<f64>,
+    /// The one-sided rests, if there are any.
+    pub contacts: Option<Contacts>,
+}
+
+impl Beam {
+    /// Everything asked for at every station.
+    ///
+    /// Stations ascending, mm, on the shaft. At a station on a rigid support that holds both ways all values
+    /// are exactly 0.
+    pub fn profile(&self, stations_mm: &[f64], want: Wanted) -> Profile {
+        match &self.steady {
+            Some(steady) if !(self.changing && want.weight) => self.steady_profile(steady, stations_mm, want),
+            _ => self.moving_profile(stations_mm, want),
+        }
+    }
+
+    /// From polynomials between the break points.
+    fn steady_profile(&self, steady: &Steady, stations: &[f64], want: Wanted) -> Profile {
+        let intervals = self.frame.intervals.len();
+        let over = |piece: &dyn Fn(usize) -> Raised| self.sample((0..intervals).map(piece), stations);
+        let radial = self.pieces(&self.radial, &steady.radial);
+        let tangential = self.pieces(&self.tangential, &steady.tangential);
+        let when = |wanted: bool, piece: &dyn Fn(usize) -> Raised| if wanted { over(piece) } else { Vec::new() };
+        let mut profile = Profile {
+            radial_mm_per_n: self.sample(steady.compliance.iter().copied(), stations),
+            couple_per_n: when(want.couple, &|k| radial.coupling(k)),
+            tangential_mm_per_n: when(want.tangential, &|k| tangential.compliance(k)),
+            sag_radial_mm: when(want.weight, &|k| radial.sag(k)),
+            sag_tangential_mm: when(want.weight, &|k| tangential.sag(k)),
+            contacts: None,
+        };
+        let rests = self.one_sided();
+        if rests.is_empty() {
+            return profile;
+        }
+        let mut contacts = self.open_contacts(&rests, &profile);
+        let count = rests.len();
+        for (slot, &row) in rests.iter().enumerate() {
+            scatter(&mut contacts.influence, &over(&|k| radial.at_rest(k, row)), slot, count);
+            if want.couple {
+                scatter(&mut contacts.couple_influence, &over(&|k| radial.couple_at_rest(k, row)), slot, count);
+            }
+            let reactions = self.frame.reactions[row];
+            let own = self.left.pair(intervals, row, row) + self.radial.base_work(reactions, reactions);
+            let matrix = &steady.radial.matrix;
+            contacts.matrix.extend(rests.iter().map(|&other| matrix.at(row, other)));
+            contacts.matrix[slot * count + slot] += REGULARISATION * own;
+            if want.weight {
+                contacts.rest_sag.push(matrix.at(row, self.frame.columns()));
+            }
+        }
+        contacts.seal(count);
+        profile.contacts = Some(contacts);
+        profile
+    }
+
+    pub(super) fn sample(&self, forms: impl Iterator<Item = Raised>, stations: &[f64]) -> Vec<f64> {
+        let mut values = Vec::with_capacity(stations.len());
+        let mut rest = stations;
+        let last = self.frame.intervals.len() - 1;
+        for ((k, interval), form) in self.frame.intervals.iter().enumerate().zip(forms) {
+            let count = if k == last { rest.len() } else { rest.partition_point(|place| *place < interval.end) };
+            let (here, behind) = rest.split_at(count);
+            let span = Span { start: interval.start, end: interval.end, inverse_length: 1.0 / interval.length };
+            sample(&form, span, here, &mut values);
+            rest = behind;
+        }
+        values
+    }
+
+    /// Station by station, where more than the load moves with the tool.
+    fn moving_profile(&self, stations: &[f64], want: Wanted) -> Profile {
+        let count = stations.len();
+        let room = |wanted: bool| Vec::with_capacity(if wanted { count } else { 0 });
+        let mut profile = Profile {
+            radial_mm_per_n: room(true),
+            couple_per_n: room(want.couple),
+            tangential_mm_per_n: room(want.tangential),
+            sag_radial_mm: room(want.weight),
+            sag_tangential_mm: room(want.weight),
+            contacts: None,
+        };
+        let rests = self.one_sided();
+        let mut contacts = self.open_contacts(&rests, &profile);
+        let rows = Rows { couple: want.couple, weight: want.weight };
+        let mut works = Works::new(&self.frame, &self.left, &self.right, &self.follow, rows);
+        let mut reduction = Reduction::default();
+        for &station in stations {
+            let k = works.place(station);
+            let (force, couple, weight) = (works.force_row(), works.couple_row(), works.weight_row());
+            let free = f64::from(!self.radial.holds_tool(&self.frame, k, station));
+            reduction.reduce(&works, &self.radial);
+            let matrix = &reduction.matrix;
+            profile.radial_mm_per_n.push(free * matrix.at(force, force));
+            if want.couple {
+                profile.couple_per_n.push(free * matrix.at(force, couple));
+            }
+            if want.weight {
+                profile.sag_radial_mm.push(free * matrix.at(force, weight));
+            }
+            for (slot, &row) in rests.iter().enumerate() {
+                reduction.note(&works, &rests, slot, row, free, want, &mut contacts);
+            }
+            if want.tangential || want.weight {
+                let free = f64::from(!self.tangential.holds_tool(&self.frame, k, station));
+                reduction.reduce(&works, &self.tangential);
+                if want.tangential {
+                    profile.tangential_mm_per_n.push(free * reduction.matrix.at(force, force));
+                }
+                if want.weight {
+                    profile.sag_tangential_mm.push(free * reduction.matrix.at(force, weight));
+                }
+            }
+        }
+        if !rests.is_empty() {
+            contacts.compliance.clone_from(&profile.radial_mm_per_n);
+            contacts.coupling.clone_from(&profile.couple_per_n);
+            contacts.sag.clone_from(&profile.sag_radial_mm);
+            contacts.seal(rests.len());
+            profile.contacts = Some(contacts);
+        }
+        profile
+    }
+
+    /// Rows of the one-sided rests: fixed ones, then follow rests.
+    fn one_sided(&self) -> Vec<usize> {
+        let one_sided = |support: usize| self.supports[support].gap_mm().is_some();
+        let fixed =
+            (0..self.unknowns.len()).filter(|&i| !self.unknowns[i].couple && one_sided(self.unknowns[i].support));
+        let follow = (0..self.follow.len()).filter(|&i| one_sided(self.follow[i].0));
+        fixed.chain(follow.map(|i| self.frame.columns() + i)).collect()
+    }
+
+    fn open_contacts(&self, rows: &[usize], profile: &Profile) -> Contacts {
+        let columns = self.frame.columns();
+        let supports: Vec<usize> = rows
+            .iter()
+            .map(|&row| if row < columns { self.unknowns[row].support } else { self.follow[row - columns].0 })
+            .collect();
+        Contacts {
+            gaps_mm: supports.iter().map(|&support| self.supports[support].gap_mm().unwrap_or(0.0)).collect(),
+            supports,
+            compliance: profile.radial_mm_per_n.clone(),
+            coupling: profile.couple_per_n.clone(),
+            sag: profile.sag_radial_mm.clone(),
+            ..Contacts::default()
+        }
+    }
+}
+
+/// Writes the values of one rest into the rows of the stations.
+fn scatter(into: &mut Vec<f64>, values: &[f64], slot: usize, count: usize) {
+    into.resize(values.len() * count, 0.0);
+    for (row, value) in into.chunks_exact_mut(count).zip(values) {
+        row[slot] = *value;
+    }
+}
+
+/// Room for the elimination at one station.
+#[derive(Default)]
+struct Reduction {
+    matrix: Symmetric,
+    redundants: Vec<usize>,
+    pivots: Vec<f64>,
+    /// Diagonal before the elimination.
+    original: Vec<f64>,
+}
+
+impl Reduction {
+    fn reduce(&mut self, works: &Works<'_>, plane: &Plane) {
+        works.sprung(plane, &mut self.matrix);
+        works.redundants(plane, &mut self.redundants);
+        self.original.clear();
+        self.original.extend((0..self.matrix.order).map(|i| self.matrix.at(i, i)));
+        self.matrix.eliminate(&self.redundants, &mut self.pivots);
+    }
+
+    /// One rest at one station; a follow rest beside the shaft is written as one that nothing moves.
+    #[allow(clippy::too_many_arguments)]
+    fn note(
+        &self,
+        works: &Works<'_>,
+        rests: &[usize],
+        slot: usize,
+        row: usize,
+        free: f64,
+        want: Wanted,
+        into: &mut Contacts,
+    ) {
+        let absent = |row: usize| works.is_absent(row);
+        let present = f64::from(!absent(row));
+        let matrix = &self.matrix;
+        into.influence.push(present * free * matrix.at(row, works.force_row()));
+        if want.couple {
+            into.couple_influence.push(present * matrix.at(row, works.couple_row()));
+        }
+        if want.weight {
+            into.rest_sag.push(present * matrix.at(row, works.weight_row()));
+        }
+        for (other_slot, &other) in rests.iter().enumerate() {
+            let both = present * f64::from(!absent(other));
+            let own = if slot == other_slot { REGULARISATION * self.original[row] } else { 0.0 };
+            into.matrix.push(both * (matrix.at(row, other) + own));
+        }
+    }
+}
+
+impl Contacts {
+    /// A rest with no compliance of its own and none of the work (on a rigid support, or beside the shaft) can do
+    /// nothing: a unit on the diagonal keeps the problem definite.
+    fn seal(&mut self, count: usize) {
+        let square = count * count;
+        for block in self.matrix.chunks_exact_mut(square) {
+            for rest in 0..count {
+                if block[rest * count + rest] <= 0.0 {
+                    for other in 0..count {
+                        block[rest * count + other] = 0.0;
+                        block[other * count + rest] = 0.0;
+                    }
+                    block[rest * count + rest] = 1.0;
+                }
+            }
+        }
+    }
+}
