@@ -254,7 +254,8 @@ fn a_displaced_rest_bends_the_shaft() {
     // Rigid centres: the shape under a force at z_s, phi = G(z, z_s)/G(z_s, z_s) of a simple beam.
     let z_s = 300.0;
     let base = |effects: Value| {
-        let mut job = job(&effects);
+        let mut job = job(&json!([]));
+        job.effects = serde_json::from_value(effects).unwrap();
         let rest = json!([
             { "kind": "centre", "z_mm": 0.0 },
             { "kind": "steady_rest", "z_mm": z_s, "compliance_um_per_n": 0.02 },

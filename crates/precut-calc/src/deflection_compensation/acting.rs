@@ -75,11 +75,6 @@ impl ForceChange {
         }
         factor.max(0.0)
     }
-
-    /// Whether nothing is changed.
-    pub(super) fn is_none(&self) -> bool {
-        *self == Self::NONE
-    }
 }
 
 /// A term of the extra radial error e.

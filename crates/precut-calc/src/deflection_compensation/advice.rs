@@ -28,8 +28,8 @@ const SLENDER: f64 = 10.0;
 /// A depth beyond so many nominal depths is worth a look.
 const DEPTH_RATIO: f64 = 2.0;
 
-/// Codes of the explanations and warnings made here.
-pub(super) const CODES: &[&str] = &[
+/// Codes of the explanations made here.
+pub(super) const EXPLANATION_CODES: &[&str] = &[
     "work_dominates",
     "headstock_dominates",
     "tailstock_dominates",
@@ -43,6 +43,10 @@ pub(super) const CODES: &[&str] = &[
     "one_step_overcuts",
     "stock_is_copied",
     "not_modelled",
+];
+
+/// Codes of the warnings made here.
+pub(super) const WARNING_CODES: &[&str] = &[
     "deflection_over_depth",
     "linear_theory_exceeded",
     "bending_stress_high",

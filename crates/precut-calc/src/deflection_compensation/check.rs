@@ -8,6 +8,35 @@ use super::grid::station_count;
 use super::input::{Job, MAX_STATIONS, Segment, Stations, Support};
 use super::structure::ends;
 
+/// Codes of the faults found here.
+pub(super) const CODES: &[&str] = &[
+    "no_segments",
+    "unknown_material",
+    "elastic_constants_missing",
+    "bad_bore",
+    "stock_below_finish",
+    "gap_of_two_sided_rest",
+    "support_outside_shaft",
+    "duplicate_support",
+    "unstable_support",
+    "speed_or_rpm",
+    "passes_not_descending",
+    "passes_incomplete",
+    "station_outside_shaft",
+    "stations_not_ascending",
+    "nothing_to_turn",
+    "too_many_stations",
+    "stock_profile_empty",
+    "stock_profile_not_ascending",
+    "bad_diameter",
+    "duplicate_effect",
+    "condition_missing",
+    "effect_beyond_base",
+    "effect_without_tailstock",
+    "effect_without_rest",
+    "effect_not_with_passes",
+];
+
 /// Supports nearer than this share of the length stand at one station.
 const SAME_STATION: f64 = 1e-9;
 

@@ -96,11 +96,14 @@ pub(crate) fn engage(
         } else {
             high = t;
         }
-        let newton = t - f / slope;
-        let next = if newton > low && newton < high && slope > 0.0 { newton } else { 0.5 * (low + high) };
-        let step = (next - t).abs();
-        t = next;
-        if step <= DEPTH_TOLERANCE * scale || f.abs() <= f64::EPSILON * scale || high - low <= DEPTH_TOLERANCE * scale {
+        let step = f / slope;
+        // Converged: the equation holds to round-off, or the step no longer moves the depth.
+        if f.abs() <= f64::EPSILON * scale || (slope > 0.0 && step.abs() <= DEPTH_TOLERANCE * scale) {
+            break;
+        }
+        let newton = t - step;
+        t = if slope > 0.0 && newton > low && newton < high { newton } else { 0.5 * (low + high) };
+        if high - low <= DEPTH_TOLERANCE * scale {
             break;
         }
     }

@@ -1,7 +1,7 @@
 //! The job: a shaft, how it is held, and the cut.
 
 use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
+use utoipa::{PartialSchema, ToSchema};
 
 use crate::calculator::{Dialect, Measured, MeasuredRow};
 use crate::effects::{DeflectionConditions, DeflectionEffect};
@@ -46,7 +46,7 @@ pub struct Job {
     /// Measured or predicted diameter of the blank along the shaft; linear between rows, constant beyond
     /// them. Replaces the segments' stock diameters in the depth of cut (not in the stiffness).
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(extensions(("x-group" = json!("measurement"))))]
+    #[schema(schema_with = Measured::<StockRow>::schema, required = false)]
     pub stock_profile: Option<Measured<StockRow>>,
     /// Several passes instead of one; each turns down to its diameter, no segment below its drawing diameter.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

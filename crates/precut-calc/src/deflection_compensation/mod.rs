@@ -42,7 +42,7 @@ pub use output::{
 };
 
 use crate::calculator::{
-    Answer, Basis, Calculator, CalculatorKind, Cost, Example, Failure, Figure, Message, Meta, Monitor, Program, Table,
+    Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Message, Meta, Monitor, Program, Table,
 };
 use crate::{force, material};
 
@@ -107,10 +107,13 @@ impl Calculator for DeflectionCompensation {
 
     fn fill(job: &mut Job) {
         if let Some(found) = job.shaft.material.take().as_deref().and_then(material::find) {
-            let (shaft, elastic) = (&mut job.shaft, &found.elastic);
-            shaft.youngs_modulus_n_per_mm2.get_or_insert(elastic.youngs_modulus_n_per_mm2);
-            shaft.poisson_ratio.get_or_insert(elastic.poisson_ratio);
-            shaft.density_kg_per_m3.get_or_insert(elastic.density_kg_per_m3);
+            let shaft = &mut job.shaft;
+            shaft.youngs_modulus_n_per_mm2.get_or_insert(found.youngs_modulus_n_per_mm2.value);
+            shaft.poisson_ratio.get_or_insert(found.poisson_ratio.value);
+            shaft.density_kg_per_m3.get_or_insert(found.density_kg_per_m3.value);
+            if let (None, Some(strength)) = (shaft.yield_strength_n_per_mm2, found.yield_strength_n_per_mm2) {
+                shaft.yield_strength_n_per_mm2 = Some(strength.value);
+            }
         }
         job.shaft.poisson_ratio.get_or_insert(DEFAULT_POISSON_RATIO);
         job.shaft.density_kg_per_m3.get_or_insert(DEFAULT_DENSITY_KG_PER_M3);
@@ -283,5 +286,12 @@ fn basis(job: &Job) -> Vec<Basis> {
     used
 }
 
-/// Everything that this calculator may utter, gathered from where it is said.
-const CODES: &[&str] = &[];
+/// Everything that this calculator may utter, from where it is said.
+const CODES: Codes = Codes {
+    faults: &[check::CODES, force::FAULT_CODES],
+    failures: &[&["path_incomplete", "pass_without_command"]],
+    warnings: &[advice::WARNING_CODES, second_order::WARNING_CODES, force::WARNING_CODES],
+    explanations: &[advice::EXPLANATION_CODES],
+    stages: &[&["stage_pass", "stage_path", "stage_advice", "stage_done"]],
+    labels: &[picture::LABEL_CODES],
+};

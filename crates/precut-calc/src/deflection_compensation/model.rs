@@ -2,8 +2,8 @@
 
 use crate::calculator::Failure;
 use crate::effects::DeflectionEffect as Effect;
-use crate::force::{DepthLaw, ForceModel};
-use crate::num::beam::{Contacts, Profile, Wanted};
+use crate::force::{DepthLaw, ForceModel, Forces};
+use crate::num::beam::{BeamError, Contacts, Profile, ToolLoad, Wanted};
 
 use super::acting::{Acting, ForceChange, Passage};
 use super::equilibrium::{Engagement, Opening, command_radius_mm, copying_factor, engage};
@@ -47,12 +47,10 @@ pub(super) struct Line {
     with_feed: bool,
 }
 
-/// Force laws at the stations: few different ones, each for one speed.
+/// Force laws at the stations, effects in them: one for every speed and hardness that differ.
 struct StationLaws {
     laws: Vec<DepthLaw>,
     of_station: Vec<u32>,
-    factor: Vec<f64>,
-    change: ForceChange,
 }
 
 /// Radii along the shaft that a cut is about, mm.
@@ -82,7 +80,7 @@ pub(super) struct Ingredients<'a> {
 impl Line {
     /// Everything along the shaft that no depth changes; `profile` holds what [`wanted`] of the job says.
     pub(super) fn of(from: &Ingredients<'_>, profile: Profile) -> Self {
-        let Ingredients { job, grid, acting, structure, regime, radii, .. } = *from;
+        let Ingredients { job, grid, structure, regime, radii, .. } = *from;
         let include = &job.include;
         let Profile { radial_mm_per_n, couple_per_n, tangential_mm_per_n, sag_radial_mm, sag_tangential_mm, contacts } =
             profile;
@@ -172,10 +170,15 @@ impl Line {
     /// With one-sided rests the displacement is piecewise linear in the complete load (`deflection/3.3`, item 3).
     fn opening_with_contacts(&self, contacts: &Contacts, i: usize, loads: &Loads) -> (f64, f64) {
         let arm = self.arm_mm[i];
-        let response = contacts.respond(i, loads.passive_n, arm * loads.feed_n, self.gravity_radial);
+        let load = ToolLoad {
+            force_n: loads.passive_n,
+            couple_n_mm: arm * loads.feed_n,
+            gravity_radial: self.gravity_radial,
+        };
+        let response = contacts.respond(i, load);
         let y = response.displacement_mm + self.carriage_mm_per_n * loads.passive_n + self.error_mm[i];
         let slope = (response.compliance_mm_per_n + self.carriage_mm_per_n) * loads.passive_slope
-            + response.couple_per_n * arm * loads.feed_slope;
+            + response.coupling_per_n * arm * loads.feed_slope;
         (y, slope)
     }
 
@@ -271,26 +274,17 @@ fn errors_mm(from: &Ingredients<'_>) -> Vec<f64> {
 impl StationLaws {
     fn of(from: &Ingredients<'_>) -> Self {
         let Ingredients { job, grid, acting, regime, radii, .. } = *from;
-        let mut laws = Self {
-            laws: Vec::new(),
-            of_station: Vec::with_capacity(grid.len()),
-            factor: Vec::with_capacity(grid.len()),
-            change: acting.force,
-        };
-        let mut speed_of_last = f64::NAN;
+        let mut laws = Self { laws: Vec::new(), of_station: Vec::with_capacity(grid.len()) };
+        let mut last = (f64::NAN, f64::NAN);
         for i in 0..grid.len() {
             let speed = regime.speed_m_per_min(radii.planned[i], radii.target[i]);
-            if speed.to_bits() != speed_of_last.to_bits() {
-                laws.laws.push(law_at(&job.force, regime.feed_mm_per_rev, speed));
-                speed_of_last = speed;
+            let factor = acting.force.factor(grid.z_mm[i] / grid.length_mm, regime.feed_mm_per_rev, speed);
+            if speed.to_bits() != last.0.to_bits() || factor.to_bits() != last.1.to_bits() {
+                laws.laws.push(law_at(&job.force, regime.feed_mm_per_rev, speed, factor, &acting.force));
+                last = (speed, factor);
             }
             // At most one law per station, and stations are limited to 200 000.
             laws.of_station.push(u32::try_from(laws.laws.len() - 1).unwrap_or(u32::MAX));
-            laws.factor.push(if acting.force.is_none() {
-                1.0
-            } else {
-                acting.force.factor(grid.z_mm[i] / grid.length_mm, regime.feed_mm_per_rev, speed)
-            });
         }
         laws
     }
@@ -304,59 +298,34 @@ impl StationLaws {
         let (passive_n, passive_slope) = law.passive_and_slope(depth_mm);
         let (main_n, main_slope) = if main { law.main_and_slope(depth_mm) } else { (0.0, 0.0) };
         let (feed_n, feed_slope) = if feed { law.feed_and_slope(depth_mm) } else { (0.0, 0.0) };
-        let mut loads = Loads { passive_n, passive_slope, main_n, main_slope, feed_n, feed_slope };
-        if !self.change.is_none() {
-            let mut factor = self.factor[i];
-            let mut relative_slope = 0.0;
-            if let Some((delta, reference_mm)) = self.change.depth {
-                factor *= (depth_mm / reference_mm).powf(delta);
-                relative_slope = delta / depth_mm;
-            }
-            loads = loads.scaled(factor, relative_slope);
-            loads.passive_n += self.change.added_passive_n;
-        }
-        loads
+        Loads { passive_n, passive_slope, main_n, main_slope, feed_n, feed_slope }
     }
 
     fn loads_at_zero(&self, i: usize, main: bool, feed: bool) -> Loads {
-        let at_zero = self.law(i).forces_at_zero();
-        let mut loads = Loads {
-            passive_n: at_zero.passive_n,
-            main_n: if main { at_zero.main_n } else { 0.0 },
-            feed_n: if feed { at_zero.feed_n } else { 0.0 },
+        let limit = self.law(i).limit();
+        Loads {
+            passive_n: limit.passive_n,
+            main_n: if main { limit.main_n } else { 0.0 },
+            feed_n: if feed { limit.feed_n } else { 0.0 },
             ..Loads::default()
-        };
-        if !self.change.is_none() {
-            // (t/t_ref)^dx -> 0 with a rising exponent; a falling one would make the constant part unbounded and is
-            // taken at its factor, which only decides between a cut and none.
-            let factor = match self.change.depth {
-                Some((delta, _)) if delta > 0.0 => 0.0,
-                _ => self.factor[i],
-            };
-            loads = loads.scaled(factor, 0.0);
-            loads.passive_n += self.change.added_passive_n;
-        }
-        loads
-    }
-}
-
-impl Loads {
-    /// All components times `factor`, which changes with the depth by `relative_slope` of itself per mm.
-    fn scaled(self, factor: f64, relative_slope: f64) -> Self {
-        let slope = |force: f64, slope: f64| factor * (slope + force * relative_slope);
-        Self {
-            passive_slope: slope(self.passive_n, self.passive_slope),
-            main_slope: slope(self.main_n, self.main_slope),
-            feed_slope: slope(self.feed_n, self.feed_slope),
-            passive_n: factor * self.passive_n,
-            main_n: factor * self.main_n,
-            feed_n: factor * self.feed_n,
         }
     }
 }
 
-fn law_at(force: &ForceModel, feed_mm_per_rev: f64, speed_m_per_min: f64) -> DepthLaw {
-    force.at(feed_mm_per_rev, speed_m_per_min)
+/// The law at one feed and speed with the effects in it: factors on all components, then the turned
+/// depth exponent, then what is added to the passive force.
+fn law_at(
+    force: &ForceModel,
+    feed_mm_per_rev: f64,
+    speed_m_per_min: f64,
+    factor: f64,
+    change: &ForceChange,
+) -> DepthLaw {
+    let mut law = force.at(feed_mm_per_rev, speed_m_per_min).scaled(factor);
+    if let Some((delta, reference_mm)) = change.depth {
+        law = law.with_depth_exponent(delta, reference_mm);
+    }
+    law.with_added(Forces { passive_n: change.added_passive_n, main_n: 0.0, feed_n: 0.0 })
 }
 
 /// Shape phi of the shaft for every displaced rest: G(z, z_s)/G(z_s, z_s) without the rest (`diagnosis/4.20`).
@@ -375,9 +344,10 @@ pub(super) fn rest_shapes(
         .map(|station_mm| {
             let rest = super::check::steady_at(job, station_mm)
                 .ok_or_else(|| Failure::Internal("a displaced rest that is no support".to_owned()))?;
-            let at_rest = structure.beam.influence(station_mm, &[station_mm], Some(rest))[0];
-            let along = structure.beam.influence(station_mm, &grid.z_mm, Some(rest));
-            Ok(along.into_iter().map(|g| g / at_rest).collect())
+            let unstable = |error: BeamError| Failure::Internal(format!("without the displaced rest: {error}"));
+            let at_rest = structure.beam.influence(station_mm, &[station_mm], Some(rest)).map_err(unstable)?;
+            let along = structure.beam.influence(station_mm, &grid.z_mm, Some(rest)).map_err(unstable)?;
+            Ok(along.into_iter().map(|g| g / at_rest[0]).collect())
         })
         .collect()
 }

@@ -12,7 +12,7 @@ pub(super) const FIGURE_IDS: &[&str] = &["profile", "compliance", "path"];
 pub(super) const TABLE_IDS: &[&str] = &["stations", "path", "increments", "one_step", "passes"];
 
 /// Codes that the figures utter.
-pub(super) const FIGURE_CODES: &[&str] = &[
+pub(super) const LABEL_CODES: &[&str] = &[
     "station",
     "radius",
     "compliance",

@@ -20,7 +20,7 @@ const SAMPLES: usize = 33;
 const NOTICEABLE_SHARE: f64 = 0.1;
 
 /// Codes of the warnings about effects that were left out.
-pub(super) const CODES: &[&str] = &["effect_left_out"];
+pub(super) const WARNING_CODES: &[&str] = &["effect_left_out"];
 
 /// Largest change of the diameter by every effect of second order.
 pub(super) fn second_order(job: &Job, grid: &Grid, acting: &Acting, stage: &Stage) -> Result<SecondOrder, Failure> {
