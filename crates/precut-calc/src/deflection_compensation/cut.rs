@@ -2,8 +2,8 @@
 
 use crate::calculator::{Failure, Monitor, checkpoint};
 
-use super::equilibrium::{Engagement, commanded_model_depth_mm};
-use super::model::{Line, Loads, Radii};
+use super::equilibrium::{Engagement, command_radius_mm, commanded_model_depth_mm, copying_factor};
+use super::model::{Line, Loads, NominalLoads, Radii};
 use super::output::{OneStep, StatusCompensated, StatusUncompensated};
 
 const UM_PER_MM: f64 = 1e3;
@@ -14,7 +14,7 @@ const STATIONS_PER_CHECK: usize = 2048;
 pub(super) struct CutLine {
     /// Planned depth a.
     pub nominal_depth_mm: Vec<f64>,
-    /// Loads at the planned depth, the components that act.
+    /// All loads at the planned depth, also those that do not act.
     pub loads: Vec<Loads>,
     /// Y(a).
     pub y_mm: Vec<f64>,
@@ -40,11 +40,12 @@ impl CutLine {
     pub(super) fn of(line: &Line, radii: &Radii, monitor: &dyn Monitor) -> Result<Self, Failure> {
         let n = radii.target.len();
         let mut cut = Self::with_capacity(n);
+        let mut last = NominalLoads::default();
         for i in 0..n {
             if i % STATIONS_PER_CHECK == 0 {
                 checkpoint(monitor)?;
             }
-            cut.plan(line, radii, i);
+            cut.plan(line, radii, i, &mut last);
             cut.predict_uncompensated(line, radii, i);
         }
         Ok(cut)
@@ -68,10 +69,12 @@ impl CutLine {
     }
 
     /// The explicit command for the wanted radius.
-    fn plan(&mut self, line: &Line, radii: &Radii, i: usize) {
-        let (target, planned) = (radii.target[i], radii.planned[i]);
-        let depth = planned - target;
-        let (command, loads, opening) = line.command(i, target, planned);
+    fn plan(&mut self, line: &Line, radii: &Radii, i: usize, last: &mut NominalLoads) {
+        let target = radii.target[i];
+        let depth = radii.planned[i] - target;
+        let loads = line.nominal_loads(i, depth, last);
+        let opening = line.opening(i, &loads);
+        let command = command_radius_mm(target, opening.y_mm, opening.z_mm);
         let slope = match command {
             // S = r_t in the wanted state, so S' = ((r_c + Y) Y' + Z Z')/r_t.
             Some(r_c) => ((r_c + opening.y_mm) * opening.y_slope + opening.z_mm * opening.z_slope) / target,
@@ -103,7 +106,7 @@ impl CutLine {
         });
         self.note(engagement);
         self.copying.push(match engagement {
-            Engagement::Cut { depth_mm, .. } => Some(line.copying(i, target, depth_mm)),
+            Engagement::Cut { opening, .. } => Some(copying_factor(target, opening)),
             _ => None,
         });
         self.uncompensated_depth_mm.push(engagement.depth_mm());
@@ -169,26 +172,26 @@ pub(super) fn one_step(line: &Line, radii: &Radii, cut: &CutLine, depth_exponent
     };
     for i in 0..n {
         let a = cut.nominal_depth_mm[i];
-        let passive = |t: f64| line.all_loads(i, t);
-        let w = line.compliance_mm_per_n(i);
-        let force = if a > 0.0 { passive(a).passive_n } else { 0.0 };
-        if force <= 0.0 {
+        let force = cut.loads[i].passive_n;
+        if a <= 0.0 || force <= 0.0 {
             step.push_nothing();
             continue;
         }
+        let w = line.compliance_mm_per_n(i);
         let y = w * force;
-        let factor = passive(a + y).passive_n / force;
+        let factor = line.passive(i, a + y).0 / force;
         let depth = a + y * factor;
+        let (stock, target) = (radii.stock[i], radii.target[i]);
         let command = radii.planned[i] - depth;
-        let produced = radii.stock[i] - line.engage(i, radii.stock[i], command, a).depth_mm();
+        let produced = stock - line.engage(i, stock, command, cut.guess_mm(i, stock - command)).depth_mm();
         step.factor.push(Some(factor));
         step.depth_mm.push(Some(depth));
-        step.diameter_error_um.push(Some(2.0 * (produced - radii.target[i]) * UM_PER_MM));
-        step.residual_commanded_model_um.push(Some((depth - w * passive(depth).passive_n - a) * UM_PER_MM));
+        step.diameter_error_um.push(Some(2.0 * (produced - target) * UM_PER_MM));
+        step.residual_commanded_model_um.push(Some((depth - w * line.passive(i, depth).0 - a) * UM_PER_MM));
         step.depth_commanded_model_mm.push(depth_exponent.and_then(|exponent| {
-            commanded_model_depth_mm(a, exponent, |t| {
-                let loads = passive(t);
-                (w * loads.passive_n, w * loads.passive_slope)
+            commanded_model_depth_mm(a, depth, exponent, |t| {
+                let (force, slope) = line.passive(i, t);
+                (w * force, w * slope)
             })
         }));
     }

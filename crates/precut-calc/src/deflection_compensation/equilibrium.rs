@@ -25,6 +25,8 @@ pub(crate) enum Engagement {
     Cut {
         /// Engaged depth t, mm.
         depth_mm: f64,
+        /// The state there.
+        opening: Opening,
         /// What is left of the equation, mm.
         residual_mm: f64,
     },
@@ -87,9 +89,10 @@ pub(crate) fn engage(
     let (mut low, mut high) = (0.0, stock_radius_mm);
     let scale = stock_radius_mm.min(commanded.max(opening_at_zero.y_mm.abs()));
     let mut t = if start_mm > 0.0 && start_mm < high { start_mm } else { commanded.min(high) };
+    let mut state = opening(t);
     let mut last = f64::INFINITY;
     for _ in 0..MAX_STEPS {
-        let (f, slope) = residual(t, opening(t));
+        let (f, slope) = residual(t, state);
         last = f;
         if f < 0.0 {
             low = t;
@@ -103,11 +106,12 @@ pub(crate) fn engage(
         }
         let newton = t - step;
         t = if slope > 0.0 && newton > low && newton < high { newton } else { 0.5 * (low + high) };
+        state = opening(t);
         if high - low <= DEPTH_TOLERANCE * scale {
             break;
         }
     }
-    Engagement::Cut { depth_mm: t, residual_mm: last }
+    Engagement::Cut { depth_mm: t, opening: state, residual_mm: last }
 }
 
 /// r_c + Y and the produced radius S = sqrt((r_c + Y)² + Z²).
@@ -126,15 +130,19 @@ pub(crate) fn copying_factor(command_radius_mm: f64, o: Opening) -> f64 {
 /// Command of the commanded-depth model (`deflection/4.2`), the paper's assumption taken to its end:
 /// the smallest root of t - y(t) = a, y(t) = k t^z non-decreasing. `None` where there is none (a fold).
 ///
-/// `deflection` returns y and dy/dt. For z <= 1 the function is convex and has exactly one root, reached
-/// from the right; for z > 1 it is concave up to its fold, and Newton climbs from t = a to the smaller root.
+/// `deflection` returns y and dy/dt; `guess_mm` is a little below the root (the one-step formula is). For
+/// z <= 1 the function is convex and has exactly one root, reached from the right, where one step from a
+/// rising point lands; for z > 1 it is concave up to its fold, and Newton climbs from t = a to the smaller root.
 pub(crate) fn commanded_model_depth_mm(
     nominal_depth_mm: f64,
+    guess_mm: f64,
     exponent: f64,
     deflection: impl Fn(f64) -> (f64, f64),
 ) -> Option<f64> {
     let mut t = nominal_depth_mm;
-    if exponent <= 1.0 {
+    if exponent <= 1.0 && deflection(guess_mm).1 < 0.5 {
+        t = guess_mm;
+    } else if exponent <= 1.0 {
         // Go right until t - y(t) - a > 0; for z = 1 with k >= 1 this never happens.
         let mut reach = nominal_depth_mm + deflection(nominal_depth_mm).0;
         let mut doublings = 0;
@@ -223,10 +231,10 @@ mod tests {
         #[test]
         fn commanded_model_meets_its_closed_forms(k in 1e-4..0.9_f64, a in 0.01..2.0_f64) {
             let y = |z: f64| move |t: f64| (k * t.powf(z), k * z * t.powf(z - 1.0));
-            prop_assert!(close(commanded_model_depth_mm(a, 1.0, y(1.0)).unwrap(), a / (1.0 - k), 1e-12));
+            prop_assert!(close(commanded_model_depth_mm(a, a, 1.0, y(1.0)).unwrap(), a / (1.0 - k), 1e-12));
             let root = (k + (k * k + 4.0 * a).sqrt()) / 2.0;
-            prop_assert!(close(commanded_model_depth_mm(a, 0.5, y(0.5)).unwrap(), root * root, 1e-12));
-            match commanded_model_depth_mm(a, 2.0, y(2.0)) {
+            prop_assert!(close(commanded_model_depth_mm(a, a, 0.5, y(0.5)).unwrap(), root * root, 1e-12));
+            match commanded_model_depth_mm(a, a, 2.0, y(2.0)) {
                 // Near the fold the root is as sensitive as the square root of the data.
                 Some(t) => prop_assert!(close(t, 2.0 * a / (1.0 + (1.0 - 4.0 * k * a).max(0.0).sqrt()), 1e-6)),
                 None => prop_assert!(4.0 * k * a > 1.0 - 1e-9),

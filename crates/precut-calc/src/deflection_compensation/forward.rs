@@ -311,7 +311,7 @@ impl PreparedRun {
         for (i, &row) in self.row_of_station.iter().enumerate() {
             let (stock, command) = (self.radii.stock[i], self.command_mm[i]);
             let commanded_depth = stock - command;
-            let (_, opening) = line.nominal(i, commanded_depth);
+            let opening = line.opening_at(i, commanded_depth);
             let guess = commanded_depth - opening.y_mm / (1.0 + opening.y_slope);
             out[row] = match line.engage(i, stock, command, guess) {
                 Engagement::Cut { depth_mm, .. } => Ok(measure.of(stock - depth_mm, self.radii.target[i])),

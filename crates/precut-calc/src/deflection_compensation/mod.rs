@@ -230,14 +230,7 @@ impl Assembly<'_> {
         let Stage { line, radii, cut, .. } = stage;
         let n = grid.len();
         let each = |value: &dyn Fn(usize) -> f64| -> Vec<f64> { (0..n).map(value).collect() };
-        let force = |acts: bool, component: fn(&model::Loads) -> f64| {
-            acts.then(|| {
-                each(&|i| {
-                    let depth = cut.nominal_depth_mm[i];
-                    if depth > 0.0 { component(&line.all_loads(i, depth)) } else { 0.0 }
-                })
-            })
-        };
+        let force = |given: bool, component: fn(&model::Loads) -> f64| given.then(|| each(&|i| component(&cut.loads[i])));
         let moves_aside = job.include.tangential || job.include.weight;
         StationColumns {
             z_mm: grid.z_mm.clone(),

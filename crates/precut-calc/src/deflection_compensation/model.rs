@@ -6,7 +6,7 @@ use crate::force::{DepthLaw, ForceModel, Forces};
 use crate::num::beam::{BeamError, Contacts, Profile, ToolLoad, Wanted};
 
 use super::acting::{Acting, ForceChange, Passage};
-use super::equilibrium::{Engagement, Opening, command_radius_mm, copying_factor, engage};
+use super::equilibrium::{Engagement, Opening, engage};
 use super::grid::Grid;
 use super::input::{FeedDirection, Include, Job};
 use super::regime::Regime;
@@ -21,6 +21,13 @@ pub(super) struct Loads {
     pub main_slope: f64,
     pub feed_n: f64,
     pub feed_slope: f64,
+}
+
+/// Loads at the nominal depth of the station before.
+#[derive(Debug, Default)]
+pub(super) struct NominalLoads {
+    key: Option<(u32, u64)>,
+    loads: Loads,
 }
 
 /// What every depth has in common along the shaft: compliances, sag, stated errors, force laws.
@@ -132,7 +139,7 @@ impl Line {
     }
 
     /// All force components at a station and depth, with slopes; also those that do not act.
-    pub(super) fn all_loads(&self, i: usize, depth_mm: f64) -> Loads {
+    fn all_loads(&self, i: usize, depth_mm: f64) -> Loads {
         self.laws.loads(i, depth_mm, true, true)
     }
 
@@ -143,6 +150,11 @@ impl Line {
     /// Loads in the limit of a vanishing depth: rubbing and ploughing.
     fn loads_at_zero(&self, i: usize) -> Loads {
         self.laws.loads_at_zero(i, self.with_main, self.with_feed)
+    }
+
+    /// Opening of the gap at an engaged depth.
+    pub(super) fn opening_at(&self, i: usize, depth_mm: f64) -> Opening {
+        self.opening(i, &self.loads(i, depth_mm))
     }
 
     /// Opening of the gap under given loads (`deflection/4.1`).
@@ -182,19 +194,20 @@ impl Line {
         (y, slope)
     }
 
-    /// Opening without any cutting force: sag and stated errors (and what rests make of the sag).
-    pub(super) fn opening_unloaded(&self, i: usize) -> Opening {
-        self.opening(i, &Loads::default())
+    /// All loads at a nominal depth, none where there is no stock. Stations in a row mostly share depth and law:
+    /// `last` keeps what was computed before.
+    pub(super) fn nominal_loads(&self, i: usize, depth_mm: f64, last: &mut NominalLoads) -> Loads {
+        let key = (self.laws.of_station[i], depth_mm.to_bits());
+        if last.key != Some(key) {
+            let loads = if depth_mm > 0.0 { self.all_loads(i, depth_mm) } else { Loads::default() };
+            *last = NominalLoads { key: Some(key), loads };
+        }
+        last.loads
     }
 
-    /// Nominal state at a planned depth: loads and opening, none where there is no stock.
-    pub(super) fn nominal(&self, i: usize, depth_mm: f64) -> (Loads, Opening) {
-        if depth_mm > 0.0 {
-            let loads = self.loads(i, depth_mm);
-            (loads, self.opening(i, &loads))
-        } else {
-            (Loads::default(), self.opening_unloaded(i))
-        }
+    /// Passive force and its slope at a station and depth.
+    pub(super) fn passive(&self, i: usize, depth_mm: f64) -> (f64, f64) {
+        self.laws.law(i).passive_and_slope(depth_mm)
     }
 
     /// What a command does at a station; `start_mm` is a guess of the engaged depth.
@@ -204,19 +217,8 @@ impl Line {
             command_mm,
             start_mm,
             self.opening(i, &self.loads_at_zero(i)),
-            |t| self.opening(i, &self.loads(i, t)),
+            |t| self.opening_at(i, t),
         )
-    }
-
-    /// Copying factor at an engaged depth under a command.
-    pub(super) fn copying(&self, i: usize, command_mm: f64, depth_mm: f64) -> f64 {
-        copying_factor(command_mm, self.opening(i, &self.loads(i, depth_mm)))
-    }
-
-    /// Command for the wanted radius at a station, and the opening that it allows for.
-    pub(super) fn command(&self, i: usize, target_mm: f64, planned_mm: f64) -> (Option<f64>, Loads, Opening) {
-        let (loads, opening) = self.nominal(i, planned_mm - target_mm);
-        (command_radius_mm(target_mm, opening.y_mm, opening.z_mm), loads, opening)
     }
 
     /// Share of the radial opening that force makes, mm: all but stated errors.

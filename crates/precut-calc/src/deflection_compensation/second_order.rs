@@ -75,8 +75,7 @@ impl Sample {
         let mut sample =
             Self { z_mm: Vec::new(), target_mm: Vec::new(), passive_n: Vec::new(), main_n: Vec::new(), feed_n: Vec::new() };
         for i in (0..n).step_by(step).chain((n > 1 && (n - 1) % step != 0).then_some(n - 1)) {
-            let depth = stage.cut.nominal_depth_mm[i];
-            let loads = if depth > 0.0 { stage.line.all_loads(i, depth) } else { Default::default() };
+            let loads = &stage.cut.loads[i];
             sample.z_mm.push(grid.z_mm[i]);
             sample.target_mm.push(stage.radii.target[i]);
             sample.passive_n.push(loads.passive_n);

@@ -4,6 +4,7 @@ use crate::calculator::{Failure, Finding, Message, Monitor};
 
 use super::acting::Acting;
 use super::cut::CutLine;
+use super::equilibrium::copying_factor;
 use super::grid::{Grid, interpolate};
 use super::input::Job;
 use super::model::{Ingredients, Line, Radii, rest_shapes, wanted};
@@ -145,7 +146,8 @@ fn pass_outcome(
         .enumerate()
         .map(|(i, command)| {
             let depth = stage.radii.stock[i] - produced[i];
-            command.filter(|_| depth > 0.0).map(|command| stage.line.copying(i, command, depth))
+            let at = |command| copying_factor(command, stage.line.opening_at(i, depth));
+            command.filter(|_| depth > 0.0).map(at)
         })
         .collect();
     let copied_so_far = copying
