@@ -1,6 +1,9 @@
 //! What the tests of the beam share: reference cases translated to the kernel's terms.
 #![allow(dead_code, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+pub(crate) mod exact;
+pub(crate) mod random;
+
 use precut_calc::num::beam::{Beam, Contact, Material, Section, Segment, Side, Springs, State, Support, Theory};
 use serde_json::Value;
 

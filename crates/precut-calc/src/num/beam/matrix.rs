@@ -2,7 +2,7 @@
 
 /// A pivot below this share of the diagonal entry it came from is rounding: the redundant hangs on supports that are
 /// already rigid there, and does nothing.
-const VANISHING: f64 = 64.0 * f64::EPSILON;
+pub(super) const VANISHING: f64 = 64.0 * f64::EPSILON;
 
 /// A full symmetric matrix.
 #[derive(Debug, Clone, Default)]

@@ -2,7 +2,7 @@
 
 use super::contact::{Contacts, REGULARISATION};
 use super::form::{Raised, Span, sample};
-use super::matrix::Symmetric;
+use super::matrix::{Symmetric, VANISHING};
 use super::plane::Plane;
 use super::station::{Rows, Works};
 use super::{Beam, Steady};
@@ -131,8 +131,8 @@ impl Beam {
             if want.weight {
                 profile.sag_radial_mm.push(free * matrix.at(force, weight));
             }
-            for (slot, &row) in rests.iter().enumerate() {
-                reduction.note(&works, &rests, slot, row, free, want, &mut contacts);
+            for slot in 0..rests.len() {
+                reduction.note(&works, &self.radial, &rests, slot, free, want, &mut contacts);
             }
             if want.tangential || want.weight {
                 let free = f64::from(!self.tangential.holds_tool(&self.frame, k, station));
@@ -208,30 +208,36 @@ impl Reduction {
         self.matrix.eliminate(&self.redundants, &mut self.pivots);
     }
 
-    /// One rest at one station; a follow rest beside the shaft is written as one that nothing moves.
+    /// A rest that cannot act: beside the shaft, or at a place that is held rigidly already.
+    fn idle(&self, works: &Works<'_>, plane: &Plane, row: usize) -> bool {
+        let own = plane.fixed.iter().chain(&plane.follow).nth(row).copied().unwrap_or(0.0);
+        works.is_absent(row) || self.matrix.at(row, row) - own <= VANISHING * self.original[row]
+    }
+
+    /// One rest at one station; one that cannot act is written as one that nothing moves.
     #[allow(clippy::too_many_arguments)]
     fn note(
         &self,
         works: &Works<'_>,
+        plane: &Plane,
         rests: &[usize],
         slot: usize,
-        row: usize,
-        free: f64,
+        tool_free: f64,
         want: Wanted,
         into: &mut Contacts,
     ) {
-        let absent = |row: usize| works.is_absent(row);
-        let present = f64::from(!absent(row));
+        let row = rests[slot];
+        let acting = f64::from(!self.idle(works, plane, row));
         let matrix = &self.matrix;
-        into.influence.push(present * free * matrix.at(row, works.force_row()));
+        into.influence.push(acting * tool_free * matrix.at(row, works.force_row()));
         if want.couple {
-            into.couple_influence.push(present * matrix.at(row, works.couple_row()));
+            into.couple_influence.push(acting * matrix.at(row, works.couple_row()));
         }
         if want.weight {
-            into.rest_sag.push(present * matrix.at(row, works.weight_row()));
+            into.rest_sag.push(acting * matrix.at(row, works.weight_row()));
         }
         for (other_slot, &other) in rests.iter().enumerate() {
-            let both = present * f64::from(!absent(other));
+            let both = acting * f64::from(!self.idle(works, plane, other));
             let own = if slot == other_slot { REGULARISATION * self.original[row] } else { 0.0 };
             into.matrix.push(both * (matrix.at(row, other) + own));
         }
@@ -239,8 +245,7 @@ impl Reduction {
 }
 
 impl Contacts {
-    /// A rest with no compliance of its own and none of the work (on a rigid support, or beside the shaft) can do
-    /// nothing: a unit on the diagonal keeps the problem definite.
+    /// A rest that cannot act has an empty row: a unit on the diagonal keeps the problem definite.
     fn seal(&mut self, count: usize) {
         let square = count * count;
         for block in self.matrix.chunks_exact_mut(square) {
