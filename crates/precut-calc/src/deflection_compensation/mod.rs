@@ -172,7 +172,7 @@ fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
     let (mut stage, passes) = all_cuts(job, &grid, &acting, monitor)?;
     monitor.progress(0.6, Message::new("stage_path"));
     let cut = &mut stage.cut;
-    let programmed = toolpath::programmed(job, &grid, &cut.command_mm, &cut.status_compensated);
+    let programmed = toolpath::programmed(job, &grid, &cut.command_mm, &cut.status_compensated, monitor)?;
     let produced = cut.produced_mm(&stage.line, &stage.radii, &programmed.command_mm, monitor)?;
     monitor.progress(0.8, Message::new("stage_advice"));
     let outcome = Assembly { job, grid: &grid, acting: &acting, stage: &stage }.outcome(programmed.path, &produced, passes)?;

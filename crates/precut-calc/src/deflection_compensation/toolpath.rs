@@ -1,7 +1,7 @@
 //! The commanded path in straight moves, and the program that drives it.
 
-use crate::calculator::{Block, Failure, Finding, Program};
-use crate::path::{fewest_chords, round_half_away};
+use crate::calculator::{Block, Failure, Finding, Monitor, Program};
+use crate::path::{round_to_increment, simplified};
 
 use super::grid::{Grid, Zone};
 use super::input::{FeedDirection, Job, ProgramZero, Segment};
@@ -30,11 +30,18 @@ pub(super) fn chord_tolerance_um(job: &Job) -> f64 {
 }
 
 /// Cuts the exact commands into the fewest straight moves, zone by zone; never across a shoulder.
-pub(super) fn programmed(job: &Job, grid: &Grid, exact_mm: &[Option<f64>], status: &[StatusCompensated]) -> Programmed {
+pub(super) fn programmed(
+    job: &Job,
+    grid: &Grid,
+    exact_mm: &[Option<f64>],
+    status: &[StatusCompensated],
+    monitor: &dyn Monitor,
+) -> Result<Programmed, Failure> {
     let tolerance_um = chord_tolerance_um(job);
     let increment_mm = job.path.increment_um / UM_PER_MM;
     let mut command_mm: Vec<Option<f64>> = vec![None; grid.len()];
     let mut zones = Vec::new();
+    let mut achieved: Option<f64> = None;
     for zone in &grid.zones {
         let stations = zone.first..zone.end;
         let usable = status[stations.clone()]
@@ -43,22 +50,16 @@ pub(super) fn programmed(job: &Job, grid: &Grid, exact_mm: &[Option<f64>], statu
         let radii: Option<Vec<f64>> = exact_mm[stations.clone()].iter().copied().collect();
         let (true, Some(radii)) = (usable, radii) else { continue };
         let z_mm = &grid.z_mm[stations];
-        let vertices = fewest_chords(z_mm, &radii, tolerance_um / UM_PER_MM);
-        let diameters: Vec<f64> =
-            vertices.iter().map(|&v| round_half_away(2.0 * radii[v], increment_mm)).collect();
-        let corners: Vec<f64> = vertices.iter().map(|&v| z_mm[v]).collect();
-        let half: Vec<f64> = diameters.iter().map(|d| d / 2.0).collect();
+        let chords = simplified(z_mm, &radii, tolerance_um / UM_PER_MM, increment_mm, monitor)?;
+        let corners: Vec<f64> = chords.vertices.iter().map(|&v| z_mm[v]).collect();
+        let half: Vec<f64> = chords.diameters_mm.iter().map(|d| d / 2.0).collect();
+        achieved = Some(achieved.map_or(chords.deviation_mm, |most| most.max(chords.deviation_mm)));
         for (slot, r) in command_mm[zone.first..zone.end].iter_mut().zip(super::grid::interpolate(&corners, &half, z_mm)) {
             *slot = Some(r);
         }
-        zones.push(path_zone(zone, corners, diameters));
+        zones.push(path_zone(zone, corners, chords.diameters_mm));
     }
     let complete = command_mm.iter().all(Option::is_some);
-    let achieved = exact_mm
-        .iter()
-        .zip(&command_mm)
-        .filter_map(|(exact, command)| Some((exact.as_ref()? - command.as_ref()?).abs()))
-        .fold(None, |most: Option<f64>, d| Some(most.map_or(d, |m| m.max(d))));
     let moves = zones.iter().map(|z| z.z_mm.len().saturating_sub(1)).sum::<usize>();
     let path = Path {
         zones,
@@ -68,7 +69,7 @@ pub(super) fn programmed(job: &Job, grid: &Grid, exact_mm: &[Option<f64>], statu
         achieved_deviation_um: achieved.map(|d| d * UM_PER_MM),
         complete,
     };
-    Programmed { path, command_mm }
+    Ok(Programmed { path, command_mm })
 }
 
 fn path_zone(zone: &Zone, z_mm: Vec<f64>, commanded_diameter_mm: Vec<f64>) -> PathZone {
@@ -110,7 +111,7 @@ impl<'a> Writer<'a> {
             regime,
             length_mm: job.shaft.segments.iter().map(|s| s.length_mm).sum(),
             increment_mm,
-            retract_mm: round_half_away(widest + job.program.clearance_x_mm, increment_mm),
+            retract_mm: round_to_increment(widest + job.program.clearance_x_mm, increment_mm),
             blocks: vec![Block::Modes],
         }
     }
@@ -177,6 +178,6 @@ impl<'a> Writer<'a> {
             ProgramZero::RightFace => self.length_mm,
             ProgramZero::LeftFace => 0.0,
         };
-        round_half_away(z_mm - zero, self.increment_mm)
+        round_to_increment(z_mm - zero, self.increment_mm)
     }
 }
