@@ -177,8 +177,23 @@ impl Texts {
         self.try_finding(language, section, finding).unwrap_or_else(|error| plain(finding.code, &error))
     }
 
-    /// The sentence of a finding, or why there is none.
+    /// The sentence of a finding, or why there is none. Where a field's own code has no text that fits (a text about a
+    /// number, and something else came), the text of the general rule that is broken (`rule`) takes its place.
     pub fn try_finding(&self, language: Language, section: &str, finding: &Finding) -> Result<String, TextError> {
+        let own = self.finding_as(language, section, finding.code, finding);
+        match (own, finding.values.get("rule")) {
+            (Err(_), Some(Value::Text(rule))) => self.finding_as(language, section, rule, finding),
+            (own, _) => own,
+        }
+    }
+
+    fn finding_as(
+        &self,
+        language: Language,
+        section: &str,
+        code: &str,
+        finding: &Finding,
+    ) -> Result<String, TextError> {
         let mut context = context(&finding.values);
         context.insert("pointer", finding.pointer.as_str().into());
         context.insert("field", field(&finding.pointer).into());
@@ -191,7 +206,7 @@ impl Texts {
         if let Some(unit) = finding.unit {
             context.entry("unit").or_insert_with(|| unit.into());
         }
-        self.render(language, section, finding.code, context)
+        self.render(language, section, code, context)
     }
 
     /// Title and detail of a problem.

@@ -32,16 +32,13 @@ pub(crate) fn resolve(job: &mut Value, parts: &[TablePart], places: &[TablePlace
     for place in places {
         each_at(job, &place.path, String::new(), &mut |value, pointer| {
             let Some(text) = csv_text(value) else { return };
-            *value = match csv_table::read(&text, place, &pointer, faults) {
-                Some(read) => {
-                    tables.sources.push(CsvSource { pointer, lines: read.lines });
-                    read.rows.into()
-                }
-                None => {
-                    tables.unread.push(pointer);
-                    Value::Null
-                }
-            };
+            if let Some(read) = csv_table::read(&text, place, &pointer, faults) {
+                tables.sources.push(CsvSource { pointer, lines: read.lines });
+                *value = read.rows.into();
+            } else {
+                tables.unread.push(pointer);
+                *value = Value::Null;
+            }
         });
     }
     tables

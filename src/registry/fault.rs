@@ -53,13 +53,16 @@ pub(super) fn findings(error: &ValidationError<'_>, schema: &Value, prefix: &str
         Kind::OneOfNotValid { .. } | Kind::OneOfMultipleValid { .. } | Kind::AnyOf { .. } => {
             vec![coded("no_variant", &pointer, node).with("received", shown(received))]
         }
-        other => vec![coded("not_allowed", &pointer, node).with("rule", other.keyword().to_owned())],
+        other => vec![coded("not_allowed", &pointer, node).with("keyword", other.keyword().to_owned())],
     }
 }
 
-/// A finding under the field's own code, if its schema has one.
-fn coded(code: &'static str, pointer: &str, node: &Value) -> Finding {
-    Finding::new(own_code(node).unwrap_or(code), pointer)
+/// A finding under the field's own code, if its schema has one; `rule` then says which rule is broken.
+fn coded(rule: &'static str, pointer: &str, node: &Value) -> Finding {
+    match own_code(node) {
+        Some(code) => Finding::new(code, pointer).with("rule", rule),
+        None => Finding::new(rule, pointer),
+    }
 }
 
 fn own_code(node: &Value) -> Option<&'static str> {
@@ -93,11 +96,11 @@ fn union_of<'a>(schema: &'a Value, place: &str) -> Option<&'a Value> {
 }
 
 fn not_one_of(pointer: &str, received: &Value, options: &Value, union: Option<&Value>) -> Finding {
-    let code = match union {
-        Some(union) => own_code(union).unwrap_or("unknown_kind"),
-        None => "not_one_of",
+    let finding = match union {
+        Some(union) => coded("unknown_kind", pointer, union),
+        None => Finding::new("not_one_of", pointer),
     };
-    let finding = with_options(Finding::new(code, pointer).with("received", shown(received)), Some(options));
+    let finding = with_options(finding.with("received", shown(received)), Some(options));
     let words = options.as_array().into_iter().flatten().filter_map(Value::as_str);
     match received.as_str().and_then(|word| nearest(word, words)) {
         Some(nearest) => finding.with("nearest", nearest.to_owned()),

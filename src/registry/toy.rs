@@ -1,5 +1,7 @@
 //! A calculator with one of everything, for the tests of what surrounds calculators.
 
+#![allow(clippy::panic, clippy::cast_precision_loss)]
+
 use std::borrow::Cow;
 use std::time::{Duration, Instant};
 
@@ -234,7 +236,7 @@ impl Calculator for Toy {
         let mut deflections_um: Vec<f64> = (0..count).map(|i| input.length_mm / (i as f64 + 3.0)).collect();
         match input.mode {
             ToyMode::Plain => {}
-            ToyMode::Endless => work(Duration::from_secs(60), monitor)?,
+            ToyMode::Endless => work(Duration::from_mins(1), monitor)?,
             ToyMode::Slow => work(Duration::from_millis(100), monitor)?,
             ToyMode::Panic => panic!("the toy breaks"),
             ToyMode::NotFinite => deflections_um[0] = f64::NAN,
@@ -283,5 +285,5 @@ fn work(long: Duration, monitor: &dyn Monitor) -> Result<(), Failure> {
 #[allow(clippy::unwrap_used)]
 pub(crate) fn registry() -> Registry {
     use precut_calc::calculator::Registrar;
-    Registry::with(|offered| offered.calculator::<Toy>()).unwrap()
+    Registry::with(Registrar::calculator::<Toy>).unwrap()
 }
