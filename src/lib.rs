@@ -1,1 +1,3 @@
 //! Precut.
+
+pub mod render;
