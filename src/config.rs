@@ -86,6 +86,8 @@ pub struct Limits {
     pub job_ms: f64,
     /// Largest estimated memory of a job, bytes.
     pub job_bytes: u64,
+    /// How long a job may wait for a core, ms.
+    pub queue_ms: u64,
 }
 
 /// What is kept.
@@ -94,6 +96,10 @@ pub struct Limits {
 pub struct Cache {
     /// Results kept in memory, bytes.
     pub memory_bytes: u64,
+    /// Results kept in the database, bytes.
+    pub store_bytes: u64,
+    /// How long a result that nobody asks for is kept, days.
+    pub store_days: u32,
 }
 
 /// How the service stops.
