@@ -6,7 +6,10 @@
 
 pub mod calculator;
 pub mod effects;
+pub mod force;
+pub mod material;
 pub mod num;
+pub mod path;
 
 use calculator::Registrar;
 
