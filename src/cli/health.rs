@@ -13,9 +13,8 @@ const MOST_BYTES: u64 = 64 * 1024;
 /// `precut health`
 pub(super) fn ask(url: Option<String>) -> Result<(), Failed> {
     let url = url.unwrap_or_else(own_url);
-    let (authority, base) = parts(&url).ok_or_else(|| {
-        Failed::Machine(format!("{url} is no address such as http://127.0.0.1:8080"))
-    })?;
+    let (authority, base) =
+        parts(&url).ok_or_else(|| Failed::Machine(format!("{url} is no address such as http://127.0.0.1:8080")))?;
     let answer = get(authority, &format!("{base}/health/ready"))
         .map_err(|error| Failed::Machine(format!("{authority} does not answer: {error}")))?;
     let (head, body) = answer.split_once("\r\n\r\n").unwrap_or((&answer, ""));

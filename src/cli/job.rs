@@ -92,13 +92,11 @@ fn read(arguments: &JobArgs) -> Result<(String, Body), Failed> {
         std::fs::read(&arguments.file)
     };
     let bytes = bytes.map_err(|error| Failed::Machine(named(&arguments.file, &error)))?;
-    match &arguments.calculator {
-        Some(calculator) => Ok((calculator.clone(), Body::Json(bytes.into()))),
-        None => {
-            let (calculator, job) = job_file(bytes)?;
-            Ok((calculator, Body::Json(job)))
-        }
-    }
+    let (calculator, job) = match &arguments.calculator {
+        Some(calculator) => (calculator.clone(), bytes.into()),
+        None => job_file(bytes)?,
+    };
+    Ok((calculator, Body::Json(job)))
 }
 
 /// A job file.
@@ -218,7 +216,9 @@ mod tests {
 
     #[test]
     fn what_is_no_job_file_is_said_with_its_place() {
-        for text in ["", "{", "[]", "{\"job\":{}}", "{\"calculator\":\"x\"}", "{\"calculator\":\"x\",\"job\":{},\"jobs\":1}"] {
+        for text in
+            ["", "{", "[]", "{\"job\":{}}", "{\"calculator\":\"x\"}", "{\"calculator\":\"x\",\"job\":{},\"jobs\":1}"]
+        {
             let Err(Failed::Problem(problem)) = job_file(text.as_bytes().to_vec()) else { unreachable!("{text}") };
             assert_eq!(problem.code(), "bad_syntax", "{text}");
         }

@@ -5,6 +5,7 @@ mod job;
 mod serve;
 
 use std::ffi::OsString;
+use std::fmt::Write as _;
 use std::io::{self, Read, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -169,7 +170,8 @@ pub fn main(
             return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
         }
     };
-    let outcome = registry().map_err(|error| Failed::Machine(error.to_string())).and_then(|registry| run(cli, &registry));
+    let outcome =
+        registry().map_err(|error| Failed::Machine(error.to_string())).and_then(|registry| run(cli, &registry));
     match outcome {
         Ok(()) | Err(Failed::NobodyListens) => ExitCode::SUCCESS,
         Err(Failed::Machine(message)) => {
@@ -188,7 +190,7 @@ pub fn main(
 /// As the help says.
 fn exit_code(problem: &Problem) -> u8 {
     match (problem.status().as_u16(), problem.code()) {
-        (422, "invalid" | "too_expensive") => 2,
+        (422, "invalid_job" | "too_expensive") => 2,
         (422, _) => 3,
         (400..=499, _) => 2,
         _ => 1,
@@ -206,7 +208,9 @@ fn run(cli: Cli, registry: &Registry) -> Result<(), Failed> {
             let entry = entry(registry, &calculator)?;
             print_json(if result { entry.output_document() } else { entry.input_document() })
         }
-        Some(Command::Example { calculator, id, job }) => job::example(entry(registry, &calculator)?, id.as_deref(), job),
+        Some(Command::Example { calculator, id, job }) => {
+            job::example(entry(registry, &calculator)?, id.as_deref(), job)
+        }
         Some(Command::Openapi) => print(openapi::json(registry).as_bytes()),
         Some(Command::Health { url }) => health::ask(url),
         Some(Command::HashKey) => hash_key(),
@@ -215,11 +219,10 @@ fn run(cli: Cli, registry: &Registry) -> Result<(), Failed> {
 
 fn list(registry: &Registry) -> Result<(), Failed> {
     let width = registry.entries().iter().map(|entry| entry.meta().id.len()).max().unwrap_or(0);
-    let lines: String = registry
-        .entries()
-        .iter()
-        .map(|entry| format!("{:width$}  {}\n", entry.meta().id, entry.meta().question))
-        .collect();
+    let mut lines = String::new();
+    for meta in registry.entries().iter().map(|entry| entry.meta()) {
+        let _ = writeln!(lines, "{:width$}  {}", meta.id, meta.question);
+    }
     print(lines.as_bytes())
 }
 
@@ -228,7 +231,9 @@ fn hash_key() -> Result<(), Failed> {
     io::stdin().read_to_string(&mut key).map_err(|error| Failed::Machine(format!("standard input: {error}")))?;
     let key = key.trim();
     if key.len() < 16 {
-        return Err(Failed::Machine("a key has at least 16 characters; make one with `openssl rand -hex 32`".to_owned()));
+        return Err(Failed::Machine(
+            "a key has at least 16 characters; make one with `openssl rand -hex 32`".to_owned(),
+        ));
     }
     print(format!("{}\n", auth::hash(key)).as_bytes())
 }

@@ -32,8 +32,7 @@ pub(super) fn run(arguments: &ServeArgs, registry: Registry) -> Result<(), Faile
 }
 
 async fn serve(config: &Config, registry: Registry) -> Result<(), Failed> {
-    let engine =
-        Engine::open(registry, settings(config)).await.map_err(|error| Failed::Machine(error.to_string()))?;
+    let engine = Engine::open(registry, settings(config)).await.map_err(|error| Failed::Machine(error.to_string()))?;
     let listener = TcpListener::bind(config.listen)
         .await
         .map_err(|error| Failed::Machine(format!("cannot listen on {}: {error}", config.listen)))?;

@@ -168,7 +168,8 @@ fn rendered(stored: &Stored, view: &View) -> Result<Bytes, Problem> {
         Media::Svg => {
             let figures = stored.figures()?;
             let figure = figures.iter().find(|figure| wanted(figure.id));
-            let figure = figure.ok_or_else(|| absent("unknown_figure", view, figures.iter().map(|figure| figure.id)))?;
+            let figure =
+                figure.ok_or_else(|| absent("unknown_figure", view, figures.iter().map(|figure| figure.id)))?;
             drawn(figure, view.language)
         }
         Media::Gcode => {

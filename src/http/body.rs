@@ -141,7 +141,7 @@ async fn parts(mut request: Request, limit: usize) -> Result<Body, Problem> {
             tables.push(TablePart { name, text: bytes });
         }
     }
-    let job = job.ok_or_else(|| Problem::multipart("there is no part `job` with the job as JSON".to_owned()))?;
+    let job = job.ok_or_else(|| Problem::new(StatusCode::BAD_REQUEST, "missing_job_part"))?;
     Ok(Body::Parts { job, tables })
 }
 

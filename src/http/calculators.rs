@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use axum::extract::{Path, Request, State};
-use axum::http::header::{ACCEPT, IF_NONE_MATCH};
 use axum::http::HeaderMap;
+use axum::http::header::{ACCEPT, IF_NONE_MATCH};
 use axum::response::Response;
 use precut_calc::calculator::{CalculatorKind, Meta};
 use serde::Serialize;
@@ -177,9 +177,10 @@ pub(super) fn listed(registry: &Registry) -> CalculatorList {
 /// A calculator's description.
 pub(super) fn described(entry: &Entry, _language: Language) -> CalculatorDescription {
     let meta = entry.meta();
-    let jobs = meta.examples.iter().map(|example| {
-        (example.id.to_owned(), serde_json::from_str(example.job).expect("a test runs every example"))
-    });
+    let jobs = meta
+        .examples
+        .iter()
+        .map(|example| (example.id.to_owned(), serde_json::from_str(example.job).expect("a test runs every example")));
     CalculatorDescription {
         summary: summary(meta),
         references: meta.references,
@@ -206,15 +207,8 @@ fn summary(meta: &Meta) -> CalculatorSummary {
         title: meta.title,
         question: meta.question,
         summary: meta.summary,
-        examples: meta
-            .examples
-            .iter()
-            .map(|example| ExampleSummary { id: example.id, title: example.title })
-            .collect(),
-        links: CalculatorLinks {
-            this: format!("/v1/calculators/{}", meta.id),
-            solve: format!("/v1/{}", meta.id),
-        },
+        examples: meta.examples.iter().map(|example| ExampleSummary { id: example.id, title: example.title }).collect(),
+        links: CalculatorLinks { this: format!("/v1/calculators/{}", meta.id), solve: format!("/v1/{}", meta.id) },
     }
 }
 

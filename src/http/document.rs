@@ -9,7 +9,9 @@ use axum::http::{HeaderMap, HeaderValue, StatusCode};
 use axum::response::Response;
 use bytes::Bytes;
 
-use super::{App, calculators, negotiate, openapi};
+use precut_calc::material;
+
+use super::{App, calculators, materials, negotiate, openapi};
 use crate::registry::Registry;
 use crate::text::Language;
 
@@ -37,8 +39,7 @@ impl Document {
     /// The document, or `304` if the client has it.
     pub(super) fn respond(&self, request: &HeaderMap) -> Response {
         let is_known = negotiate::has_already(request, self.etag.to_str().unwrap_or_default());
-        let mut response =
-            Response::new(if is_known { Body::empty() } else { Body::from(self.bytes.clone()) });
+        let mut response = Response::new(if is_known { Body::empty() } else { Body::from(self.bytes.clone()) });
         if is_known {
             *response.status_mut() = StatusCode::NOT_MODIFIED;
         }
@@ -61,6 +62,8 @@ pub(super) struct Documents {
     openapi: Document,
     calculators: Vec<(Language, Document)>,
     calculator: BTreeMap<&'static str, Vec<(Language, Document)>>,
+    materials: Document,
+    material: BTreeMap<&'static str, Document>,
 }
 
 impl Documents {
@@ -79,6 +82,12 @@ impl Documents {
             openapi: Document::new(openapi::json(registry), "application/json", None),
             calculators,
             calculator,
+            // Names and sources of the library are in English.
+            materials: Document::json(&materials::listed(), Some(Language::En)),
+            material: material::library()
+                .iter()
+                .map(|material| (material.id, Document::json(material, Some(Language::En))))
+                .collect(),
         }
     }
 
@@ -88,6 +97,16 @@ impl Documents {
 
     pub(super) fn calculator(&self, id: &str, language: Language) -> Option<&Document> {
         in_language(self.calculator.get(id)?, language)
+    }
+}
+
+impl Documents {
+    pub(super) fn materials(&self) -> &Document {
+        &self.materials
+    }
+
+    pub(super) fn material(&self, id: &str) -> Option<&Document> {
+        self.material.get(id)
     }
 }
 

@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 use axum::body::{Body, HttpBody as _};
 use axum::extract::{Request, State};
 use axum::http::header::{
-    ACCEPT_ENCODING, CACHE_CONTROL, CONTENT_ENCODING, CONTENT_LANGUAGE, CONTENT_LENGTH, CONTENT_SECURITY_POLICY,
+    ACCEPT_ENCODING, ALLOW, CACHE_CONTROL, CONTENT_ENCODING, CONTENT_LANGUAGE, CONTENT_LENGTH, CONTENT_SECURITY_POLICY,
     CONTENT_TYPE, ETAG, REFERRER_POLICY, WWW_AUTHENTICATE, X_CONTENT_TYPE_OPTIONS,
 };
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode};
@@ -65,7 +65,7 @@ pub(super) async fn gate(State(app): State<App>, mut request: Request, next: Nex
             }),
             Err(problem) => problem.into_bare_response(),
         };
-        let response = compressed(worded(response, language, &id), encodings).await;
+        let response = compressed(worded(response, &method, language, &id), encodings).await;
         log(&response, start.elapsed());
         response
     }
@@ -81,8 +81,7 @@ fn admit(app: &App, request: &Request) -> Result<(), Problem> {
     if request.uri().path_and_query().is_some_and(|target| target.as_str().len() > MOST_TARGET_BYTES) {
         return Err(Problem::of_status(StatusCode::URI_TOO_LONG));
     }
-    let header_bytes: usize =
-        request.headers().iter().map(|(name, value)| name.as_str().len() + value.len() + 4).sum();
+    let header_bytes: usize = request.headers().iter().map(|(name, value)| name.as_str().len() + value.len() + 4).sum();
     if header_bytes > MOST_HEADER_BYTES {
         return Err(Problem::of_status(StatusCode::REQUEST_HEADER_FIELDS_TOO_LARGE));
     }
@@ -92,9 +91,8 @@ fn admit(app: &App, request: &Request) -> Result<(), Problem> {
         let owner = app.keys.owner(request.headers());
         if let Some(rate) = &app.rate {
             let client = owner.map_or_else(|| Client::of(request), Client::Key);
-            rate.take(client, Instant::now()).map_err(|wait| {
-                Problem::new(StatusCode::TOO_MANY_REQUESTS, "rate_limited").retry_after(wait)
-            })?;
+            rate.take(client, Instant::now())
+                .map_err(|wait| Problem::new(StatusCode::TOO_MANY_REQUESTS, "too_many_requests").retry_after(wait))?;
         }
         if app.keys.required() && owner.is_none() {
             return Err(Problem::new(StatusCode::UNAUTHORIZED, "unauthorized")
@@ -106,9 +104,7 @@ fn admit(app: &App, request: &Request) -> Result<(), Problem> {
         return Err(Problem::shutting_down());
     }
     if !is_probe && app.in_flight.load(Ordering::Relaxed) > app.limits.concurrent_requests {
-        return Err(
-            Problem::new(StatusCode::SERVICE_UNAVAILABLE, "overloaded").retry_after(Duration::from_secs(1))
-        );
+        return Err(Problem::new(StatusCode::SERVICE_UNAVAILABLE, "overloaded").retry_after(Duration::from_secs(1)));
     }
     Ok(())
 }
@@ -176,11 +172,15 @@ fn request_id(headers: &HeaderMap) -> HeaderValue {
 }
 
 /// Puts a problem into words, the framework's own errors included.
-fn worded(mut response: Response, language: Language, id: &HeaderValue) -> Response {
+fn worded(mut response: Response, method: &Method, language: Language, id: &HeaderValue) -> Response {
     let status = response.status();
     let problem = response.extensions_mut().remove::<Problem>();
     let problem = match problem {
         Some(problem) => problem,
+        None if status == StatusCode::METHOD_NOT_ALLOWED => {
+            let allowed = response.headers().get(ALLOW).and_then(|allowed| allowed.to_str().ok());
+            Problem::method(method.as_str(), allowed.unwrap_or_default())
+        }
         None if status.is_client_error() || status.is_server_error() => Problem::of_status(status),
         None => return response,
     };

@@ -16,7 +16,8 @@ use super::gate::method_label;
 use crate::registry::Registry;
 
 /// Upper edges of the latency classes, s: from an answer out of memory to the largest job.
-const LATENCY_S: [f64; 14] = [0.000_1, 0.000_25, 0.000_5, 0.001, 0.002_5, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 1.0, 2.5, 10.0];
+const LATENCY_S: [f64; 14] =
+    [0.000_1, 0.000_25, 0.000_5, 0.001, 0.002_5, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 1.0, 2.5, 10.0];
 
 /// Addresses with a variable part, as they are counted.
 const PATTERNS: [(&str, &str); 6] = [
@@ -120,8 +121,7 @@ pub(super) struct CacheCounters {
 
 impl CacheCounters {
     pub(super) fn new(calculator: &'static str) -> Self {
-        let counter =
-            |result| metrics::counter!("precut_answers_total", "calculator" => calculator, "cache" => result);
+        let counter = |result| metrics::counter!("precut_answers_total", "calculator" => calculator, "cache" => result);
         // Registered only once the recorder is there: see `Metrics::new`.
         Self { hit: counter("hit"), miss: counter("miss") }
     }

@@ -8,6 +8,7 @@ mod codes;
 mod document;
 mod gate;
 mod health;
+mod materials;
 mod metrics;
 mod negotiate;
 pub mod openapi;
@@ -70,7 +71,7 @@ impl App {
     pub fn new(engine: Engine, config: &Config) -> Self {
         // The recorder of metrics comes first: counters made before it count nothing.
         let metrics = metrics::Metrics::new(engine.registry());
-        let rooms: Vec<_> = engine.registry().entries().iter().map(|entry| calculators::Room::new(entry)).collect();
+        let rooms: Vec<_> = engine.registry().entries().iter().map(calculators::Room::new).collect();
         let documents = document::Documents::new(engine.registry());
         Self(Arc::new(Shared {
             limits: config.limits.clone(),
@@ -104,7 +105,7 @@ struct Peer {
 }
 
 /// Every route behind the gate.
-pub fn router(app: App) -> Router {
+pub fn router(app: &App) -> Router {
     let mut router = Router::new()
         .route("/", get(pages::landing))
         .route("/docs", get(pages::docs))
@@ -118,6 +119,8 @@ pub fn router(app: App) -> Router {
         .route("/v1/calculators/{id}", get(calculators::describe))
         .route("/v1/results", get(results::list))
         .route("/v1/results/{key}", get(results::read))
+        .route("/v1/materials", get(materials::list))
+        .route("/v1/materials/{id}", get(materials::read))
         .route("/v1/{calculator}", any(unknown_calculator));
     for room in &app.rooms {
         let handler = {
@@ -137,13 +140,10 @@ pub fn router(app: App) -> Router {
 }
 
 async fn not_found(uri: Uri) -> Problem {
-    Problem::missing("not_found", uri.path())
+    Problem::not_found(uri.path())
 }
 
-async fn unknown_calculator(
-    axum::extract::State(app): axum::extract::State<App>,
-    Path(name): Path<String>,
-) -> Problem {
+async fn unknown_calculator(axum::extract::State(app): axum::extract::State<App>, Path(name): Path<String>) -> Problem {
     Error::unknown(app.engine.registry(), &name).into()
 }
 
@@ -160,14 +160,13 @@ fn cors(origins: &[String]) -> Option<CorsLayer> {
     };
     let request_headers =
         [header::ACCEPT_LANGUAGE, header::AUTHORIZATION, header::CONTENT_TYPE, header::IF_NONE_MATCH, gate::REQUEST_ID];
-    let exposed =
-        [header::CONTENT_LOCATION, header::ETAG, header::RETRY_AFTER, CACHE_STATE, gate::REQUEST_ID];
+    let exposed = [header::CONTENT_LOCATION, header::ETAG, header::RETRY_AFTER, CACHE_STATE, gate::REQUEST_ID];
     Some(
         CorsLayer::new()
             .allow_origin(allowed)
             .allow_methods([Method::GET, Method::HEAD, Method::POST])
             .allow_headers(request_headers)
             .expose_headers(exposed)
-            .max_age(std::time::Duration::from_secs(3600)),
+            .max_age(std::time::Duration::from_hours(1)),
     )
 }

@@ -91,7 +91,7 @@ pub(super) fn has_already(headers: &HeaderMap, etag: &str) -> bool {
 }
 
 /// All lines of a header as one list; bytes that are no text make a line empty.
-fn joined<'h>(headers: &'h HeaderMap, name: impl AsHeaderName + Into<HeaderName>) -> Cow<'h, str> {
+fn joined(headers: &HeaderMap, name: impl AsHeaderName + Into<HeaderName>) -> Cow<'_, str> {
     let mut lines = headers.get_all(name).iter().map(|line| line.to_str().unwrap_or_default().trim());
     let first = lines.next().unwrap_or_default();
     lines.fold(Cow::Borrowed(first), |all, line| Cow::Owned(format!("{all},{line}")))

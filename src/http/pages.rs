@@ -1,5 +1,7 @@
 //! Pages for people: what to try, the interactive contract, what a problem means. All of them in the binary.
 
+use std::fmt::Write as _;
+
 use axum::extract::{Path, State};
 use axum::http::header::CONTENT_SECURITY_POLICY;
 use axum::http::{HeaderMap, HeaderValue};
@@ -92,17 +94,16 @@ pub(super) async fn landing(State(app): State<App>, headers: HeaderMap) -> Respo
         };
         return Document::json(&landing, Some(Language::En)).respond(&headers);
     }
-    let list: String = rooms
-        .iter()
-        .map(|meta| {
-            format!(
-                "<li><a href=\"/v1/calculators/{id}\">{question}</a><br><small>{title} — <code>POST /v1/{id}</code></small></li>",
-                id = meta.id,
-                question = escaped(meta.question),
-                title = escaped(meta.title),
-            )
-        })
-        .collect();
+    let mut list = String::new();
+    for meta in &rooms {
+        let (question, title) = (escaped(meta.question), escaped(meta.title));
+        let _ = write!(
+            list,
+            "<li><a href=\"/v1/calculators/{id}\">{question}</a><br>\
+             <small>{title} — <code>POST /v1/{id}</code></small></li>",
+            id = meta.id,
+        );
+    }
     let example = rooms.first().map_or(String::new(), |meta| {
         format!(
             "<h2>Try it</h2><pre>precut example {id} | precut solve -\n\
@@ -132,7 +133,7 @@ pub(super) async fn docs_file(Path(file): Path<String>, headers: HeaderMap) -> R
     let document = match file.as_str() {
         "rapidoc-min.js" => Document::new(RAPIDOC, "text/javascript; charset=utf-8", None),
         "page.css" => Document::new(DOCS_STYLE, "text/css; charset=utf-8", None),
-        _ => return Err(Problem::missing("not_found", &format!("/docs/{file}"))),
+        _ => return Err(Problem::not_found(&format!("/docs/{file}"))),
     };
     Ok(document.respond(&headers))
 }
@@ -162,13 +163,13 @@ pub(super) async fn problem(
 fn explain(app: &App, code: &str, language: Language) -> Option<ProblemPage> {
     let texts = Texts::shared();
     let none = Values::new();
-    let text = |code: &str, part: &str| texts.word(language, "problem", &format!("{code}.{part}"), &none);
+    let help = |code: &str| texts.word(language, "help", code, &none);
     if let Some(status) = codes::status(code) {
         return Some(ProblemPage {
             code: code.to_owned(),
-            title: text(code, "title"),
+            title: texts.problem(language, code, &none).0,
             status,
-            help: text(code, "help"),
+            help: help(code),
         });
     }
     let owner = app.engine.registry().entries().iter().find(|entry| entry.meta().codes.contains(&code))?;
@@ -176,7 +177,7 @@ fn explain(app: &App, code: &str, language: Language) -> Option<ProblemPage> {
         code: code.to_owned(),
         title: code.replace('_', " "),
         status: 422,
-        help: format!("{}: {}", owner.meta().title, text("infeasible", "help")),
+        help: format!("{}: {}", owner.meta().title, help("infeasible")),
     })
 }
 

@@ -39,10 +39,10 @@ struct Inner {
 pub struct ProblemDocument {
     /// Address of a page that explains the problem: `/problems/{code}`.
     #[serde(rename = "type")]
-    #[schema(example = "/problems/invalid")]
+    #[schema(example = "/problems/invalid_job")]
     pub kind: String,
     /// Stable name of the problem; never changes its meaning.
-    #[schema(example = "invalid", pattern = "^[a-z][a-z0-9_]*$")]
+    #[schema(example = "invalid_job", pattern = "^[a-z][a-z0-9_]*$")]
     pub code: &'static str,
     /// What is wrong, the same for every occurrence.
     #[schema(example = "The job breaks rules")]
@@ -120,7 +120,7 @@ impl Problem {
     /// The same with the time after which it is worth coming again.
     pub(super) fn retry_after(self, wait: Duration) -> Self {
         let whole_s = wait.as_secs() + u64::from(wait.subsec_nanos() > 0);
-        self.header(RETRY_AFTER, HeaderValue::from(whole_s.max(1)))
+        self.with("retry_after_s", wait.as_secs_f64()).header(RETRY_AFTER, HeaderValue::from(whole_s.max(1)))
     }
 
     fn findings(mut self, findings: Vec<Finding>, total: usize) -> Self {
@@ -143,11 +143,11 @@ impl Problem {
     }
 
     pub(super) fn too_large(limit_bytes: usize) -> Self {
-        Self::new(StatusCode::PAYLOAD_TOO_LARGE, "payload_too_large").with("limit_bytes", limit_bytes)
+        Self::new(StatusCode::PAYLOAD_TOO_LARGE, "body_too_large").with("limit_bytes", limit_bytes)
     }
 
     pub(super) fn too_slow(time: Duration) -> Self {
-        Self::new(StatusCode::REQUEST_TIMEOUT, "request_timeout").with("time_s", time.as_secs_f64())
+        Self::new(StatusCode::REQUEST_TIMEOUT, "timeout").with("limit_s", time.as_secs_f64())
     }
 
     pub(super) fn cut_off() -> Self {
@@ -155,10 +155,10 @@ impl Problem {
     }
 
     pub(super) fn media_type(received: &str, takes_tables: bool) -> Self {
-        let accepted = if takes_tables { "application/json, multipart/form-data" } else { "application/json" };
+        let expected = if takes_tables { "application/json or multipart/form-data" } else { "application/json" };
         Self::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, "unsupported_media_type")
             .with("received", received.to_owned())
-            .with("accepted", accepted)
+            .with("expected", expected)
     }
 
     pub(super) fn multipart(reason: String) -> Self {
@@ -167,6 +167,16 @@ impl Problem {
 
     pub(super) fn query(reason: String) -> Self {
         Self::new(StatusCode::BAD_REQUEST, "bad_query").with("reason", reason)
+    }
+
+    pub(super) fn not_found(path: &str) -> Self {
+        Self::new(StatusCode::NOT_FOUND, "not_found").with("path", path.to_owned())
+    }
+
+    pub(super) fn method(method: &str, allowed: &str) -> Self {
+        Self::new(StatusCode::METHOD_NOT_ALLOWED, "method_not_allowed")
+            .with("method", method.to_owned())
+            .with("allowed", allowed.to_owned())
     }
 
     pub(super) fn missing(code: &'static str, name: &str) -> Self {
@@ -236,7 +246,11 @@ impl From<Error> for Problem {
                 #[allow(clippy::cast_precision_loss)] // lines and columns of a body of some megabytes
                 let (line, column) = (fault.line as f64, fault.column as f64);
                 let place = |values: Values| {
-                    values.with("line", line).with("column", column).with("message", fault.message.clone())
+                    values
+                        .with("line", line)
+                        .with("column", column)
+                        .with("reason", fault.message.clone())
+                        .with("pointer", fault.pointer.clone())
                 };
                 let mut finding = Finding::new(fault.code, fault.pointer.clone());
                 finding.values = place(Values::new());
@@ -244,8 +258,9 @@ impl From<Error> for Problem {
                 problem.0.values = place(Values::new());
                 problem
             }
-            Error::Invalid { findings, total } => Self::new(StatusCode::UNPROCESSABLE_ENTITY, "invalid")
-                .with("total", total)
+            Error::Invalid { findings, total } => Self::new(StatusCode::UNPROCESSABLE_ENTITY, "invalid_job")
+                .with("errors_total", total)
+                .with("listed", findings.len())
                 .findings(findings, total),
             Error::UnknownCalculator { name, nearest } => {
                 let problem = Self::missing("unknown_calculator", &name);
@@ -256,28 +271,26 @@ impl From<Error> for Problem {
             }
             Error::TooExpensive { cost, limit, limit_bytes } => {
                 #[allow(clippy::cast_precision_loss)] // printed with three digits
-                let (cost_mib, limit_mib) = (cost.bytes as f64 / 1048576.0, limit_bytes as f64 / 1048576.0);
+                let (estimate_mb, limit_mb) = (cost.bytes as f64 / 1e6, limit_bytes as f64 / 1e6);
                 let limit_ms = limit.as_secs_f64() * 1e3;
                 let finding = Finding::new("too_expensive", cost.driver).measured(cost.ms, limit_ms, "ms");
                 Self::new(StatusCode::UNPROCESSABLE_ENTITY, "too_expensive")
-                    .with("cost_ms", cost.ms)
+                    .with("estimate_ms", cost.ms)
                     .with("limit_ms", limit_ms)
-                    .with("cost_mib", cost_mib)
-                    .with("limit_mib", limit_mib)
-                    .with("driver", cost.driver)
+                    .with("estimate_mb", estimate_mb)
+                    .with("limit_mb", limit_mb)
+                    .with("pointer", cost.driver)
                     .findings(vec![finding], 1)
             }
-            Error::Busy { retry_after } => {
-                Self::new(StatusCode::SERVICE_UNAVAILABLE, "busy").retry_after(retry_after)
-            }
+            Error::Busy { retry_after } => Self::new(StatusCode::SERVICE_UNAVAILABLE, "busy").retry_after(retry_after),
             Error::Calculation(failure) => failure.into(),
             Error::Store(StoreError::Outdated(reason)) => {
                 tracing::debug!(reason, "a result of another version was asked for");
-                Self::new(StatusCode::GONE, "result_outdated")
+                Self::new(StatusCode::GONE, "outdated_result")
             }
             Error::Store(StoreError::Failed(cause)) => {
                 tracing::error!(cause, "the store failed");
-                Self::new(StatusCode::SERVICE_UNAVAILABLE, "store_unavailable").retry_after(Duration::from_secs(1))
+                Self::new(StatusCode::SERVICE_UNAVAILABLE, "store_failed").retry_after(Duration::from_secs(1))
             }
             // A direct answer is cancelled only when nobody waits for it, or at the end of a shutdown.
             Error::Cancelled | Error::ShuttingDown => Self::shutting_down(),

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use axum::extract::{Path, Query, State};
 use axum::http::header::{CACHE_CONTROL, HeaderValue};
-use axum::http::{HeaderMap, Uri};
+use axum::http::{HeaderMap, StatusCode, Uri};
 use axum::response::{IntoResponse, Json, Response};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -102,8 +102,8 @@ pub(super) async fn read(
     uri: Uri,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let absent = || Problem::missing("unknown_result", &name);
-    let key = Key::from_str(&name).map_err(|_| absent())?;
+    let key = Key::from_str(&name).map_err(|_| Problem::new(StatusCode::BAD_REQUEST, "bad_key"))?;
+    let absent = || Problem::new(StatusCode::NOT_FOUND, "unknown_result").with("key", name.clone());
     let stored: Arc<Stored> = app.engine.result(&key).await?.ok_or_else(absent)?;
     let meta = stored.entry().meta();
     let view = View::of(&uri, &headers, meta, &answer::offered(meta))?;

@@ -31,7 +31,7 @@ const UPKEEP: Duration = Duration::from_secs(5);
 /// Serves until `stop` says so, then lets requests in work finish for `grace`. Until they have, newcomers are
 /// answered, too: that the service is shutting down.
 pub async fn serve(listener: TcpListener, app: App, mut stop: watch::Receiver<bool>, grace: Duration) {
-    let router = super::router(app.clone());
+    let router = super::router(&app);
     let places = Arc::new(Semaphore::new(app.limits.connections));
     let header_timeout = seconds(app.limits.header_timeout_s);
     // Closed when the last connection has dropped its end.

@@ -1,12 +1,13 @@
 //! The operations that do not depend on which calculators there are.
 
+use precut_calc::material;
 use serde_json::json;
 use utoipa::openapi::path::{HttpMethod, OperationBuilder, ParameterIn, PathItem};
 use utoipa::openapi::{Content, RefOr, Schema};
 
 use super::parts;
 use crate::http::negotiate::Media;
-use crate::http::{calculators, codes, health, pages, results};
+use crate::http::{calculators, codes, health, materials, pages, results};
 use crate::registry::Registry;
 
 /// Address and operations, in the order of the document.
@@ -17,6 +18,8 @@ pub(super) fn paths(registry: &Registry) -> Vec<(&'static str, PathItem)> {
         ("/v1/calculators/{id}", get(describe_calculator(registry))),
         ("/v1/results", get(list_results(registry))),
         ("/v1/results/{key}", get(read_result())),
+        ("/v1/materials", get(list_materials())),
+        ("/v1/materials/{id}", get(read_material())),
         ("/", get(landing())),
         ("/docs", get(docs())),
         ("/openapi.json", get(openapi())),
@@ -33,6 +36,7 @@ pub(super) fn schemas() -> Vec<(String, RefOr<Schema>)> {
         super::schemas_of::<calculators::CalculatorList>(),
         super::schemas_of::<calculators::CalculatorDescription>(),
         super::schemas_of::<results::ResultList>(),
+        super::schemas_of::<materials::MaterialList>(),
         super::schemas_of::<pages::Landing>(),
         super::schemas_of::<pages::ProblemPage>(),
         super::schemas_of::<health::Health>(),
@@ -84,7 +88,11 @@ fn list_results(registry: &Registry) -> OperationBuilder {
         "Which answers are kept?",
         "The kept answers, newest first, by pages: follow `next` until it is null.",
     )
-    .parameter(query("limit", "Most results of one page.", parts::integer(1, results::MOST_ITEMS, results::DEFAULT_ITEMS)))
+    .parameter(query(
+        "limit",
+        "Most results of one page.",
+        parts::integer(1, results::MOST_ITEMS, results::DEFAULT_ITEMS),
+    ))
     .parameter(query("calculator", "Only those of this calculator.", calculator))
     .parameter(query("after", "Where the page before ended: taken from its `next`.", cursor()))
     .response("200", json_of("ResultList", "A page of results."));
@@ -101,9 +109,10 @@ fn read_result() -> OperationBuilder {
     let mut response = parts::tagged(parts::success(
         "The answer, as its calculator gave it.",
         Media::Json.essence(),
-        Content::new(Some(utoipa::openapi::schema::ObjectBuilder::new().description(Some(
-            "The answer: `calculator` says which one made it, and by which schema.",
-        )))),
+        Content::new(Some(
+            utoipa::openapi::schema::ObjectBuilder::new()
+                .description(Some("The answer: `calculator` says which one made it, and by which schema.")),
+        )),
     ))
     .header("Content-Language", parts::text_header("Language of the sentences.", "en"))
     .header("Precut-Cache", parts::text_header("Always `hit`: nothing is computed.", "hit"));
@@ -126,11 +135,40 @@ fn read_result() -> OperationBuilder {
     parts::guarded(parts::conditional(operation), &[400, 404, 406, 410, 422])
 }
 
+fn list_materials() -> OperationBuilder {
+    let operation = operation(
+        "library",
+        "list_materials",
+        "Which materials are known?",
+        "Elastic constants, strength and force laws of work materials; every number with its source and how certain it is.",
+    )
+    .response("200", parts::tagged(json_of("MaterialList", "The materials.")));
+    parts::guarded(parts::conditional(operation), &[])
+}
+
+fn read_material() -> OperationBuilder {
+    let ids = material::library().iter().map(|material| material.id.to_owned());
+    let first = material::library().first().map_or("", |material| material.id);
+    let operation = operation(
+        "library",
+        "read_material",
+        "What is known of a material?",
+        "The numbers that a job gets when it names the material.",
+    )
+    .parameter(parts::path_parameter("id", "Name of the material.", parts::one_of(ids), json!(first)))
+    .response("200", parts::tagged(json_of("Material", "The material.")));
+    parts::guarded(parts::conditional(operation), &[404])
+}
+
 fn landing() -> OperationBuilder {
     let response = json_of("Landing", "Where to go.").content("text/html", parts::text_of("The same as a page."));
-    let operation =
-        operation("service", "landing", "What is this?", "Where to go from here, as JSON or as a page (`Accept: text/html`).")
-            .response("200", parts::tagged(response));
+    let operation = operation(
+        "service",
+        "landing",
+        "What is this?",
+        "Where to go from here, as JSON or as a page (`Accept: text/html`).",
+    )
+    .response("200", parts::tagged(response));
     parts::open(parts::conditional(operation), &[])
 }
 
@@ -159,7 +197,7 @@ fn problem() -> OperationBuilder {
         "What does that problem mean?",
         "What a problem means and what to do. Codes by which a calculator says that a job has no answer are known, too.",
     )
-    .parameter(parts::path_parameter("code", "Code of the problem.", known, json!("invalid")))
+    .parameter(parts::path_parameter("code", "Code of the problem.", known, json!("invalid_job")))
     .response("200", parts::tagged(response));
     parts::open(parts::conditional(operation), &[404])
 }

@@ -95,7 +95,11 @@ const PROBLEMS: [(u16, &str, &str); 17] = [
     (413, "PayloadTooLarge", "The body is larger than the limit in `detail`."),
     (414, "UriTooLong", "The address is longer than 8 KiB."),
     (415, "UnsupportedMediaType", "The body is of another type than those in `detail`."),
-    (422, "Unprocessable", "The job breaks rules (every fault is in `errors`), is too expensive, or has no answer: infeasible, outside the model, not converged. Then `code` says why and `detail` what would make it possible."),
+    (
+        422,
+        "Unprocessable",
+        "The job breaks rules (every fault is in `errors`), is too expensive, or has no answer: infeasible, outside the model, not converged. Then `code` says why and `detail` what would make it possible.",
+    ),
     (429, "TooManyRequests", "The client asks more often than its rate allows."),
     (431, "HeaderTooLarge", "The header is larger than 32 KiB."),
     (500, "InternalError", "The service's own fault; its log knows the request id."),
@@ -127,7 +131,8 @@ pub(super) fn responses() -> Vec<(String, Response)> {
                 response = response.header("Retry-After", retry_after());
             }
             if status == 401 {
-                response = response.header("WWW-Authenticate", text_header("How to send a key.", "Bearer realm=\"precut\""));
+                response =
+                    response.header("WWW-Authenticate", text_header("How to send a key.", "Bearer realm=\"precut\""));
             }
             if status == 405 {
                 response = response.header("Allow", text_header("Methods of the address.", "GET,HEAD"));
@@ -140,16 +145,16 @@ pub(super) fn responses() -> Vec<(String, Response)> {
 fn example(status: u16) -> Option<Value> {
     (status == 422).then(|| {
         json!({
-            "type": "/problems/invalid",
-            "code": "invalid",
+            "type": "/problems/invalid_job",
+            "code": "invalid_job",
             "title": "The job breaks rules",
             "status": 422,
-            "detail": "1 fault in the job",
+            "detail": "one field is at fault; see errors",
             "instance": "019a1f0e-5d3c-7c39-9d5c-0a4d7c1f2b6e",
             "errors": [{
                 "pointer": "/cut/feed_mm_per_rev",
-                "code": "above_maximum",
-                "detail": "feed 9 mm/rev is above 5 mm/rev",
+                "code": "out_of_range",
+                "detail": "feed_mm_per_rev is 9 mm/rev; allowed is 0.01 to 5 mm/rev",
                 "value": 9.0,
                 "limit": 5.0,
                 "unit": "mm/rev"
@@ -189,12 +194,21 @@ fn with_request_id(operation: OperationBuilder) -> OperationBuilder {
 /// Parameters of everything that is worded and can be asked for again.
 pub(super) fn conditional(operation: OperationBuilder) -> OperationBuilder {
     operation
-        .parameter(header_parameter("Accept-Language", "Languages of sentences by preference; English where none fits."))
-        .parameter(header_parameter("If-None-Match", "Entity tags that the client has: `304` if the answer is among them."))
-        .response("304", ResponseBuilder::new()
-            .description("The client has the answer already.")
-            .header("ETag", etag())
-            .header("x-request-id", request_id()))
+        .parameter(header_parameter(
+            "Accept-Language",
+            "Languages of sentences by preference; English where none fits.",
+        ))
+        .parameter(header_parameter(
+            "If-None-Match",
+            "Entity tags that the client has: `304` if the answer is among them.",
+        ))
+        .response(
+            "304",
+            ResponseBuilder::new()
+                .description("The client has the answer already.")
+                .header("ETag", etag())
+                .header("x-request-id", request_id()),
+        )
 }
 
 fn header_parameter(name: &str, text: &str) -> Parameter {
@@ -272,7 +286,10 @@ pub(super) fn tagged(response: ResponseBuilder) -> ResponseBuilder {
 }
 
 pub(super) fn etag() -> Header {
-    text_header("Tag of exactly these bytes: one per content, media type and language.", "\"5d41402abc4b2a76-json--en\"")
+    text_header(
+        "Tag of exactly these bytes: one per content, media type and language.",
+        "\"5d41402abc4b2a76-json--en\"",
+    )
 }
 
 pub(super) fn request_id() -> Header {

@@ -1,5 +1,8 @@
 //! A calculator's operation, from its declaration.
 
+use precut_calc::calculator::{CalculatorKind, Meta};
+use std::fmt::Write as _;
+
 use serde_json::{Value, json};
 use utoipa::openapi::content::ContentBuilder;
 use utoipa::openapi::encoding::Encoding;
@@ -9,7 +12,6 @@ use utoipa::openapi::request_body::{RequestBody, RequestBodyBuilder};
 use utoipa::openapi::response::ResponseBuilder;
 use utoipa::openapi::schema::{AdditionalProperties, ArrayBuilder, ObjectBuilder, SchemaType, Type};
 use utoipa::openapi::{Content, Object, Ref, RefOr, Required, Schema};
-use precut_calc::calculator::{CalculatorKind, Meta};
 
 use super::parts;
 use crate::http::answer::offered;
@@ -50,7 +52,7 @@ fn description(meta: &Meta) -> String {
     if !meta.references.is_empty() {
         text.push_str("\n\nSources:\n");
         for reference in meta.references {
-            text.push_str(&format!("- {reference}\n"));
+            let _ = writeln!(text, "- {reference}");
         }
     }
     text
@@ -74,7 +76,8 @@ fn parameters(mut operation: OperationBuilder, meta: &Meta) -> OperationBuilder 
     }
     if !meta.figures.is_empty() {
         let text = "Which figure, with `Accept: image/svg+xml`; the first if absent.";
-        operation = operation.parameter(parts::parameter("figure", ParameterIn::Query, text, ids(meta.figures)).build());
+        operation =
+            operation.parameter(parts::parameter("figure", ParameterIn::Query, text, ids(meta.figures)).build());
     }
     operation
 }
@@ -102,9 +105,9 @@ fn multipart(entry: &Entry, job: &str) -> Content {
         .required("job")
         .additional_properties(Some(AdditionalProperties::FreeForm(false)));
     for table in Vec::<String>::new() {
-        let schema = ObjectBuilder::new()
-            .schema_type(SchemaType::new(Type::String))
-            .description(Some("The table as CSV in place of the field of the same name: header `name [unit]` or `name_unit`."));
+        let schema = ObjectBuilder::new().schema_type(SchemaType::new(Type::String)).description(Some(
+            "The table as CSV in place of the field of the same name: header `name [unit]` or `name_unit`.",
+        ));
         form = form.property(table, schema);
     }
     let mut encoding = Encoding::default();
@@ -141,9 +144,7 @@ fn envelope(meta: &Meta, result: &str) -> Object {
     let text = |text: &str| ObjectBuilder::new().schema_type(SchemaType::new(Type::String)).description(Some(text));
     let list = |of: &str, text: &str| ArrayBuilder::new().items(Ref::from_schema_name(of)).description(Some(text));
     let anything = |text: &str| {
-        ObjectBuilder::new()
-            .additional_properties(Some(AdditionalProperties::FreeForm(true)))
-            .description(Some(text))
+        ObjectBuilder::new().additional_properties(Some(AdditionalProperties::FreeForm(true))).description(Some(text))
     };
     let model = anything("The stored model that was asked for: name, revision, sha256; null if none.")
         .schema_type(SchemaType::from_iter([Type::Object, Type::Null]));
@@ -167,7 +168,10 @@ fn envelope(meta: &Meta, result: &str) -> Object {
         .property("model", model)
         .property("effects", effects)
         .property("result", Ref::from_schema_name(result))
-        .property("explanation", list("Explanation", "What dominates, what binds, what would help: most important first."))
+        .property(
+            "explanation",
+            list("Explanation", "What dominates, what binds, what would help: most important first."),
+        )
         .property("warnings", list("Warning", "Where an input leaves a formula's range of validity, and the like."))
         .property("basis", list("Basis", "The equations that acted, with their sources."))
         .required("calculator")
