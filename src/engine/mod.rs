@@ -227,3 +227,6 @@ pub fn check_now(registry: &Registry, calculator: &str, _body: Body) -> Result<C
 pub fn solve_now(registry: &Registry, calculator: &str, _body: Body, _monitor: &dyn Monitor) -> Result<Stored, Error> {
     Err(Error::unknown(registry, calculator))
 }
+mod csv_table;
+mod json;
+mod table;

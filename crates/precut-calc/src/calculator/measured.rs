@@ -14,8 +14,14 @@ pub trait MeasuredRow: Serialize + for<'de> Deserialize<'de> + ToSchema + Clone 
 /// A measured table in a job: rows, or in their place `{"csv": "..."}`, or a file part of the same
 /// name. The service turns the latter two into rows before the physics sees the job, so that the
 /// same data give the same key however they came.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Measured<R>(pub Vec<R>);
+
+impl<R> Default for Measured<R> {
+    fn default() -> Self {
+        Self(Vec::new())
+    }
+}
 
 impl<R> Measured<R> {
     /// The rows.
