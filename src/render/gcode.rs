@@ -229,7 +229,7 @@ mod tests {
         ["G0 X96. Z2.", "G0 X89.967", "G1 Z0. F0.5", "G1 X89.885 Z-1000.", "G1 X89.978 Z-2000.", "G0 X96."];
 
     fn expected(before: &[&str], after: &[&str]) -> String {
-        [before, &PATH, after].concat().iter().map(|line| format!("{line}\n")).collect()
+        [before, &PATH, after].concat().join("\n") + "\n"
     }
 
     #[test]
