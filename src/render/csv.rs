@@ -8,6 +8,7 @@ use super::number;
 /// A table as CSV: UTF-8 without a byte-order mark, a comma between cells, a line feed after every
 /// line, one header line `name [unit]` (the bare name for words), decimal points. Numbers are the
 /// shortest that read back bit for bit; where there is none, the cell is empty.
+#[allow(clippy::missing_panics_doc)] // writing to memory cannot fail
 pub fn csv(table: &Table) -> String {
     let mut writer = WriterBuilder::new().terminator(Terminator::Any(b'\n')).from_writer(Vec::new());
     let rows = table.columns.iter().map(length).max().unwrap_or(0);

@@ -97,9 +97,9 @@ fn line(page: &mut Page, frame: &Frame, x: &[f64], y: &[Option<f64>], class: &st
 fn band(page: &mut Page, frame: &Frame, (x, lower, upper): (&[f64], &[f64], &[f64]), class: &str, role: Role) {
     let pairs = x.iter().zip(lower.iter().zip(upper));
     let both = |(x, (low, high)): (&f64, (&f64, &f64))| frame.point(*x, *low).zip(frame.point(*x, *high));
-    let edges: Vec<Option<((f64, f64), (f64, f64))>> = pairs.map(both).collect();
-    let lower = runs(edges.iter().map(|edge| edge.map(|(low, _)| low)));
-    let upper = runs(edges.iter().map(|edge| edge.map(|(_, high)| high)));
+    // Where one edge has a gap, so has the other.
+    let (lower, upper): (Vec<_>, Vec<_>) = pairs.map(|pair| both(pair).unzip()).unzip();
+    let (lower, upper) = (runs(lower.into_iter()), runs(upper.into_iter()));
     for (lower, upper) in lower.into_iter().zip(upper) {
         let (mut lower, upper) = (thin::line(lower), thin::line(upper));
         if role == Role::Tolerance {

@@ -60,18 +60,22 @@ pub(super) fn draw(page: &mut Page, glyph: Glyph, place: Place) {
         }
         Glyph::Chuck => chuck(page, place.reach / size.max(0.1)),
         // A roller in a bracket that stands on the ground.
-        Glyph::SteadyRest => put!(
-            page,
-            "<path d=\"M0-6V-22M-10-22H10M-10-27l5 5M-5-27l5 5M0-27l5 5M5-27l5 5\"/><circle cy=\"-6\" r=\"6\"/><circle class=\"solid\" cy=\"-6\" r=\"1.4\"/>"
-        ),
+        Glyph::SteadyRest => {
+            put!(
+                page,
+                "<path d=\"M0-6V-22M-10-22H10M-10-27l5 5M-5-27l5 5M0-27l5 5M5-27l5 5\"/><circle cy=\"-6\" r=\"6\"/><circle class=\"solid\" cy=\"-6\" r=\"1.4\"/>"
+            );
+        }
         // The same on a slide that goes along.
-        Glyph::FollowRest => put!(
-            page,
-            "<path d=\"M0-6V-18\"/><rect x=\"-9\" y=\"-24\" width=\"18\" height=\"6\"/><path d=\"M-10-29H10M-6-32l-4 3l4 3M6-32l4 3l-4 3\" fill=\"none\"/><circle cy=\"-6\" r=\"6\"/><circle class=\"solid\" cy=\"-6\" r=\"1.4\"/>"
-        ),
+        Glyph::FollowRest => {
+            put!(
+                page,
+                "<path d=\"M0-6V-18\"/><rect x=\"-9\" y=\"-24\" width=\"18\" height=\"6\"/><path d=\"M-10-29H10M-6-32l-4 3l4 3M6-32l4 3l-4 3\" fill=\"none\"/><circle cy=\"-6\" r=\"6\"/><circle class=\"solid\" cy=\"-6\" r=\"1.4\"/>"
+            );
+        }
         // An insert on its shank.
         Glyph::Tool => {
-            put!(page, "<path d=\"M-5.5-12V-32H5.5V-12z\"/><path class=\"solid\" d=\"M0 0L6.5-9L0-18L-6.5-9z\"/>")
+            put!(page, "<path d=\"M-5.5-12V-32H5.5V-12z\"/><path class=\"solid\" d=\"M0 0L6.5-9L0-18L-6.5-9z\"/>");
         }
     }
     put!(page, "</g>");

@@ -1,7 +1,8 @@
 //! Figures as SVG: panels under each other on one axis, to scale, worth printing.
 //!
-//! Own code, since the plotting crates that were tried have neither outlines nor symbols in the units of
-//! the axes, bake their colours into every element (no dark screen), or need a font file to draw text.
+//! Own code: kuva 0.6, the plotting crate that came nearest, has no filled outlines and no symbols in
+//! the units of the axes, no gaps in a line, and writes its colours into every element, so that a
+//! picture cannot follow a dark screen.
 //! Text stays text; light on paper, dark on dark screens.
 
 mod draw;
@@ -161,7 +162,7 @@ impl VerticalAxis {
         }
         let data = Range::of(panel.items.iter().flat_map(ordinates));
         let range = if panel.items.iter().any(|item| matches!(item, Item::Glyph { .. })) { data } else { data.roomy() };
-        let ticks = Ticks::new(range, ((height - room_top - room_bottom) / 38.0).clamp(2.0, 8.0), decimal);
+        let ticks = y_ticks(range, height - room_top - room_bottom, decimal);
         Self { range, ticks, room_top, room_bottom, glyph_size }
     }
 
@@ -186,6 +187,13 @@ fn room_at_ends(figure: &Figure, range: Range) -> (f64, f64) {
         }
     }
     (left, right)
+}
+
+/// About one for every 27 px, closer where that would leave fewer than three.
+fn y_ticks(range: Range, room: f64, decimal: char) -> Ticks {
+    let most = (room / 27.0).clamp(2.0, 10.0);
+    let ticks = Ticks::new(range, most, decimal);
+    if ticks.marks.len() < 3 { Ticks::new(range, 1.7 * most, decimal) } else { ticks }
 }
 
 /// As many as have room for their labels.

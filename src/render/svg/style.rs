@@ -32,6 +32,7 @@ pub(super) const CSS: &str = "\
 .precut-figure .command{color:#0072b2;stroke-dasharray:16 4}\
 .precut-figure .comparison{color:#a8487f;stroke-dasharray:2.5 3}\
 .precut-figure .part{color:#6b7480}\
+.precut-figure .part.outline{fill:#dde1e6;fill-opacity:1}\
 .precut-figure .stock{color:#a06a00;stroke-dasharray:4 3;fill-opacity:.1}\
 .precut-figure .tolerance{color:#2a8fd0}\
 .precut-figure .tolerance.edge{stroke-dasharray:5 3}\
@@ -64,6 +65,7 @@ pub(super) const CSS: &str = "\
 .precut-figure .command{color:#62bdf5}\
 .precut-figure .comparison{color:#e59ac4}\
 .precut-figure .part{color:#98a1ad}\
+.precut-figure .part.outline{fill:#343a43}\
 .precut-figure .stock{color:#dba63a}\
 .precut-figure .tolerance{color:#62bdf5}\
 .precut-figure .uncertainty{color:#f0b93a}\
