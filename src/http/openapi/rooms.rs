@@ -104,7 +104,7 @@ fn multipart(entry: &Entry, job: &str) -> Content {
         .property("job", Ref::from_schema_name(job))
         .required("job")
         .additional_properties(Some(AdditionalProperties::FreeForm(false)));
-    for table in Vec::<String>::new() {
+    for table in entry.table_names() {
         let schema = ObjectBuilder::new().schema_type(SchemaType::new(Type::String)).description(Some(
             "The table as CSV in place of the field of the same name: header `name [unit]` or `name_unit`.",
         ));
