@@ -1,0 +1,142 @@
+//! How things look: colours that colour-blind eyes tell apart (Okabe and Ito), and a dash pattern or a
+//! marker of its own for each, so that nothing is said by colour alone.
+
+use std::collections::BTreeMap;
+
+use precut_calc::calculator::{Figure, Item, Role};
+
+/// Patterns for things of one role with different names, before they repeat.
+const VARIANTS: usize = 6;
+
+/// Dark rules are for screens only: paper stays white.
+pub(super) const CSS: &str = "\
+.precut-figure{font-family:system-ui,'Segoe UI',Roboto,'DejaVu Sans',Arial,sans-serif;font-size:12.5px;font-variant-numeric:tabular-nums}\
+.precut-figure .paper{fill:#fff}\
+.precut-figure text{fill:#1a1d21}\
+.precut-figure .title{font-size:17px;font-weight:600}\
+.precut-figure .name{font-weight:600}\
+.precut-figure .number{fill:#4d5561}\
+.precut-figure .grid{stroke:#e4e7eb;fill:none}\
+.precut-figure .zero,.precut-figure .frame{stroke:#9aa2ad;fill:none}\
+.precut-figure .line{fill:none;stroke:currentColor;stroke-width:1.9;stroke-linejoin:round}\
+.precut-figure .dot{fill:currentColor;stroke:none}\
+.precut-figure .band{fill:currentColor;fill-opacity:.2;stroke:none}\
+.precut-figure .edge{fill:none;stroke:currentColor;stroke-width:1}\
+.precut-figure .points{fill:none;stroke:currentColor;stroke-width:1.5}\
+.precut-figure .outline{fill:currentColor;fill-opacity:.25;stroke:currentColor;stroke-width:1.2;stroke-linejoin:round}\
+.precut-figure .glyph{fill:#fff;stroke:#1a1d21;stroke-width:1.2;stroke-linejoin:round}\
+.precut-figure .solid{fill:#1a1d21}\
+.precut-figure .nominal{color:#5c6470;stroke-width:1.3;stroke-dasharray:12 3 2 3}\
+.precut-figure .before{color:#d55e00;stroke-dasharray:8 4}\
+.precut-figure .after{color:#007a59}\
+.precut-figure .command{color:#0072b2;stroke-dasharray:16 4}\
+.precut-figure .comparison{color:#a8487f;stroke-dasharray:2.5 3}\
+.precut-figure .part{color:#6b7480}\
+.precut-figure .part.outline{fill:#dde1e6;fill-opacity:1}\
+.precut-figure .stock{color:#a06a00;stroke-dasharray:4 3;fill-opacity:.1}\
+.precut-figure .tolerance{color:#2a8fd0}\
+.precut-figure .tolerance.edge{stroke-dasharray:5 3}\
+.precut-figure .tolerance.line{stroke-dasharray:10 3 2 3 2 3}\
+.precut-figure .uncertainty{color:#e69f00}\
+.precut-figure .uncertainty.line{stroke-dasharray:4 2 1 2}\
+.precut-figure .plain{color:#1a1d21}\
+.precut-figure .v1{stroke-dasharray:5 2}\
+.precut-figure .v2{stroke-dasharray:2 2}\
+.precut-figure .v3{stroke-dasharray:10 3 2 3}\
+.precut-figure .v4{stroke-dasharray:14 3 5 3}\
+.precut-figure .v5{stroke-dasharray:5 2 1 2 1 2}\
+.precut-figure .plain.v1{color:#0072b2}\
+.precut-figure .plain.v2{color:#d55e00}\
+.precut-figure .plain.v3{color:#007a59}\
+.precut-figure .plain.v4{color:#a8487f}\
+.precut-figure .plain.v5{color:#a06a00}\
+.precut-figure .points,.precut-figure .dot{stroke-dasharray:none}\
+@media screen and (prefers-color-scheme:dark){\
+.precut-figure .paper{fill:#15181c}\
+.precut-figure text{fill:#e8eaed}\
+.precut-figure .number{fill:#aab2bd}\
+.precut-figure .grid{stroke:#2a2f36}\
+.precut-figure .zero,.precut-figure .frame{stroke:#69727e}\
+.precut-figure .glyph{fill:#15181c;stroke:#e8eaed}\
+.precut-figure .solid{fill:#e8eaed}\
+.precut-figure .nominal{color:#aab2bd}\
+.precut-figure .before{color:#ff8f45}\
+.precut-figure .after{color:#2fc79a}\
+.precut-figure .command{color:#62bdf5}\
+.precut-figure .comparison{color:#e59ac4}\
+.precut-figure .part{color:#98a1ad}\
+.precut-figure .part.outline{fill:#343a43}\
+.precut-figure .stock{color:#dba63a}\
+.precut-figure .tolerance{color:#62bdf5}\
+.precut-figure .uncertainty{color:#f0b93a}\
+.precut-figure .plain{color:#e8eaed}\
+.precut-figure .plain.v1{color:#62bdf5}\
+.precut-figure .plain.v2{color:#ff8f45}\
+.precut-figure .plain.v3{color:#2fc79a}\
+.precut-figure .plain.v4{color:#e59ac4}\
+.precut-figure .plain.v5{color:#dba63a}\
+}";
+
+/// The class of a role, and its marker as a path round the origin.
+pub(super) fn role_class(role: Role) -> (&'static str, &'static str) {
+    const CIRCLE: &str = "m-3 0a3 3 0 1 0 6 0a3 3 0 1 0-6 0";
+    const SQUARE: &str = "m-3-3h6v6h-6z";
+    const DIAMOND: &str = "m0-4l4 4l-4 4l-4-4z";
+    const TRIANGLE: &str = "m0-4l3.8 6.5h-7.6z";
+    const PLUS: &str = "m-4 0h8m-4-4v8";
+    const CROSS: &str = "m-3-3l6 6m0-6l-6 6";
+    const BAR: &str = "m0-4v8";
+    match role {
+        Role::Nominal => ("nominal", PLUS),
+        Role::Before => ("before", CROSS),
+        Role::After => ("after", SQUARE),
+        Role::Command => ("command", DIAMOND),
+        Role::Comparison => ("comparison", TRIANGLE),
+        Role::Part => ("part", CIRCLE),
+        Role::Stock => ("stock", CIRCLE),
+        Role::Tolerance => ("tolerance", BAR),
+        Role::Uncertainty => ("uncertainty", BAR),
+        Role::Plain => ("plain", CIRCLE),
+    }
+}
+
+/// Name and role of what has an entry in the legend.
+pub(super) fn identity(item: &Item) -> Option<(&'static str, Role)> {
+    match *item {
+        Item::Line { name, role, .. }
+        | Item::Band { name, role, .. }
+        | Item::Points { name, role, .. }
+        | Item::Outline { name, role, .. } => Some((name, role)),
+        Item::Glyph { .. } => None,
+    }
+}
+
+/// Gives every name of a figure its classes: equal names look equal in all panels, different names
+/// of one role differ in their pattern.
+#[derive(Debug)]
+pub(super) struct Styles(BTreeMap<(&'static str, &'static str), usize>);
+
+impl Styles {
+    pub(super) fn of(figure: &Figure) -> Self {
+        let mut counts: BTreeMap<&'static str, usize> = BTreeMap::new();
+        let mut variants = BTreeMap::new();
+        for (name, role) in figure.panels.iter().flat_map(|panel| &panel.items).filter_map(identity) {
+            let class = role_class(role).0;
+            variants.entry((class, name)).or_insert_with(|| {
+                let count = counts.entry(class).or_default();
+                *count += 1;
+                (*count - 1) % VARIANTS
+            });
+        }
+        Self(variants)
+    }
+
+    /// Classes beside that of the kind.
+    pub(super) fn class(&self, name: &'static str, role: Role) -> String {
+        let class = role_class(role).0;
+        match self.0.get(&(class, name)) {
+            Some(0) | None => class.to_owned(),
+            Some(variant) => format!("{class} v{variant}"),
+        }
+    }
+}
