@@ -246,11 +246,11 @@ fn conforms(registry: &Registry, entry: &Entry) {
         let computed = ready.prepared.run(&Unwatched).unwrap();
         for message in &computed.explanation {
             texts.try_word(Language::En, "explanation", message.code, &message.values).unwrap();
-            assert!(meta.codes.contains(&message.code), "{} utters the undeclared {}", meta.id, message.code);
+            assert!(meta.codes.contains(message.code), "{} utters the undeclared {}", meta.id, message.code);
         }
         for warning in &computed.warnings {
             texts.try_finding(Language::En, "warning", warning).unwrap();
-            assert!(meta.codes.contains(&warning.code), "{} utters the undeclared {}", meta.id, warning.code);
+            assert!(meta.codes.contains(warning.code), "{} utters the undeclared {}", meta.id, warning.code);
         }
         let stored = solve_now(registry, meta.id, body(), &Unwatched).unwrap();
         assert_eq!(solve_now(registry, meta.id, body(), &Unwatched).unwrap().body, stored.body);

@@ -6,8 +6,8 @@ use std::borrow::Cow;
 use std::time::{Duration, Instant};
 
 use precut_calc::calculator::{
-    Answer, Axis, Basis, Calculator, CalculatorKind, Check, Column, Cost, Example, Failure, Figure, Finding, Item,
-    Measured, MeasuredRow, Message, Meta, Monitor, Panel, Role, Table, Values, Violations, checkpoint,
+    Answer, Axis, Basis, Calculator, CalculatorKind, Check, Codes, Column, Cost, Example, Failure, Figure, Finding,
+    Item, Measured, MeasuredRow, Message, Meta, Monitor, Panel, Role, Table, Values, Violations, checkpoint,
 };
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -208,15 +208,14 @@ impl Calculator for Toy {
             job: r#"{"length_mm": 500, "segments": [{"diameter_mm": 20}]}"#,
         }],
         study_outputs: &["/deflections_um/0"],
-        codes: &[
-            "bad_length",
-            "no_segments",
-            "unknown_support",
-            "thicker_than_long",
-            "no_solution_here",
-            "toy_bends",
-            "toy_is_slender",
-        ],
+        codes: Codes {
+            faults: &[&["bad_length", "no_segments", "unknown_support", "thicker_than_long"]],
+            failures: &[&["no_solution_here"]],
+            warnings: &[&["toy_is_slender"]],
+            explanations: &[&["toy_bends"]],
+            stages: &[],
+            labels: &[],
+        },
         figures: &["bending"],
         tables: &["bending"],
         has_program: false,

@@ -69,11 +69,15 @@ fn examples_run_and_repeat<C: Calculator>(job: &C::Input, example: &str) {
         assert!(output.pointer(pointer).is_some_and(|v| v.is_number() || v.is_null()), "{at}: no number at {pointer}");
     }
 
-    let declared = |lists: &[&[&'static str]]| -> BTreeSet<&'static str> { lists.iter().copied().flatten().copied().collect() };
+    let declared =
+        |lists: &[&[&'static str]]| -> BTreeSet<&'static str> { lists.iter().copied().flatten().copied().collect() };
     let codes = C::META.codes;
     for warning in &first.warnings {
         assert!(declared(codes.warnings).contains(warning.code), "{at}: undeclared warning {}", warning.code);
-        assert!(warning.value.is_none_or(f64::is_finite) && warning.limit.is_none_or(f64::is_finite), "{at}: {warning:?}");
+        assert!(
+            warning.value.is_none_or(f64::is_finite) && warning.limit.is_none_or(f64::is_finite),
+            "{at}: {warning:?}"
+        );
     }
     for said in &first.explanation {
         assert!(declared(codes.explanations).contains(said.code), "{at}: undeclared explanation {}", said.code);

@@ -7,7 +7,9 @@ mod support;
 use std::f64::consts::PI;
 
 use precut_calc::calculator::{ForwardModel, Prediction, Rows, Unwatched};
-use precut_calc::deflection_compensation::{DeflectionCompensation, DeflectionPoint, DeflectionRun, FeedDirection, Job};
+use precut_calc::deflection_compensation::{
+    DeflectionCompensation, DeflectionPoint, DeflectionRun, FeedDirection, Job,
+};
 use precut_calc::effects::{DEFLECTION_CAUSES, DeflectionEffect, Fit};
 use serde_json::{Value, json};
 use support::prepared;
@@ -34,7 +36,8 @@ struct Run {
     warm_at_start: f64,
 }
 
-const RUN: Run = Run { depth: 0.8, feed: 0.2, speed: 60.0, to_headstock: true, path_at_start: 500.0, warm_at_start: 4.0 };
+const RUN: Run =
+    Run { depth: 0.8, feed: 0.2, speed: 60.0, to_headstock: true, path_at_start: 500.0, warm_at_start: 4.0 };
 
 /// The catalogue's equations: changes of C, F and e at a station.
 #[derive(Default)]
@@ -102,9 +105,8 @@ fn stations() -> Vec<f64> {
 }
 
 fn predict(job: &Job, runs: &[Run], effects: &[DeflectionEffect]) -> Vec<Prediction> {
-    let points = (0..runs.len())
-        .flat_map(|k| stations().into_iter().map(move |z_mm| (k, DeflectionPoint { z_mm })))
-        .collect();
+    let points =
+        (0..runs.len()).flat_map(|k| stations().into_iter().map(move |z_mm| (k, DeflectionPoint { z_mm }))).collect();
     let rows = Rows { runs: runs.iter().map(as_run).collect(), points };
     let prepared = DeflectionCompensation::prepare(job, &rows, "diameter_deviation_um", &Unwatched).unwrap();
     DeflectionCompensation::predict(&prepared, effects).unwrap()
@@ -165,9 +167,15 @@ fn the_base_is_the_closed_form() {
 
 #[test]
 fn compliances_add_to_the_machine() {
-    check(&json!({ "kind": "headstock_compliance", "delta_um_per_n": 0.022 }), &|_| compliance(|z| 2.2e-5 * (1.0 - z / L).powi(2)));
-    check(&json!({ "kind": "tailstock_compliance", "delta_um_per_n": 0.01 }), &|_| compliance(|z| 1e-5 * (z / L).powi(2)));
-    check(&json!({ "kind": "tailstock_compliance", "delta_um_per_n": -0.03 }), &|_| compliance(|z| -3e-5 * (z / L).powi(2)));
+    check(&json!({ "kind": "headstock_compliance", "delta_um_per_n": 0.022 }), &|_| {
+        compliance(|z| 2.2e-5 * (1.0 - z / L).powi(2))
+    });
+    check(&json!({ "kind": "tailstock_compliance", "delta_um_per_n": 0.01 }), &|_| {
+        compliance(|z| 1e-5 * (z / L).powi(2))
+    });
+    check(&json!({ "kind": "tailstock_compliance", "delta_um_per_n": -0.03 }), &|_| {
+        compliance(|z| -3e-5 * (z / L).powi(2))
+    });
     check(&json!({ "kind": "carriage_compliance", "delta_um_per_n": 0.01 }), &|_| compliance(|_| 1e-5));
     check(&json!({ "kind": "bending_scale", "delta": 0.12 }), &|_| Change { bending: Some(0.12), ..Change::default() });
 }
@@ -200,7 +208,9 @@ fn the_uncut_side_bends_with_the_blank() {
 #[test]
 fn forces_are_scaled_and_added_to() {
     check(&json!({ "kind": "force_level", "delta": -0.1 }), &|_| factor(|_, _| 0.9));
-    check(&json!({ "kind": "depth_exponent", "delta": 0.05, "reference_depth_mm": 1.5 }), &|_| factor(|_, t| (t / 1.5_f64).powf(0.05)));
+    check(&json!({ "kind": "depth_exponent", "delta": 0.05, "reference_depth_mm": 1.5 }), &|_| {
+        factor(|_, t| (t / 1.5_f64).powf(0.05))
+    });
     check(&json!({ "kind": "feed_exponent", "delta": 0.05, "reference_feed_mm_per_rev": 0.3 }), &|run| {
         let feed = run.feed;
         factor(move |_, _| (feed / 0.3).powf(0.05))
@@ -210,10 +220,13 @@ fn forces_are_scaled_and_added_to() {
         factor(move |_, _| (speed / 100.0).powf(-0.1))
     });
     check(&json!({ "kind": "hardness_gradient", "gradient": 0.2 }), &|_| factor(|z, _| 1.0 + 0.2 * (z / L - 0.5)));
-    check(&json!({ "kind": "built_up_edge", "drop": 0.2, "centre_m_per_min": 38.0, "width_m_per_min": 18.0 }), &|run| {
-        let speed = run.speed;
-        factor(move |_, _| 1.0 - 0.2 * (-((speed - 38.0) / 18.0).powi(2)).exp())
-    });
+    check(
+        &json!({ "kind": "built_up_edge", "drop": 0.2, "centre_m_per_min": 38.0, "width_m_per_min": 18.0 }),
+        &|run| {
+            let speed = run.speed;
+            factor(move |_, _| 1.0 - 0.2 * (-((speed - 38.0) / 18.0).powi(2)).exp())
+        },
+    );
     check(&json!({ "kind": "ploughing_force", "force_n": 20.0 }), &|_| Change { added_n: 20.0, ..Change::default() });
 }
 
@@ -323,9 +336,13 @@ fn divided_differences_follow_the_prediction() {
     for (i, z) in stations().into_iter().enumerate() {
         // Closed form: e opens the gap, the cut gets lighter: 2/(1 + C F').
         let step = 1e-4;
-        let by_offset = (deviation_um(&RUN, &error_um(move |_| step), z) - deviation_um(&RUN, &error_um(move |_| -step), z)) / (2.0 * step);
+        let by_offset = (deviation_um(&RUN, &error_um(move |_| step), z)
+            - deviation_um(&RUN, &error_um(move |_| -step), z))
+            / (2.0 * step);
         assert!((columns[0][i] - by_offset).abs() < 1e-6, "{} {by_offset}", columns[0][i]);
-        let by_level = (deviation_um(&RUN, &factor(move |_, _| 1.0 + step), z) - deviation_um(&RUN, &factor(move |_, _| 1.0 - step), z)) / (2.0 * step);
+        let by_level = (deviation_um(&RUN, &factor(move |_, _| 1.0 + step), z)
+            - deviation_um(&RUN, &factor(move |_, _| 1.0 - step), z))
+            / (2.0 * step);
         assert!((columns[1][i] - by_level).abs() < 1e-5 * by_level.abs(), "{} {by_level}", columns[1][i]);
     }
 }
@@ -334,7 +351,10 @@ fn divided_differences_follow_the_prediction() {
 fn a_run_cut_along_a_corrected_path_is_measured_against_the_drawing() {
     let job = job(&json!([]));
     let run = DeflectionRun {
-        commanded_path: serde_json::from_value(json!([{ "z_mm": 0.0, "diameter_mm": D - 0.1 }, { "z_mm": L, "diameter_mm": D - 0.1 }])).unwrap(),
+        commanded_path: serde_json::from_value(
+            json!([{ "z_mm": 0.0, "diameter_mm": D - 0.1 }, { "z_mm": L, "diameter_mm": D - 0.1 }]),
+        )
+        .unwrap(),
         ..as_run(&RUN)
     };
     let points = stations().into_iter().map(|z_mm| (0, DeflectionPoint { z_mm })).collect();

@@ -61,7 +61,11 @@ fn check_case(case: &Value) {
         && case["expected"].get("passes").is_none()
     {
         // A central difference made the reference: 1e-6.
-        Tolerance { rel: 0.0, abs: 1e-6 }.assert(&format!("{id}: copying"), &outcome.stations.copying_factor, &expected);
+        Tolerance { rel: 0.0, abs: 1e-6 }.assert(
+            &format!("{id}: copying"),
+            &outcome.stations.copying_factor,
+            &expected,
+        );
         compared += 1;
     }
     if let Some(form_error) = case["expected"]["form_error"].as_f64() {
@@ -213,8 +217,16 @@ fn forms_and_their_sizes_on_symmetric_centres() {
         let beta = n("beta");
         assert_eq!(json!(outcome.before.class), case["form"], "beta {beta}");
         let form_error = outcome.form_error_um.map(|f| f * UM);
-        Tolerance { rel: 1e-9, abs: 0.0 }.assert(&format!("beta {beta}"), &[form_error], &[case["form_error_diameter_201_stations"].as_f64()]);
-        Tolerance { rel: 2e-4, abs: 0.0 }.assert(&format!("beta {beta}"), &[form_error], &[case["form_error_diameter_exact"].as_f64()]);
+        Tolerance { rel: 1e-9, abs: 0.0 }.assert(
+            &format!("beta {beta}"),
+            &[form_error],
+            &[case["form_error_diameter_201_stations"].as_f64()],
+        );
+        Tolerance { rel: 2e-4, abs: 0.0 }.assert(
+            &format!("beta {beta}"),
+            &[form_error],
+            &[case["form_error_diameter_exact"].as_f64()],
+        );
     }
 }
 
@@ -235,7 +247,8 @@ fn ten_and_a_hundred_thousand_stations_keep_their_digits() {
         let (l, e) = (2000.0_f64, 210_000.0);
         let j = std::f64::consts::PI * 90.0_f64.powi(4) / 64.0;
         for (x, w) in outcome.stations.z_mm.iter().zip(&outcome.stations.work_compliance_um_per_n) {
-            let exact = x * x * (l - x).powi(2) / (3.0 * e * j * l) + (1.0 - x / l).powi(2) * 3e-5 + (x / l).powi(2) * 6e-5;
+            let exact =
+                x * x * (l - x).powi(2) / (3.0 * e * j * l) + (1.0 - x / l).powi(2) * 3e-5 + (x / l).powi(2) * 6e-5;
             assert!((w * UM - exact).abs() <= 1e-9 * exact, "{count} stations, x {x}: {w} instead of {exact}");
         }
     }

@@ -13,7 +13,9 @@ mod table;
 
 pub use figure::{Axis, Figure, Glyph, Item, Panel, Role};
 pub use finding::{Finding, Message, Value, Values, Violations};
-pub use forward::{Allowances, Column as JacobianColumn, ForwardModel, Missing, Prediction, PrepareError, Quantity, Rows};
+pub use forward::{
+    Allowances, Column as JacobianColumn, ForwardModel, Missing, Prediction, PrepareError, Quantity, Rows,
+};
 pub use measured::{Measured, MeasuredRow};
 pub use program::{Block, Dialect, Program};
 pub use table::{Cells, Column, Table};
@@ -133,6 +135,20 @@ pub struct Codes {
     pub stages: &'static [&'static [&'static str]],
     /// Titles, axes and legends of figures.
     pub labels: &'static [&'static [&'static str]],
+}
+
+impl Codes {
+    /// All of them, whatever they are used for.
+    pub fn all(&self) -> impl Iterator<Item = &'static str> {
+        [self.faults, self.failures, self.warnings, self.explanations, self.stages, self.labels]
+            .into_iter()
+            .flat_map(|lists| lists.iter().copied().flatten().copied())
+    }
+
+    /// Whether this code may be uttered.
+    pub fn contains(&self, code: &str) -> bool {
+        self.all().any(|known| known == code)
+    }
 }
 
 /// What kind of question a calculator answers.

@@ -57,8 +57,15 @@ pub(super) struct ForceChange {
 }
 
 impl ForceChange {
-    const NONE: Self =
-        Self { level: 1.0, gradient: 0.0, feed: None, speed: None, built_up_edge: None, depth: None, added_passive_n: 0.0 };
+    const NONE: Self = Self {
+        level: 1.0,
+        gradient: 0.0,
+        feed: None,
+        speed: None,
+        built_up_edge: None,
+        depth: None,
+        added_passive_n: 0.0,
+    };
 
     /// Factor on all components at relative station u, feed and speed (`diagnosis/4.10` to `4.15`).
     pub(super) fn factor(&self, u: f64, feed_mm_per_rev: f64, speed_m_per_min: f64) -> f64 {
@@ -109,12 +116,8 @@ const MM_PER_UM: f64 = 1e-3;
 impl Acting {
     /// What `effects` change. A condition that is absent counts as 0; [`super::check`] has refused it where it matters.
     pub(super) fn of(effects: &[Effect], conditions: &DeflectionConditions, direction: FeedDirection) -> Self {
-        let mut acting = Self {
-            structure: StructureChange::NONE,
-            force: ForceChange::NONE,
-            errors: Vec::new(),
-            scatter_mm: 0.0,
-        };
+        let mut acting =
+            Self { structure: StructureChange::NONE, force: ForceChange::NONE, errors: Vec::new(), scatter_mm: 0.0 };
         for effect in effects {
             acting.add(effect, conditions, direction);
         }
@@ -124,8 +127,12 @@ impl Acting {
     fn add(&mut self, effect: &Effect, conditions: &DeflectionConditions, direction: FeedDirection) {
         let (structure, force) = (&mut self.structure, &mut self.force);
         match *effect {
-            Effect::HeadstockCompliance { delta_um_per_n } => structure.headstock_mm_per_n += delta_um_per_n * MM_PER_UM,
-            Effect::TailstockCompliance { delta_um_per_n } => structure.tailstock_mm_per_n += delta_um_per_n * MM_PER_UM,
+            Effect::HeadstockCompliance { delta_um_per_n } => {
+                structure.headstock_mm_per_n += delta_um_per_n * MM_PER_UM
+            }
+            Effect::TailstockCompliance { delta_um_per_n } => {
+                structure.tailstock_mm_per_n += delta_um_per_n * MM_PER_UM
+            }
             Effect::CarriageCompliance { delta_um_per_n } => structure.carriage_mm_per_n += delta_um_per_n * MM_PER_UM,
             Effect::BendingScale { delta } => structure.flexibility *= 1.0 + delta,
             Effect::ChuckRotationalStiffness { ktheta_n_mm_per_rad } => {

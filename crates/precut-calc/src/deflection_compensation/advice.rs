@@ -196,7 +196,8 @@ fn without_command(outcome: &Outcome) -> usize {
 }
 
 fn nominal_path(before: &Form) -> Message {
-    let message = Message::new("nominal_path_leaves").with("class", before.class.map_or("incomplete", super::form::FormClass::name));
+    let message = Message::new("nominal_path_leaves")
+        .with("class", before.class.map_or("incomplete", super::form::FormClass::name));
     let message = message.with("form_error_um", before.form_error_um.unwrap_or(0.0));
     match before.largest {
         Some(largest) => message.with("largest_error_um", largest.diameter_error_um).with("z_mm", largest.z_mm),
@@ -272,10 +273,11 @@ fn structure_warnings(job: &Job, stage: &Stage, outcome: &Outcome) -> Vec<Findin
     if let Some(yield_strength) = job.shaft.yield_strength_n_per_mm2 {
         let stress = peak_stress_n_per_mm2(job, stage, outcome.shares.z_mm);
         if stress > STRESS_SHARE * yield_strength {
-            found.push(
-                Finding::new("bending_stress_high", "/shaft/yield_strength_n_per_mm2")
-                    .measured(stress, STRESS_SHARE * yield_strength, "N/mm2"),
-            );
+            found.push(Finding::new("bending_stress_high", "/shaft/yield_strength_n_per_mm2").measured(
+                stress,
+                STRESS_SHARE * yield_strength,
+                "N/mm2",
+            ));
         }
     }
     if let Some(ratio) = outcome.second_order.thrust_ratio.filter(|r| *r > THRUST_RATIO) {
@@ -339,9 +341,8 @@ fn force_warnings(job: &Job, stage: &Stage) -> Vec<Finding> {
     if least > largest {
         return Vec::new();
     }
-    let speeds = || {
-        stage.radii.planned.iter().zip(&stage.radii.target).map(|(p, t)| stage.regime.speed_m_per_min(*p, *t))
-    };
+    let speeds =
+        || stage.radii.planned.iter().zip(&stage.radii.target).map(|(p, t)| stage.regime.speed_m_per_min(*p, *t));
     let speed_pointer = match stage.regime.speed {
         Speed::Surface(_) => "/cut/speed_m_per_min",
         Speed::Spindle(_) => "/cut/spindle_speed_rpm",

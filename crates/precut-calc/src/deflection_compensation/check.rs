@@ -93,8 +93,8 @@ fn check_supports(job: &Job, violations: &mut Violations) {
     let length = length_mm(job);
     let mut seen: Vec<f64> = Vec::new();
     for (i, support) in job.supports.iter().enumerate() {
-        if let Support::SteadyRest { one_sided: false, gap_um, .. } | Support::FollowRest { one_sided: false, gap_um, .. } =
-            support
+        if let Support::SteadyRest { one_sided: false, gap_um, .. }
+        | Support::FollowRest { one_sided: false, gap_um, .. } = support
         {
             violations.require(*gap_um <= 0.0, || {
                 Finding::new("gap_of_two_sided_rest", format!("/supports/{i}/gap_um")).measured(*gap_um, 0.0, "um")
@@ -111,7 +111,8 @@ fn check_supports(job: &Job, violations: &mut Violations) {
     }
     let chuck = job.supports.iter().any(|s| matches!(s, Support::Chuck { .. }));
     let carrying = job.supports.iter().filter(|s| s.carries()).count();
-    violations.require(chuck || carrying >= 2, || Finding::new("unstable_support", "/supports").with("carrying", carrying));
+    violations
+        .require(chuck || carrying >= 2, || Finding::new("unstable_support", "/supports").with("carrying", carrying));
 }
 
 fn check_cut(job: &Job, violations: &mut Violations) {
@@ -169,9 +170,12 @@ fn check_stations(job: &Job, violations: &mut Violations) {
         }
         Stations::PerZone { .. } => {
             let count = station_count(job);
-            violations.require(count > 0 || job.shaft.segments.is_empty(), || Finding::new("nothing_to_turn", "/shaft/segments"));
+            violations.require(count > 0 || job.shaft.segments.is_empty(), || {
+                Finding::new("nothing_to_turn", "/shaft/segments")
+            });
             violations.require(count <= MAX_STATIONS, || {
-                let (count, most) = (crate::calculator::Value::from(count), crate::calculator::Value::from(MAX_STATIONS));
+                let (count, most) =
+                    (crate::calculator::Value::from(count), crate::calculator::Value::from(MAX_STATIONS));
                 Finding::new("too_many_stations", "/stations/count").with("count", count).with("most", most)
             });
         }
@@ -193,7 +197,11 @@ fn check_stock_profile(job: &Job, violations: &mut Violations) {
     let bore = job.shaft.segments.iter().map(|s| s.bore_diameter_mm).fold(0.0, f64::max);
     for (i, row) in profile.rows().iter().enumerate() {
         violations.require(row.diameter_mm > bore, || {
-            Finding::new("bad_diameter", format!("/stock_profile/{i}/diameter_mm")).measured(row.diameter_mm, bore, "mm")
+            Finding::new("bad_diameter", format!("/stock_profile/{i}/diameter_mm")).measured(
+                row.diameter_mm,
+                bore,
+                "mm",
+            )
         });
     }
 }
@@ -212,7 +220,9 @@ fn check_effects(job: &Job, violations: &mut Violations) {
                 _ => false,
             };
             violations.require(given, || {
-                Finding::new("condition_missing", format!("/conditions/{condition}")).with("kind", kind).with("condition", *condition)
+                Finding::new("condition_missing", format!("/conditions/{condition}"))
+                    .with("kind", kind)
+                    .with("condition", *condition)
             });
         }
         check_effect_on_structure(job, effect, &at, violations);
@@ -224,7 +234,9 @@ fn check_effect_on_structure(job: &Job, effect: &Effect, at: &dyn Fn(&str) -> St
     let kind = effect.kind();
     let mut softens = |base_um_per_n: f64, delta: f64| {
         violations.require(base_um_per_n + delta >= 0.0, || {
-            Finding::new("effect_beyond_base", at("/delta_um_per_n")).measured(delta, -base_um_per_n, "um/N").with("kind", kind)
+            Finding::new("effect_beyond_base", at("/delta_um_per_n"))
+                .measured(delta, -base_um_per_n, "um/N")
+                .with("kind", kind)
         });
     };
     let compliance = |support: Option<usize>| support.map_or(0.0, |i| job.supports[i].compliance_um_per_n());
@@ -238,9 +250,8 @@ fn check_effect_on_structure(job: &Job, effect: &Effect, at: &dyn Fn(&str) -> St
         Effect::SteadyRestOffset { station_mm, .. } => violations.require(steady_at(job, station_mm).is_some(), || {
             Finding::new("effect_without_rest", at("/station_mm")).value(station_mm, "mm")
         }),
-        Effect::UncutSideStiffness {} => violations.require(job.passes.is_empty(), || {
-            Finding::new("effect_not_with_passes", at("")).with("kind", kind)
-        }),
+        Effect::UncutSideStiffness {} => violations
+            .require(job.passes.is_empty(), || Finding::new("effect_not_with_passes", at("")).with("kind", kind)),
         _ => {}
     }
 }
@@ -248,7 +259,7 @@ fn check_effect_on_structure(job: &Job, effect: &Effect, at: &dyn Fn(&str) -> St
 /// Index of the steady rest that stands at a station.
 pub(super) fn steady_at(job: &Job, station_mm: f64) -> Option<usize> {
     let tolerance = SAME_STATION * length_mm(job).max(1.0);
-    job.supports.iter().position(
-        |s| matches!(s, Support::SteadyRest { z_mm, .. } if (z_mm - station_mm).abs() <= tolerance),
-    )
+    job.supports
+        .iter()
+        .position(|s| matches!(s, Support::SteadyRest { z_mm, .. } if (z_mm - station_mm).abs() <= tolerance))
 }

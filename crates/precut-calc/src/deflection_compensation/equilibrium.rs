@@ -78,8 +78,7 @@ pub(crate) fn engage(
     // F(t) = t - t_c + Y + [sqrt((r_c+Y)² + Z²) - (r_c+Y)] without cancellation, and dF/dt = 1 + dS/dt.
     let residual = |t: f64, o: Opening| {
         let (radius_y, radius) = produced_radius(command_radius_mm, o);
-        let excess =
-            if radius_y > 0.0 { o.z_mm * o.z_mm / (radius + radius_y) } else { radius - radius_y };
+        let excess = if radius_y > 0.0 { o.z_mm * o.z_mm / (radius + radius_y) } else { radius - radius_y };
         let slope = if radius > 0.0 { (radius_y * o.y_slope + o.z_mm * o.z_slope) / radius } else { o.y_slope };
         (t - commanded + o.y_mm + excess, 1.0 + slope)
     };

@@ -165,7 +165,9 @@ impl ForwardModel for DeflectionCompensation {
         let measure = Measure::named(quantity).ok_or_else(|| {
             let known: Vec<&'static str> = QUANTITIES.iter().map(|q| q.name).collect();
             PrepareError::Invalid(vec![
-                Finding::new("unknown_quantity", "/quantity").with("quantity", quantity.to_owned()).with("known", known),
+                Finding::new("unknown_quantity", "/quantity")
+                    .with("quantity", quantity.to_owned())
+                    .with("known", known),
             ])
         })?;
         let faults = faults_of_rows(job, rows);
@@ -265,8 +267,7 @@ impl PreparedRun {
         let command_mm = if run.commanded_path.is_empty() {
             target.clone()
         } else {
-            let (z, r): (Vec<f64>, Vec<f64>) =
-                run.commanded_path.iter().map(|p| (p.z_mm, p.diameter_mm / 2.0)).unzip();
+            let (z, r): (Vec<f64>, Vec<f64>) = run.commanded_path.iter().map(|p| (p.z_mm, p.diameter_mm / 2.0)).unzip();
             interpolate(&z, &r, &grid.z_mm)
         };
         let base_change = Acting::of(&job.effects, &conditions, regime.direction).structure;

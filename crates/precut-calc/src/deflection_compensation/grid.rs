@@ -132,8 +132,7 @@ fn runs_of_one_diameter(segments: &[Segment]) -> Vec<SegmentRun> {
 
 /// A zone is turned where its blank is thicker than the drawing; a measured blank may be so anywhere.
 fn is_turned(job: &Job, run: &SegmentRun) -> bool {
-    job.stock_profile.is_some()
-        || job.shaft.segments[run.first..run.end].iter().any(|s| s.stock_mm() > s.diameter_mm)
+    job.stock_profile.is_some() || job.shaft.segments[run.first..run.end].iter().any(|s| s.stock_mm() > s.diameter_mm)
 }
 
 /// Piecewise linear through the rows, constant beyond them. `z_mm` ascending on both sides.

@@ -42,7 +42,8 @@ pub use output::{
 };
 
 use crate::calculator::{
-    Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Message, Meta, Monitor, Program, Table,
+    Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Message, Meta, Monitor, Program,
+    Table,
 };
 use crate::{force, material};
 
@@ -175,7 +176,8 @@ fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
     let programmed = toolpath::programmed(job, &grid, &cut.command_mm, &cut.status_compensated, monitor)?;
     let produced = cut.produced_mm(&stage.line, &stage.radii, &programmed.command_mm, monitor)?;
     monitor.progress(0.8, Message::new("stage_advice"));
-    let outcome = Assembly { job, grid: &grid, acting: &acting, stage: &stage }.outcome(programmed.path, &produced, passes)?;
+    let outcome =
+        Assembly { job, grid: &grid, acting: &acting, stage: &stage }.outcome(programmed.path, &produced, passes)?;
     let warnings = advice::warnings(job, &grid, &stage, &outcome);
     let explanation = advice::explanation(job, &outcome);
     monitor.progress(1.0, Message::new("stage_done"));
@@ -230,7 +232,8 @@ impl Assembly<'_> {
         let Stage { line, radii, cut, .. } = stage;
         let n = grid.len();
         let each = |value: &dyn Fn(usize) -> f64| -> Vec<f64> { (0..n).map(value).collect() };
-        let force = |given: bool, component: fn(&model::Loads) -> f64| given.then(|| each(&|i| component(&cut.loads[i])));
+        let force =
+            |given: bool, component: fn(&model::Loads) -> f64| given.then(|| each(&|i| component(&cut.loads[i])));
         let moves_aside = job.include.tangential || job.include.weight;
         StationColumns {
             z_mm: grid.z_mm.clone(),
@@ -275,7 +278,9 @@ fn basis(job: &Job) -> Vec<Basis> {
         Basis { equation: "deflection/4.4", source: "copying of the previous surface" },
     ];
     used.extend(job.force.basis());
-    used.extend(job.effects.iter().map(|effect| Basis { equation: effect.cause().equation, source: "catalogue of effects" }));
+    used.extend(
+        job.effects.iter().map(|effect| Basis { equation: effect.cause().equation, source: "catalogue of effects" }),
+    );
     used
 }
 

@@ -182,11 +182,8 @@ impl Line {
     /// With one-sided rests the displacement is piecewise linear in the complete load (`deflection/3.3`, item 3).
     fn opening_with_contacts(&self, contacts: &Contacts, i: usize, loads: &Loads) -> (f64, f64) {
         let arm = self.arm_mm[i];
-        let load = ToolLoad {
-            force_n: loads.passive_n,
-            couple_n_mm: arm * loads.feed_n,
-            gravity_radial: self.gravity_radial,
-        };
+        let load =
+            ToolLoad { force_n: loads.passive_n, couple_n_mm: arm * loads.feed_n, gravity_radial: self.gravity_radial };
         let response = contacts.respond(i, load);
         let y = response.displacement_mm + self.carriage_mm_per_n * loads.passive_n + self.error_mm[i];
         let slope = (response.compliance_mm_per_n + self.carriage_mm_per_n) * loads.passive_slope
@@ -212,13 +209,9 @@ impl Line {
 
     /// What a command does at a station; `start_mm` is a guess of the engaged depth.
     pub(super) fn engage(&self, i: usize, stock_radius_mm: f64, command_mm: f64, start_mm: f64) -> Engagement {
-        engage(
-            stock_radius_mm,
-            command_mm,
-            start_mm,
-            self.opening(i, &self.loads_at_zero(i)),
-            |t| self.opening_at(i, t),
-        )
+        engage(stock_radius_mm, command_mm, start_mm, self.opening(i, &self.loads_at_zero(i)), |t| {
+            self.opening_at(i, t)
+        })
     }
 
     /// Share of the radial opening that force makes, mm: all but stated errors.

@@ -256,9 +256,8 @@ fn station_columns(stations: &StationColumns) -> Vec<Column> {
 /// Vertices of the path: station, commanded diameter.
 fn path_table(outcome: &Outcome) -> Table {
     let zones = &outcome.path.zones;
-    let gather = |values: &dyn Fn(&super::output::PathZone) -> Vec<f64>| -> Vec<f64> {
-        zones.iter().flat_map(values).collect()
-    };
+    let gather =
+        |values: &dyn Fn(&super::output::PathZone) -> Vec<f64>| -> Vec<f64> { zones.iter().flat_map(values).collect() };
     Table {
         id: "path",
         columns: vec![

@@ -102,9 +102,8 @@ pub(super) fn passages(job: &Job, grid: &Grid, regime: &Regime, pass_mm: Option<
         })
         .collect();
     let (head, tail) = ends(&job.supports);
-    let station = |support: Option<usize>, other: f64| {
-        support.and_then(|i| job.supports[i].station_mm()).unwrap_or(other)
-    };
+    let station =
+        |support: Option<usize>, other: f64| support.and_then(|i| job.supports[i].station_mm()).unwrap_or(other);
     let (z_head, z_tail) = (station(head, 0.0), station(tail, grid.length_mm));
     grid.z_mm
         .iter()

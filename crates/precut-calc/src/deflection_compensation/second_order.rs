@@ -72,8 +72,13 @@ impl Sample {
     fn of(grid: &Grid, stage: &Stage) -> Self {
         let n = grid.len();
         let step = n.div_ceil(SAMPLES).max(1);
-        let mut sample =
-            Self { z_mm: Vec::new(), target_mm: Vec::new(), passive_n: Vec::new(), main_n: Vec::new(), feed_n: Vec::new() };
+        let mut sample = Self {
+            z_mm: Vec::new(),
+            target_mm: Vec::new(),
+            passive_n: Vec::new(),
+            main_n: Vec::new(),
+            feed_n: Vec::new(),
+        };
         for i in (0..n).step_by(step).chain((n > 1 && (n - 1) % step != 0).then_some(n - 1)) {
             let loads = &stage.cut.loads[i];
             sample.z_mm.push(grid.z_mm[i]);
@@ -110,9 +115,8 @@ fn weight_um(job: &Job, sample: &Sample, profile: &Profile) -> f64 {
 
 /// N/N_cr with N_cr = pi² E J/l² between supports, a quarter of it for a chuck alone, J of the thinnest segment.
 fn thrust_ratio(job: &Job, sample: &Sample) -> f64 {
-    let thinnest = |segment: &Segment| {
-        crate::num::beam::second_moment_mm4(segment.diameter_mm, segment.bore_diameter_mm)
-    };
+    let thinnest =
+        |segment: &Segment| crate::num::beam::second_moment_mm4(segment.diameter_mm, segment.bore_diameter_mm);
     let j = job.shaft.segments.iter().map(thinnest).fold(f64::INFINITY, f64::min);
     let length: f64 = job.shaft.segments.iter().map(|s| s.length_mm).sum();
     let carrying = job.supports.iter().filter(|s| s.carries()).count();

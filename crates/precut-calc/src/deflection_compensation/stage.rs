@@ -68,7 +68,9 @@ impl Stage {
         let produced = self.cut.produced_mm(&self.line, &self.radii, &commands, monitor)?;
         let produced: Option<Vec<f64>> = produced.into_iter().collect();
         let produced = produced.ok_or_else(|| {
-            Failure::OutOfModel(Finding::new("pass_without_command", "/passes").with("diameter_mm", self.pass_mm.unwrap_or(0.0)))
+            Failure::OutOfModel(
+                Finding::new("pass_without_command", "/passes").with("diameter_mm", self.pass_mm.unwrap_or(0.0)),
+            )
         })?;
         Ok((produced, commands))
     }

@@ -54,9 +54,8 @@ pub(super) fn pass_diameter_mm(segment: &Segment, pass_diameter_mm: Option<f64>)
 
 /// Indices of the leftmost and rightmost support that carries; the latter only where it is another.
 pub(super) fn ends(supports: &[Support]) -> (Option<usize>, Option<usize>) {
-    let carrying = || {
-        supports.iter().enumerate().filter(|(_, s)| s.carries()).filter_map(|(i, s)| s.station_mm().map(|z| (i, z)))
-    };
+    let carrying =
+        || supports.iter().enumerate().filter(|(_, s)| s.carries()).filter_map(|(i, s)| s.station_mm().map(|z| (i, z)));
     let left = carrying().min_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i);
     let right = carrying().max_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i);
     (left, right.filter(|right| Some(*right) != left))
@@ -102,7 +101,8 @@ impl Structure {
             .map_err(|error| Failure::Internal(format!("a checked job gave no beam: {error}")))?;
         Ok(Self {
             beam,
-            carriage_mm_per_n: (job.carriage.compliance_um_per_n * MM_PER_UM + variant.change.carriage_mm_per_n).max(0.0),
+            carriage_mm_per_n: (job.carriage.compliance_um_per_n * MM_PER_UM + variant.change.carriage_mm_per_n)
+                .max(0.0),
             carriage_tangential_mm_per_n: job.carriage.tangential_compliance_um_per_n * MM_PER_UM,
         })
     }
@@ -161,13 +161,9 @@ fn beam_support(support: &Support, added_mm_per_n: f64, rotation: Option<f64>) -
             springs: springs(c, cz),
             rotational_rad_per_n_mm: rotation.unwrap_or(rotational_compliance_rad_per_n_mm),
         },
-        Support::SteadyRest {
-            z_mm,
-            compliance_um_per_n: c,
-            tangential_compliance_um_per_n: cz,
-            one_sided,
-            gap_um,
-        } => beam::Support::SteadyRest { z_mm, springs: springs(c, cz), contact: contact(one_sided, gap_um) },
+        Support::SteadyRest { z_mm, compliance_um_per_n: c, tangential_compliance_um_per_n: cz, one_sided, gap_um } => {
+            beam::Support::SteadyRest { z_mm, springs: springs(c, cz), contact: contact(one_sided, gap_um) }
+        }
         Support::FollowRest {
             offset_mm,
             compliance_um_per_n: c,

@@ -44,9 +44,8 @@ pub(super) fn programmed(
     let mut achieved: Option<f64> = None;
     for zone in &grid.zones {
         let stations = zone.first..zone.end;
-        let usable = status[stations.clone()]
-            .iter()
-            .all(|s| matches!(s, StatusCompensated::Ok | StatusCompensated::NoStock));
+        let usable =
+            status[stations.clone()].iter().all(|s| matches!(s, StatusCompensated::Ok | StatusCompensated::NoStock));
         let radii: Option<Vec<f64>> = exact_mm[stations.clone()].iter().copied().collect();
         let (true, Some(radii)) = (usable, radii) else { continue };
         let z_mm = &grid.z_mm[stations];
@@ -54,7 +53,9 @@ pub(super) fn programmed(
         let corners: Vec<f64> = chords.vertices.iter().map(|&v| z_mm[v]).collect();
         let half: Vec<f64> = chords.diameters_mm.iter().map(|d| d / 2.0).collect();
         achieved = Some(achieved.map_or(chords.deviation_mm, |most| most.max(chords.deviation_mm)));
-        for (slot, r) in command_mm[zone.first..zone.end].iter_mut().zip(super::grid::interpolate(&corners, &half, z_mm)) {
+        for (slot, r) in
+            command_mm[zone.first..zone.end].iter_mut().zip(super::grid::interpolate(&corners, &half, z_mm))
+        {
             *slot = Some(r);
         }
         zones.push(path_zone(zone, corners, chords.diameters_mm));
@@ -81,7 +82,8 @@ fn path_zone(zone: &Zone, z_mm: Vec<f64>, commanded_diameter_mm: Vec<f64>) -> Pa
 pub(super) fn program(job: &Job, outcome: &Outcome) -> Result<Program, Failure> {
     if !outcome.path.complete {
         let status = &outcome.stations.status_compensated;
-        let without = status.iter().filter(|s| !matches!(s, StatusCompensated::Ok | StatusCompensated::NoStock)).count();
+        let without =
+            status.iter().filter(|s| !matches!(s, StatusCompensated::Ok | StatusCompensated::NoStock)).count();
         let first = status.iter().position(|s| !matches!(s, StatusCompensated::Ok | StatusCompensated::NoStock));
         let z = first.map_or(0.0, |i| outcome.stations.z_mm[i]);
         return Err(Failure::OutOfModel(

@@ -421,12 +421,7 @@ pub const CAUSES: &[Cause] = &[
         &[amplitude("force_n", "N", 30.0, 0.0, 400.0)],
         &["depth_exponent", "carriage_compliance"],
     ),
-    cause(
-        "reversal_backlash",
-        "diagnosis/4.17",
-        &[amplitude("backlash_um", "um", 8.0, -60.0, 60.0)],
-        &["size_offset"],
-    ),
+    cause("reversal_backlash", "diagnosis/4.17", &[amplitude("backlash_um", "um", 8.0, -60.0, 60.0)], &["size_offset"]),
     cause(
         "size_offset",
         "diagnosis/4.18",
@@ -445,14 +440,7 @@ pub const CAUSES: &[Cause] = &[
         "diagnosis/4.20",
         &[
             amplitude("offset_um", "um", 10.0, -200.0, 200.0),
-            Parameter {
-                name: "station_mm",
-                unit: "mm",
-                fit: Fit::OfJob,
-                prior_sd: 0.0,
-                lower: 0.0,
-                upper: 100_000.0,
-            },
+            Parameter { name: "station_mm", unit: "mm", fit: Fit::OfJob, prior_sd: 0.0, lower: 0.0, upper: 100_000.0 },
         ],
         &["guideway_bow"],
     ),

@@ -1,5 +1,11 @@
 //! Reads the reference cases and translates their sketch of an input into jobs of the contract.
-#![allow(clippy::unwrap_used, clippy::panic, dead_code, reason = "test support, shared by several test files")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    dead_code,
+    unreachable_pub,
+    reason = "test support, shared by several test files"
+)]
 
 use precut_calc::calculator::{Calculator, Check, Unwatched, Violations};
 use precut_calc::deflection_compensation::{DeflectionCompensation, Job, Outcome};
@@ -134,34 +140,60 @@ pub fn translate(input: &Value) -> Value {
     );
     to_shaft.insert("segments".to_owned(), json!(segments));
     put(&mut to_shaft, "section", shaft.get("section").cloned());
-    put(&mut to_shaft, "theory", shaft.get("theory").map(|t| json!(if t == "euler" { "euler_bernoulli" } else { "timoshenko" })));
+    put(
+        &mut to_shaft,
+        "theory",
+        shaft.get("theory").map(|t| json!(if t == "euler" { "euler_bernoulli" } else { "timoshenko" })),
+    );
     let mut cut = renamed(&input["cut"], CUT);
     put(&mut cut, "feed_direction", shaft.get("feed_direction").cloned());
     put(&mut cut, "speed_diameter", input["cut"].get("speed_diameter").cloned());
     let mut job = Map::new();
     job.insert("shaft".to_owned(), Value::Object(to_shaft));
-    job.insert("supports".to_owned(), json!(input["supports"].as_array().unwrap().iter().map(translate_support).collect::<Vec<_>>()));
+    job.insert(
+        "supports".to_owned(),
+        json!(input["supports"].as_array().unwrap().iter().map(translate_support).collect::<Vec<_>>()),
+    );
     let carriage = [("c", "compliance_um_per_n", 1e3), ("c_z", "tangential_compliance_um_per_n", 1e3)];
     job.insert("carriage".to_owned(), Value::Object(renamed(&input["carriage"], &carriage)));
     job.insert("force".to_owned(), translate_force(&input["force"]));
     job.insert("cut".to_owned(), Value::Object(cut));
     job.insert("stations".to_owned(), json!({ "kind": "list", "z_mm": input["stations"] }));
     put(&mut job, "include", input.get("effects").cloned());
-    put(&mut job, "gravity", input.get("gravity").map(|g| {
-        Value::Object(renamed(g, &[("g", "acceleration_m_per_s2", 1.0), ("angle_deg", "angle_deg", 1.0)]))
-    }));
-    put(&mut job, "stock_profile", input.get("stock_profile").map(|p| {
-        let (x, d) = (p["x"].as_array().unwrap(), p["d"].as_array().unwrap());
-        json!(x.iter().zip(d).map(|(x, d)| json!({ "z_mm": x, "diameter_mm": d })).collect::<Vec<_>>())
-    }));
-    put(&mut job, "passes", input.get("passes").map(|passes| {
-        json!(passes.as_array().unwrap().iter().map(|pass| {
-            let mut to = renamed(pass, CUT);
-            to.insert("diameter_mm".to_owned(), pass["d"].clone());
-            put(&mut to, "compensated", pass.get("compensated").cloned());
-            Value::Object(to)
-        }).collect::<Vec<_>>())
-    }));
+    put(
+        &mut job,
+        "gravity",
+        input.get("gravity").map(|g| {
+            Value::Object(renamed(g, &[("g", "acceleration_m_per_s2", 1.0), ("angle_deg", "angle_deg", 1.0)]))
+        }),
+    );
+    put(
+        &mut job,
+        "stock_profile",
+        input.get("stock_profile").map(|p| {
+            let (x, d) = (p["x"].as_array().unwrap(), p["d"].as_array().unwrap());
+            json!(x.iter().zip(d).map(|(x, d)| json!({ "z_mm": x, "diameter_mm": d })).collect::<Vec<_>>())
+        }),
+    );
+    put(
+        &mut job,
+        "passes",
+        input.get("passes").map(|passes| {
+            json!(
+                passes
+                    .as_array()
+                    .unwrap()
+                    .iter()
+                    .map(|pass| {
+                        let mut to = renamed(pass, CUT);
+                        to.insert("diameter_mm".to_owned(), pass["d"].clone());
+                        put(&mut to, "compensated", pass.get("compensated").cloned());
+                        Value::Object(to)
+                    })
+                    .collect::<Vec<_>>()
+            )
+        }),
+    );
     Value::Object(job)
 }
 
@@ -205,7 +237,11 @@ impl Tolerance {
             match (f, e) {
                 (Some(f), Some(e)) => {
                     let allowed = self.abs.max(self.rel * e.abs());
-                    assert!((f - e).abs() <= allowed, "{what}[{i}]: {f} instead of {e}, off by {:e} of {allowed:e}", f - e);
+                    assert!(
+                        (f - e).abs() <= allowed,
+                        "{what}[{i}]: {f} instead of {e}, off by {:e} of {allowed:e}",
+                        f - e
+                    );
                 }
                 (None, None) => {}
                 _ => panic!("{what}[{i}]: {f:?} instead of {e:?}"),
