@@ -95,8 +95,7 @@ impl Contacts {
         let turned = entries(&self.couple_influence, station, count);
         let sag = entries(&self.rest_sag, station, count);
         let matrix = entries(&self.matrix, station, count * count);
-        let mut excess = Rests::default();
-        let mut scale = Rests::default();
+        let (mut excess, mut scale) = (ZEROS, ZEROS);
         for rest in 0..count {
             let parts = [
                 influence[rest] * load.force_n,
@@ -106,6 +105,18 @@ impl Contacts {
             ];
             excess[rest] = parts.iter().sum();
             scale[rest] = parts.iter().map(|part| part.abs()).sum();
+        }
+        if count == 1 {
+            let force_n = excess[0] / matrix[0];
+            if excess[0] > TOLERANCE * scale[0] {
+                let per_force = influence[0] / matrix[0];
+                response.displacement_mm -= influence[0] * force_n;
+                response.compliance_mm_per_n -= influence[0] * per_force;
+                response.coupling_per_n -= turned[0] * per_force;
+                response.closed = 1;
+                response.forces_n[0] = force_n;
+            }
+            return response;
         }
         let problem = Problem { count, matrix };
         let (closed, forces) = problem.solve(&excess, &scale);

@@ -4,6 +4,10 @@
 //! with coefficients of one sign lose no digits, and a form with `c_0 = c_1 = 0` vanishes at `a` like `xi²` to full
 //! relative accuracy: what a power of the place itself would lose.
 
+use super::model::Side;
+
+const ORDINALS: [f64; DEGREE + 1] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
+
 /// The highest degree that occurs: compliance less the squares of cubic influence functions.
 const DEGREE: usize = 6;
 
@@ -67,6 +71,30 @@ impl Form {
         Self { coefficients, degree: self.degree + other.degree }
     }
 
+    /// The integral over `xi` from the start to the place, or with `Side::Right` from the place to the end: running sums
+    /// of the coefficients in Bernstein's basis. The degree must be below six.
+    pub(super) fn accumulated(mut self, side: Side) -> Self {
+        let degree = self.degree;
+        if side == Side::Right {
+            self.coefficients[..=degree].reverse();
+        }
+        let mut coefficients = [0.0; DEGREE + 1];
+        let mut sum = 0.0;
+        // Binomial coefficients of this degree and of the next one.
+        let (mut own, mut next) = (1.0, 1.0);
+        let size = ORDINALS[degree + 1];
+        for k in 0..=degree {
+            sum += self.coefficients[k] / own;
+            own *= (size - 1.0 - ORDINALS[k]) / ORDINALS[k + 1];
+            next *= (size - ORDINALS[k]) / ORDINALS[k + 1];
+            coefficients[k + 1] = next * sum / size;
+        }
+        if side == Side::Right {
+            coefficients[..=degree + 1].reverse();
+        }
+        Self { coefficients, degree: degree + 1 }
+    }
+
     /// Multiplied by a number.
     pub(super) fn scaled(mut self, factor: f64) -> Self {
         for coefficient in &mut self.coefficients {
@@ -106,6 +134,18 @@ mod tests {
         let mut out = Vec::new();
         sample(&form.raised(), Span { start: 0.0, end: 1.0, inverse_length: 1.0 }, &[xi], &mut out);
         out[0]
+    }
+
+    #[test]
+    fn integrals_agree_with_powers() {
+        // xi³ + 2 xi² eta - eta³ over xi, by hand: 1 - 3 xi + 3 xi² ... collected in powers of xi.
+        let form = Form::new(&[-1.0, 0.0, 2.0, 1.0]);
+        let power = |x: f64| -x + 1.5 * x * x - x.powi(3) / 3.0;
+        for step in 0..=4 {
+            let x = f64::from(step) / 4.0;
+            assert!((value(form.accumulated(Side::Left), x) - power(x)).abs() < 1e-15);
+            assert!((value(form.accumulated(Side::Right), x) - power(1.0) + power(x)).abs() < 1e-15);
+        }
     }
 
     #[test]

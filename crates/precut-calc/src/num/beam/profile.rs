@@ -5,6 +5,7 @@ use super::form::{Raised, Span, sample};
 use super::matrix::{Symmetric, VANISHING};
 use super::plane::Plane;
 use super::station::{Rows, Works};
+use super::turning::Turning;
 use super::{Beam, Steady};
 
 /// What a profile is asked for besides the radial compliance.
@@ -43,6 +44,7 @@ impl Beam {
     pub fn profile(&self, stations_mm: &[f64], want: Wanted) -> Profile {
         match &self.steady {
             Some(steady) if !(self.changing && want.weight) => self.steady_profile(steady, stations_mm, want),
+            _ if self.follow.is_empty() => self.turning_profile(stations_mm, want),
             _ => self.moving_profile(stations_mm, want),
         }
     }
@@ -54,7 +56,7 @@ impl Beam {
         let radial = self.pieces(&self.radial, &steady.radial);
         let tangential = self.pieces(&self.tangential, &steady.tangential);
         let when = |wanted: bool, piece: &dyn Fn(usize) -> Raised| if wanted { over(piece) } else { Vec::new() };
-        let mut profile = Profile {
+        let profile = Profile {
             radial_mm_per_n: self.sample(steady.compliance.iter().copied(), stations),
             couple_per_n: when(want.couple, &|k| radial.coupling(k)),
             tangential_mm_per_n: when(want.tangential, &|k| tangential.compliance(k)),
@@ -66,12 +68,12 @@ impl Beam {
         if rests.is_empty() {
             return profile;
         }
-        let mut contacts = self.open_contacts(&rests, &profile);
+        let mut contacts = self.open_contacts(&rests);
         let count = rests.len();
         for (slot, &row) in rests.iter().enumerate() {
-            scatter(&mut contacts.influence, &over(&|k| radial.at_rest(k, row)), slot, count);
+            scatter(&mut contacts.influence, over(&|k| radial.at_rest(k, row)), slot, count);
             if want.couple {
-                scatter(&mut contacts.couple_influence, &over(&|k| radial.couple_at_rest(k, row)), slot, count);
+                scatter(&mut contacts.couple_influence, over(&|k| radial.couple_at_rest(k, row)), slot, count);
             }
             let reactions = self.frame.reactions[row];
             let own = self.left.pair(intervals, row, row) + self.radial.base_work(reactions, reactions);
@@ -82,9 +84,7 @@ impl Beam {
                 contacts.rest_sag.push(matrix.at(row, self.frame.columns()));
             }
         }
-        contacts.seal(count);
-        profile.contacts = Some(contacts);
-        profile
+        contacts.attach(profile)
     }
 
     pub(super) fn sample(&self, forms: impl Iterator<Item = Raised>, stations: &[f64]) -> Vec<f64> {
@@ -101,20 +101,45 @@ impl Beam {
         values
     }
 
+    /// Block by block, for the partly turned shaft.
+    fn turning_profile(&self, stations: &[f64], want: Wanted) -> Profile {
+        let mut profile = Profile::with_room(stations.len(), want);
+        let rests = self.one_sided();
+        let mut contacts = self.open_contacts(&rests);
+        let rows = Rows { couple: want.couple, weight: want.weight };
+        Turning::new(self.bending(), &self.radial, rows).run(stations, |works, block| {
+            let (force, count) = (works.force_row(), block.len());
+            profile.radial_mm_per_n.extend_from_slice(&works.work(force, force)[..count]);
+            if want.couple {
+                profile.couple_per_n.extend_from_slice(&works.work(force, force + 1)[..count]);
+            }
+            if want.weight {
+                profile.sag_radial_mm.extend_from_slice(&works.work(force, force + 2)[..count]);
+            }
+            for slot in (0..count).filter(|_| !rests.is_empty()) {
+                works.note(&rests, slot, want, &mut contacts);
+            }
+        });
+        if want.tangential || want.weight {
+            let rows = Rows { couple: false, weight: want.weight };
+            Turning::new(self.bending(), &self.tangential, rows).run(stations, |works, block| {
+                let force = works.force_row();
+                if want.tangential {
+                    profile.tangential_mm_per_n.extend_from_slice(&works.work(force, force)[..block.len()]);
+                }
+                if want.weight {
+                    profile.sag_tangential_mm.extend_from_slice(&works.work(force, force + 2)[..block.len()]);
+                }
+            });
+        }
+        contacts.attach(profile)
+    }
+
     /// Station by station, where more than the load moves with the tool.
     fn moving_profile(&self, stations: &[f64], want: Wanted) -> Profile {
-        let count = stations.len();
-        let room = |wanted: bool| Vec::with_capacity(if wanted { count } else { 0 });
-        let mut profile = Profile {
-            radial_mm_per_n: room(true),
-            couple_per_n: room(want.couple),
-            tangential_mm_per_n: room(want.tangential),
-            sag_radial_mm: room(want.weight),
-            sag_tangential_mm: room(want.weight),
-            contacts: None,
-        };
+        let mut profile = Profile::with_room(stations.len(), want);
         let rests = self.one_sided();
-        let mut contacts = self.open_contacts(&rests, &profile);
+        let mut contacts = self.open_contacts(&rests);
         let rows = Rows { couple: want.couple, weight: want.weight };
         let mut works = Works::new(&self.frame, &self.left, &self.right, &self.follow, rows);
         let mut reduction = Reduction::default();
@@ -145,14 +170,7 @@ impl Beam {
                 }
             }
         }
-        if !rests.is_empty() {
-            contacts.compliance.clone_from(&profile.radial_mm_per_n);
-            contacts.coupling.clone_from(&profile.couple_per_n);
-            contacts.sag.clone_from(&profile.sag_radial_mm);
-            contacts.seal(rests.len());
-            profile.contacts = Some(contacts);
-        }
-        profile
+        contacts.attach(profile)
     }
 
     /// Rows of the one-sided rests: fixed ones, then follow rests.
@@ -164,7 +182,7 @@ impl Beam {
         fixed.chain(follow.map(|i| self.frame.columns() + i)).collect()
     }
 
-    fn open_contacts(&self, rows: &[usize], profile: &Profile) -> Contacts {
+    fn open_contacts(&self, rows: &[usize]) -> Contacts {
         let columns = self.frame.columns();
         let supports: Vec<usize> = rows
             .iter()
@@ -173,19 +191,40 @@ impl Beam {
         Contacts {
             gaps_mm: supports.iter().map(|&support| self.supports[support].gap_mm().unwrap_or(0.0)).collect(),
             supports,
-            compliance: profile.radial_mm_per_n.clone(),
-            coupling: profile.couple_per_n.clone(),
-            sag: profile.sag_radial_mm.clone(),
             ..Contacts::default()
         }
     }
 }
 
+impl Turning<'_> {
+    /// All rests at one station of the block.
+    fn note(&self, rests: &[usize], slot: usize, want: Wanted, into: &mut Contacts) {
+        let force = self.force_row();
+        for &row in rests {
+            into.influence.push(self.work(row, force)[slot]);
+            if want.couple {
+                into.couple_influence.push(self.work(row, force + 1)[slot]);
+            }
+            if want.weight {
+                into.rest_sag.push(self.work(row, force + 2)[slot]);
+            }
+            for &other in rests {
+                let own = if row == other { REGULARISATION * self.original[row][slot] } else { 0.0 };
+                into.matrix.push(self.work(row.min(other), row.max(other))[slot] + own);
+            }
+        }
+    }
+}
+
 /// Writes the values of one rest into the rows of the stations.
-fn scatter(into: &mut Vec<f64>, values: &[f64], slot: usize, count: usize) {
+fn scatter(into: &mut Vec<f64>, values: Vec<f64>, slot: usize, count: usize) {
+    if count == 1 {
+        *into = values;
+        return;
+    }
     into.resize(values.len() * count, 0.0);
     for (row, value) in into.chunks_exact_mut(count).zip(values) {
-        row[slot] = *value;
+        row[slot] = value;
     }
 }
 
@@ -244,9 +283,37 @@ impl Reduction {
     }
 }
 
+impl Profile {
+    /// Empty, with room for what is wanted.
+    fn with_room(count: usize, want: Wanted) -> Self {
+        let room = |wanted: bool| Vec::with_capacity(if wanted { count } else { 0 });
+        Self {
+            radial_mm_per_n: room(true),
+            couple_per_n: room(want.couple),
+            tangential_mm_per_n: room(want.tangential),
+            sag_radial_mm: room(want.weight),
+            sag_tangential_mm: room(want.weight),
+            contacts: None,
+        }
+    }
+}
+
 impl Contacts {
+    /// Into the profile, if there are any rests, with what they need of it.
+    fn attach(mut self, mut profile: Profile) -> Profile {
+        if !self.supports.is_empty() {
+            self.compliance.clone_from(&profile.radial_mm_per_n);
+            self.coupling.clone_from(&profile.couple_per_n);
+            self.sag.clone_from(&profile.sag_radial_mm);
+            self.seal();
+            profile.contacts = Some(self);
+        }
+        profile
+    }
+
     /// A rest that cannot act has an empty row: a unit on the diagonal keeps the problem definite.
-    fn seal(&mut self, count: usize) {
+    fn seal(&mut self) {
+        let count = self.supports.len();
         let square = count * count;
         for block in self.matrix.chunks_exact_mut(square) {
             for rest in 0..count {

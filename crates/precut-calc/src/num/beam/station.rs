@@ -326,7 +326,7 @@ fn shares(interval: &Interval, start: f64, end: f64) -> (f64, f64) {
 
 /// By break point: what the sections right of the tool weigh more than those left of it, over the shaft before the
 /// break point and behind it.
-fn differences(frame: &Frame) -> Vec<[Resultant; 2]> {
+pub(super) fn differences(frame: &Frame) -> Vec<[Resultant; 2]> {
     let count = frame.intervals.len();
     let mut found = vec![[Resultant::default(); 2]; count + 1];
     let missing = |k: usize| {
