@@ -183,6 +183,10 @@ impl Texts {
         let own = self.finding_as(language, section, finding.code, finding);
         match (own, finding.values.get("rule")) {
             (Err(_), Some(Value::Text(rule))) => self.finding_as(language, section, rule, finding),
+            // A problem of the whole job that is listed as its only fault.
+            (Err(TextError::Missing { .. }), _) if self.has(language, "problem", &detail(finding.code)) => {
+                self.finding_as(language, "problem", &detail(finding.code), finding)
+            }
             (own, _) => own,
         }
     }
@@ -213,7 +217,7 @@ impl Texts {
     pub fn problem(&self, language: Language, code: &str, values: &Values) -> (String, String) {
         (
             self.word(language, "problem", &format!("{code}.title"), values),
-            self.word(language, "problem", &format!("{code}.detail"), values),
+            self.word(language, "problem", &detail(code), values),
         )
     }
 
@@ -314,6 +318,10 @@ fn flatten(prefix: &str, joint: &str, table: &toml::Table, flat: &mut Vec<(Strin
 fn field(pointer: &str) -> String {
     let last = pointer.rsplit('/').find(|part| part.parse::<usize>().is_err()).unwrap_or_default();
     last.replace("~1", "/").replace("~0", "~")
+}
+
+fn detail(code: &str) -> String {
+    format!("{code}.detail")
 }
 
 /// What is shown in place of a text that failed.

@@ -4,7 +4,7 @@
 
 use std::time::{Duration, Instant};
 
-use precut_calc::calculator::{Failure, Unwatched};
+use precut_calc::calculator::{Failure, Finding, Unwatched};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
@@ -154,6 +154,8 @@ async fn a_job_above_the_limit_is_refused_with_the_field_that_drives_it() {
         panic!("accepted")
     };
     assert_eq!((cost.driver, limit), ("/work_ms", Duration::from_secs(10)));
+    let finding = Finding::new("too_expensive", cost.driver).measured(cost.ms, 1e4, "ms");
+    Texts::shared().try_finding(Language::En, "fault", &finding).unwrap();
     engine.solve(TOY, work(10_000.0)).await.unwrap();
 }
 
