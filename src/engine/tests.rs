@@ -4,12 +4,14 @@
 
 use std::time::{Duration, Instant};
 
+use futures_util::future::BoxFuture;
 use precut_calc::calculator::{Failure, Finding, Unwatched};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
 use super::*;
 use crate::registry::toy;
+use crate::store::StoreError;
 use crate::text::{Language, Texts};
 
 const TOY: &str = "toy-bar";
@@ -219,6 +221,37 @@ async fn unknown_names_come_with_the_nearest() {
     let error = engine.solve("toy-baar", job(|_| {})).await.unwrap_err();
     assert_eq!(error, Error::UnknownCalculator { name: "toy-baar".to_owned(), nearest: Some(TOY) });
     assert_eq!(engine.check(TOY, job(|_| {})).unwrap().key, engine.solve(TOY, job(|_| {})).await.unwrap().stored.key);
+}
+
+/// A store on a disk that died.
+struct BrokenStore;
+
+impl ResultStore for BrokenStore {
+    fn get(&self, _key: Key) -> BoxFuture<'_, Result<Option<KeptResult>, StoreError>> {
+        Box::pin(async { Err(StoreError::Failed("disk I/O error".to_owned())) })
+    }
+    fn put(&self, _result: KeptResult) {}
+    fn list(&self, _query: ResultQuery) -> BoxFuture<'_, Result<ResultPage, StoreError>> {
+        Box::pin(async { Err(StoreError::Failed("disk I/O error".to_owned())) })
+    }
+    fn ping(&self) -> BoxFuture<'_, Result<(), StoreError>> {
+        Box::pin(async { Err(StoreError::Failed("disk I/O error".to_owned())) })
+    }
+    fn close(&self) -> BoxFuture<'_, ()> {
+        Box::pin(async {})
+    }
+}
+
+#[tokio::test]
+async fn a_store_that_fails_fails_no_answer() {
+    let settings = EngineSettings { cores: 1, ..EngineSettings::in_folder("unused") };
+    let engine = Engine::with_store(toy::registry(), settings, Arc::new(BrokenStore)).unwrap();
+    let solved = engine.solve(TOY, job(|_| {})).await.unwrap();
+    assert_eq!(engine.solve(TOY, job(|_| {})).await.unwrap().cache, CacheState::Hit);
+    assert!(engine.result(&solved.stored.key).await.unwrap().is_some());
+    let other = engine.check(TOY, job(|job| job["length_mm"] = json!(700))).unwrap().key;
+    assert!(matches!(engine.result(&other).await, Err(Error::Store(StoreError::Failed(_)))));
+    assert!(matches!(engine.ready().await, Err(Error::Store(StoreError::Failed(_)))));
 }
 
 #[test]
