@@ -266,6 +266,7 @@ fn whole(line: u64) -> f64 {
 mod tests {
     use super::*;
     use crate::registry::toy;
+    use crate::text::{Language, Texts};
     use proptest::prelude::*;
     use serde_json::json;
 
@@ -283,6 +284,9 @@ mod tests {
     fn codes(text: &str) -> Vec<&'static str> {
         let mut faults = Faults::default();
         assert!(read(text, &place(), "/measurements", &mut faults).is_none(), "{text}");
+        for finding in &faults.listed {
+            Texts::shared().try_finding(Language::En, "fault", finding).unwrap();
+        }
         faults.listed.iter().map(|finding| finding.code).collect()
     }
 

@@ -253,6 +253,31 @@ mod tests {
     }
 
     #[test]
+    fn items_are_checked_wherever_their_array_is_and_none_beyond_its_most() {
+        let several = |places: Value| json!({"kind": "several", "places_mm": places});
+        let job = with("effects", json!([several(json!([1, -1, "x"])), several(json!([0, 0, 0, -1]))]));
+        let expected = [
+            ("out_of_range", "/effects/0/places_mm/1"),
+            ("wrong_type", "/effects/0/places_mm/2"),
+            ("too_many_items", "/effects/1/places_mm"),
+        ];
+        assert_eq!(faults(&job), expected.map(|(code, pointer)| (code, pointer.to_owned())));
+        key(&with("support", several(json!([1, 2, 3]))));
+    }
+
+    #[test]
+    fn a_hostile_body_costs_no_more_than_its_bytes() {
+        let fields: serde_json::Map<String, Value> = (0..50_000).map(|i| (format!("f{i}"), Value::Null)).collect();
+        let Err(Error::Invalid { findings, total }) = read(&toy(), &body(&fields.into())) else { panic!("accepted") };
+        assert_eq!((findings.len(), total), (100, 50_002));
+        let many: Vec<Value> = vec![Value::Null; 1_000_000];
+        let Err(Error::Invalid { total, .. }) = read(&toy(), &body(&with("segments", many.into()))) else {
+            panic!("accepted")
+        };
+        assert_eq!(total, 1 + 5, "too many, and the first five of them bad");
+    }
+
+    #[test]
     fn what_is_no_object_is_a_fault_of_the_whole_job() {
         for job in [json!([]), json!(3), json!(null)] {
             assert_eq!(faults(&job), [("wrong_type", String::new())]);
@@ -271,7 +296,7 @@ mod tests {
             any::<bool>().prop_map(Value::from),
             any::<i32>().prop_map(Value::from),
             any::<f64>().prop_map(Value::from),
-            prop_oneof![Just("rigid"), Just("elastic"), Just("bar"), Just("z_mm;deviation_um\n1;2")]
+            prop_oneof![Just("rigid"), Just("elastic"), Just("several"), Just("bar"), Just("z_mm;deviation_um\n1;2")]
                 .prop_map(Value::from),
         ];
         let name = prop_oneof![
@@ -288,6 +313,7 @@ mod tests {
             Just("steady"),
             Just("x"),
             Just("compliance_um_per_n"),
+            Just("places_mm"),
         ];
         leaf.prop_recursive(4, 40, 5, move |inner| {
             prop_oneof![

@@ -170,6 +170,7 @@ fn fit(place: &TablePlace, name: &str) -> Option<Vec<String>> {
 mod tests {
     use super::*;
     use crate::registry::toy;
+    use crate::text::{Language, Texts};
 
     fn resolved(mut job: Value, parts: &[(&str, &str)]) -> (Value, Vec<&'static str>) {
         let registry = toy::registry();
@@ -179,6 +180,9 @@ mod tests {
             .collect();
         let mut faults = Faults::default();
         resolve(&mut job, &parts, registry.entry("toy-bar").unwrap().tables(), &mut faults);
+        for finding in &faults.listed {
+            Texts::shared().try_finding(Language::En, "fault", finding).unwrap();
+        }
         (job, faults.listed.iter().map(|finding| finding.code).collect())
     }
 

@@ -4,12 +4,14 @@
 
 use std::time::{Duration, Instant};
 
-use precut_calc::calculator::{Failure, Unwatched};
+use futures_util::future::BoxFuture;
+use precut_calc::calculator::{Failure, Finding, Unwatched};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
 use super::*;
 use crate::registry::toy;
+use crate::store::StoreError;
 use crate::text::{Language, Texts};
 
 const TOY: &str = "toy-bar";
@@ -154,6 +156,8 @@ async fn a_job_above_the_limit_is_refused_with_the_field_that_drives_it() {
         panic!("accepted")
     };
     assert_eq!((cost.driver, limit), ("/work_ms", Duration::from_secs(10)));
+    let finding = Finding::new("too_expensive", cost.driver).measured(cost.ms, 1e4, "ms");
+    Texts::shared().try_finding(Language::En, "fault", &finding).unwrap();
     engine.solve(TOY, work(10_000.0)).await.unwrap();
 }
 
@@ -217,6 +221,37 @@ async fn unknown_names_come_with_the_nearest() {
     let error = engine.solve("toy-baar", job(|_| {})).await.unwrap_err();
     assert_eq!(error, Error::UnknownCalculator { name: "toy-baar".to_owned(), nearest: Some(TOY) });
     assert_eq!(engine.check(TOY, job(|_| {})).unwrap().key, engine.solve(TOY, job(|_| {})).await.unwrap().stored.key);
+}
+
+/// A store on a disk that died.
+struct BrokenStore;
+
+impl ResultStore for BrokenStore {
+    fn get(&self, _key: Key) -> BoxFuture<'_, Result<Option<KeptResult>, StoreError>> {
+        Box::pin(async { Err(StoreError::Failed("disk I/O error".to_owned())) })
+    }
+    fn put(&self, _result: KeptResult) {}
+    fn list(&self, _query: ResultQuery) -> BoxFuture<'_, Result<ResultPage, StoreError>> {
+        Box::pin(async { Err(StoreError::Failed("disk I/O error".to_owned())) })
+    }
+    fn ping(&self) -> BoxFuture<'_, Result<(), StoreError>> {
+        Box::pin(async { Err(StoreError::Failed("disk I/O error".to_owned())) })
+    }
+    fn close(&self) -> BoxFuture<'_, ()> {
+        Box::pin(async {})
+    }
+}
+
+#[tokio::test]
+async fn a_store_that_fails_fails_no_answer() {
+    let settings = EngineSettings { cores: 1, ..EngineSettings::in_folder("unused") };
+    let engine = Engine::with_store(toy::registry(), settings, Arc::new(BrokenStore)).unwrap();
+    let solved = engine.solve(TOY, job(|_| {})).await.unwrap();
+    assert_eq!(engine.solve(TOY, job(|_| {})).await.unwrap().cache, CacheState::Hit);
+    assert!(engine.result(&solved.stored.key).await.unwrap().is_some());
+    let other = engine.check(TOY, job(|job| job["length_mm"] = json!(700))).unwrap().key;
+    assert!(matches!(engine.result(&other).await, Err(Error::Store(StoreError::Failed(_)))));
+    assert!(matches!(engine.ready().await, Err(Error::Store(StoreError::Failed(_)))));
 }
 
 #[test]

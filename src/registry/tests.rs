@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 
 use super::toy::{Toy, ToyInput, ToyOutput};
 use super::*;
+use crate::text::{Language, Texts};
 
 /// The toy under another name.
 struct Renamed<const NAME: usize>;
@@ -122,5 +123,38 @@ fn the_document_stands_alone_and_the_contract_says_the_same() {
         let defined = &entry.input_document()["$defs"][&name];
         // The order of extensions is lost in utoipa's hash map.
         assert_eq!(serde_json::from_str::<Value>(&component).unwrap(), *defined, "{name}");
+    }
+}
+
+#[test]
+fn every_rule_of_a_schema_has_its_code_and_its_words() {
+    let cases = [
+        (json!({"type": "string", "minLength": 2}), json!("a"), "text_too_short"),
+        (json!({"type": "string", "maxLength": 2}), json!("abc"), "text_too_long"),
+        (json!({"type": "string", "pattern": "^a"}), json!("b"), "bad_pattern"),
+        (json!({"type": "array", "minItems": 2}), json!([1]), "too_few_items"),
+        (json!({"type": "array", "maxItems": 0}), json!([1]), "too_many_items"),
+        (json!({"type": "array", "uniqueItems": true}), json!([1, 1]), "duplicate_items"),
+        (json!({"type": "object", "minProperties": 1}), json!({}), "too_few_fields"),
+        (json!({"type": "object", "maxProperties": 0}), json!({"a": 1}), "too_many_fields"),
+        (json!({"type": "number", "multipleOf": 2}), json!(3), "not_a_multiple"),
+        (json!({"oneOf": [{"minimum": 3}, {"minimum": 4}]}), json!(1), "no_variant"),
+        (json!({"not": {"type": "number"}}), json!(1), "not_allowed"),
+        (json!({"const": "a"}), json!("b"), "not_one_of"),
+        (json!({"type": "string", "enum": ["a"]}), json!("b"), "not_one_of"),
+        (json!({"type": "number", "minimum": 0}), json!(-1), "out_of_range"),
+        (json!({"type": "number", "exclusiveMaximum": 0, "minimum": -1, "x-unit": "mm"}), json!(0), "out_of_range"),
+        (json!({"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1}), json!(7), "out_of_range"),
+        (json!({"type": ["number", "null"]}), json!("x"), "wrong_type"),
+    ];
+    for (schema, value, code) in cases {
+        let schema = json!({"type": "object", "properties": {"field": schema}});
+        let checker = checker::Checker::new(schema.clone()).unwrap();
+        let mut faults = Faults::default();
+        checker.check(&json!({ "field": value }), "", &mut faults);
+        let [finding] = faults.listed.as_slice() else { panic!("{schema}: {faults:?}") };
+        assert_eq!((finding.code, finding.pointer.as_str()), (code, "/field"));
+        let words = Texts::shared().try_finding(Language::En, "fault", finding).unwrap();
+        assert!(words.contains("field") && !words.contains("  "), "{words}");
     }
 }

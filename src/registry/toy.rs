@@ -101,6 +101,12 @@ pub(crate) enum ToySupport {
         #[schema(minimum = 0, maximum = 10, extensions(("x-unit" = json!("um/N"))))]
         compliance_um_per_n: f64,
     },
+    /// At several places.
+    Several {
+        /// Where.
+        #[schema(max_items = 3, minimum = 0, maximum = 20000, extensions(("x-unit" = json!("mm"))))]
+        places_mm: Vec<f64>,
+    },
     /// A part of its own.
     Bar(ToySegment),
 }

@@ -21,6 +21,8 @@ const WAITING_BYTES: usize = 64 << 20;
 const GROUP: usize = 64;
 /// How often age is looked at.
 const SWEEP_EVERY: Duration = Duration::from_mins(10);
+/// How long a list waits for what is just being written.
+const FLUSH_TIMEOUT: Duration = Duration::from_secs(1);
 /// Rows deleted in one transaction.
 const EVICTED_AT_ONCE: i64 = 256;
 /// Eviction goes down to this share of the limit, so that it does not run for every result.
@@ -77,12 +79,15 @@ impl Writer {
         let _ = self.orders.try_send(Order::Forget(key));
     }
 
-    /// Waits until everything ordered so far is written.
+    /// Waits until everything ordered so far is written, but not for a disk that does not get on.
     pub(super) async fn flush(&self) {
         let (sender, done) = oneshot::channel();
-        if self.orders.send(Order::Flush(sender)).await.is_ok() {
-            let _ = done.await;
-        }
+        let written = async {
+            if self.orders.send(Order::Flush(sender)).await.is_ok() {
+                let _ = done.await;
+            }
+        };
+        let _ = tokio::time::timeout(FLUSH_TIMEOUT, written).await;
     }
 
     pub(super) async fn close(&self) {
