@@ -272,6 +272,9 @@ fn certainty_travels_with_the_term_and_doubt_is_said() {
     assert_eq!(cautions.len(), 3);
     assert_eq!((cautions[0].code, cautions[0].pointer.as_str()), ("unconfirmed_force_coefficient", "/force/passive"));
     assert!(WARNING_CODES.contains(&cautions[0].code));
+    // Between a likely row and one to be checked the result is to be checked.
+    let nose = |radius: f64| choice(&json!({"tool_material": "hss", "nose_radius_mm": radius})).cautions("").len();
+    assert_eq!((nose(3.0), nose(3.5), nose(4.0)), (0, 3, 3));
 }
 
 #[test]

@@ -337,4 +337,19 @@ proptest! {
         prop_assert!(law.passive(low) <= law.passive(high) + 1e-9 * (1.0 + force));
         prop_assert!(law.passive_and_slope(low).1 >= -1e-9 * (1.0 + force / depth));
     }
+
+    #[test]
+    fn tables_stay_between_neighbouring_rows(
+        rows in prop::collection::vec((0.01..1.0_f64, 0.0..200.0_f64), 2..12), share in 0.0..=1.0_f64,
+    ) {
+        let mut depth = 0.0;
+        let rows: Vec<(f64, f64)> = rows.iter().map(|(step, force)| { depth += step; (depth, *force) }).collect();
+        let job: Vec<Value> = rows.iter().map(|(t, p)| json!({"depth_mm": t, "passive_n": p})).collect();
+        let law = law(json!({"kind": "table", "rows": job}));
+        for pair in rows.windows(2) {
+            let force = law.passive(pair[0].0 + share * (pair[1].0 - pair[0].0));
+            let (least, largest) = (pair[0].1.min(pair[1].1), pair[0].1.max(pair[1].1));
+            prop_assert!((least - 1e-9..=largest + 1e-9).contains(&force), "{force} outside {least}..{largest}");
+        }
+    }
 }
