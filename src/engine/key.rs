@@ -5,6 +5,7 @@ use std::str::FromStr;
 use std::sync::LazyLock;
 
 use precut_calc::calculator::Meta;
+use precut_calc::material;
 
 /// Version of this crate; stands in every answer.
 pub const ENGINE_VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -46,9 +47,12 @@ impl Key {
 static ENGINE_FINGERPRINT: LazyLock<String> =
     LazyLock::new(|| format!("{ENGINE_VERSION}+{}", data_fingerprint().to_hex()));
 
-/// Hash of the data tables built into the engine. There are none yet that a job could name: a job brings its numbers.
+/// Hash of the data tables built into the engine: a changed material makes new keys.
 fn data_fingerprint() -> blake3::Hash {
-    blake3::Hasher::new().finalize()
+    let mut hasher = blake3::Hasher::new();
+    let materials = serde_json::to_writer(&mut hasher, material::library());
+    materials.expect("plain data with text keys serialises, and a hasher takes everything");
+    hasher.finalize()
 }
 
 impl fmt::Display for Key {

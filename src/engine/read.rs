@@ -180,14 +180,14 @@ mod tests {
 
     #[test]
     fn a_field_may_have_a_code_of_its_own() {
-        assert_eq!(faults(&with("length_mm", json!(0))), [("bad_length", "/length_mm".to_owned())]);
+        assert_eq!(faults(&with("length_mm", json!(0))), [("toy_bad_length", "/length_mm".to_owned())]);
         let finding = only(&with("length_mm", json!("500")));
-        assert_eq!((finding.code, finding.values.get("rule")), ("bad_length", Some(&"wrong_type".into())));
+        assert_eq!((finding.code, finding.values.get("rule")), ("toy_bad_length", Some(&"wrong_type".into())));
         assert_eq!(
             Texts::shared().finding(Language::En, "fault", &finding),
             "length_mm is of type string, expected number; write the number without quotes and with a decimal point"
         );
-        assert_eq!(faults(&with("segments", json!([]))), [("no_segments", "/segments".to_owned())]);
+        assert_eq!(faults(&with("segments", json!([]))), [("toy_no_segments", "/segments".to_owned())]);
         assert_eq!(
             faults(&with("support", json!({"kind": "soft"}))),
             [("unknown_support", "/support/kind".to_owned())]

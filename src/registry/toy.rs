@@ -23,7 +23,7 @@ use super::Registry;
 pub(crate) struct ToyInput {
     /// Length of the bar.
     #[schema(minimum = 1, maximum = 20000, example = 500.0,
-        extensions(("x-unit" = json!("mm")), ("x-code" = json!("bad_length"))))]
+        extensions(("x-unit" = json!("mm")), ("x-code" = json!("toy_bad_length"))))]
     pub(crate) length_mm: f64,
     /// Young's modulus.
     #[schema(minimum = 1000, maximum = 1_000_000, example = 210_000.0, extensions(("x-unit" = json!("N/mm2"))))]
@@ -63,7 +63,7 @@ fn segments() -> Array {
         .items(Ref::from_schema_name("ToySegment"))
         .min_items(Some(1))
         .max_items(Some(5))
-        .extensions(Some([("x-code", json!("no_segments"))].into_iter().collect()))
+        .extensions(Some([("x-code", json!("toy_no_segments"))].into_iter().collect()))
         .build()
 }
 
@@ -215,7 +215,7 @@ impl Calculator for Toy {
         }],
         study_outputs: &["/deflections_um/0"],
         codes: Codes {
-            faults: &[&["bad_length", "no_segments", "unknown_support", "thicker_than_long"]],
+            faults: &[&["toy_bad_length", "toy_no_segments", "unknown_support", "thicker_than_long"]],
             failures: &[&["no_solution_here"]],
             warnings: &[&["toy_is_slender"]],
             explanations: &[&["toy_bends"]],
