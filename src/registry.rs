@@ -11,11 +11,14 @@ mod nearest;
 mod place;
 mod schema;
 #[cfg(test)]
+mod tests;
+#[cfg(test)]
 pub(crate) mod toy;
 
 pub use entry::{ComputedResult, Entry, Prepared, UnreadableResult};
 
 pub(crate) use checker::{Faults, by_pointer, child};
+pub(crate) use entry::Unprepared;
 pub(crate) use finite::non_finite_place;
 pub(crate) use nearest::nearest;
 pub(crate) use place::{CellKind, Step, TableColumn, TablePlace};
@@ -80,7 +83,7 @@ pub enum RegistryError {
 impl Registry {
     /// The calculators of `precut_calc`.
     pub fn standard() -> Result<Self, RegistryError> {
-        Self::with(|offered| precut_calc::register(offered))
+        Self::with(precut_calc::register)
     }
 
     /// The calculators that `offer` names.

@@ -5,15 +5,16 @@
 //! one whole. A template sees the values of its message and fails on one that is not there, which a test finds; a
 //! reader then gets the code in plain words, never an error.
 
+mod notice;
 mod number;
+
+pub use notice::{Notice, Remark};
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
 use minijinja::{Environment, UndefinedBehavior};
 use precut_calc::calculator::{Finding, Message, Value, Values};
-use serde::Serialize;
-use utoipa::ToSchema;
 
 /// A language that the service speaks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -177,8 +178,27 @@ impl Texts {
         self.try_finding(language, section, finding).unwrap_or_else(|error| plain(finding.code, &error))
     }
 
-    /// The sentence of a finding, or why there is none.
+    /// The sentence of a finding, or why there is none. Where a field's own code has no text that fits (a text about a
+    /// number, and something else came), the text of the general rule that is broken (`rule`) takes its place.
     pub fn try_finding(&self, language: Language, section: &str, finding: &Finding) -> Result<String, TextError> {
+        let own = self.finding_as(language, section, finding.code, finding);
+        match (own, finding.values.get("rule")) {
+            (Err(_), Some(Value::Text(rule))) => self.finding_as(language, section, rule, finding),
+            // A problem of the whole job that is listed as its only fault.
+            (Err(TextError::Missing { .. }), _) if self.has(language, "problem", &detail(finding.code)) => {
+                self.finding_as(language, "problem", &detail(finding.code), finding)
+            }
+            (own, _) => own,
+        }
+    }
+
+    fn finding_as(
+        &self,
+        language: Language,
+        section: &str,
+        code: &str,
+        finding: &Finding,
+    ) -> Result<String, TextError> {
         let mut context = context(&finding.values);
         context.insert("pointer", finding.pointer.as_str().into());
         context.insert("field", field(&finding.pointer).into());
@@ -191,14 +211,14 @@ impl Texts {
         if let Some(unit) = finding.unit {
             context.entry("unit").or_insert_with(|| unit.into());
         }
-        self.render(language, section, finding.code, context)
+        self.render(language, section, code, context)
     }
 
     /// Title and detail of a problem.
     pub fn problem(&self, language: Language, code: &str, values: &Values) -> (String, String) {
         (
             self.word(language, "problem", &format!("{code}.title"), values),
-            self.word(language, "problem", &format!("{code}.detail"), values),
+            self.word(language, "problem", &detail(code), values),
         )
     }
 
@@ -237,47 +257,6 @@ impl Texts {
     }
 }
 
-/// Something wrong with a job, or a warning, in words.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct Notice {
-    /// JSON Pointer to the field; empty for the whole job.
-    #[schema(example = "/shaft/segments/0/diameter_mm")]
-    pub pointer: String,
-    /// Stable code, `snake_case`.
-    #[schema(value_type = String, example = "out_of_range")]
-    pub code: &'static str,
-    /// What it means, in the language asked for.
-    pub detail: String,
-    /// The value received or reached.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub value: Option<f64>,
-    /// The limit that it passed.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub limit: Option<f64>,
-    /// Unit of both.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(value_type = Option<String>, example = "mm")]
-    pub unit: Option<&'static str>,
-    /// What else the sentence says: `minimum`, `maximum` (or `above`, `below`), `allowed`, `nearest`, `received`,
-    /// `looks_like` ...
-    #[serde(skip_serializing_if = "Values::is_empty")]
-    #[schema(value_type = Object)]
-    pub values: Values,
-}
-
-/// A sentence of an answer's explanation.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct Remark {
-    /// Stable code, `snake_case`.
-    #[schema(value_type = String, example = "work_dominates")]
-    pub code: &'static str,
-    /// What it means.
-    pub text: String,
-    /// Its numbers by name.
-    #[schema(value_type = Object)]
-    pub values: Values,
-}
-
 fn name(language: Language, section: &str, code: &str) -> String {
     format!("{}/{section}.{code}", language.tag())
 }
@@ -299,6 +278,10 @@ fn flatten(prefix: &str, joint: &str, table: &toml::Table, flat: &mut Vec<(Strin
 fn field(pointer: &str) -> String {
     let last = pointer.rsplit('/').find(|part| part.parse::<usize>().is_err()).unwrap_or_default();
     last.replace("~1", "/").replace("~0", "~")
+}
+
+fn detail(code: &str) -> String {
+    format!("{code}.detail")
 }
 
 /// What is shown in place of a text that failed.

@@ -34,7 +34,7 @@ pub(crate) fn read(text: &str, place: &TablePlace, pointer: &str, faults: &mut F
         faults.add(Finding::new("empty_table", pointer));
         return None;
     };
-    let columns = columns(&header, place, pointer, faults);
+    let columns = columns(&header, line(text, &header), place, pointer, faults);
     if faults.total > before {
         return None;
     }
@@ -47,11 +47,20 @@ pub(crate) fn read(text: &str, place: &TablePlace, pointer: &str, faults: &mut F
             faults.add(Finding::new("too_many_rows", pointer).with("maximum", place.max_rows as f64));
             return None;
         }
-        let line = record.position().map_or(0, csv::Position::line);
+        let line = line(text, &record);
         read.rows.push(table.row(&record, line, faults));
         read.lines.push(line);
     }
     (faults.total == before).then_some(read)
+}
+
+/// The line on which a record stands. The reader's own position is that of the empty lines before it.
+fn line(text: &str, record: &csv::StringRecord) -> u64 {
+    let Some(position) = record.position() else { return 0 };
+    let before = usize::try_from(position.byte()).unwrap_or(usize::MAX);
+    let skipped = text.as_bytes().get(before..).unwrap_or_default();
+    let empty = skipped.iter().take_while(|byte| matches!(byte, b'\n' | b'\r')).filter(|byte| **byte == b'\n').count();
+    position.line() + empty as u64
 }
 
 /// Tab, semicolon or comma: the first of them that the header has outside quotes. A header without any is a single
@@ -77,11 +86,11 @@ struct CsvColumn<'a> {
 
 fn columns<'a>(
     header: &csv::StringRecord,
+    line: u64,
     place: &'a TablePlace,
     pointer: &str,
     faults: &mut Faults,
 ) -> Vec<CsvColumn<'a>> {
-    let line = header.position().map_or(1, csv::Position::line);
     let before = faults.total;
     let mut found: Vec<CsvColumn<'a>> = Vec::new();
     let used = used_cells(header);
@@ -257,6 +266,7 @@ fn whole(line: u64) -> f64 {
 mod tests {
     use super::*;
     use crate::registry::toy;
+    use crate::text::{Language, Texts};
     use proptest::prelude::*;
     use serde_json::json;
 
@@ -274,6 +284,9 @@ mod tests {
     fn codes(text: &str) -> Vec<&'static str> {
         let mut faults = Faults::default();
         assert!(read(text, &place(), "/measurements", &mut faults).is_none(), "{text}");
+        for finding in &faults.listed {
+            Texts::shared().try_finding(Language::En, "fault", finding).unwrap();
+        }
         faults.listed.iter().map(|finding| finding.code).collect()
     }
 

@@ -1,232 +1,337 @@
 //! From the bytes of a job to the bytes of its answer. Knows calculators by name, nothing of HTTP.
 
+mod answer;
+mod csv_table;
+mod envelope;
 mod error;
+mod exec;
+mod flight;
+mod json;
 mod key;
+mod memory;
+mod read;
+mod settings;
+mod table;
+#[cfg(test)]
+mod tests;
 
+pub use answer::{Body, CacheState, Checked, Solved, Stored, TablePart, Timings};
 pub use error::{Error, SyntaxFault};
-pub use key::{BadKey, Key};
+pub use key::{BadKey, ENGINE_VERSION, Key};
+pub use settings::{EngineSettings, OpenError};
 
-use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Duration;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
-use bytes::Bytes;
-use precut_calc::calculator::{Cost, Figure, Monitor, Program, Table};
-use serde_json::Value;
+use precut_calc::calculator::{Cost, Failure, Monitor};
 
 use crate::registry::{Entry, Registry};
-use crate::store::{ResultPage, ResultQuery};
+use crate::store::sqlite::SqliteStore;
+use crate::store::{KeptResult, ResultPage, ResultQuery, ResultStore};
+use exec::{Cores, Slot, guarded};
+use flight::{Boarded, Flights, Landed, Pilot};
+use memory::{Kept, Memory, fingerprint};
+use read::Ready;
+
+/// Bodies up to this size are read where they arrive, larger ones on the pool: about 1 ms of reading.
+const READ_AT_ONCE: usize = 32 << 10;
 
 /// The calculators behind their cache and their pool of cores. Cheap to clone.
 #[derive(Clone)]
 pub struct Engine {
+    inner: Arc<Inner>,
+}
+
+struct Inner {
     registry: Registry,
-}
-
-/// How an engine works.
-#[derive(Debug, Clone)]
-pub struct EngineSettings {
-    /// Folder of the database; made if absent.
-    pub data: PathBuf,
-    /// Threads for calculations.
-    pub cores: usize,
-    /// Bytes of answers kept in memory.
-    pub memory_cache_bytes: u64,
-    /// Bytes of answers kept in the database.
-    pub store_bytes: u64,
-    /// How long an unused answer is kept there.
-    pub store_age: Duration,
-    /// A job estimated above this is refused.
-    pub direct_limit: Duration,
-    /// A job estimated to hold more memory than this is refused.
-    pub direct_limit_bytes: u64,
-    /// How long a job may stand in line for a core.
-    pub patience: Duration,
-}
-
-impl EngineSettings {
-    /// The defaults, with the database in `data`.
-    pub fn in_folder(data: impl Into<PathBuf>) -> Self {
-        Self {
-            data: data.into(),
-            cores: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
-            memory_cache_bytes: 64 << 20,
-            store_bytes: 1 << 30,
-            store_age: Duration::from_secs(30 * 24 * 3600),
-            direct_limit: Duration::from_secs(10),
-            direct_limit_bytes: 1 << 30,
-            patience: Duration::from_millis(250),
-        }
-    }
-}
-
-/// Why an engine does not start.
-#[derive(Debug, thiserror::Error)]
-pub enum OpenError {
-    /// Another process serves this folder.
-    #[error("the data folder {0} is in use by another precut")]
-    InUse(PathBuf),
-    /// The folder or the database cannot be used.
-    #[error("the data folder {folder} cannot be used: {reason}")]
-    Unusable {
-        /// Which folder.
-        folder: PathBuf,
-        /// Why.
-        reason: String,
-    },
-    /// The pool of threads cannot be made.
-    #[error("the calculation threads cannot be started: {0}")]
-    Threads(String),
-}
-
-/// A job as it came.
-#[derive(Debug, Clone)]
-pub enum Body {
-    /// As JSON.
-    Json(Bytes),
-    /// As JSON with measured tables beside it.
-    Parts {
-        /// The job.
-        job: Bytes,
-        /// Its tables.
-        tables: Vec<TablePart>,
-    },
-}
-
-/// A measured table as a file beside the job.
-#[derive(Debug, Clone)]
-pub struct TablePart {
-    /// Name of the field: its last part or all of it with dots.
-    pub name: String,
-    /// The CSV.
-    pub text: Bytes,
-}
-
-/// A job that could run.
-#[derive(Debug, Clone)]
-pub struct Checked {
-    /// The job with every default filled in, measured tables replaced by their row count and hash.
-    pub input: Value,
-    /// What it would cost.
-    pub cost: Cost,
-    /// The address of its answer.
-    pub key: Key,
-}
-
-/// An answer with how it came about.
-#[derive(Debug, Clone)]
-pub struct Solved {
-    /// The answer.
-    pub stored: Arc<Stored>,
-    /// Whether it was there already.
-    pub cache: CacheState,
-    /// Where the time went.
-    pub timings: Timings,
-}
-
-/// Whether an answer was there already.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum CacheState {
-    /// It was.
-    Hit,
-    /// It was computed for this request or another one at the same time.
-    Miss,
-}
-
-/// Where the time of a request went.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Timings {
-    /// Reading and checking the job.
-    pub parse: Duration,
-    /// Waiting for a core.
-    pub queue: Duration,
-    /// Computing and writing the answer.
-    pub run: Duration,
-}
-
-/// An answer's bytes.
-pub struct Stored {
-    /// Its address.
-    pub key: Key,
-    /// The envelope in English, JSON.
-    pub body: Bytes,
-    entry: Arc<Entry>,
-}
-
-impl std::fmt::Debug for Stored {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Stored").field("key", &self.key).field("bytes", &self.body.len()).finish_non_exhaustive()
-    }
-}
-
-impl Stored {
-    /// Which calculator made it.
-    pub fn entry(&self) -> &Arc<Entry> {
-        &self.entry
-    }
-    /// Its pictures; the first is the main one.
-    pub fn figures(&self) -> Result<Vec<Figure>, Error> {
-        Ok(Vec::new())
-    }
-    /// Its tables; the first is the main one.
-    pub fn tables(&self) -> Result<Vec<Table>, Error> {
-        Ok(Vec::new())
-    }
-    /// Its program for the machine: `None` if the calculator has none, `Err` if this answer has none.
-    pub fn program(&self) -> Result<Option<Program>, Error> {
-        Ok(None)
-    }
+    settings: EngineSettings,
+    memory: Memory,
+    flights: Arc<Flights>,
+    cores: Cores,
+    store: Arc<dyn ResultStore>,
+    closed: AtomicBool,
 }
 
 impl Engine {
     /// Opens the store in the settings' folder and starts the threads.
-    #[allow(clippy::unused_async)] // the store is opened here
-    pub async fn open(registry: Registry, _settings: EngineSettings) -> Result<Self, OpenError> {
-        Ok(Self { registry })
+    pub async fn open(registry: Registry, settings: EngineSettings) -> Result<Self, OpenError> {
+        let store = SqliteStore::open(&settings.data, settings.store_bytes, settings.store_age).await?;
+        Self::with_store(registry, settings, Arc::new(store))
     }
+
+    fn with_store(
+        registry: Registry,
+        settings: EngineSettings,
+        store: Arc<dyn ResultStore>,
+    ) -> Result<Self, OpenError> {
+        let cores =
+            Cores::new(settings.cores, settings.patience).map_err(|error| OpenError::Threads(error.to_string()))?;
+        let memory = Memory::new(settings.memory_cache_bytes);
+        let closed = AtomicBool::new(false);
+        let flights = Arc::default();
+        Ok(Self { inner: Arc::new(Inner { registry, settings, memory, flights, cores, store, closed }) })
+    }
+
     /// The calculators.
     pub fn registry(&self) -> &Registry {
-        &self.registry
+        &self.inner.registry
     }
+
     /// Everything but the calculation.
     pub fn check(&self, calculator: &str, body: Body) -> Result<Checked, Error> {
-        check_now(&self.registry, calculator, body)
+        check_now(&self.inner.registry, calculator, body)
     }
+
     /// The answer to a job, from the cache or computed. Dropping the future cancels the calculation unless another
     /// request waits for the same one.
-    #[allow(clippy::unused_async)]
-    pub async fn solve(&self, calculator: &str, _body: Body) -> Result<Solved, Error> {
-        Err(Error::unknown(&self.registry, calculator))
+    pub async fn solve(&self, calculator: &str, body: Body) -> Result<Solved, Error> {
+        let inner = &self.inner;
+        if inner.closed.load(Ordering::Relaxed) {
+            return Err(Error::ShuttingDown);
+        }
+        let entry = entry(&inner.registry, calculator)?;
+        let begun = Instant::now();
+        let fingerprint = fingerprint(entry.meta().id, &body);
+        if let Some(key) = inner.memory.recognise(&fingerprint)
+            && let Some(kept) = inner.look_up(&key).await
+        {
+            return hit(kept, begun.elapsed());
+        }
+        let ready = inner.read(&entry, body).await?;
+        inner.memory.remember(fingerprint, ready.key);
+        let parse = begun.elapsed();
+        if let Some(kept) = inner.look_up(&ready.key).await {
+            return hit(kept, parse);
+        }
+        inner.afford(ready.prepared.cost)?;
+        metrics::counter!("precut_cache_total", "state" => "miss").increment(1);
+        let Boarded { seat, pilot } = inner.flights.board(ready.key);
+        if let Some(pilot) = pilot {
+            self.depart(pilot, ready);
+        }
+        let Landed { outcome, timings } = seat.landed().await;
+        Ok(Solved { stored: outcome?, cache: CacheState::Miss, timings: Timings { parse, ..timings } })
     }
+
+    /// Sees to it that the calculation runs: at once if there is a slot, else when one is free.
+    fn depart(&self, pilot: Pilot, ready: Ready) {
+        let inner = &self.inner;
+        let queued = Instant::now();
+        let grounded =
+            move |outcome| Landed { outcome, timings: Timings { queue: queued.elapsed(), ..Timings::default() } };
+        if let Some(kept) = inner.memory.get(&ready.key) {
+            // The flight before this one landed between the look into the cache and boarding.
+            return pilot.land(grounded(outcome(kept)));
+        }
+        match inner.cores.slot_now() {
+            Ok(Some(slot)) => Inner::fly(inner, pilot, ready, slot, queued),
+            Err(error) => pilot.land(grounded(Err(error))),
+            Ok(None) => {
+                let inner = Arc::clone(inner);
+                tokio::spawn(async move {
+                    match inner.cores.slot().await {
+                        Ok(slot) => Inner::fly(&inner, pilot, ready, slot, queued),
+                        Err(error) => pilot.land(grounded(Err(error))),
+                    }
+                });
+            }
+        }
+    }
+
     /// A kept answer.
-    #[allow(clippy::unused_async)]
-    pub async fn result(&self, _key: &Key) -> Result<Option<Arc<Stored>>, Error> {
-        Ok(None)
+    pub async fn result(&self, key: &Key) -> Result<Option<Arc<Stored>>, Error> {
+        match self.inner.memory.get(key) {
+            Some(Kept::Answer(stored)) => Ok(Some(stored)),
+            Some(Kept::Failure(_)) => Ok(None),
+            None => Ok(self.inner.fetch(key).await?),
+        }
     }
+
     /// The list of kept answers, newest first.
-    #[allow(clippy::unused_async)]
-    pub async fn results(&self, _query: ResultQuery) -> Result<ResultPage, Error> {
-        Ok(ResultPage::default())
+    pub async fn results(&self, query: ResultQuery) -> Result<ResultPage, Error> {
+        Ok(self.inner.store.list(query).await?)
     }
+
     /// Whether it serves: the store answers and nobody has closed it.
-    #[allow(clippy::unused_async)]
     pub async fn ready(&self) -> Result<(), Error> {
-        Ok(())
+        if self.inner.closed.load(Ordering::Relaxed) {
+            return Err(Error::ShuttingDown);
+        }
+        Ok(self.inner.store.ping().await?)
     }
-    /// Takes no more jobs, writes what waits to be written, closes the store.
-    #[allow(clippy::unused_async)]
-    pub async fn close(&self) {}
+
+    /// From now on jobs are refused and [`Engine::ready`] fails; calculations under way go on.
+    pub fn refuse_jobs(&self) {
+        self.inner.closed.store(true, Ordering::Relaxed);
+    }
+
+    /// Takes no more jobs, lets running calculations end within the grace or cancels them, writes what waits to be
+    /// written, closes the store.
+    pub async fn close(&self) {
+        self.refuse_jobs();
+        let inner = &self.inner;
+        if !inner.cores.drain(inner.settings.grace).await {
+            inner.flights.cancel_all();
+        }
+        inner.store.close().await;
+    }
+}
+
+impl Inner {
+    /// Reads a job where that does no harm.
+    async fn read(&self, entry: &Arc<Entry>, body: Body) -> Result<Ready, Error> {
+        if body.len() <= READ_AT_ONCE {
+            return guarded(|| read::read(entry, &body));
+        }
+        let slot = match self.cores.slot_now()? {
+            Some(slot) => slot,
+            None => self.cores.slot().await?,
+        };
+        let entry = Arc::clone(entry);
+        self.cores.run(slot, move || read::read(&entry, &body)).await
+    }
+
+    /// What is kept under a key, in memory or in the store. A store that fails is as good as an empty one here.
+    async fn look_up(&self, key: &Key) -> Option<Kept> {
+        if let Some(kept) = self.memory.get(key) {
+            metrics::counter!("precut_cache_total", "state" => "memory").increment(1);
+            return Some(kept);
+        }
+        match self.fetch(key).await {
+            Ok(stored) => stored.map(|stored| {
+                metrics::counter!("precut_cache_total", "state" => "store").increment(1);
+                Kept::Answer(stored)
+            }),
+            Err(error) => {
+                tracing::warn!(%error, "the store is passed over");
+                None
+            }
+        }
+    }
+
+    /// A kept answer from the store, kept in memory from now on.
+    async fn fetch(&self, key: &Key) -> Result<Option<Arc<Stored>>, crate::store::StoreError> {
+        let Some(kept) = self.store.get(*key).await? else { return Ok(None) };
+        // A calculator that is no more has no results either.
+        let Some(entry) = self.registry.entry(&kept.calculator) else { return Ok(None) };
+        let stored = Arc::new(Stored { key: *key, body: kept.body, input: kept.input, entry: Arc::clone(entry) });
+        self.memory.keep(*key, Kept::Answer(Arc::clone(&stored)));
+        Ok(Some(stored))
+    }
+
+    fn afford(&self, cost: Cost) -> Result<(), Error> {
+        let (limit, limit_bytes) = (self.settings.direct_limit, self.settings.direct_limit_bytes);
+        // An estimate that is no number is not below the limit.
+        let affordable = cost.ms <= limit.as_secs_f64() * 1e3 && cost.bytes <= limit_bytes;
+        if affordable { Ok(()) } else { Err(Error::TooExpensive { cost, limit, limit_bytes }) }
+    }
+
+    /// Runs the calculation on the pool, keeps its answer and tells it.
+    fn fly(inner: &Arc<Self>, pilot: Pilot, ready: Ready, slot: Slot, queued: Instant) {
+        let this = Arc::clone(inner);
+        inner.cores.spawn(move || {
+            let (queue, begun) = (queued.elapsed(), Instant::now());
+            let watch = pilot.watch();
+            let outcome = guarded(|| compute(&ready, &watch));
+            drop(slot);
+            let run = begun.elapsed();
+            let outcome = this.keep(&ready, outcome, run);
+            pilot.land(Landed { outcome, timings: Timings { parse: Duration::ZERO, queue, run } });
+        });
+    }
+
+    /// Keeps what would come out again: answers, and failures that follow from the job alone.
+    fn keep(&self, ready: &Ready, outcome: Result<Stored, Error>, run: Duration) -> Result<Arc<Stored>, Error> {
+        let meta = ready.entry.meta();
+        let label = match &outcome {
+            Ok(_) => "ok",
+            Err(Error::Cancelled) => "cancelled",
+            Err(Error::Crashed | Error::Calculation(Failure::Internal(_))) => "error",
+            Err(_) => "no_answer",
+        };
+        metrics::counter!("precut_calculations_total", "calculator" => meta.id, "outcome" => label).increment(1);
+        metrics::histogram!("precut_calculation_seconds", "calculator" => meta.id).record(run.as_secs_f64());
+        match outcome {
+            Ok(stored) => {
+                let stored = Arc::new(stored);
+                self.memory.keep(ready.key, Kept::Answer(Arc::clone(&stored)));
+                self.store.put(KeptResult {
+                    key: ready.key,
+                    calculator: meta.id.to_owned(),
+                    version: meta.version,
+                    engine: ENGINE_VERSION.to_owned(),
+                    input: stored.input.clone(),
+                    body: stored.body.clone(),
+                });
+                Ok(stored)
+            }
+            Err(Error::Calculation(failure)) => {
+                match &failure {
+                    Failure::Infeasible(_) | Failure::OutOfModel(_) | Failure::NotConverged { .. } => {
+                        self.memory.keep(ready.key, Kept::Failure(failure.clone()));
+                    }
+                    Failure::Internal(reason) => {
+                        tracing::error!(calculator = meta.id, key = %ready.key, reason, "a calculation failed");
+                    }
+                    Failure::Cancelled => {}
+                }
+                Err(Error::Calculation(failure))
+            }
+            Err(error) => {
+                if error == Error::Crashed {
+                    tracing::error!(calculator = meta.id, key = %ready.key, "a calculation crashed");
+                }
+                Err(error)
+            }
+        }
+    }
+}
+
+fn outcome(kept: Kept) -> Result<Arc<Stored>, Error> {
+    match kept {
+        Kept::Answer(stored) => Ok(stored),
+        Kept::Failure(failure) => Err(Error::Calculation(failure)),
+    }
+}
+
+fn hit(kept: Kept, parse: Duration) -> Result<Solved, Error> {
+    let timings = Timings { parse, ..Timings::default() };
+    Ok(Solved { stored: outcome(kept)?, cache: CacheState::Hit, timings })
+}
+
+fn entry(registry: &Registry, calculator: &str) -> Result<Arc<Entry>, Error> {
+    registry.entry(calculator).cloned().ok_or_else(|| Error::unknown(registry, calculator))
+}
+
+/// Runs a job and writes its answer.
+fn compute(ready: &Ready, monitor: &dyn Monitor) -> Result<Stored, Error> {
+    if monitor.cancelled() {
+        return Err(Error::Cancelled);
+    }
+    let written = ready.prepared.run(monitor).and_then(|computed| envelope::write(ready, &computed));
+    match written {
+        Ok(body) => Ok(Stored {
+            key: ready.key,
+            body: body.into(),
+            input: ready.canonical.clone(),
+            entry: Arc::clone(&ready.entry),
+        }),
+        Err(Failure::Cancelled) => Err(Error::Cancelled),
+        Err(failure) => Err(Error::Calculation(failure)),
+    }
 }
 
 /// [`Engine::check`] without an engine.
-pub fn check_now(registry: &Registry, calculator: &str, _body: Body) -> Result<Checked, Error> {
-    Err(Error::unknown(registry, calculator))
+#[allow(clippy::needless_pass_by_value)] // a body is handed over, here as to an engine
+pub fn check_now(registry: &Registry, calculator: &str, body: Body) -> Result<Checked, Error> {
+    let entry = entry(registry, calculator)?;
+    guarded(|| read::read(&entry, &body)).map(Ready::into_checked)
 }
 
 /// The answer to a job in this thread, without cache, store or limit of cost: for the command line.
-pub fn solve_now(registry: &Registry, calculator: &str, _body: Body, _monitor: &dyn Monitor) -> Result<Stored, Error> {
-    Err(Error::unknown(registry, calculator))
+#[allow(clippy::needless_pass_by_value)]
+pub fn solve_now(registry: &Registry, calculator: &str, body: Body, monitor: &dyn Monitor) -> Result<Stored, Error> {
+    let entry = entry(registry, calculator)?;
+    guarded(|| compute(&read::read(&entry, &body)?, monitor))
 }
-mod csv_table;
-mod json;
-mod table;

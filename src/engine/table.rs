@@ -32,16 +32,13 @@ pub(crate) fn resolve(job: &mut Value, parts: &[TablePart], places: &[TablePlace
     for place in places {
         each_at(job, &place.path, String::new(), &mut |value, pointer| {
             let Some(text) = csv_text(value) else { return };
-            *value = match csv_table::read(&text, place, &pointer, faults) {
-                Some(read) => {
-                    tables.sources.push(CsvSource { pointer, lines: read.lines });
-                    read.rows.into()
-                }
-                None => {
-                    tables.unread.push(pointer);
-                    Value::Null
-                }
-            };
+            if let Some(read) = csv_table::read(&text, place, &pointer, faults) {
+                tables.sources.push(CsvSource { pointer, lines: read.lines });
+                *value = read.rows.into();
+            } else {
+                tables.unread.push(pointer);
+                *value = Value::Null;
+            }
         });
     }
     tables
@@ -173,6 +170,7 @@ fn fit(place: &TablePlace, name: &str) -> Option<Vec<String>> {
 mod tests {
     use super::*;
     use crate::registry::toy;
+    use crate::text::{Language, Texts};
 
     fn resolved(mut job: Value, parts: &[(&str, &str)]) -> (Value, Vec<&'static str>) {
         let registry = toy::registry();
@@ -182,6 +180,9 @@ mod tests {
             .collect();
         let mut faults = Faults::default();
         resolve(&mut job, &parts, registry.entry("toy-bar").unwrap().tables(), &mut faults);
+        for finding in &faults.listed {
+            Texts::shared().try_finding(Language::En, "fault", finding).unwrap();
+        }
         (job, faults.listed.iter().map(|finding| finding.code).collect())
     }
 

@@ -157,7 +157,7 @@ pub(super) struct CalculatorDescription {
     /// Pointers into the result that a parameter study shows unless asked for others.
     study_outputs: &'static [&'static str],
     /// Codes of its messages, warnings and faults.
-    codes: &'static [&'static str],
+    codes: Vec<&'static str>,
     /// JSON Schema (2020-12) of the job, with labels, units and ranges.
     #[schema(value_type = Object)]
     input_schema: Value,
@@ -189,7 +189,7 @@ pub(super) fn described(entry: &Entry, _language: Language) -> CalculatorDescrip
         figures: meta.figures,
         takes_tables: entry.takes_tables(),
         study_outputs: meta.study_outputs,
-        codes: meta.codes,
+        codes: meta.codes.all().collect(),
         input_schema: entry.input_document().clone(),
         output_schema: entry.output_document().clone(),
         jobs: Value::Object(jobs.collect()),

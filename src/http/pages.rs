@@ -172,7 +172,7 @@ fn explain(app: &App, code: &str, language: Language) -> Option<ProblemPage> {
             help: help(code),
         });
     }
-    let owner = app.engine.registry().entries().iter().find(|entry| entry.meta().codes.contains(&code))?;
+    let owner = app.engine.registry().entries().iter().find(|entry| entry.meta().codes.contains(code))?;
     Some(ProblemPage {
         code: code.to_owned(),
         title: code.replace('_', " "),

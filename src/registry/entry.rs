@@ -107,7 +107,7 @@ impl Entry {
     }
     /// Every code that it may utter: those of its declaration and those of its fields.
     pub fn codes(&self) -> impl Iterator<Item = &str> {
-        self.meta.codes.iter().copied().chain(self.own_codes.iter().map(String::as_str))
+        self.meta.codes.all().map(|code| -> &str { code }).chain(self.own_codes.iter().map(String::as_str))
     }
 
     pub(crate) fn tables(&self) -> &[TablePlace] {

@@ -7,59 +7,75 @@ use jsonschema::{ValidationError, error::ValidationErrorKind as Kind};
 use precut_calc::calculator::Finding;
 use serde_json::{Map, Value};
 
-use super::checker::child;
+use super::checker::{Faults, child};
 use super::nearest::nearest;
 use crate::units;
 
 /// Longest piece of a received value that is shown.
 const SHOWN_CHARS: usize = 60;
 
-/// What is wrong, as many findings as fields are concerned. `schema` is the schema that was compiled, `prefix` the
+/// Adds what is wrong, one fault for every field concerned. `schema` is the schema that was compiled, `prefix` the
 /// pointer to the value that was checked.
-pub(super) fn findings(error: &ValidationError<'_>, schema: &Value, prefix: &str) -> Vec<Finding> {
-    let pointer = format!("{prefix}{}", error.instance_path().as_str());
-    let place = error.schema_path().as_str();
-    let parent = place.rsplit_once('/').map_or("", |(parent, _)| parent);
-    let node = schema.pointer(parent).unwrap_or(&Value::Null);
-    let received = error.instance().as_ref();
-    match error.kind() {
-        Kind::AdditionalProperties { unexpected } => {
-            unexpected.iter().map(|name| unknown_field(&pointer, name, node, received)).collect()
+pub(super) fn report(error: &ValidationError<'_>, schema: &Value, prefix: &str, faults: &mut Faults) {
+    let place = || {
+        let path = error.schema_path().as_str();
+        let parent = path.rsplit_once('/').map_or("", |(parent, _)| parent);
+        (format!("{prefix}{}", error.instance_path().as_str()), parent, schema.pointer(parent).unwrap_or(&Value::Null))
+    };
+    if let Kind::AdditionalProperties { unexpected } = error.kind() {
+        let (pointer, _, node) = place();
+        for name in unexpected {
+            faults.add_with(|| unknown_field(&pointer, name, node, error.instance().as_ref()));
         }
-        Kind::Required { property } => vec![missing_field(&pointer, property.as_str().unwrap_or_default(), node)],
-        Kind::Enum { options } => vec![not_one_of(&pointer, received, options, union_of(schema, parent))],
-        Kind::Constant { expected_value } => {
-            vec![not_one_of(&pointer, received, &Value::Array(vec![expected_value.as_ref().clone()]), None)]
-        }
-        Kind::Type { .. } => vec![wrong_type(&pointer, received, node)],
-        Kind::Minimum { limit }
-        | Kind::Maximum { limit }
-        | Kind::ExclusiveMinimum { limit }
-        | Kind::ExclusiveMaximum { limit } => vec![out_of_range(&pointer, received, limit, node)],
-        Kind::MinItems { limit } => vec![count(&pointer, "too_few_items", received, *limit, node)],
-        Kind::MaxItems { limit } => vec![count(&pointer, "too_many_items", received, *limit, node)],
-        Kind::MinLength { limit } => vec![count(&pointer, "text_too_short", received, *limit, node)],
-        Kind::MaxLength { limit } => vec![count(&pointer, "text_too_long", received, *limit, node)],
-        Kind::MinProperties { limit } => vec![count(&pointer, "too_few_fields", received, *limit, node)],
-        Kind::MaxProperties { limit } => vec![count(&pointer, "too_many_fields", received, *limit, node)],
-        Kind::Pattern { pattern } => vec![
-            coded("bad_pattern", &pointer, node).with("pattern", pattern.clone()).with("received", shown(received)),
-        ],
-        Kind::UniqueItems => vec![coded("duplicate_items", &pointer, node)],
-        Kind::MultipleOf { multiple_of } => {
-            let step = *multiple_of;
-            vec![numeric(coded("not_a_multiple", &pointer, node), received, node).with("step", step)]
-        }
-        Kind::OneOfNotValid { .. } | Kind::OneOfMultipleValid { .. } | Kind::AnyOf { .. } => {
-            vec![coded("no_variant", &pointer, node).with("received", shown(received))]
-        }
-        other => vec![coded("not_allowed", &pointer, node).with("rule", other.keyword().to_owned())],
+    } else {
+        faults.add_with(|| {
+            let (pointer, parent, node) = place();
+            finding(error, &pointer, node, union_of(schema, parent))
+        });
     }
 }
 
-/// A finding under the field's own code, if its schema has one.
-fn coded(code: &'static str, pointer: &str, node: &Value) -> Finding {
-    Finding::new(own_code(node).unwrap_or(code), pointer)
+/// What is wrong at `pointer`, where `node` has the keyword that is broken; `union` is the union whose tag this is.
+fn finding(error: &ValidationError<'_>, pointer: &str, node: &Value, union: Option<&Value>) -> Finding {
+    let received = error.instance().as_ref();
+    match error.kind() {
+        Kind::Required { property } => missing_field(pointer, property.as_str().unwrap_or_default(), node),
+        Kind::Enum { options } => not_one_of(pointer, received, options, union),
+        Kind::Constant { expected_value } => {
+            not_one_of(pointer, received, &Value::Array(vec![expected_value.as_ref().clone()]), None)
+        }
+        Kind::Type { .. } => wrong_type(pointer, received, node),
+        Kind::Minimum { limit }
+        | Kind::Maximum { limit }
+        | Kind::ExclusiveMinimum { limit }
+        | Kind::ExclusiveMaximum { limit } => out_of_range(pointer, received, limit, node),
+        Kind::MinItems { limit } => count(pointer, "too_few_items", received, *limit, node),
+        Kind::MaxItems { limit } => count(pointer, "too_many_items", received, *limit, node),
+        Kind::MinLength { limit } => count(pointer, "text_too_short", received, *limit, node),
+        Kind::MaxLength { limit } => count(pointer, "text_too_long", received, *limit, node),
+        Kind::MinProperties { limit } => count(pointer, "too_few_fields", received, *limit, node),
+        Kind::MaxProperties { limit } => count(pointer, "too_many_fields", received, *limit, node),
+        Kind::Pattern { pattern } => {
+            coded("bad_pattern", pointer, node).with("pattern", pattern.clone()).with("received", shown(received))
+        }
+        Kind::UniqueItems => coded("duplicate_items", pointer, node),
+        Kind::MultipleOf { multiple_of } => {
+            let step = *multiple_of;
+            numeric(coded("not_a_multiple", pointer, node), received, node).with("step", step)
+        }
+        Kind::OneOfNotValid { .. } | Kind::OneOfMultipleValid { .. } | Kind::AnyOf { .. } => {
+            coded("no_variant", pointer, node).with("received", shown(received))
+        }
+        other => coded("not_allowed", pointer, node).with("keyword", other.keyword().to_owned()),
+    }
+}
+
+/// A finding under the field's own code, if its schema has one; `rule` then says which rule is broken.
+fn coded(rule: &'static str, pointer: &str, node: &Value) -> Finding {
+    match own_code(node) {
+        Some(code) => Finding::new(code, pointer).with("rule", rule),
+        None => Finding::new(rule, pointer),
+    }
 }
 
 fn own_code(node: &Value) -> Option<&'static str> {
@@ -93,11 +109,11 @@ fn union_of<'a>(schema: &'a Value, place: &str) -> Option<&'a Value> {
 }
 
 fn not_one_of(pointer: &str, received: &Value, options: &Value, union: Option<&Value>) -> Finding {
-    let code = match union {
-        Some(union) => own_code(union).unwrap_or("unknown_kind"),
-        None => "not_one_of",
+    let finding = match union {
+        Some(union) => coded("unknown_kind", pointer, union),
+        None => Finding::new("not_one_of", pointer),
     };
-    let finding = with_options(Finding::new(code, pointer).with("received", shown(received)), Some(options));
+    let finding = with_options(finding.with("received", shown(received)), Some(options));
     let words = options.as_array().into_iter().flatten().filter_map(Value::as_str);
     match received.as_str().and_then(|word| nearest(word, words)) {
         Some(nearest) => finding.with("nearest", nearest.to_owned()),

@@ -8,9 +8,8 @@ use serde::ser::{self, Serialize, Serializer};
 pub(crate) fn non_finite_place<T: Serialize + ?Sized>(value: &T) -> Option<String> {
     let mut walk = Walk { path: Vec::new() };
     match value.serialize(&mut walk) {
-        Ok(()) => None,
         // What cannot be serialised at all is reported where it is written.
-        Err(Stop::Other) => None,
+        Ok(()) | Err(Stop::Other) => None,
         Err(Stop::NotFinite) => Some(walk.path.iter().fold(String::new(), |pointer, step| match step {
             Step::Field(name) => super::child(&pointer, name),
             Step::Key(name) => super::child(&pointer, name),

@@ -1,11 +1,13 @@
 //! A calculator with one of everything, for the tests of what surrounds calculators.
 
+#![allow(clippy::panic, clippy::cast_precision_loss)]
+
 use std::borrow::Cow;
 use std::time::{Duration, Instant};
 
 use precut_calc::calculator::{
-    Answer, Axis, Basis, Calculator, CalculatorKind, Check, Column, Cost, Example, Failure, Figure, Finding, Item,
-    Measured, MeasuredRow, Message, Meta, Monitor, Panel, Role, Table, Values, Violations, checkpoint,
+    Answer, Axis, Basis, Calculator, CalculatorKind, Check, Codes, Column, Cost, Example, Failure, Figure, Finding,
+    Item, Measured, MeasuredRow, Message, Meta, Monitor, Panel, Role, Table, Values, Violations, checkpoint,
 };
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -21,7 +23,7 @@ use super::Registry;
 pub(crate) struct ToyInput {
     /// Length of the bar.
     #[schema(minimum = 1, maximum = 20000, example = 500.0,
-        extensions(("x-unit" = json!("mm")), ("x-code" = json!("bad_length"))))]
+        extensions(("x-unit" = json!("mm")), ("x-code" = json!("toy_bad_length"))))]
     pub(crate) length_mm: f64,
     /// Young's modulus.
     #[schema(minimum = 1000, maximum = 1_000_000, example = 210_000.0, extensions(("x-unit" = json!("N/mm2"))))]
@@ -61,7 +63,7 @@ fn segments() -> Array {
         .items(Ref::from_schema_name("ToySegment"))
         .min_items(Some(1))
         .max_items(Some(5))
-        .extensions(Some([("x-code", json!("no_segments"))].into_iter().collect()))
+        .extensions(Some([("x-code", json!("toy_no_segments"))].into_iter().collect()))
         .build()
 }
 
@@ -98,6 +100,12 @@ pub(crate) enum ToySupport {
         /// Compliance.
         #[schema(minimum = 0, maximum = 10, extensions(("x-unit" = json!("um/N"))))]
         compliance_um_per_n: f64,
+    },
+    /// At several places.
+    Several {
+        /// Where.
+        #[schema(max_items = 3, minimum = 0, maximum = 20000, extensions(("x-unit" = json!("mm"))))]
+        places_mm: Vec<f64>,
     },
     /// A part of its own.
     Bar(ToySegment),
@@ -206,15 +214,14 @@ impl Calculator for Toy {
             job: r#"{"length_mm": 500, "segments": [{"diameter_mm": 20}]}"#,
         }],
         study_outputs: &["/deflections_um/0"],
-        codes: &[
-            "bad_length",
-            "no_segments",
-            "unknown_support",
-            "thicker_than_long",
-            "no_solution_here",
-            "toy_bends",
-            "toy_is_slender",
-        ],
+        codes: Codes {
+            faults: &[&["toy_bad_length", "toy_no_segments", "unknown_support", "thicker_than_long"]],
+            failures: &[&["no_solution_here"]],
+            warnings: &[&["toy_is_slender"]],
+            explanations: &[&["toy_bends"]],
+            stages: &[],
+            labels: &[],
+        },
         figures: &["bending"],
         tables: &["bending"],
         has_program: false,
@@ -234,7 +241,7 @@ impl Calculator for Toy {
         let mut deflections_um: Vec<f64> = (0..count).map(|i| input.length_mm / (i as f64 + 3.0)).collect();
         match input.mode {
             ToyMode::Plain => {}
-            ToyMode::Endless => work(Duration::from_secs(60), monitor)?,
+            ToyMode::Endless => work(Duration::from_mins(1), monitor)?,
             ToyMode::Slow => work(Duration::from_millis(100), monitor)?,
             ToyMode::Panic => panic!("the toy breaks"),
             ToyMode::NotFinite => deflections_um[0] = f64::NAN,
@@ -283,5 +290,5 @@ fn work(long: Duration, monitor: &dyn Monitor) -> Result<(), Failure> {
 #[allow(clippy::unwrap_used)]
 pub(crate) fn registry() -> Registry {
     use precut_calc::calculator::Registrar;
-    Registry::with(|offered| offered.calculator::<Toy>()).unwrap()
+    Registry::with(Registrar::calculator::<Toy>).unwrap()
 }

@@ -53,7 +53,9 @@ impl Reader<'_> {
         let work = self.work()?;
         let material = self.material_factors(&work);
         let row = self.row(work.class)?;
-        let (material, geometry) = (material?, geometry?);
+        // Where a factor is missing a fault is noted already; the forces are looked at all the same.
+        let neutral = (Triple::ONE, Certainty::Confirmed);
+        let (material, geometry) = (material.unwrap_or(neutral), geometry.unwrap_or(neutral));
         let factors = (material.0.times(geometry.0), material.1.max(geometry.1));
         self.terms(row, factors)
     }

@@ -1,0 +1,188 @@
+#!/usr/bin/env bash
+# Everything that must hold before a change goes in, by one command.
+#
+#   ./test.sh              all steps
+#   ./test.sh lint test    only these
+#   ./test.sh --list       what there is
+#
+# It fetches what it needs: Debian packages where it may (as root or by sudo without a password), Python packages
+# into a virtual environment and cargo's tools into a folder, both under the target folder. A step whose
+# tool cannot be had is named at the end; with CI=true it is a failure.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")"
+
+STEPS=(format lint docs dependencies unused scripts test contract programs dockerfile attack)
+declare -A ABOUT=(
+  [format]="rustfmt"
+  [lint]="clippy over everything, warnings denied"
+  [docs]="rustdoc, warnings denied"
+  [dependencies]="licences, sources and banned packages against deny.toml"
+  [unused]="cargo-machete: dependencies that nothing uses"
+  [scripts]="shellcheck"
+  [test]="unit, property and HTTP tests"
+  [contract]="openapi/precut.json is what the program prints"
+  [programs]="programs for machines, read by LinuxCNC's own interpreter"
+  [dockerfile]="hadolint"
+  [attack]="schemathesis against the running service, all checks"
+)
+MACHETE=0.9.2
+ABSENT=77 # exit code of a step whose tool is not to be had
+
+export CARGO_TERM_COLOR=${CARGO_TERM_COLOR:-auto}
+if [ "${CI:-}" = true ]; then
+  # Nothing is built twice there, and the folder stays smaller.
+  export CARGO_INCREMENTAL=0
+fi
+
+target() { # the folder of build products
+  cargo metadata --format-version 1 --no-deps --locked | sed 's/.*"target_directory":"\([^"]*\)".*/\1/'
+}
+
+absent() { # absent WHAT: says so and leaves the step
+  echo "NOT CHECKED: $1 is not here and cannot be installed" >&2
+  exit "$ABSENT"
+}
+
+as_root() {
+  if [ "$(id -u)" = 0 ]; then "$@"; else sudo -n "$@"; fi
+}
+
+debian() { # debian COMMAND PACKAGE...: installs the packages unless the command is there
+  local command=$1
+  shift
+  if command -v "$command" >/dev/null; then return; fi
+  command -v apt-get >/dev/null || absent "$command"
+  local install=(env DEBIAN_FRONTEND=noninteractive apt-get -q -o DPkg::Lock::Timeout=120 install -y --no-install-recommends)
+  if ! as_root "${install[@]}" "$@" >/dev/null 2>&1; then
+    # The lists may be old, or not there at all.
+    { as_root apt-get -q -o DPkg::Lock::Timeout=120 update && as_root "${install[@]}" "$@"; } || absent "$command"
+  fi
+}
+
+python_tools() { # prints the folder of the Python tools, made from requirements.txt once
+  local venv stamp
+  venv=$(target)/tools/python
+  stamp=$venv/requirements.txt
+  if ! cmp -s tests/tools/requirements.txt "$stamp"; then
+    debian python3 python3 python3-venv >&2
+    rm -rf "$venv"
+    if ! python3 -m venv "$venv" >&2; then
+      rm -rf "$venv"
+      # Debian splits what a virtual environment needs from python3 itself.
+      debian "no-such-command" python3-venv >&2
+      python3 -m venv "$venv" >&2 || absent "python3-venv"
+    fi
+    "$venv/bin/pip" install --quiet --disable-pip-version-check --requirement tests/tools/requirements.txt >&2 ||
+      absent "a package of tests/tools/requirements.txt"
+    cp tests/tools/requirements.txt "$stamp"
+  fi
+  echo "$venv/bin"
+}
+
+binary() { # prints the path of the debug build, made now
+  cargo build --locked --bin precut >&2
+  echo "$(target)/debug/precut"
+}
+
+step_format() { cargo fmt --all --check; }
+
+step_lint() { cargo clippy --workspace --all-targets --locked -- -D warnings; }
+
+step_docs() { RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --document-private-items --locked; }
+
+step_dependencies() {
+  debian python3 python3
+  python3 tests/tools/dependencies.py
+}
+
+step_unused() {
+  local root
+  root=$(target)/tools/machete-$MACHETE
+  if [ ! -x "$root/bin/cargo-machete" ]; then
+    cargo install --quiet --locked --root "$root" --target-dir "$root/build" "cargo-machete@$MACHETE" ||
+      absent "cargo-machete"
+    rm -rf "$root/build"
+  fi
+  "$root/bin/cargo-machete" --skip-target-dir
+}
+
+step_scripts() {
+  debian shellcheck shellcheck
+  find . -path ./target -prune -o -name '*.sh' -print0 | xargs -0 shellcheck .ci/run
+}
+
+step_test() { cargo test --workspace --locked; }
+
+step_contract() {
+  local precut
+  precut=$(binary)
+  "$precut" openapi | diff --unified openapi/precut.json - | head -n 60 || {
+    echo "openapi/precut.json is stale: precut openapi > openapi/precut.json" >&2
+    return 1
+  }
+}
+
+step_programs() {
+  local precut
+  debian rs274 linuxcnc-uspace
+  debian python3 python3
+  precut=$(binary)
+  python3 tests/tools/rs274_check.py self-test
+  python3 tests/tools/rs274_check.py examples "$precut"
+}
+
+step_dockerfile() {
+  local tools
+  tools=$(python_tools)
+  "$tools/hadolint" docker/Dockerfile
+}
+
+step_attack() {
+  local tools precut
+  tools=$(python_tools)
+  precut=$(binary)
+  python3 tests/tools/attack.py "$precut" "$tools/schemathesis"
+}
+
+list() {
+  local step
+  for step in "${STEPS[@]}"; do printf '%-13s %s\n' "$step" "${ABOUT[$step]}"; done
+}
+
+main() {
+  local step code seconds failed=0
+  local -a summary=()
+  for step in "$@"; do
+    if [ -z "${ABOUT[$step]:-}" ]; then
+      echo "no step '$step'; there are:" >&2
+      list >&2
+      exit 2
+    fi
+  done
+  for step in "$@"; do
+    printf '\n== %s: %s\n' "$step" "${ABOUT[$step]}"
+    seconds=$SECONDS
+    # A process of its own: there, every failing command ends the step.
+    code=0
+    "$BASH" "${BASH_SOURCE[0]}" --step "$step" || code=$?
+    seconds=$((SECONDS - seconds))
+    if [ "$code" = 0 ]; then
+      summary+=("ok           $seconds s  $step")
+    elif [ "$code" = "$ABSENT" ] && [ "${CI:-}" != true ]; then
+      summary+=("NOT CHECKED  $seconds s  $step")
+    else
+      summary+=("FAILED       $seconds s  $step")
+      failed=1
+    fi
+  done
+  printf '\n== summary, %s s\n' "$SECONDS"
+  printf '%s\n' "${summary[@]}"
+  exit "$failed"
+}
+
+case "${1:-}" in
+  --step) "step_$2" ;;
+  --list | --help | -h) list ;;
+  "") main "${STEPS[@]}" ;;
+  *) main "$@" ;;
+esac

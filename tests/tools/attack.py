@@ -1,0 +1,84 @@
+#!/usr/bin/env python3
+"""Lets schemathesis attack a running service from its own contract.
+
+    attack.py PRECUT SCHEMATHESIS [--examples N] [-- further arguments of `schemathesis run`]
+
+Starts the program PRECUT on a free port with an empty data folder, runs every check of schemathesis against
+it (schemathesis.toml beside this file), and demands afterwards that the service is alive and never panicked.
+The seed is fixed: a fault that was found once is found again.
+"""
+
+import argparse
+import pathlib
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+HERE = pathlib.Path(__file__).parent
+SEED = 20240229
+START_S = 30
+
+
+def address(process: subprocess.Popen, log: pathlib.Path) -> str:
+    """Where the service listens, as it says itself."""
+    until = time.monotonic() + START_S
+    while time.monotonic() < until:
+        if match := re.search(r"listens on (http://\S+)", log.read_text(errors="replace")):
+            return match[1]
+        if process.poll() is not None:
+            break
+        time.sleep(0.05)
+    sys.exit(f"FAULT the service did not start:\n{log.read_text(errors='replace')}")
+
+
+def attack(schemathesis: str, url: str, examples: int, further: list[str]) -> int:
+    command = [schemathesis, "--config-file", str(HERE / "schemathesis.toml"), "run", f"{url}/openapi.json"]
+    command += ["--seed", str(SEED), "--max-examples", str(examples), "--generation-database", "none", *further]
+    print("+", *command, flush=True)
+    return subprocess.run(command).returncode
+
+
+def stop(process: subprocess.Popen) -> None:
+    process.send_signal(signal.SIGTERM)
+    try:
+        process.wait(timeout=30)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("precut")
+    parser.add_argument("schemathesis")
+    parser.add_argument("--examples", type=int, default=40)
+    parser.add_argument("further", nargs="*")
+    arguments = parser.parse_args()
+
+    with tempfile.TemporaryDirectory() as folder:
+        log = pathlib.Path(folder) / "log"
+        command = [arguments.precut, "serve", "--listen", "127.0.0.1:0", "--data", f"{folder}/data"]
+        with log.open("wb") as output:
+            process = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT)
+        try:
+            url = address(process, log)
+            code = attack(arguments.schemathesis, url, arguments.examples, arguments.further)
+            faults = [] if code == 0 else [f"schemathesis ends with {code}"]
+            if subprocess.run([arguments.precut, "health", "--url", url]).returncode != 0:
+                faults.append("the service is no longer ready")
+        finally:
+            stop(process)
+        if process.returncode != 0:
+            faults.append(f"the service ends with {process.returncode}")
+        panics = [line for line in log.read_text(errors="replace").splitlines() if "panicked at" in line]
+        faults += [f"panic: {line}" for line in panics[:10]]
+    for fault in faults:
+        print("FAULT", fault)
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
