@@ -141,7 +141,9 @@ fn what_can_be_asked_is_listed_with_schema_and_examples() {
 #[test]
 fn help_and_version_are_worth_reading() {
     let help = String::from_utf8(precut(&["--help"]).stdout).unwrap();
-    for part in ["serve", "solve", "check", "list", "schema", "example", "openapi", "health", "Examples:", "Exit codes:"] {
+    for part in
+        ["serve", "solve", "check", "list", "schema", "example", "openapi", "health", "Examples:", "Exit codes:"]
+    {
         assert!(help.contains(part), "{part} in {help}");
     }
     let version = String::from_utf8(precut(&["--version"]).stdout).unwrap();

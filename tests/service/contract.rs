@@ -119,9 +119,11 @@ async fn answers_are_what_the_contract_says() {
     let server = Server::start().await;
     let document = openapi::document(&toy::registry());
     let matches = |name: &str, answer: &Value| {
-        let schema = serde_json::json!({"$ref": format!("#/components/schemas/{name}"), "components": document["components"]});
+        let schema =
+            serde_json::json!({"$ref": format!("#/components/schemas/{name}"), "components": document["components"]});
         let validator = jsonschema::validator_for(&schema).unwrap();
-        let faults: Vec<_> = validator.iter_errors(answer).map(|fault| format!("{}: {fault}", fault.instance_path())).collect();
+        let faults: Vec<_> =
+            validator.iter_errors(answer).map(|fault| format!("{}: {fault}", fault.instance_path())).collect();
         assert!(faults.is_empty(), "{name}: {faults:#?}\n{answer:#}");
     };
     let answer: Value = server.post(toy::JOB).send().await.unwrap().json().await.unwrap();

@@ -25,7 +25,9 @@ async fn guarded() -> Server {
 async fn with_keys_configured_only_their_owners_may_ask() {
     let server = guarded().await;
     for value in [None, Some("Bearer wrong"), Some("Basic 0123"), Some(KEY), Some("Bearer"), Some("Bearer ")] {
-        for request in [server.post(toy::JOB), server.get("/v1/calculators"), server.get("/v1/nothing"), server.get("/metrics")] {
+        for request in
+            [server.post(toy::JOB), server.get("/v1/calculators"), server.get("/v1/nothing"), server.get("/metrics")]
+        {
             let request = value.map_or(request.try_clone().unwrap(), |value| request.header("authorization", value));
             let response = request.send().await.unwrap();
             assert!(header(&response, "www-authenticate").starts_with("Bearer"));
@@ -41,7 +43,15 @@ async fn with_keys_configured_only_their_owners_may_ask() {
 #[tokio::test]
 async fn health_and_documentation_need_no_key() {
     let server = guarded().await;
-    for path in ["/", "/docs", "/docs/rapidoc-min.js", "/openapi.json", "/health/live", "/health/ready", "/problems/unauthorized"] {
+    for path in [
+        "/",
+        "/docs",
+        "/docs/rapidoc-min.js",
+        "/openapi.json",
+        "/health/live",
+        "/health/ready",
+        "/problems/unauthorized",
+    ] {
         assert_eq!(server.get(path).send().await.unwrap().status(), 200, "{path}");
     }
 }
@@ -71,7 +81,8 @@ async fn with_too_many_requests_in_work_more_are_refused_at_once_and_health_answ
     let mut held = Vec::new();
     for _ in 0..2 {
         let mut stream = TcpStream::connect(server.address).await.unwrap();
-        let head = "POST /v1/sagging-bar HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: 36\r\n\r\n{";
+        let head =
+            "POST /v1/sagging-bar HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: 36\r\n\r\n{";
         stream.write_all(head.as_bytes()).await.unwrap();
         held.push(stream);
     }

@@ -108,7 +108,8 @@ fn results_survive_a_restart() {
 fn a_folder_in_use_or_a_port_taken_is_said_and_ends_with_1() {
     let process = Process::start();
     let folder = process.folder.to_str().unwrap().to_owned();
-    let output = crate::support::toy_command(&["serve", "--listen", "127.0.0.1:0", "--data", &folder]).output().unwrap();
+    let output =
+        crate::support::toy_command(&["serve", "--listen", "127.0.0.1:0", "--data", &folder]).output().unwrap();
     assert_eq!(output.status.code(), Some(1));
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(said.contains("in use"), "{said}");

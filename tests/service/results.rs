@@ -69,11 +69,9 @@ async fn a_result_is_read_in_every_form_without_computing() {
     assert_eq!(response.status(), 200);
     assert_eq!(header(&response, "precut-cache"), "hit");
     assert_eq!(response.bytes().await.unwrap(), body);
-    for (accept, query, begins) in [
-        ("text/csv", "?table=summary", "max_sag [um]\n"),
-        ("image/svg+xml", "", "<svg"),
-        ("text/x-gcode", "", ""),
-    ] {
+    for (accept, query, begins) in
+        [("text/csv", "?table=summary", "max_sag [um]\n"), ("image/svg+xml", "", "<svg"), ("text/x-gcode", "", "")]
+    {
         let response = server.get(&format!("{location}{query}")).header("accept", accept).send().await.unwrap();
         assert_eq!(response.status(), 200, "{accept}");
         assert!(response.text().await.unwrap().starts_with(begins), "{accept}");

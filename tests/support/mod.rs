@@ -48,7 +48,13 @@ impl Server {
             http::serve(listener, app, stopped, Duration::from_secs(5)).await;
             engine.close().await;
         });
-        Self { address, client: Client::new(), stop, task, _data: data }
+        Self {
+            address,
+            client: Client::builder().no_gzip().no_brotli().build().expect("a plain client"),
+            stop,
+            task,
+            _data: data,
+        }
     }
 
     pub fn url(&self, path: &str) -> String {

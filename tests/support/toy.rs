@@ -4,12 +4,11 @@ use std::time::{Duration, Instant};
 
 use precut::registry::Registry;
 use precut_calc::calculator::{
-    Answer, Axis, Basis, Block, Calculator, CalculatorKind, Check, Column, Cost, Dialect, Example, Failure, Figure,
-    Finding, Item, Measured, MeasuredRow, Message, Meta, Monitor, Panel, Program, Registrar, Role, Table, Violations,
-    checkpoint,
+    Answer, Axis, Basis, Block, Calculator, CalculatorKind, Check, Codes, Column, Cost, Dialect, Example, Failure,
+    Figure, Finding, Item, Measured, MeasuredRow, Message, Meta, Monitor, Panel, Program, Registrar, Role, Table,
+    Violations, checkpoint,
 };
 use serde::{Deserialize, Serialize};
-use serde_json::json;
 use utoipa::ToSchema;
 
 /// Id of the toy.
@@ -20,7 +19,7 @@ pub const JOB: &str = r#"{"length_mm": 500.0, "load_n": 100.0}"#;
 
 /// The registry with the toy in it.
 pub fn registry() -> Registry {
-    Registry::with(|offered| offered.calculator::<Bar>()).expect("the toy is a decent calculator")
+    Registry::with(Registrar::calculator::<Bar>).expect("the toy is a decent calculator")
 }
 
 pub struct Bar;
@@ -37,7 +36,7 @@ pub struct BarJob {
     pub load_n: f64,
     /// Stations along the bar.
     #[serde(default = "ten")]
-    #[schema(minimum = 2, maximum = 200000, default = 10, example = 10, extensions(("x-unit" = json!("1"))))]
+    #[schema(minimum = 2, maximum = 200_000, default = 10, example = 10, extensions(("x-unit" = json!("1"))))]
     pub stations: u32,
     /// What the toy shall do.
     #[serde(default)]
@@ -127,7 +126,14 @@ impl Calculator for Bar {
         references: &["A textbook."],
         examples: &[Example { id: "plain", title: "A plain bar", job: JOB }],
         study_outputs: &["/max_sag_um"],
-        codes: &["load_too_large", "bar_would_break", "path_incomplete", "sag_small"],
+        codes: Codes {
+            faults: &[&["load_too_large"]],
+            failures: &[&["bar_would_break", "path_incomplete"]],
+            warnings: &[],
+            explanations: &[&["sag_small"]],
+            stages: &[],
+            labels: &[&["sag", "place"]],
+        },
         figures: &["sag", "load"],
         tables: &["stations", "summary"],
         has_program: true,
@@ -157,7 +163,8 @@ impl Calculator for Bar {
         }
         let spacing_mm = input.length_mm / f64::from(input.stations - 1);
         let z_mm: Vec<f64> = (0..input.stations).map(|station| f64::from(station) * spacing_mm).collect();
-        let sag_um: Vec<f64> = z_mm.iter().map(|z| 1e-3 * input.load_n * z * (input.length_mm - z) / input.length_mm).collect();
+        let sag_um: Vec<f64> =
+            z_mm.iter().map(|z| 1e-3 * input.load_n * z * (input.length_mm - z) / input.length_mm).collect();
         let max_sag_um = sag_um.iter().copied().fold(0.0, f64::max);
         Ok(Answer {
             output: BarResult { z_mm, sag_um, max_sag_um },
