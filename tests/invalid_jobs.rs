@@ -109,7 +109,7 @@ fn the_other_codes_of_the_specification() {
             "duplicate_effect",
             "/effects/1/kind",
         ),
-        ("/stations", json!({ "kind": "per_zone", "count": 300_000 }), "out_of_range", "/stations/count"),
+        ("/stations", json!({ "kind": "per_zone", "count": 300_000 }), "too_many_stations", "/stations/count"),
         ("/material", json!("steel"), "unknown_field", "/material"),
         ("/shaft/material", json!("unobtainium"), "unknown_material", "/shaft/material"),
     ];
