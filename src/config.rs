@@ -8,6 +8,7 @@ use figment::providers::{Format, Serialized, Toml};
 use figment::value::{Dict, Map, Value};
 use figment::{Figment, Metadata, Profile, Provider};
 use serde::{Deserialize, Serialize};
+use tracing_subscriber::EnvFilter;
 
 /// Every setting with its default and what it means; the source of the defaults.
 pub const DEFAULTS: &str = include_str!("../config.default.toml");
@@ -248,7 +249,7 @@ impl Config {
         if !(limits.job_ms > 0.0 && limits.job_ms.is_finite()) {
             faults.push(format!("limits.job_ms = {}: must be above 0", limits.job_ms));
         }
-        if let Err(error) = self.log.level.parse::<tracing_subscriber::filter::Targets>() {
+        if let Err(error) = EnvFilter::builder().parse(&self.log.level) {
             faults.push(format!("log.level = \"{}\": {error}", self.log.level));
         }
         for (index, key) in self.auth.keys.iter().enumerate() {
@@ -374,7 +375,7 @@ mod tests {
     #[test]
     fn senseless_values_are_all_reported_at_once() {
         let file = "[limits]\njson_bytes = 0\nbody_timeout_s = -1.0\n[cors]\norigins = [\"cam\"]\n\
-                    [auth]\nkeys = [{ name = \"cam\", hash = \"12\" }]\n[log]\nlevel = \"=,loud\"";
+                    [auth]\nkeys = [{ name = \"cam\", hash = \"12\" }]\n[log]\nlevel = \"precut=loud\"";
         let error = load(file, &[], &Flags::default()).unwrap_err().to_string();
         for name in ["json_bytes", "body_timeout_s", "cors.origins", "auth.keys[0]", "log.level"] {
             assert!(error.contains(name), "{name} missing in: {error}");

@@ -20,14 +20,15 @@ pub(crate) struct Ready {
     pub(crate) canonical: Bytes,
 }
 
-/// Reads a job; the first stage that finds faults answers with all of its faults.
+/// Reads a job. What the schema refuses is listed together with what the rules between fields refuse, as far as the
+/// job can be read in spite of its faults.
 pub(crate) fn read(entry: &Arc<Entry>, body: &Body) -> Result<Ready, Error> {
     let (job, parts) = match body {
         Body::Json(job) => (job, [].as_slice()),
         Body::Parts { job, tables } => (job, tables.as_slice()),
     };
     let mut job = json::parse(job)?;
-    check_schema(entry, &mut job, parts)?;
+    check_schema(entry, &mut job, parts).map_err(|found| found.with_rules(entry, &job))?;
     let prepared = entry.prepare(&job).map_err(|unprepared| match unprepared {
         Unprepared::Invalid(findings) => {
             let total = findings.len();
@@ -40,7 +41,44 @@ pub(crate) fn read(entry: &Arc<Entry>, body: &Body) -> Result<Ready, Error> {
     Ok(Ready { entry: Arc::clone(entry), prepared, key, canonical })
 }
 
-fn check_schema(entry: &Entry, job: &mut Value, parts: &[super::TablePart]) -> Result<(), Error> {
+/// What the schema and the tables found.
+struct Found {
+    findings: Vec<Finding>,
+    total: usize,
+}
+
+impl Found {
+    /// With the faults that the rules between fields find in a job that is readable although it breaks its schema.
+    ///
+    /// A rule's fault replaces the schema's at the same place: it knows more. Arrays beyond their most are not looked
+    /// at: their length is what is wrong, and rules may cost more than their length.
+    fn with_rules(mut self, entry: &Entry, job: &Value) -> Error {
+        let overlong = self.findings.iter().any(|finding| general_code(finding) == "too_many_items");
+        if !overlong && self.total <= Error::MOST_FAULTS {
+            for rule in entry.broken_rules(job) {
+                match self.findings.iter_mut().find(|finding| finding.pointer == rule.pointer) {
+                    Some(finding) if finding.code == general_code(finding) => *finding = rule,
+                    Some(_) => {}
+                    None => {
+                        self.findings.push(rule);
+                        self.total += 1;
+                    }
+                }
+            }
+        }
+        invalid(self.findings, self.total)
+    }
+}
+
+/// The general code of a schema's fault, whatever code its field has of its own.
+fn general_code(finding: &Finding) -> &str {
+    match finding.values.get("rule") {
+        Some(precut_calc::calculator::Value::Text(rule)) => rule,
+        _ => finding.code,
+    }
+}
+
+fn check_schema(entry: &Entry, job: &mut Value, parts: &[super::TablePart]) -> Result<(), Found> {
     let mut table_faults = Faults::default();
     let tables = table::resolve(job, parts, entry.tables(), &mut table_faults);
     let mut schema_faults = Faults::default();
@@ -54,7 +92,7 @@ fn check_schema(entry: &Entry, job: &mut Value, parts: &[super::TablePart]) -> R
         .collect();
     let total = schema_faults.total - (listed - findings.len()) + table_faults.total;
     findings.extend(table_faults.listed);
-    if total == 0 { Ok(()) } else { Err(invalid(findings, total)) }
+    if total == 0 { Ok(()) } else { Err(Found { findings, total }) }
 }
 
 /// The faults sorted by pointer, as many as are listed.
@@ -180,7 +218,7 @@ mod tests {
 
     #[test]
     fn a_field_may_have_a_code_of_its_own() {
-        assert_eq!(faults(&with("length_mm", json!(0))), [("toy_bad_length", "/length_mm".to_owned())]);
+        assert!(faults(&with("length_mm", json!(0))).contains(&("toy_bad_length", "/length_mm".to_owned())));
         let finding = only(&with("length_mm", json!("500")));
         assert_eq!((finding.code, finding.values.get("rule")), ("toy_bad_length", Some(&"wrong_type".into())));
         assert_eq!(
@@ -240,6 +278,14 @@ mod tests {
                 ("thicker_than_long", "/segments/2/diameter_mm".to_owned())
             ]
         );
+    }
+
+    #[test]
+    fn rules_are_checked_too_where_the_schema_is_broken_elsewhere() {
+        let mut job = with("segments", json!([{"diameter_mm": 600}]));
+        job["length_mm"] = json!(-5);
+        let codes: Vec<&str> = faults(&job).into_iter().map(|fault| fault.0).collect();
+        assert_eq!(codes, ["toy_bad_length", "thicker_than_long"]);
     }
 
     #[test]

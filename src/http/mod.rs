@@ -35,7 +35,7 @@ use crate::engine::{Engine, Error};
 pub use answer::written;
 pub use codes::CODES;
 pub use negotiate::Media;
-pub use problem::{Fault, Problem, ProblemDocument};
+pub use problem::{Problem, ProblemDocument};
 pub use server::serve;
 
 /// Says whether an answer came from the cache: `hit` or `miss`.

@@ -146,7 +146,7 @@ mod tests {
 
     const ALL: [Media; 4] = [Media::Json, Media::Csv, Media::Svg, Media::Gcode];
 
-    fn with(name: HeaderName, lines: &[&str]) -> HeaderMap {
+    fn with(name: &HeaderName, lines: &[&str]) -> HeaderMap {
         lines.iter().map(|line| (name.clone(), line.parse().unwrap())).collect()
     }
 
@@ -168,9 +168,9 @@ mod tests {
             (&["text/csv;q=2"], None),
             (&["nonsense"], None),
         ] {
-            assert_eq!(media(&with(ACCEPT, accept), &ALL), expected, "{accept:?}");
+            assert_eq!(media(&with(&ACCEPT, accept), &ALL), expected, "{accept:?}");
         }
-        assert_eq!(media(&with(ACCEPT, &["text/x-gcode"]), &ALL[..3]), None);
+        assert_eq!(media(&with(&ACCEPT, &["text/x-gcode"]), &ALL[..3]), None);
     }
 
     #[test]
@@ -185,7 +185,7 @@ mod tests {
             (&["\"b\""], false),
             (&["a"], false),
         ] {
-            assert_eq!(has_already(&with(IF_NONE_MATCH, sent), "\"a\""), expected, "{sent:?}");
+            assert_eq!(has_already(&with(&IF_NONE_MATCH, sent), "\"a\""), expected, "{sent:?}");
         }
     }
 

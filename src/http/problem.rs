@@ -15,7 +15,7 @@ use utoipa::ToSchema;
 
 use crate::engine::Error;
 use crate::store::StoreError;
-use crate::text::{Language, Texts};
+use crate::text::{Language, Notice, Texts};
 
 /// Why a request is not answered, before it is put into words.
 #[derive(Debug, Clone)]
@@ -59,36 +59,10 @@ pub struct ProblemDocument {
     pub instance: Option<String>,
     /// Every fault of the job, ordered by its place; at most 100.
     #[schema(max_items = 100)]
-    pub errors: Vec<Fault>,
+    pub errors: Vec<Notice>,
     /// How many faults there are, listed or not.
     #[schema(minimum = 0, example = 2)]
     pub errors_total: usize,
-}
-
-/// One fault of a job.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct Fault {
-    /// JSON Pointer (RFC 6901) to the field; empty for the whole job.
-    #[schema(example = "/cut/feed_mm_per_rev")]
-    pub pointer: String,
-    /// Stable name of the fault; never changes its meaning.
-    #[schema(example = "above_maximum", pattern = "^[a-z][a-z0-9_]*$")]
-    pub code: &'static str,
-    /// The fault in words: value, limit, unit.
-    #[schema(example = "feed 9 mm/rev is above 5 mm/rev")]
-    pub detail: String,
-    /// The value received or reached, in `unit`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(example = 9.0, nullable = false)]
-    pub value: Option<f64>,
-    /// The limit that it passed, in `unit`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(example = 5.0, nullable = false)]
-    pub limit: Option<f64>,
-    /// Unit of both; `1` for numbers without.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(example = "mm/rev", value_type = String, nullable = false)]
-    pub unit: Option<&'static str>,
 }
 
 impl Problem {
@@ -201,18 +175,8 @@ impl Problem {
     pub fn document(&self, language: Language, instance: Option<String>) -> ProblemDocument {
         let texts = Texts::shared();
         let inner = &*self.0;
-        let errors: Vec<Fault> = inner
-            .findings
-            .iter()
-            .map(|finding| Fault {
-                pointer: finding.pointer.clone(),
-                code: finding.code,
-                detail: texts.finding(language, "fault", finding),
-                value: finding.value.filter(|value| value.is_finite()),
-                limit: finding.limit.filter(|limit| limit.is_finite()),
-                unit: finding.unit,
-            })
-            .collect();
+        let errors: Vec<Notice> =
+            inner.findings.iter().map(|finding| texts.notice(language, "fault", finding)).collect();
         let (title, mut detail) = texts.problem(language, inner.by_finding.unwrap_or(inner.code), &inner.values);
         if let (Some(_), Some(fault)) = (inner.by_finding, errors.first()) {
             detail.clone_from(&fault.detail);

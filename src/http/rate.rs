@@ -73,7 +73,7 @@ mod tests {
         limiter.take("a", start + wait).unwrap();
         limiter.take("a", start + wait).unwrap_err();
         // However long it was idle, no more than a burst.
-        let later = start + Duration::from_secs(3600);
+        let later = start + Duration::from_hours(1);
         assert_eq!((0..10).filter(|_| limiter.take("a", later).is_ok()).count(), 3);
     }
 

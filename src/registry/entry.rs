@@ -125,6 +125,10 @@ impl Entry {
     pub(crate) fn prepare(&self, job: &Value) -> Result<Prepared, Unprepared> {
         self.calculation.prepare(job)
     }
+    /// The rules between fields that a job breaks which the schema refuses; none where it cannot be read at all.
+    pub(crate) fn broken_rules(&self, job: &Value) -> Vec<Finding> {
+        self.calculation.broken_rules(job)
+    }
     /// The pictures of a result, from its job and its envelope as JSON.
     pub(crate) fn figures(&self, input: &[u8], envelope: &[u8]) -> Result<Vec<Figure>, UnreadableResult> {
         self.calculation.figures(input, envelope)
@@ -241,6 +245,7 @@ type MaybeProgram = Option<Result<Program, Failure>>;
 
 trait Calculation: Send + Sync {
     fn prepare(&self, job: &Value) -> Result<Prepared, Unprepared>;
+    fn broken_rules(&self, job: &Value) -> Vec<Finding>;
     fn figures(&self, input: &[u8], envelope: &[u8]) -> Result<Vec<Figure>, UnreadableResult>;
     fn tables(&self, input: &[u8], envelope: &[u8]) -> Result<Vec<Table>, UnreadableResult>;
     fn program(&self, input: &[u8], envelope: &[u8]) -> Result<MaybeProgram, UnreadableResult>;
@@ -273,6 +278,13 @@ impl<C: Calculator> Calculation for Typed<C> {
         let filled = serde_json::to_value(&input)
             .map_err(|error| Unprepared::Failed(Failure::Internal(format!("the filled job: {error}"))))?;
         Ok(Prepared { cost: C::cost(&input), input: filled, job: Box::new(TypedJob::<C>(input)) })
+    }
+    fn broken_rules(&self, job: &Value) -> Vec<Finding> {
+        let mut violations = Violations::default();
+        if let Ok(input) = C::Input::deserialize(job) {
+            input.check(&mut violations);
+        }
+        violations.into_vec()
     }
     fn figures(&self, input: &[u8], envelope: &[u8]) -> Result<Vec<Figure>, UnreadableResult> {
         let (input, output) = read::<C>(input, envelope)?;

@@ -1,8 +1,7 @@
 //! What many operations of the contract share: headers, problems, the envelope of an answer.
 
-use serde::Serialize;
+use precut_calc::calculator::Basis;
 use serde_json::{Value, json};
-use utoipa::ToSchema;
 use utoipa::openapi::content::ContentBuilder;
 use utoipa::openapi::header::{Header, HeaderBuilder};
 use utoipa::openapi::path::{OperationBuilder, Parameter, ParameterBuilder, ParameterIn};
@@ -12,6 +11,7 @@ use utoipa::openapi::security::SecurityRequirement;
 use utoipa::openapi::{Content, Object, Ref, RefOr, Required, Schema};
 
 use crate::http::problem::ProblemDocument;
+use crate::text::Remark;
 
 pub(super) const BEARER: &str = "bearer";
 
@@ -23,62 +23,10 @@ pub(super) const TAGS: [(&str, &str); 5] = [
     ("service", "Health, figures, documentation."),
 ];
 
-/// A sentence about an answer: what dominates it, what binds, what would help.
-#[derive(Serialize, ToSchema)]
-#[schema(as = Explanation)]
-#[allow(dead_code)] // only its schema is used: the engine writes the envelope
-pub(super) struct Explanation {
-    /// Stable name of the sentence.
-    #[schema(example = "work_dominates")]
-    code: String,
-    /// The sentence.
-    text: String,
-    /// The numbers in it, by name.
-    #[schema(value_type = Object)]
-    values: Value,
-}
-
-/// Where an input leaves a formula's range of validity, and the like.
-#[derive(Serialize, ToSchema)]
-#[schema(as = Warning)]
-#[allow(dead_code)]
-pub(super) struct Warning {
-    /// Stable name of the warning.
-    #[schema(example = "extrapolated_force_model")]
-    code: String,
-    /// JSON Pointer to the field of the job; empty for the whole job.
-    #[schema(example = "/cut/feed_mm_per_rev")]
-    pointer: String,
-    /// The warning in words.
-    detail: String,
-    /// The value received or reached, in `unit`.
-    #[schema(example = 0.8, nullable = true)]
-    value: Option<f64>,
-    /// The limit that it passed, in `unit`.
-    #[schema(example = 0.6, nullable = true)]
-    limit: Option<f64>,
-    /// Unit of both; `1` for numbers without.
-    #[schema(example = "mm/rev", nullable = true)]
-    unit: Option<String>,
-}
-
-/// An equation that acted.
-#[derive(Serialize, ToSchema)]
-#[schema(as = Basis)]
-#[allow(dead_code)]
-pub(super) struct Basis {
-    /// Its number in the documentation of the physics.
-    #[schema(example = "deflection/4.2")]
-    equation: String,
-    /// Where it comes from.
-    source: String,
-}
-
 /// Schemas that every contract has.
 pub(super) fn schemas() -> Vec<(String, RefOr<Schema>)> {
     let mut schemas = super::schemas_of::<ProblemDocument>();
-    schemas.extend(super::schemas_of::<Explanation>());
-    schemas.extend(super::schemas_of::<Warning>());
+    schemas.extend(super::schemas_of::<Remark>());
     schemas.extend(super::schemas_of::<Basis>());
     schemas
 }

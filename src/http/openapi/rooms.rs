@@ -146,8 +146,6 @@ fn envelope(meta: &Meta, result: &str) -> Object {
     let anything = |text: &str| {
         ObjectBuilder::new().additional_properties(Some(AdditionalProperties::FreeForm(true))).description(Some(text))
     };
-    let model = anything("The stored model that was asked for: name, revision, sha256; null if none.")
-        .schema_type(SchemaType::from_iter([Type::Object, Type::Null]));
     let effects = ArrayBuilder::new()
         .items(anything("An effect with its `kind` and parameters."))
         .description(Some("Every effect that acted."));
@@ -165,21 +163,16 @@ fn envelope(meta: &Meta, result: &str) -> Object {
             "input",
             anything("The job with every default filled in; measured tables in it as their row count and hash."),
         )
-        .property("model", model)
         .property("effects", effects)
         .property("result", Ref::from_schema_name(result))
-        .property(
-            "explanation",
-            list("Explanation", "What dominates, what binds, what would help: most important first."),
-        )
-        .property("warnings", list("Warning", "Where an input leaves a formula's range of validity, and the like."))
+        .property("explanation", list("Remark", "What dominates, what binds, what would help: most important first."))
+        .property("warnings", list("Notice", "Where an input leaves a formula's range of validity, and the like."))
         .property("basis", list("Basis", "The equations that acted, with their sources."))
         .required("calculator")
         .required("version")
         .required("engine")
         .required("key")
         .required("input")
-        .required("model")
         .required("effects")
         .required("result")
         .required("explanation")

@@ -52,6 +52,10 @@ pub struct Job {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schema(max_items = 20, extensions(("x-group" = json!("cut")), ("x-advanced" = json!(true))))]
     pub passes: Vec<Pass>,
+    /// How far the answer goes.
+    #[serde(default)]
+    #[schema(default = "full", example = "full")]
+    pub detail: Detail,
     /// What the drawing allows.
     #[serde(default)]
     #[schema(extensions(("x-group" = json!("workpiece"))))]
@@ -481,6 +485,18 @@ pub struct Pass {
     #[serde(default)]
     #[schema(default = false, example = true)]
     pub compensated: bool,
+}
+
+/// How far the answer goes.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Detail {
+    /// Everything: profile, command, path in straight moves with its prediction, comparison, advice.
+    #[default]
+    Full,
+    /// The profile along the shaft, the exact command and the form alone, for studies and live pictures: several
+    /// times faster, a third of the size.
+    Profile,
 }
 
 /// What the drawing allows, on the diameter.

@@ -24,6 +24,7 @@ pub use table::{ForceRow, ForceTable};
 
 use crate::calculator::{Basis, Finding, Violations};
 use serde::{Deserialize, Serialize};
+use utoipa::openapi::extensions::Extensions;
 use utoipa::openapi::schema::OneOfBuilder;
 use utoipa::openapi::{RefOr, Schema};
 use utoipa::{PartialSchema, ToSchema};
@@ -115,6 +116,7 @@ impl PartialSchema for ForceModel {
                 .item(schema::choice("constant", Constant::schema()))
                 .item(schema::choice("table", ForceTable::schema()))
                 .description(Some("Cutting forces over depth, feed and speed."))
+                .extensions(Some(Extensions::builder().add("x-code", "unknown_force_model").build()))
                 .build(),
         ))
     }
