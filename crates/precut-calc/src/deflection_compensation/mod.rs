@@ -135,12 +135,12 @@ impl Calculator for DeflectionCompensation {
         // Measured: about 0.3 us per station and cut; each rest that opens and closes solves a contact problem anew.
         let contacts = job.supports.iter().filter(|s| !s.carries()).count() as f64;
         let us = stations * (passes + 1.0) * (0.5 + 1.5 * contacts);
-        let bytes = stations * (passes * 80.0 + 400.0) + 1e5;
+        let bytes = 100_000 + station_count(job) as u64 * (400 + 80 * job.passes.len() as u64);
         let driver = match job.stations {
             Stations::PerZone { .. } => "/stations/count",
             Stations::List { .. } => "/stations/z_mm",
         };
-        Cost { ms: 0.05 + us / 1000.0, bytes: bytes as u64, driver }
+        Cost { ms: 0.05 + us / 1000.0, bytes, driver }
     }
 
     fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
