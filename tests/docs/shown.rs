@@ -42,8 +42,7 @@ pub(crate) fn lines(shown: &str, came: &str) -> Result<(), String> {
 
 fn lines_fit(shown: &[&str], came: &[&str]) -> bool {
     match (shown, came) {
-        ([], []) => true,
-        ([ANYTHING], _) => true,
+        ([], []) | ([ANYTHING], _) => true,
         ([ANYTHING, rest @ ..], _) => (0..=came.len()).any(|skip| lines_fit(rest, &came[skip..])),
         ([first, shown @ ..], [line, came @ ..]) => fits(first, line) && lines_fit(shown, came),
         _ => false,
@@ -143,7 +142,6 @@ fn compare(shown: &Value, came: &Value, place: &str) -> Result<(), String> {
 fn elements_fit(shown: &[Value], came: &[Value], place: &str) -> Result<(), String> {
     match (shown, came) {
         ([], []) => Ok(()),
-        ([Value::String(dots)], _) if dots == ANYTHING => Ok(()),
         ([Value::String(dots), rest @ ..], _) if dots == ANYTHING => {
             let fits = (0..=came.len()).any(|skip| elements_fit(rest, &came[skip..], place).is_ok());
             if fits { Ok(()) } else { Err(format!("at {place:?}: none of the elements fits")) }
