@@ -18,7 +18,8 @@ const DEEPEST: usize = 64;
 /// Component schemas by name.
 pub(super) type Components = BTreeMap<String, Value>;
 
-/// The schema with `allOf` parts joined and extensions in alphabetical order (`utoipa` holds them in a hash map).
+/// The schema with `allOf` parts joined, extensions in alphabetical order (`utoipa` holds them in a hash map), and a
+/// description where `utoipa` leaves none or puts it out of sight.
 pub(super) fn tidy(schema: &Value, components: &Components) -> Value {
     match schema {
         Value::Object(map) => {
@@ -29,10 +30,27 @@ pub(super) fn tidy(schema: &Value, components: &Components) -> Value {
                 own.into_iter().map(|(name, part)| (name.clone(), tidy(part, components))).collect();
             let sorted: BTreeMap<_, _> = extensions.into_iter().collect();
             tidied.extend(sorted.into_iter().map(|(name, part)| (name.clone(), part.clone())));
+            describe(&mut tidied);
             Value::Object(tidied)
         }
         Value::Array(items) => items.iter().map(|item| tidy(item, components)).collect(),
         other => other.clone(),
+    }
+}
+
+/// Says what a tag is for, and lifts the description of an optional field from its one form to the field.
+fn describe(schema: &mut Map<String, Value>) {
+    if let Some(Value::Object(kind)) = schema.get_mut("properties").and_then(|fields| fields.get_mut("kind")) {
+        kind.entry("description").or_insert_with(|| json!("Which of the choices this is."));
+    }
+    if schema.contains_key("description") {
+        return;
+    }
+    if let Some(Value::Array(forms)) = schema.get_mut("oneOf")
+        && forms.iter().any(|form| *form == json!({ "type": "null" }))
+        && let Some(description) = forms.iter_mut().find_map(|form| form.as_object_mut()?.remove("description"))
+    {
+        schema.insert("description".to_owned(), description);
     }
 }
 

@@ -12,7 +12,7 @@ const UM: f64 = 1e-3;
 /// Every list that a case may expect, and where it stands in the answer.
 fn lists(outcome: &Outcome) -> Vec<(&'static str, Vec<Option<f64>>)> {
     let s = &outcome.stations;
-    let one = &outcome.one_step;
+    let one = outcome.one_step.as_ref().unwrap();
     let zeros = || vec![0.0; s.z_mm.len()];
     let depth_commanded: Vec<Option<f64>> = s
         .commanded_diameter_mm
@@ -186,10 +186,10 @@ fn scalar_equation_in_both_models() {
             ("y_nominal", Some(s.deflection_um[0] * UM)),
             ("command_exact", commanded),
             ("engaged_depth_uncompensated", one(&s.depth_uncompensated_mm)),
-            ("paper_i", one(&outcome.one_step.factor)),
-            ("paper_depth", one(&outcome.one_step.depth_mm)),
-            ("paper_overcut_radial", one(&outcome.one_step.diameter_error_um).map(|e| -e * UM / 2.0)),
-            ("command_commanded_model", one(&outcome.one_step.depth_commanded_model_mm)),
+            ("paper_i", one(&outcome.one_step.as_ref().unwrap().factor)),
+            ("paper_depth", one(&outcome.one_step.as_ref().unwrap().depth_mm)),
+            ("paper_overcut_radial", one(&outcome.one_step.as_ref().unwrap().diameter_error_um).map(|e| -e * UM / 2.0)),
+            ("command_commanded_model", one(&outcome.one_step.as_ref().unwrap().depth_commanded_model_mm)),
             ("copying_factor_at_uncompensated", one(&s.copying_factor)),
         ] {
             assert!(case.get(key).is_some(), "the case has no {key}");

@@ -66,6 +66,7 @@ impl<R: MeasuredRow> PartialSchema for Measured<R> {
         extensions.insert("x-table".to_owned(), true.into());
         RefOr::T(Schema::OneOf(
             OneOfBuilder::new()
+                .description(Some("A measured table: rows, or the same as CSV text, or a file part of this name."))
                 .item(Schema::Array(rows))
                 .item(Schema::Object(csv))
                 .extensions(Some(extensions))

@@ -128,10 +128,10 @@ impl Acting {
         let (structure, force) = (&mut self.structure, &mut self.force);
         match *effect {
             Effect::HeadstockCompliance { delta_um_per_n } => {
-                structure.headstock_mm_per_n += delta_um_per_n * MM_PER_UM
+                structure.headstock_mm_per_n += delta_um_per_n * MM_PER_UM;
             }
             Effect::TailstockCompliance { delta_um_per_n } => {
-                structure.tailstock_mm_per_n += delta_um_per_n * MM_PER_UM
+                structure.tailstock_mm_per_n += delta_um_per_n * MM_PER_UM;
             }
             Effect::CarriageCompliance { delta_um_per_n } => structure.carriage_mm_per_n += delta_um_per_n * MM_PER_UM,
             Effect::BendingScale { delta } => structure.flexibility *= 1.0 + delta,

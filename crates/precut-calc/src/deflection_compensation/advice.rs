@@ -155,13 +155,15 @@ pub(super) fn diameter_uncertainty_um(job: &Job, acting: &Acting, stage: &Stage)
 /// The answer in words, most important first.
 pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
     let mut said = vec![nominal_path(&outcome.before), dominating(&outcome.shares)];
-    said.push(match (outcome.form_error_after_um, outcome.largest_error_after_um) {
-        (Some(form), Some(largest)) => Message::new("compensated_path_leaves")
-            .with("form_error_um", form)
-            .with("largest_error_um", largest)
-            .with("moves", f64::from(outcome.path.moves)),
-        _ => Message::new("path_has_gaps").with("stations", without_command(outcome)),
-    });
+    if let Some(path) = &outcome.path {
+        said.push(match (outcome.form_error_after_um, outcome.largest_error_after_um) {
+            (Some(form), Some(largest)) => Message::new("compensated_path_leaves")
+                .with("form_error_um", form)
+                .with("largest_error_um", largest)
+                .with("moves", f64::from(path.moves)),
+            _ => Message::new("path_has_gaps").with("stations", without_command(outcome)),
+        });
+    }
     let uncertainty = outcome.stations.diameter_uncertainty_um.iter().copied().fold(0.0, f64::max);
     said.push(
         Message::new("uncertain_by")
@@ -178,7 +180,8 @@ pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
                 .with("before_um", outcome.form_error_um.unwrap_or(0.0)),
         );
     }
-    let overcut = outcome.one_step.diameter_error_um.iter().flatten().copied().fold(0.0, f64::min);
+    let overcut =
+        outcome.one_step.iter().flat_map(|step| &step.diameter_error_um).flatten().copied().fold(0.0, f64::min);
     if overcut < 0.0 {
         said.push(Message::new("one_step_overcuts").with("undersize_um", -overcut));
     }
@@ -224,7 +227,7 @@ pub(super) fn warnings(job: &Job, grid: &Grid, stage: &Stage, outcome: &Outcome)
     found.extend(structure_warnings(job, stage, outcome));
     found.extend(command_warnings(job, stage, outcome));
     found.extend(force_warnings(job, stage));
-    found.extend(super::second_order::left_out(job, &outcome.second_order));
+    found.extend(outcome.second_order.iter().flat_map(|sizes| super::second_order::left_out(job, sizes)));
     if let (Some(limit), Some(form)) = (job.tolerance.form_um, outcome.form_error_after_um)
         && form > limit
     {
@@ -280,7 +283,7 @@ fn structure_warnings(job: &Job, stage: &Stage, outcome: &Outcome) -> Vec<Findin
             ));
         }
     }
-    if let Some(ratio) = outcome.second_order.thrust_ratio.filter(|r| *r > THRUST_RATIO) {
+    if let Some(ratio) = outcome.second_order.as_ref().and_then(|s| s.thrust_ratio).filter(|r| *r > THRUST_RATIO) {
         found.push(Finding::new("thrust_near_buckling", "/force").measured(ratio, THRUST_RATIO, "1"));
     }
     let length: f64 = job.shaft.segments.iter().map(|s| s.length_mm).sum();
@@ -289,7 +292,7 @@ fn structure_warnings(job: &Job, stage: &Stage, outcome: &Outcome) -> Vec<Findin
         found.push(
             Finding::new("shear_neglected", "/shaft/theory")
                 .measured(length / thickest, SLENDER, "1")
-                .with("shear_um", outcome.second_order.shear_um.unwrap_or(0.0)),
+                .with("shear_um", outcome.second_order.as_ref().and_then(|s| s.shear_um).unwrap_or(0.0)),
         );
     }
     found
@@ -322,8 +325,8 @@ fn command_warnings(job: &Job, stage: &Stage, outcome: &Outcome) -> Vec<Finding>
     if let Some(limit) = job.limits.slope {
         let steepest = outcome
             .path
-            .zones
             .iter()
+            .flat_map(|path| &path.zones)
             .flat_map(|zone| zone.z_mm.windows(2).zip(zone.delta_x_um.windows(2)))
             .map(|(z, x)| ((x[1] - x[0]) / 2.0 / UM_PER_MM / (z[1] - z[0])).abs())
             .fold(0.0, f64::max);

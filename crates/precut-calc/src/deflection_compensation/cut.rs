@@ -33,6 +33,8 @@ pub(super) struct CutLine {
     pub copying: Vec<Option<f64>>,
     /// Largest residual of the equilibrium equation, mm.
     pub residual_mm: f64,
+    /// Lost depth over its linear estimate at the station before: along a shaft it hardly changes.
+    loss_ratio: f64,
 }
 
 impl CutLine {
@@ -65,6 +67,7 @@ impl CutLine {
             status_uncompensated: Vec::with_capacity(n),
             copying: Vec::with_capacity(n),
             residual_mm: 0.0,
+            loss_ratio: 1.0,
         }
     }
 
@@ -98,7 +101,12 @@ impl CutLine {
     /// What the nominal path r_c = r_t gives.
     fn predict_uncompensated(&mut self, line: &Line, radii: &Radii, i: usize) {
         let (target, stock) = (radii.target[i], radii.stock[i]);
-        let engagement = line.engage(i, stock, target, self.guess_mm(i, stock - target));
+        let commanded = stock - target;
+        let linear_loss = commanded - self.guess_mm(i, commanded);
+        let engagement = line.engage(i, stock, target, commanded - self.loss_ratio * linear_loss);
+        if let Engagement::Cut { depth_mm, .. } = engagement {
+            self.loss_ratio = if linear_loss.abs() > 0.0 { (commanded - depth_mm) / linear_loss } else { 1.0 };
+        }
         self.status_uncompensated.push(match engagement {
             Engagement::Cut { .. } => StatusUncompensated::Ok,
             Engagement::NoContact => StatusUncompensated::NoContact,

@@ -195,7 +195,7 @@ mod tests {
             let depth = |z: f64| engage(r0, r0 - tc, tc, Opening::default(), power(k, z)).depth_mm();
             // Round-off of R0 - r_c is 7e-15 mm, 7e-12 of the least depth; the closed forms cancel as much.
             prop_assert!(close(depth(1.0), tc / (1.0 + k), 1e-10));
-            let root = (-k + (k * k + 4.0 * tc).sqrt()) / 2.0;
+            let root = 2.0 * tc / (k + (k * k + 4.0 * tc).sqrt());
             prop_assert!(close(depth(0.5), root * root, 1e-8));
             prop_assert!(close(depth(2.0), 2.0 * tc / (1.0 + (1.0 + 4.0 * k * tc).sqrt()), 1e-10));
         }
@@ -231,7 +231,7 @@ mod tests {
         fn commanded_model_meets_its_closed_forms(k in 1e-4..0.9_f64, a in 0.01..2.0_f64) {
             let y = |z: f64| move |t: f64| (k * t.powf(z), k * z * t.powf(z - 1.0));
             prop_assert!(close(commanded_model_depth_mm(a, a, 1.0, y(1.0)).unwrap(), a / (1.0 - k), 1e-12));
-            let root = (k + (k * k + 4.0 * a).sqrt()) / 2.0;
+            let root = f64::midpoint(k, (k * k + 4.0 * a).sqrt());
             prop_assert!(close(commanded_model_depth_mm(a, a, 0.5, y(0.5)).unwrap(), root * root, 1e-12));
             match commanded_model_depth_mm(a, a, 2.0, y(2.0)) {
                 // Near the fold the root is as sensitive as the square root of the data.

@@ -1,6 +1,9 @@
 //! The job: a shaft, how it is held, and the cut.
 
 use serde::{Deserialize, Serialize};
+use utoipa::openapi::Schema;
+use utoipa::openapi::extensions::Extensions;
+use utoipa::openapi::schema::{ArrayBuilder, ObjectBuilder, SchemaType, Type};
 use utoipa::{PartialSchema, ToSchema};
 
 use crate::calculator::{Dialect, Measured, MeasuredRow};
@@ -52,6 +55,10 @@ pub struct Job {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schema(max_items = 20, extensions(("x-group" = json!("cut")), ("x-advanced" = json!(true))))]
     pub passes: Vec<Pass>,
+    /// How far the answer goes.
+    #[serde(default)]
+    #[schema(default = "full", example = "full")]
+    pub detail: Detail,
     /// What the drawing allows.
     #[serde(default)]
     #[schema(extensions(("x-group" = json!("workpiece"))))]
@@ -431,9 +438,27 @@ pub enum Stations {
     /// These, ascending. On a shoulder the segment that ends there counts.
     List {
         /// Stations from the headstock end.
-        #[schema(min_items = 1, max_items = 200_000, example = json!([0.0, 500.0, 1000.0, 1500.0, 2000.0]), extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("z"))))]
+        #[schema(schema_with = station_list)]
         z_mm: Vec<f64>,
     },
+}
+
+/// Ranges of the list's items, which utoipa's attributes do not reach.
+fn station_list() -> Schema {
+    let extensions = Extensions::builder().add("x-unit", "mm").add("x-symbol", "z").build();
+    let station = ObjectBuilder::new()
+        .schema_type(SchemaType::new(Type::Number))
+        .minimum(Some(0.0))
+        .maximum(Some(20_000_000.0))
+        .examples([500.0])
+        .extensions(Some(extensions));
+    ArrayBuilder::new()
+        .items(station)
+        .min_items(Some(1))
+        .max_items(Some(MAX_STATIONS))
+        .description(Some("Stations from the headstock end."))
+        .examples([[0.0, 500.0, 1000.0, 1500.0, 2000.0]])
+        .into()
 }
 
 impl Default for Stations {
@@ -481,6 +506,18 @@ pub struct Pass {
     #[serde(default)]
     #[schema(default = false, example = true)]
     pub compensated: bool,
+}
+
+/// How far the answer goes.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Detail {
+    /// Everything: profile, command, path in straight moves with its prediction, comparison, advice.
+    #[default]
+    Full,
+    /// The profile along the shaft, the exact command and the form alone, for studies and live pictures: several
+    /// times faster, a third of the size.
+    Profile,
 }
 
 /// What the drawing allows, on the diameter.

@@ -33,8 +33,9 @@ mod toolpath;
 pub use form::{Deviation, Extremum, ExtremumKind, Form, FormClass};
 pub use forward::{DeflectionPoint, DeflectionRun};
 pub use input::{
-    Carriage, Cut, FeedDirection, Gravity, Include, Job, Limits, MAX_STATIONS, Pass, PathSettings, ProgramSettings,
-    ProgramZero, Section, Segment, Shaft, SpeedDiameter, Stations, StockRow, Support, Theory, Tolerance, Uncertainty,
+    Carriage, Cut, Detail, FeedDirection, Gravity, Include, Job, Limits, MAX_STATIONS, Pass, PathSettings,
+    ProgramSettings, ProgramZero, Section, Segment, Shaft, SpeedDiameter, Stations, StockRow, Support, Theory,
+    Tolerance, Uncertainty,
 };
 pub use output::{
     OneMoreRest, OneStep, Outcome, PassOutcome, Path, PathZone, SecondOrder, Shares, StationColumns, StatusCompensated,
@@ -134,12 +135,12 @@ impl Calculator for DeflectionCompensation {
         // Measured: about 0.3 us per station and cut; each rest that opens and closes solves a contact problem anew.
         let contacts = job.supports.iter().filter(|s| !s.carries()).count() as f64;
         let us = stations * (passes + 1.0) * (0.5 + 1.5 * contacts);
-        let bytes = stations * (passes * 80.0 + 400.0) + 1e5;
+        let bytes = 100_000 + station_count(job) as u64 * (400 + 80 * job.passes.len() as u64);
         let driver = match job.stations {
             Stations::PerZone { .. } => "/stations/count",
             Stations::List { .. } => "/stations/z_mm",
         };
-        Cost { ms: 0.05 + us / 1000.0, bytes: bytes as u64, driver }
+        Cost { ms: 0.05 + us / 1000.0, bytes, driver }
     }
 
     fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
@@ -171,17 +172,33 @@ fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
     let grid = Grid::of(job);
     let acting = Acting::of(&job.effects, &job.conditions, job.cut.feed_direction);
     let (mut stage, passes) = all_cuts(job, &grid, &acting, monitor)?;
-    monitor.progress(0.6, Message::new("stage_path"));
-    let cut = &mut stage.cut;
-    let programmed = toolpath::programmed(job, &grid, &cut.command_mm, &cut.status_compensated, monitor)?;
-    let produced = cut.produced_mm(&stage.line, &stage.radii, &programmed.command_mm, monitor)?;
+    let driven = match job.detail {
+        Detail::Profile => None,
+        Detail::Full => {
+            monitor.progress(0.6, Message::new("stage_path"));
+            Some(drive(job, &grid, &mut stage, monitor)?)
+        }
+    };
     monitor.progress(0.8, Message::new("stage_advice"));
-    let outcome =
-        Assembly { job, grid: &grid, acting: &acting, stage: &stage }.outcome(programmed.path, &produced, passes)?;
+    let outcome = Assembly { job, grid: &grid, acting: &acting, stage: &stage }.outcome(driven, passes)?;
     let warnings = advice::warnings(job, &grid, &stage, &outcome);
     let explanation = advice::explanation(job, &outcome);
     monitor.progress(1.0, Message::new("stage_done"));
     Ok(Answer { output: outcome, warnings, explanation, basis: basis(job) })
+}
+
+/// The path as programmed and the radius that it produces, mm.
+struct Driven {
+    path: Path,
+    produced_mm: Vec<Option<f64>>,
+}
+
+/// Cuts the command into straight moves and predicts what they give.
+fn drive(job: &Job, grid: &Grid, stage: &mut Stage, monitor: &dyn Monitor) -> Result<Driven, Failure> {
+    let cut = &mut stage.cut;
+    let programmed = toolpath::programmed(job, grid, &cut.command_mm, &cut.status_compensated, monitor)?;
+    let produced_mm = cut.produced_mm(&stage.line, &stage.radii, &programmed.command_mm, monitor)?;
+    Ok(Driven { path: programmed.path, produced_mm })
 }
 
 /// What an outcome is put together from.
@@ -193,11 +210,12 @@ struct Assembly<'a> {
 }
 
 impl Assembly<'_> {
-    fn outcome(&self, path: Path, produced: &[Option<f64>], passes: Vec<PassOutcome>) -> Result<Outcome, Failure> {
+    fn outcome(&self, driven: Option<Driven>, passes: Vec<PassOutcome>) -> Result<Outcome, Failure> {
         let Self { job, grid, acting, stage } = *self;
-        let stations = self.stations(produced);
+        let full = job.detail == Detail::Full;
+        let stations = self.stations(driven.as_ref().map(|driven| driven.produced_mm.as_slice()));
         let before = Form::of(&grid.z_mm, &stations.diameter_error_uncompensated_um);
-        let after = Form::of(&grid.z_mm, &stations.diameter_error_compensated_um);
+        let after = stations.diameter_error_compensated_um.as_ref().map(|errors| Form::of(&grid.z_mm, errors));
         let time = if job.passes.is_empty() {
             regime::cutting_time_min(job, &stage.regime, None)
         } else {
@@ -210,24 +228,24 @@ impl Assembly<'_> {
         let largest_mm = stage.cut.y_mm.iter().fold(0.0, |most: f64, y| most.max(y.abs()));
         Ok(Outcome {
             form_error_um: before.form_error_um,
-            form_error_after_um: after.form_error_um,
+            form_error_after_um: after.as_ref().and_then(|form| form.form_error_um),
             largest_error_um: largest(&before),
-            largest_error_after_um: largest(&after),
+            largest_error_after_um: after.as_ref().and_then(largest),
             cutting_time_min: time,
             before,
             after,
-            path,
+            path: driven.map(|driven| driven.path),
             shares: advice::shares(job, grid, stage),
-            second_order: second_order::second_order(job, grid, acting, stage)?,
-            one_more_rest: advice::one_more_rest(job, grid, acting, stage)?,
-            one_step: one_step(&stage.line, &stage.radii, &stage.cut, job.force.depth_exponent()),
+            second_order: if full { Some(second_order::second_order(job, grid, acting, stage)?) } else { None },
+            one_more_rest: if full { advice::one_more_rest(job, grid, acting, stage)? } else { None },
+            one_step: full.then(|| one_step(&stage.line, &stage.radii, &stage.cut, job.force.depth_exponent())),
             passes,
             numerical_error_um: 2.0 * (stage.cut.residual_mm + COMPLIANCE_ACCURACY * largest_mm) * UM_PER_MM,
             stations,
         })
     }
 
-    fn stations(&self, produced: &[Option<f64>]) -> StationColumns {
+    fn stations(&self, produced: Option<&[Option<f64>]>) -> StationColumns {
         let Self { job, grid, acting, stage } = *self;
         let Stage { line, radii, cut, .. } = stage;
         let n = grid.len();
@@ -251,9 +269,10 @@ impl Assembly<'_> {
             diameter_error_uncompensated_um: cut.uncompensated_errors_um(radii),
             offset_um: (0..n).map(|i| cut.command_mm[i].map(|r| (r - radii.target[i]) * UM_PER_MM)).collect(),
             commanded_diameter_mm: cut.command_mm.iter().map(|r| r.map(|r| 2.0 * r)).collect(),
-            diameter_error_compensated_um: (0..n)
-                .map(|i| produced[i].map(|r| 2.0 * (r - radii.target[i]) * UM_PER_MM))
-                .collect(),
+            diameter_error_compensated_um: produced.map(|produced| {
+                let error = |(r, target): (&Option<f64>, &f64)| r.map(|r| 2.0 * (r - target) * UM_PER_MM);
+                produced.iter().zip(&radii.target).map(error).collect()
+            }),
             diameter_uncertainty_um: advice::diameter_uncertainty_um(job, acting, stage),
             copying_factor: cut.copying.clone(),
             status_uncompensated: cut.status_uncompensated.clone(),
@@ -287,7 +306,7 @@ fn basis(job: &Job) -> Vec<Basis> {
 /// Everything that this calculator may utter, from where it is said.
 const CODES: Codes = Codes {
     faults: &[check::CODES, force::FAULT_CODES],
-    failures: &[&["path_incomplete", "pass_without_command"]],
+    failures: &[&["path_incomplete", "path_not_computed", "pass_without_command"]],
     warnings: &[advice::WARNING_CODES, second_order::WARNING_CODES, force::WARNING_CODES],
     explanations: &[advice::EXPLANATION_CODES],
     stages: &[&["stage_pass", "stage_path", "stage_advice", "stage_done"]],

@@ -52,6 +52,10 @@ pub(super) struct Line {
     laws: StationLaws,
     with_main: bool,
     with_feed: bool,
+    /// Factor and exponent of every law where nothing but a rising power of the depth acts.
+    powers: Option<Vec<(f64, f64)>>,
+    /// Nothing opens the gap before a chip forms: no rubbing, no sag, no stated error.
+    closed_at_zero: bool,
 }
 
 /// Force laws at the stations, effects in them: one for every speed and hardness that differ.
@@ -87,7 +91,7 @@ pub(super) struct Ingredients<'a> {
 impl Line {
     /// Everything along the shaft that no depth changes; `profile` holds what [`wanted`] of the job says.
     pub(super) fn of(from: &Ingredients<'_>, profile: Profile) -> Self {
-        let Ingredients { job, grid, structure, regime, radii, .. } = *from;
+        let Ingredients { job, grid, acting, structure, regime, radii, .. } = *from;
         let include = &job.include;
         let Profile { radial_mm_per_n, couple_per_n, tangential_mm_per_n, sag_radial_mm, sag_tangential_mm, contacts } =
             profile;
@@ -116,6 +120,11 @@ impl Line {
                 tangential_offset_mm[i] = gravity_tangential * sag_tangential_mm[i];
             }
         }
+        let laws = StationLaws::of(from);
+        let closed_at_zero =
+            !include.weight && !acting.has_errors() && laws.laws.iter().all(|law| law.limit() == Forces::default());
+        let only_passive = !include.tangential && !include.axial_moment && !include.weight && contacts.is_none();
+        let powers = only_passive.then(|| laws.powers()).flatten();
         Self {
             work_mm_per_n: radial_mm_per_n,
             carriage_mm_per_n: structure.carriage_mm_per_n,
@@ -127,9 +136,11 @@ impl Line {
             contacts,
             gravity_radial: if include.weight { gravity_radial } else { 0.0 },
             arm_mm,
-            laws: StationLaws::of(from),
+            laws,
             with_main: needs_main(include),
             with_feed: include.axial_moment,
+            closed_at_zero,
+            powers,
         }
     }
 
@@ -209,8 +220,35 @@ impl Line {
 
     /// What a command does at a station; `start_mm` is a guess of the engaged depth.
     pub(super) fn engage(&self, i: usize, stock_radius_mm: f64, command_mm: f64, start_mm: f64) -> Engagement {
-        engage(stock_radius_mm, command_mm, start_mm, self.opening(i, &self.loads_at_zero(i)), |t| {
-            self.opening_at(i, t)
+        if let Some(powers) = &self.powers {
+            return self.engage_by_power(
+                i,
+                powers[self.laws.of_station[i] as usize],
+                stock_radius_mm,
+                command_mm,
+                start_mm,
+            );
+        }
+        let at_zero = if self.closed_at_zero { Opening::default() } else { self.opening(i, &self.loads_at_zero(i)) };
+        engage(stock_radius_mm, command_mm, start_mm, at_zero, |t| self.opening_at(i, t))
+    }
+
+    /// The same where nothing but a pure power of the depth acts on bilateral supports: y = W C t^z + e.
+    #[inline]
+    fn engage_by_power(
+        &self,
+        i: usize,
+        (factor_n, exponent): (f64, f64),
+        stock_radius_mm: f64,
+        command_mm: f64,
+        start_mm: f64,
+    ) -> Engagement {
+        let stiffness = self.compliance_mm_per_n(i) * factor_n;
+        let offset = self.radial_offset_mm[i];
+        let at_zero = Opening { y_mm: offset, ..Opening::default() };
+        engage(stock_radius_mm, command_mm, start_mm, at_zero, |t| {
+            let y = stiffness * (exponent * t.ln()).exp();
+            Opening { y_mm: y + offset, y_slope: exponent * y / t, z_mm: 0.0, z_slope: 0.0 }
         })
     }
 
@@ -282,6 +320,11 @@ impl StationLaws {
             laws.of_station.push(u32::try_from(laws.laws.len() - 1).unwrap_or(u32::MAX));
         }
         laws
+    }
+
+    /// Factor and exponent of the passive force of every law, where all are rising powers of the depth.
+    fn powers(&self) -> Option<Vec<(f64, f64)>> {
+        self.laws.iter().map(|law| law.passive_power().filter(|(_, exponent)| *exponent > 0.0)).collect()
     }
 
     fn law(&self, i: usize) -> &DepthLaw {

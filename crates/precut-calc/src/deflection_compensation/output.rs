@@ -26,20 +26,20 @@ pub struct Outcome {
     pub cutting_time_min: f64,
     /// Form and size without compensation.
     pub before: Form,
-    /// Form and size with the compensated path as programmed.
-    pub after: Form,
+    /// Form and size with the compensated path as programmed; only with `detail: full`.
+    pub after: Option<Form>,
     /// Everything along the shaft; of the last pass where there are several.
     pub stations: StationColumns,
-    /// The commanded path in straight moves.
-    pub path: Path,
+    /// The commanded path in straight moves; only with `detail: full`.
+    pub path: Option<Path>,
     /// What yields, at the station that deflects most.
     pub shares: Shares,
-    /// Effects of second order on the diameter, whether switched on or not.
-    pub second_order: SecondOrder,
-    /// What one more steady rest would do.
+    /// Effects of second order on the diameter, whether switched on or not; only with `detail: full`.
+    pub second_order: Option<SecondOrder>,
+    /// What one more steady rest would do; only with `detail: full`.
     pub one_more_rest: Option<OneMoreRest>,
-    /// The one-step formula of the source paper beside the exact command.
-    pub one_step: OneStep,
+    /// The one-step formula of the source paper beside the exact command; only with `detail: full`.
+    pub one_step: Option<OneStep>,
     /// Every pass where there are several.
     pub passes: Vec<PassOutcome>,
     /// Bound of the numerical error of every diameter: solver residual, and round-off of the compliance.
@@ -98,9 +98,10 @@ pub struct StationColumns {
     /// Commanded diameter.
     #[schema(extensions(("x-unit" = json!("mm"))))]
     pub commanded_diameter_mm: Vec<Option<f64>>,
-    /// Diameter error with the path as programmed (straight moves, rounded), positive = oversize.
+    /// Diameter error with the path as programmed (straight moves, rounded), positive = oversize; only with `detail: full`.
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(extensions(("x-unit" = json!("um"))))]
-    pub diameter_error_compensated_um: Vec<Option<f64>>,
+    pub diameter_error_compensated_um: Option<Vec<Option<f64>>>,
     /// Standard uncertainty of the diameter from those of force and stiffness.
     #[schema(extensions(("x-unit" = json!("um"))))]
     pub diameter_uncertainty_um: Vec<f64>,

@@ -3,7 +3,7 @@
 use crate::calculator::{Axis, Column, Figure, Glyph, Item, Message, Panel, Role, Table};
 
 use super::input::{Job, Support};
-use super::output::{Outcome, StationColumns};
+use super::output::{OneStep, Outcome, PathZone, StationColumns};
 use super::structure::ends;
 
 const Z: Axis = Axis { label: "station", unit: "mm" };
@@ -146,8 +146,8 @@ fn errors(job: &Job, outcome: &Outcome, height: f64) -> Panel {
             role: Role::Tolerance,
         });
     }
-    let after = &stations.diameter_error_compensated_um;
-    if let Some(after) = after.iter().copied().collect::<Option<Vec<f64>>>() {
+    let after = stations.diameter_error_compensated_um.as_ref();
+    if let Some(after) = after.and_then(|after| after.iter().copied().collect::<Option<Vec<f64>>>()) {
         let shifted = |sign: f64| -> Vec<f64> {
             after.iter().zip(&stations.diameter_uncertainty_um).map(|(e, u)| e + sign * 2.0 * u).collect()
         };
@@ -165,7 +165,7 @@ fn errors(job: &Job, outcome: &Outcome, height: f64) -> Panel {
         y: stations.diameter_error_uncompensated_um.clone(),
         role: Role::Before,
     });
-    items.push(Item::Line { name: "with_compensation", x: stations.z_mm.clone(), y: after.clone(), role: Role::After });
+    items.extend(after.map(|after| with_compensation(stations, after)));
     Panel { y: Axis { label: "diameter_error", unit: "um" }, height, items }
 }
 
@@ -173,8 +173,8 @@ fn path(outcome: &Outcome, height: f64) -> Panel {
     let stations = &outcome.stations;
     let vertices: Vec<(f64, f64)> = outcome
         .path
-        .zones
         .iter()
+        .flat_map(|path| &path.zones)
         .flat_map(|zone| zone.z_mm.iter().copied().zip(zone.delta_x_um.iter().map(|x| x / 2.0)))
         .collect();
     let mut items = Vec::new();
@@ -203,11 +203,17 @@ fn one_step(outcome: &Outcome, height: f64) -> Panel {
     Panel {
         y: Axis { label: "diameter_error", unit: "um" },
         height,
-        items: vec![
-            line("one_step_formula", &outcome.one_step.diameter_error_um, Role::Comparison),
-            line("with_compensation", &stations.diameter_error_compensated_um, Role::After),
-        ],
+        items: outcome
+            .one_step
+            .iter()
+            .map(|step| line("one_step_formula", &step.diameter_error_um, Role::Comparison))
+            .chain(stations.diameter_error_compensated_um.iter().map(|after| with_compensation(stations, after)))
+            .collect(),
     }
+}
+
+fn with_compensation(stations: &StationColumns, after: &[Option<f64>]) -> Item {
+    Item::Line { name: "with_compensation", x: stations.z_mm.clone(), y: after.to_vec(), role: Role::After }
 }
 
 pub(super) fn tables(outcome: &Outcome) -> Vec<Table> {
@@ -244,7 +250,10 @@ fn station_columns(stations: &StationColumns) -> Vec<Column> {
         Column::optional("diameter_error_uncompensated", "um", &stations.diameter_error_uncompensated_um),
         Column::optional("offset", "um", &stations.offset_um),
         Column::optional("commanded_diameter", "mm", &stations.commanded_diameter_mm),
-        Column::optional("diameter_error_compensated", "um", &stations.diameter_error_compensated_um),
+    ]);
+    let after = stations.diameter_error_compensated_um.as_ref();
+    columns.extend(after.map(|after| Column::optional("diameter_error_compensated", "um", after)));
+    columns.extend([
         Column::numbers("diameter_uncertainty", "um", &stations.diameter_uncertainty_um),
         Column::optional("copying_factor", "1", &stations.copying_factor),
         Column::words("status_uncompensated", stations.status_uncompensated.iter().map(|s| s.name().into()).collect()),
@@ -253,11 +262,14 @@ fn station_columns(stations: &StationColumns) -> Vec<Column> {
     columns
 }
 
+fn zones(outcome: &Outcome) -> &[PathZone] {
+    outcome.path.as_ref().map_or(&[], |path| &path.zones)
+}
+
 /// Vertices of the path: station, commanded diameter.
 fn path_table(outcome: &Outcome) -> Table {
-    let zones = &outcome.path.zones;
-    let gather =
-        |values: &dyn Fn(&super::output::PathZone) -> Vec<f64>| -> Vec<f64> { zones.iter().flat_map(values).collect() };
+    let zones = zones(outcome);
+    let gather = |values: &dyn Fn(&PathZone) -> Vec<f64>| -> Vec<f64> { zones.iter().flat_map(values).collect() };
     Table {
         id: "path",
         columns: vec![
@@ -270,18 +282,20 @@ fn path_table(outcome: &Outcome) -> Table {
 
 /// For a compensation memory: change of X on the diameter over Z.
 fn increments_table(outcome: &Outcome) -> Table {
-    let zones = &outcome.path.zones;
+    let zones = zones(outcome);
     let z: Vec<f64> = zones.iter().flat_map(|zone| zone.z_mm.iter().copied()).collect();
     let delta: Vec<f64> = zones.iter().flat_map(|zone| zone.delta_x_um.iter().copied()).collect();
     Table { id: "increments", columns: vec![Column::numbers("z", "mm", &z), Column::numbers("delta_x", "um", &delta)] }
 }
 
 fn one_step_table(outcome: &Outcome) -> Table {
-    let step = &outcome.one_step;
+    let nothing = OneStep::default();
+    let step = outcome.one_step.as_ref().unwrap_or(&nothing);
+    let z: &[f64] = if outcome.one_step.is_some() { &outcome.stations.z_mm } else { &[] };
     Table {
         id: "one_step",
         columns: vec![
-            Column::numbers("z", "mm", &outcome.stations.z_mm),
+            Column::numbers("z", "mm", z),
             Column::optional("factor", "1", &step.factor),
             Column::optional("depth", "mm", &step.depth_mm),
             Column::optional("diameter_error", "um", &step.diameter_error_um),

@@ -79,7 +79,7 @@ impl Sample {
             main_n: Vec::new(),
             feed_n: Vec::new(),
         };
-        for i in (0..n).step_by(step).chain((n > 1 && (n - 1) % step != 0).then_some(n - 1)) {
+        for i in (0..n).step_by(step).chain((n > 1 && !(n - 1).is_multiple_of(step)).then_some(n - 1)) {
             let loads = &stage.cut.loads[i];
             sample.z_mm.push(grid.z_mm[i]);
             sample.target_mm.push(stage.radii.target[i]);

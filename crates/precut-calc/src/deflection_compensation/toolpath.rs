@@ -80,7 +80,10 @@ fn path_zone(zone: &Zone, z_mm: Vec<f64>, commanded_diameter_mm: Vec<f64>) -> Pa
 
 /// The program of the (last) cut: every zone with its own approach and retract, in the order of the feed.
 pub(super) fn program(job: &Job, outcome: &Outcome) -> Result<Program, Failure> {
-    if !outcome.path.complete {
+    let Some(path) = &outcome.path else {
+        return Err(Failure::OutOfModel(Finding::new("path_not_computed", "/detail")));
+    };
+    if !path.complete {
         let status = &outcome.stations.status_compensated;
         let without =
             status.iter().filter(|s| !matches!(s, StatusCompensated::Ok | StatusCompensated::NoStock)).count();
@@ -91,7 +94,7 @@ pub(super) fn program(job: &Job, outcome: &Outcome) -> Result<Program, Failure> 
         ));
     }
     let regime = job.passes.last().map_or_else(|| Regime::of(&job.cut), |pass| Regime::of(&job.cut).of_pass(pass));
-    Ok(Writer::new(job, &regime).write(&outcome.path))
+    Ok(Writer::new(job, &regime).write(path))
 }
 
 struct Writer<'a> {
