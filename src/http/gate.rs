@@ -14,8 +14,8 @@ use std::time::{Duration, Instant};
 use axum::body::{Body, HttpBody as _};
 use axum::extract::{Request, State};
 use axum::http::header::{
-    ACCEPT_ENCODING, ALLOW, CACHE_CONTROL, CONTENT_ENCODING, CONTENT_LANGUAGE, CONTENT_LENGTH, CONTENT_SECURITY_POLICY,
-    CONTENT_TYPE, ETAG, REFERRER_POLICY, WWW_AUTHENTICATE, X_CONTENT_TYPE_OPTIONS,
+    ACCEPT_ENCODING, ALLOW, CACHE_CONTROL, CONTENT_ENCODING, CONTENT_LANGUAGE, CONTENT_LENGTH, CONTENT_LOCATION,
+    CONTENT_SECURITY_POLICY, CONTENT_TYPE, ETAG, REFERRER_POLICY, WWW_AUTHENTICATE, X_CONTENT_TYPE_OPTIONS,
 };
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode};
 use axum::middleware::Next;
@@ -231,7 +231,9 @@ async fn compressed(response: Response, encodings: Option<HeaderValue>) -> Respo
 /// One line per request; what was only read from memory is not worth one unless somebody is looking.
 fn log(response: &Response, took: Duration) {
     let status = response.status();
-    let cache = response.headers().get(CACHE_STATE).and_then(|state| state.to_str().ok());
+    let text = |name: HeaderName| response.headers().get(name).and_then(|value| value.to_str().ok());
+    let cache = text(CACHE_STATE);
+    let key = text(CONTENT_LOCATION).and_then(|location| location.rsplit('/').next());
     let ms = took.as_secs_f64() * 1e3;
     let status_code = status.as_u16();
     if status.is_server_error() && status != StatusCode::SERVICE_UNAVAILABLE {
@@ -239,9 +241,9 @@ fn log(response: &Response, took: Duration) {
     } else if status.is_client_error() || status.is_server_error() {
         tracing::info!(status = status_code, ms, "refused");
     } else if cache == Some("miss") {
-        tracing::info!(status = status_code, ms, cache, "answered");
+        tracing::info!(status = status_code, ms, cache, key, "answered");
     } else {
-        tracing::debug!(status = status_code, ms, cache, "answered");
+        tracing::debug!(status = status_code, ms, cache, key, "answered");
     }
 }
 

@@ -55,7 +55,7 @@ pub(super) struct ResultItem {
     /// Which version of the engine.
     #[schema(example = "0.1.0")]
     engine: String,
-    /// Size of the JSON answer, bytes.
+    /// What it takes in the database, bytes.
     #[schema(minimum = 0, example = 18230)]
     bytes: u64,
     /// When it was computed, UTC.

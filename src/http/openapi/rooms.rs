@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 use utoipa::openapi::content::ContentBuilder;
 use utoipa::openapi::encoding::Encoding;
 use utoipa::openapi::example::ExampleBuilder;
+use utoipa::openapi::link::LinkBuilder;
 use utoipa::openapi::path::{HttpMethod, OperationBuilder, ParameterIn, PathItem};
 use utoipa::openapi::request_body::{RequestBody, RequestBodyBuilder};
 use utoipa::openapi::response::ResponseBuilder;
@@ -127,6 +128,14 @@ fn answered(meta: &Meta, answer: &str) -> ResponseBuilder {
             "Server-Timing",
             parts::text_header("Where the time went, ms.", "parse;dur=0.041, queue;dur=0.004, run;dur=0.310"),
         );
+    response = response.link(
+        "result",
+        LinkBuilder::new()
+            .operation_id("read_result")
+            .parameter("key", "$response.body#/key")
+            .description("Reads the answer again, in any form, without computing.")
+            .build(),
+    );
     for media in offered(meta) {
         let text = match media {
             Media::Json => continue,
