@@ -195,7 +195,7 @@ impl Problem {
 }
 
 impl IntoResponse for Problem {
-    /// An answer without a body: [`super::gate`] writes the document.
+    /// An answer without a body: `super::gate` writes the document.
     fn into_response(self) -> Response {
         let mut response = self.0.status.into_response();
         response.extensions_mut().insert(self);

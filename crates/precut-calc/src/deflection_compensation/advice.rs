@@ -1,17 +1,16 @@
 //! What dominates, what would help, where not to trust: codes with numbers.
 
-use crate::calculator::{Failure, Finding, Message};
+use crate::calculator::{Failure, Finding, Message, Monitor};
 use crate::force::Reached;
-use crate::num::beam::Wanted;
 
 use super::acting::Acting;
 use super::form::Form;
 use super::grid::Grid;
-use super::input::{Job, Segment, Theory};
+use super::input::{Job, Segment, Support, Theory};
 use super::output::{OneMoreRest, Outcome, Shares, StatusCompensated};
 use super::regime::Speed;
 use super::stage::Stage;
-use super::structure::{Structure, Variant, ends};
+use super::structure::{Structure, ends};
 
 const UM_PER_MM: f64 = 1e3;
 /// Deflection over depth above which the one-step formulas fail and chatter is likely.
@@ -25,6 +24,8 @@ const STRESS_SHARE: f64 = 0.5;
 const THRUST_RATIO: f64 = 0.05;
 /// Slenderness below which shear counts.
 const SLENDER: f64 = 10.0;
+/// Stations at which one more rest is tried.
+const REST_SAMPLES: usize = 65;
 /// A depth beyond so many nominal depths is worth a look.
 const DEPTH_RATIO: f64 = 2.0;
 
@@ -42,6 +43,7 @@ pub(super) const EXPLANATION_CODES: &[&str] = &[
     "uncertain_by",
     "one_step_overcuts",
     "stock_is_copied",
+    "program_is_last_pass",
     "not_modelled",
 ];
 
@@ -59,30 +61,35 @@ pub(super) const WARNING_CODES: &[&str] = &[
     "form_tolerance_missed",
 ];
 
-/// Who yields at the station that deflects most (`deflection/3.2`): by virtual work the shares are exact.
-pub(super) fn shares(job: &Job, grid: &Grid, stage: &Stage) -> Shares {
+/// Who yields at the station that deflects most (`deflection/3.2`), one-sided rests as they stand there: by virtual
+/// work the shares are exact.
+pub(super) fn shares(job: &Job, grid: &Grid, acting: &Acting, stage: &Stage) -> Result<Shares, Failure> {
     let i = most_deflected(stage);
     let z_mm = grid.z_mm.get(i).copied().unwrap_or(0.0);
-    let parts = stage.structure.beam.shares(z_mm);
+    let touching = stage.line.touching(i, &stage.cut.loads[i]);
+    let parts = if touching.is_empty() {
+        stage.structure.beam.shares(z_mm)
+    } else {
+        let mut variant = stage.variant(job, acting);
+        variant.touching = &touching;
+        Structure::of(job, &variant)?.beam.shares(z_mm)
+    };
     let (head, tail) = ends(&job.supports);
-    let total = stage.line.compliance_mm_per_n(i);
+    let work = parts.bending_mm_per_n + parts.shear_mm_per_n;
+    let carriage = stage.line.carriage_mm_per_n;
+    let total = parts.supports_mm_per_n.iter().fold(work + carriage, |sum, part| sum + part);
     let share = |part: f64| if total > 0.0 { part / total } else { 0.0 };
     let of = |support: Option<usize>| support.map_or(0.0, |s| parts.supports_mm_per_n[s]);
-    let rests: f64 = parts
-        .supports_mm_per_n
-        .iter()
-        .enumerate()
-        .filter(|(s, _)| Some(*s) != head && Some(*s) != tail)
-        .map(|(_, part)| part)
-        .sum();
-    Shares {
+    let others = parts.supports_mm_per_n.iter().enumerate().filter(|(s, _)| Some(*s) != head && Some(*s) != tail);
+    Ok(Shares {
         z_mm,
-        work: share(parts.bending_mm_per_n + parts.shear_mm_per_n),
+        work: share(work),
         headstock: share(of(head)),
         tailstock: share(of(tail)),
-        rests: share(rests),
-        tool: share(stage.line.carriage_mm_per_n),
-    }
+        // Not `sum`: that of nothing is -0.
+        rests: share(others.fold(0.0, |sum, (_, part)| sum + part)),
+        tool: share(carriage),
+    })
 }
 
 fn most_deflected(stage: &Stage) -> usize {
@@ -95,47 +102,37 @@ fn most_deflected(stage: &Stage) -> usize {
     best
 }
 
-/// What a bilateral steady rest would do where the work deflects most, as compliant as the stiffest support
-/// that carries. `None` where the rest would stand at a support.
+/// What a bilateral steady rest would do where the shaft gives way most, as compliant as the stiffest support that
+/// carries: the same cut with it, at a sample of the stations. `None` where the rest would stand at a support.
 pub(super) fn one_more_rest(
     job: &Job,
     grid: &Grid,
     acting: &Acting,
     stage: &Stage,
+    monitor: &dyn Monitor,
 ) -> Result<Option<OneMoreRest>, Failure> {
-    let mut best = 0;
-    for (i, w) in stage.line.work_mm_per_n.iter().enumerate() {
-        if *w > stage.line.work_mm_per_n[best] {
-            best = i;
-        }
-    }
-    let Some(&z_mm) = grid.z_mm.get(best) else { return Ok(None) };
+    let Some(&z_mm) = grid.z_mm.get(most_deflected(stage)) else { return Ok(None) };
     let near = 0.01 * grid.length_mm;
-    let at_support = job.supports.iter().filter_map(super::input::Support::station_mm).any(|z| (z - z_mm).abs() < near);
+    let at_support = job.supports.iter().filter_map(Support::station_mm).any(|z| (z - z_mm).abs() < near);
     if at_support {
         return Ok(None);
     }
-    let stiffest = job.supports.iter().filter(|s| s.carries()).map(super::input::Support::compliance_um_per_n);
+    let stiffest = job.supports.iter().filter(|s| s.carries()).map(Support::compliance_um_per_n);
     let compliance_um_per_n = stiffest.fold(f64::INFINITY, f64::min);
-    let mut variant = Variant::of(job, &acting.structure);
-    variant.direction = stage.regime.direction;
-    variant.pass_diameter_mm = stage.pass_mm;
-    variant.extra_rest = Some((z_mm, compliance_um_per_n / UM_PER_MM));
-    let structure = Structure::of(job, &variant)?;
-    let none = Wanted { tangential: false, couple: false, weight: false };
-    let held = structure.beam.profile(&grid.z_mm, none).radial_mm_per_n;
-    // The cut with the smaller compliance, to first order about the one computed: e = 2 W P(a)/(1 + S').
-    let (mut high, mut low) = (f64::NEG_INFINITY, f64::INFINITY);
-    for (i, w) in held.iter().enumerate() {
-        let total = w + structure.carriage_mm_per_n;
-        let loads = &stage.cut.loads[i];
-        let y = total * loads.passive_n;
-        let slope = total * loads.passive_slope;
-        let error = 2.0 * y / (1.0 + slope) * UM_PER_MM;
-        high = high.max(error);
-        low = low.min(error);
-    }
-    Ok(Some(OneMoreRest { z_mm, compliance_um_per_n, form_error_um: high - low }))
+    let chosen = grid.sample(REST_SAMPLES);
+    let mut with_rest = job.clone();
+    with_rest.supports.push(Support::SteadyRest {
+        z_mm,
+        compliance_um_per_n,
+        tangential_compliance_um_per_n: None,
+        one_sided: false,
+        gap_um: 0.0,
+    });
+    let radii = stage.radii.at(&chosen);
+    let sampled = grid.at(&chosen);
+    let held = Stage::of(&with_rest, &sampled, acting, stage.regime, stage.pass_mm, radii, monitor)?;
+    let form = Form::of(&sampled.z_mm, &held.cut.uncompensated_errors_um(&held.radii));
+    Ok(form.form_error_um.map(|form_error_um| OneMoreRest { z_mm, compliance_um_per_n, form_error_um }))
 }
 
 /// Standard uncertainty of the diameter, um (`deflection/7`): to first order about the compensated cut
@@ -159,7 +156,7 @@ pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
         said.push(match (outcome.form_error_after_um, outcome.largest_error_after_um) {
             (Some(form), Some(largest)) => Message::new("compensated_path_leaves")
                 .with("form_error_um", form)
-                .with("largest_error_um", largest)
+                .with("largest_error_um", largest.abs())
                 .with("moves", f64::from(path.moves)),
             _ => Message::new("path_has_gaps").with("stations", without_command(outcome)),
         });
@@ -188,6 +185,9 @@ pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
     let copied = outcome.stations.copying_factor.iter().flatten().copied().fold(0.0, f64::max);
     if copied > 0.0 {
         said.push(Message::new("stock_is_copied").with("copying_factor", copied));
+    }
+    if !job.passes.is_empty() {
+        said.push(Message::new("program_is_last_pass"));
     }
     said.push(Message::new("not_modelled"));
     said

@@ -90,6 +90,25 @@ impl Grid {
         }
     }
 
+    /// Indices of at most about `count` stations, evenly, with the first and the last.
+    pub(super) fn sample(&self, count: usize) -> Vec<usize> {
+        let n = self.len();
+        let step = n.div_ceil(count).max(1);
+        let last = (n > 1 && !(n - 1).is_multiple_of(step)).then_some(n - 1);
+        (0..n).step_by(step).chain(last).collect()
+    }
+
+    /// The grid of some of the stations, ascending.
+    pub(super) fn at(&self, chosen: &[usize]) -> Self {
+        Self {
+            z_mm: chosen.iter().map(|&i| self.z_mm[i]).collect(),
+            segment: chosen.iter().map(|&i| self.segment[i]).collect(),
+            zones: Vec::new(),
+            length_mm: self.length_mm,
+            steps_mm: self.steps_mm.clone(),
+        }
+    }
+
     /// How many stations there are.
     pub(super) fn len(&self) -> usize {
         self.z_mm.len()

@@ -102,7 +102,7 @@ pub struct Shaft {
     pub material: Option<String>,
     /// Young's modulus; needed where no material is named.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 100.0, maximum = 2_000_000.0, example = 210_000.0, extensions(("x-unit" = json!("N/mm2")), ("x-symbol" = json!("E")), ("x-code" = json!("bad_modulus"))))]
+    #[schema(minimum = 1000.0, maximum = 2_000_000.0, example = 210_000.0, extensions(("x-unit" = json!("N/mm2")), ("x-symbol" = json!("E")), ("x-code" = json!("bad_modulus"))))]
     pub youngs_modulus_n_per_mm2: Option<f64>,
     /// Poisson's ratio; of the material, or 0.3. It acts with `theory` Timoshenko.
     #[serde(default, skip_serializing_if = "Option::is_none")]

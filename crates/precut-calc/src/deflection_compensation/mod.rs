@@ -4,13 +4,13 @@
 //! tool opens by y, the depth really cut falls short, and the shaft comes out as a barrel, a saddle or
 //! something between. The model: compliance W(z) at the cutting point by the force method
 //! ([`crate::num::beam`]), forces over the *engaged* depth ([`crate::force`]), and the scalar
-//! equilibrium at every station ([`equilibrium`]). The compensated command is explicit, because the
+//! equilibrium at every station (`equilibrium`). The compensated command is explicit, because the
 //! wanted state has the nominal depth; the prediction for any command is implicit.
 //!
-//! The way of a job: [`input`] -> [`check`] -> [`grid`] (stations), [`acting`] (effects),
-//! [`structure`] (beam) -> [`model`] (opening over depth) -> [`cut`] -> [`stage`] (passes) ->
-//! [`toolpath`], [`form`], [`second_order`], [`advice`] -> [`output`], [`picture`].
-//! [`forward`] gives the same model to the diagnosis.
+//! The way of a job: `input` -> `check` -> `grid` (stations), `acting` (effects),
+//! `structure` (beam) -> `model` (opening over depth) -> `cut` -> `stage` (passes) ->
+//! `toolpath`, `form`, `second_order`, `advice` -> `output`, `picture`.
+//! `forward` gives the same model to the diagnosis.
 
 mod acting;
 mod advice;
@@ -151,8 +151,8 @@ impl Calculator for DeflectionCompensation {
         picture::figures(job, outcome)
     }
 
-    fn tables(_job: &Job, outcome: &Outcome) -> Vec<Table> {
-        picture::tables(outcome)
+    fn tables(job: &Job, outcome: &Outcome) -> Vec<Table> {
+        picture::tables(job, outcome)
     }
 
     fn program(job: &Job, outcome: &Outcome) -> Option<Result<Program, Failure>> {
@@ -180,7 +180,7 @@ fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
         }
     };
     monitor.progress(0.8, Message::new("stage_advice"));
-    let outcome = Assembly { job, grid: &grid, acting: &acting, stage: &stage }.outcome(driven, passes)?;
+    let outcome = Assembly { job, grid: &grid, acting: &acting, stage: &stage }.outcome(driven, passes, monitor)?;
     let warnings = advice::warnings(job, &grid, &stage, &outcome);
     let explanation = advice::explanation(job, &outcome);
     monitor.progress(1.0, Message::new("stage_done"));
@@ -210,7 +210,12 @@ struct Assembly<'a> {
 }
 
 impl Assembly<'_> {
-    fn outcome(&self, driven: Option<Driven>, passes: Vec<PassOutcome>) -> Result<Outcome, Failure> {
+    fn outcome(
+        &self,
+        driven: Option<Driven>,
+        passes: Vec<PassOutcome>,
+        monitor: &dyn Monitor,
+    ) -> Result<Outcome, Failure> {
         let Self { job, grid, acting, stage } = *self;
         let full = job.detail == Detail::Full;
         let stations = self.stations(driven.as_ref().map(|driven| driven.produced_mm.as_slice()));
@@ -235,10 +240,11 @@ impl Assembly<'_> {
             before,
             after,
             path: driven.map(|driven| driven.path),
-            shares: advice::shares(job, grid, stage),
+            shares: advice::shares(job, grid, acting, stage)?,
             second_order: if full { Some(second_order::second_order(job, grid, acting, stage)?) } else { None },
-            one_more_rest: if full { advice::one_more_rest(job, grid, acting, stage)? } else { None },
-            one_step: full.then(|| one_step(&stage.line, &stage.radii, &stage.cut, job.force.depth_exponent())),
+            one_more_rest: if full { advice::one_more_rest(job, grid, acting, stage, monitor)? } else { None },
+            one_step: (full && !stage.line.has_contacts())
+                .then(|| one_step(&stage.line, &stage.radii, &stage.cut, job.force.depth_exponent())),
             passes,
             numerical_error_um: 2.0 * (stage.cut.residual_mm + COMPLIANCE_ACCURACY * largest_mm) * UM_PER_MM,
             stations,

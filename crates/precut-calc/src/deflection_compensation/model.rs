@@ -75,6 +75,14 @@ pub(super) struct Radii {
     pub planned: Vec<f64>,
 }
 
+impl Radii {
+    /// The radii at some of the stations.
+    pub(super) fn at(&self, chosen: &[usize]) -> Self {
+        let of = |radii: &[f64]| chosen.iter().map(|&i| radii[i]).collect();
+        Self { target: of(&self.target), stock: of(&self.stock), planned: of(&self.planned) }
+    }
+}
+
 /// What a [`Line`] is made of.
 pub(super) struct Ingredients<'a> {
     pub job: &'a Job,
@@ -141,6 +149,27 @@ impl Line {
             with_feed: include.axial_moment,
             closed_at_zero,
             powers,
+        }
+    }
+
+    /// Whether one-sided rests may open and close.
+    pub(super) fn has_contacts(&self) -> bool {
+        self.contacts.is_some()
+    }
+
+    /// The one-sided rests that touch under the nominal loads at a station, as indices of the job's supports.
+    pub(super) fn touching(&self, i: usize, loads: &Loads) -> Vec<usize> {
+        let Some(contacts) = &self.contacts else { return Vec::new() };
+        let closed = contacts.respond(i, self.tool_load(i, loads)).closed;
+        let touches = |rest: usize| closed >> rest & 1 == 1;
+        contacts.supports().iter().enumerate().filter(|(rest, _)| touches(*rest)).map(|(_, &support)| support).collect()
+    }
+
+    fn tool_load(&self, i: usize, loads: &Loads) -> ToolLoad {
+        ToolLoad {
+            force_n: loads.passive_n,
+            couple_n_mm: self.arm_mm[i] * loads.feed_n,
+            gravity_radial: self.gravity_radial,
         }
     }
 

@@ -38,7 +38,8 @@ pub struct Outcome {
     pub second_order: Option<SecondOrder>,
     /// What one more steady rest would do; only with `detail: full`.
     pub one_more_rest: Option<OneMoreRest>,
-    /// The one-step formula of the source paper beside the exact command; only with `detail: full`.
+    /// The one-step formula of the source paper beside the exact command; only with `detail: full` and without
+    /// one-sided rests, for which the formula has no compliance.
     pub one_step: Option<OneStep>,
     /// Every pass where there are several.
     pub passes: Vec<PassOutcome>,
@@ -213,7 +214,7 @@ pub struct Shares {
     /// The rightmost support that carries, where it is another.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub tailstock: f64,
-    /// All other supports.
+    /// All other supports that touch there.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub rests: f64,
     /// Carriage and tool.

@@ -216,10 +216,10 @@ fn with_compensation(stations: &StationColumns, after: &[Option<f64>]) -> Item {
     Item::Line { name: "with_compensation", x: stations.z_mm.clone(), y: after.to_vec(), role: Role::After }
 }
 
-pub(super) fn tables(outcome: &Outcome) -> Vec<Table> {
+pub(super) fn tables(job: &Job, outcome: &Outcome) -> Vec<Table> {
     vec![
         Table { id: "stations", columns: station_columns(&outcome.stations) },
-        path_table(outcome),
+        super::toolpath::path_table(job, outcome.path.as_ref()),
         increments_table(outcome),
         one_step_table(outcome),
         passes_table(outcome),
@@ -264,20 +264,6 @@ fn station_columns(stations: &StationColumns) -> Vec<Column> {
 
 fn zones(outcome: &Outcome) -> &[PathZone] {
     outcome.path.as_ref().map_or(&[], |path| &path.zones)
-}
-
-/// Vertices of the path: station, commanded diameter.
-fn path_table(outcome: &Outcome) -> Table {
-    let zones = zones(outcome);
-    let gather = |values: &dyn Fn(&PathZone) -> Vec<f64>| -> Vec<f64> { zones.iter().flat_map(values).collect() };
-    Table {
-        id: "path",
-        columns: vec![
-            Column::numbers("z", "mm", &gather(&|zone| zone.z_mm.clone())),
-            Column::numbers("diameter", "mm", &gather(&|zone| vec![zone.diameter_mm; zone.z_mm.len()])),
-            Column::numbers("commanded_diameter", "mm", &gather(&|zone| zone.commanded_diameter_mm.clone())),
-        ],
-    }
 }
 
 /// For a compensation memory: change of X on the diameter over Z.

@@ -11,7 +11,7 @@ use super::input::{Job, Section, Segment, Support, Theory};
 use super::model::gravity_components;
 use super::output::SecondOrder;
 use super::stage::Stage;
-use super::structure::{Structure, Variant};
+use super::structure::Structure;
 
 const UM_PER_MM: f64 = 1e3;
 /// Stations at which the estimates are made: extrema of smooth functions, to a percent.
@@ -27,9 +27,7 @@ pub(super) fn second_order(job: &Job, grid: &Grid, acting: &Acting, stage: &Stag
     let sample = Sample::of(grid, stage);
     let wanted = Wanted { tangential: true, couple: true, weight: true };
     let profile = stage.structure.beam.profile(&sample.z_mm, wanted);
-    let mut variant = Variant::of(job, &acting.structure);
-    variant.direction = stage.regime.direction;
-    variant.pass_diameter_mm = stage.pass_mm;
+    let variant = stage.variant(job, acting);
     let change_by = |section: Section, theory: Theory| -> Result<f64, Failure> {
         let mut other = variant;
         other.section = section;
@@ -70,8 +68,6 @@ struct Sample {
 
 impl Sample {
     fn of(grid: &Grid, stage: &Stage) -> Self {
-        let n = grid.len();
-        let step = n.div_ceil(SAMPLES).max(1);
         let mut sample = Self {
             z_mm: Vec::new(),
             target_mm: Vec::new(),
@@ -79,7 +75,7 @@ impl Sample {
             main_n: Vec::new(),
             feed_n: Vec::new(),
         };
-        for i in (0..n).step_by(step).chain((n > 1 && !(n - 1).is_multiple_of(step)).then_some(n - 1)) {
+        for i in grid.sample(SAMPLES) {
             let loads = &stage.cut.loads[i];
             sample.z_mm.push(grid.z_mm[i]);
             sample.target_mm.push(stage.radii.target[i]);

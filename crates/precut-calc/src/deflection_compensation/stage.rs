@@ -36,11 +36,7 @@ impl Stage {
         radii: Radii,
         monitor: &dyn Monitor,
     ) -> Result<Self, Failure> {
-        let mut variant = Variant::of(job, &acting.structure);
-        variant.direction = regime.direction;
-        variant.section = section_of_pass(job, acting.structure.uncut_side);
-        variant.pass_diameter_mm = pass_mm;
-        let structure = Structure::of(job, &variant)?;
+        let structure = Structure::of(job, &variant(job, acting, &regime, pass_mm))?;
         let passages = if acting.has_errors() { passages(job, grid, &regime, pass_mm) } else { Vec::new() };
         let rest_shapes = rest_shapes(&job.effects, job, grid, &structure)?;
         let ingredients = Ingredients {
@@ -56,6 +52,11 @@ impl Stage {
         let line = Line::of(&ingredients, structure.beam.profile(&grid.z_mm, wanted(job)));
         let cut = CutLine::of(&line, &radii, monitor)?;
         Ok(Self { regime, structure, radii, line, cut, pass_mm })
+    }
+
+    /// How the structure of this cut differs from the job as it stands.
+    pub(super) fn variant<'a>(&self, job: &Job, acting: &'a Acting) -> Variant<'a> {
+        variant(job, acting, &self.regime, self.pass_mm)
     }
 
     /// Deviation that the cut leaves on the radius when the path is followed that the pass asks for.
@@ -74,6 +75,14 @@ impl Stage {
         })?;
         Ok((produced, commands))
     }
+}
+
+fn variant<'a>(job: &Job, acting: &'a Acting, regime: &Regime, pass_mm: Option<f64>) -> Variant<'a> {
+    let mut variant = Variant::of(job, &acting.structure);
+    variant.direction = regime.direction;
+    variant.section = section_of_pass(job, acting.structure.uncut_side);
+    variant.pass_diameter_mm = pass_mm;
+    variant
 }
 
 /// The stock of the first cut: the profile where one is given, else the segments'.

@@ -28,8 +28,8 @@ pub(super) struct Variant<'a> {
     pub direction: FeedDirection,
     /// Diameter that a pass aims at; no segment is turned below its drawing diameter.
     pub pass_diameter_mm: Option<f64>,
-    /// A bilateral steady rest more: station and compliance, mm, mm/N.
-    pub extra_rest: Option<(f64, f64)>,
+    /// One-sided rests that touch, and so hold like any other; the others stay open.
+    pub touching: &'a [usize],
 }
 
 impl<'a> Variant<'a> {
@@ -42,7 +42,7 @@ impl<'a> Variant<'a> {
             theory: job.shaft.theory,
             direction: job.cut.feed_direction,
             pass_diameter_mm: None,
-            extra_rest: None,
+            touching: &[],
         }
     }
 }
@@ -84,12 +84,12 @@ impl Structure {
                 beam_support(support, added, rotation)
             })
             .collect();
-        if let Some((z_mm, compliance)) = variant.extra_rest {
-            supports.push(beam::Support::SteadyRest {
-                z_mm,
-                springs: beam::Springs { radial_mm_per_n: compliance, tangential_mm_per_n: compliance },
-                contact: beam::Contact::Bilateral,
-            });
+        for &i in variant.touching {
+            if let beam::Support::SteadyRest { contact, .. } | beam::Support::FollowRest { contact, .. } =
+                &mut supports[i]
+            {
+                *contact = beam::Contact::Bilateral;
+            }
         }
         let state = match (variant.section, variant.direction) {
             (Section::Finished, _) => beam::State::Finished,

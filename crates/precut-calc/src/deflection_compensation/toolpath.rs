@@ -1,6 +1,6 @@
 //! The commanded path in straight moves, and the program that drives it.
 
-use crate::calculator::{Block, Failure, Finding, Monitor, Program};
+use crate::calculator::{Block, Column, Failure, Finding, Monitor, Program, Table};
 use crate::path::{round_to_increment, simplified};
 
 use super::grid::{Grid, Zone};
@@ -25,7 +25,7 @@ pub(super) struct Programmed {
 pub(super) fn chord_tolerance_um(job: &Job) -> f64 {
     job.path.chord_tolerance_um.unwrap_or_else(|| {
         // The form tolerance is on the diameter, the chord's deviation on the radius.
-        job.tolerance.form_um.map_or(DEFAULT_CHORD_UM, |form| (CHORD_SHARE * form / 2.0).max(job.path.increment_um))
+        job.tolerance.form_um.map_or(DEFAULT_CHORD_UM, |form| (CHORD_SHARE * form).max(job.path.increment_um) / 2.0)
     })
 }
 
@@ -58,7 +58,7 @@ pub(super) fn programmed(
         {
             *slot = Some(r);
         }
-        zones.push(path_zone(zone, corners, chords.diameters_mm));
+        zones.push(path_zone(zone, corners, chords.diameters_mm, job.path.increment_um));
     }
     let complete = command_mm.iter().all(Option::is_some);
     let moves = zones.iter().map(|z| z.z_mm.len().saturating_sub(1)).sum::<usize>();
@@ -73,8 +73,9 @@ pub(super) fn programmed(
     Ok(Programmed { path, command_mm })
 }
 
-fn path_zone(zone: &Zone, z_mm: Vec<f64>, commanded_diameter_mm: Vec<f64>) -> PathZone {
-    let delta_x_um = commanded_diameter_mm.iter().map(|d| (d - zone.diameter_mm) * UM_PER_MM).collect();
+fn path_zone(zone: &Zone, z_mm: Vec<f64>, commanded_diameter_mm: Vec<f64>, increment_um: f64) -> PathZone {
+    let delta = |d: &f64| round_to_increment((d - zone.diameter_mm) * UM_PER_MM, increment_um);
+    let delta_x_um = commanded_diameter_mm.iter().map(delta).collect();
     PathZone { diameter_mm: zone.diameter_mm, z_mm, commanded_diameter_mm, delta_x_um }
 }
 
@@ -129,22 +130,14 @@ impl<'a> Writer<'a> {
             }
         });
         let mut feed = Some(self.regime.feed_mm_per_rev);
-        let to_headstock = self.regime.direction == FeedDirection::ToHeadstock;
-        let zones: Vec<&PathZone> =
-            if to_headstock { path.zones.iter().rev().collect() } else { path.zones.iter().collect() };
-        for zone in zones {
-            self.zone(zone, &mut feed);
+        for zone in corners_in_feed_order(path, self.regime.direction) {
+            self.zone(&zone, &mut feed);
         }
         self.blocks.push(Block::End);
         Program { dialect: self.job.program.dialect, increment_mm: self.increment_mm, blocks: self.blocks }
     }
 
-    fn zone(&mut self, zone: &PathZone, feed: &mut Option<f64>) {
-        let mut corners: Vec<(f64, f64)> =
-            zone.z_mm.iter().copied().zip(zone.commanded_diameter_mm.iter().copied()).collect();
-        if self.regime.direction == FeedDirection::ToHeadstock {
-            corners.reverse();
-        }
+    fn zone(&mut self, corners: &[(f64, f64)], feed: &mut Option<f64>) {
         let Some(&(first_z, first_x)) = corners.first() else { return };
         let clear = self.clearance_before(first_z, first_x);
         let approach_z = self.programmed_z(first_z + clear);
@@ -152,7 +145,7 @@ impl<'a> Writer<'a> {
         if clear.abs() > 0.0 {
             self.blocks.push(Block::Rapid { x_diameter_mm: Some(first_x), z_mm: None });
         }
-        for (z, x) in corners {
+        for &(z, x) in corners {
             let z_mm = self.programmed_z(z);
             self.blocks.push(Block::Cut { x_diameter_mm: x, z_mm, feed_mm_per_rev: feed.take() });
         }
@@ -179,10 +172,59 @@ impl<'a> Writer<'a> {
     }
 
     fn programmed_z(&self, z_mm: f64) -> f64 {
-        let zero = match self.job.program.zero {
-            ProgramZero::RightFace => self.length_mm,
-            ProgramZero::LeftFace => 0.0,
-        };
-        round_to_increment(z_mm - zero, self.increment_mm)
+        programmed_z_mm(self.job, self.length_mm, z_mm)
+    }
+}
+
+/// Z of the program at a station: from the program's zero, rounded to the increment.
+fn programmed_z_mm(job: &Job, length_mm: f64, z_mm: f64) -> f64 {
+    let zero = match job.program.zero {
+        ProgramZero::RightFace => length_mm,
+        ProgramZero::LeftFace => 0.0,
+    };
+    round_to_increment(z_mm - zero, job.path.increment_um / UM_PER_MM)
+}
+
+/// Station and commanded diameter of every corner, zone by zone as the tool passes them.
+fn corners_in_feed_order(path: &Path, direction: FeedDirection) -> Vec<Vec<(f64, f64)>> {
+    let mut zones: Vec<Vec<(f64, f64)>> = path
+        .zones
+        .iter()
+        .map(|zone| zone.z_mm.iter().copied().zip(zone.commanded_diameter_mm.iter().copied()).collect())
+        .collect();
+    if direction == FeedDirection::ToHeadstock {
+        zones.reverse();
+        zones.iter_mut().for_each(|corners| corners.reverse());
+    }
+    zones
+}
+
+/// The path as a table, in the order of the feed: station, drawing's diameter, and the program's X and Z.
+pub(super) fn path_table(job: &Job, path: Option<&Path>) -> Table {
+    let length_mm: f64 = job.shaft.segments.iter().map(|s| s.length_mm).sum();
+    let (mut station, mut drawing, mut x, mut z) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let empty =
+        Path { zones: Vec::new(), moves: 0, chord_tolerance_um: 0.0, achieved_deviation_um: None, complete: true };
+    let path = path.unwrap_or(&empty);
+    let mut diameters: Vec<f64> = path.zones.iter().map(|zone| zone.diameter_mm).collect();
+    if job.cut.feed_direction == FeedDirection::ToHeadstock {
+        diameters.reverse();
+    }
+    for (corners, diameter) in corners_in_feed_order(path, job.cut.feed_direction).into_iter().zip(diameters) {
+        for (at, commanded) in corners {
+            station.push(at);
+            drawing.push(diameter);
+            x.push(commanded);
+            z.push(programmed_z_mm(job, length_mm, at));
+        }
+    }
+    Table {
+        id: "path",
+        columns: vec![
+            Column::numbers("z", "mm", &station),
+            Column::numbers("diameter", "mm", &drawing),
+            Column::numbers("x_diameter", "mm", &x),
+            Column::numbers("z_program", "mm", &z),
+        ],
     }
 }

@@ -1,6 +1,6 @@
 //! The handbook's power law for turning, with its correction factors.
 //!
-//! A choice of work material, tool material and edge geometry stands for one [`PowerLaw`]:
+//! A choice of work material, tool material and edge geometry stands for one `PowerLaw`:
 //! coefficients of the row, times K_p = K_m K_phi K_gamma K_lambda K_r. Angles are interpolated
 //! linearly, the radius log-log; nothing is extrapolated, and what the tables do not give is asked
 //! for, never invented.
