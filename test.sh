@@ -9,6 +9,7 @@
 # into a virtual environment and cargo's tools into a folder, both under the target folder. A step whose
 # tool cannot be had is named at the end; with CI=true it is a failure.
 set -euo pipefail
+shopt -s inherit_errexit # a failing command inside $(...) ends the step too
 cd "$(dirname "${BASH_SOURCE[0]}")"
 
 STEPS=(format lint docs dependencies unused scripts test contract programs dockerfile attack)
@@ -22,7 +23,7 @@ declare -A ABOUT=(
   [test]="unit, property and HTTP tests"
   [contract]="openapi/precut.json is what the program prints"
   [programs]="programs for machines, read by LinuxCNC's own interpreter"
-  [dockerfile]="hadolint"
+  [dockerfile]="hadolint over the Dockerfile; compose.yaml is YAML"
   [attack]="schemathesis against the running service, all checks"
 )
 MACHETE=0.9.2
@@ -47,16 +48,19 @@ as_root() {
   if [ "$(id -u)" = 0 ]; then "$@"; else sudo -n "$@"; fi
 }
 
-debian() { # debian COMMAND PACKAGE...: installs the packages unless the command is there
-  local command=$1
-  shift
-  if command -v "$command" >/dev/null; then return; fi
-  command -v apt-get >/dev/null || absent "$command"
+packages() { # packages PACKAGE...: installs them, or says why it cannot
   local install=(env DEBIAN_FRONTEND=noninteractive apt-get -q -o DPkg::Lock::Timeout=120 install -y --no-install-recommends)
+  command -v apt-get >/dev/null || absent "$*"
   if ! as_root "${install[@]}" "$@" >/dev/null 2>&1; then
     # The lists may be old, or not there at all.
-    { as_root apt-get -q -o DPkg::Lock::Timeout=120 update && as_root "${install[@]}" "$@"; } || absent "$command"
+    { as_root apt-get -q -o DPkg::Lock::Timeout=120 update && as_root "${install[@]}" "$@"; } || absent "$*"
   fi
+}
+
+need() { # need COMMAND PACKAGE...: installs the packages unless the command is there
+  local command=$1
+  shift
+  command -v "$command" >/dev/null || packages "$@"
 }
 
 python_tools() { # prints the folder of the Python tools, made from requirements.txt once
@@ -64,14 +68,11 @@ python_tools() { # prints the folder of the Python tools, made from requirements
   venv=$(target)/tools/python
   stamp=$venv/requirements.txt
   if ! cmp -s tests/tools/requirements.txt "$stamp"; then
-    debian python3 python3 python3-venv >&2
+    need python3 python3 >&2
+    # Debian splits what a virtual environment needs from python3 itself.
+    python3 -c "import ensurepip, venv" 2>/dev/null || packages python3-venv >&2
     rm -rf "$venv"
-    if ! python3 -m venv "$venv" >&2; then
-      rm -rf "$venv"
-      # Debian splits what a virtual environment needs from python3 itself.
-      debian "no-such-command" python3-venv >&2
-      python3 -m venv "$venv" >&2 || absent "python3-venv"
-    fi
+    python3 -m venv "$venv" >&2
     "$venv/bin/pip" install --quiet --disable-pip-version-check --requirement tests/tools/requirements.txt >&2 ||
       absent "a package of tests/tools/requirements.txt"
     cp tests/tools/requirements.txt "$stamp"
@@ -91,7 +92,7 @@ step_lint() { cargo clippy --workspace --all-targets --locked -- -D warnings; }
 step_docs() { RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --document-private-items --locked; }
 
 step_dependencies() {
-  debian python3 python3
+  need python3 python3
   python3 tests/tools/dependencies.py
 }
 
@@ -107,7 +108,7 @@ step_unused() {
 }
 
 step_scripts() {
-  debian shellcheck shellcheck
+  need shellcheck shellcheck
   find . -path ./target -prune -o -name '*.sh' -print0 | xargs -0 shellcheck .ci/run
 }
 
@@ -128,8 +129,8 @@ step_contract() {
 
 step_programs() {
   local precut
-  debian rs274 linuxcnc-uspace
-  debian python3 python3
+  need rs274 linuxcnc-uspace
+  need python3 python3
   precut=$(binary)
   python3 tests/tools/rs274_check.py self-test
   python3 tests/tools/rs274_check.py examples "$precut"
@@ -139,6 +140,7 @@ step_dockerfile() {
   local tools
   tools=$(python_tools)
   "$tools/hadolint" docker/Dockerfile
+  "$tools/python" -c 'import sys, yaml; yaml.safe_load(sys.stdin)["services"]["precut"]' <docker/compose.yaml
 }
 
 step_attack() {
@@ -163,6 +165,8 @@ main() {
       exit 2
     fi
   done
+  # Rust links with it, and SQLite is compiled by it.
+  (need cc gcc libc6-dev) || exit 1
   for step in "$@"; do
     printf '\n== %s: %s\n' "$step" "${ABOUT[$step]}"
     seconds=$SECONDS

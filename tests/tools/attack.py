@@ -17,7 +17,7 @@ import sys
 import tempfile
 import time
 
-HERE = pathlib.Path(__file__).parent
+HERE = pathlib.Path(__file__).absolute().parent
 SEED = 20240229
 START_S = 30
 
@@ -34,11 +34,12 @@ def address(process: subprocess.Popen, log: pathlib.Path) -> str:
     sys.exit(f"FAULT the service did not start:\n{log.read_text(errors='replace')}")
 
 
-def attack(schemathesis: str, url: str, examples: int, further: list[str]) -> int:
-    command = [schemathesis, "--config-file", str(HERE / "schemathesis.toml"), "run", f"{url}/openapi.json"]
+def attack(schemathesis: str, url: str, examples: int, further: list[str], folder: str) -> int:
+    command = [str(pathlib.Path(schemathesis).absolute()), "--config-file", str(HERE / "schemathesis.toml"), "run", f"{url}/openapi.json"]
     command += ["--seed", str(SEED), "--max-examples", str(examples), "--generation-database", "none", *further]
     print("+", *command, flush=True)
-    return subprocess.run(command).returncode
+    # It leaves files where it runs.
+    return subprocess.run(command, cwd=folder).returncode
 
 
 def stop(process: subprocess.Popen) -> None:
@@ -65,7 +66,7 @@ def main() -> int:
             process = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT)
         try:
             url = address(process, log)
-            code = attack(arguments.schemathesis, url, arguments.examples, arguments.further)
+            code = attack(arguments.schemathesis, url, arguments.examples, arguments.further, folder)
             faults = [] if code == 0 else [f"schemathesis ends with {code}"]
             if subprocess.run([arguments.precut, "health", "--url", url]).returncode != 0:
                 faults.append("the service is no longer ready")

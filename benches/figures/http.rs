@@ -1,0 +1,222 @@
+//! The service as a process of its own, beside a bare axum handler that answers with the same bytes.
+//!
+//! Both get the same requests from the same client over one kept connection, in turns; compared is the CPU
+//! time that each server's threads take, from the system's own count.
+
+use std::io::{self, BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use axum::Router;
+use axum::body::Bytes;
+use axum::http::header::CONTENT_TYPE;
+use serde_json::Value;
+
+use crate::measure::Measured;
+
+const PRECUT: &str = env!("CARGO_BIN_EXE_precut");
+/// Names the file whose bytes the bare server answers with; tells this program that it is that server.
+const BARE: &str = "PRECUT_BENCH_BARE";
+const ROUNDS: usize = 15;
+const REQUESTS: usize = 300;
+
+/// What is asked, and whether each time the same.
+pub(crate) struct Exchange {
+    pub(crate) path: String,
+    /// The body of the n-th request; the first is asked once before, so that equal ones are cached.
+    pub(crate) body: Box<dyn Fn(usize) -> Vec<u8>>,
+}
+
+/// CPU time of the service per request, as a multiple of the bare handler's.
+pub(crate) fn ratio(exchange: &Exchange) -> Result<Measured, String> {
+    let folder = tempfile::tempdir().map_err(fault)?;
+    let service = Server::precut(folder.path())?;
+    let mut to_service = Client::connect(&service.address)?;
+    let answer = to_service.post(&exchange.path, &(exchange.body)(0))?;
+    let file = folder.path().join("answer");
+    std::fs::write(&file, &answer).map_err(fault)?;
+    let bare = Server::bare(&file)?;
+    let mut to_bare = Client::connect(&bare.address)?;
+
+    let mut sent = 0;
+    let mut block = |client: &mut Client, server: &Server| -> Result<f64, String> {
+        let before = server.cpu_time()?;
+        for _ in 0..REQUESTS {
+            sent += 1;
+            client.post(&exchange.path, &(exchange.body)(sent))?;
+        }
+        Ok(server.cpu_time()? - before)
+    };
+    block(&mut to_service, &service)?;
+    block(&mut to_bare, &bare)?;
+    let mut ratios = Vec::new();
+    for _ in 0..ROUNDS {
+        ratios.push(block(&mut to_service, &service)? / block(&mut to_bare, &bare)?);
+    }
+    Measured::of(ratios)
+}
+
+/// Wall time from the start of the process to its first computed answer.
+pub(crate) fn start(path: &str, body: &[u8]) -> Result<Measured, String> {
+    let times: Result<Vec<f64>, String> = (0..7)
+        .map(|_| {
+            let folder = tempfile::tempdir().map_err(fault)?;
+            let start = Instant::now();
+            let service = Server::precut(folder.path())?;
+            Client::connect(&service.address)?.post(path, body)?;
+            Ok(start.elapsed().as_secs_f64())
+        })
+        .collect();
+    Measured::of(times?)
+}
+
+/// Resident memory after the start, before any request.
+pub(crate) fn idle_memory() -> Result<Measured, String> {
+    let folder = tempfile::tempdir().map_err(fault)?;
+    let service = Server::precut(folder.path())?;
+    std::thread::sleep(Duration::from_millis(300));
+    let status = std::fs::read_to_string(format!("/proc/{}/status", service.child.id())).map_err(fault)?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).ok_or("no VmRSS")?;
+    let kib: f64 = line.trim().trim_end_matches(" kB").parse().map_err(fault)?;
+    Measured::of(vec![kib * 1024.0])
+}
+
+/// Of the program that this run was built with.
+pub(crate) fn binary_size() -> Result<Measured, String> {
+    let bytes = std::fs::metadata(PRECUT).map_err(fault)?.len();
+    Measured::of(vec![u32::try_from(bytes).map_or(f64::INFINITY, f64::from)])
+}
+
+/// The first example job of a calculator.
+pub(crate) fn example(calculator: &str) -> Result<Value, String> {
+    let run = Command::new(PRECUT).args(["example", calculator, "--job"]).output().map_err(fault)?;
+    if !run.status.success() {
+        return Err(format!("there is no example of {calculator}"));
+    }
+    serde_json::from_slice(&run.stdout).map_err(fault)
+}
+
+/// The job with one number a little larger each time: never the same job twice, never another size.
+pub(crate) fn varied(job: &Value, pointer: &str, count: usize) -> Vec<u8> {
+    let mut job = job.clone();
+    if let Some(number) = job.pointer_mut(pointer) {
+        let step = u32::try_from(count).map_or(0.0, f64::from);
+        *number = (number.as_f64().unwrap_or(1.0) * (1.0 + 1e-9 * step)).into();
+    }
+    job.to_string().into_bytes()
+}
+
+/// A server process; ends with this value.
+struct Server {
+    child: Child,
+    address: String,
+}
+
+impl Server {
+    fn precut(data: &Path) -> Result<Self, String> {
+        let mut command = Command::new(PRECUT);
+        command.args(["serve", "--listen", "127.0.0.1:0", "--data"]).arg(data.join("data"));
+        Self::spawn(command)
+    }
+
+    fn bare(answer: &Path) -> Result<Self, String> {
+        let mut command = Command::new(std::env::current_exe().map_err(fault)?);
+        command.env(BARE, answer);
+        Self::spawn(command)
+    }
+
+    fn spawn(mut command: Command) -> Result<Self, String> {
+        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().map_err(fault)?;
+        let mut said = BufReader::new(child.stdout.take().ok_or("no output")?).lines();
+        let address =
+            said.find_map(|line| line.ok()?.split_once("listens on http://").map(|(_, rest)| rest.to_owned()));
+        let server = Self { child, address: address.unwrap_or_default() };
+        // The rest of what it says goes nowhere, but must not block it.
+        std::thread::spawn(move || said.for_each(drop));
+        if server.address.is_empty() { Err("a server did not start".to_owned()) } else { Ok(server) }
+    }
+
+    /// Seconds on a core so far, of all threads.
+    fn cpu_time(&self) -> Result<f64, String> {
+        let tasks = std::fs::read_dir(format!("/proc/{}/task", self.child.id())).map_err(fault)?;
+        let mut seconds = 0.0;
+        for task in tasks {
+            let text = std::fs::read_to_string(task.map_err(fault)?.path().join("schedstat")).map_err(fault)?;
+            let ns: f64 = text.split(' ').next().unwrap_or_default().parse().map_err(fault)?;
+            seconds += ns * 1e-9;
+        }
+        Ok(seconds)
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// One kept connection.
+struct Client {
+    stream: BufReader<TcpStream>,
+    host: String,
+}
+
+impl Client {
+    fn connect(address: &str) -> Result<Self, String> {
+        let stream = TcpStream::connect(address).map_err(fault)?;
+        stream.set_nodelay(true).map_err(fault)?;
+        Ok(Self { stream: BufReader::new(stream), host: address.to_owned() })
+    }
+
+    /// The body of the answer, which must be 200.
+    fn post(&mut self, path: &str, body: &[u8]) -> Result<Vec<u8>, String> {
+        let head = format!(
+            "POST {path} HTTP/1.1\r\nhost: {}\r\ncontent-type: application/json\r\naccept: application/json\r\n\
+             content-length: {}\r\n\r\n",
+            self.host,
+            body.len()
+        );
+        let request = [head.as_bytes(), body].concat();
+        self.stream.get_mut().write_all(&request).map_err(fault)?;
+        let mut line = String::new();
+        self.stream.read_line(&mut line).map_err(fault)?;
+        let status = line.trim_end().to_owned();
+        let mut length = None;
+        loop {
+            line.clear();
+            self.stream.read_line(&mut line).map_err(fault)?;
+            if line.trim_end().is_empty() {
+                break;
+            }
+            let header = line.to_ascii_lowercase();
+            length = header.strip_prefix("content-length:").map_or(length, |number| number.trim().parse().ok());
+        }
+        let mut answer = vec![0; length.ok_or("an answer without a length")?];
+        self.stream.read_exact(&mut answer).map_err(fault)?;
+        if status.contains(" 200 ") { Ok(answer) } else { Err(format!("{path}: {status}")) }
+    }
+}
+
+fn fault(error: impl std::fmt::Display) -> String {
+    error.to_string()
+}
+
+/// Whether this process was started to be the bare server.
+pub(crate) fn is_bare_server() -> bool {
+    std::env::var_os(BARE).is_some()
+}
+
+/// Reads every request's body and answers with the bytes of the file.
+pub(crate) fn serve_bare() -> io::Result<()> {
+    let answer = Bytes::from(std::fs::read(std::env::var_os(BARE).unwrap_or_default())?);
+    let handler = move |_: Bytes| std::future::ready(([(CONTENT_TYPE, "application/json")], answer.clone()));
+    // As many threads as the service has for its connections.
+    tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?.block_on(async {
+        let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await?;
+        writeln!(io::stdout(), "listens on http://{}", listener.local_addr()?)?;
+        axum::serve(listener, Router::new().fallback(handler)).await
+    })
+}

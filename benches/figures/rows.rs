@@ -1,0 +1,94 @@
+//! What is measured. A new row is one entry in [`all`].
+
+use precut::render::{self, Wording};
+use precut_calc::calculator::{Axis, Block, Column, Dialect, Figure, Item, Message, Panel, Program, Role, Table};
+
+use crate::Row;
+use crate::http::{self, Exchange};
+use crate::measure::{Measured, Unit, cpu_time};
+
+const DEFLECTION: &str = "deflection-compensation";
+/// A number of that calculator's jobs which changes the result and not the work.
+const DEFLECTION_VARIED: &str = "/cut/feed_mm_per_rev";
+
+/// The table, top to bottom.
+pub(crate) fn all() -> Vec<Row> {
+    vec![
+        row("CSV, 10,000 rows of 8 numbers", Unit::Time, None, None, csv),
+        row("G-code, 10,000 cuts", Unit::Time, None, None, gcode),
+        row("SVG, 3 panels of 201 stations", Unit::Time, None, None, || svg(201)),
+        row("SVG, 3 panels of 100,000 stations", Unit::Time, None, None, || svg(100_000)),
+        row("cached answer over HTTP against a bare handler", Unit::Ratio, Some(2.5), Some(1.6), cached),
+        row("fresh deflection profile over HTTP against a bare handler", Unit::Ratio, Some(2.0), Some(1.3), fresh),
+        row("start to first answer, wall time", Unit::Time, Some(0.3), Some(0.1), start),
+        row("idle memory", Unit::Size, Some(60e6), Some(25e6), http::idle_memory),
+        row("binary", Unit::Size, Some(40e6), Some(20e6), http::binary_size),
+    ]
+}
+
+fn row(
+    work: &'static str,
+    unit: Unit,
+    at_least: Option<f64>,
+    aim: Option<f64>,
+    measure: fn() -> Result<Measured, String>,
+) -> Row {
+    Row { work, unit, at_least, aim, measure }
+}
+
+/// 0, 1, ... and a bow over them.
+fn profile(count: u32) -> (Vec<f64>, Vec<f64>) {
+    let x: Vec<f64> = (0..count).map(f64::from).collect();
+    let y = x.iter().map(|x| 0.05 * (x * 3.1 / f64::from(count)).sin()).collect();
+    (x, y)
+}
+
+fn csv() -> Result<Measured, String> {
+    let (x, y) = profile(10_000);
+    let columns = (0..4).flat_map(|_| [Column::numbers("z", "mm", &x), Column::numbers("error", "um", &y)]).collect();
+    let table = Table { id: "stations", columns };
+    cpu_time(|| render::csv(&table))
+}
+
+fn gcode() -> Result<Measured, String> {
+    let (x, y) = profile(10_000);
+    let cuts =
+        x.iter().zip(&y).map(|(x, y)| Block::Cut { x_diameter_mm: 90.0 - y, z_mm: -x, feed_mm_per_rev: Some(0.5) });
+    let blocks = std::iter::once(Block::Modes).chain(cuts).chain([Block::End]).collect();
+    let program = Program { dialect: Dialect::Fanuc, increment_mm: 0.001, blocks };
+    cpu_time(|| render::gcode(&program, &[]))
+}
+
+fn svg(stations: u32) -> Result<Measured, String> {
+    let (x, y) = profile(stations);
+    let line = |role| Item::Line { name: "curve", x: x.clone(), y: y.iter().copied().map(Some).collect(), role };
+    let axis = Axis { label: "axis", unit: "um" };
+    let panel = || Panel { y: axis, height: 1.0, items: vec![line(Role::Before), line(Role::After)] };
+    let figure = Figure { id: "f", title: Message::new("title"), x: axis, panels: vec![panel(), panel(), panel()] };
+    let words = Wording {
+        message: &|message| message.code.to_owned(),
+        label: &str::to_owned,
+        unit: &render::unit_symbol,
+        decimal: '.',
+    };
+    cpu_time(|| render::svg(&figure, &words))
+}
+
+fn cached() -> Result<Measured, String> {
+    let body = http::example(DEFLECTION)?.to_string().into_bytes();
+    http::ratio(&Exchange { path: format!("/v1/{DEFLECTION}"), body: Box::new(move |_| body.clone()) })
+}
+
+fn fresh() -> Result<Measured, String> {
+    let job = http::example(DEFLECTION)?;
+    if job.pointer(DEFLECTION_VARIED).is_none() {
+        return Err(format!("the example has no {DEFLECTION_VARIED}"));
+    }
+    let body = Box::new(move |count| http::varied(&job, DEFLECTION_VARIED, count));
+    http::ratio(&Exchange { path: format!("/v1/{DEFLECTION}"), body })
+}
+
+fn start() -> Result<Measured, String> {
+    let body = http::example(DEFLECTION)?.to_string().into_bytes();
+    http::start(&format!("/v1/{DEFLECTION}"), &body)
+}
