@@ -1,6 +1,6 @@
 //! Job files: read, checked, solved without a server.
 
-use std::io::{self, Read};
+use std::io::{self, IsTerminal, Read};
 use std::path::Path;
 
 use bytes::Bytes;
@@ -86,6 +86,9 @@ pub(super) fn example(entry: &Entry, id: Option<&str>, bare: bool) -> Result<(),
 /// The calculator's name and the job's bytes.
 fn read(arguments: &JobArgs) -> Result<(String, Body), Failed> {
     let bytes = if arguments.file.as_os_str() == "-" {
+        if io::stdin().is_terminal() {
+            eprintln!("reading the job from standard input; end it with Ctrl-D");
+        }
         let mut bytes = Vec::new();
         io::stdin().read_to_end(&mut bytes).map(|_| bytes)
     } else {
