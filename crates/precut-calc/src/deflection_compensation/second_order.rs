@@ -80,7 +80,7 @@ impl Sample {
             feed_n: Vec::new(),
         };
         for i in (0..n).step_by(step).chain((n > 1 && (n - 1) % step != 0).then_some(n - 1)) {
-            let loads = &stage.cut.loads[i];
+            let loads = stage.cut.loads.of(i);
             sample.z_mm.push(grid.z_mm[i]);
             sample.target_mm.push(stage.radii.target[i]);
             sample.passive_n.push(loads.passive_n);
