@@ -67,6 +67,11 @@ impl ForceChange {
         added_passive_n: 0.0,
     };
 
+    /// Whether one factor holds for all stations that are cut at one speed.
+    pub(super) fn same_everywhere(&self) -> bool {
+        self.gradient.abs() <= 0.0
+    }
+
     /// Factor on all components at relative station u, feed and speed (`diagnosis/4.10` to `4.15`).
     pub(super) fn factor(&self, u: f64, feed_mm_per_rev: f64, speed_m_per_min: f64) -> f64 {
         let mut factor = self.level * (1.0 + self.gradient * (u - 0.5));

@@ -4,6 +4,7 @@ use crate::calculator::{Failure, Finding, Message, Monitor};
 use crate::force::Reached;
 
 use super::acting::Acting;
+use super::extremes::Extremes;
 use super::form::Form;
 use super::grid::Grid;
 use super::input::{Job, Segment, Support, Theory};
@@ -63,10 +64,16 @@ pub(super) const WARNING_CODES: &[&str] = &[
 
 /// Who yields at the station that deflects most (`deflection/3.2`), one-sided rests as they stand there: by virtual
 /// work the shares are exact.
-pub(super) fn shares(job: &Job, grid: &Grid, acting: &Acting, stage: &Stage) -> Result<Shares, Failure> {
-    let i = most_deflected(stage);
+pub(super) fn shares(
+    job: &Job,
+    grid: &Grid,
+    acting: &Acting,
+    stage: &Stage,
+    most_deflected: usize,
+) -> Result<Shares, Failure> {
+    let i = most_deflected;
     let z_mm = grid.z_mm.get(i).copied().unwrap_or(0.0);
-    let touching = stage.line.touching(i, &stage.cut.loads[i]);
+    let touching = stage.line.touching(i, &stage.cut.loads.of(i));
     let parts = if touching.is_empty() {
         stage.structure.beam.shares(z_mm)
     } else {
@@ -92,14 +99,15 @@ pub(super) fn shares(job: &Job, grid: &Grid, acting: &Acting, stage: &Stage) -> 
     })
 }
 
-fn most_deflected(stage: &Stage) -> usize {
-    let mut best = 0;
+/// The first station of the largest |Y(a)|; 0 where there is none.
+pub(super) fn most_deflected(stage: &Stage) -> usize {
+    let mut best = (0, 0.0);
     for (i, y) in stage.cut.y_mm.iter().enumerate() {
-        if y.abs() > stage.cut.y_mm[best].abs() {
-            best = i;
+        if y.abs() > best.1 {
+            best = (i, y.abs());
         }
     }
-    best
+    best.0
 }
 
 /// What a bilateral steady rest would do where the shaft gives way most, as compliant as the stiffest support that
@@ -135,20 +143,6 @@ pub(super) fn one_more_rest(
     Ok(form.form_error_um.map(|form_error_um| OneMoreRest { z_mm, compliance_um_per_n, form_error_um }))
 }
 
-/// Standard uncertainty of the diameter, um (`deflection/7`): to first order about the compensated cut
-/// dr = Y_el sqrt(u_F² + u_W²)/(1 + S'), and the scatter from trace to trace.
-pub(super) fn diameter_uncertainty_um(job: &Job, acting: &Acting, stage: &Stage) -> Vec<f64> {
-    let relative = job.uncertainty.force_percent.hypot(job.uncertainty.stiffness_percent) / 100.0;
-    let scatter = 2.0 * acting.scatter_mm * UM_PER_MM;
-    stage
-        .cut
-        .elastic_mm
-        .iter()
-        .zip(&stage.cut.planned_copying)
-        .map(|(y, copying)| (2.0 * y * relative * (1.0 - copying) * UM_PER_MM).hypot(scatter))
-        .collect()
-}
-
 /// The answer in words, most important first.
 pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
     let mut said = vec![nominal_path(&outcome.before), dominating(&outcome.shares)];
@@ -161,7 +155,7 @@ pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
             _ => Message::new("path_has_gaps").with("stations", without_command(outcome)),
         });
     }
-    let uncertainty = outcome.stations.diameter_uncertainty_um.iter().copied().fold(0.0, f64::max);
+    let uncertainty = largest(outcome.stations.diameter_uncertainty_um.iter().copied());
     said.push(
         Message::new("uncertain_by")
             .with("uncertainty_um", uncertainty)
@@ -182,7 +176,7 @@ pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
     if overcut < 0.0 {
         said.push(Message::new("one_step_overcuts").with("undersize_um", -overcut));
     }
-    let copied = outcome.stations.copying_factor.iter().flatten().copied().fold(0.0, f64::max);
+    let copied = largest(outcome.stations.copying_factor.iter().flatten().copied());
     if copied > 0.0 {
         said.push(Message::new("stock_is_copied").with("copying_factor", copied));
     }
@@ -191,6 +185,11 @@ pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
     }
     said.push(Message::new("not_modelled"));
     said
+}
+
+/// The largest value above 0. By comparison: `f64::max` also settles signed zeros and NaN, at three times the cost.
+fn largest(values: impl Iterator<Item = f64>) -> f64 {
+    values.fold(0.0, |most, value| if value > most { value } else { most })
 }
 
 fn without_command(outcome: &Outcome) -> usize {
@@ -222,11 +221,11 @@ fn dominating(shares: &Shares) -> Message {
 
 /// Where an input leaves the range in which the model holds.
 pub(super) fn warnings(job: &Job, grid: &Grid, stage: &Stage, outcome: &Outcome) -> Vec<Finding> {
-    let mut found = Vec::new();
-    found.extend(deflection_warnings(job, grid, stage));
+    let extremes = Extremes::of(stage);
+    let mut found = deflection_warnings(job, grid, &extremes);
     found.extend(structure_warnings(job, stage, outcome));
-    found.extend(command_warnings(job, stage, outcome));
-    found.extend(force_warnings(job, stage));
+    found.extend(command_warnings(job, &extremes, outcome));
+    found.extend(force_warnings(job, stage, &extremes));
     found.extend(outcome.second_order.iter().flat_map(|sizes| super::second_order::left_out(job, sizes)));
     if let (Some(limit), Some(form)) = (job.tolerance.form_um, outcome.form_error_after_um)
         && form > limit
@@ -236,23 +235,11 @@ pub(super) fn warnings(job: &Job, grid: &Grid, stage: &Stage, outcome: &Outcome)
     found
 }
 
-fn deflection_warnings(job: &Job, grid: &Grid, stage: &Stage) -> Vec<Finding> {
+fn deflection_warnings(job: &Job, grid: &Grid, extremes: &Extremes) -> Vec<Finding> {
     let mut found = Vec::new();
-    let (cut, radii) = (&stage.cut, &stage.radii);
-    let mut ratio = 0.0_f64;
-    let mut largest = 0.0_f64;
-    let mut over_diameter = 0.0_f64;
-    let mut undersize = 0.0_f64;
-    for i in 0..grid.len() {
-        let depth = cut.nominal_depth_mm[i];
-        if depth > 0.0 {
-            ratio = ratio.max(cut.elastic_mm[i] / depth);
-        }
-        let moved = cut.elastic_mm[i].abs().max(cut.z_mm[i].abs());
-        largest = largest.max(moved);
-        over_diameter = over_diameter.max(moved / (2.0 * radii.target[i]));
-        undersize = undersize.max(2.0 * (radii.target[i] - radii.stock[i]));
-    }
+    let ratio = extremes.elastic_over_depth.value();
+    let (largest, over_diameter) = (extremes.moved_mm, extremes.moved_over_diameter.value());
+    let undersize = 2.0 * extremes.undersize_mm;
     if ratio > DEFLECTION_OVER_DEPTH {
         found.push(Finding::new("deflection_over_depth", "/cut").measured(ratio, DEFLECTION_OVER_DEPTH, "1"));
     }
@@ -300,7 +287,7 @@ fn structure_warnings(job: &Job, stage: &Stage, outcome: &Outcome) -> Vec<Findin
 
 /// |M| d/(2J) with the largest moment under the tool at its worst station and the thinnest segment: an upper bound.
 fn peak_stress_n_per_mm2(job: &Job, stage: &Stage, z_mm: f64) -> f64 {
-    let force = stage.cut.loads.iter().map(|l| l.passive_n).fold(0.0, f64::max);
+    let force = stage.cut.loads.distinct().map(|l| l.passive_n).fold(0.0, f64::max);
     let moment = force * stage.structure.beam.peak_bending_moment_mm(z_mm);
     let stress = |s: &Segment| {
         moment * s.diameter_mm / (2.0 * crate::num::beam::second_moment_mm4(s.diameter_mm, s.bore_diameter_mm))
@@ -308,17 +295,13 @@ fn peak_stress_n_per_mm2(job: &Job, stage: &Stage, z_mm: f64) -> f64 {
     job.shaft.segments.iter().map(stress).fold(0.0, f64::max)
 }
 
-fn command_warnings(job: &Job, stage: &Stage, outcome: &Outcome) -> Vec<Finding> {
+fn command_warnings(job: &Job, extremes: &Extremes, outcome: &Outcome) -> Vec<Finding> {
     let mut found = Vec::new();
-    let depths = stage.cut.command_mm.iter().zip(&stage.radii.stock).map(|(c, stock)| c.map(|c| stock - c));
-    let deepest = depths.clone().flatten().fold(0.0, f64::max);
+    let deepest = extremes.commanded_mm;
     if let Some(limit) = job.limits.depth_mm.filter(|limit| deepest > *limit) {
         found.push(Finding::new("command_too_deep", "/limits/depth_mm").measured(deepest, limit, "mm"));
     }
-    let ratio = depths
-        .zip(&stage.cut.nominal_depth_mm)
-        .filter_map(|(commanded, nominal)| commanded.filter(|_| *nominal > 0.0).map(|c| c / nominal))
-        .fold(0.0, f64::max);
+    let ratio = extremes.commanded_over_depth.value();
     if ratio > DEPTH_RATIO {
         found.push(Finding::new("command_doubles_depth", "/cut").measured(ratio, DEPTH_RATIO, "1"));
     }
@@ -338,28 +321,32 @@ fn command_warnings(job: &Job, stage: &Stage, outcome: &Outcome) -> Vec<Finding>
 }
 
 /// Depth, feed and speed that the force law meets, held against the range it was measured in.
-fn force_warnings(job: &Job, stage: &Stage) -> Vec<Finding> {
-    let positive = || stage.cut.nominal_depth_mm.iter().copied().filter(|a| *a > 0.0);
-    let (least, largest) = (positive().fold(f64::INFINITY, f64::min), positive().fold(0.0, f64::max));
+fn force_warnings(job: &Job, stage: &Stage, extremes: &Extremes) -> Vec<Finding> {
+    let (least, largest) = (extremes.least_depth_mm, extremes.largest_depth_mm);
     if least > largest {
         return Vec::new();
     }
-    let speeds =
-        || stage.radii.planned.iter().zip(&stage.radii.target).map(|(p, t)| stage.regime.speed_m_per_min(*p, *t));
     let speed_pointer = match stage.regime.speed {
         Speed::Surface(_) => "/cut/speed_m_per_min",
         Speed::Spindle(_) => "/cut/spindle_speed_rpm",
     };
+    let (slowest, fastest) = speed_range_m_per_min(stage);
     let feed = stage.regime.feed_mm_per_rev;
     let mut found = job.force.extrapolations(
         Reached { pointer: "/shaft/segments", least, largest },
         Reached { pointer: "/cut/feed_mm_per_rev", least: feed, largest: feed },
-        Reached {
-            pointer: speed_pointer,
-            least: speeds().fold(f64::INFINITY, f64::min),
-            largest: speeds().fold(0.0, f64::max),
-        },
+        Reached { pointer: speed_pointer, least: slowest, largest: fastest },
     );
     found.extend(job.force.cautions("/force"));
     found
+}
+
+fn speed_range_m_per_min(stage: &Stage) -> (f64, f64) {
+    if let Speed::Surface(speed) = stage.regime.speed {
+        return (speed, speed);
+    }
+    let radii = stage.radii.planned().iter().zip(&stage.radii.target);
+    radii
+        .map(|(planned, target)| stage.regime.speed_m_per_min(*planned, *target))
+        .fold((f64::INFINITY, 0.0), |(least, largest): (f64, f64), speed| (least.min(speed), largest.max(speed)))
 }

@@ -3,11 +3,11 @@
 use crate::calculator::{Failure, Monitor, checkpoint};
 
 use super::equilibrium::{Engagement, command_radius_mm, commanded_model_depth_mm, copying_factor};
-use super::model::{Line, Loads, NominalLoads, Radii};
+use super::model::{Line, Loads, Radii, Solver};
 use super::output::{OneStep, StatusCompensated, StatusUncompensated};
 
 const UM_PER_MM: f64 = 1e3;
-/// Stations between two looks at the monitor: about a millisecond of work.
+/// Stations between two looks at the monitor: less than a millisecond of work.
 const STATIONS_PER_CHECK: usize = 2048;
 
 /// A cut along the shaft, station by station.
@@ -15,67 +15,132 @@ pub(super) struct CutLine {
     /// Planned depth a.
     pub nominal_depth_mm: Vec<f64>,
     /// All loads at the planned depth, also those that do not act.
-    pub loads: Vec<Loads>,
+    pub loads: NominalLoads,
     /// Y(a).
     pub y_mm: Vec<f64>,
-    /// Z(a).
+    /// Z(a); empty where nothing moves the axis aside, see [`at`].
     pub z_mm: Vec<f64>,
     /// S'/(1+S') at the planned depth and the command: the copying factor of the compensated cut.
     pub planned_copying: Vec<f64>,
-    /// Elastic part of Y(a): without stated errors.
-    pub elastic_mm: Vec<f64>,
     /// Command r_c.
     pub command_mm: Vec<Option<f64>>,
     pub status_compensated: Vec<StatusCompensated>,
-    /// Depth really cut along the nominal line.
-    pub uncompensated_depth_mm: Vec<f64>,
+    /// Depth really cut along the nominal line; always there, as the answer has it.
+    pub uncompensated_depth_mm: Vec<Option<f64>>,
     pub status_uncompensated: Vec<StatusUncompensated>,
     pub copying: Vec<Option<f64>>,
     /// Largest residual of the equilibrium equation, mm.
     pub residual_mm: f64,
+    /// Exponent of the depth, where a power of it is all that acts.
+    exponent: Option<f64>,
     /// Lost depth over its linear estimate at the station before: along a shaft it hardly changes.
     loss_ratio: f64,
+}
+
+/// Loads at the nominal depth along a shaft. Stations in a row mostly share depth and law, and with them the loads.
+#[derive(Debug, Default)]
+pub(super) struct NominalLoads {
+    runs: Vec<LoadRun>,
+    stations: usize,
+}
+
+/// Stations from `first` to the next run have these loads.
+#[derive(Debug)]
+struct LoadRun {
+    first: usize,
+    /// Law, and bits of the depth.
+    key: (u32, u64),
+    loads: Loads,
+}
+
+impl NominalLoads {
+    /// The loads of the next station.
+    #[inline]
+    fn next(&mut self, line: &Line, depth_mm: f64) -> Loads {
+        let i = self.stations;
+        self.stations += 1;
+        let key = (line.law_index(i), depth_mm.to_bits());
+        match self.runs.last() {
+            Some(run) if run.key == key => run.loads,
+            _ => {
+                let loads = line.nominal_loads(i, depth_mm);
+                self.runs.push(LoadRun { first: i, key, loads });
+                loads
+            }
+        }
+    }
+
+    /// The loads at one station.
+    pub(super) fn of(&self, i: usize) -> Loads {
+        let after = self.runs.partition_point(|run| run.first <= i);
+        self.runs[..after].last().map_or_else(Loads::default, |run| run.loads)
+    }
+
+    /// One entry for every run of equal loads.
+    pub(super) fn distinct(&self) -> impl Iterator<Item = &Loads> {
+        self.runs.iter().map(|run| &run.loads)
+    }
+
+    /// One entry for every station.
+    pub(super) fn along(&self) -> impl Iterator<Item = &Loads> {
+        self.runs_with_length().flat_map(|(loads, length)| std::iter::repeat_n(loads, length))
+    }
+
+    /// One component at every station.
+    pub(super) fn column(&self, component: impl Fn(&Loads) -> f64) -> Vec<f64> {
+        let mut column = Vec::with_capacity(self.stations);
+        for (loads, length) in self.runs_with_length() {
+            column.extend(std::iter::repeat_n(component(loads), length));
+        }
+        column
+    }
+
+    fn runs_with_length(&self) -> impl Iterator<Item = (&Loads, usize)> {
+        let ends = self.runs.iter().skip(1).map(|run| run.first).chain([self.stations]);
+        self.runs.iter().zip(ends).map(|(run, end)| (&run.loads, end - run.first))
+    }
 }
 
 impl CutLine {
     /// Computes a cut with the forces and compliances of `line` about the radii given.
     pub(super) fn of(line: &Line, radii: &Radii, monitor: &dyn Monitor) -> Result<Self, Failure> {
         let n = radii.target.len();
-        let mut cut = Self::with_capacity(n);
-        let mut last = NominalLoads::default();
+        let mut cut = Self::with_capacity(n, line);
+        let mut solver = line.solver();
         for i in 0..n {
             if i % STATIONS_PER_CHECK == 0 {
                 checkpoint(monitor)?;
             }
-            cut.plan(line, radii, i, &mut last);
-            cut.predict_uncompensated(line, radii, i);
+            cut.plan(line, radii, i);
+            cut.predict_uncompensated(&mut solver, radii, i);
         }
         Ok(cut)
     }
 
-    fn with_capacity(n: usize) -> Self {
+    fn with_capacity(n: usize, line: &Line) -> Self {
         Self {
             nominal_depth_mm: Vec::with_capacity(n),
-            loads: Vec::with_capacity(n),
+            loads: NominalLoads::default(),
             y_mm: Vec::with_capacity(n),
-            z_mm: Vec::with_capacity(n),
+            z_mm: Vec::with_capacity(if line.moves_aside() { n } else { 0 }),
             planned_copying: Vec::with_capacity(n),
-            elastic_mm: Vec::with_capacity(n),
             command_mm: Vec::with_capacity(n),
             status_compensated: Vec::with_capacity(n),
             uncompensated_depth_mm: Vec::with_capacity(n),
             status_uncompensated: Vec::with_capacity(n),
             copying: Vec::with_capacity(n),
             residual_mm: 0.0,
+            exponent: line.exponent(),
             loss_ratio: 1.0,
         }
     }
 
     /// The explicit command for the wanted radius.
-    fn plan(&mut self, line: &Line, radii: &Radii, i: usize, last: &mut NominalLoads) {
+    #[inline]
+    fn plan(&mut self, line: &Line, radii: &Radii, i: usize) {
         let target = radii.target[i];
-        let depth = radii.planned[i] - target;
-        let loads = line.nominal_loads(i, depth, last);
+        let depth = radii.planned()[i] - target;
+        let loads = self.loads.next(line, depth);
         let opening = line.opening(i, &loads);
         let command = command_radius_mm(target, opening.y_mm, opening.z_mm);
         let slope = match command {
@@ -90,23 +155,30 @@ impl CutLine {
             Some(_) => StatusCompensated::Ok,
         });
         self.nominal_depth_mm.push(depth);
-        self.elastic_mm.push(line.elastic_mm(i, &opening));
         self.planned_copying.push(slope / (1.0 + slope));
         self.y_mm.push(opening.y_mm);
-        self.z_mm.push(opening.z_mm);
-        self.loads.push(loads);
+        if line.moves_aside() {
+            self.z_mm.push(opening.z_mm);
+        }
         self.command_mm.push(command);
     }
 
     /// What the nominal path r_c = r_t gives.
-    fn predict_uncompensated(&mut self, line: &Line, radii: &Radii, i: usize) {
+    #[inline]
+    fn predict_uncompensated(&mut self, solver: &mut Solver<'_>, radii: &Radii, i: usize) {
         let (target, stock) = (radii.target[i], radii.stock[i]);
         let commanded = stock - target;
-        let linear_loss = commanded - self.guess_mm(i, commanded);
-        let engagement = line.engage(i, stock, target, commanded - self.loss_ratio * linear_loss);
-        if let Engagement::Cut { depth_mm, .. } = engagement {
-            self.loss_ratio = if linear_loss.abs() > 0.0 { (commanded - depth_mm) / linear_loss } else { 1.0 };
-        }
+        let guess = self.guess_mm(i, commanded);
+        let engagement = if self.exponent.is_some() {
+            solver.engage(i, stock, target, guess)
+        } else {
+            let linear_loss = commanded - guess;
+            let engagement = solver.engage(i, stock, target, commanded - self.loss_ratio * linear_loss);
+            if let Engagement::Cut { depth_mm, .. } = engagement {
+                self.loss_ratio = if linear_loss.abs() > 0.0 { (commanded - depth_mm) / linear_loss } else { 1.0 };
+            }
+            engagement
+        };
         self.status_uncompensated.push(match engagement {
             Engagement::Cut { .. } => StatusUncompensated::Ok,
             Engagement::NoContact => StatusUncompensated::NoContact,
@@ -117,16 +189,26 @@ impl CutLine {
             Engagement::Cut { opening, .. } => Some(copying_factor(target, opening)),
             _ => None,
         });
-        self.uncompensated_depth_mm.push(engagement.depth_mm());
+        self.uncompensated_depth_mm.push(Some(engagement.depth_mm()));
     }
 
-    /// Depth that the nominal state lets expect: t_c - Y/(1 + Y'), one Newton step of the linearised cut.
+    /// Depth that the nominal state lets expect: a + d with d = (t_c - a - Y)/(1 + Y'), one Newton step; where Y is a
+    /// power of the depth, the two terms more of the inverse series in q = d/a that its exponent gives.
+    #[inline]
     fn guess_mm(&self, i: usize, commanded_depth_mm: f64) -> f64 {
-        let copying = self.planned_copying[i];
-        let extra = commanded_depth_mm - self.nominal_depth_mm[i];
-        self.nominal_depth_mm[i] + (extra - self.y_mm[i]) * (1.0 - copying)
+        let (nominal, copying) = (self.nominal_depth_mm[i], self.planned_copying[i]);
+        let newton = (commanded_depth_mm - nominal - self.y_mm[i]) * (1.0 - copying);
+        match self.exponent {
+            Some(z) if nominal > 0.0 => {
+                let q = newton / nominal;
+                let lean = (1.0 - z) * copying;
+                nominal + newton * (1.0 + q * lean * (0.5 + q * (0.5 * lean - (2.0 - z) / 6.0)))
+            }
+            _ => nominal + newton,
+        }
     }
 
+    #[inline]
     fn note(&mut self, engagement: Engagement) {
         if let Engagement::Cut { residual_mm, .. } = engagement {
             self.residual_mm = self.residual_mm.max(residual_mm.abs());
@@ -142,13 +224,14 @@ impl CutLine {
         monitor: &dyn Monitor,
     ) -> Result<Vec<Option<f64>>, Failure> {
         let mut produced = Vec::with_capacity(commands.len());
+        let mut solver = line.solver();
         for (i, command) in commands.iter().enumerate() {
             if i % STATIONS_PER_CHECK == 0 {
                 checkpoint(monitor)?;
             }
             produced.push(command.map(|command| {
                 let stock = radii.stock[i];
-                let engagement = line.engage(i, stock, command, self.guess_mm(i, stock - command));
+                let engagement = solver.engage(i, stock, command, self.guess_mm(i, stock - command));
                 self.note(engagement);
                 stock - engagement.depth_mm()
             }));
@@ -161,7 +244,7 @@ impl CutLine {
         self.uncompensated_depth_mm
             .iter()
             .zip(radii.stock.iter().zip(&radii.target))
-            .map(|(t, (stock, target))| Some(2.0 * (stock - t - target) * UM_PER_MM))
+            .map(|(t, (stock, target))| t.map(|t| 2.0 * (stock - t - target) * UM_PER_MM))
             .collect()
     }
 }
@@ -178,9 +261,10 @@ pub(super) fn one_step(line: &Line, radii: &Radii, cut: &CutLine, depth_exponent
         residual_commanded_model_um: Vec::with_capacity(n),
         depth_commanded_model_mm: Vec::with_capacity(n),
     };
-    for i in 0..n {
+    let mut solver = line.solver();
+    for (i, loads) in cut.loads.along().enumerate() {
         let a = cut.nominal_depth_mm[i];
-        let force = cut.loads[i].passive_n;
+        let force = loads.passive_n;
         if a <= 0.0 || force <= 0.0 {
             step.push_nothing();
             continue;
@@ -190,8 +274,8 @@ pub(super) fn one_step(line: &Line, radii: &Radii, cut: &CutLine, depth_exponent
         let factor = line.passive(i, a + y).0 / force;
         let depth = a + y * factor;
         let (stock, target) = (radii.stock[i], radii.target[i]);
-        let command = radii.planned[i] - depth;
-        let produced = stock - line.engage(i, stock, command, cut.guess_mm(i, stock - command)).depth_mm();
+        let command = radii.planned()[i] - depth;
+        let produced = stock - solver.engage(i, stock, command, cut.guess_mm(i, stock - command)).depth_mm();
         step.factor.push(Some(factor));
         step.depth_mm.push(Some(depth));
         step.diameter_error_um.push(Some(2.0 * (produced - target) * UM_PER_MM));

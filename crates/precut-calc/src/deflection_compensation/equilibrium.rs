@@ -54,6 +54,9 @@ pub(crate) fn command_radius_mm(target_radius_mm: f64, y_mm: f64, z_mm: f64) -> 
     if z_mm.abs() >= target_radius_mm {
         return None;
     }
+    if z_mm.abs() <= 0.0 {
+        return Some(target_radius_mm - y_mm);
+    }
     // r_t - Z²/(r_t + sqrt(..)) loses no digits where Z is small.
     let axis = ((target_radius_mm - z_mm) * (target_radius_mm + z_mm)).sqrt();
     Some(target_radius_mm - z_mm * z_mm / (target_radius_mm + axis) - y_mm)

@@ -105,11 +105,8 @@ pub struct Deviation {
 impl Form {
     /// Form of the diameter errors `errors_um` at the ascending stations `z_mm` (`deflection/5`).
     pub(super) fn of(z_mm: &[f64], errors_um: &[Option<f64>]) -> Self {
-        let known: Vec<f64> = errors_um.iter().filter_map(|e| *e).collect();
-        let complete = known.len() == errors_um.len() && !known.is_empty();
         let at = |i: usize| Deviation { z_mm: z_mm[i], diameter_error_um: errors_um[i].unwrap_or(0.0) };
-        let largest = extreme(errors_um, |a, b| a > b).map(at);
-        let smallest = extreme(errors_um, |a, b| a < b).map(at);
+        let (largest, smallest) = extremes(errors_um).map(|(high, low)| (at(high), at(low))).unzip();
         let mut form = Self {
             class: None,
             form_error_um: None,
@@ -121,9 +118,11 @@ impl Form {
             largest,
             smallest,
         };
-        let (true, Some(high), Some(low)) = (complete, largest, smallest) else { return form };
+        let (true, Some(high), Some(low)) = (errors_um.iter().all(Option::is_some), largest, smallest) else {
+            return form;
+        };
         let (high, low) = (high.diameter_error_um, low.diameter_error_um);
-        let taper = known[known.len() - 1] - known[0];
+        let taper = at(errors_um.len() - 1).diameter_error_um - at(0).diameter_error_um;
         let length_mm = z_mm[z_mm.len() - 1] - z_mm[0];
         let hysteresis = (HYSTERESIS_SHARE * (high - low)).max(FLAT_UM);
         form.form_error_um = Some(high - low);
@@ -132,23 +131,28 @@ impl Form {
         form.taper_um_per_m = (length_mm > 0.0).then(|| taper / length_mm * 1000.0);
         form.hysteresis_um = Some(hysteresis);
         if high - low > FLAT_UM {
-            form.extrema = interior_extrema(z_mm, &known, hysteresis);
+            form.extrema = interior_extrema(z_mm, errors_um, hysteresis);
         }
         form.class = Some(classify(high - low, taper, &form.extrema));
         form
     }
 }
 
-fn extreme(errors: &[Option<f64>], better: impl Fn(f64, f64) -> bool) -> Option<usize> {
-    let mut best: Option<(usize, f64)> = None;
+/// Indices of the first largest and the first smallest error.
+fn extremes(errors: &[Option<f64>]) -> Option<(usize, usize)> {
+    let first = errors.iter().position(Option::is_some)?;
+    let start = (first, errors[first]?);
+    let (mut high, mut low) = (start, start);
     for (i, error) in errors.iter().enumerate() {
-        if let Some(error) = *error
-            && best.is_none_or(|(_, b)| better(error, b))
-        {
-            best = Some((i, error));
+        let Some(error) = *error else { continue };
+        if error > high.1 {
+            high = (i, error);
+        }
+        if error < low.1 {
+            low = (i, error);
         }
     }
-    best.map(|(i, _)| i)
+    Some((high.0, low.0))
 }
 
 fn classify(range_um: f64, taper_um: f64, extrema: &[Extremum]) -> FormClass {
@@ -167,46 +171,45 @@ fn classify(range_um: f64, taper_um: f64, extrema: &[Extremum]) -> FormClass {
 
 /// Zigzag with hysteresis: an interior extremum counts only if the profile leaves it by more than
 /// `hysteresis` on both sides.
-fn interior_extrema(z_mm: &[f64], errors: &[f64], hysteresis: f64) -> Vec<Extremum> {
+fn interior_extrema(z_mm: &[f64], errors: &[Option<f64>], hysteresis: f64) -> Vec<Extremum> {
     let mut found = Vec::new();
     // The running highest and lowest since the last turn; which way the profile goes is open at first.
-    let (mut highest, mut lowest) = (0, 0);
+    let start = (0, errors.first().copied().flatten().unwrap_or(0.0));
+    let (mut highest, mut lowest): ((usize, f64), (usize, f64)) = (start, start);
     let mut rising: Option<bool> = None;
-    for (i, &e) in errors.iter().enumerate() {
-        if e > errors[highest] {
-            highest = i;
+    let extremum = |kind, (i, diameter_error_um): (usize, f64)| Extremum { kind, z_mm: z_mm[i], diameter_error_um };
+    for (i, error) in errors.iter().enumerate() {
+        let Some(e) = *error else { continue };
+        if e > highest.1 {
+            highest = (i, e);
         }
-        if e < errors[lowest] {
-            lowest = i;
+        if e < lowest.1 {
+            lowest = (i, e);
         }
         match rising {
-            None if e - errors[lowest] > hysteresis => {
+            None if e - lowest.1 > hysteresis => {
                 // Nothing before stood higher by the hysteresis, or it would have been falling: no minimum yet.
                 rising = Some(true);
-                highest = i;
+                highest = (i, e);
             }
-            None if errors[highest] - e > hysteresis => {
+            None if highest.1 - e > hysteresis => {
                 rising = Some(false);
-                lowest = i;
+                lowest = (i, e);
             }
-            Some(true) if errors[highest] - e > hysteresis => {
-                found.push(extremum(ExtremumKind::Maximum, z_mm, errors, highest));
+            Some(true) if highest.1 - e > hysteresis => {
+                found.push(extremum(ExtremumKind::Maximum, highest));
                 rising = Some(false);
-                lowest = i;
+                lowest = (i, e);
             }
-            Some(false) if e - errors[lowest] > hysteresis => {
-                found.push(extremum(ExtremumKind::Minimum, z_mm, errors, lowest));
+            Some(false) if e - lowest.1 > hysteresis => {
+                found.push(extremum(ExtremumKind::Minimum, lowest));
                 rising = Some(true);
-                highest = i;
+                highest = (i, e);
             }
             _ => {}
         }
     }
     found
-}
-
-fn extremum(kind: ExtremumKind, z_mm: &[f64], errors: &[f64], i: usize) -> Extremum {
-    Extremum { kind, z_mm: z_mm[i], diameter_error_um: errors[i] }
 }
 
 #[cfg(test)]

@@ -273,7 +273,7 @@ impl PreparedRun {
         let base_change = Acting::of(&job.effects, &conditions, regime.direction).structure;
         let base_profile = structure(&job, &base_change, &regime)?.beam.profile(&grid.z_mm, wanted(&job));
         Ok(Self {
-            radii: Radii { target, planned: stock.clone(), stock },
+            radii: Radii { target, stock, planned: None },
             row_of_station: places.into_iter().map(|p| p.0).collect(),
             job,
             conditions,
@@ -309,12 +309,13 @@ impl PreparedRun {
             rest_shapes: &shapes,
         };
         let line = Line::of(&ingredients, profile);
+        let mut solver = line.solver();
         for (i, &row) in self.row_of_station.iter().enumerate() {
             let (stock, command) = (self.radii.stock[i], self.command_mm[i]);
             let commanded_depth = stock - command;
             let opening = line.opening_at(i, commanded_depth);
             let guess = commanded_depth - opening.y_mm / (1.0 + opening.y_slope);
-            out[row] = match line.engage(i, stock, command, guess) {
+            out[row] = match solver.engage(i, stock, command, guess) {
                 Engagement::Cut { depth_mm, .. } => Ok(measure.of(stock - depth_mm, self.radii.target[i])),
                 Engagement::NoContact => Ok(measure.of(stock, self.radii.target[i])),
                 Engagement::NoCut => Err(Missing::NoCut),

@@ -42,6 +42,9 @@ impl Grid {
         };
         grid.length_mm = grid.steps_mm[segments.len()];
         let runs = runs_of_one_diameter(segments);
+        let stations = station_count(job);
+        grid.z_mm.reserve_exact(stations);
+        grid.segment.reserve_exact(stations);
         match &job.stations {
             Stations::PerZone { count } => {
                 for run in runs.iter().filter(|run| is_turned(job, run)) {
@@ -56,14 +59,18 @@ impl Grid {
     fn fill_run(&mut self, run: &SegmentRun, count: u32, segments: &[Segment]) {
         let (from, to) = (self.steps_mm[run.first], self.steps_mm[run.end]);
         let first = self.z_mm.len();
-        let mut segment = run.first;
-        for k in 0..count {
-            let z = if k + 1 == count { to } else { from + (to - from) * (f64::from(k) / f64::from(count - 1)) };
-            while segment + 1 < run.end && z > self.steps_mm[segment + 1] {
-                segment += 1;
-            }
-            self.z_mm.push(z);
-            self.segment.push(segment);
+        let steps = f64::from(count.saturating_sub(1));
+        self.z_mm.extend((0..count.saturating_sub(1)).map(|k| from + (to - from) * (f64::from(k) / steps)));
+        self.z_mm.push(to);
+        let mut rest = &self.z_mm[first..];
+        for segment in run.first..run.end {
+            let here = if segment + 1 == run.end {
+                rest.len()
+            } else {
+                rest.partition_point(|z| *z <= self.steps_mm[segment + 1])
+            };
+            self.segment.extend(std::iter::repeat_n(segment, here));
+            rest = &rest[here..];
         }
         self.zones.push(Zone { first, end: self.z_mm.len(), diameter_mm: segments[run.first].diameter_mm });
     }

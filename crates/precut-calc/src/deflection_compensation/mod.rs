@@ -15,8 +15,10 @@
 mod acting;
 mod advice;
 mod check;
+mod columns;
 mod cut;
 mod equilibrium;
+mod extremes;
 mod form;
 mod forward;
 mod grid;
@@ -24,6 +26,7 @@ mod input;
 mod model;
 mod output;
 mod picture;
+mod power_cut;
 mod regime;
 mod second_order;
 mod stage;
@@ -49,6 +52,7 @@ use crate::calculator::{
 use crate::{force, material};
 
 use acting::Acting;
+use columns::{Errors, columns};
 use cut::one_step;
 use grid::{Grid, station_count};
 use stage::{Stage, all_cuts};
@@ -180,8 +184,11 @@ fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
         }
     };
     monitor.progress(0.8, Message::new("stage_advice"));
-    let outcome = Assembly { job, grid: &grid, acting: &acting, stage: &stage }.outcome(driven, passes, monitor)?;
+    let errors = Errors::of(&stage, driven.as_ref().map(|driven| driven.produced_mm.as_slice()));
+    let mut outcome =
+        Assembly { job, grid: &grid, acting: &acting, stage: &stage }.outcome(driven, passes, &errors, monitor)?;
     let warnings = advice::warnings(job, &grid, &stage, &outcome);
+    outcome.stations = columns(job, &acting, grid.z_mm, stage, errors);
     let explanation = advice::explanation(job, &outcome);
     monitor.progress(1.0, Message::new("stage_done"));
     Ok(Answer { output: outcome, warnings, explanation, basis: basis(job) })
@@ -210,17 +217,18 @@ struct Assembly<'a> {
 }
 
 impl Assembly<'_> {
+    /// All but the columns: they take over the arrays of the stage once nobody asks it any more.
     fn outcome(
         &self,
         driven: Option<Driven>,
         passes: Vec<PassOutcome>,
+        errors: &Errors,
         monitor: &dyn Monitor,
     ) -> Result<Outcome, Failure> {
         let Self { job, grid, acting, stage } = *self;
         let full = job.detail == Detail::Full;
-        let stations = self.stations(driven.as_ref().map(|driven| driven.produced_mm.as_slice()));
-        let before = Form::of(&grid.z_mm, &stations.diameter_error_uncompensated_um);
-        let after = stations.diameter_error_compensated_um.as_ref().map(|errors| Form::of(&grid.z_mm, errors));
+        let before = Form::of(&grid.z_mm, &errors.uncompensated_um);
+        let after = errors.compensated_um.as_ref().map(|errors| Form::of(&grid.z_mm, errors));
         let time = if job.passes.is_empty() {
             regime::cutting_time_min(job, &stage.regime, None)
         } else {
@@ -230,7 +238,8 @@ impl Assembly<'_> {
                 .map(|pass| regime::cutting_time_min(job, &base.of_pass(pass), Some(pass.diameter_mm)))
                 .sum()
         };
-        let largest_mm = stage.cut.y_mm.iter().fold(0.0, |most: f64, y| most.max(y.abs()));
+        let most_deflected = advice::most_deflected(stage);
+        let largest_mm = model::at(&stage.cut.y_mm, most_deflected).abs();
         Ok(Outcome {
             form_error_um: before.form_error_um,
             form_error_after_um: after.as_ref().and_then(|form| form.form_error_um),
@@ -240,50 +249,15 @@ impl Assembly<'_> {
             before,
             after,
             path: driven.map(|driven| driven.path),
-            shares: advice::shares(job, grid, acting, stage)?,
+            shares: advice::shares(job, grid, acting, stage, most_deflected)?,
             second_order: if full { Some(second_order::second_order(job, grid, acting, stage)?) } else { None },
             one_more_rest: if full { advice::one_more_rest(job, grid, acting, stage, monitor)? } else { None },
             one_step: (full && !stage.line.has_contacts())
                 .then(|| one_step(&stage.line, &stage.radii, &stage.cut, job.force.depth_exponent())),
             passes,
             numerical_error_um: 2.0 * (stage.cut.residual_mm + COMPLIANCE_ACCURACY * largest_mm) * UM_PER_MM,
-            stations,
+            stations: StationColumns::default(),
         })
-    }
-
-    fn stations(&self, produced: Option<&[Option<f64>]>) -> StationColumns {
-        let Self { job, grid, acting, stage } = *self;
-        let Stage { line, radii, cut, .. } = stage;
-        let n = grid.len();
-        let each = |value: &dyn Fn(usize) -> f64| -> Vec<f64> { (0..n).map(value).collect() };
-        let force =
-            |given: bool, component: fn(&model::Loads) -> f64| given.then(|| each(&|i| component(&cut.loads[i])));
-        let moves_aside = job.include.tangential || job.include.weight;
-        StationColumns {
-            z_mm: grid.z_mm.clone(),
-            diameter_mm: each(&|i| 2.0 * radii.target[i]),
-            stock_diameter_mm: each(&|i| 2.0 * radii.stock[i]),
-            work_compliance_um_per_n: each(&|i| line.work_mm_per_n[i] * UM_PER_MM),
-            compliance_um_per_n: each(&|i| line.compliance_mm_per_n(i) * UM_PER_MM),
-            depth_mm: cut.nominal_depth_mm.clone(),
-            passive_force_n: each(&|i| cut.loads[i].passive_n),
-            main_force_n: force(job.force.has_main(), |l| l.main_n),
-            feed_force_n: force(job.force.has_feed(), |l| l.feed_n),
-            deflection_um: each(&|i| cut.y_mm[i] * UM_PER_MM),
-            tangential_deflection_um: moves_aside.then(|| each(&|i| cut.z_mm[i] * UM_PER_MM)),
-            depth_uncompensated_mm: cut.uncompensated_depth_mm.iter().copied().map(Some).collect(),
-            diameter_error_uncompensated_um: cut.uncompensated_errors_um(radii),
-            offset_um: (0..n).map(|i| cut.command_mm[i].map(|r| (r - radii.target[i]) * UM_PER_MM)).collect(),
-            commanded_diameter_mm: cut.command_mm.iter().map(|r| r.map(|r| 2.0 * r)).collect(),
-            diameter_error_compensated_um: produced.map(|produced| {
-                let error = |(r, target): (&Option<f64>, &f64)| r.map(|r| 2.0 * (r - target) * UM_PER_MM);
-                produced.iter().zip(&radii.target).map(error).collect()
-            }),
-            diameter_uncertainty_um: advice::diameter_uncertainty_um(job, acting, stage),
-            copying_factor: cut.copying.clone(),
-            status_uncompensated: cut.status_uncompensated.clone(),
-            status_compensated: cut.status_compensated.clone(),
-        }
     }
 }
 

@@ -9,7 +9,8 @@ use super::acting::{Acting, ForceChange, Passage};
 use super::equilibrium::{Engagement, Opening, engage};
 use super::grid::Grid;
 use super::input::{FeedDirection, Include, Job};
-use super::regime::Regime;
+use super::power_cut::{MAX_EXPONENT, NearbyPower, PowerCut};
+use super::regime::{Regime, Speed};
 use super::structure::Structure;
 
 /// Forces at a depth and their slopes dP/dt.
@@ -23,14 +24,9 @@ pub(super) struct Loads {
     pub feed_slope: f64,
 }
 
-/// Loads at the nominal depth of the station before.
-#[derive(Debug, Default)]
-pub(super) struct NominalLoads {
-    key: Option<(u32, u64)>,
-    loads: Loads,
-}
-
 /// What every depth has in common along the shaft: compliances, sag, stated errors, force laws.
+///
+/// A column that is 0 all along is left empty, see [`at`].
 pub(super) struct Line {
     pub work_mm_per_n: Vec<f64>,
     pub carriage_mm_per_n: f64,
@@ -38,9 +34,9 @@ pub(super) struct Line {
     moment_mm_per_n: Vec<f64>,
     /// W_z + w_cz, 0 where the tangential deflection does not act, mm/N.
     tangential_mm_per_n: Vec<f64>,
-    /// Sag and stated errors in the radial direction, mm.
-    radial_offset_mm: Vec<f64>,
-    /// The stated errors among them, mm.
+    /// Sag in the radial direction, mm.
+    sag_mm: Vec<f64>,
+    /// Stated errors, mm.
     error_mm: Vec<f64>,
     /// Sag across it, mm.
     tangential_offset_mm: Vec<f64>,
@@ -52,15 +48,29 @@ pub(super) struct Line {
     laws: StationLaws,
     with_main: bool,
     with_feed: bool,
-    /// Factor and exponent of every law where nothing but a rising power of the depth acts.
-    powers: Option<Vec<(f64, f64)>>,
+    /// Where nothing but a rising power of the depth acts on bilateral supports: y = W C t^z + e.
+    power: Option<PowerLine>,
     /// Nothing opens the gap before a chip forms: no rubbing, no sag, no stated error.
     closed_at_zero: bool,
+}
+
+/// Laws that are powers of the depth, all of one exponent.
+struct PowerLine {
+    /// Passive force at 1 mm of every law, N.
+    factors_n: Vec<f64>,
+    exponent: f64,
+}
+
+/// The entry of a column, 0 where the column was left empty.
+#[inline]
+pub(super) fn at(column: &[f64], i: usize) -> f64 {
+    column.get(i).copied().unwrap_or(0.0)
 }
 
 /// Force laws at the stations, effects in them: one for every speed and hardness that differ.
 struct StationLaws {
     laws: Vec<DepthLaw>,
+    /// Empty where there is one law for all.
     of_station: Vec<u32>,
 }
 
@@ -71,15 +81,22 @@ pub(super) struct Radii {
     pub target: Vec<f64>,
     /// Stock really there.
     pub stock: Vec<f64>,
-    /// Stock that the compensation is planned on, and the cutting speed counted with.
-    pub planned: Vec<f64>,
+    /// Stock that the compensation is planned on, and the cutting speed counted with, where it is not the real one.
+    pub planned: Option<Vec<f64>>,
+}
+
+impl Radii {
+    /// Stock that the compensation is planned on.
+    pub(super) fn planned(&self) -> &[f64] {
+        self.planned.as_ref().unwrap_or(&self.stock)
+    }
 }
 
 impl Radii {
     /// The radii at some of the stations.
     pub(super) fn at(&self, chosen: &[usize]) -> Self {
-        let of = |radii: &[f64]| chosen.iter().map(|&i| radii[i]).collect();
-        Self { target: of(&self.target), stock: of(&self.stock), planned: of(&self.planned) }
+        let of = |radii: &[f64]| -> Vec<f64> { chosen.iter().map(|&i| radii[i]).collect() };
+        Self { target: of(&self.target), stock: of(&self.stock), planned: self.planned.as_deref().map(of) }
     }
 }
 
@@ -99,46 +116,40 @@ pub(super) struct Ingredients<'a> {
 impl Line {
     /// Everything along the shaft that no depth changes; `profile` holds what [`wanted`] of the job says.
     pub(super) fn of(from: &Ingredients<'_>, profile: Profile) -> Self {
-        let Ingredients { job, grid, acting, structure, regime, radii, .. } = *from;
+        let Ingredients { job, acting, structure, regime, radii, .. } = *from;
         let include = &job.include;
         let Profile { radial_mm_per_n, couple_per_n, tangential_mm_per_n, sag_radial_mm, sag_tangential_mm, contacts } =
             profile;
-        let n = grid.len();
         // Fed to the headstock the tool pushes the work toward -z at u = -r_t: a couple -r_t P_x (`deflection/4.1`).
         let sign = if regime.direction == FeedDirection::ToHeadstock { -1.0 } else { 1.0 };
         let arm_mm: Vec<f64> =
-            if include.axial_moment { radii.target.iter().map(|r| sign * r).collect() } else { vec![0.0; n] };
-        let moment_mm_per_n = if include.axial_moment {
-            arm_mm.iter().zip(&couple_per_n).map(|(arm, g)| arm * g).collect()
-        } else {
-            vec![0.0; n]
-        };
-        let tangential_mm_per_n = if include.tangential {
-            tangential_mm_per_n.iter().map(|w| w + structure.carriage_tangential_mm_per_n).collect()
-        } else {
-            vec![0.0; n]
-        };
+            if include.axial_moment { radii.target.iter().map(|r| sign * r).collect() } else { Vec::new() };
+        // Without the moment the beam was not asked for the couple: both are empty.
+        let moment_mm_per_n = arm_mm.iter().zip(&couple_per_n).map(|(arm, g)| arm * g).collect();
+        let carriage = structure.carriage_tangential_mm_per_n;
+        let tangential_mm_per_n =
+            if include.tangential { tangential_mm_per_n.iter().map(|w| w + carriage).collect() } else { Vec::new() };
         let (gravity_tangential, gravity_radial) = gravity_components(job);
         let error_mm = errors_mm(from);
-        let mut radial_offset_mm = error_mm.clone();
-        let mut tangential_offset_mm = vec![0.0; n];
-        if include.weight {
-            for i in 0..n {
-                radial_offset_mm[i] += gravity_radial * sag_radial_mm[i];
-                tangential_offset_mm[i] = gravity_tangential * sag_tangential_mm[i];
-            }
-        }
+        let (sag_mm, tangential_offset_mm) = if include.weight {
+            (
+                sag_radial_mm.iter().map(|sag| gravity_radial * sag).collect(),
+                sag_tangential_mm.iter().map(|sag| gravity_tangential * sag).collect(),
+            )
+        } else {
+            (Vec::new(), Vec::new())
+        };
         let laws = StationLaws::of(from);
         let closed_at_zero =
             !include.weight && !acting.has_errors() && laws.laws.iter().all(|law| law.limit() == Forces::default());
         let only_passive = !include.tangential && !include.axial_moment && !include.weight && contacts.is_none();
-        let powers = only_passive.then(|| laws.powers()).flatten();
+        let power = only_passive.then(|| laws.power()).flatten();
         Self {
             work_mm_per_n: radial_mm_per_n,
             carriage_mm_per_n: structure.carriage_mm_per_n,
             moment_mm_per_n,
             tangential_mm_per_n,
-            radial_offset_mm,
+            sag_mm,
             error_mm,
             tangential_offset_mm,
             contacts,
@@ -148,7 +159,7 @@ impl Line {
             with_main: needs_main(include),
             with_feed: include.axial_moment,
             closed_at_zero,
-            powers,
+            power,
         }
     }
 
@@ -174,13 +185,9 @@ impl Line {
     }
 
     /// Total compliance W = W_work + w_c at a station, mm/N.
+    #[inline]
     pub(super) fn compliance_mm_per_n(&self, i: usize) -> f64 {
         self.work_mm_per_n[i] + self.carriage_mm_per_n
-    }
-
-    /// All force components at a station and depth, with slopes; also those that do not act.
-    fn all_loads(&self, i: usize, depth_mm: f64) -> Loads {
-        self.laws.loads(i, depth_mm, true, true)
     }
 
     fn loads(&self, i: usize, depth_mm: f64) -> Loads {
@@ -198,48 +205,60 @@ impl Line {
     }
 
     /// Opening of the gap under given loads (`deflection/4.1`).
+    #[inline]
     pub(super) fn opening(&self, i: usize, loads: &Loads) -> Opening {
         let (y_mm, y_slope) = match &self.contacts {
             None => {
                 let w = self.compliance_mm_per_n(i);
-                let moment = self.moment_mm_per_n[i];
+                let moment = at(&self.moment_mm_per_n, i);
                 (
-                    w * loads.passive_n + moment * loads.feed_n + self.radial_offset_mm[i],
+                    w * loads.passive_n + moment * loads.feed_n + self.offset_mm(i),
                     w * loads.passive_slope + moment * loads.feed_slope,
                 )
             }
             Some(contacts) => self.opening_with_contacts(contacts, i, loads),
         };
-        let wz = self.tangential_mm_per_n[i];
+        let wz = at(&self.tangential_mm_per_n, i);
         Opening {
             y_mm,
             y_slope,
-            z_mm: wz * loads.main_n + self.tangential_offset_mm[i],
+            z_mm: wz * loads.main_n + at(&self.tangential_offset_mm, i),
             z_slope: wz * loads.main_slope,
         }
     }
 
     /// With one-sided rests the displacement is piecewise linear in the complete load (`deflection/3.3`, item 3).
     fn opening_with_contacts(&self, contacts: &Contacts, i: usize, loads: &Loads) -> (f64, f64) {
-        let arm = self.arm_mm[i];
+        let arm = at(&self.arm_mm, i);
         let load =
             ToolLoad { force_n: loads.passive_n, couple_n_mm: arm * loads.feed_n, gravity_radial: self.gravity_radial };
         let response = contacts.respond(i, load);
-        let y = response.displacement_mm + self.carriage_mm_per_n * loads.passive_n + self.error_mm[i];
+        let y = response.displacement_mm + self.carriage_mm_per_n * loads.passive_n + at(&self.error_mm, i);
         let slope = (response.compliance_mm_per_n + self.carriage_mm_per_n) * loads.passive_slope
             + response.coupling_per_n * arm * loads.feed_slope;
         (y, slope)
     }
 
-    /// All loads at a nominal depth, none where there is no stock. Stations in a row mostly share depth and law:
-    /// `last` keeps what was computed before.
-    pub(super) fn nominal_loads(&self, i: usize, depth_mm: f64, last: &mut NominalLoads) -> Loads {
-        let key = (self.laws.of_station[i], depth_mm.to_bits());
-        if last.key != Some(key) {
-            let loads = if depth_mm > 0.0 { self.all_loads(i, depth_mm) } else { Loads::default() };
-            *last = NominalLoads { key: Some(key), loads };
-        }
-        last.loads
+    /// Sag and stated errors in the radial direction, mm.
+    #[inline]
+    fn offset_mm(&self, i: usize) -> f64 {
+        at(&self.error_mm, i) + at(&self.sag_mm, i)
+    }
+
+    /// All loads at a nominal depth, none where there is no stock.
+    pub(super) fn nominal_loads(&self, i: usize, depth_mm: f64) -> Loads {
+        if depth_mm > 0.0 { self.laws.loads(i, depth_mm, true, true) } else { Loads::default() }
+    }
+
+    /// Whether anything moves the axis out of the radial direction.
+    pub(super) fn moves_aside(&self) -> bool {
+        !self.tangential_mm_per_n.is_empty() || !self.tangential_offset_mm.is_empty()
+    }
+
+    /// Which of the force laws acts at a station.
+    #[inline]
+    pub(super) fn law_index(&self, i: usize) -> u32 {
+        self.laws.index(i)
     }
 
     /// Passive force and its slope at a station and depth.
@@ -247,43 +266,54 @@ impl Line {
         self.laws.law(i).passive_and_slope(depth_mm)
     }
 
-    /// What a command does at a station; `start_mm` is a guess of the engaged depth.
-    pub(super) fn engage(&self, i: usize, stock_radius_mm: f64, command_mm: f64, start_mm: f64) -> Engagement {
-        if let Some(powers) = &self.powers {
-            return self.engage_by_power(
-                i,
-                powers[self.laws.of_station[i] as usize],
-                stock_radius_mm,
-                command_mm,
-                start_mm,
-            );
-        }
+    /// Exponent of the depth where nothing but a rising power of it acts.
+    pub(super) fn exponent(&self) -> Option<f64> {
+        self.power.as_ref().map(|power| power.exponent)
+    }
+
+    /// What solves the equilibrium station by station.
+    pub(super) fn solver(&self) -> Solver<'_> {
+        let power = self.power.as_ref().map(|power| (power, NearbyPower::new(power.exponent)));
+        Solver { line: self, power }
+    }
+
+    /// What a command does at a station, solved in general.
+    fn engage(&self, i: usize, stock_radius_mm: f64, command_mm: f64, start_mm: f64) -> Engagement {
         let at_zero = if self.closed_at_zero { Opening::default() } else { self.opening(i, &self.loads_at_zero(i)) };
         engage(stock_radius_mm, command_mm, start_mm, at_zero, |t| self.opening_at(i, t))
     }
 
-    /// The same where nothing but a pure power of the depth acts on bilateral supports: y = W C t^z + e.
-    #[inline]
-    fn engage_by_power(
-        &self,
-        i: usize,
-        (factor_n, exponent): (f64, f64),
-        stock_radius_mm: f64,
-        command_mm: f64,
-        start_mm: f64,
-    ) -> Engagement {
-        let stiffness = self.compliance_mm_per_n(i) * factor_n;
-        let offset = self.radial_offset_mm[i];
-        let at_zero = Opening { y_mm: offset, ..Opening::default() };
-        engage(stock_radius_mm, command_mm, start_mm, at_zero, |t| {
-            let y = stiffness * (exponent * t.ln()).exp();
-            Opening { y_mm: y + offset, y_slope: exponent * y / t, z_mm: 0.0, z_slope: 0.0 }
-        })
-    }
-
     /// Share of the radial opening that force makes, mm: all but stated errors.
-    pub(super) fn elastic_mm(&self, i: usize, opening: &Opening) -> f64 {
-        opening.y_mm - self.error_mm[i]
+    #[inline]
+    pub(super) fn elastic_mm(&self, i: usize, y_mm: f64) -> f64 {
+        y_mm - at(&self.error_mm, i)
+    }
+}
+
+/// Solves the equilibrium along a shaft; keeps what one station can take over from another.
+pub(super) struct Solver<'a> {
+    line: &'a Line,
+    power: Option<(&'a PowerLine, NearbyPower)>,
+}
+
+impl Solver<'_> {
+    /// What a command does at a station; `start_mm` is a guess of the engaged depth.
+    #[inline]
+    pub(super) fn engage(&mut self, i: usize, stock_radius_mm: f64, command_mm: f64, start_mm: f64) -> Engagement {
+        let line = self.line;
+        if let Some((along, power)) = &mut self.power {
+            let cut = PowerCut {
+                stock_radius_mm,
+                command_radius_mm: command_mm,
+                stiffness_mm: line.compliance_mm_per_n(i) * along.factors_n[line.law_index(i) as usize],
+                offset_mm: line.offset_mm(i),
+                start_mm,
+            };
+            if let Some(engagement) = cut.engage(power) {
+                return engagement;
+            }
+        }
+        line.engage(i, stock_radius_mm, command_mm, start_mm)
     }
 }
 
@@ -318,7 +348,7 @@ pub(super) fn gravity_components(job: &Job) -> (f64, f64) {
 
 fn errors_mm(from: &Ingredients<'_>) -> Vec<f64> {
     if !from.acting.has_errors() {
-        return vec![0.0; from.grid.len()];
+        return Vec::new();
     }
     let mut shapes = vec![0.0; from.rest_shapes.len()];
     from.passages
@@ -336,13 +366,22 @@ fn errors_mm(from: &Ingredients<'_>) -> Vec<f64> {
 impl StationLaws {
     fn of(from: &Ingredients<'_>) -> Self {
         let Ingredients { job, grid, acting, regime, radii, .. } = *from;
+        let feed = regime.feed_mm_per_rev;
+        if let Speed::Surface(speed) = regime.speed
+            && acting.force.same_everywhere()
+        {
+            let factor = acting.force.factor(0.0, feed, speed);
+            let law = law_at(&job.force, feed, speed, factor, &acting.force);
+            return Self { laws: vec![law], of_station: Vec::new() };
+        }
         let mut laws = Self { laws: Vec::new(), of_station: Vec::with_capacity(grid.len()) };
         let mut last = (f64::NAN, f64::NAN);
-        for i in 0..grid.len() {
-            let speed = regime.speed_m_per_min(radii.planned[i], radii.target[i]);
-            let factor = acting.force.factor(grid.z_mm[i] / grid.length_mm, regime.feed_mm_per_rev, speed);
+        let radii = radii.planned().iter().zip(&radii.target);
+        for (z_mm, (planned, target)) in grid.z_mm.iter().zip(radii) {
+            let speed = regime.speed_m_per_min(*planned, *target);
+            let factor = acting.force.factor(z_mm / grid.length_mm, feed, speed);
             if speed.to_bits() != last.0.to_bits() || factor.to_bits() != last.1.to_bits() {
-                laws.laws.push(law_at(&job.force, regime.feed_mm_per_rev, speed, factor, &acting.force));
+                laws.laws.push(law_at(&job.force, feed, speed, factor, &acting.force));
                 last = (speed, factor);
             }
             // At most one law per station, and stations are limited to 200 000.
@@ -351,13 +390,25 @@ impl StationLaws {
         laws
     }
 
-    /// Factor and exponent of the passive force of every law, where all are rising powers of the depth.
-    fn powers(&self) -> Option<Vec<(f64, f64)>> {
-        self.laws.iter().map(|law| law.passive_power().filter(|(_, exponent)| *exponent > 0.0)).collect()
+    /// The laws where the passive force of all is a rising power of the depth, with one exponent.
+    fn power(&self) -> Option<PowerLine> {
+        let (_, exponent) = self.laws.first()?.passive_power()?;
+        let same = |other: f64| other.to_bits() == exponent.to_bits();
+        let factors_n: Option<Vec<f64>> = self
+            .laws
+            .iter()
+            .map(|law| law.passive_power().filter(|(_, z)| same(*z)).map(|(factor, _)| factor))
+            .collect();
+        (exponent > 0.0 && exponent <= MAX_EXPONENT).then_some(PowerLine { factors_n: factors_n?, exponent })
+    }
+
+    #[inline]
+    fn index(&self, i: usize) -> u32 {
+        self.of_station.get(i).copied().unwrap_or(0)
     }
 
     fn law(&self, i: usize) -> &DepthLaw {
-        &self.laws[self.of_station[i] as usize]
+        &self.laws[self.index(i) as usize]
     }
 
     fn loads(&self, i: usize, depth_mm: f64, main: bool, feed: bool) -> Loads {

@@ -76,7 +76,7 @@ impl Sample {
             feed_n: Vec::new(),
         };
         for i in grid.sample(SAMPLES) {
-            let loads = &stage.cut.loads[i];
+            let loads = stage.cut.loads.of(i);
             sample.z_mm.push(grid.z_mm[i]);
             sample.target_mm.push(stage.radii.target[i]);
             sample.passive_n.push(loads.passive_n);

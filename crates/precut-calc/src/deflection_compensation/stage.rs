@@ -115,7 +115,7 @@ pub(super) fn all_cuts(
     let mut stock = stock_radii_mm(job, grid);
     if job.passes.is_empty() {
         // The stock of a single cut is known: depth and speed follow it.
-        let radii = Radii { target: target_radii_mm(job, grid, None), planned: stock.clone(), stock };
+        let radii = Radii { target: target_radii_mm(job, grid, None), stock, planned: None };
         return Ok((Stage::of(job, grid, acting, base, None, radii, monitor)?, Vec::new()));
     }
     let mut planned = nominal_stock_radii_mm(job, grid);
@@ -129,7 +129,7 @@ pub(super) fn all_cuts(
         // Where the blank is thinner than the pass there is nothing to be cut.
         let target: Vec<f64> =
             target_radii_mm(job, grid, pass_mm).iter().zip(&planned).map(|(t, p)| t.min(*p)).collect();
-        let radii = Radii { target: target.clone(), stock, planned };
+        let radii = Radii { target: target.clone(), stock, planned: Some(planned) };
         let mut stage = Stage::of(job, grid, acting, regime, pass_mm, radii, monitor)?;
         let (produced, commands) = stage.outcome(pass.compensated, monitor)?;
         outcomes.push(pass_outcome(&stage, pass.compensated, &produced, &commands, outcomes.last()));
