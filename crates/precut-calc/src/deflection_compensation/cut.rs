@@ -59,7 +59,7 @@ impl NominalLoads {
     fn next(&mut self, line: &Line, depth_mm: f64) -> Loads {
         let i = self.stations;
         self.stations += 1;
-        let key = (line.law_index(i), depth_mm.to_bits());
+        let key = Self::key(line, i, depth_mm);
         match self.runs.last() {
             Some(run) if run.key == key => run.loads,
             _ => {
@@ -68,6 +68,12 @@ impl NominalLoads {
                 loads
             }
         }
+    }
+
+    /// Stations with one key have the same loads.
+    #[inline]
+    fn key(line: &Line, i: usize, depth_mm: f64) -> (u32, u64) {
+        (line.law_index(i), depth_mm.to_bits())
     }
 
     /// The loads at one station.
@@ -101,18 +107,35 @@ impl NominalLoads {
     }
 }
 
+/// What becomes of a command that there is.
+#[inline]
+fn status_of(depth_mm: f64, command_mm: f64) -> StatusCompensated {
+    if depth_mm <= 0.0 {
+        StatusCompensated::NoStock
+    } else if command_mm <= 0.0 {
+        StatusCompensated::ToolPastAxis
+    } else {
+        StatusCompensated::Ok
+    }
+}
+
 impl CutLine {
     /// Computes a cut with the forces and compliances of `line` about the radii given.
     pub(super) fn of(line: &Line, radii: &Radii, monitor: &dyn Monitor) -> Result<Self, Failure> {
         let n = radii.target.len();
         let mut cut = Self::with_capacity(n, line);
+        cut.nominal_depth_mm
+            .extend(radii.planned().iter().zip(&radii.target).map(|(planned, target)| planned - target));
         let mut solver = line.solver();
-        for i in 0..n {
-            if i % STATIONS_PER_CHECK == 0 {
-                checkpoint(monitor)?;
+        for first in (0..n).step_by(STATIONS_PER_CHECK) {
+            checkpoint(monitor)?;
+            let block = first..n.min(first + STATIONS_PER_CHECK);
+            if line.only_radial() {
+                cut.plan_radial(line, radii, block.clone());
+            } else {
+                block.clone().for_each(|i| cut.plan(line, radii, i));
             }
-            cut.plan(line, radii, i);
-            cut.predict_uncompensated(&mut solver, radii, i);
+            block.for_each(|i| cut.predict_uncompensated(&mut solver, radii, i));
         }
         Ok(cut)
     }
@@ -136,10 +159,8 @@ impl CutLine {
     }
 
     /// The explicit command for the wanted radius.
-    #[inline]
     fn plan(&mut self, line: &Line, radii: &Radii, i: usize) {
-        let target = radii.target[i];
-        let depth = radii.planned()[i] - target;
+        let (target, depth) = (radii.target[i], self.nominal_depth_mm[i]);
         let loads = self.loads.next(line, depth);
         let opening = line.opening(i, &loads);
         let command = command_radius_mm(target, opening.y_mm, opening.z_mm);
@@ -150,17 +171,48 @@ impl CutLine {
         };
         self.status_compensated.push(match command {
             None => StatusCompensated::NoSolution,
-            Some(_) if depth <= 0.0 => StatusCompensated::NoStock,
-            Some(r_c) if r_c <= 0.0 => StatusCompensated::ToolPastAxis,
-            Some(_) => StatusCompensated::Ok,
+            Some(r_c) => status_of(depth, r_c),
         });
-        self.nominal_depth_mm.push(depth);
         self.planned_copying.push(slope / (1.0 + slope));
         self.y_mm.push(opening.y_mm);
         if line.moves_aside() {
             self.z_mm.push(opening.z_mm);
         }
         self.command_mm.push(command);
+    }
+
+    /// The same for a block of stations where nothing moves the axis aside: then r_c = r_t - Y(a) and S' = Y'(a) up to
+    /// the rounding of r_c, and column by column there is no branch left.
+    fn plan_radial(&mut self, line: &Line, radii: &Radii, block: std::ops::Range<usize>) {
+        let mut first = block.start;
+        while first < block.end {
+            // Stations with the same loads.
+            let loads = self.loads.next(line, self.nominal_depth_mm[first]);
+            let key = NominalLoads::key(line, first, self.nominal_depth_mm[first]);
+            let mut end = first + 1;
+            while end < block.end && NominalLoads::key(line, end, self.nominal_depth_mm[end]) == key {
+                end += 1;
+            }
+            self.loads.stations = end;
+            self.plan_run(line, radii, first..end, &loads);
+            first = end;
+        }
+    }
+
+    fn plan_run(&mut self, line: &Line, radii: &Radii, run: std::ops::Range<usize>, loads: &Loads) {
+        let target = &radii.target[run.clone()];
+        let depth = self.nominal_depth_mm[run.start];
+        let work = &line.work_mm_per_n[run.clone()];
+        self.y_mm.extend(work.iter().map(|work| (work + line.carriage_mm_per_n) * loads.passive_n));
+        let y = &mut self.y_mm[run.clone()];
+        line.add_errors(run, y);
+        self.command_mm.extend(y.iter().zip(target).map(|(y, target)| Some(target - y)));
+        self.status_compensated.extend(y.iter().zip(target).map(|(y, target)| status_of(depth, target - y)));
+        self.planned_copying.extend(work.iter().zip(target).zip(&*y).map(|((work, target), y)| {
+            let y_slope = (work + line.carriage_mm_per_n) * loads.passive_slope;
+            let slope = ((target - y) + y) * y_slope / target;
+            slope / (1.0 + slope)
+        }));
     }
 
     /// What the nominal path r_c = r_t gives.
@@ -179,16 +231,16 @@ impl CutLine {
             }
             engagement
         };
-        self.status_uncompensated.push(match engagement {
-            Engagement::Cut { .. } => StatusUncompensated::Ok,
-            Engagement::NoContact => StatusUncompensated::NoContact,
-            Engagement::NoCut => StatusUncompensated::NoCut,
-        });
-        self.note(engagement);
-        self.copying.push(match engagement {
-            Engagement::Cut { opening, .. } => Some(copying_factor(target, opening)),
-            _ => None,
-        });
+        let (status, copying) = match engagement {
+            Engagement::Cut { opening, residual_mm, .. } => {
+                self.note(residual_mm);
+                (StatusUncompensated::Ok, Some(copying_factor(target, opening)))
+            }
+            Engagement::NoContact => (StatusUncompensated::NoContact, None),
+            Engagement::NoCut => (StatusUncompensated::NoCut, None),
+        };
+        self.status_uncompensated.push(status);
+        self.copying.push(copying);
         self.uncompensated_depth_mm.push(Some(engagement.depth_mm()));
     }
 
@@ -209,9 +261,9 @@ impl CutLine {
     }
 
     #[inline]
-    fn note(&mut self, engagement: Engagement) {
-        if let Engagement::Cut { residual_mm, .. } = engagement {
-            self.residual_mm = self.residual_mm.max(residual_mm.abs());
+    fn note(&mut self, residual_mm: f64) {
+        if residual_mm.abs() > self.residual_mm {
+            self.residual_mm = residual_mm.abs();
         }
     }
 
@@ -232,7 +284,9 @@ impl CutLine {
             produced.push(command.map(|command| {
                 let stock = radii.stock[i];
                 let engagement = solver.engage(i, stock, command, self.guess_mm(i, stock - command));
-                self.note(engagement);
+                if let Engagement::Cut { residual_mm, .. } = engagement {
+                    self.note(residual_mm);
+                }
                 stock - engagement.depth_mm()
             }));
         }

@@ -255,6 +255,20 @@ impl Line {
         !self.tangential_mm_per_n.is_empty() || !self.tangential_offset_mm.is_empty()
     }
 
+    /// Whether the opening is W P_y(t) and stated errors, no more.
+    pub(super) fn only_radial(&self) -> bool {
+        self.contacts.is_none() && !self.moves_aside() && self.arm_mm.is_empty()
+    }
+
+    /// Adds the stated errors at the stations of `run` to `y_mm`.
+    pub(super) fn add_errors(&self, run: std::ops::Range<usize>, y_mm: &mut [f64]) {
+        if let Some(errors) = self.error_mm.get(run) {
+            for (y, error) in y_mm.iter_mut().zip(errors) {
+                *y += error;
+            }
+        }
+    }
+
     /// Which of the force laws acts at a station.
     #[inline]
     pub(super) fn law_index(&self, i: usize) -> u32 {

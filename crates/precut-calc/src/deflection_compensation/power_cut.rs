@@ -64,6 +64,7 @@ impl NearbyPower {
 }
 
 /// One command at one station.
+#[allow(clippy::struct_field_names)] // Names carry units.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PowerCut {
     pub stock_radius_mm: f64,
@@ -146,20 +147,19 @@ mod tests {
     fn agree(cut: &PowerCut, power: &mut NearbyPower) -> Result<(), TestCaseError> {
         let general = in_general(cut, power.exponent);
         let Some(fast) = cut.engage(power) else { return Ok(()) };
-        match (fast, general) {
-            (Engagement::Cut { opening, residual_mm, .. }, Engagement::Cut { opening: other, .. }) => {
-                let commanded = cut.stock_radius_mm - cut.command_radius_mm;
-                let scale = commanded.max(cut.offset_mm.abs()) * f64::EPSILON;
-                let (a, b) = (fast.depth_mm(), general.depth_mm());
-                prop_assert!((a - b).abs() <= 8.0 * scale, "{a} and {b} differ by {} ulp", (a - b) / scale);
-                prop_assert!(residual_mm.abs() <= 8.0 * scale);
-                let (a, b) =
-                    (copying_factor(cut.command_radius_mm, opening), copying_factor(cut.command_radius_mm, other));
-                // The slope at small depths magnifies what the depth may differ by.
-                let slack = 16.0 + 16.0 * scale / f64::EPSILON / general.depth_mm();
-                prop_assert!((a - b).abs() <= slack * f64::EPSILON, "{a} and {b} in the copying factor");
-            }
-            _ => prop_assert_eq!(fast, general),
+        if let (Engagement::Cut { opening, residual_mm, .. }, Engagement::Cut { opening: other, .. }) = (fast, general)
+        {
+            let commanded = cut.stock_radius_mm - cut.command_radius_mm;
+            let scale = commanded.max(cut.offset_mm.abs()) * f64::EPSILON;
+            let (a, b) = (fast.depth_mm(), general.depth_mm());
+            prop_assert!((a - b).abs() <= 8.0 * scale, "{a} and {b} differ by {} ulp", (a - b) / scale);
+            prop_assert!(residual_mm.abs() <= 8.0 * scale);
+            let (a, b) = (copying_factor(cut.command_radius_mm, opening), copying_factor(cut.command_radius_mm, other));
+            // The slope at small depths magnifies what the depth may differ by.
+            let slack = 16.0 + 16.0 * scale / f64::EPSILON / general.depth_mm();
+            prop_assert!((a - b).abs() <= slack * f64::EPSILON, "{a} and {b} in the copying factor");
+        } else {
+            prop_assert_eq!(fast, general);
         }
         Ok(())
     }
