@@ -179,7 +179,7 @@ impl Line {
     fn tool_load(&self, i: usize, loads: &Loads) -> ToolLoad {
         ToolLoad {
             force_n: loads.passive_n,
-            couple_n_mm: self.arm_mm[i] * loads.feed_n,
+            couple_n_mm: at(&self.arm_mm, i) * loads.feed_n,
             gravity_radial: self.gravity_radial,
         }
     }
