@@ -5,7 +5,8 @@ use super::UM_PER_MM;
 use super::acting::Acting;
 use super::cut::CutLine;
 use super::input::Job;
-use super::model::{Line, Loads, Radii};
+use super::laws::Loads;
+use super::model::{Line, Radii};
 use super::output::StationColumns;
 use super::stage::Stage;
 

@@ -3,7 +3,8 @@
 use crate::calculator::{Failure, Monitor, checkpoint};
 
 use super::equilibrium::{Engagement, command_radius_mm, commanded_model_depth_mm, copying_factor};
-use super::model::{Line, Loads, Radii, Solver};
+use super::laws::Loads;
+use super::model::{Line, Radii, Solver};
 use super::output::{OneStep, StatusCompensated, StatusUncompensated};
 
 const UM_PER_MM: f64 = 1e3;

@@ -23,6 +23,7 @@ mod form;
 mod forward;
 mod grid;
 mod input;
+mod laws;
 mod model;
 mod output;
 mod picture;

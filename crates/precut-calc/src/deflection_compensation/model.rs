@@ -2,27 +2,16 @@
 
 use crate::calculator::Failure;
 use crate::effects::DeflectionEffect as Effect;
-use crate::force::{DepthLaw, ForceModel, Forces};
 use crate::num::beam::{BeamError, Contacts, Profile, ToolLoad, Wanted};
 
-use super::acting::{Acting, ForceChange, Passage};
+use super::acting::{Acting, Passage};
 use super::equilibrium::{Engagement, Opening, engage};
 use super::grid::Grid;
 use super::input::{FeedDirection, Include, Job};
-use super::power_cut::{MAX_EXPONENT, NearbyPower, PowerCut};
-use super::regime::{Regime, Speed};
+use super::laws::{Loads, PowerLine, StationLaws};
+use super::power_cut::{NearbyPower, PowerCut};
+use super::regime::Regime;
 use super::structure::Structure;
-
-/// Forces at a depth and their slopes dP/dt.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Loads {
-    pub passive_n: f64,
-    pub passive_slope: f64,
-    pub main_n: f64,
-    pub main_slope: f64,
-    pub feed_n: f64,
-    pub feed_slope: f64,
-}
 
 /// What every depth has in common along the shaft: compliances, sag, stated errors, force laws.
 ///
@@ -54,24 +43,10 @@ pub(super) struct Line {
     closed_at_zero: bool,
 }
 
-/// Laws that are powers of the depth, all of one exponent.
-struct PowerLine {
-    /// Passive force at 1 mm of every law, N.
-    factors_n: Vec<f64>,
-    exponent: f64,
-}
-
 /// The entry of a column, 0 where the column was left empty.
 #[inline]
 pub(super) fn at(column: &[f64], i: usize) -> f64 {
     column.get(i).copied().unwrap_or(0.0)
-}
-
-/// Force laws at the stations, effects in them: one for every speed and hardness that differ.
-struct StationLaws {
-    laws: Vec<DepthLaw>,
-    /// Empty where there is one law for all.
-    of_station: Vec<u32>,
 }
 
 /// Radii along the shaft that a cut is about, mm.
@@ -140,8 +115,7 @@ impl Line {
             (Vec::new(), Vec::new())
         };
         let laws = StationLaws::of(from);
-        let closed_at_zero =
-            !include.weight && !acting.has_errors() && laws.laws.iter().all(|law| law.limit() == Forces::default());
+        let closed_at_zero = !include.weight && !acting.has_errors() && laws.vanish_with_depth();
         let only_passive = !include.tangential && !include.axial_moment && !include.weight && contacts.is_none();
         let power = only_passive.then(|| laws.power()).flatten();
         Self {
@@ -375,89 +349,6 @@ fn errors_mm(from: &Ingredients<'_>) -> Vec<f64> {
             from.acting.error_mm(*at, &shapes)
         })
         .collect()
-}
-
-impl StationLaws {
-    fn of(from: &Ingredients<'_>) -> Self {
-        let Ingredients { job, grid, acting, regime, radii, .. } = *from;
-        let feed = regime.feed_mm_per_rev;
-        if let Speed::Surface(speed) = regime.speed
-            && acting.force.same_everywhere()
-        {
-            let factor = acting.force.factor(0.0, feed, speed);
-            let law = law_at(&job.force, feed, speed, factor, &acting.force);
-            return Self { laws: vec![law], of_station: Vec::new() };
-        }
-        let mut laws = Self { laws: Vec::new(), of_station: Vec::with_capacity(grid.len()) };
-        let mut last = (f64::NAN, f64::NAN);
-        let radii = radii.planned().iter().zip(&radii.target);
-        for (z_mm, (planned, target)) in grid.z_mm.iter().zip(radii) {
-            let speed = regime.speed_m_per_min(*planned, *target);
-            let factor = acting.force.factor(z_mm / grid.length_mm, feed, speed);
-            if speed.to_bits() != last.0.to_bits() || factor.to_bits() != last.1.to_bits() {
-                laws.laws.push(law_at(&job.force, feed, speed, factor, &acting.force));
-                last = (speed, factor);
-            }
-            // At most one law per station, and stations are limited to 200 000.
-            laws.of_station.push(u32::try_from(laws.laws.len() - 1).unwrap_or(u32::MAX));
-        }
-        laws
-    }
-
-    /// The laws where the passive force of all is a rising power of the depth, with one exponent.
-    fn power(&self) -> Option<PowerLine> {
-        let (_, exponent) = self.laws.first()?.passive_power()?;
-        let same = |other: f64| other.to_bits() == exponent.to_bits();
-        let factors_n: Option<Vec<f64>> = self
-            .laws
-            .iter()
-            .map(|law| law.passive_power().filter(|(_, z)| same(*z)).map(|(factor, _)| factor))
-            .collect();
-        (exponent > 0.0 && exponent <= MAX_EXPONENT).then_some(PowerLine { factors_n: factors_n?, exponent })
-    }
-
-    #[inline]
-    fn index(&self, i: usize) -> u32 {
-        self.of_station.get(i).copied().unwrap_or(0)
-    }
-
-    fn law(&self, i: usize) -> &DepthLaw {
-        &self.laws[self.index(i) as usize]
-    }
-
-    fn loads(&self, i: usize, depth_mm: f64, main: bool, feed: bool) -> Loads {
-        let law = self.law(i);
-        let (passive_n, passive_slope) = law.passive_and_slope(depth_mm);
-        let (main_n, main_slope) = if main { law.main_and_slope(depth_mm) } else { (0.0, 0.0) };
-        let (feed_n, feed_slope) = if feed { law.feed_and_slope(depth_mm) } else { (0.0, 0.0) };
-        Loads { passive_n, passive_slope, main_n, main_slope, feed_n, feed_slope }
-    }
-
-    fn loads_at_zero(&self, i: usize, main: bool, feed: bool) -> Loads {
-        let limit = self.law(i).limit();
-        Loads {
-            passive_n: limit.passive_n,
-            main_n: if main { limit.main_n } else { 0.0 },
-            feed_n: if feed { limit.feed_n } else { 0.0 },
-            ..Loads::default()
-        }
-    }
-}
-
-/// The law at one feed and speed with the effects in it: factors on all components, then the turned
-/// depth exponent, then what is added to the passive force.
-fn law_at(
-    force: &ForceModel,
-    feed_mm_per_rev: f64,
-    speed_m_per_min: f64,
-    factor: f64,
-    change: &ForceChange,
-) -> DepthLaw {
-    let mut law = force.at(feed_mm_per_rev, speed_m_per_min).scaled(factor);
-    if let Some((delta, reference_mm)) = change.depth {
-        law = law.with_depth_exponent(delta, reference_mm);
-    }
-    law.with_added(Forces { passive_n: change.added_passive_n, main_n: 0.0, feed_n: 0.0 })
 }
 
 /// Shape phi of the shaft for every displaced rest: G(z, z_s)/G(z_s, z_s) without the rest (`diagnosis/4.20`).

@@ -194,7 +194,9 @@ fn corners_in_feed_order(path: &Path, direction: FeedDirection) -> Vec<Vec<(f64,
         .collect();
     if direction == FeedDirection::ToHeadstock {
         zones.reverse();
-        zones.iter_mut().for_each(|corners| corners.reverse());
+        for corners in &mut zones {
+            corners.reverse();
+        }
     }
     zones
 }
