@@ -12,6 +12,10 @@ mod rows;
 
 use std::io::Write;
 
+/// As in the program.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 use measure::{Measured, Unit};
 
 /// One line of the table.
