@@ -15,7 +15,7 @@ mod tests;
 #[cfg(test)]
 pub(crate) mod toy;
 
-pub use entry::{ComputedResult, Entry, Prepared, UnreadableResult};
+pub use entry::{Entry, Prepared, ResultNotes, UnreadableResult};
 
 pub(crate) use checker::{Faults, by_pointer, child};
 pub(crate) use entry::Unprepared;
