@@ -3,6 +3,7 @@
 //! One line in `precut_calc::register` makes a calculator known; everything that the service needs of it
 //! follows from its [`Calculator`] declaration through [`Entry`].
 
+mod canonical;
 mod checker;
 mod entry;
 mod fault;

@@ -14,6 +14,7 @@ use serde_json::Value;
 use utoipa::ToSchema;
 use utoipa::openapi::{RefOr, Schema};
 
+use super::canonical::canonical;
 use super::checker::{Checker, Faults};
 use super::place::{TablePlace, table_places};
 use super::schema::{self, Components};
@@ -308,8 +309,7 @@ impl<C: Calculator> Calculation for Typed<C> {
             let what = format!("the filled job of {} is not finite at {place}", C::META.id);
             return Err(Unprepared::Failed(Failure::Internal(what)));
         }
-        let canonical = serde_json_canonicalizer::to_vec(&input)
-            .map_err(|error| Unprepared::Failed(unwritable("the filled job", &error)))?;
+        let canonical = canonical(&input).map_err(|error| Unprepared::Failed(unwritable("the filled job", &error)))?;
         Ok(Prepared { cost: C::cost(&input), canonical, job: Box::new(TypedJob::<C>(input)) })
     }
     fn broken_rules(&self, job: &Value) -> Vec<Finding> {
