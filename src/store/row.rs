@@ -3,7 +3,8 @@
 use std::io;
 
 use bytes::Bytes;
-use sqlx::FromRow;
+use sqlx::sqlite::{Sqlite, SqliteConnection};
+use sqlx::{FromRow, QueryBuilder};
 
 use super::KeptResult;
 use crate::engine::Key;
@@ -78,4 +79,25 @@ impl ResultRow {
         }
         *hasher.finalize().as_bytes()
     }
+}
+
+/// Adds rows in one statement, those that are there already excepted; what the others take, bytes.
+pub(super) async fn insert(
+    rows: &[ResultRow],
+    now_ms: i64,
+    connection: &mut SqliteConnection,
+) -> Result<i64, sqlx::Error> {
+    let mut statement = QueryBuilder::<Sqlite>::new(
+        "INSERT INTO results (key, calculator, version, engine, input, body, checksum, bytes, created_ms, used_ms) ",
+    );
+    statement.push_values(rows, |mut values, row| {
+        values.push_bind(&row.key).push_bind(&row.calculator).push_bind(row.version).push_bind(&row.engine);
+        values.push_bind(&row.input).push_bind(&row.body).push_bind(&row.checksum);
+        values.push_bind(row.bytes()).push_bind(now_ms).push_bind(now_ms);
+    });
+    statement.push(" ON CONFLICT (key) DO NOTHING");
+    let done = statement.build().execute(connection).await?;
+    let bytes: i64 = rows.iter().map(ResultRow::bytes).sum();
+    // Where some were there already, the total is a little too large until eviction counts anew.
+    Ok(if done.rows_affected() == 0 { 0 } else { bytes })
 }

@@ -6,13 +6,12 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex as StdMutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use sqlx::QueryBuilder;
-use sqlx::sqlite::{Sqlite, SqliteConnection, SqlitePool};
+use sqlx::sqlite::SqlitePool;
 use tokio::sync::{Mutex, Notify, mpsc, oneshot};
 use tokio::task::JoinHandle;
 
 use super::KeptResult;
-use super::row::{Packer, ResultRow};
+use super::row::{self, Packer, ResultRow};
 use super::sqlite::Keys;
 use crate::engine::Key;
 
@@ -257,10 +256,10 @@ impl Clerk {
         let mut added = 0;
         let (many, few) = rows.as_chunks::<ROWS_AT_ONCE>();
         for rows in many {
-            added += insert(rows, now, &mut transaction).await?;
+            added += row::insert(rows, now, &mut transaction).await?;
         }
-        for row in few {
-            added += insert(std::slice::from_ref(row), now, &mut transaction).await?;
+        for one in few {
+            added += row::insert(std::slice::from_ref(one), now, &mut transaction).await?;
         }
         for key in touched {
             sqlx::query("UPDATE results SET used_ms = ?2 WHERE key = ?1")
@@ -347,23 +346,6 @@ impl Clerk {
             tracing::warn!(%error, operation, "the store could not be tidied");
         }
     }
-}
-
-/// Adds rows in one statement, those that are there already excepted; what the others take, bytes.
-async fn insert(rows: &[ResultRow], now_ms: i64, connection: &mut SqliteConnection) -> Result<i64, sqlx::Error> {
-    let mut statement = QueryBuilder::<Sqlite>::new(
-        "INSERT INTO results (key, calculator, version, engine, input, body, checksum, bytes, created_ms, used_ms) ",
-    );
-    statement.push_values(rows, |mut values, row| {
-        values.push_bind(&row.key).push_bind(&row.calculator).push_bind(row.version).push_bind(&row.engine);
-        values.push_bind(&row.input).push_bind(&row.body).push_bind(&row.checksum);
-        values.push_bind(row.bytes()).push_bind(now_ms).push_bind(now_ms);
-    });
-    statement.push(" ON CONFLICT (key) DO NOTHING");
-    let done = statement.build().execute(connection).await?;
-    let bytes: i64 = rows.iter().map(ResultRow::bytes).sum();
-    // Where some were there already, the total is a little too large until eviction counts anew.
-    Ok(if done.rows_affected() == 0 { 0 } else { bytes })
 }
 
 fn group(waiting: &mut Vec<Order>) -> Group {
