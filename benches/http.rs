@@ -87,6 +87,10 @@ fn measure(name: &str, jobs: &Jobs, address: SocketAddr, count: usize) {
     print("one connection, server CPU", &one, |cost| cost.server_us);
     print("four connections, wall time", &four, |cost| cost.wall_us);
     print("four connections, server CPU", &four, |cost| cost.server_us);
+    // Under such a load the store turns away what it cannot write at its leisure.
+    let turned_away = service.metric("precut_store_failures_total{operation=\"queue\"}");
+    let computed = service.metric("precut_calculations_total");
+    println!("\nSo far {turned_away} of {computed} results were too many to be kept.");
 }
 
 /// Per request, µs.
@@ -239,6 +243,20 @@ impl Client {
             job.len()
         )
         .unwrap();
+        self.send()
+    }
+
+    /// The sum of the lines of `/metrics` that begin so.
+    fn metric(&mut self, name: &str) -> f64 {
+        self.request = b"GET /metrics HTTP/1.1\r\nHost: bench\r\n\r\n".to_vec();
+        let (begin, end) = self.send();
+        let text = String::from_utf8_lossy(&self.buffer[begin..end]);
+        let lines = text.lines().filter(|line| line.starts_with(name));
+        lines.filter_map(|line| line.rsplit(' ').next()?.parse::<f64>().ok()).sum()
+    }
+
+    /// Sends the request and reads the answer.
+    fn send(&mut self) -> (usize, usize) {
         self.stream.write_all(&self.request).unwrap();
         let mut filled = 0;
         let head = loop {
