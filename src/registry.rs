@@ -3,6 +3,7 @@
 //! One line in `precut_calc::register` makes a calculator known; everything that the service needs of it
 //! follows from its [`Calculator`] declaration through [`Entry`].
 
+mod canonical;
 mod checker;
 mod entry;
 mod fault;
@@ -15,7 +16,7 @@ mod tests;
 #[cfg(test)]
 pub(crate) mod toy;
 
-pub use entry::{ComputedResult, Entry, Prepared, UnreadableResult};
+pub use entry::{Entry, Prepared, ResultNotes, UnreadableResult};
 
 pub(crate) use checker::{Faults, by_pointer, child};
 pub(crate) use entry::Unprepared;

@@ -1,72 +1,58 @@
 //! The bytes of an answer: what every answer has in common around a result. Nothing volatile stands in it.
 
-use std::io::Write;
-
-use precut_calc::calculator::Failure;
+use precut_calc::calculator::{Failure, Monitor};
 use serde::Serialize;
-use serde_json::Value;
 
+use super::json;
 use super::key::ENGINE_VERSION;
 use super::read::Ready;
-use crate::registry::{ComputedResult, non_finite_place};
+use crate::registry::{ResultNotes, non_finite_place};
 use crate::text::{Language, Notice, Remark, Texts};
 
-/// The envelope of a computed result, in English.
-pub(crate) fn write(ready: &Ready, computed: &ComputedResult) -> Result<Vec<u8>, Failure> {
+/// Runs a job and writes the envelope of its result, in English, in one buffer from the first byte to the last.
+pub(crate) fn write(ready: &Ready, monitor: &dyn Monitor) -> Result<Vec<u8>, Failure> {
     let meta = ready.entry.meta();
-    let input = ready.echo();
-    let effects = input.get("effects").cloned().unwrap_or_else(|| Value::Array(Vec::new()));
+    let mut body = ready.entry.answer_buffer();
+    body.push(b'{');
+    field(&mut body, "calculator", &meta.id)?;
+    field(&mut body, "version", &meta.version)?;
+    field(&mut body, "engine", &ENGINE_VERSION)?;
+    field(&mut body, "key", &ready.key.to_string())?;
+    name(&mut body, "input");
+    let begin = body.len();
+    ready.write_echo(&mut body)?;
+    let effects = json::top_level_field(&body[begin..], "effects").map(|place| begin + place.start..begin + place.end);
+    name(&mut body, "effects");
+    match effects {
+        Some(effects) => body.extend_from_within(effects),
+        None => body.extend_from_slice(b"[]"),
+    }
+    name(&mut body, "result");
+    let ResultNotes { warnings, explanation, basis } = ready.prepared.run(monitor, &mut body)?;
     let texts = Texts::shared();
-    let explanation: Vec<Remark> =
-        computed.explanation.iter().map(|message| texts.remark(Language::En, message)).collect();
-    let warnings: Vec<Notice> =
-        computed.warnings.iter().map(|finding| texts.notice(Language::En, "warning", finding)).collect();
+    let explanation: Vec<Remark> = explanation.iter().map(|message| texts.remark(Language::En, message)).collect();
+    let warnings: Vec<Notice> = warnings.iter().map(|finding| texts.notice(Language::En, "warning", finding)).collect();
     if let Some(place) = non_finite_place(&explanation).or_else(|| non_finite_place(&warnings)) {
         return Err(Failure::Internal(format!("a remark of {} is not finite at {place}", meta.id)));
     }
-    let mut body = Vec::with_capacity(computed.result.len() + ready.canonical.len() + 1024);
-    let parts: [(&str, &dyn Part); 10] = [
-        ("calculator", &meta.id),
-        ("version", &meta.version),
-        ("engine", &ENGINE_VERSION),
-        ("key", &ready.key.to_string()),
-        ("input", &input),
-        ("effects", &effects),
-        ("result", &Raw(&computed.result)),
-        ("explanation", &explanation),
-        ("warnings", &warnings),
-        ("basis", &computed.basis),
-    ];
-    for (index, (name, part)) in parts.into_iter().enumerate() {
-        let joint = if index == 0 { '{' } else { ',' };
-        write!(body, "{joint}\"{name}\":").map_err(unwritable)?;
-        part.append(&mut body)?;
-    }
+    field(&mut body, "explanation", &explanation)?;
+    field(&mut body, "warnings", &warnings)?;
+    field(&mut body, "basis", &basis)?;
     body.push(b'}');
-    Ok(body)
+    Ok(ready.entry.answer_written(body))
 }
 
-/// A value of the envelope.
-trait Part {
-    fn append(&self, body: &mut Vec<u8>) -> Result<(), Failure>;
-}
-
-impl<T: Serialize> Part for T {
-    fn append(&self, body: &mut Vec<u8>) -> Result<(), Failure> {
-        serde_json::to_writer(body, self).map_err(unwritable)
+/// Begins a field.
+fn name(body: &mut Vec<u8>, name: &str) {
+    if body.len() > 1 {
+        body.push(b',');
     }
+    body.push(b'"');
+    body.extend_from_slice(name.as_bytes());
+    body.extend_from_slice(b"\":");
 }
 
-/// JSON that is written already.
-struct Raw<'a>(&'a [u8]);
-
-impl Part for Raw<'_> {
-    fn append(&self, body: &mut Vec<u8>) -> Result<(), Failure> {
-        body.extend_from_slice(self.0);
-        Ok(())
-    }
-}
-
-fn unwritable(error: impl std::fmt::Display) -> Failure {
-    Failure::Internal(format!("the envelope: {error}"))
+fn field<T: Serialize + ?Sized>(body: &mut Vec<u8>, called: &str, value: &T) -> Result<(), Failure> {
+    name(body, called);
+    serde_json::to_writer(body, value).map_err(|error| Failure::Internal(format!("the envelope: {error}")))
 }

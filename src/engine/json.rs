@@ -3,6 +3,7 @@
 
 use std::cell::RefCell;
 use std::fmt;
+use std::ops::Range;
 
 use serde::de::{DeserializeSeed, Deserializer, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Number, Value};
@@ -53,6 +54,41 @@ pub(crate) fn number(value: f64) -> Option<Value> {
         return Some(Value::Number((value as i64).into()));
     }
     Number::from_f64(value).map(Value::Number)
+}
+
+/// Where in the text of an object, written without white space, the value of a field of its own stands.
+pub(crate) fn top_level_field(object: &[u8], name: &str) -> Option<Range<usize>> {
+    let (mut depth, mut in_text, mut escaped) = (0_usize, false, false);
+    // Where the member that is being read begins, and where the value that is looked for does.
+    let (mut member, mut value) = (1, None);
+    for (index, byte) in object.iter().enumerate() {
+        if in_text {
+            match byte {
+                _ if escaped => escaped = false,
+                b'\\' => escaped = true,
+                b'"' => in_text = false,
+                _ => {}
+            }
+            continue;
+        }
+        match byte {
+            b'"' => in_text = true,
+            b'{' | b'[' => depth += 1,
+            b':' if depth == 1 => {
+                let key = object.get(member + 1..index - 1)?;
+                value = (key == name.as_bytes()).then_some(index + 1);
+            }
+            b',' | b'}' if depth == 1 => {
+                if let Some(begin) = value {
+                    return Some(begin..index);
+                }
+                member = index + 1;
+            }
+            b'}' | b']' => depth = depth.checked_sub(1)?,
+            _ => {}
+        }
+    }
+    None
 }
 
 fn fault(error: &serde_json::Error, code: Option<&'static str>, pointer: String) -> SyntaxFault {
@@ -192,6 +228,22 @@ mod tests {
         match parse(text.as_bytes()) {
             Err(Error::Syntax(fault)) => fault,
             other => panic!("{text} gave {other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_field_of_the_object_itself_is_found_in_its_text() {
+        let object = json!({
+            "a": {"effects": 1}, "b": ["effects", {"effects": [2]}], "c\"effects": "x,\"effects\":{", "": 0,
+            "effects": [{"kind": "wear\\\"]}", "of": [[1.5, null]]}, {}], "last": {},
+        });
+        let text = object.to_string();
+        for name in ["a", "b", "effects", "", "last"] {
+            let place = top_level_field(text.as_bytes(), name).unwrap();
+            assert_eq!(text[place], object[name].to_string(), "{name}");
+        }
+        for (text, name) in [("{}", "a"), ("{\"a\":{\"b\":1}}", "b"), ("[1,2]", "a"), ("", "a"), ("{\"a\":1", "a")] {
+            assert_eq!(top_level_field(text.as_bytes(), name), None, "{text}");
         }
     }
 

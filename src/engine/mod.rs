@@ -36,6 +36,9 @@ use read::Ready;
 
 /// Bodies up to this size are read where they arrive, larger ones on the pool: about 1 ms of reading.
 const READ_AT_ONCE: usize = 32 << 10;
+/// Jobs estimated up to this are computed where they arrive, larger ones on the pool: waking a thread of the pool and
+/// being woken by it costs as much as such a job.
+const COMPUTE_AT_ONCE_MS: f64 = 0.5;
 
 /// The calculators behind their cache and their pool of cores. Cheap to clone.
 #[derive(Clone)]
@@ -227,18 +230,25 @@ impl Inner {
         if affordable { Ok(()) } else { Err(Error::TooExpensive { cost, limit, limit_bytes }) }
     }
 
-    /// Runs the calculation on the pool, keeps its answer and tells it.
+    /// Sees to it that the calculation runs: here if it is short, else on the pool.
     fn fly(inner: &Arc<Self>, pilot: Pilot, ready: Ready, slot: Slot, queued: Instant) {
-        let this = Arc::clone(inner);
-        inner.cores.spawn(move || {
-            let (queue, begun) = (queued.elapsed(), Instant::now());
-            let watch = pilot.watch();
-            let outcome = guarded(|| compute(&ready, &watch));
-            drop(slot);
-            let run = begun.elapsed();
-            let outcome = this.keep(&ready, outcome, run);
-            pilot.land(Landed { outcome, timings: Timings { parse: Duration::ZERO, queue, run } });
-        });
+        if ready.prepared.cost.ms <= COMPUTE_AT_ONCE_MS {
+            inner.run(pilot, &ready, slot, queued);
+        } else {
+            let this = Arc::clone(inner);
+            inner.cores.spawn(move || this.run(pilot, &ready, slot, queued));
+        }
+    }
+
+    /// Runs the calculation, keeps its answer and tells it.
+    fn run(&self, pilot: Pilot, ready: &Ready, slot: Slot, queued: Instant) {
+        let (queue, begun) = (queued.elapsed(), Instant::now());
+        let watch = pilot.watch();
+        let outcome = guarded(|| compute(ready, &watch));
+        drop(slot);
+        let run = begun.elapsed();
+        let outcome = self.keep(ready, outcome, run);
+        pilot.land(Landed { outcome, timings: Timings { parse: Duration::ZERO, queue, run } });
     }
 
     /// Keeps what would come out again: answers, and failures that follow from the job alone.
@@ -309,8 +319,7 @@ fn compute(ready: &Ready, monitor: &dyn Monitor) -> Result<Stored, Error> {
     if monitor.cancelled() {
         return Err(Error::Cancelled);
     }
-    let written = ready.prepared.run(monitor).and_then(|computed| envelope::write(ready, &computed));
-    match written {
+    match envelope::write(ready, monitor) {
         Ok(body) => Ok(Stored {
             key: ready.key,
             body: body.into(),
@@ -326,7 +335,7 @@ fn compute(ready: &Ready, monitor: &dyn Monitor) -> Result<Stored, Error> {
 #[allow(clippy::needless_pass_by_value)] // a body is handed over, here as to an engine
 pub fn check_now(registry: &Registry, calculator: &str, body: Body) -> Result<Checked, Error> {
     let entry = entry(registry, calculator)?;
-    guarded(|| read::read(&entry, &body)).map(Ready::into_checked)
+    guarded(|| read::read(&entry, &body)?.into_checked())
 }
 
 /// The answer to a job in this thread, without cache, store or limit of cost: for the command line.

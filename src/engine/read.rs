@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bytes::Bytes;
-use precut_calc::calculator::Finding;
+use precut_calc::calculator::{Failure, Finding};
 use serde_json::Value;
 
 use super::error::Error;
@@ -29,14 +29,14 @@ pub(crate) fn read(entry: &Arc<Entry>, body: &Body) -> Result<Ready, Error> {
     };
     let mut job = json::parse(job)?;
     check_schema(entry, &mut job, parts).map_err(|found| found.with_rules(entry, &job))?;
-    let prepared = entry.prepare(&job).map_err(|unprepared| match unprepared {
+    let mut prepared = entry.prepare(&job).map_err(|unprepared| match unprepared {
         Unprepared::Invalid(findings) => {
             let total = findings.len();
             invalid(findings, total)
         }
         Unprepared::Failed(failure) => Error::Calculation(failure),
     })?;
-    let canonical = Bytes::from(serde_json_canonicalizer::to_vec(&prepared.input).expect("a JSON value has text keys"));
+    let canonical = Bytes::from(std::mem::take(&mut prepared.canonical));
     let key = Key::of(entry.meta(), &canonical);
     Ok(Ready { entry: Arc::clone(entry), prepared, key, canonical })
 }
@@ -104,12 +104,22 @@ fn invalid(mut findings: Vec<Finding>, total: usize) -> Error {
 
 impl Ready {
     /// The filled job as it is echoed.
-    pub(crate) fn echo(&self) -> Value {
-        table::without_rows(self.prepared.input.clone(), self.entry.tables())
+    pub(crate) fn echo(&self) -> Result<Value, Failure> {
+        Ok(table::without_rows(self.prepared.input()?, self.entry.tables()))
     }
 
-    pub(crate) fn into_checked(self) -> Checked {
-        Checked { input: self.echo(), cost: self.prepared.cost, key: self.key }
+    /// Appends the same as JSON.
+    pub(crate) fn write_echo(&self, body: &mut Vec<u8>) -> Result<(), Failure> {
+        if table::may_have_rows(&self.canonical, self.entry.tables()) {
+            let echo = self.echo()?;
+            return serde_json::to_writer(body, &echo).map_err(|error| Failure::Internal(format!("the echo: {error}")));
+        }
+        self.prepared.write_input(body)
+    }
+
+    pub(crate) fn into_checked(self) -> Result<Checked, Error> {
+        let input = self.echo().map_err(Error::Calculation)?;
+        Ok(Checked { input, cost: self.prepared.cost, key: self.key })
     }
 }
 
@@ -181,7 +191,7 @@ mod tests {
         let parts = Body::Parts { job: plain().to_string().into(), tables: vec![part] };
         let ready = read(&toy(), &parts).unwrap();
         assert_eq!(ready.key, key(&rows));
-        assert_eq!(ready.echo()["measurements"]["rows"], 1);
+        assert_eq!(ready.echo().unwrap()["measurements"]["rows"], 1);
     }
 
     #[test]

@@ -80,6 +80,14 @@ pub(crate) fn without_rows(mut input: Value, places: &[TablePlace]) -> Value {
     input
 }
 
+/// Whether a job in canonical JSON has rows of a table; `false` is certain.
+pub(crate) fn may_have_rows(canonical: &[u8], places: &[TablePlace]) -> bool {
+    places.iter().any(|place| {
+        let name = format!("\"{}\":[", place.name());
+        canonical.windows(name.len()).any(|bytes| bytes == name.as_bytes())
+    })
+}
+
 /// Runs `visit` on every value at `path`.
 fn each_at(value: &mut Value, path: &[Step], pointer: String, visit: &mut impl FnMut(&mut Value, String)) {
     match (path.split_first(), value) {

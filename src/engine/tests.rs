@@ -278,7 +278,9 @@ fn conforms(registry: &Registry, entry: &Entry) {
         let body = || Body::Json(example.job.into());
         let ready = read::read(&registry.entry(meta.id).unwrap().clone(), &body())
             .unwrap_or_else(|error| panic!("{} of {}: {error:?}", example.id, meta.id));
-        let computed = ready.prepared.run(&Unwatched).unwrap();
+        let computed = ready.prepared.run(&Unwatched, &mut Vec::new()).unwrap();
+        let input = ready.prepared.input().unwrap();
+        assert_eq!(ready.canonical, serde_json_canonicalizer::to_vec(&input).unwrap());
         for message in &computed.explanation {
             texts.try_word(Language::En, "explanation", message.code, &message.values).unwrap();
             assert!(meta.codes.contains(message.code), "{} utters the undeclared {}", meta.id, message.code);

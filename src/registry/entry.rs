@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::marker::PhantomData;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use precut_calc::calculator::{
     Answer, Basis, Calculator, Check, Cost, Failure, Figure, Finding, Message, Meta, Monitor, Program, Table,
@@ -13,6 +14,7 @@ use serde_json::Value;
 use utoipa::ToSchema;
 use utoipa::openapi::{RefOr, Schema};
 
+use super::canonical::canonical;
 use super::checker::{Checker, Faults};
 use super::place::{TablePlace, table_places};
 use super::schema::{self, Components};
@@ -27,6 +29,8 @@ pub struct Entry {
     tables: Vec<TablePlace>,
     own_codes: Vec<String>,
     calculation: Box<dyn Calculation>,
+    /// Bytes of the answer written last.
+    answer_bytes: AtomicUsize,
 }
 
 /// A type's schema, in the forms in which it is asked for.
@@ -62,6 +66,7 @@ impl Entry {
             input,
             output,
             calculation: Box::new(Typed::<C>(PhantomData)),
+            answer_bytes: AtomicUsize::new(0),
         })
     }
 
@@ -108,6 +113,25 @@ impl Entry {
     /// Every code that it may utter: those of its declaration and those of its fields.
     pub fn codes(&self) -> impl Iterator<Item = &str> {
         self.meta.codes.all().map(|code| -> &str { code }).chain(self.own_codes.iter().map(String::as_str))
+    }
+
+    /// A buffer for the next answer, about as large as the last one was.
+    pub(crate) fn answer_buffer(&self) -> Vec<u8> {
+        /// Answers differ by some digits and words.
+        const SPARE: usize = 512;
+        /// Beyond that, growing costs little beside what is written.
+        const MOST: usize = 1 << 20;
+        let last = self.answer_bytes.load(Ordering::Relaxed);
+        Vec::with_capacity((last + last / 64 + SPARE).min(MOST))
+    }
+    /// An answer is written: hands its bytes on without what is much too large for them.
+    pub(crate) fn answer_written(&self, mut body: Vec<u8>) -> Vec<u8> {
+        self.answer_bytes.store(body.len(), Ordering::Relaxed);
+        if body.capacity() > body.len() + body.len() / 8 {
+            // Kept in memory for long, it shall not take more than it counts for.
+            body.shrink_to_fit();
+        }
+        body
     }
 
     pub(crate) fn tables(&self) -> &[TablePlace] {
@@ -200,17 +224,25 @@ impl Contract {
 
 /// A job that can run.
 pub struct Prepared {
-    /// The job with every default filled in.
-    pub input: Value,
     /// What it would cost.
     pub cost: Cost,
+    /// The job with every default filled in, as RFC 8785 writes it.
+    pub canonical: Vec<u8>,
     job: Box<dyn Job>,
 }
 
 impl Prepared {
-    /// Computes the answer.
-    pub fn run(&self, monitor: &dyn Monitor) -> Result<ComputedResult, Failure> {
-        self.job.run(monitor)
+    /// The job with every default filled in.
+    pub fn input(&self) -> Result<Value, Failure> {
+        self.job.input()
+    }
+    /// Appends the same as JSON, its fields in the order of their declaration.
+    pub fn write_input(&self, body: &mut Vec<u8>) -> Result<(), Failure> {
+        self.job.write_input(body)
+    }
+    /// Computes the answer and appends its result as JSON, every number finite.
+    pub fn run(&self, monitor: &dyn Monitor, body: &mut Vec<u8>) -> Result<ResultNotes, Failure> {
+        self.job.run(monitor, body)
     }
 }
 
@@ -223,11 +255,9 @@ pub(crate) enum Unprepared {
     Failed(Failure),
 }
 
-/// An answer whose result is JSON already.
+/// What an answer has beside its result.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ComputedResult {
-    /// The result as JSON, every number finite.
-    pub result: Vec<u8>,
+pub struct ResultNotes {
     /// Where an input leaves a formula's range of validity, and the like.
     pub warnings: Vec<Finding>,
     /// Most important first.
@@ -252,7 +282,9 @@ trait Calculation: Send + Sync {
 }
 
 trait Job: Send + Sync {
-    fn run(&self, monitor: &dyn Monitor) -> Result<ComputedResult, Failure>;
+    fn input(&self) -> Result<Value, Failure>;
+    fn write_input(&self, body: &mut Vec<u8>) -> Result<(), Failure>;
+    fn run(&self, monitor: &dyn Monitor, body: &mut Vec<u8>) -> Result<ResultNotes, Failure>;
 }
 
 /// The types of a calculator.
@@ -263,8 +295,10 @@ struct TypedJob<C: Calculator>(C::Input);
 
 impl<C: Calculator> Calculation for Typed<C> {
     fn prepare(&self, job: &Value) -> Result<Prepared, Unprepared> {
-        let mut input: C::Input =
-            serde_path_to_error::deserialize(job).map_err(|error| Unprepared::Invalid(vec![second_line(&error)]))?;
+        // The way to a fault is noted on a second reading only: noting it costs more than reading.
+        let mut input = C::Input::deserialize(job).or_else(|_| {
+            serde_path_to_error::deserialize(job).map_err(|error| Unprepared::Invalid(vec![second_line(&error)]))
+        })?;
         let mut violations = Violations::default();
         input.check(&mut violations);
         if !violations.is_empty() {
@@ -275,9 +309,8 @@ impl<C: Calculator> Calculation for Typed<C> {
             let what = format!("the filled job of {} is not finite at {place}", C::META.id);
             return Err(Unprepared::Failed(Failure::Internal(what)));
         }
-        let filled = serde_json::to_value(&input)
-            .map_err(|error| Unprepared::Failed(Failure::Internal(format!("the filled job: {error}"))))?;
-        Ok(Prepared { cost: C::cost(&input), input: filled, job: Box::new(TypedJob::<C>(input)) })
+        let canonical = canonical(&input).map_err(|error| Unprepared::Failed(unwritable("the filled job", &error)))?;
+        Ok(Prepared { cost: C::cost(&input), canonical, job: Box::new(TypedJob::<C>(input)) })
     }
     fn broken_rules(&self, job: &Value) -> Vec<Finding> {
         let mut violations = Violations::default();
@@ -301,14 +334,24 @@ impl<C: Calculator> Calculation for Typed<C> {
 }
 
 impl<C: Calculator> Job for TypedJob<C> {
-    fn run(&self, monitor: &dyn Monitor) -> Result<ComputedResult, Failure> {
+    fn input(&self) -> Result<Value, Failure> {
+        serde_json::to_value(&self.0).map_err(|error| unwritable("the filled job", &error))
+    }
+    fn write_input(&self, body: &mut Vec<u8>) -> Result<(), Failure> {
+        serde_json::to_writer(body, &self.0).map_err(|error| unwritable("the filled job", &error))
+    }
+    fn run(&self, monitor: &dyn Monitor, body: &mut Vec<u8>) -> Result<ResultNotes, Failure> {
         let Answer { output, warnings, explanation, basis } = C::run(&self.0, monitor)?;
         if let Some(place) = non_finite_place(&output) {
             return Err(Failure::Internal(format!("the result of {} is not finite at {place}", C::META.id)));
         }
-        let result = serde_json::to_vec(&output).map_err(|error| Failure::Internal(format!("the result: {error}")))?;
-        Ok(ComputedResult { result, warnings, explanation, basis })
+        serde_json::to_writer(body, &output).map_err(|error| unwritable("the result", &error))?;
+        Ok(ResultNotes { warnings, explanation, basis })
     }
+}
+
+fn unwritable(what: &str, error: &serde_json::Error) -> Failure {
+    Failure::Internal(format!("{what}: {error}"))
 }
 
 /// What is read of an envelope.

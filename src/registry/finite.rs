@@ -6,6 +6,10 @@ use serde::ser::{self, Serialize, Serializer};
 
 /// JSON Pointer to the first number of `value` that is not finite.
 pub(crate) fn non_finite_place<T: Serialize + ?Sized>(value: &T) -> Option<String> {
+    // Nearly always nothing is wrong: the way there is noted on a second look only.
+    if !matches!(value.serialize(&mut Walk { path: NoPath }), Err(Stop::NotFinite)) {
+        return None;
+    }
     let mut walk = Walk { path: Vec::new() };
     match value.serialize(&mut walk) {
         // What cannot be serialised at all is reported where it is written.
@@ -24,9 +28,32 @@ enum Step {
     Index(usize),
 }
 
+/// The way from the root to the value that is looked at.
+trait Path {
+    fn enter(&mut self, step: impl FnOnce() -> Step);
+    fn leave(&mut self);
+}
+
+impl Path for Vec<Step> {
+    fn enter(&mut self, step: impl FnOnce() -> Step) {
+        self.push(step());
+    }
+    fn leave(&mut self) {
+        self.pop();
+    }
+}
+
+/// Nobody asks for the way.
+struct NoPath;
+
+impl Path for NoPath {
+    fn enter(&mut self, _: impl FnOnce() -> Step) {}
+    fn leave(&mut self) {}
+}
+
 /// A serializer that writes nothing and looks at every number.
-struct Walk {
-    path: Vec<Step>,
+struct Walk<P> {
+    path: P,
 }
 
 #[derive(Debug, thiserror::Error)]
@@ -43,12 +70,12 @@ impl ser::Error for Stop {
     }
 }
 
-impl Walk {
-    fn step<T: Serialize + ?Sized>(&mut self, step: Step, value: &T) -> Result<(), Stop> {
-        self.path.push(step);
+impl<P: Path> Walk<P> {
+    fn step<T: Serialize + ?Sized>(&mut self, step: impl FnOnce() -> Step, value: &T) -> Result<(), Stop> {
+        self.path.enter(step);
         value.serialize(&mut *self)?;
         // Left in place on error: it says where.
-        self.path.pop();
+        self.path.leave();
         Ok(())
     }
 }
@@ -59,16 +86,16 @@ macro_rules! fine {
     };
 }
 
-impl<'a> Serializer for &'a mut Walk {
+impl<'a, P: Path> Serializer for &'a mut Walk<P> {
     type Ok = ();
     type Error = Stop;
-    type SerializeSeq = Items<'a>;
-    type SerializeTuple = Items<'a>;
-    type SerializeTupleStruct = Items<'a>;
-    type SerializeTupleVariant = Items<'a>;
-    type SerializeMap = Entries<'a>;
-    type SerializeStruct = Fields<'a>;
-    type SerializeStructVariant = Fields<'a>;
+    type SerializeSeq = Items<'a, P>;
+    type SerializeTuple = Items<'a, P>;
+    type SerializeTupleStruct = Items<'a, P>;
+    type SerializeTupleVariant = Items<'a, P>;
+    type SerializeMap = Entries<'a, P>;
+    type SerializeStruct = Fields<'a, P>;
+    type SerializeStructVariant = Fields<'a, P>;
 
     fine! {
         serialize_bool: bool, serialize_i8: i8, serialize_i16: i16, serialize_i32: i32, serialize_i64: i64,
@@ -104,44 +131,51 @@ impl<'a> Serializer for &'a mut Walk {
         variant: &'static str,
         value: &T,
     ) -> Result<(), Stop> {
-        self.step(Step::Field(variant), value)
+        self.step(|| Step::Field(variant), value)
     }
-    fn serialize_seq(self, _: Option<usize>) -> Result<Items<'a>, Stop> {
+    fn serialize_seq(self, _: Option<usize>) -> Result<Items<'a, P>, Stop> {
         Ok(Items { walk: self, next: 0 })
     }
-    fn serialize_tuple(self, _: usize) -> Result<Items<'a>, Stop> {
+    fn serialize_tuple(self, _: usize) -> Result<Items<'a, P>, Stop> {
         Ok(Items { walk: self, next: 0 })
     }
-    fn serialize_tuple_struct(self, _: &'static str, _: usize) -> Result<Items<'a>, Stop> {
+    fn serialize_tuple_struct(self, _: &'static str, _: usize) -> Result<Items<'a, P>, Stop> {
         Ok(Items { walk: self, next: 0 })
     }
-    fn serialize_tuple_variant(self, _: &'static str, _: u32, _: &'static str, _: usize) -> Result<Items<'a>, Stop> {
+    fn serialize_tuple_variant(self, _: &'static str, _: u32, _: &'static str, _: usize) -> Result<Items<'a, P>, Stop> {
         Ok(Items { walk: self, next: 0 })
     }
-    fn serialize_map(self, _: Option<usize>) -> Result<Entries<'a>, Stop> {
+    fn serialize_map(self, _: Option<usize>) -> Result<Entries<'a, P>, Stop> {
         Ok(Entries { walk: self, key: String::new() })
     }
-    fn serialize_struct(self, _: &'static str, _: usize) -> Result<Fields<'a>, Stop> {
+    fn serialize_struct(self, _: &'static str, _: usize) -> Result<Fields<'a, P>, Stop> {
         Ok(Fields { walk: self })
     }
-    fn serialize_struct_variant(self, _: &'static str, _: u32, _: &'static str, _: usize) -> Result<Fields<'a>, Stop> {
+    fn serialize_struct_variant(
+        self,
+        _: &'static str,
+        _: u32,
+        _: &'static str,
+        _: usize,
+    ) -> Result<Fields<'a, P>, Stop> {
         Ok(Fields { walk: self })
     }
 }
 
-struct Items<'a> {
-    walk: &'a mut Walk,
+struct Items<'a, P> {
+    walk: &'a mut Walk<P>,
     next: usize,
 }
 
-impl Items<'_> {
+impl<P: Path> Items<'_, P> {
     fn item<T: Serialize + ?Sized>(&mut self, value: &T) -> Result<(), Stop> {
         self.next += 1;
-        self.walk.step(Step::Index(self.next - 1), value)
+        let index = self.next - 1;
+        self.walk.step(|| Step::Index(index), value)
     }
 }
 
-impl ser::SerializeSeq for Items<'_> {
+impl<P: Path> ser::SerializeSeq for Items<'_, P> {
     type Ok = ();
     type Error = Stop;
     fn serialize_element<T: Serialize + ?Sized>(&mut self, value: &T) -> Result<(), Stop> {
@@ -151,7 +185,7 @@ impl ser::SerializeSeq for Items<'_> {
         Ok(())
     }
 }
-impl ser::SerializeTuple for Items<'_> {
+impl<P: Path> ser::SerializeTuple for Items<'_, P> {
     type Ok = ();
     type Error = Stop;
     fn serialize_element<T: Serialize + ?Sized>(&mut self, value: &T) -> Result<(), Stop> {
@@ -161,7 +195,7 @@ impl ser::SerializeTuple for Items<'_> {
         Ok(())
     }
 }
-impl ser::SerializeTupleStruct for Items<'_> {
+impl<P: Path> ser::SerializeTupleStruct for Items<'_, P> {
     type Ok = ();
     type Error = Stop;
     fn serialize_field<T: Serialize + ?Sized>(&mut self, value: &T) -> Result<(), Stop> {
@@ -171,7 +205,7 @@ impl ser::SerializeTupleStruct for Items<'_> {
         Ok(())
     }
 }
-impl ser::SerializeTupleVariant for Items<'_> {
+impl<P: Path> ser::SerializeTupleVariant for Items<'_, P> {
     type Ok = ();
     type Error = Stop;
     fn serialize_field<T: Serialize + ?Sized>(&mut self, value: &T) -> Result<(), Stop> {
@@ -182,12 +216,12 @@ impl ser::SerializeTupleVariant for Items<'_> {
     }
 }
 
-struct Entries<'a> {
-    walk: &'a mut Walk,
+struct Entries<'a, P> {
+    walk: &'a mut Walk<P>,
     key: String,
 }
 
-impl ser::SerializeMap for Entries<'_> {
+impl<P: Path> ser::SerializeMap for Entries<'_, P> {
     type Ok = ();
     type Error = Stop;
     fn serialize_key<T: Serialize + ?Sized>(&mut self, key: &T) -> Result<(), Stop> {
@@ -196,32 +230,33 @@ impl ser::SerializeMap for Entries<'_> {
         Ok(())
     }
     fn serialize_value<T: Serialize + ?Sized>(&mut self, value: &T) -> Result<(), Stop> {
-        self.walk.step(Step::Key(std::mem::take(&mut self.key)), value)
+        let key = std::mem::take(&mut self.key);
+        self.walk.step(|| Step::Key(key), value)
     }
     fn end(self) -> Result<(), Stop> {
         Ok(())
     }
 }
 
-struct Fields<'a> {
-    walk: &'a mut Walk,
+struct Fields<'a, P> {
+    walk: &'a mut Walk<P>,
 }
 
-impl ser::SerializeStruct for Fields<'_> {
+impl<P: Path> ser::SerializeStruct for Fields<'_, P> {
     type Ok = ();
     type Error = Stop;
     fn serialize_field<T: Serialize + ?Sized>(&mut self, name: &'static str, value: &T) -> Result<(), Stop> {
-        self.walk.step(Step::Field(name), value)
+        self.walk.step(|| Step::Field(name), value)
     }
     fn end(self) -> Result<(), Stop> {
         Ok(())
     }
 }
-impl ser::SerializeStructVariant for Fields<'_> {
+impl<P: Path> ser::SerializeStructVariant for Fields<'_, P> {
     type Ok = ();
     type Error = Stop;
     fn serialize_field<T: Serialize + ?Sized>(&mut self, name: &'static str, value: &T) -> Result<(), Stop> {
-        self.walk.step(Step::Field(name), value)
+        self.walk.step(|| Step::Field(name), value)
     }
     fn end(self) -> Result<(), Stop> {
         Ok(())

@@ -67,7 +67,7 @@ impl SqliteStore {
             .foreign_keys(true);
         let failed = |error: sqlx::Error| unusable(error.to_string());
         let writing =
-            SqlitePoolOptions::new().max_connections(1).connect_with(options.clone()).await.map_err(failed)?;
+            SqlitePoolOptions::new().max_connections(1).connect_with(writing(&options)).await.map_err(failed)?;
         MIGRATIONS.run(&writing).await.map_err(|error| unusable(migration_fault(&error)))?;
         let readers = SqlitePoolOptions::new()
             .max_connections(READERS)
@@ -89,6 +89,9 @@ impl SqliteStore {
     }
 
     async fn read(&self, key: Key) -> Result<Option<KeptResult>, StoreError> {
+        if let Some(waiting) = self.writer.waiting(&key) {
+            return Ok(Some(KeptResult::clone(&waiting)));
+        }
         if !self.keys.may_have(&key) {
             return Ok(None);
         }
@@ -192,6 +195,12 @@ impl SummaryRow {
             created_ms: self.created_ms,
         })
     }
+}
+
+/// How the connection that writes is set up: with room for the pages of a group, and a log that takes several groups
+/// before its pages are copied into the database.
+fn writing(options: &SqliteConnectOptions) -> SqliteConnectOptions {
+    options.clone().pragma("cache_size", "-8000").pragma("wal_autocheckpoint", "4000")
 }
 
 fn lock(folder: &Path) -> Result<File, OpenError> {

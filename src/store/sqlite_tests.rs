@@ -42,6 +42,40 @@ async fn what_is_put_is_got_after_the_store_was_closed() {
 }
 
 #[tokio::test]
+async fn what_is_put_is_got_before_it_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = store(&folder, 1 << 30).await;
+    let all: Vec<KeptResult> = (0..100).map(|number| result(number, "a")).collect();
+    for kept in &all {
+        store.put(kept.clone());
+        assert_eq!(store.get(kept.key).await.unwrap().as_ref(), Some(kept));
+        assert!(!store.keys.may_have(&kept.key), "the writer gathers first");
+    }
+    // The same twice is kept once, and a list does not wait for the writer's rest.
+    store.put(all[0].clone());
+    assert_eq!(list(&store, None, 500, None).await.items.len(), all.len());
+    for kept in &all {
+        assert!(store.keys.may_have(&kept.key) && store.writer.waiting(&kept.key).is_none());
+        assert_eq!(store.get(kept.key).await.unwrap().as_ref(), Some(kept));
+    }
+}
+
+#[tokio::test]
+async fn what_is_too_much_to_wait_is_not_kept_and_does_no_harm() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = store(&folder, 1 << 30).await;
+    let large = |number: u32| KeptResult { body: vec![b' '; 20 << 20].into(), ..result(number, "a") };
+    for number in 0..5 {
+        store.put(large(number));
+    }
+    assert_eq!(store.get(large(4).key).await.unwrap(), None);
+    assert_eq!(list(&store, None, 10, None).await.items.len(), 3);
+    store.put(large(4));
+    assert_eq!(list(&store, None, 10, None).await.items.len(), 4);
+    assert_eq!(store.get(large(4).key).await.unwrap(), Some(large(4)));
+}
+
+#[tokio::test]
 async fn a_folder_serves_one_store() {
     let folder = tempfile::tempdir().unwrap();
     let first = store(&folder, 1 << 30).await;

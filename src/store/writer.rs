@@ -1,15 +1,17 @@
-//! What is written behind the answers: in groups, by one task over one connection.
+//! What is written behind the answers: in groups, by one task over one connection, which rests between groups so that
+//! under load the cores are there for answers. What waits is read from here.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::collections::HashMap;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex as StdMutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use sqlx::sqlite::SqlitePool;
-use tokio::sync::{Mutex, mpsc, oneshot};
+use tokio::sync::{Mutex, Notify, mpsc, oneshot};
 use tokio::task::JoinHandle;
 
 use super::KeptResult;
-use super::row::ResultRow;
+use super::row::{self, Packer, ResultRow};
 use super::sqlite::Keys;
 use crate::engine::Key;
 
@@ -18,7 +20,13 @@ const WAITING_ORDERS: usize = 4096;
 /// Bytes of results that may wait; further results are not kept.
 const WAITING_BYTES: usize = 64 << 20;
 /// Orders in one transaction.
-const GROUP: usize = 64;
+const GROUP: usize = 256;
+/// Rows in one statement.
+const ROWS_AT_ONCE: usize = 32;
+/// For so many times the time that a group took no other is written: a fifth of a core at most.
+const REST_PER_WORK: u32 = 4;
+/// A group gathers at least so long, and no rest is longer than the other.
+const REST: (Duration, Duration) = (Duration::from_millis(20), Duration::from_secs(1));
 /// How often age is looked at.
 const SWEEP_EVERY: Duration = Duration::from_mins(10);
 /// How long a list waits for what is just being written.
@@ -38,36 +46,87 @@ pub(super) struct Limits {
 /// Takes orders and has them carried out.
 pub(super) struct Writer {
     orders: mpsc::Sender<Order>,
-    waiting_bytes: Arc<AtomicUsize>,
+    desk: Arc<Desk>,
     task: Mutex<Option<JoinHandle<()>>>,
 }
 
+/// What those who order and the one who carries out have in common.
+#[derive(Default)]
+struct Desk {
+    /// Results that are not written yet, by key.
+    waiting: StdMutex<HashMap<Key, Arc<KeptResult>>>,
+    /// Their size.
+    waiting_bytes: AtomicUsize,
+    /// Whether results were turned away since the last group was written.
+    full: AtomicBool,
+    /// Ends a rest.
+    hurry: Notify,
+}
+
+impl Desk {
+    fn waiting(&self) -> MutexGuard<'_, HashMap<Key, Arc<KeptResult>>> {
+        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn done(&self, results: &[Arc<KeptResult>]) {
+        let mut waiting = self.waiting();
+        for result in results {
+            waiting.remove(&result.key);
+        }
+        drop(waiting);
+        self.waiting_bytes.fetch_sub(results.iter().map(|result| size(result)).sum(), Ordering::Relaxed);
+        self.full.store(false, Ordering::Relaxed);
+    }
+}
+
 enum Order {
-    Put(KeptResult),
+    Put(Arc<KeptResult>),
     Touch(Key),
     Forget(Key),
     Flush(oneshot::Sender<()>),
     Close,
 }
 
+impl Order {
+    /// Whether somebody waits for it.
+    fn is_urgent(&self) -> bool {
+        matches!(self, Self::Flush(_) | Self::Close)
+    }
+}
+
 impl Writer {
     pub(super) async fn start(pool: SqlitePool, keys: Keys, limits: Limits) -> Result<Self, sqlx::Error> {
         let total = total_bytes(&pool).await?;
         let (orders, receiver) = mpsc::channel(WAITING_ORDERS);
-        let waiting_bytes = Arc::new(AtomicUsize::new(0));
-        let clerk = Clerk { pool, keys, limits, total, waiting_bytes: Arc::clone(&waiting_bytes) };
+        let desk = Arc::new(Desk::default());
+        let clerk = Clerk { pool, keys, limits, total, desk: Arc::clone(&desk) };
         let task = Mutex::new(Some(tokio::spawn(clerk.work(receiver))));
-        Ok(Self { orders, waiting_bytes, task })
+        Ok(Self { orders, desk, task })
     }
 
     pub(super) fn put(&self, result: KeptResult) {
-        let size = size(&result);
-        let waiting = self.waiting_bytes.fetch_add(size, Ordering::Relaxed);
-        if waiting + size > WAITING_BYTES || self.orders.try_send(Order::Put(result)).is_err() {
-            self.waiting_bytes.fetch_sub(size, Ordering::Relaxed);
-            metrics::counter!("precut_store_failures_total", "operation" => "queue").increment(1);
-            tracing::warn!("a result is not kept: too many wait to be written");
+        let desk = &self.desk;
+        let (key, size, result) = (result.key, size(&result), Arc::new(result));
+        // In this order: once it is ordered it may be written, and then it waits no more.
+        if desk.waiting().insert(key, Arc::clone(&result)).is_some() {
+            // The same result already waits.
+            return;
         }
+        let waiting = desk.waiting_bytes.fetch_add(size, Ordering::Relaxed);
+        if waiting + size > WAITING_BYTES || self.orders.try_send(Order::Put(result)).is_err() {
+            desk.waiting().remove(&key);
+            desk.waiting_bytes.fetch_sub(size, Ordering::Relaxed);
+            metrics::counter!("precut_store_failures_total", "operation" => "queue").increment(1);
+            // Once for a crowd: under overload there are thousands of them.
+            if !desk.full.swap(true, Ordering::Relaxed) {
+                tracing::warn!("results are not kept: too many wait to be written");
+            }
+        }
+    }
+
+    /// A result that is not written yet.
+    pub(super) fn waiting(&self, key: &Key) -> Option<Arc<KeptResult>> {
+        self.desk.waiting().get(key).cloned()
     }
 
     /// Notes a use. One that is lost does no harm.
@@ -84,6 +143,7 @@ impl Writer {
         let (sender, done) = oneshot::channel();
         let written = async {
             if self.orders.send(Order::Flush(sender)).await.is_ok() {
+                self.desk.hurry.notify_one();
                 let _ = done.await;
             }
         };
@@ -91,7 +151,9 @@ impl Writer {
     }
 
     pub(super) async fn close(&self) {
+        self.desk.hurry.notify_one();
         let _ = self.orders.send(Order::Close).await;
+        self.desk.hurry.notify_one();
         if let Some(task) = self.task.lock().await.take() {
             let _ = task.await;
         }
@@ -108,13 +170,13 @@ struct Clerk {
     keys: Keys,
     limits: Limits,
     total: i64,
-    waiting_bytes: Arc<AtomicUsize>,
+    desk: Arc<Desk>,
 }
 
 /// The orders of one group.
 #[derive(Default)]
 struct Group {
-    put: Vec<KeptResult>,
+    put: Vec<Arc<KeptResult>>,
     touched: Vec<Key>,
     forgotten: Vec<Key>,
     flushed: Vec<oneshot::Sender<()>>,
@@ -124,13 +186,17 @@ struct Group {
 impl Clerk {
     async fn work(mut self, mut orders: mpsc::Receiver<Order>) {
         let mut sweep = tokio::time::interval(SWEEP_EVERY);
-        let mut waiting = Vec::with_capacity(GROUP);
+        let mut waiting = Vec::new();
+        let mut rest = REST.0;
         loop {
             tokio::select! {
                 received = orders.recv_many(&mut waiting, GROUP) => {
+                    self.gather(&mut orders, &mut waiting, rest).await;
                     let group = group(&mut waiting);
                     let close = group.close || received == 0;
+                    let begun = Instant::now();
                     self.carry_out(group).await;
+                    rest = (REST_PER_WORK * begun.elapsed()).clamp(REST.0, REST.1);
                     if close {
                         break;
                     }
@@ -141,16 +207,30 @@ impl Clerk {
         self.pool.close().await;
     }
 
+    /// Rests while orders come in, unless somebody waits for one of them.
+    async fn gather(&self, orders: &mut mpsc::Receiver<Order>, waiting: &mut Vec<Order>, rest: Duration) {
+        if !waiting.iter().any(Order::is_urgent) {
+            tokio::select! {
+                () = tokio::time::sleep(rest) => {}
+                () = self.desk.hurry.notified() => {}
+            }
+        }
+        while waiting.len() < GROUP
+            && let Ok(order) = orders.try_recv()
+        {
+            waiting.push(order);
+        }
+    }
+
     async fn carry_out(&mut self, group: Group) {
-        let bytes: usize = group.put.iter().map(size).sum();
         let orders = group.put.len() + group.touched.len() + group.forgotten.len();
         if orders > 0
-            && let Err(reason) = self.write(group.put, &group.touched, &group.forgotten).await
+            && let Err(reason) = self.write(&group.put, &group.touched, &group.forgotten).await
         {
             metrics::counter!("precut_store_failures_total", "operation" => "write").increment(1);
             tracing::warn!(orders, reason, "results are not kept");
         }
-        self.waiting_bytes.fetch_sub(bytes, Ordering::Relaxed);
+        self.desk.done(&group.put);
         if self.total > self.limits.bytes {
             self.report("evict", Self::evict).await;
         }
@@ -159,8 +239,8 @@ impl Clerk {
         }
     }
 
-    async fn write(&mut self, put: Vec<KeptResult>, touched: &[Key], forgotten: &[Key]) -> Result<(), String> {
-        let rows = compressed(put).await?;
+    async fn write(&mut self, put: &[Arc<KeptResult>], touched: &[Key], forgotten: &[Key]) -> Result<(), String> {
+        let rows = compressed(put.to_vec()).await?;
         self.write_rows(&rows, touched, forgotten).await.map_err(|error| error.to_string())
     }
 
@@ -174,26 +254,12 @@ impl Clerk {
                 .await?;
         }
         let mut added = 0;
-        for row in rows {
-            let done = sqlx::query(
-                "INSERT INTO results
-                     (key, calculator, version, engine, input, body, checksum, bytes, created_ms, used_ms)
-                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?9) ON CONFLICT (key) DO NOTHING",
-            )
-            .bind(&row.key)
-            .bind(&row.calculator)
-            .bind(row.version)
-            .bind(&row.engine)
-            .bind(&row.input)
-            .bind(&row.body)
-            .bind(&row.checksum)
-            .bind(row.bytes())
-            .bind(now)
-            .execute(&mut *transaction)
-            .await?;
-            if done.rows_affected() > 0 {
-                added += row.bytes();
-            }
+        let (many, few) = rows.as_chunks::<ROWS_AT_ONCE>();
+        for rows in many {
+            added += row::insert(rows, now, &mut transaction).await?;
+        }
+        for one in few {
+            added += row::insert(std::slice::from_ref(one), now, &mut transaction).await?;
         }
         for key in touched {
             sqlx::query("UPDATE results SET used_ms = ?2 WHERE key = ?1")
@@ -297,11 +363,14 @@ fn group(waiting: &mut Vec<Order>) -> Group {
 }
 
 /// Compressed away from the threads that move bytes.
-async fn compressed(results: Vec<KeptResult>) -> Result<Vec<ResultRow>, String> {
+async fn compressed(results: Vec<Arc<KeptResult>>) -> Result<Vec<ResultRow>, String> {
     if results.is_empty() {
         return Ok(Vec::new());
     }
-    let work = move || results.iter().map(ResultRow::of).collect::<Result<Vec<_>, _>>();
+    let work = move || {
+        let mut packer = Packer::new()?;
+        results.iter().map(|result| packer.row(result)).collect::<Result<Vec<_>, std::io::Error>>()
+    };
     tokio::task::spawn_blocking(work).await.map_err(|error| error.to_string())?.map_err(|error| error.to_string())
 }
 
