@@ -8,6 +8,7 @@ pub mod cli;
 pub mod config;
 pub mod engine;
 pub mod http;
+pub mod key;
 mod log;
 pub mod registry;
 pub mod render;

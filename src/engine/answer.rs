@@ -8,7 +8,7 @@ use precut_calc::calculator::{Cost, Figure, Program, Table};
 use serde_json::Value;
 
 use super::error::Error;
-use super::key::Key;
+use crate::key::Key;
 use crate::registry::{Entry, UnreadableResult};
 use crate::store::StoreError;
 

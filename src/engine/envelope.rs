@@ -4,8 +4,8 @@ use precut_calc::calculator::{Failure, Monitor};
 use serde::Serialize;
 
 use super::json;
-use super::key::ENGINE_VERSION;
 use super::read::Ready;
+use crate::key::ENGINE_VERSION;
 use crate::registry::{ResultNotes, non_finite_place};
 use crate::text::{Language, Notice, Remark, Texts};
 

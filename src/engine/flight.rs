@@ -8,8 +8,8 @@ use precut_calc::calculator::{Message, Monitor};
 use tokio::sync::watch;
 
 use super::error::Error;
-use super::key::Key;
 use super::{Stored, Timings};
+use crate::key::Key;
 
 /// How a calculation ended, for everyone who waits.
 #[derive(Debug, Clone)]

@@ -6,8 +6,8 @@ use precut_calc::calculator::Failure;
 use quick_cache::Weighter;
 use quick_cache::sync::Cache;
 
-use super::key::Key;
 use super::{Body, Stored};
+use crate::key::Key;
 
 /// What a job of some key comes to: always the same.
 #[derive(Debug, Clone)]

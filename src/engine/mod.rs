@@ -7,7 +7,6 @@ mod error;
 mod exec;
 mod flight;
 mod json;
-mod key;
 mod memory;
 mod read;
 mod settings;
@@ -15,10 +14,11 @@ mod table;
 #[cfg(test)]
 mod tests;
 
+pub use crate::key::{BadKey, ENGINE_VERSION, Key};
+pub use crate::store::OpenError;
 pub use answer::{Body, CacheState, Checked, Solved, Stored, TablePart, Timings};
 pub use error::{Error, SyntaxFault};
-pub use key::{BadKey, ENGINE_VERSION, Key};
-pub use settings::{EngineSettings, OpenError};
+pub use settings::EngineSettings;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -7,8 +7,8 @@ use precut_calc::calculator::{Failure, Finding};
 use serde_json::Value;
 
 use super::error::Error;
-use super::key::Key;
 use super::{Body, Checked, json, table};
+use crate::key::Key;
 use crate::registry::{Entry, Faults, Prepared, Unprepared, by_pointer};
 
 /// A job that can run, with the address of its answer.

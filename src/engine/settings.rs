@@ -1,4 +1,4 @@
-//! How an engine works, and why it does not start.
+//! How an engine works.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -41,23 +41,4 @@ impl EngineSettings {
             grace: Duration::from_secs(20),
         }
     }
-}
-
-/// Why an engine does not start.
-#[derive(Debug, thiserror::Error)]
-pub enum OpenError {
-    /// Another process serves this folder.
-    #[error("the data folder {0} is in use by another precut; stop that one or give another folder")]
-    InUse(PathBuf),
-    /// The folder or the database cannot be used.
-    #[error("the data folder {folder} cannot be used: {reason}")]
-    Unusable {
-        /// Which folder.
-        folder: PathBuf,
-        /// Why.
-        reason: String,
-    },
-    /// The pool of threads cannot be made.
-    #[error("the calculation threads cannot be started: {0}")]
-    Threads(String),
 }

@@ -5,12 +5,32 @@ pub mod sqlite;
 mod writer;
 
 use std::fmt;
+use std::path::PathBuf;
 use std::str::FromStr;
 
 use bytes::Bytes;
 use futures_util::future::BoxFuture;
 
-use crate::engine::{BadKey, Key};
+use crate::key::{BadKey, Key};
+
+/// Why an engine does not start.
+#[derive(Debug, thiserror::Error)]
+pub enum OpenError {
+    /// Another process serves this folder.
+    #[error("the data folder {0} is in use by another precut; stop that one or give another folder")]
+    InUse(PathBuf),
+    /// The folder or the database cannot be used.
+    #[error("the data folder {folder} cannot be used: {reason}")]
+    Unusable {
+        /// Which folder.
+        folder: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// The pool of threads cannot be made.
+    #[error("the calculation threads cannot be started: {0}")]
+    Threads(String),
+}
 
 /// Where results are kept. What is kept can always be computed again: no failure of a store fails an answer.
 pub trait ResultStore: Send + Sync + 'static {

@@ -7,7 +7,7 @@ use sqlx::sqlite::{Sqlite, SqliteConnection};
 use sqlx::{FromRow, QueryBuilder};
 
 use super::KeptResult;
-use crate::engine::Key;
+use crate::key::Key;
 
 /// Fast: answers shrink to a quarter anyway, and nobody waits less for the rest.
 const LEVEL: i32 = 1;

@@ -10,10 +10,11 @@ use futures_util::future::BoxFuture;
 use sqlx::migrate::{MigrateError, Migrator};
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous};
 
+use super::OpenError;
 use super::row::ResultRow;
 use super::writer::{Limits, Writer};
 use super::{Cursor, KeptResult, ResultPage, ResultQuery, ResultStore, ResultSummary, StoreError};
-use crate::engine::{Key, OpenError};
+use crate::key::Key;
 
 static MIGRATIONS: Migrator = sqlx::migrate!("./migrations");
 

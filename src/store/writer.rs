@@ -13,7 +13,7 @@ use tokio::task::JoinHandle;
 use super::KeptResult;
 use super::row::{self, Packer, ResultRow};
 use super::sqlite::Keys;
-use crate::engine::Key;
+use crate::key::Key;
 
 /// Orders that may wait.
 const WAITING_ORDERS: usize = 4096;
@@ -23,10 +23,11 @@ const WAITING_BYTES: usize = 64 << 20;
 const GROUP: usize = 256;
 /// Rows in one statement.
 const ROWS_AT_ONCE: usize = 32;
-/// For so many times the time that a group took no other is written: a fifth of a core at most.
+/// For so many times the time that a group took no other is written, unless another group waits already: answers go
+/// before what is kept of them, but an address once given is to last.
 const REST_PER_WORK: u32 = 4;
 /// A group gathers at least so long, and no rest is longer than the other.
-const REST: (Duration, Duration) = (Duration::from_millis(20), Duration::from_secs(1));
+const REST: (Duration, Duration) = (Duration::from_millis(20), Duration::from_millis(250));
 /// How often age is looked at.
 const SWEEP_EVERY: Duration = Duration::from_mins(10);
 /// How long a list waits for what is just being written.
@@ -196,7 +197,11 @@ impl Clerk {
                     let close = group.close || received == 0;
                     let begun = Instant::now();
                     self.carry_out(group).await;
-                    rest = (REST_PER_WORK * begun.elapsed()).clamp(REST.0, REST.1);
+                    rest = if orders.len() >= GROUP {
+                        Duration::ZERO
+                    } else {
+                        (REST_PER_WORK * begun.elapsed()).clamp(REST.0, REST.1)
+                    };
                     if close {
                         break;
                     }
