@@ -1,3 +1,7 @@
 //! The `precut` command.
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    precut::cli::main(std::env::args_os(), precut::registry::Registry::standard)
+}

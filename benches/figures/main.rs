@@ -5,6 +5,7 @@
 //! core, the median of batches; what goes over HTTP is a ratio to a bare handler that answers with the
 //! same bytes, measured in turns in the same run. Nothing fails here: the table is for reading.
 
+mod deflection;
 mod http;
 mod measure;
 mod rows;

@@ -4,6 +4,7 @@ use precut::render::{self, Wording};
 use precut_calc::calculator::{Axis, Block, Column, Dialect, Figure, Item, Message, Panel, Program, Role, Table};
 
 use crate::Row;
+use crate::deflection;
 use crate::http::{self, Exchange};
 use crate::measure::{Measured, Unit, cpu_time};
 
@@ -13,7 +14,28 @@ const DEFLECTION_VARIED: &str = "/cut/feed_mm_per_rev";
 
 /// The table, top to bottom.
 pub(crate) fn all() -> Vec<Row> {
+    let us = |us: f64| Some(us * 1e-6);
     vec![
+        row("compliance profile, 200 stations", Unit::Time, us(5.0), us(1.5), || deflection::compliance(200)),
+        row("compliance profile, 10,000 stations", Unit::Time, us(80.0), us(20.0), || deflection::compliance(10_000)),
+        row("complete deflection answer (detail: profile), 10,000 stations", Unit::Time, us(1000.0), us(300.0), || {
+            deflection::answer(10_000, "profile")
+        }),
+        row("the same with path, comparison and advice (detail: full)", Unit::Time, None, None, || {
+            deflection::answer(10_000, "full")
+        }),
+        row("complete deflection answer (detail: profile), 201 stations", Unit::Time, None, None, || {
+            deflection::answer(201, "profile")
+        }),
+        row("the same with path, comparison and advice (detail: full), 201 stations", Unit::Time, None, None, || {
+            deflection::answer(201, "full")
+        }),
+        row("fewest-chord tool path, 10,000 stations", Unit::Time, us(10_000.0), us(3000.0), || {
+            deflection::chords(10_000)
+        }),
+        row("fewest-chord tool path, 200,000 stations", Unit::Time, us(500_000.0), us(200_000.0), || {
+            deflection::chords(200_000)
+        }),
         row("CSV, 10,000 rows of 8 numbers", Unit::Time, None, None, csv),
         row("G-code, 10,000 cuts", Unit::Time, None, None, gcode),
         row("SVG, 3 panels of 201 stations", Unit::Time, None, None, || svg(201)),
@@ -80,7 +102,8 @@ fn cached() -> Result<Measured, String> {
 }
 
 fn fresh() -> Result<Measured, String> {
-    let job = http::example(DEFLECTION)?;
+    let mut job = http::example(DEFLECTION)?;
+    job["detail"] = "profile".into();
     if job.pointer(DEFLECTION_VARIED).is_none() {
         return Err(format!("the example has no {DEFLECTION_VARIED}"));
     }

@@ -5,10 +5,16 @@
 //! inside; micrometres and degrees only at the border, where every field's name carries its unit.
 
 pub mod calculator;
+pub mod deflection_compensation;
 pub mod effects;
+pub mod force;
+pub mod material;
 pub mod num;
+pub mod path;
 
 use calculator::Registrar;
 
 /// Every calculator, one line each. Nothing else has to change when one moves in.
-pub fn register(_registrar: &mut impl Registrar) {}
+pub fn register(registrar: &mut impl Registrar) {
+    registrar.with_forward_model::<deflection_compensation::DeflectionCompensation>();
+}

@@ -14,8 +14,14 @@ pub trait MeasuredRow: Serialize + for<'de> Deserialize<'de> + ToSchema + Clone 
 /// A measured table in a job: rows, or in their place `{"csv": "..."}`, or a file part of the same
 /// name. The service turns the latter two into rows before the physics sees the job, so that the
 /// same data give the same key however they came.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Measured<R>(pub Vec<R>);
+
+impl<R> Default for Measured<R> {
+    fn default() -> Self {
+        Self(Vec::new())
+    }
+}
 
 impl<R> Measured<R> {
     /// The rows.
@@ -60,6 +66,7 @@ impl<R: MeasuredRow> PartialSchema for Measured<R> {
         extensions.insert("x-table".to_owned(), true.into());
         RefOr::T(Schema::OneOf(
             OneOfBuilder::new()
+                .description(Some("A measured table: rows, or the same as CSV text, or a file part of this name."))
                 .item(Schema::Array(rows))
                 .item(Schema::Object(csv))
                 .extensions(Some(extensions))

@@ -13,7 +13,9 @@ mod table;
 
 pub use figure::{Axis, Figure, Glyph, Item, Panel, Role};
 pub use finding::{Finding, Message, Value, Values, Violations};
-pub use forward::{Allowances, Column as JacobianColumn, ForwardModel, Missing, Prediction, Quantity, Rows};
+pub use forward::{
+    Allowances, Column as JacobianColumn, ForwardModel, Missing, Prediction, PrepareError, Quantity, Rows,
+};
 pub use measured::{Measured, MeasuredRow};
 pub use program::{Block, Dialect, Program};
 pub use table::{Cells, Column, Table};
@@ -107,15 +109,46 @@ pub struct Meta {
     pub examples: &'static [Example],
     /// Pointers into the result that a parameter study shows unless asked for others.
     pub study_outputs: &'static [&'static str],
-    /// Codes of every message, warning and fault that this calculator may utter. A test holds that
-    /// each has a text, and that nothing else is uttered.
-    pub codes: &'static [&'static str],
+    /// Everything that this calculator may utter. A test holds that each code has a text, and that
+    /// nothing else is uttered.
+    pub codes: Codes,
     /// `id`s of the figures, tables it makes (documentation of `?figure=` and `?table=`).
     pub figures: &'static [&'static str],
     /// `id`s of the tables it makes.
     pub tables: &'static [&'static str],
     /// Whether it can make a program for a machine.
     pub has_program: bool,
+}
+
+/// Codes by what they are used for, in the lists of the modules that utter them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Codes {
+    /// Faults of a job, found by [`Check`].
+    pub faults: &'static [&'static [&'static str]],
+    /// Why a faultless job has no answer ([`Failure`]).
+    pub failures: &'static [&'static [&'static str]],
+    /// Warnings of an answer.
+    pub warnings: &'static [&'static [&'static str]],
+    /// What an answer explains.
+    pub explanations: &'static [&'static [&'static str]],
+    /// What a running calculation is doing.
+    pub stages: &'static [&'static [&'static str]],
+    /// Titles, axes and legends of figures.
+    pub labels: &'static [&'static [&'static str]],
+}
+
+impl Codes {
+    /// All of them, whatever they are used for.
+    pub fn all(&self) -> impl Iterator<Item = &'static str> {
+        [self.faults, self.failures, self.warnings, self.explanations, self.stages, self.labels]
+            .into_iter()
+            .flat_map(|lists| lists.iter().copied().flatten().copied())
+    }
+
+    /// Whether this code may be uttered.
+    pub fn contains(&self, code: &str) -> bool {
+        self.all().any(|known| known == code)
+    }
 }
 
 /// What kind of question a calculator answers.

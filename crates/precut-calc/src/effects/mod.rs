@@ -4,6 +4,10 @@
 //! parameters, a diagnosis chooses and fits it. Texts (what it looks like, what tells it apart) are
 //! worded outside, under `cause.{kind}`.
 
+mod deflection;
+
+pub use deflection::{CAUSES as DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect};
+
 /// An entry of the catalogue.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cause {
@@ -53,4 +57,6 @@ pub enum Fit {
         /// Value where none is given.
         default: f64,
     },
+    /// Read off the job (where a rest stands), not fitted.
+    OfJob,
 }

@@ -1,1 +1,3 @@
 //! Numerics with no machining words in them.
+
+pub mod beam;

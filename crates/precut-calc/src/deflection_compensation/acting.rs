@@ -1,0 +1,227 @@
+//! Named effects, digested into what they change: the structure, the force, the radial error.
+
+use crate::effects::{DeflectionConditions, DeflectionEffect as Effect};
+
+use super::input::FeedDirection;
+
+/// What the effects of a job change.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Acting {
+    pub structure: StructureChange,
+    pub force: ForceChange,
+    errors: Vec<ErrorTerm>,
+    /// Standard deviation of the radius from trace to trace, mm.
+    pub scatter_mm: f64,
+}
+
+/// Change of what bends and of what holds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct StructureChange {
+    /// Added compliance of the leftmost carrying support, mm/N.
+    pub headstock_mm_per_n: f64,
+    /// Added compliance of the rightmost, mm/N.
+    pub tailstock_mm_per_n: f64,
+    /// Added compliance of the carriage, mm/N.
+    pub carriage_mm_per_n: f64,
+    /// Factor on the flexibility of the shaft.
+    pub flexibility: f64,
+    /// Rotational compliance that the headstock gets, rad/(N mm).
+    pub headstock_rotation_rad_per_n_mm: Option<f64>,
+    /// The uncut side bends with the blank's section.
+    pub uncut_side: bool,
+}
+
+impl StructureChange {
+    const NONE: Self = Self {
+        headstock_mm_per_n: 0.0,
+        tailstock_mm_per_n: 0.0,
+        carriage_mm_per_n: 0.0,
+        flexibility: 1.0,
+        headstock_rotation_rad_per_n_mm: None,
+        uncut_side: false,
+    };
+}
+
+/// Change of the force: P -> P * factor(u, s, v) * (t/t_ref)^dx, and an addition to the passive force.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct ForceChange {
+    level: f64,
+    gradient: f64,
+    feed: Option<(f64, f64)>,
+    speed: Option<(f64, f64)>,
+    built_up_edge: Option<(f64, f64, f64)>,
+    /// Change of the depth exponent and the depth about which it turns, mm.
+    pub depth: Option<(f64, f64)>,
+    /// Added to the passive force, N.
+    pub added_passive_n: f64,
+}
+
+impl ForceChange {
+    const NONE: Self = Self {
+        level: 1.0,
+        gradient: 0.0,
+        feed: None,
+        speed: None,
+        built_up_edge: None,
+        depth: None,
+        added_passive_n: 0.0,
+    };
+
+    /// Factor on all components at relative station u, feed and speed (`diagnosis/4.10` to `4.15`).
+    pub(super) fn factor(&self, u: f64, feed_mm_per_rev: f64, speed_m_per_min: f64) -> f64 {
+        let mut factor = self.level * (1.0 + self.gradient * (u - 0.5));
+        if let Some((delta, reference)) = self.feed {
+            factor *= (feed_mm_per_rev / reference).powf(delta);
+        }
+        if let Some((delta, reference)) = self.speed {
+            factor *= (speed_m_per_min / reference).powf(delta);
+        }
+        if let Some((drop, centre, width)) = self.built_up_edge {
+            let distance = (speed_m_per_min - centre) / width;
+            factor *= 1.0 - drop * (-distance * distance).exp();
+        }
+        factor.max(0.0)
+    }
+}
+
+/// A term of the extra radial error e.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum ErrorTerm {
+    Constant { error_mm: f64 },
+    Taper { at_tailstock_mm: f64 },
+    Bow { at_middle_mm: f64 },
+    Wear { rate_mm_per_m: f64, wear_in_mm: f64, wear_in_path_m: f64, path_at_start_m: f64 },
+    Growth { growth_mm: f64, time_constant_min: f64, warm_at_start_min: f64 },
+    Heating { strain: f64, time_constant_min: f64 },
+    Rest { rest: usize, offset_mm: f64 },
+}
+
+/// Where and when the tool passes a station.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Passage {
+    /// z/L.
+    pub u: f64,
+    /// Station between headstock (0) and tailstock (1).
+    pub between_centres: f64,
+    /// Diameter produced, mm.
+    pub diameter_mm: f64,
+    /// Path cut in this pass before the station, m.
+    pub path_m: f64,
+    /// Time in the cut before the station, min.
+    pub time_min: f64,
+}
+
+const MM_PER_UM: f64 = 1e-3;
+
+impl Acting {
+    /// What `effects` change. A condition that is absent counts as 0; [`super::check`] has refused it where it matters.
+    pub(super) fn of(effects: &[Effect], conditions: &DeflectionConditions, direction: FeedDirection) -> Self {
+        let mut acting =
+            Self { structure: StructureChange::NONE, force: ForceChange::NONE, errors: Vec::new(), scatter_mm: 0.0 };
+        for effect in effects {
+            acting.add(effect, conditions, direction);
+        }
+        acting
+    }
+
+    fn add(&mut self, effect: &Effect, conditions: &DeflectionConditions, direction: FeedDirection) {
+        let (structure, force) = (&mut self.structure, &mut self.force);
+        match *effect {
+            Effect::HeadstockCompliance { delta_um_per_n } => {
+                structure.headstock_mm_per_n += delta_um_per_n * MM_PER_UM;
+            }
+            Effect::TailstockCompliance { delta_um_per_n } => {
+                structure.tailstock_mm_per_n += delta_um_per_n * MM_PER_UM;
+            }
+            Effect::CarriageCompliance { delta_um_per_n } => structure.carriage_mm_per_n += delta_um_per_n * MM_PER_UM,
+            Effect::BendingScale { delta } => structure.flexibility *= 1.0 + delta,
+            Effect::ChuckRotationalStiffness { ktheta_n_mm_per_rad } => {
+                structure.headstock_rotation_rad_per_n_mm = Some(1.0 / ktheta_n_mm_per_rad);
+            }
+            Effect::UncutSideStiffness {} => structure.uncut_side = true,
+            Effect::ForceLevel { delta } => force.level *= 1.0 + delta,
+            Effect::DepthExponent { delta, reference_depth_mm } => force.depth = Some((delta, reference_depth_mm)),
+            Effect::FeedExponent { delta, reference_feed_mm_per_rev } => {
+                force.feed = Some((delta, reference_feed_mm_per_rev));
+            }
+            Effect::SpeedExponent { delta, reference_speed_m_per_min } => {
+                force.speed = Some((delta, reference_speed_m_per_min));
+            }
+            Effect::HardnessGradient { gradient } => force.gradient += gradient,
+            Effect::BuiltUpEdge { drop, centre_m_per_min, width_m_per_min } => {
+                force.built_up_edge = Some((drop, centre_m_per_min, width_m_per_min));
+            }
+            Effect::PloughingForce { force_n } => force.added_passive_n += force_n,
+            Effect::SpindleScatter { sd_um } => self.scatter_mm = sd_um * MM_PER_UM,
+            Effect::TailstockOffset { offset_um } => {
+                self.errors.push(ErrorTerm::Taper { at_tailstock_mm: offset_um * MM_PER_UM });
+            }
+            Effect::GuidewayBow { bow_um } => self.errors.push(ErrorTerm::Bow { at_middle_mm: bow_um * MM_PER_UM }),
+            Effect::ReversalBacklash { backlash_um } => {
+                let sign = if direction == FeedDirection::ToHeadstock { 0.5 } else { -0.5 };
+                self.errors.push(ErrorTerm::Constant { error_mm: sign * backlash_um * MM_PER_UM });
+            }
+            Effect::SizeOffset { offset_um } => {
+                self.errors.push(ErrorTerm::Constant { error_mm: offset_um * MM_PER_UM });
+            }
+            Effect::ToolWear { rate_um_per_km, wear_in_um, wear_in_path_m } => self.errors.push(ErrorTerm::Wear {
+                rate_mm_per_m: rate_um_per_km * MM_PER_UM / 1000.0,
+                wear_in_mm: wear_in_um * MM_PER_UM,
+                wear_in_path_m,
+                path_at_start_m: conditions.tool_path_at_start_m.unwrap_or(0.0),
+            }),
+            Effect::ThermalGrowth { growth_um, time_constant_min } => self.errors.push(ErrorTerm::Growth {
+                growth_mm: growth_um * MM_PER_UM,
+                time_constant_min,
+                warm_at_start_min: conditions.warm_time_at_start_min.unwrap_or(0.0),
+            }),
+            Effect::WorkpieceHeating { temperature_rise_k, time_constant_min, expansion_um_per_m_k } => {
+                self.errors.push(ErrorTerm::Heating {
+                    // um/(m K) is 1e-6/K.
+                    strain: temperature_rise_k * expansion_um_per_m_k * 1e-6,
+                    time_constant_min,
+                });
+            }
+            Effect::SteadyRestOffset { offset_um, .. } => {
+                let rest = self.rests();
+                self.errors.push(ErrorTerm::Rest { rest, offset_mm: offset_um * MM_PER_UM });
+            }
+        }
+    }
+
+    fn rests(&self) -> usize {
+        self.errors.iter().filter(|term| matches!(term, ErrorTerm::Rest { .. })).count()
+    }
+
+    /// Whether any effect adds a radial error.
+    pub(super) fn has_errors(&self) -> bool {
+        !self.errors.is_empty()
+    }
+
+    /// Extra radial error e at a station, mm, positive = oversize. `rest_shapes` holds, for every
+    /// displaced rest in the order of the effects, the shape phi of the shaft there.
+    pub(super) fn error_mm(&self, at: Passage, rest_shapes: &[f64]) -> f64 {
+        self.errors.iter().map(|term| term.error_mm(at, rest_shapes)).sum()
+    }
+}
+
+impl ErrorTerm {
+    fn error_mm(self, at: Passage, rest_shapes: &[f64]) -> f64 {
+        match self {
+            Self::Constant { error_mm } => error_mm,
+            Self::Taper { at_tailstock_mm } => at_tailstock_mm * at.between_centres,
+            Self::Bow { at_middle_mm } => 4.0 * at_middle_mm * at.u * (1.0 - at.u),
+            Self::Wear { rate_mm_per_m, wear_in_mm, wear_in_path_m, path_at_start_m } => {
+                let path = path_at_start_m + at.path_m;
+                wear_in_mm * -(-path / wear_in_path_m).exp_m1() + rate_mm_per_m * path
+            }
+            Self::Growth { growth_mm, time_constant_min, warm_at_start_min } => {
+                growth_mm * (-(warm_at_start_min + at.time_min) / time_constant_min).exp_m1()
+            }
+            Self::Heating { strain, time_constant_min } => {
+                0.5 * at.diameter_mm * strain * (-at.time_min / time_constant_min).exp_m1()
+            }
+            Self::Rest { rest, offset_mm } => offset_mm * rest_shapes.get(rest).copied().unwrap_or(0.0),
+        }
+    }
+}

@@ -1,0 +1,365 @@
+//! What dominates, what would help, where not to trust: codes with numbers.
+
+use crate::calculator::{Failure, Finding, Message, Monitor};
+use crate::force::Reached;
+
+use super::acting::Acting;
+use super::form::Form;
+use super::grid::Grid;
+use super::input::{Job, Segment, Support, Theory};
+use super::output::{OneMoreRest, Outcome, Shares, StatusCompensated};
+use super::regime::Speed;
+use super::stage::Stage;
+use super::structure::{Structure, ends};
+
+const UM_PER_MM: f64 = 1e3;
+/// Deflection over depth above which the one-step formulas fail and chatter is likely.
+const DEFLECTION_OVER_DEPTH: f64 = 0.2;
+/// Small deflections: at most this share of the length, and of the diameter.
+const DEFLECTION_OVER_LENGTH: f64 = 0.01;
+const DEFLECTION_OVER_DIAMETER: f64 = 0.1;
+/// Share of the yield strength that bending may use.
+const STRESS_SHARE: f64 = 0.5;
+/// Thrust over buckling load above which the compliance grows noticeably.
+const THRUST_RATIO: f64 = 0.05;
+/// Slenderness below which shear counts.
+const SLENDER: f64 = 10.0;
+/// Stations at which one more rest is tried.
+const REST_SAMPLES: usize = 65;
+/// A depth beyond so many nominal depths is worth a look.
+const DEPTH_RATIO: f64 = 2.0;
+
+/// Codes of the explanations made here.
+pub(super) const EXPLANATION_CODES: &[&str] = &[
+    "work_dominates",
+    "headstock_dominates",
+    "tailstock_dominates",
+    "rests_dominate",
+    "tool_dominates",
+    "nominal_path_leaves",
+    "compensated_path_leaves",
+    "path_has_gaps",
+    "one_more_rest_buys",
+    "uncertain_by",
+    "one_step_overcuts",
+    "stock_is_copied",
+    "program_is_last_pass",
+    "not_modelled",
+];
+
+/// Codes of the warnings made here.
+pub(super) const WARNING_CODES: &[&str] = &[
+    "deflection_over_depth",
+    "linear_theory_exceeded",
+    "bending_stress_high",
+    "thrust_near_buckling",
+    "shear_neglected",
+    "command_too_steep",
+    "command_too_deep",
+    "command_doubles_depth",
+    "blank_undersize",
+    "form_tolerance_missed",
+];
+
+/// Who yields at the station that deflects most (`deflection/3.2`), one-sided rests as they stand there: by virtual
+/// work the shares are exact.
+pub(super) fn shares(job: &Job, grid: &Grid, acting: &Acting, stage: &Stage) -> Result<Shares, Failure> {
+    let i = most_deflected(stage);
+    let z_mm = grid.z_mm.get(i).copied().unwrap_or(0.0);
+    let touching = stage.line.touching(i, &stage.cut.loads[i]);
+    let parts = if touching.is_empty() {
+        stage.structure.beam.shares(z_mm)
+    } else {
+        let mut variant = stage.variant(job, acting);
+        variant.touching = &touching;
+        Structure::of(job, &variant)?.beam.shares(z_mm)
+    };
+    let (head, tail) = ends(&job.supports);
+    let work = parts.bending_mm_per_n + parts.shear_mm_per_n;
+    let carriage = stage.line.carriage_mm_per_n;
+    let total = parts.supports_mm_per_n.iter().fold(work + carriage, |sum, part| sum + part);
+    let share = |part: f64| if total > 0.0 { part / total } else { 0.0 };
+    let of = |support: Option<usize>| support.map_or(0.0, |s| parts.supports_mm_per_n[s]);
+    let others = parts.supports_mm_per_n.iter().enumerate().filter(|(s, _)| Some(*s) != head && Some(*s) != tail);
+    Ok(Shares {
+        z_mm,
+        work: share(work),
+        headstock: share(of(head)),
+        tailstock: share(of(tail)),
+        // Not `sum`: that of nothing is -0.
+        rests: share(others.fold(0.0, |sum, (_, part)| sum + part)),
+        tool: share(carriage),
+    })
+}
+
+fn most_deflected(stage: &Stage) -> usize {
+    let mut best = 0;
+    for (i, y) in stage.cut.y_mm.iter().enumerate() {
+        if y.abs() > stage.cut.y_mm[best].abs() {
+            best = i;
+        }
+    }
+    best
+}
+
+/// What a bilateral steady rest would do where the shaft gives way most, as compliant as the stiffest support that
+/// carries: the same cut with it, at a sample of the stations. `None` where the rest would stand at a support.
+pub(super) fn one_more_rest(
+    job: &Job,
+    grid: &Grid,
+    acting: &Acting,
+    stage: &Stage,
+    monitor: &dyn Monitor,
+) -> Result<Option<OneMoreRest>, Failure> {
+    let Some(&z_mm) = grid.z_mm.get(most_deflected(stage)) else { return Ok(None) };
+    let near = 0.01 * grid.length_mm;
+    let at_support = job.supports.iter().filter_map(Support::station_mm).any(|z| (z - z_mm).abs() < near);
+    if at_support {
+        return Ok(None);
+    }
+    let stiffest = job.supports.iter().filter(|s| s.carries()).map(Support::compliance_um_per_n);
+    let compliance_um_per_n = stiffest.fold(f64::INFINITY, f64::min);
+    let chosen = grid.sample(REST_SAMPLES);
+    let mut with_rest = job.clone();
+    with_rest.supports.push(Support::SteadyRest {
+        z_mm,
+        compliance_um_per_n,
+        tangential_compliance_um_per_n: None,
+        one_sided: false,
+        gap_um: 0.0,
+    });
+    let radii = stage.radii.at(&chosen);
+    let sampled = grid.at(&chosen);
+    let held = Stage::of(&with_rest, &sampled, acting, stage.regime, stage.pass_mm, radii, monitor)?;
+    let form = Form::of(&sampled.z_mm, &held.cut.uncompensated_errors_um(&held.radii));
+    Ok(form.form_error_um.map(|form_error_um| OneMoreRest { z_mm, compliance_um_per_n, form_error_um }))
+}
+
+/// Standard uncertainty of the diameter, um (`deflection/7`): to first order about the compensated cut
+/// dr = Y_el sqrt(u_F² + u_W²)/(1 + S'), and the scatter from trace to trace.
+pub(super) fn diameter_uncertainty_um(job: &Job, acting: &Acting, stage: &Stage) -> Vec<f64> {
+    let relative = job.uncertainty.force_percent.hypot(job.uncertainty.stiffness_percent) / 100.0;
+    let scatter = 2.0 * acting.scatter_mm * UM_PER_MM;
+    stage
+        .cut
+        .elastic_mm
+        .iter()
+        .zip(&stage.cut.planned_copying)
+        .map(|(y, copying)| (2.0 * y * relative * (1.0 - copying) * UM_PER_MM).hypot(scatter))
+        .collect()
+}
+
+/// The answer in words, most important first.
+pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
+    let mut said = vec![nominal_path(&outcome.before), dominating(&outcome.shares)];
+    if let Some(path) = &outcome.path {
+        said.push(match (outcome.form_error_after_um, outcome.largest_error_after_um) {
+            (Some(form), Some(largest)) => Message::new("compensated_path_leaves")
+                .with("form_error_um", form)
+                .with("largest_error_um", largest.abs())
+                .with("moves", f64::from(path.moves)),
+            _ => Message::new("path_has_gaps").with("stations", without_command(outcome)),
+        });
+    }
+    let uncertainty = outcome.stations.diameter_uncertainty_um.iter().copied().fold(0.0, f64::max);
+    said.push(
+        Message::new("uncertain_by")
+            .with("uncertainty_um", uncertainty)
+            .with("force_percent", job.uncertainty.force_percent)
+            .with("stiffness_percent", job.uncertainty.stiffness_percent),
+    );
+    if let Some(rest) = &outcome.one_more_rest {
+        said.push(
+            Message::new("one_more_rest_buys")
+                .with("z_mm", rest.z_mm)
+                .with("form_error_um", rest.form_error_um)
+                .with("compliance_um_per_n", rest.compliance_um_per_n)
+                .with("before_um", outcome.form_error_um.unwrap_or(0.0)),
+        );
+    }
+    let overcut =
+        outcome.one_step.iter().flat_map(|step| &step.diameter_error_um).flatten().copied().fold(0.0, f64::min);
+    if overcut < 0.0 {
+        said.push(Message::new("one_step_overcuts").with("undersize_um", -overcut));
+    }
+    let copied = outcome.stations.copying_factor.iter().flatten().copied().fold(0.0, f64::max);
+    if copied > 0.0 {
+        said.push(Message::new("stock_is_copied").with("copying_factor", copied));
+    }
+    if !job.passes.is_empty() {
+        said.push(Message::new("program_is_last_pass"));
+    }
+    said.push(Message::new("not_modelled"));
+    said
+}
+
+fn without_command(outcome: &Outcome) -> usize {
+    let status = &outcome.stations.status_compensated;
+    status.iter().filter(|s| !matches!(s, StatusCompensated::Ok | StatusCompensated::NoStock)).count()
+}
+
+fn nominal_path(before: &Form) -> Message {
+    let message = Message::new("nominal_path_leaves")
+        .with("class", before.class.map_or("incomplete", super::form::FormClass::name));
+    let message = message.with("form_error_um", before.form_error_um.unwrap_or(0.0));
+    match before.largest {
+        Some(largest) => message.with("largest_error_um", largest.diameter_error_um).with("z_mm", largest.z_mm),
+        None => message.with("largest_error_um", 0.0).with("z_mm", 0.0),
+    }
+}
+
+fn dominating(shares: &Shares) -> Message {
+    let parts = [
+        ("work_dominates", shares.work),
+        ("headstock_dominates", shares.headstock),
+        ("tailstock_dominates", shares.tailstock),
+        ("rests_dominate", shares.rests),
+        ("tool_dominates", shares.tool),
+    ];
+    let most = parts.into_iter().fold(("work_dominates", f64::NEG_INFINITY), |a, b| if b.1 > a.1 { b } else { a });
+    Message::new(most.0).with("share", most.1).with("z_mm", shares.z_mm)
+}
+
+/// Where an input leaves the range in which the model holds.
+pub(super) fn warnings(job: &Job, grid: &Grid, stage: &Stage, outcome: &Outcome) -> Vec<Finding> {
+    let mut found = Vec::new();
+    found.extend(deflection_warnings(job, grid, stage));
+    found.extend(structure_warnings(job, stage, outcome));
+    found.extend(command_warnings(job, stage, outcome));
+    found.extend(force_warnings(job, stage));
+    found.extend(outcome.second_order.iter().flat_map(|sizes| super::second_order::left_out(job, sizes)));
+    if let (Some(limit), Some(form)) = (job.tolerance.form_um, outcome.form_error_after_um)
+        && form > limit
+    {
+        found.push(Finding::new("form_tolerance_missed", "/tolerance/form_um").measured(form, limit, "um"));
+    }
+    found
+}
+
+fn deflection_warnings(job: &Job, grid: &Grid, stage: &Stage) -> Vec<Finding> {
+    let mut found = Vec::new();
+    let (cut, radii) = (&stage.cut, &stage.radii);
+    let mut ratio = 0.0_f64;
+    let mut largest = 0.0_f64;
+    let mut over_diameter = 0.0_f64;
+    let mut undersize = 0.0_f64;
+    for i in 0..grid.len() {
+        let depth = cut.nominal_depth_mm[i];
+        if depth > 0.0 {
+            ratio = ratio.max(cut.elastic_mm[i] / depth);
+        }
+        let moved = cut.elastic_mm[i].abs().max(cut.z_mm[i].abs());
+        largest = largest.max(moved);
+        over_diameter = over_diameter.max(moved / (2.0 * radii.target[i]));
+        undersize = undersize.max(2.0 * (radii.target[i] - radii.stock[i]));
+    }
+    if ratio > DEFLECTION_OVER_DEPTH {
+        found.push(Finding::new("deflection_over_depth", "/cut").measured(ratio, DEFLECTION_OVER_DEPTH, "1"));
+    }
+    let limit = DEFLECTION_OVER_LENGTH * grid.length_mm;
+    if largest > limit || over_diameter > DEFLECTION_OVER_DIAMETER {
+        found.push(
+            Finding::new("linear_theory_exceeded", "/shaft")
+                .measured(largest * UM_PER_MM, limit * UM_PER_MM, "um")
+                .with("over_diameter", over_diameter),
+        );
+    }
+    if undersize > 0.0 {
+        let pointer = if job.stock_profile.is_some() { "/stock_profile" } else { "/shaft/segments" };
+        found.push(Finding::new("blank_undersize", pointer).value(undersize, "mm"));
+    }
+    found
+}
+
+fn structure_warnings(job: &Job, stage: &Stage, outcome: &Outcome) -> Vec<Finding> {
+    let mut found = Vec::new();
+    if let Some(yield_strength) = job.shaft.yield_strength_n_per_mm2 {
+        let stress = peak_stress_n_per_mm2(job, stage, outcome.shares.z_mm);
+        if stress > STRESS_SHARE * yield_strength {
+            found.push(Finding::new("bending_stress_high", "/shaft/yield_strength_n_per_mm2").measured(
+                stress,
+                STRESS_SHARE * yield_strength,
+                "N/mm2",
+            ));
+        }
+    }
+    if let Some(ratio) = outcome.second_order.as_ref().and_then(|s| s.thrust_ratio).filter(|r| *r > THRUST_RATIO) {
+        found.push(Finding::new("thrust_near_buckling", "/force").measured(ratio, THRUST_RATIO, "1"));
+    }
+    let length: f64 = job.shaft.segments.iter().map(|s| s.length_mm).sum();
+    let thickest = job.shaft.segments.iter().map(|s| s.diameter_mm).fold(0.0, f64::max);
+    if job.shaft.theory == Theory::EulerBernoulli && length / thickest < SLENDER {
+        found.push(
+            Finding::new("shear_neglected", "/shaft/theory")
+                .measured(length / thickest, SLENDER, "1")
+                .with("shear_um", outcome.second_order.as_ref().and_then(|s| s.shear_um).unwrap_or(0.0)),
+        );
+    }
+    found
+}
+
+/// |M| d/(2J) with the largest moment under the tool at its worst station and the thinnest segment: an upper bound.
+fn peak_stress_n_per_mm2(job: &Job, stage: &Stage, z_mm: f64) -> f64 {
+    let force = stage.cut.loads.iter().map(|l| l.passive_n).fold(0.0, f64::max);
+    let moment = force * stage.structure.beam.peak_bending_moment_mm(z_mm);
+    let stress = |s: &Segment| {
+        moment * s.diameter_mm / (2.0 * crate::num::beam::second_moment_mm4(s.diameter_mm, s.bore_diameter_mm))
+    };
+    job.shaft.segments.iter().map(stress).fold(0.0, f64::max)
+}
+
+fn command_warnings(job: &Job, stage: &Stage, outcome: &Outcome) -> Vec<Finding> {
+    let mut found = Vec::new();
+    let depths = stage.cut.command_mm.iter().zip(&stage.radii.stock).map(|(c, stock)| c.map(|c| stock - c));
+    let deepest = depths.clone().flatten().fold(0.0, f64::max);
+    if let Some(limit) = job.limits.depth_mm.filter(|limit| deepest > *limit) {
+        found.push(Finding::new("command_too_deep", "/limits/depth_mm").measured(deepest, limit, "mm"));
+    }
+    let ratio = depths
+        .zip(&stage.cut.nominal_depth_mm)
+        .filter_map(|(commanded, nominal)| commanded.filter(|_| *nominal > 0.0).map(|c| c / nominal))
+        .fold(0.0, f64::max);
+    if ratio > DEPTH_RATIO {
+        found.push(Finding::new("command_doubles_depth", "/cut").measured(ratio, DEPTH_RATIO, "1"));
+    }
+    if let Some(limit) = job.limits.slope {
+        let steepest = outcome
+            .path
+            .iter()
+            .flat_map(|path| &path.zones)
+            .flat_map(|zone| zone.z_mm.windows(2).zip(zone.delta_x_um.windows(2)))
+            .map(|(z, x)| ((x[1] - x[0]) / 2.0 / UM_PER_MM / (z[1] - z[0])).abs())
+            .fold(0.0, f64::max);
+        if steepest > limit {
+            found.push(Finding::new("command_too_steep", "/limits/slope").measured(steepest, limit, "1"));
+        }
+    }
+    found
+}
+
+/// Depth, feed and speed that the force law meets, held against the range it was measured in.
+fn force_warnings(job: &Job, stage: &Stage) -> Vec<Finding> {
+    let positive = || stage.cut.nominal_depth_mm.iter().copied().filter(|a| *a > 0.0);
+    let (least, largest) = (positive().fold(f64::INFINITY, f64::min), positive().fold(0.0, f64::max));
+    if least > largest {
+        return Vec::new();
+    }
+    let speeds =
+        || stage.radii.planned.iter().zip(&stage.radii.target).map(|(p, t)| stage.regime.speed_m_per_min(*p, *t));
+    let speed_pointer = match stage.regime.speed {
+        Speed::Surface(_) => "/cut/speed_m_per_min",
+        Speed::Spindle(_) => "/cut/spindle_speed_rpm",
+    };
+    let feed = stage.regime.feed_mm_per_rev;
+    let mut found = job.force.extrapolations(
+        Reached { pointer: "/shaft/segments", least, largest },
+        Reached { pointer: "/cut/feed_mm_per_rev", least: feed, largest: feed },
+        Reached {
+            pointer: speed_pointer,
+            least: speeds().fold(f64::INFINITY, f64::min),
+            largest: speeds().fold(0.0, f64::max),
+        },
+    );
+    found.extend(job.force.cautions("/force"));
+    found
+}

@@ -1,0 +1,265 @@
+//! Rules between fields. What one field alone may hold stands in its schema.
+
+use crate::calculator::{Check, Finding, Violations};
+use crate::effects::DeflectionEffect as Effect;
+use crate::material;
+
+use super::grid::station_count;
+use super::input::{Job, MAX_STATIONS, Segment, Stations, Support};
+use super::structure::ends;
+
+/// Codes of the faults found here.
+pub(super) const CODES: &[&str] = &[
+    "no_segments",
+    "unknown_material",
+    "elastic_constants_missing",
+    "bad_bore",
+    "stock_below_finish",
+    "gap_of_two_sided_rest",
+    "support_outside_shaft",
+    "duplicate_support",
+    "unstable_support",
+    "speed_or_rpm",
+    "passes_not_descending",
+    "passes_incomplete",
+    "station_outside_shaft",
+    "stations_not_ascending",
+    "nothing_to_turn",
+    "too_many_stations",
+    "stock_profile_empty",
+    "stock_profile_not_ascending",
+    "bad_diameter",
+    "duplicate_effect",
+    "condition_missing",
+    "effect_beyond_base",
+    "effect_without_tailstock",
+    "effect_without_rest",
+    "effect_not_with_passes",
+];
+
+/// Supports nearer than this share of the length stand at one station.
+const SAME_STATION: f64 = 1e-9;
+
+impl Check for Job {
+    fn check(&self, violations: &mut Violations) {
+        check_shaft(self, violations);
+        check_supports(self, violations);
+        check_cut(self, violations);
+        check_passes(self, violations);
+        check_stations(self, violations);
+        check_stock_profile(self, violations);
+        self.force.check("/force", violations);
+        check_effects(self, violations);
+    }
+}
+
+fn length_mm(job: &Job) -> f64 {
+    job.shaft.segments.iter().map(|s| s.length_mm).sum()
+}
+
+fn check_shaft(job: &Job, violations: &mut Violations) {
+    let shaft = &job.shaft;
+    violations.require(!shaft.segments.is_empty(), || Finding::new("no_segments", "/shaft/segments"));
+    for (i, segment) in shaft.segments.iter().enumerate() {
+        check_segment(i, segment, violations);
+    }
+    match &shaft.material {
+        Some(id) => violations.require(material::find(id).is_some(), || {
+            Finding::new("unknown_material", "/shaft/material")
+                .with("id", id.clone())
+                .with("known", material::library().iter().map(|m| m.id).collect::<Vec<_>>())
+        }),
+        None => violations.require(shaft.youngs_modulus_n_per_mm2.is_some(), || {
+            Finding::new("elastic_constants_missing", "/shaft/youngs_modulus_n_per_mm2")
+        }),
+    }
+}
+
+fn check_segment(i: usize, segment: &Segment, violations: &mut Violations) {
+    let at = |field: &str| format!("/shaft/segments/{i}/{field}");
+    violations.require(segment.bore_diameter_mm < segment.diameter_mm, || {
+        Finding::new("bad_bore", at("bore_diameter_mm")).measured(segment.bore_diameter_mm, segment.diameter_mm, "mm")
+    });
+    violations.require(segment.stock_mm() >= segment.diameter_mm, || {
+        Finding::new("stock_below_finish", at("stock_diameter_mm")).measured(
+            segment.stock_mm(),
+            segment.diameter_mm,
+            "mm",
+        )
+    });
+}
+
+fn check_supports(job: &Job, violations: &mut Violations) {
+    let length = length_mm(job);
+    let mut seen: Vec<f64> = Vec::new();
+    for (i, support) in job.supports.iter().enumerate() {
+        if let Support::SteadyRest { one_sided: false, gap_um, .. }
+        | Support::FollowRest { one_sided: false, gap_um, .. } = support
+        {
+            violations.require(*gap_um <= 0.0, || {
+                Finding::new("gap_of_two_sided_rest", format!("/supports/{i}/gap_um")).measured(*gap_um, 0.0, "um")
+            });
+        }
+        let Some(z) = support.station_mm() else { continue };
+        violations.require((0.0..=length).contains(&z), || {
+            Finding::new("support_outside_shaft", format!("/supports/{i}/z_mm")).measured(z, length, "mm")
+        });
+        violations.require(seen.iter().all(|other| (other - z).abs() > SAME_STATION * length), || {
+            Finding::new("duplicate_support", format!("/supports/{i}/z_mm")).value(z, "mm")
+        });
+        seen.push(z);
+    }
+    let chuck = job.supports.iter().any(|s| matches!(s, Support::Chuck { .. }));
+    let carrying = job.supports.iter().filter(|s| s.carries()).count();
+    violations
+        .require(chuck || carrying >= 2, || Finding::new("unstable_support", "/supports").with("carrying", carrying));
+}
+
+fn check_cut(job: &Job, violations: &mut Violations) {
+    let cut = &job.cut;
+    violations.require(cut.speed_m_per_min.is_some() != cut.spindle_speed_rpm.is_some(), || {
+        let given = if cut.speed_m_per_min.is_some() { "both" } else { "neither" };
+        Finding::new("speed_or_rpm", "/cut").with("given", given)
+    });
+}
+
+fn check_passes(job: &Job, violations: &mut Violations) {
+    let mut before = f64::INFINITY;
+    for (i, pass) in job.passes.iter().enumerate() {
+        violations.require(pass.speed_m_per_min.is_none() || pass.spindle_speed_rpm.is_none(), || {
+            Finding::new("speed_or_rpm", format!("/passes/{i}")).with("given", "both")
+        });
+        violations.require(pass.diameter_mm < before, || {
+            Finding::new("passes_not_descending", format!("/passes/{i}/diameter_mm")).measured(
+                pass.diameter_mm,
+                before,
+                "mm",
+            )
+        });
+        before = pass.diameter_mm;
+    }
+    let turned = job.shaft.segments.iter().filter(|s| s.stock_mm() > s.diameter_mm).map(|s| s.diameter_mm);
+    let least = turned.fold(f64::INFINITY, f64::min);
+    if let Some(last) = job.passes.last() {
+        violations.require(last.diameter_mm <= least || least.is_infinite(), || {
+            Finding::new("passes_incomplete", format!("/passes/{}/diameter_mm", job.passes.len() - 1)).measured(
+                last.diameter_mm,
+                least,
+                "mm",
+            )
+        });
+    }
+}
+
+fn check_stations(job: &Job, violations: &mut Violations) {
+    let length = length_mm(job);
+    match &job.stations {
+        Stations::List { z_mm } => {
+            for (i, z) in z_mm.iter().enumerate() {
+                violations.require((0.0..=length).contains(z), || {
+                    Finding::new("station_outside_shaft", format!("/stations/z_mm/{i}")).measured(*z, length, "mm")
+                });
+                violations.require(i == 0 || *z > z_mm[i - 1], || {
+                    Finding::new("stations_not_ascending", format!("/stations/z_mm/{i}")).measured(
+                        *z,
+                        z_mm[i.saturating_sub(1)],
+                        "mm",
+                    )
+                });
+            }
+        }
+        Stations::PerZone { .. } => {
+            let count = station_count(job);
+            violations.require(count > 0 || job.shaft.segments.is_empty(), || {
+                Finding::new("nothing_to_turn", "/shaft/segments")
+            });
+            violations.require(count <= MAX_STATIONS, || {
+                let (count, most) =
+                    (crate::calculator::Value::from(count), crate::calculator::Value::from(MAX_STATIONS));
+                Finding::new("too_many_stations", "/stations/count").with("count", count).with("most", most)
+            });
+        }
+    }
+}
+
+fn check_stock_profile(job: &Job, violations: &mut Violations) {
+    let Some(profile) = &job.stock_profile else { return };
+    violations.require(!profile.is_empty(), || Finding::new("stock_profile_empty", "/stock_profile"));
+    for (i, pair) in profile.rows().windows(2).enumerate() {
+        violations.require(pair[1].z_mm > pair[0].z_mm, || {
+            Finding::new("stock_profile_not_ascending", format!("/stock_profile/{}/z_mm", i + 1)).measured(
+                pair[1].z_mm,
+                pair[0].z_mm,
+                "mm",
+            )
+        });
+    }
+    let bore = job.shaft.segments.iter().map(|s| s.bore_diameter_mm).fold(0.0, f64::max);
+    for (i, row) in profile.rows().iter().enumerate() {
+        violations.require(row.diameter_mm > bore, || {
+            Finding::new("bad_diameter", format!("/stock_profile/{i}/diameter_mm")).measured(
+                row.diameter_mm,
+                bore,
+                "mm",
+            )
+        });
+    }
+}
+
+fn check_effects(job: &Job, violations: &mut Violations) {
+    for (i, effect) in job.effects.iter().enumerate() {
+        let kind = effect.kind();
+        let at = |field: &str| format!("/effects/{i}{field}");
+        violations.require(job.effects[..i].iter().all(|before| before.kind() != kind), || {
+            Finding::new("duplicate_effect", at("/kind")).with("kind", kind)
+        });
+        for condition in effect.cause().conditions {
+            let given = match *condition {
+                "tool_path_at_start_m" => job.conditions.tool_path_at_start_m.is_some(),
+                "warm_time_at_start_min" => job.conditions.warm_time_at_start_min.is_some(),
+                _ => false,
+            };
+            violations.require(given, || {
+                Finding::new("condition_missing", format!("/conditions/{condition}"))
+                    .with("kind", kind)
+                    .with("condition", *condition)
+            });
+        }
+        check_effect_on_structure(job, effect, &at, violations);
+    }
+}
+
+fn check_effect_on_structure(job: &Job, effect: &Effect, at: &dyn Fn(&str) -> String, violations: &mut Violations) {
+    let (head, tail) = ends(&job.supports);
+    let kind = effect.kind();
+    let mut softens = |base_um_per_n: f64, delta: f64| {
+        violations.require(base_um_per_n + delta >= 0.0, || {
+            Finding::new("effect_beyond_base", at("/delta_um_per_n"))
+                .measured(delta, -base_um_per_n, "um/N")
+                .with("kind", kind)
+        });
+    };
+    let compliance = |support: Option<usize>| support.map_or(0.0, |i| job.supports[i].compliance_um_per_n());
+    match *effect {
+        Effect::HeadstockCompliance { delta_um_per_n } => softens(compliance(head), delta_um_per_n),
+        Effect::TailstockCompliance { delta_um_per_n } if tail.is_some() => softens(compliance(tail), delta_um_per_n),
+        Effect::CarriageCompliance { delta_um_per_n } => softens(job.carriage.compliance_um_per_n, delta_um_per_n),
+        Effect::TailstockCompliance { .. } | Effect::TailstockOffset { .. } if tail.is_none() => {
+            violations.add(Finding::new("effect_without_tailstock", at("")).with("kind", kind));
+        }
+        Effect::SteadyRestOffset { station_mm, .. } => violations.require(steady_at(job, station_mm).is_some(), || {
+            Finding::new("effect_without_rest", at("/station_mm")).value(station_mm, "mm")
+        }),
+        Effect::UncutSideStiffness {} => violations
+            .require(job.passes.is_empty(), || Finding::new("effect_not_with_passes", at("")).with("kind", kind)),
+        _ => {}
+    }
+}
+
+/// Index of the steady rest that stands at a station.
+pub(super) fn steady_at(job: &Job, station_mm: f64) -> Option<usize> {
+    let tolerance = SAME_STATION * length_mm(job).max(1.0);
+    job.supports
+        .iter()
+        .position(|s| matches!(s, Support::SteadyRest { z_mm, .. } if (z_mm - station_mm).abs() <= tolerance))
+}

@@ -1,0 +1,410 @@
+//! The model as a diagnosis needs it: measured places in, predictions out, effects as parameters.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::calculator::{
+    Allowances, Cost, Failure, Finding, ForwardModel, JacobianColumn, Missing, Monitor, Prediction, PrepareError,
+    Quantity, Rows, checkpoint,
+};
+use crate::effects::{Cause, DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect};
+use crate::num::beam::Profile;
+
+use super::DeflectionCompensation;
+use super::acting::{Acting, StructureChange};
+use super::equilibrium::Engagement;
+use super::grid::{Grid, interpolate};
+use super::input::{FeedDirection, Job, Stations};
+use super::model::{Ingredients, Line, Radii, rest_shapes, wanted};
+use super::regime::{Regime, passages, section_of_pass};
+use super::structure::{Structure, Variant};
+
+const UM_PER_MM: f64 = 1e3;
+/// Step of the divided differences in ln F and in the bending scale: truncation 1e-6, round-off 1e-12.
+const RELATIVE_STEP: f64 = 1e-3;
+/// Step of the divided difference along the shaft, mm.
+const GAUGE_STEP_MM: f64 = 0.05;
+
+/// Conditions of one run; what it leaves out is as in the job.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DeflectionRun {
+    /// Nominal depth of cut: sets the stock of every turned segment to d + 2 depth.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.0, maximum = 100.0, example = 0.5, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("a"))))]
+    pub depth_mm: Option<f64>,
+    /// Feed per revolution.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.000_1, maximum = 20.0, example = 0.2, extensions(("x-unit" = json!("mm/rev")), ("x-symbol" = json!("S"))))]
+    pub feed_mm_per_rev: Option<f64>,
+    /// Cutting speed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.01, maximum = 20_000.0, example = 120.0, extensions(("x-unit" = json!("m/min")), ("x-symbol" = json!("V"))))]
+    pub speed_m_per_min: Option<f64>,
+    /// Spindle speed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.01, maximum = 200_000.0, example = 800.0, extensions(("x-unit" = json!("rev/min")), ("x-symbol" = json!("n"))))]
+    pub spindle_speed_rpm: Option<f64>,
+    /// Which way the tool travelled.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub feed_direction: Option<FeedDirection>,
+    /// Path that the edge had cut when the run began.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.0, maximum = 1e6, example = 120.0, extensions(("x-unit" = json!("m")), ("x-symbol" = json!("s"))))]
+    pub tool_path_at_start_m: Option<f64>,
+    /// Time since the machine was cold when the run began.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.0, maximum = 1e5, example = 15.0, extensions(("x-unit" = json!("min")), ("x-symbol" = json!("tau"))))]
+    pub warm_time_at_start_min: Option<f64>,
+    /// Path that the tool was told to follow, where it was not the nominal line.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schema(max_items = 10_000)]
+    pub commanded_path: Vec<CommandedPoint>,
+}
+
+/// A vertex of the path that the tool was told to follow; straight between vertices.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CommandedPoint {
+    /// Station from the headstock end.
+    #[schema(minimum = -100_000.0, maximum = 100_000.0, example = 500.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("z"))))]
+    pub z_mm: f64,
+    /// Commanded diameter.
+    #[schema(minimum = 0.0, maximum = 10_000.0, example = 89.93, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("X"))))]
+    pub diameter_mm: f64,
+}
+
+/// Where a diameter was measured.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DeflectionPoint {
+    /// Station from the headstock end.
+    #[schema(minimum = -100_000.0, maximum = 100_000.0, example = 500.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("z"))))]
+    pub z_mm: f64,
+}
+
+/// What the measured value is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Measure {
+    DiameterDeviation,
+    RadiusDeviation,
+    Diameter,
+}
+
+const QUANTITIES: &[Quantity] = &[
+    Quantity { name: "diameter_deviation_um", unit: "um", logarithmic: false },
+    Quantity { name: "radius_deviation_um", unit: "um", logarithmic: false },
+    Quantity { name: "diameter_mm", unit: "mm", logarithmic: false },
+];
+
+impl Measure {
+    fn named(name: &str) -> Option<Self> {
+        match name {
+            "diameter_deviation_um" => Some(Self::DiameterDeviation),
+            "radius_deviation_um" => Some(Self::RadiusDeviation),
+            "diameter_mm" => Some(Self::Diameter),
+            _ => None,
+        }
+    }
+
+    fn of(self, produced_mm: f64, target_mm: f64) -> f64 {
+        match self {
+            Self::DiameterDeviation => 2.0 * (produced_mm - target_mm) * UM_PER_MM,
+            Self::RadiusDeviation => (produced_mm - target_mm) * UM_PER_MM,
+            Self::Diameter => 2.0 * produced_mm,
+        }
+    }
+
+    /// What a change of the diameter by 1 um makes in the quantity.
+    fn per_diameter_um(self) -> f64 {
+        match self {
+            Self::DiameterDeviation => 1.0,
+            Self::RadiusDeviation => 0.5,
+            Self::Diameter => 1.0 / UM_PER_MM,
+        }
+    }
+}
+
+/// What no effect parameter changes.
+pub struct PreparedDeflection {
+    runs: Vec<PreparedRun>,
+    rows: usize,
+    measure: Measure,
+}
+
+struct PreparedRun {
+    /// The job under the run's conditions.
+    job: Job,
+    conditions: DeflectionConditions,
+    grid: Grid,
+    regime: Regime,
+    radii: Radii,
+    command_mm: Vec<f64>,
+    base_change: StructureChange,
+    base_profile: Profile,
+    /// Row of every station of the grid.
+    row_of_station: Vec<usize>,
+}
+
+impl ForwardModel for DeflectionCompensation {
+    type Job = Job;
+    type Run = DeflectionRun;
+    type Point = DeflectionPoint;
+    type Effect = DeflectionEffect;
+    type Prepared = PreparedDeflection;
+
+    const CAUSES: &'static [Cause] = DEFLECTION_CAUSES;
+    const QUANTITIES: &'static [Quantity] = QUANTITIES;
+
+    fn prepare(
+        job: &Job,
+        rows: &Rows<DeflectionRun, DeflectionPoint>,
+        quantity: &str,
+        monitor: &dyn Monitor,
+    ) -> Result<PreparedDeflection, PrepareError> {
+        let measure = Measure::named(quantity).ok_or_else(|| {
+            let known: Vec<&'static str> = QUANTITIES.iter().map(|q| q.name).collect();
+            PrepareError::Invalid(vec![
+                Finding::new("unknown_quantity", "/quantity")
+                    .with("quantity", quantity.to_owned())
+                    .with("known", known),
+            ])
+        })?;
+        let faults = faults_of_rows(job, rows);
+        if !faults.is_empty() {
+            return Err(PrepareError::Invalid(faults));
+        }
+        let mut runs = Vec::with_capacity(rows.runs.len());
+        for (k, run) in rows.runs.iter().enumerate() {
+            checkpoint(monitor).map_err(PrepareError::Failed)?;
+            let places: Vec<(usize, f64)> =
+                rows.points.iter().enumerate().filter(|(_, p)| p.0 == k).map(|(row, p)| (row, p.1.z_mm)).collect();
+            if !places.is_empty() {
+                runs.push(PreparedRun::of(job, run, places).map_err(PrepareError::Failed)?);
+            }
+        }
+        Ok(PreparedDeflection { runs, rows: rows.points.len(), measure })
+    }
+
+    fn predict(prepared: &PreparedDeflection, effects: &[DeflectionEffect]) -> Result<Vec<Prediction>, Failure> {
+        let mut out = vec![Err(Missing::NoSolution); prepared.rows];
+        for run in &prepared.runs {
+            run.predict(effects, prepared.measure, &mut out)?;
+        }
+        Ok(out)
+    }
+
+    fn effect(cause: &Cause, values: &[f64]) -> Option<DeflectionEffect> {
+        DeflectionEffect::from_parameters(cause, values)
+    }
+
+    fn nuisances(prepared: &PreparedDeflection, allowances: &Allowances) -> Result<Vec<JacobianColumn>, Failure> {
+        let by_force = prepared.slope(|delta| DeflectionEffect::ForceLevel { delta })?;
+        let by_bending = prepared.slope(|delta| DeflectionEffect::BendingScale { delta })?;
+        let along = prepared.slope_along()?;
+        let scaled = |column: &[f64], by: f64| -> Vec<f64> { column.iter().map(|x| x * by).collect() };
+        let mut columns = Vec::new();
+        for run in &prepared.runs {
+            let within = |column: &[f64], by: f64| {
+                let mut of_run = vec![0.0; prepared.rows];
+                for &row in &run.row_of_station {
+                    of_run[row] = column[row] * by;
+                }
+                of_run
+            };
+            let ones = vec![prepared.measure.per_diameter_um(); prepared.rows];
+            columns.push(within(&ones, allowances.setup_diameter_um));
+            columns.push(within(&by_force, allowances.force_per_run_rel));
+            columns.push(within(&along, allowances.gauge_position_mm));
+        }
+        columns.push(scaled(&by_force, allowances.force_level_rel));
+        columns.push(scaled(&by_bending, allowances.bending_rel));
+        Ok(columns)
+    }
+
+    fn predict_cost(prepared: &PreparedDeflection) -> Cost {
+        // About 0.5 us per row, and 5 us per run for a structure that an effect changes.
+        let us = 0.5 * prepared.rows as f64 + 5.0 * prepared.runs.len() as f64;
+        Cost { ms: us / 1000.0, bytes: 400 * prepared.rows as u64, driver: "/measurements" }
+    }
+}
+
+fn faults_of_rows(job: &Job, rows: &Rows<DeflectionRun, DeflectionPoint>) -> Vec<Finding> {
+    let length: f64 = job.shaft.segments.iter().map(|s| s.length_mm).sum();
+    let mut faults = Vec::new();
+    for (row, (run, point)) in rows.points.iter().enumerate() {
+        if *run >= rows.runs.len() {
+            faults.push(Finding::new("unknown_run", format!("/measurements/{row}/run")).with("run", *run));
+        }
+        if !(0.0..=length).contains(&point.z_mm) {
+            let at = format!("/measurements/{row}/z_mm");
+            faults.push(Finding::new("station_outside_shaft", at).measured(point.z_mm, length, "mm"));
+        }
+    }
+    for (k, run) in rows.runs.iter().enumerate() {
+        if run.speed_m_per_min.is_some() && run.spindle_speed_rpm.is_some() {
+            faults.push(Finding::new("speed_or_rpm", format!("/runs/{k}")).with("given", "both"));
+        }
+        if run.commanded_path.windows(2).any(|pair| pair[1].z_mm <= pair[0].z_mm) {
+            faults.push(Finding::new("stations_not_ascending", format!("/runs/{k}/commanded_path")));
+        }
+    }
+    faults
+}
+
+impl PreparedRun {
+    fn of(base: &Job, run: &DeflectionRun, mut places: Vec<(usize, f64)>) -> Result<Self, Failure> {
+        places.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let job = job_of_run(base, run, places.iter().map(|p| p.1).collect());
+        let grid = Grid::of(&job);
+        let conditions = DeflectionConditions {
+            tool_path_at_start_m: run.tool_path_at_start_m.or(base.conditions.tool_path_at_start_m),
+            warm_time_at_start_min: run.warm_time_at_start_min.or(base.conditions.warm_time_at_start_min),
+        };
+        let regime = Regime::of(&job.cut);
+        let stock = super::stage::stock_radii_mm(&job, &grid);
+        let target: Vec<f64> = grid.segment.iter().map(|&i| job.shaft.segments[i].diameter_mm / 2.0).collect();
+        let command_mm = if run.commanded_path.is_empty() {
+            target.clone()
+        } else {
+            let (z, r): (Vec<f64>, Vec<f64>) = run.commanded_path.iter().map(|p| (p.z_mm, p.diameter_mm / 2.0)).unzip();
+            interpolate(&z, &r, &grid.z_mm)
+        };
+        let base_change = Acting::of(&job.effects, &conditions, regime.direction).structure;
+        let base_profile = structure(&job, &base_change, &regime)?.beam.profile(&grid.z_mm, wanted(&job));
+        Ok(Self {
+            radii: Radii { target, planned: stock.clone(), stock },
+            row_of_station: places.into_iter().map(|p| p.0).collect(),
+            job,
+            conditions,
+            grid,
+            regime,
+            command_mm,
+            base_change,
+            base_profile,
+        })
+    }
+
+    fn predict(&self, effects: &[DeflectionEffect], measure: Measure, out: &mut [Prediction]) -> Result<(), Failure> {
+        let mut all = self.job.effects.clone();
+        all.extend_from_slice(effects);
+        let acting = Acting::of(&all, &self.conditions, self.regime.direction);
+        let structure = structure(&self.job, &acting.structure, &self.regime)?;
+        let profile = if acting.structure == self.base_change {
+            self.base_profile.clone()
+        } else {
+            structure.beam.profile(&self.grid.z_mm, wanted(&self.job))
+        };
+        let passages =
+            if acting.has_errors() { passages(&self.job, &self.grid, &self.regime, None) } else { Vec::new() };
+        let shapes = rest_shapes(&all, &self.job, &self.grid, &structure)?;
+        let ingredients = Ingredients {
+            job: &self.job,
+            grid: &self.grid,
+            acting: &acting,
+            structure: &structure,
+            regime: &self.regime,
+            radii: &self.radii,
+            passages: &passages,
+            rest_shapes: &shapes,
+        };
+        let line = Line::of(&ingredients, profile);
+        for (i, &row) in self.row_of_station.iter().enumerate() {
+            let (stock, command) = (self.radii.stock[i], self.command_mm[i]);
+            let commanded_depth = stock - command;
+            let opening = line.opening_at(i, commanded_depth);
+            let guess = commanded_depth - opening.y_mm / (1.0 + opening.y_slope);
+            out[row] = match line.engage(i, stock, command, guess) {
+                Engagement::Cut { depth_mm, .. } => Ok(measure.of(stock - depth_mm, self.radii.target[i])),
+                Engagement::NoContact => Ok(measure.of(stock, self.radii.target[i])),
+                Engagement::NoCut => Err(Missing::NoCut),
+            };
+        }
+        Ok(())
+    }
+
+    /// The same run measured `dz_mm` further along, kept on the shaft.
+    fn shifted(&self, dz_mm: f64) -> Result<Self, Failure> {
+        let length = self.grid.length_mm;
+        let places = self
+            .row_of_station
+            .iter()
+            .zip(&self.grid.z_mm)
+            .map(|(&row, z)| (row, (z + dz_mm).clamp(0.0, length)))
+            .collect();
+        let run = DeflectionRun {
+            tool_path_at_start_m: self.conditions.tool_path_at_start_m,
+            warm_time_at_start_min: self.conditions.warm_time_at_start_min,
+            commanded_path: self
+                .grid
+                .z_mm
+                .iter()
+                .zip(&self.command_mm)
+                .map(|(&z_mm, r)| CommandedPoint { z_mm, diameter_mm: 2.0 * r })
+                .collect(),
+            ..DeflectionRun::default()
+        };
+        Self::of(&self.job, &run, places)
+    }
+}
+
+/// The base job under the conditions of a run, at the places measured.
+fn job_of_run(base: &Job, run: &DeflectionRun, z_mm: Vec<f64>) -> Job {
+    let mut job = base.clone();
+    job.stations = Stations::List { z_mm };
+    job.passes.clear();
+    if let Some(depth) = run.depth_mm {
+        job.stock_profile = None;
+        for segment in &mut job.shaft.segments {
+            if segment.stock_mm() > segment.diameter_mm {
+                segment.stock_diameter_mm = Some(segment.diameter_mm + 2.0 * depth);
+            }
+        }
+    }
+    if let Some(feed) = run.feed_mm_per_rev {
+        job.cut.feed_mm_per_rev = feed;
+    }
+    if run.speed_m_per_min.is_some() || run.spindle_speed_rpm.is_some() {
+        (job.cut.speed_m_per_min, job.cut.spindle_speed_rpm) = (run.speed_m_per_min, run.spindle_speed_rpm);
+    }
+    if let Some(direction) = run.feed_direction {
+        job.cut.feed_direction = direction;
+    }
+    job
+}
+
+fn structure(job: &Job, change: &StructureChange, regime: &Regime) -> Result<Structure, Failure> {
+    let mut variant = Variant::of(job, change);
+    variant.direction = regime.direction;
+    variant.section = section_of_pass(job, change.uncut_side);
+    Structure::of(job, &variant)
+}
+
+impl PreparedDeflection {
+    /// Central difference of the prediction by a relative effect about 0, one entry per row.
+    fn slope(&self, effect: impl Fn(f64) -> DeflectionEffect) -> Result<Vec<f64>, Failure> {
+        let at = |delta: f64| DeflectionCompensation::predict(self, &[effect(delta)]);
+        Ok(difference(&at(-RELATIVE_STEP)?, &at(RELATIVE_STEP)?, 2.0 * RELATIVE_STEP))
+    }
+
+    /// Central difference of the prediction along the shaft.
+    fn slope_along(&self) -> Result<Vec<f64>, Failure> {
+        let at = |dz_mm: f64| -> Result<Vec<Prediction>, Failure> {
+            let runs = self.runs.iter().map(|run| run.shifted(dz_mm)).collect::<Result<Vec<_>, _>>()?;
+            let shifted = Self { runs, rows: self.rows, measure: self.measure };
+            DeflectionCompensation::predict(&shifted, &[])
+        };
+        Ok(difference(&at(-GAUGE_STEP_MM)?, &at(GAUGE_STEP_MM)?, 2.0 * GAUGE_STEP_MM))
+    }
+}
+
+fn difference(below: &[Prediction], above: &[Prediction], span: f64) -> Vec<f64> {
+    below
+        .iter()
+        .zip(above)
+        .map(|(b, a)| match (b, a) {
+            (Ok(b), Ok(a)) => (a - b) / span,
+            _ => 0.0,
+        })
+        .collect()
+}

@@ -1,0 +1,659 @@
+//! The job: a shaft, how it is held, and the cut.
+
+use serde::{Deserialize, Serialize};
+use utoipa::openapi::Schema;
+use utoipa::openapi::extensions::Extensions;
+use utoipa::openapi::schema::{ArrayBuilder, ObjectBuilder, SchemaType, Type};
+use utoipa::{PartialSchema, ToSchema};
+
+use crate::calculator::{Dialect, Measured, MeasuredRow};
+use crate::effects::{DeflectionConditions, DeflectionEffect};
+use crate::force::ForceModel;
+
+/// Most stations of a job, however they are given.
+pub const MAX_STATIONS: usize = 200_000;
+
+/// A slender shaft to be turned, and what is to be known before the cut.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+#[schema(title = "DeflectionCompensationJob")]
+pub struct Job {
+    /// The workpiece.
+    #[schema(extensions(("x-group" = json!("workpiece"))))]
+    pub shaft: Shaft,
+    /// What holds it, from the headstock on: two centres, a chuck, rests.
+    #[schema(min_items = 1, max_items = 8, extensions(("x-group" = json!("machine")), ("x-code" = json!("unstable_support"))))]
+    pub supports: Vec<Support>,
+    /// Compliance of carriage and tool.
+    #[serde(default)]
+    #[schema(extensions(("x-group" = json!("machine"))))]
+    pub carriage: Carriage,
+    /// How cutting forces follow from depth, feed and speed.
+    #[schema(extensions(("x-group" = json!("cut"))))]
+    pub force: ForceModel,
+    /// Feed, speed and direction.
+    #[schema(extensions(("x-group" = json!("cut"))))]
+    pub cut: Cut,
+    /// Which parts of the base physics act.
+    #[serde(default)]
+    #[schema(extensions(("x-group" = json!("numerics"))))]
+    pub include: Include,
+    /// Direction and size of gravity, for `include.weight`.
+    #[serde(default)]
+    #[schema(extensions(("x-group" = json!("machine")), ("x-advanced" = json!(true))))]
+    pub gravity: Gravity,
+    /// Where along the shaft the answer is given.
+    #[serde(default)]
+    #[schema(extensions(("x-group" = json!("numerics"))))]
+    pub stations: Stations,
+    /// Measured or predicted diameter of the blank along the shaft; linear between rows, constant beyond
+    /// them. Replaces the segments' stock diameters in the depth of cut (not in the stiffness).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(schema_with = Measured::<StockRow>::schema, required = false)]
+    pub stock_profile: Option<Measured<StockRow>>,
+    /// Several passes instead of one; each turns down to its diameter, no segment below its drawing diameter.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schema(max_items = 20, extensions(("x-group" = json!("cut")), ("x-advanced" = json!(true))))]
+    pub passes: Vec<Pass>,
+    /// How far the answer goes.
+    #[serde(default)]
+    #[schema(default = "full", example = "full")]
+    pub detail: Detail,
+    /// What the drawing allows.
+    #[serde(default)]
+    #[schema(extensions(("x-group" = json!("workpiece"))))]
+    pub tolerance: Tolerance,
+    /// How well force and stiffness are known.
+    #[serde(default)]
+    #[schema(extensions(("x-group" = json!("numerics")), ("x-advanced" = json!(true))))]
+    pub uncertainty: Uncertainty,
+    /// How the commanded path is cut into straight moves.
+    #[serde(default)]
+    #[schema(extensions(("x-group" = json!("numerics")), ("x-advanced" = json!(true))))]
+    pub path: PathSettings,
+    /// How the program is spelled.
+    #[serde(default)]
+    #[schema(extensions(("x-group" = json!("cut")), ("x-advanced" = json!(true))))]
+    pub program: ProgramSettings,
+    /// Limits of insert and shop; a warning is given beyond them.
+    #[serde(default)]
+    #[schema(extensions(("x-group" = json!("cut")), ("x-advanced" = json!(true))))]
+    pub limits: Limits,
+    /// Named physical effects that act beside the base model; a kind occurs once.
+    #[serde(default)]
+    #[schema(max_items = 22, extensions(("x-group" = json!("effects"))))]
+    pub effects: Vec<DeflectionEffect>,
+    /// The state that effects depend on.
+    #[serde(default)]
+    #[schema(extensions(("x-group" = json!("effects"))))]
+    pub conditions: DeflectionConditions,
+}
+
+/// The workpiece: segments from the headstock end to the tailstock end.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Shaft {
+    /// Cylindrical segments, end to end, concentric.
+    #[schema(min_items = 1, max_items = 200, extensions(("x-group" = json!("workpiece")), ("x-code" = json!("no_segments"))))]
+    pub segments: Vec<Segment>,
+    /// Name in the material library; gives the elastic constants that are not stated. The echoed job has the numbers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = "steel_45", max_length = 64)]
+    pub material: Option<String>,
+    /// Young's modulus; needed where no material is named.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1000.0, maximum = 2_000_000.0, example = 210_000.0, extensions(("x-unit" = json!("N/mm2")), ("x-symbol" = json!("E")), ("x-code" = json!("bad_modulus"))))]
+    pub youngs_modulus_n_per_mm2: Option<f64>,
+    /// Poisson's ratio; of the material, or 0.3. It acts with `theory` Timoshenko.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(exclusive_minimum = -1.0, exclusive_maximum = 0.5, example = 0.3, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("nu")), ("x-code" = json!("bad_poisson"))))]
+    pub poisson_ratio: Option<f64>,
+    /// Density; of the material, or 7850. It acts with `include.weight`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1.0, maximum = 30_000.0, example = 7850.0, extensions(("x-unit" = json!("kg/m3")), ("x-symbol" = json!("rho"))))]
+    pub density_kg_per_m3: Option<f64>,
+    /// Yield strength; where given, bending stress above half of it is warned of.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1.0, maximum = 10_000.0, example = 360.0, extensions(("x-unit" = json!("N/mm2")), ("x-symbol" = json!("sigma_y"))))]
+    pub yield_strength_n_per_mm2: Option<f64>,
+    /// Beam theory.
+    #[serde(default)]
+    #[schema(default = "euler_bernoulli", example = "euler_bernoulli")]
+    pub theory: Theory,
+    /// Which section bends.
+    #[serde(default)]
+    #[schema(default = "finished", example = "mixed")]
+    pub section: Section,
+}
+
+impl Shaft {
+    /// Young's modulus of a filled job; NaN, which no answer lets pass, of one that is not.
+    pub(super) fn modulus(&self) -> f64 {
+        self.youngs_modulus_n_per_mm2.unwrap_or(f64::NAN)
+    }
+
+    /// Poisson's ratio of a filled job.
+    pub(super) fn poisson(&self) -> f64 {
+        self.poisson_ratio.unwrap_or(f64::NAN)
+    }
+
+    /// Density of a filled job.
+    pub(super) fn density(&self) -> f64 {
+        self.density_kg_per_m3.unwrap_or(f64::NAN)
+    }
+}
+
+/// A cylindrical piece of the shaft.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Segment {
+    /// Length along the axis.
+    #[schema(minimum = 0.001, maximum = 100_000.0, example = 2000.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("l")), ("x-code" = json!("bad_length"))))]
+    pub length_mm: f64,
+    /// Drawing diameter.
+    #[schema(minimum = 0.01, maximum = 10_000.0, example = 90.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("d")), ("x-code" = json!("bad_diameter"))))]
+    pub diameter_mm: f64,
+    /// Diameter of the blank; the drawing diameter where the segment is not turned.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.01, maximum = 10_000.0, example = 91.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("D_0")), ("x-code" = json!("bad_diameter"))))]
+    pub stock_diameter_mm: Option<f64>,
+    /// Diameter of the bore, 0 for solid.
+    #[serde(default)]
+    #[schema(minimum = 0.0, maximum = 10_000.0, default = 0.0, example = 0.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("d_in")), ("x-code" = json!("bad_bore"))))]
+    pub bore_diameter_mm: f64,
+}
+
+impl Segment {
+    /// Diameter of the blank.
+    pub fn stock_mm(&self) -> f64 {
+        self.stock_diameter_mm.unwrap_or(self.diameter_mm)
+    }
+}
+
+/// Beam theory.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Theory {
+    /// Bending alone.
+    #[default]
+    EulerBernoulli,
+    /// Bending and shear (Cowper's coefficient).
+    Timoshenko,
+}
+
+/// Which section bends.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Section {
+    /// The drawing's diameters everywhere.
+    #[default]
+    Finished,
+    /// The blank's diameters everywhere.
+    Stock,
+    /// Partly turned: the blank's where the tool has yet to pass, the drawing's where it has passed.
+    Mixed,
+}
+
+/// Something that holds the shaft. Compliance 0 is rigid.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Support {
+    /// A centre: holds against displacement.
+    Centre {
+        /// Station along the shaft from the headstock end.
+        #[schema(minimum = -100_000.0, maximum = 100_000.0, example = 0.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("z"))))]
+        z_mm: f64,
+        /// Radial compliance.
+        #[serde(default)]
+        #[schema(minimum = 0.0, maximum = 1000.0, default = 0.0, example = 0.033, extensions(("x-unit" = json!("um/N")), ("x-symbol" = json!("w")), ("x-code" = json!("negative_compliance"))))]
+        compliance_um_per_n: f64,
+        /// Compliance across the radial direction; the radial one where not given.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schema(minimum = 0.0, maximum = 1000.0, example = 0.033, extensions(("x-unit" = json!("um/N")), ("x-symbol" = json!("w_z")), ("x-code" = json!("negative_compliance"))))]
+        tangential_compliance_um_per_n: Option<f64>,
+    },
+    /// A chuck: holds against displacement and rotation; the shaft may go on to both sides.
+    Chuck {
+        /// Station along the shaft from the headstock end.
+        #[schema(minimum = -100_000.0, maximum = 100_000.0, example = 0.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("z"))))]
+        z_mm: f64,
+        /// Radial compliance.
+        #[serde(default)]
+        #[schema(minimum = 0.0, maximum = 1000.0, default = 0.0, example = 0.005, extensions(("x-unit" = json!("um/N")), ("x-symbol" = json!("w")), ("x-code" = json!("negative_compliance"))))]
+        compliance_um_per_n: f64,
+        /// Compliance across the radial direction; the radial one where not given.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schema(minimum = 0.0, maximum = 1000.0, example = 0.005, extensions(("x-unit" = json!("um/N")), ("x-symbol" = json!("w_z")), ("x-code" = json!("negative_compliance"))))]
+        tangential_compliance_um_per_n: Option<f64>,
+        /// Compliance against rotation, 0 = clamped.
+        #[serde(default)]
+        #[schema(minimum = 0.0, maximum = 1.0, default = 0.0, example = 4e-10, extensions(("x-unit" = json!("rad/(N mm)")), ("x-symbol" = json!("w_r")), ("x-code" = json!("negative_compliance"))))]
+        rotational_compliance_rad_per_n_mm: f64,
+    },
+    /// A steady rest: stands on the bed.
+    SteadyRest {
+        /// Station along the shaft from the headstock end.
+        #[schema(minimum = -100_000.0, maximum = 100_000.0, example = 600.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("z"))))]
+        z_mm: f64,
+        /// Radial compliance.
+        #[serde(default)]
+        #[schema(minimum = 0.0, maximum = 1000.0, default = 0.0, example = 0.03, extensions(("x-unit" = json!("um/N")), ("x-symbol" = json!("w")), ("x-code" = json!("negative_compliance"))))]
+        compliance_um_per_n: f64,
+        /// Compliance across the radial direction; the radial one where not given.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schema(minimum = 0.0, maximum = 1000.0, example = 0.03, extensions(("x-unit" = json!("um/N")), ("x-symbol" = json!("w_z")), ("x-code" = json!("negative_compliance"))))]
+        tangential_compliance_um_per_n: Option<f64>,
+        /// Whether it only bears when the work moves away from the tool by more than the gap.
+        #[serde(default)]
+        #[schema(default = false, example = true)]
+        one_sided: bool,
+        /// Gap of a one-sided rest to the undeflected work.
+        #[serde(default)]
+        #[schema(minimum = 0.0, maximum = 100_000.0, default = 0.0, example = 20.0, extensions(("x-unit" = json!("um")), ("x-symbol" = json!("gap")), ("x-code" = json!("negative_compliance"))))]
+        gap_um: f64,
+    },
+    /// A follow rest: travels with the tool.
+    FollowRest {
+        /// Distance from the tool, positive toward the tailstock. Where it would leave the shaft it does not act.
+        #[schema(minimum = -100_000.0, maximum = 100_000.0, example = 15.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("offset"))))]
+        offset_mm: f64,
+        /// Radial compliance.
+        #[serde(default)]
+        #[schema(minimum = 0.0, maximum = 1000.0, default = 0.0, example = 0.015, extensions(("x-unit" = json!("um/N")), ("x-symbol" = json!("w_f")), ("x-code" = json!("negative_compliance"))))]
+        compliance_um_per_n: f64,
+        /// Compliance across the radial direction; the radial one where not given.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schema(minimum = 0.0, maximum = 1000.0, example = 0.015, extensions(("x-unit" = json!("um/N")), ("x-symbol" = json!("w_z")), ("x-code" = json!("negative_compliance"))))]
+        tangential_compliance_um_per_n: Option<f64>,
+        /// Whether it only bears when the work moves away from the tool by more than the gap.
+        #[serde(default)]
+        #[schema(default = false, example = true)]
+        one_sided: bool,
+        /// Gap of a one-sided rest to the undeflected work.
+        #[serde(default)]
+        #[schema(minimum = 0.0, maximum = 100_000.0, default = 0.0, example = 20.0, extensions(("x-unit" = json!("um")), ("x-symbol" = json!("gap")), ("x-code" = json!("negative_compliance"))))]
+        gap_um: f64,
+    },
+}
+
+impl Support {
+    /// Its station; a follow rest has none of its own.
+    pub fn station_mm(&self) -> Option<f64> {
+        match *self {
+            Self::Centre { z_mm, .. } | Self::Chuck { z_mm, .. } | Self::SteadyRest { z_mm, .. } => Some(z_mm),
+            Self::FollowRest { .. } => None,
+        }
+    }
+
+    /// Whether it can carry the shaft: bilateral, translational, standing still.
+    pub fn carries(&self) -> bool {
+        match self {
+            Self::Centre { .. } | Self::Chuck { .. } => true,
+            Self::SteadyRest { one_sided, .. } => !one_sided,
+            Self::FollowRest { .. } => false,
+        }
+    }
+
+    /// Writes out what follows from other fields: the compliance across the radial direction.
+    pub(super) fn fill(&mut self) {
+        match self {
+            Self::Centre { compliance_um_per_n: c, tangential_compliance_um_per_n: across, .. }
+            | Self::Chuck { compliance_um_per_n: c, tangential_compliance_um_per_n: across, .. }
+            | Self::SteadyRest { compliance_um_per_n: c, tangential_compliance_um_per_n: across, .. }
+            | Self::FollowRest { compliance_um_per_n: c, tangential_compliance_um_per_n: across, .. } => {
+                across.get_or_insert(*c);
+            }
+        }
+    }
+
+    /// Radial compliance.
+    pub fn compliance_um_per_n(&self) -> f64 {
+        match *self {
+            Self::Centre { compliance_um_per_n, .. }
+            | Self::Chuck { compliance_um_per_n, .. }
+            | Self::SteadyRest { compliance_um_per_n, .. }
+            | Self::FollowRest { compliance_um_per_n, .. } => compliance_um_per_n,
+        }
+    }
+}
+
+/// Carriage with cross slide, tool post and tool, at the cutting point.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Carriage {
+    /// Radial compliance.
+    #[serde(default)]
+    #[schema(minimum = 0.0, maximum = 1000.0, default = 0.0, example = 0.033, extensions(("x-unit" = json!("um/N")), ("x-symbol" = json!("w_c")), ("x-group" = json!("machine")), ("x-code" = json!("negative_compliance"))))]
+    pub compliance_um_per_n: f64,
+    /// Compliance across the radial direction; does not follow the radial one.
+    #[serde(default)]
+    #[schema(minimum = 0.0, maximum = 1000.0, default = 0.0, example = 0.0, extensions(("x-unit" = json!("um/N")), ("x-symbol" = json!("w_cz")), ("x-group" = json!("machine")), ("x-code" = json!("negative_compliance"))))]
+    pub tangential_compliance_um_per_n: f64,
+}
+
+/// Feed, speed and direction of the cut. Exactly one of cutting speed and spindle speed is given.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cut {
+    /// Feed per revolution.
+    #[schema(minimum = 0.000_1, maximum = 20.0, example = 0.5, extensions(("x-unit" = json!("mm/rev")), ("x-symbol" = json!("s")), ("x-group" = json!("cut")), ("x-code" = json!("bad_feed"))))]
+    pub feed_mm_per_rev: f64,
+    /// Cutting speed, held constant (G96).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.01, maximum = 20_000.0, example = 140.0, extensions(("x-unit" = json!("m/min")), ("x-symbol" = json!("v")), ("x-group" = json!("cut")), ("x-code" = json!("bad_speed"))))]
+    pub speed_m_per_min: Option<f64>,
+    /// Spindle speed, held constant (G97); the cutting speed then follows the diameter.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.01, maximum = 200_000.0, example = 500.0, extensions(("x-unit" = json!("rev/min")), ("x-symbol" = json!("n")), ("x-group" = json!("cut")), ("x-code" = json!("bad_speed"))))]
+    pub spindle_speed_rpm: Option<f64>,
+    /// Diameter at which the cutting speed counts.
+    #[serde(default)]
+    #[schema(default = "stock", example = "stock")]
+    pub speed_diameter: SpeedDiameter,
+    /// Which way the tool travels.
+    #[serde(default)]
+    #[schema(default = "to_headstock", example = "to_headstock")]
+    pub feed_direction: FeedDirection,
+}
+
+/// Diameter at which the cutting speed counts.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SpeedDiameter {
+    /// The largest diameter in the cut (ISO 3002).
+    #[default]
+    Stock,
+    /// The diameter produced.
+    Finish,
+}
+
+/// Which way the tool travels.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FeedDirection {
+    /// From the tailstock to the headstock.
+    #[default]
+    ToHeadstock,
+    /// From the headstock to the tailstock.
+    ToTailstock,
+}
+
+/// Which parts of the base physics act beside the passive force.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Include {
+    /// The main force bends the shaft across the radial direction.
+    #[serde(default)]
+    #[schema(default = false, example = true)]
+    pub tangential: bool,
+    /// The feed force bends the shaft by its moment about the axis.
+    #[serde(default)]
+    #[schema(default = false, example = true)]
+    pub axial_moment: bool,
+    /// The shaft sags under its own weight.
+    #[serde(default)]
+    #[schema(default = false, example = true)]
+    pub weight: bool,
+}
+
+/// Gravity as the lathe stands.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Gravity {
+    /// Acceleration.
+    #[serde(default = "standard_gravity")]
+    #[schema(minimum = 0.0, maximum = 100.0, default = 9.81, example = 9.81, extensions(("x-unit" = json!("m/s2")), ("x-symbol" = json!("g"))))]
+    pub acceleration_m_per_s2: f64,
+    /// Angle from the radial direction away from the tool toward the direction in which the main force
+    /// pushes the work: -90 on a flat bed with the tool in front, -45 on a slant bed.
+    #[serde(default = "flat_bed")]
+    #[schema(minimum = -180.0, maximum = 180.0, default = -90.0, example = -45.0, extensions(("x-unit" = json!("deg")), ("x-symbol" = json!("angle"))))]
+    pub angle_deg: f64,
+}
+
+fn standard_gravity() -> f64 {
+    9.81
+}
+
+fn flat_bed() -> f64 {
+    -90.0
+}
+
+impl Default for Gravity {
+    fn default() -> Self {
+        Self { acceleration_m_per_s2: standard_gravity(), angle_deg: flat_bed() }
+    }
+}
+
+/// Where along the shaft the answer is given.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Stations {
+    /// So many in every turned zone (neighbouring segments of one diameter), evenly, with both its ends.
+    PerZone {
+        /// Stations per zone.
+        #[schema(minimum = 2, maximum = 200_000, example = 201, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("n"))))]
+        count: u32,
+    },
+    /// These, ascending. On a shoulder the segment that ends there counts.
+    List {
+        /// Stations from the headstock end.
+        #[schema(schema_with = station_list)]
+        z_mm: Vec<f64>,
+    },
+}
+
+/// Ranges of the list's items, which utoipa's attributes do not reach.
+fn station_list() -> Schema {
+    let extensions = Extensions::builder().add("x-unit", "mm").add("x-symbol", "z").build();
+    let station = ObjectBuilder::new()
+        .schema_type(SchemaType::new(Type::Number))
+        .minimum(Some(0.0))
+        .maximum(Some(20_000_000.0))
+        .examples([500.0])
+        .extensions(Some(extensions));
+    ArrayBuilder::new()
+        .items(station)
+        .min_items(Some(1))
+        .max_items(Some(MAX_STATIONS))
+        .description(Some("Stations from the headstock end."))
+        .examples([[0.0, 500.0, 1000.0, 1500.0, 2000.0]])
+        .into()
+}
+
+impl Default for Stations {
+    fn default() -> Self {
+        Self::PerZone { count: 201 }
+    }
+}
+
+/// One measured diameter of the blank.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StockRow {
+    /// Station from the headstock end, ascending from row to row.
+    #[schema(minimum = -100_000.0, maximum = 100_000.0, example = 200.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("z"))))]
+    pub z_mm: f64,
+    /// Diameter of the blank there.
+    #[schema(minimum = 0.01, maximum = 10_000.0, example = 44.6, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("D_0"))))]
+    pub diameter_mm: f64,
+}
+
+impl MeasuredRow for StockRow {
+    const MAX_ROWS: usize = MAX_STATIONS;
+}
+
+/// One pass of several. Feed and speed not given are those of `cut`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Pass {
+    /// Diameter that the pass turns down to.
+    #[schema(minimum = 0.01, maximum = 10_000.0, example = 41.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("d")), ("x-code" = json!("bad_diameter"))))]
+    pub diameter_mm: f64,
+    /// Feed per revolution of the pass.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.000_1, maximum = 20.0, example = 0.4, extensions(("x-unit" = json!("mm/rev")), ("x-symbol" = json!("s")), ("x-code" = json!("bad_feed"))))]
+    pub feed_mm_per_rev: Option<f64>,
+    /// Cutting speed of the pass.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.01, maximum = 20_000.0, example = 100.0, extensions(("x-unit" = json!("m/min")), ("x-symbol" = json!("v")), ("x-code" = json!("bad_speed"))))]
+    pub speed_m_per_min: Option<f64>,
+    /// Spindle speed of the pass.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.01, maximum = 200_000.0, example = 800.0, extensions(("x-unit" = json!("rev/min")), ("x-symbol" = json!("n")), ("x-code" = json!("bad_speed"))))]
+    pub spindle_speed_rpm: Option<f64>,
+    /// Whether the pass is cut along a compensated path, planned on the nominal stock.
+    #[serde(default)]
+    #[schema(default = false, example = true)]
+    pub compensated: bool,
+}
+
+/// How far the answer goes.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Detail {
+    /// Everything: profile, command, path in straight moves with its prediction, comparison, advice.
+    #[default]
+    Full,
+    /// The profile along the shaft, the exact command and the form alone, for studies and live pictures: several
+    /// times faster, a third of the size.
+    Profile,
+}
+
+/// What the drawing allows, on the diameter.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Tolerance {
+    /// Tolerance of form: largest minus smallest diameter along the shaft.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.01, maximum = 100_000.0, example = 20.0, extensions(("x-unit" = json!("um")), ("x-symbol" = json!("T_f")), ("x-group" = json!("workpiece"))))]
+    pub form_um: Option<f64>,
+    /// Tolerance of size: the diameter may deviate by plus or minus half of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.01, maximum = 100_000.0, example = 40.0, extensions(("x-unit" = json!("um")), ("x-symbol" = json!("T_d")), ("x-group" = json!("workpiece"))))]
+    pub diameter_um: Option<f64>,
+}
+
+/// Standard uncertainties of what goes in; what comes out carries theirs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Uncertainty {
+    /// Of the cutting force, relative, one standard deviation.
+    #[serde(default = "ten_percent")]
+    #[schema(minimum = 0.0, maximum = 100.0, default = 10.0, example = 10.0, extensions(("x-unit" = json!("percent")), ("x-symbol" = json!("u_F"))))]
+    pub force_percent: f64,
+    /// Of the compliance of shaft, supports and carriage, relative, one standard deviation.
+    #[serde(default = "ten_percent")]
+    #[schema(minimum = 0.0, maximum = 100.0, default = 10.0, example = 10.0, extensions(("x-unit" = json!("percent")), ("x-symbol" = json!("u_W"))))]
+    pub stiffness_percent: f64,
+}
+
+fn ten_percent() -> f64 {
+    10.0
+}
+
+impl Default for Uncertainty {
+    fn default() -> Self {
+        Self { force_percent: ten_percent(), stiffness_percent: ten_percent() }
+    }
+}
+
+/// How the commanded path is cut into straight moves.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PathSettings {
+    /// Largest radial deviation of the moves from the computed path, before rounding. Default: a tenth of
+    /// the form tolerance (a twentieth on the radius), at least one increment; without a tolerance 1 um.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.0, maximum = 1000.0, example = 1.0, extensions(("x-unit" = json!("um")), ("x-symbol" = json!("tol"))))]
+    pub chord_tolerance_um: Option<f64>,
+    /// Smallest step of the control: of X on the diameter, and of Z.
+    #[serde(default = "one_um")]
+    #[schema(minimum = 0.001, maximum = 100.0, default = 1.0, example = 1.0, extensions(("x-unit" = json!("um")), ("x-symbol" = json!("increment"))))]
+    pub increment_um: f64,
+}
+
+fn one_um() -> f64 {
+    1.0
+}
+
+impl Default for PathSettings {
+    fn default() -> Self {
+        Self { chord_tolerance_um: None, increment_um: one_um() }
+    }
+}
+
+/// How the program is spelled.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ProgramSettings {
+    /// The control.
+    #[serde(default)]
+    #[schema(default = "fanuc", example = "linuxcnc")]
+    pub dialect: Dialect,
+    /// Where Z is zero.
+    #[serde(default)]
+    #[schema(default = "right_face", example = "right_face")]
+    pub zero: ProgramZero,
+    /// Distance of approach and retract from the blank, on the diameter.
+    #[serde(default = "five_mm")]
+    #[schema(minimum = 0.0, maximum = 1000.0, default = 5.0, example = 5.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("clearance_x"))))]
+    pub clearance_x_mm: f64,
+    /// Distance of the approach before the cut along Z.
+    #[serde(default = "two_mm")]
+    #[schema(minimum = 0.0, maximum = 1000.0, default = 2.0, example = 2.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("clearance_z"))))]
+    pub clearance_z_mm: f64,
+    /// Limit of the spindle with constant cutting speed.
+    #[serde(default = "limit_rpm")]
+    #[schema(minimum = 1.0, maximum = 200_000.0, default = 3000.0, example = 3000.0, extensions(("x-unit" = json!("rev/min")), ("x-symbol" = json!("n_max"))))]
+    pub spindle_limit_rpm: f64,
+}
+
+fn five_mm() -> f64 {
+    5.0
+}
+
+fn two_mm() -> f64 {
+    2.0
+}
+
+fn limit_rpm() -> f64 {
+    3000.0
+}
+
+impl Default for ProgramSettings {
+    fn default() -> Self {
+        Self {
+            dialect: Dialect::default(),
+            zero: ProgramZero::default(),
+            clearance_x_mm: five_mm(),
+            clearance_z_mm: two_mm(),
+            spindle_limit_rpm: limit_rpm(),
+        }
+    }
+}
+
+/// Where Z is zero.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ProgramZero {
+    /// At the face of the tailstock end: Z = z - l.
+    #[default]
+    RightFace,
+    /// At the face of the headstock end: Z = z.
+    LeftFace,
+}
+
+/// Limits of insert and shop; a warning is given beyond them.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Limits {
+    /// Deepest cut that the insert's edge takes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.001, maximum = 1000.0, example = 6.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("t_max"))))]
+    pub depth_mm: Option<f64>,
+    /// Steepest commanded path, radius per length.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-9, maximum = 10.0, example = 0.01, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("slope"))))]
+    pub slope: Option<f64>,
+}

@@ -1,0 +1,320 @@
+//! Deflection compensation: where must the tool go so that the slender shaft comes out straight?
+//!
+//! A shaft held in centres, chuck and rests yields under the passive force. The gap between work and
+//! tool opens by y, the depth really cut falls short, and the shaft comes out as a barrel, a saddle or
+//! something between. The model: compliance W(z) at the cutting point by the force method
+//! ([`crate::num::beam`]), forces over the *engaged* depth ([`crate::force`]), and the scalar
+//! equilibrium at every station (`equilibrium`). The compensated command is explicit, because the
+//! wanted state has the nominal depth; the prediction for any command is implicit.
+//!
+//! The way of a job: `input` -> `check` -> `grid` (stations), `acting` (effects),
+//! `structure` (beam) -> `model` (opening over depth) -> `cut` -> `stage` (passes) ->
+//! `toolpath`, `form`, `second_order`, `advice` -> `output`, `picture`.
+//! `forward` gives the same model to the diagnosis.
+
+mod acting;
+mod advice;
+mod check;
+mod cut;
+mod equilibrium;
+mod form;
+mod forward;
+mod grid;
+mod input;
+mod model;
+mod output;
+mod picture;
+mod regime;
+mod second_order;
+mod stage;
+mod structure;
+mod toolpath;
+
+pub use form::{Deviation, Extremum, ExtremumKind, Form, FormClass};
+pub use forward::{DeflectionPoint, DeflectionRun};
+pub use input::{
+    Carriage, Cut, Detail, FeedDirection, Gravity, Include, Job, Limits, MAX_STATIONS, Pass, PathSettings,
+    ProgramSettings, ProgramZero, Section, Segment, Shaft, SpeedDiameter, Stations, StockRow, Support, Theory,
+    Tolerance, Uncertainty,
+};
+pub use output::{
+    OneMoreRest, OneStep, Outcome, PassOutcome, Path, PathZone, SecondOrder, Shares, StationColumns, StatusCompensated,
+    StatusUncompensated,
+};
+
+use crate::calculator::{
+    Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Message, Meta, Monitor, Program,
+    Table,
+};
+use crate::{force, material};
+
+use acting::Acting;
+use cut::one_step;
+use grid::{Grid, station_count};
+use stage::{Stage, all_cuts};
+
+const UM_PER_MM: f64 = 1e3;
+
+/// The calculator.
+#[derive(Debug, Clone, Copy)]
+pub struct DeflectionCompensation;
+
+impl Calculator for DeflectionCompensation {
+    type Input = Job;
+    type Output = Outcome;
+
+    const META: Meta = Meta {
+        id: "deflection-compensation",
+        kind: CalculatorKind::Calculator,
+        version: 1,
+        title: "Deflection compensation",
+        question: "Where must the tool go so that the slender shaft comes out straight?",
+        summary: "A slender shaft bends away from the tool, so less is cut than commanded. From shaft, supports, \
+                  force law and regime: the diameter along the shaft if the tool follows the nominal line, the path \
+                  that gives the drawing's diameter, the diameter with that path as programmed, what dominates, and \
+                  how sure all this is.",
+        references: &[
+            "Pegashkin, Starostin, Bulletin of the South Ural State University, Mechanical Engineering, 2018, vol. 18 no. 1, pp. 51-57",
+            "Kosilova, Meshcheryakov (eds.), Handbook of the process engineer, vol. 2, 4th ed., 1985, tables 22 and 23",
+            "Cowper, The shear coefficient in Timoshenko's beam theory, J. Appl. Mech. 33 (1966) 335-340",
+        ],
+        examples: &[
+            Example {
+                id: "paper",
+                title: "Steel shaft 90 x 2000 between centres: the source paper's own",
+                job: include_str!("examples/paper.json"),
+            },
+            Example {
+                id: "stepped_with_rest",
+                title: "Stepped shaft with a one-sided steady rest, all force components, LinuxCNC program",
+                job: include_str!("examples/stepped_with_rest.json"),
+            },
+            Example {
+                id: "chuck_and_tailstock",
+                title: "Hollow shaft in a chuck with tailstock, Kienzle force model, tool wear and a soft tailstock",
+                job: include_str!("examples/chuck_and_tailstock.json"),
+            },
+            Example {
+                id: "two_passes",
+                title: "Roughing and finishing a crooked blank: what is copied",
+                job: include_str!("examples/two_passes.json"),
+            },
+        ],
+        study_outputs: &["/form_error_um", "/form_error_after_um", "/largest_error_um", "/cutting_time_min"],
+        codes: CODES,
+        figures: picture::FIGURE_IDS,
+        tables: picture::TABLE_IDS,
+        has_program: true,
+    };
+
+    fn fill(job: &mut Job) {
+        if let Some(found) = job.shaft.material.take().as_deref().and_then(material::find) {
+            let shaft = &mut job.shaft;
+            shaft.youngs_modulus_n_per_mm2.get_or_insert(found.youngs_modulus_n_per_mm2.value);
+            shaft.poisson_ratio.get_or_insert(found.poisson_ratio.value);
+            shaft.density_kg_per_m3.get_or_insert(found.density_kg_per_m3.value);
+            if let (None, Some(strength)) = (shaft.yield_strength_n_per_mm2, found.yield_strength_n_per_mm2) {
+                shaft.yield_strength_n_per_mm2 = Some(strength.value);
+            }
+        }
+        job.shaft.poisson_ratio.get_or_insert(DEFAULT_POISSON_RATIO);
+        job.shaft.density_kg_per_m3.get_or_insert(DEFAULT_DENSITY_KG_PER_M3);
+        for segment in &mut job.shaft.segments {
+            segment.stock_diameter_mm.get_or_insert(segment.diameter_mm);
+        }
+        for support in &mut job.supports {
+            support.fill();
+        }
+        job.path.chord_tolerance_um = Some(toolpath::chord_tolerance_um(job));
+        job.force.fill();
+    }
+
+    fn cost(job: &Job) -> Cost {
+        let stations = station_count(job) as f64;
+        let passes = job.passes.len().max(1) as f64;
+        // Measured: about 0.3 us per station and cut; each rest that opens and closes solves a contact problem anew.
+        let contacts = job.supports.iter().filter(|s| !s.carries()).count() as f64;
+        let us = stations * (passes + 1.0) * (0.5 + 1.5 * contacts);
+        let bytes = 100_000 + station_count(job) as u64 * (400 + 80 * job.passes.len() as u64);
+        let driver = match job.stations {
+            Stations::PerZone { .. } => "/stations/count",
+            Stations::List { .. } => "/stations/z_mm",
+        };
+        Cost { ms: 0.05 + us / 1000.0, bytes, driver }
+    }
+
+    fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
+        run(job, monitor)
+    }
+
+    fn figures(job: &Job, outcome: &Outcome) -> Vec<Figure> {
+        picture::figures(job, outcome)
+    }
+
+    fn tables(job: &Job, outcome: &Outcome) -> Vec<Table> {
+        picture::tables(job, outcome)
+    }
+
+    fn program(job: &Job, outcome: &Outcome) -> Option<Result<Program, Failure>> {
+        Some(toolpath::program(job, outcome))
+    }
+}
+
+/// Poisson's ratio where neither job nor material states one (steel).
+const DEFAULT_POISSON_RATIO: f64 = 0.3;
+/// Density where neither job nor material states one (steel), kg/m³.
+const DEFAULT_DENSITY_KG_PER_M3: f64 = 7850.0;
+/// Bound of the relative round-off of the compliance (`deflection/3.3`).
+const COMPLIANCE_ACCURACY: f64 = 1e-9;
+
+fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
+    crate::calculator::checkpoint(monitor)?;
+    let grid = Grid::of(job);
+    let acting = Acting::of(&job.effects, &job.conditions, job.cut.feed_direction);
+    let (mut stage, passes) = all_cuts(job, &grid, &acting, monitor)?;
+    let driven = match job.detail {
+        Detail::Profile => None,
+        Detail::Full => {
+            monitor.progress(0.6, Message::new("stage_path"));
+            Some(drive(job, &grid, &mut stage, monitor)?)
+        }
+    };
+    monitor.progress(0.8, Message::new("stage_advice"));
+    let outcome = Assembly { job, grid: &grid, acting: &acting, stage: &stage }.outcome(driven, passes, monitor)?;
+    let warnings = advice::warnings(job, &grid, &stage, &outcome);
+    let explanation = advice::explanation(job, &outcome);
+    monitor.progress(1.0, Message::new("stage_done"));
+    Ok(Answer { output: outcome, warnings, explanation, basis: basis(job) })
+}
+
+/// The path as programmed and the radius that it produces, mm.
+struct Driven {
+    path: Path,
+    produced_mm: Vec<Option<f64>>,
+}
+
+/// Cuts the command into straight moves and predicts what they give.
+fn drive(job: &Job, grid: &Grid, stage: &mut Stage, monitor: &dyn Monitor) -> Result<Driven, Failure> {
+    let cut = &mut stage.cut;
+    let programmed = toolpath::programmed(job, grid, &cut.command_mm, &cut.status_compensated, monitor)?;
+    let produced_mm = cut.produced_mm(&stage.line, &stage.radii, &programmed.command_mm, monitor)?;
+    Ok(Driven { path: programmed.path, produced_mm })
+}
+
+/// What an outcome is put together from.
+struct Assembly<'a> {
+    job: &'a Job,
+    grid: &'a Grid,
+    acting: &'a Acting,
+    stage: &'a Stage,
+}
+
+impl Assembly<'_> {
+    fn outcome(
+        &self,
+        driven: Option<Driven>,
+        passes: Vec<PassOutcome>,
+        monitor: &dyn Monitor,
+    ) -> Result<Outcome, Failure> {
+        let Self { job, grid, acting, stage } = *self;
+        let full = job.detail == Detail::Full;
+        let stations = self.stations(driven.as_ref().map(|driven| driven.produced_mm.as_slice()));
+        let before = Form::of(&grid.z_mm, &stations.diameter_error_uncompensated_um);
+        let after = stations.diameter_error_compensated_um.as_ref().map(|errors| Form::of(&grid.z_mm, errors));
+        let time = if job.passes.is_empty() {
+            regime::cutting_time_min(job, &stage.regime, None)
+        } else {
+            let base = regime::Regime::of(&job.cut);
+            job.passes
+                .iter()
+                .map(|pass| regime::cutting_time_min(job, &base.of_pass(pass), Some(pass.diameter_mm)))
+                .sum()
+        };
+        let largest_mm = stage.cut.y_mm.iter().fold(0.0, |most: f64, y| most.max(y.abs()));
+        Ok(Outcome {
+            form_error_um: before.form_error_um,
+            form_error_after_um: after.as_ref().and_then(|form| form.form_error_um),
+            largest_error_um: largest(&before),
+            largest_error_after_um: after.as_ref().and_then(largest),
+            cutting_time_min: time,
+            before,
+            after,
+            path: driven.map(|driven| driven.path),
+            shares: advice::shares(job, grid, acting, stage)?,
+            second_order: if full { Some(second_order::second_order(job, grid, acting, stage)?) } else { None },
+            one_more_rest: if full { advice::one_more_rest(job, grid, acting, stage, monitor)? } else { None },
+            one_step: (full && !stage.line.has_contacts())
+                .then(|| one_step(&stage.line, &stage.radii, &stage.cut, job.force.depth_exponent())),
+            passes,
+            numerical_error_um: 2.0 * (stage.cut.residual_mm + COMPLIANCE_ACCURACY * largest_mm) * UM_PER_MM,
+            stations,
+        })
+    }
+
+    fn stations(&self, produced: Option<&[Option<f64>]>) -> StationColumns {
+        let Self { job, grid, acting, stage } = *self;
+        let Stage { line, radii, cut, .. } = stage;
+        let n = grid.len();
+        let each = |value: &dyn Fn(usize) -> f64| -> Vec<f64> { (0..n).map(value).collect() };
+        let force =
+            |given: bool, component: fn(&model::Loads) -> f64| given.then(|| each(&|i| component(&cut.loads[i])));
+        let moves_aside = job.include.tangential || job.include.weight;
+        StationColumns {
+            z_mm: grid.z_mm.clone(),
+            diameter_mm: each(&|i| 2.0 * radii.target[i]),
+            stock_diameter_mm: each(&|i| 2.0 * radii.stock[i]),
+            work_compliance_um_per_n: each(&|i| line.work_mm_per_n[i] * UM_PER_MM),
+            compliance_um_per_n: each(&|i| line.compliance_mm_per_n(i) * UM_PER_MM),
+            depth_mm: cut.nominal_depth_mm.clone(),
+            passive_force_n: each(&|i| cut.loads[i].passive_n),
+            main_force_n: force(job.force.has_main(), |l| l.main_n),
+            feed_force_n: force(job.force.has_feed(), |l| l.feed_n),
+            deflection_um: each(&|i| cut.y_mm[i] * UM_PER_MM),
+            tangential_deflection_um: moves_aside.then(|| each(&|i| cut.z_mm[i] * UM_PER_MM)),
+            depth_uncompensated_mm: cut.uncompensated_depth_mm.iter().copied().map(Some).collect(),
+            diameter_error_uncompensated_um: cut.uncompensated_errors_um(radii),
+            offset_um: (0..n).map(|i| cut.command_mm[i].map(|r| (r - radii.target[i]) * UM_PER_MM)).collect(),
+            commanded_diameter_mm: cut.command_mm.iter().map(|r| r.map(|r| 2.0 * r)).collect(),
+            diameter_error_compensated_um: produced.map(|produced| {
+                let error = |(r, target): (&Option<f64>, &f64)| r.map(|r| 2.0 * (r - target) * UM_PER_MM);
+                produced.iter().zip(&radii.target).map(error).collect()
+            }),
+            diameter_uncertainty_um: advice::diameter_uncertainty_um(job, acting, stage),
+            copying_factor: cut.copying.clone(),
+            status_uncompensated: cut.status_uncompensated.clone(),
+            status_compensated: cut.status_compensated.clone(),
+        }
+    }
+}
+
+fn largest(form: &Form) -> Option<f64> {
+    form.form_error_um?;
+    let (high, low) = (form.largest?.diameter_error_um, form.smallest?.diameter_error_um);
+    Some(if high.abs() >= low.abs() { high } else { low })
+}
+
+/// The equations that acted.
+fn basis(job: &Job) -> Vec<Basis> {
+    const PAPER: &str = "Pegashkin, Starostin 2018, corrected";
+    let mut used = vec![
+        Basis { equation: "deflection/3.2", source: "force method, Euler-Bernoulli or Timoshenko beam" },
+        Basis { equation: "deflection/4.1", source: "equilibrium at the engaged depth" },
+        Basis { equation: "deflection/4.3", source: PAPER },
+        Basis { equation: "deflection/4.4", source: "copying of the previous surface" },
+    ];
+    used.extend(job.force.basis());
+    used.extend(
+        job.effects.iter().map(|effect| Basis { equation: effect.cause().equation, source: "catalogue of effects" }),
+    );
+    used
+}
+
+/// Everything that this calculator may utter, from where it is said.
+const CODES: Codes = Codes {
+    faults: &[check::CODES, force::FAULT_CODES],
+    failures: &[&["path_incomplete", "path_not_computed", "pass_without_command"]],
+    warnings: &[advice::WARNING_CODES, second_order::WARNING_CODES, force::WARNING_CODES],
+    explanations: &[advice::EXPLANATION_CODES],
+    stages: &[&["stage_pass", "stage_path", "stage_advice", "stage_done"]],
+    labels: &[picture::LABEL_CODES],
+};

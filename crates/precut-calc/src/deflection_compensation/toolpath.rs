@@ -1,0 +1,230 @@
+//! The commanded path in straight moves, and the program that drives it.
+
+use crate::calculator::{Block, Column, Failure, Finding, Monitor, Program, Table};
+use crate::path::{round_to_increment, simplified};
+
+use super::grid::{Grid, Zone};
+use super::input::{FeedDirection, Job, ProgramZero, Segment};
+use super::output::{Outcome, Path, PathZone, StatusCompensated};
+use super::regime::{Regime, Speed};
+
+const UM_PER_MM: f64 = 1e3;
+/// Chord tolerance where the job states neither it nor a tolerance of form, um on the radius.
+const DEFAULT_CHORD_UM: f64 = 1.0;
+/// Share of the form tolerance that the chords may use up.
+const CHORD_SHARE: f64 = 0.1;
+
+/// The path and, per station, the radius that it really commands.
+pub(super) struct Programmed {
+    pub path: Path,
+    /// Commanded radius of the rounded moves, mm; `None` outside them.
+    pub command_mm: Vec<Option<f64>>,
+}
+
+/// Largest radial deviation that the chords may have, um.
+pub(super) fn chord_tolerance_um(job: &Job) -> f64 {
+    job.path.chord_tolerance_um.unwrap_or_else(|| {
+        // The form tolerance is on the diameter, the chord's deviation on the radius.
+        job.tolerance.form_um.map_or(DEFAULT_CHORD_UM, |form| (CHORD_SHARE * form).max(job.path.increment_um) / 2.0)
+    })
+}
+
+/// Cuts the exact commands into the fewest straight moves, zone by zone; never across a shoulder.
+pub(super) fn programmed(
+    job: &Job,
+    grid: &Grid,
+    exact_mm: &[Option<f64>],
+    status: &[StatusCompensated],
+    monitor: &dyn Monitor,
+) -> Result<Programmed, Failure> {
+    let tolerance_um = chord_tolerance_um(job);
+    let increment_mm = job.path.increment_um / UM_PER_MM;
+    let mut command_mm: Vec<Option<f64>> = vec![None; grid.len()];
+    let mut zones = Vec::new();
+    let mut achieved: Option<f64> = None;
+    for zone in &grid.zones {
+        let stations = zone.first..zone.end;
+        let usable =
+            status[stations.clone()].iter().all(|s| matches!(s, StatusCompensated::Ok | StatusCompensated::NoStock));
+        let radii: Option<Vec<f64>> = exact_mm[stations.clone()].iter().copied().collect();
+        let (true, Some(radii)) = (usable, radii) else { continue };
+        let z_mm = &grid.z_mm[stations];
+        let chords = simplified(z_mm, &radii, tolerance_um / UM_PER_MM, increment_mm, monitor)?;
+        let corners: Vec<f64> = chords.vertices.iter().map(|&v| z_mm[v]).collect();
+        let half: Vec<f64> = chords.diameters_mm.iter().map(|d| d / 2.0).collect();
+        achieved = Some(achieved.map_or(chords.deviation_mm, |most| most.max(chords.deviation_mm)));
+        for (slot, r) in
+            command_mm[zone.first..zone.end].iter_mut().zip(super::grid::interpolate(&corners, &half, z_mm))
+        {
+            *slot = Some(r);
+        }
+        zones.push(path_zone(zone, corners, chords.diameters_mm, job.path.increment_um));
+    }
+    let complete = command_mm.iter().all(Option::is_some);
+    let moves = zones.iter().map(|z| z.z_mm.len().saturating_sub(1)).sum::<usize>();
+    let path = Path {
+        zones,
+        // At most one move per station, and stations are limited to 200 000.
+        moves: u32::try_from(moves).unwrap_or(u32::MAX),
+        chord_tolerance_um: tolerance_um,
+        achieved_deviation_um: achieved.map(|d| d * UM_PER_MM),
+        complete,
+    };
+    Ok(Programmed { path, command_mm })
+}
+
+fn path_zone(zone: &Zone, z_mm: Vec<f64>, commanded_diameter_mm: Vec<f64>, increment_um: f64) -> PathZone {
+    let delta = |d: &f64| round_to_increment((d - zone.diameter_mm) * UM_PER_MM, increment_um);
+    let delta_x_um = commanded_diameter_mm.iter().map(delta).collect();
+    PathZone { diameter_mm: zone.diameter_mm, z_mm, commanded_diameter_mm, delta_x_um }
+}
+
+/// The program of the (last) cut: every zone with its own approach and retract, in the order of the feed.
+pub(super) fn program(job: &Job, outcome: &Outcome) -> Result<Program, Failure> {
+    let Some(path) = &outcome.path else {
+        return Err(Failure::OutOfModel(Finding::new("path_not_computed", "/detail")));
+    };
+    if !path.complete {
+        let status = &outcome.stations.status_compensated;
+        let without =
+            status.iter().filter(|s| !matches!(s, StatusCompensated::Ok | StatusCompensated::NoStock)).count();
+        let first = status.iter().position(|s| !matches!(s, StatusCompensated::Ok | StatusCompensated::NoStock));
+        let z = first.map_or(0.0, |i| outcome.stations.z_mm[i]);
+        return Err(Failure::OutOfModel(
+            Finding::new("path_incomplete", "/stations").with("stations", without).with("first_z_mm", z),
+        ));
+    }
+    let regime = job.passes.last().map_or_else(|| Regime::of(&job.cut), |pass| Regime::of(&job.cut).of_pass(pass));
+    Ok(Writer::new(job, &regime).write(path))
+}
+
+struct Writer<'a> {
+    job: &'a Job,
+    regime: &'a Regime,
+    length_mm: f64,
+    increment_mm: f64,
+    retract_mm: f64,
+    blocks: Vec<Block>,
+}
+
+impl<'a> Writer<'a> {
+    fn new(job: &'a Job, regime: &'a Regime) -> Self {
+        let increment_mm = job.path.increment_um / UM_PER_MM;
+        let profile = job.stock_profile.iter().flat_map(|p| p.rows().iter().map(|row| row.diameter_mm));
+        let widest = job.shaft.segments.iter().map(Segment::stock_mm).chain(profile).fold(0.0, f64::max);
+        Self {
+            job,
+            regime,
+            length_mm: job.shaft.segments.iter().map(|s| s.length_mm).sum(),
+            increment_mm,
+            retract_mm: round_to_increment(widest + job.program.clearance_x_mm, increment_mm),
+            blocks: vec![Block::Modes],
+        }
+    }
+
+    fn write(mut self, path: &Path) -> Program {
+        self.blocks.push(match self.regime.speed {
+            Speed::Spindle(rpm) => Block::SpindleSpeed { rpm },
+            Speed::Surface(speed_m_per_min) => {
+                Block::SurfaceSpeed { speed_m_per_min, limit_rpm: self.job.program.spindle_limit_rpm }
+            }
+        });
+        let mut feed = Some(self.regime.feed_mm_per_rev);
+        for zone in corners_in_feed_order(path, self.regime.direction) {
+            self.zone(&zone, &mut feed);
+        }
+        self.blocks.push(Block::End);
+        Program { dialect: self.job.program.dialect, increment_mm: self.increment_mm, blocks: self.blocks }
+    }
+
+    fn zone(&mut self, corners: &[(f64, f64)], feed: &mut Option<f64>) {
+        let Some(&(first_z, first_x)) = corners.first() else { return };
+        let clear = self.clearance_before(first_z, first_x);
+        let approach_z = self.programmed_z(first_z + clear);
+        self.blocks.push(Block::Rapid { x_diameter_mm: Some(self.retract_mm), z_mm: Some(approach_z) });
+        if clear.abs() > 0.0 {
+            self.blocks.push(Block::Rapid { x_diameter_mm: Some(first_x), z_mm: None });
+        }
+        for &(z, x) in corners {
+            let z_mm = self.programmed_z(z);
+            self.blocks.push(Block::Cut { x_diameter_mm: x, z_mm, feed_mm_per_rev: feed.take() });
+        }
+        self.blocks.push(Block::Rapid { x_diameter_mm: Some(self.retract_mm), z_mm: None });
+    }
+
+    /// How far before the zone the tool may go down to the start of the cut; 0 where a thicker neighbour
+    /// stands there, and the tool then feeds in radially at the shoulder.
+    fn clearance_before(&self, z_mm: f64, x_mm: f64) -> f64 {
+        let sign = if self.regime.direction == FeedDirection::ToHeadstock { 1.0 } else { -1.0 };
+        let clearance = sign * self.job.program.clearance_z_mm;
+        let (from, to) = (z_mm.min(z_mm + clearance), z_mm.max(z_mm + clearance));
+        let mut left = 0.0;
+        for segment in &self.job.shaft.segments {
+            let right = left + segment.length_mm;
+            // Neighbours on the side of the approach have been turned already where they are to be.
+            let beyond = right > from + self.increment_mm && left < to - self.increment_mm;
+            if beyond && segment.diameter_mm >= x_mm {
+                return 0.0;
+            }
+            left = right;
+        }
+        clearance
+    }
+
+    fn programmed_z(&self, z_mm: f64) -> f64 {
+        programmed_z_mm(self.job, self.length_mm, z_mm)
+    }
+}
+
+/// Z of the program at a station: from the program's zero, rounded to the increment.
+fn programmed_z_mm(job: &Job, length_mm: f64, z_mm: f64) -> f64 {
+    let zero = match job.program.zero {
+        ProgramZero::RightFace => length_mm,
+        ProgramZero::LeftFace => 0.0,
+    };
+    round_to_increment(z_mm - zero, job.path.increment_um / UM_PER_MM)
+}
+
+/// Station and commanded diameter of every corner, zone by zone as the tool passes them.
+fn corners_in_feed_order(path: &Path, direction: FeedDirection) -> Vec<Vec<(f64, f64)>> {
+    let mut zones: Vec<Vec<(f64, f64)>> = path
+        .zones
+        .iter()
+        .map(|zone| zone.z_mm.iter().copied().zip(zone.commanded_diameter_mm.iter().copied()).collect())
+        .collect();
+    if direction == FeedDirection::ToHeadstock {
+        zones.reverse();
+        zones.iter_mut().for_each(|corners| corners.reverse());
+    }
+    zones
+}
+
+/// The path as a table, in the order of the feed: station, drawing's diameter, and the program's X and Z.
+pub(super) fn path_table(job: &Job, path: Option<&Path>) -> Table {
+    let length_mm: f64 = job.shaft.segments.iter().map(|s| s.length_mm).sum();
+    let (mut station, mut drawing, mut x, mut z) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let empty =
+        Path { zones: Vec::new(), moves: 0, chord_tolerance_um: 0.0, achieved_deviation_um: None, complete: true };
+    let path = path.unwrap_or(&empty);
+    let mut diameters: Vec<f64> = path.zones.iter().map(|zone| zone.diameter_mm).collect();
+    if job.cut.feed_direction == FeedDirection::ToHeadstock {
+        diameters.reverse();
+    }
+    for (corners, diameter) in corners_in_feed_order(path, job.cut.feed_direction).into_iter().zip(diameters) {
+        for (at, commanded) in corners {
+            station.push(at);
+            drawing.push(diameter);
+            x.push(commanded);
+            z.push(programmed_z_mm(job, length_mm, at));
+        }
+    }
+    Table {
+        id: "path",
+        columns: vec![
+            Column::numbers("z", "mm", &station),
+            Column::numbers("diameter", "mm", &drawing),
+            Column::numbers("x_diameter", "mm", &x),
+            Column::numbers("z_program", "mm", &z),
+        ],
+    }
+}

@@ -1,0 +1,263 @@
+//! The power law in depth, feed and speed.
+
+use super::law::{DepthLaw, Law, Power};
+use super::{Forces, Reached, ToolMaterial, rules};
+use crate::calculator::{Basis, Finding, Violations};
+use crate::material::Certainty;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// Least depth that the handbook's law was measured for, mm.
+const LEAST_DEPTH_MM: f64 = 0.1;
+/// Least feed that the handbook's law was measured for, mm/rev.
+const LEAST_FEED_MM_PER_REV: f64 = 0.05;
+/// Speeds that the handbook's law for carbide was measured for, m/min.
+const CARBIDE_SPEEDS_M_PER_MIN: (f64, f64) = (30.0, 300.0);
+
+/// One force as P = P_0 + C K t^x s^y v^n, t in mm, s in mm/rev, v in m/min, for t > 0.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PowerTerm {
+    /// Force at 1 mm depth, 1 mm/rev and 1 m/min: ten times the handbook's C_p, which is in kgf (2430, not 243).
+    #[schema(exclusive_minimum = 0, maximum = 10_000_000, example = 2430.0,
+        extensions(("x-unit" = json!("N")), ("x-symbol" = json!("10 C")), ("x-group" = json!("cut"))))]
+    pub coefficient: f64,
+    /// Exponent of the depth of cut.
+    #[schema(minimum = 0, maximum = 3, example = 0.9,
+        extensions(("x-unit" = json!("1")), ("x-symbol" = json!("x")), ("x-group" = json!("cut"))))]
+    pub depth_exponent: f64,
+    /// Exponent of the feed.
+    #[schema(minimum = -3, maximum = 3, example = 0.6,
+        extensions(("x-unit" = json!("1")), ("x-symbol" = json!("y")), ("x-group" = json!("cut"))))]
+    pub feed_exponent: f64,
+    /// Exponent of the cutting speed, as a rule negative or 0.
+    #[serde(default)]
+    #[schema(minimum = -3, maximum = 3, default = 0.0, example = -0.3,
+        extensions(("x-unit" = json!("1")), ("x-symbol" = json!("n")), ("x-group" = json!("cut"))))]
+    pub speed_exponent: f64,
+    /// Product of the correction factors for material and edge geometry; does not act on `constant_n`.
+    #[serde(default = "rules::one")]
+    #[schema(exclusive_minimum = 0, maximum = 100, default = 1.0, example = 0.74,
+        extensions(("x-unit" = json!("1")), ("x-symbol" = json!("K_p")), ("x-group" = json!("cut"))))]
+    pub correction_factor: f64,
+    /// Constant part by rubbing of the worn flank, added wherever something is cut.
+    #[serde(default)]
+    #[schema(minimum = 0, maximum = 1_000_000, default = 0.0, example = 60.0,
+        extensions(("x-unit" = json!("N")), ("x-symbol" = json!("P_0")), ("x-group" = json!("cut")), ("x-advanced" = json!(true))))]
+    pub constant_n: f64,
+    /// How certain the coefficients are, where they come from the library. Changes no number.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub certainty: Option<Certainty>,
+}
+
+impl PowerTerm {
+    pub(super) fn check(&self, pointer: &str, violations: &mut Violations) {
+        let mut require = |holds: bool, field: &str, value: f64, limit: f64, unit: &'static str| {
+            violations.require(holds, || {
+                Finding::new("bad_power_law", format!("{pointer}/{field}")).measured(value, limit, unit)
+            });
+        };
+        require(rules::positive(self.coefficient), "coefficient", self.coefficient, 0.0, "N");
+        require(rules::not_negative(self.depth_exponent), "depth_exponent", self.depth_exponent, 0.0, "1");
+        require(self.feed_exponent.is_finite(), "feed_exponent", self.feed_exponent, 3.0, "1");
+        require(self.speed_exponent.is_finite(), "speed_exponent", self.speed_exponent, 3.0, "1");
+        require(rules::positive(self.correction_factor), "correction_factor", self.correction_factor, 0.0, "1");
+        require(rules::not_negative(self.constant_n), "constant_n", self.constant_n, 0.0, "N");
+    }
+
+    fn at(&self, feed_mm_per_rev: f64, speed_m_per_min: f64) -> Power {
+        let factor = self.coefficient
+            * self.correction_factor
+            * feed_mm_per_rev.powf(self.feed_exponent)
+            * speed_m_per_min.powf(self.speed_exponent);
+        Power::new(factor, self.depth_exponent)
+    }
+}
+
+/// Range in which the coefficients were measured; a cut outside it draws a warning.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MeasuredRange {
+    /// Least depth of cut of the trials.
+    #[schema(minimum = 0, maximum = 100, example = 0.25,
+        extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("t_min")), ("x-group" = json!("cut")), ("x-advanced" = json!(true))))]
+    pub least_depth_mm: f64,
+    /// Largest depth of cut of the trials.
+    #[schema(exclusive_minimum = 0, maximum = 100, example = 3.0,
+        extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("t_max")), ("x-group" = json!("cut")), ("x-advanced" = json!(true))))]
+    pub largest_depth_mm: f64,
+    /// Least feed of the trials.
+    #[schema(minimum = 0, maximum = 20, example = 0.1,
+        extensions(("x-unit" = json!("mm/rev")), ("x-symbol" = json!("s_min")), ("x-group" = json!("cut")), ("x-advanced" = json!(true))))]
+    pub least_feed_mm_per_rev: f64,
+    /// Largest feed of the trials.
+    #[schema(exclusive_minimum = 0, maximum = 20, example = 0.6,
+        extensions(("x-unit" = json!("mm/rev")), ("x-symbol" = json!("s_max")), ("x-group" = json!("cut")), ("x-advanced" = json!(true))))]
+    pub largest_feed_mm_per_rev: f64,
+    /// Least cutting speed of the trials.
+    #[schema(minimum = 0, maximum = 10_000, example = 60.0,
+        extensions(("x-unit" = json!("m/min")), ("x-symbol" = json!("v_min")), ("x-group" = json!("cut")), ("x-advanced" = json!(true))))]
+    pub least_speed_m_per_min: f64,
+    /// Largest cutting speed of the trials.
+    #[schema(exclusive_minimum = 0, maximum = 10_000, example = 250.0,
+        extensions(("x-unit" = json!("m/min")), ("x-symbol" = json!("v_max")), ("x-group" = json!("cut")), ("x-advanced" = json!(true))))]
+    pub largest_speed_m_per_min: f64,
+}
+
+/// Where the coefficients of a power law come from. Changes no number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum CoefficientOrigin {
+    /// Stated in the job.
+    #[default]
+    Given,
+    /// The handbook's tables, through `handbook`.
+    Handbook,
+}
+
+/// Forces as powers of depth, feed and speed. Equation `deflection/6.1`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PowerLaw {
+    /// Passive (radial) force P_y.
+    pub passive: PowerTerm,
+    /// Main (tangential) force P_z; left out: 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub main: Option<PowerTerm>,
+    /// Feed (axial) force P_x; left out: 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub feed: Option<PowerTerm>,
+    /// Factor on the law for a worn edge; 1 for a sharp one. Does not act on the constant parts.
+    #[serde(default = "rules::one")]
+    #[schema(exclusive_minimum = 0, maximum = 10, default = 1.0, example = 1.2,
+        extensions(("x-unit" = json!("1")), ("x-symbol" = json!("K_w")), ("x-group" = json!("cut")), ("x-advanced" = json!(true))))]
+    pub wear_factor: f64,
+    /// Tool material of the trials: decides which speeds count as measured where `measured_range` is left out.
+    #[serde(default)]
+    pub tool_material: ToolMaterial,
+    /// Range of the trials. Left out: that of the handbook, t >= 0.1 mm, s >= 0.05 mm/rev, for carbide v = 30 to 300 m/min.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub measured_range: Option<MeasuredRange>,
+    /// Where the coefficients come from; written by the service.
+    #[serde(default)]
+    pub origin: CoefficientOrigin,
+}
+
+impl PowerLaw {
+    fn terms(&self) -> impl Iterator<Item = (&'static str, &PowerTerm)> {
+        [("passive", Some(&self.passive)), ("main", self.main.as_ref()), ("feed", self.feed.as_ref())]
+            .into_iter()
+            .filter_map(|(name, term)| term.map(|term| (name, term)))
+    }
+
+    pub(super) fn check(&self, pointer: &str, violations: &mut Violations) {
+        for (name, term) in self.terms() {
+            term.check(&format!("{pointer}/{name}"), violations);
+        }
+        rules::check_wear(self.wear_factor, pointer, violations);
+        if let Some(range) = &self.measured_range {
+            range.check(&format!("{pointer}/measured_range"), violations);
+        }
+    }
+
+    pub(super) fn at(&self, feed_mm_per_rev: f64, speed_m_per_min: f64) -> DepthLaw {
+        let power =
+            |term: Option<&PowerTerm>| term.map_or(Power::ZERO, |term| term.at(feed_mm_per_rev, speed_m_per_min));
+        let constant = |term: Option<&PowerTerm>| term.map_or(0.0, |term| term.constant_n);
+        let (main, feed) = (self.main.as_ref(), self.feed.as_ref());
+        let law = Law::Power { passive: power(Some(&self.passive)), main: power(main), feed: power(feed) };
+        let added = Forces { passive_n: self.passive.constant_n, main_n: constant(main), feed_n: constant(feed) };
+        DepthLaw::new(law, self.wear_factor, added)
+    }
+
+    pub(super) fn depends_on_speed(&self) -> bool {
+        self.terms().any(|(_, term)| term.speed_exponent.abs() > 0.0)
+    }
+
+    pub(super) fn extrapolations(&self, depth: Reached, feed: Reached, speed: Reached) -> Vec<Finding> {
+        let (depths, feeds, speeds) = self.range();
+        [(depth, depths, "depth", "mm"), (feed, feeds, "feed", "mm/rev"), (speed, speeds, "speed", "m/min")]
+            .into_iter()
+            .filter_map(|(reached, range, quantity, unit)| outside(reached, range, quantity, unit))
+            .collect()
+    }
+
+    fn range(&self) -> ((f64, f64), (f64, f64), (f64, f64)) {
+        match (&self.measured_range, self.tool_material) {
+            (Some(range), _) => (
+                (range.least_depth_mm, range.largest_depth_mm),
+                (range.least_feed_mm_per_rev, range.largest_feed_mm_per_rev),
+                (range.least_speed_m_per_min, range.largest_speed_m_per_min),
+            ),
+            (None, tool) => (
+                (LEAST_DEPTH_MM, f64::INFINITY),
+                (LEAST_FEED_MM_PER_REV, f64::INFINITY),
+                match tool {
+                    ToolMaterial::Carbide => CARBIDE_SPEEDS_M_PER_MIN,
+                    ToolMaterial::Hss => (0.0, f64::INFINITY),
+                },
+            ),
+        }
+    }
+
+    pub(super) fn cautions(&self, pointer: &str) -> Vec<Finding> {
+        self.terms()
+            .filter_map(|(name, term)| {
+                let certainty = term.certainty.filter(|certainty| certainty.needs_check())?;
+                Some(
+                    Finding::new("unconfirmed_force_coefficient", format!("{pointer}/{name}"))
+                        .with("certainty", certainty.name()),
+                )
+            })
+            .collect()
+    }
+
+    pub(super) fn basis(&self) -> Vec<Basis> {
+        match self.origin {
+            CoefficientOrigin::Given => {
+                vec![Basis { equation: "deflection/6.1", source: "coefficients stated in the job" }]
+            }
+            CoefficientOrigin::Handbook => handbook_basis(),
+        }
+    }
+}
+
+pub(super) fn handbook_basis() -> Vec<Basis> {
+    vec![Basis { equation: "deflection/6.1", source: super::handbook::SOURCE }]
+}
+
+/// A warning if a quantity leaves its range, below before above.
+pub(super) fn outside(
+    reached: Reached,
+    (least, largest): (f64, f64),
+    quantity: &'static str,
+    unit: &'static str,
+) -> Option<Finding> {
+    let finding = |value, limit| {
+        Finding::new("extrapolated_force_model", reached.pointer)
+            .measured(value, limit, unit)
+            .with("quantity", quantity)
+    };
+    if reached.least < least {
+        Some(finding(reached.least, least))
+    } else if reached.largest > largest {
+        Some(finding(reached.largest, largest))
+    } else {
+        None
+    }
+}
+
+impl MeasuredRange {
+    fn check(&self, pointer: &str, violations: &mut Violations) {
+        let ranges = [
+            ("largest_depth_mm", self.least_depth_mm, self.largest_depth_mm, "mm"),
+            ("largest_feed_mm_per_rev", self.least_feed_mm_per_rev, self.largest_feed_mm_per_rev, "mm/rev"),
+            ("largest_speed_m_per_min", self.least_speed_m_per_min, self.largest_speed_m_per_min, "m/min"),
+        ];
+        for (field, least, largest, unit) in ranges {
+            violations.require(rules::not_negative(least) && largest.is_finite() && least <= largest, || {
+                Finding::new("bad_power_law", format!("{pointer}/{field}")).measured(largest, least, unit)
+            });
+        }
+    }
+}

@@ -1,0 +1,223 @@
+//! The partly turned shaft: its section changes where the tool is, so redundants are eliminated at every station.
+//!
+//! All works are still polynomials between break points. They are sampled in blocks of stations, and the elimination
+//! runs over a block at once: the same few operations on all its stations.
+
+use super::bending::Bending;
+use super::form::{Form, Raised, Span, sample};
+use super::frame::{Frame, Resultant};
+use super::matrix::VANISHING;
+use super::model::Side;
+use super::plane::Plane;
+use super::station::{Rows, differences};
+
+/// Stations of a block.
+const BLOCK: usize = 32;
+
+/// One work at all stations of a block.
+type Lane = [f64; BLOCK];
+
+/// The works of one plane over the whole shaft. Rows: fixed unknowns, force at the tool, then as asked couple and weight.
+pub(super) struct Turning<'a> {
+    frame: &'a Frame,
+    plane: &'a Plane,
+    order: usize,
+    /// By interval, the upper triangle by rows.
+    works: Vec<Vec<Raised>>,
+    lanes: Vec<Lane>,
+    /// Diagonal of the redundants before the elimination.
+    pub(super) original: Vec<Lane>,
+}
+
+impl<'a> Turning<'a> {
+    pub(super) fn new(bending: Bending<'a>, plane: &'a Plane, rows: Rows) -> Self {
+        let frame = bending.frame;
+        let columns = frame.columns();
+        // The weight needs the row of the couple.
+        let order = columns + 1 + usize::from(rows.couple || rows.weight) + usize::from(rows.weight);
+        let lost = if rows.weight { differences(frame) } else { Vec::new() };
+        let builder = Builder { bending, plane, rows, order };
+        let works = (0..frame.intervals.len()).map(|k| builder.interval(k, &lost)).collect();
+        let size = order * (order + 1) / 2;
+        Self { frame, plane, order, works, lanes: vec![[0.0; BLOCK]; size], original: vec![[0.0; BLOCK]; columns] }
+    }
+
+    /// All stations, block by block: the visitor finds the reduced works in [`Self::work`].
+    pub(super) fn run(&mut self, stations: &[f64], mut visit: impl FnMut(&Self, &[f64])) {
+        let mut rest = stations;
+        let mut values = Vec::with_capacity(BLOCK);
+        let last = self.frame.intervals.len() - 1;
+        for k in 0..=last {
+            let interval = &self.frame.intervals[k];
+            let count = if k == last { rest.len() } else { rest.partition_point(|place| *place < interval.end) };
+            let (here, behind) = rest.split_at(count);
+            let span = Span { start: interval.start, end: interval.end, inverse_length: 1.0 / interval.length };
+            for block in here.chunks(BLOCK) {
+                for (form, lane) in self.works[k].iter().zip(&mut self.lanes) {
+                    values.clear();
+                    sample(form, span, block, &mut values);
+                    lane[..block.len()].copy_from_slice(&values);
+                }
+                self.eliminate();
+                self.hold(k, block);
+                visit(self, block);
+            }
+            rest = behind;
+        }
+    }
+
+    /// A work of two rows, `i <= j`, with the redundants in place.
+    pub(super) fn work(&self, i: usize, j: usize) -> &Lane {
+        &self.lanes[packed(self.order, i, j)]
+    }
+
+    /// Row of the force at the tool; couple and weight follow.
+    pub(super) fn force_row(&self) -> usize {
+        self.frame.columns()
+    }
+
+    fn eliminate(&mut self) {
+        let columns = self.frame.columns();
+        for (i, original) in self.original.iter_mut().enumerate().take(columns) {
+            *original = self.lanes[packed(self.order, i, i)];
+        }
+        let mut eliminated = vec![false; self.order];
+        for &e in &self.plane.redundants {
+            eliminated[e] = true;
+            let pivot = self.lanes[packed(self.order, e, e)];
+            let mut inverse = [0.0; BLOCK];
+            for ((inverse, pivot), original) in inverse.iter_mut().zip(&pivot).zip(&self.original[e]) {
+                *inverse = if *pivot > VANISHING * original { 1.0 / pivot } else { 0.0 };
+            }
+            for i in (0..self.order).filter(|i| !eliminated[*i]) {
+                let mut factor = self.lanes[packed(self.order, i.min(e), i.max(e))];
+                for (factor, inverse) in factor.iter_mut().zip(&inverse) {
+                    *factor *= inverse;
+                }
+                for j in (i..self.order).filter(|j| !eliminated[*j]) {
+                    let other = self.lanes[packed(self.order, j.min(e), j.max(e))];
+                    let lane = &mut self.lanes[packed(self.order, i, j)];
+                    for ((work, factor), other) in lane.iter_mut().zip(&factor).zip(&other) {
+                        *work -= factor * other;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Exactly zero on rigid supports.
+    fn hold(&mut self, k: usize, block: &[f64]) {
+        let force = self.force_row();
+        for (slot, place) in block.iter().enumerate() {
+            if self.plane.holds_tool(self.frame, k, *place) {
+                for other in 0..self.order {
+                    self.lanes[packed(self.order, force.min(other), force.max(other))][slot] = 0.0;
+                }
+            }
+        }
+    }
+}
+
+/// Place of an entry `i <= j` in the upper triangle.
+fn packed(order: usize, i: usize, j: usize) -> usize {
+    i * order - i * (i + 1) / 2 + j
+}
+
+/// Makes the polynomials of one plane.
+struct Builder<'a> {
+    bending: Bending<'a>,
+    plane: &'a Plane,
+    rows: Rows,
+    order: usize,
+}
+
+/// The weight as one side of the tool sees it: force and couple at the tool in place of the difference on the other one.
+struct Replaced {
+    force: Form,
+    couple: Form,
+}
+
+impl Builder<'_> {
+    fn interval(&self, k: usize, lost: &[[Resultant; 2]]) -> Vec<Raised> {
+        let columns = self.bending.frame.columns();
+        let mut forms = vec![Form::new(&[0.0]); self.order * (self.order + 1) / 2];
+        let replaced = if self.rows.weight { self.replaced(k, lost) } else { Vec::new() };
+        for (end, side) in [Side::Left, Side::Right].into_iter().enumerate() {
+            let mut add = |i: usize, j: usize, form: Form| {
+                let entry = &mut forms[packed(self.order, i, j)];
+                *entry = entry.plus(form);
+            };
+            let own = self.bending.by_force(k, side);
+            add(columns, columns, own[0]);
+            if self.order > columns + 1 {
+                add(columns, columns + 1, own[1]);
+            }
+            for i in 0..columns {
+                let [displacement, rotation] = self.bending.by_column(k, side, i);
+                add(i, columns, displacement);
+                if self.order > columns + 1 {
+                    add(i, columns + 1, rotation);
+                }
+                for j in i..columns {
+                    add(i, j, self.bending.pair(k, side, i, j));
+                }
+                if let Some(weight) = replaced.get(end) {
+                    let instead = displacement.times(&weight.force).plus(rotation.times(&weight.couple));
+                    add(i, columns + 2, self.bending.pair(k, side, i, columns).plus(instead));
+                }
+            }
+            if let Some(weight) = replaced.get(end) {
+                let [sag, _] = self.bending.by_column(k, side, columns);
+                let instead = own[0].times(&weight.force).plus(own[1].times(&weight.couple));
+                add(columns, columns + 2, sag.plus(instead));
+            }
+        }
+        self.spring(k, &mut forms, replaced.first());
+        forms.iter().map(|form| form.raised()).collect()
+    }
+
+    /// Springs of the base and of the unknowns.
+    fn spring(&self, k: usize, forms: &mut [Form], weight: Option<&Replaced>) {
+        let frame = self.bending.frame;
+        let columns = frame.columns();
+        for generalised in 0..2 {
+            let mut reactions: Vec<Form> =
+                frame.reactions[..columns].iter().map(|r| Form::new(&[r[generalised]])).collect();
+            let (force, couple) =
+                (self.bending.reaction(k, generalised), Form::new(&[self.bending.couple_reactions()[generalised]]));
+            reactions.push(force);
+            if self.order > columns + 1 {
+                reactions.push(couple);
+            }
+            if let Some(weight) = weight {
+                let whole = Form::new(&[frame.reactions[columns][generalised]]);
+                reactions.push(whole.plus(force.times(&weight.force)).plus(couple.times(&weight.couple)));
+            }
+            // The work of couple or weight with themselves is never asked for.
+            for i in 0..=columns {
+                for j in i..self.order {
+                    let entry = &mut forms[packed(self.order, i, j)];
+                    *entry = entry.plus(reactions[i].times(&reactions[j]).scaled(self.plane.base[generalised]));
+                }
+            }
+        }
+        for (i, compliance) in self.plane.fixed.iter().enumerate() {
+            let entry = &mut forms[packed(self.order, i, i)];
+            *entry = entry.plus(Form::new(&[*compliance]));
+        }
+    }
+
+    /// For the left and the right side of the tool.
+    fn replaced(&self, k: usize, lost: &[[Resultant; 2]]) -> Vec<Replaced> {
+        let interval = &self.bending.frame.intervals[k];
+        let missing = interval.section(Side::Right).weight_n_per_mm - interval.section(Side::Left).weight_n_per_mm;
+        // The moment about the tool of a uniform load is convex: `q h²/2 xi eta` below its chord.
+        let below = Form::new(&[0.0, -0.5 * missing * interval.length * interval.length, 0.0]);
+        let between =
+            |pick: fn(&Resultant) -> f64, end: usize| Form::new(&[pick(&lost[k][end]), pick(&lost[k + 1][end])]);
+        vec![
+            Replaced { force: between(|r| r.force, 1), couple: between(|r| r.moment, 1).plus(below) },
+            Replaced { force: between(|r| r.force, 0).scaled(-1.0), couple: between(|r| r.moment, 0).plus(below) },
+        ]
+    }
+}

@@ -1,0 +1,195 @@
+//! What every calculator must keep, walked over all that are registered.
+#![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
+
+use std::collections::BTreeSet;
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+
+use precut_calc::calculator::{
+    Calculator, Cells, Check, Failure, Figure, ForwardModel, Item, Message, Monitor, Registrar, Unwatched, Violations,
+};
+use serde_json::Value;
+
+/// Runs every rule on every calculator.
+struct Conformance {
+    ids: Vec<&'static str>,
+}
+
+impl Registrar for Conformance {
+    fn calculator<C: Calculator>(&mut self) {
+        self.ids.push(C::META.id);
+        assert!(!C::META.examples.is_empty(), "{}: no example", C::META.id);
+        for example in C::META.examples {
+            let job = prepared::<C>(example.job);
+            examples_run_and_repeat::<C>(&job, example.id);
+            cancellation_is_honoured::<C>(&job);
+            cost_is_sane::<C>(&job);
+        }
+    }
+
+    fn with_forward_model<C: Calculator + ForwardModel<Job = C::Input>>(&mut self) {
+        self.calculator::<C>();
+        for cause in C::CAUSES {
+            for parameter in cause.parameters {
+                assert!(parameter.lower <= parameter.upper, "{}: {}", cause.kind, parameter.name);
+                assert!(!parameter.unit.is_empty(), "{}: {}", cause.kind, parameter.name);
+            }
+        }
+    }
+}
+
+fn prepared<C: Calculator>(text: &str) -> C::Input {
+    let mut job: C::Input = serde_json::from_str(text).unwrap_or_else(|e| panic!("{}: {e}", C::META.id));
+    let mut violations = Violations::default();
+    job.check(&mut violations);
+    let faults = violations.into_vec();
+    assert!(faults.is_empty(), "{faults:?}");
+    C::fill(&mut job);
+    job
+}
+
+fn examples_run_and_repeat<C: Calculator>(job: &C::Input, example: &str) {
+    let at = format!("{}/{example}", C::META.id);
+    let filled = serde_json::to_value(job).unwrap();
+    let mut again: C::Input = serde_json::from_value(filled.clone()).unwrap();
+    let mut violations = Violations::default();
+    again.check(&mut violations);
+    assert!(violations.is_empty(), "{at}: the echoed job is refused");
+    C::fill(&mut again);
+    assert_eq!(serde_json::to_value(&again).unwrap(), filled, "{at}: filling twice changes the job");
+
+    let watch = Watch::default();
+    let first = C::run(job, &watch).unwrap_or_else(|e| panic!("{at}: {e}"));
+    let second = C::run(&again, &Unwatched).unwrap();
+    let output = serde_json::to_value(&first.output).unwrap();
+    let bits = |value: &Value| serde_json::to_string(value).unwrap();
+    assert_eq!(bits(&output), bits(&serde_json::to_value(&second.output).unwrap()), "{at}: not deterministic");
+    let back: C::Output = serde_json::from_value(output.clone()).unwrap_or_else(|e| panic!("{at}: {e}"));
+    assert_eq!(bits(&serde_json::to_value(&back).unwrap()), bits(&output), "{at}: does not round-trip");
+    for pointer in C::META.study_outputs {
+        assert!(output.pointer(pointer).is_some_and(|v| v.is_number() || v.is_null()), "{at}: no number at {pointer}");
+    }
+
+    let declared =
+        |lists: &[&[&'static str]]| -> BTreeSet<&'static str> { lists.iter().copied().flatten().copied().collect() };
+    let codes = C::META.codes;
+    for warning in &first.warnings {
+        assert!(declared(codes.warnings).contains(warning.code), "{at}: undeclared warning {}", warning.code);
+        assert!(
+            warning.value.is_none_or(f64::is_finite) && warning.limit.is_none_or(f64::is_finite),
+            "{at}: {warning:?}"
+        );
+    }
+    for said in &first.explanation {
+        assert!(declared(codes.explanations).contains(said.code), "{at}: undeclared explanation {}", said.code);
+    }
+    for stage in watch.stages.into_inner().unwrap() {
+        assert!(declared(codes.stages).contains(stage), "{at}: undeclared stage {stage}");
+    }
+    assert!(!first.explanation.is_empty() && !first.basis.is_empty(), "{at}: says nothing, or not by what");
+
+    let figures = C::figures(job, &first.output);
+    assert_eq!(figures.iter().map(|f| f.id).collect::<Vec<_>>(), C::META.figures, "{at}");
+    for figure in &figures {
+        figure_is_sound(figure, &declared(codes.labels), &at);
+    }
+    let tables = C::tables(job, &first.output);
+    assert_eq!(tables.iter().map(|t| t.id).collect::<Vec<_>>(), C::META.tables, "{at}");
+    for table in &tables {
+        let lengths: BTreeSet<usize> = table
+            .columns
+            .iter()
+            .map(|column| match &column.cells {
+                Cells::Numbers(cells) => cells.len(),
+                Cells::Words(cells) => cells.len(),
+            })
+            .collect();
+        assert!(lengths.len() <= 1, "{at}: table {} is ragged", table.id);
+    }
+    assert_eq!(C::program(job, &first.output).is_some(), C::META.has_program, "{at}");
+}
+
+fn figure_is_sound(figure: &Figure, labels: &BTreeSet<&'static str>, at: &str) {
+    let known = |code: &str| assert!(labels.contains(code), "{at}: undeclared label {code}");
+    known(figure.title.code);
+    known(figure.x.label);
+    for panel in &figure.panels {
+        known(panel.y.label);
+        for item in &panel.items {
+            match item {
+                Item::Line { name, x, y, .. } => {
+                    known(name);
+                    assert_eq!(x.len(), y.len(), "{at}: {name}");
+                    assert!(y.iter().flatten().chain(x).all(|v| v.is_finite()), "{at}: {name}");
+                }
+                Item::Band { name, x, lower, upper, .. } => {
+                    known(name);
+                    assert_eq!((x.len(), x.len()), (lower.len(), upper.len()), "{at}: {name}");
+                    assert!(lower.iter().zip(upper).all(|(l, u)| l <= u), "{at}: {name} is inside out");
+                }
+                Item::Points { name, x, y, .. } | Item::Outline { name, x, y, .. } => {
+                    known(name);
+                    assert_eq!(x.len(), y.len(), "{at}: {name}");
+                }
+                Item::Glyph { x, y, .. } => assert!(x.is_finite() && y.is_finite(), "{at}"),
+            }
+        }
+    }
+}
+
+/// Hears stages, and that progress never falls.
+#[derive(Default)]
+struct Watch {
+    progress: AtomicU64,
+    stages: std::sync::Mutex<Vec<&'static str>>,
+}
+
+impl Monitor for Watch {
+    fn cancelled(&self) -> bool {
+        false
+    }
+    fn progress(&self, fraction: f64, stage: Message) {
+        assert!((0.0..=1.0).contains(&fraction));
+        // Bits of non-negative floats order as the floats do.
+        assert!(self.progress.swap(fraction.to_bits(), Ordering::Relaxed) <= fraction.to_bits(), "progress falls");
+        self.stages.lock().unwrap().push(stage.code);
+    }
+}
+
+/// Cancels at the n-th look.
+struct CancelAt {
+    looks: AtomicUsize,
+    at: usize,
+}
+
+impl Monitor for CancelAt {
+    fn cancelled(&self) -> bool {
+        self.looks.fetch_add(1, Ordering::Relaxed) >= self.at
+    }
+    fn progress(&self, _fraction: f64, _stage: Message) {}
+}
+
+fn cancellation_is_honoured<C: Calculator>(job: &C::Input) {
+    let count = CancelAt { looks: AtomicUsize::new(0), at: usize::MAX };
+    C::run(job, &count).unwrap();
+    let looks = count.looks.into_inner();
+    assert!(looks > 0, "{}: never looks whether it is cancelled", C::META.id);
+    for at in [0, looks / 2, looks - 1] {
+        let cancel = CancelAt { looks: AtomicUsize::new(0), at };
+        assert_eq!(C::run(job, &cancel).err(), Some(Failure::Cancelled), "{}: look {at} of {looks}", C::META.id);
+        assert_eq!(cancel.looks.into_inner(), at + 1, "{}: goes on after the cancel", C::META.id);
+    }
+}
+
+fn cost_is_sane<C: Calculator>(job: &C::Input) {
+    let cost = C::cost(job);
+    assert!(cost.ms.is_finite() && cost.ms >= 0.0 && cost.driver.starts_with('/'), "{}: {cost:?}", C::META.id);
+}
+
+#[test]
+fn every_calculator_keeps_the_contract() {
+    let mut conformance = Conformance { ids: Vec::new() };
+    precut_calc::register(&mut conformance);
+    assert!(!conformance.ids.is_empty());
+    let distinct: BTreeSet<_> = conformance.ids.iter().collect();
+    assert_eq!(distinct.len(), conformance.ids.len());
+}

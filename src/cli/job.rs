@@ -1,0 +1,229 @@
+//! Job files: read, checked, solved without a server.
+
+use std::io::{self, IsTerminal, Read};
+use std::path::Path;
+
+use bytes::Bytes;
+use precut_calc::calculator::Unwatched;
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+use serde_json::json;
+
+use super::{Failed, JobArgs, SolveArgs, print, print_json};
+use crate::engine::{Body, Error, SyntaxFault, check_now, solve_now};
+use crate::http::{Media, written};
+use crate::registry::{Entry, Registry};
+
+/// Form of an answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum Form {
+    /// The whole answer
+    Json,
+    /// One of its tables
+    Csv,
+    /// One of its figures
+    Svg,
+    /// Its program for the machine
+    Gcode,
+}
+
+impl From<Form> for Media {
+    fn from(form: Form) -> Self {
+        match form {
+            Form::Json => Self::Json,
+            Form::Csv => Self::Csv,
+            Form::Svg => Self::Svg,
+            Form::Gcode => Self::Gcode,
+        }
+    }
+}
+
+/// `precut solve`
+pub(super) fn solve(arguments: &SolveArgs, registry: &Registry) -> Result<(), Failed> {
+    let (calculator, body) = read(&arguments.job)?;
+    let part = match arguments.format {
+        Form::Csv => arguments.table.as_deref(),
+        Form::Svg => arguments.figure.as_deref(),
+        Form::Json | Form::Gcode => None,
+    };
+    let stored = solve_now(registry, &calculator, body, &Unwatched)?;
+    let bytes = written(&stored, arguments.format.into(), part)?;
+    match &arguments.output {
+        Some(path) => std::fs::write(path, &bytes).map_err(|error| Failed::Machine(named(path, &error))),
+        None if bytes.ends_with(b"\n") => print(&bytes),
+        None => print(&bytes).and_then(|()| print(b"\n")),
+    }
+}
+
+/// `precut check`
+pub(super) fn check(arguments: &JobArgs, registry: &Registry) -> Result<(), Failed> {
+    let (calculator, body) = read(arguments)?;
+    let checked = check_now(registry, &calculator, body)?;
+    print_json(&json!({
+        "calculator": calculator,
+        "key": checked.key.to_string(),
+        "cost_ms": checked.cost.ms,
+        "input": checked.input,
+    }))
+}
+
+/// `precut example`
+pub(super) fn example(entry: &Entry, id: Option<&str>, bare: bool) -> Result<(), Failed> {
+    let meta = entry.meta();
+    let example = match id {
+        Some(id) => meta.examples.iter().find(|example| example.id == id),
+        None => meta.examples.first(),
+    };
+    let Some(example) = example else {
+        let known: Vec<_> = meta.examples.iter().map(|example| example.id).collect();
+        return Err(Failed::Machine(format!("{} has these examples: {}", meta.id, known.join(", "))));
+    };
+    let job: serde_json::Value =
+        serde_json::from_str(example.job).map_err(|error| Failed::Machine(error.to_string()))?;
+    if bare { print_json(&job) } else { print_json(&json!({ "calculator": meta.id, "job": job })) }
+}
+
+/// The calculator's name and the job's bytes.
+fn read(arguments: &JobArgs) -> Result<(String, Body), Failed> {
+    let bytes = if arguments.file.as_os_str() == "-" {
+        if io::stdin().is_terminal() {
+            eprintln!("reading the job from standard input; end it with Ctrl-D");
+        }
+        let mut bytes = Vec::new();
+        io::stdin().read_to_end(&mut bytes).map(|_| bytes)
+    } else {
+        std::fs::read(&arguments.file)
+    };
+    let bytes = bytes.map_err(|error| Failed::Machine(named(&arguments.file, &error)))?;
+    let (calculator, job) = match &arguments.calculator {
+        Some(calculator) => (calculator.clone(), bytes.into()),
+        None => job_file(bytes)?,
+    };
+    Ok((calculator, Body::Json(job)))
+}
+
+/// A job file.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct JobFile {
+    calculator: String,
+    #[serde(rename = "job")]
+    _job: IgnoredAny,
+}
+
+/// Takes a job file apart. The job keeps its bytes, and its place: whatever stands around it becomes blank, so that
+/// lines and columns of a fault are those of the file.
+fn job_file(mut bytes: Vec<u8>) -> Result<(String, Bytes), Failed> {
+    let JobFile { calculator, .. } = serde_json::from_slice(&bytes).map_err(|error| {
+        let message = error.to_string();
+        let message = message.rsplit_once(" at line ").map_or(message.as_str(), |(message, _)| message);
+        Error::Syntax(SyntaxFault {
+            code: "bad_syntax",
+            pointer: String::new(),
+            line: error.line(),
+            column: error.column(),
+            message: format!("{message}; a job file is {{\"calculator\": \"...\", \"job\": {{...}}}}"),
+        })
+    })?;
+    let (start, end) = member(&bytes, b"job").unwrap_or((0, bytes.len()));
+    bytes.truncate(end);
+    for byte in &mut bytes[..start] {
+        if *byte != b'\n' {
+            *byte = b' ';
+        }
+    }
+    Ok((calculator, bytes.into()))
+}
+
+/// Where the value of a member of the outermost object stands, in text that is known to be JSON.
+fn member(json: &[u8], name: &[u8]) -> Option<(usize, usize)> {
+    let mut depth = 0_usize;
+    let mut key: Option<&[u8]> = None;
+    let mut value_start = None;
+    let mut at = 0;
+    while at < json.len() {
+        match json[at] {
+            b'"' => {
+                let end = string_end(json, at);
+                if depth == 1 && value_start.is_none() {
+                    key = json.get(at + 1..end - 1);
+                }
+                at = end;
+                continue;
+            }
+            b':' if depth == 1 && value_start.is_none() => {
+                value_start = Some(at + 1);
+            }
+            b'{' | b'[' => depth += 1,
+            byte @ (b'}' | b']' | b',') if depth == 1 => {
+                if key == Some(name) {
+                    return value_start.map(|start| (start, at));
+                }
+                value_start = None;
+                depth -= usize::from(byte != b',');
+            }
+            b'}' | b']' => depth = depth.saturating_sub(1),
+            _ => {}
+        }
+        at += 1;
+    }
+    None
+}
+
+/// Just behind the string that begins at `start`.
+fn string_end(json: &[u8], start: usize) -> usize {
+    let mut at = start + 1;
+    while at < json.len() {
+        match json[at] {
+            b'"' => return at + 1,
+            b'\\' => at += 2,
+            _ => at += 1,
+        }
+    }
+    json.len()
+}
+
+fn named(path: &Path, error: &io::Error) -> String {
+    if path.as_os_str() == "-" { format!("standard input: {error}") } else { format!("{}: {error}", path.display()) }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    fn job_of(text: &str) -> (String, String) {
+        let (calculator, job) = job_file(text.as_bytes().to_vec()).map_err(|failed| format!("{failed:?}")).unwrap();
+        (calculator, String::from_utf8(job.to_vec()).unwrap())
+    }
+
+    #[test]
+    fn the_job_keeps_its_bytes_and_its_place() {
+        let (calculator, job) = job_of("{\"calculator\": \"beam\",\n \"job\": {\"a\": 1, \"a\": 2}}\n");
+        assert_eq!(calculator, "beam");
+        assert_eq!(job.trim(), "{\"a\": 1, \"a\": 2}");
+        assert_eq!(job.find('{'), Some(31));
+        assert_eq!(job.matches('\n').count(), 1);
+    }
+
+    #[test]
+    fn order_nesting_and_escapes_do_not_confuse_it() {
+        for (text, expected) in [
+            ("{\"job\":{\"calculator\":[1,{\"job\":2}]},\"calculator\":\"x\"}", "{\"calculator\":[1,{\"job\":2}]}"),
+            ("{\"calculator\":\"job\",\"job\":[\"}\\\"]\",\"\\\\\"]}", "[\"}\\\"]\",\"\\\\\"]"),
+            ("{\"job\":null,\"calculator\":\"x\"}", "null"),
+        ] {
+            assert_eq!(job_of(text).1.trim(), expected, "{text}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_job_file_is_said_with_its_place() {
+        for text in
+            ["", "{", "[]", "{\"job\":{}}", "{\"calculator\":\"x\"}", "{\"calculator\":\"x\",\"job\":{},\"jobs\":1}"]
+        {
+            let Err(Failed::Problem(problem)) = job_file(text.as_bytes().to_vec()) else { unreachable!("{text}") };
+            assert_eq!(problem.code(), "bad_syntax", "{text}");
+        }
+    }
+}

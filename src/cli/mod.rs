@@ -1,0 +1,258 @@
+//! The command line: the service, and the same calculators without it.
+
+mod health;
+mod job;
+mod serve;
+
+use std::ffi::OsString;
+use std::fmt::Write as _;
+use std::io::{self, Read, Write};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand};
+
+use crate::config::Flags;
+use crate::engine::Error;
+use crate::http::{Problem, auth, openapi};
+use crate::registry::{Entry, Registry, RegistryError};
+use crate::text::Language;
+
+const EXAMPLES: &str = "\
+Examples:
+  precut                                          serve on 127.0.0.1:8080, database in ./data
+  precut serve --listen 0.0.0.0:8080 --data /var/lib/precut
+  precut list                                     what can be asked
+  precut example deflection-compensation          a complete job file, ready to run
+  precut example deflection-compensation | precut solve -
+  precut solve job.json --format gcode -o shaft.nc
+  precut check job.json                           every fault of a job at once
+  PRECUT_LOG_FORMAT=json precut                   settings from the environment
+
+Exit codes:
+  0  done
+  1  the machine's fault: a file, the network, the data folder
+  2  the command line or the job is at fault; the problem document on standard error lists every fault
+  3  the job is in order but has no answer (infeasible, outside the model, not converged)
+
+Settings: `precut --print-config` prints them all. Unlike other commands, `serve` writes a database.";
+
+/// What to know before the cut: machining accuracy as a service.
+///
+/// Without a command it serves HTTP. The other commands compute right here: they need no server and write no
+/// database.
+#[derive(Debug, Parser)]
+#[command(name = "precut", version, after_long_help = EXAMPLES, after_help = "See --help for examples and exit codes.")]
+#[command(args_conflicts_with_subcommands = true, max_term_width = 110)]
+struct Cli {
+    #[command(flatten)]
+    serve: ServeArgs,
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Serve HTTP until SIGTERM or Ctrl-C
+    Serve(ServeArgs),
+    /// Compute the answer to a job file
+    Solve(SolveArgs),
+    /// Check a job file without computing: prints the job with every default filled in
+    Check(JobArgs),
+    /// List the calculators with their questions
+    List,
+    /// Print the JSON Schema of a calculator's job
+    Schema {
+        /// Name of the calculator
+        calculator: String,
+        /// The schema of the result in its place
+        #[arg(long)]
+        result: bool,
+    },
+    /// Print a job file that is ready to run
+    Example {
+        /// Name of the calculator
+        calculator: String,
+        /// Which example [default: the first]
+        id: Option<String>,
+        /// Only the job, as it is posted
+        #[arg(long)]
+        job: bool,
+    },
+    /// Print the contract of the HTTP interface (OpenAPI 3.1)
+    Openapi,
+    /// Ask a running service whether it is ready; exit code 1 if not
+    Health {
+        /// Its address [default: PRECUT_LISTEN, or http://127.0.0.1:8080]
+        #[arg(long, value_name = "URL")]
+        url: Option<String>,
+    },
+    /// Read a key from standard input and print its hash for `auth.keys`
+    #[command(after_help = "Example: openssl rand -hex 32 | tee cam.key | precut hash-key")]
+    HashKey,
+}
+
+/// How to serve.
+#[derive(Debug, Args)]
+struct ServeArgs {
+    /// File with settings (TOML)
+    #[arg(long, value_name = "FILE", env = "PRECUT_CONFIG")]
+    config: Option<PathBuf>,
+    #[command(flatten)]
+    flags: Flags,
+    /// Print the settings in force as TOML, without secrets, and stop
+    #[arg(long)]
+    print_config: bool,
+}
+
+/// Where a job is.
+#[derive(Debug, Args)]
+struct JobArgs {
+    /// Job file `{"calculator": "...", "job": {...}}`; `-` reads standard input
+    #[arg(value_name = "FILE", default_value = "-")]
+    file: PathBuf,
+    /// The file is the bare job of this calculator
+    #[arg(long, short, value_name = "NAME")]
+    calculator: Option<String>,
+}
+
+#[derive(Debug, Args)]
+struct SolveArgs {
+    #[command(flatten)]
+    job: JobArgs,
+    /// Form of the answer
+    #[arg(long, short, value_enum, default_value = "json")]
+    format: job::Form,
+    /// Which table, with `--format csv` [default: the first]
+    #[arg(long, value_name = "NAME")]
+    table: Option<String>,
+    /// Which figure, with `--format svg` [default: the first]
+    #[arg(long, value_name = "NAME")]
+    figure: Option<String>,
+    /// Write here instead of to standard output
+    #[arg(long, short, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+/// Why a command did not do what it was asked to.
+#[derive(Debug)]
+enum Failed {
+    /// The command line or the job.
+    Problem(Problem),
+    /// The machine, in words.
+    Machine(String),
+    /// The reader of our output has gone: nobody is left to tell.
+    NobodyListens,
+}
+
+impl From<Problem> for Failed {
+    fn from(problem: Problem) -> Self {
+        Self::Problem(problem)
+    }
+}
+
+impl From<Error> for Failed {
+    fn from(error: Error) -> Self {
+        Self::Problem(error.into())
+    }
+}
+
+/// Runs the command that `arguments` spell (the first is the program's name), with the calculators of `registry`.
+pub fn main(
+    arguments: impl IntoIterator<Item = OsString>,
+    registry: impl FnOnce() -> Result<Registry, RegistryError>,
+) -> ExitCode {
+    let cli = match Cli::try_parse_from(arguments) {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Help and version go to standard output and are no error; a closed pipe is none either.
+            let _ = error.print();
+            return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
+        }
+    };
+    let outcome =
+        registry().map_err(|error| Failed::Machine(error.to_string())).and_then(|registry| run(cli, &registry));
+    match outcome {
+        Ok(()) | Err(Failed::NobodyListens) => ExitCode::SUCCESS,
+        Err(Failed::Machine(message)) => {
+            let _ = writeln!(io::stderr(), "precut: {message}");
+            ExitCode::FAILURE
+        }
+        Err(Failed::Problem(problem)) => {
+            let document = problem.document(Language::default(), None);
+            let text = serde_json::to_string_pretty(&document).unwrap_or_else(|_| document.detail.clone());
+            let _ = writeln!(io::stderr(), "{text}");
+            ExitCode::from(exit_code(&problem))
+        }
+    }
+}
+
+/// As the help says.
+fn exit_code(problem: &Problem) -> u8 {
+    match (problem.status().as_u16(), problem.code()) {
+        (422, "invalid_job" | "too_expensive") => 2,
+        (422, _) => 3,
+        (400..=499, _) => 2,
+        _ => 1,
+    }
+}
+
+fn run(cli: Cli, registry: &Registry) -> Result<(), Failed> {
+    match cli.command {
+        None => serve::run(&cli.serve, registry.clone()),
+        Some(Command::Serve(serve)) => serve::run(&serve, registry.clone()),
+        Some(Command::Solve(solve)) => job::solve(&solve, registry),
+        Some(Command::Check(job)) => job::check(&job, registry),
+        Some(Command::List) => list(registry),
+        Some(Command::Schema { calculator, result }) => {
+            let entry = entry(registry, &calculator)?;
+            print_json(if result { entry.output_document() } else { entry.input_document() })
+        }
+        Some(Command::Example { calculator, id, job }) => {
+            job::example(entry(registry, &calculator)?, id.as_deref(), job)
+        }
+        Some(Command::Openapi) => print(openapi::json(registry).as_bytes()),
+        Some(Command::Health { url }) => health::ask(url),
+        Some(Command::HashKey) => hash_key(),
+    }
+}
+
+fn list(registry: &Registry) -> Result<(), Failed> {
+    let width = registry.entries().iter().map(|entry| entry.meta().id.len()).max().unwrap_or(0);
+    let mut lines = String::new();
+    for meta in registry.entries().iter().map(|entry| entry.meta()) {
+        let _ = writeln!(lines, "{:width$}  {}", meta.id, meta.question);
+    }
+    print(lines.as_bytes())
+}
+
+fn hash_key() -> Result<(), Failed> {
+    let mut key = String::new();
+    io::stdin().read_to_string(&mut key).map_err(|error| Failed::Machine(format!("standard input: {error}")))?;
+    let key = key.trim();
+    if key.len() < 16 {
+        return Err(Failed::Machine(
+            "a key has at least 16 characters; make one with `openssl rand -hex 32`".to_owned(),
+        ));
+    }
+    print(format!("{}\n", auth::hash(key)).as_bytes())
+}
+
+fn entry<'r>(registry: &'r Registry, calculator: &str) -> Result<&'r Entry, Failed> {
+    Ok(registry.entry(calculator).ok_or_else(|| Error::unknown(registry, calculator))?)
+}
+
+fn print_json(value: &impl serde::Serialize) -> Result<(), Failed> {
+    let mut text = serde_json::to_string_pretty(value).map_err(|error| Failed::Machine(error.to_string()))?;
+    text.push('\n');
+    print(text.as_bytes())
+}
+
+/// To standard output.
+fn print(bytes: &[u8]) -> Result<(), Failed> {
+    let mut out = io::stdout().lock();
+    out.write_all(bytes).and_then(|()| out.flush()).map_err(|error| match error.kind() {
+        io::ErrorKind::BrokenPipe => Failed::NobodyListens,
+        _ => Failed::Machine(format!("standard output: {error}")),
+    })
+}

@@ -1,0 +1,393 @@
+//! The configuration: one struct, one source of defaults (`config.default.toml`), one order of precedence.
+
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use figment::providers::{Format, Serialized, Toml};
+use figment::value::{Dict, Map, Value};
+use figment::{Figment, Metadata, Profile, Provider};
+use serde::{Deserialize, Serialize};
+use tracing_subscriber::EnvFilter;
+
+/// Every setting with its default and what it means; the source of the defaults.
+pub const DEFAULTS: &str = include_str!("../config.default.toml");
+
+/// Sections of the configuration: `PRECUT_LOG_LEVEL` is `log.level`.
+const SECTIONS: [&str; 6] = ["log", "limits", "cache", "shutdown", "cors", "auth"];
+
+/// Settings that are words even where they look like numbers: `PRECUT_DATA=2026`.
+const WORDS: [&str; 4] = ["listen", "data", "log.level", "log.format"];
+
+/// What the service runs with. Unknown keys are refused wherever they come from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Config {
+    /// Address and port to listen on.
+    pub listen: SocketAddr,
+    /// Folder of the database.
+    pub data: PathBuf,
+    /// Threads that calculate; 0 takes all cores.
+    pub cpu: usize,
+    /// What is logged, and how.
+    pub log: Log,
+    /// What is refused because it is too large, too slow or too much.
+    pub limits: Limits,
+    /// What is kept.
+    pub cache: Cache,
+    /// How the service stops.
+    pub shutdown: Shutdown,
+    /// Which web pages may call it.
+    pub cors: Cors,
+    /// Who may call it.
+    pub auth: Auth,
+}
+
+/// What is logged, and how.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Log {
+    /// A level or a filter of `tracing-subscriber`.
+    pub level: String,
+    /// Form of a line.
+    pub format: LogFormat,
+}
+
+/// Form of a line of the log.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum LogFormat {
+    /// For people.
+    Text,
+    /// One JSON object per line.
+    Json,
+}
+
+/// What is refused because it is too large, too slow or too much.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Limits {
+    /// Largest JSON job, bytes.
+    pub json_bytes: usize,
+    /// Largest multipart job, bytes.
+    pub multipart_bytes: usize,
+    /// A body must have arrived within this time, s.
+    pub body_timeout_s: f64,
+    /// A request's header must have arrived within this time, s.
+    pub header_timeout_s: f64,
+    /// Connections open at the same time.
+    pub connections: usize,
+    /// Requests in work at the same time.
+    pub concurrent_requests: usize,
+    /// Requests per second and client in the long run; 0 for no limit.
+    pub requests_per_s: f64,
+    /// Requests that one client may send at once.
+    pub burst: f64,
+    /// Largest estimated work of a job, ms.
+    pub job_ms: f64,
+    /// Largest estimated memory of a job, bytes.
+    pub job_bytes: u64,
+    /// How long a job may wait for a core, ms.
+    pub queue_ms: u64,
+}
+
+/// What is kept.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Cache {
+    /// Results kept in memory, bytes.
+    pub memory_bytes: u64,
+    /// Results kept in the database, bytes.
+    pub store_bytes: u64,
+    /// How long a result that nobody asks for is kept, days.
+    pub store_days: u32,
+}
+
+/// How the service stops.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Shutdown {
+    /// How long requests in work may take to finish, s.
+    pub grace_s: f64,
+}
+
+/// Which web pages may call the service.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Cors {
+    /// Allowed origins, or `*`.
+    pub origins: Vec<String>,
+}
+
+/// Who may call the service.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Auth {
+    /// Accepted keys; none: everybody may call.
+    pub keys: Vec<ApiKey>,
+}
+
+/// A key that a client may send.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ApiKey {
+    /// Whose it is; stands in the log and counts for the rate limit.
+    pub name: String,
+    /// BLAKE3 of the key, 64 hexadecimal digits.
+    pub hash: String,
+}
+
+/// Settings given as flags; they win over all others.
+#[derive(Debug, Clone, Default, Serialize, clap::Args)]
+pub struct Flags {
+    /// Address and port to listen on [default: 127.0.0.1:8080]
+    #[arg(long, value_name = "ADDRESS:PORT")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub listen: Option<SocketAddr>,
+    /// Folder of the database [default: ./data]
+    #[arg(long, value_name = "DIR")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub data: Option<PathBuf>,
+    /// Threads that calculate; 0 takes all cores
+    #[arg(long, value_name = "THREADS")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cpu: Option<usize>,
+    /// Level or filter of the log [default: info]
+    #[arg(long, value_name = "LEVEL")]
+    #[serde(skip)]
+    pub log_level: Option<String>,
+    /// Form of the log [default: text]
+    #[arg(long, value_name = "FORM")]
+    #[serde(skip)]
+    pub log_format: Option<LogFormat>,
+}
+
+/// Why there is no configuration.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    /// A setting is unknown or of the wrong type; says which and where it came from.
+    #[error("{0}")]
+    Read(Box<figment::Error>),
+    /// Settings that make no sense; all of them.
+    #[error("{}", .0.join("\n"))]
+    Invalid(Vec<String>),
+}
+
+impl Config {
+    /// Defaults < file < environment < flags.
+    pub fn load(file: Option<&Path>, flags: &Flags) -> Result<Self, ConfigError> {
+        Self::from_sources(file, std::env::vars(), flags)
+    }
+
+    /// [`Config::load`] with the environment as it is given.
+    pub fn from_sources(
+        file: Option<&Path>,
+        environment: impl IntoIterator<Item = (String, String)>,
+        flags: &Flags,
+    ) -> Result<Self, ConfigError> {
+        let mut figment = Figment::from(Toml::string(DEFAULTS));
+        if let Some(file) = file {
+            figment = figment.merge(Toml::file_exact(file));
+        }
+        for variable in environment.into_iter().filter_map(Variable::new) {
+            figment = figment.merge(variable);
+        }
+        figment = figment.merge(Serialized::defaults(flags));
+        if let Some(level) = &flags.log_level {
+            figment = figment.merge(("log.level", level));
+        }
+        if let Some(format) = &flags.log_format {
+            figment = figment.merge(("log.format", format));
+        }
+        let config: Self = figment.extract().map_err(|error| ConfigError::Read(Box::new(error)))?;
+        config.validated()
+    }
+
+    /// The configuration as TOML, without secrets.
+    #[allow(clippy::missing_panics_doc)] // it cannot
+    pub fn to_toml(&self) -> String {
+        let mut shown = self.clone();
+        for key in &mut shown.auth.keys {
+            "(hidden)".clone_into(&mut key.hash);
+        }
+        toml::to_string(&shown).expect("a configuration has only TOML types")
+    }
+
+    /// Whether only this machine can reach the service.
+    pub fn is_loopback(&self) -> bool {
+        self.listen.ip().is_loopback()
+    }
+
+    fn validated(self) -> Result<Self, ConfigError> {
+        let mut faults = Vec::new();
+        let limits = &self.limits;
+        for (name, seconds) in [
+            ("limits.body_timeout_s", limits.body_timeout_s),
+            ("limits.header_timeout_s", limits.header_timeout_s),
+            ("shutdown.grace_s", self.shutdown.grace_s),
+        ] {
+            if !(0.001..=86_400.0).contains(&seconds) {
+                faults.push(format!("{name} = {seconds}: must be 0.001 to 86400 s"));
+            }
+        }
+        for (name, count) in [
+            ("limits.json_bytes", limits.json_bytes),
+            ("limits.multipart_bytes", limits.multipart_bytes),
+            ("limits.connections", limits.connections),
+            ("limits.concurrent_requests", limits.concurrent_requests),
+        ] {
+            if count == 0 {
+                faults.push(format!("{name} = 0: must be at least 1"));
+            }
+        }
+        if !(limits.requests_per_s >= 0.0 && limits.requests_per_s.is_finite()) {
+            faults.push(format!("limits.requests_per_s = {}: must be 0 or more", limits.requests_per_s));
+        }
+        if !(limits.burst >= 1.0 && limits.burst.is_finite()) {
+            faults.push(format!("limits.burst = {}: must be at least 1", limits.burst));
+        }
+        if !(limits.job_ms > 0.0 && limits.job_ms.is_finite()) {
+            faults.push(format!("limits.job_ms = {}: must be above 0", limits.job_ms));
+        }
+        if let Err(error) = EnvFilter::builder().parse(&self.log.level) {
+            faults.push(format!("log.level = \"{}\": {error}", self.log.level));
+        }
+        for (index, key) in self.auth.keys.iter().enumerate() {
+            if blake3::Hash::from_hex(&key.hash).is_err() {
+                faults.push(format!(
+                    "auth.keys[{index}].hash (\"{}\"): must be 64 hexadecimal digits, as `precut hash-key` prints them",
+                    key.name
+                ));
+            }
+        }
+        for origin in &self.cors.origins {
+            let is_origin = origin.split_once("://").is_some_and(|(scheme, host)| {
+                !scheme.is_empty() && !host.is_empty() && !host.contains('/') && host.is_ascii()
+            });
+            if origin != "*" && !is_origin {
+                faults.push(format!("cors.origins: \"{origin}\" is no origin such as https://cam.example.com"));
+            }
+        }
+        if faults.is_empty() { Ok(self) } else { Err(ConfigError::Invalid(faults)) }
+    }
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        toml::from_str(DEFAULTS).expect("a test reads the defaults")
+    }
+}
+
+/// A duration from seconds that [`Config::load`] has checked.
+pub(crate) fn seconds(s: f64) -> Duration {
+    Duration::try_from_secs_f64(s).unwrap_or(Duration::MAX)
+}
+
+/// A setting from the environment.
+struct Variable {
+    name: String,
+    key: String,
+    value: String,
+}
+
+impl Variable {
+    /// `None` for variables of others, and for the one that names the file itself.
+    fn new((name, value): (String, String)) -> Option<Self> {
+        let key = name.strip_prefix("PRECUT_")?.to_ascii_lowercase();
+        if key == "config" {
+            return None;
+        }
+        let sectioned = SECTIONS.iter().find_map(|section| {
+            key.strip_prefix(section).and_then(|rest| rest.strip_prefix('_')).map(|rest| format!("{section}.{rest}"))
+        });
+        Some(Self { name, key: sectioned.unwrap_or(key), value })
+    }
+}
+
+impl Provider for Variable {
+    fn metadata(&self) -> Metadata {
+        Metadata::named(format!("environment variable {}", self.name))
+    }
+
+    fn data(&self) -> figment::Result<Map<Profile, Dict>> {
+        let value = if WORDS.contains(&self.key.as_str()) {
+            Value::from(self.value.clone())
+        } else {
+            self.value.parse().unwrap_or_else(|never: std::convert::Infallible| match never {})
+        };
+        let nested = figment::util::nest(&self.key, value).into_dict().unwrap_or_default();
+        Ok(Map::from([(Profile::Default, nested)]))
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    fn load(file: &str, environment: &[(&str, &str)], flags: &Flags) -> Result<Config, ConfigError> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("precut.toml");
+        std::fs::write(&path, file).unwrap();
+        let environment = environment.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned()));
+        Config::from_sources(Some(&path), environment, flags)
+    }
+
+    #[test]
+    fn the_default_file_is_complete_and_valid() {
+        assert_eq!(load("", &[], &Flags::default()).unwrap(), Config::default());
+    }
+
+    #[test]
+    fn flags_win_over_environment_over_file_over_defaults() {
+        let file = "data = \"from-file\"\ncpu = 1\n[limits]\njson_bytes = 1\nburst = 7.0\n[log]\nformat = \"json\"";
+        let environment = [
+            ("PRECUT_DATA", "from-environment"),
+            ("PRECUT_LIMITS_JSON_BYTES", "2"),
+            ("PRECUT_CONFIG", "ignored-here"),
+            ("HOME", "/nobody"),
+        ];
+        let flags = Flags {
+            data: Some("from-flag".into()),
+            log_level: Some("debug".to_owned()),
+            listen: Some("127.0.0.1:9".parse().unwrap()),
+            ..Flags::default()
+        };
+        let config = load(file, &environment, &flags).unwrap();
+        assert_eq!(config.data, PathBuf::from("from-flag"));
+        assert_eq!(config.limits.json_bytes, 2);
+        assert_eq!(config.cpu, 1);
+        assert_eq!(config.log, Log { level: "debug".to_owned(), format: LogFormat::Json });
+        assert_eq!(config.listen.port(), 9);
+        assert_eq!(config.limits.multipart_bytes, Config::default().limits.multipart_bytes);
+        let config = load(file, &[("PRECUT_DATA", "2026")], &Flags::default()).unwrap();
+        assert_eq!(config.data, PathBuf::from("2026"));
+    }
+
+    #[test]
+    fn unknown_keys_are_refused_by_name_wherever_they_stand() {
+        let error = load("[limits]\njson_byte = 1", &[], &Flags::default()).unwrap_err().to_string();
+        assert!(error.contains("json_byte") && error.contains("precut.toml"), "{error}");
+        let error = load("", &[("PRECUT_LISTN", "127.0.0.1:1")], &Flags::default()).unwrap_err().to_string();
+        assert!(error.contains("listn") && error.contains("PRECUT_LISTN"), "{error}");
+    }
+
+    #[test]
+    fn senseless_values_are_all_reported_at_once() {
+        let file = "[limits]\njson_bytes = 0\nbody_timeout_s = -1.0\n[cors]\norigins = [\"cam\"]\n\
+                    [auth]\nkeys = [{ name = \"cam\", hash = \"12\" }]\n[log]\nlevel = \"precut=loud\"";
+        let error = load(file, &[], &Flags::default()).unwrap_err().to_string();
+        for name in ["json_bytes", "body_timeout_s", "cors.origins", "auth.keys[0]", "log.level"] {
+            assert!(error.contains(name), "{name} missing in: {error}");
+        }
+    }
+
+    #[test]
+    fn the_printed_configuration_reads_back_and_hides_secrets() {
+        let mut config = Config::default();
+        assert_eq!(toml::from_str::<Config>(&config.to_toml()).unwrap(), config);
+        let hash = "ab".repeat(32);
+        config.auth.keys.push(ApiKey { name: "cam".to_owned(), hash: hash.clone() });
+        assert!(!config.to_toml().contains(&hash));
+    }
+}

@@ -1,0 +1,128 @@
+//! A job on its way in, an answer on its way out.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use bytes::Bytes;
+use precut_calc::calculator::{Cost, Figure, Program, Table};
+use serde_json::Value;
+
+use super::error::Error;
+use super::key::Key;
+use crate::registry::{Entry, UnreadableResult};
+use crate::store::StoreError;
+
+/// A job as it came.
+#[derive(Debug, Clone)]
+pub enum Body {
+    /// As JSON.
+    Json(Bytes),
+    /// As JSON with measured tables beside it.
+    Parts {
+        /// The job.
+        job: Bytes,
+        /// Its tables.
+        tables: Vec<TablePart>,
+    },
+}
+
+impl Body {
+    /// Size of all of it, bytes.
+    pub(crate) fn len(&self) -> usize {
+        match self {
+            Self::Json(job) => job.len(),
+            Self::Parts { job, tables } => job.len() + tables.iter().map(|table| table.text.len()).sum::<usize>(),
+        }
+    }
+}
+
+/// A measured table as a file beside the job.
+#[derive(Debug, Clone)]
+pub struct TablePart {
+    /// Name of the field: its last part or all of it with dots.
+    pub name: String,
+    /// The CSV.
+    pub text: Bytes,
+}
+
+/// A job that could run.
+#[derive(Debug, Clone)]
+pub struct Checked {
+    /// The job with every default filled in, measured tables replaced by their row count and hash.
+    pub input: Value,
+    /// What it would cost.
+    pub cost: Cost,
+    /// The address of its answer.
+    pub key: Key,
+}
+
+/// An answer with how it came about.
+#[derive(Debug, Clone)]
+pub struct Solved {
+    /// The answer.
+    pub stored: Arc<Stored>,
+    /// Whether it was there already.
+    pub cache: CacheState,
+    /// Where the time went.
+    pub timings: Timings,
+}
+
+/// Whether an answer was there already.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CacheState {
+    /// It was.
+    Hit,
+    /// It was computed, for this request or for another one at the same time.
+    Miss,
+}
+
+/// Where the time of a request went.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Timings {
+    /// Reading and checking the job.
+    pub parse: Duration,
+    /// Waiting for a core.
+    pub queue: Duration,
+    /// Computing and writing the answer.
+    pub run: Duration,
+}
+
+/// An answer's bytes.
+pub struct Stored {
+    /// Its address.
+    pub key: Key,
+    /// The envelope in English, JSON.
+    pub body: Bytes,
+    /// The filled job in canonical JSON, with its measured tables.
+    pub(crate) input: Bytes,
+    pub(crate) entry: Arc<Entry>,
+}
+
+impl std::fmt::Debug for Stored {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Stored").field("key", &self.key).field("bytes", &self.body.len()).finish_non_exhaustive()
+    }
+}
+
+impl Stored {
+    /// Which calculator made it.
+    pub fn entry(&self) -> &Arc<Entry> {
+        &self.entry
+    }
+    /// Its pictures; the first is the main one.
+    pub fn figures(&self) -> Result<Vec<Figure>, Error> {
+        self.entry.figures(&self.input, &self.body).map_err(outdated)
+    }
+    /// Its tables; the first is the main one.
+    pub fn tables(&self) -> Result<Vec<Table>, Error> {
+        self.entry.result_tables(&self.input, &self.body).map_err(outdated)
+    }
+    /// Its program for the machine: `None` if the calculator has none, `Err` if this answer has none.
+    pub fn program(&self) -> Result<Option<Program>, Error> {
+        self.entry.program(&self.input, &self.body).map_err(outdated)?.transpose().map_err(Error::Calculation)
+    }
+}
+
+fn outdated(error: UnreadableResult) -> Error {
+    Error::Store(StoreError::Outdated(error.0))
+}

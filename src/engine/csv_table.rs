@@ -1,0 +1,374 @@
+//! A measured table as CSV text into rows.
+
+use precut_calc::calculator::Finding;
+use serde_json::{Map, Value};
+
+use super::json;
+use crate::registry::{CellKind, Faults, TableColumn, TablePlace, nearest};
+use crate::units;
+
+/// Longest piece of a cell that is shown.
+const SHOWN_CHARS: usize = 40;
+
+/// Rows with the line on which each stood.
+#[derive(Debug, Default)]
+pub(crate) struct CsvRows {
+    pub(crate) rows: Vec<Value>,
+    pub(crate) lines: Vec<u64>,
+}
+
+/// The rows of `text`; `None` after adding what is wrong with it at `pointer`.
+pub(crate) fn read(text: &str, place: &TablePlace, pointer: &str, faults: &mut Faults) -> Option<CsvRows> {
+    let before = faults.total;
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let separator = separator(text);
+    let mut reader = csv::ReaderBuilder::new()
+        .delimiter(separator)
+        .has_headers(false)
+        .flexible(true)
+        .trim(csv::Trim::All)
+        .from_reader(text.as_bytes());
+    let mut records =
+        reader.records().filter_map(Result::ok).filter(|record| record.iter().any(|cell| !cell.is_empty()));
+    let Some(header) = records.next() else {
+        faults.add(Finding::new("empty_table", pointer));
+        return None;
+    };
+    let columns = columns(&header, line(text, &header), place, pointer, faults);
+    if faults.total > before {
+        return None;
+    }
+    let table = Table { columns: &columns, decimal_comma: separator != b',', pointer };
+    let mut read = CsvRows::default();
+    for record in records {
+        if read.rows.len() == place.max_rows {
+            // A table has far fewer rows than 2^53.
+            #[allow(clippy::cast_precision_loss)]
+            faults.add(Finding::new("too_many_rows", pointer).with("maximum", place.max_rows as f64));
+            return None;
+        }
+        let line = line(text, &record);
+        read.rows.push(table.row(&record, line, faults));
+        read.lines.push(line);
+    }
+    (faults.total == before).then_some(read)
+}
+
+/// The line on which a record stands. The reader's own position is that of the empty lines before it.
+fn line(text: &str, record: &csv::StringRecord) -> u64 {
+    let Some(position) = record.position() else { return 0 };
+    let before = usize::try_from(position.byte()).unwrap_or(usize::MAX);
+    let skipped = text.as_bytes().get(before..).unwrap_or_default();
+    let empty = skipped.iter().take_while(|byte| matches!(byte, b'\n' | b'\r')).filter(|byte| **byte == b'\n').count();
+    position.line() + empty as u64
+}
+
+/// Tab, semicolon or comma: the first of them that the header has outside quotes. A header without any is a single
+/// column, which may then have decimal commas.
+fn separator(text: &str) -> u8 {
+    let header = text.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();
+    let mut quoted = false;
+    let bare: Vec<char> = header
+        .chars()
+        .filter(|c| {
+            quoted ^= *c == '"';
+            !quoted
+        })
+        .collect();
+    [b'\t', b';', b','].into_iter().find(|separator| bare.contains(&char::from(*separator))).unwrap_or(b'\t')
+}
+
+/// A column of the text: which field it fills and from which unit.
+struct CsvColumn<'a> {
+    field: &'a TableColumn,
+    unit: String,
+}
+
+fn columns<'a>(
+    header: &csv::StringRecord,
+    line: u64,
+    place: &'a TablePlace,
+    pointer: &str,
+    faults: &mut Faults,
+) -> Vec<CsvColumn<'a>> {
+    let before = faults.total;
+    let mut found: Vec<CsvColumn<'a>> = Vec::new();
+    let used = used_cells(header);
+    for cell in header.iter().take(used) {
+        let fault = |code| Finding::new(code, pointer).with("column", shown(cell)).with("line", whole(line));
+        match column(cell, place) {
+            Ok(column) if found.iter().any(|other| other.field.name == column.field.name) => {
+                faults.add(fault("duplicate_column").with("field", column.field.name.clone()));
+            }
+            Ok(column) => found.push(column),
+            Err(BadHeader::Unknown { nearest: Some(nearest) }) => {
+                faults.add(fault("unknown_column").with("nearest", nearest));
+            }
+            Err(BadHeader::Unknown { nearest: None }) => {
+                let allowed: Vec<String> = place.columns.iter().map(|column| column.name.clone()).collect();
+                faults.add(fault("unknown_column").with("allowed", allowed));
+            }
+            Err(BadHeader::NoUnit { expected }) => faults.add(fault("missing_unit").with("expected", expected)),
+            Err(BadHeader::WrongUnit { expected, received }) => {
+                faults.add(fault("wrong_unit").with("expected", expected).with("received", received));
+            }
+        }
+    }
+    let names_read = faults.total == before;
+    for field in place.columns.iter().filter(|field| field.required) {
+        // A column under a name that was not understood is not missing as well.
+        if names_read && !found.iter().any(|column| column.field.name == field.name) {
+            faults.add(Finding::new("missing_column", pointer).with("column", field.name.clone()));
+        }
+    }
+    found
+}
+
+enum BadHeader {
+    Unknown { nearest: Option<String> },
+    NoUnit { expected: String },
+    WrongUnit { expected: String, received: String },
+}
+
+/// The field that a header means: `name [unit]`, `name_unit`, or the name alone where there is no unit.
+fn column<'a>(cell: &str, place: &'a TablePlace) -> Result<CsvColumn<'a>, BadHeader> {
+    let (name, bracket) = match cell.strip_suffix(']').and_then(|cell| cell.rsplit_once('[')) {
+        Some((name, unit)) => (name, Some(unit.trim())),
+        None => (cell, None),
+    };
+    let name = name.trim().to_lowercase().replace(' ', "_");
+    for field in &place.columns {
+        let stem = field.name.strip_suffix(units::suffix(&field.unit).as_str()).unwrap_or(&field.name);
+        if name == field.name || name == stem {
+            let unit = match bracket {
+                Some(unit) => unit.to_owned(),
+                None if name == field.name || has_no_unit(field) => field.unit.clone(),
+                None => return Err(BadHeader::NoUnit { expected: field.unit.clone() }),
+            };
+            if unit == field.unit || (has_no_unit(field) && unit.is_empty()) {
+                return Ok(CsvColumn { field, unit: field.unit.clone() });
+            }
+            return match units::convert(1.0, &unit, &field.unit) {
+                Some(_) => Ok(CsvColumn { field, unit }),
+                None => Err(BadHeader::WrongUnit { expected: field.unit.clone(), received: unit }),
+            };
+        }
+        let other_unit = units::alike(&field.unit).find(|unit| {
+            let suffix = units::suffix(unit);
+            !suffix.is_empty() && name.strip_suffix(suffix.as_str()) == Some(stem)
+        });
+        if let (Some(unit), None) = (other_unit, bracket) {
+            return Ok(CsvColumn { field, unit: unit.to_owned() });
+        }
+    }
+    let names = place.columns.iter().map(|column| column.name.as_str());
+    Err(BadHeader::Unknown { nearest: nearest(&name, names).map(str::to_owned) })
+}
+
+fn has_no_unit(field: &TableColumn) -> bool {
+    field.unit.is_empty() || field.unit == "1"
+}
+
+struct Table<'a> {
+    columns: &'a [CsvColumn<'a>],
+    decimal_comma: bool,
+    pointer: &'a str,
+}
+
+impl Table<'_> {
+    fn row(&self, record: &csv::StringRecord, line: u64, faults: &mut Faults) -> Value {
+        let used = used_cells(record);
+        if used > self.columns.len() {
+            let finding = Finding::new("ragged_row", self.pointer).with("line", whole(line));
+            faults.add(finding.with("cells", used).with("columns", self.columns.len()));
+            return Value::Null;
+        }
+        let mut row = Map::new();
+        for (index, column) in self.columns.iter().enumerate() {
+            let cell = record.get(index).unwrap_or_default();
+            let fault = |code| {
+                Finding::new(code, self.pointer)
+                    .with("line", whole(line))
+                    .with("column", column.field.name.clone())
+                    .with("column_number", index + 1)
+                    .with("received", shown(cell))
+            };
+            if cell.is_empty() {
+                if column.field.required {
+                    faults.add(fault("empty_cell"));
+                }
+            } else if let Some(value) = self.value(cell, column) {
+                row.insert(column.field.name.clone(), value);
+            } else {
+                faults.add(fault("bad_cell"));
+            }
+        }
+        row.into()
+    }
+
+    fn value(&self, cell: &str, column: &CsvColumn<'_>) -> Option<Value> {
+        match column.field.kind {
+            CellKind::Word => Some(cell.into()),
+            CellKind::Truth => match cell.to_lowercase().as_str() {
+                "true" | "1" | "yes" => Some(true.into()),
+                "false" | "0" | "no" => Some(false.into()),
+                _ => None,
+            },
+            CellKind::Number | CellKind::Integer => {
+                let read = number(cell, self.decimal_comma)?;
+                let same = column.unit == column.field.unit;
+                json::number(if same { read } else { units::convert(read, &column.unit, &column.field.unit)? })
+            }
+        }
+    }
+}
+
+/// A plain decimal number: no words such as `inf`, no thousands separators.
+fn number(cell: &str, decimal_comma: bool) -> Option<f64> {
+    let plain = |c: char| c.is_ascii_digit() || matches!(c, '+' | '-' | '.' | 'e' | 'E');
+    let read = if decimal_comma && cell.contains(',') {
+        if cell.contains('.') {
+            return None;
+        }
+        cell.replace(',', ".")
+    } else {
+        cell.to_owned()
+    };
+    // The minus sign of typesetting, which spreadsheets export.
+    let read = read.replace('\u{2212}', "-");
+    if !read.chars().all(plain) {
+        return None;
+    }
+    read.parse::<f64>().ok().filter(|number| number.is_finite())
+}
+
+/// How many cells a line has, empty ones at its end left out.
+fn used_cells(record: &csv::StringRecord) -> usize {
+    (0..record.len()).rfind(|&index| !record[index].is_empty()).map_or(0, |last| last + 1)
+}
+
+fn shown(cell: &str) -> String {
+    if cell.chars().count() > SHOWN_CHARS {
+        cell.chars().take(SHOWN_CHARS).chain(['…']).collect()
+    } else {
+        cell.to_owned()
+    }
+}
+
+/// A line number; far below 2^53.
+#[allow(clippy::cast_precision_loss)]
+fn whole(line: u64) -> f64 {
+    line as f64
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::registry::toy;
+    use crate::text::{Language, Texts};
+    use proptest::prelude::*;
+    use serde_json::json;
+
+    fn place() -> TablePlace {
+        toy::registry().entry("toy-bar").unwrap().tables()[0].clone()
+    }
+
+    fn rows(text: &str) -> Value {
+        let mut faults = Faults::default();
+        let read = read(text, &place(), "/measurements", &mut faults);
+        assert!(faults.listed.is_empty(), "{text}: {:?}", faults.listed);
+        read.unwrap().rows.into()
+    }
+
+    fn codes(text: &str) -> Vec<&'static str> {
+        let mut faults = Faults::default();
+        assert!(read(text, &place(), "/measurements", &mut faults).is_none(), "{text}");
+        for finding in &faults.listed {
+            Texts::shared().try_finding(Language::En, "fault", finding).unwrap();
+        }
+        faults.listed.iter().map(|finding| finding.code).collect()
+    }
+
+    #[test]
+    fn every_way_to_write_a_table_gives_the_same_rows() {
+        let expected = json!([{"z_mm": 10, "deviation_um": -1.5}, {"z_mm": 20, "deviation_um": 0.012}]);
+        for text in [
+            "z_mm,deviation_um\n10,-1.5\n20,0.012\n",
+            "z [mm];deviation [um]\r\n10;-1,5\r\n20;0,012\r\n",
+            "\u{feff}z_mm\tdeviation_um\n\n10\t-1.5\n\n20\t1.2e-2\n\n",
+            "Z [mm],Deviation [nm]\n10,-1500\n20,12\n",
+            "z [cm];deviation [µm]\n1;-1.5\n2;,012\n",
+            "\"z [m]\",\"deviation_mm\"\n\"0.01\",\"-0.0015\"\n0.02,0.000012\n",
+            "z_mm;deviation_um;\n10;\u{2212}1,5;\n20;0,012;;\n",
+            "deviation [um],z_mm,gauge\n-1.5,10,\n0.012,20,\n",
+        ] {
+            let read = rows(text);
+            for (row, expected) in read.as_array().unwrap().iter().zip(expected.as_array().unwrap()) {
+                for name in ["z_mm", "deviation_um"] {
+                    let (a, b) = (row[name].as_f64().unwrap(), expected[name].as_f64().unwrap());
+                    assert!(a.to_bits() == b.to_bits(), "{text}: {name} is {a:e}, not {b:e}");
+                }
+            }
+            assert_eq!(read.as_array().unwrap().len(), 2, "{text}");
+        }
+    }
+
+    #[test]
+    fn words_and_counts_are_read() {
+        assert_eq!(
+            rows("z_mm;deviation_um;gauge;repeats\n1;2;\"A;B\";3\n"),
+            json!([{"z_mm": 1, "deviation_um": 2, "gauge": "A;B", "repeats": 3}])
+        );
+    }
+
+    #[test]
+    fn a_table_says_what_is_wrong_with_it() {
+        assert_eq!(codes(""), ["empty_table"]);
+        assert_eq!(codes("z,deviation_um\n1,2"), ["missing_unit"]);
+        assert_eq!(codes("z [N],deviation_um\n1,2"), ["wrong_unit"]);
+        assert_eq!(codes("z [furlong],deviation_um\n1,2"), ["wrong_unit"]);
+        assert_eq!(codes("z_mm,deviaton_um\n1,2"), ["unknown_column"]);
+        assert_eq!(codes("z_mm,z [m]\n1,2"), ["duplicate_column"]);
+        assert_eq!(codes("z_mm\n1"), ["missing_column"]);
+        assert_eq!(codes("z_mm,deviation_um\n1,2,3"), ["ragged_row"]);
+        assert_eq!(codes("z_mm,deviation_um\n1,"), ["empty_cell"]);
+        assert_eq!(codes("z_mm,deviation_um\n1,nan\n1,inf\n1,1e999\n1,x"), ["bad_cell"; 4]);
+        assert_eq!(codes("z_mm;deviation_um\n1;1.000,5"), ["bad_cell"]);
+        assert_eq!(codes(&format!("z_mm,deviation_um\n{}", "1,2\n".repeat(2001))), ["too_many_rows"]);
+    }
+
+    #[test]
+    fn a_bad_cell_is_named_by_line_and_column() {
+        let mut faults = Faults::default();
+        read("z_mm,deviation_um\n\n1,2\n3,four\n", &place(), "/measurements", &mut faults);
+        let finding = &faults.listed[0];
+        assert_eq!(finding.pointer, "/measurements");
+        assert_eq!(finding.values.get("line"), Some(&4.0.into()));
+        assert_eq!(finding.values.get("column"), Some(&"deviation_um".into()));
+        assert_eq!(finding.values.get("received"), Some(&"four".into()));
+    }
+
+    proptest! {
+        #[test]
+        fn no_text_makes_it_panic(text in "[a-z_ \\[\\];,\t\r\n\"0-9.eE+-]{0,200}") {
+            let mut faults = Faults::default();
+            let read = read(&text, &place(), "/measurements", &mut faults);
+            prop_assert_eq!(read.is_none(), faults.total > 0);
+        }
+
+        #[test]
+        fn any_bytes_after_a_good_header_give_rows_or_faults(text in "\\PC{0,200}") {
+            let mut faults = Faults::default();
+            let read = read(&format!("z_mm,deviation_um\n{text}"), &place(), "", &mut faults);
+            prop_assert_eq!(read.is_none(), faults.total > 0);
+        }
+
+        #[test]
+        fn numbers_are_read_back_to_the_last_bit(z in 0.0..20000.0_f64, d in -1e6..1e6_f64) {
+            let read = rows(&format!("z_mm;deviation_um\n{z};{}\n", format!("{d}").replace('.', ",")));
+            prop_assert_eq!(read[0]["z_mm"].as_f64().unwrap().to_bits(), z.to_bits());
+            prop_assert_eq!(read[0]["deviation_um"].as_f64().unwrap().to_bits(), d.to_bits());
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! Why a job has no answer.
+
+use std::time::Duration;
+
+use precut_calc::calculator::{Cost, Failure, Finding};
+
+use crate::registry::Registry;
+use crate::store::StoreError;
+
+/// Why a job has no answer. Knows no status codes.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Error {
+    /// The bytes are no acceptable JSON: a client's fault (400).
+    #[error("{0}")]
+    Syntax(SyntaxFault),
+    /// The job breaks rules: all of them, sorted by pointer, at most [`Error::MOST_FAULTS`] listed.
+    #[error("{total} faults in the job")]
+    Invalid {
+        /// The first of them.
+        findings: Vec<Finding>,
+        /// How many there are.
+        total: usize,
+    },
+    /// No calculator has that name.
+    #[error("no calculator is called {name:?}")]
+    UnknownCalculator {
+        /// The name asked for.
+        name: String,
+        /// The one most like it.
+        nearest: Option<&'static str>,
+    },
+    /// The job's estimate is above the limit.
+    #[error("estimated {} ms, allowed {} ms", .cost.ms, .limit.as_millis())]
+    TooExpensive {
+        /// The estimate, with the field that drives it.
+        cost: Cost,
+        /// Most time allowed.
+        limit: Duration,
+        /// Most memory allowed.
+        limit_bytes: u64,
+    },
+    /// Every core is taken and the line is full.
+    #[error("all calculation slots are taken")]
+    Busy {
+        /// When to come again.
+        retry_after: Duration,
+    },
+    /// The physics has no answer.
+    #[error(transparent)]
+    Calculation(Failure),
+    /// The store did not serve.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// Nobody waited for it any more.
+    #[error("cancelled")]
+    Cancelled,
+    /// The calculation panicked; the log has the reason.
+    #[error("the calculation crashed")]
+    Crashed,
+    /// The service stops.
+    #[error("the service is shutting down")]
+    ShuttingDown,
+}
+
+impl Error {
+    /// So many faults are listed at most.
+    pub const MOST_FAULTS: usize = 100;
+
+    /// No calculator has that name.
+    pub fn unknown(registry: &Registry, name: &str) -> Self {
+        Self::UnknownCalculator { name: name.to_owned(), nearest: registry.nearest(name) }
+    }
+}
+
+/// Where and why bytes are no acceptable JSON.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{code} at line {line}, column {column}")]
+pub struct SyntaxFault {
+    /// `bad_syntax`, `duplicate_key`, `trailing_bytes`, `nested_too_deeply`, `number_out_of_range`, `integer_too_large`,
+    /// `unexpected_end`, `empty_body`.
+    pub code: &'static str,
+    /// JSON Pointer to the value in which reading stopped.
+    pub pointer: String,
+    /// From 1.
+    pub line: usize,
+    /// From 1; 0 at the very end of a line.
+    pub column: usize,
+    /// What the parser says, without the place.
+    pub message: String,
+}

@@ -1,0 +1,83 @@
+//! The memory tier: answers by key, and keys by the bytes that asked for them.
+
+use std::sync::Arc;
+
+use precut_calc::calculator::Failure;
+use quick_cache::Weighter;
+use quick_cache::sync::Cache;
+
+use super::key::Key;
+use super::{Body, Stored};
+
+/// What a job of some key comes to: always the same.
+#[derive(Debug, Clone)]
+pub(crate) enum Kept {
+    Answer(Arc<Stored>),
+    Failure(Failure),
+}
+
+#[derive(Debug, Clone)]
+struct Bytes;
+
+impl Weighter<Key, Kept> for Bytes {
+    fn weight(&self, _key: &Key, kept: &Kept) -> u64 {
+        /// Key, handles and the cache's own bookkeeping, about.
+        const ENTRY: u64 = 256;
+        match kept {
+            Kept::Answer(stored) => ENTRY + stored.body.len() as u64 + stored.input.len() as u64,
+            Kept::Failure(_) => 2 * ENTRY,
+        }
+    }
+}
+
+/// So many bodies are recognised without being read; 64 bytes each.
+const RECOGNISED: usize = 16_384;
+
+/// The memory tier.
+pub(crate) struct Memory {
+    kept: Cache<Key, Kept, Bytes>,
+    recognised: Cache<[u8; 32], Key>,
+}
+
+impl Memory {
+    pub(crate) fn new(bytes: u64) -> Self {
+        /// What an answer weighs, about: for the cache's first table only.
+        const TYPICAL: u64 = 16 << 10;
+        let items = usize::try_from(bytes / TYPICAL).unwrap_or(usize::MAX).clamp(16, 1 << 16);
+        Self { kept: Cache::with_weighter(items, bytes, Bytes), recognised: Cache::new(RECOGNISED) }
+    }
+
+    pub(crate) fn get(&self, key: &Key) -> Option<Kept> {
+        self.kept.get(key)
+    }
+    pub(crate) fn keep(&self, key: Key, kept: Kept) {
+        self.kept.insert(key, kept);
+    }
+    /// The key of a body that was read before, by its fingerprint.
+    pub(crate) fn recognise(&self, fingerprint: &[u8; 32]) -> Option<Key> {
+        self.recognised.get(fingerprint)
+    }
+    pub(crate) fn remember(&self, fingerprint: [u8; 32], key: Key) {
+        self.recognised.insert(fingerprint, key);
+    }
+}
+
+/// Hash of a body as it came, for one calculator: equal bytes mean an equal job.
+pub(crate) fn fingerprint(calculator: &str, body: &Body) -> [u8; 32] {
+    let mut hasher = blake3::Hasher::new();
+    let mut part = |bytes: &[u8]| {
+        hasher.update(&(bytes.len() as u64).to_le_bytes()).update(bytes);
+    };
+    part(calculator.as_bytes());
+    match body {
+        Body::Json(job) => part(job),
+        Body::Parts { job, tables } => {
+            part(job);
+            for table in tables {
+                part(table.name.as_bytes());
+                part(&table.text);
+            }
+        }
+    }
+    *hasher.finalize().as_bytes()
+}

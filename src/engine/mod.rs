@@ -1,0 +1,337 @@
+//! From the bytes of a job to the bytes of its answer. Knows calculators by name, nothing of HTTP.
+
+mod answer;
+mod csv_table;
+mod envelope;
+mod error;
+mod exec;
+mod flight;
+mod json;
+mod key;
+mod memory;
+mod read;
+mod settings;
+mod table;
+#[cfg(test)]
+mod tests;
+
+pub use answer::{Body, CacheState, Checked, Solved, Stored, TablePart, Timings};
+pub use error::{Error, SyntaxFault};
+pub use key::{BadKey, ENGINE_VERSION, Key};
+pub use settings::{EngineSettings, OpenError};
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use precut_calc::calculator::{Cost, Failure, Monitor};
+
+use crate::registry::{Entry, Registry};
+use crate::store::sqlite::SqliteStore;
+use crate::store::{KeptResult, ResultPage, ResultQuery, ResultStore};
+use exec::{Cores, Slot, guarded};
+use flight::{Boarded, Flights, Landed, Pilot};
+use memory::{Kept, Memory, fingerprint};
+use read::Ready;
+
+/// Bodies up to this size are read where they arrive, larger ones on the pool: about 1 ms of reading.
+const READ_AT_ONCE: usize = 32 << 10;
+
+/// The calculators behind their cache and their pool of cores. Cheap to clone.
+#[derive(Clone)]
+pub struct Engine {
+    inner: Arc<Inner>,
+}
+
+struct Inner {
+    registry: Registry,
+    settings: EngineSettings,
+    memory: Memory,
+    flights: Arc<Flights>,
+    cores: Cores,
+    store: Arc<dyn ResultStore>,
+    closed: AtomicBool,
+}
+
+impl Engine {
+    /// Opens the store in the settings' folder and starts the threads.
+    pub async fn open(registry: Registry, settings: EngineSettings) -> Result<Self, OpenError> {
+        let store = SqliteStore::open(&settings.data, settings.store_bytes, settings.store_age).await?;
+        Self::with_store(registry, settings, Arc::new(store))
+    }
+
+    fn with_store(
+        registry: Registry,
+        settings: EngineSettings,
+        store: Arc<dyn ResultStore>,
+    ) -> Result<Self, OpenError> {
+        let cores =
+            Cores::new(settings.cores, settings.patience).map_err(|error| OpenError::Threads(error.to_string()))?;
+        let memory = Memory::new(settings.memory_cache_bytes);
+        let closed = AtomicBool::new(false);
+        let flights = Arc::default();
+        Ok(Self { inner: Arc::new(Inner { registry, settings, memory, flights, cores, store, closed }) })
+    }
+
+    /// The calculators.
+    pub fn registry(&self) -> &Registry {
+        &self.inner.registry
+    }
+
+    /// Everything but the calculation.
+    pub fn check(&self, calculator: &str, body: Body) -> Result<Checked, Error> {
+        check_now(&self.inner.registry, calculator, body)
+    }
+
+    /// The answer to a job, from the cache or computed. Dropping the future cancels the calculation unless another
+    /// request waits for the same one.
+    pub async fn solve(&self, calculator: &str, body: Body) -> Result<Solved, Error> {
+        let inner = &self.inner;
+        if inner.closed.load(Ordering::Relaxed) {
+            return Err(Error::ShuttingDown);
+        }
+        let entry = entry(&inner.registry, calculator)?;
+        let begun = Instant::now();
+        let fingerprint = fingerprint(entry.meta().id, &body);
+        if let Some(key) = inner.memory.recognise(&fingerprint)
+            && let Some(kept) = inner.look_up(&key).await
+        {
+            return hit(kept, begun.elapsed());
+        }
+        let ready = inner.read(&entry, body).await?;
+        inner.memory.remember(fingerprint, ready.key);
+        let parse = begun.elapsed();
+        if let Some(kept) = inner.look_up(&ready.key).await {
+            return hit(kept, parse);
+        }
+        inner.afford(ready.prepared.cost)?;
+        metrics::counter!("precut_cache_total", "state" => "miss").increment(1);
+        let Boarded { seat, pilot } = inner.flights.board(ready.key);
+        if let Some(pilot) = pilot {
+            self.depart(pilot, ready);
+        }
+        let Landed { outcome, timings } = seat.landed().await;
+        Ok(Solved { stored: outcome?, cache: CacheState::Miss, timings: Timings { parse, ..timings } })
+    }
+
+    /// Sees to it that the calculation runs: at once if there is a slot, else when one is free.
+    fn depart(&self, pilot: Pilot, ready: Ready) {
+        let inner = &self.inner;
+        let queued = Instant::now();
+        let grounded =
+            move |outcome| Landed { outcome, timings: Timings { queue: queued.elapsed(), ..Timings::default() } };
+        if let Some(kept) = inner.memory.get(&ready.key) {
+            // The flight before this one landed between the look into the cache and boarding.
+            return pilot.land(grounded(outcome(kept)));
+        }
+        match inner.cores.slot_now() {
+            Ok(Some(slot)) => Inner::fly(inner, pilot, ready, slot, queued),
+            Err(error) => pilot.land(grounded(Err(error))),
+            Ok(None) => {
+                let inner = Arc::clone(inner);
+                tokio::spawn(async move {
+                    match inner.cores.slot().await {
+                        Ok(slot) => Inner::fly(&inner, pilot, ready, slot, queued),
+                        Err(error) => pilot.land(grounded(Err(error))),
+                    }
+                });
+            }
+        }
+    }
+
+    /// A kept answer.
+    pub async fn result(&self, key: &Key) -> Result<Option<Arc<Stored>>, Error> {
+        match self.inner.memory.get(key) {
+            Some(Kept::Answer(stored)) => Ok(Some(stored)),
+            Some(Kept::Failure(_)) => Ok(None),
+            None => Ok(self.inner.fetch(key).await?),
+        }
+    }
+
+    /// The list of kept answers, newest first.
+    pub async fn results(&self, query: ResultQuery) -> Result<ResultPage, Error> {
+        Ok(self.inner.store.list(query).await?)
+    }
+
+    /// Whether it serves: the store answers and nobody has closed it.
+    pub async fn ready(&self) -> Result<(), Error> {
+        if self.inner.closed.load(Ordering::Relaxed) {
+            return Err(Error::ShuttingDown);
+        }
+        Ok(self.inner.store.ping().await?)
+    }
+
+    /// From now on jobs are refused and [`Engine::ready`] fails; calculations under way go on.
+    pub fn refuse_jobs(&self) {
+        self.inner.closed.store(true, Ordering::Relaxed);
+    }
+
+    /// Takes no more jobs, lets running calculations end within the grace or cancels them, writes what waits to be
+    /// written, closes the store.
+    pub async fn close(&self) {
+        self.refuse_jobs();
+        let inner = &self.inner;
+        if !inner.cores.drain(inner.settings.grace).await {
+            inner.flights.cancel_all();
+        }
+        inner.store.close().await;
+    }
+}
+
+impl Inner {
+    /// Reads a job where that does no harm.
+    async fn read(&self, entry: &Arc<Entry>, body: Body) -> Result<Ready, Error> {
+        if body.len() <= READ_AT_ONCE {
+            return guarded(|| read::read(entry, &body));
+        }
+        let slot = match self.cores.slot_now()? {
+            Some(slot) => slot,
+            None => self.cores.slot().await?,
+        };
+        let entry = Arc::clone(entry);
+        self.cores.run(slot, move || read::read(&entry, &body)).await
+    }
+
+    /// What is kept under a key, in memory or in the store. A store that fails is as good as an empty one here.
+    async fn look_up(&self, key: &Key) -> Option<Kept> {
+        if let Some(kept) = self.memory.get(key) {
+            metrics::counter!("precut_cache_total", "state" => "memory").increment(1);
+            return Some(kept);
+        }
+        match self.fetch(key).await {
+            Ok(stored) => stored.map(|stored| {
+                metrics::counter!("precut_cache_total", "state" => "store").increment(1);
+                Kept::Answer(stored)
+            }),
+            Err(error) => {
+                tracing::warn!(%error, "the store is passed over");
+                None
+            }
+        }
+    }
+
+    /// A kept answer from the store, kept in memory from now on.
+    async fn fetch(&self, key: &Key) -> Result<Option<Arc<Stored>>, crate::store::StoreError> {
+        let Some(kept) = self.store.get(*key).await? else { return Ok(None) };
+        // A calculator that is no more has no results either.
+        let Some(entry) = self.registry.entry(&kept.calculator) else { return Ok(None) };
+        let stored = Arc::new(Stored { key: *key, body: kept.body, input: kept.input, entry: Arc::clone(entry) });
+        self.memory.keep(*key, Kept::Answer(Arc::clone(&stored)));
+        Ok(Some(stored))
+    }
+
+    fn afford(&self, cost: Cost) -> Result<(), Error> {
+        let (limit, limit_bytes) = (self.settings.direct_limit, self.settings.direct_limit_bytes);
+        // An estimate that is no number is not below the limit.
+        let affordable = cost.ms <= limit.as_secs_f64() * 1e3 && cost.bytes <= limit_bytes;
+        if affordable { Ok(()) } else { Err(Error::TooExpensive { cost, limit, limit_bytes }) }
+    }
+
+    /// Runs the calculation on the pool, keeps its answer and tells it.
+    fn fly(inner: &Arc<Self>, pilot: Pilot, ready: Ready, slot: Slot, queued: Instant) {
+        let this = Arc::clone(inner);
+        inner.cores.spawn(move || {
+            let (queue, begun) = (queued.elapsed(), Instant::now());
+            let watch = pilot.watch();
+            let outcome = guarded(|| compute(&ready, &watch));
+            drop(slot);
+            let run = begun.elapsed();
+            let outcome = this.keep(&ready, outcome, run);
+            pilot.land(Landed { outcome, timings: Timings { parse: Duration::ZERO, queue, run } });
+        });
+    }
+
+    /// Keeps what would come out again: answers, and failures that follow from the job alone.
+    fn keep(&self, ready: &Ready, outcome: Result<Stored, Error>, run: Duration) -> Result<Arc<Stored>, Error> {
+        let meta = ready.entry.meta();
+        let label = match &outcome {
+            Ok(_) => "ok",
+            Err(Error::Cancelled) => "cancelled",
+            Err(Error::Crashed | Error::Calculation(Failure::Internal(_))) => "error",
+            Err(_) => "no_answer",
+        };
+        metrics::counter!("precut_calculations_total", "calculator" => meta.id, "outcome" => label).increment(1);
+        metrics::histogram!("precut_calculation_seconds", "calculator" => meta.id).record(run.as_secs_f64());
+        match outcome {
+            Ok(stored) => {
+                let stored = Arc::new(stored);
+                self.memory.keep(ready.key, Kept::Answer(Arc::clone(&stored)));
+                self.store.put(KeptResult {
+                    key: ready.key,
+                    calculator: meta.id.to_owned(),
+                    version: meta.version,
+                    engine: ENGINE_VERSION.to_owned(),
+                    input: stored.input.clone(),
+                    body: stored.body.clone(),
+                });
+                Ok(stored)
+            }
+            Err(Error::Calculation(failure)) => {
+                match &failure {
+                    Failure::Infeasible(_) | Failure::OutOfModel(_) | Failure::NotConverged { .. } => {
+                        self.memory.keep(ready.key, Kept::Failure(failure.clone()));
+                    }
+                    Failure::Internal(reason) => {
+                        tracing::error!(calculator = meta.id, key = %ready.key, reason, "a calculation failed");
+                    }
+                    Failure::Cancelled => {}
+                }
+                Err(Error::Calculation(failure))
+            }
+            Err(error) => {
+                if error == Error::Crashed {
+                    tracing::error!(calculator = meta.id, key = %ready.key, "a calculation crashed");
+                }
+                Err(error)
+            }
+        }
+    }
+}
+
+fn outcome(kept: Kept) -> Result<Arc<Stored>, Error> {
+    match kept {
+        Kept::Answer(stored) => Ok(stored),
+        Kept::Failure(failure) => Err(Error::Calculation(failure)),
+    }
+}
+
+fn hit(kept: Kept, parse: Duration) -> Result<Solved, Error> {
+    let timings = Timings { parse, ..Timings::default() };
+    Ok(Solved { stored: outcome(kept)?, cache: CacheState::Hit, timings })
+}
+
+fn entry(registry: &Registry, calculator: &str) -> Result<Arc<Entry>, Error> {
+    registry.entry(calculator).cloned().ok_or_else(|| Error::unknown(registry, calculator))
+}
+
+/// Runs a job and writes its answer.
+fn compute(ready: &Ready, monitor: &dyn Monitor) -> Result<Stored, Error> {
+    if monitor.cancelled() {
+        return Err(Error::Cancelled);
+    }
+    let written = ready.prepared.run(monitor).and_then(|computed| envelope::write(ready, &computed));
+    match written {
+        Ok(body) => Ok(Stored {
+            key: ready.key,
+            body: body.into(),
+            input: ready.canonical.clone(),
+            entry: Arc::clone(&ready.entry),
+        }),
+        Err(Failure::Cancelled) => Err(Error::Cancelled),
+        Err(failure) => Err(Error::Calculation(failure)),
+    }
+}
+
+/// [`Engine::check`] without an engine.
+#[allow(clippy::needless_pass_by_value)] // a body is handed over, here as to an engine
+pub fn check_now(registry: &Registry, calculator: &str, body: Body) -> Result<Checked, Error> {
+    let entry = entry(registry, calculator)?;
+    guarded(|| read::read(&entry, &body)).map(Ready::into_checked)
+}
+
+/// The answer to a job in this thread, without cache, store or limit of cost: for the command line.
+#[allow(clippy::needless_pass_by_value)]
+pub fn solve_now(registry: &Registry, calculator: &str, body: Body, monitor: &dyn Monitor) -> Result<Stored, Error> {
+    let entry = entry(registry, calculator)?;
+    guarded(|| compute(&read::read(&entry, &body)?, monitor))
+}

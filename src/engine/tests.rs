@@ -1,0 +1,303 @@
+//! The engine as a whole, with the toy.
+
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use std::time::{Duration, Instant};
+
+use futures_util::future::BoxFuture;
+use precut_calc::calculator::{Failure, Finding, Unwatched};
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+use super::*;
+use crate::registry::toy;
+use crate::store::StoreError;
+use crate::text::{Language, Texts};
+
+const TOY: &str = "toy-bar";
+
+async fn engine_with(change: impl FnOnce(&mut EngineSettings)) -> (Engine, TempDir) {
+    let folder = tempfile::tempdir().unwrap();
+    let mut settings = EngineSettings { cores: 2, ..EngineSettings::in_folder(folder.path()) };
+    change(&mut settings);
+    (Engine::open(toy::registry(), settings).await.unwrap(), folder)
+}
+
+async fn engine() -> (Engine, TempDir) {
+    engine_with(|_| {}).await
+}
+
+fn job(change: impl FnOnce(&mut Value)) -> Body {
+    let mut job = json!({"length_mm": 500, "segments": [{"diameter_mm": 20}]});
+    change(&mut job);
+    Body::Json(job.to_string().into())
+}
+
+fn mode(mode: &str) -> Body {
+    job(|job| job["mode"] = mode.into())
+}
+
+fn envelope(stored: &Stored) -> Value {
+    serde_json::from_slice(&stored.body).unwrap()
+}
+
+#[tokio::test]
+async fn the_envelope_has_what_every_answer_has_and_nothing_volatile() {
+    let (engine, _folder) = engine().await;
+    let body = || {
+        job(|job| {
+            job["effects"] = json!([{"kind": "elastic", "compliance_um_per_n": 0.5}]);
+            job["measurements"] = json!({"csv": "z_mm,deviation_um\n1,2\n"});
+        })
+    };
+    let solved = engine.solve(TOY, body()).await.unwrap();
+    let answer = envelope(&solved.stored);
+    let fields: Vec<&str> = answer.as_object().unwrap().keys().map(String::as_str).collect();
+    assert_eq!(
+        fields,
+        ["calculator", "version", "engine", "key", "input", "effects", "result", "explanation", "warnings", "basis"]
+    );
+    assert_eq!(answer["key"], solved.stored.key.to_string());
+    assert_eq!(answer["input"]["measurements"]["rows"], 1);
+    assert_eq!(answer["input"]["youngs_modulus_n_per_mm2"], 210_000.0);
+    assert_eq!(answer["effects"], json!([{"kind": "elastic", "compliance_um_per_n": 0.5}]));
+    assert_eq!(answer["result"]["rows"], 1);
+    assert_eq!(
+        answer["explanation"],
+        json!([{"code": "toy_bends", "text": "The toy gives 83 %.", "values": {"share": 0.83}}])
+    );
+    assert_eq!(
+        answer["warnings"],
+        json!([{"pointer": "/length_mm", "code": "toy_is_slender", "detail": "500 mm is above 100 mm", "value": 500.0,
+                "limit": 100.0, "unit": "mm"}])
+    );
+    let alone = solve_now(engine.registry(), TOY, body(), &Unwatched).unwrap();
+    assert_eq!(alone.body, solved.stored.body);
+    assert_eq!(alone.key, solved.stored.key);
+}
+
+#[tokio::test]
+async fn the_same_job_is_computed_once_however_it_is_spelled() {
+    let (engine, _folder) = engine().await;
+    let first = engine.solve(TOY, job(|_| {})).await.unwrap();
+    let again = engine.solve(TOY, job(|_| {})).await.unwrap();
+    let spelled = engine.solve(TOY, job(|job| job["stations"] = json!(3.0))).await.unwrap();
+    assert_eq!([first.cache, again.cache, spelled.cache], [CacheState::Miss, CacheState::Hit, CacheState::Hit]);
+    assert!(Arc::ptr_eq(&first.stored, &again.stored) && Arc::ptr_eq(&first.stored, &spelled.stored));
+    assert!(Arc::ptr_eq(&engine.result(&first.stored.key).await.unwrap().unwrap(), &first.stored));
+}
+
+#[tokio::test]
+async fn answers_outlive_the_engine() {
+    let (engine, folder) = engine().await;
+    let first = engine.solve(TOY, job(|_| {})).await.unwrap();
+    engine.close().await;
+    assert_eq!(engine.solve(TOY, job(|_| {})).await.unwrap_err(), Error::ShuttingDown);
+    assert_eq!(engine.ready().await, Err(Error::ShuttingDown));
+    drop(engine);
+    let engine = Engine::open(toy::registry(), EngineSettings::in_folder(folder.path())).await.unwrap();
+    engine.ready().await.unwrap();
+    let again = engine.solve(TOY, job(|_| {})).await.unwrap();
+    assert_eq!((again.cache, &again.stored.body), (CacheState::Hit, &first.stored.body));
+    assert_eq!(again.stored.figures().unwrap(), first.stored.figures().unwrap());
+    assert_eq!(again.stored.tables().unwrap(), first.stored.tables().unwrap());
+    assert_eq!(again.stored.program().unwrap(), None);
+    assert_eq!(engine.results(ResultQuery::default()).await.unwrap().items.len(), 1);
+}
+
+#[tokio::test]
+async fn equal_requests_at_the_same_time_share_one_calculation() {
+    let (engine, _folder) = engine().await;
+    let both = futures_util::future::join(engine.solve(TOY, mode("slow")), engine.solve(TOY, mode("slow"))).await;
+    let (a, b) = (both.0.unwrap(), both.1.unwrap());
+    assert!(Arc::ptr_eq(&a.stored, &b.stored));
+    assert_eq!((a.cache, b.cache), (CacheState::Miss, CacheState::Miss));
+}
+
+#[tokio::test]
+async fn a_calculation_ends_when_the_last_who_waits_has_gone() {
+    let (engine, _folder) = engine_with(|settings| settings.cores = 1).await;
+    let spawn = || {
+        let engine = engine.clone();
+        tokio::spawn(async move { engine.solve(TOY, mode("endless")).await })
+    };
+    let (first, second) = (spawn(), spawn());
+    tokio::time::sleep(Duration::from_millis(50)).await;
+    first.abort();
+    tokio::time::sleep(Duration::from_millis(50)).await;
+    assert!(!second.is_finished(), "the other still waits");
+    let begun = Instant::now();
+    second.abort();
+    // The only core is free again for the next job.
+    engine.solve(TOY, job(|_| {})).await.unwrap();
+    assert!(begun.elapsed() < Duration::from_secs(5), "cancelled after {:?}", begun.elapsed());
+}
+
+#[tokio::test]
+async fn a_panic_a_nan_and_an_impossible_job_are_told_apart() {
+    let (engine, _folder) = engine().await;
+    assert_eq!(engine.solve(TOY, mode("panic")).await.unwrap_err(), Error::Crashed);
+    let Error::Calculation(Failure::Internal(reason)) = engine.solve(TOY, mode("not_finite")).await.unwrap_err() else {
+        panic!("a NaN is our own fault")
+    };
+    assert!(reason.contains("/deflections_um/0"), "{reason}");
+    let infeasible = engine.solve(TOY, mode("infeasible")).await.unwrap_err();
+    let Error::Calculation(Failure::Infeasible(finding)) = &infeasible else { panic!("{infeasible:?}") };
+    assert!(Texts::shared().try_finding(Language::En, "fault", finding).is_ok());
+    assert_eq!(engine.solve(TOY, mode("infeasible")).await.unwrap_err(), infeasible);
+    engine.solve(TOY, job(|_| {})).await.unwrap();
+}
+
+#[tokio::test]
+async fn a_job_above_the_limit_is_refused_with_the_field_that_drives_it() {
+    let (engine, _folder) = engine().await;
+    let work = |ms: f64| job(move |job| job["work_ms"] = json!(ms));
+    let Error::TooExpensive { cost, limit, .. } = engine.solve(TOY, work(10_001.0)).await.unwrap_err() else {
+        panic!("accepted")
+    };
+    assert_eq!((cost.driver, limit), ("/work_ms", Duration::from_secs(10)));
+    let finding = Finding::new("too_expensive", cost.driver).measured(cost.ms, 1e4, "ms");
+    Texts::shared().try_finding(Language::En, "fault", &finding).unwrap();
+    engine.solve(TOY, work(10_000.0)).await.unwrap();
+}
+
+#[tokio::test]
+async fn a_full_line_is_refused_and_not_queued() {
+    let patience = Duration::from_millis(50);
+    let (engine, _folder) = engine_with(|settings| (settings.cores, settings.patience) = (1, patience)).await;
+    let spawn = |index: usize| {
+        let engine = engine.clone();
+        let body = job(|job| {
+            job["mode"] = "endless".into();
+            job["length_mm"] = json!(500 + index);
+        });
+        tokio::spawn(async move { engine.solve(TOY, body).await })
+    };
+    let running: Vec<_> = (0..2).map(spawn).collect();
+    tokio::time::sleep(Duration::from_millis(50)).await;
+    let begun = Instant::now();
+    let refused = spawn(2).await.unwrap().unwrap_err();
+    assert!(matches!(refused, Error::Busy { retry_after } if retry_after > Duration::ZERO), "{refused:?}");
+    assert!(begun.elapsed() >= patience);
+    // Two may stand in line; the third is turned away at once.
+    let line: Vec<_> = (3..5).map(spawn).collect();
+    tokio::task::yield_now().await;
+    let begun = Instant::now();
+    assert!(matches!(spawn(5).await.unwrap(), Err(Error::Busy { .. })));
+    assert!(begun.elapsed() < patience, "{:?}", begun.elapsed());
+    running.into_iter().chain(line).for_each(|task| task.abort());
+}
+
+#[tokio::test]
+async fn closing_waits_for_what_runs_and_cancels_what_runs_too_long() {
+    let (engine, _folder) = engine_with(|settings| settings.grace = Duration::from_millis(300)).await;
+    let spawn = |body: Body| {
+        let engine = engine.clone();
+        tokio::spawn(async move { engine.solve(TOY, body).await })
+    };
+    let (slow, endless) = (spawn(mode("slow")), spawn(mode("endless")));
+    tokio::time::sleep(Duration::from_millis(20)).await;
+    engine.close().await;
+    assert!(slow.await.unwrap().is_ok());
+    assert_eq!(endless.await.unwrap().unwrap_err(), Error::Cancelled);
+}
+
+#[tokio::test]
+async fn a_large_body_is_read_like_a_small_one() {
+    let (engine, _folder) = engine().await;
+    let rows: Vec<Value> = (0..1500).map(|i| json!({"z_mm": i, "deviation_um": 0.5})).collect();
+    let large = job(|job| job["measurements"] = rows.into());
+    assert!(large.len() > READ_AT_ONCE);
+    let solved = engine.solve(TOY, large.clone()).await.unwrap();
+    assert_eq!(envelope(&solved.stored)["result"]["rows"], 1500);
+    assert_eq!(engine.solve(TOY, large).await.unwrap().cache, CacheState::Hit);
+    let broken = Body::Json(format!("{{\"a\": \"{}\"", "x".repeat(READ_AT_ONCE)).into());
+    assert!(matches!(engine.solve(TOY, broken).await, Err(Error::Syntax(_))));
+}
+
+#[tokio::test]
+async fn unknown_names_come_with_the_nearest() {
+    let (engine, _folder) = engine().await;
+    let error = engine.solve("toy-baar", job(|_| {})).await.unwrap_err();
+    assert_eq!(error, Error::UnknownCalculator { name: "toy-baar".to_owned(), nearest: Some(TOY) });
+    assert_eq!(engine.check(TOY, job(|_| {})).unwrap().key, engine.solve(TOY, job(|_| {})).await.unwrap().stored.key);
+}
+
+/// A store on a disk that died.
+struct BrokenStore;
+
+impl ResultStore for BrokenStore {
+    fn get(&self, _key: Key) -> BoxFuture<'_, Result<Option<KeptResult>, StoreError>> {
+        Box::pin(async { Err(StoreError::Failed("disk I/O error".to_owned())) })
+    }
+    fn put(&self, _result: KeptResult) {}
+    fn list(&self, _query: ResultQuery) -> BoxFuture<'_, Result<ResultPage, StoreError>> {
+        Box::pin(async { Err(StoreError::Failed("disk I/O error".to_owned())) })
+    }
+    fn ping(&self) -> BoxFuture<'_, Result<(), StoreError>> {
+        Box::pin(async { Err(StoreError::Failed("disk I/O error".to_owned())) })
+    }
+    fn close(&self) -> BoxFuture<'_, ()> {
+        Box::pin(async {})
+    }
+}
+
+#[tokio::test]
+async fn a_store_that_fails_fails_no_answer() {
+    let settings = EngineSettings { cores: 1, ..EngineSettings::in_folder("unused") };
+    let engine = Engine::with_store(toy::registry(), settings, Arc::new(BrokenStore)).unwrap();
+    let solved = engine.solve(TOY, job(|_| {})).await.unwrap();
+    assert_eq!(engine.solve(TOY, job(|_| {})).await.unwrap().cache, CacheState::Hit);
+    assert!(engine.result(&solved.stored.key).await.unwrap().is_some());
+    let other = engine.check(TOY, job(|job| job["length_mm"] = json!(700))).unwrap().key;
+    assert!(matches!(engine.result(&other).await, Err(Error::Store(StoreError::Failed(_)))));
+    assert!(matches!(engine.ready().await, Err(Error::Store(StoreError::Failed(_)))));
+}
+
+#[test]
+fn what_the_calculators_utter_has_a_text_and_their_examples_run() {
+    for registry in [Registry::standard().unwrap(), toy::registry()] {
+        for entry in registry.entries() {
+            conforms(&registry, entry);
+        }
+    }
+}
+
+fn conforms(registry: &Registry, entry: &Entry) {
+    let texts = Texts::shared();
+    let meta = entry.meta();
+    for language in Language::ALL {
+        for code in entry.codes() {
+            let worded = Texts::SECTIONS.iter().any(|section| {
+                texts.has(language, section, code) || texts.has(language, section, &format!("{code}.detail"))
+            });
+            assert!(worded, "{} utters {code}, which has no {} text", meta.id, language.tag());
+        }
+    }
+    for example in meta.examples {
+        let body = || Body::Json(example.job.into());
+        let ready = read::read(&registry.entry(meta.id).unwrap().clone(), &body())
+            .unwrap_or_else(|error| panic!("{} of {}: {error:?}", example.id, meta.id));
+        let computed = ready.prepared.run(&Unwatched).unwrap();
+        for message in &computed.explanation {
+            texts.try_word(Language::En, "explanation", message.code, &message.values).unwrap();
+            assert!(meta.codes.contains(message.code), "{} utters the undeclared {}", meta.id, message.code);
+        }
+        for warning in &computed.warnings {
+            texts.try_finding(Language::En, "warning", warning).unwrap();
+            assert!(meta.codes.contains(warning.code), "{} utters the undeclared {}", meta.id, warning.code);
+        }
+        let stored = solve_now(registry, meta.id, body(), &Unwatched).unwrap();
+        assert_eq!(solve_now(registry, meta.id, body(), &Unwatched).unwrap().body, stored.body);
+        let figures: Vec<&str> = stored.figures().unwrap().iter().map(|figure| figure.id).collect();
+        assert_eq!(figures, meta.figures, "{}", meta.id);
+        let tables: Vec<&str> = stored.tables().unwrap().iter().map(|table| table.id).collect();
+        assert_eq!(tables, meta.tables, "{}", meta.id);
+        let answer = envelope(&stored);
+        let output = jsonschema::draft202012::new(entry.output_document()).unwrap();
+        assert!(output.is_valid(&answer["result"]), "{}: {:?}", meta.id, output.validate(&answer["result"]));
+        let again =
+            read::read(&registry.entry(meta.id).unwrap().clone(), &Body::Json(ready.canonical.clone())).unwrap();
+        assert_eq!(again.key, ready.key, "the filled job of {} has another key", meta.id);
+    }
+}

@@ -1,0 +1,211 @@
+//! An answer in the form that the client asked for.
+
+use std::fmt::Write as _;
+use std::sync::Arc;
+
+use axum::body::Body;
+use axum::extract::Query;
+use axum::http::header::{
+    CACHE_CONTROL, CONTENT_LANGUAGE, CONTENT_LOCATION, CONTENT_TYPE, ETAG, HeaderName, HeaderValue, VARY,
+};
+use axum::http::{HeaderMap, StatusCode, Uri};
+use axum::response::Response;
+use bytes::Bytes;
+use precut_calc::calculator::Meta;
+use serde::Deserialize;
+
+use super::negotiate::{self, Media};
+use super::problem::Problem;
+use super::{CACHE_STATE, codes};
+use crate::engine::{CacheState, Stored, Timings};
+use crate::render;
+use crate::text::{Language, Texts};
+
+const SERVER_TIMING: HeaderName = HeaderName::from_static("server-timing");
+
+/// Which form of an answer is asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct View {
+    media: Media,
+    /// Of the table or figure; the first if `None`.
+    part: Option<String>,
+    language: Language,
+}
+
+/// The query of a request for an answer.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Parts {
+    table: Option<String>,
+    figure: Option<String>,
+}
+
+/// The forms in which a calculator's answers exist.
+pub(super) fn offered(meta: &Meta) -> Vec<Media> {
+    let mut offered = vec![Media::Json];
+    offered.extend((!meta.tables.is_empty()).then_some(Media::Csv));
+    offered.extend((!meta.figures.is_empty()).then_some(Media::Svg));
+    offered.extend(meta.has_program.then_some(Media::Gcode));
+    offered
+}
+
+impl View {
+    /// What a request asks for; refused if there is no such thing.
+    pub(super) fn of(uri: &Uri, headers: &HeaderMap, meta: &Meta, offered: &[Media]) -> Result<Self, Problem> {
+        let parts = if uri.query().is_none_or(str::is_empty) {
+            Parts::default()
+        } else {
+            let Query(parts) = Query::try_from_uri(uri).map_err(|error| Problem::query(error.body_text()))?;
+            parts
+        };
+        let known = |code, part: &Option<String>, ids: &[&str]| match part {
+            Some(part) if !ids.contains(&part.as_str()) => {
+                Err(Problem::missing(code, part).with("available", ids.join(", ")))
+            }
+            _ => Ok(()),
+        };
+        known("unknown_table", &parts.table, meta.tables)?;
+        known("unknown_figure", &parts.figure, meta.figures)?;
+        let media = negotiate::media(headers, offered).ok_or_else(|| not_acceptable(offered))?;
+        let part = match media {
+            Media::Csv => parts.table,
+            Media::Svg => parts.figure,
+            Media::Json | Media::Gcode => None,
+        };
+        Ok(Self { media, part, language: negotiate::language(headers) })
+    }
+
+    /// The strong entity tag: everything that the bytes depend on.
+    fn etag(&self, stored: &Stored) -> String {
+        let mut tag = String::with_capacity(96);
+        tag.push('"');
+        tag.push_str(stored.key.to_string().trim_start_matches("b3:"));
+        let part = self.part.as_deref().unwrap_or_default();
+        let _ = write!(tag, "-{}-{part}-{}\"", self.media.short(), self.language.tag());
+        tag
+    }
+}
+
+/// The answer as a response: `304` if the client has it already.
+pub(super) async fn respond(stored: Arc<Stored>, view: View, condition: &HeaderMap) -> Result<Response, Problem> {
+    let etag = view.etag(&stored);
+    let mut response = if negotiate::has_already(condition, &etag) {
+        let mut response = Response::new(Body::empty());
+        *response.status_mut() = StatusCode::NOT_MODIFIED;
+        response
+    } else {
+        let (media, language) = (view.media, view.language);
+        let body = if media == Media::Json {
+            stored.body.clone()
+        } else {
+            let stored = stored.clone();
+            // Reading an answer back and drawing it is work: not on the threads that move bytes.
+            tokio::task::spawn_blocking(move || rendered(&stored, &view)).await.map_err(|_| Problem::internal())??
+        };
+        let mut response = Response::new(Body::from(body));
+        let headers = response.headers_mut();
+        headers.insert(CONTENT_TYPE, HeaderValue::from_static(media.content_type()));
+        headers.insert(CONTENT_LANGUAGE, HeaderValue::from_static(language.tag()));
+        response
+    };
+    let headers = response.headers_mut();
+    headers.insert(ETAG, value(etag));
+    headers.insert(CACHE_CONTROL, HeaderValue::from_static("private, no-cache"));
+    headers.insert(VARY, HeaderValue::from_static("Accept, Accept-Language, Accept-Encoding"));
+    Ok(response)
+}
+
+/// What a POST says of an answer besides: where it stays, and how it came about.
+pub(super) fn describe(response: &mut Response, stored: &Stored, cache: CacheState, timings: &Timings) {
+    let ms = |time: std::time::Duration| time.as_secs_f64() * 1e3;
+    let headers = response.headers_mut();
+    headers.insert(CONTENT_LOCATION, value(format!("/v1/results/{}", stored.key)));
+    let timing = match cache {
+        CacheState::Hit => format!("parse;dur={:.3}", ms(timings.parse)),
+        CacheState::Miss => format!(
+            "parse;dur={:.3}, queue;dur={:.3}, run;dur={:.3}",
+            ms(timings.parse),
+            ms(timings.queue),
+            ms(timings.run)
+        ),
+    };
+    headers.insert(SERVER_TIMING, value(timing));
+    let state = match cache {
+        CacheState::Hit => "hit",
+        CacheState::Miss => "miss",
+    };
+    headers.insert(CACHE_STATE, HeaderValue::from_static(state));
+}
+
+fn value(text: String) -> HeaderValue {
+    HeaderValue::from_maybe_shared(Bytes::from(text)).expect("keys, names and numbers are visible ASCII")
+}
+
+/// An answer in some form, as the command line writes it: `part` is the table or figure, the first if `None`.
+pub fn written(stored: &Stored, media: Media, part: Option<&str>) -> Result<Bytes, Problem> {
+    let meta = stored.entry().meta();
+    let offered = offered(meta);
+    if !offered.contains(&media) {
+        return Err(not_acceptable(&offered));
+    }
+    rendered(stored, &View { media, part: part.map(ToOwned::to_owned), language: Language::default() })
+}
+
+fn not_acceptable(offered: &[Media]) -> Problem {
+    let available: Vec<_> = offered.iter().map(|media| media.essence()).collect();
+    Problem::new(StatusCode::NOT_ACCEPTABLE, "not_acceptable").with("available", available.join(", "))
+}
+
+fn rendered(stored: &Stored, view: &View) -> Result<Bytes, Problem> {
+    let wanted = |id: &str| view.part.as_deref().is_none_or(|part| part == id);
+    let text = match view.media {
+        Media::Json => return Ok(stored.body.clone()),
+        Media::Csv => {
+            let tables = stored.tables()?;
+            let table = tables.iter().find(|table| wanted(table.id));
+            render::csv(table.ok_or_else(|| absent("unknown_table", view, tables.iter().map(|table| table.id)))?)
+        }
+        Media::Svg => {
+            let figures = stored.figures()?;
+            let figure = figures.iter().find(|figure| wanted(figure.id));
+            let figure =
+                figure.ok_or_else(|| absent("unknown_figure", view, figures.iter().map(|figure| figure.id)))?;
+            drawn(figure, view.language)
+        }
+        Media::Gcode => {
+            let program = stored.program()?.ok_or_else(Problem::internal)?;
+            render::gcode(&program, &program_header(stored))
+        }
+    };
+    Ok(Bytes::from(text))
+}
+
+/// A declared table or figure that this answer does not have.
+fn absent<'a>(code: &'static str, view: &View, ids: impl Iterator<Item = &'a str>) -> Problem {
+    debug_assert!(codes::status(code).is_some());
+    let available: Vec<_> = ids.collect();
+    Problem::missing(code, view.part.as_deref().unwrap_or_default()).with("available", available.join(", "))
+}
+
+fn drawn(figure: &precut_calc::calculator::Figure, language: Language) -> String {
+    let texts = Texts::shared();
+    let none = precut_calc::calculator::Values::new();
+    render::svg(
+        figure,
+        &render::Wording {
+            message: &|message| texts.message(language, "figure", message),
+            label: &|code| texts.word(language, "label", code, &none),
+            unit: &|unit| render::unit_symbol(unit),
+            decimal: '.',
+        },
+    )
+}
+
+/// Comments at the head of a program: what it is and where it comes from.
+fn program_header(stored: &Stored) -> Vec<String> {
+    let meta = stored.entry().meta();
+    vec![
+        format!("precut {} {} version {}", env!("CARGO_PKG_VERSION"), meta.id, meta.version),
+        format!("result {}", stored.key),
+    ]
+}

@@ -1,0 +1,162 @@
+//! Bodies: read within limits of size and time, as the type that they say they are.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use axum::body::Body as HttpBody;
+use axum::extract::multipart::MultipartError;
+use axum::extract::{DefaultBodyLimit, FromRequest, Multipart, Request};
+use axum::http::header::{CONTENT_ENCODING, CONTENT_LENGTH, CONTENT_TYPE};
+use axum::http::{HeaderMap, StatusCode};
+use bytes::{Bytes, BytesMut};
+use http_body_util::BodyExt;
+
+use super::Peer;
+use super::problem::Problem;
+use crate::config::{Limits, seconds};
+use crate::engine::{Body, TablePart};
+
+/// Parts of a multipart body beside `job`; a job has fewer tables.
+const MOST_TABLES: usize = 16;
+
+/// The job in the body of a request.
+pub(super) async fn job(request: Request, takes_tables: bool, limits: &Limits) -> Result<Body, Problem> {
+    let kind = Kind::of(request.headers(), takes_tables)?;
+    let limit = match kind {
+        Kind::Json => limits.json_bytes,
+        Kind::Multipart => limits.multipart_bytes,
+    };
+    let unread = request.extensions().get::<Peer>().map(|peer| peer.unread.clone());
+    let declared = declared_length(request.headers());
+    let read = async {
+        if declared.is_some_and(|length| length > limit as u64) {
+            return Err(Problem::too_large(limit));
+        }
+        match kind {
+            Kind::Json => whole(request.into_body(), declared, limit).await.map(Body::Json),
+            Kind::Multipart => parts(request, limit).await,
+        }
+    };
+    let time = seconds(limits.body_timeout_s);
+    let result = tokio::time::timeout(time, read).await.unwrap_or_else(|_| Err(Problem::too_slow(time)));
+    if result.is_err() {
+        mark(unread.as_deref());
+    }
+    result
+}
+
+/// Tells the connection that the client may still be sending.
+fn mark(unread: Option<&AtomicBool>) {
+    if let Some(unread) = unread {
+        unread.store(true, Ordering::Relaxed);
+    }
+}
+
+#[derive(Clone, Copy)]
+enum Kind {
+    Json,
+    Multipart,
+}
+
+impl Kind {
+    fn of(headers: &HeaderMap, takes_tables: bool) -> Result<Self, Problem> {
+        let refused = |received: &str| Err(Problem::media_type(received, takes_tables));
+        if let Some(encoding) = headers.get(CONTENT_ENCODING)
+            && !encoding.as_bytes().eq_ignore_ascii_case(b"identity")
+        {
+            return refused(&format!("content encoding {}", encoding.to_str().unwrap_or("?")));
+        }
+        let Some(sent) = headers.get(CONTENT_TYPE) else { return refused("none") };
+        if sent == "application/json" {
+            return Ok(Self::Json);
+        }
+        let Ok(sent) = sent.to_str() else { return refused("?") };
+        let mut parameters = sent.split(';').map(str::trim);
+        let essence = parameters.next().unwrap_or_default();
+        if essence.eq_ignore_ascii_case("multipart/form-data") && takes_tables {
+            return Ok(Self::Multipart);
+        }
+        let other_charset = parameters.filter_map(|parameter| parameter.split_once('=')).any(|(name, value)| {
+            name.trim().eq_ignore_ascii_case("charset") && !value.trim().trim_matches('"').eq_ignore_ascii_case("utf-8")
+        });
+        if essence.eq_ignore_ascii_case("application/json") && !other_charset {
+            return Ok(Self::Json);
+        }
+        refused(sent)
+    }
+}
+
+fn declared_length(headers: &HeaderMap) -> Option<u64> {
+    headers.get(CONTENT_LENGTH)?.to_str().ok()?.parse().ok()
+}
+
+/// The bytes of a body. One that came in one piece is not copied.
+async fn whole(mut body: HttpBody, declared: Option<u64>, limit: usize) -> Result<Bytes, Problem> {
+    let mut first = Bytes::new();
+    let mut rest = BytesMut::new();
+    while let Some(frame) = body.frame().await {
+        let Ok(data) = frame.map_err(|_| Problem::cut_off())?.into_data() else { continue };
+        if first.len() + rest.len() + data.len() > limit {
+            return Err(Problem::too_large(limit));
+        }
+        if first.is_empty() && rest.is_empty() {
+            first = data;
+            continue;
+        }
+        if rest.is_empty() {
+            // The limit was held against the declared length already.
+            rest.reserve(declared.and_then(|length| usize::try_from(length).ok()).unwrap_or(2 * first.len()));
+            rest.extend_from_slice(&std::mem::take(&mut first));
+        }
+        rest.extend_from_slice(&data);
+    }
+    Ok(if rest.is_empty() { first } else { rest.freeze() })
+}
+
+async fn parts(mut request: Request, limit: usize) -> Result<Body, Problem> {
+    DefaultBodyLimit::max(limit).apply(&mut request);
+    let mut multipart =
+        Multipart::from_request(request, &()).await.map_err(|error| Problem::multipart(error.body_text()))?;
+    let fault = |error: &MultipartError| {
+        let is_over_limit = error.status() == StatusCode::PAYLOAD_TOO_LARGE;
+        if is_over_limit { Problem::too_large(limit) } else { Problem::multipart(error.body_text()) }
+    };
+    let mut job = None;
+    let mut tables: Vec<TablePart> = Vec::new();
+    while let Some(field) = multipart.next_field().await.map_err(|error| fault(&error))? {
+        let Some(name) = field.name().map(ToOwned::to_owned) else {
+            return Err(Problem::multipart("a part has no name".to_owned()));
+        };
+        let bytes = field.bytes().await.map_err(|error| fault(&error))?;
+        if name == "job" {
+            if job.replace(bytes).is_some() {
+                return Err(Problem::multipart("there are two parts `job`".to_owned()));
+            }
+        } else if tables.iter().any(|table| table.name == name) {
+            return Err(Problem::multipart(format!("there are two parts `{name}`")));
+        } else if tables.len() == MOST_TABLES {
+            return Err(Problem::multipart(format!("there are more than {MOST_TABLES} tables")));
+        } else {
+            tables.push(TablePart { name, text: bytes });
+        }
+    }
+    let job = job.ok_or_else(|| Problem::new(StatusCode::BAD_REQUEST, "missing_job_part"))?;
+    Ok(Body::Parts { job, tables })
+}
+
+/// Reads and forgets what a client still sends after it was refused, so that closing the connection does not reset
+/// it before the client has read why.
+pub(super) async fn linger(io: &mut tokio::net::TcpStream, time: Duration) {
+    use tokio::io::{AsyncReadExt, AsyncWriteExt};
+    let drain = async {
+        let mut sink = vec![0_u8; 16 * 1024];
+        if io.shutdown().await.is_ok() {
+            while io.read(&mut sink).await.is_ok_and(|count| count > 0) {}
+        }
+    };
+    let _ = tokio::time::timeout(time, drain).await;
+}
+
+/// Whether a client may still be sending a body that nobody reads; shared by a connection's requests.
+pub(super) type Unread = Arc<AtomicBool>;

@@ -1,0 +1,222 @@
+//! The rooms: each calculator's own route, and what the service says of it.
+
+use std::sync::Arc;
+
+use axum::extract::{Path, Request, State};
+use axum::http::HeaderMap;
+use axum::http::header::{ACCEPT, IF_NONE_MATCH};
+use axum::response::Response;
+use precut_calc::calculator::{CalculatorKind, Meta};
+use serde::Serialize;
+use serde_json::Value;
+use utoipa::ToSchema;
+
+use super::answer::{self, View};
+use super::metrics::CacheCounters;
+use super::negotiate::{self, Media};
+use super::problem::Problem;
+use super::{App, body};
+use crate::engine::{CacheState, Error};
+use crate::registry::{Entry, Registry};
+use crate::text::Language;
+
+/// A calculator with what its route needs on every request.
+pub(super) struct Room {
+    entry: Arc<Entry>,
+    offered: Vec<Media>,
+    counters: CacheCounters,
+}
+
+impl Room {
+    pub(super) fn new(entry: &Arc<Entry>) -> Self {
+        let meta = entry.meta();
+        Self { entry: entry.clone(), offered: answer::offered(meta), counters: CacheCounters::new(meta.id) }
+    }
+
+    pub(super) fn id(&self) -> &'static str {
+        self.entry.meta().id
+    }
+}
+
+/// `POST /v1/{calculator}`
+pub(super) async fn solve(app: App, room: Arc<Room>, request: Request) -> Result<Response, Problem> {
+    let view = View::of(request.uri(), request.headers(), room.entry.meta(), &room.offered)?;
+    let mut condition = HeaderMap::new();
+    for tag in request.headers().get_all(IF_NONE_MATCH) {
+        condition.append(IF_NONE_MATCH, tag.clone());
+    }
+    let job = body::job(request, room.entry.takes_tables(), &app.limits).await?;
+    let solved = app.engine.solve(room.id(), job).await?;
+    match solved.cache {
+        CacheState::Hit => room.counters.hit.increment(1),
+        CacheState::Miss => room.counters.miss.increment(1),
+    }
+    let mut response = answer::respond(solved.stored.clone(), view, &condition).await?;
+    answer::describe(&mut response, &solved.stored, solved.cache, &solved.timings);
+    Ok(response)
+}
+
+/// `GET /v1/calculators`
+pub(super) async fn list(State(app): State<App>, headers: HeaderMap) -> Result<Response, Problem> {
+    let document = app.documents.calculators(negotiate::language(&headers)).ok_or_else(Problem::internal)?;
+    Ok(document.respond(&headers))
+}
+
+/// `GET /v1/calculators/{id}`
+pub(super) async fn describe(
+    State(app): State<App>,
+    Path(id): Path<String>,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    match app.documents.calculator(&id, negotiate::language(&headers)) {
+        Some(document) => Ok(document.respond(&headers)),
+        None => Err(Error::unknown(app.engine.registry(), &id).into()),
+    }
+}
+
+/// Every calculator of the service.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct CalculatorList {
+    /// The calculators, in the order in which they are offered.
+    items: Vec<CalculatorSummary>,
+    /// Address of the next page; always null: the list is complete.
+    next: Option<String>,
+}
+
+/// A calculator in a list.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct CalculatorSummary {
+    /// Name in routes and job files.
+    #[schema(example = "deflection-compensation")]
+    id: &'static str,
+    /// A full calculator, or an evaluation of data.
+    kind: Kind,
+    /// Rises whenever the numbers of an unchanged job may change.
+    #[schema(minimum = 0, example = 1)]
+    version: u32,
+    /// A few words.
+    #[schema(example = "Deflection compensation")]
+    title: &'static str,
+    /// The question that it answers.
+    question: &'static str,
+    /// What comes in, what comes out, by which physics.
+    summary: &'static str,
+    /// Its example jobs.
+    examples: Vec<ExampleSummary>,
+    /// Where to go from here.
+    links: CalculatorLinks,
+}
+
+/// What kind of question a calculator answers.
+#[derive(Debug, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+#[schema(as = CalculatorKind)]
+enum Kind {
+    /// Predicts and decides from a model.
+    Calculator,
+    /// Evaluates data that the user brings.
+    Evaluation,
+}
+
+/// An example job by name.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct ExampleSummary {
+    /// Name of the example.
+    id: &'static str,
+    /// What it shows.
+    title: &'static str,
+}
+
+/// Addresses of a calculator.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct CalculatorLinks {
+    /// Its description with the schema.
+    #[serde(rename = "self")]
+    #[schema(example = "/v1/calculators/deflection-compensation")]
+    this: String,
+    /// Where its jobs are posted.
+    #[schema(example = "/v1/deflection-compensation")]
+    solve: String,
+}
+
+/// A calculator with everything that a form or a client needs.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct CalculatorDescription {
+    #[serde(flatten)]
+    summary: CalculatorSummary,
+    /// Where the formulas come from.
+    references: &'static [&'static str],
+    /// Media types of its answers, to be named in `Accept`.
+    media_types: Vec<&'static str>,
+    /// Values of `?table=`; the first is the default.
+    tables: &'static [&'static str],
+    /// Values of `?figure=`; the first is the default.
+    figures: &'static [&'static str],
+    /// Whether measured tables may come as files in `multipart/form-data`.
+    takes_tables: bool,
+    /// Pointers into the result that a parameter study shows unless asked for others.
+    study_outputs: &'static [&'static str],
+    /// Codes of its messages, warnings and faults.
+    codes: Vec<&'static str>,
+    /// JSON Schema (2020-12) of the job, with labels, units and ranges.
+    #[schema(value_type = Object)]
+    input_schema: Value,
+    /// JSON Schema (2020-12) of the result.
+    #[schema(value_type = Object)]
+    output_schema: Value,
+    /// The examples' jobs, ready to be posted, by name.
+    #[schema(value_type = Object)]
+    jobs: Value,
+}
+
+/// The list of calculators.
+pub(super) fn listed(registry: &Registry) -> CalculatorList {
+    CalculatorList { items: registry.entries().iter().map(|entry| summary(entry.meta())).collect(), next: None }
+}
+
+/// A calculator's description.
+pub(super) fn described(entry: &Entry, _language: Language) -> CalculatorDescription {
+    let meta = entry.meta();
+    let jobs = meta
+        .examples
+        .iter()
+        .map(|example| (example.id.to_owned(), serde_json::from_str(example.job).expect("a test runs every example")));
+    CalculatorDescription {
+        summary: summary(meta),
+        references: meta.references,
+        media_types: answer::offered(meta).into_iter().map(Media::essence).collect(),
+        tables: meta.tables,
+        figures: meta.figures,
+        takes_tables: entry.takes_tables(),
+        study_outputs: meta.study_outputs,
+        codes: meta.codes.all().collect(),
+        input_schema: entry.input_document().clone(),
+        output_schema: entry.output_document().clone(),
+        jobs: Value::Object(jobs.collect()),
+    }
+}
+
+fn summary(meta: &Meta) -> CalculatorSummary {
+    CalculatorSummary {
+        id: meta.id,
+        kind: match meta.kind {
+            CalculatorKind::Calculator => Kind::Calculator,
+            CalculatorKind::Evaluation => Kind::Evaluation,
+        },
+        version: meta.version,
+        title: meta.title,
+        question: meta.question,
+        summary: meta.summary,
+        examples: meta.examples.iter().map(|example| ExampleSummary { id: example.id, title: example.title }).collect(),
+        links: CalculatorLinks { this: format!("/v1/calculators/{}", meta.id), solve: format!("/v1/{}", meta.id) },
+    }
+}
+
+/// Whether the client would rather have a page than JSON.
+pub(super) fn wants_page(headers: &HeaderMap) -> bool {
+    headers
+        .get_all(ACCEPT)
+        .iter()
+        .filter_map(|line| line.to_str().ok())
+        .any(|line| line.to_ascii_lowercase().contains("text/html"))
+}

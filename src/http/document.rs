@@ -1,0 +1,120 @@
+//! Documents that never change while the service runs: the contract, the list of calculators, pages.
+
+use std::collections::BTreeMap;
+
+use axum::body::Body;
+use axum::extract::State;
+use axum::http::header::{CACHE_CONTROL, CONTENT_LANGUAGE, CONTENT_TYPE, ETAG, VARY};
+use axum::http::{HeaderMap, HeaderValue, StatusCode};
+use axum::response::Response;
+use bytes::Bytes;
+
+use precut_calc::material;
+
+use super::{App, calculators, materials, negotiate, openapi};
+use crate::registry::Registry;
+use crate::text::Language;
+
+/// Bytes with their type and entity tag.
+pub(super) struct Document {
+    bytes: Bytes,
+    content_type: &'static str,
+    etag: HeaderValue,
+    language: Option<Language>,
+}
+
+impl Document {
+    pub(super) fn new(bytes: impl Into<Bytes>, content_type: &'static str, language: Option<Language>) -> Self {
+        let bytes = bytes.into();
+        let hash = blake3::hash(&bytes).to_hex();
+        let etag = HeaderValue::from_str(&format!("\"{}\"", &hash[..32])).expect("hexadecimal digits in quotes");
+        Self { bytes, content_type, etag, language }
+    }
+
+    pub(super) fn json(value: &impl serde::Serialize, language: Option<Language>) -> Self {
+        let bytes = serde_json::to_vec(value).expect("documents of the service have only words and numbers");
+        Self::new(bytes, "application/json", language)
+    }
+
+    /// The document, or `304` if the client has it.
+    pub(super) fn respond(&self, request: &HeaderMap) -> Response {
+        let is_known = negotiate::has_already(request, self.etag.to_str().unwrap_or_default());
+        let mut response = Response::new(if is_known { Body::empty() } else { Body::from(self.bytes.clone()) });
+        if is_known {
+            *response.status_mut() = StatusCode::NOT_MODIFIED;
+        }
+        let headers = response.headers_mut();
+        headers.insert(ETAG, self.etag.clone());
+        headers.insert(CACHE_CONTROL, HeaderValue::from_static("no-cache"));
+        headers.insert(VARY, HeaderValue::from_static("Accept, Accept-Language, Accept-Encoding"));
+        if !is_known {
+            headers.insert(CONTENT_TYPE, HeaderValue::from_static(self.content_type));
+            if let Some(language) = self.language {
+                headers.insert(CONTENT_LANGUAGE, HeaderValue::from_static(language.tag()));
+            }
+        }
+        response
+    }
+}
+
+/// The documents that are made once, at the start.
+pub(super) struct Documents {
+    openapi: Document,
+    calculators: Vec<(Language, Document)>,
+    calculator: BTreeMap<&'static str, Vec<(Language, Document)>>,
+    materials: Document,
+    material: BTreeMap<&'static str, Document>,
+}
+
+impl Documents {
+    pub(super) fn new(registry: &Registry) -> Self {
+        let each_language = |make: &dyn Fn(Language) -> Document| Language::ALL.map(|tag| (tag, make(tag))).into();
+        let calculators = each_language(&|language| Document::json(&calculators::listed(registry), Some(language)));
+        let calculator = registry
+            .entries()
+            .iter()
+            .map(|entry| {
+                let make = |language| Document::json(&calculators::described(entry, language), Some(language));
+                (entry.meta().id, each_language(&make))
+            })
+            .collect();
+        Self {
+            openapi: Document::new(openapi::json(registry), "application/json", None),
+            calculators,
+            calculator,
+            // Names and sources of the library are in English.
+            materials: Document::json(&materials::listed(), Some(Language::En)),
+            material: material::library()
+                .iter()
+                .map(|material| (material.id, Document::json(material, Some(Language::En))))
+                .collect(),
+        }
+    }
+
+    pub(super) fn calculators(&self, language: Language) -> Option<&Document> {
+        in_language(&self.calculators, language)
+    }
+
+    pub(super) fn calculator(&self, id: &str, language: Language) -> Option<&Document> {
+        in_language(self.calculator.get(id)?, language)
+    }
+}
+
+impl Documents {
+    pub(super) fn materials(&self) -> &Document {
+        &self.materials
+    }
+
+    pub(super) fn material(&self, id: &str) -> Option<&Document> {
+        self.material.get(id)
+    }
+}
+
+fn in_language(documents: &[(Language, Document)], language: Language) -> Option<&Document> {
+    documents.iter().find(|(tag, _)| *tag == language).map(|(_, document)| document)
+}
+
+/// `GET /openapi.json`
+pub(super) async fn openapi(State(app): State<App>, headers: HeaderMap) -> Response {
+    app.documents.openapi.respond(&headers)
+}

@@ -1,0 +1,160 @@
+//! Figures for Prometheus.
+
+use std::collections::HashMap;
+use std::sync::{OnceLock, RwLock};
+use std::time::Duration;
+
+use axum::extract::State;
+use axum::http::header::{CACHE_CONTROL, CONTENT_TYPE};
+use axum::http::{Method, StatusCode};
+use axum::response::IntoResponse;
+use metrics::{Counter, Histogram};
+use metrics_exporter_prometheus::{PrometheusBuilder, PrometheusHandle};
+
+use super::App;
+use super::gate::method_label;
+use crate::registry::Registry;
+
+/// Upper edges of the latency classes, s: from an answer out of memory to the largest job.
+const LATENCY_S: [f64; 14] =
+    [0.000_1, 0.000_25, 0.000_5, 0.001, 0.002_5, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 1.0, 2.5, 10.0];
+
+/// Addresses with a variable part, as they are counted.
+const PATTERNS: [(&str, &str); 6] = [
+    ("/v1/results/", "/v1/results/{key}"),
+    ("/v1/calculators/", "/v1/calculators/{id}"),
+    ("/v1/materials/", "/v1/materials/{id}"),
+    ("/v1/", "/v1/{calculator}"),
+    ("/problems/", "/problems/{code}"),
+    ("/docs/", "/docs/{file}"),
+];
+
+/// Addresses without one, besides the calculators'.
+const PLAIN: [&str; 10] = [
+    "/",
+    "/docs",
+    "/openapi.json",
+    "/health/live",
+    "/health/ready",
+    "/metrics",
+    "/v1/calculators",
+    "/v1/results",
+    "/v1/materials",
+    "other",
+];
+
+/// What the service counts of itself. Addresses are labels by their pattern: a client cannot invent new ones.
+pub(super) struct Metrics {
+    handle: PrometheusHandle,
+    routes: HashMap<String, Route>,
+    /// One counter per route, method and status, made when first needed.
+    requests: RwLock<HashMap<(Route, &'static str, u16), Counter>>,
+    names: Vec<String>,
+    latency: Vec<Histogram>,
+}
+
+/// A pattern of addresses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) struct Route(usize);
+
+impl Metrics {
+    pub(super) fn new(registry: &Registry) -> Self {
+        let handle = recorder().clone();
+        let rooms = registry.entries().iter().map(|entry| format!("/v1/{}", entry.meta().id));
+        let names: Vec<String> = PLAIN
+            .iter()
+            .chain(PATTERNS.iter().map(|(_, name)| name))
+            .map(|name| (*name).to_owned())
+            .chain(rooms)
+            .collect();
+        let routes = names.iter().enumerate().map(|(index, name)| (name.clone(), Route(index))).collect();
+        let latency = names
+            .iter()
+            .map(|name| metrics::histogram!("http_request_duration_seconds", "route" => name.clone()))
+            .collect();
+        Self { handle, routes, requests: RwLock::default(), names, latency }
+    }
+
+    /// The pattern that a path belongs to.
+    pub(super) fn route(&self, path: &str) -> Route {
+        let known = |name: &str| self.routes.get(name).copied();
+        known(path)
+            .filter(|_| !path.contains('{'))
+            .or_else(|| PATTERNS.iter().find(|(prefix, _)| path.starts_with(prefix)).and_then(|(_, name)| known(name)))
+            .or_else(|| known("other"))
+            .unwrap_or(Route(0))
+    }
+
+    /// Counts an answer.
+    pub(super) fn answered(&self, route: Route, method: &Method, status: StatusCode, took: Duration) {
+        self.latency[route.0].record(took.as_secs_f64());
+        let at = (route, method_label(method), status.as_u16());
+        let known = self.requests.read().unwrap_or_else(std::sync::PoisonError::into_inner).get(&at).cloned();
+        let counter = known.unwrap_or_else(|| self.counter(at));
+        counter.increment(1);
+    }
+
+    fn counter(&self, at: (Route, &'static str, u16)) -> Counter {
+        let mut requests = self.requests.write().unwrap_or_else(std::sync::PoisonError::into_inner);
+        requests
+            .entry(at)
+            .or_insert_with(|| {
+                metrics::counter!(
+                    "http_requests_total",
+                    "route" => self.names[at.0.0].clone(), "method" => at.1, "status" => at.2.to_string()
+                )
+            })
+            .clone()
+    }
+
+    /// To be called every few seconds: folds the samples taken since into the classes.
+    pub(super) fn upkeep(&self) {
+        self.handle.run_upkeep();
+    }
+}
+
+/// How often answers came from the cache, per calculator.
+pub(super) struct CacheCounters {
+    pub(super) hit: Counter,
+    pub(super) miss: Counter,
+}
+
+impl CacheCounters {
+    pub(super) fn new(calculator: &'static str) -> Self {
+        let counter = |result| metrics::counter!("precut_answers_total", "calculator" => calculator, "cache" => result);
+        // Registered only once the recorder is there: see `Metrics::new`.
+        Self { hit: counter("hit"), miss: counter("miss") }
+    }
+}
+
+/// `GET /metrics`
+pub(super) async fn get(State(app): State<App>) -> impl IntoResponse {
+    #[allow(clippy::cast_precision_loss)] // a count of requests in work
+    metrics::gauge!("http_requests_in_flight").set(app.in_flight.load(std::sync::atomic::Ordering::Relaxed) as f64);
+    let text = app.metrics.handle.render();
+    ([(CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8"), (CACHE_CONTROL, "no-store")], text)
+}
+
+/// The recorder of the process: the `metrics` facade knows only one.
+fn recorder() -> &'static PrometheusHandle {
+    static RECORDER: OnceLock<PrometheusHandle> = OnceLock::new();
+    RECORDER.get_or_init(|| {
+        let builder = PrometheusBuilder::new().set_buckets(&LATENCY_S).expect("there are classes");
+        let recorder = builder.build_recorder();
+        let handle = recorder.handle();
+        if metrics::set_global_recorder(recorder).is_err() {
+            tracing::warn!("another recorder of metrics is installed: /metrics stays empty");
+        }
+        metrics::describe_counter!("http_requests_total", "Requests answered, by route, method and status.");
+        metrics::describe_histogram!(
+            "http_request_duration_seconds",
+            metrics::Unit::Seconds,
+            "Time from a request's header to its answer's header, by route."
+        );
+        metrics::describe_gauge!("http_requests_in_flight", "Requests in work.");
+        metrics::describe_counter!("precut_answers_total", "Answers by calculator, from the cache (hit) or not.");
+        metrics::describe_gauge!("precut_build_info", "Always 1; the version is its label.");
+        metrics::gauge!("precut_build_info", "version" => env!("CARGO_PKG_VERSION")).set(1.0);
+        handle
+    })
+}

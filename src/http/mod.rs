@@ -1,0 +1,172 @@
+//! The service: HTTP into calls of the engine, and its answers and errors into HTTP. No physics, no SQL.
+
+mod answer;
+pub mod auth;
+mod body;
+mod calculators;
+mod codes;
+mod document;
+mod gate;
+mod health;
+mod materials;
+mod metrics;
+mod negotiate;
+pub mod openapi;
+mod pages;
+mod problem;
+mod rate;
+mod results;
+mod server;
+
+use std::net::IpAddr;
+use std::ops::Deref;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+use axum::Router;
+use axum::extract::{Path, Request};
+use axum::http::{HeaderName, Uri};
+use axum::routing::{any, get, post};
+use tower_http::cors::{AllowOrigin, CorsLayer};
+
+use crate::config::{Config, Limits};
+use crate::engine::{Engine, Error};
+
+pub use answer::written;
+pub use codes::CODES;
+pub use negotiate::Media;
+pub use problem::{Problem, ProblemDocument};
+pub use server::serve;
+
+/// Says whether an answer came from the cache: `hit` or `miss`.
+const CACHE_STATE: HeaderName = HeaderName::from_static("precut-cache");
+
+/// The service with all that its handlers share. Cheap to clone.
+#[derive(Clone)]
+pub struct App(Arc<Shared>);
+
+/// What all requests share.
+pub struct Shared {
+    engine: Engine,
+    limits: Limits,
+    origins: Vec<String>,
+    keys: auth::Keys,
+    rate: Option<rate::RateLimiter>,
+    metrics: metrics::Metrics,
+    rooms: Vec<Arc<calculators::Room>>,
+    documents: document::Documents,
+    in_flight: AtomicUsize,
+    stopping: AtomicBool,
+}
+
+impl Deref for App {
+    type Target = Shared;
+    fn deref(&self) -> &Shared {
+        &self.0
+    }
+}
+
+impl App {
+    /// The service in front of `engine`.
+    pub fn new(engine: Engine, config: &Config) -> Self {
+        // The recorder of metrics comes first: counters made before it count nothing.
+        let metrics = metrics::Metrics::new(engine.registry());
+        let rooms: Vec<_> = engine.registry().entries().iter().map(calculators::Room::new).collect();
+        let documents = document::Documents::new(engine.registry());
+        Self(Arc::new(Shared {
+            limits: config.limits.clone(),
+            origins: config.cors.origins.clone(),
+            keys: auth::Keys::new(&config.auth),
+            rate: rate::RateLimiter::new(config.limits.requests_per_s, config.limits.burst),
+            metrics,
+            rooms: rooms.into_iter().map(Arc::new).collect(),
+            documents,
+            in_flight: AtomicUsize::new(0),
+            stopping: AtomicBool::new(false),
+            engine,
+        }))
+    }
+
+    /// From now on the service is not ready and takes no more work.
+    pub fn stop(&self) {
+        self.stopping.store(true, Ordering::Relaxed);
+    }
+
+    fn is_stopping(&self) -> bool {
+        self.stopping.load(Ordering::Relaxed)
+    }
+}
+
+/// Who is at the other end of the connection.
+#[derive(Clone)]
+struct Peer {
+    ip: IpAddr,
+    unread: body::Unread,
+}
+
+/// Every route behind the gate.
+pub fn router(app: &App) -> Router {
+    let mut router = Router::new()
+        .route("/", get(pages::landing))
+        .route("/docs", get(pages::docs))
+        .route("/docs/{file}", get(pages::docs_file))
+        .route("/problems/{code}", get(pages::problem))
+        .route("/openapi.json", get(document::openapi))
+        .route("/health/live", get(health::live))
+        .route("/health/ready", get(health::ready))
+        .route("/metrics", get(metrics::get))
+        .route("/v1/calculators", get(calculators::list))
+        .route("/v1/calculators/{id}", get(calculators::describe))
+        .route("/v1/results", get(results::list))
+        .route("/v1/results/{key}", get(results::read))
+        .route("/v1/materials", get(materials::list))
+        .route("/v1/materials/{id}", get(materials::read))
+        .route("/v1/{calculator}", any(unknown_calculator));
+    for room in &app.rooms {
+        let handler = {
+            let (app, room) = (app.clone(), room.clone());
+            move |request: Request| calculators::solve(app.clone(), room.clone(), request)
+        };
+        router = router.route(&format!("/v1/{}", room.id()), post(handler));
+    }
+    let router = router
+        .fallback(not_found)
+        .layer(axum::middleware::from_fn_with_state(app.clone(), gate::gate))
+        .with_state(app.clone());
+    match cors(&app.origins) {
+        Some(cors) => router.layer(cors),
+        None => router,
+    }
+}
+
+async fn not_found(uri: Uri) -> Problem {
+    Problem::not_found(uri.path())
+}
+
+async fn unknown_calculator(axum::extract::State(app): axum::extract::State<App>, Path(name): Path<String>) -> Problem {
+    Error::unknown(app.engine.registry(), &name).into()
+}
+
+/// Nothing unless origins are configured.
+fn cors(origins: &[String]) -> Option<CorsLayer> {
+    use axum::http::{Method, header};
+    if origins.is_empty() {
+        return None;
+    }
+    let allowed = if origins.iter().any(|origin| origin == "*") {
+        AllowOrigin::any()
+    } else {
+        AllowOrigin::list(origins.iter().filter_map(|origin| origin.parse().ok()))
+    };
+    let request_headers =
+        [header::ACCEPT_LANGUAGE, header::AUTHORIZATION, header::CONTENT_TYPE, header::IF_NONE_MATCH, gate::REQUEST_ID];
+    let exposed = [header::CONTENT_LOCATION, header::ETAG, header::RETRY_AFTER, CACHE_STATE, gate::REQUEST_ID];
+    Some(
+        CorsLayer::new()
+            .allow_origin(allowed)
+            .allow_methods([Method::GET, Method::HEAD, Method::POST])
+            .allow_headers(request_headers)
+            .expose_headers(exposed)
+            .max_age(std::time::Duration::from_hours(1)),
+    )
+}

@@ -1,0 +1,192 @@
+//! A calculator's operation, from its declaration.
+
+use precut_calc::calculator::{CalculatorKind, Meta};
+use std::fmt::Write as _;
+
+use serde_json::{Value, json};
+use utoipa::openapi::content::ContentBuilder;
+use utoipa::openapi::encoding::Encoding;
+use utoipa::openapi::example::ExampleBuilder;
+use utoipa::openapi::link::LinkBuilder;
+use utoipa::openapi::path::{HttpMethod, OperationBuilder, ParameterIn, PathItem};
+use utoipa::openapi::request_body::{RequestBody, RequestBodyBuilder};
+use utoipa::openapi::response::ResponseBuilder;
+use utoipa::openapi::schema::{AdditionalProperties, ArrayBuilder, ObjectBuilder, SchemaType, Type};
+use utoipa::openapi::{Content, Object, Ref, RefOr, Required, Schema};
+
+use super::parts;
+use crate::http::answer::offered;
+use crate::http::negotiate::Media;
+use crate::registry::Entry;
+
+/// A calculator's part of the contract.
+pub(super) struct Room {
+    pub(super) path: PathItem,
+    pub(super) schemas: Vec<(String, RefOr<Schema>)>,
+}
+
+pub(super) fn room(entry: &Entry) -> Room {
+    let meta = entry.meta();
+    let name = pascal(meta.id);
+    let (job, result, answer) = (format!("{name}Job"), format!("{name}Result"), format!("{name}Answer"));
+    let mut schemas = entry.components();
+    schemas.push((job.clone(), entry.input_schema().clone()));
+    schemas.push((result.clone(), entry.output_schema().clone()));
+    schemas.push((answer.clone(), envelope(meta, &result).into()));
+    let operation = OperationBuilder::new()
+        .tag(match meta.kind {
+            CalculatorKind::Calculator => "calculators",
+            CalculatorKind::Evaluation => "evaluations",
+        })
+        .operation_id(Some(format!("solve_{}", meta.id.replace('-', "_"))))
+        .summary(Some(meta.question))
+        .description(Some(description(meta)))
+        .request_body(Some(body(entry, &job)))
+        .response("200", answered(meta, &answer));
+    let operation = parts::conditional(parameters(operation, meta));
+    let operation = parts::guarded(operation, &[400, 404, 406, 408, 413, 415, 422]);
+    Room { path: PathItem::new(HttpMethod::Post, operation), schemas }
+}
+
+fn description(meta: &Meta) -> String {
+    let mut text = meta.summary.to_owned();
+    if !meta.references.is_empty() {
+        text.push_str("\n\nSources:\n");
+        for reference in meta.references {
+            let _ = writeln!(text, "- {reference}");
+        }
+    }
+    text
+}
+
+/// `deflection-compensation` as `DeflectionCompensation`.
+fn pascal(id: &str) -> String {
+    id.split('-')
+        .map(|word| {
+            let mut letters = word.chars();
+            letters.next().map(|first| first.to_ascii_uppercase()).into_iter().chain(letters).collect::<String>()
+        })
+        .collect()
+}
+
+fn parameters(mut operation: OperationBuilder, meta: &Meta) -> OperationBuilder {
+    let ids = |ids: &[&str]| parts::one_of(ids.iter().map(|&id| id.to_owned()));
+    if !meta.tables.is_empty() {
+        let text = "Which table, with `Accept: text/csv`; the first if absent.";
+        operation = operation.parameter(parts::parameter("table", ParameterIn::Query, text, ids(meta.tables)).build());
+    }
+    if !meta.figures.is_empty() {
+        let text = "Which figure, with `Accept: image/svg+xml`; the first if absent.";
+        operation =
+            operation.parameter(parts::parameter("figure", ParameterIn::Query, text, ids(meta.figures)).build());
+    }
+    operation
+}
+
+fn body(entry: &Entry, job: &str) -> RequestBody {
+    let examples = entry.meta().examples.iter().map(|example| {
+        let value = serde_json::from_str(example.job).unwrap_or(Value::Null);
+        (example.id, ExampleBuilder::new().summary(example.title).value(Some(value)).build())
+    });
+    let json = ContentBuilder::new().schema(Some(Ref::from_schema_name(job))).examples_from_iter(examples).build();
+    let mut body = RequestBodyBuilder::new()
+        .description(Some("The job. Whatever is left out takes its default, which the answer's `input` shows."))
+        .required(Some(Required::True))
+        .content("application/json", json);
+    if entry.takes_tables() {
+        body = body.content("multipart/form-data", multipart(entry, job));
+    }
+    body.build()
+}
+
+/// The job as one part, its measured tables as files beside it.
+fn multipart(entry: &Entry, job: &str) -> Content {
+    let mut form = ObjectBuilder::new()
+        .property("job", Ref::from_schema_name(job))
+        .required("job")
+        .additional_properties(Some(AdditionalProperties::FreeForm(false)));
+    for table in entry.table_names() {
+        let schema = ObjectBuilder::new().schema_type(SchemaType::new(Type::String)).description(Some(
+            "The table as CSV in place of the field of the same name: header `name [unit]` or `name_unit`.",
+        ));
+        form = form.property(table, schema);
+    }
+    let mut encoding = Encoding::default();
+    encoding.content_type = Some("application/json".to_owned());
+    ContentBuilder::new().schema(Some(form.build())).encoding("job", encoding).build()
+}
+
+fn answered(meta: &Meta, answer: &str) -> ResponseBuilder {
+    let mut response = parts::tagged(parts::success("The answer.", Media::Json.essence(), parts::json_of(answer)))
+        .header("Content-Location", parts::text_header("Lasting address of the answer.", "/v1/results/b3:5d41..."))
+        .header("Content-Language", parts::text_header("Language of the sentences.", "en"))
+        .header(
+            "Precut-Cache",
+            parts::header_of(parts::one_of(["hit", "miss"].map(ToOwned::to_owned)), "Whether it was there already."),
+        )
+        .header(
+            "Server-Timing",
+            parts::text_header("Where the time went, ms.", "parse;dur=0.041, queue;dur=0.004, run;dur=0.310"),
+        );
+    response = response.link(
+        "result",
+        LinkBuilder::new()
+            .operation_id("read_result")
+            .parameter("key", "$response.body#/key")
+            .description("Reads the answer again, in any form, without computing.")
+            .build(),
+    );
+    for media in offered(meta) {
+        let text = match media {
+            Media::Json => continue,
+            Media::Csv => "One table; header `name [unit]`, decimal points, UTF-8.",
+            Media::Svg => "One figure, worth printing.",
+            Media::Gcode => "The program for the machine; `422` while a station has no command.",
+        };
+        response = response.content(media.essence(), parts::text_of(text));
+    }
+    response
+}
+
+/// What every answer has in common.
+fn envelope(meta: &Meta, result: &str) -> Object {
+    let text = |text: &str| ObjectBuilder::new().schema_type(SchemaType::new(Type::String)).description(Some(text));
+    let list = |of: &str, text: &str| ArrayBuilder::new().items(Ref::from_schema_name(of)).description(Some(text));
+    let anything = |text: &str| {
+        ObjectBuilder::new().additional_properties(Some(AdditionalProperties::FreeForm(true))).description(Some(text))
+    };
+    let effects = ArrayBuilder::new()
+        .items(anything("An effect with its `kind` and parameters."))
+        .description(Some("Every effect that acted."));
+    let version = ObjectBuilder::new()
+        .schema_type(SchemaType::new(Type::Integer))
+        .minimum(Some(0))
+        .description(Some("Version of the calculator's physics."))
+        .examples([json!(meta.version)]);
+    ObjectBuilder::new()
+        .property("calculator", text("Which calculator answered.").enum_values(Some([meta.id])))
+        .property("version", version)
+        .property("engine", text("Version of the engine.").examples([json!(env!("CARGO_PKG_VERSION"))]))
+        .property("key", parts::key())
+        .property(
+            "input",
+            anything("The job with every default filled in; measured tables in it as their row count and hash."),
+        )
+        .property("effects", effects)
+        .property("result", Ref::from_schema_name(result))
+        .property("explanation", list("Remark", "What dominates, what binds, what would help: most important first."))
+        .property("warnings", list("Notice", "Where an input leaves a formula's range of validity, and the like."))
+        .property("basis", list("Basis", "The equations that acted, with their sources."))
+        .required("calculator")
+        .required("version")
+        .required("engine")
+        .required("key")
+        .required("input")
+        .required("effects")
+        .required("result")
+        .required("explanation")
+        .required("warnings")
+        .required("basis")
+        .description(Some(format!("An answer of {}.", meta.id)))
+        .build()
+}

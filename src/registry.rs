@@ -1,0 +1,148 @@
+//! Calculators by name, their types closed over.
+//!
+//! One line in `precut_calc::register` makes a calculator known; everything that the service needs of it
+//! follows from its [`Calculator`] declaration through [`Entry`].
+
+mod checker;
+mod entry;
+mod fault;
+mod finite;
+mod nearest;
+mod place;
+mod schema;
+#[cfg(test)]
+mod tests;
+#[cfg(test)]
+pub(crate) mod toy;
+
+pub use entry::{ComputedResult, Entry, Prepared, UnreadableResult};
+
+pub(crate) use checker::{Faults, by_pointer, child};
+pub(crate) use entry::Unprepared;
+pub(crate) use finite::non_finite_place;
+pub(crate) use nearest::nearest;
+pub(crate) use place::{CellKind, Step, TableColumn, TablePlace};
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use precut_calc::calculator::{Calculator, Registrar};
+use serde_json::Value;
+use utoipa::openapi::{RefOr, Schema};
+
+/// Names under `/v1/` that the service itself uses: no calculator may have one of them.
+pub const RESERVED: [&str; 6] = ["jobs", "results", "studies", "models", "materials", "calculators"];
+
+/// Every calculator, in the order in which they are offered. Cheap to clone.
+#[derive(Clone)]
+pub struct Registry {
+    entries: Arc<Vec<Arc<Entry>>>,
+    by_id: Arc<BTreeMap<&'static str, usize>>,
+}
+
+impl std::fmt::Debug for Registry {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_list().entries(self.by_id.keys()).finish()
+    }
+}
+
+/// Why a set of calculators is none. Faults of the program, never of a user.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum RegistryError {
+    /// A calculator's id is one of [`RESERVED`].
+    #[error("the calculator's id {0:?} is a route of the service itself")]
+    Reserved(&'static str),
+    /// An id that cannot stand in an address.
+    #[error("the calculator's id {0:?} is not made of lower-case letters, digits and hyphens")]
+    BadId(&'static str),
+    /// Two calculators have one id.
+    #[error("two calculators are called {0:?}")]
+    Twice(&'static str),
+    /// Two types have one name in the contract.
+    #[error("two types are called {component:?}, one of them in {calculator:?}")]
+    ComponentClash {
+        /// The name.
+        component: String,
+        /// The later of the two calculators.
+        calculator: &'static str,
+    },
+    /// A schema refers to a component that is not there.
+    #[error("a schema refers to the unknown component {0:?}")]
+    UnknownComponent(String),
+    /// A type contains itself.
+    #[error("a type of a job contains itself")]
+    Recursive,
+    /// A measured table whose schema has no rows.
+    #[error("a measured table has no rows in its schema")]
+    TableWithoutRows,
+    /// A schema that does not compile.
+    #[error("a schema does not compile: {0}")]
+    BadSchema(String),
+}
+
+impl Registry {
+    /// The calculators of `precut_calc`.
+    pub fn standard() -> Result<Self, RegistryError> {
+        Self::with(precut_calc::register)
+    }
+
+    /// The calculators that `offer` names.
+    pub fn with(offer: impl FnOnce(&mut Offered)) -> Result<Self, RegistryError> {
+        let mut offered = Offered { entries: Vec::new() };
+        offer(&mut offered);
+        let entries = offered.entries.into_iter().collect::<Result<Vec<_>, _>>()?;
+        let mut by_id = BTreeMap::new();
+        let mut components: BTreeMap<&str, &Value> = BTreeMap::new();
+        for (index, entry) in entries.iter().enumerate() {
+            let id = entry.meta().id;
+            if by_id.insert(id, index).is_some() {
+                return Err(RegistryError::Twice(id));
+            }
+            for (name, component) in entry.open_components() {
+                if components.insert(name, component).is_some_and(|other| other != component) {
+                    return Err(RegistryError::ComponentClash { component: name.clone(), calculator: id });
+                }
+            }
+        }
+        Ok(Self { entries: Arc::new(entries.into_iter().map(Arc::new).collect()), by_id: Arc::new(by_id) })
+    }
+
+    /// All of them.
+    pub fn entries(&self) -> &[Arc<Entry>] {
+        &self.entries
+    }
+
+    /// The one of that id.
+    pub fn entry(&self, id: &str) -> Option<&Arc<Entry>> {
+        self.by_id.get(id).map(|&index| &self.entries[index])
+    }
+
+    /// The id most like `name`, if one is like it at all.
+    pub fn nearest(&self, name: &str) -> Option<&'static str> {
+        nearest(name, self.by_id.keys().copied())
+    }
+
+    /// Every component of every calculator by name, for the OpenAPI document. A type that occurs in a job is closed
+    /// (no unknown fields), one that occurs in results only is open, so that results may grow.
+    pub fn components(&self) -> Vec<(String, RefOr<Schema>)> {
+        let mut all = BTreeMap::new();
+        for entry in self.entries.iter() {
+            all.extend(entry.output_components().iter().cloned());
+        }
+        for entry in self.entries.iter() {
+            all.extend(entry.input_components().iter().cloned());
+        }
+        all.into_iter().collect()
+    }
+}
+
+/// Takes calculators in.
+pub struct Offered {
+    entries: Vec<Result<Entry, RegistryError>>,
+}
+
+impl Registrar for Offered {
+    fn calculator<C: Calculator>(&mut self) {
+        self.entries.push(Entry::of::<C>());
+    }
+}

@@ -1,0 +1,336 @@
+//! One calculator with its types closed over.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::marker::PhantomData;
+
+use precut_calc::calculator::{
+    Answer, Basis, Calculator, Check, Cost, Failure, Figure, Finding, Message, Meta, Monitor, Program, Table,
+    Violations,
+};
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use serde_json::Value;
+use utoipa::ToSchema;
+use utoipa::openapi::{RefOr, Schema};
+
+use super::checker::{Checker, Faults};
+use super::place::{TablePlace, table_places};
+use super::schema::{self, Components};
+use super::{RESERVED, RegistryError, child, non_finite_place};
+
+/// One calculator with its types closed over.
+pub struct Entry {
+    meta: Meta,
+    input: Contract,
+    output: Contract,
+    checker: Checker,
+    tables: Vec<TablePlace>,
+    own_codes: Vec<String>,
+    calculation: Box<dyn Calculation>,
+}
+
+/// A type's schema, in the forms in which it is asked for.
+struct Contract {
+    schema: RefOr<Schema>,
+    components: Vec<(String, RefOr<Schema>)>,
+    document: Value,
+    /// Before objects were closed: what makes two types of one name the same type.
+    open: Components,
+    strict: Value,
+}
+
+impl Entry {
+    /// The entry of a calculator.
+    pub(super) fn of<C: Calculator>() -> Result<Self, RegistryError> {
+        let meta = C::META;
+        let fits = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
+        if !meta.id.starts_with(|c: char| c.is_ascii_lowercase()) || !meta.id.chars().all(fits) {
+            return Err(RegistryError::BadId(meta.id));
+        }
+        if RESERVED.contains(&meta.id) {
+            return Err(RegistryError::Reserved(meta.id));
+        }
+        let input = Contract::of::<C::Input>(meta.id, true)?;
+        let output = Contract::of::<C::Output>(meta.id, false)?;
+        let mut own_codes = BTreeSet::new();
+        codes_in(&input.strict, &mut own_codes);
+        Ok(Self {
+            meta,
+            tables: table_places(&input.strict),
+            checker: Checker::new(input.strict.clone())?,
+            own_codes: own_codes.into_iter().collect(),
+            input,
+            output,
+            calculation: Box::new(Typed::<C>(PhantomData)),
+        })
+    }
+
+    /// What stands on the door.
+    pub fn meta(&self) -> &Meta {
+        &self.meta
+    }
+    /// Schema of the job for the OpenAPI document; refers to [`Entry::components`].
+    pub fn input_schema(&self) -> &RefOr<Schema> {
+        &self.input.schema
+    }
+    /// Schema of the result for the OpenAPI document; refers to [`Entry::components`].
+    pub fn output_schema(&self) -> &RefOr<Schema> {
+        &self.output.schema
+    }
+    /// Every component that either schema refers to, by name, each name once; where both do, as the job has it.
+    pub fn components(&self) -> Vec<(String, RefOr<Schema>)> {
+        let mut all: BTreeMap<_, _> = self.output.components.iter().cloned().collect();
+        all.extend(self.input.components.iter().cloned());
+        all.into_iter().collect()
+    }
+    pub(super) fn input_components(&self) -> &[(String, RefOr<Schema>)] {
+        &self.input.components
+    }
+    pub(super) fn output_components(&self) -> &[(String, RefOr<Schema>)] {
+        &self.output.components
+    }
+    /// Self-contained JSON Schema (2020-12) of the job.
+    pub fn input_document(&self) -> &Value {
+        &self.input.document
+    }
+    /// Self-contained JSON Schema (2020-12) of the result.
+    pub fn output_document(&self) -> &Value {
+        &self.output.document
+    }
+    /// Whether the job takes measured tables (CSV in place, or file parts).
+    pub fn takes_tables(&self) -> bool {
+        !self.tables.is_empty()
+    }
+    /// Names of the file parts that the job takes, with dots from the root.
+    pub fn table_names(&self) -> Vec<String> {
+        self.tables.iter().map(TablePlace::dotted).collect()
+    }
+    /// Every code that it may utter: those of its declaration and those of its fields.
+    pub fn codes(&self) -> impl Iterator<Item = &str> {
+        self.meta.codes.all().map(|code| -> &str { code }).chain(self.own_codes.iter().map(String::as_str))
+    }
+
+    pub(crate) fn tables(&self) -> &[TablePlace] {
+        &self.tables
+    }
+    pub(super) fn open_components(&self) -> impl Iterator<Item = (&String, &Value)> {
+        self.input.open.iter().chain(&self.output.open)
+    }
+
+    /// Adds every violation of the schema. Measured tables must be rows by now.
+    pub(crate) fn validate(&self, job: &Value, faults: &mut Faults) {
+        self.checker.check(job, "", faults);
+    }
+    /// A job that the schema accepts, typed, checked and filled.
+    pub(crate) fn prepare(&self, job: &Value) -> Result<Prepared, Unprepared> {
+        self.calculation.prepare(job)
+    }
+    /// The rules between fields that a job breaks which the schema refuses; none where it cannot be read at all.
+    pub(crate) fn broken_rules(&self, job: &Value) -> Vec<Finding> {
+        self.calculation.broken_rules(job)
+    }
+    /// The pictures of a result, from its job and its envelope as JSON.
+    pub(crate) fn figures(&self, input: &[u8], envelope: &[u8]) -> Result<Vec<Figure>, UnreadableResult> {
+        self.calculation.figures(input, envelope)
+    }
+    /// The tables of a result.
+    pub(crate) fn result_tables(&self, input: &[u8], envelope: &[u8]) -> Result<Vec<Table>, UnreadableResult> {
+        self.calculation.tables(input, envelope)
+    }
+    /// The program of a result, where there is one.
+    pub(crate) fn program(&self, input: &[u8], envelope: &[u8]) -> Result<MaybeProgram, UnreadableResult> {
+        self.calculation.program(input, envelope)
+    }
+}
+
+impl std::fmt::Debug for Entry {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Entry").field("id", &self.meta.id).field("version", &self.meta.version).finish_non_exhaustive()
+    }
+}
+
+fn codes_in(schema: &Value, codes: &mut BTreeSet<String>) {
+    match schema {
+        Value::Object(map) => {
+            if let Some(Value::String(code)) = map.get("x-code") {
+                codes.insert(code.clone());
+            }
+            map.values().for_each(|part| codes_in(part, codes));
+        }
+        Value::Array(parts) => parts.iter().for_each(|part| codes_in(part, codes)),
+        _ => {}
+    }
+}
+
+impl Contract {
+    fn of<T: ToSchema>(calculator: &'static str, closed: bool) -> Result<Self, RegistryError> {
+        let broken = |error: serde_json::Error| RegistryError::BadSchema(error.to_string());
+        let mut parts = Vec::new();
+        T::schemas(&mut parts);
+        let mut raw = Components::new();
+        for (name, part) in parts {
+            let part = serde_json::to_value(&part).map_err(broken)?;
+            if raw.insert(name.clone(), part.clone()).is_some_and(|other| other != part) {
+                return Err(RegistryError::ComponentClash { component: name, calculator });
+            }
+        }
+        let mut root = schema::tidy(&serde_json::to_value(T::schema()).map_err(broken)?, &raw);
+        let tidied: Components = raw.iter().map(|(name, part)| (name.clone(), schema::tidy(part, &raw))).collect();
+        // Parts that were joined into others are no components of their own any more.
+        let mut open = Components::new();
+        schema::collect(&root, &tidied, &mut open);
+        let mut components = open.clone();
+        if closed {
+            schema::close(&mut root);
+            components.values_mut().for_each(schema::close);
+        }
+        Ok(Self {
+            schema: serde_json::from_value(root.clone()).map_err(broken)?,
+            components: components
+                .iter()
+                .map(|(name, part)| Ok((name.clone(), serde_json::from_value(part.clone())?)))
+                .collect::<Result<_, serde_json::Error>>()
+                .map_err(broken)?,
+            document: schema::standing_alone(&root, &components),
+            strict: schema::strict(&root, &components)?,
+            open,
+        })
+    }
+}
+
+/// A job that can run.
+pub struct Prepared {
+    /// The job with every default filled in.
+    pub input: Value,
+    /// What it would cost.
+    pub cost: Cost,
+    job: Box<dyn Job>,
+}
+
+impl Prepared {
+    /// Computes the answer.
+    pub fn run(&self, monitor: &dyn Monitor) -> Result<ComputedResult, Failure> {
+        self.job.run(monitor)
+    }
+}
+
+/// Why a job cannot run.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Unprepared {
+    /// It breaks rules.
+    Invalid(Vec<Finding>),
+    /// Our own fault.
+    Failed(Failure),
+}
+
+/// An answer whose result is JSON already.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ComputedResult {
+    /// The result as JSON, every number finite.
+    pub result: Vec<u8>,
+    /// Where an input leaves a formula's range of validity, and the like.
+    pub warnings: Vec<Finding>,
+    /// Most important first.
+    pub explanation: Vec<Message>,
+    /// The equations used.
+    pub basis: Vec<Basis>,
+}
+
+/// A kept result that the calculator's types no longer read.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct UnreadableResult(pub String);
+
+type MaybeProgram = Option<Result<Program, Failure>>;
+
+trait Calculation: Send + Sync {
+    fn prepare(&self, job: &Value) -> Result<Prepared, Unprepared>;
+    fn broken_rules(&self, job: &Value) -> Vec<Finding>;
+    fn figures(&self, input: &[u8], envelope: &[u8]) -> Result<Vec<Figure>, UnreadableResult>;
+    fn tables(&self, input: &[u8], envelope: &[u8]) -> Result<Vec<Table>, UnreadableResult>;
+    fn program(&self, input: &[u8], envelope: &[u8]) -> Result<MaybeProgram, UnreadableResult>;
+}
+
+trait Job: Send + Sync {
+    fn run(&self, monitor: &dyn Monitor) -> Result<ComputedResult, Failure>;
+}
+
+/// The types of a calculator.
+struct Typed<C>(PhantomData<fn() -> C>);
+
+/// A filled job of a calculator.
+struct TypedJob<C: Calculator>(C::Input);
+
+impl<C: Calculator> Calculation for Typed<C> {
+    fn prepare(&self, job: &Value) -> Result<Prepared, Unprepared> {
+        let mut input: C::Input =
+            serde_path_to_error::deserialize(job).map_err(|error| Unprepared::Invalid(vec![second_line(&error)]))?;
+        let mut violations = Violations::default();
+        input.check(&mut violations);
+        if !violations.is_empty() {
+            return Err(Unprepared::Invalid(violations.into_vec()));
+        }
+        C::fill(&mut input);
+        if let Some(place) = non_finite_place(&input) {
+            let what = format!("the filled job of {} is not finite at {place}", C::META.id);
+            return Err(Unprepared::Failed(Failure::Internal(what)));
+        }
+        let filled = serde_json::to_value(&input)
+            .map_err(|error| Unprepared::Failed(Failure::Internal(format!("the filled job: {error}"))))?;
+        Ok(Prepared { cost: C::cost(&input), input: filled, job: Box::new(TypedJob::<C>(input)) })
+    }
+    fn broken_rules(&self, job: &Value) -> Vec<Finding> {
+        let mut violations = Violations::default();
+        if let Ok(input) = C::Input::deserialize(job) {
+            input.check(&mut violations);
+        }
+        violations.into_vec()
+    }
+    fn figures(&self, input: &[u8], envelope: &[u8]) -> Result<Vec<Figure>, UnreadableResult> {
+        let (input, output) = read::<C>(input, envelope)?;
+        Ok(C::figures(&input, &output))
+    }
+    fn tables(&self, input: &[u8], envelope: &[u8]) -> Result<Vec<Table>, UnreadableResult> {
+        let (input, output) = read::<C>(input, envelope)?;
+        Ok(C::tables(&input, &output))
+    }
+    fn program(&self, input: &[u8], envelope: &[u8]) -> Result<MaybeProgram, UnreadableResult> {
+        let (input, output) = read::<C>(input, envelope)?;
+        Ok(C::program(&input, &output))
+    }
+}
+
+impl<C: Calculator> Job for TypedJob<C> {
+    fn run(&self, monitor: &dyn Monitor) -> Result<ComputedResult, Failure> {
+        let Answer { output, warnings, explanation, basis } = C::run(&self.0, monitor)?;
+        if let Some(place) = non_finite_place(&output) {
+            return Err(Failure::Internal(format!("the result of {} is not finite at {place}", C::META.id)));
+        }
+        let result = serde_json::to_vec(&output).map_err(|error| Failure::Internal(format!("the result: {error}")))?;
+        Ok(ComputedResult { result, warnings, explanation, basis })
+    }
+}
+
+/// What is read of an envelope.
+#[derive(Deserialize)]
+struct ResultOf<O> {
+    result: O,
+}
+
+fn read<C: Calculator>(input: &[u8], envelope: &[u8]) -> Result<(C::Input, C::Output), UnreadableResult> {
+    fn json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, UnreadableResult> {
+        serde_json::from_slice(bytes).map_err(|error| UnreadableResult(error.to_string()))
+    }
+    Ok((json::<C::Input>(input)?, json::<ResultOf<C::Output>>(envelope)?.result))
+}
+
+/// What the types refuse although the schema does not: one fault, as deserialisation stops at the first.
+fn second_line(error: &serde_path_to_error::Error<serde_json::Error>) -> Finding {
+    use serde_path_to_error::Segment;
+    let pointer = error.path().iter().fold(String::new(), |pointer, segment| match segment {
+        Segment::Seq { index } => format!("{pointer}/{index}"),
+        Segment::Map { key } => child(&pointer, key),
+        Segment::Enum { .. } | Segment::Unknown => pointer,
+    });
+    Finding::new("not_readable", pointer).with("reason", error.inner().to_string())
+}

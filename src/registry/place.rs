@@ -1,0 +1,135 @@
+//! Where in a job measured tables stand, and what their columns are.
+
+use serde_json::Value;
+
+/// A field of a job that holds a measured table.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct TablePlace {
+    /// Way from the root of the job.
+    pub(crate) path: Vec<Step>,
+    /// What a row holds.
+    pub(crate) columns: Vec<TableColumn>,
+    /// Most rows.
+    pub(crate) max_rows: usize,
+}
+
+/// One step into a JSON value.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Step {
+    /// The field of that name.
+    Field(String),
+    /// Every item of an array.
+    Each,
+}
+
+/// A column of a measured table.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct TableColumn {
+    /// Field name, with the suffix of its unit.
+    pub(crate) name: String,
+    /// Unit as in the contract; empty where the schema names none.
+    pub(crate) unit: String,
+    /// What a cell is.
+    pub(crate) kind: CellKind,
+    /// Whether every row must have it.
+    pub(crate) required: bool,
+}
+
+/// What a cell is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum CellKind {
+    /// A number.
+    Number,
+    /// A whole number.
+    Integer,
+    /// A word.
+    Word,
+    /// true or false.
+    Truth,
+}
+
+impl TablePlace {
+    /// Names of the fields on the way, with dots; the name of a file part may be this or its last piece.
+    pub(crate) fn dotted(&self) -> String {
+        let names: Vec<&str> = self
+            .path
+            .iter()
+            .map(|step| match step {
+                Step::Field(name) => name.as_str(),
+                Step::Each => "*",
+            })
+            .collect();
+        names.join(".")
+    }
+
+    /// Last name on the way.
+    pub(crate) fn name(&self) -> &str {
+        match self.path.last() {
+            Some(Step::Field(name)) => name,
+            _ => "",
+        }
+    }
+}
+
+/// Every measured table that a job of this (strict) schema may hold.
+pub(super) fn table_places(strict: &Value) -> Vec<TablePlace> {
+    let mut places = Vec::new();
+    walk(strict, &mut Vec::new(), &mut places);
+    places
+}
+
+fn walk(schema: &Value, path: &mut Vec<Step>, places: &mut Vec<TablePlace>) {
+    let Some(map) = schema.as_object() else { return };
+    if map.contains_key("x-table") {
+        if !places.iter().any(|place| place.path == *path) {
+            places.push(place(schema, path));
+        }
+        return;
+    }
+    if let Some(Value::Object(properties)) = map.get("properties") {
+        for (name, property) in properties {
+            path.push(Step::Field(name.clone()));
+            walk(property, path, places);
+            path.pop();
+        }
+    }
+    if let Some(items) = map.get("items") {
+        path.push(Step::Each);
+        walk(items, path, places);
+        path.pop();
+    }
+    for branch in map.get("allOf").and_then(Value::as_array).into_iter().flatten() {
+        walk(branch.get("then").unwrap_or(branch), path, places);
+    }
+}
+
+fn place(schema: &Value, path: &[Step]) -> TablePlace {
+    let row = &schema["items"];
+    let required = |name: &str| row["required"].as_array().is_some_and(|names| names.iter().any(|n| n == name));
+    let columns = row["properties"]
+        .as_object()
+        .into_iter()
+        .flatten()
+        .map(|(name, field)| TableColumn {
+            name: name.clone(),
+            unit: field["x-unit"].as_str().unwrap_or_default().to_owned(),
+            kind: kind(&field["type"]),
+            required: required(name),
+        })
+        .collect();
+    let max_rows = schema["maxItems"].as_u64().and_then(|most| usize::try_from(most).ok()).unwrap_or(usize::MAX);
+    TablePlace { path: path.to_vec(), columns, max_rows }
+}
+
+fn kind(declared: &Value) -> CellKind {
+    let is = |name: &str| declared == name || declared.as_array().is_some_and(|many| many.iter().any(|k| k == name));
+    if is("number") {
+        CellKind::Number
+    } else if is("integer") {
+        CellKind::Integer
+    } else if is("boolean") {
+        CellKind::Truth
+    } else {
+        CellKind::Word
+    }
+}

@@ -1,0 +1,128 @@
+//! Kept results. Nothing outside this module speaks SQL.
+
+mod row;
+pub mod sqlite;
+mod writer;
+
+use std::fmt;
+use std::str::FromStr;
+
+use bytes::Bytes;
+use futures_util::future::BoxFuture;
+
+use crate::engine::{BadKey, Key};
+
+/// Where results are kept. What is kept can always be computed again: no failure of a store fails an answer.
+pub trait ResultStore: Send + Sync + 'static {
+    /// The result of that key.
+    fn get(&self, key: Key) -> BoxFuture<'_, Result<Option<KeptResult>, StoreError>>;
+    /// Keeps a result, soon, in a group with others. Where that fails, a warning and a metric say so.
+    fn put(&self, result: KeptResult);
+    /// The results, newest first, those just put among them.
+    fn list(&self, query: ResultQuery) -> BoxFuture<'_, Result<ResultPage, StoreError>>;
+    /// Whether it answers.
+    fn ping(&self) -> BoxFuture<'_, Result<(), StoreError>>;
+    /// Writes what waits and closes.
+    fn close(&self) -> BoxFuture<'_, ()>;
+}
+
+/// A result as it is kept.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct KeptResult {
+    /// Its address.
+    pub key: Key,
+    /// Which calculator made it.
+    pub calculator: String,
+    /// Which version of the calculator.
+    pub version: u32,
+    /// Which engine.
+    pub engine: String,
+    /// The filled job, canonical JSON.
+    pub input: Bytes,
+    /// The envelope, JSON.
+    pub body: Bytes,
+}
+
+/// What a list of results asks for.
+#[derive(Debug, Clone, Default)]
+pub struct ResultQuery {
+    /// Only those of this calculator.
+    pub calculator: Option<String>,
+    /// At most so many; [`ResultQuery::LIMIT`] unless told, never above [`ResultQuery::MOST`].
+    pub limit: Option<u32>,
+    /// Where the page before ended.
+    pub after: Option<Cursor>,
+}
+
+impl ResultQuery {
+    /// So many results are listed unless told otherwise.
+    pub const LIMIT: u32 = 50;
+    /// Never more than so many.
+    pub const MOST: u32 = 500;
+}
+
+/// A place in the list of results; opaque in the contract.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Cursor {
+    /// Time of the last result of the page before, ms UTC.
+    pub created_ms: i64,
+    /// Its key.
+    pub key: Key,
+}
+
+impl fmt::Display for Cursor {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}.{}", self.created_ms, self.key.to_string().trim_start_matches("b3:"))
+    }
+}
+
+impl FromStr for Cursor {
+    type Err = BadKey;
+    fn from_str(text: &str) -> Result<Self, BadKey> {
+        let (created_ms, digits) = text.split_once('.').ok_or(BadKey)?;
+        Ok(Self { created_ms: created_ms.parse().map_err(|_| BadKey)?, key: format!("b3:{digits}").parse()? })
+    }
+}
+
+/// A page of the list, newest first.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct ResultPage {
+    /// The results.
+    pub items: Vec<ResultSummary>,
+    /// Where the next page begins, if there is one.
+    pub next: Option<Cursor>,
+}
+
+/// A line of the list.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ResultSummary {
+    /// Its address.
+    pub key: Key,
+    /// Which calculator made it.
+    pub calculator: String,
+    /// Which version of the calculator.
+    pub version: u32,
+    /// Which engine.
+    pub engine: String,
+    /// What it takes of the disk, bytes.
+    pub bytes: u64,
+    /// When it was computed, ms UTC.
+    pub created_ms: i64,
+}
+
+/// Why the store did not serve.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum StoreError {
+    /// The database did not answer.
+    #[error("the store failed: {0}")]
+    Failed(String),
+    /// The kept result was made by a version whose contract differs.
+    #[error("the result was made by another version of its calculator: {0}")]
+    Outdated(String),
+}
+
+impl From<sqlx::Error> for StoreError {
+    fn from(error: sqlx::Error) -> Self {
+        Self::Failed(error.to_string())
+    }
+}

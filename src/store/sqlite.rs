@@ -1,0 +1,221 @@
+//! Results in an SQLite file: one connection writes, four read.
+
+use std::collections::HashSet;
+use std::fs::{self, File, TryLockError};
+use std::path::Path;
+use std::sync::{Arc, PoisonError, RwLock};
+use std::time::Duration;
+
+use futures_util::future::BoxFuture;
+use sqlx::migrate::{MigrateError, Migrator};
+use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous};
+
+use super::row::ResultRow;
+use super::writer::{Limits, Writer};
+use super::{Cursor, KeptResult, ResultPage, ResultQuery, ResultStore, ResultSummary, StoreError};
+use crate::engine::{Key, OpenError};
+
+static MIGRATIONS: Migrator = sqlx::migrate!("./migrations");
+
+const DATABASE: &str = "precut.db";
+const LOCK: &str = "precut.lock";
+const READERS: u32 = 4;
+const BUSY_TIMEOUT: Duration = Duration::from_secs(5);
+
+/// Results in an SQLite file in a folder that no other process uses.
+pub struct SqliteStore {
+    readers: SqlitePool,
+    writer: Writer,
+    keys: Keys,
+    _lock: File,
+}
+
+/// Which results there are, by eight bytes of their keys: a job that is new does not ask the disk.
+#[derive(Clone, Default)]
+pub(super) struct Keys(Arc<RwLock<HashSet<u64>>>);
+
+impl Keys {
+    fn short(key: &[u8]) -> u64 {
+        key.first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes))
+    }
+    /// Whether the key may be there; `false` is certain.
+    fn may_have(&self, key: &Key) -> bool {
+        self.0.read().unwrap_or_else(PoisonError::into_inner).contains(&Self::short(key.as_bytes()))
+    }
+    pub(super) fn add(&self, key: &[u8]) {
+        self.0.write().unwrap_or_else(PoisonError::into_inner).insert(Self::short(key));
+    }
+    pub(super) fn remove(&self, key: &[u8]) {
+        self.0.write().unwrap_or_else(PoisonError::into_inner).remove(&Self::short(key));
+    }
+}
+
+impl SqliteStore {
+    /// Opens the database in `folder`, which is made if absent; keeps at most about `bytes` of results, each at most
+    /// `age` after its last use.
+    pub async fn open(folder: &Path, bytes: u64, age: Duration) -> Result<Self, OpenError> {
+        let unusable = |reason: String| OpenError::Unusable { folder: folder.to_owned(), reason };
+        fs::create_dir_all(folder).map_err(|error| unusable(error.to_string()))?;
+        let lock = lock(folder)?;
+        let options = SqliteConnectOptions::new()
+            .filename(folder.join(DATABASE))
+            .create_if_missing(true)
+            .journal_mode(SqliteJournalMode::Wal)
+            // With NORMAL a power cut would lose what was acknowledged.
+            .synchronous(SqliteSynchronous::Full)
+            .busy_timeout(BUSY_TIMEOUT)
+            .foreign_keys(true);
+        let failed = |error: sqlx::Error| unusable(error.to_string());
+        let writing =
+            SqlitePoolOptions::new().max_connections(1).connect_with(options.clone()).await.map_err(failed)?;
+        MIGRATIONS.run(&writing).await.map_err(|error| unusable(migration_fault(&error)))?;
+        let readers = SqlitePoolOptions::new()
+            .max_connections(READERS)
+            .acquire_timeout(BUSY_TIMEOUT)
+            .connect_with(options.create_if_missing(false).pragma("query_only", "ON"))
+            .await
+            .map_err(failed)?;
+        let keys = Keys::default();
+        let all: Vec<Vec<u8>> = sqlx::query_scalar("SELECT key FROM results INDEXED BY results_by_use")
+            .fetch_all(&readers)
+            .await
+            .map_err(failed)?;
+        for key in &all {
+            keys.add(key);
+        }
+        let limits = Limits { bytes: i64::try_from(bytes).unwrap_or(i64::MAX), age };
+        let writer = Writer::start(writing, keys.clone(), limits).await.map_err(failed)?;
+        Ok(Self { readers, writer, keys, _lock: lock })
+    }
+
+    async fn read(&self, key: Key) -> Result<Option<KeptResult>, StoreError> {
+        if !self.keys.may_have(&key) {
+            return Ok(None);
+        }
+        let row: Option<ResultRow> = sqlx::query_as(
+            "SELECT key, calculator, version, engine, input, body, checksum FROM results WHERE key = ?1",
+        )
+        .bind(key.as_bytes().as_slice())
+        .fetch_optional(&self.readers)
+        .await
+        .inspect_err(|error| {
+            tracing::warn!(%key, %error, "a kept result cannot be read");
+            metrics::counter!("precut_store_failures_total", "operation" => "read").increment(1);
+        })?;
+        let Some(row) = row else { return Ok(None) };
+        let result = row.result();
+        if result.is_some() {
+            self.writer.touch(key);
+        } else {
+            tracing::warn!(%key, "a kept result is damaged; it will be computed again");
+            metrics::counter!("precut_store_failures_total", "operation" => "checksum").increment(1);
+            self.writer.forget(key);
+        }
+        Ok(result)
+    }
+
+    async fn page(&self, query: ResultQuery) -> Result<ResultPage, StoreError> {
+        self.writer.flush().await;
+        let limit = query.limit.unwrap_or(ResultQuery::LIMIT).clamp(1, ResultQuery::MOST);
+        let after = query.after.map(|cursor| (cursor.created_ms, cursor.key.as_bytes().to_vec()));
+        let (created_ms, key) = after.unwrap_or((i64::MAX, vec![0xff; 32]));
+        // One more than asked for tells whether there is another page.
+        let statement = match query.calculator {
+            None => sqlx::query_as(
+                "SELECT key, calculator, version, engine, bytes, created_ms FROM results INDEXED BY results_by_time
+                 WHERE (created_ms, key) < (?1, ?2) ORDER BY created_ms DESC, key DESC LIMIT ?3",
+            )
+            .bind(created_ms)
+            .bind(key)
+            .bind(limit + 1),
+            Some(calculator) => sqlx::query_as(
+                "SELECT key, calculator, version, engine, bytes, created_ms FROM results INDEXED BY results_by_calculator
+                 WHERE calculator = ?4 AND (created_ms, key) < (?1, ?2) ORDER BY created_ms DESC, key DESC LIMIT ?3",
+            )
+            .bind(created_ms)
+            .bind(key)
+            .bind(limit + 1)
+            .bind(calculator),
+        };
+        let rows: Vec<SummaryRow> = statement.fetch_all(&self.readers).await?;
+        let mut items: Vec<ResultSummary> = rows.into_iter().filter_map(SummaryRow::summary).collect();
+        let more = items.len() > limit as usize;
+        items.truncate(limit as usize);
+        let next = items.last().filter(|_| more).map(|last| Cursor { created_ms: last.created_ms, key: last.key });
+        Ok(ResultPage { items, next })
+    }
+}
+
+impl ResultStore for SqliteStore {
+    fn get(&self, key: Key) -> BoxFuture<'_, Result<Option<KeptResult>, StoreError>> {
+        Box::pin(self.read(key))
+    }
+    fn put(&self, result: KeptResult) {
+        self.writer.put(result);
+    }
+    fn list(&self, query: ResultQuery) -> BoxFuture<'_, Result<ResultPage, StoreError>> {
+        Box::pin(self.page(query))
+    }
+    fn ping(&self) -> BoxFuture<'_, Result<(), StoreError>> {
+        Box::pin(async {
+            sqlx::query("SELECT 1").execute(&self.readers).await?;
+            Ok(())
+        })
+    }
+    fn close(&self) -> BoxFuture<'_, ()> {
+        Box::pin(async {
+            // Readers first: the last connection, which writes, then brings the log into the file.
+            self.readers.close().await;
+            self.writer.close().await;
+        })
+    }
+}
+
+#[derive(sqlx::FromRow)]
+struct SummaryRow {
+    key: Vec<u8>,
+    calculator: String,
+    version: u32,
+    engine: String,
+    bytes: i64,
+    created_ms: i64,
+}
+
+impl SummaryRow {
+    fn summary(self) -> Option<ResultSummary> {
+        Some(ResultSummary {
+            key: Key::from_bytes(&self.key)?,
+            calculator: self.calculator,
+            version: self.version,
+            engine: self.engine,
+            bytes: u64::try_from(self.bytes).unwrap_or(0),
+            created_ms: self.created_ms,
+        })
+    }
+}
+
+fn lock(folder: &Path) -> Result<File, OpenError> {
+    let unusable = |error: std::io::Error| OpenError::Unusable { folder: folder.to_owned(), reason: error.to_string() };
+    let file = File::options().create(true).truncate(false).write(true).open(folder.join(LOCK)).map_err(unusable)?;
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(TryLockError::WouldBlock) => Err(OpenError::InUse(folder.to_owned())),
+        Err(TryLockError::Error(error)) => Err(unusable(error)),
+    }
+}
+
+fn migration_fault(error: &MigrateError) -> String {
+    match error {
+        MigrateError::VersionMissing(version) => {
+            format!("its database was written by a newer precut (migration {version})")
+        }
+        MigrateError::VersionMismatch(version) => {
+            format!("its database was not made by this program (migration {version} differs)")
+        }
+        other => other.to_string(),
+    }
+}
+
+#[cfg(test)]
+#[path = "sqlite_tests.rs"]
+mod tests;

@@ -1,0 +1,67 @@
+//! Numbers and units as people read them.
+
+/// `x` with `digits` significant digits, without trailing zeros; very large and very small numbers with an exponent.
+pub(super) fn significant(x: f64, digits: usize) -> String {
+    if x == 0.0 || !x.is_finite() {
+        return if x.is_finite() { "0".to_owned() } else { x.to_string() };
+    }
+    let scientific = format!("{x:.*e}", digits.clamp(1, 17) - 1);
+    let (mantissa, exponent) = scientific.split_once('e').unwrap_or((&scientific, "0"));
+    let exponent: i32 = exponent.parse().unwrap_or(0);
+    if !(-5..9).contains(&exponent) {
+        return format!("{}e{exponent}", trimmed(mantissa));
+    }
+    let rounded: f64 = scientific.parse().unwrap_or(x);
+    let decimals = i32::try_from(digits).unwrap_or(17) - 1 - exponent;
+    trimmed(&format!("{rounded:.*}", usize::try_from(decimals).unwrap_or(0))).to_owned()
+}
+
+/// `x` with `decimals` digits after the point.
+pub(super) fn fixed(x: f64, decimals: usize) -> String {
+    format!("{x:.*}", decimals.min(17))
+}
+
+fn trimmed(number: &str) -> &str {
+    if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { number }
+}
+
+/// A unit of the contract as it is printed: `µm/N` for `um/N`, nothing for `1`.
+pub(super) fn printed_unit(unit: &str) -> String {
+    if unit == "1" {
+        return String::new();
+    }
+    let micro = unit.strip_prefix("um").map_or_else(|| unit.to_owned(), |rest| format!("µm{rest}"));
+    micro.replace("mm2", "mm²").replace("m3", "m³").replace("s2", "s²")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_rounded_to_digits_not_to_decimals() {
+        for (x, digits, expected) in [
+            (104.3649, 3, "104"),
+            (0.012_345, 3, "0.0123"),
+            (210_000.0, 3, "210000"),
+            (999.96, 4, "1000"),
+            (-0.5, 2, "-0.5"),
+            (0.0, 3, "0"),
+            (2.1e11, 3, "2.1e11"),
+            (1.23e-7, 2, "1.2e-7"),
+            (123_456.0, 2, "120000"),
+            (0.1 + 0.2, 6, "0.3"),
+        ] {
+            assert_eq!(significant(x, digits), expected);
+        }
+        assert_eq!(fixed(1.005, 1), "1.0");
+    }
+
+    #[test]
+    fn units_are_printed_with_their_signs() {
+        assert_eq!(printed_unit("um/N"), "µm/N");
+        assert_eq!(printed_unit("N/mm2"), "N/mm²");
+        assert_eq!(printed_unit("kg/m3"), "kg/m³");
+        assert_eq!(printed_unit("1"), "");
+    }
+}

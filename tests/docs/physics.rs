@@ -1,0 +1,132 @@
+//! The pages on physics: every equation that the program cites has its heading, every cause its numbers, every code
+//! its line.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use precut::registry::Registry;
+use precut_calc::calculator::Unwatched;
+use precut_calc::effects::{Cause, DEFLECTION_CAUSES, Fit, Parameter};
+
+use super::markdown::{Document, documents};
+use super::root;
+
+const DEFLECTION: &str = "docs/physics/deflection-compensation.md";
+const EFFECTS: &str = "docs/physics/effects-deflection.md";
+
+/// Groups of equations.
+const GROUPS: [&str; 2] = ["deflection/", "diagnosis/"];
+
+/// Equations that have a heading: its first word.
+fn documented() -> BTreeSet<String> {
+    let pages = documents(root());
+    let physics = pages.iter().filter(|page| page.name.starts_with("docs/physics/"));
+    let first = |heading: &str| heading.split(' ').next().unwrap_or_default().to_owned();
+    physics.flat_map(|page| page.headings().map(first).collect::<Vec<_>>()).collect()
+}
+
+/// Numbers of equations in a text, such as `deflection/4.1`.
+fn cited(text: &str) -> Vec<String> {
+    let mut found = Vec::new();
+    for group in GROUPS {
+        for (at, _) in text.match_indices(group) {
+            let rest = &text[at + group.len()..];
+            let end = rest.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(rest.len());
+            let number = rest[..end].trim_end_matches('.');
+            if !number.is_empty() {
+                found.push(format!("{group}{number}"));
+            }
+        }
+    }
+    found
+}
+
+fn sources(folder: &Path, cites: &mut BTreeMap<String, String>) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            sources(&path, cites);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            for number in cited(&std::fs::read_to_string(&path).unwrap()) {
+                cites.insert(number, path.display().to_string());
+            }
+        }
+    }
+}
+
+#[test]
+fn every_equation_cited_in_the_source_is_documented() {
+    let mut cites = BTreeMap::new();
+    sources(&root().join("crates"), &mut cites);
+    sources(&root().join("src"), &mut cites);
+    assert!(cites.len() > 20, "{cites:?}");
+    let documented = documented();
+    let missing: Vec<_> = cites.iter().filter(|(number, _)| !documented.contains(*number)).collect();
+    assert!(missing.is_empty(), "no heading in docs/physics for {missing:?}");
+}
+
+#[test]
+fn every_equation_of_an_answer_is_documented() {
+    let documented = documented();
+    let registry = Registry::standard().unwrap();
+    for entry in registry.entries() {
+        for example in entry.meta().examples {
+            let body = precut::engine::Body::Json(example.job.into());
+            let stored = precut::engine::solve_now(&registry, entry.meta().id, body, &Unwatched).unwrap();
+            let answer: serde_json::Value = serde_json::from_slice(&stored.body).unwrap();
+            let basis = answer["basis"].as_array().unwrap();
+            assert!(!basis.is_empty(), "{}", example.id);
+            for equation in basis.iter().map(|basis| basis["equation"].as_str().unwrap()) {
+                assert!(documented.contains(equation), "{equation}, cited by the example {}", example.id);
+            }
+        }
+    }
+}
+
+/// A row of the catalogue as it must stand on its page.
+fn row(parameter: &Parameter) -> String {
+    let (fit, prior) = match parameter.fit {
+        Fit::Amplitude | Fit::Shape { grid: [] } => ("fitted".to_owned(), parameter.prior_sd.to_string()),
+        Fit::Shape { grid } => {
+            let grid: Vec<String> = grid.iter().map(f64::to_string).collect();
+            (format!("grid {}", grid.join(", ")), parameter.prior_sd.to_string())
+        }
+        Fit::Fixed { default } => (format!("stated, default {default}"), "-".to_owned()),
+        Fit::OfJob => ("of the job".to_owned(), "-".to_owned()),
+    };
+    let Parameter { name, unit, lower, upper, .. } = parameter;
+    format!("| `{name}` | {unit} | {fit} | {prior} | {lower} to {upper} |")
+}
+
+/// The part of the page on one cause.
+fn section<'t>(text: &'t str, cause: &Cause) -> &'t str {
+    let heading = format!("### {} `{}`\n", cause.equation, cause.kind);
+    let Some((_, rest)) = text.split_once(&heading) else { panic!("{EFFECTS} has no heading {heading}") };
+    rest.split("\n#").next().unwrap()
+}
+
+#[test]
+fn the_catalogue_has_the_numbers_of_the_code() {
+    let page = Document::read(root(), EFFECTS);
+    for cause in DEFLECTION_CAUSES {
+        let section = section(&page.text, cause);
+        for parameter in cause.parameters {
+            let row = row(parameter);
+            assert!(section.lines().any(|line| line == row), "{}: no row {row}", cause.kind);
+        }
+        for other in cause.conditions.iter().chain(cause.confounded_with) {
+            assert!(section.contains(&format!("`{other}`")), "{}: {other} is not named", cause.kind);
+        }
+    }
+}
+
+#[test]
+fn every_code_of_the_calculator_is_explained() {
+    let page = Document::read(root(), DEFLECTION).text;
+    let registry = Registry::standard().unwrap();
+    let entry = registry.entry("deflection-compensation").unwrap();
+    let codes = &entry.meta().codes;
+    let groups = codes.faults.iter().chain(codes.failures).chain(codes.warnings).copied();
+    let missing: Vec<_> = groups.flatten().filter(|code| !page.contains(&format!("`{code}`"))).collect();
+    assert!(missing.is_empty(), "{DEFLECTION} does not name {missing:?}");
+}

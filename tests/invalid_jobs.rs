@@ -1,0 +1,160 @@
+//! The reference's impossible jobs: each is refused with its code at its field, among whatever else is wrong.
+#![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
+
+#[path = "../crates/precut-calc/tests/support/mod.rs"]
+mod support;
+
+use precut::engine::{Body, Error, check_now};
+use precut::registry::Registry;
+use serde_json::{Value, json};
+use support::{cases, translate};
+
+/// Code and pointer of every fault.
+fn faults(registry: &Registry, job: &Value) -> Vec<(String, String)> {
+    match check_now(registry, "deflection-compensation", Body::Json(job.to_string().into())) {
+        Err(Error::Invalid { findings, .. }) => findings.into_iter().map(|f| (f.code.to_owned(), f.pointer)).collect(),
+        Err(error) => panic!("{error:?}"),
+        Ok(_) => panic!("accepted: {job}"),
+    }
+}
+
+/// `shaft.segments[0].d_in` of the sketch as a pointer of the contract.
+fn pointer(path: &str) -> String {
+    let mut pointer = String::new();
+    for part in path.split('.') {
+        let (name, index) = part.split_once('[').map_or((part, None), |(n, i)| (n, Some(i.trim_end_matches(']'))));
+        let name = match name {
+            "length" => "length_mm",
+            "d" => "diameter_mm",
+            "d_in" => "bore_diameter_mm",
+            "d_stock" => "stock_diameter_mm",
+            "x" => "z_mm",
+            "c" => "compliance_um_per_n",
+            "s" => "feed_mm_per_rev",
+            "E" => "youngs_modulus_n_per_mm2",
+            "nu" => "poisson_ratio",
+            other => other,
+        };
+        pointer.push('/');
+        pointer.push_str(name);
+        if let Some(index) = index {
+            pointer.push('/');
+            pointer.push_str(index);
+        }
+    }
+    pointer
+}
+
+#[test]
+fn every_impossible_job_is_refused_at_its_field() {
+    let registry = Registry::standard().unwrap();
+    for case in cases("invalid.json") {
+        let title = case["title"].as_str().unwrap();
+        let expected = &case["expected"]["error"];
+        let (code, at) = (expected["code"].as_str().unwrap(), pointer(expected["path"].as_str().unwrap()));
+        let found = faults(&registry, &translate(&case["input"]));
+        assert!(
+            found.iter().any(|(c, p)| c == code && (*p == at || p.starts_with(&format!("{at}/")))),
+            "{title}: {code} at {at} is not among {found:?}"
+        );
+    }
+}
+
+#[test]
+fn the_other_codes_of_the_specification() {
+    let registry = Registry::standard().unwrap();
+    let good = || {
+        json!({
+            "shaft": { "segments": [{ "length_mm": 500, "diameter_mm": 30, "stock_diameter_mm": 32 }], "youngs_modulus_n_per_mm2": 210_000 },
+            "supports": [{ "kind": "centre", "z_mm": 0 }, { "kind": "centre", "z_mm": 500 }],
+            "force": { "kind": "power_law", "passive": { "coefficient": 2430, "depth_exponent": 0.9, "feed_exponent": 0.6, "speed_exponent": -0.3 } },
+            "cut": { "feed_mm_per_rev": 0.3, "speed_m_per_min": 120 }
+        })
+    };
+    let kienzle = json!({
+        "kind": "kienzle", "cutting_edge_angle_deg": 91, "nose_radius_mm": -1,
+        "specific_cutting_force_n_per_mm2": 0, "cutting_exponent": 1.0,
+        "specific_normal_force_n_per_mm2": 900, "normal_exponent": 0.3
+    });
+    let changes: &[(&str, Value, &str, &str)] = &[
+        ("/shaft/segments/0/diameter_mm", json!(0), "bad_diameter", "/shaft/segments/0/diameter_mm"),
+        ("/shaft/segments/0/diameter_mm", json!(1e-310), "bad_diameter", "/shaft/segments/0/diameter_mm"),
+        ("/cut/speed_m_per_min", json!(0), "bad_speed", "/cut/speed_m_per_min"),
+        ("/force/passive/coefficient", json!(0), "bad_power_law", "/force/passive/coefficient"),
+        ("/force/passive/depth_exponent", json!(-0.1), "bad_power_law", "/force/passive/depth_exponent"),
+        ("/force", kienzle.clone(), "bad_lead_angle", "/force/cutting_edge_angle_deg"),
+        ("/force", kienzle.clone(), "bad_nose_radius", "/force/nose_radius_mm"),
+        ("/force", kienzle.clone(), "bad_kienzle", "/force/specific_cutting_force_n_per_mm2"),
+        ("/force", kienzle, "bad_kienzle", "/force/cutting_exponent"),
+        ("/force/kind", json!("rosenberg"), "unknown_force_model", "/force/kind"),
+        ("/supports", json!([]), "unstable_support", "/supports"),
+        (
+            "/supports/1",
+            json!({ "kind": "steady_rest", "z_mm": 500, "one_sided": true }),
+            "unstable_support",
+            "/supports",
+        ),
+        ("/supports/1", json!({ "kind": "follow_rest", "offset_mm": 5 }), "unstable_support", "/supports"),
+        ("/supports/1/gap_um", json!(-1), "unknown_field", "/supports/1/gap_um"),
+        (
+            "/effects",
+            json!([{ "kind": "tool_wear", "rate_um_per_km": 1 }]),
+            "condition_missing",
+            "/conditions/tool_path_at_start_m",
+        ),
+        ("/effects", json!([{ "kind": "tool_ware", "rate_um_per_km": 1 }]), "unknown_kind", "/effects/0/kind"),
+        (
+            "/effects",
+            json!([{ "kind": "force_level", "delta": 0.1 }, { "kind": "force_level", "delta": 0.1 }]),
+            "duplicate_effect",
+            "/effects/1/kind",
+        ),
+        ("/stations", json!({ "kind": "per_zone", "count": 300_000 }), "too_many_stations", "/stations/count"),
+        ("/material", json!("steel"), "unknown_field", "/material"),
+        ("/shaft/material", json!("unobtainium"), "unknown_material", "/shaft/material"),
+    ];
+    for (place, value, code, at) in changes {
+        let mut job = good();
+        let (parent, name) = place.rsplit_once('/').unwrap();
+        match job.pointer_mut(parent).unwrap() {
+            Value::Array(items) => items[name.parse::<usize>().unwrap()] = value.clone(),
+            Value::Object(fields) => drop(fields.insert(name.to_owned(), value.clone())),
+            other => panic!("{other}"),
+        }
+        let found = faults(&registry, &job);
+        assert!(
+            found.iter().any(|(c, p)| c == code && p == at),
+            "{place} = {value}: {code} at {at} is not among {found:?}"
+        );
+    }
+}
+
+#[test]
+fn all_faults_come_at_once() {
+    let registry = Registry::standard().unwrap();
+    let found = faults(
+        &registry,
+        &json!({
+            "shaft": { "segments": [{ "length_mm": -1, "diameter_mm": 30, "stock_diameter_mm": 29, "bore_diameter_mm": 30 }], "youngs_modulus_n_per_mm2": 0 },
+            "supports": [{ "kind": "centre", "z_mm": 0, "compliance_um_per_n": -1 }],
+            "force": { "kind": "power_law", "passive": { "coefficient": -1, "depth_exponent": 0.9, "feed_exponent": 0.6, "speed_exponent": -0.3 } },
+            "cut": { "feed_mm_per_rev": 0 },
+            "stations": { "kind": "list", "z_mm": [600] }
+        }),
+    );
+    let codes: Vec<&str> = found.iter().map(|(code, _)| code.as_str()).collect();
+    for code in [
+        "bad_length",
+        "bad_bore",
+        "stock_below_finish",
+        "bad_modulus",
+        "negative_compliance",
+        "unstable_support",
+        "bad_power_law",
+        "bad_feed",
+        "speed_or_rpm",
+        "station_outside_shaft",
+    ] {
+        assert!(codes.contains(&code), "{code} is not among {codes:?}");
+    }
+}

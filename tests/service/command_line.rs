@@ -1,0 +1,200 @@
+//! The command line, as real processes.
+
+use std::io::Write;
+use std::process::{Command, Output, Stdio};
+
+use serde_json::Value;
+
+use crate::support::{Process, toy, toy_command};
+
+const FILE: &str = r#"{"calculator": "sagging-bar", "job": {"length_mm": 500.0, "load_n": 100.0}}"#;
+
+fn run(arguments: &[&str], input: &str) -> Output {
+    feed(toy_command(arguments), input)
+}
+
+/// The shipped binary.
+fn precut(arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_precut"));
+    command.args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped());
+    for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("PRECUT_")) {
+        command.env_remove(name);
+    }
+    feed(command, "")
+}
+
+fn feed(mut command: Command, input: &str) -> Output {
+    let mut child = command.stdin(Stdio::piped()).spawn().unwrap();
+    // It may end before it has read everything.
+    let _ = child.stdin.take().unwrap().write_all(input.as_bytes());
+    child.wait_with_output().unwrap()
+}
+
+/// What the command wrote, without what the test harness around it says.
+fn said(output: &Output) -> String {
+    let text = String::from_utf8(output.stdout.clone()).unwrap();
+    text.trim_start_matches("\nrunning 1 test\n").to_owned()
+}
+
+fn complaint(output: &Output) -> Value {
+    serde_json::from_slice(&output.stderr).unwrap_or_else(|_| panic!("{}", String::from_utf8_lossy(&output.stderr)))
+}
+
+#[test]
+fn a_job_file_is_solved_in_every_form() {
+    let output = run(&["solve", "-"], FILE);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let answer: Value = serde_json::from_str(&said(&output)).unwrap();
+    assert_eq!(answer["calculator"], toy::BAR);
+    assert_eq!(answer["result"]["max_sag_um"], answer["explanation"][0]["values"]["sag_um"]);
+    for (arguments, begins) in [
+        (&["solve", "--format", "csv"][..], "z [mm],sag [um]\n0"),
+        (&["solve", "--format", "csv", "--table", "summary"], "max_sag [um]\n"),
+        (&["solve", "--format", "svg", "-"], "<svg"),
+        (&["solve", "--format", "svg", "--figure", "load"], "<svg"),
+        (&["solve", "--format", "gcode"], ""),
+    ] {
+        let output = run(arguments, FILE);
+        assert!(output.status.success(), "{arguments:?} {}", String::from_utf8_lossy(&output.stderr));
+        assert!(said(&output).starts_with(begins), "{arguments:?} {}", said(&output));
+    }
+}
+
+#[test]
+fn files_are_read_and_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let (job, out) = (folder.path().join("job.json"), folder.path().join("out.csv"));
+    std::fs::write(&job, FILE).unwrap();
+    let arguments = ["solve", job.to_str().unwrap(), "-f", "csv", "-o", out.to_str().unwrap()];
+    assert!(run(&arguments, "").status.success());
+    assert!(std::fs::read_to_string(&out).unwrap().starts_with("z [mm],sag [um]\n"));
+    let bare = run(&["solve", "--calculator", toy::BAR], toy::JOB);
+    assert!(bare.status.success(), "{}", String::from_utf8_lossy(&bare.stderr));
+    let output = run(&["solve", "/nowhere/job.json"], "");
+    assert_eq!(output.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("/nowhere/job.json"));
+}
+
+#[test]
+fn exit_codes_tell_whose_fault_it_is() {
+    for (input, code, kind) in [
+        ("{\"calculator\": \"sagging-bar\", \"job\": {\"length_mm\": -1, \"load\": 1}}", 2, "invalid_job"),
+        ("{\"calculator\": \"saging-bar\", \"job\": {}}", 2, "unknown_calculator"),
+        ("{\"calculator\": \"sagging-bar\", \"job\": {\"length_mm\": 1, \"length_mm\": 2}}", 2, "duplicate_key"),
+        ("nonsense", 2, "bad_syntax"),
+        ("", 2, "bad_syntax"),
+        (
+            "{\"calculator\": \"sagging-bar\", \"job\": {\"length_mm\": 500, \"load_n\": 1, \"behaviour\": \"infeasible\"}}",
+            3,
+            "bar_would_break",
+        ),
+    ] {
+        let output = run(&["solve", "-"], input);
+        assert_eq!(complaint(&output)["code"], kind, "{input}");
+        // The harness around the toy only tells whether it was 0.
+        assert!(!output.status.success(), "{input} should end with {code}");
+    }
+    assert_eq!(precut(&["solve", "/nowhere"]).status.code(), Some(1));
+    assert_eq!(precut(&["solve", "--format", "png"]).status.code(), Some(2));
+    assert_eq!(precut(&["schema", "no-such-calculator"]).status.code(), Some(2));
+}
+
+#[test]
+fn a_check_computes_nothing_and_says_what_would_be_computed() {
+    let slow = r#"{"calculator": "sagging-bar", "job": {"length_mm": 500, "load_n": 1, "behaviour": "slow"}}"#;
+    let start = std::time::Instant::now();
+    let output = run(&["check", "-"], slow);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let checked: Value = serde_json::from_str(&said(&output)).unwrap();
+    assert_eq!(checked["input"]["stations"], 10);
+    assert!(checked["key"].as_str().unwrap().starts_with("b3:"));
+    assert!(start.elapsed() < std::time::Duration::from_millis(900), "{:?}", start.elapsed());
+    let output = run(&["check"], r#"{"calculator": "sagging-bar", "job": {"length_mm": -1}}"#);
+    assert_eq!(complaint(&output)["errors_total"], 2);
+}
+
+#[test]
+fn places_of_faults_are_those_of_the_file() {
+    let output = run(&["check"], "{\"calculator\": \"sagging-bar\",\n\"job\": {\n\"load_n\": 1,\n\"load_n\": 2}}");
+    let detail = complaint(&output)["detail"].to_string();
+    assert!(detail.contains("line 4"), "{detail}");
+}
+
+#[test]
+fn what_can_be_asked_is_listed_with_schema_and_examples() {
+    assert_eq!(said(&run(&["list"], "")), "sagging-bar  How far does the bar sag?\n");
+    let schema: Value = serde_json::from_str(&said(&run(&["schema", toy::BAR], ""))).unwrap();
+    assert_eq!(schema["properties"]["length_mm"]["x-unit"], "mm");
+    let result: Value = serde_json::from_str(&said(&run(&["schema", toy::BAR, "--result"], ""))).unwrap();
+    assert!(result["properties"]["max_sag_um"].is_object());
+    let example = said(&run(&["example", toy::BAR], ""));
+    assert!(run(&["solve"], &example).status.success());
+    assert_eq!(said(&run(&["example", toy::BAR, "plain"], "")), example);
+    let bare = said(&run(&["example", toy::BAR, "--job"], ""));
+    assert!(run(&["solve", "-c", toy::BAR], &bare).status.success());
+    let output = run(&["example", toy::BAR, "none"], "");
+    assert!(String::from_utf8_lossy(&output.stderr).contains("plain"));
+    let contract: Value = serde_json::from_str(&said(&run(&["openapi"], ""))).unwrap();
+    assert!(contract["paths"]["/v1/sagging-bar"].is_object());
+}
+
+#[test]
+fn help_and_version_are_worth_reading() {
+    let help = String::from_utf8(precut(&["--help"]).stdout).unwrap();
+    for part in
+        ["serve", "solve", "check", "list", "schema", "example", "openapi", "health", "Examples:", "Exit codes:"]
+    {
+        assert!(help.contains(part), "{part} in {help}");
+    }
+    let version = String::from_utf8(precut(&["--version"]).stdout).unwrap();
+    assert_eq!(version.trim(), format!("precut {}", env!("CARGO_PKG_VERSION")));
+}
+
+#[test]
+fn settings_are_printed_and_refused_with_their_source() {
+    let printed = String::from_utf8(precut(&["--print-config", "--listen", "127.0.0.1:9"]).stdout).unwrap();
+    assert!(printed.contains("listen = \"127.0.0.1:9\""), "{printed}");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_precut"));
+    command.arg("--print-config").env("PRECUT_LIMITS_BURST", "none").stdout(Stdio::piped()).stderr(Stdio::piped());
+    let output = feed(command, "");
+    assert_eq!(output.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("PRECUT_LIMITS_BURST"), "{output:?}");
+}
+
+#[test]
+fn a_key_is_hashed_for_the_settings() {
+    let output = feed(
+        {
+            let mut command = Command::new(env!("CARGO_BIN_EXE_precut"));
+            command.arg("hash-key").stdout(Stdio::piped()).stderr(Stdio::piped());
+            command
+        },
+        "0123456789abcdef\n",
+    );
+    let hash = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(hash.trim(), precut::http::auth::hash("0123456789abcdef").to_string());
+}
+
+#[test]
+fn health_asks_a_running_service() {
+    let process = Process::start();
+    let url = format!("http://{}", process.address);
+    let output = precut(&["health", "--url", &url]);
+    assert!(output.status.success(), "{output:?}");
+    assert!(String::from_utf8_lossy(&output.stdout).contains("ready"));
+    drop(process);
+    let output = precut(&["health", "--url", &url]);
+    assert_eq!(output.status.code(), Some(1));
+    assert_eq!(precut(&["health", "--url", "ftp://x"]).status.code(), Some(1));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_reader_that_leaves_early_is_no_panic() {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_precut"));
+    let mut child = command.arg("openapi").stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success(), "{output:?}");
+    assert!(output.stderr.is_empty(), "{output:?}");
+}

@@ -1,0 +1,160 @@
+//! Who may ask, how often, and how much at once.
+
+use std::time::{Duration, Instant};
+
+use precut::config::ApiKey;
+use precut::http::auth;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::TcpStream;
+
+use crate::support::{Server, header, problem, toy};
+
+const KEY: &str = "0123456789abcdef0123456789abcdef";
+
+async fn guarded() -> Server {
+    Server::start_with(|config| {
+        config.auth.keys = vec![
+            ApiKey { name: "mes".to_owned(), hash: auth::hash("another key, never sent").to_string() },
+            ApiKey { name: "cam".to_owned(), hash: auth::hash(KEY).to_string() },
+        ];
+    })
+    .await
+}
+
+#[tokio::test]
+async fn with_keys_configured_only_their_owners_may_ask() {
+    let server = guarded().await;
+    for value in [None, Some("Bearer wrong"), Some("Basic 0123"), Some(KEY), Some("Bearer"), Some("Bearer ")] {
+        for request in
+            [server.post(toy::JOB), server.get("/v1/calculators"), server.get("/v1/nothing"), server.get("/metrics")]
+        {
+            let request = value.map_or(request.try_clone().unwrap(), |value| request.header("authorization", value));
+            let response = request.send().await.unwrap();
+            assert!(header(&response, "www-authenticate").starts_with("Bearer"));
+            problem(response, 401, "unauthorized").await;
+        }
+    }
+    for value in [format!("Bearer {KEY}"), format!("bearer {KEY}")] {
+        let response = server.post(toy::JOB).header("authorization", value).send().await.unwrap();
+        assert_eq!(response.status(), 200);
+    }
+}
+
+#[tokio::test]
+async fn health_and_documentation_need_no_key() {
+    let server = guarded().await;
+    for path in [
+        "/",
+        "/docs",
+        "/docs/rapidoc-min.js",
+        "/openapi.json",
+        "/health/live",
+        "/health/ready",
+        "/problems/unauthorized",
+    ] {
+        assert_eq!(server.get(path).send().await.unwrap().status(), 200, "{path}");
+    }
+}
+
+#[tokio::test]
+async fn a_client_that_asks_too_often_is_told_when_to_come_again() {
+    let server = Server::start_with(|config| {
+        config.limits.requests_per_s = 2.0;
+        config.limits.burst = 3.0;
+    })
+    .await;
+    for _ in 0..3 {
+        assert_eq!(server.get("/v1/calculators").send().await.unwrap().status(), 200);
+    }
+    let refused = server.get("/v1/calculators").send().await.unwrap();
+    assert_eq!(header(&refused, "retry-after"), "1");
+    problem(refused, 429, "too_many_requests").await;
+    assert_eq!(server.get("/health/live").send().await.unwrap().status(), 200, "probes are not counted");
+    tokio::time::sleep(Duration::from_millis(600)).await;
+    assert_eq!(server.get("/v1/calculators").send().await.unwrap().status(), 200);
+}
+
+#[tokio::test]
+async fn with_too_many_requests_in_work_more_are_refused_at_once_and_health_answers() {
+    let server = Server::start_with(|config| config.limits.concurrent_requests = 2).await;
+    // Requests whose bodies stand in the middle are in work.
+    let mut held = Vec::new();
+    for _ in 0..2 {
+        let mut stream = TcpStream::connect(server.address).await.unwrap();
+        let head =
+            "POST /v1/sagging-bar HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: 36\r\n\r\n{";
+        stream.write_all(head.as_bytes()).await.unwrap();
+        held.push(stream);
+    }
+    tokio::time::sleep(Duration::from_millis(200)).await;
+    let start = Instant::now();
+    let refused = server.post(toy::JOB).send().await.unwrap();
+    assert!(!header(&refused, "retry-after").is_empty());
+    problem(refused, 503, "overloaded").await;
+    assert!(start.elapsed() < Duration::from_millis(500), "{:?}", start.elapsed());
+    assert_eq!(server.get("/health/ready").send().await.unwrap().status(), 200);
+    assert_eq!(server.get("/metrics").send().await.unwrap().status(), 200);
+    drop(held);
+    let start = Instant::now();
+    while server.post(toy::JOB).send().await.unwrap().status() != 200 {
+        assert!(start.elapsed() < Duration::from_secs(5), "the places become free again");
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+}
+
+#[tokio::test]
+async fn a_header_that_never_ends_costs_its_connection() {
+    let server = Server::start_with(|config| config.limits.header_timeout_s = 0.2).await;
+    let mut stream = TcpStream::connect(server.address).await.unwrap();
+    stream.write_all(b"GET / HTTP/1.1\r\nHost:").await.unwrap();
+    let mut rest = Vec::new();
+    let read = tokio::time::timeout(Duration::from_secs(5), stream.read_to_end(&mut rest)).await;
+    assert!(read.is_ok(), "the connection is closed");
+}
+
+#[tokio::test]
+async fn connections_beyond_the_limit_wait_for_their_turn() {
+    let server = Server::start_with(|config| config.limits.connections = 1).await;
+    let first = TcpStream::connect(server.address).await.unwrap();
+    let mut second = TcpStream::connect(server.address).await.unwrap();
+    second.write_all(b"GET /health/live HTTP/1.1\r\nHost: x\r\n\r\n").await.unwrap();
+    let mut answer = vec![0; 1024];
+    let waiting = tokio::time::timeout(Duration::from_millis(200), second.read(&mut answer)).await;
+    assert!(waiting.is_err(), "there is one place");
+    drop(first);
+    let count = tokio::time::timeout(Duration::from_secs(5), second.read(&mut answer)).await.unwrap().unwrap();
+    assert!(answer[..count].starts_with(b"HTTP/1.1 200 "));
+}
+
+#[tokio::test]
+async fn without_configured_origins_no_web_page_may_call() {
+    let server = Server::start().await;
+    let response = server.post(toy::JOB).header("origin", "https://cam.example").send().await.unwrap();
+    assert_eq!(header(&response, "access-control-allow-origin"), "");
+    let preflight = server
+        .client
+        .request(reqwest::Method::OPTIONS, server.url("/v1/sagging-bar"))
+        .header("origin", "https://cam.example")
+        .header("access-control-request-method", "POST");
+    problem(preflight.send().await.unwrap(), 405, "method_not_allowed").await;
+}
+
+#[tokio::test]
+async fn configured_origins_may_call_and_read_the_headers() {
+    let server = Server::start_with(|config| config.cors.origins = vec!["https://cam.example".to_owned()]).await;
+    let ask = |origin: &'static str| server.post(toy::JOB).header("origin", origin).send();
+    let response = ask("https://cam.example").await.unwrap();
+    assert_eq!(header(&response, "access-control-allow-origin"), "https://cam.example");
+    assert!(header(&response, "access-control-expose-headers").contains("content-location"));
+    assert_eq!(header(&ask("https://evil.example").await.unwrap(), "access-control-allow-origin"), "");
+    let preflight = server
+        .client
+        .request(reqwest::Method::OPTIONS, server.url("/v1/sagging-bar"))
+        .header("origin", "https://cam.example")
+        .header("access-control-request-method", "POST")
+        .send()
+        .await
+        .unwrap();
+    assert_eq!(preflight.status(), 200);
+    assert!(header(&preflight, "access-control-allow-headers").contains("authorization"));
+}

@@ -1,0 +1,15 @@
+//! The service over real HTTP: one file per subject.
+
+#![allow(clippy::unwrap_used, clippy::panic, clippy::float_cmp, missing_docs, unreachable_pub)]
+
+#[path = "../support/mod.rs"]
+mod support;
+
+mod bad_input;
+mod command_line;
+mod contract;
+mod limits;
+mod negotiation;
+mod process;
+mod results;
+mod standing;

@@ -1,0 +1,123 @@
+//! The service as a process: start, signals, end.
+
+use std::io::{Read, Write};
+use std::net::TcpStream;
+use std::time::{Duration, Instant};
+
+use crate::support::{Process, be_child, toy};
+
+/// Not a test: the process that the others start.
+#[test]
+#[ignore = "started by other tests"]
+fn child_process() {
+    be_child();
+}
+
+fn request(method: &str, path: &str, body: &str) -> String {
+    format!(
+        "{method} {path} HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: {}\r\n\
+         Connection: close\r\n\r\n{body}",
+        body.len()
+    )
+}
+
+fn ask(address: std::net::SocketAddr, text: &str) -> std::io::Result<String> {
+    let mut stream = TcpStream::connect(address)?;
+    stream.set_read_timeout(Some(Duration::from_secs(10)))?;
+    stream.write_all(text.as_bytes())?;
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer)?;
+    Ok(answer)
+}
+
+#[cfg(unix)]
+#[test]
+fn a_request_in_work_is_finished_before_the_process_ends() {
+    for signal in ["TERM", "INT"] {
+        let mut process = Process::start();
+        let address = process.address;
+        let job = r#"{"length_mm": 100, "load_n": 1, "behaviour": "slow"}"#;
+        let slow = std::thread::spawn(move || ask(address, &request("POST", "/v1/sagging-bar", job)));
+        std::thread::sleep(Duration::from_millis(300));
+        process.signal(signal);
+        std::thread::sleep(Duration::from_millis(100));
+        // Not ready at once, and nothing new is begun.
+        let ready = ask(address, &request("GET", "/health/ready", "")).unwrap();
+        assert!(ready.starts_with("HTTP/1.1 503 "), "{ready}");
+        let refused = ask(address, &request("POST", "/v1/sagging-bar", toy::JOB)).unwrap();
+        assert!(refused.starts_with("HTTP/1.1 503 ") && refused.contains("shutting_down"), "{refused}");
+        let answer = slow.join().unwrap().unwrap();
+        assert!(answer.starts_with("HTTP/1.1 200 "), "{answer}");
+        assert_eq!(process.wait(Duration::from_secs(10)), Some(0), "{signal}");
+        assert!(ask(address, &request("GET", "/health/live", "")).is_err(), "nobody listens any more");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn idle_connections_do_not_hold_the_process_up() {
+    let mut process = Process::start();
+    let mut idle = TcpStream::connect(process.address).unwrap();
+    idle.write_all(b"GET /health/live HTTP/1.1\r\nHost: x\r\n\r\n").unwrap();
+    let mut some = [0; 512];
+    assert!(idle.read(&mut some).unwrap() > 0);
+    let silent = TcpStream::connect(process.address).unwrap();
+    let start = Instant::now();
+    process.signal("TERM");
+    assert_eq!(process.wait(Duration::from_secs(10)), Some(0));
+    assert!(start.elapsed() < Duration::from_secs(3), "{:?}", start.elapsed());
+    drop(silent);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_second_signal_ends_the_process_at_once() {
+    let mut process = Process::start();
+    let address = process.address;
+    let job = r#"{"length_mm": 100, "load_n": 1, "behaviour": "slow"}"#;
+    let slow = std::thread::spawn(move || ask(address, &request("POST", "/v1/sagging-bar", job)));
+    std::thread::sleep(Duration::from_millis(200));
+    process.signal("TERM");
+    std::thread::sleep(Duration::from_millis(100));
+    let start = Instant::now();
+    process.signal("TERM");
+    let code = process.wait(Duration::from_secs(5));
+    assert!(code.is_some_and(|code| code != 0), "{code:?}");
+    assert!(start.elapsed() < Duration::from_millis(500), "{:?}", start.elapsed());
+    let _ = slow.join();
+}
+
+#[cfg(unix)]
+#[test]
+fn results_survive_a_restart() {
+    let folder = tempfile::tempdir().unwrap();
+    let job = r#"{"length_mm": 123, "load_n": 4}"#;
+    let mut caches = Vec::new();
+    for _ in 0..2 {
+        let mut process = Process::start_in(folder.path());
+        let answer = ask(process.address, &request("POST", "/v1/sagging-bar", job)).unwrap();
+        assert!(answer.starts_with("HTTP/1.1 200 "), "{answer}");
+        caches.push(answer.lines().find(|line| line.starts_with("precut-cache")).unwrap().to_owned());
+        process.signal("TERM");
+        assert_eq!(process.wait(Duration::from_secs(10)), Some(0));
+    }
+    assert_eq!(caches, ["precut-cache: miss", "precut-cache: hit"]);
+}
+
+#[test]
+fn a_folder_in_use_or_a_port_taken_is_said_and_ends_with_1() {
+    let process = Process::start();
+    let folder = process.folder.to_str().unwrap().to_owned();
+    let output =
+        crate::support::toy_command(&["serve", "--listen", "127.0.0.1:0", "--data", &folder]).output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(said.contains("in use"), "{said}");
+    let other = tempfile::tempdir().unwrap();
+    let address = process.address.to_string();
+    let folder = other.path().to_str().unwrap();
+    let output = crate::support::toy_command(&["serve", "--listen", &address, "--data", folder]).output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(said.contains("cannot listen on") && said.contains(&address), "{said}");
+}

@@ -1,0 +1,99 @@
+//! Kept results.
+
+use serde_json::Value;
+
+use crate::support::{Server, header, problem, toy};
+
+async fn fill(server: &Server, count: u32) -> Vec<String> {
+    let mut keys = Vec::new();
+    for length in 0..count {
+        let job = format!("{{\"length_mm\": {}, \"load_n\": 1}}", 100 + length);
+        let response = server.post(job).send().await.unwrap();
+        keys.push(header(&response, "content-location").rsplit('/').next().unwrap().to_owned());
+    }
+    keys
+}
+
+/// Results reach the database behind the answer.
+async fn listed(server: &Server, path: &str, count: usize) -> Value {
+    let mut list = Value::Null;
+    for _ in 0..100 {
+        list = server.get(path).send().await.unwrap().json().await.unwrap();
+        if list["items"].as_array().is_some_and(|items| items.len() >= count) {
+            break;
+        }
+        tokio::time::sleep(std::time::Duration::from_millis(20)).await;
+    }
+    list
+}
+
+#[tokio::test]
+async fn results_are_listed_by_pages_without_gap_or_repetition() {
+    let server = Server::start().await;
+    let mut keys = fill(&server, 7).await;
+    let all = listed(&server, "/v1/results", 7).await;
+    assert_eq!(all["items"].as_array().unwrap().len(), 7);
+    assert_eq!(all["next"], Value::Null);
+    let item = &all["items"][0];
+    assert_eq!(item["calculator"], toy::BAR);
+    assert_eq!(item["version"], 1);
+    assert!(item["bytes"].as_u64().unwrap() > 100);
+    assert!(item["created_at"].as_str().unwrap().ends_with('Z'), "{item}");
+
+    let mut seen = Vec::new();
+    let mut path = "/v1/results?limit=3&calculator=sagging-bar".to_owned();
+    loop {
+        let page: Value = server.get(&path).send().await.unwrap().json().await.unwrap();
+        seen.extend(page["items"].as_array().unwrap().iter().map(|item| item["key"].as_str().unwrap().to_owned()));
+        match page["next"].as_str() {
+            Some(next) => path = next.to_owned(),
+            None => break,
+        }
+    }
+    let times: Vec<_> = all["items"].as_array().unwrap().iter().map(|item| item["created_at"].to_string()).collect();
+    assert!(times.is_sorted_by(|a, b| a >= b), "newest first: {times:?}");
+    seen.sort();
+    keys.sort();
+    assert_eq!(seen, keys);
+}
+
+#[tokio::test]
+async fn a_result_is_read_in_every_form_without_computing() {
+    let server = Server::start().await;
+    let job = r#"{"length_mm": 321, "load_n": 5, "behaviour": "slow"}"#;
+    let posted = server.post(job).send().await.unwrap();
+    let location = header(&posted, "content-location").to_owned();
+    let body = posted.bytes().await.unwrap();
+    let start = std::time::Instant::now();
+    let response = server.get(&location).send().await.unwrap();
+    assert_eq!(response.status(), 200);
+    assert_eq!(header(&response, "precut-cache"), "hit");
+    assert_eq!(response.bytes().await.unwrap(), body);
+    for (accept, query, begins) in
+        [("text/csv", "?table=summary", "max_sag [um]\n"), ("image/svg+xml", "", "<svg"), ("text/x-gcode", "", "")]
+    {
+        let response = server.get(&format!("{location}{query}")).header("accept", accept).send().await.unwrap();
+        assert_eq!(response.status(), 200, "{accept}");
+        assert!(response.text().await.unwrap().starts_with(begins), "{accept}");
+    }
+    assert!(start.elapsed() < std::time::Duration::from_millis(900), "{:?}", start.elapsed());
+    problem(server.get(&format!("{location}?table=none")).send().await.unwrap(), 404, "unknown_table").await;
+    let response = server.get(&location).header("accept", "text/html").send().await.unwrap();
+    problem(response, 406, "not_acceptable").await;
+}
+
+#[tokio::test]
+async fn equal_jobs_at_the_same_time_share_one_computation() {
+    let server = Server::start().await;
+    let job = r#"{"length_mm": 322, "load_n": 5, "behaviour": "slow"}"#;
+    let start = std::time::Instant::now();
+    let asked: Vec<_> = (0..8).map(|_| tokio::spawn(server.post(job).send())).collect();
+    let mut bodies = Vec::new();
+    for answer in asked {
+        let response = answer.await.unwrap().unwrap();
+        assert_eq!(response.status(), 200);
+        bodies.push(response.bytes().await.unwrap());
+    }
+    assert!(bodies.windows(2).all(|pair| pair[0] == pair[1]));
+    assert!(start.elapsed() < std::time::Duration::from_secs(3), "{:?}", start.elapsed());
+}

@@ -1,0 +1,130 @@
+//! What every answer has, and what the service says of itself.
+
+use serde_json::Value;
+
+use crate::support::{Server, header, problem, toy};
+
+#[tokio::test]
+async fn every_answer_carries_a_request_id() {
+    let server = Server::start().await;
+    let own = server.get("/health/live").header("x-request-id", "cam-17/4711").send().await.unwrap();
+    assert_eq!(header(&own, "x-request-id"), "cam-17/4711");
+    let mut seen = Vec::new();
+    for bad in ["", "with space", "tab\there", &"x".repeat(200)] {
+        let response = server.get("/nothing").header("x-request-id", bad).send().await.unwrap();
+        let id = header(&response, "x-request-id").to_owned();
+        assert_eq!(id.len(), 36, "a new id in place of {bad:?}: {id}");
+        assert!(!seen.contains(&id));
+        seen.push(id);
+    }
+    for path in ["/", "/docs", "/openapi.json", "/v1/results", "/metrics"] {
+        let response = server.get(path).send().await.unwrap();
+        assert!(!header(&response, "x-request-id").is_empty(), "{path}");
+        assert_eq!(header(&response, "x-content-type-options"), "nosniff", "{path}");
+        assert!(header(&response, "content-security-policy").contains("default-src 'self'"), "{path}");
+    }
+}
+
+#[tokio::test]
+async fn health_tells_living_from_ready() {
+    let server = Server::start().await;
+    let live: Value = server.get("/health/live").send().await.unwrap().json().await.unwrap();
+    assert_eq!(live["status"], "live");
+    let ready: Value = server.get("/health/ready").send().await.unwrap().json().await.unwrap();
+    assert_eq!(ready["status"], "ready");
+    server.stop().await;
+}
+
+#[tokio::test]
+async fn metrics_count_requests_by_route_and_status_and_answers_by_cache() {
+    let server = Server::start().await;
+    let at = |text: &str, name: &str| -> f64 {
+        text.lines().find_map(|line| line.strip_prefix(name)).map_or(0.0, |value| value.trim().parse().unwrap())
+    };
+    let read = || async { server.get("/metrics").send().await.unwrap().text().await.unwrap() };
+    let names = [
+        "http_requests_total{route=\"/v1/sagging-bar\",method=\"POST\",status=\"200\"}",
+        "http_requests_total{route=\"/v1/sagging-bar\",method=\"POST\",status=\"422\"}",
+        "http_requests_total{route=\"/v1/{calculator}\",method=\"POST\",status=\"404\"}",
+        "http_requests_total{route=\"other\",method=\"GET\",status=\"404\"}",
+        "precut_answers_total{calculator=\"sagging-bar\",cache=\"hit\"}",
+        "precut_answers_total{calculator=\"sagging-bar\",cache=\"miss\"}",
+        "http_request_duration_seconds_count{route=\"/v1/sagging-bar\"}",
+    ];
+    let before = read().await;
+    let job = r#"{"length_mm": 777.125, "load_n": 3}"#;
+    for body in [job, job, "{}"] {
+        server.post(body).send().await.unwrap();
+    }
+    server.post_to("/v1/none-such", "{}").send().await.unwrap();
+    server.get("/none/such").send().await.unwrap();
+    let after = read().await;
+    for name in names {
+        // Other tests of this process count, too.
+        assert!(at(&after, name) > at(&before, name), "{name}\n{after}");
+    }
+    assert!(after.contains("http_request_duration_seconds_bucket{route=\"/v1/sagging-bar\",le=\"0.01\"}"), "{after}");
+    assert!(after.contains("precut_build_info{version="), "{after}");
+    assert!(!after.contains("none-such"), "a client cannot make up labels");
+}
+
+#[tokio::test]
+async fn calculators_are_listed_and_described() {
+    let server = Server::start().await;
+    let list: Value = server.get("/v1/calculators").send().await.unwrap().json().await.unwrap();
+    assert_eq!(list["items"][0]["id"], toy::BAR);
+    assert_eq!(list["items"][0]["examples"][0]["id"], "plain");
+    assert_eq!(list["next"], Value::Null);
+    let path = list["items"][0]["links"]["self"].as_str().unwrap().to_owned();
+    let response = server.get(&path).send().await.unwrap();
+    let tag = header(&response, "etag").to_owned();
+    let described: Value = response.json().await.unwrap();
+    assert_eq!(described["input_schema"]["properties"]["length_mm"]["x-unit"], "mm");
+    assert_eq!(described["takes_tables"], true);
+    let job = described["jobs"]["plain"].to_string();
+    let solve = described["links"]["solve"].as_str().unwrap();
+    assert_eq!(server.post_to(solve, job).send().await.unwrap().status(), 200);
+    assert_eq!(server.get(&path).header("if-none-match", tag).send().await.unwrap().status(), 304);
+}
+
+#[tokio::test]
+async fn materials_are_listed_with_their_sources() {
+    let server = Server::start().await;
+    let list: Value = server.get("/v1/materials").send().await.unwrap().json().await.unwrap();
+    let items = list["items"].as_array().unwrap();
+    assert!(items.len() > 5);
+    for item in items {
+        let path = item["links"]["self"].as_str().unwrap();
+        let material: Value = server.get(path).send().await.unwrap().json().await.unwrap();
+        assert_eq!(material["id"], item["id"]);
+        assert!(material["youngs_modulus_n_per_mm2"]["source"].as_str().is_some_and(|source| !source.is_empty()));
+    }
+}
+
+#[tokio::test]
+async fn the_landing_page_speaks_to_people_and_to_programs() {
+    let server = Server::start().await;
+    let landing: Value = server.get("/").send().await.unwrap().json().await.unwrap();
+    for (_, path) in landing["links"].as_object().unwrap() {
+        assert_eq!(server.get(path.as_str().unwrap()).send().await.unwrap().status(), 200, "{path}");
+    }
+    let page = server.get("/").header("accept", "text/html,*/*;q=0.8").send().await.unwrap();
+    assert_eq!(header(&page, "content-type"), "text/html; charset=utf-8");
+    let text = page.text().await.unwrap();
+    assert!(text.contains("How far does the bar sag?") && text.contains("/docs"), "{text}");
+}
+
+#[tokio::test]
+async fn every_problem_has_a_page_in_words() {
+    let server = Server::start().await;
+    let own = ["bar_would_break", "path_incomplete"].into_iter();
+    for code in precut::http::CODES.iter().map(|(code, _)| *code).chain(own) {
+        let explained: Value = server.get(&format!("/problems/{code}")).send().await.unwrap().json().await.unwrap();
+        assert_eq!(explained["code"], code);
+        assert!(explained["help"].as_str().unwrap().len() > 20, "{explained}");
+        let page = server.get(&format!("/problems/{code}")).header("accept", "text/html").send().await.unwrap();
+        assert_eq!(page.status(), 200);
+        assert!(page.text().await.unwrap().contains(code));
+    }
+    problem(server.get("/problems/none_such").send().await.unwrap(), 404, "unknown_problem").await;
+}

@@ -1,0 +1,194 @@
+//! Starts the service for a test: in this process on a free port, or as a process of its own.
+
+pub mod toy;
+
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use precut::config::Config;
+use precut::engine::{Engine, EngineSettings};
+use precut::http::{self, App};
+use reqwest::{Client, RequestBuilder, Response};
+use serde_json::Value;
+use tempfile::TempDir;
+use tokio::net::TcpListener;
+use tokio::sync::watch;
+use tokio::task::JoinHandle;
+
+/// A running service with the toy calculator and a database of its own.
+pub struct Server {
+    pub address: SocketAddr,
+    pub client: Client,
+    stop: watch::Sender<bool>,
+    task: JoinHandle<()>,
+    _data: TempDir,
+}
+
+impl Server {
+    /// With the default settings.
+    pub async fn start() -> Self {
+        Self::start_with(|_| {}).await
+    }
+
+    /// With settings of the test's own.
+    pub async fn start_with(adjust: impl FnOnce(&mut Config)) -> Self {
+        let data = tempfile::tempdir().expect("a folder for temporary files");
+        let mut config = Config::default();
+        adjust(&mut config);
+        let limit = Duration::from_secs_f64(config.limits.job_ms / 1e3);
+        let settings = EngineSettings { direct_limit: limit, ..EngineSettings::in_folder(data.path()) };
+        let engine = Engine::open(toy::registry(), settings).await.expect("an empty folder");
+        let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
+        let address = listener.local_addr().expect("it is bound");
+        let app = App::new(engine.clone(), &config);
+        let (stop, stopped) = watch::channel(false);
+        let task = tokio::spawn(async move {
+            http::serve(listener, app, stopped, Duration::from_secs(5)).await;
+            engine.close().await;
+        });
+        Self {
+            address,
+            client: Client::builder().no_gzip().no_brotli().build().expect("a plain client"),
+            stop,
+            task,
+            _data: data,
+        }
+    }
+
+    pub fn url(&self, path: &str) -> String {
+        format!("http://{}{path}", self.address)
+    }
+
+    pub fn get(&self, path: &str) -> RequestBuilder {
+        self.client.get(self.url(path))
+    }
+
+    /// A job for the toy.
+    pub fn post(&self, job: impl Into<reqwest::Body>) -> RequestBuilder {
+        self.post_to(&format!("/v1/{}", toy::BAR), job)
+    }
+
+    pub fn post_to(&self, path: &str, job: impl Into<reqwest::Body>) -> RequestBuilder {
+        self.client.post(self.url(path)).header("content-type", "application/json").body(job)
+    }
+
+    /// Asks it to stop, and waits until it has.
+    pub async fn stop(self) {
+        self.stop.send_replace(true);
+        self.task.await.expect("the server ends in good order");
+    }
+}
+
+/// A header of an answer, empty if it is absent.
+pub fn header<'r>(response: &'r Response, name: &str) -> &'r str {
+    response.headers().get(name).map_or("", |value| value.to_str().expect("headers are text"))
+}
+
+/// The problem document in an answer, after checking what holds for all of them.
+pub async fn problem(response: Response, status: u16, code: &str) -> Value {
+    let id = header(&response, "x-request-id").to_owned();
+    let (got, kind) = (response.status().as_u16(), header(&response, "content-type").to_owned());
+    let text = response.text().await.expect("a body");
+    assert_eq!(got, status, "{text}");
+    assert_eq!(kind, "application/problem+json", "{text}");
+    let document: Value = serde_json::from_str(&text).expect("a problem document");
+    assert_eq!(document["code"], code, "{text}");
+    assert_eq!(document["type"], format!("/problems/{code}"));
+    assert_eq!(document["status"], status);
+    assert_eq!(document["instance"], id.as_str());
+    for part in ["title", "detail"] {
+        assert!(document[part].as_str().is_some_and(|words| !words.is_empty()), "{part} in {text}");
+    }
+    let listed = document["errors"].as_array().expect("faults").len();
+    assert!(document["errors_total"].as_u64().expect("a number") >= listed as u64);
+    document
+}
+
+/// Name of the test that is the service with the toy, when it is asked for by [`toy_command`].
+const CHILD: &str = "process::child_process";
+
+/// `precut` with the toy calculator, as a process: this test binary run again.
+pub fn toy_command(arguments: &[&str]) -> Command {
+    let mut command = Command::new(std::env::current_exe().expect("a running test has a file"));
+    command.args(["--exact", CHILD, "--ignored", "--nocapture", "--quiet"]);
+    command.env("TOY_ARGUMENTS", arguments.join("\n"));
+    for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("PRECUT_")) {
+        command.env_remove(name);
+    }
+    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+}
+
+/// What [`toy_command`] runs.
+pub fn be_child() {
+    let Ok(arguments) = std::env::var("TOY_ARGUMENTS") else { return };
+    let arguments = std::iter::once("precut").chain(arguments.lines()).map(Into::into);
+    let code = precut::cli::main(arguments, || Ok(toy::registry()));
+    // `ExitCode` does not tell its number; it is 0 or not.
+    std::process::exit(i32::from(code != std::process::ExitCode::SUCCESS));
+}
+
+/// A service as a process.
+pub struct Process {
+    pub child: Child,
+    pub address: SocketAddr,
+    pub folder: PathBuf,
+    data: Option<TempDir>,
+}
+
+impl Process {
+    /// Starts it with a database of its own.
+    pub fn start() -> Self {
+        let data = tempfile::tempdir().expect("a folder for temporary files");
+        let mut process = Self::start_in(data.path());
+        process.data = Some(data);
+        process
+    }
+
+    /// Starts it and waits until it says where it listens.
+    pub fn start_in(data: &Path) -> Self {
+        use std::io::{BufRead, BufReader};
+        let folder = data.to_str().expect("a plain name");
+        let mut child = toy_command(&["serve", "--listen", "127.0.0.1:0", "--data", folder])
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("this binary runs");
+        let mut lines = BufReader::new(child.stdout.take().expect("it is piped")).lines();
+        let address = lines
+            .by_ref()
+            .map_while(Result::ok)
+            .find_map(|line| line.split_once("listens on http://").map(|(_, address)| address.trim().to_owned()))
+            .expect("it says where it listens");
+        // Whatever else it prints has to go somewhere.
+        std::thread::spawn(move || lines.for_each(drop));
+        Self { child, address: address.parse().expect("an address"), folder: data.to_owned(), data: None }
+    }
+
+    /// Sends a signal by its name.
+    pub fn signal(&self, name: &str) {
+        let id = self.child.id().to_string();
+        let status = Command::new("kill").args(["-s", name, &id]).status().expect("kill is there");
+        assert!(status.success());
+    }
+
+    /// Waits for its end, at most for so long; its exit code.
+    pub fn wait(&mut self, at_most: Duration) -> Option<i32> {
+        let start = std::time::Instant::now();
+        while start.elapsed() < at_most {
+            if let Some(status) = self.child.try_wait().expect("it is a child") {
+                return status.code();
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        None
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}

@@ -1,0 +1,220 @@
+//! A calculator with one of everything that the service has to carry: a bar that sags.
+
+use std::time::{Duration, Instant};
+
+use precut::registry::Registry;
+use precut_calc::calculator::{
+    Answer, Axis, Basis, Block, Calculator, CalculatorKind, Check, Codes, Column, Cost, Dialect, Example, Failure,
+    Figure, Finding, Item, Measured, MeasuredRow, Message, Meta, Monitor, Panel, Program, Registrar, Role, Table,
+    Violations, checkpoint,
+};
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// Id of the toy.
+pub const BAR: &str = "sagging-bar";
+
+/// A job that runs.
+pub const JOB: &str = r#"{"length_mm": 500.0, "load_n": 100.0}"#;
+
+/// The registry with the toy in it.
+pub fn registry() -> Registry {
+    Registry::with(Registrar::calculator::<Bar>).expect("the toy is a decent calculator")
+}
+
+pub struct Bar;
+
+/// A bar under a load.
+#[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BarJob {
+    /// Length of the bar.
+    #[schema(minimum = 1, maximum = 20000, example = 500.0, extensions(("x-unit" = json!("mm"))))]
+    pub length_mm: f64,
+    /// Load in the middle.
+    #[schema(minimum = 0, maximum = 10000, example = 100.0, extensions(("x-unit" = json!("N"))))]
+    pub load_n: f64,
+    /// Stations along the bar.
+    #[serde(default = "ten")]
+    #[schema(minimum = 2, maximum = 200_000, default = 10, example = 10, extensions(("x-unit" = json!("1"))))]
+    pub stations: u32,
+    /// What the toy shall do.
+    #[serde(default)]
+    pub behaviour: Behaviour,
+    /// Estimated work.
+    #[serde(default)]
+    #[schema(minimum = 0, maximum = 1e9, default = 0.0, example = 0.0, extensions(("x-unit" = json!("ms"))))]
+    pub work_ms: f64,
+    /// What was measured.
+    #[serde(default)]
+    pub measurements: Readings,
+}
+
+fn ten() -> u32 {
+    10
+}
+
+/// What the toy does.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Behaviour {
+    /// Answers.
+    #[default]
+    Quick,
+    /// Answers after a second.
+    Slow,
+    /// Has no solution.
+    Infeasible,
+    /// Answers, but without a command at one station.
+    Incomplete,
+    /// Crashes.
+    Panic,
+}
+
+/// By another name, as a derived schema treats a generic type's name as its own business.
+type Readings = Measured<Reading>;
+
+/// A measured point.
+#[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Reading {
+    /// Place.
+    #[schema(minimum = 0, maximum = 20000, extensions(("x-unit" = json!("mm"))))]
+    pub z_mm: f64,
+    /// Sag.
+    #[schema(minimum = -10000, maximum = 10000, extensions(("x-unit" = json!("um"))))]
+    pub sag_um: f64,
+}
+
+impl MeasuredRow for Reading {
+    const MAX_ROWS: usize = 100_000;
+}
+
+/// How the bar sags.
+#[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
+pub struct BarResult {
+    /// Places.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub z_mm: Vec<f64>,
+    /// Sag there.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub sag_um: Vec<f64>,
+    /// Largest of them.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub max_sag_um: f64,
+}
+
+impl Check for BarJob {
+    fn check(&self, violations: &mut Violations) {
+        violations.require(self.load_n <= 10.0 * self.length_mm, || {
+            Finding::new("load_too_large", "/load_n").measured(self.load_n, 10.0 * self.length_mm, "N")
+        });
+    }
+}
+
+impl Calculator for Bar {
+    type Input = BarJob;
+    type Output = BarResult;
+
+    const META: Meta = Meta {
+        id: BAR,
+        kind: CalculatorKind::Calculator,
+        version: 1,
+        title: "Sagging bar",
+        question: "How far does the bar sag?",
+        summary: "A bar on two supports under a load.",
+        references: &["A textbook."],
+        examples: &[Example { id: "plain", title: "A plain bar", job: JOB }],
+        study_outputs: &["/max_sag_um"],
+        codes: Codes {
+            faults: &[&["load_too_large"]],
+            failures: &[&["bar_would_break", "path_incomplete"]],
+            warnings: &[],
+            explanations: &[&["sag_small"]],
+            stages: &[],
+            labels: &[&["sag", "place"]],
+        },
+        figures: &["sag", "load"],
+        tables: &["stations", "summary"],
+        has_program: true,
+    };
+
+    fn fill(_input: &mut BarJob) {}
+
+    fn cost(input: &BarJob) -> Cost {
+        Cost { ms: input.work_ms + f64::from(input.stations) * 1e-4, bytes: 1000, driver: "/stations" }
+    }
+
+    fn run(input: &BarJob, monitor: &dyn Monitor) -> Result<Answer<BarResult>, Failure> {
+        match input.behaviour {
+            Behaviour::Slow => {
+                let start = Instant::now();
+                while start.elapsed() < Duration::from_secs(1) {
+                    checkpoint(monitor)?;
+                    std::thread::sleep(Duration::from_millis(5));
+                }
+            }
+            Behaviour::Infeasible => {
+                let finding = Finding::new("bar_would_break", "/load_n").measured(input.load_n, 1.0, "N");
+                return Err(Failure::Infeasible(finding));
+            }
+            Behaviour::Panic => panic!("the toy was asked to"),
+            Behaviour::Quick | Behaviour::Incomplete => {}
+        }
+        let spacing_mm = input.length_mm / f64::from(input.stations - 1);
+        let z_mm: Vec<f64> = (0..input.stations).map(|station| f64::from(station) * spacing_mm).collect();
+        let sag_um: Vec<f64> =
+            z_mm.iter().map(|z| 1e-3 * input.load_n * z * (input.length_mm - z) / input.length_mm).collect();
+        let max_sag_um = sag_um.iter().copied().fold(0.0, f64::max);
+        Ok(Answer {
+            output: BarResult { z_mm, sag_um, max_sag_um },
+            warnings: vec![],
+            explanation: vec![Message::new("sag_small").with("sag_um", max_sag_um)],
+            basis: vec![Basis { equation: "toy/1", source: "a textbook" }],
+        })
+    }
+
+    fn figures(_input: &BarJob, output: &BarResult) -> Vec<Figure> {
+        let panel = || Panel {
+            y: Axis { label: "sag", unit: "um" },
+            height: 1.0,
+            items: vec![Item::Line {
+                name: "sag",
+                x: output.z_mm.clone(),
+                y: output.sag_um.iter().copied().map(Some).collect(),
+                role: Role::Plain,
+            }],
+        };
+        let figure = |id| Figure {
+            id,
+            title: Message::new("sag"),
+            x: Axis { label: "place", unit: "mm" },
+            panels: vec![panel()],
+        };
+        vec![figure("sag"), figure("load")]
+    }
+
+    fn tables(_input: &BarJob, output: &BarResult) -> Vec<Table> {
+        vec![
+            Table {
+                id: "stations",
+                columns: vec![Column::numbers("z", "mm", &output.z_mm), Column::numbers("sag", "um", &output.sag_um)],
+            },
+            Table { id: "summary", columns: vec![Column::numbers("max_sag", "um", &[output.max_sag_um])] },
+        ]
+    }
+
+    fn program(input: &BarJob, _output: &BarResult) -> Option<Result<Program, Failure>> {
+        Some(if input.behaviour == Behaviour::Incomplete {
+            Err(Failure::Infeasible(Finding::new("path_incomplete", "/load_n")))
+        } else {
+            let blocks = vec![
+                Block::Modes,
+                Block::Rapid { x_diameter_mm: Some(50.0), z_mm: Some(2.0) },
+                Block::Cut { x_diameter_mm: 50.0, z_mm: -input.length_mm, feed_mm_per_rev: Some(0.2) },
+                Block::End,
+            ];
+            Ok(Program { dialect: Dialect::Fanuc, increment_mm: 0.001, blocks })
+        })
+    }
+}
