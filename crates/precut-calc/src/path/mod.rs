@@ -22,8 +22,14 @@ pub struct Polyline {
     pub deviation_mm: f64,
 }
 
+/// Up to so many stations the chords are balanced; beyond, the search costs more than it gives.
+const BALANCED_STATIONS: usize = 2000;
+/// Halvings of the tolerance's interval when chords are balanced: the deviation is least to a 32nd of the tolerance.
+const BALANCING_STEPS: u32 = 5;
+
 /// The fewest chords that follow the radii `r_mm` over the ascending stations `z_mm` within
-/// `tolerance_mm`, their ends rounded to `increment_mm` on the diameter. Fails only by cancellation.
+/// `tolerance_mm`, and of paths with so few chords (up to 2000 stations) nearly the one with the least
+/// deviation; their ends rounded to `increment_mm` on the diameter. Fails only by cancellation.
 pub fn simplified(
     z_mm: &[f64],
     r_mm: &[f64],
@@ -31,11 +37,31 @@ pub fn simplified(
     increment_mm: f64,
     monitor: &dyn Monitor,
 ) -> Result<Polyline, Failure> {
-    let vertices = fewest_chords_watched(z_mm, r_mm, tolerance_mm, monitor)?;
+    let vertices = balanced(z_mm, r_mm, tolerance_mm, monitor)?;
     let diameters_mm: Vec<f64> =
         vertices.iter().map(|&vertex| round_to_increment(2.0 * r_mm[vertex], increment_mm)).collect();
     let deviation_mm = achieved_deviation(z_mm, r_mm, &vertices, &diameters_mm);
     Ok(Polyline { vertices, diameters_mm, deviation_mm })
+}
+
+/// Fewest chords, by bisection at the smallest tolerance that needs no more of them.
+fn balanced(z_mm: &[f64], r_mm: &[f64], tolerance_mm: f64, monitor: &dyn Monitor) -> Result<Vec<usize>, Failure> {
+    let mut vertices = fewest_chords_watched(z_mm, r_mm, tolerance_mm, monitor)?;
+    if z_mm.len() > BALANCED_STATIONS || vertices.len() <= 2 {
+        return Ok(vertices);
+    }
+    let (mut too_fine, mut fine) = (0.0, tolerance_mm);
+    for _ in 0..BALANCING_STEPS {
+        let middle = f64::midpoint(too_fine, fine);
+        let tried = fewest_chords_watched(z_mm, r_mm, middle, monitor)?;
+        if tried.len() > vertices.len() {
+            too_fine = middle;
+        } else {
+            fine = middle;
+            vertices = tried;
+        }
+    }
+    Ok(vertices)
 }
 
 /// Largest radial deviation, mm, that chords within `tolerance_mm` have after their ends were rounded

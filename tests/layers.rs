@@ -1,0 +1,102 @@
+//! Who may know whom: physics knows nothing of the service, the engine nothing of HTTP, HTTP nothing of SQL.
+#![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
+
+use std::path::{Path, PathBuf};
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// All Rust files below a folder (or the file itself).
+fn sources(place: &str) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut open = vec![root().join(place)];
+    while let Some(path) = open.pop() {
+        if path.is_dir() {
+            open.extend(std::fs::read_dir(&path).unwrap().map(|entry| entry.unwrap().path()));
+        } else if path.extension().is_some_and(|ending| ending == "rs") {
+            found.push(path);
+        }
+    }
+    assert!(!found.is_empty(), "no source at {place}");
+    found
+}
+
+/// The code of a file: without comments, and without the test module at its end.
+fn code(path: &Path) -> String {
+    let text = std::fs::read_to_string(path).unwrap();
+    let text = text.split("#[cfg(test)]\n#[allow").next().unwrap().split("#[cfg(test)]\nmod tests {").next().unwrap();
+    text.lines().filter(|line| !line.trim_start().starts_with("//")).collect::<Vec<_>>().join("\n")
+}
+
+fn forbid(place: &str, words: &[&str], except: &[&str]) {
+    for path in sources(place) {
+        let name = path.strip_prefix(root()).unwrap().to_string_lossy().into_owned();
+        if except.iter().any(|part| name.contains(part)) {
+            continue;
+        }
+        let code = code(&path);
+        for word in words {
+            assert!(!code.contains(word), "{name} uses {word}");
+        }
+    }
+}
+
+#[test]
+fn physics_is_pure() {
+    forbid(
+        "crates/precut-calc/src",
+        &[
+            "tokio",
+            "axum",
+            "sqlx",
+            "hyper",
+            "async fn",
+            "std::fs",
+            "std::net",
+            "std::io",
+            "std::env",
+            "std::thread",
+            "Instant::",
+            "SystemTime",
+            "serde_json",
+            "println!",
+            "tracing::",
+            "static mut",
+            "thread_local",
+        ],
+        &[],
+    );
+}
+
+#[test]
+fn the_compute_crate_depends_on_nothing_of_the_service() {
+    let manifest: toml::Table =
+        std::fs::read_to_string(root().join("crates/precut-calc/Cargo.toml")).unwrap().parse().unwrap();
+    let allowed = ["nalgebra", "serde", "thiserror", "utoipa"];
+    for name in manifest["dependencies"].as_table().unwrap().keys() {
+        assert!(allowed.contains(&name.as_str()), "precut-calc depends on {name}");
+    }
+}
+
+#[test]
+fn the_engine_knows_no_http() {
+    forbid("src/engine", &["axum", "hyper", "crate::http", "StatusCode", "sqlx"], &[]);
+    forbid("src/registry", &["axum", "hyper", "crate::http", "crate::engine", "sqlx"], &[]);
+    forbid("src/store", &["axum", "hyper", "crate::http", "crate::engine"], &[]);
+    forbid("src/render", &["axum", "hyper", "tokio", "sqlx", "crate::http", "crate::engine", "crate::store"], &[]);
+}
+
+#[test]
+fn http_holds_neither_sql_nor_physics() {
+    forbid("src/http", &["sqlx", "SELECT ", "deflection_compensation", "num::beam"], &[]);
+    forbid("src/cli", &["sqlx", "axum", "deflection_compensation"], &[]);
+}
+
+/// Nothing outside its room names a calculator: one line in the compute crate's `lib.rs` brings it in.
+#[test]
+fn no_part_of_the_service_names_a_calculator() {
+    let compute = code(&root().join("crates/precut-calc/src/lib.rs"));
+    assert!(compute.contains("deflection_compensation::DeflectionCompensation"));
+    forbid("src", &["deflection_compensation", "DeflectionCompensation", "\"deflection-compensation\""], &[]);
+}
