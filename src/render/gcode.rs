@@ -50,6 +50,7 @@ struct Writer {
     text: String,
     dialect: Dialect,
     increment_mm: f64,
+    decimals: usize,
     x: Option<String>,
     z: Option<String>,
     feed: Option<String>,
@@ -59,7 +60,8 @@ impl Writer {
     fn new(program: &Program) -> Self {
         let step = program.increment_mm;
         let increment_mm = if step.is_finite() && step > 0.0 { step } else { 0.001 };
-        Self { text: String::new(), dialect: program.dialect, increment_mm, x: None, z: None, feed: None }
+        let decimals = decimals_of(increment_mm);
+        Self { text: String::new(), dialect: program.dialect, increment_mm, decimals, x: None, z: None, feed: None }
     }
 
     fn line(&mut self, line: &str) {
@@ -113,7 +115,7 @@ impl Writer {
             Dialect::LinuxCnc => {
                 self.line("G21 G18 G40 G90 G95");
                 self.line("G7");
-                let tolerance = at_most(self.increment_mm, decimals_of(self.increment_mm));
+                let tolerance = at_most(self.increment_mm, self.decimals);
                 self.line(&format!("G64 P{tolerance}"));
             }
         }
@@ -156,7 +158,7 @@ impl Writer {
 
     fn coordinate(&self, value_mm: f64) -> String {
         let steps = (value_mm / self.increment_mm).round();
-        with_point(at_most(steps * self.increment_mm, decimals_of(self.increment_mm)))
+        with_point(at_most(steps * self.increment_mm, self.decimals))
     }
 }
 
