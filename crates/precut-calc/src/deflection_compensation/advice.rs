@@ -59,6 +59,7 @@ pub(super) const WARNING_CODES: &[&str] = &[
     "command_too_deep",
     "command_doubles_depth",
     "blank_undersize",
+    "tool_passes_support",
     "form_tolerance_missed",
 ];
 
@@ -223,6 +224,7 @@ fn dominating(shares: &Shares) -> Message {
 pub(super) fn warnings(job: &Job, grid: &Grid, stage: &Stage, outcome: &Outcome) -> Vec<Finding> {
     let extremes = Extremes::of(stage);
     let mut found = deflection_warnings(job, grid, &extremes);
+    found.extend(passed_supports(job, grid));
     found.extend(structure_warnings(job, stage, outcome));
     found.extend(command_warnings(job, &extremes, outcome));
     found.extend(force_warnings(job, stage, &extremes));
@@ -256,6 +258,31 @@ fn deflection_warnings(job: &Job, grid: &Grid, extremes: &Extremes) -> Vec<Findi
         found.push(Finding::new("blank_undersize", pointer).value(undersize, "mm"));
     }
     found
+}
+
+/// Chucks and steady rests with turned segments on both sides: the tool has to pass them.
+fn passed_supports(job: &Job, grid: &Grid) -> Vec<Finding> {
+    let turned = |s: &Segment| job.stock_profile.is_some() || s.stock_mm() > s.diameter_mm;
+    let ends = grid.steps_mm.windows(2).zip(&job.shaft.segments).filter(|(_, s)| turned(s)).map(|(ends, _)| ends);
+    let (mut from, mut to) = (f64::INFINITY, f64::NEG_INFINITY);
+    for ends in ends {
+        from = from.min(ends[0]);
+        to = to.max(ends[1]);
+    }
+    let passed = |support: &Support| match *support {
+        Support::Chuck { z_mm, .. } => Some(("chuck", z_mm)),
+        Support::SteadyRest { z_mm, .. } => Some(("steady_rest", z_mm)),
+        Support::Centre { .. } | Support::FollowRest { .. } => None,
+    };
+    job.supports
+        .iter()
+        .enumerate()
+        .filter_map(|(i, support)| passed(support).map(|(kind, z_mm)| (i, kind, z_mm)))
+        .filter(|(_, _, z_mm)| from < *z_mm && *z_mm < to)
+        .map(|(i, kind, z_mm)| {
+            Finding::new("tool_passes_support", format!("/supports/{i}/z_mm")).value(z_mm, "mm").with("kind", kind)
+        })
+        .collect()
 }
 
 fn structure_warnings(job: &Job, stage: &Stage, outcome: &Outcome) -> Vec<Finding> {

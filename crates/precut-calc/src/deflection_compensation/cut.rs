@@ -19,7 +19,7 @@ pub(super) struct CutLine {
     pub loads: NominalLoads,
     /// Y(a).
     pub y_mm: Vec<f64>,
-    /// Z(a); empty where nothing moves the axis aside, see [`at`].
+    /// Z(a); empty where nothing moves the axis aside, see `model::at`.
     pub z_mm: Vec<f64>,
     /// S'/(1+S') at the planned depth and the command: the copying factor of the compensated cut.
     pub planned_copying: Vec<f64>,
