@@ -35,15 +35,17 @@ impl Range {
         Self { low: middle - half, high: middle + half }
     }
 
-    /// With room beyond the outermost values, and down or up to 0 where that is near.
+    /// With room beyond the outermost values, and down or up to 0 where that is near; a curve that runs
+    /// along 0 does not run along the frame.
     pub(super) fn roomy(self) -> Self {
-        let room = 0.06 * (self.high - self.low);
-        let near = 4.0 * room;
         let Self { low, high } = self;
+        let room = 0.06 * (high - low);
+        let beyond = |end: f64| if end.abs() > 0.0 { 0.0 } else { 0.4 * room };
+        let near = 4.0 * room;
         if low >= 0.0 && low <= near {
-            Self { low: 0.0, high: high + room }
+            Self { low: -beyond(low), high: high + room }
         } else if high <= 0.0 && -high <= near {
-            Self { low: low - room, high: 0.0 }
+            Self { low: low - room, high: beyond(high) }
         } else {
             Self { low: low - room, high: high + room }
         }
@@ -199,6 +201,7 @@ mod tests {
         assert_eq!(of(&[10.0]), Range { low: 9.0, high: 11.0 });
         assert_eq!(of(&[1.0, 10.0]).roomy().low, 0.0);
         assert!(of(&[8.0, 10.0]).roomy().low > 7.0);
+        assert!(of(&[0.0, 10.0]).roomy().low < 0.0, "a curve along 0 keeps off the frame");
     }
 
     #[test]
