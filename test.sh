@@ -114,7 +114,7 @@ step_scripts() {
 
 step_test() {
   # The documentation's commands are run as they stand; without curl its test fails, the others run.
-  (debian curl curl) || true
+  (need curl curl) || true
   cargo test --workspace --locked
 }
 
