@@ -177,10 +177,14 @@ impl Problem {
         let inner = &*self.0;
         let errors: Vec<Notice> =
             inner.findings.iter().map(|finding| texts.notice(language, "fault", finding)).collect();
-        let (title, mut detail) = texts.problem(language, inner.by_finding.unwrap_or(inner.code), &inner.values);
-        if let (Some(_), Some(fault)) = (inner.by_finding, errors.first()) {
-            detail.clone_from(&fault.detail);
-        }
+        let (title, detail) = match (inner.by_finding, errors.first()) {
+            // The class gives the title; what is wrong this time is what was found.
+            (Some(class), Some(fault)) => {
+                let title = texts.word(language, "problem", &format!("{class}.title"), &inner.values);
+                (title, fault.detail.clone())
+            }
+            (class, _) => texts.problem(language, class.unwrap_or(inner.code), &inner.values),
+        };
         ProblemDocument {
             kind: format!("/problems/{}", inner.code),
             code: inner.code,

@@ -34,6 +34,7 @@ pub(super) const CODES: &[&str] = &[
     "effect_beyond_base",
     "effect_without_tailstock",
     "effect_without_rest",
+    "effect_of_carrying_rest",
     "effect_not_with_passes",
 ];
 
@@ -247,13 +248,22 @@ fn check_effect_on_structure(job: &Job, effect: &Effect, at: &dyn Fn(&str) -> St
         Effect::TailstockCompliance { .. } | Effect::TailstockOffset { .. } if tail.is_none() => {
             violations.add(Finding::new("effect_without_tailstock", at("")).with("kind", kind));
         }
-        Effect::SteadyRestOffset { station_mm, .. } => violations.require(steady_at(job, station_mm).is_some(), || {
-            Finding::new("effect_without_rest", at("/station_mm")).value(station_mm, "mm")
-        }),
+        Effect::SteadyRestOffset { station_mm, .. } => match steady_at(job, station_mm) {
+            None => violations.add(Finding::new("effect_without_rest", at("/station_mm")).value(station_mm, "mm")),
+            Some(rest) => violations.require(held_without(job, rest), || {
+                Finding::new("effect_of_carrying_rest", at("/station_mm")).value(station_mm, "mm")
+            }),
+        },
         Effect::UncutSideStiffness {} => violations
             .require(job.passes.is_empty(), || Finding::new("effect_not_with_passes", at("")).with("kind", kind)),
         _ => {}
     }
+}
+
+/// Whether the shaft is held when one of its supports is taken away.
+fn held_without(job: &Job, left_out: usize) -> bool {
+    let others = || job.supports.iter().enumerate().filter(|(i, _)| *i != left_out).map(|(_, support)| support);
+    others().any(|s| matches!(s, Support::Chuck { .. })) || others().filter(|s| s.carries()).count() >= 2
 }
 
 /// Index of the steady rest that stands at a station.

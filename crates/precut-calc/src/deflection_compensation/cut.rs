@@ -121,6 +121,13 @@ fn status_of(depth_mm: f64, command_mm: f64) -> StatusCompensated {
 }
 
 impl CutLine {
+    /// Whether all that was computed can be worked with: forces and compliances at the ends of their ranges overflow.
+    pub(super) fn is_in_reach(&self) -> bool {
+        let all = |values: &[f64]| values.iter().all(|value| in_reach(*value));
+        let known = |values: &[Option<f64>]| values.iter().flatten().all(|value| in_reach(*value));
+        all(&self.y_mm) && all(&self.z_mm) && known(&self.uncompensated_depth_mm) && known(&self.copying)
+    }
+
     /// Computes a cut with the forces and compliances of `line` about the radii given.
     pub(super) fn of(line: &Line, radii: &Radii, monitor: &dyn Monitor) -> Result<Self, Failure> {
         let n = radii.target.len();
@@ -304,6 +311,12 @@ impl CutLine {
     }
 }
 
+/// Whether a number survives what is still done with it: units, squares, sums along the shaft. False for NaN.
+fn in_reach(value: f64) -> bool {
+    const REACH: f64 = 1e150;
+    value.abs() < REACH
+}
+
 /// The source paper's one-step formula at every station, and what it leaves (`deflection/4.3`).
 ///
 /// t_calc = a + y i with y = W P_y(a) and i = P_y(a + y)/P_y(a), which is (1 + y/a)^z for a power law.
@@ -328,13 +341,19 @@ pub(super) fn one_step(line: &Line, radii: &Radii, cut: &CutLine, depth_exponent
         let y = w * force;
         let factor = line.passive(i, a + y).0 / force;
         let depth = a + y * factor;
+        let residual = depth - w * line.passive(i, depth).0 - a;
+        if !in_reach(residual) {
+            // Depths beyond the shaft and steep laws: the formula has no number there.
+            step.push_nothing();
+            continue;
+        }
         let (stock, target) = (radii.stock[i], radii.target[i]);
         let command = radii.planned()[i] - depth;
         let produced = stock - solver.engage(i, stock, command, cut.guess_mm(i, stock - command)).depth_mm();
         step.factor.push(Some(factor));
         step.depth_mm.push(Some(depth));
         step.diameter_error_um.push(Some(2.0 * (produced - target) * UM_PER_MM));
-        step.residual_commanded_model_um.push(Some((depth - w * line.passive(i, depth).0 - a) * UM_PER_MM));
+        step.residual_commanded_model_um.push(Some(residual * UM_PER_MM));
         step.depth_commanded_model_mm.push(depth_exponent.and_then(|exponent| {
             commanded_model_depth_mm(a, depth, exponent, |t| {
                 let (force, slope) = line.passive(i, t);

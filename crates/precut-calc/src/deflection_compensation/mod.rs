@@ -47,8 +47,8 @@ pub use output::{
 };
 
 use crate::calculator::{
-    Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Message, Meta, Monitor, Program,
-    Table,
+    Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Finding, Message, Meta, Monitor,
+    Program, Table,
 };
 use crate::{force, material};
 
@@ -177,6 +177,9 @@ fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
     let grid = Grid::of(job);
     let acting = Acting::of(&job.effects, &job.conditions, job.cut.feed_direction);
     let (mut stage, passes) = all_cuts(job, &grid, &acting, monitor)?;
+    if !stage.cut.is_in_reach() {
+        return Err(Failure::OutOfModel(Finding::new("numbers_out_of_reach", "")));
+    }
     let driven = match job.detail {
         Detail::Profile => None,
         Detail::Full => {
@@ -287,7 +290,7 @@ fn basis(job: &Job) -> Vec<Basis> {
 /// Everything that this calculator may utter, from where it is said.
 const CODES: Codes = Codes {
     faults: &[check::CODES, force::FAULT_CODES],
-    failures: &[&["path_incomplete", "path_not_computed", "pass_without_command"]],
+    failures: &[&["path_incomplete", "path_not_computed", "pass_without_command", "numbers_out_of_reach"]],
     warnings: &[advice::WARNING_CODES, second_order::WARNING_CODES, force::WARNING_CODES],
     explanations: &[advice::EXPLANATION_CODES],
     stages: &[&["stage_pass", "stage_path", "stage_advice", "stage_done"]],
