@@ -1,7 +1,9 @@
 //! What is measured. A new row is one entry in [`all`].
 
 use precut::render::{self, Wording};
-use precut_calc::calculator::{Axis, Block, Column, Dialect, Figure, Item, Message, Panel, Program, Role, Table};
+use precut_calc::calculator::{
+    Axis, Block, Column, Dialect, Figure, Frame, Item, Message, Panel, Program, Role, Table,
+};
 
 use crate::Row;
 use crate::deflection;
@@ -84,9 +86,15 @@ fn gcode() -> Result<Measured, String> {
 fn svg(stations: u32) -> Result<Measured, String> {
     let (x, y) = profile(stations);
     let line = |role| Item::Line { name: "curve", x: x.clone(), y: y.iter().copied().map(Some).collect(), role };
-    let axis = Axis { label: "axis", unit: "um" };
+    let axis = Axis::linear("axis", "um");
     let panel = || Panel { y: axis, height: 1.0, items: vec![line(Role::Before), line(Role::After)] };
-    let figure = Figure { id: "f", title: Message::new("title"), x: axis, panels: vec![panel(), panel(), panel()] };
+    let figure = Figure {
+        id: "f",
+        title: Message::new("title"),
+        frame: Frame::Stacked,
+        x: axis,
+        panels: vec![panel(), panel(), panel()],
+    };
     let words = Wording {
         message: &|message| message.code.to_owned(),
         label: &str::to_owned,

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use precut_calc::calculator::{
     Answer, Axis, Basis, Calculator, CalculatorKind, Check, Codes, Column, Cost, Example, Failure, Figure, Finding,
-    Item, Measured, MeasuredRow, Message, Meta, Monitor, Panel, Role, Table, Values, Violations, checkpoint,
+    Frame, Item, Measured, MeasuredRow, Message, Meta, Monitor, Panel, Role, Table, Values, Violations, checkpoint,
 };
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -269,8 +269,9 @@ impl Calculator for Toy {
         vec![Figure {
             id: "bending",
             title: Message { code: "bending", values: Values::new() },
-            x: Axis { label: "bending", unit: "1" },
-            panels: vec![Panel { y: Axis { label: "bending", unit: "um" }, height: 1.0, items: vec![line] }],
+            frame: Frame::Stacked,
+            x: Axis::linear("bending", "1"),
+            panels: vec![Panel { y: Axis::linear("bending", "um"), height: 1.0, items: vec![line] }],
         }]
     }
 

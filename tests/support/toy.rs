@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 use precut::registry::Registry;
 use precut_calc::calculator::{
     Answer, Axis, Basis, Block, Calculator, CalculatorKind, Check, Codes, Column, Cost, Dialect, Example, Failure,
-    Figure, Finding, Item, Measured, MeasuredRow, Message, Meta, Monitor, Panel, Program, Registrar, Role, Table,
-    Violations, checkpoint,
+    Figure, Finding, Frame, Item, Measured, MeasuredRow, Message, Meta, Monitor, Panel, Program, Registrar, Role,
+    Table, Violations, checkpoint,
 };
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -177,7 +177,7 @@ impl Calculator for Bar {
 
     fn figures(_input: &BarJob, output: &BarResult) -> Vec<Figure> {
         let panel = || Panel {
-            y: Axis { label: "sag", unit: "um" },
+            y: Axis::linear("sag", "um"),
             height: 1.0,
             items: vec![Item::Line {
                 name: "sag",
@@ -189,7 +189,8 @@ impl Calculator for Bar {
         let figure = |id| Figure {
             id,
             title: Message::new("sag"),
-            x: Axis { label: "place", unit: "mm" },
+            frame: Frame::Stacked,
+            x: Axis::linear("place", "mm"),
             panels: vec![panel()],
         };
         vec![figure("sag"), figure("load")]

@@ -34,7 +34,9 @@ pub(super) fn items(page: &mut Page, panel: &Panel, frame: &Frame, styles: &Styl
             Item::Line { name, .. }
             | Item::Band { name, .. }
             | Item::Points { name, .. }
+            | Item::Bars { name, .. }
             | Item::Outline { name, .. } => name,
+            Item::HeatMap { value, .. } => &value.label,
             Item::Glyph { glyph, .. } => glyph::label(*glyph),
         };
         put!(page, "<g><title>{}</title>", Escaped(&(wording.label)(code)));
@@ -46,6 +48,7 @@ pub(super) fn items(page: &mut Page, panel: &Panel, frame: &Frame, styles: &Styl
             Item::Points { name, x, y, role } => {
                 points(page, frame, x, y, (&styles.class(name, *role), role_class(*role).1));
             }
+            Item::Bars { .. } | Item::HeatMap { .. } => {}
             Item::Outline { name, x, y, role } => outline(page, frame, x, y, &styles.class(name, *role)),
             Item::Glyph { glyph, x, y } => {
                 if let Some((px, py)) = frame.point(*x, *y) {

@@ -107,7 +107,8 @@ fn sample(page: &mut Page, sample: &Sample<'_>, x: f64, y: f64, styles: &Styles)
             let (class, marker) = (class(name, *role), role_class(*role).1);
             put!(page, "<path class=\"points {class}\" d=\"M{} {}{marker}\"/>", Px(x + SAMPLE / 2.0), Px(y));
         }
-        Sample::Item(Item::Outline { name, role, .. }) => {
+        Sample::Item(Item::HeatMap { .. }) => {}
+        Sample::Item(Item::Bars { name, role, .. } | Item::Outline { name, role, .. }) => {
             let class = class(name, *role);
             put!(
                 page,

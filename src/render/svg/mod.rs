@@ -211,18 +211,21 @@ fn x_ticks(range: Range, room: f64, decimal: char) -> Ticks {
 
 fn abscissae(item: &Item) -> Box<dyn Iterator<Item = f64> + '_> {
     match item {
-        Item::Line { x, .. } | Item::Band { x, .. } | Item::Points { x, .. } | Item::Outline { x, .. } => {
-            Box::new(x.iter().copied())
-        }
+        Item::Line { x, .. }
+        | Item::Band { x, .. }
+        | Item::Points { x, .. }
+        | Item::Bars { x, .. }
+        | Item::HeatMap { x, .. }
+        | Item::Outline { x, .. } => Box::new(x.iter().copied()),
         Item::Glyph { x, .. } => Box::new(std::iter::once(*x)),
     }
 }
 
 fn ordinates(item: &Item) -> Box<dyn Iterator<Item = f64> + '_> {
     match item {
-        Item::Line { y, .. } => Box::new(y.iter().copied().flatten()),
+        Item::Line { y, .. } | Item::Bars { y, .. } => Box::new(y.iter().copied().flatten()),
         Item::Band { lower, upper, .. } => Box::new(lower.iter().chain(upper).copied()),
-        Item::Points { y, .. } | Item::Outline { y, .. } => Box::new(y.iter().copied()),
+        Item::Points { y, .. } | Item::HeatMap { y, .. } | Item::Outline { y, .. } => Box::new(y.iter().copied()),
         Item::Glyph { y, .. } => Box::new(std::iter::once(*y)),
     }
 }

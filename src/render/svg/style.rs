@@ -96,7 +96,10 @@ pub(super) fn role_class(role: Role) -> (&'static str, &'static str) {
         Role::Stock => ("stock", CIRCLE),
         Role::Tolerance => ("tolerance", BAR),
         Role::Uncertainty => ("uncertainty", BAR),
-        Role::Plain => ("plain", CIRCLE),
+        Role::Limit => ("limit", BAR),
+        Role::Stable => ("stable", CIRCLE),
+        Role::Unstable => ("unstable", CROSS),
+        Role::Series(_) | Role::Plain => ("plain", CIRCLE),
     }
 }
 
@@ -106,8 +109,9 @@ pub(super) fn identity(item: &Item) -> Option<(&'static str, Role)> {
         Item::Line { name, role, .. }
         | Item::Band { name, role, .. }
         | Item::Points { name, role, .. }
+        | Item::Bars { name, role, .. }
         | Item::Outline { name, role, .. } => Some((name, role)),
-        Item::Glyph { .. } => None,
+        Item::HeatMap { .. } | Item::Glyph { .. } => None,
     }
 }
 

@@ -1,7 +1,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use super::*;
-use precut_calc::calculator::{Glyph, Role};
+use precut_calc::calculator::{Frame as FigureFrame, Glyph, Role};
 use proptest::prelude::*;
 
 fn words<'a>() -> Wording<'a> {
@@ -36,10 +36,11 @@ pub(super) fn shaft(stations: usize) -> Figure {
     let (px, py): (Vec<f64>, Vec<f64>) = corners.into_iter().unzip();
     let (bx, by) = (vec![0.0, 2000.0, 2000.0, 0.0], vec![48.0, 48.0, -48.0, -48.0]);
     let glyph = |glyph, x, y| Item::Glyph { glyph, x, y };
-    let axis = |label, unit| Axis { label, unit };
+    let axis = |label, unit| Axis::linear(label, unit);
     Figure {
         id: "profile",
         title: Message::new("diameter_along_the_shaft_before_and_after_compensation"),
+        frame: FigureFrame::Stacked,
         x: axis("position_from_the_headstock", "mm"),
         panels: vec![
             Panel {
@@ -230,9 +231,9 @@ fn an_empty_figure_is_a_figure() {
 }
 
 fn one_item(item: Item) -> Figure {
-    let axis = Axis { label: "x", unit: "1" };
+    let axis = Axis::linear("x", "1");
     let panels = vec![Panel { y: axis, height: 1.0, items: vec![item] }];
-    Figure { id: "one", title: Message::new("one"), x: axis, panels }
+    Figure { id: "one", title: Message::new("one"), frame: FigureFrame::Stacked, x: axis, panels }
 }
 
 fn number() -> impl Strategy<Value = f64> {
@@ -287,9 +288,9 @@ fn item() -> impl Strategy<Value = Item> {
 proptest! {
     #[test]
     fn any_figure_is_sound(panels in proptest::collection::vec((number(), proptest::collection::vec(item(), 0..6)), 0..4)) {
-        let axis = Axis { label: "label <&>", unit: "um/N" };
+        let axis = Axis::linear("label <&>", "um/N");
         let panels = panels.into_iter().map(|(height, items)| Panel { y: axis, height, items }).collect();
-        let figure = Figure { id: "any", title: Message::new("any"), x: axis, panels };
+        let figure = Figure { id: "any", title: Message::new("any"), frame: FigureFrame::Stacked, x: axis, panels };
         let text = svg(&figure, &words());
         assert_sound(&text);
         prop_assert!(text.len() < 100_000);

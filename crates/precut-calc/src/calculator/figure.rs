@@ -3,17 +3,30 @@
 use super::Message;
 use serde::Serialize;
 
-/// Panels stacked over one common horizontal axis.
+/// Panels over one common abscissa.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Figure {
     /// Name for `?figure=`.
     pub id: &'static str,
     /// Code of the title.
     pub title: Message,
+    /// How abscissa and ordinates become a place on the paper.
+    pub frame: Frame,
     /// The common horizontal axis.
     pub x: Axis,
     /// From top to bottom.
     pub panels: Vec<Panel>,
+}
+
+/// How abscissa and ordinates become a place on the paper.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Frame {
+    /// Panels under each other, the abscissa to the right.
+    Stacked,
+    /// Roundness chart: the abscissa is an angle in degrees, counter-clockwise from the right; the
+    /// ordinate a deviation, drawn magnified outward from a base circle. One panel.
+    Polar,
 }
 
 /// What an axis shows.
@@ -23,6 +36,30 @@ pub struct Axis {
     pub label: &'static str,
     /// Unit as in the contract: `mm`, `um`, `um/N`, `1`.
     pub unit: &'static str,
+    /// How its numbers are spaced.
+    pub scale: Spacing,
+}
+
+impl Axis {
+    /// An axis with even spacing.
+    pub const fn linear(label: &'static str, unit: &'static str) -> Self {
+        Self { label, unit, scale: Spacing::Linear }
+    }
+
+    /// A logarithmic axis; what is not positive is a gap on it.
+    pub const fn logarithmic(label: &'static str, unit: &'static str) -> Self {
+        Self { label, unit, scale: Spacing::Logarithmic }
+    }
+}
+
+/// How the numbers of an axis are spaced.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Spacing {
+    /// Equal steps, equal distances.
+    Linear,
+    /// Equal ratios, equal distances.
+    Logarithmic,
 }
 
 /// One drawing area with its vertical axis.
@@ -75,6 +112,30 @@ pub enum Item {
         /// What they stand for.
         role: Role,
     },
+    /// A bar from zero to each ordinate.
+    Bars {
+        /// Code of the entry in the legend.
+        name: &'static str,
+        /// Middles of the bars.
+        x: Vec<f64>,
+        /// Ordinates.
+        y: Vec<Option<f64>>,
+        /// What they stand for.
+        role: Role,
+    },
+    /// A number over the plane as colour, with its scale beside the panel. One per panel.
+    HeatMap {
+        /// What the colour shows.
+        value: Axis,
+        /// Middles of the columns, ascending.
+        x: Vec<f64>,
+        /// Middles of the rows, ascending.
+        y: Vec<f64>,
+        /// Row by row; `None` is left blank.
+        values: Vec<Option<f64>>,
+        /// Whether the colours part at zero (growth and decay) or run from low to high.
+        diverging: bool,
+    },
     /// A closed, filled outline (the section of a part), in the units of the axes.
     Outline {
         /// Code of the entry in the legend.
@@ -119,6 +180,14 @@ pub enum Role {
     Tolerance,
     /// Uncertainty.
     Uncertainty,
+    /// A limit that must not be crossed.
+    Limit,
+    /// Where it is stable, holds, is allowed.
+    Stable,
+    /// Where it is not.
+    Unstable,
+    /// The n-th of a family of like curves, from 0.
+    Series(u8),
     /// A neutral curve.
     Plain,
 }

@@ -16,6 +16,8 @@ pub trait ForwardModel {
     type Point: DeserializeOwned + Serialize + ToSchema + Clone + Send + Sync;
     /// The named effects that the model takes.
     type Effect: Clone + Send + Sync;
+    /// How wrong the base may be without that being a finding: standard deviations.
+    type Allowances: DeserializeOwned + Serialize + ToSchema + Default + Clone + Send + Sync;
     /// What no effect's parameter changes.
     type Prepared: Send + Sync;
 
@@ -48,7 +50,7 @@ pub trait ForwardModel {
     }
 
     /// d predict / d allowance: how the prediction moves when the base is wrong by one standard deviation.
-    fn nuisances(prepared: &Self::Prepared, allowances: &Allowances) -> Result<Vec<Column>, Failure>;
+    fn nuisances(prepared: &Self::Prepared, allowances: &Self::Allowances) -> Result<Vec<Column>, Failure>;
 
     /// Cost of one `predict`.
     fn predict_cost(prepared: &Self::Prepared) -> Cost;
@@ -98,21 +100,6 @@ pub struct Quantity {
     pub unit: &'static str,
     /// Whether statistics work on its logarithm.
     pub logarithmic: bool,
-}
-
-/// How wrong the base may be without that being a finding, standard deviations.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Allowances {
-    /// Force level common to all runs, relative.
-    pub force_level_rel: f64,
-    /// Force level of every run, relative.
-    pub force_per_run_rel: f64,
-    /// Bending compliance, relative.
-    pub bending_rel: f64,
-    /// Setting of the diameter in every run, um on the diameter.
-    pub setup_diameter_um: f64,
-    /// Position of the gauge along the shaft in every run, mm.
-    pub gauge_position_mm: f64,
 }
 
 /// Central divided differences, step 1e-3 of the parameter's prior standard deviation, kept within bounds.

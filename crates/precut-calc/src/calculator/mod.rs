@@ -11,11 +11,9 @@ mod measured;
 mod program;
 mod table;
 
-pub use figure::{Axis, Figure, Glyph, Item, Panel, Role};
+pub use figure::{Axis, Figure, Frame, Glyph, Item, Panel, Role, Spacing};
 pub use finding::{Finding, Message, Value, Values, Violations};
-pub use forward::{
-    Allowances, Column as JacobianColumn, ForwardModel, Missing, Prediction, PrepareError, Quantity, Rows,
-};
+pub use forward::{Column as JacobianColumn, ForwardModel, Missing, Prediction, PrepareError, Quantity, Rows};
 pub use measured::{Measured, MeasuredRow};
 pub use program::{Block, Dialect, Program};
 pub use table::{Cells, Column, Table};

@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::calculator::{
-    Allowances, Cost, Failure, Finding, ForwardModel, JacobianColumn, Missing, Monitor, Prediction, PrepareError,
-    Quantity, Rows, checkpoint,
+    Cost, Failure, Finding, ForwardModel, JacobianColumn, Missing, Monitor, Prediction, PrepareError, Quantity, Rows,
+    checkpoint,
 };
 use crate::effects::{Cause, DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect};
 use crate::num::beam::Profile;
@@ -24,6 +24,39 @@ const UM_PER_MM: f64 = 1e3;
 const RELATIVE_STEP: f64 = 1e-3;
 /// Step of the divided difference along the shaft, mm.
 const GAUGE_STEP_MM: f64 = 0.05;
+
+/// How wrong the base may be without that being a finding: standard deviations.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct DeflectionAllowances {
+    /// Force level common to all runs, as a share.
+    #[schema(minimum = 0.0, maximum = 1.0, example = 0.01, extensions(("x-unit" = json!("1"))))]
+    pub force_level_rel: f64,
+    /// Force level of every run by itself, as a share.
+    #[schema(minimum = 0.0, maximum = 1.0, example = 0.007, extensions(("x-unit" = json!("1"))))]
+    pub force_per_run_rel: f64,
+    /// Bending compliance, as a share; 0.0035 is a diameter known to 0.1 %.
+    #[schema(minimum = 0.0, maximum = 1.0, example = 0.0035, extensions(("x-unit" = json!("1"))))]
+    pub bending_rel: f64,
+    /// Setting of the diameter in every run, on the diameter.
+    #[schema(minimum = 0.0, maximum = 1000.0, example = 1.0, extensions(("x-unit" = json!("um"))))]
+    pub setup_diameter_um: f64,
+    /// Position of the gauge along the shaft in every run.
+    #[schema(minimum = 0.0, maximum = 100.0, example = 0.2, extensions(("x-unit" = json!("mm"))))]
+    pub gauge_position_mm: f64,
+}
+
+impl Default for DeflectionAllowances {
+    fn default() -> Self {
+        Self {
+            force_level_rel: 0.01,
+            force_per_run_rel: 0.007,
+            bending_rel: 0.003_5,
+            setup_diameter_um: 1.0,
+            gauge_position_mm: 0.2,
+        }
+    }
+}
 
 /// Conditions of one run; what it leaves out is as in the job.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -151,6 +184,7 @@ impl ForwardModel for DeflectionCompensation {
     type Run = DeflectionRun;
     type Point = DeflectionPoint;
     type Effect = DeflectionEffect;
+    type Allowances = DeflectionAllowances;
     type Prepared = PreparedDeflection;
 
     const CAUSES: &'static [Cause] = DEFLECTION_CAUSES;
@@ -198,7 +232,10 @@ impl ForwardModel for DeflectionCompensation {
         DeflectionEffect::from_parameters(cause, values)
     }
 
-    fn nuisances(prepared: &PreparedDeflection, allowances: &Allowances) -> Result<Vec<JacobianColumn>, Failure> {
+    fn nuisances(
+        prepared: &PreparedDeflection,
+        allowances: &DeflectionAllowances,
+    ) -> Result<Vec<JacobianColumn>, Failure> {
         let by_force = prepared.slope(|delta| DeflectionEffect::ForceLevel { delta })?;
         let by_bending = prepared.slope(|delta| DeflectionEffect::BendingScale { delta })?;
         let along = prepared.slope_along()?;

@@ -35,7 +35,7 @@ mod structure;
 mod toolpath;
 
 pub use form::{Deviation, Extremum, ExtremumKind, Form, FormClass};
-pub use forward::{DeflectionPoint, DeflectionRun};
+pub use forward::{DeflectionAllowances, DeflectionPoint, DeflectionRun};
 pub use input::{
     Carriage, Cut, Detail, FeedDirection, Gravity, Include, Job, Limits, MAX_STATIONS, Pass, PathSettings,
     ProgramSettings, ProgramZero, Section, Segment, Shaft, SpeedDiameter, Stations, StockRow, Support, Theory,

@@ -1,12 +1,12 @@
 //! Figures and tables of an answer.
 
-use crate::calculator::{Axis, Column, Figure, Glyph, Item, Message, Panel, Role, Table};
+use crate::calculator::{Axis, Column, Figure, Frame, Glyph, Item, Message, Panel, Role, Table};
 
 use super::input::{Job, Support};
 use super::output::{OneStep, Outcome, PathZone, StationColumns};
 use super::structure::ends;
 
-const Z: Axis = Axis { label: "station", unit: "mm" };
+const Z: Axis = Axis::linear("station", "mm");
 
 pub(super) const FIGURE_IDS: &[&str] = &["profile", "compliance", "path"];
 pub(super) const TABLE_IDS: &[&str] = &["stations", "path", "increments", "one_step", "passes"];
@@ -41,6 +41,7 @@ pub(super) fn figures(job: &Job, outcome: &Outcome) -> Vec<Figure> {
         Figure {
             id: "profile",
             title: title("deflection_profile"),
+            frame: Frame::Stacked,
             x: Z,
             panels: vec![
                 outline(job, outcome, 0.8),
@@ -52,12 +53,14 @@ pub(super) fn figures(job: &Job, outcome: &Outcome) -> Vec<Figure> {
         Figure {
             id: "compliance",
             title: title("deflection_compliance"),
+            frame: Frame::Stacked,
             x: Z,
             panels: vec![outline(job, outcome, 0.8), compliance(&outcome.stations, 1.2)],
         },
         Figure {
             id: "path",
             title: title("deflection_path"),
+            frame: Frame::Stacked,
             x: Z,
             panels: vec![path(outcome, 1.2), one_step(outcome, 0.8)],
         },
@@ -117,13 +120,13 @@ fn outline(job: &Job, outcome: &Outcome, height: f64) -> Panel {
         });
     }
     items.push(Item::Glyph { glyph: Glyph::Tool, x: tool_z, y: -radius_at(tool_z) });
-    Panel { y: Axis { label: "radius", unit: "mm" }, height, items }
+    Panel { y: Axis::linear("radius", "mm"), height, items }
 }
 
 fn compliance(stations: &StationColumns, height: f64) -> Panel {
     let line = |name, values: &[f64], role| Item::Line { name, x: stations.z_mm.clone(), y: some(values), role };
     Panel {
-        y: Axis { label: "compliance", unit: "um/N" },
+        y: Axis::linear("compliance", "um/N"),
         height,
         items: vec![
             line("work_compliance", &stations.work_compliance_um_per_n, Role::Comparison),
@@ -166,7 +169,7 @@ fn errors(job: &Job, outcome: &Outcome, height: f64) -> Panel {
         role: Role::Before,
     });
     items.extend(after.map(|after| with_compensation(stations, after)));
-    Panel { y: Axis { label: "diameter_error", unit: "um" }, height, items }
+    Panel { y: Axis::linear("diameter_error", "um"), height, items }
 }
 
 fn path(outcome: &Outcome, height: f64) -> Panel {
@@ -194,14 +197,14 @@ fn path(outcome: &Outcome, height: f64) -> Panel {
     });
     let (x, y) = vertices.into_iter().unzip();
     items.push(Item::Points { name: "programmed_vertices", x, y, role: Role::Command });
-    Panel { y: Axis { label: "path_offset", unit: "um" }, height, items }
+    Panel { y: Axis::linear("path_offset", "um"), height, items }
 }
 
 fn one_step(outcome: &Outcome, height: f64) -> Panel {
     let stations = &outcome.stations;
     let line = |name, y: &[Option<f64>], role| Item::Line { name, x: stations.z_mm.clone(), y: y.to_vec(), role };
     Panel {
-        y: Axis { label: "diameter_error", unit: "um" },
+        y: Axis::linear("diameter_error", "um"),
         height,
         items: outcome
             .one_step
