@@ -8,6 +8,7 @@ pub mod calculator;
 pub mod deflection_compensation;
 pub mod effects;
 pub mod force;
+pub mod machinability;
 pub mod material;
 pub mod num;
 pub mod path;
