@@ -12,6 +12,7 @@ pub mod machinability;
 pub mod material;
 pub mod num;
 pub mod path;
+pub mod shaft;
 
 use calculator::Registrar;
 
