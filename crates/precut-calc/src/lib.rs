@@ -7,6 +7,7 @@
 pub mod calculator;
 pub mod deflection_compensation;
 pub mod effects;
+pub mod feed_schedule;
 pub mod force;
 pub mod machinability;
 pub mod material;

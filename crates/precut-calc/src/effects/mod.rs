@@ -5,8 +5,12 @@
 //! worded outside, under `cause.{kind}`.
 
 mod deflection;
+mod machinability;
 
 pub use deflection::{CAUSES as DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect};
+pub use machinability::{
+    CAUSES as MACHINABILITY_CAUSES, FactorLevel, MachinabilityConditions, MachinabilityEffect,
+};
 
 /// An entry of the catalogue.
 #[derive(Debug, Clone, Copy, PartialEq)]
