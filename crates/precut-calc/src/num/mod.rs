@@ -1,3 +1,4 @@
 //! Numerics with no machining words in them.
 
 pub mod beam;
+pub mod roundness;
