@@ -11,6 +11,7 @@ pub mod force;
 pub mod material;
 pub mod num;
 pub mod path;
+pub mod ring_roundness;
 
 use calculator::Registrar;
 

@@ -1,0 +1,3 @@
+//! Ring roundness: how round will a ring get that is turned while it rests on the surface being turned?
+
+mod turning;
