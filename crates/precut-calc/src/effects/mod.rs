@@ -5,8 +5,10 @@
 //! worded outside, under `cause.{kind}`.
 
 mod deflection;
+mod ring;
 
 pub use deflection::{CAUSES as DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect};
+pub use ring::{CAUSES as RING_CAUSES, RingConditions, RingEffect};
 
 /// An entry of the catalogue.
 #[derive(Debug, Clone, Copy, PartialEq)]

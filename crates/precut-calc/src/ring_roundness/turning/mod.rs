@@ -4,12 +4,14 @@ mod envelope;
 mod log;
 mod nodes;
 pub(crate) mod plane;
+mod sampled;
 mod setting;
 mod stepper;
 #[cfg(test)]
 mod tests;
 
 use plane::Vec2;
+pub(crate) use sampled::{Sampled, turn_sampled};
 pub(crate) use setting::{Motion, Oscillation, Setting, moved_across};
 use setting::{Moving, Still};
 use stepper::Stepper;

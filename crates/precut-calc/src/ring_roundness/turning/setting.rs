@@ -61,8 +61,10 @@ impl Oscillation {
 /// What moves beside the feed (effects), as functions of the rotation of the machine.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Motion {
-    /// Support A, towards the origin of the machine frame.
-    pub runout_a: Vec<Oscillation>,
+    /// A support, towards the origin of the machine frame.
+    pub runout: Vec<Oscillation>,
+    /// That support is B, as in the mirror.
+    pub runout_at_b: bool,
     /// Tip, towards the origin of the machine frame.
     pub chatter: Vec<Oscillation>,
     /// Both supports recede from the origin, mm per revolution.
@@ -73,7 +75,7 @@ pub(crate) struct Motion {
 
 impl Motion {
     fn is_still(&self) -> bool {
-        self.runout_a.is_empty() && self.chatter.is_empty() && self.wear_mm_per_rev.abs() < f64::MIN_POSITIVE
+        self.runout.is_empty() && self.chatter.is_empty() && self.wear_mm_per_rev.abs() < f64::MIN_POSITIVE
     }
 }
 
@@ -161,8 +163,9 @@ impl Moving {
 impl Machine for Moving {
     fn supports(&self, turned_rad: f64) -> (Vec2, Vec2) {
         let wear = self.motion.wear_mm_per_rev * turned_rad / TAU;
-        let inward = self.motion.runout_a.iter().map(|o| o.at(turned_rad)).fold(-wear, |sum, x| sum + x);
-        (add(self.still.a, scaled(self.a, -inward)), add(self.still.b, scaled(self.b, wear)))
+        let inward = self.motion.runout.iter().map(|o| o.at(turned_rad)).fold(0.0, |sum, x| sum + x);
+        let (a, b) = if self.motion.runout_at_b { (wear, wear - inward) } else { (wear - inward, wear) };
+        (add(self.still.a, scaled(self.a, a)), add(self.still.b, scaled(self.b, b)))
     }
     fn tip(&self, turned_rad: f64) -> Vec2 {
         let inward = self.motion.chatter.iter().map(|o| o.at(turned_rad)).fold(0.0, |sum, x| sum + x);
