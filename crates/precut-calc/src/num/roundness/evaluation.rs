@@ -50,8 +50,8 @@ pub struct Evaluation {
 pub fn evaluate(section: &Section, grid: &Grid, filter: Filter, highest: usize) -> Result<Evaluation, RoundnessError> {
     let unfiltered = circles(section)?;
     let referred_mm = refer(section, unfiltered.least_squares.circle.centre_mm, grid.len())?;
-    let filtered_profile_mm = grid.filtered(&referred_mm, filter);
+    let filtered_profile_mm = grid.filtered(&referred_mm, filter)?;
     let filtered = circles(&grid.section(&filtered_profile_mm)?)?;
-    let spectrum = grid.spectrum(&referred_mm, highest);
+    let spectrum = grid.spectrum(&referred_mm, highest)?;
     Ok(Evaluation { unfiltered, referred_mm, filtered_profile_mm, filtered, spectrum })
 }

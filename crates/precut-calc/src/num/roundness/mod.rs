@@ -14,6 +14,7 @@
 //! Equation numbers are those of `docs/physics/roundness-evaluation.md`.
 
 mod circumscribed;
+mod contact;
 mod evaluation;
 mod grid;
 mod inscribed;
@@ -21,6 +22,7 @@ mod least_squares;
 mod minimum_zone;
 mod section;
 mod spline;
+mod triangle;
 
 pub use circumscribed::{MinimumCircumscribed, minimum_circumscribed};
 pub use evaluation::{Circles, Evaluation, circles, evaluate};
