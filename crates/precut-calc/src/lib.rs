@@ -18,4 +18,5 @@ use calculator::Registrar;
 /// Every calculator, one line each. Nothing else has to change when one moves in.
 pub fn register(registrar: &mut impl Registrar) {
     registrar.with_forward_model::<deflection_compensation::DeflectionCompensation>();
+    registrar.with_forward_model::<ring_roundness::RingRoundness>();
 }

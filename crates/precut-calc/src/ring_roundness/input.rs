@@ -1,15 +1,15 @@
 //! The job: a ring, its supports, the tool, and what is asked.
 
 use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
+use utoipa::{PartialSchema, ToSchema};
 
 use crate::calculator::{Measured, MeasuredRow};
 use crate::effects::{RingConditions, RingEffect};
 
 /// Most steps of a run, revolutions times samples.
-pub const MAX_STEPS: f64 = 2e9;
+pub(super) const MAX_STEPS: f64 = 2e9;
 /// Nodes of a job that states none.
-pub const DEFAULT_SAMPLES: u32 = 3600;
+pub(super) const DEFAULT_SAMPLES: u32 = 3600;
 
 /// A ring that is turned while it rests with the surface being turned on two supports.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]

@@ -175,19 +175,20 @@ impl Lobing {
         Some(turned)
     }
 
-    /// The root that decays slowest, or grows fastest, of those with ω in `from..to`; for maps, where the certificate of
-    /// [`Self::roots`] would cost too much: Newton's method from three starts per lobe near neutral growth.
-    pub(crate) fn worst(&self, from: f64, to: f64) -> Option<Root> {
-        let mut worst: Option<Root> = None;
+    /// The roots near neutral growth with ω in `from..to`, for maps, where the certificate of [`Self::roots`] would cost too
+    /// much: Newton's method from three starts per lobe. The worst root is among them (tests compare).
+    pub(crate) fn near_neutral(&self, from: f64, to: f64) -> Vec<Root> {
+        let mut found: Vec<Root> = Vec::new();
         let rows = whole((to - from) * 3.0);
         for row in 0..=rows {
             let lobes = from + (to - from) * f64::from(row) / f64::from(rows);
             let Some(root) = self.newton(Complex::new(0.0, lobes)) else { continue };
-            if root.im > from && root.im < to && worst.is_none_or(|w| root.re > w.growth_per_rad) {
-                worst = Some(Root { lobes: root.im, growth_per_rad: root.re });
+            let known = |other: &Root| (other.lobes - root.im).hypot(other.growth_per_rad - root.re) < SAME;
+            if root.im > from && root.im < to && root.re > FASTEST_DECAY_PER_RAD && !found.iter().any(known) {
+                found.push(Root { lobes: root.im, growth_per_rad: root.re });
             }
         }
-        worst
+        found
     }
 }
 
@@ -229,7 +230,8 @@ mod tests {
             let (all, complete) = lobing.roots(1.5, 20.5);
             assert!(complete, "{beta} {tool} {k}");
             let worst = all.iter().map(|root| root.growth_per_rad).fold(f64::NEG_INFINITY, f64::max);
-            let quick = lobing.worst(1.5, 20.5).unwrap().growth_per_rad;
+            let quick = lobing.near_neutral(1.5, 20.5);
+            let quick = quick.iter().map(|root| root.growth_per_rad).fold(f64::NEG_INFINITY, f64::max);
             assert!((worst - quick).abs() < 1e-9, "{beta} {tool} {k}: {worst} {quick}");
         }
     }

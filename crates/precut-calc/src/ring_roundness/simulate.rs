@@ -5,16 +5,16 @@ use std::f64::consts::TAU;
 use crate::calculator::{Failure, Finding, Message, Monitor, checkpoint};
 use crate::num::roundness::{Grid, Section, least_squares};
 
-use super::acting::odd_waves_mm;
 use super::input::{ErrorEstimate, Job, Method};
-use super::lobing::{Lobing, Root, of_order};
+use super::linear::grows;
+use super::lobing::{Lobing, of_order};
 use super::output::{
-    CausesOutcome, Evaluated, HistoryColumns, PathColumns, ProfileColumns, SimulationOutcome, SpectrumColumns, WaveColumn,
+    CausesOutcome, HistoryColumns, PathColumns, ProfileColumns, SimulationOutcome, SpectrumColumns, WaveColumn,
 };
 use super::sampling::{samples_for_teeth, samples_of};
 use super::scene::{Scene, mirrored_rad};
 use super::stance::Stance;
-use super::surface::{Surface, UM_PER_MM, difference, of_radii, of_section, unevaluable};
+use super::surface::{Surface, UM_PER_MM, difference, odd_waves_mm, of_radii, of_section, roundness_um, unevaluable};
 use super::turning::plane::{Vec2, angle, direction, norm, scaled, sub};
 use super::turning::{Place, Revolution, Stuck, Turned, turn, turn_sampled};
 
@@ -80,7 +80,7 @@ pub(super) fn run_exact(
     let total = scene.setting.revolutions + scene.setting.spark_out_revolutions;
     let blank = scene.blank_mm(job, n as usize).map_err(unevaluable)?;
     let grid = Grid::new(n as usize).map_err(unevaluable)?;
-    let mut follower = Follower::new(total, scene.mirrored);
+    let mut follower = Follower::new(total);
     let turned = turn::<Failure>(&blank, &scene.setting, &mut |revolution, radii| {
         checkpoint(share.monitor)?;
         let done = revolution.turned_revolutions;
@@ -121,7 +121,7 @@ struct Follower {
 }
 
 impl Follower {
-    fn new(total: f64, _mirrored: bool) -> Self {
+    fn new(total: f64) -> Self {
         let waves = (2..=FOLLOWED).map(|order| WaveColumn { order, amplitude_um: Vec::new() }).collect();
         Self {
             columns: HistoryColumns { waves, ..HistoryColumns::default() },
@@ -152,7 +152,7 @@ impl Follower {
         columns.deepest_cut_um.push(std::mem::take(&mut self.deepest_mm) * UM_PER_MM);
         columns.cutting_share.push(std::mem::take(&mut self.cutting) / std::mem::take(&mut self.since));
         // About the body's origin: the eccentricity enters the waves from 2 on in second order only.
-        let spectrum = grid.spectrum(radii, FOLLOWED as usize);
+        let spectrum = grid.spectrum(radii, FOLLOWED as usize).map_err(unevaluable)?;
         for wave in &mut columns.waves {
             let found = spectrum.iter().find(|harmonic| harmonic.order == wave.order as usize);
             wave.amplitude_um.push(found.map_or(0.0, |harmonic| harmonic.amplitude_mm * UM_PER_MM));
@@ -289,9 +289,8 @@ fn causes(job: &Job, scene: &Scene, end: &Stance, run: &Run) -> Result<CausesOut
     let teeth_mm = end.radius_per_feed(setting.feed_direction) * setting.feed_mm_per_rev;
     let lobing = Lobing { copying: end.copying(), compliance_ratio: setting.compliance_ratio };
     let (roots, _) = lobing.roots(1.5, f64::from(job.highest_order) + 0.45);
-    let growing = grows(&roots);
     let growing_lobes_um = (2..=job.highest_order)
-        .filter(|order| of_order(&roots, f64::from(*order)).is_some_and(|root| growing(&root)))
+        .filter(|order| of_order(&roots, f64::from(*order)).is_some_and(|root| grows(&root)))
         .filter_map(|order| run.surface.harmonic(order))
         .map(|harmonic| 2.0 * harmonic.amplitude_mm * UM_PER_MM)
         .fold(0.0, f64::max);
@@ -300,14 +299,9 @@ fn causes(job: &Job, scene: &Scene, end: &Stance, run: &Run) -> Result<CausesOut
         feed_step_um: if stepless { 0.0 } else { teeth_mm * UM_PER_MM },
         teeth_um: teeth_mm * UM_PER_MM,
         first_bite_um: 0.5 * (run.turned.largest_bite_mm - teeth_mm).max(0.0) * UM_PER_MM,
-        odd_lobes_um: super::surface::roundness_um(&odd_waves_mm(&run.blank_mm)?, job.filter)?.0,
+        odd_lobes_um: roundness_um(&odd_waves_mm(&run.blank_mm), job.filter)?.0,
         growing_lobes_um,
     })
-}
-
-/// Growth that a thousandth of a revolution's factor makes is rounding of the setting.
-fn grows(_: &[Root]) -> impl Fn(&Root) -> bool {
-    |root| root.factor_per_revolution() > 1.0 + super::linear::NEUTRAL
 }
 
 fn spectrum(job: &Job, start: &Surface, end: Option<(&Surface, &Surface, f64)>) -> SpectrumColumns {
@@ -380,9 +374,4 @@ pub(super) fn gap_at_start_mm(job: &Job, scene: &Scene) -> Result<f64, Failure> 
 fn below(position: f64) -> (usize, f64) {
     let floor = position.floor();
     (floor as usize, position - floor)
-}
-
-/// All that an evaluated surface says, for results that have none.
-pub(super) fn headline(end: Option<&Evaluated>) -> Option<(f64, f64, f64)> {
-    end.map(|end| (end.filtered.least_squares_um, end.unfiltered.least_squares_um, end.mean_radius_mm))
 }

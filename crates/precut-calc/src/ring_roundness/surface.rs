@@ -110,9 +110,29 @@ pub(super) fn roundness_um(radii_mm: &[f64], filter: LongWave) -> Result<(f64, f
         return Ok((circle.span.width_mm() * UM_PER_MM, circle.circle.radius_mm));
     };
     let referred = crate::num::roundness::refer(&section, circle.circle.centre_mm, radii_mm.len()).map_err(unevaluable)?;
-    let filtered = grid.filtered(&referred, filter_of(filter));
+    let filtered = grid.filtered(&referred, filter_of(filter)).map_err(unevaluable)?;
     let found = least_squares(&grid.section(&filtered).map_err(unevaluable)?).map_err(unevaluable)?;
     Ok((found.span.width_mm() * UM_PER_MM, circle.circle.radius_mm))
+}
+
+/// The mean radius with the odd waves from 3 on, of radii at an even number of uniform angles: what a tool opposite to a
+/// support does not see (`ring/5.4`).
+pub(super) fn odd_waves_mm(radii_mm: &[f64]) -> Vec<f64> {
+    let n = radii_mm.len();
+    let mean = radii_mm.iter().sum::<f64>() / n as f64;
+    let mut odd: Vec<f64> = (0..n).map(|i| 0.5 * (radii_mm[i] - radii_mm[(i + n / 2) % n])).collect();
+    let direction = |i: usize| (std::f64::consts::TAU * i as f64 / n as f64).sin_cos();
+    let (mut x, mut y) = (0.0, 0.0);
+    for (i, value) in odd.iter().enumerate() {
+        let (sin, cos) = direction(i);
+        x += value * cos * 2.0 / n as f64;
+        y += value * sin * 2.0 / n as f64;
+    }
+    for (i, value) in odd.iter_mut().enumerate() {
+        let (sin, cos) = direction(i);
+        *value += mean - x * cos - y * sin;
+    }
+    odd
 }
 
 /// A profile that has no reference circles: torn, or the origin is not inside.

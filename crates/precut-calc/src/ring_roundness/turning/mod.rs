@@ -11,7 +11,7 @@ mod stepper;
 mod tests;
 
 use plane::Vec2;
-pub(crate) use sampled::{Sampled, turn_sampled};
+pub(crate) use sampled::turn_sampled;
 pub(crate) use setting::{Motion, Oscillation, Setting, moved_across};
 use setting::{Moving, Still};
 use stepper::Stepper;
