@@ -11,10 +11,12 @@ pub mod force;
 pub mod material;
 pub mod num;
 pub mod path;
+pub mod ring_roundness;
 
 use calculator::Registrar;
 
 /// Every calculator, one line each. Nothing else has to change when one moves in.
 pub fn register(registrar: &mut impl Registrar) {
     registrar.with_forward_model::<deflection_compensation::DeflectionCompensation>();
+    registrar.calculator::<ring_roundness::evaluation::RoundnessEvaluation>();
 }

@@ -1,0 +1,3 @@
+//! Roundness of rings: how it is evaluated.
+
+pub mod evaluation;
