@@ -19,4 +19,5 @@ use calculator::Registrar;
 pub fn register(registrar: &mut impl Registrar) {
     registrar.with_forward_model::<deflection_compensation::DeflectionCompensation>();
     registrar.with_forward_model::<ring_roundness::RingRoundness>();
+    registrar.calculator::<ring_roundness::evaluation::RoundnessEvaluation>();
 }

@@ -1,5 +1,13 @@
 //! Reference circles, filter and spectrum against the reference cases and against the NIST reference pairs.
-#![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::cast_precision_loss,
+    missing_docs
+)]
 
 use std::path::Path;
 
@@ -83,7 +91,11 @@ impl Comparison<'_> {
             if !wanted.is_null() {
                 self.compared += 1;
                 let error = (got - number(&wanted[axis])).abs();
-                assert!(error <= number(&self.tolerance["center_mm"]), "{} {circle}: centre off by {error:e}", self.name);
+                assert!(
+                    error <= number(&self.tolerance["center_mm"]),
+                    "{} {circle}: centre off by {error:e}",
+                    self.name
+                );
             }
         }
     }
@@ -172,7 +184,8 @@ fn the_inscribed_circle_of_an_ellipse_is_not_unique() {
 
 /// The file of reference pairs is public, but not ours to copy.
 fn nist() -> Option<Value> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/reference/nist/circle2d_reference_pairs.json");
+    let path =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/reference/nist/circle2d_reference_pairs.json");
     match std::fs::read_to_string(&path) {
         Ok(text) => Some(serde_json::from_str(&text).unwrap()),
         Err(error) => {

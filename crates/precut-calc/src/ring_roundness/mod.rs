@@ -10,6 +10,7 @@
 
 mod advice;
 mod check;
+pub mod evaluation;
 mod forward;
 mod input;
 mod linear;

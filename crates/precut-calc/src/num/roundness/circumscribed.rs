@@ -44,12 +44,15 @@ pub fn minimum_circumscribed(section: &Section, start_mm: [f64; 2]) -> Result<Mi
         let span = section.span_inside(ball.centre);
         let resolution = resolution_mm(span.farthest_mm);
         if span.farthest_mm <= ball.radius_mm + resolution {
-            return if span.farthest_mm > 0.0 { Ok(ball.answer(section, span, scans)) } else { Err(RoundnessError::NoCircle) };
+            return if span.farthest_mm > 0.0 {
+                Ok(ball.answer(section, span, scans))
+            } else {
+                Err(RoundnessError::NoCircle)
+            };
         }
-        ball = ball.with(section, span.farthest).ok_or(RoundnessError::NotConverged {
-            iterations: scans,
-            left_mm: span.farthest_mm - ball.radius_mm,
-        })?;
+        ball = ball
+            .with(section, span.farthest)
+            .ok_or(RoundnessError::NotConverged { iterations: scans, left_mm: span.farthest_mm - ball.radius_mm })?;
     }
     Err(RoundnessError::NotConverged { iterations: MOST_EXCHANGES, left_mm: ball.radius_mm })
 }
@@ -84,7 +87,9 @@ impl Ball {
         let mut offer = |ball: Self| {
             let slack = 0.5 * resolution_mm(ball.radius_mm);
             let holds = |index: usize| square(section.from(ball.centre, index)).sqrt() <= ball.radius_mm + slack;
-            if old.iter().flatten().all(|&index| holds(index)) && best.is_none_or(|best| ball.radius_mm < best.radius_mm) {
+            if old.iter().flatten().all(|&index| holds(index))
+                && best.is_none_or(|best| ball.radius_mm < best.radius_mm)
+            {
                 best = Some(ball);
             }
         };

@@ -92,17 +92,29 @@ fn fills_sectors(section: &Section, centre: [f64; 2], step: usize) -> bool {
     false
 }
 
-/// Which of the sixteen sectors of 22.5° a direction is in; the order of the numbers is of no matter.
+/// Which of the sixteen sectors of 22.5° a direction is in; its last three bits are the eighth of a turn. The order of
+/// the numbers is of no matter.
 pub(super) fn sector([x, y]: [f64; 2]) -> usize {
     const TAN_22_5: f64 = std::f64::consts::SQRT_2 - 1.0;
     let (ax, ay) = (x.abs(), y.abs());
     let (low, high) = (ax.min(ay), ax.max(ay));
-    usize::from(x < 0.0) | usize::from(y < 0.0) << 1 | usize::from(ay > ax) << 2 | usize::from(low > TAN_22_5 * high) << 3
+    usize::from(x < 0.0)
+        | usize::from(y < 0.0) << 1
+        | usize::from(ay > ax) << 2
+        | usize::from(low > TAN_22_5 * high) << 3
 }
+
+/// Sine of the angle between two bisectors below which their crossing has no digits left.
+const PARALLEL: f64 = 1e-12;
 
 /// The place from which two pairs of points are each equally far: the crossing of their perpendicular bisectors.
 /// `None` where these are parallel as far as numbers tell.
-pub(super) fn equidistant(section: &Section, near: [f64; 2], first: [usize; 2], second: [usize; 2]) -> Option<[f64; 2]> {
+pub(super) fn equidistant(
+    section: &Section,
+    near: [f64; 2],
+    first: [usize; 2],
+    second: [usize; 2],
+) -> Option<[f64; 2]> {
     // Solved for the shift from `near`, so that the round-off is that of the shift.
     let row = |[i, j]: [usize; 2]| {
         let (a, b) = (section.from(near, i), section.from(near, j));
@@ -113,7 +125,9 @@ pub(super) fn equidistant(section: &Section, near: [f64; 2], first: [usize; 2], 
     let ((a, p), (b, q)) = (row(first), row(second));
     let determinant = cross(a, b);
     let scale = (square(a) * square(b)).sqrt();
-    if !(determinant.abs() > 1e-12 * scale) {
+    // Also refuses what is no number.
+    let crosses = determinant.abs() > PARALLEL * scale;
+    if !crosses {
         return None;
     }
     Some([near[0] + (p * b[1] - q * a[1]) / determinant, near[1] + (q * a[0] - p * b[0]) / determinant])

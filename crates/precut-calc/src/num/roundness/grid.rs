@@ -6,7 +6,7 @@ use std::sync::Arc;
 use rustfft::num_complex::Complex64;
 use rustfft::{Fft, FftPlannerScalar};
 
-use super::section::{count, mean};
+use super::section::{count, in_range, mean};
 use super::{RoundnessError, Section};
 
 /// What a filter lets pass. Harmonic 0, the mean radius, always passes.
@@ -177,7 +177,7 @@ impl Grid {
         if radii_mm.len() != self.len() {
             return Err(RoundnessError::LengthsDiffer { first: radii_mm.len(), second: self.len() });
         }
-        let bad = radii_mm.iter().position(|radius| !(radius.abs() <= super::section::LARGEST_MM));
+        let bad = radii_mm.iter().position(|&radius| !in_range(radius));
         bad.map_or(Ok(()), |index| Err(RoundnessError::NotFinite { index }))
     }
 }

@@ -61,24 +61,23 @@ pub fn maximum_inscribed(section: &Section, start_mm: [f64; 2]) -> Result<Maximu
     }
     let start = section.inside(start_mm);
     let span = section.span_inside(start);
-    if let Some(found) = first_triple(section, start, span.nearest, |a, b| a < b)
-        .and_then(|triple| exchange(section, start, triple))
-    {
-        let Some(unproven) = Unproven::of(section, &found) else {
-            return Ok(answer(section, found, Vec::new(), None));
-        };
-        return Ok(match try_all(section, found.held.centre, unproven.within_mm, Some(&found)) {
-            Some((best, others)) => answer(section, best, others, None),
-            None => answer(section, found, Vec::new(), Some(unproven)),
-        });
-    }
-    if half_gap_cosine(section, start).is_none() {
-        return Err(RoundnessError::NotSurrounding);
-    }
-    // The centre can be anywhere inside.
-    try_all(section, start, span.farthest_mm, None)
-        .map(|(best, others)| answer(section, best, others, None))
-        .ok_or(RoundnessError::NotConverged { iterations: MOST_TRIALS, left_mm: span.width_mm() })
+    let exchanged =
+        first_triple(section, start, span.nearest, |a, b| a < b).and_then(|triple| exchange(section, start, triple));
+    let found = match exchanged {
+        Some(found) => found,
+        None if half_gap_cosine(section, start).is_none() => return Err(RoundnessError::NotSurrounding),
+        // The centre can be anywhere inside.
+        None => try_all(section, start, span.farthest_mm, None)
+            .map(|tried| tried.best)
+            .ok_or(RoundnessError::NotConverged { iterations: MOST_TRIALS, left_mm: span.width_mm() })?,
+    };
+    let Some(unproven) = Unproven::of(section, &found) else {
+        return Ok(answer(section, &found, &[], None));
+    };
+    Ok(match try_all(section, found.held.centre, unproven.within_mm, Some(&found)) {
+        Some(tried) => tried.answer(section),
+        None => answer(section, &found, &[], Some(unproven)),
+    })
 }
 
 /// A circle with no point inside.
@@ -100,21 +99,27 @@ impl Unproven {
     /// `None` where the proof reaches all centres (`roundness/5.4`).
     fn of(section: &Section, found: &Empty) -> Option<Self> {
         let Held { centre, radius_mm, hold, .. } = found.held;
-        let reached = reach_mm(hold, radius_mm);
-        let farthest = found.span.farthest_mm;
-        let within_mm = half_gap_cosine(section, centre)
-            .map_or(farthest, |cosine| larger_within_mm(farthest, radius_mm, cosine));
+        let farthest_mm = found.span.farthest_mm;
+        let bound =
+            half_gap_cosine(section, centre).and_then(|cosine| larger_within_mm(farthest_mm, radius_mm, cosine));
+        let Some(within_mm) = bound else {
+            return Some(Self { within_mm: farthest_mm, gap_mm: farthest_mm - radius_mm });
+        };
         let shift = within_mm.min(0.5 * radius_mm);
         let gap_mm = (shift * shift / (2.0 * (radius_mm - shift)) - hold * shift).max(0.0);
-        (within_mm > reached).then_some(Self { within_mm, gap_mm })
+        (within_mm > reach_mm(hold, radius_mm)).then_some(Self { within_mm, gap_mm })
     }
 }
 
-/// A centre at this distance or beyond has a point nearer than `radius_mm`, mm, where neighbouring points are at most twice
-/// the angle of `cosine` apart and none is beyond `farthest_mm`.
-fn larger_within_mm(farthest_mm: f64, radius_mm: f64, cosine: f64) -> f64 {
+/// A centre at this distance or beyond has a point nearer than `radius_mm`, mm, where neighbouring points are at most
+/// twice the angle of `cosine` apart and all between `radius_mm` and `farthest_mm` away; `None` where the section is too
+/// far from round to say so of every centre inside it.
+///
+/// A point at distance d and angle φ from the direction of the shift s is nearer than r while s is within
+/// d·cos φ ± √(r² − d²sin²φ); the lower end is highest for the farthest point, the upper one lowest for the nearest.
+fn larger_within_mm(farthest_mm: f64, radius_mm: f64, cosine: f64) -> Option<f64> {
     let half_chord = radius_mm * radius_mm - farthest_mm * farthest_mm * (1.0 - cosine * cosine);
-    if half_chord > 0.0 { farthest_mm * cosine - half_chord.sqrt() } else { farthest_mm }
+    (half_chord > 0.0 && farthest_mm <= 2.0 * radius_mm * cosine).then(|| farthest_mm * cosine - half_chord.sqrt())
 }
 
 fn exchange(section: &Section, start: [f64; 2], triple: [usize; 3]) -> Option<Empty> {
@@ -176,29 +181,45 @@ impl Trial<'_> {
     }
 }
 
+/// What the trial of all triangles found.
+struct Tried {
+    best: Empty,
+    others: Vec<Empty>,
+    /// Whether nothing can be larger.
+    is_global: bool,
+}
+
+impl Tried {
+    fn answer(&self, section: &Section) -> MaximumInscribed {
+        let gap_mm = self.best.span.farthest_mm - self.best.held.radius_mm;
+        let unproven = (!self.is_global).then_some(Unproven { within_mm: gap_mm, gap_mm });
+        answer(section, &self.best, &self.others, unproven)
+    }
+}
+
 /// The largest circle about a centre within a disc, and its equals; `None` where that takes too long.
 ///
 /// The circles of a few points are at least as large as those of all, so the largest of the few that holds none of all
 /// inside is the largest of all.
-fn try_all(section: &Section, middle: [f64; 2], within_mm: f64, known: Option<&Empty>) -> Option<(Empty, Vec<Empty>)> {
+fn try_all(section: &Section, middle: [f64; 2], within_mm: f64, known: Option<&Empty>) -> Option<Tried> {
     let farthest_mm = section.span_inside(middle).farthest_mm;
     let resolution_mm = resolution_mm(farthest_mm);
     let floor_mm = known.map_or(0.0, |known| known.held.radius_mm);
     let mut first = nearest_of_sectors(section, middle);
     first.extend(known.iter().flat_map(|known| known.held.contacts));
     // The few alone must keep larger circles within a disc, else the largest of the few need not be among the triangles.
-    let cosine = half_gap_cosine(&section.part(&first), middle)?;
-    let within_mm = within_mm.max(larger_within_mm(farthest_mm, floor_mm, cosine));
-    let mut trial =
-        Trial { section, middle, within_mm, floor_mm, resolution_mm, few: Vec::new(), circles: Vec::new() };
+    let bound = half_gap_cosine(&section.part(&first), middle)
+        .and_then(|cosine| larger_within_mm(farthest_mm, floor_mm, cosine));
+    let within_mm = within_mm.max(bound.unwrap_or(farthest_mm));
+    let mut trial = Trial { section, middle, within_mm, floor_mm, resolution_mm, few: Vec::new(), circles: Vec::new() };
     for index in first {
         trial.add(index);
     }
     let mut found: Vec<Empty> = known.cloned().into_iter().collect();
     let mut scans = known.map_or(0, |known| known.scans);
     loop {
-        let largest = (0..trial.circles.len())
-            .max_by(|&a, &b| trial.circles[a].radius_mm.total_cmp(&trial.circles[b].radius_mm));
+        let largest =
+            (0..trial.circles.len()).max_by(|&a, &b| trial.circles[a].radius_mm.total_cmp(&trial.circles[b].radius_mm));
         let Some(at) = largest else { break };
         let held = trial.circles.swap_remove(at);
         if held.radius_mm < trial.floor_mm - resolution_mm || found.iter().any(|known| same(&known.held, &held)) {
@@ -221,7 +242,7 @@ fn try_all(section: &Section, middle: [f64; 2], within_mm: f64, known: Option<&E
     found.retain(|empty| empty.held.radius_mm >= most - resolution_mm);
     let mut found = found.into_iter();
     let best = found.next()?;
-    Some((Empty { scans, ..best }, found.collect()))
+    Some(Tried { best: Empty { scans, ..best }, others: found.collect(), is_global: bound.is_some() })
 }
 
 /// Whether two circles are one: several triples touch it.
@@ -252,8 +273,8 @@ fn nearest_of_sectors(section: &Section, centre: [f64; 2]) -> Vec<usize> {
     nearest.into_iter().flatten().map(|(index, _)| index).collect()
 }
 
-fn answer(section: &Section, found: Empty, others: Vec<Empty>, unproven: Option<Unproven>) -> MaximumInscribed {
-    let Empty { held, span, scans } = found;
+fn answer(section: &Section, found: &Empty, others: &[Empty], unproven: Option<Unproven>) -> MaximumInscribed {
+    let &Empty { held, span, scans } = found;
     let circle = |held: &Held| Circle { centre_mm: section.outside(held.centre), radius_mm: held.radius_mm };
     MaximumInscribed {
         // No point is inside by more than the round-off; the radius is that of the nearest.

@@ -48,7 +48,8 @@ pub fn least_squares(section: &Section) -> Result<LeastSquares, RoundnessError> 
         let normal = here.sums.normal();
         let smallest = normal.smaller_eigenvalue();
         // Also refuses what is no number.
-        if !(smallest > FLATTEST * here.sums.n) {
+        let spread = smallest > FLATTEST * here.sums.n;
+        if !spread {
             return Err(RoundnessError::NoCircle);
         }
         let condition = here.sums.n / smallest;

@@ -1,14 +1,16 @@
 //! The minimum-zone reference circles, MZCI.
 
-use super::contact::{cross, equidistant, half_gap_cosine, hold_of_zone, order_from_gap, reach_mm, resolution_mm, unit};
+use super::contact::{
+    cross, equidistant, half_gap_cosine, hold_of_zone, order_from_gap, reach_mm, resolution_mm, sector, unit,
+};
 use super::section::{Span, square};
 use super::{RoundnessError, Section};
 
 /// Two concentric circles, nearest to each other, that hold all points between them, with their proof.
 ///
 /// The two outer and the two inner contacts alternate round the circle, so no small shift of the centre narrows the
-/// zone; [`Self::certified_within_mm`] says how far that proof reaches, [`Self::is_global`] whether it reaches every
-/// centre that could be better.
+/// zone; [`Self::certified_within_mm`] says how far that proof reaches, [`Self::is_unique`] whether it reaches every
+/// centre that could be as good, [`Self::is_global`] whether no other zone is narrower.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MinimumZone {
     /// Common centre in the coordinates of the section, mm.
@@ -27,8 +29,11 @@ pub struct MinimumZone {
     pub stiffness: f64,
     /// Radius of the disc about the centre in which no narrower zone exists, mm (`roundness/4.4`).
     pub certified_within_mm: f64,
-    /// Whether that disc holds every centre whose zone could be narrower: the zone is the narrowest of all, and the only one.
+    /// Whether no zone about any centre is narrower: that disc holds all that could be, or all quadruples that matter
+    /// were tried. False on arcs, where the proof is that of the disc alone.
     pub is_global: bool,
+    /// Whether no other zone is as narrow.
+    pub is_unique: bool,
     /// Bound of the round-off in the zone's width, mm, the gap to the lower bound included.
     pub width_error_mm: f64,
     /// Bound of the round-off in the centre, mm; `None` where the zone is flat and the centre not determined.
@@ -66,7 +71,7 @@ pub fn minimum_zone(section: &Section, start_mm: [f64; 2]) -> Result<MinimumZone
         .or_else(|| spread_reference(section, start))
         .and_then(|reference| exchange(section, start, reference))
         .or_else(|| cut_planes(section, start));
-    found.map(|zone| zone.with_proof(section)).ok_or(RoundnessError::NotConverged {
+    found.map(|holding| proven(section, holding)).ok_or(RoundnessError::NotConverged {
         iterations: MOST_EXCHANGES,
         left_mm: section.span_inside(start).width_mm(),
     })
@@ -207,6 +212,12 @@ fn cut_planes(section: &Section, start: [f64; 2]) -> Option<Holding> {
     let first = FIRST_CORE.min(order.len());
     let mut core: Vec<usize> = (0..first).map(|i| order[(order.len() - 1) * i / (first - 1)]).collect();
     core.extend([span.nearest, span.farthest]);
+    narrowest(section, start, core, 0.5 * span.farthest_mm)
+}
+
+/// The narrowest zone about a centre within `within_mm` of `start`: the best of a few points, which is at most as wide as
+/// that of all, until it holds all. `None` where that takes too long.
+fn narrowest(section: &Section, start: [f64; 2], mut core: Vec<usize>, within_mm: f64) -> Option<Holding> {
     let mut scans = 1;
     loop {
         core.sort_unstable();
@@ -214,7 +225,7 @@ fn cut_planes(section: &Section, start: [f64; 2]) -> Option<Holding> {
         if core.len() > LARGEST_CORE {
             return None;
         }
-        let zone = best_of(section, start, &core, 0.5 * span.farthest_mm)?;
+        let zone = best_of(section, start, &core, within_mm)?;
         let reached = section.span_inside(zone.centre);
         scans += 1;
         let missing = (reached.farthest_mm - zone.outer_mm) + (zone.inner_mm - reached.nearest_mm);
@@ -256,14 +267,55 @@ fn best_of(section: &Section, start: [f64; 2], core: &[usize], within_mm: f64) -
     best
 }
 
+/// A zone with its proof; where that of first order does not reach far enough, with that of trial.
+fn proven(section: &Section, holding: Holding) -> MinimumZone {
+    let could_be_better_mm = half_gap_cosine(section, holding.zone.centre)
+        .and_then(|cosine| narrower_within_mm(holding.span.width_mm(), cosine))
+        // Beyond half the radius nothing was proven; the bound does not go there.
+        .filter(|&mm| mm <= 0.5 * holding.span.nearest_mm);
+    let reached = reach_mm(holding.zone.hold(section), holding.zone.inner_mm);
+    if could_be_better_mm.is_some_and(|mm| mm <= reached) {
+        return holding.answer(section, true, true);
+    }
+    let tried = could_be_better_mm.and_then(|_| {
+        let mut core = extremes_of_octants(section, holding.zone.centre);
+        core.extend(holding.zone.reference.outer.iter().chain(&holding.zone.reference.inner));
+        let cosine = half_gap_cosine(&section.part(&core), holding.zone.centre)?;
+        // The few alone must keep narrower zones within a disc, else their narrowest need not be among the quadruples.
+        let within_mm = narrower_within_mm(holding.span.width_mm(), cosine)?;
+        let found = narrowest(section, holding.zone.centre, core, within_mm)?;
+        (within_mm <= 0.5 * holding.span.nearest_mm).then_some(found)
+    });
+    match tried {
+        Some(found) if found.span.width_mm() < holding.span.width_mm() => found.answer(section, true, false),
+        Some(_) => holding.answer(section, true, false),
+        None => holding.answer(section, false, false),
+    }
+}
+
+/// The nearest and the farthest point of each eighth of a turn.
+fn extremes_of_octants(section: &Section, centre: [f64; 2]) -> Vec<usize> {
+    let mut extremes: [Option<[(usize, f64); 2]>; 8] = [None; 8];
+    for index in 0..section.len() {
+        let v = section.from(centre, index);
+        let d = square(v);
+        let [near, far] = extremes[sector(v) & 7].get_or_insert([(index, d); 2]);
+        if d < near.1 {
+            *near = (index, d);
+        }
+        if d > far.1 {
+            *far = (index, d);
+        }
+    }
+    extremes.into_iter().flatten().flatten().map(|(index, _)| index).collect()
+}
+
 impl Holding {
-    fn with_proof(self, section: &Section) -> MinimumZone {
+    fn answer(self, section: &Section, is_global: bool, is_unique: bool) -> MinimumZone {
         let Self { zone, span, scans } = self;
         let stiffness = zone.hold(section).max(0.0);
-        let certified_within_mm = reach_mm(stiffness, zone.inner_mm);
         let width = span.width_mm();
         let round_off = resolution_mm(span.farthest_mm);
-        let could_be_better_mm = half_gap_cosine(section, zone.centre).and_then(|cosine| narrower_within_mm(width, cosine));
         MinimumZone {
             centre_mm: section.outside(zone.centre),
             inner_radius_mm: span.nearest_mm,
@@ -272,9 +324,9 @@ impl Holding {
             inner_contacts: zone.reference.inner,
             lower_bound_mm: (zone.outer_mm - zone.inner_mm).min(width),
             stiffness,
-            certified_within_mm,
-            // Beyond half the radius nothing was proven; the bound below does not go there.
-            is_global: could_be_better_mm.is_some_and(|mm| mm <= certified_within_mm && mm <= 0.5 * span.nearest_mm),
+            certified_within_mm: reach_mm(stiffness, zone.inner_mm),
+            is_global,
+            is_unique,
             width_error_mm: (width - (zone.outer_mm - zone.inner_mm)).max(0.0) + round_off,
             centre_error_mm: (stiffness > f64::EPSILON.sqrt()).then(|| round_off / stiffness),
             scans,

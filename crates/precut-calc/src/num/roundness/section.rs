@@ -3,7 +3,7 @@
 use super::RoundnessError;
 
 /// Coordinates beyond this are refused: their squares would leave the range of numbers, mm.
-pub(super) const LARGEST_MM: f64 = 1e150;
+const LARGEST_MM: f64 = 1e150;
 /// Points scanned as one block; the place of an extremum is looked up afterwards in its block alone.
 const BLOCK: usize = 128;
 /// Independent extrema within a block, so that the scan is not one chain of comparisons.
@@ -14,6 +14,7 @@ const LANES: usize = 4;
 /// Kept as two lists about a shifted origin: distances from a centre near the middle then carry the
 /// round-off of the radius, not that of the distance from the machine's origin.
 #[derive(Debug, Clone, PartialEq)]
+#[allow(clippy::struct_field_names, reason = "units stand in the name")]
 pub struct Section {
     /// Where the coordinates below are measured from, mm.
     pub(super) origin_mm: [f64; 2],
@@ -192,8 +193,13 @@ fn check(first: &[f64], second: &[f64]) -> Result<(), RoundnessError> {
     if first.is_empty() {
         return Err(RoundnessError::TooFewPoints { count: 0, needed: 1 });
     }
-    let bad = first.iter().zip(second).position(|(a, b)| !(a.abs() <= LARGEST_MM && b.abs() <= LARGEST_MM));
+    let bad = first.iter().zip(second).position(|(a, b)| !(in_range(*a) && in_range(*b)));
     bad.map_or(Ok(()), |index| Err(RoundnessError::NotFinite { index }))
+}
+
+/// Whether a number is finite and its square too.
+pub(super) fn in_range(value: f64) -> bool {
+    value.abs() <= LARGEST_MM
 }
 
 /// Mean of numbers, at least one.

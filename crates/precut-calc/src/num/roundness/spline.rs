@@ -64,9 +64,8 @@ impl PeriodicSpline {
                     }
                     p
                 });
-                let found = near.unwrap_or_else(|| {
-                    self.angles_rad.partition_point(|&knot| knot <= angle).clamp(1, last + 1) - 1
-                });
+                let found = near
+                    .unwrap_or_else(|| self.angles_rad.partition_point(|&knot| knot <= angle).clamp(1, last + 1) - 1);
                 piece = Some(found);
                 self.on(found, angle)
             })

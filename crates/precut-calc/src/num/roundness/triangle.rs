@@ -33,7 +33,12 @@ impl Held {
 
 /// Three points that hold the centre between them: the best by `better` (of squared distances), and the best of either
 /// quarter opposite to it; where a quarter is empty, its neighbours in angle. `None` where the points leave half a turn free.
-pub(super) fn first_triple(section: &Section, centre: [f64; 2], first: usize, better: fn(f64, f64) -> bool) -> Option<[usize; 3]> {
+pub(super) fn first_triple(
+    section: &Section,
+    centre: [f64; 2],
+    first: usize,
+    better: fn(f64, f64) -> bool,
+) -> Option<[usize; 3]> {
     let ahead = section.from(centre, first);
     let mut quarters: [Option<(usize, f64)>; 2] = [None, None];
     for index in 0..section.len() {
