@@ -13,7 +13,7 @@ use super::turning::plane::{dot, norm, sub};
 /// Codes of the faults found here.
 pub(super) const CODES: &[&str] = &[
     "ring_or_profile",
-    "bad_radius",
+    "bad_ring_radius",
     "bad_distance",
     "bad_ring_feed",
     "bad_revolutions",

@@ -108,9 +108,10 @@ fn analyses() -> Vec<Analysis> {
 /// A ring by its form.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
+#[schema(as = RingForm)]
 pub struct Ring {
     /// Mean radius.
-    #[schema(minimum = 0.1, maximum = 100_000.0, example = 150.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("R")), ("x-code" = json!("bad_radius"))))]
+    #[schema(minimum = 0.1, maximum = 100_000.0, example = 150.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("R")), ("x-code" = json!("bad_ring_radius"))))]
     pub radius_mm: f64,
     /// Ellipticity: semi-axes R + e/2 and R - e/2, so that the diameters differ by 2e and the roundness deviation is e.
     #[serde(default)]
@@ -129,6 +130,7 @@ pub struct Ring {
 /// A wave of the radius: amplitude·cos(order·(θ - angle of maximum)).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
+#[schema(as = RingWave)]
 pub struct Wave {
     /// Waves per revolution.
     #[schema(minimum = 1, maximum = 2000, example = 3, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("k"))))]
@@ -145,12 +147,13 @@ pub struct Wave {
 /// A measured point of the profile.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
+#[schema(as = RingProfileRow)]
 pub struct ProfileRow {
     /// Body angle.
     #[schema(minimum = -360.0, maximum = 720.0, example = 12.5, extensions(("x-unit" = json!("deg")), ("x-symbol" = json!("theta"))))]
     pub angle_deg: f64,
     /// Radius from the origin of the body.
-    #[schema(minimum = 1e-6, maximum = 1e9, example = 150.012, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("r")), ("x-code" = json!("bad_radius"))))]
+    #[schema(minimum = 1e-6, maximum = 1e9, example = 150.012, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("r")), ("x-code" = json!("bad_ring_radius"))))]
     pub radius_mm: f64,
 }
 
@@ -161,6 +164,7 @@ impl MeasuredRow for ProfileRow {
 /// Two supports at equal height.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
+#[schema(as = RingSupports)]
 pub struct Supports {
     /// Distance between the supports; of rollers between their centres.
     #[schema(minimum = 0.01, maximum = 100_000.0, example = 200.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("L")), ("x-code" = json!("bad_distance"))))]
@@ -177,6 +181,7 @@ pub struct Supports {
 /// A wide-edge tool: in the cross-section a point.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
+#[schema(as = RingTool)]
 pub struct Tool {
     /// Tip at the start, to the right of the origin of the machine, which lies midway between the supports.
     #[schema(minimum = -100_000.0, maximum = 100_000.0, example = 100.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("L_t"))))]
@@ -211,6 +216,7 @@ fn down() -> f64 {
 /// Sense of rotation.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
+#[schema(as = RingRotation)]
 pub enum Rotation {
     /// Over the top from right to left.
     #[default]
@@ -222,6 +228,7 @@ pub enum Rotation {
 /// Stiffness of cut, tool and supports.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
+#[schema(as = RingStiffness)]
 pub struct Stiffness {
     /// Thrust force per mm of depth, specific force times width.
     #[schema(minimum = 0.0, maximum = 1e9, example = 20_000.0, extensions(("x-unit" = json!("N/mm")), ("x-symbol" = json!("k_c w"))))]
@@ -240,6 +247,7 @@ pub struct Stiffness {
 /// Forces on the ring.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
+#[schema(as = RingForces)]
 pub struct Forces {
     /// Thrust toward the centre.
     #[schema(minimum = 0.0, maximum = 1e8, example = 400.0, extensions(("x-unit" = json!("N")), ("x-symbol" = json!("F_p"))))]
@@ -259,6 +267,7 @@ pub struct Forces {
 /// What turns the ring.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
+#[schema(as = RingDrive)]
 pub enum Drive {
     /// A pure torque, as by a floating driver.
     #[default]
@@ -270,6 +279,7 @@ pub enum Drive {
 /// Long-wave pass filter (Gaussian, 50 % at its cut-off).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
+#[schema(as = RingLongWave)]
 pub enum LongWave {
     /// No filter.
     None,
@@ -304,6 +314,7 @@ impl LongWave {
 /// How the cut is computed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
+#[schema(as = RingMethod)]
 pub enum Method {
     /// Exact location on both supports, every body angle cut.
     #[default]
@@ -315,6 +326,7 @@ pub enum Method {
 /// With which other number of nodes the run is repeated.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
+#[schema(as = RingErrorEstimate)]
 pub enum ErrorEstimate {
     /// Half as many: costs half as much again; the difference is the error if it falls in proportion to the spacing.
     #[default]
@@ -326,6 +338,7 @@ pub enum ErrorEstimate {
 /// A question.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
+#[schema(as = RingAnalysis)]
 pub enum Analysis {
     /// The cut, step by step.
     Simulation,
@@ -340,6 +353,7 @@ pub enum Analysis {
 /// Tool angles and support angles of the map.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default)]
+#[schema(as = RingMapRange)]
 pub struct MapRange {
     /// First tool angle, counter-clockwise from the right, seen from the ring's centre.
     #[schema(minimum = -60.0, maximum = 240.0, default = 0.0, example = 0.0, extensions(("x-unit" = json!("deg")), ("x-symbol" = json!("alpha_T"))))]
@@ -385,6 +399,7 @@ impl Default for MapRange {
 /// Target and machine limits of the search.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
+#[schema(as = RingSearchRange)]
 pub struct SearchRange {
     /// Roundness deviation to reach: RONt about the least-squares circle, after the job's filter.
     #[schema(minimum = 0.01, maximum = 10_000.0, example = 5.0, extensions(("x-unit" = json!("um")), ("x-symbol" = json!("RONt"))))]

@@ -39,6 +39,7 @@ pub struct Outcome {
 
 /// What the angles of tool and supports make of errors, at the end of the feed; exact but for rounding.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingSettingOutcome)]
 pub struct SettingOutcome {
     /// Radius of the circle through the tip that touches both supports: the size that a rigid machine gives.
     #[schema(extensions(("x-unit" = json!("mm"))))]
@@ -83,6 +84,7 @@ pub struct SettingOutcome {
 
 /// What the supports bear.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingReactionsOutcome)]
 pub struct ReactionsOutcome {
     /// Left support, with a pure driving torque; negative: the ring lifts off.
     #[schema(extensions(("x-unit" = json!("N"))))]
@@ -108,6 +110,7 @@ pub struct ReactionsOutcome {
 
 /// The cut, step by step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingSimulationOutcome)]
 pub struct SimulationOutcome {
     /// Nodes on the circumference.
     #[schema(extensions(("x-unit" = json!("1"))))]
@@ -155,6 +158,7 @@ pub struct SimulationOutcome {
 
 /// Values of the four reference circles.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingEvaluated)]
 pub struct Evaluated {
     /// Radius of the least-squares circle, unfiltered.
     #[schema(extensions(("x-unit" = json!("mm"))))]
@@ -167,6 +171,7 @@ pub struct Evaluated {
 
 /// Roundness deviations about the four reference circles.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingCircleValues)]
 pub struct CircleValues {
     /// Peak to valley, least-squares circle (LSCI).
     #[schema(extensions(("x-unit" = json!("um"))))]
@@ -193,6 +198,7 @@ pub struct CircleValues {
 
 /// Where the error at the end comes from, first order.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingCausesOutcome)]
 pub struct CausesOutcome {
     /// Step of the spiral that the stop of the feed leaves; 0 after half a revolution of spark-out in a rigid machine.
     #[schema(extensions(("x-unit" = json!("um"))))]
@@ -213,6 +219,7 @@ pub struct CausesOutcome {
 
 /// One entry per order from 2.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingSpectrumColumns)]
 pub struct SpectrumColumns {
     /// Waves per revolution.
     #[schema(extensions(("x-unit" = json!("1"))))]
@@ -236,6 +243,7 @@ pub struct SpectrumColumns {
 
 /// One entry per revolution, or per several of long runs.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingHistoryColumns)]
 pub struct HistoryColumns {
     /// Revolutions turned.
     #[schema(extensions(("x-unit" = json!("1"))))]
@@ -258,6 +266,7 @@ pub struct HistoryColumns {
 
 /// How one wave developed.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingWaveColumn)]
 pub struct WaveColumn {
     /// Waves per revolution.
     #[schema(extensions(("x-unit" = json!("1"))))]
@@ -269,6 +278,7 @@ pub struct WaveColumn {
 
 /// Profiles by body angle, thinned out evenly; values of the circles come from all nodes.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingProfileColumns)]
 pub struct ProfileColumns {
     /// Body angle.
     #[schema(extensions(("x-unit" = json!("deg"))))]
@@ -292,6 +302,7 @@ pub struct ProfileColumns {
 
 /// The path of the ring's origin in the last revolution, about its mean.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingPathColumns)]
 pub struct PathColumns {
     /// Revolutions turned.
     #[schema(extensions(("x-unit" = json!("1"))))]
@@ -306,6 +317,7 @@ pub struct PathColumns {
 
 /// What becomes of waves, to first order in their size.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingLinearOutcome)]
 pub struct LinearOutcome {
     /// One entry per order from 2.
     pub orders: Vec<OrderOutcome>,
@@ -319,6 +331,7 @@ pub struct LinearOutcome {
 
 /// What becomes of a wave.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingOrderOutcome)]
 pub struct OrderOutcome {
     /// Waves per revolution.
     #[schema(extensions(("x-unit" = json!("1"))))]
@@ -339,6 +352,7 @@ pub struct OrderOutcome {
 /// What becomes of a wave.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
+#[schema(as = RingFate)]
 pub enum Fate {
     /// It grows.
     Grows,
@@ -364,6 +378,7 @@ impl Fate {
 
 /// A root of the characteristic equation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingRootOutcome)]
 pub struct RootOutcome {
     /// Lobes per revolution.
     #[schema(extensions(("x-unit" = json!("1"))))]
@@ -375,6 +390,7 @@ pub struct RootOutcome {
 
 /// Worst wave over tool angle and support angle, row by row of the support angles. A neutral wave counts 1.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingMapOutcome)]
 pub struct MapOutcome {
     /// Columns.
     #[schema(extensions(("x-unit" = json!("deg"))))]
@@ -399,6 +415,7 @@ pub struct MapOutcome {
 
 /// A cell of the map.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingMapCell)]
 pub struct MapCell {
     /// Tool angle.
     #[schema(extensions(("x-unit" = json!("deg"))))]
@@ -413,6 +430,7 @@ pub struct MapCell {
 
 /// Fewest revolutions to the target, the tool opposite to a support and fed straight down.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingSearchOutcome)]
 pub struct SearchOutcome {
     /// Whether the target can be reached, and how safely.
     pub status: SearchStatus,
@@ -435,6 +453,7 @@ pub struct SearchOutcome {
 /// Whether the target can be reached.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
+#[schema(as = RingSearchStatus)]
 pub enum SearchStatus {
     /// Reached, and also with 5 % more and 5 % fewer revolutions.
     Robust,
@@ -448,6 +467,7 @@ pub enum SearchStatus {
 
 /// A setting of the search; fed straight down.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingSearchSetting)]
 pub struct SearchSetting {
     /// Tip at the start.
     #[schema(extensions(("x-unit" = json!("mm"))))]
@@ -480,6 +500,7 @@ pub struct SearchSetting {
 
 /// Settings tried.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingTriedColumns)]
 pub struct TriedColumns {
     /// Revolutions with feed.
     #[schema(extensions(("x-unit" = json!("1"))))]
@@ -494,6 +515,7 @@ pub struct TriedColumns {
 
 /// A second stage after the first: supports closer together, the tool on top.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingSecondStage)]
 pub struct SecondStage {
     /// Support half angle.
     #[schema(extensions(("x-unit" = json!("deg"))))]
