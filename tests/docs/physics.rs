@@ -6,16 +6,15 @@ use std::path::Path;
 
 use precut::registry::Registry;
 use precut_calc::calculator::Unwatched;
-use precut_calc::effects::{Cause, DEFLECTION_CAUSES, Fit, Parameter};
+use precut_calc::effects::{Cause, DEFLECTION_CAUSES, Fit, Parameter, RING_CAUSES};
 
 use super::markdown::{Document, documents};
 use super::root;
 
 const DEFLECTION: &str = "docs/physics/deflection-compensation.md";
-const EFFECTS: &str = "docs/physics/effects-deflection.md";
 
 /// Groups of equations.
-const GROUPS: [&str; 2] = ["deflection/", "diagnosis/"];
+const GROUPS: [&str; 4] = ["deflection/", "diagnosis/", "ring/", "roundness/"];
 
 /// Equations that have a heading: its first word.
 fn documented() -> BTreeSet<String> {
@@ -99,34 +98,45 @@ fn row(parameter: &Parameter) -> String {
 }
 
 /// The part of the page on one cause.
-fn section<'t>(text: &'t str, cause: &Cause) -> &'t str {
+fn section<'t>(page: &'t Document, cause: &Cause) -> &'t str {
     let heading = format!("### {} `{}`\n", cause.equation, cause.kind);
-    let Some((_, rest)) = text.split_once(&heading) else { panic!("{EFFECTS} has no heading {heading}") };
+    let Some((_, rest)) = page.text.split_once(&heading) else { panic!("{} has no heading {heading}", page.name) };
     rest.split("\n#").next().unwrap()
 }
 
+/// Catalogues of effects with their pages.
+const CATALOGUES: [(&str, &[Cause]); 2] =
+    [("docs/physics/effects-deflection.md", DEFLECTION_CAUSES), ("docs/physics/effects-ring.md", RING_CAUSES)];
+
 #[test]
 fn the_catalogue_has_the_numbers_of_the_code() {
-    let page = Document::read(root(), EFFECTS);
-    for cause in DEFLECTION_CAUSES {
-        let section = section(&page.text, cause);
-        for parameter in cause.parameters {
-            let row = row(parameter);
-            assert!(section.lines().any(|line| line == row), "{}: no row {row}", cause.kind);
-        }
-        for other in cause.conditions.iter().chain(cause.confounded_with) {
-            assert!(section.contains(&format!("`{other}`")), "{}: {other} is not named", cause.kind);
+    for (name, causes) in CATALOGUES {
+        let page = Document::read(root(), name);
+        for cause in causes {
+            let section = section(&page, cause);
+            for parameter in cause.parameters {
+                let row = row(parameter);
+                assert!(section.lines().any(|line| line == row), "{}: no row {row}", cause.kind);
+            }
+            for other in cause.conditions.iter().chain(cause.confounded_with) {
+                assert!(section.contains(&format!("`{other}`")), "{}: {other} is not named", cause.kind);
+            }
         }
     }
 }
 
+/// Calculators and evaluations with their pages.
+const PAGES: [(&str, &str); 2] =
+    [("deflection-compensation", DEFLECTION), ("ring-roundness", "docs/physics/ring-roundness.md")];
+
 #[test]
-fn every_code_of_the_calculator_is_explained() {
-    let page = Document::read(root(), DEFLECTION).text;
+fn every_code_of_a_calculator_is_explained() {
     let registry = Registry::standard().unwrap();
-    let entry = registry.entry("deflection-compensation").unwrap();
-    let codes = &entry.meta().codes;
-    let groups = codes.faults.iter().chain(codes.failures).chain(codes.warnings).copied();
-    let missing: Vec<_> = groups.flatten().filter(|code| !page.contains(&format!("`{code}`"))).collect();
-    assert!(missing.is_empty(), "{DEFLECTION} does not name {missing:?}");
+    for (id, name) in PAGES {
+        let page = Document::read(root(), name).text;
+        let codes = &registry.entry(id).unwrap().meta().codes;
+        let groups = codes.faults.iter().chain(codes.failures).chain(codes.warnings).copied();
+        let missing: Vec<_> = groups.flatten().filter(|code| !page.contains(&format!("`{code}`"))).collect();
+        assert!(missing.is_empty(), "{name} does not name {missing:?}");
+    }
 }

@@ -234,6 +234,9 @@ fn of_run(job: &Job, scene: &Scene, simulation: &SimulationOutcome, outcome: &Ou
             .with("unfiltered_um", end.unfiltered.least_squares_um)
             .with("blank_um", simulation.start.unfiltered.least_squares_um),
     );
+    if job.method == Method::NearestSamples {
+        return;
+    }
     said.push(
         Message::new("size_and_error")
             .with("radius_mm", end.mean_radius_mm)
@@ -244,7 +247,7 @@ fn of_run(job: &Job, scene: &Scene, simulation: &SimulationOutcome, outcome: &Ou
     );
     let causes = &simulation.causes;
     let share = WORTH_NAMING * end.unfiltered.least_squares_um;
-    if causes.first_bite_um > share && simulation.largest_bite_um.is_some() {
+    if causes.first_bite_um > share {
         said.push(
             Message::new("first_bite_stays")
                 .with("bite_um", simulation.largest_bite_um.unwrap_or(0.0))

@@ -18,6 +18,8 @@ use super::surface::{UM_PER_MM, unevaluable};
 pub(super) const NEUTRAL: f64 = 1e-6;
 /// Rows of the map between two looks at the monitor: some milliseconds each.
 const ROWS_AT_ONCE: usize = 4;
+/// Cells that are looked at again in full before the mildest is named.
+const CONFIRMED: usize = 20;
 /// A wave of the blank below this is rounding, mm.
 const NOTHING_MM: f64 = 1e-9;
 
@@ -151,10 +153,18 @@ pub(super) fn map(job: &Job, scene: &Scene, end: &Stance, share: Share<'_>) -> R
         support_half_angle_deg: support_half_angle_deg[i / tool_angle_deg.len()],
         worst_factor_per_revolution: worst(&cells[i]),
     };
-    let best = (0..cells.len())
-        .filter(|i| worst(&cells[*i]).is_some())
-        .min_by(|i, j| worst(&cells[*i]).unwrap_or(f64::MAX).total_cmp(&worst(&cells[*j]).unwrap_or(f64::MAX)))
-        .map(at);
+    let mut order: Vec<usize> = (0..cells.len()).filter(|i| worst(&cells[*i]).is_some()).collect();
+    order.sort_by(|i, j| worst(&cells[*i]).unwrap_or(f64::MAX).total_cmp(&worst(&cells[*j]).unwrap_or(f64::MAX)));
+    // The mildest cell is where a root that the quick search missed would show: it needs the full one.
+    let confirmed = |i: &usize| {
+        let cell = at(*i);
+        let (beta, tool) = (cell.support_half_angle_deg.to_radians(), tool_rad(cell.tool_angle_deg));
+        let lobing = Lobing { copying: Copying::of_angles(beta, tool), compliance_ratio: k };
+        let (roots, complete) = lobing.roots(1.5, f64::from(range.highest_order) + 0.5);
+        let full = worst_of(&roots).map_or(0.0, |root| root.factor_per_revolution());
+        complete && full <= worst(&cells[*i]).unwrap_or(0.0) * (1.0 + NEUTRAL)
+    };
+    let best = order.into_iter().take(CONFIRMED).find(confirmed).map(at);
     let here = cell(end.half_angle_rad, end.tool_rad(), k, range, &wanted);
     let here = MapCell {
         tool_angle_deg: super::scene::mirrored_rad(end.tool_rad(), scene.mirrored).to_degrees(),

@@ -1,4 +1,4 @@
-//! Linear theory of lobing: which waves of the surface grow, stay or decay (`ring/5`).
+//! Linear theory of lobing: which waves of the surface grow, stay or decay (`ring/5.2`).
 //!
 //! Small deviations ρ(t) of the surface cut at the rotation t obey
 //!
@@ -224,7 +224,8 @@ mod tests {
 
     #[test]
     fn the_quick_search_finds_the_worst_root() {
-        for (beta, tool, k) in [(42.0, 90.0, 0.0), (42.0, 60.0, 1.0), (30.0, 100.0, 3.0), (55.0, 35.1, 0.5)] {
+        let angles = (0..5).flat_map(|i| (0..6).map(move |j| (17.0 + 13.3 * f64::from(i), 3.0 + 34.7 * f64::from(j))));
+        for ((beta, tool), k) in angles.zip([0.0, 0.1, 0.5, 1.0, 3.0].into_iter().cycle()) {
             let copying = Copying::of_angles(f64::to_radians(beta), f64::to_radians(tool));
             let lobing = Lobing { copying, compliance_ratio: k };
             let (all, complete) = lobing.roots(1.5, 20.5);

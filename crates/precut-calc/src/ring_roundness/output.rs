@@ -455,7 +455,7 @@ pub struct SearchOutcome {
 #[serde(rename_all = "snake_case")]
 #[schema(as = RingSearchStatus)]
 pub enum SearchStatus {
-    /// Reached, and also with 5 % more and 5 % fewer revolutions.
+    /// Reached, and also with 5 %, at least one revolution, more and fewer.
     Robust,
     /// Reached, but not with all neighbours.
     Fragile,

@@ -54,6 +54,13 @@ fn some(values: &[f64]) -> Vec<Option<f64>> {
     values.iter().copied().map(Some).collect()
 }
 
+/// Below this an amplitude is rounding, um; a logarithmic axis would make the most of it.
+const LEAST_UM: f64 = 1e-4;
+
+fn above_rounding(values: &[f64]) -> Vec<Option<f64>> {
+    values.iter().map(|value| (*value >= LEAST_UM).then_some(*value)).collect()
+}
+
 fn line(name: &'static str, x: &[f64], y: &[f64], role: Role) -> Item {
     Item::Line { name, x: x.to_vec(), y: some(y), role }
 }
@@ -147,7 +154,8 @@ fn history(history: Option<&HistoryColumns>) -> Vec<Panel> {
         roundness.push(line("roundness_deviation", &history.revolution, &history.roundness_um, Role::After));
         bites.push(line("deepest_cut", &history.revolution, &history.deepest_cut_um, Role::Plain));
         for ((wave, name), series) in history.waves.iter().zip(WAVE_NAMES).zip(0..) {
-            waves.push(line(name, &history.revolution, &wave.amplitude_um, Role::Series(series)));
+            let (x, y) = (history.revolution.clone(), above_rounding(&wave.amplitude_um));
+            waves.push(Item::Line { name, x, y, role: Role::Series(series) });
         }
     }
     vec![
@@ -161,8 +169,12 @@ fn spectrum(spectrum: Option<&SpectrumColumns>, outcome: &Outcome) -> Vec<Panel>
     let (mut bars, mut factors) = (Vec::new(), Vec::new());
     if let Some(spectrum) = spectrum {
         let order: Vec<f64> = spectrum.order.iter().copied().map(f64::from).collect();
-        bars.push(Item::Points { name: "ring_before", x: order.clone(), y: spectrum.start_um.clone(), role: Role::Before });
-        bars.push(Item::Points { name: "ring_after", x: order, y: spectrum.end_um.clone(), role: Role::After });
+        let points = |name, values: &[f64], role| {
+            let (x, y) = order.iter().zip(values).filter(|(_, value)| **value >= LEAST_UM).unzip();
+            Item::Points { name, x, y, role }
+        };
+        bars.push(points("ring_before", &spectrum.start_um, Role::Before));
+        bars.push(points("ring_after", &spectrum.end_um, Role::After));
     }
     if let Some(linear) = &outcome.linear_theory {
         let order: Vec<f64> = linear.orders.iter().map(|o| f64::from(o.order)).collect();
@@ -199,7 +211,8 @@ fn map(map: Option<&MapOutcome>) -> Vec<Panel> {
             });
         };
         here(&mut growth);
-        let values = map.revolutions_to_target.clone();
+        // Near the edge of decay the revolutions go to infinity: their logarithm shows the rest, too.
+        let values = map.revolutions_to_target.iter().map(|turns| turns.map(f64::log10)).collect();
         revolutions.push(heat(Axis::linear("revolutions_to_target", "1"), values, false));
         here(&mut revolutions);
     }

@@ -294,9 +294,15 @@ fn causes(job: &Job, scene: &Scene, end: &Stance, run: &Run) -> Result<CausesOut
         .filter_map(|order| run.surface.harmonic(order))
         .map(|harmonic| 2.0 * harmonic.amplitude_mm * UM_PER_MM)
         .fold(0.0, f64::max);
-    let stepless = setting.compliance_ratio <= 0.0 && setting.spark_out_revolutions >= 0.5;
+    // The step is even waves, which spark-out multiplies by (K/(1+K))² per revolution; a rigid tool needs half a one.
+    let (k, dwell) = (setting.compliance_ratio, setting.spark_out_revolutions);
+    let step_left = match (k > 0.0, dwell >= 0.5) {
+        (true, _) => (k / (1.0 + k)).powf(2.0 * dwell),
+        (false, true) => 0.0,
+        (false, false) => 1.0,
+    };
     Ok(CausesOutcome {
-        feed_step_um: if stepless { 0.0 } else { teeth_mm * UM_PER_MM },
+        feed_step_um: step_left * teeth_mm * UM_PER_MM,
         teeth_um: teeth_mm * UM_PER_MM,
         first_bite_um: 0.5 * (run.turned.largest_bite_mm - teeth_mm).max(0.0) * UM_PER_MM,
         odd_lobes_um: roundness_um(&odd_waves_mm(&run.blank_mm), job.filter)?.0,

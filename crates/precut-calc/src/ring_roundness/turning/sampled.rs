@@ -1,4 +1,4 @@
-//! The source paper's own algorithm, for comparison (`ring/9`): a ring of sampled points, located by the points nearest to
+//! The source paper's own algorithm, for comparison (`ring/9.1`): a ring of sampled points, located by the points nearest to
 //! the supports, cut by moving the point nearest to the tip onto the tip.
 //!
 //! Two nearest samples do not locate a body: each is off the support by up to half the spacing along the surface, and as

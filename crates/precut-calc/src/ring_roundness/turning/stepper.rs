@@ -357,6 +357,7 @@ impl<'a, M: Machine> Stepper<'a, M> {
                     half_gap(vb, eb),
                 );
                 centre[l] = sub(centre[l], step);
+                body_rad[l] += dot(turned(vt), step) * frame.per_tip2;
                 // Not `max`, which would hide a not-a-number.
                 let size = step[0].abs() + step[1].abs();
                 left = if size <= left { left } else { size };
