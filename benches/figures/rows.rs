@@ -9,6 +9,7 @@ use crate::Row;
 use crate::deflection;
 use crate::http::{self, Exchange};
 use crate::measure::{Measured, Unit, cpu_time};
+use crate::ring;
 
 const DEFLECTION: &str = "deflection-compensation";
 /// A number of that calculator's jobs which changes the result and not the work.
@@ -38,6 +39,17 @@ pub(crate) fn all() -> Vec<Row> {
         row("fewest-chord tool path, 200,000 stations", Unit::Time, us(500_000.0), us(200_000.0), || {
             deflection::chords(200_000)
         }),
+        row("ring simulation, per angular step", Unit::Time, us(0.15), us(0.07), || ring::step(false)),
+        row("ring simulation on rollers, per angular step", Unit::Time, us(1.0), us(0.3), || ring::step(true)),
+        row(
+            "ring: the source paper's algorithm plainly written, N = 3600, per angular step",
+            Unit::Time,
+            None,
+            None,
+            ring::plain_paper,
+        ),
+        row("ring: complete answer to the paper's run of 256 revolutions", Unit::Time, None, None, ring::answer),
+        row("ring: set-up map, 91 x 61 cells, 20 lobes", Unit::Time, None, None, ring::map),
         row("CSV, 10,000 rows of 8 numbers", Unit::Time, None, None, csv),
         row("G-code, 10,000 cuts", Unit::Time, None, None, gcode),
         row("SVG, 3 panels of 201 stations", Unit::Time, None, None, || svg(201)),

@@ -98,7 +98,8 @@ fn supports_bear_what_the_reference_says() {
             "forces": { "thrust_n": input["thrust_force_N"], "cutting_n": input["cutting_force_N"], "weight_n": input["weight_N"] },
             "rotation": rotation
         });
-        let answer = run(&at_angles(input["beta_deg"].as_f64().unwrap(), input["alpha_T_deg"].as_f64().unwrap(), &more));
+        let answer =
+            run(&at_angles(input["beta_deg"].as_f64().unwrap(), input["alpha_T_deg"].as_f64().unwrap(), &more));
         let found = answer.output.setting.reactions.clone().unwrap();
         assert!((found.support_a_n - expected["N_A_N"].as_f64().unwrap()).abs() < tolerance, "{case} {found:?}");
         assert!((found.support_b_n - expected["N_B_N"].as_f64().unwrap()).abs() < tolerance, "{case} {found:?}");

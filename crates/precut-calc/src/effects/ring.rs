@@ -177,7 +177,7 @@ const fn cause(
 }
 
 /// Phases on which a wave is tried first; amplitude and phase together are two linear sizes.
-const PHASES: &[f64] = &[0.0, 1.570_796_326_794_896_6];
+const PHASES: &[f64] = &[0.0, std::f64::consts::FRAC_PI_2];
 /// Orders of a wave of the blank that are tried.
 const ORDERS: &[f64] = &[2.0, 3.0, 4.0, 5.0, 6.0];
 /// Ratios of ring to roller that are tried first.

@@ -155,9 +155,7 @@ fn of_simulation(job: &Job, simulation: &SimulationOutcome, outcome: &Outcome, f
     if let (Some(value), Some(error)) = (outcome.roundness_um, outcome.roundness_error_um)
         && error > ERROR_SHARE * value
     {
-        found.push(
-            Finding::new("discretisation_error_large", "/samples").measured(error, ERROR_SHARE * value, "um"),
-        );
+        found.push(Finding::new("discretisation_error_large", "/samples").measured(error, ERROR_SHARE * value, "um"));
     }
 }
 

@@ -80,7 +80,9 @@ fn check_profile(job: &Job, violations: &mut Violations) {
     let Some(measured) = &job.measured_profile else { return };
     let rows = measured.rows();
     violations.require(rows.len() >= LEAST_POINTS, || {
-        Finding::new("profile_too_few_points", "/measured_profile").with("count", rows.len()).with("least", LEAST_POINTS)
+        Finding::new("profile_too_few_points", "/measured_profile")
+            .with("count", rows.len())
+            .with("least", LEAST_POINTS)
     });
     for (i, pair) in rows.windows(2).enumerate() {
         check_neighbours(i + 1, pair[0], pair[1], violations);
@@ -88,8 +90,11 @@ fn check_profile(job: &Job, violations: &mut Violations) {
     let (Some(first), Some(last)) = (rows.first(), rows.last()) else { return };
     let span = last.angle_deg - first.angle_deg;
     violations.require(span < 360.0, || {
-        Finding::new("angles_overlap", format!("/measured_profile/{}/angle_deg", rows.len() - 1))
-            .measured(last.angle_deg, first.angle_deg + 360.0, "deg")
+        Finding::new("angles_overlap", format!("/measured_profile/{}/angle_deg", rows.len() - 1)).measured(
+            last.angle_deg,
+            first.angle_deg + 360.0,
+            "deg",
+        )
     });
     // A whole turn, one step short, in radians.
     let in_radians = rows.len() >= LEAST_POINTS && span > 5.0 && span <= TAU + 1e-9;
@@ -111,9 +116,8 @@ fn check_neighbours(i: usize, before: ProfileRow, here: ProfileRow, violations: 
     } else if step < 1e-9 {
         violations.add(Finding::new("duplicate_angle", at()).value(here.angle_deg, "deg"));
     }
-    violations.require(step <= WIDEST_GAP_DEG, || {
-        Finding::new("gap_in_profile", at()).measured(step, WIDEST_GAP_DEG, "deg")
-    });
+    violations
+        .require(step <= WIDEST_GAP_DEG, || Finding::new("gap_in_profile", at()).measured(step, WIDEST_GAP_DEG, "deg"));
 }
 
 fn check_numerics(job: &Job, violations: &mut Violations) {
@@ -180,7 +184,8 @@ fn check_analyses(job: &Job, violations: &mut Violations) {
 fn check_effects(job: &Job, violations: &mut Violations) {
     for (i, effect) in job.effects.iter().enumerate() {
         let same = |before: &crate::effects::RingEffect| {
-            before.kind() == effect.kind() && before.recurs_by().map(f64::to_bits) == effect.recurs_by().map(f64::to_bits)
+            before.kind() == effect.kind()
+                && before.recurs_by().map(f64::to_bits) == effect.recurs_by().map(f64::to_bits)
         };
         violations.require(!job.effects[..i].iter().any(same), || {
             Finding::new("duplicate_effect", format!("/effects/{i}/kind")).with("kind", effect.kind())
@@ -280,17 +285,17 @@ fn impossible(job: &Job, radius_mm: f64) -> Vec<Impossible> {
         return found;
     }
     let clear = start.tool_clearance_rad();
-    // Written so that a not-a-number is a fault.
-    if !(clear >= TOOL_CLEARANCE_RAD) {
+    // A not-a-number is a fault, too.
+    if clear.is_nan() || clear < TOOL_CLEARANCE_RAD {
         add("tool_at_support", "/tool", Some((deg(clear), deg(TOOL_CLEARANCE_RAD), "deg")));
     }
     let approach = dot(start.to_tip, setting.feed_direction);
-    if !(approach < 0.0) {
+    if approach.is_nan() || approach >= 0.0 {
         add("feed_away_from_ring", "/tool/feed_direction_deg", None);
         return found;
     }
     let gap = norm(sub(setting.tip_start_mm, start.centre_mm)) - radius_mm;
-    if !(gap >= -DEEPEST_START * radius_mm) {
+    if gap.is_nan() || gap < -DEEPEST_START * radius_mm {
         add("tool_too_deep", "/tool/y_mm", Some((-gap, DEEPEST_START * radius_mm, "mm")));
         return found;
     }
@@ -299,12 +304,12 @@ fn impossible(job: &Job, radius_mm: f64) -> Vec<Impossible> {
         add("tool_out_of_reach", "/tool/revolutions", Some((gap, travel, "mm")));
         return found;
     }
-    check_end(&through_tip(&setting, setting.tip_end_mm()), radius_mm, reach, half, &mut add);
+    check_end(through_tip(&setting, setting.tip_end_mm()).as_ref(), radius_mm, reach, half, &mut add);
     found
 }
 
 fn check_end(
-    end: &Option<Stance>,
+    end: Option<&Stance>,
     radius_mm: f64,
     reach: f64,
     half: f64,

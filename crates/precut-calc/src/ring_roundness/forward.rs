@@ -116,7 +116,9 @@ impl ForwardModel for RingRoundness {
         if measure.is_none() {
             let known: Vec<&'static str> = QUANTITIES.iter().map(|q| q.name).collect();
             faults.push(
-                Finding::new("unknown_quantity", "/quantity").with("quantity", quantity.to_owned()).with("known", known),
+                Finding::new("unknown_quantity", "/quantity")
+                    .with("quantity", quantity.to_owned())
+                    .with("known", known),
             );
         }
         for (row, (run, _)) in rows.points.iter().enumerate() {

@@ -71,19 +71,16 @@ pub(super) fn theory(job: &Job, scene: &Scene, end: &Stance) -> LinearOutcome {
 
 /// The worst of the waves from 1.5 lobes on: one lobe is the eccentricity, which is no error.
 pub(super) fn worst_of(roots: &[Root]) -> Option<Root> {
-    roots
-        .iter()
-        .filter(|root| root.lobes > 1.5)
-        .copied()
-        .max_by(|p, q| p.growth_per_rad.total_cmp(&q.growth_per_rad))
+    roots.iter().filter(|root| root.lobes > 1.5).copied().max_by(|p, q| p.growth_per_rad.total_cmp(&q.growth_per_rad))
 }
 
 /// Waves of the blank that must come down: order and the factor still allowed.
 fn wanted(job: &Job, scene: &Scene) -> Result<Vec<(u32, f64)>, Failure> {
     let n = super::input::DEFAULT_SAMPLES as usize;
     let blank = scene.blank_mm(job, n).map_err(unevaluable)?;
-    let spectrum =
-        Grid::new(n).and_then(|grid| grid.spectrum(&blank, job.setup_map.highest_order as usize)).map_err(unevaluable)?;
+    let spectrum = Grid::new(n)
+        .and_then(|grid| grid.spectrum(&blank, job.setup_map.highest_order as usize))
+        .map_err(unevaluable)?;
     let target_mm = job.setup_map.target_um / UM_PER_MM;
     let mut waves = Vec::new();
     for order in 2..=job.setup_map.highest_order {

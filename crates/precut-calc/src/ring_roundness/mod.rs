@@ -294,7 +294,10 @@ fn basis(job: &Job) -> Vec<Basis> {
     add(simulation && job.method == Method::NearestSamples, &[("ring/9.1", "Shchurova 2012")]);
     add(job.forces.is_some(), &[("ring/4.1", "equilibrium of the ring")]);
     add(job.stiffness.is_some(), &[("ring/4.2", "stiffness of tool and supports")]);
-    add(job.asks(Analysis::LinearTheory) || job.asks(Analysis::SetupMap), &[("ring/5.2", COPYING), ("ring/5.3", COPYING)]);
+    add(
+        job.asks(Analysis::LinearTheory) || job.asks(Analysis::SetupMap),
+        &[("ring/5.2", COPYING), ("ring/5.3", COPYING)],
+    );
     add(job.asks(Analysis::SettingsSearch), &[("ring/5.4", COPYING), ("ring/7.1", "scan by simulation")]);
     used.extend(
         job.effects.iter().map(|effect| Basis { equation: effect.cause().equation, source: "catalogue of effects" }),

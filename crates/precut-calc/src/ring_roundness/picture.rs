@@ -101,13 +101,7 @@ pub(super) fn figures(job: &Job, outcome: &Outcome) -> Vec<Figure> {
             Axis::linear("waves_per_revolution", "1"),
             spectrum(simulation.map(|s| &s.spectrum), outcome),
         ),
-        figure(
-            "map",
-            "ring_map",
-            Frame::Stacked,
-            Axis::linear("tool_angle", "deg"),
-            map(outcome.setup_map.as_ref()),
-        ),
+        figure("map", "ring_map", Frame::Stacked, Axis::linear("tool_angle", "deg"), map(outcome.setup_map.as_ref())),
         figure("search", "ring_search", Frame::Stacked, Axis::linear("feed_revolutions", "1"), search(job, outcome)),
     ]
 }
@@ -360,7 +354,11 @@ fn map_table(map: Option<&MapOutcome>) -> Table {
         columns: vec![
             Column::numbers("tool_angle", "deg", &tool),
             Column::numbers("support_half_angle", "deg", &support),
-            Column::optional("worst_factor_per_revolution", "1", map.map_or(nothing, |m| &m.worst_factor_per_revolution)),
+            Column::optional(
+                "worst_factor_per_revolution",
+                "1",
+                map.map_or(nothing, |m| &m.worst_factor_per_revolution),
+            ),
             Column::optional("worst_lobes", "1", map.map_or(nothing, |m| &m.worst_lobes)),
             Column::optional("revolutions_to_target", "1", map.map_or(nothing, |m| &m.revolutions_to_target)),
         ],

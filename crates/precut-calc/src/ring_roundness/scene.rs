@@ -59,9 +59,10 @@ impl Scene {
                 Effect::SparkOutMissing { spark_out_revolutions } => {
                     setting.spark_out_revolutions = spark_out_revolutions;
                 }
-                Effect::ChatterHarmonic { amplitude_mm, waves_per_revolution } => setting.motion.chatter.push(
-                    Oscillation { amplitude_mm, ratio: f64::from(waves_per_revolution), phase_rad: 0.0 },
-                ),
+                Effect::ChatterHarmonic { amplitude_mm, waves_per_revolution } => setting
+                    .motion
+                    .chatter
+                    .push(Oscillation { amplitude_mm, ratio: f64::from(waves_per_revolution), phase_rad: 0.0 }),
                 Effect::WorkSlip { slip_deg_per_rev } => setting.motion.slip += slip_deg_per_rev / 360.0,
             }
         }
@@ -74,7 +75,7 @@ impl Scene {
         }
         setting.compliance_ratio += push_off;
         let mirrored = job.rotation == Rotation::Clockwise;
-        Self { setting: if mirrored { mirror(setting) } else { setting }, mirrored, waves }
+        Self { setting: if mirrored { mirror(&setting) } else { setting }, mirrored, waves }
     }
 
     /// Radii of the blank at `n` uniform body angles, mm; in the mirror where the setting is.
@@ -149,7 +150,7 @@ fn mirrored_profile(radii: &[f64]) -> Vec<f64> {
     (0..n).map(|i| radii[(n / 2 + n - i) % n]).collect()
 }
 
-fn mirror(setting: Setting) -> Setting {
+fn mirror(setting: &Setting) -> Setting {
     let flip = |p: Vec2| [-p[0], p[1]];
     let (a, b) = (flip(setting.support_b_mm), flip(setting.support_a_mm));
     let mut motion = setting.motion.clone();
@@ -160,7 +161,7 @@ fn mirror(setting: Setting) -> Setting {
         tip_start_mm: flip(setting.tip_start_mm),
         feed_direction: flip(setting.feed_direction),
         motion,
-        ..setting
+        ..setting.clone()
     }
 }
 

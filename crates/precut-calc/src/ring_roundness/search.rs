@@ -122,8 +122,11 @@ fn plan(range: &SearchRange, scene: &Scene, blank: &[f64]) -> Option<Plan> {
     let end = through_tip(&setting, tip_end)?;
     setting.tip_start_mm = add(tip_end, [0.0, travel_mm]);
     let reduction = end.radius_per_feed(setting.feed_direction);
-    (travel_mm > 0.0 && reduction > 0.0)
-        .then(|| Plan { setting, travel_mm, natural: travel_mm * reduction * UM_PER_MM / range.target_um })
+    (travel_mm > 0.0 && reduction > 0.0).then(|| Plan {
+        setting,
+        travel_mm,
+        natural: travel_mm * reduction * UM_PER_MM / range.target_um,
+    })
 }
 
 /// How far above its end the tip must start for the circle through it to have a radius; by bisection.
@@ -215,13 +218,12 @@ impl Finder<'_> {
             let setting = self.verified(fewest)?;
             outcome.fewest = (setting.margin_um >= 0.0).then_some(setting);
         }
-        if outcome.best.is_none() {
-            if let Some((n, _)) = nearest {
-                let setting = self.verified(n)?;
-                outcome.status =
-                    if setting.margin_um >= 0.0 { SearchStatus::Fragile } else { SearchStatus::BeyondLimits };
-                outcome.best = Some(setting);
-            }
+        if outcome.best.is_none()
+            && let Some((n, _)) = nearest
+        {
+            let setting = self.verified(n)?;
+            outcome.status = if setting.margin_um >= 0.0 { SearchStatus::Fragile } else { SearchStatus::BeyondLimits };
+            outcome.best = Some(setting);
         }
         Ok(())
     }

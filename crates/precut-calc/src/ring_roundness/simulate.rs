@@ -232,7 +232,11 @@ fn nearest(job: &Job, scene: &Scene, end: &Stance, share: Share<'_>) -> Result<S
         let grid = Grid::new(n as usize).map_err(unevaluable)?;
         of_section(&section_of(&points)?, &grid, job.filter, job.highest_order.min(n / 2)).ok()
     };
-    let start = of_radii(&scene.unmirrored(scene.blank_mm(job, n as usize).map_err(unevaluable)?), job.filter, job.highest_order.min(n / 2))?;
+    let start = of_radii(
+        &scene.unmirrored(scene.blank_mm(job, n as usize).map_err(unevaluable)?),
+        job.filter,
+        job.highest_order.min(n / 2),
+    )?;
     let blank_mm = scene.unmirrored(scene.blank_mm(job, n as usize).map_err(unevaluable)?);
     let radii_mm: Option<Vec<f64>> = surface.as_ref().map(|surface| surface.evaluation.referred_mm.clone());
     let error = surface.as_ref().map(|surface| difference(&surface.evaluated, &exact.surface.evaluated, 1.0));

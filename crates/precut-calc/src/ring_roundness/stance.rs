@@ -142,6 +142,7 @@ impl Stance {
 
 /// Forces on the ring, N, for the support reactions.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(clippy::struct_field_names, reason = "the unit stands in every name")]
 pub(crate) struct Load {
     pub thrust_n: f64,
     pub cutting_n: f64,
@@ -153,10 +154,8 @@ pub(crate) struct Load {
 /// that drive the ring, T_A + T_B = F_c along the rotation, shared equally.
 pub(crate) fn reactions_n(stance: &Stance, load: &Load, rotation: f64, driven: bool) -> (f64, f64) {
     let along = scaled(turned(stance.to_tip), rotation);
-    let mut force = add(
-        add(scaled(stance.to_tip, -load.thrust_n), scaled(along, -load.cutting_n)),
-        [0.0, -load.weight_n],
-    );
+    let mut force =
+        add(add(scaled(stance.to_tip, -load.thrust_n), scaled(along, -load.cutting_n)), [0.0, -load.weight_n]);
     if driven {
         for to in [stance.to_a, stance.to_b] {
             force = add(force, scaled(turned(to), 0.5 * rotation * load.cutting_n));
@@ -173,6 +172,7 @@ pub(crate) const LOOSE_RAD: f64 = 15.0 / 180.0 * PI;
 pub(crate) const TOOL_CLEARANCE_RAD: f64 = FRAC_PI_2 / 18.0;
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
     use crate::ring_roundness::turning::Motion;

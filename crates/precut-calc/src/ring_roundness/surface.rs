@@ -33,12 +33,7 @@ pub(super) fn of_radii(radii_mm: &[f64], filter: LongWave, highest: u32) -> Resu
 }
 
 /// Of points that follow each other counter-clockwise.
-pub(super) fn of_section(
-    section: &Section,
-    grid: &Grid,
-    filter: LongWave,
-    highest: u32,
-) -> Result<Surface, Failure> {
+pub(super) fn of_section(section: &Section, grid: &Grid, filter: LongWave, highest: u32) -> Result<Surface, Failure> {
     let evaluation = evaluate(section, grid, filter_of(filter), highest as usize).map_err(unevaluable)?;
     let evaluated = Evaluated {
         mean_radius_mm: evaluation.unfiltered.least_squares.circle.radius_mm,
@@ -109,7 +104,8 @@ pub(super) fn roundness_um(radii_mm: &[f64], filter: LongWave) -> Result<(f64, f
     let Filter::LowPass { .. } = filter_of(filter) else {
         return Ok((circle.span.width_mm() * UM_PER_MM, circle.circle.radius_mm));
     };
-    let referred = crate::num::roundness::refer(&section, circle.circle.centre_mm, radii_mm.len()).map_err(unevaluable)?;
+    let referred =
+        crate::num::roundness::refer(&section, circle.circle.centre_mm, radii_mm.len()).map_err(unevaluable)?;
     let filtered = grid.filtered(&referred, filter_of(filter)).map_err(unevaluable)?;
     let found = least_squares(&grid.section(&filtered).map_err(unevaluable)?).map_err(unevaluable)?;
     Ok((found.span.width_mm() * UM_PER_MM, circle.circle.radius_mm))

@@ -37,7 +37,11 @@ pub(super) fn pad(n: usize, roller_mm: f64, largest_mm: f64) -> usize {
     nodes_within(widest, std::f64::consts::TAU / n as f64).clamp(CUBIC_PAD, n / 2)
 }
 
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an angle below pi over one of at least 2 pi / 2^31")]
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "an angle below pi over one of at least 2 pi / 2^31"
+)]
 fn nodes_within(angle_rad: f64, step_rad: f64) -> usize {
     (angle_rad / step_rad).clamp(0.0, 2e9) as usize
 }
@@ -145,9 +149,8 @@ mod tests {
     #[test]
     fn roller_on_an_eccentric_circle_runs_on_a_circle() {
         let (big, small, off) = (150.0_f64, 20.0_f64, 0.4_f64);
-        let polar = |radius: f64, theta: f64| {
-            off * theta.cos() + (radius * radius - (off * theta.sin()).powi(2)).sqrt()
-        };
+        let polar =
+            |radius: f64, theta: f64| off * theta.cos() + (radius * radius - (off * theta.sin()).powi(2)).sqrt();
         for (n, tolerance) in [(720_u32, 6e-6), (3600, 1e-8)] {
             let radii: Vec<f64> = (0..n).map(|i| polar(big, TAU * f64::from(i) / f64::from(n))).collect();
             let nodes = Nodes::new(&radii, pad(n as usize, small, big + off));

@@ -53,6 +53,9 @@ pub(crate) struct Revolution {
     pub cutting_share: f64,
 }
 
+/// Hears of every revolution with the profile so far; an error ends the run.
+pub(crate) type After<'a, E> = dyn FnMut(&Revolution, &[f64]) -> Result<(), E> + 'a;
+
 /// The ring cannot be located.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Stuck {
@@ -68,7 +71,7 @@ pub(crate) struct Stuck {
 pub(crate) fn turn<E: From<Stuck>>(
     profile_mm: &[f64],
     setting: &Setting,
-    after: &mut dyn FnMut(&Revolution, &[f64]) -> Result<(), E>,
+    after: &mut After<'_, E>,
 ) -> Result<Turned, E> {
     match Still::of(setting) {
         Some(machine) => Stepper::new(profile_mm, setting, &machine)?.run(after),

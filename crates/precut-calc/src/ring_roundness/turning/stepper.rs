@@ -13,11 +13,11 @@
 use std::f64::consts::TAU;
 
 use super::envelope::{self, Envelope};
+use super::log::Log;
 use super::nodes::{CUBIC_PAD, Nodes, Place};
 use super::plane::{Vec2, angle, cross, dot, norm, scaled, sub, turned, unit};
 use super::setting::{Machine, Setting};
-use super::log::Log;
-use super::{Revolution, Stuck, Turned};
+use super::{After, Stuck, Turned};
 
 /// Steps solved side by side.
 const LANES: usize = 4;
@@ -215,10 +215,7 @@ impl<'a, M: Machine> Stepper<'a, M> {
     }
 
     /// Runs to the end; `after` hears of every revolution and may end the run.
-    pub(super) fn run<E: From<Stuck>>(
-        mut self,
-        after: &mut dyn FnMut(&Revolution, &[f64]) -> Result<(), E>,
-    ) -> Result<Turned, E> {
+    pub(super) fn run<E: From<Stuck>>(mut self, after: &mut After<'_, E>) -> Result<Turned, E> {
         let n = self.nodes.len();
         let mut log = Log::new(self.setting, n);
         while !self.ended {
