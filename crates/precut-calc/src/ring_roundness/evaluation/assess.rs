@@ -3,7 +3,7 @@
 use crate::calculator::{Failure, Finding, Message, Monitor, checkpoint};
 use crate::num::roundness::{Circles, Evaluation, Grid, PeriodicSpline, RoundnessError, circles, evaluate, refer};
 
-use super::input::{Job, ReferenceCircle};
+use super::input::{Job, ReferenceCircle, RoundnessFilter};
 use super::output::{
     ContactKind, OtherCircle, Outcome, RoundnessCircle, RoundnessCircles, RoundnessContact, RoundnessData,
     RoundnessProfile, RoundnessProof, RoundnessSpectrum,
@@ -45,18 +45,30 @@ pub(super) fn outcome(job: &Job, monitor: &dyn Monitor) -> Result<Outcome, Failu
     let step_deg = 360.0 / number(n);
     let places =
         |index: usize| RoundnessContact { kind: ContactKind::Peak, angle_deg: step_deg * number(index), row: None };
+    let measured = circles_out(&found.unfiltered, &measured_denser, &rows);
     let filtered = circles_out(&found.filtered, &filtered_denser, &places);
+    let judged = judged(job, &measured, &filtered);
     let outcome = Outcome {
-        roundness_um: of_reference(&filtered, job.reference).ront_um,
+        roundness_um: judged.ront_um,
+        numerical_error_um: judged.numerical_error_um.max(UM_PER_MM * numerical_error_mm(&found)),
         data: data(job, &readings, &found)?,
-        measured: circles_out(&found.unfiltered, &measured_denser, &rows),
+        measured,
         filtered,
         profile: profile(&found),
         spectrum: spectrum(job, &found, highest),
-        numerical_error_um: UM_PER_MM * numerical_error_mm(&found),
     };
     monitor.progress(1.0, Message::new("stage_done"));
     Ok(outcome)
+}
+
+/// The circle that `roundness_um` is about.
+pub(super) fn judged<'a>(
+    job: &Job,
+    measured: &'a RoundnessCircles,
+    filtered: &'a RoundnessCircles,
+) -> &'a RoundnessCircle {
+    // Without a filter there is no need to bring the points to uniform angles first.
+    of_reference(if job.filter == (RoundnessFilter::None {}) { measured } else { filtered }, job.reference)
 }
 
 /// The circle that was asked for.
@@ -189,9 +201,12 @@ fn circles_out(found: &Circles, denser: &Circles, place: &dyn Fn(usize) -> Round
         contacts: Vec::new(),
         proof: None,
         sampling_error_um: UM_PER_MM * (denser_mm - (outer_mm - inner_mm)).abs(),
+        numerical_error_um: 0.0,
         centre_numerical_error_um: None,
     };
     let um = |mm: f64| Some(UM_PER_MM * mm);
+    // The far and the near end of a diameter move by the error of the centre, in opposite directions at worst.
+    let about_centre = |distance_mm: f64, centre_mm: f64| UM_PER_MM * (distance_mm + 2.0 * centre_mm);
     let (peak, valley) = (ContactKind::Peak, ContactKind::Valley);
     let (outer, inner) = (ContactKind::Outer, ContactKind::Inner);
     let least_squares = RoundnessCircle {
@@ -199,6 +214,7 @@ fn circles_out(found: &Circles, denser: &Circles, place: &dyn Fn(usize) -> Round
         ronv_um: um(ls.valley_mm),
         ronq_um: um(ls.rms_mm),
         contacts: vec![contact(peak, ls.span.farthest), contact(valley, ls.span.nearest)],
+        numerical_error_um: about_centre(mc.radius_error_mm, ls.centre_error_mm),
         centre_numerical_error_um: um(ls.centre_error_mm),
         ..circle(
             ls.circle.centre_mm,
@@ -220,6 +236,7 @@ fn circles_out(found: &Circles, denser: &Circles, place: &dyn Fn(usize) -> Round
             is_unique: mz.is_unique,
             others: Vec::new(),
         }),
+        numerical_error_um: UM_PER_MM * mz.width_error_mm,
         centre_numerical_error_um: mz.centre_error_mm.map(|mm| UM_PER_MM * mm),
         ..circle(mz.centre_mm, middle_mm, mz.inner_radius_mm, mz.outer_radius_mm, denser.minimum_zone.width_mm())
     };
@@ -233,6 +250,7 @@ fn circles_out(found: &Circles, denser: &Circles, place: &dyn Fn(usize) -> Round
             is_unique: mi.is_global && mi.others.is_empty(),
             others: mi.others.iter().map(|other| other_out(other.circle.centre_mm, other.circle.radius_mm)).collect(),
         }),
+        numerical_error_um: about_centre(mi.radius_error_mm, mi.centre_error_mm),
         centre_numerical_error_um: um(mi.centre_error_mm),
         ..circle(
             mi.circle.centre_mm,
@@ -254,6 +272,7 @@ fn circles_out(found: &Circles, denser: &Circles, place: &dyn Fn(usize) -> Round
             is_unique: true,
             others: Vec::new(),
         }),
+        numerical_error_um: about_centre(mc.radius_error_mm, mc.centre_error_mm),
         centre_numerical_error_um: um(mc.centre_error_mm),
         ..circle(
             mc.circle.centre_mm,
