@@ -8,6 +8,7 @@
 mod deflection;
 mod http;
 mod measure;
+mod roundness;
 mod rows;
 
 use std::io::Write;

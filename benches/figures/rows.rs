@@ -9,6 +9,7 @@ use crate::Row;
 use crate::deflection;
 use crate::http::{self, Exchange};
 use crate::measure::{Measured, Unit, cpu_time};
+use crate::roundness;
 
 const DEFLECTION: &str = "deflection-compensation";
 /// A number of that calculator's jobs which changes the result and not the work.
@@ -38,6 +39,17 @@ pub(crate) fn all() -> Vec<Row> {
         row("fewest-chord tool path, 200,000 stations", Unit::Time, us(500_000.0), us(200_000.0), || {
             deflection::chords(200_000)
         }),
+        row(
+            "minimum-zone circle with its least-squares start, certified, 3600 points",
+            Unit::Time,
+            us(300.0),
+            us(150.0),
+            || roundness::zone(3600),
+        ),
+        row("all four reference circles, certified, 3600 points", Unit::Time, us(500.0), us(250.0), || {
+            roundness::four(3600)
+        }),
+        row("complete roundness evaluation, 3600 points", Unit::Time, None, None, || roundness::answer(3600)),
         row("CSV, 10,000 rows of 8 numbers", Unit::Time, None, None, csv),
         row("G-code, 10,000 cuts", Unit::Time, None, None, gcode),
         row("SVG, 3 panels of 201 stations", Unit::Time, None, None, || svg(201)),

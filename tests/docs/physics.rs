@@ -15,7 +15,7 @@ const DEFLECTION: &str = "docs/physics/deflection-compensation.md";
 const EFFECTS: &str = "docs/physics/effects-deflection.md";
 
 /// Groups of equations.
-const GROUPS: [&str; 2] = ["deflection/", "diagnosis/"];
+const GROUPS: [&str; 3] = ["deflection/", "diagnosis/", "roundness/"];
 
 /// Equations that have a heading: its first word.
 fn documented() -> BTreeSet<String> {
@@ -120,13 +120,18 @@ fn the_catalogue_has_the_numbers_of_the_code() {
     }
 }
 
+/// Calculators and evaluations with their pages.
+const PAGES: [(&str, &str); 2] =
+    [("deflection-compensation", DEFLECTION), ("roundness-evaluation", "docs/physics/roundness-evaluation.md")];
+
 #[test]
-fn every_code_of_the_calculator_is_explained() {
-    let page = Document::read(root(), DEFLECTION).text;
+fn every_code_of_a_calculator_is_explained() {
     let registry = Registry::standard().unwrap();
-    let entry = registry.entry("deflection-compensation").unwrap();
-    let codes = &entry.meta().codes;
-    let groups = codes.faults.iter().chain(codes.failures).chain(codes.warnings).copied();
-    let missing: Vec<_> = groups.flatten().filter(|code| !page.contains(&format!("`{code}`"))).collect();
-    assert!(missing.is_empty(), "{DEFLECTION} does not name {missing:?}");
+    for (id, name) in PAGES {
+        let page = Document::read(root(), name).text;
+        let codes = &registry.entry(id).unwrap().meta().codes;
+        let groups = codes.faults.iter().chain(codes.failures).chain(codes.warnings).copied();
+        let missing: Vec<_> = groups.flatten().filter(|code| !page.contains(&format!("`{code}`"))).collect();
+        assert!(missing.is_empty(), "{name} does not name {missing:?}");
+    }
 }

@@ -34,8 +34,8 @@ pub(super) const WARNING_CODES: &[&str] = &[
 
 /// Points per wave of the cut-off that the standard asks for (ISO 12181-2).
 const POINTS_PER_WAVE: f64 = 7.0;
-/// Finest that roundness testers resolve, µm.
-const FINEST_UM: f64 = 0.01;
+/// The noise of a good roundness tester, and the roundness of its glass master, µm.
+const FINEST_UM: f64 = 0.02;
 /// A mean radius farther from the nominal one than this is of another quantity or unit.
 const UNLIKE: f64 = 0.02;
 /// A reading this many standard deviations (estimated from the median, which a spike does not move) off the filtered

@@ -13,6 +13,8 @@ use super::readings::{Readings, angles_deg};
 const UM_PER_MM: f64 = 1e3;
 /// Angles are uniform when they differ from uniform ones by less than this share of a step: printed decimals.
 const UNIFORM: f64 = 1e-3;
+/// How many times as densely the profile is read to see peaks between the points.
+const DENSER: usize = 4;
 /// A spline of the third degree errs with the fourth power of the step.
 const ERROR_RATIO_OF_DOUBLE_STEP: f64 = 16.0;
 
@@ -26,13 +28,13 @@ pub(super) fn outcome(job: &Job, monitor: &dyn Monitor) -> Result<Outcome, Failu
     let readings = Readings::of(job).map_err(|error| failure(error, None))?;
     let n = job.profile_points.map_or(readings.section.len(), |points| usize::try_from(points).unwrap_or(usize::MAX));
     let fail = |error| failure(error, Some(&readings));
-    let (grid, fine) = (Grid::new(n).map_err(fail)?, Grid::new(2 * n).map_err(fail)?);
+    let (grid, fine) = (Grid::new(n).map_err(fail)?, Grid::new(DENSER * n).map_err(fail)?);
     let highest = usize::try_from(job.highest_harmonic).unwrap_or(usize::MAX);
     let found = evaluate(&readings.section, &grid, job.filter.filter(), n / 2).map_err(fail)?;
     checkpoint(monitor)?;
     monitor.progress(0.5, Message::new("stage_denser"));
     let centre = found.unfiltered.least_squares.circle.centre_mm;
-    let denser = refer(&readings.section, centre, 2 * n).map_err(fail)?;
+    let denser = refer(&readings.section, centre, DENSER * n).map_err(fail)?;
     let measured_denser = circles(&fine.section(&denser).map_err(fail)?).map_err(fail)?;
     let filtered = grid.resampled(&found.referred_mm, job.filter.filter(), &fine).map_err(fail)?;
     let filtered_denser = circles(&fine.section(&filtered).map_err(fail)?).map_err(fail)?;
@@ -291,7 +293,7 @@ fn other_out([x, y]: [f64; 2], radius_mm: f64) -> OtherCircle {
 
 /// A count as a number.
 fn number(count: usize) -> f64 {
-    // At most 400 000.
+    // At most 800 000.
     #[allow(clippy::cast_precision_loss)]
     let number = count as f64;
     number

@@ -99,7 +99,7 @@ pub struct RoundnessCircle {
     pub contacts: Vec<RoundnessContact>,
     /// Why no other circle of its kind is better; absent for the least-squares circle, which is decided by all points.
     pub proof: Option<RoundnessProof>,
-    /// How much RONt changes when the profile is read twice as densely: peaks and valleys between the points.
+    /// How much RONt changes when the profile is read four times as densely: peaks and valleys between the points.
     #[schema(extensions(("x-unit" = json!("um"))))]
     pub sampling_error_um: f64,
     /// Bound of the round-off in RONt: that of the distances, and of the centre where no value is least or largest at it.
