@@ -9,6 +9,7 @@ mod deflection;
 mod http;
 mod measure;
 mod ring;
+mod roundness;
 mod rows;
 
 use std::io::Write;

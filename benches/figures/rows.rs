@@ -10,6 +10,7 @@ use crate::deflection;
 use crate::http::{self, Exchange};
 use crate::measure::{Measured, Unit, cpu_time};
 use crate::ring;
+use crate::roundness;
 
 const DEFLECTION: &str = "deflection-compensation";
 /// A number of that calculator's jobs which changes the result and not the work.
@@ -50,6 +51,17 @@ pub(crate) fn all() -> Vec<Row> {
         ),
         row("ring: complete answer to the paper's run of 256 revolutions", Unit::Time, None, None, ring::answer),
         row("ring: set-up map, 91 x 61 cells, 20 lobes", Unit::Time, None, None, ring::map),
+        row(
+            "minimum-zone circle with its least-squares start, certified, 3600 points",
+            Unit::Time,
+            us(300.0),
+            us(150.0),
+            || roundness::zone(3600),
+        ),
+        row("all four reference circles, certified, 3600 points", Unit::Time, us(500.0), us(250.0), || {
+            roundness::four(3600)
+        }),
+        row("complete roundness evaluation, 3600 points", Unit::Time, None, None, || roundness::answer(3600)),
         row("CSV, 10,000 rows of 8 numbers", Unit::Time, None, None, csv),
         row("G-code, 10,000 cuts", Unit::Time, None, None, gcode),
         row("SVG, 3 panels of 201 stations", Unit::Time, None, None, || svg(201)),

@@ -126,8 +126,11 @@ fn the_catalogue_has_the_numbers_of_the_code() {
 }
 
 /// Calculators and evaluations with their pages.
-const PAGES: [(&str, &str); 2] =
-    [("deflection-compensation", DEFLECTION), ("ring-roundness", "docs/physics/ring-roundness.md")];
+const PAGES: [(&str, &str); 3] = [
+    ("deflection-compensation", DEFLECTION),
+    ("ring-roundness", "docs/physics/ring-roundness.md"),
+    ("roundness-evaluation", "docs/physics/roundness-evaluation.md"),
+];
 
 #[test]
 fn every_code_of_a_calculator_is_explained() {

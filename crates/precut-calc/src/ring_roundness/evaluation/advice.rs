@@ -2,7 +2,7 @@
 
 use crate::calculator::{Finding, Message};
 
-use super::assess::of_reference;
+use super::assess::{judged, of_reference};
 use super::check::filter_points;
 use super::input::{Job, RoundnessFilter};
 use super::output::Outcome;
@@ -34,8 +34,8 @@ pub(super) const WARNING_CODES: &[&str] = &[
 
 /// Points per wave of the cut-off that the standard asks for (ISO 12181-2).
 const POINTS_PER_WAVE: f64 = 7.0;
-/// Finest that roundness testers resolve, µm.
-const FINEST_UM: f64 = 0.01;
+/// The noise of a good roundness tester, and the roundness of its glass master, µm.
+const FINEST_UM: f64 = 0.02;
 /// A mean radius farther from the nominal one than this is of another quantity or unit.
 const UNLIKE: f64 = 0.02;
 /// A reading this many standard deviations (estimated from the median, which a spike does not move) off the filtered
@@ -152,9 +152,10 @@ fn tolerance(job: &Job, outcome: &Outcome) -> Option<Result<Message, Finding>> {
 
 /// What is known to be unknown of the roundness asked for: between the points, of the spline, of the round-off.
 fn error_um(job: &Job, outcome: &Outcome) -> f64 {
-    let sampling_um = of_reference(&outcome.filtered, job.reference).sampling_error_um;
+    let sampling_um = judged(job, &outcome.measured, &outcome.filtered).sampling_error_um;
     // A peak and a valley, each with the error of the spline.
-    sampling_um + 2.0 * outcome.data.interpolation_error_um + outcome.numerical_error_um
+    let spline_um = if job.filter == (RoundnessFilter::None {}) { 0.0 } else { outcome.data.interpolation_error_um };
+    sampling_um + 2.0 * spline_um + outcome.numerical_error_um
 }
 
 pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
@@ -170,7 +171,8 @@ pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
                 .with("share", 1.0 - kept.ront_um / measured.ront_um),
         );
     }
-    let (least_squares_um, zone_um) = (outcome.filtered.least_squares.ront_um, outcome.filtered.minimum_zone.ront_um);
+    let shown = if job.filter == (RoundnessFilter::None {}) { &outcome.measured } else { &outcome.filtered };
+    let (least_squares_um, zone_um) = (shown.least_squares.ront_um, shown.minimum_zone.ront_um);
     if least_squares_um > 0.0 {
         said.push(
             Message::new("zone_against_least_squares")
@@ -193,7 +195,7 @@ pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
     said.push(
         Message::new("known_to")
             .with("error_um", error_um(job, outcome))
-            .with("sampling_um", kept.sampling_error_um)
+            .with("sampling_um", judged(job, &outcome.measured, &outcome.filtered).sampling_error_um)
             .with("interpolation_um", outcome.data.interpolation_error_um)
             .with("aliasing_um", outcome.data.aliasing_um),
     );
@@ -213,7 +215,7 @@ pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
 }
 
 fn roundness_is(job: &Job, outcome: &Outcome) -> Message {
-    let circle = of_reference(&outcome.filtered, job.reference);
+    let circle = judged(job, &outcome.measured, &outcome.filtered);
     let message = Message::new("roundness_is")
         .with("roundness_um", outcome.roundness_um)
         .with("reference", job.reference.name())

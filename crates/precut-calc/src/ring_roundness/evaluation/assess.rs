@@ -3,7 +3,7 @@
 use crate::calculator::{Failure, Finding, Message, Monitor, checkpoint};
 use crate::num::roundness::{Circles, Evaluation, Grid, PeriodicSpline, RoundnessError, circles, evaluate, refer};
 
-use super::input::{Job, ReferenceCircle};
+use super::input::{Job, ReferenceCircle, RoundnessFilter};
 use super::output::{
     ContactKind, OtherCircle, Outcome, RoundnessCircle, RoundnessCircles, RoundnessContact, RoundnessData,
     RoundnessProfile, RoundnessProof, RoundnessSpectrum,
@@ -13,6 +13,8 @@ use super::readings::{Readings, angles_deg};
 const UM_PER_MM: f64 = 1e3;
 /// Angles are uniform when they differ from uniform ones by less than this share of a step: printed decimals.
 const UNIFORM: f64 = 1e-3;
+/// How many times as densely the profile is read to see peaks between the points.
+const DENSER: usize = 4;
 /// A spline of the third degree errs with the fourth power of the step.
 const ERROR_RATIO_OF_DOUBLE_STEP: f64 = 16.0;
 
@@ -26,13 +28,13 @@ pub(super) fn outcome(job: &Job, monitor: &dyn Monitor) -> Result<Outcome, Failu
     let readings = Readings::of(job).map_err(|error| failure(error, None))?;
     let n = job.profile_points.map_or(readings.section.len(), |points| usize::try_from(points).unwrap_or(usize::MAX));
     let fail = |error| failure(error, Some(&readings));
-    let (grid, fine) = (Grid::new(n).map_err(fail)?, Grid::new(2 * n).map_err(fail)?);
+    let (grid, fine) = (Grid::new(n).map_err(fail)?, Grid::new(DENSER * n).map_err(fail)?);
     let highest = usize::try_from(job.highest_harmonic).unwrap_or(usize::MAX);
     let found = evaluate(&readings.section, &grid, job.filter.filter(), n / 2).map_err(fail)?;
     checkpoint(monitor)?;
     monitor.progress(0.5, Message::new("stage_denser"));
     let centre = found.unfiltered.least_squares.circle.centre_mm;
-    let denser = refer(&readings.section, centre, 2 * n).map_err(fail)?;
+    let denser = refer(&readings.section, centre, DENSER * n).map_err(fail)?;
     let measured_denser = circles(&fine.section(&denser).map_err(fail)?).map_err(fail)?;
     let filtered = grid.resampled(&found.referred_mm, job.filter.filter(), &fine).map_err(fail)?;
     let filtered_denser = circles(&fine.section(&filtered).map_err(fail)?).map_err(fail)?;
@@ -45,18 +47,30 @@ pub(super) fn outcome(job: &Job, monitor: &dyn Monitor) -> Result<Outcome, Failu
     let step_deg = 360.0 / number(n);
     let places =
         |index: usize| RoundnessContact { kind: ContactKind::Peak, angle_deg: step_deg * number(index), row: None };
+    let measured = circles_out(&found.unfiltered, &measured_denser, &rows);
     let filtered = circles_out(&found.filtered, &filtered_denser, &places);
+    let judged = judged(job, &measured, &filtered);
     let outcome = Outcome {
-        roundness_um: of_reference(&filtered, job.reference).ront_um,
+        roundness_um: judged.ront_um,
+        numerical_error_um: judged.numerical_error_um.max(UM_PER_MM * numerical_error_mm(&found)),
         data: data(job, &readings, &found)?,
-        measured: circles_out(&found.unfiltered, &measured_denser, &rows),
+        measured,
         filtered,
         profile: profile(&found),
         spectrum: spectrum(job, &found, highest),
-        numerical_error_um: UM_PER_MM * numerical_error_mm(&found),
     };
     monitor.progress(1.0, Message::new("stage_done"));
     Ok(outcome)
+}
+
+/// The circle that `roundness_um` is about.
+pub(super) fn judged<'a>(
+    job: &Job,
+    measured: &'a RoundnessCircles,
+    filtered: &'a RoundnessCircles,
+) -> &'a RoundnessCircle {
+    // Without a filter there is no need to bring the points to uniform angles first.
+    of_reference(if job.filter == (RoundnessFilter::None {}) { measured } else { filtered }, job.reference)
 }
 
 /// The circle that was asked for.
@@ -189,9 +203,12 @@ fn circles_out(found: &Circles, denser: &Circles, place: &dyn Fn(usize) -> Round
         contacts: Vec::new(),
         proof: None,
         sampling_error_um: UM_PER_MM * (denser_mm - (outer_mm - inner_mm)).abs(),
+        numerical_error_um: 0.0,
         centre_numerical_error_um: None,
     };
     let um = |mm: f64| Some(UM_PER_MM * mm);
+    // The far and the near end of a diameter move by the error of the centre, in opposite directions at worst.
+    let about_centre = |distance_mm: f64, centre_mm: f64| UM_PER_MM * (distance_mm + 2.0 * centre_mm);
     let (peak, valley) = (ContactKind::Peak, ContactKind::Valley);
     let (outer, inner) = (ContactKind::Outer, ContactKind::Inner);
     let least_squares = RoundnessCircle {
@@ -199,6 +216,7 @@ fn circles_out(found: &Circles, denser: &Circles, place: &dyn Fn(usize) -> Round
         ronv_um: um(ls.valley_mm),
         ronq_um: um(ls.rms_mm),
         contacts: vec![contact(peak, ls.span.farthest), contact(valley, ls.span.nearest)],
+        numerical_error_um: about_centre(mc.radius_error_mm, ls.centre_error_mm),
         centre_numerical_error_um: um(ls.centre_error_mm),
         ..circle(
             ls.circle.centre_mm,
@@ -220,6 +238,7 @@ fn circles_out(found: &Circles, denser: &Circles, place: &dyn Fn(usize) -> Round
             is_unique: mz.is_unique,
             others: Vec::new(),
         }),
+        numerical_error_um: UM_PER_MM * mz.width_error_mm,
         centre_numerical_error_um: mz.centre_error_mm.map(|mm| UM_PER_MM * mm),
         ..circle(mz.centre_mm, middle_mm, mz.inner_radius_mm, mz.outer_radius_mm, denser.minimum_zone.width_mm())
     };
@@ -233,6 +252,7 @@ fn circles_out(found: &Circles, denser: &Circles, place: &dyn Fn(usize) -> Round
             is_unique: mi.is_global && mi.others.is_empty(),
             others: mi.others.iter().map(|other| other_out(other.circle.centre_mm, other.circle.radius_mm)).collect(),
         }),
+        numerical_error_um: about_centre(mi.radius_error_mm, mi.centre_error_mm),
         centre_numerical_error_um: um(mi.centre_error_mm),
         ..circle(
             mi.circle.centre_mm,
@@ -254,6 +274,7 @@ fn circles_out(found: &Circles, denser: &Circles, place: &dyn Fn(usize) -> Round
             is_unique: true,
             others: Vec::new(),
         }),
+        numerical_error_um: about_centre(mc.radius_error_mm, mc.centre_error_mm),
         centre_numerical_error_um: um(mc.centre_error_mm),
         ..circle(
             mc.circle.centre_mm,
@@ -272,7 +293,7 @@ fn other_out([x, y]: [f64; 2], radius_mm: f64) -> OtherCircle {
 
 /// A count as a number.
 fn number(count: usize) -> f64 {
-    // At most 400 000.
+    // At most 800 000.
     #[allow(clippy::cast_precision_loss)]
     let number = count as f64;
     number

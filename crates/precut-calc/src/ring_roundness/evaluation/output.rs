@@ -7,20 +7,20 @@ use utoipa::ToSchema;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[schema(title = "RoundnessEvaluationResult")]
 pub struct Outcome {
-    /// RONt of the filtered profile about the reference circle that was asked for.
+    /// RONt of the filtered profile about the reference circle that was asked for; without a filter, of the points.
     #[schema(extensions(("x-unit" = json!("um"))))]
     pub roundness_um: f64,
     /// What the points are like.
     pub data: RoundnessData,
     /// Circles of the points as they are; centres in the coordinates of the job.
     pub measured: RoundnessCircles,
-    /// Circles of the filtered profile; centres relative to the least-squares centre of the points.
+    /// Circles of the filtered profile at uniform angles; centres relative to the least-squares centre of the points.
     pub filtered: RoundnessCircles,
     /// The profile about the least-squares centre of the points.
     pub profile: RoundnessProfile,
     /// Harmonics of the profile before the filter.
     pub spectrum: RoundnessSpectrum,
-    /// Bound of the round-off in every roundness value, radius and amplitude.
+    /// Bound of the round-off in `roundness_um`, in every radius and in every amplitude.
     #[schema(extensions(("x-unit" = json!("um"))))]
     pub numerical_error_um: f64,
 }
@@ -99,9 +99,12 @@ pub struct RoundnessCircle {
     pub contacts: Vec<RoundnessContact>,
     /// Why no other circle of its kind is better; absent for the least-squares circle, which is decided by all points.
     pub proof: Option<RoundnessProof>,
-    /// How much RONt changes when the profile is read twice as densely: peaks and valleys between the points.
+    /// How much RONt changes when the profile is read four times as densely: peaks and valleys between the points.
     #[schema(extensions(("x-unit" = json!("um"))))]
     pub sampling_error_um: f64,
+    /// Bound of the round-off in RONt: that of the distances, and of the centre where no value is least or largest at it.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub numerical_error_um: f64,
     /// Bound of the round-off in the centre; absent where the centre is not determined.
     #[schema(extensions(("x-unit" = json!("um"))))]
     pub centre_numerical_error_um: Option<f64>,

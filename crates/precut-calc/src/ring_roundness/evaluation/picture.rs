@@ -225,6 +225,7 @@ fn circles_table(outcome: &Outcome) -> Table {
             numbers("ronv", "um", &|circle| circle.ronv_um),
             numbers("ronq", "um", &|circle| circle.ronq_um),
             numbers("sampling_error", "um", &|circle| Some(circle.sampling_error_um)),
+            numbers("numerical_error", "um", &|circle| Some(circle.numerical_error_um)),
             numbers("stiffness", "1", &|circle| circle.proof.as_ref().map(|proof| proof.stiffness)),
             words("is_global", &proof(|proof| proof.is_global)),
             words("is_unique", &proof(|proof| proof.is_unique)),
