@@ -1,3 +1,6 @@
 //! Numerics with no machining words in them.
 
 pub mod beam;
+pub mod dense;
+pub mod lsq;
+
