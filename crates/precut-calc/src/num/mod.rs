@@ -3,4 +3,4 @@
 pub mod beam;
 pub mod dense;
 pub mod lsq;
-
+pub mod stats;
