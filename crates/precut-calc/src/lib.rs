@@ -8,9 +8,11 @@ pub mod calculator;
 pub mod deflection_compensation;
 pub mod effects;
 pub mod force;
+pub mod machinability;
 pub mod material;
 pub mod num;
 pub mod path;
+pub mod shaft;
 
 use calculator::Registrar;
 

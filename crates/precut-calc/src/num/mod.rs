@@ -2,5 +2,6 @@
 
 pub mod beam;
 pub mod dense;
+pub mod gp;
 pub mod lsq;
 pub mod stats;
