@@ -22,7 +22,7 @@ pub(crate) use checker::{Faults, by_pointer, child};
 pub(crate) use entry::Unprepared;
 pub(crate) use finite::non_finite_place;
 pub(crate) use nearest::nearest;
-pub(crate) use place::{CellKind, Step, TableColumn, TablePlace};
+pub(crate) use place::{CellKind, FreeColumns, Step, TableColumn, TablePlace};
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

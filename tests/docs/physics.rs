@@ -15,7 +15,7 @@ const DEFLECTION: &str = "docs/physics/deflection-compensation.md";
 const EFFECTS: &str = "docs/physics/effects-deflection.md";
 
 /// Groups of equations.
-const GROUPS: [&str; 2] = ["deflection/", "diagnosis/"];
+const GROUPS: [&str; 3] = ["deflection/", "diagnosis/", "fit/"];
 
 /// Equations that have a heading: its first word.
 fn documented() -> BTreeSet<String> {

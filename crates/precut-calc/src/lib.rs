@@ -7,6 +7,7 @@
 pub mod calculator;
 pub mod deflection_compensation;
 pub mod effects;
+pub mod feed_schedule;
 pub mod force;
 pub mod machinability;
 pub mod material;
@@ -19,4 +20,5 @@ use calculator::Registrar;
 /// Every calculator, one line each. Nothing else has to change when one moves in.
 pub fn register(registrar: &mut impl Registrar) {
     registrar.with_forward_model::<deflection_compensation::DeflectionCompensation>();
+    registrar.calculator::<feed_schedule::fit::MachinabilityFit>();
 }

@@ -3,5 +3,6 @@
 pub mod beam;
 pub mod dense;
 pub mod gp;
+pub mod hull;
 pub mod lsq;
 pub mod stats;
