@@ -22,7 +22,9 @@ pub(crate) use checker::{Faults, by_pointer, child};
 pub(crate) use entry::Unprepared;
 pub(crate) use finite::non_finite_place;
 pub(crate) use nearest::nearest;
-pub(crate) use place::{CellKind, FreeColumns, Step, TableColumn, TablePlace};
+#[cfg(test)]
+pub(crate) use place::FreeColumns;
+pub(crate) use place::{CellKind, Step, TableColumn, TablePlace};
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -118,9 +118,7 @@ fn place(schema: &Value, path: &[Step]) -> TablePlace {
     let row = &schema["items"];
     let required = |name: &str| row["required"].as_array().is_some_and(|names| names.iter().any(|n| n == name));
     let fields = || row["properties"].as_object().into_iter().flatten();
-    let free = |cells: &str| {
-        fields().find(|(_, field)| field["x-free-columns"] == cells).map(|(name, _)| name.clone())
-    };
+    let free = |cells: &str| fields().find(|(_, field)| field["x-free-columns"] == cells).map(|(name, _)| name.clone());
     let columns = fields()
         .filter(|(_, field)| field.get("x-free-columns").is_none())
         .map(|(name, field)| TableColumn {

@@ -67,7 +67,8 @@ fn value_of(output: &OutputFit, name: &str) -> f64 {
 
 #[test]
 fn an_exact_power_law_is_found_to_its_last_digits() {
-    let answer = solve(json!({ "trials": factorial(1, |v, s, t, _| power(v, s, t)), "form": "log_log", "resamples": 0 }));
+    let answer =
+        solve(json!({ "trials": factorial(1, |v, s, t, _| power(v, s, t)), "form": "log_log", "resamples": 0 }));
     let model = answer.output.models.roughness.as_ref().unwrap();
     // Rounding of exp and ln, times a condition number of some 20 of the constant.
     near(model.constant, 2.3, 1e-12);
@@ -90,7 +91,9 @@ fn an_exact_semi_logarithmic_law_is_preferred_to_a_power_law() {
     near(value_of(output, "constant"), 8.66, 1e-12);
     near(value_of(output, "feed_mm_per_rev"), 0.61, 1e-12);
     // Where both fit, it says that it cannot tell.
-    let flat = |v: f64, s: f64, t: f64, n: u32| 10.0 + 0.1 * (v / 120.0).ln() + 0.02 * Resampler::new(3, u64::from(n)).normal() + 0.0 * (s + t);
+    let flat = |v: f64, s: f64, t: f64, n: u32| {
+        10.0 + 0.1 * (v / 120.0).ln() + 0.02 * Resampler::new(3, u64::from(n)).normal() + 0.0 * (s + t)
+    };
     let answer = solve(json!({ "trials": factorial(1, flat) }));
     assert_eq!(answer.output.outputs[0].form_decided, Some(false));
     assert!(answer.explanation.iter().any(|said| said.code == "fit_form_undecided"));
@@ -113,7 +116,8 @@ fn factors_and_further_variables_go_into_the_model_where_it_is_used() {
             "variables": ["speed_m_per_min", "feed_mm_per_rev", "depth_mm", "nose_radius_mm"]
         }))
     };
-    let place = Conditions { speed_m_per_min: 100.0, feed_mm_per_rev: 0.17, depth_mm: 0.7, cutting_edge_angle_deg: None };
+    let place =
+        Conditions { speed_m_per_min: 100.0, feed_mm_per_rev: 0.17, depth_mm: 0.7, cutting_edge_angle_deg: None };
     for (level, shift) in [("off", 0.0_f64), ("on", 0.4)] {
         let answer = wanted(json!({ "further": { "nose_radius_mm": 0.8 }, "factors": { "coolant": level } }));
         let value = answer.output.models.roughness.as_ref().unwrap().value(&place);
@@ -173,9 +177,7 @@ fn intervals_hold_the_truth_as_often_as_they_say() {
 
 #[test]
 fn lack_of_fit_and_the_missing_term_are_found() {
-    let curved = |v: f64, s: f64, t: f64, n: u32| {
-        scattered(9, 0.03)(v, s, t, n) * (0.5 * (s / 0.2).ln().powi(2)).exp()
-    };
+    let curved = |v: f64, s: f64, t: f64, n: u32| scattered(9, 0.03)(v, s, t, n) * (0.5 * (s / 0.2).ln().powi(2)).exp();
     let answer = solve(json!({ "trials": factorial(2, curved), "form": "log_log", "resamples": 0 }));
     let output = &answer.output.outputs[0];
     assert!(output.lack_of_fit.as_ref().unwrap().p_value < 1e-6);
@@ -237,10 +239,11 @@ fn an_outlier_and_a_wrong_unit_are_named() {
 #[test]
 fn predictions_outside_the_hull_warn_even_inside_the_box() {
     // Speed and feed were varied against each other: the box has two empty corners.
-    let rows: Vec<Value> = [(80.0, 0.3), (100.0, 0.25), (120.0, 0.2), (150.0, 0.15), (180.0, 0.1), (110.0, 0.2), (130.0, 0.22)]
-        .iter()
-        .map(|(v, s)| json!({ "speed_m_per_min": v, "feed_mm_per_rev": s, "roughness_um": power(*v, *s, 1.0) }))
-        .collect();
+    let rows: Vec<Value> =
+        [(80.0, 0.3), (100.0, 0.25), (120.0, 0.2), (150.0, 0.15), (180.0, 0.1), (110.0, 0.22), (130.0, 0.18)]
+            .iter()
+            .map(|(v, s)| json!({ "speed_m_per_min": v, "feed_mm_per_rev": s, "roughness_um": power(*v, *s, 1.0) }))
+            .collect();
     let answer = solve(json!({
         "trials": rows, "form": "log_log", "resamples": 0,
         "predict": [
@@ -264,7 +267,8 @@ fn predictions_outside_the_hull_warn_even_inside_the_box() {
 #[test]
 fn the_best_set_of_terms_leaves_out_what_does_nothing() {
     let without_depth = |v: f64, s: f64, _: f64, n: u32| scattered(21, 0.05)(v, s, 1.0, n);
-    let answer = solve(json!({ "trials": factorial(2, without_depth), "terms": "best", "form": "log_log", "resamples": 0 }));
+    let answer =
+        solve(json!({ "trials": factorial(2, without_depth), "terms": "best", "form": "log_log", "resamples": 0 }));
     let names: Vec<&str> = answer.output.outputs[0].coefficients.iter().map(|c| c.name.as_str()).collect();
     assert_eq!(names, ["constant", "speed_m_per_min", "feed_mm_per_rev"]);
     let model = answer.output.models.roughness.unwrap();
@@ -287,31 +291,62 @@ fn bad_tables_are_refused_with_what_would_mend_them() {
     assert_eq!(fault(json!({ "trials": changed }), "duplicate_trial").pointer, "/trials/3/id");
     let mut changed = rows.clone();
     changed[2]["roughness_um"] = json!(0.0);
-    assert_eq!(fault(json!({ "trials": changed, "form": "log_log" }), "output_not_positive").pointer, "/trials/2/roughness_um");
+    assert_eq!(
+        fault(json!({ "trials": changed, "form": "log_log" }), "output_not_positive").pointer,
+        "/trials/2/roughness_um"
+    );
     assert!(refused(json!({ "trials": changed })).is_empty(), "semi-log can take a 0");
-    let constant: Vec<Value> = rows.iter().cloned().map(|mut r| { r["depth_mm"] = json!(1.0); r }).collect();
+    let constant: Vec<Value> = rows
+        .iter()
+        .cloned()
+        .map(|mut r| {
+            r["depth_mm"] = json!(1.0);
+            r
+        })
+        .collect();
     let named = ["speed_m_per_min", "feed_mm_per_rev", "depth_mm"];
     fault(json!({ "trials": constant, "variables": named }), "constant_variable");
     assert!(refused(json!({ "trials": constant })).is_empty(), "left out by itself");
-    let tied: Vec<Value> = rows.iter().cloned().map(|mut r| {
-        r["depth_mm"] = json!(2.0 * r["feed_mm_per_rev"].as_f64().unwrap());
-        r
-    }).collect();
+    let tied: Vec<Value> = rows
+        .iter()
+        .cloned()
+        .map(|mut r| {
+            r["depth_mm"] = json!(2.0 * r["feed_mm_per_rev"].as_f64().unwrap());
+            r
+        })
+        .collect();
     let said = fault(json!({ "trials": tied }), "collinear_columns");
     assert!(format!("{:?}", said.values).contains("feed_mm_per_rev"), "{said:?}");
     fault(json!({ "trials": [] }), "no_output");
     fault(json!({ "trials": rows, "outputs": ["tool_life_min"] }), "unknown_output_column");
     fault(json!({ "trials": rows, "outputs": ["roughness_um", "roughness_um"] }), "named_twice");
-    fault(json!({ "trials": rows, "variables": ["speed_m_per_min"], "outputs": ["speed_m_per_min"] }), "output_is_variable");
+    fault(
+        json!({ "trials": rows, "variables": ["speed_m_per_min"], "outputs": ["speed_m_per_min"] }),
+        "output_is_variable",
+    );
     fault(json!({ "trials": rows, "variables": ["hardness"] }), "unknown_variable_column");
     fault(json!({ "trials": rows, "factors": ["coolant"] }), "unknown_factor");
     fault(json!({ "trials": rows, "predict": [{ "speed_m_per_min": 100 }] }), "prediction_condition_missing");
     let mut changed = rows.clone();
     changed[1]["speed_m_per_min"] = json!(-10.0);
     assert_eq!(fault(json!({ "trials": changed }), "bad_speed").pointer, "/trials/1/speed_m_per_min");
-    let equal: Vec<Value> = rows.iter().cloned().map(|mut r| { r["roughness_um"] = json!(1.0); r }).collect();
+    let equal: Vec<Value> = rows
+        .iter()
+        .cloned()
+        .map(|mut r| {
+            r["roughness_um"] = json!(1.0);
+            r
+        })
+        .collect();
     fault(json!({ "trials": equal }), "constant_output");
-    let lives: Vec<Value> = rows.iter().cloned().map(|mut r| { r["tool_life_min"] = json!(10.0); r }).collect();
+    let lives: Vec<Value> = rows
+        .iter()
+        .cloned()
+        .map(|mut r| {
+            r["tool_life_min"] = json!(10.0);
+            r
+        })
+        .collect();
     fault(json!({ "trials": lives, "outputs": ["tool_life_min"], "form": "semi_log" }), "semi_log_not_allowed");
     let mut nan = job(json!({ "trials": rows }));
     nan.trials.0[4].roughness_um = Some(f64::NAN);

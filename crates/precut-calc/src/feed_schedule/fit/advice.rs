@@ -52,7 +52,8 @@ const MOST: usize = 10;
 pub(super) fn warnings(job: &FitJob, fits: &[Fit<'_>], outcome: &FitOutcome) -> Vec<Finding> {
     let mut warnings = of_table(job, fits, outcome);
     for (fit, output) in fits.iter().zip(&outcome.outputs) {
-        let said = |code: &'static str, pointer: String| Finding::new(code, pointer).with("output", output.name.clone());
+        let said =
+            |code: &'static str, pointer: String| Finding::new(code, pointer).with("output", output.name.clone());
         of_rows(job, fit, output, &mut warnings);
         if let Some(test) = output.lack_of_fit.as_ref().filter(|test| test.p_value < LEVEL) {
             let worst = output.missing_terms.first().filter(|term| term.p_value < 0.05);
@@ -68,10 +69,7 @@ pub(super) fn warnings(job: &FitJob, fits: &[Fit<'_>], outcome: &FitOutcome) -> 
             let terms = &fit.sample.terms;
             let finding = said("fit_collinear", "/trials".to_owned()).measured(output.largest_inflation, HARD, "1");
             warnings.push(
-                finding
-                    .with("first", term_name(&terms[a]))
-                    .with("second", term_name(&terms[b]))
-                    .with("correlation", r),
+                finding.with("first", term_name(&terms[a])).with("second", term_name(&terms[b])).with("correlation", r),
             );
         }
         let tests = [
@@ -109,9 +107,8 @@ fn of_table(job: &FitJob, fits: &[Fit<'_>], outcome: &FitOutcome) -> Vec<Finding
     let mut unused: Vec<String> = Vec::new();
     for trial in job.trials.rows() {
         let numbers = trial.further.keys().filter(|name| !variables.contains(name) && !outputs.contains(name));
-        let words = trial.factors.keys().filter(|name| {
-            !job.factors.contains(name) && job.hold_out.as_ref() != Some(*name)
-        });
+        let words =
+            trial.factors.keys().filter(|name| !job.factors.contains(name) && job.hold_out.as_ref() != Some(*name));
         for name in numbers.chain(words) {
             if !unused.contains(name) {
                 unused.push(name.clone());
@@ -243,7 +240,9 @@ pub(super) fn explanation(fits: &[Fit<'_>], outcome: &FitOutcome, job: &FitJob) 
             let message = of("fit_driven_by").with("column", term_name(&fit.sample.terms[fitted.terms[place]]));
             let size = if fitted.form == ModelForm::LogLog { change.exp() } else { change };
             if size.is_finite() {
-                said.push(message.with("change", size).with("form", form_name(fitted.form)).with("unit", output.unit.clone()));
+                said.push(
+                    message.with("change", size).with("form", form_name(fitted.form)).with("unit", output.unit.clone()),
+                );
             }
         }
         let open: Vec<String> = output
@@ -272,7 +271,13 @@ pub(super) fn explanation(fits: &[Fit<'_>], outcome: &FitOutcome, job: &FitJob) 
             .missing_terms
             .iter()
             .filter(|term| term.p_value < 0.05)
-            .map(|term| if term.column == term.with { format!("{} squared", term.column) } else { format!("{} x {}", term.column, term.with) })
+            .map(|term| {
+                if term.column == term.with {
+                    format!("{} squared", term.column)
+                } else {
+                    format!("{} x {}", term.column, term.with)
+                }
+            })
             .collect();
         if !missing.is_empty() {
             said.push(of("fit_terms_missing").with("terms", missing));

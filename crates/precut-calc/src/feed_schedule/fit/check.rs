@@ -147,7 +147,13 @@ impl FitJob {
         for (row, trial) in self.trials.rows().iter().enumerate() {
             for column in fixed() {
                 let Some(value) = trial.number(column) else { continue };
-                check_number(column, value, &format!("/trials/{row}/{column}"), known_variable(column).is_some(), violations);
+                check_number(
+                    column,
+                    value,
+                    &format!("/trials/{row}/{column}"),
+                    known_variable(column).is_some(),
+                    violations,
+                );
             }
             for (column, value) in &trial.further {
                 let pointer = format!("/trials/{row}/further/{}", escaped(column));
@@ -158,7 +164,13 @@ impl FitJob {
             for column in variables.iter() {
                 if let Some(value) = place.number(column) {
                     let inner = if known_variable(column).is_some() { String::new() } else { "further/".to_owned() };
-                    check_number(column, value, &format!("/predict/{index}/{inner}{}", escaped(column)), true, violations);
+                    check_number(
+                        column,
+                        value,
+                        &format!("/predict/{index}/{inner}{}", escaped(column)),
+                        true,
+                        violations,
+                    );
                 }
             }
         }

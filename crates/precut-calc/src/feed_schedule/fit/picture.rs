@@ -75,12 +75,7 @@ fn comparison(outcome: &FitOutcome, output: &OutputFit) -> Panel {
         y: axis(outcome, "fit_predicted", "fit_predicted_over_mean"),
         height: 1.0,
         items: vec![
-            Item::Line {
-                name: "fit_perfect",
-                x: vec![low, high],
-                y: vec![Some(low), Some(high)],
-                role: Role::Nominal,
-            },
+            Item::Line { name: "fit_perfect", x: vec![low, high], y: vec![Some(low), Some(high)], role: Role::Nominal },
             Item::Points { name: "fit_of_all", x: measured, y: scaled(&rows.fitted), role: Role::Before },
             Item::Points {
                 name: "fit_held_out",

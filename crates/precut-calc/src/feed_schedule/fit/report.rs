@@ -13,9 +13,7 @@ use crate::machinability::{FurtherVariable, MachinabilityModel, ModelForm, Model
 use crate::material::Certainty;
 use crate::num::dense::{Columns, dot};
 use crate::num::hull::distance_to_hull;
-use crate::num::stats::{
-    Test, anderson_darling, breusch_pagan, collinearity, lack_of_fit, ljung_box, t_two_sided,
-};
+use crate::num::stats::{Test, anderson_darling, breusch_pagan, collinearity, lack_of_fit, ljung_box, t_two_sided};
 
 /// Points by which the share of the hull in its box is measured.
 const HULL_POINTS: u32 = 400;
@@ -121,7 +119,8 @@ impl Fit<'_> {
         }
         for variable in crate::machinability::Variable::ALL {
             // What was the same in all trials is the range as well.
-            let mut values = self.sample.rows.iter().filter_map(|&i| self.job.trials.rows()[i].number(variable.field()));
+            let mut values =
+                self.sample.rows.iter().filter_map(|&i| self.job.trials.rows()[i].number(variable.field()));
             if range.of(variable) == (None, None)
                 && let Some(first) = values.next()
                 && values.all(|value| value.to_bits() == first.to_bits())

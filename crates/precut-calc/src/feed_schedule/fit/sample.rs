@@ -80,7 +80,9 @@ impl Sample {
             levels.sort();
             levels.dedup();
             for name in levels.iter().skip(1) {
-                design.push(&chosen.iter().map(|(_, trial)| f64::from(u8::from(level(trial) == *name))).collect::<Vec<_>>());
+                design.push(
+                    &chosen.iter().map(|(_, trial)| f64::from(u8::from(level(trial) == *name))).collect::<Vec<_>>(),
+                );
                 terms.push(Term { column: factor.clone(), source: Source::Level { level: name.clone() } });
             }
             first_levels.insert(factor.clone(), levels.into_iter().next().unwrap_or_default());
@@ -123,7 +125,9 @@ impl Sample {
     /// The trials' places in the space of the logarithms, each variable over its range: in the unit box.
     pub(super) fn unit_points(&self) -> Vec<Vec<f64>> {
         let mut points: Vec<Vec<f64>> = (0..self.rows.len()).map(|i| self.unit_point(&self.design.row(i))).collect();
-        points.sort_by(|a, b| a.iter().zip(b).map(|(a, b)| a.total_cmp(b)).find(|o| o.is_ne()).unwrap_or(std::cmp::Ordering::Equal));
+        points.sort_by(|a, b| {
+            a.iter().zip(b).map(|(a, b)| a.total_cmp(b)).find(|o| o.is_ne()).unwrap_or(std::cmp::Ordering::Equal)
+        });
         points.dedup_by(|a, b| bits(a) == bits(b));
         points
     }
