@@ -6,9 +6,12 @@
 //! same bytes, measured in turns in the same run. Nothing fails here: the table is for reading.
 
 mod deflection;
+mod fitting;
 mod http;
 mod measure;
 mod rows;
+#[path = "../../crates/precut-calc/tests/strd/mod.rs"]
+mod strd;
 
 use std::io::Write;
 

@@ -1,5 +1,5 @@
 //! The 54 runs of NIST's nonlinear reference problems, one default setting, derivatives by differences.
-#![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, missing_docs)]
 
 mod strd;
 

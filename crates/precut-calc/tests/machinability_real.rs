@@ -1,5 +1,5 @@
 //! Published tables of measured roughness and forces, read in place.
-#![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, missing_docs)]
 
 use std::path::PathBuf;
 

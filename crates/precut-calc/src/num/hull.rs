@@ -86,7 +86,9 @@ impl Corral {
         }
         let mut weights = Qr::pivoted(matrix).solve(&vec![1.0; count]);
         let sum: f64 = weights.iter().sum();
-        weights.iter_mut().for_each(|weight| *weight /= sum);
+        for weight in &mut weights {
+            *weight /= sum;
+        }
         weights
     }
 }

@@ -1,5 +1,5 @@
 //! NIST's reference problems of nonlinear least squares, read in place, and their models written as functions.
-#![allow(clippy::unwrap_used, clippy::panic, dead_code, unreachable_pub, missing_docs)]
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, dead_code, unreachable_pub, missing_docs)]
 
 use std::f64::consts::PI;
 use std::path::PathBuf;

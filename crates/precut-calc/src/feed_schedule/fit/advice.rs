@@ -146,8 +146,9 @@ fn of_table(job: &FitJob, fits: &[Fit<'_>], outcome: &FitOutcome) -> Vec<Finding
 
 /// Columns whose size no machine has in the unit that they claim.
 fn suspicious_columns(job: &FitJob) -> Vec<Finding> {
-    // Largest value of the column below or least above which another unit is likelier, and that unit.
-    let rules: [(Variable, fn(f64, f64) -> bool, &str); 3] = [
+    // The column, what its least and largest value say, and the unit that is likelier then.
+    type Rule = (Variable, fn(f64, f64) -> bool, &'static str);
+    let rules: [Rule; 3] = [
         (Variable::Speed, |_, high| high < 8.0, "m/s"),
         (Variable::Feed, |low, _| low > 5.0, "mm/min"),
         (Variable::Feed, |_, high| high < 0.003, "inch/rev"),

@@ -161,7 +161,7 @@ impl FitJob {
             }
         }
         for (index, place) in self.predict.iter().enumerate() {
-            for column in variables.iter() {
+            for column in &variables {
                 if let Some(value) = place.number(column) {
                     let inner = if known_variable(column).is_some() { String::new() } else { "further/".to_owned() };
                     check_number(

@@ -20,24 +20,29 @@ pub(super) struct Choice {
     /// Whether the trials tell the two forms apart (odds of 20 to 1).
     pub(super) form_decided: Option<bool>,
     /// Sets of terms that the trials cannot tell from the chosen one, with how much worse their criterion is.
-    pub(super) rivals: Vec<(Vec<usize>, f64)>,
+    pub(super) rivals: Vec<RivalTerms>,
 }
+
+/// A set of terms and how much worse its criterion is.
+pub(super) type RivalTerms = (Vec<usize>, f64);
 
 /// Forms that an output may have.
 pub(super) fn forms(job: &FitJob, output: &str) -> Vec<ModelForm> {
-    let power_law_only = KNOWN_OUTPUTS.iter().any(|known| known.column == output && known.power_law_only);
+    let known = KNOWN_OUTPUTS.iter().find(|known| known.column == output);
+    let positive = || job.used().filter_map(|(_, trial)| trial.number(output)).all(|value| value > 0.0);
     match job.form {
+        _ if known.is_some_and(|known| known.power_law_only) => vec![ModelForm::LogLog],
         FormChoice::LogLog => vec![ModelForm::LogLog],
-        FormChoice::SemiLog if !power_law_only => vec![ModelForm::SemiLog],
-        FormChoice::SemiLog => vec![ModelForm::LogLog],
-        FormChoice::Choose if power_law_only => vec![ModelForm::LogLog],
+        FormChoice::SemiLog => vec![ModelForm::SemiLog],
+        // A schedule limits further outputs as power laws.
+        FormChoice::Choose if known.is_none() && positive() => vec![ModelForm::LogLog],
         FormChoice::Choose => vec![ModelForm::LogLog, ModelForm::SemiLog],
     }
 }
 
 /// The fit of an output (`fit/3.1`, `fit/3.2`); `None` where the trials determine none.
 pub(super) fn choose(job: &FitJob, output: &str, sample: &Sample) -> Option<Choice> {
-    let mut candidates: Vec<(Fitted, Vec<(Vec<usize>, f64)>)> =
+    let mut candidates: Vec<(Fitted, Vec<RivalTerms>)> =
         forms(job, output).into_iter().filter_map(|form| of_form(job, sample, form)).collect();
     // A stable order: the power law stays first where the two are equal.
     candidates.sort_by(|a, b| criterion(&a.0).total_cmp(&criterion(&b.0)));
@@ -53,7 +58,7 @@ fn criterion(fitted: &Fitted) -> f64 {
     fitted.criteria.aicc.unwrap_or(fitted.criteria.bic)
 }
 
-fn of_form(job: &FitJob, sample: &Sample, form: ModelForm) -> Option<(Fitted, Vec<(Vec<usize>, f64)>)> {
+fn of_form(job: &FitJob, sample: &Sample, form: ModelForm) -> Option<(Fitted, Vec<RivalTerms>)> {
     let all: Vec<usize> = (0..sample.terms.len()).collect();
     if job.terms == Terms::All {
         return Fitted::new(sample, form, &all).map(|fitted| (fitted, Vec::new()));

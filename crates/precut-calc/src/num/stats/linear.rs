@@ -204,7 +204,9 @@ pub fn collinearity(design: &Columns) -> Collinearity {
         let mean = column.iter().sum::<f64>() / column.len().max(1) as f64;
         let mut shifted: Vec<f64> = column.iter().map(|x| x - mean).collect();
         let size = length(&shifted);
-        shifted.iter_mut().for_each(|x| *x /= size);
+        for x in &mut shifted {
+            *x /= size;
+        }
         centred.push(&shifted);
     }
     let inverse = Qr::pivoted(centred).inverse_gram();
