@@ -22,6 +22,8 @@ pub(crate) use checker::{Faults, by_pointer, child};
 pub(crate) use entry::Unprepared;
 pub(crate) use finite::non_finite_place;
 pub(crate) use nearest::nearest;
+#[cfg(test)]
+pub(crate) use place::FreeColumns;
 pub(crate) use place::{CellKind, Step, TableColumn, TablePlace};
 
 use std::collections::BTreeMap;

@@ -7,6 +7,7 @@ use precut_calc::calculator::{
 
 use crate::Row;
 use crate::deflection;
+use crate::fitting;
 use crate::http::{self, Exchange};
 use crate::measure::{Measured, Unit, cpu_time};
 use crate::ring;
@@ -62,6 +63,14 @@ pub(crate) fn all() -> Vec<Row> {
             roundness::four(3600)
         }),
         row("complete roundness evaluation, 3600 points", Unit::Time, None, None, || roundness::answer(3600)),
+        row("NIST StRD, 54 runs, default setting, no derivatives given", Unit::Time, None, None, fitting::nist_time),
+        row("of these not solved to 4 digits", Unit::Count, Some(0.0), Some(0.0), || fitting::nist_missed(4.0)),
+        row("of these not solved to 6 digits", Unit::Count, Some(2.0), Some(0.0), || fitting::nist_missed(6.0)),
+        row("of these not solved to 8 digits", Unit::Count, Some(9.0), Some(4.0), || fitting::nist_missed(8.0)),
+        row("machinability fit, 19 trials, 3 outputs, without resampling", Unit::Time, None, None, || {
+            fitting::machinability(0)
+        }),
+        row("the same with 1000 resamples", Unit::Time, None, None, || fitting::machinability(1000)),
         row("CSV, 10,000 rows of 8 numbers", Unit::Time, None, None, csv),
         row("G-code, 10,000 cuts", Unit::Time, None, None, gcode),
         row("SVG, 3 panels of 201 stations", Unit::Time, None, None, || svg(201)),

@@ -14,7 +14,7 @@ use super::root;
 const DEFLECTION: &str = "docs/physics/deflection-compensation.md";
 
 /// Groups of equations.
-const GROUPS: [&str; 4] = ["deflection/", "diagnosis/", "ring/", "roundness/"];
+const GROUPS: [&str; 5] = ["deflection/", "diagnosis/", "fit/", "ring/", "roundness/"];
 
 /// Equations that have a heading: its first word.
 fn documented() -> BTreeSet<String> {

@@ -7,11 +7,14 @@
 pub mod calculator;
 pub mod deflection_compensation;
 pub mod effects;
+pub mod feed_schedule;
 pub mod force;
+pub mod machinability;
 pub mod material;
 pub mod num;
 pub mod path;
 pub mod ring_roundness;
+pub mod shaft;
 
 use calculator::Registrar;
 
@@ -20,4 +23,5 @@ pub fn register(registrar: &mut impl Registrar) {
     registrar.with_forward_model::<deflection_compensation::DeflectionCompensation>();
     registrar.with_forward_model::<ring_roundness::RingRoundness>();
     registrar.calculator::<ring_roundness::evaluation::RoundnessEvaluation>();
+    registrar.calculator::<feed_schedule::fit::MachinabilityFit>();
 }

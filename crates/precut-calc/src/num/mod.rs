@@ -1,4 +1,9 @@
 //! Numerics with no machining words in them.
 
 pub mod beam;
+pub mod dense;
+pub mod gp;
+pub mod hull;
+pub mod lsq;
 pub mod roundness;
+pub mod stats;

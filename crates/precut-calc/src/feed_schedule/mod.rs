@@ -1,0 +1,3 @@
+//! Feed scheduling: its room holds the fit of machinability models.
+
+pub mod fit;
