@@ -9,6 +9,9 @@ mod ring;
 
 pub use deflection::{CAUSES as DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect};
 pub use ring::{CAUSES as RING_CAUSES, RingConditions, RingEffect};
+mod machinability;
+
+pub use machinability::{CAUSES as MACHINABILITY_CAUSES, FactorLevel, MachinabilityConditions, MachinabilityEffect};
 
 /// An entry of the catalogue.
 #[derive(Debug, Clone, Copy, PartialEq)]
