@@ -87,6 +87,7 @@ fn every_equation_of_an_answer_is_documented() {
 fn row(parameter: &Parameter) -> String {
     let (fit, prior) = match parameter.fit {
         Fit::Amplitude | Fit::Shape { grid: [] } => ("fitted".to_owned(), parameter.prior_sd.to_string()),
+        Fit::Factor => ("logarithm fitted".to_owned(), parameter.prior_sd.to_string()),
         Fit::Shape { grid } => {
             let grid: Vec<String> = grid.iter().map(f64::to_string).collect();
             (format!("grid {}", grid.join(", ")), parameter.prior_sd.to_string())

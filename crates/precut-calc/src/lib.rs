@@ -7,6 +7,7 @@
 pub mod calculator;
 pub mod deflection_compensation;
 pub mod effects;
+pub mod fixture_stability;
 pub mod force;
 pub mod material;
 pub mod num;
@@ -17,4 +18,5 @@ use calculator::Registrar;
 /// Every calculator, one line each. Nothing else has to change when one moves in.
 pub fn register(registrar: &mut impl Registrar) {
     registrar.with_forward_model::<deflection_compensation::DeflectionCompensation>();
+    registrar.calculator::<fixture_stability::FixtureStability>();
 }

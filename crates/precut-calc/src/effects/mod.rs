@@ -5,8 +5,10 @@
 //! worded outside, under `cause.{kind}`.
 
 mod deflection;
+mod fixture;
 
 pub use deflection::{CAUSES as DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect};
+pub use fixture::{CAUSES as FIXTURE_CAUSES, FixtureConditions, FixtureEffect};
 
 /// An entry of the catalogue.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,6 +49,8 @@ pub struct Parameter {
 pub enum Fit {
     /// Linear size of the effect, 0 = absent.
     Amplitude,
+    /// Multiplies what the job states, 1 = absent; the prior is on its logarithm.
+    Factor,
     /// Its form; tried on a grid first.
     Shape {
         /// Values of the grid.
