@@ -6,16 +6,24 @@ use std::path::Path;
 
 use precut::registry::Registry;
 use precut_calc::calculator::Unwatched;
-use precut_calc::effects::{Cause, DEFLECTION_CAUSES, Fit, Parameter};
+use precut_calc::effects::{Cause, DEFLECTION_CAUSES, FIXTURE_CAUSES, Fit, Parameter};
 
 use super::markdown::{Document, documents};
 use super::root;
 
-const DEFLECTION: &str = "docs/physics/deflection-compensation.md";
-const EFFECTS: &str = "docs/physics/effects-deflection.md";
+/// Calculators and the page that explains their codes.
+const PAGES: [(&str, &str); 2] = [
+    ("deflection-compensation", "docs/physics/deflection-compensation.md"),
+    ("fixture-stability", "docs/physics/fixture-stability.md"),
+];
+/// Catalogues and the page that has their numbers.
+const CATALOGUES: [(&[Cause], &str); 2] = [
+    (DEFLECTION_CAUSES, "docs/physics/effects-deflection.md"),
+    (FIXTURE_CAUSES, "docs/physics/effects-fixture.md"),
+];
 
 /// Groups of equations.
-const GROUPS: [&str; 2] = ["deflection/", "diagnosis/"];
+const GROUPS: [&str; 3] = ["deflection/", "diagnosis/", "fixture/"];
 
 /// Equations that have a heading: its first word.
 fn documented() -> BTreeSet<String> {
@@ -100,34 +108,37 @@ fn row(parameter: &Parameter) -> String {
 }
 
 /// The part of the page on one cause.
-fn section<'t>(text: &'t str, cause: &Cause) -> &'t str {
+fn section<'t>(page: &str, text: &'t str, cause: &Cause) -> &'t str {
     let heading = format!("### {} `{}`\n", cause.equation, cause.kind);
-    let Some((_, rest)) = text.split_once(&heading) else { panic!("{EFFECTS} has no heading {heading}") };
+    let Some((_, rest)) = text.split_once(&heading) else { panic!("{page} has no heading {heading}") };
     rest.split("\n#").next().unwrap()
 }
 
 #[test]
-fn the_catalogue_has_the_numbers_of_the_code() {
-    let page = Document::read(root(), EFFECTS);
-    for cause in DEFLECTION_CAUSES {
-        let section = section(&page.text, cause);
-        for parameter in cause.parameters {
-            let row = row(parameter);
-            assert!(section.lines().any(|line| line == row), "{}: no row {row}", cause.kind);
-        }
-        for other in cause.conditions.iter().chain(cause.confounded_with) {
-            assert!(section.contains(&format!("`{other}`")), "{}: {other} is not named", cause.kind);
+fn the_catalogues_have_the_numbers_of_the_code() {
+    for (causes, page) in CATALOGUES {
+        let text = Document::read(root(), page).text;
+        for cause in causes {
+            let section = section(page, &text, cause);
+            for parameter in cause.parameters {
+                let row = row(parameter);
+                assert!(section.lines().any(|line| line == row), "{}: no row {row}", cause.kind);
+            }
+            for other in cause.conditions.iter().chain(cause.confounded_with) {
+                assert!(section.contains(&format!("`{other}`")), "{}: {other} is not named", cause.kind);
+            }
         }
     }
 }
 
 #[test]
-fn every_code_of_the_calculator_is_explained() {
-    let page = Document::read(root(), DEFLECTION).text;
+fn every_code_of_a_calculator_is_explained() {
     let registry = Registry::standard().unwrap();
-    let entry = registry.entry("deflection-compensation").unwrap();
-    let codes = &entry.meta().codes;
-    let groups = codes.faults.iter().chain(codes.failures).chain(codes.warnings).copied();
-    let missing: Vec<_> = groups.flatten().filter(|code| !page.contains(&format!("`{code}`"))).collect();
-    assert!(missing.is_empty(), "{DEFLECTION} does not name {missing:?}");
+    for (id, page) in PAGES {
+        let text = Document::read(root(), page).text;
+        let codes = &registry.entry(id).unwrap().meta().codes;
+        let groups = codes.faults.iter().chain(codes.failures).chain(codes.warnings).copied();
+        let missing: Vec<_> = groups.flatten().filter(|code| !text.contains(&format!("`{code}`"))).collect();
+        assert!(missing.is_empty(), "{page} does not name {missing:?}");
+    }
 }

@@ -1,6 +1,6 @@
 //! Effects on a workpiece held in a vise under face milling.
 //!
-//! A factor multiplies what the job states; the rest are added terms (`diagnosis/6`).
+//! A factor multiplies what the job states; the rest are added terms.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;

@@ -287,11 +287,13 @@ fn boundary_of<const N: usize>(
     let mut points: Vec<BoundaryPoint> = Vec::new();
     for round in 0..=ROUNDS {
         let all = wanted.len();
-        for (chunk, speeds) in wanted.chunks(POINTS_PER_LOOK / SCAN as usize + 1).enumerate() {
+        let mut done = 0;
+        for speeds in wanted.chunks(POINTS_PER_LOOK / SCAN as usize + 1) {
             checkpoint(monitor)?;
             let found: Result<Vec<_>, _> = speeds.par_iter().map(|&n| at(n)).collect();
             points.extend(found?);
-            let part = ((chunk + 1) * speeds.len()).min(all) as f64 / all as f64;
+            done += speeds.len();
+            let part = done as f64 / all as f64;
             shown((f64::from(round) + part) / f64::from(ROUNDS + 1), &points);
         }
         points.sort_by(|a, b| a.spindle_rpm.total_cmp(&b.spindle_rpm));

@@ -15,6 +15,7 @@ mod answer;
 mod check;
 mod cutting;
 mod floquet;
+mod forward;
 mod holding;
 mod input;
 mod lobes;
@@ -25,6 +26,7 @@ mod response;
 mod simulate;
 mod zeroth;
 
+pub use forward::{FixtureAllowances, FixturePoint, FixtureRun};
 pub use input::{
     Analysis, ConstantForce, Entry, FaceMill, FeedToward, FixtureJob, LimitSettings, LimitSpeed, LobeSettings,
     MAX_MAP_POINTS, MillingCut, MillingForce, Regeneration, SelfLocking, SimulationSettings, Vise, ViseJoint,
@@ -198,7 +200,7 @@ fn basis(job: &FixtureJob) -> Vec<Basis> {
 
 /// Everything that this calculator may utter, from where it is said.
 const CODES: Codes = Codes {
-    faults: &[check::CODES],
+    faults: &[check::CODES, &["time_missing"]],
     failures: &[&["undamped_resonance"]],
     warnings: &[advice::WARNING_CODES],
     explanations: &[advice::EXPLANATION_CODES],

@@ -28,7 +28,7 @@ impl<const P: usize> Rule<P> {
         let (fine, weight) = gauss_legendre((TERMS + P) / 2 + 1);
         let mut moment = vec![[[0.0; P]; P]; TERMS];
         let mut moment_end = vec![[0.0; P]; TERMS];
-        let mut fill = |end: f64, row: &mut dyn FnMut(usize, usize, f64)| {
+        let fill = |end: f64, row: &mut dyn FnMut(usize, usize, f64)| {
             for (c, w) in fine.iter().zip(&weight) {
                 let s = c * end;
                 let basis: [f64; P] = std::array::from_fn(|j| lagrange(&points, j, s));
