@@ -17,10 +17,8 @@ const PAGES: [(&str, &str); 2] = [
     ("fixture-stability", "docs/physics/fixture-stability.md"),
 ];
 /// Catalogues and the page that has their numbers.
-const CATALOGUES: [(&[Cause], &str); 2] = [
-    (DEFLECTION_CAUSES, "docs/physics/effects-deflection.md"),
-    (FIXTURE_CAUSES, "docs/physics/effects-fixture.md"),
-];
+const CATALOGUES: [(&[Cause], &str); 2] =
+    [(DEFLECTION_CAUSES, "docs/physics/effects-deflection.md"), (FIXTURE_CAUSES, "docs/physics/effects-fixture.md")];
 
 /// Groups of equations.
 const GROUPS: [&str; 3] = ["deflection/", "diagnosis/", "fixture/"];

@@ -31,7 +31,9 @@ impl Case {
             |j: ViseJoint| Joint { stiffness_n_per_mm: j.stiffness_n_per_mm, damping_n_s_per_mm: j.damping_n_s_per_mm };
         let jaw = match &job.fixture {
             Vise::SelfLocking(_) => None,
-            Vise::ConstantForce(v) => Some(Jaw { mass_kg: v.jaw_mass_kg, damping_n_s_per_mm: v.jaw_damping_n_s_per_mm }),
+            Vise::ConstantForce(v) => {
+                Some(Jaw { mass_kg: v.jaw_mass_kg, damping_n_s_per_mm: v.jaw_damping_n_s_per_mm })
+            }
         };
         let mut case = Self {
             holding: Holding {

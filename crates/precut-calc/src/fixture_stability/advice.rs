@@ -104,17 +104,21 @@ pub(super) fn warnings(study: &Study<'_>, outcome: &FixtureOutcome) -> Vec<Findi
     }
     let multiplier = &outcome.multiplier;
     if (multiplier.modulus - 1.0).abs() < multiplier.modulus_error {
-        found.push(
-            Finding::new("multiplier_not_converged", "/cut").measured(multiplier.modulus, multiplier.modulus_error, "1"),
-        );
+        found.push(Finding::new("multiplier_not_converged", "/cut").measured(
+            multiplier.modulus,
+            multiplier.modulus_error,
+            "1",
+        ));
     }
     if depth > study.examined_mm {
         found.push(Finding::new("depth_not_examined", "/limits/depth_max_mm").measured(depth, study.examined_mm, "mm"));
     }
     if outcome.verdict.state == FixtureState::Chatter && multiplier.modulus < 1.0 {
-        found.push(
-            Finding::new("verdict_by_simulation", "/simulation").measured(outcome.simulation.sample_scatter, 1e-3, "1"),
-        );
+        found.push(Finding::new("verdict_by_simulation", "/simulation").measured(
+            outcome.simulation.sample_scatter,
+            1e-3,
+            "1",
+        ));
     }
     found
 }
@@ -200,7 +204,9 @@ pub(super) fn explanation(study: &Study<'_>, outcome: &FixtureOutcome) -> Vec<Me
     }
     if verdict.peak_to_peak_over_feed > 1.0 {
         said.push(
-            Message::new("amplitude_over_feed").with("peak_to_peak_um", verdict.peak_to_peak_um).with("feed_um", feed_um),
+            Message::new("amplitude_over_feed")
+                .with("peak_to_peak_um", verdict.peak_to_peak_um)
+                .with("feed_um", feed_um),
         );
     }
     said.push(Message::new("no_surface_location_error"));

@@ -17,6 +17,7 @@ use super::output::{
     FixtureState, FixtureVerdict, FloquetMultiplier, ForcedMotion, Histories, LobeBoundary, LobeDiagram, LobeMap,
     OpenJoint, Oscillogram, QuasiStatic, Simulated, SpeedLimit, TextbookForce, VibrationMode, ZerothOrder,
 };
+use super::parts::plane_of;
 use super::picture::lobes_so_far;
 use super::response::{Response, response};
 use super::simulate::{count, plan, run, scatter, small};
@@ -501,7 +502,8 @@ fn first_reached(
         if of(&at_depth(study, middle)?) > limit { high = middle } else { low = middle }
     }
     // A jump at the onset of chatter is at the onset.
-    let onset = study.chatter_mm.filter(|chatter| (high - chatter) < (depths[above] - chatter) / 200.0 && high >= *chatter);
+    let onset =
+        study.chatter_mm.filter(|chatter| (high - chatter) < (depths[above] - chatter) / 200.0 && high >= *chatter);
     Ok(Some(onset.unwrap_or(high)))
 }
 
@@ -509,14 +511,7 @@ fn lobes(study: &Study<'_>) -> Result<LobeDiagram, Failure> {
     let case = &study.case;
     let settings = &study.job.lobes;
     let working = case.working;
-    let plane = Plane {
-        from_rpm: settings.from_rpm.unwrap_or(0.5 * working.spindle_rpm),
-        to_rpm: settings.to_rpm.unwrap_or(2.0 * working.spindle_rpm),
-        speeds: settings.speeds as usize,
-        most_mm: settings.depth_max_mm.unwrap_or(study.examined_mm),
-        depths: settings.depths as usize,
-        feed_mm: working.feed_mm,
-    };
+    let plane = plane_of(study.job, case, study.examined_mm);
     let monitor = study.monitor;
     let (from, share) = (0.4, if settings.map { 0.2 } else { 0.5 });
     let points = boundary(&study.rules, &case.holding, &case.cutting, &plane, monitor, &mut |part, points| {
@@ -538,14 +533,7 @@ fn lobes(study: &Study<'_>) -> Result<LobeDiagram, Failure> {
                 monitor.interim(lobes_so_far(&known, Some(so_far), working));
             },
         )?;
-        let (refined_speed_rpm, refined_depth_mm) = full.refined.into_iter().unzip();
-        Some(LobeMap {
-            spindle_speed_rpm: full.speeds_rpm,
-            depth_mm: full.depths_mm,
-            modulus: full.modulus,
-            refined_speed_rpm,
-            refined_depth_mm,
-        })
+        Some(LobeMap::of(full))
     } else {
         None
     };

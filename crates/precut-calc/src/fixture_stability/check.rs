@@ -70,21 +70,15 @@ fn check_cut(job: &FixtureJob, violations: &mut Violations) {
 fn check_lobes(job: &FixtureJob, violations: &mut Violations) {
     let lobes = &job.lobes;
     let working = job.spindle_rpm();
-    let (from, to) = (
-        lobes.from_rpm.or(working.map(|n| 0.5 * n)),
-        lobes.to_rpm.or(working.map(|n| 2.0 * n)),
-    );
+    let (from, to) = (lobes.from_rpm.or(working.map(|n| 0.5 * n)), lobes.to_rpm.or(working.map(|n| 2.0 * n)));
     if let (Some(from), Some(to)) = (from, to) {
-        violations.require(from < to, || {
-            Finding::new("speeds_reversed", "/lobes/to_rpm").measured(to, from, "rev/min")
-        });
+        violations
+            .require(from < to, || Finding::new("speeds_reversed", "/lobes/to_rpm").measured(to, from, "rev/min"));
     }
     let points = u64::from(lobes.speeds) * if lobes.map { u64::from(lobes.depths) } else { 24 };
     violations.require(points <= MAX_MAP_POINTS, || {
         let at = if lobes.map && lobes.depths > lobes.speeds { "/lobes/depths" } else { "/lobes/speeds" };
-        Finding::new("too_many_map_points", at)
-            .with("points", points as f64)
-            .with("most", MAX_MAP_POINTS as f64)
+        Finding::new("too_many_map_points", at).with("points", points as f64).with("most", MAX_MAP_POINTS as f64)
     });
 }
 

@@ -95,15 +95,11 @@ impl<const N: usize, const P: usize> SpeedPlan<N, P> {
                 });
                 let at = |i: usize| from + rule.points[i] * length;
                 let slope = (0..phases)
-                    .map(|phase| {
-                        std::array::from_fn(|i| cutting.chip_slope(&stretch, at(i), phase, working.feed_mm))
-                    })
+                    .map(|phase| std::array::from_fn(|i| cutting.chip_slope(&stretch, at(i), phase, working.feed_mm)))
                     .collect();
                 let stiffening = stiffening.map_or_else(Vec::new, |stiffness| {
                     (0..phases)
-                        .map(|phase| {
-                            std::array::from_fn(|i| stiffness(at(i) * seconds_per_rad + phase as f64 * tau))
-                        })
+                        .map(|phase| std::array::from_fn(|i| stiffness(at(i) * seconds_per_rad + phase as f64 * tau)))
                         .collect()
                 });
                 plan.spans.push(Span::Element { kind, slope, stiffening });
@@ -147,7 +143,6 @@ impl<const N: usize, const P: usize> SpeedPlan<N, P> {
             residual: found.residual,
         })
     }
-
 }
 
 /// A with the process damping of so many teeth in cut.

@@ -182,10 +182,7 @@ impl ForwardModel for FixtureStability {
         FixtureEffect::from_parameters(cause, values)
     }
 
-    fn nuisances(
-        prepared: &PreparedFixture,
-        allowances: &FixtureAllowances,
-    ) -> Result<Vec<JacobianColumn>, Failure> {
+    fn nuisances(prepared: &PreparedFixture, allowances: &FixtureAllowances) -> Result<Vec<JacobianColumn>, Failure> {
         // A level moves every value by the same share; the margin of a regime has none.
         let share = if prepared.measure == Measure::Regime { 0.0 } else { allowances.amplitude_level_rel };
         let base = prepared.predict(&[])?;
@@ -225,9 +222,8 @@ impl PreparedFixture {
                 continue;
             }
             let conditions = FixtureConditions { time_since_clamping_min: row.time_since_clamping_min };
-            let case = Case::with(&self.job, &all, &conditions)
-                .map(|case| Case { working, ..case })
-                .filter(check::holds);
+            let case =
+                Case::with(&self.job, &all, &conditions).map(|case| Case { working, ..case }).filter(check::holds);
             let Some(case) = case else {
                 out.push(Err(Missing::NoSolution));
                 continue;

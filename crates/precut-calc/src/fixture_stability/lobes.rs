@@ -297,9 +297,11 @@ fn boundary_of<const N: usize>(
             shown((f64::from(round) + part) / f64::from(ROUNDS + 1), &points);
         }
         points.sort_by(|a, b| a.spindle_rpm.total_cmp(&b.spindle_rpm));
-        wanted = points.windows(2).filter(|pair| differ(&pair[0], &pair[1])).map(|pair| {
-            0.5 * (pair[0].spindle_rpm + pair[1].spindle_rpm)
-        }).collect();
+        wanted = points
+            .windows(2)
+            .filter(|pair| differ(&pair[0], &pair[1]))
+            .map(|pair| 0.5 * (pair[0].spindle_rpm + pair[1].spindle_rpm))
+            .collect();
         if wanted.is_empty() || points.len() + wanted.len() > 4 * plane.speeds.max(50) {
             break;
         }

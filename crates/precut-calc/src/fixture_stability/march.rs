@@ -311,9 +311,7 @@ impl<'a, const N: usize> State<'a, N> {
         let flows = grid
             .step_s
             .iter()
-            .flat_map(|&h| {
-                (0..4).map(move |which| (h, Closed { left: which % 2 == 1, right: which / 2 == 1 }))
-            })
+            .flat_map(|&h| (0..4).map(move |which| (h, Closed { left: which % 2 == 1, right: which / 2 == 1 })))
             .map(|(h, closed)| {
                 if !plan.unilateral && closed != Closed::BOTH {
                     // Never used: a bonded run has one system.
@@ -365,16 +363,22 @@ impl<'a, const N: usize> State<'a, N> {
         if self.plan.gradual {
             let share = (self.tooth_period + 1) as f64 / self.cutting.teeth as f64;
             let whole = self.grid.cells as f64;
-            self.reached =
-                if share >= 1.0 { self.grid.cells } else { (0..self.grid.cells).take_while(|&c| (c as f64) < share * whole).count() };
+            self.reached = if share >= 1.0 {
+                self.grid.cells
+            } else {
+                (0..self.grid.cells).take_while(|&c| (c as f64) < share * whole).count()
+            };
         }
     }
 
     /// Effective feed of tooth j at a cell when the workpiece is at x (`fixture/3.2`).
     #[inline]
     fn feed(&self, j: usize, cell: usize, x_mm: f64) -> f64 {
-        let stands_out =
-            if self.cutting.uneven() && self.cutting.tooth_number(self.tooth_period, j) == 0 { self.cutting.runout_mm } else { 0.0 };
+        let stands_out = if self.cutting.uneven() && self.cutting.tooth_number(self.tooth_period, j) == 0 {
+            self.cutting.runout_mm
+        } else {
+            0.0
+        };
         let tip = stands_out - self.cutting.direction * x_mm;
         tip - (self.surface[cell] - self.plan.working.feed_mm)
     }
@@ -434,6 +438,7 @@ impl<'a, const N: usize> State<'a, N> {
         let cut: f64 = self.of_tooth[..teeth].iter().sum();
         let from = cut + self.own_force(self.cutting_teeth(teeth), &self.q);
         record.take(self, i, teeth, cut, step_s);
+        let before = (self.q[0], self.system.velocity(&self.q, 0));
         let which = 4 * after + index(self.closed);
         // The force at the end from the position that the force at the start gives: wrong by the fifth power of the step.
         let guess = self.flows[which].step(&self.q, from, from);
@@ -455,6 +460,7 @@ impl<'a, const N: usize> State<'a, N> {
             self.q = moved;
         }
         let x = self.q[0];
+        record.between(self, before, step_s);
         for j in 0..teeth {
             let cell = j * self.grid.steps + i + 1;
             if cell < self.reached {
@@ -630,6 +636,15 @@ impl Record {
                 right_demand_n: demand[1],
             };
             if early { self.first.push(step) } else { self.last.push(step) }
+        }
+    }
+
+    /// A turn of the motion between two steps, by the cubic through them.
+    #[inline]
+    fn between<const N: usize>(&mut self, state: &State<'_, N>, before: (f64, f64), step_s: f64) {
+        let velocity = state.system.velocity(&state.q, 0);
+        if state.tooth_period >= self.steady_from && before.1 * velocity < 0.0 {
+            self.x_mm.take_cubic(step_s, (before.0, state.q[0]), (before.1, velocity));
         }
     }
 

@@ -21,6 +21,7 @@ mod input;
 mod lobes;
 mod march;
 mod output;
+mod parts;
 mod picture;
 mod response;
 mod simulate;
@@ -36,6 +37,8 @@ pub use output::{
     FixtureState, FixtureVerdict, FloquetMultiplier, ForcedMotion, Histories, LobeBoundary, LobeDiagram, LobeMap,
     OpenJoint, Oscillogram, QuasiStatic, Simulated, SpeedLimit, TextbookForce, VibrationMode, ZerothOrder,
 };
+
+pub use parts::{TimeRun, forced_motion, lobe_boundary, lobe_map, multiplier_modulus, run_in_time};
 
 use crate::calculator::{
     Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Message, Meta, Monitor, Table,
@@ -148,10 +151,13 @@ fn cost(job: &FixtureJob) -> Cost {
     let states = case.holding.states() as f64;
     let point_ms = |n: f64| (0.008 + 0.0006 * history(n)) * (0.5 + 0.25 * states);
     let working = case.working.spindle_rpm;
-    let steps = job.simulation.steps_per_tooth.map_or_else(|| simulate::steps_per_tooth(&case, working) as f64, f64::from);
+    let steps =
+        job.simulation.steps_per_tooth.map_or_else(|| simulate::steps_per_tooth(&case, working) as f64, f64::from);
     let run_ms = steps * job.simulation.tooth_periods.map_or(400.0, f64::from) * 6e-5;
-    let runs = 1.0 + f64::from(u8::from(job.simulation.verified)) * 2.0 + f64::from(u8::from(job.asks(Analysis::ClampForce)));
-    let mut parts = vec![(2.0 + 100.0 * point_ms(working), "/cut/spindle_speed_rpm"), (runs * run_ms, "/simulation/tooth_periods")];
+    let runs =
+        1.0 + f64::from(u8::from(job.simulation.verified)) * 2.0 + f64::from(u8::from(job.asks(Analysis::ClampForce)));
+    let mut parts =
+        vec![(2.0 + 100.0 * point_ms(working), "/cut/spindle_speed_rpm"), (runs * run_ms, "/simulation/tooth_periods")];
     if job.asks(Analysis::Limits) {
         parts.push((0.6 * f64::from(job.limits.depths) * run_ms, "/limits/depths"));
     }

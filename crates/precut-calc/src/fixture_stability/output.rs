@@ -570,6 +570,19 @@ pub struct LobeMap {
     pub refined_depth_mm: Vec<f64>,
 }
 
+impl LobeMap {
+    pub(super) fn of(map: super::lobes::Map) -> Self {
+        let (refined_speed_rpm, refined_depth_mm) = map.refined.into_iter().unzip();
+        Self {
+            spindle_speed_rpm: map.speeds_rpm,
+            depth_mm: map.depths_mm,
+            modulus: map.modulus,
+            refined_speed_rpm,
+            refined_depth_mm,
+        }
+    }
+}
+
 /// Oscillograms.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Histories {

@@ -78,8 +78,7 @@ fn working_point(spindle_rpm: f64, depth_mm: f64) -> Item {
 
 /// The lobe diagram while it is computed.
 pub(super) fn lobes_so_far(boundary: &[(f64, Option<f64>)], map: Option<&Map>, working: Working) -> Figure {
-    let mut items: Vec<Item> =
-        map.map(|map| heat(&map.speeds_rpm, &map.depths_mm, &map.modulus)).into_iter().collect();
+    let mut items: Vec<Item> = map.map(|map| heat(&map.speeds_rpm, &map.depths_mm, &map.modulus)).into_iter().collect();
     let mut points: Vec<(f64, Option<f64>)> = boundary.to_vec();
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (x, y): (Vec<f64>, Vec<Option<f64>>) = points.into_iter().unzip();
@@ -117,11 +116,8 @@ pub(super) fn figures(job: &FixtureJob, outcome: &FixtureOutcome) -> Vec<Figure>
 fn lobes(job: &FixtureJob, outcome: &FixtureOutcome) -> Vec<Item> {
     let working = working_point(outcome.engagement.spindle_speed_rpm, job.cut.depth_mm);
     let Some(lobes) = &outcome.lobes else { return vec![working] };
-    let mut items: Vec<Item> = lobes
-        .map
-        .iter()
-        .map(|map| heat(&map.spindle_speed_rpm, &map.depth_mm, &map.modulus))
-        .collect();
+    let mut items: Vec<Item> =
+        lobes.map.iter().map(|map| heat(&map.spindle_speed_rpm, &map.depth_mm, &map.modulus)).collect();
     let LobeBoundary { spindle_speed_rpm: x, .. } = &lobes.boundary;
     let of = &lobes.boundary;
     items.push(line("chatter_limit", x, of.chatter_mm.clone(), Role::Limit));
@@ -297,10 +293,8 @@ fn map_table(map: Option<&LobeMap>) -> Table {
 }
 
 fn wave_table(id: &'static str, wave: &Oscillogram) -> Table {
-    let mut columns = vec![
-        Column::numbers("time", "s", &wave.time_s),
-        Column::numbers("displacement", "um", &wave.displacement_um),
-    ];
+    let mut columns =
+        vec![Column::numbers("time", "s", &wave.time_s), Column::numbers("displacement", "um", &wave.displacement_um)];
     columns.extend(wave.jaw_um.as_ref().map(|jaw| Column::numbers("jaw", "um", jaw)));
     columns.extend([
         Column::numbers("force", "N", &wave.force_n),

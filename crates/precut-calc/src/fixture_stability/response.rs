@@ -41,7 +41,7 @@ impl Range {
     }
 
     /// The cubic through two values and slopes.
-    fn take_cubic(&mut self, step: f64, values: (f64, f64), slopes: (f64, f64)) {
+    pub(super) fn take_cubic(&mut self, step: f64, values: (f64, f64), slopes: (f64, f64)) {
         self.take(values.0);
         self.take(values.1);
         if slopes.0 * slopes.1 < 0.0 {
@@ -366,10 +366,5 @@ pub(super) fn demands<const N: usize>(system: &System<N>, holding: &Holding, q: 
     let left_hard = if system.jaw.is_some() { 1.0 } else { hard };
     let left = -holding.left.stiffness_n_per_mm * (x - jaw_x) * left_hard;
     let right = holding.right.stiffness_n_per_mm * x * hard;
-    [
-        left - holding.left.damping_n_s_per_mm * (v - jaw_v),
-        right + holding.right.damping_n_s_per_mm * v,
-        left,
-        right,
-    ]
+    [left - holding.left.damping_n_s_per_mm * (v - jaw_v), right + holding.right.damping_n_s_per_mm * v, left, right]
 }

@@ -51,7 +51,13 @@ pub fn translate(input: &Value) -> Value {
 
 /// Teeth, speed, depth and the rest of the reference fixture, type 1 or 2.
 pub fn reference_job(kind: u8) -> Value {
-    let case = reference("cases.json").as_array().unwrap().iter().find(|c| c["id"] == format!("S0{}", 7 + kind)).unwrap().clone();
+    let case = reference("cases.json")
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|c| c["id"] == format!("S0{}", 7 + kind))
+        .unwrap()
+        .clone();
     translate(&case["input"])
 }
 

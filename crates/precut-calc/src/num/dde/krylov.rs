@@ -27,12 +27,7 @@ impl Eigenvalue {
 /// Deterministic: the start vector is a fixed pseudo-random sequence. When a Krylov space of [`LARGEST`] vectors does
 /// not suffice, it starts again from the last vector a few times; the residual then says how far it got. The zero
 /// map gives 0.
-pub fn largest(
-    dimension: usize,
-    power_steps: usize,
-    tolerance: f64,
-    mut apply: impl FnMut(&mut [f64]),
-) -> Eigenvalue {
+pub fn largest(dimension: usize, power_steps: usize, tolerance: f64, mut apply: impl FnMut(&mut [f64])) -> Eigenvalue {
     let mut start = start_vector(dimension);
     let mut best = Eigenvalue { re: 0.0, im: 0.0, residual: 1.0 };
     let mut workspace = Workspace::new(dimension);
@@ -141,7 +136,8 @@ impl Workspace {
             let size = k + 1;
             if below <= 0.0 || (size >= 5 && size % 2 == 1) || size == limit {
                 let found = ritz(&self.hessenberg, ld, size, below);
-                let settled = (found.modulus() - last.modulus()).abs() <= tolerance.sqrt().max(tolerance) * found.modulus();
+                let settled =
+                    (found.modulus() - last.modulus()).abs() <= tolerance.sqrt().max(tolerance) * found.modulus();
                 if below <= 0.0 || (found.residual <= tolerance && settled) || size == limit {
                     start.copy_from_slice(&self.basis[k]);
                     return found;
@@ -260,8 +256,7 @@ fn two(a: f64, b: f64, c: f64, d: f64) -> [(f64, f64); 2] {
 fn francis(a: &mut [f64], n: usize, low: usize, high: usize, exceptional: bool) {
     let at = |i: usize, j: usize| i * n + j;
     let (p, q) = (high - 2, high - 1);
-    let (mut sum, mut product) =
-        (a[at(p, p)] + a[at(q, q)], a[at(p, p)] * a[at(q, q)] - a[at(p, q)] * a[at(q, p)]);
+    let (mut sum, mut product) = (a[at(p, p)] + a[at(q, q)], a[at(p, p)] * a[at(q, q)] - a[at(p, q)] * a[at(q, p)]);
     if exceptional {
         let s = a[at(q, p)].abs() + a[at(p, p - 1)].abs();
         (sum, product) = (1.5 * s, s * s);
@@ -360,11 +355,13 @@ mod tests {
     #[test]
     fn the_largest_of_many_rotations_is_found() {
         // Block diagonal rotations of slightly different modulus: the hard case of close complex pairs.
-        let blocks: Vec<(f64, f64)> = (0..40).map(|k| (0.9 - 0.002 * f64::from(k), 0.1 + 0.07 * f64::from(k))).collect();
+        let blocks: Vec<(f64, f64)> =
+            (0..40).map(|k| (0.9 - 0.002 * f64::from(k), 0.1 + 0.07 * f64::from(k))).collect();
         let found = largest(80, 12, 1e-9, |v| {
             for (k, (r, angle)) in blocks.iter().enumerate() {
                 let (x, y) = (v[2 * k], v[2 * k + 1]);
-                (v[2 * k], v[2 * k + 1]) = (r * (angle.cos() * x - angle.sin() * y), r * (angle.sin() * x + angle.cos() * y));
+                (v[2 * k], v[2 * k + 1]) =
+                    (r * (angle.cos() * x - angle.sin() * y), r * (angle.sin() * x + angle.cos() * y));
             }
         });
         assert!((found.modulus() - 0.9).abs() < 1e-8, "{found:?}");
