@@ -7,6 +7,7 @@
 
 mod deflection;
 mod fitting;
+mod fixture;
 mod http;
 mod measure;
 mod ring;

@@ -8,6 +8,7 @@ pub mod calculator;
 pub mod deflection_compensation;
 pub mod effects;
 pub mod feed_schedule;
+pub mod fixture_stability;
 pub mod force;
 pub mod machinability;
 pub mod material;
@@ -24,4 +25,5 @@ pub fn register(registrar: &mut impl Registrar) {
     registrar.with_forward_model::<ring_roundness::RingRoundness>();
     registrar.calculator::<ring_roundness::evaluation::RoundnessEvaluation>();
     registrar.calculator::<feed_schedule::fit::MachinabilityFit>();
+    registrar.with_forward_model::<fixture_stability::FixtureStability>();
 }
