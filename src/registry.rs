@@ -10,6 +10,7 @@ mod fault;
 mod finite;
 mod nearest;
 mod place;
+mod result_text;
 mod schema;
 #[cfg(test)]
 mod tests;
@@ -23,6 +24,7 @@ pub(crate) use entry::Unprepared;
 pub(crate) use finite::non_finite_place;
 pub(crate) use nearest::nearest;
 pub(crate) use place::{CellKind, Step, TableColumn, TablePlace};
+pub(crate) use result_text::{Unwritable, append as append_result};
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
