@@ -31,8 +31,13 @@ pub(crate) fn read(entry: &Arc<Entry>, body: &Body) -> Result<Ready, Error> {
     };
     let mut job = json::parse(job)?;
     check_schema(entry, &mut job, parts).map_err(|found| found.with_rules(entry, &job))?;
-    let has_rows = table::has_rows(&job, entry.tables());
-    let mut prepared = entry.prepare(&job).map_err(|unprepared| match unprepared {
+    prepared(entry, &job)
+}
+
+/// A job whose syntax, tables and schema are in order, or were when it was accepted.
+pub(crate) fn prepared(entry: &Arc<Entry>, job: &Value) -> Result<Ready, Error> {
+    let has_rows = table::has_rows(job, entry.tables());
+    let mut prepared = entry.prepare(job).map_err(|unprepared| match unprepared {
         Unprepared::Invalid(findings) => {
             let total = findings.len();
             invalid(findings, total)

@@ -1,12 +1,17 @@
-//! Kept results. Nothing outside this module speaks SQL.
+//! Kept results, and jobs with their queue. Nothing outside this module speaks SQL.
 
+pub mod jobs;
+mod ledger;
+mod queue;
 mod row;
 pub mod sqlite;
+mod sqlite_jobs;
 mod writer;
 
 use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use bytes::Bytes;
 use futures_util::future::BoxFuture;
@@ -136,6 +141,9 @@ pub enum StoreError {
     /// The database did not answer.
     #[error("the store failed: {0}")]
     Failed(String),
+    /// The disk is full.
+    #[error("the disk is full: {0}")]
+    Full(String),
     /// The kept result was made by a version whose contract differs.
     #[error("the result was made by another version of its calculator: {0}")]
     Outdated(String),
@@ -143,6 +151,23 @@ pub enum StoreError {
 
 impl From<sqlx::Error> for StoreError {
     fn from(error: sqlx::Error) -> Self {
+        /// `SQLITE_FULL`.
+        const FULL: i32 = 13;
+        if sqlite_code(&error) == Some(FULL) {
+            return Self::Full(error.to_string());
+        }
         Self::Failed(error.to_string())
     }
+}
+
+/// Kind of an error of SQLite: the lowest byte of its code, the rest of which says more of it.
+fn sqlite_code(error: &sqlx::Error) -> Option<i32> {
+    let code: i32 = error.as_database_error()?.code()?.parse().ok()?;
+    Some(code & 0xff)
+}
+
+/// The time, ms UTC.
+pub(crate) fn now_ms() -> i64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    i64::try_from(since.as_millis()).unwrap_or(i64::MAX)
 }
