@@ -7,7 +7,7 @@ use precut_calc::calculator::{Failure, Finding};
 use serde_json::Value;
 
 use super::error::Error;
-use super::{Body, Checked, json, table};
+use super::{Body, Checked, TablePart, json, table};
 use crate::key::Key;
 use crate::registry::{Entry, Faults, Prepared, Unprepared, by_pointer};
 
@@ -27,7 +27,11 @@ pub(crate) fn read(entry: &Arc<Entry>, body: &Body) -> Result<Ready, Error> {
         Body::Json(job) => (job, [].as_slice()),
         Body::Parts { job, tables } => (job, tables.as_slice()),
     };
-    let mut job = json::parse(job)?;
+    read_value(entry, json::parse(job)?, parts)
+}
+
+/// The same from a JSON value that [`json::parse`] made.
+pub(crate) fn read_value(entry: &Arc<Entry>, mut job: Value, parts: &[TablePart]) -> Result<Ready, Error> {
     check_schema(entry, &mut job, parts).map_err(|found| found.with_rules(entry, &job))?;
     let mut prepared = entry.prepare(&job).map_err(|unprepared| match unprepared {
         Unprepared::Invalid(findings) => {
@@ -37,7 +41,7 @@ pub(crate) fn read(entry: &Arc<Entry>, body: &Body) -> Result<Ready, Error> {
         Unprepared::Failed(failure) => Error::Calculation(failure),
     })?;
     let canonical = Bytes::from(std::mem::take(&mut prepared.canonical));
-    let key = Key::of(entry.meta(), &canonical);
+    let key = Key::of(entry.meta(), prepared.numbers_of.as_ref(), &canonical);
     Ok(Ready { entry: Arc::clone(entry), prepared, key, canonical })
 }
 
@@ -78,7 +82,7 @@ fn general_code(finding: &Finding) -> &str {
     }
 }
 
-fn check_schema(entry: &Entry, job: &mut Value, parts: &[super::TablePart]) -> Result<(), Found> {
+fn check_schema(entry: &Entry, job: &mut Value, parts: &[TablePart]) -> Result<(), Found> {
     let mut table_faults = Faults::default();
     let tables = table::resolve(job, parts, entry.tables(), &mut table_faults);
     let mut schema_faults = Faults::default();
@@ -127,7 +131,6 @@ impl Ready {
 #[allow(clippy::unwrap_used, clippy::panic)]
 mod tests {
     use super::*;
-    use crate::engine::TablePart;
     use crate::registry::toy;
     use crate::text::{Language, Texts};
     use proptest::prelude::*;

@@ -20,6 +20,8 @@ pub struct EngineSettings {
     pub direct_limit: Duration,
     /// A job estimated to hold more memory than this is refused.
     pub direct_limit_bytes: u64,
+    /// So many points has a parameter study at most.
+    pub study_points: u64,
     /// How long a job may stand in line for a core.
     pub patience: Duration,
     /// How long running calculations may go on when the engine is closed.
@@ -37,6 +39,7 @@ impl EngineSettings {
             store_age: Duration::from_hours(30 * 24),
             direct_limit: Duration::from_secs(10),
             direct_limit_bytes: 1 << 30,
+            study_points: super::study::MOST_POINTS,
             patience: Duration::from_millis(250),
             grace: Duration::from_secs(20),
         }

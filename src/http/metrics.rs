@@ -30,7 +30,7 @@ const PATTERNS: [(&str, &str); 6] = [
 ];
 
 /// Addresses without one, besides the calculators'.
-const PLAIN: [&str; 10] = [
+const PLAIN: [&str; 11] = [
     "/",
     "/docs",
     "/openapi.json",
@@ -40,6 +40,7 @@ const PLAIN: [&str; 10] = [
     "/v1/calculators",
     "/v1/results",
     "/v1/materials",
+    "/v1/studies",
     "other",
 ];
 
