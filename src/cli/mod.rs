@@ -108,7 +108,7 @@ struct ServeArgs {
 /// Where a job is.
 #[derive(Debug, Args)]
 struct JobArgs {
-    /// Job file `{"calculator": "...", "job": {...}}`; `-` reads standard input
+    /// Job file `{"calculator": "...", "job": {...}}` or `{"study": {...}}`; `-` reads standard input
     #[arg(value_name = "FILE", default_value = "-")]
     file: PathBuf,
     /// The file is the bare job of this calculator

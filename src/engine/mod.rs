@@ -1,4 +1,8 @@
 //! From the bytes of a job to the bytes of its answer. Knows calculators by name, nothing of HTTP.
+//!
+//! A job is answered at once ([`Engine::solve`]) or put on record and run behind ([`Engine::submit`], [`jobs`]). Both
+//! ways share the cache, the calculations under way and the calculation itself; [`jobs`] says how something else than
+//! one calculation becomes a job.
 
 mod answer;
 mod csv_table;
@@ -6,8 +10,10 @@ mod envelope;
 mod error;
 mod exec;
 mod flight;
+pub(crate) mod jobs;
 mod json;
 mod memory;
+mod progress;
 mod read;
 mod settings;
 mod study;
@@ -17,8 +23,11 @@ mod tests;
 
 pub use crate::key::{BadKey, ENGINE_VERSION, Key};
 pub use crate::store::OpenError;
+pub use crate::store::jobs::{JobId, JobKind, JobQuery, JobRecord, JobState, Priority};
 pub use answer::{Body, CacheState, Checked, Solved, Stored, TablePart, Timings};
 pub use error::{Error, SyntaxFault};
+pub use jobs::{Ask, Feed, Job};
+pub use progress::Interim;
 pub use settings::EngineSettings;
 pub use study::STUDIES;
 
@@ -29,10 +38,12 @@ use std::time::{Duration, Instant};
 use precut_calc::calculator::{Cost, Failure, Monitor};
 
 use crate::registry::{Entry, Registry};
-use crate::store::sqlite::SqliteStore;
-use crate::store::{KeptResult, ResultPage, ResultQuery, ResultStore};
+use crate::store::jobs::JobStore;
+use crate::store::sqlite::{Keep, SqliteStore};
+use crate::store::{ResultPage, ResultQuery, ResultStore};
 use exec::{Cores, Slot, guarded};
 use flight::{Boarded, Flights, Landed, Pilot};
+use jobs::{Jobs, Request};
 use memory::{Kept, Memory, fingerprint};
 use read::Ready;
 
@@ -48,39 +59,61 @@ pub struct Engine {
     inner: Arc<Inner>,
 }
 
-struct Inner {
+pub(crate) struct Inner {
     registry: Registry,
     settings: EngineSettings,
     memory: Memory,
     flights: Arc<Flights>,
     cores: Cores,
     store: Arc<dyn ResultStore>,
+    jobs: Jobs,
     /// Parameter studies: asked like a calculator, made of the registry's.
     studies: Arc<Entry>,
     closed: AtomicBool,
 }
 
+/// What came of a request.
+#[derive(Debug, Clone)]
+pub enum Answered {
+    /// Its answer.
+    Solved(Box<Solved>),
+    /// A job that is not over yet.
+    Job(Box<Job>),
+}
+
+/// A job that was read.
+enum Known {
+    /// What it comes to is known.
+    Kept(Kept, Duration),
+    /// It is to be computed.
+    New(Box<Ready>, Duration),
+}
+
 impl Engine {
     /// Opens the store in the settings' folder and starts the threads.
     pub async fn open(registry: Registry, settings: EngineSettings) -> Result<Self, OpenError> {
-        let store = SqliteStore::open(&settings.data, settings.store_bytes, settings.store_age).await?;
-        Self::with_store(registry, settings, Arc::new(store))
+        let keep = Keep { bytes: settings.store_bytes, age: settings.store_age, jobs: settings.job_age };
+        let store = Arc::new(SqliteStore::open(&settings.data, keep).await?);
+        Self::with_stores(registry, settings, Arc::clone(&store) as Arc<dyn ResultStore>, store).await
     }
 
-    fn with_store(
+    async fn with_stores(
         registry: Registry,
         settings: EngineSettings,
         store: Arc<dyn ResultStore>,
+        jobs: Arc<dyn JobStore>,
     ) -> Result<Self, OpenError> {
-        let cores =
-            Cores::new(settings.cores, settings.patience).map_err(|error| OpenError::Threads(error.to_string()))?;
+        let cores = Cores::new(settings.cores, settings.job_slots, settings.patience)
+            .map_err(|error| OpenError::Threads(error.to_string()))?;
         let memory = Memory::new(settings.memory_cache_bytes);
         let closed = AtomicBool::new(false);
         let flights = Arc::default();
+        let jobs = Jobs::new(jobs);
         let host = Arc::new(study::InEngine::default());
         let studies = Arc::new(study::entry(&registry, settings.study_points, Arc::<study::InEngine>::clone(&host)));
-        let inner = Arc::new(Inner { registry, settings, memory, flights, cores, store, studies, closed });
+        let inner = Arc::new(Inner { registry, settings, memory, flights, cores, store, jobs, studies, closed });
         host.move_in(&inner);
+        Jobs::start(&inner).await;
         Ok(Self { inner })
     }
 
@@ -102,39 +135,172 @@ impl Engine {
     /// Everything but the calculation.
     pub fn check(&self, calculator: &str, body: Body) -> Result<Checked, Error> {
         let inner = &self.inner;
-        let entry = inner.entry(calculator).cloned().ok_or_else(|| Error::unknown(&inner.registry, calculator))?;
+        let entry = inner.known(calculator)?;
         guarded(|| read::read(&entry, &body)?.into_checked())
     }
 
     /// The answer to a job, from the cache or computed. Dropping the future cancels the calculation unless another
     /// request waits for the same one.
     pub async fn solve(&self, calculator: &str, body: Body) -> Result<Solved, Error> {
+        match self.know(calculator, &body).await? {
+            Known::Kept(kept, parse) => hit(kept, parse),
+            Known::New(ready, parse) => {
+                self.inner.afford(ready.prepared.cost)?;
+                self.solve_directly(*ready, parse).await
+            }
+        }
+    }
+
+    /// The answer to a job, or the job itself where it takes long, where the client wants to be told at once that it
+    /// will be done, and wherever it has to be done whatever happens.
+    pub async fn submit(&self, calculator: &str, body: Body, ask: Ask) -> Result<Answered, Error> {
+        let inner = &self.inner;
+        let body_hash = ask.idempotency_key.as_ref().map(|_| fingerprint(calculator, &body));
+        let (ready, parse, kept) = match self.know(calculator, &body).await? {
+            Known::Kept(kept, parse) if body_hash.is_none() => return solved(hit(kept, parse)?),
+            // It has a record, too, by which it is known again.
+            Known::Kept(kept, parse) => {
+                (Box::new(inner.read(&inner.known(calculator)?, body).await?), parse, Some(kept))
+            }
+            Known::New(ready, parse) => (ready, parse, None),
+        };
+        inner.afford(ready.prepared.cost)?;
+        let meta = ready.entry.meta();
+        let estimate_ms = inner.jobs.estimates.corrected(meta.id, meta.version, ready.prepared.cost.ms);
+        let is_short = estimate_ms <= inner.settings.direct_limit.as_secs_f64() * 1e3;
+        if is_short && ask.wait.is_none() && body_hash.is_none() {
+            let answer = self.solve_directly(*ready, parse);
+            return match ask.deadline {
+                None => solved(answer.await?),
+                Some(deadline) => {
+                    solved(tokio::time::timeout(deadline, answer).await.unwrap_or(Err(Error::DeadlineExceeded))?)
+                }
+            };
+        }
+        let result = match kept {
+            Some(Kept::Answer(stored)) => Some(stored),
+            _ => None,
+        };
+        let request = Request {
+            kind: JobKind::Calculation,
+            calculator: meta.id,
+            version: meta.version,
+            key: ready.key,
+            input: ready.canonical.clone(),
+            estimate_ms,
+            body_hash: body_hash.unwrap_or_default(),
+            result,
+        };
+        let record = inner.jobs.accept(request, &ask, inner.settings.queue_limit).await?;
+        // A short job with a name of its own is answered as others are, if it gets its turn soon.
+        let short_wait = if is_short { inner.settings.direct_limit + inner.settings.patience } else { Duration::ZERO };
+        let job = inner.jobs.wait(record.id, ask.wait.unwrap_or(short_wait)).await?;
+        if !job.record.state.is_final() {
+            return Ok(Answered::Job(Box::new(job)));
+        }
+        let run = job.record.started_ms.zip(job.record.finished_ms).map_or(0, |(start, end)| (end - start).max(0));
+        let timings = Timings { parse, run: Duration::from_millis(run.unsigned_abs()), ..Timings::default() };
+        let cache = if run == 0 { CacheState::Hit } else { CacheState::Miss };
+        solved(Solved { stored: self.result_of(job).await?, cache, timings })
+    }
+
+    /// Reads a job, and what is known of it.
+    async fn know(&self, calculator: &str, body: &Body) -> Result<Known, Error> {
         let inner = &self.inner;
         if inner.closed.load(Ordering::Relaxed) {
             return Err(Error::ShuttingDown);
         }
-        let entry = inner.entry(calculator).cloned().ok_or_else(|| Error::unknown(&inner.registry, calculator))?;
+        let entry = inner.known(calculator)?;
         let begun = Instant::now();
-        let fingerprint = fingerprint(entry.meta().id, &body);
+        let fingerprint = fingerprint(entry.meta().id, body);
         if let Some(key) = inner.memory.recognise(&fingerprint)
             && let Some(kept) = inner.look_up(&key).await
         {
-            return hit(kept, begun.elapsed());
+            return Ok(Known::Kept(kept, begun.elapsed()));
         }
-        let ready = inner.read(&entry, body).await?;
+        let ready = inner.read(&entry, body.clone()).await?;
         inner.memory.remember(fingerprint, ready.key);
         let parse = begun.elapsed();
-        if let Some(kept) = inner.look_up(&ready.key).await {
-            return hit(kept, parse);
-        }
-        inner.afford(ready.prepared.cost)?;
+        Ok(match inner.look_up(&ready.key).await {
+            Some(kept) => Known::Kept(kept, parse),
+            None => Known::New(Box::new(ready), parse),
+        })
+    }
+
+    /// Computes the answer to a job while somebody waits for it.
+    async fn solve_directly(&self, ready: Ready, parse: Duration) -> Result<Solved, Error> {
         metrics::counter!("precut_cache_total", "state" => "miss").increment(1);
-        let Boarded { seat, pilot } = inner.flights.board(ready.key);
+        let Boarded { seat, pilot } = self.inner.flights.board(ready.key);
         if let Some(pilot) = pilot {
             self.depart(pilot, ready);
         }
         let Landed { outcome, timings } = seat.landed().await;
         Ok(Solved { stored: outcome?, cache: CacheState::Miss, timings: Timings { parse, ..timings } })
+    }
+
+    /// A job as it is now.
+    pub async fn job(&self, id: JobId) -> Result<Job, Error> {
+        self.inner.jobs.job(id).await
+    }
+
+    /// The jobs, newest first, and where the next page begins.
+    pub async fn jobs(&self, query: JobQuery) -> Result<(Vec<Job>, Option<JobId>), Error> {
+        self.inner.jobs.list(query).await
+    }
+
+    /// Cancels a job; with its state before.
+    pub async fn cancel(&self, id: JobId) -> Result<(Job, JobState), Error> {
+        self.inner.jobs.cancel(id).await
+    }
+
+    /// News of a job. To be asked for before looking at the job.
+    pub fn feed(&self, id: JobId) -> Feed {
+        self.inner.jobs.feed(id)
+    }
+
+    /// What a job came to.
+    pub async fn job_result(&self, id: JobId) -> Result<Arc<Stored>, Error> {
+        let job = self.inner.jobs.job(id).await?;
+        self.result_of(job).await
+    }
+
+    async fn result_of(&self, job: Job) -> Result<Arc<Stored>, Error> {
+        let state = job.record.state;
+        let not_finished = |retry_after| Error::JobNotFinished { state, retry_after };
+        if job.is_expired() {
+            return Err(Error::JobExpired);
+        }
+        match state {
+            JobState::Queued | JobState::Running => Err(not_finished(job.retry_after())),
+            JobState::Cancelled => Err(Error::JobCancelled),
+            JobState::Failed => {
+                Err(job.problem.unwrap_or_else(|| Error::internal("a job failed without a reason".to_owned())))
+            }
+            JobState::Succeeded => match self.result(&job.record.key).await? {
+                Some(stored) => Ok(stored),
+                None => {
+                    // The row was damaged. The job is known: it is computed again.
+                    tracing::warn!(job = %job.record.id, "the result of a job is gone; it is computed again");
+                    self.inner.jobs.store.redo(job.record.id).await?;
+                    Err(Error::JobNotFinished { state: JobState::Queued, retry_after: job.retry_after() })
+                }
+            },
+        }
+    }
+
+    /// From now on no job is taken up, and those that run go back in line; the rest goes on.
+    pub fn stop_jobs(&self) {
+        self.inner.jobs.stop();
+    }
+
+    /// A job that was read before, with what is known in memory by now.
+    pub fn refreshed(&self, record: JobRecord) -> Job {
+        self.inner.jobs.now(record)
+    }
+
+    /// Waits until [`Engine::stop_jobs`].
+    pub async fn stopped(&self) {
+        self.inner.jobs.stopped().await;
     }
 
     /// Sees to it that the calculation runs: at once if there is a slot, else when one is free.
@@ -184,9 +350,11 @@ impl Engine {
         Ok(self.inner.store.ping().await?)
     }
 
-    /// From now on jobs are refused and [`Engine::ready`] fails; calculations under way go on.
+    /// From now on jobs are refused and [`Engine::ready`] fails; direct calculations under way go on, jobs go back in
+    /// line.
     pub fn refuse_jobs(&self) {
         self.inner.closed.store(true, Ordering::Relaxed);
+        self.inner.jobs.stop();
     }
 
     /// Takes no more jobs, lets running calculations end within the grace or cancels them, writes what waits to be
@@ -194,6 +362,7 @@ impl Engine {
     pub async fn close(&self) {
         self.refuse_jobs();
         let inner = &self.inner;
+        inner.jobs.close().await;
         if !inner.cores.drain(inner.settings.grace).await {
             inner.flights.cancel_all();
         }
@@ -204,6 +373,11 @@ impl Engine {
 impl Inner {
     fn entry(&self, name: &str) -> Option<&Arc<Entry>> {
         if name == STUDIES { Some(&self.studies) } else { self.registry.entry(name) }
+    }
+
+    /// What is asked under a name.
+    fn known(&self, name: &str) -> Result<Arc<Entry>, Error> {
+        self.entry(name).cloned().ok_or_else(|| Error::unknown(&self.registry, name))
     }
 
     /// Reads a job where that does no harm.
@@ -248,7 +422,7 @@ impl Inner {
     }
 
     fn afford(&self, cost: Cost) -> Result<(), Error> {
-        let (limit, limit_bytes) = (self.settings.direct_limit, self.settings.direct_limit_bytes);
+        let (limit, limit_bytes) = (self.settings.cost_limit, self.settings.cost_limit_bytes);
         // An estimate that is no number is not below the limit.
         let affordable = cost.ms <= limit.as_secs_f64() * 1e3 && cost.bytes <= limit_bytes;
         if affordable { Ok(()) } else { Err(Error::TooExpensive { cost, limit, limit_bytes }) }
@@ -257,15 +431,15 @@ impl Inner {
     /// Sees to it that the calculation runs: here if it is short, else on the pool.
     fn fly(inner: &Arc<Self>, pilot: Pilot, ready: Ready, slot: Slot, queued: Instant) {
         if ready.prepared.cost.ms <= COMPUTE_AT_ONCE_MS && !ready.entry.is_composed() {
-            inner.run(pilot, &ready, slot, queued);
+            inner.run(pilot, &ready, Some(slot), queued);
         } else {
             let this = Arc::clone(inner);
-            inner.cores.spawn(move || this.run(pilot, &ready, slot, queued));
+            inner.cores.spawn(move || this.run(pilot, &ready, Some(slot), queued));
         }
     }
 
     /// Runs the calculation, keeps its answer and tells it.
-    fn run(&self, pilot: Pilot, ready: &Ready, slot: Slot, queued: Instant) {
+    fn run(&self, pilot: Pilot, ready: &Ready, slot: Option<Slot>, queued: Instant) {
         let (queue, begun) = (queued.elapsed(), Instant::now());
         let watch = pilot.watch();
         let outcome = guarded(|| compute(ready, &watch));
@@ -290,14 +464,7 @@ impl Inner {
             Ok(stored) => {
                 let stored = Arc::new(stored);
                 self.memory.keep(ready.key, Kept::Answer(Arc::clone(&stored)));
-                self.store.put(KeptResult {
-                    key: ready.key,
-                    calculator: meta.id.to_owned(),
-                    version: meta.version,
-                    engine: ENGINE_VERSION.to_owned(),
-                    input: stored.input.clone(),
-                    body: stored.body.clone(),
-                });
+                self.store.put(stored.kept());
                 Ok(stored)
             }
             Err(Error::Calculation(failure)) => {
@@ -327,6 +494,10 @@ fn outcome(kept: Kept) -> Result<Arc<Stored>, Error> {
         Kept::Answer(stored) => Ok(stored),
         Kept::Failure(failure) => Err(Error::Calculation(failure)),
     }
+}
+
+fn solved(solved: Solved) -> Result<Answered, Error> {
+    Ok(Answered::Solved(Box::new(solved)))
 }
 
 fn hit(kept: Kept, parse: Duration) -> Result<Solved, Error> {

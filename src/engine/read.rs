@@ -33,7 +33,12 @@ pub(crate) fn read(entry: &Arc<Entry>, body: &Body) -> Result<Ready, Error> {
 /// The same from a JSON value that [`json::parse`] made.
 pub(crate) fn read_value(entry: &Arc<Entry>, mut job: Value, parts: &[TablePart]) -> Result<Ready, Error> {
     check_schema(entry, &mut job, parts).map_err(|found| found.with_rules(entry, &job))?;
-    let mut prepared = entry.prepare(&job).map_err(|unprepared| match unprepared {
+    prepared(entry, &job)
+}
+
+/// A job whose syntax, tables and schema are in order, or were when it was accepted.
+pub(crate) fn prepared(entry: &Arc<Entry>, job: &Value) -> Result<Ready, Error> {
+    let mut prepared = entry.prepare(job).map_err(|unprepared| match unprepared {
         Unprepared::Invalid(findings) => {
             let total = findings.len();
             invalid(findings, total)
@@ -97,6 +102,11 @@ fn check_schema(entry: &Entry, job: &mut Value, parts: &[TablePart]) -> Result<(
     let total = schema_faults.total - (listed - findings.len()) + table_faults.total;
     findings.extend(table_faults.listed);
     if total == 0 { Ok(()) } else { Err(Found { findings, total }) }
+}
+
+/// What the schema alone finds wrong with a job.
+pub(crate) fn schema_faults(entry: &Entry, mut job: Value) -> Vec<Finding> {
+    check_schema(entry, &mut job, &[]).err().map(|found| found.findings).unwrap_or_default()
 }
 
 /// The faults sorted by pointer, as many as are listed.

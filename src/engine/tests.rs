@@ -11,7 +11,7 @@ use tempfile::TempDir;
 
 use super::*;
 use crate::registry::toy;
-use crate::store::StoreError;
+use crate::store::{KeptResult, StoreError};
 use crate::text::{Language, Texts};
 
 const TOY: &str = "toy-bar";
@@ -150,7 +150,7 @@ async fn a_panic_a_nan_and_an_impossible_job_are_told_apart() {
 
 #[tokio::test]
 async fn a_job_above_the_limit_is_refused_with_the_field_that_drives_it() {
-    let (engine, _folder) = engine().await;
+    let (engine, _folder) = engine_with(|settings| settings.cost_limit = Duration::from_secs(10)).await;
     let work = |ms: f64| job(move |job| job["work_ms"] = json!(ms));
     let Error::TooExpensive { cost, limit, .. } = engine.solve(TOY, work(10_001.0)).await.unwrap_err() else {
         panic!("accepted")
@@ -244,8 +244,11 @@ impl ResultStore for BrokenStore {
 
 #[tokio::test]
 async fn a_store_that_fails_fails_no_answer() {
-    let settings = EngineSettings { cores: 1, ..EngineSettings::in_folder("unused") };
-    let engine = Engine::with_store(toy::registry(), settings, Arc::new(BrokenStore)).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let settings = EngineSettings { cores: 1, ..EngineSettings::in_folder(folder.path()) };
+    let keep = Keep { bytes: 1, age: settings.store_age, jobs: settings.job_age };
+    let jobs = Arc::new(SqliteStore::open(folder.path(), keep).await.unwrap());
+    let engine = Engine::with_stores(toy::registry(), settings, Arc::new(BrokenStore), jobs).await.unwrap();
     let solved = engine.solve(TOY, job(|_| {})).await.unwrap();
     assert_eq!(engine.solve(TOY, job(|_| {})).await.unwrap().cache, CacheState::Hit);
     assert!(engine.result(&solved.stored.key).await.unwrap().is_some());

@@ -104,6 +104,34 @@ fn results_survive_a_restart() {
     assert_eq!(caches, ["precut-cache: miss", "precut-cache: hit"]);
 }
 
+#[cfg(unix)]
+#[test]
+fn a_killed_job_is_finished_by_the_next_process() {
+    let folder = tempfile::tempdir().unwrap();
+    let job = r#"{"length_mm": 100, "load_n": 1, "duration_ms": 800}"#;
+    let mut process = Process::start_in(folder.path());
+    let accepted = ask(process.address, &request("POST", "/v1/sagging-bar", job)).unwrap();
+    assert!(accepted.starts_with("HTTP/1.1 202 "), "{accepted}");
+    let address = accepted.lines().find_map(|line| line.strip_prefix("location: ")).unwrap().to_owned();
+    std::thread::sleep(Duration::from_millis(300));
+    process.signal("KILL");
+    process.wait(Duration::from_secs(5));
+    let process = Process::start_in(folder.path());
+    let start = Instant::now();
+    loop {
+        let answer = ask(process.address, &request("GET", &address, "")).unwrap();
+        assert!(answer.starts_with("HTTP/1.1 200 "), "{answer}");
+        if answer.contains("\"state\":\"succeeded\"") {
+            assert!(answer.contains("\"attempt\":2"), "{answer}");
+            break;
+        }
+        assert!(start.elapsed() < Duration::from_secs(10), "{answer}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let result = ask(process.address, &request("GET", &format!("{address}/result"), "")).unwrap();
+    assert!(result.starts_with("HTTP/1.1 200 ") && result.contains("max_sag_um"), "{result}");
+}
+
 #[test]
 fn a_folder_in_use_or_a_port_taken_is_said_and_ends_with_1() {
     let process = Process::start();

@@ -37,8 +37,8 @@ impl Server {
         let data = tempfile::tempdir().expect("a folder for temporary files");
         let mut config = Config::default();
         adjust(&mut config);
-        let limit = Duration::from_secs_f64(config.limits.job_ms / 1e3);
-        let settings = EngineSettings { direct_limit: limit, ..EngineSettings::in_folder(data.path()) };
+        config.data = data.path().to_owned();
+        let settings = EngineSettings::of(&config);
         let engine = Engine::open(toy::registry(), settings).await.expect("an empty folder");
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
         let address = listener.local_addr().expect("it is bound");

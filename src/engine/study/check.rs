@@ -10,7 +10,6 @@ use super::faults;
 use super::input::{Combine, Spacing, StudyInput, Variable};
 use super::place;
 use super::plan::{Found, Output, Planned};
-use crate::engine::error::Error;
 use crate::engine::read;
 use crate::registry::Entry;
 
@@ -34,8 +33,10 @@ pub(super) fn structure(input: &StudyInput, most_points: u64) -> (Vec<u64>, Vec<
     } else if all_known {
         let points = Shape::new(known.clone(), input.combine).points();
         if points > u128::from(most_points) {
-            // Printed with six digits.
-            let (points, limit) = (points as f64, most_points as f64);
+            // Printed with six digits; a product of three counts may be beyond every whole number type.
+            let lengths = known.iter().map(|&length| length as f64);
+            let points = if input.combine == Combine::Zip { points as f64 } else { lengths.product() };
+            let limit = most_points as f64;
             found.push(Finding::new("too_many_points", "/vary").measured(points, limit, "1"));
         }
     }
@@ -204,8 +205,9 @@ pub(super) fn values(input: &StudyInput, fields: Vec<Option<Found>>, found: &mut
     planned
 }
 
-/// What is wrong with the job where no variable is concerned.
-pub(super) fn job(entry: &std::sync::Arc<Entry>, input: &StudyInput, fields: &[Option<Found>]) -> Vec<Finding> {
+/// What the schema finds wrong with the job where no variable is concerned. Rules between fields may be broken by the
+/// variables' values alone, and say nothing yet.
+pub(super) fn job(entry: &Entry, input: &StudyInput, fields: &[Option<Found>]) -> Vec<Finding> {
     let mut job = input.job.clone();
     for (variable, found) in input.vary.iter().zip(fields) {
         if let Some(found) = found
@@ -214,9 +216,7 @@ pub(super) fn job(entry: &std::sync::Arc<Entry>, input: &StudyInput, fields: &[O
             set(&mut job, &found.tokens, first);
         }
     }
-    let Err(Error::Invalid { findings, .. }) = read::read_value(entry, Value::Object(job), &[]) else {
-        return Vec::new();
-    };
+    let findings = read::schema_faults(entry, Value::Object(job));
     let concerns = |finding: &Finding| input.vary.iter().any(|variable| variable.pointer == finding.pointer);
     findings.into_iter().filter(|finding| !concerns(finding)).map(faults::in_job).collect()
 }

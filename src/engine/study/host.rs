@@ -11,14 +11,17 @@ use crate::engine::memory::Kept;
 use crate::engine::read::Ready;
 use crate::key::Key;
 
+/// What a helper does. It asks from time to time whether it may go on, or whether somebody else waits for its core.
+pub(crate) type Help = dyn Fn(&mut dyn FnMut() -> bool) + Send + Sync;
+
 /// What a study needs of the engine in which it runs. Called from threads that calculate: calls may block.
 pub(crate) trait Host: Send + Sync {
     /// What is kept under a key.
     fn kept(&self, key: &Key) -> Option<Kept>;
     /// Keeps what would come out again.
     fn keep(&self, ready: &Ready, outcome: Result<Stored, Error>, took: Duration) -> Result<Arc<Stored>, Error>;
-    /// Runs `work` on further cores that nobody else has a right to, on at most so many; on how many.
-    fn help(&self, most: usize, work: Arc<dyn Fn() + Send + Sync>) -> usize;
+    /// Runs `work` on further cores that nobody else has a right to, on at most so many.
+    fn help(&self, most: usize, work: &Arc<Help>);
     /// What was put down of a study before, by the number of the shard.
     fn put_down(&self, study: &Key) -> Vec<(usize, Bytes)>;
     /// Puts a part of a study down; on return it and the answers of its points outlast the process, if they can.
@@ -37,9 +40,7 @@ impl Host for Alone {
     fn keep(&self, _ready: &Ready, outcome: Result<Stored, Error>, _took: Duration) -> Result<Arc<Stored>, Error> {
         outcome.map(Arc::new)
     }
-    fn help(&self, _most: usize, _work: Arc<dyn Fn() + Send + Sync>) -> usize {
-        0
-    }
+    fn help(&self, _most: usize, _work: &Arc<Help>) {}
     fn put_down(&self, _study: &Key) -> Vec<(usize, Bytes)> {
         Vec::new()
     }

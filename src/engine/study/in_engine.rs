@@ -6,7 +6,7 @@ use std::time::Duration;
 use bytes::Bytes;
 use tokio::runtime::Handle;
 
-use super::host::{Alone, Host};
+use super::host::{Alone, Help, Host};
 use crate::engine::Inner;
 use crate::engine::answer::Stored;
 use crate::engine::error::Error;
@@ -51,12 +51,45 @@ impl Host for InEngine {
         }
     }
 
-    fn help(&self, _most: usize, _work: Arc<dyn Fn() + Send + Sync>) -> usize {
-        0
+    fn help(&self, most: usize, work: &Arc<Help>) {
+        let Some((engine, _)) = self.engine() else { return };
+        for _ in 0..most {
+            let Some(slot) = engine.cores.spare_job_slot() else { return };
+            let (cores, work) = (Arc::clone(&engine), Arc::clone(work));
+            engine.cores.spawn_job(move || {
+                let mut slot = Some(slot);
+                // Whoever waits for a core gets this one.
+                work(&mut || {
+                    slot = None;
+                    slot = cores.cores.spare_job_slot();
+                    slot.is_some()
+                });
+            });
+        }
     }
-    fn put_down(&self, _study: &Key) -> Vec<(usize, Bytes)> {
-        Vec::new()
+
+    fn put_down(&self, study: &Key) -> Vec<(usize, Bytes)> {
+        let Some((engine, Some(runtime))) = self.engine() else { return Vec::new() };
+        match runtime.block_on(engine.store.shards(*study)) {
+            Ok(shards) => shards.into_iter().map(|(shard, content)| (shard as usize, content)).collect(),
+            Err(error) => {
+                tracing::warn!(%study, %error, "what was put down of a study cannot be read; it begins anew");
+                Vec::new()
+            }
+        }
     }
-    fn put(&self, _study: &Key, _shard: usize, _content: Bytes) {}
-    fn forget(&self, _study: &Key) {}
+
+    fn put(&self, study: &Key, shard: usize, content: Bytes) {
+        let (Some((engine, Some(runtime))), Ok(number)) = (self.engine(), u32::try_from(shard)) else { return };
+        if let Err(error) = runtime.block_on(engine.store.put_shard(*study, number, content)) {
+            tracing::warn!(%study, shard, %error, "a part of a study is not put down");
+        }
+    }
+
+    fn forget(&self, study: &Key) {
+        let Some((engine, Some(runtime))) = self.engine() else { return };
+        if let Err(error) = runtime.block_on(engine.store.forget_shards(*study)) {
+            tracing::warn!(%study, %error, "the parts of a study are not forgotten");
+        }
+    }
 }

@@ -73,7 +73,9 @@ impl Plan {
         let outputs = check::outputs(entry, &mut input, &mut found);
         if !found.is_empty() {
             // What is wrong with the job itself is said along with it, as far as it can be told.
-            found.extend(check::job(entry, &input, &fields));
+            // A table that could not be read is no fault of its own once more.
+            let said: BTreeSet<String> = found.iter().map(|finding| finding.pointer.clone()).collect();
+            found.extend(check::job(entry, &input, &fields).into_iter().filter(|one| !said.contains(&one.pointer)));
             return Err(found);
         }
         let shape = Shape::new(lengths, input.combine);

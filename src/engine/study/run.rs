@@ -11,10 +11,11 @@ use std::time::{Duration, Instant};
 use precut_calc::calculator::{Failure, Message, Monitor};
 
 use super::figure;
-use super::host::Host;
+use super::host::{Help, Host};
 use super::plan::Plan;
 use super::point::Shard;
 use super::result::Row;
+use crate::engine::exec::guarded;
 use crate::key::Key;
 
 /// A study whose cost is below is not worth a second core, nor putting down, ms.
@@ -32,6 +33,7 @@ struct Work {
     next: AtomicUsize,
     points_done: AtomicUsize,
     stop: AtomicBool,
+    crashed: AtomicBool,
     done: Mutex<Done>,
     changed: Condvar,
 }
@@ -59,8 +61,9 @@ impl Work {
         self.changed.notify_all();
     }
 
-    /// Computes shards until none is left. `told` is called after each point.
-    fn share(&self, monitor: &dyn Monitor, mut told: impl FnMut()) {
+    /// Computes shards until none is left, or until `go_on` says no; that is asked after each shard, and `told` is
+    /// called after each point.
+    fn share(&self, monitor: &dyn Monitor, go_on: &mut dyn FnMut() -> bool, mut told: impl FnMut()) {
         loop {
             let index = self.next.fetch_add(1, Ordering::Relaxed);
             if index >= self.plan.shards() || self.stop.load(Ordering::Relaxed) {
@@ -84,6 +87,28 @@ impl Work {
                 self.host.put(&self.key, index, content.into());
             }
             self.add(index, shard);
+            if !go_on() {
+                return;
+            }
+        }
+    }
+
+    /// How many shards nobody has begun.
+    fn left(&self) -> usize {
+        self.plan.shards().saturating_sub(self.next.load(Ordering::Relaxed))
+    }
+
+    /// What a helper does. A panic here would end the process, and a shard that nobody ends would never be waited for
+    /// to the end.
+    fn help(&self, go_on: &mut dyn FnMut() -> bool) {
+        let outcome = guarded(|| {
+            self.share(&Helper(self), go_on, || {});
+            Ok(())
+        });
+        if outcome.is_err() {
+            self.crashed.store(true, Ordering::Relaxed);
+            self.stop.store(true, Ordering::Relaxed);
+            self.changed.notify_all();
         }
     }
 
@@ -151,13 +176,21 @@ pub(crate) fn run(
         next: AtomicUsize::new(0),
         points_done: AtomicUsize::new(0),
         stop: AtomicBool::new(false),
+        crashed: AtomicBool::new(false),
         done: Mutex::new(Done { shards: vec![None; shards], missing: shards }),
         changed: Condvar::new(),
     });
+    let helped = Arc::clone(&work);
+    let help: Arc<Help> = Arc::new(move |go_on: &mut dyn FnMut() -> bool| helped.help(go_on));
+    let mut hire = || {
+        if work.is_large() {
+            host.help(work.left().saturating_sub(1), &help);
+        }
+        true
+    };
     if work.is_large() {
         work.resume();
-        let helped = Arc::clone(&work);
-        host.help(shards - 1, Arc::new(move || helped.share(&Helper(&helped), || {})));
+        hire();
     }
     let mut drawn = Instant::now();
     let mut tell = || {
@@ -167,7 +200,7 @@ pub(crate) fn run(
             drawn = Instant::now();
         }
     };
-    work.share(monitor, &mut tell);
+    work.share(monitor, &mut hire, &mut tell);
     let mut done = work.done();
     while done.missing > 0 && !work.stop.load(Ordering::Relaxed) {
         (done, _) = work.changed.wait_timeout(done, LOOK).unwrap_or_else(PoisonError::into_inner);
@@ -180,6 +213,9 @@ pub(crate) fn run(
     }
     let shards = std::mem::take(&mut done.shards);
     drop(done);
+    if work.crashed.load(Ordering::Relaxed) {
+        return Err(Failure::Internal("a part of a study crashed".to_owned()));
+    }
     let all: Option<Vec<Shard>> = shards.into_iter().collect();
     let all = all.ok_or(Failure::Cancelled)?;
     if work.is_large() {
