@@ -191,7 +191,8 @@ impl Engine {
             body_hash: body_hash.unwrap_or_default(),
             result,
         };
-        let record = inner.jobs.accept(request, &ask, inner.settings.queue_limit).await?;
+        let was_there = request.result.is_some();
+        let (record, is_new) = inner.jobs.accept(request, &ask, inner.settings.queue_limit).await?;
         // A short job with a name of its own is answered as others are, if it gets its turn soon.
         let short_wait = if is_short { inner.settings.direct_limit + inner.settings.patience } else { Duration::ZERO };
         let job = inner.jobs.wait(record.id, ask.wait.unwrap_or(short_wait)).await?;
@@ -200,7 +201,7 @@ impl Engine {
         }
         let run = job.record.started_ms.zip(job.record.finished_ms).map_or(0, |(start, end)| (end - start).max(0));
         let timings = Timings { parse, run: Duration::from_millis(run.unsigned_abs()), ..Timings::default() };
-        let cache = if run == 0 { CacheState::Hit } else { CacheState::Miss };
+        let cache = if is_new && !was_there { CacheState::Miss } else { CacheState::Hit };
         solved(Solved { stored: self.result_of(job).await?, cache, timings })
     }
 

@@ -85,7 +85,7 @@ pub(super) async fn solve(app: App, room: Arc<Room>, request: Request) -> Result
     }
     let mut response = answer::respond(solved.stored.clone(), view, &condition).await?;
     answer::describe(&mut response, &solved.stored, solved.cache, &solved.timings);
-    if preference.wait_s.is_some() {
+    if preference.wait_s.is_some() && solved.cache == CacheState::Miss {
         jobs::apply(&mut response, Preference { respond_async: false, ..preference });
     }
     Ok(response)

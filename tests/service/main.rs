@@ -8,6 +8,7 @@ mod support;
 mod bad_input;
 mod command_line;
 mod contract;
+mod events;
 mod jobs;
 mod limits;
 mod negotiation;

@@ -200,8 +200,13 @@ impl Jobs {
         let _ = self.stop.subscribe().wait_for(|stop| *stop).await;
     }
 
-    /// Puts a job on record.
-    pub(crate) async fn accept(&self, request: Request, ask: &Ask, queue_limit: u64) -> Result<JobRecord, Error> {
+    /// Puts a job on record; whether it is a new one.
+    pub(crate) async fn accept(
+        &self,
+        request: Request,
+        ask: &Ask,
+        queue_limit: u64,
+    ) -> Result<(JobRecord, bool), Error> {
         let idempotency = ask.idempotency_key.clone().map(|key| Idempotency { key, body_hash: request.body_hash });
         let deadline_ms = ask.deadline.map(|after| {
             now_ms().saturating_add(i64::try_from(after.as_millis()).unwrap_or(i64::MAX / 2)).min(i64::MAX / 2)
@@ -226,9 +231,9 @@ impl Jobs {
                 if deadline_ms.is_some() {
                     self.new_deadline.notify_one();
                 }
-                Ok(record)
+                Ok((record, true))
             }
-            Accepted::Known(record) => Ok(record),
+            Accepted::Known(record) => Ok((record, false)),
             Accepted::OtherBody(id) => Err(Error::IdempotencyKeyReused(id)),
             Accepted::QueueFull { queued } => {
                 metrics::counter!("precut_queue_full_total").increment(1);

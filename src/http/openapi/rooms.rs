@@ -14,7 +14,7 @@ use utoipa::openapi::response::ResponseBuilder;
 use utoipa::openapi::schema::{AdditionalProperties, ArrayBuilder, ObjectBuilder, SchemaType, Type};
 use utoipa::openapi::{Content, Object, Ref, RefOr, Required, Schema};
 
-use super::parts;
+use super::{jobs, parts};
 use crate::http::answer::offered;
 use crate::http::negotiate::Media;
 use crate::engine;
@@ -60,8 +60,8 @@ fn operation(entry: &Entry, name: &str, tag: &str, examples: &[Example]) -> Room
         .description(Some(description(meta)))
         .request_body(Some(body(entry, &job, examples)))
         .response("200", answered(meta, &answer));
-    let operation = parts::conditional(parameters(operation, meta));
-    let operation = parts::guarded(operation, &[400, 404, 406, 408, 413, 415, 422]);
+    let operation = parts::conditional(jobs::may_become_one(parameters(operation, meta)));
+    let operation = parts::guarded(operation, &[400, 404, 406, 408, 409, 410, 413, 415, 422, 507]);
     Room { path: PathItem::new(HttpMethod::Post, operation), schemas }
 }
 
@@ -141,6 +141,7 @@ fn answered(meta: &Meta, answer: &str) -> ResponseBuilder {
             "Precut-Cache",
             parts::header_of(parts::one_of(["hit", "miss"].map(ToOwned::to_owned)), "Whether it was there already."),
         )
+        .header("Preference-Applied", parts::text_header("Preferences that were followed.", "wait=10"))
         .header(
             "Server-Timing",
             parts::text_header("Where the time went, ms.", "parse;dur=0.041, queue;dur=0.004, run;dur=0.310"),
