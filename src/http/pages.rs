@@ -49,8 +49,6 @@ pub(super) struct LandingLinks {
     calculators: &'static str,
     /// The kept results.
     results: &'static str,
-    /// Where parameter studies are posted.
-    studies: &'static str,
     /// The library of materials.
     materials: &'static str,
     /// The contract (OpenAPI 3.1).
@@ -88,7 +86,6 @@ pub(super) async fn landing(State(app): State<App>, headers: HeaderMap) -> Respo
             links: LandingLinks {
                 calculators: "/v1/calculators",
                 results: "/v1/results",
-                studies: "/v1/studies",
                 materials: "/v1/materials",
                 openapi: "/openapi.json",
                 docs: "/docs",
