@@ -24,7 +24,7 @@ impl Service {
     /// Starts it in a folder, with settings from the environment, and waits until it is ready.
     pub async fn start(folder: &Path, settings: &[(&str, &str)]) -> Self {
         let process = Process::start_with(folder, settings);
-        let client = Client::builder().no_gzip().no_brotli().pool_max_idle_per_host(4).build().unwrap();
+        let client = Client::builder().no_gzip().no_brotli().pool_max_idle_per_host(0).build().unwrap();
         let service = Self { process, client };
         until("readiness", async || {
             let response = service.client.get(service.url("/health/ready")).send().await.ok()?;
