@@ -1,6 +1,7 @@
 //! The rooms: each calculator's own route, and what the service says of it.
 
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use axum::extract::{Path, Request, State};
@@ -61,7 +62,12 @@ pub(super) async fn solve(app: App, room: Arc<Room>, request: Request) -> Result
     let SolveQuery { table, figure, priority, deadline_s } = answer::query(request.uri())?;
     let headers = request.headers();
     let view = View::of_parts(Parts { table, figure }, headers, room.entry.meta(), &room.offered)?;
-    let preference = Preference::of(headers);
+    let mut preference = Preference::of(headers);
+    // Those who wait are requests in work: they leave room for those who do not.
+    let waiting = preference.wait_s.map(|_| Waiting::new(&app));
+    if waiting.as_ref().is_some_and(|waiting| waiting.is_too_many) {
+        preference.wait_s = Some(0);
+    }
     let ask = Ask {
         priority: priority.map_or(Priority::Normal, Into::into),
         deadline: deadline_s.map(deadline).transpose()?,
@@ -89,6 +95,25 @@ pub(super) async fn solve(app: App, room: Arc<Room>, request: Request) -> Result
         jobs::apply(&mut response, Preference { respond_async: false, ..preference });
     }
     Ok(response)
+}
+
+/// Counts a request that may wait for a job while it lives.
+struct Waiting<'a> {
+    app: &'a App,
+    is_too_many: bool,
+}
+
+impl<'a> Waiting<'a> {
+    fn new(app: &'a App) -> Self {
+        let before = app.waiting.fetch_add(1, Ordering::Relaxed);
+        Self { app, is_too_many: before >= app.limits.concurrent_requests.div_ceil(2) }
+    }
+}
+
+impl Drop for Waiting<'_> {
+    fn drop(&mut self) {
+        self.app.waiting.fetch_sub(1, Ordering::Relaxed);
+    }
 }
 
 fn deadline(s: f64) -> Result<Duration, Problem> {

@@ -60,6 +60,7 @@ pub struct Shared {
     documents: document::Documents,
     streams: Arc<events::Streams>,
     in_flight: AtomicUsize,
+    waiting: AtomicUsize,
     stopping: AtomicBool,
 }
 
@@ -88,6 +89,7 @@ impl App {
             documents,
             streams: Arc::new(events::Streams::new(config.jobs.streams)),
             in_flight: AtomicUsize::new(0),
+            waiting: AtomicUsize::new(0),
             stopping: AtomicBool::new(false),
             engine,
         }))

@@ -4,6 +4,7 @@
 //! away in the middle leaves no half-done transaction.
 
 use futures_util::future::BoxFuture;
+use sqlx::Connection;
 use sqlx::sqlite::{SqliteConnection, SqlitePool};
 use tokio::sync::{mpsc, oneshot};
 
@@ -77,11 +78,11 @@ async fn carry_out(pool: SqlitePool, mut orders: mpsc::Receiver<Box<dyn Order>>)
     while orders.recv_many(&mut group, GROUP).await > 0 {
         match together(&pool, &mut group).await {
             Ok(()) => group.drain(..).for_each(|order| order.done(Ok(()))),
-            Err(error) if group.len() == 1 => {
+            Err(error) if group.len() == 1 || !is_of_one_order(&error) => {
                 let error = StoreError::from(error);
                 group.drain(..).for_each(|order| order.done(Err(error.clone())));
             }
-            // One of them is at fault, or the disk: each alone shows which.
+            // One of them is at fault: each alone shows which.
             Err(_) => {
                 for order in group.drain(..) {
                     let mut alone = vec![order];
@@ -93,8 +94,29 @@ async fn carry_out(pool: SqlitePool, mut orders: mpsc::Receiver<Box<dyn Order>>)
     }
 }
 
+/// Whether an error may be that of one order; a disk or a lock fails them all, and trying each would only take longer.
+fn is_of_one_order(error: &sqlx::Error) -> bool {
+    /// `BUSY`, `LOCKED`, `READONLY`, `IOERR`, `FULL`, `CANTOPEN` of SQLite.
+    const OF_ALL: [i32; 6] = [5, 6, 8, 10, 13, 14];
+    match error.as_database_error().and_then(|error| error.code()).and_then(|code| code.parse::<i32>().ok()) {
+        Some(code) => !OF_ALL.contains(&(code & 0xff)),
+        None => !matches!(error, sqlx::Error::PoolTimedOut | sqlx::Error::PoolClosed | sqlx::Error::Io(_)),
+    }
+}
+
 async fn together(pool: &SqlitePool, group: &mut [Box<dyn Order>]) -> Result<(), sqlx::Error> {
-    let mut transaction = pool.begin_with("BEGIN IMMEDIATE").await?;
+    let mut connection = pool.acquire().await?;
+    let outcome = within(&mut connection, group).await;
+    if outcome.is_err() {
+        // Where SQLite has rolled back by itself (a full disk), the driver still counts a transaction that nothing can
+        // end, and would refuse every later one.
+        connection.close_on_drop();
+    }
+    outcome
+}
+
+async fn within(connection: &mut SqliteConnection, group: &mut [Box<dyn Order>]) -> Result<(), sqlx::Error> {
+    let mut transaction = connection.begin_with("BEGIN IMMEDIATE").await?;
     for order in group {
         order.attempt(&mut transaction).await?;
     }

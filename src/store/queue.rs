@@ -33,7 +33,7 @@ const ATTEMPTS: usize = 1_000_000;
 /// How long a task that is done is kept.
 const DONE_FOR_S: i64 = 60;
 /// Pause after the queue failed.
-const PAUSE: Duration = Duration::from_millis(500);
+const PAUSE: Duration = Duration::from_secs(1);
 /// Places in the order of one priority.
 const TURNS: i64 = 1 << 40;
 
@@ -113,6 +113,12 @@ pub(super) struct Tasks {
 impl Tasks {
     pub(super) fn new(pool: SqlitePool) -> Self {
         Self { pool, bell: Arc::default() }
+    }
+
+    /// The connection that writes.
+    #[cfg(test)]
+    pub(super) fn pool(&self) -> SqlitePool {
+        self.pool.clone()
     }
 
     /// There may be new tasks.

@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use futures_util::future::BoxFuture;
+use sqlx::Connection;
 use sqlx::migrate::{MigrateError, Migrator};
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous};
 
@@ -89,6 +90,9 @@ impl SqliteStore {
         let writing = SqlitePoolOptions::new()
             .max_connections(1)
             .acquire_timeout(2 * BUSY_TIMEOUT)
+            // On a full disk SQLite rolls back by itself, and the driver, which wants to as well, takes the
+            // transaction for open ever after: such a connection is replaced.
+            .before_acquire(|connection, _| Box::pin(async move { Ok(!connection.is_in_transaction()) }))
             .connect_with(writing(&options))
             .await
             .map_err(failed)?;

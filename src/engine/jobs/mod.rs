@@ -40,12 +40,14 @@
 mod estimate;
 mod fault;
 mod feeds;
+mod requests;
 mod running;
 mod sweeper;
 pub(crate) mod work;
 mod worker;
 
 pub use feeds::Feed;
+pub use requests::Answered;
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -58,7 +60,7 @@ use tokio::task::JoinHandle;
 use super::progress::Reported;
 use super::{Error, Inner, Key, Stored};
 use crate::store::jobs::{
-    Accepted, Idempotency, JobId, JobKind, JobPage, JobQuery, JobRecord, JobState, JobStore, NewJob, Priority,
+    Accepted, Idempotency, JobId, JobKind, JobPage, JobQuery, JobRecord, JobState, JobStore, NewJob, Priority, Timing,
 };
 use crate::store::now_ms;
 use estimate::Estimates;
@@ -198,6 +200,16 @@ impl Jobs {
     pub(crate) async fn stopped(&self) {
         // The sender lives as long as this does.
         let _ = self.stop.subscribe().wait_for(|stop| *stop).await;
+    }
+
+    /// What a calculation took corrects what the next ones are estimated at.
+    async fn learn(&self, calculator: &str, version: u32, predicted_ms: f64, took: Duration) {
+        let actual_ms = took.as_secs_f64() * 1e3;
+        let timing = Timing { calculator: calculator.to_owned(), version, predicted_ms, actual_ms };
+        self.estimates.learn(&timing);
+        if let Err(error) = self.store.note_timing(timing).await {
+            tracing::debug!(%error, "a timing is not kept");
+        }
     }
 
     /// Puts a job on record; whether it is a new one.

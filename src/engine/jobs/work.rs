@@ -1,6 +1,7 @@
 //! What a job does when it runs: one arm per [`JobKind`].
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use bytes::Bytes;
 use futures_util::future::BoxFuture;
@@ -9,6 +10,7 @@ use tokio::sync::oneshot;
 
 use super::running::Running;
 use crate::engine::exec::{Slot, guarded};
+use crate::engine::flight::Boarded;
 use crate::engine::read::Ready;
 use crate::engine::{Error, Inner, Stored, read};
 use crate::registry::Entry;
@@ -118,25 +120,42 @@ impl Inner {
         slot: Option<Slot>,
         is_all: bool,
     ) -> Result<Arc<Stored>, Error> {
-        if running.is_cancelled() {
-            return Err(Error::Cancelled);
-        }
-        if let Some(kept) = engine.look_up(&ready.key).await {
-            return crate::engine::outcome(kept);
-        }
-        let boarded = engine.flights.board(ready.key);
-        if is_all {
-            running.follow(boarded.seat.progress());
-        }
-        if let Some(pilot) = boarded.pilot {
-            let this = Arc::clone(engine);
-            let queued = std::time::Instant::now();
-            engine.cores.spawn_job(move || this.run(pilot, &ready, slot, queued));
-        }
-        tokio::select! {
-            landed = boarded.seat.landed() => landed.outcome,
-            // The seat is left with the future, and the calculation ends when nobody else sits in it.
-            () = running.cancelled() => Err(Error::Cancelled),
+        let mut mine = Some((ready, slot));
+        loop {
+            let Some((ready, _)) = &mine else { return Err(Error::Crashed) };
+            if running.is_cancelled() {
+                return Err(Error::Cancelled);
+            }
+            if let Some(kept) = engine.look_up(&ready.key).await {
+                return crate::engine::outcome(kept);
+            }
+            let (id, version, cost_ms) = (ready.entry.meta().id, ready.entry.meta().version, ready.prepared.cost.ms);
+            let Boarded { seat, pilot } = engine.flights.board(ready.key);
+            if is_all {
+                running.follow(seat.progress());
+            }
+            let is_mine = pilot.is_some();
+            if let Some(pilot) = pilot
+                && let Some((ready, slot)) = mine.take()
+            {
+                let (this, queued) = (Arc::clone(engine), Instant::now());
+                engine.cores.spawn_job(move || this.run(pilot, &ready, slot, queued));
+            }
+            let landed = tokio::select! {
+                landed = seat.landed() => landed,
+                // The seat is left with the future, and the calculation ends when nobody else sits in it.
+                () = running.cancelled() => return Err(Error::Cancelled),
+            };
+            match landed.outcome {
+                // A direct answer found no core. A job has one: it computes what was not computed there.
+                Err(Error::Busy { .. } | Error::ShuttingDown) if !is_mine => {}
+                outcome => {
+                    if is_mine && outcome.is_ok() {
+                        engine.jobs.learn(id, version, cost_ms, landed.timings.run).await;
+                    }
+                    return outcome;
+                }
+            }
         }
     }
 }

@@ -8,7 +8,7 @@ use precut_calc::calculator::Failure;
 use super::{MOST_ATTEMPTS, fault, work};
 use crate::engine::{Error, Inner, Stored};
 use crate::store::StoreError;
-use crate::store::jobs::{Claim, Claimed, Ending, JobId, Timing};
+use crate::store::jobs::{Claim, Claimed, Ending, JobId};
 
 /// Runs the job of a task, if it still waits. Returns when its record says how it ended, or that it waits again.
 pub(super) async fn run_task(engine: Arc<Inner>, id: JobId) {
@@ -65,12 +65,7 @@ async fn settle(
     let jobs = &engine.jobs;
     let ms = took.as_secs_f64() * 1e3;
     let (ending, label) = match outcome {
-        Ok(stored) => {
-            if claim.kind == crate::store::jobs::JobKind::Calculation {
-                learn(engine, claim, ms).await;
-            }
-            (Ending::Succeeded(stored.kept()), "succeeded")
-        }
+        Ok(stored) => (Ending::Succeeded(stored.kept()), "succeeded"),
         // Its jobs ended before it did.
         Err(Error::Cancelled) if unwanted => {
             metrics::counter!("precut_jobs_total", "calculator" => claim.calculator.clone(), "outcome" => "cancelled")
@@ -93,19 +88,6 @@ async fn settle(
     if let Some(ended) = stubbornly(engine, || jobs.store.finish(claim.lease, ending.clone())).await {
         tracing::info!(job = %claim.jobs[0], ms, outcome = label, "a job ends");
         jobs.feeds.touch(&ended);
-    }
-}
-
-async fn learn(engine: &Arc<Inner>, claim: &Claim, actual_ms: f64) {
-    let Some(entry) = engine.entry(&claim.calculator) else { return };
-    // The calculator's own estimate, without the correction.
-    let version = entry.meta().version;
-    let now = engine.jobs.estimates.corrected(&claim.calculator, version, 1.0);
-    let timing =
-        Timing { calculator: claim.calculator.clone(), version, predicted_ms: claim.estimate_ms / now, actual_ms };
-    engine.jobs.estimates.learn(&timing);
-    if let Err(error) = engine.jobs.store.note_timing(timing).await {
-        tracing::debug!(%error, "a timing is not kept");
     }
 }
 
