@@ -87,7 +87,9 @@ async fn carry_out(pool: SqlitePool, mut orders: mpsc::Receiver<Box<dyn Order>>)
                 for order in group.drain(..) {
                     let mut alone = vec![order];
                     let outcome = together(&pool, &mut alone).await.map_err(StoreError::from);
-                    alone.into_iter().for_each(|order| order.done(outcome.clone()));
+                    for order in alone {
+                        order.done(outcome.clone());
+                    }
                 }
             }
         }
@@ -98,8 +100,8 @@ async fn carry_out(pool: SqlitePool, mut orders: mpsc::Receiver<Box<dyn Order>>)
 fn is_of_one_order(error: &sqlx::Error) -> bool {
     /// `BUSY`, `LOCKED`, `READONLY`, `IOERR`, `FULL`, `CANTOPEN` of SQLite.
     const OF_ALL: [i32; 6] = [5, 6, 8, 10, 13, 14];
-    match error.as_database_error().and_then(|error| error.code()).and_then(|code| code.parse::<i32>().ok()) {
-        Some(code) => !OF_ALL.contains(&(code & 0xff)),
+    match super::sqlite_code(error) {
+        Some(code) => !OF_ALL.contains(&code),
         None => !matches!(error, sqlx::Error::PoolTimedOut | sqlx::Error::PoolClosed | sqlx::Error::Io(_)),
     }
 }

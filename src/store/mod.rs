@@ -166,13 +166,17 @@ impl From<sqlx::Error> for StoreError {
     fn from(error: sqlx::Error) -> Self {
         /// `SQLITE_FULL`.
         const FULL: i32 = 13;
-        let code = error.as_database_error().and_then(|error| error.code()).and_then(|code| code.parse::<i32>().ok());
-        // The lowest byte is the kind of error, the rest says more of it.
-        if code.is_some_and(|code| code & 0xff == FULL) {
+        if sqlite_code(&error) == Some(FULL) {
             return Self::Full(error.to_string());
         }
         Self::Failed(error.to_string())
     }
+}
+
+/// Kind of an error of SQLite: the lowest byte of its code, the rest of which says more of it.
+fn sqlite_code(error: &sqlx::Error) -> Option<i32> {
+    let code: i32 = error.as_database_error()?.code()?.parse().ok()?;
+    Some(code & 0xff)
 }
 
 /// The time, ms UTC.

@@ -72,7 +72,7 @@ pub(crate) const MOST_ATTEMPTS: u32 = 3;
 /// When a client that found the queue full should come again.
 const RETRY_QUEUE: Duration = Duration::from_secs(5);
 /// Bounds of the advice when to look at a job again.
-const RETRY_JOB: (Duration, Duration) = (Duration::from_secs(1), Duration::from_secs(60));
+const RETRY_JOB: (Duration, Duration) = (Duration::from_secs(1), Duration::from_mins(1));
 /// Timings read at the start.
 const TIMINGS: u32 = 5000;
 
@@ -284,7 +284,11 @@ impl Jobs {
     }
 
     /// Waits until a job is over, at most so long and not beyond the end of the service; the job then.
-    pub(crate) async fn wait(&self, id: JobId, most: Duration) -> Result<Job, Error> {
+    pub(crate) async fn wait(&self, record: JobRecord, most: Duration) -> Result<Job, Error> {
+        if most.is_zero() || record.state.is_final() {
+            return Ok(self.now(record));
+        }
+        let id = record.id;
         let mut feed = self.feed(id);
         let over = async {
             loop {

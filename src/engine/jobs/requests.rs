@@ -24,7 +24,7 @@ impl Engine {
         let inner = &self.inner;
         let body_hash = ask.idempotency_key.as_ref().map(|_| fingerprint(calculator, &body));
         let (ready, parse, kept) = match self.know(calculator, &body).await? {
-            Known::Kept(kept, parse) if body_hash.is_none() => return solved(hit(kept, parse)?),
+            Known::Kept(kept, parse) if body_hash.is_none() => return Ok(solved(hit(kept, parse)?)),
             // It has a record, too, by which it is known again.
             Known::Kept(kept, parse) => {
                 (Box::new(inner.read(&inner.known(calculator)?, body).await?), parse, Some(kept))
@@ -37,12 +37,11 @@ impl Engine {
         let is_short = estimate_ms <= inner.settings.direct_limit.as_secs_f64() * 1e3;
         if is_short && ask.wait.is_none() && body_hash.is_none() {
             let answer = self.solve_directly(*ready, parse);
-            return match ask.deadline {
-                None => solved(answer.await?),
-                Some(deadline) => {
-                    solved(tokio::time::timeout(deadline, answer).await.unwrap_or(Err(Error::DeadlineExceeded))?)
-                }
+            let outcome = match ask.deadline {
+                None => answer.await,
+                Some(deadline) => tokio::time::timeout(deadline, answer).await.unwrap_or(Err(Error::DeadlineExceeded)),
             };
+            return outcome.map(solved);
         }
         let result = match kept {
             Some(Kept::Answer(stored)) => Some(stored),
@@ -62,14 +61,14 @@ impl Engine {
         let (record, is_new) = inner.jobs.accept(request, &ask, inner.settings.queue_limit).await?;
         // A short job with a name of its own is answered as others are, if it gets its turn soon.
         let short_wait = if is_short { inner.settings.direct_limit + inner.settings.patience } else { Duration::ZERO };
-        let job = inner.jobs.wait(record.id, ask.wait.unwrap_or(short_wait)).await?;
+        let job = inner.jobs.wait(record, ask.wait.unwrap_or(short_wait)).await?;
         if !job.record.state.is_final() {
             return Ok(Answered::Job(Box::new(job)));
         }
         let run = job.record.started_ms.zip(job.record.finished_ms).map_or(0, |(start, end)| (end - start).max(0));
         let timings = Timings { parse, run: Duration::from_millis(run.unsigned_abs()), ..Timings::default() };
         let cache = if is_new && !was_there { CacheState::Miss } else { CacheState::Hit };
-        solved(Solved { stored: self.result_of(job).await?, cache, timings })
+        Ok(solved(Solved { stored: self.result_of(job).await?, cache, timings }))
     }
 
     /// A job as it is now.
@@ -110,15 +109,15 @@ impl Engine {
             JobState::Failed => {
                 Err(job.problem.unwrap_or_else(|| Error::internal("a job failed without a reason".to_owned())))
             }
-            JobState::Succeeded => match self.result(&job.record.key).await? {
-                Some(stored) => Ok(stored),
-                None => {
-                    // The row was damaged. The job is known: it is computed again.
-                    tracing::warn!(job = %job.record.id, "the result of a job is gone; it is computed again");
-                    self.inner.jobs.store.redo(job.record.id).await?;
-                    Err(Error::JobNotFinished { state: JobState::Queued, retry_after: job.retry_after() })
+            JobState::Succeeded => {
+                if let Some(stored) = self.result(&job.record.key).await? {
+                    return Ok(stored);
                 }
-            },
+                // The row was damaged. The job is known: it is computed again.
+                tracing::warn!(job = %job.record.id, "the result of a job is gone; it is computed again");
+                self.inner.jobs.store.redo(job.record.id).await?;
+                Err(Error::JobNotFinished { state: JobState::Queued, retry_after: job.retry_after() })
+            }
         }
     }
 
@@ -138,6 +137,6 @@ impl Engine {
     }
 }
 
-fn solved(solved: Solved) -> Result<Answered, Error> {
-    Ok(Answered::Solved(Box::new(solved)))
+fn solved(solved: Solved) -> Answered {
+    Answered::Solved(Box::new(solved))
 }

@@ -16,7 +16,7 @@ const SWEEP: u64 = 5;
 /// Beats between two rounds of forgetting.
 const FORGET: u64 = 60;
 /// A deadline is looked for at least so often, whatever the clock does meanwhile.
-const LONGEST_SLEEP: Duration = Duration::from_secs(60);
+const LONGEST_SLEEP: Duration = Duration::from_mins(1);
 
 pub(super) async fn run(engine: Weak<Inner>) {
     let mut beat = tokio::time::interval(BEAT);

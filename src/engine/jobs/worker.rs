@@ -74,7 +74,7 @@ async fn settle(
             return;
         }
         // The service stops: the job waits for the next one, and this start does not count.
-        Err(Error::Cancelled | Error::ShuttingDown) | Err(Error::Calculation(Failure::Cancelled)) => {
+        Err(Error::Cancelled | Error::ShuttingDown | Error::Calculation(Failure::Cancelled)) => {
             match jobs.store.release(claim.lease).await {
                 Ok(back) => jobs.feeds.touch(&back),
                 Err(error) => tracing::warn!(%error, "a job could not be put back; it is taken up at the next start"),

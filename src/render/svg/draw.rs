@@ -36,7 +36,7 @@ pub(super) fn items(page: &mut Page, panel: &Panel, frame: &Frame, styles: &Styl
             | Item::Points { name, .. }
             | Item::Bars { name, .. }
             | Item::Outline { name, .. } => name,
-            Item::HeatMap { value, .. } => &value.label,
+            Item::HeatMap { value, .. } => value.label,
             Item::Glyph { glyph, .. } => glyph::label(*glyph),
         };
         put!(page, "<g><title>{}</title>", Escaped(&(wording.label)(code)));

