@@ -80,7 +80,11 @@ pub(super) fn example(entry: &Entry, id: Option<&str>, bare: bool) -> Result<(),
     };
     let job: serde_json::Value =
         serde_json::from_str(example.job).map_err(|error| Failed::Machine(error.to_string()))?;
-    if bare { print_json(&job) } else { print_json(&json!({ "calculator": meta.id, "job": job })) }
+    match (bare, meta.id) {
+        (true, _) => print_json(&job),
+        (false, STUDIES) => print_json(&json!({ "study": job })),
+        (false, id) => print_json(&json!({ "calculator": id, "job": job })),
+    }
 }
 
 /// The calculator's name and the job's bytes.

@@ -33,7 +33,9 @@ impl Engine {
         };
         inner.afford(ready.prepared.cost)?;
         let meta = ready.entry.meta();
-        let estimate_ms = inner.jobs.estimates.corrected(meta.id, meta.version, ready.prepared.cost.ms);
+        // What was learned of a calculator holds for a study of it, too.
+        let numbers_of = ready.prepared.numbers_of.as_ref().unwrap_or(meta);
+        let estimate_ms = inner.jobs.estimates.corrected(numbers_of.id, numbers_of.version, ready.prepared.cost.ms);
         let is_short = estimate_ms <= inner.settings.direct_limit.as_secs_f64() * 1e3;
         if is_short && ask.wait.is_none() && body_hash.is_none() {
             let answer = self.solve_directly(*ready, parse);

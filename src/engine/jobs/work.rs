@@ -129,6 +129,8 @@ impl Inner {
             if let Some(kept) = engine.look_up(&ready.key).await {
                 return crate::engine::outcome(kept);
             }
+            // A study whose points were there already says nothing of what points take.
+            let teaches = !ready.entry.is_composed();
             let (id, version, cost_ms) = (ready.entry.meta().id, ready.entry.meta().version, ready.prepared.cost.ms);
             let Boarded { seat, pilot } = engine.flights.board(ready.key);
             if is_all {
@@ -150,7 +152,7 @@ impl Inner {
                 // A direct answer found no core. A job has one: it computes what was not computed there.
                 Err(Error::Busy { .. } | Error::ShuttingDown) if !is_mine => {}
                 outcome => {
-                    if is_mine && outcome.is_ok() {
+                    if is_mine && teaches && outcome.is_ok() {
                         engine.jobs.learn(id, version, cost_ms, landed.timings.run).await;
                     }
                     return outcome;

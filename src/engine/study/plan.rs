@@ -17,6 +17,8 @@ use crate::registry::{Entry, Faults, Registry};
 
 /// So many points at most are looked at before a study is accepted; all of them where there are no more.
 const LOOKED_AT: usize = 64;
+/// Fewer where the job is large: so many of its values are looked at in all, about 50 ms of work.
+const VALUES_LOOKED_AT: usize = 100_000;
 /// What a point costs beside its calculation (its job made, checked, looked up, its answer kept), ms.
 const POINT_MS: f64 = 0.2;
 /// What a row takes until the study is written, bytes.
@@ -103,10 +105,12 @@ impl Plan {
 
     /// Looks at some points, all if they are few: what they cost, and whether the job is at fault wherever one looks.
     fn look(&mut self) -> Result<(), Vec<Finding>> {
-        let looked_at: Vec<usize> = if self.points <= LOOKED_AT {
+        let size: usize = self.input.job.values().map(values_in).sum();
+        let most = (VALUES_LOOKED_AT / size.max(1)).clamp(2, LOOKED_AT);
+        let looked_at: Vec<usize> = if self.points <= most {
             (0..self.points).collect()
         } else {
-            (0..LOOKED_AT).map(|index| index * (self.points - 1) / (LOOKED_AT - 1)).collect()
+            (0..most).map(|index| index * (self.points - 1) / (most - 1)).collect()
         };
         let mut common: Option<Vec<Finding>> = None;
         let (mut fine, mut ms, mut bytes) = (0_usize, 0.0, 0_u64);
@@ -184,6 +188,15 @@ impl Plan {
     pub(crate) fn shard(&self, index: usize) -> std::ops::Range<usize> {
         let first = index * self.shard_points;
         first..self.points.min(first + self.shard_points)
+    }
+}
+
+/// How many values there are in a value, itself among them.
+fn values_in(value: &Value) -> usize {
+    match value {
+        Value::Array(items) => 1 + items.iter().map(values_in).sum::<usize>(),
+        Value::Object(fields) => 1 + fields.values().map(values_in).sum::<usize>(),
+        _ => 1,
     }
 }
 
