@@ -253,9 +253,16 @@ mod tests {
 
     #[test]
     fn what_is_no_job_file_is_said_with_its_place() {
-        for text in
-            ["", "{", "[]", "{}", "{\"study\":{},\"job\":{}}", "{\"job\":{}}", "{\"calculator\":\"x\"}", "{\"calculator\":\"x\",\"job\":{},\"jobs\":1}"]
-        {
+        for text in [
+            "",
+            "{",
+            "[]",
+            "{}",
+            "{\"study\":{},\"job\":{}}",
+            "{\"job\":{}}",
+            "{\"calculator\":\"x\"}",
+            "{\"calculator\":\"x\",\"job\":{},\"jobs\":1}",
+        ] {
             let Err(Failed::Problem(problem)) = job_file(text.as_bytes().to_vec()) else { unreachable!("{text}") };
             assert_eq!(problem.code(), "bad_syntax", "{text}");
         }

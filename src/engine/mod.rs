@@ -124,6 +124,7 @@ impl Engine {
     }
 
     /// Everything but the calculation.
+    #[allow(clippy::needless_pass_by_value)] // a body is handed over, as everywhere
     pub fn check(&self, calculator: &str, body: Body) -> Result<Checked, Error> {
         let inner = &self.inner;
         let entry = inner.known(calculator)?;

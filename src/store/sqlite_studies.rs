@@ -43,7 +43,8 @@ impl SqliteStore {
                 .bind(study.as_bytes().as_slice())
                 .fetch_all(&self.readers)
                 .await?;
-        let sound = rows.into_iter().filter(|(_, packed, checksum)| blake3::hash(packed).as_bytes() == checksum.as_slice());
+        let sound =
+            rows.into_iter().filter(|(_, packed, checksum)| blake3::hash(packed).as_bytes() == checksum.as_slice());
         Ok(sound.filter_map(|(shard, packed, _)| Some((shard, zstd::decode_all(&*packed).ok()?.into()))).collect())
     }
 

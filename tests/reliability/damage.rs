@@ -20,11 +20,12 @@ async fn a_damaged_result_is_computed_again_and_never_served() {
     service.get("/v1/results").await;
     service.stop();
     let mut connection = database(folder.path()).await;
-    let damaged = sqlx::query("UPDATE results SET body = CAST(substr(body, 1, length(body) - 4) || x'00000000' AS BLOB)")
-        .execute(&mut connection)
-        .await
-        .unwrap()
-        .rows_affected();
+    let damaged =
+        sqlx::query("UPDATE results SET body = CAST(substr(body, 1, length(body) - 4) || x'00000000' AS BLOB)")
+            .execute(&mut connection)
+            .await
+            .unwrap()
+            .rows_affected();
     connection.close().await.unwrap();
     assert_eq!(damaged, 2);
 

@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 
 use serde_json::{Value, json};
 
-use crate::support::{header, problem};
+use crate::support::header;
 use crate::watch::{Service, assert_intact, database, refused_start, runs, until};
 
 /// A small file system; gone with this value.
@@ -103,10 +103,19 @@ async fn with_a_full_disk_answers_go_on_jobs_are_refused_and_nothing_breaks() {
     let first = service.accepted(&job(100, 20)).await;
     service.over(&first).await;
     let running = service.accepted(&job(101, 1500)).await;
+    // A study puts its parts down while it runs: it goes on without.
+    let study = json!({
+        "calculator": "sagging-bar", "job": {"load_n": 1, "duration_ms": 30},
+        "vary": [{"pointer": "/length_mm", "from": 200, "to": 239, "count": 40}],
+    });
+    let long = service.post_to("/v1/studies", &study).header("prefer", "respond-async").send().await.unwrap();
+    assert_eq!(long.status(), 202);
+    let long = header(&long, "location").to_owned();
     disk.fill();
     let counts = with_a_full_disk(&service, &running, 1000).await;
     disk.make_room();
     assert_eq!(service.over(&running).await["state"], "succeeded", "it is recorded once there is room");
+    assert_eq!(service.over(&long).await["state"], "succeeded");
     let again = service.accepted(&job(1001, 20)).await;
     assert_eq!(service.over(&again).await["state"], "succeeded");
     // Full at its start: it says so.
@@ -131,7 +140,9 @@ async fn on_a_disk_that_became_read_only_answers_go_on_until_it_is_writable_agai
     let first = service.accepted(&job(100, 20)).await;
     service.over(&first).await;
     // A file system with open files for writing refuses to become read-only; then there is nothing to test.
-    if disk.remount("ro") {
+    let while_serving = disk.remount("ro");
+    println!("made read-only while it serves: {}", if while_serving { "yes" } else { "not possible here" });
+    if while_serving {
         let direct = service.post(&job(200, 0)).send().await.unwrap();
         assert_eq!(direct.status(), 200);
         let refused = service.post(&job(201, 20)).header("prefer", "respond-async").send().await.unwrap();

@@ -151,10 +151,9 @@ async fn the_program_itself_finishes_what_it_was_killed_in() {
         let address = crate::support::address_of(&mut child);
         (child, address)
     };
-    let example: Value = serde_json::from_str(
-        precut::registry::Registry::standard().unwrap().entries()[0].meta().examples[0].job,
-    )
-    .unwrap();
+    let example: Value =
+        serde_json::from_str(precut::registry::Registry::standard().unwrap().entries()[0].meta().examples[0].job)
+            .unwrap();
     let study = |number: u32| {
         json!({
             "calculator": "deflection-compensation", "job": example,

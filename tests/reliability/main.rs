@@ -5,15 +5,16 @@
 //! polls for what shall come, with a patience that a busy machine does not exhaust.
 
 #![cfg(unix)]
-#![allow(clippy::unwrap_used, clippy::panic, clippy::float_cmp, missing_docs, unreachable_pub)]
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, clippy::float_cmp, missing_docs, unreachable_pub)]
 
 #[path = "../support/mod.rs"]
+#[allow(dead_code)] // these tests start processes only
 mod support;
 
 mod clients;
 mod damage;
-mod disk;
 mod dice;
+mod disk;
 mod killed;
 mod locked;
 mod process;

@@ -87,13 +87,7 @@ pub(super) fn variables(entry: &Entry, input: &StudyInput, found: &mut Vec<Findi
     each.map(|(index, variable)| self::variable(entry, &job, index, variable, found)).collect()
 }
 
-fn variable(
-    entry: &Entry,
-    job: &Value,
-    index: usize,
-    variable: &Variable,
-    found: &mut Vec<Finding>,
-) -> Option<Found> {
+fn variable(entry: &Entry, job: &Value, index: usize, variable: &Variable, found: &mut Vec<Finding>) -> Option<Found> {
     let at = format!("/vary/{index}/pointer");
     let Some(tokens) = tokens(&variable.pointer) else {
         found.push(faults::bad_pointer(at, &variable.pointer));
@@ -115,14 +109,16 @@ fn variable(
         found.push(Finding::new("not_variable", at).with("received", variable.pointer.clone()));
         return None;
     }
-    if variable.values.is_none() && variable.from.is_some() && !field.number {
+    if variable.values.is_none() && variable.from.is_some() && !field.is_number() {
         found.push(Finding::new("range_of_words", format!("/vary/{index}")).with("expected", field.types()));
         return None;
     }
     for (number, value) in variable.values.iter().flatten().enumerate() {
         let at = || format!("/vary/{index}/values/{number}");
         let fits = match value {
-            Value::Number(number) => field.number && (!field.whole || number.as_f64().is_some_and(|n| n.fract() == 0.0)),
+            Value::Number(number) => {
+                field.is_number() && (!field.is_whole() || number.as_f64().is_some_and(|n| n.fract() == 0.0))
+            }
             Value::Bool(_) => field.truth,
             Value::String(_) => field.word,
             Value::Null | Value::Array(_) | Value::Object(_) => false,
@@ -159,7 +155,7 @@ pub(super) fn outputs(entry: &Entry, input: &mut StudyInput, found: &mut Vec<Fin
             continue;
         };
         match place::field(entry.strict_output(), None, &tokens) {
-            Ok(field) if field.number => {
+            Ok(field) if field.is_number() => {
                 outputs.push(Output { pointer: pointer.clone(), tokens, unit: field.unit });
             }
             Ok(_) => found.push(Finding::new("not_a_number", at).with("received", pointer.clone())),
@@ -180,7 +176,7 @@ pub(super) fn values(input: &StudyInput, fields: Vec<Option<Found>>, found: &mut
             (None, Some(from), Some(to), Some(count)) => {
                 let count = usize::try_from(count).unwrap_or(usize::MAX);
                 let values = expand::range(from, to, count, spacing.unwrap_or_default());
-                if field.whole && values.iter().any(|value| value.fract() != 0.0) {
+                if field.is_whole() && values.iter().any(|value| value.fract() != 0.0) {
                     found.push(Finding::new("range_not_whole", format!("/vary/{index}/count")));
                 }
                 values.into_iter().map(number).collect()
@@ -211,7 +207,7 @@ pub(super) fn job(entry: &Entry, input: &StudyInput, fields: &[Option<Found>]) -
     let mut job = input.job.clone();
     for (variable, found) in input.vary.iter().zip(fields) {
         if let Some(found) = found
-            && let Some(first) = found.first(variable)
+            && let Some(first) = variable.first()
         {
             set(&mut job, &found.tokens, first);
         }

@@ -78,7 +78,7 @@ pub(super) fn wrong_type(place: String, received: &Value, field: &Field) -> Find
     };
     let quoted = received.as_str().is_some_and(|text| text.trim().replace(',', ".").parse::<f64>().is_ok());
     let finding = Finding::new("wrong_type", place).with("expected", field.types()).with("received_type", kind);
-    if quoted && field.number { finding.with("quoted_number", "yes") } else { finding }
+    if quoted && field.is_number() { finding.with("quoted_number", "yes") } else { finding }
 }
 
 pub(super) fn not_one_of(place: String, received: &str, options: &[String]) -> Finding {

@@ -61,7 +61,7 @@ pub(super) fn of_plan(plan: &Plan, rows: &[Option<&Row>]) -> Option<Figure> {
         (one.pointer.as_str(), one.unit.as_deref(), one.spacing, values)
     });
     let outputs = plan.outputs.iter().map(|one| (one.pointer.as_str(), one.unit.as_deref()));
-    let board = Board::new(plan.input.combine, variables.collect(), outputs.collect(), rows);
+    let board = Board::new(plan.input.combine, variables.collect(), &outputs.collect::<Vec<_>>(), rows);
     board.map().or_else(|| board.curves())
 }
 
@@ -71,7 +71,7 @@ pub(super) fn of_result(result: &StudyResult) -> Vec<Figure> {
     let variables =
         result.variables.iter().map(|one| (one.pointer.as_str(), one.unit.as_deref(), one.spacing, one.values.clone()));
     let outputs = result.outputs.iter().map(|one| (one.pointer.as_str(), one.unit.as_deref()));
-    let board = Board::new(result.combine, variables.collect(), outputs.collect(), &rows);
+    let board = Board::new(result.combine, variables.collect(), &outputs.collect::<Vec<_>>(), &rows);
     board.map().into_iter().chain(board.curves()).collect()
 }
 
@@ -81,7 +81,7 @@ impl<'s> Board<'s> {
     fn new(
         combine: Combine,
         variables: Vec<VariableParts<'_>>,
-        outputs: Vec<(&str, Option<&str>)>,
+        outputs: &[(&str, Option<&str>)],
         rows: &'s [Option<&'s Row>],
     ) -> Self {
         let fields: Vec<_> = variables.iter().map(|(pointer, unit, ..)| (*pointer, *unit)).collect();
@@ -92,8 +92,9 @@ impl<'s> Board<'s> {
             spacing,
             values,
         });
-        let names = labels(&outputs);
-        let outputs = outputs.iter().zip(names).map(|((_, unit), label)| Output { label, unit: unit.map(str::to_owned) });
+        let names = labels(outputs);
+        let outputs =
+            outputs.iter().zip(names).map(|((_, unit), label)| Output { label, unit: unit.map(str::to_owned) });
         Self { combine, variables: variables.collect(), outputs: outputs.collect(), rows }
     }
 

@@ -62,6 +62,14 @@ pub(crate) struct Variable {
     pub(crate) spacing: Option<Spacing>,
 }
 
+impl Variable {
+    /// The first of its values, if it says so.
+    pub(crate) fn first(&self) -> Option<Value> {
+        let given = self.values.as_ref().and_then(|values| values.first().cloned());
+        given.or_else(|| self.from.map(super::expand::number))
+    }
+}
+
 /// How the values of a range are spaced.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
@@ -105,9 +113,7 @@ fn settings() -> Array {
     ArrayBuilder::new()
         .items(scalar())
         .min_items(Some(1))
-        .description(Some(
-            "The values, in the order of the rows: numbers in the field's unit, words, or truth values.",
-        ))
+        .description(Some("The values, in the order of the rows: numbers in the field's unit, words, or truth values."))
         .build()
 }
 

@@ -28,7 +28,9 @@ pub(crate) use in_engine::InEngine;
 
 use std::sync::Arc;
 
-use precut_calc::calculator::{CalculatorKind, Codes, Example, Failure, Figure, Finding, Meta, Monitor, Program, Table};
+use precut_calc::calculator::{
+    CalculatorKind, Codes, Example, Failure, Figure, Finding, Meta, Monitor, Program, Table,
+};
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -38,8 +40,7 @@ use result::StudyResult;
 
 use crate::key::Key;
 use crate::registry::{
-    Calculation, Entry, Job, Prepared, Registry, ResultNotes, UnreadableResult, Unprepared, canonical,
-    second_line,
+    Calculation, Entry, Job, Prepared, Registry, ResultNotes, Unprepared, UnreadableResult, canonical, second_line,
 };
 
 /// Name of studies in routes and job files.
@@ -103,8 +104,8 @@ struct Studies {
 
 impl Calculation for Studies {
     fn prepare(&self, job: &Value) -> Result<Prepared, Unprepared> {
-        let input: StudyInput = serde_path_to_error::deserialize(job)
-            .map_err(|error| Unprepared::Invalid(vec![second_line(&error)]))?;
+        let input: StudyInput =
+            serde_path_to_error::deserialize(job).map_err(|error| Unprepared::Invalid(vec![second_line(&error)]))?;
         let plan = Plan::new(&self.registry, self.most_points, input).map_err(Unprepared::Invalid)?;
         let canonical = canonical(&plan.input)
             .map_err(|error| Unprepared::Failed(Failure::Internal(format!("the filled study: {error}"))))?;
@@ -128,11 +129,7 @@ impl Calculation for Studies {
         Ok(table::tables(&read(envelope)?))
     }
 
-    fn program(
-        &self,
-        _input: &[u8],
-        _envelope: &[u8],
-    ) -> Result<Option<Result<Program, Failure>>, UnreadableResult> {
+    fn program(&self, _input: &[u8], _envelope: &[u8]) -> Result<Option<Result<Program, Failure>>, UnreadableResult> {
         Ok(None)
     }
 }
@@ -142,8 +139,7 @@ fn read(envelope: &[u8]) -> Result<StudyResult, UnreadableResult> {
     struct Envelope {
         result: StudyResult,
     }
-    let envelope: Envelope =
-        serde_json::from_slice(envelope).map_err(|error| UnreadableResult(error.to_string()))?;
+    let envelope: Envelope = serde_json::from_slice(envelope).map_err(|error| UnreadableResult(error.to_string()))?;
     Ok(envelope.result)
 }
 

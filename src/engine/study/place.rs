@@ -9,10 +9,8 @@ use super::expand::index;
 /// A field that a pointer leads to.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Field {
-    /// It may be a number.
-    pub(crate) number: bool,
-    /// It may only be a whole number.
-    pub(crate) whole: bool,
+    /// The numbers that it may be.
+    pub(crate) numbers: Option<Numbers>,
     /// It may be true or false.
     pub(crate) truth: bool,
     /// It may be a word.
@@ -23,16 +21,35 @@ pub(crate) struct Field {
     pub(crate) unit: Option<String>,
 }
 
+/// Which numbers a field may be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Numbers {
+    /// Any.
+    Any,
+    /// Whole ones.
+    Whole,
+}
+
 impl Field {
+    /// Whether it may be a number.
+    pub(crate) fn is_number(&self) -> bool {
+        self.numbers.is_some()
+    }
+
+    /// Whether, as a number, it must be a whole one.
+    pub(crate) fn is_whole(&self) -> bool {
+        self.numbers == Some(Numbers::Whole)
+    }
+
     /// Whether it holds one thing and not several.
     pub(crate) fn is_scalar(&self) -> bool {
-        self.number || self.truth || self.word
+        self.is_number() || self.truth || self.word
     }
 
     /// The JSON types of its values.
     pub(crate) fn types(&self) -> Vec<&'static str> {
-        let number = if self.whole { "integer" } else { "number" };
-        [(self.number, number), (self.truth, "boolean"), (self.word, "string")]
+        let number = if self.is_whole() { "integer" } else { "number" };
+        [(self.is_number(), number), (self.truth, "boolean"), (self.word, "string")]
             .into_iter()
             .filter_map(|(may, name)| may.then_some(name))
             .collect()
@@ -115,9 +132,11 @@ fn merged(mut field: Field, form: &Value) -> Field {
         Value::Array(kinds) => kinds.iter().any(|one| one == kind),
         one => one == kind,
     };
-    let (number, integer) = (is("number"), is("integer"));
-    field.whole = (integer && !number) && (field.whole || !field.number);
-    field.number |= number || integer;
+    field.numbers = match (field.numbers, is("number"), is("integer")) {
+        (Some(Numbers::Any), ..) | (_, true, _) => Some(Numbers::Any),
+        (known, false, false) => known,
+        (_, false, true) => Some(Numbers::Whole),
+    };
     field.truth |= is("boolean");
     field.word |= is("string");
     let options = form["enum"].as_array().into_iter().flatten().chain(form.get("const"));
@@ -149,16 +168,16 @@ mod tests {
         let job = json!({"length_mm": 500, "segments": [{"diameter_mm": 20}],
             "support": {"kind": "elastic", "compliance_um_per_n": 1}});
         let length = at("/length_mm", &job).unwrap();
-        assert_eq!((length.number, length.word, length.unit.as_deref()), (true, false, Some("mm")));
-        assert!(at("/segments/0/diameter_mm", &job).unwrap().number);
-        assert!(at("/youngs_modulus_n_per_mm2", &job).unwrap().number, "absent, but it has a default");
+        assert_eq!((length.is_number(), length.word, length.unit.as_deref()), (true, false, Some("mm")));
+        assert!(at("/segments/0/diameter_mm", &job).unwrap().is_number());
+        assert!(at("/youngs_modulus_n_per_mm2", &job).unwrap().is_number(), "absent, but it has a default");
         assert_eq!(at("/support/compliance_um_per_n", &job).unwrap().unit.as_deref(), Some("um/N"));
-        assert!(at("/steady/compliance_um_per_n", &job).unwrap().number, "absent: any variant will do");
+        assert!(at("/steady/compliance_um_per_n", &job).unwrap().is_number(), "absent: any variant will do");
         let mode = at("/mode", &job).unwrap();
         assert!(mode.word && mode.options.contains(&"slow".to_owned()));
         assert!(at("/support/kind", &job).unwrap().options.contains(&"rigid".to_owned()));
         let count = at("/stations", &job).unwrap();
-        assert!(count.number && count.whole, "a count or a list");
+        assert!(count.is_whole(), "a count or a list");
         assert!(!at("/segments/0", &job).unwrap().is_scalar());
         assert!(!at("/segments", &job).unwrap().is_scalar());
     }
@@ -183,7 +202,7 @@ mod tests {
         let registry = toy::registry();
         let output = registry.entry("toy-bar").unwrap().strict_output();
         let deflection = field(output, None, &tokens("/deflections_um/17").unwrap()).unwrap();
-        assert_eq!((deflection.number, deflection.unit.as_deref()), (true, Some("um")));
+        assert_eq!((deflection.is_number(), deflection.unit.as_deref()), (true, Some("um")));
         assert!(!field(output, None, &tokens("/deflections_um").unwrap()).unwrap().is_scalar());
         assert!(field(output, None, &tokens("/deflection_um/0").unwrap()).is_err());
     }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use precut_calc::calculator::{Cost, Finding};
 use serde_json::{Map, Value};
 
-use super::expand::{self, Shape, set};
+use super::expand::{Shape, set};
 use super::input::{Spacing, StudyInput};
 use super::pick::Wanted;
 use super::result::Setting;
@@ -215,12 +215,4 @@ fn rows_for_tables(entry: &Entry, job: &mut Map<String, Value>) -> Vec<Finding> 
 pub(crate) struct Found {
     pub(crate) tokens: Vec<String>,
     pub(crate) field: super::place::Field,
-}
-
-impl Found {
-    /// The first of its values, if it is one for the field.
-    pub(crate) fn first(&self, variable: &super::input::Variable) -> Option<Value> {
-        let given = variable.values.as_ref().and_then(|values| values.first().cloned());
-        given.or_else(|| variable.from.map(expand::number))
-    }
 }

@@ -58,7 +58,9 @@ impl Shard {
             shard.rows.push(row);
             // Once per point, however many places of its answer warn of the same.
             let own: BTreeSet<Warning> = picked.warnings.into_iter().collect();
-            own.into_iter().for_each(|warning| warnings.add(warning.code, warning.pointer, 1));
+            for Warning { code, pointer } in own {
+                warnings.add(code, pointer, 1);
+            }
             shard.basis.extend(picked.basis);
             done();
         }

@@ -37,7 +37,9 @@ pub(crate) fn report(plan: &Plan, shards: Vec<Shard>) -> (StudyResult, ResultNot
     let mut basis: BTreeSet<Cited> = BTreeSet::new();
     for shard in shards {
         rows.extend(shard.rows);
-        shard.warnings.into_iter().for_each(|(code, pointer, points)| warnings.add(code, pointer, points));
+        for (code, pointer, points) in shard.warnings {
+            warnings.add(code, pointer, points);
+        }
         basis.extend(shard.basis);
     }
     let succeeded = rows.iter().filter(|row| row.status == Status::Succeeded).count();
@@ -48,12 +50,16 @@ pub(crate) fn report(plan: &Plan, shards: Vec<Shard>) -> (StudyResult, ResultNot
         succeeded,
         failed: plan.points - succeeded,
         combine: plan.input.combine,
-        variables: plan.variables.iter().map(|variable| VariedField {
-            pointer: variable.pointer.clone(),
-            unit: variable.unit.clone(),
-            spacing: variable.spacing,
-            values: variable.values.iter().filter_map(Setting::of).collect(),
-        }).collect(),
+        variables: plan
+            .variables
+            .iter()
+            .map(|variable| VariedField {
+                pointer: variable.pointer.clone(),
+                unit: variable.unit.clone(),
+                spacing: variable.spacing,
+                values: variable.values.iter().filter_map(Setting::of).collect(),
+            })
+            .collect(),
         outputs: outputs(plan, &rows),
         failures: failures(&rows),
         rows,
@@ -71,10 +77,7 @@ pub(crate) fn report(plan: &Plan, shards: Vec<Shard>) -> (StudyResult, ResultNot
 }
 
 fn warned((code, pointer, points): (String, String, usize), of: usize) -> Finding {
-    Finding::new("study_points_warn", format!("/job{pointer}"))
-        .with("code", code)
-        .with("points", points)
-        .with("of", of)
+    Finding::new("study_points_warn", format!("/job{pointer}")).with("code", code).with("points", points).with("of", of)
 }
 
 fn outputs(plan: &Plan, rows: &[Row]) -> Vec<OutputField> {

@@ -1,6 +1,6 @@
 //! Studies of the toy, without a service: what is refused, what comes out.
 
-#![allow(clippy::unwrap_used, clippy::panic, clippy::float_cmp)]
+#![allow(clippy::unwrap_used, clippy::panic, clippy::float_cmp, clippy::needless_pass_by_value)]
 
 use precut_calc::calculator::{Figure, Item, Message, Monitor, Unwatched};
 use proptest::prelude::*;
@@ -69,7 +69,7 @@ fn every_calculators_own_choice_of_outputs_is_one() {
         for pointer in entry.meta().study_outputs {
             let tokens = super::expand::tokens(pointer).unwrap();
             let field = super::place::field(entry.strict_output(), None, &tokens);
-            assert!(field.is_ok_and(|field| field.number), "{} has no number at {pointer}", entry.meta().id);
+            assert!(field.is_ok_and(|field| field.is_number()), "{} has no number at {pointer}", entry.meta().id);
         }
     }
 }
@@ -78,8 +78,8 @@ fn every_calculators_own_choice_of_outputs_is_one() {
 fn every_example_runs() {
     let registry = Registry::standard().unwrap();
     for example in super::EXAMPLES {
-        let stored =
-            solve_now(&registry, STUDIES, Body::Json(example.job.into()), &Unwatched).unwrap_or_else(|e| panic!("{e:?}"));
+        let stored = solve_now(&registry, STUDIES, Body::Json(example.job.into()), &Unwatched)
+            .unwrap_or_else(|e| panic!("{e:?}"));
         let answer: Value = serde_json::from_slice(&stored.body).unwrap();
         assert!(answer["result"]["succeeded"].as_u64().unwrap() > 3, "{}", example.id);
         assert!(!stored.figures().unwrap().is_empty());
@@ -95,9 +95,13 @@ fn a_grid_has_a_row_for_each_combination_and_each_is_the_ordinary_job() {
     let answer = solved(&study);
     let result = &answer["result"];
     assert_eq!((&answer["calculator"], &result["calculator"]), (&json!("studies"), &json!("toy-bar")));
-    assert_eq!((&result["points"], &result["succeeded"], &result["calculator_version"]), (&json!(6), &json!(6), &json!(7)));
+    assert_eq!(
+        (&result["points"], &result["succeeded"], &result["calculator_version"]),
+        (&json!(6), &json!(6), &json!(7))
+    );
     let rows = result["rows"].as_array().unwrap();
-    let values: Vec<_> = rows.iter().map(|row| (row["values"][0].as_f64().unwrap(), row["values"][1].as_f64().unwrap())).collect();
+    let values: Vec<_> =
+        rows.iter().map(|row| (row["values"][0].as_f64().unwrap(), row["values"][1].as_f64().unwrap())).collect();
     assert_eq!(values, [(100.0, 2.0), (100.0, 4.0), (200.0, 2.0), (200.0, 4.0), (300.0, 2.0), (300.0, 4.0)]);
     for ((length, stations), row) in values.iter().zip(rows) {
         assert_eq!(row["outputs"], json!([length / 3.0]), "the calculator's own choice: /deflections_um/0");
@@ -105,10 +109,14 @@ fn a_grid_has_a_row_for_each_combination_and_each_is_the_ordinary_job() {
         let checked = check_now(&toy::registry(), "toy-bar", body(&job)).unwrap();
         assert_eq!(row["key"], json!(checked.key.to_string()));
     }
-    assert_eq!(result["outputs"][0]["least"], json!({"value": 100.0 / 3.0, "row": 0, "at": [100.0, 2.0],
-        "at_end_of": ["/length_mm", "/stations"]}));
+    assert_eq!(
+        result["outputs"][0]["least"],
+        json!({"value": 100.0 / 3.0, "row": 0, "at": [100.0, 2.0],
+        "at_end_of": ["/length_mm", "/stations"]})
+    );
     assert_eq!(result["outputs"][0]["unit"], "um");
-    let codes: Vec<_> = answer["explanation"].as_array().unwrap().iter().map(|one| one["code"].as_str().unwrap()).collect();
+    let codes: Vec<_> =
+        answer["explanation"].as_array().unwrap().iter().map(|one| one["code"].as_str().unwrap()).collect();
     assert_eq!(
         codes,
         ["study_extremes", "study_dominant", "study_least_at_end", "study_largest_at_end", "study_own_error"]
@@ -144,7 +152,10 @@ fn points_without_an_answer_keep_their_rows() {
     }
     assert_eq!(rows, want.iter().map(|(status, code)| (status, code)).collect::<Vec<_>>());
     assert_eq!((&result["succeeded"], &result["failed"]), (&json!(1), &json!(11)));
-    assert_eq!(result["failures"][0], json!({"status": "invalid", "code": "thicker_than_long", "points": 4, "first_row": 1}));
+    assert_eq!(
+        result["failures"][0],
+        json!({"status": "invalid", "code": "thicker_than_long", "points": 4, "first_row": 1})
+    );
     let rows = result["rows"].as_array().unwrap();
     assert_eq!(rows[1]["detail"], "diameter_mm 600 mm is above the length, 500 mm");
     assert_eq!((&rows[1]["key"], &rows[1]["outputs"]), (&Value::Null, &json!([null])));
@@ -156,7 +167,9 @@ fn a_study_of_a_billion_points_is_refused_with_limit_and_count() {
     let range = |pointer: &str, count: u64| json!({"pointer": pointer, "from": 1, "to": 2, "count": count});
     for counts in [[1000, 1000, 1000], [1 << 53, 1 << 53, 1 << 53]] {
         let study = study(json!([
-            range("/length_mm", counts[0]), range("/work_ms", counts[1]), range("/youngs_modulus_n_per_mm2", counts[2]),
+            range("/length_mm", counts[0]),
+            range("/work_ms", counts[1]),
+            range("/youngs_modulus_n_per_mm2", counts[2]),
         ]));
         let Err(Error::Invalid { findings, total: 1 }) = check_now(&toy::registry(), STUDIES, body(&study)) else {
             panic!("not one fault")
@@ -204,21 +217,31 @@ fn every_fault_of_a_study_is_listed_at_once() {
 fn values_must_fit_their_field() {
     let all = |values: Value| study(json!([values]));
     for (vary, want) in [
-        (json!({"pointer": "/length_mm", "values": [1, "2", true]}),
-         vec![("wrong_type", "/vary/0/values/1"), ("wrong_type", "/vary/0/values/2")]),
-        (json!({"pointer": "/mode", "values": ["plain", "plein", 3]}),
-         vec![("not_one_of", "/vary/0/values/1"), ("wrong_type", "/vary/0/values/2")]),
+        (
+            json!({"pointer": "/length_mm", "values": [1, "2", true]}),
+            vec![("wrong_type", "/vary/0/values/1"), ("wrong_type", "/vary/0/values/2")],
+        ),
+        (
+            json!({"pointer": "/mode", "values": ["plain", "plein", 3]}),
+            vec![("not_one_of", "/vary/0/values/1"), ("wrong_type", "/vary/0/values/2")],
+        ),
         (json!({"pointer": "/mode", "from": 1, "to": 2, "count": 2}), vec![("range_of_words", "/vary/0")]),
         (json!({"pointer": "/length_mm", "values": [5, 5.0]}), vec![("duplicate_value", "/vary/0/values/1")]),
         (json!({"pointer": "/length_mm", "values": [1, null]}), vec![("wrong_type", "/vary/0/values/1")]),
         (json!({"pointer": "/length_mm", "values": []}), vec![("too_few_items", "/vary/0/values")]),
         (json!({"pointer": "/length_mm"}), vec![("no_values", "/vary/0")]),
-        (json!({"pointer": "/length_mm", "from": 1}),
-         vec![("missing_field", "/vary/0/count"), ("missing_field", "/vary/0/to")]),
-        (json!({"pointer": "/length_mm", "from": 0, "to": -1, "count": 3, "spacing": "log"}),
-         vec![("log_not_positive", "/vary/0/from"), ("log_not_positive", "/vary/0/to")]),
-        (json!({"pointer": "/length_mm", "from": 1, "to": 1.000_000_000_000_001, "count": 9}),
-         vec![("range_too_fine", "/vary/0/count")]),
+        (
+            json!({"pointer": "/length_mm", "from": 1}),
+            vec![("missing_field", "/vary/0/count"), ("missing_field", "/vary/0/to")],
+        ),
+        (
+            json!({"pointer": "/length_mm", "from": 0, "to": -1, "count": 3, "spacing": "log"}),
+            vec![("log_not_positive", "/vary/0/from"), ("log_not_positive", "/vary/0/to")],
+        ),
+        (
+            json!({"pointer": "/length_mm", "from": 1, "to": 1.000_000_000_000_001, "count": 9}),
+            vec![("range_too_fine", "/vary/0/count")],
+        ),
         (json!({"pointer": "/length_mm", "from": 100, "to": 200, "count": 1}), vec![("out_of_range", "/vary/0/count")]),
         (json!({"pointer": "/stations", "from": 2, "to": 5, "count": 3}), vec![("range_not_whole", "/vary/0/count")]),
         (json!({"pointer": "/stations", "values": [2.5]}), vec![("wrong_type", "/vary/0/values/0")]),
@@ -335,7 +358,17 @@ fn pictures_are_a_map_over_two_and_curves_over_one() {
     let third = |length: f64| Some(length / 3.0);
     assert_eq!(
         values,
-        &[third(100.0), third(200.0), third(400.0), third(100.0), third(200.0), third(400.0), None, third(200.0), third(400.0)],
+        &[
+            third(100.0),
+            third(200.0),
+            third(400.0),
+            third(100.0),
+            third(200.0),
+            third(400.0),
+            None,
+            third(200.0),
+            third(400.0)
+        ],
         "row by row; where the bar is thicker than long there is none"
     );
 
@@ -476,15 +509,27 @@ fn any_study() -> impl Strategy<Value = Value> {
         prop_oneof![Just("plain"), Just("rigid"), Just("log"), Just("zip"), Just("grid")].prop_map(Value::from),
     ];
     let pointer = prop_oneof![
-        Just("/length_mm"), Just("/segments/0/diameter_mm"), Just("/segments"), Just("/mode"), Just("/support/kind"),
-        Just("/stations"), Just("/stations/0"), Just("/steady/compliance_um_per_n"), Just("/measurements/0/z_mm"),
-        Just("/"), Just(""), Just("/effects/0/kind"), Just("/~2"),
+        Just("/length_mm"),
+        Just("/segments/0/diameter_mm"),
+        Just("/segments"),
+        Just("/mode"),
+        Just("/support/kind"),
+        Just("/stations"),
+        Just("/stations/0"),
+        Just("/steady/compliance_um_per_n"),
+        Just("/measurements/0/z_mm"),
+        Just("/"),
+        Just(""),
+        Just("/effects/0/kind"),
+        Just("/~2"),
     ];
     let field = prop_oneof![Just("values"), Just("from"), Just("to"), Just("count"), Just("spacing")];
     let value = prop_oneof![scalar.clone(), prop::collection::vec(scalar.clone(), 0..4).prop_map(Value::from)];
     let variable = (pointer, prop::collection::vec((field, value.clone()), 0..5)).prop_map(|(pointer, fields)| {
         let mut variable = json!({ "pointer": pointer });
-        fields.into_iter().for_each(|(name, value)| variable[name] = value);
+        for (name, value) in fields {
+            variable[name] = value;
+        }
         variable
     });
     let output = prop_oneof![Just("/rows"), Just("/deflections_um/1"), Just("/x"), Just("")];

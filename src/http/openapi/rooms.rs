@@ -15,9 +15,9 @@ use utoipa::openapi::schema::{AdditionalProperties, ArrayBuilder, ObjectBuilder,
 use utoipa::openapi::{Content, Object, Ref, RefOr, Required, Schema};
 
 use super::{jobs, parts};
+use crate::engine;
 use crate::http::answer::offered;
 use crate::http::negotiate::Media;
-use crate::engine;
 use crate::registry::{Entry, Registry};
 
 /// A calculator's part of the contract.
