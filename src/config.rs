@@ -91,6 +91,8 @@ pub struct Limits {
     pub job_ms: f64,
     /// Largest estimated memory of a job, bytes.
     pub job_bytes: u64,
+    /// Most points of a parameter study.
+    pub study_points: u64,
     /// How long a job may wait for a core, ms.
     pub queue_ms: u64,
 }

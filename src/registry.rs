@@ -19,8 +19,10 @@ pub(crate) mod toy;
 
 pub use entry::{Entry, Prepared, ResultNotes, UnreadableResult};
 
+pub(crate) use canonical::canonical;
 pub(crate) use checker::{Faults, by_pointer, child};
-pub(crate) use entry::Unprepared;
+pub(crate) use entry::{Calculation, Job, Unprepared, second_line};
+pub(crate) use fault::intern as interned;
 pub(crate) use finite::non_finite_place;
 pub(crate) use nearest::nearest;
 #[cfg(test)]

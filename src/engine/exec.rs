@@ -89,6 +89,11 @@ impl Cores {
         permit.map(Slot).map_err(|_closed| Error::ShuttingDown)
     }
 
+    /// The right to use one more core for a job, if nobody waits for it.
+    pub(crate) fn spare_job_slot(&self) -> Option<Slot> {
+        Arc::clone(&self.job_slots).try_acquire_owned().ok().map(Slot)
+    }
+
     /// Runs `work` on the jobs' pool.
     pub(crate) fn spawn_job(&self, work: impl FnOnce() + Send + 'static) {
         self.job_pool.spawn(work);

@@ -16,6 +16,7 @@ mod memory;
 mod progress;
 mod read;
 mod settings;
+mod study;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -28,6 +29,7 @@ pub use error::{Error, SyntaxFault};
 pub use jobs::{Answered, Ask, Feed, Job};
 pub use progress::Interim;
 pub use settings::EngineSettings;
+pub use study::STUDIES;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -65,6 +67,8 @@ pub(crate) struct Inner {
     cores: Cores,
     store: Arc<dyn ResultStore>,
     jobs: Jobs,
+    /// Parameter studies: asked like a calculator, made of the registry's.
+    studies: Arc<Entry>,
     closed: AtomicBool,
 }
 
@@ -96,7 +100,10 @@ impl Engine {
         let closed = AtomicBool::new(false);
         let flights = Arc::default();
         let jobs = Jobs::new(jobs);
-        let inner = Arc::new(Inner { registry, settings, memory, flights, cores, store, jobs, closed });
+        let host = Arc::new(study::InEngine::default());
+        let studies = Arc::new(study::entry(&registry, settings.study_points, Arc::<study::InEngine>::clone(&host)));
+        let inner = Arc::new(Inner { registry, settings, memory, flights, cores, store, jobs, studies, closed });
+        host.move_in(&inner);
         Jobs::start(&inner).await;
         Ok(Self { inner })
     }
@@ -106,9 +113,22 @@ impl Engine {
         &self.inner.registry
     }
 
+    /// Parameter studies, which are asked like a calculator.
+    pub fn studies(&self) -> &Arc<Entry> {
+        &self.inner.studies
+    }
+
+    /// What is asked under a name: a calculator, or parameter studies.
+    pub fn entry(&self, name: &str) -> Option<&Arc<Entry>> {
+        self.inner.entry(name)
+    }
+
     /// Everything but the calculation.
+    #[allow(clippy::needless_pass_by_value)] // a body is handed over, as everywhere
     pub fn check(&self, calculator: &str, body: Body) -> Result<Checked, Error> {
-        check_now(&self.inner.registry, calculator, body)
+        let inner = &self.inner;
+        let entry = inner.known(calculator)?;
+        guarded(|| read::read(&entry, &body)?.into_checked())
     }
 
     /// The answer to a job, from the cache or computed. Dropping the future cancels the calculation unless another
@@ -129,7 +149,7 @@ impl Engine {
         if inner.closed.load(Ordering::Relaxed) {
             return Err(Error::ShuttingDown);
         }
-        let entry = entry(&inner.registry, calculator)?;
+        let entry = inner.known(calculator)?;
         let begun = Instant::now();
         let fingerprint = fingerprint(entry.meta().id, body);
         if let Some(key) = inner.memory.recognise(&fingerprint)
@@ -225,9 +245,18 @@ impl Engine {
 }
 
 impl Inner {
+    fn entry(&self, name: &str) -> Option<&Arc<Entry>> {
+        if name == STUDIES { Some(&self.studies) } else { self.registry.entry(name) }
+    }
+
+    /// What is asked under a name.
+    fn known(&self, name: &str) -> Result<Arc<Entry>, Error> {
+        self.entry(name).cloned().ok_or_else(|| Error::unknown(&self.registry, name))
+    }
+
     /// Reads a job where that does no harm.
     async fn read(&self, entry: &Arc<Entry>, body: Body) -> Result<Ready, Error> {
-        if body.len() <= READ_AT_ONCE {
+        if body.len() <= READ_AT_ONCE && !entry.is_composed() {
             return guarded(|| read::read(entry, &body));
         }
         let slot = match self.cores.slot_now()? {
@@ -260,7 +289,7 @@ impl Inner {
     async fn fetch(&self, key: &Key) -> Result<Option<Arc<Stored>>, crate::store::StoreError> {
         let Some(kept) = self.store.get(*key).await? else { return Ok(None) };
         // A calculator that is no more has no results either.
-        let Some(entry) = self.registry.entry(&kept.calculator) else { return Ok(None) };
+        let Some(entry) = self.entry(&kept.calculator) else { return Ok(None) };
         let stored = Arc::new(Stored { key: *key, body: kept.body, input: kept.input, entry: Arc::clone(entry) });
         self.memory.keep(*key, Kept::Answer(Arc::clone(&stored)));
         Ok(Some(stored))
@@ -275,7 +304,7 @@ impl Inner {
 
     /// Sees to it that the calculation runs: here if it is short, else on the pool.
     fn fly(inner: &Arc<Self>, pilot: Pilot, ready: Ready, slot: Slot, queued: Instant) {
-        if ready.prepared.cost.ms <= COMPUTE_AT_ONCE_MS {
+        if ready.prepared.cost.ms <= COMPUTE_AT_ONCE_MS && !ready.entry.is_composed() {
             inner.run(pilot, &ready, Some(slot), queued);
         } else {
             let this = Arc::clone(inner);
@@ -349,8 +378,17 @@ fn hit(kept: Kept, parse: Duration) -> Result<Solved, Error> {
     Ok(Solved { stored: outcome(kept)?, cache: CacheState::Hit, timings })
 }
 
+/// What is asked under a name, without an engine.
 fn entry(registry: &Registry, calculator: &str) -> Result<Arc<Entry>, Error> {
+    if calculator == STUDIES {
+        return Ok(studies_of(registry));
+    }
     registry.entry(calculator).cloned().ok_or_else(|| Error::unknown(registry, calculator))
+}
+
+/// Parameter studies over the calculators of a registry, without an engine: nothing is kept.
+pub fn studies_of(registry: &Registry) -> Arc<Entry> {
+    Arc::new(study::entry(registry, study::MOST_POINTS, Arc::new(study::Alone)))
 }
 
 /// Runs a job and writes its answer.

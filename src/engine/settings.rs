@@ -30,6 +30,8 @@ pub struct EngineSettings {
     pub job_slots: usize,
     /// How long finished jobs and their results are kept.
     pub job_age: Duration,
+    /// So many points has a parameter study at most.
+    pub study_points: u64,
     /// How long a job may stand in line for a core.
     pub patience: Duration,
     /// How long running calculations may go on when the engine is closed.
@@ -52,6 +54,7 @@ impl EngineSettings {
             queue_limit: 10_000,
             job_slots: Self::job_slots_of(cores),
             job_age: Duration::from_hours(30 * 24),
+            study_points: super::study::MOST_POINTS,
             patience: Duration::from_millis(250),
             grace: Duration::from_secs(20),
         }
@@ -73,6 +76,7 @@ impl EngineSettings {
             queue_limit: config.jobs.queue,
             job_slots: if config.jobs.slots == 0 { Self::job_slots_of(cores) } else { config.jobs.slots },
             job_age: Duration::from_secs(u64::from(config.jobs.days) * 24 * 3600),
+            study_points: config.limits.study_points,
             patience: Duration::from_millis(config.limits.queue_ms),
             grace: seconds(config.shutdown.grace_s),
         }

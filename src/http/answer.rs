@@ -196,13 +196,18 @@ fn absent<'a>(code: &'static str, view: &View, ids: impl Iterator<Item = &'a str
 }
 
 fn drawn(figure: &precut_calc::calculator::Figure, language: Language) -> String {
+    use precut_calc::calculator::{Value, Values};
     let texts = Texts::shared();
-    let none = precut_calc::calculator::Values::new();
+    let none = Values::new();
     render::svg(
         figure,
         &render::Wording {
             message: &|message| texts.message(language, "figure", message),
-            label: &|code| texts.word(language, "label", code, &none),
+            // Names that no table of texts has, such as those of a study's variables, stand in the title's values.
+            label: &|code| match figure.title.values.get(code) {
+                Some(Value::Text(name)) => name.clone().into_owned(),
+                _ => texts.word(language, "label", code, &none),
+            },
             unit: &|unit| render::unit_symbol(unit),
             decimal: '.',
         },

@@ -37,7 +37,7 @@ const PATTERNS: [(&str, &str); 9] = [
 ];
 
 /// Addresses without one, besides the calculators'.
-const PLAIN: [&str; 11] = [
+const PLAIN: [&str; 12] = [
     "/",
     "/docs",
     "/openapi.json",
@@ -48,6 +48,7 @@ const PLAIN: [&str; 11] = [
     "/v1/jobs",
     "/v1/results",
     "/v1/materials",
+    "/v1/studies",
     "other",
 ];
 

@@ -76,7 +76,8 @@ impl App {
     pub fn new(engine: Engine, config: &Config) -> Self {
         // The recorder of metrics comes first: counters made before it count nothing.
         let metrics = metrics::Metrics::new(engine.registry());
-        let rooms: Vec<_> = engine.registry().entries().iter().map(calculators::Room::new).collect();
+        let entries = engine.registry().entries().iter().chain([engine.studies()]);
+        let rooms: Vec<_> = entries.map(calculators::Room::new).collect();
         let documents = document::Documents::new(engine.registry());
         Self(Arc::new(Shared {
             limits: config.limits.clone(),

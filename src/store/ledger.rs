@@ -4,6 +4,7 @@
 //! away in the middle leaves no half-done transaction.
 
 use futures_util::future::BoxFuture;
+use sqlx::Connection;
 use sqlx::sqlite::{SqliteConnection, SqlitePool};
 use tokio::sync::{mpsc, oneshot};
 
@@ -106,7 +107,18 @@ fn is_of_one_order(error: &sqlx::Error) -> bool {
 }
 
 async fn together(pool: &SqlitePool, group: &mut [Box<dyn Order>]) -> Result<(), sqlx::Error> {
-    let mut transaction = pool.begin_with("BEGIN IMMEDIATE").await?;
+    let mut connection = pool.acquire().await?;
+    let outcome = within(&mut connection, group).await;
+    if outcome.is_err() {
+        // Where SQLite has rolled back by itself (a full disk), the driver still counts a transaction that nothing can
+        // end, and would refuse every later one.
+        connection.close_on_drop();
+    }
+    outcome
+}
+
+async fn within(connection: &mut SqliteConnection, group: &mut [Box<dyn Order>]) -> Result<(), sqlx::Error> {
+    let mut transaction = connection.begin_with("BEGIN IMMEDIATE").await?;
     for order in group {
         order.attempt(&mut transaction).await?;
     }

@@ -6,6 +6,7 @@ mod queue;
 mod row;
 pub mod sqlite;
 mod sqlite_jobs;
+mod sqlite_studies;
 mod writer;
 
 use std::fmt;
@@ -49,6 +50,18 @@ pub trait ResultStore: Send + Sync + 'static {
     fn ping(&self) -> BoxFuture<'_, Result<(), StoreError>>;
     /// Writes what waits and closes.
     fn close(&self) -> BoxFuture<'_, ()>;
+    /// Puts a part of a study down. On return it outlasts the process, and so do the results of its points.
+    fn put_shard(&self, _study: Key, _shard: u32, _content: Bytes) -> BoxFuture<'_, Result<(), StoreError>> {
+        Box::pin(async { Ok(()) })
+    }
+    /// The parts of a study that are put down.
+    fn shards(&self, _study: Key) -> BoxFuture<'_, Result<Vec<(u32, Bytes)>, StoreError>> {
+        Box::pin(async { Ok(Vec::new()) })
+    }
+    /// Forgets the parts of a study.
+    fn forget_shards(&self, _study: Key) -> BoxFuture<'_, Result<(), StoreError>> {
+        Box::pin(async { Ok(()) })
+    }
 }
 
 /// A result as it is kept.

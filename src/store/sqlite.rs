@@ -6,6 +6,7 @@ use std::path::Path;
 use std::sync::{Arc, PoisonError, RwLock};
 use std::time::Duration;
 
+use bytes::Bytes;
 use futures_util::future::BoxFuture;
 use sqlx::Connection;
 use sqlx::migrate::{MigrateError, Migrator};
@@ -197,6 +198,15 @@ impl ResultStore for SqliteStore {
             sqlx::query("SELECT 1").execute(&self.readers).await?;
             Ok(())
         })
+    }
+    fn put_shard(&self, study: Key, shard: u32, content: Bytes) -> BoxFuture<'_, Result<(), StoreError>> {
+        Box::pin(self.put_down_shard(study, shard, content))
+    }
+    fn shards(&self, study: Key) -> BoxFuture<'_, Result<Vec<(u32, Bytes)>, StoreError>> {
+        Box::pin(self.shards_of(study))
+    }
+    fn forget_shards(&self, study: Key) -> BoxFuture<'_, Result<(), StoreError>> {
+        Box::pin(self.forget_shards_of(study))
     }
     fn close(&self) -> BoxFuture<'_, ()> {
         Box::pin(async {

@@ -6,7 +6,8 @@ use std::sync::atomic::{AtomicBool, AtomicI64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex as StdMutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use sqlx::sqlite::SqlitePool;
+use sqlx::Connection;
+use sqlx::sqlite::{SqliteConnection, SqlitePool};
 use tokio::sync::{Mutex, Notify, mpsc, oneshot};
 use tokio::task::JoinHandle;
 
@@ -259,29 +260,14 @@ impl Clerk {
 
     async fn write_rows(&mut self, rows: &[ResultRow], touched: &[Key], forgotten: &[Key]) -> Result<(), sqlx::Error> {
         let now = now_ms();
-        let mut transaction = self.pool.begin_with("BEGIN IMMEDIATE").await?;
-        for key in forgotten {
-            sqlx::query("DELETE FROM results WHERE key = ?1")
-                .bind(key.as_bytes().as_slice())
-                .execute(&mut *transaction)
-                .await?;
+        let mut connection = self.pool.acquire().await?;
+        let outcome = insert(&mut connection, rows, touched, forgotten, now).await;
+        if outcome.is_err() {
+            // Where SQLite has rolled back by itself (a full disk), the driver still counts a transaction that nothing
+            // can end, and would refuse every later one.
+            connection.close_on_drop();
         }
-        let mut added = 0;
-        let (many, few) = rows.as_chunks::<ROWS_AT_ONCE>();
-        for rows in many {
-            added += row::insert(rows, now, &mut transaction).await?;
-        }
-        for one in few {
-            added += row::insert(std::slice::from_ref(one), now, &mut transaction).await?;
-        }
-        for key in touched {
-            sqlx::query("UPDATE results SET used_ms = ?2 WHERE key = ?1")
-                .bind(key.as_bytes().as_slice())
-                .bind(now)
-                .execute(&mut *transaction)
-                .await?;
-        }
-        transaction.commit().await?;
+        let added = outcome?;
         for key in forgotten {
             self.keys.remove(key.as_bytes());
         }
@@ -376,6 +362,40 @@ impl Clerk {
             tracing::warn!(%error, operation, "the store could not be tidied");
         }
     }
+}
+
+/// Writes rows in one transaction; how many bytes they add.
+async fn insert(
+    connection: &mut SqliteConnection,
+    rows: &[ResultRow],
+    touched: &[Key],
+    forgotten: &[Key],
+    now: i64,
+) -> Result<i64, sqlx::Error> {
+    let mut transaction = connection.begin_with("BEGIN IMMEDIATE").await?;
+    for key in forgotten {
+        sqlx::query("DELETE FROM results WHERE key = ?1")
+            .bind(key.as_bytes().as_slice())
+            .execute(&mut *transaction)
+            .await?;
+    }
+    let mut added = 0;
+    let (many, few) = rows.as_chunks::<ROWS_AT_ONCE>();
+    for rows in many {
+        added += row::insert(rows, now, &mut transaction).await?;
+    }
+    for one in few {
+        added += row::insert(std::slice::from_ref(one), now, &mut transaction).await?;
+    }
+    for key in touched {
+        sqlx::query("UPDATE results SET used_ms = ?2 WHERE key = ?1")
+            .bind(key.as_bytes().as_slice())
+            .bind(now)
+            .execute(&mut *transaction)
+            .await?;
+    }
+    transaction.commit().await?;
+    Ok(added)
 }
 
 fn group(waiting: &mut Vec<Order>) -> Group {

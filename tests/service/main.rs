@@ -15,3 +15,4 @@ mod negotiation;
 mod process;
 mod results;
 mod standing;
+mod studies;

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use super::{Ask, Feed, Job, Request};
 use crate::engine::memory::{Kept, fingerprint};
-use crate::engine::{Body, CacheState, Engine, Error, Known, Solved, Stored, Timings, entry, hit};
+use crate::engine::{Body, CacheState, Engine, Error, Known, Solved, Stored, Timings, hit};
 use crate::store::jobs::{JobId, JobKind, JobQuery, JobRecord, JobState};
 
 /// What came of a request.
@@ -27,13 +27,15 @@ impl Engine {
             Known::Kept(kept, parse) if body_hash.is_none() => return Ok(solved(hit(kept, parse)?)),
             // It has a record, too, by which it is known again.
             Known::Kept(kept, parse) => {
-                (Box::new(inner.read(&entry(&inner.registry, calculator)?, body).await?), parse, Some(kept))
+                (Box::new(inner.read(&inner.known(calculator)?, body).await?), parse, Some(kept))
             }
             Known::New(ready, parse) => (ready, parse, None),
         };
         inner.afford(ready.prepared.cost)?;
         let meta = ready.entry.meta();
-        let estimate_ms = inner.jobs.estimates.corrected(meta.id, meta.version, ready.prepared.cost.ms);
+        // What was learned of a calculator holds for a study of it, too.
+        let numbers_of = ready.prepared.numbers_of.as_ref().unwrap_or(meta);
+        let estimate_ms = inner.jobs.estimates.corrected(numbers_of.id, numbers_of.version, ready.prepared.cost.ms);
         let is_short = estimate_ms <= inner.settings.direct_limit.as_secs_f64() * 1e3;
         if is_short && ask.wait.is_none() && body_hash.is_none() {
             let answer = self.solve_directly(*ready, parse);

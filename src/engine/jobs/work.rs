@@ -3,14 +3,17 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use bytes::Bytes;
 use futures_util::future::BoxFuture;
 use serde_json::Value;
+use tokio::sync::oneshot;
 
 use super::running::Running;
-use crate::engine::exec::Slot;
+use crate::engine::exec::{Slot, guarded};
 use crate::engine::flight::Boarded;
 use crate::engine::read::Ready;
 use crate::engine::{Error, Inner, Stored, read};
+use crate::registry::Entry;
 use crate::store::jobs::{Claim, JobKind};
 
 /// Something to run for jobs.
@@ -29,12 +32,45 @@ pub(crate) trait Work: Send + Sync {
 pub(super) fn of(engine: &Inner, claim: &Claim) -> Result<Box<dyn Work>, Error> {
     match claim.kind {
         JobKind::Calculation => {
-            let entry = crate::engine::entry(&engine.registry, &claim.calculator)?;
-            let job: Value = serde_json::from_slice(&claim.input)
-                .map_err(|error| Error::internal(format!("a kept job is not readable: {error}")))?;
-            Ok(Box::new(Calculation { ready: read::prepared(&entry, &job)? }))
+            let entry = engine.known(&claim.calculator)?;
+            if entry.is_composed() {
+                return Ok(Box::new(Composed { entry, input: claim.input.clone() }));
+            }
+            Ok(Box::new(Calculation { ready: ready(&entry, &claim.input)? }))
         }
         JobKind::Study => Err(Error::internal("this version runs no studies".to_owned())),
+    }
+}
+
+/// A kept job, ready to run.
+fn ready(entry: &Arc<Entry>, input: &[u8]) -> Result<Ready, Error> {
+    let job: Value = serde_json::from_slice(input)
+        .map_err(|error| Error::internal(format!("a kept job is not readable: {error}")))?;
+    read::prepared(entry, &job)
+}
+
+/// An answer made of many: reading it is work, too.
+struct Composed {
+    entry: Arc<Entry>,
+    input: Bytes,
+}
+
+impl Work for Composed {
+    fn run(
+        self: Box<Self>,
+        engine: Arc<Inner>,
+        running: Arc<Running>,
+        slot: Slot,
+    ) -> BoxFuture<'static, Result<Arc<Stored>, Error>> {
+        Box::pin(async move {
+            let (sender, receiver) = oneshot::channel();
+            engine.cores.spawn_job(move || {
+                // Nobody listens if the job was given up.
+                let _ = sender.send(guarded(|| ready(&self.entry, &self.input)));
+            });
+            let ready = receiver.await.unwrap_or(Err(Error::Crashed))?;
+            Inner::calculate(&engine, ready, &running, Some(slot)).await
+        })
     }
 }
 
@@ -93,6 +129,8 @@ impl Inner {
             if let Some(kept) = engine.look_up(&ready.key).await {
                 return crate::engine::outcome(kept);
             }
+            // A study whose points were there already says nothing of what points take.
+            let teaches = !ready.entry.is_composed();
             let (id, version, cost_ms) = (ready.entry.meta().id, ready.entry.meta().version, ready.prepared.cost.ms);
             let Boarded { seat, pilot } = engine.flights.board(ready.key);
             if is_all {
@@ -114,7 +152,7 @@ impl Inner {
                 // A direct answer found no core. A job has one: it computes what was not computed there.
                 Err(Error::Busy { .. } | Error::ShuttingDown) if !is_mine => {}
                 outcome => {
-                    if is_mine && outcome.is_ok() {
+                    if is_mine && teaches && outcome.is_ok() {
                         engine.jobs.learn(id, version, cost_ms, landed.timings.run).await;
                     }
                     return outcome;

@@ -15,6 +15,7 @@ use utoipa::openapi::{ComponentsBuilder, InfoBuilder, LicenseBuilder, OpenApiBui
 use utoipa::openapi::{RefOr, Schema};
 use utoipa::{PartialSchema, ToSchema};
 
+use crate::engine::STUDIES;
 use crate::registry::Registry;
 
 const DESCRIPTION: &str = "\
@@ -55,6 +56,9 @@ pub fn document(registry: &Registry) -> Value {
         paths = paths.path(format!("/v1/{}", entry.meta().id), room.path);
         schemas.extend(room.schemas);
     }
+    let studies = rooms::studies(registry);
+    paths = paths.path(format!("/v1/{STUDIES}"), studies.path);
+    schemas.extend(studies.schemas);
     for (address, path) in jobs::paths(registry).into_iter().chain(fixed::paths(registry)) {
         paths = paths.path(address, path);
     }
