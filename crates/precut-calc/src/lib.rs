@@ -6,6 +6,7 @@
 
 pub mod calculator;
 pub mod deflection_compensation;
+pub mod diagnosis;
 pub mod effects;
 pub mod force;
 pub mod material;

@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::calculator::{
-    Cost, Failure, Finding, ForwardModel, JacobianColumn, Missing, Monitor, Prediction, PrepareError, Quantity, Rows,
-    checkpoint,
+    Cost, Design, Failure, Finding, ForwardModel, Hypotheses, Hypothesis, JacobianColumn, Missing, Monitor, Prediction,
+    PrepareError, Quantity, Rows, checkpoint,
 };
 use crate::effects::{Cause, DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect};
 use crate::num::beam::Profile;
@@ -14,6 +14,7 @@ use super::DeflectionCompensation;
 use super::acting::{Acting, StructureChange};
 use super::equilibrium::Engagement;
 use super::grid::{Grid, interpolate};
+use super::hypotheses::{Experiment, chuck_scale_n_mm_per_rad, design};
 use super::input::{FeedDirection, Job, Stations};
 use super::model::{Ingredients, Line, Radii, rest_shapes, wanted};
 use super::regime::{Regime, passages, section_of_pass};
@@ -163,6 +164,10 @@ pub struct PreparedDeflection {
     runs: Vec<PreparedRun>,
     rows: usize,
     measure: Measure,
+    job: Job,
+    conditions_of_runs: Vec<DeflectionRun>,
+    /// Run and station of every row.
+    places: Vec<(usize, f64)>,
 }
 
 struct PreparedRun {
@@ -217,19 +222,45 @@ impl ForwardModel for DeflectionCompensation {
                 runs.push(PreparedRun::of(job, run, places).map_err(PrepareError::Failed)?);
             }
         }
-        Ok(PreparedDeflection { runs, rows: rows.points.len(), measure })
+        Ok(PreparedDeflection {
+            runs,
+            rows: rows.points.len(),
+            measure,
+            job: job.clone(),
+            conditions_of_runs: rows.runs.clone(),
+            places: rows.points.iter().map(|(run, point)| (*run, point.z_mm)).collect(),
+        })
     }
 
     fn predict(prepared: &PreparedDeflection, effects: &[DeflectionEffect]) -> Result<Vec<Prediction>, Failure> {
-        let mut out = vec![Err(Missing::NoSolution); prepared.rows];
-        for run in &prepared.runs {
-            run.predict(effects, prepared.measure, &mut out)?;
-        }
-        Ok(out)
+        predict(&prepared.runs, prepared.rows, prepared.measure, effects)
     }
 
     fn effect(cause: &Cause, values: &[f64]) -> Option<DeflectionEffect> {
         DeflectionEffect::from_parameters(cause, values)
+    }
+
+    fn hypotheses(prepared: &PreparedDeflection) -> Hypotheses {
+        Experiment { job: &prepared.job, runs: &prepared.conditions_of_runs }.hypotheses()
+    }
+
+    fn effects(
+        prepared: &PreparedDeflection,
+        hypothesis: &Hypothesis,
+        values: &[f64],
+    ) -> Option<Vec<DeflectionEffect>> {
+        let effect = match (hypothesis.cause.kind, values) {
+            ("chuck_rotational_stiffness", &[kappa]) => {
+                let ktheta = kappa / (1.0 - kappa) * chuck_scale_n_mm_per_rad(&prepared.job);
+                DeflectionEffect::ChuckRotationalStiffness { ktheta_n_mm_per_rad: ktheta.max(1.0) }
+            }
+            _ => DeflectionEffect::from_parameters(hypothesis.cause, values)?,
+        };
+        Some(vec![effect])
+    }
+
+    fn design(prepared: &PreparedDeflection) -> Design {
+        design(&prepared.job, &prepared.places)
     }
 
     fn nuisances(
@@ -418,6 +449,19 @@ fn structure(job: &Job, change: &StructureChange, regime: &Regime) -> Result<Str
     Structure::of(job, &variant)
 }
 
+fn predict(
+    runs: &[PreparedRun],
+    rows: usize,
+    measure: Measure,
+    effects: &[DeflectionEffect],
+) -> Result<Vec<Prediction>, Failure> {
+    let mut out = vec![Err(Missing::NoSolution); rows];
+    for run in runs {
+        run.predict(effects, measure, &mut out)?;
+    }
+    Ok(out)
+}
+
 impl PreparedDeflection {
     /// Central difference of the prediction by a relative effect about 0, one entry per row.
     fn slope(&self, effect: impl Fn(f64) -> DeflectionEffect) -> Result<Vec<f64>, Failure> {
@@ -429,8 +473,7 @@ impl PreparedDeflection {
     fn slope_along(&self) -> Result<Vec<f64>, Failure> {
         let at = |dz_mm: f64| -> Result<Vec<Prediction>, Failure> {
             let runs = self.runs.iter().map(|run| run.shifted(dz_mm)).collect::<Result<Vec<_>, _>>()?;
-            let shifted = Self { runs, rows: self.rows, measure: self.measure };
-            DeflectionCompensation::predict(&shifted, &[])
+            predict(&runs, self.rows, self.measure, &[])
         };
         Ok(difference(&at(-GAUGE_STEP_MM)?, &at(GAUGE_STEP_MM)?, 2.0 * GAUGE_STEP_MM))
     }

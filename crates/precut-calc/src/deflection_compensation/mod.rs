@@ -22,6 +22,7 @@ mod extremes;
 mod form;
 mod forward;
 mod grid;
+mod hypotheses;
 mod input;
 mod laws;
 mod model;
