@@ -9,22 +9,34 @@
 //!   smooth remainder, explains the rows (`diagnosis/3.4`, `diagnosis/3.5`);
 //! - `weigh`: posterior weights and the verdict (`diagnosis/3.5`, `diagnosis/3.7`).
 
+mod adequacy;
 mod base;
 mod basis;
 mod data;
 mod discrepancy;
 mod evidence;
+mod foundation;
+mod gain;
+mod identify;
 mod noise;
 mod outlier;
 mod refine;
+mod remainder;
 mod search;
 mod subject;
+mod suspect;
 mod weigh;
 mod whiten;
 
+pub use adequacy::{Test, TestKind, adequacy};
 pub use base::Bound;
 pub use data::{Data, Layout};
+pub use foundation::Foundation;
+pub use gain::{Gain, gain};
+pub use identify::{COLLINEAR_ABOVE, CONFOUNDED_BELOW, Separation, Signature, separations, twins};
 pub use noise::{Noise, NoiseSource};
-pub use outlier::{Outliers, outliers};
+pub use outlier::Outliers;
+pub use remainder::{RemainderShape, remainder_shape};
 pub use subject::{Setting, Subject};
-pub use weigh::{Diagnosed, SetWeight, Settings, Verdict, diagnose};
+pub use suspect::{SuspectedFactor, copied_traces, suspected_factor};
+pub use weigh::{Effort, SetWeight, Verdict, Weighing};

@@ -39,7 +39,7 @@ impl Outliers {
 ///
 /// The deletion is essential: in a fit that contains it, a spike of 20 sigma drags its neighbours beyond
 /// 3 sigma with it and would pass for structure.
-pub fn outliers(data: &Data, residual: &[f64]) -> Outliers {
+pub(super) fn outliers(data: &Data, residual: &[f64]) -> Outliers {
     let ordered = data.layout.design.smooth != Smooth::None;
     let mut traces: Vec<Fit> = if ordered {
         data.layout

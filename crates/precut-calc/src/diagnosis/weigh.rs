@@ -1,15 +1,14 @@
 //! From rows to posterior weights and a verdict (`diagnosis/3.5`, `diagnosis/3.7`).
 
-use super::data::Data;
 use super::discrepancy::{self, Kind, Remainder};
 use super::evidence::{Scale, Side, log_sum_exp};
+use super::foundation::Foundation;
 use super::noise::Noise;
-use super::outlier::{Outliers, outliers};
 use super::refine::{Fit, Refinement};
-use super::search::{Candidate, Linear, Signatures, by_weight};
-use super::subject::{Setting, Subject};
+use super::search::{Candidate, Linear, by_weight};
+use super::subject::Setting;
 use super::whiten::{White, Whitener};
-use crate::calculator::{Failure, Message, Monitor, checkpoint};
+use crate::calculator::{Failure, Monitor, checkpoint};
 
 /// Sets that are refined about the model itself.
 const LEADERS: usize = 12;
@@ -30,18 +29,21 @@ const NAMED_IF_COMMON: f64 = 0.5;
 /// Share of the named posterior that the list of likely sets holds.
 const LIKELY: f64 = 0.95;
 
-/// What the search may do.
+/// How far the search goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Settings {
+pub struct Effort {
     /// Causes at the same time, 0 to 3.
     pub most_causes: usize,
-    /// Whether rows that stand alone are left out.
-    pub leave_outliers_out: bool,
+    /// Sets that are refined about the model itself.
+    pub leaders: usize,
+    /// Sets that lead only after the others were refined, and are then refined too.
+    pub late_leaders: usize,
 }
 
-impl Default for Settings {
-    fn default() -> Self {
-        Self { most_causes: 3, leave_outliers_out: true }
+impl Effort {
+    /// The whole search.
+    pub fn full(most_causes: usize) -> Self {
+        Self { most_causes, leaders: LEADERS, late_leaders: LATE_LEADERS }
     }
 }
 
@@ -65,84 +67,84 @@ pub struct SetWeight {
     pub members: Vec<usize>,
     /// Share of the whole posterior.
     pub posterior: f64,
-    /// Whether an unnamed remainder stands beside them.
-    pub with_remainder: bool,
     /// Fitted values.
     pub settings: Vec<Setting>,
     /// Posterior standard deviations of the values, 0 where they are stated.
     pub standard_deviations: Vec<Vec<f64>>,
     /// Whether the model itself was linearised at the optimum.
     pub refined: bool,
+    /// The remainder beside them, where there is one.
+    pub(super) remainder: Option<Remainder>,
 }
 
-/// Everything that the later steps need.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Diagnosed {
-    /// The verdict.
-    pub verdict: Verdict,
+/// All sets of causes weighed against each other, against nothing, and against a remainder without a name.
+pub struct Weighing<'a> {
+    pub(super) foundation: &'a Foundation<'a>,
+    /// Rows that count.
+    pub keep: Vec<bool>,
+    /// Scatter of the rows.
+    pub noise: Noise,
+    pub(super) whitener: Whitener,
+    pub(super) linear: Linear<'a>,
+    ranking: Ranking,
+    pub(super) kinds: Vec<Kind>,
     /// All sets, heaviest first.
     pub sets: Vec<SetWeight>,
     /// Posterior of "nothing is wrong".
     pub none: f64,
     /// Posterior of all sets with an unnamed remainder.
     pub unnamed: f64,
-    /// Scatter of the rows.
-    pub noise: Noise,
-    /// Rows that stand alone.
-    pub outliers: Outliers,
     /// Posterior that a hypothesis takes part, for every hypothesis.
     pub inclusion: Vec<f64>,
-    /// Hypotheses whose signature is too small to be seen in these rows.
-    pub invisible: Vec<usize>,
+    /// The verdict.
+    pub verdict: Verdict,
 }
 
-/// Weighs all sets of causes against each other, against nothing, and against a remainder without a name.
-pub fn diagnose(
-    subject: &dyn Subject,
-    data: &Data,
-    settings: Settings,
-    monitor: &dyn Monitor,
-) -> Result<Diagnosed, Failure> {
-    let base = subject.predict(&[])?;
-    let predicted: Vec<bool> = base.iter().map(Result::is_ok).collect();
-    let base: Vec<f64> = base.into_iter().map(|f| f.unwrap_or(0.0)).collect();
-    let signatures = Signatures::of(subject, &base, monitor)?;
-    let nuisances = subject.nuisances()?;
-    let residual: Vec<f64> =
-        data.value.iter().zip(&base).zip(&predicted).map(|((y, f), ok)| if *ok { y - f } else { 0.0 }).collect();
-    let found = if settings.leave_outliers_out {
-        outliers(data, &residual)
-    } else {
-        Outliers { rows: Vec::new(), too_many: false }
-    };
-    let keep: Vec<bool> = found.keep(data.value.len()).iter().zip(&predicted).map(|(a, b)| *a && *b).collect();
-    let noise = Noise::of(data, &residual, &keep);
-    let whitener = Whitener::new(data, &noise, &nuisances, &keep);
-    let scale = Scale::of(&noise);
-    let linear = Linear::new(subject.hypotheses(), &signatures, &whitener, &residual, scale);
-    monitor.progress(0.2, Message::new("diagnosis_search"));
-    let candidates = linear.search(settings.most_causes, monitor)?;
-    let refinement = Refinement { subject, value: &data.value, keep: &keep, whitener: &whitener, scale };
-    let mut ranking = Ranking { candidates, fits: Vec::new() };
-    ranking.refine(&linear, &refinement, LEADERS, monitor)?;
-    ranking.refine(&linear, &refinement, LATE_LEADERS, monitor)?;
-    monitor.progress(0.6, Message::new("diagnosis_remainder"));
-    let kinds = discrepancy::kinds(data, &whitener, noise.sigma);
-    let mut weighed = ranking.weigh(&linear, &kinds, monitor)?;
-    let total = log_sum_exp(&weighed.iter().map(|set| set.0).collect::<Vec<_>>());
-    weighed.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.1.members.cmp(&b.1.members)));
-    let sets: Vec<SetWeight> = weighed
-        .into_iter()
-        .map(|(log_weight, set)| SetWeight { posterior: (log_weight - total).exp(), ..set })
-        .collect();
-    let sum =
-        |choose: &dyn Fn(&SetWeight) -> bool| sets.iter().filter(|set| choose(set)).map(|set| set.posterior).sum();
-    let none = sum(&|set| set.members.is_empty() && !set.with_remainder);
-    let unnamed = sum(&|set| set.with_remainder);
-    let inclusion = (0..subject.hypotheses().len()).map(|h| sum(&|set| set.members.contains(&h))).collect();
-    let invisible = (0..subject.hypotheses().len()).filter(|h| !linear.visible.contains(h)).collect();
-    let verdict = verdict(&sets, none, unnamed);
-    Ok(Diagnosed { verdict, sets, none, unnamed, noise, outliers: found, inclusion, invisible })
+impl<'a> Weighing<'a> {
+    /// Weighs with the rows that are kept.
+    pub fn of(
+        foundation: &'a Foundation<'a>,
+        keep: Vec<bool>,
+        effort: Effort,
+        monitor: &dyn Monitor,
+    ) -> Result<Self, Failure> {
+        let Foundation { subject, data, residual, nuisances, signatures, .. } = foundation;
+        let noise = Noise::of(data, residual, &keep);
+        let whitener = Whitener::new(data, &noise, nuisances, &keep);
+        let scale = Scale::of(&noise);
+        let linear = Linear::new(subject.hypotheses(), signatures, &whitener, residual, scale);
+        let candidates = linear.search(effort.most_causes, monitor)?;
+        let refinement = Refinement { subject: *subject, value: &data.value, keep: &keep, whitener: &whitener, scale };
+        let mut ranking = Ranking { candidates, fits: Vec::new() };
+        ranking.refine(&linear, &refinement, effort.leaders, monitor)?;
+        ranking.refine(&linear, &refinement, effort.late_leaders, monitor)?;
+        let kinds = discrepancy::kinds(data, &whitener, noise.sigma);
+        let mut weighed = ranking.weigh(&linear, &kinds, monitor)?;
+        let total = log_sum_exp(&weighed.iter().map(|set| set.0).collect::<Vec<_>>());
+        weighed.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.1.members.cmp(&b.1.members)));
+        let sets: Vec<SetWeight> = weighed
+            .into_iter()
+            .map(|(log_weight, set)| SetWeight { posterior: (log_weight - total).exp(), ..set })
+            .collect();
+        let sum = |choose: &dyn Fn(&SetWeight) -> bool| -> f64 {
+            sets.iter().filter(|set| choose(set)).map(|set| set.posterior).sum()
+        };
+        let none = sum(&|set| set.members.is_empty() && set.remainder.is_none());
+        let unnamed = sum(&|set| set.remainder.is_some());
+        let inclusion = (0..subject.hypotheses().len()).map(|h| sum(&|set| set.members.contains(&h))).collect();
+        let verdict = verdict(&sets, none, unnamed);
+        Ok(Self { foundation, keep, noise, whitener, linear, ranking, kinds, sets, none, unnamed, inclusion, verdict })
+    }
+
+    /// The fit of a set about the model itself, where it was made.
+    pub(super) fn fit(&self, members: &[usize]) -> Option<&Fit> {
+        self.ranking.fit(members)
+    }
+
+    /// Sets without a remainder, heaviest first.
+    pub fn named_sets(&self) -> impl Iterator<Item = &SetWeight> {
+        self.sets.iter().filter(|set| set.remainder.is_none() && !set.members.is_empty())
+    }
 }
 
 /// Candidates, and the fits of those that were refined.
@@ -203,14 +205,14 @@ impl Ranking {
         monitor: &dyn Monitor,
     ) -> Result<Vec<(f64, SetWeight)>, Failure> {
         let mut weighed: Vec<(f64, SetWeight)> =
-            self.candidates.iter().map(|c| (c.log_weight(), self.set(linear, c, false))).collect();
+            self.candidates.iter().map(|c| (c.log_weight(), self.set(linear, c, None))).collect();
         let empty = self.candidates.iter().filter(|c| c.members.is_empty());
         let leading = self.candidates.iter().filter(|c| !c.members.is_empty()).take(WITH_REMAINDER - 1);
         for candidate in empty.chain(leading) {
             checkpoint(monitor)?;
             if let Some(remainder) = self.beside(linear, kinds, candidate) {
                 let log_weight = remainder.log_z + candidate.log_prior + REMAINDER_PRIOR.ln();
-                weighed.push((log_weight, self.set(linear, candidate, true)));
+                weighed.push((log_weight, self.set(linear, candidate, Some(remainder))));
             }
         }
         Ok(weighed)
@@ -227,7 +229,7 @@ impl Ranking {
         discrepancy::beside(kinds, &columns, &residual, &sides, linear.scale, linear.rows)
     }
 
-    fn set(&self, linear: &Linear<'_>, candidate: &Candidate, with_remainder: bool) -> SetWeight {
+    fn set(&self, linear: &Linear<'_>, candidate: &Candidate, remainder: Option<Remainder>) -> SetWeight {
         let fit = self.fit(&candidate.members);
         let settings = fit.map_or_else(|| linear.settings(candidate), |fit| fit.settings.clone());
         let mut standard_deviations: Vec<Vec<f64>> = settings.iter().map(|s| vec![0.0; s.values.len()]).collect();
@@ -239,10 +241,10 @@ impl Ranking {
         SetWeight {
             members: candidate.members.clone(),
             posterior: 0.0,
-            with_remainder,
             settings,
             standard_deviations,
             refined: fit.is_some(),
+            remainder,
         }
     }
 }
@@ -252,10 +254,10 @@ fn verdict(sets: &[SetWeight], none: f64, unnamed: f64) -> Verdict {
         return Verdict::Adequate;
     }
     if unnamed >= UNNAMED {
-        let leading = sets.iter().find(|set| set.with_remainder);
+        let leading = sets.iter().find(|set| set.remainder.is_some());
         return Verdict::Unknown(leading.map_or_else(Vec::new, |set| set.members.clone()));
     }
-    let named: Vec<&SetWeight> = sets.iter().filter(|set| !set.with_remainder && !set.members.is_empty()).collect();
+    let named: Vec<&SetWeight> = sets.iter().filter(|set| set.remainder.is_none() && !set.members.is_empty()).collect();
     let whole: f64 = named.iter().map(|set| set.posterior).sum();
     let mut likely: Vec<&SetWeight> = Vec::new();
     let mut held = 0.0;

@@ -32,18 +32,9 @@ impl White {
         dot(&self.own, &other.own) - dot(&self.allowed, &other.allowed)
     }
 
-    pub(super) fn scaled(&self, by: f64) -> Self {
-        let scale = |column: &[f64]| column.iter().map(|x| x * by).collect();
-        Self { own: scale(&self.own), allowed: scale(&self.allowed) }
-    }
-
     pub(super) fn minus(&self, other: &Self) -> Self {
         let less = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a - b).collect();
         Self { own: less(&self.own, &other.own), allowed: less(&self.allowed, &other.allowed) }
-    }
-
-    pub(super) fn plus(&self, other: &Self) -> Self {
-        self.minus(&other.scaled(-1.0))
     }
 }
 
@@ -81,6 +72,19 @@ impl Whitener {
                 decorrelated(&scaled, self.rho)
             })
             .collect()
+    }
+
+    /// A column trace by trace, in units of the scatter, less what the allowances most probably explain of it.
+    pub(super) fn beyond_allowances(&self, column: &[f64]) -> Vec<Vec<f64>> {
+        let White { mut own, allowed } = self.white(column);
+        if let Some(factor) = &self.factor {
+            let along = factor.l_dirty().tr_solve_lower_triangular(&DVector::from_vec(allowed));
+            for (size, nuisance) in along.iter().flat_map(|v| v.iter()).zip(&self.nuisances) {
+                own.iter_mut().zip(nuisance).for_each(|(r, n)| *r -= size * n);
+            }
+        }
+        let mut rest = own.into_iter();
+        self.traces.iter().map(|rows| rest.by_ref().take(rows.len()).collect()).collect()
     }
 
     pub(super) fn white(&self, column: &[f64]) -> White {
