@@ -5,7 +5,8 @@ use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
 use precut_calc::calculator::{
-    Calculator, Cells, Check, Failure, Figure, ForwardModel, Item, Message, Monitor, Registrar, Unwatched, Violations,
+    Calculator, Cells, Check, Failure, Figure, ForwardModel, Frame, Item, Message, Monitor, Registrar, Unwatched,
+    Violations,
 };
 use serde_json::Value;
 
@@ -112,11 +113,16 @@ fn figure_is_sound(figure: &Figure, labels: &BTreeSet<&'static str>, at: &str) {
     let known = |code: &str| assert!(labels.contains(code), "{at}: undeclared label {code}");
     known(figure.title.code);
     known(figure.x.label);
+    if figure.frame == Frame::Polar {
+        assert_eq!((figure.panels.len(), figure.x.unit), (1, "deg"), "{at}: {}", figure.id);
+    }
     for panel in &figure.panels {
         known(panel.y.label);
+        let maps = panel.items.iter().filter(|item| matches!(item, Item::HeatMap { .. })).count();
+        assert!(maps <= 1, "{at}: {} has a panel of {maps} maps", figure.id);
         for item in &panel.items {
             match item {
-                Item::Line { name, x, y, .. } => {
+                Item::Line { name, x, y, .. } | Item::Bars { name, x, y, .. } => {
                     known(name);
                     assert_eq!(x.len(), y.len(), "{at}: {name}");
                     assert!(y.iter().flatten().chain(x).all(|v| v.is_finite()), "{at}: {name}");
@@ -129,6 +135,12 @@ fn figure_is_sound(figure: &Figure, labels: &BTreeSet<&'static str>, at: &str) {
                 Item::Points { name, x, y, .. } | Item::Outline { name, x, y, .. } => {
                     known(name);
                     assert_eq!(x.len(), y.len(), "{at}: {name}");
+                }
+                Item::HeatMap { value, x, y, values, .. } => {
+                    known(value.label);
+                    assert_eq!(values.len(), x.len() * y.len(), "{at}: {}", value.label);
+                    assert!([x, y].iter().all(|m| m.is_sorted_by(|a, b| a < b)), "{at}: {}", value.label);
+                    assert!(values.iter().flatten().chain(x).chain(y).all(|v| v.is_finite()), "{at}: {}", value.label);
                 }
                 Item::Glyph { x, y, .. } => assert!(x.is_finite() && y.is_finite(), "{at}"),
             }

@@ -1,11 +1,13 @@
 //! The contents of a panel.
 
-use precut_calc::calculator::{Glyph, Item, Panel, Role};
+use precut_calc::calculator::{Glyph, Item, Panel, Role, Spacing};
 
-use super::glyph::{self, Place};
+use super::bars::Stand;
+use super::glyph::{self, Stance};
+use super::map::Key;
 use super::page::{Escaped, Page, Px, put};
-use super::scale::Scale;
-use super::style::{Styles, role_class};
+use super::plane::{Place, Plane};
+use super::style::{Styles, is_hatched, role_class};
 use super::{Wording, thin};
 
 /// A drawing area, px.
@@ -15,45 +17,60 @@ pub(super) struct Frame {
     pub(super) right: f64,
     pub(super) top: f64,
     pub(super) bottom: f64,
-    pub(super) x: Scale,
-    pub(super) y: Scale,
+    pub(super) plane: Plane,
     /// Of its symbols.
     pub(super) glyph_size: f64,
 }
 
-impl Frame {
-    fn point(&self, x: f64, y: f64) -> Option<(f64, f64)> {
-        (x.is_finite() && y.is_finite()).then(|| (self.x.at(x), self.y.at(y)))
-    }
-}
-
-/// Draws everything in a panel, in its order.
-pub(super) fn items(page: &mut Page, panel: &Panel, frame: &Frame, styles: &Styles, wording: &Wording<'_>) {
+/// Draws everything in a panel, in its order; the grid again over a map that hides it.
+pub(super) fn items(
+    page: &mut Page,
+    (panel, key): (&Panel, Option<&Key<'_>>),
+    frame: &Frame,
+    (x, grid): (Spacing, &dyn Fn(&mut Page)),
+    (styles, wording): (&Styles, &Wording<'_>),
+) {
+    let plane = &frame.plane;
+    let mut stand = Stand::of(panel, x);
     for item in &panel.items {
         let code = match item {
             Item::Line { name, .. }
             | Item::Band { name, .. }
             | Item::Points { name, .. }
             | Item::Bars { name, .. }
-            | Item::Outline { name, .. } => name,
-            Item::HeatMap { value, .. } => &value.label,
+            | Item::Outline { name, .. } => *name,
+            Item::HeatMap { value, .. } => value.label,
             Item::Glyph { glyph, .. } => glyph::label(*glyph),
         };
         put!(page, "<g><title>{}</title>", Escaped(&(wording.label)(code)));
+        // Between a curve and the colours under it.
         match item {
-            Item::Line { name, x, y, role } => line(page, frame, x, y, &styles.class(name, *role)),
+            Item::Line { x, y, .. } if key.is_some() => line(page, plane, x, y, "casing"),
+            Item::Points { x, y, role, .. } if key.is_some() => {
+                points(page, plane, x, y, ("casing", role_class(*role).1));
+            }
+            _ => {}
+        }
+        match item {
+            Item::Line { name, x, y, role } => line(page, plane, x, y, &styles.class(name, *role)),
             Item::Band { name, x, lower, upper, role } => {
-                band(page, frame, (x, lower, upper), &styles.class(name, *role), *role);
+                band(page, plane, (x, lower, upper), &styles.class(name, *role), *role);
             }
             Item::Points { name, x, y, role } => {
-                points(page, frame, x, y, (&styles.class(name, *role), role_class(*role).1));
+                points(page, plane, x, y, (&styles.class(name, *role), role_class(*role).1));
             }
-            Item::Bars { .. } | Item::HeatMap { .. } => {}
-            Item::Outline { name, x, y, role } => outline(page, frame, x, y, &styles.class(name, *role)),
+            Item::Bars { name, x, y, role } => stand.draw(page, plane, (x, y), &styles.class(name, *role)),
+            Item::HeatMap { .. } => {
+                if let Some(key) = key {
+                    key.draw(page, plane, (x, panel.y.scale));
+                    grid(page);
+                }
+            }
+            Item::Outline { name, x, y, role } => outline(page, plane, x, y, &styles.class(name, *role)),
             Item::Glyph { glyph, x, y } => {
-                if let Some((px, py)) = frame.point(*x, *y) {
+                if let Some(place) = plane.place(*x, *y) {
                     put!(page, "<g class=\"glyph\">");
-                    glyph::draw(page, *glyph, place(panel, frame, *glyph, (*x, *y), (px, py)));
+                    glyph::draw(page, *glyph, stance(panel, frame, *glyph, (*x, *y), place));
                     put!(page, "</g>");
                 }
             }
@@ -63,7 +80,7 @@ pub(super) fn items(page: &mut Page, panel: &Panel, frame: &Frame, styles: &Styl
 }
 
 /// Runs of points between gaps.
-fn runs(points: impl Iterator<Item = Option<(f64, f64)>>) -> Vec<Vec<(f64, f64)>> {
+fn runs(points: impl IntoIterator<Item = Option<Place>>) -> Vec<Vec<Place>> {
     let mut runs = vec![Vec::new()];
     for point in points {
         match (point, runs.last_mut()) {
@@ -76,50 +93,46 @@ fn runs(points: impl Iterator<Item = Option<(f64, f64)>>) -> Vec<Vec<(f64, f64)>
     runs
 }
 
-fn path(page: &mut Page, points: &[(f64, f64)]) {
-    for (index, (x, y)) in points.iter().enumerate() {
-        put!(page, "{}{} {}", if index == 0 { 'M' } else { 'L' }, Px(*x), Px(*y));
-    }
-}
-
-fn line(page: &mut Page, frame: &Frame, x: &[f64], y: &[Option<f64>], class: &str) {
-    let runs = runs(x.iter().zip(y).map(|(x, y)| y.and_then(|y| frame.point(*x, y))));
-    let (single, long): (Vec<_>, Vec<_>) = runs.into_iter().partition(|run| run.len() == 1);
+fn line(page: &mut Page, plane: &Plane, x: &[f64], y: &[Option<f64>], class: &str) {
+    let mut places: Vec<_> = x.iter().zip(y).map(|(x, y)| y.and_then(|y| plane.place(*x, y))).collect();
+    plane.close(&mut places);
+    let (single, long): (Vec<_>, Vec<_>) = runs(places).into_iter().partition(|run| run.len() == 1);
     if !long.is_empty() {
         put!(page, "<path class=\"line {class}\" d=\"");
         for run in long {
-            path(page, &thin::line(run));
+            plane.draw(page, &thin::line(run));
         }
         put!(page, "\"/>");
     }
-    for (x, y) in single.into_iter().flatten() {
+    for (x, y) in single.into_iter().flatten().map(|place| plane.bent(place)) {
         put!(page, "<circle class=\"dot {class}\" cx=\"{}\" cy=\"{}\" r=\"2\"/>", Px(x), Px(y));
     }
 }
 
-fn band(page: &mut Page, frame: &Frame, (x, lower, upper): (&[f64], &[f64], &[f64]), class: &str, role: Role) {
+fn band(page: &mut Page, plane: &Plane, (x, lower, upper): (&[f64], &[f64], &[f64]), class: &str, role: Role) {
     let pairs = x.iter().zip(lower.iter().zip(upper));
-    let both = |(x, (low, high)): (&f64, (&f64, &f64))| frame.point(*x, *low).zip(frame.point(*x, *high));
+    let both = |(x, (low, high)): (&f64, (&f64, &f64))| plane.place(*x, *low).zip(plane.place(*x, *high));
     // Where one edge has a gap, so has the other.
-    let (lower, upper): (Vec<_>, Vec<_>) = pairs.map(|pair| both(pair).unzip()).unzip();
-    let (lower, upper) = (runs(lower.into_iter()), runs(upper.into_iter()));
-    for (lower, upper) in lower.into_iter().zip(upper) {
+    let (mut lower, mut upper): (Vec<_>, Vec<_>) = pairs.map(|pair| both(pair).unzip()).unzip();
+    plane.close(&mut lower);
+    plane.close(&mut upper);
+    for (lower, upper) in runs(lower).into_iter().zip(runs(upper)) {
         let (mut lower, upper) = (thin::line(lower), thin::line(upper));
         if role == Role::Tolerance {
             put!(page, "<path class=\"edge {class}\" d=\"");
-            path(page, &upper);
-            path(page, &lower);
+            plane.draw(page, &upper);
+            plane.draw(page, &lower);
             put!(page, "\"/>");
         }
         lower.reverse();
-        put!(page, "<path class=\"band {class}\" d=\"");
-        path(page, &[upper, lower].concat());
-        put!(page, "z\"/>");
+        let area = [upper, lower].concat();
+        filled(page, plane, &area, &format!("band {class}"), role);
     }
 }
 
-fn points(page: &mut Page, frame: &Frame, x: &[f64], y: &[f64], (class, marker): (&str, &str)) {
-    let points: Vec<_> = x.iter().zip(y).filter_map(|(x, y)| frame.point(*x, *y)).collect();
+fn points(page: &mut Page, plane: &Plane, x: &[f64], y: &[f64], (class, marker): (&str, &str)) {
+    let places = x.iter().zip(y).filter_map(|(x, y)| plane.place(*x, *y)).map(|place| plane.bent(place));
+    let points: Vec<_> = places.collect();
     if points.is_empty() {
         return;
     }
@@ -130,11 +143,21 @@ fn points(page: &mut Page, frame: &Frame, x: &[f64], y: &[f64], (class, marker):
     put!(page, "\"/>");
 }
 
-fn outline(page: &mut Page, frame: &Frame, x: &[f64], y: &[f64], class: &str) {
-    let corners: Vec<_> = x.iter().zip(y).filter_map(|(x, y)| frame.point(*x, *y)).collect();
+fn outline(page: &mut Page, plane: &Plane, x: &[f64], y: &[f64], class: &str) {
+    let corners: Vec<_> = x.iter().zip(y).filter_map(|(x, y)| plane.place(*x, *y)).collect();
     if corners.len() > 1 {
         put!(page, "<path class=\"outline {class}\" d=\"");
-        path(page, &thin::line(corners));
+        plane.draw(page, &thin::line(corners));
+        put!(page, "z\"/>");
+    }
+}
+
+/// A closed area, and its hatching.
+fn filled(page: &mut Page, plane: &Plane, area: &[Place], class: &str, role: Role) {
+    let hatch = is_hatched(role).then_some("hatch");
+    for class in std::iter::once(class).chain(hatch) {
+        put!(page, "<path class=\"{class}\" d=\"");
+        plane.draw(page, area);
         put!(page, "z\"/>");
     }
 }
@@ -160,26 +183,41 @@ pub(super) fn stands_above(panel: &Panel, y: f64) -> bool {
 }
 
 /// Half of the part's height where it is nearest to `x`, px.
-fn reach(panel: &Panel, frame: &Frame, x: f64, y: f64) -> Option<f64> {
+fn reach(panel: &Panel, plane: &Plane, x: f64, y: f64) -> Option<f64> {
     let corners = panel.items.iter().filter_map(|item| match item {
         Item::Outline { x, y, role: Role::Part, .. } => Some(x.iter().copied().zip(y.iter().copied())),
         _ => None,
     });
     let corners: Vec<(f64, f64)> = corners.flatten().filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
     let nearest = corners.iter().map(|corner| (corner.0 - x).abs()).min_by(f64::total_cmp)?;
-    let axis = frame.y.at(y);
+    let axis = plane.along_y().at(y)?;
     corners
         .iter()
         .filter(|corner| (corner.0 - x).abs() <= nearest)
-        .map(|corner| (frame.y.at(corner.1) - axis).abs())
+        .filter_map(|corner| Some((plane.along_y().at(corner.1)? - axis).abs()))
         .max_by(f64::total_cmp)
 }
 
-fn place(panel: &Panel, frame: &Frame, glyph: Glyph, (x, y): (f64, f64), (px, py): (f64, f64)) -> Place {
-    let mirrored = match glyph {
-        Glyph::Chuck => px > f64::midpoint(frame.left, frame.right),
-        _ => !stands_above(panel, y),
-    };
-    let reach = reach(panel, frame, x, y).unwrap_or(12.0);
-    Place { x: px, y: py, reach, mirrored, size: frame.glyph_size }
+fn stance(panel: &Panel, frame: &Frame, glyph: Glyph, (x, y): (f64, f64), place: Place) -> Stance {
+    let (px, py) = frame.plane.bent(place);
+    let upright = Stance { x: px, y: py, reach: 12.0, mirrored: false, size: frame.glyph_size, turn: 0.0 };
+    match frame.plane {
+        // Its tip inward.
+        Plane::Round { .. } => {
+            let angle = x.rem_euclid(360.0);
+            let turn = match glyph {
+                Glyph::CentreLeft | Glyph::Chuck => 180.0 - angle,
+                Glyph::CentreRight => -angle,
+                Glyph::SteadyRest | Glyph::FollowRest | Glyph::Tool => 90.0 - angle,
+            };
+            Stance { turn, ..upright }
+        }
+        Plane::Flat { .. } => {
+            let mirrored = match glyph {
+                Glyph::Chuck => px > f64::midpoint(frame.left, frame.right),
+                _ => !stands_above(panel, y),
+            };
+            Stance { mirrored, reach: reach(panel, &frame.plane, x, y).unwrap_or(upright.reach), ..upright }
+        }
+    }
 }

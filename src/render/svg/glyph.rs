@@ -34,7 +34,7 @@ pub(super) fn room_above(glyph: Glyph) -> (f64, bool) {
 
 /// Where and how a symbol is drawn.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Place {
+pub(super) struct Stance {
     /// Its tip, px.
     pub(super) x: f64,
     pub(super) y: f64,
@@ -44,21 +44,27 @@ pub(super) struct Place {
     pub(super) mirrored: bool,
     /// 1 for full size.
     pub(super) size: f64,
+    /// Clockwise, degrees.
+    pub(super) turn: f64,
 }
 
 /// Draws a symbol, its tip at the place.
-pub(super) fn draw(page: &mut Page, glyph: Glyph, place: Place) {
-    let Place { x, y, size, mirrored, .. } = place;
+pub(super) fn draw(page: &mut Page, glyph: Glyph, stance: Stance) {
+    let Stance { x, y, size, mirrored, .. } = stance;
     let flip = |condition: bool| if condition { -size } else { size };
     let across = flip(glyph == Glyph::CentreRight || (glyph == Glyph::Chuck && mirrored));
     let up = flip(mirrored && matches!(glyph, Glyph::SteadyRest | Glyph::FollowRest | Glyph::Tool));
-    put!(page, "<g transform=\"translate({} {})scale({} {})\">", Px(x), Px(y), Px(across), Px(up));
+    put!(page, "<g transform=\"translate({} {})", Px(x), Px(y));
+    if stance.turn.abs() > 0.0 {
+        put!(page, "rotate({})", Px(stance.turn));
+    }
+    put!(page, "scale({} {})\">", Px(across), Px(up));
     match glyph {
         // 60 degrees, with its shank.
         Glyph::CentreLeft | Glyph::CentreRight => {
             put!(page, "<path d=\"M0 0L-15.6-9H-30V9H-15.6z\"/><path d=\"M-15.6-9V9\"/>");
         }
-        Glyph::Chuck => chuck(page, place.reach / size.max(0.1)),
+        Glyph::Chuck => chuck(page, stance.reach / size.max(0.1)),
         // A roller in a bracket that stands on the ground.
         Glyph::SteadyRest => {
             put!(

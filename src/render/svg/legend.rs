@@ -3,9 +3,10 @@
 use precut_calc::calculator::{Glyph, Item, Panel, Role};
 
 use super::Wording;
-use super::glyph::{self, Place};
+use super::glyph::{self, Stance};
+use super::map::Key;
 use super::page::{Escaped, Page, Px, put, width};
-use super::style::{Styles, identity, role_class};
+use super::style::{Styles, identity, is_hatched, role_class};
 
 /// Height of a line, px.
 pub(super) const LINE: f64 = 20.0;
@@ -26,6 +27,7 @@ struct Entry<'a> {
 enum Sample<'a> {
     Item(&'a Item),
     Glyph(Glyph),
+    Map(&'a Key<'a>),
 }
 
 /// The name of a panel's axis and the entries after it.
@@ -38,12 +40,20 @@ pub(super) struct Legend<'a> {
 
 impl<'a> Legend<'a> {
     /// Entries in the order of drawing, each name once, in lines of `room` px.
-    pub(super) fn new(name: String, panel: &'a Panel, wording: &Wording<'_>, room: f64) -> Self {
+    /// A map comes with its colours' meaning in words.
+    pub(super) fn new(
+        name: String,
+        panel: &'a Panel,
+        map: Option<(&'a Key<'a>, String)>,
+        wording: &Wording<'_>,
+        room: f64,
+    ) -> Self {
+        let map = map.map(|(key, text)| (Sample::Map(key), text));
+        let named = distinct(panel).into_iter().map(|(sample, code)| (sample, (wording.label)(code)));
         let mut x = width(&name, SIZE * 1.05) + 1.5 * GAP;
         let mut line = 0;
         let mut entries = Vec::new();
-        for (sample, code) in distinct(panel) {
-            let text = (wording.label)(code);
+        for (sample, text) in map.into_iter().chain(named) {
             let wide = SAMPLE + 6.0 + width(&text, SIZE);
             if x + wide > room && x > 0.0 {
                 (x, line) = (0.0, line + 1);
@@ -99,6 +109,9 @@ fn sample(page: &mut Page, sample: &Sample<'_>, x: f64, y: f64, styles: &Styles)
             let class = class(name, *role);
             let (left, top) = (Px(x), Px(y - 5.0));
             put!(page, "<rect class=\"band {class}\" x=\"{left}\" y=\"{top}\" width=\"{SAMPLE}\" height=\"10\"/>");
+            if is_hatched(*role) {
+                put!(page, "<rect class=\"hatch\" x=\"{left}\" y=\"{top}\" width=\"{SAMPLE}\" height=\"10\"/>");
+            }
             if *role == Role::Tolerance {
                 put!(page, "<path class=\"edge {class}\" d=\"M{left} {top}h{SAMPLE}m-{SAMPLE} 10h{SAMPLE}\"/>");
             }
@@ -107,15 +120,22 @@ fn sample(page: &mut Page, sample: &Sample<'_>, x: f64, y: f64, styles: &Styles)
             let (class, marker) = (class(name, *role), role_class(*role).1);
             put!(page, "<path class=\"points {class}\" d=\"M{} {}{marker}\"/>", Px(x + SAMPLE / 2.0), Px(y));
         }
+        // The map has an entry of its own.
         Sample::Item(Item::HeatMap { .. }) => {}
-        Sample::Item(Item::Bars { name, role, .. } | Item::Outline { name, role, .. }) => {
+        Sample::Map(key) => key.sample(page, (x, y - 5.0), (SAMPLE, 10.0)),
+        Sample::Item(Item::Bars { name, role, .. }) => {
             let class = class(name, *role);
+            let middle = Px(x + SAMPLE / 2.0 - 5.0);
             put!(
                 page,
-                "<rect class=\"outline {class}\" x=\"{}\" y=\"{}\" width=\"{SAMPLE}\" height=\"10\"/>",
-                Px(x),
+                "<rect class=\"bars {class}\" x=\"{middle}\" y=\"{}\" width=\"10\" height=\"10\"/>",
                 Px(y - 5.0)
             );
+        }
+        Sample::Item(Item::Outline { name, role, .. }) => {
+            let class = class(name, *role);
+            let (x, y) = (Px(x), Px(y - 5.0));
+            put!(page, "<rect class=\"outline {class}\" x=\"{x}\" y=\"{y}\" width=\"{SAMPLE}\" height=\"10\"/>");
         }
         Sample::Item(Item::Glyph { glyph, .. }) | Sample::Glyph(glyph) => {
             let (dx, dy) = match glyph {
@@ -124,7 +144,11 @@ fn sample(page: &mut Page, sample: &Sample<'_>, x: f64, y: f64, styles: &Styles)
                 Glyph::SteadyRest | Glyph::FollowRest | Glyph::Tool => (15.0, 8.0),
             };
             put!(page, "<g class=\"glyph\">");
-            glyph::draw(page, *glyph, Place { x: x + dx, y: y + dy, reach: 3.0, mirrored: false, size: 0.5 });
+            glyph::draw(
+                page,
+                *glyph,
+                Stance { x: x + dx, y: y + dy, reach: 3.0, mirrored: false, size: 0.5, turn: 0.0 },
+            );
             put!(page, "</g>");
         }
     }

@@ -17,6 +17,7 @@ pub(super) const CSS: &str = "\
 .precut-figure .name{font-weight:600}\
 .precut-figure .number{fill:#4d5561}\
 .precut-figure .grid{stroke:#e4e7eb;fill:none}\
+.precut-figure .fine{stroke-opacity:.55}\
 .precut-figure .zero,.precut-figure .frame{stroke:#9aa2ad;fill:none}\
 .precut-figure .line{fill:none;stroke:currentColor;stroke-width:1.9;stroke-linejoin:round}\
 .precut-figure .dot{fill:currentColor;stroke:none}\
@@ -39,7 +40,19 @@ pub(super) const CSS: &str = "\
 .precut-figure .tolerance.line{stroke-dasharray:10 3 2 3 2 3}\
 .precut-figure .uncertainty{color:#e69f00}\
 .precut-figure .uncertainty.line{stroke-dasharray:4 2 1 2}\
+.precut-figure .limit{color:#b00020}\
+.precut-figure .limit.line{stroke-width:2.8}\
+.precut-figure .stable{color:#1f6fb4}\
+.precut-figure .unstable{color:#c24a00;stroke-dasharray:4 3}\
 .precut-figure .plain{color:#1a1d21}\
+.precut-figure .n0{color:#0072b2}\
+.precut-figure .n1{color:#c24a00;stroke-dasharray:8 4}\
+.precut-figure .n2{color:#007a59;stroke-dasharray:2.5 3}\
+.precut-figure .n3{color:#a8487f;stroke-dasharray:12 3 2 3}\
+.precut-figure .n4{color:#8a5c00;stroke-dasharray:16 4}\
+.precut-figure .n5{color:#1a7f9c;stroke-dasharray:5 2 1 2 1 2}\
+.precut-figure .n6{color:#5c6470;stroke-dasharray:5 2}\
+.precut-figure .n7{color:#5b4bb0;stroke-dasharray:10 3 2 3 2 3}\
 .precut-figure .v1{stroke-dasharray:5 2}\
 .precut-figure .v2{stroke-dasharray:2 2}\
 .precut-figure .v3{stroke-dasharray:10 3 2 3}\
@@ -50,7 +63,15 @@ pub(super) const CSS: &str = "\
 .precut-figure .plain.v3{color:#007a59}\
 .precut-figure .plain.v4{color:#a8487f}\
 .precut-figure .plain.v5{color:#a06a00}\
-.precut-figure .points,.precut-figure .dot{stroke-dasharray:none}\
+.precut-figure .points,.precut-figure .dot,.precut-figure .bars{stroke-dasharray:none}\
+.precut-figure .bars{fill:currentColor;fill-opacity:.85;stroke:currentColor;stroke-width:.8}\
+.precut-figure .bars.nominal,.precut-figure .bars.before,.precut-figure .bars.comparison,.precut-figure .bars.n1,\
+.precut-figure .bars.n3,.precut-figure .bars.n5,.precut-figure .bars.n7{fill-opacity:.2}\
+.precut-figure .casing{stroke:#fff;stroke-width:4.6;stroke-opacity:.7}\
+.precut-figure .hatch{fill:url(#precut-hatch)}\
+.precut-figure .over{stroke:#1a1d21;stroke-opacity:.14}\
+.precut-figure .halo{stroke:#fff;stroke-width:3;stroke-linejoin:round;paint-order:stroke}\
+#precut-hatch path{stroke:#1a1d21;stroke-width:.7;stroke-opacity:.45}\
 @media screen and (prefers-color-scheme:dark){\
 .precut-figure .paper{fill:#15181c}\
 .precut-figure text{fill:#e8eaed}\
@@ -69,7 +90,21 @@ pub(super) const CSS: &str = "\
 .precut-figure .stock{color:#dba63a}\
 .precut-figure .tolerance{color:#62bdf5}\
 .precut-figure .uncertainty{color:#f0b93a}\
+.precut-figure .limit{color:#ff6b78}\
+.precut-figure .stable{color:#62bdf5}\
+.precut-figure .unstable{color:#ff8f45}\
 .precut-figure .plain{color:#e8eaed}\
+.precut-figure .n0{color:#62bdf5}\
+.precut-figure .n1{color:#ff8f45}\
+.precut-figure .n2{color:#2fc79a}\
+.precut-figure .n3{color:#e59ac4}\
+.precut-figure .n4{color:#dba63a}\
+.precut-figure .n5{color:#6fd3ec}\
+.precut-figure .n6{color:#aab2bd}\
+.precut-figure .n7{color:#ab9ff2}\
+.precut-figure .over{stroke:#e8eaed}\
+.precut-figure .halo,.precut-figure .casing{stroke:#15181c}\
+#precut-hatch path{stroke:#fff}\
 .precut-figure .plain.v1{color:#62bdf5}\
 .precut-figure .plain.v2{color:#ff8f45}\
 .precut-figure .plain.v3{color:#2fc79a}\
@@ -77,15 +112,30 @@ pub(super) const CSS: &str = "\
 .precut-figure .plain.v5{color:#dba63a}\
 }";
 
+/// A thin line across everything that is so filled.
+pub(super) const HATCH: &str = "<defs><pattern id=\"precut-hatch\" width=\"7\" height=\"7\" \
+patternUnits=\"userSpaceOnUse\" patternTransform=\"rotate(45)\"><path d=\"M0 0V7\"/></pattern></defs>\n";
+
 /// The class of a role, and its marker as a path round the origin.
 pub(super) fn role_class(role: Role) -> (&'static str, &'static str) {
     const CIRCLE: &str = "m-3 0a3 3 0 1 0 6 0a3 3 0 1 0-6 0";
     const SQUARE: &str = "m-3-3h6v6h-6z";
     const DIAMOND: &str = "m0-4l4 4l-4 4l-4-4z";
     const TRIANGLE: &str = "m0-4l3.8 6.5h-7.6z";
+    const DOWNWARD: &str = "m0 4l3.8-6.5h-7.6z";
     const PLUS: &str = "m-4 0h8m-4-4v8";
     const CROSS: &str = "m-3-3l6 6m0-6l-6 6";
     const BAR: &str = "m0-4v8";
+    const SERIES: [(&str, &str); 8] = [
+        ("n0", CIRCLE),
+        ("n1", SQUARE),
+        ("n2", TRIANGLE),
+        ("n3", DIAMOND),
+        ("n4", CROSS),
+        ("n5", PLUS),
+        ("n6", BAR),
+        ("n7", DOWNWARD),
+    ];
     match role {
         Role::Nominal => ("nominal", PLUS),
         Role::Before => ("before", CROSS),
@@ -99,7 +149,8 @@ pub(super) fn role_class(role: Role) -> (&'static str, &'static str) {
         Role::Limit => ("limit", BAR),
         Role::Stable => ("stable", CIRCLE),
         Role::Unstable => ("unstable", CROSS),
-        Role::Series(_) | Role::Plain => ("plain", CIRCLE),
+        Role::Series(n) => SERIES[usize::from(n) % SERIES.len()],
+        Role::Plain => ("plain", CIRCLE),
     }
 }
 
@@ -113,6 +164,20 @@ pub(super) fn identity(item: &Item) -> Option<(&'static str, Role)> {
         | Item::Outline { name, role, .. } => Some((name, role)),
         Item::HeatMap { .. } | Item::Glyph { .. } => None,
     }
+}
+
+/// Whether an area of this role is hatched, to be told from one of the other kind without colour.
+pub(super) fn is_hatched(role: Role) -> bool {
+    matches!(role, Role::Unstable | Role::Limit)
+}
+
+/// Whether anything in a figure is hatched.
+pub(super) fn has_hatching(figure: &Figure) -> bool {
+    figure.panels.iter().flat_map(|panel| &panel.items).any(|item| match item {
+        Item::HeatMap { diverging, .. } => *diverging,
+        Item::Band { role, .. } => is_hatched(*role),
+        _ => false,
+    })
 }
 
 /// Gives every name of a figure its classes: equal names look equal in all panels, different names

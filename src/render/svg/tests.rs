@@ -1,10 +1,10 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use super::*;
-use precut_calc::calculator::{Frame as FigureFrame, Glyph, Role};
+use precut_calc::calculator::{Glyph, Role, Spacing};
 use proptest::prelude::*;
 
-fn words<'a>() -> Wording<'a> {
+pub(super) fn words<'a>() -> Wording<'a> {
     Wording {
         message: &|message| message.code.replace('_', " "),
         label: &|code| code.trim_start_matches("glyph_").replace('_', " "),
@@ -40,7 +40,7 @@ pub(super) fn shaft(stations: usize) -> Figure {
     Figure {
         id: "profile",
         title: Message::new("diameter_along_the_shaft_before_and_after_compensation"),
-        frame: FigureFrame::Stacked,
+        frame: Frame::Stacked,
         x: axis("position_from_the_headstock", "mm"),
         panels: vec![
             Panel {
@@ -129,7 +129,7 @@ fn plain(text: &str) -> Result<(), String> {
     if stray || control { Err(format!("text {text:?}")) } else { Ok(()) }
 }
 
-fn assert_sound(text: &str) {
+pub(super) fn assert_sound(text: &str) {
     if let Err(fault) = well_formed(text) {
         panic!("{fault}");
     }
@@ -143,7 +143,7 @@ fn assert_sound(text: &str) {
 }
 
 /// With `PRECUT_PICTURES=folder`, the pictures are left there.
-fn draw_to_look_at(name: &str, text: &str) {
+pub(super) fn draw_to_look_at(name: &str, text: &str) {
     if let Ok(folder) = std::env::var("PRECUT_PICTURES") {
         std::fs::write(format!("{folder}/{name}.svg"), text).unwrap();
     }
@@ -233,7 +233,7 @@ fn an_empty_figure_is_a_figure() {
 fn one_item(item: Item) -> Figure {
     let axis = Axis::linear("x", "1");
     let panels = vec![Panel { y: axis, height: 1.0, items: vec![item] }];
-    Figure { id: "one", title: Message::new("one"), frame: FigureFrame::Stacked, x: axis, panels }
+    Figure { id: "one", title: Message::new("one"), frame: Frame::Stacked, x: axis, panels }
 }
 
 fn number() -> impl Strategy<Value = f64> {
@@ -255,6 +255,11 @@ fn role() -> impl Strategy<Value = Role> {
         Role::Stock,
         Role::Tolerance,
         Role::Uncertainty,
+        Role::Limit,
+        Role::Stable,
+        Role::Unstable,
+        Role::Series(2),
+        Role::Series(255),
         Role::Plain,
     ])
 }
@@ -280,19 +285,34 @@ fn item() -> impl Strategy<Value = Item> {
             role
         }),
         (name.clone(), numbers(), numbers(), role()).prop_map(|(name, x, y, role)| Item::Points { name, x, y, role }),
-        (name, numbers(), numbers(), role()).prop_map(|(name, x, y, role)| Item::Outline { name, x, y, role }),
+        (name.clone(), numbers(), numbers(), role()).prop_map(|(name, x, y, role)| Item::Outline { name, x, y, role }),
+        (name, numbers(), proptest::collection::vec(proptest::option::of(number()), 0..12), role())
+            .prop_map(|(name, x, y, role)| Item::Bars { name, x, y, role }),
+        (axis(), numbers(), numbers(), proptest::collection::vec(proptest::option::of(number()), 0..60), any::<bool>())
+            .prop_map(|(value, x, y, values, diverging)| Item::HeatMap { value, x, y, values, diverging }),
         (glyph, number(), number()).prop_map(|(glyph, x, y)| Item::Glyph { glyph, x, y }),
     ]
 }
 
+fn axis() -> impl Strategy<Value = Axis> {
+    let scale = proptest::sample::select(vec![Spacing::Linear, Spacing::Logarithmic]);
+    scale.prop_map(|scale| Axis { label: "label <&>", unit: "um/N", scale })
+}
+
 proptest! {
     #[test]
-    fn any_figure_is_sound(panels in proptest::collection::vec((number(), proptest::collection::vec(item(), 0..6)), 0..4)) {
-        let axis = Axis::linear("label <&>", "um/N");
-        let panels = panels.into_iter().map(|(height, items)| Panel { y: axis, height, items }).collect();
-        let figure = Figure { id: "any", title: Message::new("any"), frame: FigureFrame::Stacked, x: axis, panels };
+    fn any_figure_is_sound(
+        x in axis(),
+        frame in proptest::sample::select(vec![Frame::Stacked, Frame::Polar]),
+        panels in proptest::collection::vec((axis(), number(), proptest::collection::vec(item(), 0..6)), 0..4),
+    ) {
+        let panels: Vec<_> = panels.into_iter().map(|(y, height, items)| Panel { y, height, items }).collect();
+        // Curves that jump round a chart at random are drawn in arcs.
+        let bound = if frame == Frame::Polar { 1_000_000 } else { 100_000 };
+        let figure = Figure { id: "any", title: Message::new("any"), frame, x, panels };
         let text = svg(&figure, &words());
         assert_sound(&text);
-        prop_assert!(text.len() < 100_000);
+        prop_assert!(text.len() < bound, "{} bytes", text.len());
+        prop_assert_eq!(text, svg(&figure, &words()));
     }
 }

@@ -40,6 +40,24 @@ pub(super) fn markers(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     points.into_iter().filter(|(x, y)| taken.insert((cell(*x), cell(*y)))).collect()
 }
 
+/// Bars, thinned where there are many: of those in one pixel column the one that reaches farthest to each side.
+pub(super) fn bars(bars: Vec<Bar>) -> Vec<Bar> {
+    if bars.len() <= MANY {
+        return bars;
+    }
+    let top = |bar: &&Bar| bar.1.1;
+    let mut kept = Vec::new();
+    for column in bars.chunk_by(|a, b| same_cell(a.0.0, b.0.0, 1.0)) {
+        let lowest = column.iter().min_by(|a, b| top(a).total_cmp(&top(b)));
+        let highest = column.iter().max_by(|a, b| top(a).total_cmp(&top(b)));
+        kept.extend(lowest.into_iter().chain(highest));
+    }
+    kept
+}
+
+/// Its ends across, and its foot and top.
+type Bar = ((f64, f64), (f64, f64));
+
 #[allow(clippy::float_cmp)] // whole numbers
 fn same_cell(a: f64, b: f64, size: f64) -> bool {
     (a / size).floor() == (b / size).floor()

@@ -25,7 +25,8 @@ pub enum Frame {
     /// Panels under each other, the abscissa to the right.
     Stacked,
     /// Roundness chart: the abscissa is an angle in degrees, counter-clockwise from the right; the
-    /// ordinate a deviation, drawn magnified outward from a base circle. One panel.
+    /// ordinate a deviation, drawn magnified outward from a base circle. A curve that goes once round
+    /// closes; two points 360 degrees apart are a circle. One panel.
     Polar,
 }
 
@@ -112,7 +113,7 @@ pub enum Item {
         /// What they stand for.
         role: Role,
     },
-    /// A bar from zero to each ordinate.
+    /// A bar from zero to each ordinate; those of several names over one abscissa stand side by side.
     Bars {
         /// Code of the entry in the legend.
         name: &'static str,
@@ -133,7 +134,8 @@ pub enum Item {
         y: Vec<f64>,
         /// Row by row; `None` is left blank.
         values: Vec<Option<f64>>,
-        /// Whether the colours part at zero (growth and decay) or run from low to high.
+        /// Whether the colours part at zero (growth and decay; at one, if `value` is logarithmic) or run
+        /// from low to high.
         diverging: bool,
     },
     /// A closed, filled outline (the section of a part), in the units of the axes.
