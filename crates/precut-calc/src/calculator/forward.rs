@@ -1,6 +1,6 @@
 //! What a diagnosis needs of a calculator: the model as a function of its effects.
 
-use super::{Cost, Design, Failure, Finding, Hypotheses, Hypothesis, Monitor};
+use super::{Cost, Failure, Finding, Monitor};
 use crate::effects::{Cause, Parameter};
 use serde::{Serialize, de::DeserializeOwned};
 use utoipa::ToSchema;
@@ -39,16 +39,6 @@ pub trait ForwardModel {
 
     /// The effect of a cause with its parameters set to `values`, in the order of [`Cause::parameters`].
     fn effect(cause: &Cause, values: &[f64]) -> Option<Self::Effect>;
-
-    /// The causes that these rows can speak about, in the coordinates in which they are fitted, with bounds
-    /// and references as the job has them.
-    fn hypotheses(prepared: &Self::Prepared) -> Hypotheses;
-
-    /// The effects that a hypothesis stands for at these values of its variables; `None` outside their ranges.
-    fn effects(prepared: &Self::Prepared, hypothesis: &Hypothesis, values: &[f64]) -> Option<Vec<Self::Effect>>;
-
-    /// How the rows hang together.
-    fn design(prepared: &Self::Prepared) -> Design;
 
     /// d predict / d parameter, one column per entry of `of`; `of` names an effect of `effects` and one of its parameters.
     fn jacobian(

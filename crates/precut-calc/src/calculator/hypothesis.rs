@@ -31,6 +31,8 @@ pub enum Inapplicability {
     NothingToActOn,
     /// The job holds it already.
     InJob,
+    /// The user asked for other causes.
+    NotAskedFor,
     /// It scatters, but moves no mean: it is part of the noise.
     ScatterOnly,
 }

@@ -5,6 +5,7 @@
 //! with named numbers ([`Message`], [`Finding`]), never in sentences: the service words them.
 
 mod design;
+mod diagnosable;
 mod figure;
 mod finding;
 mod forward;
@@ -14,6 +15,7 @@ mod program;
 mod table;
 
 pub use design::{Design, Grouping, Smooth};
+pub use diagnosable::{Diagnosable, Measurement};
 pub use figure::{Axis, Figure, Frame, Glyph, Item, Panel, Role, Spacing};
 pub use finding::{Finding, Message, Value, Values, Violations};
 pub use forward::{Column as JacobianColumn, ForwardModel, Missing, Prediction, PrepareError, Quantity, Rows};

@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::calculator::{
-    Cost, Design, Failure, Finding, ForwardModel, Hypotheses, Hypothesis, JacobianColumn, Missing, Monitor, Prediction,
-    PrepareError, Quantity, Rows, checkpoint,
+    Cost, Design, Diagnosable, Example, Failure, Finding, ForwardModel, Hypotheses, Hypothesis, JacobianColumn,
+    Missing, Monitor, Prediction, PrepareError, Quantity, Rows, checkpoint,
 };
 use crate::effects::{Cause, DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect};
 use crate::num::beam::Profile;
@@ -16,6 +16,7 @@ use super::equilibrium::Engagement;
 use super::grid::{Grid, interpolate};
 use super::hypotheses::{Experiment, chuck_scale_n_mm_per_rad, design};
 use super::input::{FeedDirection, Job, Stations};
+use super::measurement::DeflectionMeasurement;
 use super::model::{Ingredients, Line, Radii, rest_shapes, wanted};
 use super::regime::{Regime, passages, section_of_pass};
 use super::structure::{Structure, Variant};
@@ -240,29 +241,6 @@ impl ForwardModel for DeflectionCompensation {
         DeflectionEffect::from_parameters(cause, values)
     }
 
-    fn hypotheses(prepared: &PreparedDeflection) -> Hypotheses {
-        Experiment { job: &prepared.job, runs: &prepared.conditions_of_runs }.hypotheses()
-    }
-
-    fn effects(
-        prepared: &PreparedDeflection,
-        hypothesis: &Hypothesis,
-        values: &[f64],
-    ) -> Option<Vec<DeflectionEffect>> {
-        let effect = match (hypothesis.cause.kind, values) {
-            ("chuck_rotational_stiffness", &[kappa]) => {
-                let ktheta = kappa / (1.0 - kappa) * chuck_scale_n_mm_per_rad(&prepared.job);
-                DeflectionEffect::ChuckRotationalStiffness { ktheta_n_mm_per_rad: ktheta.max(1.0) }
-            }
-            _ => DeflectionEffect::from_parameters(hypothesis.cause, values)?,
-        };
-        Some(vec![effect])
-    }
-
-    fn design(prepared: &PreparedDeflection) -> Design {
-        design(&prepared.job, &prepared.places)
-    }
-
     fn nuisances(
         prepared: &PreparedDeflection,
         allowances: &DeflectionAllowances,
@@ -294,6 +272,39 @@ impl ForwardModel for DeflectionCompensation {
         // About 0.5 us per row, and 5 us per run for a structure that an effect changes.
         let us = 0.5 * prepared.rows as f64 + 5.0 * prepared.runs.len() as f64;
         Cost { ms: us / 1000.0, bytes: 400 * prepared.rows as u64, driver: "/measurements" }
+    }
+}
+
+impl Diagnosable for DeflectionCompensation {
+    type Row = DeflectionMeasurement;
+
+    const DIAGNOSES: &'static [Example] = &[Example {
+        id: "headstock",
+        title: "Five runs of a slender shaft: the headstock is softer than assumed",
+        job: include_str!("examples/diagnosis_headstock.json"),
+    }];
+
+    fn hypotheses(prepared: &PreparedDeflection) -> Hypotheses {
+        Experiment { job: &prepared.job, runs: &prepared.conditions_of_runs }.hypotheses()
+    }
+
+    fn effects(
+        prepared: &PreparedDeflection,
+        hypothesis: &Hypothesis,
+        values: &[f64],
+    ) -> Option<Vec<DeflectionEffect>> {
+        let effect = match (hypothesis.cause.kind, values) {
+            ("chuck_rotational_stiffness", &[kappa]) => {
+                let ktheta = kappa / (1.0 - kappa) * chuck_scale_n_mm_per_rad(&prepared.job);
+                DeflectionEffect::ChuckRotationalStiffness { ktheta_n_mm_per_rad: ktheta.max(1.0) }
+            }
+            _ => DeflectionEffect::from_parameters(hypothesis.cause, values)?,
+        };
+        Some(vec![effect])
+    }
+
+    fn design(prepared: &PreparedDeflection) -> Design {
+        design(&prepared.job, &prepared.places)
     }
 }
 

@@ -25,6 +25,7 @@ mod grid;
 mod hypotheses;
 mod input;
 mod laws;
+mod measurement;
 mod model;
 mod output;
 mod picture;
@@ -42,6 +43,7 @@ pub use input::{
     ProgramSettings, ProgramZero, Section, Segment, Shaft, SpeedDiameter, Stations, StockRow, Support, Theory,
     Tolerance, Uncertainty,
 };
+pub use measurement::DeflectionMeasurement;
 pub use output::{
     OneMoreRest, OneStep, Outcome, PassOutcome, Path, PathZone, SecondOrder, Shares, StationColumns, StatusCompensated,
     StatusUncompensated,

@@ -4,7 +4,8 @@ use rayon::prelude::*;
 
 use super::subject::{Setting, Subject};
 use crate::calculator::{
-    Failure, ForwardModel, Hypotheses, Hypothesis, JacobianColumn, Missing, Prediction, Treatment, Variable,
+    Diagnosable, Failure, Hypotheses, Hypothesis, Inapplicability, Inapplicable, JacobianColumn, Missing, Prediction,
+    Treatment, Variable,
 };
 
 /// Step of a divided difference, prior standard deviations (of a shape without a prior: of its value).
@@ -14,18 +15,26 @@ use crate::calculator::{
 const STEP: f64 = 1e-3;
 
 /// A forward model with its rows and allowances.
-pub struct Bound<M: ForwardModel> {
+pub struct Bound<M: Diagnosable> {
     prepared: M::Prepared,
     allowances: M::Allowances,
     hypotheses: Hypotheses,
     logarithmic: bool,
 }
 
-impl<M: ForwardModel> Bound<M> {
+impl<M: Diagnosable> Bound<M> {
     /// `quantity` decides whether residuals are taken of the value or of its logarithm.
-    pub fn new(prepared: M::Prepared, allowances: M::Allowances, quantity: &str) -> Self {
+    /// `asked_for` leaves out all other kinds of causes.
+    pub fn new(prepared: M::Prepared, allowances: M::Allowances, quantity: &str, asked_for: Option<&[String]>) -> Self {
         let logarithmic = M::QUANTITIES.iter().any(|known| known.name == quantity && known.logarithmic);
-        let hypotheses = M::hypotheses(&prepared);
+        let mut hypotheses = M::hypotheses(&prepared);
+        if let Some(asked_for) = asked_for {
+            let (kept, left): (Vec<Hypothesis>, Vec<Hypothesis>) =
+                hypotheses.applicable.into_iter().partition(|h| asked_for.iter().any(|kind| kind == h.cause.kind));
+            hypotheses.applicable = kept;
+            let reason = Inapplicability::NotAskedFor;
+            hypotheses.inapplicable.extend(left.into_iter().map(|h| Inapplicable { cause: h.cause, reason }));
+        }
         Self { prepared, allowances, hypotheses, logarithmic }
     }
 
@@ -39,7 +48,8 @@ impl<M: ForwardModel> Bound<M> {
         &self.hypotheses
     }
 
-    fn effects_of(&self, settings: &[Setting]) -> Result<Vec<M::Effect>, Failure> {
+    /// The effects that settings stand for.
+    pub(super) fn effects_of(&self, settings: &[Setting]) -> Result<Vec<M::Effect>, Failure> {
         let mut effects = Vec::with_capacity(settings.len());
         for setting in settings {
             let hypothesis = &self.hypotheses.applicable[setting.hypothesis];
@@ -82,7 +92,7 @@ fn width(variable: &Variable, value: f64) -> f64 {
     }
 }
 
-impl<M: ForwardModel> Subject for Bound<M>
+impl<M: Diagnosable> Subject for Bound<M>
 where
     M::Allowances: Sync,
 {
