@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
 use precut_calc::calculator::{Answer, Calculator, Check, Diagnosable, Unwatched, Violations};
-use precut_calc::deflection_compensation::DeflectionCompensation;
+use precut_calc::deflection_compensation::{DeflectionCompensation, DeflectionRun};
 use precut_calc::diagnosis::{Diagnosis, DiagnosisResult, VerdictClass};
 use precut_calc::effects::DeflectionEffect;
 use serde_json::{Value, json};
@@ -20,7 +20,7 @@ fn faults(job: &Value) -> Vec<(&'static str, String)> {
     violations.into_vec().into_iter().map(|finding| (finding.code, finding.pointer)).collect()
 }
 
-fn answered(job: &Value) -> Answer<DiagnosisResult<DeflectionEffect>> {
+fn answered(job: &Value) -> Answer<DiagnosisResult<DeflectionEffect, DeflectionRun>> {
     assert_eq!(faults(job), []);
     let mut job: <Deflection as Calculator>::Input = serde_json::from_value(job.clone()).unwrap();
     Deflection::fill(&mut job);
@@ -103,4 +103,15 @@ fn figures_and_tables_hold_every_row() {
     let figures = Deflection::figures(&job, &result);
     assert_eq!(figures.iter().map(|f| f.id).collect::<Vec<_>>(), Deflection::META.figures);
     assert_eq!(result.rows.row.len(), example()["measurements"].as_array().unwrap().len());
+}
+
+#[test]
+fn the_next_run_parts_the_leader_from_its_rival() {
+    let result = answered(&example()).output;
+    let next = result.next_measurement.unwrap();
+    println!("{next:?}");
+    assert_eq!(next.leader, ["headstock_compliance"]);
+    assert!(!next.rival.contains(&"headstock_compliance".to_owned()));
+    // More rows never part less.
+    assert!(next.separation_then_sigmas >= next.separation_now_sigmas);
 }

@@ -3,7 +3,7 @@
 use serde::{Serialize, de::DeserializeOwned};
 use utoipa::ToSchema;
 
-use super::{Calculator, Design, Example, ForwardModel, Hypotheses, Hypothesis, MeasuredRow};
+use super::{Calculator, Design, Example, ForwardModel, Hypotheses, Hypothesis, MeasuredRow, Rows};
 
 /// A calculator whose model can be compared with measurements, cause by cause.
 pub trait Diagnosable:
@@ -30,6 +30,21 @@ pub trait Diagnosable:
 
     /// How the rows hang together.
     fn design(prepared: &Self::Prepared) -> Design;
+
+    /// Runs that could be measured next, each with its rows: every condition moved to the ends of its
+    /// range, or started afresh. None where a job has no runs.
+    fn next_runs(job: &Self::Job, rows: &Rows<Self::Run, Self::Point>) -> Vec<NextRun<Self::Run, Self::Point>>;
+}
+
+/// A run that could be measured next.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NextRun<R, P> {
+    /// The condition that it changes: a field of the run.
+    pub changes: &'static str,
+    /// Its conditions.
+    pub run: R,
+    /// Where it would be measured.
+    pub points: Vec<P>,
 }
 
 /// A row of measurements.

@@ -15,7 +15,7 @@ mod program;
 mod table;
 
 pub use design::{Design, Grouping, Smooth};
-pub use diagnosable::{Diagnosable, Measurement};
+pub use diagnosable::{Diagnosable, Measurement, NextRun};
 pub use figure::{Axis, Figure, Frame, Glyph, Item, Panel, Role, Spacing};
 pub use finding::{Finding, Message, Value, Values, Violations};
 pub use forward::{Column as JacobianColumn, ForwardModel, Missing, Prediction, PrepareError, Quantity, Rows};

@@ -5,7 +5,7 @@ use utoipa::ToSchema;
 
 use crate::calculator::{
     Cost, Design, Diagnosable, Example, Failure, Finding, ForwardModel, Hypotheses, Hypothesis, JacobianColumn,
-    Missing, Monitor, Prediction, PrepareError, Quantity, Rows, checkpoint,
+    Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Rows, checkpoint,
 };
 use crate::effects::{Cause, DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect};
 use crate::num::beam::Profile;
@@ -18,6 +18,7 @@ use super::hypotheses::{Experiment, chuck_scale_n_mm_per_rad, design};
 use super::input::{FeedDirection, Job, Stations};
 use super::measurement::DeflectionMeasurement;
 use super::model::{Ingredients, Line, Radii, rest_shapes, wanted};
+use super::next_runs::next_runs;
 use super::regime::{Regime, passages, section_of_pass};
 use super::structure::{Structure, Variant};
 
@@ -305,6 +306,13 @@ impl Diagnosable for DeflectionCompensation {
 
     fn design(prepared: &PreparedDeflection) -> Design {
         design(&prepared.job, &prepared.places)
+    }
+
+    fn next_runs(
+        job: &Job,
+        rows: &Rows<DeflectionRun, DeflectionPoint>,
+    ) -> Vec<NextRun<DeflectionRun, DeflectionPoint>> {
+        next_runs(job, rows)
     }
 }
 

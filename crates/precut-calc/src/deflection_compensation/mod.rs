@@ -27,6 +27,7 @@ mod input;
 mod laws;
 mod measurement;
 mod model;
+mod next_runs;
 mod output;
 mod picture;
 mod power_cut;

@@ -29,7 +29,7 @@ pub type JobOf<M> = DiagnosisJob<
 
 impl<M: Diagnosable> Calculator for Diagnosis<M> {
     type Input = JobOf<M>;
-    type Output = DiagnosisResult<M::Effect>;
+    type Output = DiagnosisResult<M::Effect, M::Run>;
 
     const META: Meta = Meta {
         id: "diagnosis",
@@ -76,7 +76,7 @@ impl<M: Diagnosable> Calculator for Diagnosis<M> {
         let design = M::design(&prepared);
         let data = data::<M>(job, &used, design);
         let bound = Bound::<M>::new(prepared, job.allowances.clone(), &job.quantity, job.options.causes.as_deref());
-        report::answer::<M>(job, &used, &bound, &data, monitor)
+        report::answer::<M>(job, &places, &used, &bound, &data, monitor)
     }
 
     fn figures(job: &Self::Input, output: &Self::Output) -> Vec<Figure> {

@@ -2,10 +2,10 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use super::subject::Setting;
+use super::subject::{Setting, Subject};
 use super::weigh::Weighing;
-use super::whiten::White;
-use crate::calculator::Failure;
+use super::whiten::{White, Whitener};
+use crate::calculator::{Failure, Treatment};
 
 /// Cosine from which on two signatures are one for every size.
 const SAME: f64 = 0.9995;
@@ -59,6 +59,42 @@ impl Signature {
             .collect();
         let directions = weighing.fit(members).map_or_else(Vec::new, |fit| fit.columns.clone());
         Ok(Self { members: members.to_vec(), whole: weighing.whitener.white(&change), directions })
+    }
+
+    /// Of no effect at all, beside another.
+    pub(super) fn nothing(beside: &Self) -> Self {
+        Self { members: Vec::new(), whole: beside.whole.minus(&beside.whole), directions: Vec::new() }
+    }
+
+    /// Of settings under other rows than those that were weighed.
+    pub(super) fn anew(
+        subject: &dyn Subject,
+        whitener: &Whitener,
+        keep: &[bool],
+        settings: &[Setting],
+    ) -> Result<Self, Failure> {
+        let (base, with) = (subject.predict(&[])?, subject.predict(settings)?);
+        let change: Vec<f64> = with
+            .iter()
+            .zip(&base)
+            .zip(keep)
+            .map(|((with, base), keep)| match (with, base) {
+                (Ok(with), Ok(base)) if *keep => with - base,
+                _ => 0.0,
+            })
+            .collect();
+        let mut of = Vec::new();
+        for (member, setting) in settings.iter().enumerate() {
+            let variables = &subject.hypotheses()[setting.hypothesis].variables;
+            of.extend(
+                (0..variables.len())
+                    .filter(|&v| matches!(variables[v].treatment, Treatment::Amplitude { .. }))
+                    .map(|v| (member, v)),
+            );
+        }
+        let directions = subject.jacobian(settings, &of)?.iter().map(|column| whitener.white(column)).collect();
+        let members = settings.iter().map(|setting| setting.hypothesis).collect();
+        Ok(Self { members, whole: whitener.white(&change), directions })
     }
 
     /// Length in sigmas: how visible it is against nothing.

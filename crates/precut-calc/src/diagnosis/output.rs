@@ -5,8 +5,8 @@ use utoipa::ToSchema;
 
 /// What the measurements say about the base model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(bound(serialize = "E: Serialize", deserialize = "E: Deserialize<'de>"))]
-pub struct DiagnosisResult<E: ToSchema> {
+#[serde(bound(serialize = "E: Serialize, R: Serialize", deserialize = "E: Deserialize<'de>, R: Deserialize<'de>"))]
+pub struct DiagnosisResult<E: ToSchema, R: ToSchema> {
     /// What kind of answer this is.
     pub verdict: VerdictClass,
     /// The causes named; for `unknown` those that act at least; empty otherwise.
@@ -41,6 +41,8 @@ pub struct DiagnosisResult<E: ToSchema> {
     pub effects: Vec<E>,
     /// Error on data held back, base against extended.
     pub gain: Option<GainReport>,
+    /// The run that would best part the leading set from its strongest rival.
+    pub next_measurement: Option<NextReport<R>>,
     /// Row by row.
     pub rows: RowColumns,
     /// Rows left out because they stand alone, by their number from 1.
@@ -262,6 +264,35 @@ pub struct GainReport {
     /// Share of what could be explained that was; absent where the base is at the ceiling already.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub explained_share: Option<f64>,
+}
+
+/// A run worth measuring.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(bound(serialize = "R: Serialize", deserialize = "R: Deserialize<'de>"))]
+pub struct NextReport<R: ToSchema> {
+    /// The condition that it changes.
+    pub changes: String,
+    /// Its conditions.
+    pub run: R,
+    /// Rows that it would bring.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub rows: u32,
+    /// Kinds of the leading set.
+    pub leader: Vec<String>,
+    /// Kinds of its strongest rival; none for the base.
+    pub rival: Vec<String>,
+    /// Separation of both with the rows there are, sigmas.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub separation_now_sigmas: f64,
+    /// The same with this run measured too.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub separation_then_sigmas: f64,
+    /// Bayes factor to be expected from this run.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub bayes_factor: f64,
+    /// Rows of this kind that would bring odds of 20 to 1; absent where no number would.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub rows_needed: Option<u32>,
 }
 
 /// Row by row, in the order of the measurements; values in the unit of the quantity (logarithms where it is logarithmic).

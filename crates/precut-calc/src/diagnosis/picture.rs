@@ -19,7 +19,10 @@ pub(super) const LABEL_CODES: &[&str] = &[
     "diagnosis_probability",
 ];
 
-pub(super) fn figures<E: utoipa::ToSchema>(quantity: &str, output: &DiagnosisResult<E>) -> Vec<Figure> {
+pub(super) fn figures<E: utoipa::ToSchema, R: utoipa::ToSchema>(
+    quantity: &str,
+    output: &DiagnosisResult<E, R>,
+) -> Vec<Figure> {
     let unit = unit_of(quantity);
     vec![
         Figure {
@@ -48,7 +51,7 @@ fn unit_of(quantity: &str) -> &'static str {
     }
 }
 
-fn residuals<E: utoipa::ToSchema>(output: &DiagnosisResult<E>, unit: &'static str) -> Panel {
+fn residuals<E: utoipa::ToSchema, R: utoipa::ToSchema>(output: &DiagnosisResult<E, R>, unit: &'static str) -> Panel {
     let rows = &output.rows;
     let x: Vec<f64> = rows.row.iter().map(|row| f64::from(*row)).collect();
     let (mut at, mut before, mut after) = (Vec::new(), Vec::new(), Vec::new());
@@ -76,14 +79,14 @@ fn residuals<E: utoipa::ToSchema>(output: &DiagnosisResult<E>, unit: &'static st
     Panel { y: Axis::linear("diagnosis_residual", unit), height: 1.0, items }
 }
 
-fn evidence<E: utoipa::ToSchema>(output: &DiagnosisResult<E>) -> Panel {
+fn evidence<E: utoipa::ToSchema, R: utoipa::ToSchema>(output: &DiagnosisResult<E, R>) -> Panel {
     let x: Vec<f64> = (1..=output.causes.len()).map(|rank| rank as f64).collect();
     let y = output.causes.iter().map(|cause| Some(cause.probability)).collect();
     let bars = Item::Bars { name: "diagnosis_probability", x, y, role: Role::After };
     Panel { y: Axis::linear("diagnosis_probability", "1"), height: 1.0, items: vec![bars] }
 }
 
-pub(super) fn tables<E: utoipa::ToSchema>(output: &DiagnosisResult<E>) -> Vec<Table> {
+pub(super) fn tables<E: utoipa::ToSchema, R: utoipa::ToSchema>(output: &DiagnosisResult<E, R>) -> Vec<Table> {
     let rows = &output.rows;
     let whole = |values: &[u32]| values.iter().map(|v| f64::from(*v)).collect::<Vec<f64>>();
     let words = |values: Vec<String>| values.into_iter().map(Cow::Owned).collect::<Vec<_>>();

@@ -9,9 +9,10 @@ use super::data::Data;
 use super::foundation::Foundation;
 use super::gain::{Gain, gain};
 use super::identify::{CONFOUNDED_BELOW, Signature, separations, twins};
+use super::next::{NextMeasurement, next_measurement};
 use super::noise::{Noise, NoiseSource};
 use super::output::{
-    CausePair, CauseReport, DiagnosisResult, GainReport, LikelySet, NamedCause, NoiseReport, NotApplicable,
+    CausePair, CauseReport, DiagnosisResult, GainReport, LikelySet, NamedCause, NextReport, NoiseReport, NotApplicable,
     ParameterReport, Refusal, RemainderReport, RowColumns, SeparationReport, SetReport, TestReport, VerdictClass,
 };
 use super::remainder::remainder_shape;
@@ -19,8 +20,8 @@ use super::subject::{Setting, Subject};
 use super::suspect::{SuspectedFactor, copied_traces, suspected_factor};
 use super::weigh::{Effort, SetWeight, Verdict, Weighing};
 use crate::calculator::{
-    Answer, Basis, Diagnosable, Failure, Finding, Hypothesis, Inapplicability, Measurement, Message, Monitor, Smooth,
-    Treatment,
+    Answer, Basis, Diagnosable, Failure, Finding, Hypothesis, Inapplicability, Measurement, Message, Monitor, Rows,
+    Smooth, Treatment,
 };
 
 /// Sets that are listed.
@@ -41,6 +42,7 @@ pub(super) const EXPLANATION_CODES: &[&str] = &[
     "diagnosis_unit_suspected",
     "diagnosis_base_fails",
     "diagnosis_gain",
+    "diagnosis_next",
 ];
 pub(super) const STAGE_CODES: &[&str] =
     &["diagnosis_stage_signatures", "diagnosis_stage_search", "diagnosis_stage_gain", "stage_done"];
@@ -48,11 +50,12 @@ pub(super) const STAGE_CODES: &[&str] =
 /// The whole answer.
 pub(super) fn answer<M: Diagnosable>(
     job: &JobOf<M>,
+    places: &Rows<M::Run, M::Point>,
     used: &[usize],
     bound: &Bound<M>,
     data: &Data,
     monitor: &dyn Monitor,
-) -> Result<Answer<DiagnosisResult<M::Effect>>, Failure> {
+) -> Result<Answer<DiagnosisResult<M::Effect, M::Run>>, Failure> {
     stage(monitor, 0.05, "diagnosis_stage_signatures");
     let foundation = Foundation::of(bound, data, monitor)?;
     let found = foundation.outliers();
@@ -67,6 +70,7 @@ pub(super) fn answer<M: Diagnosable>(
     } else {
         None
     };
+    let next = if refusal.is_none() { next_measurement::<M>(job, places, &weighing, monitor)? } else { None };
     let view = View { hypotheses: bound.hypotheses(), weighing: &weighing };
     let named = view.named();
     let settings: &[Setting] = view.leading().map_or(&[], |set| &set.settings);
@@ -112,6 +116,7 @@ pub(super) fn answer<M: Diagnosable>(
         ),
         effects,
         gain: gain.as_ref().map(gain_report),
+        next_measurement: next.map(|next| view.next_report(next)),
         rows: row_columns::<M>(job, used, &foundation, &weighing, extended.as_deref()),
         outliers: found.rows.iter().map(|&row| row_number(used[row])).collect(),
         refusal,
@@ -222,6 +227,22 @@ impl View<'_> {
             .collect();
         causes.sort_by(|a, b| b.probability.total_cmp(&a.probability));
         causes
+    }
+
+    fn next_report<R: utoipa::ToSchema>(&self, next: NextMeasurement<R>) -> NextReport<R> {
+        let kinds = |members: &[usize]| members.iter().map(|&h| self.kind(h).to_owned()).collect();
+        let count = |rows: usize| u32::try_from(rows).unwrap_or(u32::MAX);
+        NextReport {
+            changes: next.changes.to_owned(),
+            run: next.run,
+            rows: count(next.rows),
+            leader: kinds(&next.leader),
+            rival: kinds(&next.rival),
+            separation_now_sigmas: next.separation_now,
+            separation_then_sigmas: next.separation_then,
+            bayes_factor: next.bayes_factor,
+            rows_needed: next.rows_needed.map(count),
+        }
     }
 
     fn separations(&self) -> Result<Vec<SeparationReport>, Failure> {
@@ -378,7 +399,10 @@ fn row_columns<M: Diagnosable>(
 }
 
 /// Most important first: the verdict, then the gain.
-fn explanation<E: utoipa::ToSchema>(output: &DiagnosisResult<E>, quantity: &str) -> Vec<Message> {
+fn explanation<E: utoipa::ToSchema, R: utoipa::ToSchema>(
+    output: &DiagnosisResult<E, R>,
+    quantity: &str,
+) -> Vec<Message> {
     let kinds = |causes: &[NamedCause]| causes.iter().map(|cause| cause.kind.clone()).collect::<Vec<_>>();
     let mut said = vec![match output.verdict {
         VerdictClass::Adequate if output.none_probability < 0.5 => {
@@ -407,6 +431,16 @@ fn explanation<E: utoipa::ToSchema>(output: &DiagnosisResult<E>, quantity: &str)
             _ => Message::new("diagnosis_base_fails"),
         },
     }];
+    if let Some(next) = &output.next_measurement {
+        said.push(
+            Message::new("diagnosis_next")
+                .with("changes", next.changes.clone())
+                .with("leader", next.leader.clone())
+                .with("rival", next.rival.clone())
+                .with("now", next.separation_now_sigmas)
+                .with("then", next.separation_then_sigmas),
+        );
+    }
     if let Some(gain) = &output.gain {
         said.push(
             Message::new("diagnosis_gain")
