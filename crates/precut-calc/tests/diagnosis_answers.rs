@@ -109,7 +109,6 @@ fn figures_and_tables_hold_every_row() {
 fn the_next_run_parts_the_leader_from_its_rival() {
     let result = answered(&example()).output;
     let next = result.next_measurement.unwrap();
-    println!("{next:?}");
     assert_eq!(next.leader, ["headstock_compliance"]);
     assert!(!next.rival.contains(&"headstock_compliance".to_owned()));
     // More rows never part less.

@@ -187,10 +187,6 @@ fn the_gain_on_held_back_runs_is_what_the_fit_promises() {
     for name in [HEADSTOCK, WEAR, TWO] {
         Case::of(name).weighed(|foundation, weighing| {
             let nested = gain(foundation, weighing, Effort::full(3), true, 1, &Unwatched).unwrap().unwrap();
-            println!(
-                "{name}: {} -> {} of {} share {:?} [{:?}]",
-                nested.rmse_base, nested.rmse_extended, nested.ceiling, nested.explained_share, nested.interval
-            );
             assert!(nested.rmse_extended < nested.rmse_base);
             assert!(nested.interval.0 <= nested.gain && nested.gain <= nested.interval.1);
             assert!(nested.explained_share.unwrap() > 0.8, "{:?}", nested.explained_share);
@@ -198,7 +194,6 @@ fn the_gain_on_held_back_runs_is_what_the_fit_promises() {
     }
     Case::of(ADEQUATE).weighed(|foundation, weighing| {
         let nested = gain(foundation, weighing, Effort::full(3), true, 1, &Unwatched).unwrap().unwrap();
-        println!("{} {}", nested.rmse_base, nested.rmse_extended);
         assert!(nested.gain.abs() < 0.05, "{}", nested.gain);
     });
 }
@@ -254,7 +249,6 @@ fn causes_that_look_alike_in_these_rows_are_told_with_their_separation() {
         assert!(signatures[0].detectability() > 5.0);
         for pair in &found {
             assert!(pair.sigmas <= signatures[0].detectability() + signatures[3].detectability());
-            println!("{:?} {:?} {}", pair.a, pair.b, pair.sigmas);
         }
         // A superset can imitate the set it extends.
         let subset = found.iter().find(|p| p.a.iter().all(|h| p.b.contains(h))).unwrap();

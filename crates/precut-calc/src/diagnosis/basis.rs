@@ -43,7 +43,9 @@ pub(super) fn orthonormal(columns: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
         }
         let after = dot(&column, &column).sqrt();
         if after > DEPENDENT * before {
-            column.iter_mut().for_each(|c| *c /= after);
+            for c in &mut column {
+                *c /= after;
+            }
             basis.push(column);
         }
     }

@@ -19,6 +19,9 @@ pub(super) const LEAST_ROWS: usize = 8;
 #[derive(Debug, Clone, Copy)]
 pub struct Diagnosis<M>(PhantomData<M>);
 
+/// The answer of a diagnosis of `M`.
+pub type ResultOf<M> = DiagnosisResult<<M as ForwardModel>::Effect, <M as ForwardModel>::Run>;
+
 /// The job of a diagnosis of `M`.
 pub type JobOf<M> = DiagnosisJob<
     <M as ForwardModel>::Job,
@@ -177,7 +180,7 @@ where
     let rows = job.measurements.rows();
     let runs = job.runs.len().max(1);
     for (index, row) in rows.iter().enumerate() {
-        violations.require((1..=runs.min(MAX_RUNS) as u32).contains(&row.run()), || {
+        violations.require((1..=runs.min(MAX_RUNS)).contains(&(row.run() as usize)), || {
             Finding::new("unknown_run", format!("/measurements/{index}/run"))
                 .measured(f64::from(row.run()), runs as f64, "1")
                 .with("runs", runs)

@@ -61,7 +61,9 @@ pub(super) fn kinds(data: &Data, whitener: &Whitener, sigma: f64) -> Vec<Kind> {
                 for run in &runs {
                     for k in 0..RUN_ORDERS {
                         let mut column = vec![0.0; rows];
-                        run.iter().for_each(|&row| column[row] = cosine(k, u[row]));
+                        for &row in run {
+                            column[row] = cosine(k, u[row]);
+                        }
                         columns.push(column);
                         orders.push(k as f64);
                     }

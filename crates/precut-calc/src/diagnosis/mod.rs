@@ -36,7 +36,7 @@ mod whiten;
 
 pub use adequacy::{Test, TestKind, adequacy};
 pub use base::Bound;
-pub use calculator::{Diagnosis, JobOf};
+pub use calculator::{Diagnosis, JobOf, ResultOf};
 pub use data::{Data, Layout};
 pub use foundation::Foundation;
 pub use gain::{Gain, gain};

@@ -192,7 +192,9 @@ fn log_gram(columns: &[Vec<f64>]) -> f64 {
         }
         let length = dot(&column, &column).sqrt().max(f64::MIN_POSITIVE);
         sum += 2.0 * length.ln();
-        column.iter_mut().for_each(|c| *c /= length);
+        for c in &mut column {
+            *c /= length;
+        }
         basis.push(column);
     }
     sum

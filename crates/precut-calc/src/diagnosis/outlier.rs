@@ -11,8 +11,8 @@ const SUSPECT: f64 = 4.5;
 const AT_PEACE: f64 = 3.0;
 /// 1 / Phi^-1(3/4): makes the median absolute deviation a standard deviation of Gaussian scatter.
 const MAD_TO_SD: f64 = 1.482_602_218_505_602;
-/// More flagged rows than this share are no outliers but heavy tails.
-const MOST: f64 = 0.05;
+/// More flagged rows than one in so many are no outliers but heavy tails.
+const ONE_IN: usize = 20;
 
 /// Rows that stand alone.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,9 +55,9 @@ pub(super) fn outliers(data: &Data, residual: &[f64]) -> Outliers {
         vec![Fit::of(&rows, data.layout.design.regressors.clone(), residual)]
     };
     let mut flagged = Vec::new();
-    let most = ((MOST * residual.len() as f64).floor() as usize).max(1);
+    let most = (residual.len() / ONE_IN).max(1);
     loop {
-        let spread = robust_sd(traces.iter().flat_map(|fit| fit.open_residuals()));
+        let spread = robust_sd(traces.iter().flat_map(Fit::open_residuals));
         if spread <= 0.0 {
             break;
         }

@@ -79,9 +79,8 @@ impl Coordinate {
     /// d value / d t.
     fn slope(self, value: f64) -> f64 {
         match self {
-            Self::Amplitude { sd } => sd,
             Self::Shape(Shape { sd, logarithmic: true, .. }) => sd * value,
-            Self::Shape(Shape { sd, logarithmic: false, .. }) => sd,
+            Self::Amplitude { sd } | Self::Shape(Shape { sd, logarithmic: false, .. }) => sd,
         }
     }
 }

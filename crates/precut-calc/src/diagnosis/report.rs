@@ -4,7 +4,7 @@ use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
 use super::adequacy::{TestKind, adequacy};
 use super::base::Bound;
-use super::calculator::{JobOf, stage};
+use super::calculator::{JobOf, ResultOf, stage};
 use super::data::Data;
 use super::foundation::Foundation;
 use super::gain::{Gain, gain};
@@ -55,7 +55,7 @@ pub(super) fn answer<M: Diagnosable>(
     bound: &Bound<M>,
     data: &Data,
     monitor: &dyn Monitor,
-) -> Result<Answer<DiagnosisResult<M::Effect, M::Run>>, Failure> {
+) -> Result<Answer<ResultOf<M>>, Failure> {
     stage(monitor, 0.05, "diagnosis_stage_signatures");
     let foundation = Foundation::of(bound, data, monitor)?;
     let found = foundation.outliers();

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::evidence::{Evidence, Normal, Scale, Side, log_mean_exp};
+use super::evidence::{Evidence, Normal, Scale, Side, log_mean_exp, log_sum_exp};
 use super::subject::{Setting, Subject};
 use super::whiten::{White, Whitener};
 use crate::calculator::{Failure, Hypothesis, Monitor, Treatment, checkpoint};
@@ -129,6 +129,10 @@ pub(super) struct Candidate {
     pub(super) variants: Vec<usize>,
     /// The fit there, in units of the priors.
     pub(super) t: Vec<f64>,
+    /// Root mean square distance of every variable of every member from its value there, over the posterior
+    /// of the whole grid: what a standard deviation at one point of the grid leaves out. In the units of the
+    /// variables; empty where there is no grid.
+    pub(super) spread: Vec<Vec<f64>>,
 }
 
 impl Candidate {
@@ -226,17 +230,40 @@ impl<'a> Linear<'a> {
             let count = self.signatures.variants[h].len();
             points = points.into_iter().flat_map(|p| (0..count).map(move |v| [p.as_slice(), &[v]].concat())).collect();
         }
-        let mut all = Vec::with_capacity(points.len());
-        let mut best: Option<(Vec<usize>, Evidence)> = None;
+        let mut found = Vec::with_capacity(points.len());
         for point in points {
             let evidence = self.evidence(&members, &point)?;
-            all.push(evidence.log_z);
-            if best.as_ref().is_none_or(|(_, most)| evidence.log_z > most.log_z) {
-                best = Some((point, evidence));
+            found.push((point, evidence));
+        }
+        let all: Vec<f64> = found.iter().map(|(_, evidence)| evidence.log_z).collect();
+        let best = (0..found.len()).rev().max_by(|&a, &b| all[a].total_cmp(&all[b]))?;
+        let spread = if found.len() > 1 { self.spread(&members, &found, best) } else { Vec::new() };
+        let (variants, evidence) = found.swap_remove(best);
+        Some(Candidate { members, log_z: log_mean_exp(&all), log_prior, variants, t: evidence.t, spread })
+    }
+
+    fn spread(&self, members: &[usize], found: &[(Vec<usize>, Evidence)], best: usize) -> Vec<Vec<f64>> {
+        let total = log_sum_exp(&found.iter().map(|(_, evidence)| evidence.log_z).collect::<Vec<_>>());
+        let mut squares: Vec<Vec<f64>> =
+            members.iter().map(|&h| vec![0.0; self.hypotheses[h].variables.len()]).collect();
+        for (point, evidence) in found {
+            let weight = (evidence.log_z - total).exp();
+            let mut column = 0;
+            for (member, &h) in members.iter().enumerate() {
+                let (here, there) = (self.variant(h, point[member]), self.variant(h, found[best].0[member]));
+                let shapes = here.setting.values.iter().zip(&there.setting.values);
+                for (square, (value, best)) in squares[member].iter_mut().zip(shapes) {
+                    *square += weight * (value - best) * (value - best);
+                }
+                for amplitude in &here.amplitudes {
+                    let gap = evidence.t[column] - found[best].1.t[column];
+                    let square = evidence.covariance[(column, column)] + gap * gap;
+                    squares[member][amplitude.variable] += weight * square * amplitude.prior_sd * amplitude.prior_sd;
+                    column += 1;
+                }
             }
         }
-        let (variants, evidence) = best?;
-        Some(Candidate { members, log_z: log_mean_exp(&all), log_prior, variants, t: evidence.t })
+        squares.into_iter().map(|member| member.into_iter().map(f64::sqrt).collect()).collect()
     }
 
     fn log_prior(&self, members: &[usize]) -> f64 {

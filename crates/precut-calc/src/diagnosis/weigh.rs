@@ -8,7 +8,7 @@ use super::refine::{Fit, Refinement};
 use super::search::{Candidate, Linear, by_weight};
 use super::subject::Setting;
 use super::whiten::{White, Whitener};
-use crate::calculator::{Failure, Monitor, checkpoint};
+use crate::calculator::{Failure, Hypothesis, Monitor, Treatment, checkpoint};
 
 /// Sets that are refined about the model itself.
 const LEADERS: usize = 12;
@@ -132,7 +132,9 @@ impl<'a> Weighing<'a> {
         let none = sum(&|set| set.members.is_empty() && set.remainder.is_none());
         let unnamed = sum(&|set| set.remainder.is_some());
         let inclusion = (0..subject.hypotheses().len()).map(|h| sum(&|set| set.members.contains(&h))).collect();
-        let verdict = verdict(&sets, none, unnamed);
+        let at_limit =
+            |set: &SetWeight| ranking.fit(&set.members).is_some_and(|fit| at_limit(fit, subject.hypotheses()));
+        let verdict = verdict(&sets, none, unnamed, &at_limit);
         Ok(Self { foundation, keep, noise, whitener, linear, ranking, kinds, sets, none, unnamed, inclusion, verdict })
     }
 
@@ -219,13 +221,13 @@ impl Ranking {
     }
 
     fn beside(&self, linear: &Linear<'_>, kinds: &[Kind], candidate: &Candidate) -> Option<Remainder> {
-        let (columns, residual, sides): (Vec<&White>, White, Vec<Side>) = match self.fit(&candidate.members) {
-            Some(fit) => (fit.columns.iter().collect(), fit.residual.clone(), fit.sides.clone()),
-            None => {
+        let (columns, residual, sides): (Vec<&White>, White, Vec<Side>) =
+            if let Some(fit) = self.fit(&candidate.members) {
+                (fit.columns.iter().collect(), fit.residual.clone(), fit.sides.clone())
+            } else {
                 let (columns, sides, residual) = linear.parts(&candidate.members, &candidate.variants);
                 (columns, residual, sides)
-            }
-        };
+            };
         discrepancy::beside(kinds, &columns, &residual, &sides, linear.scale, linear.rows)
     }
 
@@ -236,6 +238,12 @@ impl Ranking {
         if let Some(fit) = fit {
             for (k, &(member, variable)) in fit.free.iter().enumerate() {
                 standard_deviations[member][variable] = fit.covariance[(k, k)].sqrt();
+            }
+        }
+        // A shape that stays on its grid is uncertain, too, and widens the sizes.
+        if fit.is_none_or(|fit| !fit.with_shapes) {
+            for (own, spread) in standard_deviations.iter_mut().zip(&candidate.spread) {
+                own.iter_mut().zip(spread).for_each(|(own, spread)| *own = own.max(*spread));
             }
         }
         SetWeight {
@@ -249,7 +257,21 @@ impl Ranking {
     }
 }
 
-fn verdict(sets: &[SetWeight], none: f64, unnamed: f64) -> Verdict {
+/// Whether the size of a cause lies at its physical limit; absent, at 0, is no limit, and of several sizes
+/// of one cause the first counts.
+fn at_limit(fit: &Fit, hypotheses: &[Hypothesis]) -> bool {
+    fit.settings.iter().any(|setting| {
+        let variables = &hypotheses[setting.hypothesis].variables;
+        let first =
+            variables.iter().zip(&setting.values).find(|(v, _)| matches!(v.treatment, Treatment::Amplitude { .. }));
+        first.is_some_and(|(variable, value)| {
+            let near = |bound: f64| (value - bound).abs() < 1e-9 * (variable.range.upper - variable.range.lower);
+            (near(variable.range.lower) && variable.range.lower < 0.0) || near(variable.range.upper)
+        })
+    })
+}
+
+fn verdict(sets: &[SetWeight], none: f64, unnamed: f64, at_limit: &dyn Fn(&SetWeight) -> bool) -> Verdict {
     if none >= ALARM {
         return Verdict::Adequate;
     }
@@ -270,7 +292,9 @@ fn verdict(sets: &[SetWeight], none: f64, unnamed: f64) -> Verdict {
     }
     if let Some(leader) = likely.first() {
         let in_all = likely.iter().all(|set| leader.members.iter().all(|h| set.members.contains(h)));
-        if leader.posterior >= NAMED || (leader.posterior >= NAMED_IF_COMMON && in_all) {
+        let sure = leader.posterior >= NAMED || (leader.posterior >= NAMED_IF_COMMON && in_all);
+        // At its limit a size is not what the data ask for: something else acts, or the limit is wrong.
+        if sure && !at_limit(leader) {
             return Verdict::Named(leader.members.clone());
         }
     }
