@@ -3,7 +3,7 @@
 
 mod support;
 
-use precut_calc::calculator::{ForwardModel, Rows, Unwatched};
+use precut_calc::calculator::{Diagnosable, ForwardModel, Rows, Unwatched};
 use precut_calc::deflection_compensation::{
     DeflectionAllowances, DeflectionCompensation, DeflectionPoint, DeflectionRun, Job,
 };
