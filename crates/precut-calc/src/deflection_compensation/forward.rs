@@ -15,7 +15,7 @@ use super::acting::{Acting, StructureChange};
 use super::equilibrium::Engagement;
 use super::grid::{Grid, interpolate};
 use super::hypotheses::{Experiment, chuck_scale_n_mm_per_rad, design};
-use super::input::{FeedDirection, Job, Stations};
+use super::input::{FeedDirection, Job, Stations, Theory};
 use super::measurement::DeflectionMeasurement;
 use super::model::{Ingredients, Line, Radii, rest_shapes, wanted};
 use super::next_runs::next_runs;
@@ -215,22 +215,15 @@ impl ForwardModel for DeflectionCompensation {
         if !faults.is_empty() {
             return Err(PrepareError::Invalid(faults));
         }
-        let mut runs = Vec::with_capacity(rows.runs.len());
-        for (k, run) in rows.runs.iter().enumerate() {
-            checkpoint(monitor).map_err(PrepareError::Failed)?;
-            let places: Vec<(usize, f64)> =
-                rows.points.iter().enumerate().filter(|(_, p)| p.0 == k).map(|(row, p)| (row, p.1.z_mm)).collect();
-            if !places.is_empty() {
-                runs.push(PreparedRun::of(job, run, places).map_err(PrepareError::Failed)?);
-            }
-        }
+        checkpoint(monitor).map_err(PrepareError::Failed)?;
+        let places: Vec<(usize, f64)> = rows.points.iter().map(|(run, point)| (*run, point.z_mm)).collect();
         Ok(PreparedDeflection {
-            runs,
+            runs: prepared_runs(job, &rows.runs, &places).map_err(PrepareError::Failed)?,
             rows: rows.points.len(),
             measure,
             job: job.clone(),
             conditions_of_runs: rows.runs.clone(),
-            places: rows.points.iter().map(|(run, point)| (*run, point.z_mm)).collect(),
+            places,
         })
     }
 
@@ -266,6 +259,7 @@ impl ForwardModel for DeflectionCompensation {
         }
         columns.push(scaled(&by_force, allowances.force_level_rel));
         columns.push(scaled(&by_bending, allowances.bending_rel));
+        columns.extend(prepared.neglected_shear()?);
         Ok(columns)
     }
 
@@ -481,7 +475,33 @@ fn predict(
     Ok(out)
 }
 
+/// The runs that have rows, each with its own.
+fn prepared_runs(job: &Job, runs: &[DeflectionRun], places: &[(usize, f64)]) -> Result<Vec<PreparedRun>, Failure> {
+    let mut prepared = Vec::with_capacity(runs.len());
+    for (k, run) in runs.iter().enumerate() {
+        let own: Vec<(usize, f64)> =
+            places.iter().enumerate().filter(|(_, place)| place.0 == k).map(|(row, place)| (row, place.1)).collect();
+        if !own.is_empty() {
+            prepared.push(PreparedRun::of(job, run, own)?);
+        }
+    }
+    Ok(prepared)
+}
+
 impl PreparedDeflection {
+    /// What a base that bends without shear leaves out: known, so it is allowed for rather than found.
+    /// `None` where the base has it.
+    fn neglected_shear(&self) -> Result<Option<JacobianColumn>, Failure> {
+        if self.job.shaft.theory == Theory::Timoshenko {
+            return Ok(None);
+        }
+        let mut with_shear = self.job.clone();
+        with_shear.shaft.theory = Theory::Timoshenko;
+        let runs = prepared_runs(&with_shear, &self.conditions_of_runs, &self.places)?;
+        let without = DeflectionCompensation::predict(self, &[])?;
+        Ok(Some(difference(&without, &predict(&runs, self.rows, self.measure, &[])?, 1.0)))
+    }
+
     /// Central difference of the prediction by a relative effect about 0, one entry per row.
     fn slope(&self, effect: impl Fn(f64) -> DeflectionEffect) -> Result<Vec<f64>, Failure> {
         let at = |delta: f64| DeflectionCompensation::predict(self, &[effect(delta)]);
