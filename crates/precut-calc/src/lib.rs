@@ -6,6 +6,7 @@
 
 pub mod calculator;
 pub mod deflection_compensation;
+pub mod diagnosis;
 pub mod effects;
 pub mod feed_schedule;
 pub mod fixture_stability;
