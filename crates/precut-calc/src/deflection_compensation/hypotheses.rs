@@ -136,7 +136,7 @@ impl Experiment<'_> {
             _ => parameter.lower,
         };
         let treatment = match parameter.fit {
-            Fit::Amplitude => Treatment::Amplitude { prior_sd: parameter.prior_sd },
+            Fit::Amplitude | Fit::Factor => Treatment::Amplitude { prior_sd: parameter.prior_sd },
             Fit::Shape { grid } => Treatment::Shape { grid: grid.to_vec(), prior: shape_prior(parameter.name) },
             Fit::Fixed { default } => Treatment::Stated { value: self.reference(parameter.name).unwrap_or(default) },
             Fit::OfJob => Treatment::Stated { value: station_mm.unwrap_or(0.0) },

@@ -142,11 +142,10 @@ fn trials(job: &FitJob, outcome: &FitOutcome) -> Table {
             Column::optional("studentised", "1", &number(|o, k| o.rows.studentised[k])),
             Column::optional("leverage", "1", &number(|o, k| Some(o.rows.leverage[k]))),
             Column::optional("cooks_distance", "1", &number(|o, k| o.rows.cooks_distance[k])),
-            Column {
-                name: "outlier",
-                unit: "",
-                cells: Cells::Words(words(all().map(|(o, k)| if o.rows.outlier[k] { "yes" } else { "no" }.to_owned()))),
-            },
+            Column::words(
+                "outlier",
+                words(all().map(|(o, k)| if o.rows.outlier[k] { "yes" } else { "no" }.to_owned())),
+            ),
         ],
     }
 }
