@@ -257,6 +257,25 @@ impl From<Error> for Problem {
                     .with("pointer", cost.driver)
                     .findings(vec![finding], 1)
             }
+            Error::QueueFull { queued, retry_after } => {
+                #[allow(clippy::cast_precision_loss)] // a count of jobs
+                Self::new(StatusCode::SERVICE_UNAVAILABLE, "queue_full")
+                    .with("queued", queued as f64)
+                    .retry_after(retry_after)
+            }
+            Error::IdempotencyKeyReused(job) => {
+                Self::new(StatusCode::UNPROCESSABLE_ENTITY, "idempotency_key_reused").with("job", job.to_string())
+            }
+            Error::UnknownJob(job) => Self::missing("unknown_job", &job.to_string()),
+            Error::JobNotFinished { state, retry_after } => {
+                Self::new(StatusCode::CONFLICT, "job_not_finished").with("state", state.word()).retry_after(retry_after)
+            }
+            Error::JobCancelled => Self::new(StatusCode::CONFLICT, "job_cancelled"),
+            Error::JobExpired => Self::new(StatusCode::GONE, "job_expired"),
+            Error::DeadlineExceeded => Self::new(StatusCode::UNPROCESSABLE_ENTITY, "deadline_exceeded"),
+            Error::CrashedRepeatedly { attempts } => {
+                Self::new(StatusCode::INTERNAL_SERVER_ERROR, "crashed_repeatedly").with("attempts", f64::from(attempts))
+            }
             Error::Busy { retry_after } => Self::new(StatusCode::SERVICE_UNAVAILABLE, "busy").retry_after(retry_after),
             Error::Calculation(failure) => failure.into(),
             Error::Store(StoreError::Outdated(reason)) => {
@@ -266,6 +285,10 @@ impl From<Error> for Problem {
             Error::Store(StoreError::Failed(cause)) => {
                 tracing::error!(cause, "the store failed");
                 Self::new(StatusCode::SERVICE_UNAVAILABLE, "store_failed").retry_after(Duration::from_secs(1))
+            }
+            Error::Store(StoreError::Full(cause)) => {
+                tracing::error!(cause, "the disk is full");
+                Self::new(StatusCode::INSUFFICIENT_STORAGE, "disk_full")
             }
             // A direct answer is cancelled only when nobody waits for it, or at the end of a shutdown.
             Error::Cancelled | Error::ShuttingDown => Self::shutting_down(),

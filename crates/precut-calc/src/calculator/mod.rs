@@ -5,17 +5,23 @@
 //! with named numbers ([`Message`], [`Finding`]), never in sentences: the service words them.
 
 mod conflict;
+mod design;
+mod diagnosable;
 mod figure;
 mod finding;
 mod forward;
+mod hypothesis;
 mod measured;
 mod program;
 mod table;
 
 pub use conflict::{Conflict, ConstraintName, ElasticScope, Infeasible, Relaxation};
+pub use design::{Design, Grouping, Smooth};
+pub use diagnosable::{Diagnosable, Measurement, NextRun};
 pub use figure::{Axis, Figure, Frame, Glyph, Item, Panel, Role, Spacing};
 pub use finding::{Finding, Message, Value, Values, Violations};
 pub use forward::{Column as JacobianColumn, ForwardModel, Missing, Prediction, PrepareError, Quantity, Rows};
+pub use hypothesis::{Hypotheses, Hypothesis, Inapplicability, Inapplicable, Range, Shape, Treatment, Variable};
 pub use measured::{Measured, MeasuredRow};
 pub use program::{Block, Dialect, Program};
 pub use table::{Cells, Column, Table};

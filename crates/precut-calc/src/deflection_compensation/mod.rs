@@ -22,9 +22,12 @@ mod extremes;
 mod form;
 mod forward;
 mod grid;
+mod hypotheses;
 mod input;
 mod laws;
+mod measurement;
 mod model;
+mod next_runs;
 mod output;
 mod picture;
 mod power_cut;
@@ -41,6 +44,7 @@ pub use input::{
     ProgramSettings, ProgramZero, Section, Segment, Shaft, SpeedDiameter, Stations, StockRow, Support, Theory,
     Tolerance, Uncertainty,
 };
+pub use measurement::DeflectionMeasurement;
 pub use output::{
     OneMoreRest, OneStep, Outcome, PassOutcome, Path, PathZone, SecondOrder, Shares, StationColumns, StatusCompensated,
     StatusUncompensated,

@@ -111,4 +111,3 @@ fn section(job: &Job, variant: &Variant<'_>, diameter_mm: f64, bore_mm: f64) -> 
     let g = job.gravity.acceleration_m_per_s2;
     elastic::section(&job.shaft, variant.theory, variant.change.flexibility, diameter_mm, bore_mm, g)
 }
-

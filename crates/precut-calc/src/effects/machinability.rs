@@ -405,22 +405,63 @@ impl MachinabilityEffect {
         let output = None;
         Some(match (cause.kind, values) {
             ("level_shift", &[delta_ln]) => Self::LevelShift { delta_ln, output },
-            ("speed_exponent", &[delta, reference_speed_m_per_min]) => Self::SpeedExponent { delta, reference_speed_m_per_min: Some(reference_speed_m_per_min), output },
-            ("feed_exponent", &[delta, reference_feed_mm_per_rev]) => Self::FeedExponent { delta, reference_feed_mm_per_rev: Some(reference_feed_mm_per_rev), output },
-            ("depth_exponent", &[delta, reference_depth_mm]) => Self::DepthExponent { delta, reference_depth_mm: Some(reference_depth_mm), output },
-            ("angle_exponent", &[delta, reference_angle_deg]) => Self::AngleExponent { delta, reference_angle_deg: Some(reference_angle_deg), output },
-            ("speed_curvature", &[coef, reference_speed_m_per_min]) => Self::SpeedCurvature { coef, reference_speed_m_per_min: Some(reference_speed_m_per_min), output },
-            ("feed_curvature", &[coef, reference_feed_mm_per_rev]) => Self::FeedCurvature { coef, reference_feed_mm_per_rev: Some(reference_feed_mm_per_rev), output },
-            ("depth_curvature", &[coef, reference_depth_mm]) => Self::DepthCurvature { coef, reference_depth_mm: Some(reference_depth_mm), output },
-            ("speed_feed_interaction", &[coef, reference_speed_m_per_min, reference_feed_mm_per_rev]) => Self::SpeedFeedInteraction { coef, reference_speed_m_per_min: Some(reference_speed_m_per_min), reference_feed_mm_per_rev: Some(reference_feed_mm_per_rev), output },
-            ("feed_depth_interaction", &[coef, reference_feed_mm_per_rev, reference_depth_mm]) => Self::FeedDepthInteraction { coef, reference_feed_mm_per_rev: Some(reference_feed_mm_per_rev), reference_depth_mm: Some(reference_depth_mm), output },
-            ("speed_depth_interaction", &[coef, reference_speed_m_per_min, reference_depth_mm]) => Self::SpeedDepthInteraction { coef, reference_speed_m_per_min: Some(reference_speed_m_per_min), reference_depth_mm: Some(reference_depth_mm), output },
-            ("built_up_edge", &[hump_ln, centre_m_per_min, width_m_per_min]) => Self::BuiltUpEdge { hump_ln, centre_m_per_min, width_m_per_min, output },
+            ("speed_exponent", &[delta, reference_speed_m_per_min]) => {
+                Self::SpeedExponent { delta, reference_speed_m_per_min: Some(reference_speed_m_per_min), output }
+            }
+            ("feed_exponent", &[delta, reference_feed_mm_per_rev]) => {
+                Self::FeedExponent { delta, reference_feed_mm_per_rev: Some(reference_feed_mm_per_rev), output }
+            }
+            ("depth_exponent", &[delta, reference_depth_mm]) => {
+                Self::DepthExponent { delta, reference_depth_mm: Some(reference_depth_mm), output }
+            }
+            ("angle_exponent", &[delta, reference_angle_deg]) => {
+                Self::AngleExponent { delta, reference_angle_deg: Some(reference_angle_deg), output }
+            }
+            ("speed_curvature", &[coef, reference_speed_m_per_min]) => {
+                Self::SpeedCurvature { coef, reference_speed_m_per_min: Some(reference_speed_m_per_min), output }
+            }
+            ("feed_curvature", &[coef, reference_feed_mm_per_rev]) => {
+                Self::FeedCurvature { coef, reference_feed_mm_per_rev: Some(reference_feed_mm_per_rev), output }
+            }
+            ("depth_curvature", &[coef, reference_depth_mm]) => {
+                Self::DepthCurvature { coef, reference_depth_mm: Some(reference_depth_mm), output }
+            }
+            ("speed_feed_interaction", &[coef, reference_speed_m_per_min, reference_feed_mm_per_rev]) => {
+                Self::SpeedFeedInteraction {
+                    coef,
+                    reference_speed_m_per_min: Some(reference_speed_m_per_min),
+                    reference_feed_mm_per_rev: Some(reference_feed_mm_per_rev),
+                    output,
+                }
+            }
+            ("feed_depth_interaction", &[coef, reference_feed_mm_per_rev, reference_depth_mm]) => {
+                Self::FeedDepthInteraction {
+                    coef,
+                    reference_feed_mm_per_rev: Some(reference_feed_mm_per_rev),
+                    reference_depth_mm: Some(reference_depth_mm),
+                    output,
+                }
+            }
+            ("speed_depth_interaction", &[coef, reference_speed_m_per_min, reference_depth_mm]) => {
+                Self::SpeedDepthInteraction {
+                    coef,
+                    reference_speed_m_per_min: Some(reference_speed_m_per_min),
+                    reference_depth_mm: Some(reference_depth_mm),
+                    output,
+                }
+            }
+            ("built_up_edge", &[hump_ln, centre_m_per_min, width_m_per_min]) => {
+                Self::BuiltUpEdge { hump_ln, centre_m_per_min, width_m_per_min, output }
+            }
             ("nose_radius_floor", &[k, nose_radius_mm]) => Self::NoseRadiusFloor { k, nose_radius_mm, output },
             ("edge_force_offset", &[offset_n]) => Self::EdgeForceOffset { offset_n, output },
             ("wear_multiplicative", &[per_mm]) => Self::WearMultiplicative { per_mm, output },
-            ("wear_force_additive", &[n_per_mm, depth_power, reference_depth_mm]) => Self::WearForceAdditive { n_per_mm, depth_power, reference_depth_mm: Some(reference_depth_mm), output },
-            ("wear_in", &[wear_in_mm, time_constant_min, rate_mm_per_min]) => Self::WearIn { wear_in_mm, time_constant_min, rate_mm_per_min, output },
+            ("wear_force_additive", &[n_per_mm, depth_power, reference_depth_mm]) => {
+                Self::WearForceAdditive { n_per_mm, depth_power, reference_depth_mm: Some(reference_depth_mm), output }
+            }
+            ("wear_in", &[wear_in_mm, time_constant_min, rate_mm_per_min]) => {
+                Self::WearIn { wear_in_mm, time_constant_min, rate_mm_per_min, output }
+            }
             _ => return None,
         })
     }
@@ -471,7 +512,14 @@ const fn amplitude(name: &'static str, unit: &'static str, prior_sd: f64, lower:
     Parameter { name, unit, fit: Fit::Amplitude, prior_sd, lower, upper }
 }
 
-const fn shape(name: &'static str, unit: &'static str, grid: &'static [f64], prior_sd: f64, lower: f64, upper: f64) -> Parameter {
+const fn shape(
+    name: &'static str,
+    unit: &'static str,
+    grid: &'static [f64],
+    prior_sd: f64,
+    lower: f64,
+    upper: f64,
+) -> Parameter {
     Parameter { name, unit, fit: Fit::Shape { grid }, prior_sd, lower, upper }
 }
 
@@ -498,23 +546,140 @@ const fn cause(
 /// the logarithm of the output, or with `semi_log` the output in its unit.
 pub const CAUSES: &[Cause] = &[
     cause("level_shift", "diagnosis/5.1", &[amplitude("delta_ln", "1", 0.2, -3.0, 3.0)], &[], &[]),
-    cause("batch_shift", "diagnosis/5.2", &[amplitude("delta_ln", "1", 0.15, -3.0, 3.0)], &["batch"], &["wear_multiplicative"]),
-    cause("factor_shift", "diagnosis/5.3", &[amplitude("delta_ln", "1", 0.15, -3.0, 3.0)], &["factors"], &["batch_shift"]),
-    cause("speed_exponent", "diagnosis/5.4", &[amplitude("delta", "1", 0.15, -3.0, 3.0), REFERENCE_SPEED], &[], &["speed_curvature"]),
-    cause("feed_exponent", "diagnosis/5.5", &[amplitude("delta", "1", 0.15, -3.0, 3.0), REFERENCE_FEED], &[], &["feed_curvature"]),
-    cause("depth_exponent", "diagnosis/5.6", &[amplitude("delta", "1", 0.15, -3.0, 3.0), REFERENCE_DEPTH], &[], &["depth_curvature"]),
+    cause(
+        "batch_shift",
+        "diagnosis/5.2",
+        &[amplitude("delta_ln", "1", 0.15, -3.0, 3.0)],
+        &["batch"],
+        &["wear_multiplicative"],
+    ),
+    cause(
+        "factor_shift",
+        "diagnosis/5.3",
+        &[amplitude("delta_ln", "1", 0.15, -3.0, 3.0)],
+        &["factors"],
+        &["batch_shift"],
+    ),
+    cause(
+        "speed_exponent",
+        "diagnosis/5.4",
+        &[amplitude("delta", "1", 0.15, -3.0, 3.0), REFERENCE_SPEED],
+        &[],
+        &["speed_curvature"],
+    ),
+    cause(
+        "feed_exponent",
+        "diagnosis/5.5",
+        &[amplitude("delta", "1", 0.15, -3.0, 3.0), REFERENCE_FEED],
+        &[],
+        &["feed_curvature"],
+    ),
+    cause(
+        "depth_exponent",
+        "diagnosis/5.6",
+        &[amplitude("delta", "1", 0.15, -3.0, 3.0), REFERENCE_DEPTH],
+        &[],
+        &["depth_curvature"],
+    ),
     cause("angle_exponent", "diagnosis/5.7", &[amplitude("delta", "1", 0.15, -3.0, 3.0), REFERENCE_ANGLE], &[], &[]),
-    cause("speed_curvature", "diagnosis/5.8", &[amplitude("coef", "1", 0.1, -3.0, 3.0), REFERENCE_SPEED], &[], &["speed_exponent"]),
-    cause("feed_curvature", "diagnosis/5.9", &[amplitude("coef", "1", 0.1, -3.0, 3.0), REFERENCE_FEED], &[], &["feed_exponent"]),
-    cause("depth_curvature", "diagnosis/5.10", &[amplitude("coef", "1", 0.1, -3.0, 3.0), REFERENCE_DEPTH], &[], &["depth_exponent"]),
-    cause("speed_feed_interaction", "diagnosis/5.11", &[amplitude("coef", "1", 0.1, -3.0, 3.0), REFERENCE_SPEED, REFERENCE_FEED], &[], &["speed_exponent", "feed_exponent"]),
-    cause("feed_depth_interaction", "diagnosis/5.12", &[amplitude("coef", "1", 0.1, -3.0, 3.0), REFERENCE_FEED, REFERENCE_DEPTH], &[], &["feed_exponent", "depth_exponent"]),
-    cause("speed_depth_interaction", "diagnosis/5.13", &[amplitude("coef", "1", 0.1, -3.0, 3.0), REFERENCE_SPEED, REFERENCE_DEPTH], &[], &["speed_exponent", "depth_exponent"]),
+    cause(
+        "speed_curvature",
+        "diagnosis/5.8",
+        &[amplitude("coef", "1", 0.1, -3.0, 3.0), REFERENCE_SPEED],
+        &[],
+        &["speed_exponent"],
+    ),
+    cause(
+        "feed_curvature",
+        "diagnosis/5.9",
+        &[amplitude("coef", "1", 0.1, -3.0, 3.0), REFERENCE_FEED],
+        &[],
+        &["feed_exponent"],
+    ),
+    cause(
+        "depth_curvature",
+        "diagnosis/5.10",
+        &[amplitude("coef", "1", 0.1, -3.0, 3.0), REFERENCE_DEPTH],
+        &[],
+        &["depth_exponent"],
+    ),
+    cause(
+        "speed_feed_interaction",
+        "diagnosis/5.11",
+        &[amplitude("coef", "1", 0.1, -3.0, 3.0), REFERENCE_SPEED, REFERENCE_FEED],
+        &[],
+        &["speed_exponent", "feed_exponent"],
+    ),
+    cause(
+        "feed_depth_interaction",
+        "diagnosis/5.12",
+        &[amplitude("coef", "1", 0.1, -3.0, 3.0), REFERENCE_FEED, REFERENCE_DEPTH],
+        &[],
+        &["feed_exponent", "depth_exponent"],
+    ),
+    cause(
+        "speed_depth_interaction",
+        "diagnosis/5.13",
+        &[amplitude("coef", "1", 0.1, -3.0, 3.0), REFERENCE_SPEED, REFERENCE_DEPTH],
+        &[],
+        &["speed_exponent", "depth_exponent"],
+    ),
     cause("factor_interaction", "diagnosis/5.14", &[amplitude("delta_ln", "1", 0.3, -3.0, 3.0)], &["factors"], &[]),
-    cause("built_up_edge", "diagnosis/5.15", &[amplitude("hump_ln", "1", 0.5, 0.0, 3.0), shape("centre_m_per_min", "m/min", &[25.0, 35.0, 45.0, 55.0], 10.0, 5.0, 150.0), shape("width_m_per_min", "m/min", &[12.0, 20.0, 30.0], 7.0, 3.0, 100.0)], &[], &["speed_curvature"]),
-    cause("nose_radius_floor", "diagnosis/5.16", &[shape("k", "1", &[0.5, 0.75, 1.0, 1.5, 2.0, 3.0], 1.0, 0.0, 10.0), of_job("nose_radius_mm", "mm", 0.01, 100.0)], &[], &["feed_curvature", "feed_exponent"]),
-    cause("edge_force_offset", "diagnosis/5.17", &[amplitude("offset_n", "N", 30.0, 0.0, 10_000.0)], &[], &["feed_exponent", "depth_exponent"]),
-    cause("wear_multiplicative", "diagnosis/5.18", &[amplitude("per_mm", "1/mm", 1.0, 0.0, 20.0)], &["flank_wear_mm"], &["batch_shift"]),
-    cause("wear_force_additive", "diagnosis/5.19", &[amplitude("n_per_mm", "N/mm", 300.0, 0.0, 100_000.0), shape("depth_power", "1", &[0.0, 0.25, 0.5, 1.0], 0.5, -1.0, 2.0), REFERENCE_DEPTH], &["flank_wear_mm"], &["wear_multiplicative"]),
-    cause("wear_in", "diagnosis/5.20", &[amplitude("wear_in_mm", "mm", 0.1, 0.0, 1.0), shape("time_constant_min", "min", &[2.0, 4.0, 8.0, 16.0], 4.0, 0.1, 200.0), amplitude("rate_mm_per_min", "mm/min", 0.02, 0.0, 1.0)], &["time_min"], &[]),
+    cause(
+        "built_up_edge",
+        "diagnosis/5.15",
+        &[
+            amplitude("hump_ln", "1", 0.5, 0.0, 3.0),
+            shape("centre_m_per_min", "m/min", &[25.0, 35.0, 45.0, 55.0], 10.0, 5.0, 150.0),
+            shape("width_m_per_min", "m/min", &[12.0, 20.0, 30.0], 7.0, 3.0, 100.0),
+        ],
+        &[],
+        &["speed_curvature"],
+    ),
+    cause(
+        "nose_radius_floor",
+        "diagnosis/5.16",
+        &[
+            shape("k", "1", &[0.5, 0.75, 1.0, 1.5, 2.0, 3.0], 1.0, 0.0, 10.0),
+            of_job("nose_radius_mm", "mm", 0.01, 100.0),
+        ],
+        &[],
+        &["feed_curvature", "feed_exponent"],
+    ),
+    cause(
+        "edge_force_offset",
+        "diagnosis/5.17",
+        &[amplitude("offset_n", "N", 30.0, 0.0, 10_000.0)],
+        &[],
+        &["feed_exponent", "depth_exponent"],
+    ),
+    cause(
+        "wear_multiplicative",
+        "diagnosis/5.18",
+        &[amplitude("per_mm", "1/mm", 1.0, 0.0, 20.0)],
+        &["flank_wear_mm"],
+        &["batch_shift"],
+    ),
+    cause(
+        "wear_force_additive",
+        "diagnosis/5.19",
+        &[
+            amplitude("n_per_mm", "N/mm", 300.0, 0.0, 100_000.0),
+            shape("depth_power", "1", &[0.0, 0.25, 0.5, 1.0], 0.5, -1.0, 2.0),
+            REFERENCE_DEPTH,
+        ],
+        &["flank_wear_mm"],
+        &["wear_multiplicative"],
+    ),
+    cause(
+        "wear_in",
+        "diagnosis/5.20",
+        &[
+            amplitude("wear_in_mm", "mm", 0.1, 0.0, 1.0),
+            shape("time_constant_min", "min", &[2.0, 4.0, 8.0, 16.0], 4.0, 0.1, 200.0),
+            amplitude("rate_mm_per_min", "mm/min", 0.02, 0.0, 1.0),
+        ],
+        &["time_min"],
+        &[],
+    ),
 ];

@@ -83,14 +83,19 @@ pub(super) fn warnings(job: &Job, case: &Case, outcome: &Outcome, at: &[(f64, f6
         }
     }
     if outcome.certificate.local && !matches!(job.method, Method::EqualDeflection { .. }) {
-        out.push(Finding::new("local_optimum", "/effects").with("linearisations", f64::from(outcome.certificate.linearisations)));
+        out.push(
+            Finding::new("local_optimum", "/effects")
+                .with("linearisations", f64::from(outcome.certificate.linearisations)),
+        );
     }
     if let (Some(found), Method::Continuous { loss_percent, .. }) = (&outcome.continuous, &job.method)
         && !found.loss_reached
     {
-        out.push(
-            Finding::new("loss_not_reached", "/method/segments_max").measured(found.loss_percent, *loss_percent, "percent"),
-        );
+        out.push(Finding::new("loss_not_reached", "/method/segments_max").measured(
+            found.loss_percent,
+            *loss_percent,
+            "percent",
+        ));
     }
     let kappa = job.limits.as_ref().map_or(1.0, |limits| limits.deflection_residual_fraction);
     if kappa < 1.0 && job.zones.iter().any(|zone| zone.deflection_max_um.is_some()) {
@@ -104,9 +109,12 @@ fn ranges(job: &Job, case: &Case, outcome: &Outcome, out: &mut Vec<Finding>) {
     let named = Output::ALL.iter().filter_map(|output| {
         job.models.get(*output).map(|model| (format!("/models/{}", output.name()), output.name().to_owned(), model))
     });
-    let further = job.models.further.iter().enumerate().map(|(k, further)| {
-        (format!("/models/further/{k}/model"), further.name.clone(), &further.model)
-    });
+    let further = job
+        .models
+        .further
+        .iter()
+        .enumerate()
+        .map(|(k, further)| (format!("/models/further/{k}/model"), further.name.clone(), &further.model));
     let mut unsure = 0;
     for (pointer, name, model) in named.chain(further) {
         one_range(job, case, outcome, &pointer, &name, model, out);
@@ -216,10 +224,19 @@ fn unused(job: &Job, out: &mut Vec<Finding>) {
         }
     };
     idle(job.shaft.is_none() && !job.supports.is_empty(), "/supports");
-    idle(job.variables.fixed_feed_mm_per_rev.is_some() && job.variables.feed != super::input::FeedMode::Fixed, "/variables/fixed_feed_mm_per_rev");
-    idle(job.variables.fixed_speed_m_per_min.is_some() && job.variables.speed != super::input::SpeedMode::Fixed, "/variables/fixed_speed_m_per_min");
+    idle(
+        job.variables.fixed_feed_mm_per_rev.is_some() && job.variables.feed != super::input::FeedMode::Fixed,
+        "/variables/fixed_feed_mm_per_rev",
+    );
+    idle(
+        job.variables.fixed_speed_m_per_min.is_some() && job.variables.speed != super::input::SpeedMode::Fixed,
+        "/variables/fixed_speed_m_per_min",
+    );
     let limits = job.limits.as_ref();
-    idle(limits.is_some_and(|limits| limits.feed_step_ratio_max.is_some()) && job.zones.len() < 2, "/limits/feed_step_ratio_max");
+    idle(
+        limits.is_some_and(|limits| limits.feed_step_ratio_max.is_some()) && job.zones.len() < 2,
+        "/limits/feed_step_ratio_max",
+    );
 }
 
 /// What is to be said of the answer, the most important first.
@@ -304,7 +321,11 @@ pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
         out.push(Message::new("rule_has_no_optimum"));
     } else {
         let gap = outcome.certificate.duality_gap.max(1e-16);
-        out.push(Message::new("optimum_within").with("gap", gap).with("iterations", f64::from(outcome.certificate.iterations)));
+        out.push(
+            Message::new("optimum_within")
+                .with("gap", gap)
+                .with("iterations", f64::from(outcome.certificate.iterations)),
+        );
     }
     out
 }
@@ -314,7 +335,10 @@ pub(super) fn basis(job: &Job) -> Vec<Basis> {
     let mut used = vec![
         Basis { equation: "feed/2.1", source: "machinability models of the job" },
         Basis { equation: "feed/6.1", source: "geometric program in ln V, ln S" },
-        Basis { equation: "feed/6.3", source: "primal-dual interior-point method (Mehrotra), optimality by its multipliers" },
+        Basis {
+            equation: "feed/6.3",
+            source: "primal-dual interior-point method (Mehrotra), optimality by its multipliers",
+        },
     ];
     if job.shaft.is_some() {
         used.push(Basis { equation: "feed/3.1", source: "beam of the deflection calculator" });
@@ -323,7 +347,9 @@ pub(super) fn basis(job: &Job) -> Vec<Basis> {
         Method::EqualDeflection { .. } => {
             used.push(Basis { equation: "feed/4.1", source: "turning of gas-turbine shafts of variable stiffness" });
         }
-        Method::Continuous { .. } => used.push(Basis { equation: "feed/8.3", source: "dynamic programming over the grid" }),
+        Method::Continuous { .. } => {
+            used.push(Basis { equation: "feed/8.3", source: "dynamic programming over the grid" })
+        }
         Method::Optimal => {}
     }
     if job.passes.is_some() {
@@ -332,6 +358,8 @@ pub(super) fn basis(job: &Job) -> Vec<Basis> {
     if job.compensation.is_some() {
         used.push(Basis { equation: "feed/9.1", source: "deflection calculator" });
     }
-    used.extend(job.effects.iter().map(|effect| Basis { equation: effect.cause().equation, source: "catalogue of effects" }));
+    used.extend(
+        job.effects.iter().map(|effect| Basis { equation: effect.cause().equation, source: "catalogue of effects" }),
+    );
     used
 }

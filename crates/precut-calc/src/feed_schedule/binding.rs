@@ -78,10 +78,7 @@ fn has_parallel(solved: &Solved, row: usize) -> bool {
             return false;
         }
         let entries: Vec<(usize, f64)> = rows.entries(other).collect();
-        let dot: f64 = own
-            .iter()
-            .map(|(i, a)| a * entries.iter().find(|(j, _)| i == j).map_or(0.0, |(_, b)| *b))
-            .sum();
+        let dot: f64 = own.iter().map(|(i, a)| a * entries.iter().find(|(j, _)| i == j).map_or(0.0, |(_, b)| *b)).sum();
         dot >= (1.0 - 1e-12) * norm(&own) * norm(&entries) && dot > 0.0
     })
 }

@@ -275,9 +275,8 @@ impl Case {
 
     fn add_couplings(&mut self, job: &Job) {
         for coupling in &job.couplings {
-            let find = |name: &str| {
-                self.zones.iter().position(|zone| zone.id == name || zone.id == format!("{name}:finish"))
-            };
+            let find =
+                |name: &str| self.zones.iter().position(|zone| zone.id == name || zone.id == format!("{name}:finish"));
             let terms: Option<Vec<(usize, f64, f64)>> = coupling
                 .terms
                 .iter()

@@ -71,8 +71,7 @@ fn check_shaft(job: &Job, violations: &mut Violations) {
             support,
             Support::SteadyRest { one_sided: true, .. } | Support::FollowRest { one_sided: true, .. }
         );
-        violations
-            .require(!one_sided, || Finding::new("one_sided_rest", format!("/supports/{i}")).with("rest", i));
+        violations.require(!one_sided, || Finding::new("one_sided_rest", format!("/supports/{i}")).with("rest", i));
     }
 }
 
@@ -160,10 +159,9 @@ fn check_limits(job: &Job, limits: &Limits, violations: &mut Violations) {
             order(limits.feed_min_mm_per_rev, own, &format!("/zones/{i}/feed_max_mm_per_rev"), "mm/rev");
         }
     }
-    violations
-        .require(!(limits.whole_parts_per_edge && limits.tool_usage_scope == UsageScope::Surface), || {
-            Finding::new("whole_parts_per_surface", "/limits/whole_parts_per_edge")
-        });
+    violations.require(!(limits.whole_parts_per_edge && limits.tool_usage_scope == UsageScope::Surface), || {
+        Finding::new("whole_parts_per_surface", "/limits/whole_parts_per_edge")
+    });
 }
 
 /// Every limit and objective has the models that it needs.
@@ -192,7 +190,9 @@ fn check_needs(job: &Job, violations: &mut Violations) {
         need(limits.deflection_spread_ratio_max.is_some(), Output::ForceY, "deflection_spread_ratio_max");
     }
     match &job.objective {
-        Goal::Time { tool_change_time_min, .. } => need(*tool_change_time_min > 0.0, Output::ToolLife, "tool_change_time_min"),
+        Goal::Time { tool_change_time_min, .. } => {
+            need(*tool_change_time_min > 0.0, Output::ToolLife, "tool_change_time_min")
+        }
         Goal::Cost { tool_change_time_min, edge_cost, .. } => {
             need(*tool_change_time_min > 0.0 || *edge_cost > 0.0, Output::ToolLife, "edge_cost");
         }
@@ -267,14 +267,18 @@ fn check_named(job: &Job, violations: &mut Violations) {
             .and_then(|set| set.models.iter().find(|model| model.output == output));
         let form = found.map(|further| further.model.form).or(of_library.map(|model| model.form));
         match form {
-            None => violations.add(Finding::new("unknown_output", format!("{at}/output")).with("output", output.clone())),
+            None => {
+                violations.add(Finding::new("unknown_output", format!("{at}/output")).with("output", output.clone()))
+            }
             Some(ModelForm::SemiLog) => {
                 let plain = custom.constant == 0.0
                     && custom.speed_exponent == 0.0
                     && custom.feed_exponent == 0.0
                     && custom.depth_exponent == 0.0;
                 violations.require(plain, || {
-                    Finding::new("model_not_convex", at.clone()).with("output", output.clone()).with("reason", "product")
+                    Finding::new("model_not_convex", at.clone())
+                        .with("output", output.clone())
+                        .with("reason", "product")
                 });
             }
             Some(ModelForm::LogLog) => {}
@@ -319,7 +323,8 @@ fn check_method(job: &Job, violations: &mut Violations) {
     if matches!(job.method, Method::Continuous { .. }) {
         violations.require(matches!(job.objective, Goal::Time { .. }), || together("another objective than time"));
         violations.require(job.variables.feed == FeedMode::PerZone, || together("a common feed"));
-        violations.require(job.custom.iter().all(|custom| custom.zone == "all"), || together("custom limits of one zone"));
+        violations
+            .require(job.custom.iter().all(|custom| custom.zone == "all"), || together("custom limits of one zone"));
         violations.require(job.couplings.is_empty(), || together("couplings"));
         let whole = job.limits.as_ref().is_some_and(|limits| limits.whole_parts_per_edge);
         violations.require(!whole, || together("whole parts per edge"));

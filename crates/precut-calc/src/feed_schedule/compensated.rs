@@ -65,7 +65,8 @@ fn deflection_job(job: &Job, zone: &ZoneCase, u: f64, x: f64, wanted: &Compensat
     for segment in &mut shaft.segments {
         let right = left + segment.length_mm;
         let cut = right > zone.from_mm + INSIDE_MM && left < zone.to_mm - INSIDE_MM;
-        segment.stock_diameter_mm = Some(if cut { segment.diameter_mm + 2.0 * zone.depth_mm } else { segment.diameter_mm });
+        segment.stock_diameter_mm =
+            Some(if cut { segment.diameter_mm + 2.0 * zone.depth_mm } else { segment.diameter_mm });
         left = right;
     }
     let count = wanted.stations_per_zone as usize;
@@ -92,10 +93,7 @@ fn deflection_job(job: &Job, zone: &ZoneCase, u: f64, x: f64, wanted: &Compensat
         detail: Detail::Full,
         tolerance: Tolerance::default(),
         uncertainty: Uncertainty::default(),
-        path: PathSettings {
-            chord_tolerance_um: Some(wanted.chord_tolerance_um),
-            increment_um: wanted.increment_um,
-        },
+        path: PathSettings { chord_tolerance_um: Some(wanted.chord_tolerance_um), increment_um: wanted.increment_um },
         program: job.program.clone(),
         limits: deflection::Limits::default(),
         effects: Vec::new(),

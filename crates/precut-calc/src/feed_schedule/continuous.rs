@@ -45,8 +45,11 @@ pub(super) fn find(
     let forced = grid.stretches.len();
     if cuts.is_empty() {
         return Err(Failure::OutOfModel(
-            crate::calculator::Finding::new("too_few_segments", "/method/segments_max")
-                .measured(asked.segments_max as f64, forced as f64, "1"),
+            crate::calculator::Finding::new("too_few_segments", "/method/segments_max").measured(
+                asked.segments_max as f64,
+                forced as f64,
+                "1",
+            ),
         )
         .into());
     }
@@ -159,7 +162,9 @@ fn explicit(base: &Case, grid: &Grid, held: Option<&Held>, gradient: Option<f64>
     let usage = |x: &[f64]| -> f64 {
         let density: Vec<f64> = (0..x.len())
             .map(|k| {
-                let life = base.zones[grid.zone[k]].model(Output::ToolLife).map_or(f64::INFINITY, |t| t.output(speed.ln(), x[k]));
+                let life = base.zones[grid.zone[k]]
+                    .model(Output::ToolLife)
+                    .map_or(f64::INFINITY, |t| t.output(speed.ln(), x[k]));
                 works[k] / (speed * x[k].exp() * life)
             })
             .collect();
@@ -171,7 +176,10 @@ fn explicit(base: &Case, grid: &Grid, held: Option<&Held>, gradient: Option<f64>
     {
         // At one speed the free minimiser of time plus usage is one feed for all points of a depth; a cap on the feed is
         // its image, and usage falls with it while the feed exponent of the tool life is below -1.
-        let (mut low, mut high) = (lowest.iter().copied().fold(f64::INFINITY, f64::min), highest.iter().copied().fold(f64::NEG_INFINITY, f64::max));
+        let (mut low, mut high) = (
+            lowest.iter().copied().fold(f64::INFINITY, f64::min),
+            highest.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+        );
         if usage(&enveloped(low)) > most || !one_depth(base) {
             return None;
         }
@@ -285,9 +293,10 @@ fn by_program(
 fn solve_cells(case: &Case, gradient: Option<f64>, monitor: &dyn Monitor) -> Result<Solved, Unsolved> {
     let Some(g) = gradient else { return solve(case, false, monitor) };
     if case.bends() {
-        return Err(Failure::OutOfModel(
-            crate::calculator::Finding::new("gradient_with_bending_model", "/method/feed_gradient_per_mm"),
-        )
+        return Err(Failure::OutOfModel(crate::calculator::Finding::new(
+            "gradient_with_bending_model",
+            "/method/feed_gradient_per_mm",
+        ))
         .into());
     }
     let mut built = build(case, &Variation::default());
@@ -302,8 +311,8 @@ fn solve_cells(case: &Case, gradient: Option<f64>, monitor: &dyn Monitor) -> Res
             built.program.rows.push(&[(right, 1.0), (left, -1.0)], -g * apart);
         }
     }
-    let solution = gp::minimise(&built.program, &gp::Settings::default())
-        .map_err(|_| Unsolved::Infeasible(Box::default()))?;
+    let solution =
+        gp::minimise(&built.program, &gp::Settings::default()).map_err(|_| Unsolved::Infeasible(Box::default()))?;
     let at = (0..case.zones.len()).map(|i| (built.speed[i].at(&solution.y), built.feed[i].at(&solution.y))).collect();
     let objective = solution.objective.exp() + built.fixed;
     Ok(Solved {
@@ -324,7 +333,11 @@ fn solve_cells(case: &Case, gradient: Option<f64>, monitor: &dyn Monitor) -> Res
 fn none(base: &Case, monitor: &dyn Monitor) -> Unsolved {
     match solve(base, true, monitor) {
         Err(unsolved) => unsolved,
-        Ok(_) => Unsolved::Failed(Failure::NotConverged { what: "the continuous schedule", residual: f64::NAN, iterations: 0 }),
+        Ok(_) => Unsolved::Failed(Failure::NotConverged {
+            what: "the continuous schedule",
+            residual: f64::NAN,
+            iterations: 0,
+        }),
     }
 }
 
@@ -405,8 +418,7 @@ fn case_of_cut(base: &Case, grid: &Grid, cut: &segments::Cut, held: Option<&Held
         {
             piece.compliance_um_per_n = Some(c[k]);
         }
-        piece.touches_next =
-            stretches.get(k + 1).is_some_and(|next| (next.0 - to).abs() <= super::case::TOUCHING_MM);
+        piece.touches_next = stretches.get(k + 1).is_some_and(|next| (next.0 - to).abs() <= super::case::TOUCHING_MM);
         add_zone(&mut case, base, zone, piece);
     }
     case

@@ -203,7 +203,11 @@ impl ForwardModel for FeedSchedule {
 
     fn predict_cost(prepared: &PreparedMachinability) -> Cost {
         // About 0.2 us per row: a few logarithms and an exponential.
-        Cost { ms: 0.0002 * prepared.rows.len() as f64, bytes: 300 * prepared.rows.len() as u64, driver: "/measurements" }
+        Cost {
+            ms: 0.0002 * prepared.rows.len() as f64,
+            bytes: 300 * prepared.rows.len() as u64,
+            driver: "/measurements",
+        }
     }
 }
 

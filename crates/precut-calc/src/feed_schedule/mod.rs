@@ -11,7 +11,7 @@
 //! linearisation), or `infeasible` -> `assess`, `binding` -> `run` (comparison, trade-off) -> `output`, `picture`,
 //! `toolpath`, `advice`. `rule` is the source paper's method; `continuous` and `segments` find zones; `passes` finds
 //! the split into passes; `compensated` asks the deflection calculator for the path; `forward` gives the models to the
-//! diagnosis.
+//! diagnosis. `fit` fits the models to trials.
 
 mod acting;
 mod advice;
@@ -23,6 +23,7 @@ mod compensated;
 mod compliance;
 mod continuous;
 mod effects;
+pub mod fit;
 mod forward;
 mod infeasible;
 mod input;

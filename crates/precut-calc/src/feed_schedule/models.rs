@@ -177,8 +177,12 @@ fn of_force(force: &ForceModel, output: Output) -> Option<MachinabilityModel> {
         _ => return None,
     };
     let power = force.monomial(component)?;
-    let mut model =
-        MachinabilityModel::power_law(power.coefficient.ln(), power.speed_exponent, power.feed_exponent, power.depth_exponent);
+    let mut model = MachinabilityModel::power_law(
+        power.coefficient.ln(),
+        power.speed_exponent,
+        power.feed_exponent,
+        power.depth_exponent,
+    );
     model.source = Some("force model of the job".to_owned());
     Some(model)
 }

@@ -61,9 +61,9 @@ pub(super) fn best(
             };
             Ok((case, solved, outcome))
         }
-        None => Err(why.unwrap_or_else(|| Unsolved::Failed(Failure::OutOfModel(
-            crate::calculator::Finding::new("no_pass_split", "/passes"),
-        )))),
+        None => Err(why.unwrap_or_else(|| {
+            Unsolved::Failed(Failure::OutOfModel(crate::calculator::Finding::new("no_pass_split", "/passes")))
+        })),
     }
 }
 

@@ -137,7 +137,8 @@ fn feeds(outcome: &Outcome, height: f64) -> Panel {
     let zones = shown(outcome);
     let (x, y) = steps(&zones, |zone| Some(zone.feed_mm_per_rev));
     let mut items = Vec::new();
-    if let (Some(constant), Some(first), Some(last)) = (&outcome.comparison.constant_feed, zones.first(), zones.last()) {
+    if let (Some(constant), Some(first), Some(last)) = (&outcome.comparison.constant_feed, zones.first(), zones.last())
+    {
         items.push(Item::Line {
             name: "constant_feed",
             x: vec![first.z_start_mm, last.z_end_mm],
@@ -336,7 +337,11 @@ fn passes(outcome: &Outcome) -> Table {
     Table {
         id: "passes",
         columns: vec![
-            Column::numbers("roughing_passes", "1", &all.iter().map(|p| f64::from(p.roughing_passes)).collect::<Vec<_>>()),
+            Column::numbers(
+                "roughing_passes",
+                "1",
+                &all.iter().map(|p| f64::from(p.roughing_passes)).collect::<Vec<_>>(),
+            ),
             Column::optional("finishing_depth", "mm", &all.iter().map(|p| p.finishing_depth_mm).collect::<Vec<_>>()),
             Column::optional("objective", "1", &all.iter().map(|p| p.objective).collect::<Vec<_>>()),
         ],

@@ -263,10 +263,10 @@ fn sources(case: &Case) -> (Vec<Source>, Vec<Source>, usize, usize) {
         .map(|(i, zone)| match v.speed {
             SpeedMode::PerZone => Source { variable: Some(i * stride), constant: 0.0 },
             SpeedMode::ConstantSpeed => Source { variable: common_speed, constant: 0.0 },
-            SpeedMode::ConstantRpm => Source { variable: common_speed, constant: (PI * zone.diameter_mm / 1000.0).ln() },
-            SpeedMode::Fixed => {
-                Source { variable: None, constant: v.fixed_speed_m_per_min.unwrap_or(f64::NAN).ln() }
+            SpeedMode::ConstantRpm => {
+                Source { variable: common_speed, constant: (PI * zone.diameter_mm / 1000.0).ln() }
             }
+            SpeedMode::Fixed => Source { variable: None, constant: v.fixed_speed_m_per_min.unwrap_or(f64::NAN).ln() },
         })
         .collect();
     let feed = (0..n)
@@ -612,7 +612,10 @@ pub(super) fn second_objective(case: &Case, built: &Built) -> Objective {
     let n = case.zones.len();
     let entry = |source: Source, a: f64| source.variable.map_or((0, 0.0), |variable| (variable, a));
     let is_time = Rates::of(case).is_some();
-    let life = case.zones.iter().all(|zone| zone.model(Output::ToolLife).is_some_and(|t| t.bends() == super::acting::Bend::Straight));
+    let life = case
+        .zones
+        .iter()
+        .all(|zone| zone.model(Output::ToolLife).is_some_and(|t| t.bends() == super::acting::Bend::Straight));
     if is_time && !life {
         let mut form = Affines::new();
         let entries: Vec<(usize, f64)> = built.speed.iter().map(|&source| entry(source, 1.0)).collect();
@@ -622,10 +625,9 @@ pub(super) fn second_objective(case: &Case, built: &Built) -> Objective {
     let mut terms = Affines::with_capacity(n, 2 * n);
     for i in 0..n {
         let (v, s, c) = if is_time {
-            let form = case.zones[i].model(Output::ToolLife).map_or(
-                Form { constant: 0.0, speed: 0.0, feed: 0.0, log_log: true },
-                |t| t.form(0.0, 0.0),
-            );
+            let form = case.zones[i]
+                .model(Output::ToolLife)
+                .map_or(Form { constant: 0.0, speed: 0.0, feed: 0.0, log_log: true }, |t| t.form(0.0, 0.0));
             (-1.0 - form.speed, -1.0 - form.feed, -form.constant)
         } else {
             (-1.0, -1.0, 0.0)

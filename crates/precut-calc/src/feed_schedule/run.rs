@@ -241,12 +241,15 @@ fn comparison(found: &Found, time_min: f64, monitor: &dyn Monitor) -> Result<Com
         match solve(&case, false, monitor) {
             Ok(solved) => {
                 let time = assess::cutting_time_min(&case, &solved.at);
-                constant_feed = Some((solved.at.clone(), ConstantFeed {
-                    feed_mm_per_rev: solved.at[0].1.exp(),
-                    cutting_time_min: time,
-                    objective: solved.objective,
-                    time_saved_percent: 100.0 * (1.0 - time_min / time),
-                }));
+                constant_feed = Some((
+                    solved.at.clone(),
+                    ConstantFeed {
+                        feed_mm_per_rev: solved.at[0].1.exp(),
+                        cutting_time_min: time,
+                        objective: solved.objective,
+                        time_saved_percent: 100.0 * (1.0 - time_min / time),
+                    },
+                ));
             }
             Err(Unsolved::Failed(Failure::Cancelled)) => return Err(Failure::Cancelled),
             // No single feed meets all limits, or none was found: there is nothing to compare with.
@@ -331,9 +334,7 @@ pub(super) fn broken(case: &Case, at: &[(f64, f64)]) -> Vec<(crate::calculator::
     let rows = built.rows.iter().enumerate().map(|(row, label)| (label, built.program.rows.value(row, &y)));
     let sums = built.sums.iter().zip(&built.program.sums).map(|(label, terms)| (label, terms.log_sum_exp(&y)));
     rows.chain(sums)
-        .filter(|(label, value)| {
-            label.kind.is_limit() && label.kind != super::program::Kind::Spread && *value > 1e-9
-        })
+        .filter(|(label, value)| label.kind.is_limit() && label.kind != super::program::Kind::Spread && *value > 1e-9)
         .map(|(label, value)| {
             let factor = if label.plain { 1.0 + value / label.limit } else { value.exp() };
             (label.name(case), factor)

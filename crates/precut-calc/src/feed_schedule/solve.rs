@@ -142,7 +142,8 @@ fn finish(
         }
         Goal::Deflection {} | Goal::Roughness {} => (certificate.objective.exp(), 1.0),
         Goal::Hardening {} => {
-            let plain = case.zones.iter().filter_map(|zone| zone.model(Output::Hardening)).all(|m| !m.form(0.0, 0.0).log_log);
+            let plain =
+                case.zones.iter().filter_map(|zone| zone.model(Output::Hardening)).all(|m| !m.form(0.0, 0.0).log_log);
             (if plain { certificate.objective } else { certificate.objective.exp() }, 1.0)
         }
     };
@@ -234,8 +235,7 @@ fn broken_tie(case: &Case, built: &Built, first: &Solution) -> Option<Vec<f64>> 
 fn linearised(case: &Case, parts: Option<u32>, why: bool, monitor: &dyn Monitor) -> Result<Solved, Unsolved> {
     let start = build(case, &Variation { parts_per_edge: parts, about: None });
     let y = &start.program.start;
-    let mut at: Vec<(f64, f64)> =
-        (0..case.zones.len()).map(|i| (start.speed[i].at(y), start.feed[i].at(y))).collect();
+    let mut at: Vec<(f64, f64)> = (0..case.zones.len()).map(|i| (start.speed[i].at(y), start.feed[i].at(y))).collect();
     let mut radius = f64::INFINITY;
     let mut before: Option<Vec<(f64, f64)>> = None;
     for round in 1..=LINEARISATIONS {
@@ -262,9 +262,9 @@ fn linearised(case: &Case, parts: Option<u32>, why: bool, monitor: &dyn Monitor)
             solved.local = !convex(case);
             return Ok(solved);
         }
-        let turned = before.as_ref().is_some_and(|before| {
-            before.iter().zip(&step).map(|(a, b)| a.0 * b.0 + a.1 * b.1).sum::<f64>() < 0.0
-        });
+        let turned = before
+            .as_ref()
+            .is_some_and(|before| before.iter().zip(&step).map(|(a, b)| a.0 * b.0 + a.1 * b.1).sum::<f64>() < 0.0);
         radius = if !radius.is_finite() {
             1.0
         } else if turned {

@@ -164,9 +164,10 @@ fn limits_of_zones(job: &Job, outcome: &Outcome, held: Option<&Held>) -> Result<
             .zones
             .iter()
             .filter_map(|given| {
-                let own = base.zones.iter().find(|own| {
-                    own.from_mm <= given.z_start_mm + 1e-6 && own.to_mm >= given.z_end_mm - 1e-6
-                })?;
+                let own = base
+                    .zones
+                    .iter()
+                    .find(|own| own.from_mm <= given.z_start_mm + 1e-6 && own.to_mm >= given.z_end_mm - 1e-6)?;
                 let mut piece = own.clone();
                 (piece.from_mm, piece.to_mm) = (given.z_start_mm, given.z_end_mm);
                 piece.compliance_um_per_n = given.compliance_um_per_n;

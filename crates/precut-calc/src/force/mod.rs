@@ -24,6 +24,8 @@ pub use monomial::Monomial;
 pub use power::{CoefficientOrigin, MeasuredRange, PowerLaw, PowerTerm};
 pub use table::{ForceRow, ForceTable};
 
+pub(crate) use schema::choice;
+
 use crate::calculator::{Basis, Finding, Violations};
 use serde::{Deserialize, Serialize};
 use utoipa::openapi::extensions::Extensions;

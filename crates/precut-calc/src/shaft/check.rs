@@ -78,4 +78,3 @@ pub(crate) fn supports(shaft: &Shaft, supports: &[Support], violations: &mut Vio
     violations
         .require(chuck || carrying >= 2, || Finding::new("unstable_support", "/supports").with("carrying", carrying));
 }
-

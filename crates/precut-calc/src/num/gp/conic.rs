@@ -108,8 +108,8 @@ pub fn minimise(program: &Program, tolerance: f64) -> Result<Solution, NotSolved
         tol_feas: tolerance,
         ..DefaultSettings::default()
     };
-    let mut solver = DefaultSolver::new(&p, &q, &a, &cones.right, &kinds, settings)
-        .map_err(|error| NotSolved(error.to_string()))?;
+    let mut solver =
+        DefaultSolver::new(&p, &q, &a, &cones.right, &kinds, settings).map_err(|error| NotSolved(error.to_string()))?;
     solver.solve();
     let found = &solver.solution;
     if !matches!(found.status, SolverStatus::Solved | SolverStatus::AlmostSolved) {

@@ -151,12 +151,9 @@ impl Method {
         self.product.iter_mut().for_each(|p| *p = 0.0);
         self.direction(layout, 0.0, refine);
         let (primal, dual) = self.reach();
-        let (affine_primal, affine_dual) =
-            if curved { (primal.min(dual), primal.min(dual)) } else { (primal, dual) };
+        let (affine_primal, affine_dual) = if curved { (primal.min(dual), primal.min(dual)) } else { (primal, dual) };
         let affine: f64 = (0..self.ds.len())
-            .map(|k| {
-                (self.state.s[k] + affine_primal * self.ds[k]) * (self.state.z[k] + affine_dual * self.dz[k])
-            })
+            .map(|k| (self.state.s[k] + affine_primal * self.ds[k]) * (self.state.z[k] + affine_dual * self.dz[k]))
             .sum::<f64>()
             / m;
         let centring = (affine / mu).powi(3);
@@ -186,8 +183,7 @@ impl Method {
     fn direction(&mut self, layout: &Layout, target: f64, refine: bool) {
         let state = &self.state;
         for k in 0..self.weight.len() {
-            self.weight[k] =
-                (target - self.product[k]) / state.s[k] + self.newton.ratio[k] * state.residual[k];
+            self.weight[k] = (target - self.product[k]) / state.s[k] + self.newton.ratio[k] * state.residual[k];
         }
         state.gradient(layout, &self.weight, &mut self.right);
         for r in &mut self.right {
@@ -201,8 +197,7 @@ impl Method {
         state.slopes(layout, &self.dy, &mut self.ds);
         for k in 0..self.ds.len() {
             self.ds[k] = -state.residual[k] - self.ds[k];
-            self.dz[k] =
-                (target - self.product[k]) / state.s[k] - state.z[k] - self.newton.ratio[k] * self.ds[k];
+            self.dz[k] = (target - self.product[k]) / state.s[k] - state.z[k] - self.newton.ratio[k] * self.ds[k];
         }
     }
 

@@ -151,7 +151,8 @@ impl Newton {
         self.ratio.clear();
         self.ratio.extend(state.z.iter().zip(&state.s).map(|(z, s)| z / s));
         let (nl, nc) = (layout.local, layout.common);
-        let low_rank = usize::from(matches!(layout.objective, Objective::Sum(_))) + layout.sums.len() + layout.far.len();
+        let low_rank =
+            usize::from(matches!(layout.objective, Objective::Sum(_))) + layout.sums.len() + layout.far.len();
         self.matrix.reset(nl, nc + low_rank);
         let ratio = std::mem::take(&mut self.ratio);
         self.add_pairs(layout, &ratio);
