@@ -57,7 +57,6 @@ pub(super) struct ZoneCase {
 /// A custom limit in one zone.
 #[derive(Debug, Clone)]
 pub(super) struct CustomCase {
-    pub index: usize,
     pub name: String,
     pub zone: usize,
     /// Its power law at the zone's depth.
@@ -251,14 +250,13 @@ impl Case {
     }
 
     fn add_custom(&mut self, job: &Job) {
-        for (index, custom) in job.custom.iter().enumerate() {
+        for custom in &job.custom {
             for (i, zone) in self.zones.iter().enumerate() {
                 if !meant(&custom.zone, zone, &job.zones[zone.index].id) {
                     continue;
                 }
                 let constant = custom.constant + custom.depth_exponent * zone.depth_mm.ln();
                 self.custom.push(CustomCase {
-                    index,
                     name: custom.name.clone(),
                     zone: i,
                     own: Form { constant, speed: custom.speed_exponent, feed: custom.feed_exponent, log_log: true },

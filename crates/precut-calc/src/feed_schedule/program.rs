@@ -38,8 +38,6 @@ pub(super) enum Kind {
     Coupling(String),
     /// A step of successive linearisation may not go further.
     Trust,
-    /// The objective, held in the second solve.
-    Held,
     /// Part of a least-of-the-largest objective, no limit of the job.
     Epigraph,
 }
@@ -69,7 +67,6 @@ impl Kind {
             Self::FeedStep => "feed_step",
             Self::Custom(name) | Self::Coupling(name) => return Cow::Owned(name.clone()),
             Self::Trust => "trust",
-            Self::Held => "held",
             Self::Epigraph => "largest",
         })
     }
@@ -94,7 +91,7 @@ impl Kind {
 
     /// Whether it is a limit of the job.
     pub(super) fn is_limit(&self) -> bool {
-        !matches!(self, Self::Trust | Self::Held | Self::Epigraph)
+        !matches!(self, Self::Trust | Self::Epigraph)
     }
 }
 

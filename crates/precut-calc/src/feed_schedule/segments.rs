@@ -100,17 +100,16 @@ pub(super) fn cut(grid: &Grid, cost: &[f64], most: usize, monitor: &dyn Monitor)
             row[p] = least;
         }
         // The next stretch begins where this one ends, at no cost.
-        for &(first, end) in &grid.stretches {
+        for &(_, end) in &grid.stretches {
             if end < n {
                 row[end] = row[end - 1];
                 origin[end] = u32::MAX;
             }
-            let _ = first;
         }
         best.push(row);
         from.push(origin);
     }
-    Ok((1..=most).filter(|&k| best[k][n - 1].is_finite()).map(|k| trace(grid, &best, &from, k, n)).collect())
+    Ok((1..=most).filter(|&k| best[k][n - 1].is_finite()).map(|k| trace(&best, &from, k, n)).collect())
 }
 
 /// First point of the stretch of every point.
@@ -122,7 +121,7 @@ fn stretch_of(grid: &Grid, n: usize) -> Vec<usize> {
     starts
 }
 
-fn trace(grid: &Grid, best: &[Vec<f64>], from: &[Vec<u32>], segments: usize, n: usize) -> Cut {
+fn trace(best: &[Vec<f64>], from: &[Vec<u32>], segments: usize, n: usize) -> Cut {
     let (mut pieces, mut p) = (Vec::with_capacity(segments), n - 1);
     for k in (1..=segments).rev() {
         if from[k][p] == u32::MAX {
@@ -133,7 +132,6 @@ fn trace(grid: &Grid, best: &[Vec<f64>], from: &[Vec<u32>], segments: usize, n: 
         p = q;
     }
     pieces.reverse();
-    let _ = grid;
     Cut { segments, cost: best[segments][n - 1], pieces }
 }
 
