@@ -129,13 +129,9 @@ fn single_zones_in_closed_form() {
                 }
                 "objective" => near(name, outcome.objective, value.as_f64().unwrap(), 1e-6, 0.0),
                 "cutting_time_min" => near(name, outcome.cutting_time_min, value.as_f64().unwrap(), 1e-6, 0.0),
-                other => near(
-                    &format!("{name} {other}"),
-                    of_zone(&outcome, "z1", other),
-                    value.as_f64().unwrap(),
-                    1e-6,
-                    0.0,
-                ),
+                other => {
+                    near(&format!("{name} {other}"), of_zone(&outcome, "z1", other), value.as_f64().unwrap(), 1e-6, 0.0)
+                }
             }
         }
     }
@@ -177,8 +173,7 @@ fn beam_compliances() {
 
 fn pairs(set: &Value) -> Vec<(String, String)> {
     let text = |v: &Value| v.as_str().unwrap().to_owned();
-    let mut all: Vec<_> =
-        set.as_array().unwrap().iter().map(|m| (text(&m["constraint"]), text(&m["zone"]))).collect();
+    let mut all: Vec<_> = set.as_array().unwrap().iter().map(|m| (text(&m["constraint"]), text(&m["zone"]))).collect();
     all.sort();
     all
 }
@@ -342,8 +337,7 @@ fn chen_and_tsai_published_vector() {
 #[test]
 fn chen_and_tsai_passes_found() {
     for (total, roughing, finishing, cost) in [(6.0, 1, 3.0, 2.082_560_79), (8.0, 2, 8.0 / 3.0, 2.587_310_45)] {
-        let mut job: Value =
-            serde_json::from_str(include_str!("../src/feed_schedule/examples/passes.json")).unwrap();
+        let mut job: Value = serde_json::from_str(include_str!("../src/feed_schedule/examples/passes.json")).unwrap();
         job["passes"]["total_depth_mm"] = json!(total);
         let outcome = solved(job);
         let passes = outcome.passes.as_ref().unwrap();

@@ -20,8 +20,7 @@ impl Grid {
         let mut grid = Self { z_mm: Vec::new(), zone: Vec::new(), stretches: Vec::new() };
         let cells = (count - 1) as f64;
         for &(zone, from, to) in stretches {
-            // At most some thousand cells.
-            let own = ((to - from) / total * cells).round().max(1.0) as usize;
+            let own = nearest(((to - from) / total * cells).max(1.0));
             let first = grid.z_mm.len();
             let step = (to - from) / own as f64;
             for k in 0..=own {
@@ -54,6 +53,12 @@ impl Grid {
             })
             .sum()
     }
+}
+
+/// The whole number nearest to a count of at most some thousand.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 1 and the grid's few thousand")]
+fn nearest(count: f64) -> usize {
+    count.round() as usize
 }
 
 /// A way to cut the course into so many pieces.

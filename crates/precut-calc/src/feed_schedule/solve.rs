@@ -195,9 +195,8 @@ fn by_cones(program: &Program) -> Result<Option<Solution>, Failure> {
     }
     match gp::conic::minimise(program, 1e-9) {
         Ok(solution) if solution.y.iter().all(|y| y.is_finite()) => Ok(Some(solution)),
-        Ok(_) => Err(Failure::NotConverged { what: "the schedule", residual: f64::INFINITY, iterations: 200 }),
         Err(status) if status.0.contains("Infeasible") => Ok(None),
-        Err(_) => Err(Failure::NotConverged { what: "the schedule", residual: f64::INFINITY, iterations: 200 }),
+        _ => Err(Failure::NotConverged { what: "the schedule", residual: f64::INFINITY, iterations: 200 }),
     }
 }
 

@@ -47,7 +47,8 @@ pub(super) fn program(job: &Job, outcome: &Outcome) -> Result<Program, Failure> 
     let held = Held::of(job)?;
     let (case, built) = limits_of_zones(job, outcome, held.as_ref())?;
     let words = words_of_zones(job, &built, outcome, surface);
-    let at: Vec<(f64, f64)> = outcome.zones.iter().zip(&words).map(|(zone, words)| logs(zone, words, surface)).collect();
+    let at: Vec<(f64, f64)> =
+        outcome.zones.iter().zip(&words).map(|(zone, words)| logs(zone, words, surface)).collect();
     let widest = outcome.zones.iter().map(|zone| zone.diameter_mm + 2.0 * zone.depth_mm * f64::from(zone.passes));
     let retract = round_to_increment(widest.fold(0.0, f64::max) + job.program.clearance_x_mm, INCREMENT_MM);
     let mut blocks = vec![Block::Modes];
@@ -264,9 +265,7 @@ fn passed(case: &Case, built: &Built, at: &[(f64, f64)]) -> Vec<String> {
     let rows = built.rows.iter().enumerate().map(|(row, label)| (label, built.program.rows.value(row, &y)));
     let sums = built.sums.iter().zip(&built.program.sums).map(|(label, terms)| (label, terms.log_sum_exp(&y)));
     rows.chain(sums)
-        .filter(|(label, value)| {
-            label.kind.is_limit() && !matches!(label.place, Place::Zone(_)) && *value > KEPT
-        })
+        .filter(|(label, value)| label.kind.is_limit() && !matches!(label.place, Place::Zone(_)) && *value > KEPT)
         .map(|(label, value)| {
             let name = label.name(case);
             format!("rounded words pass {} of {} by {:.2} percent", name.constraint, name.zone, 100.0 * value.exp_m1())
@@ -283,9 +282,8 @@ fn words_of_zones(job: &Job, built: &Built, outcome: &Outcome, surface: bool) ->
     let lower = |zone: &ZoneOutcome| (exact(zone) + 1e-9).floor().max(1.0);
     let upper = |zone: &ZoneOutcome| (exact(zone) - 1e-9).ceil().max(1.0);
     let down = |zone: &ZoneOutcome| ((zone.feed_mm_per_rev / FEED_STEP + 1e-9).floor() * FEED_STEP).max(FEED_STEP);
-    let keeps = |i: usize, feed: f64, speed: f64| {
-        holds(built, i, (metres_per_min(&zones[i], speed, surface).ln(), feed.ln()))
-    };
+    let keeps =
+        |i: usize, feed: f64, speed: f64| holds(built, i, (metres_per_min(&zones[i], speed, surface).ln(), feed.ln()));
     let shared = matches!(job.variables.speed, SpeedMode::ConstantSpeed | SpeedMode::ConstantRpm);
     let all_upper = shared && zones.iter().enumerate().all(|(i, zone)| keeps(i, down(zone), upper(zone)));
     zones
