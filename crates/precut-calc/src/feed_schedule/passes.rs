@@ -114,7 +114,7 @@ fn of_count(
     monitor: &dyn Monitor,
 ) -> Result<Option<Tried>, Unsolved> {
     let mut best: Option<Tried> = None;
-    let mut value = |depth: f64, best: &mut Option<Tried>| -> Result<f64, Unsolved> {
+    let value = |depth: f64, best: &mut Option<Tried>| -> Result<f64, Unsolved> {
         let split = split(plan, roughing, depth);
         match attempt(job, held, &split, false, monitor) {
             Ok((case, solved)) => {
