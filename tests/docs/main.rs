@@ -136,7 +136,7 @@ fn every_setting_of_the_operations_page_exists() {
 #[test]
 fn a_page_that_shows_something_else_is_caught() {
     let page = |text: &str| run(&Document { name: "page.md".to_owned(), text: text.replace("~~~", "```") });
-    let listed = "~~~console\n$ precut list\ndeflection-compensation  ...\n~~~\n";
+    let listed = "~~~console\n$ precut list | grep deflection\ndeflection-compensation  ...\n~~~\n";
     assert_eq!(page(listed), Vec::<String>::new());
     for (wrong, line) in [
         ("~~~console\n$ precut list\nfeed-schedule  ...\n~~~\n", 1),
