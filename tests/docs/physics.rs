@@ -6,15 +6,23 @@ use std::path::Path;
 
 use precut::registry::Registry;
 use precut_calc::calculator::Unwatched;
-use precut_calc::effects::{Cause, DEFLECTION_CAUSES, Fit, Parameter, RING_CAUSES};
+use precut_calc::effects::{
+    Cause, DEFLECTION_CAUSES, FIXTURE_CAUSES, Fit, MACHINABILITY_CAUSES, Parameter, RING_CAUSES,
+};
 
 use super::markdown::{Document, documents};
 use super::root;
 
-const DEFLECTION: &str = "docs/physics/deflection-compensation.md";
+/// Catalogues and the page that has their numbers.
+const CATALOGUES: [(&[Cause], &str); 4] = [
+    (DEFLECTION_CAUSES, "docs/physics/effects-deflection.md"),
+    (FIXTURE_CAUSES, "docs/physics/effects-fixture.md"),
+    (MACHINABILITY_CAUSES, "docs/physics/effects-machinability.md"),
+    (RING_CAUSES, "docs/physics/effects-ring.md"),
+];
 
 /// Groups of equations.
-const GROUPS: [&str; 4] = ["deflection/", "diagnosis/", "ring/", "roundness/"];
+const GROUPS: [&str; 7] = ["deflection/", "diagnosis/", "feed/", "fit/", "fixture/", "ring/", "roundness/"];
 
 /// Equations that have a heading: its first word.
 fn documented() -> BTreeSet<String> {
@@ -86,6 +94,7 @@ fn every_equation_of_an_answer_is_documented() {
 fn row(parameter: &Parameter) -> String {
     let (fit, prior) = match parameter.fit {
         Fit::Amplitude | Fit::Shape { grid: [] } => ("fitted".to_owned(), parameter.prior_sd.to_string()),
+        Fit::Factor => ("logarithm fitted".to_owned(), parameter.prior_sd.to_string()),
         Fit::Shape { grid } => {
             let grid: Vec<String> = grid.iter().map(f64::to_string).collect();
             (format!("grid {}", grid.join(", ")), parameter.prior_sd.to_string())
@@ -98,22 +107,18 @@ fn row(parameter: &Parameter) -> String {
 }
 
 /// The part of the page on one cause.
-fn section<'t>(page: &'t Document, cause: &Cause) -> &'t str {
+fn section<'t>(page: &str, text: &'t str, cause: &Cause) -> &'t str {
     let heading = format!("### {} `{}`\n", cause.equation, cause.kind);
-    let Some((_, rest)) = page.text.split_once(&heading) else { panic!("{} has no heading {heading}", page.name) };
+    let Some((_, rest)) = text.split_once(&heading) else { panic!("{page} has no heading {heading}") };
     rest.split("\n#").next().unwrap()
 }
 
-/// Catalogues of effects with their pages.
-const CATALOGUES: [(&str, &[Cause]); 2] =
-    [("docs/physics/effects-deflection.md", DEFLECTION_CAUSES), ("docs/physics/effects-ring.md", RING_CAUSES)];
-
 #[test]
-fn the_catalogue_has_the_numbers_of_the_code() {
-    for (name, causes) in CATALOGUES {
-        let page = Document::read(root(), name);
+fn the_catalogues_have_the_numbers_of_the_code() {
+    for (causes, page) in CATALOGUES {
+        let text = Document::read(root(), page).text;
         for cause in causes {
-            let section = section(&page, cause);
+            let section = section(page, &text, cause);
             for parameter in cause.parameters {
                 let row = row(parameter);
                 assert!(section.lines().any(|line| line == row), "{}: no row {row}", cause.kind);
@@ -125,21 +130,15 @@ fn the_catalogue_has_the_numbers_of_the_code() {
     }
 }
 
-/// Calculators and evaluations with their pages.
-const PAGES: [(&str, &str); 3] = [
-    ("deflection-compensation", DEFLECTION),
-    ("ring-roundness", "docs/physics/ring-roundness.md"),
-    ("roundness-evaluation", "docs/physics/roundness-evaluation.md"),
-];
-
 #[test]
 fn every_code_of_a_calculator_is_explained() {
     let registry = Registry::standard().unwrap();
-    for (id, name) in PAGES {
-        let page = Document::read(root(), name).text;
-        let codes = &registry.entry(id).unwrap().meta().codes;
+    for entry in registry.entries() {
+        let page = format!("docs/physics/{}.md", entry.meta().id);
+        let text = Document::read(root(), &page).text;
+        let codes = &entry.meta().codes;
         let groups = codes.faults.iter().chain(codes.failures).chain(codes.warnings).copied();
-        let missing: Vec<_> = groups.flatten().filter(|code| !page.contains(&format!("`{code}`"))).collect();
-        assert!(missing.is_empty(), "{name} does not name {missing:?}");
+        let missing: Vec<_> = groups.flatten().filter(|code| !text.contains(&format!("`{code}`"))).collect();
+        assert!(missing.is_empty(), "{page} does not name {missing:?}");
     }
 }
