@@ -70,6 +70,24 @@ fn impossible_geometry_is_refused_at_its_field() {
     assert!(codes(&beside).contains(&"tool_at_support"), "{:?}", codes(&beside));
 }
 
+/// What a field alone is guilty of is its schema's to say; the rules between fields add no consequences of it.
+#[test]
+fn a_number_that_is_no_good_draws_no_other_faults() {
+    for (pointer, value) in [
+        ("/ring/radius_mm", json!(0)),
+        ("/supports/distance_mm", json!(0)),
+        ("/tool/feed_mm_per_rev", json!(-0.1)),
+        ("/tool/revolutions", json!(0)),
+    ] {
+        assert_eq!(codes(&with(pointer, value)), Vec::<&str>::new(), "{pointer}");
+    }
+    let mut reversed = points(36, 150.0).as_array().unwrap().clone();
+    reversed.reverse();
+    let found = codes(&measured(json!(reversed)));
+    assert!(found.iter().all(|code| *code == "angles_not_ascending"), "{found:?}");
+    assert_eq!(found.len(), 35);
+}
+
 #[test]
 fn a_tip_that_never_touches_is_told_the_gap() {
     // 0.9 mm clear of the largest diameter and 0.05 mm of travel.
