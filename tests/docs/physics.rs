@@ -6,22 +6,23 @@ use std::path::Path;
 
 use precut::registry::Registry;
 use precut_calc::calculator::Unwatched;
-use precut_calc::effects::{Cause, DEFLECTION_CAUSES, FIXTURE_CAUSES, Fit, Parameter};
+use precut_calc::effects::{
+    Cause, DEFLECTION_CAUSES, FIXTURE_CAUSES, Fit, MACHINABILITY_CAUSES, Parameter, RING_CAUSES,
+};
 
 use super::markdown::{Document, documents};
 use super::root;
 
-/// Calculators and the page that explains their codes.
-const PAGES: [(&str, &str); 2] = [
-    ("deflection-compensation", "docs/physics/deflection-compensation.md"),
-    ("fixture-stability", "docs/physics/fixture-stability.md"),
-];
 /// Catalogues and the page that has their numbers.
-const CATALOGUES: [(&[Cause], &str); 2] =
-    [(DEFLECTION_CAUSES, "docs/physics/effects-deflection.md"), (FIXTURE_CAUSES, "docs/physics/effects-fixture.md")];
+const CATALOGUES: [(&[Cause], &str); 4] = [
+    (DEFLECTION_CAUSES, "docs/physics/effects-deflection.md"),
+    (FIXTURE_CAUSES, "docs/physics/effects-fixture.md"),
+    (MACHINABILITY_CAUSES, "docs/physics/effects-machinability.md"),
+    (RING_CAUSES, "docs/physics/effects-ring.md"),
+];
 
 /// Groups of equations.
-const GROUPS: [&str; 3] = ["deflection/", "diagnosis/", "fixture/"];
+const GROUPS: [&str; 7] = ["deflection/", "diagnosis/", "feed/", "fit/", "fixture/", "ring/", "roundness/"];
 
 /// Equations that have a heading: its first word.
 fn documented() -> BTreeSet<String> {
@@ -132,9 +133,10 @@ fn the_catalogues_have_the_numbers_of_the_code() {
 #[test]
 fn every_code_of_a_calculator_is_explained() {
     let registry = Registry::standard().unwrap();
-    for (id, page) in PAGES {
-        let text = Document::read(root(), page).text;
-        let codes = &registry.entry(id).unwrap().meta().codes;
+    for entry in registry.entries() {
+        let page = format!("docs/physics/{}.md", entry.meta().id);
+        let text = Document::read(root(), &page).text;
+        let codes = &entry.meta().codes;
         let groups = codes.faults.iter().chain(codes.failures).chain(codes.warnings).copied();
         let missing: Vec<_> = groups.flatten().filter(|code| !text.contains(&format!("`{code}`"))).collect();
         assert!(missing.is_empty(), "{page} does not name {missing:?}");

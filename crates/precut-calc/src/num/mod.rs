@@ -2,4 +2,10 @@
 
 pub mod beam;
 pub mod dde;
+pub mod dense;
+pub mod gp;
+pub mod hull;
+pub mod lsq;
 pub mod quadrature;
+pub mod roundness;
+pub mod stats;
