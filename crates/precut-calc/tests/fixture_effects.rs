@@ -56,11 +56,12 @@ fn one_tooth_that_stands_out_makes_a_revolution_of_the_period() {
     // alone with one of an even chip.
     assert!(uneven.quasi_static.force_max_n > even.quasi_static.force_max_n);
     assert!(uneven.quasi_static.force_min_n < even.quasi_static.force_min_n);
-    // The period is a revolution, so the chips answer to the motion: by some microns, not more.
+    // The period is a revolution, so the chips answer to the motion: a quarter more force on one tooth (r/S_z) moves the
+    // workpiece by a quarter of its 20 um, 5 um, and a little more near the onset of chatter.
     let (exact, run) = (uneven.forced.peak_to_peak_um, uneven.simulation.peak_to_peak_um);
     assert!((run / exact - 1.0).abs() < 2e-3, "{run} {exact}");
     let chips = (uneven.simulation.effective_feed_min_mm, uneven.simulation.effective_feed_max_mm);
-    assert!((chips.0 - 0.0293).abs() < 3e-3 && (chips.1 - 0.0493).abs() < 3e-3, "{chips:?}");
+    assert!((chips.0 - 0.0293).abs() < 6e-3 && (chips.1 - 0.0493).abs() < 6e-3, "{chips:?}");
 }
 
 #[test]
