@@ -27,4 +27,5 @@ pub fn register(registrar: &mut impl Registrar) {
     registrar.calculator::<ring_roundness::evaluation::RoundnessEvaluation>();
     registrar.calculator::<feed_schedule::fit::MachinabilityFit>();
     registrar.with_forward_model::<fixture_stability::FixtureStability>();
+    registrar.calculator::<fixture_stability::identification::FixtureIdentification>();
 }
