@@ -10,6 +10,7 @@ mod fault;
 mod finite;
 mod nearest;
 mod place;
+mod result_text;
 mod schema;
 #[cfg(test)]
 mod tests;
@@ -24,7 +25,10 @@ pub(crate) use entry::{Calculation, Job, Unprepared, second_line};
 pub(crate) use fault::intern as interned;
 pub(crate) use finite::non_finite_place;
 pub(crate) use nearest::nearest;
+#[cfg(test)]
+pub(crate) use place::FreeColumns;
 pub(crate) use place::{CellKind, Step, TableColumn, TablePlace};
+pub(crate) use result_text::{Unwritable, append as append_result};
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -307,8 +307,8 @@ fn environment() -> Environment<'static> {
     let mut environment = Environment::new();
     environment.set_undefined_behavior(UndefinedBehavior::Strict);
     environment.set_auto_escape_callback(|_| minijinja::AutoEscape::None);
-    environment.set_formatter(|out, state, value| match f64::try_from(value.clone()) {
-        Ok(number) if value.is_number() => Ok(out.write_str(&number::significant(number, 6))?),
+    environment.set_formatter(|out, state, value| match value.is_number().then(|| f64::try_from(value.clone())) {
+        Some(Ok(number)) => Ok(out.write_str(&number::significant(number, 6))?),
         _ => minijinja::escape_formatter(out, state, value),
     });
     environment.add_filter("sig", number::significant);

@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::json;
 use super::read::Ready;
 use crate::key::ENGINE_VERSION;
-use crate::registry::{ResultNotes, non_finite_place};
+use crate::registry::{ResultNotes, append_result, non_finite_place};
 use crate::text::{Language, Notice, Remark, Texts};
 
 /// Runs a job and writes the envelope of its result, in English, in one buffer from the first byte to the last.
@@ -54,5 +54,5 @@ fn name(body: &mut Vec<u8>, name: &str) {
 
 fn field<T: Serialize + ?Sized>(body: &mut Vec<u8>, called: &str, value: &T) -> Result<(), Failure> {
     name(body, called);
-    serde_json::to_writer(body, value).map_err(|error| Failure::Internal(format!("the envelope: {error}")))
+    append_result(body, value).map_err(|error| Failure::Internal(format!("the envelope, {called}: {error}")))
 }

@@ -6,6 +6,7 @@ use std::fmt;
 use std::ops::Range;
 
 use serde::de::{DeserializeSeed, Deserializer, MapAccess, SeqAccess, Visitor};
+use serde_json::map::Entry;
 use serde_json::{Map, Number, Value};
 
 use super::error::{Error, SyntaxFault};
@@ -198,19 +199,22 @@ impl<'de> Visitor<'de> for Strict<'_> {
         let inside = self.inside()?;
         let mut fields = Map::new();
         while let Some(name) = access.next_key::<String>()? {
-            if fields.contains_key(&name) {
-                let error = self.trail.refuse("duplicate_key", format_args!("the key {name:?} occurs twice"));
-                self.trail.steps.borrow_mut().push(Step::Key(name));
-                return Err(error);
-            }
-            match access.next_value_seed(inside) {
-                Ok(value) => {
-                    fields.insert(name, value);
-                }
-                Err(error) => {
-                    self.trail.steps.borrow_mut().push(Step::Key(name));
+            match fields.entry(name) {
+                Entry::Occupied(there) => {
+                    let name = there.key();
+                    let error = self.trail.refuse("duplicate_key", format_args!("the key {name:?} occurs twice"));
+                    self.trail.steps.borrow_mut().push(Step::Key(name.clone()));
                     return Err(error);
                 }
+                Entry::Vacant(place) => match access.next_value_seed(inside) {
+                    Ok(value) => {
+                        place.insert(value);
+                    }
+                    Err(error) => {
+                        self.trail.steps.borrow_mut().push(Step::Key(place.key().clone()));
+                        return Err(error);
+                    }
+                },
             }
         }
         Ok(Value::Object(fields))

@@ -343,7 +343,10 @@ impl Inner {
             }
             Err(Error::Calculation(failure)) => {
                 match &failure {
-                    Failure::Infeasible(_) | Failure::OutOfModel(_) | Failure::NotConverged { .. } => {
+                    Failure::Infeasible(_)
+                    | Failure::Conflicting(_)
+                    | Failure::OutOfModel(_)
+                    | Failure::NotConverged { .. } => {
                         self.memory.keep(ready.key, Kept::Failure(failure.clone()));
                     }
                     Failure::Internal(reason) => {

@@ -18,6 +18,8 @@ pub(crate) struct Ready {
     pub(crate) key: Key,
     /// The filled job as RFC 8785 writes it.
     pub(crate) canonical: Bytes,
+    /// Whether there are measured tables in it.
+    has_rows: bool,
 }
 
 /// Reads a job. What the schema refuses is listed together with what the rules between fields refuse, as far as the
@@ -38,6 +40,7 @@ pub(crate) fn read_value(entry: &Arc<Entry>, mut job: Value, parts: &[TablePart]
 
 /// A job whose syntax, tables and schema are in order, or were when it was accepted.
 pub(crate) fn prepared(entry: &Arc<Entry>, job: &Value) -> Result<Ready, Error> {
+    let has_rows = table::has_rows(job, entry.tables());
     let mut prepared = entry.prepare(job).map_err(|unprepared| match unprepared {
         Unprepared::Invalid(findings) => {
             let total = findings.len();
@@ -47,7 +50,7 @@ pub(crate) fn prepared(entry: &Arc<Entry>, job: &Value) -> Result<Ready, Error> 
     })?;
     let canonical = Bytes::from(std::mem::take(&mut prepared.canonical));
     let key = Key::of(entry.meta(), prepared.numbers_of.as_ref(), &canonical);
-    Ok(Ready { entry: Arc::clone(entry), prepared, key, canonical })
+    Ok(Ready { entry: Arc::clone(entry), prepared, key, canonical, has_rows })
 }
 
 /// What the schema and the tables found.
@@ -124,7 +127,7 @@ impl Ready {
 
     /// Appends the same as JSON.
     pub(crate) fn write_echo(&self, body: &mut Vec<u8>) -> Result<(), Failure> {
-        if table::may_have_rows(&self.canonical, self.entry.tables()) {
+        if self.has_rows {
             let echo = self.echo()?;
             return serde_json::to_writer(body, &echo).map_err(|error| Failure::Internal(format!("the echo: {error}")));
         }

@@ -80,12 +80,19 @@ pub(crate) fn without_rows(mut input: Value, places: &[TablePlace]) -> Value {
     input
 }
 
-/// Whether a job in canonical JSON has rows of a table; `false` is certain.
-pub(crate) fn may_have_rows(canonical: &[u8], places: &[TablePlace]) -> bool {
-    places.iter().any(|place| {
-        let name = format!("\"{}\":[", place.name());
-        canonical.windows(name.len()).any(|bytes| bytes == name.as_bytes())
-    })
+/// Whether a job has rows of a table.
+pub(crate) fn has_rows(job: &Value, places: &[TablePlace]) -> bool {
+    fn any_at(value: &Value, path: &[Step]) -> bool {
+        match (path.split_first(), value) {
+            (None, Value::Array(rows)) => !rows.is_empty(),
+            (Some((Step::Field(name), rest)), Value::Object(map)) => {
+                map.get(name).is_some_and(|inner| any_at(inner, rest))
+            }
+            (Some((Step::Each, rest)), Value::Array(items)) => items.iter().any(|item| any_at(item, rest)),
+            _ => false,
+        }
+    }
+    places.iter().any(|place| any_at(job, &place.path))
 }
 
 /// Runs `visit` on every value at `path`.

@@ -9,7 +9,7 @@ use std::time::Duration;
 use axum::http::header::RETRY_AFTER;
 use axum::http::{HeaderName, HeaderValue, StatusCode};
 use axum::response::{IntoResponse, Response};
-use precut_calc::calculator::{Failure, Finding, Values};
+use precut_calc::calculator::{Failure, Finding, Infeasible, Values};
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -31,6 +31,7 @@ struct Inner {
     /// The findings' sentences are the detail: a job without an answer.
     by_finding: Option<&'static str>,
     header: Option<(HeaderName, HeaderValue)>,
+    infeasible: Option<Infeasible>,
 }
 
 /// A problem document (RFC 9457).
@@ -63,6 +64,10 @@ pub struct ProblemDocument {
     /// How many faults there are, listed or not.
     #[schema(minimum = 0, example = 2)]
     pub errors_total: usize,
+    /// Where limits conflict: which, and the least relaxation that lets them hold.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub infeasible: Option<Infeasible>,
 }
 
 impl Problem {
@@ -76,6 +81,7 @@ impl Problem {
             total: 0,
             by_finding: None,
             header: None,
+            infeasible: None,
         }))
     }
 
@@ -194,6 +200,7 @@ impl Problem {
             instance,
             errors,
             errors_total: inner.total,
+            infeasible: inner.infeasible.clone(),
         }
     }
 }
@@ -295,6 +302,11 @@ impl From<Failure> for Problem {
         match failure {
             Failure::Cancelled => Self::shutting_down(),
             Failure::Infeasible(finding) => Self::without_answer("infeasible", finding),
+            Failure::Conflicting(conflict) => {
+                let mut problem = Self::without_answer("infeasible", conflict.finding);
+                problem.0.infeasible = Some(conflict.infeasible);
+                problem
+            }
             Failure::OutOfModel(finding) => Self::without_answer("out_of_model", finding),
             Failure::NotConverged { what, residual, iterations } => {
                 Self::new(StatusCode::UNPROCESSABLE_ENTITY, "not_converged")

@@ -40,6 +40,8 @@ struct Member {
     begin: usize,
     colon: usize,
     end: usize,
+    /// Whether its name is ASCII without escapes: then its bytes are in the order of its code units.
+    is_plain: bool,
 }
 
 impl Page {
@@ -47,18 +49,27 @@ impl Page {
         &self.text[member.begin + 1..member.colon - 1]
     }
 
+    /// The order of two members of an object, whose names differ.
+    fn order(&self, a: Member, b: Member) -> Ordering {
+        let (first, second) = (self.name(a), self.name(b));
+        if a.is_plain && b.is_plain { first.cmp(second) } else { by_code_units(first, second) }
+    }
+
     /// Puts the members of the innermost object in order, with commas between them.
     fn end_object(&mut self) {
         let Some(object) = self.objects.pop() else { return };
-        let mut members = self.members.split_off(object.members);
-        members.sort_by(|a, b| by_code_units(self.name(*a), self.name(*b)));
+        let mut members = std::mem::take(&mut self.members);
+        let own = &mut members[object.members..];
+        own.sort_unstable_by(|a, b| self.order(*a, *b));
         self.sorted.clear();
-        for (index, member) in members.iter().enumerate() {
+        for (index, member) in own.iter().enumerate() {
             if index > 0 {
                 self.sorted.push(b',');
             }
             self.sorted.extend_from_slice(&self.text[member.begin..member.end]);
         }
+        members.truncate(object.members);
+        self.members = members;
         self.text.truncate(object.text);
         self.text.push(b'{');
         self.text.extend_from_slice(&self.sorted);
@@ -68,10 +79,6 @@ impl Page {
 
 /// The order of names: by UTF-16 code units. Names come as they are written, with their escapes.
 fn by_code_units(a: &[u8], b: &[u8]) -> Ordering {
-    let is_plain = |name: &[u8]| name.is_ascii() && !name.contains(&b'\\');
-    if is_plain(a) && is_plain(b) {
-        return a.cmp(b);
-    }
     let units = |name: &[u8]| -> Vec<u16> {
         let quoted = [b"\"", name, b"\""].concat();
         serde_json::from_slice::<String>(&quoted).unwrap_or_default().encode_utf16().collect()
@@ -134,16 +141,19 @@ impl Formatter for OnPage<'_> {
 
     fn begin_object_key<W: io::Write + ?Sized>(&mut self, _: &mut W, _: bool) -> io::Result<()> {
         let begin = self.0.text.len();
-        self.0.members.push(Member { begin, colon: begin, end: begin });
+        self.0.members.push(Member { begin, colon: begin, end: begin, is_plain: false });
         Ok(())
     }
 
     fn begin_object_value<W: io::Write + ?Sized>(&mut self, _: &mut W) -> io::Result<()> {
-        let colon = self.0.text.len();
-        self.0.text.push(b':');
-        if let Some(member) = self.0.members.last_mut() {
+        let page = &mut *self.0;
+        let colon = page.text.len();
+        if let Some(member) = page.members.last_mut() {
             member.colon = colon;
+            let name = &page.text[member.begin + 1..colon - 1];
+            member.is_plain = name.iter().all(|byte| byte.is_ascii() && *byte != b'\\');
         }
+        page.text.push(b':');
         Ok(())
     }
 

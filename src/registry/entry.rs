@@ -18,7 +18,7 @@ use super::canonical::canonical;
 use super::checker::{Checker, Faults};
 use super::place::{TablePlace, table_places};
 use super::schema::{self, Components};
-use super::{RESERVED, RegistryError, child, non_finite_place};
+use super::{RESERVED, RegistryError, Unwritable, append_result, child, non_finite_place};
 
 /// One calculator with its types closed over.
 pub struct Entry {
@@ -384,15 +384,18 @@ impl<C: Calculator> Job for TypedJob<C> {
     }
     fn run(&self, monitor: &dyn Monitor, body: &mut Vec<u8>) -> Result<ResultNotes, Failure> {
         let Answer { output, warnings, explanation, basis } = C::run(&self.0, monitor)?;
-        if let Some(place) = non_finite_place(&output) {
-            return Err(Failure::Internal(format!("the result of {} is not finite at {place}", C::META.id)));
-        }
-        serde_json::to_writer(body, &output).map_err(|error| unwritable("the result", &error))?;
+        append_result(body, &output).map_err(|error| match error {
+            Unwritable::NotFinite => {
+                let place = non_finite_place(&output).unwrap_or_default();
+                Failure::Internal(format!("the result of {} is not finite at {place}", C::META.id))
+            }
+            Unwritable::Other(_) => unwritable("the result", &error),
+        })?;
         Ok(ResultNotes { warnings, explanation, basis })
     }
 }
 
-fn unwritable(what: &str, error: &serde_json::Error) -> Failure {
+fn unwritable(what: &str, error: &impl std::fmt::Display) -> Failure {
     Failure::Internal(format!("{what}: {error}"))
 }
 

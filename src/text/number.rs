@@ -8,12 +8,17 @@ pub(crate) fn significant(x: f64, digits: usize) -> String {
     let scientific = format!("{x:.*e}", digits.clamp(1, 17) - 1);
     let (mantissa, exponent) = scientific.split_once('e').unwrap_or((&scientific, "0"));
     let exponent: i32 = exponent.parse().unwrap_or(0);
+    let mantissa = trimmed(mantissa);
     if !(-5..9).contains(&exponent) {
-        return format!("{}e{exponent}", trimmed(mantissa));
+        return format!("{mantissa}e{exponent}");
     }
-    let rounded: f64 = scientific.parse().unwrap_or(x);
-    let decimals = i32::try_from(digits).unwrap_or(17) - 1 - exponent;
-    trimmed(&format!("{rounded:.*}", usize::try_from(decimals).unwrap_or(0))).to_owned()
+    let (sign, mantissa) = mantissa.strip_prefix('-').map_or(("", mantissa), |size| ("-", size));
+    let digits = mantissa.replace('.', "");
+    match usize::try_from(exponent) {
+        Ok(exponent) if digits.len() <= exponent + 1 => format!("{sign}{digits:0<0$}", exponent + 1),
+        Ok(exponent) => format!("{sign}{}.{}", &digits[..=exponent], &digits[exponent + 1..]),
+        Err(_) => format!("{sign}0.{:0>1$}{digits}", "", usize::try_from(-1 - exponent).unwrap_or(0)),
+    }
 }
 
 /// `x` with `decimals` digits after the point.
@@ -51,6 +56,10 @@ mod tests {
             (1.23e-7, 2, "1.2e-7"),
             (123_456.0, 2, "120000"),
             (0.1 + 0.2, 6, "0.3"),
+            (-0.000_123_45, 3, "-0.000123"),
+            (1e-5, 3, "0.00001"),
+            (-12_000.5, 2, "-12000"),
+            (123.456, 6, "123.456"),
         ] {
             assert_eq!(significant(x, digits), expected);
         }

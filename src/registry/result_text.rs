@@ -1,0 +1,371 @@
+//! Results as JSON in one pass: what is written is looked at on the way, for a number that is not finite has no text.
+//!
+//! `serde_json` writes it as `null` without a word, so that a second pass would have to look for it before.
+
+use std::fmt::Display;
+
+use serde::Serialize;
+use serde::ser::{
+    self, SerializeMap, SerializeSeq, SerializeStruct, SerializeStructVariant, SerializeTuple, SerializeTupleStruct,
+    SerializeTupleVariant, Serializer,
+};
+
+/// Why a value cannot be written.
+#[derive(Debug, PartialEq, thiserror::Error)]
+pub(crate) enum Unwritable {
+    /// A number is infinite or none; [`super::non_finite_place`] says which.
+    #[error("a number is not finite")]
+    NotFinite,
+    /// Its type has no form in JSON.
+    #[error("{0}")]
+    Other(String),
+}
+
+impl ser::Error for Unwritable {
+    fn custom<T: Display>(reason: T) -> Self {
+        Self::Other(reason.to_string())
+    }
+}
+
+/// Appends `value` as `serde_json` would write it; a number that is not finite stops the writing.
+pub(crate) fn append<T: Serialize + ?Sized>(text: &mut Vec<u8>, value: &T) -> Result<(), Unwritable> {
+    value.serialize(Pen { text })
+}
+
+/// Writes one value.
+struct Pen<'a> {
+    text: &'a mut Vec<u8>,
+}
+
+/// What `serde_json` writes: whole numbers, texts that may need escapes.
+fn plainly<T: Serialize + ?Sized>(text: &mut Vec<u8>, value: &T) -> Result<(), Unwritable> {
+    serde_json::to_writer(text, value).map_err(|error| Unwritable::Other(error.to_string()))
+}
+
+/// A name of a field or a variant: words of the code, which hardly ever need an escape.
+fn word(text: &mut Vec<u8>, name: &str) -> Result<(), Unwritable> {
+    if !name.bytes().all(|byte| byte.wrapping_sub(b'a') < 26 || byte == b'_' || byte.is_ascii_digit()) {
+        return plainly(text, name);
+    }
+    text.reserve(name.len() + 2);
+    text.push(b'"');
+    text.extend_from_slice(name.as_bytes());
+    text.push(b'"');
+    Ok(())
+}
+
+macro_rules! whole {
+    ($($method:ident: $type:ty),* $(,)?) => {
+        $(fn $method(self, value: $type) -> Result<(), Unwritable> { plainly(self.text, &value) })*
+    };
+}
+
+impl<'a> Serializer for Pen<'a> {
+    type Ok = ();
+    type Error = Unwritable;
+    type SerializeSeq = List<'a>;
+    type SerializeTuple = List<'a>;
+    type SerializeTupleStruct = List<'a>;
+    type SerializeTupleVariant = List<'a>;
+    type SerializeMap = List<'a>;
+    type SerializeStruct = List<'a>;
+    type SerializeStructVariant = List<'a>;
+
+    whole! {
+        serialize_i8: i8, serialize_i16: i16, serialize_i32: i32, serialize_i64: i64, serialize_u8: u8,
+        serialize_u16: u16, serialize_u32: u32, serialize_u64: u64, serialize_i128: i128, serialize_u128: u128,
+        serialize_char: char, serialize_str: &str, serialize_bytes: &[u8],
+    }
+
+    fn serialize_bool(self, value: bool) -> Result<(), Unwritable> {
+        self.text.extend_from_slice(if value { b"true" } else { b"false" });
+        Ok(())
+    }
+    fn serialize_f32(self, value: f32) -> Result<(), Unwritable> {
+        if value.is_finite() { plainly(self.text, &value) } else { Err(Unwritable::NotFinite) }
+    }
+    fn serialize_f64(self, value: f64) -> Result<(), Unwritable> {
+        if !value.is_finite() {
+            return Err(Unwritable::NotFinite);
+        }
+        // As `serde_json` does: the shortest text that reads back bit for bit.
+        self.text.extend_from_slice(zmij::Buffer::new().format_finite(value).as_bytes());
+        Ok(())
+    }
+    fn serialize_none(self) -> Result<(), Unwritable> {
+        self.serialize_unit()
+    }
+    fn serialize_some<T: Serialize + ?Sized>(self, value: &T) -> Result<(), Unwritable> {
+        value.serialize(self)
+    }
+    fn serialize_unit(self) -> Result<(), Unwritable> {
+        self.text.extend_from_slice(b"null");
+        Ok(())
+    }
+    fn serialize_unit_struct(self, _: &'static str) -> Result<(), Unwritable> {
+        self.serialize_unit()
+    }
+    fn serialize_unit_variant(self, _: &'static str, _: u32, variant: &'static str) -> Result<(), Unwritable> {
+        word(self.text, variant)
+    }
+    fn serialize_newtype_struct<T: Serialize + ?Sized>(self, _: &'static str, value: &T) -> Result<(), Unwritable> {
+        value.serialize(self)
+    }
+    fn serialize_newtype_variant<T: Serialize + ?Sized>(
+        self,
+        _: &'static str,
+        _: u32,
+        variant: &'static str,
+        value: &T,
+    ) -> Result<(), Unwritable> {
+        self.text.push(b'{');
+        word(self.text, variant)?;
+        self.text.push(b':');
+        append(self.text, value)?;
+        self.text.push(b'}');
+        Ok(())
+    }
+    fn serialize_seq(self, _: Option<usize>) -> Result<List<'a>, Unwritable> {
+        Ok(List::open(self.text, b'[', "]"))
+    }
+    fn serialize_tuple(self, _: usize) -> Result<List<'a>, Unwritable> {
+        Ok(List::open(self.text, b'[', "]"))
+    }
+    fn serialize_tuple_struct(self, _: &'static str, _: usize) -> Result<List<'a>, Unwritable> {
+        Ok(List::open(self.text, b'[', "]"))
+    }
+    fn serialize_tuple_variant(
+        self,
+        _: &'static str,
+        _: u32,
+        variant: &'static str,
+        _: usize,
+    ) -> Result<List<'a>, Unwritable> {
+        self.text.push(b'{');
+        word(self.text, variant)?;
+        self.text.push(b':');
+        Ok(List::open(self.text, b'[', "]}"))
+    }
+    fn serialize_map(self, _: Option<usize>) -> Result<List<'a>, Unwritable> {
+        Ok(List::open(self.text, b'{', "}"))
+    }
+    fn serialize_struct(self, _: &'static str, _: usize) -> Result<List<'a>, Unwritable> {
+        Ok(List::open(self.text, b'{', "}"))
+    }
+    fn serialize_struct_variant(
+        self,
+        _: &'static str,
+        _: u32,
+        variant: &'static str,
+        _: usize,
+    ) -> Result<List<'a>, Unwritable> {
+        self.text.push(b'{');
+        word(self.text, variant)?;
+        self.text.push(b':');
+        Ok(List::open(self.text, b'{', "}}"))
+    }
+}
+
+/// Writes the items of an array or the members of an object.
+struct List<'a> {
+    text: &'a mut Vec<u8>,
+    is_first: bool,
+    end: &'static str,
+}
+
+impl<'a> List<'a> {
+    fn open(text: &'a mut Vec<u8>, begin: u8, end: &'static str) -> Self {
+        text.push(begin);
+        Self { text, is_first: true, end }
+    }
+
+    fn next(&mut self) {
+        if !self.is_first {
+            self.text.push(b',');
+        }
+        self.is_first = false;
+    }
+
+    fn item<T: Serialize + ?Sized>(&mut self, value: &T) -> Result<(), Unwritable> {
+        self.next();
+        append(self.text, value)
+    }
+
+    fn member<T: Serialize + ?Sized>(&mut self, name: &str, value: &T) -> Result<(), Unwritable> {
+        self.next();
+        word(self.text, name)?;
+        self.text.push(b':');
+        append(self.text, value)
+    }
+
+    fn close(self) {
+        self.text.extend_from_slice(self.end.as_bytes());
+    }
+}
+
+macro_rules! lists {
+    ($($form:ident: $method:ident),* $(,)?) => {
+        $(impl $form for List<'_> {
+            type Ok = ();
+            type Error = Unwritable;
+            fn $method<T: Serialize + ?Sized>(&mut self, value: &T) -> Result<(), Unwritable> {
+                self.item(value)
+            }
+            fn end(self) -> Result<(), Unwritable> {
+                self.close();
+                Ok(())
+            }
+        })*
+    };
+}
+
+lists! {
+    SerializeSeq: serialize_element, SerializeTuple: serialize_element, SerializeTupleStruct: serialize_field,
+    SerializeTupleVariant: serialize_field,
+}
+
+macro_rules! objects {
+    ($($form:ident),* $(,)?) => {
+        $(impl $form for List<'_> {
+            type Ok = ();
+            type Error = Unwritable;
+            fn serialize_field<T: Serialize + ?Sized>(
+                &mut self,
+                name: &'static str,
+                value: &T,
+            ) -> Result<(), Unwritable> {
+                self.member(name, value)
+            }
+            fn end(self) -> Result<(), Unwritable> {
+                self.close();
+                Ok(())
+            }
+        })*
+    };
+}
+
+objects! { SerializeStruct, SerializeStructVariant }
+
+impl SerializeMap for List<'_> {
+    type Ok = ();
+    type Error = Unwritable;
+    fn serialize_key<T: Serialize + ?Sized>(&mut self, key: &T) -> Result<(), Unwritable> {
+        self.next();
+        let key = serde_json::to_value(key).map_err(|error| Unwritable::Other(error.to_string()))?;
+        match key {
+            serde_json::Value::String(name) => word(self.text, &name),
+            serde_json::Value::Number(_) | serde_json::Value::Bool(_) => word(self.text, &key.to_string()),
+            _ => Err(Unwritable::Other("a key is neither text nor number".to_owned())),
+        }
+    }
+    fn serialize_value<T: Serialize + ?Sized>(&mut self, value: &T) -> Result<(), Unwritable> {
+        self.text.push(b':');
+        append(self.text, value)
+    }
+    fn end(self) -> Result<(), Unwritable> {
+        self.close();
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use serde_json::Value;
+    use std::collections::BTreeMap;
+
+    fn text<T: Serialize + ?Sized>(value: &T) -> Result<String, Unwritable> {
+        let mut text = Vec::new();
+        append(&mut text, value)?;
+        Ok(String::from_utf8(text).unwrap())
+    }
+
+    #[derive(Serialize)]
+    struct Unit;
+
+    #[derive(Serialize)]
+    struct Pair(f64, &'static str);
+
+    #[derive(Serialize)]
+    #[serde(rename_all = "kebab-case")]
+    enum Plain {
+        One,
+        Number(f64),
+        Both(u8, i64),
+        Named { depth_mm: Option<f64> },
+    }
+
+    #[derive(Serialize)]
+    #[serde(tag = "kind", rename_all = "snake_case")]
+    enum Tagged {
+        Empty,
+        Round { radius_mm: f64 },
+        Inner(Inner),
+    }
+
+    #[derive(Serialize)]
+    struct Inner {
+        name: String,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        absent: Option<f64>,
+        #[serde(flatten)]
+        rest: BTreeMap<String, f64>,
+    }
+
+    /// Everything that serde knows.
+    #[test]
+    fn every_form_is_written_as_serde_json_writes_it() {
+        let inner = || Inner {
+            name: "quo\"te \u{1f600}\n".to_owned(),
+            absent: None,
+            rest: BTreeMap::from([("a b".to_owned(), 0.25), ("ü".to_owned(), -3.0)]),
+        };
+        let value = (
+            (true, 'x', 7_u8, -7_i64, u64::MAX, 0.5_f32, "plain", [1.5, 2.0]),
+            (Unit, Pair(1e-7, "p"), Plain::One, Plain::Number(2.0), Plain::Both(1, -2)),
+            (Plain::Named { depth_mm: Some(0.1) }, Plain::Named { depth_mm: None }),
+            (Tagged::Empty, Tagged::Round { radius_mm: 45.0 }, Tagged::Inner(inner())),
+            (vec![None, Some(1.0)], Vec::<f64>::new(), (), BTreeMap::from([(3, "three")]), BTreeMap::<u8, u8>::new()),
+        );
+        assert_eq!(text(&value).unwrap(), serde_json::to_string(&value).unwrap());
+    }
+
+    #[test]
+    fn what_is_not_finite_stops_the_writing() {
+        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            assert_eq!(text(&vec![Some(1.0), Some(bad)]), Err(Unwritable::NotFinite));
+        }
+        assert_eq!(text(&f32::NAN), Err(Unwritable::NotFinite));
+    }
+
+    #[test]
+    fn a_key_that_is_no_word_is_refused() {
+        assert!(matches!(text(&BTreeMap::from([((1, 2), 3)])), Err(Unwritable::Other(_))));
+    }
+
+    fn any_value() -> impl Strategy<Value = Value> {
+        let leaf = prop_oneof![
+            Just(Value::Null),
+            any::<bool>().prop_map(Value::from),
+            any::<i64>().prop_map(Value::from),
+            any::<f64>().prop_map(Value::from),
+            any::<String>().prop_map(Value::from),
+        ];
+        leaf.prop_recursive(4, 60, 6, |inner| {
+            prop_oneof![
+                prop::collection::vec(inner.clone(), 0..6).prop_map(Value::from),
+                prop::collection::hash_map(any::<String>(), inner, 0..6)
+                    .prop_map(|fields| Value::Object(fields.into_iter().collect())),
+            ]
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn any_value_comes_out_as_serde_json_writes_it(value in any_value()) {
+            prop_assert_eq!(text(&value).unwrap(), serde_json::to_string(&value).unwrap());
+        }
+    }
+}
