@@ -14,7 +14,7 @@ use tracing_subscriber::EnvFilter;
 pub const DEFAULTS: &str = include_str!("../config.default.toml");
 
 /// Sections of the configuration: `PRECUT_LOG_LEVEL` is `log.level`.
-const SECTIONS: [&str; 6] = ["log", "limits", "cache", "shutdown", "cors", "auth"];
+const SECTIONS: [&str; 7] = ["log", "limits", "jobs", "cache", "shutdown", "cors", "auth"];
 
 /// Settings that are words even where they look like numbers: `PRECUT_DATA=2026`.
 const WORDS: [&str; 4] = ["listen", "data", "log.level", "log.format"];
@@ -33,6 +33,8 @@ pub struct Config {
     pub log: Log,
     /// What is refused because it is too large, too slow or too much.
     pub limits: Limits,
+    /// What runs behind the answers.
+    pub jobs: Jobs,
     /// What is kept.
     pub cache: Cache,
     /// How the service stops.
@@ -83,12 +85,30 @@ pub struct Limits {
     pub requests_per_s: f64,
     /// Requests that one client may send at once.
     pub burst: f64,
+    /// Largest estimated work that is answered at once, ms; what is larger runs as a job.
+    pub direct_ms: f64,
     /// Largest estimated work of a job, ms.
     pub job_ms: f64,
     /// Largest estimated memory of a job, bytes.
     pub job_bytes: u64,
+    /// Most points of a parameter study.
+    pub study_points: u64,
     /// How long a job may wait for a core, ms.
     pub queue_ms: u64,
+}
+
+/// What runs behind the answers.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Jobs {
+    /// Jobs that run at the same time; 0 takes all cores but one.
+    pub slots: usize,
+    /// Jobs that may wait.
+    pub queue: u64,
+    /// How long finished jobs and their results are kept, days.
+    pub days: u32,
+    /// Event streams that one client may have open.
+    pub streams: usize,
 }
 
 /// What is kept.
@@ -235,6 +255,7 @@ impl Config {
             ("limits.multipart_bytes", limits.multipart_bytes),
             ("limits.connections", limits.connections),
             ("limits.concurrent_requests", limits.concurrent_requests),
+            ("jobs.streams", self.jobs.streams),
         ] {
             if count == 0 {
                 faults.push(format!("{name} = 0: must be at least 1"));
@@ -246,8 +267,13 @@ impl Config {
         if !(limits.burst >= 1.0 && limits.burst.is_finite()) {
             faults.push(format!("limits.burst = {}: must be at least 1", limits.burst));
         }
-        if !(limits.job_ms > 0.0 && limits.job_ms.is_finite()) {
-            faults.push(format!("limits.job_ms = {}: must be above 0", limits.job_ms));
+        for (name, ms) in [("limits.direct_ms", limits.direct_ms), ("limits.job_ms", limits.job_ms)] {
+            if !(ms > 0.0 && ms.is_finite()) {
+                faults.push(format!("{name} = {ms}: must be above 0"));
+            }
+        }
+        if self.jobs.queue == 0 || self.jobs.days == 0 {
+            faults.push("jobs.queue and jobs.days: must be at least 1".to_owned());
         }
         if let Err(error) = EnvFilter::builder().parse(&self.log.level) {
             faults.push(format!("log.level = \"{}\": {error}", self.log.level));
@@ -281,6 +307,11 @@ impl Default for Config {
 /// A duration from seconds that [`Config::load`] has checked.
 pub(crate) fn seconds(s: f64) -> Duration {
     Duration::try_from_secs_f64(s).unwrap_or(Duration::MAX)
+}
+
+/// The same from milliseconds.
+pub(crate) fn milliseconds(ms: f64) -> Duration {
+    seconds(ms / 1e3)
 }
 
 /// A setting from the environment.

@@ -22,11 +22,16 @@ pub struct BadKey;
 impl Key {
     /// The key of a calculator's filled job in canonical JSON (RFC 8785):
     /// `BLAKE3("precut-cache-1\n" name 0 version 0 engine 0 job)`. The separators occur in no part before the job.
-    pub(crate) fn of(meta: &Meta, canonical_job: &[u8]) -> Self {
+    ///
+    /// Where the numbers are another calculator's (`numbers_of`), its name and version stand before the job, too.
+    pub(crate) fn of(meta: &Meta, numbers_of: Option<&Meta>, canonical_job: &[u8]) -> Self {
         let mut hasher = blake3::Hasher::new();
         hasher.update(b"precut-cache-1\n");
         for part in [meta.id, &meta.version.to_string(), &ENGINE_FINGERPRINT] {
             hasher.update(part.as_bytes()).update(&[0]);
+        }
+        if let Some(meta) = numbers_of {
+            hasher.update(meta.id.as_bytes()).update(&[0]).update(meta.version.to_string().as_bytes()).update(&[0]);
         }
         hasher.update(canonical_job);
         Self(*hasher.finalize().as_bytes())
@@ -84,7 +89,7 @@ mod tests {
     #[test]
     fn a_key_is_read_back_from_its_text() {
         let registry = toy::registry();
-        let key = Key::of(registry.entry("toy-bar").unwrap().meta(), b"{}");
+        let key = Key::of(registry.entry("toy-bar").unwrap().meta(), None, b"{}");
         assert_eq!(key.to_string().parse(), Ok(key));
         assert_eq!(key.to_string().len(), 67);
         for bad in ["", "b3:", "b3:00", &key.to_string()[3..], &format!("{key}0"), "b2:00"] {
@@ -95,9 +100,12 @@ mod tests {
     #[test]
     fn name_and_version_are_part_of_the_key() {
         let meta = *toy::registry().entry("toy-bar").unwrap().meta();
-        let key = |id, version| Key::of(&Meta { id, version, ..meta }, b"{}");
+        let key = |id, version| Key::of(&Meta { id, version, ..meta }, None, b"{}");
         assert_ne!(key("toy-bar", 1), key("toy-bar", 2));
         assert_ne!(key("toy-bar", 1), key("toy-baz", 1));
         assert_ne!(key("toy-bar", 11), key("toy-bar1", 1));
+        let other = |version| Meta { version, ..meta };
+        assert_ne!(Key::of(&meta, Some(&other(1)), b"{}"), Key::of(&meta, Some(&other(2)), b"{}"));
+        assert_ne!(Key::of(&meta, Some(&other(1)), b"{}"), Key::of(&meta, None, b"{}"));
     }
 }

@@ -19,10 +19,14 @@ pub(crate) mod toy;
 
 pub use entry::{Entry, Prepared, ResultNotes, UnreadableResult};
 
+pub(crate) use canonical::canonical;
 pub(crate) use checker::{Faults, by_pointer, child};
-pub(crate) use entry::Unprepared;
+pub(crate) use entry::{Calculation, Job, Unprepared, second_line};
+pub(crate) use fault::intern as interned;
 pub(crate) use finite::non_finite_place;
 pub(crate) use nearest::nearest;
+#[cfg(test)]
+pub(crate) use place::FreeColumns;
 pub(crate) use place::{CellKind, Step, TableColumn, TablePlace};
 pub(crate) use result_text::{Unwritable, append as append_result};
 

@@ -9,6 +9,7 @@ mod notice;
 mod number;
 
 pub use notice::{Notice, Remark};
+pub(crate) use number::significant;
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;

@@ -6,9 +6,15 @@
 //! same bytes, measured in turns in the same run. Nothing fails here: the table is for reading.
 
 mod deflection;
+mod fitting;
+mod fixture;
 mod http;
 mod measure;
+mod ring;
+mod roundness;
 mod rows;
+#[path = "../../crates/precut-calc/tests/strd/mod.rs"]
+mod strd;
 
 use std::io::Write;
 

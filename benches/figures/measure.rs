@@ -14,6 +14,8 @@ pub(crate) enum Unit {
     Ratio,
     /// Bytes.
     Size,
+    /// Things that went wrong.
+    Count,
 }
 
 impl Unit {
@@ -35,6 +37,7 @@ impl Unit {
         match self {
             Self::Time => scaled(&[(1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns")]),
             Self::Ratio => format!("{value:.2} x"),
+            Self::Count => format!("{value:.0}"),
             Self::Size => scaled(&[(1e6, "MB"), (1e3, "kB"), (1.0, "B")]),
         }
     }

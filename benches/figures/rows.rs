@@ -7,8 +7,12 @@ use precut_calc::calculator::{
 
 use crate::Row;
 use crate::deflection;
+use crate::fitting;
+use crate::fixture;
 use crate::http::{self, Bare, Clock, Exchange};
 use crate::measure::{Measured, Unit, cpu_time};
+use crate::ring;
+use crate::roundness;
 
 const DEFLECTION: &str = "deflection-compensation";
 /// A number of that calculator's jobs which changes the result and not the work.
@@ -38,6 +42,59 @@ pub(crate) fn all() -> Vec<Row> {
         row("fewest-chord tool path, 200,000 stations", Unit::Time, us(500_000.0), us(200_000.0), || {
             deflection::chords(200_000)
         }),
+        row("ring simulation, per angular step", Unit::Time, us(0.15), us(0.07), || ring::step(false)),
+        row("ring simulation on rollers, per angular step", Unit::Time, us(1.0), us(0.3), || ring::step(true)),
+        row(
+            "ring: the source paper's algorithm plainly written, N = 3600, per angular step",
+            Unit::Time,
+            None,
+            None,
+            ring::plain_paper,
+        ),
+        row("ring: complete answer to the paper's run of 256 revolutions", Unit::Time, None, None, ring::answer),
+        row("ring: set-up map, 91 x 61 cells, 20 lobes", Unit::Time, None, None, ring::map),
+        row(
+            "minimum-zone circle with its least-squares start, certified, 3600 points",
+            Unit::Time,
+            us(300.0),
+            us(150.0),
+            || roundness::zone(3600),
+        ),
+        row("all four reference circles, certified, 3600 points", Unit::Time, us(500.0), us(250.0), || {
+            roundness::four(3600)
+        }),
+        row("complete roundness evaluation, 3600 points", Unit::Time, None, None, || roundness::answer(3600)),
+        row("NIST StRD, 54 runs, default setting, no derivatives given", Unit::Time, None, None, fitting::nist_time),
+        row("of these not solved to 4 digits", Unit::Count, Some(0.0), Some(0.0), || fitting::nist_missed(4.0)),
+        row("of these not solved to 6 digits", Unit::Count, Some(2.0), Some(0.0), || fitting::nist_missed(6.0)),
+        row("of these not solved to 8 digits", Unit::Count, Some(9.0), Some(4.0), || fitting::nist_missed(8.0)),
+        row("machinability fit, 19 trials, 3 outputs, without resampling", Unit::Time, None, None, || {
+            fitting::machinability(0)
+        }),
+        row("the same with 1000 resamples", Unit::Time, None, None, || fitting::machinability(1000)),
+        row("lobe map 200 x 100 converged, one mode, full slot", Unit::Time, us(400_000.0), us(120_000.0), || {
+            fixture::map(1.0)
+        }),
+        row("the same at 5 % radial immersion", Unit::Time, us(130_000.0), us(70_000.0), || fixture::map(0.05)),
+        row(
+            "lobe map 200 x 100 converged, two modes",
+            Unit::Time,
+            us(600_000.0),
+            us(300_000.0),
+            fixture::map_two_modes,
+        ),
+        row("textbook semi-discretisation on the first map (a part, scaled)", Unit::Time, None, None, || {
+            fixture::textbook(1.0)
+        }),
+        row("lobe boundary, 400 speeds", Unit::Time, us(200_000.0), us(60_000.0), fixture::boundary),
+        row("one converged multiplier with its error", Unit::Time, us(1000.0), us(300.0), || {
+            fixture::multiplier(false)
+        }),
+        row("the same with two modes", Unit::Time, us(1500.0), us(500.0), || fixture::multiplier(true)),
+        row("forced motion and least clamp force", Unit::Time, us(1000.0), us(300.0), fixture::forced),
+        row("a step of the cut in time, linear force law", Unit::Time, us(0.01), us(0.0067), || fixture::step(0.0)),
+        row("a step of the cut in time, power law", Unit::Time, us(0.04), us(0.0167), || fixture::step(0.1)),
+        row("complete fixture answer: verdict", Unit::Time, None, None, fixture::answer),
         row("CSV, 10,000 rows of 8 numbers", Unit::Time, None, None, csv),
         row("G-code, 10,000 cuts", Unit::Time, None, None, gcode),
         row("SVG, 3 panels of 201 stations", Unit::Time, None, None, || svg(201)),

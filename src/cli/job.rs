@@ -10,7 +10,7 @@ use serde::de::IgnoredAny;
 use serde_json::json;
 
 use super::{Failed, JobArgs, SolveArgs, print, print_json};
-use crate::engine::{Body, Error, SyntaxFault, check_now, solve_now};
+use crate::engine::{Body, Error, STUDIES, SyntaxFault, check_now, solve_now};
 use crate::http::{Media, written};
 use crate::registry::{Entry, Registry};
 
@@ -80,7 +80,11 @@ pub(super) fn example(entry: &Entry, id: Option<&str>, bare: bool) -> Result<(),
     };
     let job: serde_json::Value =
         serde_json::from_str(example.job).map_err(|error| Failed::Machine(error.to_string()))?;
-    if bare { print_json(&job) } else { print_json(&json!({ "calculator": meta.id, "job": job })) }
+    match (bare, meta.id) {
+        (true, _) => print_json(&job),
+        (false, STUDIES) => print_json(&json!({ "study": job })),
+        (false, id) => print_json(&json!({ "calculator": id, "job": job })),
+    }
 }
 
 /// The calculator's name and the job's bytes.
@@ -102,30 +106,54 @@ fn read(arguments: &JobArgs) -> Result<(String, Body), Failed> {
     Ok((calculator, Body::Json(job)))
 }
 
-/// A job file.
+/// A job file: a job with its calculator, or a parameter study.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct JobFile {
-    calculator: String,
-    #[serde(rename = "job")]
-    _job: IgnoredAny,
+    calculator: Option<String>,
+    #[serde(default, deserialize_with = "present")]
+    job: bool,
+    #[serde(default, deserialize_with = "present")]
+    study: bool,
+}
+
+/// Whatever is there, be it null, is there.
+fn present<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<bool, D::Error> {
+    IgnoredAny::deserialize(deserializer).map(|_| true)
+}
+
+impl JobFile {
+    /// Whose job it is, and which member it is.
+    fn parts(self) -> Option<(String, &'static [u8])> {
+        match (self.calculator, self.job, self.study) {
+            (Some(calculator), true, false) => Some((calculator, b"job")),
+            (None, false, true) => Some((STUDIES.to_owned(), b"study")),
+            _ => None,
+        }
+    }
 }
 
 /// Takes a job file apart. The job keeps its bytes, and its place: whatever stands around it becomes blank, so that
 /// lines and columns of a fault are those of the file.
 fn job_file(mut bytes: Vec<u8>) -> Result<(String, Bytes), Failed> {
-    let JobFile { calculator, .. } = serde_json::from_slice(&bytes).map_err(|error| {
-        let message = error.to_string();
-        let message = message.rsplit_once(" at line ").map_or(message.as_str(), |(message, _)| message);
+    let fault = |message: &str, line, column| {
         Error::Syntax(SyntaxFault {
             code: "bad_syntax",
             pointer: String::new(),
-            line: error.line(),
-            column: error.column(),
-            message: format!("{message}; a job file is {{\"calculator\": \"...\", \"job\": {{...}}}}"),
+            line,
+            column,
+            message: format!(
+                "{message}; a job file is {{\"calculator\": \"...\", \"job\": {{...}}}} or {{\"study\": {{...}}}}"
+            ),
         })
+    };
+    let file: JobFile = serde_json::from_slice(&bytes).map_err(|error| {
+        let message = error.to_string();
+        let message = message.rsplit_once(" at line ").map_or(message.as_str(), |(message, _)| message);
+        fault(message, error.line(), error.column())
     })?;
-    let (start, end) = member(&bytes, b"job").unwrap_or((0, bytes.len()));
+    let (calculator, name) = file.parts().ok_or_else(|| fault("this is neither a job nor a study", 1, 1))?;
+    let (start, end) = member(&bytes, name).unwrap_or((0, bytes.len()));
     bytes.truncate(end);
     for byte in &mut bytes[..start] {
         if *byte != b'\n' {
@@ -218,10 +246,23 @@ mod tests {
     }
 
     #[test]
+    fn a_study_is_a_job_file_too() {
+        let (calculator, study) = job_of("{\"study\": {\"calculator\": \"beam\", \"job\": {}}}");
+        assert_eq!((calculator.as_str(), study.trim()), ("studies", "{\"calculator\": \"beam\", \"job\": {}}"));
+    }
+
+    #[test]
     fn what_is_no_job_file_is_said_with_its_place() {
-        for text in
-            ["", "{", "[]", "{\"job\":{}}", "{\"calculator\":\"x\"}", "{\"calculator\":\"x\",\"job\":{},\"jobs\":1}"]
-        {
+        for text in [
+            "",
+            "{",
+            "[]",
+            "{}",
+            "{\"study\":{},\"job\":{}}",
+            "{\"job\":{}}",
+            "{\"calculator\":\"x\"}",
+            "{\"calculator\":\"x\",\"job\":{},\"jobs\":1}",
+        ] {
             let Err(Failed::Problem(problem)) = job_file(text.as_bytes().to_vec()) else { unreachable!("{text}") };
             assert_eq!(problem.code(), "bad_syntax", "{text}");
         }

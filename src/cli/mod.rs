@@ -9,11 +9,12 @@ use std::fmt::Write as _;
 use std::io::{self, Read, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::Arc;
 
 use clap::{Args, Parser, Subcommand};
 
 use crate::config::Flags;
-use crate::engine::Error;
+use crate::engine::{Error, STUDIES, studies_of};
 use crate::http::{Problem, auth, openapi};
 use crate::registry::{Entry, Registry, RegistryError};
 use crate::text::Language;
@@ -27,6 +28,7 @@ Examples:
   precut example deflection-compensation | precut solve -
   precut solve job.json --format gcode -o shaft.nc
   precut check job.json                           every fault of a job at once
+  precut example studies | precut solve - --format csv
   PRECUT_LOG_FORMAT=json precut                   settings from the environment
 
 Exit codes:
@@ -63,7 +65,7 @@ enum Command {
     List,
     /// Print the JSON Schema of a calculator's job
     Schema {
-        /// Name of the calculator
+        /// Name of the calculator, or `studies`
         calculator: String,
         /// The schema of the result in its place
         #[arg(long)]
@@ -71,7 +73,7 @@ enum Command {
     },
     /// Print a job file that is ready to run
     Example {
-        /// Name of the calculator
+        /// Name of the calculator, or `studies`
         calculator: String,
         /// Which example [default: the first]
         id: Option<String>,
@@ -108,7 +110,7 @@ struct ServeArgs {
 /// Where a job is.
 #[derive(Debug, Args)]
 struct JobArgs {
-    /// Job file `{"calculator": "...", "job": {...}}`; `-` reads standard input
+    /// Job file `{"calculator": "...", "job": {...}}` or `{"study": {...}}`; `-` reads standard input
     #[arg(value_name = "FILE", default_value = "-")]
     file: PathBuf,
     /// The file is the bare job of this calculator
@@ -209,7 +211,7 @@ fn run(cli: Cli, registry: &Registry) -> Result<(), Failed> {
             print_json(if result { entry.output_document() } else { entry.input_document() })
         }
         Some(Command::Example { calculator, id, job }) => {
-            job::example(entry(registry, &calculator)?, id.as_deref(), job)
+            job::example(&*entry(registry, &calculator)?, id.as_deref(), job)
         }
         Some(Command::Openapi) => print(openapi::json(registry).as_bytes()),
         Some(Command::Health { url }) => health::ask(url),
@@ -238,8 +240,12 @@ fn hash_key() -> Result<(), Failed> {
     print(format!("{}\n", auth::hash(key)).as_bytes())
 }
 
-fn entry<'r>(registry: &'r Registry, calculator: &str) -> Result<&'r Entry, Failed> {
-    Ok(registry.entry(calculator).ok_or_else(|| Error::unknown(registry, calculator))?)
+/// A calculator, or parameter studies.
+fn entry(registry: &Registry, name: &str) -> Result<Arc<Entry>, Failed> {
+    if name == STUDIES {
+        return Ok(studies_of(registry));
+    }
+    Ok(registry.entry(name).cloned().ok_or_else(|| Error::unknown(registry, name))?)
 }
 
 fn print_json(value: &impl serde::Serialize) -> Result<(), Failed> {

@@ -1,7 +1,5 @@
 //! The service as a process: settings, start, signals, end.
 
-use std::time::Duration;
-
 use tokio::net::TcpListener;
 use tokio::sync::watch;
 
@@ -32,7 +30,8 @@ pub(super) fn run(arguments: &ServeArgs, registry: Registry) -> Result<(), Faile
 }
 
 async fn serve(config: &Config, registry: Registry) -> Result<(), Failed> {
-    let engine = Engine::open(registry, settings(config)).await.map_err(|error| Failed::Machine(error.to_string()))?;
+    let engine =
+        Engine::open(registry, EngineSettings::of(config)).await.map_err(|error| Failed::Machine(error.to_string()))?;
     let listener = TcpListener::bind(config.listen)
         .await
         .map_err(|error| Failed::Machine(format!("cannot listen on {}: {error}", config.listen)))?;
@@ -49,20 +48,6 @@ async fn serve(config: &Config, registry: Registry) -> Result<(), Failed> {
     engine.close().await;
     tracing::info!("stopped");
     Ok(())
-}
-
-fn settings(config: &Config) -> EngineSettings {
-    let defaults = EngineSettings::in_folder(&config.data);
-    EngineSettings {
-        cores: if config.cpu == 0 { defaults.cores } else { config.cpu },
-        memory_cache_bytes: config.cache.memory_bytes,
-        store_bytes: config.cache.store_bytes,
-        store_age: Duration::from_secs(u64::from(config.cache.store_days) * 24 * 3600),
-        direct_limit: Duration::try_from_secs_f64(config.limits.job_ms / 1e3).unwrap_or(Duration::MAX),
-        direct_limit_bytes: config.limits.job_bytes,
-        patience: Duration::from_millis(config.limits.queue_ms),
-        ..defaults
-    }
 }
 
 /// The address, and three things to try.

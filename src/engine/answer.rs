@@ -8,9 +8,9 @@ use precut_calc::calculator::{Cost, Figure, Program, Table};
 use serde_json::Value;
 
 use super::error::Error;
-use crate::key::Key;
+use crate::key::{ENGINE_VERSION, Key};
 use crate::registry::{Entry, UnreadableResult};
-use crate::store::StoreError;
+use crate::store::{KeptResult, StoreError};
 
 /// A job as it came.
 #[derive(Debug, Clone)]
@@ -108,6 +108,18 @@ impl Stored {
     /// Which calculator made it.
     pub fn entry(&self) -> &Arc<Entry> {
         &self.entry
+    }
+    /// As it is kept.
+    pub(crate) fn kept(&self) -> KeptResult {
+        let meta = self.entry.meta();
+        KeptResult {
+            key: self.key,
+            calculator: meta.id.to_owned(),
+            version: meta.version,
+            engine: ENGINE_VERSION.to_owned(),
+            input: self.input.clone(),
+            body: self.body.clone(),
+        }
     }
     /// Its pictures; the first is the main one.
     pub fn figures(&self) -> Result<Vec<Figure>, Error> {

@@ -1,5 +1,7 @@
 //! A measured table as CSV text into rows.
 
+use std::borrow::Cow;
+
 use precut_calc::calculator::Finding;
 use serde_json::{Map, Value};
 
@@ -7,6 +9,8 @@ use super::json;
 use crate::registry::{CellKind, Faults, TableColumn, TablePlace, nearest};
 use crate::units;
 
+/// Longest name of a column that no field names.
+const LONGEST_NAME: usize = 64;
 /// Longest piece of a cell that is shown.
 const SHOWN_CHARS: usize = 40;
 
@@ -34,21 +38,24 @@ pub(crate) fn read(text: &str, place: &TablePlace, pointer: &str, faults: &mut F
         faults.add(Finding::new("empty_table", pointer));
         return None;
     };
-    let columns = columns(&header, line(text, &header), place, pointer, faults);
+    // One more than the most, so that the excess is seen.
+    let records: Vec<csv::StringRecord> = records.take(place.max_rows.saturating_add(1)).collect();
+    let lines = Lines { header: line(text, &header), decimal_comma: separator != b',', records: &records };
+    let columns = columns(&header, &lines, place, pointer, faults);
     if faults.total > before {
         return None;
     }
     let table = Table { columns: &columns, decimal_comma: separator != b',', pointer };
     let mut read = CsvRows::default();
-    for record in records {
+    for record in &records {
         if read.rows.len() == place.max_rows {
             // A table has far fewer rows than 2^53.
             #[allow(clippy::cast_precision_loss)]
             faults.add(Finding::new("too_many_rows", pointer).with("maximum", place.max_rows as f64));
             return None;
         }
-        let line = line(text, &record);
-        read.rows.push(table.row(&record, line, faults));
+        let line = line(text, record);
+        read.rows.push(table.row(record, line, faults));
         read.lines.push(line);
     }
     (faults.total == before).then_some(read)
@@ -80,13 +87,22 @@ fn separator(text: &str) -> u8 {
 
 /// A column of the text: which field it fills and from which unit.
 struct CsvColumn<'a> {
-    field: &'a TableColumn,
+    field: Cow<'a, TableColumn>,
     unit: String,
+    /// The field of the row that holds it by name, of a column that has no field of its own.
+    within: Option<&'a str>,
+}
+
+/// What stands around the header.
+struct Lines<'a> {
+    header: u64,
+    decimal_comma: bool,
+    records: &'a [csv::StringRecord],
 }
 
 fn columns<'a>(
     header: &csv::StringRecord,
-    line: u64,
+    lines: &Lines<'_>,
     place: &'a TablePlace,
     pointer: &str,
     faults: &mut Faults,
@@ -94,9 +110,15 @@ fn columns<'a>(
     let before = faults.total;
     let mut found: Vec<CsvColumn<'a>> = Vec::new();
     let used = used_cells(header);
-    for cell in header.iter().take(used) {
-        let fault = |code| Finding::new(code, pointer).with("column", shown(cell)).with("line", whole(line));
-        match column(cell, place) {
+    for (index, cell) in header.iter().take(used).enumerate() {
+        let fault = |code| Finding::new(code, pointer).with("column", shown(cell)).with("line", whole(lines.header));
+        let read = match column(cell, place) {
+            Err(BadHeader::Unknown { nearest }) => {
+                free_column(cell, index, lines, place).ok_or(BadHeader::Unknown { nearest })
+            }
+            known => known,
+        };
+        match read {
             Ok(column) if found.iter().any(|other| other.field.name == column.field.name) => {
                 faults.add(fault("duplicate_column").with("field", column.field.name.clone()));
             }
@@ -124,6 +146,27 @@ fn columns<'a>(
     found
 }
 
+/// A column that no field names, where the table takes such: numbers if all its cells are, else words.
+fn free_column<'a>(cell: &str, index: usize, lines: &Lines<'_>, place: &'a TablePlace) -> Option<CsvColumn<'a>> {
+    let (name, unit) = match cell.strip_suffix(']').and_then(|cell| cell.rsplit_once('[')) {
+        Some((name, unit)) => (name, units::suffix(unit.trim())),
+        None => (cell, String::new()),
+    };
+    let name = name.trim().to_lowercase().replace(' ', "_") + &unit;
+    if name.is_empty() || name.len() > LONGEST_NAME {
+        return None;
+    }
+    let cells = || lines.records.iter().filter_map(|record| record.get(index)).filter(|cell| !cell.is_empty());
+    let numbers = cells().all(|cell| number(cell, lines.decimal_comma).is_some());
+    let (within, kind) = match (&place.free.numbers, &place.free.words) {
+        (Some(within), _) if numbers => (within, CellKind::Number),
+        (_, Some(within)) => (within, CellKind::Word),
+        _ => return None,
+    };
+    let field = Cow::Owned(TableColumn { name, unit: String::new(), kind, required: false });
+    Some(CsvColumn { field, unit: String::new(), within: Some(within) })
+}
+
 enum BadHeader {
     Unknown { nearest: Option<String> },
     NoUnit { expected: String },
@@ -146,10 +189,10 @@ fn column<'a>(cell: &str, place: &'a TablePlace) -> Result<CsvColumn<'a>, BadHea
                 None => return Err(BadHeader::NoUnit { expected: field.unit.clone() }),
             };
             if unit == field.unit || (has_no_unit(field) && unit.is_empty()) {
-                return Ok(CsvColumn { field, unit: field.unit.clone() });
+                return Ok(CsvColumn { field: Cow::Borrowed(field), unit: field.unit.clone(), within: None });
             }
             return match units::convert(1.0, &unit, &field.unit) {
-                Some(_) => Ok(CsvColumn { field, unit }),
+                Some(_) => Ok(CsvColumn { field: Cow::Borrowed(field), unit, within: None }),
                 None => Err(BadHeader::WrongUnit { expected: field.unit.clone(), received: unit }),
             };
         }
@@ -158,7 +201,7 @@ fn column<'a>(cell: &str, place: &'a TablePlace) -> Result<CsvColumn<'a>, BadHea
             !suffix.is_empty() && name.strip_suffix(suffix.as_str()) == Some(stem)
         });
         if let (Some(unit), None) = (other_unit, bracket) {
-            return Ok(CsvColumn { field, unit: unit.to_owned() });
+            return Ok(CsvColumn { field: Cow::Borrowed(field), unit: unit.to_owned(), within: None });
         }
     }
     let names = place.columns.iter().map(|column| column.name.as_str());
@@ -198,7 +241,15 @@ impl Table<'_> {
                     faults.add(fault("empty_cell"));
                 }
             } else if let Some(value) = self.value(cell, column) {
-                row.insert(column.field.name.clone(), value);
+                let name = column.field.name.clone();
+                match column.within {
+                    None => row.insert(name, value),
+                    Some(map) => row
+                        .entry(map)
+                        .or_insert_with(|| Value::Object(Map::new()))
+                        .as_object_mut()
+                        .and_then(|map| map.insert(name, value)),
+                };
             } else {
                 faults.add(fault("bad_cell"));
             }
@@ -312,6 +363,24 @@ mod tests {
             }
             assert_eq!(read.as_array().unwrap().len(), 2, "{text}");
         }
+    }
+
+    #[test]
+    fn columns_without_a_field_go_where_the_row_takes_them() {
+        let mut place = place();
+        place.free =
+            crate::registry::FreeColumns { numbers: Some("further".to_owned()), words: Some("factors".to_owned()) };
+        let mut faults = Faults::default();
+        let text = "z_mm;deviation_um;Nose radius [mm];coolant;humidity\n1;2;0,8;on;\n3;4;1,2;7;0,5\n";
+        let read = read(text, &place, "/measurements", &mut faults).unwrap();
+        assert!(faults.listed.is_empty(), "{:?}", faults.listed);
+        assert_eq!(
+            Value::Array(read.rows),
+            json!([
+                {"z_mm": 1, "deviation_um": 2, "further": {"nose_radius_mm": 0.8}, "factors": {"coolant": "on"}},
+                {"z_mm": 3, "deviation_um": 4, "further": {"nose_radius_mm": 1.2, "humidity": 0.5}, "factors": {"coolant": "7"}}
+            ])
+        );
     }
 
     #[test]

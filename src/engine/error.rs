@@ -6,6 +6,7 @@ use precut_calc::calculator::{Cost, Failure, Finding};
 
 use crate::registry::Registry;
 use crate::store::StoreError;
+use crate::store::jobs::{JobId, JobState};
 
 /// Why a job has no answer. Knows no status codes.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -45,6 +46,43 @@ pub enum Error {
         /// When to come again.
         retry_after: Duration,
     },
+    /// Too many jobs wait.
+    #[error("{queued} jobs wait")]
+    QueueFull {
+        /// How many.
+        queued: u64,
+        /// When to come again.
+        retry_after: Duration,
+    },
+    /// Something else was asked under the same idempotency key.
+    #[error("the idempotency key belongs to job {0}, which asked something else")]
+    IdempotencyKeyReused(JobId),
+    /// No job has that name.
+    #[error("there is no job {0}")]
+    UnknownJob(JobId),
+    /// The job has not come to its end yet.
+    #[error("the job is {}", .state.word())]
+    JobNotFinished {
+        /// How far it is.
+        state: JobState,
+        /// When to come again.
+        retry_after: Duration,
+    },
+    /// The job was cancelled.
+    #[error("the job was cancelled")]
+    JobCancelled,
+    /// The job's result is kept no longer.
+    #[error("the job's result is kept no longer")]
+    JobExpired,
+    /// The job was not done before its deadline.
+    #[error("the deadline passed")]
+    DeadlineExceeded,
+    /// The job took its process along at every attempt.
+    #[error("the process ended at each of {attempts} attempts")]
+    CrashedRepeatedly {
+        /// How many attempts.
+        attempts: u32,
+    },
     /// The physics has no answer.
     #[error(transparent)]
     Calculation(Failure),
@@ -65,6 +103,11 @@ pub enum Error {
 impl Error {
     /// So many faults are listed at most.
     pub const MOST_FAULTS: usize = 100;
+
+    /// Our own fault.
+    pub(crate) fn internal(cause: String) -> Self {
+        Self::Calculation(Failure::Internal(cause))
+    }
 
     /// No calculator has that name.
     pub fn unknown(registry: &Registry, name: &str) -> Self {

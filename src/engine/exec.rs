@@ -1,4 +1,8 @@
-//! Cores: one named pool for all physics, and who may use it.
+//! Cores: the named pools for all physics, and who may use them.
+//!
+//! Direct answers have a thread per core. Jobs have a pool of their own with one thread less: whatever a long
+//! calculation does in parallel, it cannot take all threads from the short ones, which would otherwise stand behind
+//! every piece of its work.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -12,9 +16,12 @@ use super::error::Error;
 /// When a client that found no slot should come again.
 const RETRY_AFTER: Duration = Duration::from_secs(1);
 
-/// The pool of calculation threads with its slots.
+/// The pools of calculation threads with their slots.
 pub(crate) struct Cores {
     pool: rayon::ThreadPool,
+    job_pool: rayon::ThreadPool,
+    job_slots: Arc<Semaphore>,
+    job_slot_count: u32,
     slots: Arc<Semaphore>,
     slot_count: u32,
     in_line: AtomicUsize,
@@ -26,13 +33,21 @@ pub(crate) struct Slot(#[allow(dead_code)] OwnedSemaphorePermit); // held, never
 
 impl Cores {
     /// Twice as many slots as cores: while one job ends, the next is there.
-    pub(crate) fn new(cores: usize, patience: Duration) -> Result<Self, rayon::ThreadPoolBuildError> {
-        let cores = cores.clamp(1, 1024);
-        let pool =
-            rayon::ThreadPoolBuilder::new().num_threads(cores).thread_name(|index| format!("calc-{index}")).build()?;
+    pub(crate) fn new(cores: usize, job_slots: usize, patience: Duration) -> Result<Self, rayon::ThreadPoolBuildError> {
+        let pool = |name: &'static str, threads: usize| {
+            rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .thread_name(move |index| format!("{name}-{index}"))
+                .build()
+        };
+        let (cores, job_slots) = (cores.clamp(1, 1024), job_slots.clamp(1, 1024));
+        let (job_slot_count, job_pool) = (u32::try_from(job_slots).unwrap_or(1), pool("job", job_slots)?);
+        let pool = pool("calc", cores)?;
+        let job_slots = Arc::new(Semaphore::new(job_slots));
         let slot_count = u32::try_from(2 * cores).unwrap_or(u32::MAX);
         let slots = Arc::new(Semaphore::new(2 * cores));
-        Ok(Self { pool, slots, slot_count, in_line: AtomicUsize::new(0), patience })
+        let in_line = AtomicUsize::new(0);
+        Ok(Self { pool, job_pool, job_slots, job_slot_count, slots, slot_count, in_line, patience })
     }
 
     /// A slot if one is free.
@@ -62,6 +77,28 @@ impl Cores {
         }
     }
 
+    /// How many jobs may run at the same time.
+    pub(crate) fn job_places(&self) -> usize {
+        self.job_slot_count as usize
+    }
+
+    /// The right to run a job: alone, or beside others. Waits for it.
+    pub(crate) async fn job_slot(&self, alone: bool) -> Result<Slot, Error> {
+        let permits = if alone { self.job_slot_count } else { 1 };
+        let permit = Arc::clone(&self.job_slots).acquire_many_owned(permits).await;
+        permit.map(Slot).map_err(|_closed| Error::ShuttingDown)
+    }
+
+    /// The right to use one more core for a job, if nobody waits for it.
+    pub(crate) fn spare_job_slot(&self) -> Option<Slot> {
+        Arc::clone(&self.job_slots).try_acquire_owned().ok().map(Slot)
+    }
+
+    /// Runs `work` on the jobs' pool.
+    pub(crate) fn spawn_job(&self, work: impl FnOnce() + Send + 'static) {
+        self.job_pool.spawn(work);
+    }
+
     /// Runs `work` on the pool.
     pub(crate) fn spawn(&self, work: impl FnOnce() + Send + 'static) {
         self.pool.spawn(work);
@@ -85,9 +122,13 @@ impl Cores {
 
     /// Gives no more slots and waits until those given are back, at most so long; whether they are.
     pub(crate) async fn drain(&self, most: Duration) -> bool {
-        let all = tokio::time::timeout(most, self.slots.acquire_many(self.slot_count)).await;
-        let back = matches!(all, Ok(Ok(_)));
+        let all = async {
+            let _jobs = self.job_slots.acquire_many(self.job_slot_count).await?;
+            self.slots.acquire_many(self.slot_count).await.map(drop)
+        };
+        let back = matches!(tokio::time::timeout(most, all).await, Ok(Ok(())));
         self.slots.close();
+        self.job_slots.close();
         back
     }
 }

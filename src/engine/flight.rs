@@ -4,10 +4,11 @@ use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use precut_calc::calculator::{Message, Monitor};
+use precut_calc::calculator::{Figure, Message, Monitor};
 use tokio::sync::watch;
 
 use super::error::Error;
+use super::progress::Progress;
 use super::{Stored, Timings};
 use crate::key::Key;
 
@@ -26,6 +27,7 @@ pub(crate) struct Flights {
 
 struct Flight {
     cancelled: Arc<AtomicBool>,
+    progress: Arc<Progress>,
     waiting: AtomicUsize,
     landed: watch::Receiver<Option<Landed>>,
 }
@@ -47,8 +49,9 @@ impl Flights {
             return Boarded { seat, pilot: None };
         }
         let (sender, landed) = watch::channel(None);
-        let cancelled = Arc::new(AtomicBool::new(false));
-        let flight = Arc::new(Flight { cancelled: Arc::clone(&cancelled), waiting: AtomicUsize::new(1), landed });
+        let cancelled = Arc::default();
+        let progress = Arc::default();
+        let flight = Arc::new(Flight { cancelled, progress, waiting: AtomicUsize::new(1), landed });
         under_way.insert(key, Arc::clone(&flight));
         let pilot = Pilot { flights: Arc::clone(self), flight: Arc::clone(&flight), key, sender, landed: false };
         Boarded { seat: Seat { flights: Arc::clone(self), flight, key }, pilot: Some(pilot) }
@@ -79,6 +82,11 @@ pub(crate) struct Seat {
 }
 
 impl Seat {
+    /// How far the calculation is.
+    pub(crate) fn progress(&self) -> Arc<Progress> {
+        Arc::clone(&self.flight.progress)
+    }
+
     pub(crate) async fn landed(self) -> Landed {
         let mut receiver = self.flight.landed.clone();
         let landed = receiver.wait_for(Option::is_some).await.ok().and_then(|landed| landed.clone());
@@ -111,7 +119,7 @@ pub(crate) struct Pilot {
 impl Pilot {
     /// What the calculation asks whether to go on.
     pub(crate) fn watch(&self) -> Watch {
-        Watch(Arc::clone(&self.flight.cancelled))
+        Watch { cancelled: Arc::clone(&self.flight.cancelled), progress: Arc::clone(&self.flight.progress) }
     }
 
     pub(crate) fn land(mut self, landed: Landed) {
@@ -134,11 +142,19 @@ impl Drop for Pilot {
 }
 
 /// A calculation's view of those who wait for it.
-pub(crate) struct Watch(Arc<AtomicBool>);
+pub(crate) struct Watch {
+    cancelled: Arc<AtomicBool>,
+    progress: Arc<Progress>,
+}
 
 impl Monitor for Watch {
     fn cancelled(&self) -> bool {
-        self.0.load(Ordering::Relaxed)
+        self.cancelled.load(Ordering::Relaxed)
     }
-    fn progress(&self, _fraction: f64, _stage: Message) {}
+    fn progress(&self, fraction: f64, stage: Message) {
+        self.progress.report(fraction, stage);
+    }
+    fn interim(&self, figure: Figure) {
+        self.progress.show(figure);
+    }
 }

@@ -1,4 +1,8 @@
 //! From the bytes of a job to the bytes of its answer. Knows calculators by name, nothing of HTTP.
+//!
+//! A job is answered at once ([`Engine::solve`]) or put on record and run behind ([`Engine::submit`], [`jobs`]). Both
+//! ways share the cache, the calculations under way and the calculation itself; [`jobs`] says how something else than
+//! one calculation becomes a job.
 
 mod answer;
 mod csv_table;
@@ -6,19 +10,26 @@ mod envelope;
 mod error;
 mod exec;
 mod flight;
+pub(crate) mod jobs;
 mod json;
 mod memory;
+mod progress;
 mod read;
 mod settings;
+mod study;
 mod table;
 #[cfg(test)]
 mod tests;
 
 pub use crate::key::{BadKey, ENGINE_VERSION, Key};
 pub use crate::store::OpenError;
+pub use crate::store::jobs::{JobId, JobKind, JobQuery, JobRecord, JobState, Priority};
 pub use answer::{Body, CacheState, Checked, Solved, Stored, TablePart, Timings};
 pub use error::{Error, SyntaxFault};
+pub use jobs::{Answered, Ask, Feed, Job};
+pub use progress::Interim;
 pub use settings::EngineSettings;
+pub use study::STUDIES;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -27,10 +38,12 @@ use std::time::{Duration, Instant};
 use precut_calc::calculator::{Cost, Failure, Monitor};
 
 use crate::registry::{Entry, Registry};
-use crate::store::sqlite::SqliteStore;
-use crate::store::{KeptResult, ResultPage, ResultQuery, ResultStore};
+use crate::store::jobs::JobStore;
+use crate::store::sqlite::{Keep, SqliteStore};
+use crate::store::{ResultPage, ResultQuery, ResultStore};
 use exec::{Cores, Slot, guarded};
 use flight::{Boarded, Flights, Landed, Pilot};
+use jobs::Jobs;
 use memory::{Kept, Memory, fingerprint};
 use read::Ready;
 
@@ -46,34 +59,53 @@ pub struct Engine {
     inner: Arc<Inner>,
 }
 
-struct Inner {
+pub(crate) struct Inner {
     registry: Registry,
     settings: EngineSettings,
     memory: Memory,
     flights: Arc<Flights>,
     cores: Cores,
     store: Arc<dyn ResultStore>,
+    jobs: Jobs,
+    /// Parameter studies: asked like a calculator, made of the registry's.
+    studies: Arc<Entry>,
     closed: AtomicBool,
+}
+
+/// A job that was read.
+enum Known {
+    /// What it comes to is known.
+    Kept(Kept, Duration),
+    /// It is to be computed.
+    New(Box<Ready>, Duration),
 }
 
 impl Engine {
     /// Opens the store in the settings' folder and starts the threads.
     pub async fn open(registry: Registry, settings: EngineSettings) -> Result<Self, OpenError> {
-        let store = SqliteStore::open(&settings.data, settings.store_bytes, settings.store_age).await?;
-        Self::with_store(registry, settings, Arc::new(store))
+        let keep = Keep { bytes: settings.store_bytes, age: settings.store_age, jobs: settings.job_age };
+        let store = Arc::new(SqliteStore::open(&settings.data, keep).await?);
+        Self::with_stores(registry, settings, Arc::clone(&store) as Arc<dyn ResultStore>, store).await
     }
 
-    fn with_store(
+    async fn with_stores(
         registry: Registry,
         settings: EngineSettings,
         store: Arc<dyn ResultStore>,
+        jobs: Arc<dyn JobStore>,
     ) -> Result<Self, OpenError> {
-        let cores =
-            Cores::new(settings.cores, settings.patience).map_err(|error| OpenError::Threads(error.to_string()))?;
+        let cores = Cores::new(settings.cores, settings.job_slots, settings.patience)
+            .map_err(|error| OpenError::Threads(error.to_string()))?;
         let memory = Memory::new(settings.memory_cache_bytes);
         let closed = AtomicBool::new(false);
         let flights = Arc::default();
-        Ok(Self { inner: Arc::new(Inner { registry, settings, memory, flights, cores, store, closed }) })
+        let jobs = Jobs::new(jobs);
+        let host = Arc::new(study::InEngine::default());
+        let studies = Arc::new(study::entry(&registry, settings.study_points, Arc::<study::InEngine>::clone(&host)));
+        let inner = Arc::new(Inner { registry, settings, memory, flights, cores, store, jobs, studies, closed });
+        host.move_in(&inner);
+        Jobs::start(&inner).await;
+        Ok(Self { inner })
     }
 
     /// The calculators.
@@ -81,35 +113,63 @@ impl Engine {
         &self.inner.registry
     }
 
+    /// Parameter studies, which are asked like a calculator.
+    pub fn studies(&self) -> &Arc<Entry> {
+        &self.inner.studies
+    }
+
+    /// What is asked under a name: a calculator, or parameter studies.
+    pub fn entry(&self, name: &str) -> Option<&Arc<Entry>> {
+        self.inner.entry(name)
+    }
+
     /// Everything but the calculation.
+    #[allow(clippy::needless_pass_by_value)] // a body is handed over, as everywhere
     pub fn check(&self, calculator: &str, body: Body) -> Result<Checked, Error> {
-        check_now(&self.inner.registry, calculator, body)
+        let inner = &self.inner;
+        let entry = inner.known(calculator)?;
+        guarded(|| read::read(&entry, &body)?.into_checked())
     }
 
     /// The answer to a job, from the cache or computed. Dropping the future cancels the calculation unless another
     /// request waits for the same one.
     pub async fn solve(&self, calculator: &str, body: Body) -> Result<Solved, Error> {
+        match self.know(calculator, &body).await? {
+            Known::Kept(kept, parse) => hit(kept, parse),
+            Known::New(ready, parse) => {
+                self.inner.afford(ready.prepared.cost)?;
+                self.solve_directly(*ready, parse).await
+            }
+        }
+    }
+
+    /// Reads a job, and what is known of it.
+    async fn know(&self, calculator: &str, body: &Body) -> Result<Known, Error> {
         let inner = &self.inner;
         if inner.closed.load(Ordering::Relaxed) {
             return Err(Error::ShuttingDown);
         }
-        let entry = entry(&inner.registry, calculator)?;
+        let entry = inner.known(calculator)?;
         let begun = Instant::now();
-        let fingerprint = fingerprint(entry.meta().id, &body);
+        let fingerprint = fingerprint(entry.meta().id, body);
         if let Some(key) = inner.memory.recognise(&fingerprint)
             && let Some(kept) = inner.look_up(&key).await
         {
-            return hit(kept, begun.elapsed());
+            return Ok(Known::Kept(kept, begun.elapsed()));
         }
-        let ready = inner.read(&entry, body).await?;
+        let ready = inner.read(&entry, body.clone()).await?;
         inner.memory.remember(fingerprint, ready.key);
         let parse = begun.elapsed();
-        if let Some(kept) = inner.look_up(&ready.key).await {
-            return hit(kept, parse);
-        }
-        inner.afford(ready.prepared.cost)?;
+        Ok(match inner.look_up(&ready.key).await {
+            Some(kept) => Known::Kept(kept, parse),
+            None => Known::New(Box::new(ready), parse),
+        })
+    }
+
+    /// Computes the answer to a job while somebody waits for it.
+    async fn solve_directly(&self, ready: Ready, parse: Duration) -> Result<Solved, Error> {
         metrics::counter!("precut_cache_total", "state" => "miss").increment(1);
-        let Boarded { seat, pilot } = inner.flights.board(ready.key);
+        let Boarded { seat, pilot } = self.inner.flights.board(ready.key);
         if let Some(pilot) = pilot {
             self.depart(pilot, ready);
         }
@@ -164,9 +224,11 @@ impl Engine {
         Ok(self.inner.store.ping().await?)
     }
 
-    /// From now on jobs are refused and [`Engine::ready`] fails; calculations under way go on.
+    /// From now on jobs are refused and [`Engine::ready`] fails; direct calculations under way go on, jobs go back in
+    /// line.
     pub fn refuse_jobs(&self) {
         self.inner.closed.store(true, Ordering::Relaxed);
+        self.inner.jobs.stop();
     }
 
     /// Takes no more jobs, lets running calculations end within the grace or cancels them, writes what waits to be
@@ -174,6 +236,7 @@ impl Engine {
     pub async fn close(&self) {
         self.refuse_jobs();
         let inner = &self.inner;
+        inner.jobs.close().await;
         if !inner.cores.drain(inner.settings.grace).await {
             inner.flights.cancel_all();
         }
@@ -182,9 +245,18 @@ impl Engine {
 }
 
 impl Inner {
+    fn entry(&self, name: &str) -> Option<&Arc<Entry>> {
+        if name == STUDIES { Some(&self.studies) } else { self.registry.entry(name) }
+    }
+
+    /// What is asked under a name.
+    fn known(&self, name: &str) -> Result<Arc<Entry>, Error> {
+        self.entry(name).cloned().ok_or_else(|| Error::unknown(&self.registry, name))
+    }
+
     /// Reads a job where that does no harm.
     async fn read(&self, entry: &Arc<Entry>, body: Body) -> Result<Ready, Error> {
-        if body.len() <= READ_AT_ONCE {
+        if body.len() <= READ_AT_ONCE && !entry.is_composed() {
             return guarded(|| read::read(entry, &body));
         }
         let slot = match self.cores.slot_now()? {
@@ -217,14 +289,14 @@ impl Inner {
     async fn fetch(&self, key: &Key) -> Result<Option<Arc<Stored>>, crate::store::StoreError> {
         let Some(kept) = self.store.get(*key).await? else { return Ok(None) };
         // A calculator that is no more has no results either.
-        let Some(entry) = self.registry.entry(&kept.calculator) else { return Ok(None) };
+        let Some(entry) = self.entry(&kept.calculator) else { return Ok(None) };
         let stored = Arc::new(Stored { key: *key, body: kept.body, input: kept.input, entry: Arc::clone(entry) });
         self.memory.keep(*key, Kept::Answer(Arc::clone(&stored)));
         Ok(Some(stored))
     }
 
     fn afford(&self, cost: Cost) -> Result<(), Error> {
-        let (limit, limit_bytes) = (self.settings.direct_limit, self.settings.direct_limit_bytes);
+        let (limit, limit_bytes) = (self.settings.cost_limit, self.settings.cost_limit_bytes);
         // An estimate that is no number is not below the limit.
         let affordable = cost.ms <= limit.as_secs_f64() * 1e3 && cost.bytes <= limit_bytes;
         if affordable { Ok(()) } else { Err(Error::TooExpensive { cost, limit, limit_bytes }) }
@@ -232,16 +304,16 @@ impl Inner {
 
     /// Sees to it that the calculation runs: here if it is short, else on the pool.
     fn fly(inner: &Arc<Self>, pilot: Pilot, ready: Ready, slot: Slot, queued: Instant) {
-        if ready.prepared.cost.ms <= COMPUTE_AT_ONCE_MS {
-            inner.run(pilot, &ready, slot, queued);
+        if ready.prepared.cost.ms <= COMPUTE_AT_ONCE_MS && !ready.entry.is_composed() {
+            inner.run(pilot, &ready, Some(slot), queued);
         } else {
             let this = Arc::clone(inner);
-            inner.cores.spawn(move || this.run(pilot, &ready, slot, queued));
+            inner.cores.spawn(move || this.run(pilot, &ready, Some(slot), queued));
         }
     }
 
     /// Runs the calculation, keeps its answer and tells it.
-    fn run(&self, pilot: Pilot, ready: &Ready, slot: Slot, queued: Instant) {
+    fn run(&self, pilot: Pilot, ready: &Ready, slot: Option<Slot>, queued: Instant) {
         let (queue, begun) = (queued.elapsed(), Instant::now());
         let watch = pilot.watch();
         let outcome = guarded(|| compute(ready, &watch));
@@ -266,19 +338,15 @@ impl Inner {
             Ok(stored) => {
                 let stored = Arc::new(stored);
                 self.memory.keep(ready.key, Kept::Answer(Arc::clone(&stored)));
-                self.store.put(KeptResult {
-                    key: ready.key,
-                    calculator: meta.id.to_owned(),
-                    version: meta.version,
-                    engine: ENGINE_VERSION.to_owned(),
-                    input: stored.input.clone(),
-                    body: stored.body.clone(),
-                });
+                self.store.put(stored.kept());
                 Ok(stored)
             }
             Err(Error::Calculation(failure)) => {
                 match &failure {
-                    Failure::Infeasible(_) | Failure::OutOfModel(_) | Failure::NotConverged { .. } => {
+                    Failure::Infeasible(_)
+                    | Failure::Conflicting(_)
+                    | Failure::OutOfModel(_)
+                    | Failure::NotConverged { .. } => {
                         self.memory.keep(ready.key, Kept::Failure(failure.clone()));
                     }
                     Failure::Internal(reason) => {
@@ -310,8 +378,17 @@ fn hit(kept: Kept, parse: Duration) -> Result<Solved, Error> {
     Ok(Solved { stored: outcome(kept)?, cache: CacheState::Hit, timings })
 }
 
+/// What is asked under a name, without an engine.
 fn entry(registry: &Registry, calculator: &str) -> Result<Arc<Entry>, Error> {
+    if calculator == STUDIES {
+        return Ok(studies_of(registry));
+    }
     registry.entry(calculator).cloned().ok_or_else(|| Error::unknown(registry, calculator))
+}
+
+/// Parameter studies over the calculators of a registry, without an engine: nothing is kept.
+pub fn studies_of(registry: &Registry) -> Arc<Entry> {
+    Arc::new(study::entry(registry, study::MOST_POINTS, Arc::new(study::Alone)))
 }
 
 /// Runs a job and writes its answer.

@@ -7,7 +7,7 @@ use precut_calc::calculator::{Failure, Finding};
 use serde_json::Value;
 
 use super::error::Error;
-use super::{Body, Checked, json, table};
+use super::{Body, Checked, TablePart, json, table};
 use crate::key::Key;
 use crate::registry::{Entry, Faults, Prepared, Unprepared, by_pointer};
 
@@ -29,10 +29,19 @@ pub(crate) fn read(entry: &Arc<Entry>, body: &Body) -> Result<Ready, Error> {
         Body::Json(job) => (job, [].as_slice()),
         Body::Parts { job, tables } => (job, tables.as_slice()),
     };
-    let mut job = json::parse(job)?;
+    read_value(entry, json::parse(job)?, parts)
+}
+
+/// The same from a JSON value that [`json::parse`] made.
+pub(crate) fn read_value(entry: &Arc<Entry>, mut job: Value, parts: &[TablePart]) -> Result<Ready, Error> {
     check_schema(entry, &mut job, parts).map_err(|found| found.with_rules(entry, &job))?;
-    let has_rows = table::has_rows(&job, entry.tables());
-    let mut prepared = entry.prepare(&job).map_err(|unprepared| match unprepared {
+    prepared(entry, &job)
+}
+
+/// A job whose syntax, tables and schema are in order, or were when it was accepted.
+pub(crate) fn prepared(entry: &Arc<Entry>, job: &Value) -> Result<Ready, Error> {
+    let has_rows = table::has_rows(job, entry.tables());
+    let mut prepared = entry.prepare(job).map_err(|unprepared| match unprepared {
         Unprepared::Invalid(findings) => {
             let total = findings.len();
             invalid(findings, total)
@@ -40,7 +49,7 @@ pub(crate) fn read(entry: &Arc<Entry>, body: &Body) -> Result<Ready, Error> {
         Unprepared::Failed(failure) => Error::Calculation(failure),
     })?;
     let canonical = Bytes::from(std::mem::take(&mut prepared.canonical));
-    let key = Key::of(entry.meta(), &canonical);
+    let key = Key::of(entry.meta(), prepared.numbers_of.as_ref(), &canonical);
     Ok(Ready { entry: Arc::clone(entry), prepared, key, canonical, has_rows })
 }
 
@@ -81,7 +90,7 @@ fn general_code(finding: &Finding) -> &str {
     }
 }
 
-fn check_schema(entry: &Entry, job: &mut Value, parts: &[super::TablePart]) -> Result<(), Found> {
+fn check_schema(entry: &Entry, job: &mut Value, parts: &[TablePart]) -> Result<(), Found> {
     let mut table_faults = Faults::default();
     let tables = table::resolve(job, parts, entry.tables(), &mut table_faults);
     let mut schema_faults = Faults::default();
@@ -96,6 +105,11 @@ fn check_schema(entry: &Entry, job: &mut Value, parts: &[super::TablePart]) -> R
     let total = schema_faults.total - (listed - findings.len()) + table_faults.total;
     findings.extend(table_faults.listed);
     if total == 0 { Ok(()) } else { Err(Found { findings, total }) }
+}
+
+/// What the schema alone finds wrong with a job.
+pub(crate) fn schema_faults(entry: &Entry, mut job: Value) -> Vec<Finding> {
+    check_schema(entry, &mut job, &[]).err().map(|found| found.findings).unwrap_or_default()
 }
 
 /// The faults sorted by pointer, as many as are listed.
@@ -130,7 +144,6 @@ impl Ready {
 #[allow(clippy::unwrap_used, clippy::panic)]
 mod tests {
     use super::*;
-    use crate::engine::TablePart;
     use crate::registry::toy;
     use crate::text::{Language, Texts};
     use proptest::prelude::*;

@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
+use crate::config::{Config, milliseconds, seconds};
+
 /// How an engine works.
 #[derive(Debug, Clone)]
 pub struct EngineSettings {
@@ -16,10 +18,20 @@ pub struct EngineSettings {
     pub store_bytes: u64,
     /// How long an unused answer is kept there.
     pub store_age: Duration,
-    /// A job estimated above this is refused.
+    /// A job estimated above this is not answered at once, but run behind.
     pub direct_limit: Duration,
+    /// A job estimated above this is refused.
+    pub cost_limit: Duration,
     /// A job estimated to hold more memory than this is refused.
-    pub direct_limit_bytes: u64,
+    pub cost_limit_bytes: u64,
+    /// With so many jobs waiting, further ones are refused.
+    pub queue_limit: u64,
+    /// Jobs run at the same time behind the direct answers.
+    pub job_slots: usize,
+    /// How long finished jobs and their results are kept.
+    pub job_age: Duration,
+    /// So many points has a parameter study at most.
+    pub study_points: u64,
     /// How long a job may stand in line for a core.
     pub patience: Duration,
     /// How long running calculations may go on when the engine is closed.
@@ -29,16 +41,49 @@ pub struct EngineSettings {
 impl EngineSettings {
     /// The defaults, with the database in `data`.
     pub fn in_folder(data: impl Into<PathBuf>) -> Self {
+        let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
         Self {
             data: data.into(),
-            cores: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
+            cores,
             memory_cache_bytes: 64 << 20,
             store_bytes: 1 << 30,
             store_age: Duration::from_hours(30 * 24),
-            direct_limit: Duration::from_secs(10),
-            direct_limit_bytes: 1 << 30,
+            direct_limit: Duration::from_millis(500),
+            cost_limit: Duration::from_hours(1),
+            cost_limit_bytes: 1 << 30,
+            queue_limit: 10_000,
+            job_slots: Self::job_slots_of(cores),
+            job_age: Duration::from_hours(30 * 24),
+            study_points: super::study::MOST_POINTS,
             patience: Duration::from_millis(250),
             grace: Duration::from_secs(20),
         }
+    }
+
+    /// Those of a configuration.
+    pub fn of(config: &Config) -> Self {
+        let defaults = Self::in_folder(&config.data);
+        let cores = if config.cpu == 0 { defaults.cores } else { config.cpu };
+        Self {
+            data: defaults.data,
+            cores,
+            memory_cache_bytes: config.cache.memory_bytes,
+            store_bytes: config.cache.store_bytes,
+            store_age: Duration::from_secs(u64::from(config.cache.store_days) * 24 * 3600),
+            direct_limit: milliseconds(config.limits.direct_ms),
+            cost_limit: milliseconds(config.limits.job_ms),
+            cost_limit_bytes: config.limits.job_bytes,
+            queue_limit: config.jobs.queue,
+            job_slots: if config.jobs.slots == 0 { Self::job_slots_of(cores) } else { config.jobs.slots },
+            job_age: Duration::from_secs(u64::from(config.jobs.days) * 24 * 3600),
+            study_points: config.limits.study_points,
+            patience: Duration::from_millis(config.limits.queue_ms),
+            grace: seconds(config.shutdown.grace_s),
+        }
+    }
+
+    /// All cores but one: long jobs leave short answers a core.
+    pub const fn job_slots_of(cores: usize) -> usize {
+        if cores > 2 { cores - 1 } else { 1 }
     }
 }

@@ -11,7 +11,7 @@ use tempfile::TempDir;
 
 use super::*;
 use crate::registry::toy;
-use crate::store::StoreError;
+use crate::store::{KeptResult, StoreError};
 use crate::text::{Language, Texts};
 
 const TOY: &str = "toy-bar";
@@ -150,7 +150,7 @@ async fn a_panic_a_nan_and_an_impossible_job_are_told_apart() {
 
 #[tokio::test]
 async fn a_job_above_the_limit_is_refused_with_the_field_that_drives_it() {
-    let (engine, _folder) = engine().await;
+    let (engine, _folder) = engine_with(|settings| settings.cost_limit = Duration::from_secs(10)).await;
     let work = |ms: f64| job(move |job| job["work_ms"] = json!(ms));
     let Error::TooExpensive { cost, limit, .. } = engine.solve(TOY, work(10_001.0)).await.unwrap_err() else {
         panic!("accepted")
@@ -223,6 +223,97 @@ async fn unknown_names_come_with_the_nearest() {
     assert_eq!(engine.check(TOY, job(|_| {})).unwrap().key, engine.solve(TOY, job(|_| {})).await.unwrap().stored.key);
 }
 
+fn asynchronously() -> Ask {
+    Ask { wait: Some(Duration::ZERO), ..Ask::plain("a client") }
+}
+
+async fn accepted(engine: &Engine, body: Body) -> JobId {
+    match engine.submit(TOY, body, asynchronously()).await.unwrap() {
+        Answered::Job(job) => job.record.id,
+        Answered::Solved(_) => panic!("answered at once"),
+    }
+}
+
+async fn over(engine: &Engine, id: JobId) -> Job {
+    let record = engine.job(id).await.unwrap().record;
+    engine.inner.jobs.wait(record, Duration::from_secs(20)).await.unwrap()
+}
+
+#[tokio::test]
+async fn a_job_and_a_direct_answer_come_to_the_same_and_share_the_calculation() {
+    let (engine, _folder) = engine().await;
+    let id = accepted(&engine, mode("slow")).await;
+    let direct = engine.solve(TOY, mode("slow")).await.unwrap();
+    assert_eq!(over(&engine, id).await.record.state, JobState::Succeeded);
+    let of_job = engine.job_result(id).await.unwrap();
+    assert_eq!((of_job.key, &of_job.body), (direct.stored.key, &direct.stored.body));
+}
+
+#[tokio::test]
+async fn a_job_computes_what_a_direct_request_found_no_core_for() {
+    let (engine, _folder) = engine_with(|settings| {
+        settings.cores = 1;
+        settings.patience = Duration::from_millis(300);
+    })
+    .await;
+    // Both slots of the one core are taken by others.
+    let inner = &engine.inner;
+    let taken = [inner.cores.slot_now().unwrap(), inner.cores.slot_now().unwrap()];
+    let direct = tokio::spawn({
+        let engine = engine.clone();
+        async move { engine.solve(TOY, mode("slow")).await }
+    });
+    tokio::time::sleep(Duration::from_millis(50)).await;
+    let id = accepted(&engine, mode("slow")).await;
+    assert!(matches!(direct.await.unwrap(), Err(Error::Busy { .. })));
+    let job = over(&engine, id).await;
+    assert_eq!((job.record.state, job.problem), (JobState::Succeeded, None));
+    drop(taken);
+}
+
+#[tokio::test]
+async fn the_result_of_a_job_goes_when_its_time_is_over() {
+    let (engine, _folder) = engine_with(|settings| settings.job_age = Duration::from_millis(300)).await;
+    let id = accepted(&engine, job(|_| {})).await;
+    assert_eq!(over(&engine, id).await.record.state, JobState::Succeeded);
+    engine.job_result(id).await.unwrap();
+    tokio::time::sleep(Duration::from_millis(350)).await;
+    assert_eq!(engine.job_result(id).await.unwrap_err(), Error::JobExpired);
+    assert_eq!(engine.job(id).await.unwrap().record.state, JobState::Succeeded, "that it was is still known");
+}
+
+#[tokio::test]
+async fn a_damaged_result_of_a_job_is_computed_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = EngineSettings { cores: 1, ..EngineSettings::in_folder(folder.path()) };
+    let engine = Engine::open(toy::registry(), settings.clone()).await.unwrap();
+    let id = accepted(&engine, job(|_| {})).await;
+    over(&engine, id).await;
+    let before = engine.job_result(id).await.unwrap();
+    engine.close().await;
+    drop(engine);
+    // A bit falls over in everything that is compressed.
+    let file = folder.path().join("precut.db");
+    let mut bytes = std::fs::read(&file).unwrap();
+    let marks: Vec<usize> = (0..bytes.len() - 4).filter(|&at| bytes[at..at + 4] == [0x28, 0xb5, 0x2f, 0xfd]).collect();
+    assert!(marks.len() >= 3, "zstd's mark stands before the job, and the result's job and body");
+    for mark in marks {
+        bytes[mark + 12] ^= 1;
+    }
+    std::fs::write(&file, bytes).unwrap();
+    let engine = Engine::open(toy::registry(), settings).await.unwrap();
+    let outcome = engine.job_result(id).await;
+    let again = matches!(outcome, Err(Error::JobNotFinished { state: JobState::Queued, .. }));
+    assert!(again, "{outcome:?}");
+    let job = over(&engine, id).await;
+    // The input of the job is damaged as well: that is said, and nothing wrong is served.
+    assert!(job.record.state.is_final());
+    match job.record.state {
+        JobState::Succeeded => assert_eq!(engine.job_result(id).await.unwrap().body, before.body),
+        _ => assert!(job.problem.is_some()),
+    }
+}
+
 /// A store on a disk that died.
 struct BrokenStore;
 
@@ -244,8 +335,11 @@ impl ResultStore for BrokenStore {
 
 #[tokio::test]
 async fn a_store_that_fails_fails_no_answer() {
-    let settings = EngineSettings { cores: 1, ..EngineSettings::in_folder("unused") };
-    let engine = Engine::with_store(toy::registry(), settings, Arc::new(BrokenStore)).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let settings = EngineSettings { cores: 1, ..EngineSettings::in_folder(folder.path()) };
+    let keep = Keep { bytes: 1, age: settings.store_age, jobs: settings.job_age };
+    let jobs = Arc::new(SqliteStore::open(folder.path(), keep).await.unwrap());
+    let engine = Engine::with_stores(toy::registry(), settings, Arc::new(BrokenStore), jobs).await.unwrap();
     let solved = engine.solve(TOY, job(|_| {})).await.unwrap();
     assert_eq!(engine.solve(TOY, job(|_| {})).await.unwrap().cache, CacheState::Hit);
     assert!(engine.result(&solved.stored.key).await.unwrap().is_some());

@@ -35,9 +35,9 @@ pub(super) struct View {
 /// The query of a request for an answer.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Parts {
-    table: Option<String>,
-    figure: Option<String>,
+pub(super) struct Parts {
+    pub(super) table: Option<String>,
+    pub(super) figure: Option<String>,
 }
 
 /// The forms in which a calculator's answers exist.
@@ -49,15 +49,23 @@ pub(super) fn offered(meta: &Meta) -> Vec<Media> {
     offered
 }
 
+/// What stands behind the question mark.
+pub(super) fn query<T: Default + serde::de::DeserializeOwned>(uri: &Uri) -> Result<T, Problem> {
+    if uri.query().is_none_or(str::is_empty) {
+        return Ok(T::default());
+    }
+    let Query(query) = Query::try_from_uri(uri).map_err(|error| Problem::query(error.body_text()))?;
+    Ok(query)
+}
+
 impl View {
     /// What a request asks for; refused if there is no such thing.
     pub(super) fn of(uri: &Uri, headers: &HeaderMap, meta: &Meta, offered: &[Media]) -> Result<Self, Problem> {
-        let parts = if uri.query().is_none_or(str::is_empty) {
-            Parts::default()
-        } else {
-            let Query(parts) = Query::try_from_uri(uri).map_err(|error| Problem::query(error.body_text()))?;
-            parts
-        };
+        Self::of_parts(query(uri)?, headers, meta, offered)
+    }
+
+    /// The same of a query that was read already.
+    pub(super) fn of_parts(parts: Parts, headers: &HeaderMap, meta: &Meta, offered: &[Media]) -> Result<Self, Problem> {
         let known = |code, part: &Option<String>, ids: &[&str]| match part {
             Some(part) if !ids.contains(&part.as_str()) => {
                 Err(Problem::missing(code, part).with("available", ids.join(", ")))
@@ -188,13 +196,18 @@ fn absent<'a>(code: &'static str, view: &View, ids: impl Iterator<Item = &'a str
 }
 
 fn drawn(figure: &precut_calc::calculator::Figure, language: Language) -> String {
+    use precut_calc::calculator::{Value, Values};
     let texts = Texts::shared();
-    let none = precut_calc::calculator::Values::new();
+    let none = Values::new();
     render::svg(
         figure,
         &render::Wording {
             message: &|message| texts.message(language, "figure", message),
-            label: &|code| texts.word(language, "label", code, &none),
+            // Names that no table of texts has, such as those of a study's variables, stand in the title's values.
+            label: &|code| match figure.title.values.get(code) {
+                Some(Value::Text(name)) => name.clone().into_owned(),
+                _ => texts.word(language, "label", code, &none),
+            },
             unit: &|unit| render::unit_symbol(unit),
             decimal: '.',
         },

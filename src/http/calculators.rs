@@ -1,22 +1,26 @@
 //! The rooms: each calculator's own route, and what the service says of it.
 
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
 
 use axum::extract::{Path, Request, State};
 use axum::http::HeaderMap;
 use axum::http::header::{ACCEPT, IF_NONE_MATCH};
 use axum::response::Response;
 use precut_calc::calculator::{CalculatorKind, Meta};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use utoipa::ToSchema;
 
-use super::answer::{self, View};
+use super::answer::{self, Parts, View};
+use super::jobs::{self, Precedence};
 use super::metrics::CacheCounters;
 use super::negotiate::{self, Media};
+use super::prefer::{self, Preference};
 use super::problem::Problem;
-use super::{App, body};
-use crate::engine::{CacheState, Error};
+use super::{App, body, gate};
+use crate::engine::{Answered, Ask, CacheState, Error, Priority};
 use crate::registry::{Entry, Registry};
 use crate::text::Language;
 
@@ -38,22 +42,85 @@ impl Room {
     }
 }
 
+/// Longest deadline, s: a year.
+pub(super) const MOST_DEADLINE_S: f64 = 31_536_000.0;
+/// Shortest deadline, s.
+pub(super) const LEAST_DEADLINE_S: f64 = 0.001;
+
+/// The query of a request for an answer: which part of it, and how it is to be computed.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SolveQuery {
+    table: Option<String>,
+    figure: Option<String>,
+    priority: Option<Precedence>,
+    deadline_s: Option<f64>,
+}
+
 /// `POST /v1/{calculator}`
 pub(super) async fn solve(app: App, room: Arc<Room>, request: Request) -> Result<Response, Problem> {
-    let view = View::of(request.uri(), request.headers(), room.entry.meta(), &room.offered)?;
+    let SolveQuery { table, figure, priority, deadline_s } = answer::query(request.uri())?;
+    let headers = request.headers();
+    let view = View::of_parts(Parts { table, figure }, headers, room.entry.meta(), &room.offered)?;
+    let mut preference = Preference::of(headers);
+    // Those who wait are requests in work: they leave room for those who do not.
+    let waiting = preference.wait_s.map(|_| Waiting::new(&app));
+    if waiting.as_ref().is_some_and(|waiting| waiting.is_too_many) {
+        preference.wait_s = Some(0);
+    }
+    let ask = Ask {
+        priority: priority.map_or(Priority::Normal, Into::into),
+        deadline: deadline_s.map(deadline).transpose()?,
+        idempotency_key: prefer::idempotency_key(headers)?,
+        wait: preference.wait(),
+        ..Ask::plain(gate::owner(&app, &request))
+    };
+    let language = negotiate::language(headers);
     let mut condition = HeaderMap::new();
-    for tag in request.headers().get_all(IF_NONE_MATCH) {
+    for tag in headers.get_all(IF_NONE_MATCH) {
         condition.append(IF_NONE_MATCH, tag.clone());
     }
     let job = body::job(request, room.entry.takes_tables(), &app.limits).await?;
-    let solved = app.engine.solve(room.id(), job).await?;
+    let solved = match app.engine.submit(room.id(), job, ask).await? {
+        Answered::Solved(solved) => solved,
+        Answered::Job(job) => return Ok(jobs::accepted(&job, preference, language)),
+    };
     match solved.cache {
         CacheState::Hit => room.counters.hit.increment(1),
         CacheState::Miss => room.counters.miss.increment(1),
     }
     let mut response = answer::respond(solved.stored.clone(), view, &condition).await?;
     answer::describe(&mut response, &solved.stored, solved.cache, &solved.timings);
+    if preference.wait_s.is_some() && solved.cache == CacheState::Miss {
+        jobs::apply(&mut response, Preference { respond_async: false, ..preference });
+    }
     Ok(response)
+}
+
+/// Counts a request that may wait for a job while it lives.
+struct Waiting<'a> {
+    app: &'a App,
+    is_too_many: bool,
+}
+
+impl<'a> Waiting<'a> {
+    fn new(app: &'a App) -> Self {
+        let before = app.waiting.fetch_add(1, Ordering::Relaxed);
+        Self { app, is_too_many: before >= app.limits.concurrent_requests.div_ceil(2) }
+    }
+}
+
+impl Drop for Waiting<'_> {
+    fn drop(&mut self) {
+        self.app.waiting.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+fn deadline(s: f64) -> Result<Duration, Problem> {
+    if (LEAST_DEADLINE_S..=MOST_DEADLINE_S).contains(&s) {
+        return Ok(Duration::from_secs_f64(s));
+    }
+    Err(Problem::query(format!("deadline_s {s} is not between {LEAST_DEADLINE_S} and {MOST_DEADLINE_S}")))
 }
 
 /// `GET /v1/calculators`

@@ -130,6 +130,23 @@ impl Client<'_> {
     }
 }
 
+/// Who asks, as a name for the fair order of jobs and the like.
+pub(super) fn owner(app: &App, request: &Request) -> String {
+    use std::net::{Ipv4Addr, Ipv6Addr};
+    if let Some(name) = app.keys.owner(request.headers()) {
+        return format!("key:{name}");
+    }
+    match Client::of(request) {
+        Client::V4(octets) => format!("ip:{}", Ipv4Addr::from(octets)),
+        Client::V6Network(network) => {
+            let mut octets = [0; 16];
+            octets[..8].copy_from_slice(&network);
+            format!("ip:{}/64", Ipv6Addr::from(octets))
+        }
+        Client::Key(_) | Client::Unknown => "unknown".to_owned(),
+    }
+}
+
 impl Hash for Client<'_> {
     fn hash<H: Hasher>(&self, state: &mut H) {
         std::mem::discriminant(self).hash(state);
@@ -270,6 +287,7 @@ pub(super) fn method_label(method: &Method) -> &'static str {
         "GET" => "GET",
         "HEAD" => "HEAD",
         "POST" => "POST",
+        "DELETE" => "DELETE",
         "OPTIONS" => "OPTIONS",
         _ => "other",
     }

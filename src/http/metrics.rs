@@ -19,8 +19,15 @@ use crate::registry::Registry;
 const LATENCY_S: [f64; 14] =
     [0.000_1, 0.000_25, 0.000_5, 0.001, 0.002_5, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 1.0, 2.5, 10.0];
 
+const JOB: &str = "/v1/jobs/{id}";
+const JOB_RESULT: &str = "/v1/jobs/{id}/result";
+const JOB_EVENTS: &str = "/v1/jobs/{id}/events";
+
 /// Addresses with a variable part, as they are counted.
-const PATTERNS: [(&str, &str); 6] = [
+const PATTERNS: [(&str, &str); 9] = [
+    ("/v1/jobs/", JOB),
+    ("/v1/jobs/", JOB_RESULT),
+    ("/v1/jobs/", JOB_EVENTS),
     ("/v1/results/", "/v1/results/{key}"),
     ("/v1/calculators/", "/v1/calculators/{id}"),
     ("/v1/materials/", "/v1/materials/{id}"),
@@ -30,7 +37,7 @@ const PATTERNS: [(&str, &str); 6] = [
 ];
 
 /// Addresses without one, besides the calculators'.
-const PLAIN: [&str; 10] = [
+const PLAIN: [&str; 12] = [
     "/",
     "/docs",
     "/openapi.json",
@@ -38,8 +45,10 @@ const PLAIN: [&str; 10] = [
     "/health/ready",
     "/metrics",
     "/v1/calculators",
+    "/v1/jobs",
     "/v1/results",
     "/v1/materials",
+    "/v1/studies",
     "other",
 ];
 
@@ -80,7 +89,7 @@ impl Metrics {
         let known = |name: &str| self.routes.get(name).copied();
         known(path)
             .filter(|_| !path.contains('{'))
-            .or_else(|| PATTERNS.iter().find(|(prefix, _)| path.starts_with(prefix)).and_then(|(_, name)| known(name)))
+            .or_else(|| known(pattern(path)?))
             .or_else(|| known("other"))
             .unwrap_or(Route(0))
     }
@@ -111,6 +120,19 @@ impl Metrics {
     pub(super) fn upkeep(&self) {
         self.handle.run_upkeep();
     }
+}
+
+/// The pattern of an address with a variable part.
+fn pattern(path: &str) -> Option<&'static str> {
+    if path.starts_with("/v1/jobs/") {
+        let part = path.rsplit('/').next();
+        return Some(match part {
+            Some("result") => JOB_RESULT,
+            Some("events") => JOB_EVENTS,
+            _ => JOB,
+        });
+    }
+    PATTERNS.iter().find(|(prefix, _)| path.starts_with(prefix)).map(|&(_, name)| name)
 }
 
 /// How often answers came from the cache, per calculator.
@@ -153,6 +175,16 @@ fn recorder() -> &'static PrometheusHandle {
         );
         metrics::describe_gauge!("http_requests_in_flight", "Requests in work.");
         metrics::describe_counter!("precut_answers_total", "Answers by calculator, from the cache (hit) or not.");
+        metrics::describe_counter!("precut_jobs_accepted_total", "Jobs put on record, by calculator.");
+        metrics::describe_counter!("precut_jobs_total", "Computations for jobs that ended, by calculator and outcome.");
+        metrics::describe_histogram!(
+            "precut_job_seconds",
+            metrics::Unit::Seconds,
+            "Time that a job's computation took, by calculator."
+        );
+        metrics::describe_gauge!("precut_jobs", "Jobs by state: queued, running.");
+        metrics::describe_counter!("precut_queue_full_total", "Jobs refused because too many waited.");
+        metrics::describe_counter!("precut_jobs_poisonous_total", "Jobs given up: they ended the process each time.");
         metrics::describe_gauge!("precut_build_info", "Always 1; the version is its label.");
         metrics::gauge!("precut_build_info", "version" => env!("CARGO_PKG_VERSION")).set(1.0);
         handle

@@ -6,13 +6,16 @@ mod body;
 mod calculators;
 mod codes;
 mod document;
+mod events;
 mod gate;
 mod health;
+mod jobs;
 mod materials;
 mod metrics;
 mod negotiate;
 pub mod openapi;
 mod pages;
+mod prefer;
 mod problem;
 mod rate;
 mod results;
@@ -55,7 +58,9 @@ pub struct Shared {
     metrics: metrics::Metrics,
     rooms: Vec<Arc<calculators::Room>>,
     documents: document::Documents,
+    streams: Arc<events::Streams>,
     in_flight: AtomicUsize,
+    waiting: AtomicUsize,
     stopping: AtomicBool,
 }
 
@@ -71,7 +76,8 @@ impl App {
     pub fn new(engine: Engine, config: &Config) -> Self {
         // The recorder of metrics comes first: counters made before it count nothing.
         let metrics = metrics::Metrics::new(engine.registry());
-        let rooms: Vec<_> = engine.registry().entries().iter().map(calculators::Room::new).collect();
+        let entries = engine.registry().entries().iter().chain([engine.studies()]);
+        let rooms: Vec<_> = entries.map(calculators::Room::new).collect();
         let documents = document::Documents::new(engine.registry());
         Self(Arc::new(Shared {
             limits: config.limits.clone(),
@@ -81,7 +87,9 @@ impl App {
             metrics,
             rooms: rooms.into_iter().map(Arc::new).collect(),
             documents,
+            streams: Arc::new(events::Streams::new(config.jobs.streams)),
             in_flight: AtomicUsize::new(0),
+            waiting: AtomicUsize::new(0),
             stopping: AtomicBool::new(false),
             engine,
         }))
@@ -90,6 +98,7 @@ impl App {
     /// From now on the service is not ready and takes no more work.
     pub fn stop(&self) {
         self.stopping.store(true, Ordering::Relaxed);
+        self.engine.stop_jobs();
     }
 
     fn is_stopping(&self) -> bool {
@@ -117,6 +126,10 @@ pub fn router(app: &App) -> Router {
         .route("/metrics", get(metrics::get))
         .route("/v1/calculators", get(calculators::list))
         .route("/v1/calculators/{id}", get(calculators::describe))
+        .route("/v1/jobs", get(jobs::list))
+        .route("/v1/jobs/{id}", get(jobs::read).delete(jobs::cancel))
+        .route("/v1/jobs/{id}/result", get(jobs::result))
+        .route("/v1/jobs/{id}/events", get(events::follow))
         .route("/v1/results", get(results::list))
         .route("/v1/results/{key}", get(results::read))
         .route("/v1/materials", get(materials::list))
@@ -158,13 +171,29 @@ fn cors(origins: &[String]) -> Option<CorsLayer> {
     } else {
         AllowOrigin::list(origins.iter().filter_map(|origin| origin.parse().ok()))
     };
-    let request_headers =
-        [header::ACCEPT_LANGUAGE, header::AUTHORIZATION, header::CONTENT_TYPE, header::IF_NONE_MATCH, gate::REQUEST_ID];
-    let exposed = [header::CONTENT_LOCATION, header::ETAG, header::RETRY_AFTER, CACHE_STATE, gate::REQUEST_ID];
+    let request_headers = [
+        header::ACCEPT_LANGUAGE,
+        header::AUTHORIZATION,
+        header::CONTENT_TYPE,
+        header::IF_NONE_MATCH,
+        events::LAST_EVENT_ID,
+        prefer::IDEMPOTENCY_KEY,
+        prefer::PREFER,
+        gate::REQUEST_ID,
+    ];
+    let exposed = [
+        header::CONTENT_LOCATION,
+        header::ETAG,
+        header::LOCATION,
+        header::RETRY_AFTER,
+        prefer::PREFERENCE_APPLIED,
+        CACHE_STATE,
+        gate::REQUEST_ID,
+    ];
     Some(
         CorsLayer::new()
             .allow_origin(allowed)
-            .allow_methods([Method::GET, Method::HEAD, Method::POST])
+            .allow_methods([Method::GET, Method::HEAD, Method::POST, Method::DELETE])
             .allow_headers(request_headers)
             .expose_headers(exposed)
             .max_age(std::time::Duration::from_hours(1)),

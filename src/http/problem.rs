@@ -9,7 +9,7 @@ use std::time::Duration;
 use axum::http::header::RETRY_AFTER;
 use axum::http::{HeaderName, HeaderValue, StatusCode};
 use axum::response::{IntoResponse, Response};
-use precut_calc::calculator::{Failure, Finding, Values};
+use precut_calc::calculator::{Failure, Finding, Infeasible, Values};
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -31,6 +31,7 @@ struct Inner {
     /// The findings' sentences are the detail: a job without an answer.
     by_finding: Option<&'static str>,
     header: Option<(HeaderName, HeaderValue)>,
+    infeasible: Option<Infeasible>,
 }
 
 /// A problem document (RFC 9457).
@@ -63,6 +64,10 @@ pub struct ProblemDocument {
     /// How many faults there are, listed or not.
     #[schema(minimum = 0, example = 2)]
     pub errors_total: usize,
+    /// Where limits conflict: which, and the least relaxation that lets them hold.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub infeasible: Option<Infeasible>,
 }
 
 impl Problem {
@@ -76,6 +81,7 @@ impl Problem {
             total: 0,
             by_finding: None,
             header: None,
+            infeasible: None,
         }))
     }
 
@@ -194,6 +200,7 @@ impl Problem {
             instance,
             errors,
             errors_total: inner.total,
+            infeasible: inner.infeasible.clone(),
         }
     }
 }
@@ -250,6 +257,25 @@ impl From<Error> for Problem {
                     .with("pointer", cost.driver)
                     .findings(vec![finding], 1)
             }
+            Error::QueueFull { queued, retry_after } => {
+                #[allow(clippy::cast_precision_loss)] // a count of jobs
+                Self::new(StatusCode::SERVICE_UNAVAILABLE, "queue_full")
+                    .with("queued", queued as f64)
+                    .retry_after(retry_after)
+            }
+            Error::IdempotencyKeyReused(job) => {
+                Self::new(StatusCode::UNPROCESSABLE_ENTITY, "idempotency_key_reused").with("job", job.to_string())
+            }
+            Error::UnknownJob(job) => Self::missing("unknown_job", &job.to_string()),
+            Error::JobNotFinished { state, retry_after } => {
+                Self::new(StatusCode::CONFLICT, "job_not_finished").with("state", state.word()).retry_after(retry_after)
+            }
+            Error::JobCancelled => Self::new(StatusCode::CONFLICT, "job_cancelled"),
+            Error::JobExpired => Self::new(StatusCode::GONE, "job_expired"),
+            Error::DeadlineExceeded => Self::new(StatusCode::UNPROCESSABLE_ENTITY, "deadline_exceeded"),
+            Error::CrashedRepeatedly { attempts } => {
+                Self::new(StatusCode::INTERNAL_SERVER_ERROR, "crashed_repeatedly").with("attempts", f64::from(attempts))
+            }
             Error::Busy { retry_after } => Self::new(StatusCode::SERVICE_UNAVAILABLE, "busy").retry_after(retry_after),
             Error::Calculation(failure) => failure.into(),
             Error::Store(StoreError::Outdated(reason)) => {
@@ -259,6 +285,10 @@ impl From<Error> for Problem {
             Error::Store(StoreError::Failed(cause)) => {
                 tracing::error!(cause, "the store failed");
                 Self::new(StatusCode::SERVICE_UNAVAILABLE, "store_failed").retry_after(Duration::from_secs(1))
+            }
+            Error::Store(StoreError::Full(cause)) => {
+                tracing::error!(cause, "the disk is full");
+                Self::new(StatusCode::INSUFFICIENT_STORAGE, "disk_full")
             }
             // A direct answer is cancelled only when nobody waits for it, or at the end of a shutdown.
             Error::Cancelled | Error::ShuttingDown => Self::shutting_down(),
@@ -272,6 +302,11 @@ impl From<Failure> for Problem {
         match failure {
             Failure::Cancelled => Self::shutting_down(),
             Failure::Infeasible(finding) => Self::without_answer("infeasible", finding),
+            Failure::Conflicting(conflict) => {
+                let mut problem = Self::without_answer("infeasible", conflict.finding);
+                problem.0.infeasible = Some(conflict.infeasible);
+                problem
+            }
             Failure::OutOfModel(finding) => Self::without_answer("out_of_model", finding),
             Failure::NotConverged { what, residual, iterations } => {
                 Self::new(StatusCode::UNPROCESSABLE_ENTITY, "not_converged")

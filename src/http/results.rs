@@ -81,7 +81,7 @@ pub(super) async fn list(State(app): State<App>, uri: Uri) -> Result<Response, P
         return Err(Problem::query(format!("limit {limit} is not between 1 and {MOST_ITEMS}")));
     }
     if let Some(id) = &query.calculator
-        && app.engine.registry().entry(id).is_none()
+        && app.engine.entry(id).is_none()
     {
         return Err(Error::unknown(app.engine.registry(), id).into());
     }

@@ -29,6 +29,7 @@ pub struct Entry {
     tables: Vec<TablePlace>,
     own_codes: Vec<String>,
     calculation: Box<dyn Calculation>,
+    composed: bool,
     /// Bytes of the answer written last.
     answer_bytes: AtomicUsize,
 }
@@ -54,8 +55,25 @@ impl Entry {
         if RESERVED.contains(&meta.id) {
             return Err(RegistryError::Reserved(meta.id));
         }
-        let input = Contract::of::<C::Input>(meta.id, true)?;
-        let output = Contract::of::<C::Output>(meta.id, false)?;
+        Self::made::<C::Input, C::Output>(meta, Box::new(Typed::<C>(PhantomData)), false)
+    }
+
+    /// The entry of something that is asked like a calculator and made of other calculators' jobs. It has a route of
+    /// the service's own and stands in no registry.
+    pub(crate) fn composed<I: ToSchema, O: ToSchema>(
+        meta: Meta,
+        calculation: Box<dyn Calculation>,
+    ) -> Result<Self, RegistryError> {
+        Self::made::<I, O>(meta, calculation, true)
+    }
+
+    fn made<I: ToSchema, O: ToSchema>(
+        meta: Meta,
+        calculation: Box<dyn Calculation>,
+        composed: bool,
+    ) -> Result<Self, RegistryError> {
+        let input = Contract::of::<I>(meta.id, true)?;
+        let output = Contract::of::<O>(meta.id, false)?;
         let mut own_codes = BTreeSet::new();
         codes_in(&input.strict, &mut own_codes);
         Ok(Self {
@@ -65,7 +83,8 @@ impl Entry {
             own_codes: own_codes.into_iter().collect(),
             input,
             output,
-            calculation: Box::new(Typed::<C>(PhantomData)),
+            calculation,
+            composed,
             answer_bytes: AtomicUsize::new(0),
         })
     }
@@ -136,6 +155,18 @@ impl Entry {
 
     pub(crate) fn tables(&self) -> &[TablePlace] {
         &self.tables
+    }
+    /// Whether it is made of other entries' jobs: reading one is work, and running one waits for the store.
+    pub(crate) fn is_composed(&self) -> bool {
+        self.composed
+    }
+    /// Schema of the job with references followed and unions told apart.
+    pub(crate) fn strict_input(&self) -> &Value {
+        &self.input.strict
+    }
+    /// Schema of the result in the same form.
+    pub(crate) fn strict_output(&self) -> &Value {
+        &self.output.strict
     }
     pub(super) fn open_components(&self) -> impl Iterator<Item = (&String, &Value)> {
         self.input.open.iter().chain(&self.output.open)
@@ -228,10 +259,19 @@ pub struct Prepared {
     pub cost: Cost,
     /// The job with every default filled in, as RFC 8785 writes it.
     pub canonical: Vec<u8>,
+    /// The calculator whose numbers come out, where that is another one.
+    pub(crate) numbers_of: Option<Meta>,
     job: Box<dyn Job>,
 }
 
 impl Prepared {
+    pub(crate) fn new(cost: Cost, canonical: Vec<u8>, job: Box<dyn Job>) -> Self {
+        Self { cost, canonical, numbers_of: None, job }
+    }
+    /// The same with numbers that another calculator makes: its version counts, too.
+    pub(crate) fn with_numbers_of(self, meta: Meta) -> Self {
+        Self { numbers_of: Some(meta), ..self }
+    }
     /// The job with every default filled in.
     pub fn input(&self) -> Result<Value, Failure> {
         self.job.input()
@@ -273,7 +313,8 @@ pub struct UnreadableResult(pub String);
 
 type MaybeProgram = Option<Result<Program, Failure>>;
 
-trait Calculation: Send + Sync {
+/// What an entry does, whatever its types are.
+pub(crate) trait Calculation: Send + Sync {
     fn prepare(&self, job: &Value) -> Result<Prepared, Unprepared>;
     fn broken_rules(&self, job: &Value) -> Vec<Finding>;
     fn figures(&self, input: &[u8], envelope: &[u8]) -> Result<Vec<Figure>, UnreadableResult>;
@@ -281,7 +322,8 @@ trait Calculation: Send + Sync {
     fn program(&self, input: &[u8], envelope: &[u8]) -> Result<MaybeProgram, UnreadableResult>;
 }
 
-trait Job: Send + Sync {
+/// A filled job.
+pub(crate) trait Job: Send + Sync {
     fn input(&self) -> Result<Value, Failure>;
     fn write_input(&self, body: &mut Vec<u8>) -> Result<(), Failure>;
     fn run(&self, monitor: &dyn Monitor, body: &mut Vec<u8>) -> Result<ResultNotes, Failure>;
@@ -310,7 +352,7 @@ impl<C: Calculator> Calculation for Typed<C> {
             return Err(Unprepared::Failed(Failure::Internal(what)));
         }
         let canonical = canonical(&input).map_err(|error| Unprepared::Failed(unwritable("the filled job", &error)))?;
-        Ok(Prepared { cost: C::cost(&input), canonical, job: Box::new(TypedJob::<C>(input)) })
+        Ok(Prepared::new(C::cost(&input), canonical, Box::new(TypedJob::<C>(input))))
     }
     fn broken_rules(&self, job: &Value) -> Vec<Finding> {
         let mut violations = Violations::default();
@@ -371,7 +413,7 @@ fn read<C: Calculator>(input: &[u8], envelope: &[u8]) -> Result<(C::Input, C::Ou
 }
 
 /// What the types refuse although the schema does not: one fault, as deserialisation stops at the first.
-fn second_line(error: &serde_path_to_error::Error<serde_json::Error>) -> Finding {
+pub(crate) fn second_line(error: &serde_path_to_error::Error<serde_json::Error>) -> Finding {
     use serde_path_to_error::Segment;
     let pointer = error.path().iter().fold(String::new(), |pointer, segment| match segment {
         Segment::Seq { index } => format!("{pointer}/{index}"),

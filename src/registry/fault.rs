@@ -226,8 +226,9 @@ fn shown(value: &Value) -> String {
     }
 }
 
-/// A text of a schema for as long as the process lives. Only ever given texts of schemas, of which there are few.
-fn intern(text: &str) -> &'static str {
+/// A text for as long as the process lives. Only ever given texts of schemas and of declarations, of which there are
+/// few.
+pub(crate) fn intern(text: &str) -> &'static str {
     static TEXTS: Mutex<BTreeSet<&'static str>> = Mutex::new(BTreeSet::new());
     let mut texts = TEXTS.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     if let Some(known) = texts.get(text) {

@@ -11,6 +11,17 @@ pub(crate) struct TablePlace {
     pub(crate) columns: Vec<TableColumn>,
     /// Most rows.
     pub(crate) max_rows: usize,
+    /// Fields of a row that take the columns which no field names: one for numbers, one for words.
+    pub(crate) free: FreeColumns,
+}
+
+/// Where columns go that no field names; without a place they are faults.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(crate) struct FreeColumns {
+    /// An object of numbers by name.
+    pub(crate) numbers: Option<String>,
+    /// An object of words by name.
+    pub(crate) words: Option<String>,
 }
 
 /// One step into a JSON value.
@@ -106,10 +117,10 @@ fn walk(schema: &Value, path: &mut Vec<Step>, places: &mut Vec<TablePlace>) {
 fn place(schema: &Value, path: &[Step]) -> TablePlace {
     let row = &schema["items"];
     let required = |name: &str| row["required"].as_array().is_some_and(|names| names.iter().any(|n| n == name));
-    let columns = row["properties"]
-        .as_object()
-        .into_iter()
-        .flatten()
+    let fields = || row["properties"].as_object().into_iter().flatten();
+    let free = |cells: &str| fields().find(|(_, field)| field["x-free-columns"] == cells).map(|(name, _)| name.clone());
+    let columns = fields()
+        .filter(|(_, field)| field.get("x-free-columns").is_none())
         .map(|(name, field)| TableColumn {
             name: name.clone(),
             unit: field["x-unit"].as_str().unwrap_or_default().to_owned(),
@@ -118,7 +129,8 @@ fn place(schema: &Value, path: &[Step]) -> TablePlace {
         })
         .collect();
     let max_rows = schema["maxItems"].as_u64().and_then(|most| usize::try_from(most).ok()).unwrap_or(usize::MAX);
-    TablePlace { path: path.to_vec(), columns, max_rows }
+    let free = FreeColumns { numbers: free("numbers"), words: free("words") };
+    TablePlace { path: path.to_vec(), columns, max_rows, free }
 }
 
 fn kind(declared: &Value) -> CellKind {

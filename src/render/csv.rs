@@ -23,7 +23,7 @@ pub fn csv(table: &Table) -> String {
 
 fn header(column: &Column) -> String {
     match column.unit {
-        "" => column.name.to_owned(),
+        "" => column.name.clone().into_owned(),
         unit => format!("{} [{unit}]", column.name),
     }
 }

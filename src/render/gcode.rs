@@ -80,6 +80,7 @@ impl Writer {
     fn block(&mut self, block: &Block) {
         match *block {
             Block::Modes => self.modes(),
+            Block::Note(ref text) => self.comment(text),
             Block::SpindleSpeed { rpm } => {
                 let speed = self.speed(rpm);
                 self.line(&format!("G97 S{speed} M3"));

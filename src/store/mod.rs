@@ -1,12 +1,18 @@
-//! Kept results. Nothing outside this module speaks SQL.
+//! Kept results, and jobs with their queue. Nothing outside this module speaks SQL.
 
+pub mod jobs;
+mod ledger;
+mod queue;
 mod row;
 pub mod sqlite;
+mod sqlite_jobs;
+mod sqlite_studies;
 mod writer;
 
 use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use bytes::Bytes;
 use futures_util::future::BoxFuture;
@@ -44,6 +50,18 @@ pub trait ResultStore: Send + Sync + 'static {
     fn ping(&self) -> BoxFuture<'_, Result<(), StoreError>>;
     /// Writes what waits and closes.
     fn close(&self) -> BoxFuture<'_, ()>;
+    /// Puts a part of a study down. On return it outlasts the process, and so do the results of its points.
+    fn put_shard(&self, _study: Key, _shard: u32, _content: Bytes) -> BoxFuture<'_, Result<(), StoreError>> {
+        Box::pin(async { Ok(()) })
+    }
+    /// The parts of a study that are put down.
+    fn shards(&self, _study: Key) -> BoxFuture<'_, Result<Vec<(u32, Bytes)>, StoreError>> {
+        Box::pin(async { Ok(Vec::new()) })
+    }
+    /// Forgets the parts of a study.
+    fn forget_shards(&self, _study: Key) -> BoxFuture<'_, Result<(), StoreError>> {
+        Box::pin(async { Ok(()) })
+    }
 }
 
 /// A result as it is kept.
@@ -136,6 +154,9 @@ pub enum StoreError {
     /// The database did not answer.
     #[error("the store failed: {0}")]
     Failed(String),
+    /// The disk is full.
+    #[error("the disk is full: {0}")]
+    Full(String),
     /// The kept result was made by a version whose contract differs.
     #[error("the result was made by another version of its calculator: {0}")]
     Outdated(String),
@@ -143,6 +164,23 @@ pub enum StoreError {
 
 impl From<sqlx::Error> for StoreError {
     fn from(error: sqlx::Error) -> Self {
+        /// `SQLITE_FULL`.
+        const FULL: i32 = 13;
+        if sqlite_code(&error) == Some(FULL) {
+            return Self::Full(error.to_string());
+        }
         Self::Failed(error.to_string())
     }
+}
+
+/// Kind of an error of SQLite: the lowest byte of its code, the rest of which says more of it.
+fn sqlite_code(error: &sqlx::Error) -> Option<i32> {
+    let code: i32 = error.as_database_error()?.code()?.parse().ok()?;
+    Some(code & 0xff)
+}
+
+/// The time, ms UTC.
+pub(crate) fn now_ms() -> i64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    i64::try_from(since.as_millis()).unwrap_or(i64::MAX)
 }

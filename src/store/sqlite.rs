@@ -1,4 +1,4 @@
-//! Results in an SQLite file: one connection writes, four read.
+//! Results and jobs in an SQLite file: one connection writes, four read.
 
 use std::collections::HashSet;
 use std::fs::{self, File, TryLockError};
@@ -6,28 +6,49 @@ use std::path::Path;
 use std::sync::{Arc, PoisonError, RwLock};
 use std::time::Duration;
 
+use bytes::Bytes;
 use futures_util::future::BoxFuture;
+use sqlx::Connection;
 use sqlx::migrate::{MigrateError, Migrator};
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous};
 
 use super::OpenError;
+use super::ledger::Ledger;
+use super::queue::{self, Tasks};
 use super::row::ResultRow;
+use super::sqlite_jobs;
 use super::writer::{Limits, Writer};
 use super::{Cursor, KeptResult, ResultPage, ResultQuery, ResultStore, ResultSummary, StoreError};
 use crate::key::Key;
 
-static MIGRATIONS: Migrator = sqlx::migrate!("./migrations");
+fn migrations() -> Migrator {
+    sqlx::migrate!("./migrations")
+}
 
 const DATABASE: &str = "precut.db";
 const LOCK: &str = "precut.lock";
 const READERS: u32 = 4;
 const BUSY_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// Results in an SQLite file in a folder that no other process uses.
+/// How much is kept, and how long.
+#[derive(Debug, Clone, Copy)]
+pub struct Keep {
+    /// Results, bytes, about.
+    pub bytes: u64,
+    /// Results that nobody asks for.
+    pub age: Duration,
+    /// Finished jobs with what they gave.
+    pub jobs: Duration,
+}
+
+/// Results and jobs in an SQLite file in a folder that no other process uses.
 pub struct SqliteStore {
-    readers: SqlitePool,
-    writer: Writer,
-    keys: Keys,
+    pub(super) readers: SqlitePool,
+    pub(super) writer: Writer,
+    pub(super) ledger: Ledger,
+    pub(super) tasks: Tasks,
+    pub(super) keys: Keys,
+    pub(super) keep_ms: i64,
     _lock: File,
 }
 
@@ -52,9 +73,8 @@ impl Keys {
 }
 
 impl SqliteStore {
-    /// Opens the database in `folder`, which is made if absent; keeps at most about `bytes` of results, each at most
-    /// `age` after its last use.
-    pub async fn open(folder: &Path, bytes: u64, age: Duration) -> Result<Self, OpenError> {
+    /// Opens the database in `folder`, which is made if absent. What a process before left running is back in line.
+    pub async fn open(folder: &Path, keep: Keep) -> Result<Self, OpenError> {
         let unusable = |reason: String| OpenError::Unusable { folder: folder.to_owned(), reason };
         fs::create_dir_all(folder).map_err(|error| unusable(error.to_string()))?;
         let lock = lock(folder)?;
@@ -67,9 +87,20 @@ impl SqliteStore {
             .busy_timeout(BUSY_TIMEOUT)
             .foreign_keys(true);
         let failed = |error: sqlx::Error| unusable(error.to_string());
-        let writing =
-            SqlitePoolOptions::new().max_connections(1).connect_with(writing(&options)).await.map_err(failed)?;
-        MIGRATIONS.run(&writing).await.map_err(|error| unusable(migration_fault(&error)))?;
+        let writing = SqlitePoolOptions::new()
+            .max_connections(1)
+            .acquire_timeout(2 * BUSY_TIMEOUT)
+            // On a full disk SQLite rolls back by itself, and the driver, which wants to as well, takes the
+            // transaction for open ever after: such a connection is replaced.
+            .before_acquire(|connection, _| Box::pin(async move { Ok(!connection.is_in_transaction()) }))
+            .connect_with(writing(&options))
+            .await
+            .map_err(failed)?;
+        migrate(&writing).await.map_err(unusable)?;
+        let orphans = sqlite_jobs::recover(&writing).await.map_err(failed)?;
+        if orphans > 0 {
+            tracing::warn!(jobs = orphans, "jobs were running when the process before ended; they run again");
+        }
         let readers = SqlitePoolOptions::new()
             .max_connections(READERS)
             .acquire_timeout(BUSY_TIMEOUT)
@@ -84,9 +115,11 @@ impl SqliteStore {
         for key in &all {
             keys.add(key);
         }
-        let limits = Limits { bytes: i64::try_from(bytes).unwrap_or(i64::MAX), age };
+        let limits = Limits { bytes: i64::try_from(keep.bytes).unwrap_or(i64::MAX), age: keep.age };
+        let (ledger, tasks) = (Ledger::start(writing.clone()), Tasks::new(writing.clone()));
         let writer = Writer::start(writing, keys.clone(), limits).await.map_err(failed)?;
-        Ok(Self { readers, writer, keys, _lock: lock })
+        let keep_ms = i64::try_from(keep.jobs.as_millis()).unwrap_or(i64::MAX);
+        Ok(Self { readers, writer, ledger, tasks, keys, keep_ms, _lock: lock })
     }
 
     async fn read(&self, key: Key) -> Result<Option<KeptResult>, StoreError> {
@@ -166,8 +199,19 @@ impl ResultStore for SqliteStore {
             Ok(())
         })
     }
+    fn put_shard(&self, study: Key, shard: u32, content: Bytes) -> BoxFuture<'_, Result<(), StoreError>> {
+        Box::pin(self.put_down_shard(study, shard, content))
+    }
+    fn shards(&self, study: Key) -> BoxFuture<'_, Result<Vec<(u32, Bytes)>, StoreError>> {
+        Box::pin(self.shards_of(study))
+    }
+    fn forget_shards(&self, study: Key) -> BoxFuture<'_, Result<(), StoreError>> {
+        Box::pin(self.forget_shards_of(study))
+    }
     fn close(&self) -> BoxFuture<'_, ()> {
         Box::pin(async {
+            // What was ordered is written.
+            let _ = self.ledger.write(|_| Box::pin(async { Ok(()) })).await;
             // Readers first: the last connection, which writes, then brings the log into the file.
             self.readers.close().await;
             self.writer.close().await;
@@ -214,11 +258,40 @@ fn lock(folder: &Path) -> Result<File, OpenError> {
     }
 }
 
+/// Brings the tables up to date: ours and the queue's, which number their migrations by time in the same list.
+async fn migrate(pool: &SqlitePool) -> Result<(), String> {
+    /// Ours are 1, 2, 3 ..., theirs years.
+    const OURS_BELOW: i64 = 1_000_000;
+    let fault = |error: MigrateError| migration_fault(&error);
+    let is_new: bool =
+        sqlx::query_scalar("SELECT NOT EXISTS (SELECT 1 FROM sqlite_master WHERE name = '_sqlx_migrations')")
+            .fetch_one(pool)
+            .await
+            .map_err(|error| error.to_string())?;
+    if !is_new {
+        let latest: Option<i64> = sqlx::query_scalar("SELECT max(version) FROM _sqlx_migrations WHERE version < ?1")
+            .bind(OURS_BELOW)
+            .fetch_one(pool)
+            .await
+            .map_err(|error| error.to_string())?;
+        let known = migrations().iter().map(|migration| migration.version).max();
+        if latest > known {
+            return Err(format!(
+                "its database was written by a newer precut (migration {})",
+                latest.unwrap_or_default()
+            ));
+        }
+    }
+    // Neither may stumble over the other's.
+    let (mut ours, mut theirs) = (migrations(), queue::migrations());
+    ours.set_ignore_missing(true);
+    theirs.set_ignore_missing(true);
+    ours.run(pool).await.map_err(fault)?;
+    theirs.run(pool).await.map_err(fault)
+}
+
 fn migration_fault(error: &MigrateError) -> String {
     match error {
-        MigrateError::VersionMissing(version) => {
-            format!("its database was written by a newer precut (migration {version})")
-        }
         MigrateError::VersionMismatch(version) => {
             format!("its database was not made by this program (migration {version} differs)")
         }

@@ -18,8 +18,12 @@ fn result(number: u32, calculator: &str) -> KeptResult {
     }
 }
 
+fn keep(bytes: u64) -> Keep {
+    Keep { bytes, age: AGE, jobs: AGE }
+}
+
 async fn store(folder: &TempDir, bytes: u64) -> SqliteStore {
-    SqliteStore::open(folder.path(), bytes, AGE).await.unwrap()
+    SqliteStore::open(folder.path(), keep(bytes)).await.unwrap()
 }
 
 async fn list(store: &SqliteStore, calculator: Option<&str>, limit: u32, after: Option<Cursor>) -> ResultPage {
@@ -79,7 +83,7 @@ async fn what_is_too_much_to_wait_is_not_kept_and_does_no_harm() {
 async fn a_folder_serves_one_store() {
     let folder = tempfile::tempdir().unwrap();
     let first = store(&folder, 1 << 30).await;
-    let refused = SqliteStore::open(folder.path(), 1 << 30, AGE).await;
+    let refused = SqliteStore::open(folder.path(), keep(1 << 30)).await;
     assert!(matches!(refused, Err(OpenError::InUse(_))));
     first.close().await;
     drop(first);
@@ -165,7 +169,8 @@ async fn what_is_old_is_forgotten_at_the_next_start() {
     first.close().await;
     drop(first);
     tokio::time::sleep(Duration::from_millis(20)).await;
-    let second = SqliteStore::open(folder.path(), 1 << 30, Duration::from_millis(1)).await.unwrap();
+    let second =
+        SqliteStore::open(folder.path(), Keep { age: Duration::from_millis(1), ..keep(1 << 30) }).await.unwrap();
     tokio::time::sleep(Duration::from_millis(50)).await;
     assert_eq!(list(&second, None, 10, None).await.items, []);
     assert_eq!(second.get(result(1, "a").key).await.unwrap(), None);
@@ -175,7 +180,7 @@ async fn what_is_old_is_forgotten_at_the_next_start() {
 async fn a_file_that_is_no_database_is_refused_with_its_folder() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join(DATABASE), "this is no database, whatever its name says ".repeat(100)).unwrap();
-    let Err(OpenError::Unusable { folder: named, reason }) = SqliteStore::open(folder.path(), 1 << 30, AGE).await
+    let Err(OpenError::Unusable { folder: named, reason }) = SqliteStore::open(folder.path(), keep(1 << 30)).await
     else {
         panic!("opened")
     };
@@ -196,7 +201,7 @@ async fn a_database_of_a_newer_program_is_refused() {
         .await
         .unwrap();
     pool.close().await;
-    let Err(OpenError::Unusable { reason, .. }) = SqliteStore::open(folder.path(), 1 << 30, AGE).await else {
+    let Err(OpenError::Unusable { reason, .. }) = SqliteStore::open(folder.path(), keep(1 << 30)).await else {
         panic!("opened")
     };
     assert!(reason.contains("newer"), "{reason}");

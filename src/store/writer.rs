@@ -2,17 +2,18 @@
 //! under load the cores are there for answers. What waits is read from here.
 
 use std::collections::HashMap;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex as StdMutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant};
 
-use sqlx::sqlite::SqlitePool;
+use sqlx::Connection;
+use sqlx::sqlite::{SqliteConnection, SqlitePool};
 use tokio::sync::{Mutex, Notify, mpsc, oneshot};
 use tokio::task::JoinHandle;
 
-use super::KeptResult;
 use super::row::{self, Packer, ResultRow};
 use super::sqlite::Keys;
+use super::{KeptResult, now_ms};
 use crate::key::Key;
 
 /// Orders that may wait.
@@ -58,6 +59,8 @@ struct Desk {
     waiting: StdMutex<HashMap<Key, Arc<KeptResult>>>,
     /// Their size.
     waiting_bytes: AtomicUsize,
+    /// Size of the results that are written.
+    total: AtomicI64,
     /// Whether results were turned away since the last group was written.
     full: AtomicBool,
     /// Ends a rest.
@@ -99,8 +102,8 @@ impl Writer {
     pub(super) async fn start(pool: SqlitePool, keys: Keys, limits: Limits) -> Result<Self, sqlx::Error> {
         let total = total_bytes(&pool).await?;
         let (orders, receiver) = mpsc::channel(WAITING_ORDERS);
-        let desk = Arc::new(Desk::default());
-        let clerk = Clerk { pool, keys, limits, total, desk: Arc::clone(&desk) };
+        let desk = Arc::new(Desk { total: AtomicI64::new(total), ..Desk::default() });
+        let clerk = Clerk { pool, keys, limits, enough: limits.bytes, desk: Arc::clone(&desk) };
         let task = Mutex::new(Some(tokio::spawn(clerk.work(receiver))));
         Ok(Self { orders, desk, task })
     }
@@ -128,6 +131,11 @@ impl Writer {
     /// A result that is not written yet.
     pub(super) fn waiting(&self, key: &Key) -> Option<Arc<KeptResult>> {
         self.desk.waiting().get(key).cloned()
+    }
+
+    /// A result was written by somebody else.
+    pub(super) fn added(&self, bytes: i64) {
+        self.desk.total.fetch_add(bytes, Ordering::Relaxed);
     }
 
     /// Notes a use. One that is lost does no harm.
@@ -170,7 +178,8 @@ struct Clerk {
     pool: SqlitePool,
     keys: Keys,
     limits: Limits,
-    total: i64,
+    /// Above so many bytes something is deleted: the limit, or more where the rest may not go.
+    enough: i64,
     desk: Arc<Desk>,
 }
 
@@ -236,7 +245,7 @@ impl Clerk {
             tracing::warn!(orders, reason, "results are not kept");
         }
         self.desk.done(&group.put);
-        if self.total > self.limits.bytes {
+        if self.desk.total.load(Ordering::Relaxed) > self.enough {
             self.report("evict", Self::evict).await;
         }
         for flushed in group.flushed {
@@ -251,64 +260,63 @@ impl Clerk {
 
     async fn write_rows(&mut self, rows: &[ResultRow], touched: &[Key], forgotten: &[Key]) -> Result<(), sqlx::Error> {
         let now = now_ms();
-        let mut transaction = self.pool.begin_with("BEGIN IMMEDIATE").await?;
-        for key in forgotten {
-            sqlx::query("DELETE FROM results WHERE key = ?1")
-                .bind(key.as_bytes().as_slice())
-                .execute(&mut *transaction)
-                .await?;
+        let mut connection = self.pool.acquire().await?;
+        let outcome = insert(&mut connection, rows, touched, forgotten, now).await;
+        if outcome.is_err() {
+            // Where SQLite has rolled back by itself (a full disk), the driver still counts a transaction that nothing
+            // can end, and would refuse every later one.
+            connection.close_on_drop();
         }
-        let mut added = 0;
-        let (many, few) = rows.as_chunks::<ROWS_AT_ONCE>();
-        for rows in many {
-            added += row::insert(rows, now, &mut transaction).await?;
-        }
-        for one in few {
-            added += row::insert(std::slice::from_ref(one), now, &mut transaction).await?;
-        }
-        for key in touched {
-            sqlx::query("UPDATE results SET used_ms = ?2 WHERE key = ?1")
-                .bind(key.as_bytes().as_slice())
-                .bind(now)
-                .execute(&mut *transaction)
-                .await?;
-        }
-        transaction.commit().await?;
+        let added = outcome?;
         for key in forgotten {
             self.keys.remove(key.as_bytes());
         }
         for row in rows {
             self.keys.add(&row.key);
         }
-        self.total += added;
+        self.desk.total.fetch_add(added, Ordering::Relaxed);
         Ok(())
     }
 
     /// Deletes what has not been used for longest until the total is below the limit again.
     async fn evict(&mut self) -> Result<(), sqlx::Error> {
         // The running total does not know of rows that were forgotten.
-        self.total = total_bytes(&self.pool).await?;
+        self.desk.total.store(total_bytes(&self.pool).await?, Ordering::Relaxed);
         // Sizes of files are far below 2^53.
         #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation)]
         let goal = (self.limits.bytes as f64 * EVICT_TO) as i64;
+        let desk = Arc::clone(&self.desk);
+        let total = || desk.total.load(Ordering::Relaxed);
         let mut gone = 1;
-        while self.total > goal && gone > 0 {
-            let surplus = self.total - goal;
+        while total() > goal && gone > 0 {
+            let surplus = total() - goal;
             let deleted: Vec<(Vec<u8>, i64)> = sqlx::query_as(
                 "DELETE FROM results WHERE key IN (
                      SELECT key FROM (
                          SELECT key, sum(bytes) OVER (ORDER BY used_ms, key) - bytes AS before
                          FROM (SELECT key, used_ms, bytes FROM results INDEXED BY results_by_use
+                               WHERE NOT EXISTS (SELECT 1 FROM precut_jobs WHERE precut_jobs.key = results.key
+                                                 AND state = 'succeeded' AND expires_ms > ?3)
                                ORDER BY used_ms, key LIMIT ?2))
                      WHERE before < ?1)
                  RETURNING key, bytes",
             )
             .bind(surplus)
             .bind(EVICTED_AT_ONCE)
+            .bind(now_ms())
             .fetch_all(&self.pool)
             .await?;
             gone = deleted.len();
             self.gone(&deleted);
+        }
+        // What is left belongs to kept jobs: it is not looked through again before there is something more.
+        self.enough = self.limits.bytes.max(total() + self.limits.bytes / 16);
+        if total() > self.limits.bytes {
+            tracing::warn!(
+                bytes = total(),
+                limit = self.limits.bytes,
+                "results of kept jobs alone are beyond the limit"
+            );
         }
         Ok(())
     }
@@ -323,11 +331,14 @@ impl Clerk {
         loop {
             let deleted: Vec<(Vec<u8>, i64)> = sqlx::query_as(
                 "DELETE FROM results WHERE key IN (
-                     SELECT key FROM results INDEXED BY results_by_use WHERE used_ms < ?1 LIMIT ?2)
+                     SELECT key FROM results INDEXED BY results_by_use WHERE used_ms < ?1
+                         AND NOT EXISTS (SELECT 1 FROM precut_jobs WHERE precut_jobs.key = results.key
+                                         AND state = 'succeeded' AND expires_ms > ?3) LIMIT ?2)
                  RETURNING key, bytes",
             )
             .bind(before)
             .bind(EVICTED_AT_ONCE)
+            .bind(now_ms())
             .fetch_all(&self.pool)
             .await?;
             self.gone(&deleted);
@@ -340,7 +351,7 @@ impl Clerk {
     fn gone(&mut self, deleted: &[(Vec<u8>, i64)]) {
         for (key, bytes) in deleted {
             self.keys.remove(key);
-            self.total -= bytes;
+            self.desk.total.fetch_sub(*bytes, Ordering::Relaxed);
         }
         metrics::counter!("precut_results_evicted_total").increment(deleted.len() as u64);
     }
@@ -351,6 +362,40 @@ impl Clerk {
             tracing::warn!(%error, operation, "the store could not be tidied");
         }
     }
+}
+
+/// Writes rows in one transaction; how many bytes they add.
+async fn insert(
+    connection: &mut SqliteConnection,
+    rows: &[ResultRow],
+    touched: &[Key],
+    forgotten: &[Key],
+    now: i64,
+) -> Result<i64, sqlx::Error> {
+    let mut transaction = connection.begin_with("BEGIN IMMEDIATE").await?;
+    for key in forgotten {
+        sqlx::query("DELETE FROM results WHERE key = ?1")
+            .bind(key.as_bytes().as_slice())
+            .execute(&mut *transaction)
+            .await?;
+    }
+    let mut added = 0;
+    let (many, few) = rows.as_chunks::<ROWS_AT_ONCE>();
+    for rows in many {
+        added += row::insert(rows, now, &mut transaction).await?;
+    }
+    for one in few {
+        added += row::insert(std::slice::from_ref(one), now, &mut transaction).await?;
+    }
+    for key in touched {
+        sqlx::query("UPDATE results SET used_ms = ?2 WHERE key = ?1")
+            .bind(key.as_bytes().as_slice())
+            .bind(now)
+            .execute(&mut *transaction)
+            .await?;
+    }
+    transaction.commit().await?;
+    Ok(added)
 }
 
 fn group(waiting: &mut Vec<Order>) -> Group {
@@ -381,9 +426,4 @@ async fn compressed(results: Vec<Arc<KeptResult>>) -> Result<Vec<ResultRow>, Str
 
 async fn total_bytes(pool: &SqlitePool) -> Result<i64, sqlx::Error> {
     sqlx::query_scalar("SELECT coalesce(sum(bytes), 0) FROM results INDEXED BY results_by_use").fetch_one(pool).await
-}
-
-fn now_ms() -> i64 {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-    i64::try_from(since.as_millis()).unwrap_or(i64::MAX)
 }

@@ -1,7 +1,7 @@
 //! Numbers and units as people read them.
 
 /// `x` with `digits` significant digits, without trailing zeros; very large and very small numbers with an exponent.
-pub(super) fn significant(x: f64, digits: usize) -> String {
+pub(crate) fn significant(x: f64, digits: usize) -> String {
     if x == 0.0 || !x.is_finite() {
         return if x.is_finite() { "0".to_owned() } else { x.to_string() };
     }

@@ -136,13 +136,13 @@ fn every_setting_of_the_operations_page_exists() {
 #[test]
 fn a_page_that_shows_something_else_is_caught() {
     let page = |text: &str| run(&Document { name: "page.md".to_owned(), text: text.replace("~~~", "```") });
-    let listed = "~~~console\n$ precut list\ndeflection-compensation  ...\n~~~\n";
+    let listed = "~~~console\n$ precut list\n...\ndeflection-compensation  ...\n...\n~~~\n";
     assert_eq!(page(listed), Vec::<String>::new());
     for (wrong, line) in [
         ("~~~console\n$ precut list\nfeed-schedule  ...\n~~~\n", 1),
         ("~~~console\n$ precut no-such-command\n~~~\n", 1),
-        (&format!("{listed}\n~~~json\n{{}}\n~~~\n"), 6),
-        (&format!("{listed}\n~~~json answer\n{{ ... }}\n~~~\n"), 6),
+        (&format!("{listed}\n~~~json\n{{}}\n~~~\n"), 8),
+        (&format!("{listed}\n~~~json answer\n{{ ... }}\n~~~\n"), 8),
         (
             "~~~console\n$ curl http://127.0.0.1:8080/health/live\n~~~\n~~~json answer\n{ \"status\": \"dead\", ... }\n~~~\n",
             4,

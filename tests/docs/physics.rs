@@ -6,16 +6,23 @@ use std::path::Path;
 
 use precut::registry::Registry;
 use precut_calc::calculator::Unwatched;
-use precut_calc::effects::{Cause, DEFLECTION_CAUSES, Fit, Parameter};
+use precut_calc::effects::{
+    Cause, DEFLECTION_CAUSES, FIXTURE_CAUSES, Fit, MACHINABILITY_CAUSES, Parameter, RING_CAUSES,
+};
 
 use super::markdown::{Document, documents};
 use super::root;
 
-const DEFLECTION: &str = "docs/physics/deflection-compensation.md";
-const EFFECTS: &str = "docs/physics/effects-deflection.md";
+/// Catalogues and the page that has their numbers.
+const CATALOGUES: [(&[Cause], &str); 4] = [
+    (DEFLECTION_CAUSES, "docs/physics/effects-deflection.md"),
+    (FIXTURE_CAUSES, "docs/physics/effects-fixture.md"),
+    (MACHINABILITY_CAUSES, "docs/physics/effects-machinability.md"),
+    (RING_CAUSES, "docs/physics/effects-ring.md"),
+];
 
 /// Groups of equations.
-const GROUPS: [&str; 2] = ["deflection/", "diagnosis/"];
+const GROUPS: [&str; 7] = ["deflection/", "diagnosis/", "feed/", "fit/", "fixture/", "ring/", "roundness/"];
 
 /// Equations that have a heading: its first word.
 fn documented() -> BTreeSet<String> {
@@ -87,6 +94,7 @@ fn every_equation_of_an_answer_is_documented() {
 fn row(parameter: &Parameter) -> String {
     let (fit, prior) = match parameter.fit {
         Fit::Amplitude | Fit::Shape { grid: [] } => ("fitted".to_owned(), parameter.prior_sd.to_string()),
+        Fit::Factor => ("logarithm fitted".to_owned(), parameter.prior_sd.to_string()),
         Fit::Shape { grid } => {
             let grid: Vec<String> = grid.iter().map(f64::to_string).collect();
             (format!("grid {}", grid.join(", ")), parameter.prior_sd.to_string())
@@ -99,34 +107,38 @@ fn row(parameter: &Parameter) -> String {
 }
 
 /// The part of the page on one cause.
-fn section<'t>(text: &'t str, cause: &Cause) -> &'t str {
+fn section<'t>(page: &str, text: &'t str, cause: &Cause) -> &'t str {
     let heading = format!("### {} `{}`\n", cause.equation, cause.kind);
-    let Some((_, rest)) = text.split_once(&heading) else { panic!("{EFFECTS} has no heading {heading}") };
+    let Some((_, rest)) = text.split_once(&heading) else { panic!("{page} has no heading {heading}") };
     rest.split("\n#").next().unwrap()
 }
 
 #[test]
-fn the_catalogue_has_the_numbers_of_the_code() {
-    let page = Document::read(root(), EFFECTS);
-    for cause in DEFLECTION_CAUSES {
-        let section = section(&page.text, cause);
-        for parameter in cause.parameters {
-            let row = row(parameter);
-            assert!(section.lines().any(|line| line == row), "{}: no row {row}", cause.kind);
-        }
-        for other in cause.conditions.iter().chain(cause.confounded_with) {
-            assert!(section.contains(&format!("`{other}`")), "{}: {other} is not named", cause.kind);
+fn the_catalogues_have_the_numbers_of_the_code() {
+    for (causes, page) in CATALOGUES {
+        let text = Document::read(root(), page).text;
+        for cause in causes {
+            let section = section(page, &text, cause);
+            for parameter in cause.parameters {
+                let row = row(parameter);
+                assert!(section.lines().any(|line| line == row), "{}: no row {row}", cause.kind);
+            }
+            for other in cause.conditions.iter().chain(cause.confounded_with) {
+                assert!(section.contains(&format!("`{other}`")), "{}: {other} is not named", cause.kind);
+            }
         }
     }
 }
 
 #[test]
-fn every_code_of_the_calculator_is_explained() {
-    let page = Document::read(root(), DEFLECTION).text;
+fn every_code_of_a_calculator_is_explained() {
     let registry = Registry::standard().unwrap();
-    let entry = registry.entry("deflection-compensation").unwrap();
-    let codes = &entry.meta().codes;
-    let groups = codes.faults.iter().chain(codes.failures).chain(codes.warnings).copied();
-    let missing: Vec<_> = groups.flatten().filter(|code| !page.contains(&format!("`{code}`"))).collect();
-    assert!(missing.is_empty(), "{DEFLECTION} does not name {missing:?}");
+    for entry in registry.entries() {
+        let page = format!("docs/physics/{}.md", entry.meta().id);
+        let text = Document::read(root(), &page).text;
+        let codes = &entry.meta().codes;
+        let groups = codes.faults.iter().chain(codes.failures).chain(codes.warnings).copied();
+        let missing: Vec<_> = groups.flatten().filter(|code| !text.contains(&format!("`{code}`"))).collect();
+        assert!(missing.is_empty(), "{page} does not name {missing:?}");
+    }
 }

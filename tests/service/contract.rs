@@ -128,6 +128,12 @@ async fn answers_are_what_the_contract_says() {
     };
     let answer: Value = server.post(toy::JOB).send().await.unwrap().json().await.unwrap();
     matches("SaggingBarAnswer", &answer);
+    let study = serde_json::json!({
+        "calculator": toy::BAR, "job": {"length_mm": 500, "load_n": 100},
+        "vary": [{"pointer": "/load_n", "values": [1, 9000]}, {"pointer": "/behaviour", "values": ["quick", "infeasible"]}],
+    });
+    let answer: Value = server.post_to("/v1/studies", study.to_string()).send().await.unwrap().json().await.unwrap();
+    matches("StudyAnswer", &answer);
     for (path, name) in [
         ("/", "Landing"),
         ("/v1/calculators", "CalculatorList"),

@@ -166,11 +166,20 @@ async fn every_form_has_a_tag_of_its_own_and_is_not_sent_twice() {
 }
 
 #[tokio::test]
-async fn preferences_are_not_claimed_to_be_applied() {
+async fn only_preferences_that_were_followed_are_said_to_be_applied() {
     let server = Server::start().await;
-    let response = server.post(toy::JOB).header("prefer", "respond-async, wait=5").send().await.unwrap();
-    assert_eq!(response.status(), 200);
-    assert_eq!(header(&response, "preference-applied"), "");
+    for (preferences, applied) in [
+        ("handling=lenient", ""),
+        ("respond-async, wait=5", "wait=5"),
+        // What is there already needs no waiting.
+        ("respond-async, wait=5", ""),
+        ("respond-async", ""),
+    ] {
+        let job = if applied.is_empty() { toy::JOB } else { r#"{"length_mm": 501, "load_n": 1}"# };
+        let response = server.post(job).header("prefer", preferences).send().await.unwrap();
+        assert_eq!(response.status(), 200);
+        assert_eq!(header(&response, "preference-applied"), applied, "{preferences}");
+    }
 }
 
 #[tokio::test]

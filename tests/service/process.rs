@@ -104,6 +104,106 @@ fn results_survive_a_restart() {
     assert_eq!(caches, ["precut-cache: miss", "precut-cache: hit"]);
 }
 
+#[cfg(unix)]
+#[test]
+fn a_killed_job_is_finished_by_the_next_process() {
+    let folder = tempfile::tempdir().unwrap();
+    let job = r#"{"length_mm": 100, "load_n": 1, "duration_ms": 800}"#;
+    let mut process = Process::start_in(folder.path());
+    let accepted = ask(process.address, &request("POST", "/v1/sagging-bar", job)).unwrap();
+    assert!(accepted.starts_with("HTTP/1.1 202 "), "{accepted}");
+    let address = accepted.lines().find_map(|line| line.strip_prefix("location: ")).unwrap().to_owned();
+    std::thread::sleep(Duration::from_millis(300));
+    process.signal("KILL");
+    process.wait(Duration::from_secs(5));
+    let process = Process::start_in(folder.path());
+    let start = Instant::now();
+    loop {
+        let answer = ask(process.address, &request("GET", &address, "")).unwrap();
+        assert!(answer.starts_with("HTTP/1.1 200 "), "{answer}");
+        if answer.contains("\"state\":\"succeeded\"") {
+            assert!(answer.contains("\"attempt\":2"), "{answer}");
+            break;
+        }
+        assert!(start.elapsed() < Duration::from_secs(10), "{answer}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let result = ask(process.address, &request("GET", &format!("{address}/result"), "")).unwrap();
+    assert!(result.starts_with("HTTP/1.1 200 ") && result.contains("max_sag_um"), "{result}");
+}
+
+/// The document of a job, from its address.
+#[cfg(unix)]
+fn job(process: &Process, address: &str) -> serde_json::Value {
+    let answer = ask(process.address, &request("GET", address, "")).unwrap();
+    assert!(answer.starts_with("HTTP/1.1 200 "), "{answer}");
+    serde_json::from_str(answer.split_once("\r\n\r\n").unwrap().1).unwrap()
+}
+
+#[cfg(unix)]
+fn accepted(process: &Process, job: &str) -> String {
+    let answer = ask(process.address, &request("POST", "/v1/sagging-bar", job)).unwrap();
+    assert!(answer.starts_with("HTTP/1.1 202 "), "{answer}");
+    answer.lines().find_map(|line| line.strip_prefix("location: ")).unwrap().to_owned()
+}
+
+#[cfg(unix)]
+fn until(process: &Process, address: &str, state: &str) -> serde_json::Value {
+    let start = Instant::now();
+    loop {
+        let job = job(process, address);
+        if job["state"] == state {
+            return job;
+        }
+        assert!(start.elapsed() < Duration::from_secs(20), "{job:#}");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_job_that_a_shutdown_interrupts_is_put_back_without_a_charge() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut process = Process::start_in(folder.path());
+    let address = accepted(&process, r#"{"length_mm": 100, "load_n": 1, "duration_ms": 1500}"#);
+    assert_eq!(until(&process, &address, "running")["attempt"], 1);
+    process.signal("TERM");
+    assert_eq!(process.wait(Duration::from_secs(10)), Some(0));
+    let process = Process::start_in(folder.path());
+    assert_eq!(until(&process, &address, "succeeded")["attempt"], 1);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_job_that_ends_its_process_each_time_is_given_up_and_its_neighbours_are_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut process = Process::start_in(folder.path());
+    let waiting = accepted(&process, r#"{"length_mm": 101, "load_n": 1, "duration_ms": 600}"#);
+    let deadly = r#"{"length_mm": 100, "load_n": 1, "behaviour": "abort", "duration_ms": 501}"#;
+    let deadly = accepted(&process, deadly);
+    let after = accepted(&process, r#"{"length_mm": 102, "load_n": 1, "duration_ms": 600}"#);
+    let mut deaths = 0;
+    let failed = loop {
+        if process.wait(Duration::from_millis(1)).is_some() || process.child.try_wait().unwrap().is_some() {
+            deaths += 1;
+            assert!(deaths <= 3, "it is given up after three");
+            process = Process::start_in(folder.path());
+        }
+        let answer = ask(process.address, &request("GET", &deadly, "")).unwrap_or_default();
+        if answer.contains("\"state\":\"failed\"") {
+            break job(&process, &deadly);
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    };
+    assert_eq!((deaths, failed["attempt"].as_u64()), (3, Some(3)));
+    assert_eq!(failed["problem"]["code"], "crashed_repeatedly");
+    for address in [&waiting, &after] {
+        until(&process, address, "succeeded");
+    }
+    let result = ask(process.address, &request("GET", &format!("{deadly}/result"), "")).unwrap();
+    assert!(result.starts_with("HTTP/1.1 500 ") && result.contains("crashed_repeatedly"), "{result}");
+}
+
 #[test]
 fn a_folder_in_use_or_a_port_taken_is_said_and_ends_with_1() {
     let process = Process::start();

@@ -37,8 +37,8 @@ impl Server {
         let data = tempfile::tempdir().expect("a folder for temporary files");
         let mut config = Config::default();
         adjust(&mut config);
-        let limit = Duration::from_secs_f64(config.limits.job_ms / 1e3);
-        let settings = EngineSettings { direct_limit: limit, ..EngineSettings::in_folder(data.path()) };
+        config.data = data.path().to_owned();
+        let settings = EngineSettings::of(&config);
         let engine = Engine::open(toy::registry(), settings).await.expect("an empty folder");
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
         let address = listener.local_addr().expect("it is bound");
@@ -149,21 +149,19 @@ impl Process {
 
     /// Starts it and waits until it says where it listens.
     pub fn start_in(data: &Path) -> Self {
-        use std::io::{BufRead, BufReader};
+        Self::start_with(data, &[])
+    }
+
+    /// The same with settings in its environment.
+    pub fn start_with(data: &Path, settings: &[(&str, &str)]) -> Self {
         let folder = data.to_str().expect("a plain name");
         let mut child = toy_command(&["serve", "--listen", "127.0.0.1:0", "--data", folder])
+            .envs(settings.iter().copied())
             .stderr(Stdio::null())
             .spawn()
             .expect("this binary runs");
-        let mut lines = BufReader::new(child.stdout.take().expect("it is piped")).lines();
-        let address = lines
-            .by_ref()
-            .map_while(Result::ok)
-            .find_map(|line| line.split_once("listens on http://").map(|(_, address)| address.trim().to_owned()))
-            .expect("it says where it listens");
-        // Whatever else it prints has to go somewhere.
-        std::thread::spawn(move || lines.for_each(drop));
-        Self { child, address: address.parse().expect("an address"), folder: data.to_owned(), data: None }
+        let address = address_of(&mut child);
+        Self { child, address, folder: data.to_owned(), data: None }
     }
 
     /// Sends a signal by its name.
@@ -184,6 +182,20 @@ impl Process {
         }
         None
     }
+}
+
+/// Where a service that was just started listens, by its own word.
+pub fn address_of(child: &mut Child) -> SocketAddr {
+    use std::io::{BufRead, BufReader};
+    let mut lines = BufReader::new(child.stdout.take().expect("it is piped")).lines();
+    let address = lines
+        .by_ref()
+        .map_while(Result::ok)
+        .find_map(|line| line.split_once("listens on http://").map(|(_, address)| address.trim().to_owned()))
+        .expect("it says where it listens");
+    // Whatever else it prints has to go somewhere.
+    std::thread::spawn(move || lines.for_each(drop));
+    address.parse().expect("an address")
 }
 
 impl Drop for Process {

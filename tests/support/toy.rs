@@ -41,7 +41,11 @@ pub struct BarJob {
     /// What the toy shall do.
     #[serde(default)]
     pub behaviour: Behaviour,
-    /// Estimated work.
+    /// How long it computes; it tells its progress meanwhile and can be stopped.
+    #[serde(default)]
+    #[schema(minimum = 0, maximum = 600_000, default = 0.0, example = 0.0, extensions(("x-unit" = json!("ms"))))]
+    pub duration_ms: f64,
+    /// Estimated work beyond that.
     #[serde(default)]
     #[schema(minimum = 0, maximum = 1e9, default = 0.0, example = 0.0, extensions(("x-unit" = json!("ms"))))]
     pub work_ms: f64,
@@ -69,6 +73,8 @@ pub enum Behaviour {
     Incomplete,
     /// Crashes.
     Panic,
+    /// Ends the process.
+    Abort,
 }
 
 /// By another name, as a derived schema treats a generic type's name as its own business.
@@ -104,6 +110,34 @@ pub struct BarResult {
     pub max_sag_um: f64,
 }
 
+/// Takes the time that the job asks for, telling how far it is and what the bar looks like so far.
+fn take_time(input: &BarJob, monitor: &dyn Monitor) -> Result<(), Failure> {
+    let (start, whole) = (Instant::now(), Duration::from_secs_f64(input.duration_ms / 1e3));
+    let mut pictures = 0;
+    while start.elapsed() < whole {
+        checkpoint(monitor)?;
+        let share = start.elapsed().as_secs_f64() / whole.as_secs_f64();
+        monitor.progress(share.min(1.0), Message::new("bar_sags").with("percent", (100.0 * share).floor()));
+        if share >= 0.25 * f64::from(pictures) {
+            pictures += 1;
+            monitor.interim(figure("sag", &[0.0, input.length_mm], &[0.0, share]));
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    Ok(())
+}
+
+fn figure(id: &'static str, x: &[f64], y: &[f64]) -> Figure {
+    let line = Item::Line { name: "sag", x: x.to_vec(), y: y.iter().copied().map(Some).collect(), role: Role::Plain };
+    Figure {
+        id,
+        title: Message::new("sag"),
+        frame: Frame::Stacked,
+        x: Axis::linear("place", "mm"),
+        panels: vec![Panel { y: Axis::linear("sag", "um"), height: 1.0, items: vec![line] }],
+    }
+}
+
 impl Check for BarJob {
     fn check(&self, violations: &mut Violations) {
         violations.require(self.load_n <= 10.0 * self.length_mm, || {
@@ -131,7 +165,7 @@ impl Calculator for Bar {
             failures: &[&["bar_would_break", "path_incomplete"]],
             warnings: &[],
             explanations: &[&["sag_small"]],
-            stages: &[],
+            stages: &[&["bar_sags"]],
             labels: &[&["sag", "place"]],
         },
         figures: &["sag", "load"],
@@ -142,11 +176,14 @@ impl Calculator for Bar {
     fn fill(_input: &mut BarJob) {}
 
     fn cost(input: &BarJob) -> Cost {
-        let least_ms = if matches!(input.behaviour, Behaviour::Slow) { 1000.0 } else { 0.0 };
-        Cost { ms: least_ms + input.work_ms + f64::from(input.stations) * 1e-4, bytes: 1000, driver: "/stations" }
+        // Slow answers take longer than they say: they are for those who wait.
+        let least_ms = if matches!(input.behaviour, Behaviour::Slow) { 400.0 } else { 0.0 };
+        let ms = least_ms + input.duration_ms + input.work_ms + f64::from(input.stations) * 1e-4;
+        Cost { ms, bytes: 1000, driver: "/stations" }
     }
 
     fn run(input: &BarJob, monitor: &dyn Monitor) -> Result<Answer<BarResult>, Failure> {
+        take_time(input, monitor)?;
         match input.behaviour {
             Behaviour::Slow => {
                 let start = Instant::now();
@@ -160,6 +197,7 @@ impl Calculator for Bar {
                 return Err(Failure::Infeasible(finding));
             }
             Behaviour::Panic => panic!("the toy was asked to"),
+            Behaviour::Abort => std::process::abort(),
             Behaviour::Quick | Behaviour::Incomplete => {}
         }
         let spacing_mm = input.length_mm / f64::from(input.stations - 1);
@@ -176,24 +214,7 @@ impl Calculator for Bar {
     }
 
     fn figures(_input: &BarJob, output: &BarResult) -> Vec<Figure> {
-        let panel = || Panel {
-            y: Axis::linear("sag", "um"),
-            height: 1.0,
-            items: vec![Item::Line {
-                name: "sag",
-                x: output.z_mm.clone(),
-                y: output.sag_um.iter().copied().map(Some).collect(),
-                role: Role::Plain,
-            }],
-        };
-        let figure = |id| Figure {
-            id,
-            title: Message::new("sag"),
-            frame: Frame::Stacked,
-            x: Axis::linear("place", "mm"),
-            panels: vec![panel()],
-        };
-        vec![figure("sag"), figure("load")]
+        ["sag", "load"].map(|id| figure(id, &output.z_mm, &output.sag_um)).to_vec()
     }
 
     fn tables(_input: &BarJob, output: &BarResult) -> Vec<Table> {

@@ -6,15 +6,25 @@
 
 pub mod calculator;
 pub mod deflection_compensation;
+pub mod diagnosis;
 pub mod effects;
+pub mod feed_schedule;
+pub mod fixture_stability;
 pub mod force;
+pub mod machinability;
 pub mod material;
 pub mod num;
 pub mod path;
+pub mod ring_roundness;
+pub mod shaft;
 
 use calculator::Registrar;
 
 /// Every calculator, one line each. Nothing else has to change when one moves in.
 pub fn register(registrar: &mut impl Registrar) {
     registrar.with_forward_model::<deflection_compensation::DeflectionCompensation>();
+    registrar.with_forward_model::<ring_roundness::RingRoundness>();
+    registrar.calculator::<ring_roundness::evaluation::RoundnessEvaluation>();
+    registrar.calculator::<feed_schedule::fit::MachinabilityFit>();
+    registrar.with_forward_model::<fixture_stability::FixtureStability>();
 }

@@ -305,6 +305,7 @@ fn the_catalogue_and_the_effect_objects_agree() {
             .iter()
             .map(|p| match p.fit {
                 Fit::Amplitude => 0.5 * p.prior_sd,
+                Fit::Factor => 1.0 + 0.5 * p.prior_sd,
                 Fit::Shape { grid } => grid.first().copied().unwrap_or(1e6),
                 Fit::Fixed { default } => default,
                 Fit::OfJob => 100.0,

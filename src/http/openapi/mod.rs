@@ -1,6 +1,7 @@
 //! The contract: an OpenAPI 3.1 document, made from the calculators' own declarations.
 
 mod fixed;
+mod jobs;
 mod parts;
 mod rooms;
 
@@ -14,6 +15,7 @@ use utoipa::openapi::{ComponentsBuilder, InfoBuilder, LicenseBuilder, OpenApiBui
 use utoipa::openapi::{RefOr, Schema};
 use utoipa::{PartialSchema, ToSchema};
 
+use crate::engine::STUDIES;
 use crate::registry::Registry;
 
 const DESCRIPTION: &str = "\
@@ -25,6 +27,10 @@ what dominates it, and where an input left the range for which a formula was che
 **Answers are kept** under the hash of their complete job: the same job twice is computed once (`Precut-Cache`), \
 `Content-Location` is its lasting address, `ETag` and `If-None-Match` save its transfer, also on `POST`, which here is \
 a safe query.
+
+**Long calculations** become jobs (`202` and `Location`): to be asked for, followed as events, cancelled. An accepted \
+job is done whatever happens to the process. `Prefer: respond-async` makes a job of anything, `Prefer: wait=N` waits for \
+one, `Idempotency-Key` makes sending it twice harmless.
 
 **Forms**: `Accept` chooses among JSON, CSV (`?table=`), SVG (`?figure=`) and, where a path is the answer, G-code. \
 `Accept-Language` chooses the language of sentences; names and codes are never translated.
@@ -50,10 +56,13 @@ pub fn document(registry: &Registry) -> Value {
         paths = paths.path(format!("/v1/{}", entry.meta().id), room.path);
         schemas.extend(room.schemas);
     }
-    for (address, path) in fixed::paths(registry) {
+    let studies = rooms::studies(registry);
+    paths = paths.path(format!("/v1/{STUDIES}"), studies.path);
+    schemas.extend(studies.schemas);
+    for (address, path) in jobs::paths(registry).into_iter().chain(fixed::paths(registry)) {
         paths = paths.path(address, path);
     }
-    for (name, schema) in parts::schemas().into_iter().chain(fixed::schemas()) {
+    for (name, schema) in parts::schemas().into_iter().chain(fixed::schemas()).chain(jobs::schemas()) {
         schemas.insert(name, schema);
     }
     let components = schemas

@@ -15,9 +15,11 @@ use crate::text::Remark;
 
 pub(super) const BEARER: &str = "bearer";
 
-pub(super) const TAGS: [(&str, &str); 5] = [
+pub(super) const TAGS: [(&str, &str); 7] = [
     ("calculators", "Predict and decide from a model of the process."),
     ("evaluations", "Evaluate data that the user brings."),
+    ("studies", "Vary one to three fields of any of them."),
+    ("jobs", "Calculations that take long: watched, cancelled, and their results."),
     ("library", "What can be asked, and the data of the engine."),
     ("results", "Kept answers, read again without computing."),
     ("service", "Health, figures, documentation."),
@@ -32,14 +34,19 @@ pub(super) fn schemas() -> Vec<(String, RefOr<Schema>)> {
 }
 
 /// Problems by status: name of the response, what it means.
-const PROBLEMS: [(u16, &str, &str); 17] = [
+const PROBLEMS: [(u16, &str, &str); 18] = [
     (400, "BadRequest", "The request or the body's JSON is malformed: `errors` has line and column."),
     (401, "Unauthorized", "A key is needed, or the one sent is none."),
     (404, "NotFound", "There is nothing of that name; where one is like it, `detail` says which."),
     (405, "MethodNotAllowed", "The address has other methods: see `Allow`."),
     (406, "NotAcceptable", "None of the accepted media types exists here; `detail` lists those that do."),
     (408, "RequestTimeout", "The body did not arrive in time."),
-    (410, "Gone", "The result was made by another version of its calculator and cannot be drawn any more."),
+    (409, "Conflict", "The job has no result: it is not finished (come again after `Retry-After`), or was cancelled."),
+    (
+        410,
+        "Gone",
+        "The result is kept no longer, or was made by another version of its calculator and cannot be drawn any more.",
+    ),
     (413, "PayloadTooLarge", "The body is larger than the limit in `detail`."),
     (414, "UriTooLong", "The address is longer than 8 KiB."),
     (415, "UnsupportedMediaType", "The body is of another type than those in `detail`."),
@@ -48,11 +55,15 @@ const PROBLEMS: [(u16, &str, &str); 17] = [
         "Unprocessable",
         "The job breaks rules (every fault is in `errors`), is too expensive, or has no answer: infeasible, outside the model, not converged. Then `code` says why and `detail` what would make it possible.",
     ),
-    (429, "TooManyRequests", "The client asks more often than its rate allows."),
+    (429, "TooManyRequests", "The client asks more often than its rate allows, or has too many event streams open."),
     (431, "HeaderTooLarge", "The header is larger than 32 KiB."),
     (500, "InternalError", "The service's own fault; its log knows the request id."),
-    (503, "Unavailable", "Busy, overloaded, shutting down, or without its store: come again after `Retry-After`."),
-    (507, "InsufficientStorage", "The disk is full."),
+    (
+        503,
+        "Unavailable",
+        "Busy, overloaded, its queue full, shutting down, or without its store: come again after `Retry-After`.",
+    ),
+    (507, "InsufficientStorage", "The disk is full: a job that cannot be put on record is not taken."),
     (0, "Problem", "Any other problem."),
 ];
 
@@ -75,7 +86,7 @@ pub(super) fn responses() -> Vec<(String, Response)> {
                 .content("application/problem+json", content)
                 .header("x-request-id", request_id())
                 .header("Content-Language", text_header("Language of the sentences.", "en"));
-            if matches!(status, 429 | 503) {
+            if matches!(status, 409 | 429 | 503) {
                 response = response.header("Retry-After", retry_after());
             }
             if status == 401 {

@@ -1,6 +1,6 @@
 //! A calculator's operation, from its declaration.
 
-use precut_calc::calculator::{CalculatorKind, Meta};
+use precut_calc::calculator::{CalculatorKind, Example, Meta};
 use std::fmt::Write as _;
 
 use serde_json::{Value, json};
@@ -14,10 +14,11 @@ use utoipa::openapi::response::ResponseBuilder;
 use utoipa::openapi::schema::{AdditionalProperties, ArrayBuilder, ObjectBuilder, SchemaType, Type};
 use utoipa::openapi::{Content, Object, Ref, RefOr, Required, Schema};
 
-use super::parts;
+use super::{jobs, parts};
+use crate::engine;
 use crate::http::answer::offered;
 use crate::http::negotiate::Media;
-use crate::registry::Entry;
+use crate::registry::{Entry, Registry};
 
 /// A calculator's part of the contract.
 pub(super) struct Room {
@@ -27,24 +28,40 @@ pub(super) struct Room {
 
 pub(super) fn room(entry: &Entry) -> Room {
     let meta = entry.meta();
-    let name = pascal(meta.id);
+    let tag = match meta.kind {
+        CalculatorKind::Calculator => "calculators",
+        CalculatorKind::Evaluation => "evaluations",
+    };
+    operation(entry, &pascal(meta.id), tag, meta.examples)
+}
+
+/// Parameter studies, with the examples of calculators that are there.
+pub(super) fn studies(registry: &Registry) -> Room {
+    let entry = engine::studies_of(registry);
+    let of = |example: &Example| {
+        let study: Value = serde_json::from_str(example.job).unwrap_or(Value::Null);
+        study["calculator"].as_str().is_some_and(|id| registry.entry(id).is_some())
+    };
+    let examples: Vec<Example> = entry.meta().examples.iter().filter(|example| of(example)).copied().collect();
+    operation(&entry, "Study", "studies", &examples)
+}
+
+fn operation(entry: &Entry, name: &str, tag: &str, examples: &[Example]) -> Room {
+    let meta = entry.meta();
     let (job, result, answer) = (format!("{name}Job"), format!("{name}Result"), format!("{name}Answer"));
     let mut schemas = entry.components();
     schemas.push((job.clone(), entry.input_schema().clone()));
     schemas.push((result.clone(), entry.output_schema().clone()));
     schemas.push((answer.clone(), envelope(meta, &result).into()));
     let operation = OperationBuilder::new()
-        .tag(match meta.kind {
-            CalculatorKind::Calculator => "calculators",
-            CalculatorKind::Evaluation => "evaluations",
-        })
+        .tag(tag)
         .operation_id(Some(format!("solve_{}", meta.id.replace('-', "_"))))
         .summary(Some(meta.question))
         .description(Some(description(meta)))
-        .request_body(Some(body(entry, &job)))
+        .request_body(Some(body(entry, &job, examples)))
         .response("200", answered(meta, &answer));
-    let operation = parts::conditional(parameters(operation, meta));
-    let operation = parts::guarded(operation, &[400, 404, 406, 408, 413, 415, 422]);
+    let operation = parts::conditional(jobs::may_become_one(parameters(operation, meta)));
+    let operation = parts::guarded(operation, &[400, 404, 406, 408, 409, 410, 413, 415, 422, 507]);
     Room { path: PathItem::new(HttpMethod::Post, operation), schemas }
 }
 
@@ -83,8 +100,8 @@ fn parameters(mut operation: OperationBuilder, meta: &Meta) -> OperationBuilder 
     operation
 }
 
-fn body(entry: &Entry, job: &str) -> RequestBody {
-    let examples = entry.meta().examples.iter().map(|example| {
+fn body(entry: &Entry, job: &str, examples: &[Example]) -> RequestBody {
+    let examples = examples.iter().map(|example| {
         let value = serde_json::from_str(example.job).unwrap_or(Value::Null);
         (example.id, ExampleBuilder::new().summary(example.title).value(Some(value)).build())
     });
@@ -124,6 +141,7 @@ fn answered(meta: &Meta, answer: &str) -> ResponseBuilder {
             "Precut-Cache",
             parts::header_of(parts::one_of(["hit", "miss"].map(ToOwned::to_owned)), "Whether it was there already."),
         )
+        .header("Preference-Applied", parts::text_header("Preferences that were followed.", "wait=10"))
         .header(
             "Server-Timing",
             parts::text_header("Where the time went, ms.", "parse;dur=0.041, queue;dur=0.004, run;dur=0.310"),

@@ -4,16 +4,24 @@
 //! cache key, command line, figures and tests follow from that declaration. Physics speaks in codes
 //! with named numbers ([`Message`], [`Finding`]), never in sentences: the service words them.
 
+mod conflict;
+mod design;
+mod diagnosable;
 mod figure;
 mod finding;
 mod forward;
+mod hypothesis;
 mod measured;
 mod program;
 mod table;
 
+pub use conflict::{Conflict, ConstraintName, ElasticScope, Infeasible, Relaxation};
+pub use design::{Design, Grouping, Smooth};
+pub use diagnosable::{Diagnosable, Measurement, NextRun};
 pub use figure::{Axis, Figure, Frame, Glyph, Item, Panel, Role, Spacing};
 pub use finding::{Finding, Message, Value, Values, Violations};
 pub use forward::{Column as JacobianColumn, ForwardModel, Missing, Prediction, PrepareError, Quantity, Rows};
+pub use hypothesis::{Hypotheses, Hypothesis, Inapplicability, Inapplicable, Range, Shape, Treatment, Variable};
 pub use measured::{Measured, MeasuredRow};
 pub use program::{Block, Dialect, Program};
 pub use table::{Cells, Column, Table};
@@ -211,6 +219,9 @@ pub enum Failure {
     /// No solution exists; says which limits conflict and what would make it possible.
     #[error("infeasible: {}", .0.code)]
     Infeasible(Finding),
+    /// No solution exists, with the limits that conflict and the least relaxation that would make one.
+    #[error("limits conflict: {}", .0.finding.code)]
+    Conflicting(Box<Conflict>),
     /// An iteration did not reach its tolerance.
     #[error("{what} did not converge after {iterations} iterations, residual {residual:e}")]
     NotConverged {

@@ -29,10 +29,12 @@ pub struct Program {
 }
 
 /// One step of a program. Coordinates are already rounded to the machine's increment.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Block {
     /// Metric, XZ plane, no cutter radius compensation, absolute, feed per revolution, diameters.
     Modes,
+    /// A comment.
+    Note(String),
     /// Constant spindle speed, spindle on.
     SpindleSpeed {
         /// rev/min.

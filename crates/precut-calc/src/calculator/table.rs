@@ -15,7 +15,7 @@ pub struct Table {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Column {
     /// Field name without its unit's suffix: `diameter_error`.
-    pub name: &'static str,
+    pub name: Cow<'static, str>,
     /// Unit as in the contract, `1` for numbers without, empty for words.
     pub unit: &'static str,
     /// The rows.
@@ -34,14 +34,14 @@ pub enum Cells {
 impl Column {
     /// A column of numbers that are all there.
     pub fn numbers(name: &'static str, unit: &'static str, cells: &[f64]) -> Self {
-        Self { name, unit, cells: Cells::Numbers(cells.iter().copied().map(Some).collect()) }
+        Self { name: name.into(), unit, cells: Cells::Numbers(cells.iter().copied().map(Some).collect()) }
     }
     /// A column of numbers with gaps.
     pub fn optional(name: &'static str, unit: &'static str, cells: &[Option<f64>]) -> Self {
-        Self { name, unit, cells: Cells::Numbers(cells.to_vec()) }
+        Self { name: name.into(), unit, cells: Cells::Numbers(cells.to_vec()) }
     }
     /// A column of words.
     pub fn words(name: &'static str, cells: Vec<Cow<'static, str>>) -> Self {
-        Self { name, unit: "", cells: Cells::Words(cells) }
+        Self { name: name.into(), unit: "", cells: Cells::Words(cells) }
     }
 }

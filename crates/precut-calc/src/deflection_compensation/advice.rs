@@ -11,7 +11,8 @@ use super::input::{Job, Segment, Support, Theory};
 use super::output::{OneMoreRest, Outcome, Shares, StatusCompensated};
 use super::regime::Speed;
 use super::stage::Stage;
-use super::structure::{Structure, ends};
+use super::structure::Structure;
+use crate::shaft::elastic::ends;
 
 const UM_PER_MM: f64 = 1e3;
 /// Deflection over depth above which the one-step formulas fail and chatter is likely.

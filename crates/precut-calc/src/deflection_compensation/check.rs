@@ -2,23 +2,13 @@
 
 use crate::calculator::{Check, Finding, Violations};
 use crate::effects::DeflectionEffect as Effect;
-use crate::material;
 
 use super::grid::station_count;
-use super::input::{Job, MAX_STATIONS, Segment, Stations, Support};
-use super::structure::ends;
+use super::input::{Job, MAX_STATIONS, Stations, Support};
+use crate::shaft::{self, elastic::ends};
 
 /// Codes of the faults found here.
 pub(super) const CODES: &[&str] = &[
-    "no_segments",
-    "unknown_material",
-    "elastic_constants_missing",
-    "bad_bore",
-    "stock_below_finish",
-    "gap_of_two_sided_rest",
-    "support_outside_shaft",
-    "duplicate_support",
-    "unstable_support",
     "speed_or_rpm",
     "passes_not_descending",
     "passes_incomplete",
@@ -38,13 +28,10 @@ pub(super) const CODES: &[&str] = &[
     "effect_not_with_passes",
 ];
 
-/// Supports nearer than this share of the length stand at one station.
-const SAME_STATION: f64 = 1e-9;
-
 impl Check for Job {
     fn check(&self, violations: &mut Violations) {
-        check_shaft(self, violations);
-        check_supports(self, violations);
+        shaft::check::shaft(&self.shaft, violations);
+        shaft::check::supports(&self.shaft, &self.supports, violations);
         check_cut(self, violations);
         check_passes(self, violations);
         check_stations(self, violations);
@@ -56,64 +43,6 @@ impl Check for Job {
 
 fn length_mm(job: &Job) -> f64 {
     job.shaft.segments.iter().map(|s| s.length_mm).sum()
-}
-
-fn check_shaft(job: &Job, violations: &mut Violations) {
-    let shaft = &job.shaft;
-    violations.require(!shaft.segments.is_empty(), || Finding::new("no_segments", "/shaft/segments"));
-    for (i, segment) in shaft.segments.iter().enumerate() {
-        check_segment(i, segment, violations);
-    }
-    match &shaft.material {
-        Some(id) => violations.require(material::find(id).is_some(), || {
-            Finding::new("unknown_material", "/shaft/material")
-                .with("id", id.clone())
-                .with("known", material::library().iter().map(|m| m.id).collect::<Vec<_>>())
-        }),
-        None => violations.require(shaft.youngs_modulus_n_per_mm2.is_some(), || {
-            Finding::new("elastic_constants_missing", "/shaft/youngs_modulus_n_per_mm2")
-        }),
-    }
-}
-
-fn check_segment(i: usize, segment: &Segment, violations: &mut Violations) {
-    let at = |field: &str| format!("/shaft/segments/{i}/{field}");
-    violations.require(segment.bore_diameter_mm < segment.diameter_mm, || {
-        Finding::new("bad_bore", at("bore_diameter_mm")).measured(segment.bore_diameter_mm, segment.diameter_mm, "mm")
-    });
-    violations.require(segment.stock_mm() >= segment.diameter_mm, || {
-        Finding::new("stock_below_finish", at("stock_diameter_mm")).measured(
-            segment.stock_mm(),
-            segment.diameter_mm,
-            "mm",
-        )
-    });
-}
-
-fn check_supports(job: &Job, violations: &mut Violations) {
-    let length = length_mm(job);
-    let mut seen: Vec<f64> = Vec::new();
-    for (i, support) in job.supports.iter().enumerate() {
-        if let Support::SteadyRest { one_sided: false, gap_um, .. }
-        | Support::FollowRest { one_sided: false, gap_um, .. } = support
-        {
-            violations.require(*gap_um <= 0.0, || {
-                Finding::new("gap_of_two_sided_rest", format!("/supports/{i}/gap_um")).measured(*gap_um, 0.0, "um")
-            });
-        }
-        let Some(z) = support.station_mm() else { continue };
-        violations.require((0.0..=length).contains(&z), || {
-            Finding::new("support_outside_shaft", format!("/supports/{i}/z_mm")).measured(z, length, "mm")
-        });
-        violations.require(seen.iter().all(|other| (other - z).abs() > SAME_STATION * length), || {
-            Finding::new("duplicate_support", format!("/supports/{i}/z_mm")).value(z, "mm")
-        });
-        seen.push(z);
-    }
-    let chuck = job.supports.iter().any(|s| matches!(s, Support::Chuck { .. }));
-    let carrying = job.supports.iter().filter(|s| s.carries()).count();
-    violations
-        .require(chuck || carrying >= 2, || Finding::new("unstable_support", "/supports").with("carrying", carrying));
 }
 
 fn check_cut(job: &Job, violations: &mut Violations) {
@@ -268,7 +197,7 @@ fn held_without(job: &Job, left_out: usize) -> bool {
 
 /// Index of the steady rest that stands at a station.
 pub(super) fn steady_at(job: &Job, station_mm: f64) -> Option<usize> {
-    let tolerance = SAME_STATION * length_mm(job).max(1.0);
+    let tolerance = shaft::check::SAME_STATION * length_mm(job).max(1.0);
     job.supports
         .iter()
         .position(|s| matches!(s, Support::SteadyRest { z_mm, .. } if (z_mm - station_mm).abs() <= tolerance))

@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::calculator::{
-    Cost, Failure, Finding, ForwardModel, JacobianColumn, Missing, Monitor, Prediction, PrepareError, Quantity, Rows,
-    checkpoint,
+    Cost, Design, Diagnosable, Example, Failure, Finding, ForwardModel, Hypotheses, Hypothesis, JacobianColumn,
+    Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Rows, checkpoint,
 };
 use crate::effects::{Cause, DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect};
 use crate::num::beam::Profile;
@@ -14,8 +14,11 @@ use super::DeflectionCompensation;
 use super::acting::{Acting, StructureChange};
 use super::equilibrium::Engagement;
 use super::grid::{Grid, interpolate};
-use super::input::{FeedDirection, Job, Stations};
+use super::hypotheses::{Experiment, chuck_scale_n_mm_per_rad, design};
+use super::input::{FeedDirection, Job, Stations, Theory};
+use super::measurement::DeflectionMeasurement;
 use super::model::{Ingredients, Line, Radii, rest_shapes, wanted};
+use super::next_runs::next_runs;
 use super::regime::{Regime, passages, section_of_pass};
 use super::structure::{Structure, Variant};
 
@@ -163,6 +166,10 @@ pub struct PreparedDeflection {
     runs: Vec<PreparedRun>,
     rows: usize,
     measure: Measure,
+    job: Job,
+    conditions_of_runs: Vec<DeflectionRun>,
+    /// Run and station of every row.
+    places: Vec<(usize, f64)>,
 }
 
 struct PreparedRun {
@@ -208,24 +215,20 @@ impl ForwardModel for DeflectionCompensation {
         if !faults.is_empty() {
             return Err(PrepareError::Invalid(faults));
         }
-        let mut runs = Vec::with_capacity(rows.runs.len());
-        for (k, run) in rows.runs.iter().enumerate() {
-            checkpoint(monitor).map_err(PrepareError::Failed)?;
-            let places: Vec<(usize, f64)> =
-                rows.points.iter().enumerate().filter(|(_, p)| p.0 == k).map(|(row, p)| (row, p.1.z_mm)).collect();
-            if !places.is_empty() {
-                runs.push(PreparedRun::of(job, run, places).map_err(PrepareError::Failed)?);
-            }
-        }
-        Ok(PreparedDeflection { runs, rows: rows.points.len(), measure })
+        checkpoint(monitor).map_err(PrepareError::Failed)?;
+        let places: Vec<(usize, f64)> = rows.points.iter().map(|(run, point)| (*run, point.z_mm)).collect();
+        Ok(PreparedDeflection {
+            runs: prepared_runs(job, &rows.runs, &places).map_err(PrepareError::Failed)?,
+            rows: rows.points.len(),
+            measure,
+            job: job.clone(),
+            conditions_of_runs: rows.runs.clone(),
+            places,
+        })
     }
 
     fn predict(prepared: &PreparedDeflection, effects: &[DeflectionEffect]) -> Result<Vec<Prediction>, Failure> {
-        let mut out = vec![Err(Missing::NoSolution); prepared.rows];
-        for run in &prepared.runs {
-            run.predict(effects, prepared.measure, &mut out)?;
-        }
-        Ok(out)
+        predict(&prepared.runs, prepared.rows, prepared.measure, effects)
     }
 
     fn effect(cause: &Cause, values: &[f64]) -> Option<DeflectionEffect> {
@@ -256,6 +259,7 @@ impl ForwardModel for DeflectionCompensation {
         }
         columns.push(scaled(&by_force, allowances.force_level_rel));
         columns.push(scaled(&by_bending, allowances.bending_rel));
+        columns.extend(prepared.neglected_shear()?);
         Ok(columns)
     }
 
@@ -263,6 +267,46 @@ impl ForwardModel for DeflectionCompensation {
         // About 0.5 us per row, and 5 us per run for a structure that an effect changes.
         let us = 0.5 * prepared.rows as f64 + 5.0 * prepared.runs.len() as f64;
         Cost { ms: us / 1000.0, bytes: 400 * prepared.rows as u64, driver: "/measurements" }
+    }
+}
+
+impl Diagnosable for DeflectionCompensation {
+    type Row = DeflectionMeasurement;
+
+    const DIAGNOSES: &'static [Example] = &[Example {
+        id: "headstock",
+        title: "Five runs of a slender shaft: the headstock is softer than assumed",
+        job: include_str!("examples/diagnosis_headstock.json"),
+    }];
+
+    fn hypotheses(prepared: &PreparedDeflection) -> Hypotheses {
+        Experiment { job: &prepared.job, runs: &prepared.conditions_of_runs }.hypotheses()
+    }
+
+    fn effects(
+        prepared: &PreparedDeflection,
+        hypothesis: &Hypothesis,
+        values: &[f64],
+    ) -> Option<Vec<DeflectionEffect>> {
+        let effect = match (hypothesis.cause.kind, values) {
+            ("chuck_rotational_stiffness", &[kappa]) => {
+                let ktheta = kappa / (1.0 - kappa) * chuck_scale_n_mm_per_rad(&prepared.job);
+                DeflectionEffect::ChuckRotationalStiffness { ktheta_n_mm_per_rad: ktheta.max(1.0) }
+            }
+            _ => DeflectionEffect::from_parameters(hypothesis.cause, values)?,
+        };
+        Some(vec![effect])
+    }
+
+    fn design(prepared: &PreparedDeflection) -> Design {
+        design(&prepared.job, &prepared.places)
+    }
+
+    fn next_runs(
+        job: &Job,
+        rows: &Rows<DeflectionRun, DeflectionPoint>,
+    ) -> Vec<NextRun<DeflectionRun, DeflectionPoint>> {
+        next_runs(job, rows)
     }
 }
 
@@ -418,7 +462,46 @@ fn structure(job: &Job, change: &StructureChange, regime: &Regime) -> Result<Str
     Structure::of(job, &variant)
 }
 
+fn predict(
+    runs: &[PreparedRun],
+    rows: usize,
+    measure: Measure,
+    effects: &[DeflectionEffect],
+) -> Result<Vec<Prediction>, Failure> {
+    let mut out = vec![Err(Missing::NoSolution); rows];
+    for run in runs {
+        run.predict(effects, measure, &mut out)?;
+    }
+    Ok(out)
+}
+
+/// The runs that have rows, each with its own.
+fn prepared_runs(job: &Job, runs: &[DeflectionRun], places: &[(usize, f64)]) -> Result<Vec<PreparedRun>, Failure> {
+    let mut prepared = Vec::with_capacity(runs.len());
+    for (k, run) in runs.iter().enumerate() {
+        let own: Vec<(usize, f64)> =
+            places.iter().enumerate().filter(|(_, place)| place.0 == k).map(|(row, place)| (row, place.1)).collect();
+        if !own.is_empty() {
+            prepared.push(PreparedRun::of(job, run, own)?);
+        }
+    }
+    Ok(prepared)
+}
+
 impl PreparedDeflection {
+    /// What a base that bends without shear leaves out: known, so it is allowed for rather than found.
+    /// `None` where the base has it.
+    fn neglected_shear(&self) -> Result<Option<JacobianColumn>, Failure> {
+        if self.job.shaft.theory == Theory::Timoshenko {
+            return Ok(None);
+        }
+        let mut with_shear = self.job.clone();
+        with_shear.shaft.theory = Theory::Timoshenko;
+        let runs = prepared_runs(&with_shear, &self.conditions_of_runs, &self.places)?;
+        let without = DeflectionCompensation::predict(self, &[])?;
+        Ok(Some(difference(&without, &predict(&runs, self.rows, self.measure, &[])?, 1.0)))
+    }
+
     /// Central difference of the prediction by a relative effect about 0, one entry per row.
     fn slope(&self, effect: impl Fn(f64) -> DeflectionEffect) -> Result<Vec<f64>, Failure> {
         let at = |delta: f64| DeflectionCompensation::predict(self, &[effect(delta)]);
@@ -429,8 +512,7 @@ impl PreparedDeflection {
     fn slope_along(&self) -> Result<Vec<f64>, Failure> {
         let at = |dz_mm: f64| -> Result<Vec<Prediction>, Failure> {
             let runs = self.runs.iter().map(|run| run.shifted(dz_mm)).collect::<Result<Vec<_>, _>>()?;
-            let shifted = Self { runs, rows: self.rows, measure: self.measure };
-            DeflectionCompensation::predict(&shifted, &[])
+            predict(&runs, self.rows, self.measure, &[])
         };
         Ok(difference(&at(-GAUGE_STEP_MM)?, &at(GAUGE_STEP_MM)?, 2.0 * GAUGE_STEP_MM))
     }

@@ -22,9 +22,12 @@ mod extremes;
 mod form;
 mod forward;
 mod grid;
+mod hypotheses;
 mod input;
 mod laws;
+mod measurement;
 mod model;
+mod next_runs;
 mod output;
 mod picture;
 mod power_cut;
@@ -41,6 +44,7 @@ pub use input::{
     ProgramSettings, ProgramZero, Section, Segment, Shaft, SpeedDiameter, Stations, StockRow, Support, Theory,
     Tolerance, Uncertainty,
 };
+pub use measurement::DeflectionMeasurement;
 pub use output::{
     OneMoreRest, OneStep, Outcome, PassOutcome, Path, PathZone, SecondOrder, Shares, StationColumns, StatusCompensated,
     StatusUncompensated,
@@ -50,7 +54,7 @@ use crate::calculator::{
     Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Finding, Message, Meta, Monitor,
     Program, Table,
 };
-use crate::{force, material};
+use crate::force;
 
 use acting::Acting;
 use columns::{Errors, columns};
@@ -113,20 +117,7 @@ impl Calculator for DeflectionCompensation {
     };
 
     fn fill(job: &mut Job) {
-        if let Some(found) = job.shaft.material.take().as_deref().and_then(material::find) {
-            let shaft = &mut job.shaft;
-            shaft.youngs_modulus_n_per_mm2.get_or_insert(found.youngs_modulus_n_per_mm2.value);
-            shaft.poisson_ratio.get_or_insert(found.poisson_ratio.value);
-            shaft.density_kg_per_m3.get_or_insert(found.density_kg_per_m3.value);
-            if let (None, Some(strength)) = (shaft.yield_strength_n_per_mm2, found.yield_strength_n_per_mm2) {
-                shaft.yield_strength_n_per_mm2 = Some(strength.value);
-            }
-        }
-        job.shaft.poisson_ratio.get_or_insert(DEFAULT_POISSON_RATIO);
-        job.shaft.density_kg_per_m3.get_or_insert(DEFAULT_DENSITY_KG_PER_M3);
-        for segment in &mut job.shaft.segments {
-            segment.stock_diameter_mm.get_or_insert(segment.diameter_mm);
-        }
+        job.shaft.fill();
         for support in &mut job.supports {
             support.fill();
         }
@@ -165,10 +156,6 @@ impl Calculator for DeflectionCompensation {
     }
 }
 
-/// Poisson's ratio where neither job nor material states one (steel).
-const DEFAULT_POISSON_RATIO: f64 = 0.3;
-/// Density where neither job nor material states one (steel), kg/m³.
-const DEFAULT_DENSITY_KG_PER_M3: f64 = 7850.0;
 /// Bound of the relative round-off of the compliance (`deflection/3.3`).
 const COMPLIANCE_ACCURACY: f64 = 1e-9;
 
@@ -289,7 +276,7 @@ fn basis(job: &Job) -> Vec<Basis> {
 
 /// Everything that this calculator may utter, from where it is said.
 const CODES: Codes = Codes {
-    faults: &[check::CODES, force::FAULT_CODES],
+    faults: &[check::CODES, crate::shaft::check::CODES, force::FAULT_CODES],
     failures: &[&["path_incomplete", "path_not_computed", "pass_without_command", "numbers_out_of_reach"]],
     warnings: &[advice::WARNING_CODES, second_order::WARNING_CODES, force::WARNING_CODES],
     explanations: &[advice::EXPLANATION_CODES],

@@ -4,7 +4,7 @@ use crate::calculator::{Axis, Column, Figure, Frame, Glyph, Item, Message, Panel
 
 use super::input::{Job, Support};
 use super::output::{OneStep, Outcome, PathZone, StationColumns};
-use super::structure::ends;
+use crate::shaft::elastic::ends;
 
 const Z: Axis = Axis::linear("station", "mm");
 

@@ -5,7 +5,8 @@ use std::f64::consts::PI;
 use super::acting::Passage;
 use super::grid::Grid;
 use super::input::{Cut, FeedDirection, Job, Pass, Section, SpeedDiameter};
-use super::structure::{ends, pass_diameter_mm};
+use super::structure::pass_diameter_mm;
+use crate::shaft::elastic::ends;
 
 /// Feed, speed and direction of one cut.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -5,8 +5,14 @@
 //! worded outside, under `cause.{kind}`.
 
 mod deflection;
+mod fixture;
+mod machinability;
+mod ring;
 
 pub use deflection::{CAUSES as DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect};
+pub use fixture::{CAUSES as FIXTURE_CAUSES, FixtureConditions, FixtureEffect};
+pub use machinability::{CAUSES as MACHINABILITY_CAUSES, FactorLevel, MachinabilityConditions, MachinabilityEffect};
+pub use ring::{CAUSES as RING_CAUSES, RingConditions, RingEffect};
 
 /// An entry of the catalogue.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,6 +53,8 @@ pub struct Parameter {
 pub enum Fit {
     /// Linear size of the effect, 0 = absent.
     Amplitude,
+    /// Multiplies what the job states, 1 = absent; the prior is on its logarithm.
+    Factor,
     /// Its form; tried on a grid first.
     Shape {
         /// Values of the grid.

@@ -9,6 +9,7 @@ mod constant;
 pub mod handbook;
 mod kienzle;
 mod law;
+mod monomial;
 mod power;
 mod rules;
 mod schema;
@@ -19,8 +20,11 @@ pub use constant::Constant;
 pub use handbook::{Handbook, WorkMaterial};
 pub use kienzle::Kienzle;
 pub use law::{Component, DepthLaw};
+pub use monomial::Monomial;
 pub use power::{CoefficientOrigin, MeasuredRange, PowerLaw, PowerTerm};
 pub use table::{ForceRow, ForceTable};
+
+pub(crate) use schema::choice;
 
 use crate::calculator::{Basis, Finding, Violations};
 use serde::{Deserialize, Serialize};

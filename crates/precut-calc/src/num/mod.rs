@@ -1,3 +1,11 @@
 //! Numerics with no machining words in them.
 
 pub mod beam;
+pub mod dde;
+pub mod dense;
+pub mod gp;
+pub mod hull;
+pub mod lsq;
+pub mod quadrature;
+pub mod roundness;
+pub mod stats;

@@ -1,0 +1,67 @@
+//! What turns a forward model into one that can be diagnosed.
+
+use serde::{Serialize, de::DeserializeOwned};
+use utoipa::ToSchema;
+
+use super::{Calculator, Design, Example, ForwardModel, Hypotheses, Hypothesis, MeasuredRow, Rows};
+
+/// A calculator whose model can be compared with measurements, cause by cause.
+pub trait Diagnosable:
+    Calculator<Input: Clone + PartialEq + std::fmt::Debug>
+    + ForwardModel<
+        Job = <Self as Calculator>::Input,
+        Run: Default + PartialEq + std::fmt::Debug + 'static,
+        Allowances: PartialEq + std::fmt::Debug + 'static,
+        Effect: Serialize + DeserializeOwned + ToSchema + PartialEq + std::fmt::Debug + 'static,
+    >
+{
+    /// A measured row: its place, its run, and the value under the name of its quantity.
+    type Row: MeasuredRow + Measurement<Model = Self> + PartialEq + std::fmt::Debug;
+
+    /// Complete diagnoses that really run.
+    const DIAGNOSES: &'static [Example];
+
+    /// The causes that these rows can speak about, in the coordinates in which they are fitted, with bounds
+    /// and references as the job has them.
+    fn hypotheses(prepared: &Self::Prepared) -> Hypotheses;
+
+    /// The effects that a hypothesis stands for at these values of its variables; `None` outside their ranges.
+    fn effects(prepared: &Self::Prepared, hypothesis: &Hypothesis, values: &[f64]) -> Option<Vec<Self::Effect>>;
+
+    /// How the rows hang together.
+    fn design(prepared: &Self::Prepared) -> Design;
+
+    /// Runs that could be measured next, each with its rows: every condition moved to the ends of its
+    /// range, or started afresh. None where a job has no runs.
+    fn next_runs(job: &Self::Job, rows: &Rows<Self::Run, Self::Point>) -> Vec<NextRun<Self::Run, Self::Point>>;
+}
+
+/// A run that could be measured next.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NextRun<R, P> {
+    /// The condition that it changes: a field of the run.
+    pub changes: &'static str,
+    /// Its conditions.
+    pub run: R,
+    /// Where it would be measured.
+    pub points: Vec<P>,
+}
+
+/// A row of measurements.
+pub trait Measurement {
+    /// Whose rows these are.
+    type Model: ForwardModel;
+
+    /// Number of its run as the row names it; runs are numbered from 1 in the order of the job.
+    fn run(&self) -> u32;
+    /// Number of its sweep within the run: rows of one sweep stand in measuring order.
+    fn trace(&self) -> u32;
+    /// Where it was measured.
+    fn point(&self) -> <Self::Model as ForwardModel>::Point;
+    /// The value of a quantity, in the quantity's unit; `None` where this row has none.
+    fn value(&self, quantity: &str) -> Option<f64>;
+    /// Standard uncertainty, in the quantity's unit.
+    fn uncertainty(&self) -> Option<f64>;
+    /// Whether the user set it aside.
+    fn excluded(&self) -> bool;
+}

@@ -1,0 +1,113 @@
+//! Causes as they stand for a job and its measured rows: what a diagnosis fits.
+
+use crate::effects::Cause;
+
+/// The catalogue, sorted by whether these rows can speak about a cause at all.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Hypotheses {
+    /// Those that can be fitted.
+    pub applicable: Vec<Hypothesis>,
+    /// Those that cannot, and why.
+    pub inapplicable: Vec<Inapplicable>,
+}
+
+/// A cause that these rows cannot speak about.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Inapplicable {
+    /// Its entry in the catalogue.
+    pub cause: &'static Cause,
+    /// Why.
+    pub reason: Inapplicability,
+}
+
+/// Why rows cannot speak about a cause.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Inapplicability {
+    /// This field of the runs' conditions is not given everywhere.
+    ConditionAbsent(&'static str),
+    /// This condition is the same in all runs.
+    ConditionConstant(&'static str),
+    /// The job has nothing that it could act on (no steady rest, no tailstock).
+    NothingToActOn,
+    /// The job holds it already.
+    InJob,
+    /// The user asked for other causes.
+    NotAskedFor,
+    /// It scatters, but moves no mean: it is part of the noise.
+    ScatterOnly,
+}
+
+/// A cause as it stands for a base model and its rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Hypothesis {
+    /// Its entry in the catalogue.
+    pub cause: &'static Cause,
+    /// Which of several effects of one kind: a batch, a harmonic's order; empty where there is one.
+    pub label: String,
+    /// What is fitted or stated, in the order of the cause's parameters.
+    pub variables: Vec<Variable>,
+    /// Prior weight relative to the other causes.
+    pub prior_weight: f64,
+}
+
+impl Hypothesis {
+    /// Whether it has a size of its own, rather than being there or not.
+    pub fn has_amplitude(&self) -> bool {
+        self.variables.iter().any(|v| matches!(v.treatment, Treatment::Amplitude { .. }))
+    }
+}
+
+/// A parameter in the coordinate in which it is fitted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Variable {
+    /// Name with its unit.
+    pub name: &'static str,
+    /// Unit as in the contract.
+    pub unit: &'static str,
+    /// How it is treated.
+    pub treatment: Treatment,
+    /// Where it may lie.
+    pub range: Range,
+}
+
+/// Bounds of a variable.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Range {
+    /// Least value.
+    pub lower: f64,
+    /// Largest value.
+    pub upper: f64,
+}
+
+/// How a variable is treated.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Treatment {
+    /// Size of the effect, absent at 0; Gaussian prior about 0, cut at a bound that is 0.
+    Amplitude {
+        /// Standard deviation of the prior, in the unit of the variable.
+        prior_sd: f64,
+    },
+    /// Form of the effect: tried on a grid, then fitted where a prior is given.
+    Shape {
+        /// Values tried, of equal weight.
+        grid: Vec<f64>,
+        /// Prior of the fit.
+        prior: Option<Shape>,
+    },
+    /// Stated, not fitted.
+    Stated {
+        /// Its value.
+        value: f64,
+    },
+}
+
+/// Gaussian prior of a shape.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shape {
+    /// Mean, of the logarithm where it is logarithmic.
+    pub mean: f64,
+    /// Standard deviation, of the logarithm where it is logarithmic.
+    pub sd: f64,
+    /// Whether the prior is on the logarithm.
+    pub logarithmic: bool,
+}

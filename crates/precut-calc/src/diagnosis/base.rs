@@ -1,0 +1,120 @@
+//! A calculator's own forward model as the subject of a diagnosis.
+
+use rayon::prelude::*;
+
+use super::subject::{Setting, Subject};
+use crate::calculator::{
+    Diagnosable, Failure, Hypotheses, Hypothesis, Inapplicability, Inapplicable, JacobianColumn, Missing, Prediction,
+    Treatment, Variable,
+};
+
+/// Step of a divided difference, prior standard deviations (of a shape without a prior: of its value).
+///
+/// Central: the truncation is of order (1e-3)^2 of the curvature over one prior standard deviation, the
+/// round-off about 1e-13 of the value divided by 1e-3.
+const STEP: f64 = 1e-3;
+
+/// A forward model with its rows and allowances.
+pub struct Bound<M: Diagnosable> {
+    prepared: M::Prepared,
+    allowances: M::Allowances,
+    hypotheses: Hypotheses,
+    logarithmic: bool,
+}
+
+impl<M: Diagnosable> Bound<M> {
+    /// `quantity` decides whether residuals are taken of the value or of its logarithm.
+    /// `asked_for` leaves out all other kinds of causes.
+    pub fn new(prepared: M::Prepared, allowances: M::Allowances, quantity: &str, asked_for: Option<&[String]>) -> Self {
+        let logarithmic = M::QUANTITIES.iter().any(|known| known.name == quantity && known.logarithmic);
+        let mut hypotheses = M::hypotheses(&prepared);
+        if let Some(asked_for) = asked_for {
+            let (kept, left): (Vec<Hypothesis>, Vec<Hypothesis>) =
+                hypotheses.applicable.into_iter().partition(|h| asked_for.iter().any(|kind| kind == h.cause.kind));
+            hypotheses.applicable = kept;
+            let reason = Inapplicability::NotAskedFor;
+            hypotheses.inapplicable.extend(left.into_iter().map(|h| Inapplicable { cause: h.cause, reason }));
+        }
+        Self { prepared, allowances, hypotheses, logarithmic }
+    }
+
+    /// The forward model's own view of the rows.
+    pub fn prepared(&self) -> &M::Prepared {
+        &self.prepared
+    }
+
+    /// What these rows can and cannot speak about.
+    pub fn catalogue(&self) -> &Hypotheses {
+        &self.hypotheses
+    }
+
+    /// The effects that settings stand for.
+    pub(super) fn effects_of(&self, settings: &[Setting]) -> Result<Vec<M::Effect>, Failure> {
+        let mut effects = Vec::with_capacity(settings.len());
+        for setting in settings {
+            let hypothesis = &self.hypotheses.applicable[setting.hypothesis];
+            effects.extend(M::effects(&self.prepared, hypothesis, &setting.values).ok_or_else(|| {
+                Failure::Internal(format!("{} takes no {:?}", hypothesis.cause.kind, setting.values))
+            })?);
+        }
+        Ok(effects)
+    }
+
+    fn slope(&self, settings: &[Setting], (member, variable): (usize, usize)) -> Result<JacobianColumn, Failure> {
+        let declared: &Variable = &self.hypotheses.applicable[settings[member].hypothesis].variables[variable];
+        let centre = settings[member].values[variable];
+        let step = STEP * width(declared, centre);
+        let low = (centre - step).max(declared.range.lower);
+        let high = (centre + step).min(declared.range.upper);
+        let at = |value: f64| {
+            let mut moved = settings.to_vec();
+            moved[member].values[variable] = value;
+            self.predict(&moved)
+        };
+        let (below, above) = (at(low)?, at(high)?);
+        Ok(below
+            .iter()
+            .zip(&above)
+            .map(|pair| match pair {
+                (Ok(below), Ok(above)) => (above - below) / (high - low),
+                _ => 0.0,
+            })
+            .collect())
+    }
+}
+
+/// The scale on which a variable matters.
+fn width(variable: &Variable, value: f64) -> f64 {
+    match &variable.treatment {
+        Treatment::Amplitude { prior_sd } => *prior_sd,
+        Treatment::Shape { prior: Some(prior), .. } if !prior.logarithmic => prior.sd,
+        Treatment::Shape { .. } | Treatment::Stated { .. } => value.abs().max(f64::MIN_POSITIVE.sqrt()),
+    }
+}
+
+impl<M: Diagnosable> Subject for Bound<M>
+where
+    M::Allowances: Sync,
+{
+    fn hypotheses(&self) -> &[Hypothesis] {
+        &self.hypotheses.applicable
+    }
+
+    fn predict(&self, settings: &[Setting]) -> Result<Vec<Prediction>, Failure> {
+        let mut predicted = M::predict(&self.prepared, &self.effects_of(settings)?)?;
+        if self.logarithmic {
+            for value in &mut predicted {
+                *value = value.and_then(|v| if v > 0.0 { Ok(v.ln()) } else { Err(Missing::NoSolution) });
+            }
+        }
+        Ok(predicted)
+    }
+
+    fn jacobian(&self, settings: &[Setting], of: &[(usize, usize)]) -> Result<Vec<JacobianColumn>, Failure> {
+        of.par_iter().map(|&place| self.slope(settings, place)).collect()
+    }
+
+    fn nuisances(&self) -> Result<Vec<JacobianColumn>, Failure> {
+        M::nuisances(&self.prepared, &self.allowances)
+    }
+}

@@ -1,0 +1,206 @@
+//! The diagnosis as a calculator over any base that can be diagnosed.
+
+use std::marker::PhantomData;
+
+use super::base::Bound;
+use super::data::{Data, Layout};
+use super::input::{DiagnosisJob, MAX_RUNS};
+use super::output::DiagnosisResult;
+use super::{picture, report};
+use crate::calculator::{
+    Answer, Calculator, CalculatorKind, Check, Codes, Cost, Diagnosable, Failure, Figure, Finding, ForwardModel,
+    MeasuredRow, Measurement, Message, Meta, Monitor, PrepareError, Rows, Table, Violations,
+};
+
+/// Rows from which on at least adequacy can be judged.
+pub(super) const LEAST_ROWS: usize = 8;
+
+/// The diagnosis of one base.
+#[derive(Debug, Clone, Copy)]
+pub struct Diagnosis<M>(PhantomData<M>);
+
+/// The answer of a diagnosis of `M`.
+pub type ResultOf<M> = DiagnosisResult<<M as ForwardModel>::Effect, <M as ForwardModel>::Run>;
+
+/// The job of a diagnosis of `M`.
+pub type JobOf<M> = DiagnosisJob<
+    <M as ForwardModel>::Job,
+    <M as ForwardModel>::Run,
+    <M as Diagnosable>::Row,
+    <M as ForwardModel>::Allowances,
+>;
+
+impl<M: Diagnosable> Calculator for Diagnosis<M> {
+    type Input = JobOf<M>;
+    type Output = DiagnosisResult<M::Effect, M::Run>;
+
+    const META: Meta = Meta {
+        id: "diagnosis",
+        kind: CalculatorKind::Calculator,
+        version: 1,
+        title: "Diagnosis",
+        question: "What does the simulation get wrong, why, and what is gained by mending it?",
+        summary: "Measurements of what was really cut against a calculator's job: whether anything is wrong beyond \
+                  scatter and allowances, which named causes explain it and how surely, what these data cannot tell \
+                  apart, the base model extended by the causes, and what that gains on data held back. It never \
+                  forces a name.",
+        references: &[
+            "Kennedy, O'Hagan, Bayesian calibration of computer models, J. R. Stat. Soc. B 63 (2001) 425-464",
+            "Brun, Reichert, Kuensch, Practical identifiability analysis of large environmental simulation models, Water Resour. Res. 37 (2001) 1015-1030",
+        ],
+        examples: M::DIAGNOSES,
+        study_outputs: &["/none_probability", "/unnamed_probability"],
+        codes: CODES,
+        figures: picture::FIGURE_IDS,
+        tables: picture::TABLE_IDS,
+        has_program: false,
+    };
+
+    fn fill(job: &mut Self::Input) {
+        M::fill(&mut job.job);
+    }
+
+    fn cost(job: &Self::Input) -> Cost {
+        // Measured: about 25 ms for 400 rows and 18 causes without folds; folds repeat it.
+        let rows = job.measurements.rows().len() as f64;
+        let folds = if job.options.held_out { 1.0 + job.runs.len().clamp(1, 30) as f64 } else { 1.0 };
+        let bytes = 1_000_000 + 8 * 400 * job.measurements.rows().len() as u64;
+        Cost { ms: 1.0 + 0.08 * rows * folds, bytes, driver: "/measurements" }
+    }
+
+    fn run(job: &Self::Input, monitor: &dyn Monitor) -> Result<Answer<Self::Output>, Failure> {
+        let rows = job.measurements.rows();
+        let used: Vec<usize> =
+            (0..rows.len()).filter(|&row| !rows[row].excluded() && rows[row].value(&job.quantity).is_some()).collect();
+        let runs = if job.runs.is_empty() { vec![M::Run::default()] } else { job.runs.clone() };
+        let places: Rows<M::Run, M::Point> =
+            Rows { points: used.iter().map(|&row| (rows[row].run() as usize - 1, rows[row].point())).collect(), runs };
+        let prepared = M::prepare(&job.job, &places, &job.quantity, monitor).map_err(unprepared)?;
+        let design = M::design(&prepared);
+        let data = data::<M>(job, &used, design);
+        let bound = Bound::<M>::new(prepared, job.allowances.clone(), &job.quantity, job.options.causes.as_deref());
+        report::answer::<M>(job, &places, &used, &bound, &data, monitor)
+    }
+
+    fn figures(job: &Self::Input, output: &Self::Output) -> Vec<Figure> {
+        picture::figures(&job.quantity, output)
+    }
+
+    fn tables(_job: &Self::Input, output: &Self::Output) -> Vec<Table> {
+        picture::tables(output)
+    }
+}
+
+/// Everything that a diagnosis may utter.
+const CODES: Codes = Codes {
+    faults: &[FAULT_CODES],
+    failures: &[FAULT_CODES],
+    warnings: &[report::WARNING_CODES],
+    explanations: &[report::EXPLANATION_CODES],
+    stages: &[report::STAGE_CODES],
+    labels: &[picture::LABEL_CODES],
+};
+
+/// Faults of a diagnosis beside those of the base's own job.
+pub(super) const FAULT_CODES: &[&str] =
+    &["too_few_measurements", "unknown_run", "value_absent", "unknown_quantity", "unknown_cause"];
+
+fn unprepared(error: PrepareError) -> Failure {
+    match error {
+        PrepareError::Failed(failure) => failure,
+        PrepareError::Invalid(findings) => findings
+            .into_iter()
+            .next()
+            .map_or_else(|| Failure::Internal("rows without a reason".to_owned()), Failure::OutOfModel),
+    }
+}
+
+/// Rows that have a value, sweep by sweep.
+fn data<M: Diagnosable>(job: &JobOf<M>, used: &[usize], design: crate::calculator::Design) -> Data {
+    let rows = job.measurements.rows();
+    let logarithmic = M::QUANTITIES.iter().any(|known| known.name == job.quantity && known.logarithmic);
+    let raw: Vec<f64> = used.iter().map(|&row| rows[row].value(&job.quantity).unwrap_or(0.0)).collect();
+    let stated: Option<Vec<f64>> = used.iter().map(|&row| rows[row].uncertainty()).collect();
+    let uncertainty = stated.filter(|_| !used.is_empty()).map(|stated| {
+        let relative = |(u, value): (f64, &f64)| if logarithmic { u / value.abs() } else { u };
+        stated.into_iter().zip(&raw).map(relative).collect()
+    });
+    let mut sweeps: Vec<((u32, u32), Vec<usize>)> = Vec::new();
+    for (index, &row) in used.iter().enumerate() {
+        let id = (rows[row].run(), rows[row].trace());
+        match sweeps.iter_mut().find(|(of, _)| *of == id) {
+            Some((_, members)) => members.push(index),
+            None => sweeps.push((id, vec![index])),
+        }
+    }
+    // By number, so that the order of the sweeps among the rows changes nothing.
+    sweeps.sort_by_key(|(id, _)| *id);
+    let layout = Layout {
+        run_of_trace: sweeps.iter().map(|((run, _), _)| *run as usize - 1).collect(),
+        traces: sweeps.into_iter().map(|(_, members)| members).collect(),
+        design,
+    };
+    let value = raw.into_iter().map(|y| if logarithmic { y.max(f64::MIN_POSITIVE).ln() } else { y }).collect();
+    Data { value, uncertainty, layout }
+}
+
+impl<J, R, W, A> Check for DiagnosisJob<J, R, W, A>
+where
+    J: Check + utoipa::ToSchema,
+    R: utoipa::ToSchema,
+    W: MeasuredRow + Measurement,
+    A: utoipa::ToSchema,
+{
+    fn check(&self, violations: &mut Violations) {
+        let mut of_base = Violations::default();
+        self.job.check(&mut of_base);
+        for mut finding in of_base.into_vec() {
+            finding.pointer = format!("/job{}", finding.pointer);
+            violations.add(finding);
+        }
+        check_rows(self, violations);
+    }
+}
+
+/// Rules between the fields of a diagnosis that hold for every base.
+fn check_rows<J, R, W, A>(job: &DiagnosisJob<J, R, W, A>, violations: &mut Violations)
+where
+    J: utoipa::ToSchema,
+    R: utoipa::ToSchema,
+    W: MeasuredRow + Measurement,
+    A: utoipa::ToSchema,
+{
+    let (quantities, causes) = (W::Model::QUANTITIES, W::Model::CAUSES);
+    let known: Vec<&'static str> = quantities.iter().map(|quantity| quantity.name).collect();
+    violations.require(known.contains(&job.quantity.as_str()), || {
+        Finding::new("unknown_quantity", "/quantity")
+            .with("quantity", job.quantity.clone())
+            .with("known", known.clone())
+    });
+    let rows = job.measurements.rows();
+    let runs = job.runs.len().max(1);
+    for (index, row) in rows.iter().enumerate() {
+        violations.require((1..=runs.min(MAX_RUNS)).contains(&(row.run() as usize)), || {
+            Finding::new("unknown_run", format!("/measurements/{index}/run"))
+                .measured(f64::from(row.run()), runs as f64, "1")
+                .with("runs", runs)
+        });
+    }
+    let used = rows.iter().filter(|row| !row.excluded() && row.value(&job.quantity).is_some()).count();
+    violations.require(used >= LEAST_ROWS, || {
+        Finding::new("too_few_measurements", "/measurements").measured(used as f64, LEAST_ROWS as f64, "1")
+    });
+    for (index, kind) in job.options.causes.iter().flatten().enumerate() {
+        violations.require(causes.iter().any(|cause| cause.kind == kind), || {
+            let known: Vec<&'static str> = causes.iter().map(|cause| cause.kind).collect();
+            Finding::new("unknown_cause", format!("/options/causes/{index}"))
+                .with("kind", kind.clone())
+                .with("known", known)
+        });
+    }
+}
+
+/// What a diagnosis is doing.
+pub(super) fn stage(monitor: &dyn Monitor, fraction: f64, code: &'static str) {
+    monitor.progress(fraction, Message::new(code));
+}

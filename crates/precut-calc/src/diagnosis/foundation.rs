@@ -1,0 +1,47 @@
+//! What every step and every fold of a diagnosis stands on: base prediction, residuals, signatures.
+
+use super::data::Data;
+use super::outlier::{Outliers, outliers};
+use super::search::Signatures;
+use super::subject::Subject;
+use crate::calculator::{Failure, Monitor};
+
+/// A subject with its rows, and all that does not depend on which rows are kept.
+pub struct Foundation<'a> {
+    /// The base model.
+    pub subject: &'a dyn Subject,
+    /// The rows.
+    pub data: &'a Data,
+    /// Prediction of the base, 0 where it has none.
+    pub base: Vec<f64>,
+    /// Whether the base predicts a row.
+    pub predicted: Vec<bool>,
+    /// Measured minus base, 0 where the base predicts nothing.
+    pub residual: Vec<f64>,
+    pub(super) signatures: Signatures,
+    pub(super) nuisances: Vec<Vec<f64>>,
+}
+
+impl<'a> Foundation<'a> {
+    /// Runs the base and one divided difference for every size of every hypothesis.
+    pub fn of(subject: &'a dyn Subject, data: &'a Data, monitor: &dyn Monitor) -> Result<Self, Failure> {
+        let base = subject.predict(&[])?;
+        let predicted: Vec<bool> = base.iter().map(Result::is_ok).collect();
+        let base: Vec<f64> = base.into_iter().map(|f| f.unwrap_or(0.0)).collect();
+        let signatures = Signatures::of(subject, &base, monitor)?;
+        let nuisances = subject.nuisances()?;
+        let rows = data.value.iter().zip(&base).zip(&predicted);
+        let residual = rows.map(|((y, f), ok)| if *ok { y - f } else { 0.0 }).collect();
+        Ok(Self { subject, data, base, predicted, residual, signatures, nuisances })
+    }
+
+    /// Rows that stand alone.
+    pub fn outliers(&self) -> Outliers {
+        outliers(self.data, &self.residual)
+    }
+
+    /// Rows that the base predicts and that are not set aside.
+    pub fn keep(&self, outliers: &Outliers) -> Vec<bool> {
+        outliers.keep(self.residual.len()).iter().zip(&self.predicted).map(|(a, b)| *a && *b).collect()
+    }
+}

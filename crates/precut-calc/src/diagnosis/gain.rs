@@ -1,0 +1,170 @@
+//! What the extended model gains on rows that were held back (`diagnosis/3.8`).
+
+use rand::RngExt;
+use rand::SeedableRng;
+use rand_pcg::Pcg64;
+
+use super::foundation::Foundation;
+use super::weigh::{Effort, SetWeight, Verdict, Weighing};
+use crate::calculator::{Failure, Monitor, checkpoint};
+
+/// Resamples of folds.
+const RESAMPLES: usize = 2000;
+/// Leading sets over which a prediction is averaged where none holds enough.
+const AVERAGED: usize = 6;
+/// Posterior from which on one set predicts alone.
+const ALONE: f64 = 0.8;
+/// The base is at the ceiling within this share: then there is nothing to explain.
+const AT_CEILING: f64 = 0.05;
+
+/// Errors on held-back rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gain {
+    /// Root mean square error of the base.
+    pub rmse_base: f64,
+    /// Of the extended model.
+    pub rmse_extended: f64,
+    /// 1 - extended/base.
+    pub gain: f64,
+    /// 95 % interval of the gain, over resampled folds.
+    pub interval: (f64, f64),
+    /// Root mean square error that scatter and allowances leave to any model.
+    pub ceiling: f64,
+    /// Share of what could be explained that was; `None` where the base is at the ceiling already.
+    pub explained_share: Option<f64>,
+    /// Folds that were held back.
+    pub folds: usize,
+    /// Errors by row, of the base and of the extended model; 0 where no fold held the row.
+    pub errors: Vec<(f64, f64)>,
+}
+
+/// Held-back error with causes chosen anew in every fold (`nested`), or with those of the whole data.
+///
+/// Sets are judged and fitted without the fold; its own set-up, force level and gauge position are not
+/// known to the prediction.
+pub fn gain(
+    foundation: &Foundation<'_>,
+    whole: &Weighing<'_>,
+    effort: Effort,
+    nested: bool,
+    seed: u64,
+    monitor: &dyn Monitor,
+) -> Result<Option<Gain>, Failure> {
+    let fold = &foundation.data.layout.design.fold;
+    let folds = fold.iter().copied().max().map_or(0, |most| most + 1);
+    let held: Vec<usize> =
+        (0..folds).filter(|f| fold.iter().zip(&whole.keep).any(|(of, keep)| of == f && *keep)).collect();
+    if held.len() < 2 {
+        return Ok(None);
+    }
+    let mut errors = vec![(0.0, 0.0); fold.len()];
+    for &f in &held {
+        checkpoint(monitor)?;
+        let keep: Vec<bool> = whole.keep.iter().zip(fold).map(|(keep, of)| *keep && *of != f).collect();
+        let predicted = if matches!(whole.verdict, Verdict::Adequate) && !nested {
+            foundation.base.clone()
+        } else {
+            let without = Weighing::of(foundation, keep, effort, monitor)?;
+            prediction(foundation, &without, (!nested).then_some(whole))?
+        };
+        for row in 0..fold.len() {
+            if fold[row] == f && whole.keep[row] {
+                let y = foundation.data.value[row];
+                errors[row] = (y - foundation.base[row], y - predicted[row]);
+            }
+        }
+    }
+    Ok(Some(summary(errors, whole, &held, seed)))
+}
+
+/// Prediction of the sets that lead without the fold: the base where nothing is wrong, the leader where it
+/// holds enough, else the mean over the leading sets.
+fn prediction(
+    foundation: &Foundation<'_>,
+    without: &Weighing<'_>,
+    chosen: Option<&Weighing<'_>>,
+) -> Result<Vec<f64>, Failure> {
+    let leading: Vec<&SetWeight> = match chosen.map(|whole| &whole.verdict) {
+        Some(Verdict::Named(members) | Verdict::Unknown(members)) => {
+            without.sets.iter().filter(|set| set.remainder.is_none() && set.members == *members).collect()
+        }
+        Some(_) => without.named_sets().take(AVERAGED).collect(),
+        None if matches!(without.verdict, Verdict::Adequate) => Vec::new(),
+        None => {
+            let mut named = without.named_sets();
+            let leader = named.next();
+            if leader.is_some_and(|set| set.posterior >= ALONE) {
+                leader.into_iter().collect()
+            } else {
+                leader.into_iter().chain(named).take(AVERAGED).collect()
+            }
+        }
+    };
+    let total: f64 = leading.iter().map(|set| set.posterior).sum();
+    if leading.is_empty() || total <= 0.0 {
+        return Ok(foundation.base.clone());
+    }
+    let mut mean = vec![0.0; foundation.base.len()];
+    for set in leading {
+        let with = foundation.subject.predict(&set.settings)?;
+        let share = set.posterior / total;
+        for (row, value) in with.iter().enumerate() {
+            mean[row] += share * value.unwrap_or(foundation.base[row]);
+        }
+    }
+    Ok(mean)
+}
+
+fn summary(errors: Vec<(f64, f64)>, whole: &Weighing<'_>, held: &[usize], seed: u64) -> Gain {
+    let fold = &whole.foundation.data.layout.design.fold;
+    let kept = |row: usize| whole.keep[row];
+    // Sums of squares and counts by fold: a resample draws folds.
+    let sums: Vec<(f64, f64, f64)> = held
+        .iter()
+        .map(|f| {
+            let rows = (0..errors.len()).filter(|&row| fold[row] == *f && kept(row));
+            rows.fold((0.0, 0.0, 0.0), |(base, extended, count), row| {
+                let (b, e) = errors[row];
+                (base + b * b, extended + e * e, count + 1.0)
+            })
+        })
+        .collect();
+    let total = |chosen: &mut dyn Iterator<Item = usize>| {
+        chosen
+            .fold((0.0, 0.0, 0.0), |sum: (f64, f64, f64), i| (sum.0 + sums[i].0, sum.1 + sums[i].1, sum.2 + sums[i].2))
+    };
+    let ratio = |(base, extended, _): (f64, f64, f64)| if base > 0.0 { 1.0 - (extended / base).sqrt() } else { 0.0 };
+    let all = total(&mut (0..sums.len()));
+    let mut random = Pcg64::seed_from_u64(seed);
+    let mut gains: Vec<f64> = (0..RESAMPLES)
+        .map(|_| ratio(total(&mut (0..sums.len()).map(|_| random.random_range(0..sums.len())))))
+        .collect();
+    gains.sort_by(f64::total_cmp);
+    let (rmse_base, rmse_extended) = ((all.0 / all.2).sqrt(), (all.1 / all.2).sqrt());
+    let ceiling = ceiling(whole);
+    let explainable = rmse_base * rmse_base - ceiling * ceiling;
+    let explained_share = (rmse_base > (1.0 + AT_CEILING) * ceiling)
+        .then(|| ((rmse_base * rmse_base - rmse_extended * rmse_extended) / explainable).clamp(0.0, 1.0));
+    Gain {
+        rmse_base,
+        rmse_extended,
+        gain: ratio(all),
+        interval: (gains[RESAMPLES / 40], gains[RESAMPLES - 1 - RESAMPLES / 40]),
+        ceiling,
+        explained_share,
+        folds: held.len(),
+        errors,
+    }
+}
+
+/// Root mean square of sqrt(diag C): scatter and allowances.
+fn ceiling(whole: &Weighing<'_>) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for row in (0..whole.keep.len()).filter(|&row| whole.keep[row]) {
+        let sigma = whole.noise.per_row.as_ref().map_or(whole.noise.sigma, |own| own[row]);
+        let allowed: f64 = whole.foundation.nuisances.iter().map(|column| column[row] * column[row]).sum();
+        sum += sigma * sigma + allowed;
+        count += 1.0;
+    }
+    if count > 0.0 { (sum / count).sqrt() } else { 0.0 }
+}

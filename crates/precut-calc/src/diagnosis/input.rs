@@ -1,0 +1,82 @@
+//! The job of a diagnosis: a base model, what was measured, and what may be off without being a finding.
+
+use serde::{Deserialize, Serialize};
+use utoipa::{PartialSchema, ToSchema};
+
+use crate::calculator::{Measured, MeasuredRow};
+
+/// Most runs of one diagnosis.
+pub const MAX_RUNS: usize = 500;
+
+/// Measurements against a calculator's job.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+#[serde(bound(
+    serialize = "J: Serialize, R: Serialize, A: Serialize",
+    deserialize = "J: Deserialize<'de>, R: Deserialize<'de>, A: Deserialize<'de> + Default"
+))]
+pub struct DiagnosisJob<J: ToSchema, R: ToSchema, W: MeasuredRow, A: ToSchema> {
+    /// Whose job this is.
+    #[schema(example = "deflection-compensation")]
+    pub calculator: String,
+    /// The base model: a complete job of that calculator. The diagnosis adds to the effects that it holds.
+    pub job: J,
+    /// Conditions of the runs that were measured; what a run leaves out is as in the job.
+    #[serde(default = "Vec::new", skip_serializing_if = "Vec::is_empty")]
+    #[schema(max_items = 500)]
+    pub runs: Vec<R>,
+    /// Name of the quantity that was measured.
+    #[schema(example = "diameter_deviation_um", max_length = 64)]
+    pub quantity: String,
+    /// The measured rows.
+    #[schema(schema_with = Measured::<W>::schema)]
+    pub measurements: Measured<W>,
+    /// How wrong the base may be without that being a finding.
+    #[serde(default)]
+    pub allowances: A,
+    /// What is looked for, and how far.
+    #[serde(default)]
+    pub options: DiagnosisOptions,
+}
+
+/// What is looked for, and how far.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct DiagnosisOptions {
+    /// Kinds of causes to look for; all of the catalogue where not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(min_items = 1, max_items = 64, example = json!(["headstock_compliance", "tailstock_offset"]))]
+    pub causes: Option<Vec<String>>,
+    /// Most causes at the same time.
+    #[schema(minimum = 1, maximum = 3, default = 3, example = 3, extensions(("x-unit" = json!("1"))))]
+    pub most_causes: u8,
+    /// Significance level of the tests.
+    #[schema(minimum = 1e-6, maximum = 0.2, default = 0.01, example = 0.01, extensions(("x-unit" = json!("1"))))]
+    pub level: f64,
+    /// Whether single rows that stand alone are left out.
+    #[schema(default = true, example = true)]
+    pub leave_outliers_out: bool,
+    /// Whether the gain is measured on data held back, with causes chosen anew in every fold.
+    #[schema(default = true, example = true)]
+    pub held_out: bool,
+    /// Go on although the data look like a wrong unit or sign.
+    #[schema(default = false, example = false)]
+    pub accept_suspected_unit: bool,
+    /// Seed of the resamples behind the interval of the gain.
+    #[schema(minimum = 0, maximum = 4_294_967_295_u32, default = 1, example = 1, extensions(("x-unit" = json!("1"))))]
+    pub seed: u32,
+}
+
+impl Default for DiagnosisOptions {
+    fn default() -> Self {
+        Self {
+            causes: None,
+            most_causes: 3,
+            level: 0.01,
+            leave_outliers_out: true,
+            held_out: true,
+            accept_suspected_unit: false,
+            seed: 1,
+        }
+    }
+}

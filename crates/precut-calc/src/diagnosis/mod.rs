@@ -1,0 +1,52 @@
+//! Diagnosis: what a simulation gets wrong, which named causes explain it, and what these data cannot tell.
+//!
+//! A base model with its catalogue of effects is a [`Subject`]; rows are [`Data`]. The statistics in
+//! between know no machining:
+//!
+//! - `outlier`, `noise`: what the rows say about their own scatter (`diagnosis/3.1`);
+//! - `whiten`: scatter and allowances as one covariance (`diagnosis/3.2`);
+//! - `evidence`, `discrepancy`, `search`, `refine`: how well each set of causes, alone or with an unnamed
+//!   smooth remainder, explains the rows (`diagnosis/3.4`, `diagnosis/3.5`);
+//! - `weigh`: posterior weights and the verdict (`diagnosis/3.5`, `diagnosis/3.7`).
+
+mod adequacy;
+mod base;
+mod basis;
+mod calculator;
+mod data;
+mod discrepancy;
+mod evidence;
+mod foundation;
+mod gain;
+mod identify;
+mod input;
+mod next;
+mod noise;
+mod outlier;
+mod output;
+mod picture;
+mod refine;
+mod remainder;
+mod report;
+mod search;
+mod subject;
+mod suspect;
+mod weigh;
+mod whiten;
+
+pub use adequacy::{Test, TestKind, adequacy};
+pub use base::Bound;
+pub use calculator::{Diagnosis, JobOf, ResultOf};
+pub use data::{Data, Layout};
+pub use foundation::Foundation;
+pub use gain::{Gain, gain};
+pub use identify::{COLLINEAR_ABOVE, CONFOUNDED_BELOW, Separation, Signature, separations, twins};
+pub use input::{DiagnosisJob, DiagnosisOptions, MAX_RUNS};
+pub use next::NextMeasurement;
+pub use noise::{Noise, NoiseSource};
+pub use outlier::Outliers;
+pub use output::*;
+pub use remainder::{RemainderShape, remainder_shape};
+pub use subject::{Setting, Subject};
+pub use suspect::{SuspectedFactor, copied_traces, suspected_factor};
+pub use weigh::{Effort, SetWeight, Verdict, Weighing};

@@ -1,0 +1,147 @@
+//! The next measurement worth making (`diagnosis/3.6`).
+
+use super::base::Bound;
+use super::calculator::JobOf;
+use super::data::{Data, Layout};
+use super::identify::Signature;
+use super::subject::{Setting, Subject};
+use super::weigh::{SetWeight, Verdict, Weighing};
+use super::whiten::Whitener;
+use crate::calculator::{Diagnosable, Failure, Monitor, NextRun, Rows, checkpoint};
+
+/// Odds that settle a question.
+const SETTLING_ODDS: f64 = 20.0;
+
+/// A run worth measuring.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NextMeasurement<R> {
+    /// The condition that it changes.
+    pub changes: &'static str,
+    /// Its conditions.
+    pub run: R,
+    /// Rows that it would bring.
+    pub rows: usize,
+    /// Separation of the leader from its strongest rival with the rows there are, sigmas.
+    pub separation_now: f64,
+    /// The same with this run measured too.
+    pub separation_then: f64,
+    /// Bayes factor to be expected from this run alone.
+    pub bayes_factor: f64,
+    /// Rows of this kind that would bring odds of 20 to 1; `None` where no number would.
+    pub rows_needed: Option<usize>,
+    /// Hypotheses of the leader.
+    pub leader: Vec<usize>,
+    /// Hypotheses of its strongest rival; none for the base.
+    pub rival: Vec<usize>,
+}
+
+/// The run that parts the leader from its strongest rival best; `None` where there is no rival or no run.
+pub(super) fn next_measurement<M: Diagnosable>(
+    job: &JobOf<M>,
+    rows: &Rows<M::Run, M::Point>,
+    weighing: &Weighing<'_>,
+    monitor: &dyn Monitor,
+) -> Result<Option<NextMeasurement<M::Run>>, Failure> {
+    let Some((leader, rival)) = contenders(weighing) else { return Ok(None) };
+    let mut best: Option<NextMeasurement<M::Run>> = None;
+    let now = Signature::of(weighing, &leader.members, &leader.settings)?;
+    let other = match rival {
+        Some(rival) => Signature::of(weighing, &rival.members, &rival.settings)?,
+        None => Signature::nothing(&now),
+    };
+    let separation_now = now.separation(&other);
+    for candidate in M::next_runs(&job.job, rows) {
+        checkpoint(monitor)?;
+        let Some(separation_then) = separation_with::<M>(job, rows, &candidate, weighing, leader, rival)? else {
+            continue;
+        };
+        let gained = separation_then * separation_then - separation_now * separation_now;
+        if best.as_ref().is_none_or(|best| separation_then > best.separation_then) {
+            best = Some(NextMeasurement {
+                changes: candidate.changes,
+                rows: candidate.points.len(),
+                run: candidate.run,
+                separation_now,
+                separation_then,
+                bayes_factor: (0.5 * gained.max(0.0)).min(600.0).exp(),
+                rows_needed: rows_needed(gained, candidate.points.len()),
+                leader: leader.members.clone(),
+                rival: rival.map_or_else(Vec::new, |rival| rival.members.clone()),
+            });
+        }
+    }
+    Ok(best)
+}
+
+/// Rows in proportion to what a whole run gains: odds grow as exp(d^2/2), d^2 with the number of rows.
+fn rows_needed(gained: f64, rows: usize) -> Option<usize> {
+    let wanted = 2.0 * SETTLING_ODDS.ln();
+    // Less than a thousandth of what is needed from a whole run will not be had by more of the same.
+    (gained > 1e-3 * wanted).then(|| {
+        let count = (wanted / gained * rows as f64).ceil();
+        // At most a thousand runs, by the bound above.
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let count = count as usize;
+        count.max(1)
+    })
+}
+
+/// The leading set, and the heaviest set that is no superset of it; the base is a rival while it may be right.
+fn contenders<'a>(weighing: &'a Weighing<'_>) -> Option<(&'a SetWeight, Option<&'a SetWeight>)> {
+    let leader = weighing.named_sets().next()?;
+    if matches!(weighing.verdict, Verdict::Adequate) {
+        return Some((leader, None));
+    }
+    let rival = weighing.named_sets().skip(1).find(|set| !leader.members.iter().all(|h| set.members.contains(h)))?;
+    Some((leader, Some(rival)))
+}
+
+fn separation_with<M: Diagnosable>(
+    job: &JobOf<M>,
+    rows: &Rows<M::Run, M::Point>,
+    candidate: &NextRun<M::Run, M::Point>,
+    weighing: &Weighing<'_>,
+    leader: &SetWeight,
+    rival: Option<&SetWeight>,
+) -> Result<Option<f64>, Failure> {
+    let mut all = rows.clone();
+    let run = all.runs.len();
+    all.runs.push(candidate.run.clone());
+    all.points.extend(candidate.points.iter().map(|point| (run, point.clone())));
+    // A candidate beyond what the model covers is no candidate.
+    let Ok(prepared) = M::prepare(&job.job, &all, &job.quantity, &crate::calculator::Unwatched) else {
+        return Ok(None);
+    };
+    let old = weighing.foundation.data;
+    let first = old.value.len();
+    let layout = Layout {
+        traces: old.layout.traces.iter().cloned().chain([(first..all.points.len()).collect()]).collect(),
+        run_of_trace: old.layout.run_of_trace.iter().copied().chain([run]).collect(),
+        design: M::design(&prepared),
+    };
+    let mut noise = weighing.noise.clone();
+    if let Some(per_row) = &mut noise.per_row {
+        per_row.resize(all.points.len(), noise.sigma);
+    }
+    let data = Data { value: vec![0.0; all.points.len()], uncertainty: None, layout };
+    let bound = Bound::<M>::new(prepared, job.allowances.clone(), &job.quantity, None);
+    let translated = |set: &SetWeight| -> Option<Vec<Setting>> {
+        set.settings
+            .iter()
+            .map(|setting| {
+                let of = &weighing.foundation.subject.hypotheses()[setting.hypothesis];
+                let hypothesis = bound.hypotheses().iter().position(|h| h.cause == of.cause && h.label == of.label)?;
+                Some(Setting { hypothesis, values: setting.values.clone() })
+            })
+            .collect()
+    };
+    let (Some(of_leader), Some(of_rival)) = (translated(leader), rival.map_or(Some(Vec::new()), translated)) else {
+        return Ok(None);
+    };
+    let mut keep = weighing.keep.clone();
+    keep.resize(all.points.len(), true);
+    let whitener = Whitener::new(&data, &noise, &bound.nuisances()?, &keep);
+    let a = Signature::anew(&bound, &whitener, &keep, &of_leader)?;
+    let b = Signature::anew(&bound, &whitener, &keep, &of_rival)?;
+    Ok(Some(a.separation(&b)))
+}

@@ -1,0 +1,201 @@
+//! Scatter of the rows, from what was stated, from repeats, or from the rows themselves (`diagnosis/3.1`).
+
+use super::basis::{dot, orthonormal, smooth_columns};
+use super::data::Data;
+use crate::calculator::Smooth;
+
+/// Correlations from row to row that are tried.
+const CORRELATIONS: [f64; 5] = [0.0, 0.1, 0.2, 0.3, 0.45];
+/// Cosines that are projected out of a trace along a part.
+const COSINES: usize = 8;
+/// Fourier orders that are projected out of a trace round a part.
+const FOURIER_ORDERS: usize = 12;
+/// Pure-error degrees of freedom that suffice on their own.
+const ENOUGH_REPEATS: f64 = 10.0;
+
+/// Scatter of single rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Noise {
+    /// Standard deviation; the pooled one where rows have uncertainties of their own.
+    pub sigma: f64,
+    /// Standard deviation of every row, where stated.
+    pub per_row: Option<Vec<f64>>,
+    /// Correlation from one row of a trace to the next.
+    pub rho: f64,
+    /// Degrees of freedom of `sigma`.
+    pub dof: f64,
+    /// Where it comes from.
+    pub source: NoiseSource,
+}
+
+/// Where the scatter comes from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum NoiseSource {
+    /// Stated with the rows; what the rows themselves say, relative to it.
+    Stated {
+        /// Scatter of the rows in units of what was stated.
+        scatter_factor: f64,
+    },
+    /// From repeats.
+    Repeats,
+    /// From what is left of every trace when smooth columns are taken out.
+    Profile,
+    /// From what a regression without physics leaves.
+    Regression,
+}
+
+/// How many smooth columns a trace of so many rows can lose.
+pub(super) fn smooth_order(smooth: &Smooth, rows: usize) -> usize {
+    match smooth {
+        Smooth::Along(_) if rows < 16 => rows / 2,
+        Smooth::Along(_) => COSINES,
+        Smooth::Around(_) if rows < 50 => rows / 4,
+        Smooth::Around(_) => FOURIER_ORDERS,
+        Smooth::None => 0,
+    }
+}
+
+impl Noise {
+    /// Scatter of the kept rows about the base; `residual` is measured minus base.
+    pub fn of(data: &Data, residual: &[f64], keep: &[bool]) -> Self {
+        let mut noise = Self::of_rows(data, residual, keep);
+        // Equal values in all rows say nothing of the scatter; the resolution does.
+        let floor = resolution(&data.value, keep) / 12.0_f64.sqrt();
+        noise.sigma = noise.sigma.max(floor).max(f64::MIN_POSITIVE.sqrt());
+        noise
+    }
+
+    fn of_rows(data: &Data, residual: &[f64], keep: &[bool]) -> Self {
+        let ordered = data.layout.design.smooth != Smooth::None;
+        let own = if ordered { profile(data, residual, keep) } else { unordered(data, residual, keep) };
+        match &data.uncertainty {
+            None => own,
+            Some(stated) => {
+                let kept = stated.iter().zip(keep).filter(|(_, keep)| **keep).map(|(u, _)| u * u);
+                let count = keep.iter().filter(|keep| **keep).count().max(1);
+                let sigma = (kept.sum::<f64>() / count as f64).sqrt();
+                Self {
+                    sigma,
+                    per_row: Some(stated.clone()),
+                    rho: own.rho,
+                    dof: f64::INFINITY,
+                    source: NoiseSource::Stated { scatter_factor: own.sigma / sigma },
+                }
+            }
+        }
+    }
+}
+
+/// Smallest difference between two different values.
+fn resolution(values: &[f64], keep: &[bool]) -> f64 {
+    let mut values: Vec<f64> = values.iter().zip(keep).filter(|(_, keep)| **keep).map(|(v, _)| *v).collect();
+    values.sort_by(f64::total_cmp);
+    values.windows(2).map(|pair| pair[1] - pair[0]).filter(|d| *d > 0.0).min_by(f64::total_cmp).unwrap_or(0.0)
+}
+
+/// Rows without an order: pooled pure error where it has enough degrees of freedom, else what a
+/// regression leaves.
+fn unordered(data: &Data, residual: &[f64], keep: &[bool]) -> Noise {
+    let (sum, dof) = pure_error(data, residual, keep);
+    if dof >= ENOUGH_REPEATS {
+        return Noise { sigma: (sum / dof).sqrt(), per_row: None, rho: 0.0, dof, source: NoiseSource::Repeats };
+    }
+    let pick = |column: &[f64]| -> Vec<f64> {
+        column.iter().zip(keep).filter(|(_, keep)| **keep).map(|(value, _)| *value).collect()
+    };
+    let mut left = pick(residual);
+    let basis = orthonormal(data.layout.design.regressors.iter().map(|column| pick(column)).collect());
+    for column in &basis {
+        let along = dot(column, &left);
+        left.iter_mut().zip(column).for_each(|(r, c)| *r -= along * c);
+    }
+    let dof = (left.len() as f64 - basis.len() as f64).max(1.0);
+    Noise { sigma: (dot(&left, &left) / dof).sqrt(), per_row: None, rho: 0.0, dof, source: NoiseSource::Regression }
+}
+
+/// Sum of squares within repeats, and its degrees of freedom.
+pub(super) fn pure_error(data: &Data, residual: &[f64], keep: &[bool]) -> (f64, f64) {
+    let cells = data.layout.design.cell.iter().copied().max().map_or(0, |most| most + 1);
+    let mut groups: Vec<Vec<f64>> = vec![Vec::new(); cells];
+    for (row, &cell) in data.layout.design.cell.iter().enumerate() {
+        if keep[row] {
+            groups[cell].push(residual[row]);
+        }
+    }
+    groups.iter().filter(|group| group.len() > 1).fold((0.0, 0.0), |(sum, dof), group| {
+        let mean = group.iter().sum::<f64>() / group.len() as f64;
+        let within: f64 = group.iter().map(|r| (r - mean) * (r - mean)).sum();
+        (sum + within, dof + group.len() as f64 - 1.0)
+    })
+}
+
+/// Restricted maximum likelihood over sigma and rho after taking smooth columns out of every trace.
+///
+/// The likelihood of Q'r with Q spanning the complement of Z is that of the generalised least-squares
+/// residual: log|Q'RQ| = log|R| + log|Z'R^-1 Z| - log|Z'Z|. With the stationary AR(1) correlation R,
+/// whitening is a difference of neighbours and log|R| = (n-1) log(1 - rho^2).
+fn profile(data: &Data, residual: &[f64], keep: &[bool]) -> Noise {
+    let traces: Vec<(Vec<f64>, Vec<Vec<f64>>)> = data
+        .layout
+        .kept_traces(keep)
+        .into_iter()
+        .map(|(_, rows)| {
+            let columns =
+                smooth_columns(&data.layout.design.smooth, &rows, smooth_order(&data.layout.design.smooth, rows.len()));
+            (rows.iter().map(|&row| residual[row]).collect(), orthonormal(columns))
+        })
+        .collect();
+    let mut best: Option<(f64, Noise)> = None;
+    for rho in CORRELATIONS {
+        let (mut log_det, mut quadratic, mut dof) = (0.0, 0.0, 0.0);
+        for (values, columns) in &traces {
+            let white: Vec<Vec<f64>> = columns.iter().map(|column| decorrelated(column, rho)).collect();
+            let mut left = decorrelated(values, rho);
+            log_det += (values.len() as f64 - 1.0) * (1.0 - rho * rho).ln() + log_gram(&white);
+            let basis = orthonormal(white);
+            for column in &basis {
+                let along = dot(column, &left);
+                left.iter_mut().zip(column).for_each(|(r, c)| *r -= along * c);
+            }
+            quadratic += dot(&left, &left);
+            dof += values.len() as f64 - columns.len() as f64;
+        }
+        let dof = dof.max(1.0);
+        let variance = (quadratic / dof).max(f64::MIN_POSITIVE);
+        let log_l = -0.5 * log_det - 0.5 * dof * variance.ln();
+        if best.as_ref().is_none_or(|(most, _)| log_l > *most) {
+            let source = NoiseSource::Profile;
+            best = Some((log_l, Noise { sigma: variance.sqrt(), per_row: None, rho, dof, source }));
+        }
+    }
+    best.map_or_else(|| unordered(data, residual, keep), |(_, noise)| noise)
+}
+
+/// AR(1) whitening of a trace in measuring order.
+pub(super) fn decorrelated(values: &[f64], rho: f64) -> Vec<f64> {
+    let scale = 1.0 / (1.0 - rho * rho).sqrt();
+    let first = values.first().copied();
+    first.into_iter().chain(values.windows(2).map(|pair| (pair[1] - rho * pair[0]) * scale)).collect()
+}
+
+/// log|Z'Z|, by the lengths that Gram-Schmidt divides by.
+fn log_gram(columns: &[Vec<f64>]) -> f64 {
+    let mut basis: Vec<Vec<f64>> = Vec::with_capacity(columns.len());
+    let mut sum = 0.0;
+    for column in columns {
+        let mut column = column.clone();
+        for _ in 0..2 {
+            for done in &basis {
+                let along = dot(done, &column);
+                column.iter_mut().zip(done).for_each(|(c, d)| *c -= along * d);
+            }
+        }
+        let length = dot(&column, &column).sqrt().max(f64::MIN_POSITIVE);
+        sum += 2.0 * length.ln();
+        for c in &mut column {
+            *c /= length;
+        }
+        basis.push(column);
+    }
+    sum
+}

@@ -1,0 +1,183 @@
+//! Single rows that do not belong to their trace (`diagnosis/3.1`, robustness).
+
+use super::basis::{dot, orthonormal, smooth_columns};
+use super::data::Data;
+use super::noise::smooth_order;
+use crate::calculator::Smooth;
+
+/// Scaled deleted residual beyond which a row is looked at, in robust standard deviations.
+const SUSPECT: f64 = 4.5;
+/// Below this, a neighbour of a row that was taken out is at peace: the row stood alone.
+const AT_PEACE: f64 = 3.0;
+/// 1 / Phi^-1(3/4): makes the median absolute deviation a standard deviation of Gaussian scatter.
+const MAD_TO_SD: f64 = 1.482_602_218_505_602;
+/// More flagged rows than one in so many are no outliers but heavy tails.
+const ONE_IN: usize = 20;
+
+/// Rows that stand alone.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outliers {
+    /// Their numbers, worst first.
+    pub rows: Vec<usize>,
+    /// Whether there are too many to be called outliers: then none is left out.
+    pub too_many: bool,
+}
+
+impl Outliers {
+    /// Which rows stay.
+    pub fn keep(&self, rows: usize) -> Vec<bool> {
+        let mut keep = vec![true; rows];
+        if !self.too_many {
+            self.rows.iter().for_each(|&row| keep[row] = false);
+        }
+        keep
+    }
+}
+
+/// Worst first: a row is taken out, its trace fitted again without it, and flagged if its neighbours are
+/// then at peace; otherwise it is part of a structure and stays.
+///
+/// The deletion is essential: in a fit that contains it, a spike of 20 sigma drags its neighbours beyond
+/// 3 sigma with it and would pass for structure.
+pub(super) fn outliers(data: &Data, residual: &[f64]) -> Outliers {
+    let ordered = data.layout.design.smooth != Smooth::None;
+    let mut traces: Vec<Fit> = if ordered {
+        data.layout
+            .traces
+            .iter()
+            .map(|rows| {
+                let count = smooth_order(&data.layout.design.smooth, rows.len());
+                Fit::of(rows, smooth_columns(&data.layout.design.smooth, rows, count), residual)
+            })
+            .collect()
+    } else {
+        let rows: Vec<usize> = (0..residual.len()).collect();
+        vec![Fit::of(&rows, data.layout.design.regressors.clone(), residual)]
+    };
+    let mut flagged = Vec::new();
+    let most = (residual.len() / ONE_IN).max(1);
+    loop {
+        let spread = robust_sd(traces.iter().flat_map(Fit::open_residuals));
+        if spread <= 0.0 {
+            break;
+        }
+        let worst = traces
+            .iter()
+            .enumerate()
+            .filter_map(|(k, fit)| fit.worst().map(|(place, t)| (k, place, t)))
+            .max_by(|a, b| a.2.total_cmp(&b.2));
+        let Some((trace, place, t)) = worst else { break };
+        if t < SUSPECT * spread {
+            break;
+        }
+        let fit = &mut traces[trace];
+        if fit.stands_alone(place, AT_PEACE * spread, ordered) {
+            flagged.push(fit.rows[place]);
+            fit.out[place] = true;
+            fit.refit();
+            if flagged.len() > most {
+                return Outliers { rows: flagged, too_many: true };
+            }
+        } else {
+            fit.structure[place] = true;
+        }
+    }
+    Outliers { rows: flagged, too_many: false }
+}
+
+fn robust_sd(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.map(f64::abs).collect();
+    if values.is_empty() {
+        return 0.0;
+    }
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    let median =
+        if values.len().is_multiple_of(2) { f64::midpoint(values[middle - 1], values[middle]) } else { values[middle] };
+    MAD_TO_SD * median
+}
+
+/// The rich fit of one trace.
+struct Fit {
+    rows: Vec<usize>,
+    columns: Vec<Vec<f64>>,
+    value: Vec<f64>,
+    /// Taken out.
+    out: Vec<bool>,
+    /// Looked at, and found to be part of a structure.
+    structure: Vec<bool>,
+    /// residual / sqrt(1 - leverage), 0 where a row is out.
+    t: Vec<f64>,
+}
+
+impl Fit {
+    fn of(rows: &[usize], columns: Vec<Vec<f64>>, residual: &[f64]) -> Self {
+        let value: Vec<f64> = rows.iter().map(|&row| residual[row]).collect();
+        let count = rows.len();
+        let mut fit = Self {
+            rows: rows.to_vec(),
+            columns,
+            value,
+            out: vec![false; count],
+            structure: vec![false; count],
+            t: vec![0.0; count],
+        };
+        fit.refit();
+        fit
+    }
+
+    fn refit(&mut self) {
+        self.t = scaled_residuals(&self.columns, &self.value, &self.out);
+    }
+
+    /// Scaled residuals of the rows that are in.
+    fn open_residuals(&self) -> impl Iterator<Item = f64> + '_ {
+        self.t.iter().zip(&self.out).filter(|(_, out)| !**out).map(|(t, _)| *t)
+    }
+
+    fn worst(&self) -> Option<(usize, f64)> {
+        (0..self.rows.len())
+            .filter(|&place| !self.out[place] && !self.structure[place])
+            .map(|place| (place, self.t[place].abs()))
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    /// Whether, with this row out, its neighbours in measuring order fit.
+    fn stands_alone(&self, place: usize, peace: f64, ordered: bool) -> bool {
+        if !ordered {
+            return true;
+        }
+        let mut out = self.out.clone();
+        out[place] = true;
+        let t = scaled_residuals(&self.columns, &self.value, &out);
+        let before = (0..place).rev().find(|&i| !out[i]);
+        let after = (place + 1..out.len()).find(|&i| !out[i]);
+        [before, after].into_iter().flatten().all(|i| t[i].abs() < peace)
+    }
+}
+
+fn scaled_residuals(columns: &[Vec<f64>], value: &[f64], out: &[bool]) -> Vec<f64> {
+    let pick = |column: &[f64]| -> Vec<f64> {
+        column.iter().zip(out).filter(|(_, out)| !**out).map(|(value, _)| *value).collect()
+    };
+    let mut residual = pick(value);
+    let basis = orthonormal(columns.iter().map(|column| pick(column)).collect());
+    let mut free = vec![1.0; residual.len()];
+    for column in &basis {
+        let along = dot(column, &residual);
+        residual.iter_mut().zip(column).for_each(|(r, c)| *r -= along * c);
+        free.iter_mut().zip(column).for_each(|(f, c)| *f -= c * c);
+    }
+    let mut kept = residual.into_iter().zip(free);
+    out.iter()
+        .map(|out| match kept_next(*out, &mut kept) {
+            // A row that its trace cannot judge: the fit goes through it.
+            Some((r, free)) if free > 1e-6 => r / free.sqrt(),
+            _ => 0.0,
+        })
+        .collect()
+}
+
+fn kept_next(out: bool, kept: &mut impl Iterator<Item = (f64, f64)>) -> Option<(f64, f64)> {
+    if out { None } else { kept.next() }
+}

@@ -1,0 +1,321 @@
+//! The answer of a diagnosis.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// What the measurements say about the base model.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(bound(serialize = "E: Serialize, R: Serialize", deserialize = "E: Deserialize<'de>, R: Deserialize<'de>"))]
+pub struct DiagnosisResult<E: ToSchema, R: ToSchema> {
+    /// What kind of answer this is.
+    pub verdict: VerdictClass,
+    /// The causes named; for `unknown` those that act at least; empty otherwise.
+    pub named: Vec<NamedCause>,
+    /// For `confounded`: the likely sets of causes, likeliest first, which these data cannot tell apart.
+    pub likely_sets: Vec<LikelySet>,
+    /// Why nothing is said about physics, for `refused`.
+    pub refusal: Option<Refusal>,
+    /// Posterior probability that nothing is wrong that these rows could show.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub none_probability: f64,
+    /// Posterior probability that something acts that the catalogue does not hold.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub unnamed_probability: f64,
+    /// Scatter of single rows.
+    pub noise: NoiseReport,
+    /// Classical tests of the base.
+    pub tests: Vec<TestReport>,
+    /// Sets of causes, heaviest first.
+    pub sets: Vec<SetReport>,
+    /// Causes with the probability that they take part, likeliest first.
+    pub causes: Vec<CauseReport>,
+    /// Causes of the catalogue that these rows cannot speak about.
+    pub not_applicable: Vec<NotApplicable>,
+    /// Pairs of causes with one signature whatever their size: this experiment cannot tell them apart.
+    pub twins: Vec<CausePair>,
+    /// How well leading sets can be told apart, sigmas.
+    pub separations: Vec<SeparationReport>,
+    /// Shape of what the catalogue does not explain.
+    pub remainder: Option<RemainderReport>,
+    /// The effects that extend the base model; empty where none is named.
+    pub effects: Vec<E>,
+    /// Error on data held back, base against extended.
+    pub gain: Option<GainReport>,
+    /// The run that would best part the leading set from its strongest rival.
+    pub next_measurement: Option<NextReport<R>>,
+    /// Row by row.
+    pub rows: RowColumns,
+    /// Rows left out because they stand alone, by their number from 1.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub outliers: Vec<u32>,
+}
+
+/// Kinds of answers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum VerdictClass {
+    /// Nothing is wrong that these rows could show.
+    Adequate,
+    /// The causes are named.
+    Named,
+    /// One of several sets of causes; these data cannot tell which.
+    Confounded,
+    /// Something that the catalogue does not hold.
+    Unknown,
+    /// The data cannot be judged; the reason says why.
+    Refused,
+}
+
+/// A cause with its fitted parameters.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct NamedCause {
+    /// Kind of the effect.
+    pub kind: String,
+    /// Which of several effects of one kind; empty where there is one.
+    pub label: String,
+    /// Its parameters.
+    pub parameters: Vec<ParameterReport>,
+}
+
+/// A fitted or stated parameter.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ParameterReport {
+    /// Name with its unit.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// Value, in the unit that `unit` names.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub value: f64,
+    /// Posterior standard deviation; absent for what is stated.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub standard_deviation: Option<f64>,
+    /// 50 % interval.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub interval_50: Option<[f64; 2]>,
+    /// 90 % interval.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub interval_90: Option<[f64; 2]>,
+    /// 95 % interval.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub interval_95: Option<[f64; 2]>,
+    /// Whether it lies at its physical limit.
+    pub at_limit: bool,
+}
+
+/// A set of causes in the list of a confounded answer.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct LikelySet {
+    /// The causes.
+    pub causes: Vec<NamedCause>,
+    /// Share of the whole posterior.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub posterior: f64,
+}
+
+/// Why the data cannot be judged.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Refusal {
+    /// Code of the reason: `unit_suspected`, `too_few_rows`, `base_fails`.
+    pub reason: String,
+    /// For a suspected unit: the factor that it would leave.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub factor: Option<f64>,
+    /// For a suspected unit: the factor fitted.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub fitted_factor: Option<f64>,
+    /// Rows that would do, where there are too few.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub rows_needed: Option<u32>,
+}
+
+/// Scatter of single rows.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct NoiseReport {
+    /// Standard deviation, in the unit of the quantity (relative where it is logarithmic).
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub standard_deviation: f64,
+    /// Correlation from one row of a sweep to the next.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub correlation: f64,
+    /// Degrees of freedom; absent where the scatter was stated.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub degrees_of_freedom: Option<f64>,
+    /// Where it comes from: `stated`, `repeats`, `profile`, `regression`.
+    pub source: String,
+    /// Scatter of the rows in units of what was stated.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub scatter_factor: Option<f64>,
+}
+
+/// A test of the base.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct TestReport {
+    /// `lack_of_fit`, `smooth_directions`, `ljung_box`, `runs`.
+    pub test: String,
+    /// Its statistic.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub statistic: f64,
+    /// Probability of a larger one if the base were right.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub p: f64,
+    /// The same, corrected for the number of tests after Holm.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub p_holm: f64,
+    /// Whether it rejects the base at the level asked for.
+    pub rejects: bool,
+}
+
+/// A set of causes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct SetReport {
+    /// Its causes; none for the base itself.
+    pub causes: Vec<NamedCause>,
+    /// Share of the whole posterior.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub posterior: f64,
+    /// Whether an unnamed remainder stands beside them.
+    pub with_remainder: bool,
+}
+
+/// A cause and the probability that it takes part.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct CauseReport {
+    /// Kind of the effect.
+    pub kind: String,
+    /// Which of several effects of one kind; empty where there is one.
+    pub label: String,
+    /// Posterior probability that it takes part.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub probability: f64,
+    /// Kinds that some experiments cannot tell from it.
+    pub confounded_with: Vec<String>,
+}
+
+/// A cause that these rows cannot speak about.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct NotApplicable {
+    /// Kind of the effect.
+    pub kind: String,
+    /// `condition_absent`, `condition_constant`, `nothing_to_act_on`, `in_job`, `scatter_only`, `not_asked_for`, `too_small`.
+    pub reason: String,
+    /// The condition that is absent or does not vary.
+    pub condition: Option<String>,
+}
+
+/// Two causes with one signature.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct CausePair {
+    /// One kind.
+    pub a: String,
+    /// The other.
+    pub b: String,
+}
+
+/// How well two sets can be told apart.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct SeparationReport {
+    /// Kinds of one set.
+    pub a: Vec<String>,
+    /// Kinds of the other.
+    pub b: Vec<String>,
+    /// Distance between their best fits, sigmas; below 3 these data cannot tell them apart.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub sigmas: f64,
+}
+
+/// Shape of what the catalogue does not explain.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct RemainderReport {
+    /// What it is free over: `common` to all runs, `per_run`, `around` the part, `test_order`, or a grouping.
+    pub kind: String,
+    /// Root mean square over the rows, in the unit of the quantity.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub rms: f64,
+    /// Row where it is largest, from 1.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub largest_at_row: u32,
+    /// Share of the mean square left by the named part that it explains.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub explained_share: f64,
+}
+
+/// Error on data held back.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct GainReport {
+    /// Parts of the data that were held back one after the other.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub folds: u32,
+    /// Root mean square error of the base, in the unit of the quantity.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub rmse_base: f64,
+    /// Of the extended model, causes chosen and fitted anew without each part.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub rmse_extended: f64,
+    /// 1 - extended/base.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub gain: f64,
+    /// 95 % interval of the gain.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub gain_interval_95: [f64; 2],
+    /// What scatter and allowances leave to any model.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub noise_ceiling: f64,
+    /// Share of what could be explained that was; absent where the base is at the ceiling already.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub explained_share: Option<f64>,
+}
+
+/// A run worth measuring.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(bound(serialize = "R: Serialize", deserialize = "R: Deserialize<'de>"))]
+pub struct NextReport<R: ToSchema> {
+    /// The condition that it changes.
+    pub changes: String,
+    /// Its conditions.
+    pub run: R,
+    /// Rows that it would bring.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub rows: u32,
+    /// Kinds of the leading set.
+    pub leader: Vec<String>,
+    /// Kinds of its strongest rival; none for the base.
+    pub rival: Vec<String>,
+    /// Separation of both with the rows there are, sigmas.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub separation_now_sigmas: f64,
+    /// The same with this run measured too.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub separation_then_sigmas: f64,
+    /// Bayes factor to be expected from this run.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub bayes_factor: f64,
+    /// Rows of this kind that would bring odds of 20 to 1; absent where no number would.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub rows_needed: Option<u32>,
+}
+
+/// Row by row, in the order of the measurements; values in the unit of the quantity (logarithms where it is logarithmic).
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct RowColumns {
+    /// Number of the measured row, from 1.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub row: Vec<u32>,
+    /// Run of the row.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub run: Vec<u32>,
+    /// Where along the part, as a share of its length or of a turn; absent for rows without a place.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub place: Vec<Option<f64>>,
+    /// Measured.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub measured: Vec<f64>,
+    /// Prediction of the base.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub base: Vec<Option<f64>>,
+    /// Prediction of the extended model: the leading set.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub extended: Vec<Option<f64>>,
+    /// Whether the row counted.
+    pub used: Vec<bool>,
+}

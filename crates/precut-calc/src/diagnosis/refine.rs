@@ -1,0 +1,221 @@
+//! Gauss-Newton about the model itself for the sets that lead (`diagnosis/3.4`, refinement).
+
+use nalgebra::DMatrix;
+
+use super::evidence::{Normal, Scale, Side};
+use super::subject::{Setting, Subject};
+use super::whiten::{White, Whitener};
+use crate::calculator::{Failure, Hypothesis, Shape, Treatment, Variable};
+
+/// Steps where only amplitudes are free.
+const STEPS: usize = 4;
+/// Steps where shapes are free too.
+const STEPS_WITH_SHAPES: usize = 6;
+/// Longest step, prior standard deviations.
+const LONGEST_STEP: f64 = 2.0;
+/// A step shorter than this changes nothing that is reported: a hundredth of a prior standard deviation,
+/// or of a posterior one where that is smaller.
+const SETTLED: f64 = 0.01;
+
+/// A set of causes fitted with the model linearised at its optimum.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Fit {
+    pub(super) settings: Vec<Setting>,
+    /// What is free: member of the set and its variable.
+    pub(super) free: Vec<(usize, usize)>,
+    /// Laplace evidence.
+    pub(super) log_z: f64,
+    /// Covariance of the free values, in their units.
+    pub(super) covariance: DMatrix<f64>,
+    /// Posterior means in units of the priors, before they are cut at the bounds.
+    pub(super) t: Vec<f64>,
+    pub(super) sides: Vec<Side>,
+    /// Columns at the optimum, whitened, at one prior standard deviation.
+    pub(super) columns: Vec<White>,
+    /// y - f(theta) + X t there, whitened.
+    pub(super) residual: White,
+    /// The same columns on the rows, per unit of each value.
+    pub(super) slopes: Vec<Vec<f64>>,
+    /// Whether the last step was short.
+    pub(super) settled: bool,
+    /// Whether a shape is free.
+    pub(super) with_shapes: bool,
+    /// min |r - X t|^2 + |t|^2.
+    pub(super) q: f64,
+}
+
+/// A free value and its Gaussian coordinate t ~ N(0, 1).
+#[derive(Debug, Clone, Copy)]
+enum Coordinate {
+    Amplitude { sd: f64 },
+    Shape(Shape),
+}
+
+impl Coordinate {
+    fn of(variable: &Variable) -> Option<Self> {
+        match &variable.treatment {
+            Treatment::Amplitude { prior_sd } => Some(Self::Amplitude { sd: *prior_sd }),
+            Treatment::Shape { prior: Some(prior), .. } => Some(Self::Shape(*prior)),
+            _ => None,
+        }
+    }
+
+    fn t(self, value: f64) -> f64 {
+        match self {
+            Self::Amplitude { sd } => value / sd,
+            Self::Shape(Shape { mean, sd, logarithmic: true }) => (value.ln() - mean) / sd,
+            Self::Shape(Shape { mean, sd, logarithmic: false }) => (value - mean) / sd,
+        }
+    }
+
+    fn value(self, t: f64) -> f64 {
+        match self {
+            Self::Amplitude { sd } => sd * t,
+            Self::Shape(Shape { mean, sd, logarithmic: true }) => (mean + sd * t).exp(),
+            Self::Shape(Shape { mean, sd, logarithmic: false }) => mean + sd * t,
+        }
+    }
+
+    /// d value / d t.
+    fn slope(self, value: f64) -> f64 {
+        match self {
+            Self::Shape(Shape { sd, logarithmic: true, .. }) => sd * value,
+            Self::Amplitude { sd } | Self::Shape(Shape { sd, logarithmic: false, .. }) => sd,
+        }
+    }
+}
+
+/// What stays the same while a set is refined.
+pub(super) struct Refinement<'a> {
+    pub(super) subject: &'a dyn Subject,
+    pub(super) value: &'a [f64],
+    pub(super) keep: &'a [bool],
+    pub(super) whitener: &'a Whitener,
+    pub(super) scale: Scale,
+}
+
+impl Refinement<'_> {
+    /// Refines from `start`; `None` where the model has no value for a row on the way.
+    pub(super) fn fit(&self, start: Vec<Setting>, with_shapes: bool) -> Result<Option<Fit>, Failure> {
+        let hypotheses = self.subject.hypotheses();
+        let (free, coordinates) = free_values(hypotheses, &start, with_shapes);
+        let variable = |k: usize| {
+            let (member, variable): (usize, usize) = free[k];
+            &hypotheses[start[member].hypothesis].variables[variable]
+        };
+        let ranges: Vec<_> = (0..free.len()).map(|k| variable(k).range).collect();
+        let sides: Vec<Side> = coordinates
+            .iter()
+            .zip(&ranges)
+            .map(|(coordinate, range)| match coordinate {
+                Coordinate::Amplitude { .. } => Side::of(*range),
+                Coordinate::Shape(_) => Side::Both,
+            })
+            .collect();
+        let with_shapes = coordinates.iter().any(|c| matches!(c, Coordinate::Shape(_)));
+        let most = if with_shapes { STEPS_WITH_SHAPES } else { STEPS };
+        let mut settings = start;
+        let mut step = 0;
+        loop {
+            let Some(here) = self.linearise(&settings, &free, &coordinates)? else { return Ok(None) };
+            let columns: Vec<&White> = here.columns.iter().collect();
+            let Some(evidence) =
+                Normal::of(&columns, &here.residual).evidence(&sides, self.scale, self.whitener.rows())
+            else {
+                return Ok(None);
+            };
+            let mut longest: f64 = 0.0;
+            for (k, coordinate) in coordinates.iter().enumerate() {
+                let (member, variable) = free[k];
+                let value = &mut settings[member].values[variable];
+                let before = coordinate.t(*value);
+                let wanted = before + (evidence.t[k] - before).clamp(-LONGEST_STEP, LONGEST_STEP);
+                // Projected on the bounds: a reflection would swing to and fro about an optimum at a bound.
+                *value = coordinate.value(wanted).clamp(ranges[k].lower, ranges[k].upper);
+                let posterior_sd = evidence.covariance[(k, k)].sqrt();
+                longest = longest.max((coordinate.t(*value) - before).abs() / posterior_sd.clamp(0.05, 1.0));
+            }
+            step += 1;
+            let settled = longest < SETTLED;
+            if settled || step >= most {
+                let scale: Vec<f64> = free
+                    .iter()
+                    .zip(&coordinates)
+                    .map(|(&(member, variable), coordinate)| coordinate.slope(settings[member].values[variable]))
+                    .collect();
+                let covariance =
+                    DMatrix::from_fn(free.len(), free.len(), |i, j| evidence.covariance[(i, j)] * scale[i] * scale[j]);
+                return Ok(Some(Fit {
+                    settings,
+                    free,
+                    log_z: evidence.log_z,
+                    covariance,
+                    t: evidence.t,
+                    sides,
+                    columns: here.columns,
+                    residual: here.residual,
+                    slopes: here.slopes,
+                    settled: settled || longest < 0.2,
+                    with_shapes,
+                    q: evidence.q,
+                }));
+            }
+        }
+    }
+
+    fn linearise(
+        &self,
+        settings: &[Setting],
+        free: &[(usize, usize)],
+        coordinates: &[Coordinate],
+    ) -> Result<Option<Here>, Failure> {
+        let predicted = self.subject.predict(settings)?;
+        let Some(mut residual) = self
+            .value
+            .iter()
+            .zip(predicted)
+            .zip(self.keep)
+            .map(|((y, f), keep)| if *keep { f.ok().map(|f| y - f) } else { Some(0.0) })
+            .collect::<Option<Vec<f64>>>()
+        else {
+            return Ok(None);
+        };
+        let slopes = self.subject.jacobian(settings, free)?;
+        let mut columns = Vec::with_capacity(free.len());
+        for ((&(member, variable), coordinate), slope) in free.iter().zip(coordinates).zip(&slopes) {
+            let value = settings[member].values[variable];
+            let by = coordinate.slope(value);
+            let column: Vec<f64> = slope.iter().map(|s| s * by).collect();
+            let t = coordinate.t(value);
+            residual.iter_mut().zip(&column).for_each(|(r, c)| *r += c * t);
+            columns.push(self.whitener.white(&column));
+        }
+        Ok(Some(Here { residual: self.whitener.white(&residual), columns, slopes }))
+    }
+}
+
+struct Here {
+    residual: White,
+    columns: Vec<White>,
+    slopes: Vec<Vec<f64>>,
+}
+
+fn free_values(
+    hypotheses: &[Hypothesis],
+    settings: &[Setting],
+    with_shapes: bool,
+) -> (Vec<(usize, usize)>, Vec<Coordinate>) {
+    let mut free = Vec::new();
+    let mut coordinates = Vec::new();
+    for (member, setting) in settings.iter().enumerate() {
+        for (index, variable) in hypotheses[setting.hypothesis].variables.iter().enumerate() {
+            let Some(coordinate) = Coordinate::of(variable) else { continue };
+            if matches!(coordinate, Coordinate::Shape(_)) && !with_shapes {
+                continue;
+            }
+            free.push((member, index));
+            coordinates.push(coordinate);
+        }
+    }
+    (free, coordinates)
+}

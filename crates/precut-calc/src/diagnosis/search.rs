@@ -1,0 +1,346 @@
+//! Which sets of causes explain the rows, all from one matrix of inner products (`diagnosis/3.4`).
+
+use nalgebra::{DMatrix, DVector};
+
+use super::evidence::{Evidence, Normal, Scale, Side, log_mean_exp, log_sum_exp};
+use super::subject::{Setting, Subject};
+use super::whiten::{White, Whitener};
+use crate::calculator::{Failure, Hypothesis, Monitor, Treatment, checkpoint};
+
+/// Singles that may have partners.
+const LEADING_SINGLES: usize = 6;
+/// Pairs that may have a third.
+const LEADING_PAIRS: usize = 6;
+/// A signature shorter than this, whitened and at one prior standard deviation, cannot be seen.
+const VISIBLE: f64 = 0.05;
+/// Prior weights of none, one, two, three causes together.
+const PRIOR: [f64; 4] = [0.5, 0.38, 0.10, 0.02];
+
+/// A hypothesis at one point of the grid of its shapes.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Variant {
+    /// Values with every amplitude at 0.
+    pub(super) setting: Setting,
+    /// Its amplitudes: index of the variable, prior standard deviation, side, column among all.
+    pub(super) amplitudes: Vec<Amplitude>,
+    /// Column of what it does without an amplitude of its own.
+    offset: Option<usize>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Amplitude {
+    pub(super) variable: usize,
+    pub(super) prior_sd: f64,
+    pub(super) side: Side,
+    column: usize,
+}
+
+/// Signatures of a hypothesis before they are whitened: what a fold can use again.
+pub(super) struct Signatures {
+    /// Variants of every hypothesis.
+    variants: Vec<Vec<Variant>>,
+    /// Columns at one prior standard deviation.
+    columns: Vec<Vec<f64>>,
+}
+
+impl Signatures {
+    /// One Jacobian column for every amplitude at every point of the grids.
+    pub(super) fn of(subject: &dyn Subject, base: &[f64], monitor: &dyn Monitor) -> Result<Self, Failure> {
+        let mut signatures = Self { variants: Vec::new(), columns: Vec::new() };
+        for (index, hypothesis) in subject.hypotheses().iter().enumerate() {
+            checkpoint(monitor)?;
+            let mut variants = Vec::new();
+            for values in grid(hypothesis) {
+                variants.push(signatures.variant(subject, base, Setting { hypothesis: index, values })?);
+            }
+            signatures.variants.push(variants);
+        }
+        Ok(signatures)
+    }
+
+    fn variant(&mut self, subject: &dyn Subject, base: &[f64], setting: Setting) -> Result<Variant, Failure> {
+        let hypothesis = &subject.hypotheses()[setting.hypothesis];
+        let sizes: Vec<(usize, f64)> = hypothesis
+            .variables
+            .iter()
+            .enumerate()
+            .filter_map(|(variable, v)| match v.treatment {
+                Treatment::Amplitude { prior_sd } => Some((variable, prior_sd)),
+                _ => None,
+            })
+            .collect();
+        let mut offset = None;
+        if sizes.is_empty() {
+            let with = subject.predict(std::slice::from_ref(&setting))?;
+            self.columns.push(with.iter().zip(base).map(|(with, base)| with.map_or(0.0, |with| with - base)).collect());
+            offset = Some(self.columns.len() - 1);
+        }
+        let of: Vec<(usize, usize)> = sizes.iter().map(|(variable, _)| (0, *variable)).collect();
+        let slopes = subject.jacobian(std::slice::from_ref(&setting), &of)?;
+        let mut amplitudes = Vec::new();
+        for ((variable, prior_sd), slope) in sizes.into_iter().zip(slopes) {
+            self.columns.push(slope.iter().map(|x| x * prior_sd).collect());
+            let side = Side::of(hypothesis.variables[variable].range);
+            amplitudes.push(Amplitude { variable, prior_sd, side, column: self.columns.len() - 1 });
+        }
+        Ok(Variant { setting, amplitudes, offset })
+    }
+}
+
+/// Product grid of a hypothesis' shapes, amplitudes at 0.
+fn grid(hypothesis: &Hypothesis) -> Vec<Vec<f64>> {
+    hypothesis.variables.iter().fold(vec![Vec::new()], |points, variable| {
+        let choices = match &variable.treatment {
+            Treatment::Amplitude { .. } => vec![0.0],
+            Treatment::Shape { grid, .. } => grid.clone(),
+            Treatment::Stated { value } => vec![*value],
+        };
+        points
+            .into_iter()
+            .flat_map(|point| choices.iter().map(move |choice| [point.as_slice(), &[*choice]].concat()))
+            .collect()
+    })
+}
+
+/// All inner products that the sets are made of.
+pub(super) struct Linear<'a> {
+    pub(super) hypotheses: &'a [Hypothesis],
+    signatures: &'a Signatures,
+    pub(super) white: Vec<White>,
+    pub(super) residual: White,
+    gram: DMatrix<f64>,
+    right: DVector<f64>,
+    square: f64,
+    pub(super) scale: Scale,
+    pub(super) rows: f64,
+    /// Hypotheses that these rows can see.
+    pub(super) visible: Vec<usize>,
+}
+
+/// A set of causes and how well it explains the rows.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Candidate {
+    /// Hypotheses, ascending.
+    pub(super) members: Vec<usize>,
+    /// Evidence, averaged over the grids.
+    pub(super) log_z: f64,
+    pub(super) log_prior: f64,
+    /// The best point of the grids: variant of every member.
+    pub(super) variants: Vec<usize>,
+    /// The fit there, in units of the priors.
+    pub(super) t: Vec<f64>,
+    /// Root mean square distance of every variable of every member from its value there, over the posterior
+    /// of the whole grid: what a standard deviation at one point of the grid leaves out. In the units of the
+    /// variables; empty where there is no grid.
+    pub(super) spread: Vec<Vec<f64>>,
+}
+
+impl Candidate {
+    pub(super) fn log_weight(&self) -> f64 {
+        self.log_z + self.log_prior
+    }
+}
+
+impl<'a> Linear<'a> {
+    pub(super) fn new(
+        hypotheses: &'a [Hypothesis],
+        signatures: &'a Signatures,
+        whitener: &Whitener,
+        residual: &[f64],
+        scale: Scale,
+    ) -> Self {
+        let white: Vec<White> = signatures.columns.iter().map(|column| whitener.white(column)).collect();
+        let residual = whitener.white(residual);
+        let Normal { gram, right, square } = Normal::of(&white.iter().collect::<Vec<_>>(), &residual);
+        let seen = |h: &usize| {
+            signatures.variants[*h].iter().any(|variant| {
+                let mut columns = variant.amplitudes.iter().map(|a| a.column).chain(variant.offset);
+                columns.any(|column| gram[(column, column)] > VISIBLE * VISIBLE)
+            })
+        };
+        let visible = (0..hypotheses.len()).filter(seen).collect();
+        let rows = whitener.rows();
+        Self { hypotheses, signatures, white, residual, gram, right, square, scale, rows, visible }
+    }
+
+    pub(super) fn variant(&self, hypothesis: usize, variant: usize) -> &Variant {
+        &self.signatures.variants[hypothesis][variant]
+    }
+
+    /// Whether a hypothesis has a single form.
+    pub(super) fn has_no_grid(&self, hypothesis: usize) -> bool {
+        self.signatures.variants[hypothesis].len() == 1
+    }
+
+    /// Cosine of the angle between the signatures of two hypotheses with one amplitude and no grid.
+    pub(super) fn alike(&self, a: usize, b: usize) -> Option<f64> {
+        let column = |h: usize| match self.signatures.variants[h].as_slice() {
+            [variant] => match variant.amplitudes.as_slice() {
+                [amplitude] => Some(amplitude.column),
+                _ => None,
+            },
+            _ => None,
+        };
+        let (a, b) = (column(a)?, column(b)?);
+        Some(self.gram[(a, b)] / (self.gram[(a, a)] * self.gram[(b, b)]).sqrt())
+    }
+
+    /// Columns, sides and the residual of a set at a point of its grids.
+    pub(super) fn parts(&self, members: &[usize], variants: &[usize]) -> (Vec<&White>, Vec<Side>, White) {
+        let mut residual = self.residual.clone();
+        let (mut columns, mut sides) = (Vec::new(), Vec::new());
+        for (&h, &v) in members.iter().zip(variants) {
+            let variant = self.variant(h, v);
+            for amplitude in &variant.amplitudes {
+                columns.push(&self.white[amplitude.column]);
+                sides.push(amplitude.side);
+            }
+            if let Some(offset) = variant.offset {
+                residual = residual.minus(&self.white[offset]);
+            }
+        }
+        (columns, sides, residual)
+    }
+
+    fn evidence(&self, members: &[usize], variants: &[usize]) -> Option<Evidence> {
+        let (mut columns, mut sides, mut offsets) = (Vec::new(), Vec::new(), Vec::new());
+        for (&h, &v) in members.iter().zip(variants) {
+            let variant = self.variant(h, v);
+            columns.extend(variant.amplitudes.iter().map(|a| a.column));
+            sides.extend(variant.amplitudes.iter().map(|a| a.side));
+            offsets.extend(variant.offset);
+        }
+        let count = columns.len();
+        let gram = DMatrix::from_fn(count, count, |i, j| self.gram[(columns[i], columns[j])]);
+        let shifted =
+            |i: usize| self.right[columns[i]] - offsets.iter().map(|&o| self.gram[(columns[i], o)]).sum::<f64>();
+        let right = DVector::from_fn(count, |i, _| shifted(i));
+        let mut square = self.square;
+        for &o in &offsets {
+            square -= 2.0 * self.right[o];
+            square += offsets.iter().map(|&p| self.gram[(o, p)]).sum::<f64>();
+        }
+        Normal { gram, right, square }.evidence(&sides, self.scale, self.rows)
+    }
+
+    /// A set of causes: mean evidence over the product of the grids, and the best point.
+    pub(super) fn candidate(&self, members: Vec<usize>, log_prior: f64) -> Option<Candidate> {
+        let mut points: Vec<Vec<usize>> = vec![Vec::new()];
+        for &h in &members {
+            let count = self.signatures.variants[h].len();
+            points = points.into_iter().flat_map(|p| (0..count).map(move |v| [p.as_slice(), &[v]].concat())).collect();
+        }
+        let mut found = Vec::with_capacity(points.len());
+        for point in points {
+            let evidence = self.evidence(&members, &point)?;
+            found.push((point, evidence));
+        }
+        let all: Vec<f64> = found.iter().map(|(_, evidence)| evidence.log_z).collect();
+        let best = (0..found.len()).rev().max_by(|&a, &b| all[a].total_cmp(&all[b]))?;
+        let spread = if found.len() > 1 { self.spread(&members, &found, best) } else { Vec::new() };
+        let (variants, evidence) = found.swap_remove(best);
+        Some(Candidate { members, log_z: log_mean_exp(&all), log_prior, variants, t: evidence.t, spread })
+    }
+
+    fn spread(&self, members: &[usize], found: &[(Vec<usize>, Evidence)], best: usize) -> Vec<Vec<f64>> {
+        let total = log_sum_exp(&found.iter().map(|(_, evidence)| evidence.log_z).collect::<Vec<_>>());
+        let mut squares: Vec<Vec<f64>> =
+            members.iter().map(|&h| vec![0.0; self.hypotheses[h].variables.len()]).collect();
+        for (point, evidence) in found {
+            let weight = (evidence.log_z - total).exp();
+            let mut column = 0;
+            for (member, &h) in members.iter().enumerate() {
+                let (here, there) = (self.variant(h, point[member]), self.variant(h, found[best].0[member]));
+                let shapes = here.setting.values.iter().zip(&there.setting.values);
+                for (square, (value, best)) in squares[member].iter_mut().zip(shapes) {
+                    *square += weight * (value - best) * (value - best);
+                }
+                for amplitude in &here.amplitudes {
+                    let gap = evidence.t[column] - found[best].1.t[column];
+                    let square = evidence.covariance[(column, column)] + gap * gap;
+                    squares[member][amplitude.variable] += weight * square * amplitude.prior_sd * amplitude.prior_sd;
+                    column += 1;
+                }
+            }
+        }
+        squares.into_iter().map(|member| member.into_iter().map(f64::sqrt).collect()).collect()
+    }
+
+    fn log_prior(&self, members: &[usize]) -> f64 {
+        let count = self.visible.len() as f64;
+        let ways = match members.len() {
+            0 => 1.0,
+            1 => count,
+            2 => count * (count - 1.0) / 2.0,
+            _ => count * (count - 1.0) * (count - 2.0) / 6.0,
+        };
+        let own: f64 = members.iter().map(|&h| self.hypotheses[h].prior_weight.ln()).sum();
+        (PRIOR[members.len().min(3)] / ways).ln() + own
+    }
+
+    /// The empty set, all singles, pairs with a leading single in them, and leading pairs with a third.
+    pub(super) fn search(&self, most_causes: usize, monitor: &dyn Monitor) -> Result<Vec<Candidate>, Failure> {
+        let set = |members: Vec<usize>| {
+            let log_prior = self.log_prior(&members);
+            self.candidate(members, log_prior)
+        };
+        let mut found: Vec<Candidate> = set(Vec::new()).into_iter().collect();
+        let mut singles: Vec<Candidate> = Vec::new();
+        if most_causes >= 1 {
+            singles = self.visible.iter().filter_map(|&h| set(vec![h])).collect();
+            by_weight(&mut singles);
+        }
+        let mut pairs = Vec::new();
+        if most_causes >= 2 {
+            for (rank, single) in singles.iter().take(LEADING_SINGLES).enumerate() {
+                checkpoint(monitor)?;
+                let leaders: Vec<usize> = singles[..rank].iter().map(|s| s.members[0]).collect();
+                let first = single.members[0];
+                let partners = self.visible.iter().filter(|h| **h != first && !leaders.contains(h));
+                pairs.extend(partners.filter_map(|&h| set(vec![first.min(h), first.max(h)])));
+            }
+            by_weight(&mut pairs);
+        }
+        let mut triples: Vec<Candidate> = Vec::new();
+        if most_causes >= 3 {
+            for pair in pairs.iter().take(LEADING_PAIRS) {
+                checkpoint(monitor)?;
+                for &third in self.visible.iter().filter(|h| !pair.members.contains(h)) {
+                    let mut members = [pair.members.as_slice(), &[third]].concat();
+                    members.sort_unstable();
+                    if triples.iter().all(|triple| triple.members != members) {
+                        triples.extend(set(members));
+                    }
+                }
+            }
+        }
+        found.extend(singles);
+        found.extend(pairs);
+        found.extend(triples);
+        by_weight(&mut found);
+        Ok(found)
+    }
+
+    /// Full settings of a candidate at the best point of its grids.
+    pub(super) fn settings(&self, candidate: &Candidate) -> Vec<Setting> {
+        let mut t = candidate.t.iter();
+        let members = candidate.members.iter().zip(&candidate.variants);
+        members
+            .map(|(&h, &v)| {
+                let variant = self.variant(h, v);
+                let mut setting = variant.setting.clone();
+                for amplitude in &variant.amplitudes {
+                    let range = self.hypotheses[h].variables[amplitude.variable].range;
+                    let size = t.next().map_or(0.0, |t| t * amplitude.prior_sd);
+                    setting.values[amplitude.variable] = size.clamp(range.lower, range.upper);
+                }
+                setting
+            })
+            .collect()
+    }
+}
+
+/// Heaviest first; equal weights in the order of their members, so that the order never depends on the search.
+pub(super) fn by_weight(candidates: &mut [Candidate]) {
+    candidates.sort_by(|a, b| b.log_weight().total_cmp(&a.log_weight()).then_with(|| a.members.cmp(&b.members)));
+}

@@ -1,0 +1,302 @@
+//! From rows to posterior weights and a verdict (`diagnosis/3.5`, `diagnosis/3.7`).
+
+use super::discrepancy::{self, Kind, Remainder};
+use super::evidence::{Scale, Side, log_sum_exp};
+use super::foundation::Foundation;
+use super::noise::Noise;
+use super::refine::{Fit, Refinement};
+use super::search::{Candidate, Linear, by_weight};
+use super::subject::Setting;
+use super::whiten::{White, Whitener};
+use crate::calculator::{Failure, Hypothesis, Monitor, Treatment, checkpoint};
+
+/// Sets that are refined about the model itself.
+const LEADERS: usize = 12;
+/// Sets that lead only after the others were refined, and are then refined too.
+const LATE_LEADERS: usize = 6;
+/// Sets that are tried with an unnamed remainder beside them.
+const WITH_REMAINDER: usize = 5;
+/// Prior of the remainder beside a set, relative to the set.
+const REMAINDER_PRIOR: f64 = 0.08;
+/// Below this posterior of "nothing", something is wrong: an alarm needs a Bayes factor of about nine.
+const ALARM: f64 = 0.1;
+/// Posterior of the remainder from which on the answer is "not in the catalogue".
+const UNNAMED: f64 = 0.5;
+/// Posterior from which on a set is named.
+const NAMED: f64 = 0.8;
+/// Posterior from which on a set is named if every likely set contains it.
+const NAMED_IF_COMMON: f64 = 0.5;
+/// Share of the named posterior that the list of likely sets holds.
+const LIKELY: f64 = 0.95;
+
+/// How far the search goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Effort {
+    /// Causes at the same time, 0 to 3.
+    pub most_causes: usize,
+    /// Sets that are refined about the model itself.
+    pub leaders: usize,
+    /// Sets that lead only after the others were refined, and are then refined too.
+    pub late_leaders: usize,
+}
+
+impl Effort {
+    /// The whole search.
+    pub fn full(most_causes: usize) -> Self {
+        Self { most_causes, leaders: LEADERS, late_leaders: LATE_LEADERS }
+    }
+}
+
+/// What the rows say.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Verdict {
+    /// Nothing is wrong that these rows could show.
+    Adequate,
+    /// These causes, by their hypotheses.
+    Named(Vec<usize>),
+    /// One of these sets; the data cannot tell which.
+    Confounded(Vec<Vec<usize>>),
+    /// Something that the catalogue does not hold, beside at least these causes.
+    Unknown(Vec<usize>),
+}
+
+/// A set of causes with its posterior.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SetWeight {
+    /// Hypotheses, ascending.
+    pub members: Vec<usize>,
+    /// Share of the whole posterior.
+    pub posterior: f64,
+    /// Fitted values.
+    pub settings: Vec<Setting>,
+    /// Posterior standard deviations of the values, 0 where they are stated.
+    pub standard_deviations: Vec<Vec<f64>>,
+    /// Whether the model itself was linearised at the optimum.
+    pub refined: bool,
+    /// The remainder beside them, where there is one.
+    pub(super) remainder: Option<Remainder>,
+}
+
+/// All sets of causes weighed against each other, against nothing, and against a remainder without a name.
+pub struct Weighing<'a> {
+    pub(super) foundation: &'a Foundation<'a>,
+    /// Rows that count.
+    pub keep: Vec<bool>,
+    /// Scatter of the rows.
+    pub noise: Noise,
+    pub(super) whitener: Whitener,
+    pub(super) linear: Linear<'a>,
+    ranking: Ranking,
+    pub(super) kinds: Vec<Kind>,
+    /// All sets, heaviest first.
+    pub sets: Vec<SetWeight>,
+    /// Posterior of "nothing is wrong".
+    pub none: f64,
+    /// Posterior of all sets with an unnamed remainder.
+    pub unnamed: f64,
+    /// Posterior that a hypothesis takes part, for every hypothesis.
+    pub inclusion: Vec<f64>,
+    /// The verdict.
+    pub verdict: Verdict,
+}
+
+impl<'a> Weighing<'a> {
+    /// Weighs with the rows that are kept.
+    pub fn of(
+        foundation: &'a Foundation<'a>,
+        keep: Vec<bool>,
+        effort: Effort,
+        monitor: &dyn Monitor,
+    ) -> Result<Self, Failure> {
+        let Foundation { subject, data, residual, nuisances, signatures, .. } = foundation;
+        let noise = Noise::of(data, residual, &keep);
+        let whitener = Whitener::new(data, &noise, nuisances, &keep);
+        let scale = Scale::of(&noise);
+        let linear = Linear::new(subject.hypotheses(), signatures, &whitener, residual, scale);
+        let candidates = linear.search(effort.most_causes, monitor)?;
+        let refinement = Refinement { subject: *subject, value: &data.value, keep: &keep, whitener: &whitener, scale };
+        let mut ranking = Ranking { candidates, fits: Vec::new() };
+        ranking.refine(&linear, &refinement, effort.leaders, monitor)?;
+        ranking.refine(&linear, &refinement, effort.late_leaders, monitor)?;
+        let kinds = discrepancy::kinds(data, &whitener, noise.sigma);
+        let mut weighed = ranking.weigh(&linear, &kinds, monitor)?;
+        let total = log_sum_exp(&weighed.iter().map(|set| set.0).collect::<Vec<_>>());
+        weighed.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.1.members.cmp(&b.1.members)));
+        let sets: Vec<SetWeight> = weighed
+            .into_iter()
+            .map(|(log_weight, set)| SetWeight { posterior: (log_weight - total).exp(), ..set })
+            .collect();
+        let sum = |choose: &dyn Fn(&SetWeight) -> bool| -> f64 {
+            sets.iter().filter(|set| choose(set)).map(|set| set.posterior).sum()
+        };
+        let none = sum(&|set| set.members.is_empty() && set.remainder.is_none());
+        let unnamed = sum(&|set| set.remainder.is_some());
+        let inclusion = (0..subject.hypotheses().len()).map(|h| sum(&|set| set.members.contains(&h))).collect();
+        let at_limit =
+            |set: &SetWeight| ranking.fit(&set.members).is_some_and(|fit| at_limit(fit, subject.hypotheses()));
+        let verdict = verdict(&sets, none, unnamed, &at_limit);
+        Ok(Self { foundation, keep, noise, whitener, linear, ranking, kinds, sets, none, unnamed, inclusion, verdict })
+    }
+
+    /// The fit of a set about the model itself, where it was made.
+    pub(super) fn fit(&self, members: &[usize]) -> Option<&Fit> {
+        self.ranking.fit(members)
+    }
+
+    /// Sets without a remainder, heaviest first.
+    pub fn named_sets(&self) -> impl Iterator<Item = &SetWeight> {
+        self.sets.iter().filter(|set| set.remainder.is_none() && !set.members.is_empty())
+    }
+}
+
+/// Candidates, and the fits of those that were refined.
+struct Ranking {
+    candidates: Vec<Candidate>,
+    fits: Vec<(Vec<usize>, Option<Fit>)>,
+}
+
+impl Ranking {
+    fn fit(&self, members: &[usize]) -> Option<&Fit> {
+        self.fits.iter().find(|(of, _)| of == members).and_then(|(_, fit)| fit.as_ref())
+    }
+
+    /// Refines the heaviest sets that are not refined yet, and gives them the evidence found there.
+    fn refine(
+        &mut self,
+        linear: &Linear<'_>,
+        refinement: &Refinement<'_>,
+        count: usize,
+        monitor: &dyn Monitor,
+    ) -> Result<(), Failure> {
+        let leaders: Vec<usize> = (0..self.candidates.len().min(count)).collect();
+        for index in leaders {
+            checkpoint(monitor)?;
+            let candidate = &mut self.candidates[index];
+            if candidate.members.is_empty() || self.fits.iter().any(|(of, _)| *of == candidate.members) {
+                continue;
+            }
+            let start = linear.settings(candidate);
+            let plain = refinement.fit(start.clone(), false)?;
+            let free = refinement.fit(start, true)?.filter(|fit| fit.with_shapes && fit.settled);
+            let fit = match (plain, free) {
+                // Where free shapes explain less than the mean over the grid, the grid stays.
+                (plain, Some(free)) if free.log_z >= candidate.log_z => {
+                    candidate.log_z = free.log_z;
+                    let _ = plain;
+                    Some(free)
+                }
+                (Some(plain), _) => {
+                    if linear.settings(candidate).iter().all(|s| linear.has_no_grid(s.hypothesis)) {
+                        candidate.log_z = plain.log_z;
+                    }
+                    Some(plain)
+                }
+                (None, _) => None,
+            };
+            self.fits.push((candidate.members.clone(), fit));
+        }
+        by_weight(&mut self.candidates);
+        Ok(())
+    }
+
+    /// Log weight of every set, alone and, where it leads, beside a remainder.
+    fn weigh(
+        &self,
+        linear: &Linear<'_>,
+        kinds: &[Kind],
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<(f64, SetWeight)>, Failure> {
+        let mut weighed: Vec<(f64, SetWeight)> =
+            self.candidates.iter().map(|c| (c.log_weight(), self.set(linear, c, None))).collect();
+        let empty = self.candidates.iter().filter(|c| c.members.is_empty());
+        let leading = self.candidates.iter().filter(|c| !c.members.is_empty()).take(WITH_REMAINDER - 1);
+        for candidate in empty.chain(leading) {
+            checkpoint(monitor)?;
+            if let Some(remainder) = self.beside(linear, kinds, candidate) {
+                let log_weight = remainder.log_z + candidate.log_prior + REMAINDER_PRIOR.ln();
+                weighed.push((log_weight, self.set(linear, candidate, Some(remainder))));
+            }
+        }
+        Ok(weighed)
+    }
+
+    fn beside(&self, linear: &Linear<'_>, kinds: &[Kind], candidate: &Candidate) -> Option<Remainder> {
+        let (columns, residual, sides): (Vec<&White>, White, Vec<Side>) =
+            if let Some(fit) = self.fit(&candidate.members) {
+                (fit.columns.iter().collect(), fit.residual.clone(), fit.sides.clone())
+            } else {
+                let (columns, sides, residual) = linear.parts(&candidate.members, &candidate.variants);
+                (columns, residual, sides)
+            };
+        discrepancy::beside(kinds, &columns, &residual, &sides, linear.scale, linear.rows)
+    }
+
+    fn set(&self, linear: &Linear<'_>, candidate: &Candidate, remainder: Option<Remainder>) -> SetWeight {
+        let fit = self.fit(&candidate.members);
+        let settings = fit.map_or_else(|| linear.settings(candidate), |fit| fit.settings.clone());
+        let mut standard_deviations: Vec<Vec<f64>> = settings.iter().map(|s| vec![0.0; s.values.len()]).collect();
+        if let Some(fit) = fit {
+            for (k, &(member, variable)) in fit.free.iter().enumerate() {
+                standard_deviations[member][variable] = fit.covariance[(k, k)].sqrt();
+            }
+        }
+        // A shape that stays on its grid is uncertain, too, and widens the sizes.
+        if fit.is_none_or(|fit| !fit.with_shapes) {
+            for (own, spread) in standard_deviations.iter_mut().zip(&candidate.spread) {
+                own.iter_mut().zip(spread).for_each(|(own, spread)| *own = own.max(*spread));
+            }
+        }
+        SetWeight {
+            members: candidate.members.clone(),
+            posterior: 0.0,
+            settings,
+            standard_deviations,
+            refined: fit.is_some(),
+            remainder,
+        }
+    }
+}
+
+/// Whether the size of a cause lies at its physical limit; absent, at 0, is no limit, and of several sizes
+/// of one cause the first counts.
+fn at_limit(fit: &Fit, hypotheses: &[Hypothesis]) -> bool {
+    fit.settings.iter().any(|setting| {
+        let variables = &hypotheses[setting.hypothesis].variables;
+        let first =
+            variables.iter().zip(&setting.values).find(|(v, _)| matches!(v.treatment, Treatment::Amplitude { .. }));
+        first.is_some_and(|(variable, value)| {
+            let near = |bound: f64| (value - bound).abs() < 1e-9 * (variable.range.upper - variable.range.lower);
+            (near(variable.range.lower) && variable.range.lower < 0.0) || near(variable.range.upper)
+        })
+    })
+}
+
+fn verdict(sets: &[SetWeight], none: f64, unnamed: f64, at_limit: &dyn Fn(&SetWeight) -> bool) -> Verdict {
+    if none >= ALARM {
+        return Verdict::Adequate;
+    }
+    if unnamed >= UNNAMED {
+        let leading = sets.iter().find(|set| set.remainder.is_some());
+        return Verdict::Unknown(leading.map_or_else(Vec::new, |set| set.members.clone()));
+    }
+    let named: Vec<&SetWeight> = sets.iter().filter(|set| set.remainder.is_none() && !set.members.is_empty()).collect();
+    let whole: f64 = named.iter().map(|set| set.posterior).sum();
+    let mut likely: Vec<&SetWeight> = Vec::new();
+    let mut held = 0.0;
+    for set in &named {
+        if held >= LIKELY * whole {
+            break;
+        }
+        held += set.posterior;
+        likely.push(set);
+    }
+    if let Some(leader) = likely.first() {
+        let in_all = likely.iter().all(|set| leader.members.iter().all(|h| set.members.contains(h)));
+        let sure = leader.posterior >= NAMED || (leader.posterior >= NAMED_IF_COMMON && in_all);
+        // At its limit a size is not what the data ask for: something else acts, or the limit is wrong.
+        if sure && !at_limit(leader) {
+            return Verdict::Named(leader.members.clone());
+        }
+    }
+    Verdict::Confounded(likely.iter().map(|set| set.members.clone()).collect())
+}

@@ -1,0 +1,98 @@
+//! Scatter and allowances as one covariance: C = sigma^2 R(rho) + N N' (`diagnosis/3.2`).
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use super::basis::dot;
+use super::data::Data;
+use super::noise::{Noise, decorrelated};
+
+/// C^-1 as an inner product, without ever forming C: rows are decorrelated and divided by sigma, the few
+/// columns of N are then taken out by the identity (I + N N')^-1 = I - N (I + N'N)^-1 N'.
+#[derive(Debug, Clone)]
+pub(super) struct Whitener {
+    traces: Vec<Vec<usize>>,
+    sigma: Vec<f64>,
+    rho: f64,
+    nuisances: Vec<Vec<f64>>,
+    factor: Option<Cholesky<f64, Dyn>>,
+    rows: usize,
+}
+
+/// A column in whitened coordinates.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct White {
+    own: Vec<f64>,
+    /// What the allowances can explain of it.
+    allowed: Vec<f64>,
+}
+
+impl White {
+    /// a' C^-1 b.
+    pub(super) fn inner(&self, other: &Self) -> f64 {
+        dot(&self.own, &other.own) - dot(&self.allowed, &other.allowed)
+    }
+
+    pub(super) fn minus(&self, other: &Self) -> Self {
+        let less = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a - b).collect();
+        Self { own: less(&self.own, &other.own), allowed: less(&self.allowed, &other.allowed) }
+    }
+}
+
+impl Whitener {
+    /// `nuisances`: one standard deviation of every allowance, in the unit of the rows.
+    pub(super) fn new(data: &Data, noise: &Noise, nuisances: &[Vec<f64>], keep: &[bool]) -> Self {
+        let traces: Vec<Vec<usize>> = data.layout.kept_traces(keep).into_iter().map(|(_, rows)| rows).collect();
+        let sigma = noise.per_row.clone().unwrap_or_else(|| vec![noise.sigma; data.value.len()]);
+        let rows = traces.iter().map(Vec::len).sum();
+        let mut whitener = Self { traces, sigma, rho: noise.rho, nuisances: Vec::new(), factor: None, rows };
+        let white: Vec<Vec<f64>> = nuisances
+            .iter()
+            .map(|column| whitener.decorrelate(column))
+            .filter(|column| dot(column, column) > 0.0)
+            .collect();
+        if !white.is_empty() {
+            let count = white.len();
+            let gram = DMatrix::from_fn(count, count, |i, j| dot(&white[i], &white[j]) + f64::from(u8::from(i == j)));
+            whitener.factor = Cholesky::new(gram);
+            whitener.nuisances = white;
+        }
+        whitener
+    }
+
+    /// Number of rows that count.
+    pub(super) fn rows(&self) -> f64 {
+        self.rows as f64
+    }
+
+    fn decorrelate(&self, column: &[f64]) -> Vec<f64> {
+        self.traces
+            .iter()
+            .flat_map(|rows| {
+                let scaled: Vec<f64> = rows.iter().map(|&row| column[row] / self.sigma[row]).collect();
+                decorrelated(&scaled, self.rho)
+            })
+            .collect()
+    }
+
+    /// A column trace by trace, in units of the scatter, less what the allowances most probably explain of it.
+    pub(super) fn beyond_allowances(&self, column: &[f64]) -> Vec<Vec<f64>> {
+        let White { mut own, allowed } = self.white(column);
+        if let Some(factor) = &self.factor {
+            let along = factor.l_dirty().tr_solve_lower_triangular(&DVector::from_vec(allowed));
+            for (size, nuisance) in along.iter().flat_map(|v| v.iter()).zip(&self.nuisances) {
+                own.iter_mut().zip(nuisance).for_each(|(r, n)| *r -= size * n);
+            }
+        }
+        let mut rest = own.into_iter();
+        self.traces.iter().map(|rows| rest.by_ref().take(rows.len()).collect()).collect()
+    }
+
+    pub(super) fn white(&self, column: &[f64]) -> White {
+        let own = self.decorrelate(column);
+        let along = DVector::from_iterator(self.nuisances.len(), self.nuisances.iter().map(|n| dot(n, &own)));
+        let allowed = self.factor.as_ref().map_or_else(Vec::new, |factor| {
+            factor.l_dirty().solve_lower_triangular(&along).map_or_else(Vec::new, |p| p.as_slice().to_vec())
+        });
+        White { own, allowed }
+    }
+}

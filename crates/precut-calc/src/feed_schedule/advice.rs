@@ -1,0 +1,365 @@
+//! What binds, what would help, where not to trust: codes with numbers.
+
+use crate::calculator::{Basis, Finding, Message};
+use crate::machinability::{Conditions, MachinabilityModel};
+
+use super::case::Case;
+use super::input::{Goal, Job};
+use super::models::Output;
+use super::output::Outcome;
+use super::plan::Method;
+use super::run::broken;
+
+/// Codes of the warnings made here.
+pub(super) const WARNING_CODES: &[&str] = &[
+    "outside_data_range",
+    "tool_life_extrapolated",
+    "zone_straddles_diameter_step",
+    "thin_wall_local_deflection",
+    "feed_below_edge_radius",
+    "degenerate",
+    "unused_input",
+    "limit_not_kept",
+    "local_optimum",
+    "loss_not_reached",
+    "compensation_needed",
+    "unconfirmed_model",
+];
+
+/// Codes of the explanations made here.
+pub(super) const EXPLANATION_CODES: &[&str] = &[
+    "limit_costs_most",
+    "nothing_binds",
+    "against_constant_feed",
+    "against_equal_deflection",
+    "edge_used",
+    "whole_parts",
+    "edge_changes",
+    "fewest_zones",
+    "passes_found",
+    "equal_deflection_clamped",
+    "path_leaves",
+    "optimum_within",
+    "rule_has_no_optimum",
+];
+
+/// Tool lives that trials cover as a rule, min.
+const USUAL_LIFE_MIN: (f64, f64) = (2.0, 240.0);
+/// Wall over radius below which the shell yields locally.
+const THIN_WALL: f64 = 0.1;
+/// Feed below which the edge's radius rules the chip, mm/rev.
+const LEAST_FEED_MM_PER_REV: f64 = 0.03;
+
+/// All warnings.
+pub(super) fn warnings(job: &Job, case: &Case, outcome: &Outcome, at: &[(f64, f64)]) -> Vec<Finding> {
+    let mut out = Vec::new();
+    ranges(job, case, outcome, &mut out);
+    lives(outcome, &mut out);
+    shapes(job, &mut out);
+    let slow = outcome.zones.iter().filter(|zone| zone.feed_mm_per_rev < LEAST_FEED_MM_PER_REV);
+    if let Some(zone) = slow.clone().min_by(|a, b| a.feed_mm_per_rev.total_cmp(&b.feed_mm_per_rev)) {
+        out.push(
+            Finding::new("feed_below_edge_radius", "/limits/feed_min_mm_per_rev")
+                .measured(zone.feed_mm_per_rev, LEAST_FEED_MM_PER_REV, "mm/rev")
+                .with("zones", slow.count()),
+        );
+    }
+    if let Some(first) = outcome.binding.iter().find(|binding| binding.degenerate) {
+        out.push(
+            Finding::new("degenerate", "/limits")
+                .with("constraint", first.constraint.clone())
+                .with("zone", first.zone.clone()),
+        );
+    }
+    unused(job, &mut out);
+    if matches!(job.method, Method::EqualDeflection { .. }) {
+        for (name, factor) in broken(case, at).into_iter().take(20) {
+            out.push(
+                Finding::new("limit_not_kept", "/method")
+                    .with("constraint", name.constraint)
+                    .with("zone", name.zone)
+                    .with("factor", factor),
+            );
+        }
+    }
+    if outcome.certificate.local && !matches!(job.method, Method::EqualDeflection { .. }) {
+        out.push(
+            Finding::new("local_optimum", "/effects")
+                .with("linearisations", f64::from(outcome.certificate.linearisations)),
+        );
+    }
+    if let (Some(found), Method::Continuous { loss_percent, .. }) = (&outcome.continuous, &job.method)
+        && !found.loss_reached
+    {
+        out.push(Finding::new("loss_not_reached", "/method/segments_max").measured(
+            found.loss_percent,
+            *loss_percent,
+            "percent",
+        ));
+    }
+    let kappa = job.limits.as_ref().map_or(1.0, |limits| limits.deflection_residual_fraction);
+    if kappa < 1.0 && job.zones.iter().any(|zone| zone.deflection_max_um.is_some()) {
+        out.push(Finding::new("compensation_needed", "/limits/deflection_residual_fraction").value(kappa, "1"));
+    }
+    out
+}
+
+/// Variables that leave the range of the trials behind a model, the worst zone of each.
+fn ranges(job: &Job, case: &Case, outcome: &Outcome, out: &mut Vec<Finding>) {
+    let named = Output::ALL.iter().filter_map(|output| {
+        job.models.get(*output).map(|model| (format!("/models/{}", output.name()), output.name().to_owned(), model))
+    });
+    let further = job
+        .models
+        .further
+        .iter()
+        .enumerate()
+        .map(|(k, further)| (format!("/models/further/{k}/model"), further.name.clone(), &further.model));
+    let mut unsure = 0;
+    for (pointer, name, model) in named.chain(further) {
+        one_range(job, case, outcome, &pointer, &name, model, out);
+        unsure += usize::from(model.certainty.is_some_and(crate::material::Certainty::needs_check));
+    }
+    if unsure > 0 {
+        out.push(Finding::new("unconfirmed_model", "/models").with("models", unsure));
+    }
+}
+
+fn one_range(
+    job: &Job,
+    case: &Case,
+    outcome: &Outcome,
+    pointer: &str,
+    name: &str,
+    model: &MachinabilityModel,
+    out: &mut Vec<Finding>,
+) {
+    let mut worst: Vec<(crate::machinability::Variable, f64, f64, String)> = Vec::new();
+    for (zone, given) in case.zones.iter().zip(&outcome.zones) {
+        let at = Conditions {
+            speed_m_per_min: given.speed_m_per_min,
+            feed_mm_per_rev: given.feed_mm_per_rev,
+            depth_mm: zone.depth_mm,
+            cutting_edge_angle_deg: job.cutting_edge_angle_deg,
+        };
+        for (variable, value, end) in model.outside_range(&at) {
+            let further = |(_, v, e, _): &(crate::machinability::Variable, f64, f64, String)| {
+                (value / end).ln().abs() > (v / e).ln().abs()
+            };
+            match worst.iter_mut().find(|known| known.0 == variable) {
+                Some(known) if further(known) => *known = (variable, value, end, given.id.clone()),
+                Some(_) => {}
+                None => worst.push((variable, value, end, given.id.clone())),
+            }
+        }
+    }
+    for (variable, value, end, zone) in worst {
+        out.push(
+            Finding::new("outside_data_range", pointer)
+                .measured(value, end, variable.unit())
+                .with("variable", variable.field())
+                .with("model", name.to_owned())
+                .with("zone", zone),
+        );
+    }
+}
+
+fn lives(outcome: &Outcome, out: &mut Vec<Finding>) {
+    let (least, most) = USUAL_LIFE_MIN;
+    let far = |life: f64| if life < least { least / life } else { life / most };
+    let worst = outcome
+        .zones
+        .iter()
+        .filter_map(|zone| zone.tool_life_min.map(|life| (zone, life)))
+        .filter(|(_, life)| *life < least || *life > most)
+        .max_by(|a, b| far(a.1).total_cmp(&far(b.1)));
+    if let Some((zone, life)) = worst {
+        let limit = if life < least { least } else { most };
+        out.push(
+            Finding::new("tool_life_extrapolated", "/models/tool_life")
+                .measured(life, limit, "min")
+                .with("zone", zone.id.clone()),
+        );
+    }
+}
+
+/// Zones over a diameter step, and walls so thin that the beam is not all that yields.
+fn shapes(job: &Job, out: &mut Vec<Finding>) {
+    let Some(shaft) = &job.shaft else { return };
+    for (i, zone) in job.zones.iter().enumerate() {
+        let mut left = 0.0;
+        let mut diameters: Vec<f64> = Vec::new();
+        let mut thinnest: Option<f64> = None;
+        for segment in &shaft.segments {
+            let right = left + segment.length_mm;
+            if right > zone.z_start_mm + 1e-6 && left < zone.z_end_mm - 1e-6 {
+                diameters.push(segment.diameter_mm);
+                if segment.bore_diameter_mm > 0.0 {
+                    let ratio = (segment.diameter_mm - segment.bore_diameter_mm) / segment.diameter_mm;
+                    thinnest = Some(thinnest.map_or(ratio, |least: f64| least.min(ratio)));
+                }
+            }
+            left = right;
+        }
+        if diameters.windows(2).any(|pair| (pair[1] - pair[0]).abs() > 1e-9) {
+            out.push(Finding::new("zone_straddles_diameter_step", format!("/zones/{i}")).with("zone", zone.id.clone()));
+        }
+        if let Some(ratio) = thinnest.filter(|ratio| *ratio < THIN_WALL)
+            && zone.compliance_um_per_n.is_none()
+        {
+            out.push(
+                Finding::new("thin_wall_local_deflection", format!("/zones/{i}/compliance_um_per_n"))
+                    .measured(ratio, THIN_WALL, "1")
+                    .with("zone", zone.id.clone()),
+            );
+        }
+    }
+}
+
+/// Inputs that change nothing.
+fn unused(job: &Job, out: &mut Vec<Finding>) {
+    let mut idle = |condition: bool, pointer: &str| {
+        if condition {
+            out.push(Finding::new("unused_input", pointer));
+        }
+    };
+    idle(job.shaft.is_none() && !job.supports.is_empty(), "/supports");
+    idle(
+        job.variables.fixed_feed_mm_per_rev.is_some() && job.variables.feed != super::input::FeedMode::Fixed,
+        "/variables/fixed_feed_mm_per_rev",
+    );
+    idle(
+        job.variables.fixed_speed_m_per_min.is_some() && job.variables.speed != super::input::SpeedMode::Fixed,
+        "/variables/fixed_speed_m_per_min",
+    );
+    let limits = job.limits.as_ref();
+    idle(
+        limits.is_some_and(|limits| limits.feed_step_ratio_max.is_some()) && job.zones.len() < 2,
+        "/limits/feed_step_ratio_max",
+    );
+}
+
+/// What is to be said of the answer, the most important first.
+pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
+    let mut out = Vec::new();
+    let percent = if matches!(job.objective, Goal::Hardening {}) { "percentage points" } else { "percent" };
+    match outcome.binding.first() {
+        Some(first) => out.push(
+            Message::new("limit_costs_most")
+                .with("constraint", first.constraint.clone())
+                .with("zone", first.zone.clone())
+                .with("gain_percent", first.gain_percent)
+                .with("gain_unit", percent)
+                .with("objective", job.objective.name())
+                .with("others", outcome.binding.len() - 1),
+        ),
+        None if outcome.equal_deflection.is_none() => out.push(Message::new("nothing_binds")),
+        None => {}
+    }
+    if let Some(constant) = &outcome.comparison.constant_feed {
+        out.push(
+            Message::new("against_constant_feed")
+                .with("feed_mm_per_rev", constant.feed_mm_per_rev)
+                .with("constant_min", constant.cutting_time_min)
+                .with("time_min", outcome.cutting_time_min)
+                .with("saved_percent", constant.time_saved_percent),
+        );
+    }
+    if let Some(rule) = &outcome.comparison.equal_deflection {
+        let least = rule.rule_feed_mm_per_rev.iter().copied().fold(f64::INFINITY, f64::min);
+        out.push(
+            Message::new("against_equal_deflection")
+                .with("least_feed_mm_per_rev", least)
+                .with("clamped", rule.clamped.len())
+                .with("rule_min", rule.cutting_time_min)
+                .with("time_min", outcome.cutting_time_min),
+        );
+    }
+    if let Some(rule) = &outcome.equal_deflection {
+        out.push(
+            Message::new("equal_deflection_clamped")
+                .with("clamped", rule.clamped.len())
+                .with("zones", outcome.zones.len())
+                .with("before_um", rule.largest_before_um)
+                .with("after_um", rule.largest_deflection_um)
+                .with("before_min", rule.cutting_time_before_min)
+                .with("after_min", rule.cutting_time_min),
+        );
+    }
+    if let (Some(usage), None) = (outcome.tool_usage, outcome.parts_per_edge) {
+        out.push(Message::new("edge_used").with("usage", usage));
+    }
+    if let (Some(parts), Some(usage)) = (outcome.parts_per_edge, outcome.tool_usage) {
+        out.push(Message::new("whole_parts").with("parts", f64::from(parts)).with("usage", usage));
+    }
+    if outcome.edges.len() > 1 {
+        out.push(Message::new("edge_changes").with("edges", outcome.edges.len()));
+    }
+    if let Some(found) = &outcome.continuous {
+        out.push(
+            Message::new("fewest_zones")
+                .with("segments", f64::from(found.segments))
+                .with("loss_percent", found.loss_percent)
+                .with("continuous_min", found.cutting_time_min),
+        );
+    }
+    if let Some(passes) = &outcome.passes {
+        out.push(
+            Message::new("passes_found")
+                .with("roughing", f64::from(passes.roughing_passes))
+                .with("finishing_mm", passes.finishing_depth_mm),
+        );
+    }
+    if let Some(path) = &outcome.compensated_path {
+        out.push(
+            Message::new("path_leaves")
+                .with("before_um", path.largest_uncompensated_um)
+                .with("after_um", path.largest_compensated_um),
+        );
+    }
+    if outcome.equal_deflection.is_some() {
+        out.push(Message::new("rule_has_no_optimum"));
+    } else {
+        let gap = outcome.certificate.duality_gap.max(1e-16);
+        out.push(
+            Message::new("optimum_within")
+                .with("gap", gap)
+                .with("iterations", f64::from(outcome.certificate.iterations)),
+        );
+    }
+    out
+}
+
+/// The equations that acted.
+pub(super) fn basis(job: &Job) -> Vec<Basis> {
+    let mut used = vec![
+        Basis { equation: "feed/2.1", source: "machinability models of the job" },
+        Basis { equation: "feed/6.1", source: "geometric program in ln V, ln S" },
+        Basis {
+            equation: "feed/6.3",
+            source: "primal-dual interior-point method (Mehrotra), optimality by its multipliers",
+        },
+    ];
+    if job.shaft.is_some() {
+        used.push(Basis { equation: "feed/3.1", source: "beam of the deflection calculator" });
+    }
+    match job.method {
+        Method::EqualDeflection { .. } => {
+            used.push(Basis { equation: "feed/4.1", source: "turning of gas-turbine shafts of variable stiffness" });
+        }
+        Method::Continuous { .. } => {
+            used.push(Basis { equation: "feed/8.3", source: "dynamic programming over the grid" })
+        }
+        Method::Optimal => {}
+    }
+    if job.passes.is_some() {
+        used.push(Basis { equation: "feed/7.1", source: "enumeration of passes" });
+    }
+    if job.compensation.is_some() {
+        used.push(Basis { equation: "feed/9.1", source: "deflection calculator" });
+    }
+    used.extend(
+        job.effects.iter().map(|effect| Basis { equation: effect.cause().equation, source: "catalogue of effects" }),
+    );
+    used
+}

@@ -1,0 +1,192 @@
+//! Feed schedules: which feed and speed in which zone is fastest, cheapest or best within all limits?
+//!
+//! A shaft of varying stiffness is turned zone by zone. Tool life, roughness, hardening and forces are power laws of
+//! speed, feed and depth, or linear in their logarithms ([`crate::machinability`]); the deflection is the beam's
+//! compliance times the passive force ([`crate::num::beam`]). In ln V and ln S all limits are convex: a geometric
+//! program ([`crate::num::gp`]), solved to a certificate, with the price of every limit as its multiplier. A conflict
+//! is answered with a smallest set of limits that conflict and the least relaxation.
+//!
+//! The way of a job: `input`, `models`, `plan` -> `check`, `effects` -> `case` (zones with compliances and acting
+//! models) -> `program` (rows and sums with names) -> `solve` (once, over whole parts per edge, or by successive
+//! linearisation), or `infeasible` -> `assess`, `binding` -> `run` (comparison, trade-off) -> `output`, `picture`,
+//! `toolpath`, `advice`. `rule` is the source paper's method; `continuous` and `segments` find zones; `passes` finds
+//! the split into passes; `compensated` asks the deflection calculator for the path; `forward` gives the models to the
+//! diagnosis. `fit` fits the models to trials.
+
+mod acting;
+mod advice;
+mod assess;
+mod binding;
+mod case;
+mod check;
+mod compensated;
+mod compliance;
+mod continuous;
+mod effects;
+pub mod fit;
+mod forward;
+mod infeasible;
+mod input;
+mod models;
+mod output;
+mod passes;
+mod picture;
+mod plan;
+mod program;
+mod rule;
+mod run;
+mod segments;
+mod solve;
+mod toolpath;
+
+pub use forward::{MachinabilityAllowances, MachinabilityPoint, MachinabilityRun};
+pub use input::{
+    Coupling, CouplingTerm, CustomLimit, FeedMode, Goal, Job, Limits, MAX_ZONES, Machine, Reference, SpeedMode,
+    UsageScope, Variables, Zone,
+};
+pub use models::{FurtherModel, Models, Output};
+pub use output::{
+    Binding, Certificate, Comparison, CompensatedPath, ConstantFeed, Continuous, EdgeUse, EqualDeflection, NamedValue,
+    Outcome, PassTrial, PassesOutcome, PathOfZone, SegmentTime, Solver, SurfaceUsage, TradePoint, ZoneOutcome,
+};
+pub use plan::{Compensation, EqualTarget, Method, PassPlan, TradeOff, TradedLimit};
+
+use crate::calculator::{
+    Answer, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Meta, Monitor, Program, Table,
+};
+use crate::{force, shaft};
+
+/// The calculator.
+#[derive(Debug, Clone, Copy)]
+pub struct FeedSchedule;
+
+impl Calculator for FeedSchedule {
+    type Input = Job;
+    type Output = Outcome;
+
+    const META: Meta = Meta {
+        id: "feed-schedule",
+        kind: CalculatorKind::Calculator,
+        version: 1,
+        title: "Feed schedule",
+        question: "Which feed and speed in which zone: fastest within tolerance, roughness, tool life and power?",
+        summary: "From a shaft in its supports, models of force, tool life and surface, and limits: feed and speed of \
+                  every zone for least time, least cost or best surface, proven optimal, with the price of every limit \
+                  that binds; or, where limits conflict, which ones and by how little they must give.",
+        references: &[
+            "Study of the influence of cutting conditions on accuracy and surface layer: turning of gas-turbine shafts of variable stiffness (equal deflection by zone)",
+            "Ermer, Optimization of the constrained machining economics problem by geometric programming, J. Eng. Ind. 93 (1971) 1067-1072",
+            "Mehrotra, On the implementation of a primal-dual interior point method, SIAM J. Optim. 2 (1992) 575-601",
+            "Boyd, Kim, Vandenberghe, Hassibi, A tutorial on geometric programming, Optim. Eng. 8 (2007) 67-127",
+        ],
+        examples: &[
+            Example {
+                id: "paper",
+                title: "Gas-turbine shaft of VT9 in six zones: the source paper's setting, least time",
+                job: include_str!("examples/paper.json"),
+            },
+            Example {
+                id: "equal_deflection",
+                title: "The source paper's own rule on the same shaft",
+                job: include_str!("examples/equal_deflection.json"),
+            },
+            Example {
+                id: "compensated",
+                title: "Feed limits only what the compensated path leaves; the path comes with the schedule, whole parts per edge",
+                job: include_str!("examples/compensated.json"),
+            },
+            Example {
+                id: "zones_found",
+                title: "Zones found: a continuous schedule cut into the fewest within one percent",
+                job: include_str!("examples/zones_found.json"),
+            },
+            Example {
+                id: "passes",
+                title: "Number of passes and depth of the last for least cost (Shin-Joo, Chen-Tsai)",
+                job: include_str!("examples/passes.json"),
+            },
+        ],
+        study_outputs: &["/objective", "/cutting_time_min", "/tool_usage", "/largest_deflection_um"],
+        codes: CODES,
+        figures: picture::FIGURE_IDS,
+        tables: picture::TABLE_IDS,
+        has_program: true,
+    };
+
+    fn fill(job: &mut Job) {
+        if let Some(shaft) = &mut job.shaft {
+            shaft.fill();
+        }
+        for support in &mut job.supports {
+            support.fill();
+        }
+        if let Some(force) = &mut job.force {
+            force.fill();
+        }
+        let force = job.force.clone();
+        effects::fill(job);
+        job.models.fill(force.as_ref());
+    }
+
+    fn cost(job: &Job) -> Cost {
+        let zones = job.zones.len() as f64;
+        // Measured: about 7 us per zone and solve, twice for the comparison.
+        let mut ms = 0.1 + 0.03 * zones;
+        if let Some(plan) = &job.passes {
+            ms += 0.03 * zones * 55.0 * f64::from(plan.roughing_passes_max + 1);
+        }
+        if let Some(wanted) = &job.trade_off {
+            ms += 0.015 * zones * f64::from(wanted.count);
+        }
+        if let Some(wanted) = &job.compensation {
+            ms += zones * (0.2 + 0.004 * f64::from(wanted.stations_per_zone));
+        }
+        let mut driver = "/zones";
+        if let Method::Continuous { grid_points, segments_max, .. } = &job.method {
+            let (points, segments) = (f64::from(*grid_points), f64::from(*segments_max));
+            ms += points * points * segments * 1e-6 + points * 0.05 + segments * segments * 0.02;
+            driver = "/method/grid_points";
+        }
+        if !job.effects.is_empty() {
+            ms *= 20.0;
+        }
+        if job.limits.as_ref().is_some_and(|limits| limits.whole_parts_per_edge) {
+            ms *= 10.0;
+        }
+        Cost { ms, bytes: 1_000_000 + job.zones.len() as u64 * 20_000, driver }
+    }
+
+    fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
+        run::run(job, monitor)
+    }
+
+    fn figures(job: &Job, outcome: &Outcome) -> Vec<Figure> {
+        picture::figures(job, outcome)
+    }
+
+    fn tables(_job: &Job, outcome: &Outcome) -> Vec<Table> {
+        picture::tables(outcome)
+    }
+
+    fn program(job: &Job, outcome: &Outcome) -> Option<Result<Program, Failure>> {
+        Some(toolpath::program(job, outcome))
+    }
+}
+
+/// Everything that this calculator may utter, from where it is said.
+const CODES: Codes = Codes {
+    faults: &[check::CODES, effects::CODES, shaft::check::CODES, force::FAULT_CODES],
+    failures: &[&[
+        "no_zones",
+        "nothing_bends",
+        "schedule_out_of_reach",
+        "infeasible_schedule",
+        "no_pass_split",
+        "too_few_segments",
+        "gradient_with_bending_model",
+    ]],
+    warnings: &[advice::WARNING_CODES],
+    explanations: &[advice::EXPLANATION_CODES],
+    stages: &[&["stage_passes", "stage_continuous", "stage_segments", "stage_comparison", "stage_path", "stage_done"]],
+    labels: &[picture::LABEL_CODES],
+};

@@ -1,0 +1,494 @@
+//! The answer.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+use utoipa::openapi::Schema;
+use utoipa::openapi::extensions::Extensions;
+use utoipa::openapi::schema::{ArrayBuilder, ObjectBuilder, SchemaType, Type};
+
+/// Feed and speed of every zone, what they give, which limits bind, and how sure it is.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Outcome {
+    /// What was to be least, in the unit of `objective_unit`.
+    #[schema(example = 39.4, extensions(("x-unit" = json!("as objective_unit says"))))]
+    pub objective: f64,
+    /// Which quantity that is: `time`, `cost`, `deflection`, `roughness`, `hardening`.
+    #[schema(example = "time")]
+    pub objective_kind: String,
+    /// Its unit: `min`, `money`, `1` (relative to the limit), `percent`.
+    #[schema(example = "min")]
+    pub objective_unit: String,
+    /// Time in the cut.
+    #[schema(example = 39.4, extensions(("x-unit" = json!("min"))))]
+    pub cutting_time_min: f64,
+    /// Share of a cutting edge that the part uses, Σ time/tool life.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 0.62, extensions(("x-unit" = json!("1"))))]
+    pub tool_usage: Option<f64>,
+    /// The same by surface.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tool_usage_by_surface: Vec<SurfaceUsage>,
+    /// Parts that one edge serves, where a whole number was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 2, extensions(("x-unit" = json!("1"))))]
+    pub parts_per_edge: Option<u32>,
+    /// Where the edge is changed, if the part needs several: contiguous surfaces per edge.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub edges: Vec<EdgeUse>,
+    /// Largest radial deflection; the diameter error is twice that. Not reduced by compensation.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 10.0, extensions(("x-unit" = json!("um"))))]
+    pub largest_deflection_um: Option<f64>,
+    /// Largest deflection over least.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 4.7, extensions(("x-unit" = json!("1"))))]
+    pub deflection_spread: Option<f64>,
+    /// Largest roughness.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 1.6, extensions(("x-unit" = json!("um"))))]
+    pub largest_roughness_um: Option<f64>,
+    /// Largest roughness over least.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 1.1, extensions(("x-unit" = json!("1"))))]
+    pub roughness_spread: Option<f64>,
+    /// The zones in order; with several passes the roughing of a zone before its finish.
+    pub zones: Vec<ZoneOutcome>,
+    /// Limits that bind, the most costly first.
+    pub binding: Vec<Binding>,
+    /// How near to the optimum the answer provably is.
+    pub certificate: Certificate,
+    /// The same part with one feed, and by the source paper's rule.
+    pub comparison: Comparison,
+    /// The equal-deflection rule, where it is the method.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub equal_deflection: Option<EqualDeflection>,
+    /// The continuous schedule and how it was cut into zones, where zones were found.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub continuous: Option<Continuous>,
+    /// The splits into passes that were tried, where passes were asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub passes: Option<PassesOutcome>,
+    /// The curve of the objective over a tolerance, where one was asked for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub trade_off: Vec<TradePoint>,
+    /// The compensated path, where one was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub compensated_path: Option<CompensatedPath>,
+}
+
+/// A zone's feed and speed and what they give.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ZoneOutcome {
+    /// The zone.
+    #[schema(example = "z1")]
+    pub id: String,
+    /// Where it begins.
+    #[schema(example = 0.0, extensions(("x-unit" = json!("mm"))))]
+    pub z_start_mm: f64,
+    /// Where it ends.
+    #[schema(example = 150.0, extensions(("x-unit" = json!("mm"))))]
+    pub z_end_mm: f64,
+    /// Its diameter.
+    #[schema(example = 80.0, extensions(("x-unit" = json!("mm"))))]
+    pub diameter_mm: f64,
+    /// Depth of cut.
+    #[schema(example = 0.3, extensions(("x-unit" = json!("mm"))))]
+    pub depth_mm: f64,
+    /// How often it is cut.
+    #[schema(example = 1, extensions(("x-unit" = json!("1"))))]
+    pub passes: u32,
+    /// Feed.
+    #[schema(example = 0.15, extensions(("x-unit" = json!("mm/rev"))))]
+    pub feed_mm_per_rev: f64,
+    /// Cutting speed.
+    #[schema(example = 60.0, extensions(("x-unit" = json!("m/min"))))]
+    pub speed_m_per_min: f64,
+    /// Spindle speed.
+    #[schema(example = 238.7, extensions(("x-unit" = json!("rev/min"))))]
+    pub spindle_speed_rpm: f64,
+    /// Time in the cut, all passes.
+    #[schema(example = 4.2, extensions(("x-unit" = json!("min"))))]
+    pub cutting_time_min: f64,
+    /// Largest radial compliance.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 0.21, extensions(("x-unit" = json!("um/N"))))]
+    pub compliance_um_per_n: Option<f64>,
+    /// Passive force.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 66.0, extensions(("x-unit" = json!("N"))))]
+    pub force_y_n: Option<f64>,
+    /// Main force.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 96.0, extensions(("x-unit" = json!("N"))))]
+    pub force_z_n: Option<f64>,
+    /// Power of the motor.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 0.13, extensions(("x-unit" = json!("kW"))))]
+    pub power_kw: Option<f64>,
+    /// Torque at the spindle.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 4.8, extensions(("x-unit" = json!("N m"))))]
+    pub torque_n_m: Option<f64>,
+    /// Largest radial deflection, not reduced by compensation.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 10.0, extensions(("x-unit" = json!("um"))))]
+    pub deflection_um: Option<f64>,
+    /// Error of the diameter by it, twice the deflection.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 20.0, extensions(("x-unit" = json!("um"))))]
+    pub diameter_error_um: Option<f64>,
+    /// Roughness.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 1.6, extensions(("x-unit" = json!("um"))))]
+    pub roughness_um: Option<f64>,
+    /// Degree of hardening.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 6.2, extensions(("x-unit" = json!("percent"))))]
+    pub hardening_percent: Option<f64>,
+    /// Depth of hardening.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 71.2, extensions(("x-unit" = json!("um"))))]
+    pub hardening_depth_um: Option<f64>,
+    /// Tool life at these conditions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 60.0, extensions(("x-unit" = json!("min"))))]
+    pub tool_life_min: Option<f64>,
+    /// Share of a cutting edge used here.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 0.07, extensions(("x-unit" = json!("1"))))]
+    pub tool_usage: Option<f64>,
+    /// Further outputs of the models.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub further: Vec<NamedValue>,
+    /// Limits that bind here, the most costly first.
+    #[schema(example = json!(["deflection"]))]
+    pub active: Vec<String>,
+}
+
+/// A further output.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NamedValue {
+    /// Its name.
+    #[schema(example = "cost")]
+    pub name: String,
+    /// Its value, in `unit`.
+    #[schema(example = 46.6, extensions(("x-unit" = json!("as unit says"))))]
+    pub value: f64,
+    /// Its unit.
+    #[schema(example = "rub")]
+    pub unit: String,
+}
+
+/// Use of a cutting edge on one surface.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SurfaceUsage {
+    /// The surface.
+    #[schema(example = "A")]
+    pub surface: String,
+    /// Share of a cutting edge.
+    #[schema(example = 0.4, extensions(("x-unit" = json!("1"))))]
+    pub tool_usage: f64,
+}
+
+/// What one cutting edge cuts.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct EdgeUse {
+    /// The surfaces, in order.
+    #[schema(example = json!(["A", "B"]))]
+    pub surfaces: Vec<String>,
+    /// Share of the edge that they use; above 1 where one surface alone uses more.
+    #[schema(example = 0.9, extensions(("x-unit" = json!("1"))))]
+    pub tool_usage: f64,
+}
+
+/// A limit that binds and what it costs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Binding {
+    /// The limit.
+    #[schema(example = "deflection")]
+    pub constraint: String,
+    /// Where it holds.
+    #[schema(example = "z5")]
+    pub zone: String,
+    /// The limit, in `unit`.
+    #[schema(example = 10.0, extensions(("x-unit" = json!("as unit says"))))]
+    pub limit: f64,
+    /// Its unit.
+    #[schema(example = "um")]
+    pub unit: String,
+    /// Shadow price: -d ln(objective)/d ln(limit), with the objective `hardening` its fall in percentage points; for limits on semi-log models per unit of the limit.
+    #[schema(example = 0.34, extensions(("x-unit" = json!("1"))))]
+    pub multiplier: f64,
+    /// Whether the multiplier is per unit of the limit.
+    #[schema(example = false)]
+    pub per_unit: bool,
+    /// What one percent more of the limit takes off the objective, in percent of it; with the objective `hardening` in percentage points.
+    #[schema(example = 0.34, extensions(("x-unit" = json!("percent"))))]
+    pub gain_percent: f64,
+    /// Other limits that bind at the same place in the same way: only the sum of their multipliers is certain.
+    #[schema(example = false)]
+    pub degenerate: bool,
+}
+
+/// How near to the optimum the answer provably is.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Certificate {
+    /// Complementarity gap: ln(objective), or with the objective `hardening` the objective, is at most so much above the least possible.
+    #[schema(example = 4e-11, extensions(("x-unit" = json!("1"))))]
+    pub duality_gap: f64,
+    /// Largest component of the gradient of the Lagrangian.
+    #[schema(example = 3e-10, extensions(("x-unit" = json!("1"))))]
+    pub kkt_residual: f64,
+    /// Largest violation of a limit, in logarithms, or in the unit of a semi-log limit.
+    #[schema(example = 1e-12, extensions(("x-unit" = json!("1"))))]
+    pub primal_residual: f64,
+    /// Newton steps.
+    #[schema(example = 9, extensions(("x-unit" = json!("1"))))]
+    pub iterations: u32,
+    /// Who found it.
+    #[schema(example = "interior_point")]
+    pub solver: Solver,
+    /// Programs solved in turn because a model bends; 0 where every model is exact in the program.
+    #[schema(example = 0, extensions(("x-unit" = json!("1"))))]
+    pub linearisations: u32,
+    /// Whether only a local optimum is claimed: an effect makes the problem not convex.
+    #[schema(example = false)]
+    pub local: bool,
+    /// Whether several schedules share the optimum and the best of them by a second objective was taken.
+    #[schema(example = false)]
+    pub tie_broken: bool,
+}
+
+/// Who found the optimum.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Solver {
+    /// The product's own interior-point method.
+    InteriorPoint,
+    /// The general conic solver, where the other stalled.
+    Conic,
+    /// No optimum is claimed: a rule was applied.
+    Rule,
+}
+
+/// Other schedules of the same part.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Comparison {
+    /// The best single feed that meets all limits, speed as in the job; absent where none does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub constant_feed: Option<ConstantFeed>,
+    /// The source paper's rule from that feed; absent where nothing bends.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub equal_deflection: Option<EqualDeflection>,
+}
+
+/// The best single feed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ConstantFeed {
+    /// The feed.
+    #[schema(example = 0.07, extensions(("x-unit" = json!("mm/rev"))))]
+    pub feed_mm_per_rev: f64,
+    /// Time in the cut.
+    #[schema(example = 55.9, extensions(("x-unit" = json!("min"))))]
+    pub cutting_time_min: f64,
+    /// The objective.
+    #[schema(example = 55.9, extensions(("x-unit" = json!("as objective_unit says"))))]
+    pub objective: f64,
+    /// What the schedule saves of that time; negative where another objective takes longer.
+    #[schema(example = 29.5, extensions(("x-unit" = json!("percent"))))]
+    pub time_saved_percent: f64,
+}
+
+/// Feeds by the equal-deflection rule S_i = S_0 (delta_0/delta_i)^(1/s_y).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct EqualDeflection {
+    /// Feed that the rule starts from.
+    #[schema(example = 0.15, extensions(("x-unit" = json!("mm/rev"))))]
+    pub reference_feed_mm_per_rev: f64,
+    /// Deflection aimed at; absent where it is every zone's limit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 3.5, extensions(("x-unit" = json!("um"))))]
+    pub target_um: Option<f64>,
+    /// Largest deflection at the reference feed.
+    #[schema(example = 16.4, extensions(("x-unit" = json!("um"))))]
+    pub largest_before_um: f64,
+    /// Time in the cut at the reference feed.
+    #[schema(example = 37.8, extensions(("x-unit" = json!("min"))))]
+    pub cutting_time_before_min: f64,
+    /// Time in the cut by the rule.
+    #[schema(example = 120.0, extensions(("x-unit" = json!("min"))))]
+    pub cutting_time_min: f64,
+    /// Largest deflection by the rule.
+    #[schema(example = 5.0, extensions(("x-unit" = json!("um"))))]
+    pub largest_deflection_um: f64,
+    /// Feed that the rule asks for, by zone, before it is cut off.
+    #[schema(schema_with = feeds)]
+    pub rule_feed_mm_per_rev: Vec<f64>,
+    /// Zones whose feed was cut off at a bound.
+    #[schema(example = json!(["z2"]))]
+    pub clamped: Vec<String>,
+}
+
+/// The continuous schedule and how it was cut into zones.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Continuous {
+    /// Time in the cut with a feed that varies freely.
+    #[schema(example = 28.8, extensions(("x-unit" = json!("min"))))]
+    pub cutting_time_min: f64,
+    /// Zones found.
+    #[schema(example = 18, extensions(("x-unit" = json!("1"))))]
+    pub segments: u32,
+    /// Time that the zones found cost over the continuous schedule.
+    #[schema(example = 0.96, extensions(("x-unit" = json!("percent"))))]
+    pub loss_percent: f64,
+    /// Whether the loss asked for was reached.
+    #[schema(example = true)]
+    pub loss_reached: bool,
+    /// Cutting speed, where it is one for all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 60.0, extensions(("x-unit" = json!("m/min"))))]
+    pub speed_m_per_min: Option<f64>,
+    /// Grid of the continuous schedule.
+    #[schema(schema_with = stations)]
+    pub z_mm: Vec<f64>,
+    /// The feed on it.
+    #[schema(schema_with = feeds)]
+    pub feed_mm_per_rev: Vec<f64>,
+    /// Time over the number of zones.
+    pub by_segments: Vec<SegmentTime>,
+}
+
+/// Time with so many zones.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SegmentTime {
+    /// Zones.
+    #[schema(example = 3, extensions(("x-unit" = json!("1"))))]
+    pub segments: u32,
+    /// Least time in the cut.
+    #[schema(example = 30.8, extensions(("x-unit" = json!("min"))))]
+    pub cutting_time_min: f64,
+    /// Over the continuous schedule.
+    #[schema(example = 6.7, extensions(("x-unit" = json!("percent"))))]
+    pub loss_percent: f64,
+    /// Borders of the zones.
+    #[schema(schema_with = stations)]
+    pub boundaries_mm: Vec<f64>,
+}
+
+/// The split into passes and those that were tried.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PassesOutcome {
+    /// Roughing passes.
+    #[schema(example = 1, extensions(("x-unit" = json!("1"))))]
+    pub roughing_passes: u32,
+    /// Depth of each; absent without roughing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 3.0, extensions(("x-unit" = json!("mm"))))]
+    pub roughing_depth_mm: Option<f64>,
+    /// Depth of the finishing pass.
+    #[schema(example = 3.0, extensions(("x-unit" = json!("mm"))))]
+    pub finishing_depth_mm: f64,
+    /// The best of every number of passes.
+    pub tried: Vec<PassTrial>,
+}
+
+/// The best split with so many passes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PassTrial {
+    /// Roughing passes.
+    #[schema(example = 1, extensions(("x-unit" = json!("1"))))]
+    pub roughing_passes: u32,
+    /// Depth of the finishing pass.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 3.0, extensions(("x-unit" = json!("mm"))))]
+    pub finishing_depth_mm: Option<f64>,
+    /// The objective; absent where no depth is feasible.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 2.08, extensions(("x-unit" = json!("as objective_unit says"))))]
+    pub objective: Option<f64>,
+}
+
+/// A point of the trade-off.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TradePoint {
+    /// Factor on the limits.
+    #[schema(example = 0.5, extensions(("x-unit" = json!("1"))))]
+    pub factor: f64,
+    /// The objective; absent where no schedule exists.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 61.2, extensions(("x-unit" = json!("as objective_unit says"))))]
+    pub objective: Option<f64>,
+    /// Time in the cut.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 61.2, extensions(("x-unit" = json!("min"))))]
+    pub cutting_time_min: Option<f64>,
+    /// Share of a cutting edge.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 0.4, extensions(("x-unit" = json!("1"))))]
+    pub tool_usage: Option<f64>,
+}
+
+/// The path that takes the predicted deflection out.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CompensatedPath {
+    /// Moves of every zone.
+    pub zones: Vec<PathOfZone>,
+    /// Largest deviation of the diameter on the nominal path.
+    #[schema(example = 20.0, extensions(("x-unit" = json!("um"))))]
+    pub largest_uncompensated_um: f64,
+    /// Largest deviation of the diameter on this path, as predicted.
+    #[schema(example = 1.1, extensions(("x-unit" = json!("um"))))]
+    pub largest_compensated_um: f64,
+    /// Straight moves.
+    #[schema(example = 14, extensions(("x-unit" = json!("1"))))]
+    pub moves: u32,
+}
+
+/// Straight moves along a zone.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PathOfZone {
+    /// The zone.
+    #[schema(example = "z1")]
+    pub id: String,
+    /// Ends of the moves.
+    #[schema(schema_with = stations)]
+    pub z_mm: Vec<f64>,
+    /// Diameter to command there.
+    #[schema(schema_with = diameters)]
+    pub commanded_diameter_mm: Vec<f64>,
+}
+
+fn list(unit: &'static str, description: &'static str, example: f64) -> Schema {
+    let extensions = Extensions::builder().add("x-unit", unit).build();
+    let item = ObjectBuilder::new().schema_type(SchemaType::new(Type::Number)).extensions(Some(extensions));
+    ArrayBuilder::new().items(item).description(Some(description)).examples([[example]]).into()
+}
+
+fn feeds() -> Schema {
+    list("mm/rev", "Feeds.", 0.15)
+}
+
+fn stations() -> Schema {
+    list("mm", "Stations from the headstock end.", 320.8)
+}
+
+fn diameters() -> Schema {
+    list("mm", "Diameters.", 79.98)
+}

@@ -1,0 +1,640 @@
+//! From a case to a geometric program with named limits (`feed/6.1`).
+
+use std::borrow::Cow;
+use std::f64::consts::PI;
+
+use crate::calculator::ConstraintName;
+use crate::num::gp::{Affines, Objective, Program};
+
+use super::acting::Form;
+use super::case::{Case, ZoneCase};
+use super::input::{FeedMode, Goal, SpeedMode};
+use super::models::Output;
+
+/// A kind of limit, as answers name it.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(super) enum Kind {
+    Deflection,
+    Spread,
+    Roughness,
+    Hardening,
+    HardeningDepth,
+    ToolLifeMin,
+    ToolUsage,
+    TimeMax,
+    Power,
+    Torque,
+    ForceZ,
+    ForceY,
+    RpmMin,
+    RpmMax,
+    FeedRateMax,
+    FeedMin,
+    FeedMax,
+    SpeedMin,
+    SpeedMax,
+    FeedStep,
+    Custom(String),
+    Coupling(String),
+    /// A step of successive linearisation may not go further.
+    Trust,
+    /// The objective, held in the second solve.
+    Held,
+    /// Part of a least-of-the-largest objective, no limit of the job.
+    Epigraph,
+}
+
+impl Kind {
+    pub(super) fn name(&self) -> Cow<'static, str> {
+        Cow::Borrowed(match self {
+            Self::Deflection => "deflection",
+            Self::Spread => "deflection_spread",
+            Self::Roughness => "roughness",
+            Self::Hardening => "hardening",
+            Self::HardeningDepth => "hardening_depth",
+            Self::ToolLifeMin => "tool_life_min",
+            Self::ToolUsage => "tool_usage",
+            Self::TimeMax => "time_max",
+            Self::Power => "power",
+            Self::Torque => "torque",
+            Self::ForceZ => "force_z",
+            Self::ForceY => "force_y",
+            Self::RpmMin => "rpm_min",
+            Self::RpmMax => "rpm_max",
+            Self::FeedRateMax => "feed_rate_max",
+            Self::FeedMin => "feed_min",
+            Self::FeedMax => "feed_max",
+            Self::SpeedMin => "speed_min",
+            Self::SpeedMax => "speed_max",
+            Self::FeedStep => "feed_step",
+            Self::Custom(name) | Self::Coupling(name) => return Cow::Owned(name.clone()),
+            Self::Trust => "trust",
+            Self::Held => "held",
+            Self::Epigraph => "largest",
+        })
+    }
+
+    /// Whether the least relaxation may loosen it before machine and data ranges (`feed/6.5`).
+    pub(super) fn is_requirement(&self) -> bool {
+        matches!(
+            self,
+            Self::Deflection
+                | Self::Spread
+                | Self::Roughness
+                | Self::Hardening
+                | Self::HardeningDepth
+                | Self::ToolUsage
+                | Self::ToolLifeMin
+                | Self::TimeMax
+                | Self::ForceZ
+                | Self::ForceY
+                | Self::FeedStep
+        )
+    }
+
+    /// Whether it is a limit of the job.
+    pub(super) fn is_limit(&self) -> bool {
+        !matches!(self, Self::Trust | Self::Held | Self::Epigraph)
+    }
+}
+
+/// Where a limit holds.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(super) enum Place {
+    Zone(usize),
+    Part,
+    Surface(usize),
+    Zones(Vec<usize>),
+}
+
+/// Name, place and size of a limit.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Label {
+    pub kind: Kind,
+    pub place: Place,
+    /// The limit in its unit.
+    pub limit: f64,
+    pub unit: &'static str,
+    /// The row is in units of the limit, not in logarithms: a semi-log model.
+    pub plain: bool,
+    /// A lower limit: its relaxation divides.
+    pub lower: bool,
+}
+
+impl Label {
+    pub(super) fn name(&self, case: &Case) -> ConstraintName {
+        let zone = match &self.place {
+            Place::Zone(i) => case.zones[*i].id.clone(),
+            Place::Part => "part".to_owned(),
+            Place::Surface(s) => case.surfaces[*s].clone(),
+            Place::Zones(zones) => zones.iter().map(|&i| case.zones[i].id.as_str()).collect::<Vec<_>>().join("|"),
+        };
+        ConstraintName { constraint: self.kind.name().into_owned(), zone }
+    }
+}
+
+/// ln V or ln S of a zone: a variable of the program plus a constant, or a constant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Source {
+    pub variable: Option<usize>,
+    pub constant: f64,
+}
+
+impl Source {
+    pub(super) fn at(&self, y: &[f64]) -> f64 {
+        self.variable.map_or(0.0, |v| y[v]) + self.constant
+    }
+}
+
+/// A program with what its rows and variables mean.
+#[derive(Debug, Clone)]
+pub(super) struct Built {
+    pub program: Program,
+    pub rows: Vec<Label>,
+    pub sums: Vec<Label>,
+    pub speed: Vec<Source>,
+    pub feed: Vec<Source>,
+    /// Constant part of the objective: fixed times and costs, tool parts of whole edges.
+    pub fixed: f64,
+}
+
+/// What differs from the case as it stands.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Variation<'a> {
+    /// A whole number of parts per edge.
+    pub parts_per_edge: Option<u32>,
+    /// Where bending models are linearised: ln V, ln S per zone, and how far the step may go.
+    pub about: Option<(&'a [(f64, f64)], f64)>,
+}
+
+/// What the objective's terms are made of: money or minutes per minute in the cut and per edge, and fixed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Rates {
+    pub per_minute: f64,
+    pub per_edge: f64,
+    pub fixed: f64,
+}
+
+impl Rates {
+    pub(super) fn of(case: &Case) -> Option<Self> {
+        match case.goal {
+            Goal::Time { tool_change_time_min, fixed_time_min } => Some(Self {
+                per_minute: 1.0,
+                per_edge: tool_change_time_min,
+                fixed: fixed_time_min + case.passes_time_min,
+            }),
+            Goal::Cost { machine_rate_per_min, tool_change_time_min, edge_cost, fixed_time_min, fixed_cost } => {
+                Some(Self {
+                    per_minute: machine_rate_per_min,
+                    per_edge: machine_rate_per_min * tool_change_time_min + edge_cost,
+                    fixed: machine_rate_per_min * (fixed_time_min + case.passes_time_min) + fixed_cost,
+                })
+            }
+            Goal::Deflection {} | Goal::Roughness {} | Goal::Hardening {} => None,
+        }
+    }
+}
+
+struct Builder<'a> {
+    case: &'a Case,
+    variation: &'a Variation<'a>,
+    speed: Vec<Source>,
+    feed: Vec<Source>,
+    local: usize,
+    common: usize,
+    rows: Affines,
+    labels: Vec<Label>,
+}
+
+/// The program of a case.
+pub(super) fn build(case: &Case, variation: &Variation<'_>) -> Built {
+    let n = case.zones.len();
+    let (speed, feed, local, common) = sources(case);
+    let mut builder = Builder {
+        case,
+        variation,
+        speed,
+        feed,
+        local,
+        common,
+        rows: Affines::with_capacity(12 * n, 24 * n),
+        labels: Vec::with_capacity(12 * n),
+    };
+    for i in 0..n {
+        builder.zone(i);
+    }
+    builder.spread();
+    builder.couplings();
+    let (sums, sum_labels) = builder.sums();
+    let (objective, fixed) = builder.objective();
+    let mut start = vec![0.0; builder.local + builder.common];
+    builder.middle(&mut start);
+    builder.trust();
+    Built {
+        program: Program { local: builder.local, common: builder.common, objective, rows: builder.rows, sums, start },
+        rows: builder.labels,
+        sums: sum_labels,
+        speed: builder.speed,
+        feed: builder.feed,
+        fixed,
+    }
+}
+
+/// Variables of every zone; those that are common stand behind the chain.
+fn sources(case: &Case) -> (Vec<Source>, Vec<Source>, usize, usize) {
+    let v = &case.variables;
+    let n = case.zones.len();
+    let (own_speed, own_feed) = (v.speed == SpeedMode::PerZone, v.feed == FeedMode::PerZone);
+    let stride = usize::from(own_speed) + usize::from(own_feed);
+    let local = n * stride;
+    let mut common = 0;
+    let mut shared = |wanted: bool| {
+        wanted.then(|| {
+            common += 1;
+            local + common - 1
+        })
+    };
+    let common_speed = shared(matches!(v.speed, SpeedMode::ConstantSpeed | SpeedMode::ConstantRpm));
+    let common_feed = shared(v.feed == FeedMode::Constant);
+    let speed = case
+        .zones
+        .iter()
+        .enumerate()
+        .map(|(i, zone)| match v.speed {
+            SpeedMode::PerZone => Source { variable: Some(i * stride), constant: 0.0 },
+            SpeedMode::ConstantSpeed => Source { variable: common_speed, constant: 0.0 },
+            SpeedMode::ConstantRpm => {
+                Source { variable: common_speed, constant: (PI * zone.diameter_mm / 1000.0).ln() }
+            }
+            SpeedMode::Fixed => Source { variable: None, constant: v.fixed_speed_m_per_min.unwrap_or(f64::NAN).ln() },
+        })
+        .collect();
+    let feed = (0..n)
+        .map(|i| match v.feed {
+            FeedMode::PerZone => Source { variable: Some(i * stride + stride - 1), constant: 0.0 },
+            FeedMode::Constant => Source { variable: common_feed, constant: 0.0 },
+            FeedMode::Fixed => Source { variable: None, constant: v.fixed_feed_mm_per_rev.unwrap_or(f64::NAN).ln() },
+        })
+        .collect();
+    (speed, feed, local, common)
+}
+
+impl Builder<'_> {
+    /// Entries and constant of v ln V_i + s ln S_i + c.
+    fn affine(&self, i: usize, v: f64, s: f64, c: f64) -> ([(usize, f64); 2], f64) {
+        let (speed, feed) = (self.speed[i], self.feed[i]);
+        let entry = |source: Source, a: f64| source.variable.map_or((0, 0.0), |variable| (variable, a));
+        // A fixed speed may stand beside any exponent; 0 times its logarithm is 0 also where none is given.
+        let fixed = |source: Source, a: f64| if a == 0.0 { 0.0 } else { a * source.constant };
+        ([entry(speed, v), entry(feed, s)], c + fixed(speed, v) + fixed(feed, s))
+    }
+
+    fn row(&mut self, i: usize, v: f64, s: f64, c: f64, kind: Kind, limit: f64, unit: &'static str, plain: bool) {
+        let (entries, constant) = self.affine(i, v, s, c);
+        self.rows.push(&entries, constant);
+        let lower = matches!(kind, Kind::RpmMin | Kind::FeedMin | Kind::SpeedMin | Kind::ToolLifeMin);
+        self.labels.push(Label { kind, place: Place::Zone(i), limit, unit, plain, lower });
+    }
+
+    /// The form of an output in a zone, linearised where it bends.
+    fn form(&self, i: usize, output: Output) -> Option<Form> {
+        let (u, x) = self.about(i);
+        self.case.zones[i].model(output).map(|model| model.form(u, x))
+    }
+
+    fn about(&self, i: usize) -> (f64, f64) {
+        self.variation.about.map_or_else(|| middle_of(self.case, i), |(at, _)| at[i])
+    }
+
+    /// An upper limit on an output, in logarithms or plain.
+    fn output_limit(&mut self, i: usize, output: Output, limit: Option<f64>, kind: Kind) {
+        let (Some(form), Some(limit)) = (self.form(i, output), limit) else { return };
+        let bound = if form.log_log { limit.ln() } else { limit };
+        self.row(i, form.speed, form.feed, form.constant - bound, kind, limit, output.unit(), !form.log_log);
+    }
+
+    fn zone(&mut self, i: usize) {
+        let case = self.case;
+        let zone = &case.zones[i];
+        let (limits, machine) = (&case.limits, &case.machine);
+        if let (Some(y), Some(c), Some(limit)) = (self.form(i, Output::ForceY), zone.yields(), zone.deflection_max_um) {
+            let kappa = limits.deflection_residual_fraction;
+            self.row(i, y.speed, y.feed, y.constant + (kappa * c / limit).ln(), Kind::Deflection, limit, "um", false);
+        }
+        self.output_limit(i, Output::Roughness, zone.roughness_max_um, Kind::Roughness);
+        self.output_limit(i, Output::Hardening, zone.hardening_max_percent, Kind::Hardening);
+        self.output_limit(i, Output::HardeningDepth, zone.hardening_depth_max_um, Kind::HardeningDepth);
+        self.output_limit(i, Output::ForceZ, limits.force_z_max_n, Kind::ForceZ);
+        self.output_limit(i, Output::ForceY, limits.force_y_max_n, Kind::ForceY);
+        if let (Some(t), Some(least)) = (self.form(i, Output::ToolLife), limits.tool_life_min_min) {
+            self.row(i, -t.speed, -t.feed, least.ln() - t.constant, Kind::ToolLifeMin, least, "min", false);
+        }
+        if let Some(z) = self.form(i, Output::ForceZ) {
+            if let Some(power) = machine.power_kw {
+                let c = z.constant - (60_000.0 * machine.efficiency * power).ln();
+                self.row(i, z.speed + 1.0, z.feed, c, Kind::Power, power, "kW", false);
+            }
+            if let Some(torque) = machine.torque_n_m {
+                let c = z.constant + (zone.diameter_mm / (2000.0 * torque)).ln();
+                self.row(i, z.speed, z.feed, c, Kind::Torque, torque, "N m", false);
+            }
+        }
+        self.bounds(i, zone);
+        self.custom(i);
+        if let (true, Some(ratio)) = (zone.touches_next, limits.feed_step_ratio_max) {
+            self.feed_step(i, ratio);
+        }
+    }
+
+    fn bounds(&mut self, i: usize, zone: &ZoneCase) {
+        let case = self.case;
+        let (limits, machine) = (&case.limits, &case.machine);
+        // n = 1000 V/(pi D).
+        let per_speed = (1000.0 / (PI * zone.diameter_mm)).ln();
+        if let Some(n) = machine.spindle_speed_min_rpm {
+            self.row(i, -1.0, 0.0, n.ln() - per_speed, Kind::RpmMin, n, "rev/min", false);
+        }
+        if let Some(n) = machine.spindle_speed_max_rpm {
+            self.row(i, 1.0, 0.0, per_speed - n.ln(), Kind::RpmMax, n, "rev/min", false);
+        }
+        if let Some(rate) = machine.feed_rate_max_mm_per_min {
+            self.row(i, 1.0, 1.0, per_speed - rate.ln(), Kind::FeedRateMax, rate, "mm/min", false);
+        }
+        let (low, high) = (limits.feed_min_mm_per_rev, zone.feed_max_mm_per_rev);
+        self.row(i, 0.0, -1.0, low.ln(), Kind::FeedMin, low, "mm/rev", false);
+        self.row(i, 0.0, 1.0, -high.ln(), Kind::FeedMax, high, "mm/rev", false);
+        let (low, high) = (limits.speed_min_m_per_min, limits.speed_max_m_per_min);
+        self.row(i, -1.0, 0.0, low.ln(), Kind::SpeedMin, low, "m/min", false);
+        self.row(i, 1.0, 0.0, -high.ln(), Kind::SpeedMax, high, "m/min", false);
+    }
+
+    fn custom(&mut self, i: usize) {
+        let case = self.case;
+        for custom in case.custom.iter().filter(|custom| custom.zone == i) {
+            let mut form = custom.own;
+            if let Some(further) = custom.further.and_then(|k| case.zones[i].further.get(k)) {
+                let (u, x) = self.about(i);
+                let other = further.form(u, x);
+                form.constant += other.constant;
+                form.speed += other.speed;
+                form.feed += other.feed;
+                form.log_log = other.log_log;
+            }
+            let bound = |limit: f64| if form.log_log { limit.ln() } else { limit };
+            let kind = || Kind::Custom(custom.name.clone());
+            if let Some(max) = custom.max {
+                self.row(i, form.speed, form.feed, form.constant - bound(max), kind(), max, "1", !form.log_log);
+            }
+            if let Some(min) = custom.min {
+                self.row(i, -form.speed, -form.feed, bound(min) - form.constant, kind(), min, "1", !form.log_log);
+                if let Some(label) = self.labels.last_mut() {
+                    label.lower = true;
+                }
+            }
+        }
+    }
+
+    fn feed_step(&mut self, i: usize, ratio: f64) {
+        let (here, next) = (self.feed[i], self.feed[i + 1]);
+        let (Some(a), Some(b)) = (here.variable, next.variable) else { return };
+        if a == b {
+            return;
+        }
+        for (up, down) in [(a, b), (b, a)] {
+            self.rows.push(&[(up, 1.0), (down, -1.0)], -ratio.ln());
+            self.labels.push(Label {
+                kind: Kind::FeedStep,
+                place: Place::Zones(vec![i, i + 1]),
+                limit: ratio,
+                unit: "1",
+                plain: false,
+                lower: false,
+            });
+        }
+    }
+
+    fn new_common(&mut self) -> usize {
+        self.common += 1;
+        self.local + self.common - 1
+    }
+
+    fn spread(&mut self) {
+        let Some(ratio) = self.case.limits.deflection_spread_ratio_max else { return };
+        let w = self.new_common();
+        for i in 0..self.case.zones.len() {
+            let (Some(y), Some(c)) = (self.form(i, Output::ForceY), self.case.zones[i].yields()) else { continue };
+            let (entries, constant) = self.affine(i, y.speed, y.feed, y.constant + c.ln());
+            let label = Label {
+                kind: Kind::Spread,
+                place: Place::Zone(i),
+                limit: ratio,
+                unit: "1",
+                plain: false,
+                lower: false,
+            };
+            self.rows.push(&[entries[0], entries[1], (w, -1.0)], constant);
+            self.labels.push(label.clone());
+            let negative = entries.map(|(variable, a)| (variable, -a));
+            self.rows.push(&[negative[0], negative[1], (w, 1.0)], -constant - ratio.ln());
+            self.labels.push(label);
+        }
+    }
+
+    fn couplings(&mut self) {
+        let case = self.case;
+        for coupling in &case.couplings {
+            let mut entries = Vec::with_capacity(2 * coupling.terms.len());
+            let mut constant = coupling.constant - coupling.max.ln();
+            for &(zone, v, s) in &coupling.terms {
+                let (of_zone, c) = self.affine(zone, v, s, 0.0);
+                entries.extend(of_zone);
+                constant += c;
+            }
+            self.rows.push(&entries, constant);
+            self.labels.push(Label {
+                kind: Kind::Coupling(coupling.name.clone()),
+                place: Place::Zones(coupling.terms.iter().map(|term| term.0).collect()),
+                limit: coupling.max,
+                unit: "1",
+                plain: false,
+                lower: false,
+            });
+        }
+    }
+
+    /// Term of the cutting time over `scale`.
+    fn time_term(&self, terms: &mut Affines, i: usize, ln_scale: f64) {
+        let (entries, constant) = self.affine(i, -1.0, -1.0, self.case.zones[i].work().ln() + ln_scale);
+        terms.push(&entries, constant);
+    }
+
+    /// Term of the tool usage over `scale`; none without a tool life.
+    fn usage_term(&self, terms: &mut Affines, i: usize, ln_scale: f64) {
+        let Some(t) = self.form(i, Output::ToolLife) else { return };
+        let c = self.case.zones[i].work().ln() - t.constant + ln_scale;
+        let (entries, constant) = self.affine(i, -1.0 - t.speed, -1.0 - t.feed, c);
+        terms.push(&entries, constant);
+    }
+
+    fn sums(&self) -> (Vec<Affines>, Vec<Label>) {
+        let case = self.case;
+        let (mut sums, mut labels) = (Vec::new(), Vec::new());
+        let label = |kind, place, limit, unit| Label { kind, place, limit, unit, plain: false, lower: false };
+        let parts = self.variation.parts_per_edge.map(|m| 1.0 / f64::from(m));
+        let most = match (case.limits.tool_usage_max, parts) {
+            (Some(u), Some(parts)) => Some(u.min(parts)),
+            (u, parts) => parts.or(u),
+        };
+        if let Some(most) = most {
+            let groups = case.usage_groups();
+            let of_part = groups.len() == 1 && groups[0].len() == case.zones.len();
+            for (s, group) in groups.iter().enumerate() {
+                let mut terms = Affines::with_capacity(group.len(), 2 * group.len());
+                group.iter().for_each(|&i| self.usage_term(&mut terms, i, -most.ln()));
+                let part = of_part && case.limits.tool_usage_scope == super::input::UsageScope::Part;
+                let place = if part { Place::Part } else { Place::Surface(s) };
+                sums.push(terms);
+                labels.push(label(Kind::ToolUsage, place, most, "1"));
+            }
+        }
+        if let Some(most) = case.limits.time_max_min {
+            let mut terms = Affines::with_capacity(case.zones.len(), 2 * case.zones.len());
+            (0..case.zones.len()).for_each(|i| self.time_term(&mut terms, i, -most.ln()));
+            sums.push(terms);
+            labels.push(label(Kind::TimeMax, Place::Part, most, "min"));
+        }
+        (sums, labels)
+    }
+
+    fn objective(&mut self) -> (Objective, f64) {
+        let n = self.case.zones.len();
+        if let Some(rates) = Rates::of(self.case) {
+            let mut terms = Affines::with_capacity(2 * n, 4 * n);
+            (0..n).for_each(|i| self.time_term(&mut terms, i, rates.per_minute.ln()));
+            let mut fixed = rates.fixed;
+            match self.variation.parts_per_edge {
+                Some(m) => fixed += rates.per_edge / f64::from(m),
+                None if rates.per_edge > 0.0 => {
+                    (0..n).for_each(|i| self.usage_term(&mut terms, i, rates.per_edge.ln()));
+                }
+                None => {}
+            }
+            return (Objective::Sum(terms), fixed);
+        }
+        let g = self.new_common();
+        for i in 0..n {
+            let zone = &self.case.zones[i];
+            let form = match self.case.goal {
+                Goal::Roughness {} => zone.roughness_max_um.and_then(|limit| {
+                    self.form(i, Output::Roughness).map(|form| Form { constant: form.constant - limit.ln(), ..form })
+                }),
+                Goal::Hardening {} => self.form(i, Output::Hardening),
+                _ => match (self.form(i, Output::ForceY), zone.yields(), zone.deflection_max_um) {
+                    (Some(y), Some(c), Some(limit)) => Some(Form { constant: y.constant + (c / limit).ln(), ..y }),
+                    _ => None,
+                },
+            };
+            let Some(form) = form else { continue };
+            let (entries, constant) = self.affine(i, form.speed, form.feed, form.constant);
+            self.rows.push(&[entries[0], entries[1], (g, -1.0)], constant);
+            self.labels.push(Label {
+                kind: Kind::Epigraph,
+                place: Place::Zone(i),
+                limit: 1.0,
+                unit: "1",
+                plain: false,
+                lower: false,
+            });
+        }
+        let mut least = Affines::new();
+        least.push(&[(g, 1.0)], 0.0);
+        (Objective::Linear(least), 0.0)
+    }
+
+    /// The start: the middle of the bounds in logarithms, auxiliary variables where their rows meet it.
+    fn middle(&self, start: &mut [f64]) {
+        for i in 0..self.case.zones.len() {
+            let (u, x) = self.variation.about.map_or_else(|| middle_of(self.case, i), |(at, _)| at[i]);
+            for (source, value) in [(self.speed[i], u), (self.feed[i], x)] {
+                if let Some(variable) = source.variable {
+                    start[variable] = value - source.constant;
+                }
+            }
+        }
+        // Auxiliary variables stand above everything they bound.
+        for row in 0..self.rows.len() {
+            if let Some((aux, _)) = self.rows.entries(row).find(|&(v, a)| v >= self.aux_from() && a < 0.0) {
+                let others: f64 = self.rows.value(row, start) + start[aux];
+                start[aux] = start[aux].max(others + 0.1);
+            }
+        }
+    }
+
+    fn aux_from(&self) -> usize {
+        let v = &self.case.variables;
+        let shared = usize::from(matches!(v.speed, SpeedMode::ConstantSpeed | SpeedMode::ConstantRpm))
+            + usize::from(v.feed == FeedMode::Constant);
+        self.local + shared
+    }
+
+    /// Bounds on the step of a linearised program.
+    fn trust(&mut self) {
+        let Some((at, radius)) = self.variation.about else { return };
+        if !radius.is_finite() {
+            return;
+        }
+        for (i, &(u, x)) in at.iter().enumerate() {
+            for (v, s, centre) in [(1.0, 0.0, u), (0.0, 1.0, x)] {
+                self.row(i, v, s, -centre - radius, Kind::Trust, radius, "1", false);
+                self.row(i, -v, -s, centre - radius, Kind::Trust, radius, "1", false);
+            }
+        }
+    }
+}
+
+/// Middle of the bounds of a zone, ln V and ln S; the fixed values where they are.
+fn middle_of(case: &Case, i: usize) -> (f64, f64) {
+    let limits = &case.limits;
+    let between = |low: f64, high: f64| 0.5 * (low.ln() + high.ln());
+    let u = match case.variables.fixed_speed_m_per_min {
+        Some(speed) if case.variables.speed == SpeedMode::Fixed => speed.ln(),
+        _ => between(limits.speed_min_m_per_min, limits.speed_max_m_per_min),
+    };
+    let x = match case.variables.fixed_feed_mm_per_rev {
+        Some(feed) if case.variables.feed == FeedMode::Fixed => feed.ln(),
+        _ => between(limits.feed_min_mm_per_rev, case.zones[i].feed_max_mm_per_rev),
+    };
+    (u, x)
+}
+
+/// Least ln V over all zones, or least usage, or least time: what breaks a tie (`feed/6.2`).
+pub(super) fn second_objective(case: &Case, built: &Built) -> Objective {
+    let n = case.zones.len();
+    let entry = |source: Source, a: f64| source.variable.map_or((0, 0.0), |variable| (variable, a));
+    let is_time = Rates::of(case).is_some();
+    let life = case
+        .zones
+        .iter()
+        .all(|zone| zone.model(Output::ToolLife).is_some_and(|t| t.bends() == super::acting::Bend::Straight));
+    if is_time && !life {
+        let mut form = Affines::new();
+        let entries: Vec<(usize, f64)> = built.speed.iter().map(|&source| entry(source, 1.0)).collect();
+        form.push(&entries, 0.0);
+        return Objective::Linear(form);
+    }
+    let mut terms = Affines::with_capacity(n, 2 * n);
+    for i in 0..n {
+        let (v, s, c) = if is_time {
+            let form = case.zones[i]
+                .model(Output::ToolLife)
+                .map_or(Form { constant: 0.0, speed: 0.0, feed: 0.0, log_log: true }, |t| t.form(0.0, 0.0));
+            (-1.0 - form.speed, -1.0 - form.feed, -form.constant)
+        } else {
+            (-1.0, -1.0, 0.0)
+        };
+        let fixed = |source: Source, a: f64| if a == 0.0 { 0.0 } else { a * source.constant };
+        let constant = case.zones[i].work().ln() + c + fixed(built.speed[i], v) + fixed(built.feed[i], s);
+        terms.push(&[entry(built.speed[i], v), entry(built.feed[i], s)], constant);
+    }
+    Objective::Sum(terms)
+}

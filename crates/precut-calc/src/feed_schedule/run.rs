@@ -1,0 +1,343 @@
+//! From a job to its answer.
+
+use crate::calculator::{
+    Answer, Conflict, ElasticScope, Failure, Finding, Infeasible, Message, Monitor, Relaxation, checkpoint,
+};
+
+use super::advice;
+use super::assess;
+use super::binding::binding;
+use super::case::Case;
+use super::compensated;
+use super::compliance::Held;
+use super::continuous::{self, Asked};
+use super::infeasible::Infeasibility;
+use super::input::{FeedMode, Goal, Job};
+use super::models::Output;
+use super::output::{
+    Certificate, Comparison, ConstantFeed, Continuous, EqualDeflection, Outcome, PassesOutcome, Solver, TradePoint,
+    ZoneOutcome,
+};
+use super::passes;
+use super::plan::{Method, TradeOff, TradedLimit};
+use super::program::{Rates, Variation, build};
+use super::rule::{self, Target};
+use super::solve::{Solved, Unsolved, solve};
+
+/// What the chosen method gave.
+struct Found {
+    case: Case,
+    solved: Option<Solved>,
+    at: Vec<(f64, f64)>,
+    rule: Option<EqualDeflection>,
+    continuous: Option<Continuous>,
+    passes: Option<PassesOutcome>,
+}
+
+/// The answer of a checked and filled job.
+pub(super) fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
+    checkpoint(monitor)?;
+    if job.zones.is_empty() {
+        return Err(Failure::OutOfModel(Finding::new("no_zones", "/zones")));
+    }
+    let held = Held::of(job)?;
+    let found = by_method(job, held.as_ref(), monitor).map_err(|unsolved| worded(unsolved, job))?;
+    monitor.progress(0.7, Message::new("stage_comparison"));
+    let zones: Vec<ZoneOutcome> =
+        found.at.iter().enumerate().map(|(i, &at)| assess::zone_outcome(&found.case, job, i, at)).collect();
+    if !in_reach(&zones) {
+        return Err(Failure::OutOfModel(Finding::new("schedule_out_of_reach", "/models")));
+    }
+    let mut outcome = outcome(job, &found, zones);
+    outcome.comparison = comparison(&found, outcome.cutting_time_min, monitor)?;
+    if let Some(wanted) = &job.trade_off {
+        outcome.trade_off = trade_off(job, &found.case, wanted, held.as_ref(), monitor)?;
+    }
+    if let Some(wanted) = &job.compensation {
+        monitor.progress(0.9, Message::new("stage_path"));
+        outcome.compensated_path = compensated::path(job, &found.case, &found.at, wanted, monitor)?;
+    }
+    let warnings = advice::warnings(job, &found.case, &outcome, &found.at);
+    let explanation = advice::explanation(job, &outcome);
+    monitor.progress(1.0, Message::new("stage_done"));
+    Ok(Answer { output: outcome, warnings, explanation, basis: advice::basis(job) })
+}
+
+fn by_method(job: &Job, held: Option<&Held>, monitor: &dyn Monitor) -> Result<Found, Unsolved> {
+    if let Some(plan) = &job.passes {
+        let (case, solved, passes) = passes::best(job, plan, held, monitor)?;
+        let at = solved.at.clone();
+        return Ok(Found { case, solved: Some(solved), at, rule: None, continuous: None, passes: Some(passes) });
+    }
+    match &job.method {
+        Method::Optimal => {
+            let case = Case::of(job, held, None)?;
+            let solved = solve(&case, true, monitor)?;
+            let at = solved.at.clone();
+            Ok(Found { case, solved: Some(solved), at, rule: None, continuous: None, passes: None })
+        }
+        Method::EqualDeflection { target, target_um, reference_feed_mm_per_rev, speed_m_per_min } => {
+            let case = Case::of(job, held, None)?;
+            let speeds = vec![*speed_m_per_min; case.zones.len()];
+            let target = Target::of(*target, *target_um);
+            let (at, rule) = rule::equal_deflection(&case, &speeds, *reference_feed_mm_per_rev, target)
+                .ok_or_else(|| Failure::OutOfModel(Finding::new("nothing_bends", "/zones")))?;
+            Ok(Found { case, solved: None, at, rule: Some(rule), continuous: None, passes: None })
+        }
+        Method::Continuous { grid_points, loss_percent, segments_max, feed_gradient_per_mm } => {
+            let asked = Asked {
+                grid_points: *grid_points as usize,
+                loss_percent: *loss_percent,
+                segments_max: *segments_max as usize,
+                gradient_per_mm: *feed_gradient_per_mm,
+            };
+            let (case, solved, continuous) = continuous::find(job, &asked, held, monitor)?;
+            let at = solved.at.clone();
+            Ok(Found { case, solved: Some(solved), at, rule: None, continuous: Some(continuous), passes: None })
+        }
+    }
+}
+
+/// A failure in the words of the contract.
+fn worded(unsolved: Unsolved, job: &Job) -> Failure {
+    match unsolved {
+        Unsolved::Failed(failure) => failure,
+        Unsolved::Infeasible(found) => Failure::Conflicting(Box::new(conflict(*found, job))),
+    }
+}
+
+fn conflict(found: Infeasibility, job: &Job) -> Conflict {
+    let first = found.relaxations.first();
+    let named = |name: &crate::calculator::ConstraintName| format!("{}@{}", name.constraint, name.zone);
+    let mut finding = Finding::new("infeasible_schedule", "/limits")
+        .with("conflict", found.conflict.iter().map(named).collect::<Vec<_>>())
+        .with("relaxations", found.relaxations.len())
+        .with("zones", job.zones.len());
+    if let Some((name, factor)) = first {
+        finding = finding.with("largest", named(name)).with("factor", *factor);
+    }
+    Conflict {
+        finding,
+        infeasible: Infeasible {
+            elastic_total: found.elastic_total,
+            elastic_scope: if found.all_elastic { ElasticScope::All } else { ElasticScope::Requirements },
+            relaxations: found
+                .relaxations
+                .into_iter()
+                .map(|(name, factor)| Relaxation { constraint: name.constraint, zone: name.zone, factor })
+                .collect(),
+            conflict_set: found.conflict,
+        },
+    }
+}
+
+fn in_reach(zones: &[ZoneOutcome]) -> bool {
+    zones.iter().all(|zone| {
+        let optional = [
+            zone.force_y_n,
+            zone.force_z_n,
+            zone.power_kw,
+            zone.torque_n_m,
+            zone.deflection_um,
+            zone.diameter_error_um,
+            zone.roughness_um,
+            zone.hardening_percent,
+            zone.hardening_depth_um,
+            zone.tool_life_min,
+            zone.tool_usage,
+        ];
+        let always = [zone.feed_mm_per_rev, zone.speed_m_per_min, zone.spindle_speed_rpm, zone.cutting_time_min];
+        optional.iter().flatten().chain(&always).all(|value| value.is_finite())
+            && zone.further.iter().all(|further| further.value.is_finite())
+    })
+}
+
+fn outcome(job: &Job, found: &Found, mut zones: Vec<ZoneOutcome>) -> Outcome {
+    let case = &found.case;
+    let bound = found.solved.as_ref().map(|solved| binding(case, solved)).unwrap_or_default();
+    for zone in &mut zones {
+        let touches = |name: &str| name.split('|').any(|part| part == zone.id);
+        zone.active = bound.iter().filter(|b| touches(&b.zone)).map(|b| b.constraint.clone()).collect();
+    }
+    let by_surface = assess::usage_by_surface(case, &zones);
+    let usage = zones.iter().map(|zone| zone.tool_usage).sum::<Option<f64>>();
+    let deflections = || zones.iter().map(|zone| zone.deflection_um);
+    let roughnesses = || zones.iter().map(|zone| zone.roughness_um);
+    Outcome {
+        objective: found.solved.as_ref().map_or_else(|| objective_at(case, &zones), |solved| solved.objective),
+        objective_kind: job.objective.name().to_owned(),
+        objective_unit: job.objective.unit().to_owned(),
+        cutting_time_min: zones.iter().map(|zone| zone.cutting_time_min).sum(),
+        tool_usage: usage,
+        edges: assess::edges(&by_surface),
+        tool_usage_by_surface: by_surface,
+        parts_per_edge: found.solved.as_ref().and_then(|solved| solved.parts_per_edge),
+        largest_deflection_um: assess::largest(deflections()),
+        deflection_spread: assess::spread(deflections()),
+        largest_roughness_um: assess::largest(roughnesses()),
+        roughness_spread: assess::spread(roughnesses()),
+        binding: bound,
+        certificate: certificate(found.solved.as_ref()),
+        comparison: Comparison { constant_feed: None, equal_deflection: None },
+        equal_deflection: found.rule.clone(),
+        continuous: found.continuous.clone(),
+        passes: found.passes.clone(),
+        trade_off: Vec::new(),
+        compensated_path: None,
+        zones,
+    }
+}
+
+/// The objective of a schedule that no program made.
+fn objective_at(case: &Case, zones: &[ZoneOutcome]) -> f64 {
+    if let Some(rates) = Rates::of(case) {
+        return rates.fixed
+            + zones
+                .iter()
+                .map(|zone| rates.per_minute * zone.cutting_time_min + rates.per_edge * zone.tool_usage.unwrap_or(0.0))
+                .sum::<f64>();
+    }
+    let relative = |value: Option<f64>, limit: Option<f64>| Some(value? / limit?);
+    let values = case.zones.iter().zip(zones).map(|(zone, given)| match case.goal {
+        Goal::Roughness {} => relative(given.roughness_um, zone.roughness_max_um),
+        Goal::Hardening {} => given.hardening_percent,
+        _ => relative(given.deflection_um, zone.deflection_max_um),
+    });
+    assess::largest(values).unwrap_or(0.0)
+}
+
+fn certificate(solved: Option<&Solved>) -> Certificate {
+    let Some(solved) = solved else {
+        return Certificate {
+            duality_gap: 0.0,
+            kkt_residual: 0.0,
+            primal_residual: 0.0,
+            iterations: 0,
+            solver: Solver::Rule,
+            linearisations: 0,
+            local: true,
+            tie_broken: false,
+        };
+    };
+    let found = &solved.certificate;
+    Certificate {
+        duality_gap: found.gap,
+        kkt_residual: found.dual_residual,
+        primal_residual: found.primal_residual,
+        iterations: found.iterations,
+        solver: if solved.conic { Solver::Conic } else { Solver::InteriorPoint },
+        linearisations: solved.linearisations,
+        local: solved.local,
+        tie_broken: solved.tie_broken,
+    }
+}
+
+/// The best single feed, and the source paper's rule from it.
+fn comparison(found: &Found, time_min: f64, monitor: &dyn Monitor) -> Result<Comparison, Failure> {
+    let mut case = found.case.clone();
+    let mut constant_feed = None;
+    if case.variables.feed != FeedMode::Fixed {
+        case.variables.feed = FeedMode::Constant;
+        match solve(&case, false, monitor) {
+            Ok(solved) => {
+                let time = assess::cutting_time_min(&case, &solved.at);
+                constant_feed = Some((
+                    solved.at.clone(),
+                    ConstantFeed {
+                        feed_mm_per_rev: solved.at[0].1.exp(),
+                        cutting_time_min: time,
+                        objective: solved.objective,
+                        time_saved_percent: 100.0 * (1.0 - time_min / time),
+                    },
+                ));
+            }
+            Err(Unsolved::Failed(Failure::Cancelled)) => return Err(Failure::Cancelled),
+            // No single feed meets all limits, or none was found: there is nothing to compare with.
+            Err(_) => {}
+        }
+    }
+    let bends = found.case.zones.iter().any(|zone| zone.yields().is_some() && zone.model(Output::ForceY).is_some());
+    let equal_deflection = match (&constant_feed, found.rule.is_none() && bends) {
+        (Some((at, constant)), true) => {
+            let speeds: Vec<f64> = at.iter().map(|(u, _)| u.exp()).collect();
+            rule::equal_deflection(&found.case, &speeds, constant.feed_mm_per_rev, Target::Minimum).map(|rule| rule.1)
+        }
+        _ => None,
+    };
+    Ok(Comparison { constant_feed: constant_feed.map(|(_, constant)| constant), equal_deflection })
+}
+
+/// The same zones with all limits of one kind multiplied by a factor that runs over a range.
+fn trade_off(
+    job: &Job,
+    case: &Case,
+    wanted: &TradeOff,
+    held: Option<&Held>,
+    monitor: &dyn Monitor,
+) -> Result<Vec<TradePoint>, Failure> {
+    let _ = (job, held);
+    let last = f64::from(wanted.count - 1);
+    (0..wanted.count)
+        .map(|k| {
+            checkpoint(monitor)?;
+            let share = f64::from(k) / last;
+            let factor = (wanted.factor_from.ln() * (1.0 - share) + wanted.factor_to.ln() * share).exp();
+            let mut scaled = case.clone();
+            let times = |limit: &mut Option<f64>| {
+                if let Some(limit) = limit {
+                    *limit *= factor;
+                }
+            };
+            match wanted.limit {
+                TradedLimit::Deflection => scaled.zones.iter_mut().for_each(|zone| times(&mut zone.deflection_max_um)),
+                TradedLimit::Roughness => scaled.zones.iter_mut().for_each(|zone| times(&mut zone.roughness_max_um)),
+                TradedLimit::ToolUsage => times(&mut scaled.limits.tool_usage_max),
+                TradedLimit::Time => times(&mut scaled.limits.time_max_min),
+            }
+            match solve(&scaled, false, monitor) {
+                Ok(solved) => {
+                    let usage: Option<f64> = scaled
+                        .zones
+                        .iter()
+                        .zip(&solved.at)
+                        .map(|(zone, &(u, x))| {
+                            Some(zone.work() * (-u - x).exp() / zone.model(Output::ToolLife)?.output(u, x))
+                        })
+                        .sum();
+                    Ok(TradePoint {
+                        factor,
+                        objective: Some(solved.objective),
+                        cutting_time_min: Some(assess::cutting_time_min(&scaled, &solved.at)),
+                        tool_usage: usage,
+                    })
+                }
+                Err(Unsolved::Failed(Failure::Cancelled)) => Err(Failure::Cancelled),
+                Err(_) => Ok(TradePoint { factor, objective: None, cutting_time_min: None, tool_usage: None }),
+            }
+        })
+        .collect()
+}
+
+/// Limits that a schedule breaks, with what it reaches: for schedules that no program made.
+pub(super) fn broken(case: &Case, at: &[(f64, f64)]) -> Vec<(crate::calculator::ConstraintName, f64)> {
+    let mut free = case.clone();
+    free.variables = super::input::Variables::default();
+    let built = build(&free, &Variation { parts_per_edge: None, about: Some((at, f64::INFINITY)) });
+    let mut y = built.program.start.clone();
+    for (i, &(u, x)) in at.iter().enumerate() {
+        for (source, value) in [(built.speed[i], u), (built.feed[i], x)] {
+            if let Some(variable) = source.variable {
+                y[variable] = value;
+            }
+        }
+    }
+    let rows = built.rows.iter().enumerate().map(|(row, label)| (label, built.program.rows.value(row, &y)));
+    let sums = built.sums.iter().zip(&built.program.sums).map(|(label, terms)| (label, terms.log_sum_exp(&y)));
+    rows.chain(sums)
+        .filter(|(label, value)| label.kind.is_limit() && label.kind != super::program::Kind::Spread && *value > 1e-9)
+        .map(|(label, value)| {
+            let factor = if label.plain { 1.0 + value / label.limit } else { value.exp() };
+            (label.name(case), factor)
+        })
+        .collect()
+}

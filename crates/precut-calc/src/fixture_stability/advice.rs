@@ -1,0 +1,215 @@
+//! What binds, what would help, where not to trust: codes with numbers.
+
+use crate::calculator::{Finding, Message};
+
+use super::answer::Study;
+use super::output::{ChatterKind, FirstLimit, FixtureOutcome, FixtureState, OpenJoint};
+
+/// Distance of the tooth frequency (or a harmonic) from a natural frequency that is worth a warning.
+const NEAR_RESONANCE: f64 = 0.1;
+/// Working depth over chatter limit that is worth a warning.
+const NEAR_CHATTER: f64 = 0.9;
+/// Oscillations per tooth period above which lobes merge.
+const MERGED_LOBES: f64 = 50.0;
+/// Difference of the zeroth-order limit that is worth saying.
+const ZEROTH_OFF: f64 = 0.05;
+/// Damping ratio below which a limit hangs on its damping alone.
+const UNDAMPED: f64 = 1e-6;
+
+/// Codes of the warnings made here.
+pub(super) const WARNING_CODES: &[&str] = &[
+    "full_slot",
+    "no_damping",
+    "resonance_of_teeth",
+    "near_chatter_limit",
+    "lobes_merge",
+    "zeroth_order_off",
+    "directional_factor_reversed",
+    "no_clamp_force",
+    "simulation_diverged",
+    "multiplier_not_converged",
+    "depth_not_examined",
+    "verdict_by_simulation",
+];
+
+/// Codes of the explanations made here.
+pub(super) const EXPLANATION_CODES: &[&str] = &[
+    "fixture_stable",
+    "fixture_chatters",
+    "fixture_chip_lost",
+    "fixture_joint_opens",
+    "chatter_limit_is",
+    "no_chatter_limit",
+    "better_speed_is",
+    "lowest_limit_is",
+    "first_limit_is",
+    "clamp_force_needed",
+    "clamp_force_only_inertia",
+    "opening_is_unstable",
+    "opening_stays_stable",
+    "amplitude_over_feed",
+    "no_surface_location_error",
+    "fixture_not_modelled",
+];
+
+pub(super) fn warnings(study: &Study<'_>, outcome: &FixtureOutcome) -> Vec<Finding> {
+    let (job, case) = (study.job, &study.case);
+    let mut found = Vec::new();
+    let diameter = job.cutter.diameter_mm;
+    let half_width = 0.5 * job.cut.width_mm;
+    if half_width + job.cut.offset_mm.abs() > 0.5 * diameter && half_width >= 0.5 * diameter {
+        found.push(Finding::new("full_slot", "/cut/width_mm").measured(job.cut.width_mm, diameter, "mm"));
+    }
+    if outcome.modes.iter().any(|mode| mode.damping_ratio < UNDAMPED) {
+        found.push(Finding::new("no_damping", "/fixture/fixed_joint/damping_n_s_per_mm"));
+    }
+    let tooth = outcome.engagement.tooth_frequency_hz;
+    for mode in &outcome.modes {
+        for harmonic in 1..=3_u8 {
+            let ratio = f64::from(harmonic) * tooth / mode.natural_frequency_hz;
+            if (ratio - 1.0).abs() < NEAR_RESONANCE {
+                found.push(
+                    Finding::new("resonance_of_teeth", "/cut/spindle_speed_rpm")
+                        .measured(f64::from(harmonic) * tooth, mode.natural_frequency_hz, "Hz")
+                        .with("harmonic", f64::from(harmonic)),
+                );
+            }
+        }
+        let oscillations = mode.natural_frequency_hz / tooth;
+        if oscillations > MERGED_LOBES {
+            found.push(Finding::new("lobes_merge", "/cut/spindle_speed_rpm").measured(oscillations, MERGED_LOBES, "1"));
+        }
+    }
+    let depth = case.working.depth_mm;
+    if let Some(limit) = study.chatter_mm
+        && depth >= NEAR_CHATTER * limit
+        && depth < limit
+    {
+        found.push(Finding::new("near_chatter_limit", "/cut/depth_mm").measured(depth, limit, "mm"));
+    }
+    if let (Some(limit), Some(zeroth)) = (study.chatter_mm, outcome.zeroth_order.depth_at_speed_mm)
+        && (zeroth / limit - 1.0).abs() > ZEROTH_OFF
+    {
+        found.push(Finding::new("zeroth_order_off", "/cut").measured(zeroth, limit, "mm"));
+    }
+    if outcome.zeroth_order.mean_directional_factor <= 0.0 {
+        let factor = outcome.zeroth_order.mean_directional_factor;
+        found.push(Finding::new("directional_factor_reversed", "/cut/offset_mm").measured(factor, 0.0, "1"));
+    }
+    if case.holding.clamp_force_n.is_some_and(|force| force <= 0.0) {
+        found.push(Finding::new("no_clamp_force", "/fixture/clamp_force_n").measured(0.0, 0.0, "N"));
+    }
+    if outcome.simulation.diverged {
+        found.push(Finding::new("simulation_diverged", "/simulation"));
+    }
+    let multiplier = &outcome.multiplier;
+    if (multiplier.modulus - 1.0).abs() < multiplier.modulus_error {
+        found.push(Finding::new("multiplier_not_converged", "/cut").measured(
+            multiplier.modulus,
+            multiplier.modulus_error,
+            "1",
+        ));
+    }
+    if depth > study.examined_mm {
+        found.push(Finding::new("depth_not_examined", "/limits/depth_max_mm").measured(depth, study.examined_mm, "mm"));
+    }
+    if outcome.verdict.state == FixtureState::Chatter && multiplier.modulus < 1.0 {
+        found.push(Finding::new("verdict_by_simulation", "/simulation").measured(
+            outcome.simulation.sample_scatter,
+            1e-3,
+            "1",
+        ));
+    }
+    found
+}
+
+fn joint_name(joint: Option<OpenJoint>) -> &'static str {
+    match joint {
+        Some(OpenJoint::Movable) => "movable",
+        Some(OpenJoint::Fixed) => "fixed",
+        Some(OpenJoint::Both) => "both",
+        None => "none",
+    }
+}
+
+pub(super) fn explanation(study: &Study<'_>, outcome: &FixtureOutcome) -> Vec<Message> {
+    let verdict = &outcome.verdict;
+    let multiplier = &outcome.multiplier;
+    let feed_um = 1e3 * study.case.working.feed_mm;
+    let mut said = vec![match verdict.state {
+        FixtureState::Stable => Message::new("fixture_stable")
+            .with("modulus", multiplier.modulus)
+            .with("peak_to_peak_um", verdict.peak_to_peak_um),
+        FixtureState::Chatter => Message::new("fixture_chatters")
+            .with("modulus", multiplier.modulus)
+            .with("frequency_hz", multiplier.chatter_frequency_hz)
+            .with("kind", if multiplier.kind == ChatterKind::Flip { "flip" } else { "hopf" })
+            .with("peak_to_peak_um", verdict.peak_to_peak_um),
+        FixtureState::ChipLost => Message::new("fixture_chip_lost").with("share", verdict.lost_cut_share),
+        FixtureState::JointOpen => Message::new("fixture_joint_opens")
+            .with("joint", joint_name(verdict.joint))
+            .with("time_s", verdict.first_opening_s.unwrap_or(0.0))
+            .with("share", verdict.open_share)
+            .with("peak_to_peak_um", verdict.peak_to_peak_um),
+    }];
+    said.push(match study.chatter_mm {
+        Some(limit) => Message::new("chatter_limit_is")
+            .with("depth_mm", limit)
+            .with("spindle_speed_rpm", study.case.working.spindle_rpm),
+        None => Message::new("no_chatter_limit").with("depth_mm", study.examined_mm),
+    });
+    if let Some(lobes) = &outcome.lobes {
+        if let Some(better) = lobes.better_speeds.first() {
+            said.push(
+                Message::new("better_speed_is")
+                    .with("spindle_speed_rpm", better.spindle_speed_rpm)
+                    .with("depth_mm", better.chatter_mm.unwrap_or(study.examined_mm)),
+            );
+        }
+        if let Some(lowest) = &lobes.lowest {
+            said.push(
+                Message::new("lowest_limit_is")
+                    .with("spindle_speed_rpm", lowest.spindle_speed_rpm)
+                    .with("depth_mm", lowest.chatter_mm.unwrap_or(study.examined_mm)),
+            );
+        }
+    }
+    if let Some(limits) = &outcome.limits
+        && let (Some(first), Some(depth)) = (limits.first, limits.first_mm)
+    {
+        said.push(
+            Message::new("first_limit_is")
+                .with("what", FirstLimit::name(first))
+                .with("depth_mm", depth)
+                .with("removal_rate_cm3_per_min", limits.removal_rate_cm3_per_min.unwrap_or(0.0)),
+        );
+    }
+    if let Some(clamp) = &outcome.clamp {
+        said.push(match clamp.factor_needed {
+            Some(factor) => Message::new("clamp_force_needed")
+                .with("least_n", clamp.least_n)
+                .with("entry_n", clamp.least_with_entry_n)
+                .with("joint", joint_name(clamp.binding_joint))
+                .with("factor", factor),
+            None => Message::new("clamp_force_only_inertia")
+                .with("least_n", clamp.least_n)
+                .with("entry_n", clamp.least_with_entry_n),
+        });
+        let open = match clamp.binding_joint {
+            Some(OpenJoint::Movable) => clamp.modulus_movable_open,
+            _ => clamp.modulus_fixed_open,
+        };
+        let code = if open >= 1.0 { "opening_is_unstable" } else { "opening_stays_stable" };
+        said.push(Message::new(code).with("joint", joint_name(clamp.binding_joint)).with("modulus", open));
+    }
+    if verdict.peak_to_peak_over_feed > 1.0 {
+        said.push(
+            Message::new("amplitude_over_feed")
+                .with("peak_to_peak_um", verdict.peak_to_peak_um)
+                .with("feed_um", feed_um),
+        );
+    }
+    said.push(Message::new("no_surface_location_error"));
+    said.push(Message::new("fixture_not_modelled"));
+    said
+}

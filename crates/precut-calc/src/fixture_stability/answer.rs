@@ -1,0 +1,650 @@
+//! The answer, put together.
+
+use std::f64::consts::{PI, TAU};
+
+use rayon::prelude::*;
+
+use crate::calculator::{Failure, Message, Monitor, checkpoint};
+
+use super::acting::Case;
+use super::floquet::{Multiplier, Working};
+use super::holding::Closed;
+use super::input::{Analysis, FixtureJob};
+use super::lobes::{Plane, Point, Rules, boundary, by_states, critical_depth, map, point};
+use super::march::{Marched, Plan, Step};
+use super::output::{
+    AmplitudeCurve, ArcProfile, ChatterKind, ClampForce, DepthLimits, Engagement, FirstLimit, FixtureOutcome,
+    FixtureState, FixtureVerdict, FloquetMultiplier, ForcedMotion, Histories, LobeBoundary, LobeDiagram, LobeMap,
+    OpenJoint, Oscillogram, QuasiStatic, Simulated, SpeedLimit, TextbookForce, VibrationMode, ZerothOrder,
+};
+use super::parts::plane_of;
+use super::picture::lobes_so_far;
+use super::response::{Response, response};
+use super::simulate::{count, plan, run, scatter, small};
+use super::zeroth::{at_speed, depth_mm, zeroth};
+
+pub(super) const UM_PER_MM: f64 = 1e3;
+/// Sampling error of the exact forced motion, relative.
+const SAMPLING: f64 = 1e-6;
+/// Safety factors that textbooks use.
+const TEXTBOOK_FACTORS: [f64; 4] = [1.5, 2.0, 2.5, 6.0];
+/// Entries of an oscillogram at most.
+const OSCILLOGRAM: usize = 1200;
+/// Steps of the bracketing of a limit that only simulation gives: to 1/256 of a step of the curve.
+const BRACKETING: u32 = 8;
+
+/// What the parts of an answer share.
+pub(super) struct Study<'a> {
+    pub job: &'a FixtureJob,
+    pub case: Case,
+    pub rules: Rules,
+    pub monitor: &'a dyn Monitor,
+    pub point: Point,
+    pub forced: Response,
+    pub examined_mm: f64,
+    pub chatter_mm: Option<f64>,
+}
+
+impl<'a> Study<'a> {
+    pub(super) fn new(job: &'a FixtureJob, case: Case, monitor: &'a dyn Monitor) -> Result<Self, Failure> {
+        let rules = Rules::new();
+        let point = point(&rules, &case.holding, &case.cutting, case.working, Closed::BOTH)?;
+        let forced = forced(&case, case.working)?;
+        let examined_mm = examined_mm(job, &case);
+        let chatter_mm = critical_depth(&rules, &case.holding, &case.cutting, case.working, examined_mm)?;
+        Ok(Self { job, case, rules, monitor, point, forced, examined_mm, chatter_mm })
+    }
+
+    fn stable(&self) -> bool {
+        self.point.multiplier.modulus < 1.0
+    }
+
+    /// Runs the cut in time at the working point.
+    pub(super) fn simulated(&self, unilateral: bool, keep: bool) -> Result<(Plan, Marched), Failure> {
+        let mut plan = plan(&self.case, &self.job.simulation, self.case.working, self.point.multiplier.modulus);
+        plan.unilateral = unilateral;
+        if keep {
+            let revolution = self.case.cutting.teeth.clamp(4, 40);
+            plan.keep_first = revolution.min(plan.tooth_periods / 2);
+            plan.keep_last = revolution.min(plan.tooth_periods / 2);
+        }
+        let run = run(&self.case, &plan, self.monitor)?;
+        Ok((plan, run))
+    }
+}
+
+pub(super) fn forced(case: &Case, working: Working) -> Result<Response, Failure> {
+    by_states!(case.holding, response(&case.holding, &case.cutting, working))
+}
+
+/// How deep limits are looked for: as the job says, else well above the zeroth-order limit and the working depth.
+fn examined_mm(job: &FixtureJob, case: &Case) -> f64 {
+    if let Some(depth) = job.limits.depth_max_mm.or(job.lobes.depth_max_mm) {
+        return depth;
+    }
+    let zeroth = zeroth(&case.holding, &case.cutting);
+    let feed = case.working.feed_mm;
+    let by_zeroth = at_speed(&case.holding, &case.cutting, case.working.spindle_rpm)
+        .or(zeroth.least.map(|(kappa, _)| kappa))
+        .map(|kappa| 2.5 * depth_mm(&case.cutting, zeroth.mean_factor, kappa, feed));
+    by_zeroth.unwrap_or(10.0).max(2.0 * case.working.depth_mm).clamp(0.001, 1000.0)
+}
+
+/// Computes everything that the job asks.
+pub(super) fn outcome(study: &Study<'_>) -> Result<FixtureOutcome, Failure> {
+    let Study { job, case, monitor, .. } = study;
+    checkpoint(*monitor)?;
+    monitor.progress(0.05, Message::new("stage_simulation"));
+    let keep = job.asks(Analysis::History);
+    let (plan, run_) = study.simulated(case.holding.clamp_force_n.is_some(), keep)?;
+    let mut simulation = simulation(study, &plan, &run_);
+    if job.simulation.verified {
+        let finer = Plan { steps_per_tooth: 2 * plan.steps_per_tooth, keep_first: 0, keep_last: 0, ..plan };
+        let again = run(case, &finer, *monitor)?;
+        simulation.halved_step_change_um = Some((again.x_mm.span() - run_.x_mm.span()).abs() * UM_PER_MM);
+    }
+    checkpoint(*monitor)?;
+    let clamp = if job.asks(Analysis::ClampForce) {
+        monitor.progress(0.15, Message::new("stage_clamp_force"));
+        Some(clamp_force(study)?)
+    } else {
+        None
+    };
+    let limits = if job.asks(Analysis::Limits) {
+        monitor.progress(0.2, Message::new("stage_limits"));
+        Some(limits(study)?)
+    } else {
+        None
+    };
+    let lobes = if job.asks(Analysis::Lobes) { Some(lobes(study)?) } else { None };
+    let history = keep.then(|| histories(study, &run_));
+    let zeroth_order = zeroth_order(study);
+    Ok(FixtureOutcome {
+        verdict: verdict(study, &simulation, &run_),
+        engagement: engagement(study),
+        quasi_static: quasi_static(case),
+        modes: case
+            .holding
+            .modes()
+            .into_iter()
+            .map(|mode| VibrationMode {
+                natural_frequency_hz: mode.natural_hz,
+                damped_frequency_hz: mode.damped_hz,
+                damping_ratio: mode.damping_ratio,
+            })
+            .collect(),
+        multiplier: multiplier(study),
+        chatter_depth_mm: study.chatter_mm,
+        depth_examined_mm: study.examined_mm,
+        zeroth_order,
+        forced: forced_motion(study),
+        simulation,
+        clamp,
+        limits,
+        lobes,
+        history,
+    })
+}
+
+fn engagement(study: &Study<'_>) -> Engagement {
+    let case = &study.case;
+    let (cutting, working) = (&case.cutting, case.working);
+    let stretches = cutting.stretches();
+    let z = cutting.teeth as f64;
+    let table = working.feed_mm * working.spindle_rpm * z;
+    Engagement {
+        entry_angle_deg: cutting.entry_rad.to_degrees(),
+        exit_angle_deg: cutting.exit_rad.to_degrees(),
+        arc_deg: cutting.arc_rad().to_degrees(),
+        teeth_in_cut_mean: cutting.arc_rad() * z / TAU,
+        teeth_in_cut_max: small(stretches.iter().map(|s| s.teeth).max().unwrap_or(0)),
+        teeth_in_cut_min: small(stretches.iter().map(|s| s.teeth).min().unwrap_or(0)),
+        spindle_speed_rpm: working.spindle_rpm,
+        speed_m_per_min: TAU * cutting.radius_mm * working.spindle_rpm / 1000.0,
+        feed_mm_per_tooth: working.feed_mm,
+        feed_mm_per_min: table,
+        tooth_frequency_hz: working.spindle_rpm * z / 60.0,
+        removal_rate_cm3_per_min: removal_rate(case, working.depth_mm),
+    }
+}
+
+/// Width of the strip within the cutter times depth times table feed, cm3/min.
+pub(super) fn removal_rate(case: &Case, depth_mm: f64) -> f64 {
+    let width = case.cutting.radius_mm * (case.cutting.entry_rad.cos() - case.cutting.exit_rad.cos());
+    width * depth_mm * case.working.feed_mm * case.working.spindle_rpm * case.cutting.teeth as f64 / 1000.0
+}
+
+fn quasi_static(case: &Case) -> QuasiStatic {
+    let (high, low) = case.cutting.static_extremes_n(case.working.feed_mm, case.working.depth_mm);
+    let stiffness = case.holding.static_stiffness_n_per_mm();
+    QuasiStatic {
+        force_max_n: high,
+        force_min_n: low,
+        stiffness_n_per_mm: stiffness,
+        displacement_max_um: high / stiffness * UM_PER_MM,
+        displacement_min_um: low / stiffness * UM_PER_MM,
+    }
+}
+
+/// Frequency at which a multiplier vibrates: of all aliases the one nearest to a mode, Hz.
+fn chatter_frequency_hz(case: &Case, found: &Multiplier) -> f64 {
+    let period = case.cutting.tooth_period_s(case.working.spindle_rpm) * found.phases as f64;
+    let angle = found.im.atan2(found.re);
+    let mut best = (f64::INFINITY, 0.0);
+    for mode in case.holding.modes() {
+        for sign in [1.0, -1.0] {
+            let turns = (mode.damped_hz * period - sign * angle / TAU).round();
+            let frequency = (sign * angle / TAU + turns) / period;
+            let distance = (frequency - mode.damped_hz).abs();
+            if frequency >= 0.0 && distance < best.0 {
+                best = (distance, frequency);
+            }
+        }
+    }
+    best.1
+}
+
+fn multiplier(study: &Study<'_>) -> FloquetMultiplier {
+    let found = study.point.multiplier;
+    let kind = if found.im > 1e-9 * found.modulus {
+        ChatterKind::Hopf
+    } else if found.re < 0.0 {
+        ChatterKind::Flip
+    } else {
+        ChatterKind::Fold
+    };
+    let tau = study.case.cutting.tooth_period_s(study.case.working.spindle_rpm);
+    FloquetMultiplier {
+        modulus: found.modulus,
+        real: found.re,
+        imaginary: found.im.abs(),
+        tooth_periods: small(found.phases),
+        kind,
+        chatter_frequency_hz: chatter_frequency_hz(&study.case, &found),
+        // A disturbance that vanishes within a tooth period decays at no finite rate: 1e-300 stands for it.
+        growth_per_s: found.modulus.max(1e-300).ln() / tau,
+        modulus_error: study.point.error,
+    }
+}
+
+fn zeroth_order(study: &Study<'_>) -> ZerothOrder {
+    let case = &study.case;
+    let found = zeroth(&case.holding, &case.cutting);
+    let feed = case.working.feed_mm;
+    let depth = |kappa: f64| depth_mm(&case.cutting, found.mean_factor, kappa, feed);
+    ZerothOrder {
+        mean_directional_factor: found.mean_factor,
+        depth_min_mm: found.least.map(|(kappa, _)| depth(kappa)),
+        frequency_hz: found.least.map(|(_, hz)| hz),
+        depth_at_speed_mm: at_speed(&case.holding, &case.cutting, case.working.spindle_rpm).map(depth),
+    }
+}
+
+fn forced_motion(study: &Study<'_>) -> ForcedMotion {
+    let forced = &study.forced;
+    let (high, low) = study.case.cutting.static_extremes_n(study.case.working.feed_mm, study.case.working.depth_mm);
+    let quasi = (high - low) / study.case.holding.static_stiffness_n_per_mm();
+    ForcedMotion {
+        displacement_max_um: forced.x_mm.high * UM_PER_MM,
+        displacement_min_um: forced.x_mm.low * UM_PER_MM,
+        peak_to_peak_um: forced.x_mm.span() * UM_PER_MM,
+        displacement_at_entry_um: forced.x_at_entry_mm * UM_PER_MM,
+        displacement_at_exit_um: forced.x_at_exit_mm * UM_PER_MM,
+        dynamic_factor: (quasi > 0.0).then(|| forced.x_mm.span() / quasi),
+        clamp_movable_n: forced.left_n.high.max(0.0),
+        clamp_fixed_n: forced.right_n.high.max(0.0),
+    }
+}
+
+fn simulation(study: &Study<'_>, plan: &Plan, run: &Marched) -> Simulated {
+    let (sample_scatter, settled) = scatter(&study.case, plan, run);
+    Simulated {
+        steps_per_tooth: small(plan.steps_per_tooth),
+        tooth_periods: small(plan.tooth_periods),
+        steady_tooth_periods: small(plan.steady_periods),
+        diverged: run.diverged,
+        settled: settled && !run.diverged,
+        sample_scatter,
+        displacement_max_um: run.x_mm.high * UM_PER_MM,
+        displacement_min_um: run.x_mm.low * UM_PER_MM,
+        peak_to_peak_um: run.x_mm.span() * UM_PER_MM,
+        force_max_n: run.force_n.high,
+        force_min_n: run.force_n.low,
+        effective_feed_max_mm: run.feed_mm.high,
+        effective_feed_min_mm: run.feed_mm.low,
+        lost_cut_share: run.lost_cut,
+        first_lost_cut_s: run.first_lost_s,
+        clamp_movable_n: run.left_n.high.max(0.0),
+        clamp_fixed_n: run.right_n.high.max(0.0),
+        clamp_movable_entry_n: run.left_entry_n.max(0.0),
+        clamp_fixed_entry_n: run.right_entry_n.max(0.0),
+        unilateral: plan.unilateral,
+        open_movable_share: run.open.left,
+        open_fixed_share: run.open.right,
+        open_both_share: run.open.both,
+        halved_step_change_um: None,
+    }
+}
+
+fn verdict(study: &Study<'_>, simulated: &Simulated, run: &Marched) -> FixtureVerdict {
+    let case = &study.case;
+    let opened = (run.first_open_left_s, run.first_open_right_s);
+    let joint = match opened {
+        (Some(_), Some(_)) => Some(OpenJoint::Both),
+        (Some(_), None) => Some(OpenJoint::Movable),
+        (None, Some(_)) => Some(OpenJoint::Fixed),
+        (None, None) => None,
+    };
+    let state = if joint.is_some() {
+        FixtureState::JointOpen
+    } else if !study.stable() || !simulated.settled {
+        FixtureState::Chatter
+    } else if run.lost_cut > 0.0 {
+        FixtureState::ChipLost
+    } else {
+        FixtureState::Stable
+    };
+    let exact = state == FixtureState::Stable;
+    let range = if exact { study.forced.x_mm } else { run.x_mm };
+    let span_um = range.span() * UM_PER_MM;
+    let asked = study.forced.left_n.high.max(study.forced.right_n.high).max(0.0);
+    FixtureVerdict {
+        state,
+        joint,
+        first_opening_s: [opened.0, opened.1].into_iter().flatten().reduce(f64::min),
+        open_share: run.open.left + run.open.right - run.open.both,
+        lost_cut_share: run.lost_cut,
+        peak_to_peak_um: span_um,
+        peak_to_peak_over_feed: range.span() / case.working.feed_mm,
+        peak_to_peak_error_um: if exact { Some(SAMPLING * span_um) } else { simulated.halved_step_change_um },
+        displacement_max_um: range.high.abs().max(range.low.abs()) * UM_PER_MM,
+        depth_margin: study.chatter_mm.filter(|_| case.working.depth_mm > 0.0).map(|h| h / case.working.depth_mm),
+        clamp_margin: case.holding.clamp_force_n.filter(|_| exact && asked > 0.0).map(|force| force / asked),
+    }
+}
+
+/// Static force on the joints at the movable and the fixed jaw (`fixture/5.7`).
+pub(super) fn static_clamp_n(case: &Case, high_n: f64, low_n: f64) -> (f64, f64) {
+    let (left, right) = (case.holding.left.stiffness_n_per_mm, case.holding.right.stiffness_n_per_mm);
+    let (toward_movable, toward_fixed) = (high_n.max(0.0), (-low_n).max(0.0));
+    if case.holding.jaw.is_some() {
+        (0.0, toward_movable)
+    } else {
+        (toward_fixed * left / (left + right), toward_movable * right / (left + right))
+    }
+}
+
+fn clamp_force(study: &Study<'_>) -> Result<ClampForce, Failure> {
+    let case = &study.case;
+    let stable = study.stable();
+    let (_, run) = study.simulated(false, false)?;
+    let (movable, fixed, movable_elastic, fixed_elastic) = if stable {
+        let forced = &study.forced;
+        (forced.left_n.high, forced.right_n.high, forced.left_elastic_n.high, forced.right_elastic_n.high)
+    } else {
+        (run.left_n.high, run.right_n.high, run.left_elastic_n.high, run.right_elastic_n.high)
+    };
+    let (movable, fixed) = (movable.max(0.0), fixed.max(0.0));
+    let least_n = movable.max(fixed);
+    let least_with_entry_n = least_n.max(run.left_entry_n).max(run.right_entry_n);
+    let (high, low) = case.cutting.static_extremes_n(case.working.feed_mm, case.working.depth_mm);
+    let (static_movable_n, static_fixed_n) = static_clamp_n(case, high, low);
+    let static_n = static_movable_n.max(static_fixed_n);
+    let power = 1.0 / (1.0 - case.cutting.depth_exponent);
+    let given = case.holding.clamp_force_n.filter(|_| stable && least_n > 0.0 && case.is_linear());
+    let depth_for_given = given
+        .map(|force| case.working.depth_mm * (force / least_n).powf(power))
+        .filter(|depth| *depth <= study.chatter_mm.unwrap_or(study.examined_mm));
+    let open = |closed: Closed| -> Result<f64, Failure> {
+        Ok(point(&study.rules, &case.holding, &case.cutting, case.working, closed)?.multiplier.modulus)
+    };
+    Ok(ClampForce {
+        least_n,
+        least_with_entry_n,
+        binding_joint: (least_n > 0.0).then(|| if movable > fixed { OpenJoint::Movable } else { OpenJoint::Fixed }),
+        movable_n: movable,
+        fixed_n: fixed,
+        movable_elastic_n: movable_elastic.max(0.0),
+        fixed_elastic_n: fixed_elastic.max(0.0),
+        static_movable_n,
+        static_fixed_n,
+        factor_needed: (static_n > 0.0).then(|| least_n / static_n),
+        factor_needed_with_entry: (static_n > 0.0).then(|| least_with_entry_n / static_n),
+        stable,
+        depth_for_given_force_mm: depth_for_given,
+        modulus_movable_open: open(Closed { left: false, right: true })?,
+        modulus_fixed_open: open(Closed { left: true, right: false })?,
+        textbook: TEXTBOOK_FACTORS
+            .iter()
+            .map(|&factor| TextbookForce {
+                factor,
+                clamp_force_n: factor * static_n,
+                enough: factor * static_n >= least_n,
+            })
+            .collect(),
+    })
+}
+
+/// What one depth gives with joints that stay closed.
+#[derive(Clone, Copy)]
+struct AtDepth {
+    modulus: f64,
+    span_mm: f64,
+    left_n: f64,
+    right_n: f64,
+    lost: f64,
+}
+
+fn at_depth(study: &Study<'_>, depth: f64) -> Result<AtDepth, Failure> {
+    let case = &study.case;
+    let working = case.at_depth(depth);
+    let modulus = point(&study.rules, &case.holding, &case.cutting, working, Closed::BOTH)?.multiplier.modulus;
+    if modulus < 1.0 {
+        let forced = forced(case, working)?;
+        return Ok(AtDepth {
+            modulus,
+            span_mm: forced.x_mm.span(),
+            left_n: forced.left_elastic_n.high.max(0.0),
+            right_n: forced.right_elastic_n.high.max(0.0),
+            lost: 0.0,
+        });
+    }
+    let run = run(case, &plan(case, &study.job.simulation, working, modulus), &crate::calculator::Unwatched)?;
+    Ok(AtDepth {
+        modulus,
+        span_mm: run.x_mm.span(),
+        left_n: run.left_elastic_n.high.max(0.0),
+        right_n: run.right_elastic_n.high.max(0.0),
+        lost: run.lost_cut,
+    })
+}
+
+fn limits(study: &Study<'_>) -> Result<DepthLimits, Failure> {
+    let case = &study.case;
+    let wanted = study.job.limits.depths;
+    let depths: Vec<f64> = (1..=wanted).map(|i| study.examined_mm * f64::from(i) / f64::from(wanted)).collect();
+    let mut found: Vec<AtDepth> = Vec::with_capacity(depths.len());
+    for chunk in depths.chunks(8) {
+        checkpoint(study.monitor)?;
+        let part: Result<Vec<AtDepth>, Failure> = chunk.par_iter().map(|&depth| at_depth(study, depth)).collect();
+        found.extend(part?);
+        let done = found.len() as f64 / depths.len() as f64;
+        study.monitor.progress(0.2 + 0.2 * done, Message::new("stage_limits"));
+    }
+    let force = case.holding.clamp_force_n;
+    let reach = |of: &(dyn Fn(&AtDepth) -> f64 + Sync), limit: f64| first_reached(study, &depths, &found, of, limit);
+    let amplitude_mm = reach(&|at| at.span_mm, case.working.feed_mm)?;
+    let movable_opens_mm = force.map(|force| reach(&|at| at.left_n, force)).transpose()?.flatten();
+    let fixed_opens_mm = force.map(|force| reach(&|at| at.right_n, force)).transpose()?.flatten();
+    let candidates = [
+        (FirstLimit::Chatter, study.chatter_mm),
+        (FirstLimit::MovableOpens, movable_opens_mm),
+        (FirstLimit::FixedOpens, fixed_opens_mm),
+        (FirstLimit::Amplitude, amplitude_mm),
+    ];
+    // At one depth the earlier of the list is the cause of the later.
+    let first = candidates
+        .iter()
+        .filter_map(|(what, depth)| depth.map(|depth| (*what, depth)))
+        .reduce(|best, next| if next.1 < best.1 * (1.0 - 1e-6) { next } else { best });
+    let mut at_speeds = Vec::with_capacity(study.job.limits.speeds_rpm.len());
+    for speed in &study.job.limits.speeds_rpm {
+        checkpoint(study.monitor)?;
+        let working = Working { spindle_rpm: speed.0, ..case.working };
+        let chatter_mm = critical_depth(&study.rules, &case.holding, &case.cutting, working, study.examined_mm)?;
+        at_speeds.push(SpeedLimit { spindle_speed_rpm: speed.0, chatter_mm });
+    }
+    let column = |of: &dyn Fn(&AtDepth) -> f64| found.iter().map(of).collect::<Vec<f64>>();
+    Ok(DepthLimits {
+        chatter_mm: study.chatter_mm,
+        amplitude_mm,
+        movable_opens_mm,
+        fixed_opens_mm,
+        first: first.map(|(what, _)| what),
+        first_mm: first.map(|(_, depth)| depth),
+        removal_rate_cm3_per_min: first.map(|(_, depth)| removal_rate(case, depth)),
+        at_speeds,
+        curve: AmplitudeCurve {
+            modulus: column(&|at| at.modulus),
+            peak_to_peak_um: column(&|at| at.span_mm * UM_PER_MM),
+            clamp_movable_n: column(&|at| at.left_n),
+            clamp_fixed_n: column(&|at| at.right_n),
+            lost_cut_share: column(&|at| at.lost),
+            depth_mm: depths,
+        },
+    })
+}
+
+/// Smallest depth at which a quantity exceeds its limit: bracketed on the curve, split at the chatter limit where the
+/// quantity jumps, then bisected.
+fn first_reached(
+    study: &Study<'_>,
+    depths: &[f64],
+    found: &[AtDepth],
+    of: &(dyn Fn(&AtDepth) -> f64 + Sync),
+    limit: f64,
+) -> Result<Option<f64>, Failure> {
+    let Some(above) = found.iter().position(|at| of(at) > limit) else { return Ok(None) };
+    let (mut low, mut high) = (if above == 0 { 0.0 } else { depths[above - 1] }, depths[above]);
+    if let Some(chatter) = study.chatter_mm.filter(|chatter| *chatter > low && *chatter < high) {
+        let just_below = at_depth(study, chatter * (1.0 - 1e-7))?;
+        if of(&just_below) > limit { high = chatter } else { low = chatter }
+    }
+    // Proportional to H^(1-mu) where the motion is the forced one.
+    if study.case.is_linear() && study.chatter_mm.is_none_or(|chatter| high <= chatter) {
+        let value = of(&at_depth(study, high * (1.0 - 1e-7))?);
+        let power = 1.0 / (1.0 - study.case.cutting.depth_exponent);
+        return Ok((value > 0.0).then(|| high * (limit / value).powf(power)));
+    }
+    for _ in 0..BRACKETING {
+        checkpoint(study.monitor)?;
+        let middle = 0.5 * (low + high);
+        if of(&at_depth(study, middle)?) > limit { high = middle } else { low = middle }
+    }
+    // A jump at the onset of chatter is at the onset.
+    let onset =
+        study.chatter_mm.filter(|chatter| (high - chatter) < (depths[above] - chatter) / 200.0 && high >= *chatter);
+    Ok(Some(onset.unwrap_or(high)))
+}
+
+fn lobes(study: &Study<'_>) -> Result<LobeDiagram, Failure> {
+    let case = &study.case;
+    let settings = &study.job.lobes;
+    let working = case.working;
+    let plane = plane_of(study.job, case, study.examined_mm);
+    let monitor = study.monitor;
+    let (from, share) = (0.4, if settings.map { 0.2 } else { 0.5 });
+    let points = boundary(&study.rules, &case.holding, &case.cutting, &plane, monitor, &mut |part, points| {
+        monitor.progress(from + share * part, Message::new("stage_boundary"));
+        let known: Vec<_> = points.iter().map(|p| (p.spindle_rpm, p.crossings_mm.first().copied())).collect();
+        monitor.interim(lobes_so_far(&known, None, working));
+    })?;
+    let known: Vec<_> = points.iter().map(|p| (p.spindle_rpm, p.crossings_mm.first().copied())).collect();
+    let map = if settings.map {
+        let full = map(
+            &study.rules,
+            &case.holding,
+            &case.cutting,
+            &plane,
+            settings.refinement,
+            monitor,
+            &mut |part, so_far| {
+                monitor.progress(0.6 + 0.3 * part, Message::new("stage_map"));
+                monitor.interim(lobes_so_far(&known, Some(so_far), working));
+            },
+        )?;
+        Some(LobeMap::of(full))
+    } else {
+        None
+    };
+    let boundary = beside(study, &plane, &points)?;
+    let limits: Vec<SpeedLimit> = points
+        .iter()
+        .map(|p| SpeedLimit { spindle_speed_rpm: p.spindle_rpm, chatter_mm: p.crossings_mm.first().copied() })
+        .collect();
+    let lowest = limits
+        .iter()
+        .filter_map(|limit| limit.chatter_mm.map(|depth| (depth, *limit)))
+        .reduce(|best, next| if next.0 < best.0 { next } else { best })
+        .map(|(_, limit)| limit);
+    Ok(LobeDiagram { lowest, better_speeds: better_speeds(study, &limits, plane.most_mm), boundary, map })
+}
+
+/// The boundary with the other limits over the same speeds.
+fn beside(study: &Study<'_>, plane: &Plane, points: &[super::lobes::BoundaryPoint]) -> Result<LobeBoundary, Failure> {
+    let case = &study.case;
+    let power = 1.0 / (1.0 - case.cutting.depth_exponent);
+    let factor = case.cutting.mean_factor();
+    let one = |point: &super::lobes::BoundaryPoint| -> Result<[Option<f64>; 4], Failure> {
+        let kappa = at_speed(&case.holding, &case.cutting, point.spindle_rpm);
+        let zeroth = kappa.map(|k| depth_mm(&case.cutting, factor, k, plane.feed_mm)).filter(|h| *h <= plane.most_mm);
+        if !case.is_linear() {
+            return Ok([None, None, None, zeroth]);
+        }
+        // At 1 mm; the forced motion goes with H^(1-mu).
+        let forced = forced(case, Working { spindle_rpm: point.spindle_rpm, feed_mm: plane.feed_mm, depth_mm: 1.0 })?;
+        let limit = point.crossings_mm.first().copied().unwrap_or(plane.most_mm);
+        let reaches = |value: f64, most: Option<f64>| {
+            most.filter(|_| value > 0.0).map(|most| (most / value).powf(power)).filter(|depth| *depth <= limit)
+        };
+        let force = case.holding.clamp_force_n;
+        Ok([
+            reaches(forced.x_mm.span(), Some(plane.feed_mm)),
+            reaches(forced.left_elastic_n.high, force),
+            reaches(forced.right_elastic_n.high, force),
+            zeroth,
+        ])
+    };
+    let mut rows = Vec::with_capacity(points.len());
+    for (number, chunk) in points.chunks(32).enumerate() {
+        checkpoint(study.monitor)?;
+        let part: Result<Vec<_>, Failure> = chunk.par_iter().map(one).collect();
+        rows.extend(part?);
+        let done = ((number + 1) * 32).min(points.len()) as f64 / points.len().max(1) as f64;
+        study.monitor.progress(0.9 + 0.09 * done, Message::new("stage_boundary"));
+    }
+    let column = |which: usize| rows.iter().map(|row| row[which]).collect::<Vec<_>>();
+    Ok(LobeBoundary {
+        spindle_speed_rpm: points.iter().map(|p| p.spindle_rpm).collect(),
+        chatter_mm: points.iter().map(|p| p.crossings_mm.first().copied()).collect(),
+        stable_again_mm: points.iter().map(|p| p.crossings_mm.get(1).copied()).collect(),
+        amplitude_mm: column(0),
+        movable_opens_mm: column(1),
+        fixed_opens_mm: column(2),
+        zeroth_order_mm: column(3),
+    })
+}
+
+/// Peaks of the boundary that lie deeper than the limit at the working speed, nearest first.
+fn better_speeds(study: &Study<'_>, limits: &[SpeedLimit], most_mm: f64) -> Vec<SpeedLimit> {
+    let depth = |limit: &SpeedLimit| limit.chatter_mm.unwrap_or(most_mm);
+    let here = study.chatter_mm.unwrap_or(most_mm);
+    let mut peaks: Vec<SpeedLimit> = (0..limits.len())
+        .filter(|&i| {
+            let at = depth(&limits[i]);
+            let left = i.checked_sub(1).is_none_or(|j| depth(&limits[j]) < at);
+            let right = limits.get(i + 1).is_none_or(|next| depth(next) <= at);
+            left && right && at > 1.02 * here
+        })
+        .map(|i| limits[i])
+        .collect();
+    let working = study.case.working.spindle_rpm;
+    peaks.sort_by(|a, b| {
+        (a.spindle_speed_rpm / working).ln().abs().total_cmp(&(b.spindle_speed_rpm / working).ln().abs())
+    });
+    peaks.truncate(5);
+    peaks
+}
+
+fn histories(study: &Study<'_>, run: &Marched) -> Histories {
+    let feed = study.case.working.feed_mm;
+    // The arc is drawn with as many places as it has degrees and more.
+    let stride = (run.arc.len() / OSCILLOGRAM).max(1);
+    let arc: Vec<(f64, f64)> = run.arc.iter().step_by(stride).copied().collect();
+    let sine = |angle: f64| angle.min(PI).sin().max(0.0);
+    Histories {
+        entry: oscillogram(&run.first),
+        steady: oscillogram(&run.last),
+        arc: ArcProfile {
+            angle_deg: arc.iter().map(|(angle, _)| angle.to_degrees()).collect(),
+            effective_feed_mm: arc.iter().map(|(_, f)| *f).collect(),
+            chip_thickness_mm: arc.iter().map(|(angle, f)| f * sine(*angle)).collect(),
+            smooth_chip_mm: arc.iter().map(|(angle, _)| feed * sine(*angle)).collect(),
+        },
+    }
+}
+
+fn oscillogram(steps: &[Step]) -> Oscillogram {
+    let stride = count((steps.len() as f64 / OSCILLOGRAM as f64).ceil().max(1.0));
+    let kept: Vec<&Step> = steps.iter().step_by(stride).collect();
+    let jaw = kept.first().is_some_and(|step| step.jaw_mm.is_some());
+    Oscillogram {
+        time_s: kept.iter().map(|s| s.time_s).collect(),
+        displacement_um: kept.iter().map(|s| s.x_mm * UM_PER_MM).collect(),
+        jaw_um: jaw.then(|| kept.iter().map(|s| s.jaw_mm.unwrap_or(0.0) * UM_PER_MM).collect()),
+        force_n: kept.iter().map(|s| s.force_n).collect(),
+        effective_feed_mm: kept.iter().map(|s| s.feed_mm).collect(),
+        clamp_movable_n: kept.iter().map(|s| s.left_demand_n).collect(),
+        clamp_fixed_n: kept.iter().map(|s| s.right_demand_n).collect(),
+    }
+}

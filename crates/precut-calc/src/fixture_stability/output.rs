@@ -1,0 +1,639 @@
+//! The answer: the verdict, how the cut forces the workpiece, and what limits depth and clamp force.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// Whether the workpiece holds still enough in its vise.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(title = "FixtureStabilityResult")]
+pub struct FixtureOutcome {
+    /// What happens.
+    pub verdict: FixtureVerdict,
+    /// Teeth in cut.
+    pub engagement: Engagement,
+    /// Force and displacement if nothing moved fast.
+    pub quasi_static: QuasiStatic,
+    /// Modes of the closed vise without cutting, rising.
+    pub modes: Vec<VibrationMode>,
+    /// The largest Floquet multiplier of the motion with both joints closed.
+    pub multiplier: FloquetMultiplier,
+    /// Depth at which chatter begins at this speed; null where none begins up to `depth_examined_mm`.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub chatter_depth_mm: Option<f64>,
+    /// Depth up to which limits were looked for.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub depth_examined_mm: f64,
+    /// The zeroth-order approximation beside it.
+    pub zeroth_order: ZerothOrder,
+    /// The exact forced motion with both joints closed. It is what is seen while the motion is stable.
+    pub forced: ForcedMotion,
+    /// The cut in time, from the entry on.
+    pub simulation: Simulated,
+    /// Least clamp force; only with the analysis `clamp_force`.
+    pub clamp: Option<ClampForce>,
+    /// Limits of the depth; only with the analysis `limits`.
+    pub limits: Option<DepthLimits>,
+    /// The lobe diagram; only with the analysis `lobes`.
+    pub lobes: Option<LobeDiagram>,
+    /// Oscillograms; only with the analysis `history`.
+    pub history: Option<Histories>,
+}
+
+/// What happens at the working point.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct FixtureVerdict {
+    /// The worst of what happens.
+    pub state: FixtureState,
+    /// Which joint opens, where one does.
+    pub joint: Option<OpenJoint>,
+    /// When a joint first opens, from the entry.
+    #[schema(extensions(("x-unit" = json!("s"))))]
+    pub first_opening_s: Option<f64>,
+    /// Share of the steady time in which any joint is open.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub open_share: f64,
+    /// Share of the steps of teeth in the arc that cut nothing.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub lost_cut_share: f64,
+    /// Peak-to-peak displacement of the workpiece in the steady state.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub peak_to_peak_um: f64,
+    /// The same over the feed per tooth: above 1 the source paper calls the process unusable.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub peak_to_peak_over_feed: f64,
+    /// Estimated error of the peak-to-peak displacement; null where chatter was simulated without `verified`.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub peak_to_peak_error_um: Option<f64>,
+    /// Largest displacement from the clamped equilibrium, either way.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub displacement_max_um: f64,
+    /// Chatter limit over working depth, where there is a limit.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub depth_margin: Option<f64>,
+    /// Clamp force over what the steady motion asks, where a force is given and some is asked.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub clamp_margin: Option<f64>,
+}
+
+/// The worst of what happens.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FixtureState {
+    /// The workpiece follows the cut, nothing grows.
+    Stable,
+    /// Teeth leave the cut although the closed vise is stable.
+    ChipLost,
+    /// Vibration grows until teeth leave the cut.
+    Chatter,
+    /// A joint opens.
+    JointOpen,
+}
+
+impl FixtureState {
+    /// Its name, as in the contract.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Stable => "stable",
+            Self::ChipLost => "chip_lost",
+            Self::Chatter => "chatter",
+            Self::JointOpen => "joint_open",
+        }
+    }
+}
+
+/// Which joint opens.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum OpenJoint {
+    /// At the movable jaw.
+    Movable,
+    /// At the fixed jaw.
+    Fixed,
+    /// Each in its turn.
+    Both,
+}
+
+/// Teeth in cut and what follows from the regime.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Engagement {
+    /// Angle at which a tooth enters, from the normal to the feed on the entry side.
+    #[schema(extensions(("x-unit" = json!("deg"))))]
+    pub entry_angle_deg: f64,
+    /// Angle at which it leaves.
+    #[schema(extensions(("x-unit" = json!("deg"))))]
+    pub exit_angle_deg: f64,
+    /// The arc between.
+    #[schema(extensions(("x-unit" = json!("deg"))))]
+    pub arc_deg: f64,
+    /// Teeth in cut on average.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub teeth_in_cut_mean: f64,
+    /// Most teeth in cut.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub teeth_in_cut_max: u32,
+    /// Fewest teeth in cut.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub teeth_in_cut_min: u32,
+    /// Spindle speed.
+    #[schema(extensions(("x-unit" = json!("rev/min"))))]
+    pub spindle_speed_rpm: f64,
+    /// Cutting speed.
+    #[schema(extensions(("x-unit" = json!("m/min"))))]
+    pub speed_m_per_min: f64,
+    /// Feed per tooth.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub feed_mm_per_tooth: f64,
+    /// Table feed.
+    #[schema(extensions(("x-unit" = json!("mm/min"))))]
+    pub feed_mm_per_min: f64,
+    /// Teeth per second.
+    #[schema(extensions(("x-unit" = json!("Hz"))))]
+    pub tooth_frequency_hz: f64,
+    /// Material removal rate at the working depth.
+    #[schema(extensions(("x-unit" = json!("cm3/min"))))]
+    pub removal_rate_cm3_per_min: f64,
+}
+
+/// Force along the feed with smooth chips, and what it would do slowly.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct QuasiStatic {
+    /// Largest force, positive toward the movable jaw.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub force_max_n: f64,
+    /// Smallest force.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub force_min_n: f64,
+    /// Stiffness along the feed: both joints, or the fixed one where the movable jaw follows.
+    #[schema(extensions(("x-unit" = json!("N/mm"))))]
+    pub stiffness_n_per_mm: f64,
+    /// Displacement by the largest force.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub displacement_max_um: f64,
+    /// Displacement by the smallest force.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub displacement_min_um: f64,
+}
+
+/// A mode of the closed vise without cutting.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct VibrationMode {
+    /// Undamped.
+    #[schema(extensions(("x-unit" = json!("Hz"))))]
+    pub natural_frequency_hz: f64,
+    /// Damped.
+    #[schema(extensions(("x-unit" = json!("Hz"))))]
+    pub damped_frequency_hz: f64,
+    /// Damping ratio.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub damping_ratio: f64,
+}
+
+/// The largest Floquet multiplier: what a disturbance is multiplied by from tooth to tooth.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct FloquetMultiplier {
+    /// Modulus per tooth period; below 1 is stable.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub modulus: f64,
+    /// Real part, over a period of the force.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub real: f64,
+    /// Modulus of the imaginary part.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub imaginary: f64,
+    /// Tooth periods in a period of the force: 1, or all teeth where they are uneven.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub tooth_periods: u32,
+    /// What a loss of stability looks like.
+    pub kind: ChatterKind,
+    /// Frequency at which it vibrates.
+    #[schema(extensions(("x-unit" = json!("Hz"))))]
+    pub chatter_frequency_hz: f64,
+    /// Growth of a disturbance, negative where it decays.
+    #[schema(extensions(("x-unit" = json!("1/s"))))]
+    pub growth_per_s: f64,
+    /// Estimated error of the modulus: two orders compared, and the residual of the eigenvalue.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub modulus_error: f64,
+}
+
+/// What a loss of stability looks like.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ChatterKind {
+    /// A complex pair: quasi-periodic vibration.
+    Hopf,
+    /// A negative real multiplier: every other tooth cuts the same (period doubling).
+    Flip,
+    /// A positive real multiplier.
+    Fold,
+}
+
+impl ChatterKind {
+    /// Its name, as in the contract.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Hopf => "hopf",
+            Self::Flip => "flip",
+            Self::Fold => "fold",
+        }
+    }
+}
+
+/// The zeroth-order approximation: mean cutting stiffness.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ZerothOrder {
+    /// Mean directional factor a0; its sign says which way the cutting stiffness acts.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub mean_directional_factor: f64,
+    /// Lowest chatter limit over all speeds.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub depth_min_mm: Option<f64>,
+    /// Frequency there.
+    #[schema(extensions(("x-unit" = json!("Hz"))))]
+    pub frequency_hz: Option<f64>,
+    /// Lowest of all lobes at this speed.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub depth_at_speed_mm: Option<f64>,
+}
+
+/// The forced motion with both joints closed: exact but for its sampling, whose error is below 1e-6.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ForcedMotion {
+    /// Largest displacement, positive toward the movable jaw.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub displacement_max_um: f64,
+    /// Smallest displacement.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub displacement_min_um: f64,
+    /// Their difference.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub peak_to_peak_um: f64,
+    /// Displacement where a tooth enters.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub displacement_at_entry_um: f64,
+    /// Displacement where a tooth leaves.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub displacement_at_exit_um: f64,
+    /// Peak-to-peak over the quasi-static difference.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub dynamic_factor: Option<f64>,
+    /// Clamp force that the joint at the movable jaw asks for.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub clamp_movable_n: f64,
+    /// Clamp force that the joint at the fixed jaw asks for.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub clamp_fixed_n: f64,
+}
+
+/// The cut in time.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Simulated {
+    /// Steps per tooth pitch.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub steps_per_tooth: u32,
+    /// Tooth periods.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub tooth_periods: u32,
+    /// Tooth periods at the end over which the steady values were taken.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub steady_tooth_periods: u32,
+    /// Whether the displacement grew beyond all bounds.
+    pub diverged: bool,
+    /// Whether once-per-tooth samples of the displacement settled.
+    pub settled: bool,
+    /// Scatter of the once-per-tooth samples in the steady state, over the feed per tooth.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub sample_scatter: f64,
+    /// Largest displacement in the steady state.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub displacement_max_um: f64,
+    /// Smallest.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub displacement_min_um: f64,
+    /// Their difference.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub peak_to_peak_um: f64,
+    /// Largest force along the feed.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub force_max_n: f64,
+    /// Smallest.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub force_min_n: f64,
+    /// Largest effective feed of any tooth.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub effective_feed_max_mm: f64,
+    /// Smallest; 0 where a tooth leaves the cut.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub effective_feed_min_mm: f64,
+    /// Share of tooth-steps in the arc without a chip.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub lost_cut_share: f64,
+    /// When a tooth first lost the cut.
+    #[schema(extensions(("x-unit" = json!("s"))))]
+    pub first_lost_cut_s: Option<f64>,
+    /// Clamp force that the joint at the movable jaw asks for in the steady state.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub clamp_movable_n: f64,
+    /// That at the fixed jaw.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub clamp_fixed_n: f64,
+    /// The same from the entry on: joint at the movable jaw.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub clamp_movable_entry_n: f64,
+    /// Joint at the fixed jaw.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub clamp_fixed_entry_n: f64,
+    /// Whether joints could open: a clamp force was given.
+    pub unilateral: bool,
+    /// Share of the steady time in which the joint at the movable jaw is open.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub open_movable_share: f64,
+    /// That at the fixed jaw.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub open_fixed_share: f64,
+    /// Both at once.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub open_both_share: f64,
+    /// Change of the peak-to-peak displacement with half the step; only with `verified`.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub halved_step_change_um: Option<f64>,
+}
+
+/// Least clamp force for a regime in which no joint opens.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ClampForce {
+    /// Clamp force below which a joint opens in the steady state.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub least_n: f64,
+    /// The same with the hard entry.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub least_with_entry_n: f64,
+    /// Which joint asks for it; null where none asks for any.
+    pub binding_joint: Option<OpenJoint>,
+    /// Steady state: joint at the movable jaw, with its damping.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub movable_n: f64,
+    /// Joint at the fixed jaw.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub fixed_n: f64,
+    /// Elastic part alone: joint at the movable jaw.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub movable_elastic_n: f64,
+    /// Joint at the fixed jaw.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub fixed_elastic_n: f64,
+    /// What a textbook asks: the static force on the joint at the movable jaw, factor 1.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub static_movable_n: f64,
+    /// On the joint at the fixed jaw.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub static_fixed_n: f64,
+    /// The safety factor that is really needed on the static force; null where the static force is 0.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub factor_needed: Option<f64>,
+    /// The same with the hard entry.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub factor_needed_with_entry: Option<f64>,
+    /// Whether it comes from the exact forced motion (stable) or from a simulated chatter that should not be run.
+    pub stable: bool,
+    /// Deepest cut that the given clamp force holds, where it is reached before chatter.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub depth_for_given_force_mm: Option<f64>,
+    /// What happens if the joint at the movable jaw opens: modulus of the multiplier of what is left.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub modulus_movable_open: f64,
+    /// If that at the fixed jaw opens.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub modulus_fixed_open: f64,
+    /// Textbook safety factors beside it.
+    pub textbook: Vec<TextbookForce>,
+}
+
+/// Static clamp force times a safety factor.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct TextbookForce {
+    /// Safety factor.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub factor: f64,
+    /// Clamp force with it.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub clamp_force_n: f64,
+    /// Whether it is enough in the steady state.
+    pub enough: bool,
+}
+
+/// Depths at which something gives out.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct DepthLimits {
+    /// Chatter begins.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub chatter_mm: Option<f64>,
+    /// The peak-to-peak displacement exceeds the feed per tooth.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub amplitude_mm: Option<f64>,
+    /// The joint at the movable jaw opens at the given clamp force.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub movable_opens_mm: Option<f64>,
+    /// That at the fixed jaw.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub fixed_opens_mm: Option<f64>,
+    /// Which comes first; null where nothing gives out up to the depth examined.
+    pub first: Option<FirstLimit>,
+    /// Its depth.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub first_mm: Option<f64>,
+    /// Material removal rate there.
+    #[schema(extensions(("x-unit" = json!("cm3/min"))))]
+    pub removal_rate_cm3_per_min: Option<f64>,
+    /// Chatter limit at the speeds that were asked for.
+    pub at_speeds: Vec<SpeedLimit>,
+    /// Amplitude and clamp force over the depth.
+    pub curve: AmplitudeCurve,
+}
+
+/// What gives out first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FirstLimit {
+    /// Chatter begins.
+    Chatter,
+    /// The amplitude exceeds the feed per tooth.
+    Amplitude,
+    /// The joint at the movable jaw opens.
+    MovableOpens,
+    /// The joint at the fixed jaw opens.
+    FixedOpens,
+}
+
+impl FirstLimit {
+    /// Its name, as in the contract.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Chatter => "chatter",
+            Self::Amplitude => "amplitude",
+            Self::MovableOpens => "movable_opens",
+            Self::FixedOpens => "fixed_opens",
+        }
+    }
+}
+
+/// Chatter limit at a speed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct SpeedLimit {
+    /// Spindle speed.
+    #[schema(extensions(("x-unit" = json!("rev/min"))))]
+    pub spindle_speed_rpm: f64,
+    /// Depth at which chatter begins; null where none begins up to the depth examined.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub chatter_mm: Option<f64>,
+}
+
+/// One entry per depth.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct AmplitudeCurve {
+    /// Depth of cut.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub depth_mm: Vec<f64>,
+    /// Modulus of the multiplier.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub modulus: Vec<f64>,
+    /// Peak-to-peak displacement with joints that stay closed: exact where stable, simulated where not.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub peak_to_peak_um: Vec<f64>,
+    /// Clamp force that the joint at the movable jaw asks for (elastic part).
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub clamp_movable_n: Vec<f64>,
+    /// That at the fixed jaw.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub clamp_fixed_n: Vec<f64>,
+    /// Share of tooth-steps in the arc without a chip.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub lost_cut_share: Vec<f64>,
+}
+
+/// The lobe diagram.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct LobeDiagram {
+    /// The traced boundary, by spindle speed.
+    pub boundary: LobeBoundary,
+    /// Lowest limit on it.
+    pub lowest: Option<SpeedLimit>,
+    /// Speeds with deeper limits than the working speed has, nearest first.
+    pub better_speeds: Vec<SpeedLimit>,
+    /// |multiplier| over the plane, where it was asked for.
+    pub map: Option<LobeMap>,
+}
+
+/// The traced boundary: one entry per spindle speed.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct LobeBoundary {
+    /// Spindle speed.
+    #[schema(extensions(("x-unit" = json!("rev/min"))))]
+    pub spindle_speed_rpm: Vec<f64>,
+    /// Depth at which chatter begins; null where none begins up to the greatest depth.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub chatter_mm: Vec<Option<f64>>,
+    /// Depth at which it ends again (above an island), where it does.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub stable_again_mm: Vec<Option<f64>>,
+    /// Depth at which the forced peak-to-peak displacement exceeds the feed per tooth, without chatter.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub amplitude_mm: Vec<Option<f64>>,
+    /// Depth at which the joint at the movable jaw opens at the given clamp force, without chatter.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub movable_opens_mm: Vec<Option<f64>>,
+    /// That at the fixed jaw.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub fixed_opens_mm: Vec<Option<f64>>,
+    /// The zeroth-order approximation.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub zeroth_order_mm: Vec<Option<f64>>,
+}
+
+/// |multiplier| over speed and depth.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct LobeMap {
+    /// Spindle speeds of the columns.
+    #[schema(extensions(("x-unit" = json!("rev/min"))))]
+    pub spindle_speed_rpm: Vec<f64>,
+    /// Depths of the rows.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub depth_mm: Vec<f64>,
+    /// Modulus per tooth period, row by row.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub modulus: Vec<f64>,
+    /// Points of the boundary found by halving cells, spindle speeds.
+    #[schema(extensions(("x-unit" = json!("rev/min"))))]
+    pub refined_speed_rpm: Vec<f64>,
+    /// The same, depths.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub refined_depth_mm: Vec<f64>,
+}
+
+impl LobeMap {
+    pub(super) fn of(map: super::lobes::Map) -> Self {
+        let (refined_speed_rpm, refined_depth_mm) = map.refined.into_iter().unzip();
+        Self {
+            spindle_speed_rpm: map.speeds_rpm,
+            depth_mm: map.depths_mm,
+            modulus: map.modulus,
+            refined_speed_rpm,
+            refined_depth_mm,
+        }
+    }
+}
+
+/// Oscillograms.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Histories {
+    /// From the entry on.
+    pub entry: Oscillogram,
+    /// The last revolution.
+    pub steady: Oscillogram,
+    /// The last pass over every place of the arc.
+    pub arc: ArcProfile,
+}
+
+/// One entry per moment.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Oscillogram {
+    /// Time since the entry.
+    #[schema(extensions(("x-unit" = json!("s"))))]
+    pub time_s: Vec<f64>,
+    /// Displacement of the workpiece, positive toward the movable jaw.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub displacement_um: Vec<f64>,
+    /// Displacement of the movable jaw, where it moves by itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub jaw_um: Option<Vec<f64>>,
+    /// Force along the feed.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub force_n: Vec<f64>,
+    /// Effective feed of the tooth that entered last.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub effective_feed_mm: Vec<Option<f64>>,
+    /// Clamp force that the joint at the movable jaw asks for.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub clamp_movable_n: Vec<f64>,
+    /// That at the fixed jaw.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub clamp_fixed_n: Vec<f64>,
+}
+
+/// Chip along the arc.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ArcProfile {
+    /// Angle of the tooth.
+    #[schema(extensions(("x-unit" = json!("deg"))))]
+    pub angle_deg: Vec<f64>,
+    /// Effective feed.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub effective_feed_mm: Vec<f64>,
+    /// Chip thickness.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub chip_thickness_mm: Vec<f64>,
+    /// Chip thickness with a smooth feed.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub smooth_chip_mm: Vec<f64>,
+}

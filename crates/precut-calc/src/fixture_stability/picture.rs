@@ -1,0 +1,306 @@
+//! Figures and tables of an answer.
+
+use crate::calculator::{Axis, Column, Figure, Frame, Item, Message, Panel, Role, Table};
+
+use super::floquet::Working;
+use super::input::FixtureJob;
+use super::lobes::Map;
+use super::output::{AmplitudeCurve, ArcProfile, FixtureOutcome, LobeBoundary, LobeMap, Oscillogram};
+
+pub(super) const FIGURE_IDS: &[&str] = &["lobes", "oscillogram", "chip", "amplitude"];
+pub(super) const TABLE_IDS: &[&str] = &["boundary", "map", "amplitude", "entry", "steady", "arc"];
+
+/// Codes that the figures utter.
+pub(super) const LABEL_CODES: &[&str] = &[
+    "spindle_speed",
+    "depth_of_cut",
+    "time",
+    "displacement",
+    "force_along_feed",
+    "tooth_angle",
+    "chip_thickness",
+    "peak_to_peak",
+    "clamp_force_asked",
+    "multiplier_modulus",
+    "chatter_limit",
+    "zeroth_order_limit",
+    "amplitude_limit",
+    "movable_joint_limit",
+    "fixed_joint_limit",
+    "refined_boundary",
+    "working_point",
+    "working_depth",
+    "workpiece_displacement",
+    "jaw_displacement",
+    "cutting_force",
+    "actual_chip",
+    "smooth_chip",
+    "feed_per_tooth",
+    "movable_joint",
+    "fixed_joint",
+    "given_clamp_force",
+    "fixture_lobes",
+    "fixture_oscillogram",
+    "fixture_chip",
+    "fixture_amplitude",
+];
+
+const SPEED: Axis = Axis::linear("spindle_speed", "rev/min");
+const DEPTH: Axis = Axis::linear("depth_of_cut", "mm");
+
+fn line(name: &'static str, x: &[f64], y: Vec<Option<f64>>, role: Role) -> Item {
+    Item::Line { name, x: x.to_vec(), y, role }
+}
+
+fn some(values: &[f64]) -> Vec<Option<f64>> {
+    values.iter().copied().map(Some).collect()
+}
+
+fn figure(id: &'static str, title: &'static str, x: Axis, panels: Vec<Panel>) -> Figure {
+    Figure { id, title: Message::new(title), frame: Frame::Stacked, x, panels }
+}
+
+/// ln |mu|: decay below 0, growth above.
+fn heat(speeds: &[f64], depths: &[f64], modulus: &[f64]) -> Item {
+    Item::HeatMap {
+        value: Axis::linear("multiplier_modulus", "1"),
+        x: speeds.to_vec(),
+        y: depths.to_vec(),
+        // A map that is still growing has zeros where nothing was computed yet.
+        values: modulus.iter().map(|m| (*m > 0.0).then(|| m.ln())).collect(),
+        diverging: true,
+    }
+}
+
+fn working_point(spindle_rpm: f64, depth_mm: f64) -> Item {
+    Item::Points { name: "working_point", x: vec![spindle_rpm], y: vec![depth_mm], role: Role::Command }
+}
+
+/// The lobe diagram while it is computed.
+pub(super) fn lobes_so_far(boundary: &[(f64, Option<f64>)], map: Option<&Map>, working: Working) -> Figure {
+    let mut items: Vec<Item> = map.map(|map| heat(&map.speeds_rpm, &map.depths_mm, &map.modulus)).into_iter().collect();
+    let mut points: Vec<(f64, Option<f64>)> = boundary.to_vec();
+    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (x, y): (Vec<f64>, Vec<Option<f64>>) = points.into_iter().unzip();
+    items.push(Item::Line { name: "chatter_limit", x, y, role: Role::Limit });
+    items.push(working_point(working.spindle_rpm, working.depth_mm));
+    figure("lobes", "fixture_lobes", SPEED, vec![Panel { y: DEPTH, height: 1.0, items }])
+}
+
+pub(super) fn figures(job: &FixtureJob, outcome: &FixtureOutcome) -> Vec<Figure> {
+    let nothing = Oscillogram::default();
+    let steady = outcome.history.as_ref().map_or(&nothing, |history| &history.steady);
+    let entry = outcome.history.as_ref().map_or(&nothing, |history| &history.entry);
+    let no_arc = ArcProfile::default();
+    let arc = outcome.history.as_ref().map_or(&no_arc, |history| &history.arc);
+    vec![
+        figure("lobes", "fixture_lobes", SPEED, vec![Panel { y: DEPTH, height: 1.0, items: lobes(job, outcome) }]),
+        oscillograms(entry, steady),
+        figure(
+            "chip",
+            "fixture_chip",
+            Axis::linear("tooth_angle", "deg"),
+            vec![Panel {
+                y: Axis::linear("chip_thickness", "mm"),
+                height: 1.0,
+                items: vec![
+                    line("smooth_chip", &arc.angle_deg, some(&arc.smooth_chip_mm), Role::Nominal),
+                    line("actual_chip", &arc.angle_deg, some(&arc.chip_thickness_mm), Role::Plain),
+                ],
+            }],
+        ),
+        amplitude(job, outcome),
+    ]
+}
+
+fn lobes(job: &FixtureJob, outcome: &FixtureOutcome) -> Vec<Item> {
+    let working = working_point(outcome.engagement.spindle_speed_rpm, job.cut.depth_mm);
+    let Some(lobes) = &outcome.lobes else { return vec![working] };
+    let mut items: Vec<Item> =
+        lobes.map.iter().map(|map| heat(&map.spindle_speed_rpm, &map.depth_mm, &map.modulus)).collect();
+    let LobeBoundary { spindle_speed_rpm: x, .. } = &lobes.boundary;
+    let of = &lobes.boundary;
+    items.push(line("chatter_limit", x, of.chatter_mm.clone(), Role::Limit));
+    items.push(line("zeroth_order_limit", x, of.zeroth_order_mm.clone(), Role::Comparison));
+    for (name, values, series) in [
+        ("amplitude_limit", &of.amplitude_mm, 0),
+        ("movable_joint_limit", &of.movable_opens_mm, 1),
+        ("fixed_joint_limit", &of.fixed_opens_mm, 2),
+    ] {
+        if values.iter().any(Option::is_some) {
+            items.push(line(name, x, values.clone(), Role::Series(series)));
+        }
+    }
+    if let Some(LobeMap { refined_speed_rpm, refined_depth_mm, .. }) = &lobes.map
+        && !refined_speed_rpm.is_empty()
+    {
+        items.push(Item::Points {
+            name: "refined_boundary",
+            x: refined_speed_rpm.clone(),
+            y: refined_depth_mm.clone(),
+            role: Role::Unstable,
+        });
+    }
+    items.push(working);
+    items
+}
+
+fn oscillograms(entry: &Oscillogram, steady: &Oscillogram) -> Figure {
+    let panel = |y: Axis, items: Vec<Item>| Panel { y, height: 1.0, items };
+    // The entry and the last revolution lie far apart; the picture shows both behind one another, a gap between them.
+    let joined = |of: &dyn Fn(&Oscillogram) -> Vec<Option<f64>>| -> Vec<Option<f64>> {
+        let mut values = of(entry);
+        values.push(None);
+        values.extend(of(steady));
+        values
+    };
+    let start = entry.time_s.last().copied().unwrap_or(0.0);
+    let first = steady.time_s.first().copied().unwrap_or(start);
+    let gap = 0.1 * start;
+    let mut time = entry.time_s.clone();
+    time.push(start + 0.5 * gap);
+    time.extend(steady.time_s.iter().map(|t| t - first + start + gap));
+    let mut displacement =
+        vec![line("workpiece_displacement", &time, joined(&|o| some(&o.displacement_um)), Role::Plain)];
+    if entry.jaw_um.is_some() {
+        let jaw = joined(&|o| o.jaw_um.as_ref().map_or_else(Vec::new, |jaw| some(jaw)));
+        displacement.push(line("jaw_displacement", &time, jaw, Role::Series(0)));
+    }
+    figure(
+        "oscillogram",
+        "fixture_oscillogram",
+        Axis::linear("time", "s"),
+        vec![
+            panel(
+                Axis::linear("force_along_feed", "N"),
+                vec![line("cutting_force", &time, joined(&|o| some(&o.force_n)), Role::Plain)],
+            ),
+            panel(Axis::linear("displacement", "um"), displacement),
+            panel(
+                Axis::linear("clamp_force_asked", "N"),
+                vec![
+                    line("movable_joint", &time, joined(&|o| some(&o.clamp_movable_n)), Role::Series(0)),
+                    line("fixed_joint", &time, joined(&|o| some(&o.clamp_fixed_n)), Role::Series(1)),
+                ],
+            ),
+        ],
+    )
+}
+
+fn amplitude(job: &FixtureJob, outcome: &FixtureOutcome) -> Figure {
+    let nothing = AmplitudeCurve::default();
+    let curve = outcome.limits.as_ref().map_or(&nothing, |limits| &limits.curve);
+    let ends: Vec<f64> = curve.depth_mm.first().into_iter().chain(curve.depth_mm.last()).copied().collect();
+    let level = |name, value: f64, role| line(name, &ends, vec![Some(value); ends.len()], role);
+    let mut forces = vec![
+        line("movable_joint", &curve.depth_mm, some(&curve.clamp_movable_n), Role::Series(0)),
+        line("fixed_joint", &curve.depth_mm, some(&curve.clamp_fixed_n), Role::Series(1)),
+    ];
+    if let Some(force) = job.fixture.common().3 {
+        forces.push(level("given_clamp_force", force, Role::Limit));
+    }
+    figure(
+        "amplitude",
+        "fixture_amplitude",
+        DEPTH,
+        vec![
+            Panel {
+                y: Axis::linear("peak_to_peak", "um"),
+                height: 1.2,
+                items: vec![
+                    line("workpiece_displacement", &curve.depth_mm, some(&curve.peak_to_peak_um), Role::Plain),
+                    level("feed_per_tooth", 1e3 * outcome.engagement.feed_mm_per_tooth, Role::Limit),
+                    Item::Points {
+                        name: "working_depth",
+                        x: vec![job.cut.depth_mm],
+                        y: vec![outcome.verdict.peak_to_peak_um],
+                        role: Role::Command,
+                    },
+                ],
+            },
+            Panel { y: Axis::linear("clamp_force_asked", "N"), height: 0.8, items: forces },
+        ],
+    )
+}
+
+pub(super) fn tables(outcome: &FixtureOutcome) -> Vec<Table> {
+    let no_boundary = LobeBoundary::default();
+    let of = outcome.lobes.as_ref().map_or(&no_boundary, |lobes| &lobes.boundary);
+    let no_curve = AmplitudeCurve::default();
+    let curve = outcome.limits.as_ref().map_or(&no_curve, |limits| &limits.curve);
+    let no_wave = Oscillogram::default();
+    let (entry, steady) =
+        outcome.history.as_ref().map_or((&no_wave, &no_wave), |history| (&history.entry, &history.steady));
+    let no_arc = ArcProfile::default();
+    let arc = outcome.history.as_ref().map_or(&no_arc, |history| &history.arc);
+    vec![
+        Table {
+            id: "boundary",
+            columns: vec![
+                Column::numbers("spindle_speed", "rev/min", &of.spindle_speed_rpm),
+                Column::optional("chatter", "mm", &of.chatter_mm),
+                Column::optional("stable_again", "mm", &of.stable_again_mm),
+                Column::optional("amplitude", "mm", &of.amplitude_mm),
+                Column::optional("movable_opens", "mm", &of.movable_opens_mm),
+                Column::optional("fixed_opens", "mm", &of.fixed_opens_mm),
+                Column::optional("zeroth_order", "mm", &of.zeroth_order_mm),
+            ],
+        },
+        map_table(outcome.lobes.as_ref().and_then(|lobes| lobes.map.as_ref())),
+        Table {
+            id: "amplitude",
+            columns: vec![
+                Column::numbers("depth", "mm", &curve.depth_mm),
+                Column::numbers("modulus", "1", &curve.modulus),
+                Column::numbers("peak_to_peak", "um", &curve.peak_to_peak_um),
+                Column::numbers("clamp_movable", "N", &curve.clamp_movable_n),
+                Column::numbers("clamp_fixed", "N", &curve.clamp_fixed_n),
+                Column::numbers("lost_cut_share", "1", &curve.lost_cut_share),
+            ],
+        },
+        wave_table("entry", entry),
+        wave_table("steady", steady),
+        Table {
+            id: "arc",
+            columns: vec![
+                Column::numbers("angle", "deg", &arc.angle_deg),
+                Column::numbers("effective_feed", "mm", &arc.effective_feed_mm),
+                Column::numbers("chip_thickness", "mm", &arc.chip_thickness_mm),
+                Column::numbers("smooth_chip", "mm", &arc.smooth_chip_mm),
+            ],
+        },
+    ]
+}
+
+/// One row per point of the map.
+fn map_table(map: Option<&LobeMap>) -> Table {
+    let (mut speed, mut depth, mut modulus) = (Vec::new(), Vec::new(), Vec::new());
+    if let Some(map) = map {
+        for &h in &map.depth_mm {
+            speed.extend_from_slice(&map.spindle_speed_rpm);
+            depth.extend(std::iter::repeat_n(h, map.spindle_speed_rpm.len()));
+        }
+        modulus.clone_from(&map.modulus);
+    }
+    Table {
+        id: "map",
+        columns: vec![
+            Column::numbers("spindle_speed", "rev/min", &speed),
+            Column::numbers("depth", "mm", &depth),
+            Column::numbers("modulus", "1", &modulus),
+        ],
+    }
+}
+
+fn wave_table(id: &'static str, wave: &Oscillogram) -> Table {
+    let mut columns =
+        vec![Column::numbers("time", "s", &wave.time_s), Column::numbers("displacement", "um", &wave.displacement_um)];
+    columns.extend(wave.jaw_um.as_ref().map(|jaw| Column::numbers("jaw", "um", jaw)));
+    columns.extend([
+        Column::numbers("force", "N", &wave.force_n),
+        Column::optional("effective_feed", "mm", &wave.effective_feed_mm),
+        Column::numbers("clamp_movable", "N", &wave.clamp_movable_n),
+        Column::numbers("clamp_fixed", "N", &wave.clamp_fixed_n),
+    ]);
+    Table { id, columns }
+}

@@ -1,0 +1,41 @@
+//! A force as one product of powers, where it is one: what a geometric program can hold.
+
+use super::{Component, ForceModel, PowerLaw, PowerTerm};
+
+/// A force K t^x s^y v^n, N, with t in mm, s in mm/rev, v in m/min.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Monomial {
+    /// Force at 1 mm, 1 mm/rev, 1 m/min, N.
+    pub coefficient: f64,
+    /// Exponent of the depth.
+    pub depth_exponent: f64,
+    /// Exponent of the feed.
+    pub feed_exponent: f64,
+    /// Exponent of the speed.
+    pub speed_exponent: f64,
+}
+
+impl ForceModel {
+    /// The force component as a product of powers: of a power law, or a handbook choice, without a constant part.
+    pub fn monomial(&self, component: Component) -> Option<Monomial> {
+        match self {
+            Self::PowerLaw(law) => of_law(law, component),
+            Self::Handbook(handbook) => of_law(&handbook.resolve("").ok()?, component),
+            Self::Kienzle(_) | Self::Constant(_) | Self::Table(_) => None,
+        }
+    }
+}
+
+fn of_law(law: &PowerLaw, component: Component) -> Option<Monomial> {
+    let term: &PowerTerm = match component {
+        Component::Passive => &law.passive,
+        Component::Main => law.main.as_ref()?,
+        Component::Feed => law.feed.as_ref()?,
+    };
+    (term.constant_n <= 0.0).then_some(Monomial {
+        coefficient: term.coefficient * term.correction_factor * law.wear_factor,
+        depth_exponent: term.depth_exponent,
+        feed_exponent: term.feed_exponent,
+        speed_exponent: term.speed_exponent,
+    })
+}

@@ -1,0 +1,73 @@
+//! Whether any point satisfies the limits: phase 1 and its certificate.
+
+use super::interior::{Failed, Settings};
+use super::{Affines, Layout, Objective, Program};
+
+/// What phase 1 found.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Verdict {
+    /// A point that satisfies every limit, within `excess` (at most [`TOLERANCE`]).
+    Feasible,
+    /// None does. The limits that say so, with their weights in the certificate: rows, then sums.
+    Infeasible {
+        /// Least common relaxation that makes it feasible.
+        excess: f64,
+        /// Weight of every row.
+        rows: Vec<f64>,
+        /// Weight of every sum.
+        sums: Vec<f64>,
+    },
+}
+
+/// A common relaxation up to this counts as none.
+const TOLERANCE: f64 = 1e-7;
+/// Half-width of the box that keeps every variable bounded when bounds are left out, in logarithms.
+const BOX: f64 = 12.0;
+
+/// Minimises the common relaxation t >= -0.5 of the chosen rows and sums (`feed/6.5`); the others are left out.
+///
+/// # Errors
+/// [`Failed::Stalled`] where the method came to nothing.
+pub fn feasibility(program: &Program, rows: &[usize], sums: &[usize]) -> Result<Verdict, Failed> {
+    let relaxed = relaxed(program, rows, sums);
+    let layout = Layout::new(&relaxed).ok_or(Failed::NotChained)?;
+    let settings = Settings { gap: 1e-9, enough: Some(-1e-6), iterations: 120, ..Settings::default() };
+    let solution = layout.minimise(&settings)?;
+    if solution.objective <= TOLERANCE {
+        return Ok(Verdict::Feasible);
+    }
+    let mut weights = vec![0.0; program.rows.len()];
+    for (k, &row) in rows.iter().enumerate() {
+        weights[row] = solution.row_multipliers[k];
+    }
+    let mut of_sums = vec![0.0; program.sums.len()];
+    for (k, &sum) in sums.iter().enumerate() {
+        of_sums[sum] = solution.sum_multipliers[k];
+    }
+    Ok(Verdict::Infeasible { excess: solution.objective, rows: weights, sums: of_sums })
+}
+
+fn relaxed(program: &Program, rows: &[usize], sums: &[usize]) -> Program {
+    let t = program.variables();
+    let mut all = program.rows.chosen(rows).with_entry(t, -1.0);
+    for (i, start) in program.start.iter().enumerate() {
+        all.push(&[(i, 1.0)], -(start + BOX));
+        all.push(&[(i, -1.0)], start - BOX);
+    }
+    all.push(&[(t, -1.0)], -0.5);
+    let sums: Vec<Affines> = sums.iter().map(|&sum| program.sums[sum].with_entry(t, -1.0)).collect();
+    let mut least = Affines::new();
+    least.push(&[(t, 1.0)], 0.0);
+    let mut relaxed = Program {
+        local: program.local,
+        common: program.common + 1,
+        objective: Objective::Linear(least),
+        rows: all,
+        sums,
+        start: program.start.clone(),
+    };
+    relaxed.start.push(0.0);
+    let worst = relaxed.violation(&relaxed.start);
+    relaxed.start[t] = worst.max(-0.4) + 0.5;
+    relaxed
+}

@@ -1,0 +1,330 @@
+//! What dominates, what would help, where not to trust: codes with numbers.
+
+use crate::calculator::{Finding, Message};
+
+use super::input::{Job, LongWave, Method};
+use super::output::{Fate, Outcome, SearchOutcome, SearchStatus, SimulationOutcome};
+use super::scene::Scene;
+use super::stance::{LOOSE_RAD, Stance, through_tip};
+use super::surface::UM_PER_MM;
+use super::turning::plane::{add, scaled};
+
+/// |a| + |b| above which lobes grow noticeably.
+const GAIN: f64 = 1.02;
+/// |a| + |b| up to which the tool counts as opposite to a support.
+const DIAMETRAL: f64 = 1.001;
+/// A bite is large above so many feeds and this share of the blank's deviation.
+const BITE_OVER_FEED: f64 = 3.0;
+const BITE_OVER_BLANK: f64 = 0.25;
+/// Nodes per wave of the filter's cut-off.
+const PER_CUTOFF_WAVE: u32 = 7;
+/// Share of the roundness that makes a cause worth naming.
+const WORTH_NAMING: f64 = 0.3;
+/// Share of the roundness above which its error is warned of.
+const ERROR_SHARE: f64 = 0.1;
+
+/// Codes of the warnings made here.
+pub(super) const WARNING_CODES: &[&str] = &[
+    "setting_not_diametral_lobes_grow",
+    "not_cleaned_up",
+    "first_bite_too_large_odd_lobes_locked_in",
+    "supports_too_close_unstable",
+    "ring_lifts_off",
+    "tip_starts_inside",
+    "samples_below_cutoff",
+    "teeth_unresolved",
+    "samples_limited",
+    "discretisation_error_large",
+    "nearest_samples_no_geometry",
+    "points_flew_apart",
+    "roots_incomplete",
+];
+
+/// Codes of the explanations made here.
+pub(super) const EXPLANATION_CODES: &[&str] = &[
+    "ring_comes_out",
+    "size_and_error",
+    "opposite_to_support",
+    "off_the_diameter",
+    "first_bite_stays",
+    "start_clear",
+    "odd_waves_stay",
+    "teeth_of_feed",
+    "feed_step_stays",
+    "growing_waves",
+    "nearest_samples_explained",
+    "worst_wave",
+    "no_worst_wave",
+    "map_best",
+    "map_empty",
+    "search_robust",
+    "search_fragile",
+    "search_beyond",
+    "search_odd",
+    "second_stage",
+    "setting_only",
+    "ring_not_modelled",
+];
+
+/// What to warn of.
+pub(super) fn warnings(job: &Job, scene: &Scene, end: &Stance, outcome: &Outcome) -> Vec<Finding> {
+    let mut found = Vec::new();
+    let setting = &outcome.setting;
+    if setting.coefficient_sum > GAIN {
+        let lobing = super::linear::lobing(scene, end);
+        let roots = lobing.near_neutral(1.5, f64::from(job.highest_order) + 0.45);
+        let worst = super::linear::worst_of(&roots);
+        let mut finding =
+            Finding::new("setting_not_diametral_lobes_grow", "/tool").measured(setting.coefficient_sum, GAIN, "1");
+        if let Some(worst) = worst {
+            finding = finding.with("lobes", worst.lobes).with("factor", worst.factor_per_revolution());
+        }
+        found.push(finding);
+    }
+    if end.half_angle_rad < LOOSE_RAD {
+        found.push(Finding::new("supports_too_close_unstable", "/supports/distance_mm").measured(
+            end.half_angle_rad.to_degrees(),
+            LOOSE_RAD.to_degrees(),
+            "deg",
+        ));
+    }
+    if let Some(reactions) = &setting.reactions
+        && !reactions.seated
+    {
+        let values = [reactions.support_a_n, reactions.support_b_n];
+        let driven = [reactions.driven_support_a_n, reactions.driven_support_b_n];
+        let least = values.into_iter().chain(driven.into_iter().flatten()).fold(f64::INFINITY, f64::min);
+        found.push(Finding::new("ring_lifts_off", "/forces").measured(least, 0.0, "N"));
+    }
+    if setting.gap_at_start_um < 0.0 {
+        let bite = outcome.simulation.as_ref().and_then(|s| s.largest_bite_um);
+        let mut finding = Finding::new("tip_starts_inside", "/tool/y_mm")
+            .measured(-setting.gap_at_start_um, 0.0, "um")
+            .with("half_turn_reduction_um", setting.half_turn_reduction_um);
+        if let Some(bite) = bite {
+            finding = finding.with("bite_um", bite);
+        }
+        found.push(finding);
+    }
+    if let Some(simulation) = &outcome.simulation {
+        of_simulation(job, simulation, outcome, &mut found);
+    }
+    if outcome.linear_theory.as_ref().is_some_and(|linear| !linear.complete) {
+        found.push(Finding::new("roots_incomplete", "/analyses"));
+    }
+    found
+}
+
+fn of_simulation(job: &Job, simulation: &SimulationOutcome, outcome: &Outcome, found: &mut Vec<Finding>) {
+    if simulation.uncut_share > 0.0 {
+        found.push(Finding::new("not_cleaned_up", "/tool/revolutions").measured(simulation.uncut_share, 0.0, "1"));
+    }
+    let blank_um = simulation.start.unfiltered.least_squares_um;
+    if let Some(bite_um) = simulation.largest_bite_um {
+        let limit = (BITE_OVER_FEED * job.tool.feed_mm_per_rev * UM_PER_MM).max(BITE_OVER_BLANK * blank_um);
+        if bite_um > limit {
+            found.push(
+                Finding::new("first_bite_too_large_odd_lobes_locked_in", "/tool/y_mm").measured(bite_um, limit, "um"),
+            );
+        }
+    }
+    if let Some(cutoff) = job.filter.cutoff_upr()
+        && simulation.samples < PER_CUTOFF_WAVE * cutoff
+    {
+        let (samples, needed) = (f64::from(simulation.samples), f64::from(PER_CUTOFF_WAVE * cutoff));
+        found.push(Finding::new("samples_below_cutoff", "/samples").measured(samples, needed, "1"));
+    }
+    if job.method == Method::NearestSamples {
+        if let (Some(end), Some(exact)) = (&simulation.end, &simulation.exact_contact) {
+            let (here, exact) = (end.filtered.least_squares_um, exact.filtered.least_squares_um);
+            found.push(Finding::new("nearest_samples_no_geometry", "/method").measured(here, exact, "um"));
+        } else {
+            found.push(Finding::new("points_flew_apart", "/samples").value(f64::from(simulation.samples), "1"));
+        }
+        return;
+    }
+    let (samples, needed) = (f64::from(simulation.samples), f64::from(simulation.samples_for_teeth));
+    if job.filter == LongWave::None && simulation.samples < simulation.samples_for_teeth {
+        let code = if job.samples.is_some_and(|n| n != super::sampling::MOST_CHOSEN) {
+            "teeth_unresolved"
+        } else {
+            "samples_limited"
+        };
+        found.push(Finding::new(code, "/samples").measured(samples, needed, "1"));
+    }
+    if let (Some(value), Some(error)) = (outcome.roundness_um, outcome.roundness_error_um)
+        && error > ERROR_SHARE * value
+    {
+        found.push(Finding::new("discretisation_error_large", "/samples").measured(error, ERROR_SHARE * value, "um"));
+    }
+}
+
+/// What to say, most important first.
+pub(super) fn explanation(job: &Job, scene: &Scene, outcome: &Outcome) -> Vec<Message> {
+    let mut said = Vec::new();
+    if let Some(simulation) = &outcome.simulation {
+        of_run(job, scene, simulation, outcome, &mut said);
+    }
+    let setting = &outcome.setting;
+    let diametral = setting.coefficient_sum <= DIAMETRAL;
+    said.push(
+        Message::new(if diametral { "opposite_to_support" } else { "off_the_diameter" })
+            .with("sum", setting.coefficient_sum)
+            .with("half_turn_reduction_um", setting.half_turn_reduction_um)
+            .with("support", if setting.coefficient_a.abs() >= setting.coefficient_b.abs() { "A" } else { "B" }),
+    );
+    if let Some(linear) = &outcome.linear_theory {
+        match &linear.worst {
+            Some(worst) => {
+                let growing = linear.orders.iter().filter(|order| order.fate == Fate::Grows).count();
+                said.push(
+                    Message::new("worst_wave")
+                        .with("lobes", worst.lobes)
+                        .with("factor", worst.factor_per_revolution)
+                        .with("growing", growing),
+                );
+            }
+            None => said.push(Message::new("no_worst_wave")),
+        }
+    }
+    if let Some(map) = &outcome.setup_map {
+        match &map.best {
+            Some(best) => said.push(
+                Message::new("map_best")
+                    .with("tool_angle_deg", best.tool_angle_deg)
+                    .with("support_half_angle_deg", best.support_half_angle_deg)
+                    .with("factor", best.worst_factor_per_revolution.unwrap_or(0.0))
+                    .with("here", map.here.worst_factor_per_revolution.unwrap_or(0.0)),
+            ),
+            None => said.push(Message::new("map_empty")),
+        }
+    }
+    if let Some(search) = &outcome.settings_search {
+        of_search(job, search, &mut said);
+    }
+    if outcome.simulation.is_none() {
+        said.push(
+            Message::new("setting_only")
+                .with("circumradius_mm", setting.circumradius_mm)
+                .with("radius_per_feed", setting.radius_per_feed),
+        );
+    }
+    said.push(Message::new("ring_not_modelled"));
+    said
+}
+
+fn of_run(job: &Job, scene: &Scene, simulation: &SimulationOutcome, outcome: &Outcome, said: &mut Vec<Message>) {
+    if job.method == Method::NearestSamples {
+        // First order in the spacing, about πR/N.
+        let radius = simulation.start.mean_radius_mm;
+        said.push(
+            Message::new("nearest_samples_explained")
+                .with("samples", f64::from(simulation.samples))
+                .with("location_error_um", std::f64::consts::PI * radius / f64::from(simulation.samples) * UM_PER_MM)
+                .with("exact_um", simulation.exact_contact.as_ref().map_or(0.0, |e| e.filtered.least_squares_um)),
+        );
+    }
+    let (Some(end), Some(error)) = (&simulation.end, &simulation.end_error) else { return };
+    said.push(
+        Message::new("ring_comes_out")
+            .with("roundness_um", end.filtered.least_squares_um)
+            .with("minimum_zone_um", end.filtered.minimum_zone_um)
+            .with("unfiltered_um", end.unfiltered.least_squares_um)
+            .with("blank_um", simulation.start.unfiltered.least_squares_um),
+    );
+    if job.method == Method::NearestSamples {
+        return;
+    }
+    said.push(
+        Message::new("size_and_error")
+            .with("radius_mm", end.mean_radius_mm)
+            .with("radius_per_feed", outcome.setting.radius_per_feed)
+            .with("roundness_error_um", error.filtered.least_squares_um)
+            .with("unfiltered_error_um", error.unfiltered.least_squares_um)
+            .with("samples", f64::from(simulation.samples)),
+    );
+    let causes = &simulation.causes;
+    let share = WORTH_NAMING * end.unfiltered.least_squares_um;
+    if causes.first_bite_um > share {
+        said.push(
+            Message::new("first_bite_stays")
+                .with("bite_um", simulation.largest_bite_um.unwrap_or(0.0))
+                .with("left_um", causes.first_bite_um),
+        );
+        if let Some(back_mm) = back_off_mm(scene, simulation) {
+            said.push(Message::new("start_clear").with("back_mm", back_mm));
+        }
+    }
+    if causes.odd_lobes_um > share {
+        said.push(Message::new("odd_waves_stay").with("odd_lobes_um", causes.odd_lobes_um));
+    }
+    if causes.teeth_um > share {
+        said.push(Message::new("teeth_of_feed").with("teeth_um", causes.teeth_um));
+    }
+    if causes.feed_step_um > share {
+        said.push(Message::new("feed_step_stays").with("step_um", causes.feed_step_um));
+    }
+    if causes.growing_lobes_um > share {
+        said.push(Message::new("growing_waves").with("height_um", causes.growing_lobes_um));
+    }
+}
+
+/// How much further back the tip must start to be clear of the largest diameter, mm along the feed.
+fn back_off_mm(scene: &Scene, simulation: &SimulationOutcome) -> Option<f64> {
+    let radii = &simulation.profile.start_radius_mm;
+    let n = radii.len();
+    let widest = (0..n).map(|i| radii[i] + radii[(i + n / 2) % n]).fold(0.0, f64::max);
+    let setting = &scene.setting;
+    let radius = |back: f64| {
+        through_tip(setting, add(setting.tip_start_mm, scaled(setting.feed_direction, -back))).map(|s| s.radius_mm)
+    };
+    let (mut low, mut high) = (0.0, 0.2 * widest);
+    if radius(0.0)? >= 0.5 * widest || radius(high)? < 0.5 * widest {
+        return None;
+    }
+    for _ in 0..50 {
+        let mid = 0.5 * (low + high);
+        if radius(mid)? < 0.5 * widest {
+            low = mid;
+        } else {
+            high = mid;
+        }
+    }
+    Some(high)
+}
+
+fn of_search(job: &Job, search: &SearchOutcome, said: &mut Vec<Message>) {
+    let target = job.settings_search.map_or(0.0, |range| range.target_um);
+    let code = match search.status {
+        SearchStatus::Robust => "search_robust",
+        SearchStatus::Fragile => "search_fragile",
+        SearchStatus::BeyondLimits => "search_beyond",
+        SearchStatus::OddLobes => "search_odd",
+    };
+    let mut message = Message::new(code)
+        .with("target_um", target)
+        .with("tried", search.tried.revolutions.len())
+        .with("odd_lobes_um", search.odd_lobes_um)
+        .with("odd_orders", search.odd_orders.iter().map(|order| f64::from(*order)).collect::<Vec<_>>());
+    if let Some(best) = &search.best {
+        message = message
+            .with("revolutions", best.revolutions)
+            .with("feed_mm_per_rev", best.feed_mm_per_rev)
+            .with("x_mm", best.tool_x_mm)
+            .with("y_mm", best.tool_y_mm)
+            .with("roundness_um", best.roundness_um)
+            .with("margin_um", best.margin_um);
+    }
+    said.push(message);
+    if let Some(stage) = &search.second_stage {
+        said.push(
+            Message::new("second_stage")
+                .with("support_distance_mm", stage.support_distance_mm)
+                .with("revolutions", stage.revolutions)
+                .with("feed_mm_per_rev", stage.feed_mm_per_rev)
+                .with("before_um", stage.before_um)
+                .with("after_um", stage.after_um)
+                .with("after_off_um", stage.after_off_um),
+        );
+    }
+}

@@ -1,0 +1,316 @@
+//! Ring roundness: how round will a ring get that is turned while it rests on the surface being turned?
+//!
+//! The ring lies with its outer surface on two supports; a wide-edge tool, a point in the cross-section, is fed toward
+//! it. Every error of the surface that passes a support moves the ring and is copied onto what passes the tool. The
+//! simulation (`turning`) locates the ring exactly at every step and cuts every body angle; the linear theory (`lobing`)
+//! says which waves grow, stay or decay; the reference circles are those of [`crate::num::roundness`].
+//!
+//! The way of a job: `input` -> `check` -> `scene` (setting and blank with effects, mirrored for clockwise rotation) ->
+//! `simulate`, `linear`, `search` -> `output`, `advice`, `picture`. `forward` gives the same model to the diagnosis.
+
+mod advice;
+mod check;
+pub mod evaluation;
+mod forward;
+mod input;
+mod linear;
+mod lobing;
+mod output;
+mod picture;
+mod sampling;
+mod scene;
+mod search;
+mod simulate;
+mod stance;
+mod surface;
+mod turning;
+
+pub use forward::{RingAllowances, RingPoint, RingRun};
+pub use input::{
+    Analysis, Drive, ErrorEstimate, Forces, Job, LongWave, MapRange, Method, ProfileRow, Ring, Rotation, SearchRange,
+    Stiffness, Supports, Tool, Wave,
+};
+pub use output::{
+    CausesOutcome, CircleValues, Evaluated, Fate, HistoryColumns, LinearOutcome, MapCell, MapOutcome, OrderOutcome,
+    Outcome, PathColumns, ProfileColumns, ReactionsOutcome, RootOutcome, SearchOutcome, SearchSetting, SearchStatus,
+    SecondStage, SettingOutcome, SimulationOutcome, SpectrumColumns, TriedColumns, WaveColumn,
+};
+
+use crate::calculator::{
+    Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Finding, Message, Meta, Monitor,
+    Table, checkpoint,
+};
+
+use scene::Scene;
+use simulate::Share;
+use stance::{Load, Stance, reactions_n};
+use surface::UM_PER_MM;
+
+/// The calculator.
+#[derive(Debug, Clone, Copy)]
+pub struct RingRoundness;
+
+impl Calculator for RingRoundness {
+    type Input = Job;
+    type Output = Outcome;
+
+    const META: Meta = Meta {
+        id: "ring-roundness",
+        kind: CalculatorKind::Calculator,
+        version: 1,
+        title: "Ring roundness",
+        question: "How round will a ring get that is turned while it rests on the surface being turned?",
+        summary: "A ring or a journal rests with the surface being turned on two supports while a wide-edge tool is fed \
+                  toward it. From blank, supports, tool and feed: the profile that comes out, its roundness about all \
+                  four reference circles, how it develops revolution by revolution, which waves grow, stay or decay, \
+                  which setting and feed reach a target, and how sure all this is.",
+        references: &[
+            "Shchurova, Bulletin of the South Ural State University, Mechanical Engineering, 2012",
+            "Dall, Rounding effect in centreless grinding, Mechanical Engineering 68 (1946) 325-329",
+            "Gurney, An analysis of centerless grinding, J. Eng. Ind. 86 (1964) 163-174",
+            "Rowe, Barash, Computer method for investigating the inherent accuracy of centreless grinding, Int. J. Mach. Tool Des. Res. 4 (1964) 91-116",
+            "ISO 12181-1, ISO 12181-2, ISO 16610-21",
+        ],
+        examples: &[
+            Example {
+                id: "paper",
+                title: "Ellipse 300 mm, 256 revolutions: the source paper's run as printed, located exactly",
+                job: include_str!("examples/paper.json"),
+            },
+            Example {
+                id: "clear_start",
+                title: "The same feed, the tool starting clear of the largest diameter, with the linear theory",
+                job: include_str!("examples/clear_start.json"),
+            },
+            Example {
+                id: "paper_algorithm",
+                title: "The source paper's own algorithm, whose answer depends on the number of samples",
+                job: include_str!("examples/paper_algorithm.json"),
+            },
+            Example {
+                id: "rollers",
+                title: "Measured blank on rollers, compliant tool, forces, one roller running out",
+                job: include_str!("examples/rollers.json"),
+            },
+            Example {
+                id: "set_up",
+                title: "Which angles, which feed: set-up map and settings search",
+                job: include_str!("examples/set_up.json"),
+            },
+        ],
+        study_outputs: &["/roundness_um", "/roundness_unfiltered_um", "/mean_radius_mm", "/setting/coefficient_sum"],
+        codes: CODES,
+        figures: picture::FIGURE_IDS,
+        tables: picture::TABLE_IDS,
+        has_program: false,
+    };
+
+    fn fill(job: &mut Job) {
+        job.samples = Some(sampling::samples_of(job));
+    }
+
+    fn cost(job: &Job) -> Cost {
+        cost(job)
+    }
+
+    fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
+        run(job, monitor)
+    }
+
+    fn figures(job: &Job, outcome: &Outcome) -> Vec<Figure> {
+        picture::figures(job, outcome)
+    }
+
+    fn tables(_job: &Job, outcome: &Outcome) -> Vec<Table> {
+        picture::tables(outcome)
+    }
+}
+
+/// Measured on one core: 60 to 110 ns per step, rollers 0.3 to 0.5 us, the paper's algorithm 6 ns per step and point,
+/// a map's cell 30 us.
+fn cost(job: &Job) -> Cost {
+    let n = f64::from(sampling::samples_of(job));
+    let turns = job.tool.revolutions + job.tool.spark_out_revolutions;
+    let step_ns = if job.supports.roller_radius_mm > 0.0 { 400.0 } else { 90.0 };
+    let mut ms = 1.0;
+    let mut driver = if n > 7200.0 { "/samples" } else { "/tool/revolutions" };
+    if job.asks(Analysis::Simulation) {
+        let runs = match job.error_estimate {
+            ErrorEstimate::HalfSamples => 1.5,
+            ErrorEstimate::DoubleSamples => 3.0,
+        };
+        ms += 1e-6
+            * turns
+            * match job.method {
+                Method::ExactContact => runs * n * step_ns,
+                Method::NearestSamples => 7.0 * n * n + 3600.0 * step_ns,
+            };
+        // The history fits a circle per entry.
+        ms += 3e-5 * n * turns.min(400.0) + 1e-3 * n;
+    }
+    if job.asks(Analysis::LinearTheory) {
+        ms += 5.0;
+    }
+    if job.asks(Analysis::SetupMap) {
+        let cells = f64::from(job.setup_map.tool_angles) * f64::from(job.setup_map.support_angles);
+        let map = 2e-3 * cells * f64::from(job.setup_map.highest_order);
+        if map > ms {
+            driver = "/setup_map/tool_angles";
+        }
+        ms += map;
+    }
+    if let (true, Some(range)) = (job.asks(Analysis::SettingsSearch), &job.settings_search) {
+        let nodes = if job.filter == LongWave::None { n } else { n.min(1800.0) };
+        // A scan in steps of 5 % sums to 21 times its largest run.
+        let search = 1e-6 * step_ns * (21.0 * nodes + 6.0 * n) * range.revolutions_max.min(2000.0);
+        if search > ms {
+            driver = "/settings_search/revolutions_max";
+        }
+        ms += search;
+    }
+    let rows = job.measured_profile.as_ref().map_or(0, |profile| profile.rows().len());
+    let bytes = 200_000 + u64::from(sampling::samples_of(job)) * 400 + rows as u64 * 100;
+    Cost { ms, bytes, driver }
+}
+
+fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
+    checkpoint(monitor)?;
+    let scene = Scene::of(job, &job.effects);
+    let end = scene.end().ok_or_else(|| Failure::OutOfModel(Finding::new("no_end_position", "/tool")))?;
+    let mut outcome = Outcome {
+        roundness_um: None,
+        roundness_error_um: None,
+        roundness_unfiltered_um: None,
+        roundness_unfiltered_error_um: None,
+        mean_radius_mm: None,
+        mean_radius_error_um: None,
+        setting: setting(job, &scene, &end)?,
+        simulation: None,
+        linear_theory: None,
+        setup_map: None,
+        settings_search: None,
+    };
+    let whole = Share { monitor, from: 0.0, to: 1.0 };
+    if job.asks(Analysis::Simulation) {
+        let to = if job.asks(Analysis::SettingsSearch) { 0.4 } else { 0.8 };
+        let simulated = simulate::simulate(job, &scene, &end, whole.part(0.0, to))?;
+        if let (Some(end), Some(error)) = (&simulated.end, &simulated.end_error) {
+            outcome.roundness_um = Some(end.filtered.least_squares_um);
+            outcome.roundness_error_um = Some(error.filtered.least_squares_um);
+            outcome.roundness_unfiltered_um = Some(end.unfiltered.least_squares_um);
+            outcome.roundness_unfiltered_error_um = Some(error.unfiltered.least_squares_um);
+            outcome.mean_radius_mm = Some(end.mean_radius_mm);
+            outcome.mean_radius_error_um = Some(error.mean_radius_mm * UM_PER_MM);
+        }
+        outcome.simulation = Some(simulated);
+    }
+    if job.asks(Analysis::LinearTheory) {
+        outcome.linear_theory = Some(linear::theory(job, &scene, &end));
+    }
+    if job.asks(Analysis::SetupMap) {
+        outcome.setup_map = Some(linear::map(job, &scene, &end, whole.part(0.8, 0.9))?);
+    }
+    if let (true, Some(range)) = (job.asks(Analysis::SettingsSearch), &job.settings_search) {
+        let from = if outcome.setup_map.is_some() { 0.9 } else { 0.4 };
+        outcome.settings_search = Some(search::search(job, range, &scene, whole.part(from, 1.0))?);
+    }
+    let warnings = advice::warnings(job, &scene, &end, &outcome);
+    let explanation = advice::explanation(job, &scene, &outcome);
+    monitor.progress(1.0, Message::new("stage_done"));
+    Ok(Answer { output: outcome, warnings, explanation, basis: basis(job) })
+}
+
+fn setting(job: &Job, scene: &Scene, end: &Stance) -> Result<SettingOutcome, Failure> {
+    let copying = end.copying();
+    let per_feed = end.radius_per_feed(scene.setting.feed_direction);
+    // In the mirror the supports have changed places.
+    let (a, b, delay_a, delay_b) = if scene.mirrored {
+        (copying.b, copying.a, copying.delay_b_rad, copying.delay_a_rad)
+    } else {
+        (copying.a, copying.b, copying.delay_a_rad, copying.delay_b_rad)
+    };
+    Ok(SettingOutcome {
+        circumradius_mm: end.radius_mm,
+        support_half_angle_deg: end.half_angle_rad.to_degrees(),
+        tool_angle_deg: scene::mirrored_rad(end.tool_rad(), scene.mirrored).to_degrees(),
+        coefficient_a: a,
+        coefficient_b: b,
+        coefficient_sum: copying.gain(),
+        delay_a_deg: delay_a.to_degrees(),
+        delay_b_deg: delay_b.to_degrees(),
+        compliance_ratio: scene.setting.compliance_ratio,
+        radius_per_feed: per_feed,
+        half_turn_reduction_um: per_feed * scene.setting.feed_mm_per_rev * UM_PER_MM,
+        gap_at_start_um: simulate::gap_at_start_mm(job, scene)? * UM_PER_MM,
+        reactions: job.forces.as_ref().map(|forces| reactions(forces, scene, end)),
+    })
+}
+
+fn reactions(forces: &Forces, scene: &Scene, end: &Stance) -> ReactionsOutcome {
+    let load = Load { thrust_n: forces.thrust_n, cutting_n: forces.cutting_n, weight_n: forces.weight_n };
+    // The mirror turns a clockwise ring into a counter-clockwise one and swaps the supports.
+    let swap = |(a, b): (f64, f64)| if scene.mirrored { (b, a) } else { (a, b) };
+    let (support_a_n, support_b_n) = swap(reactions_n(end, &load, 1.0, false));
+    let driven = (forces.drive == Drive::Rollers).then(|| swap(reactions_n(end, &load, 1.0, true)));
+    let (least_a, least_b) = driven.unwrap_or((support_a_n, support_b_n));
+    let seated = least_a >= 0.0 && least_b >= 0.0;
+    let pressed = least_a + least_b;
+    ReactionsOutcome {
+        support_a_n,
+        support_b_n,
+        driven_support_a_n: driven.map(|(a, _)| a),
+        driven_support_b_n: driven.map(|(_, b)| b),
+        friction_needed: (driven.is_some() && seated && pressed > 0.0).then(|| forces.cutting_n / pressed),
+        drive_torque_n_m: forces.cutting_n * end.radius_mm / 1000.0,
+        seated,
+    }
+}
+
+/// The equations that acted.
+fn basis(job: &Job) -> Vec<Basis> {
+    const COPYING: &str = "regenerative centring: Dall 1946, Gurney 1964, Rowe and Barash 1964";
+    let mut used = vec![
+        Basis { equation: "ring/2.2", source: "circle through the tip that touches both supports" },
+        Basis { equation: "ring/5.1", source: COPYING },
+    ];
+    let mut add = |asked: bool, equations: &[(&'static str, &'static str)]| {
+        if asked {
+            used.extend(equations.iter().map(|&(equation, source)| Basis { equation, source }));
+        }
+    };
+    let simulation = job.asks(Analysis::Simulation);
+    add(
+        simulation,
+        &[
+            ("ring/3.1", "exact location on both supports"),
+            ("ring/3.3", "node-aligned stepping"),
+            ("ring/3.4", "wide-edge removal"),
+            ("ring/6.1", "causes of the error, first order"),
+            ("ring/8.1", "repetition with another number of nodes"),
+        ],
+    );
+    add(simulation && job.supports.roller_radius_mm > 0.0, &[("ring/3.2", "envelope of the roller")]);
+    add(simulation && job.tool.wheel_radius_mm.is_some(), &[("ring/3.5", "sides of the wheel")]);
+    add(simulation && job.method == Method::NearestSamples, &[("ring/9.1", "Shchurova 2012")]);
+    add(job.forces.is_some(), &[("ring/4.1", "equilibrium of the ring")]);
+    add(job.stiffness.is_some(), &[("ring/4.2", "stiffness of tool and supports")]);
+    add(
+        job.asks(Analysis::LinearTheory) || job.asks(Analysis::SetupMap),
+        &[("ring/5.2", COPYING), ("ring/5.3", COPYING)],
+    );
+    add(job.asks(Analysis::SettingsSearch), &[("ring/5.4", COPYING), ("ring/7.1", "scan by simulation")]);
+    used.extend(
+        job.effects.iter().map(|effect| Basis { equation: effect.cause().equation, source: "catalogue of effects" }),
+    );
+    used
+}
+
+/// Everything that this calculator may utter, from where it is said.
+const CODES: Codes = Codes {
+    faults: &[check::CODES],
+    failures: &[simulate::FAILURE_CODES, &["no_end_position"]],
+    warnings: &[advice::WARNING_CODES],
+    explanations: &[advice::EXPLANATION_CODES],
+    stages: &[&["stage_revolution", "stage_map", "stage_search", "stage_done"]],
+    labels: &[picture::LABEL_CODES],
+};

@@ -1,0 +1,544 @@
+//! The answer: what comes out, why, and how sure it is.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// How round the ring will be, and what decides it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(title = "RingRoundnessResult")]
+pub struct Outcome {
+    /// Roundness deviation at the end, about the least-squares circle, filtered; null without simulation.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub roundness_um: Option<f64>,
+    /// Error of it by the number of nodes.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub roundness_error_um: Option<f64>,
+    /// The same without filter.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub roundness_unfiltered_um: Option<f64>,
+    /// Error of it by the number of nodes.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub roundness_unfiltered_error_um: Option<f64>,
+    /// Radius of the least-squares circle at the end.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub mean_radius_mm: Option<f64>,
+    /// Error of it by the number of nodes.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub mean_radius_error_um: Option<f64>,
+    /// What the angles of tool and supports make of errors, at the end of the feed.
+    pub setting: SettingOutcome,
+    /// The cut, step by step.
+    pub simulation: Option<SimulationOutcome>,
+    /// Which waves grow, stay or decay.
+    pub linear_theory: Option<LinearOutcome>,
+    /// The same over tool angle and support angle.
+    pub setup_map: Option<MapOutcome>,
+    /// Fewest revolutions to the target.
+    pub settings_search: Option<SearchOutcome>,
+}
+
+/// What the angles of tool and supports make of errors, at the end of the feed; exact but for rounding.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingSettingOutcome)]
+pub struct SettingOutcome {
+    /// Radius of the circle through the tip that touches both supports: the size that a rigid machine gives.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub circumradius_mm: f64,
+    /// Support half angle from the downward vertical.
+    #[schema(extensions(("x-unit" = json!("deg"))))]
+    pub support_half_angle_deg: f64,
+    /// Tool angle seen from the ring's centre.
+    #[schema(extensions(("x-unit" = json!("deg"))))]
+    pub tool_angle_deg: f64,
+    /// Copying coefficient of the left support.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub coefficient_a: f64,
+    /// Copying coefficient of the right support.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub coefficient_b: f64,
+    /// Sum of their sizes: 1 where the tool stands opposite to a support; above, some lobes grow.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub coefficient_sum: f64,
+    /// Rotation from the tool to the left support.
+    #[schema(extensions(("x-unit" = json!("deg"))))]
+    pub delay_a_deg: f64,
+    /// Rotation from the tool to the right support.
+    #[schema(extensions(("x-unit" = json!("deg"))))]
+    pub delay_b_deg: f64,
+    /// Compliance ratio that acted, effects included.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub compliance_ratio: f64,
+    /// Radius lost per mm of feed.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub radius_per_feed: f64,
+    /// What the tool takes off the diameter in half a revolution: the bound of the roundness deviation after spark-out
+    /// where the tool stands opposite to a support and starts clear.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub half_turn_reduction_um: f64,
+    /// Distance of the tip from the surface before the ring turns, negative inside.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub gap_at_start_um: f64,
+    /// What the supports bear; null where no forces are given.
+    pub reactions: Option<ReactionsOutcome>,
+}
+
+/// What the supports bear.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingReactionsOutcome)]
+pub struct ReactionsOutcome {
+    /// Left support, with a pure driving torque; negative: the ring lifts off.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub support_a_n: f64,
+    /// Right support.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub support_b_n: f64,
+    /// Left support, with friction drive by both rollers in equal parts; null where a torque drives.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub driven_support_a_n: Option<f64>,
+    /// Right support, likewise.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub driven_support_b_n: Option<f64>,
+    /// Coefficient of friction that driving rollers need; null where a torque drives or the ring lifts off.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub friction_needed: Option<f64>,
+    /// Torque that turns the ring.
+    #[schema(extensions(("x-unit" = json!("N m"))))]
+    pub drive_torque_n_m: f64,
+    /// Whether both supports stay loaded.
+    pub seated: bool,
+}
+
+/// The cut, step by step.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingSimulationOutcome)]
+pub struct SimulationOutcome {
+    /// Nodes on the circumference.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub samples: u32,
+    /// Nodes of the run beside it that the errors come from; with `nearest_samples` those of the exact one.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub samples_beside: u32,
+    /// Nodes that the teeth of the surface need for unfiltered values.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub samples_for_teeth: u32,
+    /// Before the cut.
+    pub start: Evaluated,
+    /// After the cut; null where the points of `nearest_samples` flew apart.
+    pub end: Option<Evaluated>,
+    /// Error of every value of `end` by the number of nodes; with `nearest_samples` the difference from exact contact.
+    pub end_error: Option<Evaluated>,
+    /// Radius at the end less the circumradius of the setting.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub size_error_um: Option<f64>,
+    /// Largest depth that the tip met.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub largest_bite_um: Option<f64>,
+    /// Revolution of the first contact.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub first_contact_rev: Option<f64>,
+    /// Last revolution of the feed at which the tip was in the air; null where it never was.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub last_air_cut_rev: Option<f64>,
+    /// Share of the surface that was never cut.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub uncut_share: f64,
+    /// Where the error at the end comes from.
+    pub causes: CausesOutcome,
+    /// Waves before and after.
+    pub spectrum: SpectrumColumns,
+    /// Revolution by revolution; empty with `nearest_samples`.
+    pub history: HistoryColumns,
+    /// Profiles by body angle.
+    pub profile: ProfileColumns,
+    /// Where the ring's origin went in the last revolution: what an indicator at the tool shows.
+    pub centre_path: PathColumns,
+    /// What exact contact gives with the same job, beside `nearest_samples`.
+    pub exact_contact: Option<Evaluated>,
+}
+
+/// Values of the four reference circles.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingEvaluated)]
+pub struct Evaluated {
+    /// Radius of the least-squares circle, unfiltered.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub mean_radius_mm: f64,
+    /// Without filter.
+    pub unfiltered: CircleValues,
+    /// After the filter.
+    pub filtered: CircleValues,
+}
+
+/// Roundness deviations about the four reference circles.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingCircleValues)]
+pub struct CircleValues {
+    /// Peak to valley, least-squares circle (LSCI).
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub least_squares_um: f64,
+    /// Peak to valley, minimum zone (MZCI).
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub minimum_zone_um: f64,
+    /// Peak to valley, maximum inscribed circle (MICI).
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub inscribed_um: f64,
+    /// Peak to valley, minimum circumscribed circle (MCCI).
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub circumscribed_um: f64,
+    /// Highest peak above the least-squares circle (RONp).
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub peak_um: f64,
+    /// Deepest valley below it (RONv).
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub valley_um: f64,
+    /// Root mean square about it (RONq).
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub rms_um: f64,
+}
+
+/// Where the error at the end comes from, first order.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingCausesOutcome)]
+pub struct CausesOutcome {
+    /// Step of the spiral that the stop of the feed leaves; 0 after half a revolution of spark-out in a rigid machine.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub feed_step_um: f64,
+    /// Bound of the teeth that the feed leaves.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub teeth_um: f64,
+    /// Half of what the largest bite takes above that, which stays as odd lobes; 0 where the tool starts clear.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub first_bite_um: f64,
+    /// Peak to valley of the odd waves (3, 5, ...) of the start profile, which a tool opposite to a support cannot see.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub odd_lobes_um: f64,
+    /// Largest peak to valley at the end of a single wave that the linear theory says grows.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub growing_lobes_um: f64,
+}
+
+/// One entry per order from 2.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingSpectrumColumns)]
+pub struct SpectrumColumns {
+    /// Waves per revolution.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub order: Vec<u32>,
+    /// Amplitude before the cut.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub start_um: Vec<f64>,
+    /// Amplitude after the cut.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub end_um: Vec<f64>,
+    /// Its error by the number of nodes.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub end_error_um: Vec<f64>,
+    /// Body angle of the first maximum after the cut.
+    #[schema(extensions(("x-unit" = json!("deg"))))]
+    pub end_angle_of_max_deg: Vec<f64>,
+    /// After over before; null where nothing was there before.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub ratio: Vec<Option<f64>>,
+}
+
+/// One entry per revolution, or per several of long runs.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingHistoryColumns)]
+pub struct HistoryColumns {
+    /// Revolutions turned.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub revolution: Vec<f64>,
+    /// Roundness deviation, least-squares circle, unfiltered.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub roundness_um: Vec<f64>,
+    /// Radius of the least-squares circle.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub mean_radius_mm: Vec<f64>,
+    /// Deepest cut since the entry before.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub deepest_cut_um: Vec<f64>,
+    /// Share of the time in cut since the entry before.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub cutting_share: Vec<f64>,
+    /// Amplitudes of the waves of orders 2 to 7: one list per order.
+    pub waves: Vec<WaveColumn>,
+}
+
+/// How one wave developed.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingWaveColumn)]
+pub struct WaveColumn {
+    /// Waves per revolution.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub order: u32,
+    /// Amplitude.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub amplitude_um: Vec<f64>,
+}
+
+/// Profiles by body angle, thinned out evenly; values of the circles come from all nodes.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingProfileColumns)]
+pub struct ProfileColumns {
+    /// Body angle.
+    #[schema(extensions(("x-unit" = json!("deg"))))]
+    pub angle_deg: Vec<f64>,
+    /// Radius from the body's origin before the cut.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub start_radius_mm: Vec<f64>,
+    /// Radius from the body's origin after the cut.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub end_radius_mm: Vec<f64>,
+    /// Deviation from the least-squares circle before the cut.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub start_deviation_um: Vec<f64>,
+    /// Deviation from the least-squares circle after the cut.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub end_deviation_um: Vec<f64>,
+    /// The same after the filter.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub end_filtered_um: Vec<f64>,
+}
+
+/// The path of the ring's origin in the last revolution, about its mean.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingPathColumns)]
+pub struct PathColumns {
+    /// Revolutions turned.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub revolution: Vec<f64>,
+    /// To the right.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub x_um: Vec<f64>,
+    /// Up.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub y_um: Vec<f64>,
+}
+
+/// What becomes of waves, to first order in their size.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingLinearOutcome)]
+pub struct LinearOutcome {
+    /// One entry per order from 2.
+    pub orders: Vec<OrderOutcome>,
+    /// Roots of the characteristic equation by rising lobes; lobes need not be whole.
+    pub roots: Vec<RootOutcome>,
+    /// Whether the argument principle confirms that no root is missing.
+    pub complete: bool,
+    /// The wave that decays slowest or grows fastest; null where every wave is gone within a revolution.
+    pub worst: Option<RootOutcome>,
+}
+
+/// What becomes of a wave.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingOrderOutcome)]
+pub struct OrderOutcome {
+    /// Waves per revolution.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub order: u32,
+    /// Share of an error that one pass of the tool finds, real part of A(k).
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub visibility_real: f64,
+    /// Imaginary part.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub visibility_imaginary: f64,
+    /// Factor on its amplitude per revolution; null where it is gone within one (below 0.0066).
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub factor_per_revolution: Option<f64>,
+    /// What becomes of it.
+    pub fate: Fate,
+}
+
+/// What becomes of a wave.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+#[schema(as = RingFate)]
+pub enum Fate {
+    /// It grows.
+    Grows,
+    /// It stays.
+    Stays,
+    /// It decays.
+    Decays,
+    /// It is gone within a revolution.
+    Gone,
+}
+
+impl Fate {
+    /// Its name, as in the contract.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Grows => "grows",
+            Self::Stays => "stays",
+            Self::Decays => "decays",
+            Self::Gone => "gone",
+        }
+    }
+}
+
+/// A root of the characteristic equation.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingRootOutcome)]
+pub struct RootOutcome {
+    /// Lobes per revolution.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub lobes: f64,
+    /// Factor on the amplitude per revolution.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub factor_per_revolution: f64,
+}
+
+/// Worst wave over tool angle and support angle, row by row of the support angles. A neutral wave counts 1.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingMapOutcome)]
+pub struct MapOutcome {
+    /// Columns.
+    #[schema(extensions(("x-unit" = json!("deg"))))]
+    pub tool_angle_deg: Vec<f64>,
+    /// Rows.
+    #[schema(extensions(("x-unit" = json!("deg"))))]
+    pub support_half_angle_deg: Vec<f64>,
+    /// Factor per revolution of the worst wave; null where the tool is too near to a support, or every wave is gone.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub worst_factor_per_revolution: Vec<Option<f64>>,
+    /// Its lobes.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub worst_lobes: Vec<Option<f64>>,
+    /// Revolutions in which every wave of the start profile comes down to the target; null where one does not.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub revolutions_to_target: Vec<Option<f64>>,
+    /// The cell whose worst wave decays most.
+    pub best: Option<MapCell>,
+    /// The job's own angles.
+    pub here: MapCell,
+}
+
+/// A cell of the map.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingMapCell)]
+pub struct MapCell {
+    /// Tool angle.
+    #[schema(extensions(("x-unit" = json!("deg"))))]
+    pub tool_angle_deg: f64,
+    /// Support half angle.
+    #[schema(extensions(("x-unit" = json!("deg"))))]
+    pub support_half_angle_deg: f64,
+    /// Factor per revolution of the worst wave.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub worst_factor_per_revolution: Option<f64>,
+}
+
+/// Fewest revolutions to the target, the tool opposite to a support and fed straight down.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingSearchOutcome)]
+pub struct SearchOutcome {
+    /// Whether the target can be reached, and how safely.
+    pub status: SearchStatus,
+    /// The setting advised; where the target is out of reach, the one that comes nearest.
+    pub best: Option<SearchSetting>,
+    /// Fewest revolutions of all that reached the target, without regard to their neighbours.
+    pub fewest: Option<SearchSetting>,
+    /// Peak to valley of the odd waves of the start profile, filtered: what stays in this setting whatever the feed.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub odd_lobes_um: f64,
+    /// Orders of these waves, largest first.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub odd_orders: Vec<u32>,
+    /// Everything tried, by rising revolutions.
+    pub tried: TriedColumns,
+    /// A second stage that helps, by simulation of both; null where none is needed or none helps.
+    pub second_stage: Option<SecondStage>,
+}
+
+/// Whether the target can be reached.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+#[schema(as = RingSearchStatus)]
+pub enum SearchStatus {
+    /// Reached, and also with 5 %, at least one revolution, more and fewer.
+    Robust,
+    /// Reached, but not with all neighbours.
+    Fragile,
+    /// Not within the machine's limits.
+    BeyondLimits,
+    /// Not in this setting: the odd waves of the start profile alone are larger.
+    OddLobes,
+}
+
+/// A setting of the search; fed straight down.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingSearchSetting)]
+pub struct SearchSetting {
+    /// Tip at the start.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub tool_x_mm: f64,
+    /// Tip at the start.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub tool_y_mm: f64,
+    /// Feed.
+    #[schema(extensions(("x-unit" = json!("mm/rev"))))]
+    pub feed_mm_per_rev: f64,
+    /// Revolutions with feed.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub revolutions: f64,
+    /// Revolutions without.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub spark_out_revolutions: f64,
+    /// Roundness deviation that the simulation gives.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub roundness_um: f64,
+    /// Its error by the number of nodes.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub roundness_error_um: f64,
+    /// Target less roundness, less its error.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub margin_um: f64,
+    /// Radius of the least-squares circle at the end.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub mean_radius_mm: f64,
+}
+
+/// Settings tried.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingTriedColumns)]
+pub struct TriedColumns {
+    /// Revolutions with feed.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub revolutions: Vec<f64>,
+    /// Feed.
+    #[schema(extensions(("x-unit" = json!("mm/rev"))))]
+    pub feed_mm_per_rev: Vec<f64>,
+    /// Roundness deviation, with the nodes of the search.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub roundness_um: Vec<f64>,
+}
+
+/// A second stage after the first: supports closer together, the tool on top.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingSecondStage)]
+pub struct SecondStage {
+    /// Support half angle.
+    #[schema(extensions(("x-unit" = json!("deg"))))]
+    pub support_half_angle_deg: f64,
+    /// Tool angle.
+    #[schema(extensions(("x-unit" = json!("deg"))))]
+    pub tool_angle_deg: f64,
+    /// Distance of the supports that gives this angle.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub support_distance_mm: f64,
+    /// Feed.
+    #[schema(extensions(("x-unit" = json!("mm/rev"))))]
+    pub feed_mm_per_rev: f64,
+    /// Revolutions with feed.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub revolutions: f64,
+    /// Roundness deviation after the first stage.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub before_um: f64,
+    /// Roundness deviation after both.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub after_um: f64,
+    /// The same with the tool 0.1° off: how much the stage depends on the setting.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub after_off_um: f64,
+}

@@ -1,0 +1,80 @@
+//! Rules between the fields of a shaft and what holds it.
+
+use super::{Segment, Shaft, Support};
+use crate::calculator::{Finding, Violations};
+use crate::material;
+
+/// Codes of the faults found here.
+pub(crate) const CODES: &[&str] = &[
+    "no_segments",
+    "unknown_material",
+    "elastic_constants_missing",
+    "bad_bore",
+    "stock_below_finish",
+    "gap_of_two_sided_rest",
+    "support_outside_shaft",
+    "duplicate_support",
+    "unstable_support",
+];
+
+/// Supports nearer than this share of the length stand at one station.
+pub(crate) const SAME_STATION: f64 = 1e-9;
+
+/// Faults of the shaft, which stands at `/shaft`.
+pub(crate) fn shaft(shaft: &Shaft, violations: &mut Violations) {
+    violations.require(!shaft.segments.is_empty(), || Finding::new("no_segments", "/shaft/segments"));
+    for (i, segment) in shaft.segments.iter().enumerate() {
+        check_segment(i, segment, violations);
+    }
+    match &shaft.material {
+        Some(id) => violations.require(material::find(id).is_some(), || {
+            Finding::new("unknown_material", "/shaft/material")
+                .with("id", id.clone())
+                .with("known", material::library().iter().map(|m| m.id).collect::<Vec<_>>())
+        }),
+        None => violations.require(shaft.youngs_modulus_n_per_mm2.is_some(), || {
+            Finding::new("elastic_constants_missing", "/shaft/youngs_modulus_n_per_mm2")
+        }),
+    }
+}
+
+fn check_segment(i: usize, segment: &Segment, violations: &mut Violations) {
+    let at = |field: &str| format!("/shaft/segments/{i}/{field}");
+    violations.require(segment.bore_diameter_mm < segment.diameter_mm, || {
+        Finding::new("bad_bore", at("bore_diameter_mm")).measured(segment.bore_diameter_mm, segment.diameter_mm, "mm")
+    });
+    violations.require(segment.stock_mm() >= segment.diameter_mm, || {
+        Finding::new("stock_below_finish", at("stock_diameter_mm")).measured(
+            segment.stock_mm(),
+            segment.diameter_mm,
+            "mm",
+        )
+    });
+}
+
+/// Faults of the supports, which stand at `/supports`.
+pub(crate) fn supports(shaft: &Shaft, supports: &[Support], violations: &mut Violations) {
+    let length = shaft.length_mm();
+    let mut seen: Vec<f64> = Vec::new();
+    for (i, support) in supports.iter().enumerate() {
+        if let Support::SteadyRest { one_sided: false, gap_um, .. }
+        | Support::FollowRest { one_sided: false, gap_um, .. } = support
+        {
+            violations.require(*gap_um <= 0.0, || {
+                Finding::new("gap_of_two_sided_rest", format!("/supports/{i}/gap_um")).measured(*gap_um, 0.0, "um")
+            });
+        }
+        let Some(z) = support.station_mm() else { continue };
+        violations.require((0.0..=length).contains(&z), || {
+            Finding::new("support_outside_shaft", format!("/supports/{i}/z_mm")).measured(z, length, "mm")
+        });
+        violations.require(seen.iter().all(|other| (other - z).abs() > SAME_STATION * length), || {
+            Finding::new("duplicate_support", format!("/supports/{i}/z_mm")).value(z, "mm")
+        });
+        seen.push(z);
+    }
+    let chuck = supports.iter().any(|s| matches!(s, Support::Chuck { .. }));
+    let carrying = supports.iter().filter(|s| s.carries()).count();
+    violations
+        .require(chuck || carrying >= 2, || Finding::new("unstable_support", "/supports").with("carrying", carrying));
+}

@@ -1,0 +1,7 @@
+//! The shaft, its supports and what yields with them: one description for every calculator that bends it.
+
+pub(crate) mod check;
+pub(crate) mod elastic;
+mod input;
+
+pub use input::{Carriage, FeedDirection, Section, Segment, Shaft, Support, Theory};

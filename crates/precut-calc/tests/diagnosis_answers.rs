@@ -1,0 +1,116 @@
+//! The diagnosis as a calculator: its examples, its refusals, its rules between fields.
+#![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
+
+use precut_calc::calculator::{Answer, Calculator, Check, Diagnosable, Unwatched, Violations};
+use precut_calc::deflection_compensation::{DeflectionCompensation, DeflectionRun};
+use precut_calc::diagnosis::{Diagnosis, DiagnosisResult, VerdictClass};
+use precut_calc::effects::DeflectionEffect;
+use serde_json::{Value, json};
+
+type Deflection = Diagnosis<DeflectionCompensation>;
+
+fn example() -> Value {
+    serde_json::from_str(DeflectionCompensation::DIAGNOSES[0].job).unwrap()
+}
+
+fn faults(job: &Value) -> Vec<(&'static str, String)> {
+    let job: <Deflection as Calculator>::Input = serde_json::from_value(job.clone()).unwrap();
+    let mut violations = Violations::default();
+    job.check(&mut violations);
+    violations.into_vec().into_iter().map(|finding| (finding.code, finding.pointer)).collect()
+}
+
+fn answered(job: &Value) -> Answer<DiagnosisResult<DeflectionEffect, DeflectionRun>> {
+    assert_eq!(faults(job), []);
+    let mut job: <Deflection as Calculator>::Input = serde_json::from_value(job.clone()).unwrap();
+    Deflection::fill(&mut job);
+    Deflection::run(&job, &Unwatched).unwrap()
+}
+
+#[test]
+fn the_example_names_its_cause_and_gives_the_effect_that_a_job_takes() {
+    let answer = answered(&example());
+    let result = &answer.output;
+    assert_eq!(result.verdict, VerdictClass::Named);
+    assert_eq!(result.named[0].kind, "headstock_compliance");
+    assert_eq!(answer.explanation[0].code, "diagnosis_named");
+    assert!(matches!(result.effects[..], [DeflectionEffect::HeadstockCompliance { .. }]));
+    let gain = result.gain.as_ref().unwrap();
+    assert!(gain.rmse_extended < gain.rmse_base && gain.explained_share.unwrap() > 0.9);
+    // The extended model in the ordinary calculator: what the diagnosis fitted is what a job can hold.
+    let mut job = example()["job"].clone();
+    job["effects"] = serde_json::to_value(&result.effects).unwrap();
+    let mut job: <DeflectionCompensation as Calculator>::Input = serde_json::from_value(job).unwrap();
+    let mut violations = Violations::default();
+    job.check(&mut violations);
+    assert!(violations.is_empty());
+    DeflectionCompensation::fill(&mut job);
+    DeflectionCompensation::run(&job, &Unwatched).unwrap();
+}
+
+#[test]
+fn radii_given_as_diameters_are_refused_with_the_factor_and_judged_when_the_user_insists() {
+    let mut job = example();
+    for row in job["measurements"].as_array_mut().unwrap() {
+        row["diameter_deviation_um"] = json!(row["diameter_deviation_um"].as_f64().unwrap() / 2.0);
+    }
+    let answer = answered(&job);
+    assert_eq!(answer.output.verdict, VerdictClass::Refused);
+    assert_eq!(answer.output.refusal.as_ref().unwrap().factor, Some(0.5));
+    assert!(answer.output.effects.is_empty() && answer.output.named.is_empty());
+    job["options"] = json!({ "accept_suspected_unit": true });
+    assert_ne!(answered(&job).output.verdict, VerdictClass::Refused);
+}
+
+#[test]
+fn causes_that_nobody_asked_for_are_not_named() {
+    let mut job = example();
+    job["options"] = json!({ "causes": ["tool_wear", "guideway_bow"], "held_out": false });
+    let result = answered(&job).output;
+    assert!(result.named.iter().all(|cause| cause.kind == "tool_wear" || cause.kind == "guideway_bow"));
+    assert_ne!(result.verdict, VerdictClass::Adequate);
+    assert!(result.gain.is_none());
+    let left: Vec<&str> =
+        result.not_applicable.iter().filter(|n| n.reason == "not_asked_for").map(|n| n.kind.as_str()).collect();
+    assert!(left.contains(&"headstock_compliance"));
+}
+
+#[test]
+fn all_faults_are_told_at_once() {
+    let mut job = example();
+    job["quantity"] = json!("roundness_um");
+    job["measurements"][3]["run"] = json!(77);
+    job["options"] = json!({ "causes": ["gravity"] });
+    job["job"]["supports"] = json!([{ "kind": "centre", "z_mm": 0.0 }]);
+    let found = faults(&job);
+    for expected in [
+        ("unknown_quantity", "/quantity"),
+        ("unknown_run", "/measurements/3/run"),
+        ("unknown_cause", "/options/causes/0"),
+        ("too_few_measurements", "/measurements"),
+    ] {
+        assert!(found.contains(&(expected.0, expected.1.to_owned())), "{expected:?} not in {found:?}");
+    }
+    assert!(found.iter().any(|(_, pointer)| pointer.starts_with("/job/")), "{found:?}");
+}
+
+#[test]
+fn figures_and_tables_hold_every_row() {
+    let job: <Deflection as Calculator>::Input = serde_json::from_value(example()).unwrap();
+    let result = answered(&example()).output;
+    let tables = Deflection::tables(&job, &result);
+    assert_eq!(tables.iter().map(|t| t.id).collect::<Vec<_>>(), Deflection::META.tables);
+    let figures = Deflection::figures(&job, &result);
+    assert_eq!(figures.iter().map(|f| f.id).collect::<Vec<_>>(), Deflection::META.figures);
+    assert_eq!(result.rows.row.len(), example()["measurements"].as_array().unwrap().len());
+}
+
+#[test]
+fn the_next_run_parts_the_leader_from_its_rival() {
+    let result = answered(&example()).output;
+    let next = result.next_measurement.unwrap();
+    assert_eq!(next.leader, ["headstock_compliance"]);
+    assert!(!next.rival.contains(&"headstock_compliance".to_owned()));
+    // More rows never part less.
+    assert!(next.separation_then_sigmas >= next.separation_now_sigmas);
+}

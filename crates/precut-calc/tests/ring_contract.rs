@@ -1,0 +1,325 @@
+//! What a ring job may not be, what is said of it, and what must hold of every answer.
+#![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
+
+mod ring_support;
+
+use precut_calc::calculator::{Calculator, Failure};
+use precut_calc::ring_roundness::{Outcome, RingRoundness};
+use ring_support::{codes, faults, run, try_run};
+use serde_json::{Value, json};
+
+fn paper() -> Value {
+    serde_json::from_str(RingRoundness::META.examples[0].job).unwrap()
+}
+
+fn with(pointer: &str, value: Value) -> Value {
+    let mut job = paper();
+    let (parent, name) = pointer.rsplit_once('/').unwrap();
+    job.pointer_mut(parent).unwrap()[name] = value;
+    job
+}
+
+/// The paper's ring, a few revolutions at a coarse feed.
+fn short() -> Value {
+    let mut job = with("/tool/y_mm", json!(113.5));
+    job["tool"]["feed_mm_per_rev"] = json!(0.08);
+    job["tool"]["revolutions"] = json!(32);
+    job["tool"]["spark_out_revolutions"] = json!(1);
+    job["samples"] = json!(1440);
+    job
+}
+
+fn points(count: u32, radius: f64) -> Value {
+    (0..count)
+        .map(|i| {
+            let angle = 360.0 * f64::from(i) / f64::from(count);
+            json!({ "angle_deg": angle, "radius_mm": radius * (1.0 + 2e-4 * (2.0 * angle.to_radians()).cos()) })
+        })
+        .collect()
+}
+
+fn measured(rows: Value) -> Value {
+    let mut job = short();
+    job.as_object_mut().unwrap().remove("ring");
+    job["measured_profile"] = rows;
+    job
+}
+
+#[test]
+fn impossible_geometry_is_refused_at_its_field() {
+    let cases = [
+        (with("/supports/distance_mm", json!(310)), "ring_falls_through", "/supports/distance_mm"),
+        (with("/supports/distance_mm", json!(295)), "ring_jams", "/supports/distance_mm"),
+        (with("/tool/y_mm", json!(100)), "tool_too_deep", "/tool/y_mm"),
+        (with("/tool/y_mm", json!(140)), "tool_out_of_reach", "/tool/revolutions"),
+        (with("/tool/feed_direction_deg", json!(90)), "feed_away_from_ring", "/tool/feed_direction_deg"),
+        (with("/tool/revolutions", json!(1e7)), "run_too_long", "/tool/revolutions"),
+        (with("/ring/ellipticity_mm", json!(20)), "deviation_too_large", "/ring"),
+        (with("/samples", json!(358)), "bad_samples", "/samples"),
+        (with("/samples", json!(3602)), "bad_samples", "/samples"),
+    ];
+    for (job, code, at) in cases {
+        let found = faults(&job);
+        assert!(found.iter().any(|f| f.code == code && f.pointer == at), "{code} at {at} is not among {found:?}");
+    }
+    let mut below = with("/tool/y_mm", json!(-170));
+    below["tool"]["x_mm"] = json!(0);
+    assert!(codes(&below).contains(&"tool_below_ring"));
+    let mut beside = with("/tool/y_mm", json!(-104));
+    beside["tool"]["x_mm"] = json!(108);
+    assert!(codes(&beside).contains(&"tool_at_support"), "{:?}", codes(&beside));
+}
+
+#[test]
+fn a_tip_that_never_touches_is_told_the_gap() {
+    // 0.9 mm clear of the largest diameter and 0.05 mm of travel.
+    let mut job = with("/tool/y_mm", json!(115.7));
+    job["tool"]["revolutions"] = json!(8);
+    match try_run(&job) {
+        Err(Failure::Infeasible(finding)) => {
+            assert_eq!(finding.code, "nothing_cut");
+            // The tip is vertically above B: what is left is D(T_end) less the largest diameter, nearly.
+            let end: f64 = 115.7 - 8.0 * 0.005_859_375;
+            let expected = ((200.0_f64.powi(2) + (end + 111.0).powi(2)).sqrt() - 300.5) * 1e3;
+            assert!((finding.value.unwrap() - expected).abs() < 0.02 * expected, "{finding:?} {expected}");
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn a_profile_in_another_unit_is_suspected() {
+    for (factor, unit) in [(1e3, "um"), (1e-3, "m"), (1.0 / 25.4, "inch"), (2.0, "diameter")] {
+        let found = faults(&measured(points(72, 150.0 * factor)));
+        let said =
+            found.iter().find(|f| f.code == "profile_unit_suspected").unwrap_or_else(|| panic!("{unit}: {found:?}"));
+        assert_eq!(said.values.get("unit_meant"), Some(&unit.to_owned().into()), "{unit}");
+        assert_eq!(said.pointer, "/measured_profile");
+    }
+    assert!(codes(&with("/ring/radius_mm", json!(0.15))).contains(&"profile_unit_suspected"));
+    assert!(codes(&measured(points(72, 150.0))).is_empty());
+}
+
+#[test]
+fn measured_points_must_make_a_profile() {
+    assert!(codes(&measured(points(12, 150.0))).contains(&"profile_too_few_points"));
+    let mut rows = points(72, 150.0);
+    rows.as_array_mut().unwrap().swap(3, 4);
+    assert!(codes(&measured(rows)).contains(&"angles_not_ascending"));
+    let mut rows = points(72, 150.0);
+    rows[5]["angle_deg"] = rows[4]["angle_deg"].clone();
+    assert!(codes(&measured(rows)).contains(&"duplicate_angle"));
+    let mut rows = points(72, 150.0);
+    rows.as_array_mut().unwrap().drain(10..18);
+    let found = faults(&measured(rows));
+    assert!(found.iter().any(|f| f.code == "gap_in_profile" && f.value == Some(45.0)), "{found:?}");
+    let mut rows = points(72, 150.0);
+    rows.as_array_mut().unwrap().drain(66..);
+    assert!(codes(&measured(rows)).contains(&"gap_in_profile"));
+    let mut rows = points(72, 150.0);
+    rows.as_array_mut().unwrap().push(json!({ "angle_deg": 360.0, "radius_mm": 150.0 }));
+    assert!(codes(&measured(rows)).contains(&"angles_overlap"));
+    let radians: Value = points(72, 150.0)
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|row| json!({ "angle_deg": row["angle_deg"].as_f64().unwrap().to_radians(), "radius_mm": row["radius_mm"] }))
+        .collect();
+    assert!(codes(&measured(radians)).contains(&"angles_look_like_radians"));
+}
+
+#[test]
+fn everything_wrong_is_said_at_once() {
+    let mut job = with("/supports/distance_mm", json!(310));
+    job["samples"] = json!(1001);
+    job["compliance_ratio"] = json!(1);
+    job["stiffness"] =
+        json!({ "cut_n_per_mm": 1, "tool_n_per_mm": 1, "support_a_n_per_mm": 1, "support_b_n_per_mm": 1 });
+    job["tool"]["wheel_radius_mm"] = json!(100);
+    job["analyses"] = json!(["settings_search", "settings_search"]);
+    job["effects"] = json!([
+        { "kind": "work_slip", "slip_deg_per_rev": 0.5 },
+        { "kind": "work_slip", "slip_deg_per_rev": 0.5 },
+        { "kind": "initial_harmonic", "order": 3, "amplitude_mm": 0.01, "phase_rad": 0 },
+        { "kind": "initial_harmonic", "order": 5, "amplitude_mm": 0.01, "phase_rad": 0 }
+    ]);
+    let mut found = codes(&job);
+    found.sort_unstable();
+    let mut expected = vec![
+        "bad_samples",
+        "compliance_given_twice",
+        "duplicate_analysis",
+        "duplicate_effect",
+        "ring_falls_through",
+        "search_range_missing",
+        "wheel_with_compliance",
+    ];
+    expected.sort_unstable();
+    found.retain(|code| *code != "profile_unit_suspected");
+    assert_eq!(found, expected);
+    let mut both = paper();
+    both["measured_profile"] = points(72, 150.0);
+    assert!(codes(&both).contains(&"ring_or_profile"));
+    let mut nearest = paper();
+    nearest["method"] = json!("nearest_samples");
+    nearest["samples"] = json!(2000);
+    nearest["compliance_ratio"] = json!(1);
+    assert_eq!(codes(&nearest), ["bad_samples", "not_with_nearest_samples"]);
+}
+
+#[test]
+fn a_tip_that_starts_inside_is_told_its_first_bite() {
+    let answer = run(&paper());
+    let said = answer.warnings.iter().find(|w| w.code == "tip_starts_inside").unwrap();
+    // The centre rests 0.7695 mm high on the sampled ellipse: 0.02 mm inside, first bite 0.58 mm.
+    assert!((said.value.unwrap() - 23.04).abs() < 0.01, "{said:?}");
+    let bite = answer.output.simulation.unwrap().largest_bite_um.unwrap();
+    assert!((bite - 579.8).abs() < 1.8 && said.values.get("bite_um") == Some(&bite.into()));
+}
+
+fn ron(outcome: &Outcome) -> (f64, f64) {
+    (outcome.roundness_um.unwrap(), outcome.roundness_unfiltered_um.unwrap())
+}
+
+#[test]
+fn the_mirror_turns_the_other_way_round() {
+    let mut job = short();
+    job["tool"]["x_mm"] = json!(90);
+    job["tool"]["y_mm"] = json!(121);
+    job["ring"]["harmonics"] = json!([{ "order": 5, "amplitude_um": 10, "angle_of_max_deg": 25 }]);
+    job["effects"] = json!([{ "kind": "support_wear", "recession_um_per_rev": 0.2 }]);
+    let straight = run(&job).output;
+    job["rotation"] = json!("clockwise");
+    job["tool"]["x_mm"] = json!(-90);
+    // A wave at θ becomes one at 180° - θ.
+    job["ring"]["harmonics"] = json!([{ "order": 5, "amplitude_um": 10, "angle_of_max_deg": 155 }]);
+    let mirrored = run(&job).output;
+    // The same sums in another order: rounding of the radius, 1e-13 of 150 mm, through 33 revolutions.
+    assert!((ron(&straight).0 - ron(&mirrored).0).abs() < 1e-5);
+    assert!((ron(&straight).1 - ron(&mirrored).1).abs() < 1e-5);
+    assert!((straight.setting.coefficient_a - mirrored.setting.coefficient_b).abs() < 1e-12);
+    assert!((straight.setting.tool_angle_deg + mirrored.setting.tool_angle_deg - 180.0).abs() < 1e-9);
+    let (p, q) = (straight.simulation.unwrap(), mirrored.simulation.unwrap());
+    let m = p.profile.angle_deg.len();
+    for i in 0..m {
+        let j = (m / 2 + m - i) % m;
+        assert!((p.profile.end_radius_mm[i] - q.profile.end_radius_mm[j]).abs() < 1e-7, "{i}");
+    }
+}
+
+#[test]
+fn feed_is_all_that_decides_after_a_clear_start() {
+    // RONt after spark-out is at most D', whatever the total depth and the ellipse.
+    for (ellipticity, y, revolutions) in [(0.5, 113.5, 54.0), (0.5, 113.5, 90.0), (0.2, 113.5, 60.0)] {
+        let mut job = short();
+        job["ring"]["ellipticity_mm"] = json!(ellipticity);
+        job["tool"]["y_mm"] = json!(y);
+        job["tool"]["feed_mm_per_rev"] = json!(0.046_875);
+        job["tool"]["revolutions"] = json!(revolutions);
+        let answer = run(&job).output;
+        let bound = answer.setting.half_turn_reduction_um;
+        assert!(ron(&answer).1 <= bound && ron(&answer).1 > 0.3 * bound, "{} {bound}", ron(&answer).1);
+    }
+}
+
+#[test]
+fn a_measured_profile_is_the_ring_it_was_measured_on() {
+    let form = run(&short()).output;
+    let (long, short_axis) = (150.25_f64, 149.75_f64);
+    let rows: Value = (0..180)
+        .map(|i| {
+            let angle = 2.0 * f64::from(i);
+            let t = angle.to_radians();
+            let r = long * short_axis / ((short_axis * t.cos()).powi(2) + (long * t.sin()).powi(2)).sqrt();
+            json!({ "angle_deg": angle, "radius_mm": r })
+        })
+        .collect();
+    let points = run(&measured(rows)).output;
+    // The spline through points 2° apart misses the ellipse by h⁴/384 of its fourth derivative, about 1e-8 mm.
+    assert!((ron(&form).0 - ron(&points).0).abs() < 1e-3);
+    assert!((form.mean_radius_mm.unwrap() - points.mean_radius_mm.unwrap()).abs() < 1e-6);
+}
+
+#[test]
+fn more_samples_bring_the_estimated_error_down_and_keep_within_it() {
+    let at = |samples: u32| {
+        let mut job = short();
+        job["samples"] = json!(samples);
+        run(&job).output
+    };
+    let (coarse, fine) = (at(720), at(5760));
+    let off = (ron(&coarse).0 - ron(&fine).0).abs();
+    assert!(off <= coarse.roundness_error_um.unwrap() + fine.roundness_error_um.unwrap());
+    assert!(fine.roundness_error_um < coarse.roundness_error_um);
+}
+
+#[test]
+fn minimum_zone_is_the_narrowest() {
+    for example in RingRoundness::META.examples {
+        let job: Value = serde_json::from_str(example.job).unwrap();
+        let Some(simulation) = run(&job).output.simulation else { continue };
+        for values in simulation.end.iter().flat_map(|end| [&end.unfiltered, &end.filtered]) {
+            let least = values.least_squares_um.min(values.inscribed_um).min(values.circumscribed_um);
+            assert!(values.minimum_zone_um <= least + 1e-7, "{}: {values:?}", example.id);
+        }
+    }
+}
+
+#[test]
+fn unfiltered_values_get_the_nodes_that_teeth_need() {
+    let mut job = short();
+    job.as_object_mut().unwrap().remove("samples");
+    job["filter"] = json!("none");
+    job["tool"]["feed_mm_per_rev"] = json!(0.04);
+    job["tool"]["revolutions"] = json!(64);
+    let answer = run(&job);
+    // N >= 12·2π max|dW/dθ|/D': the ellipse has 2e = 1 mm per rad, D' = 0.04 · 0.3715 mm.
+    let needed = 12.0 * std::f64::consts::TAU * 1.0 / (0.04 * 0.3715);
+    let samples = f64::from(answer.output.simulation.unwrap().samples);
+    assert!(samples >= needed && samples <= needed + 800.0, "{samples} {needed}");
+    job["samples"] = json!(1440);
+    assert!(run(&job).warnings.iter().any(|w| w.code == "teeth_unresolved"));
+}
+
+#[test]
+fn stiffness_gives_the_compliance_ratio() {
+    let mut job = short();
+    job["stiffness"] = json!({
+        "cut_n_per_mm": 20_000, "tool_n_per_mm": 60_000, "support_a_n_per_mm": 150_000, "support_b_n_per_mm": 90_000
+    });
+    // Opposite to A: a = -1, b = 0.
+    let found = run(&job).output.setting.compliance_ratio;
+    assert!((found - 20_000.0 * (1.0 / 60_000.0 + 1.0 / 150_000.0)).abs() < 1e-9);
+}
+
+#[test]
+fn search_says_what_is_out_of_reach_and_what_would_help() {
+    let mut job = paper();
+    job["analyses"] = json!(["settings_search"]);
+    job["ring"] = json!({ "radius_mm": 150, "ellipticity_mm": 0.0, "harmonics": [{ "order": 3, "amplitude_um": 50 }] });
+    job["settings_search"] = json!({ "target_um": 5, "clearance_mm": 0.3, "allowance_mm": 0.5 });
+    let answer = run(&job);
+    let search = answer.output.settings_search.unwrap();
+    assert_eq!(json!(search.status), "odd_lobes");
+    assert_eq!(search.odd_orders, [3]);
+    // 50 um of 3 lobes are 100 um from peak to valley; the filter of 50 UPR takes 0.25 % of the wave.
+    assert!((search.odd_lobes_um - 99.75).abs() < 0.01, "{}", search.odd_lobes_um);
+    let stage = search.second_stage.unwrap();
+    assert!(stage.before_um > 95.0 && stage.after_um < 0.1 * stage.before_um, "{stage:?}");
+    job["ring"] = json!({ "radius_mm": 150, "ellipticity_mm": 0.1 });
+    job["settings_search"] = json!({ "target_um": 0.01, "revolutions_max": 20 });
+    let search = run(&job).output.settings_search.unwrap();
+    assert_eq!(json!(search.status), "beyond_limits");
+    job["settings_search"] = json!({ "target_um": 4.0 });
+    let search = run(&job).output.settings_search.unwrap();
+    let best = search.best.unwrap();
+    assert!(best.margin_um >= 0.0 && best.roundness_um + best.roundness_error_um <= 4.0);
+    // The setting advised, sent as a job, gives the roundness promised.
+    job["analyses"] = json!(["simulation"]);
+    job["tool"] = json!({
+        "x_mm": best.tool_x_mm, "y_mm": best.tool_y_mm, "feed_mm_per_rev": best.feed_mm_per_rev,
+        "revolutions": best.revolutions, "spark_out_revolutions": best.spark_out_revolutions
+    });
+    let found = run(&job).output.roundness_um.unwrap();
+    assert!((found - best.roundness_um).abs() < 1e-9, "{found} {best:?}");
+}

@@ -1,0 +1,58 @@
+//! Blind trials: jobs and measurements in which an effect is hidden, for testing a diagnosis.
+//!
+//! Nothing here is shared with the calculators: another discretisation (a shear-flexible finite-element
+//! beam on springs), another solver (bisection), another noise law (Student-t with six degrees of freedom,
+//! uneven and correlated), nuisances drawn uniformly inside the allowances, and errors of the machine that
+//! are not fed back into the depth of cut. A test that refits its own generator proves nothing.
+
+pub mod deflection;
+mod random;
+pub mod score;
+
+pub use random::Random;
+
+use serde_json::Value;
+
+/// A request to diagnose, and what is hidden in it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trial {
+    /// The body of a request; it never names the cause.
+    pub request: Value,
+    /// What is hidden.
+    pub truth: Truth,
+    /// Standard deviation of the scatter, in the unit of the quantity.
+    pub sigma: f64,
+}
+
+/// What is hidden in a trial.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Truth {
+    /// Which class of trial.
+    pub class: Class,
+    /// The causes that act, by kind; of class [`Class::Outside`] one that no catalogue holds.
+    pub causes: Vec<Hidden>,
+}
+
+/// Classes of trials.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Class {
+    /// Nothing is hidden.
+    Nothing,
+    /// One cause of the catalogue.
+    One,
+    /// Two causes of the catalogue.
+    Two,
+    /// Something that the catalogue does not hold.
+    Outside,
+}
+
+/// A hidden cause.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Hidden {
+    /// Its kind.
+    pub kind: &'static str,
+    /// Its first parameter, in the catalogue's unit.
+    pub size: f64,
+    /// Root mean square of its signature over the rows, standard deviations of the scatter.
+    pub snr: f64,
+}

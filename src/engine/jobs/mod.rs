@@ -1,0 +1,354 @@
+//! Jobs: calculations that outlive their request and their process.
+//!
+//! A job is a record in the [`JobStore`] (who asked what, how far it is, how it ended) and a place in its queue. The
+//! record is the truth; what is in memory here (progress between two writes, who waits for news, which computations
+//! this process runs) may be lost at any moment without harm.
+//!
+//! # Life of a job
+//!
+//! 1. [`Engine::submit`](crate::engine::Engine::submit) writes record and task in one transaction: after it has
+//!    answered, the job survives whatever happens. A job equal to one that is being computed joins it at once.
+//! 2. A task comes up in the queue; [`worker`] takes the job with all equal ones that wait under one **lease**, and
+//!    charges them a start. Every later write names the lease and finds no record once it is lost: a computation that
+//!    was given to somebody else cannot write any more.
+//! 3. It runs on the jobs' own pool. How far it is stands in memory and is written once a second.
+//! 4. Its end, with its result, is written in one transaction for all jobs that still hold the lease. A cancel or a
+//!    deadline takes one job off the lease; when the last has gone, the computation is told to stop.
+//!
+//! What a dead process left running is in line again when the next one opens the store. Each start is charged; at the
+//! last of [`MOST_ATTEMPTS`] a job runs alone, and one that takes the process along even then is failed as
+//! `crashed_repeatedly`. A start that a shutdown interrupts is not charged. A panic is no such start: it is caught, and
+//! the job fails at once, as it would panic again.
+//!
+//! # What else may be a job
+//!
+//! Everything here but [`work`] knows a job only as a [`NewJob`](crate::store::jobs::NewJob): kind, calculator, key,
+//! input as bytes. A further kind of job
+//!
+//! - has an arm in [`JobKind`](crate::store::jobs::JobKind) and in [`work::of`], which makes a [`work::Work`] out of
+//!   the record's input again;
+//! - is submitted by [`Jobs::accept`] with a [`Request`] whose key names its result;
+//! - tells its progress by [`Running::follow`](running::Running::follow) with a
+//!   [`Progress`](crate::engine::progress::Progress) of its own (`Progress::report`, and `Progress::show` for a picture
+//!   so far), and ends soon after [`Running::cancelled`](running::Running::cancelled);
+//! - runs the calculations that it is made of by `Inner::calculate_point`: each is an ordinary cached calculation,
+//!   shared with whoever else asks for it, on the jobs' pool, and leaves its result where every result is. The
+//!   calculations of a job killed in the middle are hits when it runs again. It keeps the one slot that it was given
+//!   until it ends; the pool's threads bound what it can do at once;
+//! - comes to a [`Stored`], whose `kept` form is written with the end of the job and read back by its key.
+
+mod estimate;
+mod fault;
+mod feeds;
+mod requests;
+mod running;
+mod sweeper;
+pub(crate) mod work;
+mod worker;
+
+pub use feeds::Feed;
+pub use requests::Answered;
+
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use bytes::Bytes;
+use precut_calc::calculator::Message;
+use tokio::sync::{Notify, watch};
+use tokio::task::JoinHandle;
+
+use super::progress::Reported;
+use super::{Error, Inner, Key, Stored};
+use crate::store::jobs::{
+    Accepted, Idempotency, JobId, JobKind, JobPage, JobQuery, JobRecord, JobState, JobStore, NewJob, Priority, Timing,
+};
+use crate::store::now_ms;
+use estimate::Estimates;
+use feeds::Feeds;
+use running::Computations;
+
+/// Starts after which a job that takes its process along is given up.
+pub(crate) const MOST_ATTEMPTS: u32 = 3;
+/// When a client that found the queue full should come again.
+const RETRY_QUEUE: Duration = Duration::from_secs(5);
+/// Bounds of the advice when to look at a job again.
+const RETRY_JOB: (Duration, Duration) = (Duration::from_secs(1), Duration::from_mins(1));
+/// Timings read at the start.
+const TIMINGS: u32 = 5000;
+
+/// Who asks for a job, and how.
+#[derive(Debug, Clone)]
+pub struct Ask {
+    /// Whose job it is: clients take turns.
+    pub owner: String,
+    /// How soon.
+    pub priority: Priority,
+    /// After so long it is of no use any more.
+    pub deadline: Option<Duration>,
+    /// The client's own name for the request.
+    pub idempotency_key: Option<String>,
+    /// Wait at most so long for the result of a job; `None`: as the service thinks best.
+    pub wait: Option<Duration>,
+}
+
+impl Ask {
+    /// A request without wishes.
+    pub fn plain(owner: impl Into<String>) -> Self {
+        Self { owner: owner.into(), priority: Priority::Normal, deadline: None, idempotency_key: None, wait: None }
+    }
+}
+
+/// A job to be accepted, of whatever kind.
+pub(crate) struct Request {
+    /// What it computes.
+    pub(crate) kind: JobKind,
+    /// By which calculator.
+    pub(crate) calculator: &'static str,
+    /// Which version of it.
+    pub(crate) version: u32,
+    /// Address of its result.
+    pub(crate) key: Key,
+    /// All that [`work::of`] needs.
+    pub(crate) input: Bytes,
+    /// Estimated work, ms.
+    pub(crate) estimate_ms: f64,
+    /// Hash of the request as it came, for [`Ask::idempotency_key`].
+    pub(crate) body_hash: [u8; 32],
+    /// Its result, where it is there already.
+    pub(crate) result: Option<Arc<Stored>>,
+}
+
+/// A job as it is now.
+#[derive(Debug, Clone)]
+pub struct Job {
+    /// Its record.
+    pub record: JobRecord,
+    /// How far it is, 0 to 1.
+    pub progress: f64,
+    /// What it is doing.
+    pub stage: Option<Message>,
+    /// The picture so far.
+    pub interim: Option<super::Interim>,
+    /// Time left, ms, as far as that can be said.
+    pub remaining_ms: Option<f64>,
+    /// Why it failed.
+    pub problem: Option<Error>,
+}
+
+/// The jobs of an engine.
+pub(crate) struct Jobs {
+    pub(crate) store: Arc<dyn JobStore>,
+    pub(crate) estimates: Estimates,
+    feeds: Arc<Feeds>,
+    computations: Arc<Computations>,
+    new_deadline: Notify,
+    stop: watch::Sender<bool>,
+    tasks: Mutex<Vec<JoinHandle<()>>>,
+}
+
+impl Jobs {
+    pub(crate) fn new(store: Arc<dyn JobStore>) -> Self {
+        Self {
+            store,
+            estimates: Estimates::default(),
+            feeds: Arc::default(),
+            computations: Arc::default(),
+            new_deadline: Notify::new(),
+            stop: watch::channel(false).0,
+            tasks: Mutex::default(),
+        }
+    }
+
+    /// Begins to work.
+    pub(crate) async fn start(engine: &Arc<Inner>) {
+        let jobs = &engine.jobs;
+        match jobs.store.timings(TIMINGS).await {
+            Ok(timings) => timings.iter().rev().for_each(|timing| jobs.estimates.learn(timing)),
+            Err(error) => tracing::warn!(%error, "earlier timings cannot be read"),
+        }
+        // Weak: who works for an engine does not keep it alive.
+        let weak = Arc::downgrade(engine);
+        let run = Arc::new(move |id| {
+            let engine = weak.upgrade();
+            let task: futures_util::future::BoxFuture<'static, ()> = Box::pin(async move {
+                if let Some(engine) = engine {
+                    worker::run_task(engine, id).await;
+                }
+            });
+            task
+        });
+        let work = jobs.store.work(engine.cores.job_places(), run, jobs.stop.subscribe());
+        let tasks = [tokio::spawn(work), tokio::spawn(sweeper::run(Arc::downgrade(engine)))];
+        jobs.tasks.lock().unwrap_or_else(PoisonError::into_inner).extend(tasks);
+    }
+
+    /// Takes up no more jobs and puts those that run back in line.
+    pub(crate) fn stop(&self) {
+        self.stop.send_replace(true);
+    }
+
+    /// Waits until that is done.
+    pub(crate) async fn close(&self) {
+        self.stop();
+        let tasks = std::mem::take(&mut *self.tasks.lock().unwrap_or_else(PoisonError::into_inner));
+        for task in tasks {
+            let _ = task.await;
+        }
+    }
+
+    /// Waits until [`Jobs::stop`].
+    pub(crate) async fn stopped(&self) {
+        // The sender lives as long as this does.
+        let _ = self.stop.subscribe().wait_for(|stop| *stop).await;
+    }
+
+    /// What a calculation took corrects what the next ones are estimated at.
+    async fn learn(&self, calculator: &str, version: u32, predicted_ms: f64, took: Duration) {
+        let actual_ms = took.as_secs_f64() * 1e3;
+        let timing = Timing { calculator: calculator.to_owned(), version, predicted_ms, actual_ms };
+        self.estimates.learn(&timing);
+        if let Err(error) = self.store.note_timing(timing).await {
+            tracing::debug!(%error, "a timing is not kept");
+        }
+    }
+
+    /// Puts a job on record; whether it is a new one.
+    pub(crate) async fn accept(
+        &self,
+        request: Request,
+        ask: &Ask,
+        queue_limit: u64,
+    ) -> Result<(JobRecord, bool), Error> {
+        let idempotency = ask.idempotency_key.clone().map(|key| Idempotency { key, body_hash: request.body_hash });
+        let deadline_ms = ask.deadline.map(|after| {
+            now_ms().saturating_add(i64::try_from(after.as_millis()).unwrap_or(i64::MAX / 2)).min(i64::MAX / 2)
+        });
+        let job = NewJob {
+            id: JobId::new(),
+            kind: request.kind,
+            calculator: request.calculator.to_owned(),
+            version: request.version,
+            key: request.key,
+            input: request.input,
+            priority: ask.priority,
+            owner: ask.owner.clone(),
+            idempotency,
+            estimate_ms: request.estimate_ms,
+            deadline_ms,
+            result: request.result.map(|stored| stored.kept()),
+        };
+        match self.store.submit(job, queue_limit).await? {
+            Accepted::New(record) => {
+                metrics::counter!("precut_jobs_accepted_total", "calculator" => request.calculator).increment(1);
+                if deadline_ms.is_some() {
+                    self.new_deadline.notify_one();
+                }
+                Ok((record, true))
+            }
+            Accepted::Known(record) => Ok((record, false)),
+            Accepted::OtherBody(id) => Err(Error::IdempotencyKeyReused(id)),
+            Accepted::QueueFull { queued } => {
+                metrics::counter!("precut_queue_full_total").increment(1);
+                Err(Error::QueueFull { queued, retry_after: RETRY_QUEUE })
+            }
+        }
+    }
+
+    /// The job as it is now.
+    pub(crate) async fn job(&self, id: JobId) -> Result<Job, Error> {
+        let record = self.store.job(id).await?.ok_or(Error::UnknownJob(id))?;
+        Ok(self.now(record))
+    }
+
+    /// The jobs, newest first; where the next page begins.
+    pub(crate) async fn list(&self, query: JobQuery) -> Result<(Vec<Job>, Option<JobId>), Error> {
+        let JobPage { items, next } = self.store.jobs(query).await?;
+        Ok((items.into_iter().map(|record| self.now(record)).collect(), next))
+    }
+
+    /// Ends a job; with its state before.
+    pub(crate) async fn cancel(&self, id: JobId) -> Result<(Job, JobState), Error> {
+        let cancelled = self.store.cancel(id).await?.ok_or(Error::UnknownJob(id))?;
+        if let Some(lease) = cancelled.unwanted {
+            self.computations.cancel(&[lease]);
+        }
+        if !cancelled.before.is_final() {
+            self.feeds.touch(&[id]);
+        }
+        Ok((self.now(cancelled.job), cancelled.before))
+    }
+
+    /// News of a job.
+    pub(crate) fn feed(&self, id: JobId) -> Feed {
+        self.feeds.subscribe(id)
+    }
+
+    /// Waits until a job is over, at most so long and not beyond the end of the service; the job then.
+    pub(crate) async fn wait(&self, record: JobRecord, most: Duration) -> Result<Job, Error> {
+        if most.is_zero() || record.state.is_final() {
+            return Ok(self.now(record));
+        }
+        let id = record.id;
+        let mut feed = self.feed(id);
+        let over = async {
+            loop {
+                let job = self.job(id).await?;
+                if job.record.state.is_final() {
+                    return Ok(job);
+                }
+                feed.changed().await;
+            }
+        };
+        tokio::select! {
+            job = over => return job,
+            () = tokio::time::sleep(most) => {}
+            () = self.stopped() => {}
+        }
+        self.job(id).await
+    }
+
+    /// A record together with what is known in memory.
+    pub(crate) fn now(&self, record: JobRecord) -> Job {
+        let live = record.lease.and_then(|lease| self.computations.reported(lease));
+        let Reported { fraction, stage, interim } = live.unwrap_or_else(|| Reported {
+            fraction: record.progress,
+            stage: record.stage.as_deref().and_then(fault::read_stage),
+            interim: None,
+        });
+        let is_running = record.state == JobState::Running;
+        let progress = if record.state == JobState::Succeeded { 1.0 } else { fraction };
+        Job {
+            progress,
+            stage: stage.filter(|_| is_running),
+            interim: interim.filter(|_| is_running),
+            remaining_ms: remaining_ms(&record, progress),
+            problem: record.problem.as_deref().map(fault::read),
+            record,
+        }
+    }
+}
+
+/// Time left of a running job, ms: from what it has done so far, or from its estimate where it has done too little.
+fn remaining_ms(record: &JobRecord, progress: f64) -> Option<f64> {
+    /// Below this share the speed so far says little.
+    const ENOUGH: f64 = 0.02;
+    let started = record.started_ms.filter(|_| record.state == JobState::Running)?;
+    #[allow(clippy::cast_precision_loss)] // times of jobs, far below 2^53 ms
+    let elapsed = (now_ms() - started).max(0) as f64;
+    let left = if progress >= ENOUGH { elapsed * (1.0 - progress) / progress } else { record.estimate_ms - elapsed };
+    Some(left.max(0.0))
+}
+
+impl Job {
+    /// When it is worth looking at it again.
+    pub fn retry_after(&self) -> Duration {
+        let left = self.remaining_ms.unwrap_or(self.record.estimate_ms);
+        let left = Duration::try_from_secs_f64(left / 1e3).unwrap_or(RETRY_JOB.1);
+        left.clamp(RETRY_JOB.0, RETRY_JOB.1)
+    }
+
+    /// Whether its result is kept no longer.
+    pub fn is_expired(&self) -> bool {
+        self.record.expires_ms.is_some_and(|at| at <= now_ms())
+    }
+}

@@ -1,0 +1,94 @@
+//! What has to be looked after from time to time: progress on record, deadlines, lost tasks, what is to be forgotten.
+
+use std::sync::{Arc, Weak};
+use std::time::Duration;
+
+use tokio::time::Instant;
+
+use super::fault;
+use crate::engine::{Error, Inner};
+use crate::store::now_ms;
+
+/// How often progress is written.
+const BEAT: Duration = Duration::from_secs(1);
+/// Beats between two looks for lost jobs.
+const SWEEP: u64 = 5;
+/// Beats between two rounds of forgetting.
+const FORGET: u64 = 60;
+/// A deadline is looked for at least so often, whatever the clock does meanwhile.
+const LONGEST_SLEEP: Duration = Duration::from_mins(1);
+
+pub(super) async fn run(engine: Weak<Inner>) {
+    let mut beat = tokio::time::interval(BEAT);
+    beat.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+    let (mut count, mut due) = (0_u64, Instant::now());
+    loop {
+        let Some(engine) = engine.upgrade() else { return };
+        let jobs = &engine.jobs;
+        tokio::select! {
+            () = jobs.stopped() => return,
+            _ = beat.tick() => {
+                count += 1;
+                beats(&engine).await;
+                if count.is_multiple_of(SWEEP) {
+                    sweep(&engine).await;
+                }
+                if count.is_multiple_of(FORGET) {
+                    report("forget", jobs.store.forget_expired().await);
+                }
+            }
+            () = jobs.new_deadline.notified() => due = Instant::now() + deadlines(&engine).await,
+            () = tokio::time::sleep_until(due) => due = Instant::now() + deadlines(&engine).await,
+        }
+    }
+}
+
+async fn beats(engine: &Arc<Inner>) {
+    let jobs = &engine.jobs;
+    let beats = jobs.computations.beats();
+    if beats.is_empty() {
+        return;
+    }
+    if let Some(unwanted) = report("beat", jobs.store.beat(beats).await) {
+        jobs.computations.cancel(&unwanted);
+    }
+}
+
+async fn sweep(engine: &Arc<Inner>) {
+    let jobs = &engine.jobs;
+    let computations = Arc::clone(&jobs.computations);
+    if let Some(back) = report("sweep", jobs.store.sweep(Arc::new(move || computations.leases())).await)
+        && !back.is_empty()
+    {
+        tracing::warn!(jobs = back.len(), "jobs that nobody ran are in line again");
+        jobs.feeds.touch(&back);
+    }
+    if let Some(counts) = report("count", jobs.store.counts().await) {
+        #[allow(clippy::cast_precision_loss)] // counts of jobs
+        let gauge =
+            |state: &'static str, count: u64| metrics::gauge!("precut_jobs", "state" => state).set(count as f64);
+        gauge("queued", counts.queued);
+        gauge("running", counts.running);
+    }
+}
+
+/// Ends what is late; how long until the next deadline.
+async fn deadlines(engine: &Arc<Inner>) -> Duration {
+    let jobs = &engine.jobs;
+    let outcome = jobs.store.expire_deadlines(fault::written(&Error::DeadlineExceeded)).await;
+    let Some((late, next)) = report("deadline", outcome) else { return BEAT };
+    jobs.computations.cancel(&late.unwanted);
+    jobs.feeds.touch(&late.jobs);
+    let wait = next.map(|at| u64::try_from(at.saturating_sub(now_ms())).unwrap_or(0));
+    // At least a millisecond later: the clock counts whole ones.
+    wait.map_or(LONGEST_SLEEP, |ms| Duration::from_millis(ms + 1)).min(LONGEST_SLEEP)
+}
+
+fn report<T>(operation: &'static str, outcome: Result<T, crate::store::StoreError>) -> Option<T> {
+    outcome
+        .inspect_err(|error| {
+            metrics::counter!("precut_store_failures_total", "operation" => operation).increment(1);
+            tracing::warn!(%error, operation, "the jobs could not be looked after");
+        })
+        .ok()
+}

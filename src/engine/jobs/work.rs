@@ -1,0 +1,163 @@
+//! What a job does when it runs: one arm per [`JobKind`].
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use bytes::Bytes;
+use futures_util::future::BoxFuture;
+use serde_json::Value;
+use tokio::sync::oneshot;
+
+use super::running::Running;
+use crate::engine::exec::{Slot, guarded};
+use crate::engine::flight::Boarded;
+use crate::engine::read::Ready;
+use crate::engine::{Error, Inner, Stored, read};
+use crate::registry::Entry;
+use crate::store::jobs::{Claim, JobKind};
+
+/// Something to run for jobs.
+pub(crate) trait Work: Send + Sync {
+    /// Runs it. `slot` is the right to the jobs' pool, to be held as long as cores are used. To be given up soon after
+    /// [`Running::cancelled`]; its own progress is to be told by [`Running::follow`].
+    fn run(
+        self: Box<Self>,
+        engine: Arc<Inner>,
+        running: Arc<Running>,
+        slot: Slot,
+    ) -> BoxFuture<'static, Result<Arc<Stored>, Error>>;
+}
+
+/// The work of a claimed job, read back from its record.
+pub(super) fn of(engine: &Inner, claim: &Claim) -> Result<Box<dyn Work>, Error> {
+    match claim.kind {
+        JobKind::Calculation => {
+            let entry = engine.known(&claim.calculator)?;
+            if entry.is_composed() {
+                return Ok(Box::new(Composed { entry, input: claim.input.clone() }));
+            }
+            Ok(Box::new(Calculation { ready: ready(&entry, &claim.input)? }))
+        }
+        JobKind::Study => Err(Error::internal("this version runs no studies".to_owned())),
+    }
+}
+
+/// A kept job, ready to run.
+fn ready(entry: &Arc<Entry>, input: &[u8]) -> Result<Ready, Error> {
+    let job: Value = serde_json::from_slice(input)
+        .map_err(|error| Error::internal(format!("a kept job is not readable: {error}")))?;
+    read::prepared(entry, &job)
+}
+
+/// An answer made of many: reading it is work, too.
+struct Composed {
+    entry: Arc<Entry>,
+    input: Bytes,
+}
+
+impl Work for Composed {
+    fn run(
+        self: Box<Self>,
+        engine: Arc<Inner>,
+        running: Arc<Running>,
+        slot: Slot,
+    ) -> BoxFuture<'static, Result<Arc<Stored>, Error>> {
+        Box::pin(async move {
+            let (sender, receiver) = oneshot::channel();
+            engine.cores.spawn_job(move || {
+                // Nobody listens if the job was given up.
+                let _ = sender.send(guarded(|| ready(&self.entry, &self.input)));
+            });
+            let ready = receiver.await.unwrap_or(Err(Error::Crashed))?;
+            Inner::calculate(&engine, ready, &running, Some(slot)).await
+        })
+    }
+}
+
+/// One answer of one calculator.
+struct Calculation {
+    ready: Ready,
+}
+
+impl Work for Calculation {
+    fn run(
+        self: Box<Self>,
+        engine: Arc<Inner>,
+        running: Arc<Running>,
+        slot: Slot,
+    ) -> BoxFuture<'static, Result<Arc<Stored>, Error>> {
+        Box::pin(async move { Inner::calculate(&engine, self.ready, &running, Some(slot)).await })
+    }
+}
+
+impl Inner {
+    /// An ordinary cached calculation inside a job: from the cache, from whoever computes it already, or computed on
+    /// the jobs' pool, and then kept for whoever asks next. `slot` goes to the calculation where it is a job's only
+    /// one; a job of many calculations keeps its slot and gives none.
+    pub(crate) async fn calculate(
+        engine: &Arc<Self>,
+        ready: Ready,
+        running: &Running,
+        slot: Option<Slot>,
+    ) -> Result<Arc<Stored>, Error> {
+        Self::calculate_as(engine, ready, running, slot, true).await
+    }
+
+    /// The same for one of many calculations of a job, whose own progress says nothing of the whole.
+    #[allow(dead_code)] // for kinds of jobs made of many calculations
+    pub(crate) async fn calculate_point(
+        engine: &Arc<Self>,
+        ready: Ready,
+        running: &Running,
+    ) -> Result<Arc<Stored>, Error> {
+        Self::calculate_as(engine, ready, running, None, false).await
+    }
+
+    async fn calculate_as(
+        engine: &Arc<Self>,
+        ready: Ready,
+        running: &Running,
+        slot: Option<Slot>,
+        is_all: bool,
+    ) -> Result<Arc<Stored>, Error> {
+        let mut mine = Some((ready, slot));
+        loop {
+            let Some((ready, _)) = &mine else { return Err(Error::Crashed) };
+            if running.is_cancelled() {
+                return Err(Error::Cancelled);
+            }
+            if let Some(kept) = engine.look_up(&ready.key).await {
+                return crate::engine::outcome(kept);
+            }
+            // A study whose points were there already says nothing of what points take.
+            let teaches = !ready.entry.is_composed();
+            let (id, version, cost_ms) = (ready.entry.meta().id, ready.entry.meta().version, ready.prepared.cost.ms);
+            let Boarded { seat, pilot } = engine.flights.board(ready.key);
+            if is_all {
+                running.follow(seat.progress());
+            }
+            let is_mine = pilot.is_some();
+            if let Some(pilot) = pilot
+                && let Some((ready, slot)) = mine.take()
+            {
+                let (this, queued) = (Arc::clone(engine), Instant::now());
+                engine.cores.spawn_job(move || this.run(pilot, &ready, slot, queued));
+            }
+            let landed = tokio::select! {
+                landed = seat.landed() => landed,
+                // The seat is left with the future, and the calculation ends when nobody else sits in it.
+                () = running.cancelled() => return Err(Error::Cancelled),
+            };
+            match landed.outcome {
+                // A direct answer found no core. A job has one: it computes what was not computed there.
+                Err(Error::Busy { .. } | Error::ShuttingDown) if !is_mine => {}
+                outcome => {
+                    if is_mine && teaches && outcome.is_ok() {
+                        engine.jobs.learn(id, version, cost_ms, landed.timings.run).await;
+                    }
+                    return outcome;
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,113 @@
+//! From a task of the queue to a finished job.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use precut_calc::calculator::Failure;
+
+use super::{MOST_ATTEMPTS, fault, work};
+use crate::engine::{Error, Inner, Stored};
+use crate::store::StoreError;
+use crate::store::jobs::{Claim, Claimed, Ending, JobId};
+
+/// Runs the job of a task, if it still waits. Returns when its record says how it ended, or that it waits again.
+pub(super) async fn run_task(engine: Arc<Inner>, id: JobId) {
+    let jobs = &engine.jobs;
+    let Some(Some(charged)) = stubbornly(&engine, || jobs.store.waiting_attempts(id)).await else { return };
+    // A start that takes the process along is charged to all that ran beside it. Before a job is given up as the one
+    // to blame, it is tried alone.
+    let alone = charged + 1 >= MOST_ATTEMPTS;
+    let slot = tokio::select! {
+        slot = engine.cores.job_slot(alone) => slot,
+        () = jobs.stopped() => return,
+    };
+    let Ok(slot) = slot else { return };
+    let begun = jobs.computations.begin();
+    let running = Arc::clone(&begun.running);
+    let poison = fault::written(&Error::CrashedRepeatedly { attempts: MOST_ATTEMPTS });
+    let claim = || jobs.store.claim(id, running.lease(), MOST_ATTEMPTS, poison.clone());
+    let claim = match stubbornly(&engine, claim).await {
+        Some(Claimed::Run(claim)) => claim,
+        Some(Claimed::Poisonous(failed)) => {
+            for id in &failed {
+                tracing::error!(job = %id, attempts = MOST_ATTEMPTS, "a job ended its process at every attempt");
+            }
+            metrics::counter!("precut_jobs_poisonous_total").increment(failed.len() as u64);
+            return jobs.feeds.touch(&failed);
+        }
+        Some(Claimed::Nothing) | None => return,
+    };
+    running.claimed();
+    jobs.feeds.touch(&claim.jobs);
+    tracing::info!(job = %id, calculator = claim.calculator, attempt = claim.attempt, "a job begins");
+    let started = Instant::now();
+    let outcome = match work::of(&engine, &claim) {
+        Ok(work) => {
+            let working = work.run(Arc::clone(&engine), Arc::clone(&running), slot);
+            tokio::select! {
+                outcome = working => outcome,
+                () = jobs.stopped() => Err(Error::ShuttingDown),
+            }
+        }
+        Err(error) => Err(error),
+    };
+    settle(&engine, &claim, outcome, started.elapsed(), running.is_cancelled()).await;
+}
+
+/// Writes how a computation ended.
+async fn settle(
+    engine: &Arc<Inner>,
+    claim: &Claim,
+    outcome: Result<Arc<Stored>, Error>,
+    took: Duration,
+    unwanted: bool,
+) {
+    let jobs = &engine.jobs;
+    let ms = took.as_secs_f64() * 1e3;
+    let (ending, label) = match outcome {
+        Ok(stored) => (Ending::Succeeded(stored.kept()), "succeeded"),
+        // Its jobs ended before it did.
+        Err(Error::Cancelled) if unwanted => {
+            metrics::counter!("precut_jobs_total", "calculator" => claim.calculator.clone(), "outcome" => "cancelled")
+                .increment(1);
+            tracing::info!(job = %claim.jobs[0], ms, "a job was given up: nobody wants it any more");
+            return;
+        }
+        // The service stops: the job waits for the next one, and this start does not count.
+        Err(Error::Cancelled | Error::ShuttingDown | Error::Calculation(Failure::Cancelled)) => {
+            match jobs.store.release(claim.lease).await {
+                Ok(back) => jobs.feeds.touch(&back),
+                Err(error) => tracing::warn!(%error, "a job could not be put back; it is taken up at the next start"),
+            }
+            return;
+        }
+        Err(error) => (Ending::Failed(fault::written(&error)), "failed"),
+    };
+    metrics::counter!("precut_jobs_total", "calculator" => claim.calculator.clone(), "outcome" => label).increment(1);
+    metrics::histogram!("precut_job_seconds", "calculator" => claim.calculator.clone()).record(took.as_secs_f64());
+    if let Some(ended) = stubbornly(engine, || jobs.store.finish(claim.lease, ending.clone())).await {
+        tracing::info!(job = %claim.jobs[0], ms, outcome = label, "a job ends");
+        jobs.feeds.touch(&ended);
+    }
+}
+
+/// Tries until the store answers or the service stops: a task must not end while its job is open.
+async fn stubbornly<T, F>(engine: &Arc<Inner>, attempt: impl Fn() -> F) -> Option<T>
+where
+    F: Future<Output = Result<T, StoreError>>,
+{
+    let mut count = 0;
+    loop {
+        match attempt().await {
+            Ok(value) => return Some(value),
+            Err(error) => {
+                metrics::counter!("precut_store_failures_total", "operation" => "job").increment(1);
+                tracing::warn!(%error, "the store does not take word of a job; trying again");
+            }
+        }
+        tokio::select! {
+            () = tokio::time::sleep(fault::pause(count)) => count += 1,
+            () = engine.jobs.stopped() => return None,
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! A study inside an engine: its points come out of the engine's cache and go into it.
+
+use std::sync::{Arc, OnceLock, Weak};
+use std::time::Duration;
+
+use bytes::Bytes;
+use tokio::runtime::Handle;
+
+use super::host::{Alone, Help, Host};
+use crate::engine::Inner;
+use crate::engine::answer::Stored;
+use crate::engine::error::Error;
+use crate::engine::memory::Kept;
+use crate::engine::read::Ready;
+use crate::key::Key;
+
+/// The engine that a study runs in. The engine holds the entry of studies, and that this: hence the weak link.
+#[derive(Default)]
+pub(crate) struct InEngine(OnceLock<Place>);
+
+struct Place {
+    engine: Weak<Inner>,
+    /// The runtime that the store needs; studies run on threads of their own, which may wait for it.
+    runtime: Option<Handle>,
+}
+
+impl InEngine {
+    /// From now on this is the engine, and the runtime is that of the caller.
+    pub(crate) fn move_in(&self, engine: &Arc<Inner>) {
+        let place = Place { engine: Arc::downgrade(engine), runtime: Handle::try_current().ok() };
+        // An engine is made once.
+        let _ = self.0.set(place);
+    }
+
+    fn engine(&self) -> Option<(Arc<Inner>, Option<&Handle>)> {
+        let place = self.0.get()?;
+        Some((place.engine.upgrade()?, place.runtime.as_ref()))
+    }
+}
+
+impl Host for InEngine {
+    fn kept(&self, key: &Key) -> Option<Kept> {
+        let (engine, runtime) = self.engine()?;
+        engine.memory.get(key).or_else(|| runtime?.block_on(engine.look_up(key)))
+    }
+
+    fn keep(&self, ready: &Ready, outcome: Result<Stored, Error>, took: Duration) -> Result<Arc<Stored>, Error> {
+        match self.engine() {
+            Some((engine, _)) => engine.keep(ready, outcome, took),
+            None => Alone.keep(ready, outcome, took),
+        }
+    }
+
+    fn help(&self, most: usize, work: &Arc<Help>) {
+        let Some((engine, _)) = self.engine() else { return };
+        for _ in 0..most {
+            let Some(slot) = engine.cores.spare_job_slot() else { return };
+            let (cores, work) = (Arc::clone(&engine), Arc::clone(work));
+            engine.cores.spawn_job(move || {
+                let mut slot = Some(slot);
+                // Whoever waits for a core gets this one.
+                work(&mut || {
+                    slot = None;
+                    slot = cores.cores.spare_job_slot();
+                    slot.is_some()
+                });
+            });
+        }
+    }
+
+    fn put_down(&self, study: &Key) -> Vec<(usize, Bytes)> {
+        let Some((engine, Some(runtime))) = self.engine() else { return Vec::new() };
+        match runtime.block_on(engine.store.shards(*study)) {
+            Ok(shards) => shards.into_iter().map(|(shard, content)| (shard as usize, content)).collect(),
+            Err(error) => {
+                tracing::warn!(%study, %error, "what was put down of a study cannot be read; it begins anew");
+                Vec::new()
+            }
+        }
+    }
+
+    fn put(&self, study: &Key, shard: usize, content: Bytes) {
+        let (Some((engine, Some(runtime))), Ok(number)) = (self.engine(), u32::try_from(shard)) else { return };
+        if let Err(error) = runtime.block_on(engine.store.put_shard(*study, number, content)) {
+            tracing::warn!(%study, shard, %error, "a part of a study is not put down");
+        }
+    }
+
+    fn forget(&self, study: &Key) {
+        let Some((engine, Some(runtime))) = self.engine() else { return };
+        if let Err(error) = runtime.block_on(engine.store.forget_shards(*study)) {
+            tracing::warn!(%study, %error, "the parts of a study are not forgotten");
+        }
+    }
+}

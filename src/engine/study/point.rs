@@ -1,0 +1,140 @@
+//! One point of a study: its job looked up or computed, and what the table says of it.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+use std::time::Instant;
+
+use precut_calc::calculator::{Failure, Monitor};
+use serde::{Deserialize, Serialize};
+
+use super::host::Host;
+use super::pick::{Cited, Picked, Warning};
+use super::plan::Plan;
+use super::result::{Row, Status};
+use crate::engine::answer::Stored;
+use crate::engine::error::Error;
+use crate::engine::exec::guarded;
+use crate::engine::memory::Kept;
+use crate::text::{Language, Texts};
+
+/// Some points that are done.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Shard {
+    pub(crate) rows: Vec<Row>,
+    /// Warnings of their answers, and how many have each.
+    pub(crate) warnings: Vec<(String, String, usize)>,
+    pub(crate) basis: BTreeSet<Cited>,
+}
+
+/// Counts warnings by code and pointer.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Warnings(BTreeMap<(String, String), usize>);
+
+impl Warnings {
+    pub(crate) fn add(&mut self, code: String, pointer: String, points: usize) {
+        *self.0.entry((code, pointer)).or_default() += points;
+    }
+    pub(crate) fn into_list(self) -> Vec<(String, String, usize)> {
+        self.0.into_iter().map(|((code, pointer), points)| (code, pointer, points)).collect()
+    }
+}
+
+impl Shard {
+    /// Computes the points of a range; after each one `done` is told. `None` where it was cancelled.
+    pub(crate) fn compute(
+        plan: &Plan,
+        points: std::ops::Range<usize>,
+        host: &dyn Host,
+        monitor: &dyn Monitor,
+        mut done: impl FnMut(),
+    ) -> Option<Self> {
+        let mut shard = Self::default();
+        let mut warnings = Warnings::default();
+        for point in points {
+            if monitor.cancelled() {
+                return None;
+            }
+            let (row, picked) = compute(plan, point, host, monitor)?;
+            shard.rows.push(row);
+            // Once per point, however many places of its answer warn of the same.
+            let own: BTreeSet<Warning> = picked.warnings.into_iter().collect();
+            for Warning { code, pointer } in own {
+                warnings.add(code, pointer, 1);
+            }
+            shard.basis.extend(picked.basis);
+            done();
+        }
+        shard.warnings = warnings.into_list();
+        Some(shard)
+    }
+}
+
+fn compute(plan: &Plan, point: usize, host: &dyn Host, monitor: &dyn Monitor) -> Option<(Row, Picked)> {
+    let mut key = None;
+    let outcome = guarded(|| plan.ready(point)).and_then(|ready| {
+        key = Some(ready.key);
+        match host.kept(&ready.key) {
+            Some(Kept::Answer(stored)) => Ok(stored),
+            Some(Kept::Failure(failure)) => Err(Error::Calculation(failure)),
+            None => {
+                let begun = Instant::now();
+                let outcome = guarded(|| crate::engine::compute(&ready, &Quiet(monitor)));
+                host.keep(&ready, outcome, begun.elapsed())
+            }
+        }
+    });
+    let picked = outcome.and_then(|stored: Arc<Stored>| {
+        let unreadable = |error: serde_json::Error| Error::Calculation(Failure::Internal(error.to_string()));
+        plan.wanted.pick(&stored.body).map_err(unreadable)
+    });
+    let row = |status, code, detail, outputs| Row {
+        values: plan.settings(point),
+        status,
+        code,
+        detail,
+        outputs,
+        key: key.map(|key| key.to_string()),
+    };
+    match picked {
+        Ok(picked) => Some((row(Status::Succeeded, None, None, picked.numbers.clone()), picked)),
+        Err(Error::Cancelled | Error::ShuttingDown) => None,
+        Err(error) => {
+            let (status, code, detail) = reason(&error);
+            let nothing = vec![None; plan.outputs.len()];
+            Some((row(status, Some(code.to_owned()), Some(detail), nothing), Picked::default()))
+        }
+    }
+}
+
+/// Why a point has no answer: kind, code, sentence.
+fn reason(error: &Error) -> (Status, &'static str, String) {
+    let texts = Texts::shared();
+    let fault = |finding| texts.finding(Language::En, "fault", finding);
+    let problem = |code, values| texts.problem(Language::En, code, &values).1;
+    let none = precut_calc::calculator::Values::new;
+    match error {
+        Error::Invalid { findings, .. } => match findings.first() {
+            Some(first) => (Status::Invalid, first.code, fault(first)),
+            None => (Status::Invalid, "invalid_job", String::new()),
+        },
+        Error::Calculation(Failure::Infeasible(finding)) => (Status::Infeasible, finding.code, fault(finding)),
+        Error::Calculation(Failure::OutOfModel(finding)) => (Status::OutOfModel, finding.code, fault(finding)),
+        Error::Calculation(Failure::NotConverged { what, residual, iterations }) => {
+            let values =
+                none().with("what", *what).with("residual", *residual).with("iterations", f64::from(*iterations));
+            (Status::NotConverged, "not_converged", problem("not_converged", values))
+        }
+        Error::Crashed => (Status::Failed, "crashed", problem("crashed", none())),
+        _ => (Status::Failed, "internal", problem("internal", none())),
+    }
+}
+
+/// A point's view of the study's monitor: it may be cancelled, its progress is nobody's business.
+struct Quiet<'m>(&'m dyn Monitor);
+
+impl Monitor for Quiet<'_> {
+    fn cancelled(&self) -> bool {
+        self.0.cancelled()
+    }
+    fn progress(&self, _fraction: f64, _stage: precut_calc::calculator::Message) {}
+}

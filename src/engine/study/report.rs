@@ -1,0 +1,221 @@
+//! From the rows of a study to what is to be said of them.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use precut_calc::calculator::{Basis, Finding, Message};
+
+use super::input::Combine;
+use super::pick::Cited;
+use super::plan::Plan;
+use super::point::{Shard, Warnings};
+use super::result::{Extreme, FailureCount, OutputField, Row, Setting, Status, StudyResult, VariedField};
+use crate::registry::{ResultNotes, interned};
+
+/// Codes of what a study explains.
+pub(crate) const EXPLANATIONS: &[&str] = &[
+    "study_constant",
+    "study_dominant",
+    "study_extremes",
+    "study_least_at_end",
+    "study_largest_at_end",
+    "study_no_answers",
+    "study_own_error",
+    "study_some_failed",
+];
+/// Codes of what a study warns of.
+pub(crate) const WARNINGS: &[&str] = &["study_points_warn"];
+
+/// So many outputs are spoken of.
+const OUTPUTS_SPOKEN_OF: usize = 4;
+/// So many reasons are named.
+const REASONS_NAMED: usize = 5;
+
+/// The result of a study and what is to be said of it.
+pub(crate) fn report(plan: &Plan, shards: Vec<Shard>) -> (StudyResult, ResultNotes) {
+    let mut rows = Vec::with_capacity(plan.points);
+    let mut warnings = Warnings::default();
+    let mut basis: BTreeSet<Cited> = BTreeSet::new();
+    for shard in shards {
+        rows.extend(shard.rows);
+        for (code, pointer, points) in shard.warnings {
+            warnings.add(code, pointer, points);
+        }
+        basis.extend(shard.basis);
+    }
+    let succeeded = rows.iter().filter(|row| row.status == Status::Succeeded).count();
+    let result = StudyResult {
+        calculator: plan.entry.meta().id.to_owned(),
+        calculator_version: plan.entry.meta().version,
+        points: plan.points,
+        succeeded,
+        failed: plan.points - succeeded,
+        combine: plan.input.combine,
+        variables: plan
+            .variables
+            .iter()
+            .map(|variable| VariedField {
+                pointer: variable.pointer.clone(),
+                unit: variable.unit.clone(),
+                spacing: variable.spacing,
+                values: variable.values.iter().filter_map(Setting::of).collect(),
+            })
+            .collect(),
+        outputs: outputs(plan, &rows),
+        failures: failures(&rows),
+        rows,
+    };
+    let notes = ResultNotes {
+        warnings: warnings.into_list().into_iter().map(|warning| warned(warning, succeeded)).collect(),
+        explanation: explanation(plan, &result),
+        basis: basis
+            .into_iter()
+            // Written by calculators of ours, of which each has a handful.
+            .map(|cited| Basis { equation: interned(&cited.equation), source: interned(&cited.source) })
+            .collect(),
+    };
+    (result, notes)
+}
+
+fn warned((code, pointer, points): (String, String, usize), of: usize) -> Finding {
+    Finding::new("study_points_warn", format!("/job{pointer}")).with("code", code).with("points", points).with("of", of)
+}
+
+fn outputs(plan: &Plan, rows: &[Row]) -> Vec<OutputField> {
+    let field = |(index, output): (usize, &super::plan::Output)| {
+        let extreme = |better: fn(f64, f64) -> bool| {
+            let mut best: Option<(usize, f64)> = None;
+            for (row, value) in rows.iter().enumerate().filter_map(|(row, one)| Some((row, one.outputs[index]?))) {
+                if best.is_none_or(|(_, so_far)| better(value, so_far)) {
+                    best = Some((row, value));
+                }
+            }
+            best.map(|(row, value)| Extreme {
+                value,
+                row,
+                at: rows[row].values.clone(),
+                at_end_of: ends(plan, &rows[row].values),
+            })
+        };
+        OutputField {
+            pointer: output.pointer.clone(),
+            unit: output.unit.clone(),
+            least: extreme(|a, b| a < b),
+            largest: extreme(|a, b| a > b),
+        }
+    };
+    plan.outputs.iter().enumerate().map(field).collect()
+}
+
+/// The numeric variables that stand at an end of their values.
+fn ends(plan: &Plan, settings: &[Setting]) -> Vec<String> {
+    let is_end = |(index, setting): (usize, &Setting)| {
+        let here = setting.number()?;
+        let values: Vec<f64> = plan.variables[index].values.iter().filter_map(serde_json::Value::as_f64).collect();
+        let beyond = |more: fn(f64, f64) -> bool| values.iter().any(|&value| more(value, here));
+        let inside = beyond(|value, here| value < here) && beyond(|value, here| value > here);
+        (!inside).then(|| plan.variables[index].pointer.clone())
+    };
+    settings.iter().enumerate().filter_map(is_end).collect()
+}
+
+fn failures(rows: &[Row]) -> Vec<FailureCount> {
+    let mut counts: BTreeMap<(Status, &str), (usize, usize)> = BTreeMap::new();
+    for (number, row) in rows.iter().enumerate() {
+        if let Some(code) = &row.code {
+            counts.entry((row.status, code.as_str())).or_insert((0, number)).0 += 1;
+        }
+    }
+    let mut counts: Vec<FailureCount> = counts
+        .into_iter()
+        .map(|((status, code), (points, first_row))| FailureCount { status, code: code.to_owned(), points, first_row })
+        .collect();
+    counts.sort_by(|a, b| b.points.cmp(&a.points).then(a.first_row.cmp(&b.first_row)));
+    counts
+}
+
+fn explanation(plan: &Plan, result: &StudyResult) -> Vec<Message> {
+    let mut said = Vec::new();
+    let reasons: Vec<String> = result
+        .failures
+        .iter()
+        .take(REASONS_NAMED)
+        .map(|one| format!("{} {} ({})", one.points, one.code, one.status.name()))
+        .collect();
+    if result.succeeded == 0 {
+        said.push(Message::new("study_no_answers").with("points", result.points).with("reasons", reasons));
+        return said;
+    }
+    for (index, output) in result.outputs.iter().take(OUTPUTS_SPOKEN_OF).enumerate() {
+        let (Some(least), Some(largest)) = (&output.least, &output.largest) else { continue };
+        let unit = output.unit.clone().unwrap_or_else(|| "1".to_owned());
+        let message = |code| {
+            let message = Message::new(code).with("output", output.pointer.clone()).with("unit", unit.clone());
+            message.with("least", least.value)
+        };
+        if least.value.total_cmp(&largest.value).is_eq() {
+            said.push(message("study_constant"));
+            continue;
+        }
+        said.push(
+            message("study_extremes")
+                .with("least_at", named(result, &least.at))
+                .with("largest", largest.value)
+                .with("largest_at", named(result, &largest.at)),
+        );
+        if let Some((variable, share)) = dominant(plan, result, index) {
+            said.push(
+                Message::new("study_dominant")
+                    .with("output", output.pointer.clone())
+                    .with("variable", variable)
+                    .with("share", share),
+            );
+        }
+        for (code, extreme) in [("study_least_at_end", least), ("study_largest_at_end", largest)] {
+            if index == 0 && !extreme.at_end_of.is_empty() {
+                said.push(
+                    Message::new(code)
+                        .with("output", output.pointer.clone())
+                        .with("variables", extreme.at_end_of.clone()),
+                );
+            }
+        }
+    }
+    if result.failed > 0 {
+        said.push(
+            Message::new("study_some_failed")
+                .with("failed", result.failed)
+                .with("points", result.points)
+                .with("reasons", reasons),
+        );
+    }
+    said.push(Message::new("study_own_error"));
+    said
+}
+
+/// `/cut/feed_mm_per_rev = 0.2` for every variable.
+fn named(result: &StudyResult, at: &[Setting]) -> Vec<String> {
+    result.variables.iter().zip(at).map(|(variable, setting)| format!("{} = {setting}", variable.pointer)).collect()
+}
+
+/// The variable that alone explains most of how an output varies over a complete grid, and which share of the variance
+/// the means over the others have.
+fn dominant(plan: &Plan, result: &StudyResult, output: usize) -> Option<(String, f64)> {
+    if plan.input.combine != Combine::Grid || plan.variables.len() < 2 {
+        return None;
+    }
+    let values: Option<Vec<f64>> = result.rows.iter().map(|row| row.outputs[output]).collect();
+    let values = values?;
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / values.len() as f64;
+    let shares = plan.variables.iter().enumerate().map(|(index, variable)| {
+        let mut sums = vec![(0.0, 0_usize); variable.values.len()];
+        for (point, value) in values.iter().enumerate() {
+            let sum = &mut sums[plan.shape.at(point)[index]];
+            sum.0 += value;
+            sum.1 += 1;
+        }
+        let between: f64 = sums.iter().map(|(sum, count)| (sum / *count as f64 - mean).powi(2)).sum();
+        (variable.pointer.clone(), between / sums.len() as f64 / variance)
+    });
+    shares.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, share)| share.is_finite())
+}

@@ -1,0 +1,225 @@
+//! The points of a study over the cores that are free, and put down as they are done.
+//!
+//! A shard is a run of points. Whoever has a core takes the next one; the thread that was given the study takes part,
+//! and alone talks to the monitor. What a shard comes to does not depend on who computes it, so that the rows are the
+//! same on one core and on many, and after any number of restarts.
+
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use precut_calc::calculator::{Failure, Message, Monitor};
+
+use super::figure;
+use super::host::{Help, Host};
+use super::plan::Plan;
+use super::point::Shard;
+use super::result::Row;
+use crate::engine::exec::guarded;
+use crate::key::Key;
+
+/// A study whose cost is below is not worth a second core, nor putting down, ms.
+const LARGE_MS: f64 = 200.0;
+/// How often the picture so far is drawn.
+const INTERIM: Duration = Duration::from_millis(500);
+/// How often the thread that waits for the others looks whether it is still wanted.
+const LOOK: Duration = Duration::from_millis(20);
+
+/// What everyone who works on a study has in common.
+struct Work {
+    plan: Arc<Plan>,
+    host: Arc<dyn Host>,
+    key: Key,
+    next: AtomicUsize,
+    points_done: AtomicUsize,
+    stop: AtomicBool,
+    crashed: AtomicBool,
+    done: Mutex<Done>,
+    changed: Condvar,
+}
+
+struct Done {
+    shards: Vec<Option<Shard>>,
+    missing: usize,
+}
+
+impl Work {
+    fn done(&self) -> MutexGuard<'_, Done> {
+        self.done.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn is_large(&self) -> bool {
+        self.plan.cost.ms >= LARGE_MS
+    }
+
+    fn add(&self, index: usize, shard: Shard) {
+        let mut done = self.done();
+        if done.shards[index].replace(shard).is_none() {
+            done.missing -= 1;
+        }
+        drop(done);
+        self.changed.notify_all();
+    }
+
+    /// Computes shards until none is left, or until `go_on` says no; that is asked after each shard, and `told` is
+    /// called after each point.
+    fn share(&self, monitor: &dyn Monitor, go_on: &mut dyn FnMut() -> bool, mut told: impl FnMut()) {
+        loop {
+            let index = self.next.fetch_add(1, Ordering::Relaxed);
+            if index >= self.plan.shards() || self.stop.load(Ordering::Relaxed) {
+                return;
+            }
+            if self.done().shards[index].is_some() {
+                continue;
+            }
+            let computed = Shard::compute(&self.plan, self.plan.shard(index), &*self.host, monitor, || {
+                self.points_done.fetch_add(1, Ordering::Relaxed);
+                told();
+            });
+            let Some(shard) = computed else {
+                self.stop.store(true, Ordering::Relaxed);
+                self.changed.notify_all();
+                return;
+            };
+            if self.is_large()
+                && let Ok(content) = serde_json::to_vec(&shard)
+            {
+                self.host.put(&self.key, index, content.into());
+            }
+            self.add(index, shard);
+            if !go_on() {
+                return;
+            }
+        }
+    }
+
+    /// How many shards nobody has begun.
+    fn left(&self) -> usize {
+        self.plan.shards().saturating_sub(self.next.load(Ordering::Relaxed))
+    }
+
+    /// What a helper does. A panic here would end the process, and a shard that nobody ends would never be waited for
+    /// to the end.
+    fn help(&self, go_on: &mut dyn FnMut() -> bool) {
+        let outcome = guarded(|| {
+            self.share(&Helper(self), go_on, || {});
+            Ok(())
+        });
+        if outcome.is_err() {
+            self.crashed.store(true, Ordering::Relaxed);
+            self.stop.store(true, Ordering::Relaxed);
+            self.changed.notify_all();
+        }
+    }
+
+    /// Takes up what was put down before. What does not fit is computed again.
+    fn resume(&self) {
+        for (index, content) in self.host.put_down(&self.key) {
+            if index >= self.plan.shards() {
+                continue;
+            }
+            let points = self.plan.shard(index);
+            if let Ok(shard) = serde_json::from_slice::<Shard>(&content)
+                && shard.rows.len() == points.len()
+                && shard.rows.iter().zip(points.clone()).all(|(row, point)| row.values == self.plan.settings(point))
+            {
+                self.points_done.fetch_add(points.len(), Ordering::Relaxed);
+                self.add(index, shard);
+            }
+        }
+    }
+
+    fn progress(&self, monitor: &dyn Monitor) {
+        let (done, of) = (self.points_done.load(Ordering::Relaxed), self.plan.points);
+        let stage = Message::new("study_point").with("done", done).with("of", of);
+        monitor.progress(done as f64 / of as f64, stage);
+    }
+
+    fn interim(&self, monitor: &dyn Monitor) {
+        let done = self.done();
+        let rows: Vec<Option<&Row>> = (0..self.plan.points)
+            .map(|point| {
+                let shard = done.shards[point / self.plan.shard_points].as_ref()?;
+                shard.rows.get(point % self.plan.shard_points)
+            })
+            .collect();
+        let figure = figure::of_plan(&self.plan, &rows);
+        drop(done);
+        if let Some(figure) = figure {
+            monitor.interim(figure);
+        }
+    }
+}
+
+/// Everyone but the first only needs to know whether to go on.
+struct Helper<'w>(&'w Work);
+
+impl Monitor for Helper<'_> {
+    fn cancelled(&self) -> bool {
+        self.0.stop.load(Ordering::Relaxed)
+    }
+    fn progress(&self, _fraction: f64, _stage: Message) {}
+}
+
+/// Computes the shards of a study.
+pub(crate) fn run(
+    plan: &Arc<Plan>,
+    host: &Arc<dyn Host>,
+    key: Key,
+    monitor: &dyn Monitor,
+) -> Result<Vec<Shard>, Failure> {
+    let shards = plan.shards();
+    let work = Arc::new(Work {
+        plan: Arc::clone(plan),
+        host: Arc::clone(host),
+        key,
+        next: AtomicUsize::new(0),
+        points_done: AtomicUsize::new(0),
+        stop: AtomicBool::new(false),
+        crashed: AtomicBool::new(false),
+        done: Mutex::new(Done { shards: vec![None; shards], missing: shards }),
+        changed: Condvar::new(),
+    });
+    let helped = Arc::clone(&work);
+    let help: Arc<Help> = Arc::new(move |go_on: &mut dyn FnMut() -> bool| helped.help(go_on));
+    let mut hire = || {
+        if work.is_large() {
+            host.help(work.left().saturating_sub(1), &help);
+        }
+        true
+    };
+    if work.is_large() {
+        work.resume();
+        hire();
+    }
+    let mut drawn = Instant::now();
+    let mut tell = || {
+        work.progress(monitor);
+        if drawn.elapsed() >= INTERIM {
+            work.interim(monitor);
+            drawn = Instant::now();
+        }
+    };
+    work.share(monitor, &mut hire, &mut tell);
+    let mut done = work.done();
+    while done.missing > 0 && !work.stop.load(Ordering::Relaxed) {
+        (done, _) = work.changed.wait_timeout(done, LOOK).unwrap_or_else(PoisonError::into_inner);
+        drop(done);
+        if monitor.cancelled() {
+            work.stop.store(true, Ordering::Relaxed);
+        }
+        tell();
+        done = work.done();
+    }
+    let shards = std::mem::take(&mut done.shards);
+    drop(done);
+    if work.crashed.load(Ordering::Relaxed) {
+        return Err(Failure::Internal("a part of a study crashed".to_owned()));
+    }
+    let all: Option<Vec<Shard>> = shards.into_iter().collect();
+    let all = all.ok_or(Failure::Cancelled)?;
+    if work.is_large() {
+        host.forget(&key);
+    }
+    Ok(all)
+}

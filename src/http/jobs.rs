@@ -1,0 +1,304 @@
+//! Jobs: listed, watched, cancelled, and their results.
+
+use axum::extract::{Path, Query, State};
+use axum::http::header::{CACHE_CONTROL, CONTENT_LANGUAGE, CONTENT_TYPE, HeaderValue, LOCATION, RETRY_AFTER};
+use axum::http::{HeaderMap, StatusCode, Uri};
+use axum::response::Response;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::App;
+use super::answer::{self, View};
+use super::negotiate;
+use super::prefer::{PREFERENCE_APPLIED, Preference};
+use super::problem::{Problem, ProblemDocument};
+use crate::engine::{CacheState, Error, Job, JobId, JobQuery, JobState, Priority, Timings};
+use crate::text::{Language, Texts};
+
+/// Most jobs of one page.
+pub(super) const MOST_ITEMS: u32 = 500;
+/// Jobs of one page unless asked for more or fewer.
+pub(super) const DEFAULT_ITEMS: u32 = 50;
+
+/// A job: what became of a request that is not answered at once.
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = Job)]
+pub(super) struct JobDocument {
+    /// Its name.
+    #[schema(
+        pattern = "^[0-9a-f]{8}-[0-9a-f]{4}-7[0-9a-f]{3}-[0-9a-f]{4}-[0-9a-f]{12}$",
+        example = "0198c5f1-8a3e-7c40-b0a1-5e2d9f4c6b7a"
+    )]
+    id: String,
+    /// Which calculator computes it.
+    #[schema(example = "deflection-compensation")]
+    calculator: String,
+    /// How far it is.
+    state: Progression,
+    /// What it is doing; null unless it runs.
+    #[schema(example = "revolution 31 of 96")]
+    stage: Option<String>,
+    /// How far the computation is.
+    #[schema(minimum = 0, maximum = 1, example = 0.32)]
+    progress: f64,
+    /// Times it was started; more than 1 if a start was cut short.
+    #[schema(minimum = 0, example = 1)]
+    attempt: u32,
+    /// Which jobs go first.
+    priority: Precedence,
+    /// Address of its result: equal jobs have equal keys.
+    #[schema(pattern = "^b3:[0-9a-f]{64}$")]
+    key: String,
+    /// When it was accepted, UTC.
+    #[schema(format = DateTime, example = "2026-02-03T10:15:00.123Z")]
+    created_at: String,
+    /// When it was started last.
+    #[schema(format = DateTime, example = "2026-02-03T10:15:00.142Z")]
+    started_at: Option<String>,
+    /// When it ended.
+    #[schema(format = DateTime)]
+    finished_at: Option<String>,
+    /// When it is of no use any more: `deadline_s` after it was accepted.
+    #[schema(format = DateTime)]
+    deadline_at: Option<String>,
+    /// Until when its result is kept.
+    #[schema(format = DateTime)]
+    expires_at: Option<String>,
+    /// Work expected when it was accepted, ms.
+    #[schema(minimum = 0, example = 4200.0, extensions(("x-unit" = json!("ms"))))]
+    estimate_ms: f64,
+    /// Time left, ms; null unless it runs.
+    #[schema(minimum = 0, example = 2900.0, extensions(("x-unit" = json!("ms"))))]
+    remaining_ms: Option<f64>,
+    /// Where to go from here.
+    links: JobLinks,
+    /// Why it failed.
+    problem: Option<ProblemDocument>,
+}
+
+/// How far a job is.
+#[derive(Debug, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+#[schema(as = JobState)]
+enum Progression {
+    /// It waits.
+    Queued,
+    /// It is computed.
+    Running,
+    /// It has its result.
+    Succeeded,
+    /// It has none, and `problem` says why.
+    Failed,
+    /// Nobody wants it any more.
+    Cancelled,
+}
+
+/// Which jobs go first.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+#[schema(as = Priority)]
+pub(super) enum Precedence {
+    /// When nothing else waits.
+    Low,
+    /// As all others.
+    Normal,
+    /// Before all others.
+    High,
+}
+
+impl From<Precedence> for Priority {
+    fn from(priority: Precedence) -> Self {
+        match priority {
+            Precedence::Low => Self::Low,
+            Precedence::Normal => Self::Normal,
+            Precedence::High => Self::High,
+        }
+    }
+}
+
+/// Addresses of a job.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct JobLinks {
+    /// The job itself.
+    #[serde(rename = "self")]
+    #[schema(example = "/v1/jobs/0198c5f1-8a3e-7c40-b0a1-5e2d9f4c6b7a")]
+    this: String,
+    /// Its result.
+    result: String,
+    /// Its server-sent events.
+    events: String,
+    /// Where a `DELETE` cancels it.
+    cancel: String,
+}
+
+/// A page of jobs.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct JobList {
+    /// The jobs, newest first.
+    items: Vec<JobDocument>,
+    /// Address of the next page; null on the last.
+    #[schema(example = "/v1/jobs?limit=50&after=0198c5f1-8a3e-7c40-b0a1-5e2d9f4c6b7a")]
+    next: Option<String>,
+}
+
+/// The job in words.
+pub(super) fn document(job: &Job, language: Language) -> JobDocument {
+    let record = &job.record;
+    let id = record.id;
+    let time = |ms: i64| format!("{:.3}", jiff::Timestamp::from_millisecond(ms).unwrap_or_default());
+    let finite = |number: f64| if number.is_finite() { number } else { 0.0 };
+    JobDocument {
+        id: id.to_string(),
+        calculator: record.calculator.clone(),
+        state: match record.state {
+            JobState::Queued => Progression::Queued,
+            JobState::Running => Progression::Running,
+            JobState::Succeeded => Progression::Succeeded,
+            JobState::Failed => Progression::Failed,
+            JobState::Cancelled => Progression::Cancelled,
+        },
+        stage: job.stage.as_ref().map(|stage| Texts::shared().message(language, "stage", stage)),
+        progress: finite(job.progress),
+        attempt: record.attempt,
+        priority: match record.priority {
+            Priority::Low => Precedence::Low,
+            Priority::Normal => Precedence::Normal,
+            Priority::High => Precedence::High,
+        },
+        key: record.key.to_string(),
+        created_at: time(record.created_ms),
+        started_at: record.started_ms.map(time),
+        finished_at: record.finished_ms.map(time),
+        deadline_at: record.deadline_ms.map(time),
+        expires_at: record.expires_ms.map(time),
+        estimate_ms: finite(record.estimate_ms),
+        remaining_ms: job.remaining_ms.filter(|ms| ms.is_finite()),
+        links: JobLinks {
+            this: format!("/v1/jobs/{id}"),
+            result: format!("/v1/jobs/{id}/result"),
+            events: format!("/v1/jobs/{id}/events"),
+            cancel: format!("/v1/jobs/{id}"),
+        },
+        problem: job.problem.clone().map(|problem| Problem::from(problem).document(language, None)),
+    }
+}
+
+/// A job as a response.
+fn answered(job: &Job, status: StatusCode, language: Language) -> Response {
+    let body = serde_json::to_vec(&document(job, language)).expect("a job has only finite numbers and words");
+    let mut response = Response::new(body.into());
+    *response.status_mut() = status;
+    let headers = response.headers_mut();
+    headers.insert(CONTENT_TYPE, HeaderValue::from_static("application/json"));
+    headers.insert(CONTENT_LANGUAGE, HeaderValue::from_static(language.tag()));
+    headers.insert(CACHE_CONTROL, HeaderValue::from_static("no-store"));
+    if !job.record.state.is_final() {
+        headers.insert(RETRY_AFTER, HeaderValue::from(job.retry_after().as_secs().max(1)));
+    }
+    response
+}
+
+/// The answer to a request that became a job.
+pub(super) fn accepted(job: &Job, preference: Preference, language: Language) -> Response {
+    let mut response = answered(job, StatusCode::ACCEPTED, language);
+    let location = HeaderValue::try_from(format!("/v1/jobs/{}", job.record.id)).expect("an id is visible ASCII");
+    response.headers_mut().insert(LOCATION, location);
+    apply(&mut response, preference);
+    response
+}
+
+/// Says which preferences were followed.
+pub(super) fn apply(response: &mut Response, preference: Preference) {
+    if let Some(applied) = preference.applied() {
+        let applied = HeaderValue::try_from(applied).expect("preferences are words and numbers");
+        response.headers_mut().insert(PREFERENCE_APPLIED, applied);
+    }
+}
+
+/// The query of the list.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ListQuery {
+    state: Option<String>,
+    calculator: Option<String>,
+    limit: Option<u32>,
+    after: Option<String>,
+}
+
+/// `GET /v1/jobs`
+pub(super) async fn list(State(app): State<App>, uri: Uri, headers: HeaderMap) -> Result<Response, Problem> {
+    let Query(query) = Query::<ListQuery>::try_from_uri(&uri).map_err(|error| Problem::query(error.body_text()))?;
+    let limit = query.limit.unwrap_or(DEFAULT_ITEMS);
+    if !(1..=MOST_ITEMS).contains(&limit) {
+        return Err(Problem::query(format!("limit {limit} is not between 1 and {MOST_ITEMS}")));
+    }
+    if let Some(id) = &query.calculator
+        && app.engine.entry(id).is_none()
+    {
+        return Err(Error::unknown(app.engine.registry(), id).into());
+    }
+    let state = query.state.as_deref().map(|word| {
+        let known: Vec<_> = JobState::ALL.iter().map(|state| state.word()).collect();
+        JobState::of_word(word).ok_or_else(|| Problem::query(format!("state {word} is none of {}", known.join(", "))))
+    });
+    let before = query.after.as_deref().map(|text| {
+        text.parse().map_err(|_| Problem::query("after: take it from `next` of the page before".to_owned()))
+    });
+    let (state, before) = (state.transpose()?, before.transpose()?);
+    let (jobs, next) = app.engine.jobs(JobQuery { state, calculator: query.calculator.clone(), limit, before }).await?;
+    let filter = state.map(|state| format!("&state={}", state.word())).unwrap_or_default()
+        + &query.calculator.map(|id| format!("&calculator={id}")).unwrap_or_default();
+    let language = negotiate::language(&headers);
+    let list = JobList {
+        items: jobs.iter().map(|job| document(job, language)).collect(),
+        next: next.map(|next| format!("/v1/jobs?limit={limit}{filter}&after={next}")),
+    };
+    let body = serde_json::to_vec(&list).expect("jobs have only finite numbers and words");
+    let mut response = Response::new(body.into());
+    let headers = response.headers_mut();
+    headers.insert(CONTENT_TYPE, HeaderValue::from_static("application/json"));
+    headers.insert(CONTENT_LANGUAGE, HeaderValue::from_static(language.tag()));
+    headers.insert(CACHE_CONTROL, HeaderValue::from_static("no-store"));
+    Ok(response)
+}
+
+/// The job that an address names.
+pub(super) fn named(id: &str) -> Result<JobId, Problem> {
+    id.parse().map_err(|_| Problem::missing("unknown_job", id))
+}
+
+/// `GET /v1/jobs/{id}`
+pub(super) async fn read(
+    State(app): State<App>,
+    Path(id): Path<String>,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    let job = app.engine.job(named(&id)?).await?;
+    Ok(answered(&job, StatusCode::OK, negotiate::language(&headers)))
+}
+
+/// `DELETE /v1/jobs/{id}`
+pub(super) async fn cancel(
+    State(app): State<App>,
+    Path(id): Path<String>,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    let (job, before) = app.engine.cancel(named(&id)?).await?;
+    let status = if before == JobState::Running { StatusCode::ACCEPTED } else { StatusCode::OK };
+    Ok(answered(&job, status, negotiate::language(&headers)))
+}
+
+/// `GET /v1/jobs/{id}/result`
+pub(super) async fn result(
+    State(app): State<App>,
+    Path(id): Path<String>,
+    uri: Uri,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    let stored = app.engine.job_result(named(&id)?).await?;
+    let meta = stored.entry().meta();
+    let view = View::of(&uri, &headers, meta, &answer::offered(meta))?;
+    let mut response = answer::respond(stored.clone(), view, &headers).await?;
+    answer::describe(&mut response, &stored, CacheState::Hit, &Timings::default());
+    Ok(response)
+}

@@ -1,0 +1,397 @@
+//! Jobs as they are kept: what was asked, how far it is, how it ended; and the queue that says which runs next.
+//!
+//! The truth about a job is its record. The queue only says who runs which job and when again, so that it may lose or
+//! repeat a task without harm: a task for a job that does not wait is nothing.
+
+use std::fmt;
+use std::str::FromStr;
+use std::sync::Arc;
+
+use bytes::Bytes;
+use futures_util::future::BoxFuture;
+use tokio::sync::watch;
+use uuid::Uuid;
+
+use super::{KeptResult, StoreError};
+use crate::key::Key;
+
+/// A job's name, in the order of time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct JobId(Uuid);
+
+impl JobId {
+    /// A new one, after all before.
+    pub fn new() -> Self {
+        Self(Uuid::now_v7())
+    }
+}
+
+impl Default for JobId {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl fmt::Display for JobId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(&self.0.hyphenated(), f)
+    }
+}
+
+impl FromStr for JobId {
+    type Err = uuid::Error;
+    fn from_str(text: &str) -> Result<Self, uuid::Error> {
+        Uuid::try_parse(text).map(Self)
+    }
+}
+
+/// The right to run a computation: whoever has lost it cannot write any more.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Lease(Uuid);
+
+impl Lease {
+    /// A new one.
+    pub fn new() -> Self {
+        Self(Uuid::now_v7())
+    }
+}
+
+impl Default for Lease {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl fmt::Display for Lease {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(&self.0.simple(), f)
+    }
+}
+
+impl FromStr for Lease {
+    type Err = uuid::Error;
+    fn from_str(text: &str) -> Result<Self, uuid::Error> {
+        Uuid::try_parse(text).map(Self)
+    }
+}
+
+macro_rules! words {
+    ($(#[$about:meta])* $name:ident { $($(#[$each:meta])* $variant:ident = $word:literal),+ $(,)? }) => {
+        $(#[$about])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        pub enum $name { $($(#[$each])* $variant),+ }
+
+        impl $name {
+            /// All of them.
+            pub const ALL: &'static [Self] = &[$(Self::$variant),+];
+
+            /// As it is written.
+            pub const fn word(self) -> &'static str {
+                match self { $(Self::$variant => $word),+ }
+            }
+
+            /// The one that is written so.
+            pub fn of_word(word: &str) -> Option<Self> {
+                Self::ALL.iter().copied().find(|known| known.word() == word)
+            }
+        }
+    };
+}
+
+words! {
+    /// What a job computes.
+    JobKind {
+        /// One answer of one calculator.
+        Calculation = "calculation",
+        /// Many answers of one calculator.
+        Study = "study",
+    }
+}
+
+words! {
+    /// How far a job is.
+    JobState {
+        /// It waits.
+        Queued = "queued",
+        /// It is computed.
+        Running = "running",
+        /// It has its result.
+        Succeeded = "succeeded",
+        /// It has none and says why.
+        Failed = "failed",
+        /// Nobody wants it any more.
+        Cancelled = "cancelled",
+    }
+}
+
+impl JobState {
+    /// Whether nothing more will happen to it.
+    pub const fn is_final(self) -> bool {
+        matches!(self, Self::Succeeded | Self::Failed | Self::Cancelled)
+    }
+}
+
+words! {
+    /// Which jobs go first.
+    Priority {
+        /// When nothing else waits.
+        Low = "low",
+        /// As all others.
+        Normal = "normal",
+        /// Before all others.
+        High = "high",
+    }
+}
+
+/// A job to be accepted.
+#[derive(Debug, Clone)]
+pub struct NewJob {
+    /// Its name.
+    pub id: JobId,
+    /// What it computes.
+    pub kind: JobKind,
+    /// By which calculator.
+    pub calculator: String,
+    /// Which version of it.
+    pub version: u32,
+    /// Address of its result.
+    pub key: Key,
+    /// All that is needed to run it.
+    pub input: Bytes,
+    /// How soon.
+    pub priority: Priority,
+    /// Who asks.
+    pub owner: String,
+    /// The client's own name for the request.
+    pub idempotency: Option<Idempotency>,
+    /// Estimated work, ms.
+    pub estimate_ms: f64,
+    /// When it is of no use any more, ms UTC.
+    pub deadline_ms: Option<i64>,
+    /// Its result, where it is there already.
+    pub result: Option<KeptResult>,
+}
+
+/// A client's own name for a request, with the hash of what it asked.
+#[derive(Debug, Clone)]
+pub struct Idempotency {
+    /// The name.
+    pub key: String,
+    /// The hash.
+    pub body_hash: [u8; 32],
+}
+
+/// A job's record, without its input.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JobRecord {
+    /// Its name.
+    pub id: JobId,
+    /// What it computes.
+    pub kind: JobKind,
+    /// By which calculator.
+    pub calculator: String,
+    /// Address of its result.
+    pub key: Key,
+    /// How far it is.
+    pub state: JobState,
+    /// What it was doing when that was last written, as JSON.
+    pub stage: Option<String>,
+    /// How far it was then, 0 to 1.
+    pub progress: f64,
+    /// Starts charged.
+    pub attempt: u32,
+    /// Who runs it.
+    pub lease: Option<Lease>,
+    /// How soon.
+    pub priority: Priority,
+    /// Why it failed, as JSON.
+    pub problem: Option<String>,
+    /// Estimated work, ms.
+    pub estimate_ms: f64,
+    /// Times, ms UTC.
+    pub created_ms: i64,
+    /// When it was started last.
+    pub started_ms: Option<i64>,
+    /// When it ended.
+    pub finished_ms: Option<i64>,
+    /// When it is of no use any more.
+    pub deadline_ms: Option<i64>,
+    /// When its result may go.
+    pub expires_ms: Option<i64>,
+}
+
+/// What came of a new job.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Accepted {
+    /// It is on record.
+    New(JobRecord),
+    /// The client asked the same before, by the same name.
+    Known(JobRecord),
+    /// The client asked something else by the same name.
+    OtherBody(JobId),
+    /// Too many wait.
+    QueueFull {
+        /// How many.
+        queued: u64,
+    },
+}
+
+/// A computation to run.
+#[derive(Debug, Clone)]
+pub struct Claim {
+    /// The right to.
+    pub lease: Lease,
+    /// All jobs that it serves.
+    pub jobs: Vec<JobId>,
+    /// What it computes.
+    pub kind: JobKind,
+    /// By which calculator.
+    pub calculator: String,
+    /// All that is needed.
+    pub input: Bytes,
+    /// Starts charged, this one among them.
+    pub attempt: u32,
+    /// Estimated work, ms.
+    pub estimate_ms: f64,
+}
+
+/// What came of a task.
+#[derive(Debug, Clone)]
+pub enum Claimed {
+    /// Run this.
+    Run(Claim),
+    /// It has taken its last process with it: these jobs failed.
+    Poisonous(Vec<JobId>),
+    /// Nothing waits there.
+    Nothing,
+}
+
+/// How a computation ended.
+#[derive(Debug, Clone)]
+pub enum Ending {
+    /// With a result.
+    Succeeded(KeptResult),
+    /// Without; why, as JSON.
+    Failed(String),
+}
+
+/// Jobs that changed, and computations that nobody wants any more.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Changed {
+    /// The jobs.
+    pub jobs: Vec<JobId>,
+    /// The computations.
+    pub unwanted: Vec<Lease>,
+}
+
+/// What came of a cancel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cancelled {
+    /// The job now.
+    pub job: JobRecord,
+    /// Its state before.
+    pub before: JobState,
+    /// The computation that nobody wants any more.
+    pub unwanted: Option<Lease>,
+}
+
+/// How far a computation is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Beat {
+    /// Which.
+    pub lease: Lease,
+    /// How far, 0 to 1.
+    pub progress: f64,
+    /// What it is doing, as JSON.
+    pub stage: Option<String>,
+}
+
+/// What a list of jobs asks for.
+#[derive(Debug, Clone, Default)]
+pub struct JobQuery {
+    /// Only those in this state.
+    pub state: Option<JobState>,
+    /// Only those of this calculator.
+    pub calculator: Option<String>,
+    /// At most so many.
+    pub limit: u32,
+    /// Only those before this one.
+    pub before: Option<JobId>,
+}
+
+/// A page of the list, newest first.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct JobPage {
+    /// The jobs.
+    pub items: Vec<JobRecord>,
+    /// Where the next page begins, if there is one.
+    pub next: Option<JobId>,
+}
+
+/// How many jobs are in which state.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct JobCounts {
+    /// Waiting.
+    pub queued: u64,
+    /// Being computed.
+    pub running: u64,
+}
+
+/// What a job took.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Timing {
+    /// By which calculator.
+    pub calculator: String,
+    /// Which version.
+    pub version: u32,
+    /// What was estimated, ms.
+    pub predicted_ms: f64,
+    /// What it took, ms.
+    pub actual_ms: f64,
+}
+
+/// What runs a task. It never fails: whatever comes of a job stands on its record.
+pub type RunTask = Arc<dyn Fn(JobId) -> BoxFuture<'static, ()> + Send + Sync>;
+
+/// Tells which computations this process runs, at the moment of asking.
+pub type Live = Arc<dyn Fn() -> Vec<Lease> + Send + Sync>;
+
+/// Where jobs are kept and queued. What it has said yes to survives the process.
+pub trait JobStore: Send + Sync + 'static {
+    /// Puts a job on record and in line, both or neither; refused with more than `queue_limit` waiting.
+    fn submit(&self, job: NewJob, queue_limit: u64) -> BoxFuture<'_, Result<Accepted, StoreError>>;
+    /// A job's record.
+    fn job(&self, id: JobId) -> BoxFuture<'_, Result<Option<JobRecord>, StoreError>>;
+    /// The jobs, newest first.
+    fn jobs(&self, query: JobQuery) -> BoxFuture<'_, Result<JobPage, StoreError>>;
+    /// How many wait and run.
+    fn counts(&self) -> BoxFuture<'_, Result<JobCounts, StoreError>>;
+    /// Starts charged to the job's computation so far, if it waits.
+    fn waiting_attempts(&self, id: JobId) -> BoxFuture<'_, Result<Option<u32>, StoreError>>;
+    /// Takes the job and all equal ones that wait under a lease, and charges them one start; fails them, with
+    /// `problem`, if they have been charged `most` already.
+    fn claim(&self, id: JobId, lease: Lease, most: u32, problem: String) -> BoxFuture<'_, Result<Claimed, StoreError>>;
+    /// Ends a computation and all jobs that still want it; which these are.
+    fn finish(&self, lease: Lease, ending: Ending) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>>;
+    /// Puts a computation back in line without a charge.
+    fn release(&self, lease: Lease) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>>;
+    /// Ends one job without a result.
+    fn cancel(&self, id: JobId) -> BoxFuture<'_, Result<Option<Cancelled>, StoreError>>;
+    /// Puts a job whose result is damaged back in line.
+    fn redo(&self, id: JobId) -> BoxFuture<'_, Result<(), StoreError>>;
+    /// Notes how far computations are; which of them nobody wants any more.
+    fn beat(&self, beats: Vec<Beat>) -> BoxFuture<'_, Result<Vec<Lease>, StoreError>>;
+    /// Fails, with `problem`, what is past its deadline; and when the next deadline is, ms UTC.
+    fn expire_deadlines(&self, problem: String) -> BoxFuture<'_, Result<(Changed, Option<i64>), StoreError>>;
+    /// Puts back in line what nobody runs (`live` tells the computations of this process, those about to be claimed
+    /// among them), and in the queue what waits and is not there.
+    fn sweep(&self, live: Live) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>>;
+    /// Forgets jobs whose time is over.
+    fn forget_expired(&self) -> BoxFuture<'_, Result<u64, StoreError>>;
+    /// Notes what a job took.
+    fn note_timing(&self, timing: Timing) -> BoxFuture<'_, Result<(), StoreError>>;
+    /// The latest timings, newest first, at most `limit`.
+    fn timings(&self, limit: u32) -> BoxFuture<'_, Result<Vec<Timing>, StoreError>>;
+    /// Takes tasks out of the queue, at most `places` at a time, until `stop` says so; returns when the last has ended.
+    fn work(&self, places: usize, run: RunTask, stop: watch::Receiver<bool>) -> BoxFuture<'static, ()>;
+}

@@ -1,0 +1,122 @@
+//! What is done from time to time, and at the start.
+
+use sqlx::sqlite::{SqliteConnection, SqlitePool};
+
+use super::record::{Outcome, ids, json_list, parsed};
+use super::run::{requeue, unwanted};
+use crate::store::jobs::{Changed, JobId, Lease, Timing};
+use crate::store::queue;
+
+/// Timings kept of each calculator.
+const TIMINGS: i64 = 1000;
+/// A finished job's record outlives its result by this share of the time that the result is kept.
+const TOMBSTONE: i64 = 1;
+/// Jobs forgotten in one transaction.
+const FORGOTTEN_AT_ONCE: i64 = 500;
+
+pub(super) async fn expire_deadlines(
+    connection: &mut SqliteConnection,
+    problem: &str,
+    keep_ms: i64,
+    now: i64,
+) -> Outcome<(Changed, Option<i64>)> {
+    let late: Vec<(String, Option<String>)> = sqlx::query_as(
+        "SELECT id, lease FROM precut_jobs INDEXED BY precut_jobs_by_deadline
+         WHERE deadline_ms IS NOT NULL AND deadline_ms <= ?1 AND state IN ('queued', 'running')",
+    )
+    .bind(now)
+    .fetch_all(&mut *connection)
+    .await?;
+    for (id, _) in &late {
+        sqlx::query(
+            "UPDATE precut_jobs SET state = 'failed', problem = ?2, lease = NULL, heartbeat_ms = NULL, stage = NULL,
+                 finished_ms = ?3, expires_ms = ?4 WHERE id = ?1",
+        )
+        .bind(id)
+        .bind(problem)
+        .bind(now)
+        .bind(now.saturating_add(keep_ms))
+        .execute(&mut *connection)
+        .await?;
+    }
+    let jobs = late.iter().map(|(id, _)| parsed(id)).collect::<Outcome<Vec<JobId>>>()?;
+    let leases: Vec<String> = late.into_iter().filter_map(|(_, lease)| lease).collect();
+    let unwanted = if leases.is_empty() { Vec::new() } else { unwanted(connection, &leases).await? };
+    let next = sqlx::query_scalar(
+        "SELECT min(deadline_ms) FROM precut_jobs INDEXED BY precut_jobs_by_deadline
+         WHERE deadline_ms IS NOT NULL AND state IN ('queued', 'running')",
+    )
+    .fetch_one(connection)
+    .await?;
+    Ok((Changed { jobs, unwanted }, next))
+}
+
+pub(super) async fn sweep(connection: &mut SqliteConnection, live: &[Lease]) -> Outcome<Vec<JobId>> {
+    let stale: Vec<String> = sqlx::query_scalar(
+        "SELECT DISTINCT lease FROM precut_jobs
+         WHERE state = 'running' AND lease NOT IN (SELECT value FROM json_each(?1))",
+    )
+    .bind(json_list(live))
+    .fetch_all(&mut *connection)
+    .await?;
+    let mut back = if stale.is_empty() { Vec::new() } else { requeue(connection, &json_list(&stale), true).await? };
+    back.extend(ids(&queue::push_lost(connection).await?)?);
+    Ok(back)
+}
+
+pub(super) async fn forget_expired(connection: &mut SqliteConnection, keep_ms: i64, now: i64) -> Outcome<u64> {
+    // First the input, then, much later, the record: that a job was there is known longer than what it gave.
+    sqlx::query(
+        "UPDATE precut_jobs SET input = x'', idempotency = NULL, body_hash = NULL
+         WHERE id IN (SELECT id FROM precut_jobs WHERE expires_ms <= ?1 AND length(input) > 0 LIMIT ?2)",
+    )
+    .bind(now)
+    .bind(FORGOTTEN_AT_ONCE)
+    .execute(&mut *connection)
+    .await?;
+    let gone =
+        sqlx::query("DELETE FROM precut_jobs WHERE id IN (SELECT id FROM precut_jobs WHERE expires_ms <= ?1 LIMIT ?2)")
+            .bind(now.saturating_sub(keep_ms.saturating_mul(TOMBSTONE)))
+            .bind(FORGOTTEN_AT_ONCE)
+            .execute(connection)
+            .await?;
+    Ok(gone.rows_affected())
+}
+
+pub(super) async fn note_timing(connection: &mut SqliteConnection, timing: &Timing, now: i64) -> Outcome<()> {
+    sqlx::query(
+        "INSERT INTO timings (calculator, version, predicted_ms, actual_ms, at_ms) VALUES (?1, ?2, ?3, ?4, ?5)",
+    )
+    .bind(&timing.calculator)
+    .bind(timing.version)
+    .bind(timing.predicted_ms)
+    .bind(timing.actual_ms)
+    .bind(now)
+    .execute(&mut *connection)
+    .await?;
+    sqlx::query(
+        "DELETE FROM timings WHERE calculator = ?1 AND at_ms < (
+             SELECT at_ms FROM timings WHERE calculator = ?1 ORDER BY at_ms DESC LIMIT 1 OFFSET ?2)",
+    )
+    .bind(&timing.calculator)
+    .bind(TIMINGS)
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// What the process before left behind: its running jobs go back in line, and the queue is made anew from the records.
+pub(in crate::store) async fn recover(pool: &SqlitePool) -> Outcome<u64> {
+    let mut transaction = pool.begin_with("BEGIN IMMEDIATE").await?;
+    let orphans: Vec<String> = sqlx::query_scalar("SELECT DISTINCT lease FROM precut_jobs WHERE state = 'running'")
+        .fetch_all(&mut *transaction)
+        .await?;
+    queue::empty(&mut transaction).await?;
+    let mut count = 0;
+    if !orphans.is_empty() {
+        count = requeue(&mut transaction, &json_list(&orphans), true).await?.len();
+    }
+    queue::push_lost(&mut transaction).await?;
+    transaction.commit().await?;
+    Ok(count as u64)
+}

@@ -1,0 +1,234 @@
+//! Jobs in the SQLite file. The functions below work inside a transaction of the ledger.
+
+mod care;
+mod line;
+mod pack;
+mod record;
+mod run;
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+
+use futures_util::future::BoxFuture;
+use sqlx::QueryBuilder;
+use sqlx::sqlite::Sqlite;
+use tokio::sync::watch;
+
+use super::jobs::{
+    Accepted, Beat, Cancelled, Changed, Claimed, Ending, JobCounts, JobId, JobPage, JobQuery, JobRecord, JobStore,
+    Lease, Live, NewJob, RunTask, Timing,
+};
+use super::queue::{self, Tasks};
+use super::sqlite::SqliteStore;
+use super::{StoreError, now_ms};
+pub(super) use care::recover;
+use care::{expire_deadlines, forget_expired, note_timing, sweep};
+use line::submit;
+use pack::{PackedEnding, packed, packed_ending};
+use record::{Outcome, RecordRow, columns, json_list, record};
+use run::{beat, cancel, claim, finish, redo, requeue};
+
+impl SqliteStore {
+    async fn finish_job(&self, lease: Lease, ending: Ending) -> Result<Vec<JobId>, StoreError> {
+        let keep_ms = self.keep_ms;
+        let ending = Arc::new(packed_ending(ending).await?);
+        let written = Arc::clone(&ending);
+        let jobs = self
+            .ledger
+            .write(move |connection| {
+                let ending = Arc::clone(&ending);
+                Box::pin(async move { finish(connection, lease, &ending, keep_ms, now_ms()).await })
+            })
+            .await?;
+        if let PackedEnding::Succeeded(row) = &*written
+            && !jobs.is_empty()
+        {
+            self.kept(&row.key, row.bytes());
+        }
+        Ok(jobs)
+    }
+
+    async fn submit_job(&self, job: NewJob, queue_limit: u64) -> Result<Accepted, StoreError> {
+        let keep_ms = self.keep_ms;
+        let packed = Arc::new(packed(job).await?);
+        let written = Arc::clone(&packed);
+        let accepted = self
+            .ledger
+            .write(move |connection| {
+                let packed = Arc::clone(&packed);
+                Box::pin(async move { submit(connection, &packed, queue_limit, keep_ms, now_ms()).await })
+            })
+            .await?;
+        if let (Accepted::New(_), Some(row)) = (&accepted, &written.result) {
+            self.kept(&row.key, row.bytes());
+        }
+        self.tasks.wake();
+        Ok(accepted)
+    }
+
+    async fn list_jobs(&self, query: JobQuery) -> Result<JobPage, StoreError> {
+        let mut statement = QueryBuilder::<Sqlite>::new(concat!("SELECT ", columns!(), " FROM precut_jobs WHERE true"));
+        if let Some(state) = query.state {
+            statement.push(" AND state = ").push_bind(state.word());
+        }
+        if let Some(calculator) = query.calculator {
+            statement.push(" AND calculator = ").push_bind(calculator);
+        }
+        if let Some(before) = query.before {
+            statement.push(" AND id < ").push_bind(before.to_string());
+        }
+        // One more than asked for tells whether there is another page.
+        statement.push(" ORDER BY id DESC LIMIT ").push_bind(i64::from(query.limit) + 1);
+        let rows: Vec<RecordRow> = statement.build_query_as().fetch_all(&self.readers).await?;
+        let mut items = rows.into_iter().map(RecordRow::record).collect::<Outcome<Vec<_>>>()?;
+        let more = items.len() > query.limit as usize;
+        items.truncate(query.limit as usize);
+        let next = items.last().filter(|_| more).map(|last| last.id);
+        Ok(JobPage { items, next })
+    }
+
+    async fn count_jobs(&self) -> Result<JobCounts, StoreError> {
+        let count = |state: &'static str| async move {
+            let count: i64 = sqlx::query_scalar("SELECT count(*) FROM precut_jobs WHERE state = ?1")
+                .bind(state)
+                .fetch_one(&self.readers)
+                .await?;
+            Ok::<_, StoreError>(u64::try_from(count).unwrap_or(0))
+        };
+        Ok(JobCounts { queued: count("queued").await?, running: count("running").await? })
+    }
+}
+
+impl JobStore for SqliteStore {
+    fn submit(&self, job: NewJob, queue_limit: u64) -> BoxFuture<'_, Result<Accepted, StoreError>> {
+        Box::pin(self.submit_job(job, queue_limit))
+    }
+    fn job(&self, id: JobId) -> BoxFuture<'_, Result<Option<JobRecord>, StoreError>> {
+        Box::pin(async move {
+            let mut reader = self.readers.acquire().await?;
+            Ok(record(&mut reader, id).await?)
+        })
+    }
+    fn jobs(&self, query: JobQuery) -> BoxFuture<'_, Result<JobPage, StoreError>> {
+        Box::pin(self.list_jobs(query))
+    }
+    fn counts(&self) -> BoxFuture<'_, Result<JobCounts, StoreError>> {
+        Box::pin(self.count_jobs())
+    }
+    fn waiting_attempts(&self, id: JobId) -> BoxFuture<'_, Result<Option<u32>, StoreError>> {
+        Box::pin(async move {
+            let attempts = sqlx::query_scalar(
+                "SELECT max(other.attempt) FROM precut_jobs AS one JOIN precut_jobs AS other USING (key)
+                 WHERE one.id = ?1 AND one.state = 'queued' AND other.state = 'queued'",
+            )
+            .bind(id.to_string())
+            .fetch_one(&self.readers)
+            .await?;
+            Ok(attempts)
+        })
+    }
+    fn claim(&self, id: JobId, lease: Lease, most: u32, problem: String) -> BoxFuture<'_, Result<Claimed, StoreError>> {
+        let keep_ms = self.keep_ms;
+        Box::pin(self.ledger.write(move |connection| {
+            let problem = problem.clone();
+            Box::pin(async move { claim(connection, id, lease, (most, &problem), keep_ms, now_ms()).await })
+        }))
+    }
+    fn finish(&self, lease: Lease, ending: Ending) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>> {
+        Box::pin(self.finish_job(lease, ending))
+    }
+    fn release(&self, lease: Lease) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>> {
+        Box::pin(
+            self.ledger.write(move |connection| {
+                Box::pin(async move { requeue(connection, &json_list(&[lease]), false).await })
+            }),
+        )
+    }
+    fn cancel(&self, id: JobId) -> BoxFuture<'_, Result<Option<Cancelled>, StoreError>> {
+        let keep_ms = self.keep_ms;
+        Box::pin(
+            self.ledger
+                .write(move |connection| Box::pin(async move { cancel(connection, id, keep_ms, now_ms()).await })),
+        )
+    }
+    fn redo(&self, id: JobId) -> BoxFuture<'_, Result<(), StoreError>> {
+        Box::pin(async move {
+            self.ledger.write(move |connection| Box::pin(redo(connection, id))).await?;
+            self.tasks.wake();
+            Ok(())
+        })
+    }
+    fn beat(&self, beats: Vec<Beat>) -> BoxFuture<'_, Result<Vec<Lease>, StoreError>> {
+        Box::pin(self.ledger.write(move |connection| {
+            let beats = beats.clone();
+            Box::pin(async move { beat(connection, &beats, now_ms()).await })
+        }))
+    }
+    fn expire_deadlines(&self, problem: String) -> BoxFuture<'_, Result<(Changed, Option<i64>), StoreError>> {
+        let keep_ms = self.keep_ms;
+        Box::pin(self.ledger.write(move |connection| {
+            let problem = problem.clone();
+            Box::pin(async move { expire_deadlines(connection, &problem, keep_ms, now_ms()).await })
+        }))
+    }
+    fn sweep(&self, live: Live) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>> {
+        Box::pin(async move {
+            let back = self
+                .ledger
+                .write(move |connection| {
+                    let live = Arc::clone(&live);
+                    // Asked here, where no claim can come between asking and looking.
+                    Box::pin(async move { sweep(connection, &live()).await })
+                })
+                .await?;
+            if !back.is_empty() {
+                self.tasks.wake();
+            }
+            Ok(back)
+        })
+    }
+    fn forget_expired(&self) -> BoxFuture<'_, Result<u64, StoreError>> {
+        let keep_ms = self.keep_ms;
+        Box::pin(self.ledger.write(move |connection| {
+            Box::pin(async move {
+                queue::forget_done(connection).await?;
+                forget_expired(connection, keep_ms, now_ms()).await
+            })
+        }))
+    }
+    fn note_timing(&self, timing: Timing) -> BoxFuture<'_, Result<(), StoreError>> {
+        Box::pin(self.ledger.write(move |connection| {
+            let timing = timing.clone();
+            Box::pin(async move { note_timing(connection, &timing, now_ms()).await })
+        }))
+    }
+    fn timings(&self, limit: u32) -> BoxFuture<'_, Result<Vec<Timing>, StoreError>> {
+        Box::pin(async move {
+            let rows: Vec<(String, u32, f64, f64)> = sqlx::query_as(
+                "SELECT calculator, version, predicted_ms, actual_ms FROM timings ORDER BY at_ms DESC LIMIT ?1",
+            )
+            .bind(limit)
+            .fetch_all(&self.readers)
+            .await?;
+            let timing = |(calculator, version, predicted_ms, actual_ms)| Timing {
+                calculator,
+                version,
+                predicted_ms,
+                actual_ms,
+            };
+            Ok(rows.into_iter().map(timing).collect())
+        })
+    }
+    fn work(&self, places: usize, run: RunTask, stop: watch::Receiver<bool>) -> BoxFuture<'static, ()> {
+        Box::pin(Tasks::work(self.tasks.clone(), places, run, stop))
+    }
+}
+
+impl SqliteStore {
+    /// A result was written beside the group writer.
+    fn kept(&self, key: &[u8], bytes: i64) {
+        self.keys.add(key);
+        self.writer.added(bytes);
+    }
+}

@@ -1,0 +1,67 @@
+//! Parts of studies in the SQLite file.
+
+use bytes::Bytes;
+
+use super::sqlite::SqliteStore;
+use super::{StoreError, now_ms};
+use crate::key::Key;
+
+/// Fast: what is put down is hardly ever read again.
+const LEVEL: i32 = 1;
+
+impl SqliteStore {
+    /// Puts a part of a study down. What was put before, the results of its points, is on the disk by then.
+    pub(super) async fn put_down_shard(&self, study: Key, shard: u32, content: Bytes) -> Result<(), StoreError> {
+        let packed = zstd::bulk::compress(&content, LEVEL).map_err(|error| StoreError::Failed(error.to_string()))?;
+        let checksum = blake3::hash(&packed);
+        self.writer.flush().await;
+        self.ledger
+            .write(move |connection| {
+                let packed = packed.clone();
+                Box::pin(async move {
+                    sqlx::query(
+                        "INSERT INTO studies (study, shard, points, checksum, created_ms) VALUES (?1, ?2, ?3, ?4, ?5)
+                         ON CONFLICT DO UPDATE SET points = excluded.points, checksum = excluded.checksum",
+                    )
+                    .bind(study.as_bytes().as_slice())
+                    .bind(shard)
+                    .bind(packed)
+                    .bind(checksum.as_bytes().as_slice())
+                    .bind(now_ms())
+                    .execute(connection)
+                    .await?;
+                    Ok(())
+                })
+            })
+            .await
+    }
+
+    /// The parts of a study that are done. One that is damaged is none.
+    pub(super) async fn shards_of(&self, study: Key) -> Result<Vec<(u32, Bytes)>, StoreError> {
+        let rows: Vec<(u32, Vec<u8>, Vec<u8>)> =
+            sqlx::query_as("SELECT shard, points, checksum FROM studies WHERE study = ?1 ORDER BY shard")
+                .bind(study.as_bytes().as_slice())
+                .fetch_all(&self.readers)
+                .await?;
+        let sound =
+            rows.into_iter().filter(|(_, packed, checksum)| blake3::hash(packed).as_bytes() == checksum.as_slice());
+        Ok(sound.filter_map(|(shard, packed, _)| Some((shard, zstd::decode_all(&*packed).ok()?.into()))).collect())
+    }
+
+    /// Forgets the parts of a study, and those of studies that nobody took up again for as long as jobs are kept.
+    pub(super) async fn forget_shards_of(&self, study: Key) -> Result<(), StoreError> {
+        let before = now_ms().saturating_sub(self.keep_ms);
+        self.ledger
+            .write(move |connection| {
+                Box::pin(async move {
+                    sqlx::query("DELETE FROM studies WHERE study = ?1 OR created_ms < ?2")
+                        .bind(study.as_bytes().as_slice())
+                        .bind(before)
+                        .execute(connection)
+                        .await?;
+                    Ok(())
+                })
+            })
+            .await
+    }
+}

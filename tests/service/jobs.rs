@@ -1,0 +1,426 @@
+//! Jobs over HTTP: accepted, watched, cancelled, answered.
+
+use std::time::{Duration, Instant};
+
+use precut::config::ApiKey;
+use precut::http::auth;
+use reqwest::{RequestBuilder, Response};
+use serde_json::{Value, json};
+
+use crate::support::{Server, header, problem, toy};
+
+/// A job that is computed for so long, another one for each length.
+pub fn lasting(length_mm: u32, duration_ms: u32) -> String {
+    json!({"length_mm": length_mm, "load_n": 1, "duration_ms": duration_ms}).to_string()
+}
+
+/// Long enough to become a job by itself.
+fn slow(length_mm: u32) -> String {
+    lasting(length_mm, 600)
+}
+
+/// The job's document, now.
+pub async fn job(server: &Server, address: &str) -> Value {
+    let response = server.get(address).send().await.unwrap();
+    assert_eq!(response.status(), 200);
+    response.json().await.unwrap()
+}
+
+/// Waits until a job is in one of these states.
+pub async fn until(server: &Server, address: &str, states: &[&str]) -> Value {
+    let start = Instant::now();
+    loop {
+        let job = job(server, address).await;
+        if states.contains(&job["state"].as_str().unwrap()) {
+            return job;
+        }
+        assert!(start.elapsed() < Duration::from_secs(20), "{job:#}");
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+}
+
+/// Sends a job that shall be done behind; its address.
+pub async fn sent(server: &Server, body: String) -> String {
+    let response = server.post(body).header("prefer", "respond-async").send().await.unwrap();
+    assert_eq!(response.status(), 202);
+    header(&response, "location").to_owned()
+}
+
+#[tokio::test]
+async fn a_long_job_is_accepted_computed_and_read() {
+    let server = Server::start().await;
+    let response = server.post(slow(100)).send().await.unwrap();
+    assert_eq!(response.status(), 202);
+    let address = header(&response, "location").to_owned();
+    assert!(header(&response, "retry-after").parse::<u32>().unwrap() >= 1);
+    assert_eq!(header(&response, "cache-control"), "no-store");
+    let accepted: Value = response.json().await.unwrap();
+    assert_eq!(accepted["links"]["self"], address.as_str());
+    assert_eq!(accepted["calculator"], toy::BAR);
+    assert_eq!(accepted["finished_at"], Value::Null);
+    let early = server.get(&format!("{address}/result")).send().await.unwrap();
+    assert!(!header(&early, "retry-after").is_empty());
+    problem(early, 409, "job_not_finished").await;
+    let running = until(&server, &address, &["running"]).await;
+    assert_eq!(running["attempt"], 1);
+    let done = until(&server, &address, &["succeeded"]).await;
+    assert_eq!(done["progress"], 1.0);
+    assert!(done["expires_at"].is_string() && done["problem"].is_null());
+    let result: Response = server.get(&format!("{address}/result")).send().await.unwrap();
+    assert_eq!(result.status(), 200);
+    let place = header(&result, "content-location").to_owned();
+    let result = result.bytes().await.unwrap();
+    assert_eq!(place, format!("/v1/results/{}", done["key"].as_str().unwrap()));
+    // The same bytes as the direct answer, and as the kept result.
+    let again = server.post(slow(100)).send().await.unwrap();
+    assert_eq!((again.status().as_u16(), header(&again, "precut-cache")), (200, "hit"));
+    assert_eq!(again.bytes().await.unwrap(), result);
+    assert_eq!(server.get(&place).send().await.unwrap().bytes().await.unwrap(), result);
+}
+
+#[tokio::test]
+async fn a_preference_makes_a_job_of_anything_that_is_not_there_already() {
+    let server = Server::start().await;
+    let ask = || server.post(toy::JOB).header("prefer", "respond-async").send();
+    let response = ask().await.unwrap();
+    assert_eq!((response.status().as_u16(), header(&response, "preference-applied")), (202, "respond-async"));
+    let address = header(&response, "location").to_owned();
+    until(&server, &address, &["succeeded"]).await;
+    let response = ask().await.unwrap();
+    assert_eq!((response.status().as_u16(), header(&response, "precut-cache")), (200, "hit"));
+    assert_eq!(header(&response, "preference-applied"), "");
+}
+
+#[tokio::test]
+async fn a_client_may_wait_for_a_job() {
+    let server = Server::start().await;
+    let ask = |body: String, wait: &str| server.post(body).header("prefer", wait.to_owned()).send();
+    let response = ask(slow(200), "wait=20").await.unwrap();
+    assert_eq!((response.status().as_u16(), header(&response, "preference-applied")), (200, "wait=20"));
+    assert_eq!(header(&response, "precut-cache"), "miss");
+    assert!(response.json::<Value>().await.unwrap()["result"]["max_sag_um"].is_number());
+    // A failed job is told at once, with the status of its problem.
+    let body = json!({"length_mm": 202, "load_n": 1, "behaviour": "infeasible"}).to_string();
+    problem(ask(body, "wait=20").await.unwrap(), 422, "bar_would_break").await;
+    let response = ask(lasting(201, 60_000), "wait=1").await.unwrap();
+    assert_eq!((response.status().as_u16(), header(&response, "preference-applied")), (202, "wait=1"));
+}
+
+#[tokio::test]
+async fn a_cancel_stops_the_work_and_is_final() {
+    let server = Server::start().await;
+    let cancel = |address: &str| server.client.delete(server.url(address)).send();
+    let running = sent(&server, lasting(300, 60_000)).await;
+    let waiting = sent(&server, lasting(301, 60_000)).await;
+    until(&server, &running, &["running"]).await;
+    // One core runs one job: the other one waits.
+    let response = cancel(&waiting).await.unwrap();
+    assert_eq!(response.status(), 200);
+    assert_eq!(response.json::<Value>().await.unwrap()["state"], "cancelled");
+    let response = cancel(&running).await.unwrap();
+    assert_eq!(response.status(), 202);
+    let cancelled: Value = response.json().await.unwrap();
+    assert_eq!((cancelled["state"].as_str(), cancelled["stage"].as_str()), (Some("cancelled"), None));
+    // The core is free for the next long before the minute is over.
+    let next = sent(&server, lasting(302, 1)).await;
+    let done = until(&server, &next, &["succeeded"]).await;
+    for address in [&running, &waiting] {
+        problem(server.get(&format!("{address}/result")).send().await.unwrap(), 409, "job_cancelled").await;
+        let again = cancel(address).await.unwrap();
+        assert_eq!(again.status(), 200);
+        assert_eq!(again.json::<Value>().await.unwrap()["state"], "cancelled");
+    }
+    // What is over cannot be cancelled any more.
+    let late = cancel(&next).await.unwrap();
+    assert_eq!(late.status(), 200);
+    assert_eq!(late.json::<Value>().await.unwrap(), done);
+}
+
+#[tokio::test]
+async fn equal_jobs_share_one_computation_until_the_last_is_cancelled() {
+    let server = Server::start().await;
+    let mut addresses = Vec::new();
+    for _ in 0..4 {
+        addresses.push(sent(&server, lasting(400, 1500)).await);
+    }
+    let mut distinct = addresses.clone();
+    distinct.sort();
+    distinct.dedup();
+    assert_eq!(distinct.len(), 4, "each has a name of its own");
+    for address in &addresses {
+        until(&server, address, &["running"]).await;
+    }
+    // One that comes while the others are computed joins them.
+    addresses.push(sent(&server, lasting(400, 1500)).await);
+    assert_eq!(job(&server, &addresses[4]).await["state"], "running");
+    server.client.delete(server.url(&addresses[0])).send().await.unwrap();
+    let mut ends = Vec::new();
+    for address in &addresses[1..] {
+        let done = until(&server, address, &["succeeded"]).await;
+        assert_eq!(done["attempt"], 1);
+        ends.push((done["started_at"].clone(), done["finished_at"].clone(), done["key"].clone()));
+    }
+    ends.dedup();
+    assert_eq!(ends.len(), 1, "one computation: {ends:?}");
+    assert_eq!(job(&server, &addresses[0]).await["state"], "cancelled");
+    // All cancelled: the core is free again.
+    let both = [sent(&server, lasting(401, 60_000)).await, sent(&server, lasting(401, 60_000)).await];
+    for address in &both {
+        until(&server, address, &["running"]).await;
+    }
+    for address in &both {
+        server.client.delete(server.url(address)).send().await.unwrap();
+    }
+    let next = sent(&server, lasting(402, 1)).await;
+    until(&server, &next, &["succeeded"]).await;
+}
+
+#[tokio::test]
+async fn a_request_by_name_is_one_job_however_often_it_is_sent() {
+    let server = Server::start().await;
+    let ask = |body: String, key: &str| server.post(body).header("idempotency-key", key.to_owned()).send();
+    let first = ask(slow(500), "a").await.unwrap();
+    assert_eq!(first.status(), 202);
+    let address = header(&first, "location").to_owned();
+    let second = ask(slow(500), "a").await.unwrap();
+    assert_eq!((second.status().as_u16(), header(&second, "location")), (202, address.as_str()));
+    let other = problem(ask(slow(501), "a").await.unwrap(), 422, "idempotency_key_reused").await;
+    assert!(other["detail"].as_str().unwrap().contains(address.rsplit('/').next().unwrap()));
+    assert_ne!(header(&ask(slow(500), "b").await.unwrap(), "location"), address, "another name, another job");
+    until(&server, &address, &["succeeded"]).await;
+    let third = ask(slow(500), "a").await.unwrap();
+    assert_eq!(third.status(), 200);
+    let jobs: Value = server.get("/v1/jobs").send().await.unwrap().json().await.unwrap();
+    assert_eq!(jobs["items"].as_array().unwrap().len(), 2);
+    // A short one is answered, and is on record all the same.
+    let short = ask(toy::JOB.to_owned(), "c").await.unwrap();
+    assert_eq!((short.status().as_u16(), header(&short, "precut-cache")), (200, "miss"));
+    let again = ask(toy::JOB.to_owned(), "c").await.unwrap();
+    assert_eq!((again.status().as_u16(), header(&again, "precut-cache")), (200, "hit"));
+    let jobs: Value = server.get("/v1/jobs?state=succeeded").send().await.unwrap().json().await.unwrap();
+    assert!(jobs["items"].as_array().unwrap().len() >= 2);
+    for bad in ["a b", ""] {
+        problem(ask(slow(500), bad).await.unwrap(), 400, "bad_idempotency_key").await;
+    }
+}
+
+#[tokio::test]
+async fn a_full_queue_and_a_job_beyond_the_limit_are_refused() {
+    let server = Server::start_with(|config| {
+        config.jobs.queue = 2;
+        config.limits.job_ms = 100_000.0;
+    })
+    .await;
+    let running = sent(&server, lasting(600, 60_000)).await;
+    until(&server, &running, &["running"]).await;
+    let ask = |body: String| server.post(body).header("prefer", "respond-async").send();
+    for length in [601, 602] {
+        assert_eq!(ask(lasting(length, 60_000)).await.unwrap().status(), 202);
+    }
+    let refused = ask(lasting(603, 60_000)).await.unwrap();
+    assert!(header(&refused, "retry-after").parse::<u32>().unwrap() >= 1);
+    problem(refused, 503, "queue_full").await;
+    // What is being computed takes further ones along without a place in the queue.
+    assert_eq!(ask(lasting(600, 60_000)).await.unwrap().status(), 202);
+    let body = json!({"length_mm": 604, "load_n": 1, "work_ms": 200_000}).to_string();
+    let refused = problem(ask(body).await.unwrap(), 422, "too_expensive").await;
+    assert_eq!(refused["errors"][0]["pointer"], "/stations");
+    assert_eq!(refused["errors"][0]["limit"], 100_000.0);
+    // Direct answers go on.
+    assert_eq!(server.post(toy::JOB).send().await.unwrap().status(), 200);
+}
+
+#[tokio::test]
+async fn what_is_not_done_before_its_deadline_fails() {
+    let server = Server::start().await;
+    let ask = |path: &str, body: String| server.post_to(&format!("/v1/{}{path}", toy::BAR), body).send();
+    let first = ask("?deadline_s=0.3", lasting(700, 60_000)).await.unwrap();
+    assert_eq!(first.status(), 202);
+    let running = header(&first, "location").to_owned();
+    let second = ask("?deadline_s=0.4&priority=low", lasting(701, 60_000)).await.unwrap();
+    let waiting = header(&second, "location").to_owned();
+    for address in [&running, &waiting] {
+        let failed = until(&server, address, &["failed"]).await;
+        assert!(failed["deadline_at"].is_string());
+        assert_eq!(failed["problem"]["code"], "deadline_exceeded");
+        problem(server.get(&format!("{address}/result")).send().await.unwrap(), 422, "deadline_exceeded").await;
+    }
+    let next = sent(&server, lasting(702, 1)).await;
+    until(&server, &next, &["succeeded"]).await;
+    // A direct answer has no more time either.
+    let body = json!({"length_mm": 703, "load_n": 1, "behaviour": "slow"}).to_string();
+    problem(ask("?deadline_s=0.05", body).await.unwrap(), 422, "deadline_exceeded").await;
+    for bad in ["?deadline_s=0", "?deadline_s=-1", "?deadline_s=1e99", "?deadline_s=soon", "?priority=urgent"] {
+        problem(ask(bad, toy::JOB.to_owned()).await.unwrap(), 400, "bad_query").await;
+    }
+}
+
+#[tokio::test]
+async fn jobs_are_listed_newest_first_by_pages_and_filtered() {
+    let server = Server::start().await;
+    let mut addresses = Vec::new();
+    for length in 800..805 {
+        addresses.push(sent(&server, lasting(length, 1)).await);
+    }
+    for address in &addresses {
+        until(&server, address, &["succeeded"]).await;
+    }
+    let held = sent(&server, lasting(805, 60_000)).await;
+    until(&server, &held, &["running"]).await;
+    let list = async |path: &str| -> Value { server.get(path).send().await.unwrap().json().await.unwrap() };
+    let whole = list("/v1/jobs").await;
+    let ids = |list: &Value| -> Vec<String> {
+        list["items"].as_array().unwrap().iter().map(|job| job["links"]["self"].as_str().unwrap().to_owned()).collect()
+    };
+    let expected: Vec<String> = addresses.iter().chain([&held]).rev().cloned().collect();
+    assert_eq!((ids(&whole), &whole["next"]), (expected.clone(), &Value::Null));
+    let mut paged = Vec::new();
+    let mut next = "/v1/jobs?limit=4".to_owned();
+    loop {
+        let page = list(&next).await;
+        paged.extend(ids(&page));
+        let Some(more) = page["next"].as_str() else { break };
+        more.clone_into(&mut next);
+    }
+    assert_eq!(paged, expected);
+    assert_eq!(ids(&list("/v1/jobs?state=running").await), [held]);
+    assert_eq!(ids(&list("/v1/jobs?state=succeeded&calculator=sagging-bar&limit=2").await), expected[1..3]);
+    assert_eq!(ids(&list("/v1/jobs?state=failed").await), [""; 0]);
+    for bad in ["limit=0", "limit=501", "state=done", "after=x", "colour=red"] {
+        problem(server.get(&format!("/v1/jobs?{bad}")).send().await.unwrap(), 400, "bad_query").await;
+    }
+    problem(server.get("/v1/jobs?calculator=none").send().await.unwrap(), 404, "unknown_calculator").await;
+}
+
+#[tokio::test]
+async fn an_unknown_job_is_404_whatever_is_asked_of_it() {
+    let server = Server::start().await;
+    for id in ["0198c5f1-8a3e-7c40-b0a1-5e2d9f4c6b7a", "17", "%20"] {
+        for request in [
+            server.get(&format!("/v1/jobs/{id}")),
+            server.get(&format!("/v1/jobs/{id}/result")),
+            server.get(&format!("/v1/jobs/{id}/events")),
+            server.client.delete(server.url(&format!("/v1/jobs/{id}"))),
+        ] {
+            problem(request.send().await.unwrap(), 404, "unknown_job").await;
+        }
+    }
+    problem(server.client.delete(server.url("/v1/jobs")).send().await.unwrap(), 405, "method_not_allowed").await;
+}
+
+/// When each of these jobs was finished, as text that sorts by time.
+async fn ends(server: &Server, addresses: &[String]) -> Vec<String> {
+    let mut ends = Vec::new();
+    for address in addresses {
+        ends.push(until(server, address, &["succeeded"]).await["finished_at"].as_str().unwrap().to_owned());
+    }
+    ends
+}
+
+#[tokio::test]
+async fn jobs_of_higher_priority_go_first() {
+    let server = Server::start_with(|config| config.jobs.slots = 1).await;
+    let first = sent(&server, lasting(900, 400)).await;
+    until(&server, &first, &["running"]).await;
+    let mut addresses = Vec::new();
+    for (priority, length) in [("low", 901), ("normal", 902), ("high", 903)] {
+        let path = format!("/v1/{}?priority={priority}", toy::BAR);
+        let response =
+            server.post_to(&path, lasting(length, 30)).header("prefer", "respond-async").send().await.unwrap();
+        assert_eq!(response.status(), 202);
+        addresses.push(header(&response, "location").to_owned());
+        assert_eq!(response.json::<Value>().await.unwrap()["priority"], priority);
+    }
+    let ends = ends(&server, &addresses).await;
+    assert!(ends[2] < ends[1] && ends[1] < ends[0], "{ends:?}");
+}
+
+#[tokio::test]
+async fn clients_take_turns() {
+    let keys = ["one client's key, 0123456789", "another client's key, 98765432"];
+    let server = Server::start_with(|config| {
+        config.jobs.slots = 1;
+        config.auth.keys =
+            keys.map(|key| ApiKey { name: key[..3].to_owned(), hash: auth::hash(key).to_string() }).to_vec();
+    })
+    .await;
+    let client = |who: usize, request: RequestBuilder| request.bearer_auth(keys[who]);
+    let send = async |who: usize, body: String| -> String {
+        let response = client(who, server.post(body)).header("prefer", "respond-async").send().await.unwrap();
+        assert_eq!(response.status(), 202);
+        header(&response, "location").to_owned()
+    };
+    let mut first = Vec::new();
+    for length in 910..915 {
+        first.push(send(0, lasting(length, 100)).await);
+    }
+    let second = send(1, lasting(920, 100)).await;
+    let mut ends = Vec::new();
+    for address in first.iter().chain([&second]) {
+        let start = Instant::now();
+        ends.push(loop {
+            let job: Value = client(0, server.get(address)).send().await.unwrap().json().await.unwrap();
+            if job["state"] == "succeeded" {
+                break job["finished_at"].as_str().unwrap().to_owned();
+            }
+            assert!(start.elapsed() < Duration::from_secs(20), "{job:#}");
+            tokio::time::sleep(Duration::from_millis(10)).await;
+        });
+    }
+    // The one that came last waits for the first client's running job and one more at most.
+    assert!(ends[5] < ends[3], "{ends:?}");
+}
+
+#[tokio::test]
+async fn a_job_without_a_result_says_why() {
+    let server = Server::start().await;
+    for (behaviour, status, code) in [("panic", 500, "crashed"), ("infeasible", 422, "bar_would_break")] {
+        let body = json!({"length_mm": 950, "load_n": 2, "behaviour": behaviour, "duration_ms": 1}).to_string();
+        let address = sent(&server, body).await;
+        let failed = until(&server, &address, &["failed"]).await;
+        assert_eq!((failed["problem"]["code"].as_str(), failed["attempt"].as_u64()), (Some(code), Some(1)));
+        assert_eq!(failed["problem"]["status"], status);
+        let document = problem(server.get(&format!("{address}/result")).send().await.unwrap(), status, code).await;
+        for part in ["title", "detail", "errors"] {
+            assert_eq!(document[part], failed["problem"][part]);
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_result_has_every_form_that_the_direct_answer_has() {
+    let server = Server::start().await;
+    let address = sent(&server, toy::JOB.to_owned()).await;
+    until(&server, &address, &["succeeded"]).await;
+    let result = format!("{address}/result");
+    for (accept, query, kind) in [
+        ("text/csv", "?table=summary", "text/csv"),
+        ("image/svg+xml", "?figure=load", "image/svg+xml"),
+        ("text/x-gcode", "", "text/x-gcode"),
+    ] {
+        let direct = server.post_to(&format!("/v1/{}{query}", toy::BAR), toy::JOB).header("accept", accept);
+        let direct = direct.send().await.unwrap().bytes().await.unwrap();
+        let response = server.get(&format!("{result}{query}")).header("accept", accept).send().await.unwrap();
+        assert!(header(&response, "content-type").starts_with(kind));
+        let tag = header(&response, "etag").to_owned();
+        assert_eq!(response.bytes().await.unwrap(), direct);
+        let known = server.get(&format!("{result}{query}")).header("accept", accept).header("if-none-match", tag);
+        assert_eq!(known.send().await.unwrap().status(), 304);
+    }
+    problem(server.get(&result).header("accept", "text/html").send().await.unwrap(), 406, "not_acceptable").await;
+    problem(server.get(&format!("{result}?table=none")).send().await.unwrap(), 404, "unknown_table").await;
+    problem(server.get(&format!("{result}?priority=low")).send().await.unwrap(), 400, "bad_query").await;
+}
+
+#[tokio::test]
+async fn long_jobs_leave_the_short_answers_their_place() {
+    let server = Server::start_with(|config| config.cpu = 1).await;
+    for length in 960..964 {
+        sent(&server, lasting(length, 60_000)).await;
+    }
+    for length in 970..980 {
+        // Too long to be computed where it arrives.
+        let body = json!({"length_mm": length, "load_n": 1, "work_ms": 5}).to_string();
+        assert_eq!(server.post(body).send().await.unwrap().status(), 200);
+    }
+}
