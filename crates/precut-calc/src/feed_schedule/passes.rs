@@ -43,12 +43,9 @@ pub(super) fn best(
         });
         match found {
             Some(found) if best.as_ref().is_none_or(|best| found.2.objective < best.2.objective) => best = Some(found),
-            Some(_) => {}
-            None if why.is_none() => {
-                // Analysed at the deepest finishing pass; asked for only when nothing at all is feasible.
-                why = attempt(job, held, &split(plan, roughing, high), true, monitor).err();
-            }
-            None => {}
+            // Analysed at the deepest finishing pass; asked for only when nothing at all is feasible.
+            None if why.is_none() => why = attempt(job, held, &split(plan, roughing, high), true, monitor).err(),
+            _ => {}
         }
     }
     match best {
