@@ -28,4 +28,5 @@ pub fn register(registrar: &mut impl Registrar) {
     registrar.with_forward_model::<feed_schedule::FeedSchedule>();
     registrar.calculator::<feed_schedule::fit::MachinabilityFit>();
     registrar.with_forward_model::<fixture_stability::FixtureStability>();
+    registrar.calculator::<fixture_stability::identification::FixtureIdentification>();
 }

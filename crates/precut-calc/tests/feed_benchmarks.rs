@@ -152,7 +152,8 @@ fn pass_of_quiza(tool_use_max_percent: Option<f64>) -> Program {
     let life = rate(&[(0, -3.46), (1, -0.696), (2, -0.46)], 5.48e9_f64.ln());
     let force = rate(&[(0, -0.286), (1, 0.917), (2, 1.10)], 6.56e3_f64.ln());
     let mut rows = Affines::new();
-    let mut limit = |(entries, constant): &(Vec<(usize, f64)>, f64), most: f64| rows.push(entries, constant - most.ln());
+    let mut limit =
+        |(entries, constant): &(Vec<(usize, f64)>, f64), most: f64| rows.push(entries, constant - most.ln());
     limit(&force, 5000.0);
     limit(&rate(&[(0, 1.0 - 0.286), (1, 0.917), (2, 1.10)], force.1 - 60_000.0_f64.ln()), 7.5);
     limit(&rate(&[(1, 2.0)], (125.0_f64 / 0.8).ln()), 50.0);

@@ -43,7 +43,13 @@ fn every_effect_is_its_formula() {
     let roughness = predicted(base(json!([])), "roughness_um");
     let force = predicted(base(json!([])), "force_y_n");
     let hardening = predicted(base(json!([])), "hardening_percent");
-    near("roughness", roughness, 3.0 * 35.0_f64.powf(-0.2) * 0.1_f64.powf(0.8) * 1.5_f64.powf(0.1) * 75.0_f64.powf(0.3), 1e-12, 0.0);
+    near(
+        "roughness",
+        roughness,
+        3.0 * 35.0_f64.powf(-0.2) * 0.1_f64.powf(0.8) * 1.5_f64.powf(0.1) * 75.0_f64.powf(0.3),
+        1e-12,
+        0.0,
+    );
     let ln = |kind: Value, expected: f64| {
         let mut effect = kind;
         effect["output"] = json!("roughness");
@@ -121,18 +127,44 @@ fn what_an_effect_lacks_is_a_fault() {
         effect
     };
     for (field, effect, expected) in [
-        ("conditions", of(json!({ "kind": "batch_shift", "batch": "B", "delta_ln": 0.1 })), fault("condition_missing", "/conditions/batch")),
-        ("conditions", of(json!({ "kind": "factor_shift", "factor": "coolant", "level": "off", "delta_ln": 0.4 })), fault("condition_missing", "/conditions/factors")),
-        ("conditions", of(json!({ "kind": "wear_multiplicative", "per_mm": 1.0 })), fault("condition_missing", "/conditions/flank_wear_mm")),
-        ("conditions", json!({ "kind": "wear_in", "wear_in_mm": 0.07, "time_constant_min": 4.0, "rate_mm_per_min": 0.01 }), fault("condition_missing", "/conditions/time_min")),
-        ("reference", of(json!({ "kind": "speed_curvature", "coef": 0.1 })), fault("effect_reference_missing", "/effects/0/reference_speed_m_per_min")),
+        (
+            "conditions",
+            of(json!({ "kind": "batch_shift", "batch": "B", "delta_ln": 0.1 })),
+            fault("condition_missing", "/conditions/batch"),
+        ),
+        (
+            "conditions",
+            of(json!({ "kind": "factor_shift", "factor": "coolant", "level": "off", "delta_ln": 0.4 })),
+            fault("condition_missing", "/conditions/factors"),
+        ),
+        (
+            "conditions",
+            of(json!({ "kind": "wear_multiplicative", "per_mm": 1.0 })),
+            fault("condition_missing", "/conditions/flank_wear_mm"),
+        ),
+        (
+            "conditions",
+            json!({ "kind": "wear_in", "wear_in_mm": 0.07, "time_constant_min": 4.0, "rate_mm_per_min": 0.01 }),
+            fault("condition_missing", "/conditions/time_min"),
+        ),
+        (
+            "reference",
+            of(json!({ "kind": "speed_curvature", "coef": 0.1 })),
+            fault("effect_reference_missing", "/effects/0/reference_speed_m_per_min"),
+        ),
     ] {
         assert_eq!(without(field, effect.clone()), expected, "{effect}");
         assert_eq!(faults(base(json!([effect]))), vec![]);
     }
     // On which output: said where more than one may be meant.
-    assert_eq!(faults(base(json!([{ "kind": "level_shift", "delta_ln": 0.1 }]))), fault("effect_output_missing", "/effects/0/output"));
-    assert_eq!(faults(base(json!([{ "kind": "edge_force_offset", "offset_n": 40.0, "output": "roughness" }]))), fault("effect_output_missing", "/effects/0/output"));
+    assert_eq!(
+        faults(base(json!([{ "kind": "level_shift", "delta_ln": 0.1 }]))),
+        fault("effect_output_missing", "/effects/0/output")
+    );
+    assert_eq!(
+        faults(base(json!([{ "kind": "edge_force_offset", "offset_n": 40.0, "output": "roughness" }]))),
+        fault("effect_output_missing", "/effects/0/output")
+    );
     let twice = of(json!({ "kind": "level_shift", "delta_ln": 0.1 }));
     assert_eq!(faults(base(json!([twice, twice]))), fault("duplicate_effect", "/effects/1"));
 }
@@ -176,11 +208,44 @@ fn schedules_with_effects_are_the_best_of_a_grid() {
     };
     type Law = Box<dyn Fn(f64, f64) -> f64>;
     let cases: Vec<(Value, Law, Law, u32, bool)> = vec![
-        (effect("speed_exponent", json!({ "delta": -0.2, "output": "roughness" })), Box::new(move |v, s| own(v, s) * (v / 60.0).powf(-0.2)), Box::new(pull), 0, false),
-        (effect("feed_curvature", json!({ "coef": 0.3, "output": "roughness" })), Box::new(move |v, s| own(v, s) * (0.3 * (s / 0.2_f64).ln().powi(2)).exp()), Box::new(pull), 1, false),
-        (effect("edge_force_offset", json!({ "offset_n": 60.0 })), Box::new(own), Box::new(move |v, s| pull(v, s) + 60.0), 1, false),
-        (effect("nose_radius_floor", json!({ "k": 1.0, "nose_radius_mm": 0.4 })), Box::new(move |v, s| (own(v, s).powi(8) + (1000.0 * s * s / 12.8).powi(8)).powf(0.125)), Box::new(pull), 1, false),
-        (effect("built_up_edge", json!({ "hump_ln": 0.5, "centre_m_per_min": 35.0, "width_m_per_min": 18.0, "output": "roughness" })), Box::new(move |v, s| own(v, s) * (0.5 * (-((v - 35.0) / 18.0).powi(2)).exp()).exp()), Box::new(pull), 1, true),
+        (
+            effect("speed_exponent", json!({ "delta": -0.2, "output": "roughness" })),
+            Box::new(move |v, s| own(v, s) * (v / 60.0).powf(-0.2)),
+            Box::new(pull),
+            0,
+            false,
+        ),
+        (
+            effect("feed_curvature", json!({ "coef": 0.3, "output": "roughness" })),
+            Box::new(move |v, s| own(v, s) * (0.3 * (s / 0.2_f64).ln().powi(2)).exp()),
+            Box::new(pull),
+            1,
+            false,
+        ),
+        (
+            effect("edge_force_offset", json!({ "offset_n": 60.0 })),
+            Box::new(own),
+            Box::new(move |v, s| pull(v, s) + 60.0),
+            1,
+            false,
+        ),
+        (
+            effect("nose_radius_floor", json!({ "k": 1.0, "nose_radius_mm": 0.4 })),
+            Box::new(move |v, s| (own(v, s).powi(8) + (1000.0 * s * s / 12.8).powi(8)).powf(0.125)),
+            Box::new(pull),
+            1,
+            false,
+        ),
+        (
+            effect(
+                "built_up_edge",
+                json!({ "hump_ln": 0.5, "centre_m_per_min": 35.0, "width_m_per_min": 18.0, "output": "roughness" }),
+            ),
+            Box::new(move |v, s| own(v, s) * (0.5 * (-((v - 35.0) / 18.0).powi(2)).exp()).exp()),
+            Box::new(pull),
+            1,
+            true,
+        ),
     ];
     for (effect, roughness, force, linearisations, local) in cases {
         let outcome = solved(zone(json!([effect])));

@@ -175,8 +175,12 @@ fn random_feasible_points_never_win() {
         let m = &base["models"][name];
         let phi = m.get("angle_exponent").map_or(0.0, number) * 75.0_f64.ln();
         let e = |key: &str| m.get(key).map_or(0.0, number);
-        (e("constant") + phi + e("speed_exponent") * v.ln() + e("feed_exponent") * s.ln() + e("depth_exponent") * t.ln())
-            .exp()
+        (e("constant")
+            + phi
+            + e("speed_exponent") * v.ln()
+            + e("feed_exponent") * s.ln()
+            + e("depth_exponent") * t.ln())
+        .exp()
     };
     let mut dice = Pcg64Mcg::seed_from_u64(11);
     let between = |dice: &mut Pcg64Mcg, low: f64, high: f64| low * (high / low).powf(dice.random::<f64>());
@@ -191,7 +195,8 @@ fn random_feasible_points_never_win() {
             let s = (solved.feed_mm_per_rev * between(&mut dice, 0.9, 1.02))
                 .clamp(number(&limits["feed_min_mm_per_rev"]), number(&limits["feed_max_mm_per_rev"]));
             let rpm = 1000.0 * v / (std::f64::consts::PI * d);
-            ok &= solved.compliance_um_per_n.unwrap() * power_law("force_y", v, s, t) <= number(&zone["deflection_max_um"]);
+            ok &= solved.compliance_um_per_n.unwrap() * power_law("force_y", v, s, t)
+                <= number(&zone["deflection_max_um"]);
             ok &= power_law("roughness", v, s, t) <= number(&zone["roughness_max_um"]);
             ok &= (20.0..=2000.0).contains(&rpm) && rpm * s <= 2000.0;
             ok &= power_law("force_z", v, s, t) * v / 60_000.0 / 0.8 <= 10.0;
