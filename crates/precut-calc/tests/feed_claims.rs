@@ -102,7 +102,8 @@ fn what_the_claims_cost() {
     job["limits"]["feed_max_mm_per_rev"] = json!(0.15);
     job["limits"]["feed_min_mm_per_rev"] = json!(0.15 / 1.125_f64.powf(1.0 / 0.78));
     let (time, _, spread) = row(&solved(job));
-    printed("time", time, 9.1, 0.05);
+    // Slowing all of z3 to z5 to that feed would cost 9.1 %; the least time leaves z5 partly fast.
+    printed("time", time, 7.1, 0.05);
     printed("Ra spread", spread, 12.5, 0.05);
 }
 
