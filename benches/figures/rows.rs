@@ -95,6 +95,16 @@ pub(crate) fn all() -> Vec<Row> {
         row("a step of the cut in time, linear force law", Unit::Time, us(0.01), us(0.0067), || fixture::step(0.0)),
         row("a step of the cut in time, power law", Unit::Time, us(0.04), us(0.0167), || fixture::step(0.1)),
         row("complete fixture answer: verdict", Unit::Time, None, None, fixture::answer),
+        row("the source paper's table of 28 rows under both laws, each with two steps", Unit::Time, None, None, || {
+            fixture::table()
+        }),
+        row(
+            "identification: one set of a search over it (25 rows, 5 unknowns)",
+            Unit::Time,
+            None,
+            None,
+            fixture::search,
+        ),
         row("CSV, 10,000 rows of 8 numbers", Unit::Time, None, None, csv),
         row("G-code, 10,000 cuts", Unit::Time, None, None, gcode),
         row("SVG, 3 panels of 201 stations", Unit::Time, None, None, || svg(201)),
