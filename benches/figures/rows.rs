@@ -117,6 +117,16 @@ pub(crate) fn all() -> Vec<Row> {
         ),
         row("1000 single zones", Unit::Time, us(10_000.0), us(2000.0), feed::single_zones),
         row("complete feed schedule: six zones with comparison", Unit::Time, None, None, feed::answer),
+        row("the source paper's table of 28 rows under both laws, each with two steps", Unit::Time, None, None, || {
+            fixture::table()
+        }),
+        row(
+            "identification: one set of a search over it (25 rows, 5 unknowns)",
+            Unit::Time,
+            None,
+            None,
+            fixture::search,
+        ),
         row("CSV, 10,000 rows of 8 numbers", Unit::Time, None, None, csv),
         row("G-code, 10,000 cuts", Unit::Time, None, None, gcode),
         row("SVG, 3 panels of 201 stations", Unit::Time, None, None, || svg(201)),
