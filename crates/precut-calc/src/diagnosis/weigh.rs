@@ -45,6 +45,16 @@ impl Effort {
     pub fn full(most_causes: usize) -> Self {
         Self { most_causes, leaders: LEADERS, late_leaders: LATE_LEADERS }
     }
+
+    /// Half the sets refined: where every prediction is a simulation.
+    pub fn dear(most_causes: usize) -> Self {
+        Self { most_causes, leaders: LEADERS / 2, late_leaders: LATE_LEADERS / 2 }
+    }
+
+    /// The sets that a fold refines where every prediction is a simulation.
+    pub fn dear_fold(most_causes: usize) -> Self {
+        Self { most_causes, leaders: 2, late_leaders: 1 }
+    }
 }
 
 /// What the rows say.
@@ -176,22 +186,22 @@ impl Ranking {
                 continue;
             }
             let start = linear.settings(candidate);
-            let plain = refinement.fit(start.clone(), false)?;
-            let free = refinement.fit(start, true)?.filter(|fit| fit.with_shapes && fit.settled);
-            let fit = match (plain, free) {
-                // Where free shapes explain less than the mean over the grid, the grid stays.
-                (plain, Some(free)) if free.log_z >= candidate.log_z => {
+            let free = if linear.has_free_shapes(&candidate.members) {
+                refinement.fit(start.clone(), true)?.filter(|fit| fit.with_shapes && fit.settled)
+            } else {
+                None
+            };
+            // Where free shapes explain less than the mean over the grid, the grid stays.
+            let fit = match free.filter(|free| free.log_z >= candidate.log_z) {
+                Some(free) => {
                     candidate.log_z = free.log_z;
-                    let _ = plain;
                     Some(free)
                 }
-                (Some(plain), _) => {
-                    if linear.settings(candidate).iter().all(|s| linear.has_no_grid(s.hypothesis)) {
+                None => refinement.fit(start, false)?.inspect(|plain| {
+                    if candidate.members.iter().all(|&h| linear.has_no_grid(h)) {
                         candidate.log_z = plain.log_z;
                     }
-                    Some(plain)
-                }
-                (None, _) => None,
+                }),
             };
             self.fits.push((candidate.members.clone(), fit));
         }
