@@ -199,7 +199,7 @@ fn every_fault_of_a_study_is_listed_at_once() {
             ("unknown_field", "/job/colour"),
             ("missing_column", "/job/measurements"),
             ("not_a_number", "/outputs/0"),
-            ("duplicate_output", "/outputs/2"),
+            ("repeated_output", "/outputs/2"),
             ("no_such_field", "/outputs/3"),
             ("bad_pointer", "/outputs/4"),
             ("no_such_field", "/outputs/5"),
