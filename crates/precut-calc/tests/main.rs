@@ -16,6 +16,7 @@ mod diagnosis_trials;
 mod feed_reference;
 mod feed_support;
 mod fixture_effects;
+mod fixture_identification;
 mod fixture_methods;
 mod fixture_paper;
 mod fixture_reference;
