@@ -168,7 +168,6 @@ impl Engine {
 
     /// Computes the answer to a job while somebody waits for it.
     async fn solve_directly(&self, ready: Ready, parse: Duration) -> Result<Solved, Error> {
-        metrics::counter!("precut_cache_total", "state" => "miss").increment(1);
         let Boarded { seat, pilot } = self.inner.flights.board(ready.key);
         if let Some(pilot) = pilot {
             self.depart(pilot, ready);
@@ -270,12 +269,12 @@ impl Inner {
     /// What is kept under a key, in memory or in the store. A store that fails is as good as an empty one here.
     async fn look_up(&self, key: &Key) -> Option<Kept> {
         if let Some(kept) = self.memory.get(key) {
-            metrics::counter!("precut_cache_total", "state" => "memory").increment(1);
+            metrics::counter!("precut_cache_hits_total", "tier" => "memory").increment(1);
             return Some(kept);
         }
         match self.fetch(key).await {
             Ok(stored) => stored.map(|stored| {
-                metrics::counter!("precut_cache_total", "state" => "store").increment(1);
+                metrics::counter!("precut_cache_hits_total", "tier" => "store").increment(1);
                 Kept::Answer(stored)
             }),
             Err(error) => {

@@ -291,7 +291,7 @@ mod tests {
         assert_eq!((finding.code, finding.pointer.as_str()), ("out_of_range", "/measurements/1/z_mm"));
         assert_eq!(finding.values.get("line"), Some(&5.0.into()));
         let unreadable = with("measurements", json!({"csv": "z_mm,deviation_um\n1,x\n"}));
-        assert_eq!(faults(&unreadable), [("bad_cell", "/measurements".to_owned())]);
+        assert_eq!(faults(&unreadable), [("bad_cell", "/measurements/0/deviation_um".to_owned())]);
     }
 
     #[test]

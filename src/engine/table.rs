@@ -128,7 +128,7 @@ fn place_part(job: &mut Value, part: &TablePart, places: &[TablePlace]) -> Resul
     let name = || part.name.clone();
     let Some(path) = fitting.next() else {
         let names: Vec<String> = places.iter().map(TablePlace::dotted).collect();
-        let finding = Finding::new("unknown_table", "").with("name", name());
+        let finding = Finding::new("unknown_table", meant(&part.name)).with("name", name());
         let near = nearest(&part.name, names.iter().map(String::as_str)).map(str::to_owned);
         return Err(match near {
             Some(near) => finding.with("nearest", near),
@@ -137,7 +137,7 @@ fn place_part(job: &mut Value, part: &TablePart, places: &[TablePlace]) -> Resul
     };
     let pointer = path.iter().fold(String::new(), |pointer, step| child(&pointer, step));
     if fitting.next().is_some() {
-        return Err(Finding::new("ambiguous_table", "").with("name", name()));
+        return Err(Finding::new("ambiguous_table", meant(&part.name)).with("name", name()));
     }
     let Ok(text) = std::str::from_utf8(&part.text) else {
         return Err(Finding::new("table_not_utf8", pointer).with("name", name()));
@@ -163,6 +163,11 @@ fn place_part(job: &mut Value, part: &TablePart, places: &[TablePlace]) -> Resul
     }
     *target = json!({ "csv": text });
     Ok(())
+}
+
+/// Where a part with this name would stand in the job.
+fn meant(name: &str) -> String {
+    name.split('.').fold(String::new(), |pointer, step| child(&pointer, step))
 }
 
 /// The way to the place that the name of a part means: the last name, or all names and indices with dots.

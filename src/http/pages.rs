@@ -49,6 +49,10 @@ pub(super) struct LandingLinks {
     calculators: &'static str,
     /// The kept results.
     results: &'static str,
+    /// The jobs.
+    jobs: &'static str,
+    /// Where studies are posted to.
+    studies: &'static str,
     /// The library of materials.
     materials: &'static str,
     /// The contract (OpenAPI 3.1).
@@ -61,7 +65,7 @@ pub(super) struct LandingLinks {
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct ProblemPage {
     /// Stable name of the problem.
-    #[schema(example = "invalid")]
+    #[schema(example = "invalid_job")]
     code: String,
     /// What is wrong.
     title: String,
@@ -86,6 +90,8 @@ pub(super) async fn landing(State(app): State<App>, headers: HeaderMap) -> Respo
             links: LandingLinks {
                 calculators: "/v1/calculators",
                 results: "/v1/results",
+                jobs: "/v1/jobs",
+                studies: "/v1/studies",
                 materials: "/v1/materials",
                 openapi: "/openapi.json",
                 docs: "/docs",
@@ -116,7 +122,8 @@ pub(super) async fn landing(State(app): State<App>, headers: HeaderMap) -> Respo
     let body = format!(
         "<h1>precut</h1><p>{DESCRIPTION}</p><h2>Ask</h2><ul>{list}</ul>{example}\
          <p><a href=\"/docs\">Interactive documentation</a> · <a href=\"/openapi.json\">Contract (OpenAPI 3.1)</a> · \
-         <a href=\"/v1/results\">Kept results</a> · <a href=\"/v1/materials\">Materials</a></p>"
+         <a href=\"/v1/results\">Kept results</a> · <a href=\"/v1/jobs\">Jobs</a> · \
+         <a href=\"/v1/materials\">Materials</a></p>"
     );
     Document::new(page("precut", &body), HTML, Some(Language::En)).respond(&headers)
 }

@@ -99,7 +99,7 @@ impl ResultQuery {
     pub const MOST: u32 = 500;
 }
 
-/// A place in the list of results; opaque in the contract.
+/// A place in the list of results; opaque in the contract, and written in one way only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Cursor {
     /// Time of the last result of the page before, ms UTC.
@@ -110,15 +110,17 @@ pub struct Cursor {
 
 impl fmt::Display for Cursor {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}.{}", self.created_ms, self.key.to_string().trim_start_matches("b3:"))
+        write!(f, "{}-{}", self.created_ms, self.key.to_string().trim_start_matches("b3:"))
     }
 }
 
 impl FromStr for Cursor {
     type Err = BadKey;
     fn from_str(text: &str) -> Result<Self, BadKey> {
-        let (created_ms, digits) = text.split_once('.').ok_or(BadKey)?;
-        Ok(Self { created_ms: created_ms.parse().map_err(|_| BadKey)?, key: format!("b3:{digits}").parse()? })
+        let (created_ms, digits) = text.split_once('-').ok_or(BadKey)?;
+        let read = Self { created_ms: created_ms.parse().map_err(|_| BadKey)?, key: format!("b3:{digits}").parse()? };
+        // Signs, zeros in front and capitals would be other addresses of the same page.
+        if read.to_string() == text { Ok(read) } else { Err(BadKey) }
     }
 }
 

@@ -1,12 +1,10 @@
 //! Parameters from tables of amplitude against depth: the source paper's two tables, and tables made with known ones.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::float_cmp, missing_docs)]
 
-mod fixture_support;
-
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use fixture_support::{outcome, reference};
+use crate::fixture_support::{outcome, reference};
 use precut_calc::calculator::{Answer, Calculator, Check, Failure, Figure, Message, Monitor, Unwatched, Violations};
 use precut_calc::fixture_stability::Regeneration;
 use precut_calc::fixture_stability::identification::{
