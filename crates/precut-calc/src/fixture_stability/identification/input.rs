@@ -166,7 +166,7 @@ pub struct AmplitudeRow {
     pub amplitude_um: Option<f64>,
     /// Which joint opened; left out: none did.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(example = "fixed")]
+    #[schema(inline, example = "fixed")]
     pub opened: Option<OpenedJoint>,
     /// Left out of the search, predicted all the same.
     #[serde(default, skip_serializing_if = "is_false")]
