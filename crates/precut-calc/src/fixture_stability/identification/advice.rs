@@ -194,8 +194,8 @@ pub(super) fn explanation(problem: &Problem<'_>, outcome: &IdentificationOutcome
             None => message,
         });
     }
-    if let Some(clamp) = &outcome.clamp_force {
-        said.push(match clamp.most_n.filter(|_| clamp.consistent) {
+    if let Some(clamp) = outcome.clamp_force.as_ref().filter(|clamp| clamp.consistent) {
+        said.push(match clamp.most_n {
             Some(most) => {
                 Message::new("identification_clamp_between").with("least_n", clamp.least_n).with("most_n", most)
             }
