@@ -7,7 +7,7 @@ use super::json;
 use super::read::Ready;
 use crate::key::ENGINE_VERSION;
 use crate::registry::{ResultNotes, append_result, non_finite_place};
-use crate::text::{Language, Notice, Remark, Texts};
+use crate::text::{Language, Notice, Remark, Texts, reworded, reworded_rows};
 
 /// Runs a job and writes the envelope of its result, in English, in one buffer from the first byte to the last.
 pub(crate) fn write(ready: &Ready, monitor: &dyn Monitor) -> Result<Vec<u8>, Failure> {
@@ -40,6 +40,31 @@ pub(crate) fn write(ready: &Ready, monitor: &dyn Monitor) -> Result<Vec<u8>, Fai
     field(&mut body, "basis", &basis)?;
     body.push(b'}');
     Ok(ready.entry.answer_written(body))
+}
+
+/// An envelope with its sentences in another language; as it is where it cannot be taken apart.
+pub(crate) fn in_language(body: &[u8], language: Language) -> Vec<u8> {
+    let mut said = body.to_vec();
+    if language == Language::default() {
+        return said;
+    }
+    for name in ["warnings", "explanation"] {
+        replace(&mut said, name, |text| reworded(name, text, language));
+    }
+    // Only a study's rows have sentences of their own.
+    if said.starts_with(br#"{"calculator":"studies""#) {
+        replace(&mut said, "result", |text| reworded_rows(text, language));
+    }
+    said
+}
+
+/// Puts what is made of a field of the envelope in its place.
+fn replace(body: &mut Vec<u8>, name: &str, make: impl FnOnce(&[u8]) -> Option<Vec<u8>>) {
+    if let Some(place) = json::top_level_field(body, name)
+        && let Some(again) = make(&body[place.clone()])
+    {
+        body.splice(place, again);
+    }
 }
 
 /// Begins a field.

@@ -12,7 +12,7 @@ use tempfile::TempDir;
 use super::*;
 use crate::registry::toy;
 use crate::store::{KeptResult, StoreError};
-use crate::text::{Language, Texts};
+use crate::text::{Language, Texts, complete};
 
 const TOY: &str = "toy-bar";
 
@@ -357,6 +357,15 @@ fn what_the_calculators_utter_has_a_text_and_their_examples_run() {
     }
 }
 
+/// Names that the user gave (`job`) stay as they are.
+fn in_its_language(language: Language, said: &str, job: &str) {
+    if language != Language::En {
+        let mut english = complete::english_in(said);
+        english.retain(|word| !job.contains(word));
+        assert!(english.is_empty(), "{english:?} in {said:?}");
+    }
+}
+
 fn conforms(registry: &Registry, entry: &Entry) {
     let texts = Texts::shared();
     let meta = entry.meta();
@@ -376,11 +385,17 @@ fn conforms(registry: &Registry, entry: &Entry) {
         let input = ready.prepared.input().unwrap();
         assert_eq!(ready.canonical, serde_json_canonicalizer::to_vec(&input).unwrap());
         for message in &computed.explanation {
-            texts.try_word(Language::En, "explanation", message.code, &message.values).unwrap();
+            for language in Language::ALL {
+                let said = texts.try_word(language, "explanation", message.code, &message.values).unwrap();
+                in_its_language(language, &said, example.job);
+            }
             assert!(meta.codes.contains(message.code), "{} utters the undeclared {}", meta.id, message.code);
         }
         for warning in &computed.warnings {
-            texts.try_finding(Language::En, "warning", warning).unwrap();
+            for language in Language::ALL {
+                let said = texts.try_finding(language, "warning", warning).unwrap();
+                in_its_language(language, &said, example.job);
+            }
             assert!(meta.codes.contains(warning.code), "{} utters the undeclared {}", meta.id, warning.code);
         }
         let stored = solve_now(registry, meta.id, body(), &Unwatched).unwrap();

@@ -38,6 +38,8 @@ use crate::engine::{Engine, Error};
 pub use answer::written;
 pub use codes::CODES;
 pub use negotiate::Media;
+#[cfg(test)]
+pub(crate) use pages::DESCRIPTION;
 pub use problem::{Problem, ProblemDocument};
 pub use server::serve;
 

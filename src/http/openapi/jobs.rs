@@ -76,7 +76,7 @@ fn accepted() -> ResponseBuilder {
     .header("Location", parts::text_header("Address of the job.", &format!("/v1/jobs/{EXAMPLE}")))
     .header("Retry-After", seconds())
     .header("Preference-Applied", parts::text_header("Preferences that were followed.", "respond-async"))
-    .header("Content-Language", parts::text_header("Language of the sentences.", "en"))
+    .header("Content-Language", parts::text_header("Language of the sentences: `en` or `ru`.", "en"))
     .link("job", link("read_job", "Reads the job."))
     .link("result", link("read_job_result", "Reads its result."))
     .link("cancel", link("cancel_job", "Cancels it."))
@@ -106,14 +106,14 @@ fn text_like(pattern: &str) -> Object {
 }
 
 fn languages(operation: OperationBuilder) -> OperationBuilder {
-    let text = "Languages of sentences by preference; English where none fits.";
+    let text = "Languages of sentences by preference: `en` (English) or `ru` (Russian); English where none fits.";
     operation.parameter(parts::parameter("Accept-Language", ParameterIn::Header, text, parts::string()).build())
 }
 
 fn the_job(text: &str) -> ResponseBuilder {
     parts::success(text, "application/json", parts::json_of("Job"))
         .header("Retry-After", seconds())
-        .header("Content-Language", parts::text_header("Language of the sentences.", "en"))
+        .header("Content-Language", parts::text_header("Language of the sentences: `en` or `ru`.", "en"))
 }
 
 fn list(registry: &Registry) -> OperationBuilder {
@@ -136,7 +136,7 @@ fn list(registry: &Registry) -> OperationBuilder {
     .response(
         "200",
         parts::success("A page of jobs.", "application/json", parts::json_of("JobList"))
-            .header("Content-Language", parts::text_header("Language of the sentences.", "en")),
+            .header("Content-Language", parts::text_header("Language of the sentences: `en` or `ru`.", "en")),
     );
     parts::guarded(languages(operation), &[400, 404])
 }
@@ -167,7 +167,7 @@ fn result() -> OperationBuilder {
         ObjectBuilder::new().description(Some("The answer: `calculator` says which one made it, and by which schema."));
     let mut response = parts::tagged(parts::success("The answer.", Media::Json.essence(), Content::new(Some(answer))))
         .header("Content-Location", parts::text_header("Lasting address of the answer.", "/v1/results/b3:5d41..."))
-        .header("Content-Language", parts::text_header("Language of the sentences.", "en"))
+        .header("Content-Language", parts::text_header("Language of the sentences: `en` or `ru`.", "en"))
         .header("Precut-Cache", parts::text_header("Always `hit`: nothing is computed.", "hit"))
         .header("Server-Timing", parts::text_header("Where the time went, ms.", "parse;dur=0.000"));
     for (media, text) in

@@ -85,7 +85,7 @@ pub(super) fn responses() -> Vec<(String, Response)> {
                 .description(text)
                 .content("application/problem+json", content)
                 .header("x-request-id", request_id())
-                .header("Content-Language", text_header("Language of the sentences.", "en"));
+                .header("Content-Language", text_header("Language of the sentences: `en` or `ru`.", "en"));
             if matches!(status, 409 | 429 | 503) {
                 response = response.header("Retry-After", retry_after());
             }
@@ -155,7 +155,7 @@ pub(super) fn conditional(operation: OperationBuilder) -> OperationBuilder {
     operation
         .parameter(header_parameter(
             "Accept-Language",
-            "Languages of sentences by preference; English where none fits.",
+            "Languages of sentences by preference: `en` (English) or `ru` (Russian); English where none fits.",
         ))
         .parameter(header_parameter(
             "If-None-Match",

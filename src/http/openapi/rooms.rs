@@ -136,7 +136,7 @@ fn multipart(entry: &Entry, job: &str) -> Content {
 fn answered(meta: &Meta, answer: &str) -> ResponseBuilder {
     let mut response = parts::tagged(parts::success("The answer.", Media::Json.essence(), parts::json_of(answer)))
         .header("Content-Location", parts::text_header("Lasting address of the answer.", "/v1/results/b3:5d41..."))
-        .header("Content-Language", parts::text_header("Language of the sentences.", "en"))
+        .header("Content-Language", parts::text_header("Language of the sentences: `en` or `ru`.", "en"))
         .header(
             "Precut-Cache",
             parts::header_of(parts::one_of(["hit", "miss"].map(ToOwned::to_owned)), "Whether it was there already."),
