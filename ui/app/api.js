@@ -89,14 +89,10 @@ export async function program(key) {
   return (await ask(`/v1/results/${key}`, { headers: { Accept: 'text/x-gcode' } })).text();
 }
 
-/** Stored models: `null` where the service has none to offer. */
+/** Stored models: `null` where the service keeps none. */
 export async function models() {
-  try {
-    return (await json('/v1/models?limit=500')).items;
-  } catch (error) {
-    if (error instanceof Refused && (error.status === 404 || error.status === 405)) return null;
-    throw error;
-  }
+  const { links } = await json('/', { headers: { Accept: 'application/json' } });
+  return links.models ? (await json(`${links.models}?limit=500`)).items : null;
 }
 export const saveModel = (name, source) => json(`/v1/models/${enc(name)}`, {
   method: 'PUT',

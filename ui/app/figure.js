@@ -1,12 +1,12 @@
 // A figure of the service, drawn to be read: hover or arrow keys read a station through all panels, dragging zooms,
 // a pinned run lies under the present one. What to draw comes as data; nothing here knows a calculator.
 import { html, useState, useRef, useMemo, useLayoutEffect, useEffect, unique } from './lib.js';
-import { t, number, unitSymbol, languageChanged } from './text.js';
+import { t, number, unitSymbol } from './text.js';
 import { scale, extent, aired, ticks, labels, valueAt } from './scale.js';
 import { items, styles, role } from './draw.js';
 import { colouring } from './palette.js';
 
-const LEAST_PANEL = 96;
+const LEAST_PANEL = 78;
 const AXIS_ROOM = 40;
 const END_GLYPHS = ['centre_left', 'centre_right', 'chuck'];
 const GLYPH_ROOM = 36;
@@ -171,7 +171,7 @@ export function Picture({ figure, pinned, height = 460, onPick, main }) {
     </div>`;
   return html`
     <figure class=${`picture ${main ? 'main' : ''}`} aria-labelledby=${`${id}-title`}>
-      <figcaption><h3 id=${`${id}-title`}>${figure.title.text}</h3>${tools}</figcaption>
+      <figcaption><h2 id=${`${id}-title`}>${figure.title.text}</h2>${tools}</figcaption>
       <div ref=${ref} class="plot" tabindex="0" role="application" aria-label=${`${figure.title.text}. ${t('picture_keys')}`} onKeyDown=${key}>
         ${width > 0 && (isPolar
           ? html`<${Polar} ...${common} setAt=${setAt} />`
@@ -274,7 +274,7 @@ function Stacked({ figure, pinned, width, style, hidden, toggle, at, setAt, show
     const span = extent([...ordinates(panel, view), ...(ghosts[index] ? ordinates(ghosts[index], view) : [])], panel.y.scale);
     const isMap = panel.items.some(item => item.kind === 'heat_map');
     const domain = isMap ? span : aired(span, panel.y.scale);
-    const places = ticks(panel.y.scale, domain, Math.max(2, Math.round(tall / 44)));
+    const places = ticks(panel.y.scale, domain, Math.max(3, Math.round(tall / 42)));
     return { panel, ghost: ghosts[index], tall, domain, places, ...labels(panel.y.scale, places), span: span ? span[1] - span[0] : 0 };
   });
   const left = Math.max(34, ...panels.map(({ texts }) => 12 + 6.6 * Math.max(0, ...texts.map(text => text.length))));
@@ -445,5 +445,3 @@ function Polar({ figure, pinned, width, height, style, hidden, toggle, at, setAt
         })}`}
     </svg>`;
 }
-
-export { languageChanged };

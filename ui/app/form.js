@@ -12,6 +12,8 @@ const LONG_LIST = 40;
 /** Everything that fields share: the root schema, errors by pointer, what changes, who shows help. */
 class Context {
   constructor(fields) { Object.assign(this, fields); }
+  /** What the service filled in where nothing was given. */
+  filledAt(path) { return this.filled ? at(this.filled, path) : undefined; }
   errorsAt(path) { return this.errors.get(pointer(path)) || []; }
   /** Faults of everything below a path, and of the path itself. */
   errorsBelow(path) {
@@ -25,7 +27,7 @@ class Context {
 export const fieldId = path => `field${pointer(path).replace(/[^A-Za-z0-9_]/g, '-')}`;
 
 /** The form of a job. `errors` are those of a problem document; `libraries` the choices of `x-library` fields. */
-export function Form({ schema, value, onChange, errors, libraries, models, disabled }) {
+export function Form({ schema, value, filled, onChange, errors, libraries, models, disabled }) {
   const [help, setHelp] = useState(null);
   const root = schema;
   const byPointer = useMemo(() => {
@@ -33,7 +35,7 @@ export function Form({ schema, value, onChange, errors, libraries, models, disab
     for (const error of errors || []) map.set(error.pointer, [...(map.get(error.pointer) || []), error]);
     return map;
   }, [errors]);
-  const context = new Context({ root, errors: byPointer, libraries, models, setHelp, disabled, set: (path, part, how) => onChange(changed(value, path, part), how) });
+  const context = new Context({ root, filled, errors: byPointer, libraries, models, setHelp, disabled, set: (path, part, how) => onChange(changed(value, path, part), how) });
   const top = resolve(schema, root);
   const all = Object.entries(top.properties || {}).map(([name, part]) => ({ name, schema: resolve(part, root) }));
   const required = new Set(top.required || []);
@@ -225,13 +227,14 @@ function Row({ name, schema, path, value, required, context, control: Control, c
     id, schema, value, context, label,
     set: (part, how) => context.set(path, part, how),
     setWrong,
+    filled: context.filledAt(path),
     described: `${id}-about${faults.length || wrong ? ` ${id}-fault` : ''}`,
     invalid: faults.length > 0 || wrong !== null,
     required,
   };
   return html`
     <div class=${`row ${faults.length || wrong ? 'faulty' : ''} ${compact ? 'compact' : ''}`} onMouseEnter=${show} onFocusIn=${show}>
-      <${Control} ...${common} label=${html`<span>${label}</span>${schema['x-symbol'] && html` <${Symbol} symbol=${schema['x-symbol']} />`}`} unit=${unit} plain=${label} />
+      <${Control} ...${common} label=${html`<span>${label}</span>${schema['x-symbol'] && schema['x-symbol'].toLowerCase() !== label.toLowerCase() && html` <${Symbol} symbol=${schema['x-symbol']} />`}`} unit=${unit} plain=${label} />
       <span id=${`${id}-about`} class="hidden">${[unit && t('in_unit', { unit }), allowed, description].filter(Boolean).join('. ')}</span>
       <${Faults} faults=${wrong ? [{ detail: wrong }] : faults} id=${`${id}-fault`} />
     </div>`;
@@ -242,7 +245,8 @@ function Faults({ faults, id }) {
   return html`<p class="fault" id=${id}>${faults.map(fault => html`<span>${sentence(fault.detail)}</span>`)}</p>`;
 }
 
-const sentence = text => (text ? text.charAt(0).toUpperCase() + text.slice(1) : text);
+/** Names of fields keep their small letters. */
+const sentence = text => (!text || /^[a-z]+_/.test(text) ? text : text.charAt(0).toUpperCase() + text.slice(1));
 
 /** Steps of the arrow keys: a hundredth of the value's size, a tenth with shift. */
 function nudged(value, schema, direction, shift) {
@@ -258,9 +262,11 @@ function nudged(value, schema, direction, shift) {
   return Math.min(Math.max(next, low ?? -Infinity), high ?? Infinity);
 }
 
-function NumberInput({ id, schema, value, set, setWrong, described, invalid, label, unit, required, context }) {
+function NumberInput({ id, schema, value, filled, set, setWrong, described, invalid, label, unit, required, context }) {
   const [draft, setDraft] = useState(null);
-  const shown = draft ?? typed(value);
+  const [isFocused, setFocused] = useState(false);
+  // All digits only while they may be edited.
+  const shown = draft ?? (isFocused || typeof value !== 'number' ? typed(value) : typed(Number(value.toPrecision(7))));
   const take = text => {
     setDraft(text);
     const read = parsed(text);
@@ -273,6 +279,7 @@ function NumberInput({ id, schema, value, set, setWrong, described, invalid, lab
     }
   };
   const leave = () => {
+    setFocused(false);
     if (draft !== null && !Number.isNaN(parsed(draft)) && !(parsed(draft) === null && required)) setDraft(null);
   };
   const key = event => {
@@ -283,12 +290,13 @@ function NumberInput({ id, schema, value, set, setWrong, described, invalid, lab
     set(nudged(value, schema, event.key === 'ArrowUp' ? 1 : -1, event.shiftKey), 'typing');
   };
   const drag = useDrag(value, schema, next => { setDraft(null); setWrong(null); set(next, 'typing'); });
-  const placeholder = schema.default !== undefined && schema.default !== null ? typed(schema.default) : '';
+  const standIn = typeof filled === 'number' ? filled : schema.default;
+  const placeholder = standIn === undefined || standIn === null ? '' : typed(Number(standIn.toPrecision(7)));
   return html`
     <label for=${id} class="label draggable" ...${drag}>${label}</label>
     <span class="control"><input id=${id} type="text" inputmode="decimal" autocomplete="off" spellcheck=${false} value=${shown} placeholder=${placeholder}
       disabled=${context.disabled} aria-describedby=${described} aria-invalid=${invalid ? 'true' : undefined} aria-required=${required ? 'true' : undefined}
-      onInput=${event => take(event.currentTarget.value)} onBlur=${leave} onKeyDown=${key} onFocus=${event => event.currentTarget.select()} /></span>
+      onInput=${event => take(event.currentTarget.value)} onBlur=${leave} onKeyDown=${key} onFocus=${event => { const field = event.currentTarget; setFocused(true); setTimeout(() => { if (document.activeElement === field) field.select(); }, 0); }} /></span>
     <span class="unit" aria-hidden="true">${unit}</span>`;
 }
 
@@ -427,7 +435,7 @@ function List({ name, schema, path, value, context }) {
       </table></div>`
     : shown.map((item, index) => html`
       <fieldset class="item" key=${index} id=${fieldId([...path, index])}>
-        <legend><span>${label(index)}</span>
+        <legend><span><span class="hidden">${labelOf(name, schema)} </span>${index + 1}${kindOf(items) === 'choice' ? ` · ${humanised(String(variantOf(variants(items, context.root), item).value ?? ''))}` : ''}</span>
           <button type="button" class="icon" disabled=${value.length <= (schema.minItems || 0)} aria-label=${`${t('remove')}: ${label(index)}`} onClick=${() => remove(index)}>×</button></legend>
         <${Faults} faults=${context.errorsAt([...path, index])} id=${`${fieldId([...path, index])}-item`} />
         <${Body} name=${name} schema=${items} path=${[...path, index]} value=${item} context=${context} />
@@ -546,5 +554,3 @@ export function goTo(place) {
     }
   }
 }
-
-export { at };

@@ -1,6 +1,6 @@
 // The pages beside the calculators: what there is to ask, jobs, kept results, stored models.
 import { html, useState, useEffect, useRef } from './lib.js';
-import { t, number, duration, moment, plural, languageChanged } from './text.js';
+import { t, number, duration, moment } from './text.js';
 import * as api from './api.js';
 import { save } from './result.js';
 
@@ -132,5 +132,3 @@ export function Models({ calculators, models, refreshModels }) {
         <p><label class="button">${t('import_model')} <input type="file" class="hidden" accept=".json,application/json" onChange=${event => load(event.currentTarget.files)} /></label></p>`}
     </main>`;
 }
-
-export { languageChanged, plural };

@@ -18,31 +18,28 @@ export function save(blob, name) {
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }
 
-/** The height that the picture may have. */
-function usePictureHeight() {
-  const measure = () => {
-    const wide = innerWidth >= 900;
-    return Math.round(Math.max(240, Math.min(innerHeight * (wide ? 0.56 : 0.5), 760)));
-  };
-  const [height, setHeight] = useState(measure);
+/** The height that the panels of a picture may have: what is left beside titles, names and a first sentence. */
+function usePictureHeight(panels) {
+  const [size, setSize] = useState([innerWidth, innerHeight]);
   useEffect(() => {
-    const change = () => setHeight(measure());
+    const change = () => setSize([innerWidth, innerHeight]);
     addEventListener('resize', change);
     return () => removeEventListener('resize', change);
   }, []);
-  return height;
+  const around = size[0] > 860 ? 330 : 290;
+  return Math.round(Math.max(240, Math.min(size[1] - around - 34 * panels, 900)));
 }
 
 export function Result({ id, description, answer, problem, running, pinned, pin, job, models, canPick, onPick, stale }) {
   const [chosen, setChosen] = useState(null);
   const [difference, setDifference] = useState(false);
-  const height = usePictureHeight();
   const interim = running?.interim;
+  const figures = answer?.figures || [];
+  const figure = interim || figures.find(({ id: name }) => name === chosen) || figures[0];
+  const height = usePictureHeight(figure?.panels.length || 1);
   if (!answer && !interim) {
     return html`<div class="empty">${problem || running ? '' : html`<p class="late">${t('first_answer')}</p>`}</div>`;
   }
-  const figures = answer?.figures || [];
-  const figure = interim || figures.find(({ id: name }) => name === chosen) || figures[0];
   const twin = pinned && !interim && pinned.key !== answer?.key ? pinned.figures.find(({ id: name }) => name === figure?.id) : null;
   const subtracted = twin && difference ? differenceOf(figure, twin) : null;
   const picks = figure && !interim && !subtracted ? canPick(figure) : null;
@@ -58,6 +55,7 @@ export function Result({ id, description, answer, problem, running, pinned, pin,
         <div class="picture-box">
           ${figure ? html`<${Picture} key=${figure.id} figure=${subtracted && subtracted.panels.length ? subtracted : figure} pinned=${subtracted ? null : twin} height=${height} main onPick=${picks ? (x, y) => onPick(figure, x, y) : null} />`
             : html`<p class="quiet">${t('no_figure')}</p>`}
+          ${stale && html`<p class="stale-note" role="status">${t('stale_note')}</p>`}
           ${picks && html`<p class="quiet hint">${t('click_to_try')}</p>`}
           ${interim && html`<p class="quiet hint">${t('so_far')}</p>`}
         </div>
@@ -82,7 +80,8 @@ export function Result({ id, description, answer, problem, running, pinned, pin,
     </div>`;
 }
 
-const capital = text => text.charAt(0).toUpperCase() + text.slice(1);
+/** Names of fields keep their small letters. */
+const capital = text => (/^[a-z]+_/.test(text) ? text : text.charAt(0).toUpperCase() + text.slice(1));
 const short = text => { const head = text.split(/[:;,(–]/)[0].trim(); return head.length > 34 ? `${head.slice(0, 32)}…` : head; };
 
 function Downloads({ id, description, answer, figure }) {

@@ -1,10 +1,10 @@
 // The page of one calculator or evaluation: the form, the picture that follows it, and the state in the URL.
 import { html, useState, useEffect, useRef, useMemo, useCallback, debounced } from './lib.js';
-import { t, number, duration, language } from './text.js';
+import { t, duration, language } from './text.js';
 import * as api from './api.js';
 import { Form, goTo } from './form.js';
 import { Result } from './result.js';
-import { resolve, kindOf, labelOf, humanised, difference, changed, parts, at, pointer } from './schema.js';
+import { resolve, kindOf, stem, difference, changed, parts } from './schema.js';
 
 /** Longer addresses name the kept result instead of the changes. */
 const LONGEST_QUERY = 1600;
@@ -55,15 +55,15 @@ function fieldsOfAxes(figure, schema, job) {
   const walk = (part, value, path) => {
     const whole = resolve(part, schema);
     if (kindOf(whole) === 'object') for (const [name, inner] of Object.entries(whole.properties)) walk(inner, value?.[name], [...path, name]);
-    else if (kindOf(whole) === 'number' && typeof value === 'number') leaves.push({ path, unit: whole['x-unit'], stem: humanised(path.at(-1), whole['x-unit']).toLowerCase().replace(/ /g, '_'), schema: whole });
+    else if (kindOf(whole) === 'number' && typeof value === 'number') leaves.push({ path, unit: whole['x-unit'], stem: stem(path.at(-1), whole['x-unit']), schema: whole });
   };
   walk(schema, job, []);
-  const find = axis => leaves.find(({ unit, stem }) => unit === axis.unit && (stem === axis.label || axis.label.startsWith(`${stem}_`)));
+  const find = axis => leaves.find(({ unit, stem: name }) => unit === axis.unit && (name === axis.label || axis.label.startsWith(`${name}_`)));
   const [x, y] = [find(figure.x), find(figure.panels[0].y)];
   return x && y && x !== y ? [x, y] : null;
 }
 
-export function Room({ id, query, replace, push, models, refreshJobs, title }) {
+export function Room({ id, query, replace, push, models, refreshJobs }) {
   const [description, setDescription] = useState(null);
   const [missing, setMissing] = useState(null);
   const [libraries, setLibraries] = useState({});
@@ -286,6 +286,7 @@ export function Room({ id, query, replace, push, models, refreshJobs, title }) {
         <button type="button" aria-pressed=${pane === 'picture'} onClick=${() => setPane('picture')}>${t('result')}</button>
       </div>
       <section class="form-pane" aria-label=${t('inputs')}>
+        <h1 class="hidden narrow-title">${description.question}</h1>
         <div class="form-head">
           <label for="example">${t('example')}</label>
           <select id="example" value=${state.baseName.example || ''} onChange=${event => pickExample(event.currentTarget.value)}>
@@ -294,11 +295,11 @@ export function Room({ id, query, replace, push, models, refreshJobs, title }) {
           </select>
           <button type="button" class=${`primary ${waiting ? 'calling' : ''}`} onClick=${() => { runLater.cancel(); run(state.job); }} title="Ctrl+Enter">${waiting ? t('run_changed') : t('run')}</button>
         </div>
-        <${Form} key=${`${id} ${asked.includes('result=') ? 'kept' : state.baseName.example}`} schema=${description.input_schema} value=${state.job} onChange=${change} errors=${faults} libraries=${libraries} models=${(models || []).filter(model => model.calculator === id)} />
+        <${Form} key=${`${id} ${asked.includes('result=') ? 'kept' : state.baseName.example}`} schema=${description.input_schema} value=${state.job} filled=${answer?.answer.input} onChange=${change} errors=${faults} libraries=${libraries} models=${(models || []).filter(model => model.calculator === id)} />
       </section>
       <section class="result-pane" aria-label=${t('result')} aria-busy=${isBusy ? 'true' : 'false'}>
-        <header class="room-head"><h1>${description.question}</h1><p class="summary">${description.title}</p></header>
         <div class=${`work-line ${pending && !running ? 'on' : ''}`} aria-hidden="true"></div>
+        <header class="room-head"><h1>${description.question}</h1><p class="summary">${description.title}</p></header>
         ${running && html`<${Progress} running=${running} stop=${stop} />`}
         ${problem && html`<${Trouble} problem=${problem} onGo=${place => { setPane('form'); setTimeout(() => goTo(place), 30); }} />`}
         <${Result} ...${{ id, description, answer, problem, running, pinned, pin, job: state.job, models, canPick, onPick, stale: Boolean(answer && (problem || waiting)) }} />
@@ -337,6 +338,5 @@ function Trouble({ problem, onGo }) {
     </div>`;
 }
 
-const capital = text => text.charAt(0).toUpperCase() + text.slice(1);
-
-export { at, pointer, labelOf, number };
+/** Names of fields keep their small letters. */
+const capital = text => (/^[a-z]+_/.test(text) ? text : text.charAt(0).toUpperCase() + text.slice(1));

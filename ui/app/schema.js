@@ -96,17 +96,23 @@ export function blank(schema, root, depth = 0) {
   }
 }
 
-/** The suffix that a unit gives to a field's name: `_n_per_mm2`. */
-function suffix(unit) {
-  if (!unit || unit === '1') return '';
-  return `_${unit.toLowerCase().replace(/[()]/g, '').replace(/\//g, '_per_').replace(/[ *]+/g, '_')}`;
+/** What units add to a field's name, the longest first. */
+const SUFFIXES = [
+  'n_mm_per_rad', 'rad_per_n_mm', 'n_per_mm2', 'n_per_mm', 'n_s_per_mm', 'kg_per_m3', 'um_per_m_k', 'um_per_km', 'um_per_rev', 'um_per_n', 'um_per_k', 'mm_per_tooth',
+  'mm_per_rev', 'mm_per_min', 'm_per_min', 'm_per_s2', 'deg_per_rev', 'n_m', 'percent', 'rpm', 'deg', 'rad', 'min', 'hz', 'kw', 'kg', 'km', 'mm', 'um', 'ms', 'n', 'm', 's', 'k', 'h',
+];
+const written = unit => unit.toLowerCase().replace(/[()]/g, '').replace(/\//g, '_per_').replace(/[ *]+/g, '_');
+
+/** A field's name without its unit. */
+export function stem(name, unit) {
+  if (!unit || unit === '1') return name;
+  const tail = [written(unit), ...SUFFIXES].find(suffix => name.endsWith(`_${suffix}`) && name.length > suffix.length + 1);
+  return tail ? name.slice(0, -tail.length - 1) : name;
 }
 
 /** A field's name as words, without its unit. */
 export function humanised(name, unit) {
-  const tail = suffix(unit);
-  const stem = tail && name.endsWith(tail) && name.length > tail.length ? name.slice(0, -tail.length) : name;
-  const words = stem.replace(/_/g, ' ');
+  const words = stem(name, unit).replace(/_/g, ' ');
   return words.charAt(0).toUpperCase() + words.slice(1);
 }
 
