@@ -11,6 +11,7 @@ use super::error::Error;
 use crate::key::{ENGINE_VERSION, Key};
 use crate::registry::{Entry, UnreadableResult};
 use crate::store::{KeptResult, StoreError};
+use crate::text::Language;
 
 /// A job as it came.
 #[derive(Debug, Clone)]
@@ -105,6 +106,13 @@ impl std::fmt::Debug for Stored {
 }
 
 impl Stored {
+    /// The envelope in that language.
+    pub fn body_in(&self, language: Language) -> Bytes {
+        if language == Language::default() {
+            return self.body.clone();
+        }
+        super::envelope::in_language(&self.body, language).into()
+    }
     /// Which calculator made it.
     pub fn entry(&self) -> &Arc<Entry> {
         &self.entry

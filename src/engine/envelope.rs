@@ -7,7 +7,7 @@ use super::json;
 use super::read::Ready;
 use crate::key::ENGINE_VERSION;
 use crate::registry::{ResultNotes, append_result, non_finite_place};
-use crate::text::{Language, Notice, Remark, Texts};
+use crate::text::{Language, Notice, Remark, Texts, reworded};
 
 /// Runs a job and writes the envelope of its result, in English, in one buffer from the first byte to the last.
 pub(crate) fn write(ready: &Ready, monitor: &dyn Monitor) -> Result<Vec<u8>, Failure> {
@@ -40,6 +40,22 @@ pub(crate) fn write(ready: &Ready, monitor: &dyn Monitor) -> Result<Vec<u8>, Fai
     field(&mut body, "basis", &basis)?;
     body.push(b'}');
     Ok(ready.entry.answer_written(body))
+}
+
+/// An envelope with its sentences in another language; as it is where it cannot be taken apart.
+pub(crate) fn in_language(body: &[u8], language: Language) -> Vec<u8> {
+    let mut said = body.to_vec();
+    if language == Language::default() {
+        return said;
+    }
+    for name in ["warnings", "explanation"] {
+        if let Some(place) = json::top_level_field(&said, name)
+            && let Some(again) = reworded(name, &said[place.clone()], language)
+        {
+            said.splice(place, again);
+        }
+    }
+    said
 }
 
 /// Begins a field.

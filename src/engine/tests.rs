@@ -376,11 +376,15 @@ fn conforms(registry: &Registry, entry: &Entry) {
         let input = ready.prepared.input().unwrap();
         assert_eq!(ready.canonical, serde_json_canonicalizer::to_vec(&input).unwrap());
         for message in &computed.explanation {
-            texts.try_word(Language::En, "explanation", message.code, &message.values).unwrap();
+            for language in Language::ALL {
+                texts.try_word(language, "explanation", message.code, &message.values).unwrap();
+            }
             assert!(meta.codes.contains(message.code), "{} utters the undeclared {}", meta.id, message.code);
         }
         for warning in &computed.warnings {
-            texts.try_finding(Language::En, "warning", warning).unwrap();
+            for language in Language::ALL {
+                texts.try_finding(language, "warning", warning).unwrap();
+            }
             assert!(meta.codes.contains(warning.code), "{} utters the undeclared {}", meta.id, warning.code);
         }
         let stored = solve_now(registry, meta.id, body(), &Unwatched).unwrap();

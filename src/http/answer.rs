@@ -19,7 +19,7 @@ use super::problem::Problem;
 use super::{CACHE_STATE, codes};
 use crate::engine::{CacheState, Stored, Timings};
 use crate::render;
-use crate::text::{Language, Texts};
+use crate::text::{Glossary, Language, Texts, fingerprint};
 
 const SERVER_TIMING: HeaderName = HeaderName::from_static("server-timing");
 
@@ -89,7 +89,12 @@ impl View {
         tag.push('"');
         tag.push_str(stored.key.to_string().trim_start_matches("b3:"));
         let part = self.part.as_deref().unwrap_or_default();
-        let _ = write!(tag, "-{}-{part}-{}\"", self.media.short(), self.language.tag());
+        let _ = write!(tag, "-{}-{part}-{}", self.media.short(), self.language.tag());
+        // What is put into words when it is asked for changes with the words.
+        if self.media == Media::Svg || (self.media == Media::Json && self.language != Language::default()) {
+            let _ = write!(tag, "-{}", fingerprint(self.language));
+        }
+        tag.push('"');
         tag
     }
 }
@@ -103,11 +108,11 @@ pub(super) async fn respond(stored: Arc<Stored>, view: View, condition: &HeaderM
         response
     } else {
         let (media, language) = (view.media, view.language);
-        let body = if media == Media::Json {
+        let body = if media == Media::Json && language == Language::default() {
             stored.body.clone()
         } else {
             let stored = stored.clone();
-            // Reading an answer back and drawing it is work: not on the threads that move bytes.
+            // Reading an answer back, wording and drawing it is work: not on the threads that move bytes.
             tokio::task::spawn_blocking(move || rendered(&stored, &view)).await.map_err(|_| Problem::internal())??
         };
         let mut response = Response::new(Body::from(body));
@@ -150,13 +155,13 @@ fn value(text: String) -> HeaderValue {
 }
 
 /// An answer in some form, as the command line writes it: `part` is the table or figure, the first if `None`.
-pub fn written(stored: &Stored, media: Media, part: Option<&str>) -> Result<Bytes, Problem> {
+pub fn written(stored: &Stored, media: Media, part: Option<&str>, language: Language) -> Result<Bytes, Problem> {
     let meta = stored.entry().meta();
     let offered = offered(meta);
     if !offered.contains(&media) {
         return Err(not_acceptable(&offered));
     }
-    rendered(stored, &View { media, part: part.map(ToOwned::to_owned), language: Language::default() })
+    rendered(stored, &View { media, part: part.map(ToOwned::to_owned), language })
 }
 
 fn not_acceptable(offered: &[Media]) -> Problem {
@@ -167,7 +172,7 @@ fn not_acceptable(offered: &[Media]) -> Problem {
 fn rendered(stored: &Stored, view: &View) -> Result<Bytes, Problem> {
     let wanted = |id: &str| view.part.as_deref().is_none_or(|part| part == id);
     let text = match view.media {
-        Media::Json => return Ok(stored.body.clone()),
+        Media::Json => return Ok(stored.body_in(view.language)),
         Media::Csv => {
             let tables = stored.tables()?;
             let table = tables.iter().find(|table| wanted(table.id));
@@ -202,8 +207,11 @@ fn drawn(figure: &Figure, language: Language) -> String {
         &render::Wording {
             message: &|message| texts.message(language, "figure", message),
             label: &|code| label(figure, code, language),
-            unit: &|unit| render::unit_symbol(unit),
-            decimal: '.',
+            unit: &|unit| match language {
+                Language::En => render::unit_symbol(unit),
+                Language::Ru => Glossary::of(language).unit(unit),
+            },
+            decimal: language.decimal(),
         },
     )
 }

@@ -38,6 +38,8 @@ use crate::config::{Config, Limits};
 use crate::engine::{Engine, Error};
 
 pub use answer::written;
+#[cfg(test)]
+pub(crate) use pages::DESCRIPTION;
 pub use codes::CODES;
 pub use negotiate::Media;
 pub use problem::{Problem, ProblemDocument};

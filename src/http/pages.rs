@@ -12,7 +12,7 @@ use super::calculators::wants_page;
 use super::document::Document;
 use super::problem::Problem;
 use super::{App, codes, negotiate, workbench};
-use crate::text::{Language, Texts};
+use crate::text::{Glossary, Language, Texts};
 
 const HTML: &str = "text/html; charset=utf-8";
 const DOCS: &str = include_str!("../../ui/docs/index.html");
@@ -70,17 +70,18 @@ pub(super) struct ProblemPage {
     help: String,
 }
 
-const DESCRIPTION: &str =
+pub(crate) const DESCRIPTION: &str =
     "What to know before the cut: how accurate it will be, and what to change so that it is accurate.";
 
 /// `GET /`
 pub(super) async fn landing(State(app): State<App>, headers: HeaderMap) -> Result<Response, Problem> {
     let rooms: Vec<_> = app.engine.registry().entries().iter().map(|entry| *entry.meta()).collect();
     if !wants_page(&headers) {
+        let language = negotiate::language(&headers);
         let landing = Landing {
             name: "precut",
             engine: env!("CARGO_PKG_VERSION"),
-            description: DESCRIPTION,
+            description: Glossary::of(language).help(DESCRIPTION),
             links: LandingLinks {
                 calculators: "/v1/calculators",
                 results: "/v1/results",
@@ -90,7 +91,7 @@ pub(super) async fn landing(State(app): State<App>, headers: HeaderMap) -> Resul
             },
             calculators: rooms.iter().map(|meta| format!("/v1/{}", meta.id)).collect(),
         };
-        return Ok(Document::json(&landing, Some(Language::En)).respond(&headers));
+        return Ok(Document::json(&landing, Some(language)).respond(&headers));
     }
     workbench::index(&headers)
 }
@@ -124,13 +125,16 @@ pub(super) async fn problem(
         return Ok(Document::json(&explained, Some(language)).respond(&headers));
     }
     let title = escaped(&explained.title);
+    let label = |code| escaped(&Texts::shared().word(language, "label", code, &Values::new()));
     let body = format!(
-        "<h1>{title}</h1><p><code>{}</code>, status {}</p><p>{}</p><p><a href=\"/docs\">Documentation</a></p>",
+        "<h1>{title}</h1><p><code>{}</code>, {} {}</p><p>{}</p><p><a href=\"/docs\">{}</a></p>",
         escaped(&explained.code),
+        label("page_status"),
         explained.status,
-        escaped(&explained.help)
+        escaped(&explained.help),
+        label("page_documentation"),
     );
-    Ok(Document::new(page(&title, &body), HTML, Some(language)).respond(&headers))
+    Ok(Document::new(page(&title, &body, language), HTML, Some(language)).respond(&headers))
 }
 
 /// The service's own problems, and those by which a calculator says that a job has no answer.
@@ -149,17 +153,18 @@ fn explain(app: &App, code: &str, language: Language) -> Option<ProblemPage> {
     let owner = app.engine.registry().entries().iter().find(|entry| entry.meta().codes.contains(code))?;
     Some(ProblemPage {
         code: code.to_owned(),
-        title: code.replace('_', " "),
+        title: texts.problem(language, "infeasible", &none).0,
         status: 422,
-        help: format!("{}: {}", owner.meta().title, help("infeasible")),
+        help: format!("{}: {}", Glossary::of(language).help(owner.meta().title), help("infeasible")),
     })
 }
 
-fn page(title: &str, body: &str) -> String {
+fn page(title: &str, body: &str, language: Language) -> String {
     format!(
-        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
+        "<!doctype html>\n<html lang=\"{tag}\"><head><meta charset=\"utf-8\">\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"><title>{title}</title>\
-         <link rel=\"stylesheet\" href=\"/docs/page.css\"></head><body><main>{body}</main></body></html>\n"
+         <link rel=\"stylesheet\" href=\"/docs/page.css\"></head><body><main>{body}</main></body></html>\n",
+        tag = language.tag(),
     )
 }
 

@@ -17,7 +17,7 @@ use super::document::Document;
 use super::problem::Problem;
 use super::{App, answer, negotiate};
 use crate::engine::{Key, Stored};
-use crate::text::{Language, Texts};
+use crate::text::{Glossary, Language, Texts};
 
 /// The figures of an answer, as data.
 #[derive(Debug, Serialize, ToSchema)]
@@ -168,9 +168,10 @@ fn shown(table: Table, language: Language) -> ResultTable {
     let texts = Texts::shared();
     let columns = table.columns.into_iter().map(|column| {
         let name = column.name.into_owned();
-        let text = match texts.has(language, "label", &name) {
-            true => texts.word(language, "label", &name, &Values::new()),
-            false => name.replace('_', " "),
+        let text = if texts.has(language, "label", &name) {
+            texts.word(language, "label", &name, &Values::new())
+        } else {
+            Glossary::of(language).word(&name)
         };
         let cells = match column.cells {
             Cells::Numbers(cells) => cells.into_iter().map(|cell| json!(cell)).collect(),
