@@ -1,7 +1,7 @@
 // A form from a schema. Nothing here knows a calculator.
 import { html, useState, useEffect, useRef, useMemo, unique } from './lib.js';
-import { t, typed, parsed, number, unitSymbol } from './text.js';
-import { resolve, kindOf, variants, variantOf, blank, labelOf, humanised, symbolParts, range, pointer, at, changed } from './schema.js';
+import { t, typed, parsed, number, unitOf } from './text.js';
+import { resolve, kindOf, variants, variantOf, variantName, blank, labelOf, wordOf, symbolParts, range, pointer, at, changed } from './schema.js';
 import { TableInput } from './table-input.js';
 
 /** Most columns of a list that is shown as a grid. */
@@ -57,7 +57,7 @@ export function Form({ schema, value, filled, onChange, errors, libraries, model
         ${asked.map(entry => section(entry, true))}
         ${usual.map(entry => section(entry, false))}
         ${[...loose].map(([group, entries]) => html`
-          <${Fold} key=${`group-${group}`} title=${t(`group_${group}`)} open=${true} errors=${entries.reduce((sum, { name }) => sum + context.errorsBelow([name]), 0)}>
+          <${Fold} key=${`group-${group}`} title=${entries[0].schema['x-group-label'] || t(`group_${group}`)} open=${true} errors=${entries.reduce((sum, { name }) => sum + context.errorsBelow([name]), 0)}>
             <${Fields} entries=${entries} path=${[]} value=${value} required=${required} context=${context} />
           <//>`)}
         ${further.length > 0 && html`<h2 class="divider">${t('further_settings')}</h2>`}
@@ -121,15 +121,16 @@ function Section({ name, schema, path, value, open, required, context }) {
 /** What a folded part holds, in a few words. */
 function summary(schema, value, root) {
   if (value === undefined || value === null) return t('not_set');
-  if (Array.isArray(value)) return value.every(part => typeof part === 'string') ? value.map(word => humanised(word)).join(', ') : `${value.length}`;
+  if (Array.isArray(value)) return value.every(part => typeof part === 'string') ? value.map(word => wordOf(schema.items && resolve(schema.items, root), word)).join(', ') : `${value.length}`;
   if (typeof value !== 'object') return String(value);
   if (value.csv) return 'CSV';
   const words = [];
+  const shape = schema.properties ? schema : variantOf(variants(schema, root), value)?.schema;
   for (const [name, part] of Object.entries(value)) {
+    const inner = resolve(shape?.properties?.[name] || {}, root);
     if (typeof part === 'number') {
-      const inner = resolve(schema.properties?.[name] || {}, root);
-      words.push(`${number(part, 4)} ${unitSymbol(inner['x-unit'])}`.trim());
-    } else if (typeof part === 'string') words.push(humanised(part).toLowerCase());
+      words.push(`${number(part, 4)} ${unitOf(inner)}`.trim());
+    } else if (typeof part === 'string') words.push(inner.enum ? wordOf(inner, part).toLowerCase() : part);
     if (words.length === 3) break;
   }
   return words.join(' · ');
@@ -200,7 +201,7 @@ function Field(props) {
 
 function rangeText(schema) {
   const { low, high, openLow, openHigh } = range(schema);
-  const unit = unitSymbol(schema['x-unit']);
+  const unit = unitOf(schema);
   const tail = unit ? ` ${unit}` : '';
   if (low !== undefined && high !== undefined) return `${openLow ? '>' : ''}${number(low)} … ${openHigh ? '<' : ''}${number(high)}${tail}`;
   if (low !== undefined) return `${openLow ? '>' : '≥'} ${number(low)}${tail}`;
@@ -210,7 +211,7 @@ function rangeText(schema) {
 
 const defaultText = schema => {
   if (schema.default === undefined || schema.default === null || typeof schema.default === 'object') return '';
-  return t('default_is', { value: typeof schema.default === 'number' ? number(schema.default) : schema.default === true ? t('yes') : schema.default === false ? t('no') : humanised(String(schema.default)) });
+  return t('default_is', { value: typeof schema.default === 'number' ? number(schema.default) : schema.default === true ? t('yes') : schema.default === false ? t('no') : wordOf(schema, schema.default) });
 };
 
 /** Label, control, unit, and the words of the service where the value is at fault. */
@@ -222,7 +223,7 @@ function Row({ name, schema, path, value, required, context, control: Control, c
   const allowed = kindOf(schema) === 'number' ? rangeText(schema) : '';
   const show = () => context.setHelp({ label, symbol: schema['x-symbol'], range: allowed, description });
   const [wrong, setWrong] = useState(null);
-  const unit = unitSymbol(schema['x-unit']);
+  const unit = unitOf(schema);
   const common = {
     id, schema, value, context, label,
     set: (part, how) => context.set(path, part, how),
@@ -334,7 +335,7 @@ function TextInput({ id, value, schema, set, described, invalid, label, required
 }
 
 /** The service's words for the values of an enumeration, where it has any. */
-const optionText = (schema, value) => schema['x-labels']?.[value] || humanised(String(value));
+const optionText = (schema, value) => wordOf(schema, value);
 
 function Enum({ id, schema, value, set, described, invalid, label, required, context }) {
   const fallback = schema.default;
@@ -391,7 +392,7 @@ function Choice({ schema, path, value, context }) {
     }
     context.set(path, fresh);
   };
-  const name = ({ schema: part, value: tag }) => part['x-label'] || (tag ? humanised(tag) : t(`form_${kindOf(part)}`));
+  const name = variant => variantName(variant, context.root) ?? t(`form_${kindOf(variant.schema)}`);
   const show = () => context.setHelp({ label: name(now), description: now.schema.description });
   return html`
     <div class="row" onMouseEnter=${show} onFocusIn=${show}>
@@ -427,7 +428,7 @@ function List({ name, schema, path, value, context }) {
   return html`
     ${isGrid && value.length > 0 ? html`
       <div class="grid-scroll"><table class="grid">
-        <thead><tr>${plain.map(field => html`<th scope="col" title=${field.schema.description}>${labelOf(field.name, field.schema)}<span class="unit">${unitSymbol(field.schema['x-unit'])}</span></th>`)}<th><span class="hidden">${t('remove')}</span></th></tr></thead>
+        <thead><tr>${plain.map(field => html`<th scope="col" title=${field.schema.description}>${labelOf(field.name, field.schema)}<span class="unit">${unitOf(field.schema)}</span></th>`)}<th><span class="hidden">${t('remove')}</span></th></tr></thead>
         <tbody>${shown.map((row, index) => html`<tr key=${index}>
           ${plain.map(field => html`<td><${Cell} field=${field} path=${[...path, index, field.name]} value=${row[field.name]} required=${(items.required || []).includes(field.name)} context=${context} row=${label(index)} /></td>`)}
           <td><button type="button" class="icon" disabled=${value.length <= (schema.minItems || 0)} aria-label=${`${t('remove')}: ${label(index)}`} onClick=${() => remove(index)}>×</button></td>
@@ -435,7 +436,7 @@ function List({ name, schema, path, value, context }) {
       </table></div>`
     : shown.map((item, index) => html`
       <fieldset class="item" key=${index} id=${fieldId([...path, index])}>
-        <legend><span><span class="hidden">${labelOf(name, schema)} </span>${index + 1}${kindOf(items) === 'choice' ? ` · ${humanised(String(variantOf(variants(items, context.root), item).value ?? ''))}` : ''}</span>
+        <legend><span><span class="hidden">${labelOf(name, schema)} </span>${index + 1}${kindOf(items) === 'choice' ? ` · ${variantName(variantOf(variants(items, context.root), item), context.root) ?? ''}` : ''}</span>
           <button type="button" class="icon" disabled=${value.length <= (schema.minItems || 0)} aria-label=${`${t('remove')}: ${label(index)}`} onClick=${() => remove(index)}>×</button></legend>
         <${Faults} faults=${context.errorsAt([...path, index])} id=${`${fieldId([...path, index])}-item`} />
         <${Body} name=${name} schema=${items} path=${[...path, index]} value=${item} context=${context} />
@@ -498,7 +499,7 @@ function Numbers({ name, schema, path, value, context }) {
   return html`
     <div class="line"><input id=${id} type="text" aria-label=${`${labelOf(name, schema)} (${t('numbers_hint')})`} placeholder=${t('numbers_hint')} value=${draft ?? value.map(typed).join('; ')}
       aria-invalid=${wrong ? 'true' : undefined} onInput=${event => take(event.currentTarget.value)} onBlur=${() => { if (!wrong) setDraft(null); }} />
-    <span class="unit">${unitSymbol(schema['x-unit'] || schema.items['x-unit'])}</span></div>
+    <span class="unit">${unitOf(schema['x-unit'] ? schema : schema.items)}</span></div>
     <${Faults} faults=${wrong ? [{ detail: t('not_a_number') }] : []} id=${`${id}-fault`} />`;
 }
 

@@ -1,9 +1,9 @@
 // What a run gave: the picture, a sentence, and everything else behind tabs.
 import { html, useState, useEffect, useMemo, useRef } from './lib.js';
-import { t, number, unitSymbol, plural, moment } from './text.js';
+import { t, number, unitSymbol, unitOf, plural, moment } from './text.js';
 import * as api from './api.js';
 import { Picture, differenceOf } from './figure.js';
-import { resolve, humanised } from './schema.js';
+import { resolve, humanised, labelOf, wordOf } from './schema.js';
 
 /** Rows of a table shown at once. */
 const TABLE_ROWS = 200;
@@ -122,7 +122,7 @@ function Tabs({ id, description, answer, pinned, job }) {
       </div>
       <div role="tabpanel" id="tab-panel" aria-labelledby=${`tab-${current}`} tabindex="0">
         ${current === 'values' && html`<${Values} schema=${description.output_schema} result=${answer.answer.result} pinned=${pinned && pinned.key !== answer.key ? pinned.answer.result : null} />`}
-        ${current === 'tables' && html`<${Tables} answerKey=${answer.key} id=${id} />`}
+        ${current === 'tables' && html`<${Tables} answerKey=${answer.key} id=${id} labels=${description.labels} />`}
         ${current === 'program' && html`<${Program} answerKey=${answer.key} />`}
         ${current === 'basis' && html`<${Basis} body=${answer.answer} description=${description} />`}
         ${current === 'request' && html`<${RequestView} id=${id} job=${job} answer=${answer} />`}
@@ -131,19 +131,19 @@ function Tabs({ id, description, answer, pinned, job }) {
 }
 
 /** The single numbers and words of a result, by groups. */
-function flat(schema, value, root, path = [], out = []) {
+function flat(schema, value, root, path = [], out = [], names = []) {
   const whole = resolve(schema || {}, root);
   if (value === null || value === undefined || Array.isArray(value)) return out;
   if (typeof value === 'object') {
     const shape = whole.oneOf ? whole.oneOf.map(form => resolve(form, root)).find(form => Object.keys(value).every(name => form.properties?.[name])) || whole : whole;
-    for (const [name, part] of Object.entries(value)) flat(shape.properties?.[name], part, root, [...path, name], out);
+    for (const [name, part] of Object.entries(value)) flat(shape.properties?.[name], part, root, [...path, name], out, [...names, labelOf(name, resolve(shape.properties?.[name] || {}, root))]);
     return out;
   }
-  out.push({ path, value, unit: whole['x-unit'], description: whole.description, label: whole['x-label'] || humanised(path.at(-1), whole['x-unit']), group: path.length > 1 ? path.slice(0, -1).map(part => humanised(part)).join(' · ') : '' });
+  out.push({ path, value, unit: unitOf(whole), description: whole.description, schema: whole, label: labelOf(path.at(-1), whole), group: names.slice(0, -1).join(' · ') });
   return out;
 }
 
-const shownValue = (value, digits = 5) => (typeof value === 'number' ? number(value, digits) : value === true ? t('yes') : value === false ? t('no') : humanised(String(value)));
+const shownValue = (value, schema) => (typeof value === 'number' ? number(value, 5) : value === true ? t('yes') : value === false ? t('no') : schema?.enum ? wordOf(schema, value) : String(value));
 
 function Values({ schema, result, pinned }) {
   const rows = useMemo(() => flat(schema, result, schema), [schema, result]);
@@ -156,14 +156,15 @@ function Values({ schema, result, pinned }) {
         <thead class=${before ? '' : 'hidden'}><tr><th scope="col">${t('name')}</th><th scope="col">${t('value')}</th>${before && html`<th scope="col">${t('pinned_value')}</th><th scope="col">${t('difference')}</th>`}<th scope="col">${t('unit')}</th></tr></thead>
         <tbody>${rows.filter(row => row.group === group).map(row => {
           const other = before?.get(row.path.join('/'));
-          return html`<tr key=${row.path.join('/')}><th scope="row" title=${row.description}>${row.label}</th><td>${shownValue(row.value)}</td>
-            ${before && html`<td>${other === undefined ? '' : shownValue(other)}</td><td>${typeof other === 'number' && typeof row.value === 'number' ? `${row.value > other ? '+' : ''}${number(row.value - other, 3)}` : ''}</td>`}
-            <td class="unit">${unitSymbol(row.unit)}</td></tr>`;
+          return html`<tr key=${row.path.join('/')}><th scope="row" title=${row.description}>${row.label}</th><td>${shownValue(row.value, row.schema)}</td>
+            ${before && html`<td>${other === undefined ? '' : shownValue(other, row.schema)}</td><td>${typeof other === 'number' && typeof row.value === 'number' ? `${row.value > other ? '+' : ''}${number(row.value - other, 3)}` : ''}</td>`}
+            <td class="unit">${row.unit}</td></tr>`;
         })}</tbody>
       </table>`)}</div>`;
 }
 
-function Tables({ answerKey, id }) {
+function Tables({ answerKey, id, labels }) {
+  const titled = name => (labels?.[name] ? capital(labels[name]) : humanised(name));
   const [tables, setTables] = useState(null);
   const [chosen, setChosen] = useState(0);
   const [rows, setRows] = useState(TABLE_ROWS);
@@ -179,10 +180,10 @@ function Tables({ answerKey, id }) {
   const table = tables[Math.min(chosen, tables.length - 1)];
   const count = Math.max(0, ...table.columns.map(({ cells }) => cells.length));
   return html`
-    <div class="bar">${tables.length > 1 && html`<label>${t('table')} <select value=${chosen} onChange=${event => { setChosen(Number(event.currentTarget.value)); setRows(TABLE_ROWS); }}>${tables.map(({ id: name }, index) => html`<option value=${index}>${humanised(name)}</option>`)}</select></label>`}
+    <div class="bar">${tables.length > 1 && html`<label>${t('table')} <select value=${chosen} onChange=${event => { setChosen(Number(event.currentTarget.value)); setRows(TABLE_ROWS); }}>${tables.map(({ id: name }, index) => html`<option value=${index}>${titled(name)}</option>`)}</select></label>`}
       <span class="quiet">${plural('rows', count)}</span>
       <button type="button" onClick=${async () => save(await api.file(answerKey, 'text/csv', `?table=${table.id}`), `${id}-${table.id}.csv`)}>CSV</button></div>
-    <div class="grid-scroll tall" tabindex="0" role="region" aria-label=${humanised(table.id)}><table class="grid still">
+    <div class="grid-scroll tall" tabindex="0" role="region" aria-label=${titled(table.id)}><table class="grid still">
       <thead><tr>${table.columns.map(({ text, unit }) => html`<th scope="col">${capital(text)} <span class="unit">${unitSymbol(unit)}</span></th>`)}</tr></thead>
       <tbody>${Array.from({ length: Math.min(rows, count) }, (_, row) => html`<tr key=${row}>${table.columns.map(({ cells, unit }) => html`<td class=${unit === '' ? 'word' : ''}>${cells[row] === null || cells[row] === undefined ? '' : typeof cells[row] === 'number' ? number(cells[row], 6) : humanised(String(cells[row]))}</td>`)}</tr>`)}</tbody>
     </table></div>
@@ -267,7 +268,7 @@ function Sheet({ description, body, job }) {
   return html`
     <section class="sheet" aria-hidden="true">
       <h2>${t('inputs')}</h2>
-      <ul>${rows.slice(0, 120).map(row => html`<li key=${row.path.join('/')}>${row.group ? `${row.group}: ` : ''}${row.label} ${shownValue(row.value)} ${unitSymbol(row.unit)}</li>`)}</ul>
+      <ul>${rows.slice(0, 120).map(row => html`<li key=${row.path.join('/')}>${row.group ? `${row.group}: ` : ''}${row.label} ${shownValue(row.value, row.schema)} ${row.unit}</li>`)}</ul>
       <p>precut ${body.engine} · ${body.calculator} ${t('version')} ${body.version} · ${body.key} · ${moment(new Date().toISOString())}</p>
     </section>`;
 }

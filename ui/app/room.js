@@ -12,6 +12,8 @@ const LONGEST_QUERY = 1600;
 const LIVE_LIMIT_MS = 1500;
 const TYPING_PAUSE_MS = 220;
 const HISTORY_PAUSE_MS = 900;
+/** Between two attempts to reach a service that is away. */
+const LONGEST_PAUSE_MS = 15000;
 /** Words of the address that are no pointers. */
 const OWN = ['example', 'result', 'run', 'pin', 'model'];
 
@@ -171,8 +173,10 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
         await new Promise(resolve_ => setTimeout(resolve_, 1000 * (error.retryAfter || 1)));
         if (!signal.aborted) return run(job, again + 1);
       } else if (error instanceof api.Unreachable) {
+        // Asked again ever more rarely: what was typed is computed when the service is back.
         fail(error);
-        const stop = api.online.watch(isOn => { if (isOn) { stop(); if (!signal.aborted && alive.current) run(job); } });
+        await new Promise(resolve_ => setTimeout(resolve_, Math.min(1000 * 2 ** again, LONGEST_PAUSE_MS)));
+        if (!signal.aborted && alive.current) return run(job, again + 1);
       } else fail(error);
     }
   }, [id, watch, tell]);

@@ -116,8 +116,18 @@ export function humanised(name, unit) {
   return words.charAt(0).toUpperCase() + words.slice(1);
 }
 
+const capital = text => text.charAt(0).toUpperCase() + text.slice(1);
+
 /** What a field is called: the service's own label, or its name. */
-export const labelOf = (name, schema) => schema['x-label'] || humanised(name, schema['x-unit']);
+export const labelOf = (name, schema) => (schema.title ? capital(schema.title) : humanised(name, schema['x-unit']));
+
+/** What a word of an enumeration is called. */
+export const wordOf = (schema, word) => capital(schema?.['x-labels']?.[word] || humanised(String(word)));
+
+/** What a variant of a choice is called: by the label of its tag. */
+export function variantName({ schema, tag, value }, root) {
+  return tag ? wordOf(resolve(schema.properties[tag], root), value) : null;
+}
 
 /** A symbol as print writes it: `D_0` as its parts. */
 const GREEK = {

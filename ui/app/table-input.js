@@ -1,7 +1,7 @@
 // A measured table: dropped, chosen or pasted as CSV; its columns and units are matched with what is needed and
 // shown for confirmation. What is sent is CSV with the headers that the service knows: the service converts units.
 import { html, useState, useRef, useMemo, unique } from './lib.js';
-import { t, plural, number, unitSymbol } from './text.js';
+import { t, plural, number, unitSymbol, unitOf } from './text.js';
 import { resolve, labelOf } from './schema.js';
 
 /** Units of one dimension: the service converts between them. */
@@ -158,7 +158,7 @@ function Preview({ rows, columns, label }) {
   const shown = all ? rows.slice(0, 500) : rows.slice(0, 4);
   return html`
     <div class="grid-scroll" tabindex="0" role="region" aria-label=${label}><table class="grid still">
-      <thead><tr>${used.map(({ name, schema }) => html`<th scope="col" title=${schema.description}>${labelOf(name, schema)} <span class="unit">${unitSymbol(schema['x-unit'])}</span></th>`)}</tr></thead>
+      <thead><tr>${used.map(({ name, schema }) => html`<th scope="col" title=${schema.description}>${labelOf(name, schema)} <span class="unit">${unitOf(schema)}</span></th>`)}</tr></thead>
       <tbody>${shown.map((row, index) => html`<tr key=${index}>${used.map(({ name }) => html`<td>${typeof row[name] === 'number' ? number(row[name]) : row[name] === true ? t('yes') : row[name] ?? ''}</td>`)}</tr>`)}</tbody>
     </table></div>
     ${rows.length > shown.length && html`<button type="button" class="more" onClick=${() => setAll(true)}>${t('show_all', { count: Math.min(rows.length, 500) })}</button>`}`;
@@ -186,7 +186,7 @@ function Matching({ draft, setDraft, columns, missing, accept, cancel, label }) 
               ${file.header.map((title, index) => html`<option value=${index}>${title || `${index + 1}`}${file.rows[0]?.[index] ? ` (${file.rows[0][index]} …)` : ''}</option>`)}
             </select></td>
             <td>${schema['x-unit'] && match && (units.length > 1 ? html`<select aria-label=${`${labelOf(name, schema)}: ${t('unit')}`} value=${match.unit} onChange=${event => set(name, { ...match, unit: event.currentTarget.value })}>
-              ${units.map(unit => html`<option value=${unit}>${unitSymbol(unit) || '1'}</option>`)}</select>` : unitSymbol(schema['x-unit']))}</td>
+              ${units.map(unit => html`<option value=${unit}>${unitSymbol(unit) || '1'}</option>`)}</select>` : unitOf(schema))}</td>
           </tr>`;
         })}</tbody></table>
       ${!all && columns.length > shown.length && html`<button type="button" class="more" onClick=${() => setAll(true)}>${t('more_fields', { count: columns.length - shown.length })}</button>`}

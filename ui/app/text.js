@@ -103,3 +103,6 @@ export function unitSymbol(unit) {
     .replace(/([A-Za-zµ]+)(-?\d*)/g, (_, word, power) => spell(word) + superscript(power))
     .replace(/[* ]/g, '·');
 }
+
+/** The unit of a field as it is printed. */
+export const unitOf = schema => schema?.['x-unit-label'] ?? unitSymbol(schema?.['x-unit']);
