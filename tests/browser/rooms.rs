@@ -61,6 +61,8 @@ fn a_changed_number_changes_the_picture_and_the_address() {
     page.until(&format!("document.querySelector('{FEED}').value !== '0.26' && {SETTLED}"));
     page.evaluate("history.back()");
     page.until(&format!("document.querySelector('{FEED}').value === '0.26' && {SETTLED}"));
+    page.evaluate("history.back()");
+    page.until(&format!("document.querySelector('{FEED}').value !== '0.26' && {SETTLED}"));
     page.assert_calm();
 }
 

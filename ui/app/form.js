@@ -27,7 +27,7 @@ class Context {
 export const fieldId = path => `field${pointer(path).replace(/[^A-Za-z0-9_]/g, '-')}`;
 
 /** The form of a job. `errors` are those of a problem document; `libraries` the choices of `x-library` fields. */
-export function Form({ schema, value, filled, onChange, errors, libraries, models, disabled }) {
+export function Form({ schema, value, filled, onChange, errors, libraries, models, examples, disabled }) {
   const [help, setHelp] = useState(null);
   const root = schema;
   const byPointer = useMemo(() => {
@@ -36,8 +36,12 @@ export function Form({ schema, value, filled, onChange, errors, libraries, model
     return map;
   }, [errors]);
   const context = new Context({ root, filled, errors: byPointer, libraries, models, setHelp, disabled, set: (path, part, how) => onChange(changed(value, path, part), how) });
-  const top = resolve(schema, root);
-  const all = Object.entries(top.properties || {}).map(([name, part]) => ({ name, schema: resolve(part, root) }));
+  const whole = resolve(schema, root);
+  // A family of jobs, told apart by one field.
+  const family = kindOf(whole) === 'choice' ? variants(whole, root) : null;
+  const member = family && variantOf(family, value);
+  const top = member ? member.schema : whole;
+  const all = Object.entries(top.properties || {}).map(([name, part]) => ({ name, schema: resolve(part, root) })).filter(entry => kindOf(entry.schema) !== 'constant');
   const required = new Set(top.required || []);
   const isSection = ({ schema: part }) => ['object', 'choice', 'array', 'table', 'map', 'json'].includes(kindOf(part));
   const sections = all.filter(isSection);
@@ -54,6 +58,12 @@ export function Form({ schema, value, filled, onChange, errors, libraries, model
   return html`
     <form class="form" onSubmit=${event => { event.preventDefault(); onChange(value, 'run'); }} novalidate aria-label=${t('inputs')}>
       <div class="sections">
+        ${member && html`<div class="family"><div class="row"><label class="label" for="family">${labelOf(member.tag, resolve(top.properties[member.tag], root))}</label>
+          <span class="control wide"><select id="family" value=${family.indexOf(member)} onChange=${event => {
+            const chosen = family[Number(event.currentTarget.value)];
+            const example = Object.values(examples || {}).find(job => job[chosen.tag] === chosen.value);
+            onChange(example || blank(chosen.schema, root));
+          }}>${family.map((variant, index) => html`<option value=${index}>${variantName(variant, root)}</option>`)}</select></span></div></div>`}
         ${asked.map(entry => section(entry, true))}
         ${usual.map(entry => section(entry, false))}
         ${[...loose].map(([group, entries]) => html`
@@ -266,6 +276,11 @@ function nudged(value, schema, direction, shift) {
 function NumberInput({ id, schema, value, filled, set, setWrong, described, invalid, label, unit, required, context }) {
   const [draft, setDraft] = useState(null);
   const [isFocused, setFocused] = useState(false);
+  // The value may change under a draft: by the way back, by a click in the picture.
+  useEffect(() => {
+    const read = draft === null ? null : parsed(draft);
+    if (draft !== null && !Number.isNaN(read) && !Object.is(read ?? undefined, value)) setDraft(null);
+  }, [value]);
   // All digits only while they may be edited.
   const shown = draft ?? (isFocused || typeof value !== 'number' ? typed(value) : typed(Number(value.toPrecision(7))));
   const take = text => {
@@ -450,6 +465,10 @@ function Cell({ field, path, value, required, context, row }) {
   const [draft, setDraft] = useState(null);
   const faults = context.errorsAt(path);
   const label = labelOf(field.name, field.schema);
+  useEffect(() => {
+    const typed_ = draft === null ? null : parsed(draft);
+    if (draft !== null && !Number.isNaN(typed_) && !Object.is(typed_ ?? undefined, value)) setDraft(null);
+  }, [value]);
   const read = draft === null ? value : parsed(draft);
   const wrong = Number.isNaN(read) || (required && read === null);
   const show = () => context.setHelp({ label, symbol: field.schema['x-symbol'], range: rangeText(field.schema), description: [field.schema.description, defaultText(field.schema)].join(' ') });

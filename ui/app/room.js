@@ -86,13 +86,17 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
   const alive = useRef(true);
   useEffect(() => () => { alive.current = false; control.current?.abort(); stopFollowing.current?.(); }, []);
 
+  /** Whether a change waits to become an entry of the history. */
+  const isUnwritten = useRef(false);
   const tell = useCallback((job, key, run, how) => {
+    if (how === 'replace' && isUnwritten.current) return;
     const next = written(queryOf(now.current.state, job, key, run, now.current.pinned?.key));
     if (next === ownQuery.current) return;
     ownQuery.current = next;
     (how === 'push' ? push : replace)(next);
   }, [push, replace]);
   const pushLater = useMemo(() => debounced(() => {
+    isUnwritten.current = false;
     const { state: current, answer: shown, running: run } = now.current;
     if (alive.current && current) tell(current.job, shown?.job === current.job ? shown.key : null, run?.id, 'push');
   }, HISTORY_PAUSE_MS), [tell]);
@@ -250,6 +254,7 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
   const change = (job, how) => {
     setState({ ...state, job });
     now.current.state = { ...state, job };
+    isUnwritten.current = true;
     pushLater();
     if (how === 'run') { runLater.cancel(); run(job); return; }
     if (!isLive.current) { setWaiting(true); return; }
@@ -299,7 +304,7 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
           </select>
           <button type="button" class=${`primary ${waiting ? 'calling' : ''}`} onClick=${() => { runLater.cancel(); run(state.job); }} title="Ctrl+Enter">${waiting ? t('run_changed') : t('run')}</button>
         </div>
-        <${Form} key=${`${id} ${asked.includes('result=') ? 'kept' : state.baseName.example}`} schema=${description.input_schema} value=${state.job} filled=${answer?.answer.input} onChange=${change} errors=${faults} libraries=${libraries} models=${(models || []).filter(model => model.calculator === id)} />
+        <${Form} key=${`${id} ${asked.includes('result=') ? 'kept' : state.baseName.example}`} schema=${description.input_schema} value=${state.job} filled=${answer?.answer.input} onChange=${change} errors=${faults} examples=${description.jobs} libraries=${libraries} models=${(models || []).filter(model => model.calculator === id)} />
       </section>
       <section class="result-pane" aria-label=${t('result')} aria-busy=${isBusy ? 'true' : 'false'}>
         <div class=${`work-line ${pending && !running ? 'on' : ''}`} aria-hidden="true"></div>
