@@ -17,7 +17,7 @@ mod template;
 
 pub(crate) use described::described;
 pub(crate) use glossary::Glossary;
-pub(crate) use kept::reworded;
+pub(crate) use kept::{reworded, reworded_rows};
 pub use language::Language;
 pub use notice::{Notice, Remark};
 pub(crate) use number::significant;
@@ -366,7 +366,9 @@ mod tests {
             texts.message(Language::Ru, "explanation", &message)
         };
         assert_eq!(said(1.0), "83,5 %, 1,04 мкм, 250,5 мм, мкм/Н, 1 точка, a, b, 1,5; 2, 1,2e-7");
-        for (count, noun) in [(2.0, "2 точки"), (5.0, "5 точек"), (11.0, "11 точек"), (21.0, "21 точка"), (1.5, "1,5 точки")] {
+        for (count, noun) in
+            [(2.0, "2 точки"), (5.0, "5 точек"), (11.0, "11 точек"), (21.0, "21 точка"), (1.5, "1,5 точки")]
+        {
             assert!(said(count).contains(noun), "{count}");
         }
     }

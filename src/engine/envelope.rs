@@ -7,7 +7,7 @@ use super::json;
 use super::read::Ready;
 use crate::key::ENGINE_VERSION;
 use crate::registry::{ResultNotes, append_result, non_finite_place};
-use crate::text::{Language, Notice, Remark, Texts, reworded};
+use crate::text::{Language, Notice, Remark, Texts, reworded, reworded_rows};
 
 /// Runs a job and writes the envelope of its result, in English, in one buffer from the first byte to the last.
 pub(crate) fn write(ready: &Ready, monitor: &dyn Monitor) -> Result<Vec<u8>, Failure> {
@@ -49,13 +49,22 @@ pub(crate) fn in_language(body: &[u8], language: Language) -> Vec<u8> {
         return said;
     }
     for name in ["warnings", "explanation"] {
-        if let Some(place) = json::top_level_field(&said, name)
-            && let Some(again) = reworded(name, &said[place.clone()], language)
-        {
-            said.splice(place, again);
-        }
+        replace(&mut said, name, |text| reworded(name, text, language));
+    }
+    // Only a study's rows have sentences of their own.
+    if said.starts_with(br#"{"calculator":"studies""#) {
+        replace(&mut said, "result", |text| reworded_rows(text, language));
     }
     said
+}
+
+/// Puts what is made of a field of the envelope in its place.
+fn replace(body: &mut Vec<u8>, name: &str, make: impl FnOnce(&[u8]) -> Option<Vec<u8>>) {
+    if let Some(place) = json::top_level_field(body, name)
+        && let Some(again) = make(&body[place.clone()])
+    {
+        body.splice(place, again);
+    }
 }
 
 /// Begins a field.

@@ -243,7 +243,10 @@ pub(super) struct CalculatorDescription {
 
 /// The list of calculators.
 pub(super) fn listed(registry: &Registry, language: Language) -> CalculatorList {
-    CalculatorList { items: registry.entries().iter().map(|entry| summary(entry.meta(), language)).collect(), next: None }
+    CalculatorList {
+        items: registry.entries().iter().map(|entry| summary(entry.meta(), language)).collect(),
+        next: None,
+    }
 }
 
 /// A calculator's description.
@@ -287,7 +290,11 @@ fn summary(meta: &Meta, language: Language) -> CalculatorSummary {
         title: said(meta.title),
         question: said(meta.question),
         summary: said(meta.summary),
-        examples: meta.examples.iter().map(|example| ExampleSummary { id: example.id, title: said(example.title) }).collect(),
+        examples: meta
+            .examples
+            .iter()
+            .map(|example| ExampleSummary { id: example.id, title: said(example.title) })
+            .collect(),
         links: CalculatorLinks { this: format!("/v1/calculators/{}", meta.id), solve: format!("/v1/{}", meta.id) },
     }
 }

@@ -71,7 +71,8 @@ pub(super) struct Documents {
 impl Documents {
     pub(super) fn new(registry: &Registry) -> Self {
         let each_language = |make: &dyn Fn(Language) -> Document| Language::ALL.map(|tag| (tag, make(tag))).into();
-        let calculators = each_language(&|language| Document::json(&calculators::listed(registry, language), Some(language)));
+        let calculators =
+            each_language(&|language| Document::json(&calculators::listed(registry, language), Some(language)));
         let calculator = registry
             .entries()
             .iter()

@@ -38,10 +38,10 @@ use crate::config::{Config, Limits};
 use crate::engine::{Engine, Error};
 
 pub use answer::written;
-#[cfg(test)]
-pub(crate) use pages::DESCRIPTION;
 pub use codes::CODES;
 pub use negotiate::Media;
+#[cfg(test)]
+pub(crate) use pages::DESCRIPTION;
 pub use problem::{Problem, ProblemDocument};
 pub use server::serve;
 

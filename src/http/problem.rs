@@ -309,10 +309,11 @@ impl From<Failure> for Problem {
             }
             Failure::OutOfModel(finding) => Self::without_answer("out_of_model", finding),
             Failure::NotConverged { what, residual, iterations } => {
-                Self::new(StatusCode::UNPROCESSABLE_ENTITY, "not_converged")
+                let problem = Self::new(StatusCode::UNPROCESSABLE_ENTITY, "not_converged")
                     .with("what", what)
-                    .with("residual", residual)
-                    .with("iterations", f64::from(iterations))
+                    .with("iterations", f64::from(iterations));
+                // Solvers that fail before their first residual have none.
+                if residual.is_finite() { problem.with("residual", residual) } else { problem }
             }
             Failure::Internal(cause) => {
                 tracing::error!(cause, "a calculation failed");

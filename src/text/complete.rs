@@ -16,11 +16,68 @@ const TRANSLATIONS: [Language; 1] = [Language::Ru];
 
 /// Words in Latin letters that Russian texts have beside the names of the contract: protocols, standards, names.
 const LATIN: &[&str] = &[
-    "Accept", "After", "Allow", "Authorization", "Bearer", "Clarabel", "Content", "Encoding", "GET", "Idempotency",
-    "Infinity", "Kennametal", "Key", "Kienzle", "Language", "Levenberg", "Location", "Marquardt", "NaN", "Pointer",
-    "Prefer", "RONt", "Retry", "Sandvik", "Schema", "Type", "Bootstrap", "Accept-Language", "Content-Location",
-    "log", "ln", "null", "true", "false", "data", "form", "application", "multipart", "json", "openapi", "docs", "jobs",
-    "events", "calculators", "materials", "csv", "inf", "nan", "max", "min", "sin", "cos", "tan", "atan", "exp", "lim",
+    // Protocols, formats, programs, standards, names.
+    "Accept",
+    "After",
+    "Allow",
+    "Authorization",
+    "Bearer",
+    "Content",
+    "Encoding",
+    "Fanuc",
+    "GET",
+    "Idempotency",
+    "Infinity",
+    "Key",
+    "LinuxCNC",
+    "Location",
+    "NaN",
+    "RONt",
+    "RONp",
+    "RONv",
+    "RONq",
+    "Retry",
+    "Siemens",
+    "1.4301",
+    "angle",
+    "application",
+    "calculators",
+    "csv",
+    "data",
+    "docs",
+    "errors",
+    "events",
+    "form",
+    "jobs",
+    "json",
+    "materials",
+    "money",
+    "multipart",
+    "openapi",
+    "percent",
+    "rad",
+    "rough",
+    // Symbols of formulas.
+    "alpha",
+    "delta",
+    "dn",
+    "dp",
+    "dw",
+    "dx",
+    "exp",
+    "ln",
+    "lambda",
+    "log",
+    "mu",
+    "ph",
+    "phi",
+    "rho",
+    "tau",
+    // Values of JSON.
+    "false",
+    "inf",
+    "null",
+    "true",
 ];
 
 /// Names of templates without their language, by language.
@@ -78,7 +135,8 @@ fn every_sentence_says_the_same_values_in_every_language() {
 fn plain(template: &str) -> String {
     let mut text = String::new();
     let mut rest = template;
-    while let Some(start) = rest.find(['{']).filter(|start| matches!(rest.as_bytes().get(start + 1), Some(b'{' | b'%'))) {
+    while let Some(start) = rest.find(['{']).filter(|start| matches!(rest.as_bytes().get(start + 1), Some(b'{' | b'%')))
+    {
         text.push_str(&rest[..start]);
         text.push(' ');
         let close = if rest.as_bytes()[start + 1] == b'{' { "}}" } else { "%}" };
@@ -217,7 +275,9 @@ fn every_label_help_and_word_is_there_in_every_language() {
             }
         }
         for ((component, field), place) in &asked.label {
-            if glossary.get("label", field).is_none() && glossary.get("label", &format!("{component}.{field}")).is_none() {
+            if glossary.get("label", field).is_none()
+                && glossary.get("label", &format!("{component}.{field}")).is_none()
+            {
                 missing.insert(format!("[label] {field} = \"\"  # {place}"));
             }
         }
@@ -298,7 +358,8 @@ fn leftovers_are_found() {
         assert_eq!(leftovers(text, &names), expected, "{text}");
     }
     assert_eq!(plain("a {{ {'x': 'y'}[z] }} b{% if c %}d{% endif %}"), "a   b d ");
-    assert_eq!(quoted("{{ n | plural('один', 'two') }} {{ {'key': 'value'}[x] }} {{ y | default('z') }}"), [
-        "один", "two", "value"
-    ]);
+    assert_eq!(
+        quoted("{{ n | plural('один', 'two') }} {{ {'key': 'value'}[x] }} {{ y | default('z') }}"),
+        ["один", "two", "value"]
+    );
 }

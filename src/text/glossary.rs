@@ -241,7 +241,9 @@ mod tests {
 
     #[test]
     fn what_libraries_say_keeps_what_they_quote() {
-        let own = glossary("[reason]\n\"unknown field `*`, expected *\" = \"поле `*` неизвестно, ожидается *\"\nend = \"конец\"");
+        let own = glossary(
+            "[reason]\n\"unknown field `*`, expected *\" = \"поле `*` неизвестно, ожидается *\"\nend = \"конец\"",
+        );
         assert_eq!(own.reason("unknown field `tabel`, expected `table`"), "поле `tabel` неизвестно, ожидается `table`");
         assert_eq!(own.reason("end"), "конец");
         assert_eq!(own.reason("something else"), "something else");

@@ -22,6 +22,21 @@ pub(crate) fn reworded(field: &str, text: &[u8], language: Language) -> Option<V
     serde_json::to_vec(&again).ok()
 }
 
+/// The result of a parameter study that `text` holds as JSON, with the reasons of its rows in `language`.
+pub(crate) fn reworded_rows(text: &[u8], language: Language) -> Option<Vec<u8>> {
+    let mut result: Value = serde_json::from_slice(text).ok()?;
+    for row in result["rows"].as_array_mut()? {
+        let Some(Value::Object(mut told)) = row.get("detail_values").cloned() else { continue };
+        told.insert("code".to_owned(), row["code"].clone());
+        if let Some(finding) = finding(&told.into())
+            && let Ok(said) = Texts::shared().try_finding(language, "fault", &finding)
+        {
+            row["detail"] = said.into();
+        }
+    }
+    serde_json::to_vec(&result).ok()
+}
+
 fn remark(item: &Value, language: Language) -> Option<Value> {
     let message = Message { code: interned(item["code"].as_str()?), values: values(item.get("values"))? };
     Texts::shared().try_word(language, "explanation", message.code, &message.values).ok()?;

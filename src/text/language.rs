@@ -79,10 +79,13 @@ mod tests {
 
     #[test]
     fn the_language_is_negotiated() {
-        for header in ["", "en", "en-GB, fr;q=0.5", "xx", "*", "fr;q=0.9, en;q=0.1", "garbage;;q=,", "en, ru", "ru;q=0"] {
+        for header in ["", "en", "en-GB, fr;q=0.5", "xx", "*", "fr;q=0.9, en;q=0.1", "garbage;;q=,", "en, ru", "ru;q=0"]
+        {
             assert_eq!(Language::negotiate(header), Language::En, "{header}");
         }
-        for header in ["ru", "RU", "ru-RU", "ru-RU,ru;q=0.9,en-US;q=0.8", "ru, en", "fr, ru;q=0.1", "en;q=0.3, ru;q=0.4"] {
+        for header in
+            ["ru", "RU", "ru-RU", "ru-RU,ru;q=0.9,en-US;q=0.8", "ru, en", "fr, ru;q=0.1", "en;q=0.3, ru;q=0.4"]
+        {
             assert_eq!(Language::negotiate(header), Language::Ru, "{header}");
         }
         // Anything but English is Russian here; a weight that is none is no wish.

@@ -169,13 +169,17 @@ fn what_a_table_cannot_see_is_said() {
 /// Fit of the reference's set at its own step: 0.134 and 0.216; with the step refined near the jumps 0.165 and 0.231.
 #[test]
 fn the_papers_tables_are_predicted_with_their_differences() {
-    for (id, name, rms) in [("paper_screw_vise", "table1_type1", 0.17), ("paper_pneumatic_vise", "table2_type2", 0.24)] {
+    for (id, name, rms) in [("paper_screw_vise", "table1_type1", 0.17), ("paper_pneumatic_vise", "table2_type2", 0.24)]
+    {
         let answer = solve(&example(id));
         let got = &answer.output;
         let want = reference("identified.json")[name]["rows"].as_array().unwrap().clone();
         assert_eq!(got.rows.len(), want.len());
         for (row, want) in got.rows.iter().zip(&want) {
-            assert_eq!((f64::from(row.teeth), Some(row.depth_mm)), (want["z"].as_f64().unwrap(), want["depth_mm"].as_f64()));
+            assert_eq!(
+                (f64::from(row.teeth), Some(row.depth_mm)),
+                (want["z"].as_f64().unwrap(), want["depth_mm"].as_f64())
+            );
             let fine = 1e3 * want["single_delay_p2p_fine_mm"].as_f64().unwrap();
             // Rounded to 0.1 um; in chatter the reference's own step leaves some percent, and 160 periods just above the
             // onset do not see it grow out.
@@ -183,7 +187,10 @@ fn the_papers_tables_are_predicted_with_their_differences() {
             assert!((row.simulated_um - fine).abs() < within, "{name} {row:?}, reference {fine}");
             assert!(row.simulated_error_um <= 0.02 * row.simulated_um, "{row:?}");
         }
-        assert_eq!((got.regeneration, got.fit.rows), (Regeneration::Single, if id == "paper_screw_vise" { 25 } else { 24 }));
+        assert_eq!(
+            (got.regeneration, got.fit.rows),
+            (Regeneration::Single, if id == "paper_screw_vise" { 25 } else { 24 })
+        );
         assert!(got.fit.rms_log < rms && got.fit.median_log < 0.12, "{:?}", got.fit);
         assert!(got.onsets.len() == 3 && got.onsets.iter().all(|onset| onset.within), "{:?}", got.onsets);
         assert!(got.parameters.is_empty() && got.evaluations == 2);
@@ -261,7 +268,10 @@ fn faults_are_named_all_at_once() {
         job["cut"].as_object_mut().unwrap().remove("feed_mm_per_tooth");
         job["unknowns"] = json!({ "spindle_speed_rpm": [100, 1000] });
     });
-    assert!(found.contains(&("row_feed_missing".to_owned(), "/measurements/0/feed_mm_per_tooth".to_owned())), "{found:?}");
+    assert!(
+        found.contains(&("row_feed_missing".to_owned(), "/measurements/0/feed_mm_per_tooth".to_owned())),
+        "{found:?}"
+    );
     assert!(found.contains(&("unknown_stated_elsewhere".to_owned(), "/unknowns/spindle_speed_rpm".to_owned())));
 }
 
