@@ -15,11 +15,13 @@ mod metrics;
 mod negotiate;
 pub mod openapi;
 mod pages;
+mod parts;
 mod prefer;
 mod problem;
 mod rate;
 mod results;
 mod server;
+mod workbench;
 
 use std::net::IpAddr;
 use std::ops::Deref;
@@ -119,6 +121,7 @@ struct Peer {
 pub fn router(app: &App) -> Router {
     let mut router = Router::new()
         .route("/", get(pages::landing))
+        .route("/ui/{version}/{*file}", get(workbench::file))
         .route("/docs", get(pages::docs))
         .route("/docs/{file}", get(pages::docs_file))
         .route("/problems/{code}", get(pages::problem))
@@ -134,6 +137,9 @@ pub fn router(app: &App) -> Router {
         .route("/v1/jobs/{id}/events", get(events::follow))
         .route("/v1/results", get(results::list))
         .route("/v1/results/{key}", get(results::read))
+        .route("/v1/results/{key}/figures", get(parts::figures))
+        .route("/v1/results/{key}/tables", get(parts::tables))
+        .route("/v1/results/{key}/job", get(parts::job))
         .route("/v1/materials", get(materials::list))
         .route("/v1/materials/{id}", get(materials::read))
         .route("/v1/{calculator}", any(unknown_calculator));
