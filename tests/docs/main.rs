@@ -120,7 +120,7 @@ fn every_setting_of_the_operations_page_exists() {
         names.try_fold(first, |value, name| value.map(|value| value.get(name))).flatten().is_some()
     };
     let text = Document::read(root(), "docs/operations.md").text;
-    let sections = ["log.", "limits.", "cache.", "shutdown.", "cors.", "auth."];
+    let sections = ["log.", "limits.", "jobs.", "cache.", "shutdown.", "cors.", "auth."];
     let named: Vec<&str> = text
         .split('`')
         .skip(1)
