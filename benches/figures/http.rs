@@ -1,12 +1,14 @@
 //! The service as a process of its own, beside a bare axum handler that answers with the same bytes.
 //!
-//! Both get the same requests from the same client over one kept connection, in turns; compared is the CPU
-//! time that each server's threads take, from the system's own count.
+//! Both get the same requests from the same client over one kept connection, in turns. Compared is the CPU time that
+//! each server's threads take, from the system's own count, with all that goes on behind the answers; or the time that
+//! the client waits. Client and servers share the machine, so what the client itself takes is in the latter for both.
 
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use axum::Router;
@@ -19,6 +21,8 @@ use crate::measure::Measured;
 const PRECUT: &str = env!("CARGO_BIN_EXE_precut");
 /// Names the file whose bytes the bare server answers with; tells this program that it is that server.
 const BARE: &str = "PRECUT_BENCH_BARE";
+/// What the bare server does for its answer.
+const WORK: &str = "PRECUT_BENCH_WORK";
 const ROUNDS: usize = 15;
 const REQUESTS: usize = 300;
 
@@ -26,28 +30,61 @@ const REQUESTS: usize = 300;
 pub(crate) struct Exchange {
     pub(crate) path: String,
     /// The body of the n-th request; the first is asked once before, so that equal ones are cached.
-    pub(crate) body: Box<dyn Fn(usize) -> Vec<u8>>,
+    pub(crate) body: Box<dyn Fn(usize) -> Vec<u8> + Sync>,
 }
 
-/// CPU time of the service per request, as a multiple of the bare handler's.
-pub(crate) fn ratio(exchange: &Exchange) -> Result<Measured, String> {
+/// What a bare handler does between a request and its answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Bare {
+    /// Takes the body in and sends bytes from memory.
+    Sends,
+    /// Parses the body as JSON and sends bytes from memory.
+    Parses,
+    /// Parses the body as JSON and writes the answer as JSON, number by number.
+    Writes,
+}
+
+impl Bare {
+    const ALL: [(Self, &str); 3] = [(Self::Sends, "sends"), (Self::Parses, "parses"), (Self::Writes, "writes")];
+
+    fn word(self) -> &'static str {
+        Self::ALL.iter().find(|(bare, _)| *bare == self).map_or("", |(_, word)| word)
+    }
+}
+
+/// What is compared.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Clock {
+    /// Time on a core of all threads of the server.
+    ServerCpu,
+    /// From the first byte of a request to the last of its answer.
+    Wall,
+}
+
+/// What a request costs, as a multiple of what it costs with the bare handler.
+pub(crate) fn ratio(exchange: &Exchange, bare: Bare, clock: Clock) -> Result<Measured, String> {
     let folder = tempfile::tempdir().map_err(fault)?;
     let service = Server::precut(folder.path())?;
     let mut to_service = Client::connect(&service.address)?;
     let answer = to_service.post(&exchange.path, &(exchange.body)(0))?;
     let file = folder.path().join("answer");
     std::fs::write(&file, &answer).map_err(fault)?;
-    let bare = Server::bare(&file)?;
+    let bare = Server::bare(&file, bare)?;
     let mut to_bare = Client::connect(&bare.address)?;
 
     let mut sent = 0;
     let mut block = |client: &mut Client, server: &Server| -> Result<f64, String> {
-        let before = server.cpu_time()?;
-        for _ in 0..REQUESTS {
-            sent += 1;
-            client.post(&exchange.path, &(exchange.body)(sent))?;
+        // The client makes its requests before the clock runs.
+        let bodies: Vec<Vec<u8>> = (0..REQUESTS).map(|number| (exchange.body)(sent + number + 1)).collect();
+        sent += REQUESTS;
+        let (before, begun) = (server.cpu_time()?, Instant::now());
+        for body in &bodies {
+            client.post(&exchange.path, body)?;
         }
-        Ok(server.cpu_time()? - before)
+        Ok(match clock {
+            Clock::ServerCpu => server.cpu_time()? - before,
+            Clock::Wall => begun.elapsed().as_secs_f64(),
+        })
     };
     block(&mut to_service, &service)?;
     block(&mut to_bare, &bare)?;
@@ -70,6 +107,75 @@ pub(crate) fn start(path: &str, body: &[u8]) -> Result<Measured, String> {
         })
         .collect();
     Measured::of(times?)
+}
+
+/// Requests timed under load.
+const PROBES: usize = 300;
+/// Pause between them: the load is not to be theirs.
+const PAUSE: Duration = Duration::from_millis(10);
+
+/// Wall time of one request after another while every core computes for others: the slowest one of a hundred, with the
+/// median and the slowest of all as its spread. `load` are jobs that keep a core for some hundred milliseconds each.
+pub(crate) fn latency_under_load(probe: &Exchange, load: &Exchange) -> Result<Measured, String> {
+    let folder = tempfile::tempdir().map_err(fault)?;
+    let service = Server::precut(folder.path())?;
+    let done = AtomicBool::new(false);
+    let (computed, times) = std::thread::scope(|scope| {
+        // Twice as many as there are cores, each with the next job as soon as it has the answer to the last.
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        let bodies: Vec<Vec<Vec<u8>>> = (0..2 * cores)
+            .map(|lane| (0..LOAD).map(|count| (load.body)(1 + lane + 2 * cores * count)).collect())
+            .collect();
+        let (service, done, path) = (&service, &done, &load.path);
+        let lanes: Vec<_> = bodies
+            .into_iter()
+            .map(|bodies| {
+                scope.spawn(move || -> Result<usize, String> {
+                    let mut client = Client::connect(&service.address)?;
+                    let mut count = 0;
+                    for body in bodies.iter().cycle() {
+                        if done.load(Ordering::Relaxed) {
+                            break;
+                        }
+                        let (status, _) = client.send("POST", path, body)?;
+                        count += usize::from(status.contains(" 200 "));
+                    }
+                    Ok(count)
+                })
+            })
+            .collect();
+        let times = probes(service, probe);
+        done.store(true, Ordering::Relaxed);
+        let computed: Result<Vec<usize>, String> =
+            lanes.into_iter().map(|lane| lane.join().map_err(|_| "a client ended".to_owned())?).collect();
+        (computed, times)
+    });
+    let (computed, mut times) = (computed?.iter().sum::<usize>(), times?);
+    if computed < 4 {
+        return Err(format!("only {computed} jobs were computed meanwhile"));
+    }
+    times.sort_by(f64::total_cmp);
+    let at = |share: usize| times[(times.len() - 1) * share / 100];
+    Ok(Measured { median: at(99), low: at(50), high: at(100) })
+}
+
+/// Different jobs of the load; more of them would be prepared than asked for.
+const LOAD: usize = 200;
+
+fn probes(service: &Server, probe: &Exchange) -> Result<Vec<f64>, String> {
+    // The load has to be there first.
+    std::thread::sleep(Duration::from_millis(500));
+    let mut client = Client::connect(&service.address)?;
+    (0..PROBES)
+        .map(|count| {
+            std::thread::sleep(PAUSE);
+            let body = (probe.body)(count);
+            let start = Instant::now();
+            let (status, _) = client.send(if body.is_empty() { "GET" } else { "POST" }, &probe.path, &body)?;
+            let took = start.elapsed().as_secs_f64();
+            if status.contains(" 200 ") { Ok(took) } else { Err(format!("{}: {status}", probe.path)) }
+        })
+        .collect()
 }
 
 /// Resident memory after the start, before any request.
@@ -121,9 +227,9 @@ impl Server {
         Self::spawn(command)
     }
 
-    fn bare(answer: &Path) -> Result<Self, String> {
+    fn bare(answer: &Path, bare: Bare) -> Result<Self, String> {
         let mut command = Command::new(std::env::current_exe().map_err(fault)?);
-        command.env(BARE, answer);
+        command.env(BARE, answer).env(WORK, bare.word());
         Self::spawn(command)
     }
 
@@ -173,8 +279,14 @@ impl Client {
 
     /// The body of the answer, which must be 200.
     fn post(&mut self, path: &str, body: &[u8]) -> Result<Vec<u8>, String> {
+        let (status, answer) = self.send("POST", path, body)?;
+        if status.contains(" 200 ") { Ok(answer) } else { Err(format!("{path}: {status}")) }
+    }
+
+    /// The first line of the answer, and its body.
+    fn send(&mut self, method: &str, path: &str, body: &[u8]) -> Result<(String, Vec<u8>), String> {
         let head = format!(
-            "POST {path} HTTP/1.1\r\nhost: {}\r\ncontent-type: application/json\r\naccept: application/json\r\n\
+            "{method} {path} HTTP/1.1\r\nhost: {}\r\ncontent-type: application/json\r\naccept: application/json\r\n\
              content-length: {}\r\n\r\n",
             self.host,
             body.len()
@@ -196,7 +308,7 @@ impl Client {
         }
         let mut answer = vec![0; length.ok_or("an answer without a length")?];
         self.stream.read_exact(&mut answer).map_err(fault)?;
-        if status.contains(" 200 ") { Ok(answer) } else { Err(format!("{path}: {status}")) }
+        Ok((status, answer))
     }
 }
 
@@ -209,10 +321,21 @@ pub(crate) fn is_bare_server() -> bool {
     std::env::var_os(BARE).is_some()
 }
 
-/// Reads every request's body and answers with the bytes of the file.
+/// Answers every request with the bytes of the file, after the work that is asked for.
 pub(crate) fn serve_bare() -> io::Result<()> {
     let answer = Bytes::from(std::fs::read(std::env::var_os(BARE).unwrap_or_default())?);
-    let handler = move |_: Bytes| std::future::ready(([(CONTENT_TYPE, "application/json")], answer.clone()));
+    let numbers: Value = serde_json::from_slice(&answer).unwrap_or_default();
+    let work = std::env::var(WORK).unwrap_or_default();
+    let work = Bare::ALL.iter().find(|(_, word)| *word == work).map_or(Bare::Sends, |(bare, _)| *bare);
+    let handler = move |body: Bytes| {
+        let is_job = work == Bare::Sends || serde_json::from_slice::<Value>(&body).is_ok_and(|job| job.is_object());
+        let body = match work {
+            _ if !is_job => Bytes::new(),
+            Bare::Writes => serde_json::to_vec(&numbers).unwrap_or_default().into(),
+            Bare::Sends | Bare::Parses => answer.clone(),
+        };
+        std::future::ready(([(CONTENT_TYPE, "application/json")], body))
+    };
     // As many threads as the service has for its connections.
     tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?.block_on(async {
         let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await?;

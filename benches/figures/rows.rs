@@ -9,7 +9,7 @@ use crate::Row;
 use crate::deflection;
 use crate::fitting;
 use crate::fixture;
-use crate::http::{self, Exchange};
+use crate::http::{self, Bare, Clock, Exchange};
 use crate::measure::{Measured, Unit, cpu_time};
 use crate::ring;
 use crate::roundness;
@@ -100,7 +100,38 @@ pub(crate) fn all() -> Vec<Row> {
         row("SVG, 3 panels of 201 stations", Unit::Time, None, None, || svg(201)),
         row("SVG, 3 panels of 100,000 stations", Unit::Time, None, None, || svg(100_000)),
         row("cached answer over HTTP against a bare handler", Unit::Ratio, Some(2.5), Some(1.6), cached),
-        row("fresh deflection profile over HTTP against a bare handler", Unit::Ratio, Some(2.0), Some(1.3), fresh),
+        row(
+            "fresh deflection profile over HTTP, the client's wait, against a handler that parses the job and sends as \
+             many bytes",
+            Unit::Ratio,
+            Some(2.0),
+            Some(1.3),
+            || fresh(Bare::Parses, Clock::Wall),
+        ),
+        row(
+            "the same fresh profile, CPU time of the server with that of keeping the result",
+            Unit::Ratio,
+            Some(2.0),
+            Some(1.3),
+            || fresh(Bare::Parses, Clock::ServerCpu),
+        ),
+        row(
+            "fresh deflection profile, the client's wait, against a handler that parses the job and writes as many \
+             numbers as JSON",
+            Unit::Ratio,
+            None,
+            None,
+            || fresh(Bare::Writes, Clock::Wall),
+        ),
+        row(
+            "the same fresh profile against that handler, CPU time of the server with that of keeping the result",
+            Unit::Ratio,
+            None,
+            None,
+            || fresh(Bare::Writes, Clock::ServerCpu),
+        ),
+        row("health while every core computes: slowest of 100, wall time", Unit::Time, Some(0.05), Some(0.02), health),
+        row("small fresh answer while every core computes: slowest of 100, wall time", Unit::Time, None, None, small),
         row("start to first answer, wall time", Unit::Time, Some(0.3), Some(0.1), start),
         row("idle memory", Unit::Size, Some(60e6), Some(25e6), http::idle_memory),
         row("binary", Unit::Size, Some(40e6), Some(20e6), http::binary_size),
@@ -163,17 +194,39 @@ fn svg(stations: u32) -> Result<Measured, String> {
 
 fn cached() -> Result<Measured, String> {
     let body = http::example(DEFLECTION)?.to_string().into_bytes();
-    http::ratio(&Exchange { path: format!("/v1/{DEFLECTION}"), body: Box::new(move |_| body.clone()) })
+    let exchange = Exchange { path: format!("/v1/{DEFLECTION}"), body: Box::new(move |_| body.clone()) };
+    http::ratio(&exchange, Bare::Sends, Clock::ServerCpu)
 }
 
-fn fresh() -> Result<Measured, String> {
+fn fresh(bare: Bare, clock: Clock) -> Result<Measured, String> {
     let mut job = http::example(DEFLECTION)?;
     job["detail"] = "profile".into();
     if job.pointer(DEFLECTION_VARIED).is_none() {
         return Err(format!("the example has no {DEFLECTION_VARIED}"));
     }
     let body = Box::new(move |count| http::varied(&job, DEFLECTION_VARIED, count));
-    http::ratio(&Exchange { path: format!("/v1/{DEFLECTION}"), body })
+    http::ratio(&Exchange { path: format!("/v1/{DEFLECTION}"), body }, bare, clock)
+}
+
+fn health() -> Result<Measured, String> {
+    let probe = Exchange { path: "/health/live".to_owned(), body: Box::new(|_| Vec::new()) };
+    http::latency_under_load(&probe, &load()?)
+}
+
+fn small() -> Result<Measured, String> {
+    let job = http::example(DEFLECTION)?;
+    let body = Box::new(move |count| http::varied(&job, DEFLECTION_VARIED, count));
+    http::latency_under_load(&Exchange { path: format!("/v1/{DEFLECTION}"), body }, &load()?)
+}
+
+/// Large jobs, each another one.
+fn load() -> Result<Exchange, String> {
+    /// None of those that are asked for meanwhile.
+    const BEYOND: usize = 1_000_000;
+    let mut job = http::example(DEFLECTION)?;
+    job["stations"] = serde_json::json!({"kind": "per_zone", "count": 50_000});
+    let body = Box::new(move |count| http::varied(&job, DEFLECTION_VARIED, BEYOND + count));
+    Ok(Exchange { path: format!("/v1/{DEFLECTION}"), body })
 }
 
 fn start() -> Result<Measured, String> {

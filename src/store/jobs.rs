@@ -15,6 +15,9 @@ use uuid::{ContextV7, Timestamp, Uuid};
 use super::{KeptResult, StoreError};
 use crate::key::Key;
 
+/// Starts after which a job that takes its process along is given up.
+pub(crate) const MOST_ATTEMPTS: u32 = 3;
+
 /// A job's name, in the order of time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct JobId(Uuid);
@@ -113,8 +116,6 @@ words! {
     JobKind {
         /// One answer of one calculator.
         Calculation = "calculation",
-        /// Many answers of one calculator.
-        Study = "study",
     }
 }
 

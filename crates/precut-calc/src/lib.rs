@@ -25,6 +25,8 @@ pub fn register(registrar: &mut impl Registrar) {
     registrar.with_forward_model::<deflection_compensation::DeflectionCompensation>();
     registrar.with_forward_model::<ring_roundness::RingRoundness>();
     registrar.calculator::<ring_roundness::evaluation::RoundnessEvaluation>();
+    registrar.with_forward_model::<feed_schedule::FeedSchedule>();
     registrar.calculator::<feed_schedule::fit::MachinabilityFit>();
     registrar.with_forward_model::<fixture_stability::FixtureStability>();
+    registrar.calculator::<fixture_stability::identification::FixtureIdentification>();
 }

@@ -70,6 +70,24 @@ fn impossible_geometry_is_refused_at_its_field() {
     assert!(codes(&beside).contains(&"tool_at_support"), "{:?}", codes(&beside));
 }
 
+/// What a field alone is guilty of is its schema's to say; the rules between fields add no consequences of it.
+#[test]
+fn a_number_that_is_no_good_draws_no_other_faults() {
+    for (pointer, value) in [
+        ("/ring/radius_mm", json!(0)),
+        ("/supports/distance_mm", json!(0)),
+        ("/tool/feed_mm_per_rev", json!(-0.1)),
+        ("/tool/revolutions", json!(0)),
+    ] {
+        assert_eq!(codes(&with(pointer, value)), Vec::<&str>::new(), "{pointer}");
+    }
+    let mut reversed = points(36, 150.0).as_array().unwrap().clone();
+    reversed.reverse();
+    let found = codes(&measured(json!(reversed)));
+    assert!(found.iter().all(|code| *code == "angles_not_ascending"), "{found:?}");
+    assert_eq!(found.len(), 35);
+}
+
 #[test]
 fn a_tip_that_never_touches_is_told_the_gap() {
     // 0.9 mm clear of the largest diameter and 0.05 mm of travel.
@@ -322,4 +340,115 @@ fn search_says_what_is_out_of_reach_and_what_would_help() {
     });
     let found = run(&job).output.roundness_um.unwrap();
     assert!((found - best.roundness_um).abs() < 1e-9, "{found} {best:?}");
+}
+
+mod any {
+    use proptest::prelude::*;
+    use serde_json::{Value, json};
+
+    /// Between the ends evenly in the logarithm, and often one of the ends.
+    fn wide(low: f64, high: f64) -> impl Strategy<Value = f64> {
+        prop_oneof![1 => Just(low), 1 => Just(high), 4 => (low.ln()..high.ln()).prop_map(move |x| x.exp().clamp(low, high))]
+    }
+
+    fn effects() -> impl Strategy<Value = Value> {
+        let each = vec![
+            json!({ "kind": "initial_harmonic", "order": 500, "amplitude_mm": 10.0, "phase_rad": 100.0 }),
+            json!({ "kind": "initial_harmonic", "order": 3, "amplitude_mm": 0.02, "phase_rad": 1.0 }),
+            json!({ "kind": "tool_off_line", "tangential_offset_mm": -100.0 }),
+            json!({ "kind": "support_position", "support_b_shift_mm": 100.0 }),
+            json!({ "kind": "support_wear", "recession_um_per_rev": 100.0 }),
+            json!({ "kind": "roller_runout", "amplitude_mm": 1.0, "ratio": 1000.0, "phase_rad": 0.3 }),
+            json!({ "kind": "tool_push_off", "push_off_ratio": 1000.0 }),
+            json!({ "kind": "spark_out_missing", "spark_out_revolutions": 0.0 }),
+            json!({ "kind": "chatter_harmonic", "amplitude_mm": -1.0, "waves_per_revolution": 1000 }),
+            json!({ "kind": "work_slip", "slip_deg_per_rev": 90.0 }),
+        ];
+        prop::sample::subsequence(each, 0..=3).prop_map(Value::from)
+    }
+
+    /// Jobs round a ring of some size, from sensible to absurd.
+    pub fn job() -> impl Strategy<Value = Value> {
+        let machine =
+            (wide(0.1, 1e5), 5.0..80.0_f64, -0.06..0.2_f64, 0.0..360.0_f64, prop_oneof![Just(0.0), wide(1e-3, 10.0)]);
+        let cut =
+            (wide(1e-7, 10.0), wide(0.01, 40.0), 0.0..3.0_f64, 0.0..360.0_f64, prop_oneof![Just(0.0), wide(1e-3, 1e3)]);
+        let form = (prop_oneof![Just(0.0), 0.0..0.1_f64], 1..60_u32, prop_oneof![Just(0.0), 0.0..0.05_f64]);
+        let rest = (
+            any::<bool>(),
+            any::<bool>(),
+            prop::sample::select(vec!["none", "upr_15", "upr_500"]),
+            effects(),
+            0..4_u32,
+        );
+        (machine, cut, form, rest).prop_map(|((radius, beta, gap, tool, roller), (feed, turns, dwell, direction, k), (e, order, wave), (clockwise, inward, filter, effects, what))| {
+            let roller = roller * radius;
+            let reach = radius + roller;
+            let (sin, cos) = beta.to_radians().sin_cos();
+            let at = tool.to_radians();
+            let tip = radius * (1.0 + gap);
+            let mut job = json!({
+                "ring": {
+                    "radius_mm": radius, "ellipticity_mm": e * radius,
+                    "harmonics": [{ "order": order, "amplitude_um": wave * radius * 1e3 }]
+                },
+                "supports": { "distance_mm": 2.0 * reach * sin, "depth_mm": reach * cos, "roller_radius_mm": roller },
+                "tool": {
+                    "x_mm": tip * at.cos(), "y_mm": tip * at.sin(),
+                    "feed_direction_deg": if inward { (tool + 180.0) % 360.0 } else { direction },
+                    "feed_mm_per_rev": feed * radius.min(1.0), "revolutions": turns, "spark_out_revolutions": dwell
+                },
+                "rotation": if clockwise { "clockwise" } else { "counter_clockwise" },
+                "compliance_ratio": k, "filter": filter, "samples": 360, "profile_points": 36, "highest_order": 20,
+                "effects": effects
+            });
+            match what {
+                1 => job["method"] = json!("nearest_samples"),
+                2 => job["tool"]["wheel_radius_mm"] = json!(radius),
+                3 => {
+                    job["analyses"] = json!(["linear_theory", "settings_search"]);
+                    job["settings_search"] = json!({ "target_um": 5.0, "revolutions_max": 20.0 });
+                }
+                _ => {}
+            }
+            job
+        })
+    }
+
+    /// Every number of a value is finite: JSON has null for the others, which `roundness_um` must not be after a run.
+    pub fn finite(value: &Value) -> bool {
+        match value {
+            Value::Number(number) => number.as_f64().is_some_and(f64::is_finite),
+            Value::Array(items) => items.iter().all(finite),
+            Value::Object(fields) => fields.values().all(finite),
+            _ => true,
+        }
+    }
+}
+
+proptest::proptest! {
+    #![proptest_config(proptest::prelude::ProptestConfig { cases: 400, ..Default::default() })]
+
+    /// Whatever comes is refused with a reason or answered with finite numbers.
+    #[test]
+    fn any_job_is_answered_or_refused(job in any::job()) {
+        if !faults(&job).is_empty() {
+            return Ok(());
+        }
+        match try_run(&job) {
+            Ok(answer) => {
+                let values = serde_json::to_value(&answer.output).unwrap();
+                proptest::prop_assert!(any::finite(&values));
+                if let Some(simulation) = &answer.output.simulation {
+                    let history = serde_json::to_value(&simulation.history).unwrap().to_string();
+                    proptest::prop_assert!(!history.contains("null"), "{history}");
+                }
+            }
+            Err(Failure::Infeasible(finding) | Failure::OutOfModel(finding)) => {
+                proptest::prop_assert!(["nothing_cut", "profile_not_evaluable", "no_end_position"].contains(&finding.code));
+            }
+            Err(Failure::NotConverged { .. }) => {}
+            Err(other) => proptest::prop_assert!(false, "{other:?}"),
+        }
+    }
 }

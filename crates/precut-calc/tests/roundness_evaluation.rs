@@ -263,6 +263,12 @@ fn what_is_wrong_is_said_at_its_place_and_all_at_once() {
         .map(|a| json!({ "angle_deg": a, "radius_mm": 10.0 + form_um(a.to_radians()) }))
         .collect();
     assert_eq!(faults(json!({ "radii": wrong, "filter": { "kind": "none" } })), at("not_round", "/radii"));
+    let radians = with(&|rows| {
+        for row in rows.iter_mut() {
+            row["angle_deg"] = json!(row["angle_deg"].as_f64().unwrap().to_radians());
+        }
+    });
+    assert_eq!(faults(radians), at("angles_look_like_radians", "/radii"));
     let cutoff = json!({ "radii": good, "filter": { "kind": "low_pass", "cutoff_upr": 37 } });
     assert_eq!(faults(cutoff), at("cutoff_beyond_points", "/filter/cutoff_upr"));
     let several = json!({

@@ -19,25 +19,18 @@
 //! when nobody has heard of the computation for some seconds. Who runs a job and who is asked about it may be two
 //! processes: [`JobStore::tell`] brings news from one to the other, and every request reads the record. Each start is charged; at the
 //! last of [`MOST_ATTEMPTS`] a job runs alone, and one that takes the process along even then is failed as
-//! `crashed_repeatedly`. A start that a shutdown interrupts is not charged. A panic is no such start: it is caught, and
+//! `crashed_repeatedly`. A start that a shutdown interrupts is not charged, and the last one that is allowed is not
+//! charged to a study that gets on in it (it has put a part down, which is not computed again): however often its process
+//! is killed, it is finished. A panic is no such start: it is caught, and
 //! the job fails at once, as it would panic again.
 //!
 //! # What else may be a job
 //!
-//! Everything here but [`work`] knows a job only as a [`NewJob`](crate::store::jobs::NewJob): kind, calculator, key,
-//! input as bytes. A further kind of job
-//!
-//! - has an arm in [`JobKind`](crate::store::jobs::JobKind) and in [`work::of`], which makes a [`work::Work`] out of
-//!   the record's input again;
-//! - is submitted by [`Jobs::accept`] with a [`Request`] whose key names its result;
-//! - tells its progress by [`Running::follow`](running::Running::follow) with a
-//!   [`Progress`](crate::engine::progress::Progress) of its own (`Progress::report`, and `Progress::show` for a picture
-//!   so far), and ends soon after [`Running::cancelled`](running::Running::cancelled);
-//! - runs the calculations that it is made of by `Inner::calculate_point`: each is an ordinary cached calculation,
-//!   shared with whoever else asks for it, on the jobs' pool, and leaves its result where every result is. The
-//!   calculations of a job killed in the middle are hits when it runs again. It keeps the one slot that it was given
-//!   until it ends; the pool's threads bound what it can do at once;
-//! - comes to a [`Stored`], whose `kept` form is written with the end of the job and read back by its key.
+//! A parameter study is a job like any other: its entry ([`study`](crate::engine::study)) is declared as a calculator's
+//! is, and looks after its points itself. Everything here but [`work`] knows a job only as a
+//! [`NewJob`](crate::store::jobs::NewJob): kind, calculator, key, input as bytes. A job that is no calculation of an
+//! entry would have an arm in [`JobKind`](crate::store::jobs::JobKind) and in [`work::of`], which makes a
+//! [`work::Work`] out of the record's input again.
 
 mod estimate;
 mod fault;
@@ -63,7 +56,8 @@ use tokio::task::JoinHandle;
 use super::progress::Reported;
 use super::{Error, Inner, Key, Stored};
 use crate::store::jobs::{
-    Accepted, Changed, Idempotency, JobId, JobKind, JobPage, JobQuery, JobRecord, JobState, JobStore, NewJob, News,
+    Accepted, Changed, Idempotency, JobId, JobKind, JobPage, JobQuery, JobRecord, JobState, JobStore, MOST_ATTEMPTS, NewJob,
+    News,
     Priority, Timing,
 };
 use crate::store::now_ms;
@@ -71,8 +65,6 @@ use estimate::Estimates;
 use feeds::Feeds;
 use running::Computations;
 
-/// Starts after which a job that takes its process along is given up.
-pub(crate) const MOST_ATTEMPTS: u32 = 3;
 /// When a client that found the queue full should come again.
 const RETRY_QUEUE: Duration = Duration::from_secs(5);
 /// Bounds of the advice when to look at a job again.

@@ -230,7 +230,7 @@ impl ActingModel {
         let determinant = 4.0 * q_uu * q_xx - q_ux * q_ux;
         let inner = if self.hump.is_some() {
             Bend::Mixed
-        } else if self.quadratic == [0.0; 3] {
+        } else if self.quadratic.iter().all(|q| q.abs() <= 0.0) {
             Bend::Straight
         } else if q_uu >= 0.0 && q_xx >= 0.0 && determinant >= 0.0 {
             Bend::Convex

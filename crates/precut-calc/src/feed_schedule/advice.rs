@@ -348,7 +348,7 @@ pub(super) fn basis(job: &Job) -> Vec<Basis> {
             used.push(Basis { equation: "feed/4.1", source: "turning of gas-turbine shafts of variable stiffness" });
         }
         Method::Continuous { .. } => {
-            used.push(Basis { equation: "feed/8.3", source: "dynamic programming over the grid" })
+            used.push(Basis { equation: "feed/8.3", source: "dynamic programming over the grid" });
         }
         Method::Optimal => {}
     }

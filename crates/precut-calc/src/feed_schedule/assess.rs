@@ -22,8 +22,7 @@ pub(super) fn zone_outcome(case: &Case, job: &Job, i: usize, (u, x): (f64, f64))
         z_end_mm: zone.to_mm,
         diameter_mm: zone.diameter_mm,
         depth_mm: zone.depth_mm,
-        // Repeats and passes are whole numbers of some thousand at most.
-        passes: zone.repeat.round() as u32,
+        passes: zone.repeat,
         feed_mm_per_rev: feed,
         speed_m_per_min: speed,
         spindle_speed_rpm: 1000.0 * speed / (PI * zone.diameter_mm),

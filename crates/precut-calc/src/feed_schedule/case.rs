@@ -33,7 +33,7 @@ pub(super) struct ZoneCase {
     pub to_mm: f64,
     pub diameter_mm: f64,
     pub depth_mm: f64,
-    pub repeat: f64,
+    pub repeat: u32,
     pub surface: usize,
     /// The compliance comes from the beam, not from the job.
     pub compliance_is_of_beam: bool,
@@ -57,7 +57,6 @@ pub(super) struct ZoneCase {
 /// A custom limit in one zone.
 #[derive(Debug, Clone)]
 pub(super) struct CustomCase {
-    pub index: usize,
     pub name: String,
     pub zone: usize,
     /// Its power law at the zone's depth.
@@ -86,7 +85,7 @@ impl ZoneCase {
 
     /// A_i = r pi D L/1000: the cutting time is A/(V S), min.
     pub(super) fn work(&self) -> f64 {
-        self.repeat * std::f64::consts::PI * self.diameter_mm * self.length_mm() / 1000.0
+        f64::from(self.repeat) * std::f64::consts::PI * self.diameter_mm * self.length_mm() / 1000.0
     }
 
     /// The acting model of an output.
@@ -161,7 +160,7 @@ impl<'a> Resolver<'a> {
             to_mm: zone.z_end_mm,
             diameter_mm: zone.diameter_mm,
             depth_mm,
-            repeat: f64::from(zone.repeat),
+            repeat: zone.repeat,
             surface,
             compliance_is_of_beam: zone.compliance_um_per_n.is_none(),
             compliance_um_per_n: zone.compliance_um_per_n,
@@ -251,14 +250,13 @@ impl Case {
     }
 
     fn add_custom(&mut self, job: &Job) {
-        for (index, custom) in job.custom.iter().enumerate() {
+        for custom in &job.custom {
             for (i, zone) in self.zones.iter().enumerate() {
                 if !meant(&custom.zone, zone, &job.zones[zone.index].id) {
                     continue;
                 }
                 let constant = custom.constant + custom.depth_exponent * zone.depth_mm.ln();
                 self.custom.push(CustomCase {
-                    index,
                     name: custom.name.clone(),
                     zone: i,
                     own: Form { constant, speed: custom.speed_exponent, feed: custom.feed_exponent, log_log: true },
@@ -320,7 +318,7 @@ fn rough(resolver: &Resolver<'_>, finish: &ZoneCase, split: &PassSplit) -> ZoneC
     ZoneCase {
         id: format!("{}:rough", finish.id),
         depth_mm: split.roughing_mm,
-        repeat: finish.repeat * f64::from(split.roughing_passes),
+        repeat: finish.repeat.saturating_mul(split.roughing_passes),
         deflection_max_um: None,
         roughness_max_um: None,
         hardening_max_percent: None,

@@ -191,7 +191,7 @@ fn check_needs(job: &Job, violations: &mut Violations) {
     }
     match &job.objective {
         Goal::Time { tool_change_time_min, .. } => {
-            need(*tool_change_time_min > 0.0, Output::ToolLife, "tool_change_time_min")
+            need(*tool_change_time_min > 0.0, Output::ToolLife, "tool_change_time_min");
         }
         Goal::Cost { tool_change_time_min, edge_cost, .. } => {
             need(*tool_change_time_min > 0.0 || *edge_cost > 0.0, Output::ToolLife, "edge_cost");
@@ -268,7 +268,7 @@ fn check_named(job: &Job, violations: &mut Violations) {
         let form = found.map(|further| further.model.form).or(of_library.map(|model| model.form));
         match form {
             None => {
-                violations.add(Finding::new("unknown_output", format!("{at}/output")).with("output", output.clone()))
+                violations.add(Finding::new("unknown_output", format!("{at}/output")).with("output", output.clone()));
             }
             Some(ModelForm::SemiLog) => {
                 let plain = custom.constant == 0.0

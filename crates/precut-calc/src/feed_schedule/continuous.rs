@@ -261,7 +261,7 @@ fn by_program(
     }
     let solved = solve_cells(&case, gradient, monitor).map_err(|unsolved| match unsolved {
         Unsolved::Infeasible(_) => none(base, monitor),
-        failed => failed,
+        Unsolved::Failed(failure) => Unsolved::Failed(failure),
     })?;
     let mut ln_feed = vec![f64::INFINITY; grid.z_mm.len()];
     let mut ln_speed = vec![0.0; grid.z_mm.len()];

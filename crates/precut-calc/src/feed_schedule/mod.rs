@@ -164,8 +164,8 @@ impl Calculator for FeedSchedule {
         picture::figures(job, outcome)
     }
 
-    fn tables(_job: &Job, outcome: &Outcome) -> Vec<Table> {
-        picture::tables(outcome)
+    fn tables(job: &Job, outcome: &Outcome) -> Vec<Table> {
+        picture::tables(job, outcome)
     }
 
     fn program(job: &Job, outcome: &Outcome) -> Option<Result<Program, Failure>> {

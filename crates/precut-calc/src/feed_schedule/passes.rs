@@ -43,12 +43,9 @@ pub(super) fn best(
         });
         match found {
             Some(found) if best.as_ref().is_none_or(|best| found.2.objective < best.2.objective) => best = Some(found),
-            Some(_) => {}
-            None if why.is_none() => {
-                // Analysed at the deepest finishing pass; asked for only when nothing at all is feasible.
-                why = attempt(job, held, &split(plan, roughing, high), true, monitor).err();
-            }
-            None => {}
+            // Analysed at the deepest finishing pass; asked for only when nothing at all is feasible.
+            None if why.is_none() => why = attempt(job, held, &split(plan, roughing, high), true, monitor).err(),
+            _ => {}
         }
     }
     match best {
@@ -114,7 +111,7 @@ fn of_count(
     monitor: &dyn Monitor,
 ) -> Result<Option<Tried>, Unsolved> {
     let mut best: Option<Tried> = None;
-    let mut value = |depth: f64, best: &mut Option<Tried>| -> Result<f64, Unsolved> {
+    let value = |depth: f64, best: &mut Option<Tried>| -> Result<f64, Unsolved> {
         let split = split(plan, roughing, depth);
         match attempt(job, held, &split, false, monitor) {
             Ok((case, solved)) => {

@@ -7,11 +7,12 @@ use crate::shaft::Support;
 
 use super::input::Job;
 use super::output::{Outcome, ZoneOutcome};
+use super::toolpath::path_table;
 
 const Z: Axis = Axis::linear("station", "mm");
 
 pub(super) const FIGURE_IDS: &[&str] = &["schedule", "trade_off", "zones_found"];
-pub(super) const TABLE_IDS: &[&str] = &["zones", "binding", "segments", "trade_off", "passes"];
+pub(super) const TABLE_IDS: &[&str] = &["zones", "binding", "path", "segments", "trade_off", "passes"];
 
 /// Codes that the figures utter.
 pub(super) const LABEL_CODES: &[&str] = &[
@@ -238,8 +239,15 @@ fn found(outcome: &Outcome) -> Panel {
     Panel { y: Axis::linear("feed", "mm/rev"), height: 1.2, items }
 }
 
-pub(super) fn tables(outcome: &Outcome) -> Vec<Table> {
-    vec![zones(outcome), binding(outcome), segments(outcome), trade_off_table(outcome), passes(outcome)]
+pub(super) fn tables(job: &Job, outcome: &Outcome) -> Vec<Table> {
+    vec![
+        zones(outcome),
+        binding(outcome),
+        path_table(job, outcome),
+        segments(outcome),
+        trade_off_table(outcome),
+        passes(outcome),
+    ]
 }
 
 fn words<'a>(items: impl Iterator<Item = &'a str>) -> Vec<Cow<'static, str>> {

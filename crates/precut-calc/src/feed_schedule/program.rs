@@ -38,8 +38,6 @@ pub(super) enum Kind {
     Coupling(String),
     /// A step of successive linearisation may not go further.
     Trust,
-    /// The objective, held in the second solve.
-    Held,
     /// Part of a least-of-the-largest objective, no limit of the job.
     Epigraph,
 }
@@ -69,7 +67,6 @@ impl Kind {
             Self::FeedStep => "feed_step",
             Self::Custom(name) | Self::Coupling(name) => return Cow::Owned(name.clone()),
             Self::Trust => "trust",
-            Self::Held => "held",
             Self::Epigraph => "largest",
         })
     }
@@ -94,7 +91,7 @@ impl Kind {
 
     /// Whether it is a limit of the job.
     pub(super) fn is_limit(&self) -> bool {
-        !matches!(self, Self::Trust | Self::Held | Self::Epigraph)
+        !matches!(self, Self::Trust | Self::Epigraph)
     }
 }
 
@@ -289,6 +286,7 @@ impl Builder<'_> {
         ([entry(speed, v), entry(feed, s)], c + fixed(speed, v) + fixed(feed, s))
     }
 
+    #[allow(clippy::too_many_arguments, reason = "one row of the table of limits per call, read as such")]
     fn row(&mut self, i: usize, v: f64, s: f64, c: f64, kind: Kind, limit: f64, unit: &'static str, plain: bool) {
         let (entries, constant) = self.affine(i, v, s, c);
         self.rows.push(&entries, constant);
@@ -490,7 +488,9 @@ impl Builder<'_> {
             let of_part = groups.len() == 1 && groups[0].len() == case.zones.len();
             for (s, group) in groups.iter().enumerate() {
                 let mut terms = Affines::with_capacity(group.len(), 2 * group.len());
-                group.iter().for_each(|&i| self.usage_term(&mut terms, i, -most.ln()));
+                for &i in group {
+                    self.usage_term(&mut terms, i, -most.ln());
+                }
                 let part = of_part && case.limits.tool_usage_scope == super::input::UsageScope::Part;
                 let place = if part { Place::Part } else { Place::Surface(s) };
                 sums.push(terms);

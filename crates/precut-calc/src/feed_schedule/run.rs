@@ -51,7 +51,7 @@ pub(super) fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, F
     let mut outcome = outcome(job, &found, zones);
     outcome.comparison = comparison(&found, outcome.cutting_time_min, monitor)?;
     if let Some(wanted) = &job.trade_off {
-        outcome.trade_off = trade_off(job, &found.case, wanted, held.as_ref(), monitor)?;
+        outcome.trade_off = trade_off(&found.case, wanted, monitor)?;
     }
     if let Some(wanted) = &job.compensation {
         monitor.progress(0.9, Message::new("stage_path"));
@@ -268,14 +268,7 @@ fn comparison(found: &Found, time_min: f64, monitor: &dyn Monitor) -> Result<Com
 }
 
 /// The same zones with all limits of one kind multiplied by a factor that runs over a range.
-fn trade_off(
-    job: &Job,
-    case: &Case,
-    wanted: &TradeOff,
-    held: Option<&Held>,
-    monitor: &dyn Monitor,
-) -> Result<Vec<TradePoint>, Failure> {
-    let _ = (job, held);
+fn trade_off(case: &Case, wanted: &TradeOff, monitor: &dyn Monitor) -> Result<Vec<TradePoint>, Failure> {
     let last = f64::from(wanted.count - 1);
     (0..wanted.count)
         .map(|k| {

@@ -20,8 +20,7 @@ impl Grid {
         let mut grid = Self { z_mm: Vec::new(), zone: Vec::new(), stretches: Vec::new() };
         let cells = (count - 1) as f64;
         for &(zone, from, to) in stretches {
-            // At most some thousand cells.
-            let own = ((to - from) / total * cells).round().max(1.0) as usize;
+            let own = nearest(((to - from) / total * cells).max(1.0));
             let first = grid.z_mm.len();
             let step = (to - from) / own as f64;
             for k in 0..=own {
@@ -54,6 +53,12 @@ impl Grid {
             })
             .sum()
     }
+}
+
+/// The whole number nearest to a count of at most some thousand.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 1 and the grid's few thousand")]
+fn nearest(count: f64) -> usize {
+    count.round() as usize
 }
 
 /// A way to cut the course into so many pieces.
@@ -100,17 +105,16 @@ pub(super) fn cut(grid: &Grid, cost: &[f64], most: usize, monitor: &dyn Monitor)
             row[p] = least;
         }
         // The next stretch begins where this one ends, at no cost.
-        for &(first, end) in &grid.stretches {
+        for &(_, end) in &grid.stretches {
             if end < n {
                 row[end] = row[end - 1];
                 origin[end] = u32::MAX;
             }
-            let _ = first;
         }
         best.push(row);
         from.push(origin);
     }
-    Ok((1..=most).filter(|&k| best[k][n - 1].is_finite()).map(|k| trace(grid, &best, &from, k, n)).collect())
+    Ok((1..=most).filter(|&k| best[k][n - 1].is_finite()).map(|k| trace(&best, &from, k, n)).collect())
 }
 
 /// First point of the stretch of every point.
@@ -122,7 +126,7 @@ fn stretch_of(grid: &Grid, n: usize) -> Vec<usize> {
     starts
 }
 
-fn trace(grid: &Grid, best: &[Vec<f64>], from: &[Vec<u32>], segments: usize, n: usize) -> Cut {
+fn trace(best: &[Vec<f64>], from: &[Vec<u32>], segments: usize, n: usize) -> Cut {
     let (mut pieces, mut p) = (Vec::with_capacity(segments), n - 1);
     for k in (1..=segments).rev() {
         if from[k][p] == u32::MAX {
@@ -133,7 +137,6 @@ fn trace(grid: &Grid, best: &[Vec<f64>], from: &[Vec<u32>], segments: usize, n: 
         p = q;
     }
     pieces.reverse();
-    let _ = grid;
     Cut { segments, cost: best[segments][n - 1], pieces }
 }
 

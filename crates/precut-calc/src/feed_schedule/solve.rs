@@ -47,8 +47,8 @@ impl From<Failure> for Unsolved {
     }
 }
 
-/// Relative slack in which the second solve holds the objective.
-const HELD: f64 = 1e-6;
+/// Relative slack in which the second solve holds the objective: so little that totals keep seven digits.
+const HELD: f64 = 2e-8;
 /// Most linearisations.
 const LINEARISATIONS: u32 = 60;
 /// Steps of ln V, ln S below this end the linearisations.
@@ -94,14 +94,13 @@ fn whole_parts(case: &Case, why: bool, monitor: &dyn Monitor) -> Result<Solved, 
 /// Solves the program of a case as it stands, or as linearised.
 fn once(case: &Case, variation: &Variation<'_>, why: bool) -> Result<Solved, Unsolved> {
     let built = build(case, variation);
-    let infeasible = |built: &Built| {
+    let infeasible = || {
         if why {
             match infeasible::analyse(case, variation) {
                 Ok(found) => Unsolved::Infeasible(Box::new(found)),
                 Err(failure) => Unsolved::Failed(failure),
             }
         } else {
-            let _ = built;
             Unsolved::Infeasible(Box::default())
         }
     };
@@ -114,7 +113,7 @@ fn once(case: &Case, variation: &Variation<'_>, why: bool) -> Result<Solved, Uns
         Ok(solution) => (solution, false),
         Err(_) => match by_cones(&built.program) {
             Ok(Some(solution)) => (solution, true),
-            Ok(None) => return Err(infeasible(&built)),
+            Ok(None) => return Err(infeasible()),
             Err(failure) => return Err(failure.into()),
         },
     };
@@ -166,10 +165,10 @@ fn fixed(
     case: &Case,
     built: Built,
     variation: &Variation<'_>,
-    infeasible: &dyn Fn(&Built) -> Unsolved,
+    infeasible: &dyn Fn() -> Unsolved,
 ) -> Result<Solved, Unsolved> {
     if built.program.violation(&[]) > 1e-9 {
-        return Err(infeasible(&built));
+        return Err(infeasible());
     }
     let at = (0..case.zones.len()).map(|i| (built.speed[i].constant, built.feed[i].constant)).collect();
     let rows = built.program.rows.len();
@@ -196,9 +195,8 @@ fn by_cones(program: &Program) -> Result<Option<Solution>, Failure> {
     }
     match gp::conic::minimise(program, 1e-9) {
         Ok(solution) if solution.y.iter().all(|y| y.is_finite()) => Ok(Some(solution)),
-        Ok(_) => Err(Failure::NotConverged { what: "the schedule", residual: f64::INFINITY, iterations: 200 }),
         Err(status) if status.0.contains("Infeasible") => Ok(None),
-        Err(_) => Err(Failure::NotConverged { what: "the schedule", residual: f64::INFINITY, iterations: 200 }),
+        _ => Err(Failure::NotConverged { what: "the schedule", residual: f64::INFINITY, iterations: 200 }),
     }
 }
 

@@ -1,10 +1,13 @@
 //! The program of a schedule: one or more cuts per zone, feed and speed in the control's steps (`feed/9.2`).
 
-use crate::calculator::{Block, Failure, Program};
+use std::borrow::Cow;
+
+use crate::calculator::{Block, Column, Failure, Program, Table};
 use crate::deflection_compensation::ProgramZero;
 use crate::path::round_to_increment;
 use crate::shaft::FeedDirection;
 
+use super::assess;
 use super::case::Case;
 use super::compliance::Held;
 use super::input::{Job, SpeedMode, Variables};
@@ -28,33 +31,36 @@ struct Words {
     kept: bool,
 }
 
+/// One cut along a zone: where the tool turns, in the control's steps, in the order of the cut.
+#[derive(Debug, Clone, PartialEq)]
+struct Pass {
+    zone: usize,
+    /// Diameter and station from program zero.
+    corners: Vec<(f64, f64)>,
+    /// Where the tool goes down before it; at the first corner itself beside a thicker neighbour.
+    approach_mm: Option<f64>,
+}
+
 /// The program of an answer.
 pub(super) fn program(job: &Job, outcome: &Outcome) -> Result<Program, Failure> {
     let surface = job.variables.speed == SpeedMode::ConstantSpeed;
     let held = Held::of(job)?;
-    let rows = limits_of_zones(job, outcome, held.as_ref())?;
-    let length = job.shaft.as_ref().map_or_else(
-        || outcome.zones.iter().map(|zone| zone.z_end_mm).fold(0.0, f64::max),
-        crate::shaft::Shaft::length_mm,
-    );
-    let zero = match job.program.zero {
-        ProgramZero::RightFace => length,
-        ProgramZero::LeftFace => 0.0,
-    };
-    let to_headstock = job.feed_direction == FeedDirection::ToHeadstock;
+    let (case, built) = limits_of_zones(job, outcome, held.as_ref())?;
+    let words = words_of_zones(job, &built, outcome, surface);
+    let at: Vec<(f64, f64)> =
+        outcome.zones.iter().zip(&words).map(|(zone, words)| logs(zone, words, surface)).collect();
     let widest = outcome.zones.iter().map(|zone| zone.diameter_mm + 2.0 * zone.depth_mm * f64::from(zone.passes));
     let retract = round_to_increment(widest.fold(0.0, f64::max) + job.program.clearance_x_mm, INCREMENT_MM);
     let mut blocks = vec![Block::Modes];
-    let order: Vec<usize> =
-        if to_headstock { (0..outcome.zones.len()).rev().collect() } else { (0..outcome.zones.len()).collect() };
-    // Roughing of a zone stands before its finish and is cut first, whichever way the tool travels.
-    let rough = order.iter().copied().filter(|&i| outcome.zones[i].id.ends_with(":rough"));
-    let finish = order.iter().copied().filter(|&i| !outcome.zones[i].id.ends_with(":rough"));
-    let mut spoken: Option<f64> = None;
-    for i in rough.chain(finish) {
-        let zone = &outcome.zones[i];
-        let words = words(&rows, i, zone, surface);
-        blocks.push(Block::Note(note(zone, &words)));
+    blocks.extend(passed(&case, &built, &at).into_iter().map(Block::Note));
+    let (mut spoken, mut noted): (Option<f64>, Option<usize>) = (None, None);
+    for pass in passes(job, outcome) {
+        let words = &words[pass.zone];
+        if noted != Some(pass.zone) {
+            let rounded = assess::zone_outcome(&case, job, pass.zone, at[pass.zone]);
+            blocks.push(Block::Note(note(&rounded, words)));
+            noted = Some(pass.zone);
+        }
         if spoken.is_none_or(|last| (last - words.speed).abs() > 1e-9) {
             blocks.push(if surface {
                 Block::SurfaceSpeed { speed_m_per_min: words.speed, limit_rpm: job.program.spindle_limit_rpm }
@@ -63,12 +69,55 @@ pub(super) fn program(job: &Job, outcome: &Outcome) -> Result<Program, Failure> 
             });
             spoken = Some(words.speed);
         }
-        for x_mm in diameters(outcome, zone) {
-            cut(&mut blocks, job, outcome, zone, i, x_mm, &words, retract, zero);
-        }
+        cut(&mut blocks, &pass, words, retract);
     }
     blocks.push(Block::End);
     Ok(Program { dialect: job.program.dialect, increment_mm: INCREMENT_MM, blocks })
+}
+
+/// Every corner of the program's cuts, in its order.
+pub(super) fn path_table(job: &Job, outcome: &Outcome) -> Table {
+    let (mut zone, mut x, mut z) = (Vec::new(), Vec::new(), Vec::new());
+    for pass in passes(job, outcome) {
+        for (x_mm, z_mm) in pass.corners {
+            zone.push(Cow::Owned(outcome.zones[pass.zone].id.clone()));
+            x.push(x_mm);
+            z.push(z_mm);
+        }
+    }
+    Table {
+        id: "path",
+        columns: vec![
+            Column::words("zone", zone),
+            Column::numbers("x_diameter", "mm", &x),
+            Column::numbers("z_program", "mm", &z),
+        ],
+    }
+}
+
+/// The cuts in their order: zones in the direction of cutting, all roughing before the finish.
+fn passes(job: &Job, outcome: &Outcome) -> Vec<Pass> {
+    let length = job.shaft.as_ref().map_or_else(
+        || outcome.zones.iter().map(|zone| zone.z_end_mm).fold(0.0, f64::max),
+        crate::shaft::Shaft::length_mm,
+    );
+    let zero = match job.program.zero {
+        ProgramZero::RightFace => length,
+        ProgramZero::LeftFace => 0.0,
+    };
+    let mut order: Vec<usize> = (0..outcome.zones.len()).collect();
+    if job.feed_direction == FeedDirection::ToHeadstock {
+        order.reverse();
+    }
+    // Roughing of a zone stands before its finish and is cut first, whichever way the tool travels.
+    order.sort_by_key(|&i| !outcome.zones[i].id.ends_with(":rough"));
+    let mut all = Vec::new();
+    for i in order {
+        for x_mm in diameters(outcome, &outcome.zones[i]) {
+            all.push(pass(job, outcome, i, x_mm, zero));
+        }
+    }
+    all
 }
 
 /// Diameters that the passes of a zone turn down to. Repeats of a finish are spark-out passes at its diameter.
@@ -79,6 +128,33 @@ fn diameters(outcome: &Outcome, zone: &ZoneOutcome) -> Vec<f64> {
     let finish = outcome.zones.iter().find(|other| other.id.strip_suffix(":finish") == Some(bare));
     let rest = finish.map_or(0.0, |finish| finish.depth_mm);
     (0..zone.passes).rev().map(|k| zone.diameter_mm + 2.0 * (rest + f64::from(k) * zone.depth_mm)).collect()
+}
+
+fn pass(job: &Job, outcome: &Outcome, index: usize, x_mm: f64, zero: f64) -> Pass {
+    let to_headstock = job.feed_direction == FeedDirection::ToHeadstock;
+    let zone = &outcome.zones[index];
+    let path = outcome.compensated_path.as_ref().and_then(|path| path.zones.get(index));
+    let mut corners: Vec<(f64, f64)> = match path {
+        Some(path) => path.commanded_diameter_mm.iter().copied().zip(path.z_mm.iter().copied()).collect(),
+        None => vec![(x_mm, zone.z_start_mm), (x_mm, zone.z_end_mm)],
+    };
+    if to_headstock {
+        corners.reverse();
+    }
+    let place = |z: f64| round_to_increment(z - zero, INCREMENT_MM);
+    let (first_x, first_z) = corners[0];
+    let sign = if to_headstock { 1.0 } else { -1.0 };
+    let approach = first_z + sign * job.program.clearance_z_mm;
+    // Beside a thicker neighbour the tool goes down at the shoulder itself.
+    let blocked = outcome.zones.iter().any(|other| {
+        let (low, high) = (approach.min(first_z), approach.max(first_z));
+        other.z_end_mm > low + 1e-6 && other.z_start_mm < high - 1e-6 && other.diameter_mm >= first_x - 1e-9
+    });
+    Pass {
+        zone: index,
+        approach_mm: (!blocked).then(|| place(approach)),
+        corners: corners.into_iter().map(|(x, z)| (round_to_increment(x, INCREMENT_MM), place(z))).collect(),
+    }
 }
 
 fn note(zone: &ZoneOutcome, words: &Words) -> String {
@@ -95,60 +171,26 @@ fn note(zone: &ZoneOutcome, words: &Words) -> String {
         let _ = write!(text, " edge {:.1} percent", 100.0 * usage);
     }
     if !words.kept {
-        text.push_str(" rounding breaks a limit");
+        text.push_str(" rounding breaks a limit of this zone");
     }
     text
 }
 
-#[allow(clippy::too_many_arguments)]
-fn cut(
-    blocks: &mut Vec<Block>,
-    job: &Job,
-    outcome: &Outcome,
-    zone: &ZoneOutcome,
-    index: usize,
-    x_mm: f64,
-    words: &Words,
-    retract: f64,
-    zero: f64,
-) {
-    let to_headstock = job.feed_direction == FeedDirection::ToHeadstock;
-    let path = outcome.compensated_path.as_ref().and_then(|path| path.zones.get(index));
-    let mut corners: Vec<(f64, f64)> = match path {
-        Some(path) => path.z_mm.iter().copied().zip(path.commanded_diameter_mm.iter().copied()).collect(),
-        None => vec![(zone.z_start_mm, x_mm), (zone.z_end_mm, x_mm)],
-    };
-    if to_headstock {
-        corners.reverse();
-    }
-    let place = |z: f64| round_to_increment(z - zero, INCREMENT_MM);
-    let (first_z, first_x) = corners[0];
-    let sign = if to_headstock { 1.0 } else { -1.0 };
-    let approach = first_z + sign * job.program.clearance_z_mm;
-    // Beside a thicker neighbour the tool goes down at the shoulder itself.
-    let blocked = outcome.zones.iter().any(|other| {
-        let (low, high) = (approach.min(first_z), approach.max(first_z));
-        other.z_end_mm > low + 1e-6 && other.z_start_mm < high - 1e-6 && other.diameter_mm >= first_x - 1e-9
-    });
-    let start = if blocked { first_z } else { approach };
-    blocks.push(Block::Rapid { x_diameter_mm: Some(retract), z_mm: Some(place(start)) });
-    let x = round_to_increment(first_x, INCREMENT_MM);
-    if !blocked {
-        blocks.push(Block::Rapid { x_diameter_mm: Some(x), z_mm: None });
+fn cut(blocks: &mut Vec<Block>, pass: &Pass, words: &Words, retract: f64) {
+    let (first_x, first_z) = pass.corners[0];
+    blocks.push(Block::Rapid { x_diameter_mm: Some(retract), z_mm: Some(pass.approach_mm.unwrap_or(first_z)) });
+    if pass.approach_mm.is_some() {
+        blocks.push(Block::Rapid { x_diameter_mm: Some(first_x), z_mm: None });
     }
     let mut feed = Some(words.feed_mm_per_rev);
-    for (z, x) in corners {
-        blocks.push(Block::Cut {
-            x_diameter_mm: round_to_increment(x, INCREMENT_MM),
-            z_mm: place(z),
-            feed_mm_per_rev: feed.take(),
-        });
+    for &(x_diameter_mm, z_mm) in &pass.corners {
+        blocks.push(Block::Cut { x_diameter_mm, z_mm, feed_mm_per_rev: feed.take() });
     }
     blocks.push(Block::Rapid { x_diameter_mm: Some(retract), z_mm: None });
 }
 
 /// The limits of every zone with feed and speed of its own, in the order of the answer's zones.
-fn limits_of_zones(job: &Job, outcome: &Outcome, held: Option<&Held>) -> Result<Built, Failure> {
+fn limits_of_zones(job: &Job, outcome: &Outcome, held: Option<&Held>) -> Result<(Case, Built), Failure> {
     let split = outcome.passes.as_ref().map(|passes| super::case::PassSplit {
         roughing_passes: passes.roughing_passes,
         roughing_mm: passes.roughing_depth_mm.unwrap_or(0.0),
@@ -179,17 +221,35 @@ fn limits_of_zones(job: &Job, outcome: &Outcome, held: Option<&Held>) -> Result<
     case.limits.deflection_spread_ratio_max = None;
     let at: Vec<(f64, f64)> =
         outcome.zones.iter().map(|zone| (zone.speed_m_per_min.ln(), zone.feed_mm_per_rev.ln())).collect();
-    Ok(build(&case, &Variation { parts_per_edge: None, about: Some((&at, f64::INFINITY)) }))
+    let built = build(&case, &Variation { parts_per_edge: outcome.parts_per_edge, about: Some((&at, f64::INFINITY)) });
+    Ok((case, built))
+}
+
+/// ln V and ln S as programmed.
+fn logs(zone: &ZoneOutcome, words: &Words, surface: bool) -> (f64, f64) {
+    (metres_per_min(zone, words.speed, surface).ln(), words.feed_mm_per_rev.ln())
+}
+
+fn metres_per_min(zone: &ZoneOutcome, speed: f64, surface: bool) -> f64 {
+    if surface { speed } else { speed * std::f64::consts::PI * zone.diameter_mm / 1000.0 }
+}
+
+/// The program's variables with these values in the zones.
+fn variables(built: &Built, at: impl Iterator<Item = (usize, (f64, f64))>) -> Vec<f64> {
+    let mut y = built.program.start.clone();
+    for (zone, (u, x)) in at {
+        for (source, value) in [(built.speed[zone], u), (built.feed[zone], x)] {
+            if let Some(variable) = source.variable {
+                y[variable] = value;
+            }
+        }
+    }
+    y
 }
 
 /// Whether all limits of the zone by itself hold.
-fn holds(built: &Built, zone: usize, u: f64, x: f64) -> bool {
-    let mut y = built.program.start.clone();
-    for (source, value) in [(built.speed[zone], u), (built.feed[zone], x)] {
-        if let Some(variable) = source.variable {
-            y[variable] = value;
-        }
-    }
+fn holds(built: &Built, zone: usize, at: (f64, f64)) -> bool {
+    let y = variables(built, std::iter::once((zone, at)));
     built
         .rows
         .iter()
@@ -198,20 +258,48 @@ fn holds(built: &Built, zone: usize, u: f64, x: f64) -> bool {
         .all(|(row, _)| built.program.rows.value(row, &y) <= KEPT)
 }
 
-/// Feed rounded down and speed to the neighbouring whole number that keeps all limits of the zone; where neither does,
-/// the lower speed and one more step of feed down.
-fn words(built: &Built, zone: usize, given: &ZoneOutcome, surface: bool) -> Words {
-    let per_rpm = std::f64::consts::PI * given.diameter_mm / 1000.0;
-    let exact = if surface { given.speed_m_per_min } else { given.spindle_speed_rpm };
-    let metres = |speed: f64| if surface { speed } else { speed * per_rpm };
-    let down = |feed: f64| (feed / FEED_STEP + 1e-9).floor() * FEED_STEP;
-    let feed = down(given.feed_mm_per_rev).max(FEED_STEP);
-    let lower = (exact + 1e-9).floor().max(1.0);
-    let upper = (exact - 1e-9).ceil().max(1.0);
-    for (feed, speed) in [(feed, upper), (feed, lower), ((feed - FEED_STEP).max(FEED_STEP), lower)] {
-        if holds(built, zone, metres(speed).ln(), feed.ln()) {
-            return Words { feed_mm_per_rev: round_to_increment(feed, FEED_STEP), speed, kept: true };
-        }
-    }
-    Words { feed_mm_per_rev: round_to_increment(feed, FEED_STEP), speed: lower, kept: false }
+/// Limits over several zones or the part that the rounded words pass, each in words. A lower feed takes longer, and can
+/// use more of the edge.
+fn passed(case: &Case, built: &Built, at: &[(f64, f64)]) -> Vec<String> {
+    let y = variables(built, at.iter().copied().enumerate());
+    let rows = built.rows.iter().enumerate().map(|(row, label)| (label, built.program.rows.value(row, &y)));
+    let sums = built.sums.iter().zip(&built.program.sums).map(|(label, terms)| (label, terms.log_sum_exp(&y)));
+    rows.chain(sums)
+        .filter(|(label, value)| label.kind.is_limit() && !matches!(label.place, Place::Zone(_)) && *value > KEPT)
+        .map(|(label, value)| {
+            let name = label.name(case);
+            format!("rounded words pass {} of {} by {:.2} percent", name.constraint, name.zone, 100.0 * value.exp_m1())
+        })
+        .collect()
+}
+
+/// Feed rounded down and speed to a neighbouring whole number that keeps all limits: not always the lower one, since
+/// the passive force grows when the speed falls. Where neither does, the lower speed and one more step of feed down.
+/// A speed that is one for all zones stays one.
+fn words_of_zones(job: &Job, built: &Built, outcome: &Outcome, surface: bool) -> Vec<Words> {
+    let zones = &outcome.zones;
+    let exact = |zone: &ZoneOutcome| if surface { zone.speed_m_per_min } else { zone.spindle_speed_rpm };
+    let lower = |zone: &ZoneOutcome| (exact(zone) + 1e-9).floor().max(1.0);
+    let upper = |zone: &ZoneOutcome| (exact(zone) - 1e-9).ceil().max(1.0);
+    let down = |zone: &ZoneOutcome| ((zone.feed_mm_per_rev / FEED_STEP + 1e-9).floor() * FEED_STEP).max(FEED_STEP);
+    let keeps =
+        |i: usize, feed: f64, speed: f64| holds(built, i, (metres_per_min(&zones[i], speed, surface).ln(), feed.ln()));
+    let shared = matches!(job.variables.speed, SpeedMode::ConstantSpeed | SpeedMode::ConstantRpm);
+    let all_upper = shared && zones.iter().enumerate().all(|(i, zone)| keeps(i, down(zone), upper(zone)));
+    zones
+        .iter()
+        .enumerate()
+        .map(|(i, zone)| {
+            let feed = down(zone);
+            let slower = (feed - FEED_STEP).max(FEED_STEP);
+            let tries = match (shared, all_upper) {
+                (true, true) => vec![(feed, upper(zone))],
+                (true, false) => vec![(feed, lower(zone)), (slower, lower(zone))],
+                (false, _) => vec![(feed, upper(zone)), (feed, lower(zone)), (slower, lower(zone))],
+            };
+            let found = tries.iter().copied().find(|&(feed, speed)| keeps(i, feed, speed));
+            let (feed, speed) = found.unwrap_or((feed, lower(zone)));
+            Words { feed_mm_per_rev: round_to_increment(feed, FEED_STEP), speed, kept: found.is_some() }
+        })
+        .collect()
 }

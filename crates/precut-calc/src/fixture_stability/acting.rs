@@ -119,6 +119,6 @@ impl Case {
 
     /// Whether the forced motion is proportional to H^(1-mu).
     pub(super) fn is_linear(&self) -> bool {
-        self.holding.hardening_per_mm2 <= 0.0 && self.cutting.process_damping_n_per_mm <= 0.0
+        !self.cutting.uneven() && self.holding.hardening_per_mm2 <= 0.0 && self.cutting.process_damping_n_per_mm <= 0.0
     }
 }

@@ -373,6 +373,16 @@ pub enum Regeneration {
     Single,
 }
 
+impl Regeneration {
+    /// Its name, as in the contract.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Multiple => "multiple",
+            Self::Single => "single",
+        }
+    }
+}
+
 /// How the cut begins.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]

@@ -227,6 +227,29 @@ fn critical_of<const N: usize>(
     Ok(column.crossings(most_mm, FINE_DEPTH, true)?.first().copied())
 }
 
+/// |mu| at several depths of one speed, to the accuracy of maps.
+pub(super) fn moduli(
+    rules: &Rules,
+    holding: &Holding,
+    cutting: &Cutting,
+    working: Working,
+    depths_mm: &[f64],
+) -> Result<Vec<f64>, Failure> {
+    by_states!(holding, moduli_of(rules, holding, cutting, working, depths_mm))
+}
+
+fn moduli_of<const N: usize>(
+    rules: &Rules,
+    holding: &Holding,
+    cutting: &Cutting,
+    working: Working,
+    depths_mm: &[f64],
+) -> Result<Vec<f64>, Failure> {
+    let system = holding.system::<N>(Closed::BOTH);
+    let column = Column::new(&rules.coarse, &system, holding, cutting, working, COARSE_RESIDUAL);
+    depths_mm.iter().map(|&depth| column.modulus(depth)).collect()
+}
+
 /// A speed on the boundary.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct BoundaryPoint {

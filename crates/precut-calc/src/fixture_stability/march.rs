@@ -54,6 +54,7 @@ pub(super) struct Plan {
 pub(super) struct Step {
     pub time_s: f64,
     pub x_mm: f64,
+    pub velocity_mm_per_s: f64,
     pub jaw_mm: Option<f64>,
     pub force_n: f64,
     /// Effective feed of the tooth that entered last; none where no tooth is in the arc.
@@ -629,6 +630,7 @@ impl Record {
             let step = Step {
                 time_s: self.time_s,
                 x_mm: state.q[0],
+                velocity_mm_per_s: state.system.velocity(&state.q, 0),
                 jaw_mm: state.system.jaw.map(|jaw| state.q[jaw]),
                 force_n: cut_n,
                 feed_mm: (teeth > 0).then(|| state.chip[i]),

@@ -17,6 +17,7 @@ mod cutting;
 mod floquet;
 mod forward;
 mod holding;
+pub mod identification;
 mod input;
 mod lobes;
 mod march;

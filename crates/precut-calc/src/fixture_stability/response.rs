@@ -4,12 +4,14 @@
 //! the plain linear system under the smooth-feed force (`fixture/5.2`). With joints that harden it is found by Newton's
 //! method on the same elements.
 
-use crate::calculator::Failure;
+use crate::calculator::{Failure, Unwatched};
 use crate::num::dde::{Matrix, Propagator, Rule, times};
 
 use super::cutting::{Cutting, Stretch};
 use super::floquet::{Working, damped};
 use super::holding::{Closed, Holding, System};
+use super::march::{Marched, Plan, Surface, march};
+use super::simulate::count;
 
 /// Points of an element; with elements of a fiftieth of the fastest oscillation their error is round-off.
 const POINTS: usize = 4;
@@ -131,6 +133,11 @@ pub(super) fn response<const N: usize>(
     cutting: &Cutting,
     working: Working,
 ) -> Result<Response, Failure> {
+    if cutting.uneven()
+        && let Some(settled) = settled::<N>(holding, cutting, working)?
+    {
+        return Ok(settled);
+    }
     let system = holding.system::<N>(Closed::BOTH);
     let elements = Elements::new(&system, holding, cutting, working);
     let hardening = holding.hardening_n_per_mm3(Closed::BOTH);
@@ -154,6 +161,88 @@ pub(super) fn response<const N: usize>(
         }
     }
     Ok(elements.record(&start, &known, hardening))
+}
+
+/// Steps per tooth pitch, first and most tooth periods of a run that is to settle, and how well.
+const SETTLING_STEPS: f64 = 400.0;
+const FIRST_PERIODS: usize = 160;
+const MOST_PERIODS: usize = 5120;
+const AT_REST: f64 = 1e-6;
+
+/// The forced motion of uneven teeth: its period is a revolution, in which x(t) and x(t - tau) differ, so the chips do
+/// answer to it. It is the run in time that has settled; `None` where it does not (chatter), for which the motion
+/// with undisturbed chips stands.
+fn settled<const N: usize>(
+    holding: &Holding,
+    cutting: &Cutting,
+    working: Working,
+) -> Result<Option<Response>, Failure> {
+    let highest = holding.modes().last().map_or(0.0, |mode| mode.natural_hz);
+    let steps = count((80.0 * highest * cutting.tooth_period_s(working.spindle_rpm)).clamp(SETTLING_STEPS, 8000.0));
+    let mut periods = FIRST_PERIODS;
+    while periods <= MOST_PERIODS {
+        let whole = periods.div_ceil(cutting.teeth).max(3) * cutting.teeth;
+        let plan = Plan {
+            working,
+            steps_per_tooth: steps,
+            tooth_periods: whole,
+            steady_periods: cutting.teeth,
+            surface: Surface::Multiple,
+            gradual: false,
+            unilateral: false,
+            keep_first: 0,
+            keep_last: cutting.teeth,
+        };
+        let run = march::<N>(holding, cutting, &plan, &Unwatched)?;
+        if run.diverged {
+            return Ok(None);
+        }
+        let (last, before) = (whole - cutting.teeth, whole - 2 * cutting.teeth);
+        let change = (0..cutting.teeth)
+            .map(|i| (run.samples_mm[last + i] - run.samples_mm[before + i]).abs())
+            .fold(0.0, f64::max);
+        if change <= AT_REST * working.feed_mm {
+            return Ok(Some(of_run(cutting, working, &run)));
+        }
+        periods *= 4;
+    }
+    Ok(None)
+}
+
+/// The last revolution of a settled run.
+fn of_run(cutting: &Cutting, working: Working, run: &Marched) -> Response {
+    let tau = cutting.tooth_period_s(working.spindle_rpm);
+    let start = run.last.first().map_or(0.0, |step| step.time_s);
+    let rad_per_s = cutting.pitch_rad() / tau;
+    let mut moments: Vec<Moment> = run
+        .last
+        .iter()
+        .map(|step| Moment {
+            time_s: step.time_s - start,
+            since_entry_rad: ((step.time_s - start) % tau) * rad_per_s,
+            x_mm: step.x_mm,
+            velocity_mm_per_s: step.velocity_mm_per_s,
+            force_n: step.force_n,
+        })
+        .collect();
+    let period_s = tau * cutting.teeth as f64;
+    moments.extend(moments.first().map(|first| Moment { time_s: period_s, ..*first }));
+    let first = moments.first().map_or(0.0, |moment| moment.x_mm);
+    let mut response = Response {
+        moments,
+        x_mm: run.x_mm,
+        left_n: run.left_n,
+        right_n: run.right_n,
+        left_elastic_n: run.left_elastic_n,
+        right_elastic_n: run.right_elastic_n,
+        x_at_entry_mm: first,
+        x_at_exit_mm: first,
+        period_s,
+    };
+    if let [before, _] = cutting.stretches()[..] {
+        response.x_at_exit_mm = response.x_at(before.length_rad() / rad_per_s);
+    }
+    response
 }
 
 impl<'a, const N: usize> Elements<'a, N> {

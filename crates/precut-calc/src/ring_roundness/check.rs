@@ -66,11 +66,21 @@ impl Check for Job {
         check_machine(self, violations);
         check_analyses(self, violations);
         check_effects(self, violations);
-        if let Some(radius_mm) = mean_radius_mm(self) {
+        // Of a radius of nothing, or a feed backwards, the rest would only be consequences.
+        if let Some(radius_mm) = mean_radius_mm(self).filter(|radius| fields_hold(self, *radius)) {
             check_deviation(self, radius_mm, violations);
             check_geometry(self, radius_mm, violations);
         }
     }
+}
+
+/// Whether the numbers that the geometry is made of are any good by themselves; their own schemas say what is wrong.
+fn fields_hold(job: &Job, radius_mm: f64) -> bool {
+    radius_mm > 0.0
+        && job.supports.distance_mm > 0.0
+        && job.tool.feed_mm_per_rev > 0.0
+        && job.tool.revolutions > 0.0
+        && job.tool.spark_out_revolutions >= 0.0
 }
 
 fn check_profile(job: &Job, violations: &mut Violations) {
@@ -88,6 +98,10 @@ fn check_profile(job: &Job, violations: &mut Violations) {
         check_neighbours(i + 1, pair[0], pair[1], violations);
     }
     let (Some(first), Some(last)) = (rows.first(), rows.last()) else { return };
+    // Out of order, the ends are not the ends.
+    if rows.windows(2).any(|pair| pair[1].angle_deg < pair[0].angle_deg) {
+        return;
+    }
     let span = last.angle_deg - first.angle_deg;
     violations.require(span < 360.0, || {
         Finding::new("angles_overlap", format!("/measured_profile/{}/angle_deg", rows.len() - 1)).measured(

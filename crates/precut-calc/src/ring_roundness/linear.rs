@@ -137,7 +137,7 @@ pub(super) fn map(job: &Job, scene: &Scene, end: &Stance, share: Share<'_>) -> R
     for (done, rows) in support_half_angle_deg.chunks(ROWS_AT_ONCE).enumerate() {
         checkpoint(share.monitor)?;
         let share_done = (done * ROWS_AT_ONCE) as f64 / support_half_angle_deg.len() as f64;
-        share.report(share_done, Message::new("stage_map").with("percent", (100.0 * share_done).round()));
+        share.report(share_done, Message::new("stage_setup_map").with("percent", (100.0 * share_done).round()));
         let row = |beta: &f64| {
             let of = |tool: &f64| cell(beta.to_radians(), tool_rad(*tool), k, range, &wanted);
             tool_angle_deg.iter().map(of).collect::<Vec<_>>()

@@ -311,6 +311,6 @@ const CODES: Codes = Codes {
     failures: &[simulate::FAILURE_CODES, &["no_end_position"]],
     warnings: &[advice::WARNING_CODES],
     explanations: &[advice::EXPLANATION_CODES],
-    stages: &[&["stage_revolution", "stage_map", "stage_search", "stage_done"]],
+    stages: &[&["stage_revolution", "stage_setup_map", "stage_search", "stage_done"]],
     labels: &[picture::LABEL_CODES],
 };

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use super::input::FitJob;
 use super::output::{FitOutcome, OutputFit};
-use crate::calculator::{Axis, Cells, Column, Figure, Frame, Item, Message, Panel, Role, Table};
+use crate::calculator::{Axis, Column, Figure, Frame, Item, Message, Panel, Role, Table};
 use crate::num::stats::t_quantile;
 
 pub(super) const FIGURE_IDS: &[&str] = &["predicted_against_measured", "residuals"];

@@ -59,10 +59,10 @@ impl Bordered {
                 row[k] = sum;
             }
             let mut pivot = diagonal;
-            for k in 1..=reach {
-                let lower = row[k] * self.inverse[i - k];
-                pivot -= row[k] * lower;
-                row[k] = lower;
+            for (k, entry) in row.iter_mut().enumerate().take(reach + 1).skip(1) {
+                let lower = *entry * self.inverse[i - k];
+                pivot -= *entry * lower;
+                *entry = lower;
             }
             let relative = pivot / diagonal;
             least = least.min(if relative.is_nan() { 0.0 } else { relative });
@@ -156,14 +156,14 @@ impl Bordered {
         }
         for k in 0..m {
             let value = small[k];
-            for i in k + 1..m {
-                small[i] -= self.corner[i * m + k] * value;
+            for (i, later) in small.iter_mut().enumerate().skip(k + 1) {
+                *later -= self.corner[i * m + k] * value;
             }
         }
         for k in (0..m).rev() {
             let mut sum = small[k];
-            for j in k + 1..m {
-                sum -= self.corner[k * m + j] * small[j];
+            for (j, later) in small.iter().enumerate().skip(k + 1) {
+                sum -= self.corner[k * m + j] * later;
             }
             let head = self.corner[k * m + k];
             small[k] = if head == 0.0 { 0.0 } else { sum / head };

@@ -9,6 +9,9 @@ use super::{Affines, Objective, Program, Solution};
 #[derive(Debug, Clone, PartialEq)]
 pub struct NotSolved(pub String);
 
+/// Entries and constant of an exponent, and the variable that stands for its exponential.
+type Term = (Vec<(usize, f64)>, f64, usize);
+
 /// K_exp = {(a, b, c): b > 0, b exp(a/b) <= c}: Σ exp(v_k) <= 1 becomes (v_k, 1, p_k) in K_exp, Σ p_k <= 1.
 struct Cones {
     rows: Vec<usize>,
@@ -17,7 +20,7 @@ struct Cones {
     right: Vec<f64>,
     variables: usize,
     /// Linear rows come first.
-    exponential: Vec<(Vec<(usize, f64)>, f64, usize)>,
+    exponential: Vec<Term>,
 }
 
 impl Cones {

@@ -220,9 +220,9 @@ impl Newton {
     fn add_pairs(&mut self, layout: &Layout, weight: &[f64]) {
         let pairs = &layout.pairs;
         let band = &mut self.matrix.band;
-        for k in 0..pairs.high.len() {
+        for (k, &w) in weight.iter().enumerate().take(pairs.high.len()) {
             let (i, j) = (pairs.high[k] as usize, pairs.low[k] as usize);
-            let (a, b, w) = (pairs.a_high[k], pairs.a_low[k], weight[k]);
+            let (a, b) = (pairs.a_high[k], pairs.a_low[k]);
             band[i][0] += w * a * a;
             // Where there is one variable b is 0 and both of these add nothing.
             band[j][0] += w * b * b;

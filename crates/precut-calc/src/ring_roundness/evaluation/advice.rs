@@ -184,7 +184,8 @@ pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
     let (e, radius_mm) = (outcome.data.eccentricity_mm, outcome.measured.least_squares.radius_mm);
     // What the limaçon leaves of a true circle: a second harmonic of e²/4R, peak to valley e²/2R.
     let limacon_um = 1e3 * e * e / (2.0 * radius_mm);
-    if job.points.is_none() && e > 0.0 {
+    // Below a nanometre nobody can have set it up.
+    if job.points.is_none() && e > 1e-6 {
         said.push(
             Message::new("eccentricity_taken_out")
                 .with("eccentricity_um", 1e3 * e)

@@ -14,6 +14,7 @@ pub(super) const CODES: &[&str] = &[
     "angles_not_ascending",
     "duplicate_angle",
     "angles_beyond_one_turn",
+    "angles_look_like_radians",
     "gap_too_wide",
     "points_on_a_line",
     "duplicate_point",
@@ -70,6 +71,13 @@ fn check_angles(at: &str, angles: &[f64], violations: &mut Violations) -> bool {
     {
         let finding = Finding::new("angles_beyond_one_turn", format!("{at}/{}/angle_deg", angles.len() - 1));
         violations.add(finding.measured(*last, first + 360.0, "deg"));
+        in_order = false;
+    } else if let (true, Some(first), Some(last)) = (in_order, angles.first(), angles.last())
+        && angles.len() >= FEWEST_POINTS
+        && (5.0..=std::f64::consts::TAU + 1e-9).contains(&(last - first))
+    {
+        // A whole turn, one step short, in radians.
+        violations.add(Finding::new("angles_look_like_radians", at).value(*last, "deg"));
         in_order = false;
     }
     in_order

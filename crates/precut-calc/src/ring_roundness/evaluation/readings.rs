@@ -87,10 +87,16 @@ impl Readings {
 }
 
 /// Widest step between neighbouring angles round the circle, and the index of the point after it.
+///
+/// All steps add up to one turn; each that leads backwards counts as nearly a turn more and is no gap.
 fn largest_gap(angles_deg: &[f64]) -> (f64, usize) {
     let n = angles_deg.len();
     let step = |index: usize| (angles_deg[index] - angles_deg[(index + n - 1) % n]).rem_euclid(360.0);
-    (0..n).map(|index| (step(index), index)).fold((0.0, 0), |most, next| if next.0 > most.0 { next } else { most })
+    let mut steps: Vec<(f64, usize)> = (0..n).map(|index| (step(index), index)).collect();
+    let sum_deg: f64 = steps.iter().map(|(step, _)| step).sum();
+    steps.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    let backwards = (1..n).take_while(|&turns| 360.0 * turns as f64 + 180.0 < sum_deg).count();
+    steps.get(backwards).copied().unwrap_or((0.0, 0))
 }
 
 fn section(job: &Job) -> Result<Section, RoundnessError> {
