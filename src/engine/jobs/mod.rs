@@ -15,7 +15,9 @@
 //! 4. Its end, with its result, is written in one transaction for all jobs that still hold the lease. A cancel or a
 //!    deadline takes one job off the lease; when the last has gone, the computation is told to stop.
 //!
-//! What a dead process left running is in line again when the next one opens the store. Each start is charged; at the
+//! What a dead process left running is in line again when the next one opens the store; where several share a store,
+//! when nobody has heard of the computation for some seconds. Who runs a job and who is asked about it may be two
+//! processes: [`JobStore::tell`] brings news from one to the other, and every request reads the record. Each start is charged; at the
 //! last of [`MOST_ATTEMPTS`] a job runs alone, and one that takes the process along even then is failed as
 //! `crashed_repeatedly`. A start that a shutdown interrupts is not charged, and the last one that is allowed is not
 //! charged to a study that gets on in it (it has put a part down, which is not computed again): however often its process
@@ -33,6 +35,7 @@
 mod estimate;
 mod fault;
 mod feeds;
+mod help;
 mod requests;
 mod running;
 mod sweeper;
@@ -53,7 +56,8 @@ use tokio::task::JoinHandle;
 use super::progress::Reported;
 use super::{Error, Inner, Key, Stored};
 use crate::store::jobs::{
-    Accepted, Idempotency, JobId, JobKind, JobPage, JobQuery, JobRecord, JobState, JobStore, MOST_ATTEMPTS, NewJob,
+    Accepted, Changed, Idempotency, JobId, JobKind, JobPage, JobQuery, JobRecord, JobState, JobStore, MOST_ATTEMPTS, NewJob,
+    News,
     Priority, Timing,
 };
 use crate::store::now_ms;
@@ -169,8 +173,20 @@ impl Jobs {
             });
             task
         });
-        let work = jobs.store.work(engine.cores.job_places(), run, jobs.stop.subscribe());
-        let tasks = [tokio::spawn(work), tokio::spawn(sweeper::run(Arc::downgrade(engine)))];
+        let mut tasks = vec![tokio::spawn(sweeper::run(Arc::downgrade(engine)))];
+        if engine.settings.role.works() {
+            let work = jobs.store.work(engine.cores.job_places(), run, jobs.stop.subscribe());
+            tasks.push(tokio::spawn(work));
+        }
+        let (feeds, computations) = (Arc::clone(&jobs.feeds), Arc::clone(&jobs.computations));
+        jobs.store.tell(Arc::new(move |news| match news {
+            News::Changed(Changed { jobs, unwanted }) => {
+                computations.cancel(&unwanted);
+                feeds.touch(&jobs);
+            }
+            // Computations that are not wanted any more are told so by the next word of their progress.
+            News::Missed => feeds.touch_all(),
+        }));
         jobs.tasks.lock().unwrap_or_else(PoisonError::into_inner).extend(tasks);
     }
 
@@ -213,10 +229,10 @@ impl Jobs {
     ) -> Result<(JobRecord, bool), Error> {
         let idempotency = ask.idempotency_key.clone().map(|key| Idempotency { key, body_hash: request.body_hash });
         let deadline_ms = ask.deadline.map(|after| {
-            now_ms().saturating_add(i64::try_from(after.as_millis()).unwrap_or(i64::MAX / 2)).min(i64::MAX / 2)
+            self.store.now_ms().saturating_add(i64::try_from(after.as_millis()).unwrap_or(i64::MAX / 2)).min(i64::MAX / 2)
         });
         let job = NewJob {
-            id: JobId::new(),
+            id: JobId::at(self.store.now_ms()),
             kind: request.kind,
             calculator: request.calculator.to_owned(),
             version: request.version,
@@ -313,7 +329,7 @@ impl Jobs {
             progress,
             stage: stage.filter(|_| is_running),
             interim: interim.filter(|_| is_running),
-            remaining_ms: remaining_ms(&record, progress),
+            remaining_ms: remaining_ms(&record, progress, self.store.now_ms()),
             problem: record.problem.as_deref().map(fault::read),
             record,
         }
@@ -321,12 +337,12 @@ impl Jobs {
 }
 
 /// Time left of a running job, ms: from what it has done so far, or from its estimate where it has done too little.
-fn remaining_ms(record: &JobRecord, progress: f64) -> Option<f64> {
+fn remaining_ms(record: &JobRecord, progress: f64, now_ms: i64) -> Option<f64> {
     /// Below this share the speed so far says little.
     const ENOUGH: f64 = 0.02;
     let started = record.started_ms.filter(|_| record.state == JobState::Running)?;
     #[allow(clippy::cast_precision_loss)] // times of jobs, far below 2^53 ms
-    let elapsed = (now_ms() - started).max(0) as f64;
+    let elapsed = (now_ms - started).max(0) as f64;
     let left = if progress >= ENOUGH { elapsed * (1.0 - progress) / progress } else { record.estimate_ms - elapsed };
     Some(left.max(0.0))
 }

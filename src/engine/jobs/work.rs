@@ -42,7 +42,7 @@ pub(super) fn of(engine: &Inner, claim: &Claim) -> Result<Box<dyn Work>, Error> 
 }
 
 /// A kept job, ready to run.
-fn ready(entry: &Arc<Entry>, input: &[u8]) -> Result<Ready, Error> {
+pub(super) fn ready(entry: &Arc<Entry>, input: &[u8]) -> Result<Ready, Error> {
     let job: Value = serde_json::from_slice(input)
         .map_err(|error| Error::internal(format!("a kept job is not readable: {error}")))?;
     read::prepared(entry, &job)
