@@ -40,7 +40,7 @@ pub(crate) fn read_value(entry: &Arc<Entry>, mut job: Value, parts: &[TablePart]
 
 /// A job whose syntax, tables and schema are in order, or were when it was accepted.
 pub(crate) fn prepared(entry: &Arc<Entry>, job: &Value) -> Result<Ready, Error> {
-    let has_rows = table::has_rows(job, entry.tables());
+    let has_rows = table::has_rows(job, entry.tables_of(job));
     let mut prepared = entry.prepare(job).map_err(|unprepared| match unprepared {
         Unprepared::Invalid(findings) => {
             let total = findings.len();
@@ -92,7 +92,8 @@ fn general_code(finding: &Finding) -> &str {
 
 fn check_schema(entry: &Entry, job: &mut Value, parts: &[TablePart]) -> Result<(), Found> {
     let mut table_faults = Faults::default();
-    let tables = table::resolve(job, parts, entry.tables(), &mut table_faults);
+    let places = entry.tables_of(job).to_vec();
+    let tables = table::resolve(job, parts, &places, &mut table_faults);
     let mut schema_faults = Faults::default();
     entry.validate(job, &mut schema_faults);
     let listed = schema_faults.listed.len();
@@ -122,7 +123,9 @@ fn invalid(mut findings: Vec<Finding>, total: usize) -> Error {
 impl Ready {
     /// The filled job as it is echoed.
     pub(crate) fn echo(&self) -> Result<Value, Failure> {
-        Ok(table::without_rows(self.prepared.input()?, self.entry.tables()))
+        let input = self.prepared.input()?;
+        let places = self.entry.tables_of(&input).to_vec();
+        Ok(table::without_rows(input, &places))
     }
 
     /// Appends the same as JSON.
