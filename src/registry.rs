@@ -24,7 +24,7 @@ pub use entry::{Entry, Prepared, ResultNotes, UnreadableResult};
 
 pub(crate) use canonical::canonical;
 pub(crate) use checker::{Faults, by_pointer, child};
-pub(crate) use entry::{Calculation, Job, Unprepared, second_line};
+pub(crate) use entry::{Calculation, Job, ModelUse, Unprepared, second_line};
 pub(crate) use fault::intern as interned;
 pub(crate) use finite::non_finite_place;
 pub(crate) use nearest::nearest;
@@ -36,7 +36,7 @@ pub(crate) use result_text::{Unwritable, append as append_result};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use precut_calc::calculator::{Calculator, Diagnosable, Registrar};
+use precut_calc::calculator::{Calculator, Diagnosable, ForwardModel, Registrar};
 use serde_json::Value;
 use utoipa::openapi::{RefOr, Schema};
 
@@ -156,6 +156,9 @@ pub struct Offered {
 impl Registrar for Offered {
     fn calculator<C: Calculator>(&mut self) {
         self.entries.push(Entry::of::<C>());
+    }
+    fn with_forward_model<C: Calculator + ForwardModel<Job = C::Input>>(&mut self) {
+        self.entries.push(Entry::with_model::<C>());
     }
     fn diagnosable<C: Diagnosable>(&mut self) {
         self.with_forward_model::<C>();

@@ -5,8 +5,8 @@ use std::marker::PhantomData;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use precut_calc::calculator::{
-    Answer, Basis, Calculator, Check, Cost, Diagnosable, Failure, Figure, Finding, Message, Meta, Monitor, Program, Table,
-    Violations,
+    Answer, Basis, Calculator, Check, Cost, Diagnosable, Failure, Figure, Finding, Message, Meta, Monitor, Program,
+    Table, Violations,
 };
 use precut_calc::diagnosis::{Diagnosis, JobOf, ResultOf};
 use serde::Deserialize;
@@ -17,9 +17,9 @@ use utoipa::openapi::{RefOr, Schema};
 
 use super::canonical::canonical;
 use super::checker::{Checker, Faults};
+use super::family;
 use super::place::{TablePlace, table_places};
 use super::schema::{self, Components};
-use super::family;
 use super::{RESERVED, RegistryError, Unwritable, append_result, child, non_finite_place};
 
 /// One calculator with its types closed over.
@@ -32,11 +32,25 @@ pub struct Entry {
     own_codes: Vec<String>,
     calculation: Box<dyn Calculation>,
     composed: bool,
+    model_use: ModelUse,
     /// Where the calculator of a job stands in the job: one entry for each of them, in the order of their names' place
     /// in the contract.
     members: Vec<Member>,
     /// Bytes of the answer written last.
     answer_bytes: AtomicUsize,
+}
+
+/// Whether a job may name a stored model, and what of it the model extends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum ModelUse {
+    /// It may not.
+    None,
+    /// The job itself.
+    OfJob,
+    /// The base job inside it.
+    OfBase,
+    /// The job inside it names the model.
+    Within,
 }
 
 /// One calculator's form of a question that is asked of several.
@@ -70,15 +84,27 @@ impl Entry {
         Self::made::<C::Input, C::Output>(meta, Box::new(Typed::<C>(PhantomData)), false)
     }
 
+    /// The entry of a calculator whose jobs may name a stored model.
+    pub(super) fn with_model<C: Calculator>() -> Result<Self, RegistryError> {
+        let entry = Self::of::<C>()?;
+        let input = Contract::of::<C::Input>(C::META.id, true, family::offer_model)?;
+        let made = Self::from_contracts(entry.meta, input, entry.output, entry.calculation)?;
+        Ok(Self { model_use: ModelUse::OfJob, ..made })
+    }
+
     /// The entry of the diagnosis of one calculator.
     pub(super) fn of_diagnosis<M: Diagnosable>() -> Result<Self, RegistryError> {
         let base = M::META;
         let calculation = Box::new(NumbersOf { meta: base, calculation: Typed::<Diagnosis<M>>(PhantomData) });
-        let input = Contract::of::<JobOf<M>>(base.id, true, |job| family::name_calculator(job, base.id))?;
+        let input = Contract::of::<JobOf<M>>(base.id, true, |job| {
+            family::name_calculator(job, base.id);
+            family::offer_model(job);
+        })?;
         let output = Contract::of::<ResultOf<M>>(base.id, false, |_| {})?;
         let mut entry = Self::from_contracts(<Diagnosis<M> as Calculator>::META, input, output, calculation)?;
         // A diagnosis refuses a base job in the words of the base.
         let of_base = [base.codes.faults, base.codes.failures].into_iter().flatten().copied().flatten();
+        entry.model_use = ModelUse::OfBase;
         entry.own_codes.extend(of_base.map(|code| (*code).to_owned()));
         Ok(entry)
     }
@@ -97,6 +123,7 @@ impl Entry {
         let own_codes: BTreeSet<String> = members.iter().flat_map(|of| of.entry.own_codes.iter().cloned()).collect();
         let mut entry = Self::from_contracts(meta, input, output, Box::new(NoCalculator))?;
         entry.own_codes = own_codes.into_iter().collect();
+        entry.model_use = ModelUse::OfBase;
         entry.members = members;
         Ok(Some(entry))
     }
@@ -139,7 +166,8 @@ impl Entry {
     ) -> Result<Self, RegistryError> {
         let input = Contract::of::<I>(meta.id, true, |_| {})?;
         let output = Contract::of::<O>(meta.id, false, |_| {})?;
-        Ok(Self { composed, ..Self::from_contracts(meta, input, output, calculation)? })
+        let model_use = if composed { ModelUse::Within } else { ModelUse::None };
+        Ok(Self { composed, model_use, ..Self::from_contracts(meta, input, output, calculation)? })
     }
 
     fn from_contracts(
@@ -159,6 +187,7 @@ impl Entry {
             output,
             calculation,
             composed: false,
+            model_use: ModelUse::None,
             members: Vec::new(),
             answer_bytes: AtomicUsize::new(0),
         })
@@ -232,6 +261,10 @@ impl Entry {
     pub(crate) fn tables_of(&self, job: &Value) -> &[TablePlace] {
         self.of_job(job).map_or(&[], |entry| &entry.tables)
     }
+    /// Whether a job may name a stored model.
+    pub(crate) fn model_use(&self) -> ModelUse {
+        self.model_use
+    }
     /// Whether it is made of other entries' jobs: reading one is work, and running one waits for the store.
     pub(crate) fn is_composed(&self) -> bool {
         self.composed
@@ -251,6 +284,14 @@ impl Entry {
     /// Adds every violation of the schema. Measured tables must be rows by now.
     pub(crate) fn validate(&self, job: &Value, faults: &mut Faults) {
         self.checker.check(job, "", faults);
+    }
+    /// Adds what is wrong with effects that are to act in jobs of this calculator.
+    pub(crate) fn validate_effects(&self, effects: &Value, faults: &mut Faults) {
+        let schema = self.strict_input()["properties"]["effects"].clone();
+        match Checker::new(schema) {
+            Ok(checker) => checker.check(effects, "/effects", faults),
+            Err(error) => tracing::error!(%error, "the schema of a calculator's effects does not stand alone"),
+        }
     }
     /// A job that the schema accepts, typed, checked and filled.
     pub(crate) fn prepare(&self, job: &Value) -> Result<Prepared, Unprepared> {
@@ -338,10 +379,7 @@ impl Contract {
     }
 
     /// One of several contracts, by what stands in the field `calculator` of a job.
-    fn joined<'a>(
-        parts: impl Iterator<Item = (String, &'a Self)>,
-        told_apart: bool,
-    ) -> Result<Self, RegistryError> {
+    fn joined<'a>(parts: impl Iterator<Item = (String, &'a Self)>, told_apart: bool) -> Result<Self, RegistryError> {
         let broken = |error: serde_json::Error| RegistryError::BadSchema(error.to_string());
         let mut components = Components::new();
         let mut open = Components::new();

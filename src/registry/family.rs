@@ -20,6 +20,17 @@ pub(super) fn name_calculator(job: &mut Value, calculator: &str) {
     job["properties"][CALCULATOR]["example"] = json!(calculator);
 }
 
+/// Lets a job name a stored model.
+pub(super) fn offer_model(job: &mut Value) {
+    job["properties"]["model"] = json!({
+        "type": "string",
+        "pattern": "^[a-z0-9][a-z0-9_-]{0,63}(@[1-9][0-9]{0,8})?$",
+        "description": "A stored model of this calculator, `name` or `name@revision`: its effects act beside those of the job.",
+        "examples": ["lathe-7-winter"],
+        "x-group": "effects",
+    });
+}
+
 /// Name of a calculator's own type in the contract: `deflection-compensation` gives `DeflectionCompensation...`.
 pub(super) fn type_name(calculator: &str, suffix: &str) -> String {
     let capital = |word: &str| {

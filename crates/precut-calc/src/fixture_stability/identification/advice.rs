@@ -48,7 +48,8 @@ pub(super) fn warnings(problem: &Problem<'_>, outcome: &IdentificationOutcome) -
         let at = format!("/unknowns/{}", parameter.name);
         let unit = unknown.parameter.unit();
         if parameter.at_bound {
-            let end = if parameter.value - unknown.from < unknown.to - parameter.value { unknown.from } else { unknown.to };
+            let end =
+                if parameter.value - unknown.from < unknown.to - parameter.value { unknown.from } else { unknown.to };
             found.push(
                 Finding::new("identification_at_bound", at.clone())
                     .measured(parameter.value, end, unit)
@@ -94,7 +95,8 @@ pub(super) fn warnings(problem: &Problem<'_>, outcome: &IdentificationOutcome) -
         }
     }
     for onset in outcome.onsets.iter().filter(|onset| !onset.within) {
-        let mut finding = Finding::new("identification_onset_missed", "/measurements").with("teeth", f64::from(onset.teeth));
+        let mut finding =
+            Finding::new("identification_onset_missed", "/measurements").with("teeth", f64::from(onset.teeth));
         for (name, depth) in [
             ("stable_mm", onset.table_stable_mm),
             ("chatter_mm", onset.table_chatter_mm),

@@ -24,12 +24,7 @@ pub(super) struct Certainty {
     pub scatter: f64,
 }
 
-pub(super) fn certainty(
-    problem: &Problem<'_>,
-    law: Law,
-    at: &[f64],
-    base: &[Predicted],
-) -> Result<Certainty, Failure> {
+pub(super) fn certainty(problem: &Problem<'_>, law: Law, at: &[f64], base: &[Predicted]) -> Result<Certainty, Failure> {
     let rows: Vec<usize> = (0..base.len()).filter(|&row| problem.sigma(row).is_some()).collect();
     let residuals: Vec<f64> = rows.iter().map(|&row| problem.residual(row, base[row].amplitude_mm)).collect();
     let weights: Vec<f64> = residuals.iter().map(|r| (HUBER / r.abs().max(HUBER)).sqrt()).collect();
@@ -49,7 +44,8 @@ pub(super) fn certainty(
             // A row that passes the limit of chatter jumps; a slope there is none.
             let stable = |of: &Predicted| of.modulus < 1.0;
             if width > 0.0 && stable(&low[row]) == stable(&high[row]) {
-                let change = problem.residual(row, high[row].amplitude_mm) - problem.residual(row, low[row].amplitude_mm);
+                let change =
+                    problem.residual(row, high[row].amplitude_mm) - problem.residual(row, low[row].amplitude_mm);
                 jacobian.set(i, j, weights[i] * change / width);
             }
         }
