@@ -130,6 +130,8 @@ pub(crate) fn all() -> Vec<Row> {
             None,
             || fresh(Bare::Writes, Clock::ServerCpu),
         ),
+        row("health while every core computes: slowest of 100, wall time", Unit::Time, Some(0.05), Some(0.02), health),
+        row("small fresh answer while every core computes: slowest of 100, wall time", Unit::Time, None, None, small),
         row("start to first answer, wall time", Unit::Time, Some(0.3), Some(0.1), start),
         row("idle memory", Unit::Size, Some(60e6), Some(25e6), http::idle_memory),
         row("binary", Unit::Size, Some(40e6), Some(20e6), http::binary_size),
@@ -204,6 +206,27 @@ fn fresh(bare: Bare, clock: Clock) -> Result<Measured, String> {
     }
     let body = Box::new(move |count| http::varied(&job, DEFLECTION_VARIED, count));
     http::ratio(&Exchange { path: format!("/v1/{DEFLECTION}"), body }, bare, clock)
+}
+
+fn health() -> Result<Measured, String> {
+    let probe = Exchange { path: "/health/live".to_owned(), body: Box::new(|_| Vec::new()) };
+    http::latency_under_load(&probe, &load()?)
+}
+
+fn small() -> Result<Measured, String> {
+    let job = http::example(DEFLECTION)?;
+    let body = Box::new(move |count| http::varied(&job, DEFLECTION_VARIED, count));
+    http::latency_under_load(&Exchange { path: format!("/v1/{DEFLECTION}"), body }, &load()?)
+}
+
+/// Large jobs, each another one.
+fn load() -> Result<Exchange, String> {
+    /// None of those that are asked for meanwhile.
+    const BEYOND: usize = 1_000_000;
+    let mut job = http::example(DEFLECTION)?;
+    job["stations"] = serde_json::json!({"kind": "per_zone", "count": 50_000});
+    let body = Box::new(move |count| http::varied(&job, DEFLECTION_VARIED, BEYOND + count));
+    Ok(Exchange { path: format!("/v1/{DEFLECTION}"), body })
 }
 
 fn start() -> Result<Measured, String> {

@@ -39,7 +39,7 @@ CREATE INDEX results_by_calculator ON precut.results (calculator, created_ms, ke
 -- Room in the pages: progress is written every second, and no index knows of it.
 CREATE TABLE precut.jobs (
     id           text COLLATE "C" NOT NULL PRIMARY KEY,
-    kind         text    NOT NULL CHECK (kind IN ('calculation', 'study')),
+    kind         text    NOT NULL,
     calculator   text    NOT NULL,
     version      integer NOT NULL,
     -- Version of the program that accepted it: an earlier one need not be able to read it.

@@ -44,8 +44,7 @@ use precut_calc::calculator::{Cost, Failure, Monitor};
 use crate::registry::{Entry, Registry};
 use crate::store::jobs::JobStore;
 use crate::store::models::ModelStore;
-use crate::store::sqlite::{Keep, SqliteStore};
-use crate::store::{ResultPage, ResultQuery, ResultStore};
+use crate::store::{ResultPage, ResultQuery, ResultStore, Store};
 use exec::{Cores, Slot, guarded};
 use flight::{Boarded, Flights, Landed, Pilot};
 use jobs::Jobs;
@@ -90,16 +89,9 @@ enum Known {
 impl Engine {
     /// Opens the store in the settings' folder and starts the threads.
     pub async fn open(registry: Registry, settings: EngineSettings) -> Result<Self, OpenError> {
-        let keep = Keep { bytes: settings.store_bytes, age: settings.store_age, jobs: settings.job_age };
-        let store = Arc::new(SqliteStore::open(&settings.data, keep).await?);
-        Self::with_stores(
-            registry,
-            settings,
-            Arc::clone(&store) as Arc<dyn ResultStore>,
-            Arc::clone(&store) as Arc<dyn ModelStore>,
-            store,
-        )
-        .await
+        let store = crate::store::open(&settings.store_settings()).await?;
+        let (results, models) = (Arc::<dyn Store>::clone(&store), Arc::<dyn Store>::clone(&store));
+        Self::with_stores(registry, settings, results, models, store).await
     }
 
     async fn with_stores(

@@ -209,8 +209,8 @@ mod tests {
         Arc::clone(toy::registry().entry("toy-bar").unwrap())
     }
 
-    fn no_models() -> Models<'static> {
-        Models { registry: toy::shared(), found: None }
+    fn read(entry: &Arc<Entry>, body: &Body) -> Result<Ready, Error> {
+        super::read(entry, body, &Models { registry: toy::shared(), found: None })
     }
 
     fn body(job: &Value) -> Body {
@@ -218,14 +218,12 @@ mod tests {
     }
 
     fn key(job: &Value) -> Key {
-        read(&toy(), &body(job), &no_models()).unwrap_or_else(|error| panic!("{job}: {error:?}")).key
+        read(&toy(), &body(job)).unwrap_or_else(|error| panic!("{job}: {error:?}")).key
     }
 
     /// Code and pointer of every fault; each must have a text that fits its values.
     fn faults(job: &Value) -> Vec<(&'static str, String)> {
-        let Err(Error::Invalid { findings, total }) = read(&toy(), &body(job), &no_models()) else {
-            panic!("{job} is accepted")
-        };
+        let Err(Error::Invalid { findings, total }) = read(&toy(), &body(job)) else { panic!("{job} is accepted") };
         assert_eq!(findings.len(), total.min(Error::MOST_FAULTS));
         for finding in &findings {
             Texts::shared().try_finding(Language::En, "fault", finding).unwrap();
@@ -234,7 +232,7 @@ mod tests {
     }
 
     fn only(job: &Value) -> Finding {
-        let Err(Error::Invalid { mut findings, total: 1 }) = read(&toy(), &body(job), &no_models()) else {
+        let Err(Error::Invalid { mut findings, total: 1 }) = read(&toy(), &body(job)) else {
             panic!("not one fault in {job}")
         };
         findings.remove(0)
@@ -267,7 +265,7 @@ mod tests {
         assert_eq!(key(&rows), key(&with("measurements", json!({ "csv": text }))));
         let part = TablePart { name: "measurements".to_owned(), text: text.into() };
         let parts = Body::Parts { job: plain().to_string().into(), tables: vec![part] };
-        let ready = read(&toy(), &parts, &no_models()).unwrap();
+        let ready = read(&toy(), &parts).unwrap();
         assert_eq!(ready.key, key(&rows));
         assert_eq!(ready.echo().unwrap()["measurements"]["rows"], 1);
     }

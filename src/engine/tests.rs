@@ -11,6 +11,7 @@ use tempfile::TempDir;
 
 use super::*;
 use crate::registry::toy;
+use crate::store::sqlite::{Keep, SqliteStore};
 use crate::store::{KeptResult, StoreError};
 use crate::text::{Language, Texts};
 

@@ -33,7 +33,7 @@ use axum::http::{HeaderName, Uri};
 use axum::routing::{any, get, post};
 use tower_http::cors::{AllowOrigin, CorsLayer};
 
-use crate::config::{Config, Limits};
+use crate::config::{Config, Limits, Role};
 use crate::engine::{Engine, Error};
 
 pub use answer::written;
@@ -63,6 +63,7 @@ pub struct Shared {
     in_flight: AtomicUsize,
     waiting: AtomicUsize,
     stopping: AtomicBool,
+    role: Role,
 }
 
 impl Deref for App {
@@ -92,6 +93,7 @@ impl App {
             in_flight: AtomicUsize::new(0),
             waiting: AtomicUsize::new(0),
             stopping: AtomicBool::new(false),
+            role: config.role,
             engine,
         }))
     }
@@ -116,15 +118,29 @@ struct Peer {
 
 /// Every route behind the gate.
 pub fn router(app: &App) -> Router {
-    let mut router = Router::new()
+    let health = Router::new()
+        .route("/health/live", get(health::live))
+        .route("/health/ready", get(health::ready))
+        .route("/metrics", get(metrics::get));
+    // Who only runs jobs is asked how it is, and nothing else.
+    let router = if app.role == Role::Worker { health } else { routes(app, health) };
+    let router = router
+        .fallback(not_found)
+        .layer(axum::middleware::from_fn_with_state(app.clone(), gate::gate))
+        .with_state(app.clone());
+    match cors(&app.origins) {
+        Some(cors) => router.layer(cors),
+        None => router,
+    }
+}
+
+fn routes(app: &App, health: Router<App>) -> Router<App> {
+    let mut router = health
         .route("/", get(pages::landing))
         .route("/docs", get(pages::docs))
         .route("/docs/{file}", get(pages::docs_file))
         .route("/problems/{code}", get(pages::problem))
         .route("/openapi.json", get(document::openapi))
-        .route("/health/live", get(health::live))
-        .route("/health/ready", get(health::ready))
-        .route("/metrics", get(metrics::get))
         .route("/v1/calculators", get(calculators::list))
         .route("/v1/calculators/{id}", get(calculators::describe))
         .route("/v1/jobs", get(jobs::list))
@@ -145,14 +161,7 @@ pub fn router(app: &App) -> Router {
         };
         router = router.route(&format!("/v1/{}", room.id()), post(handler));
     }
-    let router = router
-        .fallback(not_found)
-        .layer(axum::middleware::from_fn_with_state(app.clone(), gate::gate))
-        .with_state(app.clone());
-    match cors(&app.origins) {
-        Some(cors) => router.layer(cors),
-        None => router,
-    }
+    router
 }
 
 async fn not_found(uri: Uri) -> Problem {

@@ -438,6 +438,10 @@ impl Prepared {
     pub fn run(&self, monitor: &dyn Monitor, body: &mut Vec<u8>) -> Result<ResultNotes, Failure> {
         self.job.run(monitor, body)
     }
+    /// Computes parts of the job that somebody else runs, as long as `go_on` says so; whether some may be left.
+    pub(crate) fn help(&self, monitor: &dyn Monitor, go_on: &mut dyn FnMut() -> bool) -> bool {
+        self.job.help(monitor, go_on)
+    }
 }
 
 /// Why a job cannot run.
@@ -481,6 +485,10 @@ pub(crate) trait Job: Send + Sync {
     fn input(&self) -> Result<Value, Failure>;
     fn write_input(&self, body: &mut Vec<u8>) -> Result<(), Failure>;
     fn run(&self, monitor: &dyn Monitor, body: &mut Vec<u8>) -> Result<ResultNotes, Failure>;
+    /// Computes parts of the job that somebody else runs, as long as `go_on` says so; whether some may be left.
+    fn help(&self, _monitor: &dyn Monitor, _go_on: &mut dyn FnMut() -> bool) -> bool {
+        false
+    }
 }
 
 /// The types of a calculator.

@@ -5,15 +5,18 @@
 
 use std::fmt;
 use std::str::FromStr;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use bytes::Bytes;
 use futures_util::future::BoxFuture;
 use tokio::sync::watch;
-use uuid::Uuid;
+use uuid::{ContextV7, Timestamp, Uuid};
 
 use super::{KeptResult, StoreError};
 use crate::key::Key;
+
+/// Starts after which a job that takes its process along is given up.
+pub(crate) const MOST_ATTEMPTS: u32 = 3;
 
 /// A job's name, in the order of time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -22,7 +25,17 @@ pub struct JobId(Uuid);
 impl JobId {
     /// A new one, after all before.
     pub fn new() -> Self {
-        Self(Uuid::now_v7())
+        Self::at(super::now_ms())
+    }
+
+    /// A new one at some time, ms UTC, after all before of that time.
+    pub fn at(now_ms: i64) -> Self {
+        /// Counts within a millisecond.
+        static CONTEXT: Mutex<ContextV7> = Mutex::new(ContextV7::new());
+        let now_ms = now_ms.max(0).unsigned_abs();
+        let nanos = u32::try_from(now_ms % 1000).unwrap_or(0) * 1_000_000;
+        let context = CONTEXT.lock().unwrap_or_else(PoisonError::into_inner);
+        Self(Uuid::new_v7(Timestamp::from_unix(&*context, now_ms / 1000, nanos)))
     }
 }
 
@@ -103,8 +116,6 @@ words! {
     JobKind {
         /// One answer of one calculator.
         Calculation = "calculation",
-        /// Many answers of one calculator.
-        Study = "study",
     }
 }
 

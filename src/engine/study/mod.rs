@@ -174,4 +174,8 @@ impl Job for Study {
         serde_json::to_writer(body, &result).map_err(|error| Failure::Internal(format!("the study: {error}")))?;
         Ok(notes)
     }
+
+    fn help(&self, monitor: &dyn Monitor, go_on: &mut dyn FnMut() -> bool) -> bool {
+        run::help(&self.plan, &self.host, self.key, monitor, go_on)
+    }
 }

@@ -11,7 +11,7 @@ use tokio::task::JoinHandle;
 use super::PostgresStore;
 use super::record::{Outcome, column, count};
 use crate::key::Key;
-use crate::store::jobs::Lease;
+use crate::store::jobs::{Lease, MOST_ATTEMPTS};
 use crate::store::{StoreError, Taken};
 
 /// Fast: what is put down is hardly ever read again.
@@ -124,6 +124,13 @@ impl PostgresStore {
         .execute(&self.pool)
         .await?;
         self.held.parts().remove(&(study, shard));
+        // Whoever gets on is not to blame for the end of its processes: what is put down is not computed again, so that
+        // this cannot go on for ever.
+        sqlx::query("UPDATE precut.jobs SET attempt = $2 WHERE key = $1 AND state = 'running' AND attempt > $2")
+            .bind(study.as_bytes().as_slice())
+            .bind(column(MOST_ATTEMPTS - 1))
+            .execute(&self.pool)
+            .await?;
         Ok(())
     }
 
