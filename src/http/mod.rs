@@ -12,6 +12,7 @@ mod health;
 mod jobs;
 mod materials;
 mod metrics;
+mod models;
 mod negotiate;
 pub mod openapi;
 mod pages;
@@ -151,6 +152,8 @@ fn routes(app: &App, health: Router<App>) -> Router<App> {
         .route("/v1/jobs/{id}", get(jobs::read).delete(jobs::cancel))
         .route("/v1/jobs/{id}/result", get(jobs::result))
         .route("/v1/jobs/{id}/events", get(events::follow))
+        .route("/v1/models", get(models::list))
+        .route("/v1/models/{name}", get(models::read).put(models::store).delete(models::delete))
         .route("/v1/results", get(results::list))
         .route("/v1/results/{key}", get(results::read))
         .route("/v1/results/{key}/figures", get(parts::figures))
@@ -210,7 +213,7 @@ fn cors(origins: &[String]) -> Option<CorsLayer> {
     Some(
         CorsLayer::new()
             .allow_origin(allowed)
-            .allow_methods([Method::GET, Method::HEAD, Method::POST, Method::DELETE])
+            .allow_methods([Method::GET, Method::HEAD, Method::POST, Method::PUT, Method::DELETE])
             .allow_headers(request_headers)
             .expose_headers(exposed)
             .max_age(std::time::Duration::from_hours(1)),

@@ -3,11 +3,13 @@
 pub mod address;
 pub mod jobs;
 mod ledger;
+pub mod models;
 mod postgres;
 mod queue;
 mod row;
 pub mod sqlite;
 mod sqlite_jobs;
+mod sqlite_models;
 mod sqlite_studies;
 mod writer;
 
@@ -47,8 +49,8 @@ pub enum OpenError {
 }
 
 /// Everything that outlasts a process.
-pub trait Store: ResultStore + jobs::JobStore {}
-impl<S: ResultStore + jobs::JobStore> Store for S {}
+pub trait Store: ResultStore + jobs::JobStore + models::ModelStore {}
+impl<S: ResultStore + jobs::JobStore + models::ModelStore> Store for S {}
 
 /// Which store, and how it is used.
 #[derive(Debug, Clone)]
