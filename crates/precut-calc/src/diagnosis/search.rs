@@ -124,6 +124,8 @@ pub(super) struct Candidate {
     pub(super) members: Vec<usize>,
     /// Evidence, averaged over the grids.
     pub(super) log_z: f64,
+    /// Evidence at the best point of the grids.
+    pub(super) best_log_z: f64,
     pub(super) log_prior: f64,
     /// The best point of the grids: variant of every member.
     pub(super) variants: Vec<usize>,
@@ -174,9 +176,10 @@ impl<'a> Linear<'a> {
 
     /// Whether a shape of one of these hypotheses may leave its grid.
     pub(super) fn has_free_shapes(&self, members: &[usize]) -> bool {
-        members.iter().flat_map(|&h| &self.hypotheses[h].variables).any(|variable| {
-            matches!(variable.treatment, Treatment::Shape { prior: Some(_), .. })
-        })
+        members
+            .iter()
+            .flat_map(|&h| &self.hypotheses[h].variables)
+            .any(|variable| matches!(variable.treatment, Treatment::Shape { prior: Some(_), .. }))
     }
 
     /// Cosine of the angle between the signatures of two hypotheses with one amplitude and no grid.
@@ -246,7 +249,15 @@ impl<'a> Linear<'a> {
         let best = (0..found.len()).rev().max_by(|&a, &b| all[a].total_cmp(&all[b]))?;
         let spread = if found.len() > 1 { self.spread(&members, &found, best) } else { Vec::new() };
         let (variants, evidence) = found.swap_remove(best);
-        Some(Candidate { members, log_z: log_mean_exp(&all), log_prior, variants, t: evidence.t, spread })
+        Some(Candidate {
+            members,
+            log_z: log_mean_exp(&all),
+            best_log_z: evidence.log_z,
+            log_prior,
+            variants,
+            t: evidence.t,
+            spread,
+        })
     }
 
     fn spread(&self, members: &[usize], found: &[(Vec<usize>, Evidence)], best: usize) -> Vec<Vec<f64>> {

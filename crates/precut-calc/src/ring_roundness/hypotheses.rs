@@ -3,8 +3,9 @@
 use std::f64::consts::TAU;
 
 use super::input::Job;
+use super::scene::Scene;
 use crate::calculator::{
-    Design, Hypotheses, Hypothesis, Inapplicability, Inapplicable, Range, Shape, Smooth, Treatment, Variable,
+    Design, Hypotheses, Hypothesis, Inapplicability, Inapplicable, Range, Smooth, Treatment, Variable,
 };
 use crate::effects::{Cause, Fit, Parameter, RING_CAUSES, RingEffect};
 
@@ -12,10 +13,9 @@ use crate::effects::{Cause, Fit, Parameter, RING_CAUSES, RingEffect};
 const BLOCK_DEG: f64 = 30.0;
 /// Folds that the blocks go to by turns.
 const FOLDS: usize = 4;
-/// Spread of the ratio of ring to roller where the roller's radius is stated, relative: the ring shrinks under it.
-const KNOWN_RATIO_SD: f64 = 0.01;
-/// Mean and spread of the logarithm of that ratio where nothing is known of the roller.
-const UNKNOWN_RATIO: (f64, f64) = (5.0, 0.6);
+/// Steps between two whole ratios of ring to roller, where nothing is known of the roller: within a tenth the beat of a
+/// ratio that is not whole runs out of step only after more revolutions than what one pass leaves to the next is cut.
+const PARTS_OF_A_RATIO: u32 = 10;
 
 /// The catalogue, sorted by whether traces of these rings can speak about a cause.
 ///
@@ -109,22 +109,23 @@ fn quadratures(cause: &Cause) -> Vec<Variable> {
         .collect()
 }
 
-/// Of the stated roller the ratio is known but for what is cut off the ring; else it is looked for.
+/// Of a stated roller the ratio is known, that of the finished ring; else it is looked for.
 fn ratio(cause: &Cause, rings: &[&Job]) -> Treatment {
-    let known = rings.first().and_then(|job| {
-        let roller = job.supports.roller_radius_mm;
-        super::check::mean_radius_mm(job).filter(|_| roller > 0.0).map(|radius| radius / roller)
+    let known = rings.first().filter(|job| job.supports.roller_radius_mm > 0.0).and_then(|job| {
+        let end = Scene::of(job, &job.effects).end()?;
+        Some(end.radius_mm / job.supports.roller_radius_mm)
     });
-    match known {
-        Some(ratio) => Treatment::Shape {
-            grid: vec![ratio],
-            prior: Some(Shape { mean: ratio.ln(), sd: KNOWN_RATIO_SD, logarithmic: true }),
-        },
-        None => Treatment::Shape {
-            grid: grid_of(cause, "ratio").to_vec(),
-            prior: Some(Shape { mean: UNKNOWN_RATIO.0.ln(), sd: UNKNOWN_RATIO.1, logarithmic: true }),
-        },
-    }
+    let grid = known.map_or_else(|| finer(grid_of(cause, "ratio")), |ratio| vec![ratio]);
+    Treatment::Shape { grid, prior: None }
+}
+
+/// A grid with its steps divided.
+fn finer(grid: &[f64]) -> Vec<f64> {
+    let parts = f64::from(PARTS_OF_A_RATIO);
+    let between = grid.windows(2).flat_map(|pair| {
+        (0..PARTS_OF_A_RATIO).map(move |part| pair[0] + (pair[1] - pair[0]) * f64::from(part) / parts)
+    });
+    between.chain(grid.last().copied()).collect()
 }
 
 fn variable(parameter: &Parameter, treatment: Treatment) -> Variable {
