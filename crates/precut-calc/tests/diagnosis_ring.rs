@@ -178,11 +178,11 @@ fn a_run_is_a_ring_with_its_own_settings() {
         apart.extend(RingRoundness::predict(&ring, &effects).unwrap());
     }
     assert_eq!(together, apart);
-    let wrong = RingRun { feed_mm_per_rev: Some(5.0), ..RingRun::default() };
+    let wrong = RingRun { tool_y_mm: Some(-80.0), ..RingRun::default() };
     let rows = Rows { runs: vec![wrong], points: all_round(72, 0).collect() };
     match RingRoundness::prepare(&job(&short()), &rows, "radial_deviation_um", &Unwatched) {
         Err(PrepareError::Invalid(faults)) => assert!(faults.iter().all(|fault| fault.pointer == "/runs/0")),
-        _ => panic!("a ring that is turned away was accepted"),
+        _ => panic!("a tool below the ring was accepted"),
     }
 }
 

@@ -13,9 +13,13 @@ use crate::effects::{Cause, Fit, Parameter, RING_CAUSES, RingEffect};
 const BLOCK_DEG: f64 = 30.0;
 /// Folds that the blocks go to by turns.
 const FOLDS: usize = 4;
-/// Steps between two whole ratios of ring to roller, where nothing is known of the roller: within a tenth the beat of a
-/// ratio that is not whole runs out of step only after more revolutions than what one pass leaves to the next is cut.
-const PARTS_OF_A_RATIO: u32 = 10;
+/// Steps between two whole ratios of ring to roller, where nothing is known of the roller.
+const PARTS_OF_A_RATIO: u32 = 2;
+/// Sizes about which a displacement or a slip is linearised, prior standard deviations: from one to the next the teeth that
+/// the feed leaves move by a part of their width, and a signature is another one after a few of these steps.
+const EXPANSION_STEP: f64 = 0.2;
+/// How many of them to either side: three prior standard deviations.
+const EXPANSIONS: u32 = 15;
 
 /// The catalogue, sorted by whether traces of these rings can speak about a cause.
 ///
@@ -142,6 +146,19 @@ fn grid_of(cause: &Cause, name: &str) -> &'static [f64] {
     match parameter(cause, name).fit {
         Fit::Shape { grid } => grid,
         _ => &[],
+    }
+}
+
+/// Sizes about which a hypothesis is linearised beside 0.
+pub(super) fn expansions(hypothesis: &Hypothesis) -> Vec<f64> {
+    match (hypothesis.cause.kind, hypothesis.variables.as_slice()) {
+        (
+            "tool_off_line" | "support_position" | "work_slip",
+            [Variable { treatment: Treatment::Amplitude { prior_sd }, .. }],
+        ) => {
+            (1..=EXPANSIONS).map(|k| EXPANSION_STEP * f64::from(k) * prior_sd).flat_map(|size| [size, -size]).collect()
+        }
+        _ => Vec::new(),
     }
 }
 
