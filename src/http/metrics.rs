@@ -175,6 +175,7 @@ fn recorder() -> &'static PrometheusHandle {
         );
         metrics::describe_gauge!("http_requests_in_flight", "Requests in work.");
         metrics::describe_counter!("precut_answers_total", "Answers by calculator, from the cache (hit) or not.");
+        metrics::describe_counter!("precut_results_evicted_total", "Kept results forgotten to make room.");
         metrics::describe_counter!("precut_cache_hits_total", "Answers found, by tier: in memory or in the store.");
         metrics::describe_counter!(
             "precut_calculations_total",
