@@ -324,7 +324,7 @@ mod tests {
     use serde_json::json;
 
     fn place() -> TablePlace {
-        toy::registry().entry("toy-bar").unwrap().tables()[0].clone()
+        toy::registry().entry("toy-bar").unwrap().tables_of(&Value::Null)[0].clone()
     }
 
     fn rows(text: &str) -> Value {

@@ -199,7 +199,7 @@ mod tests {
             .map(|(name, text)| TablePart { name: (*name).into(), text: text.to_string().into() })
             .collect();
         let mut faults = Faults::default();
-        resolve(&mut job, &parts, registry.entry("toy-bar").unwrap().tables(), &mut faults);
+        resolve(&mut job, &parts, registry.entry("toy-bar").unwrap().tables_of(&Value::Null), &mut faults);
         for finding in &faults.listed {
             Texts::shared().try_finding(Language::En, "fault", finding).unwrap();
         }
@@ -226,7 +226,7 @@ mod tests {
     #[test]
     fn the_echo_has_the_hash_of_the_rows() {
         let registry = toy::registry();
-        let places = registry.entry("toy-bar").unwrap().tables();
+        let places = registry.entry("toy-bar").unwrap().tables_of(&Value::Null);
         let echo = without_rows(json!({"measurements": [{"z_mm": 1, "deviation_um": 2}]}), places);
         let other = without_rows(json!({"measurements": [{"deviation_um": 2.0, "z_mm": 1.0}]}), places);
         assert_eq!(echo["measurements"]["rows"], 1);

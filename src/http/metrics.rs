@@ -22,18 +22,26 @@ const LATENCY_S: [f64; 14] =
 const JOB: &str = "/v1/jobs/{id}";
 const JOB_RESULT: &str = "/v1/jobs/{id}/result";
 const JOB_EVENTS: &str = "/v1/jobs/{id}/events";
+const RESULT: &str = "/v1/results/{key}";
+const RESULT_FIGURES: &str = "/v1/results/{key}/figures";
+const RESULT_TABLES: &str = "/v1/results/{key}/tables";
+const RESULT_JOB: &str = "/v1/results/{key}/job";
 
 /// Addresses with a variable part, as they are counted.
-const PATTERNS: [(&str, &str); 9] = [
+const PATTERNS: [(&str, &str); 13] = [
     ("/v1/jobs/", JOB),
     ("/v1/jobs/", JOB_RESULT),
     ("/v1/jobs/", JOB_EVENTS),
-    ("/v1/results/", "/v1/results/{key}"),
+    ("/v1/results/", RESULT),
+    ("/v1/results/", RESULT_FIGURES),
+    ("/v1/results/", RESULT_TABLES),
+    ("/v1/results/", RESULT_JOB),
     ("/v1/calculators/", "/v1/calculators/{id}"),
     ("/v1/materials/", "/v1/materials/{id}"),
     ("/v1/", "/v1/{calculator}"),
     ("/problems/", "/problems/{code}"),
     ("/docs/", "/docs/{file}"),
+    ("/ui/", "/ui/{version}/{file}"),
 ];
 
 /// Addresses without one, besides the calculators'.
@@ -130,6 +138,15 @@ fn pattern(path: &str) -> Option<&'static str> {
             Some("result") => JOB_RESULT,
             Some("events") => JOB_EVENTS,
             _ => JOB,
+        });
+    }
+    if path.starts_with("/v1/results/") {
+        let part = path.rsplit('/').next();
+        return Some(match part {
+            Some("figures") => RESULT_FIGURES,
+            Some("tables") => RESULT_TABLES,
+            Some("job") => RESULT_JOB,
+            _ => RESULT,
         });
     }
     PATTERNS.iter().find(|(prefix, _)| path.starts_with(prefix)).map(|&(_, name)| name)

@@ -132,3 +132,38 @@ async fn a_place_in_the_list_is_written_in_one_way_only() {
         problem(server.get(&format!("/v1/jobs/{other}")).send().await.unwrap(), 404, "unknown_job").await;
     }
 }
+
+#[tokio::test]
+async fn a_result_is_read_in_parts_with_words() {
+    let server = Server::start().await;
+    let key = fill(&server, 1).await.remove(0);
+    let read = async |part: &str| -> Value {
+        let response = server.get(&format!("/v1/results/{key}/{part}")).send().await.unwrap();
+        assert_eq!(response.status(), 200, "{part}");
+        assert!(header(&response, "cache-control").contains("private"));
+        response.json().await.unwrap()
+    };
+    let figures = read("figures").await;
+    let figure = &figures["items"][0];
+    assert_eq!(figure["id"], "sag");
+    let texts = [&figure["title"]["text"], &figure["x"]["text"], &figure["panels"][0]["items"][0]["text"]];
+    assert!(texts.iter().all(|text| text.as_str().is_some_and(|text| !text.is_empty() && !text.contains('_'))), "{figure}");
+
+    let tables = read("tables").await;
+    let columns = tables["items"][0]["columns"].as_array().unwrap();
+    assert!(columns.iter().all(|column| column["text"].as_str().is_some() && !column["cells"].as_array().unwrap().is_empty()));
+
+    // The job of a result gives that result again.
+    let file = read("job").await;
+    assert_eq!(file["calculator"], toy::BAR);
+    let again = server.post(file["job"].to_string()).send().await.unwrap();
+    assert_eq!(header(&again, "precut-cache"), "hit");
+    assert!(header(&again, "content-location").ends_with(&key));
+
+    let zeros = "0".repeat(64);
+    for part in ["figures", "tables", "job"] {
+        let absent = server.get(&format!("/v1/results/b3:{zeros}/{part}")).send().await.unwrap();
+        problem(absent, 404, "unknown_result").await;
+        problem(server.get(&format!("/v1/results/none/{part}")).send().await.unwrap(), 400, "bad_key").await;
+    }
+}

@@ -121,7 +121,7 @@ async fn the_landing_page_speaks_to_people_and_to_programs() {
     let page = server.get("/").header("accept", "text/html,*/*;q=0.8").send().await.unwrap();
     assert_eq!(header(&page, "content-type"), "text/html; charset=utf-8");
     let text = page.text().await.unwrap();
-    assert!(text.contains("How far does the bar sag?") && text.contains("/docs"), "{text}");
+    assert!(text.contains("/main.js\"></script>") && text.contains("/docs"), "{text}");
 }
 
 #[tokio::test]
