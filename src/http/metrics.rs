@@ -214,6 +214,10 @@ fn recorder() -> &'static PrometheusHandle {
             "Time that a job's computation took, by calculator."
         );
         metrics::describe_gauge!("precut_jobs", "Jobs by state: queued, running.");
+        metrics::describe_counter!(
+            "precut_jobs_helped_total",
+            "Jobs that another worker may take up again, because the one that had them is gone."
+        );
         metrics::describe_counter!("precut_queue_full_total", "Jobs refused because too many waited.");
         metrics::describe_counter!("precut_jobs_poisonous_total", "Jobs given up: they ended the process each time.");
         metrics::describe_gauge!("precut_build_info", "Always 1; the version is its label.");

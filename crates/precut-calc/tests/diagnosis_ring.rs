@@ -20,7 +20,8 @@ fn answered(job: &Value) -> Answer<DiagnosisResult<RingEffect, RingRun>> {
 
 #[test]
 fn probe() {
-    let mut job: Value = serde_json::from_str(&std::fs::read_to_string("/tmp/diagnosis_roller_ref.json").unwrap()).unwrap();
+    let mut job: Value =
+        serde_json::from_str(&std::fs::read_to_string("/tmp/diagnosis_roller_ref.json").unwrap()).unwrap();
     job["options"] = json!({ "held_out": std::env::var("HELD").is_ok() });
     let start = std::time::Instant::now();
     let answer = answered(&job);
@@ -30,7 +31,19 @@ fn probe() {
     println!("{}", serde_json::to_string(&r.effects).unwrap());
     println!("{}", serde_json::to_string(&r.noise).unwrap());
     for s in r.sets.iter().take(6) {
-        println!("{:.3e} {} {:?}", s.posterior, s.with_remainder, s.causes.iter().map(|c| (c.kind.clone(), c.label.clone(), c.parameters.iter().map(|p| (p.value, p.standard_deviation)).collect::<Vec<_>>())).collect::<Vec<_>>());
+        println!(
+            "{:.3e} {} {:?}",
+            s.posterior,
+            s.with_remainder,
+            s.causes
+                .iter()
+                .map(|c| (
+                    c.kind.clone(),
+                    c.label.clone(),
+                    c.parameters.iter().map(|p| (p.value, p.standard_deviation)).collect::<Vec<_>>()
+                ))
+                .collect::<Vec<_>>()
+        );
     }
     println!("{}", serde_json::to_string(&r.gain).unwrap());
     println!("{}", serde_json::to_string(&r.next_measurement).unwrap());

@@ -95,7 +95,9 @@ impl<M: Diagnosable> Bound<M> {
             let hypothesis = &self.hypotheses.applicable[setting.hypothesis];
             let sizes = hypothesis.variables.iter().zip(&setting.values);
             hypothesis.has_amplitude()
-                && sizes.into_iter().all(|(v, value)| !matches!(v.treatment, Treatment::Amplitude { .. }) || value.abs() < f64::MIN_POSITIVE)
+                && sizes.into_iter().all(|(v, value)| {
+                    !matches!(v.treatment, Treatment::Amplitude { .. }) || value.abs() < f64::MIN_POSITIVE
+                })
         };
         if !settings.iter().all(absent) {
             return self.coarsely(settings);

@@ -174,9 +174,10 @@ impl<'a> Linear<'a> {
 
     /// Whether a shape of one of these hypotheses may leave its grid.
     pub(super) fn has_free_shapes(&self, members: &[usize]) -> bool {
-        members.iter().flat_map(|&h| &self.hypotheses[h].variables).any(|variable| {
-            matches!(variable.treatment, Treatment::Shape { prior: Some(_), .. })
-        })
+        members
+            .iter()
+            .flat_map(|&h| &self.hypotheses[h].variables)
+            .any(|variable| matches!(variable.treatment, Treatment::Shape { prior: Some(_), .. }))
     }
 
     /// Cosine of the angle between the signatures of two hypotheses with one amplitude and no grid.
