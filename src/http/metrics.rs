@@ -216,7 +216,7 @@ fn recorder() -> &'static PrometheusHandle {
         metrics::describe_gauge!("precut_jobs", "Jobs by state: queued, running.");
         metrics::describe_counter!(
             "precut_jobs_helped_total",
-            "Jobs that another worker may take up again, because the one that had them is gone."
+            "Times that this process computed parts of a job that another one runs."
         );
         metrics::describe_counter!("precut_queue_full_total", "Jobs refused because too many waited.");
         metrics::describe_counter!("precut_jobs_poisonous_total", "Jobs given up: they ended the process each time.");
