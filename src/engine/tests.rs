@@ -11,6 +11,7 @@ use tempfile::TempDir;
 
 use super::*;
 use crate::registry::toy;
+use crate::store::sqlite::{Keep, SqliteStore};
 use crate::store::{KeptResult, StoreError};
 use crate::text::{Language, Texts, complete};
 
@@ -339,7 +340,8 @@ async fn a_store_that_fails_fails_no_answer() {
     let settings = EngineSettings { cores: 1, ..EngineSettings::in_folder(folder.path()) };
     let keep = Keep { bytes: 1, age: settings.store_age, jobs: settings.job_age };
     let jobs = Arc::new(SqliteStore::open(folder.path(), keep).await.unwrap());
-    let engine = Engine::with_stores(toy::registry(), settings, Arc::new(BrokenStore), jobs).await.unwrap();
+    let engine =
+        Engine::with_stores(toy::registry(), settings, Arc::new(BrokenStore), jobs.clone(), jobs).await.unwrap();
     let solved = engine.solve(TOY, job(|_| {})).await.unwrap();
     assert_eq!(engine.solve(TOY, job(|_| {})).await.unwrap().cache, CacheState::Hit);
     assert!(engine.result(&solved.stored.key).await.unwrap().is_some());
@@ -379,8 +381,12 @@ fn conforms(registry: &Registry, entry: &Entry) {
     }
     for example in meta.examples {
         let body = || Body::Json(example.job.into());
-        let ready = read::read(&registry.entry(meta.id).unwrap().clone(), &body())
-            .unwrap_or_else(|error| panic!("{} of {}: {error:?}", example.id, meta.id));
+        let ready = read::read(
+            &registry.entry(meta.id).unwrap().clone(),
+            &body(),
+            &Models { registry: &registry, found: None },
+        )
+        .unwrap_or_else(|error| panic!("{} of {}: {error:?}", example.id, meta.id));
         let computed = ready.prepared.run(&Unwatched, &mut Vec::new()).unwrap();
         let input = ready.prepared.input().unwrap();
         assert_eq!(ready.canonical, serde_json_canonicalizer::to_vec(&input).unwrap());
@@ -408,8 +414,12 @@ fn conforms(registry: &Registry, entry: &Entry) {
         let answer = envelope(&stored);
         let output = jsonschema::draft202012::new(entry.output_document()).unwrap();
         assert!(output.is_valid(&answer["result"]), "{}: {:?}", meta.id, output.validate(&answer["result"]));
-        let again =
-            read::read(&registry.entry(meta.id).unwrap().clone(), &Body::Json(ready.canonical.clone())).unwrap();
+        let again = read::read(
+            &registry.entry(meta.id).unwrap().clone(),
+            &Body::Json(ready.canonical.clone()),
+            &Models { registry: &registry, found: None },
+        )
+        .unwrap();
         assert_eq!(again.key, ready.key, "the filled job of {} has another key", meta.id);
     }
 }

@@ -11,7 +11,7 @@ use axum::http::header::{
 use axum::http::{HeaderMap, StatusCode, Uri};
 use axum::response::Response;
 use bytes::Bytes;
-use precut_calc::calculator::Meta;
+use precut_calc::calculator::{Figure, Meta, Value, Values};
 use serde::Deserialize;
 
 use super::negotiate::{self, Media};
@@ -200,19 +200,13 @@ fn absent<'a>(code: &'static str, view: &View, ids: impl Iterator<Item = &'a str
     Problem::missing(code, view.part.as_deref().unwrap_or_default()).with("available", available.join(", "))
 }
 
-fn drawn(figure: &precut_calc::calculator::Figure, language: Language) -> String {
-    use precut_calc::calculator::{Value, Values};
+fn drawn(figure: &Figure, language: Language) -> String {
     let texts = Texts::shared();
-    let none = Values::new();
     render::svg(
         figure,
         &render::Wording {
             message: &|message| texts.message(language, "figure", message),
-            // Names that no table of texts has, such as those of a study's variables, stand in the title's values.
-            label: &|code| match figure.title.values.get(code) {
-                Some(Value::Text(name)) => name.clone().into_owned(),
-                _ => texts.word(language, "label", code, &none),
-            },
+            label: &|code| label(figure, code, language),
             unit: &|unit| match language {
                 Language::En => render::unit_symbol(unit),
                 Language::Ru => Glossary::of(language).unit(unit),
@@ -220,6 +214,15 @@ fn drawn(figure: &precut_calc::calculator::Figure, language: Language) -> String
             decimal: language.decimal(),
         },
     )
+}
+
+/// What a figure calls an axis or a curve. Names that no table of texts has, such as those of a study's variables,
+/// stand in the title's values.
+pub(super) fn label(figure: &Figure, code: &str, language: Language) -> String {
+    match figure.title.values.get(code) {
+        Some(Value::Text(name)) => name.clone().into_owned(),
+        _ => Texts::shared().word(language, "label", code, &Values::new()),
+    }
 }
 
 /// Comments at the head of a program: what it is and where it comes from.

@@ -1,7 +1,5 @@
 //! Pages for people: what to try, the interactive contract, what a problem means. All of them in the binary.
 
-use std::fmt::Write as _;
-
 use axum::extract::{Path, State};
 use axum::http::header::CONTENT_SECURITY_POLICY;
 use axum::http::{HeaderMap, HeaderValue};
@@ -13,7 +11,7 @@ use utoipa::ToSchema;
 use super::calculators::wants_page;
 use super::document::Document;
 use super::problem::Problem;
-use super::{App, codes, negotiate};
+use super::{App, codes, negotiate, workbench};
 use crate::text::{Glossary, Language, Texts};
 
 const HTML: &str = "text/html; charset=utf-8";
@@ -49,6 +47,10 @@ pub(super) struct LandingLinks {
     calculators: &'static str,
     /// The kept results.
     results: &'static str,
+    /// The jobs.
+    jobs: &'static str,
+    /// Where studies are posted to.
+    studies: &'static str,
     /// The library of materials.
     materials: &'static str,
     /// The contract (OpenAPI 3.1).
@@ -61,7 +63,7 @@ pub(super) struct LandingLinks {
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct ProblemPage {
     /// Stable name of the problem.
-    #[schema(example = "invalid")]
+    #[schema(example = "invalid_job")]
     code: String,
     /// What is wrong.
     title: String,
@@ -76,7 +78,7 @@ pub(crate) const DESCRIPTION: &str =
     "What to know before the cut: how accurate it will be, and what to change so that it is accurate.";
 
 /// `GET /`
-pub(super) async fn landing(State(app): State<App>, headers: HeaderMap) -> Response {
+pub(super) async fn landing(State(app): State<App>, headers: HeaderMap) -> Result<Response, Problem> {
     let rooms: Vec<_> = app.engine.registry().entries().iter().map(|entry| *entry.meta()).collect();
     if !wants_page(&headers) {
         let language = negotiate::language(&headers);
@@ -87,39 +89,17 @@ pub(super) async fn landing(State(app): State<App>, headers: HeaderMap) -> Respo
             links: LandingLinks {
                 calculators: "/v1/calculators",
                 results: "/v1/results",
+                jobs: "/v1/jobs",
+                studies: "/v1/studies",
                 materials: "/v1/materials",
                 openapi: "/openapi.json",
                 docs: "/docs",
             },
             calculators: rooms.iter().map(|meta| format!("/v1/{}", meta.id)).collect(),
         };
-        return Document::json(&landing, Some(language)).respond(&headers);
+        return Ok(Document::json(&landing, Some(language)).respond(&headers));
     }
-    let mut list = String::new();
-    for meta in &rooms {
-        let (question, title) = (escaped(meta.question), escaped(meta.title));
-        let _ = write!(
-            list,
-            "<li><a href=\"/v1/calculators/{id}\">{question}</a><br>\
-             <small>{title} — <code>POST /v1/{id}</code></small></li>",
-            id = meta.id,
-        );
-    }
-    let example = rooms.first().map_or(String::new(), |meta| {
-        format!(
-            "<h2>Try it</h2><pre>precut example {id} | precut solve -\n\
-             precut example {id} --job | curl --json @- http://{address}/v1/{id}\n\
-             precut example {id} --job | curl --json @- -H 'Accept: text/csv' http://{address}/v1/{id}</pre>",
-            id = meta.id,
-            address = escaped(headers.get("host").and_then(|host| host.to_str().ok()).unwrap_or("127.0.0.1:8080")),
-        )
-    });
-    let body = format!(
-        "<h1>precut</h1><p>{DESCRIPTION}</p><h2>Ask</h2><ul>{list}</ul>{example}\
-         <p><a href=\"/docs\">Interactive documentation</a> · <a href=\"/openapi.json\">Contract (OpenAPI 3.1)</a> · \
-         <a href=\"/v1/results\">Kept results</a> · <a href=\"/v1/materials\">Materials</a></p>"
-    );
-    Document::new(page("precut", &body, Language::En), HTML, Some(Language::En)).respond(&headers)
+    workbench::index(&headers)
 }
 
 /// `GET /docs`

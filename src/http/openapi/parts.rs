@@ -15,11 +15,12 @@ use crate::text::Remark;
 
 pub(super) const BEARER: &str = "bearer";
 
-pub(super) const TAGS: [(&str, &str); 7] = [
+pub(super) const TAGS: [(&str, &str); 8] = [
     ("calculators", "Predict and decide from a model of the process."),
     ("evaluations", "Evaluate data that the user brings."),
     ("studies", "Vary one to three fields of any of them."),
     ("jobs", "Calculations that take long: watched, cancelled, and their results."),
+    ("models", "What diagnoses found, stored for later jobs."),
     ("library", "What can be asked, and the data of the engine."),
     ("results", "Kept answers, read again without computing."),
     ("service", "Health, figures, documentation."),
