@@ -100,8 +100,9 @@ step_unused() {
   local root
   root=$(target)/tools/machete-$MACHETE
   if [ ! -x "$root/bin/cargo-machete" ]; then
-    cargo install --quiet --locked --root "$root" --target-dir "$root/build" "cargo-machete@$MACHETE" ||
-      absent "cargo-machete"
+    # It runs for seconds: optimised it would take longer to build than it saves.
+    CARGO_PROFILE_DEV_DEBUG=none cargo install --quiet --locked --debug --root "$root" --target-dir "$root/build" \
+      "cargo-machete@$MACHETE" || absent "cargo-machete"
     rm -rf "$root/build"
   fi
   "$root/bin/cargo-machete" --skip-target-dir

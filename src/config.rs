@@ -10,14 +10,16 @@ use figment::{Figment, Metadata, Profile, Provider};
 use serde::{Deserialize, Serialize};
 use tracing_subscriber::EnvFilter;
 
+use crate::store::address::{Given, StoreAddress};
+
 /// Every setting with its default and what it means; the source of the defaults.
 pub const DEFAULTS: &str = include_str!("../config.default.toml");
 
 /// Sections of the configuration: `PRECUT_LOG_LEVEL` is `log.level`.
-const SECTIONS: [&str; 7] = ["log", "limits", "jobs", "cache", "shutdown", "cors", "auth"];
+const SECTIONS: [&str; 8] = ["log", "limits", "jobs", "cache", "postgres", "shutdown", "cors", "auth"];
 
 /// Settings that are words even where they look like numbers: `PRECUT_DATA=2026`.
-const WORDS: [&str; 4] = ["listen", "data", "log.level", "log.format"];
+const WORDS: [&str; 6] = ["listen", "data", "store", "role", "log.level", "log.format"];
 
 /// What the service runs with. Unknown keys are refused wherever they come from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -27,6 +29,10 @@ pub struct Config {
     pub listen: SocketAddr,
     /// Folder of the database.
     pub data: PathBuf,
+    /// Where results, jobs and the queue are kept.
+    pub store: StoreAddress,
+    /// What this process does.
+    pub role: Role,
     /// Threads that calculate; 0 takes all cores.
     pub cpu: usize,
     /// What is logged, and how.
@@ -37,6 +43,8 @@ pub struct Config {
     pub jobs: Jobs,
     /// What is kept.
     pub cache: Cache,
+    /// How a PostgreSQL database is used.
+    pub postgres: Postgres,
     /// How the service stops.
     pub shutdown: Shutdown,
     /// Which web pages may call it.
@@ -123,6 +131,36 @@ pub struct Cache {
     pub store_days: u32,
 }
 
+/// What a process does.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Role {
+    /// Answers requests and runs jobs.
+    #[default]
+    All,
+    /// Answers requests; jobs are run by others.
+    Api,
+    /// Runs jobs; of requests only health and metrics.
+    Worker,
+}
+
+impl Role {
+    /// Whether it runs jobs.
+    pub const fn works(self) -> bool {
+        matches!(self, Self::All | Self::Worker)
+    }
+}
+
+/// How a PostgreSQL database is used.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Postgres {
+    /// Connections of this process at most; one more listens for notifications.
+    pub connections: u32,
+    /// How long to wait at the start for a database that does not answer, s.
+    pub wait_s: f64,
+}
+
 /// How the service stops.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -168,6 +206,15 @@ pub struct Flags {
     #[arg(long, value_name = "DIR")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub data: Option<PathBuf>,
+    /// `sqlite` in the data folder, or postgres://user:password@host:5432/database; others can see a flag, so that
+    /// the environment (PRECUT_STORE) is the better place for a password [default: sqlite]
+    #[arg(long, value_name = "STORE")]
+    #[serde(skip)]
+    pub store: Option<Given>,
+    /// What this process does; other than `all` only with a PostgreSQL store [default: all]
+    #[arg(long, value_name = "ROLE")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub role: Option<Role>,
     /// Threads that calculate; 0 takes all cores
     #[arg(long, value_name = "THREADS")]
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -213,6 +260,9 @@ impl Config {
             figment = figment.merge(variable);
         }
         figment = figment.merge(Serialized::defaults(flags));
+        if let Some(store) = &flags.store {
+            figment = figment.merge(("store", store.reveal()));
+        }
         if let Some(level) = &flags.log_level {
             figment = figment.merge(("log.level", level));
         }
@@ -245,6 +295,7 @@ impl Config {
             ("limits.body_timeout_s", limits.body_timeout_s),
             ("limits.header_timeout_s", limits.header_timeout_s),
             ("shutdown.grace_s", self.shutdown.grace_s),
+            ("postgres.wait_s", self.postgres.wait_s),
         ] {
             if !(0.001..=86_400.0).contains(&seconds) {
                 faults.push(format!("{name} = {seconds}: must be 0.001 to 86400 s"));
@@ -271,6 +322,12 @@ impl Config {
             if !(ms > 0.0 && ms.is_finite()) {
                 faults.push(format!("{name} = {ms}: must be above 0"));
             }
+        }
+        if !(2..=1000).contains(&self.postgres.connections) {
+            faults.push(format!("postgres.connections = {}: must be 2 to 1000", self.postgres.connections));
+        }
+        if self.role != Role::All && !self.store.is_shared() {
+            faults.push("role: other than \"all\" only with a store that processes share: postgres://...".to_owned());
         }
         if self.jobs.queue == 0 || self.jobs.days == 0 {
             faults.push("jobs.queue and jobs.days: must be at least 1".to_owned());

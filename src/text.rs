@@ -6,7 +6,7 @@
 //! reader then gets the code in plain words, never an error.
 
 #[cfg(test)]
-mod complete;
+pub(crate) mod complete;
 mod described;
 mod glossary;
 mod kept;

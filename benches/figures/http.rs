@@ -8,6 +8,7 @@ use std::io::{self, BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use axum::Router;
@@ -29,7 +30,7 @@ const REQUESTS: usize = 300;
 pub(crate) struct Exchange {
     pub(crate) path: String,
     /// The body of the n-th request; the first is asked once before, so that equal ones are cached.
-    pub(crate) body: Box<dyn Fn(usize) -> Vec<u8>>,
+    pub(crate) body: Box<dyn Fn(usize) -> Vec<u8> + Sync>,
 }
 
 /// What a bare handler does between a request and its answer.
@@ -106,6 +107,75 @@ pub(crate) fn start(path: &str, body: &[u8]) -> Result<Measured, String> {
         })
         .collect();
     Measured::of(times?)
+}
+
+/// Requests timed under load.
+const PROBES: usize = 300;
+/// Pause between them: the load is not to be theirs.
+const PAUSE: Duration = Duration::from_millis(10);
+
+/// Wall time of one request after another while every core computes for others: the slowest one of a hundred, with the
+/// median and the slowest of all as its spread. `load` are jobs that keep a core for some hundred milliseconds each.
+pub(crate) fn latency_under_load(probe: &Exchange, load: &Exchange) -> Result<Measured, String> {
+    let folder = tempfile::tempdir().map_err(fault)?;
+    let service = Server::precut(folder.path())?;
+    let done = AtomicBool::new(false);
+    let (computed, times) = std::thread::scope(|scope| {
+        // Twice as many as there are cores, each with the next job as soon as it has the answer to the last.
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        let bodies: Vec<Vec<Vec<u8>>> = (0..2 * cores)
+            .map(|lane| (0..LOAD).map(|count| (load.body)(1 + lane + 2 * cores * count)).collect())
+            .collect();
+        let (service, done, path) = (&service, &done, &load.path);
+        let lanes: Vec<_> = bodies
+            .into_iter()
+            .map(|bodies| {
+                scope.spawn(move || -> Result<usize, String> {
+                    let mut client = Client::connect(&service.address)?;
+                    let mut count = 0;
+                    for body in bodies.iter().cycle() {
+                        if done.load(Ordering::Relaxed) {
+                            break;
+                        }
+                        let (status, _) = client.send("POST", path, body)?;
+                        count += usize::from(status.contains(" 200 "));
+                    }
+                    Ok(count)
+                })
+            })
+            .collect();
+        let times = probes(service, probe);
+        done.store(true, Ordering::Relaxed);
+        let computed: Result<Vec<usize>, String> =
+            lanes.into_iter().map(|lane| lane.join().map_err(|_| "a client ended".to_owned())?).collect();
+        (computed, times)
+    });
+    let (computed, mut times) = (computed?.iter().sum::<usize>(), times?);
+    if computed < 4 {
+        return Err(format!("only {computed} jobs were computed meanwhile"));
+    }
+    times.sort_by(f64::total_cmp);
+    let at = |share: usize| times[(times.len() - 1) * share / 100];
+    Ok(Measured { median: at(99), low: at(50), high: at(100) })
+}
+
+/// Different jobs of the load; more of them would be prepared than asked for.
+const LOAD: usize = 200;
+
+fn probes(service: &Server, probe: &Exchange) -> Result<Vec<f64>, String> {
+    // The load has to be there first.
+    std::thread::sleep(Duration::from_millis(500));
+    let mut client = Client::connect(&service.address)?;
+    (0..PROBES)
+        .map(|count| {
+            std::thread::sleep(PAUSE);
+            let body = (probe.body)(count);
+            let start = Instant::now();
+            let (status, _) = client.send(if body.is_empty() { "GET" } else { "POST" }, &probe.path, &body)?;
+            let took = start.elapsed().as_secs_f64();
+            if status.contains(" 200 ") { Ok(took) } else { Err(format!("{}: {status}", probe.path)) }
+        })
+        .collect()
 }
 
 /// Resident memory after the start, before any request.
@@ -209,8 +279,14 @@ impl Client {
 
     /// The body of the answer, which must be 200.
     fn post(&mut self, path: &str, body: &[u8]) -> Result<Vec<u8>, String> {
+        let (status, answer) = self.send("POST", path, body)?;
+        if status.contains(" 200 ") { Ok(answer) } else { Err(format!("{path}: {status}")) }
+    }
+
+    /// The first line of the answer, and its body.
+    fn send(&mut self, method: &str, path: &str, body: &[u8]) -> Result<(String, Vec<u8>), String> {
         let head = format!(
-            "POST {path} HTTP/1.1\r\nhost: {}\r\ncontent-type: application/json\r\naccept: application/json\r\n\
+            "{method} {path} HTTP/1.1\r\nhost: {}\r\ncontent-type: application/json\r\naccept: application/json\r\n\
              content-length: {}\r\n\r\n",
             self.host,
             body.len()
@@ -232,7 +308,7 @@ impl Client {
         }
         let mut answer = vec![0; length.ok_or("an answer without a length")?];
         self.stream.read_exact(&mut answer).map_err(fault)?;
-        if status.contains(" 200 ") { Ok(answer) } else { Err(format!("{path}: {status}")) }
+        Ok((status, answer))
     }
 }
 

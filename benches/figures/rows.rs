@@ -117,6 +117,16 @@ pub(crate) fn all() -> Vec<Row> {
         ),
         row("1000 single zones", Unit::Time, us(10_000.0), us(2000.0), feed::single_zones),
         row("complete feed schedule: six zones with comparison", Unit::Time, None, None, feed::answer),
+        row("the source paper's table of 28 rows under both laws, each with two steps", Unit::Time, None, None, || {
+            fixture::table()
+        }),
+        row(
+            "identification: one set of a search over it (25 rows, 5 unknowns)",
+            Unit::Time,
+            None,
+            None,
+            fixture::search,
+        ),
         row("CSV, 10,000 rows of 8 numbers", Unit::Time, None, None, csv),
         row("G-code, 10,000 cuts", Unit::Time, None, None, gcode),
         row("SVG, 3 panels of 201 stations", Unit::Time, None, None, || svg(201)),
@@ -152,6 +162,8 @@ pub(crate) fn all() -> Vec<Row> {
             None,
             || fresh(Bare::Writes, Clock::ServerCpu),
         ),
+        row("health while every core computes: slowest of 100, wall time", Unit::Time, Some(0.05), Some(0.02), health),
+        row("small fresh answer while every core computes: slowest of 100, wall time", Unit::Time, None, None, small),
         row("start to first answer, wall time", Unit::Time, Some(0.3), Some(0.1), start),
         row("idle memory", Unit::Size, Some(60e6), Some(25e6), http::idle_memory),
         row("binary", Unit::Size, Some(40e6), Some(20e6), http::binary_size),
@@ -226,6 +238,27 @@ fn fresh(bare: Bare, clock: Clock) -> Result<Measured, String> {
     }
     let body = Box::new(move |count| http::varied(&job, DEFLECTION_VARIED, count));
     http::ratio(&Exchange { path: format!("/v1/{DEFLECTION}"), body }, bare, clock)
+}
+
+fn health() -> Result<Measured, String> {
+    let probe = Exchange { path: "/health/live".to_owned(), body: Box::new(|_| Vec::new()) };
+    http::latency_under_load(&probe, &load()?)
+}
+
+fn small() -> Result<Measured, String> {
+    let job = http::example(DEFLECTION)?;
+    let body = Box::new(move |count| http::varied(&job, DEFLECTION_VARIED, count));
+    http::latency_under_load(&Exchange { path: format!("/v1/{DEFLECTION}"), body }, &load()?)
+}
+
+/// Large jobs, each another one.
+fn load() -> Result<Exchange, String> {
+    /// None of those that are asked for meanwhile.
+    const BEYOND: usize = 1_000_000;
+    let mut job = http::example(DEFLECTION)?;
+    job["stations"] = serde_json::json!({"kind": "per_zone", "count": 50_000});
+    let body = Box::new(move |count| http::varied(&job, DEFLECTION_VARIED, BEYOND + count));
+    Ok(Exchange { path: format!("/v1/{DEFLECTION}"), body })
 }
 
 fn start() -> Result<Measured, String> {

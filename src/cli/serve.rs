@@ -41,7 +41,7 @@ async fn serve(config: &Config, registry: Registry) -> Result<(), Failed> {
     }
     let app = App::new(engine.clone(), config);
     greet(&engine, address)?;
-    tracing::info!(%address, data = %config.data.display(), "serving");
+    tracing::info!(%address, data = %config.data.display(), store = %config.store, role = ?config.role, "serving");
     let (stop, stopped) = watch::channel(false);
     tokio::spawn(watch_signals(stop));
     http::serve(listener, app, stopped, seconds(config.shutdown.grace_s)).await;

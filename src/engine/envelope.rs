@@ -3,8 +3,8 @@
 use precut_calc::calculator::{Failure, Monitor};
 use serde::Serialize;
 
-use super::json;
 use super::read::Ready;
+use super::{json, model};
 use crate::key::ENGINE_VERSION;
 use crate::registry::{ResultNotes, append_result, non_finite_place};
 use crate::text::{Language, Notice, Remark, Texts, reworded, reworded_rows};
@@ -22,13 +22,16 @@ pub(crate) fn write(ready: &Ready, monitor: &dyn Monitor) -> Result<Vec<u8>, Fai
     let begin = body.len();
     ready.write_echo(&mut body)?;
     let effects = json::top_level_field(&body[begin..], "effects").map(|place| begin + place.start..begin + place.end);
+    field(&mut body, "model", &ready.model)?;
     name(&mut body, "effects");
     match effects {
         Some(effects) => body.extend_from_within(effects),
         None => body.extend_from_slice(b"[]"),
     }
     name(&mut body, "result");
-    let ResultNotes { warnings, explanation, basis } = ready.prepared.run(monitor, &mut body)?;
+    let begin = body.len();
+    let ResultNotes { warnings, mut explanation, basis } = ready.prepared.run(monitor, &mut body)?;
+    explanation.extend(model::changes(ready, &body[begin..]));
     let texts = Texts::shared();
     let explanation: Vec<Remark> = explanation.iter().map(|message| texts.remark(Language::En, message)).collect();
     let warnings: Vec<Notice> = warnings.iter().map(|finding| texts.notice(Language::En, "warning", finding)).collect();

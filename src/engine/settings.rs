@@ -3,13 +3,24 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use crate::config::{Config, milliseconds, seconds};
+use crate::config::{Config, Role, milliseconds, seconds};
+use crate::store::StoreSettings;
+use crate::store::address::StoreAddress;
+use crate::store::sqlite::Keep;
 
 /// How an engine works.
 #[derive(Debug, Clone)]
 pub struct EngineSettings {
     /// Folder of the database; made if absent.
     pub data: PathBuf,
+    /// Where results, jobs and the queue are kept.
+    pub store: StoreAddress,
+    /// Connections to a PostgreSQL store at most.
+    pub store_connections: u32,
+    /// How long to wait at the start for a PostgreSQL store that does not answer.
+    pub store_wait: Duration,
+    /// Whether jobs are run here, and not only accepted.
+    pub role: Role,
     /// Threads for calculations.
     pub cores: usize,
     /// Bytes of answers kept in memory.
@@ -44,6 +55,10 @@ impl EngineSettings {
         let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
         Self {
             data: data.into(),
+            store: StoreAddress::Sqlite,
+            store_connections: 8,
+            store_wait: Duration::from_secs(10),
+            role: Role::All,
             cores,
             memory_cache_bytes: 64 << 20,
             store_bytes: 1 << 30,
@@ -66,6 +81,10 @@ impl EngineSettings {
         let cores = if config.cpu == 0 { defaults.cores } else { config.cpu };
         Self {
             data: defaults.data,
+            store: config.store.clone(),
+            store_connections: config.postgres.connections,
+            store_wait: seconds(config.postgres.wait_s),
+            role: config.role,
             cores,
             memory_cache_bytes: config.cache.memory_bytes,
             store_bytes: config.cache.store_bytes,
@@ -79,6 +98,17 @@ impl EngineSettings {
             study_points: config.limits.study_points,
             patience: Duration::from_millis(config.limits.queue_ms),
             grace: seconds(config.shutdown.grace_s),
+        }
+    }
+
+    /// How the store is opened.
+    pub(crate) fn store_settings(&self) -> StoreSettings {
+        StoreSettings {
+            address: self.store.clone(),
+            data: self.data.clone(),
+            keep: Keep { bytes: self.store_bytes, age: self.store_age, jobs: self.job_age },
+            connections: self.store_connections,
+            wait: self.store_wait,
         }
     }
 

@@ -1,6 +1,7 @@
 //! Documents that never change while the service runs: the contract, the list of calculators, pages.
 
 use std::collections::BTreeMap;
+use std::sync::OnceLock;
 
 use axum::body::Body;
 use axum::extract::State;
@@ -59,11 +60,13 @@ impl Document {
     }
 }
 
-/// The documents that are made once, at the start.
+/// The documents that are made once.
 pub(super) struct Documents {
     openapi: Document,
     calculators: Vec<(Language, Document)>,
-    calculator: BTreeMap<&'static str, Vec<(Language, Document)>>,
+    /// Made when they are first asked for: most languages of most calculators never are.
+    calculator: BTreeMap<&'static str, [OnceLock<Document>; Language::ALL.len()]>,
+    registry: Registry,
     materials: Vec<(Language, Document)>,
     material: BTreeMap<&'static str, Vec<(Language, Document)>>,
 }
@@ -73,18 +76,13 @@ impl Documents {
         let each_language = |make: &dyn Fn(Language) -> Document| Language::ALL.map(|tag| (tag, make(tag))).into();
         let calculators =
             each_language(&|language| Document::json(&calculators::listed(registry, language), Some(language)));
-        let calculator = registry
-            .entries()
-            .iter()
-            .map(|entry| {
-                let make = |language| Document::json(&calculators::described(entry, language), Some(language));
-                (entry.meta().id, each_language(&make))
-            })
-            .collect();
+        let calculator =
+            registry.entries().iter().map(|entry| (entry.meta().id, Language::ALL.map(|_| OnceLock::new()))).collect();
         Self {
             openapi: Document::new(openapi::json(registry), "application/json", None),
             calculators,
             calculator,
+            registry: registry.clone(),
             materials: each_language(&|language| Document::json(&materials::listed(language), Some(language))),
             material: material::library()
                 .iter()
@@ -101,7 +99,9 @@ impl Documents {
     }
 
     pub(super) fn calculator(&self, id: &str, language: Language) -> Option<&Document> {
-        in_language(self.calculator.get(id)?, language)
+        let (entry, made) = (self.registry.entry(id)?, self.calculator.get(id)?);
+        let make = || Document::json(&calculators::described(entry, language), Some(language));
+        Some(made[language.index()].get_or_init(make))
     }
 }
 

@@ -29,8 +29,10 @@ const X_ACCEL_BUFFERING: HeaderName = HeaderName::from_static("x-accel-buffering
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
 /// Progress is looked at so often, and therefore sent at most so often.
 const LOOK: Duration = Duration::from_millis(200);
-/// The record is read again after so many looks without news: whoever else serves the job may have written.
+/// The record is read again after so many looks without news: whoever else serves the job may have written. Where that
+/// is another process, it writes every second how far the job is.
 const LOOKS_PER_READING: u32 = 10;
+const LOOKS_PER_READING_SHARED: u32 = 5;
 /// The last event's number lies so far beyond those that a running job can have: ms.
 const BEYOND: u64 = 1000;
 
@@ -183,11 +185,12 @@ impl Follower {
             }
             // Progress is looked at; everything else is news.
             let is_running = job.record.state == JobState::Running;
+            let every = if self.engine.is_shared() { LOOKS_PER_READING_SHARED } else { LOOKS_PER_READING };
             let job = tokio::select! {
                 () = self.feed.changed() => self.read(job).await,
                 () = tokio::time::sleep(LOOK) => {
                     self.looks += 1;
-                    if self.looks.is_multiple_of(LOOKS_PER_READING) {
+                    if self.looks.is_multiple_of(every) {
                         self.read(job).await
                     } else if is_running {
                         self.engine.refreshed(job.record)
@@ -243,7 +246,7 @@ impl Follower {
     }
 
     fn push(&mut self, name: &str, job: &Job, data: &impl Serialize) {
-        let since = u64::try_from(crate::store::now_ms() - job.record.created_ms).unwrap_or(0);
+        let since = u64::try_from(self.engine.now_ms() - job.record.created_ms).unwrap_or(0);
         self.number = if job.record.state.is_final() { self.number + 1 } else { since.max(self.number + 1) };
         let event = Event::default().event(name).id(self.number.to_string());
         match event.json_data(data) {

@@ -41,7 +41,7 @@ pub(super) struct JobDocument {
     /// How far the computation is.
     #[schema(minimum = 0, maximum = 1, example = 0.32)]
     progress: f64,
-    /// Times it was started; more than 1 if a start was cut short.
+    /// Times it was started; more than 1 if a start was cut short. Of a study that gets on, no more than 2 are counted.
     #[schema(minimum = 0, example = 1)]
     attempt: u32,
     /// Which jobs go first.

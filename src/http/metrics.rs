@@ -192,6 +192,19 @@ fn recorder() -> &'static PrometheusHandle {
         );
         metrics::describe_gauge!("http_requests_in_flight", "Requests in work.");
         metrics::describe_counter!("precut_answers_total", "Answers by calculator, from the cache (hit) or not.");
+        metrics::describe_counter!("precut_cache_hits_total", "Answers found, by tier: in memory or in the store.");
+        metrics::describe_counter!(
+            "precut_calculations_total",
+            "Calculations by calculator and outcome: ok, no_answer (the job has none), cancelled, error (a fault of ours)."
+        );
+        metrics::describe_histogram!(
+            "precut_calculation_seconds",
+            metrics::Unit::Seconds,
+            "Time that a calculation took on its core, by calculator."
+        );
+        metrics::describe_counter!("precut_busy_total", "Jobs refused because every core computed and the line was full.");
+        metrics::describe_counter!("precut_panics_total", "Calculations that crashed. Each is a fault of ours.");
+        metrics::describe_counter!("precut_store_failures_total", "Failures of the store, by operation.");
         metrics::describe_counter!("precut_jobs_accepted_total", "Jobs put on record, by calculator.");
         metrics::describe_counter!("precut_jobs_total", "Computations for jobs that ended, by calculator and outcome.");
         metrics::describe_histogram!(

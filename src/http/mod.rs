@@ -12,6 +12,7 @@ mod health;
 mod jobs;
 mod materials;
 mod metrics;
+mod models;
 mod negotiate;
 pub mod openapi;
 mod pages;
@@ -34,7 +35,7 @@ use axum::http::{HeaderName, Uri};
 use axum::routing::{any, get, post};
 use tower_http::cors::{AllowOrigin, CorsLayer};
 
-use crate::config::{Config, Limits};
+use crate::config::{Config, Limits, Role};
 use crate::engine::{Engine, Error};
 
 pub use answer::written;
@@ -66,6 +67,7 @@ pub struct Shared {
     in_flight: AtomicUsize,
     waiting: AtomicUsize,
     stopping: AtomicBool,
+    role: Role,
 }
 
 impl Deref for App {
@@ -95,6 +97,7 @@ impl App {
             in_flight: AtomicUsize::new(0),
             waiting: AtomicUsize::new(0),
             stopping: AtomicBool::new(false),
+            role: config.role,
             engine,
         }))
     }
@@ -119,22 +122,38 @@ struct Peer {
 
 /// Every route behind the gate.
 pub fn router(app: &App) -> Router {
-    let mut router = Router::new()
+    let health = Router::new()
+        .route("/health/live", get(health::live))
+        .route("/health/ready", get(health::ready))
+        .route("/metrics", get(metrics::get));
+    // Who only runs jobs is asked how it is, and nothing else.
+    let router = if app.role == Role::Worker { health } else { routes(app, health) };
+    let router = router
+        .fallback(not_found)
+        .layer(axum::middleware::from_fn_with_state(app.clone(), gate::gate))
+        .with_state(app.clone());
+    match cors(&app.origins) {
+        Some(cors) => router.layer(cors),
+        None => router,
+    }
+}
+
+fn routes(app: &App, health: Router<App>) -> Router<App> {
+    let mut router = health
         .route("/", get(pages::landing))
         .route("/ui/{version}/{*file}", get(workbench::file))
         .route("/docs", get(pages::docs))
         .route("/docs/{file}", get(pages::docs_file))
         .route("/problems/{code}", get(pages::problem))
         .route("/openapi.json", get(document::openapi))
-        .route("/health/live", get(health::live))
-        .route("/health/ready", get(health::ready))
-        .route("/metrics", get(metrics::get))
         .route("/v1/calculators", get(calculators::list))
         .route("/v1/calculators/{id}", get(calculators::describe))
         .route("/v1/jobs", get(jobs::list))
         .route("/v1/jobs/{id}", get(jobs::read).delete(jobs::cancel))
         .route("/v1/jobs/{id}/result", get(jobs::result))
         .route("/v1/jobs/{id}/events", get(events::follow))
+        .route("/v1/models", get(models::list))
+        .route("/v1/models/{name}", get(models::read).put(models::store).delete(models::delete))
         .route("/v1/results", get(results::list))
         .route("/v1/results/{key}", get(results::read))
         .route("/v1/results/{key}/figures", get(parts::figures))
@@ -150,14 +169,7 @@ pub fn router(app: &App) -> Router {
         };
         router = router.route(&format!("/v1/{}", room.id()), post(handler));
     }
-    let router = router
-        .fallback(not_found)
-        .layer(axum::middleware::from_fn_with_state(app.clone(), gate::gate))
-        .with_state(app.clone());
-    match cors(&app.origins) {
-        Some(cors) => router.layer(cors),
-        None => router,
-    }
+    router
 }
 
 async fn not_found(uri: Uri) -> Problem {
@@ -201,7 +213,7 @@ fn cors(origins: &[String]) -> Option<CorsLayer> {
     Some(
         CorsLayer::new()
             .allow_origin(allowed)
-            .allow_methods([Method::GET, Method::HEAD, Method::POST, Method::DELETE])
+            .allow_methods([Method::GET, Method::HEAD, Method::POST, Method::PUT, Method::DELETE])
             .allow_headers(request_headers)
             .expose_headers(exposed)
             .max_age(std::time::Duration::from_hours(1)),

@@ -47,6 +47,10 @@ pub(super) struct LandingLinks {
     calculators: &'static str,
     /// The kept results.
     results: &'static str,
+    /// The jobs.
+    jobs: &'static str,
+    /// Where studies are posted to.
+    studies: &'static str,
     /// The library of materials.
     materials: &'static str,
     /// The contract (OpenAPI 3.1).
@@ -59,7 +63,7 @@ pub(super) struct LandingLinks {
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct ProblemPage {
     /// Stable name of the problem.
-    #[schema(example = "invalid")]
+    #[schema(example = "invalid_job")]
     code: String,
     /// What is wrong.
     title: String,
@@ -85,6 +89,8 @@ pub(super) async fn landing(State(app): State<App>, headers: HeaderMap) -> Resul
             links: LandingLinks {
                 calculators: "/v1/calculators",
                 results: "/v1/results",
+                jobs: "/v1/jobs",
+                studies: "/v1/studies",
                 materials: "/v1/materials",
                 openapi: "/openapi.json",
                 docs: "/docs",

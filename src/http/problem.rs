@@ -163,6 +163,12 @@ impl Problem {
         Self::new(StatusCode::NOT_FOUND, code).with("name", name.to_owned())
     }
 
+    /// A model that breaks rules.
+    pub(super) fn invalid_model(findings: Vec<Finding>) -> Self {
+        let total = findings.len();
+        Self::new(StatusCode::UNPROCESSABLE_ENTITY, "invalid_model").findings(findings, total)
+    }
+
     /// Status of the answer.
     pub fn status(&self) -> StatusCode {
         self.0.status

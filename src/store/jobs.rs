@@ -5,15 +5,23 @@
 
 use std::fmt;
 use std::str::FromStr;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use bytes::Bytes;
 use futures_util::future::BoxFuture;
 use tokio::sync::watch;
-use uuid::Uuid;
+use uuid::{ContextV7, Timestamp, Uuid};
 
 use super::{KeptResult, StoreError};
 use crate::key::Key;
+
+/// Starts after which a job that takes its process along is given up.
+pub(crate) const MOST_ATTEMPTS: u32 = 3;
+
+/// This is not the name of a job.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("a job's id is a UUID in lower case with hyphens")]
+pub struct BadJobId;
 
 /// A job's name, in the order of time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -22,7 +30,17 @@ pub struct JobId(Uuid);
 impl JobId {
     /// A new one, after all before.
     pub fn new() -> Self {
-        Self(Uuid::now_v7())
+        Self::at(super::now_ms())
+    }
+
+    /// A new one at some time, ms UTC, after all before of that time.
+    pub fn at(now_ms: i64) -> Self {
+        /// Counts within a millisecond.
+        static CONTEXT: Mutex<ContextV7> = Mutex::new(ContextV7::new());
+        let now_ms = now_ms.max(0).unsigned_abs();
+        let nanos = u32::try_from(now_ms % 1000).unwrap_or(0) * 1_000_000;
+        let context = CONTEXT.lock().unwrap_or_else(PoisonError::into_inner);
+        Self(Uuid::new_v7(Timestamp::from_unix(&*context, now_ms / 1000, nanos)))
     }
 }
 
@@ -39,9 +57,11 @@ impl fmt::Display for JobId {
 }
 
 impl FromStr for JobId {
-    type Err = uuid::Error;
-    fn from_str(text: &str) -> Result<Self, uuid::Error> {
-        Uuid::try_parse(text).map(Self)
+    type Err = BadJobId;
+    fn from_str(text: &str) -> Result<Self, BadJobId> {
+        // As it is written here: braces, capitals and the form without hyphens would be other addresses of one job.
+        let read = Uuid::try_parse(text).map(Self).map_err(|_| BadJobId)?;
+        if read.to_string() == text { Ok(read) } else { Err(BadJobId) }
     }
 }
 
@@ -103,8 +123,6 @@ words! {
     JobKind {
         /// One answer of one calculator.
         Calculation = "calculation",
-        /// Many answers of one calculator.
-        Study = "study",
     }
 }
 
@@ -356,6 +374,29 @@ pub type RunTask = Arc<dyn Fn(JobId) -> BoxFuture<'static, ()> + Send + Sync>;
 /// Tells which computations this process runs, at the moment of asking.
 pub type Live = Arc<dyn Fn() -> Vec<Lease> + Send + Sync>;
 
+/// What happened in another process.
+#[derive(Debug, Clone, PartialEq)]
+pub enum News {
+    /// These jobs changed, and nobody wants these computations any more.
+    Changed(Changed),
+    /// Something was said that could not be heard: anything may have changed.
+    Missed,
+}
+
+/// Who hears of news.
+pub type Hear = Arc<dyn Fn(News) + Send + Sync>;
+
+/// A job that is being computed and made of parts that others may compute, too.
+#[derive(Debug, Clone)]
+pub struct Shared {
+    /// Address of its result.
+    pub key: Key,
+    /// By which calculator.
+    pub calculator: String,
+    /// All that is needed.
+    pub input: Bytes,
+}
+
 /// Where jobs are kept and queued. What it has said yes to survives the process.
 pub trait JobStore: Send + Sync + 'static {
     /// Puts a job on record and in line, both or neither; refused with more than `queue_limit` waiting.
@@ -394,4 +435,23 @@ pub trait JobStore: Send + Sync + 'static {
     fn timings(&self, limit: u32) -> BoxFuture<'_, Result<Vec<Timing>, StoreError>>;
     /// Takes tasks out of the queue, at most `places` at a time, until `stop` says so; returns when the last has ended.
     fn work(&self, places: usize, run: RunTask, stop: watch::Receiver<bool>) -> BoxFuture<'static, ()>;
+
+    /// Whether other processes work with the same jobs.
+    fn is_shared(&self) -> bool {
+        false
+    }
+    /// The time by which jobs live, ms UTC: the same for all processes.
+    fn now_ms(&self) -> i64 {
+        super::now_ms()
+    }
+    /// From now on tells what happens in other processes.
+    fn tell(&self, _hear: Hear) {}
+    /// Asks other processes to compute parts of the job that is computed under this key, by at most so many tasks.
+    fn call_for_help(&self, _key: Key, _most: u32) -> BoxFuture<'_, Result<(), StoreError>> {
+        Box::pin(async { Ok(()) })
+    }
+    /// The job of a task that waits for nobody, if its parts are shared out.
+    fn shared(&self, _id: JobId) -> BoxFuture<'_, Result<Option<Shared>, StoreError>> {
+        Box::pin(async { Ok(None) })
+    }
 }

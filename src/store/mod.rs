@@ -1,23 +1,30 @@
 //! Kept results, and jobs with their queue. Nothing outside this module speaks SQL.
 
+pub mod address;
 pub mod jobs;
 mod ledger;
+pub mod models;
+mod postgres;
 mod queue;
 mod row;
 pub mod sqlite;
 mod sqlite_jobs;
+mod sqlite_models;
 mod sqlite_studies;
 mod writer;
 
 use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::sync::Arc;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use bytes::Bytes;
 use futures_util::future::BoxFuture;
 
 use crate::key::{BadKey, Key};
+use address::StoreAddress;
+use sqlite::Keep;
 
 /// Why an engine does not start.
 #[derive(Debug, thiserror::Error)]
@@ -33,9 +40,45 @@ pub enum OpenError {
         /// Why.
         reason: String,
     },
+    /// The database cannot be used.
+    #[error("the database cannot be used: {0}")]
+    Database(String),
     /// The pool of threads cannot be made.
     #[error("the calculation threads cannot be started: {0}")]
     Threads(String),
+}
+
+/// Everything that outlasts a process.
+pub trait Store: ResultStore + jobs::JobStore + models::ModelStore {}
+impl<S: ResultStore + jobs::JobStore + models::ModelStore> Store for S {}
+
+/// Which store, and how it is used.
+#[derive(Debug, Clone)]
+pub(crate) struct StoreSettings {
+    pub(crate) address: StoreAddress,
+    /// Folder of the SQLite file.
+    pub(crate) data: PathBuf,
+    pub(crate) keep: Keep,
+    /// Connections to PostgreSQL at most.
+    pub(crate) connections: u32,
+    /// How long to wait at the start for a PostgreSQL that does not answer.
+    pub(crate) wait: Duration,
+}
+
+/// Opens the store.
+pub(crate) async fn open(settings: &StoreSettings) -> Result<Arc<dyn Store>, OpenError> {
+    match &settings.address {
+        StoreAddress::Sqlite => Ok(Arc::new(sqlite::SqliteStore::open(&settings.data, settings.keep).await?)),
+        StoreAddress::Postgres(address) => {
+            let usage = postgres::Use {
+                keep: settings.keep,
+                connections: settings.connections,
+                patience: postgres::Patience { start: settings.wait, ..postgres::Patience::default() },
+                engine: crate::key::ENGINE_VERSION.to_owned(),
+            };
+            Ok(Arc::new(postgres::PostgresStore::open(address, usage).await?))
+        }
+    }
 }
 
 /// Where results are kept. What is kept can always be computed again: no failure of a store fails an answer.
@@ -62,6 +105,32 @@ pub trait ResultStore: Send + Sync + 'static {
     fn forget_shards(&self, _study: Key) -> BoxFuture<'_, Result<(), StoreError>> {
         Box::pin(async { Ok(()) })
     }
+    /// Takes the next part of a study of so many parts for this process, where several share them; it keeps it until it
+    /// puts it down, gives it back, or dies.
+    fn take_shard(&self, _study: Key, _of: u32) -> BoxFuture<'_, Result<Taken, StoreError>> {
+        Box::pin(async { Ok(Taken::NotShared) })
+    }
+    /// Gives a part back that was taken and is not put down.
+    fn give_shard_back(&self, _study: Key, _shard: u32) {}
+    /// The parts of a study that are put down, of those asked for.
+    fn some_shards(&self, study: Key, wanted: Vec<u32>) -> BoxFuture<'_, Result<Vec<(u32, Bytes)>, StoreError>> {
+        Box::pin(async move {
+            let mut shards = self.shards(study).await?;
+            shards.retain(|(shard, _)| wanted.contains(shard));
+            Ok(shards)
+        })
+    }
+}
+
+/// What came of asking for a part of a study.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Taken {
+    /// This one is to be computed.
+    Shard(u32),
+    /// All are done or in the hands of somebody who lives.
+    NoneLeft,
+    /// Nobody else computes parts: whoever asks has them all.
+    NotShared,
 }
 
 /// A result as it is kept.
@@ -99,7 +168,7 @@ impl ResultQuery {
     pub const MOST: u32 = 500;
 }
 
-/// A place in the list of results; opaque in the contract.
+/// A place in the list of results; opaque in the contract, and written in one way only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Cursor {
     /// Time of the last result of the page before, ms UTC.
@@ -110,15 +179,17 @@ pub struct Cursor {
 
 impl fmt::Display for Cursor {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}.{}", self.created_ms, self.key.to_string().trim_start_matches("b3:"))
+        write!(f, "{}-{}", self.created_ms, self.key.to_string().trim_start_matches("b3:"))
     }
 }
 
 impl FromStr for Cursor {
     type Err = BadKey;
     fn from_str(text: &str) -> Result<Self, BadKey> {
-        let (created_ms, digits) = text.split_once('.').ok_or(BadKey)?;
-        Ok(Self { created_ms: created_ms.parse().map_err(|_| BadKey)?, key: format!("b3:{digits}").parse()? })
+        let (created_ms, digits) = text.split_once('-').ok_or(BadKey)?;
+        let read = Self { created_ms: created_ms.parse().map_err(|_| BadKey)?, key: format!("b3:{digits}").parse()? };
+        // Signs, zeros in front and capitals would be other addresses of the same page.
+        if read.to_string() == text { Ok(read) } else { Err(BadKey) }
     }
 }
 
@@ -166,16 +237,23 @@ impl From<sqlx::Error> for StoreError {
     fn from(error: sqlx::Error) -> Self {
         /// `SQLITE_FULL`.
         const FULL: i32 = 13;
-        if sqlite_code(&error) == Some(FULL) {
+        if sqlite_code(&error) == Some(FULL) || is_disk_full(&error) {
             return Self::Full(error.to_string());
         }
         Self::Failed(error.to_string())
     }
 }
 
+/// `disk_full` of PostgreSQL.
+fn is_disk_full(error: &sqlx::Error) -> bool {
+    let error = error.as_database_error().and_then(|error| error.try_downcast_ref::<sqlx::postgres::PgDatabaseError>());
+    error.is_some_and(|error| error.code() == "53100")
+}
+
 /// Kind of an error of SQLite: the lowest byte of its code, the rest of which says more of it.
 fn sqlite_code(error: &sqlx::Error) -> Option<i32> {
-    let code: i32 = error.as_database_error()?.code()?.parse().ok()?;
+    let error = error.as_database_error()?.try_downcast_ref::<sqlx::sqlite::SqliteError>()?;
+    let code: i32 = sqlx::error::DatabaseError::code(error)?.parse().ok()?;
     Some(code & 0xff)
 }
 

@@ -178,7 +178,7 @@ impl Tasks {
 }
 
 /// Boxed, as the compiler cannot see through both futures at once that they may be sent.
-fn stopped(mut stop: watch::Receiver<bool>) -> BoxFuture<'static, ()> {
+pub(super) fn stopped(mut stop: watch::Receiver<bool>) -> BoxFuture<'static, ()> {
     // A sender that is gone means stop as well.
     Box::pin(async move { drop(stop.wait_for(|stop| *stop).await) })
 }

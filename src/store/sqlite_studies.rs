@@ -2,6 +2,7 @@
 
 use bytes::Bytes;
 
+use super::jobs::MOST_ATTEMPTS;
 use super::sqlite::SqliteStore;
 use super::{StoreError, now_ms};
 use crate::key::Key;
@@ -28,6 +29,15 @@ impl SqliteStore {
                     .bind(packed)
                     .bind(checksum.as_bytes().as_slice())
                     .bind(now_ms())
+                    .execute(&mut *connection)
+                    .await?;
+                    // Whoever gets on is not to blame for the end of its processes: what is put down is not computed
+                    // again, so that this cannot go on for ever.
+                    sqlx::query(
+                        "UPDATE precut_jobs SET attempt = ?2 WHERE key = ?1 AND state = 'running' AND attempt > ?2",
+                    )
+                    .bind(study.as_bytes().as_slice())
+                    .bind(MOST_ATTEMPTS - 1)
                     .execute(connection)
                     .await?;
                     Ok(())

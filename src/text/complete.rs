@@ -3,6 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
+use std::sync::LazyLock;
 
 use precut_calc::material;
 use serde_json::Value;
@@ -59,6 +60,7 @@ const LATIN: &[&str] = &[
     "rough",
     // Symbols of formulas.
     "alpha",
+    "cos",
     "delta",
     "dn",
     "dp",
@@ -180,11 +182,17 @@ fn leftovers(text: &str, names: &BTreeSet<String>) -> Vec<String> {
             let digits = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
             digits(whole) && digits(decimals)
         });
-        if (in_lower && !is_name && !all_known) || decimal {
+        if (in_lower && !is_name && !all_known) || (decimal && !is_name) {
             found.push(token.to_owned());
         }
     }
     found
+}
+
+/// Words of English in a sentence as it is said.
+pub(crate) fn english_in(text: &str) -> Vec<String> {
+    static NAMES: LazyLock<BTreeSet<String>> = LazyLock::new(|| Asked::of_contract().names());
+    leftovers(text, &NAMES)
 }
 
 /// What the contract asks the glossary for, each with where.

@@ -36,7 +36,7 @@ impl Language {
     }
 
     /// Its place in [`Self::ALL`].
-    pub(super) const fn index(self) -> usize {
+    pub(crate) const fn index(self) -> usize {
         self as usize
     }
 

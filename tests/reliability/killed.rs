@@ -1,6 +1,7 @@
 //! kill -9 at random moments: nothing lost, nothing done twice, nothing half-written.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -135,6 +136,105 @@ async fn check(service: &Service, addresses: &[String], finished: &BTreeMap<Stri
     }
 }
 
+const POINTS: usize = 200;
+
+/// So many points of 20 ms each, every one of them put down by itself: it is estimated at half a second.
+fn study() -> Value {
+    json!({
+        "calculator": "sagging-bar", "job": {"load_n": 10, "duration_ms": 20, "work_ms": 500},
+        "vary": [{"pointer": "/length_mm", "from": 100, "to": 99 + POINTS, "count": POINTS}],
+    })
+}
+
+/// The number of points that are put down.
+async fn put_down(folder: &Path) -> i64 {
+    let mut database = database(folder).await;
+    sqlx::query_scalar("SELECT count(*) FROM studies").fetch_one(&mut database).await.unwrap()
+}
+
+#[tokio::test]
+async fn a_study_that_gets_on_is_finished_however_often_its_process_is_killed() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = [("PRECUT_JOBS_SLOTS", "2")];
+    let mut dice = Dice::new(11);
+    let mut service = Service::start(folder.path(), &settings).await;
+    let response = service.post_to("/v1/studies", &study()).send().await.unwrap();
+    assert_eq!(response.status(), 202);
+    let address = header(&response, "location").to_owned();
+    let mut stood = Vec::new();
+    for _ in 0..KILLS {
+        let before = put_down(folder.path()).await;
+        until("the study to get on", async || (put_down(folder.path()).await > before).then_some(())).await;
+        tokio::time::sleep(dice.time(0, 60)).await;
+        service.kill();
+        stood.push(put_down(folder.path()).await);
+        service = Service::start(folder.path(), &settings).await;
+    }
+    let done = service.over(&address).await;
+    assert_eq!(done["state"], "succeeded", "{done:#}");
+    let result = service.get(&format!("{address}/result")).await.json::<Value>().await.unwrap();
+    assert_eq!((&result["result"]["points"], &result["result"]["succeeded"]), (&json!(POINTS), &json!(POINTS)));
+    service.stop();
+    assert_intact(folder.path()).await;
+    let mut database = database(folder.path()).await;
+    let count = async |database: &mut sqlx::SqliteConnection, what: &'static str| -> i64 {
+        sqlx::query_scalar(what).fetch_one(database).await.unwrap()
+    };
+    let jobs = count(&mut database, "SELECT count(*) FROM precut_jobs WHERE state = 'succeeded'").await;
+    let results = count(&mut database, "SELECT count(*) FROM results").await;
+    let left = count(&mut database, "SELECT count(*) FROM studies").await;
+    println!(
+        "a study killed {} times, with {stood:?} of {POINTS} points put down: {jobs} job with {results} results, its \
+         own among them",
+        stood.len()
+    );
+    assert_eq!((jobs, results, left), (1, i64::try_from(POINTS).unwrap() + 1, 0));
+}
+
+#[tokio::test]
+async fn a_study_that_ends_its_process_at_the_same_point_each_time_is_given_up() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = [("PRECUT_JOBS_SLOTS", "2")];
+    let mut service = Service::start(folder.path(), &settings).await;
+    let behaviours: Vec<&str> = (0..10).map(|point| if point == 6 { "abort" } else { "quick" }).collect();
+    let study = json!({
+        "calculator": "sagging-bar", "job": {"load_n": 10, "duration_ms": 20, "work_ms": 500},
+        "vary": [
+            {"pointer": "/length_mm", "from": 100, "to": 109, "count": 10},
+            {"pointer": "/behaviour", "values": behaviours},
+        ],
+        "combine": "zip",
+    });
+    let response = service.post_to("/v1/studies", &study).send().await.unwrap();
+    assert_eq!(response.status(), 202);
+    let address = header(&response, "location").to_owned();
+    let mut deaths = 0;
+    let job = loop {
+        let asked = service.request(reqwest::Method::GET, &address).send().await;
+        let job: Option<Value> = match asked {
+            Ok(response) => response.json().await.ok(),
+            Err(_) => None,
+        };
+        match job {
+            Some(job) if job["finished_at"].is_string() => break job,
+            Some(_) => tokio::time::sleep(Duration::from_millis(10)).await,
+            None => {
+                service.kill();
+                deaths += 1;
+                // Three starts, and one more for what it got on in the last of them.
+                assert!(deaths <= 4, "it is given up");
+                service = Service::start(folder.path(), &settings).await;
+            }
+        }
+    };
+    assert_eq!((&job["state"], &job["problem"]["code"]), (&json!("failed"), &json!("crashed_repeatedly")), "{job:#}");
+    // What it came to before that point is there.
+    let point = service.post(&json!({"length_mm": 100, "load_n": 10, "duration_ms": 20, "work_ms": 500}));
+    assert_eq!(header(&point.send().await.unwrap(), "precut-cache"), "hit");
+    println!("a study with a deadly point: given up after {deaths} deaths of its process");
+    service.stop();
+}
+
 /// The program itself, with its own calculators: studies and single jobs, killed in between.
 #[tokio::test]
 async fn the_program_itself_finishes_what_it_was_killed_in() {
@@ -165,7 +265,6 @@ async fn the_program_itself_finishes_what_it_was_killed_in() {
     };
     let mut dice = Dice::new(7);
     let mut addresses: Vec<String> = Vec::new();
-    // A study that is killed at its third attempt is given up, rightly.
     let kills = 2;
     for round in 0..=kills {
         let (mut child, address) = start();

@@ -66,6 +66,16 @@ async fn metrics_count_requests_by_route_and_status_and_answers_by_cache() {
     assert!(after.contains("http_request_duration_seconds_bucket{route=\"/v1/sagging-bar\",le=\"0.01\"}"), "{after}");
     assert!(after.contains("precut_build_info{version="), "{after}");
     assert!(!after.contains("none-such"), "a client cannot make up labels");
+    for line in after.lines().filter_map(|line| line.strip_prefix("# TYPE ")) {
+        let name = line.split(' ').next().unwrap();
+        assert!(after.contains(&format!("# HELP {name} ")), "{name} is not explained");
+    }
+    let mut series: Vec<_> =
+        after.lines().filter(|line| !line.starts_with('#')).filter_map(|line| line.rsplit_once(' ')).collect();
+    let lines = series.len();
+    series.sort_unstable();
+    series.dedup_by_key(|(name, _)| *name);
+    assert_eq!(series.len(), lines, "a series stands there twice");
 }
 
 #[tokio::test]

@@ -26,6 +26,13 @@ impl Feeds {
         }
     }
 
+    /// Any job may have changed.
+    pub(crate) fn touch_all(&self) {
+        for sender in self.lock().values() {
+            sender.send_replace(());
+        }
+    }
+
     fn lock(&self) -> MutexGuard<'_, HashMap<JobId, watch::Sender<()>>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -15,31 +15,27 @@
 //! 4. Its end, with its result, is written in one transaction for all jobs that still hold the lease. A cancel or a
 //!    deadline takes one job off the lease; when the last has gone, the computation is told to stop.
 //!
-//! What a dead process left running is in line again when the next one opens the store. Each start is charged; at the
+//! What a dead process left running is in line again when the next one opens the store; where several share a store,
+//! when nobody has heard of the computation for some seconds. Who runs a job and who is asked about it may be two
+//! processes: [`JobStore::tell`] brings news from one to the other, and every request reads the record. Each start is charged; at the
 //! last of [`MOST_ATTEMPTS`] a job runs alone, and one that takes the process along even then is failed as
-//! `crashed_repeatedly`. A start that a shutdown interrupts is not charged. A panic is no such start: it is caught, and
+//! `crashed_repeatedly`. A start that a shutdown interrupts is not charged, and the last one that is allowed is not
+//! charged to a study that gets on in it (it has put a part down, which is not computed again): however often its process
+//! is killed, it is finished. A panic is no such start: it is caught, and
 //! the job fails at once, as it would panic again.
 //!
 //! # What else may be a job
 //!
-//! Everything here but [`work`] knows a job only as a [`NewJob`](crate::store::jobs::NewJob): kind, calculator, key,
-//! input as bytes. A further kind of job
-//!
-//! - has an arm in [`JobKind`](crate::store::jobs::JobKind) and in [`work::of`], which makes a [`work::Work`] out of
-//!   the record's input again;
-//! - is submitted by [`Jobs::accept`] with a [`Request`] whose key names its result;
-//! - tells its progress by [`Running::follow`](running::Running::follow) with a
-//!   [`Progress`](crate::engine::progress::Progress) of its own (`Progress::report`, and `Progress::show` for a picture
-//!   so far), and ends soon after [`Running::cancelled`](running::Running::cancelled);
-//! - runs the calculations that it is made of by `Inner::calculate_point`: each is an ordinary cached calculation,
-//!   shared with whoever else asks for it, on the jobs' pool, and leaves its result where every result is. The
-//!   calculations of a job killed in the middle are hits when it runs again. It keeps the one slot that it was given
-//!   until it ends; the pool's threads bound what it can do at once;
-//! - comes to a [`Stored`], whose `kept` form is written with the end of the job and read back by its key.
+//! A parameter study is a job like any other: its entry ([`study`](crate::engine::study)) is declared as a calculator's
+//! is, and looks after its points itself. Everything here but [`work`] knows a job only as a
+//! [`NewJob`](crate::store::jobs::NewJob): kind, calculator, key, input as bytes. A job that is no calculation of an
+//! entry would have an arm in [`JobKind`](crate::store::jobs::JobKind) and in [`work::of`], which makes a
+//! [`work::Work`] out of the record's input again.
 
 mod estimate;
 mod fault;
 mod feeds;
+mod help;
 mod requests;
 mod running;
 mod sweeper;
@@ -60,15 +56,14 @@ use tokio::task::JoinHandle;
 use super::progress::Reported;
 use super::{Error, Inner, Key, Stored};
 use crate::store::jobs::{
-    Accepted, Idempotency, JobId, JobKind, JobPage, JobQuery, JobRecord, JobState, JobStore, NewJob, Priority, Timing,
+    Accepted, Changed, Idempotency, JobId, JobKind, JobPage, JobQuery, JobRecord, JobState, JobStore, MOST_ATTEMPTS,
+    NewJob, News, Priority, Timing,
 };
 use crate::store::now_ms;
 use estimate::Estimates;
 use feeds::Feeds;
 use running::Computations;
 
-/// Starts after which a job that takes its process along is given up.
-pub(crate) const MOST_ATTEMPTS: u32 = 3;
 /// When a client that found the queue full should come again.
 const RETRY_QUEUE: Duration = Duration::from_secs(5);
 /// Bounds of the advice when to look at a job again.
@@ -177,8 +172,20 @@ impl Jobs {
             });
             task
         });
-        let work = jobs.store.work(engine.cores.job_places(), run, jobs.stop.subscribe());
-        let tasks = [tokio::spawn(work), tokio::spawn(sweeper::run(Arc::downgrade(engine)))];
+        let mut tasks = vec![tokio::spawn(sweeper::run(Arc::downgrade(engine)))];
+        if engine.settings.role.works() {
+            let work = jobs.store.work(engine.cores.job_places(), run, jobs.stop.subscribe());
+            tasks.push(tokio::spawn(work));
+        }
+        let (feeds, computations) = (Arc::clone(&jobs.feeds), Arc::clone(&jobs.computations));
+        jobs.store.tell(Arc::new(move |news| match news {
+            News::Changed(Changed { jobs, unwanted }) => {
+                computations.cancel(&unwanted);
+                feeds.touch(&jobs);
+            }
+            // Computations that are not wanted any more are told so by the next word of their progress.
+            News::Missed => feeds.touch_all(),
+        }));
         jobs.tasks.lock().unwrap_or_else(PoisonError::into_inner).extend(tasks);
     }
 
@@ -221,10 +228,13 @@ impl Jobs {
     ) -> Result<(JobRecord, bool), Error> {
         let idempotency = ask.idempotency_key.clone().map(|key| Idempotency { key, body_hash: request.body_hash });
         let deadline_ms = ask.deadline.map(|after| {
-            now_ms().saturating_add(i64::try_from(after.as_millis()).unwrap_or(i64::MAX / 2)).min(i64::MAX / 2)
+            self.store
+                .now_ms()
+                .saturating_add(i64::try_from(after.as_millis()).unwrap_or(i64::MAX / 2))
+                .min(i64::MAX / 2)
         });
         let job = NewJob {
-            id: JobId::new(),
+            id: JobId::at(self.store.now_ms()),
             kind: request.kind,
             calculator: request.calculator.to_owned(),
             version: request.version,
@@ -321,7 +331,7 @@ impl Jobs {
             progress,
             stage: stage.filter(|_| is_running),
             interim: interim.filter(|_| is_running),
-            remaining_ms: remaining_ms(&record, progress),
+            remaining_ms: remaining_ms(&record, progress, self.store.now_ms()),
             problem: record.problem.as_deref().map(fault::read),
             record,
         }
@@ -329,12 +339,12 @@ impl Jobs {
 }
 
 /// Time left of a running job, ms: from what it has done so far, or from its estimate where it has done too little.
-fn remaining_ms(record: &JobRecord, progress: f64) -> Option<f64> {
+fn remaining_ms(record: &JobRecord, progress: f64, now_ms: i64) -> Option<f64> {
     /// Below this share the speed so far says little.
     const ENOUGH: f64 = 0.02;
     let started = record.started_ms.filter(|_| record.state == JobState::Running)?;
     #[allow(clippy::cast_precision_loss)] // times of jobs, far below 2^53 ms
-    let elapsed = (now_ms() - started).max(0) as f64;
+    let elapsed = (now_ms - started).max(0) as f64;
     let left = if progress >= ENOUGH { elapsed * (1.0 - progress) / progress } else { record.estimate_ms - elapsed };
     Some(left.max(0.0))
 }

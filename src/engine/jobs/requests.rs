@@ -133,6 +133,16 @@ impl Engine {
         self.inner.jobs.now(record)
     }
 
+    /// Whether jobs may be run by other processes.
+    pub fn is_shared(&self) -> bool {
+        self.inner.jobs.store.is_shared()
+    }
+
+    /// The time by which jobs live, ms UTC.
+    pub fn now_ms(&self) -> i64 {
+        self.inner.jobs.store.now_ms()
+    }
+
     /// Waits until [`Engine::stop_jobs`].
     pub async fn stopped(&self) {
         self.inner.jobs.stopped().await;

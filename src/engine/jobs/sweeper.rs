@@ -7,12 +7,13 @@ use tokio::time::Instant;
 
 use super::fault;
 use crate::engine::{Error, Inner};
-use crate::store::now_ms;
 
 /// How often progress is written.
 const BEAT: Duration = Duration::from_secs(1);
-/// Beats between two looks for lost jobs.
+/// Beats between two looks for lost jobs. Where processes share a store every beat: one of them may have died.
 const SWEEP: u64 = 5;
+/// Beats between two counts.
+const COUNT: u64 = 5;
 /// Beats between two rounds of forgetting.
 const FORGET: u64 = 60;
 /// A deadline is looked for at least so often, whatever the clock does meanwhile.
@@ -30,8 +31,11 @@ pub(super) async fn run(engine: Weak<Inner>) {
             _ = beat.tick() => {
                 count += 1;
                 beats(&engine).await;
-                if count.is_multiple_of(SWEEP) {
+                if jobs.store.is_shared() || count.is_multiple_of(SWEEP) {
                     sweep(&engine).await;
+                }
+                if count.is_multiple_of(COUNT) {
+                    tally(&engine).await;
                 }
                 if count.is_multiple_of(FORGET) {
                     report("forget", jobs.store.forget_expired().await);
@@ -63,7 +67,10 @@ async fn sweep(engine: &Arc<Inner>) {
         tracing::warn!(jobs = back.len(), "jobs that nobody ran are in line again");
         jobs.feeds.touch(&back);
     }
-    if let Some(counts) = report("count", jobs.store.counts().await) {
+}
+
+async fn tally(engine: &Arc<Inner>) {
+    if let Some(counts) = report("count", engine.jobs.store.counts().await) {
         #[allow(clippy::cast_precision_loss)] // counts of jobs
         let gauge =
             |state: &'static str, count: u64| metrics::gauge!("precut_jobs", "state" => state).set(count as f64);
@@ -79,7 +86,7 @@ async fn deadlines(engine: &Arc<Inner>) -> Duration {
     let Some((late, next)) = report("deadline", outcome) else { return BEAT };
     jobs.computations.cancel(&late.unwanted);
     jobs.feeds.touch(&late.jobs);
-    let wait = next.map(|at| u64::try_from(at.saturating_sub(now_ms())).unwrap_or(0));
+    let wait = next.map(|at| u64::try_from(at.saturating_sub(jobs.store.now_ms())).unwrap_or(0));
     // At least a millisecond later: the clock counts whole ones.
     wait.map_or(LONGEST_SLEEP, |ms| Duration::from_millis(ms + 1)).min(LONGEST_SLEEP)
 }

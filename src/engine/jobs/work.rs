@@ -38,12 +38,11 @@ pub(super) fn of(engine: &Inner, claim: &Claim) -> Result<Box<dyn Work>, Error> 
             }
             Ok(Box::new(Calculation { ready: ready(&entry, &claim.input)? }))
         }
-        JobKind::Study => Err(Error::internal("this version runs no studies".to_owned())),
     }
 }
 
 /// A kept job, ready to run.
-fn ready(entry: &Arc<Entry>, input: &[u8]) -> Result<Ready, Error> {
+pub(super) fn ready(entry: &Arc<Entry>, input: &[u8]) -> Result<Ready, Error> {
     let job: Value = serde_json::from_slice(input)
         .map_err(|error| Error::internal(format!("a kept job is not readable: {error}")))?;
     read::prepared(entry, &job)
@@ -91,34 +90,13 @@ impl Work for Calculation {
 }
 
 impl Inner {
-    /// An ordinary cached calculation inside a job: from the cache, from whoever computes it already, or computed on
-    /// the jobs' pool, and then kept for whoever asks next. `slot` goes to the calculation where it is a job's only
-    /// one; a job of many calculations keeps its slot and gives none.
+    /// An ordinary cached calculation as a job: from the cache, from whoever computes it already, or computed on the
+    /// jobs' pool with the job's `slot`, and then kept for whoever asks next.
     pub(crate) async fn calculate(
         engine: &Arc<Self>,
         ready: Ready,
         running: &Running,
         slot: Option<Slot>,
-    ) -> Result<Arc<Stored>, Error> {
-        Self::calculate_as(engine, ready, running, slot, true).await
-    }
-
-    /// The same for one of many calculations of a job, whose own progress says nothing of the whole.
-    #[allow(dead_code)] // for kinds of jobs made of many calculations
-    pub(crate) async fn calculate_point(
-        engine: &Arc<Self>,
-        ready: Ready,
-        running: &Running,
-    ) -> Result<Arc<Stored>, Error> {
-        Self::calculate_as(engine, ready, running, None, false).await
-    }
-
-    async fn calculate_as(
-        engine: &Arc<Self>,
-        ready: Ready,
-        running: &Running,
-        slot: Option<Slot>,
-        is_all: bool,
     ) -> Result<Arc<Stored>, Error> {
         let mut mine = Some((ready, slot));
         loop {
@@ -133,9 +111,7 @@ impl Inner {
             let teaches = !ready.entry.is_composed();
             let (id, version, cost_ms) = (ready.entry.meta().id, ready.entry.meta().version, ready.prepared.cost.ms);
             let Boarded { seat, pilot } = engine.flights.board(ready.key);
-            if is_all {
-                running.follow(seat.progress());
-            }
+            running.follow(seat.progress());
             let is_mine = pilot.is_some();
             if let Some(pilot) = pilot
                 && let Some((ready, slot)) = mine.take()

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use precut_calc::calculator::Failure;
 
-use super::{MOST_ATTEMPTS, fault, work};
+use super::{MOST_ATTEMPTS, fault, help, work};
 use crate::engine::{Error, Inner, Stored};
 use crate::store::StoreError;
 use crate::store::jobs::{Claim, Claimed, Ending, JobId};
@@ -13,7 +13,12 @@ use crate::store::jobs::{Claim, Claimed, Ending, JobId};
 /// Runs the job of a task, if it still waits. Returns when its record says how it ended, or that it waits again.
 pub(super) async fn run_task(engine: Arc<Inner>, id: JobId) {
     let jobs = &engine.jobs;
-    let Some(Some(charged)) = stubbornly(&engine, || jobs.store.waiting_attempts(id)).await else { return };
+    let charged = match stubbornly(&engine, || jobs.store.waiting_attempts(id)).await {
+        Some(Some(charged)) => charged,
+        // Nobody waits for it to begin; perhaps somebody has asked for help with it.
+        Some(None) => return help::run(&engine, id).await,
+        None => return,
+    };
     // A start that takes the process along is charged to all that ran beside it. Before a job is given up as the one
     // to blame, it is tried alone.
     let alone = charged + 1 >= MOST_ATTEMPTS;

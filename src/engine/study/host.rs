@@ -24,8 +24,25 @@ pub(crate) trait Host: Send + Sync {
     fn help(&self, most: usize, work: &Arc<Help>);
     /// What was put down of a study before, by the number of the shard.
     fn put_down(&self, study: &Key) -> Vec<(usize, Bytes)>;
-    /// Puts a part of a study down; on return it and the answers of its points outlast the process, if they can.
-    fn put(&self, study: &Key, shard: usize, content: Bytes);
+    /// Puts a part of a study down; where it says yes, it and the answers of its points outlast the process.
+    fn put(&self, study: &Key, shard: usize, content: Bytes) -> bool;
+    /// Whether other processes may compute parts of a study.
+    fn is_shared(&self) -> bool {
+        false
+    }
+    /// Asks them to, by at most so many tasks.
+    fn call(&self, _study: &Key, _most: usize) {}
+    /// Takes the next part of a study of so many that are shared out; `None` where all are done or in somebody's hands,
+    /// an error where that cannot be said at the moment.
+    fn take(&self, _study: &Key, _of: usize) -> Result<Option<usize>, ()> {
+        Ok(None)
+    }
+    /// Gives a part back that was taken and is not put down.
+    fn give_back(&self, _study: &Key, _shard: usize) {}
+    /// What others have put down of these parts.
+    fn collect(&self, _study: &Key, _wanted: Vec<usize>) -> Vec<(usize, Bytes)> {
+        Vec::new()
+    }
     /// The study is complete: what was put down of it is needed no more.
     fn forget(&self, study: &Key);
 }
@@ -44,6 +61,8 @@ impl Host for Alone {
     fn put_down(&self, _study: &Key) -> Vec<(usize, Bytes)> {
         Vec::new()
     }
-    fn put(&self, _study: &Key, _shard: usize, _content: Bytes) {}
+    fn put(&self, _study: &Key, _shard: usize, _content: Bytes) -> bool {
+        false
+    }
     fn forget(&self, _study: &Key) {}
 }

@@ -13,6 +13,7 @@ use crate::engine::error::Error;
 use crate::engine::memory::Kept;
 use crate::engine::read::Ready;
 use crate::key::Key;
+use crate::store::Taken;
 
 /// The engine that a study runs in. The engine holds the entry of studies, and that this: hence the weak link.
 #[derive(Default)]
@@ -79,10 +80,53 @@ impl Host for InEngine {
         }
     }
 
-    fn put(&self, study: &Key, shard: usize, content: Bytes) {
-        let (Some((engine, Some(runtime))), Ok(number)) = (self.engine(), u32::try_from(shard)) else { return };
-        if let Err(error) = runtime.block_on(engine.store.put_shard(*study, number, content)) {
+    fn put(&self, study: &Key, shard: usize, content: Bytes) -> bool {
+        let (Some((engine, Some(runtime))), Ok(number)) = (self.engine(), u32::try_from(shard)) else { return false };
+        let outcome = runtime.block_on(engine.store.put_shard(*study, number, content));
+        if let Err(error) = &outcome {
             tracing::warn!(%study, shard, %error, "a part of a study is not put down");
+        }
+        outcome.is_ok()
+    }
+
+    fn is_shared(&self) -> bool {
+        self.engine().is_some_and(|(engine, runtime)| runtime.is_some() && engine.jobs.store.is_shared())
+    }
+
+    fn call(&self, study: &Key, most: usize) {
+        let (Some((engine, Some(runtime))), Ok(most)) = (self.engine(), u32::try_from(most)) else { return };
+        if let Err(error) = runtime.block_on(engine.jobs.store.call_for_help(*study, most)) {
+            tracing::warn!(%study, %error, "nobody else is asked to compute parts of a study");
+        }
+    }
+
+    fn take(&self, study: &Key, of: usize) -> Result<Option<usize>, ()> {
+        let (Some((engine, Some(runtime))), Ok(of)) = (self.engine(), u32::try_from(of)) else { return Err(()) };
+        match runtime.block_on(engine.store.take_shard(*study, of)) {
+            Ok(Taken::Shard(shard)) => Ok(Some(shard as usize)),
+            Ok(Taken::NoneLeft | Taken::NotShared) => Ok(None),
+            Err(error) => {
+                tracing::warn!(%study, %error, "no part of a study can be taken at the moment");
+                Err(())
+            }
+        }
+    }
+
+    fn give_back(&self, study: &Key, shard: usize) {
+        let (Some((engine, Some(runtime))), Ok(shard)) = (self.engine(), u32::try_from(shard)) else { return };
+        let _runtime = runtime.enter();
+        engine.store.give_shard_back(*study, shard);
+    }
+
+    fn collect(&self, study: &Key, wanted: Vec<usize>) -> Vec<(usize, Bytes)> {
+        let Some((engine, Some(runtime))) = self.engine() else { return Vec::new() };
+        let wanted = wanted.into_iter().filter_map(|shard| u32::try_from(shard).ok()).collect();
+        match runtime.block_on(engine.store.some_shards(*study, wanted)) {
+            Ok(shards) => shards.into_iter().map(|(shard, content)| (shard as usize, content)).collect(),
+            Err(error) => {
+                tracing::debug!(%study, %error, "parts of a study cannot be collected at the moment");
+                Vec::new()
+            }
         }
     }
 

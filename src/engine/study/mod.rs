@@ -154,7 +154,9 @@ impl Job for Study {
     /// Measured tables of the job as row count and hash.
     fn input(&self) -> Result<Value, Failure> {
         let mut input = self.plan.input.clone();
-        let job = super::table::without_rows(Value::Object(std::mem::take(&mut input.job)), self.plan.entry.tables());
+        let job = Value::Object(std::mem::take(&mut input.job));
+        let places = self.plan.entry.tables_of(&job).to_vec();
+        let job = super::table::without_rows(job, &places);
         if let Value::Object(job) = job {
             input.job = job;
         }
@@ -171,5 +173,9 @@ impl Job for Study {
         let (result, notes) = report::report(&self.plan, shards);
         serde_json::to_writer(body, &result).map_err(|error| Failure::Internal(format!("the study: {error}")))?;
         Ok(notes)
+    }
+
+    fn help(&self, monitor: &dyn Monitor, go_on: &mut dyn FnMut() -> bool) -> bool {
+        run::help(&self.plan, &self.host, self.key, monitor, go_on)
     }
 }

@@ -25,11 +25,22 @@ const INTERIM: Duration = Duration::from_millis(500);
 /// How often the thread that waits for the others looks whether it is still wanted.
 const LOOK: Duration = Duration::from_millis(20);
 
+/// How often what others have done is collected.
+const COLLECT: Duration = Duration::from_millis(200);
+/// How often there is a look for parts that were left behind by others.
+const RETAKE: Duration = Duration::from_secs(1);
+/// Pause where it cannot be said which part is next.
+const PAUSE: Duration = Duration::from_millis(200);
+/// Parts asked for at once.
+const COLLECTED_AT_ONCE: usize = 512;
+
 /// What everyone who works on a study has in common.
 struct Work {
     plan: Arc<Plan>,
     host: Arc<dyn Host>,
     key: Key,
+    /// Whether other processes take parts, too.
+    shared: bool,
     next: AtomicUsize,
     points_done: AtomicUsize,
     stop: AtomicBool,
@@ -61,17 +72,59 @@ impl Work {
         self.changed.notify_all();
     }
 
-    /// Computes shards until none is left, or until `go_on` says no; that is asked after each shard, and `told` is
-    /// called after each point.
-    fn share(&self, monitor: &dyn Monitor, go_on: &mut dyn FnMut() -> bool, mut told: impl FnMut()) {
+    fn new(plan: &Arc<Plan>, host: &Arc<dyn Host>, key: Key) -> Self {
+        let shards = plan.shards();
+        Self {
+            plan: Arc::clone(plan),
+            host: Arc::clone(host),
+            key,
+            shared: plan.cost.ms >= LARGE_MS && shards > 1 && host.is_shared(),
+            next: AtomicUsize::new(0),
+            points_done: AtomicUsize::new(0),
+            stop: AtomicBool::new(false),
+            crashed: AtomicBool::new(false),
+            done: Mutex::new(Done { shards: vec![None; shards], missing: shards }),
+            changed: Condvar::new(),
+        }
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+
+    /// The next shard for whoever asks; `None` if none is left or nobody wants the study any more.
+    fn next(&self, monitor: &dyn Monitor) -> Option<Held<'_>> {
         loop {
-            let index = self.next.fetch_add(1, Ordering::Relaxed);
-            if index >= self.plan.shards() || self.stop.load(Ordering::Relaxed) {
-                return;
+            if self.is_stopped() || monitor.cancelled() {
+                return None;
             }
-            if self.done().shards[index].is_some() {
-                continue;
+            let index = if self.shared {
+                match self.host.take(&self.key, self.plan.shards()) {
+                    Ok(index) => index?,
+                    Err(()) => {
+                        std::thread::sleep(PAUSE);
+                        continue;
+                    }
+                }
+            } else {
+                self.next.fetch_add(1, Ordering::Relaxed)
+            };
+            if index >= self.plan.shards() {
+                return None;
             }
+            let held = Held { work: self, index, is_down: !self.shared };
+            if self.done().shards[index].is_none() {
+                return Some(held);
+            }
+        }
+    }
+
+    /// Computes shards until none is left, or until `go_on` says no; that is asked after each shard, and `told` is
+    /// called after each point. Whether none is left.
+    fn share(&self, monitor: &dyn Monitor, go_on: &mut dyn FnMut() -> bool, mut told: impl FnMut()) -> bool {
+        loop {
+            let Some(mut held) = self.next(monitor) else { return !self.is_stopped() };
+            let index = held.index;
             let computed = Shard::compute(&self.plan, self.plan.shard(index), &*self.host, monitor, || {
                 self.points_done.fetch_add(1, Ordering::Relaxed);
                 told();
@@ -79,22 +132,26 @@ impl Work {
             let Some(shard) = computed else {
                 self.stop.store(true, Ordering::Relaxed);
                 self.changed.notify_all();
-                return;
+                return false;
             };
             if self.is_large()
                 && let Ok(content) = serde_json::to_vec(&shard)
             {
-                self.host.put(&self.key, index, content.into());
+                held.is_down |= self.host.put(&self.key, index, content.into());
             }
+            drop(held);
             self.add(index, shard);
             if !go_on() {
-                return;
+                return false;
             }
         }
     }
 
-    /// How many shards nobody has begun.
+    /// How many shards nobody has begun, about.
     fn left(&self) -> usize {
+        if self.shared {
+            return self.done().missing;
+        }
         self.plan.shards().saturating_sub(self.next.load(Ordering::Relaxed))
     }
 
@@ -114,8 +171,27 @@ impl Work {
 
     /// Takes up what was put down before. What does not fit is computed again.
     fn resume(&self) {
-        for (index, content) in self.host.put_down(&self.key) {
-            if index >= self.plan.shards() {
+        self.take_up(self.host.put_down(&self.key));
+    }
+
+    /// Takes up what others have done meanwhile.
+    fn collect(&self) {
+        if !self.shared {
+            return;
+        }
+        let missing: Vec<usize> = {
+            let done = self.done();
+            let missing = done.shards.iter().enumerate().filter(|(_, shard)| shard.is_none());
+            missing.map(|(index, _)| index).take(COLLECTED_AT_ONCE).collect()
+        };
+        if !missing.is_empty() {
+            self.take_up(self.host.collect(&self.key, missing));
+        }
+    }
+
+    fn take_up(&self, shards: Vec<(usize, bytes::Bytes)>) {
+        for (index, content) in shards {
+            if index >= self.plan.shards() || self.done().shards[index].is_some() {
                 continue;
             }
             let points = self.plan.shard(index);
@@ -130,7 +206,9 @@ impl Work {
     }
 
     fn progress(&self, monitor: &dyn Monitor) {
-        let (done, of) = (self.points_done.load(Ordering::Relaxed), self.plan.points);
+        // A part that two have computed counts once.
+        let of = self.plan.points;
+        let done = self.points_done.load(Ordering::Relaxed).min(of);
         let stage = Message::new("study_point").with("done", done).with("of", of);
         monitor.progress(done as f64 / of as f64, stage);
     }
@@ -147,6 +225,21 @@ impl Work {
         drop(done);
         if let Some(figure) = figure {
             monitor.interim(figure);
+        }
+    }
+}
+
+/// A shard in somebody's hands, until it is put down or given back.
+struct Held<'w> {
+    work: &'w Work,
+    index: usize,
+    is_down: bool,
+}
+
+impl Drop for Held<'_> {
+    fn drop(&mut self) {
+        if !self.is_down {
+            self.work.host.give_back(&self.work.key, self.index);
         }
     }
 }
@@ -168,28 +261,21 @@ pub(crate) fn run(
     key: Key,
     monitor: &dyn Monitor,
 ) -> Result<Vec<Shard>, Failure> {
-    let shards = plan.shards();
-    let work = Arc::new(Work {
-        plan: Arc::clone(plan),
-        host: Arc::clone(host),
-        key,
-        next: AtomicUsize::new(0),
-        points_done: AtomicUsize::new(0),
-        stop: AtomicBool::new(false),
-        crashed: AtomicBool::new(false),
-        done: Mutex::new(Done { shards: vec![None; shards], missing: shards }),
-        changed: Condvar::new(),
-    });
+    let work = Arc::new(Work::new(plan, host, key));
     let helped = Arc::clone(&work);
     let help: Arc<Help> = Arc::new(move |go_on: &mut dyn FnMut() -> bool| helped.help(go_on));
     let mut hire = || {
         if work.is_large() {
             host.help(work.left().saturating_sub(1), &help);
         }
+        work.collect();
         true
     };
     if work.is_large() {
         work.resume();
+        if work.shared {
+            host.call(&key, work.left().saturating_sub(1));
+        }
         hire();
     }
     let mut drawn = Instant::now();
@@ -201,12 +287,22 @@ pub(crate) fn run(
         }
     };
     work.share(monitor, &mut hire, &mut tell);
+    let (mut collected, mut retaken) = (Instant::now(), Instant::now());
     let mut done = work.done();
-    while done.missing > 0 && !work.stop.load(Ordering::Relaxed) {
+    while done.missing > 0 && !work.is_stopped() {
         (done, _) = work.changed.wait_timeout(done, LOOK).unwrap_or_else(PoisonError::into_inner);
         drop(done);
         if monitor.cancelled() {
             work.stop.store(true, Ordering::Relaxed);
+        }
+        if collected.elapsed() >= COLLECT {
+            work.collect();
+            collected = Instant::now();
+        }
+        if work.shared && retaken.elapsed() >= RETAKE {
+            // What somebody who died had in his hands.
+            work.share(monitor, &mut hire, &mut tell);
+            retaken = Instant::now();
         }
         tell();
         done = work.done();
@@ -222,4 +318,17 @@ pub(crate) fn run(
         host.forget(&key);
     }
     Ok(all)
+}
+
+/// Computes shards of a study that another process runs and puts together, as long as `go_on` says so; whether some may
+/// be left.
+pub(crate) fn help(
+    plan: &Arc<Plan>,
+    host: &Arc<dyn Host>,
+    key: Key,
+    monitor: &dyn Monitor,
+    go_on: &mut dyn FnMut() -> bool,
+) -> bool {
+    let work = Work::new(plan, host, key);
+    work.shared && !work.share(monitor, go_on, || {})
 }

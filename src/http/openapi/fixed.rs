@@ -120,7 +120,7 @@ fn read_result() -> OperationBuilder {
                 .description(Some("The answer: `calculator` says which one made it, and by which schema.")),
         )),
     ))
-    .header("Content-Language", parts::text_header("Language of the sentences.", "en"))
+    .header("Content-Language", parts::text_header("Language of the sentences: `en` or `ru`.", "en"))
     .header("Precut-Cache", parts::text_header("Always `hit`: nothing is computed.", "hit"));
     for (media, text) in
         [(Media::Csv, "One of its tables."), (Media::Svg, "One of its figures."), (Media::Gcode, "Its program.")]

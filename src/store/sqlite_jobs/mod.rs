@@ -2,8 +2,8 @@
 
 mod care;
 mod line;
-mod pack;
-mod record;
+pub(super) mod pack;
+pub(super) mod record;
 mod run;
 #[cfg(test)]
 mod tests;

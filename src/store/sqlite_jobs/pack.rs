@@ -12,13 +12,13 @@ const PACK_AT_ONCE: usize = 64 << 10;
 const LEVEL: i32 = 1;
 
 /// A job with its input packed, to be written.
-pub(super) struct Packed {
-    pub(super) job: NewJob,
-    pub(super) input: Vec<u8>,
-    pub(super) result: Option<ResultRow>,
+pub(in crate::store) struct Packed {
+    pub(in crate::store) job: NewJob,
+    pub(in crate::store) input: Vec<u8>,
+    pub(in crate::store) result: Option<ResultRow>,
 }
 
-pub(super) async fn packed(job: NewJob) -> Result<Packed, StoreError> {
+pub(in crate::store) async fn packed(job: NewJob) -> Result<Packed, StoreError> {
     let size = job.input.len() + job.result.as_ref().map_or(0, |result| result.body.len() + result.input.len());
     let pack = move || -> io::Result<Packed> {
         let input = zstd::bulk::compress(&job.input, LEVEL)?;
@@ -28,7 +28,7 @@ pub(super) async fn packed(job: NewJob) -> Result<Packed, StoreError> {
     blocking(size, pack).await
 }
 
-pub(super) async fn packed_ending(ending: Ending) -> Result<PackedEnding, StoreError> {
+pub(in crate::store) async fn packed_ending(ending: Ending) -> Result<PackedEnding, StoreError> {
     match ending {
         Ending::Failed(problem) => Ok(PackedEnding::Failed(problem)),
         Ending::Succeeded(result) => {
@@ -38,7 +38,7 @@ pub(super) async fn packed_ending(ending: Ending) -> Result<PackedEnding, StoreE
     }
 }
 
-pub(super) enum PackedEnding {
+pub(in crate::store) enum PackedEnding {
     Succeeded(ResultRow),
     Failed(String),
 }

@@ -61,15 +61,18 @@ impl RecordRow {
     }
 }
 
-pub(super) fn parsed<T: std::str::FromStr<Err = uuid::Error>>(text: &str) -> Result<T, sqlx::Error> {
-    text.parse().map_err(|error: uuid::Error| sqlx::Error::Decode(error.into()))
+pub(in crate::store) fn parsed<T>(text: &str) -> Result<T, sqlx::Error>
+where
+    T: std::str::FromStr<Err: std::error::Error + Send + Sync + 'static>,
+{
+    text.parse().map_err(|error: T::Err| sqlx::Error::Decode(error.into()))
 }
 
-pub(super) fn unreadable(column: &str) -> sqlx::Error {
+pub(in crate::store) fn unreadable(column: &str) -> sqlx::Error {
     sqlx::Error::Decode(format!("the column {column} of a job").into())
 }
 
-pub(super) const fn rank(priority: Priority) -> i64 {
+pub(in crate::store) const fn rank(priority: Priority) -> i64 {
     match priority {
         Priority::Low => 0,
         Priority::Normal => 1,
@@ -77,7 +80,7 @@ pub(super) const fn rank(priority: Priority) -> i64 {
     }
 }
 
-pub(super) fn of_rank(rank_: i64) -> Option<Priority> {
+pub(in crate::store) fn of_rank(rank_: i64) -> Option<Priority> {
     Priority::ALL.iter().copied().find(|priority| rank(*priority) == rank_)
 }
 

@@ -130,7 +130,7 @@ pub(super) fn warnings(problem: &Problem<'_>, outcome: &IdentificationOutcome) -
             Finding::new("identification_clamp_contradicted", "/measurements")
                 .measured(clamp.least_n, clamp.most_n.unwrap_or(clamp.least_n), "N")
                 .with("best_n", clamp.best_n)
-                .with("rows", clamp.contradicted_rows.clone()),
+                .with("rows", numbers(&clamp.contradicted_rows)),
         );
     }
     if let Some(rows) = outcome.clamp_force.as_ref().and_then(|clamp| clamp.contradicted_by_stated.as_ref())
@@ -139,10 +139,15 @@ pub(super) fn warnings(problem: &Problem<'_>, outcome: &IdentificationOutcome) -
         found.push(
             Finding::new("identification_clamp_contradicted", "/fixture/clamp_force_n")
                 .value(problem.job.fixture.common().3.unwrap_or(0.0), "N")
-                .with("rows", rows.clone()),
+                .with("rows", numbers(rows)),
         );
     }
     found
+}
+
+/// Row numbers as words: a list of them is read, not computed with.
+fn numbers(rows: &[usize]) -> Vec<String> {
+    rows.iter().map(ToString::to_string).collect()
 }
 
 fn law(regeneration: &str, amplitude: &str) -> String {

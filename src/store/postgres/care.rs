@@ -1,0 +1,305 @@
+//! What is done from time to time. Every process does it; where one is enough, the first to come does it.
+
+use sqlx::postgres::{PgConnection, PgPool};
+
+use super::record::{Outcome, column, count, ids, texts};
+use super::run::{requeue, unwanted};
+use super::{PostgresStore, lock, news, queue};
+use crate::key::Key;
+use crate::store::StoreError;
+use crate::store::jobs::{Changed, JobId, Lease, Live, Timing};
+use crate::store::sqlite_jobs::record::parsed;
+
+/// Timings kept.
+const TIMINGS: i64 = 20_000;
+/// Jobs forgotten in one transaction; a minute's worth at a million a day is 700.
+const FORGOTTEN_AT_ONCE: i64 = 5_000;
+/// Leases and lost tasks looked after in one round.
+const AT_ONCE: i64 = 500;
+/// How long a task that is done is kept, and a worker that is gone.
+const DONE_FOR_S: f64 = 60.0;
+/// A queue whose workers have all been silent for so long has none.
+const DESERTED_S: f64 = 30.0;
+/// Locks of which one process at a time has each.
+const CARE: i32 = 0x7072_6563;
+
+#[derive(Clone, Copy)]
+enum Duty {
+    Sweep = 1,
+    Forget = 2,
+}
+
+/// Whether this process is the first to do that now.
+async fn is_first(connection: &mut PgConnection, duty: Duty) -> Outcome<bool> {
+    sqlx::query_scalar("SELECT pg_try_advisory_xact_lock($1, $2)")
+        .bind(CARE)
+        .bind(duty as i32)
+        .fetch_one(connection)
+        .await
+}
+
+impl PostgresStore {
+    pub(super) async fn expire(&self, problem: &str) -> Result<(Changed, Option<i64>), StoreError> {
+        let keys: Vec<Vec<u8>> = sqlx::query_scalar(
+            "SELECT DISTINCT key FROM precut.jobs
+             WHERE deadline_ms IS NOT NULL AND state IN ('queued', 'running') AND deadline_ms <= precut.now_ms()",
+        )
+        .fetch_all(&self.pool)
+        .await?;
+        let mut all = Changed::default();
+        for key in keys.iter().filter_map(|key| Key::from_bytes(key)) {
+            let keep_ms = self.keep_ms;
+            let problem = problem.to_owned();
+            let changed = self
+                .write(move |connection| Box::pin(async move { expire_key(connection, key, &problem, keep_ms).await }))
+                .await?;
+            all.jobs.extend(changed.jobs);
+            all.unwanted.extend(changed.unwanted);
+        }
+        let next = sqlx::query_scalar(
+            "SELECT min(deadline_ms) FROM precut.jobs WHERE deadline_ms IS NOT NULL AND state IN ('queued', 'running')",
+        )
+        .fetch_one(&self.pool)
+        .await?;
+        Ok((all, next))
+    }
+
+    pub(super) async fn sweep_jobs(&self, live: Live) -> Result<Vec<JobId>, StoreError> {
+        let _ = self.clock.read(&self.pool).await;
+        let silent_ms = i64::try_from(self.patience.lease.as_millis()).unwrap_or(i64::MAX);
+        let grace_s = self.patience.grace.as_secs_f64();
+        let live = texts(&live());
+        let stale = self.write(|connection| Box::pin(stale(connection, live, silent_ms, grace_s))).await?;
+        let mut back = Vec::new();
+        for lease in stale.unwrap_or_default() {
+            let again = self.write(|connection| Box::pin(requeue(connection, lease, true, Some(silent_ms)))).await?;
+            back.extend(again);
+        }
+        if self.is_time_to_look_for_lost() {
+            let mine = self.engine.clone();
+            let lost = self.write(|connection| Box::pin(push_lost(connection, mine))).await?;
+            back.extend(lost);
+        }
+        if !back.is_empty() {
+            self.tasks.wake();
+        }
+        Ok(back)
+    }
+
+    fn is_time_to_look_for_lost(&self) -> bool {
+        let now = tokio::time::Instant::now();
+        let mut last = self.lost.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let is_time = last.is_none_or(|last| now.duration_since(last) >= self.patience.lost);
+        if is_time {
+            *last = Some(now);
+        }
+        is_time
+    }
+
+    pub(super) async fn forget(&self) -> Result<u64, StoreError> {
+        let keep_ms = self.keep_ms;
+        self.write(|connection| Box::pin(forget(connection, keep_ms))).await
+    }
+}
+
+async fn expire_key(connection: &mut PgConnection, key: Key, problem: &str, keep_ms: i64) -> Outcome<Changed> {
+    let now = lock(connection, &key).await?;
+    let late: Vec<(String, Option<String>)> = sqlx::query_as(
+        "WITH late AS (SELECT id, lease FROM precut.jobs
+                       WHERE key = $1 AND deadline_ms <= $2 AND state IN ('queued', 'running'))
+         UPDATE precut.jobs AS job SET state = 'failed', problem = $3, lease = NULL, heartbeat_ms = NULL, stage = NULL,
+             finished_ms = $2, expires_ms = $2 + $4
+         FROM late WHERE job.id = late.id RETURNING job.id, late.lease",
+    )
+    .bind(key.as_bytes().as_slice())
+    .bind(now)
+    .bind(problem)
+    .bind(keep_ms)
+    .fetch_all(&mut *connection)
+    .await?;
+    let jobs = late.iter().map(|(id, _)| parsed(id)).collect::<Outcome<Vec<JobId>>>()?;
+    let leases: Vec<String> = late.into_iter().filter_map(|(_, lease)| lease).collect();
+    let unwanted = unwanted(connection, &leases).await?;
+    news::tell(connection, &jobs, &unwanted).await?;
+    Ok(Changed { jobs, unwanted })
+}
+
+/// Leases of computations that have been silent for too long; `None` where another process looks just now.
+async fn stale(
+    connection: &mut PgConnection,
+    live: Vec<String>,
+    silent_ms: i64,
+    grace_s: f64,
+) -> Outcome<Option<Vec<Lease>>> {
+    if !is_first(connection, Duty::Sweep).await? {
+        return Ok(None);
+    }
+    let stale: Vec<String> = sqlx::query_scalar(
+        "SELECT DISTINCT lease FROM precut.jobs
+         WHERE state = 'running' AND heartbeat_ms <= precut.now_ms() - $1 AND NOT lease = ANY($2)
+             AND clock_timestamp() - pg_postmaster_start_time() > make_interval(secs => $3)
+         LIMIT $4",
+    )
+    .bind(silent_ms)
+    .bind(live)
+    .bind(grace_s)
+    .bind(AT_ONCE)
+    .fetch_all(connection)
+    .await?;
+    stale.iter().map(|lease| parsed(lease)).collect::<Outcome<_>>().map(Some)
+}
+
+/// Gives a task to every job that waits and has none; which these are.
+async fn push_lost(connection: &mut PgConnection, mine: String) -> Outcome<Vec<JobId>> {
+    adopt(connection, &mine).await?;
+    let lost: Vec<String> = sqlx::query_scalar(
+        "SELECT id FROM precut.jobs AS job WHERE state = 'queued' AND NOT EXISTS (
+             SELECT FROM apalis.jobs AS task
+             WHERE task.job_type = $1 || job.engine AND task.idempotency_key = job.id || ':' || job.pushed
+                 AND task.status IN ('Pending', 'Queued', 'Running'))
+         ORDER BY priority DESC, turn, id LIMIT $2 FOR UPDATE SKIP LOCKED",
+    )
+    .bind(queue::QUEUES)
+    .bind(AT_ONCE)
+    .fetch_all(&mut *connection)
+    .await?;
+    queue::push(connection, &lost).await?;
+    ids(&lost)
+}
+
+/// Takes over jobs of earlier versions that have no workers any more, where ours has. A later version's jobs wait for
+/// its workers: there may be something in them that this one cannot read.
+async fn adopt(connection: &mut PgConnection, mine: &str) -> Outcome<()> {
+    let engines: Vec<String> =
+        sqlx::query_scalar("SELECT DISTINCT engine FROM precut.jobs WHERE state = 'queued' AND engine <> $1")
+            .bind(mine)
+            .fetch_all(&mut *connection)
+            .await?;
+    let older: Vec<String> = engines.into_iter().filter(|engine| is_older(engine, mine)).collect();
+    if older.is_empty() {
+        return Ok(());
+    }
+    let served: Vec<String> = sqlx::query_scalar(
+        "SELECT DISTINCT substr(worker_type, length($1) + 1) FROM apalis.workers
+         WHERE starts_with(worker_type, $1) AND last_seen > now() - make_interval(secs => $2)",
+    )
+    .bind(queue::QUEUES)
+    .bind(DESERTED_S)
+    .fetch_all(&mut *connection)
+    .await?;
+    if !served.iter().any(|engine| engine == mine) {
+        return Ok(());
+    }
+    let deserted: Vec<String> = older.into_iter().filter(|engine| !served.contains(engine)).collect();
+    let taken_over = sqlx::query("UPDATE precut.jobs SET engine = $1 WHERE state = 'queued' AND engine = ANY($2)")
+        .bind(mine)
+        .bind(&deserted)
+        .execute(connection)
+        .await?;
+    if taken_over.rows_affected() > 0 {
+        tracing::info!(jobs = taken_over.rows_affected(), of = ?deserted, "jobs of earlier versions are taken over");
+    }
+    Ok(())
+}
+
+/// Whether a version comes before another, number by number.
+fn is_older(version: &str, than: &str) -> bool {
+    let numbers =
+        |version: &str| -> Vec<u64> { version.split(['.', '-', '+']).map_while(|part| part.parse().ok()).collect() };
+    numbers(version) < numbers(than)
+}
+
+async fn forget(connection: &mut PgConnection, keep_ms: i64) -> Outcome<u64> {
+    if !is_first(connection, Duty::Forget).await? {
+        return Ok(0);
+    }
+    // First the input, then, much later, the record: that a job was there is known longer than what it gave.
+    sqlx::query(
+        "UPDATE precut.jobs SET input = '', idempotency = NULL, body_hash = NULL
+         WHERE id IN (SELECT id FROM precut.jobs WHERE expires_ms <= precut.now_ms() AND length(input) > 0 LIMIT $1)",
+    )
+    .bind(FORGOTTEN_AT_ONCE)
+    .execute(&mut *connection)
+    .await?;
+    let gone = sqlx::query(
+        "DELETE FROM precut.jobs
+         WHERE id IN (SELECT id FROM precut.jobs WHERE expires_ms <= precut.now_ms() - $1 LIMIT $2)",
+    )
+    .bind(keep_ms)
+    .bind(FORGOTTEN_AT_ONCE)
+    .execute(&mut *connection)
+    .await?;
+    sqlx::query(
+        "DELETE FROM apalis.jobs WHERE starts_with(job_type, $1) AND status IN ('Done', 'Killed', 'Failed')
+             AND done_at < now() - make_interval(secs => $2)",
+    )
+    .bind(queue::QUEUES)
+    .bind(DONE_FOR_S)
+    .execute(&mut *connection)
+    .await?;
+    sqlx::query(
+        "DELETE FROM apalis.workers AS worker WHERE starts_with(worker_type, $1)
+             AND last_seen < now() - make_interval(secs => 10 * $2)
+             AND NOT EXISTS (SELECT FROM apalis.jobs WHERE jobs.lock_by = worker.id)",
+    )
+    .bind(queue::QUEUES)
+    .bind(DONE_FOR_S)
+    .execute(&mut *connection)
+    .await?;
+    sqlx::query(
+        "DELETE FROM precut.timings WHERE at_ms < (SELECT at_ms FROM precut.timings ORDER BY at_ms DESC LIMIT 1 OFFSET $1)",
+    )
+    .bind(TIMINGS)
+    .execute(&mut *connection)
+    .await?;
+    sqlx::query("DELETE FROM precut.shared_studies WHERE created_ms < precut.now_ms() - $1")
+        .bind(keep_ms)
+        .execute(&mut *connection)
+        .await?;
+    sqlx::query("DELETE FROM precut.studies WHERE created_ms < precut.now_ms() - $1")
+        .bind(keep_ms)
+        .execute(connection)
+        .await?;
+    Ok(gone.rows_affected())
+}
+
+pub(super) async fn note_timing(pool: &PgPool, timing: &Timing) -> Outcome<()> {
+    sqlx::query(
+        "INSERT INTO precut.timings (calculator, version, predicted_ms, actual_ms, at_ms)
+         VALUES ($1, $2, $3, $4, precut.now_ms())",
+    )
+    .bind(&timing.calculator)
+    .bind(column(timing.version))
+    .bind(timing.predicted_ms)
+    .bind(timing.actual_ms)
+    .execute(pool)
+    .await?;
+    Ok(())
+}
+
+pub(super) async fn timings(pool: &PgPool, limit: u32) -> Outcome<Vec<Timing>> {
+    let rows: Vec<(String, i32, f64, f64)> = sqlx::query_as(
+        "SELECT calculator, version, predicted_ms, actual_ms FROM precut.timings ORDER BY at_ms DESC LIMIT $1",
+    )
+    .bind(i64::from(limit))
+    .fetch_all(pool)
+    .await?;
+    let timing = |(calculator, version, predicted_ms, actual_ms)| Timing {
+        calculator,
+        version: count(version),
+        predicted_ms,
+        actual_ms,
+    };
+    Ok(rows.into_iter().map(timing).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_older;
+
+    #[test]
+    fn versions_are_compared_number_by_number() {
+        assert!(is_older("0.9.1", "0.10.0") && is_older("0.1.0", "0.1.1") && is_older("1.0", "1.0.1"));
+        assert!(!is_older("0.10.0", "0.9.1") && !is_older("0.1.0", "0.1.0"));
+    }
+}

@@ -1,0 +1,255 @@
+//! The store's two faces: results and jobs.
+
+use bytes::Bytes;
+use futures_util::future::BoxFuture;
+use sqlx::QueryBuilder;
+use sqlx::postgres::{PgConnection, Postgres};
+use tokio::sync::watch;
+use uuid::Uuid;
+
+use super::PostgresStore;
+use super::care::{note_timing, timings};
+use super::line::submit;
+use super::queue::{self, Task, Tasks};
+use super::record::{Outcome, RecordRow, columns, count, record};
+use super::run::{beat, cancel, claim, finish, redo, requeue};
+use crate::key::Key;
+use crate::store::jobs::{
+    Accepted, Beat, Cancelled, Changed, Claimed, Ending, Hear, JobCounts, JobId, JobPage, JobQuery, JobRecord,
+    JobStore, Lease, Live, NewJob, RunTask, Shared, Timing,
+};
+use crate::store::sqlite_jobs::pack::{packed, packed_ending};
+use crate::store::{KeptResult, ResultPage, ResultQuery, ResultStore, StoreError, Taken};
+
+/// Tasks that one call for help makes at most.
+const MOST_HELP: u32 = 256;
+/// Tasks for each worker that is there.
+const HELP_PER_WORKER: u32 = 4;
+
+impl ResultStore for PostgresStore {
+    fn get(&self, key: Key) -> BoxFuture<'_, Result<Option<KeptResult>, StoreError>> {
+        Box::pin(self.read(key))
+    }
+    fn put(&self, result: KeptResult) {
+        self.writer.put(result);
+    }
+    fn list(&self, query: ResultQuery) -> BoxFuture<'_, Result<ResultPage, StoreError>> {
+        Box::pin(self.page(query))
+    }
+    fn ping(&self) -> BoxFuture<'_, Result<(), StoreError>> {
+        Box::pin(async {
+            sqlx::query("SELECT 1").execute(&self.pool).await?;
+            Ok(())
+        })
+    }
+    fn close(&self) -> BoxFuture<'_, ()> {
+        Box::pin(async {
+            self.writer.close().await;
+            self.newsroom.close();
+            self.pool.close().await;
+        })
+    }
+    fn put_shard(&self, study: Key, shard: u32, content: Bytes) -> BoxFuture<'_, Result<(), StoreError>> {
+        Box::pin(self.put_down(study, shard, content))
+    }
+    fn shards(&self, study: Key) -> BoxFuture<'_, Result<Vec<(u32, Bytes)>, StoreError>> {
+        Box::pin(self.done(study, None))
+    }
+    fn some_shards(&self, study: Key, wanted: Vec<u32>) -> BoxFuture<'_, Result<Vec<(u32, Bytes)>, StoreError>> {
+        Box::pin(self.done(study, Some(wanted)))
+    }
+    fn forget_shards(&self, study: Key) -> BoxFuture<'_, Result<(), StoreError>> {
+        Box::pin(self.forget_study(study))
+    }
+    fn take_shard(&self, study: Key, of: u32) -> BoxFuture<'_, Result<Taken, StoreError>> {
+        Box::pin(self.take(study, of))
+    }
+    fn give_shard_back(&self, study: Key, shard: u32) {
+        self.give_back(study, shard);
+    }
+}
+
+impl PostgresStore {
+    async fn submit_job(&self, job: NewJob, queue_limit: u64) -> Result<Accepted, StoreError> {
+        let packed = packed(job).await?;
+        let (keep_ms, engine) = (self.keep_ms, self.engine.clone());
+        let accepted = self
+            .write(move |connection| {
+                Box::pin(async move { submit(connection, &packed, (queue_limit, keep_ms, &engine)).await })
+            })
+            .await?;
+        self.tasks.wake();
+        Ok(accepted)
+    }
+
+    async fn finish_job(&self, lease: Lease, ending: Ending) -> Result<Vec<JobId>, StoreError> {
+        let ending = packed_ending(ending).await?;
+        let keep_ms = self.keep_ms;
+        self.write(move |connection| Box::pin(async move { finish(connection, lease, &ending, keep_ms).await })).await
+    }
+
+    async fn list_jobs(&self, query: JobQuery) -> Result<JobPage, StoreError> {
+        let mut statement =
+            QueryBuilder::<Postgres>::new(concat!("SELECT ", columns!(), " FROM precut.jobs WHERE true"));
+        if let Some(state) = query.state {
+            statement.push(" AND state = ").push_bind(state.word());
+        }
+        if let Some(calculator) = query.calculator {
+            statement.push(" AND calculator = ").push_bind(calculator);
+        }
+        if let Some(before) = query.before {
+            statement.push(" AND id < ").push_bind(before.to_string());
+        }
+        // One more than asked for tells whether there is another page.
+        statement.push(" ORDER BY id DESC LIMIT ").push_bind(i64::from(query.limit) + 1);
+        let rows: Vec<RecordRow> = statement.build_query_as().fetch_all(&self.pool).await?;
+        let mut items = rows.into_iter().map(RecordRow::record).collect::<Outcome<Vec<_>>>()?;
+        let more = items.len() > query.limit as usize;
+        items.truncate(query.limit as usize);
+        let next = items.last().filter(|_| more).map(|last| last.id);
+        Ok(JobPage { items, next })
+    }
+
+    async fn help(&self, key: Key, most: u32) -> Result<(), StoreError> {
+        let engine = self.engine.clone();
+        self.write(|connection| Box::pin(call(connection, key, most, engine))).await?;
+        self.tasks.wake();
+        Ok(())
+    }
+}
+
+/// Pushes further tasks for the job that is computed under a key.
+async fn call(connection: &mut PgConnection, key: Key, most: u32, engine: String) -> Outcome<()> {
+    let job: Option<(String, i32)> =
+        sqlx::query_as("SELECT id, priority FROM precut.jobs WHERE key = $1 AND state = 'running' ORDER BY id LIMIT 1")
+            .bind(key.as_bytes().as_slice())
+            .fetch_optional(&mut *connection)
+            .await?;
+    let Some((job, priority)) = job else { return Ok(()) };
+    let workers: i64 = sqlx::query_scalar(
+        "SELECT count(*) FROM apalis.workers WHERE worker_type = $1 AND last_seen > now() - interval '10 seconds'",
+    )
+    .bind(queue::name(&engine))
+    .fetch_one(&mut *connection)
+    .await?;
+    let tasks = most.min(MOST_HELP).min(u32::try_from(workers).unwrap_or(0).saturating_mul(HELP_PER_WORKER));
+    let tasks: Vec<Task<'_>> = (0..tasks)
+        .map(|_| Task { job: &job, name: format!("{job}:help:{}", Uuid::now_v7().simple()), priority, turn: None })
+        .collect();
+    queue::add(connection, &engine, &tasks).await
+}
+
+impl JobStore for PostgresStore {
+    fn submit(&self, job: NewJob, queue_limit: u64) -> BoxFuture<'_, Result<Accepted, StoreError>> {
+        Box::pin(self.submit_job(job, queue_limit))
+    }
+    fn job(&self, id: JobId) -> BoxFuture<'_, Result<Option<JobRecord>, StoreError>> {
+        Box::pin(async move {
+            let mut connection = self.pool.acquire().await?;
+            Ok(record(&mut connection, id).await?)
+        })
+    }
+    fn jobs(&self, query: JobQuery) -> BoxFuture<'_, Result<JobPage, StoreError>> {
+        Box::pin(self.list_jobs(query))
+    }
+    fn counts(&self) -> BoxFuture<'_, Result<JobCounts, StoreError>> {
+        Box::pin(async {
+            let (queued, running): (i64, i64) = sqlx::query_as(
+                "SELECT (SELECT count(*) FROM precut.jobs WHERE state = 'queued'),
+                     (SELECT count(*) FROM precut.jobs WHERE state = 'running')",
+            )
+            .fetch_one(&self.pool)
+            .await?;
+            Ok(JobCounts { queued: u64::try_from(queued).unwrap_or(0), running: u64::try_from(running).unwrap_or(0) })
+        })
+    }
+    fn waiting_attempts(&self, id: JobId) -> BoxFuture<'_, Result<Option<u32>, StoreError>> {
+        Box::pin(async move {
+            let attempts: Option<i32> = sqlx::query_scalar(
+                "SELECT max(other.attempt) FROM precut.jobs AS one JOIN precut.jobs AS other USING (key)
+                 WHERE one.id = $1 AND one.state = 'queued' AND other.state = 'queued'",
+            )
+            .bind(id.to_string())
+            .fetch_one(&self.pool)
+            .await?;
+            Ok(attempts.map(count))
+        })
+    }
+    fn claim(&self, id: JobId, lease: Lease, most: u32, problem: String) -> BoxFuture<'_, Result<Claimed, StoreError>> {
+        Box::pin(async move {
+            let keep_ms = self.keep_ms;
+            self.write(move |connection| {
+                Box::pin(async move { claim(connection, id, lease, (most, &problem), keep_ms).await })
+            })
+            .await
+        })
+    }
+    fn finish(&self, lease: Lease, ending: Ending) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>> {
+        Box::pin(self.finish_job(lease, ending))
+    }
+    fn release(&self, lease: Lease) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>> {
+        Box::pin(self.write(move |connection| Box::pin(requeue(connection, lease, false, None))))
+    }
+    fn cancel(&self, id: JobId) -> BoxFuture<'_, Result<Option<Cancelled>, StoreError>> {
+        let keep_ms = self.keep_ms;
+        Box::pin(self.write(move |connection| Box::pin(cancel(connection, id, keep_ms))))
+    }
+    fn redo(&self, id: JobId) -> BoxFuture<'_, Result<(), StoreError>> {
+        Box::pin(async move {
+            self.write(|connection| Box::pin(redo(connection, id))).await?;
+            self.tasks.wake();
+            Ok(())
+        })
+    }
+    fn beat(&self, beats: Vec<Beat>) -> BoxFuture<'_, Result<Vec<Lease>, StoreError>> {
+        Box::pin(async move {
+            let mut connection = self.pool.acquire().await?;
+            Ok(beat(&mut connection, &beats).await?)
+        })
+    }
+    fn expire_deadlines(&self, problem: String) -> BoxFuture<'_, Result<(Changed, Option<i64>), StoreError>> {
+        Box::pin(async move { self.expire(&problem).await })
+    }
+    fn sweep(&self, live: Live) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>> {
+        Box::pin(self.sweep_jobs(live))
+    }
+    fn forget_expired(&self) -> BoxFuture<'_, Result<u64, StoreError>> {
+        Box::pin(self.forget())
+    }
+    fn note_timing(&self, timing: Timing) -> BoxFuture<'_, Result<(), StoreError>> {
+        Box::pin(async move { Ok(note_timing(&self.pool, &timing).await?) })
+    }
+    fn timings(&self, limit: u32) -> BoxFuture<'_, Result<Vec<Timing>, StoreError>> {
+        Box::pin(async move { Ok(timings(&self.pool, limit).await?) })
+    }
+    fn work(&self, places: usize, run: RunTask, stop: watch::Receiver<bool>) -> BoxFuture<'static, ()> {
+        Box::pin(Tasks::work(self.tasks.clone(), places, run, stop))
+    }
+    fn is_shared(&self) -> bool {
+        true
+    }
+    fn now_ms(&self) -> i64 {
+        self.clock.now_ms()
+    }
+    fn tell(&self, hear: Hear) {
+        self.newsroom.to(hear);
+    }
+    fn call_for_help(&self, key: Key, most: u32) -> BoxFuture<'_, Result<(), StoreError>> {
+        Box::pin(self.help(key, most))
+    }
+    fn shared(&self, id: JobId) -> BoxFuture<'_, Result<Option<Shared>, StoreError>> {
+        Box::pin(async move {
+            let row: Option<(Vec<u8>, String, Vec<u8>)> = sqlx::query_as(
+                "SELECT key, calculator, input FROM precut.jobs WHERE id = $1 AND state = 'running'
+                     AND EXISTS (SELECT FROM precut.shared_studies WHERE study = key)",
+            )
+            .bind(id.to_string())
+            .fetch_optional(&self.pool)
+            .await?;
+            let Some((key, calculator, input)) = row else { return Ok(None) };
+            let Some(key) = Key::from_bytes(&key) else { return Ok(None) };
+            let input = zstd::decode_all(input.as_slice()).map_err(|error| StoreError::Failed(error.to_string()))?;
+            Ok(Some(Shared { key, calculator, input: input.into() }))
+        })
+    }
+}

@@ -1,0 +1,135 @@
+//! How a job gets into line.
+
+use sqlx::postgres::PgConnection;
+
+use super::lock;
+use super::queue::{self, Task, task_name};
+use super::record::{Outcome, RecordRow, column, columns, record};
+use super::results::insert;
+use crate::store::jobs::{Accepted, JobState, NewJob};
+use crate::store::sqlite_jobs::pack::Packed;
+use crate::store::sqlite_jobs::record::{parsed, rank};
+
+/// What a new job's place depends on.
+#[derive(sqlx::FromRow)]
+struct Facts {
+    lease: Option<String>,
+    attempt: Option<i32>,
+    started_ms: Option<i64>,
+    /// Last place of the owner, first place of all.
+    own: Option<i64>,
+    first: Option<i64>,
+    queued: i64,
+}
+
+/// See the SQLite store for the order of turns.
+async fn facts(connection: &mut PgConnection, job: &NewJob, queue_limit: u64) -> Outcome<Facts> {
+    sqlx::query_as(
+        "SELECT running.lease, running.attempt, running.started_ms,
+             (SELECT max(turn) FROM precut.jobs WHERE state = 'queued' AND owner = $2 AND priority = $3) AS own,
+             (SELECT min(turn) FROM precut.jobs WHERE state = 'queued' AND priority = $3) AS first,
+             (SELECT count(*) FROM (SELECT FROM precut.jobs WHERE state = 'queued' LIMIT $4) AS waiting) AS queued
+         FROM (VALUES (1)) AS one
+         LEFT JOIN LATERAL (SELECT lease, attempt, started_ms FROM precut.jobs WHERE key = $1 AND state = 'running' LIMIT 1)
+             AS running ON true",
+    )
+    .bind(job.key.as_bytes().as_slice())
+    .bind(&job.owner)
+    .bind(i32::try_from(rank(job.priority)).unwrap_or(0))
+    .bind(i64::try_from(queue_limit).unwrap_or(i64::MAX))
+    .fetch_one(connection)
+    .await
+}
+
+/// The job that the client asked for before by the same name.
+async fn known(connection: &mut PgConnection, job: &NewJob) -> Outcome<Option<Accepted>> {
+    let Some(idempotency) = &job.idempotency else { return Ok(None) };
+    let known: Option<(String, Vec<u8>)> =
+        sqlx::query_as("SELECT id, body_hash FROM precut.jobs WHERE owner = $1 AND idempotency = $2")
+            .bind(&job.owner)
+            .bind(&idempotency.key)
+            .fetch_optional(&mut *connection)
+            .await?;
+    let Some((id, body_hash)) = known else { return Ok(None) };
+    let id = parsed(&id)?;
+    if body_hash != idempotency.body_hash {
+        return Ok(Some(Accepted::OtherBody(id)));
+    }
+    Ok(Some(record(connection, id).await?.map_or(Accepted::OtherBody(id), Accepted::Known)))
+}
+
+pub(super) async fn submit(
+    connection: &mut PgConnection,
+    packed: &Packed,
+    (queue_limit, keep_ms, engine): (u64, i64, &str),
+) -> Outcome<Accepted> {
+    let Packed { job, input, result } = packed;
+    let now = lock(connection, &job.key).await?;
+    if let Some(known) = known(connection, job).await? {
+        return Ok(known);
+    }
+    let facts = facts(connection, job, queue_limit).await?;
+    // An equal job that is being computed takes this one along.
+    let (state, lease, attempt, started_ms) = match (result, facts.lease) {
+        (Some(_), _) => (JobState::Succeeded, None, 0, None),
+        (None, Some(lease)) => (JobState::Running, Some(lease), facts.attempt.unwrap_or(0), facts.started_ms),
+        (None, None) => (JobState::Queued, None, 0, None),
+    };
+    if state == JobState::Queued {
+        let queued = u64::try_from(facts.queued).unwrap_or(0);
+        if queued >= queue_limit {
+            return Ok(Accepted::QueueFull { queued });
+        }
+    }
+    if let Some(result) = result {
+        insert(connection, std::slice::from_ref(result), now).await?;
+    }
+    let finished = (state == JobState::Succeeded).then_some(now);
+    let priority = i32::try_from(rank(job.priority)).unwrap_or(0);
+    let turn = facts.own.map_or(0, |turn| turn + 1).max(facts.first.unwrap_or(0));
+    let id = job.id.to_string();
+    let row: Option<RecordRow> = sqlx::query_as(concat!(
+        "INSERT INTO precut.jobs (id, kind, calculator, version, engine, key, input, state, progress, attempt, lease,
+             heartbeat_ms, priority, turn, pushed, owner, idempotency, body_hash, estimate_ms, created_ms, started_ms,
+             finished_ms, deadline_ms, expires_ms)
+         VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14, $15, $16, $17, $18, $19, $20, $21, $22,
+             $23, $24)
+         ON CONFLICT (owner, idempotency) DO NOTHING RETURNING ",
+        columns!()
+    ))
+    .bind(&id)
+    .bind(job.kind.word())
+    .bind(&job.calculator)
+    .bind(column(job.version))
+    .bind(engine)
+    .bind(job.key.as_bytes().as_slice())
+    .bind(input)
+    .bind(state.word())
+    .bind(if finished.is_some() { 1.0 } else { 0.0 })
+    .bind(attempt)
+    .bind(&lease)
+    .bind(lease.as_ref().map(|_| now))
+    .bind(priority)
+    .bind(turn)
+    .bind(i32::from(state == JobState::Queued))
+    .bind(&job.owner)
+    .bind(job.idempotency.as_ref().map(|idempotency| &idempotency.key))
+    .bind(job.idempotency.as_ref().map(|idempotency| idempotency.body_hash.to_vec()))
+    .bind(job.estimate_ms)
+    .bind(now)
+    .bind(started_ms.or(finished))
+    .bind(finished)
+    .bind(job.deadline_ms)
+    .bind(finished.map(|at| at.saturating_add(keep_ms)))
+    .fetch_optional(&mut *connection)
+    .await?;
+    let Some(row) = row else {
+        // Somebody else was faster: his is the job.
+        return known(connection, job).await?.ok_or(sqlx::Error::RowNotFound);
+    };
+    if state == JobState::Queued {
+        let task = Task { job: &id, name: task_name(&id, 1), priority, turn: Some(turn) };
+        queue::add(connection, engine, &[task]).await?;
+    }
+    Ok(Accepted::New(row.record()?))
+}

@@ -1,0 +1,159 @@
+//! Results, jobs and the queue in a PostgreSQL database that any number of processes share.
+//!
+//! What one connection that writes does for the SQLite file, locks do here: whoever changes who computes a key holds the
+//! lock of that key ([`lock`]) until the transaction ends. All times are the database's ([`clock::Clock`]), so that the clocks
+//! of the processes need not agree. What a process does is told to the others by notifications ([`news`]); one that is
+//! lost costs at most a second, as everything is looked at again.
+
+mod care;
+mod clock;
+mod jobs;
+mod line;
+mod models;
+mod news;
+mod queue;
+mod record;
+mod results;
+mod run;
+mod start;
+mod studies;
+mod writer;
+
+use std::time::Duration;
+
+use futures_util::future::BoxFuture;
+use sqlx::postgres::{PgConnection, PgPool};
+
+use super::address::Secret;
+use super::jobs::Lease;
+use super::sqlite::Keep;
+use super::{OpenError, StoreError};
+use crate::key::Key;
+use clock::Clock;
+use news::Newsroom;
+use queue::Tasks;
+use studies::Held;
+use writer::Writer;
+
+/// How long to wait for what.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Patience {
+    /// For a database that does not answer at the start.
+    pub(crate) start: Duration,
+    /// A computation that says nothing for so long has lost its lease.
+    pub(crate) lease: Duration,
+    /// So long after a start of the database nobody is taken for dead: nobody could say that he lives before.
+    pub(crate) grace: Duration,
+    /// Between two looks for jobs without a task.
+    pub(crate) lost: Duration,
+}
+
+impl Default for Patience {
+    fn default() -> Self {
+        Self {
+            start: Duration::from_secs(10),
+            lease: Duration::from_secs(4),
+            grace: Duration::from_secs(8),
+            lost: Duration::from_secs(5),
+        }
+    }
+}
+
+/// How a process uses the database.
+#[derive(Debug, Clone)]
+pub(crate) struct Use {
+    /// How much is kept, and how long.
+    pub(crate) keep: Keep,
+    /// Connections at most, the one that listens for news not counted.
+    pub(crate) connections: u32,
+    /// How long to wait for what.
+    pub(crate) patience: Patience,
+    /// Version of the program: whose jobs it runs.
+    pub(crate) engine: String,
+}
+
+/// Results, jobs and the queue in a PostgreSQL database.
+pub(crate) struct PostgresStore {
+    pool: PgPool,
+    writer: Writer,
+    tasks: Tasks,
+    newsroom: Newsroom,
+    clock: Clock,
+    held: Held,
+    keep_ms: i64,
+    engine: String,
+    patience: Patience,
+    lost: std::sync::Mutex<Option<tokio::time::Instant>>,
+}
+
+impl PostgresStore {
+    /// Connects, brings the tables up to date and looks after what this process takes on.
+    pub(crate) async fn open(address: &Secret, usage: Use) -> Result<Self, OpenError> {
+        let pool = start::connected(address, &usage).await?;
+        let clock = Clock::new();
+        clock.read(&pool).await.map_err(|error| start::refused(&error))?;
+        let keep_ms = i64::try_from(usage.keep.jobs.as_millis()).unwrap_or(i64::MAX / 4);
+        let tasks = Tasks::new(pool.clone(), &usage.engine);
+        Ok(Self {
+            writer: Writer::start(pool.clone(), usage.keep),
+            newsroom: Newsroom::open(pool.clone(), tasks.bell()),
+            held: Held::start(pool.clone()),
+            tasks,
+            clock,
+            keep_ms,
+            engine: usage.engine,
+            patience: usage.patience,
+            lost: std::sync::Mutex::default(),
+            pool,
+        })
+    }
+
+    /// Does `work` in a transaction.
+    async fn write<T: Send>(
+        &self,
+        work: impl for<'c> FnOnce(&'c mut PgConnection) -> BoxFuture<'c, Result<T, sqlx::Error>> + Send,
+    ) -> Result<T, StoreError> {
+        let mut transaction = self.pool.begin().await?;
+        let value = work(&mut transaction).await?;
+        transaction.commit().await?;
+        Ok(value)
+    }
+}
+
+/// The lock of a key, as the function `precut.lock_of` makes it.
+fn lock_of(key: &Key) -> i64 {
+    key.as_bytes().first_chunk().map_or(0, |bytes| i64::from_be_bytes(*bytes))
+}
+
+/// Takes the lock of a key until the transaction ends. What is read afterwards is as whoever had it before left it.
+async fn lock(connection: &mut PgConnection, key: &Key) -> Result<i64, sqlx::Error> {
+    let (now,): (i64,) = sqlx::query_as("SELECT precut.now_ms() FROM pg_advisory_xact_lock($1)")
+        .bind(lock_of(key))
+        .fetch_one(connection)
+        .await?;
+    Ok(now)
+}
+
+/// The same for the key of a job; `None` where there is no such job.
+async fn lock_job(connection: &mut PgConnection, job: &str) -> Result<Option<(Key, i64)>, sqlx::Error> {
+    let key: Option<Vec<u8>> = sqlx::query_scalar("SELECT key FROM precut.jobs WHERE id = $1")
+        .bind(job)
+        .fetch_optional(&mut *connection)
+        .await?;
+    locked(connection, key).await
+}
+
+/// The same for the key that is computed under a lease; `None` where nothing is.
+async fn lock_lease(connection: &mut PgConnection, lease: Lease) -> Result<Option<(Key, i64)>, sqlx::Error> {
+    let key: Option<Vec<u8>> = sqlx::query_scalar("SELECT key FROM precut.jobs WHERE lease = $1 LIMIT 1")
+        .bind(lease.to_string())
+        .fetch_optional(&mut *connection)
+        .await?;
+    locked(connection, key).await
+}
+
+async fn locked(connection: &mut PgConnection, key: Option<Vec<u8>>) -> Result<Option<(Key, i64)>, sqlx::Error> {
+    let Some(key) = key.as_deref().and_then(Key::from_bytes) else { return Ok(None) };
+    let now = lock(connection, &key).await?;
+    Ok(Some((key, now)))
+}
