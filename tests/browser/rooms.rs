@@ -112,7 +112,7 @@ fn a_run_is_pinned_compared_and_read() {
     page.click(".bar input[type=checkbox]");
 
     // The mouse reads all curves at one place; so do the keys.
-    let middle = page.middle(".stack svg");
+    let middle = page.middle(".stack svg.chart");
     page.point(middle);
     page.until("[...document.querySelectorAll('.series output')].length >= 4");
     page.evaluate("document.querySelector('.plot').focus()");
@@ -139,7 +139,7 @@ fn a_click_in_the_lobes_tries_that_point() {
     page.until(SETTLED);
     let speed = page.value("#field-cut-spindle_speed_rpm");
     let depth = page.value("#field-cut-depth_mm");
-    page.click(".stack svg");
+    page.click(".stack svg.chart");
     page.until(&format!(
         "document.querySelector('#field-cut-spindle_speed_rpm').value !== {} && {SETTLED}",
         json!(speed)

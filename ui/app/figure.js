@@ -338,7 +338,7 @@ function Stacked({ figure, pinned, width, style, hidden, toggle, at, setAt, show
         const frame = { left, top: 6, width: right - left, height: tall };
         const clip = `clip-${figure.id}-${index}`;
         const stance = item => {
-          const outline = panel.items.find(other => other.kind === 'outline');
+          const outline = panel.items.find(other => other.kind === 'outline' && other.role === 'part');
           const radius = outline ? Math.max(...outline.y.filter((_, place) => Math.abs(outline.x[place] - item.x) <= (shown[1] - shown[0]) / 50 + 1e-9), 0) : 0;
           return { mirrored: item.glyph === 'chuck' ? item.x > (shown[0] + shown[1]) / 2 : item.y < 0, reach: Math.abs(y(0) - y(radius || domain[1] * 0.5)) };
         };
