@@ -32,8 +32,9 @@ fn rooms(page: &mut Page, service: &Service) -> Vec<String> {
 #[test]
 fn axe_finds_no_violation_on_any_page() {
     let Some((_turn, mut page, service)) = both() else { return };
+    let rooms = rooms(&mut page, &service);
     assert_accessible(&mut page, "start");
-    for (index, room) in rooms(&mut page, &service).iter().enumerate() {
+    for (index, room) in rooms.iter().enumerate() {
         // Either scheme for every second one.
         page.screen(1440, 900, index % 2 == 1);
         page.open(&service.page(room));

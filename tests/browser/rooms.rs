@@ -55,7 +55,12 @@ fn a_changed_number_changes_the_picture_and_the_address() {
     page.until("location.hash.includes('/cut/feed_mm_per_rev=0.26')");
     assert_eq!(page.value(FEED), "0.26");
 
-    // The address brings it all back, and so does the way back.
+    // So does the way back, change by change, and forward again.
+    for (step, value) in [("back", "0.25"), ("back", "0.5"), ("forward", "0.25"), ("forward", "0.26")] {
+        page.evaluate(&format!("history.{step}()"));
+        page.until(&format!("document.querySelector('{FEED}').value === '{value}' && {SETTLED}"));
+    }
+    // The address brings it all back.
     let address = page.evaluate("location.href");
     page.open(address.as_str().unwrap());
     page.until(SETTLED);
@@ -64,8 +69,6 @@ fn a_changed_number_changes_the_picture_and_the_address() {
     page.until(&format!("document.querySelector('{FEED}').value !== '0.26' && {SETTLED}"));
     page.evaluate("history.back()");
     page.until(&format!("document.querySelector('{FEED}').value === '0.26' && {SETTLED}"));
-    page.evaluate("history.back()");
-    page.until(&format!("document.querySelector('{FEED}').value !== '0.26' && {SETTLED}"));
     page.assert_calm();
 }
 
@@ -109,7 +112,7 @@ fn a_run_is_pinned_compared_and_read() {
     page.click(".bar input[type=checkbox]");
 
     // The mouse reads all curves at one place; so do the keys.
-    let middle = page.middle(".stack svg");
+    let middle = page.middle(".stack svg.chart");
     page.point(middle);
     page.until("[...document.querySelectorAll('.series output')].length >= 4");
     page.evaluate("document.querySelector('.plot').focus()");
@@ -136,7 +139,7 @@ fn a_click_in_the_lobes_tries_that_point() {
     page.until(SETTLED);
     let speed = page.value("#field-cut-spindle_speed_rpm");
     let depth = page.value("#field-cut-depth_mm");
-    page.click(".stack svg");
+    page.click(".stack svg.chart");
     page.until(&format!(
         "document.querySelector('#field-cut-spindle_speed_rpm').value !== {} && {SETTLED}",
         json!(speed)
