@@ -337,8 +337,8 @@ impl ResultStore for BrokenStore {
 async fn a_store_that_fails_fails_no_answer() {
     let folder = tempfile::tempdir().unwrap();
     let settings = EngineSettings { cores: 1, ..EngineSettings::in_folder(folder.path()) };
-    let keep = Keep { bytes: 1, age: settings.store_age, jobs: settings.job_age };
-    let jobs = Arc::new(SqliteStore::open(folder.path(), keep).await.unwrap());
+    let keep = crate::store::sqlite::Keep { bytes: 1, age: settings.store_age, jobs: settings.job_age };
+    let jobs = Arc::new(crate::store::sqlite::SqliteStore::open(folder.path(), keep).await.unwrap());
     let engine = Engine::with_stores(toy::registry(), settings, Arc::new(BrokenStore), jobs).await.unwrap();
     let solved = engine.solve(TOY, job(|_| {})).await.unwrap();
     assert_eq!(engine.solve(TOY, job(|_| {})).await.unwrap().cache, CacheState::Hit);

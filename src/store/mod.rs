@@ -9,6 +9,8 @@ mod row;
 pub mod sqlite;
 mod sqlite_jobs;
 mod sqlite_studies;
+#[cfg(test)]
+mod suite;
 mod writer;
 
 use std::fmt;
