@@ -6,6 +6,7 @@
 mod canonical;
 mod checker;
 mod entry;
+mod family;
 mod fault;
 mod finite;
 mod nearest;
@@ -17,11 +18,13 @@ mod tests;
 #[cfg(test)]
 pub(crate) mod toy;
 
+use entry::Member;
+
 pub use entry::{Entry, Prepared, ResultNotes, UnreadableResult};
 
 pub(crate) use canonical::canonical;
 pub(crate) use checker::{Faults, by_pointer, child};
-pub(crate) use entry::{Calculation, Job, Unprepared, second_line};
+pub(crate) use entry::{Calculation, Job, ModelUse, Unprepared, second_line};
 pub(crate) use fault::intern as interned;
 pub(crate) use finite::non_finite_place;
 pub(crate) use nearest::nearest;
@@ -33,7 +36,7 @@ pub(crate) use result_text::{Unwritable, append as append_result};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use precut_calc::calculator::{Calculator, Registrar};
+use precut_calc::calculator::{Calculator, Diagnosable, ForwardModel, Registrar};
 use serde_json::Value;
 use utoipa::openapi::{RefOr, Schema};
 
@@ -95,9 +98,10 @@ impl Registry {
 
     /// The calculators that `offer` names.
     pub fn with(offer: impl FnOnce(&mut Offered)) -> Result<Self, RegistryError> {
-        let mut offered = Offered { entries: Vec::new() };
+        let mut offered = Offered { entries: Vec::new(), diagnoses: Vec::new() };
         offer(&mut offered);
-        let entries = offered.entries.into_iter().collect::<Result<Vec<_>, _>>()?;
+        let mut entries = offered.entries.into_iter().collect::<Result<Vec<_>, _>>()?;
+        entries.extend(Entry::family(offered.diagnoses.into_iter().collect::<Result<Vec<_>, _>>()?)?);
         let mut by_id = BTreeMap::new();
         let mut components: BTreeMap<&str, &Value> = BTreeMap::new();
         for (index, entry) in entries.iter().enumerate() {
@@ -146,10 +150,18 @@ impl Registry {
 /// Takes calculators in.
 pub struct Offered {
     entries: Vec<Result<Entry, RegistryError>>,
+    diagnoses: Vec<Result<Member, RegistryError>>,
 }
 
 impl Registrar for Offered {
     fn calculator<C: Calculator>(&mut self) {
         self.entries.push(Entry::of::<C>());
+    }
+    fn with_forward_model<C: Calculator + ForwardModel<Job = C::Input>>(&mut self) {
+        self.entries.push(Entry::with_model::<C>());
+    }
+    fn diagnosable<C: Diagnosable>(&mut self) {
+        self.with_forward_model::<C>();
+        self.diagnoses.push(Entry::of_diagnosis::<C>().map(|entry| Member { calculator: C::META.id, entry }));
     }
 }

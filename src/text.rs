@@ -5,55 +5,28 @@
 //! one whole. A template sees the values of its message and fails on one that is not there, which a test finds; a
 //! reader then gets the code in plain words, never an error.
 
+#[cfg(test)]
+pub(crate) mod complete;
+mod described;
+mod glossary;
+mod kept;
+mod language;
 mod notice;
 mod number;
+mod template;
 
+pub(crate) use described::described;
+pub(crate) use glossary::Glossary;
+pub(crate) use kept::{reworded, reworded_rows};
+pub use language::Language;
 pub use notice::{Notice, Remark};
 pub(crate) use number::significant;
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
-use minijinja::{Environment, UndefinedBehavior};
+use minijinja::Environment;
 use precut_calc::calculator::{Finding, Message, Value, Values};
-
-/// A language that the service speaks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub enum Language {
-    /// English.
-    #[default]
-    En,
-}
-
-impl Language {
-    /// All of them, the default first.
-    pub const ALL: [Self; 1] = [Self::En];
-
-    /// As in `Content-Language`.
-    pub const fn tag(self) -> &'static str {
-        match self {
-            Self::En => "en",
-        }
-    }
-
-    /// The best for the text of an `Accept-Language` header; the default where none fits.
-    pub fn negotiate(accept_language: &str) -> Self {
-        let mut best = (0.0, Self::default());
-        for wish in accept_language.split(',') {
-            let mut parts = wish.split(';').map(str::trim);
-            let tag = parts.next().unwrap_or_default();
-            let weight = parts.find_map(|part| part.strip_prefix("q=")).map_or(1.0, |q| q.parse().unwrap_or(0.0));
-            let primary = tag.split('-').next().unwrap_or_default();
-            let wanted = Self::ALL.into_iter().find(|language| primary.eq_ignore_ascii_case(language.tag()));
-            if let Some(language) = wanted.or((tag == "*").then(Self::default))
-                && weight > best.0
-            {
-                best = (weight, language);
-            }
-        }
-        best.1
-    }
-}
 
 #[derive(rust_embed::RustEmbed)]
 #[folder = "locales"]
@@ -102,14 +75,41 @@ static SHARED: LazyLock<Texts> = LazyLock::new(|| {
     Texts::from_files(&files).expect("the texts in the binary are tested")
 });
 
-/// Path below `locales/` and content of every file.
+/// Folder of the glossary's files, below that of the language: words and names, which are no templates.
+const FIELDS: &str = "fields/";
+
+/// Path below `locales/` and content of every file of templates.
 fn embedded() -> Vec<(String, String)> {
-    let files = Locales::iter()
-        .filter(|path| path.ends_with(".toml"))
-        .filter_map(|path| Some((path.to_string(), String::from_utf8(Locales::get(&path)?.data.into_owned()).ok()?)));
+    let files = files().filter(|(path, _)| !path.contains(FIELDS));
     #[cfg(test)]
-    let files = files.chain([("en/toy-bar.toml".to_owned(), include_str!("registry/toy.en.toml").to_owned())]);
+    let files = files.chain([
+        ("en/toy-bar.toml".to_owned(), include_str!("registry/toy.en.toml").to_owned()),
+        ("ru/toy-bar.toml".to_owned(), include_str!("registry/toy.ru.toml").to_owned()),
+    ]);
     files.collect()
+}
+
+/// Path below `locales/` and content of every file.
+fn files() -> impl Iterator<Item = (String, String)> {
+    Locales::iter()
+        .filter(|path| path.ends_with(".toml"))
+        .filter_map(|path| Some((path.to_string(), String::from_utf8(Locales::get(&path)?.data.into_owned()).ok()?)))
+}
+
+/// Changes with any text of a language: for the tags of what is worded when it is asked for.
+pub(crate) fn fingerprint(language: Language) -> &'static str {
+    static PRINTS: LazyLock<[String; Language::ALL.len()]> = LazyLock::new(|| {
+        Language::ALL.map(|language| {
+            let mut own: Vec<_> = files().filter(|(path, _)| language.owns(path)).collect();
+            own.sort();
+            let mut hasher = blake3::Hasher::new();
+            for (path, content) in &own {
+                hasher.update(path.as_bytes()).update(&[0]).update(content.as_bytes()).update(&[0]);
+            }
+            hasher.finalize().to_hex()[..8].to_owned()
+        })
+    });
+    &PRINTS[language.index()]
 }
 
 impl Texts {
@@ -137,7 +137,7 @@ impl Texts {
                 }
             }
         }
-        let mut environment = environment();
+        let mut environment = template::environment();
         for (name, source) in sources {
             environment
                 .add_template_owned(name.clone(), source)
@@ -303,26 +303,6 @@ fn template_value(value: &Value) -> minijinja::Value {
     }
 }
 
-fn environment() -> Environment<'static> {
-    let mut environment = Environment::new();
-    environment.set_undefined_behavior(UndefinedBehavior::Strict);
-    environment.set_auto_escape_callback(|_| minijinja::AutoEscape::None);
-    environment.set_formatter(|out, state, value| match value.is_number().then(|| f64::try_from(value.clone())) {
-        Some(Ok(number)) => Ok(out.write_str(&number::significant(number, 6))?),
-        _ => minijinja::escape_formatter(out, state, value),
-    });
-    environment.add_filter("sig", number::significant);
-    environment.add_filter("fixed", number::fixed);
-    environment.add_filter("percent", |share: f64| format!("{} %", number::significant(100.0 * share, 3)));
-    environment.add_filter("um", |value: f64| format!("{} µm", number::significant(value, 3)));
-    environment.add_filter("mm", |value: f64| format!("{} mm", number::significant(value, 6)));
-    environment.add_filter("unit", |unit: &str| number::printed_unit(unit));
-    environment.add_filter("list", |items: Vec<minijinja::Value>| {
-        items.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
-    });
-    environment
-}
-
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
@@ -368,6 +348,32 @@ mod tests {
     }
 
     #[test]
+    fn russian_numbers_have_a_comma_cyrillic_units_and_words_in_their_plural() {
+        let content = "[explanation]\nwork = \"{{ share | percent }}, {{ depth_um | um }}, {{ z_mm | mm }}, {{ unit | unit }}, \
+                       {{ count }} {{ count | plural('точка', 'точки', 'точек') }}, {{ names | list }}, {{ many | list }}, \
+                       {{ small | sig(2) }}\"";
+        let texts = Texts::from_files(&[("ru/room.toml".to_owned(), content.to_owned())]).unwrap();
+        let said = |count: f64| {
+            let message = Message::new("work")
+                .with("share", 0.8349)
+                .with("depth_um", 1.0436)
+                .with("z_mm", 250.5)
+                .with("unit", "um/N")
+                .with("count", count)
+                .with("names", vec!["a", "b"])
+                .with("many", vec![1.5, 2.0])
+                .with("small", 1.2e-7);
+            texts.message(Language::Ru, "explanation", &message)
+        };
+        assert_eq!(said(1.0), "83,5 %, 1,04 мкм, 250,5 мм, мкм/Н, 1 точка, a, b, 1,5; 2, 1,2e-7");
+        for (count, noun) in
+            [(2.0, "2 точки"), (5.0, "5 точек"), (11.0, "11 точек"), (21.0, "21 точка"), (1.5, "1,5 точки")]
+        {
+            assert!(said(count).contains(noun), "{count}");
+        }
+    }
+
+    #[test]
     fn a_value_that_is_not_there_is_an_error_and_reads_as_plain_words() {
         let texts = Texts::from_files(&file("[fault]\nbad_length = \"{{ value }} and {{ nothing }}\"")).unwrap();
         let finding = Finding::new("bad_length", "/a").value(1.0, "mm");
@@ -383,13 +389,6 @@ mod tests {
         let broken = file("[fault]\na = \"{{ x\"");
         assert!(matches!(Texts::from_files(&broken), Err(TextError::BadTemplate { .. })));
         assert!(matches!(Texts::from_files(&file("[fault]\na = 3")), Err(TextError::BadFile { .. })));
-    }
-
-    #[test]
-    fn the_language_is_negotiated() {
-        for header in ["", "en", "en-GB, fr;q=0.5", "xx", "*", "fr;q=0.9, en;q=0.1", "garbage;;q=,"] {
-            assert_eq!(Language::negotiate(header), Language::En, "{header}");
-        }
     }
 
     #[test]

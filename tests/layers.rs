@@ -101,3 +101,25 @@ fn no_part_of_the_service_names_a_calculator() {
     assert!(compute.contains("deflection_compensation::DeflectionCompensation"));
     forbid("src", &["deflection_compensation", "DeflectionCompensation"], &[]);
 }
+
+#[test]
+fn every_metric_is_explained() {
+    let macros = ["counter!", "gauge!", "histogram!"];
+    let text: String = sources("src").iter().map(|path| code(path)).collect();
+    // The name behind each macro of that beginning, which may stand on the next line.
+    let names = |begin: &str| -> Vec<String> {
+        macros
+            .iter()
+            .flat_map(|kind| text.split(&format!("{begin}{kind}(")).skip(1).collect::<Vec<_>>())
+            .filter_map(|rest| rest.trim_start().strip_prefix('"')?.split('"').next().map(str::to_owned))
+            .collect()
+    };
+    let (used, explained) = (names("metrics::"), names("metrics::describe_"));
+    assert!(used.len() > 15, "{used:?}");
+    for name in &used {
+        assert!(explained.contains(name), "{name} has no description");
+    }
+    for name in &explained {
+        assert!(used.contains(name), "{name} is described and never counted");
+    }
+}

@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, Matrix4};
 use precut_calc::calculator::{Calculator, Unwatched};
+use precut_calc::fixture_stability::identification::{FixtureIdentification, IdentificationJob};
 use precut_calc::fixture_stability::{
     FixtureJob, FixtureStability, forced_motion, lobe_boundary, lobe_map, multiplier_modulus, run_in_time,
 };
@@ -92,6 +93,33 @@ pub(crate) fn step(chip_exponent: f64) -> Result<Measured, String> {
 pub(crate) fn answer() -> Result<Measured, String> {
     let job = vise(false, 0.1, 3.0)?;
     cpu_time(|| FixtureStability::run(&job, &Unwatched))
+}
+
+/// The source paper's table of the screw vise: every row predicted under both laws of regeneration.
+fn paper() -> Result<Value, String> {
+    let example = FixtureIdentification::META.examples.first().ok_or("no example")?;
+    serde_json::from_str(example.job).map_err(|error| error.to_string())
+}
+
+pub(crate) fn table() -> Result<Measured, String> {
+    let job: IdentificationJob = serde_json::from_value(paper()?).map_err(|error| error.to_string())?;
+    cpu_time(|| FixtureIdentification::run(&job, &Unwatched))
+}
+
+/// A short search over that table, divided by the sets that it tried. Both laws.
+pub(crate) fn search() -> Result<Measured, String> {
+    let mut job = paper()?;
+    job["peak_force"] = json!({ "force_n": 500, "depth_mm": 3, "teeth": 8, "feed_mm_per_tooth": 0.039 });
+    job["unknowns"] = json!({
+        "stiffness_n_per_mm": [20_000, 90_000], "natural_frequency_hz": [250, 1000], "damping_ratio": [0.02, 0.2],
+        "chip_thickness_exponent": [0.0, 0.5], "spindle_speed_rpm": [100, 800]
+    });
+    job["search"] = json!({ "members": 8, "generations": 3 });
+    let job: IdentificationJob = serde_json::from_value(job).map_err(|error| error.to_string())?;
+    let answer = FixtureIdentification::run(&job, &Unwatched).map_err(|error| error.to_string())?;
+    let sets = answer.output.evaluations as f64;
+    let all = cpu_time(|| FixtureIdentification::run(&job, &Unwatched))?;
+    Ok(Measured { median: all.median / sets, low: all.low / sets, high: all.high / sets })
 }
 
 /// The textbook on the map of [`map`]: first-order semi-discretisation, 40 intervals, a matrix exponential for every

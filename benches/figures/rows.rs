@@ -7,6 +7,7 @@ use precut_calc::calculator::{
 
 use crate::Row;
 use crate::deflection;
+use crate::feed;
 use crate::fitting;
 use crate::fixture;
 use crate::http::{self, Bare, Clock, Exchange};
@@ -95,6 +96,37 @@ pub(crate) fn all() -> Vec<Row> {
         row("a step of the cut in time, linear force law", Unit::Time, us(0.01), us(0.0067), || fixture::step(0.0)),
         row("a step of the cut in time, power law", Unit::Time, us(0.04), us(0.0167), || fixture::step(0.1)),
         row("complete fixture answer: verdict", Unit::Time, None, None, fixture::answer),
+        row("thirty zones, usage and feed steps: solver alone", Unit::Time, us(300.0), us(80.0), || feed::solver(30)),
+        row("a hundred zones, the same", Unit::Time, us(1000.0), us(300.0), || feed::solver(100)),
+        row("thirty zones through the general conic solver, 1e-8", Unit::Time, us(5000.0), None, || feed::conic(30)),
+        row("a hundred zones, the same", Unit::Time, us(20_000.0), None, || feed::conic(100)),
+        row("compliances of thirty zones", Unit::Time, us(100.0), us(20.0), feed::compliances),
+        row(
+            "conflict of thirty zones: least relaxation and smallest set",
+            Unit::Time,
+            us(20_000.0),
+            us(5000.0),
+            feed::conflict,
+        ),
+        row(
+            "continuous schedule on 600 points, cut into up to 24 zones",
+            Unit::Time,
+            us(15_000.0),
+            us(3000.0),
+            feed::continuous,
+        ),
+        row("1000 single zones", Unit::Time, us(10_000.0), us(2000.0), feed::single_zones),
+        row("complete feed schedule: six zones with comparison", Unit::Time, None, None, feed::answer),
+        row("the source paper's table of 28 rows under both laws, each with two steps", Unit::Time, None, None, || {
+            fixture::table()
+        }),
+        row(
+            "identification: one set of a search over it (25 rows, 5 unknowns)",
+            Unit::Time,
+            None,
+            None,
+            fixture::search,
+        ),
         row("CSV, 10,000 rows of 8 numbers", Unit::Time, None, None, csv),
         row("G-code, 10,000 cuts", Unit::Time, None, None, gcode),
         row("SVG, 3 panels of 201 stations", Unit::Time, None, None, || svg(201)),

@@ -109,3 +109,15 @@ CREATE TABLE precut.studies (
 ALTER TABLE precut.studies ALTER COLUMN points SET STORAGE EXTERNAL;
 CREATE INDEX studies_by_time ON precut.studies (created_ms);
 CREATE INDEX studies_held ON precut.studies (study, beat_ms) WHERE points IS NULL;
+
+-- Models that a diagnosis made, by name: each change is a revision of its own, which never changes. A deleted model
+-- leaves its last number, so that no later one of its name takes a number that results already cite.
+CREATE TABLE precut.models (
+    name       text    NOT NULL,
+    revision   integer NOT NULL CHECK (revision >= 1),
+    calculator text    NOT NULL,
+    content    text,
+    sha256     text    NOT NULL CHECK (length(sha256) = 64),
+    created_ms bigint  NOT NULL,
+    PRIMARY KEY (name, revision)
+);

@@ -13,6 +13,7 @@ use super::{Failed, JobArgs, SolveArgs, print, print_json};
 use crate::engine::{Body, Error, STUDIES, SyntaxFault, check_now, solve_now};
 use crate::http::{Media, written};
 use crate::registry::{Entry, Registry};
+use crate::text::Language;
 
 /// Form of an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -39,7 +40,7 @@ impl From<Form> for Media {
 }
 
 /// `precut solve`
-pub(super) fn solve(arguments: &SolveArgs, registry: &Registry) -> Result<(), Failed> {
+pub(super) fn solve(arguments: &SolveArgs, registry: &Registry, language: Language) -> Result<(), Failed> {
     let (calculator, body) = read(&arguments.job)?;
     let part = match arguments.format {
         Form::Csv => arguments.table.as_deref(),
@@ -47,7 +48,7 @@ pub(super) fn solve(arguments: &SolveArgs, registry: &Registry) -> Result<(), Fa
         Form::Json | Form::Gcode => None,
     };
     let stored = solve_now(registry, &calculator, body, &Unwatched)?;
-    let bytes = written(&stored, arguments.format.into(), part)?;
+    let bytes = written(&stored, arguments.format.into(), part, language)?;
     match &arguments.output {
         Some(path) => std::fs::write(path, &bytes).map_err(|error| Failed::Machine(named(path, &error))),
         None if bytes.ends_with(b"\n") => print(&bytes),

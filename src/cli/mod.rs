@@ -17,7 +17,7 @@ use crate::config::Flags;
 use crate::engine::{Error, STUDIES, studies_of};
 use crate::http::{Problem, auth, openapi};
 use crate::registry::{Entry, Registry, RegistryError};
-use crate::text::Language;
+use crate::text::{self, Glossary, Language};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -28,6 +28,7 @@ Examples:
   precut example deflection-compensation | precut solve -
   precut solve job.json --format gcode -o shaft.nc
   precut check job.json                           every fault of a job at once
+  precut solve job.json --lang ru                 the same in Russian
   precut example studies | precut solve - --format csv
   PRECUT_LOG_FORMAT=json precut                   settings from the environment
 
@@ -49,6 +50,9 @@ Settings: `precut --print-config` prints them all. Unlike other commands, `serve
 struct Cli {
     #[command(flatten)]
     serve: ServeArgs,
+    /// Language of answers, faults and labels
+    #[arg(long, global = true, value_name = "LANGUAGE", env = "PRECUT_LANG", value_parser = spoken)]
+    lang: Option<Language>,
     #[command(subcommand)]
     command: Option<Command>,
 }
@@ -136,6 +140,12 @@ struct SolveArgs {
     output: Option<PathBuf>,
 }
 
+/// A language by its tag.
+fn spoken(tag: &str) -> Result<Language, String> {
+    let known = Language::ALL.map(Language::tag).join(", ");
+    Language::of_tag(tag).ok_or_else(|| format!("the languages are {known}"))
+}
+
 /// Why a command did not do what it was asked to.
 #[derive(Debug)]
 enum Failed {
@@ -172,6 +182,7 @@ pub fn main(
             return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
         }
     };
+    let language = cli.lang.unwrap_or_default();
     let outcome =
         registry().map_err(|error| Failed::Machine(error.to_string())).and_then(|registry| run(cli, &registry));
     match outcome {
@@ -181,7 +192,7 @@ pub fn main(
             ExitCode::FAILURE
         }
         Err(Failed::Problem(problem)) => {
-            let document = problem.document(Language::default(), None);
+            let document = problem.document(language, None);
             let text = serde_json::to_string_pretty(&document).unwrap_or_else(|_| document.detail.clone());
             let _ = writeln!(io::stderr(), "{text}");
             ExitCode::from(exit_code(&problem))
@@ -200,15 +211,17 @@ fn exit_code(problem: &Problem) -> u8 {
 }
 
 fn run(cli: Cli, registry: &Registry) -> Result<(), Failed> {
+    let language = cli.lang.unwrap_or_default();
     match cli.command {
         None => serve::run(&cli.serve, registry.clone()),
         Some(Command::Serve(serve)) => serve::run(&serve, registry.clone()),
-        Some(Command::Solve(solve)) => job::solve(&solve, registry),
+        Some(Command::Solve(solve)) => job::solve(&solve, registry, language),
         Some(Command::Check(job)) => job::check(&job, registry),
-        Some(Command::List) => list(registry),
+        Some(Command::List) => list(registry, language),
         Some(Command::Schema { calculator, result }) => {
             let entry = entry(registry, &calculator)?;
-            print_json(if result { entry.output_document() } else { entry.input_document() })
+            let document = if result { entry.output_document() } else { entry.input_document() };
+            print_json(&text::described(document, entry.meta().id, language))
         }
         Some(Command::Example { calculator, id, job }) => {
             job::example(&*entry(registry, &calculator)?, id.as_deref(), job)
@@ -219,11 +232,11 @@ fn run(cli: Cli, registry: &Registry) -> Result<(), Failed> {
     }
 }
 
-fn list(registry: &Registry) -> Result<(), Failed> {
+fn list(registry: &Registry, language: Language) -> Result<(), Failed> {
     let width = registry.entries().iter().map(|entry| entry.meta().id.len()).max().unwrap_or(0);
     let mut lines = String::new();
     for meta in registry.entries().iter().map(|entry| entry.meta()) {
-        let _ = writeln!(lines, "{:width$}  {}", meta.id, meta.question);
+        let _ = writeln!(lines, "{:width$}  {}", meta.id, Glossary::of(language).help(meta.question));
     }
     print(lines.as_bytes())
 }

@@ -8,9 +8,11 @@ use precut_calc::calculator::{Cost, Figure, Program, Table};
 use serde_json::Value;
 
 use super::error::Error;
+use super::model;
 use crate::key::{ENGINE_VERSION, Key};
 use crate::registry::{Entry, UnreadableResult};
 use crate::store::{KeptResult, StoreError};
+use crate::text::Language;
 
 /// A job as it came.
 #[derive(Debug, Clone)]
@@ -105,6 +107,13 @@ impl std::fmt::Debug for Stored {
 }
 
 impl Stored {
+    /// The envelope in that language.
+    pub fn body_in(&self, language: Language) -> Bytes {
+        if language == Language::default() {
+            return self.body.clone();
+        }
+        super::envelope::in_language(&self.body, language).into()
+    }
     /// Which calculator made it.
     pub fn entry(&self) -> &Arc<Entry> {
         &self.entry
@@ -123,15 +132,19 @@ impl Stored {
     }
     /// Its pictures; the first is the main one.
     pub fn figures(&self) -> Result<Vec<Figure>, Error> {
-        self.entry.figures(&self.input, &self.body).map_err(outdated)
+        self.entry.figures(&model::without_model(&self.entry, &self.input), &self.body).map_err(outdated)
     }
     /// Its tables; the first is the main one.
     pub fn tables(&self) -> Result<Vec<Table>, Error> {
-        self.entry.result_tables(&self.input, &self.body).map_err(outdated)
+        self.entry.result_tables(&model::without_model(&self.entry, &self.input), &self.body).map_err(outdated)
     }
     /// Its program for the machine: `None` if the calculator has none, `Err` if this answer has none.
     pub fn program(&self) -> Result<Option<Program>, Error> {
-        self.entry.program(&self.input, &self.body).map_err(outdated)?.transpose().map_err(Error::Calculation)
+        self.entry
+            .program(&model::without_model(&self.entry, &self.input), &self.body)
+            .map_err(outdated)?
+            .transpose()
+            .map_err(Error::Calculation)
     }
 }
 

@@ -6,7 +6,7 @@ use precut_calc::calculator::Finding;
 use serde_json::{Map, Value};
 
 use super::json;
-use crate::registry::{CellKind, Faults, TableColumn, TablePlace, nearest};
+use crate::registry::{CellKind, Faults, TableColumn, TablePlace, child, nearest};
 use crate::units;
 
 /// Longest name of a column that no field names.
@@ -47,15 +47,15 @@ pub(crate) fn read(text: &str, place: &TablePlace, pointer: &str, faults: &mut F
     }
     let table = Table { columns: &columns, decimal_comma: separator != b',', pointer };
     let mut read = CsvRows::default();
-    for record in &records {
-        if read.rows.len() == place.max_rows {
+    for (number, record) in records.iter().enumerate() {
+        if number == place.max_rows {
             // A table has far fewer rows than 2^53.
             #[allow(clippy::cast_precision_loss)]
             faults.add(Finding::new("too_many_rows", pointer).with("maximum", place.max_rows as f64));
             return None;
         }
         let line = line(text, record);
-        read.rows.push(table.row(record, line, faults));
+        read.rows.push(table.row(number, record, line, faults));
         read.lines.push(line);
     }
     (faults.total == before).then_some(read)
@@ -219,10 +219,11 @@ struct Table<'a> {
 }
 
 impl Table<'_> {
-    fn row(&self, record: &csv::StringRecord, line: u64, faults: &mut Faults) -> Value {
+    fn row(&self, number: usize, record: &csv::StringRecord, line: u64, faults: &mut Faults) -> Value {
         let used = used_cells(record);
+        let place = || format!("{}/{number}", self.pointer);
         if used > self.columns.len() {
-            let finding = Finding::new("ragged_row", self.pointer).with("line", whole(line));
+            let finding = Finding::new("ragged_row", place()).with("line", whole(line));
             faults.add(finding.with("cells", used).with("columns", self.columns.len()));
             return Value::Null;
         }
@@ -230,7 +231,8 @@ impl Table<'_> {
         for (index, column) in self.columns.iter().enumerate() {
             let cell = record.get(index).unwrap_or_default();
             let fault = |code| {
-                Finding::new(code, self.pointer)
+                let map = column.within.map_or_else(place, |map| child(&place(), map));
+                Finding::new(code, child(&map, &column.field.name))
                     .with("line", whole(line))
                     .with("column", column.field.name.clone())
                     .with("column_number", index + 1)
@@ -322,7 +324,7 @@ mod tests {
     use serde_json::json;
 
     fn place() -> TablePlace {
-        toy::registry().entry("toy-bar").unwrap().tables()[0].clone()
+        toy::registry().entry("toy-bar").unwrap().tables_of(&Value::Null)[0].clone()
     }
 
     fn rows(text: &str) -> Value {
@@ -412,7 +414,7 @@ mod tests {
         let mut faults = Faults::default();
         read("z_mm,deviation_um\n\n1,2\n3,four\n", &place(), "/measurements", &mut faults);
         let finding = &faults.listed[0];
-        assert_eq!(finding.pointer, "/measurements");
+        assert_eq!(finding.pointer, "/measurements/1/deviation_um");
         assert_eq!(finding.values.get("line"), Some(&4.0.into()));
         assert_eq!(finding.values.get("column"), Some(&"deviation_um".into()));
         assert_eq!(finding.values.get("received"), Some(&"four".into()));

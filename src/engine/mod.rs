@@ -13,6 +13,8 @@ mod flight;
 pub(crate) mod jobs;
 mod json;
 mod memory;
+mod model;
+mod models;
 mod progress;
 mod read;
 mod settings;
@@ -27,6 +29,8 @@ pub use crate::store::jobs::{JobId, JobKind, JobQuery, JobRecord, JobState, Prio
 pub use answer::{Body, CacheState, Checked, Solved, Stored, TablePart, Timings};
 pub use error::{Error, SyntaxFault};
 pub use jobs::{Answered, Ask, Feed, Job};
+pub use model::ModelContent;
+pub use models::{ModelAnswer, ModelError, ModelSource, StoredModel};
 pub use progress::Interim;
 pub use settings::EngineSettings;
 pub use study::STUDIES;
@@ -39,11 +43,13 @@ use precut_calc::calculator::{Cost, Failure, Monitor};
 
 use crate::registry::{Entry, Registry};
 use crate::store::jobs::JobStore;
+use crate::store::models::ModelStore;
 use crate::store::{ResultPage, ResultQuery, ResultStore, Store};
 use exec::{Cores, Slot, guarded};
 use flight::{Boarded, Flights, Landed, Pilot};
 use jobs::Jobs;
 use memory::{Kept, Memory, fingerprint};
+use model::Models;
 use read::Ready;
 
 /// Bodies up to this size are read where they arrive, larger ones on the pool: about 1 ms of reading.
@@ -65,6 +71,7 @@ pub(crate) struct Inner {
     flights: Arc<Flights>,
     cores: Cores,
     store: Arc<dyn ResultStore>,
+    models: Arc<dyn ModelStore>,
     jobs: Jobs,
     /// Parameter studies: asked like a calculator, made of the registry's.
     studies: Arc<Entry>,
@@ -83,13 +90,15 @@ impl Engine {
     /// Opens the store in the settings' folder and starts the threads.
     pub async fn open(registry: Registry, settings: EngineSettings) -> Result<Self, OpenError> {
         let store = crate::store::open(&settings.store_settings()).await?;
-        Self::with_stores(registry, settings, Arc::<dyn Store>::clone(&store), store).await
+        let (results, models) = (Arc::<dyn Store>::clone(&store), Arc::<dyn Store>::clone(&store));
+        Self::with_stores(registry, settings, results, models, store).await
     }
 
     async fn with_stores(
         registry: Registry,
         settings: EngineSettings,
         store: Arc<dyn ResultStore>,
+        models: Arc<dyn ModelStore>,
         jobs: Arc<dyn JobStore>,
     ) -> Result<Self, OpenError> {
         let cores = Cores::new(settings.cores, settings.job_slots, settings.patience)
@@ -100,7 +109,8 @@ impl Engine {
         let jobs = Jobs::new(jobs);
         let host = Arc::new(study::InEngine::default());
         let studies = Arc::new(study::entry(&registry, settings.study_points, Arc::<study::InEngine>::clone(&host)));
-        let inner = Arc::new(Inner { registry, settings, memory, flights, cores, store, jobs, studies, closed });
+        let inner =
+            Arc::new(Inner { registry, settings, memory, flights, cores, store, models, jobs, studies, closed });
         host.move_in(&inner);
         Jobs::start(&inner).await;
         Ok(Self { inner })
@@ -126,7 +136,8 @@ impl Engine {
     pub fn check(&self, calculator: &str, body: Body) -> Result<Checked, Error> {
         let inner = &self.inner;
         let entry = inner.known(calculator)?;
-        guarded(|| read::read(&entry, &body)?.into_checked())
+        let models = Models { registry: &inner.registry, found: None };
+        guarded(|| read::read(&entry, &body, &models)?.into_checked())
     }
 
     /// The answer to a job, from the cache or computed. Dropping the future cancels the calculation unless another
@@ -156,7 +167,9 @@ impl Engine {
             return Ok(Known::Kept(kept, begun.elapsed()));
         }
         let ready = inner.read(&entry, body.clone()).await?;
-        inner.memory.remember(fingerprint, ready.key);
+        if ready.lasts {
+            inner.memory.remember(fingerprint, ready.key);
+        }
         let parse = begun.elapsed();
         Ok(match inner.look_up(&ready.key).await {
             Some(kept) => Known::Kept(kept, parse),
@@ -166,7 +179,6 @@ impl Engine {
 
     /// Computes the answer to a job while somebody waits for it.
     async fn solve_directly(&self, ready: Ready, parse: Duration) -> Result<Solved, Error> {
-        metrics::counter!("precut_cache_total", "state" => "miss").increment(1);
         let Boarded { seat, pilot } = self.inner.flights.board(ready.key);
         if let Some(pilot) = pilot {
             self.depart(pilot, ready);
@@ -254,26 +266,29 @@ impl Inner {
 
     /// Reads a job where that does no harm.
     async fn read(&self, entry: &Arc<Entry>, body: Body) -> Result<Ready, Error> {
+        let found = self.find_model(entry, &body).await?;
         if body.len() <= READ_AT_ONCE && !entry.is_composed() {
-            return guarded(|| read::read(entry, &body));
+            let models = Models { registry: &self.registry, found };
+            return guarded(|| read::read(entry, &body, &models));
         }
         let slot = match self.cores.slot_now()? {
             Some(slot) => slot,
             None => self.cores.slot().await?,
         };
-        let entry = Arc::clone(entry);
-        self.cores.run(slot, move || read::read(&entry, &body)).await
+        let (entry, registry) = (Arc::clone(entry), self.registry.clone());
+        let work = move || read::read(&entry, &body, &Models { registry: &registry, found });
+        self.cores.run(slot, work).await
     }
 
     /// What is kept under a key, in memory or in the store. A store that fails is as good as an empty one here.
     async fn look_up(&self, key: &Key) -> Option<Kept> {
         if let Some(kept) = self.memory.get(key) {
-            metrics::counter!("precut_cache_total", "state" => "memory").increment(1);
+            metrics::counter!("precut_cache_hits_total", "tier" => "memory").increment(1);
             return Some(kept);
         }
         match self.fetch(key).await {
             Ok(stored) => stored.map(|stored| {
-                metrics::counter!("precut_cache_total", "state" => "store").increment(1);
+                metrics::counter!("precut_cache_hits_total", "tier" => "store").increment(1);
                 Kept::Answer(stored)
             }),
             Err(error) => {
@@ -410,12 +425,12 @@ fn compute(ready: &Ready, monitor: &dyn Monitor) -> Result<Stored, Error> {
 #[allow(clippy::needless_pass_by_value)] // a body is handed over, here as to an engine
 pub fn check_now(registry: &Registry, calculator: &str, body: Body) -> Result<Checked, Error> {
     let entry = entry(registry, calculator)?;
-    guarded(|| read::read(&entry, &body)?.into_checked())
+    guarded(|| read::read(&entry, &body, &Models { registry, found: None })?.into_checked())
 }
 
 /// The answer to a job in this thread, without cache, store or limit of cost: for the command line.
 #[allow(clippy::needless_pass_by_value)]
 pub fn solve_now(registry: &Registry, calculator: &str, body: Body, monitor: &dyn Monitor) -> Result<Stored, Error> {
     let entry = entry(registry, calculator)?;
-    guarded(|| compute(&read::read(&entry, &body)?, monitor))
+    guarded(|| compute(&read::read(&entry, &body, &Models { registry, found: None })?, monitor))
 }

@@ -7,6 +7,7 @@ use precut_calc::calculator::{Failure, Finding};
 use serde_json::Value;
 
 use super::error::Error;
+use super::model::{self, Held, Models};
 use super::{Body, Checked, TablePart, json, table};
 use crate::key::Key;
 use crate::registry::{Entry, Faults, Prepared, Unprepared, by_pointer};
@@ -18,39 +19,72 @@ pub(crate) struct Ready {
     pub(crate) key: Key,
     /// The filled job as RFC 8785 writes it.
     pub(crate) canonical: Bytes,
+    /// The stored model that extends it.
+    pub(crate) model: Option<Held>,
+    /// The job without what the model adds.
+    pub(crate) base: Option<Prepared>,
+    /// Whether the same bytes will always mean the same job: not where they name a model, which may be revised.
+    pub(crate) lasts: bool,
     /// Whether there are measured tables in it.
     has_rows: bool,
 }
 
 /// Reads a job. What the schema refuses is listed together with what the rules between fields refuse, as far as the
 /// job can be read in spite of its faults.
-pub(crate) fn read(entry: &Arc<Entry>, body: &Body) -> Result<Ready, Error> {
+pub(crate) fn read(entry: &Arc<Entry>, body: &Body, models: &Models<'_>) -> Result<Ready, Error> {
     let (job, parts) = match body {
         Body::Json(job) => (job, [].as_slice()),
         Body::Parts { job, tables } => (job, tables.as_slice()),
     };
-    read_value(entry, json::parse(job)?, parts)
+    let mut job = json::parse(job)?;
+    let names_a_model = model::named(models.registry, entry, &mut job).is_some();
+    let of_model = model::extend(models, entry, &mut job);
+    let ready = read_extended(entry, job, parts, of_model)?;
+    Ok(Ready { lasts: !names_a_model, ..ready })
 }
 
-/// The same from a JSON value that [`json::parse`] made.
-pub(crate) fn read_value(entry: &Arc<Entry>, mut job: Value, parts: &[TablePart]) -> Result<Ready, Error> {
-    check_schema(entry, &mut job, parts).map_err(|found| found.with_rules(entry, &job))?;
-    prepared(entry, &job)
+/// A job from a JSON value that [`json::parse`] made; a model in it is resolved.
+pub(crate) fn read_value(entry: &Arc<Entry>, job: Value, parts: &[TablePart]) -> Result<Ready, Error> {
+    read_extended(entry, job, parts, Vec::new())
+}
+
+fn read_extended(
+    entry: &Arc<Entry>,
+    mut job: Value,
+    parts: &[TablePart],
+    of_model: Vec<Finding>,
+) -> Result<Ready, Error> {
+    match check_schema(entry, &mut job, parts) {
+        Ok(()) if of_model.is_empty() => prepared(entry, &job),
+        Ok(()) => Err(Found { total: of_model.len(), findings: of_model }.with_rules(entry, &job)),
+        Err(found) => Err(found.and(of_model).with_rules(entry, &job)),
+    }
 }
 
 /// A job whose syntax, tables and schema are in order, or were when it was accepted.
 pub(crate) fn prepared(entry: &Arc<Entry>, job: &Value) -> Result<Ready, Error> {
-    let has_rows = table::has_rows(job, entry.tables());
-    let mut prepared = entry.prepare(job).map_err(|unprepared| match unprepared {
+    let (job, model) = model::split(entry, job);
+    let has_rows = table::has_rows(&job, entry.tables_of(&job));
+    let mut prepared = entry.prepare(&job).map_err(|unprepared| match unprepared {
         Unprepared::Invalid(findings) => {
             let total = findings.len();
+            let findings =
+                findings.into_iter().map(|one| model::pointed_at_model(entry, &job, model.as_ref(), one)).collect();
             invalid(findings, total)
         }
         Unprepared::Failed(failure) => Error::Calculation(failure),
     })?;
-    let canonical = Bytes::from(std::mem::take(&mut prepared.canonical));
+    let canonical = std::mem::take(&mut prepared.canonical);
+    let canonical = Bytes::from(match &model {
+        None => canonical,
+        Some(held) => model::canonical_with(&canonical, held).map_err(Error::internal)?,
+    });
+    let base = model.as_ref().and_then(|held| model::base(entry, &job, held));
+    if let Some(base) = &base {
+        prepared.cost.ms += base.cost.ms;
+    }
     let key = Key::of(entry.meta(), prepared.numbers_of.as_ref(), &canonical);
-    Ok(Ready { entry: Arc::clone(entry), prepared, key, canonical, has_rows })
+    Ok(Ready { entry: Arc::clone(entry), prepared, key, canonical, model, base, lasts: true, has_rows })
 }
 
 /// What the schema and the tables found.
@@ -60,6 +94,17 @@ struct Found {
 }
 
 impl Found {
+    /// With more; the first fault at a place is enough.
+    fn and(mut self, more: Vec<Finding>) -> Self {
+        for finding in more {
+            if !self.findings.iter().any(|there| there.pointer == finding.pointer) {
+                self.findings.push(finding);
+                self.total += 1;
+            }
+        }
+        self
+    }
+
     /// With the faults that the rules between fields find in a job that is readable although it breaks its schema.
     ///
     /// A rule's fault replaces the schema's at the same place: it knows more. Arrays beyond their most are not looked
@@ -67,7 +112,9 @@ impl Found {
     fn with_rules(mut self, entry: &Entry, job: &Value) -> Error {
         let overlong = self.findings.iter().any(|finding| general_code(finding) == "too_many_items");
         if !overlong && self.total <= Error::MOST_FAULTS {
-            for rule in entry.broken_rules(job) {
+            let (job, model) = model::split(entry, job);
+            for rule in entry.broken_rules(&job) {
+                let rule = model::pointed_at_model(entry, &job, model.as_ref(), rule);
                 match self.findings.iter_mut().find(|finding| finding.pointer == rule.pointer) {
                     Some(finding) if finding.code == general_code(finding) => *finding = rule,
                     Some(_) => {}
@@ -92,9 +139,12 @@ fn general_code(finding: &Finding) -> &str {
 
 fn check_schema(entry: &Entry, job: &mut Value, parts: &[TablePart]) -> Result<(), Found> {
     let mut table_faults = Faults::default();
-    let tables = table::resolve(job, parts, entry.tables(), &mut table_faults);
+    let places = entry.tables_of(job).to_vec();
+    let tables = table::resolve(job, parts, &places, &mut table_faults);
     let mut schema_faults = Faults::default();
-    entry.validate(job, &mut schema_faults);
+    // A resolved model is in order.
+    let (plain, held) = model::split(entry, job);
+    entry.validate(if held.is_some() { &plain } else { job }, &mut schema_faults);
     let listed = schema_faults.listed.len();
     let mut findings: Vec<Finding> = schema_faults
         .listed
@@ -122,12 +172,18 @@ fn invalid(mut findings: Vec<Finding>, total: usize) -> Error {
 impl Ready {
     /// The filled job as it is echoed.
     pub(crate) fn echo(&self) -> Result<Value, Failure> {
-        Ok(table::without_rows(self.prepared.input()?, self.entry.tables()))
+        let input = self.prepared.input()?;
+        let places = self.entry.tables_of(&input).to_vec();
+        let echo = table::without_rows(input, &places);
+        Ok(match &self.model {
+            Some(held) => model::with_model(echo, held),
+            None => echo,
+        })
     }
 
     /// Appends the same as JSON.
     pub(crate) fn write_echo(&self, body: &mut Vec<u8>) -> Result<(), Failure> {
-        if self.has_rows {
+        if self.has_rows || self.model.is_some() {
             let echo = self.echo()?;
             return serde_json::to_writer(body, &echo).map_err(|error| Failure::Internal(format!("the echo: {error}")));
         }
@@ -151,6 +207,10 @@ mod tests {
 
     fn toy() -> Arc<Entry> {
         Arc::clone(toy::registry().entry("toy-bar").unwrap())
+    }
+
+    fn read(entry: &Arc<Entry>, body: &Body) -> Result<Ready, Error> {
+        super::read(entry, body, &Models { registry: toy::shared(), found: None })
     }
 
     fn body(job: &Value) -> Body {
@@ -291,7 +351,7 @@ mod tests {
         assert_eq!((finding.code, finding.pointer.as_str()), ("out_of_range", "/measurements/1/z_mm"));
         assert_eq!(finding.values.get("line"), Some(&5.0.into()));
         let unreadable = with("measurements", json!({"csv": "z_mm,deviation_um\n1,x\n"}));
-        assert_eq!(faults(&unreadable), [("bad_cell", "/measurements".to_owned())]);
+        assert_eq!(faults(&unreadable), [("bad_cell", "/measurements/0/deviation_um".to_owned())]);
     }
 
     #[test]

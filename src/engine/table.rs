@@ -128,7 +128,7 @@ fn place_part(job: &mut Value, part: &TablePart, places: &[TablePlace]) -> Resul
     let name = || part.name.clone();
     let Some(path) = fitting.next() else {
         let names: Vec<String> = places.iter().map(TablePlace::dotted).collect();
-        let finding = Finding::new("unknown_table", "").with("name", name());
+        let finding = Finding::new("unknown_table", meant(&part.name)).with("name", name());
         let near = nearest(&part.name, names.iter().map(String::as_str)).map(str::to_owned);
         return Err(match near {
             Some(near) => finding.with("nearest", near),
@@ -137,7 +137,7 @@ fn place_part(job: &mut Value, part: &TablePart, places: &[TablePlace]) -> Resul
     };
     let pointer = path.iter().fold(String::new(), |pointer, step| child(&pointer, step));
     if fitting.next().is_some() {
-        return Err(Finding::new("ambiguous_table", "").with("name", name()));
+        return Err(Finding::new("ambiguous_table", meant(&part.name)).with("name", name()));
     }
     let Ok(text) = std::str::from_utf8(&part.text) else {
         return Err(Finding::new("table_not_utf8", pointer).with("name", name()));
@@ -163,6 +163,11 @@ fn place_part(job: &mut Value, part: &TablePart, places: &[TablePlace]) -> Resul
     }
     *target = json!({ "csv": text });
     Ok(())
+}
+
+/// Where a part with this name would stand in the job.
+fn meant(name: &str) -> String {
+    name.split('.').fold(String::new(), |pointer, step| child(&pointer, step))
 }
 
 /// The way to the place that the name of a part means: the last name, or all names and indices with dots.
@@ -194,7 +199,7 @@ mod tests {
             .map(|(name, text)| TablePart { name: (*name).into(), text: text.to_string().into() })
             .collect();
         let mut faults = Faults::default();
-        resolve(&mut job, &parts, registry.entry("toy-bar").unwrap().tables(), &mut faults);
+        resolve(&mut job, &parts, registry.entry("toy-bar").unwrap().tables_of(&Value::Null), &mut faults);
         for finding in &faults.listed {
             Texts::shared().try_finding(Language::En, "fault", finding).unwrap();
         }
@@ -221,7 +226,7 @@ mod tests {
     #[test]
     fn the_echo_has_the_hash_of_the_rows() {
         let registry = toy::registry();
-        let places = registry.entry("toy-bar").unwrap().tables();
+        let places = registry.entry("toy-bar").unwrap().tables_of(&Value::Null);
         let echo = without_rows(json!({"measurements": [{"z_mm": 1, "deviation_um": 2}]}), places);
         let other = without_rows(json!({"measurements": [{"deviation_um": 2.0, "z_mm": 1.0}]}), places);
         assert_eq!(echo["measurements"]["rows"], 1);

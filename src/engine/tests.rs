@@ -11,8 +11,9 @@ use tempfile::TempDir;
 
 use super::*;
 use crate::registry::toy;
+use crate::store::sqlite::{Keep, SqliteStore};
 use crate::store::{KeptResult, StoreError};
-use crate::text::{Language, Texts};
+use crate::text::{Language, Texts, complete};
 
 const TOY: &str = "toy-bar";
 
@@ -337,9 +338,10 @@ impl ResultStore for BrokenStore {
 async fn a_store_that_fails_fails_no_answer() {
     let folder = tempfile::tempdir().unwrap();
     let settings = EngineSettings { cores: 1, ..EngineSettings::in_folder(folder.path()) };
-    let keep = crate::store::sqlite::Keep { bytes: 1, age: settings.store_age, jobs: settings.job_age };
-    let jobs = Arc::new(crate::store::sqlite::SqliteStore::open(folder.path(), keep).await.unwrap());
-    let engine = Engine::with_stores(toy::registry(), settings, Arc::new(BrokenStore), jobs).await.unwrap();
+    let keep = Keep { bytes: 1, age: settings.store_age, jobs: settings.job_age };
+    let jobs = Arc::new(SqliteStore::open(folder.path(), keep).await.unwrap());
+    let engine =
+        Engine::with_stores(toy::registry(), settings, Arc::new(BrokenStore), jobs.clone(), jobs).await.unwrap();
     let solved = engine.solve(TOY, job(|_| {})).await.unwrap();
     assert_eq!(engine.solve(TOY, job(|_| {})).await.unwrap().cache, CacheState::Hit);
     assert!(engine.result(&solved.stored.key).await.unwrap().is_some());
@@ -357,6 +359,15 @@ fn what_the_calculators_utter_has_a_text_and_their_examples_run() {
     }
 }
 
+/// Names that the user gave (`job`) stay as they are.
+fn in_its_language(language: Language, said: &str, job: &str) {
+    if language != Language::En {
+        let mut english = complete::english_in(said);
+        english.retain(|word| !job.contains(word));
+        assert!(english.is_empty(), "{english:?} in {said:?}");
+    }
+}
+
 fn conforms(registry: &Registry, entry: &Entry) {
     let texts = Texts::shared();
     let meta = entry.meta();
@@ -370,17 +381,27 @@ fn conforms(registry: &Registry, entry: &Entry) {
     }
     for example in meta.examples {
         let body = || Body::Json(example.job.into());
-        let ready = read::read(&registry.entry(meta.id).unwrap().clone(), &body())
-            .unwrap_or_else(|error| panic!("{} of {}: {error:?}", example.id, meta.id));
+        let ready = read::read(
+            &registry.entry(meta.id).unwrap().clone(),
+            &body(),
+            &Models { registry: &registry, found: None },
+        )
+        .unwrap_or_else(|error| panic!("{} of {}: {error:?}", example.id, meta.id));
         let computed = ready.prepared.run(&Unwatched, &mut Vec::new()).unwrap();
         let input = ready.prepared.input().unwrap();
         assert_eq!(ready.canonical, serde_json_canonicalizer::to_vec(&input).unwrap());
         for message in &computed.explanation {
-            texts.try_word(Language::En, "explanation", message.code, &message.values).unwrap();
+            for language in Language::ALL {
+                let said = texts.try_word(language, "explanation", message.code, &message.values).unwrap();
+                in_its_language(language, &said, example.job);
+            }
             assert!(meta.codes.contains(message.code), "{} utters the undeclared {}", meta.id, message.code);
         }
         for warning in &computed.warnings {
-            texts.try_finding(Language::En, "warning", warning).unwrap();
+            for language in Language::ALL {
+                let said = texts.try_finding(language, "warning", warning).unwrap();
+                in_its_language(language, &said, example.job);
+            }
             assert!(meta.codes.contains(warning.code), "{} utters the undeclared {}", meta.id, warning.code);
         }
         let stored = solve_now(registry, meta.id, body(), &Unwatched).unwrap();
@@ -392,8 +413,12 @@ fn conforms(registry: &Registry, entry: &Entry) {
         let answer = envelope(&stored);
         let output = jsonschema::draft202012::new(entry.output_document()).unwrap();
         assert!(output.is_valid(&answer["result"]), "{}: {:?}", meta.id, output.validate(&answer["result"]));
-        let again =
-            read::read(&registry.entry(meta.id).unwrap().clone(), &Body::Json(ready.canonical.clone())).unwrap();
+        let again = read::read(
+            &registry.entry(meta.id).unwrap().clone(),
+            &Body::Json(ready.canonical.clone()),
+            &Models { registry: &registry, found: None },
+        )
+        .unwrap();
         assert_eq!(again.key, ready.key, "the filled job of {} has another key", meta.id);
     }
 }

@@ -11,7 +11,7 @@ use axum::http::header::{
 use axum::http::{HeaderMap, StatusCode, Uri};
 use axum::response::Response;
 use bytes::Bytes;
-use precut_calc::calculator::Meta;
+use precut_calc::calculator::{Figure, Meta, Value, Values};
 use serde::Deserialize;
 
 use super::negotiate::{self, Media};
@@ -19,7 +19,7 @@ use super::problem::Problem;
 use super::{CACHE_STATE, codes};
 use crate::engine::{CacheState, Stored, Timings};
 use crate::render;
-use crate::text::{Language, Texts};
+use crate::text::{Glossary, Language, Texts, fingerprint};
 
 const SERVER_TIMING: HeaderName = HeaderName::from_static("server-timing");
 
@@ -89,7 +89,12 @@ impl View {
         tag.push('"');
         tag.push_str(stored.key.to_string().trim_start_matches("b3:"));
         let part = self.part.as_deref().unwrap_or_default();
-        let _ = write!(tag, "-{}-{part}-{}\"", self.media.short(), self.language.tag());
+        let _ = write!(tag, "-{}-{part}-{}", self.media.short(), self.language.tag());
+        // What is put into words when it is asked for changes with the words.
+        if self.media == Media::Svg || (self.media == Media::Json && self.language != Language::default()) {
+            let _ = write!(tag, "-{}", fingerprint(self.language));
+        }
+        tag.push('"');
         tag
     }
 }
@@ -103,11 +108,11 @@ pub(super) async fn respond(stored: Arc<Stored>, view: View, condition: &HeaderM
         response
     } else {
         let (media, language) = (view.media, view.language);
-        let body = if media == Media::Json {
+        let body = if media == Media::Json && language == Language::default() {
             stored.body.clone()
         } else {
             let stored = stored.clone();
-            // Reading an answer back and drawing it is work: not on the threads that move bytes.
+            // Reading an answer back, wording and drawing it is work: not on the threads that move bytes.
             tokio::task::spawn_blocking(move || rendered(&stored, &view)).await.map_err(|_| Problem::internal())??
         };
         let mut response = Response::new(Body::from(body));
@@ -150,13 +155,13 @@ fn value(text: String) -> HeaderValue {
 }
 
 /// An answer in some form, as the command line writes it: `part` is the table or figure, the first if `None`.
-pub fn written(stored: &Stored, media: Media, part: Option<&str>) -> Result<Bytes, Problem> {
+pub fn written(stored: &Stored, media: Media, part: Option<&str>, language: Language) -> Result<Bytes, Problem> {
     let meta = stored.entry().meta();
     let offered = offered(meta);
     if !offered.contains(&media) {
         return Err(not_acceptable(&offered));
     }
-    rendered(stored, &View { media, part: part.map(ToOwned::to_owned), language: Language::default() })
+    rendered(stored, &View { media, part: part.map(ToOwned::to_owned), language })
 }
 
 fn not_acceptable(offered: &[Media]) -> Problem {
@@ -167,7 +172,7 @@ fn not_acceptable(offered: &[Media]) -> Problem {
 fn rendered(stored: &Stored, view: &View) -> Result<Bytes, Problem> {
     let wanted = |id: &str| view.part.as_deref().is_none_or(|part| part == id);
     let text = match view.media {
-        Media::Json => return Ok(stored.body.clone()),
+        Media::Json => return Ok(stored.body_in(view.language)),
         Media::Csv => {
             let tables = stored.tables()?;
             let table = tables.iter().find(|table| wanted(table.id));
@@ -195,23 +200,29 @@ fn absent<'a>(code: &'static str, view: &View, ids: impl Iterator<Item = &'a str
     Problem::missing(code, view.part.as_deref().unwrap_or_default()).with("available", available.join(", "))
 }
 
-fn drawn(figure: &precut_calc::calculator::Figure, language: Language) -> String {
-    use precut_calc::calculator::{Value, Values};
+fn drawn(figure: &Figure, language: Language) -> String {
     let texts = Texts::shared();
-    let none = Values::new();
     render::svg(
         figure,
         &render::Wording {
             message: &|message| texts.message(language, "figure", message),
-            // Names that no table of texts has, such as those of a study's variables, stand in the title's values.
-            label: &|code| match figure.title.values.get(code) {
-                Some(Value::Text(name)) => name.clone().into_owned(),
-                _ => texts.word(language, "label", code, &none),
+            label: &|code| label(figure, code, language),
+            unit: &|unit| match language {
+                Language::En => render::unit_symbol(unit),
+                Language::Ru => Glossary::of(language).unit(unit),
             },
-            unit: &|unit| render::unit_symbol(unit),
-            decimal: '.',
+            decimal: language.decimal(),
         },
     )
+}
+
+/// What a figure calls an axis or a curve. Names that no table of texts has, such as those of a study's variables,
+/// stand in the title's values.
+pub(super) fn label(figure: &Figure, code: &str, language: Language) -> String {
+    match figure.title.values.get(code) {
+        Some(Value::Text(name)) => name.clone().into_owned(),
+        _ => Texts::shared().word(language, "label", code, &Values::new()),
+    }
 }
 
 /// Comments at the head of a program: what it is and where it comes from.

@@ -22,7 +22,7 @@ use super::problem::Problem;
 use super::{App, body, gate};
 use crate::engine::{Answered, Ask, CacheState, Error, Priority};
 use crate::registry::{Entry, Registry};
-use crate::text::Language;
+use crate::text::{self, Glossary, Language};
 
 /// A calculator with what its route needs on every request.
 pub(super) struct Room {
@@ -225,10 +225,15 @@ pub(super) struct CalculatorDescription {
     study_outputs: &'static [&'static str],
     /// Codes of its messages, warnings and faults.
     codes: Vec<&'static str>,
-    /// JSON Schema (2020-12) of the job, with labels, units and ranges.
+    /// What its figures and tables are called, by their names.
+    #[schema(value_type = Object)]
+    labels: Value,
+    /// JSON Schema (2020-12) of the job in the language asked for: `title` is the label of a field, `description` its
+    /// help, `x-labels` what the words of an `enum` are called, `x-unit-label` and `x-group-label` the printed unit and
+    /// the part of the form.
     #[schema(value_type = Object)]
     input_schema: Value,
-    /// JSON Schema (2020-12) of the result.
+    /// JSON Schema (2020-12) of the result, with the same labels.
     #[schema(value_type = Object)]
     output_schema: Value,
     /// The examples' jobs, ready to be posted, by name.
@@ -237,19 +242,22 @@ pub(super) struct CalculatorDescription {
 }
 
 /// The list of calculators.
-pub(super) fn listed(registry: &Registry) -> CalculatorList {
-    CalculatorList { items: registry.entries().iter().map(|entry| summary(entry.meta())).collect(), next: None }
+pub(super) fn listed(registry: &Registry, language: Language) -> CalculatorList {
+    CalculatorList {
+        items: registry.entries().iter().map(|entry| summary(entry.meta(), language)).collect(),
+        next: None,
+    }
 }
 
 /// A calculator's description.
-pub(super) fn described(entry: &Entry, _language: Language) -> CalculatorDescription {
+pub(super) fn described(entry: &Entry, language: Language) -> CalculatorDescription {
     let meta = entry.meta();
     let jobs = meta
         .examples
         .iter()
         .map(|example| (example.id.to_owned(), serde_json::from_str(example.job).expect("a test runs every example")));
     CalculatorDescription {
-        summary: summary(meta),
+        summary: summary(meta, language),
         references: meta.references,
         media_types: answer::offered(meta).into_iter().map(Media::essence).collect(),
         tables: meta.tables,
@@ -257,13 +265,21 @@ pub(super) fn described(entry: &Entry, _language: Language) -> CalculatorDescrip
         takes_tables: entry.takes_tables(),
         study_outputs: meta.study_outputs,
         codes: meta.codes.all().collect(),
-        input_schema: entry.input_document().clone(),
-        output_schema: entry.output_document().clone(),
+        labels: labels(meta, language),
+        input_schema: text::described(entry.input_document(), meta.id, language),
+        output_schema: text::described(entry.output_document(), meta.id, language),
         jobs: Value::Object(jobs.collect()),
     }
 }
 
-fn summary(meta: &Meta) -> CalculatorSummary {
+fn labels(meta: &Meta, language: Language) -> Value {
+    let glossary = Glossary::of(language);
+    let ids = meta.figures.iter().chain(meta.tables);
+    Value::Object(ids.map(|id| ((*id).to_owned(), glossary.word(id).into())).collect())
+}
+
+fn summary(meta: &Meta, language: Language) -> CalculatorSummary {
+    let said = |english| Glossary::of(language).help(english);
     CalculatorSummary {
         id: meta.id,
         kind: match meta.kind {
@@ -271,10 +287,14 @@ fn summary(meta: &Meta) -> CalculatorSummary {
             CalculatorKind::Evaluation => Kind::Evaluation,
         },
         version: meta.version,
-        title: meta.title,
-        question: meta.question,
-        summary: meta.summary,
-        examples: meta.examples.iter().map(|example| ExampleSummary { id: example.id, title: example.title }).collect(),
+        title: said(meta.title),
+        question: said(meta.question),
+        summary: said(meta.summary),
+        examples: meta
+            .examples
+            .iter()
+            .map(|example| ExampleSummary { id: example.id, title: said(example.title) })
+            .collect(),
         links: CalculatorLinks { this: format!("/v1/calculators/{}", meta.id), solve: format!("/v1/{}", meta.id) },
     }
 }

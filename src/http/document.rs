@@ -1,6 +1,7 @@
 //! Documents that never change while the service runs: the contract, the list of calculators, pages.
 
 use std::collections::BTreeMap;
+use std::sync::OnceLock;
 
 use axum::body::Body;
 use axum::extract::State;
@@ -27,7 +28,9 @@ impl Document {
     pub(super) fn new(bytes: impl Into<Bytes>, content_type: &'static str, language: Option<Language>) -> Self {
         let bytes = bytes.into();
         let hash = blake3::hash(&bytes).to_hex();
-        let etag = HeaderValue::from_str(&format!("\"{}\"", &hash[..32])).expect("hexadecimal digits in quotes");
+        // Also where the same bytes serve several languages: a tag is that of one representation.
+        let tag = language.map_or_else(String::new, |language| format!("-{}", language.tag()));
+        let etag = HeaderValue::from_str(&format!("\"{}{tag}\"", &hash[..32])).expect("digits and letters in quotes");
         Self { bytes, content_type, etag, language }
     }
 
@@ -57,36 +60,36 @@ impl Document {
     }
 }
 
-/// The documents that are made once, at the start.
+/// The documents that are made once.
 pub(super) struct Documents {
     openapi: Document,
     calculators: Vec<(Language, Document)>,
-    calculator: BTreeMap<&'static str, Vec<(Language, Document)>>,
-    materials: Document,
-    material: BTreeMap<&'static str, Document>,
+    /// Made when they are first asked for: most languages of most calculators never are.
+    calculator: BTreeMap<&'static str, [OnceLock<Document>; Language::ALL.len()]>,
+    registry: Registry,
+    materials: Vec<(Language, Document)>,
+    material: BTreeMap<&'static str, Vec<(Language, Document)>>,
 }
 
 impl Documents {
     pub(super) fn new(registry: &Registry) -> Self {
         let each_language = |make: &dyn Fn(Language) -> Document| Language::ALL.map(|tag| (tag, make(tag))).into();
-        let calculators = each_language(&|language| Document::json(&calculators::listed(registry), Some(language)));
-        let calculator = registry
-            .entries()
-            .iter()
-            .map(|entry| {
-                let make = |language| Document::json(&calculators::described(entry, language), Some(language));
-                (entry.meta().id, each_language(&make))
-            })
-            .collect();
+        let calculators =
+            each_language(&|language| Document::json(&calculators::listed(registry, language), Some(language)));
+        let calculator =
+            registry.entries().iter().map(|entry| (entry.meta().id, Language::ALL.map(|_| OnceLock::new()))).collect();
         Self {
             openapi: Document::new(openapi::json(registry), "application/json", None),
             calculators,
             calculator,
-            // Names and sources of the library are in English.
-            materials: Document::json(&materials::listed(), Some(Language::En)),
+            registry: registry.clone(),
+            materials: each_language(&|language| Document::json(&materials::listed(language), Some(language))),
             material: material::library()
                 .iter()
-                .map(|material| (material.id, Document::json(material, Some(Language::En))))
+                .map(|material| {
+                    let make = |language| Document::json(&materials::said(material, language), Some(language));
+                    (material.id, each_language(&make))
+                })
                 .collect(),
         }
     }
@@ -96,17 +99,19 @@ impl Documents {
     }
 
     pub(super) fn calculator(&self, id: &str, language: Language) -> Option<&Document> {
-        in_language(self.calculator.get(id)?, language)
+        let (entry, made) = (self.registry.entry(id)?, self.calculator.get(id)?);
+        let make = || Document::json(&calculators::described(entry, language), Some(language));
+        Some(made[language.index()].get_or_init(make))
     }
 }
 
 impl Documents {
-    pub(super) fn materials(&self) -> &Document {
-        &self.materials
+    pub(super) fn materials(&self, language: Language) -> Option<&Document> {
+        in_language(&self.materials, language)
     }
 
-    pub(super) fn material(&self, id: &str) -> Option<&Document> {
-        self.material.get(id)
+    pub(super) fn material(&self, id: &str, language: Language) -> Option<&Document> {
+        in_language(self.material.get(id)?, language)
     }
 }
 

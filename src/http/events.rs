@@ -18,7 +18,7 @@ use utoipa::ToSchema;
 
 use super::jobs::{self, named};
 use super::problem::Problem;
-use super::{App, gate, negotiate};
+use super::{App, gate, negotiate, parts};
 use crate::engine::{Engine, Feed, Job, JobId, JobRecord, JobState};
 use crate::text::{Language, Texts};
 
@@ -240,7 +240,7 @@ impl Follower {
         if let Some(interim) = &job.interim
             && !self.sent.interim.as_ref().is_some_and(|sent| Arc::ptr_eq(sent, &interim.figure))
         {
-            self.push("interim", job, &*interim.figure);
+            self.push("interim", job, &parts::worded(&interim.figure, self.language));
             self.sent.interim = Some(Arc::clone(&interim.figure));
         }
     }

@@ -7,8 +7,9 @@ use precut_calc::material::{self, Material};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::App;
 use super::problem::Problem;
+use super::{App, negotiate};
+use crate::text::{Glossary, Language};
 
 /// Every material of the library.
 #[derive(Debug, Serialize, ToSchema)]
@@ -37,18 +38,24 @@ pub(super) struct MaterialLinks {
     this: String,
 }
 
+/// A material with its title in a language. Sources are cited as they are written.
+pub(super) fn said(material: &Material, language: Language) -> Material {
+    Material { title: Glossary::of(language).help(material.title), ..*material }
+}
+
 /// The list as it is answered.
-pub(super) fn listed() -> MaterialList {
+pub(super) fn listed(language: Language) -> MaterialList {
     let item = |material: &Material| MaterialItem {
-        material: *material,
+        material: said(material, language),
         links: MaterialLinks { this: format!("/v1/materials/{}", material.id) },
     };
     MaterialList { items: material::library().iter().map(item).collect(), next: None }
 }
 
 /// `GET /v1/materials`
-pub(super) async fn list(State(app): State<App>, headers: HeaderMap) -> Response {
-    app.documents.materials().respond(&headers)
+pub(super) async fn list(State(app): State<App>, headers: HeaderMap) -> Result<Response, Problem> {
+    let document = app.documents.materials(negotiate::language(&headers)).ok_or_else(Problem::internal)?;
+    Ok(document.respond(&headers))
 }
 
 /// `GET /v1/materials/{id}`
@@ -57,7 +64,7 @@ pub(super) async fn read(
     Path(id): Path<String>,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    match app.documents.material(&id) {
+    match app.documents.material(&id, negotiate::language(&headers)) {
         Some(document) => Ok(document.respond(&headers)),
         None => Err(Problem::missing("unknown_material", &id)),
     }

@@ -22,18 +22,26 @@ const LATENCY_S: [f64; 14] =
 const JOB: &str = "/v1/jobs/{id}";
 const JOB_RESULT: &str = "/v1/jobs/{id}/result";
 const JOB_EVENTS: &str = "/v1/jobs/{id}/events";
+const RESULT: &str = "/v1/results/{key}";
+const RESULT_FIGURES: &str = "/v1/results/{key}/figures";
+const RESULT_TABLES: &str = "/v1/results/{key}/tables";
+const RESULT_JOB: &str = "/v1/results/{key}/job";
 
 /// Addresses with a variable part, as they are counted.
-const PATTERNS: [(&str, &str); 9] = [
+const PATTERNS: [(&str, &str); 13] = [
     ("/v1/jobs/", JOB),
     ("/v1/jobs/", JOB_RESULT),
     ("/v1/jobs/", JOB_EVENTS),
-    ("/v1/results/", "/v1/results/{key}"),
+    ("/v1/results/", RESULT),
+    ("/v1/results/", RESULT_FIGURES),
+    ("/v1/results/", RESULT_TABLES),
+    ("/v1/results/", RESULT_JOB),
     ("/v1/calculators/", "/v1/calculators/{id}"),
     ("/v1/materials/", "/v1/materials/{id}"),
     ("/v1/", "/v1/{calculator}"),
     ("/problems/", "/problems/{code}"),
     ("/docs/", "/docs/{file}"),
+    ("/ui/", "/ui/{version}/{file}"),
 ];
 
 /// Addresses without one, besides the calculators'.
@@ -132,6 +140,15 @@ fn pattern(path: &str) -> Option<&'static str> {
             _ => JOB,
         });
     }
+    if path.starts_with("/v1/results/") {
+        let part = path.rsplit('/').next();
+        return Some(match part {
+            Some("figures") => RESULT_FIGURES,
+            Some("tables") => RESULT_TABLES,
+            Some("job") => RESULT_JOB,
+            _ => RESULT,
+        });
+    }
     PATTERNS.iter().find(|(prefix, _)| path.starts_with(prefix)).map(|&(_, name)| name)
 }
 
@@ -175,6 +192,19 @@ fn recorder() -> &'static PrometheusHandle {
         );
         metrics::describe_gauge!("http_requests_in_flight", "Requests in work.");
         metrics::describe_counter!("precut_answers_total", "Answers by calculator, from the cache (hit) or not.");
+        metrics::describe_counter!("precut_cache_hits_total", "Answers found, by tier: in memory or in the store.");
+        metrics::describe_counter!(
+            "precut_calculations_total",
+            "Calculations by calculator and outcome: ok, no_answer (the job has none), cancelled, error (a fault of ours)."
+        );
+        metrics::describe_histogram!(
+            "precut_calculation_seconds",
+            metrics::Unit::Seconds,
+            "Time that a calculation took on its core, by calculator."
+        );
+        metrics::describe_counter!("precut_busy_total", "Jobs refused because every core computed and the line was full.");
+        metrics::describe_counter!("precut_panics_total", "Calculations that crashed. Each is a fault of ours.");
+        metrics::describe_counter!("precut_store_failures_total", "Failures of the store, by operation.");
         metrics::describe_counter!("precut_jobs_accepted_total", "Jobs put on record, by calculator.");
         metrics::describe_counter!("precut_jobs_total", "Computations for jobs that ended, by calculator and outcome.");
         metrics::describe_histogram!(

@@ -12,14 +12,17 @@ mod health;
 mod jobs;
 mod materials;
 mod metrics;
+mod models;
 mod negotiate;
 pub mod openapi;
 mod pages;
+mod parts;
 mod prefer;
 mod problem;
 mod rate;
 mod results;
 mod server;
+mod workbench;
 
 use std::net::IpAddr;
 use std::ops::Deref;
@@ -38,6 +41,8 @@ use crate::engine::{Engine, Error};
 pub use answer::written;
 pub use codes::CODES;
 pub use negotiate::Media;
+#[cfg(test)]
+pub(crate) use pages::DESCRIPTION;
 pub use problem::{Problem, ProblemDocument};
 pub use server::serve;
 
@@ -136,6 +141,7 @@ pub fn router(app: &App) -> Router {
 fn routes(app: &App, health: Router<App>) -> Router<App> {
     let mut router = health
         .route("/", get(pages::landing))
+        .route("/ui/{version}/{*file}", get(workbench::file))
         .route("/docs", get(pages::docs))
         .route("/docs/{file}", get(pages::docs_file))
         .route("/problems/{code}", get(pages::problem))
@@ -146,8 +152,13 @@ fn routes(app: &App, health: Router<App>) -> Router<App> {
         .route("/v1/jobs/{id}", get(jobs::read).delete(jobs::cancel))
         .route("/v1/jobs/{id}/result", get(jobs::result))
         .route("/v1/jobs/{id}/events", get(events::follow))
+        .route("/v1/models", get(models::list))
+        .route("/v1/models/{name}", get(models::read).put(models::store).delete(models::delete))
         .route("/v1/results", get(results::list))
         .route("/v1/results/{key}", get(results::read))
+        .route("/v1/results/{key}/figures", get(parts::figures))
+        .route("/v1/results/{key}/tables", get(parts::tables))
+        .route("/v1/results/{key}/job", get(parts::job))
         .route("/v1/materials", get(materials::list))
         .route("/v1/materials/{id}", get(materials::read))
         .route("/v1/{calculator}", any(unknown_calculator));
@@ -202,7 +213,7 @@ fn cors(origins: &[String]) -> Option<CorsLayer> {
     Some(
         CorsLayer::new()
             .allow_origin(allowed)
-            .allow_methods([Method::GET, Method::HEAD, Method::POST, Method::DELETE])
+            .allow_methods([Method::GET, Method::HEAD, Method::POST, Method::PUT, Method::DELETE])
             .allow_headers(request_headers)
             .expose_headers(exposed)
             .max_age(std::time::Duration::from_hours(1)),

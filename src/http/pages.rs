@@ -1,7 +1,5 @@
 //! Pages for people: what to try, the interactive contract, what a problem means. All of them in the binary.
 
-use std::fmt::Write as _;
-
 use axum::extract::{Path, State};
 use axum::http::header::CONTENT_SECURITY_POLICY;
 use axum::http::{HeaderMap, HeaderValue};
@@ -13,8 +11,8 @@ use utoipa::ToSchema;
 use super::calculators::wants_page;
 use super::document::Document;
 use super::problem::Problem;
-use super::{App, codes, negotiate};
-use crate::text::{Language, Texts};
+use super::{App, codes, negotiate, workbench};
+use crate::text::{Glossary, Language, Texts};
 
 const HTML: &str = "text/html; charset=utf-8";
 const DOCS: &str = include_str!("../../ui/docs/index.html");
@@ -49,6 +47,10 @@ pub(super) struct LandingLinks {
     calculators: &'static str,
     /// The kept results.
     results: &'static str,
+    /// The jobs.
+    jobs: &'static str,
+    /// Where studies are posted to.
+    studies: &'static str,
     /// The library of materials.
     materials: &'static str,
     /// The contract (OpenAPI 3.1).
@@ -61,7 +63,7 @@ pub(super) struct LandingLinks {
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct ProblemPage {
     /// Stable name of the problem.
-    #[schema(example = "invalid")]
+    #[schema(example = "invalid_job")]
     code: String,
     /// What is wrong.
     title: String,
@@ -72,53 +74,32 @@ pub(super) struct ProblemPage {
     help: String,
 }
 
-const DESCRIPTION: &str =
+pub(crate) const DESCRIPTION: &str =
     "What to know before the cut: how accurate it will be, and what to change so that it is accurate.";
 
 /// `GET /`
-pub(super) async fn landing(State(app): State<App>, headers: HeaderMap) -> Response {
+pub(super) async fn landing(State(app): State<App>, headers: HeaderMap) -> Result<Response, Problem> {
     let rooms: Vec<_> = app.engine.registry().entries().iter().map(|entry| *entry.meta()).collect();
     if !wants_page(&headers) {
+        let language = negotiate::language(&headers);
         let landing = Landing {
             name: "precut",
             engine: env!("CARGO_PKG_VERSION"),
-            description: DESCRIPTION,
+            description: Glossary::of(language).help(DESCRIPTION),
             links: LandingLinks {
                 calculators: "/v1/calculators",
                 results: "/v1/results",
+                jobs: "/v1/jobs",
+                studies: "/v1/studies",
                 materials: "/v1/materials",
                 openapi: "/openapi.json",
                 docs: "/docs",
             },
             calculators: rooms.iter().map(|meta| format!("/v1/{}", meta.id)).collect(),
         };
-        return Document::json(&landing, Some(Language::En)).respond(&headers);
+        return Ok(Document::json(&landing, Some(language)).respond(&headers));
     }
-    let mut list = String::new();
-    for meta in &rooms {
-        let (question, title) = (escaped(meta.question), escaped(meta.title));
-        let _ = write!(
-            list,
-            "<li><a href=\"/v1/calculators/{id}\">{question}</a><br>\
-             <small>{title} — <code>POST /v1/{id}</code></small></li>",
-            id = meta.id,
-        );
-    }
-    let example = rooms.first().map_or(String::new(), |meta| {
-        format!(
-            "<h2>Try it</h2><pre>precut example {id} | precut solve -\n\
-             precut example {id} --job | curl --json @- http://{address}/v1/{id}\n\
-             precut example {id} --job | curl --json @- -H 'Accept: text/csv' http://{address}/v1/{id}</pre>",
-            id = meta.id,
-            address = escaped(headers.get("host").and_then(|host| host.to_str().ok()).unwrap_or("127.0.0.1:8080")),
-        )
-    });
-    let body = format!(
-        "<h1>precut</h1><p>{DESCRIPTION}</p><h2>Ask</h2><ul>{list}</ul>{example}\
-         <p><a href=\"/docs\">Interactive documentation</a> · <a href=\"/openapi.json\">Contract (OpenAPI 3.1)</a> · \
-         <a href=\"/v1/results\">Kept results</a> · <a href=\"/v1/materials\">Materials</a></p>"
-    );
-    Document::new(page("precut", &body), HTML, Some(Language::En)).respond(&headers)
+    workbench::index(&headers)
 }
 
 /// `GET /docs`
@@ -150,13 +131,16 @@ pub(super) async fn problem(
         return Ok(Document::json(&explained, Some(language)).respond(&headers));
     }
     let title = escaped(&explained.title);
+    let label = |code| escaped(&Texts::shared().word(language, "label", code, &Values::new()));
     let body = format!(
-        "<h1>{title}</h1><p><code>{}</code>, status {}</p><p>{}</p><p><a href=\"/docs\">Documentation</a></p>",
+        "<h1>{title}</h1><p><code>{}</code>, {} {}</p><p>{}</p><p><a href=\"/docs\">{}</a></p>",
         escaped(&explained.code),
+        label("page_status"),
         explained.status,
-        escaped(&explained.help)
+        escaped(&explained.help),
+        label("page_documentation"),
     );
-    Ok(Document::new(page(&title, &body), HTML, Some(language)).respond(&headers))
+    Ok(Document::new(page(&title, &body, language), HTML, Some(language)).respond(&headers))
 }
 
 /// The service's own problems, and those by which a calculator says that a job has no answer.
@@ -175,17 +159,18 @@ fn explain(app: &App, code: &str, language: Language) -> Option<ProblemPage> {
     let owner = app.engine.registry().entries().iter().find(|entry| entry.meta().codes.contains(code))?;
     Some(ProblemPage {
         code: code.to_owned(),
-        title: code.replace('_', " "),
+        title: texts.problem(language, "infeasible", &none).0,
         status: 422,
-        help: format!("{}: {}", owner.meta().title, help("infeasible")),
+        help: format!("{}: {}", Glossary::of(language).help(owner.meta().title), help("infeasible")),
     })
 }
 
-fn page(title: &str, body: &str) -> String {
+fn page(title: &str, body: &str, language: Language) -> String {
     format!(
-        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
+        "<!doctype html>\n<html lang=\"{tag}\"><head><meta charset=\"utf-8\">\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"><title>{title}</title>\
-         <link rel=\"stylesheet\" href=\"/docs/page.css\"></head><body><main>{body}</main></body></html>\n"
+         <link rel=\"stylesheet\" href=\"/docs/page.css\"></head><body><main>{body}</main></body></html>\n",
+        tag = language.tag(),
     )
 }
 

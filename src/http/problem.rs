@@ -163,6 +163,12 @@ impl Problem {
         Self::new(StatusCode::NOT_FOUND, code).with("name", name.to_owned())
     }
 
+    /// A model that breaks rules.
+    pub(super) fn invalid_model(findings: Vec<Finding>) -> Self {
+        let total = findings.len();
+        Self::new(StatusCode::UNPROCESSABLE_ENTITY, "invalid_model").findings(findings, total)
+    }
+
     /// Status of the answer.
     pub fn status(&self) -> StatusCode {
         self.0.status
@@ -309,10 +315,11 @@ impl From<Failure> for Problem {
             }
             Failure::OutOfModel(finding) => Self::without_answer("out_of_model", finding),
             Failure::NotConverged { what, residual, iterations } => {
-                Self::new(StatusCode::UNPROCESSABLE_ENTITY, "not_converged")
+                let problem = Self::new(StatusCode::UNPROCESSABLE_ENTITY, "not_converged")
                     .with("what", what)
-                    .with("residual", residual)
-                    .with("iterations", f64::from(iterations))
+                    .with("iterations", f64::from(iterations));
+                // Solvers that fail before their first residual have none.
+                if residual.is_finite() { problem.with("residual", residual) } else { problem }
             }
             Failure::Internal(cause) => {
                 tracing::error!(cause, "a calculation failed");

@@ -5,9 +5,10 @@ use std::marker::PhantomData;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use precut_calc::calculator::{
-    Answer, Basis, Calculator, Check, Cost, Failure, Figure, Finding, Message, Meta, Monitor, Program, Table,
-    Violations,
+    Answer, Basis, Calculator, Check, Cost, Diagnosable, Failure, Figure, Finding, Message, Meta, Monitor, Program,
+    Table, Violations,
 };
+use precut_calc::diagnosis::{Diagnosis, JobOf, ResultOf};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -16,6 +17,7 @@ use utoipa::openapi::{RefOr, Schema};
 
 use super::canonical::canonical;
 use super::checker::{Checker, Faults};
+use super::family;
 use super::place::{TablePlace, table_places};
 use super::schema::{self, Components};
 use super::{RESERVED, RegistryError, Unwritable, append_result, child, non_finite_place};
@@ -30,12 +32,36 @@ pub struct Entry {
     own_codes: Vec<String>,
     calculation: Box<dyn Calculation>,
     composed: bool,
+    model_use: ModelUse,
+    /// Where the calculator of a job stands in the job: one entry for each of them, in the order of their names' place
+    /// in the contract.
+    members: Vec<Member>,
     /// Bytes of the answer written last.
     answer_bytes: AtomicUsize,
 }
 
+/// Whether a job may name a stored model, and what of it the model extends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum ModelUse {
+    /// It may not.
+    None,
+    /// The job itself.
+    OfJob,
+    /// The base job inside it.
+    OfBase,
+    /// The job inside it names the model.
+    Within,
+}
+
+/// One calculator's form of a question that is asked of several.
+pub(super) struct Member {
+    /// Whose jobs it takes.
+    pub(super) calculator: &'static str,
+    pub(super) entry: Entry,
+}
+
 /// A type's schema, in the forms in which it is asked for.
-struct Contract {
+pub(super) struct Contract {
     schema: RefOr<Schema>,
     components: Vec<(String, RefOr<Schema>)>,
     document: Value,
@@ -58,6 +84,72 @@ impl Entry {
         Self::made::<C::Input, C::Output>(meta, Box::new(Typed::<C>(PhantomData)), false)
     }
 
+    /// The entry of a calculator whose jobs may name a stored model.
+    pub(super) fn with_model<C: Calculator>() -> Result<Self, RegistryError> {
+        let entry = Self::of::<C>()?;
+        let input = Contract::of::<C::Input>(C::META.id, true, family::offer_model)?;
+        let made = Self::from_contracts(entry.meta, input, entry.output, entry.calculation)?;
+        Ok(Self { model_use: ModelUse::OfJob, ..made })
+    }
+
+    /// The entry of the diagnosis of one calculator.
+    pub(super) fn of_diagnosis<M: Diagnosable>() -> Result<Self, RegistryError> {
+        let base = M::META;
+        let calculation = Box::new(NumbersOf { meta: base, calculation: Typed::<Diagnosis<M>>(PhantomData) });
+        let input = Contract::of::<JobOf<M>>(base.id, true, |job| {
+            family::name_calculator(job, base.id);
+            family::offer_model(job);
+        })?;
+        let output = Contract::of::<ResultOf<M>>(base.id, false, |_| {})?;
+        let mut entry = Self::from_contracts(<Diagnosis<M> as Calculator>::META, input, output, calculation)?;
+        // A diagnosis refuses a base job in the words of the base.
+        let of_base = [base.codes.faults, base.codes.failures].into_iter().flatten().copied().flatten();
+        entry.model_use = ModelUse::OfBase;
+        entry.own_codes.extend(of_base.map(|code| (*code).to_owned()));
+        Ok(entry)
+    }
+
+    /// One question that is asked of several calculators, each with its own form of job and answer.
+    pub(super) fn family(members: Vec<Member>) -> Result<Option<Self>, RegistryError> {
+        let Some(first) = members.first() else { return Ok(None) };
+        let examples: Vec<_> = members.iter().flat_map(|member| member.entry.meta.examples).copied().collect();
+        // A registry lives as long as the process.
+        let meta = Meta { examples: Vec::leak(examples), ..first.entry.meta };
+        let parts = |suffix: &'static str, contract: fn(&Self) -> &Contract| {
+            members.iter().map(move |of| (family::type_name(of.calculator, suffix), contract(&of.entry)))
+        };
+        let input = Contract::joined(parts("DiagnosisJob", |entry| &entry.input), true)?;
+        let output = Contract::joined(parts("DiagnosisResult", |entry| &entry.output), false)?;
+        let own_codes: BTreeSet<String> = members.iter().flat_map(|of| of.entry.own_codes.iter().cloned()).collect();
+        let mut entry = Self::from_contracts(meta, input, output, Box::new(NoCalculator))?;
+        entry.own_codes = own_codes.into_iter().collect();
+        entry.model_use = ModelUse::OfBase;
+        entry.members = members;
+        Ok(Some(entry))
+    }
+
+    /// The form of a family's job that a job has, by the calculator that it names; this entry where it is no family.
+    pub(crate) fn of_job(&self, job: &Value) -> Option<&Self> {
+        match self.members.as_slice() {
+            [] => Some(self),
+            _ => self.member(job.get(family::CALCULATOR)?.as_str()?),
+        }
+    }
+
+    fn member(&self, calculator: &str) -> Option<&Self> {
+        self.members.iter().find(|of| of.calculator == calculator).map(|of| &of.entry)
+    }
+
+    /// The same for a kept job.
+    fn of_kept_job(&self, input: &[u8]) -> Result<&Self, UnreadableResult> {
+        if self.members.is_empty() {
+            return Ok(self);
+        }
+        let unreadable = |error: String| UnreadableResult(error);
+        let named: family::Named = serde_json::from_slice(input).map_err(|error| unreadable(error.to_string()))?;
+        self.member(&named.calculator).ok_or_else(|| unreadable(format!("no calculator {}", named.calculator)))
+    }
+
     /// The entry of something that is asked like a calculator and made of other calculators' jobs. It has a route of
     /// the service's own and stands in no registry.
     pub(crate) fn composed<I: ToSchema, O: ToSchema>(
@@ -72,8 +164,18 @@ impl Entry {
         calculation: Box<dyn Calculation>,
         composed: bool,
     ) -> Result<Self, RegistryError> {
-        let input = Contract::of::<I>(meta.id, true)?;
-        let output = Contract::of::<O>(meta.id, false)?;
+        let input = Contract::of::<I>(meta.id, true, |_| {})?;
+        let output = Contract::of::<O>(meta.id, false, |_| {})?;
+        let model_use = if composed { ModelUse::Within } else { ModelUse::None };
+        Ok(Self { composed, model_use, ..Self::from_contracts(meta, input, output, calculation)? })
+    }
+
+    fn from_contracts(
+        meta: Meta,
+        input: Contract,
+        output: Contract,
+        calculation: Box<dyn Calculation>,
+    ) -> Result<Self, RegistryError> {
         let mut own_codes = BTreeSet::new();
         codes_in(&input.strict, &mut own_codes);
         Ok(Self {
@@ -84,7 +186,9 @@ impl Entry {
             input,
             output,
             calculation,
-            composed,
+            composed: false,
+            model_use: ModelUse::None,
+            members: Vec::new(),
             answer_bytes: AtomicUsize::new(0),
         })
     }
@@ -153,8 +257,13 @@ impl Entry {
         body
     }
 
-    pub(crate) fn tables(&self) -> &[TablePlace] {
-        &self.tables
+    /// Where the measured tables of a job stand; nowhere where it cannot be told what job it is.
+    pub(crate) fn tables_of(&self, job: &Value) -> &[TablePlace] {
+        self.of_job(job).map_or(&[], |entry| &entry.tables)
+    }
+    /// Whether a job may name a stored model.
+    pub(crate) fn model_use(&self) -> ModelUse {
+        self.model_use
     }
     /// Whether it is made of other entries' jobs: reading one is work, and running one waits for the store.
     pub(crate) fn is_composed(&self) -> bool {
@@ -176,25 +285,36 @@ impl Entry {
     pub(crate) fn validate(&self, job: &Value, faults: &mut Faults) {
         self.checker.check(job, "", faults);
     }
+    /// Adds what is wrong with effects that are to act in jobs of this calculator.
+    pub(crate) fn validate_effects(&self, effects: &Value, faults: &mut Faults) {
+        let schema = self.strict_input()["properties"]["effects"].clone();
+        match Checker::new(schema) {
+            Ok(checker) => checker.check(effects, "/effects", faults),
+            Err(error) => tracing::error!(%error, "the schema of a calculator's effects does not stand alone"),
+        }
+    }
     /// A job that the schema accepts, typed, checked and filled.
     pub(crate) fn prepare(&self, job: &Value) -> Result<Prepared, Unprepared> {
-        self.calculation.prepare(job)
+        match self.of_job(job) {
+            Some(entry) => entry.calculation.prepare(job),
+            None => self.calculation.prepare(job),
+        }
     }
     /// The rules between fields that a job breaks which the schema refuses; none where it cannot be read at all.
     pub(crate) fn broken_rules(&self, job: &Value) -> Vec<Finding> {
-        self.calculation.broken_rules(job)
+        self.of_job(job).map(|entry| entry.calculation.broken_rules(job)).unwrap_or_default()
     }
     /// The pictures of a result, from its job and its envelope as JSON.
     pub(crate) fn figures(&self, input: &[u8], envelope: &[u8]) -> Result<Vec<Figure>, UnreadableResult> {
-        self.calculation.figures(input, envelope)
+        self.of_kept_job(input)?.calculation.figures(input, envelope)
     }
     /// The tables of a result.
     pub(crate) fn result_tables(&self, input: &[u8], envelope: &[u8]) -> Result<Vec<Table>, UnreadableResult> {
-        self.calculation.tables(input, envelope)
+        self.of_kept_job(input)?.calculation.tables(input, envelope)
     }
     /// The program of a result, where there is one.
     pub(crate) fn program(&self, input: &[u8], envelope: &[u8]) -> Result<MaybeProgram, UnreadableResult> {
-        self.calculation.program(input, envelope)
+        self.of_kept_job(input)?.calculation.program(input, envelope)
     }
 }
 
@@ -218,7 +338,12 @@ fn codes_in(schema: &Value, codes: &mut BTreeSet<String>) {
 }
 
 impl Contract {
-    fn of<T: ToSchema>(calculator: &'static str, closed: bool) -> Result<Self, RegistryError> {
+    /// The contract of a type. `adapt` may change its root before objects are closed.
+    fn of<T: ToSchema>(
+        calculator: &'static str,
+        closed: bool,
+        adapt: impl FnOnce(&mut Value),
+    ) -> Result<Self, RegistryError> {
         let broken = |error: serde_json::Error| RegistryError::BadSchema(error.to_string());
         let mut parts = Vec::new();
         T::schemas(&mut parts);
@@ -230,6 +355,7 @@ impl Contract {
             }
         }
         let mut root = schema::tidy(&serde_json::to_value(T::schema()).map_err(broken)?, &raw);
+        adapt(&mut root);
         let tidied: Components = raw.iter().map(|(name, part)| (name.clone(), schema::tidy(part, &raw))).collect();
         // Parts that were joined into others are no components of their own any more.
         let mut open = Components::new();
@@ -239,6 +365,34 @@ impl Contract {
             schema::close(&mut root);
             components.values_mut().for_each(schema::close);
         }
+        Ok(Self {
+            schema: serde_json::from_value(root.clone()).map_err(broken)?,
+            components: components
+                .iter()
+                .map(|(name, part)| Ok((name.clone(), serde_json::from_value(part.clone())?)))
+                .collect::<Result<_, serde_json::Error>>()
+                .map_err(broken)?,
+            document: schema::standing_alone(&root, &components),
+            strict: schema::strict(&root, &components)?,
+            open,
+        })
+    }
+
+    /// One of several contracts, by what stands in the field `calculator` of a job.
+    fn joined<'a>(parts: impl Iterator<Item = (String, &'a Self)>, told_apart: bool) -> Result<Self, RegistryError> {
+        let broken = |error: serde_json::Error| RegistryError::BadSchema(error.to_string());
+        let mut components = Components::new();
+        let mut open = Components::new();
+        let mut names = Vec::new();
+        for (name, part) in parts {
+            for (name, component) in &part.components {
+                components.insert(name.clone(), serde_json::to_value(component).map_err(broken)?);
+            }
+            open.extend(part.open.clone());
+            components.insert(name.clone(), serde_json::to_value(&part.schema).map_err(broken)?);
+            names.push(name);
+        }
+        let root = family::one_of(&names, &components, told_apart);
         Ok(Self {
             schema: serde_json::from_value(root.clone()).map_err(broken)?,
             components: components
@@ -340,6 +494,51 @@ pub(crate) trait Job: Send + Sync {
 /// The types of a calculator.
 struct Typed<C>(PhantomData<fn() -> C>);
 
+/// A calculation whose numbers are another calculator's, too.
+struct NumbersOf<T> {
+    meta: Meta,
+    calculation: T,
+}
+
+impl<T: Calculation> Calculation for NumbersOf<T> {
+    fn prepare(&self, job: &Value) -> Result<Prepared, Unprepared> {
+        Ok(self.calculation.prepare(job)?.with_numbers_of(self.meta))
+    }
+    fn broken_rules(&self, job: &Value) -> Vec<Finding> {
+        self.calculation.broken_rules(job)
+    }
+    fn figures(&self, input: &[u8], envelope: &[u8]) -> Result<Vec<Figure>, UnreadableResult> {
+        self.calculation.figures(input, envelope)
+    }
+    fn tables(&self, input: &[u8], envelope: &[u8]) -> Result<Vec<Table>, UnreadableResult> {
+        self.calculation.tables(input, envelope)
+    }
+    fn program(&self, input: &[u8], envelope: &[u8]) -> Result<MaybeProgram, UnreadableResult> {
+        self.calculation.program(input, envelope)
+    }
+}
+
+/// What a family does with a job that names none of its calculators; the schema has refused such a job before.
+struct NoCalculator;
+
+impl Calculation for NoCalculator {
+    fn prepare(&self, _job: &Value) -> Result<Prepared, Unprepared> {
+        Err(Unprepared::Failed(Failure::Internal("a job of no calculator".to_owned())))
+    }
+    fn broken_rules(&self, _job: &Value) -> Vec<Finding> {
+        Vec::new()
+    }
+    fn figures(&self, _input: &[u8], _envelope: &[u8]) -> Result<Vec<Figure>, UnreadableResult> {
+        Err(UnreadableResult("a job of no calculator".to_owned()))
+    }
+    fn tables(&self, _input: &[u8], _envelope: &[u8]) -> Result<Vec<Table>, UnreadableResult> {
+        Err(UnreadableResult("a job of no calculator".to_owned()))
+    }
+    fn program(&self, _input: &[u8], _envelope: &[u8]) -> Result<MaybeProgram, UnreadableResult> {
+        Err(UnreadableResult("a job of no calculator".to_owned()))
+    }
+}
+
 /// A filled job of a calculator.
 struct TypedJob<C: Calculator>(C::Input);
 
@@ -409,7 +608,7 @@ fn unwritable(what: &str, error: &impl std::fmt::Display) -> Failure {
 
 /// What is read of an envelope.
 #[derive(Deserialize)]
-struct ResultOf<O> {
+struct Answered<O> {
     result: O,
 }
 
@@ -417,7 +616,7 @@ fn read<C: Calculator>(input: &[u8], envelope: &[u8]) -> Result<(C::Input, C::Ou
     fn json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, UnreadableResult> {
         serde_json::from_slice(bytes).map_err(|error| UnreadableResult(error.to_string()))
     }
-    Ok((json::<C::Input>(input)?, json::<ResultOf<C::Output>>(envelope)?.result))
+    Ok((json::<C::Input>(input)?, json::<Answered<C::Output>>(envelope)?.result))
 }
 
 /// What the types refuse although the schema does not: one fault, as deserialisation stops at the first.

@@ -297,3 +297,9 @@ pub(crate) fn registry() -> Registry {
     use precut_calc::calculator::Registrar;
     Registry::with(Registrar::calculator::<Toy>).unwrap()
 }
+
+/// The same for tests that only look.
+pub(crate) fn shared() -> &'static Registry {
+    static REGISTRY: std::sync::LazyLock<Registry> = std::sync::LazyLock::new(registry);
+    &REGISTRY
+}

@@ -18,6 +18,11 @@ use crate::key::Key;
 /// Starts after which a job that takes its process along is given up.
 pub(crate) const MOST_ATTEMPTS: u32 = 3;
 
+/// This is not the name of a job.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("a job's id is a UUID in lower case with hyphens")]
+pub struct BadJobId;
+
 /// A job's name, in the order of time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct JobId(Uuid);
@@ -52,9 +57,11 @@ impl fmt::Display for JobId {
 }
 
 impl FromStr for JobId {
-    type Err = uuid::Error;
-    fn from_str(text: &str) -> Result<Self, uuid::Error> {
-        Uuid::try_parse(text).map(Self)
+    type Err = BadJobId;
+    fn from_str(text: &str) -> Result<Self, BadJobId> {
+        // As it is written here: braces, capitals and the form without hyphens would be other addresses of one job.
+        let read = Uuid::try_parse(text).map(Self).map_err(|_| BadJobId)?;
+        if read.to_string() == text { Ok(read) } else { Err(BadJobId) }
     }
 }
 

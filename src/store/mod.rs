@@ -3,11 +3,13 @@
 pub mod address;
 pub mod jobs;
 mod ledger;
+pub mod models;
 mod postgres;
 mod queue;
 mod row;
 pub mod sqlite;
 mod sqlite_jobs;
+mod sqlite_models;
 mod sqlite_studies;
 #[cfg(test)]
 mod suite;
@@ -49,8 +51,8 @@ pub enum OpenError {
 }
 
 /// Everything that outlasts a process.
-pub trait Store: ResultStore + jobs::JobStore {}
-impl<S: ResultStore + jobs::JobStore> Store for S {}
+pub trait Store: ResultStore + jobs::JobStore + models::ModelStore {}
+impl<S: ResultStore + jobs::JobStore + models::ModelStore> Store for S {}
 
 /// Which store, and how it is used.
 #[derive(Debug, Clone)]
@@ -168,7 +170,7 @@ impl ResultQuery {
     pub const MOST: u32 = 500;
 }
 
-/// A place in the list of results; opaque in the contract.
+/// A place in the list of results; opaque in the contract, and written in one way only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Cursor {
     /// Time of the last result of the page before, ms UTC.
@@ -179,15 +181,17 @@ pub struct Cursor {
 
 impl fmt::Display for Cursor {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}.{}", self.created_ms, self.key.to_string().trim_start_matches("b3:"))
+        write!(f, "{}-{}", self.created_ms, self.key.to_string().trim_start_matches("b3:"))
     }
 }
 
 impl FromStr for Cursor {
     type Err = BadKey;
     fn from_str(text: &str) -> Result<Self, BadKey> {
-        let (created_ms, digits) = text.split_once('.').ok_or(BadKey)?;
-        Ok(Self { created_ms: created_ms.parse().map_err(|_| BadKey)?, key: format!("b3:{digits}").parse()? })
+        let (created_ms, digits) = text.split_once('-').ok_or(BadKey)?;
+        let read = Self { created_ms: created_ms.parse().map_err(|_| BadKey)?, key: format!("b3:{digits}").parse()? };
+        // Signs, zeros in front and capitals would be other addresses of the same page.
+        if read.to_string() == text { Ok(read) } else { Err(BadKey) }
     }
 }
 

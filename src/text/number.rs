@@ -1,4 +1,6 @@
-//! Numbers and units as people read them.
+//! Numbers as people read them.
+
+use super::Language;
 
 /// `x` with `digits` significant digits, without trailing zeros; very large and very small numbers with an exponent.
 pub(crate) fn significant(x: f64, digits: usize) -> String {
@@ -30,13 +32,12 @@ fn trimmed(number: &str) -> &str {
     if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { number }
 }
 
-/// A unit of the contract as it is printed: `µm/N` for `um/N`, nothing for `1`.
-pub(super) fn printed_unit(unit: &str) -> String {
-    if unit == "1" {
-        return String::new();
+/// A number as it stands in a sentence of that language.
+pub(super) fn spoken(number: &str, language: Language) -> String {
+    match language.decimal() {
+        '.' => number.to_owned(),
+        decimal => number.replace('.', decimal.encode_utf8(&mut [0; 4])),
     }
-    let micro = unit.strip_prefix("um").map_or_else(|| unit.to_owned(), |rest| format!("µm{rest}"));
-    micro.replace("mm2", "mm²").replace("m3", "m³").replace("s2", "s²")
 }
 
 #[cfg(test)]
@@ -64,13 +65,5 @@ mod tests {
             assert_eq!(significant(x, digits), expected);
         }
         assert_eq!(fixed(1.005, 1), "1.0");
-    }
-
-    #[test]
-    fn units_are_printed_with_their_signs() {
-        assert_eq!(printed_unit("um/N"), "µm/N");
-        assert_eq!(printed_unit("N/mm2"), "N/mm²");
-        assert_eq!(printed_unit("kg/m3"), "kg/m³");
-        assert_eq!(printed_unit("1"), "");
     }
 }

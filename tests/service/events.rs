@@ -61,6 +61,7 @@ async fn a_stream_tells_a_jobs_life_from_its_state_to_its_end() {
     let interim = named("interim");
     assert!(!interim.is_empty() && interim.len() <= 5);
     assert_eq!(interim[0].data["id"], "sag");
+    assert!(interim[0].data["title"]["text"].as_str().is_some_and(|title| !title.is_empty()));
     let last = events.last().unwrap();
     assert_eq!(last.name, "done");
     assert_eq!(last.data, job(&server, &address).await);

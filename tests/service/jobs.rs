@@ -286,7 +286,7 @@ async fn jobs_are_listed_newest_first_by_pages_and_filtered() {
     assert_eq!(ids(&list("/v1/jobs?state=running").await), [held]);
     assert_eq!(ids(&list("/v1/jobs?state=succeeded&calculator=sagging-bar&limit=2").await), expected[1..3]);
     assert_eq!(ids(&list("/v1/jobs?state=failed").await), [""; 0]);
-    for bad in ["limit=0", "limit=501", "state=done", "after=x", "colour=red"] {
+    for bad in ["limit=0", "limit=501", "state=done", "after=x", "after=", "colour=red"] {
         problem(server.get(&format!("/v1/jobs?{bad}")).send().await.unwrap(), 400, "bad_query").await;
     }
     problem(server.get("/v1/jobs?calculator=none").send().await.unwrap(), 404, "unknown_calculator").await;

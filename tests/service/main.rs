@@ -10,6 +10,7 @@ mod command_line;
 mod contract;
 mod events;
 mod jobs;
+mod language;
 mod limits;
 mod negotiation;
 mod process;

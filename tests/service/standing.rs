@@ -66,6 +66,16 @@ async fn metrics_count_requests_by_route_and_status_and_answers_by_cache() {
     assert!(after.contains("http_request_duration_seconds_bucket{route=\"/v1/sagging-bar\",le=\"0.01\"}"), "{after}");
     assert!(after.contains("precut_build_info{version="), "{after}");
     assert!(!after.contains("none-such"), "a client cannot make up labels");
+    for line in after.lines().filter_map(|line| line.strip_prefix("# TYPE ")) {
+        let name = line.split(' ').next().unwrap();
+        assert!(after.contains(&format!("# HELP {name} ")), "{name} is not explained");
+    }
+    let mut series: Vec<_> =
+        after.lines().filter(|line| !line.starts_with('#')).filter_map(|line| line.rsplit_once(' ')).collect();
+    let lines = series.len();
+    series.sort_unstable();
+    series.dedup_by_key(|(name, _)| *name);
+    assert_eq!(series.len(), lines, "a series stands there twice");
 }
 
 #[tokio::test]
@@ -111,7 +121,7 @@ async fn the_landing_page_speaks_to_people_and_to_programs() {
     let page = server.get("/").header("accept", "text/html,*/*;q=0.8").send().await.unwrap();
     assert_eq!(header(&page, "content-type"), "text/html; charset=utf-8");
     let text = page.text().await.unwrap();
-    assert!(text.contains("How far does the bar sag?") && text.contains("/docs"), "{text}");
+    assert!(text.contains("/main.js\"></script>") && text.contains("/docs"), "{text}");
 }
 
 #[tokio::test]

@@ -10,6 +10,7 @@ use std::time::Duration;
 use precut::config::Config;
 use precut::engine::{Engine, EngineSettings};
 use precut::http::{self, App};
+use precut::registry::Registry;
 use reqwest::{Client, RequestBuilder, Response};
 use serde_json::Value;
 use tempfile::TempDir;
@@ -34,12 +35,17 @@ impl Server {
 
     /// With settings of the test's own.
     pub async fn start_with(adjust: impl FnOnce(&mut Config)) -> Self {
+        Self::start_of(toy::registry(), adjust).await
+    }
+
+    /// With the calculators of a registry.
+    pub async fn start_of(registry: Registry, adjust: impl FnOnce(&mut Config)) -> Self {
         let data = tempfile::tempdir().expect("a folder for temporary files");
         let mut config = Config::default();
         adjust(&mut config);
         config.data = data.path().to_owned();
         let settings = EngineSettings::of(&config);
-        let engine = Engine::open(toy::registry(), settings).await.expect("an empty folder");
+        let engine = Engine::open(registry, settings).await.expect("an empty folder");
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
         let address = listener.local_addr().expect("it is bound");
         let app = App::new(engine.clone(), &config);

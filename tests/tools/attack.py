@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Lets schemathesis attack a running service from its own contract.
 
-    attack.py PRECUT SCHEMATHESIS [--examples N] [-- further arguments of `schemathesis run`]
+    attack.py [--examples N] PRECUT SCHEMATHESIS [-- further arguments of `schemathesis run`]
 
 Starts the program PRECUT on a free port with an empty data folder, runs every check of schemathesis against
 it (schemathesis.toml beside this file), and demands afterwards that the service is alive and never panicked.

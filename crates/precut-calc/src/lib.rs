@@ -20,9 +20,10 @@ pub mod shaft;
 
 use calculator::Registrar;
 
-/// Every calculator, one line each. Nothing else has to change when one moves in.
+/// Every calculator, one line each. Nothing else has to change when one moves in: those that can be diagnosed make up
+/// the calculator `diagnosis`.
 pub fn register(registrar: &mut impl Registrar) {
-    registrar.with_forward_model::<deflection_compensation::DeflectionCompensation>();
+    registrar.diagnosable::<deflection_compensation::DeflectionCompensation>();
     registrar.with_forward_model::<ring_roundness::RingRoundness>();
     registrar.calculator::<ring_roundness::evaluation::RoundnessEvaluation>();
     registrar.with_forward_model::<feed_schedule::FeedSchedule>();

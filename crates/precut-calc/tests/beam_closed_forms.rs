@@ -1,9 +1,7 @@
 //! The beam against closed forms.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod beam_support;
-
-use beam_support::{assert_close, beam, number, numbers};
+use crate::beam_support::{assert_close, beam, number, numbers};
 use precut_calc::num::beam::Wanted;
 use serde_json::Value;
 

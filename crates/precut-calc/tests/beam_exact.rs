@@ -1,10 +1,8 @@
 //! The beam against an independent exact solution of the differential equation, for random shafts.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod beam_support;
-
-use beam_support::exact::{Acting, Exact, Plane};
-use beam_support::random::{Case, cases};
+use crate::beam_support::exact::{Acting, Exact, Plane};
+use crate::beam_support::random::{Case, cases};
 use precut_calc::num::beam::{Beam, Profile, State, Support, ToolLoad, Wanted};
 use proptest::prelude::*;
 

@@ -1,9 +1,7 @@
 //! What must hold for every shaft: reciprocity, symmetry, scaling, limits.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod beam_support;
-
-use beam_support::random::{Case, cases, moved};
+use crate::beam_support::random::{Case, cases, moved};
 use precut_calc::num::beam::{Beam, Contact, Section, Segment, Side, Springs, State, Support, ToolLoad, Wanted};
 use proptest::prelude::*;
 

@@ -2,17 +2,15 @@
 //! for a uniform shaft between centres and solved by bisection.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
-mod support;
-
 use std::f64::consts::PI;
 
+use crate::support::prepared;
 use precut_calc::calculator::{ForwardModel, Prediction, Rows, Unwatched};
 use precut_calc::deflection_compensation::{
     DeflectionCompensation, DeflectionPoint, DeflectionRun, FeedDirection, Job,
 };
 use precut_calc::effects::{DEFLECTION_CAUSES, DeflectionEffect, Fit};
 use serde_json::{Value, json};
-use support::prepared;
 
 const L: f64 = 660.0;
 const D: f64 = 40.0;

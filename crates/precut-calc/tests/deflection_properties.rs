@@ -1,15 +1,13 @@
 //! What must hold for any shaft: the command gives the drawing, mirrored jobs give mirrored answers, and so on.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
-mod support;
-
+use crate::support::{prepared, solved};
 use precut_calc::calculator::{ForwardModel, Rows, Unwatched};
 use precut_calc::deflection_compensation::{
     DeflectionCompensation, DeflectionPoint, DeflectionRun, Job, Outcome, StatusCompensated,
 };
 use proptest::prelude::*;
 use serde_json::{Value, json};
-use support::{prepared, solved};
 
 /// A shaft of three segments in centres, with or without a one-sided rest and everything that can act.
 #[derive(Debug, Clone)]

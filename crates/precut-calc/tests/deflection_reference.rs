@@ -1,11 +1,9 @@
 //! The reference cases of the deflection calculator, in full.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
-mod support;
-
+use crate::support::{Tolerance, cases, expected, reference, scaled, scaled_gaps, solved, translate};
 use precut_calc::deflection_compensation::Outcome;
 use serde_json::{Value, json};
-use support::{Tolerance, cases, expected, reference, scaled, scaled_gaps, solved, translate};
 
 const UM: f64 = 1e-3;
 

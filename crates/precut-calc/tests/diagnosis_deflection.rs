@@ -1,8 +1,7 @@
 //! The open deflection cases of the diagnosis, whose hidden cause is known.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
-mod support;
-
+use crate::support::prepared;
 use precut_calc::calculator::{Diagnosable, ForwardModel, Rows, Unwatched};
 use precut_calc::deflection_compensation::{
     DeflectionAllowances, DeflectionCompensation, DeflectionPoint, DeflectionRun, Job,
@@ -12,7 +11,6 @@ use precut_calc::diagnosis::{
     remainder_shape, separations, suspected_factor,
 };
 use serde_json::{Value, json};
-use support::prepared;
 
 fn example(name: &str) -> Value {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference/diagnosis").join(name);

@@ -1,7 +1,7 @@
 //! Blind trials of the diagnosis: effects hidden by a generator that shares no code with the calculators.
 //!
 //! On a fixed set of seeds the goals are asserted, two binomial standard deviations below. Other seeds and
-//! sizes: `PRECUT_TRIALS=300 PRECUT_TRIAL_SEED=12345 cargo test --release -p precut-calc --test diagnosis_trials -- --nocapture`.
+//! sizes: `PRECUT_TRIALS=300 PRECUT_TRIAL_SEED=12345 cargo test --release -p precut-calc diagnosis_trials -- --nocapture`.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, missing_docs)]
 
 use precut_calc::calculator::{Calculator, Check, Unwatched, Violations};

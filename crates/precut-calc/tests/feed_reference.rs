@@ -1,9 +1,7 @@
 //! The reference cases of the feed schedule, in full.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
-mod feed_support;
-
-use feed_support::{conflict, multipliers, near, of_zone, reference, solve, solved, translate};
+use crate::feed_support::{conflict, multipliers, near, of_zone, reference, solve, solved, translate};
 use precut_calc::calculator::{Failure, Unwatched};
 use precut_calc::feed_schedule::Outcome;
 use serde_json::{Value, json};

@@ -1,11 +1,9 @@
 //! Effects on the fixture model and the model as a diagnosis sees it.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
-mod fixture_support;
-
 use std::path::Path;
 
-use fixture_support::{checked, outcome, reference_job, with};
+use crate::fixture_support::{checked, outcome, reference_job, with};
 use precut_calc::calculator::{ForwardModel, Missing, Rows, Unwatched};
 use precut_calc::effects::{FIXTURE_CAUSES, FixtureEffect};
 use precut_calc::fixture_stability::{FixtureAllowances, FixturePoint, FixtureRun, FixtureStability};

@@ -2,16 +2,12 @@
 //! zeroth order.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::float_cmp, missing_docs)]
 
-mod fixture_support;
-#[path = "fixture_support/semi.rs"]
-mod semi;
-
 use std::f64::consts::{PI, TAU};
 
-use fixture_support::{outcome, reference, reference_job, translate, with};
+use crate::fixture_support::semi::{Equation, multiplier};
+use crate::fixture_support::{outcome, reference, reference_job, translate, with};
 use nalgebra::DMatrix;
 use precut_calc::num::dde::{PeriodMap, Propagator, Rule, largest};
-use semi::{Equation, multiplier};
 use serde_json::{Value, json};
 
 /// Largest multiplier of q' = A q - b [present(t) x + delayed(t) x(t - T)] on even elements.

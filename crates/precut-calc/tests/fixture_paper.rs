@@ -1,9 +1,7 @@
 //! The source paper's two tables with the identified parameters, row by row.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
-mod fixture_support;
-
-use fixture_support::{outcome, reference};
+use crate::fixture_support::{outcome, reference};
 use serde_json::{Value, json};
 
 /// The job of a row of the identified set; the paper's program forgets what earlier teeth left.

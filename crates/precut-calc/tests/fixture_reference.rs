@@ -1,9 +1,8 @@
 //! The reference cases, closed forms, the published benchmark and the source paper's tables.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::float_cmp, missing_docs)]
 
-mod fixture_support;
-
-use fixture_support::{checked, outcome, reference, translate, with};
+use crate::fixture_support;
+use crate::fixture_support::{checked, outcome, reference, translate, with};
 use precut_calc::fixture_stability::FixtureOutcome;
 use serde_json::{Value, json};
 

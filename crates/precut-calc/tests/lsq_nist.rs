@@ -1,8 +1,7 @@
 //! The 54 runs of NIST's nonlinear reference problems, one default setting, derivatives by differences.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, missing_docs)]
 
-mod strd;
-
+use crate::strd;
 use precut_calc::num::lsq::{Ending, Noise};
 
 #[test]

@@ -1,11 +1,9 @@
 //! What a ring job may not be, what is said of it, and what must hold of every answer.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
-mod ring_support;
-
+use crate::ring_support::{codes, faults, run, try_run};
 use precut_calc::calculator::{Calculator, Failure};
 use precut_calc::ring_roundness::{Outcome, RingRoundness};
-use ring_support::{codes, faults, run, try_run};
 use serde_json::{Value, json};
 
 fn paper() -> Value {
@@ -368,7 +366,7 @@ mod any {
     }
 
     /// Jobs round a ring of some size, from sensible to absurd.
-    pub fn job() -> impl Strategy<Value = Value> {
+    pub(super) fn job() -> impl Strategy<Value = Value> {
         let machine =
             (wide(0.1, 1e5), 5.0..80.0_f64, -0.06..0.2_f64, 0.0..360.0_f64, prop_oneof![Just(0.0), wide(1e-3, 10.0)]);
         let cut =
@@ -416,7 +414,7 @@ mod any {
     }
 
     /// Every number of a value is finite: JSON has null for the others, which `roundness_um` must not be after a run.
-    pub fn finite(value: &Value) -> bool {
+    pub(super) fn finite(value: &Value) -> bool {
         match value {
             Value::Number(number) => number.as_f64().is_some_and(f64::is_finite),
             Value::Array(items) => items.iter().all(finite),

@@ -2,11 +2,9 @@
 //! linear theory, closed forms, support reactions.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
-mod ring_support;
-
+use crate::ring_support::{reference, run, translate};
 use precut_calc::calculator::Answer;
 use precut_calc::ring_roundness::{Outcome, SimulationOutcome};
-use ring_support::{reference, run, translate};
 use serde_json::{Value, json};
 
 /// Compares within the file's own tolerance, which is three times what halving the nodes changes.

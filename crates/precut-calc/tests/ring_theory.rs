@@ -1,10 +1,8 @@
 //! Linear theory and support reactions of the ring against the reference, through jobs with the same angles.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
-mod ring_support;
-
+use crate::ring_support::{reference, run};
 use precut_calc::ring_roundness::{Fate, Outcome};
-use ring_support::{reference, run};
 use serde_json::{Value, json};
 
 /// A job whose ring rests at the end of its feed with its centre in the origin, at the angles asked for.

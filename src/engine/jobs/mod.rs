@@ -56,9 +56,8 @@ use tokio::task::JoinHandle;
 use super::progress::Reported;
 use super::{Error, Inner, Key, Stored};
 use crate::store::jobs::{
-    Accepted, Changed, Idempotency, JobId, JobKind, JobPage, JobQuery, JobRecord, JobState, JobStore, MOST_ATTEMPTS, NewJob,
-    News,
-    Priority, Timing,
+    Accepted, Changed, Idempotency, JobId, JobKind, JobPage, JobQuery, JobRecord, JobState, JobStore, MOST_ATTEMPTS,
+    NewJob, News, Priority, Timing,
 };
 use crate::store::now_ms;
 use estimate::Estimates;
@@ -229,7 +228,10 @@ impl Jobs {
     ) -> Result<(JobRecord, bool), Error> {
         let idempotency = ask.idempotency_key.clone().map(|key| Idempotency { key, body_hash: request.body_hash });
         let deadline_ms = ask.deadline.map(|after| {
-            self.store.now_ms().saturating_add(i64::try_from(after.as_millis()).unwrap_or(i64::MAX / 2)).min(i64::MAX / 2)
+            self.store
+                .now_ms()
+                .saturating_add(i64::try_from(after.as_millis()).unwrap_or(i64::MAX / 2))
+                .min(i64::MAX / 2)
         });
         let job = NewJob {
             id: JobId::at(self.store.now_ms()),

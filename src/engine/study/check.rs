@@ -147,7 +147,7 @@ pub(super) fn outputs(entry: &Entry, input: &mut StudyInput, found: &mut Vec<Fin
     for (index, pointer) in input.outputs.iter().enumerate() {
         let at = format!("/outputs/{index}");
         if !seen.insert(pointer) {
-            found.push(Finding::new("duplicate_output", at).with("received", pointer.clone()));
+            found.push(Finding::new("repeated_output", at).with("received", pointer.clone()));
             continue;
         }
         let Some(tokens) = tokens(pointer) else {

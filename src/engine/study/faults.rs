@@ -9,7 +9,7 @@ use crate::registry::{Registry, nearest};
 /// Codes of the faults that only a study has.
 pub(crate) const FAULTS: &[&str] = &[
     "bad_pointer",
-    "duplicate_output",
+    "repeated_output",
     "duplicate_value",
     "duplicate_variable",
     "empty_range",

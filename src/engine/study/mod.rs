@@ -154,7 +154,9 @@ impl Job for Study {
     /// Measured tables of the job as row count and hash.
     fn input(&self) -> Result<Value, Failure> {
         let mut input = self.plan.input.clone();
-        let job = super::table::without_rows(Value::Object(std::mem::take(&mut input.job)), self.plan.entry.tables());
+        let job = Value::Object(std::mem::take(&mut input.job));
+        let places = self.plan.entry.tables_of(&job).to_vec();
+        let job = super::table::without_rows(job, &places);
         if let Value::Object(job) = job {
             input.job = job;
         }

@@ -204,7 +204,8 @@ fn values_in(value: &Value) -> usize {
 fn rows_for_tables(entry: &Entry, job: &mut Map<String, Value>) -> Vec<Finding> {
     let mut whole = Value::Object(std::mem::take(job));
     let mut faults = Faults::default();
-    crate::engine::table::resolve(&mut whole, &[], entry.tables(), &mut faults);
+    let places = entry.tables_of(&whole).to_vec();
+    crate::engine::table::resolve(&mut whole, &[], &places, &mut faults);
     if let Value::Object(resolved) = whole {
         *job = resolved;
     }

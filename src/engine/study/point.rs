@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Instant;
 
-use precut_calc::calculator::{Failure, Monitor};
+use precut_calc::calculator::{Failure, Finding, Monitor};
 use serde::{Deserialize, Serialize};
 
 use super::host::Host;
@@ -87,46 +87,51 @@ fn compute(plan: &Plan, point: usize, host: &dyn Host, monitor: &dyn Monitor) ->
         let unreadable = |error: serde_json::Error| Error::Calculation(Failure::Internal(error.to_string()));
         plan.wanted.pick(&stored.body).map_err(unreadable)
     });
-    let row = |status, code, detail, outputs| Row {
+    let row = |status, said: Option<&Finding>, outputs| Row {
         values: plan.settings(point),
         status,
-        code,
-        detail,
+        code: said.map(|finding| finding.code.to_owned()),
+        detail: said.map(|finding| Texts::shared().finding(Language::default(), "fault", finding)),
+        detail_values: said.map(values_of),
         outputs,
         key: key.map(|key| key.to_string()),
     };
     match picked {
-        Ok(picked) => Some((row(Status::Succeeded, None, None, picked.numbers.clone()), picked)),
+        Ok(picked) => Some((row(Status::Succeeded, None, picked.numbers.clone()), picked)),
         Err(Error::Cancelled | Error::ShuttingDown) => None,
         Err(error) => {
-            let (status, code, detail) = reason(&error);
+            let (status, finding) = reason(&error);
             let nothing = vec![None; plan.outputs.len()];
-            Some((row(status, Some(code.to_owned()), Some(detail), nothing), Picked::default()))
+            Some((row(status, Some(&finding), nothing), Picked::default()))
         }
     }
 }
 
-/// Why a point has no answer: kind, code, sentence.
-fn reason(error: &Error) -> (Status, &'static str, String) {
-    let texts = Texts::shared();
-    let fault = |finding| texts.finding(Language::En, "fault", finding);
-    let problem = |code, values| texts.problem(Language::En, code, &values).1;
-    let none = precut_calc::calculator::Values::new;
+/// Why a point has no answer: what kind of reason, and what is to be said.
+fn reason(error: &Error) -> (Status, Finding) {
+    let whole = |code| Finding::new(code, "");
     match error {
-        Error::Invalid { findings, .. } => match findings.first() {
-            Some(first) => (Status::Invalid, first.code, fault(first)),
-            None => (Status::Invalid, "invalid_job", String::new()),
-        },
-        Error::Calculation(Failure::Infeasible(finding)) => (Status::Infeasible, finding.code, fault(finding)),
-        Error::Calculation(Failure::OutOfModel(finding)) => (Status::OutOfModel, finding.code, fault(finding)),
-        Error::Calculation(Failure::NotConverged { what, residual, iterations }) => {
-            let values =
-                none().with("what", *what).with("residual", *residual).with("iterations", f64::from(*iterations));
-            (Status::NotConverged, "not_converged", problem("not_converged", values))
+        Error::Invalid { findings, .. } => {
+            (Status::Invalid, findings.first().cloned().unwrap_or_else(|| whole("invalid_job")))
         }
-        Error::Crashed => (Status::Failed, "crashed", problem("crashed", none())),
-        _ => (Status::Failed, "internal", problem("internal", none())),
+        Error::Calculation(Failure::Infeasible(finding)) => (Status::Infeasible, finding.clone()),
+        Error::Calculation(Failure::Conflicting(conflict)) => (Status::Infeasible, conflict.finding.clone()),
+        Error::Calculation(Failure::OutOfModel(finding)) => (Status::OutOfModel, finding.clone()),
+        Error::Calculation(Failure::NotConverged { what, residual, iterations }) => {
+            let finding = whole("not_converged").with("what", *what).with("iterations", f64::from(*iterations));
+            (Status::NotConverged, if residual.is_finite() { finding.with("residual", *residual) } else { finding })
+        }
+        Error::Crashed => (Status::Failed, whole("crashed")),
+        _ => (Status::Failed, whole("internal")),
     }
+}
+
+/// What a sentence says beside its code, so that it can be said in another language.
+fn values_of(finding: &Finding) -> serde_json::Value {
+    serde_json::json!({
+        "pointer": finding.pointer, "value": finding.value, "limit": finding.limit, "unit": finding.unit,
+        "values": finding.values,
+    })
 }
 
 /// A point's view of the study's monitor: it may be cancelled, its progress is nobody's business.

@@ -123,6 +123,10 @@ pub(crate) struct Row {
     pub(crate) code: Option<String>,
     /// The same in a sentence.
     pub(crate) detail: Option<String>,
+    /// What the sentence says: `pointer`, `value`, `limit`, `unit` and further `values`; only where there is no answer.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = Option<Object>)]
+    pub(crate) detail_values: Option<serde_json::Value>,
     /// The outputs, in the order of `outputs`; null where the answer has none.
     #[schema(schema_with = numbers)]
     pub(crate) outputs: Vec<Option<f64>>,

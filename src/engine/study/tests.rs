@@ -199,7 +199,7 @@ fn every_fault_of_a_study_is_listed_at_once() {
             ("unknown_field", "/job/colour"),
             ("missing_column", "/job/measurements"),
             ("not_a_number", "/outputs/0"),
-            ("duplicate_output", "/outputs/2"),
+            ("repeated_output", "/outputs/2"),
             ("no_such_field", "/outputs/3"),
             ("bad_pointer", "/outputs/4"),
             ("no_such_field", "/outputs/5"),
@@ -495,7 +495,9 @@ fn the_cost_is_that_of_its_points() {
 fn a_composed_entry_is_never_run_where_it_arrives() {
     let entry = studies_of(&toy::registry());
     assert!(entry.is_composed());
-    let ready = read::read(&entry, &body(&study(json!([{"pointer": "/length_mm", "values": [100]}])))).unwrap();
+    let models = crate::engine::model::Models { registry: toy::shared(), found: None };
+    let study = study(json!([{"pointer": "/length_mm", "values": [100]}]));
+    let ready = read::read(&entry, &body(&study), &models).unwrap();
     assert!(ready.prepared.cost.ms < 0.5, "although it is short");
 }
 

@@ -7,7 +7,7 @@ use utoipa::openapi::{Content, RefOr, Schema};
 
 use super::parts;
 use crate::http::negotiate::Media;
-use crate::http::{calculators, codes, health, materials, pages, results};
+use crate::http::{calculators, codes, health, materials, pages, parts as result_parts, results};
 use crate::registry::Registry;
 
 /// Address and operations, in the order of the document.
@@ -18,6 +18,9 @@ pub(super) fn paths(registry: &Registry) -> Vec<(&'static str, PathItem)> {
         ("/v1/calculators/{id}", get(describe_calculator(registry))),
         ("/v1/results", get(list_results(registry))),
         ("/v1/results/{key}", get(read_result())),
+        ("/v1/results/{key}/figures", get(read_figures())),
+        ("/v1/results/{key}/tables", get(read_tables())),
+        ("/v1/results/{key}/job", get(read_result_job())),
         ("/v1/materials", get(list_materials())),
         ("/v1/materials/{id}", get(read_material())),
         ("/", get(landing())),
@@ -36,6 +39,9 @@ pub(super) fn schemas() -> Vec<(String, RefOr<Schema>)> {
         super::schemas_of::<calculators::CalculatorList>(),
         super::schemas_of::<calculators::CalculatorDescription>(),
         super::schemas_of::<results::ResultList>(),
+        super::schemas_of::<result_parts::FigureList>(),
+        super::schemas_of::<result_parts::TableList>(),
+        super::schemas_of::<result_parts::JobFile>(),
         super::schemas_of::<materials::MaterialList>(),
         super::schemas_of::<pages::Landing>(),
         super::schemas_of::<pages::ProblemPage>(),
@@ -114,7 +120,7 @@ fn read_result() -> OperationBuilder {
                 .description(Some("The answer: `calculator` says which one made it, and by which schema.")),
         )),
     ))
-    .header("Content-Language", parts::text_header("Language of the sentences.", "en"))
+    .header("Content-Language", parts::text_header("Language of the sentences: `en` or `ru`.", "en"))
     .header("Precut-Cache", parts::text_header("Always `hit`: nothing is computed.", "hit"));
     for (media, text) in
         [(Media::Csv, "One of its tables."), (Media::Svg, "One of its figures."), (Media::Gcode, "Its program.")]
@@ -133,6 +139,42 @@ fn read_result() -> OperationBuilder {
     .parameter(query("figure", "Which figure, with `Accept: image/svg+xml`; the first if absent."))
     .response("200", response);
     parts::guarded(parts::conditional(operation), &[400, 404, 406, 410, 422])
+}
+
+/// An operation that reads a part of a kept answer.
+fn part_of_result(id: &str, summary: &str, description: &str, schema: &str) -> OperationBuilder {
+    let key = json!("b3:0000000000000000000000000000000000000000000000000000000000000000");
+    let operation = operation("results", id, summary, description)
+        .parameter(parts::path_parameter("key", "Address of the answer.", parts::key(), key))
+        .response("200", parts::tagged(json_of(schema, "The part of the answer.")));
+    parts::guarded(parts::conditional(operation), &[400, 404, 410, 422])
+}
+
+fn read_figures() -> OperationBuilder {
+    part_of_result(
+        "read_result_figures",
+        "What is there to draw?",
+        "The figures of a kept answer as data: frame, axes, curves and symbols, with their words.",
+        "FigureList",
+    )
+}
+
+fn read_tables() -> OperationBuilder {
+    part_of_result(
+        "read_result_tables",
+        "What is there to tabulate?",
+        "The tables of a kept answer by columns, with their words.",
+        "TableList",
+    )
+}
+
+fn read_result_job() -> OperationBuilder {
+    part_of_result(
+        "read_result_job",
+        "Which job made that answer?",
+        "The job of a kept answer with every default filled in and its measured tables as rows: to be changed and sent again.",
+        "JobFile",
+    )
 }
 
 fn list_materials() -> OperationBuilder {

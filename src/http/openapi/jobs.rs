@@ -76,7 +76,7 @@ fn accepted() -> ResponseBuilder {
     .header("Location", parts::text_header("Address of the job.", &format!("/v1/jobs/{EXAMPLE}")))
     .header("Retry-After", seconds())
     .header("Preference-Applied", parts::text_header("Preferences that were followed.", "respond-async"))
-    .header("Content-Language", parts::text_header("Language of the sentences.", "en"))
+    .header("Content-Language", parts::text_header("Language of the sentences: `en` or `ru`.", "en"))
     .link("job", link("read_job", "Reads the job."))
     .link("result", link("read_job_result", "Reads its result."))
     .link("cancel", link("cancel_job", "Cancels it."))
@@ -106,14 +106,14 @@ fn text_like(pattern: &str) -> Object {
 }
 
 fn languages(operation: OperationBuilder) -> OperationBuilder {
-    let text = "Languages of sentences by preference; English where none fits.";
+    let text = "Languages of sentences by preference: `en` (English) or `ru` (Russian); English where none fits.";
     operation.parameter(parts::parameter("Accept-Language", ParameterIn::Header, text, parts::string()).build())
 }
 
 fn the_job(text: &str) -> ResponseBuilder {
     parts::success(text, "application/json", parts::json_of("Job"))
         .header("Retry-After", seconds())
-        .header("Content-Language", parts::text_header("Language of the sentences.", "en"))
+        .header("Content-Language", parts::text_header("Language of the sentences: `en` or `ru`.", "en"))
 }
 
 fn list(registry: &Registry) -> OperationBuilder {
@@ -136,7 +136,7 @@ fn list(registry: &Registry) -> OperationBuilder {
     .response(
         "200",
         parts::success("A page of jobs.", "application/json", parts::json_of("JobList"))
-            .header("Content-Language", parts::text_header("Language of the sentences.", "en")),
+            .header("Content-Language", parts::text_header("Language of the sentences: `en` or `ru`.", "en")),
     );
     parts::guarded(languages(operation), &[400, 404])
 }
@@ -167,7 +167,7 @@ fn result() -> OperationBuilder {
         ObjectBuilder::new().description(Some("The answer: `calculator` says which one made it, and by which schema."));
     let mut response = parts::tagged(parts::success("The answer.", Media::Json.essence(), Content::new(Some(answer))))
         .header("Content-Location", parts::text_header("Lasting address of the answer.", "/v1/results/b3:5d41..."))
-        .header("Content-Language", parts::text_header("Language of the sentences.", "en"))
+        .header("Content-Language", parts::text_header("Language of the sentences: `en` or `ru`.", "en"))
         .header("Precut-Cache", parts::text_header("Always `hit`: nothing is computed.", "hit"))
         .header("Server-Timing", parts::text_header("Where the time went, ms.", "parse;dur=0.000"));
     for (media, text) in
@@ -191,9 +191,17 @@ fn result() -> OperationBuilder {
 fn follow() -> OperationBuilder {
     let text = "Events `state` and `done` with the job as data, `progress` with a `JobProgress`, `interim` with a figure \
                 of what is computed so far. At most five `progress` and `interim` each second.";
-    let schema = ObjectBuilder::new().schema_type(SchemaType::new(Type::String)).description(Some(text)).build();
+    // OpenAPI 3.1 has no word for the items of a stream: as its tools have it, the schema is that of one event.
+    let string = |about: &str| ObjectBuilder::new().schema_type(SchemaType::new(Type::String)).description(Some(about));
+    let schema = ObjectBuilder::new()
+        .property("event", string("`state`, `progress`, `interim` or `done`."))
+        .property("id", string("Number of the event, for `Last-Event-ID`."))
+        .property("data", string("JSON: a `Job`, a `JobProgress` or a figure."))
+        .description(Some(text))
+        .build();
     let stream = parts::success("The events, until the job is over.", "text/event-stream", Content::new(Some(schema)));
-    let last = ObjectBuilder::new().schema_type(SchemaType::new(Type::Integer)).minimum(Some(0)).build();
+    // Any text: what is no number of an event is as good as none.
+    let last = ObjectBuilder::new().schema_type(SchemaType::new(Type::String)).build();
     let operation = operation(
         "follow_job",
         "Can I watch that job?",

@@ -2,6 +2,7 @@
 
 mod fixed;
 mod jobs;
+mod models;
 mod parts;
 mod rooms;
 
@@ -59,10 +60,12 @@ pub fn document(registry: &Registry) -> Value {
     let studies = rooms::studies(registry);
     paths = paths.path(format!("/v1/{STUDIES}"), studies.path);
     schemas.extend(studies.schemas);
-    for (address, path) in jobs::paths(registry).into_iter().chain(fixed::paths(registry)) {
+    for (address, path) in jobs::paths(registry).into_iter().chain(models::paths()).chain(fixed::paths(registry)) {
         paths = paths.path(address, path);
     }
-    for (name, schema) in parts::schemas().into_iter().chain(fixed::schemas()).chain(jobs::schemas()) {
+    for (name, schema) in
+        parts::schemas().into_iter().chain(fixed::schemas()).chain(jobs::schemas()).chain(models::schemas())
+    {
         schemas.insert(name, schema);
     }
     let components = schemas

@@ -15,11 +15,12 @@ use crate::text::Remark;
 
 pub(super) const BEARER: &str = "bearer";
 
-pub(super) const TAGS: [(&str, &str); 7] = [
+pub(super) const TAGS: [(&str, &str); 8] = [
     ("calculators", "Predict and decide from a model of the process."),
     ("evaluations", "Evaluate data that the user brings."),
     ("studies", "Vary one to three fields of any of them."),
     ("jobs", "Calculations that take long: watched, cancelled, and their results."),
+    ("models", "What diagnoses found, stored for later jobs."),
     ("library", "What can be asked, and the data of the engine."),
     ("results", "Kept answers, read again without computing."),
     ("service", "Health, figures, documentation."),
@@ -85,7 +86,7 @@ pub(super) fn responses() -> Vec<(String, Response)> {
                 .description(text)
                 .content("application/problem+json", content)
                 .header("x-request-id", request_id())
-                .header("Content-Language", text_header("Language of the sentences.", "en"));
+                .header("Content-Language", text_header("Language of the sentences: `en` or `ru`.", "en"));
             if matches!(status, 409 | 429 | 503) {
                 response = response.header("Retry-After", retry_after());
             }
@@ -155,7 +156,7 @@ pub(super) fn conditional(operation: OperationBuilder) -> OperationBuilder {
     operation
         .parameter(header_parameter(
             "Accept-Language",
-            "Languages of sentences by preference; English where none fits.",
+            "Languages of sentences by preference: `en` (English) or `ru` (Russian); English where none fits.",
         ))
         .parameter(header_parameter(
             "If-None-Match",

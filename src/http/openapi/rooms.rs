@@ -136,7 +136,7 @@ fn multipart(entry: &Entry, job: &str) -> Content {
 fn answered(meta: &Meta, answer: &str) -> ResponseBuilder {
     let mut response = parts::tagged(parts::success("The answer.", Media::Json.essence(), parts::json_of(answer)))
         .header("Content-Location", parts::text_header("Lasting address of the answer.", "/v1/results/b3:5d41..."))
-        .header("Content-Language", parts::text_header("Language of the sentences.", "en"))
+        .header("Content-Language", parts::text_header("Language of the sentences: `en` or `ru`.", "en"))
         .header(
             "Precut-Cache",
             parts::header_of(parts::one_of(["hit", "miss"].map(ToOwned::to_owned)), "Whether it was there already."),
@@ -190,6 +190,7 @@ fn envelope(meta: &Meta, result: &str) -> Object {
             "input",
             anything("The job with every default filled in; measured tables in it as their row count and hash."),
         )
+        .property("model", model())
         .property("effects", effects)
         .property("result", Ref::from_schema_name(result))
         .property("explanation", list("Remark", "What dominates, what binds, what would help: most important first."))
@@ -200,11 +201,32 @@ fn envelope(meta: &Meta, result: &str) -> Object {
         .required("engine")
         .required("key")
         .required("input")
+        .required("model")
         .required("effects")
         .required("result")
         .required("explanation")
         .required("warnings")
         .required("basis")
         .description(Some(format!("An answer of {}.", meta.id)))
+        .build()
+}
+
+/// The stored model that took part in an answer.
+fn model() -> Object {
+    let text = |text: &str| ObjectBuilder::new().schema_type(SchemaType::new(Type::String)).description(Some(text));
+    let whole = |least: u32, text: &str| {
+        ObjectBuilder::new().schema_type(SchemaType::new(Type::Integer)).minimum(Some(least)).description(Some(text))
+    };
+    ObjectBuilder::new()
+        .schema_type(SchemaType::from_iter([Type::Object, Type::Null]))
+        .property("name", text("Its name."))
+        .property("revision", whole(1, "Its revision, which never changes."))
+        .property("sha256", text("Hash of its content."))
+        .property("effects", whole(0, "So many of the effects, the last ones, are the model's."))
+        .required("name")
+        .required("revision")
+        .required("sha256")
+        .required("effects")
+        .description(Some("The stored model that took part; null where none was asked for."))
         .build()
 }

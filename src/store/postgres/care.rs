@@ -191,12 +191,11 @@ async fn adopt(connection: &mut PgConnection, mine: &str) -> Outcome<()> {
         return Ok(());
     }
     let deserted: Vec<String> = older.into_iter().filter(|engine| !served.contains(engine)).collect();
-    let taken_over =
-        sqlx::query("UPDATE precut.jobs SET engine = $1 WHERE state = 'queued' AND engine = ANY($2)")
-            .bind(mine)
-            .bind(&deserted)
-            .execute(connection)
-            .await?;
+    let taken_over = sqlx::query("UPDATE precut.jobs SET engine = $1 WHERE state = 'queued' AND engine = ANY($2)")
+        .bind(mine)
+        .bind(&deserted)
+        .execute(connection)
+        .await?;
     if taken_over.rows_affected() > 0 {
         tracing::info!(jobs = taken_over.rows_affected(), of = ?deserted, "jobs of earlier versions are taken over");
     }
@@ -205,9 +204,8 @@ async fn adopt(connection: &mut PgConnection, mine: &str) -> Outcome<()> {
 
 /// Whether a version comes before another, number by number.
 fn is_older(version: &str, than: &str) -> bool {
-    let numbers = |version: &str| -> Vec<u64> {
-        version.split(['.', '-', '+']).map_while(|part| part.parse().ok()).collect()
-    };
+    let numbers =
+        |version: &str| -> Vec<u64> { version.split(['.', '-', '+']).map_while(|part| part.parse().ok()).collect() };
     numbers(version) < numbers(than)
 }
 

@@ -7,16 +7,16 @@ use sqlx::postgres::{PgConnection, Postgres};
 use tokio::sync::watch;
 use uuid::Uuid;
 
+use super::PostgresStore;
 use super::care::{note_timing, timings};
 use super::line::submit;
 use super::queue::{self, Task, Tasks};
 use super::record::{Outcome, RecordRow, columns, count, record};
 use super::run::{beat, cancel, claim, finish, redo, requeue};
-use super::PostgresStore;
 use crate::key::Key;
 use crate::store::jobs::{
-    Accepted, Beat, Cancelled, Changed, Claimed, Ending, Hear, JobCounts, JobId, JobPage, JobQuery, JobRecord, JobStore,
-    Lease, Live, NewJob, RunTask, Shared, Timing,
+    Accepted, Beat, Cancelled, Changed, Claimed, Ending, Hear, JobCounts, JobId, JobPage, JobQuery, JobRecord,
+    JobStore, Lease, Live, NewJob, RunTask, Shared, Timing,
 };
 use crate::store::sqlite_jobs::pack::{packed, packed_ending};
 use crate::store::{KeptResult, ResultPage, ResultQuery, ResultStore, StoreError, Taken};
@@ -253,4 +253,3 @@ impl JobStore for PostgresStore {
         })
     }
 }
-

@@ -2,10 +2,10 @@
 
 use sqlx::postgres::PgConnection;
 
+use super::lock;
 use super::queue::{self, Task, task_name};
 use super::record::{Outcome, RecordRow, column, columns, record};
 use super::results::insert;
-use super::lock;
 use crate::store::jobs::{Accepted, JobState, NewJob};
 use crate::store::sqlite_jobs::pack::Packed;
 use crate::store::sqlite_jobs::record::{parsed, rank};

@@ -9,6 +9,7 @@ mod care;
 mod clock;
 mod jobs;
 mod line;
+mod models;
 mod news;
 mod queue;
 mod record;
@@ -137,8 +138,10 @@ async fn lock(connection: &mut PgConnection, key: &Key) -> Result<i64, sqlx::Err
 
 /// The same for the key of a job; `None` where there is no such job.
 async fn lock_job(connection: &mut PgConnection, job: &str) -> Result<Option<(Key, i64)>, sqlx::Error> {
-    let key: Option<Vec<u8>> =
-        sqlx::query_scalar("SELECT key FROM precut.jobs WHERE id = $1").bind(job).fetch_optional(&mut *connection).await?;
+    let key: Option<Vec<u8>> = sqlx::query_scalar("SELECT key FROM precut.jobs WHERE id = $1")
+        .bind(job)
+        .fetch_optional(&mut *connection)
+        .await?;
     locked(connection, key).await
 }
 

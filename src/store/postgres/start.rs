@@ -60,9 +60,11 @@ fn reason(error: &sqlx::Error) -> String {
         (sqlx::Error::Configuration(_), _) => "the address is not understood; it reads \
                                                postgres://user:password@host:5432/database"
             .to_owned(),
-        (sqlx::Error::Tls(_), _) => "it insists on TLS, which this program does not speak to a database; use a private \
+        (sqlx::Error::Tls(_), _) => {
+            "it insists on TLS, which this program does not speak to a database; use a private \
                                      network or a tunnel"
-            .to_owned(),
+                .to_owned()
+        }
         (sqlx::Error::Io(error), _) => format!("it does not answer ({error})"),
         (sqlx::Error::PoolTimedOut, _) => "it does not answer".to_owned(),
         (other, _) => other.to_string(),
@@ -82,9 +84,8 @@ fn may_pass(error: &sqlx::Error) -> bool {
 
 /// A pool of connections to a database whose tables are up to date.
 pub(super) async fn connected(address: &Secret, usage: &Use) -> Result<PgPool, OpenError> {
-    let options = PgConnectOptions::from_str(address.reveal())
-        .map_err(|error| refused(&error))?
-        .application_name("precut");
+    let options =
+        PgConnectOptions::from_str(address.reveal()).map_err(|error| refused(&error))?.application_name("precut");
     // A connection of its own: to bring tables up to date may take longer than anything later.
     let first = patiently(&options, usage.patience.start).await?;
     let prepared = prepare(&first).await;
@@ -167,8 +168,10 @@ async fn prepare(pool: &PgPool) -> Result<(), OpenError> {
 /// does not are an error.
 async fn is_up_to_date(pool: &PgPool) -> Result<bool, OpenError> {
     let failed = |error: sqlx::Error| refused(&error);
-    let there: bool =
-        sqlx::query_scalar("SELECT to_regclass('precut.versions') IS NOT NULL").fetch_one(pool).await.map_err(failed)?;
+    let there: bool = sqlx::query_scalar("SELECT to_regclass('precut.versions') IS NOT NULL")
+        .fetch_one(pool)
+        .await
+        .map_err(failed)?;
     if !there {
         return Ok(false);
     }
@@ -183,7 +186,11 @@ async fn is_up_to_date(pool: &PgPool) -> Result<bool, OpenError> {
         )));
     }
     if version > SCHEMA {
-        tracing::info!(schema = version, known = SCHEMA, "the tables are those of a newer precut, which serve this one");
+        tracing::info!(
+            schema = version,
+            known = SCHEMA,
+            "the tables are those of a newer precut, which serve this one"
+        );
     }
     Ok(version >= SCHEMA)
 }

@@ -77,8 +77,7 @@ impl PostgresStore {
     pub(super) async fn take(&self, study: Key, of: u32) -> Result<Taken, StoreError> {
         let silent_ms = i64::try_from(self.patience.lease.as_millis()).unwrap_or(i64::MAX);
         let holder = self.held.holder.to_string();
-        let taken =
-            self.write(|connection| Box::pin(take(connection, study, column(of), holder, silent_ms))).await?;
+        let taken = self.write(|connection| Box::pin(take(connection, study, column(of), holder, silent_ms))).await?;
         Ok(match taken {
             Some(shard) => {
                 self.held.parts().insert((study, shard));
@@ -177,7 +176,8 @@ impl PostgresStore {
 
     pub(super) async fn forget_study(&self, study: Key) -> Result<(), StoreError> {
         self.held.parts().retain(|(held, _)| *held != study);
-        for table in ["DELETE FROM precut.shared_studies WHERE study = $1", "DELETE FROM precut.studies WHERE study = $1"]
+        for table in
+            ["DELETE FROM precut.shared_studies WHERE study = $1", "DELETE FROM precut.studies WHERE study = $1"]
         {
             sqlx::query(table).bind(study.as_bytes().as_slice()).execute(&self.pool).await?;
         }

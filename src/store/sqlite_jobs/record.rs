@@ -61,8 +61,11 @@ impl RecordRow {
     }
 }
 
-pub(in crate::store) fn parsed<T: std::str::FromStr<Err = uuid::Error>>(text: &str) -> Result<T, sqlx::Error> {
-    text.parse().map_err(|error: uuid::Error| sqlx::Error::Decode(error.into()))
+pub(in crate::store) fn parsed<T>(text: &str) -> Result<T, sqlx::Error>
+where
+    T: std::str::FromStr<Err: std::error::Error + Send + Sync + 'static>,
+{
+    text.parse().map_err(|error: T::Err| sqlx::Error::Decode(error.into()))
 }
 
 pub(in crate::store) fn unreadable(column: &str) -> sqlx::Error {

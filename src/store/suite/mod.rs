@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 pub(in crate::store) mod jobs;
+pub(in crate::store) mod models;
 pub(in crate::store) mod results;
 
 use std::time::Duration;
@@ -126,6 +127,9 @@ macro_rules! suite {
             what_a_kept_job_points_to_stays_and_what_is_expired_goes
             timings_are_kept_newest_first
             the_queue_hands_out_each_task_once_and_no_more_than_there_are_places
+        }
+        suite! { $place, models:
+            revisions_rise_and_are_never_given_twice
         }
         suite! { $place, results:
             what_is_put_is_got_after_the_store_was_closed

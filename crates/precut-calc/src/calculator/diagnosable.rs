@@ -3,7 +3,9 @@
 use serde::{Serialize, de::DeserializeOwned};
 use utoipa::ToSchema;
 
-use super::{Calculator, Design, Example, ForwardModel, Hypotheses, Hypothesis, MeasuredRow, Rows};
+use super::{
+    Calculator, Design, Example, Failure, ForwardModel, Hypotheses, Hypothesis, MeasuredRow, Prediction, Rows,
+};
 
 /// A calculator whose model can be compared with measurements, cause by cause.
 pub trait Diagnosable:
@@ -34,6 +36,18 @@ pub trait Diagnosable:
     /// Runs that could be measured next, each with its rows: every condition moved to the ends of its
     /// range, or started afresh. None where a job has no runs.
     fn next_runs(job: &Self::Job, rows: &Rows<Self::Run, Self::Point>) -> Vec<NextRun<Self::Run, Self::Point>>;
+
+    /// The prediction as divided differences need it: where a prediction is dear, with coarser numerics, whose own error
+    /// cancels in a difference.
+    fn predict_coarsely(prepared: &Self::Prepared, effects: &[Self::Effect]) -> Result<Vec<Prediction>, Failure> {
+        Self::predict(prepared, effects)
+    }
+
+    /// Expected time of one prediction of one run, ms: a diagnosis makes some hundreds. 0 where it is next to nothing
+    /// beside the statistics.
+    fn predict_ms(_job: &Self::Job) -> f64 {
+        0.0
+    }
 }
 
 /// A run that could be measured next.

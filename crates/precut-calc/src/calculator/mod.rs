@@ -248,4 +248,8 @@ pub trait Registrar {
     fn with_forward_model<C: Calculator + ForwardModel<Job = C::Input>>(&mut self) {
         self.calculator::<C>();
     }
+    /// A calculator whose model a diagnosis can compare with measurements.
+    fn diagnosable<C: Diagnosable>(&mut self) {
+        self.with_forward_model::<C>();
+    }
 }

@@ -1,5 +1,7 @@
 //! A calculator's own forward model as the subject of a diagnosis.
 
+use std::sync::OnceLock;
+
 use rayon::prelude::*;
 
 use super::subject::{Setting, Subject};
@@ -8,10 +10,14 @@ use crate::calculator::{
     Treatment, Variable,
 };
 
+/// From this time of one prediction on, ms, divided differences are one-sided and fewer sets are refined.
+const DEAR_MS: f64 = 5.0;
+
 /// Step of a divided difference, prior standard deviations (of a shape without a prior: of its value).
 ///
 /// Central: the truncation is of order (1e-3)^2 of the curvature over one prior standard deviation, the
-/// round-off about 1e-13 of the value divided by 1e-3.
+/// round-off about 1e-13 of the value divided by 1e-3. One-sided where a prediction is dear: then the truncation is of
+/// order 1e-3 of the curvature.
 const STEP: f64 = 1e-3;
 
 /// A forward model with its rows and allowances.
@@ -20,6 +26,9 @@ pub struct Bound<M: Diagnosable> {
     allowances: M::Allowances,
     hypotheses: Hypotheses,
     logarithmic: bool,
+    dear: bool,
+    /// The base with the numerics of divided differences.
+    coarse_base: OnceLock<Vec<Prediction>>,
 }
 
 impl<M: Diagnosable> Bound<M> {
@@ -35,12 +44,18 @@ impl<M: Diagnosable> Bound<M> {
             let reason = Inapplicability::NotAskedFor;
             hypotheses.inapplicable.extend(left.into_iter().map(|h| Inapplicable { cause: h.cause, reason }));
         }
-        Self { prepared, allowances, hypotheses, logarithmic }
+        let dear = M::predict_cost(&prepared).ms > DEAR_MS;
+        Self { prepared, allowances, hypotheses, logarithmic, dear, coarse_base: OnceLock::new() }
     }
 
     /// The forward model's own view of the rows.
     pub fn prepared(&self) -> &M::Prepared {
         &self.prepared
+    }
+
+    /// Whether a prediction costs more than the statistics about it.
+    pub fn is_dear(&self) -> bool {
+        self.dear
     }
 
     /// What these rows can and cannot speak about.
@@ -60,18 +75,64 @@ impl<M: Diagnosable> Bound<M> {
         Ok(effects)
     }
 
-    fn slope(&self, settings: &[Setting], (member, variable): (usize, usize)) -> Result<JacobianColumn, Failure> {
+    fn coarsely(&self, settings: &[Setting]) -> Result<Vec<Prediction>, Failure> {
+        Ok(self.in_unit(M::predict_coarsely(&self.prepared, &self.effects_of(settings)?)?))
+    }
+
+    /// Residuals are taken of the logarithm where the quantity is logarithmic.
+    fn in_unit(&self, mut predicted: Vec<Prediction>) -> Vec<Prediction> {
+        if self.logarithmic {
+            for value in &mut predicted {
+                *value = value.and_then(|v| if v > 0.0 { Ok(v.ln()) } else { Err(Missing::NoSolution) });
+            }
+        }
+        predicted
+    }
+
+    /// Prediction in the middle of one-sided differences; the base's own where every size is 0.
+    fn centre(&self, settings: &[Setting]) -> Result<Vec<Prediction>, Failure> {
+        let absent = |setting: &Setting| {
+            let hypothesis = &self.hypotheses.applicable[setting.hypothesis];
+            let sizes = hypothesis.variables.iter().zip(&setting.values);
+            hypothesis.has_amplitude()
+                && sizes.into_iter().all(|(v, value)| !matches!(v.treatment, Treatment::Amplitude { .. }) || value.abs() < f64::MIN_POSITIVE)
+        };
+        if !settings.iter().all(absent) {
+            return self.coarsely(settings);
+        }
+        if let Some(base) = self.coarse_base.get() {
+            return Ok(base.clone());
+        }
+        let base = self.coarsely(&[])?;
+        Ok(self.coarse_base.get_or_init(|| base).clone())
+    }
+
+    /// d predict / d variable; one-sided where the prediction in the middle is given.
+    fn slope(
+        &self,
+        settings: &[Setting],
+        (member, variable): (usize, usize),
+        middle: Option<&[Prediction]>,
+    ) -> Result<JacobianColumn, Failure> {
         let declared: &Variable = &self.hypotheses.applicable[settings[member].hypothesis].variables[variable];
         let centre = settings[member].values[variable];
         let step = STEP * width(declared, centre);
-        let low = (centre - step).max(declared.range.lower);
+        let mut low = (centre - step).max(declared.range.lower);
         let high = (centre + step).min(declared.range.upper);
         let at = |value: f64| {
             let mut moved = settings.to_vec();
             moved[member].values[variable] = value;
-            self.predict(&moved)
+            self.coarsely(&moved)
         };
-        let (below, above) = (at(low)?, at(high)?);
+        let (below, above) = match middle {
+            // At the upper bound downwards.
+            Some(middle) if high > centre => {
+                low = centre;
+                (middle.to_vec(), at(high)?)
+            }
+            Some(middle) => (at(low)?, middle.to_vec()),
+            None => (at(low)?, at(high)?),
+        };
         Ok(below
             .iter()
             .zip(&above)
@@ -101,17 +162,12 @@ where
     }
 
     fn predict(&self, settings: &[Setting]) -> Result<Vec<Prediction>, Failure> {
-        let mut predicted = M::predict(&self.prepared, &self.effects_of(settings)?)?;
-        if self.logarithmic {
-            for value in &mut predicted {
-                *value = value.and_then(|v| if v > 0.0 { Ok(v.ln()) } else { Err(Missing::NoSolution) });
-            }
-        }
-        Ok(predicted)
+        Ok(self.in_unit(M::predict(&self.prepared, &self.effects_of(settings)?)?))
     }
 
     fn jacobian(&self, settings: &[Setting], of: &[(usize, usize)]) -> Result<Vec<JacobianColumn>, Failure> {
-        of.par_iter().map(|&place| self.slope(settings, place)).collect()
+        let middle = if self.dear && !of.is_empty() { Some(self.centre(settings)?) } else { None };
+        of.par_iter().map(|&place| self.slope(settings, place, middle.as_deref())).collect()
     }
 
     fn nuisances(&self) -> Result<Vec<JacobianColumn>, Failure> {

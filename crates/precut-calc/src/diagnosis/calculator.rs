@@ -15,6 +15,9 @@ use crate::calculator::{
 /// Rows from which on at least adequacy can be judged.
 pub(super) const LEAST_ROWS: usize = 8;
 
+/// Predictions of every run where they are dear: signatures, the sets refined, the next run, the folds.
+const PREDICTIONS: f64 = 300.0;
+
 /// The diagnosis of one base.
 #[derive(Debug, Clone, Copy)]
 pub struct Diagnosis<M>(PhantomData<M>);
@@ -65,7 +68,10 @@ impl<M: Diagnosable> Calculator for Diagnosis<M> {
         let rows = job.measurements.rows().len() as f64;
         let folds = if job.options.held_out { 1.0 + job.runs.len().clamp(1, 30) as f64 } else { 1.0 };
         let bytes = 1_000_000 + 8 * 400 * job.measurements.rows().len() as u64;
-        Cost { ms: 1.0 + 0.08 * rows * folds, bytes, driver: "/measurements" }
+        let predictions = M::predict_ms(&job.job) * job.runs.len().max(1) as f64 * PREDICTIONS;
+        let statistics = 1.0 + 0.08 * rows * folds;
+        let driver = if predictions > statistics { "/job" } else { "/measurements" };
+        Cost { ms: statistics + predictions, bytes, driver }
     }
 
     fn run(job: &Self::Input, monitor: &dyn Monitor) -> Result<Answer<Self::Output>, Failure> {

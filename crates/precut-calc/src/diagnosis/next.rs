@@ -140,7 +140,9 @@ fn separation_with<M: Diagnosable>(
     };
     let mut keep = weighing.keep.clone();
     keep.resize(all.points.len(), true);
-    let whitener = Whitener::new(&data, &noise, &bound.nuisances()?, &keep);
+    // Nor one that the model cannot run.
+    let Ok(nuisances) = bound.nuisances() else { return Ok(None) };
+    let whitener = Whitener::new(&data, &noise, &nuisances, &keep);
     let a = Signature::anew(&bound, &whitener, &keep, &of_leader)?;
     let b = Signature::anew(&bound, &whitener, &keep, &of_rival)?;
     Ok(Some(a.separation(&b)))

@@ -61,12 +61,17 @@ pub(super) fn answer<M: Diagnosable>(
     let found = foundation.outliers();
     let keep = if job.options.leave_outliers_out { foundation.keep(&found) } else { foundation.predicted.clone() };
     stage(monitor, 0.2, "diagnosis_stage_search");
-    let effort = Effort::full(usize::from(job.options.most_causes));
+    let most_causes = usize::from(job.options.most_causes);
+    let (effort, fold_effort) = if bound.is_dear() {
+        (Effort::dear(most_causes), Effort::dear_fold(most_causes))
+    } else {
+        (Effort::full(most_causes), Effort::full(most_causes))
+    };
     let weighing = Weighing::of(&foundation, keep, effort, monitor)?;
     let refusal = refusal(job.options.accept_suspected_unit, &foundation, &weighing);
     let gain = if job.options.held_out && refusal.is_none() {
         stage(monitor, 0.5, "diagnosis_stage_gain");
-        gain(&foundation, &weighing, effort, true, u64::from(job.options.seed), monitor)?
+        gain(&foundation, &weighing, fold_effort, true, u64::from(job.options.seed), monitor)?
     } else {
         None
     };

@@ -172,6 +172,13 @@ impl<'a> Linear<'a> {
         self.signatures.variants[hypothesis].len() == 1
     }
 
+    /// Whether a shape of one of these hypotheses may leave its grid.
+    pub(super) fn has_free_shapes(&self, members: &[usize]) -> bool {
+        members.iter().flat_map(|&h| &self.hypotheses[h].variables).any(|variable| {
+            matches!(variable.treatment, Treatment::Shape { prior: Some(_), .. })
+        })
+    }
+
     /// Cosine of the angle between the signatures of two hypotheses with one amplitude and no grid.
     pub(super) fn alike(&self, a: usize, b: usize) -> Option<f64> {
         let column = |h: usize| match self.signatures.variants[h].as_slice() {

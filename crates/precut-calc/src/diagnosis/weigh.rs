@@ -36,14 +36,29 @@ pub struct Effort {
     pub most_causes: usize,
     /// Sets that are refined about the model itself.
     pub leaders: usize,
-    /// Sets that lead only after the others were refined, and are then refined too.
+    /// Of the sets of none, one, two and three causes those that are refined in any case: from the base a single cause
+    /// of a model that is far from linear looks worse than a set that mimics it.
+    pub of_each_size: [usize; 4],
+    /// How often those that lead only after others were refined are refined, too, and how many each time.
+    pub rounds: usize,
+    /// See `rounds`.
     pub late_leaders: usize,
 }
 
 impl Effort {
     /// The whole search.
     pub fn full(most_causes: usize) -> Self {
-        Self { most_causes, leaders: LEADERS, late_leaders: LATE_LEADERS }
+        Self { most_causes, leaders: LEADERS, of_each_size: [0; 4], rounds: 1, late_leaders: LATE_LEADERS }
+    }
+
+    /// Where every prediction is a simulation: fewer sets.
+    pub fn dear(most_causes: usize) -> Self {
+        Self { most_causes, leaders: 1, of_each_size: [0, 4, 2, 1], rounds: 3, late_leaders: 2 }
+    }
+
+    /// The same in a fold.
+    pub fn dear_fold(most_causes: usize) -> Self {
+        Self { most_causes, leaders: 1, of_each_size: [0, 2, 1, 0], rounds: 1, late_leaders: 1 }
     }
 }
 
@@ -116,8 +131,10 @@ impl<'a> Weighing<'a> {
         let candidates = linear.search(effort.most_causes, monitor)?;
         let refinement = Refinement { subject: *subject, value: &data.value, keep: &keep, whitener: &whitener, scale };
         let mut ranking = Ranking { candidates, fits: Vec::new() };
-        ranking.refine(&linear, &refinement, effort.leaders, monitor)?;
-        ranking.refine(&linear, &refinement, effort.late_leaders, monitor)?;
+        ranking.refine(&linear, &refinement, effort.leaders, effort.of_each_size, monitor)?;
+        for _ in 0..effort.rounds {
+            ranking.refine(&linear, &refinement, effort.late_leaders, [0; 4], monitor)?;
+        }
         let kinds = discrepancy::kinds(data, &whitener, noise.sigma);
         let mut weighed = ranking.weigh(&linear, &kinds, monitor)?;
         let total = log_sum_exp(&weighed.iter().map(|set| set.0).collect::<Vec<_>>());
@@ -160,15 +177,28 @@ impl Ranking {
         self.fits.iter().find(|(of, _)| of == members).and_then(|(_, fit)| fit.as_ref())
     }
 
+    /// The heaviest sets: so many of all, and so many of each size.
+    fn leaders(&self, count: usize, of_each_size: [usize; 4]) -> Vec<usize> {
+        let mut met = [0; 4];
+        (0..self.candidates.len())
+            .filter(|&index| {
+                let size = self.candidates[index].members.len().min(3);
+                met[size] += 1;
+                index < count || met[size] <= of_each_size[size]
+            })
+            .collect()
+    }
+
     /// Refines the heaviest sets that are not refined yet, and gives them the evidence found there.
     fn refine(
         &mut self,
         linear: &Linear<'_>,
         refinement: &Refinement<'_>,
         count: usize,
+        of_each_size: [usize; 4],
         monitor: &dyn Monitor,
     ) -> Result<(), Failure> {
-        let leaders: Vec<usize> = (0..self.candidates.len().min(count)).collect();
+        let leaders = self.leaders(count, of_each_size);
         for index in leaders {
             checkpoint(monitor)?;
             let candidate = &mut self.candidates[index];
@@ -176,22 +206,22 @@ impl Ranking {
                 continue;
             }
             let start = linear.settings(candidate);
-            let plain = refinement.fit(start.clone(), false)?;
-            let free = refinement.fit(start, true)?.filter(|fit| fit.with_shapes && fit.settled);
-            let fit = match (plain, free) {
-                // Where free shapes explain less than the mean over the grid, the grid stays.
-                (plain, Some(free)) if free.log_z >= candidate.log_z => {
+            let free = if linear.has_free_shapes(&candidate.members) {
+                refinement.fit(start.clone(), true)?.filter(|fit| fit.with_shapes && fit.settled)
+            } else {
+                None
+            };
+            // Where free shapes explain less than the mean over the grid, the grid stays.
+            let fit = match free.filter(|free| free.log_z >= candidate.log_z) {
+                Some(free) => {
                     candidate.log_z = free.log_z;
-                    let _ = plain;
                     Some(free)
                 }
-                (Some(plain), _) => {
-                    if linear.settings(candidate).iter().all(|s| linear.has_no_grid(s.hypothesis)) {
+                None => refinement.fit(start, false)?.inspect(|plain| {
+                    if candidate.members.iter().all(|&h| linear.has_no_grid(h)) {
                         candidate.log_z = plain.log_z;
                     }
-                    Some(plain)
-                }
-                (None, _) => None,
+                }),
             };
             self.fits.push((candidate.members.clone(), fit));
         }

@@ -24,7 +24,7 @@ pub(super) const CODES: &[&str] = &[
     "model_not_convex",
     "edge_angle_missing",
     "unknown_model_set",
-    "duplicate_output",
+    "duplicate_model_output",
     "fixed_value_missing",
     "whole_parts_per_surface",
     "nothing_to_minimise",
@@ -94,7 +94,8 @@ fn check_models(job: &Job, violations: &mut Violations) {
     for (k, further) in job.models.further.iter().enumerate() {
         check_model(job, &further.model, &format!("/models/further/{k}/model"), violations);
         violations.require(!names.contains(&further.name.as_str()), || {
-            Finding::new("duplicate_output", format!("/models/further/{k}/name")).with("name", further.name.clone())
+            Finding::new("duplicate_model_output", format!("/models/further/{k}/name"))
+                .with("name", further.name.clone())
         });
         names.push(&further.name);
     }

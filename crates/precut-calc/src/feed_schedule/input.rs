@@ -218,6 +218,7 @@ impl Default for Machine {
 /// What must hold beside the limits of the zones; what is left out does not limit.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
+#[schema(as = ScheduleLimits)]
 pub struct Limits {
     /// Least feed.
     #[schema(minimum = 1e-4, maximum = 20.0, example = 0.05, extensions(("x-unit" = json!("mm/rev")), ("x-symbol" = json!("S_min"))))]

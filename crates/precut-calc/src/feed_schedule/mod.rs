@@ -56,6 +56,20 @@ use crate::calculator::{
 };
 use crate::{force, shaft};
 
+/// The geometric program of a checked and filled job, as its solver gets it: for other solvers and for measurements.
+/// Models that bend stand in it as their tangents at the middle of the bounds.
+pub fn geometric_program(job: &Job) -> Result<crate::num::gp::Program, Failure> {
+    let held = compliance::Held::of(job)?;
+    let case = case::Case::of(job, held.as_ref(), None)?;
+    Ok(program::build(&case, &program::Variation::default()).program)
+}
+
+/// Largest compliance of every zone by the beam, um/N; empty without a shaft.
+pub fn zone_compliances(job: &Job) -> Result<Vec<f64>, Failure> {
+    let stretches: Vec<(f64, f64)> = job.zones.iter().map(|zone| (zone.z_start_mm, zone.z_end_mm)).collect();
+    Ok(compliance::Held::of(job)?.map(|held| held.largest(&stretches)).unwrap_or_default())
+}
+
 /// The calculator.
 #[derive(Debug, Clone, Copy)]
 pub struct FeedSchedule;

@@ -39,6 +39,8 @@ struct Pass {
     corners: Vec<(f64, f64)>,
     /// Where the tool goes down before it; at the first corner itself beside a thicker neighbour.
     approach_mm: Option<f64>,
+    /// It goes on where the cut before it ended: the tool stays in the work.
+    goes_on: bool,
 }
 
 /// The program of an answer.
@@ -54,7 +56,8 @@ pub(super) fn program(job: &Job, outcome: &Outcome) -> Result<Program, Failure> 
     let mut blocks = vec![Block::Modes];
     blocks.extend(passed(&case, &built, &at).into_iter().map(Block::Note));
     let (mut spoken, mut noted): (Option<f64>, Option<usize>) = (None, None);
-    for pass in passes(job, outcome) {
+    let passes = passes(job, outcome);
+    for (k, pass) in passes.iter().enumerate() {
         let words = &words[pass.zone];
         if noted != Some(pass.zone) {
             let rounded = assess::zone_outcome(&case, job, pass.zone, at[pass.zone]);
@@ -69,7 +72,10 @@ pub(super) fn program(job: &Job, outcome: &Outcome) -> Result<Program, Failure> 
             });
             spoken = Some(words.speed);
         }
-        cut(&mut blocks, &pass, words, retract);
+        cut(&mut blocks, pass, words, retract);
+        if !passes.get(k + 1).is_some_and(|next| next.goes_on) {
+            blocks.push(Block::Rapid { x_diameter_mm: Some(retract), z_mm: None });
+        }
     }
     blocks.push(Block::End);
     Ok(Program { dialect: job.program.dialect, increment_mm: INCREMENT_MM, blocks })
@@ -111,13 +117,29 @@ fn passes(job: &Job, outcome: &Outcome) -> Vec<Pass> {
     }
     // Roughing of a zone stands before its finish and is cut first, whichever way the tool travels.
     order.sort_by_key(|&i| !outcome.zones[i].id.ends_with(":rough"));
-    let mut all = Vec::new();
+    let mut all: Vec<Pass> = Vec::new();
     for i in order {
         for x_mm in diameters(outcome, &outcome.zones[i]) {
-            all.push(pass(job, outcome, i, x_mm, zero));
+            let mut next = pass(job, outcome, i, x_mm, zero);
+            if let Some(before) = all.last() {
+                join(before, &mut next, outcome);
+            }
+            all.push(next);
         }
     }
     all
+}
+
+/// Lets a cut go on where the one before it ended, if both are the only cuts of zones that touch: the feed changes in the
+/// work and leaves no mark of a new start.
+fn join(before: &Pass, next: &mut Pass, outcome: &Outcome) {
+    let single = |pass: &Pass| outcome.zones[pass.zone].passes == 1 && !outcome.zones[pass.zone].id.ends_with(":rough");
+    let (Some(&last), Some(&first)) = (before.corners.last(), next.corners.first()) else { return };
+    let near = |a: f64, b: f64| (a - b).abs() < 0.5 * INCREMENT_MM;
+    next.goes_on = before.zone != next.zone && single(before) && single(next) && near(last.1, first.1);
+    if next.goes_on && near(last.0, first.0) {
+        next.corners.remove(0);
+    }
 }
 
 /// Diameters that the passes of a zone turn down to. Repeats of a finish are spark-out passes at its diameter.
@@ -151,6 +173,7 @@ fn pass(job: &Job, outcome: &Outcome, index: usize, x_mm: f64, zero: f64) -> Pas
         other.z_end_mm > low + 1e-6 && other.z_start_mm < high - 1e-6 && other.diameter_mm >= first_x - 1e-9
     });
     Pass {
+        goes_on: false,
         zone: index,
         approach_mm: (!blocked).then(|| place(approach)),
         corners: corners.into_iter().map(|(x, z)| (round_to_increment(x, INCREMENT_MM), place(z))).collect(),
@@ -177,16 +200,16 @@ fn note(zone: &ZoneOutcome, words: &Words) -> String {
 }
 
 fn cut(blocks: &mut Vec<Block>, pass: &Pass, words: &Words, retract: f64) {
-    let (first_x, first_z) = pass.corners[0];
-    blocks.push(Block::Rapid { x_diameter_mm: Some(retract), z_mm: Some(pass.approach_mm.unwrap_or(first_z)) });
-    if pass.approach_mm.is_some() {
-        blocks.push(Block::Rapid { x_diameter_mm: Some(first_x), z_mm: None });
+    if let (Some(&(first_x, first_z)), false) = (pass.corners.first(), pass.goes_on) {
+        blocks.push(Block::Rapid { x_diameter_mm: Some(retract), z_mm: Some(pass.approach_mm.unwrap_or(first_z)) });
+        if pass.approach_mm.is_some() {
+            blocks.push(Block::Rapid { x_diameter_mm: Some(first_x), z_mm: None });
+        }
     }
     let mut feed = Some(words.feed_mm_per_rev);
     for &(x_diameter_mm, z_mm) in &pass.corners {
         blocks.push(Block::Cut { x_diameter_mm, z_mm, feed_mm_per_rev: feed.take() });
     }
-    blocks.push(Block::Rapid { x_diameter_mm: Some(retract), z_mm: None });
 }
 
 /// The limits of every zone with feed and speed of its own, in the order of the answer's zones.

@@ -83,6 +83,10 @@ pub(super) fn lobes_so_far(boundary: &[(f64, Option<f64>)], map: Option<&Map>, w
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (x, y): (Vec<f64>, Vec<Option<f64>>) = points.into_iter().unzip();
     items.push(Item::Line { name: "chatter_limit", x, y, role: Role::Limit });
+    if let Some(map) = map.filter(|map| !map.refined.is_empty()) {
+        let (x, y) = map.refined.iter().copied().unzip();
+        items.push(Item::Points { name: "refined_boundary", x, y, role: Role::Unstable });
+    }
     items.push(working_point(working.spindle_rpm, working.depth_mm));
     figure("lobes", "fixture_lobes", SPEED, vec![Panel { y: DEPTH, height: 1.0, items }])
 }

@@ -170,8 +170,7 @@ pub fn simplex(
         if width < end {
             break;
         }
-        let middle: Vec<f64> =
-            (0..n).map(|k| corners[..n].iter().map(|c| c.at[k]).sum::<f64>() / n as f64).collect();
+        let middle: Vec<f64> = (0..n).map(|k| corners[..n].iter().map(|c| c.at[k]).sum::<f64>() / n as f64).collect();
         let along = |share: f64| -> Vec<f64> {
             middle.iter().zip(&corners[n].at).map(|(m, worst)| m + share * (m - worst)).collect()
         };

@@ -2,23 +2,29 @@
 
 use std::f64::consts::TAU;
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::calculator::{
-    Cost, Failure, Finding, ForwardModel, JacobianColumn, Missing, Monitor, Prediction, PrepareError, Quantity, Rows,
-    checkpoint,
+    Check, Cost, Design, Diagnosable, Example, Failure, Finding, ForwardModel, Hypotheses, Hypothesis, JacobianColumn,
+    Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Rows, Violations, checkpoint,
 };
 use crate::effects::{Cause, RING_CAUSES, RingEffect};
 
 use super::RingRoundness;
-use super::input::Job;
+use super::hypotheses::{design, effects, hypotheses};
+use super::input::{Job, Method};
+use super::measurement::RingMeasurement;
+use super::next_runs::next_runs;
 use super::scene::Scene;
 use super::surface::UM_PER_MM;
 use super::turning::{Stuck, turn};
 
 /// Nodes of a prediction: an error of 0.02 to 0.07 um rms in the cases measured.
 const NODES: usize = 7200;
+/// Nodes of the predictions that divided differences are made of.
+const COARSE_NODES: usize = 1440;
 
 /// How wrong the base may be without that being a finding: standard deviations.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -27,9 +33,15 @@ pub struct RingAllowances {
     /// Zero of the body angle.
     #[schema(minimum = 0.0, maximum = 90.0, example = 0.05, extensions(("x-unit" = json!("deg"))))]
     pub angle_deg: f64,
-    /// What the centring and the size of the measured circle leave: a constant and the two first waves.
+    /// What the instrument's circle leaves in deviations: a constant and the two first waves.
     #[schema(minimum = 0.0, maximum = 1000.0, example = 0.2, extensions(("x-unit" = json!("um"))))]
     pub centring_um: f64,
+    /// Size of the ring against the setting of the tool, where radii were measured.
+    #[schema(minimum = 0.0, maximum = 10_000.0, example = 5.0, extensions(("x-unit" = json!("um"))))]
+    pub size_um: f64,
+    /// How far off the axis of the instrument the ring may lie in each direction, where radii were measured.
+    #[schema(minimum = 0.0, maximum = 10_000.0, example = 50.0, extensions(("x-unit" = json!("um"))))]
+    pub eccentricity_um: f64,
     /// Multiple of the difference that twice as many nodes make.
     #[schema(minimum = 0.0, maximum = 100.0, example = 1.0, extensions(("x-unit" = json!("1"))))]
     pub discretisation: f64,
@@ -37,14 +49,47 @@ pub struct RingAllowances {
 
 impl Default for RingAllowances {
     fn default() -> Self {
-        Self { angle_deg: 0.05, centring_um: 0.2, discretisation: 1.0 }
+        Self { angle_deg: 0.05, centring_um: 0.2, size_um: 5.0, eccentricity_um: 50.0, discretisation: 1.0 }
     }
 }
 
-/// Conditions of one run: all are in the job.
+/// One ring: what was set otherwise for it than in the job.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct RingRun {}
+pub struct RingRun {
+    /// Tip at the start of the feed, to the right.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = -100_000.0, maximum = 100_000.0, example = 100.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("L_t"))))]
+    pub tool_x_mm: Option<f64>,
+    /// Tip at the start of the feed, upwards.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = -100_000.0, maximum = 100_000.0, example = 113.5, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("H_t"))))]
+    pub tool_y_mm: Option<f64>,
+    /// Feed per revolution.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-7, maximum = 10.0, example = 0.0117, extensions(("x-unit" = json!("mm/rev")), ("x-symbol" = json!("S"))))]
+    pub feed_mm_per_rev: Option<f64>,
+    /// Revolutions with feed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.01, maximum = 1e7, example = 128.0, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("n"))))]
+    pub revolutions: Option<f64>,
+    /// Revolutions without feed at the end.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.0, maximum = 1e6, example = 4.0, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("n_s"))))]
+    pub spark_out_revolutions: Option<f64>,
+}
+
+/// The job of one ring.
+pub(super) fn job_of_run(job: &Job, run: &RingRun) -> Job {
+    let mut job = job.clone();
+    let tool = &mut job.tool;
+    tool.x_mm = run.tool_x_mm.unwrap_or(tool.x_mm);
+    tool.y_mm = run.tool_y_mm.unwrap_or(tool.y_mm);
+    tool.feed_mm_per_rev = run.feed_mm_per_rev.unwrap_or(tool.feed_mm_per_rev);
+    tool.revolutions = run.revolutions.unwrap_or(tool.revolutions);
+    tool.spark_out_revolutions = run.spark_out_revolutions.unwrap_or(tool.spark_out_revolutions);
+    job
+}
 
 /// Where a radius was measured.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -87,10 +132,17 @@ impl Measure {
 
 /// What no effect parameter changes.
 pub struct PreparedRing {
-    job: Job,
     measure: Measure,
-    /// Body angles of the rows, rad.
-    angles_rad: Vec<f64>,
+    rings: Vec<TurnedRing>,
+    /// Ring and body angle (rad) of every row.
+    places: Vec<(usize, f64)>,
+}
+
+/// One ring as it is turned.
+struct TurnedRing {
+    job: Job,
+    /// Rows that were measured on it.
+    rows: Vec<usize>,
 }
 
 impl ForwardModel for RingRoundness {
@@ -126,22 +178,27 @@ impl ForwardModel for RingRoundness {
                 faults.push(Finding::new("unknown_run", format!("/measurements/{row}/run")).with("run", *run));
             }
         }
+        if job.method == Method::NearestSamples {
+            faults.push(Finding::new("not_with_nearest_samples", "/job/method"));
+        }
+        let places: Vec<(usize, f64)> =
+            rows.points.iter().map(|(run, point)| (*run, point.angle_deg.to_radians())).collect();
+        let rings = rows.runs.iter().enumerate().map(|(k, run)| TurnedRing {
+            job: job_of_run(job, run),
+            rows: (0..places.len()).filter(|&row| places[row].0 == k).collect(),
+        });
+        let rings: Vec<TurnedRing> = rings.collect();
+        for (k, ring) in rings.iter().enumerate() {
+            faults.extend(faults_of_ring(k, &ring.job));
+        }
         match measure {
-            Some(measure) if faults.is_empty() => Ok(PreparedRing {
-                job: job.clone(),
-                measure,
-                angles_rad: rows.points.iter().map(|(_, point)| point.angle_deg.to_radians()).collect(),
-            }),
+            Some(measure) if faults.is_empty() => Ok(PreparedRing { measure, rings, places }),
             _ => Err(PrepareError::Invalid(faults)),
         }
     }
 
     fn predict(prepared: &PreparedRing, effects: &[RingEffect]) -> Result<Vec<Prediction>, Failure> {
-        Ok(match prepared.profile(effects, NODES) {
-            Ok(profile) => prepared.angles_rad.iter().map(|angle| Ok(read(&profile, *angle))).collect(),
-            // An effect so large that the ring cannot rest on its supports.
-            Err(Unlocated) => vec![Err(Missing::NoSolution); prepared.angles_rad.len()],
-        })
+        Ok(prepared.predicted(effects, NODES))
     }
 
     fn effect(cause: &Cause, values: &[f64]) -> Option<RingEffect> {
@@ -149,32 +206,97 @@ impl ForwardModel for RingRoundness {
     }
 
     fn nuisances(prepared: &PreparedRing, allowances: &RingAllowances) -> Result<Vec<JacobianColumn>, Failure> {
-        let base = |n: usize| {
-            prepared.profile(&[], n).map_err(|Unlocated| Failure::NotConverged {
-                what: "location of the ring on its supports",
-                residual: 0.0,
-                iterations: 0,
-            })
+        let (size_um, centre_um) = match prepared.measure {
+            Measure::Deviation => (allowances.centring_um, allowances.centring_um),
+            Measure::Radius => (allowances.size_um, allowances.eccentricity_um),
         };
-        let (once, twice) = (base(NODES)?, base(2 * NODES)?);
-        let of = |column: &dyn Fn(f64) -> f64| prepared.angles_rad.iter().map(|a| column(*a)).collect::<Vec<f64>>();
-        let centring = allowances.centring_um * prepared.measure.per_um();
+        let unit = prepared.measure.per_um();
+        let (size, centre) = (size_um * unit, centre_um * unit);
         let step = TAU / NODES as f64;
-        let slope = |a: f64| (read(&once, a + step) - read(&once, a - step)) / (2.0 * step);
-        Ok(vec![
-            of(&|a| allowances.angle_deg.to_radians() * slope(a)),
-            of(&|_| centring),
-            of(&|a| centring * a.cos()),
-            of(&|a| centring * a.sin()),
-            of(&|a| allowances.discretisation * (read(&twice, a) - read(&once, a))),
-        ])
+        let mut columns = Vec::new();
+        for ring in &prepared.rings {
+            let base = |n: usize| {
+                prepared.profile(ring, &[], n).map_err(|Unlocated| Failure::NotConverged {
+                    what: "location of the ring on its supports",
+                    residual: 0.0,
+                    iterations: 0,
+                })
+            };
+            let (once, twice) = rayon::join(|| base(NODES), || base(2 * NODES));
+            let (once, twice) = (once?, twice?);
+            let slope = |a: f64| (read(&once, a + step) - read(&once, a - step)) / (2.0 * step);
+            let mut of = |column: &dyn Fn(f64) -> f64| {
+                let mut values = vec![0.0; prepared.places.len()];
+                for &row in &ring.rows {
+                    values[row] = column(prepared.places[row].1);
+                }
+                columns.push(values);
+            };
+            of(&|a| allowances.angle_deg.to_radians() * slope(a));
+            of(&|_| size);
+            of(&|a| centre * a.cos());
+            of(&|a| centre * a.sin());
+            of(&|a| allowances.discretisation * (read(&twice, a) - read(&once, a)));
+        }
+        Ok(columns)
     }
 
     fn predict_cost(prepared: &PreparedRing) -> Cost {
-        let turns = prepared.job.tool.revolutions + prepared.job.tool.spark_out_revolutions;
-        let step_ns = if prepared.job.supports.roller_radius_mm > 0.0 { 400.0 } else { 100.0 };
-        Cost { ms: 1e-6 * step_ns * NODES as f64 * turns, bytes: 1_000_000, driver: "/job/tool/revolutions" }
+        let ms = prepared.rings.iter().map(|ring| predict_ms(&ring.job)).sum();
+        Cost { ms, bytes: 1_000_000 * prepared.rings.len() as u64, driver: "/job/tool/revolutions" }
     }
+}
+
+impl Diagnosable for RingRoundness {
+    type Row = RingMeasurement;
+
+    const DIAGNOSES: &'static [Example] = &[Example {
+        id: "roller",
+        title: "Two traces of a ring: its left roller runs out",
+        job: include_str!("examples/diagnosis_roller.json"),
+    }];
+
+    fn hypotheses(prepared: &PreparedRing) -> Hypotheses {
+        hypotheses(&prepared.rings.iter().map(|ring| &ring.job).collect::<Vec<_>>())
+    }
+
+    fn effects(_prepared: &PreparedRing, hypothesis: &Hypothesis, values: &[f64]) -> Option<Vec<RingEffect>> {
+        effects(hypothesis, values)
+    }
+
+    fn design(prepared: &PreparedRing) -> Design {
+        design(&prepared.places)
+    }
+
+    fn next_runs(job: &Job, rows: &Rows<RingRun, RingPoint>) -> Vec<NextRun<RingRun, RingPoint>> {
+        next_runs(job, rows)
+    }
+
+    fn predict_coarsely(prepared: &PreparedRing, effects: &[RingEffect]) -> Result<Vec<Prediction>, Failure> {
+        Ok(prepared.predicted(effects, COARSE_NODES))
+    }
+
+    fn predict_ms(job: &Job) -> f64 {
+        predict_ms(job)
+    }
+}
+
+/// Measured on one core.
+fn predict_ms(job: &Job) -> f64 {
+    let turns = job.tool.revolutions + job.tool.spark_out_revolutions;
+    let step_ns = if job.supports.roller_radius_mm > 0.0 { 400.0 } else { 100.0 };
+    1e-6 * step_ns * NODES as f64 * turns
+}
+
+/// What a ring's own settings make impossible.
+fn faults_of_ring(k: usize, job: &Job) -> Vec<Finding> {
+    let mut violations = Violations::default();
+    job.check(&mut violations);
+    let mut faults = violations.into_vec();
+    for fault in &mut faults {
+        fault.pointer = format!("/runs/{k}");
+    }
+    faults
 }
 
 /// The ring cannot be located on its supports.
@@ -187,13 +309,26 @@ impl From<Stuck> for Unlocated {
 }
 
 impl PreparedRing {
+    fn predicted(&self, effects: &[RingEffect], nodes: usize) -> Vec<Prediction> {
+        let profiles: Vec<_> = self.rings.par_iter().map(|ring| self.profile(ring, effects, nodes)).collect();
+        let mut predicted = vec![Err(Missing::NoSolution); self.places.len()];
+        for (ring, profile) in self.rings.iter().zip(&profiles) {
+            // None where an effect is so large that the ring cannot rest on its supports.
+            let Ok(profile) = profile else { continue };
+            for &row in &ring.rows {
+                predicted[row] = Ok(read(profile, self.places[row].1));
+            }
+        }
+        predicted
+    }
+
     /// The measured quantity at uniform body angles: the least-squares circle removed to first order (mean and first
     /// wave), or the radius.
-    fn profile(&self, effects: &[RingEffect], n: usize) -> Result<Vec<f64>, Unlocated> {
-        let mut all = self.job.effects.clone();
+    fn profile(&self, ring: &TurnedRing, effects: &[RingEffect], n: usize) -> Result<Vec<f64>, Unlocated> {
+        let mut all = ring.job.effects.clone();
         all.extend_from_slice(effects);
-        let scene = Scene::of(&self.job, &all);
-        let blank = scene.blank_mm(&self.job, n).map_err(|_| Unlocated)?;
+        let scene = Scene::of(&ring.job, &all);
+        let blank = scene.blank_mm(&ring.job, n).map_err(|_| Unlocated)?;
         let turned = turn::<Unlocated>(&blank, &scene.setting, &mut |_, _| Ok(()))?;
         let radii = scene.unmirrored(turned.radii_mm);
         Ok(match self.measure {

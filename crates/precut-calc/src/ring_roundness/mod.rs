@@ -12,9 +12,12 @@ mod advice;
 mod check;
 pub mod evaluation;
 mod forward;
+mod hypotheses;
 mod input;
 mod linear;
 mod lobing;
+mod measurement;
+mod next_runs;
 mod output;
 mod picture;
 mod sampling;
@@ -30,6 +33,7 @@ pub use input::{
     Analysis, Drive, ErrorEstimate, Forces, Job, LongWave, MapRange, Method, ProfileRow, Ring, Rotation, SearchRange,
     Stiffness, Supports, Tool, Wave,
 };
+pub use measurement::RingMeasurement;
 pub use output::{
     CausesOutcome, CircleValues, Evaluated, Fate, HistoryColumns, LinearOutcome, MapCell, MapOutcome, OrderOutcome,
     Outcome, PathColumns, ProfileColumns, ReactionsOutcome, RootOutcome, SearchOutcome, SearchSetting, SearchStatus,

@@ -19,7 +19,7 @@ pub struct Shaft {
     pub segments: Vec<Segment>,
     /// Name in the material library; gives the elastic constants that are not stated. The echoed job has the numbers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(example = "steel_45", max_length = 64)]
+    #[schema(example = "steel_45", max_length = 64, extensions(("x-library" = json!("materials"))))]
     pub material: Option<String>,
     /// Young's modulus; needed where no material is named.
     #[serde(default, skip_serializing_if = "Option::is_none")]

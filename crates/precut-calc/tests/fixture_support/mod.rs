@@ -1,6 +1,8 @@
 //! Shared by the tests of fixture stability: the reference's cases as jobs of the contract.
 #![allow(dead_code, unreachable_pub, clippy::unwrap_used, clippy::panic, missing_docs)]
 
+pub(crate) mod semi;
+
 use std::path::Path;
 
 use precut_calc::calculator::{Answer, Calculator, Check, Unwatched, Violations};

@@ -48,7 +48,8 @@ pub(super) fn warnings(problem: &Problem<'_>, outcome: &IdentificationOutcome) -
         let at = format!("/unknowns/{}", parameter.name);
         let unit = unknown.parameter.unit();
         if parameter.at_bound {
-            let end = if parameter.value - unknown.from < unknown.to - parameter.value { unknown.from } else { unknown.to };
+            let end =
+                if parameter.value - unknown.from < unknown.to - parameter.value { unknown.from } else { unknown.to };
             found.push(
                 Finding::new("identification_at_bound", at.clone())
                     .measured(parameter.value, end, unit)
@@ -94,7 +95,8 @@ pub(super) fn warnings(problem: &Problem<'_>, outcome: &IdentificationOutcome) -
         }
     }
     for onset in outcome.onsets.iter().filter(|onset| !onset.within) {
-        let mut finding = Finding::new("identification_onset_missed", "/measurements").with("teeth", f64::from(onset.teeth));
+        let mut finding =
+            Finding::new("identification_onset_missed", "/measurements").with("teeth", f64::from(onset.teeth));
         for (name, depth) in [
             ("stable_mm", onset.table_stable_mm),
             ("chatter_mm", onset.table_chatter_mm),
@@ -128,7 +130,7 @@ pub(super) fn warnings(problem: &Problem<'_>, outcome: &IdentificationOutcome) -
             Finding::new("identification_clamp_contradicted", "/measurements")
                 .measured(clamp.least_n, clamp.most_n.unwrap_or(clamp.least_n), "N")
                 .with("best_n", clamp.best_n)
-                .with("rows", clamp.contradicted_rows.clone()),
+                .with("rows", numbers(&clamp.contradicted_rows)),
         );
     }
     if let Some(rows) = outcome.clamp_force.as_ref().and_then(|clamp| clamp.contradicted_by_stated.as_ref())
@@ -137,10 +139,15 @@ pub(super) fn warnings(problem: &Problem<'_>, outcome: &IdentificationOutcome) -
         found.push(
             Finding::new("identification_clamp_contradicted", "/fixture/clamp_force_n")
                 .value(problem.job.fixture.common().3.unwrap_or(0.0), "N")
-                .with("rows", rows.clone()),
+                .with("rows", numbers(rows)),
         );
     }
     found
+}
+
+/// Row numbers as words: a list of them is read, not computed with.
+fn numbers(rows: &[usize]) -> Vec<String> {
+    rows.iter().map(ToString::to_string).collect()
 }
 
 fn law(regeneration: &str, amplitude: &str) -> String {
@@ -192,8 +199,8 @@ pub(super) fn explanation(problem: &Problem<'_>, outcome: &IdentificationOutcome
             None => message,
         });
     }
-    if let Some(clamp) = &outcome.clamp_force {
-        said.push(match clamp.most_n.filter(|_| clamp.consistent) {
+    if let Some(clamp) = outcome.clamp_force.as_ref().filter(|clamp| clamp.consistent) {
+        said.push(match clamp.most_n {
             Some(most) => {
                 Message::new("identification_clamp_between").with("least_n", clamp.least_n).with("most_n", most)
             }

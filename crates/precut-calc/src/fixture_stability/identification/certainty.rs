@@ -7,6 +7,9 @@ use super::problem::{HUBER, Law, Predicted, Problem};
 
 /// Change of a parameter's logarithm (or of the value of what is searched plainly) for a difference.
 const STEP: f64 = 0.01;
+/// Modulus up to which a chattering row has no slope: its oscillation starts from nothing so slowly that what a run sees
+/// of it says more of the length of the run.
+const STEEP: f64 = 1.02;
 /// An eigenvalue below this share of the largest says that the table does not see the combination.
 const UNSEEN: f64 = 1e-10;
 
@@ -24,12 +27,7 @@ pub(super) struct Certainty {
     pub scatter: f64,
 }
 
-pub(super) fn certainty(
-    problem: &Problem<'_>,
-    law: Law,
-    at: &[f64],
-    base: &[Predicted],
-) -> Result<Certainty, Failure> {
+pub(super) fn certainty(problem: &Problem<'_>, law: Law, at: &[f64], base: &[Predicted]) -> Result<Certainty, Failure> {
     let rows: Vec<usize> = (0..base.len()).filter(|&row| problem.sigma(row).is_some()).collect();
     let residuals: Vec<f64> = rows.iter().map(|&row| problem.residual(row, base[row].amplitude_mm)).collect();
     let weights: Vec<f64> = residuals.iter().map(|r| (HUBER / r.abs().max(HUBER)).sqrt()).collect();
@@ -46,10 +44,14 @@ pub(super) fn certainty(
         let ((from, low), (to, high)) = (side(-1.0)?, side(1.0)?);
         let width = (to - from) / unknown.coordinate_per_unit();
         for (i, &row) in rows.iter().enumerate() {
-            // A row that passes the limit of chatter jumps; a slope there is none.
+            // A row that passes the limit of chatter jumps, and just above it the amplitude rises like a wall.
             let stable = |of: &Predicted| of.modulus < 1.0;
+            if [&low[row], &base[row], &high[row]].iter().any(|of| (1.0..STEEP).contains(&of.modulus)) {
+                continue;
+            }
             if width > 0.0 && stable(&low[row]) == stable(&high[row]) {
-                let change = problem.residual(row, high[row].amplitude_mm) - problem.residual(row, low[row].amplitude_mm);
+                let change =
+                    problem.residual(row, high[row].amplitude_mm) - problem.residual(row, low[row].amplitude_mm);
                 jacobian.set(i, j, weights[i] * change / width);
             }
         }

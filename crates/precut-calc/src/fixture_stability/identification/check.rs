@@ -74,9 +74,7 @@ fn check_rows(job: &IdentificationJob, violations: &mut Violations) {
     let feed_known = job.cut.feed_mm_per_tooth.is_some() || job.cut.feed_mm_per_min.is_some();
     for (i, row) in job.measurements.rows().iter().enumerate() {
         let mut require = |holds: bool, code: &'static str, field: &str| {
-            violations.require(holds, || {
-                Finding::new(code, format!("/measurements/{i}/{field}")).with("row", i)
-            });
+            violations.require(holds, || Finding::new(code, format!("/measurements/{i}/{field}")).with("row", i));
         };
         require(row.teeth.is_some() || job.cutter.teeth.is_some(), "teeth_missing", "teeth");
         require(row.spindle_speed_rpm.is_some() || speed_known, "row_speed_missing", "spindle_speed_rpm");
@@ -96,8 +94,7 @@ fn check_unknowns(job: &IdentificationJob, violations: &mut Violations) {
         });
     }
     let has = |parameter: Parameter| unknowns.iter().any(|unknown| unknown.parameter == parameter);
-    for (one, other) in
-        [(Parameter::NaturalFrequency, Parameter::Mass), (Parameter::DampingRatio, Parameter::Damping)]
+    for (one, other) in [(Parameter::NaturalFrequency, Parameter::Mass), (Parameter::DampingRatio, Parameter::Damping)]
     {
         violations.require(!(has(one) && has(other)), || {
             Finding::new("unknowns_exclude_each_other", pointer(one))

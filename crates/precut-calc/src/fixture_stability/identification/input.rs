@@ -166,7 +166,7 @@ pub struct AmplitudeRow {
     pub amplitude_um: Option<f64>,
     /// Which joint opened; left out: none did.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(example = "fixed")]
+    #[schema(inline, example = "fixed")]
     pub opened: Option<OpenedJoint>,
     /// Left out of the search, predicted all the same.
     #[serde(default, skip_serializing_if = "is_false")]
@@ -311,14 +311,7 @@ macro_rules! range_schema {
     };
 }
 
-range_schema!(
-    stiffness_range,
-    "Both joints together, C1 + C2.",
-    "N/mm",
-    "C",
-    0.001..1e9,
-    [10_000.0, 100_000.0]
-);
+range_schema!(stiffness_range, "Both joints together, C1 + C2.", "N/mm", "C", 0.001..1e9, [10_000.0, 100_000.0]);
 range_schema!(mass_range, "Mass of the workpiece.", "kg", "m", 0.0001..1e6, [1.0, 10.0]);
 range_schema!(
     frequency_range,

@@ -113,9 +113,7 @@ fn run(job: &IdentificationJob, monitor: &dyn Monitor) -> Result<Answer<Identifi
     let laws: Vec<Law> = job
         .amplitudes
         .iter()
-        .flat_map(|&amplitude| {
-            job.regenerations.iter().map(move |&regeneration| Law { regeneration, amplitude })
-        })
+        .flat_map(|&amplitude| job.regenerations.iter().map(move |&regeneration| Law { regeneration, amplitude }))
         .collect();
     // Per law: a fifth for the first sets (once per meaning of the amplitude), the rest for the search.
     let parts = laws.len() as f64;
@@ -184,11 +182,7 @@ fn cost(job: &IdentificationJob) -> Cost {
     let quick_ms = rows * 0.004 * (20.0 + oscillations);
     let laws = (job.amplitudes.len() * job.regenerations.len()).max(1) as f64;
     let unknowns = unknowns::Unknown::all(job).len() as f64;
-    let sets = if unknowns > 0.0 {
-        f64::from(job.search.members) * f64::from(job.search.generations)
-    } else {
-        0.0
-    };
+    let sets = if unknowns > 0.0 { f64::from(job.search.members) * f64::from(job.search.generations) } else { 0.0 };
     let ms = laws * (sets * (quick_ms + 0.5 * (run_ms + quick_ms)) + (3.0 + 44.0 * unknowns) * (run_ms + quick_ms));
     let driver = if unknowns > 0.0 { "/search/generations" } else { "/measurements" };
     Cost { ms: ms + 5.0, bytes: 4_000_000 + job.measurements.rows().len() as u64 * 20_000, driver }

@@ -309,9 +309,9 @@ fn groups(job: &IdentificationJob) -> Vec<Group> {
         }
     }
     for group in &mut groups {
-        group.rows.sort_by(|&a, &b| {
-            job.measurements.rows()[a].depth_mm.total_cmp(&job.measurements.rows()[b].depth_mm)
-        });
+        group
+            .rows
+            .sort_by(|&a, &b| job.measurements.rows()[a].depth_mm.total_cmp(&job.measurements.rows()[b].depth_mm));
     }
     groups
 }

@@ -107,9 +107,7 @@ pub(super) struct Unknown {
 
 impl Unknown {
     pub(super) fn all(job: &IdentificationJob) -> Vec<Self> {
-        let of = |parameter: Parameter| {
-            parameter.range(&job.unknowns).map(|[from, to]| Self { parameter, from, to })
-        };
+        let of = |parameter: Parameter| parameter.range(&job.unknowns).map(|[from, to]| Self { parameter, from, to });
         Parameter::ALL.into_iter().filter_map(of).collect()
     }
 
@@ -285,10 +283,8 @@ impl Values {
     /// The vise as a job of fixture stability takes it.
     pub(super) fn vise(&self, clamp_force_n: Option<f64>) -> Vise {
         let (left, right) = self.joints();
-        let joint = |j: Joint| ViseJoint {
-            stiffness_n_per_mm: j.stiffness_n_per_mm,
-            damping_n_s_per_mm: j.damping_n_s_per_mm,
-        };
+        let joint =
+            |j: Joint| ViseJoint { stiffness_n_per_mm: j.stiffness_n_per_mm, damping_n_s_per_mm: j.damping_n_s_per_mm };
         match self.jaw {
             None => Vise::SelfLocking(SelfLocking {
                 workpiece_mass_kg: self.mass_kg,

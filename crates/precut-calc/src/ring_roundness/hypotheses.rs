@@ -1,0 +1,188 @@
+//! The causes of the catalogue as they stand for a ring and its measured traces.
+
+use std::f64::consts::TAU;
+
+use super::input::Job;
+use crate::calculator::{
+    Design, Hypotheses, Hypothesis, Inapplicability, Inapplicable, Range, Shape, Smooth, Treatment, Variable,
+};
+use crate::effects::{Cause, Fit, Parameter, RING_CAUSES, RingEffect};
+
+/// Blocks of a trace that are held back by turns, deg: longer than what a remainder is correlated over.
+const BLOCK_DEG: f64 = 30.0;
+/// Folds that the blocks go to by turns.
+const FOLDS: usize = 4;
+/// Spread of the ratio of ring to roller where the roller's radius is stated, relative: the ring shrinks under it.
+const KNOWN_RATIO_SD: f64 = 0.01;
+/// Mean and spread of the logarithm of that ratio where nothing is known of the roller.
+const UNKNOWN_RATIO: (f64, f64) = (5.0, 0.6);
+
+/// The catalogue, sorted by whether traces of these rings can speak about a cause.
+///
+/// A wave with a phase is two sizes, A cos ph and A sin ph: the model is linear in both, and no phase is tried first.
+pub(super) fn hypotheses(rings: &[&Job]) -> Hypotheses {
+    let mut sorted = Hypotheses::default();
+    for cause in RING_CAUSES {
+        match inapplicability(cause, rings) {
+            Some(reason) => sorted.inapplicable.push(Inapplicable { cause, reason }),
+            None => sorted.applicable.extend(hypotheses_of(cause, rings)),
+        }
+    }
+    sorted
+}
+
+fn held<'a>(rings: &'a [&Job], kind: &'a str) -> impl Iterator<Item = &'a RingEffect> {
+    rings.iter().take(1).flat_map(|job| &job.effects).filter(move |effect| effect.kind() == kind)
+}
+
+fn inapplicability(cause: &'static Cause, rings: &[&Job]) -> Option<Inapplicability> {
+    let recurs = matches!(cause.kind, "initial_harmonic" | "chatter_harmonic");
+    if !recurs && held(rings, cause.kind).next().is_some() {
+        return Some(Inapplicability::InJob);
+    }
+    match cause.kind {
+        "spark_out_missing" if rings.iter().all(|job| job.tool.spark_out_revolutions <= 0.0) => {
+            Some(Inapplicability::NothingToActOn)
+        }
+        // The sides of a wheel are those of a rigid machine.
+        "tool_push_off" if rings.iter().any(|job| job.tool.wheel_radius_mm.is_some()) => {
+            Some(Inapplicability::NothingToActOn)
+        }
+        _ => None,
+    }
+}
+
+fn hypotheses_of(cause: &'static Cause, rings: &[&Job]) -> Vec<Hypothesis> {
+    let of = |label: String, variables: Vec<Variable>, prior_weight: f64| Hypothesis {
+        cause,
+        label,
+        variables,
+        prior_weight,
+    };
+    match cause.kind {
+        "initial_harmonic" => {
+            let known: Vec<f64> = held(rings, cause.kind).filter_map(RingEffect::recurs_by).collect();
+            let all = grid_of(cause, "order");
+            let orders = all.iter().filter(|order| !known.contains(order));
+            // Several waves are one cause: they share its weight.
+            let share = 1.0 / all.len() as f64;
+            let stated = |order: f64| Treatment::Stated { value: order };
+            orders
+                .map(|&order| {
+                    let mut variables = quadratures(cause);
+                    variables.push(variable(parameter(cause, "order"), stated(order)));
+                    of(format!("order {order}"), variables, share)
+                })
+                .collect()
+        }
+        "roller_runout" => {
+            let mut variables = quadratures(cause);
+            variables.push(variable(parameter(cause, "ratio"), ratio(cause, rings)));
+            vec![of(String::new(), variables, 1.0)]
+        }
+        "chatter_harmonic" => {
+            let known: Vec<f64> = held(rings, cause.kind).filter_map(RingEffect::recurs_by).collect();
+            let waves = grid_of(cause, "waves_per_revolution").iter().copied().filter(|m| !known.contains(m)).collect();
+            let size = parameter(cause, "amplitude_mm");
+            let variables = vec![
+                variable(size, Treatment::Amplitude { prior_sd: size.prior_sd }),
+                variable(parameter(cause, "waves_per_revolution"), Treatment::Shape { grid: waves, prior: None }),
+            ];
+            vec![of(String::new(), variables, 1.0)]
+        }
+        _ => {
+            let treated = |p: &Parameter| match p.fit {
+                Fit::Fixed { default } => Treatment::Stated { value: default },
+                _ => Treatment::Amplitude { prior_sd: p.prior_sd },
+            };
+            vec![of(String::new(), cause.parameters.iter().map(|p| variable(p, treated(p))).collect(), 1.0)]
+        }
+    }
+}
+
+/// A cos ph and A sin ph of a wave, each with the prior of the amplitude.
+fn quadratures(cause: &Cause) -> Vec<Variable> {
+    let size = parameter(cause, "amplitude_mm");
+    ["amplitude_cos_phase_mm", "amplitude_sin_phase_mm"]
+        .into_iter()
+        .map(|name| Variable { name, ..variable(size, Treatment::Amplitude { prior_sd: size.prior_sd }) })
+        .collect()
+}
+
+/// Of the stated roller the ratio is known but for what is cut off the ring; else it is looked for.
+fn ratio(cause: &Cause, rings: &[&Job]) -> Treatment {
+    let known = rings.first().and_then(|job| {
+        let roller = job.supports.roller_radius_mm;
+        super::check::mean_radius_mm(job).filter(|_| roller > 0.0).map(|radius| radius / roller)
+    });
+    match known {
+        Some(ratio) => Treatment::Shape {
+            grid: vec![ratio],
+            prior: Some(Shape { mean: ratio.ln(), sd: KNOWN_RATIO_SD, logarithmic: true }),
+        },
+        None => Treatment::Shape {
+            grid: grid_of(cause, "ratio").to_vec(),
+            prior: Some(Shape { mean: UNKNOWN_RATIO.0.ln(), sd: UNKNOWN_RATIO.1, logarithmic: true }),
+        },
+    }
+}
+
+fn variable(parameter: &Parameter, treatment: Treatment) -> Variable {
+    let range = Range { lower: parameter.lower, upper: parameter.upper };
+    Variable { name: parameter.name, unit: parameter.unit, treatment, range }
+}
+
+fn parameter(cause: &Cause, name: &str) -> &'static Parameter {
+    let all: &'static [Parameter] = cause.parameters;
+    all.iter().find(|p| p.name == name).expect("the catalogue names this parameter; a test builds every hypothesis")
+}
+
+fn grid_of(cause: &Cause, name: &str) -> &'static [f64] {
+    match parameter(cause, name).fit {
+        Fit::Shape { grid } => grid,
+        _ => &[],
+    }
+}
+
+/// The effects that a hypothesis stands for at these values of its variables.
+pub(super) fn effects(hypothesis: &Hypothesis, values: &[f64]) -> Option<Vec<RingEffect>> {
+    let cause = hypothesis.cause;
+    let effect = match (cause.kind, values) {
+        ("initial_harmonic" | "roller_runout", &[cos, sin, form]) => {
+            RingEffect::from_parameters(cause, &[cos.hypot(sin), sin.atan2(cos), form])?
+        }
+        _ => RingEffect::from_parameters(cause, values)?,
+    };
+    Some(vec![effect])
+}
+
+/// Rows round the ring; equal angles of one ring are repeats; blocks of 30 degrees are held back by turns, in every trace
+/// alike: a neighbour or a repeat would give the held-back row away.
+pub(super) fn design(places: &[(usize, f64)]) -> Design {
+    let turn = |angle_rad: f64| (angle_rad / TAU).rem_euclid(1.0);
+    let mut sorted: Vec<usize> = (0..places.len()).collect();
+    let key = |row: usize| (places[row].0, turn(places[row].1));
+    sorted.sort_by(|&a, &b| key(a).0.cmp(&key(b).0).then(key(a).1.total_cmp(&key(b).1)));
+    let mut cell = vec![0; places.len()];
+    let mut cells: Vec<(usize, f64)> = Vec::new();
+    for row in sorted {
+        let (ring, at) = key(row);
+        if cells.last().is_none_or(|(r, before)| *r != ring || at - before > 1e-9) {
+            cells.push((ring, at));
+        }
+        cell[row] = cells.len() - 1;
+    }
+    Design {
+        smooth: Smooth::Around(places.iter().map(|(_, angle)| turn(*angle) * TAU).collect()),
+        cell,
+        regressors: Vec::new(),
+        groupings: Vec::new(),
+        order: None,
+        fold: places.iter().map(|(_, angle)| block(turn(*angle) * 360.0) % FOLDS).collect(),
+    }
+}
+
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 12")]
+fn block(angle_deg: f64) -> usize {
+    (angle_deg / BLOCK_DEG) as usize
+}

@@ -1,0 +1,41 @@
+//! Rings that could be turned and measured next to tell causes apart.
+
+use super::forward::{RingPoint, RingRun};
+use super::input::Job;
+use crate::calculator::{NextRun, Rows};
+
+/// Revolutions that a longer spark-out has more.
+const LONGER_SPARK_OUT: f64 = 3.0;
+/// Share of the radius by which the tool is moved across.
+const TOOL_MOVED: f64 = 0.01;
+/// Angles at which the next ring is measured: enough for waves up to 60.
+const ANGLES: u32 = 180;
+
+/// Another ring with one setting of the machine changed: no spark-out and a longer one, half the feed over twice the
+/// revolutions, the tool moved to either side.
+pub(super) fn next_runs(job: &Job, rows: &Rows<RingRun, RingPoint>) -> Vec<NextRun<RingRun, RingPoint>> {
+    let typical = rows.runs.first().cloned().unwrap_or_default();
+    let points: Vec<RingPoint> =
+        (0..ANGLES).map(|k| RingPoint { angle_deg: 360.0 * f64::from(k) / f64::from(ANGLES) }).collect();
+    let tool = &super::forward::job_of_run(job, &typical).tool;
+    let mut next = Vec::new();
+    let mut add = |changes, run| next.push(NextRun { changes, run, points: points.clone() });
+    let spark_out = |revolutions| RingRun { spark_out_revolutions: Some(revolutions), ..typical.clone() };
+    if tool.spark_out_revolutions > 0.0 {
+        add("spark_out_revolutions", spark_out(0.0));
+    }
+    add("spark_out_revolutions", spark_out(tool.spark_out_revolutions + LONGER_SPARK_OUT));
+    add(
+        "feed_mm_per_rev",
+        RingRun {
+            feed_mm_per_rev: Some(0.5 * tool.feed_mm_per_rev),
+            revolutions: Some(2.0 * tool.revolutions),
+            ..typical.clone()
+        },
+    );
+    let aside = TOOL_MOVED * super::check::mean_radius_mm(job).unwrap_or(0.0);
+    for x_mm in [tool.x_mm - aside, tool.x_mm + aside] {
+        add("tool_x_mm", RingRun { tool_x_mm: Some(x_mm), ..typical.clone() });
+    }
+    next
+}

@@ -1,0 +1,58 @@
+//! All tests of the crate in one program: what they use of the crate is compiled and linked once, not by every file.
+//!
+//! `cargo test -p precut-calc beam_exact::` runs those of one file.
+
+mod beam_closed_forms;
+mod beam_exact;
+mod beam_properties;
+mod beam_support;
+mod conformance;
+mod deflection_effects;
+mod deflection_properties;
+mod deflection_reference;
+mod diagnosis_answers;
+mod diagnosis_deflection;
+mod diagnosis_trials;
+mod feed_reference;
+mod feed_support;
+mod fixture_effects;
+mod fixture_identification;
+mod fixture_methods;
+mod fixture_paper;
+mod fixture_reference;
+mod fixture_support;
+mod force_contract;
+mod force_handbook;
+mod force_laws;
+mod force_reference;
+mod lsq_nist;
+mod lsq_properties;
+mod machinability_fit;
+mod machinability_real;
+mod material_library;
+mod path_chords;
+mod ring_contract;
+mod ring_effects;
+mod ring_reference;
+mod ring_support;
+mod ring_theory;
+mod roundness_circles;
+mod roundness_evaluation;
+mod roundness_profile;
+mod roundness_reference;
+mod stats;
+mod strd;
+mod support;
+
+/// A file that is not named above would never run.
+#[test]
+fn every_file_of_this_folder_is_a_module_of_this_program() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests");
+    for entry in std::fs::read_dir(folder).expect("the folder of this file") {
+        let path = entry.expect("an entry of the folder").path();
+        let Some(name) = path.file_stem().and_then(|name| name.to_str()) else { continue };
+        let is_module = path.extension().is_some_and(|end| end == "rs") || path.join("mod.rs").is_file();
+        let listed = include_str!("main.rs").lines().any(|line| line == format!("mod {name};"));
+        assert!(!is_module || name == "main" || listed, "mod {name}; is missing in tests/main.rs");
+    }
+}

@@ -1,0 +1,315 @@
+//! Stored models in jobs. A job names a model; when it is accepted the model's effects join the job's own and the name
+//! becomes `{name, revision, sha256}`, so that a model that is revised or deleted later changes no accepted job.
+
+use std::borrow::Cow;
+
+use precut_calc::calculator::{Finding, Message, Unwatched, Violations};
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value, json};
+use sha2::{Digest, Sha256};
+
+use super::read::Ready;
+use crate::registry::{Entry, ModelUse, Prepared, Registry, canonical, nearest};
+use crate::store::models::KeptModel;
+
+/// The field of a job that names a model.
+const MODEL: &str = "model";
+const EFFECTS: &str = "effects";
+/// The field that holds the base job of a diagnosis or a study.
+const JOB: &str = "job";
+/// The field by which a diagnosis or a study names the calculator of its base job.
+const CALCULATOR: &str = "calculator";
+/// Letters of a name at most.
+const MOST_LETTERS: usize = 64;
+
+/// A model as an accepted job holds it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Held {
+    pub(crate) name: String,
+    pub(crate) revision: u32,
+    pub(crate) sha256: String,
+    /// So many of the job's effects, the last ones, are the model's.
+    pub(crate) effects: usize,
+}
+
+/// What a model says: the part of it that its hash covers.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ModelContent {
+    /// Whose jobs it extends.
+    pub calculator: String,
+    /// The effects that it adds to a job.
+    pub effects: Vec<Value>,
+    /// Where it comes from.
+    pub provenance: Value,
+}
+
+impl ModelContent {
+    /// As it is kept and hashed.
+    pub(crate) fn canonical(&self) -> String {
+        let bytes = canonical(self).expect("effects and provenance came as JSON");
+        String::from_utf8(bytes).expect("JSON is UTF-8")
+    }
+    pub(crate) fn read(kept: &KeptModel) -> Option<Self> {
+        serde_json::from_str(&kept.content).ok()
+    }
+}
+
+/// SHA-256 of a text, hexadecimal.
+pub(crate) fn sha256(text: &str) -> String {
+    Sha256::digest(text.as_bytes()).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// A name with the revision asked for, `name` or `name@3`.
+pub(crate) fn asked(text: &str) -> Option<(String, Option<u32>)> {
+    let (name, revision) = match text.split_once('@') {
+        None => (text, None),
+        Some((name, digits)) => {
+            let plain = digits.bytes().all(|digit| digit.is_ascii_digit()) && !digits.starts_with('0');
+            (name, Some(digits.parse().ok().filter(|_| plain)?))
+        }
+    };
+    is_name(name).then(|| (name.to_owned(), revision))
+}
+
+/// Whether a text can name a model.
+pub(crate) fn is_name(text: &str) -> bool {
+    let plain = |byte: u8| byte.is_ascii_lowercase() || byte.is_ascii_digit();
+    text.len() <= MOST_LETTERS
+        && text.bytes().next().is_some_and(plain)
+        && text.bytes().all(|byte| plain(byte) || byte == b'_' || byte == b'-')
+}
+
+/// Where a job names a model and has its effects.
+struct Places {
+    /// Fields that lead to the object with the name.
+    model: Vec<&'static str>,
+    /// Fields that lead to the object with the effects.
+    effects: Vec<&'static str>,
+    calculator: String,
+}
+
+/// `None` where this job cannot name one.
+fn places(registry: &Registry, entry: &Entry, job: &Value) -> Option<Places> {
+    let of_base = || job.get(CALCULATOR)?.as_str().map(str::to_owned);
+    match entry.model_use() {
+        ModelUse::None => None,
+        ModelUse::OfJob => Some(Places { model: vec![], effects: vec![], calculator: entry.meta().id.to_owned() }),
+        ModelUse::OfBase => Some(Places { model: vec![], effects: vec![JOB], calculator: of_base()? }),
+        ModelUse::Within => {
+            let inner = registry.entry(&of_base()?)?;
+            let mut places = places(registry, inner, job.get(JOB)?)?;
+            places.model.insert(0, JOB);
+            places.effects.insert(0, JOB);
+            Some(places)
+        }
+    }
+}
+
+fn within<'a>(job: &'a mut Value, path: &[&str]) -> Option<&'a mut Map<String, Value>> {
+    path.iter().try_fold(job, |value, name| value.get_mut(name))?.as_object_mut()
+}
+
+fn pointer(path: &[&str], name: &str) -> String {
+    path.iter().chain([&name]).map(|part| format!("/{part}")).collect()
+}
+
+/// The model that a job as it came names, without looking at the rest of it.
+pub(crate) fn named(registry: &Registry, entry: &Entry, job: &mut Value) -> Option<String> {
+    let places = places(registry, entry, job)?;
+    Some(within(job, &places.model)?.get(MODEL)?.as_str()?.to_owned())
+}
+
+/// What may be asked about models while a job is read.
+pub(crate) struct Models<'a> {
+    pub(crate) registry: &'a Registry,
+    /// What the store knows of the name that the job asks for.
+    pub(crate) found: Option<Found>,
+}
+
+/// What the store knows of a name.
+pub(crate) enum Found {
+    /// This one.
+    Model(Box<KeptModel>),
+    /// None of that name; these are there.
+    Unknown(Vec<String>),
+}
+
+/// Puts the effects of the model that a job names to the job's own. Faults where that cannot be.
+pub(crate) fn extend(models: &Models<'_>, entry: &Entry, job: &mut Value) -> Vec<Finding> {
+    let Some(places) = places(models.registry, entry, job) else { return Vec::new() };
+    let at = pointer(&places.model, MODEL);
+    let Some(asked) = within(job, &places.model).and_then(|fields| fields.get(MODEL)).cloned() else {
+        return Vec::new();
+    };
+    let Value::String(name) = asked else {
+        // Only what was resolved here may stand in the form of a resolved model.
+        return vec![Finding::new("model_not_a_name", at)];
+    };
+    if self::asked(&name).is_none() {
+        return vec![Finding::new("bad_model_name", at).with("name", name)];
+    }
+    let kept = match &models.found {
+        Some(Found::Model(kept)) => kept,
+        Some(Found::Unknown(known)) => {
+            let finding = Finding::new("unknown_model", at).with("name", name.clone());
+            let near = nearest(&name, known.iter().map(String::as_str)).map(str::to_owned);
+            return vec![near.into_iter().fold(finding, |finding, near| finding.with("nearest", near))];
+        }
+        None => return vec![Finding::new("no_models_here", at).with("name", name)],
+    };
+    if kept.calculator != places.calculator {
+        return vec![
+            Finding::new("model_of_another_calculator", at)
+                .with("name", name)
+                .with("of", kept.calculator.clone())
+                .with("calculator", places.calculator),
+        ];
+    }
+    let Some(content) = ModelContent::read(kept) else {
+        return vec![Finding::new("unknown_model", at).with("name", name)];
+    };
+    let held = Held {
+        name: kept.name.clone(),
+        revision: kept.revision,
+        sha256: kept.sha256.clone(),
+        effects: content.effects.len(),
+    };
+    let faults = join(job, &places, content.effects);
+    if faults.is_empty()
+        && let Some(fields) = within(job, &places.model)
+    {
+        fields.insert(MODEL.to_owned(), json!(held));
+    }
+    faults
+}
+
+fn kind(effect: &Value) -> Option<&str> {
+    effect.get("kind")?.as_str()
+}
+
+/// Appends the model's effects. One that the job has already is a fault.
+fn join(job: &mut Value, places: &Places, effects: Vec<Value>) -> Vec<Finding> {
+    let at = pointer(&places.effects, EFFECTS);
+    // What is no object or no list is the schema's to refuse.
+    let Some(fields) = within(job, &places.effects) else { return Vec::new() };
+    let Value::Array(own) = fields.entry(EFFECTS).or_insert_with(|| json!([])) else { return Vec::new() };
+    let mut violations = Violations::default();
+    for (index, one) in own.iter().enumerate() {
+        let both = kind(one).filter(|own| effects.iter().any(|effect| kind(effect) == Some(own)));
+        if let Some(kind) = both {
+            violations.add(Finding::new("effect_in_both", format!("{at}/{index}/kind")).with("kind", kind.to_owned()));
+        }
+    }
+    let violations = violations.into_vec();
+    if violations.is_empty() {
+        own.extend(effects);
+    }
+    violations
+}
+
+/// A job without its model, and that model where it is resolved.
+pub(crate) fn split<'a>(entry: &Entry, job: &'a Value) -> (Cow<'a, Value>, Option<Held>) {
+    let names_one = matches!(entry.model_use(), ModelUse::OfJob | ModelUse::OfBase) && job.get(MODEL).is_some();
+    if !names_one {
+        return (Cow::Borrowed(job), None);
+    }
+    let mut job = job.clone();
+    let held = job.as_object_mut().and_then(|fields| fields.remove(MODEL));
+    (Cow::Owned(job), held.and_then(|held| serde_json::from_value(held).ok()))
+}
+
+/// The same with the model in it again.
+pub(crate) fn with_model(mut job: Value, held: &Held) -> Value {
+    if let Value::Object(fields) = &mut job {
+        fields.insert(MODEL.to_owned(), json!(held));
+    }
+    job
+}
+
+/// A filled job with the model in it, as RFC 8785 writes it.
+pub(crate) fn canonical_with(job: &[u8], held: &Held) -> Result<Vec<u8>, String> {
+    let job: Value = serde_json::from_slice(job).map_err(|error| format!("a filled job: {error}"))?;
+    canonical(&with_model(job, held)).map_err(|error| format!("a filled job with its model: {error}"))
+}
+
+/// A kept job without the resolved model in it.
+pub(crate) fn without_model<'a>(entry: &Entry, input: &'a [u8]) -> Cow<'a, [u8]> {
+    if super::json::top_level_field(input, MODEL).is_none() {
+        return Cow::Borrowed(input);
+    }
+    let Ok(job) = serde_json::from_slice::<Value>(input) else { return Cow::Borrowed(input) };
+    match split(entry, &job) {
+        (job, Some(_)) => serde_json::to_vec(&*job).map_or(Cow::Borrowed(input), Cow::Owned),
+        (_, None) => Cow::Borrowed(input),
+    }
+}
+
+/// Faults in effects that are the model's are the model's faults.
+pub(crate) fn pointed_at_model(entry: &Entry, job: &Value, held: Option<&Held>, finding: Finding) -> Finding {
+    let Some(held) = held else { return finding };
+    let effects_in = if entry.model_use() == ModelUse::OfBase { vec![JOB] } else { vec![] };
+    let list = effects_in.iter().try_fold(job, |value, name| value.get(name)).and_then(|job| job.get(EFFECTS));
+    let count = list.and_then(Value::as_array).map_or(0, Vec::len);
+    let index = finding
+        .pointer
+        .strip_prefix(&format!("{}/", pointer(&effects_in, EFFECTS)))
+        .and_then(|rest| rest.split('/').next()?.parse::<usize>().ok());
+    match index {
+        Some(index) if index + held.effects >= count => Finding { pointer: pointer(&[], MODEL), ..finding },
+        _ => finding,
+    }
+}
+
+/// The job that a model extends, ready to show what the extension changes.
+pub(crate) fn base(entry: &Entry, job: &Value, held: &Held) -> Option<Prepared> {
+    if entry.model_use() != ModelUse::OfJob {
+        return None;
+    }
+    let mut job = job.clone();
+    let effects = job.get_mut(EFFECTS)?.as_array_mut()?;
+    effects.truncate(effects.len().saturating_sub(held.effects));
+    entry.prepare(&job).ok()
+}
+
+/// What the model changed: the numbers that a study would show, with it and without it.
+pub(crate) fn changes(ready: &Ready, result: &[u8]) -> Vec<Message> {
+    let (Some(held), Some(base)) = (&ready.model, &ready.base) else { return Vec::new() };
+    let name = format!("{}@{}", held.name, held.revision);
+    let Ok(with) = serde_json::from_slice::<Value>(result) else { return Vec::new() };
+    let mut text = Vec::new();
+    if base.run(&Unwatched, &mut text).is_err() {
+        return vec![Message::new("model_alone_answers").with("model", name)];
+    }
+    let Ok(without) = serde_json::from_slice::<Value>(&text) else { return Vec::new() };
+    let number = |result: &Value, pointer: &str| result.pointer(pointer).and_then(Value::as_f64);
+    let outputs = ready.entry.meta().study_outputs.iter();
+    outputs
+        .filter_map(|pointer| {
+            let (with, without) = (number(&with, pointer)?, number(&without, pointer)?);
+            let message = Message::new("model_changed").with("model", name.clone());
+            Some(message.with("output", (*pointer).to_owned()).with("with", with).with("without", without))
+        })
+        .collect()
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_and_revisions_are_read() {
+        assert_eq!(asked("lathe-7"), Some(("lathe-7".to_owned(), None)));
+        assert_eq!(asked("lathe-7@12"), Some(("lathe-7".to_owned(), Some(12))));
+        for bad in ["", "-a", "A", "a b", "a@", "a@0", "a@01", "a@-1", "a@x", "a@1@2", "ä", &"a".repeat(65)] {
+            assert_eq!(asked(bad), None, "{bad}");
+        }
+        assert!(is_name(&"a".repeat(64)));
+    }
+
+    #[test]
+    fn a_hash_is_that_of_the_standard() {
+        // FIPS 180-4, the example "abc".
+        assert_eq!(sha256("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+    }
+}

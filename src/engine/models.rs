@@ -1,0 +1,296 @@
+//! Stored models: made of what a diagnosis found, listed, read, deleted, and found for the jobs that name them.
+
+use std::str::FromStr;
+use std::sync::Arc;
+
+use precut_calc::calculator::Finding;
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use super::model::{self, Found, ModelContent};
+use super::{Body, Engine, Error, Inner, Key, Stored, json as read_json};
+use crate::registry::{Entry, Faults, ModelUse, canonical, nearest};
+use crate::store::jobs::JobId;
+use crate::store::models::{KeptModel, NewModel};
+
+/// The calculator whose results can become models.
+const DIAGNOSIS: &str = "diagnosis";
+/// Names that are looked through for one like an unknown name.
+const NEAR_NAMES: u32 = 1000;
+
+/// A stored model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StoredModel {
+    /// Its name.
+    pub name: String,
+    /// From 1; a revision never changes.
+    pub revision: u32,
+    /// SHA-256 of its content in canonical JSON.
+    pub sha256: String,
+    /// When it was stored, ms since 1970, UTC.
+    pub created_ms: i64,
+    /// What it says.
+    pub content: ModelContent,
+}
+
+/// Where a new revision comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ModelSource {
+    /// The kept result of a diagnosis.
+    Result(Key),
+    /// A job that was a diagnosis.
+    Job(JobId),
+    /// A model that was read elsewhere, with its hash where it has one.
+    Exported {
+        /// What it says.
+        content: ModelContent,
+        /// What its hash was.
+        sha256: Option<String>,
+    },
+}
+
+/// What came of storing a model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModelAnswer {
+    /// As it is kept.
+    pub model: StoredModel,
+    /// Whether nothing had the name before.
+    pub is_new: bool,
+}
+
+/// Why a model is not stored or not found.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ModelError {
+    /// No model of that name, or no such revision of it; the name most like it.
+    Unknown {
+        /// The name asked for.
+        name: String,
+        /// The one most like it.
+        nearest: Option<String>,
+    },
+    /// The name is taken, and only a new one was wanted.
+    Exists(String),
+    /// What was sent breaks rules.
+    Invalid(Vec<Finding>),
+    /// No such result is kept.
+    UnknownResult(Key),
+    /// Anything else.
+    Other(Error),
+}
+
+impl<E: Into<Error>> From<E> for ModelError {
+    fn from(error: E) -> Self {
+        Self::Other(error.into())
+    }
+}
+
+impl ModelSource {
+    /// What the body of a request says.
+    pub fn read(body: &[u8]) -> Result<Self, ModelError> {
+        #[derive(Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct Sent {
+            from_result: Option<String>,
+            from_job: Option<String>,
+            calculator: Option<String>,
+            effects: Option<Vec<Value>>,
+            provenance: Option<Value>,
+            sha256: Option<String>,
+            // An exported document has these, too; the store gives its own.
+            #[serde(rename = "name")]
+            _name: Option<Value>,
+            #[serde(rename = "revision")]
+            _revision: Option<Value>,
+            #[serde(rename = "created_at")]
+            _created_at: Option<Value>,
+            #[serde(rename = "links")]
+            _links: Option<Value>,
+        }
+        let refuse = |code, pointer: &str| Err(ModelError::Invalid(vec![Finding::new(code, pointer)]));
+        let value = read_json::parse(body)?;
+        let sent: Sent = serde_path_to_error::deserialize(&value)
+            .map_err(|error| ModelError::Invalid(vec![crate::registry::second_line(&error)]))?;
+        match (sent.from_result, sent.from_job, sent.calculator, sent.effects) {
+            (Some(key), None, None, None) => match Key::from_str(&key) {
+                Ok(key) => Ok(Self::Result(key)),
+                Err(_) => refuse("not_a_key", "/from_result"),
+            },
+            (None, Some(id), None, None) => match JobId::from_str(&id) {
+                Ok(id) => Ok(Self::Job(id)),
+                Err(_) => refuse("not_a_job_id", "/from_job"),
+            },
+            (None, None, Some(calculator), Some(effects)) => {
+                let provenance = sent.provenance.unwrap_or(Value::Null);
+                Ok(Self::Exported { content: ModelContent { calculator, effects, provenance }, sha256: sent.sha256 })
+            }
+            _ => refuse("model_from_nothing", ""),
+        }
+    }
+}
+
+impl Engine {
+    /// Stores a model as the next revision of its name.
+    pub async fn put_model(&self, name: &str, source: ModelSource, only_new: bool) -> Result<ModelAnswer, ModelError> {
+        let inner = &self.inner;
+        if !model::is_name(name) {
+            let finding = Finding::new("bad_model_name", "").with("name", name.to_owned());
+            return Err(ModelError::Invalid(vec![finding]));
+        }
+        let content = match source {
+            ModelSource::Result(key) => {
+                content_of(&*self.result(&key).await?.ok_or(ModelError::UnknownResult(key))?, "/from_result")?
+            }
+            ModelSource::Job(id) => content_of(&*self.job_result(id).await?, "/from_job")?,
+            ModelSource::Exported { content, sha256 } => {
+                let is_whole = sha256.is_none_or(|sha256| sha256 == model::sha256(&content.canonical()));
+                if !is_whole {
+                    return Err(ModelError::Invalid(vec![Finding::new("model_damaged", "/sha256")]));
+                }
+                content
+            }
+        };
+        let findings = inner.faults_of_model(&content);
+        if !findings.is_empty() {
+            return Err(ModelError::Invalid(findings));
+        }
+        let text = content.canonical();
+        let new = NewModel {
+            name: name.to_owned(),
+            calculator: content.calculator.clone(),
+            sha256: model::sha256(&text),
+            content: text,
+            only_new,
+        };
+        let kept = inner.models.put_model(new).await?.ok_or_else(|| ModelError::Exists(name.to_owned()))?;
+        let is_new = kept.revision == 1;
+        Ok(ModelAnswer { model: stored(kept, content), is_new })
+    }
+
+    /// A model, `name` for its newest revision or `name@revision`.
+    pub async fn model(&self, asked: &str) -> Result<StoredModel, ModelError> {
+        let inner = &self.inner;
+        let found = match model::asked(asked) {
+            Some((name, revision)) => inner.models.model(name, revision).await?,
+            None => None,
+        };
+        match found.and_then(|kept| ModelContent::read(&kept).map(|content| stored(kept, content))) {
+            Some(model) => Ok(model),
+            None => Err(inner.unknown_model(asked).await?),
+        }
+    }
+
+    /// The newest revisions of up to `limit` models whose names follow `after`, by name.
+    pub async fn models(&self, after: String, limit: u32) -> Result<Vec<StoredModel>, ModelError> {
+        let kept = self.inner.models.models(after, limit).await?;
+        Ok(kept
+            .into_iter()
+            .filter_map(|kept| Some((ModelContent::read(&kept)?, kept)))
+            .map(|(c, k)| stored(k, c))
+            .collect())
+    }
+
+    /// Deletes every revision of a model. Jobs that were accepted with it are not touched.
+    pub async fn delete_model(&self, name: &str) -> Result<(), ModelError> {
+        let inner = &self.inner;
+        if model::is_name(name) && inner.models.delete_model(name.to_owned()).await? {
+            return Ok(());
+        }
+        Err(inner.unknown_model(name).await?)
+    }
+}
+
+impl Inner {
+    /// What the store knows of the model that a job names; nothing where it names none.
+    pub(super) async fn find_model(&self, entry: &Arc<Entry>, body: &Body) -> Result<Option<Found>, Error> {
+        /// Looked for before anything is parsed: hardly any job has it.
+        const FIELD: &[u8] = b"\"model\"";
+        let job = match body {
+            Body::Json(job) | Body::Parts { job, .. } => job,
+        };
+        if entry.model_use() == ModelUse::None || !job.windows(FIELD.len()).any(|bytes| bytes == FIELD) {
+            return Ok(None);
+        }
+        let mut job = read_json::parse(job)?;
+        let Some(name) = model::named(&self.registry, entry, &mut job) else { return Ok(None) };
+        let Some((plain, revision)) = model::asked(&name) else { return Ok(None) };
+        Ok(Some(match self.models.model(plain, revision).await? {
+            Some(kept) => Found::Model(Box::new(kept)),
+            None => Found::Unknown(self.near_names().await?),
+        }))
+    }
+
+    async fn near_names(&self) -> Result<Vec<String>, Error> {
+        let models = self.models.models(String::new(), NEAR_NAMES).await?;
+        Ok(models.into_iter().map(|model| model.name).collect())
+    }
+
+    async fn unknown_model(&self, name: &str) -> Result<ModelError, Error> {
+        let names = self.near_names().await?;
+        let plain = name.split('@').next().unwrap_or_default();
+        let nearest = nearest(plain, names.iter().map(String::as_str)).map(str::to_owned);
+        Ok(ModelError::Unknown { name: name.to_owned(), nearest })
+    }
+
+    /// What is wrong with a model: its calculator, or effects that the calculator does not know.
+    fn faults_of_model(&self, content: &ModelContent) -> Vec<Finding> {
+        let entry = self.registry.entry(&content.calculator).filter(|entry| entry.model_use() == ModelUse::OfJob);
+        let Some(entry) = entry else {
+            let known: Vec<String> = self
+                .registry
+                .entries()
+                .iter()
+                .filter(|entry| entry.model_use() == ModelUse::OfJob)
+                .map(|entry| entry.meta().id.to_owned())
+                .collect();
+            let finding = Finding::new("calculator_without_models", "/calculator");
+            return vec![finding.with("name", content.calculator.clone()).with("known", known)];
+        };
+        if content.effects.is_empty() {
+            return vec![Finding::new("model_without_effects", "/effects")];
+        }
+        let mut faults = Faults::default();
+        entry.validate_effects(&json!(content.effects), &mut faults);
+        faults.listed
+    }
+}
+
+fn stored(kept: KeptModel, content: ModelContent) -> StoredModel {
+    StoredModel { name: kept.name, revision: kept.revision, sha256: kept.sha256, created_ms: kept.created_ms, content }
+}
+
+/// The model that a diagnosis found, with where it comes from.
+fn content_of(stored: &Stored, pointer: &str) -> Result<ModelContent, ModelError> {
+    if stored.entry().meta().id != DIAGNOSIS {
+        let finding = Finding::new("not_a_diagnosis", pointer).with("calculator", stored.entry().meta().id);
+        return Err(ModelError::Invalid(vec![finding]));
+    }
+    let broken = |error: serde_json::Error| Error::internal(format!("a kept diagnosis: {error}"));
+    let answer: Value = serde_json::from_slice(&stored.body).map_err(broken)?;
+    let (input, result) = (&answer["input"], &answer["result"]);
+    let named = result["effects"].as_array().cloned().unwrap_or_default();
+    if named.is_empty() {
+        let verdict = result["verdict"].as_str().unwrap_or_default().to_owned();
+        let finding = Finding::new("diagnosis_without_causes", pointer).with("verdict", verdict);
+        return Err(ModelError::Invalid(vec![finding]));
+    }
+    // What an earlier model added to the base job belongs to the extended one.
+    let of_job = input["job"]["effects"].as_array().map_or(&[][..], Vec::as_slice);
+    let inherited = input["model"]["effects"].as_u64().and_then(|count| usize::try_from(count).ok()).unwrap_or(0);
+    let effects = of_job[of_job.len().saturating_sub(inherited)..].iter().cloned().chain(named).collect();
+    let base = canonical(&input["job"]).map_err(|error| Error::internal(format!("a kept diagnosis: {error}")))?;
+    Ok(ModelContent {
+        calculator: input["calculator"].as_str().unwrap_or_default().to_owned(),
+        effects,
+        provenance: json!({
+            "diagnosis": stored.key.to_string(),
+            "engine": answer["engine"],
+            "verdict": result["verdict"],
+            "quantity": input["quantity"],
+            "data": input["measurements"],
+            "base_job_b3": blake3::hash(&base).to_hex().as_str(),
+            "extends": input.get("model").cloned().unwrap_or(Value::Null),
+            "causes": result["named"],
+            "gain": result["gain"],
+        }),
+    })
+}

@@ -1,0 +1,80 @@
+//! Stored models in PostgreSQL.
+
+use futures_util::future::BoxFuture;
+
+use super::PostgresStore;
+use crate::store::StoreError;
+use crate::store::models::{KeptModel, ModelRow, ModelStore, NewModel, column};
+
+impl ModelStore for PostgresStore {
+    fn put_model(&self, model: NewModel) -> BoxFuture<'_, Result<Option<KeptModel>, StoreError>> {
+        Box::pin(async move {
+            let row: Option<ModelRow> = self
+                .write(|connection| {
+                    Box::pin(async move {
+                        // One after the other, so that no two take the same number.
+                        sqlx::query("SELECT pg_advisory_xact_lock(hashtextextended('precut.models ' || $1, 0))")
+                            .bind(model.name.clone())
+                            .execute(&mut *connection)
+                            .await?;
+                        sqlx::query_as(
+                            "INSERT INTO precut.models (name, revision, calculator, content, sha256, created_ms)
+                             SELECT $1, 1 + coalesce(max(revision), 0), $2, $3, $4, precut.now_ms()
+                             FROM precut.models WHERE name = $1
+                             HAVING NOT $5 OR count(content) = 0
+                             RETURNING name, revision, calculator, content, sha256, created_ms",
+                        )
+                        .bind(model.name)
+                        .bind(model.calculator)
+                        .bind(model.content)
+                        .bind(model.sha256)
+                        .bind(model.only_new)
+                        .fetch_optional(connection)
+                        .await
+                    })
+                })
+                .await?;
+            Ok(row.and_then(ModelRow::model))
+        })
+    }
+
+    fn model(&self, name: String, revision: Option<u32>) -> BoxFuture<'_, Result<Option<KeptModel>, StoreError>> {
+        Box::pin(async move {
+            let row: Option<ModelRow> = sqlx::query_as(
+                "SELECT name, revision, calculator, content, sha256, created_ms FROM precut.models
+                 WHERE name = $1 AND content IS NOT NULL AND ($2::integer IS NULL OR revision = $2)
+                 ORDER BY revision DESC LIMIT 1",
+            )
+            .bind(name)
+            .bind(column(revision))
+            .fetch_optional(&self.pool)
+            .await?;
+            Ok(row.and_then(ModelRow::model))
+        })
+    }
+
+    fn models(&self, after: String, limit: u32) -> BoxFuture<'_, Result<Vec<KeptModel>, StoreError>> {
+        Box::pin(async move {
+            let rows: Vec<ModelRow> = sqlx::query_as(
+                "SELECT DISTINCT ON (name COLLATE \"C\") name, revision, calculator, content, sha256, created_ms FROM precut.models
+                 WHERE name COLLATE \"C\" > $1 AND content IS NOT NULL
+                 ORDER BY name COLLATE \"C\", revision DESC LIMIT $2",
+            )
+            .bind(after)
+            .bind(i64::from(limit))
+            .fetch_all(&self.pool)
+            .await?;
+            Ok(rows.into_iter().filter_map(ModelRow::model).collect())
+        })
+    }
+
+    fn delete_model(&self, name: String) -> BoxFuture<'_, Result<bool, StoreError>> {
+        Box::pin(async move {
+            let done = sqlx::query("UPDATE precut.models SET content = NULL WHERE name = $1 AND content IS NOT NULL")
+                .bind(name)
+                .execute(&self.pool)
+                .await?;
+            Ok(done.rows_affected() > 0)
+        })
+    }
+}

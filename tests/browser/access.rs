@@ -1,0 +1,104 @@
+//! For everybody: axe-core finds nothing, the keyboard reaches everything, no width overflows.
+
+use serde_json::{Value, json};
+
+use crate::chromium::Page;
+use crate::service::Service;
+use crate::{SETTLED, both};
+
+/// Version 4.14.1, see its folder.
+const AXE: &str = include_str!("vendor/axe-core/axe.min.js");
+const RULES: &str = "['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice']";
+
+fn assert_accessible(page: &mut Page, place: &str) {
+    if page.evaluate("typeof axe") == "undefined" {
+        page.evaluate(&format!("{AXE};0"));
+    }
+    let found = page.evaluate(&format!(
+        "axe.run(document, {{runOnly: {RULES}}}).then(it => it.violations.map(rule => [rule.id, rule.help, rule.nodes.slice(0, 3).map(node => node.html.slice(0, 200) + ' ' + node.failureSummary)]))"
+    ));
+    assert_eq!(found, json!([]), "{place}: {found:#}");
+}
+
+fn rooms(page: &mut Page, service: &Service) -> Vec<String> {
+    page.open(&service.page(""));
+    page.wait_for(".questions li");
+    let rooms = page.evaluate("[...document.querySelectorAll('.questions li > a')].map(link => link.getAttribute('href').slice(2))");
+    rooms.as_array().unwrap().iter().filter_map(Value::as_str).map(str::to_owned).collect()
+}
+
+#[test]
+fn axe_finds_no_violation_on_any_page() {
+    let Some((_turn, mut page, service)) = both() else { return };
+    assert_accessible(&mut page, "start");
+    for (index, room) in rooms(&mut page, &service).iter().enumerate() {
+        // Either scheme for every second one.
+        page.screen(1440, 900, index % 2 == 1);
+        page.open(&service.page(room));
+        page.until(SETTLED);
+        assert_accessible(&mut page, room);
+    }
+    page.screen(360, 740, true);
+    page.open(&service.page("fixture-stability?example=lobes"));
+    page.until(SETTLED);
+    assert_accessible(&mut page, "phone, picture");
+    page.click(".pane-switch button");
+    assert_accessible(&mut page, "phone, form");
+    page.screen(1024, 600, false);
+    page.open(&service.page("deflection-compensation?/cut/feed_mm_per_rev=900"));
+    page.wait_for(".problem");
+    assert_accessible(&mut page, "fault");
+    for place in ["jobs", "results", "models", "nothing-like-it"] {
+        page.open(&service.page(place));
+        page.wait_for("main h1");
+        assert_accessible(&mut page, place);
+    }
+    page.assert_calm();
+}
+
+#[test]
+fn no_page_is_wider_than_its_window() {
+    let Some((_turn, mut page, service)) = both() else { return };
+    let mut places = rooms(&mut page, &service);
+    places.extend(["", "jobs", "results"].map(str::to_owned));
+    for place in &places {
+        page.screen(360, 740, false);
+        page.open(&service.page(place));
+        if place.is_empty() || place == "jobs" || place == "results" {
+            page.wait_for("main h1");
+        } else {
+            page.until(SETTLED);
+        }
+        for (width, height) in [(360, 740), (768, 1024), (1024, 600), (2560, 1300)] {
+            page.screen(width, height, false);
+            page.until(&format!("innerWidth === {width}"));
+            page.until("document.documentElement.scrollWidth <= innerWidth");
+        }
+    }
+}
+
+#[test]
+fn the_keyboard_alone_is_enough() {
+    let Some((_turn, mut page, service)) = both() else { return };
+    page.open(&service.page("deflection-compensation"));
+    page.until(SETTLED);
+    page.press("Tab");
+    page.until("document.activeElement.classList.contains('skip')");
+    // Through the shell into the form, in the order in which it is read.
+    let mut seen = Vec::new();
+    for _ in 0..16 {
+        page.press("Tab");
+        let name = page.evaluate("(() => { const it = document.activeElement; return (it.id || it.textContent).trim().slice(0, 40) })()");
+        seen.push(name.as_str().unwrap_or_default().to_owned());
+        assert_eq!(page.evaluate("document.activeElement.checkVisibility()"), true, "{seen:?}");
+    }
+    let place = |part: &str| seen.iter().position(|name| name.contains(part)).unwrap_or_else(|| panic!("{part}: {seen:?}"));
+    assert!(place("Jobs") < place("EN") && place("EN") < place("example") && place("example") < place("Shaft"), "{seen:?}");
+    // The menu of questions opens, closes and gives the focus back.
+    page.evaluate("document.querySelector('.ask button').focus()");
+    page.press("Enter");
+    page.until("!document.querySelector('.menu').hidden");
+    page.press("Escape");
+    page.until("document.querySelector('.menu').hidden && document.activeElement === document.querySelector('.ask button')");
+    page.assert_calm();
+}

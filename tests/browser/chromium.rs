@@ -1,0 +1,320 @@
+//! A headless Chromium, driven over its DevTools protocol: what a test needs of it and no more.
+
+use std::io::{BufRead, BufReader};
+use std::net::TcpStream;
+use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+use tempfile::TempDir;
+use tungstenite::{Message, WebSocket};
+
+/// Names under which it is found; Debian's package has the first.
+const NAMES: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
+/// Longest wait for something on the page. The machine may be busy.
+const PATIENCE: Duration = Duration::from_secs(60);
+/// Between two looks.
+const LOOK: Duration = Duration::from_millis(40);
+
+/// A browser with one page. It ends with the test.
+pub struct Page {
+    process: Child,
+    socket: WebSocket<TcpStream>,
+    session: String,
+    last: u64,
+    complaints: Vec<String>,
+    _profile: TempDir,
+    /// Where downloads land.
+    pub downloads: TempDir,
+}
+
+/// The path of the program, if it is installed. With `CI=true` it must be.
+pub fn found() -> Option<PathBuf> {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let found = std::env::split_paths(&path).flat_map(|folder| NAMES.map(|name| folder.join(name))).find(|file| file.is_file());
+    if found.is_none() {
+        assert!(std::env::var("CI").as_deref() != Ok("true"), "chromium is not installed");
+        eprintln!("NOT CHECKED: chromium is not here");
+    }
+    found
+}
+
+impl Page {
+    /// A fresh browser.
+    pub fn new() -> Option<Self> {
+        let program = found()?;
+        let profile = tempfile::tempdir().unwrap();
+        let downloads = tempfile::tempdir().unwrap();
+        let mut process = Command::new(program)
+            .args(["--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--hide-scrollbars"])
+            .args(["--force-color-profile=srgb", "--lang=en", "--remote-debugging-port=0", "--no-first-run"])
+            .arg(format!("--user-data-dir={}", profile.path().display()))
+            .arg("about:blank")
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut lines = BufReader::new(process.stderr.take().unwrap()).lines();
+        let address = lines.by_ref().map_while(Result::ok).find_map(|line| Some(line.split_once("listening on ")?.1.to_owned()));
+        let address = address.expect("chromium says where it listens");
+        // Whatever else it says must not fill the pipe.
+        thread::spawn(move || lines.for_each(drop));
+        let host = address.trim_start_matches("ws://").split('/').next().unwrap();
+        let stream = TcpStream::connect(host).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        let (socket, _) = tungstenite::client(address.as_str(), stream).unwrap();
+        let mut page = Self {
+            process,
+            socket,
+            session: String::new(),
+            last: 0,
+            complaints: Vec::new(),
+            _profile: profile,
+            downloads,
+        };
+        let target = page.call("Target.createTarget", json!({"url": "about:blank"}));
+        let attached = page.call("Target.attachToTarget", json!({"targetId": target["targetId"], "flatten": true}));
+        let folder = page.downloads.path().to_str().unwrap().to_owned();
+        page.call("Browser.setDownloadBehavior", json!({"behavior": "allow", "downloadPath": folder}));
+        attached["sessionId"].as_str().unwrap().clone_into(&mut page.session);
+        for domain in ["Page", "Runtime", "Log"] {
+            page.call(&format!("{domain}.enable"), json!({}));
+        }
+        page.screen(1440, 900, false);
+        Some(page)
+    }
+
+    /// Sends a command and waits for its answer. What the page complains of meanwhile is kept.
+    pub fn call(&mut self, method: &str, parameters: Value) -> Value {
+        self.last += 1;
+        let id = self.last;
+        let mut command = json!({"id": id, "method": method, "params": parameters});
+        if !self.session.is_empty() {
+            command["sessionId"] = self.session.as_str().into();
+        }
+        self.socket.send(Message::text(command.to_string())).unwrap();
+        loop {
+            let Message::Text(text) = self.socket.read().unwrap() else { continue };
+            let mut message: Value = serde_json::from_str(&text).unwrap();
+            if message["id"] == id {
+                assert!(message.get("error").is_none(), "{method}: {}", message["error"]);
+                return message["result"].take();
+            }
+            self.note(&message);
+        }
+    }
+
+    fn note(&mut self, message: &Value) {
+        let said = match message["method"].as_str() {
+            Some("Runtime.exceptionThrown") => &message["params"]["exceptionDetails"],
+            Some("Log.entryAdded") if message["params"]["entry"]["level"] == "error" => &message["params"]["entry"],
+            Some("Runtime.consoleAPICalled") if message["params"]["type"] == "error" => &message["params"]["args"],
+            _ => return,
+        };
+        // Refusals of the service are no faults of the page.
+        if said["source"] != "network" {
+            self.complaints.push(said.to_string());
+        }
+    }
+
+    /// Fails if the page threw, logged an error or broke its content policy.
+    pub fn assert_calm(&mut self) {
+        self.evaluate("0");
+        assert!(self.complaints.is_empty(), "{:#?}", self.complaints);
+        let trouble = self.text("#trouble");
+        assert!(trouble.is_empty() || self.evaluate("document.getElementById('trouble').hidden") == true, "{trouble}");
+    }
+
+    /// The value of an expression; a promise is waited for.
+    pub fn evaluate(&mut self, expression: &str) -> Value {
+        let parameters = json!({"expression": expression, "awaitPromise": true, "returnByValue": true});
+        let mut answer = self.call("Runtime.evaluate", parameters);
+        assert!(answer.get("exceptionDetails").is_none(), "{expression}: {}", answer["exceptionDetails"]);
+        answer["result"]["value"].take()
+    }
+
+    /// Waits until an expression is true.
+    pub fn until(&mut self, expression: &str) {
+        let start = Instant::now();
+        while !self.holds(expression) {
+            let main = || "document.querySelector('main')?.innerText.slice(0, 2000)";
+            assert!(start.elapsed() < PATIENCE, "never came true: {expression}\n{}", self.evaluate(main()));
+            thread::sleep(LOOK);
+        }
+    }
+
+    /// Whether an expression is true; not while the page is being replaced.
+    fn holds(&mut self, expression: &str) -> bool {
+        let guarded = format!("(() => {{ try {{ return Boolean({expression}) }} catch {{ return false }} }})()");
+        self.evaluate(&guarded) == true
+    }
+
+    /// Waits for an element.
+    pub fn wait_for(&mut self, selector: &str) {
+        self.until(&format!("document.querySelector({})", json!(selector)));
+    }
+
+    /// Opens an address as if typed: the page is loaded anew.
+    pub fn open(&mut self, url: &str) {
+        self.call("Page.navigate", json!({"url": "about:blank"}));
+        self.until("location.href === 'about:blank'");
+        self.call("Page.navigate", json!({"url": url}));
+        self.until("location.href !== 'about:blank' && document.querySelector('header.shell')");
+    }
+
+    /// Size of the window and colour scheme.
+    pub fn screen(&mut self, width: u32, height: u32, dark: bool) {
+        let mobile = width < 500;
+        self.call(
+            "Emulation.setDeviceMetricsOverride",
+            json!({"width": width, "height": height, "deviceScaleFactor": 1, "mobile": mobile}),
+        );
+        let scheme = if dark { "dark" } else { "light" };
+        let features = json!([{"name": "prefers-color-scheme", "value": scheme}, {"name": "prefers-reduced-motion", "value": "reduce"}]);
+        self.call("Emulation.setEmulatedMedia", json!({"features": features}));
+    }
+
+    /// Text of the first element that fits; empty where there is none.
+    pub fn text(&mut self, selector: &str) -> String {
+        let text = self.evaluate(&format!("document.querySelector({})?.textContent ?? ''", json!(selector)));
+        text.as_str().unwrap_or_default().to_owned()
+    }
+
+    /// Value of a field.
+    pub fn value(&mut self, selector: &str) -> String {
+        let value = self.evaluate(&format!("document.querySelector({}).value", json!(selector)));
+        value.as_str().unwrap_or_default().to_owned()
+    }
+
+    /// Middle of an element, px, after bringing it into sight.
+    pub fn middle(&mut self, selector: &str) -> (f64, f64) {
+        self.wait_for(selector);
+        let found = self.evaluate(&format!(
+            "(() => {{ const it = document.querySelector({}); it.scrollIntoView({{block: 'center'}}); \
+             const box = it.getBoundingClientRect(); return [box.x + box.width / 2, box.y + box.height / 2] }})()",
+            json!(selector)
+        ));
+        (found[0].as_f64().unwrap(), found[1].as_f64().unwrap())
+    }
+
+    /// Moves the mouse.
+    pub fn point(&mut self, (x, y): (f64, f64)) {
+        self.mouse("mouseMoved", (x, y), 0);
+    }
+
+    fn mouse(&mut self, kind: &str, (x, y): (f64, f64), buttons: u8) {
+        let button = if kind == "mouseMoved" && buttons == 0 { "none" } else { "left" };
+        self.call(
+            "Input.dispatchMouseEvent",
+            json!({"type": kind, "x": x, "y": y, "button": button, "buttons": buttons, "clickCount": 1}),
+        );
+    }
+
+    /// Presses and moves and lets go.
+    pub fn drag(&mut self, from: (f64, f64), to: (f64, f64)) {
+        self.point(from);
+        self.mouse("mousePressed", from, 1);
+        for step in 1..=8 {
+            let share = f64::from(step) / 8.0;
+            self.mouse("mouseMoved", (from.0 + share * (to.0 - from.0), from.1 + share * (to.1 - from.1)), 1);
+        }
+        self.mouse("mouseReleased", to, 0);
+    }
+
+    /// A real click in the middle of an element.
+    pub fn click(&mut self, selector: &str) {
+        let place = self.middle(selector);
+        self.point(place);
+        self.mouse("mousePressed", place, 1);
+        self.mouse("mouseReleased", place, 0);
+    }
+
+    /// A click on the button or link whose text begins so.
+    pub fn click_on(&mut self, text: &str) {
+        let mark = format!(
+            "(() => {{ for (const it of document.querySelectorAll('button, a, label.button')) \
+             if (it.textContent.trim().startsWith({}) && it.checkVisibility()) {{ \
+             document.querySelectorAll('[data-click]').forEach(old => old.removeAttribute('data-click')); \
+             it.dataset.click = ''; return true }} return false }})()",
+            json!(text)
+        );
+        self.until(&mark);
+        self.click("[data-click]");
+    }
+
+    /// Types into a field in place of what is there.
+    pub fn fill(&mut self, selector: &str, text: &str) {
+        self.wait_for(selector);
+        self.evaluate(&format!("document.querySelector({}).focus(), document.querySelector({0}).select()", json!(selector)));
+        // The field selects all of itself a moment after it gets the focus.
+        thread::sleep(Duration::from_millis(20));
+        self.call("Input.insertText", json!({"text": text}));
+    }
+
+    /// Picks an option of a list by its value.
+    pub fn pick(&mut self, selector: &str, value: &str) {
+        self.wait_for(selector);
+        self.evaluate(&format!(
+            "(() => {{ const it = document.querySelector({}); it.value = {}; it.dispatchEvent(new Event('change', {{bubbles: true}})) }})()",
+            json!(selector),
+            json!(value)
+        ));
+    }
+
+    /// Presses a key.
+    pub fn press(&mut self, key: &str) {
+        let code = match key {
+            "Tab" => 9,
+            "Enter" => 13,
+            "Escape" => 27,
+            "ArrowLeft" => 37,
+            "ArrowUp" => 38,
+            "ArrowRight" => 39,
+            "ArrowDown" => 40,
+            _ => 0,
+        };
+        let text = match key {
+            "Enter" => "\r",
+            key if key.chars().count() == 1 => key,
+            _ => "",
+        };
+        let kind = if text.is_empty() { "rawKeyDown" } else { "keyDown" };
+        let down = json!({"type": kind, "key": key, "text": text, "windowsVirtualKeyCode": code});
+        self.call("Input.dispatchKeyEvent", down);
+        self.call("Input.dispatchKeyEvent", json!({"type": "keyUp", "key": key, "windowsVirtualKeyCode": code}));
+    }
+
+    /// The window as PNG.
+    pub fn picture(&mut self) -> Vec<u8> {
+        let shot = self.call("Page.captureScreenshot", json!({"format": "png", "optimizeForSpeed": false}));
+        decoded(shot["data"].as_str().unwrap())
+    }
+}
+
+impl Drop for Page {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+/// Base64 without line breaks.
+fn decoded(text: &str) -> Vec<u8> {
+    let digit = |byte: u8| match byte {
+        b'A'..=b'Z' => byte - b'A',
+        b'a'..=b'z' => byte - b'a' + 26,
+        b'0'..=b'9' => byte - b'0' + 52,
+        b'+' => 62,
+        _ => 63,
+    };
+    let mut bytes = Vec::with_capacity(text.len() / 4 * 3);
+    for group in text.as_bytes().chunks(4) {
+        let given: Vec<u8> = group.iter().copied().filter(|byte| *byte != b'=').collect();
+        let word = given.iter().fold(0_u32, |word, byte| word << 6 | u32::from(digit(*byte))) << (6 * (4 - given.len()));
+        bytes.extend_from_slice(&word.to_be_bytes()[1..given.len()]);
+    }
+    bytes
+}

@@ -1,0 +1,57 @@
+//! What takes longer: progress, a reload, a cancel, the lists.
+
+use crate::{SETTLED, both};
+
+/// A map of a quarter of a million points: seconds even on a fast machine.
+const LONG: &str = "ring-roundness?example=set_up&/setup_map/tool_angles=721&/setup_map/support_angles=361&/setup_map/highest_order=60";
+
+#[test]
+fn a_long_job_shows_its_progress_survives_a_reload_and_is_cancelled() {
+    let Some((_turn, mut page, service)) = both() else { return };
+    page.open(&service.page(LONG));
+    page.wait_for(".progress-box progress");
+    page.until("location.hash.includes('run=')");
+    page.until("document.querySelector('.progress-text').textContent.includes('%')");
+    page.until("document.querySelector('.count')");
+
+    let address = page.evaluate("location.href");
+    page.open(address.as_str().unwrap());
+    page.wait_for(".progress-box progress");
+    assert_eq!(page.value("#field-setup_map-tool_angles"), "721");
+
+    page.click("#cancel-job");
+    page.until("!document.querySelector('.progress-box') && document.querySelector('.problem')?.textContent.includes('Cancelled')");
+
+    page.open(&service.page("jobs"));
+    page.until("document.querySelector('.state.cancelled')");
+    page.assert_calm();
+}
+
+#[test]
+fn kept_results_are_listed_and_opened_without_computing() {
+    let Some((_turn, mut page, service)) = both() else { return };
+    page.open(&service.page("fixture-stability"));
+    page.until(SETTLED);
+    let verdict = page.text(".verdict");
+    page.open(&service.page("results"));
+    page.wait_for(".list tbody a");
+    page.click(".list tbody a");
+    page.until(&format!("{SETTLED} && location.hash.includes('result=b3:')"));
+    assert_eq!(page.text(".verdict"), verdict);
+    // Changed, it is computed again.
+    page.fill("#field-cut-depth_mm", "1.25");
+    page.until(&format!("document.querySelector('.verdict').textContent !== {} && {SETTLED}", serde_json::json!(verdict)));
+    page.assert_calm();
+}
+
+#[test]
+fn a_service_that_goes_away_is_said_and_nothing_typed_is_lost() {
+    let Some((_turn, mut page, service)) = both() else { return };
+    page.open(&service.page("deflection-compensation"));
+    page.until(SETTLED);
+    drop(service);
+    page.fill("#field-cut-feed_mm_per_rev", "0.4");
+    page.wait_for(".banner[role=status]");
+    assert_eq!(page.value("#field-cut-feed_mm_per_rev"), "0.4");
+    page.assert_calm();
+}

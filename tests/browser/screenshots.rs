@@ -1,0 +1,55 @@
+//! The pictures of the documentation.
+
+use std::path::Path;
+
+use serde_json::json;
+
+use crate::{SETTLED, both};
+
+/// Name, place, width, height, whether dark.
+const SHOTS: [(&str, &str, u32, u32, bool); 9] = [
+    ("deflection", "deflection-compensation", 1440, 900, false),
+    ("deflection-ru", "deflection-compensation?example=stepped_with_rest", 1440, 900, false),
+    ("lobes", "fixture-stability?example=lobes", 1440, 900, true),
+    ("ring", "ring-roundness", 1440, 900, false),
+    ("feed", "feed-schedule", 1440, 900, false),
+    ("trials", "machinability-fit", 1920, 1080, false),
+    ("tablet", "roundness-evaluation", 1024, 600, true),
+    ("phone", "fixture-stability?example=lobes", 360, 740, false),
+    ("wide", "deflection-compensation?example=chuck_and_tailstock", 2560, 1300, true),
+];
+
+#[test]
+fn the_documentation_shows_the_workbench_as_it_is() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/workbench");
+    let page_of_it = std::fs::read_to_string(folder.with_extension("md")).unwrap();
+    for (name, ..) in SHOTS {
+        assert!(page_of_it.contains(&format!("workbench/{name}.png")), "docs/workbench.md does not show {name}");
+    }
+    if std::env::var_os("PRECUT_WRITE_SCREENSHOTS").is_none() {
+        for (name, ..) in SHOTS {
+            let picture = std::fs::read(folder.join(format!("{name}.png"))).unwrap();
+            assert!(picture.starts_with(b"\x89PNG"), "{name}");
+        }
+        return;
+    }
+    let (_turn, mut page, service) = both().unwrap();
+    std::fs::create_dir_all(&folder).unwrap();
+    for (name, place, width, height, dark) in SHOTS {
+        page.screen(width, height, dark);
+        page.open(&service.page(place));
+        let language = if name.ends_with("-ru") { "ru" } else { "en" };
+        page.click_on(&language.to_uppercase());
+        page.until(&format!("document.documentElement.lang === {} && {SETTLED}", json!(language)));
+        if name == "deflection" {
+            page.click_on("Pin to compare");
+            page.fill("#field-cut-feed_mm_per_rev", "0.35");
+            page.until(&format!("document.querySelector('.chart .ghost') && {SETTLED}"));
+            let middle = page.middle(".stack svg:nth-of-type(3)");
+            page.evaluate("scrollTo(0, 0)");
+            page.point(middle);
+        }
+        std::thread::sleep(std::time::Duration::from_millis(300));
+        std::fs::write(folder.join(format!("{name}.png")), page.picture()).unwrap();
+    }
+}

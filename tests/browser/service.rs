@@ -1,0 +1,59 @@
+//! The whole service with its own calculators, on a free port of this machine, while a test lives.
+
+use std::net::SocketAddr;
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use precut::config::Config;
+use precut::engine::{Engine, EngineSettings};
+use precut::http::{self, App};
+use precut::registry::Registry;
+use tokio::net::TcpListener;
+use tokio::sync::watch;
+
+/// A running service.
+pub struct Service {
+    address: SocketAddr,
+    stop: watch::Sender<bool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Service {
+    pub fn start() -> Self {
+        let (tell, told) = std::sync::mpsc::channel();
+        let (stop, stopped) = watch::channel(false);
+        let thread = std::thread::spawn(move || {
+            let data = tempfile::tempdir().unwrap();
+            let config = Config { data: data.path().to_owned(), ..Config::default() };
+            let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
+            runtime.block_on(async move {
+                let settings = EngineSettings::of(&config);
+                let engine = Engine::open(Registry::standard().unwrap(), settings).await.unwrap();
+                let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+                tell.send(listener.local_addr().unwrap()).unwrap();
+                let app = App::new(engine.clone(), &config);
+                http::serve(listener, app, stopped, Duration::from_millis(200)).await;
+                engine.close().await;
+            });
+        });
+        Self { address: told.recv().unwrap(), stop, thread: Some(thread) }
+    }
+
+    /// The address of a place in the workbench: what stands behind `#/`.
+    pub fn page(&self, place: &str) -> String {
+        format!("http://{}/#/{place}", self.address)
+    }
+
+    pub fn url(&self, path: &str) -> String {
+        format!("http://{}{path}", self.address)
+    }
+}
+
+impl Drop for Service {
+    fn drop(&mut self) {
+        self.stop.send_replace(true);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}

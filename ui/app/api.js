@@ -1,0 +1,164 @@
+// The only file that talks to the service.
+import { language } from './text.js';
+import { cell } from './lib.js';
+
+/** Whether the service answers. */
+export const online = cell(true);
+/** Set when the service asks for a key. */
+export const keyAsked = cell(false);
+
+const KEY = 'precut-key';
+const storedKey = () => {
+  try { return sessionStorage.getItem(KEY); } catch { return null; }
+};
+export function useKey(key) {
+  try { sessionStorage.setItem(KEY, key.trim()); } catch { /* it is asked for again after a reload */ }
+  keyAsked.set(false);
+}
+
+/** What the service says when it refuses: an RFC 9457 document. */
+export class Refused extends Error {
+  constructor(status, problem, retryAfter) {
+    super(problem.detail || problem.title || `status ${status}`);
+    this.status = status;
+    this.problem = problem;
+    this.retryAfter = retryAfter;
+  }
+}
+
+/** The service cannot be reached. */
+export class Unreachable extends Error {}
+
+async function ask(path, { headers = {}, ...options } = {}) {
+  const key = storedKey();
+  let response;
+  try {
+    response = await fetch(path, {
+      credentials: 'omit',
+      ...options,
+      headers: { 'Accept-Language': language(), ...(key && { Authorization: `Bearer ${key}` }), ...headers },
+    });
+  } catch (error) {
+    if (error.name === 'AbortError') throw error;
+    online.set(false);
+    throw new Unreachable(error.message);
+  }
+  if (!online.get()) online.set(true);
+  if (response.ok) return response;
+  if (response.status === 401) keyAsked.set(true);
+  const problem = await response.json().catch(() => ({ title: response.statusText }));
+  throw new Refused(response.status, problem, Number(response.headers.get('Retry-After')) || null);
+}
+
+const json = async (path, options) => (await ask(path, options)).json();
+const enc = encodeURIComponent;
+
+export const calculators = () => json('/v1/calculators');
+export const calculator = id => json(`/v1/calculators/${enc(id)}`);
+export const materials = () => json('/v1/materials');
+export const results = query => json(`/v1/results?${new URLSearchParams(query)}`);
+export const page = path => json(path);
+export const result = (key, signal) => json(`/v1/results/${key}`, { signal });
+export const figures = async (key, signal) => (await json(`/v1/results/${key}/figures`, { signal })).items;
+export const tables = async (key, signal) => (await json(`/v1/results/${key}/tables`, { signal })).items;
+export const jobOf = key => json(`/v1/results/${key}/job`);
+export const jobs = query => json(`/v1/jobs?${new URLSearchParams(query)}`);
+export const job = id => json(`/v1/jobs/${enc(id)}`);
+export const jobResult = (id, signal) => json(`/v1/jobs/${enc(id)}/result`, { signal });
+export const cancel = id => json(`/v1/jobs/${enc(id)}`, { method: 'DELETE' });
+export const alive = async () => { await ask('/health/live'); };
+
+/** Sends a job: `{answer}` if it is answered at once, `{job}` if it takes longer. */
+export async function solve(id, body, { signal } = {}) {
+  const response = await ask(`/v1/${enc(id)}`, {
+    method: 'POST',
+    signal,
+    headers: { 'Content-Type': 'application/json' },
+    body: JSON.stringify(body),
+  });
+  const document = await response.json();
+  if (response.status === 202) return { job: document };
+  return { answer: document, cache: response.headers.get('Precut-Cache'), timing: response.headers.get('Server-Timing') };
+}
+
+/** A result in another form, as a file. */
+export async function file(key, accept, query = '') {
+  return (await ask(`/v1/results/${key}${query}`, { headers: { Accept: accept } })).blob();
+}
+export async function program(key) {
+  return (await ask(`/v1/results/${key}`, { headers: { Accept: 'text/x-gcode' } })).text();
+}
+
+/** Stored models: `null` where the service keeps none. */
+export async function models() {
+  const { links } = await json('/', { headers: { Accept: 'application/json' } });
+  return links.models ? (await json(`${links.models}?limit=500`)).items : null;
+}
+export const saveModel = (name, source) => json(`/v1/models/${enc(name)}`, {
+  method: 'PUT',
+  headers: { 'Content-Type': 'application/json' },
+  body: JSON.stringify(source),
+});
+export const dropModel = name => ask(`/v1/models/${enc(name)}`, { method: 'DELETE' });
+export const model = name => json(`/v1/models/${enc(name)}`);
+
+/** Follows a job's events until it is over; connects again where the line breaks. Returns how to stop. */
+export function follow(id, { onState, onProgress, onInterim, onDone, onTrouble }) {
+  const control = new AbortController();
+  let last = '';
+  const handle = event => {
+    if (event.id) last = event.id;
+    if (!event.data) return false;
+    const data = JSON.parse(event.data);
+    if (event.name === 'state') onState?.(data);
+    if (event.name === 'progress') onProgress?.(data);
+    if (event.name === 'interim') onInterim?.(data);
+    if (event.name === 'done') {
+      onDone?.(data);
+      return true;
+    }
+    return false;
+  };
+  const stream = async () => {
+    const headers = { Accept: 'text/event-stream', ...(last && { 'Last-Event-ID': last }) };
+    const response = await ask(`/v1/jobs/${enc(id)}/events`, { headers, signal: control.signal });
+    if (response.status === 204) {
+      onDone?.(await job(id));
+      return true;
+    }
+    const reader = response.body.pipeThrough(new TextDecoderStream()).getReader();
+    let rest = '';
+    for (;;) {
+      const { value, done } = await reader.read();
+      if (done) return false;
+      rest += value;
+      for (let end = rest.indexOf('\n\n'); end >= 0; end = rest.indexOf('\n\n')) {
+        const event = { name: 'message', data: '', id: '' };
+        for (const line of rest.slice(0, end).split('\n')) {
+          const [, field, text] = /^(\w+): ?(.*)$/.exec(line) || [];
+          if (field === 'event') event.name = text;
+          if (field === 'data') event.data += text;
+          if (field === 'id') event.id = text;
+        }
+        rest = rest.slice(end + 2);
+        if (handle(event)) return true;
+      }
+    }
+  };
+  (async () => {
+    for (let pause = 300; !control.signal.aborted; pause = Math.min(2 * pause, 5000)) {
+      try {
+        if (await stream()) return;
+        pause = 300;
+      } catch (error) {
+        if (control.signal.aborted) return;
+        if (error instanceof Refused && error.status !== 429 && error.status < 500) {
+          onTrouble?.(error);
+          return;
+        }
+      }
+      await new Promise(resolve => setTimeout(resolve, pause));
+    }
+  })();
+  return () => control.abort();
+}

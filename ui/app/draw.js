@@ -1,0 +1,190 @@
+// The items of a figure as SVG elements.
+import { html } from './lib.js';
+import { ascends, below } from './scale.js';
+import { colouring } from './palette.js';
+
+const MARKERS = {
+  circle: 'm-3 0a3 3 0 1 0 6 0a3 3 0 1 0-6 0', square: 'm-3-3h6v6h-6z', diamond: 'm0-4l4 4l-4 4l-4-4z', triangle: 'm0-4l3.8 6.5h-7.6z',
+  down: 'm0 4l3.8-6.5h-7.6z', plus: 'm-4 0h8m-4-4v8', cross: 'm-3-3l6 6m0-6l-6 6', bar: 'm0-4v8',
+};
+const BY_ROLE = {
+  nominal: 'plus', before: 'cross', after: 'square', command: 'diamond', comparison: 'triangle', part: 'circle', stock: 'circle', tolerance: 'bar',
+  uncertainty: 'bar', limit: 'bar', stable: 'circle', unstable: 'cross', plain: 'circle',
+};
+const SERIES = ['circle', 'square', 'triangle', 'diamond', 'cross', 'plus', 'bar', 'down'];
+const VARIANTS = 6;
+
+/** The class of a role and its marker. */
+export function role(of) {
+  if (of && typeof of === 'object') {
+    const n = of.series % SERIES.length;
+    return { name: `n${n}`, marker: MARKERS[SERIES[n]] };
+  }
+  return { name: of, marker: MARKERS[BY_ROLE[of] || 'circle'] };
+}
+
+/** The classes of every name: equal names look equal in all panels, different names of one role differ. */
+export function styles(figure) {
+  const counts = {};
+  const known = new Map();
+  for (const panel of figure.panels) {
+    for (const item of panel.items.filter(({ name }) => name)) {
+      const base = role(item.role).name;
+      const key = `${base} ${item.name}`;
+      if (known.has(key)) continue;
+      counts[base] = (counts[base] ?? -1) + 1;
+      const variant = counts[base] % VARIANTS;
+      known.set(key, variant ? `${base} v${variant}` : base);
+    }
+  }
+  return item => known.get(`${role(item.role).name} ${item.name}`) || role(item.role).name;
+}
+
+const px = value => Math.round(value * 10) / 10;
+
+/** A curve as a path. Where there are many more points than pixels, the extremes of each pixel stand for them. */
+export function linePath(xs, ys, place, width) {
+  let path = '';
+  let pen = false;
+  const put = (x, y) => {
+    const [h, v] = place(x, y);
+    if (!Number.isFinite(h) || !Number.isFinite(v)) { pen = false; return; }
+    path += `${pen ? 'L' : 'M'}${px(h)} ${px(v)}`;
+    pen = true;
+  };
+  const dense = xs.length > 4 * width && ascends(xs);
+  if (!dense) {
+    for (let index = 0; index < xs.length; index += 1) {
+      if (ys[index] === null) pen = false;
+      else put(xs[index], ys[index]);
+    }
+    return path;
+  }
+  let index = 0;
+  while (index < xs.length) {
+    const column = Math.floor(place(xs[index], 0)[0]);
+    let low = null;
+    let high = null;
+    let gap = false;
+    const first = index;
+    while (index < xs.length && Math.floor(place(xs[index], 0)[0]) === column) {
+      if (ys[index] === null) gap = true;
+      else {
+        if (low === null || ys[index] < ys[low]) low = index;
+        if (high === null || ys[index] > ys[high]) high = index;
+      }
+      index += 1;
+    }
+    if (gap) pen = false;
+    if (low !== null) for (const at of [...new Set([first, low, high, index - 1])].sort((a, b) => a - b)) if (ys[at] !== null) put(xs[at], ys[at]);
+  }
+  return path;
+}
+
+function ring(xs, ys, place) {
+  return xs.map((x, index) => place(x, ys[index])).filter(point => point.every(Number.isFinite)).map(([h, v], index) => `${index ? 'L' : 'M'}${px(h)} ${px(v)}`).join('');
+}
+
+/** Where the middles of neighbouring columns meet. */
+const nearest = (list, value) => {
+  const at = below(list, value);
+  if (at < 0) return 0;
+  if (at >= list.length - 1) return list.length - 1;
+  return value - list[at] < list[at + 1] - value ? at : at + 1;
+};
+
+/** A map as a picture of its pixels; what is above the parting of colours is hatched, too. */
+function mapImage(item, x, y, { left, top, width, height }) {
+  const canvas = document.createElement('canvas');
+  const [columns, rows] = [Math.max(1, Math.round(width)), Math.max(1, Math.round(height))];
+  canvas.width = columns;
+  canvas.height = rows;
+  const context = canvas.getContext('2d');
+  const image = context.createImageData(columns, rows);
+  const { step, steps, isAbove } = colouring(item);
+  const half = list => (list.length > 1 ? [(list[1] - list[0]) / 2, (list.at(-1) - list.at(-2)) / 2] : [0, 0]);
+  const inside = (list, value, [first, last]) => value >= list[0] - first && value <= list.at(-1) + last;
+  const [hx, hy] = [half(item.x), half(item.y)];
+  const across = Array.from({ length: columns }, (_, column) => {
+    const value = x.back(left + column + 0.5);
+    return inside(item.x, value, hx) ? nearest(item.x, value) : -1;
+  });
+  for (let row = 0; row < rows; row += 1) {
+    const value = y.back(top + row + 0.5);
+    if (!inside(item.y, value, hy)) continue;
+    const base = nearest(item.y, value) * item.x.length;
+    for (let column = 0; column < columns; column += 1) {
+      if (across[column] < 0) continue;
+      const number = item.values[base + across[column]];
+      if (number === null) continue;
+      const colour = steps[step(number)];
+      const at = 4 * (row * columns + column);
+      const dim = item.diverging && isAbove(number) && (row + column) % 9 === 0 ? 0.78 : 1;
+      for (let part = 0; part < 3; part += 1) image.data[at + part] = colour[part] * dim;
+      image.data[at + 3] = 255;
+    }
+  }
+  context.putImageData(image, 0, 0);
+  return html`<image x=${left} y=${top} width=${width} height=${height} href=${canvas.toDataURL()} preserveAspectRatio="none" />`;
+}
+
+/** A symbol, its tip at the place. */
+function glyph(item, place, { mirrored, turn = 0, reach = 12 }) {
+  const [h, v] = place(item.x, item.y);
+  if (!Number.isFinite(h) || !Number.isFinite(v)) return null;
+  const across = item.glyph === 'centre_right' || (item.glyph === 'chuck' && mirrored) ? -1 : 1;
+  const up = mirrored && ['steady_rest', 'follow_rest', 'tool'].includes(item.glyph) ? -1 : 1;
+  const half = Math.max(reach, 5) + 12;
+  const jaw = Math.max(reach, 5);
+  const shape = {
+    centre_left: html`<path d="M0 0L-15.6-9H-30V9H-15.6z" /><path d="M-15.6-9V9" />`,
+    centre_right: html`<path d="M0 0L-15.6-9H-30V9H-15.6z" /><path d="M-15.6-9V9" />`,
+    chuck: html`<rect x="-30" y=${-half} width="22" height=${2 * half} /><path d=${`M-8-${jaw}H12v-8H-8zM-8 ${jaw}H12v8H-8z`} />`,
+    steady_rest: html`<path d="M0-6V-22M-10-22H10M-10-27l5 5M-5-27l5 5M0-27l5 5M5-27l5 5" /><circle cy="-6" r="6" /><circle class="solid" cy="-6" r="1.4" />`,
+    follow_rest: html`<path d="M0-6V-18" /><rect x="-9" y="-24" width="18" height="6" /><path d="M-10-29H10M-6-32l-4 3l4 3M6-32l4 3l-4 3" fill="none" /><circle cy="-6" r="6" /><circle class="solid" cy="-6" r="1.4" />`,
+    tool: html`<path d="M-5.5-12V-32H5.5V-12z" /><path class="solid" d="M0 0L6.5-9L0-18L-6.5-9z" />`,
+  }[item.glyph];
+  return html`<g class="glyph" transform=${`translate(${px(h)} ${px(v)}) rotate(${turn}) scale(${across} ${up})`}>${shape}</g>`;
+}
+
+/** Draws the items of a panel. `plane` has `place(x, y)`, the scales, the frame, and how symbols stand. */
+export function items(panel, plane, { style, hidden, ghost }) {
+  const { place, x, y, frame, stance } = plane;
+  const barNames = [...new Set(panel.items.filter(item => item.kind === 'bars').map(item => item.name))];
+  return panel.items.map((item, index) => {
+    if (item.name && hidden.has(item.name)) return null;
+    const look = `${style(item)}${ghost ? ' ghost' : ''}`;
+    switch (item.kind) {
+      case 'line': return html`<path key=${index} class=${`line ${look}`} d=${linePath(item.x, item.y, place, frame.width)} />`;
+      case 'band': {
+        const edge = ring([...item.x, ...[...item.x].reverse()], [...item.upper, ...[...item.lower].reverse()], place);
+        const lines = [item.upper, item.lower].map(side => html`<path class=${`edge ${look}`} d=${linePath(item.x, side, place, frame.width)} />`);
+        return html`<g key=${index}><path class=${`band ${look}`} d=${`${edge}z`} />${lines}</g>`;
+      }
+      case 'points': {
+        const marker = role(item.role).marker;
+        const d = item.x.map((value, at) => place(value, item.y[at])).filter(point => point.every(Number.isFinite)).map(([h, v]) => `M${px(h)} ${px(v)}${marker}`).join('');
+        return html`<path key=${index} class=${`points ${look}`} d=${d} />`;
+      }
+      case 'bars': {
+        if (ghost && !x) return null;
+        const at = barNames.indexOf(item.name);
+        const step = item.x.length > 1 ? Math.abs(x(item.x[1]) - x(item.x[0])) : frame.width / 3;
+        const whole = Math.min(step * 0.8, 60);
+        const width = Math.max(whole / barNames.length, 1);
+        const zero = y.spacing === 'logarithmic' ? frame.top + frame.height : Math.min(Math.max(y(0), frame.top), frame.top + frame.height);
+        const d = item.x.map((value, place_) => {
+          if (item.y[place_] === null || !Number.isFinite(y(item.y[place_]))) return '';
+          const left = x(value) - whole / 2 + at * width;
+          const tip = y(item.y[place_]);
+          return `M${px(left)} ${px(zero)}V${px(tip)}h${px(width * 0.94)}V${px(zero)}z`;
+        }).join('');
+        return html`<path key=${index} class=${`bars ${look}`} d=${d} />`;
+      }
+      case 'heat_map': return ghost || !x ? null : html`<g key=${index}>${mapImage(item, x, y, frame)}</g>`;
+      case 'outline': return html`<path key=${index} class=${`outline ${look}`} d=${`${ring(item.x, item.y, place)}z`} />`;
+      case 'glyph': return ghost ? null : html`<g key=${index}>${glyph(item, place, stance(item))}</g>`;
+      default: return null;
+    }
+  });
+}

@@ -1,0 +1,447 @@
+// A figure of the service, drawn to be read: hover or arrow keys read a station through all panels, dragging zooms,
+// a pinned run lies under the present one. What to draw comes as data; nothing here knows a calculator.
+import { html, useState, useRef, useMemo, useLayoutEffect, useEffect, unique } from './lib.js';
+import { t, number, unitSymbol } from './text.js';
+import { scale, extent, aired, ticks, labels, valueAt } from './scale.js';
+import { items, styles, role } from './draw.js';
+import { colouring } from './palette.js';
+
+const LEAST_PANEL = 78;
+const AXIS_ROOM = 40;
+const END_GLYPHS = ['centre_left', 'centre_right', 'chuck'];
+const GLYPH_ROOM = 36;
+/** Rows of the table that says what the picture shows. */
+const TABLE_ROWS = 120;
+
+const axisName = (axis, factor) => {
+  const unit = [factor, unitSymbol(axis.unit)].filter(Boolean).join(' ');
+  const text = axis.text.charAt(0).toUpperCase() + axis.text.slice(1);
+  return unit ? `${text}, ${unit}` : text;
+};
+
+/** Digits that a number needs beside others of the span shown: about a thousandth of it. */
+function readDigits(value, span) {
+  if (value === null || value === undefined || !Number.isFinite(value)) return '–';
+  const size = Math.abs(value);
+  if (size === 0 || !span) return number(value, 4);
+  return number(value, Math.min(8, Math.max(3, Math.ceil(Math.log10(size / span)) + 4)));
+}
+
+function abscissae(figure) {
+  return figure.panels.flatMap(panel => panel.items.flatMap(item => (item.kind === 'glyph' ? [] : item.x)));
+}
+
+function ordinates(panel, view) {
+  const inside = view ? x => x >= view[0] && x <= view[1] : () => true;
+  const found = [];
+  for (const item of panel.items) {
+    const sides = { line: [item.y], bars: [item.y], points: [item.y], outline: [item.y], band: [item.lower, item.upper], heat_map: [] }[item.kind] || [];
+    for (const side of sides) {
+      let before = null;
+      for (let index = 0; index < side.length; index += 1) {
+        const within = inside(item.x[index]);
+        if (within) {
+          if (before !== null) { found.push(before); before = null; }
+          found.push(side[index]);
+        } else if (view && item.kind !== 'points') {
+          // The point next to the view on either side: the curve enters from there.
+          if (index > 0 && inside(item.x[index - 1])) found.push(side[index]);
+          before = side[index];
+        }
+      }
+    }
+    if (item.kind === 'heat_map') {
+      const half = item.y.length > 1 ? (item.y[1] - item.y[0]) / 2 : 0;
+      found.push(Math.max(item.y[0] - half, item.y[0] > 0 ? item.y[0] / 10 : -Infinity), item.y.at(-1) + half);
+    }
+    if (item.kind === 'bars') found.push(0);
+  }
+  return found;
+}
+
+/** The width of an element, as it changes. */
+function useWidth() {
+  const ref = useRef(null);
+  const [width, setWidth] = useState(0);
+  useLayoutEffect(() => {
+    const measure = () => setWidth(Math.floor(ref.current?.clientWidth || 0));
+    measure();
+    const observer = new ResizeObserver(measure);
+    observer.observe(ref.current);
+    return () => observer.disconnect();
+  }, []);
+  return [ref, width];
+}
+
+/** Draws again when the colour scheme changes: maps are pictures of pixels. */
+function useScheme() {
+  const [scheme, setScheme] = useState(0);
+  useEffect(() => {
+    const query = matchMedia('(prefers-color-scheme: dark)');
+    const change = () => setScheme(count => count + 1);
+    query.addEventListener('change', change);
+    return () => query.removeEventListener('change', change);
+  }, []);
+  return scheme;
+}
+
+/** What a figure is with another taken from it: curves of the same name, point by point. */
+export function differenceOf(figure, other) {
+  const panels = figure.panels.map((panel, index) => {
+    const twins = other.panels[index]?.items || [];
+    const lines = panel.items.filter(item => item.kind === 'line' || item.kind === 'bars').flatMap(item => {
+      const twin = twins.find(candidate => candidate.kind === item.kind && candidate.name === item.name);
+      if (!twin) return [];
+      const y = item.x.map((x, at) => {
+        const before = valueAt(twin.x, twin.y, x, item.kind === 'line');
+        return item.y[at] === null || before === null || before === undefined ? null : item.y[at] - before;
+      });
+      return [{ ...item, y }];
+    });
+    return { ...panel, y: { ...panel.y, scale: 'linear', text: `Δ ${panel.y.text}` }, items: lines };
+  });
+  return { ...figure, panels: panels.filter(panel => panel.items.length > 0) };
+}
+
+/** The picture. `onPick(x, y)` where a click in it means something; `mark` where it stands now. */
+export function Picture({ figure, pinned, height = 460, onPick, main }) {
+  const [ref, width] = useWidth();
+  const [view, setView] = useState(null);
+  const [at, setAt] = useState(null);
+  const [hidden, setHidden] = useState(() => new Set());
+  const [drag, setDrag] = useState(null);
+  const [spoken, setSpoken] = useState('');
+  const [tabled, setTabled] = useState(false);
+  useScheme();
+  const id = useMemo(() => unique('picture'), []);
+  useEffect(() => { setView(null); setAt(null); }, [figure.id]);
+  const style = useMemo(() => styles(figure), [figure]);
+  const toggle = name => setHidden(old => {
+    const next = new Set(old);
+    if (!next.delete(name)) next.add(name);
+    return next;
+  });
+  const isPolar = figure.frame === 'polar';
+  const full = useMemo(() => {
+    const span = extent([...abscissae(figure), ...(pinned ? abscissae(pinned) : [])], figure.x.scale);
+    const hasWide = figure.panels.some(panel => panel.items.some(item => item.kind === 'bars'));
+    const onlyPoints = figure.panels.every(panel => panel.items.every(item => item.kind === 'points' || item.kind === 'line'));
+    const scatter = onlyPoints && figure.panels.some(panel => panel.items.some(item => item.kind === 'points'));
+    return hasWide || scatter || !span || span[0] === span[1] ? aired(span, figure.x.scale, hasWide ? 0.03 : 0.04) : span;
+  }, [figure, pinned]);
+  const shown = view || full;
+  const samples = useMemo(() => {
+    const longest = figure.panels.flatMap(panel => panel.items).filter(item => ['line', 'bars', 'points'].includes(item.kind)).sort((a, b) => b.x.length - a.x.length)[0];
+    return longest ? [...new Set(longest.x)].sort((a, b) => a - b) : [];
+  }, [figure]);
+
+  const zoom = factor => {
+    const log = figure.x.scale === 'logarithmic';
+    const bend = log ? Math.log10 : value => value;
+    const straight = log ? value => 10 ** value : value => value;
+    const [a, b] = shown.map(bend);
+    const middle = at !== null && at >= shown[0] && at <= shown[1] ? bend(at) : (a + b) / 2;
+    const next = [straight(middle - (middle - a) * factor), straight(middle + (b - middle) * factor)];
+    const clipped = [Math.max(next[0], full[0]), Math.min(next[1], full[1])];
+    setView(clipped[0] <= full[0] && clipped[1] >= full[1] ? null : clipped);
+  };
+  const step = (count, far) => {
+    if (samples.length === 0) return;
+    const inside = samples.filter(x => x >= shown[0] && x <= shown[1]);
+    if (inside.length === 0) return;
+    const now = at === null ? Math.floor(inside.length / 2) : inside.findIndex(x => x >= at - 1e-12 * Math.abs(at));
+    const stride = far ? Math.max(1, Math.round(inside.length / 10)) : Math.max(1, Math.round(inside.length / 200));
+    const next = inside[Math.min(Math.max((now < 0 ? inside.length - 1 : now) + count * stride, 0), inside.length - 1)];
+    setAt(next);
+    setSpoken(readings(figure, next).map(({ text, value, unit }) => `${text} ${number(value, 4)} ${unit}`).join('; '));
+  };
+  const key = event => {
+    const act = { ArrowLeft: () => step(-1, event.shiftKey), ArrowRight: () => step(1, event.shiftKey), Home: () => { setAt(shown[0]); }, End: () => { setAt(shown[1]); }, '+': () => zoom(0.5), '=': () => zoom(0.5), '-': () => zoom(2), 0: () => setView(null), Escape: () => { setAt(null); setView(null); } }[event.key];
+    if (!act || event.ctrlKey || event.metaKey || event.altKey || event.target !== event.currentTarget) return;
+    event.preventDefault();
+    act();
+  };
+  const common = { figure, pinned, width, style, hidden, toggle, at, shown, view, height };
+  const tools = html`
+    <div class="tools" role="group" aria-label=${t('picture_tools')}>
+      ${!isPolar && html`<button type="button" class="icon" aria-label=${t('zoom_in')} title=${t('zoom_in')} onClick=${() => zoom(0.5)}>+</button>
+      <button type="button" class="icon" aria-label=${t('zoom_out')} title=${t('zoom_out')} disabled=${!view} onClick=${() => zoom(2)}>−</button>
+      <button type="button" class="icon" aria-label=${t('zoom_reset')} title=${t('zoom_reset')} disabled=${!view} onClick=${() => setView(null)}>⤢</button>`}
+      <button type="button" class="icon" aria-label=${t('as_table')} title=${t('as_table')} aria-pressed=${tabled} onClick=${() => setTabled(!tabled)}>▤</button>
+    </div>`;
+  return html`
+    <figure class=${`picture ${main ? 'main' : ''}`} aria-labelledby=${`${id}-title`}>
+      <figcaption><h2 id=${`${id}-title`}>${figure.title.text}</h2>${tools}</figcaption>
+      <div ref=${ref} class="plot" tabindex="0" role="application" aria-label=${`${figure.title.text}. ${t('picture_keys')}`} onKeyDown=${key}>
+        ${width > 0 && (isPolar
+          ? html`<${Polar} ...${common} setAt=${setAt} />`
+          : html`<${Stacked} ...${common} ...${{ setAt, setView, drag, setDrag, onPick }} />`)}
+      </div>
+      <p class="hidden" role="status">${spoken}</p>
+      ${tabled && html`<${Numbers} figure=${figure} samples=${samples} />`}
+    </figure>`;
+}
+
+/** The names and values of all curves at one abscissa. */
+function readings(figure, x) {
+  const list = [{ text: figure.x.text, value: x, unit: unitSymbol(figure.x.unit) }];
+  for (const panel of figure.panels) {
+    for (const item of panel.items) {
+      if (!['line', 'bars', 'points'].includes(item.kind)) continue;
+      const value = valueAt(item.x, item.y, x, item.kind === 'line');
+      if (value !== null && value !== undefined) list.push({ text: item.text, value, unit: unitSymbol(panel.y.unit) });
+    }
+  }
+  return list;
+}
+
+/** What the picture shows, as numbers. */
+function Numbers({ figure, samples }) {
+  const stride = Math.max(1, Math.ceil(samples.length / TABLE_ROWS));
+  const xs = samples.filter((_, index) => index % stride === 0);
+  const columns = figure.panels.flatMap(panel => panel.items.filter(item => ['line', 'bars', 'points'].includes(item.kind)).map(item => ({ item, unit: panel.y.unit })));
+  if (columns.length === 0) return html`<p class="quiet">${t('see_tables')}</p>`;
+  return html`
+    <div class="grid-scroll numbers" tabindex="0" role="region" aria-label=${figure.title.text}><table class="grid still">
+      <thead><tr><th scope="col">${figure.x.text} <span class="unit">${unitSymbol(figure.x.unit)}</span></th>${columns.map(({ item, unit }) => html`<th scope="col">${item.text} <span class="unit">${unitSymbol(unit)}</span></th>`)}</tr></thead>
+      <tbody>${xs.map(x => html`<tr key=${x}><th scope="row">${number(x, 6)}</th>${columns.map(({ item }) => {
+        const value = valueAt(item.x, item.y, x, item.kind === 'line');
+        return html`<td>${value === null || value === undefined ? '' : number(value, 5)}</td>`;
+      })}</tr>`)}</tbody>
+    </table></div>`;
+}
+
+/** Name of the axis and of each curve, with its value at the cursor. */
+function Head({ panel, ghost, style, hidden, toggle, at, factor, span, polar }) {
+  const seen = new Set();
+  const named = panel.items.filter(item => item.name && !seen.has(item.name) && seen.add(item.name));
+  const value = (source, item) => {
+    if (at === null) return null;
+    const twin = source.items.find(other => other.name === item.name && other.kind === item.kind);
+    if (!twin) return null;
+    if (twin.kind === 'band') {
+      const [low, high] = [valueAt(twin.x, twin.lower, at), valueAt(twin.x, twin.upper, at)];
+      return low === null || low === undefined ? null : `${readDigits(low, span)} … ${readDigits(high, span)}`;
+    }
+    if (!['line', 'bars', 'points'].includes(twin.kind)) return null;
+    const read = valueAt(twin.x, twin.y, at, twin.kind === 'line');
+    return read === null || read === undefined ? null : readDigits(read, span);
+  };
+  const map = panel.items.find(item => item.kind === 'heat_map');
+  return html`
+    <div class="panel-head">
+      <span class="axis-name">${polar ? t('magnified', { name: axisName(panel.y, factor) }) : axisName(panel.y, factor)}</span>
+      ${named.map(item => {
+        const now = value(panel, item);
+        const before = ghost ? value(ghost, item) : null;
+        return html`<button type="button" key=${item.name} class="series" aria-pressed=${!hidden.has(item.name)} onClick=${() => toggle(item.name)}>
+          <${Swatch} item=${item} look=${style(item)} /><span>${item.text}</span>
+          ${now !== null && html`<output>${now}${before !== null && html`<small> (${before})</small>`}</output>`}
+        </button>`;
+      })}
+      ${map && html`<${Key} item=${map} />`}
+    </div>`;
+}
+
+function Swatch({ item, look }) {
+  const shape = {
+    line: html`<path class=${`line ${look}`} d="M1 7H27" />`,
+    band: html`<rect class=${`band ${look}`} x="1" y="2" width="26" height="10" />`,
+    points: html`<path class=${`points ${look}`} d=${`M14 7${role(item.role).marker}`} />`,
+    bars: html`<rect class=${`bars ${look}`} x="8" y="2" width="12" height="10" />`,
+    outline: html`<rect class=${`outline ${look}`} x="2" y="2" width="24" height="10" />`,
+  }[item.kind];
+  return html`<svg class="swatch" width="28" height="14" viewBox="0 0 28 14" aria-hidden="true">${shape}</svg>`;
+}
+
+/** The colours of a map with their numbers. */
+function Key({ item }) {
+  const { steps, low, high } = colouring(item);
+  return html`
+    <span class="key"><span>${axisName(item.value)}</span><span class="key-end">${number(low, 3)}</span>
+      <svg width="120" height="12" viewBox="0 0 120 12" aria-hidden="true">${steps.map((colour, index) => html`<rect x=${(index * 120) / steps.length} width=${120 / steps.length + 0.4} height="12" fill=${`rgb(${colour})`} />`)}</svg>
+      <span class="key-end">${number(high, 3)}</span></span>`;
+}
+
+/** Panels under each other over one abscissa. */
+function Stacked({ figure, pinned, width, style, hidden, toggle, at, setAt, shown, view, setView, height, drag, setDrag, onPick }) {
+  const shares = figure.panels.reduce((sum, panel) => sum + panel.height, 0) || 1;
+  const ghosts = figure.panels.map((panel, index) => pinned?.panels[index] || null);
+  const visible = figure.panels.map(panel => ({ ...panel, items: panel.items.filter(item => !item.name || !hidden.has(item.name)) }));
+  const count = width < 480 ? 4 : 6;
+  const panels = visible.map((panel, index) => {
+    const tall = Math.max(LEAST_PANEL, Math.round((height * panel.height) / shares));
+    const span = extent([...ordinates(panel, view), ...(ghosts[index] ? ordinates(ghosts[index], view) : [])], panel.y.scale);
+    const isMap = panel.items.some(item => item.kind === 'heat_map');
+    const domain = isMap ? span : aired(span, panel.y.scale);
+    const places = ticks(panel.y.scale, domain, Math.max(3, Math.round(tall / 42)));
+    return { panel, ghost: ghosts[index], tall, domain, places, ...labels(panel.y.scale, places), span: span ? span[1] - span[0] : 0 };
+  });
+  const left = Math.max(34, ...panels.map(({ texts }) => 12 + 6.6 * Math.max(0, ...texts.map(text => text.length))));
+  const right = width - 10;
+  const glyphs = figure.panels.flatMap(panel => panel.items.filter(item => item.kind === 'glyph'));
+  const atEnds = glyphs.some(({ glyph }) => END_GLYPHS.includes(glyph));
+  const edge = atEnds && !view ? Math.min(GLYPH_ROOM, (right - left) / 8) : 0;
+  const x = scale(figure.x.scale, shown, [left + edge, right - edge]);
+  const xPlaces = ticks(figure.x.scale, shown, Math.max(2, Math.round((right - left) / 90)));
+  const xLabels = labels(figure.x.scale, xPlaces);
+
+  const where = event => {
+    const box = event.currentTarget.getBoundingClientRect();
+    const place = Math.min(Math.max(event.clientX - box.left, left + edge), right - edge);
+    return { place, value: x.back(place) };
+  };
+  const move = event => {
+    const { place, value } = where(event);
+    setAt(value);
+    if (drag) setDrag({ ...drag, to: place });
+  };
+  const down = event => {
+    if (event.button !== 0 || event.target.closest('button')) return;
+    const { place } = where(event);
+    event.currentTarget.setPointerCapture(event.pointerId);
+    setDrag({ from: place, to: place });
+  };
+  const up = event => {
+    if (!drag) return;
+    const ends = [drag.from, drag.to].sort((a, b) => a - b);
+    setDrag(null);
+    if (ends[1] - ends[0] > 8) { setView(ends.map(x.back)); return; }
+    if (!onPick) return;
+    const svg = event.target.closest?.('svg') || document.elementFromPoint(event.clientX, event.clientY)?.closest('svg');
+    const index = svg ? Number(svg.dataset.panel) : NaN;
+    if (Number.isNaN(index)) return;
+    const box = svg.getBoundingClientRect();
+    const { domain, panel, tall } = panels[index];
+    onPick(where(event).value, scale(panel.y.scale, domain, [tall, 0]).back(event.clientY - box.top - 6));
+  };
+  const wheel = event => {
+    if (!event.ctrlKey && !event.metaKey) return;
+    event.preventDefault();
+    const { value } = where(event);
+    const factor = event.deltaY > 0 ? 1.25 : 0.8;
+    if (figure.x.scale === 'logarithmic') return;
+    const next = [value - (value - shown[0]) * factor, value + (shown[1] - value) * factor];
+    setView(next[1] - next[0] > 0 ? next : view);
+  };
+  return html`
+    <div class=${`stack ${onPick ? 'pickable' : ''}`} onPointerMove=${move} onPointerDown=${down} onPointerUp=${up} onPointerCancel=${() => setDrag(null)} onPointerLeave=${() => { if (!drag) setAt(null); }} onDblClick=${() => setView(null)} onWheel=${wheel}>
+      ${panels.map(({ panel, ghost, tall, domain, places, texts, factor, span }, index) => {
+        const last = index === panels.length - 1;
+        const own = panel.items.filter(item => item.kind === 'glyph');
+        const above = own.some(item => !END_GLYPHS.includes(item.glyph) && item.y >= 0) ? GLYPH_ROOM : own.length ? 14 : 0;
+        const under = own.some(item => !END_GLYPHS.includes(item.glyph) && item.y < 0) ? GLYPH_ROOM : own.length ? 14 : 0;
+        const y = scale(panel.y.scale, domain, [6 + tall - Math.min(under, tall / 4), 6 + Math.min(above, tall / 4)]);
+        const frame = { left, top: 6, width: right - left, height: tall };
+        const clip = `clip-${figure.id}-${index}`;
+        const stance = item => {
+          const outline = panel.items.find(other => other.kind === 'outline');
+          const radius = outline ? Math.max(...outline.y.filter((_, place) => Math.abs(outline.x[place] - item.x) <= (shown[1] - shown[0]) / 50 + 1e-9), 0) : 0;
+          return { mirrored: item.glyph === 'chuck' ? item.x > (shown[0] + shown[1]) / 2 : item.y < 0, reach: Math.abs(y(0) - y(radius || domain[1] * 0.5)) };
+        };
+        const plane = { x, y, frame, stance, place: (h, v) => [x(h), y(v)] };
+        const cursor = at !== null && at >= shown[0] && at <= shown[1] ? x(at) : null;
+        const svgHeight = 6 + tall + (last ? AXIS_ROOM : 8);
+        return html`
+          <${Head} key=${`head-${index}`} ...${{ panel: figure.panels[index], ghost, style, hidden, toggle, at, factor, span }} />
+          <svg key=${`panel-${index}`} data-panel=${index} class="chart" width=${width} height=${svgHeight} viewBox=${`0 0 ${width} ${svgHeight}`} role="img" aria-label=${describe(panel, figure)}>
+            <defs><clipPath id=${clip}><rect x=${left} y="6" width=${Math.max(1, right - left)} height=${tall} /></clipPath></defs>
+            <g class="grid">${places.map(place => html`<path d=${`M${left} ${y(place).toFixed(1)}H${right}`} />`)}${xPlaces.map(place => html`<path d=${`M${x(place).toFixed(1)} 6V${6 + tall}`} />`)}</g>
+            ${domain[0] < 0 && domain[1] > 0 && panel.y.scale === 'linear' && html`<path class="zero" d=${`M${left} ${y(0).toFixed(1)}H${right}`} />`}
+            <g clip-path=${`url(#${clip})`}>
+              ${ghost && items(ghost, plane, { style, hidden, ghost: true })}
+              ${items(panel, plane, { style, hidden })}
+            </g>
+            <rect class="frame" x=${left} y="6" width=${Math.max(1, right - left)} height=${tall} />
+            <g class="tick-labels" text-anchor="end">${places.map((place, tick) => html`<text x=${left - 6} y=${y(place) + 4}>${texts[tick]}</text>`)}</g>
+            ${last && html`<g class="tick-labels" text-anchor="middle">${xPlaces.map((place, tick) => html`<text x=${Math.min(Math.max(x(place), 12), width - 14)} y=${tall + 22}>${xLabels.texts[tick]}</text>`)}</g>
+              <text class="x-name" x=${(left + right) / 2} y=${tall + 39} text-anchor="middle">${axisName(figure.x, xLabels.factor)}${at !== null ? ` = ${readDigits(at, shown[1] - shown[0])}` : ''}</text>`}
+            ${drag && Math.abs(drag.to - drag.from) > 4 && html`<rect class="selection" x=${Math.min(drag.from, drag.to)} y="6" width=${Math.abs(drag.to - drag.from)} height=${tall} />`}
+            ${cursor !== null && html`<path class="cursor" d=${`M${cursor.toFixed(1)} 6V${6 + tall}`} />
+              ${panel.items.filter(item => item.kind === 'line' && !hidden.has(item.name)).map(item => {
+                const v = valueAt(item.x, item.y, at);
+                const h = v === null || v === undefined ? NaN : y(v);
+                return h >= 5 && h <= 7 + tall ? html`<circle class=${`dot ${style(item)}`} cx=${cursor} cy=${h} r="3.4" />` : null;
+              })}`}
+          </svg>`;
+      })}
+    </div>`;
+}
+
+/** A panel in words, for those who cannot see it. */
+function describe(panel, figure) {
+  const spans = panel.items.filter(item => item.name && (item.y || item.lower)).map(item => {
+    const span = extent(item.y || [...item.lower, ...item.upper], 'linear');
+    return span ? `${item.text} ${number(span[0], 3)} … ${number(span[1], 3)}` : item.text;
+  });
+  return `${axisName(panel.y)} (${axisName(figure.x)}): ${spans.join('; ')}`;
+}
+
+/** A roundness chart: deviations magnified outward from a base circle. */
+function Polar({ figure, pinned, width, height, style, hidden, toggle, at, setAt }) {
+  const panel = { ...figure.panels[0], items: figure.panels[0].items.filter(item => !item.name || !hidden.has(item.name)) };
+  const ghost = pinned?.panels[0];
+  const size = Math.max(240, Math.min(width, Math.max(height, 380)));
+  const hasGlyphs = panel.items.some(item => item.kind === 'glyph');
+  const centre = [width / 2, size / 2];
+  const radius = size / 2 - (hasGlyphs ? 46 : 26);
+  const span = extent([...ordinates(panel), ...(ghost ? ordinates(ghost) : [])], panel.y.scale);
+  const domain = aired(span, panel.y.scale, 0.04);
+  const r = scale(panel.y.scale, domain, [radius * 0.4, radius]);
+  const places = ticks(panel.y.scale, domain, 4).filter(place => place >= domain[0] && place <= domain[1]);
+  const { texts, factor } = labels(panel.y.scale, places);
+  const place = (angle, value) => {
+    const length = r(value);
+    const turn = (angle * Math.PI) / 180;
+    return [centre[0] + length * Math.cos(turn), centre[1] - length * Math.sin(turn)];
+  };
+  const spoke = (angle, from, to) => {
+    const [c, s] = [Math.cos((angle * Math.PI) / 180), Math.sin((angle * Math.PI) / 180)];
+    return `M${(centre[0] + from * c).toFixed(1)} ${(centre[1] - from * s).toFixed(1)}L${(centre[0] + to * c).toFixed(1)} ${(centre[1] - to * s).toFixed(1)}`;
+  };
+  const closed = item => {
+    if (item.kind !== 'line' || item.x.length < 2) return item;
+    // Two points a turn apart are a circle.
+    if (item.x.length === 2) {
+      const xs = Array.from({ length: 181 }, (_, index) => item.x[0] + ((item.x[1] - item.x[0]) * index) / 180);
+      return { ...item, x: xs, y: xs.map(() => item.y[0]) };
+    }
+    const turn = item.x.at(-1) - item.x[0];
+    return turn > 350 && turn < 360 ? { ...item, x: [...item.x, item.x[0] + 360], y: [...item.y, item.y[0]] } : item;
+  };
+  const stance = item => ({ mirrored: false, turn: 90 - item.x });
+  const plane = { place, frame: { left: 0, top: 0, width: size * 4, height: size }, stance };
+  const move = event => {
+    const box = event.currentTarget.getBoundingClientRect();
+    const angle = (Math.atan2(centre[1] - (event.clientY - box.top), event.clientX - box.left - centre[0]) * 180) / Math.PI;
+    setAt((angle + 360) % 360);
+  };
+  const round = source => ({ ...source, items: source.items.map(closed) });
+  const turned = at === null ? null : at;
+  const lines = round(panel).items.filter(item => item.kind === 'line');
+  return html`
+    <${Head} ...${{ panel: round(figure.panels[0]), ghost: ghost && round(ghost), style, hidden, toggle, at, factor, span: span ? span[1] - span[0] : 0, polar: true }} />
+    <svg class="chart polar" width=${width} height=${size} viewBox=${`0 0 ${width} ${size}`} role="img" aria-label=${describe(panel, figure)} onPointerMove=${move} onPointerLeave=${() => setAt(null)}>
+      <g class="grid">${places.map(value => html`<circle cx=${centre[0]} cy=${centre[1]} r=${r(value)} class=${value === 0 ? 'zero' : ''} />`)}
+        ${Array.from({ length: 12 }, (_, index) => html`<path d=${spoke(30 * index, radius * 0.4, radius)} />`)}</g>
+      <circle class="frame" cx=${centre[0]} cy=${centre[1]} r=${radius} />
+      ${ghost && items(round(ghost), plane, { style, hidden, ghost: true })}
+      ${items(round(panel), plane, { style, hidden })}
+      <g class="tick-labels halo" text-anchor="middle">${places.map((value, index) => {
+        const [h, v] = place(75, value);
+        return html`<text x=${h} y=${v + 4}>${texts[index]}</text>`;
+      })}</g>
+      <g class="tick-labels" text-anchor="middle">${[0, 90, 180, 270].map(angle => {
+        const [c, s] = [Math.cos((angle * Math.PI) / 180), Math.sin((angle * Math.PI) / 180)];
+        return html`<text x=${centre[0] + (radius + (hasGlyphs ? 38 : 15)) * c} y=${centre[1] - (radius + (hasGlyphs ? 36 : 13)) * s + 4}>${angle}°</text>`;
+      })}</g>
+      ${turned !== null && html`<path class="cursor" d=${spoke(turned, radius * 0.1, radius)} />
+        <text class="x-name" x=${centre[0]} y=${centre[1] + 5} text-anchor="middle">${number(turned, 4)}°</text>
+        ${lines.map(item => {
+          const value = valueAt(item.x, item.y, turned);
+          if (value === null || value === undefined) return null;
+          const [h, v] = place(turned, value);
+          return html`<circle class=${`dot ${style(item)}`} cx=${h} cy=${v} r="3.4" />`;
+        })}`}
+    </svg>`;
+}

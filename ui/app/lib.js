@@ -1,0 +1,38 @@
+// The one place from which the vendored libraries come.
+import { h, render, Component, Fragment } from './vendor/preact.module.js';
+import htm from './vendor/htm.module.js';
+
+export { useState, useEffect, useLayoutEffect, useMemo, useRef, useCallback, useReducer } from './vendor/hooks.module.js';
+export { h, render, Component, Fragment };
+export const html = htm.bind(h);
+
+/** Calls `task` after `wait` ms without another call. */
+export function debounced(task, wait) {
+  let timer;
+  const later = (...values) => {
+    clearTimeout(timer);
+    timer = setTimeout(() => task(...values), wait);
+  };
+  later.cancel = () => clearTimeout(timer);
+  return later;
+}
+
+/** A store that components may watch. */
+export function cell(value) {
+  const watchers = new Set();
+  return {
+    get: () => value,
+    set: next => {
+      value = next;
+      watchers.forEach(watcher => watcher(value));
+    },
+    watch: watcher => {
+      watchers.add(watcher);
+      return () => watchers.delete(watcher);
+    },
+  };
+}
+
+let counter = 0;
+/** A name that no other element has. */
+export const unique = prefix => `${prefix}-${++counter}`;

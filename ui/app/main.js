@@ -1,0 +1,169 @@
+// The shell: language, address, navigation, and what is said when something goes wrong.
+import { html, render, useState, useEffect, useRef, useCallback, Component } from './lib.js';
+import { t, speak, language, languages, languageChanged } from './text.js';
+import * as api from './api.js';
+import { Room } from './room.js';
+import { Home, Jobs, Results, Models } from './pages.js';
+
+const JOBS_LOOK_MS = 4000;
+const trouble = document.getElementById('trouble');
+
+/** Whatever goes wrong in the page is said, not swallowed. */
+function complain(error) {
+  if (error?.name === 'AbortError') return;
+  const known = error instanceof api.Refused || error instanceof api.Unreachable;
+  const words = t('page_trouble') === 'page_trouble' ? 'Something in this page failed. Reload it; if it happens again, tell those who run the service:' : t('page_trouble');
+  trouble.textContent = known ? error.problem?.detail || t('offline_detail') : `${words} ${error?.message || error}`;
+  trouble.hidden = false;
+  setTimeout(() => { trouble.hidden = true; }, known ? 6000 : 30000);
+}
+addEventListener('error', event => complain(event.error || event.message));
+addEventListener('unhandledrejection', event => complain(event.reason));
+
+/** The page and the state in the address: `#/page?query`. */
+function place() {
+  const [path, query = ''] = location.hash.replace(/^#\/?/, '').split(/\?(.*)/s);
+  return { page: decodeURIComponent(path), query: new URLSearchParams(query) };
+}
+
+class Guard extends Component {
+  constructor() { super(); this.state = { error: null }; }
+  componentDidCatch(error) { this.setState({ error }); complain(error); }
+  render({ children }, { error }) {
+    return error ? html`<main class="plain" id="main"><h1>${t('trouble_title')}</h1><p>${t('page_trouble')} ${error.message}</p><p><a href="#/" onClick=${() => this.setState({ error: null })}>${t('start_over')}</a></p></main>` : children;
+  }
+}
+
+function useCell(cell) {
+  const [value, set] = useState(cell.get());
+  useEffect(() => cell.watch(set), [cell]);
+  return value;
+}
+
+function App() {
+  const [{ page, query }, setPlace] = useState(place);
+  const [calculators, setCalculators] = useState(null);
+  const [models, setModels] = useState(null);
+  const [running, setRunning] = useState(0);
+  const spoken = useCell(languageChanged);
+  const isOnline = useCell(api.online);
+  const needsKey = useCell(api.keyAsked);
+  const [attempt, setAttempt] = useState(0);
+
+  useEffect(() => {
+    const move = () => setPlace(place());
+    addEventListener('hashchange', move);
+    addEventListener('popstate', move);
+    return () => { removeEventListener('hashchange', move); removeEventListener('popstate', move); };
+  }, []);
+  useEffect(() => {
+    api.calculators().then(({ items }) => setCalculators(items), error => { if (!(error instanceof api.Unreachable) && error.status !== 401) complain(error); });
+  }, [spoken, attempt, isOnline]);
+  const refreshModels = useCallback(() => api.models().then(setModels, () => {}), []);
+  useEffect(() => { refreshModels(); }, [page, attempt]);
+  const refreshJobs = useCallback(async () => {
+    try {
+      const [active, queued] = await Promise.all(['running', 'queued'].map(state => api.jobs({ state, limit: 100 })));
+      setRunning(active.items.length + queued.items.length);
+    } catch { /* the count is of no use then, and the next look tells */ }
+  }, []);
+  useEffect(() => {
+    refreshJobs();
+    const timer = setInterval(() => { if (!document.hidden) refreshJobs(); }, JOBS_LOOK_MS);
+    return () => clearInterval(timer);
+  }, [attempt]);
+  // While the service is away, it is asked now and then whether it is back.
+  useEffect(() => {
+    if (isOnline) return undefined;
+    const timer = setInterval(() => api.alive().catch(() => {}), 2000);
+    return () => clearInterval(timer);
+  }, [isOnline]);
+
+  const known = calculators?.find(({ id }) => id === page);
+  useEffect(() => {
+    const names = { jobs: t('jobs'), results: t('results'), models: t('models') };
+    document.title = known ? `${known.title} – precut` : names[page] ? `${names[page]} – precut` : 'precut';
+  }, [page, known, spoken]);
+  const first = useRef(true);
+  useEffect(() => {
+    // A new page begins at its beginning, also for those who hear it.
+    if (first.current) { first.current = false; return; }
+    scrollTo(0, 0);
+    document.getElementById('main')?.focus({ preventScroll: true });
+  }, [page]);
+
+  const to = (method, name) => next => {
+    history[method](null, '', `#/${name}${next ? `?${next}` : ''}`);
+    setPlace(place());
+  };
+  const push = useCallback(to('pushState', page), [page]);
+  const replace = useCallback(to('replaceState', page), [page]);
+
+  return html`
+    <a class="skip" href="#main" onClick=${event => { event.preventDefault(); document.getElementById('main')?.focus(); }}>${t('skip')}</a>
+    <${Header} ...${{ page, calculators, running, models, known }} />
+    ${!isOnline && html`<p class="banner" role="status">${t('offline_title')}. ${t('offline_detail')}</p>`}
+    ${needsKey && html`<${KeyForm} done=${() => setAttempt(attempt + 1)} />`}
+    <${Guard} key=${page}>
+      ${!calculators ? html`<main class="plain" id="main" tabindex="-1"><p class="late">${t('loading')}</p></main>`
+        : page === '' ? html`<${Home} calculators=${calculators} />`
+        : page === 'jobs' ? html`<${Jobs} calculators=${calculators} refreshJobs=${refreshJobs} />`
+        : page === 'results' ? html`<${Results} calculators=${calculators} query=${query} replace=${replace} />`
+        : page === 'models' ? html`<${Models} calculators=${calculators} models=${models} refreshModels=${refreshModels} />`
+        : known ? html`<${Room} key=${page} id=${page} ...${{ query, push, replace, models, refreshJobs }} />`
+        : html`<main class="plain" id="main" tabindex="-1"><h1>${t('no_page')}</h1><p><a href="#/">${t('to_start')}</a></p></main>`}
+    <//>`;
+}
+
+function Header({ page, calculators, running, models, known }) {
+  const [open, setOpen] = useState(false);
+  const menu = useRef(null);
+  useEffect(() => { setOpen(false); }, [page]);
+  useEffect(() => {
+    if (!open) return undefined;
+    const leave = event => { if (!menu.current?.contains(event.target)) setOpen(false); };
+    const key = event => { if (event.key === 'Escape') { setOpen(false); menu.current?.querySelector('button')?.focus(); } };
+    addEventListener('pointerdown', leave);
+    addEventListener('keydown', key);
+    return () => { removeEventListener('pointerdown', leave); removeEventListener('keydown', key); };
+  }, [open]);
+  const link = (name, text, extra) => html`<a href=${`#/${name}`} aria-current=${page === name ? 'page' : undefined}>${text}${extra}</a>`;
+  return html`
+    <header class="shell">
+      <a class="brand" href="#/" aria-label=${`precut, ${t('to_start')}`}><svg width="22" height="22" viewBox="0 0 32 32" aria-hidden="true"><path d="M3 21c7-8 19-8 26 0" fill="none" stroke="currentColor" stroke-width="3" stroke-linecap="round" /><path d="M3 21h26" stroke="currentColor" stroke-width="1.8" stroke-dasharray="3.5 2.6" opacity=".6" /><path d="M16 4l4 4.2-4 4.2-4-4.2z" fill="currentColor" /></svg><span>precut</span></a>
+      <div class="ask" ref=${menu}>
+        <button type="button" aria-expanded=${open} aria-controls="questions" onClick=${() => setOpen(!open)}><span>${known ? known.title : t('ask')}</span><span class="chevron" aria-hidden="true"></span></button>
+        <nav id="questions" class="menu" hidden=${!open} aria-label=${t('calculators')}>
+          ${(calculators || []).map(({ id, question, title }) => html`<a key=${id} href=${`#/${id}`} aria-current=${page === id ? 'page' : undefined} onClick=${() => setOpen(false)}><span>${question}</span><small>${title}</small></a>`)}
+        </nav>
+      </div>
+      <nav class="places" aria-label=${t('places')}>
+        ${link('jobs', t('jobs'), running > 0 && html`<span class="count"><span aria-hidden="true">${running}</span><span class="hidden">, ${running} ${t('open_jobs')}</span></span>`)}
+        ${link('results', t('results'))}
+        ${(models !== null || page === 'models') && link('models', t('models'))}
+        <a href="/docs" class="docs-link">${t('docs')}</a>
+      </nav>
+      <div class="languages" role="group" aria-label=${t('language')}>
+        ${languages.map(tag => html`<button type="button" key=${tag} lang=${tag} aria-pressed=${language() === tag} onClick=${() => speak(tag).catch(() => location.reload())}>${tag.toUpperCase()}</button>`)}
+      </div>
+    </header>`;
+}
+
+/** The service is locked: it wants a key. */
+function KeyForm({ done }) {
+  const [key, setKey] = useState('');
+  return html`
+    <form class="banner key-form" onSubmit=${event => { event.preventDefault(); api.useKey(key); done(); }}>
+      <label for="api-key">${t('key_wanted')}</label><input id="api-key" type="password" autocomplete="off" value=${key} onInput=${event => setKey(event.currentTarget.value)} required /><button type="submit" class="primary">${t('use_key')}</button>
+    </form>`;
+}
+
+addEventListener('keydown', event => {
+  if (event.key === 'Enter' && (event.ctrlKey || event.metaKey)) document.querySelector('.form')?.requestSubmit();
+});
+
+const root = document.getElementById('app');
+speak().then(() => {
+  root.textContent = '';
+  render(html`<${App} />`, root);
+}).catch(complain);

@@ -1,0 +1,134 @@
+// The pages beside the calculators: what there is to ask, jobs, kept results, stored models.
+import { html, useState, useEffect, useRef } from './lib.js';
+import { t, number, duration, moment } from './text.js';
+import * as api from './api.js';
+import { save } from './result.js';
+
+const LOOK_MS = 1500;
+
+export function Home({ calculators }) {
+  const group = kind => calculators.filter(item => item.kind === kind);
+  const list = items => html`<ul class="questions">${items.map(({ id, question, title, summary, examples }) => html`
+    <li key=${id}><a href=${`#/${id}`}><span class="question">${question}</span><span class="room-title">${title}</span></a>
+      <p>${summary}</p>
+      <p class="examples">${examples.map(example => html`<a key=${example.id} href=${`#/${id}?example=${example.id}`}>${example.title}</a>`)}</p></li>`)}</ul>`;
+  return html`
+    <main class="plain home" id="main" tabindex="-1"><h1>${t('slogan')}</h1>
+      ${list(group('calculator'))}
+      ${group('evaluation').length > 0 && html`<h2>${t('evaluations')}</h2>${list(group('evaluation'))}`}
+      <p class="quiet">${t('for_programs')} <a href="/docs">${t('docs')}</a></p>
+    </main>`;
+}
+
+/** A page of a list, and the way to more of it. */
+function usePages(first, look) {
+  const [items, setItems] = useState(null);
+  const [next, setNext] = useState(null);
+  const [trouble, setTrouble] = useState(null);
+  const grown = useRef(false);
+  const load = async () => {
+    try {
+      const page = await first();
+      if (grown.current) setItems(old => [...page.items, ...(old || []).filter(item => !page.items.some(fresh => (fresh.id || fresh.key) === (item.id || item.key)))]);
+      else { setItems(page.items); setNext(page.next); }
+      setTrouble(null);
+    } catch (error) { setTrouble(error); }
+  };
+  const more = async () => {
+    grown.current = true;
+    const page = await api.page(next);
+    setItems(old => [...old, ...page.items]);
+    setNext(page.next);
+  };
+  useEffect(() => {
+    grown.current = false;
+    load();
+    if (!look) return undefined;
+    const timer = setInterval(() => { if (!document.hidden) load(); }, look);
+    return () => clearInterval(timer);
+  }, [first]);
+  return { items, next, more, trouble, load };
+}
+
+function ListState({ items, trouble, empty }) {
+  if (trouble) return html`<p class="problem" role="alert">${trouble.problem?.detail || trouble.message}</p>`;
+  if (!items) return html`<p class="late">${t('loading')}</p>`;
+  if (items.length === 0) return html`<p class="empty-list">${empty}</p>`;
+  return null;
+}
+
+const titleOf = (calculators, id) => calculators.find(item => item.id === id)?.title || id;
+
+export function Jobs({ calculators, refreshJobs }) {
+  const [first] = useState(() => () => api.jobs({ limit: 50 }));
+  const { items, next, more, trouble, load } = usePages(first, LOOK_MS);
+  const stop = async id => { try { await api.cancel(id); } finally { load(); refreshJobs(); } };
+  const known = new Set(calculators.map(({ id }) => id));
+  return html`
+    <main class="plain" id="main" tabindex="-1"><h1>${t('jobs')}</h1><p class="quiet">${t('jobs_about')}</p>
+      <${ListState} items=${items} trouble=${trouble} empty=${t('no_jobs')} />
+      ${items && items.length > 0 && html`<div class="grid-scroll" tabindex="0" role="region" aria-label=${t('jobs')}><table class="list">
+        <thead><tr><th scope="col">${t('calculator')}</th><th scope="col">${t('state')}</th><th scope="col">${t('progress')}</th><th scope="col">${t('started')}</th><th scope="col"><span class="hidden">${t('actions')}</span></th></tr></thead>
+        <tbody>${items.map(item => {
+          const isOpen = item.state === 'queued' || item.state === 'running';
+          const name = titleOf(calculators, item.calculator);
+          return html`<tr key=${item.id}>
+            <th scope="row">${!known.has(item.calculator) ? name : item.state === 'succeeded' ? html`<a href=${`#/${item.calculator}?result=${item.key}`}>${name}</a>` : isOpen ? html`<a href=${`#/${item.calculator}?run=${item.id}`}>${name}</a>` : name}</th>
+            <td><span class=${`state ${item.state}`}>${t(`state_${item.state}`)}</span>${item.problem ? html`<span class="quiet"> ${item.problem.detail || item.problem.title}</span>` : ''}</td>
+            <td class="progress-cell">${isOpen ? html`<progress max="1" value=${item.progress} aria-label=${`${name}: ${t('progress')}`}></progress><span class="quiet">${item.stage || ''}${item.remaining_ms ? ` · ${t('time_left', { time: duration(item.remaining_ms) })}` : ''}</span>`
+              : item.started_at && item.finished_at ? duration(new Date(item.finished_at) - new Date(item.started_at)) : ''}</td>
+            <td>${moment(item.created_at)}</td>
+            <td>${isOpen && html`<button type="button" onClick=${() => stop(item.id)}>${t('cancel_job')}<span class="hidden"> ${name}</span></button>`}</td></tr>`;
+        })}</tbody></table></div>`}
+      ${next && html`<button type="button" class="more" onClick=${more}>${t('older')}</button>`}
+    </main>`;
+}
+
+export function Results({ calculators, query, replace }) {
+  const wanted = query.get('calculator') || '';
+  return html`<${ResultList} key=${wanted} ...${{ calculators, wanted, replace }} />`;
+}
+
+function ResultList({ calculators, wanted, replace }) {
+  const [first] = useState(() => () => api.results({ limit: 50, ...(wanted && { calculator: wanted }) }));
+  const { items, next, more, trouble } = usePages(first);
+  const known = new Set(calculators.map(({ id }) => id));
+  return html`
+    <main class="plain" id="main" tabindex="-1"><h1>${t('results')}</h1><p class="quiet">${t('results_about')}</p>
+      <p><label>${t('calculator')} <select value=${wanted} onChange=${event => replace(event.currentTarget.value ? `calculator=${event.currentTarget.value}` : '')}>
+        <option value="">${t('all_calculators')}</option>${calculators.map(({ id, title }) => html`<option value=${id}>${title}</option>`)}</select></label></p>
+      <${ListState} items=${items} trouble=${trouble} empty=${t('no_results')} />
+      ${items && items.length > 0 && html`<div class="grid-scroll" tabindex="0" role="region" aria-label=${t('results')}><table class="list">
+        <thead><tr><th scope="col">${t('calculator')}</th><th scope="col">${t('computed')}</th><th scope="col">${t('key')}</th><th scope="col">${t('size')}</th></tr></thead>
+        <tbody>${items.map(item => html`<tr key=${item.key}>
+          <th scope="row">${known.has(item.calculator) ? html`<a href=${`#/${item.calculator}?result=${item.key}`}>${titleOf(calculators, item.calculator)}</a>` : titleOf(calculators, item.calculator)}</th>
+          <td>${moment(item.created_at)}</td><td><code>${item.key.slice(3, 15)}…</code></td><td class="number">${number(item.bytes / 1024, 3)} ${t('kilobytes')}</td></tr>`)}</tbody></table></div>`}
+      ${next && html`<button type="button" class="more" onClick=${more}>${t('older')}</button>`}
+    </main>`;
+}
+
+export function Models({ calculators, models, refreshModels }) {
+  const [trouble, setTrouble] = useState(null);
+  const drop = async name => { setTrouble(null); try { await api.dropModel(name); await refreshModels(); } catch (error) { setTrouble(error.problem?.detail || error.message); } };
+  const fetchDocument = async name => save(new Blob([JSON.stringify(await api.model(name), null, 2)], { type: 'application/json' }), `${name}.json`);
+  const load = async files => {
+    setTrouble(null);
+    try {
+      const document = JSON.parse(await files[0].text());
+      await api.saveModel(document.name || files[0].name.replace(/\.json$/, '').toLowerCase(), document);
+      await refreshModels();
+    } catch (error) { setTrouble(error.problem?.detail || error.message); }
+  };
+  return html`
+    <main class="plain" id="main" tabindex="-1"><h1>${t('models')}</h1><p class="quiet">${t('models_about')}</p>
+      ${trouble && html`<p class="problem" role="alert">${trouble}</p>`}
+      ${models === null ? html`<p class="empty-list">${t('models_absent')}</p>` : html`
+        ${models.length === 0 ? html`<p class="empty-list">${t('no_models')}</p>` : html`<div class="grid-scroll" tabindex="0" role="region" aria-label=${t('models')}><table class="list">
+          <thead><tr><th scope="col">${t('name')}</th><th scope="col">${t('calculator')}</th><th scope="col">${t('revision')}</th><th scope="col">${t('created')}</th><th scope="col"><span class="hidden">${t('actions')}</span></th></tr></thead>
+          <tbody>${models.map(({ name, calculator, revision, created_at: created }) => html`<tr key=${name}><th scope="row">${name}</th><td>${titleOf(calculators, calculator)}</td><td class="number">${revision}</td><td>${created ? moment(created) : ''}</td>
+            <td class="actions"><a class="button" href=${`#/${calculator}?model=${name}`}>${t('use_model')}<span class="hidden"> ${name}</span></a>
+              <button type="button" onClick=${() => fetchDocument(name)}>JSON<span class="hidden"> ${name}</span></button>
+              <button type="button" onClick=${() => drop(name)}>${t('delete')}<span class="hidden"> ${name}</span></button></td></tr>`)}</tbody></table></div>`}
+        <p><label class="button">${t('import_model')} <input type="file" class="hidden" accept=".json,application/json" onChange=${event => load(event.currentTarget.files)} /></label></p>`}
+    </main>`;
+}

@@ -1,0 +1,274 @@
+// What a run gave: the picture, a sentence, and everything else behind tabs.
+import { html, useState, useEffect, useMemo, useRef } from './lib.js';
+import { t, number, unitSymbol, unitOf, plural, moment } from './text.js';
+import * as api from './api.js';
+import { Picture, differenceOf } from './figure.js';
+import { resolve, humanised, labelOf, wordOf } from './schema.js';
+
+/** Rows of a table shown at once. */
+const TABLE_ROWS = 200;
+
+export function save(blob, name) {
+  const link = document.createElement('a');
+  link.href = URL.createObjectURL(blob);
+  link.download = name;
+  document.body.append(link);
+  link.click();
+  link.remove();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+
+/** The height that the panels of a picture may have: what is left beside titles, names and a first sentence. */
+function usePictureHeight(panels) {
+  const [size, setSize] = useState([innerWidth, innerHeight]);
+  useEffect(() => {
+    const change = () => setSize([innerWidth, innerHeight]);
+    addEventListener('resize', change);
+    return () => removeEventListener('resize', change);
+  }, []);
+  const around = size[0] > 860 ? 330 : 290;
+  return Math.round(Math.max(240, Math.min(size[1] - around - 34 * panels, 900)));
+}
+
+export function Result({ id, description, answer, problem, running, pinned, pin, job, models, canPick, onPick, stale }) {
+  const [chosen, setChosen] = useState(null);
+  const [difference, setDifference] = useState(false);
+  const interim = running?.interim;
+  const figures = answer?.figures || [];
+  const figure = interim || figures.find(({ id: name }) => name === chosen) || figures[0];
+  const height = usePictureHeight(figure?.panels.length || 1);
+  if (!answer && !interim) {
+    return html`<div class="empty">${problem || running ? '' : html`<p class="late">${t('first_answer')}</p>`}</div>`;
+  }
+  const twin = pinned && !interim && pinned.key !== answer?.key ? pinned.figures.find(({ id: name }) => name === figure?.id) : null;
+  const subtracted = twin && difference ? differenceOf(figure, twin) : null;
+  const picks = figure && !interim && !subtracted ? canPick(figure) : null;
+  const body = answer?.answer;
+  const [first, ...others] = body?.explanation || [];
+  return html`
+    <div class=${`result ${stale ? 'stale' : ''}`}>
+      ${figures.length > 1 && !interim && html`
+        <div class="figure-choice" role="group" aria-label=${t('figures')}>
+          ${figures.map(({ id: name, title }) => html`<button type="button" key=${name} aria-pressed=${figure.id === name} onClick=${() => setChosen(name)}>${short(title.text)}</button>`)}
+        </div>`}
+      <div class="picture-and-words">
+        <div class="picture-box">
+          ${figure ? html`<${Picture} key=${figure.id} figure=${subtracted && subtracted.panels.length ? subtracted : figure} pinned=${subtracted ? null : twin} height=${height} main onPick=${picks ? (x, y) => onPick(figure, x, y) : null} />`
+            : html`<p class="quiet">${t('no_figure')}</p>`}
+          ${stale && html`<p class="stale-note" role="status">${t('stale_note')}</p>`}
+          ${picks && html`<p class="quiet hint">${t('click_to_try')}</p>`}
+          ${interim && html`<p class="quiet hint">${t('so_far')}</p>`}
+        </div>
+        ${body && html`
+        <div class="words">
+          ${first && html`<p class="verdict">${first.text}</p>`}
+          ${body.warnings.length > 0 && html`<ul class="warnings" aria-label=${t('warnings')}>${body.warnings.map(({ code, detail, pointer }) => html`<li key=${code + pointer}><span class="sign" aria-hidden="true">!</span><span>${capital(detail)}</span></li>`)}</ul>`}
+          ${others.length > 0 && html`<ul class="explanation">${others.map(({ code, text }, index) => html`<li key=${code + index}>${text}</li>`)}</ul>`}
+        </div>`}
+      </div>
+      ${body && html`
+        <div class="bar">
+          <button type="button" aria-pressed=${Boolean(pinned)} onClick=${pin}>${pinned ? t('unpin') : t('pin')}</button>
+          ${pinned && (pinned.key === answer.key ? html`<span class="quiet">${t('pinned_same')}</span>` : html`
+            <label><input type="checkbox" checked=${difference} onChange=${event => setDifference(event.currentTarget.checked)} /> ${t('draw_difference')}</label>
+            <a href=${`#/${id}?result=${pinned.key}`}>${t('open_pinned')}</a>`)}
+          <${Downloads} ...${{ id, description, answer, figure }} />
+        </div>
+        ${id === 'diagnosis' && models && html`<${SaveModel} resultKey=${answer.key} />`}
+        <${Tabs} ...${{ id, description, answer, pinned, job }} />
+        <${Sheet} ...${{ description, body, job }} />`}
+    </div>`;
+}
+
+/** Names of fields keep their small letters. */
+const capital = text => (/^[a-z]+_/.test(text) ? text : text.charAt(0).toUpperCase() + text.slice(1));
+const short = text => { const head = text.split(/[:;,(–]/)[0].trim(); return head.length > 34 ? `${head.slice(0, 32)}…` : head; };
+
+function Downloads({ id, description, answer, figure }) {
+  const [trouble, setTrouble] = useState(null);
+  const name = `${id}-${answer.key.slice(3, 11)}`;
+  const get = (accept, ending, query) => async () => {
+    setTrouble(null);
+    try { save(await api.file(answer.key, accept, query), `${name}.${ending}`); } catch (error) { setTrouble(error.problem?.detail || error.message); }
+  };
+  const has = type => description.media_types.includes(type);
+  return html`
+    <span class="downloads" role="group" aria-label=${t('download')}><span class="quiet">${t('download')}</span>
+      <button type="button" onClick=${get('application/json', 'json', '')}>JSON</button>
+      ${has('text/csv') && html`<button type="button" onClick=${get('text/csv', 'csv', '')}>CSV</button>`}
+      ${has('image/svg+xml') && figure && html`<button type="button" onClick=${get('image/svg+xml', 'svg', `?figure=${figure.id}`)}>SVG</button>`}
+      ${has('text/x-gcode') && html`<button type="button" onClick=${get('text/x-gcode', 'nc', '')}>${t('gcode')}</button>`}
+      <button type="button" onClick=${() => window.print()}>${t('print')}</button>
+    </span>
+    ${trouble && html`<p class="fault" role="alert"><span>${trouble}</span></p>`}`;
+}
+
+function Tabs({ id, description, answer, pinned, job }) {
+  const names = ['values', ...(description.tables.length ? ['tables'] : []), ...(description.media_types.includes('text/x-gcode') ? ['program'] : []), 'basis', 'request'];
+  const [open, setOpen] = useState('values');
+  const current = names.includes(open) ? open : names[0];
+  const key = event => {
+    const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+    if (!step) return;
+    event.preventDefault();
+    const next = names[(names.indexOf(current) + step + names.length) % names.length];
+    setOpen(next);
+    document.getElementById(`tab-${next}`)?.focus();
+  };
+  return html`
+    <div class="tabs">
+      <div role="tablist" aria-label=${t('details')} onKeyDown=${key}>
+        ${names.map(name => html`<button type="button" role="tab" key=${name} id=${`tab-${name}`} aria-selected=${name === current} aria-controls="tab-panel" tabindex=${name === current ? 0 : -1} onClick=${() => setOpen(name)}>${t(`tab_${name}`)}</button>`)}
+      </div>
+      <div role="tabpanel" id="tab-panel" aria-labelledby=${`tab-${current}`} tabindex="0">
+        ${current === 'values' && html`<${Values} schema=${description.output_schema} result=${answer.answer.result} pinned=${pinned && pinned.key !== answer.key ? pinned.answer.result : null} />`}
+        ${current === 'tables' && html`<${Tables} answerKey=${answer.key} id=${id} labels=${description.labels} />`}
+        ${current === 'program' && html`<${Program} answerKey=${answer.key} />`}
+        ${current === 'basis' && html`<${Basis} body=${answer.answer} description=${description} />`}
+        ${current === 'request' && html`<${RequestView} id=${id} job=${job} answer=${answer} />`}
+      </div>
+    </div>`;
+}
+
+/** The single numbers and words of a result, by groups. */
+function flat(schema, value, root, path = [], out = [], names = []) {
+  const whole = resolve(schema || {}, root);
+  if (value === null || value === undefined || Array.isArray(value)) return out;
+  if (typeof value === 'object') {
+    const shape = whole.oneOf ? whole.oneOf.map(form => resolve(form, root)).find(form => Object.keys(value).every(name => form.properties?.[name])) || whole : whole;
+    for (const [name, part] of Object.entries(value)) flat(shape.properties?.[name], part, root, [...path, name], out, [...names, labelOf(name, resolve(shape.properties?.[name] || {}, root))]);
+    return out;
+  }
+  out.push({ path, value, unit: unitOf(whole), description: whole.description, schema: whole, label: labelOf(path.at(-1), whole), group: names.slice(0, -1).join(' · ') });
+  return out;
+}
+
+const shownValue = (value, schema) => (typeof value === 'number' ? number(value, 5) : value === true ? t('yes') : value === false ? t('no') : schema?.enum ? wordOf(schema, value) : String(value));
+
+function Values({ schema, result, pinned }) {
+  const rows = useMemo(() => flat(schema, result, schema), [schema, result]);
+  const before = pinned ? new Map(flat(schema, pinned, schema).map(row => [row.path.join('/'), row.value])) : null;
+  const groups = [...new Set(rows.map(({ group }) => group))];
+  return html`
+    <div class="values">${groups.map(group => html`
+      <table key=${group} class="value-table">
+        <caption>${group || t('main_values')}</caption>
+        <thead class=${before ? '' : 'hidden'}><tr><th scope="col">${t('name')}</th><th scope="col">${t('value')}</th>${before && html`<th scope="col">${t('pinned_value')}</th><th scope="col">${t('difference')}</th>`}<th scope="col">${t('unit')}</th></tr></thead>
+        <tbody>${rows.filter(row => row.group === group).map(row => {
+          const other = before?.get(row.path.join('/'));
+          return html`<tr key=${row.path.join('/')}><th scope="row" title=${row.description}>${row.label}</th><td>${shownValue(row.value, row.schema)}</td>
+            ${before && html`<td>${other === undefined ? '' : shownValue(other, row.schema)}</td><td>${typeof other === 'number' && typeof row.value === 'number' ? `${row.value > other ? '+' : ''}${number(row.value - other, 3)}` : ''}</td>`}
+            <td class="unit">${row.unit}</td></tr>`;
+        })}</tbody>
+      </table>`)}</div>`;
+}
+
+function Tables({ answerKey, id, labels }) {
+  const titled = name => (labels?.[name] ? capital(labels[name]) : humanised(name));
+  const [tables, setTables] = useState(null);
+  const [chosen, setChosen] = useState(0);
+  const [rows, setRows] = useState(TABLE_ROWS);
+  const [trouble, setTrouble] = useState(null);
+  useEffect(() => {
+    const control = new AbortController();
+    api.tables(answerKey, control.signal).then(setTables, error => error.name !== 'AbortError' && setTrouble(error.message));
+    return () => control.abort();
+  }, [answerKey]);
+  if (trouble) return html`<p class="fault"><span>${trouble}</span></p>`;
+  if (!tables) return html`<p class="late">${t('loading')}</p>`;
+  if (tables.length === 0) return html`<p class="quiet">${t('no_table')}</p>`;
+  const table = tables[Math.min(chosen, tables.length - 1)];
+  const count = Math.max(0, ...table.columns.map(({ cells }) => cells.length));
+  return html`
+    <div class="bar">${tables.length > 1 && html`<label>${t('table')} <select value=${chosen} onChange=${event => { setChosen(Number(event.currentTarget.value)); setRows(TABLE_ROWS); }}>${tables.map(({ id: name }, index) => html`<option value=${index}>${titled(name)}</option>`)}</select></label>`}
+      <span class="quiet">${plural('rows', count)}</span>
+      <button type="button" onClick=${async () => save(await api.file(answerKey, 'text/csv', `?table=${table.id}`), `${id}-${table.id}.csv`)}>CSV</button></div>
+    <div class="grid-scroll tall" tabindex="0" role="region" aria-label=${titled(table.id)}><table class="grid still">
+      <thead><tr>${table.columns.map(({ text, unit }) => html`<th scope="col">${capital(text)} <span class="unit">${unitSymbol(unit)}</span></th>`)}</tr></thead>
+      <tbody>${Array.from({ length: Math.min(rows, count) }, (_, row) => html`<tr key=${row}>${table.columns.map(({ cells, unit }) => html`<td class=${unit === '' ? 'word' : ''}>${cells[row] === null || cells[row] === undefined ? '' : typeof cells[row] === 'number' ? number(cells[row], 6) : humanised(String(cells[row]))}</td>`)}</tr>`)}</tbody>
+    </table></div>
+    ${count > rows && html`<button type="button" class="more" onClick=${() => setRows(rows + 1000)}>${t('more_rows', { count: count - rows })}</button>`}`;
+}
+
+function Program({ answerKey }) {
+  const [text, setText] = useState(null);
+  const [trouble, setTrouble] = useState(null);
+  useEffect(() => {
+    setTrouble(null);
+    api.program(answerKey).then(setText, error => setTrouble(error.problem?.detail || error.message));
+  }, [answerKey]);
+  if (trouble) return html`<p class="fault"><span>${trouble}</span></p>`;
+  if (text === null) return html`<p class="late">${t('loading')}</p>`;
+  const lines = text.split('\n');
+  return html`<div class="code-box"><${Copy} text=${text} /><pre tabindex="0" aria-label=${t('tab_program')}>${lines.slice(0, 400).join('\n')}${lines.length > 400 ? `\n… ${lines.length - 400}` : ''}</pre></div>`;
+}
+
+function Basis({ body, description }) {
+  return html`
+    <dl class="facts">
+      <dt>${t('equations')}</dt><dd><ul>${body.basis.map(({ equation, source }, index) => html`<li key=${index}><code>${equation}</code> ${source}</li>`)}</ul></dd>
+      ${description.references.length > 0 && html`<dt>${t('references')}</dt><dd><ul>${description.references.map(text => html`<li>${text}</li>`)}</ul></dd>`}
+      <dt>${t('engine')}</dt><dd>${body.engine} · ${body.calculator} ${t('version')} ${body.version}</dd>
+      <dt>${t('key')}</dt><dd><code class="key-text">${body.key}</code></dd>
+      ${body.model && html`<dt>${t('model')}</dt><dd>${body.model.name} (${t('revision')} ${body.model.revision})</dd>`}
+    </dl>`;
+}
+
+function RequestView({ id, job, answer }) {
+  const text = JSON.stringify(job, null, 2);
+  const line = `curl -sS ${location.origin}/v1/${id} -H 'Content-Type: application/json' -d '${JSON.stringify(job).replace(/'/g, "'\\''")}'`;
+  const short_ = line.length > 20000 ? `${line.slice(0, 2000)} …` : line;
+  return html`
+    <p>${t('curl_line')}</p><div class="code-box"><${Copy} text=${line} /><pre class="wrapped" tabindex="0" aria-label=${t('curl_line')}>${short_}</pre></div>
+    <p>${t('job_json')}</p><div class="code-box"><${Copy} text=${text} /><pre tabindex="0" aria-label=${t('job_json')}>${text.slice(0, 40000)}</pre></div>
+    <p>${t('kept_under')} <a href=${`#/${id}?result=${answer.key}`}>${t('share_link')}</a></p>`;
+}
+
+function Copy({ text }) {
+  const [done, setDone] = useState(false);
+  const area = useRef(null);
+  const copy = async () => {
+    try { await navigator.clipboard.writeText(text); } catch {
+      // Without a secure origin there is no clipboard: the old way.
+      area.current.hidden = false;
+      area.current.value = text;
+      area.current.select();
+      document.execCommand('copy');
+      area.current.hidden = true;
+    }
+    setDone(true);
+    setTimeout(() => setDone(false), 1500);
+  };
+  return html`<button type="button" class="copy" onClick=${copy}>${done ? t('copied') : t('copy')}</button><textarea ref=${area} hidden aria-hidden="true" tabindex="-1"></textarea>`;
+}
+
+/** The extended model of a diagnosis, under a name of the user's own. */
+function SaveModel({ resultKey }) {
+  const [name, setName] = useState('');
+  const [done, setDone] = useState(null);
+  const [trouble, setTrouble] = useState(null);
+  const keep = async event => {
+    event.preventDefault();
+    setTrouble(null);
+    try { setDone(await api.saveModel(name, { from_result: resultKey })); } catch (error) { setTrouble(error.problem?.errors?.[0]?.detail || error.problem?.detail || error.message); }
+  };
+  return html`
+    <form class="bar save-model" onSubmit=${keep}>
+      <label for="model-name">${t('save_model')}</label>
+      <input id="model-name" type="text" value=${name} placeholder="lathe-7-winter" pattern="[a-z0-9][a-z0-9_\\-]{0,63}" required onInput=${event => setName(event.currentTarget.value)} aria-describedby="model-name-hint" />
+      <button type="submit" class="primary">${t('save')}</button>
+      <span class="quiet" id="model-name-hint">${done ? html`${t('model_saved', { name: done.name, revision: done.revision })} <a href="#/models">${t('models')}</a>` : t('model_name_hint')}</span>
+      ${trouble && html`<p class="fault" role="alert"><span>${trouble}</span></p>`}
+    </form>`;
+}
+
+/** What only the printed sheet shows: inputs, key and versions. */
+function Sheet({ description, body, job }) {
+  const rows = flat(description.input_schema, job, description.input_schema);
+  return html`
+    <section class="sheet" aria-hidden="true">
+      <h2>${t('inputs')}</h2>
+      <ul>${rows.slice(0, 120).map(row => html`<li key=${row.path.join('/')}>${row.group ? `${row.group}: ` : ''}${row.label} ${shownValue(row.value, row.schema)} ${row.unit}</li>`)}</ul>
+      <p>precut ${body.engine} · ${body.calculator} ${t('version')} ${body.version} · ${body.key} · ${moment(new Date().toISOString())}</p>
+    </section>`;
+}

@@ -1,0 +1,351 @@
+// The page of one calculator or evaluation: the form, the picture that follows it, and the state in the URL.
+import { html, useState, useEffect, useRef, useMemo, useCallback, debounced } from './lib.js';
+import { t, duration, language } from './text.js';
+import * as api from './api.js';
+import { Form, goTo } from './form.js';
+import { Result } from './result.js';
+import { resolve, kindOf, stem, difference, changed, parts } from './schema.js';
+
+/** Longer addresses name the kept result instead of the changes. */
+const LONGEST_QUERY = 1600;
+/** An answer slower than this, ms, is asked for and not followed live. */
+const LIVE_LIMIT_MS = 1500;
+const TYPING_PAUSE_MS = 220;
+const HISTORY_PAUSE_MS = 900;
+/** Between two attempts to reach a service that is away. */
+const LONGEST_PAUSE_MS = 15000;
+/** Words of the address that are no pointers. */
+const OWN = ['example', 'result', 'run', 'pin', 'model'];
+
+/** The job that an address stands for. */
+async function jobOf(description, query) {
+  const key = query.get('result');
+  if (key) {
+    const kept = await api.jobOf(key);
+    return { job: kept.job, base: kept.job, baseName: { result: key }, key };
+  }
+  const name = query.get('example') || description.examples[0]?.id;
+  const base = description.jobs[name] ?? {};
+  let job = base;
+  for (const [place, text] of query) {
+    if (!place.startsWith('/')) continue;
+    job = changed(job, parts(place), text === '' ? undefined : JSON.parse(text));
+  }
+  if (query.get('model')) job = { ...job, model: query.get('model') };
+  return { job, base, baseName: { example: name }, key: null };
+}
+
+/** The address of a job: its base with what differs, or its kept result where that is too long. */
+function queryOf({ base, baseName }, job, key, run, pin) {
+  const query = new URLSearchParams(baseName.example ? { example: baseName.example } : {});
+  const changes = baseName.example ? difference(base, job) : [];
+  for (const [place, value] of changes) query.set(place, value === undefined ? '' : JSON.stringify(value));
+  const isLong = query.toString().length > LONGEST_QUERY || (baseName.result && difference(base, job).length > 0);
+  const kept = isLong && key ? new URLSearchParams({ result: key }) : baseName.result && !isLong ? new URLSearchParams({ result: baseName.result }) : query;
+  if (run) kept.set('run', run);
+  if (pin) kept.set('pin', pin);
+  return kept;
+}
+
+/** Slashes of pointers are legible in an address. */
+const written = query => query.toString().replace(/%2F/g, '/').replace(/%3A/g, ':');
+
+/** Fields of the job that the axes of a figure show: `[pointer of x, pointer of y]`, to be set by a click. */
+function fieldsOfAxes(figure, schema, job) {
+  if (!figure || figure.frame !== 'stacked' || figure.panels.length !== 1) return null;
+  const leaves = [];
+  const walk = (part, value, path) => {
+    const whole = resolve(part, schema);
+    if (kindOf(whole) === 'object') for (const [name, inner] of Object.entries(whole.properties)) walk(inner, value?.[name], [...path, name]);
+    else if (kindOf(whole) === 'number' && typeof value === 'number') leaves.push({ path, unit: whole['x-unit'], stem: stem(path.at(-1), whole['x-unit']), schema: whole });
+  };
+  walk(schema, job, []);
+  const find = axis => leaves.find(({ unit, stem: name }) => unit === axis.unit && (name === axis.label || axis.label.startsWith(`${name}_`)));
+  const [x, y] = [find(figure.x), find(figure.panels[0].y)];
+  return x && y && x !== y ? [x, y] : null;
+}
+
+export function Room({ id, query, replace, push, models, refreshJobs }) {
+  const [description, setDescription] = useState(null);
+  const [missing, setMissing] = useState(null);
+  const [libraries, setLibraries] = useState({});
+  const [state, setState] = useState(null);
+  const [answer, setAnswer] = useState(null);
+  const [problem, setProblem] = useState(null);
+  const [running, setRunning] = useState(null);
+  const [pending, setPending] = useState(false);
+  const [waiting, setWaiting] = useState(false);
+  const [pinned, setPinned] = useState(null);
+  const [pane, setPane] = useState('picture');
+  const now = useRef({});
+  now.current = { state, answer, running, description, pinned };
+  const control = useRef(null);
+  const stopFollowing = useRef(null);
+  const isLive = useRef(true);
+  const ownQuery = useRef(null);
+  const alive = useRef(true);
+  useEffect(() => () => { alive.current = false; control.current?.abort(); stopFollowing.current?.(); }, []);
+
+  /** Whether a change waits to become an entry of the history. */
+  const isUnwritten = useRef(false);
+  const tell = useCallback((job, key, run, how) => {
+    if (how === 'replace' && isUnwritten.current) return;
+    const next = written(queryOf(now.current.state, job, key, run, now.current.pinned?.key));
+    if (next === ownQuery.current) return;
+    ownQuery.current = next;
+    (how === 'push' ? push : replace)(next);
+  }, [push, replace]);
+  const pushLater = useMemo(() => debounced(() => {
+    isUnwritten.current = false;
+    const { state: current, answer: shown, running: run } = now.current;
+    if (alive.current && current) tell(current.job, shown?.job === current.job ? shown.key : null, run?.id, 'push');
+  }, HISTORY_PAUSE_MS), [tell]);
+
+  const show = async (key, body, job, signal) => {
+    const [whole, figures] = await Promise.all([body ?? api.result(key, signal), api.figures(key, signal)]);
+    if (signal?.aborted || !alive.current) return;
+    setAnswer({ key, answer: whole, figures, job, language: language() });
+    setProblem(null);
+    setPending(false);
+    setWaiting(false);
+  };
+
+  const watch = useCallback((record, job) => {
+    stopFollowing.current?.();
+    setRunning({ ...record, interim: null });
+    refreshJobs?.();
+    stopFollowing.current = api.follow(record.id, {
+      onState: next => setRunning(old => (old?.id === next.id ? { ...old, ...next } : old)),
+      onProgress: progress => setRunning(old => old && { ...old, ...progress }),
+      onInterim: interim => setRunning(old => old && { ...old, interim }),
+      onTrouble: error => { setRunning(null); setPending(false); setProblem(error.problem); },
+      onDone: async done => {
+        refreshJobs?.();
+        if (!alive.current) return;
+        try {
+          if (done.state === 'succeeded') {
+            await show(done.key, null, job, control.current?.signal);
+            if (now.current.state) tell(now.current.state.job, done.key, null, 'replace');
+          } else {
+            setProblem(done.problem || { title: t(`state_${done.state}`), code: done.state });
+          }
+        } catch (error) { fail(error); } finally { setRunning(null); setPending(false); }
+      },
+    });
+  }, [tell]);
+
+  const fail = error => {
+    if (error.name === 'AbortError' || !alive.current) return;
+    setPending(false);
+    if (error instanceof api.Refused) setProblem(error.problem);
+    else if (error instanceof api.Unreachable) setProblem({ title: t('offline_title'), detail: t('offline_detail'), code: 'offline' });
+    else throw error;
+  };
+
+  const run = useCallback(async (job, again = 0) => {
+    control.current?.abort();
+    control.current = new AbortController();
+    const { signal } = control.current;
+    const before = now.current.running;
+    if (before) {
+      // A run that was started for an older state is of no use any more.
+      stopFollowing.current?.();
+      setRunning(null);
+      api.cancel(before.id).catch(() => {}).then(() => refreshJobs?.());
+    }
+    setPending(true);
+    setWaiting(false);
+    const start = performance.now();
+    try {
+      const { answer: body, job: record } = await api.solve(id, job, { signal });
+      if (signal.aborted) return;
+      if (record) {
+        isLive.current = false;
+        setProblem(null);
+        watch(record, job);
+        if (now.current.state) {
+          try { sessionStorage.setItem(`precut-run-${record.id}`, JSON.stringify(job)); } catch { /* too large to keep: the form then shows the base */ }
+          tell(now.current.state.job, null, record.id, 'replace');
+        }
+        return;
+      }
+      isLive.current = performance.now() - start < LIVE_LIMIT_MS;
+      await show(body.key, body, job, signal);
+      if (!signal.aborted && now.current.state?.job === job) tell(job, body.key, null, 'replace');
+    } catch (error) {
+      if (error instanceof api.Refused && error.status === 503 && again < 5) {
+        await new Promise(resolve_ => setTimeout(resolve_, 1000 * (error.retryAfter || 1)));
+        if (!signal.aborted) return run(job, again + 1);
+      } else if (error instanceof api.Unreachable) {
+        // Asked again ever more rarely: what was typed is computed when the service is back.
+        fail(error);
+        await new Promise(resolve_ => setTimeout(resolve_, Math.min(1000 * 2 ** again, LONGEST_PAUSE_MS)));
+        if (!signal.aborted && alive.current) return run(job, again + 1);
+      } else fail(error);
+    }
+  }, [id, watch, tell]);
+  const runLater = useMemo(() => debounced(job => run(job), TYPING_PAUSE_MS), [run]);
+
+  // The description, again in each language; the rest of the state stays.
+  const spoken = language();
+  useEffect(() => {
+    let gone = false;
+    (async () => {
+      try {
+        const found = await api.calculator(id);
+        if (gone) return;
+        setDescription(found);
+        if (JSON.stringify(found.input_schema).includes('"x-library"')) api.materials().then(({ items }) => !gone && setLibraries({ materials: items })).catch(() => {});
+        if (now.current.answer && now.current.answer.language !== spoken) {
+          const { key, job } = now.current.answer;
+          await show(key, null, job);
+          if (now.current.pinned) setPinned(await pinOf(now.current.pinned.key));
+        }
+      } catch (error) { if (!gone) setMissing(error); }
+    })();
+    return () => { gone = true; };
+  }, [id, spoken]);
+
+  // The state of the address: at the start, and when the user goes back or forward.
+  const asked = query.toString();
+  useEffect(() => {
+    if (!description || written(query) === ownQuery.current) return;
+    let gone = false;
+    ownQuery.current = written(query);
+    (async () => {
+      try {
+        const next = await jobOf(description, query);
+        const runId = query.get('run');
+        const kept = runId && sessionStorage.getItem(`precut-run-${runId}`);
+        if (kept) next.job = JSON.parse(kept);
+        if (gone) return;
+        setState(next);
+        now.current.state = next;
+        setProblem(null);
+        const pin = query.get('pin');
+        if (pin && now.current.pinned?.key !== pin) pinOf(pin).then(setPinned, () => {});
+        if (runId) {
+          try {
+            const record = await api.job(runId);
+            if (gone) return;
+            if (['queued', 'running', 'succeeded'].includes(record.state)) { setPending(true); watch(record, next.job); return; }
+          } catch (error) { if (!(error instanceof api.Refused)) throw error; }
+        }
+        if (next.key) {
+          control.current?.abort();
+          control.current = new AbortController();
+          await show(next.key, null, next.job, control.current.signal);
+        } else run(next.job);
+      } catch (error) {
+        if (gone) return;
+        if (error instanceof api.Refused || error instanceof SyntaxError) setMissing(error);
+        else fail(error);
+      }
+    })();
+    return () => { gone = true; };
+  }, [description && id, asked]);
+
+  if (missing) {
+    return html`<main class="plain" id="main" tabindex="-1"><h1>${missing.problem?.title || t('trouble_title')}</h1><p>${missing.problem?.detail || missing.message}</p>
+      <p><a href=${`#/${id}`} onClick=${() => setTimeout(() => location.reload(), 0)}>${t('start_over')}</a></p></main>`;
+  }
+  if (!description || !state) return html`<main class="plain quiet-start" id="main" tabindex="-1"><p>${t('loading')}</p></main>`;
+
+  const change = (job, how) => {
+    setState({ ...state, job });
+    now.current.state = { ...state, job };
+    isUnwritten.current = true;
+    pushLater();
+    if (how === 'run') { runLater.cancel(); run(job); return; }
+    if (!isLive.current) { setWaiting(true); return; }
+    setPending(true);
+    if (how === 'typing') runLater(job);
+    else { runLater.cancel(); run(job); }
+  };
+  const pickExample = name => {
+    isLive.current = true;
+    push(written(new URLSearchParams({ example: name })));
+  };
+  const stop = async () => {
+    try { await api.cancel(running.id); } catch (error) { fail(error); }
+  };
+  const pin = async () => {
+    if (pinned) { setPinned(null); now.current.pinned = null; } else {
+      const next = { key: answer.key, figures: answer.figures, answer: answer.answer };
+      setPinned(next);
+      now.current.pinned = next;
+    }
+    tell(state.job, answer?.key, running?.id, 'replace');
+  };
+  const onPick = (figure, x, y) => {
+    const axes = fieldsOfAxes(figure, description.input_schema, state.job);
+    if (!axes) return;
+    const round = (value, schema) => (schema.type === 'integer' ? Math.round(value) : Number(value.toPrecision(3)));
+    let job = changed(state.job, axes[0].path, round(x, axes[0].schema));
+    job = changed(job, axes[1].path, round(y, axes[1].schema));
+    change(job, 'run');
+  };
+  const canPick = figure => fieldsOfAxes(figure, description.input_schema, state.job);
+  const faults = problem?.errors || [];
+  const isBusy = pending || running;
+  return html`
+    <main class="room" data-pane=${pane} id="main" tabindex="-1">
+      <div class="pane-switch" role="group" aria-label=${t('panes')}>
+        <button type="button" aria-pressed=${pane === 'form'} onClick=${() => setPane('form')}>${t('inputs')}${faults.length > 0 && html` <span class="badge">${faults.length}</span>`}</button>
+        <button type="button" aria-pressed=${pane === 'picture'} onClick=${() => setPane('picture')}>${t('result')}</button>
+      </div>
+      <section class="form-pane" aria-label=${t('inputs')}>
+        <h1 class="hidden narrow-title">${description.question}</h1>
+        <div class="form-head">
+          <label for="example">${t('example')}</label>
+          <select id="example" value=${state.baseName.example || ''} onChange=${event => pickExample(event.currentTarget.value)}>
+            ${state.baseName.result && html`<option value="">${t('kept_result')}</option>`}
+            ${description.examples.map(({ id: name, title: text }) => html`<option value=${name}>${text}</option>`)}
+          </select>
+          <button type="button" class=${`primary ${waiting ? 'calling' : ''}`} onClick=${() => { runLater.cancel(); run(state.job); }} title="Ctrl+Enter">${waiting ? t('run_changed') : t('run')}</button>
+        </div>
+        <${Form} key=${`${id} ${asked.includes('result=') ? 'kept' : state.baseName.example}`} schema=${description.input_schema} value=${state.job} filled=${answer?.answer.input} onChange=${change} errors=${faults} examples=${description.jobs} libraries=${libraries} models=${(models || []).filter(model => model.calculator === id)} />
+      </section>
+      <section class="result-pane" aria-label=${t('result')} aria-busy=${isBusy ? 'true' : 'false'}>
+        <div class=${`work-line ${pending && !running ? 'on' : ''}`} aria-hidden="true"></div>
+        <header class="room-head"><h1>${description.question}</h1><p class="summary">${description.title}</p></header>
+        ${running && html`<${Progress} running=${running} stop=${stop} />`}
+        ${problem && html`<${Trouble} problem=${problem} onGo=${place => { setPane('form'); setTimeout(() => goTo(place), 30); }} />`}
+        <${Result} ...${{ id, description, answer, problem, running, pinned, pin, job: state.job, models, canPick, onPick, stale: Boolean(answer && (problem || waiting)) }} />
+      </section>
+    </main>`;
+}
+
+async function pinOf(key) {
+  const [answer, figures] = await Promise.all([api.result(key), api.figures(key)]);
+  return { key, answer, figures };
+}
+
+/** How far a job is, and a way to stop it. */
+function Progress({ running, stop }) {
+  const [isStopping, setStopping] = useState(false);
+  const share = Math.round(100 * (running.progress || 0));
+  return html`
+    <div class="progress-box" role="group" aria-label=${t('job_progress')}>
+      <div class="progress-text"><span><strong>${t(`state_${running.state}`)}</strong>${running.stage ? ` – ${running.stage}` : ''}</span>
+        <span>${share} %${running.remaining_ms ? ` · ${t('time_left', { time: duration(running.remaining_ms) })}` : ''}</span></div>
+      <progress max="100" value=${share} aria-label=${t('job_progress')}></progress>
+      <div class="actions"><button type="button" id="cancel-job" disabled=${isStopping} onClick=${() => { setStopping(true); stop(); }}>${t('cancel_job')}</button><a href="#/jobs">${t('all_jobs')}</a></div>
+    </div>`;
+}
+
+/** What is wrong: the service's words, and the way to each field. */
+function Trouble({ problem, onGo }) {
+  const errors = problem.errors || [];
+  return html`
+    <div class="problem" role="alert">
+      <p><strong>${problem.title}</strong></p>
+      ${problem.detail && errors.length === 0 && html`<p>${capital(problem.detail)}</p>`}
+      ${errors.length > 0 && html`<ul>${errors.map(({ pointer: place, detail }) => html`<li key=${place + detail}>
+        ${place ? html`<button type="button" class="link" onClick=${() => onGo(place)}><code>${place}</code></button> ` : ''}${detail}</li>`)}</ul>`}
+      ${problem.code && problem.type && html`<p class="quiet"><a href=${problem.type} target="_blank" rel="noopener">${t('what_it_means')}</a></p>`}
+    </div>`;
+}
+
+/** Names of fields keep their small letters. */
+const capital = text => (/^[a-z]+_/.test(text) ? text : text.charAt(0).toUpperCase() + text.slice(1));

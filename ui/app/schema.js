@@ -1,0 +1,188 @@
+// What a form can learn from a JSON Schema (2020-12) as the service writes them.
+
+const REFERENCE = '#/$defs/';
+
+/** The schema that is meant: references followed, `null` as one of the choices taken off and noted. */
+export function resolve(schema, root) {
+  let whole = schema;
+  let optional = false;
+  for (let depth = 0; depth < 32; depth += 1) {
+    if (whole.$ref) {
+      const { $ref, ...own } = whole;
+      whole = { ...root.$defs[$ref.slice(REFERENCE.length)], ...own };
+      continue;
+    }
+    const choices = whole.oneOf || whole.anyOf;
+    if (choices && choices.some(choice => choice.type === 'null')) {
+      optional = true;
+      const rest = choices.filter(choice => choice.type !== 'null');
+      const { oneOf, anyOf, ...own } = whole;
+      whole = rest.length === 1 ? { ...rest[0], ...own } : { ...own, oneOf: rest };
+      continue;
+    }
+    if (Array.isArray(whole.type)) {
+      optional = optional || whole.type.includes('null');
+      const rest = whole.type.filter(type => type !== 'null');
+      whole = { ...whole, type: rest.length === 1 ? rest[0] : rest };
+      continue;
+    }
+    break;
+  }
+  return optional ? { ...whole, optional: true } : whole;
+}
+
+/** What a schema asks to be shown as. */
+export function kindOf(schema) {
+  if (schema['x-table']) return 'table';
+  if (schema.const !== undefined) return 'constant';
+  if (schema.oneOf || schema.anyOf) return 'choice';
+  if (schema.enum) return schema.enum.length === 1 ? 'constant' : 'enum';
+  if (schema.type === 'object' && schema.properties) return 'object';
+  if (schema.type === 'object') return 'map';
+  if (schema.type === 'array') return 'array';
+  if (schema.type === 'boolean') return 'boolean';
+  if (schema.type === 'integer' || schema.type === 'number') return 'number';
+  if (schema.type === 'string') return 'string';
+  return 'json';
+}
+
+/** The variants of a choice: each with its tag field and value where it has one. */
+export function variants(schema, root) {
+  return (schema.oneOf || schema.anyOf || []).map(choice => {
+    const whole = resolve(choice, root);
+    for (const [name, part] of Object.entries(whole.properties || {})) {
+      const inner = resolve(part, root);
+      const value = inner.const ?? (inner.enum?.length === 1 ? inner.enum[0] : undefined);
+      if (value !== undefined) return { schema: whole, tag: name, value };
+    }
+    return { schema: whole, tag: null, value: null };
+  });
+}
+
+/** Which variant a value is of. */
+export function variantOf(list, value) {
+  if (value && typeof value === 'object' && !Array.isArray(value)) {
+    const tagged = list.find(({ tag, value: name }) => tag && value[tag] === name);
+    if (tagged) return tagged;
+    return list.find(({ tag, schema }) => !tag && schema.type === 'object') || list[0];
+  }
+  const type = Array.isArray(value) ? 'array' : typeof value;
+  return list.find(({ schema }) => schema.type === type || (type === 'number' && schema.type === 'integer')) || list[0];
+}
+
+/** A value to begin with: what must be there, from the schema's examples. */
+export function blank(schema, root, depth = 0) {
+  const whole = resolve(schema, root);
+  if (depth > 12) return null;
+  switch (kindOf(whole)) {
+    case 'constant': return whole.const ?? whole.enum[0];
+    case 'enum': return whole.default ?? whole.enum[0];
+    case 'choice': return blank(variants(whole, root)[0].schema, root, depth + 1);
+    case 'object': {
+      const value = {};
+      for (const name of whole.required || []) value[name] = blank(whole.properties[name], root, depth + 1);
+      return value;
+    }
+    case 'table': return [];
+    case 'map': return {};
+    case 'array': {
+      if (Array.isArray(whole.example)) return whole.example;
+      return Array.from({ length: whole.minItems || 0 }, () => blank(whole.items, root, depth + 1));
+    }
+    case 'boolean': return whole.example ?? whole.default ?? false;
+    case 'number': return whole.example ?? whole.default ?? whole.minimum ?? 0;
+    case 'string': return whole.example ?? whole.default ?? '';
+    default: return whole.example ?? null;
+  }
+}
+
+/** What units add to a field's name, the longest first. */
+const SUFFIXES = [
+  'n_mm_per_rad', 'rad_per_n_mm', 'n_per_mm2', 'n_per_mm', 'n_s_per_mm', 'kg_per_m3', 'um_per_m_k', 'um_per_km', 'um_per_rev', 'um_per_n', 'um_per_k', 'mm_per_tooth',
+  'mm_per_rev', 'mm_per_min', 'm_per_min', 'm_per_s2', 'deg_per_rev', 'n_m', 'percent', 'rpm', 'deg', 'rad', 'min', 'hz', 'kw', 'kg', 'km', 'mm', 'um', 'ms', 'n', 'm', 's', 'k', 'h',
+];
+const written = unit => unit.toLowerCase().replace(/[()]/g, '').replace(/\//g, '_per_').replace(/[ *]+/g, '_');
+
+/** A field's name without its unit. */
+export function stem(name, unit) {
+  if (!unit || unit === '1') return name;
+  const tail = [written(unit), ...SUFFIXES].find(suffix => name.endsWith(`_${suffix}`) && name.length > suffix.length + 1);
+  return tail ? name.slice(0, -tail.length - 1) : name;
+}
+
+/** A field's name as words, without its unit. */
+export function humanised(name, unit) {
+  const words = stem(name, unit).replace(/_/g, ' ');
+  return words.charAt(0).toUpperCase() + words.slice(1);
+}
+
+const capital = text => text.charAt(0).toUpperCase() + text.slice(1);
+
+/** What a field is called: the service's own label, or its name. */
+export const labelOf = (name, schema) => (schema.title ? capital(schema.title) : humanised(name, schema['x-unit']));
+
+/** What a word of an enumeration is called. */
+export const wordOf = (schema, word) => capital(schema?.['x-labels']?.[word] || humanised(String(word)));
+
+/** What a variant of a choice is called: by the label of its tag. */
+export function variantName({ schema, tag, value }, root) {
+  return tag ? wordOf(resolve(schema.properties[tag], root), value) : null;
+}
+
+/** A symbol as print writes it: `D_0` as its parts. */
+const GREEK = {
+  alpha: 'α', beta: 'β', gamma: 'γ', delta: 'δ', epsilon: 'ε', zeta: 'ζ', eta: 'η', theta: 'θ', kappa: 'κ', lambda: 'λ', mu: 'μ', nu: 'ν',
+  xi: 'ξ', rho: 'ρ', sigma: 'σ', tau: 'τ', phi: 'φ', chi: 'χ', psi: 'ψ', omega: 'ω', Delta: 'Δ', Omega: 'Ω', Sigma: 'Σ', Phi: 'Φ',
+};
+export function symbolParts(symbol) {
+  const greek = text => GREEK[text] || text;
+  const [base, ...rest] = symbol.split('_');
+  return { base: greek(base), sub: rest.map(greek).join(',') };
+}
+
+/** The range that a number may have. */
+export function range(schema) {
+  return {
+    low: schema.minimum ?? schema.exclusiveMinimum,
+    high: schema.maximum ?? schema.exclusiveMaximum,
+    openLow: schema.minimum === undefined && schema.exclusiveMinimum !== undefined,
+    openHigh: schema.maximum === undefined && schema.exclusiveMaximum !== undefined,
+  };
+}
+
+// Pointers (RFC 6901) and values by them.
+
+export const pointer = path => path.map(part => `/${String(part).replace(/~/g, '~0').replace(/\//g, '~1')}`).join('');
+export const parts = text => text.split('/').slice(1).map(part => part.replace(/~1/g, '/').replace(/~0/g, '~'));
+
+export function at(value, path) {
+  return path.reduce((inner, part) => (inner === null || inner === undefined ? undefined : inner[part]), value);
+}
+
+/** The value with another part at `path`; `undefined` takes the part out. */
+export function changed(value, path, part) {
+  if (path.length === 0) return part;
+  const [first, ...rest] = path;
+  if (Array.isArray(value)) {
+    const copy = [...value];
+    const inner = changed(copy[first], rest, part);
+    if (inner === undefined) copy.splice(Number(first), 1);
+    else copy[first] = inner;
+    return copy;
+  }
+  const copy = { ...(value ?? {}) };
+  const inner = changed(copy[first], rest, part);
+  if (inner === undefined) delete copy[first];
+  else copy[first] = inner;
+  return copy;
+}
+
+/** What differs between two values: `[pointer, new value]`, `undefined` for what is gone. */
+export function difference(from, to, path = []) {
+  const isObject = value => value !== null && typeof value === 'object';
+  if (isObject(from) && isObject(to) && Array.isArray(from) === Array.isArray(to)) {
+    if (Array.isArray(from) && from.length !== to.length) return [[pointer(path), to]];
+    return [...new Set([...Object.keys(from), ...Object.keys(to)])].flatMap(name => difference(from[name], to[name], [...path, name]));
+  }
+  return Object.is(from, to) ? [] : [[pointer(path), to]];
+}

@@ -1,0 +1,197 @@
+// A measured table: dropped, chosen or pasted as CSV; its columns and units are matched with what is needed and
+// shown for confirmation. What is sent is CSV with the headers that the service knows: the service converts units.
+import { html, useState, useRef, useMemo, unique } from './lib.js';
+import { t, plural, number, unitSymbol, unitOf } from './text.js';
+import { resolve, labelOf } from './schema.js';
+
+/** Units of one dimension: the service converts between them. */
+const DIMENSIONS = [
+  ['um', 'mm', 'm', 'nm', 'in'],
+  ['deg', 'rad'],
+  ['N', 'kN'],
+  ['s', 'ms', 'min', 'h'],
+  ['rpm'],
+  ['m/min', 'mm/min', 'm/s'],
+  ['mm/rev', 'um/rev'],
+  ['percent', '1'],
+];
+const alike = unit => DIMENSIONS.find(units => units.includes(unit)) || [unit];
+const norm = text => text.toLowerCase().replace(/µ|μ/g, 'u').replace(/мкм/g, 'um').replace(/мм/g, 'mm').replace(/град|°/g, 'deg').replace(/[^a-z0-9]+/g, '_').replace(/^_|_$/g, '');
+
+/** The cells of one line; quotes protect separators. */
+function cells(line, separator) {
+  const found = [];
+  let text = '';
+  let quoted = false;
+  for (let at = 0; at < line.length; at += 1) {
+    const c = line[at];
+    if (c === '"' && quoted && line[at + 1] === '"') { text += '"'; at += 1; } else if (c === '"') quoted = !quoted;
+    else if (c === separator && !quoted) { found.push(text.trim()); text = ''; } else text += c;
+  }
+  found.push(text.trim());
+  return found;
+}
+
+/** A CSV as its header and rows. */
+export function readCsv(text) {
+  const lines = text.replace(/^\ufeff/, '').split(/\r\n|\n|\r/).filter(line => line.trim() !== '' && !line.startsWith('#'));
+  if (lines.length < 2) return null;
+  const count = c => lines[0].split(c).length - 1;
+  const separator = ['\t', ';', ','].sort((a, b) => count(b) - count(a))[0];
+  const header = cells(lines[0], separator);
+  return { separator, header, rows: lines.slice(1).map(line => cells(line, separator)) };
+}
+
+/** Name and unit in a header: `diameter [um]`, `diameter (um)`, `diameter, um`. */
+function headed(title) {
+  const found = /^(.*?)\s*(?:[[(]\s*([^\])]+)\s*[\])]|,\s*(\S+))\s*$/.exec(title);
+  return found ? { name: found[1], unit: (found[2] || found[3]).replace(/µ|μ/g, 'u') } : { name: title, unit: null };
+}
+
+/** The columns that the table may have. */
+function wanted(schema, root) {
+  const rows = resolve((schema.oneOf || schema.anyOf).find(form => resolve(form, root).type === 'array'), root);
+  const item = resolve(rows.items, root);
+  return Object.entries(item.properties || {})
+    .map(([name, part]) => ({ name, schema: resolve(part, root), required: (item.required || []).includes(name) }))
+    .filter(({ schema: part }) => ['number', 'integer', 'string', 'boolean'].includes(part.type));
+}
+
+/** Which column of the file goes where, as far as names and units tell. */
+function guess(columns, header) {
+  const left = header.map((title, index) => ({ index, title, ...headed(title) }));
+  const matches = {};
+  const take = (column, test) => {
+    if (matches[column.name]) return;
+    const found = left.find(test);
+    if (!found) return;
+    left.splice(left.indexOf(found), 1);
+    const unit = column.schema['x-unit'];
+    const own = alike(unit).find(other => norm(other) === norm(found.unit ?? '') || (found.unit === null && norm(found.name).endsWith(`_${norm(other)}`)));
+    matches[column.name] = { index: found.index, unit: own ?? unit };
+  };
+  for (const column of columns) {
+    const unit = norm(column.schema['x-unit'] || '');
+    const stem = norm(column.name).replace(new RegExp(`_${unit}$`), '');
+    take(column, ({ title, name }) => norm(title) === norm(column.name) || norm(name) === stem || norm(name) === norm(column.name));
+    take(column, ({ name }) => alike(column.schema['x-unit']).some(other => norm(name) === `${stem}_${norm(other)}`));
+  }
+  for (const column of columns) {
+    const symbol = norm(column.schema['x-symbol'] || '');
+    const words = norm(column.name).split('_').filter(word => word.length > 3);
+    if (symbol) take(column, ({ name }) => norm(name) === symbol);
+    take(column, ({ name }) => words.length > 0 && words.every(word => norm(name).includes(word) || word === norm(column.schema['x-unit'] || '')));
+  }
+  for (const column of columns.filter(({ required }) => required)) {
+    take(column, ({ name }) => norm(column.name).split('_').some(word => word.length > 3 && norm(name).includes(word)));
+  }
+  return matches;
+}
+
+const quote = (text, separator) => (text.includes(separator) || text.includes('"') ? `"${text.replace(/"/g, '""')}"` : text);
+
+/** The file with the columns that were matched, under the names that the service knows. */
+function matched(file, columns, matches) {
+  const used = columns.filter(({ name }) => matches[name]);
+  const title = ({ name, schema }) => {
+    const unit = matches[name].unit;
+    const own = schema['x-unit'];
+    if (!unit || unit === own || own === undefined) return name;
+    const tail = `_${own.toLowerCase().replace(/\//g, '_per_')}`;
+    return `${name.endsWith(tail) ? name.slice(0, -tail.length) : name} [${unit}]`;
+  };
+  const line = parts => parts.map(part => quote(part, file.separator)).join(file.separator);
+  return `${[line(used.map(title)), ...file.rows.map(row => line(used.map(({ name }) => row[matches[name].index] ?? '')))].join('\n')}\n`;
+}
+
+export function TableInput({ name, schema, root, value, onChange, faults, below }) {
+  const [draft, setDraft] = useState(null);
+  const [over, setOver] = useState(false);
+  const [pasting, setPasting] = useState(false);
+  const [trouble, setTrouble] = useState(null);
+  const picker = useRef(null);
+  const id = useMemo(() => unique('table'), []);
+  const columns = useMemo(() => wanted(schema, root), [schema, root]);
+  const label = labelOf(name, schema);
+  const open = (text, file) => {
+    const read = readCsv(text);
+    if (!read) { setTrouble(t('csv_empty')); return; }
+    setTrouble(null);
+    setPasting(false);
+    setDraft({ file: read, source: file, matches: guess(columns, read.header) });
+  };
+  const take = async files => { if (files?.[0]) open(await files[0].text(), files[0].name); };
+  const missing = draft ? columns.filter(({ name: column, required }) => required && !draft.matches[column]) : [];
+  const accept = () => { onChange({ csv: matched(draft.file, columns, draft.matches) }); setDraft(null); };
+  const rows = Array.isArray(value) ? value.length : value?.csv ? value.csv.trim().split('\n').length - 1 : 0;
+  const list = [...(faults || []), ...(below || [])];
+  return html`
+    <div class=${`table-input ${over ? 'over' : ''}`}
+      onDragOver=${event => { event.preventDefault(); setOver(true); }} onDragLeave=${() => setOver(false)}
+      onDrop=${event => { event.preventDefault(); setOver(false); take(event.dataTransfer.files); }}>
+      ${list.length > 0 && html`<p class="fault" id=${`${id}-fault`}>${list.slice(0, 6).map(fault => html`<span>${fault.pointer ? `${fault.pointer.split('/').slice(2).join(' ')} ` : ''}${fault.detail}</span>`)}
+        ${list.length > 6 && html`<span>${t('and_more', { count: list.length - 6 })}</span>`}</p>`}
+      ${trouble && html`<p class="fault" role="alert"><span>${trouble}</span></p>`}
+      ${draft ? html`<${Matching} ...${{ draft, setDraft, columns, missing, accept, label }} cancel=${() => setDraft(null)} />` : html`
+        ${rows > 0
+          ? html`<p class="table-state"><strong>${plural('rows', rows)}</strong> <span class="quiet">${(value.csv ? value.csv.split('\n')[0] : Object.keys(value[0]).join(', ')).slice(0, 160)}</span></p>
+            ${Array.isArray(value) && html`<${Preview} rows=${value} columns=${columns} label=${label} />`}`
+          : html`<p class="quiet">${schema.description}</p>`}
+        <div class="actions">
+          <button type="button" onClick=${() => picker.current.click()}>${t('choose_file')}<span class="hidden">: ${label}</span></button>
+          <button type="button" onClick=${() => setPasting(!pasting)} aria-expanded=${pasting}>${t('paste_table')}<span class="hidden">: ${label}</span></button>
+          ${rows > 0 && html`<button type="button" onClick=${() => onChange(undefined)}>${t('remove')}<span class="hidden">: ${label}</span></button>`}
+          <span class="quiet drop-hint">${t('drop_hint')}</span>
+        </div>
+        <input ref=${picker} type="file" class="hidden" tabindex="-1" accept=".csv,.txt,.tsv,text/csv,text/plain" aria-label=${`${t('choose_file')}: ${label}`} data-table=${name}
+          onChange=${event => { take(event.currentTarget.files); event.currentTarget.value = ''; }} />
+        ${pasting && html`<textarea rows="5" class="json" aria-label=${`${t('paste_table')}: ${label}`} placeholder=${columns.filter(({ required }) => required).map(({ name: column }) => column).join(';')}
+          onPaste=${event => { const text = event.clipboardData.getData('text'); event.preventDefault(); open(text, t('pasted')); }}
+          onChange=${event => open(event.currentTarget.value, t('pasted'))}></textarea>`}`}
+    </div>`;
+}
+
+/** The first rows of a table. */
+function Preview({ rows, columns, label }) {
+  const [all, setAll] = useState(false);
+  const used = columns.filter(({ name }) => rows.some(row => row[name] !== undefined && row[name] !== null));
+  const shown = all ? rows.slice(0, 500) : rows.slice(0, 4);
+  return html`
+    <div class="grid-scroll" tabindex="0" role="region" aria-label=${label}><table class="grid still">
+      <thead><tr>${used.map(({ name, schema }) => html`<th scope="col" title=${schema.description}>${labelOf(name, schema)} <span class="unit">${unitOf(schema)}</span></th>`)}</tr></thead>
+      <tbody>${shown.map((row, index) => html`<tr key=${index}>${used.map(({ name }) => html`<td>${typeof row[name] === 'number' ? number(row[name]) : row[name] === true ? t('yes') : row[name] ?? ''}</td>`)}</tr>`)}</tbody>
+    </table></div>
+    ${rows.length > shown.length && html`<button type="button" class="more" onClick=${() => setAll(true)}>${t('show_all', { count: Math.min(rows.length, 500) })}</button>`}`;
+}
+
+/** Columns and units of a file, to be confirmed. */
+function Matching({ draft, setDraft, columns, missing, accept, cancel, label }) {
+  const { file, matches } = draft;
+  const set = (column, match) => setDraft({ ...draft, matches: { ...matches, [column]: match } });
+  const sure = columns.filter(({ name, required }) => required || matches[name]);
+  const [all, setAll] = useState(sure.length === 0);
+  const shown = all ? columns : sure;
+  return html`
+    <div class="matching" role="group" aria-label=${t('match_columns')}>
+      <p><strong>${draft.source}</strong> <span class="quiet">${plural('rows', file.rows.length)}, ${plural('columns', file.header.length)}</span></p>
+      <p>${t('match_hint')}</p>
+      <table class="grid still match"><thead><tr><th scope="col">${t('needed_column')}</th><th scope="col">${t('file_column')}</th><th scope="col">${t('unit')}</th></tr></thead>
+        <tbody>${shown.map(({ name, schema, required }) => {
+          const match = matches[name];
+          const units = alike(schema['x-unit']).filter(Boolean);
+          return html`<tr key=${name} class=${required && !match ? 'faulty' : ''}>
+            <th scope="row" title=${schema.description}>${labelOf(name, schema)}${required && html`<span aria-hidden="true"> *</span>`}</th>
+            <td><select aria-label=${`${labelOf(name, schema)}: ${t('file_column')}`} value=${match ? match.index : ''} onChange=${event => set(name, event.currentTarget.value === '' ? undefined : { index: Number(event.currentTarget.value), unit: matches[name]?.unit ?? headed(file.header[Number(event.currentTarget.value)]).unit ?? schema['x-unit'] })}>
+              <option value="">${t('no_column')}</option>
+              ${file.header.map((title, index) => html`<option value=${index}>${title || `${index + 1}`}${file.rows[0]?.[index] ? ` (${file.rows[0][index]} …)` : ''}</option>`)}
+            </select></td>
+            <td>${schema['x-unit'] && match && (units.length > 1 ? html`<select aria-label=${`${labelOf(name, schema)}: ${t('unit')}`} value=${match.unit} onChange=${event => set(name, { ...match, unit: event.currentTarget.value })}>
+              ${units.map(unit => html`<option value=${unit}>${unitSymbol(unit) || '1'}</option>`)}</select>` : unitOf(schema))}</td>
+          </tr>`;
+        })}</tbody></table>
+      ${!all && columns.length > shown.length && html`<button type="button" class="more" onClick=${() => setAll(true)}>${t('more_fields', { count: columns.length - shown.length })}</button>`}
+      ${missing.length > 0 && html`<p class="fault"><span>${t('columns_missing', { names: missing.map(({ name, schema }) => labelOf(name, schema)).join(', ') })}</span></p>`}
+      <div class="actions"><button type="button" class="primary" disabled=${missing.length > 0 || Object.values(matches).filter(Boolean).length === 0} onClick=${accept}>${t('use_table')}<span class="hidden">: ${label}</span></button>
+        <button type="button" onClick=${cancel}>${t('cancel')}</button></div>
+    </div>`;
+}
