@@ -49,8 +49,6 @@ pub(super) struct LandingLinks {
     results: &'static str,
     /// The jobs.
     jobs: &'static str,
-    /// Where studies are posted to.
-    studies: &'static str,
     /// The library of materials.
     materials: &'static str,
     /// The contract (OpenAPI 3.1).
@@ -90,7 +88,6 @@ pub(super) async fn landing(State(app): State<App>, headers: HeaderMap) -> Resul
                 calculators: "/v1/calculators",
                 results: "/v1/results",
                 jobs: "/v1/jobs",
-                studies: "/v1/studies",
                 materials: "/v1/materials",
                 openapi: "/openapi.json",
                 docs: "/docs",
