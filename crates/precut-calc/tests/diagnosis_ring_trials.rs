@@ -1,7 +1,7 @@
 //! Blind trials of the diagnosis on rings: effects hidden by a generator that shares no code with the calculator.
 //!
 //! Every prediction is a simulation, so few are drawn here; more and others:
-//! `PRECUT_TRIALS=100 PRECUT_TRIAL_SEED=12345 cargo test --release -p precut-calc --test diagnosis_ring_trials -- --nocapture`.
+//! `PRECUT_TRIALS=100 PRECUT_TRIAL_SEED=12345 cargo test --release -p precut-calc diagnosis_ring_trials:: -- --nocapture`.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, missing_docs)]
 
 use precut_calc::calculator::{Calculator, Check, Unwatched, Violations};
