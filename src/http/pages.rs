@@ -51,6 +51,8 @@ pub(super) struct LandingLinks {
     jobs: &'static str,
     /// Where studies are posted to.
     studies: &'static str,
+    /// The stored models.
+    models: &'static str,
     /// The library of materials.
     materials: &'static str,
     /// The contract (OpenAPI 3.1).
@@ -91,6 +93,7 @@ pub(super) async fn landing(State(app): State<App>, headers: HeaderMap) -> Resul
                 results: "/v1/results",
                 jobs: "/v1/jobs",
                 studies: "/v1/studies",
+                models: "/v1/models",
                 materials: "/v1/materials",
                 openapi: "/openapi.json",
                 docs: "/docs",

@@ -38,10 +38,7 @@ pub(super) fn index(headers: &HeaderMap) -> Result<Response, Problem> {
 }
 
 /// `GET /ui/{version}/{file}`
-pub(super) async fn file(
-    Path((asked, name)): Path<(String, String)>,
-    headers: HeaderMap,
-) -> Result<Response, Problem> {
+pub(super) async fn file(Path((asked, name)): Path<(String, String)>, headers: HeaderMap) -> Result<Response, Problem> {
     let absent = || Problem::not_found(&format!("/ui/{asked}/{name}"));
     let kind = content_type(&name).ok_or_else(absent)?;
     let file = Files::get(&name).ok_or_else(absent)?;

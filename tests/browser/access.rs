@@ -23,15 +23,18 @@ fn assert_accessible(page: &mut Page, place: &str) {
 fn rooms(page: &mut Page, service: &Service) -> Vec<String> {
     page.open(&service.page(""));
     page.wait_for(".questions li");
-    let rooms = page.evaluate("[...document.querySelectorAll('.questions li > a')].map(link => link.getAttribute('href').slice(2))");
+    let rooms = page.evaluate(
+        "[...document.querySelectorAll('.questions li > a')].map(link => link.getAttribute('href').slice(2))",
+    );
     rooms.as_array().unwrap().iter().filter_map(Value::as_str).map(str::to_owned).collect()
 }
 
 #[test]
 fn axe_finds_no_violation_on_any_page() {
     let Some((_turn, mut page, service)) = both() else { return };
+    let rooms = rooms(&mut page, &service);
     assert_accessible(&mut page, "start");
-    for (index, room) in rooms(&mut page, &service).iter().enumerate() {
+    for (index, room) in rooms.iter().enumerate() {
         // Either scheme for every second one.
         page.screen(1440, 900, index % 2 == 1);
         page.open(&service.page(room));
@@ -88,17 +91,25 @@ fn the_keyboard_alone_is_enough() {
     let mut seen = Vec::new();
     for _ in 0..16 {
         page.press("Tab");
-        let name = page.evaluate("(() => { const it = document.activeElement; return (it.id || it.textContent).trim().slice(0, 40) })()");
+        let name = page.evaluate(
+            "(() => { const it = document.activeElement; return (it.id || it.textContent).trim().slice(0, 40) })()",
+        );
         seen.push(name.as_str().unwrap_or_default().to_owned());
         assert_eq!(page.evaluate("document.activeElement.checkVisibility()"), true, "{seen:?}");
     }
-    let place = |part: &str| seen.iter().position(|name| name.contains(part)).unwrap_or_else(|| panic!("{part}: {seen:?}"));
-    assert!(place("Jobs") < place("EN") && place("EN") < place("example") && place("example") < place("Shaft"), "{seen:?}");
+    let place =
+        |part: &str| seen.iter().position(|name| name.contains(part)).unwrap_or_else(|| panic!("{part}: {seen:?}"));
+    assert!(
+        place("Jobs") < place("EN") && place("EN") < place("example") && place("example") < place("Shaft"),
+        "{seen:?}"
+    );
     // The menu of questions opens, closes and gives the focus back.
     page.evaluate("document.querySelector('.ask button').focus()");
     page.press("Enter");
     page.until("!document.querySelector('.menu').hidden");
     page.press("Escape");
-    page.until("document.querySelector('.menu').hidden && document.activeElement === document.querySelector('.ask button')");
+    page.until(
+        "document.querySelector('.menu').hidden && document.activeElement === document.querySelector('.ask button')",
+    );
     page.assert_calm();
 }

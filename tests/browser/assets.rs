@@ -14,7 +14,9 @@ async fn the_page_is_small_and_kept_by_its_version() {
     let get = |url: String| client.get(url).header(ACCEPT, "text/html, */*;q=0.5").header(ACCEPT_ENCODING, "br");
     let answer = get(service.url("/")).send().await.unwrap();
     let policy = answer.headers()["content-security-policy"].to_str().unwrap().to_owned();
-    for part in ["default-src 'none'", "script-src 'self'", "style-src 'self'", "connect-src 'self'", "frame-ancestors 'none'"] {
+    for part in
+        ["default-src 'none'", "script-src 'self'", "style-src 'self'", "connect-src 'self'", "frame-ancestors 'none'"]
+    {
         assert!(policy.contains(part), "{policy}");
     }
     assert!(!policy.contains("unsafe"), "{policy}");
@@ -38,7 +40,9 @@ async fn the_page_is_small_and_kept_by_its_version() {
     // Another version's address leads to what there is now, not to be kept.
     let other = get(service.url("/ui/0123456789ab/main.js")).send().await.unwrap();
     assert_eq!(other.headers()["cache-control"], "no-cache");
-    for absent in ["/ui/0123456789ab/nothing.js", "/ui/0123456789ab/vendor/LICENSE-preact.txt", "/ui/0123456789ab/../Cargo.toml"] {
+    for absent in
+        ["/ui/0123456789ab/nothing.js", "/ui/0123456789ab/vendor/LICENSE-preact.txt", "/ui/0123456789ab/../Cargo.toml"]
+    {
         assert_eq!(get(service.url(absent)).send().await.unwrap().status(), 404, "{absent}");
     }
 }

@@ -33,7 +33,8 @@ pub struct Page {
 /// The path of the program, if it is installed. With `CI=true` it must be.
 pub fn found() -> Option<PathBuf> {
     let path = std::env::var_os("PATH").unwrap_or_default();
-    let found = std::env::split_paths(&path).flat_map(|folder| NAMES.map(|name| folder.join(name))).find(|file| file.is_file());
+    let found =
+        std::env::split_paths(&path).flat_map(|folder| NAMES.map(|name| folder.join(name))).find(|file| file.is_file());
     if found.is_none() {
         assert!(std::env::var("CI").as_deref() != Ok("true"), "chromium is not installed");
         eprintln!("NOT CHECKED: chromium is not here");
@@ -58,7 +59,8 @@ impl Page {
             .spawn()
             .unwrap();
         let mut lines = BufReader::new(process.stderr.take().unwrap()).lines();
-        let address = lines.by_ref().map_while(Result::ok).find_map(|line| Some(line.split_once("listening on ")?.1.to_owned()));
+        let address =
+            lines.by_ref().map_while(Result::ok).find_map(|line| Some(line.split_once("listening on ")?.1.to_owned()));
         let address = address.expect("chromium says where it listens");
         // Whatever else it says must not fill the pipe.
         thread::spawn(move || lines.for_each(drop));
@@ -248,7 +250,10 @@ impl Page {
     /// Types into a field in place of what is there.
     pub fn fill(&mut self, selector: &str, text: &str) {
         self.wait_for(selector);
-        self.evaluate(&format!("document.querySelector({}).focus(), document.querySelector({0}).select()", json!(selector)));
+        self.evaluate(&format!(
+            "document.querySelector({}).focus(), document.querySelector({0}).select()",
+            json!(selector)
+        ));
         // The field selects all of itself a moment after it gets the focus.
         thread::sleep(Duration::from_millis(20));
         self.call("Input.insertText", json!({"text": text}));
@@ -313,7 +318,8 @@ fn decoded(text: &str) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(text.len() / 4 * 3);
     for group in text.as_bytes().chunks(4) {
         let given: Vec<u8> = group.iter().copied().filter(|byte| *byte != b'=').collect();
-        let word = given.iter().fold(0_u32, |word, byte| word << 6 | u32::from(digit(*byte))) << (6 * (4 - given.len()));
+        let word =
+            given.iter().fold(0_u32, |word, byte| word << 6 | u32::from(digit(*byte))) << (6 * (4 - given.len()));
         bytes.extend_from_slice(&word.to_be_bytes()[1..given.len()]);
     }
     bytes

@@ -40,7 +40,10 @@ fn kept_results_are_listed_and_opened_without_computing() {
     assert_eq!(page.text(".verdict"), verdict);
     // Changed, it is computed again.
     page.fill("#field-cut-depth_mm", "1.25");
-    page.until(&format!("document.querySelector('.verdict').textContent !== {} && {SETTLED}", serde_json::json!(verdict)));
+    page.until(&format!(
+        "document.querySelector('.verdict').textContent !== {} && {SETTLED}",
+        serde_json::json!(verdict)
+    ));
     page.assert_calm();
 }
 

@@ -33,4 +33,5 @@ fn both() -> Option<(MutexGuard<'static, ()>, Page, Service)> {
 const SETTLED: &str = "document.querySelector('.picture svg.chart') && \
     document.querySelector('.result-pane')?.getAttribute('aria-busy') === 'false'";
 /// Whatever the main picture draws.
-const DRAWN: &str = "[...document.querySelectorAll('.picture svg.chart path')].map(path => path.getAttribute('d')).join('')";
+const DRAWN: &str =
+    "[...document.querySelectorAll('.picture svg.chart path')].map(path => path.getAttribute('d')).join('')";

@@ -13,7 +13,8 @@ fn every_calculator_shows_its_first_example_as_a_picture_with_words() {
     let Some((_turn, mut page, service)) = both() else { return };
     page.open(&service.page(""));
     page.wait_for(".questions li");
-    let rooms = page.evaluate("[...document.querySelectorAll('.questions li > a')].map(link => link.getAttribute('href'))");
+    let rooms =
+        page.evaluate("[...document.querySelectorAll('.questions li > a')].map(link => link.getAttribute('href'))");
     let rooms: Vec<&str> = rooms.as_array().unwrap().iter().filter_map(Value::as_str).collect();
     assert!(rooms.len() >= 5, "{rooms:?}");
     for room in rooms {
@@ -27,7 +28,9 @@ fn every_calculator_shows_its_first_example_as_a_picture_with_words() {
         assert!(!drawn.as_str().unwrap().contains("NaN"), "{room}: {drawn}");
     }
     // Nothing came from anywhere else.
-    let foreign = page.evaluate("performance.getEntriesByType('resource').map(it => it.name).filter(name => !name.startsWith(location.origin))");
+    let foreign = page.evaluate(
+        "performance.getEntriesByType('resource').map(it => it.name).filter(name => !name.startsWith(location.origin))",
+    );
     assert_eq!(foreign, json!([]));
     page.assert_calm();
 }
@@ -52,7 +55,12 @@ fn a_changed_number_changes_the_picture_and_the_address() {
     page.until("location.hash.includes('/cut/feed_mm_per_rev=0.26')");
     assert_eq!(page.value(FEED), "0.26");
 
-    // The address brings it all back, and so does the way back.
+    // So does the way back, change by change, and forward again.
+    for (step, value) in [("back", "0.25"), ("back", "0.5"), ("forward", "0.25"), ("forward", "0.26")] {
+        page.evaluate(&format!("history.{step}()"));
+        page.until(&format!("document.querySelector('{FEED}').value === '{value}' && {SETTLED}"));
+    }
+    // The address brings it all back.
     let address = page.evaluate("location.href");
     page.open(address.as_str().unwrap());
     page.until(SETTLED);
@@ -61,8 +69,6 @@ fn a_changed_number_changes_the_picture_and_the_address() {
     page.until(&format!("document.querySelector('{FEED}').value !== '0.26' && {SETTLED}"));
     page.evaluate("history.back()");
     page.until(&format!("document.querySelector('{FEED}').value === '0.26' && {SETTLED}"));
-    page.evaluate("history.back()");
-    page.until(&format!("document.querySelector('{FEED}').value !== '0.26' && {SETTLED}"));
     page.assert_calm();
 }
 
@@ -106,7 +112,7 @@ fn a_run_is_pinned_compared_and_read() {
     page.click(".bar input[type=checkbox]");
 
     // The mouse reads all curves at one place; so do the keys.
-    let middle = page.middle(".stack svg");
+    let middle = page.middle(".stack svg.chart");
     page.point(middle);
     page.until("[...document.querySelectorAll('.series output')].length >= 4");
     page.evaluate("document.querySelector('.plot').focus()");
@@ -133,8 +139,11 @@ fn a_click_in_the_lobes_tries_that_point() {
     page.until(SETTLED);
     let speed = page.value("#field-cut-spindle_speed_rpm");
     let depth = page.value("#field-cut-depth_mm");
-    page.click(".stack svg");
-    page.until(&format!("document.querySelector('#field-cut-spindle_speed_rpm').value !== {} && {SETTLED}", json!(speed)));
+    page.click(".stack svg.chart");
+    page.until(&format!(
+        "document.querySelector('#field-cut-spindle_speed_rpm').value !== {} && {SETTLED}",
+        json!(speed)
+    ));
     assert_ne!(page.value("#field-cut-depth_mm"), depth);
     page.assert_calm();
 }
@@ -170,7 +179,8 @@ fn a_dropped_csv_is_matched_by_column_and_unit_and_evaluated() {
     page.until(&format!("document.querySelector('.verdict').textContent !== {} && {SETTLED}", json!(before)));
     // Cosine of three waves, 4 µm: peak to valley about the least-squares circle 8 µm, a little less behind the filter.
     let verdict = page.text(".verdict");
-    let roundness: f64 = verdict.split("circle is ").nth(1).and_then(|rest| rest.split(' ').next()).unwrap().parse().unwrap();
+    let roundness: f64 =
+        verdict.split("circle is ").nth(1).and_then(|rest| rest.split(' ').next()).unwrap().parse().unwrap();
     assert!((7.0..8.01).contains(&roundness), "{verdict}");
     assert!(page.text(".table-state").contains("120"));
 
@@ -188,11 +198,14 @@ fn results_are_downloaded_in_every_form() {
     let Some((_turn, mut page, service)) = both() else { return };
     page.open(&service.page("deflection-compensation"));
     page.until(SETTLED);
-    for (button, ending, begins) in [("JSON", "json", "{\"calculator\""), ("CSV", "csv", "z"), ("SVG", "svg", "<svg"), ("G-code", "nc", "")] {
+    for (button, ending, begins) in
+        [("JSON", "json", "{\"calculator\""), ("CSV", "csv", "z"), ("SVG", "svg", "<svg"), ("G-code", "nc", "")]
+    {
         page.click_on(button);
         let start = Instant::now();
         let text = loop {
-            let files: Vec<_> = std::fs::read_dir(page.downloads.path()).unwrap().map(|file| file.unwrap().path()).collect();
+            let files: Vec<_> =
+                std::fs::read_dir(page.downloads.path()).unwrap().map(|file| file.unwrap().path()).collect();
             let found = files.iter().find(|file| file.extension().is_some_and(|own| own == ending));
             if let Some(file) = found {
                 break std::fs::read_to_string(file).unwrap();

@@ -45,7 +45,7 @@ fn the_documentation_shows_the_workbench_as_it_is() {
             page.click_on("Pin to compare");
             page.fill("#field-cut-feed_mm_per_rev", "0.35");
             page.until(&format!("document.querySelector('.chart .ghost') && {SETTLED}"));
-            let middle = page.middle(".stack svg:nth-of-type(3)");
+            let middle = page.middle("svg.chart[data-panel='2']");
             page.evaluate("scrollTo(0, 0)");
             page.point(middle);
         }

@@ -24,7 +24,8 @@ fn stem(code: &str) -> &str {
 
 #[test]
 fn every_word_of_the_page_exists_in_both_languages_and_is_used() {
-    let known: Vec<BTreeSet<String>> = ["en", "ru"].map(|tag| texts(tag).keys().map(|code| stem(code).to_owned()).collect()).into();
+    let known: Vec<BTreeSet<String>> =
+        ["en", "ru"].map(|tag| texts(tag).keys().map(|code| stem(code).to_owned()).collect()).into();
     assert_eq!(known[0], known[1]);
     let scripts: String = std::fs::read_dir(folder())
         .unwrap()
@@ -50,7 +51,8 @@ fn every_word_of_the_page_exists_in_both_languages_and_is_used() {
     let russian = texts("ru");
     for (code, text) in &russian {
         let text = text.as_str().unwrap();
-        let needs_letters = texts("en").get(code).is_some_and(|english| english != text) || text.chars().any(|c| ('а'..='я').contains(&c));
+        let needs_letters = texts("en").get(code).is_some_and(|english| english != text)
+            || text.chars().any(|c| ('а'..='я').contains(&c));
         assert!(needs_letters || ["docs", "form_json"].contains(&code.as_str()), "{code} is not translated: {text}");
     }
 }

@@ -147,11 +147,18 @@ async fn a_result_is_read_in_parts_with_words() {
     let figure = &figures["items"][0];
     assert_eq!(figure["id"], "sag");
     let texts = [&figure["title"]["text"], &figure["x"]["text"], &figure["panels"][0]["items"][0]["text"]];
-    assert!(texts.iter().all(|text| text.as_str().is_some_and(|text| !text.is_empty() && !text.contains('_'))), "{figure}");
+    assert!(
+        texts.iter().all(|text| text.as_str().is_some_and(|text| !text.is_empty() && !text.contains('_'))),
+        "{figure}"
+    );
 
     let tables = read("tables").await;
     let columns = tables["items"][0]["columns"].as_array().unwrap();
-    assert!(columns.iter().all(|column| column["text"].as_str().is_some() && !column["cells"].as_array().unwrap().is_empty()));
+    assert!(
+        columns
+            .iter()
+            .all(|column| column["text"].as_str().is_some() && !column["cells"].as_array().unwrap().is_empty())
+    );
 
     // The job of a result gives that result again.
     let file = read("job").await;

@@ -291,21 +291,24 @@ function Stacked({ figure, pinned, width, style, hidden, toggle, at, setAt, show
     const place = Math.min(Math.max(event.clientX - box.left, left + edge), right - edge);
     return { place, value: x.back(place) };
   };
+  // Held beside the state: a press and its release may come faster than a drawing.
+  const held = useRef(null);
+  const hold = next => { held.current = next; setDrag(next); };
   const move = event => {
     const { place, value } = where(event);
     setAt(value);
-    if (drag) setDrag({ ...drag, to: place });
+    if (held.current) hold({ ...held.current, to: place });
   };
   const down = event => {
     if (event.button !== 0 || event.target.closest('button')) return;
     const { place } = where(event);
     event.currentTarget.setPointerCapture(event.pointerId);
-    setDrag({ from: place, to: place });
+    hold({ from: place, to: place });
   };
   const up = event => {
-    if (!drag) return;
-    const ends = [drag.from, drag.to].sort((a, b) => a - b);
-    setDrag(null);
+    if (!held.current) return;
+    const ends = [held.current.from, held.current.to].sort((a, b) => a - b);
+    hold(null);
     if (ends[1] - ends[0] > 8) { setView(ends.map(x.back)); return; }
     if (!onPick) return;
     const svg = event.target.closest?.('svg') || document.elementFromPoint(event.clientX, event.clientY)?.closest('svg');
@@ -325,7 +328,7 @@ function Stacked({ figure, pinned, width, style, hidden, toggle, at, setAt, show
     setView(next[1] - next[0] > 0 ? next : view);
   };
   return html`
-    <div class=${`stack ${onPick ? 'pickable' : ''}`} onPointerMove=${move} onPointerDown=${down} onPointerUp=${up} onPointerCancel=${() => setDrag(null)} onPointerLeave=${() => { if (!drag) setAt(null); }} onDblClick=${() => setView(null)} onWheel=${wheel}>
+    <div class=${`stack ${onPick ? 'pickable' : ''}`} onPointerMove=${move} onPointerDown=${down} onPointerUp=${up} onPointerCancel=${() => hold(null)} onPointerLeave=${() => { if (!held.current) setAt(null); }} onDblClick=${() => setView(null)} onWheel=${wheel}>
       ${panels.map(({ panel, ghost, tall, domain, places, texts, factor, span }, index) => {
         const last = index === panels.length - 1;
         const own = panel.items.filter(item => item.kind === 'glyph');
@@ -335,7 +338,7 @@ function Stacked({ figure, pinned, width, style, hidden, toggle, at, setAt, show
         const frame = { left, top: 6, width: right - left, height: tall };
         const clip = `clip-${figure.id}-${index}`;
         const stance = item => {
-          const outline = panel.items.find(other => other.kind === 'outline');
+          const outline = panel.items.find(other => other.kind === 'outline' && other.role === 'part');
           const radius = outline ? Math.max(...outline.y.filter((_, place) => Math.abs(outline.x[place] - item.x) <= (shown[1] - shown[0]) / 50 + 1e-9), 0) : 0;
           return { mirrored: item.glyph === 'chuck' ? item.x > (shown[0] + shown[1]) / 2 : item.y < 0, reach: Math.abs(y(0) - y(radius || domain[1] * 0.5)) };
         };

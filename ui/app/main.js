@@ -1,5 +1,5 @@
 // The shell: language, address, navigation, and what is said when something goes wrong.
-import { html, render, useState, useEffect, useRef, useCallback, Component } from './lib.js';
+import { html, render, useState, useEffect, useLayoutEffect, useRef, useCallback, Component } from './lib.js';
 import { t, speak, language, languages, languageChanged } from './text.js';
 import * as api from './api.js';
 import { Room } from './room.js';
@@ -119,7 +119,7 @@ function Header({ page, calculators, running, models, known }) {
   const [open, setOpen] = useState(false);
   const menu = useRef(null);
   useEffect(() => { setOpen(false); }, [page]);
-  useEffect(() => {
+  useLayoutEffect(() => {
     if (!open) return undefined;
     const leave = event => { if (!menu.current?.contains(event.target)) setOpen(false); };
     const key = event => { if (event.key === 'Escape') { setOpen(false); menu.current?.querySelector('button')?.focus(); } };

@@ -26,7 +26,7 @@ function usePictureHeight(panels) {
     addEventListener('resize', change);
     return () => removeEventListener('resize', change);
   }, []);
-  const around = size[0] > 860 ? 330 : 290;
+  const around = size[0] <= 860 ? 290 : size[1] < 700 ? 220 : 330;
   return Math.round(Math.max(240, Math.min(size[1] - around - 34 * panels, 900)));
 }
 
@@ -135,7 +135,8 @@ function flat(schema, value, root, path = [], out = [], names = []) {
   const whole = resolve(schema || {}, root);
   if (value === null || value === undefined || Array.isArray(value)) return out;
   if (typeof value === 'object') {
-    const shape = whole.oneOf ? whole.oneOf.map(form => resolve(form, root)).find(form => Object.keys(value).every(name => form.properties?.[name])) || whole : whole;
+    const forms = whole.oneOf || whole.anyOf;
+    const shape = forms?.map(form => resolve(form, root)).find(form => Object.keys(value).every(name => form.properties?.[name])) || whole;
     for (const [name, part] of Object.entries(value)) flat(shape.properties?.[name], part, root, [...path, name], out, [...names, labelOf(name, resolve(shape.properties?.[name] || {}, root))]);
     return out;
   }

@@ -35,7 +35,8 @@ export function aired(span, spacing, share = 0.06) {
     const ratio = Math.max(high / low, 1.2) ** share;
     return [low / ratio, high * ratio];
   }
-  if (low === high) {
+  // Less than the numbers' own rounding is no span.
+  if (high - low <= 1e-9 * Math.max(Math.abs(low), Math.abs(high))) {
     const half = Math.abs(low) * 0.1 || 1;
     return [low - half, high + half];
   }

@@ -111,7 +111,8 @@ fn outline(job: &Job, outcome: &Outcome, height: f64) -> Panel {
                 let glyph = if Some(i) == tail { Glyph::CentreRight } else { Glyph::CentreLeft };
                 Item::Glyph { glyph, x: z_mm, y: 0.0 }
             }
-            Support::Chuck { z_mm, .. } => Item::Glyph { glyph: Glyph::Chuck, x: z_mm, y: radius_at(z_mm) },
+            // It grips the part on both sides of the axis.
+            Support::Chuck { z_mm, .. } => Item::Glyph { glyph: Glyph::Chuck, x: z_mm, y: 0.0 },
             Support::SteadyRest { z_mm, .. } => Item::Glyph { glyph: Glyph::SteadyRest, x: z_mm, y: radius_at(z_mm) },
             Support::FollowRest { offset_mm, .. } => {
                 let z = tool_z + offset_mm;

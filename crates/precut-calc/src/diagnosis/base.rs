@@ -95,7 +95,9 @@ impl<M: Diagnosable> Bound<M> {
             let hypothesis = &self.hypotheses.applicable[setting.hypothesis];
             let sizes = hypothesis.variables.iter().zip(&setting.values);
             hypothesis.has_amplitude()
-                && sizes.into_iter().all(|(v, value)| !matches!(v.treatment, Treatment::Amplitude { .. }) || value.abs() < f64::MIN_POSITIVE)
+                && sizes.into_iter().all(|(v, value)| {
+                    !matches!(v.treatment, Treatment::Amplitude { .. }) || value.abs() < f64::MIN_POSITIVE
+                })
         };
         if !settings.iter().all(absent) {
             return self.coarsely(settings);
@@ -163,6 +165,14 @@ where
 
     fn predict(&self, settings: &[Setting]) -> Result<Vec<Prediction>, Failure> {
         Ok(self.in_unit(M::predict(&self.prepared, &self.effects_of(settings)?)?))
+    }
+
+    fn predict_coarsely(&self, settings: &[Setting]) -> Result<Vec<Prediction>, Failure> {
+        self.centre(settings)
+    }
+
+    fn expansions(&self, hypothesis: usize) -> Vec<f64> {
+        M::expansions(&self.prepared, &self.hypotheses.applicable[hypothesis])
     }
 
     fn jacobian(&self, settings: &[Setting], of: &[(usize, usize)]) -> Result<Vec<JacobianColumn>, Failure> {

@@ -151,14 +151,7 @@ fn clean_um(rig: &Rig, hidden: &[Scaled], angles: &[f64]) -> Option<Vec<f64>> {
 
 /// The size at which the root mean square of the signature is as asked for, to a few percent: by bisection, since most
 /// effects are far from linear. `None` where the cause cannot be seen on this ring.
-fn scaled(
-    cause: Size,
-    rig: &Rig,
-    base: &[f64],
-    angles: &[f64],
-    rms_um: f64,
-    random: &mut Random,
-) -> Option<Scaled> {
+fn scaled(cause: Size, rig: &Rig, base: &[f64], angles: &[f64], rms_um: f64, random: &mut Random) -> Option<Scaled> {
     let sign = if cause.two_sided { random.sign() } else { 1.0 };
     let form = [random.uniform(0.0, 1.0), random.uniform(0.0, 1.0), random.uniform(0.0, 1.0)];
     let at = |size: f64| Scaled { cause, size: sign * size, form };
