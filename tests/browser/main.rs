@@ -8,6 +8,7 @@
 mod access;
 mod assets;
 mod chromium;
+mod diagnosis;
 mod jobs;
 mod rooms;
 mod screenshots;

@@ -27,7 +27,7 @@ class Context {
 export const fieldId = path => `field${pointer(path).replace(/[^A-Za-z0-9_]/g, '-')}`;
 
 /** The form of a job. `errors` are those of a problem document; `libraries` the choices of `x-library` fields. */
-export function Form({ schema, value, filled, onChange, errors, libraries, models, examples, disabled }) {
+export function Form({ calculator, schema, value, filled, onChange, errors, libraries, models, examples, disabled }) {
   const [help, setHelp] = useState(null);
   const root = schema;
   const byPointer = useMemo(() => {
@@ -35,7 +35,9 @@ export function Form({ schema, value, filled, onChange, errors, libraries, model
     for (const error of errors || []) map.set(error.pointer, [...(map.get(error.pointer) || []), error]);
     return map;
   }, [errors]);
-  const context = new Context({ root, filled, errors: byPointer, libraries, models, setHelp, disabled, set: (path, part, how) => onChange(changed(value, path, part), how) });
+  // Models extend the jobs of one calculator: of the one whose job stands in this one, if there is such.
+  const owner = typeof value.calculator === 'string' ? value.calculator : calculator;
+  const context = new Context({ root, filled, errors: byPointer, libraries, models: (models || []).filter(model => model.calculator === owner), setHelp, disabled, set: (path, part, how) => onChange(changed(value, path, part), how) });
   const whole = resolve(schema, root);
   // A family of jobs, told apart by one field.
   const family = kindOf(whole) === 'choice' ? variants(whole, root) : null;
@@ -189,7 +191,7 @@ function Field(props) {
   const { name, schema, path, value, required, context } = props;
   const kind = kindOf(schema);
   if (schema['x-library'] === 'materials' && context.libraries?.materials) return html`<${Row} ...${props} control=${Library} />`;
-  if (name === 'model' && path.length === 1 && context.models) return html`<${Row} ...${props} control=${ModelChoice} />`;
+  if (name === 'model' && kind === 'string' && context.models.length + (value ? 1 : 0) > 0) return html`<${Row} ...${props} control=${ModelChoice} />`;
   if (kind === 'number') return html`<${Row} ...${props} control=${NumberInput} />`;
   if (kind === 'string') return html`<${Row} ...${props} control=${TextInput} />`;
   if (kind === 'enum') return html`<${Row} ...${props} control=${Enum} />`;
