@@ -113,11 +113,27 @@ step_scripts() {
   find . -path ./target -prune -o -name '*.sh' -print0 | xargs -0 shellcheck .ci/run
 }
 
+postgres_installed() { [ -n "$(find /usr/lib/postgresql -path '*/bin/initdb' 2>/dev/null)" ] || command -v initdb >/dev/null; }
+
 step_test() {
+  local folder port
   # The documentation's commands are run as they stand; without curl its test fails, the others run.
   (need curl curl) || true
   # So is the workbench in a browser; without one its tests say so and pass, in CI they fail.
   (need chromium chromium) || true
+  # The tests of the store run over a PostgreSQL, too, and those of many processes start and break one of their own.
+  # Debian's package starts a server by itself where it may: that one is not touched.
+  if postgres_installed || (packages postgresql); then
+    folder=$(mktemp -d /tmp/precut-postgres.XXXXXX)
+    # shellcheck disable=SC2064 # the folder as it is now
+    trap "tests/tools/postgres.sh remove '$folder'" EXIT
+    need python3 python3
+    port=$(python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])')
+    PRECUT_TEST_POSTGRES=$(tests/tools/postgres.sh start "$folder" "$port")
+    export PRECUT_TEST_POSTGRES
+  elif [ "${CI:-}" = true ]; then
+    absent postgresql
+  fi
   cargo test --workspace --locked
 }
 
@@ -143,7 +159,8 @@ step_dockerfile() {
   local tools
   tools=$(python_tools)
   "$tools/hadolint" docker/Dockerfile
-  "$tools/python" -c 'import sys, yaml; yaml.safe_load(sys.stdin)["services"]["precut"]' <docker/compose.yaml
+  "$tools/python" -c 'import sys, yaml; services = yaml.safe_load(sys.stdin)["services"]; services["precut"]; services["worker"]' \
+    <docker/compose.yaml
 }
 
 step_attack() {

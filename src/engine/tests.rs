@@ -359,11 +359,11 @@ fn what_the_calculators_utter_has_a_text_and_their_examples_run() {
     }
 }
 
-/// Names that the user gave (`job`) stay as they are.
-fn in_its_language(language: Language, said: &str, job: &str) {
+/// Names that the job or the library gives (`names`) stay as they are.
+fn in_its_language(language: Language, said: &str, names: &str) {
     if language != Language::En {
         let mut english = complete::english_in(said);
-        english.retain(|word| !job.contains(word));
+        english.retain(|word| !names.contains(word));
         assert!(english.is_empty(), "{english:?} in {said:?}");
     }
 }
@@ -390,17 +390,18 @@ fn conforms(registry: &Registry, entry: &Entry) {
         let computed = ready.prepared.run(&Unwatched, &mut Vec::new()).unwrap();
         let input = ready.prepared.input().unwrap();
         assert_eq!(ready.canonical, serde_json_canonicalizer::to_vec(&input).unwrap());
+        let names = input.to_string();
         for message in &computed.explanation {
             for language in Language::ALL {
                 let said = texts.try_word(language, "explanation", message.code, &message.values).unwrap();
-                in_its_language(language, &said, example.job);
+                in_its_language(language, &said, &names);
             }
             assert!(meta.codes.contains(message.code), "{} utters the undeclared {}", meta.id, message.code);
         }
         for warning in &computed.warnings {
             for language in Language::ALL {
                 let said = texts.try_finding(language, "warning", warning).unwrap();
-                in_its_language(language, &said, example.job);
+                in_its_language(language, &said, &names);
             }
             assert!(meta.codes.contains(warning.code), "{} utters the undeclared {}", meta.id, warning.code);
         }

@@ -15,7 +15,7 @@ use axum::body::{Body, HttpBody as _};
 use axum::extract::{Request, State};
 use axum::http::header::{
     ACCEPT_ENCODING, ALLOW, CACHE_CONTROL, CONTENT_ENCODING, CONTENT_LANGUAGE, CONTENT_LENGTH, CONTENT_LOCATION,
-    CONTENT_SECURITY_POLICY, CONTENT_TYPE, ETAG, REFERRER_POLICY, WWW_AUTHENTICATE, X_CONTENT_TYPE_OPTIONS,
+    CONTENT_SECURITY_POLICY, CONTENT_TYPE, ETAG, REFERRER_POLICY, VARY, WWW_AUTHENTICATE, X_CONTENT_TYPE_OPTIONS,
 };
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode};
 use axum::middleware::Next;
@@ -210,6 +210,7 @@ fn worded(mut response: Response, method: &Method, language: Language, id: &Head
     head.headers.remove(CONTENT_LENGTH);
     head.headers.insert(CONTENT_TYPE, HeaderValue::from_static("application/problem+json"));
     head.headers.insert(CONTENT_LANGUAGE, HeaderValue::from_static(language.tag()));
+    head.headers.insert(VARY, HeaderValue::from_static("Accept-Language, Accept-Encoding"));
     head.headers.insert(CACHE_CONTROL, HeaderValue::from_static("no-store"));
     tracing::debug!(code = problem.code(), detail = document.detail, "problem");
     Response::from_parts(head, Body::from(body))

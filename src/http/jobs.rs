@@ -1,7 +1,7 @@
 //! Jobs: listed, watched, cancelled, and their results.
 
 use axum::extract::{Path, Query, State};
-use axum::http::header::{CACHE_CONTROL, CONTENT_LANGUAGE, CONTENT_TYPE, HeaderValue, LOCATION, RETRY_AFTER};
+use axum::http::header::{CACHE_CONTROL, CONTENT_LANGUAGE, CONTENT_TYPE, HeaderValue, LOCATION, RETRY_AFTER, VARY};
 use axum::http::{HeaderMap, StatusCode, Uri};
 use axum::response::Response;
 use serde::{Deserialize, Serialize};
@@ -191,6 +191,7 @@ fn answered(job: &Job, status: StatusCode, language: Language) -> Response {
     let headers = response.headers_mut();
     headers.insert(CONTENT_TYPE, HeaderValue::from_static("application/json"));
     headers.insert(CONTENT_LANGUAGE, HeaderValue::from_static(language.tag()));
+    headers.insert(VARY, HeaderValue::from_static("Accept-Language, Accept-Encoding"));
     headers.insert(CACHE_CONTROL, HeaderValue::from_static("no-store"));
     if !job.record.state.is_final() {
         headers.insert(RETRY_AFTER, HeaderValue::from(job.retry_after().as_secs().max(1)));
@@ -258,6 +259,7 @@ pub(super) async fn list(State(app): State<App>, uri: Uri, headers: HeaderMap) -
     let headers = response.headers_mut();
     headers.insert(CONTENT_TYPE, HeaderValue::from_static("application/json"));
     headers.insert(CONTENT_LANGUAGE, HeaderValue::from_static(language.tag()));
+    headers.insert(VARY, HeaderValue::from_static("Accept-Language, Accept-Encoding"));
     headers.insert(CACHE_CONTROL, HeaderValue::from_static("no-store"));
     Ok(response)
 }

@@ -192,6 +192,7 @@ fn recorder() -> &'static PrometheusHandle {
         );
         metrics::describe_gauge!("http_requests_in_flight", "Requests in work.");
         metrics::describe_counter!("precut_answers_total", "Answers by calculator, from the cache (hit) or not.");
+        metrics::describe_counter!("precut_results_evicted_total", "Kept results forgotten to make room.");
         metrics::describe_counter!("precut_cache_hits_total", "Answers found, by tier: in memory or in the store.");
         metrics::describe_counter!(
             "precut_calculations_total",
@@ -213,6 +214,10 @@ fn recorder() -> &'static PrometheusHandle {
             "Time that a job's computation took, by calculator."
         );
         metrics::describe_gauge!("precut_jobs", "Jobs by state: queued, running.");
+        metrics::describe_counter!(
+            "precut_jobs_helped_total",
+            "Times that this process computed parts of a job that another one runs."
+        );
         metrics::describe_counter!("precut_queue_full_total", "Jobs refused because too many waited.");
         metrics::describe_counter!("precut_jobs_poisonous_total", "Jobs given up: they ended the process each time.");
         metrics::describe_gauge!("precut_build_info", "Always 1; the version is its label.");

@@ -11,6 +11,8 @@ pub mod sqlite;
 mod sqlite_jobs;
 mod sqlite_models;
 mod sqlite_studies;
+#[cfg(test)]
+mod suite;
 mod writer;
 
 use std::fmt;

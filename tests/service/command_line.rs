@@ -15,12 +15,17 @@ fn run(arguments: &[&str], input: &str) -> Output {
 
 /// The shipped binary.
 fn precut(arguments: &[&str]) -> Output {
+    feed_precut(arguments, "")
+}
+
+/// The same with something to read.
+fn feed_precut(arguments: &[&str], input: &str) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_precut"));
     command.args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped());
     for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("PRECUT_")) {
         command.env_remove(name);
     }
-    feed(command, "")
+    feed(command, input)
 }
 
 fn feed(mut command: Command, input: &str) -> Output {
@@ -197,4 +202,18 @@ fn a_reader_that_leaves_early_is_no_panic() {
     let output = child.wait_with_output().unwrap();
     assert!(output.status.success(), "{output:?}");
     assert!(output.stderr.is_empty(), "{output:?}");
+}
+
+#[test]
+fn the_command_line_speaks_the_language_asked_for() {
+    let list = precut(&["list", "--lang", "ru"]);
+    assert!(said(&list).contains("Куда должен идти инструмент"), "{}", said(&list));
+    let schema: Value = serde_json::from_str(&said(&precut(&["schema", "ring-roundness", "--lang", "ru"]))).unwrap();
+    assert_eq!(schema["properties"]["ring"]["title"], "Кольцо");
+    let bad = feed_precut(&["check", "--lang", "ru"], r#"{"calculator": "ring-roundness", "job": {}}"#);
+    assert_eq!(bad.status.code(), Some(2));
+    assert_eq!(complaint(&bad)["title"], "Задание составлено с ошибками");
+    let unknown = precut(&["list", "--lang", "fi"]);
+    assert_eq!(unknown.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&unknown.stderr).contains("en, ru"));
 }

@@ -79,6 +79,7 @@ async fn faults_are_said_in_the_language_of_the_request() {
     let bad = r#"{"cut": {"feed_mm_per_rev": 900.5}}"#;
     let response = server.post_to(ROOM, bad).header("accept-language", "ru").send().await.unwrap();
     assert_eq!(header(&response, "content-language"), "ru");
+    assert_eq!(header(&response, "vary"), "Accept-Language, Accept-Encoding");
     let document = problem(response, 422, "invalid_job").await;
     assert_eq!(document["title"], "Задание составлено с ошибками");
     let errors = document["errors"].as_array().unwrap();

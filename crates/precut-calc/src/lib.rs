@@ -24,7 +24,7 @@ use calculator::Registrar;
 /// the calculator `diagnosis`.
 pub fn register(registrar: &mut impl Registrar) {
     registrar.diagnosable::<deflection_compensation::DeflectionCompensation>();
-    registrar.with_forward_model::<ring_roundness::RingRoundness>();
+    registrar.diagnosable::<ring_roundness::RingRoundness>();
     registrar.calculator::<ring_roundness::evaluation::RoundnessEvaluation>();
     registrar.with_forward_model::<feed_schedule::FeedSchedule>();
     registrar.calculator::<feed_schedule::fit::MachinabilityFit>();

@@ -53,9 +53,17 @@ fn answer(trial: &Trial) -> Said {
             };
             causes.iter().map(each).collect::<Vec<_>>().join(" + ")
         };
-        println!("truth {:?} sigma {:.2} found {:.2} -> {verdict}", trial.truth.causes, trial.sigma, result.noise.standard_deviation);
+        println!(
+            "truth {:?} sigma {:.2} found {:.2} -> {verdict}",
+            trial.truth.causes, trial.sigma, result.noise.standard_deviation
+        );
         for set in result.sets.iter().take(4) {
-            println!("     {:.2e} {} {}", set.posterior, if set.with_remainder { "+rest" } else { "" }, names(&set.causes));
+            println!(
+                "     {:.2e} {} {}",
+                set.posterior,
+                if set.with_remainder { "+rest" } else { "" },
+                names(&set.causes)
+            );
         }
     }
     let first = result.sets.iter().find(|set| !set.causes.is_empty() && !set.with_remainder);

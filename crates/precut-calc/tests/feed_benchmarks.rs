@@ -1,9 +1,7 @@
 //! Published turning benchmarks, solved: the comparison tables of the documentation, and that each optimum is one.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
-mod feed_support;
-
-use feed_support::{near, of_zone, reference, solved, translate};
+use crate::feed_support::{near, of_zone, reference, solved, translate};
 use precut_calc::num::gp::{self, Affines, Objective, Program, Settings};
 use serde_json::{Value, json};
 

@@ -1,9 +1,7 @@
 //! The source paper's method and claims on a realistic gas-turbine shaft: what can be had, and what it costs in time.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
-mod feed_support;
-
-use feed_support::{reference, solved, translate};
+use crate::feed_support::{reference, solved, translate};
 use precut_calc::feed_schedule::Outcome;
 use serde_json::{Value, json};
 

@@ -1,9 +1,8 @@
 //! Effects on machinability models: the exact terms, what a schedule makes of them, and measured examples.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
-mod feed_support;
-
-use feed_support::{near, solve, solved};
+use crate::feed_support;
+use crate::feed_support::{near, solve, solved};
 use precut_calc::calculator::{Check, ForwardModel, Rows, Unwatched, Violations};
 use precut_calc::effects::{MACHINABILITY_CAUSES, MachinabilityEffect};
 use precut_calc::feed_schedule::{FeedSchedule, Job, MachinabilityPoint, MachinabilityRun};

@@ -1,9 +1,8 @@
 //! What every schedule must keep: optimality, prices, invariances.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
-mod feed_support;
-
-use feed_support::{multipliers, near, reference, solve, solved, translate};
+use crate::feed_support;
+use crate::feed_support::{multipliers, near, reference, solve, solved, translate};
 use precut_calc::feed_schedule::geometric_program;
 use precut_calc::num::gp::{self, Settings};
 use rand::{RngExt, SeedableRng};

@@ -1,12 +1,10 @@
 //! What a lobe diagram shows while it is computed, and how soon it stops when nobody waits.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::float_cmp, missing_docs)]
 
-mod fixture_support;
-
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use fixture_support::{checked, reference_job, with};
+use crate::fixture_support::{checked, reference_job, with};
 use precut_calc::calculator::{Calculator, Failure, Figure, Item, Message, Monitor};
 use precut_calc::fixture_stability::{FixtureJob, FixtureStability};
 use serde_json::json;

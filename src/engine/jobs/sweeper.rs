@@ -18,6 +18,8 @@ const COUNT: u64 = 5;
 const FORGET: u64 = 60;
 /// A deadline is looked for at least so often, whatever the clock does meanwhile.
 const LONGEST_SLEEP: Duration = Duration::from_mins(1);
+/// The same where another process may have accepted the job and died since.
+const LONGEST_SLEEP_SHARED: Duration = Duration::from_secs(5);
 
 pub(super) async fn run(engine: Weak<Inner>) {
     let mut beat = tokio::time::interval(BEAT);
@@ -84,11 +86,12 @@ async fn deadlines(engine: &Arc<Inner>) -> Duration {
     let jobs = &engine.jobs;
     let outcome = jobs.store.expire_deadlines(fault::written(&Error::DeadlineExceeded)).await;
     let Some((late, next)) = report("deadline", outcome) else { return BEAT };
+    let longest = if jobs.store.is_shared() { LONGEST_SLEEP_SHARED } else { LONGEST_SLEEP };
     jobs.computations.cancel(&late.unwanted);
     jobs.feeds.touch(&late.jobs);
     let wait = next.map(|at| u64::try_from(at.saturating_sub(jobs.store.now_ms())).unwrap_or(0));
     // At least a millisecond later: the clock counts whole ones.
-    wait.map_or(LONGEST_SLEEP, |ms| Duration::from_millis(ms + 1)).min(LONGEST_SLEEP)
+    wait.map_or(longest, |ms| Duration::from_millis(ms + 1)).min(longest)
 }
 
 fn report<T>(operation: &'static str, outcome: Result<T, crate::store::StoreError>) -> Option<T> {

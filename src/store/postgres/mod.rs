@@ -17,6 +17,8 @@ mod results;
 mod run;
 mod start;
 mod studies;
+#[cfg(test)]
+mod tests;
 mod writer;
 
 use std::time::Duration;

@@ -100,7 +100,7 @@ pub(super) async fn finish(
     let ended: Vec<String> = sqlx::query_scalar(
         "UPDATE precut.jobs
          SET state = $2, problem = $3, progress = CASE WHEN $2 = 'succeeded' THEN 1.0 ELSE progress END, stage = NULL,
-             lease = NULL, heartbeat_ms = NULL, finished_ms = $4, expires_ms = $4 + $5, key = coalesce($6, key)
+             lease = NULL, heartbeat_ms = NULL, finished_ms = $4, expires_ms = $4::bigint + $5, key = coalesce($6, key)
          WHERE lease = $1 AND state = 'running' RETURNING id",
     )
     .bind(lease.to_string())
@@ -175,7 +175,7 @@ pub(super) async fn cancel(connection: &mut PgConnection, id: JobId, keep_ms: i6
     }
     sqlx::query(
         "UPDATE precut.jobs SET state = 'cancelled', lease = NULL, heartbeat_ms = NULL, stage = NULL, finished_ms = $2,
-             expires_ms = $2 + $3 WHERE id = $1 AND state IN ('queued', 'running')",
+             expires_ms = $2::bigint + $3 WHERE id = $1 AND state IN ('queued', 'running')",
     )
     .bind(id.to_string())
     .bind(now)

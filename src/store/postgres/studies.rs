@@ -87,6 +87,12 @@ impl PostgresStore {
         })
     }
 
+    /// The parts that are said to be held.
+    #[cfg(test)]
+    pub(super) fn held_parts(&self) -> MutexGuard<'_, HashSet<(Key, u32)>> {
+        self.held.parts()
+    }
+
     pub(super) fn give_back(&self, study: Key, shard: u32) {
         if !self.held.parts().remove(&(study, shard)) {
             return;

@@ -37,6 +37,12 @@ pub trait Diagnosable:
     /// range, or started afresh. None where a job has no runs.
     fn next_runs(job: &Self::Job, rows: &Rows<Self::Run, Self::Point>) -> Vec<NextRun<Self::Run, Self::Point>>;
 
+    /// Values of a hypothesis' first size about which the model is linearised, too, beside 0: where what the size does is
+    /// far from proportional to it.
+    fn expansions(_prepared: &Self::Prepared, _hypothesis: &Hypothesis) -> Vec<f64> {
+        Vec::new()
+    }
+
     /// The prediction as divided differences need it: where a prediction is dear, with coarser numerics, whose own error
     /// cancels in a difference.
     fn predict_coarsely(prepared: &Self::Prepared, effects: &[Self::Effect]) -> Result<Vec<Prediction>, Failure> {

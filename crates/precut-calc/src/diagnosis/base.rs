@@ -167,6 +167,14 @@ where
         Ok(self.in_unit(M::predict(&self.prepared, &self.effects_of(settings)?)?))
     }
 
+    fn predict_coarsely(&self, settings: &[Setting]) -> Result<Vec<Prediction>, Failure> {
+        self.centre(settings)
+    }
+
+    fn expansions(&self, hypothesis: usize) -> Vec<f64> {
+        M::expansions(&self.prepared, &self.hypotheses.applicable[hypothesis])
+    }
+
     fn jacobian(&self, settings: &[Setting], of: &[(usize, usize)]) -> Result<Vec<JacobianColumn>, Failure> {
         let middle = if self.dear && !of.is_empty() { Some(self.centre(settings)?) } else { None };
         of.par_iter().map(|&place| self.slope(settings, place, middle.as_deref())).collect()

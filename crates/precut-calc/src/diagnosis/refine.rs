@@ -11,6 +11,8 @@ use crate::calculator::{Failure, Hypothesis, Shape, Treatment, Variable};
 const STEPS: usize = 4;
 /// Steps where shapes are free too.
 const STEPS_WITH_SHAPES: usize = 6;
+/// Steps where the model is far from linear.
+const STEPS_NONLINEAR: usize = 8;
 /// Longest step, prior standard deviations.
 const LONGEST_STEP: f64 = 2.0;
 /// A step shorter than this changes nothing that is reported: a hundredth of a prior standard deviation,
@@ -92,6 +94,8 @@ pub(super) struct Refinement<'a> {
     pub(super) keep: &'a [bool],
     pub(super) whitener: &'a Whitener,
     pub(super) scale: Scale,
+    /// Whether the model is far from linear in its sizes.
+    pub(super) nonlinear: bool,
 }
 
 impl Refinement<'_> {
@@ -113,7 +117,13 @@ impl Refinement<'_> {
             })
             .collect();
         let with_shapes = coordinates.iter().any(|c| matches!(c, Coordinate::Shape(_)));
-        let most = if with_shapes { STEPS_WITH_SHAPES } else { STEPS };
+        let most = if self.nonlinear {
+            STEPS_NONLINEAR
+        } else if with_shapes {
+            STEPS_WITH_SHAPES
+        } else {
+            STEPS
+        };
         let mut settings = start;
         let mut step = 0;
         loop {

@@ -342,13 +342,27 @@ fn refusal(accept: bool, foundation: &Foundation<'_>, weighing: &Weighing<'_>) -
     if predicted < LEAST_PREDICTED * count {
         return Some(Refusal { reason: "base_fails".to_owned(), factor: None, fitted_factor: None, rows_needed: None });
     }
-    let suspected = suspected_factor(&foundation.data.value, &foundation.base, &weighing.keep).filter(|_| !accept);
+    let suspected = suspected_factor(&foundation.data.value, &foundation.base, &weighing.keep)
+        .filter(|suspected| !accept && !explained_better(foundation, weighing, suspected));
     suspected.map(|SuspectedFactor { factor, fitted, .. }| Refusal {
         reason: "unit_suspected".to_owned(),
         factor: Some(factor),
         fitted_factor: Some(fitted),
         rows_needed: None,
     })
+}
+
+/// Whether causes leave less than half of what the factor leaves: then the rows are in the right unit. A wrong unit that
+/// causes imitate leaves as little with the factor as with them.
+fn explained_better(foundation: &Foundation<'_>, weighing: &Weighing<'_>, suspected: &SuspectedFactor) -> bool {
+    let Some(set) = weighing.named_sets().next() else { return false };
+    let Ok(with) = foundation.subject.predict(&set.settings) else { return false };
+    let kept: Vec<usize> = (0..with.len()).filter(|&row| weighing.keep[row]).collect();
+    let value = |row: usize| foundation.data.value[row];
+    let mean = kept.iter().map(|&row| value(row)).sum::<f64>() / kept.len().max(1) as f64;
+    let whole: f64 = kept.iter().map(|&row| (value(row) - mean).powi(2)).sum();
+    let left: f64 = kept.iter().map(|&row| with[row].map_or(f64::INFINITY, |f| (value(row) - f).powi(2))).sum();
+    left < 0.5 * (1.0 - suspected.explained) * whole
 }
 
 fn warnings(

@@ -16,14 +16,15 @@ const VISIBLE: f64 = 0.05;
 /// Prior weights of none, one, two, three causes together.
 const PRIOR: [f64; 4] = [0.5, 0.38, 0.10, 0.02];
 
-/// A hypothesis at one point of the grid of its shapes.
+/// A hypothesis at one point of the grid of its shapes, linearised about one size.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Variant {
-    /// Values with every amplitude at 0.
+    /// Values with every amplitude at 0, or where it is linearised.
     pub(super) setting: Setting,
     /// Its amplitudes: index of the variable, prior standard deviation, side, column among all.
     pub(super) amplitudes: Vec<Amplitude>,
-    /// Column of what it does without an amplitude of its own.
+    /// Column of what it does without an amplitude of its own, or of what a straight line through the place of its
+    /// linearisation does at 0.
     offset: Option<usize>,
 }
 
@@ -37,8 +38,10 @@ pub(super) struct Amplitude {
 
 /// Signatures of a hypothesis before they are whitened: what a fold can use again.
 pub(super) struct Signatures {
-    /// Variants of every hypothesis.
+    /// Variants of every hypothesis; the points of its grid first.
     variants: Vec<Vec<Variant>>,
+    /// How many of them are points of its grid.
+    grid_points: Vec<usize>,
     /// Columns at one prior standard deviation.
     columns: Vec<Vec<f64>>,
 }
@@ -46,16 +49,54 @@ pub(super) struct Signatures {
 impl Signatures {
     /// One Jacobian column for every amplitude at every point of the grids.
     pub(super) fn of(subject: &dyn Subject, base: &[f64], monitor: &dyn Monitor) -> Result<Self, Failure> {
-        let mut signatures = Self { variants: Vec::new(), columns: Vec::new() };
+        let mut signatures = Self { variants: Vec::new(), grid_points: Vec::new(), columns: Vec::new() };
         for (index, hypothesis) in subject.hypotheses().iter().enumerate() {
             checkpoint(monitor)?;
             let mut variants = Vec::new();
-            for values in grid(hypothesis) {
-                variants.push(signatures.variant(subject, base, Setting { hypothesis: index, values })?);
+            let grid = grid(hypothesis);
+            let size = hypothesis.variables.iter().position(|v| matches!(v.treatment, Treatment::Amplitude { .. }));
+            for values in &grid {
+                let setting = Setting { hypothesis: index, values: values.clone() };
+                variants.push(signatures.variant(subject, base, setting)?);
+            }
+            for (value, values) in subject.expansions(index).into_iter().flat_map(|v| grid.iter().map(move |g| (v, g)))
+            {
+                checkpoint(monitor)?;
+                let Some(size) = size else { break };
+                let mut values = values.clone();
+                values[size] = value;
+                variants.extend(signatures.expansion(subject, Setting { hypothesis: index, values })?);
             }
             signatures.variants.push(variants);
+            signatures.grid_points.push(grid.len());
         }
         Ok(signatures)
+    }
+
+    /// Linearised about a size: f(theta) = f(0) + (f(theta_0) - f(0) - J theta_0) + J theta. `None` where the model has no
+    /// value there.
+    fn expansion(&mut self, subject: &dyn Subject, setting: Setting) -> Result<Option<Variant>, Failure> {
+        let (without, with) =
+            (subject.predict_coarsely(&[])?, subject.predict_coarsely(std::slice::from_ref(&setting))?);
+        let change: Option<Vec<f64>> = with
+            .iter()
+            .zip(&without)
+            .map(|(with, without)| match (with, without) {
+                (Ok(with), Ok(without)) => Some(with - without),
+                (Err(_), Ok(_)) => None,
+                _ => Some(0.0),
+            })
+            .collect();
+        let Some(mut offset) = change else { return Ok(None) };
+        let values = setting.values.clone();
+        let mut variant = self.variant(subject, &[], setting)?;
+        for amplitude in &variant.amplitudes {
+            let t = values[amplitude.variable] / amplitude.prior_sd;
+            offset.iter_mut().zip(&self.columns[amplitude.column]).for_each(|(o, c)| *o -= c * t);
+        }
+        self.columns.push(offset);
+        variant.offset = Some(self.columns.len() - 1);
+        Ok(Some(variant))
     }
 
     fn variant(&mut self, subject: &dyn Subject, base: &[f64], setting: Setting) -> Result<Variant, Failure> {
@@ -124,6 +165,8 @@ pub(super) struct Candidate {
     pub(super) members: Vec<usize>,
     /// Evidence, averaged over the grids.
     pub(super) log_z: f64,
+    /// Evidence at the best point of the grids.
+    pub(super) best_log_z: f64,
     pub(super) log_prior: f64,
     /// The best point of the grids: variant of every member.
     pub(super) variants: Vec<usize>,
@@ -169,7 +212,7 @@ impl<'a> Linear<'a> {
 
     /// Whether a hypothesis has a single form.
     pub(super) fn has_no_grid(&self, hypothesis: usize) -> bool {
-        self.signatures.variants[hypothesis].len() == 1
+        self.signatures.grid_points[hypothesis] == 1
     }
 
     /// Whether a shape of one of these hypotheses may leave its grid.
@@ -182,11 +225,8 @@ impl<'a> Linear<'a> {
 
     /// Cosine of the angle between the signatures of two hypotheses with one amplitude and no grid.
     pub(super) fn alike(&self, a: usize, b: usize) -> Option<f64> {
-        let column = |h: usize| match self.signatures.variants[h].as_slice() {
-            [variant] => match variant.amplitudes.as_slice() {
-                [amplitude] => Some(amplitude.column),
-                _ => None,
-            },
+        let column = |h: usize| match self.signatures.variants[h][0].amplitudes.as_slice() {
+            [amplitude] if self.has_no_grid(h) => Some(amplitude.column),
             _ => None,
         };
         let (a, b) = (column(a)?, column(b)?);
@@ -247,7 +287,15 @@ impl<'a> Linear<'a> {
         let best = (0..found.len()).rev().max_by(|&a, &b| all[a].total_cmp(&all[b]))?;
         let spread = if found.len() > 1 { self.spread(&members, &found, best) } else { Vec::new() };
         let (variants, evidence) = found.swap_remove(best);
-        Some(Candidate { members, log_z: log_mean_exp(&all), log_prior, variants, t: evidence.t, spread })
+        Some(Candidate {
+            members,
+            log_z: log_mean_exp(&all),
+            best_log_z: evidence.log_z,
+            log_prior,
+            variants,
+            t: evidence.t,
+            spread,
+        })
     }
 
     fn spread(&self, members: &[usize], found: &[(Vec<usize>, Evidence)], best: usize) -> Vec<Vec<f64>> {

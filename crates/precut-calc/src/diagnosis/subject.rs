@@ -11,6 +11,16 @@ pub trait Subject: Sync {
     /// where the quantity is logarithmic).
     fn predict(&self, effects: &[Setting]) -> Result<Vec<Prediction>, Failure>;
 
+    /// The same with the numerics of divided differences.
+    fn predict_coarsely(&self, effects: &[Setting]) -> Result<Vec<Prediction>, Failure> {
+        self.predict(effects)
+    }
+
+    /// Values of a hypothesis' first size about which the model is linearised, too, beside 0.
+    fn expansions(&self, _hypothesis: usize) -> Vec<f64> {
+        Vec::new()
+    }
+
     /// d predict / d variable: one column per entry of `of`, which names an entry of `effects` and one of its variables.
     fn jacobian(&self, effects: &[Setting], of: &[(usize, usize)]) -> Result<Vec<JacobianColumn>, Failure>;
 

@@ -43,22 +43,32 @@ pub struct Effort {
     pub rounds: usize,
     /// See `rounds`.
     pub late_leaders: usize,
+    /// Whether the model is far from linear in its sizes: then a refinement takes more steps, and what it changes at
+    /// the best point of a grid corrects the whole grid.
+    pub nonlinear: bool,
 }
 
 impl Effort {
     /// The whole search.
     pub fn full(most_causes: usize) -> Self {
-        Self { most_causes, leaders: LEADERS, of_each_size: [0; 4], rounds: 1, late_leaders: LATE_LEADERS }
+        Self {
+            most_causes,
+            leaders: LEADERS,
+            of_each_size: [0; 4],
+            rounds: 1,
+            late_leaders: LATE_LEADERS,
+            nonlinear: false,
+        }
     }
 
     /// Where every prediction is a simulation: fewer sets.
     pub fn dear(most_causes: usize) -> Self {
-        Self { most_causes, leaders: 1, of_each_size: [0, 4, 2, 1], rounds: 3, late_leaders: 2 }
+        Self { most_causes, leaders: 1, of_each_size: [0, 4, 2, 1], rounds: 3, late_leaders: 2, nonlinear: true }
     }
 
     /// The same in a fold.
     pub fn dear_fold(most_causes: usize) -> Self {
-        Self { most_causes, leaders: 1, of_each_size: [0, 2, 1, 0], rounds: 1, late_leaders: 1 }
+        Self { most_causes, leaders: 1, of_each_size: [0, 2, 1, 0], rounds: 1, late_leaders: 1, nonlinear: true }
     }
 }
 
@@ -129,7 +139,14 @@ impl<'a> Weighing<'a> {
         let scale = Scale::of(&noise);
         let linear = Linear::new(subject.hypotheses(), signatures, &whitener, residual, scale);
         let candidates = linear.search(effort.most_causes, monitor)?;
-        let refinement = Refinement { subject: *subject, value: &data.value, keep: &keep, whitener: &whitener, scale };
+        let refinement = Refinement {
+            subject: *subject,
+            value: &data.value,
+            keep: &keep,
+            whitener: &whitener,
+            scale,
+            nonlinear: effort.nonlinear,
+        };
         let mut ranking = Ranking { candidates, fits: Vec::new() };
         ranking.refine(&linear, &refinement, effort.leaders, effort.of_each_size, monitor)?;
         for _ in 0..effort.rounds {
@@ -220,6 +237,8 @@ impl Ranking {
                 None => refinement.fit(start, false)?.inspect(|plain| {
                     if candidate.members.iter().all(|&h| linear.has_no_grid(h)) {
                         candidate.log_z = plain.log_z;
+                    } else if refinement.nonlinear {
+                        candidate.log_z += plain.log_z - candidate.best_log_z;
                     }
                 }),
             };

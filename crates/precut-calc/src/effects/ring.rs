@@ -181,8 +181,7 @@ const PHASES: &[f64] = &[0.0, std::f64::consts::FRAC_PI_2];
 /// Orders of a wave of the blank that are tried.
 const ORDERS: &[f64] = &[2.0, 3.0, 4.0, 5.0, 6.0];
 /// Ratios of ring to roller that are tried first.
-const RATIOS: &[f64] =
-    &[2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0, 5.5, 6.0, 6.5, 7.0, 7.5, 8.0, 8.5, 9.0, 9.5, 10.0, 10.5, 11.0, 11.5, 12.0];
+const RATIOS: &[f64] = &[2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0];
 /// Orders of chatter that are tried.
 const WAVES: &[f64] = &[
     8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0, 17.0, 18.0, 19.0, 20.0, 21.0, 22.0, 23.0, 24.0, 25.0, 26.0,

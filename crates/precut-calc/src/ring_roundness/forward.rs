@@ -13,7 +13,7 @@ use crate::calculator::{
 use crate::effects::{Cause, RING_CAUSES, RingEffect};
 
 use super::RingRoundness;
-use super::hypotheses::{design, effects, hypotheses};
+use super::hypotheses::{design, effects, expansions, hypotheses};
 use super::input::{Job, Method};
 use super::measurement::RingMeasurement;
 use super::next_runs::next_runs;
@@ -270,6 +270,10 @@ impl Diagnosable for RingRoundness {
 
     fn next_runs(job: &Job, rows: &Rows<RingRun, RingPoint>) -> Vec<NextRun<RingRun, RingPoint>> {
         next_runs(job, rows)
+    }
+
+    fn expansions(_prepared: &PreparedRing, hypothesis: &Hypothesis) -> Vec<f64> {
+        expansions(hypothesis)
     }
 
     fn predict_coarsely(prepared: &PreparedRing, effects: &[RingEffect]) -> Result<Vec<Prediction>, Failure> {

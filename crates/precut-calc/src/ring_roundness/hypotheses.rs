@@ -3,8 +3,9 @@
 use std::f64::consts::TAU;
 
 use super::input::Job;
+use super::scene::Scene;
 use crate::calculator::{
-    Design, Hypotheses, Hypothesis, Inapplicability, Inapplicable, Range, Shape, Smooth, Treatment, Variable,
+    Design, Hypotheses, Hypothesis, Inapplicability, Inapplicable, Range, Smooth, Treatment, Variable,
 };
 use crate::effects::{Cause, Fit, Parameter, RING_CAUSES, RingEffect};
 
@@ -12,10 +13,13 @@ use crate::effects::{Cause, Fit, Parameter, RING_CAUSES, RingEffect};
 const BLOCK_DEG: f64 = 30.0;
 /// Folds that the blocks go to by turns.
 const FOLDS: usize = 4;
-/// Spread of the ratio of ring to roller where the roller's radius is stated, relative: the ring shrinks under it.
-const KNOWN_RATIO_SD: f64 = 0.01;
-/// Mean and spread of the logarithm of that ratio where nothing is known of the roller.
-const UNKNOWN_RATIO: (f64, f64) = (5.0, 0.6);
+/// Steps between two whole ratios of ring to roller, where nothing is known of the roller.
+const PARTS_OF_A_RATIO: u32 = 2;
+/// Sizes about which a displacement or a slip is linearised, prior standard deviations: from one to the next the teeth that
+/// the feed leaves move by a part of their width, and a signature is another one after a few of these steps.
+const EXPANSION_STEP: f64 = 0.2;
+/// How many of them to either side: three prior standard deviations.
+const EXPANSIONS: u32 = 15;
 
 /// The catalogue, sorted by whether traces of these rings can speak about a cause.
 ///
@@ -109,22 +113,23 @@ fn quadratures(cause: &Cause) -> Vec<Variable> {
         .collect()
 }
 
-/// Of the stated roller the ratio is known but for what is cut off the ring; else it is looked for.
+/// Of a stated roller the ratio is known, that of the finished ring; else it is looked for.
 fn ratio(cause: &Cause, rings: &[&Job]) -> Treatment {
-    let known = rings.first().and_then(|job| {
-        let roller = job.supports.roller_radius_mm;
-        super::check::mean_radius_mm(job).filter(|_| roller > 0.0).map(|radius| radius / roller)
+    let known = rings.first().filter(|job| job.supports.roller_radius_mm > 0.0).and_then(|job| {
+        let end = Scene::of(job, &job.effects).end()?;
+        Some(end.radius_mm / job.supports.roller_radius_mm)
     });
-    match known {
-        Some(ratio) => Treatment::Shape {
-            grid: vec![ratio],
-            prior: Some(Shape { mean: ratio.ln(), sd: KNOWN_RATIO_SD, logarithmic: true }),
-        },
-        None => Treatment::Shape {
-            grid: grid_of(cause, "ratio").to_vec(),
-            prior: Some(Shape { mean: UNKNOWN_RATIO.0.ln(), sd: UNKNOWN_RATIO.1, logarithmic: true }),
-        },
-    }
+    let grid = known.map_or_else(|| finer(grid_of(cause, "ratio")), |ratio| vec![ratio]);
+    Treatment::Shape { grid, prior: None }
+}
+
+/// A grid with its steps divided.
+fn finer(grid: &[f64]) -> Vec<f64> {
+    let parts = f64::from(PARTS_OF_A_RATIO);
+    let between = grid.windows(2).flat_map(|pair| {
+        (0..PARTS_OF_A_RATIO).map(move |part| pair[0] + (pair[1] - pair[0]) * f64::from(part) / parts)
+    });
+    between.chain(grid.last().copied()).collect()
 }
 
 fn variable(parameter: &Parameter, treatment: Treatment) -> Variable {
@@ -141,6 +146,19 @@ fn grid_of(cause: &Cause, name: &str) -> &'static [f64] {
     match parameter(cause, name).fit {
         Fit::Shape { grid } => grid,
         _ => &[],
+    }
+}
+
+/// Sizes about which a hypothesis is linearised beside 0.
+pub(super) fn expansions(hypothesis: &Hypothesis) -> Vec<f64> {
+    match (hypothesis.cause.kind, hypothesis.variables.as_slice()) {
+        (
+            "tool_off_line" | "support_position" | "work_slip",
+            [Variable { treatment: Treatment::Amplitude { prior_sd }, .. }],
+        ) => {
+            (1..=EXPANSIONS).map(|k| EXPANSION_STEP * f64::from(k) * prior_sd).flat_map(|size| [size, -size]).collect()
+        }
+        _ => Vec::new(),
     }
 }
 

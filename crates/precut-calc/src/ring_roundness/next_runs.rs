@@ -12,7 +12,7 @@ const TOOL_MOVED: f64 = 0.01;
 const ANGLES: u32 = 180;
 
 /// Another ring with one setting of the machine changed: no spark-out and a longer one, half the feed over twice the
-/// revolutions, the tool moved to either side.
+/// revolutions, the tool moved across its own direction to either side.
 pub(super) fn next_runs(job: &Job, rows: &Rows<RingRun, RingPoint>) -> Vec<NextRun<RingRun, RingPoint>> {
     let typical = rows.runs.first().cloned().unwrap_or_default();
     let points: Vec<RingPoint> =
@@ -34,8 +34,10 @@ pub(super) fn next_runs(job: &Job, rows: &Rows<RingRun, RingPoint>) -> Vec<NextR
         },
     );
     let aside = TOOL_MOVED * super::check::mean_radius_mm(job).unwrap_or(0.0);
-    for x_mm in [tool.x_mm - aside, tool.x_mm + aside] {
-        add("tool_x_mm", RingRun { tool_x_mm: Some(x_mm), ..typical.clone() });
+    let reach = tool.x_mm.hypot(tool.y_mm).max(f64::MIN_POSITIVE);
+    for share in [-aside / reach, aside / reach] {
+        let (x_mm, y_mm) = (tool.x_mm - share * tool.y_mm, tool.y_mm + share * tool.x_mm);
+        add("tool_x_mm", RingRun { tool_x_mm: Some(x_mm), tool_y_mm: Some(y_mm), ..typical.clone() });
     }
     next
 }

@@ -18,17 +18,17 @@ const fn size(kind: &'static str, most: f64, two_sided: bool) -> Size {
     Size { kind, most, two_sided }
 }
 
-/// Causes of the catalogue.
+/// Causes of the catalogue, up to what a workshop would still believe.
 pub(crate) const CAUSES: &[Size] = &[
-    size("initial_harmonic", 0.2, false),
-    size("tool_off_line", 4.0, true),
-    size("support_position", 4.0, true),
-    size("support_wear", 8.0, false),
-    size("roller_runout", 0.05, false),
-    size("tool_push_off", 3.0, false),
+    size("initial_harmonic", 0.06, false),
+    size("tool_off_line", 1.5, true),
+    size("support_position", 1.5, true),
+    size("support_wear", 1.0, false),
+    size("roller_runout", 0.02, false),
+    size("tool_push_off", 1.0, false),
     size("spark_out_missing", 1.0, false),
-    size("chatter_harmonic", 0.02, true),
-    size("work_slip", 6.0, true),
+    size("chatter_harmonic", 0.008, true),
+    size("work_slip", 2.0, true),
 ];
 
 /// Errors that no catalogue holds.

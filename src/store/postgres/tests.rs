@@ -1,0 +1,401 @@
+//! The suite over a real PostgreSQL, and what only such a store has. `PRECUT_TEST_POSTGRES` names a server on which
+//! databases may be made; without it these tests say so and pass, where nothing may be left out they fail.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use std::str::FromStr;
+use std::sync::Arc;
+use std::time::Duration;
+
+use sqlx::postgres::{PgConnectOptions, PgPool};
+use tokio::sync::{OnceCell, mpsc};
+
+use super::*;
+use crate::store::address::StoreAddress;
+use crate::store::jobs::{
+    Accepted, Beat, Changed, Claimed, Ending, JobId, JobState, JobStore, Lease, NewJob, News,
+};
+use crate::store::suite::{MOST, PROBLEM, Place, job, keep, key, result, suite};
+use crate::store::{ResultStore, Store, Taken};
+
+const SERVER: &str = "PRECUT_TEST_POSTGRES";
+/// Tests that do not look at waiting do not wait.
+const AT_ONCE: Patience =
+    Patience { start: Duration::from_secs(5), lease: Duration::from_secs(4), grace: Duration::ZERO, lost: Duration::ZERO };
+
+fn server() -> Option<String> {
+    std::env::var(SERVER).ok()
+}
+
+/// A database of its own on the server.
+struct InDatabase {
+    store: PostgresStore,
+    name: String,
+    keep: Keep,
+    runtime_pool: PgPool,
+}
+
+fn secret(database: &str) -> Secret {
+    let server = server().unwrap();
+    let (address, query) = server.split_once('?').map_or((server.as_str(), ""), |(address, query)| (address, query));
+    let start = address.rsplit_once('/').unwrap().0;
+    match format!("{start}/{database}?{query}").parse().unwrap() {
+        StoreAddress::Postgres(secret) => secret,
+        StoreAddress::Sqlite => panic!("{SERVER} is no PostgreSQL"),
+    }
+}
+
+async fn pool(database: &str) -> PgPool {
+    PgPool::connect_with(PgConnectOptions::from_str(secret(database).reveal()).unwrap()).await.unwrap()
+}
+
+/// A database whose tables are made once: a copy of it is quicker than making them again.
+async fn template() -> &'static str {
+    static TEMPLATE: OnceCell<String> = OnceCell::const_new();
+    TEMPLATE
+        .get_or_init(|| async {
+            let name = format!("precut_template_{}", std::process::id());
+            create(&name, "template0").await;
+            let pool = start::connected(&secret(&name), &usage(keep(Duration::from_hours(1)))).await.unwrap();
+            pool.close().await;
+            name
+        })
+        .await
+}
+
+async fn create(name: &str, template: &str) {
+    let server = pool("postgres").await;
+    let statement = format!("CREATE DATABASE {name} TEMPLATE {template}");
+    // Two copies of one template at once are refused.
+    for _ in 0..200 {
+        match sqlx::query(sqlx::AssertSqlSafe(statement.clone())).execute(&server).await {
+            Ok(_) => return server.close().await,
+            Err(_) => tokio::time::sleep(Duration::from_millis(25)).await,
+        }
+    }
+    panic!("{statement}");
+}
+
+fn usage(keep: Keep) -> Use {
+    Use { keep, connections: 4, patience: AT_ONCE, engine: "0.1.0".to_owned() }
+}
+
+impl InDatabase {
+    fn is_there() -> bool {
+        if server().is_some() {
+            return true;
+        }
+        assert!(std::env::var("CI").as_deref() != Ok("true"), "{SERVER} names no PostgreSQL");
+        eprintln!("NOT TESTED: no PostgreSQL ({SERVER}); ./test.sh starts one");
+        false
+    }
+
+    async fn open(name: String, keep: Keep, usage: Use) -> Self {
+        let store = PostgresStore::open(&secret(&name), usage).await.unwrap();
+        let runtime_pool = pool(&name).await;
+        Self { store, name, keep, runtime_pool }
+    }
+
+    /// Another process with the same database.
+    async fn other(&self) -> PostgresStore {
+        PostgresStore::open(&secret(&self.name), usage(self.keep)).await.unwrap()
+    }
+
+    async fn execute(&self, statement: &'static str) {
+        sqlx::query(statement).execute(&self.runtime_pool).await.unwrap();
+    }
+}
+
+impl Place for InDatabase {
+    async fn with(keep: Keep) -> Self {
+        let name = format!("precut_test_{}", uuid::Uuid::now_v7().simple());
+        create(&name, template().await).await;
+        Self::open(name, keep, usage(keep)).await
+    }
+
+    fn store(&self) -> &dyn Store {
+        &self.store
+    }
+
+    async fn again_with(self, keep: Keep) -> Self {
+        let Self { store, name, runtime_pool, .. } = self;
+        store.close().await;
+        runtime_pool.close().await;
+        drop(store);
+        let place = Self::open(name, keep, usage(keep)).await;
+        // What is done at the start of the only process is done here when its leases have run out.
+        place.silence().await;
+        place.store.sweep(Arc::new(Vec::new)).await.unwrap();
+        place
+    }
+
+    async fn line(&self) -> Vec<JobId> {
+        let messages: Vec<Vec<u8>> = sqlx::query_scalar(
+            "SELECT job FROM apalis.jobs WHERE status = 'Pending' ORDER BY priority DESC, run_at ASC, id ASC",
+        )
+        .fetch_all(&self.runtime_pool)
+        .await
+        .unwrap();
+        let mut line: Vec<JobId> = messages
+            .iter()
+            .map(|message| serde_json::from_slice::<String>(message).unwrap().parse().unwrap())
+            .collect();
+        // A job that was taken without its task, as tests do, has an old task and a new one.
+        let mut seen = std::collections::HashSet::new();
+        line.reverse();
+        line.retain(|id| seen.insert(*id));
+        line.reverse();
+        line
+    }
+
+    async fn lose_task(&self, id: JobId) {
+        sqlx::query("DELETE FROM apalis.jobs WHERE idempotency_key LIKE $1")
+            .bind(format!("{id}:%"))
+            .execute(&self.runtime_pool)
+            .await
+            .unwrap();
+    }
+
+    async fn silence(&self) {
+        self.execute("UPDATE precut.jobs SET heartbeat_ms = heartbeat_ms - 100000").await;
+        self.execute("UPDATE precut.studies SET beat_ms = beat_ms - 100000").await;
+    }
+
+    async fn damage(&self) {
+        self.execute("UPDATE precut.results SET version = 4").await;
+    }
+}
+
+suite!(InDatabase);
+
+/// What only several processes meet.
+macro_rules! shared {
+    ($($(#[$about:meta])* async fn $test:ident() $body:block)+) => {
+        $(
+            $(#[$about])*
+            #[tokio::test]
+            async fn $test() {
+                if InDatabase::is_there() $body
+            }
+        )+
+    };
+}
+
+shared! {
+    async fn a_computation_that_says_it_lives_is_left_to_its_process() {
+        let place = InDatabase::new().await;
+        let other = place.other().await;
+        let id = place.accept(job(1)).await.id;
+        let claim = place.run(id).await;
+        // The other process knows nothing of the lease but what stands in the record.
+        assert_eq!(other.sweep(Arc::new(Vec::new)).await.unwrap(), []);
+        place.silence().await;
+        let beat = Beat { lease: claim.lease, progress: 0.5, stage: None };
+        assert_eq!(place.store.beat(vec![beat]).await.unwrap(), []);
+        assert_eq!(other.sweep(Arc::new(Vec::new)).await.unwrap(), []);
+        assert_eq!(other.job(id).await.unwrap().unwrap().progress.to_bits(), 0.5_f64.to_bits());
+        place.silence().await;
+        assert_eq!(other.sweep(Arc::new(Vec::new)).await.unwrap(), [id]);
+    }
+
+    async fn nobody_is_taken_for_dead_just_after_the_database_has_started() {
+        let place = InDatabase::new().await;
+        let patience = Patience { grace: Duration::from_hours(1_000_000), ..AT_ONCE };
+        let usage = Use { patience, ..usage(place.keep) };
+        let other = PostgresStore::open(&secret(&place.name), usage).await.unwrap();
+        let id = place.accept(job(1)).await.id;
+        place.run(id).await;
+        place.silence().await;
+        assert_eq!(other.sweep(Arc::new(Vec::new)).await.unwrap(), []);
+        assert_eq!(place.store.sweep(Arc::new(Vec::new)).await.unwrap(), [id]);
+    }
+
+    async fn a_claim_whose_answer_was_lost_is_answered_again() {
+        let place = InDatabase::new().await;
+        let id = place.accept(job(1)).await.id;
+        let lease = Lease::new();
+        for _ in 0..2 {
+            let Claimed::Run(claim) = place.store.claim(id, lease, MOST, PROBLEM.to_owned()).await.unwrap() else {
+                panic!("it is ours")
+            };
+            assert_eq!((claim.jobs.as_slice(), claim.attempt), (&[id][..], 1));
+            assert_eq!(claim.input, "{\"number\":1}");
+        }
+    }
+
+    async fn what_happens_in_one_process_is_told_to_the_other() {
+        let place = InDatabase::new().await;
+        let other = place.other().await;
+        let (sender, mut heard) = mpsc::unbounded_channel();
+        other.tell(Arc::new(move |news| drop(sender.send(news))));
+        // It listens from some moment on.
+        let mut next = async |wanted: &dyn Fn(&Changed) -> bool| loop {
+            let news = tokio::time::timeout(Duration::from_secs(10), heard.recv()).await;
+            match news.expect("news within ten seconds").expect("the store lives") {
+                News::Changed(changed) if wanted(&changed) => return changed,
+                _ => {}
+            }
+        };
+        let mut told = 0;
+        while told == 0 {
+            let id = place.accept(job(100)).await.id;
+            let cancelled = place.store.cancel(id).await.unwrap().unwrap();
+            assert_eq!(cancelled.job.state, JobState::Cancelled);
+            tokio::time::sleep(Duration::from_millis(20)).await;
+            told += usize::from(tokio::time::timeout(Duration::from_millis(200), next(&|_| true)).await.is_ok());
+        }
+        let id = place.accept(job(1)).await.id;
+        let claim = place.run(id).await;
+        next(&|changed| changed.jobs == [id]).await;
+        place.store.cancel(id).await.unwrap();
+        next(&|changed| changed.unwanted == [claim.lease]).await;
+    }
+
+    async fn equal_jobs_that_come_and_end_at_once_are_lost_nowhere() {
+        let place = InDatabase::new().await;
+        let other = place.other().await;
+        for round in 0..20 {
+            let first = place.accept(job(round)).await.id;
+            let claim = place.run(first).await;
+            let ending = Ending::Succeeded(result(round));
+            let late = job(round);
+            let id = late.id;
+            let (ended, accepted) = tokio::join!(place.store.finish(claim.lease, ending), other.submit(late, 100));
+            let (ended, Accepted::New(_)) = (ended.unwrap(), accepted.unwrap()) else { panic!("accepted") };
+            let state = place.record(id).await.state;
+            // It ended with the other, or it waits by itself: nothing between.
+            assert_eq!(state == JobState::Succeeded, ended.contains(&id), "round {round}: {state:?}");
+            assert!(matches!(state, JobState::Succeeded | JobState::Queued), "round {round}: {state:?}");
+        }
+    }
+
+    async fn times_are_those_of_the_database_whatever_this_machine_says() {
+        let place = InDatabase::new().await;
+        let before = place.store.now_ms();
+        for skew_ms in [-600_000, 600_000] {
+            place.store.clock.skew(skew_ms);
+            place.store.sweep(Arc::new(Vec::new)).await.unwrap();
+            assert!((place.store.now_ms() - before).abs() < 60_000, "{}", place.store.now_ms() - before);
+            let due = NewJob { deadline_ms: Some(place.store.now_ms() + 60_000), ..job(1) };
+            let accepted = place.accept(due).await;
+            assert!((accepted.created_ms - before).abs() < 60_000);
+            assert_eq!(place.line().await.len(), 1, "a task is not held back by the clock of whoever pushes it");
+            let (changed, next) = place.store.expire_deadlines(PROBLEM.to_owned()).await.unwrap();
+            assert_eq!(changed, Changed::default());
+            assert!(next.is_some_and(|next| (next - before - 60_000).abs() < 60_000));
+            let claim = place.run(accepted.id).await;
+            assert_eq!(place.store.sweep(Arc::new(Vec::new)).await.unwrap(), [], "nor is a lease shorter for it");
+            place.store.finish(claim.lease, Ending::Failed("{}".to_owned())).await.unwrap();
+            place.lose_task(accepted.id).await;
+        }
+    }
+
+    async fn parts_of_a_study_are_handed_out_once_and_again_when_their_holder_is_silent() {
+        let place = InDatabase::new().await;
+        let other = place.other().await;
+        let study = key(1);
+        let take = async |store: &PostgresStore| store.take_shard(study, 4).await.unwrap();
+        assert_eq!(take(&place.store).await, Taken::Shard(0));
+        assert_eq!(take(&other).await, Taken::Shard(1));
+        place.store.put_shard(study, 0, "zero".into()).await.unwrap();
+        assert_eq!(take(&place.store).await, Taken::Shard(2));
+        assert_eq!(take(&other).await, Taken::Shard(3));
+        assert_eq!(take(&place.store).await, Taken::NoneLeft);
+        // What is given back is there at once.
+        place.store.give_shard_back(study, 2);
+        let mut again = Taken::NoneLeft;
+        for _ in 0..100 {
+            again = take(&other).await;
+            if again != Taken::NoneLeft {
+                break;
+            }
+            tokio::time::sleep(Duration::from_millis(20)).await;
+        }
+        assert_eq!(again, Taken::Shard(2));
+        // The other is stopped, its parts are given away, and what it puts down afterwards counts for nothing.
+        let parts = std::mem::take(&mut *other.held_parts());
+        place.silence().await;
+        assert_eq!(take(&place.store).await, Taken::Shard(1));
+        other.held_parts().extend(parts);
+        other.put_shard(study, 1, "late".into()).await.unwrap();
+        assert_eq!(place.store.shards(study).await.unwrap(), [(0, "zero".into())]);
+        place.store.put_shard(study, 1, "one".into()).await.unwrap();
+        other.put_shard(study, 1, "later".into()).await.unwrap();
+        assert_eq!(place.store.shards(study).await.unwrap(), [(0, "zero".into()), (1, "one".into())]);
+    }
+
+    async fn jobs_of_an_earlier_version_are_taken_over_when_it_has_no_workers() {
+        let place = InDatabase::new().await;
+        let newer = Use { engine: "0.2.0".to_owned(), ..usage(place.keep) };
+        let newer = PostgresStore::open(&secret(&place.name), newer).await.unwrap();
+        let old = place.accept(job(1)).await.id;
+        let Accepted::New(new) = newer.submit(job(2), 100).await.unwrap() else { panic!("accepted") };
+        let queue_of = async |id: JobId| -> Vec<String> {
+            sqlx::query_scalar("SELECT job_type FROM apalis.jobs WHERE idempotency_key LIKE $1 ORDER BY job_type")
+                .bind(format!("{id}:%"))
+                .fetch_all(&place.runtime_pool)
+                .await
+                .unwrap()
+        };
+        assert_eq!((queue_of(old).await, queue_of(new.id).await), (vec!["precut/0.1.0".into()], vec!["precut/0.2.0".into()]));
+        // Nobody works yet: everything stays where it is, whoever looks.
+        newer.sweep(Arc::new(Vec::new)).await.unwrap();
+        place.store.sweep(Arc::new(Vec::new)).await.unwrap();
+        assert_eq!(queue_of(old).await, ["precut/0.1.0"]);
+        let worker = async |engine: &str| {
+            sqlx::query("INSERT INTO apalis.workers (id, worker_type, storage_name) VALUES ($1, $1, 'test')")
+                .bind(queue::name(engine))
+                .execute(&place.runtime_pool)
+                .await
+                .unwrap();
+        };
+        worker("0.1.0").await;
+        place.store.sweep(Arc::new(Vec::new)).await.unwrap();
+        assert_eq!(queue_of(new.id).await, ["precut/0.2.0"], "an old version takes no job of a new one");
+        worker("0.2.0").await;
+        newer.sweep(Arc::new(Vec::new)).await.unwrap();
+        assert_eq!(queue_of(old).await, ["precut/0.1.0"], "its own workers are there");
+        place.execute("DELETE FROM apalis.workers WHERE worker_type = 'precut/0.1.0'").await;
+        assert_eq!(newer.sweep(Arc::new(Vec::new)).await.unwrap(), [old]);
+        assert_eq!(queue_of(old).await, ["precut/0.1.0", "precut/0.2.0"]);
+    }
+
+    async fn a_newer_schema_is_refused_unless_it_says_that_it_serves_this_program() {
+        let place = InDatabase::new().await;
+        place.execute("ALTER TABLE precut.jobs ADD COLUMN future text NOT NULL DEFAULT 'later'").await;
+        place.execute("INSERT INTO precut.versions VALUES (2, 1)").await;
+        let beside = place.other().await;
+        let id = place.accept(job(1)).await.id;
+        assert_eq!(beside.job(id).await.unwrap().unwrap().id, id);
+        place.execute("INSERT INTO precut.versions VALUES (3, 2)").await;
+        let Err(refused) = PostgresStore::open(&secret(&place.name), usage(place.keep)).await else { panic!("opened") };
+        assert!(refused.to_string().contains("newer precut"), "{refused}");
+    }
+
+    async fn a_database_that_cannot_be_used_is_refused_without_a_word_of_its_credentials() {
+        let place = InDatabase::new().await;
+        let open = async |address: String, start_s: u64| {
+            let StoreAddress::Postgres(secret) = address.parse().unwrap() else { panic!("{address}") };
+            let patience = Patience { start: Duration::from_secs(start_s), ..AT_ONCE };
+            let begun = std::time::Instant::now();
+            let outcome = PostgresStore::open(&secret, Use { patience, ..usage(place.keep) }).await;
+            let Err(refused) = outcome else { panic!("opened") };
+            (refused.to_string(), begun.elapsed())
+        };
+        // Nobody listens on port 1.
+        let (refused, took) = open("postgres://anna:pa55w0rd@127.0.0.1:1/precut".to_owned(), 1).await;
+        assert!(refused.contains("does not answer") && took > Duration::from_secs(1), "{refused} {took:?}");
+        assert!(!refused.contains("anna") && !refused.contains("pa55w0rd"), "{refused}");
+        let there = secret("postgres").reveal().to_owned();
+        let host = there.rsplit('@').next().unwrap().split('/').next().unwrap().to_owned();
+        let (refused, _) = open(format!("postgres://anna:pa55w0rd@{host}/precut"), 1).await;
+        assert!(refused.contains("user name or the password"), "{refused}");
+        assert!(!refused.contains("anna") && !refused.contains("pa55w0rd"), "{refused}");
+        let (refused, _) = open(there.replace("/postgres?", "/no_such_database?"), 1).await;
+        assert!(refused.contains("no database of that name"), "{refused}");
+        let read_only = format!("{}&options[default_transaction_read_only]=on", secret(&place.name).reveal());
+        let (refused, _) = open(read_only, 1).await;
+        assert!(refused.contains("read-only"), "{refused}");
+        let (refused, _) = open("postgres://anna:pa55w0rd@host:port/x".to_owned(), 1).await;
+        assert!(refused.contains("not understood") && !refused.contains("pa55w0rd"), "{refused}");
+    }
+}

@@ -1,0 +1,156 @@
+//! The tests that every store has to pass, unchanged. A store comes with a [`Place`] and the line `suite!(Place);`.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+pub(in crate::store) mod jobs;
+pub(in crate::store) mod models;
+pub(in crate::store) mod results;
+
+use std::time::Duration;
+
+use crate::key::Key;
+use crate::store::jobs::{Accepted, Claim, Claimed, JobId, JobKind, JobRecord, Lease, NewJob, Priority};
+use crate::store::sqlite::Keep;
+use crate::store::{Cursor, KeptResult, ResultPage, ResultQuery, Store};
+
+pub(in crate::store) const MOST: u32 = 3;
+pub(in crate::store) const PROBLEM: &str = r#"{"kind":"deadline_exceeded"}"#;
+
+/// A store of its own for one test, and what a test cannot ask of a store.
+#[allow(async_fn_in_trait)] // nobody else implements it, and tests run on one thread
+pub(in crate::store) trait Place: Sized {
+    async fn with(keep: Keep) -> Self;
+    fn store(&self) -> &dyn Store;
+    /// As after the end of the process.
+    async fn again_with(self, keep: Keep) -> Self;
+    /// The jobs that the queue would hand out, in its order.
+    async fn line(&self) -> Vec<JobId>;
+    /// Takes the tasks of a job out of the queue.
+    async fn lose_task(&self, id: JobId);
+    /// From now on nobody has heard of any computation for long.
+    async fn silence(&self);
+    /// Changes the rows of kept results.
+    async fn damage(&self);
+
+    async fn new() -> Self {
+        Self::with(keep(Duration::from_hours(1))).await
+    }
+
+    async fn again(self) -> Self {
+        self.again_with(keep(Duration::from_hours(1))).await
+    }
+
+    async fn accept(&self, job: NewJob) -> JobRecord {
+        match self.store().submit(job, 100).await.unwrap() {
+            Accepted::New(record) => record,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    async fn record(&self, id: JobId) -> JobRecord {
+        self.store().job(id).await.unwrap().unwrap()
+    }
+
+    async fn claim(&self, id: JobId) -> Claimed {
+        self.store().claim(id, Lease::new(), MOST, PROBLEM.to_owned()).await.unwrap()
+    }
+
+    async fn run(&self, id: JobId) -> Claim {
+        match self.claim(id).await {
+            Claimed::Run(claim) => claim,
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+pub(in crate::store) fn keep(jobs: Duration) -> Keep {
+    Keep { bytes: 1 << 30, age: Duration::from_hours(1), jobs }
+}
+
+pub(in crate::store) fn key(number: u32) -> Key {
+    Key::from_bytes(blake3::hash(&number.to_le_bytes()).as_bytes()).unwrap()
+}
+
+pub(in crate::store) fn job(number: u32) -> NewJob {
+    NewJob {
+        id: JobId::new(),
+        kind: JobKind::Calculation,
+        calculator: "a".to_owned(),
+        version: 1,
+        key: key(number),
+        input: format!("{{\"number\":{number}}}").into(),
+        priority: Priority::Normal,
+        owner: "one".to_owned(),
+        idempotency: None,
+        estimate_ms: 10.0,
+        deadline_ms: None,
+        result: None,
+    }
+}
+
+pub(in crate::store) fn result(number: u32) -> KeptResult {
+    KeptResult {
+        key: key(number),
+        calculator: "a".to_owned(),
+        version: 1,
+        engine: "0".to_owned(),
+        input: "{}".into(),
+        body: format!("{{\"answer\":{number}}}").into(),
+    }
+}
+
+pub(in crate::store) async fn list(
+    store: &dyn Store,
+    calculator: Option<&str>,
+    limit: u32,
+    after: Option<Cursor>,
+) -> ResultPage {
+    let query = ResultQuery { calculator: calculator.map(str::to_owned), limit: Some(limit), after };
+    store.list(query).await.unwrap()
+}
+
+/// All of them for one store.
+macro_rules! suite {
+    ($place:ty) => {
+        suite! { $place, jobs:
+            a_job_goes_from_the_line_to_its_result
+            who_has_lost_the_lease_cannot_write
+            a_live_lease_is_left_alone
+            what_a_process_left_running_is_in_line_again_at_the_next_start
+            a_start_that_was_given_back_is_not_charged
+            equal_jobs_are_taken_together_and_end_together
+            a_job_whose_result_is_there_ends_where_it_begins
+            a_name_is_one_job_for_its_owner
+            a_full_queue_takes_no_more
+            the_line_is_fair_between_owners_and_keeps_priorities
+            deadlines_end_what_is_late_and_nothing_else
+            a_lost_task_is_given_again_and_no_other
+            what_a_kept_job_points_to_stays_and_what_is_expired_goes
+            timings_are_kept_newest_first
+            the_queue_hands_out_each_task_once_and_no_more_than_there_are_places
+        }
+        suite! { $place, models:
+            revisions_rise_and_are_never_given_twice
+        }
+        suite! { $place, results:
+            what_is_put_is_got_after_the_store_was_closed
+            what_is_too_much_to_wait_is_not_kept_and_does_no_harm
+            a_damaged_row_is_not_served_and_goes_away
+            the_list_is_paged_newest_first_and_filtered
+            the_total_stays_below_the_limit_and_the_last_used_stay
+            what_is_old_is_forgotten_at_the_next_start
+            parts_of_a_study_are_put_down_and_forgotten
+        }
+    };
+    ($place:ty, $part:ident: $($test:ident)+) => {
+        $(
+            #[tokio::test]
+            async fn $test() {
+                if <$place>::is_there() {
+                    crate::store::suite::$part::$test::<$place>().await;
+                }
+            }
+        )+
+    };
+}
+
+pub(in crate::store) use suite;

@@ -1,0 +1,132 @@
+//! What every store has to do with results and parts of studies.
+
+use std::time::Duration;
+
+use super::{Place, keep, list};
+use crate::key::Key;
+use crate::store::sqlite::Keep;
+use crate::store::{KeptResult, ResultPage};
+
+fn result(number: u32, calculator: &str) -> KeptResult {
+    let body: Vec<u8> =
+        (0..4000_u32).flat_map(|i| i.wrapping_mul(number).wrapping_mul(2_654_435_761).to_le_bytes()).collect();
+    KeptResult {
+        key: Key::from_bytes(blake3::hash(&number.to_le_bytes()).as_bytes()).unwrap(),
+        calculator: calculator.to_owned(),
+        version: 3,
+        engine: "0.0.0".to_owned(),
+        input: vec![b' '; 100].into(),
+        body: body.into(),
+    }
+}
+
+fn of_bytes(bytes: u64) -> Keep {
+    Keep { bytes, ..keep(Duration::from_hours(1)) }
+}
+
+pub(in crate::store) async fn what_is_put_is_got_after_the_store_was_closed<P: Place>() {
+    let kept = result(1, "a");
+    let first = P::new().await;
+    assert_eq!(first.store().get(kept.key).await.unwrap(), None);
+    first.store().put(kept.clone());
+    let second = first.again().await;
+    second.store().ping().await.unwrap();
+    assert_eq!(second.store().get(kept.key).await.unwrap(), Some(kept));
+}
+
+pub(in crate::store) async fn what_is_too_much_to_wait_is_not_kept_and_does_no_harm<P: Place>() {
+    let place = P::new().await;
+    let large = |number: u32| KeptResult { body: vec![b' '; 20 << 20].into(), ..result(number, "a") };
+    for number in 0..5 {
+        place.store().put(large(number));
+    }
+    assert_eq!(place.store().get(large(4).key).await.unwrap(), None);
+    assert_eq!(list(place.store(), None, 10, None).await.items.len(), 3);
+    place.store().put(large(4));
+    assert_eq!(list(place.store(), None, 10, None).await.items.len(), 4);
+    assert_eq!(place.store().get(large(4).key).await.unwrap(), Some(large(4)));
+}
+
+pub(in crate::store) async fn a_damaged_row_is_not_served_and_goes_away<P: Place>() {
+    let kept = result(1, "a");
+    let place = P::new().await;
+    place.store().put(kept.clone());
+    let place = place.again().await;
+    place.damage().await;
+    assert_eq!(place.store().get(kept.key).await.unwrap(), None);
+    assert_eq!(list(place.store(), None, 10, None).await.items, []);
+    // It can be kept again.
+    place.store().put(kept.clone());
+    assert_eq!(list(place.store(), None, 10, None).await.items.len(), 1);
+    assert_eq!(place.store().get(kept.key).await.unwrap(), Some(kept));
+}
+
+pub(in crate::store) async fn the_list_is_paged_newest_first_and_filtered<P: Place>() {
+    let place = P::new().await;
+    for number in 0..7 {
+        place.store().put(result(number, if number % 2 == 0 { "even" } else { "odd" }));
+        if number == 3 {
+            tokio::time::sleep(Duration::from_millis(5)).await;
+        }
+    }
+    let whole = list(place.store(), None, 100, None).await;
+    assert_eq!((whole.items.len(), whole.next), (7, None));
+    assert!(whole.items.is_sorted_by(|a, b| (a.created_ms, a.key) > (b.created_ms, b.key)));
+    let mut paged = Vec::new();
+    let mut after = None;
+    loop {
+        let page = list(place.store(), None, 3, after).await;
+        paged.extend(page.items);
+        after = page.next;
+        // A cursor goes through the text of an address.
+        let Some(cursor) = after else { break };
+        assert_eq!(cursor.to_string().parse(), Ok(cursor));
+    }
+    assert_eq!(paged, whole.items);
+    let odd = list(place.store(), Some("odd"), 2, None).await;
+    let rest = list(place.store(), Some("odd"), 2, odd.next).await;
+    assert_eq!((odd.items.len(), rest.items.len(), rest.next), (2, 1, None));
+    assert!(odd.items.iter().chain(&rest.items).all(|item| item.calculator == "odd"));
+    assert_eq!(list(place.store(), Some("none"), 2, None).await, ResultPage::default());
+}
+
+pub(in crate::store) async fn the_total_stays_below_the_limit_and_the_last_used_stay<P: Place>() {
+    let place = P::with(of_bytes(200_000)).await;
+    for number in 0..40 {
+        place.store().put(result(number, "a"));
+        tokio::time::sleep(Duration::from_millis(2)).await;
+        list(place.store(), None, 1, None).await;
+    }
+    // Another list: what came last was written before, and eviction follows the writing.
+    let items = list(place.store(), None, 500, None).await.items;
+    let total: u64 = items.iter().map(|item| item.bytes).sum();
+    assert!(total <= 220_000 && items.len() > 5, "{total} bytes in {}", items.len());
+    assert_eq!(place.store().get(result(0, "a").key).await.unwrap(), None);
+    assert_eq!(place.store().get(result(39, "a").key).await.unwrap(), Some(result(39, "a")));
+}
+
+pub(in crate::store) async fn what_is_old_is_forgotten_at_the_next_start<P: Place>() {
+    let first = P::new().await;
+    first.store().put(result(1, "a"));
+    tokio::time::sleep(Duration::from_millis(20)).await;
+    let second = first.again_with(Keep { age: Duration::from_millis(1), ..of_bytes(1 << 30) }).await;
+    tokio::time::sleep(Duration::from_millis(100)).await;
+    assert_eq!(list(second.store(), None, 10, None).await.items, []);
+    assert_eq!(second.store().get(result(1, "a").key).await.unwrap(), None);
+}
+
+pub(in crate::store) async fn parts_of_a_study_are_put_down_and_forgotten<P: Place>() {
+    let place = P::new().await;
+    let (study, other) = (super::key(1), super::key(2));
+    for (study, shard) in [(study, 3), (study, 0), (other, 1)] {
+        place.store().put_shard(study, shard, format!("part {shard}").into()).await.unwrap();
+    }
+    let expected = vec![(0, "part 0".into()), (3, "part 3".into())];
+    assert_eq!(place.store().shards(study).await.unwrap(), expected);
+    assert_eq!(place.store().some_shards(study, vec![1, 2, 3]).await.unwrap(), expected[1..]);
+    let place = place.again().await;
+    assert_eq!(place.store().shards(study).await.unwrap(), expected);
+    place.store().forget_shards(study).await.unwrap();
+    assert_eq!(place.store().shards(study).await.unwrap(), []);
+    assert_eq!(place.store().shards(other).await.unwrap().len(), 1);
+}

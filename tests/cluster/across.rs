@@ -1,0 +1,121 @@
+//! Any process answers for any job.
+
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+
+use crate::database::{Database, Member, PATIENCE, until};
+use crate::support::{header, toy};
+
+const BAR: &str = "/v1/sagging-bar";
+
+#[tokio::test]
+async fn any_api_answers_for_any_job_and_a_cancel_reaches_its_worker() {
+    let Some(database) = Database::start() else { return };
+    let one = Member::start(&database, "api", &[]).await;
+    let other = Member::start(&database, "api", &[]).await;
+    assert_eq!(toy::BAR, "sagging-bar");
+
+    // Accepted by one, and while nobody works, it waits.
+    let short = json!({"length_mm": 321, "load_n": 10, "duration_ms": 300});
+    let request = one.post(&short).header("idempotency-key", "the-same").header("prefer", "respond-async");
+    let response = request.send().await.unwrap();
+    let address = header(&response, "location").to_owned();
+    assert_eq!(response.status(), 202);
+    assert_eq!(other.job(&address).await["state"], "queued");
+    let worker = Member::start(&database, "worker", &[("PRECUT_JOBS_SLOTS", "2")]).await;
+    assert_eq!(worker.get(BAR).await.status(), 404, "a worker is asked how it is and nothing else");
+    other.job_in(&address, "succeeded").await;
+    let results = [one.get(&format!("{address}/result")).await, other.get(&format!("{address}/result")).await];
+    let mut bodies = Vec::new();
+    for result in results {
+        assert_eq!(result.status(), 200);
+        bodies.push(result.bytes().await.unwrap());
+    }
+    assert_eq!(bodies[0], bodies[1]);
+
+    // The same name is the same job, whoever is asked; another body under it is a fault.
+    let again = other.post(&short).header("idempotency-key", "the-same").header("prefer", "respond-async");
+    let again = again.send().await.unwrap();
+    assert_eq!((again.status().as_u16(), again.bytes().await.unwrap()), (200, bodies.remove(0)));
+    let another = json!({"length_mm": 322, "load_n": 10, "duration_ms": 300});
+    let reused = other.post(&another).header("idempotency-key", "the-same").send().await.unwrap();
+    assert_eq!(reused.status(), 422);
+
+    // What one has answered is a hit for the other.
+    let direct = json!({"length_mm": 400, "load_n": 10});
+    let miss = one.post(&direct).send().await.unwrap();
+    assert_eq!((miss.status().as_u16(), header(&miss, "precut-cache")), (200, "miss"));
+    until("the other to know the answer", async || {
+        let place = header(&miss, "content-location").to_owned();
+        (other.get(&place).await.status() == 200).then_some(())
+    })
+    .await;
+    assert_eq!(header(&other.post(&direct).send().await.unwrap(), "precut-cache"), "hit");
+
+    // A long one is watched at one process, computed by another and cancelled by a third.
+    let long = json!({"length_mm": 500, "load_n": 10, "duration_ms": 120_000});
+    let address = one.accepted(BAR, &long).await;
+    one.job_in(&address, "running").await;
+    let mut events = one.get(&format!("{address}/events")).await;
+    let (mut text, mut seen, begun) = (String::new(), 0, Instant::now());
+    while seen < 2 {
+        text += &String::from_utf8_lossy(&events.chunk().await.unwrap().unwrap());
+        seen = text.matches("event: progress").count();
+        assert!(begun.elapsed() < PATIENCE, "{text}");
+    }
+    let cancelled = Instant::now();
+    let response = other.client.delete(other.url(&address)).send().await.unwrap();
+    assert_eq!(response.status(), 202);
+    while !text.contains("event: done") {
+        text += &String::from_utf8_lossy(&events.chunk().await.unwrap().unwrap());
+    }
+    let told = cancelled.elapsed();
+    assert!(text.contains("\"state\":\"cancelled\""), "{text}");
+    // The worker has its place again as soon as it has given the job up.
+    let next = one.accepted(BAR, &json!({"length_mm": 501, "load_n": 10, "duration_ms": 1})).await;
+    one.job_in(&next, "succeeded").await;
+    until("the worker to give the job up", async || (worker.figure("precut_jobs_total{").await >= 3.0).then_some(())).await;
+    println!("cancel across processes: told after {told:.1?}, given up by its worker after {:.1?}", cancelled.elapsed());
+    for member in [one, other, worker] {
+        member.stop();
+    }
+}
+
+#[tokio::test]
+async fn the_database_restarts_under_load_and_nothing_is_lost() {
+    let Some(mut database) = Database::start() else { return };
+    let api = Member::start(&database, "api", &[]).await;
+    let worker = Member::start(&database, "worker", &[("PRECUT_JOBS_SLOTS", "2")]).await;
+    let mut addresses = Vec::new();
+    for number in 0..20 {
+        addresses.push(api.accepted(BAR, &json!({"length_mm": 100 + number, "load_n": 10, "duration_ms": 300})).await);
+    }
+    api.job_in(&addresses[1], "succeeded").await;
+    database.stop("immediate");
+    // Clients are told to come again, and nothing of what is ours has crashed.
+    let job = json!({"length_mm": 900, "load_n": 10, "duration_ms": 300});
+    let refused = api.post(&job).header("prefer", "respond-async").send().await.unwrap();
+    assert_eq!(refused.status(), 503);
+    assert!(!header(&refused, "retry-after").is_empty());
+    let problem: Value = refused.json().await.unwrap();
+    assert_eq!(problem["code"], "store_failed");
+    let refused = api.get(&addresses[5]).await;
+    assert_eq!((refused.status().as_u16(), header(&refused, "retry-after").is_empty()), (503, false));
+    assert_eq!(api.get("/health/live").await.status(), 200);
+    assert_eq!(api.get("/health/ready").await.status(), 503);
+    // What needs no database goes on.
+    assert_eq!(api.post(&json!({"length_mm": 77, "load_n": 10})).send().await.unwrap().status(), 200);
+    tokio::time::sleep(Duration::from_secs(1)).await;
+    let down = Instant::now();
+    database.run_again();
+    until("readiness", async || (api.get("/health/ready").await.status() == 200).then_some(())).await;
+    let ready = down.elapsed();
+    for address in &addresses {
+        let job = api.job_in(address, "succeeded").await;
+        assert_eq!(job["attempt"], 1, "nobody was taken for dead: {job}");
+    }
+    println!("after a restart of the database: ready after {ready:.1?}, all jobs done after {:.1?}", down.elapsed());
+    worker.stop();
+    api.stop();
+}

@@ -1,0 +1,23 @@
+//! Many processes over one PostgreSQL: real processes, real HTTP, a real database of their own that these tests start,
+//! stop and break.
+//!
+//! Each test prints its counts (`cargo test --test cluster -- --nocapture`). `PRECUT_RELIABILITY=N` makes the chaos N
+//! times as long. Without an installed PostgreSQL the tests say so and pass; where nothing may be left out (CI=true)
+//! they fail.
+
+#![cfg(unix)]
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, clippy::float_cmp, missing_docs, unreachable_pub)]
+
+#[path = "../support/mod.rs"]
+#[allow(dead_code)] // these tests start processes only
+mod support;
+
+#[path = "../reliability/dice.rs"]
+mod dice;
+
+mod across;
+mod chaos;
+mod database;
+mod process;
+mod start;
+mod studies;
