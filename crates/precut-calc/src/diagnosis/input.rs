@@ -20,7 +20,7 @@ pub struct DiagnosisJob<J: ToSchema, R: ToSchema, W: MeasuredRow, A: ToSchema> {
     #[schema(example = "deflection-compensation")]
     pub calculator: String,
     /// The base model: a complete job of that calculator. The diagnosis adds to the effects that it holds.
-    #[schema(inline)] // a type of many names: it is no component of its own
+    #[schema(inline)]
     pub job: J,
     /// Conditions of the runs that were measured; what a run leaves out is as in the job.
     #[serde(default = "Vec::new", skip_serializing_if = "Vec::is_empty")]
