@@ -80,8 +80,8 @@ export function Picture({ figure, pinned, height = 460, onPick, main }) {
   const full = useMemo(() => {
     const span = extent([...abscissae(figure), ...(pinned ? abscissae(pinned) : [])], figure.x.scale);
     const hasWide = figure.panels.some(panel => panel.items.some(item => item.kind === 'bars'));
-    const onlyPoints = figure.panels.every(panel => panel.items.every(item => item.kind === 'points' || item.kind === 'line'));
-    const scatter = onlyPoints && figure.panels.some(panel => panel.items.some(item => item.kind === 'points'));
+    const kinds = new Set(figure.panels.flatMap(panel => panel.items.map(item => item.kind)));
+    const scatter = kinds.has('points') && !kinds.has('outline') && !kinds.has('heat_map');
     return hasWide || scatter || !span || span[0] === span[1] ? aired(span, figure.x.scale, hasWide ? 0.03 : 0.04) : span;
   }, [figure, pinned]);
   const shown = view || full;

@@ -12,6 +12,17 @@ export function resolve(schema, root) {
       whole = { ...root.$defs[$ref.slice(REFERENCE.length)], ...own };
       continue;
     }
+    if (whole.allOf) {
+      // What is said beside a reference, or parts of one object.
+      const { allOf, ...own } = whole;
+      const joined = allOf.map(part => resolve(part, root));
+      whole = Object.assign({}, ...joined, own);
+      if (joined.length > 1) {
+        whole.properties = Object.assign({}, ...joined.map(part => part.properties || {}), own.properties || {});
+        whole.required = [...new Set([...joined, own].flatMap(part => part.required || []))];
+      }
+      continue;
+    }
     const choices = whole.oneOf || whole.anyOf;
     if (choices && choices.some(choice => choice.type === 'null')) {
       optional = true;
