@@ -60,7 +60,12 @@ fn joined(map: &Map<String, Value>, components: &Components) -> Option<Map<Strin
     let mut properties = Map::new();
     let mut required: Vec<Value> = Vec::new();
     let mut whole = Map::new();
+    let mut said = None;
     for part in parts {
+        if let Some(description) = remark(part) {
+            said = Some(description.clone());
+            continue;
+        }
         let part = object_part(part, components, 0)?;
         for (name, value) in part {
             match (name.as_str(), value) {
@@ -78,6 +83,10 @@ fn joined(map: &Map<String, Value>, components: &Components) -> Option<Map<Strin
             whole.insert(name.clone(), value.clone());
         }
     }
+    if let Some(description) = said {
+        // What a field says of its type says more than the type.
+        whole.insert("description".to_owned(), description);
+    }
     whole.insert("type".to_owned(), json!("object"));
     if !required.is_empty() {
         let mut seen = Vec::new();
@@ -90,6 +99,13 @@ fn joined(map: &Map<String, Value>, components: &Components) -> Option<Map<Strin
     }
     whole.insert("properties".to_owned(), properties.into());
     Some(whole)
+}
+
+/// What a part of an `allOf` says that says nothing else: the field's own description beside its type in place.
+fn remark(part: &Value) -> Option<&Value> {
+    let map = part.as_object()?;
+    let says_nothing_else = map.keys().all(|name| name == "type" || name == "description");
+    map.get("description").filter(|_| says_nothing_else && map.get("type").is_none_or(|kind| kind == "object"))
 }
 
 /// A part of an `allOf` with its reference followed, if it is a plain object.

@@ -78,6 +78,14 @@ const LATIN: &[&str] = &[
     "phi",
     "rho",
     "tau",
+    // Values of fields, and an example of a name.
+    "around",
+    "common",
+    "If-None-Match",
+    "lathe-7",
+    "regression",
+    "repeats",
+    "stated",
     // Values of JSON.
     "false",
     "inf",

@@ -1,5 +1,5 @@
 //! Geometric programs in log variables: minimise ln of a posynomial, or a linear form, under linear rows and
-//! posynomial limits. Equations `feed/6`.
+//! posynomial limits. Equations `feed/6.1` to `feed/6.3`.
 //!
 //! Convex, so a point with small residuals and a small complementarity gap is the optimum within that gap,
 //! and its multipliers are the certificate. Two ways to it, each the check of the other: [`interior`], a
