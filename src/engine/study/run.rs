@@ -99,13 +99,11 @@ impl Work {
                 return None;
             }
             let index = if self.shared {
-                match self.host.take(&self.key, self.plan.shards()) {
-                    Ok(index) => index?,
-                    Err(()) => {
-                        std::thread::sleep(PAUSE);
-                        continue;
-                    }
-                }
+                let Ok(index) = self.host.take(&self.key, self.plan.shards()) else {
+                    std::thread::sleep(PAUSE);
+                    continue;
+                };
+                index?
             } else {
                 self.next.fetch_add(1, Ordering::Relaxed)
             };

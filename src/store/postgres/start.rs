@@ -1,9 +1,11 @@
 //! Connecting, and what may be wrong at the start. No word of it repeats the address: it may hold a password.
 
+use std::borrow::Cow;
 use std::str::FromStr;
 use std::time::Duration;
 
 use sqlx::Connection;
+use sqlx::error::DatabaseError;
 use sqlx::migrate::{MigrateError, Migrator};
 use sqlx::postgres::{PgConnectOptions, PgPool, PgPoolOptions};
 use tokio::time::Instant;
@@ -37,7 +39,7 @@ pub(super) fn refused(error: &sqlx::Error) -> OpenError {
 
 /// What is wrong, without credentials and without the address.
 fn reason(error: &sqlx::Error) -> String {
-    let code = error.as_database_error().and_then(|error| error.code().map(|code| code.into_owned()));
+    let code = error.as_database_error().and_then(DatabaseError::code).map(Cow::into_owned);
     match (error, code.as_deref()) {
         (_, Some("28P01" | "28000")) => "it does not accept the user name or the password (user and password stand in \
                                          the address, or in PGUSER and PGPASSWORD)"
@@ -77,7 +79,7 @@ fn may_pass(error: &sqlx::Error) -> bool {
         sqlx::Error::Io(_) | sqlx::Error::PoolTimedOut => true,
         other => other
             .as_database_error()
-            .and_then(|error| error.code())
+            .and_then(DatabaseError::code)
             .is_some_and(|code| matches!(code.as_ref(), "57P03" | "57P01" | "57P02" | "53300")),
     }
 }
