@@ -158,7 +158,9 @@ fn name_parts(value: &mut Value, word: &dyn Fn(&str) -> String) {
         }
         // Series of numbers have no names.
         Value::Array(items) if items.first().is_some_and(Value::is_object) => {
-            items.iter_mut().for_each(|item| name_parts(item, word));
+            for item in items {
+                name_parts(item, word);
+            }
         }
         _ => {}
     }

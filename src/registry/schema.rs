@@ -67,8 +67,13 @@ fn joined(map: &Map<String, Value>, components: &Components) -> Option<Map<Strin
             continue;
         }
         let part = object_part(part, components, 0)?;
+        let remark = is_remark(&part);
         for (name, value) in part {
             match (name.as_str(), value) {
+                // What is said of the field itself comes before what is said of its type.
+                ("description", value) if remark => {
+                    whole.insert(name, value);
+                }
                 ("properties", Value::Object(own)) => properties.extend(own),
                 ("required", Value::Array(own)) => required.extend(own),
                 ("type" | "additionalProperties", _) => {}
@@ -122,7 +127,13 @@ fn object_part(part: &Value, components: &Components, depth: usize) -> Option<Ma
     if map.contains_key("allOf") {
         return joined(map, components);
     }
-    (map.get("type") == Some(&json!("object")) && map.contains_key("properties")).then(|| map.clone())
+    let is_object = map.get("type") == Some(&json!("object"));
+    (is_object && (map.contains_key("properties") || is_remark(map))).then(|| map.clone())
+}
+
+/// Whether a part only says something of an object, as `utoipa` does beside a type that is written in place.
+fn is_remark(map: &Map<String, Value>) -> bool {
+    map.contains_key("description") && map.keys().all(|name| matches!(name.as_str(), "type" | "description"))
 }
 
 /// Adds `additionalProperties: false` to every object with named fields that says nothing about others.

@@ -35,7 +35,7 @@ async fn the_page_is_small_and_kept_by_its_version() {
         assert_eq!(answer.headers()["cache-control"], "public, max-age=31536000, immutable", "{file}");
         total += answer.bytes().await.unwrap().len();
     }
-    println!("the workbench is {total} bytes compressed");
+    eprintln!("the workbench is {total} bytes compressed");
     assert!(total < MOST_BYTES, "{total} bytes");
     // Another version's address leads to what there is now, not to be kept.
     let other = get(service.url("/ui/0123456789ab/main.js")).send().await.unwrap();

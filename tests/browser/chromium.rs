@@ -14,7 +14,7 @@ use tungstenite::{Message, WebSocket};
 /// Names under which it is found; Debian's package has the first.
 const NAMES: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
 /// Longest wait for something on the page. The machine may be busy.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_mins(1);
 /// Between two looks.
 const LOOK: Duration = Duration::from_millis(40);
 
