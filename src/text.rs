@@ -168,6 +168,14 @@ impl Texts {
         self.render(language, section, code, context(values))
     }
 
+    /// What a column of a table is called: as in pictures, or as the field of that name and unit is.
+    pub(crate) fn column(&self, language: Language, name: &str, unit: &str) -> String {
+        if self.has(language, "label", name) {
+            return self.word(language, "label", name, &Values::new());
+        }
+        Glossary::of(language).column(name, unit)
+    }
+
     /// The sentence of a message in `section`.
     pub fn message(&self, language: Language, section: &str, message: &Message) -> String {
         self.word(language, section, message.code, &message.values)

@@ -411,6 +411,11 @@ fn conforms(registry: &Registry, entry: &Entry) {
         assert_eq!(figures, meta.figures, "{}", meta.id);
         let tables: Vec<&str> = stored.tables().unwrap().iter().map(|table| table.id).collect();
         assert_eq!(tables, meta.tables, "{}", meta.id);
+        for column in stored.tables().unwrap().iter().flat_map(|table| &table.columns) {
+            for language in Language::ALL {
+                in_its_language(language, &texts.column(language, &column.name, column.unit), &names);
+            }
+        }
         let answer = envelope(&stored);
         let output = jsonschema::draft202012::new(entry.output_document()).unwrap();
         assert!(output.is_valid(&answer["result"]), "{}: {:?}", meta.id, output.validate(&answer["result"]));

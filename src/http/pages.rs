@@ -49,8 +49,6 @@ pub(super) struct LandingLinks {
     results: &'static str,
     /// The jobs.
     jobs: &'static str,
-    /// Where studies are posted to.
-    studies: &'static str,
     /// The stored models.
     models: &'static str,
     /// The library of materials.
@@ -92,7 +90,6 @@ pub(super) async fn landing(State(app): State<App>, headers: HeaderMap) -> Resul
                 calculators: "/v1/calculators",
                 results: "/v1/results",
                 jobs: "/v1/jobs",
-                studies: "/v1/studies",
                 models: "/v1/models",
                 materials: "/v1/materials",
                 openapi: "/openapi.json",

@@ -8,7 +8,7 @@ use axum::extract::{Path, State};
 use axum::http::header::CACHE_CONTROL;
 use axum::http::{HeaderMap, HeaderValue, StatusCode};
 use axum::response::Response;
-use precut_calc::calculator::{Cells, Figure, Table, Values};
+use precut_calc::calculator::{Cells, Figure, Table};
 use serde::Serialize;
 use serde_json::{Value, json};
 use utoipa::ToSchema;
@@ -17,7 +17,7 @@ use super::document::Document;
 use super::problem::Problem;
 use super::{App, answer, negotiate};
 use crate::engine::{Key, Stored};
-use crate::text::{Glossary, Language, Texts};
+use crate::text::{Language, Texts};
 
 /// The figures of an answer, as data.
 #[derive(Debug, Serialize, ToSchema)]
@@ -168,11 +168,7 @@ fn shown(table: Table, language: Language) -> ResultTable {
     let texts = Texts::shared();
     let columns = table.columns.into_iter().map(|column| {
         let name = column.name.into_owned();
-        let text = if texts.has(language, "label", &name) {
-            texts.word(language, "label", &name, &Values::new())
-        } else {
-            Glossary::of(language).word(&name)
-        };
+        let text = texts.column(language, &name, column.unit);
         let cells = match column.cells {
             Cells::Numbers(cells) => cells.into_iter().map(|cell| json!(cell)).collect(),
             Cells::Words(cells) => cells.into_iter().map(|cell| Value::String(cell.into_owned())).collect(),

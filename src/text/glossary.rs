@@ -91,6 +91,13 @@ impl Glossary {
         own.map_or_else(|| derived(field, unit), str::to_owned)
     }
 
+    /// What a column of that name and unit is called: as the field, or in its own words.
+    pub(crate) fn column(&self, name: &str, unit: &str) -> String {
+        let suffix = if unit == "rev/min" { "_rpm".to_owned() } else { units::suffix(unit) };
+        let as_field = self.get("label", &format!("{name}{suffix}")).or_else(|| self.get("label", name));
+        as_field.map_or_else(|| self.word(name), str::to_owned)
+    }
+
     /// What an English description says.
     pub(crate) fn help<'a>(&'a self, english: &'a str) -> &'a str {
         self.get("help", english).unwrap_or(english)
@@ -216,6 +223,9 @@ mod tests {
         assert_eq!(own.label("Segment", "length_mm", Some("mm")), "Длина");
         assert_eq!(own.label("Shaft", "length_mm", Some("mm")), "Длина вала");
         assert_eq!(own.label("Shaft", "width_mm", Some("mm")), "Width");
+        // A column of a table is called as the field is.
+        assert_eq!(own.column("length", "mm"), "Длина");
+        assert_eq!(own.column("diameter_error", "um"), "diameter error");
     }
 
     #[test]

@@ -319,7 +319,7 @@ fn decoded(text: &str) -> Vec<u8> {
     for group in text.as_bytes().chunks(4) {
         let given: Vec<u8> = group.iter().copied().filter(|byte| *byte != b'=').collect();
         let word =
-            given.iter().fold(0_u32, |word, byte| word << 6 | u32::from(digit(*byte))) << (6 * (4 - given.len()));
+            given.iter().fold(0_u32, |word, byte| (word << 6) | u32::from(digit(*byte))) << (6 * (4 - given.len()));
         bytes.extend_from_slice(&word.to_be_bytes()[1..given.len()]);
     }
     bytes

@@ -3,11 +3,12 @@
 //! `PRECUT_WRITE_SCREENSHOTS=1 cargo test --test browser the_documentation_shows` draws the pictures of
 //! `docs/workbench.md` anew. Without Chromium the tests say so and pass; with `CI=true` they fail.
 
-#![allow(clippy::unwrap_used, clippy::panic, missing_docs, unreachable_pub)]
+#![allow(clippy::unwrap_used, clippy::panic, clippy::needless_pass_by_value, missing_docs, unreachable_pub)]
 
 mod access;
 mod assets;
 mod chromium;
+mod diagnosis;
 mod jobs;
 mod rooms;
 mod screenshots;

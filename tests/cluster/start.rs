@@ -76,9 +76,9 @@ async fn what_is_wrong_with_the_store_is_said_without_its_credentials() {
     // Nor where it works, however much is logged.
     let data = tempfile::tempdir().unwrap();
     let log = data.path().join("log");
-    let mut child = toy_command(&["serve", "--listen", "127.0.0.1:0", "--data", data.path().to_str().unwrap()])
-        .args(["--store", &database.address])
-        .env("PRECUT_STORE", &database.address)
+    let folder = data.path().to_str().unwrap();
+    let arguments = ["serve", "--listen", "127.0.0.1:0", "--data", folder, "--store", &database.address];
+    let mut child = toy_command(&arguments)
         .env("PRECUT_LOG_LEVEL", "trace")
         .stderr(std::fs::File::create(&log).unwrap())
         .spawn()

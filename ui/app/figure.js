@@ -3,8 +3,9 @@
 import { html, useState, useRef, useMemo, useLayoutEffect, useEffect, unique } from './lib.js';
 import { t, number, unitSymbol } from './text.js';
 import { scale, extent, aired, ticks, labels, valueAt } from './scale.js';
-import { items, styles, role } from './draw.js';
-import { colouring } from './palette.js';
+import { items, styles } from './draw.js';
+import { axisName, readDigits, abscissae, ordinates, Head, describe } from './panel.js';
+import { Polar } from './polar.js';
 
 const LEAST_PANEL = 78;
 const AXIS_ROOM = 40;
@@ -12,52 +13,6 @@ const END_GLYPHS = ['centre_left', 'centre_right', 'chuck'];
 const GLYPH_ROOM = 36;
 /** Rows of the table that says what the picture shows. */
 const TABLE_ROWS = 120;
-
-const axisName = (axis, factor) => {
-  const unit = [factor, unitSymbol(axis.unit)].filter(Boolean).join(' ');
-  const text = axis.text.charAt(0).toUpperCase() + axis.text.slice(1);
-  return unit ? `${text}, ${unit}` : text;
-};
-
-/** Digits that a number needs beside others of the span shown: about a thousandth of it. */
-function readDigits(value, span) {
-  if (value === null || value === undefined || !Number.isFinite(value)) return '–';
-  const size = Math.abs(value);
-  if (size === 0 || !span) return number(value, 4);
-  return number(value, Math.min(8, Math.max(3, Math.ceil(Math.log10(size / span)) + 4)));
-}
-
-function abscissae(figure) {
-  return figure.panels.flatMap(panel => panel.items.flatMap(item => (item.kind === 'glyph' ? [] : item.x)));
-}
-
-function ordinates(panel, view) {
-  const inside = view ? x => x >= view[0] && x <= view[1] : () => true;
-  const found = [];
-  for (const item of panel.items) {
-    const sides = { line: [item.y], bars: [item.y], points: [item.y], outline: [item.y], band: [item.lower, item.upper], heat_map: [] }[item.kind] || [];
-    for (const side of sides) {
-      let before = null;
-      for (let index = 0; index < side.length; index += 1) {
-        const within = inside(item.x[index]);
-        if (within) {
-          if (before !== null) { found.push(before); before = null; }
-          found.push(side[index]);
-        } else if (view && item.kind !== 'points') {
-          // The point next to the view on either side: the curve enters from there.
-          if (index > 0 && inside(item.x[index - 1])) found.push(side[index]);
-          before = side[index];
-        }
-      }
-    }
-    if (item.kind === 'heat_map') {
-      const half = item.y.length > 1 ? (item.y[1] - item.y[0]) / 2 : 0;
-      found.push(Math.max(item.y[0] - half, item.y[0] > 0 ? item.y[0] / 10 : -Infinity), item.y.at(-1) + half);
-    }
-    if (item.kind === 'bars') found.push(0);
-  }
-  return found;
-}
 
 /** The width of an element, as it changes. */
 function useWidth() {
@@ -211,58 +166,6 @@ function Numbers({ figure, samples }) {
     </table></div>`;
 }
 
-/** Name of the axis and of each curve, with its value at the cursor. */
-function Head({ panel, ghost, style, hidden, toggle, at, factor, span, polar }) {
-  const seen = new Set();
-  const named = panel.items.filter(item => item.name && !seen.has(item.name) && seen.add(item.name));
-  const value = (source, item) => {
-    if (at === null) return null;
-    const twin = source.items.find(other => other.name === item.name && other.kind === item.kind);
-    if (!twin) return null;
-    if (twin.kind === 'band') {
-      const [low, high] = [valueAt(twin.x, twin.lower, at), valueAt(twin.x, twin.upper, at)];
-      return low === null || low === undefined ? null : `${readDigits(low, span)} … ${readDigits(high, span)}`;
-    }
-    if (!['line', 'bars', 'points'].includes(twin.kind)) return null;
-    const read = valueAt(twin.x, twin.y, at, twin.kind === 'line');
-    return read === null || read === undefined ? null : readDigits(read, span);
-  };
-  const map = panel.items.find(item => item.kind === 'heat_map');
-  return html`
-    <div class="panel-head">
-      <span class="axis-name">${polar ? t('magnified', { name: axisName(panel.y, factor) }) : axisName(panel.y, factor)}</span>
-      ${named.map(item => {
-        const now = value(panel, item);
-        const before = ghost ? value(ghost, item) : null;
-        return html`<button type="button" key=${item.name} class="series" aria-pressed=${!hidden.has(item.name)} onClick=${() => toggle(item.name)}>
-          <${Swatch} item=${item} look=${style(item)} /><span>${item.text}</span>
-          ${now !== null && html`<output>${now}${before !== null && html`<small> (${before})</small>`}</output>`}
-        </button>`;
-      })}
-      ${map && html`<${Key} item=${map} />`}
-    </div>`;
-}
-
-function Swatch({ item, look }) {
-  const shape = {
-    line: html`<path class=${`line ${look}`} d="M1 7H27" />`,
-    band: html`<rect class=${`band ${look}`} x="1" y="2" width="26" height="10" />`,
-    points: html`<path class=${`points ${look}`} d=${`M14 7${role(item.role).marker}`} />`,
-    bars: html`<rect class=${`bars ${look}`} x="8" y="2" width="12" height="10" />`,
-    outline: html`<rect class=${`outline ${look}`} x="2" y="2" width="24" height="10" />`,
-  }[item.kind];
-  return html`<svg class="swatch" width="28" height="14" viewBox="0 0 28 14" aria-hidden="true">${shape}</svg>`;
-}
-
-/** The colours of a map with their numbers. */
-function Key({ item }) {
-  const { steps, low, high } = colouring(item);
-  return html`
-    <span class="key"><span>${axisName(item.value)}</span><span class="key-end">${number(low, 3)}</span>
-      <svg width="120" height="12" viewBox="0 0 120 12" aria-hidden="true">${steps.map((colour, index) => html`<rect x=${(index * 120) / steps.length} width=${120 / steps.length + 0.4} height="12" fill=${`rgb(${colour})`} />`)}</svg>
-      <span class="key-end">${number(high, 3)}</span></span>`;
-}
-
 /** Panels under each other over one abscissa. */
 function Stacked({ figure, pinned, width, style, hidden, toggle, at, setAt, shown, view, setView, height, drag, setDrag, onPick }) {
   const shares = figure.panels.reduce((sum, panel) => sum + panel.height, 0) || 1;
@@ -369,82 +272,4 @@ function Stacked({ figure, pinned, width, style, hidden, toggle, at, setAt, show
           </svg>`;
       })}
     </div>`;
-}
-
-/** A panel in words, for those who cannot see it. */
-function describe(panel, figure) {
-  const spans = panel.items.filter(item => item.name && (item.y || item.lower)).map(item => {
-    const span = extent(item.y || [...item.lower, ...item.upper], 'linear');
-    return span ? `${item.text} ${number(span[0], 3)} … ${number(span[1], 3)}` : item.text;
-  });
-  return `${axisName(panel.y)} (${axisName(figure.x)}): ${spans.join('; ')}`;
-}
-
-/** A roundness chart: deviations magnified outward from a base circle. */
-function Polar({ figure, pinned, width, height, style, hidden, toggle, at, setAt }) {
-  const panel = { ...figure.panels[0], items: figure.panels[0].items.filter(item => !item.name || !hidden.has(item.name)) };
-  const ghost = pinned?.panels[0];
-  const size = Math.max(240, Math.min(width, Math.max(height, 380)));
-  const hasGlyphs = panel.items.some(item => item.kind === 'glyph');
-  const centre = [width / 2, size / 2];
-  const radius = size / 2 - (hasGlyphs ? 46 : 26);
-  const span = extent([...ordinates(panel), ...(ghost ? ordinates(ghost) : [])], panel.y.scale);
-  const domain = aired(span, panel.y.scale, 0.04);
-  const r = scale(panel.y.scale, domain, [radius * 0.4, radius]);
-  const places = ticks(panel.y.scale, domain, 4).filter(place => place >= domain[0] && place <= domain[1]);
-  const { texts, factor } = labels(panel.y.scale, places);
-  const place = (angle, value) => {
-    const length = r(value);
-    const turn = (angle * Math.PI) / 180;
-    return [centre[0] + length * Math.cos(turn), centre[1] - length * Math.sin(turn)];
-  };
-  const spoke = (angle, from, to) => {
-    const [c, s] = [Math.cos((angle * Math.PI) / 180), Math.sin((angle * Math.PI) / 180)];
-    return `M${(centre[0] + from * c).toFixed(1)} ${(centre[1] - from * s).toFixed(1)}L${(centre[0] + to * c).toFixed(1)} ${(centre[1] - to * s).toFixed(1)}`;
-  };
-  const closed = item => {
-    if (item.kind !== 'line' || item.x.length < 2) return item;
-    // Two points a turn apart are a circle.
-    if (item.x.length === 2) {
-      const xs = Array.from({ length: 181 }, (_, index) => item.x[0] + ((item.x[1] - item.x[0]) * index) / 180);
-      return { ...item, x: xs, y: xs.map(() => item.y[0]) };
-    }
-    const turn = item.x.at(-1) - item.x[0];
-    return turn > 350 && turn < 360 ? { ...item, x: [...item.x, item.x[0] + 360], y: [...item.y, item.y[0]] } : item;
-  };
-  const stance = item => ({ mirrored: false, turn: 90 - item.x });
-  const plane = { place, frame: { left: 0, top: 0, width: size * 4, height: size }, stance };
-  const move = event => {
-    const box = event.currentTarget.getBoundingClientRect();
-    const angle = (Math.atan2(centre[1] - (event.clientY - box.top), event.clientX - box.left - centre[0]) * 180) / Math.PI;
-    setAt((angle + 360) % 360);
-  };
-  const round = source => ({ ...source, items: source.items.map(closed) });
-  const turned = at === null ? null : at;
-  const lines = round(panel).items.filter(item => item.kind === 'line');
-  return html`
-    <${Head} ...${{ panel: round(figure.panels[0]), ghost: ghost && round(ghost), style, hidden, toggle, at, factor, span: span ? span[1] - span[0] : 0, polar: true }} />
-    <svg class="chart polar" width=${width} height=${size} viewBox=${`0 0 ${width} ${size}`} role="img" aria-label=${describe(panel, figure)} onPointerMove=${move} onPointerLeave=${() => setAt(null)}>
-      <g class="grid">${places.map(value => html`<circle cx=${centre[0]} cy=${centre[1]} r=${r(value)} class=${value === 0 ? 'zero' : ''} />`)}
-        ${Array.from({ length: 12 }, (_, index) => html`<path d=${spoke(30 * index, radius * 0.4, radius)} />`)}</g>
-      <circle class="frame" cx=${centre[0]} cy=${centre[1]} r=${radius} />
-      ${ghost && items(round(ghost), plane, { style, hidden, ghost: true })}
-      ${items(round(panel), plane, { style, hidden })}
-      <g class="tick-labels halo" text-anchor="middle">${places.map((value, index) => {
-        const [h, v] = place(75, value);
-        return html`<text x=${h} y=${v + 4}>${texts[index]}</text>`;
-      })}</g>
-      <g class="tick-labels" text-anchor="middle">${[0, 90, 180, 270].map(angle => {
-        const [c, s] = [Math.cos((angle * Math.PI) / 180), Math.sin((angle * Math.PI) / 180)];
-        return html`<text x=${centre[0] + (radius + (hasGlyphs ? 38 : 15)) * c} y=${centre[1] - (radius + (hasGlyphs ? 36 : 13)) * s + 4}>${angle}°</text>`;
-      })}</g>
-      ${turned !== null && html`<path class="cursor" d=${spoke(turned, radius * 0.1, radius)} />
-        <text class="x-name" x=${centre[0]} y=${centre[1] + 5} text-anchor="middle">${number(turned, 4)}°</text>
-        ${lines.map(item => {
-          const value = valueAt(item.x, item.y, turned);
-          if (value === null || value === undefined) return null;
-          const [h, v] = place(turned, value);
-          return html`<circle class=${`dot ${style(item)}`} cx=${h} cy=${v} r="3.4" />`;
-        })}`}
-    </svg>`;
 }

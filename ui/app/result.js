@@ -61,7 +61,7 @@ export function Result({ id, description, answer, problem, running, pinned, pin,
         </div>
         ${body && html`
         <div class="words">
-          ${first && html`<p class="verdict">${first.text}</p>`}
+          ${first && html`<p class="verdict" aria-live="polite">${first.text}</p>`}
           ${body.warnings.length > 0 && html`<ul class="warnings" aria-label=${t('warnings')}>${body.warnings.map(({ code, detail, pointer }) => html`<li key=${code + pointer}><span class="sign" aria-hidden="true">!</span><span>${capital(detail)}</span></li>`)}</ul>`}
           ${others.length > 0 && html`<ul class="explanation">${others.map(({ code, text }, index) => html`<li key=${code + index}>${text}</li>`)}</ul>`}
         </div>`}

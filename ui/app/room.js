@@ -304,7 +304,7 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
           </select>
           <button type="button" class=${`primary ${waiting ? 'calling' : ''}`} onClick=${() => { runLater.cancel(); run(state.job); }} title="Ctrl+Enter">${waiting ? t('run_changed') : t('run')}</button>
         </div>
-        <${Form} key=${`${id} ${asked.includes('result=') ? 'kept' : state.baseName.example}`} schema=${description.input_schema} value=${state.job} filled=${answer?.answer.input} onChange=${change} errors=${faults} examples=${description.jobs} libraries=${libraries} models=${(models || []).filter(model => model.calculator === id)} />
+        <${Form} key=${`${id} ${asked.includes('result=') ? 'kept' : state.baseName.example}`} schema=${description.input_schema} value=${state.job} filled=${answer?.answer.input} onChange=${change} errors=${faults} examples=${description.jobs} libraries=${libraries} calculator=${id} models=${models} />
       </section>
       <section class="result-pane" aria-label=${t('result')} aria-busy=${isBusy ? 'true' : 'false'}>
         <div class=${`work-line ${pending && !running ? 'on' : ''}`} aria-hidden="true"></div>

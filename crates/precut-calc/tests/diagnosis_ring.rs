@@ -98,6 +98,24 @@ fn the_hidden_cause_of_the_open_case_is_named() {
 }
 
 #[test]
+fn the_example_names_its_cause_and_predicts_what_was_held_back() {
+    let example: Value = serde_json::from_str(RingRoundness::DIAGNOSES[0].job).unwrap();
+    let result = answered(&example).unwrap().output;
+    assert_eq!(result.verdict, VerdictClass::Named, "{:?}", result.sets);
+    assert_eq!(result.named.iter().map(|cause| cause.kind.as_str()).collect::<Vec<_>>(), ["roller_runout"]);
+    let gain = result.gain.unwrap();
+    assert_eq!(gain.folds, 4);
+    assert!(gain.rmse_extended < 0.5 * gain.rmse_base, "{gain:?}");
+    // What was fitted is what the ring's own job takes.
+    let mut extended = example["job"].clone();
+    extended["effects"] = serde_json::to_value(&result.effects).unwrap();
+    let extended = job(&extended);
+    let mut violations = Violations::default();
+    extended.check(&mut violations);
+    assert!(violations.is_empty());
+}
+
+#[test]
 fn every_cause_is_a_hypothesis_or_says_why_not() {
     let rigid = prepared(&job(&short()), vec![RingRun::default()], "radial_deviation_um");
     let found = RingRoundness::hypotheses(&rigid);

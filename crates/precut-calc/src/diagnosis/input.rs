@@ -20,10 +20,11 @@ pub struct DiagnosisJob<J: ToSchema, R: ToSchema, W: MeasuredRow, A: ToSchema> {
     #[schema(example = "deflection-compensation")]
     pub calculator: String,
     /// The base model: a complete job of that calculator. The diagnosis adds to the effects that it holds.
+    #[schema(inline)]
     pub job: J,
     /// Conditions of the runs that were measured; what a run leaves out is as in the job.
     #[serde(default = "Vec::new", skip_serializing_if = "Vec::is_empty")]
-    #[schema(max_items = 500)]
+    #[schema(inline, max_items = 500)]
     pub runs: Vec<R>,
     /// Name of the quantity that was measured.
     #[schema(example = "diameter_deviation_um", max_length = 64)]
@@ -33,6 +34,7 @@ pub struct DiagnosisJob<J: ToSchema, R: ToSchema, W: MeasuredRow, A: ToSchema> {
     pub measurements: Measured<W>,
     /// How wrong the base may be without that being a finding.
     #[serde(default)]
+    #[schema(inline)]
     pub allowances: A,
     /// What is looked for, and how far.
     #[serde(default)]

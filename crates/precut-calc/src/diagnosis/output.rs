@@ -38,10 +38,12 @@ pub struct DiagnosisResult<E: ToSchema, R: ToSchema> {
     /// Shape of what the catalogue does not explain.
     pub remainder: Option<RemainderReport>,
     /// The effects that extend the base model; empty where none is named.
+    #[schema(inline)]
     pub effects: Vec<E>,
     /// Error on data held back, base against extended.
     pub gain: Option<GainReport>,
     /// The run that would best part the leading set from its strongest rival.
+    #[schema(inline)]
     pub next_measurement: Option<NextReport<R>>,
     /// Row by row.
     pub rows: RowColumns,
@@ -273,6 +275,7 @@ pub struct NextReport<R: ToSchema> {
     /// The condition that it changes.
     pub changes: String,
     /// Its conditions.
+    #[schema(inline)]
     pub run: R,
     /// Rows that it would bring.
     #[schema(extensions(("x-unit" = json!("1"))))]

@@ -352,7 +352,7 @@ fn refusal(accept: bool, foundation: &Foundation<'_>, weighing: &Weighing<'_>) -
     })
 }
 
-/// Whether causes leave less than half of what the factor leaves: then the rows are in the right unit. A wrong unit that
+/// Whether causes leave a fifth less than what the factor leaves: then the rows are in the right unit. A wrong unit that
 /// causes imitate leaves as little with the factor as with them.
 fn explained_better(foundation: &Foundation<'_>, weighing: &Weighing<'_>, suspected: &SuspectedFactor) -> bool {
     let Some(set) = weighing.named_sets().next() else { return false };
@@ -362,7 +362,7 @@ fn explained_better(foundation: &Foundation<'_>, weighing: &Weighing<'_>, suspec
     let mean = kept.iter().map(|&row| value(row)).sum::<f64>() / kept.len().max(1) as f64;
     let whole: f64 = kept.iter().map(|&row| (value(row) - mean).powi(2)).sum();
     let left: f64 = kept.iter().map(|&row| with[row].map_or(f64::INFINITY, |f| (value(row) - f).powi(2))).sum();
-    left < 0.5 * (1.0 - suspected.explained) * whole
+    left < 0.8 * (1.0 - suspected.explained) * whole
 }
 
 fn warnings(

@@ -1,0 +1,60 @@
+//! From measurements to a stored model to a job that uses it.
+
+use crate::{SETTLED, both};
+
+#[test]
+fn a_diagnosis_is_saved_as_a_model_and_used_in_another_form() {
+    let Some((_turn, mut page, service)) = both() else { return };
+    page.open(&service.page("diagnosis"));
+    page.until(SETTLED);
+    assert!(page.text(".verdict").len() > 20);
+    // A bad name is refused before it is sent, a good one makes a revision.
+    page.fill("#model-name", "lathe-7-winter");
+    page.click(".save-model button");
+    page.until("/lathe-7-winter.*1/.test(document.querySelector('#model-name-hint').textContent)");
+    page.click(".save-model button");
+    page.until("/lathe-7-winter.*2/.test(document.querySelector('#model-name-hint').textContent)");
+
+    page.open(&service.page("models"));
+    page.wait_for(".list tbody tr");
+    assert!(page.text(".list tbody th").contains("lathe-7-winter"));
+    page.click(".list tbody a.button");
+    page.until(&format!("location.hash.includes('lathe-7-winter') && {SETTLED}"));
+    assert_eq!(page.value("#field-model"), "lathe-7-winter");
+    page.click("#tab-basis");
+    page.until("document.querySelector('[role=tabpanel]').textContent.includes('lathe-7-winter')");
+
+    page.open(&service.page("models"));
+    page.wait_for(".list tbody tr");
+    page.click(".list tbody tr td:last-child button:last-child");
+    page.until("!document.querySelector('.list tbody tr')");
+    page.assert_calm();
+}
+
+#[test]
+fn measurements_are_dropped_on_a_diagnosis() {
+    let Some((_turn, mut page, service)) = both() else { return };
+    page.open(&service.page("diagnosis"));
+    page.until(SETTLED);
+    let before = page.text(".verdict");
+    // The rows of the example, their first numbers a little larger: as a file with units of its own.
+    let csv = page.evaluate(
+        "(async () => { \
+         const room = await (await fetch('/v1/calculators/diagnosis')).json(); \
+         const job = room.jobs[room.examples[0].id]; const rows = job.measurements; const names = Object.keys(rows[0]); \
+         const title = name => name.replace(/_(um|mm)$/, ' [$1]'); \
+         return [names.map(title).join(';'), ...rows.map(row => names.map(name => name.endsWith('_um') ? row[name] * 1.5 : row[name] ?? '').join(';'))].join('\\n') })()",
+    );
+    page.evaluate(&format!(
+        "(() => {{ const data = new DataTransfer(); data.items.add(new File([{csv}], 'shaft.csv', {{type: 'text/csv'}})); \
+         const input = document.querySelector('input[data-table=measurements]').closest('.table-input'); \
+         input.dispatchEvent(new DragEvent('drop', {{bubbles: true, cancelable: true, dataTransfer: data}})) }})()"
+    ));
+    page.wait_for(".matching .primary:not(:disabled)");
+    page.click(".matching .primary");
+    page.until(&format!(
+        "document.querySelector('.verdict').textContent !== {} && {SETTLED}",
+        serde_json::json!(before)
+    ));
+    page.assert_calm();
+}

@@ -1,0 +1,196 @@
+// Fields of a single value: label, control, unit, and the words of the service where the value is at fault.
+import { html, useState, useEffect, useRef } from './lib.js';
+import { t, typed, parsed, number, unitOf } from './text.js';
+import { kindOf, labelOf, wordOf, symbolParts, range, pointer } from './schema.js';
+
+export const fieldId = path => `field${pointer(path).replace(/[^A-Za-z0-9_]/g, '-')}`;
+
+/** Whether one control is enough for it. */
+export const isLeaf = schema => ['number', 'string', 'boolean', 'enum'].includes(kindOf(schema));
+
+export function Symbol({ symbol }) {
+  const { base, sub } = symbolParts(symbol);
+  return html`<i class="symbol">${base}${sub && html`<sub>${sub}</sub>`}</i>`;
+}
+
+export function rangeText(schema) {
+  const { low, high, openLow, openHigh } = range(schema);
+  const unit = unitOf(schema);
+  const tail = unit ? ` ${unit}` : '';
+  if (low !== undefined && high !== undefined) return `${openLow ? '>' : ''}${number(low)} … ${openHigh ? '<' : ''}${number(high)}${tail}`;
+  if (low !== undefined) return `${openLow ? '>' : '≥'} ${number(low)}${tail}`;
+  if (high !== undefined) return `${openHigh ? '<' : '≤'} ${number(high)}${tail}`;
+  return '';
+}
+
+export const defaultText = schema => {
+  if (schema.default === undefined || schema.default === null || typeof schema.default === 'object') return '';
+  return t('default_is', { value: typeof schema.default === 'number' ? number(schema.default) : schema.default === true ? t('yes') : schema.default === false ? t('no') : wordOf(schema, schema.default) });
+};
+
+/** Label, control, unit, and the words of the service where the value is at fault. */
+export function Row({ name, schema, path, value, required, context, control: Control, compact }) {
+  const id = fieldId(path);
+  const label = labelOf(name, schema);
+  const faults = context.errorsAt(path);
+  const description = [schema.description, defaultText(schema)].filter(Boolean).join(' ');
+  const allowed = kindOf(schema) === 'number' ? rangeText(schema) : '';
+  const show = () => context.setHelp({ label, symbol: schema['x-symbol'], range: allowed, description });
+  const [wrong, setWrong] = useState(null);
+  const unit = unitOf(schema);
+  const common = {
+    id, schema, value, context, label,
+    set: (part, how) => context.set(path, part, how),
+    setWrong,
+    filled: context.filledAt(path),
+    described: `${id}-about${faults.length || wrong ? ` ${id}-fault` : ''}`,
+    invalid: faults.length > 0 || wrong !== null,
+    required,
+  };
+  return html`
+    <div class=${`row ${faults.length || wrong ? 'faulty' : ''} ${compact ? 'compact' : ''}`} onMouseEnter=${show} onFocusIn=${show}>
+      <${Control} ...${common} label=${html`<span>${label}</span>${schema['x-symbol'] && schema['x-symbol'].toLowerCase() !== label.toLowerCase() && html` <${Symbol} symbol=${schema['x-symbol']} />`}`} unit=${unit} plain=${label} />
+      <span id=${`${id}-about`} class="hidden">${[unit && t('in_unit', { unit }), allowed, description].filter(Boolean).join('. ')}</span>
+      <${Faults} faults=${wrong ? [{ detail: wrong }] : faults} id=${`${id}-fault`} />
+    </div>`;
+}
+
+export function Faults({ faults, id }) {
+  if (!faults || faults.length === 0) return null;
+  return html`<p class="fault" id=${id}>${faults.map(fault => html`<span>${sentence(fault.detail)}</span>`)}</p>`;
+}
+
+/** Names of fields keep their small letters. */
+const sentence = text => (!text || /^[a-z]+_/.test(text) ? text : text.charAt(0).toUpperCase() + text.slice(1));
+
+/** Steps of the arrow keys: a hundredth of the value's size, a tenth with shift. */
+export function nudged(value, schema, direction, shift) {
+  const { low, high } = range(schema);
+  if (schema.type === 'integer') {
+    const step = shift ? 10 : 1;
+    return Math.min(Math.max((value ?? schema.default ?? low ?? 0) + direction * step, low ?? -Infinity), high ?? Infinity);
+  }
+  const from = value ?? schema.default ?? schema.example ?? 0;
+  const size = from === 0 ? Math.abs(schema.example || 1) : Math.abs(from);
+  const step = 10 ** (Math.floor(Math.log10(size)) - (shift ? 0 : 1));
+  const next = Number((from + direction * step).toPrecision(12));
+  return Math.min(Math.max(next, low ?? -Infinity), high ?? Infinity);
+}
+
+export function NumberInput({ id, schema, value, filled, set, setWrong, described, invalid, label, unit, required, context }) {
+  const [draft, setDraft] = useState(null);
+  const [isFocused, setFocused] = useState(false);
+  // The value may change under a draft: by the way back, by a click in the picture.
+  useEffect(() => {
+    const read = draft === null ? null : parsed(draft);
+    if (draft !== null && !Number.isNaN(read) && !Object.is(read ?? undefined, value)) setDraft(null);
+  }, [value]);
+  // All digits only while they may be edited.
+  const shown = draft ?? (isFocused || typeof value !== 'number' ? typed(value) : typed(Number(value.toPrecision(7))));
+  const take = text => {
+    setDraft(text);
+    const read = parsed(text);
+    if (Number.isNaN(read)) setWrong(t('not_a_number'));
+    else if (read === null && required) setWrong(t('needed'));
+    else if (read !== null && schema.type === 'integer' && !Number.isInteger(read)) setWrong(t('not_whole'));
+    else {
+      setWrong(null);
+      if (!Object.is(read ?? undefined, value)) set(read === null ? undefined : read, 'typing');
+    }
+  };
+  const leave = () => {
+    setFocused(false);
+    if (draft !== null && !Number.isNaN(parsed(draft)) && !(parsed(draft) === null && required)) setDraft(null);
+  };
+  const key = event => {
+    if (event.key !== 'ArrowUp' && event.key !== 'ArrowDown') return;
+    event.preventDefault();
+    setDraft(null);
+    setWrong(null);
+    set(nudged(value, schema, event.key === 'ArrowUp' ? 1 : -1, event.shiftKey), 'typing');
+  };
+  const drag = useDrag(value, schema, next => { setDraft(null); setWrong(null); set(next, 'typing'); });
+  const standIn = typeof filled === 'number' ? filled : schema.default;
+  const placeholder = standIn === undefined || standIn === null ? '' : typed(Number(standIn.toPrecision(7)));
+  return html`
+    <label for=${id} class="label draggable" ...${drag}>${label}</label>
+    <span class="control"><input id=${id} type="text" inputmode="decimal" autocomplete="off" spellcheck=${false} value=${shown} placeholder=${placeholder}
+      disabled=${context.disabled} aria-describedby=${described} aria-invalid=${invalid ? 'true' : undefined} aria-required=${required ? 'true' : undefined}
+      onInput=${event => take(event.currentTarget.value)} onBlur=${leave} onKeyDown=${key} onFocus=${event => { const field = event.currentTarget; setFocused(true); setTimeout(() => { if (document.activeElement === field) field.select(); }, 0); }} /></span>
+    <span class="unit" aria-hidden="true">${unit}</span>`;
+}
+
+/** A number dragged by its label: 60 px double it. */
+function useDrag(value, schema, set) {
+  const start = useRef(null);
+  const { low, high } = range(schema);
+  return {
+    onPointerDown: event => {
+      if (event.button !== 0 || event.pointerType === 'touch') return;
+      start.current = { x: event.clientX, value: value ?? schema.default ?? schema.example ?? 0, moved: false };
+      event.currentTarget.setPointerCapture(event.pointerId);
+    },
+    onPointerMove: event => {
+      if (!start.current) return;
+      const dx = event.clientX - start.current.x;
+      if (!start.current.moved && Math.abs(dx) < 4) return;
+      start.current.moved = true;
+      const from = start.current.value;
+      const raw = from === 0 ? (dx / 60) * Math.abs(schema.example || 1) : from * 2 ** ((Math.sign(from) * dx) / 60);
+      const limited = Math.min(Math.max(raw, low ?? -Infinity), high ?? Infinity);
+      set(schema.type === 'integer' ? Math.round(limited) : Number(limited.toPrecision(3)));
+    },
+    onPointerUp: () => { start.current = start.current?.moved ? { done: true } : null; if (start.current) setTimeout(() => { start.current = null; }, 0); },
+    onClick: event => { if (start.current?.done) event.preventDefault(); },
+  };
+}
+
+export function TextInput({ id, value, schema, set, described, invalid, label, required, context }) {
+  return html`
+    <label for=${id} class="label">${label}</label>
+    <span class="control wide"><input id=${id} type="text" autocomplete="off" value=${value ?? ''} placeholder=${schema.default ?? ''} disabled=${context.disabled}
+      aria-describedby=${described} aria-invalid=${invalid ? 'true' : undefined} aria-required=${required ? 'true' : undefined}
+      onChange=${event => set(event.currentTarget.value === '' && !required ? undefined : event.currentTarget.value)} /></span>`;
+}
+
+/** The service's words for the values of an enumeration, where it has any. */
+export const optionText = (schema, value) => wordOf(schema, value);
+
+export function Enum({ id, schema, value, set, described, invalid, label, required, context }) {
+  const fallback = schema.default;
+  return html`
+    <label for=${id} class="label">${label}</label>
+    <span class="control wide"><select id=${id} disabled=${context.disabled} aria-describedby=${described} aria-invalid=${invalid ? 'true' : undefined}
+      value=${value ?? fallback ?? ''} onChange=${event => set(event.currentTarget.value === '' ? undefined : event.currentTarget.value)}>
+      ${!required && fallback === undefined && html`<option value="">${t('not_set')}</option>`}
+      ${schema.enum.filter(option => option !== null).map(option => html`<option value=${option}>${optionText(schema, option)}</option>`)}
+    </select></span>`;
+}
+
+export function Switch({ id, schema, value, set, described, label, context }) {
+  return html`
+    <label for=${id} class="label">${label}</label>
+    <span class="control"><input id=${id} type="checkbox" role="switch" disabled=${context.disabled} checked=${value ?? schema.default ?? false} aria-describedby=${described}
+      onChange=${event => set(event.currentTarget.checked)} /></span>`;
+}
+
+export function Library({ id, value, set, described, invalid, label, context }) {
+  return html`
+    <label for=${id} class="label">${label}</label>
+    <span class="control wide"><select id=${id} value=${value ?? ''} aria-describedby=${described} aria-invalid=${invalid ? 'true' : undefined}
+      onChange=${event => set(event.currentTarget.value || undefined)}>
+      <option value="">${t('not_set')}</option>
+      ${context.libraries.materials.map(({ id: name, title }) => html`<option value=${name}>${title}</option>`)}
+    </select></span>`;
+}
+
+export function ModelChoice({ id, value, set, described, invalid, label, context }) {
+  return html`
+    <label for=${id} class="label">${label}</label>
+    <span class="control wide"><select id=${id} value=${value ?? ''} aria-describedby=${described} aria-invalid=${invalid ? 'true' : undefined}
+      onChange=${event => set(event.currentTarget.value || undefined)}>
+      <option value="">${t('no_model')}</option>
+      ${value && !context.models.some(({ name }) => name === value) && html`<option value=${value}>${value}</option>`}
+      ${context.models.map(({ name }) => html`<option value=${name}>${name}</option>`)}
+    </select></span>`;
+}

@@ -1,0 +1,114 @@
+// What every panel of a figure has, whatever its frame: the axis with its name, the curves with theirs, the numbers
+// that it spans.
+import { html } from './lib.js';
+import { t, number, unitSymbol } from './text.js';
+import { extent, valueAt } from './scale.js';
+import { role } from './draw.js';
+import { colouring } from './palette.js';
+
+export const axisName = (axis, factor) => {
+  const unit = [factor, unitSymbol(axis.unit)].filter(Boolean).join(' ');
+  const text = axis.text.charAt(0).toUpperCase() + axis.text.slice(1);
+  return unit ? `${text}, ${unit}` : text;
+};
+
+/** Digits that a number needs beside others of the span shown: about a thousandth of it. */
+export function readDigits(value, span) {
+  if (value === null || value === undefined || !Number.isFinite(value)) return '–';
+  const size = Math.abs(value);
+  if (size === 0 || !span) return number(value, 4);
+  return number(value, Math.min(8, Math.max(3, Math.ceil(Math.log10(size / span)) + 4)));
+}
+
+export function abscissae(figure) {
+  return figure.panels.flatMap(panel => panel.items.flatMap(item => (item.kind === 'glyph' ? [] : item.x)));
+}
+
+export function ordinates(panel, view) {
+  const inside = view ? x => x >= view[0] && x <= view[1] : () => true;
+  const found = [];
+  for (const item of panel.items) {
+    const sides = { line: [item.y], bars: [item.y], points: [item.y], outline: [item.y], band: [item.lower, item.upper], heat_map: [] }[item.kind] || [];
+    for (const side of sides) {
+      let before = null;
+      for (let index = 0; index < side.length; index += 1) {
+        const within = inside(item.x[index]);
+        if (within) {
+          if (before !== null) { found.push(before); before = null; }
+          found.push(side[index]);
+        } else if (view && item.kind !== 'points') {
+          // The point next to the view on either side: the curve enters from there.
+          if (index > 0 && inside(item.x[index - 1])) found.push(side[index]);
+          before = side[index];
+        }
+      }
+    }
+    if (item.kind === 'heat_map') {
+      const half = item.y.length > 1 ? (item.y[1] - item.y[0]) / 2 : 0;
+      found.push(Math.max(item.y[0] - half, item.y[0] > 0 ? item.y[0] / 10 : -Infinity), item.y.at(-1) + half);
+    }
+    if (item.kind === 'bars') found.push(0);
+  }
+  return found;
+}
+
+/** Name of the axis and of each curve, with its value at the cursor. */
+export function Head({ panel, ghost, style, hidden, toggle, at, factor, span, polar }) {
+  const seen = new Set();
+  const named = panel.items.filter(item => item.name && !seen.has(item.name) && seen.add(item.name));
+  const value = (source, item) => {
+    if (at === null) return null;
+    const twin = source.items.find(other => other.name === item.name && other.kind === item.kind);
+    if (!twin) return null;
+    if (twin.kind === 'band') {
+      const [low, high] = [valueAt(twin.x, twin.lower, at), valueAt(twin.x, twin.upper, at)];
+      return low === null || low === undefined ? null : `${readDigits(low, span)} … ${readDigits(high, span)}`;
+    }
+    if (!['line', 'bars', 'points'].includes(twin.kind)) return null;
+    const read = valueAt(twin.x, twin.y, at, twin.kind === 'line');
+    return read === null || read === undefined ? null : readDigits(read, span);
+  };
+  const map = panel.items.find(item => item.kind === 'heat_map');
+  return html`
+    <div class="panel-head">
+      <span class="axis-name">${polar ? t('magnified', { name: axisName(panel.y, factor) }) : axisName(panel.y, factor)}</span>
+      ${named.map(item => {
+        const now = value(panel, item);
+        const before = ghost ? value(ghost, item) : null;
+        return html`<button type="button" key=${item.name} class="series" aria-pressed=${!hidden.has(item.name)} onClick=${() => toggle(item.name)}>
+          <${Swatch} item=${item} look=${style(item)} /><span>${item.text}</span>
+          ${now !== null && html`<output>${now}${before !== null && html`<small> (${before})</small>`}</output>`}
+        </button>`;
+      })}
+      ${map && html`<${Key} item=${map} />`}
+    </div>`;
+}
+
+function Swatch({ item, look }) {
+  const shape = {
+    line: html`<path class=${`line ${look}`} d="M1 7H27" />`,
+    band: html`<rect class=${`band ${look}`} x="1" y="2" width="26" height="10" />`,
+    points: html`<path class=${`points ${look}`} d=${`M14 7${role(item.role).marker}`} />`,
+    bars: html`<rect class=${`bars ${look}`} x="8" y="2" width="12" height="10" />`,
+    outline: html`<rect class=${`outline ${look}`} x="2" y="2" width="24" height="10" />`,
+  }[item.kind];
+  return html`<svg class="swatch" width="28" height="14" viewBox="0 0 28 14" aria-hidden="true">${shape}</svg>`;
+}
+
+/** The colours of a map with their numbers. */
+function Key({ item }) {
+  const { steps, low, high } = colouring(item);
+  return html`
+    <span class="key"><span>${axisName(item.value)}</span><span class="key-end">${number(low, 3)}</span>
+      <svg width="120" height="12" viewBox="0 0 120 12" aria-hidden="true">${steps.map((colour, index) => html`<rect x=${(index * 120) / steps.length} width=${120 / steps.length + 0.4} height="12" fill=${`rgb(${colour})`} />`)}</svg>
+      <span class="key-end">${number(high, 3)}</span></span>`;
+}
+
+/** A panel in words, for those who cannot see it. */
+export function describe(panel, figure) {
+  const spans = panel.items.filter(item => item.name && (item.y || item.lower)).map(item => {
+    const span = extent(item.y || [...item.lower, ...item.upper], 'linear');
+    return span ? `${item.text} ${number(span[0], 3)} … ${number(span[1], 3)}` : item.text;
+  });
+  return `${axisName(panel.y)} (${axisName(figure.x)}): ${spans.join('; ')}`;
+}
