@@ -28,6 +28,6 @@ pub fn register(registrar: &mut impl Registrar) {
     registrar.calculator::<ring_roundness::evaluation::RoundnessEvaluation>();
     registrar.with_forward_model::<feed_schedule::FeedSchedule>();
     registrar.calculator::<feed_schedule::fit::MachinabilityFit>();
-    registrar.with_forward_model::<fixture_stability::FixtureStability>();
+    registrar.diagnosable::<fixture_stability::FixtureStability>();
     registrar.calculator::<fixture_stability::identification::FixtureIdentification>();
 }

@@ -21,6 +21,8 @@ mod feed_effects;
 mod feed_properties;
 mod feed_reference;
 mod feed_support;
+mod fixture_diagnosis;
+mod fixture_diagnosis_trials;
 mod fixture_effects;
 mod fixture_identification;
 mod fixture_methods;

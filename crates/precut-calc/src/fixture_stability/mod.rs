@@ -17,13 +17,17 @@ mod cutting;
 mod floquet;
 mod forward;
 mod holding;
+mod hypotheses;
 pub mod identification;
 mod input;
 mod lobes;
 mod march;
+mod measurement;
+mod next_runs;
 mod output;
 mod parts;
 mod picture;
+mod predict;
 mod response;
 mod simulate;
 mod zeroth;
@@ -33,6 +37,7 @@ pub use input::{
     Analysis, ConstantForce, Entry, FaceMill, FeedToward, FixtureJob, LimitSettings, LimitSpeed, LobeSettings,
     MAX_MAP_POINTS, MillingCut, MillingForce, Regeneration, SelfLocking, SimulationSettings, Vise, ViseJoint,
 };
+pub use measurement::FixtureMeasurement;
 pub use output::{
     AmplitudeCurve, ArcProfile, ChatterKind, ClampForce, DepthLimits, Engagement, FirstLimit, FixtureOutcome,
     FixtureState, FixtureVerdict, FloquetMultiplier, ForcedMotion, Histories, LobeBoundary, LobeDiagram, LobeMap,

@@ -1,0 +1,204 @@
+//! The causes of the catalogue as they stand for a vise and what was measured on it.
+
+use super::forward::Measure;
+use super::predict::{PreparedFixture, PreparedRow};
+use crate::calculator::{
+    Design, Grouping, Hypotheses, Hypothesis, Inapplicability, Inapplicable, Range, Smooth, Treatment, Variable,
+};
+use crate::effects::{Cause, FIXTURE_CAUSES, Fit, FixtureEffect, Parameter};
+
+/// Largest sum of an exponent of the job and what is added to it: a force that hardly depends on the chip any more.
+const LARGEST_EXPONENT: f64 = 0.95;
+/// Largest share of the feed by which a tooth may stand out: beyond it the next one does not cut.
+const RUNOUT_SHARE: f64 = 0.9;
+/// A mass below this is none, kg.
+const NO_MASS_KG: f64 = 1e-4;
+/// Sizes about which a runout is linearised, prior standard deviations.
+const EXPANSIONS: [f64; 4] = [0.25, 0.5, 1.0, 2.0];
+
+/// What decides which causes rows can speak about.
+pub(super) struct Experiment<'a> {
+    pub(super) prepared: &'a PreparedFixture,
+}
+
+impl Experiment<'_> {
+    /// The catalogue, sorted by whether these rows can speak about a cause.
+    pub(super) fn hypotheses(&self) -> Hypotheses {
+        let mut sorted = Hypotheses::default();
+        for cause in FIXTURE_CAUSES {
+            match self.inapplicability(cause) {
+                Some(reason) => sorted.inapplicable.push(Inapplicable { cause, reason }),
+                None => sorted.applicable.push(self.hypothesis(cause)),
+            }
+        }
+        sorted
+    }
+
+    fn inapplicability(&self, cause: &'static Cause) -> Option<Inapplicability> {
+        let PreparedFixture { job, base, rows, measure, .. } = self.prepared;
+        if job.effects.iter().any(|effect| effect.kind() == cause.kind) {
+            return Some(Inapplicability::InJob);
+        }
+        let nothing = |acts: bool| (!acts).then_some(Inapplicability::NothingToActOn);
+        match cause.kind {
+            // At one depth it is a force level.
+            "depth_exponent" if *measure != Measure::DepthLimit && !varies(rows, |row| row.working.depth_mm) => {
+                Some(Inapplicability::ConditionConstant("depth_mm"))
+            }
+            "tooth_runout" => nothing(base.cutting.teeth > 1),
+            "jaw_mass" => nothing(base.holding.jaw.is_some()),
+            // Stable amplitudes and limits are those of closed joints: only a history shows one that opens.
+            "preload_loss" if *measure != Measure::Displacement || base.holding.clamp_force_n.is_none() => {
+                nothing(false)
+            }
+            "preload_loss" if rows.iter().any(|row| row.time_since_clamping_min.is_none()) => {
+                Some(Inapplicability::ConditionAbsent("time_since_clamping_min"))
+            }
+            _ => None,
+        }
+    }
+
+    fn hypothesis(&self, cause: &'static Cause) -> Hypothesis {
+        let variables = cause.parameters.iter().map(|p| self.variable(cause, p)).collect();
+        Hypothesis { cause, label: String::new(), variables, prior_weight: 1.0 }
+    }
+
+    fn variable(&self, cause: &Cause, parameter: &Parameter) -> Variable {
+        let cutting = &self.prepared.base.cutting;
+        let (mut lower, mut upper) = (parameter.lower, parameter.upper);
+        match cause.kind {
+            "chip_thickness_exponent" => {
+                lower = lower.max(-cutting.chip_exponent);
+                upper = upper.min(LARGEST_EXPONENT - cutting.chip_exponent);
+            }
+            "depth_exponent" => {
+                lower = lower.max(-cutting.depth_exponent);
+                upper = upper.min(LARGEST_EXPONENT - cutting.depth_exponent);
+            }
+            "tooth_runout" => {
+                let feeds = self.prepared.rows.iter().map(|row| row.working.feed_mm);
+                upper = feeds.fold(upper, |least, feed| least.min(RUNOUT_SHARE * feed));
+                lower = -upper;
+            }
+            // The catalogue's least mass keeps an effect of a job finite; here none is none.
+            "second_mode" if parameter.name == "mass_kg" => lower = 0.0,
+            _ => {}
+        }
+        let treatment = match parameter.fit {
+            Fit::Amplitude | Fit::Factor => Treatment::Amplitude { prior_sd: parameter.prior_sd },
+            Fit::Shape { grid } => Treatment::Shape { grid: grid.to_vec(), prior: None },
+            Fit::Fixed { default } => Treatment::Stated { value: default },
+            Fit::OfJob => Treatment::Stated { value: 0.0 },
+        };
+        match parameter.fit {
+            // Its logarithm is 0 where it is absent, and a factor of 2 as far as one of 1/2.
+            Fit::Factor => {
+                let range = Range { lower: lower.ln(), upper: upper.ln() };
+                Variable { name: "ln_factor", unit: "1", treatment, range }
+            }
+            _ => Variable { name: parameter.name, unit: parameter.unit, treatment, range: Range { lower, upper } },
+        }
+    }
+}
+
+fn varies(rows: &[PreparedRow], of: impl Fn(&PreparedRow) -> f64) -> bool {
+    let first = rows.first().map_or(0.0, &of);
+    rows.iter().any(|row| (of(row) - first).abs() > 1e-9 * first.abs())
+}
+
+/// The effects that a hypothesis stands for at these values of its variables.
+pub(super) fn effects(hypothesis: &Hypothesis, values: &[f64]) -> Option<Vec<FixtureEffect>> {
+    let cause = hypothesis.cause;
+    let effect = match (cause.kind, values) {
+        ("second_mode", &[mass_kg, ..]) if mass_kg < NO_MASS_KG => return Some(Vec::new()),
+        ("stiffness" | "damping" | "mass" | "force_coefficient" | "jaw_mass", &[ln_factor]) => {
+            FixtureEffect::from_parameters(cause, &[ln_factor.exp()])?
+        }
+        _ => FixtureEffect::from_parameters(cause, values)?,
+    };
+    Some(vec![effect])
+}
+
+/// Sizes about which a hypothesis is linearised beside 0: the amplitude of a cutter grows with a tooth that stands out to
+/// either side, so that a straight line through none of it shows nothing.
+pub(super) fn expansions(hypothesis: &Hypothesis) -> Vec<f64> {
+    match (hypothesis.cause.kind, hypothesis.variables.as_slice()) {
+        ("tooth_runout", [Variable { treatment: Treatment::Amplitude { prior_sd }, range, .. }]) => EXPANSIONS
+            .iter()
+            .map(|share| share * prior_sd)
+            .filter(|size| *size < range.upper)
+            .flat_map(|size| [size, -size])
+            .collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// Rows of one working point are repeats; rows of one speed are held back together. Of histories, rows of one run are.
+pub(super) fn design(prepared: &PreparedFixture) -> Design {
+    let rows = &prepared.rows;
+    let numbered = |key: &dyn Fn(&PreparedRow) -> [u64; 5]| -> Vec<usize> {
+        let mut keys: Vec<[u64; 5]> = rows.iter().map(key).collect();
+        keys.sort_unstable();
+        keys.dedup();
+        rows.iter().map(|row| keys.partition_point(|known| *known < key(row))).collect()
+    };
+    let speed = |row: &PreparedRow| row.working.spindle_rpm.to_bits();
+    let depth = |row: &PreparedRow| row.working.depth_mm.to_bits();
+    if prepared.measure == Measure::Displacement {
+        let longest = rows.iter().map(|row| row.time_s).fold(f64::MIN_POSITIVE, f64::max);
+        return Design {
+            smooth: Smooth::Along(rows.iter().map(|row| row.time_s / longest).collect()),
+            cell: numbered(&|row| [row.run as u64, depth(row), row.time_s.to_bits(), 0, 0]),
+            regressors: Vec::new(),
+            groupings: Vec::new(),
+            order: None,
+            fold: numbered(&|row| [row.run as u64, 0, 0, 0, 0]),
+        };
+    }
+    // The depth of a limit is what was measured, not where.
+    let limit = prepared.measure == Measure::DepthLimit;
+    let at_depth = |row: &PreparedRow| if limit { 0 } else { depth(row) };
+    let cell = numbered(&|row| {
+        let (speed, feed, clamped) = row.regime();
+        [speed, feed, clamped, at_depth(row), 0]
+    });
+    let per_speed = numbered(&|row| [speed(row), 0, 0, 0, 0]);
+    let mut groupings = vec![Grouping { name: "per_speed", group: per_speed.clone() }];
+    if !limit {
+        groupings.push(Grouping { name: "per_depth", group: numbered(&|row| [depth(row), 0, 0, 0, 0]) });
+        groupings.push(Grouping { name: "per_cell", group: cell.clone() });
+    }
+    let regressors = regressors(rows, &per_speed, &cell, limit);
+    Design { smooth: Smooth::None, cell, regressors, groupings, order: None, fold: per_speed }
+}
+
+/// Columns for the scatter without repeats: a level per speed where there are cells enough, for resonances are sharper than
+/// any parabola, and the logarithms of depth and feed with their squares.
+fn regressors(rows: &[PreparedRow], per_speed: &[usize], cell: &[usize], limit: bool) -> Vec<Vec<f64>> {
+    let count = |of: &[usize]| of.iter().copied().max().map_or(0, |most| most + 1);
+    let (speeds, cells) = (count(per_speed), count(cell));
+    let ln = |of: &dyn Fn(&PreparedRow) -> f64| -> Vec<f64> {
+        let values: Vec<f64> = rows.iter().map(|row| of(row).max(f64::MIN_POSITIVE).ln()).collect();
+        let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+        values.into_iter().map(|value| value - mean).collect()
+    };
+    let mut columns: Vec<Vec<f64>> = Vec::new();
+    if cells >= 2 * (speeds + 4) {
+        columns.extend((0..speeds).map(|s| per_speed.iter().map(|&of| f64::from(u8::from(of == s))).collect()));
+    } else {
+        let speed = ln(&|row| row.working.spindle_rpm);
+        let square = speed.iter().map(|v| v * v).collect();
+        columns.extend([vec![1.0; rows.len()], speed, square]);
+    }
+    let mut conditions = vec![ln(&|row| row.working.feed_mm)];
+    if !limit {
+        conditions.push(ln(&|row| row.working.depth_mm));
+    }
+    for column in conditions {
+        if column.iter().any(|value| value.abs() > 1e-9) {
+            columns.push(column.iter().map(|v| v * v).collect());
+            columns.push(column);
+        }
+    }
+    columns
+}

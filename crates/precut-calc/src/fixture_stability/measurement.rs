@@ -1,0 +1,95 @@
+//! A measured row of a workpiece that is milled in a vise.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::FixtureStability;
+use super::forward::FixturePoint;
+use crate::calculator::{MeasuredRow, Measurement};
+
+/// An amplitude at a depth, a point of a history, or a depth at which chatter began.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FixtureMeasurement {
+    /// Number of the run that states its speed and feed, from 1 in the order of `runs`.
+    #[serde(default = "one")]
+    #[schema(minimum = 1, maximum = 10_000, default = 1, example = 1, extensions(("x-unit" = json!("1"))))]
+    pub run: u32,
+    /// Number of the repetition; rows of one history stand in the order of time.
+    #[serde(default = "one")]
+    #[schema(minimum = 1, maximum = 10_000, default = 1, example = 1, extensions(("x-unit" = json!("1"))))]
+    pub repeat: u32,
+    /// Axial depth of cut, where the run does not state it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.0, maximum = 1000.0, example = 2.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("H"))))]
+    pub depth_mm: Option<f64>,
+    /// Time since the entry, of a displacement.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.0, maximum = 1000.0, example = 0.05, extensions(("x-unit" = json!("s")), ("x-symbol" = json!("t"))))]
+    pub time_s: Option<f64>,
+    /// Largest minus smallest displacement of the workpiece along the feed, in the settled cut.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.000_001, maximum = 1e6, example = 12.3, extensions(("x-unit" = json!("um"))))]
+    pub peak_to_peak_um: Option<f64>,
+    /// Displacement of the workpiece along the feed, positive toward the movable jaw.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = -1e6, maximum = 1e6, example = 4.5, extensions(("x-unit" = json!("um"))))]
+    pub displacement_um: Option<f64>,
+    /// Depth at which chatter began at this speed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.000_001, maximum = 1000.0, example = 3.2, extensions(("x-unit" = json!("mm"))))]
+    pub depth_limit_mm: Option<f64>,
+    /// Standard uncertainty of an amplitude or a displacement.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-9, maximum = 1e6, example = 0.2, extensions(("x-unit" = json!("um"))))]
+    pub uncertainty_um: Option<f64>,
+    /// Standard uncertainty of a depth limit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-9, maximum = 1000.0, example = 0.1, extensions(("x-unit" = json!("mm"))))]
+    pub uncertainty_mm: Option<f64>,
+    /// Whether the row is set aside: listed, not used.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    #[schema(default = false, example = false)]
+    pub excluded: bool,
+}
+
+fn one() -> u32 {
+    1
+}
+
+impl MeasuredRow for FixtureMeasurement {
+    const MAX_ROWS: usize = 20_000;
+}
+
+impl Measurement for FixtureMeasurement {
+    type Model = FixtureStability;
+
+    fn run(&self) -> u32 {
+        self.run
+    }
+
+    fn trace(&self) -> u32 {
+        self.repeat
+    }
+
+    fn point(&self) -> FixturePoint {
+        FixturePoint { depth_mm: self.depth_mm, repeat: Some(self.repeat), time_s: self.time_s }
+    }
+
+    fn value(&self, quantity: &str) -> Option<f64> {
+        match quantity {
+            "peak_to_peak_um" => self.peak_to_peak_um,
+            "displacement_um" => self.displacement_um,
+            "depth_limit_mm" => self.depth_limit_mm,
+            _ => None,
+        }
+    }
+
+    fn uncertainty(&self) -> Option<f64> {
+        if self.depth_limit_mm.is_some() { self.uncertainty_mm } else { self.uncertainty_um }
+    }
+
+    fn excluded(&self) -> bool {
+        self.excluded
+    }
+}

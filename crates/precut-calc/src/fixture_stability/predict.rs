@@ -1,0 +1,233 @@
+//! Predictions of measured rows; what rows of one working point share is computed once.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use crate::calculator::{Failure, JacobianColumn, Missing, Prediction, Unwatched};
+use crate::effects::{FixtureConditions, FixtureEffect};
+
+use super::acting::Case;
+use super::answer::{UM_PER_MM, forced};
+use super::check;
+use super::floquet::Working;
+use super::forward::Measure;
+use super::holding::Closed;
+use super::input::FixtureJob;
+use super::lobes::{Rules, critical_depth, point};
+use super::response::Response;
+use super::simulate::{count, plan, run as simulate};
+
+/// Step of a difference over time, s: below a tenth of a period of any vise.
+const TIME_STEP_S: f64 = 1e-5;
+/// Measured on one core, ms: a forced motion, a multiplier, a limit, a history.
+const FORCED_MS: f64 = 0.05;
+const MULTIPLIER_MS: f64 = 0.2;
+const LIMIT_MS: f64 = 2.0;
+const HISTORY_MS: f64 = 8.0;
+
+/// What no effect parameter changes.
+pub struct PreparedFixture {
+    pub(super) job: FixtureJob,
+    /// The job with the effects that it holds.
+    pub(super) base: Case,
+    pub(super) rows: Vec<PreparedRow>,
+    pub(super) measure: Measure,
+    rules: Rules,
+    /// Rows of one speed, feed and time since clamping.
+    groups: Vec<Vec<usize>>,
+}
+
+/// A measured row's working point.
+#[derive(Clone, Copy)]
+pub(super) struct PreparedRow {
+    /// Index of its run.
+    pub run: usize,
+    pub working: Working,
+    pub time_since_clamping_min: Option<f64>,
+    /// Of a history.
+    pub time_s: f64,
+}
+
+impl PreparedRow {
+    /// What all rows of one speed share, as keys: not negative, so their bits are in order.
+    pub(super) fn regime(&self) -> (u64, u64, u64) {
+        let clamped = self.time_since_clamping_min.unwrap_or(0.0);
+        (self.working.spindle_rpm.to_bits(), self.working.feed_mm.to_bits(), clamped.to_bits())
+    }
+}
+
+/// How rows are predicted.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Ask {
+    /// Whether a chattering point is to be found out.
+    pub whether_stable: bool,
+    /// How much later every row of a history is read, s.
+    pub later_s: f64,
+}
+
+impl Default for Ask {
+    fn default() -> Self {
+        Self { whether_stable: true, later_s: 0.0 }
+    }
+}
+
+impl PreparedFixture {
+    pub(super) fn new(job: FixtureJob, base: Case, rows: Vec<PreparedRow>, measure: Measure, rules: Rules) -> Self {
+        let mut groups: BTreeMap<_, Vec<usize>> = BTreeMap::new();
+        for (index, row) in rows.iter().enumerate() {
+            groups.entry(row.regime()).or_default().push(index);
+        }
+        Self { job, base, rows, measure, rules, groups: groups.into_values().collect() }
+    }
+
+    /// One value per row.
+    pub(super) fn predicted(&self, effects: &[FixtureEffect], ask: Ask) -> Result<Vec<Prediction>, Failure> {
+        let mut all = self.job.effects.clone();
+        all.extend_from_slice(effects);
+        let of_groups: Vec<Vec<(usize, Prediction)>> =
+            self.groups.par_iter().map(|rows| self.group(rows, &all, ask)).collect::<Result<_, _>>()?;
+        let mut predicted = vec![Err(Missing::NoSolution); self.rows.len()];
+        for (row, prediction) in of_groups.into_iter().flatten() {
+            predicted[row] = prediction;
+        }
+        Ok(predicted)
+    }
+
+    fn group(&self, rows: &[usize], effects: &[FixtureEffect], ask: Ask) -> Result<Vec<(usize, Prediction)>, Failure> {
+        let first = &self.rows[rows[0]];
+        let conditions = FixtureConditions { time_since_clamping_min: first.time_since_clamping_min };
+        let case = Case::with(&self.job, effects, &conditions)
+            .map(|case| Case { working: first.working, ..case })
+            .filter(check::holds);
+        let Some(case) = case else { return Ok(rows.iter().map(|&row| (row, Err(Missing::NoSolution))).collect()) };
+        let mut by_depth: BTreeMap<u64, Vec<usize>> = BTreeMap::new();
+        for &row in rows {
+            by_depth.entry(self.rows[row].working.depth_mm.to_bits()).or_default().push(row);
+        }
+        let mut unit = None;
+        let mut predicted = Vec::with_capacity(rows.len());
+        for rows in by_depth.into_values() {
+            let working = self.rows[rows[0]].working;
+            let case = Case { working, ..case.clone() };
+            if self.measure == Measure::Displacement {
+                predicted.extend(self.history(&case, &rows, ask)?);
+                continue;
+            }
+            let prediction = match self.measure {
+                Measure::PeakToPeak => self.peak_to_peak(&case, &mut unit, ask)?,
+                Measure::Regime | Measure::Displacement => self.margin(&case)?,
+                Measure::DepthLimit => {
+                    let most = 4.0 * working.depth_mm.max(2.5);
+                    critical_depth(&self.rules, &case.holding, &case.cutting, working, most)?.ok_or(Missing::NoSolution)
+                }
+            };
+            predicted.extend(rows.into_iter().map(|row| (row, prediction)));
+        }
+        Ok(predicted)
+    }
+
+    fn modulus(&self, case: &Case) -> Result<f64, Failure> {
+        Ok(point(&self.rules, &case.holding, &case.cutting, case.working, Closed::BOTH)?.multiplier.modulus)
+    }
+
+    /// The exact forced motion; a chattering point has no amplitude that a small change moves a little. `unit` is the
+    /// motion at 1 mm of depth, where the motion goes with H^(1-mu).
+    fn peak_to_peak(&self, case: &Case, unit: &mut Option<Response>, ask: Ask) -> Result<Prediction, Failure> {
+        if case.working.depth_mm <= 0.0 {
+            return Ok(Err(Missing::NoCut));
+        }
+        if ask.whether_stable && self.modulus(case)? >= 1.0 {
+            return Ok(Err(Missing::Unstable));
+        }
+        if !case.is_linear() {
+            return Ok(Ok(forced(case, case.working)?.x_mm.span() * UM_PER_MM));
+        }
+        let span = match unit {
+            Some(unit) => unit.x_mm.span(),
+            None => unit.insert(forced(case, case.at_depth(1.0))?).x_mm.span(),
+        };
+        Ok(Ok(span * case.cutting.depth_power(case.working.depth_mm) * UM_PER_MM))
+    }
+
+    /// -ln |mu|, or the relative reserve of the clamp force where that is smaller.
+    fn margin(&self, case: &Case) -> Result<Prediction, Failure> {
+        let growth = -self.modulus(case)?.max(1e-300).ln();
+        let Some(force) = case.holding.clamp_force_n.filter(|_| growth > 0.0) else { return Ok(Ok(growth)) };
+        let forced = forced(case, case.working)?;
+        let asked = forced.left_elastic_n.high.max(forced.right_elastic_n.high).max(0.0);
+        // At no clamp force any demand opens: the reserve is then as bad as it gets.
+        let reserve = if asked <= 0.0 { f64::INFINITY } else { ((force - asked) / asked).max(-1.0) };
+        Ok(Ok(growth.min(reserve)))
+    }
+
+    /// x at the times of these rows after the entry: one cut in time, as long as the last row within it asks.
+    fn history(&self, case: &Case, rows: &[usize], ask: Ask) -> Result<Vec<(usize, Prediction)>, Failure> {
+        if ask.whether_stable && self.modulus(case)? >= 1.0 {
+            return Ok(rows.iter().map(|&row| (row, Err(Missing::Unstable))).collect());
+        }
+        let tau = case.cutting.tooth_period_s(case.working.spindle_rpm);
+        let mut plan = plan(case, &self.job.simulation, case.working, 0.5);
+        let time = |row: usize| (self.rows[row].time_s + ask.later_s).max(0.0);
+        let periods = |row: usize| count((time(row) / tau).ceil() + 1.0);
+        let (early, late): (Vec<usize>, Vec<usize>) = rows.iter().partition(|&&row| periods(row) <= plan.tooth_periods);
+        let mut predicted = Vec::with_capacity(rows.len());
+        if !late.is_empty() {
+            // Long after the entry: the forced motion, in step with the tooth that entered at the start.
+            let forced = forced(case, case.working)?;
+            predicted.extend(late.into_iter().map(|row| (row, Ok(forced.x_at(time(row)) * UM_PER_MM))));
+        }
+        let Some(wanted) = early.iter().map(|&row| periods(row)).max() else { return Ok(predicted) };
+        plan.tooth_periods = wanted;
+        plan.steady_periods = 1;
+        plan.keep_first = wanted;
+        plan.unilateral = case.holding.clamp_force_n.is_some();
+        let steps = simulate(case, &plan, &Unwatched)?.first;
+        predicted.extend(early.into_iter().map(|row| {
+            let after = steps.partition_point(|step| step.time_s <= time(row)).clamp(1, steps.len().max(2) - 1);
+            let value = match (steps.get(after - 1), steps.get(after)) {
+                (Some(p), Some(q)) => {
+                    let share = (time(row) - p.time_s) / (q.time_s - p.time_s);
+                    Ok((p.x_mm + share * (q.x_mm - p.x_mm)) * UM_PER_MM)
+                }
+                _ => Err(Missing::NoSolution),
+            };
+            (row, value)
+        }));
+        Ok(predicted)
+    }
+
+    /// What a late zero of time does to the history of each run.
+    pub(super) fn late_by_ms(&self, late_ms: f64) -> Result<Vec<JacobianColumn>, Failure> {
+        let at = |later_s: f64| self.predicted(&[], Ask { later_s, ..Ask::default() });
+        let (before, after) = (at(-TIME_STEP_S)?, at(TIME_STEP_S)?);
+        let slopes: Vec<f64> = before
+            .iter()
+            .zip(&after)
+            .map(|pair| match pair {
+                (Ok(before), Ok(after)) => (after - before) / (2.0 * TIME_STEP_S),
+                _ => 0.0,
+            })
+            .collect();
+        let runs = self.rows.iter().map(|row| row.run).max().map_or(0, |most| most + 1);
+        let column = |run: usize| -> JacobianColumn {
+            let moved = |(row, slope): (&PreparedRow, &f64)| if row.run == run { 1e-3 * late_ms * slope } else { 0.0 };
+            self.rows.iter().zip(&slopes).map(moved).collect()
+        };
+        Ok((0..runs).filter(|&run| self.rows.iter().any(|row| row.run == run)).map(column).collect())
+    }
+
+    /// Expected time of one prediction, ms.
+    pub(super) fn predict_ms(&self) -> f64 {
+        let mut cells: Vec<_> = self.rows.iter().map(|row| (row.regime(), row.working.depth_mm.to_bits())).collect();
+        cells.sort_unstable();
+        cells.dedup();
+        let (groups, cells) = (self.groups.len() as f64, cells.len() as f64);
+        match self.measure {
+            Measure::PeakToPeak => FORCED_MS * groups + MULTIPLIER_MS * cells,
+            Measure::Regime => (FORCED_MS + MULTIPLIER_MS) * cells,
+            Measure::DepthLimit => LIMIT_MS * cells,
+            Measure::Displacement => HISTORY_MS * cells,
+        }
+    }
+}
