@@ -71,7 +71,10 @@ fn every_operation_is_described_with_its_parameters_and_problems() {
                 assert!(parameter["description"].as_str().is_some_and(|text| text.len() > 10), "{parameter} of {at}");
             }
             let responses = operation["responses"].as_object().unwrap();
-            assert!((responses.contains_key("200") || responses.contains_key("204")) && responses.contains_key("500"), "{at}");
+            assert!(
+                (responses.contains_key("200") || responses.contains_key("204")) && responses.contains_key("500"),
+                "{at}"
+            );
             let needs_key = path.starts_with("/v1/") || path == "/metrics";
             assert_eq!(responses.contains_key("401"), needs_key, "{at}");
             assert_eq!(operation.get("security").is_some(), needs_key, "{at}");

@@ -361,7 +361,7 @@ fn clamp_force(study: &Study<'_>) -> Result<ClampForce, Failure> {
     Ok(ClampForce {
         least_n,
         least_with_entry_n,
-        binding_joint: (least_n > 0.0).then(|| if movable > fixed { OpenJoint::Movable } else { OpenJoint::Fixed }),
+        binding_joint: (least_n > 0.0).then_some(if movable > fixed { OpenJoint::Movable } else { OpenJoint::Fixed }),
         movable_n: movable,
         fixed_n: fixed,
         movable_elastic_n: movable_elastic.max(0.0),

@@ -169,7 +169,8 @@ fn elements(cutting: &Cutting, stretch: &Stretch, seconds_per_rad: f64, radius_r
     let longest = (LONGEST / (radius_rad_per_s * seconds_per_rad)).min(LONGEST_RAD);
     let count = (length / longest).ceil().max(1.0);
     let even = length / count;
-    let count = (1..).take_while(|&n| f64::from(n) <= count).last().unwrap_or(1_u32);
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // whole, from 1 to some thousands
+    let count = count as u32;
     let mut lengths: Vec<f64> = (0..count).map(|_| even).collect();
     if cutting.chip_exponent > 0.0 && stretch.teeth > 0 {
         let (start, end) = cutting.distance_from_root_rad(stretch);

@@ -141,12 +141,11 @@ impl<'a, const N: usize, const P: usize> Column<'a, N, P> {
     }
 
     fn modulus(&self, depth_mm: f64) -> Result<f64, Failure> {
-        let found = match &self.plan {
-            Some(plan) => plan.multiplier(self.cutting.level(depth_mm), self.residual).ok_or_else(unsolved)?,
-            None => {
-                let working = Working { depth_mm, ..self.working };
-                at(self.rule, self.system, self.holding, self.cutting, working, Closed::BOTH, self.residual)?
-            }
+        let found = if let Some(plan) = &self.plan {
+            plan.multiplier(self.cutting.level(depth_mm), self.residual).ok_or_else(unsolved)?
+        } else {
+            let working = Working { depth_mm, ..self.working };
+            at(self.rule, self.system, self.holding, self.cutting, working, Closed::BOTH, self.residual)?
         };
         Ok(found.modulus)
     }

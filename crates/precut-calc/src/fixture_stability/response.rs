@@ -262,7 +262,9 @@ impl<'a, const N: usize> Elements<'a, N> {
                 let length = stretch.length_rad() / count;
                 propagators.push(Propagator::new(&rule, &a, &system.b, length * seconds_per_rad));
                 matrices.push((a, length));
-                (length, (1..).take_while(|&n| n as f64 <= count).last().unwrap_or(1_usize))
+                #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // whole, from 4 to some thousands
+                let count = count as usize;
+                (length, count)
             })
             .collect();
         for phase in 0..cutting.phases() {
@@ -299,9 +301,11 @@ impl<'a, const N: usize> Elements<'a, N> {
         let propagator = &self.propagators[piece.propagator];
         let mut x: [f64; POINTS] = std::array::from_fn(|i| {
             let mut sum = 0.0;
+            #[allow(clippy::needless_range_loop)] // indices as in the formula
             for k in 0..N {
                 sum += propagator.at_points[i][k] * q[k];
             }
+            #[allow(clippy::needless_range_loop)] // indices as in the formula
             for j in 0..POINTS {
                 let fixed = force_share * (piece.force_n[j] + 2.0 * hardening * known[j].powi(3));
                 sum += propagator.points_by_force[i][j] * fixed;
@@ -325,6 +329,7 @@ impl<'a, const N: usize> Elements<'a, N> {
         for j in 0..POINTS {
             let own = 3.0 * hardening * known[j] * known[j] * x[j];
             let force = force_share * (piece.force_n[j] + 2.0 * hardening * known[j].powi(3)) - own;
+            #[allow(clippy::needless_range_loop)] // indices as in the formula
             for k in 0..N {
                 end[k] += propagator.end_by_force[j][k] * force;
             }
@@ -334,6 +339,7 @@ impl<'a, const N: usize> Elements<'a, N> {
 
     fn sweep(&self, start: &[f64; N], force_share: f64, known: &Known, hardening: f64) -> [f64; N] {
         let mut q = *start;
+        #[allow(clippy::needless_range_loop)] // indices as in the formula
         for index in 0..self.pieces.len() {
             q = self.step(index, &q, force_share, &known[index], hardening).1;
         }
@@ -393,6 +399,7 @@ impl<'a, const N: usize> Elements<'a, N> {
             let rate = |q: &[f64; N], force: f64| -> [f64; N] {
                 let mut rate = times(a, q);
                 let spring = hardening * q[0].powi(3);
+                #[allow(clippy::needless_range_loop)] // indices as in the formula
                 for k in 0..N {
                     rate[k] += self.system.b[k] * (force - spring);
                 }

@@ -153,8 +153,7 @@ impl<'a> Problem<'a> {
                 let growth = modulus.max(1e-300).ln();
                 let wrong = || huber(WRONG_SIDE.0 + WRONG_SIDE.1 * growth.abs().min(10.0));
                 sum += match (growth > 0.0, self.jumped[row]) {
-                    (false, true) => wrong(),
-                    (true, false) => wrong(),
+                    (false, true) | (true, false) => wrong(),
                     (true, true) => 0.0,
                     (false, false) => {
                         let scale = cut.cutting.depth_power(self.job.measurements.rows()[row].depth_mm);
@@ -336,7 +335,7 @@ fn mark_jumps(job: &IdentificationJob, group: &Group, jumped: &mut [bool]) {
 pub(super) fn onset_mm(problem: &Problem<'_>, group: &Group) -> (Option<f64>, Option<f64>) {
     let depth = |row: &&usize| problem.job.measurements.rows()[**row].depth_mm;
     let with_value = |row: &&usize| problem.job.measurements.rows()[**row].amplitude_um.is_some();
-    let below = group.rows.iter().filter(with_value).filter(|row| !problem.jumped[**row]).next_back();
+    let below = group.rows.iter().filter(with_value).rfind(|row| !problem.jumped[**row]);
     let above = group.rows.iter().find(|row| problem.jumped[**row]);
     (below.as_ref().map(depth), above.as_ref().map(depth))
 }

@@ -187,6 +187,7 @@ fn last_component(hessenberg: &[f64], ld: usize, size: usize, (re, im): (f64, f6
     for row in (1..size).rev() {
         // (H - theta) y = 0 in this row gives the component before.
         let (mut sum_re, mut sum_im) = (-re * y[row].0 + im * y[row].1, -re * y[row].1 - im * y[row].0);
+        #[allow(clippy::needless_range_loop)] // indices as in the formula
         for j in row..size {
             sum_re += h(row, j) * y[j].0;
             sum_im += h(row, j) * y[j].1;

@@ -111,13 +111,16 @@ impl<const N: usize, const P: usize> Active<N, P> {
         let mut end = times(&self.whole, q);
         for i in 0..P {
             let mut x = 0.0;
+            #[allow(clippy::needless_range_loop)] // indices as in the formula
             for j in 0..P {
                 x += self.by_history[i][j] * before[j];
             }
+            #[allow(clippy::needless_range_loop)] // indices as in the formula
             for k in 0..N {
                 x += self.by_state[i][k] * q[k];
             }
             let force = self.present[i] * x + self.delayed[i] * before[i];
+            #[allow(clippy::needless_range_loop)] // indices as in the formula
             for k in 0..N {
                 end[k] -= self.end_by_force[i][k] * force;
             }

@@ -25,7 +25,7 @@ impl<const P: usize> Rule<P> {
         let mut points = [0.0; P];
         points.copy_from_slice(&gauss);
         // Of degree TERMS + P - 1 at most: exact on so many points.
-        let (fine, weight) = gauss_legendre((TERMS + P) / 2 + 1);
+        let (fine, weight) = gauss_legendre(usize::midpoint(TERMS, P) + 1);
         let mut moment = vec![[[0.0; P]; P]; TERMS];
         let mut moment_end = vec![[0.0; P]; TERMS];
         let fill = |end: f64, row: &mut dyn FnMut(usize, usize, f64)| {
@@ -144,6 +144,7 @@ impl<const N: usize, const P: usize> Propagator<N, P> {
                     at_points[i][k] += powers[i] * row[k];
                 }
                 powers[i] *= rule.points[i];
+                #[allow(clippy::needless_range_loop)] // indices as in the formula
                 for j in 0..P {
                     points_by_force[i][j] += force[0] * rule.moment[m][i][j];
                 }
