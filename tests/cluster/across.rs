@@ -75,8 +75,12 @@ async fn any_api_answers_for_any_job_and_a_cancel_reaches_its_worker() {
     // The worker has its place again as soon as it has given the job up.
     let next = one.accepted(BAR, &json!({"length_mm": 501, "load_n": 10, "duration_ms": 1})).await;
     one.job_in(&next, "succeeded").await;
-    until("the worker to give the job up", async || (worker.figure("precut_jobs_total{").await >= 3.0).then_some(())).await;
-    println!("cancel across processes: told after {told:.1?}, given up by its worker after {:.1?}", cancelled.elapsed());
+    until("the worker to give the job up", async || (worker.figure("precut_jobs_total{").await >= 3.0).then_some(()))
+        .await;
+    println!(
+        "cancel across processes: told after {told:.1?}, given up by its worker after {:.1?}",
+        cancelled.elapsed()
+    );
     for member in [one, other, worker] {
         member.stop();
     }

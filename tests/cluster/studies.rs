@@ -47,7 +47,8 @@ async fn a_study_is_spread_over_the_workers_and_has_the_same_bytes_as_on_one_mac
     let workers = [Member::start(&database, "worker", &slots).await, Member::start(&database, "worker", &slots).await];
     let (together, together_s) = run(&api, &study).await;
     assert_eq!(alone, together);
-    let helped: f64 = workers[0].figure("precut_jobs_helped_total").await + workers[1].figure("precut_jobs_helped_total").await;
+    let helped: f64 =
+        workers[0].figure("precut_jobs_helped_total").await + workers[1].figure("precut_jobs_helped_total").await;
     assert!(helped > 0.0, "the other worker has helped");
 
     // And as with the embedded store.
@@ -85,7 +86,10 @@ async fn a_study_survives_whoever_runs_it_and_whoever_helps() {
     api.job_in(&address, "running").await;
     let pool = database.pool().await;
     let done = async || -> i64 {
-        sqlx::query_scalar("SELECT count(*) FROM precut.studies WHERE points IS NOT NULL").fetch_one(&pool).await.unwrap()
+        sqlx::query_scalar("SELECT count(*) FROM precut.studies WHERE points IS NOT NULL")
+            .fetch_one(&pool)
+            .await
+            .unwrap()
     };
     until("some parts", async || (done().await >= 3).then_some(())).await;
     // Two of three are killed: whoever runs it is among them, or else both who help.

@@ -11,16 +11,18 @@ use tokio::sync::{OnceCell, mpsc};
 
 use super::*;
 use crate::store::address::StoreAddress;
-use crate::store::jobs::{
-    Accepted, Beat, Changed, Claimed, Ending, JobId, JobState, JobStore, Lease, NewJob, News,
-};
+use crate::store::jobs::{Accepted, Beat, Changed, Claimed, Ending, JobId, JobState, JobStore, Lease, NewJob, News};
 use crate::store::suite::{MOST, PROBLEM, Place, job, keep, key, result, suite};
 use crate::store::{ResultStore, Store, Taken};
 
 const SERVER: &str = "PRECUT_TEST_POSTGRES";
 /// Tests that do not look at waiting do not wait.
-const AT_ONCE: Patience =
-    Patience { start: Duration::from_secs(5), lease: Duration::from_secs(4), grace: Duration::ZERO, lost: Duration::ZERO };
+const AT_ONCE: Patience = Patience {
+    start: Duration::from_secs(5),
+    lease: Duration::from_secs(4),
+    grace: Duration::ZERO,
+    lost: Duration::ZERO,
+};
 
 fn server() -> Option<String> {
     std::env::var(SERVER).ok()

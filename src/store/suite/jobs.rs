@@ -298,4 +298,3 @@ pub(in crate::store) async fn the_queue_hands_out_each_task_once_and_no_more_tha
     assert_eq!(seen, expected);
     assert_eq!(most.load(Ordering::SeqCst), 2);
 }
-
