@@ -2,6 +2,7 @@
 //! becomes `{name, revision, sha256}`, so that a model that is revised or deleted later changes no accepted job.
 
 use std::borrow::Cow;
+use std::fmt::Write as _;
 
 use precut_calc::calculator::{Finding, Message, Unwatched, Violations};
 use serde::{Deserialize, Serialize};
@@ -9,7 +10,7 @@ use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
 
 use super::read::Ready;
-use crate::registry::{Entry, ModelUse, Prepared, Registry, canonical, nearest};
+use crate::registry::{Entry, ModelUse, Prepared, Registry, canonical, child, nearest};
 use crate::store::models::KeptModel;
 
 /// The field of a job that names a model.
@@ -56,7 +57,10 @@ impl ModelContent {
 
 /// SHA-256 of a text, hexadecimal.
 pub(crate) fn sha256(text: &str) -> String {
-    Sha256::digest(text.as_bytes()).iter().map(|byte| format!("{byte:02x}")).collect()
+    Sha256::digest(text.as_bytes()).iter().fold(String::new(), |mut hex, byte| {
+        let _ = write!(hex, "{byte:02x}");
+        hex
+    })
 }
 
 /// A name with the revision asked for, `name` or `name@3`.
@@ -110,7 +114,7 @@ fn within<'a>(job: &'a mut Value, path: &[&str]) -> Option<&'a mut Map<String, V
 }
 
 fn pointer(path: &[&str], name: &str) -> String {
-    path.iter().chain([&name]).map(|part| format!("/{part}")).collect()
+    path.iter().chain([&name]).fold(String::new(), |pointer, part| child(&pointer, part))
 }
 
 /// The model that a job as it came names, without looking at the rest of it.

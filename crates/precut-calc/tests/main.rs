@@ -17,6 +17,8 @@ mod diagnosis_ring_trials;
 mod diagnosis_trials;
 mod feed_benchmarks;
 mod feed_claims;
+mod feed_diagnosis;
+mod feed_diagnosis_trials;
 mod feed_effects;
 mod feed_properties;
 mod feed_reference;

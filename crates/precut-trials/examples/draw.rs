@@ -3,11 +3,11 @@
 
 use std::io::{Error, Write};
 
-use precut_trials::{Class, deflection, fixture, ring};
+use precut_trials::{Class, deflection, fixture, machinability, ring};
 
 fn main() -> Result<(), Error> {
     let given: Vec<String> = std::env::args().skip(1).collect();
-    let usage = || Error::other("draw deflection|ring|fixture nothing|one|two|outside <signal to noise> <seed>");
+    let usage = || Error::other("draw deflection|ring|fixture|machinability nothing|one|two|outside <signal to noise> <seed>");
     let [of, class, snr, seed] = &given[..] else { return Err(usage()) };
     let class = match class.as_str() {
         "nothing" => Class::Nothing,
@@ -21,6 +21,7 @@ fn main() -> Result<(), Error> {
         "deflection" => deflection::draw(class, snr, seed),
         "ring" => ring::draw(class, snr, seed),
         "fixture" => fixture::draw(class, snr, seed),
+        "machinability" => machinability::draw(class, snr, seed),
         _ => return Err(usage()),
     };
     writeln!(std::io::stderr(), "{:?}, scatter {:.3}", trial.truth, trial.sigma)?;

@@ -1,12 +1,14 @@
 //! Blind trials: jobs and measurements in which an effect is hidden, for testing a diagnosis.
 //!
 //! Nothing here is shared with the calculators: another discretisation (a shear-flexible finite-element
-//! beam on springs; a ring turned in even steps that know no nodes; a cut in a vise by Runge-Kutta steps), another solver (bisection, fixed point), another noise law (Student-t with six degrees of freedom,
+//! beam on springs; a ring turned in even steps that know no nodes; a cut in a vise by Runge-Kutta steps; cuts as
+//! products of powers), another solver (bisection, fixed point), another noise law (Student-t with six degrees of freedom,
 //! uneven and correlated), nuisances drawn uniformly inside the allowances, and errors of the machine that
 //! are not fed back into the depth of cut. A test that refits its own generator proves nothing.
 
 pub mod deflection;
 pub mod fixture;
+pub mod machinability;
 mod random;
 pub mod ring;
 pub mod score;

@@ -37,6 +37,11 @@ pub trait Diagnosable:
     /// range, or started afresh. None where a job has no runs.
     fn next_runs(job: &Self::Job, rows: &Rows<Self::Run, Self::Point>) -> Vec<NextRun<Self::Run, Self::Point>>;
 
+    /// How many times rows are held back: for the time that it takes.
+    fn folds(_rows: usize, runs: usize) -> usize {
+        runs.clamp(1, 30)
+    }
+
     /// Values of a hypothesis' first size about which the model is linearised, too, beside 0: where what the size does is
     /// far from proportional to it.
     fn expansions(_prepared: &Self::Prepared, _hypothesis: &Hypothesis) -> Vec<f64> {
@@ -82,6 +87,10 @@ pub trait Measurement {
     fn value(&self, quantity: &str) -> Option<f64>;
     /// Standard uncertainty, in the quantity's unit.
     fn uncertainty(&self) -> Option<f64>;
+    /// Standard uncertainty of one quantity, where a row has several.
+    fn uncertainty_of(&self, _quantity: &str) -> Option<f64> {
+        self.uncertainty()
+    }
     /// Whether the user set it aside.
     fn excluded(&self) -> bool;
 }

@@ -27,6 +27,8 @@ pub enum Inapplicability {
     ConditionAbsent(&'static str),
     /// This condition is the same in all runs.
     ConditionConstant(&'static str),
+    /// This condition has two levels: a bend cannot be told from a slope.
+    ConditionAtTwoLevels(&'static str),
     /// The job has nothing that it could act on (no steady rest, no tailstock).
     NothingToActOn,
     /// The job holds it already.

@@ -66,7 +66,8 @@ impl<M: Diagnosable> Calculator for Diagnosis<M> {
     fn cost(job: &Self::Input) -> Cost {
         // Measured: about 25 ms for 400 rows and 18 causes without folds; folds repeat it.
         let rows = job.measurements.rows().len() as f64;
-        let folds = if job.options.held_out { 1.0 + job.runs.len().clamp(1, 30) as f64 } else { 1.0 };
+        let held_out = if job.options.held_out { M::folds(job.measurements.rows().len(), job.runs.len()) } else { 0 };
+        let folds = 1.0 + held_out as f64;
         let bytes = 1_000_000 + 8 * 400 * job.measurements.rows().len() as u64;
         let predictions = M::predict_ms(&job.job) * job.runs.len().max(1) as f64 * PREDICTIONS;
         let statistics = 1.0 + 0.08 * rows * folds;
@@ -126,7 +127,7 @@ fn data<M: Diagnosable>(job: &JobOf<M>, used: &[usize], design: crate::calculato
     let rows = job.measurements.rows();
     let logarithmic = M::QUANTITIES.iter().any(|known| known.name == job.quantity && known.logarithmic);
     let raw: Vec<f64> = used.iter().map(|&row| rows[row].value(&job.quantity).unwrap_or(0.0)).collect();
-    let stated: Option<Vec<f64>> = used.iter().map(|&row| rows[row].uncertainty()).collect();
+    let stated: Option<Vec<f64>> = used.iter().map(|&row| rows[row].uncertainty_of(&job.quantity)).collect();
     let uncertainty = stated.filter(|_| !used.is_empty()).map(|stated| {
         let relative = |(u, value): (f64, &f64)| if logarithmic { u / value.abs() } else { u };
         stated.into_iter().zip(&raw).map(relative).collect()

@@ -199,7 +199,7 @@ pub struct CauseReport {
 pub struct NotApplicable {
     /// Kind of the effect.
     pub kind: String,
-    /// `condition_absent`, `condition_constant`, `nothing_to_act_on`, `in_job`, `scatter_only`, `not_asked_for`, `too_small`.
+    /// `condition_absent`, `condition_constant`, `condition_at_two_levels`, `nothing_to_act_on`, `in_job`, `scatter_only`, `not_asked_for`, `too_small`.
     pub reason: String,
     /// The condition that is absent or does not vary.
     pub condition: Option<String>,

@@ -324,6 +324,7 @@ fn not_applicable<M: Diagnosable>(bound: &Bound<M>, weighing: &Weighing<'_>) -> 
         match entry.reason {
             Inapplicability::ConditionAbsent(field) => report(kind, "condition_absent", Some(field)),
             Inapplicability::ConditionConstant(field) => report(kind, "condition_constant", Some(field)),
+            Inapplicability::ConditionAtTwoLevels(field) => report(kind, "condition_at_two_levels", Some(field)),
             Inapplicability::NothingToActOn => report(kind, "nothing_to_act_on", None),
             Inapplicability::InJob => report(kind, "in_job", None),
             Inapplicability::ScatterOnly => report(kind, "scatter_only", None),

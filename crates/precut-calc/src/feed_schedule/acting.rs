@@ -78,7 +78,10 @@ impl ActingModel {
             offset: 0.0,
             floor: None,
         };
-        for effect in effects {
+        // A wear-in stands in place of the model: whatever else acts, acts on it.
+        let (instead, beside): (Vec<&Effect>, Vec<&Effect>) =
+            effects.partition(|effect| matches!(effect, Effect::WearIn { .. }));
+        for effect in instead.into_iter().chain(beside) {
             acting.add(effect, conditions, reference, depth_mm.ln(), angle_deg.map(f64::ln));
         }
         acting

@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::calculator::{
-    Cost, Failure, Finding, ForwardModel, JacobianColumn, Missing, Monitor, Prediction, PrepareError, Quantity, Rows,
+    Cost, Design, Diagnosable, Example, Failure, Finding, ForwardModel, Hypotheses, Hypothesis, JacobianColumn,
+    Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Rows,
 };
 use crate::effects::{
     Cause, FactorLevel, MACHINABILITY_CAUSES, MachinabilityConditions, MachinabilityEffect as Effect,
@@ -13,13 +14,42 @@ use crate::machinability::{MachinabilityModel, ModelForm};
 
 use super::FeedSchedule;
 use super::acting::ActingModel;
+use super::design::{MOST_FOLDS, design};
+use super::hypotheses::expansions;
 use super::input::{Job, Reference};
+use super::levels::{self, NamedLevel};
+use super::measurement::MachinabilityMeasurement;
 use super::models::Output;
+use super::next_runs::next_runs;
 
-/// Conditions that all measurements of a run share; what it leaves out is taken from the job.
+/// Conditions that all measurements of a run share.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MachinabilityRun {
+    /// Cutting speed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-2, maximum = 20_000.0, example = 60.0, extensions(("x-unit" = json!("m/min")), ("x-symbol" = json!("V"))))]
+    pub speed_m_per_min: Option<f64>,
+    /// Feed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-4, maximum = 20.0, example = 0.2, extensions(("x-unit" = json!("mm/rev")), ("x-symbol" = json!("S"))))]
+    pub feed_mm_per_rev: Option<f64>,
+    /// Depth of cut.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-4, maximum = 1000.0, example = 0.5, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("t"))))]
+    pub depth_mm: Option<f64>,
+    /// Major cutting edge angle.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1.0, maximum = 179.0, example = 75.0, extensions(("x-unit" = json!("deg")), ("x-symbol" = json!("phi"))))]
+    pub cutting_edge_angle_deg: Option<f64>,
+    /// Nose radius of the insert.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.01, maximum = 100.0, example = 0.8, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("r"))))]
+    pub nose_radius_mm: Option<f64>,
+    /// Flank wear of the edge.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.0, maximum = 10.0, example = 0.2, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("VB"))))]
+    pub flank_wear_mm: Option<f64>,
     /// Batch of the material.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(max_length = 64, example = "B")]
@@ -28,25 +58,40 @@ pub struct MachinabilityRun {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schema(max_items = 20)]
     pub factors: Vec<FactorLevel>,
+    /// Place in the order of the tests.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.0, maximum = 1e9, example = 7.0, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("test"))))]
+    pub test: Option<f64>,
+    /// Time that the edge had been in the cut.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.0, maximum = 1e6, example = 5.0, extensions(("x-unit" = json!("min")), ("x-symbol" = json!("T"))))]
+    pub time_min: Option<f64>,
 }
 
-/// The cut in which a value was measured; what it leaves out is taken from the job.
+/// The cut in which a value was measured; what it leaves out is taken from its run, then from the job.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MachinabilityPoint {
     /// Cutting speed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-2, maximum = 20_000.0, example = 60.0, extensions(("x-unit" = json!("m/min")), ("x-symbol" = json!("V"))))]
-    pub speed_m_per_min: f64,
+    pub speed_m_per_min: Option<f64>,
     /// Feed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-4, maximum = 20.0, example = 0.2, extensions(("x-unit" = json!("mm/rev")), ("x-symbol" = json!("S"))))]
-    pub feed_mm_per_rev: f64,
+    pub feed_mm_per_rev: Option<f64>,
     /// Depth of cut.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-4, maximum = 1000.0, example = 0.5, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("t"))))]
-    pub depth_mm: f64,
+    pub depth_mm: Option<f64>,
     /// Major cutting edge angle.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1.0, maximum = 179.0, example = 75.0, extensions(("x-unit" = json!("deg")), ("x-symbol" = json!("phi"))))]
     pub cutting_edge_angle_deg: Option<f64>,
+    /// Nose radius of the insert.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.01, maximum = 100.0, example = 0.8, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("r"))))]
+    pub nose_radius_mm: Option<f64>,
     /// Flank wear of the edge.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 0.0, maximum = 10.0, example = 0.2, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("VB"))))]
@@ -73,19 +118,19 @@ pub struct MachinabilityPoint {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MachinabilityAllowances {
-    /// Level of the output, relative, one standard deviation.
-    #[serde(default = "no_allowance")]
-    #[schema(minimum = 0.0, maximum = 10.0, default = 0.0, example = 0.05, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("a_level"))))]
+    /// Level of the output, as a share, one standard deviation.
+    #[serde(default = "level_rel")]
+    #[schema(minimum = 0.0, maximum = 10.0, default = 0.01, example = 0.05, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("a_level"))))]
     pub level_rel: f64,
 }
 
-fn no_allowance() -> f64 {
-    0.0
+fn level_rel() -> f64 {
+    0.01
 }
 
 impl Default for MachinabilityAllowances {
     fn default() -> Self {
-        Self { level_rel: no_allowance() }
+        Self { level_rel: level_rel() }
     }
 }
 
@@ -99,21 +144,30 @@ const QUANTITIES: &[Quantity] = &[
     Quantity { name: "flank_wear_mm", unit: "mm", logarithmic: true },
 ];
 
+/// Codes of the faults found here.
+pub(super) const CODES: &[&str] = &["regime_incomplete"];
+
 /// What no effect parameter changes.
 pub struct PreparedMachinability {
-    model: MachinabilityModel,
+    pub(super) model: MachinabilityModel,
+    /// The output's name in `models`.
+    pub(super) output: String,
     /// Effects of the job on this output.
-    own: Vec<Effect>,
-    reference: Reference,
-    rows: Vec<Row>,
+    pub(super) own: Vec<Effect>,
+    pub(super) reference: Reference,
+    pub(super) rows: Vec<Row>,
+    pub(super) named: Vec<NamedLevel>,
 }
 
-struct Row {
-    u: f64,
-    x: f64,
-    depth_mm: f64,
-    angle_deg: Option<f64>,
-    conditions: MachinabilityConditions,
+/// The cut behind a row.
+pub(super) struct Row {
+    pub(super) u: f64,
+    pub(super) x: f64,
+    pub(super) depth_mm: f64,
+    pub(super) angle_deg: Option<f64>,
+    pub(super) nose_radius_mm: Option<f64>,
+    pub(super) conditions: MachinabilityConditions,
+    pub(super) test: Option<f64>,
 }
 
 /// The model behind a quantity, and its name among the outputs: `roughness_um`, or a further output by its own name,
@@ -157,17 +211,24 @@ impl ForwardModel for FeedSchedule {
             ]));
         };
         let mut faults = Vec::new();
+        let mut cuts = Vec::with_capacity(rows.points.len());
         for (k, (run, point)) in rows.points.iter().enumerate() {
-            if *run >= rows.runs.len() {
+            let Some(shared) = rows.runs.get(*run) else {
                 faults.push(Finding::new("unknown_run", format!("/measurements/{k}/run")).with("run", *run));
+                continue;
+            };
+            let cut = row(job, shared, point);
+            if let Err(field) = &cut {
+                faults.push(Finding::new("regime_incomplete", format!("/measurements/{k}/{field}")));
             }
-            let angle = point.cutting_edge_angle_deg.or(job.cutting_edge_angle_deg);
+            let angle = point.cutting_edge_angle_deg.or(shared.cutting_edge_angle_deg).or(job.cutting_edge_angle_deg);
             if model.needs_angle() && angle.is_none() {
                 faults.push(
                     Finding::new("edge_angle_missing", format!("/measurements/{k}/cutting_edge_angle_deg"))
                         .with("model", name.to_owned()),
                 );
             }
+            cuts.extend(cut.ok());
         }
         if !faults.is_empty() {
             return Err(PrepareError::Invalid(faults));
@@ -175,8 +236,10 @@ impl ForwardModel for FeedSchedule {
         let own = job.effects.iter().filter(|effect| effect.output().is_none_or(|output| output == name)).cloned();
         Ok(PreparedMachinability {
             own: own.collect(),
-            reference: reference(job, rows),
-            rows: rows.points.iter().map(|(run, point)| row(job, &rows.runs[*run], point)).collect(),
+            reference: reference(job, &cuts),
+            named: levels::named(&job.conditions, &cuts, name),
+            rows: cuts,
+            output: name.to_owned(),
             model,
         })
     }
@@ -193,12 +256,8 @@ impl ForwardModel for FeedSchedule {
         prepared: &PreparedMachinability,
         allowances: &MachinabilityAllowances,
     ) -> Result<Vec<JacobianColumn>, Failure> {
-        // The level: relative, so the column is the prediction itself times the allowance.
-        let column = Self::predict(prepared, &[])?
-            .into_iter()
-            .map(|value| value.map_or(0.0, |value| value * allowances.level_rel))
-            .collect();
-        Ok(vec![column])
+        // Residuals are taken of logarithms: a share of the level is the same on every row.
+        Ok(vec![vec![allowances.level_rel; prepared.rows.len()]])
     }
 
     fn predict_cost(prepared: &PreparedMachinability) -> Cost {
@@ -211,11 +270,74 @@ impl ForwardModel for FeedSchedule {
     }
 }
 
+impl Diagnosable for FeedSchedule {
+    type Row = MachinabilityMeasurement;
+
+    const DIAGNOSES: &'static [Example] = &[Example {
+        id: "built_up_edge",
+        title: "Roughness of 69 cuts: a built-up edge at low speed that the model does not know",
+        job: include_str!("examples/diagnosis_built_up_edge.json"),
+    }];
+
+    fn hypotheses(prepared: &PreparedMachinability) -> Hypotheses {
+        prepared.hypotheses()
+    }
+
+    fn effects(prepared: &PreparedMachinability, hypothesis: &Hypothesis, values: &[f64]) -> Option<Vec<Effect>> {
+        prepared.effects_of(hypothesis, values)
+    }
+
+    fn design(prepared: &PreparedMachinability) -> Design {
+        design(prepared)
+    }
+
+    fn next_runs(
+        job: &Job,
+        rows: &Rows<MachinabilityRun, MachinabilityPoint>,
+    ) -> Vec<NextRun<MachinabilityRun, MachinabilityPoint>> {
+        let cuts: Vec<Row> =
+            rows.points.iter().filter_map(|(run, point)| row(job, rows.runs.get(*run)?, point).ok()).collect();
+        next_runs(&cuts)
+    }
+
+    fn folds(rows: usize, _runs: usize) -> usize {
+        rows.min(MOST_FOLDS)
+    }
+
+    fn expansions(_prepared: &PreparedMachinability, hypothesis: &Hypothesis) -> Vec<f64> {
+        expansions(hypothesis)
+    }
+}
+
 impl PreparedMachinability {
+    /// The base at the reference, where effects that are shares of the output have their scale.
+    pub(super) fn value_at_reference(&self) -> f64 {
+        let typical = &self.reference;
+        let model = &self.model;
+        let depth = typical.depth_mm.unwrap_or(1.0);
+        let l = model.constant_at(depth, typical.cutting_edge_angle_deg)
+            + model.speed_exponent * typical.speed_m_per_min.unwrap_or(1.0).ln()
+            + model.feed_exponent * typical.feed_mm_per_rev.unwrap_or(1.0).ln();
+        if model.form == ModelForm::SemiLog { l } else { l.exp() }
+    }
+
     fn value(&self, row: &Row, effects: &[Effect]) -> Prediction {
+        let all = || self.own.iter().chain(effects);
+        // Feed marks are those of the row's own insert.
+        let marks = row.nose_radius_mm.and_then(|radius| {
+            all().find_map(|effect| match effect {
+                Effect::NoseRadiusFloor { k, output, .. } => {
+                    Some(Effect::NoseRadiusFloor { k: *k, nose_radius_mm: radius, output: output.clone() })
+                }
+                _ => None,
+            })
+        });
         let acting = ActingModel::of(
             &self.model,
-            self.own.iter().chain(effects),
+            all().map(|effect| match (effect, &marks) {
+                (Effect::NoseRadiusFloor { .. }, Some(marks)) => marks,
+                _ => effect,
+            }),
             &row.conditions,
             &self.reference,
             row.depth_mm,
@@ -227,41 +349,43 @@ impl PreparedMachinability {
     }
 }
 
-fn row(job: &Job, run: &MachinabilityRun, point: &MachinabilityPoint) -> Row {
+/// A row with what its run and the job say of it; the field that nobody states.
+fn row(job: &Job, run: &MachinabilityRun, point: &MachinabilityPoint) -> Result<Row, &'static str> {
     let mut factors = point.factors.clone();
     for known in run.factors.iter().chain(&job.conditions.factors) {
         if !factors.iter().any(|factor| factor.factor == known.factor) {
             factors.push(known.clone());
         }
     }
-    Row {
-        u: point.speed_m_per_min.ln(),
-        x: point.feed_mm_per_rev.ln(),
-        depth_mm: point.depth_mm,
-        angle_deg: point.cutting_edge_angle_deg.or(job.cutting_edge_angle_deg),
+    let own = &job.conditions;
+    Ok(Row {
+        u: point.speed_m_per_min.or(run.speed_m_per_min).ok_or("speed_m_per_min")?.ln(),
+        x: point.feed_mm_per_rev.or(run.feed_mm_per_rev).ok_or("feed_mm_per_rev")?.ln(),
+        depth_mm: point.depth_mm.or(run.depth_mm).ok_or("depth_mm")?,
+        angle_deg: point.cutting_edge_angle_deg.or(run.cutting_edge_angle_deg).or(job.cutting_edge_angle_deg),
+        nose_radius_mm: point.nose_radius_mm.or(run.nose_radius_mm),
         conditions: MachinabilityConditions {
-            flank_wear_mm: point.flank_wear_mm.or(job.conditions.flank_wear_mm),
-            batch: point.batch.clone().or_else(|| run.batch.clone()).or_else(|| job.conditions.batch.clone()),
+            flank_wear_mm: point.flank_wear_mm.or(run.flank_wear_mm).or(own.flank_wear_mm),
+            batch: point.batch.clone().or_else(|| run.batch.clone()).or_else(|| own.batch.clone()),
             factors,
-            time_min: point.time_min.or(job.conditions.time_min),
+            time_min: point.time_min.or(run.time_min).or(own.time_min),
         },
-    }
+        test: point.test.or(run.test),
+    })
 }
 
 /// What exponents turn about: the job's reference, else the geometric mean of the rows.
-fn reference(job: &Job, rows: &Rows<MachinabilityRun, MachinabilityPoint>) -> Reference {
+fn reference(job: &Job, rows: &[Row]) -> Reference {
     let stated = job.reference.unwrap_or_default();
-    let count = rows.points.len().max(1) as f64;
-    let mean = |of: &dyn Fn(&MachinabilityPoint) -> Option<f64>| -> Option<f64> {
-        let sum: Option<f64> = rows.points.iter().map(|(_, point)| of(point).map(f64::ln)).sum();
-        sum.filter(|_| !rows.points.is_empty()).map(|sum| (sum / count).exp())
+    let count = rows.len().max(1) as f64;
+    let mean = |of: &dyn Fn(&Row) -> Option<f64>| -> Option<f64> {
+        let sum: Option<f64> = rows.iter().map(of).sum();
+        sum.filter(|_| !rows.is_empty()).map(|sum| (sum / count).exp())
     };
     Reference {
-        speed_m_per_min: stated.speed_m_per_min.or_else(|| mean(&|p| Some(p.speed_m_per_min))),
-        feed_mm_per_rev: stated.feed_mm_per_rev.or_else(|| mean(&|p| Some(p.feed_mm_per_rev))),
-        depth_mm: stated.depth_mm.or_else(|| mean(&|p| Some(p.depth_mm))),
-        cutting_edge_angle_deg: stated
-            .cutting_edge_angle_deg
-            .or_else(|| mean(&|p| p.cutting_edge_angle_deg.or(job.cutting_edge_angle_deg))),
+        speed_m_per_min: stated.speed_m_per_min.or_else(|| mean(&|row| Some(row.u))),
+        feed_mm_per_rev: stated.feed_mm_per_rev.or_else(|| mean(&|row| Some(row.x))),
+        depth_mm: stated.depth_mm.or_else(|| mean(&|row| Some(row.depth_mm.ln()))),
+        cutting_edge_angle_deg: stated.cutting_edge_angle_deg.or_else(|| mean(&|row| row.angle_deg.map(f64::ln))),
     }
 }

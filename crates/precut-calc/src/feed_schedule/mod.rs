@@ -11,7 +11,7 @@
 //! linearisation), or `infeasible` -> `assess`, `binding` -> `run` (comparison, trade-off) -> `output`, `picture`,
 //! `toolpath`, `advice`. `rule` is the source paper's method; `continuous` and `segments` find zones; `passes` finds
 //! the split into passes; `compensated` asks the deflection calculator for the path; `forward` gives the models to the
-//! diagnosis. `fit` fits the models to trials.
+//! diagnosis; `measurement`, `levels`, `hypotheses`, `design` and `next_runs` are what it brings to one. `fit` fits the models to trials.
 
 mod acting;
 mod advice;
@@ -22,12 +22,17 @@ mod check;
 mod compensated;
 mod compliance;
 mod continuous;
+mod design;
 mod effects;
 pub mod fit;
 mod forward;
+mod hypotheses;
 mod infeasible;
 mod input;
+mod levels;
+mod measurement;
 mod models;
+mod next_runs;
 mod output;
 mod passes;
 mod picture;
@@ -44,6 +49,7 @@ pub use input::{
     Coupling, CouplingTerm, CustomLimit, FeedMode, Goal, Job, Limits, MAX_ZONES, Machine, Reference, SpeedMode,
     UsageScope, Variables, Zone,
 };
+pub use measurement::MachinabilityMeasurement;
 pub use models::{FurtherModel, Models, Output};
 pub use output::{
     Binding, Certificate, Comparison, CompensatedPath, ConstantFeed, Continuous, EdgeUse, EqualDeflection, NamedValue,
@@ -189,7 +195,7 @@ impl Calculator for FeedSchedule {
 
 /// Everything that this calculator may utter, from where it is said.
 const CODES: Codes = Codes {
-    faults: &[check::CODES, effects::CODES, shaft::check::CODES, force::FAULT_CODES],
+    faults: &[check::CODES, effects::CODES, forward::CODES, shaft::check::CODES, force::FAULT_CODES],
     failures: &[&[
         "no_zones",
         "nothing_bends",

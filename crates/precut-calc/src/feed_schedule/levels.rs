@@ -1,0 +1,128 @@
+//! Batches and factor levels that occur in the rows, as effects of their own.
+
+use crate::effects::{FactorLevel, MachinabilityConditions, MachinabilityEffect as Effect};
+
+use super::forward::Row;
+
+/// Most pairs of levels that are tried.
+const MOST_PAIRS: usize = 24;
+
+/// A batch, a level or a pair of levels that may lie higher or lower.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct NamedLevel {
+    /// Words for it: `B`, `coolant = off`.
+    pub(super) label: String,
+    /// The effect, with nothing added yet.
+    pub(super) effect: Effect,
+    /// Share of its cause's prior weight.
+    pub(super) weight: f64,
+}
+
+impl NamedLevel {
+    /// The effect with so much added.
+    pub(super) fn shifted(&self, by: f64) -> Effect {
+        let mut effect = self.effect.clone();
+        if let Effect::BatchShift { delta_ln, .. }
+        | Effect::FactorShift { delta_ln, .. }
+        | Effect::FactorInteraction { delta_ln, .. } = &mut effect
+        {
+            *delta_ln = by;
+        }
+        effect
+    }
+}
+
+/// Batches of the rows; none where a row does not state its own.
+pub(super) fn batches(rows: &[Row]) -> Vec<String> {
+    sorted(rows.iter().map(|row| row.conditions.batch.clone()))
+}
+
+/// Factors that every row states, each with its levels.
+pub(super) fn factors(rows: &[Row]) -> Vec<(String, Vec<String>)> {
+    let Some(first) = rows.first() else { return Vec::new() };
+    let mut names: Vec<&String> = first.conditions.factors.iter().map(|known| &known.factor).collect();
+    names.sort();
+    names
+        .into_iter()
+        .map(|name| (name.clone(), sorted(rows.iter().map(|row| row.conditions.level(name).map(str::to_owned)))))
+        .filter(|(_, levels)| !levels.is_empty())
+        .collect()
+}
+
+/// Different values in the order of their names; none where one is missing.
+fn sorted(values: impl Iterator<Item = Option<String>>) -> Vec<String> {
+    let Some(mut all) = values.collect::<Option<Vec<String>>>() else { return Vec::new() };
+    all.sort();
+    all.dedup();
+    all
+}
+
+/// Levels that may be shifted: not the one that the base was made for. Where nobody says which that is, of two the
+/// second: both would be each other's mirror image beside a shift of the whole; of more than two each of them.
+fn free(levels: &[String], stated: Option<&str>) -> Vec<String> {
+    if levels.len() < 2 {
+        return Vec::new();
+    }
+    match stated.filter(|stated| levels.iter().any(|level| level == stated)) {
+        Some(stated) => levels.iter().filter(|level| *level != stated).cloned().collect(),
+        None if levels.len() == 2 => vec![levels[1].clone()],
+        None => levels.to_vec(),
+    }
+}
+
+/// Everything by name that may differ in these rows, on this output.
+pub(super) fn named(stated: &MachinabilityConditions, rows: &[Row], output: &str) -> Vec<NamedLevel> {
+    let on = || Some(output.to_owned());
+    let own = free(&batches(rows), stated.batch.as_deref());
+    let mut all: Vec<NamedLevel> = own
+        .iter()
+        .map(|batch| NamedLevel {
+            label: batch.clone(),
+            effect: Effect::BatchShift { batch: batch.clone(), delta_ln: 0.0, output: on() },
+            weight: 1.0 / own.len() as f64,
+        })
+        .collect();
+    let factors = factors(rows);
+    for (factor, levels) in &factors {
+        let own = free(levels, stated.level(factor));
+        all.extend(own.iter().map(|level| NamedLevel {
+            label: format!("{factor} = {level}"),
+            effect: Effect::FactorShift { factor: factor.clone(), level: level.clone(), delta_ln: 0.0, output: on() },
+            weight: 1.0 / own.len() as f64,
+        }));
+    }
+    let pairs = pairs(&factors);
+    let weight = 1.0 / pairs.len().max(1) as f64;
+    all.extend(pairs.into_iter().map(|(one, other)| NamedLevel {
+        label: format!("{} = {}, {} = {}", one.factor, one.level, other.factor, other.level),
+        effect: Effect::FactorInteraction {
+            factor_1: one.factor,
+            level_1: one.level,
+            factor_2: other.factor,
+            level_2: other.level,
+            delta_ln: 0.0,
+            output: on(),
+        },
+        weight,
+    }));
+    all
+}
+
+/// Pairs of levels of two factors that both vary.
+fn pairs(factors: &[(String, Vec<String>)]) -> Vec<(FactorLevel, FactorLevel)> {
+    let varying: Vec<&(String, Vec<String>)> = factors.iter().filter(|(_, levels)| levels.len() > 1).collect();
+    let mut pairs = Vec::new();
+    for (i, (one, of_one)) in varying.iter().enumerate() {
+        for (other, of_other) in &varying[i + 1..] {
+            for level in of_one {
+                pairs.extend(of_other.iter().map(|beside| {
+                    let at =
+                        |factor: &String, level: &String| FactorLevel { factor: factor.clone(), level: level.clone() };
+                    (at(one, level), at(other, beside))
+                }));
+            }
+        }
+    }
+    pairs.truncate(MOST_PAIRS);
+    pairs
+}

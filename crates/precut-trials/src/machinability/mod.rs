@@ -1,0 +1,213 @@
+//! Cutting trials: roughness, force or tool life over regimes, one value a cut.
+//!
+//! The law is a product of powers of ratios, not a polynomial of logarithms; speed and depth that are really cut differ
+//! from what is written down; scatter is that of Student's t with six degrees of freedom, uneven from cut to cut.
+
+mod hide;
+
+use serde_json::{Value, json};
+
+use crate::{Class, Hidden, Random, Trial, Truth};
+use hide::{CAUSES, OUTSIDE, Scaled, Size};
+
+const SPEEDS: [f64; 5] = [20.0, 35.0, 60.0, 100.0, 160.0];
+const FEEDS: [f64; 5] = [0.06, 0.1, 0.16, 0.25, 0.4];
+const DEPTHS: [f64; 5] = [0.3, 0.6, 1.0, 1.8, 3.0];
+/// Where the law has its value.
+pub(crate) const MIDDLE: [f64; 3] = [60.0, 0.2, 1.0];
+/// Standard deviation of the level that is allowed without being a finding.
+const LEVEL: f64 = 0.01;
+/// Largest error of the speed and of the depth really cut.
+const SPEED_ERROR: f64 = 0.01;
+const DEPTH_ERROR: f64 = 0.005;
+
+/// A measured output and its law.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Output {
+    pub(crate) quantity: &'static str,
+    pub(crate) model: &'static str,
+    pub(crate) middle: f64,
+    pub(crate) powers: [f64; 3],
+}
+
+/// One cut as it is written down.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Cut {
+    pub(crate) speed: f64,
+    pub(crate) feed: f64,
+    pub(crate) depth: f64,
+    pub(crate) wear_mm: f64,
+    pub(crate) second_batch: bool,
+    pub(crate) test: u32,
+    /// Place in the order of testing, 0 to 1.
+    pub(crate) when: f64,
+    pub(crate) radius_mm: f64,
+}
+
+impl Output {
+    /// The law without anything hidden.
+    pub(crate) fn plain(&self, cut: &Cut) -> f64 {
+        let ratios = [cut.speed / MIDDLE[0], cut.feed / MIDDLE[1], cut.depth / MIDDLE[2]];
+        self.middle * ratios.iter().zip(self.powers).map(|(ratio, power)| ratio.powf(power)).product::<f64>()
+    }
+}
+
+/// Draws a trial. `snr` is that of every hidden cause.
+pub fn draw(class: Class, snr: f64, seed: u64) -> Trial {
+    let mut random = Random::new(seed);
+    loop {
+        // A cause that this draw cannot show is drawn again.
+        if let Some(trial) = attempt(class, snr, &mut random) {
+            return trial;
+        }
+    }
+}
+
+fn attempt(class: Class, snr: f64, random: &mut Random) -> Option<Trial> {
+    let output = output(random);
+    let cuts = cuts(random);
+    let sigma = random.uniform(0.03, 0.06);
+    let causes: Vec<Size> = match class {
+        Class::Nothing => Vec::new(),
+        Class::One => vec![random.pick(CAUSES)],
+        Class::Two => {
+            let (first, second) = (random.pick(CAUSES), random.pick(CAUSES));
+            if first.kind == second.kind {
+                return None;
+            }
+            vec![first, second]
+        }
+        Class::Outside => vec![random.pick(OUTSIDE)],
+    };
+    let mut hidden = Vec::new();
+    for cause in causes {
+        hidden.push(scaled(cause, &output, &cuts, snr * sigma, random)?);
+    }
+    let level = 1.0 + random.uniform_sd(LEVEL);
+    let rows = cuts
+        .iter()
+        .map(|cut| {
+            let real = Cut {
+                speed: cut.speed * (1.0 + random.uniform(-SPEED_ERROR, SPEED_ERROR)),
+                depth: cut.depth * (1.0 + random.uniform(-DEPTH_ERROR, DEPTH_ERROR)),
+                ..*cut
+            };
+            let noise = sigma * random.uniform(0.8, 1.2) * random.student_6();
+            let value = level * with(&hidden, &output, &real) * noise.exp();
+            let mut row = json!({
+                "test": cut.test, "speed_m_per_min": cut.speed, "feed_mm_per_rev": cut.feed, "depth_mm": cut.depth,
+                "flank_wear_mm": cut.wear_mm, "batch": if cut.second_batch { "B" } else { "A" }
+            });
+            row[output.quantity] = json!(four_digits(value));
+            row
+        })
+        .collect();
+    let causes = hidden.iter().map(|h| Hidden { kind: h.cause.kind, size: h.size, snr }).collect();
+    let radius_mm = cuts.first().map_or(0.8, |cut| cut.radius_mm);
+    Some(Trial { request: request(&output, radius_mm, rows), truth: Truth { class, causes }, sigma })
+}
+
+fn output(random: &mut Random) -> Output {
+    match random.whole(0, 2) {
+        0 => Output {
+            quantity: "roughness_um",
+            model: "roughness",
+            middle: random.uniform(1.2, 2.5),
+            powers: [random.uniform(-0.3, -0.1), random.uniform(0.6, 1.0), random.uniform(0.05, 0.2)],
+        },
+        1 => Output {
+            quantity: "force_z_n",
+            model: "force_z",
+            middle: random.uniform(250.0, 700.0),
+            powers: [random.uniform(-0.2, 0.0), random.uniform(0.65, 0.8), random.uniform(0.85, 1.0)],
+        },
+        _ => Output {
+            quantity: "tool_life_min",
+            model: "tool_life",
+            middle: random.uniform(30.0, 120.0),
+            powers: [random.uniform(-3.5, -2.0), random.uniform(-1.2, -0.5), random.uniform(-0.4, -0.1)],
+        },
+    }
+}
+
+/// Regimes of a plan in random order, some of them cut twice or thrice.
+fn cuts(random: &mut Random) -> Vec<Cut> {
+    let tests = random.whole(36, 60);
+    let radius_mm = random.pick(&[0.4, 0.8, 1.2]);
+    let mut cuts = Vec::new();
+    for test in 0..tests {
+        let cut = Cut {
+            speed: random.pick(&SPEEDS),
+            feed: random.pick(&FEEDS),
+            depth: random.pick(&DEPTHS),
+            wear_mm: (100.0 * random.uniform(0.02, 0.4)).round() / 100.0,
+            second_batch: random.chance(0.5),
+            test: u32::try_from(test + 1).unwrap_or(u32::MAX),
+            when: test as f64 / (tests - 1) as f64,
+            radius_mm,
+        };
+        let repeats = random.pick(&[1, 1, 2, 3]);
+        cuts.extend(std::iter::repeat_n(cut, repeats));
+    }
+    cuts
+}
+
+fn with(hidden: &[Scaled], output: &Output, cut: &Cut) -> f64 {
+    let times: f64 = hidden.iter().map(|effect| effect.times(cut)).product();
+    let marks = hidden.iter().filter_map(|effect| effect.marks_um(cut)).fold(0.0, f64::max);
+    let added: f64 = hidden.iter().map(|effect| effect.added(output, cut)).sum();
+    let own = output.plain(cut) * times;
+    // The larger of the two, rounded off where they are alike.
+    let top = own.max(marks);
+    top * ((own / top).powi(8) + (marks / top).powi(8)).powf(0.125) + added
+}
+
+/// The size at which the root mean square of what it does to the logarithm is as asked for; `None` where the cause
+/// cannot act on this output, or only at a size that nobody would believe.
+fn scaled(cause: Size, output: &Output, cuts: &[Cut], rms: f64, random: &mut Random) -> Option<Scaled> {
+    if !cause.acts_on(output) {
+        return None;
+    }
+    let sign = if cause.two_sided { random.sign() } else { 1.0 };
+    let form = [random.uniform(0.0, 1.0), random.uniform(0.0, 1.0)];
+    let unit = if cause.share { output.middle } else { 1.0 };
+    let at = |size: f64| Scaled { cause, size: sign * size * unit, form };
+    let reached = |size: f64| {
+        let effect = [at(size)];
+        let square = |cut: &Cut| (with(&effect, output, cut) / output.plain(cut)).ln().powi(2);
+        (cuts.iter().map(square).sum::<f64>() / cuts.len() as f64).sqrt()
+    };
+    if reached(cause.most) < rms {
+        return None;
+    }
+    let (mut low, mut high) = (0.0, cause.most);
+    for _ in 0..40 {
+        let middle = 0.5 * (low + high);
+        if reached(middle) < rms { low = middle } else { high = middle }
+    }
+    Some(at(0.5 * (low + high)))
+}
+
+fn four_digits(value: f64) -> f64 {
+    let scale = 10.0_f64.powf(3.0 - value.log10().floor());
+    (value * scale).round() / scale
+}
+
+fn request(output: &Output, radius_mm: f64, rows: Vec<Value>) -> Value {
+    let powers = output.powers;
+    let constant = output.middle.ln() - powers.iter().zip(MIDDLE).map(|(power, at)| power * at.ln()).sum::<f64>();
+    let model = json!({
+        "form": "log_log", "constant": constant,
+        "speed_exponent": powers[0], "feed_exponent": powers[1], "depth_exponent": powers[2]
+    });
+    json!({
+        "calculator": "feed-schedule",
+        "job": {
+            "models": { output.model: model },
+            "reference": { "speed_m_per_min": MIDDLE[0], "feed_mm_per_rev": MIDDLE[1], "depth_mm": MIDDLE[2] }
+        },
+        "runs": [{ "nose_radius_mm": radius_mm }],
+        "quantity": output.quantity,
+        "measurements": rows
+    })
+}
