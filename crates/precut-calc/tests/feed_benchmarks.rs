@@ -37,7 +37,9 @@ fn turning_economics_of_ermer() {
         ));
         assert!(power_hp < 10.0 * (1.0 + 1e-6) || limits == "feed <= 0.005 in/rev");
     }
-    lines.iter().for_each(|line| documented(line));
+    for line in &lines {
+        documented(line);
+    }
 }
 
 /// A job of the multi-pass benchmark: lives of at least these, no upper limit on them; time is least.

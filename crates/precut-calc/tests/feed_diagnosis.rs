@@ -2,12 +2,9 @@
 //! calculator brings to a diagnosis.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, missing_docs)]
 
-use precut_calc::calculator::{
-    Answer, Calculator, Check, Diagnosable, Failure, ForwardModel, Inapplicability, PrepareError, Rows, Treatment,
-    Unwatched, Violations,
-};
+use precut_calc::calculator::{Answer, Calculator, Check, Failure, Unwatched, Violations};
 use precut_calc::diagnosis::{Diagnosis, DiagnosisResult, VerdictClass};
-use precut_calc::effects::{MACHINABILITY_CAUSES, MachinabilityEffect};
+use precut_calc::effects::MachinabilityEffect;
 use precut_calc::feed_schedule::{FeedSchedule, MachinabilityRun};
 use serde_json::{Value, json};
 

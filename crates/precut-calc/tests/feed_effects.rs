@@ -9,6 +9,7 @@ use precut_calc::feed_schedule::{FeedSchedule, Job, MachinabilityPoint, Machinab
 use serde_json::{Value, json};
 
 /// 3 V^-0.2 S^0.8 t^0.1 phi^0.3 um, 2000 t S^0.7 N, and wear.
+#[allow(clippy::needless_pass_by_value)] // called with `json!`
 fn base(effects: Value) -> Value {
     let model = |constant: f64, v: f64, s: f64, t: f64| json!({ "form": "log_log", "constant": constant, "speed_exponent": v, "feed_exponent": s, "depth_exponent": t });
     json!({
@@ -196,6 +197,8 @@ fn by_grid(roughness: impl Fn(f64, f64) -> f64, force: impl Fn(f64, f64) -> f64)
 }
 
 /// Straight, convex and local effects: the answer is the best point of a grid to the grid's step, and says which it is.
+type Law = Box<dyn Fn(f64, f64) -> f64>;
+
 #[test]
 fn schedules_with_effects_are_the_best_of_a_grid() {
     let own = |v: f64, s: f64| 3.0 * v.powf(-0.2) * s.powf(0.8) * 0.5_f64.powf(0.1) * 75.0_f64.powf(0.3);
@@ -205,7 +208,6 @@ fn schedules_with_effects_are_the_best_of_a_grid() {
         effect["kind"] = json!(kind);
         effect
     };
-    type Law = Box<dyn Fn(f64, f64) -> f64>;
     let cases: Vec<(Value, Law, Law, u32, bool)> = vec![
         (
             effect("speed_exponent", json!({ "delta": -0.2, "output": "roughness" })),

@@ -128,7 +128,13 @@ fn single_zones_in_closed_form() {
                 "objective" => near(name, outcome.objective, value.as_f64().unwrap(), 1e-6, 0.0),
                 "cutting_time_min" => near(name, outcome.cutting_time_min, value.as_f64().unwrap(), 1e-6, 0.0),
                 other => {
-                    near(&format!("{name} {other}"), of_zone(&outcome, "z1", other), value.as_f64().unwrap(), 1e-6, 0.0)
+                    near(
+                        &format!("{name} {other}"),
+                        of_zone(&outcome, "z1", other),
+                        value.as_f64().unwrap(),
+                        1e-6,
+                        0.0,
+                    );
                 }
             }
         }

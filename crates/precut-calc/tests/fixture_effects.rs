@@ -9,6 +9,7 @@ use precut_calc::effects::{FIXTURE_CAUSES, FixtureEffect};
 use precut_calc::fixture_stability::{FixtureAllowances, FixturePoint, FixtureRun, FixtureStability};
 use serde_json::{Value, json};
 
+#[allow(clippy::needless_pass_by_value)] // called with `json!`
 fn under(job: &Value, effect: Value) -> Value {
     with(job, "/effects", json!([effect]))
 }
@@ -201,7 +202,7 @@ fn the_forward_model_is_the_calculator() {
         let got = outcome(&under(&job, json!({ "kind": "stiffness", "factor": 0.9 })));
         match prediction {
             Ok(value) => {
-                assert!((value / got.forced.peak_to_peak_um - 1.0).abs() < 1e-9 && got.multiplier.modulus < 1.0)
+                assert!((value / got.forced.peak_to_peak_um - 1.0).abs() < 1e-9 && got.multiplier.modulus < 1.0);
             }
             Err(missing) => assert!(*missing == Missing::Unstable && got.multiplier.modulus >= 1.0),
         }

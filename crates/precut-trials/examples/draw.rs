@@ -7,7 +7,8 @@ use precut_trials::{Class, deflection, fixture, machinability, ring};
 
 fn main() -> Result<(), Error> {
     let given: Vec<String> = std::env::args().skip(1).collect();
-    let usage = || Error::other("draw deflection|ring|fixture|machinability nothing|one|two|outside <signal to noise> <seed>");
+    let usage =
+        || Error::other("draw deflection|ring|fixture|machinability nothing|one|two|outside <signal to noise> <seed>");
     let [of, class, snr, seed] = &given[..] else { return Err(usage()) };
     let class = match class.as_str() {
         "nothing" => Class::Nothing,

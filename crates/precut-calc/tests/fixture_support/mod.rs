@@ -90,14 +90,13 @@ pub fn with(job: &Value, pointer: &str, value: Value) -> Value {
     let mut job = job.clone();
     let mut at = &mut job;
     for part in pointer.trim_start_matches('/').split('/') {
-        at = match part.parse::<usize>() {
-            Ok(index) => &mut at[index],
-            Err(_) => {
-                if at.is_null() {
-                    *at = json!({});
-                }
-                &mut at[part]
+        at = if let Ok(index) = part.parse::<usize>() {
+            &mut at[index]
+        } else {
+            if at.is_null() {
+                *at = json!({});
             }
+            &mut at[part]
         };
     }
     *at = value;

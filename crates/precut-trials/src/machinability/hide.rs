@@ -96,13 +96,7 @@ impl Scaled {
                 (size * (cut.when.powf(bend) - 0.5)).exp()
             }
             // Beyond a depth the chip breaks in another way, below it does not.
-            "threshold" => {
-                if cut.depth > 0.8 && cut.feed > 0.12 {
-                    size.exp()
-                } else {
-                    1.0
-                }
-            }
+            "threshold" if cut.depth > 0.8 && cut.feed > 0.12 => size.exp(),
             _ => 1.0,
         }
     }

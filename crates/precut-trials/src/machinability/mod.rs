@@ -193,6 +193,7 @@ fn four_digits(value: f64) -> f64 {
     (value * scale).round() / scale
 }
 
+#[allow(clippy::needless_pass_by_value)] // they become part of the request
 fn request(output: &Output, radius_mm: f64, rows: Vec<Value>) -> Value {
     let powers = output.powers;
     let constant = output.middle.ln() - powers.iter().zip(MIDDLE).map(|(power, at)| power * at.ln()).sum::<f64>();
