@@ -14,7 +14,7 @@ fn job(more: &Value) -> Result<Job, String> {
     let mut job = json!({
         "ring": { "radius_mm": 150, "ellipticity_mm": 0.5 },
         "supports": { "distance_mm": 200, "depth_mm": 111 },
-        "tool": { "x_mm": 100, "y_mm": 113.5, "feed_mm_per_rev": 0.0234375, "revolutions": 107 }
+        "tool": { "x_mm": 100, "y_mm": 113.5, "feed_mm_per_rev": 0.023_437_5, "revolutions": 107 }
     });
     for (name, value) in more.as_object().into_iter().flatten() {
         job[name] = value.clone();
@@ -31,8 +31,8 @@ fn per(measured: Measured, count: f64) -> Measured {
 /// One step of one run: the forward model turns with 7200 nodes and reads one angle off.
 pub(crate) fn step(rollers: bool) -> Result<Measured, String> {
     let rolling = json!({
-        "supports": { "distance_mm": 226.773378, "depth_mm": 125.859225, "roller_radius_mm": 20 },
-        "tool": { "x_mm": 100, "y_mm": 113.5, "feed_mm_per_rev": 0.0390625, "revolutions": 64 }
+        "supports": { "distance_mm": 226.773_378, "depth_mm": 125.859_225, "roller_radius_mm": 20 },
+        "tool": { "x_mm": 100, "y_mm": 113.5, "feed_mm_per_rev": 0.039_062_5, "revolutions": 64 }
     });
     let job = job(&if rollers { rolling } else { json!({}) })?;
     let rows = Rows { runs: vec![RingRun::default()], points: vec![(0, RingPoint { angle_deg: 0.0 })] };
@@ -80,8 +80,8 @@ pub(crate) fn plain_paper() -> Result<Measured, String> {
                 let a = [-100.0 - shift[0], -111.0 - shift[1]];
                 let b = [100.0 - shift[0], -111.0 - shift[1]];
                 let (at_a, at_b) = (turned[nearest(&turned, a)], turned[nearest(&turned, b)]);
-                let dx = ((a[0] - at_a[0]) + (b[0] - at_b[0])) / 2.0;
-                let dy = ((a[1] - at_a[1]) + (b[1] - at_b[1])) / 2.0;
+                let dx = f64::midpoint(a[0] - at_a[0], b[0] - at_b[0]);
+                let dy = f64::midpoint(a[1] - at_a[1], b[1] - at_b[1]);
                 shift = [shift[0] + dx, shift[1] + dy];
                 if dx.hypot(dy) < 1e-7 {
                     break;

@@ -20,6 +20,7 @@ const DEFLECTION: &str = "deflection-compensation";
 const DEFLECTION_VARIED: &str = "/cut/feed_mm_per_rev";
 
 /// The table, top to bottom.
+#[allow(clippy::too_many_lines)] // a table
 pub(crate) fn all() -> Vec<Row> {
     let us = |us: f64| Some(us * 1e-6);
     vec![

@@ -393,12 +393,8 @@ fn conforms(registry: &Registry, entry: &Entry) {
     }
     for example in meta.examples {
         let body = || Body::Json(example.job.into());
-        let ready = read::read(
-            &registry.entry(meta.id).unwrap().clone(),
-            &body(),
-            &Models { registry: &registry, found: None },
-        )
-        .unwrap_or_else(|error| panic!("{} of {}: {error:?}", example.id, meta.id));
+        let ready = read::read(&registry.entry(meta.id).unwrap().clone(), &body(), &Models { registry, found: None })
+            .unwrap_or_else(|error| panic!("{} of {}: {error:?}", example.id, meta.id));
         let computed = ready.prepared.run(&Unwatched, &mut Vec::new()).unwrap();
         let input = ready.prepared.input().unwrap();
         assert_eq!(ready.canonical, serde_json_canonicalizer::to_vec(&input).unwrap());
@@ -442,7 +438,7 @@ fn conforms(registry: &Registry, entry: &Entry) {
         let again = read::read(
             &registry.entry(meta.id).unwrap().clone(),
             &Body::Json(ready.canonical.clone()),
-            &Models { registry: &registry, found: None },
+            &Models { registry, found: None },
         )
         .unwrap();
         assert_eq!(again.key, ready.key, "the filled job of {} has another key", meta.id);
