@@ -84,19 +84,19 @@ fn score(class: Class, snr: f64, seed: u64, count: u64) -> Score {
 
 #[test]
 fn nothing_hidden_raises_no_alarm() {
-    let score = score(Class::Nothing, 0.0, number("PRECUT_TRIAL_SEED", 1), number("PRECUT_TRIALS", 6));
+    let score = score(Class::Nothing, 0.0, number("PRECUT_TRIAL_SEED", 1), number("PRECUT_TRIALS", 1));
     assert!(score.quiet.reaches(0.97), "{}", score.quiet);
 }
 
 #[test]
 fn one_hidden_cause_is_named_right_or_not_at_all() {
-    let score = score(Class::One, 5.0, number("PRECUT_TRIAL_SEED", 2), number("PRECUT_TRIALS", 10));
+    let score = score(Class::One, 5.0, number("PRECUT_TRIAL_SEED", 2), number("PRECUT_TRIALS", 2));
     assert!(score.named_right.reaches(0.96), "{}", score.named_right);
     assert!(score.truth_listed.reaches(0.90), "{}", score.truth_listed);
 }
 
 #[test]
 fn what_the_catalogue_lacks_is_unknown() {
-    let score = score(Class::Outside, 5.0, number("PRECUT_TRIAL_SEED", 4), number("PRECUT_TRIALS", 6));
+    let score = score(Class::Outside, 5.0, number("PRECUT_TRIAL_SEED", 4), number("PRECUT_TRIALS", 1));
     assert!(score.unknown.reaches(0.93), "{}", score.unknown);
 }

@@ -221,4 +221,9 @@ impl Diagnosable for FixtureStability {
         // Whether a point is stable is asked of the prediction itself, not of every step beside it.
         prepared.predicted(effects, Ask { whether_stable: false, ..Ask::default() })
     }
+
+    fn predict_ms(_job: &FixtureJob) -> f64 {
+        // Of one run of some depths, with the motions that are not linear; a history takes about as long.
+        5.0
+    }
 }
