@@ -9,9 +9,9 @@ use precut_calc::feed_schedule::{FeedSchedule, MachinabilityRun};
 use serde_json::{Value, json};
 
 type Cuts = Diagnosis<FeedSchedule>;
-type Result_ = DiagnosisResult<MachinabilityEffect, MachinabilityRun>;
+type Found = DiagnosisResult<MachinabilityEffect, MachinabilityRun>;
 
-fn answered(job: &Value) -> Result<Answer<Result_>, Failure> {
+fn answered(job: &Value) -> Result<Answer<Found>, Failure> {
     let mut job: <Cuts as Calculator>::Input = serde_json::from_value(job.clone()).unwrap();
     let mut violations = Violations::default();
     job.check(&mut violations);
@@ -20,7 +20,7 @@ fn answered(job: &Value) -> Result<Answer<Result_>, Failure> {
     Cuts::run(&job, &Unwatched)
 }
 
-fn talk(name: &str, result: &Result_) {
+fn talk(name: &str, result: &Found) {
     println!(
         "{name}: {:?}, none {:.2e}, unnamed {:.2e}, scatter {:.4} ({})",
         result.verdict,
@@ -190,7 +190,7 @@ fn power_law(rows: &[Value], quantity: &str) -> Value {
     json!({ "form": "log_log", "constant": x(0), "speed_exponent": x(1), "feed_exponent": x(2), "depth_exponent": x(3) })
 }
 
-fn of_table(name: &str, [model, quantity]: [&str; 2], base: &[Value], rows: &[Value], options: &Value) -> Result_ {
+fn of_table(name: &str, [model, quantity]: [&str; 2], base: &[Value], rows: &[Value], options: &Value) -> Found {
     let request = json!({
         "options": options,
         "calculator": "feed-schedule", "job": { "models": { model: power_law(base, quantity) } },
@@ -294,6 +294,6 @@ fn measured_roughness_of_steel_depends_on_the_coolant() {
     // Roughness inverse to the radius would be a shift between the two inserts: there is none. Marks that only the
     // heaviest feeds leave are another matter: they are believed if they predict what was held back.
     assert!(probability("factor_shift", "nose") < 0.05);
-    let error = |result: &Result_| result.gain.as_ref().unwrap().rmse_extended;
+    let error = |result: &Found| result.gain.as_ref().unwrap().rmse_extended;
     assert!(error(&result) < error(&without));
 }
