@@ -26,7 +26,7 @@ pub fn register(registrar: &mut impl Registrar) {
     registrar.diagnosable::<deflection_compensation::DeflectionCompensation>();
     registrar.diagnosable::<ring_roundness::RingRoundness>();
     registrar.calculator::<ring_roundness::evaluation::RoundnessEvaluation>();
-    registrar.diagnosable::<feed_schedule::FeedSchedule>();
+    registrar.with_forward_model::<feed_schedule::FeedSchedule>();
     registrar.calculator::<feed_schedule::fit::MachinabilityFit>();
     registrar.with_forward_model::<fixture_stability::FixtureStability>();
     registrar.calculator::<fixture_stability::identification::FixtureIdentification>();
