@@ -4,7 +4,7 @@
 
 use precut_calc::calculator::{Answer, Calculator, Check, Failure, Unwatched, Violations};
 use precut_calc::diagnosis::{Diagnosis, DiagnosisResult, VerdictClass};
-use precut_calc::effects::MachinabilityEffect;
+use precut_calc::effects::{MACHINABILITY_CAUSES, MachinabilityEffect};
 use precut_calc::feed_schedule::{FeedSchedule, MachinabilityRun};
 use serde_json::{Value, json};
 
