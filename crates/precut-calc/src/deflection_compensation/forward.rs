@@ -33,19 +33,19 @@ const GAUGE_STEP_MM: f64 = 0.05;
 #[serde(deny_unknown_fields, default)]
 pub struct DeflectionAllowances {
     /// Force level common to all runs, as a share.
-    #[schema(minimum = 0.0, maximum = 1.0, example = 0.01, extensions(("x-unit" = json!("1"))))]
+    #[schema(minimum = 0.0, maximum = 1.0, example = 0.01, extensions(("x-symbol" = json!("u_F")), ("x-unit" = json!("1"))))]
     pub force_level_rel: f64,
     /// Force level of every run by itself, as a share.
-    #[schema(minimum = 0.0, maximum = 1.0, example = 0.007, extensions(("x-unit" = json!("1"))))]
+    #[schema(minimum = 0.0, maximum = 1.0, example = 0.007, extensions(("x-symbol" = json!("u_Fi")), ("x-unit" = json!("1"))))]
     pub force_per_run_rel: f64,
     /// Bending compliance, as a share; 0.0035 is a diameter known to 0.1 %.
-    #[schema(minimum = 0.0, maximum = 1.0, example = 0.0035, extensions(("x-unit" = json!("1"))))]
+    #[schema(minimum = 0.0, maximum = 1.0, example = 0.0035, extensions(("x-symbol" = json!("u_b")), ("x-unit" = json!("1"))))]
     pub bending_rel: f64,
     /// Setting of the diameter in every run, on the diameter.
-    #[schema(minimum = 0.0, maximum = 1000.0, example = 1.0, extensions(("x-unit" = json!("um"))))]
+    #[schema(minimum = 0.0, maximum = 1000.0, example = 1.0, extensions(("x-symbol" = json!("u_0")), ("x-unit" = json!("um"))))]
     pub setup_diameter_um: f64,
     /// Position of the gauge along the shaft in every run.
-    #[schema(minimum = 0.0, maximum = 100.0, example = 0.2, extensions(("x-unit" = json!("mm"))))]
+    #[schema(minimum = 0.0, maximum = 100.0, example = 0.2, extensions(("x-symbol" = json!("u_z")), ("x-unit" = json!("mm"))))]
     pub gauge_position_mm: f64,
 }
 

@@ -13,30 +13,30 @@ use crate::calculator::{MeasuredRow, Measurement};
 pub struct DeflectionMeasurement {
     /// Number of the run that turned it, from 1 in the order of `runs`.
     #[serde(default = "one")]
-    #[schema(minimum = 1, maximum = 10_000, default = 1, example = 1, extensions(("x-unit" = json!("1"))))]
+    #[schema(minimum = 1, maximum = 10_000, default = 1, example = 1, extensions(("x-symbol" = json!("i")), ("x-unit" = json!("1"))))]
     pub run: u32,
     /// Number of the sweep over this run's shaft; rows of one sweep stand in measuring order.
     #[serde(default = "one")]
-    #[schema(minimum = 1, maximum = 10_000, default = 1, example = 1, extensions(("x-unit" = json!("1"))))]
+    #[schema(minimum = 1, maximum = 10_000, default = 1, example = 1, extensions(("x-symbol" = json!("j")), ("x-unit" = json!("1"))))]
     pub trace: u32,
     /// Station from the headstock end.
     #[schema(minimum = -100_000.0, maximum = 100_000.0, example = 500.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("z"))))]
     pub z_mm: f64,
     /// Measured minus nominal diameter; positive is oversize.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = -1e6, maximum = 1e6, example = 12.5, extensions(("x-unit" = json!("um"))))]
+    #[schema(minimum = -1e6, maximum = 1e6, example = 12.5, extensions(("x-symbol" = json!("dD")), ("x-unit" = json!("um"))))]
     pub diameter_deviation_um: Option<f64>,
     /// Measured minus nominal radius; positive is oversize.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = -1e6, maximum = 1e6, example = 6.25, extensions(("x-unit" = json!("um"))))]
+    #[schema(minimum = -1e6, maximum = 1e6, example = 6.25, extensions(("x-symbol" = json!("dR")), ("x-unit" = json!("um"))))]
     pub radius_deviation_um: Option<f64>,
     /// Measured diameter.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 0.0, maximum = 10_000.0, example = 90.012, extensions(("x-unit" = json!("mm"))))]
+    #[schema(minimum = 0.0, maximum = 10_000.0, example = 90.012, extensions(("x-symbol" = json!("D")), ("x-unit" = json!("mm"))))]
     pub diameter_mm: Option<f64>,
     /// Standard uncertainty of the value.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-9, maximum = 1e6, example = 0.8, extensions(("x-unit" = json!("um"))))]
+    #[schema(minimum = 1e-9, maximum = 1e6, example = 0.8, extensions(("x-symbol" = json!("u")), ("x-unit" = json!("um"))))]
     pub uncertainty_um: Option<f64>,
     /// Whether the row is set aside: listed, not used.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]

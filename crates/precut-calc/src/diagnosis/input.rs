@@ -50,10 +50,10 @@ pub struct DiagnosisOptions {
     #[schema(min_items = 1, max_items = 64, example = json!(["headstock_compliance", "tailstock_offset"]))]
     pub causes: Option<Vec<String>>,
     /// Most causes at the same time.
-    #[schema(minimum = 1, maximum = 3, default = 3, example = 3, extensions(("x-unit" = json!("1"))))]
+    #[schema(minimum = 1, maximum = 3, default = 3, example = 3, extensions(("x-symbol" = json!("k")), ("x-unit" = json!("1"))))]
     pub most_causes: u8,
     /// Significance level of the tests.
-    #[schema(minimum = 1e-6, maximum = 0.2, default = 0.01, example = 0.01, extensions(("x-unit" = json!("1"))))]
+    #[schema(minimum = 1e-6, maximum = 0.2, default = 0.01, example = 0.01, extensions(("x-symbol" = json!("alpha")), ("x-unit" = json!("1"))))]
     pub level: f64,
     /// Whether single rows that stand alone are left out.
     #[schema(default = true, example = true)]
@@ -65,7 +65,7 @@ pub struct DiagnosisOptions {
     #[schema(default = false, example = false)]
     pub accept_suspected_unit: bool,
     /// Seed of the resamples behind the interval of the gain.
-    #[schema(minimum = 0, maximum = 4_294_967_295_u32, default = 1, example = 1, extensions(("x-unit" = json!("1"))))]
+    #[schema(minimum = 0, maximum = 4_294_967_295_u32, default = 1, example = 1, extensions(("x-symbol" = json!("s_0")), ("x-unit" = json!("1"))))]
     pub seed: u32,
 }
 

@@ -14,7 +14,7 @@ use crate::effects::FactorLevel;
 pub struct MachinabilityMeasurement {
     /// Number of the run whose conditions it shares, from 1 in the order of `runs`.
     #[serde(default = "one")]
-    #[schema(minimum = 1, maximum = 10_000, default = 1, example = 1, extensions(("x-unit" = json!("1"))))]
+    #[schema(minimum = 1, maximum = 10_000, default = 1, example = 1, extensions(("x-symbol" = json!("i")), ("x-unit" = json!("1"))))]
     pub run: u32,
     /// Cutting speed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -58,31 +58,31 @@ pub struct MachinabilityMeasurement {
     pub time_min: Option<f64>,
     /// Measured main (tangential) force.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-9, maximum = 1e9, example = 480.0, extensions(("x-unit" = json!("N"))))]
+    #[schema(minimum = 1e-9, maximum = 1e9, example = 480.0, extensions(("x-symbol" = json!("F_z")), ("x-unit" = json!("N"))))]
     pub force_z_n: Option<f64>,
     /// Measured passive (radial) force.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-9, maximum = 1e9, example = 210.0, extensions(("x-unit" = json!("N"))))]
+    #[schema(minimum = 1e-9, maximum = 1e9, example = 210.0, extensions(("x-symbol" = json!("F_y")), ("x-unit" = json!("N"))))]
     pub force_y_n: Option<f64>,
     /// Measured tool life.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-9, maximum = 1e9, example = 42.0, extensions(("x-unit" = json!("min"))))]
+    #[schema(minimum = 1e-9, maximum = 1e9, example = 42.0, extensions(("x-symbol" = json!("T")), ("x-unit" = json!("min"))))]
     pub tool_life_min: Option<f64>,
     /// Measured roughness.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-9, maximum = 1e6, example = 1.6, extensions(("x-unit" = json!("um"))))]
+    #[schema(minimum = 1e-9, maximum = 1e6, example = 1.6, extensions(("x-symbol" = json!("Ra")), ("x-unit" = json!("um"))))]
     pub roughness_um: Option<f64>,
     /// Measured degree of hardening.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-9, maximum = 1e6, example = 25.0, extensions(("x-unit" = json!("percent"))))]
+    #[schema(minimum = 1e-9, maximum = 1e6, example = 25.0, extensions(("x-symbol" = json!("N")), ("x-unit" = json!("percent"))))]
     pub hardening_percent: Option<f64>,
     /// Measured depth of hardening.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-9, maximum = 1e6, example = 80.0, extensions(("x-unit" = json!("um"))))]
+    #[schema(minimum = 1e-9, maximum = 1e6, example = 80.0, extensions(("x-symbol" = json!("h_c")), ("x-unit" = json!("um"))))]
     pub hardening_depth_um: Option<f64>,
     /// Standard uncertainty of the values of this row, as a share of them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-9, maximum = 10.0, example = 0.05, extensions(("x-unit" = json!("1"))))]
+    #[schema(minimum = 1e-9, maximum = 10.0, example = 0.05, extensions(("x-symbol" = json!("u")), ("x-unit" = json!("1"))))]
     pub uncertainty_rel: Option<f64>,
     /// Whether the row is set aside: listed, not used.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]

@@ -13,11 +13,11 @@ use crate::calculator::{MeasuredRow, Measurement};
 pub struct FixtureMeasurement {
     /// Number of the run that states its speed and feed, from 1 in the order of `runs`.
     #[serde(default = "one")]
-    #[schema(minimum = 1, maximum = 10_000, default = 1, example = 1, extensions(("x-unit" = json!("1"))))]
+    #[schema(minimum = 1, maximum = 10_000, default = 1, example = 1, extensions(("x-symbol" = json!("i")), ("x-unit" = json!("1"))))]
     pub run: u32,
     /// Number of the repetition; rows of one history stand in the order of time.
     #[serde(default = "one")]
-    #[schema(minimum = 1, maximum = 10_000, default = 1, example = 1, extensions(("x-unit" = json!("1"))))]
+    #[schema(minimum = 1, maximum = 10_000, default = 1, example = 1, extensions(("x-symbol" = json!("j")), ("x-unit" = json!("1"))))]
     pub repeat: u32,
     /// Axial depth of cut, where the run does not state it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -29,23 +29,23 @@ pub struct FixtureMeasurement {
     pub time_s: Option<f64>,
     /// Largest minus smallest displacement of the workpiece along the feed, in the settled cut.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 0.000_001, maximum = 1e6, example = 12.3, extensions(("x-unit" = json!("um"))))]
+    #[schema(minimum = 0.000_001, maximum = 1e6, example = 12.3, extensions(("x-symbol" = json!("A")), ("x-unit" = json!("um"))))]
     pub peak_to_peak_um: Option<f64>,
     /// Displacement of the workpiece along the feed, positive toward the movable jaw.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = -1e6, maximum = 1e6, example = 4.5, extensions(("x-unit" = json!("um"))))]
+    #[schema(minimum = -1e6, maximum = 1e6, example = 4.5, extensions(("x-symbol" = json!("x")), ("x-unit" = json!("um"))))]
     pub displacement_um: Option<f64>,
     /// Depth at which chatter began at this speed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 0.000_001, maximum = 1000.0, example = 3.2, extensions(("x-unit" = json!("mm"))))]
+    #[schema(minimum = 0.000_001, maximum = 1000.0, example = 3.2, extensions(("x-symbol" = json!("a_lim")), ("x-unit" = json!("mm"))))]
     pub depth_limit_mm: Option<f64>,
     /// Standard uncertainty of an amplitude or a displacement.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-9, maximum = 1e6, example = 0.2, extensions(("x-unit" = json!("um"))))]
+    #[schema(minimum = 1e-9, maximum = 1e6, example = 0.2, extensions(("x-symbol" = json!("u")), ("x-unit" = json!("um"))))]
     pub uncertainty_um: Option<f64>,
     /// Standard uncertainty of a depth limit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-9, maximum = 1000.0, example = 0.1, extensions(("x-unit" = json!("mm"))))]
+    #[schema(minimum = 1e-9, maximum = 1000.0, example = 0.1, extensions(("x-symbol" = json!("u")), ("x-unit" = json!("mm"))))]
     pub uncertainty_mm: Option<f64>,
     /// Whether the row is set aside: listed, not used.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]

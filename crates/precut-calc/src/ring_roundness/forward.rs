@@ -31,19 +31,19 @@ const COARSE_NODES: usize = 1440;
 #[serde(deny_unknown_fields, default)]
 pub struct RingAllowances {
     /// Zero of the body angle.
-    #[schema(minimum = 0.0, maximum = 90.0, example = 0.05, extensions(("x-unit" = json!("deg"))))]
+    #[schema(minimum = 0.0, maximum = 90.0, example = 0.05, extensions(("x-symbol" = json!("u_theta")), ("x-unit" = json!("deg"))))]
     pub angle_deg: f64,
     /// What the instrument's circle leaves in deviations: a constant and the two first waves.
-    #[schema(minimum = 0.0, maximum = 1000.0, example = 0.2, extensions(("x-unit" = json!("um"))))]
+    #[schema(minimum = 0.0, maximum = 1000.0, example = 0.2, extensions(("x-symbol" = json!("u_c")), ("x-unit" = json!("um"))))]
     pub centring_um: f64,
     /// Size of the ring against the setting of the tool, where radii were measured.
-    #[schema(minimum = 0.0, maximum = 10_000.0, example = 5.0, extensions(("x-unit" = json!("um"))))]
+    #[schema(minimum = 0.0, maximum = 10_000.0, example = 5.0, extensions(("x-symbol" = json!("u_R")), ("x-unit" = json!("um"))))]
     pub size_um: f64,
     /// How far off the axis of the instrument the ring may lie in each direction, where radii were measured.
-    #[schema(minimum = 0.0, maximum = 10_000.0, example = 50.0, extensions(("x-unit" = json!("um"))))]
+    #[schema(minimum = 0.0, maximum = 10_000.0, example = 50.0, extensions(("x-symbol" = json!("u_e")), ("x-unit" = json!("um"))))]
     pub eccentricity_um: f64,
     /// Multiple of the difference that twice as many nodes make.
-    #[schema(minimum = 0.0, maximum = 100.0, example = 1.0, extensions(("x-unit" = json!("1"))))]
+    #[schema(minimum = 0.0, maximum = 100.0, example = 1.0, extensions(("x-symbol" = json!("k_N")), ("x-unit" = json!("1"))))]
     pub discretisation: f64,
 }
 
