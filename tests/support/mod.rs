@@ -160,14 +160,22 @@ impl Process {
 
     /// The same with settings in its environment.
     pub fn start_with(data: &Path, settings: &[(&str, &str)]) -> Self {
+        Self::try_start_with(data, settings).expect("it says where it listens")
+    }
+
+    /// The same for a service that may die of its jobs before it says anything.
+    pub fn try_start_with(data: &Path, settings: &[(&str, &str)]) -> Option<Self> {
         let folder = data.to_str().expect("a plain name");
         let mut child = toy_command(&["serve", "--listen", "127.0.0.1:0", "--data", folder])
             .envs(settings.iter().copied())
             .stderr(Stdio::null())
             .spawn()
             .expect("this binary runs");
-        let address = address_of(&mut child);
-        Self { child, address, folder: data.to_owned(), data: None }
+        let Some(address) = said_address(&mut child) else {
+            let _ = child.wait();
+            return None;
+        };
+        Some(Self { child, address, folder: data.to_owned(), data: None })
     }
 
     /// Sends a signal by its name.
@@ -192,16 +200,19 @@ impl Process {
 
 /// Where a service that was just started listens, by its own word.
 pub fn address_of(child: &mut Child) -> SocketAddr {
+    said_address(child).expect("it says where it listens")
+}
+
+fn said_address(child: &mut Child) -> Option<SocketAddr> {
     use std::io::{BufRead, BufReader};
     let mut lines = BufReader::new(child.stdout.take().expect("it is piped")).lines();
     let address = lines
         .by_ref()
         .map_while(Result::ok)
-        .find_map(|line| line.split_once("listens on http://").map(|(_, address)| address.trim().to_owned()))
-        .expect("it says where it listens");
+        .find_map(|line| line.split_once("listens on http://").map(|(_, address)| address.trim().to_owned()))?;
     // Whatever else it prints has to go somewhere.
     std::thread::spawn(move || lines.for_each(drop));
-    address.parse().expect("an address")
+    Some(address.parse().expect("an address"))
 }
 
 impl Drop for Process {

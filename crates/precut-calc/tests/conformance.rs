@@ -89,12 +89,17 @@ fn examples_run_and_repeat<C: Calculator>(job: &C::Input, example: &str) {
     assert!(!first.explanation.is_empty() && !first.basis.is_empty(), "{at}: says nothing, or not by what");
 
     let figures = C::figures(job, &first.output);
-    assert_eq!(figures.iter().map(|f| f.id).collect::<Vec<_>>(), C::META.figures, "{at}");
+    // That every declared one is drawn by some example is tested where all examples run.
+    let shown: Vec<_> = figures.iter().map(|figure| figure.id).collect();
+    let declared_ids: Vec<_> = C::META.figures.iter().copied().filter(|id| shown.contains(id)).collect();
+    assert_eq!(shown, declared_ids, "{at}");
     for figure in &figures {
         figure_is_sound(figure, &declared(codes.labels), &at);
     }
     let tables = C::tables(job, &first.output);
-    assert_eq!(tables.iter().map(|t| t.id).collect::<Vec<_>>(), C::META.tables, "{at}");
+    let shown: Vec<_> = tables.iter().map(|table| table.id).collect();
+    let declared_ids: Vec<_> = C::META.tables.iter().copied().filter(|id| shown.contains(id)).collect();
+    assert_eq!(shown, declared_ids, "{at}");
     for table in &tables {
         let lengths: BTreeSet<usize> = table
             .columns

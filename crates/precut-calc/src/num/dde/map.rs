@@ -2,8 +2,10 @@
 //!
 //! The period is cut into elements inside which a and c are smooth. On an element with the Gauss points c_i,
 //!
+//! ```text
 //!     x_i = e_0 exp(A c_i h) q(0) - sum_j K_ij (a_j x_j + c_j x_j(t - T)),
 //!     q(h) = exp(A h) q(0) - sum_j k_j (a_j x_j + c_j x_j(t - T)):
+//! ```
 //!
 //! one P x P system per element, whatever the size of A, and all integrals depend on A and h alone. The map acts on
 //! (q(0), x at the points of the period before). Only x is delayed.
