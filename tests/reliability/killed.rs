@@ -224,7 +224,7 @@ async fn a_study_that_ends_its_process_at_the_same_point_each_time_is_given_up()
                     deaths += 1;
                     // Three starts, and one more for what it got on in the last of them.
                     assert!(deaths <= 4, "it is given up");
-                    if let Some(service) = Service::try_start(folder.path(), &settings).await {
+                    if let Some(service) = Service::try_start(folder.path(), &settings) {
                         break service;
                     }
                 };

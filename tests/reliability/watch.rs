@@ -35,7 +35,7 @@ impl Service {
     }
 
     /// The same for a service that may die of what it takes up first.
-    pub async fn try_start(folder: &Path, settings: &[(&str, &str)]) -> Option<Self> {
+    pub fn try_start(folder: &Path, settings: &[(&str, &str)]) -> Option<Self> {
         let process = Process::try_start_with(folder, settings)?;
         let client = Client::builder().no_gzip().no_brotli().pool_max_idle_per_host(0).build().unwrap();
         Some(Self { process, client })

@@ -199,6 +199,7 @@ impl Process {
 }
 
 /// Where a service that was just started listens, by its own word.
+#[allow(dead_code)] // not every program of tests starts one by itself
 pub fn address_of(child: &mut Child) -> SocketAddr {
     said_address(child).expect("it says where it listens")
 }
