@@ -375,7 +375,8 @@ fn what_the_calculators_utter_has_a_text_and_their_examples_run() {
 fn in_its_language(language: Language, said: &str, names: &str) {
     if language != Language::En {
         let mut english = complete::english_in(said);
-        english.retain(|word| !names.contains(word));
+        // Products of powers of fields are formulas.
+        english.retain(|word| !names.contains(word) && !said.contains(&format!("^{word}")));
         assert!(english.is_empty(), "{english:?} in {said:?}");
     }
 }
