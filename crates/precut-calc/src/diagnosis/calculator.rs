@@ -109,8 +109,7 @@ const CODES: Codes = Codes {
 };
 
 /// Faults of a diagnosis beside those of the base's own job.
-pub(super) const FAULT_CODES: &[&str] =
-    &["too_few_measurements", "unknown_run", "value_absent", "unknown_quantity", "unknown_cause"];
+pub(super) const FAULT_CODES: &[&str] = &["too_few_measurements", "unknown_run", "unknown_quantity", "unknown_cause"];
 
 fn unprepared(error: PrepareError) -> Failure {
     match error {

@@ -24,7 +24,7 @@ impl Eigenvalue {
 /// The eigenvalue of largest modulus of `apply`, by Arnoldi's method after `power_steps` plain applications, until the
 /// residual is below `tolerance` of the modulus (and the modulus settled in two successive tests).
 ///
-/// Deterministic: the start vector is a fixed pseudo-random sequence. When a Krylov space of [`LARGEST`] vectors does
+/// Deterministic: the start vector is a fixed pseudo-random sequence. When a Krylov space of 64 vectors does
 /// not suffice, it starts again from the last vector a few times; the residual then says how far it got. The zero
 /// map gives 0.
 pub fn largest(dimension: usize, power_steps: usize, tolerance: f64, mut apply: impl FnMut(&mut [f64])) -> Eigenvalue {

@@ -1,8 +1,8 @@
 //! Linear delay equations with periodic coefficients and a delay of one period: the period map and its largest
 //! Floquet multiplier.
 //!
-//! Spectral elements on Gauss points with the linear part exact ([`map`]), the eigenvalue by Arnoldi's method on the
-//! map itself ([`krylov`]). With elements of at most 0.6 period of the fastest oscillation eight points give the
+//! Spectral elements on Gauss points with the linear part exact (`map`), the eigenvalue by Arnoldi's method on the
+//! map itself (`krylov`). With elements of at most 0.6 period of the fastest oscillation eight points give the
 //! modulus to about 2e-5, twelve to 1e-10.
 
 mod krylov;

@@ -6,7 +6,7 @@ use super::{Affines, Layout, Objective, Program};
 /// What phase 1 found.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Verdict {
-    /// A point that satisfies every limit, within `excess` (at most [`TOLERANCE`]).
+    /// A point that satisfies every limit, within `excess` (at most the tolerance).
     Feasible,
     /// None does. The limits that say so, with their weights in the certificate: rows, then sums.
     Infeasible {

@@ -2,7 +2,7 @@
 //! posynomial limits. Equations `feed/6.1` to `feed/6.3`.
 //!
 //! Convex, so a point with small residuals and a small complementarity gap is the optimum within that gap,
-//! and its multipliers are the certificate. Two ways to it, each the check of the other: [`interior`], a
+//! and its multipliers are the certificate. Two ways to it, each the check of the other: `interior`, a
 //! primal-dual method that uses the chain structure of the variables, and [`conic`], the same program on
 //! exponential cones for a general solver.
 
