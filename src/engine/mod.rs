@@ -1,7 +1,7 @@
 //! From the bytes of a job to the bytes of its answer. Knows calculators by name, nothing of HTTP.
 //!
-//! A job is answered at once ([`Engine::solve`]) or put on record and run behind ([`Engine::submit`], [`jobs`]). Both
-//! ways share the cache, the calculations under way and the calculation itself; [`jobs`] says how something else than
+//! A job is answered at once ([`Engine::solve`]) or put on record and run behind ([`Engine::submit`], `jobs`). Both
+//! ways share the cache, the calculations under way and the calculation itself; `jobs` says how something else than
 //! one calculation becomes a job.
 
 mod answer;

@@ -28,8 +28,8 @@
 //!
 //! A parameter study is a job like any other: its entry ([`study`](crate::engine::study)) is declared as a calculator's
 //! is, and looks after its points itself. Everything here but [`work`] knows a job only as a
-//! [`NewJob`](crate::store::jobs::NewJob): kind, calculator, key, input as bytes. A job that is no calculation of an
-//! entry would have an arm in [`JobKind`](crate::store::jobs::JobKind) and in [`work::of`], which makes a
+//! [`NewJob`]: kind, calculator, key, input as bytes. A job that is no calculation of an
+//! entry would have an arm in [`JobKind`] and in [`work::of`], which makes a
 //! [`work::Work`] out of the record's input again.
 
 mod estimate;
