@@ -58,7 +58,7 @@ pub(super) struct ResultColumn {
     #[schema(example = "um")]
     unit: &'static str,
     /// The rows: numbers, words, or null where there is none.
-    #[schema(value_type = Vec<Object>)]
+    #[schema(value_type = Vec<Value>)]
     cells: Vec<Value>,
 }
 
