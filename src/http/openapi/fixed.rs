@@ -107,7 +107,10 @@ fn list_results(registry: &Registry) -> OperationBuilder {
 
 fn cursor() -> utoipa::openapi::Object {
     use utoipa::openapi::schema::{ObjectBuilder, SchemaType, Type};
-    ObjectBuilder::new().schema_type(SchemaType::new(Type::String)).pattern(Some("^(0|[1-9][0-9]{0,14})-[0-9a-f]{64}$")).build()
+    ObjectBuilder::new()
+        .schema_type(SchemaType::new(Type::String))
+        .pattern(Some("^(0|[1-9][0-9]{0,14})-[0-9a-f]{64}$"))
+        .build()
 }
 
 fn read_result() -> OperationBuilder {

@@ -1,7 +1,7 @@
 //! The compensated path that goes with a schedule: the deflection calculator, zone by zone at its feed and speed
 //! (`feed/9.1`).
 
-use crate::calculator::{Calculator, Failure, Monitor, checkpoint};
+use crate::calculator::{Calculator, Failure, Message, Monitor, checkpoint};
 use crate::deflection_compensation::{
     self as deflection, Cut, DeflectionCompensation, Detail, Gravity, Include, PathSettings, SpeedDiameter, Stations,
     Tolerance, Uncertainty,
@@ -18,6 +18,16 @@ use super::plan::Compensation;
 /// Stations keep this far from the ends of a zone, so that none stands on a shoulder of its neighbour, mm.
 const INSIDE_MM: f64 = 1e-6;
 
+/// A zone's view of the schedule's monitor: it may be cancelled, its own progress is not the schedule's.
+struct OfZone<'m>(&'m dyn Monitor);
+
+impl Monitor for OfZone<'_> {
+    fn cancelled(&self) -> bool {
+        self.0.cancelled()
+    }
+    fn progress(&self, _fraction: f64, _stage: Message) {}
+}
+
 /// The path of every zone.
 pub(super) fn path(
     job: &Job,
@@ -32,7 +42,7 @@ pub(super) fn path(
         checkpoint(monitor)?;
         let Some(mut own) = deflection_job(job, zone, u, x, wanted) else { return Ok(None) };
         DeflectionCompensation::fill(&mut own);
-        let answer = DeflectionCompensation::run(&own, monitor)?.output;
+        let answer = DeflectionCompensation::run(&own, &OfZone(monitor))?.output;
         let (Some(path), Some(uncompensated), Some(compensated)) =
             (&answer.path, answer.largest_error_um, answer.largest_error_after_um)
         else {
