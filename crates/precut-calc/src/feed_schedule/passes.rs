@@ -28,7 +28,8 @@ pub(super) fn best(
     let mut why: Option<Unsolved> = None;
     for roughing in 0..=plan.roughing_passes_max {
         monitor.progress(
-            f64::from(roughing) / f64::from(plan.roughing_passes_max + 1),
+            // The comparison begins at 0.7.
+            0.65 * (f64::from(roughing) / f64::from(plan.roughing_passes_max + 1)),
             Message::new("stage_passes").with("passes", roughing as usize + 1),
         );
         let Some((low, high)) = range(plan, roughing) else {
