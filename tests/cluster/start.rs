@@ -34,7 +34,6 @@ async fn a_database_that_is_absent_is_waited_for_and_then_given_up_with_the_reas
     let mut child = toy_command(&["serve", "--listen", "127.0.0.1:0", "--data", &folder])
         .env("PRECUT_STORE", &address)
         .env("PRECUT_POSTGRES_WAIT_S", "60")
-        .stderr(Stdio::null())
         .spawn()
         .unwrap();
     tokio::time::sleep(Duration::from_millis(700)).await;

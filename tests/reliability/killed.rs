@@ -249,7 +249,7 @@ async fn the_program_itself_finishes_what_it_was_killed_in() {
             .args(["serve", "--listen", "127.0.0.1:0", "--data", folder.path().to_str().unwrap()])
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
-            .stderr(Stdio::null())
+            .stderr(Stdio::piped())
             .spawn()
             .unwrap();
         let address = crate::support::address_of(&mut child);

@@ -168,13 +168,9 @@ impl Process {
         let folder = data.to_str().expect("a plain name");
         let mut child = toy_command(&["serve", "--listen", "127.0.0.1:0", "--data", folder])
             .envs(settings.iter().copied())
-            .stderr(Stdio::null())
             .spawn()
             .expect("this binary runs");
-        let Some(address) = said_address(&mut child) else {
-            let _ = child.wait();
-            return None;
-        };
+        let address = said_address(&mut child).ok()?;
         Some(Self { child, address, folder: data.to_owned(), data: None })
     }
 
@@ -198,22 +194,35 @@ impl Process {
     }
 }
 
-/// Where a service that was just started listens, by its own word.
+/// Where a service that was just started, its output piped, listens, by its own word.
 #[allow(dead_code)] // not every program of tests starts one by itself
 pub fn address_of(child: &mut Child) -> SocketAddr {
     said_address(child).expect("it says where it listens")
 }
 
-fn said_address(child: &mut Child) -> Option<SocketAddr> {
-    use std::io::{BufRead, BufReader};
+/// The same, or how the service ended and what it complained of.
+fn said_address(child: &mut Child) -> Result<SocketAddr, String> {
+    use std::io::{BufRead, BufReader, Read};
+    let complaints = child.stderr.take().map(|mut pipe| {
+        std::thread::spawn(move || {
+            let mut bytes = Vec::new();
+            let _ = pipe.read_to_end(&mut bytes);
+            String::from_utf8_lossy(&bytes).into_owned()
+        })
+    });
     let mut lines = BufReader::new(child.stdout.take().expect("it is piped")).lines();
     let address = lines
         .by_ref()
         .map_while(Result::ok)
-        .find_map(|line| line.split_once("listens on http://").map(|(_, address)| address.trim().to_owned()))?;
+        .find_map(|line| line.split_once("listens on http://").map(|(_, address)| address.trim().to_owned()));
+    let Some(address) = address else {
+        let status = child.wait().expect("it is a child");
+        let said = complaints.and_then(|thread| thread.join().ok()).unwrap_or_default();
+        return Err(format!("{status}: {said}"));
+    };
     // Whatever else it prints has to go somewhere.
     std::thread::spawn(move || lines.for_each(drop));
-    Some(address.parse().expect("an address"))
+    Ok(address.parse().expect("an address"))
 }
 
 impl Drop for Process {

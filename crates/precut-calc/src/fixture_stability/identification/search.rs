@@ -39,17 +39,21 @@ pub(super) fn first_sets(
     progress: Progress<'_>,
 ) -> Result<Vec<Member>, Failure> {
     let settings = evolution(problem);
-    // A set whose multiplier does not converge is no set.
-    let objective = |at: &[f64], _: f64| {
-        if problem.monitor.cancelled() { f64::INFINITY } else { problem.quick(at, amplitude).unwrap_or(f64::INFINITY) }
-    };
+    let objective = |at: &[f64], _: f64| unless_cancelled(problem, || problem.quick(at, amplitude));
     let found = evolve(problem.unknowns.len(), &[stated(problem)], &settings, &objective, &mut |generation, best| {
         let part = f64::from(generation) / f64::from(settings.generations);
         progress(part, Message::new("stage_identification_first").with("objective", best.value));
-        !problem.monitor.cancelled()
     });
-    checkpoint(problem.monitor)?;
-    Ok(found)
+    found.ok_or(Failure::Cancelled)
+}
+
+/// A value of the search; none once nobody waits for it. A set whose multiplier does not converge is no set.
+fn unless_cancelled(problem: &Problem<'_>, value: impl Fn() -> Result<f64, Failure>) -> Option<f64> {
+    match checkpoint(problem.monitor).and_then(|()| value()) {
+        Err(Failure::Cancelled) => None,
+        Err(_) => Some(f64::INFINITY),
+        Ok(value) => Some(value),
+    }
 }
 
 /// The best set: evolved from the first sets and as many others, then refined (`fixture/6.1`).
@@ -60,12 +64,7 @@ pub(super) fn best_set(
     progress: Progress<'_>,
 ) -> Result<Found, Failure> {
     let settings = evolution(problem);
-    let value = |at: &[f64], bound: f64| {
-        if problem.monitor.cancelled() {
-            return f64::INFINITY;
-        }
-        problem.objective(at, law, bound).unwrap_or(f64::INFINITY)
-    };
+    let value = |at: &[f64], bound: f64| unless_cancelled(problem, || problem.objective(at, law, bound));
     let mut begin: Vec<Vec<f64>> = vec![stated(problem)];
     begin.extend(first.iter().take(settings.members / 2).map(|member| member.at.clone()));
     let mut generations = 0;
@@ -78,10 +77,8 @@ pub(super) fn best_set(
     let population = evolve(problem.unknowns.len(), &begin, &settings, &value, &mut |generation, best| {
         generations = generation + 1;
         said(0.8 * f64::from(generation) / f64::from(settings.generations), best.value);
-        !problem.monitor.cancelled()
     });
-    checkpoint(problem.monitor)?;
-    let Some(best) = population.into_iter().next() else {
+    let Some(best) = population.ok_or(Failure::Cancelled)?.into_iter().next() else {
         return Err(Failure::Internal("a search without members".to_owned()));
     };
     let most = REFINEMENTS * u32::try_from(problem.unknowns.len()).unwrap_or(1);
@@ -89,9 +86,8 @@ pub(super) fn best_set(
     let refined = simplex(&best, SIMPLEX.0, SIMPLEX.1, most, &|at| value(at, f64::INFINITY), &mut |taken| {
         refinements = taken;
         said(0.8 + 0.2 * f64::from(taken) / f64::from(most), best.value);
-        !problem.monitor.cancelled()
-    });
-    checkpoint(problem.monitor)?;
+    })
+    .ok_or(Failure::Cancelled)?;
     if !refined.value.is_finite() {
         return Err(Failure::NotConverged {
             what: "identification of fixture parameters",
