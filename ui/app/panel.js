@@ -2,7 +2,7 @@
 // that it spans.
 import { html } from './lib.js';
 import { t, number, unitSymbol } from './text.js';
-import { extent, valueAt } from './scale.js';
+import { extent, valueAt, cellAt } from './scale.js';
 import { role } from './draw.js';
 import { colouring } from './palette.js';
 
@@ -53,7 +53,7 @@ export function ordinates(panel, view) {
 }
 
 /** Name of the axis and of each curve, with its value at the cursor. */
-export function Head({ panel, ghost, style, hidden, toggle, at, factor, span, polar }) {
+export function Head({ panel, ghost, style, hidden, toggle, at, over = null, factor, span, polar }) {
   const seen = new Set();
   const named = panel.items.filter(item => item.name && !seen.has(item.name) && seen.add(item.name));
   const value = (source, item) => {
@@ -80,7 +80,7 @@ export function Head({ panel, ghost, style, hidden, toggle, at, factor, span, po
           ${now !== null && html`<output>${now}${before !== null && html`<small> (${before})</small>`}</output>`}
         </button>`;
       })}
-      ${map && html`<${Key} item=${map} />`}
+      ${map && html`<${Key} item=${map} now=${at !== null && over !== null ? cellAt(map, at, over) : null} />`}
     </div>`;
 }
 
@@ -96,10 +96,10 @@ function Swatch({ item, look }) {
 }
 
 /** The colours of a map with their numbers. */
-function Key({ item }) {
+function Key({ item, now }) {
   const { steps, low, high } = colouring(item);
   return html`
-    <span class="key"><span>${axisName(item.value)}</span><span class="key-end">${number(low, 3)}</span>
+    <span class="key"><span>${axisName(item.value)}</span><output>${now === null ? '' : `= ${number(now, 3)}`}</output><span class="key-end">${number(low, 3)}</span>
       <svg width="120" height="12" viewBox="0 0 120 12" aria-hidden="true">${steps.map((colour, index) => html`<rect x=${(index * 120) / steps.length} width=${120 / steps.length + 0.4} height="12" fill=${`rgb(${colour})`} />`)}</svg>
       <span class="key-end">${number(high, 3)}</span></span>`;
 }
