@@ -10,7 +10,7 @@ use crate::{SETTLED, both};
 const AXE: &str = include_str!("vendor/axe-core/axe.min.js");
 const RULES: &str = "['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice']";
 
-fn assert_accessible(page: &mut Page, place: &str) {
+pub fn assert_accessible(page: &mut Page, place: &str) {
     if page.evaluate("typeof axe") == "undefined" {
         page.evaluate(&format!("{AXE};0"));
     }

@@ -25,6 +25,7 @@ fn a_locked_service_asks_for_its_key_and_says_when_it_is_wrong() {
     page.fill("#api-key", "another key");
     page.press("Enter");
     page.until("document.querySelector('.key-form [role=alert]')?.textContent.includes('does not know')");
+    crate::access::assert_accessible(&mut page, "key refused");
     assert_eq!(page.value("#api-key"), "");
     assert_eq!(page.evaluate("document.querySelector('#api-key').type"), "password");
 

@@ -78,7 +78,7 @@ export function Jobs({ calculators, refreshJobs }) {
             <td><span class=${`state ${item.state}`}>${t(`state_${item.state}`)}</span>${item.problem ? html`<span class="quiet"> ${item.problem.detail || item.problem.title}</span>` : ''}</td>
             <td class="progress-cell">${isOpen ? html`<progress max="1" value=${item.progress} aria-label=${`${name}: ${t('progress')}`}></progress><span class="quiet">${item.stage || ''}${item.remaining_ms ? ` · ${t('time_left', { time: duration(item.remaining_ms) })}` : ''}</span>`
               : item.started_at && item.finished_at ? duration(new Date(item.finished_at) - new Date(item.started_at)) : ''}</td>
-            <td>${moment(item.created_at)}</td>
+            <td class="when">${moment(item.created_at)}</td>
             <td>${isOpen && html`<button type="button" onClick=${() => stop(item.id)}>${t('cancel_job')}<span class="hidden"> ${name}</span></button>`}</td></tr>`;
         })}</tbody></table></div>`}
       ${next && html`<button type="button" class="more" onClick=${more}>${t('older')}</button>`}
@@ -103,7 +103,7 @@ function ResultList({ calculators, wanted, replace }) {
         <thead><tr><th scope="col">${t('calculator')}</th><th scope="col">${t('computed')}</th><th scope="col">${t('key')}</th><th scope="col">${t('size')}</th></tr></thead>
         <tbody>${items.map(item => html`<tr key=${item.key}>
           <th scope="row">${known.has(item.calculator) ? html`<a href=${addressOf(item)}>${titleOf(calculators, item.calculator)}</a>` : titleOf(calculators, item.calculator)}</th>
-          <td>${moment(item.created_at)}</td><td><code>${item.key.slice(3, 15)}…</code></td><td class="number">${number(item.bytes / 1024, 3)} ${t('kilobytes')}</td></tr>`)}</tbody></table></div>`}
+          <td class="when">${moment(item.created_at)}</td><td><code>${item.key.slice(3, 15)}…</code></td><td class="number">${number(item.bytes / 1024, 3)} ${t('kilobytes')}</td></tr>`)}</tbody></table></div>`}
       ${next && html`<button type="button" class="more" onClick=${more}>${t('older')}</button>`}
     </main>`;
 }
@@ -126,7 +126,7 @@ export function Models({ calculators, models, refreshModels }) {
       ${models === null ? html`<p class="empty-list">${t('models_absent')}</p>` : html`
         ${models.length === 0 ? html`<p class="empty-list">${t('no_models')}</p>` : html`<div class="grid-scroll" tabindex="0" role="region" aria-label=${t('models')}><table class="list">
           <thead><tr><th scope="col">${t('name')}</th><th scope="col">${t('calculator')}</th><th scope="col">${t('revision')}</th><th scope="col">${t('created')}</th><th scope="col"><span class="hidden">${t('actions')}</span></th></tr></thead>
-          <tbody>${models.map(({ name, calculator, revision, created_at: created }) => html`<tr key=${name}><th scope="row">${name}</th><td>${titleOf(calculators, calculator)}</td><td class="number">${revision}</td><td>${created ? moment(created) : ''}</td>
+          <tbody>${models.map(({ name, calculator, revision, created_at: created }) => html`<tr key=${name}><th scope="row">${name}</th><td>${titleOf(calculators, calculator)}</td><td class="number">${revision}</td><td class="when">${created ? moment(created) : ''}</td>
             <td class="actions"><a class="button" href=${`#/${calculator}?model=${name}`}>${t('use_model')}<span class="hidden"> ${name}</span></a>
               <button type="button" onClick=${() => fetchDocument(name)}>JSON<span class="hidden"> ${name}</span></button>
               <button type="button" onClick=${() => drop(name)}>${t('delete')}<span class="hidden"> ${name}</span></button></td></tr>`)}</tbody></table></div>`}

@@ -8,6 +8,7 @@ import { spreadOf, spreadColumns, withSpread } from './digits.js';
 import { canReplay, Replay } from './replay.js';
 import { canTrade, spanOf, TradeOff } from './tradeoff.js';
 import { hasClamp, ClampBars } from './clamp.js';
+import { hasCauses, Causes } from './cause.js';
 
 /** The curve above a schedule leaves room for it. */
 const TRADE_HEIGHT = 260;
@@ -93,6 +94,7 @@ export function Result({ id, description, answer, problem, running, pinned, pin,
           ${first && html`<p class="verdict" aria-live="polite">${first.text}</p>`}
           <${Warnings} key=${answer.key} list=${body.warnings} />
           ${hasClamp(id, body.result) && html`<${ClampBars} result=${body.result} input=${body.input} schema=${description.output_schema} />`}
+          ${hasCauses(id, body.result) && html`<${Causes} result=${body.result} schema=${description.input_schema} unit=${unitSymbol(figures.find(one => one.id === 'residuals')?.panels[0]?.y.unit)} />`}
           ${others.length > 0 && html`<ul class="explanation">${others.map(({ code, text }, index) => html`<li key=${code + index}>${text}</li>`)}</ul>`}
         </div>`}
       </div>
