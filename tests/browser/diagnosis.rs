@@ -26,7 +26,9 @@ fn a_diagnosis_is_saved_as_a_model_and_used_in_another_form() {
     page.until("document.querySelector('.causes .named')?.textContent.startsWith('Податливость передней бабки')");
     page.until("!/[a-z]{4}/.test(document.querySelector('.causes').textContent)");
     page.click_on("EN");
-    page.until(&format!("document.documentElement.lang === 'en' && {SETTLED}"));
+    page.until(&format!(
+        "document.querySelector('.causes .named').textContent.startsWith('Headstock') && /^[ -~]+$/.test(document.querySelector('.verdict').textContent) && {SETTLED}"
+    ));
     // A bad name is refused before it is sent, a good one makes a revision.
     page.fill("#model-name", "lathe-7-winter");
     page.click(".save-model button");

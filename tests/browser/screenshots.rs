@@ -16,7 +16,7 @@ const SHOTS: [(&str, &str, u32, u32, bool); 17] = [
     ("ring-map", "ring-roundness?example=set_up", 1440, 900, true),
     ("feed", "feed-schedule", 1440, 900, false),
     ("trade-off", "feed-schedule", 1440, 1150, false),
-    ("clamp", "fixture-stability", 1440, 1150, false),
+    ("clamp", "fixture-stability", 1920, 1080, true),
     ("study", "studies", 1440, 900, false),
     ("diagnosis", "diagnosis", 1440, 1500, false),
     ("diagnosis-phone", "diagnosis", 360, 740, true),

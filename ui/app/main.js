@@ -108,7 +108,8 @@ function App() {
     ${!isOnline && html`<p class="banner" role="status">${t('offline_title')}. ${t('offline_detail')}</p>`}
     ${needsKey && html`<${KeyForm} key=${attempt} refused=${needsKey === 'refused'} done=${() => setAttempt(attempt + 1)} />`}
     <${Guard} key=${page}>
-      ${!calculators ? html`<main class="plain" id="main" tabindex="-1"><p class="late">${t('loading')}</p></main>`
+      ${!calculators && needsKey ? html`<main class="plain" id="main" tabindex="-1"><h1>${t('slogan')}</h1><p>${t('key_why')}</p></main>`
+        : !calculators ? html`<main class="plain" id="main" tabindex="-1"><p class="late">${t('loading')}</p></main>`
         : page === '' ? html`<${Home} calculators=${calculators} />`
         : page === 'jobs' ? html`<${Jobs} calculators=${calculators} refreshJobs=${refreshJobs} />`
         : page === 'results' ? html`<${Results} calculators=${calculators} query=${query} replace=${replace} />`
@@ -160,8 +161,9 @@ function KeyForm({ done, refused }) {
   useEffect(() => { document.getElementById('api-key')?.focus(); }, []);
   return html`
     <form class="banner key-form" aria-label=${t('key_wanted')} onSubmit=${event => { event.preventDefault(); api.useKey(key); done(); }}>
-      <label for="api-key" role=${refused ? 'alert' : undefined}>${refused ? t('key_refused') : t('key_wanted')}</label><input id="api-key" type="password" autocomplete="off" value=${key} aria-describedby="api-key-hint" aria-invalid=${refused ? 'true' : undefined} onInput=${event => setKey(event.currentTarget.value)} required /><button type="submit" class="primary">${t('use_key')}</button>
-      <span class="quiet" id="api-key-hint">${t('key_hint')}</span>
+      <label for="api-key">${t('key_wanted')}</label><input id="api-key" type="password" autocomplete="off" value=${key} aria-describedby="api-key-hint" aria-invalid=${refused ? 'true' : undefined} onInput=${event => setKey(event.currentTarget.value)} required /><button type="submit" class="primary">${t('use_key')}</button>
+      ${refused && html`<span class="refused" role="alert">${t('key_refused')}</span>`}
+      <span id="api-key-hint">${t('key_hint')}</span>
     </form>`;
 }
 
