@@ -18,7 +18,7 @@ const SHOTS: [(&str, &str, u32, u32, bool); 17] = [
     ("trade-off", "feed-schedule", 1440, 1150, false),
     ("clamp", "fixture-stability", 1920, 1080, true),
     ("study", "studies", 1440, 900, false),
-    ("diagnosis", "diagnosis", 1440, 1500, false),
+    ("diagnosis", "diagnosis", 1920, 1080, false),
     ("diagnosis-phone", "diagnosis", 360, 740, true),
     ("diagnosis-wide", "diagnosis", 2560, 1300, false),
     ("models", "models", 1024, 600, false),

@@ -325,7 +325,7 @@ function Stacked({ figure, pinned, width, style, hidden, toggle, at, setAt, over
               <text class="x-name" x=${(left + right) / 2} y=${tall + 39} text-anchor="middle">${axisName(figure.x, xLabels.factor)}${at !== null ? ` = ${readDigits(at, shown[1] - shown[0])}` : ''}</text>`}
             ${drag && Math.abs(drag.to - drag.from) > 4 && html`<rect class="selection" x=${Math.min(drag.from, drag.to)} y="6" width=${Math.abs(drag.to - drag.from)} height=${tall} />`}
             ${over !== null && over >= domain[0] && over <= domain[1] && html`<path class="cursor" d=${`M${left} ${y(over).toFixed(1)}H${right}`} />`}
-            ${index === 0 && grip && html`<circle class="handle" cx=${grip[0]} cy=${grip[1]} r="7.5" />`}
+            ${index === 0 && grip && html`<circle class="reach" cx=${grip[0]} cy=${grip[1]} r="22" /><circle class="handle" cx=${grip[0]} cy=${grip[1]} r="7.5" />`}
             ${cursor !== null && html`<path class="cursor" d=${`M${cursor.toFixed(1)} 6V${6 + tall}`} />
               ${panel.items.filter(item => item.kind === 'line' && !hidden.has(item.name)).map(item => {
                 const v = valueAt(item.x, item.y, at);

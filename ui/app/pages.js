@@ -5,6 +5,8 @@ import * as api from './api.js';
 import { save } from './result.js';
 
 const LOOK_MS = 1500;
+/** Results of one calculator not further apart than this stand in one line until asked for. */
+const BURST_MS = 600000;
 
 export function Home({ calculators }) {
   const group = kind => calculators.filter(item => item.kind === kind);
@@ -90,9 +92,21 @@ export function Results({ calculators, query, replace }) {
   return html`<${ResultList} key=${wanted} ...${{ calculators, wanted, replace }} />`;
 }
 
+/** Results of one calculator in a row: of a slider, a study, a number that was nudged. */
+function inBursts(items) {
+  const bursts = [];
+  for (const item of items) {
+    const last = bursts.at(-1)?.at(-1);
+    if (last && last.calculator === item.calculator && Math.abs(new Date(last.created_at) - new Date(item.created_at)) < BURST_MS) bursts.at(-1).push(item);
+    else bursts.push([item]);
+  }
+  return bursts;
+}
+
 function ResultList({ calculators, wanted, replace }) {
   const [first] = useState(() => () => api.results({ limit: 50, ...(wanted && { calculator: wanted }) }));
   const { items, next, more, trouble } = usePages(first);
+  const [opened, setOpened] = useState(() => new Set());
   const known = new Set([...calculators.map(({ id }) => id), 'studies']);
   return html`
     <main class="plain" id="main" tabindex="-1"><h1>${t('results')}</h1><p class="quiet">${t('results_about')}</p>
@@ -101,8 +115,9 @@ function ResultList({ calculators, wanted, replace }) {
       <${ListState} items=${items} trouble=${trouble} empty=${t('no_results')} />
       ${items && items.length > 0 && html`<div class="grid-scroll" tabindex="0" role="region" aria-label=${t('results')}><table class="list">
         <thead><tr><th scope="col">${t('calculator')}</th><th scope="col">${t('computed')}</th><th scope="col">${t('key')}</th><th scope="col">${t('size')}</th></tr></thead>
-        <tbody>${items.map(item => html`<tr key=${item.key}>
-          <th scope="row">${known.has(item.calculator) ? html`<a href=${addressOf(item)}>${titleOf(calculators, item.calculator)}</a>` : titleOf(calculators, item.calculator)}</th>
+        <tbody>${inBursts(items).flatMap(([item, ...rest]) => [item, ...(opened.has(item.key) ? rest : [])].map((one, place) => ({ item: one, folded: place === 0 && !opened.has(item.key) ? rest.length : 0 }))).map(({ item, folded }) => html`<tr key=${item.key}>
+          <th scope="row">${known.has(item.calculator) ? html`<a href=${addressOf(item)}>${titleOf(calculators, item.calculator)}</a>` : titleOf(calculators, item.calculator)}
+            ${folded > 0 && html` <button type="button" class="quiet-button" onClick=${() => setOpened(new Set([...opened, item.key]))}>${t('and_more', { count: folded })}<span class="hidden">: ${titleOf(calculators, item.calculator)}</span></button>`}</th>
           <td class="when">${moment(item.created_at)}</td><td><code>${item.key.slice(3, 15)}…</code></td><td class="number">${number(item.bytes / 1024, 3)} ${t('kilobytes')}</td></tr>`)}</tbody></table></div>`}
       ${next && html`<button type="button" class="more" onClick=${more}>${t('older')}</button>`}
     </main>`;

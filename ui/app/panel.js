@@ -20,8 +20,16 @@ export function readDigits(value, span) {
   return number(value, Math.min(8, Math.max(3, Math.ceil(Math.log10(size / span)) + 4)));
 }
 
+/** The outer edges of the first and the last cell of a map. */
+const edges = (x, isLog) => {
+  if (x.length < 2) return x;
+  const [low, high] = [x[0] - (x[1] - x[0]) / 2, x.at(-1) + (x.at(-1) - x.at(-2)) / 2];
+  return [isLog && low <= 0 ? x[0] : low, high];
+};
+
 export function abscissae(figure) {
-  return figure.panels.flatMap(panel => panel.items.flatMap(item => (item.kind === 'glyph' ? [] : item.x)));
+  const isLog = figure.x.scale === 'logarithmic';
+  return figure.panels.flatMap(panel => panel.items.flatMap(item => (item.kind === 'glyph' ? [] : item.kind === 'heat_map' ? edges(item.x, isLog) : item.x)));
 }
 
 export function ordinates(panel, view) {
