@@ -107,9 +107,9 @@ function Swatch({ item, look }) {
 function Key({ item, now }) {
   const { steps, low, high } = colouring(item);
   return html`
-    <span class="key"><span>${axisName(item.value)}</span><output>${now === null ? '' : `= ${number(now, 3)}`}</output><span class="key-end">${number(low, 3)}</span>
+    <span class="key"><span>${axisName(item.value)}</span><output>${now === null ? '' : `= ${number(now, 3)}`}</output><span class="key-scale"><span class="key-end">${number(low, 3)}</span>
       <svg width="120" height="12" viewBox="0 0 120 12" aria-hidden="true">${steps.map((colour, index) => html`<rect x=${(index * 120) / steps.length} width=${120 / steps.length + 0.4} height="12" fill=${`rgb(${colour})`} />`)}</svg>
-      <span class="key-end">${number(high, 3)}</span></span>`;
+      <span class="key-end">${number(high, 3)}</span></span></span>`;
 }
 
 /** A panel in words, for those who cannot see it. */

@@ -4,6 +4,8 @@ import * as api from './api.js';
 
 /** Answers kept while the page is open. */
 const KEPT = 400;
+/** Times that a busy service is asked again. */
+const MOST_TRIES = 5;
 
 /** Follows a job as fast as the service answers; one that is passed by before its turn is never sent. `tag` names the
  *  job, `null` asks for none. Gives the last answer found: `{ tag, answer, figures }` or `{ tag, problem }`. */
@@ -38,12 +40,17 @@ export function useProbe(id, tag, job) {
   return found;
 }
 
-async function fetched(id, { tag, job }, signal) {
+async function fetched(id, { tag, job }, signal, again = 0) {
   try {
     const answer = await api.answered(id, job, signal);
     return { tag, answer, figures: await api.figures(answer.key, signal) };
   } catch (error) {
     if (error.name === 'AbortError') return null;
+    if ((error.status === 429 || error.status === 503) && again < MOST_TRIES) {
+      // Too many at once: asked again when the service says.
+      await new Promise(resolve => setTimeout(resolve, 1000 * (error.retryAfter || 1)));
+      return signal.aborted ? null : fetched(id, { tag, job }, signal, again + 1);
+    }
     return { tag, problem: error.problem || { title: error.message } };
   }
 }

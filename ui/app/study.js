@@ -208,7 +208,7 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
         ${running && html`<${Progress} running=${running} stop=${() => api.cancel(running.id).catch(fail)} />`}
         ${problem && html`<${Trouble} problem=${problem} onGo=${go} />`}
         ${!answer && !running?.interim ? html`<div class="empty">${problem || running ? '' : html`<p>${pending ? t('first_answer') : t('study_empty')}</p>`}</div>`
-          : html`<${Findings} ...${{ answer, interim: running?.interim, leaves, outputs, calculator: description.id }} stale=${Boolean(answer && JSON.stringify(answer.asked) !== JSON.stringify(body) && !stored)} />`}
+          : html`<${Findings} ...${{ answer, interim: running?.interim, asked: body, leaves, outputs, calculator: description.id }} stale=${Boolean(answer && JSON.stringify(answer.asked) !== JSON.stringify(body) && !stored)} />`}
       </section>
     </main>`;
 }
@@ -260,11 +260,13 @@ function valuesOf({ from, to, count, spacing }) {
 }
 
 /** What came out: pictures, a sentence, one row per point. */
-function Findings({ answer, interim, leaves, outputs, calculator, stale }) {
+function Findings({ answer, interim, asked, leaves, outputs, calculator, stale }) {
   const [chosen, setChosen] = useState(null);
   const [picked, setPicked] = useState(null);
   const result = answer?.answer.result;
-  const all = (interim ? [interim] : answer?.figures || []).map(figure => (result && !interim ? relabelled(figure, result, leaves, outputs) : figure));
+  // What is so far is drawn of the study that was asked.
+  const drawn = interim ? { variables: asked.vary.map(one => ({ pointer: one.pointer, values: one.values || [one.from, one.to] })), outputs: asked.outputs.map(one => ({ pointer: one })) } : result;
+  const all = (interim ? [interim] : answer?.figures || []).map(figure => relabelled(figure, drawn, leaves, outputs));
   const figure = all.find(({ id }) => id === chosen) || all[0];
   const isEmpty = figure && !figure.panels.some(panel => panel.items.some(item => (item.values || item.y).some(value => value !== null)));
   const height = usePictureHeight(figure?.panels.length || 1);
