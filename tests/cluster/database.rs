@@ -18,7 +18,8 @@ pub const PATIENCE: Duration = Duration::from_mins(3);
 pub struct Database {
     folder: PathBuf,
     /// Removes the folder at the end, where it is the database's own.
-    _own: Option<TempDir>,
+    #[allow(dead_code)] // held, never looked at
+    own: Option<TempDir>,
     port: u16,
     pub address: String,
 }
@@ -44,8 +45,9 @@ impl Database {
     /// With settings of its own.
     pub fn start_with(settings: &[&str]) -> Option<Self> {
         let folder = tempfile::Builder::new().prefix("precut-postgres-").tempdir().unwrap();
-        let database = Self::start_in(folder.path(), settings)?;
-        Some(Self { _own: Some(folder), ..database })
+        let mut database = Self::start_in(folder.path(), settings)?;
+        database.own = Some(folder);
+        Some(database)
     }
 
     /// In a folder of the test's.
@@ -56,7 +58,7 @@ impl Database {
             return None;
         }
         let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
-        let mut database = Self { folder: folder.to_owned(), _own: None, port, address: String::new() };
+        let mut database = Self { folder: folder.to_owned(), own: None, port, address: String::new() };
         database.run(settings);
         Some(database)
     }
