@@ -6,6 +6,7 @@ mod beam_closed_forms;
 mod beam_exact;
 mod beam_properties;
 mod beam_support;
+mod blind_trials;
 mod conformance;
 mod deflection_effects;
 mod deflection_properties;

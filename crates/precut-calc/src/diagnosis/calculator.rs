@@ -6,7 +6,7 @@ use super::base::Bound;
 use super::data::{Data, Layout};
 use super::input::{DiagnosisJob, MAX_RUNS};
 use super::output::DiagnosisResult;
-use super::{picture, report};
+use super::{picture, report, said};
 use crate::calculator::{
     Answer, Calculator, CalculatorKind, Check, Codes, Cost, Diagnosable, Failure, Figure, Finding, ForwardModel,
     MeasuredRow, Measurement, Message, Meta, Monitor, PrepareError, Rows, Table, Violations,
@@ -40,7 +40,7 @@ impl<M: Diagnosable> Calculator for Diagnosis<M> {
     const META: Meta = Meta {
         id: "diagnosis",
         kind: CalculatorKind::Calculator,
-        version: 1,
+        version: 2,
         title: "Diagnosis",
         question: "What does the simulation get wrong, why, and what is gained by mending it?",
         summary: "Measurements of what was really cut against a calculator's job: whether anything is wrong beyond \
@@ -90,7 +90,7 @@ impl<M: Diagnosable> Calculator for Diagnosis<M> {
     }
 
     fn figures(job: &Self::Input, output: &Self::Output) -> Vec<Figure> {
-        picture::figures(&job.quantity, output)
+        picture::figures::<M>(&job.quantity, output)
     }
 
     fn tables(_job: &Self::Input, output: &Self::Output) -> Vec<Table> {
@@ -102,8 +102,8 @@ impl<M: Diagnosable> Calculator for Diagnosis<M> {
 const CODES: Codes = Codes {
     faults: &[FAULT_CODES],
     failures: &[FAULT_CODES],
-    warnings: &[report::WARNING_CODES],
-    explanations: &[report::EXPLANATION_CODES],
+    warnings: &[said::WARNING_CODES],
+    explanations: &[said::EXPLANATION_CODES],
     stages: &[report::STAGE_CODES],
     labels: &[picture::LABEL_CODES],
 };
