@@ -221,7 +221,9 @@ fn drawn(figure: &Figure, language: Language) -> String {
 pub(super) fn label(figure: &Figure, code: &str, language: Language) -> String {
     match figure.title.values.get(code) {
         Some(Value::Text(name)) => name.clone().into_owned(),
-        _ if Texts::shared().has(language, "label", code) => Texts::shared().word(language, "label", code, &Values::new()),
+        _ if Texts::shared().has(language, "label", code) => {
+            Texts::shared().word(language, "label", code, &Values::new())
+        }
         _ => Glossary::of(language).name(code),
     }
 }

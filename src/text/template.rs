@@ -31,7 +31,8 @@ pub(super) fn environment() -> Environment<'static> {
     environment.add_filter("word", |state: &State<'_, '_>, word: &str| Glossary::of(language_of(state)).word(word));
     environment.add_filter("words", words);
     environment.add_filter("field", |state: &State<'_, '_>, name: &str| {
-        let said: Vec<String> = name.split(", ").map(|name| Glossary::of(language_of(state)).name_within(name)).collect();
+        let said: Vec<String> =
+            name.split(", ").map(|name| Glossary::of(language_of(state)).name_within(name)).collect();
         said.join(", ")
     });
     environment.add_filter("labelled", labelled);

@@ -10,6 +10,8 @@
 //!
 //! `PRECUT_TRIALS=300 PRECUT_TRIAL_SEED=12345 cargo test --release -p precut-calc diagnosis_trials -- --nocapture`
 
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
+
 use precut_calc::calculator::{Calculator, Check, Diagnosable, Unwatched, Violations};
 use precut_calc::diagnosis::{Diagnosis, NamedCause, ResultOf, VerdictClass};
 use precut_trials::score::{Said, Score};
@@ -20,7 +22,7 @@ use serde_json::json;
 type Draw = fn(Class, f64, u64) -> Trial;
 
 /// The score of the diagnosis of `M` on so many draws; printed with its confusion matrix.
-pub fn score<M: Diagnosable>(draw: Draw, class: Class, snr: f64, seed: u64, count: u64) -> Score {
+pub(crate) fn score<M: Diagnosable>(draw: Draw, class: Class, snr: f64, seed: u64, count: u64) -> Score {
     let (seed, count) = (number("PRECUT_TRIAL_SEED", seed), number("PRECUT_TRIALS", count));
     let mut score = Score::default();
     for k in 0..count {

@@ -13,6 +13,8 @@ mod deflection_properties;
 mod deflection_reference;
 mod diagnosis_answers;
 mod diagnosis_deflection;
+mod diagnosis_profiles;
+mod diagnosis_refusals;
 mod diagnosis_ring;
 mod diagnosis_ring_trials;
 mod diagnosis_trials;

@@ -128,7 +128,10 @@ impl Kind {
             orders.iter().map(|&k| sigma * shape(k) / variance.sqrt()).collect()
         });
         let halved = |order: &f64| if name == "around" { 0.5 * order } else { *order };
-        Self { orders: Some(orders.iter().map(halved).collect()), ..Self::new(name, columns, spreads.to_vec(), whitener) }
+        Self {
+            orders: Some(orders.iter().map(halved).collect()),
+            ..Self::new(name, columns, spreads.to_vec(), whitener)
+        }
     }
 
     fn levels(name: &'static str, columns: Vec<Vec<f64>>, whitener: &Whitener, sigma: f64) -> Self {

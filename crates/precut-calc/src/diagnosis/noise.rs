@@ -62,7 +62,8 @@ impl Noise {
         // Equal values in all rows say nothing of the scatter; the resolution does.
         let floor = resolution(&data.value, keep) / 12.0_f64.sqrt();
         // Where all values are equal even that is nothing: then the last digits of a number are.
-        let largest = data.value.iter().zip(keep).filter(|(_, keep)| **keep).fold(0.0, |most: f64, (v, _)| most.max(v.abs()));
+        let largest =
+            data.value.iter().zip(keep).filter(|(_, keep)| **keep).fold(0.0, |most: f64, (v, _)| most.max(v.abs()));
         noise.sigma = noise.sigma.max(floor).max(1e-9 * largest).max(1e-12);
         noise
     }

@@ -42,10 +42,7 @@ impl Profile {
         let least = (0..self.rise.len()).min_by(|&a, &b| self.rise[a].total_cmp(&self.rise[b])).unwrap_or(0);
         let below: Vec<usize> = (0..=least).rev().collect();
         let above: Vec<usize> = (least..self.value.len()).collect();
-        [
-            self.edge(&below, reach).unwrap_or(self.range.lower),
-            self.edge(&above, reach).unwrap_or(self.range.upper),
-        ]
+        [self.edge(&below, reach).unwrap_or(self.range.lower), self.edge(&above, reach).unwrap_or(self.range.upper)]
     }
 
     fn edge(&self, way: &[usize], reach: f64) -> Option<f64> {

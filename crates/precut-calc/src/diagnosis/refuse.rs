@@ -67,11 +67,7 @@ fn is_absolute(quantity: &Quantity, values: &[f64]) -> bool {
     quantity.name.contains("deviation") && quantity.unit == "um" && median > NO_DEVIATION_UM
 }
 
-fn suspected(
-    quantity: &Quantity,
-    foundation: &Foundation<'_>,
-    weighing: &Weighing<'_>,
-) -> Option<SuspectedFactor> {
+fn suspected(quantity: &Quantity, foundation: &Foundation<'_>, weighing: &Weighing<'_>) -> Option<SuspectedFactor> {
     let (values, base, keep) = (&foundation.data.value, &foundation.base, &weighing.keep);
     if quantity.logarithmic {
         return suspected_offset(quantity, values, base, keep)
@@ -92,4 +88,3 @@ fn explained_better(foundation: &Foundation<'_>, weighing: &Weighing<'_>, suspec
     let left: f64 = kept.iter().map(|&row| with[row].map_or(f64::INFINITY, |f| (value(row) - f).powi(2))).sum();
     left < 0.8 * (1.0 - suspected.explained) * whole
 }
-

@@ -19,7 +19,9 @@ use super::said::{basis, explanation, warnings};
 use super::subject::{Setting, Subject};
 use super::view::View;
 use super::weigh::{Effort, Verdict, Weighing};
-use crate::calculator::{Answer, Diagnosable, Failure, Inapplicability, Measurement, Monitor, Prediction, Rows, Smooth};
+use crate::calculator::{
+    Answer, Diagnosable, Failure, Inapplicability, Measurement, Monitor, Prediction, Rows, Smooth,
+};
 
 /// Sets that are listed.
 const LISTED_SETS: usize = 20;
@@ -227,4 +229,3 @@ fn row_columns<M: Diagnosable>(
         used: weighing.keep.clone(),
     }
 }
-

@@ -241,4 +241,3 @@ pub(super) fn quantile(share: f64, dof: f64) -> f64 {
         _ => Normal::standard().inverse_cdf(p),
     }
 }
-

@@ -216,8 +216,10 @@ impl<'a> Weighing<'a> {
         let count = fit.free.len();
         let of_row = |row: usize| {
             let slope = |k: usize| fit.slopes[k][row];
-            let fitted: f64 =
-                (0..count).flat_map(|i| (0..count).map(move |j| (i, j))).map(|(i, j)| slope(i) * fit.covariance[(i, j)] * slope(j)).sum();
+            let fitted: f64 = (0..count)
+                .flat_map(|i| (0..count).map(move |j| (i, j)))
+                .map(|(i, j)| slope(i) * fit.covariance[(i, j)] * slope(j))
+                .sum();
             (self.own_variance(row) + fitted.max(0.0)).sqrt()
         };
         Some((0..self.keep.len()).map(of_row).collect())

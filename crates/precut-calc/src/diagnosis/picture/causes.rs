@@ -98,12 +98,7 @@ fn of_profile<M: Diagnosable>(profile: &ProfileReport) -> Vec<Item> {
     let parameters = M::CAUSES.iter().filter(|cause| cause.kind == profile.kind).flat_map(|cause| cause.parameters);
     let name = parameters.map(|parameter| parameter.name).find(|name| *name == profile.parameter);
     let x = &profile.deviations;
-    let line = |name, y: Vec<f64>, role| Item::Line {
-        name,
-        x: x.clone(),
-        y: y.into_iter().map(Some).collect(),
-        role,
-    };
+    let line = |name, y: Vec<f64>, role| Item::Line { name, x: x.clone(), y: y.into_iter().map(Some).collect(), role };
     vec![
         line("diagnosis_profile_limit", vec![profile.rise_at_95; x.len()], Role::Limit),
         line("diagnosis_quadratic", x.iter().map(|x| x * x).collect(), Role::Comparison),
@@ -123,12 +118,7 @@ pub(super) fn held_back<E: ToSchema, R: ToSchema>(
         bar("diagnosis_base_residual", 1.0, gain.rmse_base, Role::Before),
         bar("diagnosis_extended_residual", 2.0, gain.rmse_extended, Role::After),
         bar("diagnosis_ceiling", 3.0, gain.noise_ceiling, Role::Uncertainty),
-        Item::Line {
-            name: "diagnosis_interval",
-            x: vec![2.0, 2.0],
-            y: vec![Some(low), Some(high)],
-            role: Role::Plain,
-        },
+        Item::Line { name: "diagnosis_interval", x: vec![2.0, 2.0], y: vec![Some(low), Some(high)], role: Role::Plain },
     ];
     let y = Axis::linear("diagnosis_error", unit);
     Some(figure("held_back", "diagnosis_held_back", Axis::linear("diagnosis_model", "1"), vec![panel(y, items)]))

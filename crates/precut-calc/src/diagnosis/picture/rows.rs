@@ -94,12 +94,7 @@ impl Residuals {
                 x: ends.clone(),
                 role: Role::Uncertainty,
             },
-            Item::Points {
-                name: "diagnosis_base_residual",
-                x: x.clone(),
-                y: self.before.clone(),
-                role: Role::Before,
-            },
+            Item::Points { name: "diagnosis_base_residual", x: x.clone(), y: self.before.clone(), role: Role::Before },
             Item::Points { name: "diagnosis_extended_residual", x, y: self.after.clone(), role: Role::After },
         ]
     }
@@ -128,10 +123,7 @@ fn abscissa(rows: &RowColumns, index: &[usize]) -> (Axis, Vec<f64>) {
 }
 
 /// Measured with both predictions and the band of the extended one, run by run; and predicted against measured.
-pub(super) fn predictions<E: ToSchema, R: ToSchema>(
-    output: &DiagnosisResult<E, R>,
-    unit: &'static str,
-) -> Vec<Figure> {
+pub(super) fn predictions<E: ToSchema, R: ToSchema>(output: &DiagnosisResult<E, R>, unit: &'static str) -> Vec<Figure> {
     let rows = &output.rows;
     let shown = Residuals::of(rows).index;
     let (x, _) = abscissa(rows, &shown);
@@ -244,10 +236,7 @@ pub(super) fn remainder<E: ToSchema, R: ToSchema>(output: &DiagnosisResult<E, R>
     let mut items = Vec::new();
     if remainder.standard_deviation.len() == remainder.value.len() {
         let edge = |sign: f64| {
-            index
-                .iter()
-                .map(|&i| remainder.value[i] + sign * NINETY_FIVE * remainder.standard_deviation[i])
-                .collect()
+            index.iter().map(|&i| remainder.value[i] + sign * NINETY_FIVE * remainder.standard_deviation[i]).collect()
         };
         items.push(Item::Band {
             name: "diagnosis_band",
@@ -263,8 +252,7 @@ pub(super) fn remainder<E: ToSchema, R: ToSchema>(output: &DiagnosisResult<E, R>
     let mut figures = vec![figure("remainder", "diagnosis_remainder", axis, vec![panel(value, items)])];
     if !remainder.orders.is_empty() {
         let y = remainder.amplitudes.iter().copied().map(Some).collect();
-        let bars =
-            Item::Bars { name: "diagnosis_amplitude", x: remainder.orders.clone(), y, role: Role::Comparison };
+        let bars = Item::Bars { name: "diagnosis_amplitude", x: remainder.orders.clone(), y, role: Role::Comparison };
         figures.push(figure(
             "remainder_spectrum",
             "diagnosis_remainder_spectrum",
