@@ -119,13 +119,19 @@ fn model_file(path: &Path, registry: &Registry) -> Result<ModelFile, Failed> {
     Ok(ModelFile::read(registry, &bytes).map_err(Problem::from)?)
 }
 
-/// A measured table from `FILE`, or from `FIELD=FILE` where the job has several.
+/// What was measured stands in this field of a job that has other tables, too.
+const MEASUREMENTS: &str = "measurements";
+
+/// A measured table from `FILE`: the only one of the job, else its measurements; from `FIELD=FILE` any.
 fn table(given: &str, calculator: &str, names: &[String]) -> Result<TablePart, Failed> {
     let (name, path) = match given.split_once('=').filter(|(name, _)| names.iter().any(|known| is_field(known, name))) {
         Some((name, path)) => (name.to_owned(), Path::new(path)),
         None => match names {
             [only] => (only.clone(), Path::new(given)),
             [] => return Err(Failed::Usage(format!("a job of {calculator} takes no measured table"))),
+            several if several.iter().any(|known| known == MEASUREMENTS) => {
+                (MEASUREMENTS.to_owned(), Path::new(given))
+            }
             several => {
                 let known = several.join(", ");
                 let example = several[0].as_str();

@@ -122,8 +122,8 @@ struct JobArgs {
     /// The file is the bare job of this calculator
     #[arg(long, short, value_name = "NAME")]
     calculator: Option<String>,
-    /// Measured table of the job as a CSV file with units in its header, instead of rows in the job; `FIELD=FILE` where
-    /// the job has several
+    /// What was measured, as a CSV file with units in its header, instead of rows in the job; `FIELD=FILE` for another
+    /// table of the job
     #[arg(long, value_name = "FILE")]
     data: Vec<String>,
     /// Stored model that extends the job, as `GET /v1/models/NAME` exported it; the job may name it

@@ -259,10 +259,14 @@ fn measurements_come_from_a_file_beside_the_job() {
     let absent = feed_precut(&["check", "--data", "/nowhere/shaft.csv"], &file.to_string());
     assert_eq!(absent.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&absent.stderr).contains("/nowhere/shaft.csv"));
-    let example = said(&precut(&["example", "deflection-compensation"]));
+    let example = said(&precut(&["example", "ring-roundness"]));
     let none = feed_precut(&["check", "--data", path], &example);
     assert_eq!(none.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&none.stderr).contains("takes no measured table"), "{none:?}");
+    let example = said(&precut(&["example", "deflection-compensation"]));
+    let several = feed_precut(&["check", "--data", path], &example);
+    assert_eq!(several.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&several.stderr).contains("force.rows"), "{several:?}");
 }
 
 #[test]
