@@ -129,9 +129,7 @@ fn table(given: &str, calculator: &str, names: &[String]) -> Result<TablePart, F
         None => match names {
             [only] => (only.clone(), Path::new(given)),
             [] => return Err(Failed::Usage(format!("a job of {calculator} takes no measured table"))),
-            several if several.iter().any(|known| known == MEASUREMENTS) => {
-                (MEASUREMENTS.to_owned(), Path::new(given))
-            }
+            several if several.iter().any(|known| known == MEASUREMENTS) => (MEASUREMENTS.to_owned(), Path::new(given)),
             several => {
                 let known = several.join(", ");
                 let example = several[0].as_str();

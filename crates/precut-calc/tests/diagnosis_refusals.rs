@@ -68,11 +68,47 @@ fn a_few_rows_are_tested_and_not_named() {
     job["measurements"] = few.into();
     let answer = answered::<DeflectionCompensation>(&job);
     assert_eq!(answer.output.refusal.as_ref().unwrap().reason, "too_few_rows");
-    assert_eq!(answer.output.refusal.unwrap().rows_needed, Some(12));
+    assert_eq!(answer.output.refusal.as_ref().unwrap().rows_needed, Some(12));
     assert!(!answer.output.tests.is_empty());
-    let warning = answer.warnings.iter().find(|warning| warning.code == "rows_for_causes").unwrap();
+    let warned = |answer: &Answer<ResultOf<DeflectionCompensation>>| {
+        let of_rows = answer.warnings.iter().find(|warning| warning.code == "rows_for_causes");
+        of_rows.map(|warning| (warning.value.unwrap(), warning.limit.unwrap()))
+    };
+    assert_eq!(warned(&answer), None);
     // Three times three causes and two.
-    assert_eq!((warning.value, warning.limit), (Some(9.0), Some(15.0)));
+    let mut job = shaft(|_, _| ());
+    let few: Vec<Value> = job["measurements"].as_array().unwrap().iter().step_by(8).take(13).cloned().collect();
+    job["measurements"] = few.into();
+    assert_eq!(warned(&answered::<DeflectionCompensation>(&job)), Some((13.0, 15.0)));
+}
+
+#[test]
+fn swapped_columns_are_told() {
+    let swapped = shaft(|_, row| {
+        let (z, deviation) = (row["z_mm"].clone(), row["diameter_deviation_um"].clone());
+        row["z_mm"] = json!(deviation.as_f64().unwrap().max(0.0));
+        row["diameter_deviation_um"] = z;
+    });
+    assert!(warned::<DeflectionCompensation>(&swapped).contains(&"swapped_columns"));
+    assert!(!warned::<DeflectionCompensation>(&shaft(|_, _| ())).contains(&"swapped_columns"));
+}
+
+/// Which set extends another is no news to the reader: the sentence names the smallest ones, and not more than a few.
+#[test]
+fn the_sentence_of_a_confounded_answer_is_short() {
+    let answer = answered::<DeflectionCompensation>(&shaft(|_, row| row["z_mm"] = json!(300.0)));
+    assert_eq!(answer.output.verdict, VerdictClass::Confounded);
+    let text = serde_json::to_value(&answer.explanation[0]).unwrap();
+    let sets = text["values"]["sets"].as_array().unwrap();
+    assert!(sets.len() <= 6 && sets.len() < answer.output.likely_sets.len());
+    for set in sets {
+        let extends = |other: &&Value| {
+            let kinds = other.as_array().unwrap();
+            kinds.len() < set.as_array().unwrap().len()
+                && kinds.iter().all(|kind| set.as_array().unwrap().contains(kind))
+        };
+        assert_eq!(sets.iter().find(extends), None);
+    }
 }
 
 #[test]

@@ -54,5 +54,5 @@ pub use output::*;
 pub use profile::Profile;
 pub use remainder::{RemainderShape, remainder_shape};
 pub use subject::{Setting, Subject};
-pub use suspect::{SuspectedFactor, copied_traces, repeated_rows, suspected_factor, suspected_offset};
+pub use suspect::{SuspectedFactor, copied_traces, repeated_rows, suspected_factor, suspected_offset, swapped_columns};
 pub use weigh::{Effort, SetWeight, Verdict, Weighing};

@@ -67,7 +67,7 @@ pub(super) fn answer<M: Diagnosable>(
         prediction: leading.map(|_| bound.predict(settings)).transpose()?,
         deviation: leading.and_then(|set| weighing.deviation(set)),
     };
-    let warnings = warnings(&job.options, &weighing, &found, used, gain.is_some() || refusal.is_some());
+    let warnings = warnings(&job.options, &weighing, &found, used, refusal.is_none(), gain.is_some());
     let (signatures, separations) = view.signatures()?;
     let output = DiagnosisResult {
         verdict: if refusal.is_some() { VerdictClass::Refused } else { view.class() },

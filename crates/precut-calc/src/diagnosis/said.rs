@@ -6,9 +6,12 @@ use super::noise::NoiseSource;
 use super::outlier::Outliers;
 use super::output::{DiagnosisResult, NamedCause, Refusal, VerdictClass};
 use super::refuse::{most_causes, rows_for};
-use super::suspect::{copied_traces, repeated_rows};
+use super::suspect::{copied_traces, repeated_rows, swapped_columns};
 use super::weigh::Weighing;
 use crate::calculator::{Basis, Finding, Message, Quantity, Smooth};
+
+/// Sets that the sentence of a confounded answer names.
+const SAID_SETS: usize = 6;
 
 pub(super) const WARNING_CODES: &[&str] = &[
     "rows_not_predicted",
@@ -18,6 +21,7 @@ pub(super) const WARNING_CODES: &[&str] = &[
     "repeated_rows",
     "scatter_unlike_stated",
     "one_place",
+    "swapped_columns",
     "rows_for_causes",
     "nothing_held_back",
 ];
@@ -42,12 +46,13 @@ pub(super) fn warnings(
     weighing: &Weighing<'_>,
     found: &Outliers,
     used: &[usize],
+    judged: bool,
     has_gain: bool,
 ) -> Vec<Finding> {
     let foundation = weighing.foundation;
     let mut warnings = odd_rows(options.leave_outliers_out, weighing, found, used);
     let asked_for = usize::from(options.most_causes);
-    if most_causes(asked_for, used.len()) < asked_for {
+    if judged && most_causes(asked_for, used.len()) < asked_for {
         let needed = rows_for(asked_for) as f64;
         warnings.push(
             Finding::new("rows_for_causes", "/options/most_causes")
@@ -56,7 +61,7 @@ pub(super) fn warnings(
                 .with("searched", most_causes(asked_for, used.len())),
         );
     }
-    if options.held_out && !has_gain {
+    if judged && options.held_out && !has_gain {
         warnings.push(Finding::new("nothing_held_back", "/options/held_out"));
     }
     let design = &foundation.data.layout.design;
@@ -67,6 +72,8 @@ pub(super) fn warnings(
     };
     if at_one_place {
         warnings.push(Finding::new("one_place", "/measurements").with("count", used.len()));
+    } else if swapped_columns(foundation.data) {
+        warnings.push(Finding::new("swapped_columns", "/measurements"));
     }
     warnings
 }
@@ -119,8 +126,13 @@ pub(super) fn explanation<E: utoipa::ToSchema, R: utoipa::ToSchema>(
             .with("labels", labels(&output.named))
             .with("probability", output.sets.first().map_or(0.0, |set| set.posterior)),
         VerdictClass::Confounded => {
-            let sets: Vec<Vec<String>> = output.likely_sets.iter().map(|set| kinds(&set.causes)).collect();
-            Message::new("diagnosis_confounded").with("sets", sets).with("limit_sigmas", CONFOUNDED_BELOW)
+            let mut sets = folded(output.likely_sets.iter().map(|set| kinds(&set.causes)).collect());
+            let more = sets.len().saturating_sub(SAID_SETS);
+            sets.truncate(SAID_SETS);
+            Message::new("diagnosis_confounded")
+                .with("sets", sets)
+                .with("more", more)
+                .with("limit_sigmas", CONFOUNDED_BELOW)
         }
         VerdictClass::Unknown => Message::new("diagnosis_unknown")
             .with("probability", output.unnamed_probability)
@@ -129,7 +141,8 @@ pub(super) fn explanation<E: utoipa::ToSchema, R: utoipa::ToSchema>(
             .with("named", kinds(&output.named)),
         VerdictClass::Refused => refused(output.refusal.as_ref(), output.rows.row.len()),
     }];
-    if let Some(next) = &output.next_measurement {
+    // A run that parts nothing is not worth a sentence.
+    if let Some(next) = output.next_measurement.as_ref().filter(|next| next.rows_needed.is_some()) {
         said.push(
             Message::new("diagnosis_next")
                 .with("changes", next.changes.clone())
@@ -151,6 +164,13 @@ pub(super) fn explanation<E: utoipa::ToSchema, R: utoipa::ToSchema>(
         );
     }
     said
+}
+
+/// Sets without those that only extend another of them.
+fn folded(sets: Vec<Vec<String>>) -> Vec<Vec<String>> {
+    let extends =
+        |set: &Vec<String>, other: &Vec<String>| other.len() < set.len() && other.iter().all(|kind| set.contains(kind));
+    sets.iter().filter(|set| !sets.iter().any(|other| extends(set, other))).cloned().collect()
 }
 
 fn kinds(causes: &[NamedCause]) -> Vec<String> {

@@ -108,6 +108,18 @@ pub fn repeated_rows(data: &Data) -> Vec<usize> {
     repeated
 }
 
+/// Whether every sweep has values that go one way from row to row, and places that do not.
+pub fn swapped_columns(data: &Data) -> bool {
+    let Smooth::Along(places) = &data.layout.design.smooth else { return false };
+    let goes_one_way = |of: &dyn Fn(usize) -> f64, rows: &[usize]| {
+        let steps = || rows.windows(2).map(|pair| of(pair[1]) - of(pair[0]));
+        steps().all(|step| step > 0.0) || steps().all(|step| step < 0.0)
+    };
+    let mut sweeps = data.layout.traces.iter().filter(|rows| rows.len() > 4).peekable();
+    sweeps.peek().is_some()
+        && sweeps.all(|rows| goes_one_way(&|row| data.value[row], rows) && !goes_one_way(&|row| places[row], rows))
+}
+
 /// Traces of one run that repeat each other digit for digit: copied, not measured again.
 pub fn copied_traces(data: &Data) -> Vec<(usize, usize)> {
     let traces = &data.layout.traces;
