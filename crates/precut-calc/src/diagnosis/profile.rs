@@ -20,6 +20,8 @@ const MOST_POINTS: usize = 12;
 const BEYOND: f64 = 1.1;
 /// Gauss-Newton steps of the other parameters at a point, with the columns of the fit.
 const ROUNDS: usize = 2;
+/// The same where every prediction is dear.
+const DEAR_ROUNDS: usize = 1;
 
 /// What one parameter costs when all others are fitted anew: the rise of the least |r - X t|^2 + |t|^2 above that of the
 /// fit. Of a quadratic likelihood it is the square of the distance in posterior standard deviations.
@@ -136,7 +138,8 @@ impl Profiler<'_> {
     /// none fixed at these settings. `None` where the model has no value for a row.
     fn least(&self, settings: &mut [Setting], fixed: Option<usize>) -> Result<Option<f64>, Failure> {
         let mut least: Option<(f64, Vec<Setting>)> = None;
-        for round in 0..=ROUNDS {
+        let rounds = if self.dear { DEAR_ROUNDS } else { ROUNDS };
+        for round in 0..=rounds {
             let Some(residual) = self.refinement.residual(settings)? else { break };
             let t: Vec<f64> = (0..self.fit.free.len())
                 .map(|k| {
@@ -148,7 +151,7 @@ impl Profiler<'_> {
             if least.as_ref().is_none_or(|(known, _)| cost < *known) {
                 least = Some((cost, settings.to_vec()));
             }
-            if round == ROUNDS || fixed.is_none() || self.fit.free.len() < 2 {
+            if round == rounds || fixed.is_none() || self.fit.free.len() < 2 {
                 break;
             }
             self.refinement.move_others(self.fit, settings, &t, &residual, fixed);
