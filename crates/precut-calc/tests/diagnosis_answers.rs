@@ -156,6 +156,24 @@ fn parameters_have_profiles_that_agree_with_their_intervals() {
     assert!(inside / n > 0.95 - 2.0 * (0.95 * 0.05 / n).sqrt(), "{inside} of {n}");
 }
 
+/// A set lies as near as one likes to what it extends: only rivals are held against each other.
+#[test]
+fn rivals_are_held_against_each_other_and_not_against_what_extends_them() {
+    let result = answered(&example()).output;
+    let sets: Vec<&Vec<String>> = result.signatures.iter().map(|signature| &signature.causes).collect();
+    assert_eq!(sets[0], &["headstock_compliance"]);
+    for (index, set) in sets.iter().enumerate() {
+        assert!(sets[..index].iter().all(|other| !other.iter().all(|kind| set.contains(kind))), "{set:?}");
+    }
+    assert_eq!(result.separations.len(), sets.len() * (sets.len() - 1) / 2);
+    // Its change is what the extended model does to the prediction.
+    for (change, (base, extended)) in
+        result.signatures[0].change.iter().zip(result.rows.base.iter().zip(&result.rows.extended))
+    {
+        assert!((change - (extended.unwrap() - base.unwrap())).abs() < 1e-9);
+    }
+}
+
 #[test]
 fn the_next_run_parts_the_leader_from_its_rival() {
     let result = answered(&example()).output;

@@ -35,7 +35,7 @@ pub struct DiagnosisResult<E: ToSchema, R: ToSchema> {
     pub twins: Vec<CausePair>,
     /// How well leading sets can be told apart, sigmas.
     pub separations: Vec<SeparationReport>,
-    /// What each leading set changes in the prediction, in the order in which `sets` lists those without a remainder.
+    /// What each leading set changes in the prediction, likeliest first; of sets that extend none that is likelier.
     pub signatures: Vec<SignatureReport>,
     /// Profile likelihoods of the parameters of the set that is named, of a `confounded` answer of its likeliest.
     pub profiles: Vec<ProfileReport>,

@@ -13,7 +13,7 @@ use super::subject::Setting;
 use super::weigh::{SetWeight, Verdict, Weighing};
 use crate::calculator::{Failure, Hypothesis, Monitor, Treatment};
 
-/// Leading sets whose signatures and separations are given.
+/// Leading sets whose signatures and separations are given: those that extend no likelier one.
 const SEPARATED_SETS: usize = 6;
 /// How far the edges of an interval may differ from those of a quadratic likelihood, as a share of their distance from
 /// the fit, before the profile takes their place.
@@ -216,9 +216,16 @@ impl<'a> View<'a> {
 
     /// What leading sets change, and how well they can be told apart.
     pub(super) fn signatures(&self) -> Result<(Vec<SignatureReport>, Vec<SeparationReport>), Failure> {
-        let mut signatures = Vec::new();
-        for set in self.weighing.named_sets().take(SEPARATED_SETS) {
+        let mut signatures: Vec<Signature> = Vec::new();
+        for set in self.weighing.named_sets() {
+            // A set lies as near as one likes to what it extends.
+            if signatures.iter().any(|likelier| likelier.members.iter().all(|h| set.members.contains(h))) {
+                continue;
+            }
             signatures.push(Signature::of(self.weighing, &set.members, &set.settings)?);
+            if signatures.len() == SEPARATED_SETS {
+                break;
+            }
         }
         let kinds = |members: &[usize]| members.iter().map(|&h| self.kind(h).to_owned()).collect();
         let apart = separations(&signatures)
