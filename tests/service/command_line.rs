@@ -246,7 +246,7 @@ fn measurements_come_from_a_file_beside_the_job() {
     let absent = feed_precut(&["check", "--data", "/nowhere/shaft.csv"], &file.to_string());
     assert_eq!(absent.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&absent.stderr).contains("/nowhere/shaft.csv"));
-    let example = said(&precut(&["example", "ring-roundness"]));
+    let example = said(&precut(&["example", "fixture-stability"]));
     let none = feed_precut(&["check", "--data", path], &example);
     assert_eq!(none.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&none.stderr).contains("takes no measured table"), "{none:?}");
