@@ -157,10 +157,16 @@ impl<const N: usize> Flow<N> {
         Self { a: system.a, constant, phi: exponential(&system.a, h), shift, start, end }
     }
 
+    /// What a step is without the force at its end, which is added by [`Self::ended`].
     #[inline]
-    fn step(&self, q: &[f64; N], from_n: f64, to_n: f64) -> [f64; N] {
+    fn begun(&self, q: &[f64; N], from_n: f64) -> [f64; N] {
         let moved = times(&self.phi, q);
-        std::array::from_fn(|i| moved[i] + self.shift[i] + self.start[i] * from_n + self.end[i] * to_n)
+        std::array::from_fn(|i| moved[i] + self.shift[i] + self.start[i] * from_n)
+    }
+
+    #[inline]
+    fn ended(&self, begun: &[f64; N], to_n: f64) -> [f64; N] {
+        std::array::from_fn(|i| begun[i] + self.end[i] * to_n)
     }
 
     /// The same over a part t of the step, the force rising with `slope`: the Taylor series to round-off.
@@ -265,6 +271,12 @@ struct State<'a, const N: usize> {
     flows: Vec<Flow<N>>,
     level: f64,
     damping: f64,
+    hardening: f64,
+    /// What each step asks of the job, at hand.
+    feed_mm: f64,
+    direction: f64,
+    clamp_force_n: f64,
+    uneven: bool,
     closed: Closed,
     q: [f64; N],
     tooth_period: usize,
@@ -342,6 +354,11 @@ impl<'a, const N: usize> State<'a, N> {
             flows,
             level: cutting.direction * cutting.level(plan.working.depth_mm),
             damping: process_damping(cutting, &plan.working),
+            hardening: holding.hardening_per_mm2,
+            feed_mm: plan.working.feed_mm,
+            direction: cutting.direction,
+            clamp_force_n: holding.clamp_force_n.unwrap_or(0.0),
+            uneven: cutting.uneven(),
             closed: Closed::BOTH,
             q: [0.0; N],
             tooth_period: 0,
@@ -375,13 +392,13 @@ impl<'a, const N: usize> State<'a, N> {
     /// Effective feed of tooth j at a cell when the workpiece is at x (`fixture/3.2`).
     #[inline]
     fn feed(&self, j: usize, cell: usize, x_mm: f64) -> f64 {
-        let stands_out = if self.cutting.uneven() && self.cutting.tooth_number(self.tooth_period, j) == 0 {
+        let stands_out = if self.uneven && self.cutting.tooth_number(self.tooth_period, j) == 0 {
             self.cutting.runout_mm
         } else {
             0.0
         };
-        let tip = stands_out - self.cutting.direction * x_mm;
-        tip - (self.surface[cell] - self.plan.working.feed_mm)
+        let tip = stands_out - self.direction * x_mm;
+        tip - (self.surface[cell] - self.feed_mm)
     }
 
     #[inline]
@@ -406,7 +423,7 @@ impl<'a, const N: usize> State<'a, N> {
     #[inline]
     fn leave(&mut self, cell: usize, feed: f64) {
         // Seen from the next tooth, which is one feed further on.
-        let before = self.surface[cell] - self.plan.working.feed_mm;
+        let before = self.surface[cell] - self.feed_mm;
         self.surface[cell] = match self.plan.surface {
             Surface::Multiple => before + feed.max(0.0),
             Surface::Single => before + feed,
@@ -421,7 +438,7 @@ impl<'a, const N: usize> State<'a, N> {
         if self.damping > 0.0 {
             force -= self.damping * cutting_teeth * self.system.velocity(q, 0);
         }
-        if self.holding.hardening_per_mm2 > 0.0 {
+        if self.hardening > 0.0 {
             force -= self.holding.hardening_n_per_mm3(self.closed) * q[0].powi(3);
         }
         force
@@ -432,17 +449,20 @@ impl<'a, const N: usize> State<'a, N> {
     }
 
     /// One step of the tooth period.
+    #[inline]
     fn advance(&mut self, i: usize, record: &mut Record) {
         let after = usize::from(i >= self.grid.leave);
         let teeth = if after == 0 { self.grid.teeth_before } else { self.grid.teeth_after };
         let step_s = self.grid.step_s[after];
         let cut: f64 = self.of_tooth[..teeth].iter().sum();
-        let from = cut + self.own_force(self.cutting_teeth(teeth), &self.q);
+        let alone = self.damping <= 0.0 && self.hardening <= 0.0;
+        let from = if alone { cut } else { cut + self.own_force(self.cutting_teeth(teeth), &self.q) };
         record.take(self, i, teeth, cut, step_s);
         let before = (self.q[0], self.system.velocity(&self.q, 0));
         let which = 4 * after + index(self.closed);
         // The force at the end from the position that the force at the start gives: wrong by the fifth power of the step.
-        let guess = self.flows[which].step(&self.q, from, from);
+        let begun = self.flows[which].begun(&self.q, from);
+        let guess = self.flows[which].ended(&begun, from);
         let mut to = 0.0;
         let mut cutting = 0.0;
         for j in 0..teeth {
@@ -453,8 +473,10 @@ impl<'a, const N: usize> State<'a, N> {
             to += force;
             self.of_tooth[j] = force;
         }
-        to += self.own_force(cutting, &guess);
-        let moved = self.flows[which].step(&self.q, from, to);
+        if !alone {
+            to += self.own_force(cutting, &guess);
+        }
+        let moved = self.flows[which].ended(&begun, to);
         if self.plan.unilateral && self.carrying(&moved) != self.closed {
             self.switch(4 * after, from, to, step_s, record);
         } else {
@@ -485,7 +507,7 @@ impl<'a, const N: usize> State<'a, N> {
 
     /// Which joints carry in a state: compressed, and not pulled apart by their damping.
     fn carrying(&self, q: &[f64; N]) -> Closed {
-        let force = self.holding.clamp_force_n.unwrap_or(0.0);
+        let force = self.clamp_force_n;
         let [left, right, left_elastic, right_elastic] = demands(&self.system, self.holding, q);
         Closed { left: force > left.max(left_elastic), right: force > right.max(right_elastic) }
     }
@@ -548,9 +570,15 @@ struct Record {
 
 const NOTHING: Range = Range { low: f64::INFINITY, high: f64::NEG_INFINITY };
 
+#[inline]
 fn take(range: &mut Range, value: f64) {
-    range.low = range.low.min(value);
-    range.high = range.high.max(value);
+    // Plain comparisons: the library's minimum asks each time whether a value is a number. What is none ends the run.
+    if value < range.low {
+        range.low = value;
+    }
+    if value > range.high {
+        range.high = value;
+    }
 }
 
 impl Record {
@@ -588,7 +616,7 @@ impl Record {
         take(&mut self.x_all_mm, state.q[0]);
         self.entry[0] = self.entry[0].max(demand[0]);
         self.entry[1] = self.entry[1].max(demand[1]);
-        let force = state.holding.clamp_force_n.unwrap_or(0.0);
+        let force = state.clamp_force_n;
         if state.plan.unilateral {
             for (side, elastic) in [demand[2], demand[3]].into_iter().enumerate() {
                 if elastic >= force && self.first_open[side].is_none() {
@@ -652,7 +680,7 @@ impl Record {
 
     /// A joint has opened or closed inside a step, at `done` after its start.
     fn event<const N: usize>(&mut self, state: &State<'_, N>, done: f64) {
-        let force = state.holding.clamp_force_n.unwrap_or(0.0);
+        let force = state.clamp_force_n;
         let [_, _, left, right] = demands(&state.system, state.holding, &state.q);
         for (side, elastic) in [left, right].into_iter().enumerate() {
             if elastic >= force && self.first_open[side].is_none() {

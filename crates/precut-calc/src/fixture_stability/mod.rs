@@ -14,6 +14,7 @@ mod advice;
 mod answer;
 mod check;
 mod cutting;
+mod drive;
 mod floquet;
 mod forward;
 mod holding;
@@ -35,11 +36,11 @@ mod zeroth;
 pub use forward::{FixtureAllowances, FixturePoint, FixtureRun};
 pub use input::{
     Analysis, ConstantForce, Entry, FaceMill, FeedToward, FixtureJob, LimitSettings, LimitSpeed, LobeSettings,
-    MAX_MAP_POINTS, MillingCut, MillingForce, Regeneration, SelfLocking, SimulationSettings, Vise, ViseJoint,
+    MAX_MAP_POINTS, MillingCut, MillingForce, Regeneration, SelfLocking, SimulationSettings, Spindle, SpindlePoint, Vise, ViseJoint,
 };
 pub use measurement::FixtureMeasurement;
 pub use output::{
-    AmplitudeCurve, ArcProfile, ChatterKind, ClampForce, DepthLimits, Engagement, FirstLimit, FixtureOutcome,
+    AmplitudeCurve, ArcProfile, ChatterKind, ClampForce, CuttingDrive, DepthLimits, Engagement, FirstLimit, FixtureOutcome,
     FixtureState, FixtureVerdict, FloquetMultiplier, ForcedMotion, Histories, LobeBoundary, LobeDiagram, LobeMap,
     OpenJoint, Oscillogram, QuasiStatic, Simulated, SpeedLimit, TextbookForce, VibrationMode, ZerothOrder,
 };
@@ -65,7 +66,7 @@ impl Calculator for FixtureStability {
     const META: Meta = Meta {
         id: "fixture-stability",
         kind: CalculatorKind::Calculator,
-        version: 1,
+        version: 2,
         title: "Fixture stability",
         question: "How deep can this face mill cut in this vise before chatter or a joint opens, and how hard must one clamp?",
         summary: "A face mill shakes the workpiece in its vise: teeth enter and leave, each cuts what earlier ones left, \
@@ -203,6 +204,9 @@ fn basis(job: &FixtureJob) -> Vec<Basis> {
     ];
     if job.asks(Analysis::ClampForce) {
         used.push(Basis { equation: "fixture/5.7", source: "statics of the clamped workpiece" });
+    }
+    if job.spindle.is_some() {
+        used.push(Basis { equation: "fixture/5.8", source: "mean torque of smooth chips" });
     }
     used.extend(
         job.effects.iter().map(|effect| Basis { equation: effect.cause().equation, source: "catalogue of effects" }),
