@@ -56,9 +56,7 @@ fn read_extended(
 ) -> Result<Ready, Error> {
     match check_schema(entry, &mut job, parts) {
         Ok(()) if of_model.is_empty() => prepared(entry, &job),
-        Ok(()) => {
-            Err(Found { total: of_model.len(), findings: of_model, unread: Vec::new() }.with_rules(entry, &job))
-        }
+        Ok(()) => Err(Found { total: of_model.len(), findings: of_model, unread: Vec::new() }.with_rules(entry, &job)),
         Err(found) => Err(found.and(of_model).with_rules(entry, &job)),
     }
 }

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 
 use crate::fixture_support::{checked, outcome, reference_job, solve, with};
 use precut_calc::calculator::{Calculator, Item};
-use precut_calc::fixture_stability::{FirstLimit, FixtureState, FixtureStability};
+use precut_calc::fixture_stability::{FirstLimit, FixtureStability, FixtureState};
 use serde_json::{Value, json};
 
 /// Closed forms in double precision: a handful of operations each.
@@ -100,7 +100,9 @@ fn driven(power_kw: f64) -> Value {
 fn a_characteristic_is_read_between_its_rows() {
     let at = |rpm: f64| outcome(&with(&driven(2.0), "/cut/spindle_speed_rpm", json!(rpm))).drive;
     // Straight lines between rows, never above the power that holds everywhere; a column ends with its last row.
-    for (rpm, power) in [(150.0, 2.0), (200.0, 1.0), (250.0, 1.25), (400.0, 2.0), (700.0, 2.0), (1000.0, 2.0), (1100.0, 2.0)] {
+    for (rpm, power) in
+        [(150.0, 2.0), (200.0, 1.0), (250.0, 1.25), (400.0, 2.0), (700.0, 2.0), (1000.0, 2.0), (1100.0, 2.0)]
+    {
         close(at(rpm).power_limit_kw.unwrap(), power, EXACT);
     }
     assert!(at(150.0).torque_limit_n_m.is_none() && at(700.0).torque_limit_n_m.is_none());

@@ -324,7 +324,11 @@ fn a_search_tells_how_far_it_is_and_can_be_cancelled() {
     // Whatever the threads: the same bits.
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     assert_eq!(pool.install(|| FixtureIdentification::run(&job, &Watch::default())).unwrap(), first);
-    for looks in [0, 1, 20, 200] {
+    let counting = Watch { cancel_after: Some(usize::MAX), ..Watch::default() };
+    FixtureIdentification::run(&job, &counting).unwrap();
+    let all = counting.looks.into_inner();
+    assert!(all > 100, "{all}");
+    for looks in [0, 1, 20, all / 2, all * 9 / 10] {
         let watch = Watch { cancel_after: Some(looks), ..Watch::default() };
         assert_eq!(FixtureIdentification::run(&job, &watch), Err(Failure::Cancelled), "{looks}");
     }

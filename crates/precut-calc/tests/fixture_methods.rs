@@ -175,6 +175,22 @@ fn both_laws_of_regeneration_agree_while_no_tooth_leaves_the_cut() {
     assert!(of("single", &deep).peak_to_peak_um > 1.1 * of("multiple", &deep).peak_to_peak_um);
 }
 
+/// A joint that never opens is a bonded one: the run that asks at every step, and the run of a plain vise that does not, by
+/// the same operations.
+#[test]
+fn joints_that_stay_closed_run_as_bonded_ones() {
+    for kind in [1, 2] {
+        for (depth, law) in [(3.0, "multiple"), (5.0, "multiple"), (5.0, "single")] {
+            let mut job = with(&reference_job(kind), "/cut/depth_mm", json!(depth));
+            job["simulation"] = json!({ "regeneration": law, "tooth_periods": 100 });
+            let bonded = outcome(&job).simulation;
+            let held = outcome(&with(&job, "/fixture/clamp_force_n", json!(1e8))).simulation;
+            assert!(held.unilateral && !bonded.unilateral);
+            assert_eq!(precut_calc::fixture_stability::Simulated { unilateral: true, ..bonded }, held, "{kind} {law}");
+        }
+    }
+}
+
 #[test]
 fn the_zeroth_order_is_right_where_the_cut_is_nearly_steady() {
     // 48 teeth, an arc of eight pitches: 0.5671 against 0.5673 mm.

@@ -14,9 +14,10 @@ use super::input::{Analysis, FixtureJob};
 use super::lobes::{Plane, Point, Rules, boundary, by_states, critical_depth, map, point};
 use super::march::{Marched, Plan, Step};
 use super::output::{
-    AmplitudeCurve, ArcProfile, ChatterKind, ClampForce, CuttingDrive, DepthLimits, Engagement, FirstLimit, FixtureOutcome,
-    FixtureState, FixtureVerdict, FloquetMultiplier, ForcedMotion, Histories, LobeBoundary, LobeDiagram, LobeMap,
-    OpenJoint, Oscillogram, QuasiStatic, Simulated, SpeedLimit, TextbookForce, VibrationMode, ZerothOrder,
+    AmplitudeCurve, ArcProfile, ChatterKind, ClampForce, CuttingDrive, DepthLimits, Engagement, FirstLimit,
+    FixtureOutcome, FixtureState, FixtureVerdict, FloquetMultiplier, ForcedMotion, Histories, LobeBoundary,
+    LobeDiagram, LobeMap, OpenJoint, Oscillogram, QuasiStatic, Simulated, SpeedLimit, TextbookForce, VibrationMode,
+    ZerothOrder,
 };
 use super::parts::plane_of;
 use super::picture::lobes_so_far;
@@ -220,8 +221,7 @@ impl CuttingDrive {
     /// What the spindle gives over what the cut asks, the lesser of power and torque.
     fn margin(&self) -> Option<f64> {
         let of = |limit: Option<f64>, asked: f64| limit.filter(|_| asked > 0.0).map(|limit| limit / asked);
-        let both =
-            [of(self.power_limit_kw, self.motor_power_kw), of(self.torque_limit_n_m, self.torque_mean_n_m)];
+        let both = [of(self.power_limit_kw, self.motor_power_kw), of(self.torque_limit_n_m, self.torque_mean_n_m)];
         both.into_iter().flatten().reduce(f64::min)
     }
 }
@@ -655,7 +655,8 @@ fn beside(study: &Study<'_>, plane: &Plane, points: &[super::lobes::BoundaryPoin
 
 /// Peaks of what chatter and the spindle allow that lie deeper than at the working speed, nearest first.
 fn better_speeds(study: &Study<'_>, limits: &[SpeedLimit], most_mm: f64) -> Vec<SpeedLimit> {
-    let allowed = |chatter: Option<f64>, drive: Option<f64>| chatter.unwrap_or(most_mm).min(drive.unwrap_or(f64::INFINITY));
+    let allowed =
+        |chatter: Option<f64>, drive: Option<f64>| chatter.unwrap_or(most_mm).min(drive.unwrap_or(f64::INFINITY));
     let depth = |limit: &SpeedLimit| allowed(limit.chatter_mm, limit.drive_mm);
     let here = allowed(study.chatter_mm, study.drive_depths(study.case.working.spindle_rpm).least_mm());
     let mut peaks: Vec<SpeedLimit> = (0..limits.len())

@@ -180,7 +180,9 @@ impl Krylov {
             return ritz(&self.projected, self.basis.len(), self.size, below);
         }
         let square = self.square();
-        let Some(&(re, im)) = by_modulus(&square).first() else { return Eigenvalue { re: 0.0, im: 0.0, residual: 1.0 } };
+        let Some(&(re, im)) = by_modulus(&square).first() else {
+            return Eigenvalue { re: 0.0, im: 0.0, residual: 1.0 };
+        };
         let modulus = f64::hypot(re, im);
         if below <= 0.0 || modulus <= 0.0 {
             return Eigenvalue { re, im, residual: 0.0 };
