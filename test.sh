@@ -134,7 +134,8 @@ step_test() {
   elif [ "${CI:-}" = true ]; then
     absent postgresql
   fi
-  cargo test --workspace --locked
+  # All programs of tests are run, so that one look at the log shows all that fails.
+  cargo test --workspace --locked --no-fail-fast
 }
 
 step_contract() {

@@ -55,7 +55,7 @@ use read::Ready;
 /// Bodies up to this size are read where they arrive, larger ones on the pool: about 1 ms of reading.
 const READ_AT_ONCE: usize = 32 << 10;
 /// Jobs estimated up to this are computed where they arrive, larger ones on the pool: waking a thread of the pool and
-/// being woken by it costs as much as such a job.
+/// being woken by it costs as much as such a job. They need no slot: they are answered while every core computes.
 const COMPUTE_AT_ONCE_MS: f64 = 0.5;
 
 /// The calculators behind their cache and their pool of cores. Cheap to clone.
@@ -187,7 +187,7 @@ impl Engine {
         Ok(Solved { stored: outcome?, cache: CacheState::Miss, timings: Timings { parse, ..timings } })
     }
 
-    /// Sees to it that the calculation runs: at once if there is a slot, else when one is free.
+    /// Sees to it that the calculation runs: here and now if it is short, else on the pool, when there is a slot.
     fn depart(&self, pilot: Pilot, ready: Ready) {
         let inner = &self.inner;
         let queued = Instant::now();
@@ -196,6 +196,9 @@ impl Engine {
         if let Some(kept) = inner.memory.get(&ready.key) {
             // The flight before this one landed between the look into the cache and boarding.
             return pilot.land(grounded(outcome(kept)));
+        }
+        if ready.prepared.cost.ms <= COMPUTE_AT_ONCE_MS && !ready.entry.is_composed() {
+            return inner.run(pilot, &ready, None, queued);
         }
         match inner.cores.slot_now() {
             Ok(Some(slot)) => Inner::fly(inner, pilot, ready, slot, queued),
@@ -315,14 +318,10 @@ impl Inner {
         if affordable { Ok(()) } else { Err(Error::TooExpensive { cost, limit, limit_bytes }) }
     }
 
-    /// Sees to it that the calculation runs: here if it is short, else on the pool.
+    /// Runs the calculation on the pool.
     fn fly(inner: &Arc<Self>, pilot: Pilot, ready: Ready, slot: Slot, queued: Instant) {
-        if ready.prepared.cost.ms <= COMPUTE_AT_ONCE_MS && !ready.entry.is_composed() {
-            inner.run(pilot, &ready, Some(slot), queued);
-        } else {
-            let this = Arc::clone(inner);
-            inner.cores.spawn(move || this.run(pilot, &ready, Some(slot), queued));
-        }
+        let this = Arc::clone(inner);
+        inner.cores.spawn(move || this.run(pilot, &ready, Some(slot), queued));
     }
 
     /// Runs the calculation, keeps its answer and tells it.

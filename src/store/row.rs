@@ -5,19 +5,25 @@ use std::io;
 use bytes::Bytes;
 use sqlx::sqlite::{Sqlite, SqliteConnection};
 use sqlx::{FromRow, QueryBuilder};
+use zstd::zstd_safe::CParameter;
 
 use super::KeptResult;
 use crate::key::Key;
 
 /// Fast: answers shrink to a quarter anyway, and nobody waits less for the rest.
 const LEVEL: i32 = 1;
+/// Shortest repetition that is looked for. Answers are digits, where shorter ones are chance: without them an answer
+/// stays within 3 % of its size and takes three quarters of the time.
+const LEAST_MATCH: u32 = 7;
 
 /// Makes rows, one after the other in the same workspace: setting one up costs as much as a small answer.
 pub(super) struct Packer(zstd::bulk::Compressor<'static>);
 
 impl Packer {
     pub(super) fn new() -> io::Result<Self> {
-        zstd::bulk::Compressor::new(LEVEL).map(Self)
+        let mut compressor = zstd::bulk::Compressor::new(LEVEL)?;
+        compressor.set_parameter(CParameter::MinMatch(LEAST_MATCH))?;
+        Ok(Self(compressor))
     }
 
     pub(super) fn row(&mut self, result: &KeptResult) -> io::Result<ResultRow> {

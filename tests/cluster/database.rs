@@ -1,7 +1,7 @@
 //! A PostgreSQL of a test's own, and processes over it.
 
 use std::net::TcpListener;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
@@ -16,7 +16,10 @@ pub const PATIENCE: Duration = Duration::from_mins(3);
 
 /// A database server of its own, gone with the test.
 pub struct Database {
-    folder: TempDir,
+    folder: PathBuf,
+    /// Removes the folder at the end, where it is the database's own.
+    #[allow(dead_code)] // held, never looked at
+    own: Option<TempDir>,
     port: u16,
     pub address: String,
 }
@@ -41,20 +44,27 @@ impl Database {
 
     /// With settings of its own.
     pub fn start_with(settings: &[&str]) -> Option<Self> {
+        let folder = tempfile::Builder::new().prefix("precut-postgres-").tempdir().unwrap();
+        let mut database = Self::start_in(folder.path(), settings)?;
+        database.own = Some(folder);
+        Some(database)
+    }
+
+    /// In a folder of the test's.
+    pub fn start_in(folder: &Path, settings: &[&str]) -> Option<Self> {
         if !is_installed() {
             assert!(std::env::var("CI").as_deref() != Ok("true"), "no PostgreSQL is installed");
             println!("NOT TESTED: no PostgreSQL is installed; ./test.sh installs one");
             return None;
         }
-        let folder = tempfile::Builder::new().prefix("precut-postgres-").tempdir().unwrap();
         let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
-        let mut database = Self { folder, port, address: String::new() };
+        let mut database = Self { folder: folder.to_owned(), own: None, port, address: String::new() };
         database.run(settings);
         Some(database)
     }
 
     fn place(&self) -> &str {
-        self.folder.path().to_str().unwrap()
+        self.folder.to_str().unwrap()
     }
 
     fn run(&mut self, settings: &[&str]) {
@@ -66,6 +76,11 @@ impl Database {
 
     pub fn run_again(&mut self) {
         self.run(&[]);
+    }
+
+    /// Whether it runs; it may have given up by itself.
+    pub fn is_running(&self) -> bool {
+        script(&["running", self.place()]).status.success()
     }
 
     /// `fast`, or `immediate`: as if it were killed.

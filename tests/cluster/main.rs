@@ -15,9 +15,13 @@ mod support;
 #[path = "../reliability/dice.rs"]
 mod dice;
 
+#[path = "../reliability/small_disk.rs"]
+mod small_disk;
+
 mod across;
 mod chaos;
 mod database;
+mod full;
 mod process;
 mod start;
 mod studies;

@@ -3,56 +3,14 @@
 //! As root a small file system in memory is mounted; elsewhere the process gets a limit on the size of its files, by
 //! which its writes fail alike (the second half of the test).
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Stdio};
 
 use serde_json::{Value, json};
 
+use crate::small_disk::SmallDisk;
 use crate::support::header;
-use crate::watch::{Service, assert_intact, database, refused_start, runs, until};
-
-/// A small file system; gone with this value.
-struct SmallDisk {
-    folder: tempfile::TempDir,
-}
-
-impl SmallDisk {
-    /// `None` where nobody may mount one.
-    fn new(size: &str) -> Option<Self> {
-        let folder = tempfile::tempdir().unwrap();
-        let place = folder.path().to_str().unwrap();
-        runs("mount", &["-t", "tmpfs", "-o", &format!("size={size}"), "tmpfs", place]).then_some(Self { folder })
-    }
-
-    fn data(&self) -> PathBuf {
-        self.folder.path().join("data")
-    }
-
-    /// Takes all room that is left.
-    fn fill(&self) {
-        let file = self.folder.path().join("ballast");
-        let status = Command::new("dd")
-            .args(["if=/dev/zero", &format!("of={}", file.display()), "bs=4096", "oflag=append", "conv=notrunc"])
-            .stderr(Stdio::null())
-            .status()
-            .unwrap();
-        assert!(!status.success(), "the disk is full");
-    }
-
-    fn make_room(&self) {
-        std::fs::remove_file(self.folder.path().join("ballast")).unwrap();
-    }
-
-    fn remount(&self, mode: &str) -> bool {
-        runs("mount", &["-o", &format!("remount,{mode}"), self.folder.path().to_str().unwrap()])
-    }
-}
-
-impl Drop for SmallDisk {
-    fn drop(&mut self) {
-        runs("umount", &["-l", self.folder.path().to_str().unwrap()]);
-    }
-}
+use crate::watch::{Service, assert_intact, database, refused_start, until};
 
 fn job(length: usize, duration_ms: u32) -> Value {
     json!({"length_mm": length, "load_n": 1, "duration_ms": duration_ms})
@@ -99,7 +57,7 @@ async fn with_a_full_disk_answers_go_on_jobs_are_refused_and_nothing_breaks() {
         println!("no small disk can be mounted here: see the test with a limit on files");
         return;
     };
-    let service = Service::start(&disk.data(), &[]).await;
+    let service = Service::start(&disk.path().join("data"), &[]).await;
     let first = service.accepted(&job(100, 20)).await;
     service.over(&first).await;
     let running = service.accepted(&job(101, 1500)).await;
@@ -120,9 +78,9 @@ async fn with_a_full_disk_answers_go_on_jobs_are_refused_and_nothing_breaks() {
     assert_eq!(service.over(&again).await["state"], "succeeded");
     // Full at its start: it says so.
     service.stop();
-    assert_intact(&disk.data()).await;
+    assert_intact(&disk.path().join("data")).await;
     disk.fill();
-    let other = disk.folder.path().join("other");
+    let other = disk.path().join("other");
     let (code, said) = refused_start(&other);
     assert_eq!(code, Some(1), "{said}");
     assert!(said.contains("cannot be used"), "{said}");
@@ -136,7 +94,7 @@ async fn on_a_disk_that_became_read_only_answers_go_on_until_it_is_writable_agai
         println!("no disk can be mounted here");
         return;
     };
-    let service = Service::start(&disk.data(), &[]).await;
+    let service = Service::start(&disk.path().join("data"), &[]).await;
     let first = service.accepted(&job(100, 20)).await;
     service.over(&first).await;
     // A file system with open files for writing refuses to become read-only; then there is nothing to test.
@@ -153,12 +111,12 @@ async fn on_a_disk_that_became_read_only_answers_go_on_until_it_is_writable_agai
     }
     service.stop();
     assert!(disk.remount("ro"));
-    let (code, said) = refused_start(&disk.data());
+    let (code, said) = refused_start(&disk.path().join("data"));
     assert_eq!(code, Some(1), "{said}");
     assert!(said.contains("cannot be used"), "{said}");
     println!("read-only at the start: refused, {}", said.trim());
     assert!(disk.remount("rw"));
-    assert_intact(&disk.data()).await;
+    assert_intact(&disk.path().join("data")).await;
 }
 
 /// The same by a limit on the size of files, which needs no rights. The signal that comes with it is ignored.

@@ -2,13 +2,12 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
 use crate::dice::{Dice, scale};
-use crate::support::header;
+use crate::support::{header, precut_command};
 use crate::watch::{Service, assert_intact, database, until};
 
 const JOBS: u32 = 100;
@@ -245,13 +244,8 @@ async fn the_program_itself_finishes_what_it_was_killed_in() {
     let folder = tempfile::tempdir().unwrap();
     let client = reqwest::Client::new();
     let start = || {
-        let mut child = Command::new(env!("CARGO_BIN_EXE_precut"))
-            .args(["serve", "--listen", "127.0.0.1:0", "--data", folder.path().to_str().unwrap()])
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
+        let data = folder.path().to_str().unwrap();
+        let mut child = precut_command(&["serve", "--listen", "127.0.0.1:0", "--data", data]).spawn().unwrap();
         let address = crate::support::address_of(&mut child);
         (child, address)
     };

@@ -18,5 +18,6 @@ mod disk;
 mod killed;
 mod locked;
 mod process;
+mod small_disk;
 mod streams;
 mod watch;

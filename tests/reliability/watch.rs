@@ -1,7 +1,7 @@
 //! A service as a process, and what can be asked of it from outside.
 
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 use reqwest::{Client, Method, RequestBuilder, Response};
@@ -134,10 +134,4 @@ pub async fn assert_intact(folder: &Path) {
     let said: Vec<String> = sqlx::query_scalar("PRAGMA integrity_check").fetch_all(&mut database).await.unwrap();
     assert_eq!(said, ["ok"]);
     database.close().await.unwrap();
-}
-
-/// Runs a command of the system; whether it did what it should.
-pub fn runs(program: &str, arguments: &[&str]) -> bool {
-    let command = Command::new(program).args(arguments).stdout(Stdio::null()).stderr(Stdio::null()).status();
-    command.is_ok_and(|status| status.success())
 }

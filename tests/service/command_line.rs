@@ -5,7 +5,7 @@ use std::process::{Command, Output, Stdio};
 
 use serde_json::Value;
 
-use crate::support::{Process, toy, toy_command};
+use crate::support::{Process, precut_command, toy, toy_command};
 
 const FILE: &str = r#"{"calculator": "sagging-bar", "job": {"length_mm": 500.0, "load_n": 100.0}}"#;
 
@@ -20,12 +20,7 @@ fn precut(arguments: &[&str]) -> Output {
 
 /// The same with something to read.
 fn feed_precut(arguments: &[&str], input: &str) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_precut"));
-    command.args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped());
-    for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("PRECUT_")) {
-        command.env_remove(name);
-    }
-    feed(command, input)
+    feed(precut_command(arguments), input)
 }
 
 fn feed(mut command: Command, input: &str) -> Output {
@@ -159,8 +154,8 @@ fn help_and_version_are_worth_reading() {
 fn settings_are_printed_and_refused_with_their_source() {
     let printed = String::from_utf8(precut(&["--print-config", "--listen", "127.0.0.1:9"]).stdout).unwrap();
     assert!(printed.contains("listen = \"127.0.0.1:9\""), "{printed}");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_precut"));
-    command.arg("--print-config").env("PRECUT_LIMITS_BURST", "none").stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut command = precut_command(&["--print-config"]);
+    command.env("PRECUT_LIMITS_BURST", "none");
     let output = feed(command, "");
     assert_eq!(output.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&output.stderr).contains("PRECUT_LIMITS_BURST"), "{output:?}");
@@ -168,14 +163,7 @@ fn settings_are_printed_and_refused_with_their_source() {
 
 #[test]
 fn a_key_is_hashed_for_the_settings() {
-    let output = feed(
-        {
-            let mut command = Command::new(env!("CARGO_BIN_EXE_precut"));
-            command.arg("hash-key").stdout(Stdio::piped()).stderr(Stdio::piped());
-            command
-        },
-        "0123456789abcdef\n",
-    );
+    let output = feed_precut(&["hash-key"], "0123456789abcdef\n");
     let hash = String::from_utf8(output.stdout).unwrap();
     assert_eq!(hash.trim(), precut::http::auth::hash("0123456789abcdef").to_string());
 }
@@ -196,8 +184,7 @@ fn health_asks_a_running_service() {
 #[cfg(unix)]
 #[test]
 fn a_reader_that_leaves_early_is_no_panic() {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_precut"));
-    let mut child = command.arg("openapi").stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut child = precut_command(&["openapi"]).spawn().unwrap();
     drop(child.stdout.take());
     let output = child.wait_with_output().unwrap();
     assert!(output.status.success(), "{output:?}");

@@ -117,9 +117,23 @@ const CHILD: &str = "process::child_process";
 
 /// `precut` with the toy calculator, as a process: this test binary run again.
 pub fn toy_command(arguments: &[&str]) -> Command {
-    let mut command = Command::new(std::env::current_exe().expect("a running test has a file"));
+    let mut command = piped(&std::env::current_exe().expect("a running test has a file"));
     command.args(["--exact", CHILD, "--ignored", "--nocapture", "--quiet"]);
     command.env("TOY_ARGUMENTS", arguments.join("\n"));
+    command
+}
+
+/// The shipped program.
+#[allow(dead_code)] // not every program of tests runs it
+pub fn precut_command(arguments: &[&str]) -> Command {
+    let mut command = piped(Path::new(env!("CARGO_BIN_EXE_precut")));
+    command.args(arguments);
+    command
+}
+
+/// A program that the settings of whoever runs the tests do not reach, with nothing to read and its outputs piped.
+fn piped(program: &Path) -> Command {
+    let mut command = Command::new(program);
     for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("PRECUT_")) {
         command.env_remove(name);
     }

@@ -150,7 +150,7 @@ def settle(database: Database, states: str, jobs: int):
 
 def job_of(example: dict, number: int) -> dict:
     job = json.loads(json.dumps(example))
-    job["shaft"]["segments"][0]["diameter_mm"] *= 1 + 1e-6 * number
+    job["cut"]["feed_mm_per_rev"] *= 1 - 1e-8 * number
     return job
 
 

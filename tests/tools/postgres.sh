@@ -3,6 +3,7 @@
 #
 #   postgres.sh start FOLDER PORT [SETTING=VALUE ...]   makes it where it is absent, starts it, prints its address
 #   postgres.sh stop FOLDER [MODE]                      smart, fast (default) or immediate: as if it were killed
+#   postgres.sh running FOLDER                          whether it runs
 #   postgres.sh remove FOLDER                           stops it and removes its folder
 #
 # The database refuses to be run by root: then it is run by the user that Debian's package has made for it.
@@ -66,9 +67,10 @@ stop() { as_user "$BIN/pg_ctl" --pgdata "$1/data" --mode "${2:-fast}" --wait sto
 case "${1:-}" in
   start) start "${@:2}" ;;
   stop) stop "${@:2}" ;;
+  running) as_user "$BIN/pg_ctl" --pgdata "$2/data" status >/dev/null ;;
   remove)
     stop "$2" immediate || true
     rm -rf "$2"
     ;;
-  *) die "start, stop or remove" ;;
+  *) die "start, stop, running or remove" ;;
 esac
