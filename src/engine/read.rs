@@ -11,6 +11,7 @@ use super::model::{self, Held, Models};
 use super::{Body, Checked, TablePart, json, table};
 use crate::key::Key;
 use crate::registry::{Entry, Faults, Prepared, Unprepared, by_pointer};
+use crate::store::models::KeptModel;
 
 /// A job that can run, with the address of its answer.
 pub(crate) struct Ready {
@@ -32,11 +33,25 @@ pub(crate) struct Ready {
 /// Reads a job. What the schema refuses is listed together with what the rules between fields refuse, as far as the
 /// job can be read in spite of its faults.
 pub(crate) fn read(entry: &Arc<Entry>, body: &Body, models: &Models<'_>) -> Result<Ready, Error> {
+    read_with(entry, body, models, None)
+}
+
+/// The same with a model that the job takes although it may not name it.
+pub(crate) fn read_with(
+    entry: &Arc<Entry>,
+    body: &Body,
+    models: &Models<'_>,
+    given: Option<&KeptModel>,
+) -> Result<Ready, Error> {
     let (job, parts) = match body {
         Body::Json(job) => (job, [].as_slice()),
         Body::Parts { job, tables } => (job, tables.as_slice()),
     };
     let mut job = json::parse(job)?;
+    let misfit = given.and_then(|given| model::impose(models.registry, entry, &mut job, given));
+    if let Some(misfit) = misfit {
+        return Err(Found { total: 1, findings: vec![misfit] }.with_rules(entry, &job));
+    }
     let names_a_model = model::named(models.registry, entry, &mut job).is_some();
     let of_model = model::extend(models, entry, &mut job);
     let ready = read_extended(entry, job, parts, of_model)?;

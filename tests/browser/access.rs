@@ -10,7 +10,7 @@ use crate::{SETTLED, both};
 const AXE: &str = include_str!("vendor/axe-core/axe.min.js");
 const RULES: &str = "['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice']";
 
-fn assert_accessible(page: &mut Page, place: &str) {
+pub fn assert_accessible(page: &mut Page, place: &str) {
     if page.evaluate("typeof axe") == "undefined" {
         page.evaluate(&format!("{AXE};0"));
     }
@@ -51,6 +51,20 @@ fn axe_finds_no_violation_on_any_page() {
     page.open(&service.page("deflection-compensation?/cut/feed_mm_per_rev=900"));
     page.wait_for(".problem");
     assert_accessible(&mut page, "fault");
+    page.screen(1440, 900, true);
+    page.open(&service.page("studies"));
+    page.wait_for("#run-study");
+    assert_accessible(&mut page, "studies, nothing computed");
+    page.click("#add-varied");
+    page.click("#run-study");
+    page.until(&format!("document.querySelector('.study-rows') && {SETTLED}"));
+    assert_accessible(&mut page, "studies");
+    page.screen(1440, 900, false);
+    page.open(&service.page("feed-schedule"));
+    page.until(SETTLED);
+    page.click_on("Objective over");
+    page.wait_for(".preview .picture");
+    assert_accessible(&mut page, "trade-off");
     for place in ["jobs", "results", "models", "nothing-like-it"] {
         page.open(&service.page(place));
         page.wait_for("main h1");
@@ -63,11 +77,11 @@ fn axe_finds_no_violation_on_any_page() {
 fn no_page_is_wider_than_its_window() {
     let Some((_turn, mut page, service)) = both() else { return };
     let mut places = rooms(&mut page, &service);
-    places.extend(["", "jobs", "results"].map(str::to_owned));
+    places.extend(["", "jobs", "results", "models", "studies"].map(str::to_owned));
     for place in &places {
         page.screen(360, 740, false);
         page.open(&service.page(place));
-        if place.is_empty() || place == "jobs" || place == "results" {
+        if ["", "jobs", "results", "models", "studies"].contains(&place.as_str()) {
             page.wait_for("main h1");
         } else {
             page.until(SETTLED);

@@ -8,6 +8,27 @@ fn a_diagnosis_is_saved_as_a_model_and_used_in_another_form() {
     page.open(&service.page("diagnosis"));
     page.until(SETTLED);
     assert!(page.text(".verdict").len() > 20);
+    // The named cause beside "nothing" and "unknown", its size with as many digits as it is sure of, what is gained on
+    // held-back data, and the next measurement.
+    let found = page.text(".causes");
+    for part in [
+        "Headstock compliance",
+        "Nothing: scatter alone",
+        "not in the list",
+        "0.0220 ± 0.0012 µm/N",
+        "held back",
+        "worth making next",
+    ] {
+        assert!(found.contains(part), "{part}: {found}");
+    }
+    page.until("document.querySelectorAll('.causes tr.named').length === 1");
+    page.click_on("RU");
+    page.until("document.querySelector('.causes .named')?.textContent.startsWith('Податливость передней бабки')");
+    page.until("!/[a-z]{4}/.test(document.querySelector('.causes').textContent)");
+    page.click_on("EN");
+    page.until(&format!(
+        "document.querySelector('.causes .named').textContent.startsWith('Headstock') && /^[ -~]+$/.test(document.querySelector('.verdict').textContent) && {SETTLED}"
+    ));
     // A bad name is refused before it is sent, a good one makes a revision.
     page.fill("#model-name", "lathe-7-winter");
     page.click(".save-model button");

@@ -44,6 +44,14 @@ fn kept_results_are_listed_and_opened_without_computing() {
         "document.querySelector('.verdict').textContent !== {} && {SETTLED}",
         serde_json::json!(verdict)
     ));
+    // What came one after the other from one page is one line of the list until asked for.
+    page.open(&service.page("results"));
+    page.wait_for(".list tbody .quiet-button");
+    assert_eq!(page.evaluate("document.querySelectorAll('.list tbody tr').length"), 1);
+    page.click(".list tbody .quiet-button");
+    page.until(
+        "document.querySelectorAll('.list tbody tr').length >= 2 && !document.querySelector('.list .quiet-button')",
+    );
     page.assert_calm();
 }
 

@@ -9,10 +9,13 @@ mod access;
 mod assets;
 mod chromium;
 mod diagnosis;
+mod instruments;
 mod jobs;
+mod keys;
 mod rooms;
 mod screenshots;
 mod service;
+mod studies;
 mod words;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};

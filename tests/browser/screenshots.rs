@@ -4,15 +4,24 @@ use std::path::Path;
 
 use serde_json::json;
 
+use crate::chromium::Page;
 use crate::{SETTLED, both};
 
 /// Name, place, width, height, whether dark.
-const SHOTS: [(&str, &str, u32, u32, bool); 9] = [
+const SHOTS: [(&str, &str, u32, u32, bool); 17] = [
     ("deflection", "deflection-compensation", 1440, 900, false),
     ("deflection-ru", "deflection-compensation?example=stepped_with_rest", 1440, 900, false),
     ("lobes", "fixture-stability?example=lobes", 1440, 900, true),
     ("ring", "ring-roundness", 1440, 900, false),
+    ("ring-map", "ring-roundness?example=set_up", 1440, 900, true),
     ("feed", "feed-schedule", 1440, 900, false),
+    ("trade-off", "feed-schedule", 1440, 1150, false),
+    ("clamp", "fixture-stability", 1920, 1080, true),
+    ("study", "studies", 1440, 900, false),
+    ("diagnosis", "diagnosis", 1920, 1080, false),
+    ("diagnosis-phone", "diagnosis", 360, 740, true),
+    ("diagnosis-wide", "diagnosis", 2560, 1300, false),
+    ("models", "models", 1024, 600, false),
     ("trials", "machinability-fit", 1920, 1080, false),
     ("tablet", "roundness-evaluation", 1024, 600, true),
     ("phone", "fixture-stability?example=lobes", 360, 740, false),
@@ -40,8 +49,22 @@ fn the_documentation_shows_the_workbench_as_it_is() {
         page.open(&service.page(place));
         let language = if name.ends_with("-ru") { "ru" } else { "en" };
         page.click_on(&language.to_uppercase());
-        page.until(&format!("document.documentElement.lang === {} && {SETTLED}", json!(language)));
-        if name == "deflection" {
+        page.until(&format!("document.documentElement.lang === {}", json!(language)));
+        match place {
+            "models" => page.wait_for(".list tbody tr"),
+            "studies" => page.wait_for("#run-study"),
+            _ => page.until(SETTLED),
+        }
+        stage(&mut page, name);
+        std::thread::sleep(std::time::Duration::from_millis(300));
+        std::fs::write(folder.join(format!("{name}.png")), page.picture()).unwrap();
+    }
+}
+
+/// What is done on a page before it is shown.
+fn stage(page: &mut Page, name: &str) {
+    match name {
+        "deflection" => {
             page.click_on("Pin to compare");
             page.fill("#field-cut-feed_mm_per_rev", "0.35");
             page.until(&format!("document.querySelector('.chart .ghost') && {SETTLED}"));
@@ -49,7 +72,40 @@ fn the_documentation_shows_the_workbench_as_it_is() {
             page.evaluate("scrollTo(0, 0)");
             page.point(middle);
         }
-        std::thread::sleep(std::time::Duration::from_millis(300));
-        std::fs::write(folder.join(format!("{name}.png")), page.picture()).unwrap();
+        "ring" => {
+            page.evaluate("document.querySelector('#replay').focus()");
+            page.press("Home");
+            for _ in 0..3 {
+                page.press("ArrowRight");
+            }
+            page.until("document.querySelector('.picture h2').textContent.includes('revolution 3 of')");
+        }
+        "ring-map" => {
+            page.click_on("Worst wave");
+            let middle = page.middle("svg.chart[data-panel='0']");
+            page.evaluate("scrollTo(0, 0)");
+            page.point((middle.0 + 60.0, middle.1));
+        }
+        "trade-off" => {
+            page.click_on("Objective over");
+            page.evaluate("document.querySelector('#trade-off').focus()");
+            for _ in 0..14 {
+                page.press("ArrowRight");
+            }
+            page.until("document.querySelector('.preview .ghost')");
+        }
+        "study" => {
+            page.click("#add-varied");
+            page.pick("#vary-1", "/supports/1/compliance_um_per_n");
+            page.click("#run-study");
+            page.until(&format!("document.querySelector('.study-rows tbody tr') && {SETTLED}"));
+        }
+        "diagnosis" => {
+            page.fill("#model-name", "lathe-7-winter");
+            page.click(".save-model button");
+            page.until("/lathe-7-winter.*1/.test(document.querySelector('#model-name-hint').textContent)");
+            page.evaluate("scrollTo(0, 0)");
+        }
+        _ => {}
     }
 }

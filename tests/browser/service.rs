@@ -20,11 +20,17 @@ pub struct Service {
 
 impl Service {
     pub fn start() -> Self {
+        Self::start_with(|_| {})
+    }
+
+    /// With settings of its own.
+    pub fn start_with(set: impl FnOnce(&mut Config) + Send + 'static) -> Self {
         let (tell, told) = std::sync::mpsc::channel();
         let (stop, stopped) = watch::channel(false);
         let thread = std::thread::spawn(move || {
             let data = tempfile::tempdir().unwrap();
-            let config = Config { data: data.path().to_owned(), ..Config::default() };
+            let mut config = Config { data: data.path().to_owned(), ..Config::default() };
+            set(&mut config);
             let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
             runtime.block_on(async move {
                 let settings = EngineSettings::of(&config);

@@ -4,8 +4,8 @@ import { cell } from './lib.js';
 
 /** Whether the service answers. */
 export const online = cell(true);
-/** Set when the service asks for a key. */
-export const keyAsked = cell(false);
+/** Set when the service asks for a key: `refused` if the one that was sent is not known to it. */
+export const keyAsked = cell(null);
 
 const KEY = 'precut-key';
 const storedKey = () => {
@@ -13,7 +13,7 @@ const storedKey = () => {
 };
 export function useKey(key) {
   try { sessionStorage.setItem(KEY, key.trim()); } catch { /* it is asked for again after a reload */ }
-  keyAsked.set(false);
+  keyAsked.set(null);
 }
 
 /** What the service says when it refuses: an RFC 9457 document. */
@@ -45,7 +45,7 @@ async function ask(path, { headers = {}, ...options } = {}) {
   }
   if (!online.get()) online.set(true);
   if (response.ok) return response;
-  if (response.status === 401) keyAsked.set(true);
+  if (response.status === 401 && !keyAsked.get()) keyAsked.set(key ? 'refused' : 'wanted');
   const problem = await response.json().catch(() => ({ title: response.statusText }));
   throw new Refused(response.status, problem, Number(response.headers.get('Retry-After')) || null);
 }
@@ -79,6 +79,22 @@ export async function solve(id, body, { signal } = {}) {
   const document = await response.json();
   if (response.status === 202) return { job: document };
   return { answer: document, cache: response.headers.get('Precut-Cache'), timing: response.headers.get('Server-Timing') };
+}
+
+/** An answer, however long it takes; given up, its job is cancelled. */
+export async function answered(id, body, signal) {
+  const { answer, job: record } = await solve(id, body, { signal });
+  if (answer) return answer;
+  const done = await new Promise((resolve, reject) => {
+    const stop = follow(record.id, { onDone: resolve, onTrouble: reject });
+    signal?.addEventListener('abort', () => {
+      stop();
+      cancel(record.id).catch(() => {});
+      reject(new DOMException('', 'AbortError'));
+    });
+  });
+  if (done.state !== 'succeeded') throw new Refused(done.problem?.status || 409, done.problem || { title: done.state });
+  return result(done.key, signal);
 }
 
 /** A result in another form, as a file. */

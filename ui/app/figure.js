@@ -2,7 +2,7 @@
 // a pinned run lies under the present one. What to draw comes as data; nothing here knows a calculator.
 import { html, useState, useRef, useMemo, useLayoutEffect, useEffect, unique } from './lib.js';
 import { t, number, unitSymbol } from './text.js';
-import { scale, extent, aired, ticks, labels, valueAt } from './scale.js';
+import { scale, extent, aired, ticks, labels, valueAt, cellAt } from './scale.js';
 import { items, styles } from './draw.js';
 import { axisName, readDigits, abscissae, ordinates, Head, describe } from './panel.js';
 import { Polar } from './polar.js';
@@ -58,18 +58,28 @@ export function differenceOf(figure, other) {
   return { ...figure, panels: panels.filter(panel => panel.items.length > 0) };
 }
 
-/** The picture. `onPick(x, y)` where a click in it means something; `mark` where it stands now. */
-export function Picture({ figure, pinned, height = 460, onPick, main }) {
+/** Places along an axis at which a cross may stand where nothing is drawn that has places of its own. */
+const CROSS_STEPS = 60;
+const evenly = ([low, high], isLog) => Array.from({ length: CROSS_STEPS + 1 }, (_, index) => {
+  const share = index / CROSS_STEPS;
+  return isLog ? low * (high / low) ** share : low + (high - low) * share;
+});
+
+/** The picture. `onPick(x, y)` where a click in it, or Enter at the cross, means something; `handle` is a point that
+ *  can be dragged: `{ x, y, onMove(x, y), onDrop(x, y) }`, without `y` along the first curve. */
+export function Picture({ figure, pinned, height = 460, onPick, handle, main }) {
   const [ref, width] = useWidth();
   const [view, setView] = useState(null);
   const [at, setAt] = useState(null);
+  // Where the cross is, in a picture that is read in both directions.
+  const [over, setOver] = useState(null);
   const [hidden, setHidden] = useState(() => new Set());
   const [drag, setDrag] = useState(null);
   const [spoken, setSpoken] = useState('');
   const [tabled, setTabled] = useState(false);
   useScheme();
   const id = useMemo(() => unique('picture'), []);
-  useEffect(() => { setView(null); setAt(null); }, [figure.id]);
+  useEffect(() => { setView(null); setAt(null); setOver(null); }, [figure.id]);
   const style = useMemo(() => styles(figure), [figure]);
   const toggle = name => setHidden(old => {
     const next = new Set(old);
@@ -85,7 +95,9 @@ export function Picture({ figure, pinned, height = 460, onPick, main }) {
     return hasWide || scatter || !span || span[0] === span[1] ? aired(span, figure.x.scale, hasWide ? 0.03 : 0.04) : span;
   }, [figure, pinned]);
   const shown = view || full;
+  const map = isPolar ? null : figure.panels.flatMap(panel => panel.items).find(item => item.kind === 'heat_map');
   const samples = useMemo(() => {
+    if (map || onPick) return map ? map.x : evenly(full, figure.x.scale === 'logarithmic');
     const longest = figure.panels.flatMap(panel => panel.items).filter(item => ['line', 'bars', 'points'].includes(item.kind)).sort((a, b) => b.x.length - a.x.length)[0];
     return longest ? [...new Set(longest.x)].sort((a, b) => a - b) : [];
   }, [figure]);
@@ -104,19 +116,33 @@ export function Picture({ figure, pinned, height = 460, onPick, main }) {
     if (samples.length === 0) return;
     const inside = samples.filter(x => x >= shown[0] && x <= shown[1]);
     if (inside.length === 0) return;
-    const now = at === null ? Math.floor(inside.length / 2) : inside.findIndex(x => x >= at - 1e-12 * Math.abs(at));
+    const now = at === null ? (handle && isPlane ? inside.findIndex(x => x >= handle.x) : Math.floor(inside.length / 2)) : inside.findIndex(x => x >= at - 1e-12 * Math.abs(at));
     const stride = far ? Math.max(1, Math.round(inside.length / 10)) : Math.max(1, Math.round(inside.length / 200));
     const next = inside[Math.min(Math.max((now < 0 ? inside.length - 1 : now) + count * stride, 0), inside.length - 1)];
     setAt(next);
-    setSpoken(readings(figure, next).map(({ text, value, unit }) => `${text} ${number(value, 4)} ${unit}`).join('; '));
+    setSpoken(readings(figure, next, over).map(({ text, value, unit }) => `${text} ${number(value, 4)} ${unit}`).join('; '));
   };
+  // Up and down: the cross of a map, or of a picture in which a point can be tried.
+  const rise = (count, far) => {
+    const panel = figure.panels[0];
+    const span = aired(extent(ordinates(panel, view), panel.y.scale), panel.y.scale);
+    const rows = map ? map.y : evenly(span, panel.y.scale === 'logarithmic');
+    const from = over ?? handle?.y ?? rows[Math.floor(rows.length / 2)];
+    const now = rows.reduce((best, y, index) => (Math.abs(y - from) < Math.abs(rows[best] - from) ? index : best), 0);
+    const next = rows[Math.min(Math.max(now + count * (far ? 5 : 1), 0), rows.length - 1)];
+    if (at === null) setAt(handle?.x ?? samples[Math.floor(samples.length / 2)]);
+    setOver(next);
+    setSpoken(readings(figure, at, next).map(({ text, value, unit }) => `${text} ${number(value, 4)} ${unit}`).join('; '));
+  };
+  const isPlane = Boolean(map || (onPick && !isPolar));
   const key = event => {
-    const act = { ArrowLeft: () => step(-1, event.shiftKey), ArrowRight: () => step(1, event.shiftKey), Home: () => { setAt(shown[0]); }, End: () => { setAt(shown[1]); }, '+': () => zoom(0.5), '=': () => zoom(0.5), '-': () => zoom(2), 0: () => setView(null), Escape: () => { setAt(null); setView(null); } }[event.key];
+    const plane = isPlane ? { ArrowUp: () => rise(1, event.shiftKey), ArrowDown: () => rise(-1, event.shiftKey), Enter: () => { if (onPick && at !== null && over !== null) onPick(at, over); } } : {};
+    const act = { ...plane, ArrowLeft: () => step(-1, event.shiftKey), ArrowRight: () => step(1, event.shiftKey), Home: () => { setAt(shown[0]); }, End: () => { setAt(shown[1]); }, '+': () => zoom(0.5), '=': () => zoom(0.5), '-': () => zoom(2), 0: () => setView(null), Escape: () => { setAt(null); setOver(null); setView(null); } }[event.key];
     if (!act || event.ctrlKey || event.metaKey || event.altKey || event.target !== event.currentTarget) return;
     event.preventDefault();
     act();
   };
-  const common = { figure, pinned, width, style, hidden, toggle, at, shown, view, height };
+  const common = { figure, pinned, width, style, hidden, toggle, at, over: isPlane ? over : null, shown, view, height };
   const tools = html`
     <div class="tools" role="group" aria-label=${t('picture_tools')}>
       ${!isPolar && html`<button type="button" class="icon" aria-label=${t('zoom_in')} title=${t('zoom_in')} onClick=${() => zoom(0.5)}>+</button>
@@ -127,22 +153,27 @@ export function Picture({ figure, pinned, height = 460, onPick, main }) {
   return html`
     <figure class=${`picture ${main ? 'main' : ''}`} aria-labelledby=${`${id}-title`}>
       <figcaption><h2 id=${`${id}-title`}>${figure.title.text}</h2>${tools}</figcaption>
-      <div ref=${ref} class="plot" tabindex="0" role="application" aria-label=${`${figure.title.text}. ${t('picture_keys')}`} onKeyDown=${key}>
+      <div ref=${ref} class="plot" tabindex="0" role="application" aria-label=${`${figure.title.text}. ${t('picture_keys')}${onPick ? ` ${t('pick_keys')}` : ''}`} onKeyDown=${key}>
         ${width > 0 && (isPolar
           ? html`<${Polar} ...${common} setAt=${setAt} />`
-          : html`<${Stacked} ...${common} ...${{ setAt, setView, drag, setDrag, onPick }} />`)}
+          : html`<${Stacked} ...${common} ...${{ setAt, setOver, setView, drag, setDrag, onPick, handle }} />`)}
       </div>
       <p class="hidden" role="status">${spoken}</p>
       ${tabled && html`<${Numbers} figure=${figure} samples=${samples} />`}
     </figure>`;
 }
 
-/** The names and values of all curves at one abscissa. */
-function readings(figure, x) {
+/** The names and values of all curves at one abscissa, of maps at one place. */
+function readings(figure, x, y = null) {
   const list = [{ text: figure.x.text, value: x, unit: unitSymbol(figure.x.unit) }];
+  if (y !== null) list.push({ text: figure.panels[0].y.text, value: y, unit: unitSymbol(figure.panels[0].y.unit) });
   for (const panel of figure.panels) {
     for (const item of panel.items) {
-      if (!['line', 'bars', 'points'].includes(item.kind)) continue;
+      if (item.kind === 'heat_map' && y !== null) {
+        const value = cellAt(item, x, y);
+        if (value !== null) list.push({ text: item.value.text, value, unit: unitSymbol(item.value.unit) });
+      }
+      if (!['line', 'bars', 'points'].includes(item.kind) || (y !== null && item.kind === 'points')) continue;
       const value = valueAt(item.x, item.y, x, item.kind === 'line');
       if (value !== null && value !== undefined) list.push({ text: item.text, value, unit: unitSymbol(panel.y.unit) });
     }
@@ -167,7 +198,7 @@ function Numbers({ figure, samples }) {
 }
 
 /** Panels under each other over one abscissa. */
-function Stacked({ figure, pinned, width, style, hidden, toggle, at, setAt, shown, view, setView, height, drag, setDrag, onPick }) {
+function Stacked({ figure, pinned, width, style, hidden, toggle, at, setAt, over, setOver, shown, view, setView, height, drag, setDrag, onPick, handle }) {
   const shares = figure.panels.reduce((sum, panel) => sum + panel.height, 0) || 1;
   const ghosts = figure.panels.map((panel, index) => pinned?.panels[index] || null);
   const visible = figure.panels.map(panel => ({ ...panel, items: panel.items.filter(item => !item.name || !hidden.has(item.name)) }));
@@ -194,32 +225,62 @@ function Stacked({ figure, pinned, width, style, hidden, toggle, at, setAt, show
     const place = Math.min(Math.max(event.clientX - box.left, left + edge), right - edge);
     return { place, value: x.back(place) };
   };
+  /** The ordinate under the pointer, in the panel that it is over. */
+  const spot = event => {
+    const svgs = [...event.currentTarget.querySelectorAll('svg[data-panel]')];
+    const svg = svgs.findLast(one => event.clientY >= one.getBoundingClientRect().top) || svgs[0];
+    const { domain, panel, tall } = panels[Number(svg.dataset.panel)];
+    const v = Math.min(Math.max(event.clientY - svg.getBoundingClientRect().top, 6), 6 + tall);
+    return scale(panel.y.scale, domain, [6 + tall, 6]).back(v);
+  };
+  /** The point that can be dragged: its place in the first panel. */
+  const grip = handle && (() => {
+    const { panel, domain, tall } = panels[0];
+    const line = panel.items.find(item => item.kind === 'line');
+    const value = handle.y ?? (line ? valueAt(line.x, line.y, handle.x) : null);
+    const v = value === null || value === undefined ? NaN : scale(panel.y.scale, domain, [6 + tall, 6])(value);
+    const h = x(handle.x);
+    return h >= left && h <= right && v >= 0 && v <= 12 + tall ? [h, v] : null;
+  })();
+  const nearGrip = event => {
+    if (!grip) return false;
+    const svg = event.currentTarget.querySelector('svg[data-panel="0"]').getBoundingClientRect();
+    return Math.hypot(event.clientX - svg.left - grip[0], event.clientY - svg.top - grip[1]) <= (event.pointerType === 'touch' ? 26 : 14);
+  };
   // Held beside the state: a press and its release may come faster than a drawing.
   const held = useRef(null);
   const hold = next => { held.current = next; setDrag(next); };
   const move = event => {
     const { place, value } = where(event);
     setAt(value);
+    if (held.current?.grip) {
+      held.current.moved = true;
+      handle?.onMove(value, spot(event));
+      return;
+    }
+    setOver(spot(event));
     if (held.current) hold({ ...held.current, to: place });
   };
   const down = event => {
     if (event.button !== 0 || event.target.closest('button')) return;
     const { place } = where(event);
     event.currentTarget.setPointerCapture(event.pointerId);
+    if (nearGrip(event)) { held.current = { grip: true, moved: false }; return; }
     hold({ from: place, to: place });
   };
   const up = event => {
     if (!held.current) return;
+    if (held.current.grip) {
+      const { moved } = held.current;
+      held.current = null;
+      if (moved) handle?.onDrop(where(event).value, spot(event));
+      return;
+    }
     const ends = [held.current.from, held.current.to].sort((a, b) => a - b);
     hold(null);
     if (ends[1] - ends[0] > 8) { setView(ends.map(x.back)); return; }
     if (!onPick) return;
-    const svg = event.target.closest?.('svg') || document.elementFromPoint(event.clientX, event.clientY)?.closest('svg');
-    const index = svg ? Number(svg.dataset.panel) : NaN;
-    if (Number.isNaN(index)) return;
-    const box = svg.getBoundingClientRect();
-    const { domain, panel, tall } = panels[index];
-    onPick(where(event).value, scale(panel.y.scale, domain, [tall, 0]).back(event.clientY - box.top - 6));
+    onPick(where(event).value, spot(event));
   };
   const wheel = event => {
     if (!event.ctrlKey && !event.metaKey) return;
@@ -231,7 +292,7 @@ function Stacked({ figure, pinned, width, style, hidden, toggle, at, setAt, show
     setView(next[1] - next[0] > 0 ? next : view);
   };
   return html`
-    <div class=${`stack ${onPick ? 'pickable' : ''}`} onPointerMove=${move} onPointerDown=${down} onPointerUp=${up} onPointerCancel=${() => hold(null)} onPointerLeave=${() => { if (!held.current) setAt(null); }} onDblClick=${() => setView(null)} onWheel=${wheel}>
+    <div class=${`stack ${onPick ? 'pickable' : ''}`} onPointerMove=${move} onPointerDown=${down} onPointerUp=${up} onPointerCancel=${() => hold(null)} onPointerLeave=${() => { if (!held.current) { setAt(null); setOver(null); } }} onDblClick=${() => setView(null)} onWheel=${wheel}>
       ${panels.map(({ panel, ghost, tall, domain, places, texts, factor, span }, index) => {
         const last = index === panels.length - 1;
         const own = panel.items.filter(item => item.kind === 'glyph');
@@ -249,7 +310,7 @@ function Stacked({ figure, pinned, width, style, hidden, toggle, at, setAt, show
         const cursor = at !== null && at >= shown[0] && at <= shown[1] ? x(at) : null;
         const svgHeight = 6 + tall + (last ? AXIS_ROOM : 8);
         return html`
-          <${Head} key=${`head-${index}`} ...${{ panel: figure.panels[index], ghost, style, hidden, toggle, at, factor, span }} />
+          <${Head} key=${`head-${index}`} ...${{ panel: figure.panels[index], ghost, style, hidden, toggle, at, over, factor, span }} />
           <svg key=${`panel-${index}`} data-panel=${index} class="chart" width=${width} height=${svgHeight} viewBox=${`0 0 ${width} ${svgHeight}`} role="img" aria-label=${describe(panel, figure)}>
             <defs><clipPath id=${clip}><rect x=${left} y="6" width=${Math.max(1, right - left)} height=${tall} /></clipPath></defs>
             <g class="grid">${places.map(place => html`<path d=${`M${left} ${y(place).toFixed(1)}H${right}`} />`)}${xPlaces.map(place => html`<path d=${`M${x(place).toFixed(1)} 6V${6 + tall}`} />`)}</g>
@@ -263,6 +324,8 @@ function Stacked({ figure, pinned, width, style, hidden, toggle, at, setAt, show
             ${last && html`<g class="tick-labels" text-anchor="middle">${xPlaces.map((place, tick) => html`<text x=${Math.min(Math.max(x(place), 12), width - 14)} y=${tall + 22}>${xLabels.texts[tick]}</text>`)}</g>
               <text class="x-name" x=${(left + right) / 2} y=${tall + 39} text-anchor="middle">${axisName(figure.x, xLabels.factor)}${at !== null ? ` = ${readDigits(at, shown[1] - shown[0])}` : ''}</text>`}
             ${drag && Math.abs(drag.to - drag.from) > 4 && html`<rect class="selection" x=${Math.min(drag.from, drag.to)} y="6" width=${Math.abs(drag.to - drag.from)} height=${tall} />`}
+            ${over !== null && over >= domain[0] && over <= domain[1] && html`<path class="cursor" d=${`M${left} ${y(over).toFixed(1)}H${right}`} />`}
+            ${index === 0 && grip && html`<circle class="reach" cx=${grip[0]} cy=${grip[1]} r="22" /><circle class="handle" cx=${grip[0]} cy=${grip[1]} r="7.5" />`}
             ${cursor !== null && html`<path class="cursor" d=${`M${cursor.toFixed(1)} 6V${6 + tall}`} />
               ${panel.items.filter(item => item.kind === 'line' && !hidden.has(item.name)).map(item => {
                 const v = valueAt(item.x, item.y, at);

@@ -3,6 +3,7 @@ import { html, render, useState, useEffect, useLayoutEffect, useRef, useCallback
 import { t, speak, language, languages, languageChanged } from './text.js';
 import * as api from './api.js';
 import { Room } from './room.js';
+import { Study } from './study.js';
 import { Home, Jobs, Results, Models } from './pages.js';
 
 const JOBS_LOOK_MS = 4000;
@@ -11,6 +12,8 @@ const trouble = document.getElementById('trouble');
 /** Whatever goes wrong in the page is said, not swallowed. */
 function complain(error) {
   if (error?.name === 'AbortError') return;
+  // A notice of the browser that a size settles one frame later.
+  if (String(error?.message ?? error).startsWith('ResizeObserver loop')) return;
   const known = error instanceof api.Refused || error instanceof api.Unreachable;
   const words = t('page_trouble') === 'page_trouble' ? 'Something in this page failed. Reload it; if it happens again, tell those who run the service:' : t('page_trouble');
   trouble.textContent = known ? error.problem?.detail || t('offline_detail') : `${words} ${error?.message || error}`;
@@ -81,7 +84,7 @@ function App() {
 
   const known = calculators?.find(({ id }) => id === page);
   useEffect(() => {
-    const names = { jobs: t('jobs'), results: t('results'), models: t('models') };
+    const names = { studies: t('studies'), jobs: t('jobs'), results: t('results'), models: t('models') };
     document.title = known ? `${known.title} – precut` : names[page] ? `${names[page]} – precut` : 'precut';
   }, [page, known, spoken]);
   const first = useRef(true);
@@ -103,14 +106,16 @@ function App() {
     <a class="skip" href="#main" onClick=${event => { event.preventDefault(); document.getElementById('main')?.focus(); }}>${t('skip')}</a>
     <${Header} ...${{ page, calculators, running, models, known }} />
     ${!isOnline && html`<p class="banner" role="status">${t('offline_title')}. ${t('offline_detail')}</p>`}
-    ${needsKey && html`<${KeyForm} done=${() => setAttempt(attempt + 1)} />`}
+    ${needsKey && html`<${KeyForm} key=${attempt} refused=${needsKey === 'refused'} done=${() => setAttempt(attempt + 1)} />`}
     <${Guard} key=${page}>
-      ${!calculators ? html`<main class="plain" id="main" tabindex="-1"><p class="late">${t('loading')}</p></main>`
+      ${!calculators && needsKey ? html`<main class="plain" id="main" tabindex="-1"><h1>${t('slogan')}</h1><p>${t('key_why')}</p></main>`
+        : !calculators ? html`<main class="plain" id="main" tabindex="-1"><p class="late">${t('loading')}</p></main>`
         : page === '' ? html`<${Home} calculators=${calculators} />`
         : page === 'jobs' ? html`<${Jobs} calculators=${calculators} refreshJobs=${refreshJobs} />`
         : page === 'results' ? html`<${Results} calculators=${calculators} query=${query} replace=${replace} />`
+        : page === 'studies' ? html`<${Study} key=${attempt} ...${{ calculators, query, push, replace, refreshJobs }} />`
         : page === 'models' ? html`<${Models} calculators=${calculators} models=${models} refreshModels=${refreshModels} />`
-        : known ? html`<${Room} key=${page} id=${page} ...${{ query, push, replace, models, refreshJobs }} />`
+        : known ? html`<${Room} key=${`${page} ${attempt}`} id=${page} ...${{ query, push, replace, models, refreshJobs }} />`
         : html`<main class="plain" id="main" tabindex="-1"><h1>${t('no_page')}</h1><p><a href="#/">${t('to_start')}</a></p></main>`}
     <//>`;
 }
@@ -138,6 +143,7 @@ function Header({ page, calculators, running, models, known }) {
         </nav>
       </div>
       <nav class="places" aria-label=${t('places')}>
+        ${link('studies', t('studies'))}
         ${link('jobs', t('jobs'), running > 0 && html`<span class="count"><span aria-hidden="true">${running}</span><span class="hidden">, ${running} ${t('open_jobs')}</span></span>`)}
         ${link('results', t('results'))}
         ${(models !== null || page === 'models') && link('models', t('models'))}
@@ -150,11 +156,14 @@ function Header({ page, calculators, running, models, known }) {
 }
 
 /** The service is locked: it wants a key. */
-function KeyForm({ done }) {
+function KeyForm({ done, refused }) {
   const [key, setKey] = useState('');
+  useEffect(() => { document.getElementById('api-key')?.focus(); }, []);
   return html`
-    <form class="banner key-form" onSubmit=${event => { event.preventDefault(); api.useKey(key); done(); }}>
-      <label for="api-key">${t('key_wanted')}</label><input id="api-key" type="password" autocomplete="off" value=${key} onInput=${event => setKey(event.currentTarget.value)} required /><button type="submit" class="primary">${t('use_key')}</button>
+    <form class="banner key-form" aria-label=${t('key_wanted')} onSubmit=${event => { event.preventDefault(); api.useKey(key); done(); }}>
+      <label for="api-key">${t('key_wanted')}</label><input id="api-key" type="password" autocomplete="off" value=${key} aria-describedby="api-key-hint" aria-invalid=${refused ? 'true' : undefined} onInput=${event => setKey(event.currentTarget.value)} required /><button type="submit" class="primary">${t('use_key')}</button>
+      ${refused && html`<span class="refused" role="alert">${t('key_refused')}</span>`}
+      <span id="api-key-hint">${t('key_hint')}</span>
     </form>`;
 }
 

@@ -5,6 +5,8 @@ import * as api from './api.js';
 import { save } from './result.js';
 
 const LOOK_MS = 1500;
+/** Results of one calculator not further apart than this stand in one line until asked for. */
+const BURST_MS = 600000;
 
 export function Home({ calculators }) {
   const group = kind => calculators.filter(item => item.kind === kind);
@@ -57,13 +59,14 @@ function ListState({ items, trouble, empty }) {
   return null;
 }
 
-const titleOf = (calculators, id) => calculators.find(item => item.id === id)?.title || id;
+const addressOf = ({ calculator, key }) => (calculator === 'studies' ? `#/studies?study=${key}` : `#/${calculator}?result=${key}`);
+const titleOf = (calculators, id) => (id === 'studies' ? t('study') : calculators.find(item => item.id === id)?.title || id);
 
 export function Jobs({ calculators, refreshJobs }) {
   const [first] = useState(() => () => api.jobs({ limit: 50 }));
   const { items, next, more, trouble, load } = usePages(first, LOOK_MS);
   const stop = async id => { try { await api.cancel(id); } finally { load(); refreshJobs(); } };
-  const known = new Set(calculators.map(({ id }) => id));
+  const known = new Set([...calculators.map(({ id }) => id), 'studies']);
   return html`
     <main class="plain" id="main" tabindex="-1"><h1>${t('jobs')}</h1><p class="quiet">${t('jobs_about')}</p>
       <${ListState} items=${items} trouble=${trouble} empty=${t('no_jobs')} />
@@ -73,11 +76,11 @@ export function Jobs({ calculators, refreshJobs }) {
           const isOpen = item.state === 'queued' || item.state === 'running';
           const name = titleOf(calculators, item.calculator);
           return html`<tr key=${item.id}>
-            <th scope="row">${!known.has(item.calculator) ? name : item.state === 'succeeded' ? html`<a href=${`#/${item.calculator}?result=${item.key}`}>${name}</a>` : isOpen ? html`<a href=${`#/${item.calculator}?run=${item.id}`}>${name}</a>` : name}</th>
+            <th scope="row">${!known.has(item.calculator) ? name : item.state === 'succeeded' ? html`<a href=${addressOf(item)}>${name}</a>` : isOpen ? html`<a href=${`#/${item.calculator}?run=${item.id}`}>${name}</a>` : name}</th>
             <td><span class=${`state ${item.state}`}>${t(`state_${item.state}`)}</span>${item.problem ? html`<span class="quiet"> ${item.problem.detail || item.problem.title}</span>` : ''}</td>
             <td class="progress-cell">${isOpen ? html`<progress max="1" value=${item.progress} aria-label=${`${name}: ${t('progress')}`}></progress><span class="quiet">${item.stage || ''}${item.remaining_ms ? ` · ${t('time_left', { time: duration(item.remaining_ms) })}` : ''}</span>`
               : item.started_at && item.finished_at ? duration(new Date(item.finished_at) - new Date(item.started_at)) : ''}</td>
-            <td>${moment(item.created_at)}</td>
+            <td class="when">${moment(item.created_at)}</td>
             <td>${isOpen && html`<button type="button" onClick=${() => stop(item.id)}>${t('cancel_job')}<span class="hidden"> ${name}</span></button>`}</td></tr>`;
         })}</tbody></table></div>`}
       ${next && html`<button type="button" class="more" onClick=${more}>${t('older')}</button>`}
@@ -89,20 +92,33 @@ export function Results({ calculators, query, replace }) {
   return html`<${ResultList} key=${wanted} ...${{ calculators, wanted, replace }} />`;
 }
 
+/** Results of one calculator in a row: of a slider, a study, a number that was nudged. */
+function inBursts(items) {
+  const bursts = [];
+  for (const item of items) {
+    const last = bursts.at(-1)?.at(-1);
+    if (last && last.calculator === item.calculator && Math.abs(new Date(last.created_at) - new Date(item.created_at)) < BURST_MS) bursts.at(-1).push(item);
+    else bursts.push([item]);
+  }
+  return bursts;
+}
+
 function ResultList({ calculators, wanted, replace }) {
   const [first] = useState(() => () => api.results({ limit: 50, ...(wanted && { calculator: wanted }) }));
   const { items, next, more, trouble } = usePages(first);
-  const known = new Set(calculators.map(({ id }) => id));
+  const [opened, setOpened] = useState(() => new Set());
+  const known = new Set([...calculators.map(({ id }) => id), 'studies']);
   return html`
     <main class="plain" id="main" tabindex="-1"><h1>${t('results')}</h1><p class="quiet">${t('results_about')}</p>
       <p><label>${t('calculator')} <select value=${wanted} onChange=${event => replace(event.currentTarget.value ? `calculator=${event.currentTarget.value}` : '')}>
-        <option value="">${t('all_calculators')}</option>${calculators.map(({ id, title }) => html`<option value=${id}>${title}</option>`)}</select></label></p>
+        <option value="">${t('all_calculators')}</option>${calculators.map(({ id, title }) => html`<option value=${id}>${title}</option>`)}<option value="studies">${t('studies')}</option></select></label></p>
       <${ListState} items=${items} trouble=${trouble} empty=${t('no_results')} />
       ${items && items.length > 0 && html`<div class="grid-scroll" tabindex="0" role="region" aria-label=${t('results')}><table class="list">
         <thead><tr><th scope="col">${t('calculator')}</th><th scope="col">${t('computed')}</th><th scope="col">${t('key')}</th><th scope="col">${t('size')}</th></tr></thead>
-        <tbody>${items.map(item => html`<tr key=${item.key}>
-          <th scope="row">${known.has(item.calculator) ? html`<a href=${`#/${item.calculator}?result=${item.key}`}>${titleOf(calculators, item.calculator)}</a>` : titleOf(calculators, item.calculator)}</th>
-          <td>${moment(item.created_at)}</td><td><code>${item.key.slice(3, 15)}…</code></td><td class="number">${number(item.bytes / 1024, 3)} ${t('kilobytes')}</td></tr>`)}</tbody></table></div>`}
+        <tbody>${inBursts(items).flatMap(([item, ...rest]) => [item, ...(opened.has(item.key) ? rest : [])].map((one, place) => ({ item: one, folded: place === 0 && !opened.has(item.key) ? rest.length : 0 }))).map(({ item, folded }) => html`<tr key=${item.key}>
+          <th scope="row">${known.has(item.calculator) ? html`<a href=${addressOf(item)}>${titleOf(calculators, item.calculator)}</a>` : titleOf(calculators, item.calculator)}
+            ${folded > 0 && html` <button type="button" class="quiet-button" onClick=${() => setOpened(new Set([...opened, item.key]))}>${t('and_more', { count: folded })}<span class="hidden">: ${titleOf(calculators, item.calculator)}</span></button>`}</th>
+          <td class="when">${moment(item.created_at)}</td><td><code>${item.key.slice(3, 15)}…</code></td><td class="number">${number(item.bytes / 1024, 3)} ${t('kilobytes')}</td></tr>`)}</tbody></table></div>`}
       ${next && html`<button type="button" class="more" onClick=${more}>${t('older')}</button>`}
     </main>`;
 }
@@ -125,7 +141,7 @@ export function Models({ calculators, models, refreshModels }) {
       ${models === null ? html`<p class="empty-list">${t('models_absent')}</p>` : html`
         ${models.length === 0 ? html`<p class="empty-list">${t('no_models')}</p>` : html`<div class="grid-scroll" tabindex="0" role="region" aria-label=${t('models')}><table class="list">
           <thead><tr><th scope="col">${t('name')}</th><th scope="col">${t('calculator')}</th><th scope="col">${t('revision')}</th><th scope="col">${t('created')}</th><th scope="col"><span class="hidden">${t('actions')}</span></th></tr></thead>
-          <tbody>${models.map(({ name, calculator, revision, created_at: created }) => html`<tr key=${name}><th scope="row">${name}</th><td>${titleOf(calculators, calculator)}</td><td class="number">${revision}</td><td>${created ? moment(created) : ''}</td>
+          <tbody>${models.map(({ name, calculator, revision, created_at: created }) => html`<tr key=${name}><th scope="row">${name}</th><td>${titleOf(calculators, calculator)}</td><td class="number">${revision}</td><td class="when">${created ? moment(created) : ''}</td>
             <td class="actions"><a class="button" href=${`#/${calculator}?model=${name}`}>${t('use_model')}<span class="hidden"> ${name}</span></a>
               <button type="button" onClick=${() => fetchDocument(name)}>JSON<span class="hidden"> ${name}</span></button>
               <button type="button" onClick=${() => drop(name)}>${t('delete')}<span class="hidden"> ${name}</span></button></td></tr>`)}</tbody></table></div>`}

@@ -2,7 +2,7 @@
 // that it spans.
 import { html } from './lib.js';
 import { t, number, unitSymbol } from './text.js';
-import { extent, valueAt } from './scale.js';
+import { extent, valueAt, cellAt } from './scale.js';
 import { role } from './draw.js';
 import { colouring } from './palette.js';
 
@@ -20,8 +20,16 @@ export function readDigits(value, span) {
   return number(value, Math.min(8, Math.max(3, Math.ceil(Math.log10(size / span)) + 4)));
 }
 
+/** The outer edges of the first and the last cell of a map. */
+const edges = (x, isLog) => {
+  if (x.length < 2) return x;
+  const [low, high] = [x[0] - (x[1] - x[0]) / 2, x.at(-1) + (x.at(-1) - x.at(-2)) / 2];
+  return [isLog && low <= 0 ? x[0] : low, high];
+};
+
 export function abscissae(figure) {
-  return figure.panels.flatMap(panel => panel.items.flatMap(item => (item.kind === 'glyph' ? [] : item.x)));
+  const isLog = figure.x.scale === 'logarithmic';
+  return figure.panels.flatMap(panel => panel.items.flatMap(item => (item.kind === 'glyph' ? [] : item.kind === 'heat_map' ? edges(item.x, isLog) : item.x)));
 }
 
 export function ordinates(panel, view) {
@@ -53,7 +61,7 @@ export function ordinates(panel, view) {
 }
 
 /** Name of the axis and of each curve, with its value at the cursor. */
-export function Head({ panel, ghost, style, hidden, toggle, at, factor, span, polar }) {
+export function Head({ panel, ghost, style, hidden, toggle, at, over = null, factor, span, polar }) {
   const seen = new Set();
   const named = panel.items.filter(item => item.name && !seen.has(item.name) && seen.add(item.name));
   const value = (source, item) => {
@@ -80,7 +88,7 @@ export function Head({ panel, ghost, style, hidden, toggle, at, factor, span, po
           ${now !== null && html`<output>${now}${before !== null && html`<small> (${before})</small>`}</output>`}
         </button>`;
       })}
-      ${map && html`<${Key} item=${map} />`}
+      ${map && html`<${Key} item=${map} now=${at !== null && over !== null ? cellAt(map, at, over) : null} />`}
     </div>`;
 }
 
@@ -96,12 +104,12 @@ function Swatch({ item, look }) {
 }
 
 /** The colours of a map with their numbers. */
-function Key({ item }) {
+function Key({ item, now }) {
   const { steps, low, high } = colouring(item);
   return html`
-    <span class="key"><span>${axisName(item.value)}</span><span class="key-end">${number(low, 3)}</span>
+    <span class="key"><span>${axisName(item.value)}</span><output>${now === null ? '' : `= ${number(now, 3)}`}</output><span class="key-scale"><span class="key-end">${number(low, 3)}</span>
       <svg width="120" height="12" viewBox="0 0 120 12" aria-hidden="true">${steps.map((colour, index) => html`<rect x=${(index * 120) / steps.length} width=${120 / steps.length + 0.4} height="12" fill=${`rgb(${colour})`} />`)}</svg>
-      <span class="key-end">${number(high, 3)}</span></span>`;
+      <span class="key-end">${number(high, 3)}</span></span></span>`;
 }
 
 /** A panel in words, for those who cannot see it. */

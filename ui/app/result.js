@@ -4,7 +4,16 @@ import { t, number, unitSymbol, unitOf, plural, moment } from './text.js';
 import * as api from './api.js';
 import { Picture, differenceOf } from './figure.js';
 import { resolve, humanised, labelOf, wordOf } from './schema.js';
+import { spreadOf, spreadColumns, withSpread } from './digits.js';
+import { canReplay, Replay } from './replay.js';
+import { canTrade, spanOf, TradeOff } from './tradeoff.js';
+import { hasClamp, ClampBars } from './clamp.js';
+import { hasCauses, Causes } from './cause.js';
 
+/** The curve above a schedule leaves room for it. */
+const TRADE_HEIGHT = 260;
+/** More warnings than these are folded. */
+const FEW_WARNINGS = 3;
 /** Rows of a table shown at once. */
 const TABLE_ROWS = 200;
 
@@ -19,7 +28,7 @@ export function save(blob, name) {
 }
 
 /** The height that the panels of a picture may have: what is left beside titles, names and a first sentence. */
-function usePictureHeight(panels) {
+export function usePictureHeight(panels) {
   const [size, setSize] = useState([innerWidth, innerHeight]);
   useEffect(() => {
     const change = () => setSize([innerWidth, innerHeight]);
@@ -30,20 +39,39 @@ function usePictureHeight(panels) {
   return Math.round(Math.max(240, Math.min(size[1] - around - 34 * panels, 900)));
 }
 
-export function Result({ id, description, answer, problem, running, pinned, pin, job, models, canPick, onPick, stale }) {
+const drawn = figure => figure.panels.flatMap(panel => panel.items).filter(({ kind, x }) => kind !== 'glyph' && x.length > 0);
+/** Pictures of what the job did not ask for are empty: they are not offered. */
+const shownOf = figures => { const some = figures.filter(figure => drawn(figure).length > 0); return some.length > 0 ? some : figures.slice(0, 1); };
+/** Whether a picture shows more than a single point. */
+const isTelling = figure => drawn(figure).some(({ kind, x }) => kind !== 'points' || x.length > 1);
+
+export function Result({ id, description, answer, problem, running, pinned, pin, job, models, pickOf, onApply, study, stale }) {
   const [chosen, setChosen] = useState(null);
   const [difference, setDifference] = useState(false);
+  // An earlier state of the same run, in place of its end.
+  const [earlier, setEarlier] = useState(null);
+  const [factor, setFactor] = useState(1);
+  // A point that is being dragged.
+  const [grabbed, setGrabbed] = useState(null);
+  useEffect(() => { setEarlier(null); setFactor(1); setGrabbed(null); }, [answer?.key]);
   const interim = running?.interim;
-  const figures = answer?.figures || [];
-  const figure = interim || figures.find(({ id: name }) => name === chosen) || figures[0];
+  const figures = shownOf(answer?.figures || []);
+  const figure = interim || figures.find(({ id: name }) => name === chosen) || figures.find(isTelling) || figures[0];
   const height = usePictureHeight(figure?.panels.length || 1);
   if (!answer && !interim) {
     return html`<div class="empty">${problem || running ? '' : html`<p class="late">${t('first_answer')}</p>`}</div>`;
   }
   const twin = pinned && !interim && pinned.key !== answer?.key ? pinned.figures.find(({ id: name }) => name === figure?.id) : null;
   const subtracted = twin && difference ? differenceOf(figure, twin) : null;
-  const picks = figure && !interim && !subtracted ? canPick(figure) : null;
   const body = answer?.answer;
+  const isOwn = figure && body && !interim && !subtracted;
+  const picks = isOwn ? pickOf(figure, body.result) : null;
+  const replays = isOwn && canReplay(id, figure, body.result);
+  const trades = isOwn && canTrade(id, figure, answer.job);
+  const pick = (x, y) => { const next = picks.jobAt(x, y); if (next) onApply(next); };
+  const held = ([low, high], value) => Math.min(Math.max(value, low), high);
+  const handle = trades ? { x: factor, onMove: x => setFactor(Number(held(spanOf(figure), x).toPrecision(4))), onDrop: () => {} }
+    : picks?.at ? { x: (grabbed || picks.at)[0], y: (grabbed || picks.at)[1], onMove: (x, y) => setGrabbed([x, y]), onDrop: (x, y) => { setGrabbed(null); pick(x, y); } } : null;
   const [first, ...others] = body?.explanation || [];
   return html`
     <div class=${`result ${stale ? 'stale' : ''}`}>
@@ -53,16 +81,20 @@ export function Result({ id, description, answer, problem, running, pinned, pin,
         </div>`}
       <div class="picture-and-words">
         <div class="picture-box">
-          ${figure ? html`<${Picture} key=${figure.id} figure=${subtracted && subtracted.panels.length ? subtracted : figure} pinned=${subtracted ? null : twin} height=${height} main onPick=${picks ? (x, y) => onPick(figure, x, y) : null} />`
+          ${figure ? html`<${Picture} key=${figure.id} figure=${subtracted && subtracted.panels.length ? subtracted : (replays && earlier) || figure} pinned=${subtracted ? null : twin} height=${trades ? Math.min(height, TRADE_HEIGHT) : height} main onPick=${picks ? pick : null} handle=${handle} />`
             : html`<p class="quiet">${t('no_figure')}</p>`}
+          ${replays && html`<${Replay} key=${answer.key} id=${id} answer=${body} job=${answer.job} figures=${figures} onShow=${setEarlier} />`}
+          ${trades && html`<${TradeOff} key=${answer.key} ...${{ id, figure, factor, setFactor, figures }} answer=${body} job=${answer.job} schema=${description.input_schema} apply=${onApply} />`}
           ${stale && html`<p class="stale-note" role="status">${t('stale_note')}</p>`}
-          ${picks && html`<p class="quiet hint">${t('click_to_try')}</p>`}
+          ${picks && html`<p class="quiet hint">${picks.hint}</p>`}
           ${interim && html`<p class="quiet hint">${t('so_far')}</p>`}
         </div>
         ${body && html`
         <div class="words">
           ${first && html`<p class="verdict" aria-live="polite">${first.text}</p>`}
-          ${body.warnings.length > 0 && html`<ul class="warnings" aria-label=${t('warnings')}>${body.warnings.map(({ code, detail, pointer }) => html`<li key=${code + pointer}><span class="sign" aria-hidden="true">!</span><span>${capital(detail)}</span></li>`)}</ul>`}
+          <${Warnings} key=${answer.key} list=${body.warnings} />
+          ${hasClamp(id, body.result) && html`<${ClampBars} result=${body.result} input=${body.input} schema=${description.output_schema} />`}
+          ${hasCauses(id, body.result) && html`<${Causes} result=${body.result} schema=${description.input_schema} unit=${unitSymbol(figures.find(one => one.id === 'residuals')?.panels[0]?.y.unit)} />`}
           ${others.length > 0 && html`<ul class="explanation">${others.map(({ code, text }, index) => html`<li key=${code + index}>${text}</li>`)}</ul>`}
         </div>`}
       </div>
@@ -72,6 +104,7 @@ export function Result({ id, description, answer, problem, running, pinned, pin,
           ${pinned && (pinned.key === answer.key ? html`<span class="quiet">${t('pinned_same')}</span>` : html`
             <label><input type="checkbox" checked=${difference} onChange=${event => setDifference(event.currentTarget.checked)} /> ${t('draw_difference')}</label>
             <a href=${`#/${id}?result=${pinned.key}`}>${t('open_pinned')}</a>`)}
+          ${study && html`<a class="button" id="vary" href=${study}>${t('vary_fields')}</a>`}
           <${Downloads} ...${{ id, description, answer, figure }} />
         </div>
         ${id === 'diagnosis' && models && html`<${SaveModel} resultKey=${answer.key} />`}
@@ -80,11 +113,20 @@ export function Result({ id, description, answer, problem, running, pinned, pin,
     </div>`;
 }
 
-/** Names of fields keep their small letters. */
-const capital = text => (/^[a-z]+_/.test(text) ? text : text.charAt(0).toUpperCase() + text.slice(1));
-const short = text => { const head = text.split(/[:;,(–]/)[0].trim(); return head.length > 34 ? `${head.slice(0, 32)}…` : head; };
+/** Warnings; of many the first few until all are asked for. */
+export function Warnings({ list }) {
+  const [whole, setWhole] = useState(list.length <= FEW_WARNINGS + 1);
+  if (list.length === 0) return null;
+  return html`
+    <ul class="warnings" aria-label=${t('warnings')}>${(whole ? list : list.slice(0, FEW_WARNINGS)).map(({ code, detail, pointer }, index) => html`<li key=${code + pointer + index}><span class="sign" aria-hidden="true">!</span><span>${capital(detail)}</span></li>`)}</ul>
+    ${!whole && html`<button type="button" class="more" onClick=${() => setWhole(true)}>${t('and_more', { count: list.length - FEW_WARNINGS })}</button>`}`;
+}
 
-function Downloads({ id, description, answer, figure }) {
+/** Names of fields keep their small letters. */
+export const capital = text => (/^[a-z]+_/.test(text) ? text : text.charAt(0).toUpperCase() + text.slice(1));
+export const short = text => { const head = text.split(/[:;,(–]/)[0].trim(); return head.length > 34 ? `${head.slice(0, 32)}…` : head; };
+
+export function Downloads({ id, description, answer, figure }) {
   const [trouble, setTrouble] = useState(null);
   const name = `${id}-${answer.key.slice(3, 11)}`;
   const get = (accept, ending, query) => async () => {
@@ -130,24 +172,36 @@ function Tabs({ id, description, answer, pinned, job }) {
     </div>`;
 }
 
+/** The unit of a number whose unit is a result itself (`as objective_unit says`): that of the nearest field so named. */
+function saidUnit(schema, beside) {
+  const name = /^as (\w+) says$/.exec(schema['x-unit'] || '')?.[1];
+  const found = name && beside.find(object => typeof object[name] === 'string');
+  return found ? unitSymbol(found[name]) : undefined;
+}
+
 /** The single numbers and words of a result, by groups. */
-function flat(schema, value, root, path = [], out = [], names = []) {
+function flat(schema, value, root, path = [], out = [], names = [], spread = null, beside = [{}]) {
   const whole = resolve(schema || {}, root);
   if (value === null || value === undefined || Array.isArray(value)) return out;
   if (typeof value === 'object') {
     const forms = whole.oneOf || whole.anyOf;
     const shape = forms?.map(form => resolve(form, root)).find(form => Object.keys(value).every(name => form.properties?.[name])) || whole;
-    for (const [name, part] of Object.entries(value)) flat(shape.properties?.[name], part, root, [...path, name], out, [...names, labelOf(name, resolve(shape.properties?.[name] || {}, root))]);
+    for (const [name, part] of Object.entries(value)) flat(shape.properties?.[name], part, root, [...path, name], out, [...names, labelOf(name, resolve(shape.properties?.[name] || {}, root))], spread, [value, ...beside]);
     return out;
   }
-  out.push({ path, value, unit: unitOf(whole), description: whole.description, schema: whole, label: labelOf(path.at(-1), whole), group: names.slice(0, -1).join(' · ') });
+  out.push({ path, value, spread: spread?.(path), unit: saidUnit(whole, beside) ?? unitOf(whole), description: whole.description, schema: whole, label: labelOf(path.at(-1), whole), group: names.slice(0, -1).join(' · ') });
   return out;
 }
 
 const shownValue = (value, schema) => (typeof value === 'number' ? number(value, 5) : value === true ? t('yes') : value === false ? t('no') : schema?.enum ? wordOf(schema, value) : String(value));
 
 function Values({ schema, result, pinned }) {
-  const rows = useMemo(() => flat(schema, result, schema), [schema, result]);
+  const rows = useMemo(() => {
+    const all = flat(schema, result, schema, [], [], [], path => spreadOf(result, path));
+    // An uncertainty stands behind its number, not once more in a line of its own.
+    const said = new Set(all.filter(({ spread, value }) => spread && typeof value === 'number').map(({ spread }) => spread.path.join('/')));
+    return all.filter(({ path }) => !said.has(path.join('/')));
+  }, [schema, result]);
   const before = pinned ? new Map(flat(schema, pinned, schema).map(row => [row.path.join('/'), row.value])) : null;
   const groups = [...new Set(rows.map(({ group }) => group))];
   return html`
@@ -157,7 +211,7 @@ function Values({ schema, result, pinned }) {
         <thead class=${before ? '' : 'hidden'}><tr><th scope="col">${t('name')}</th><th scope="col">${t('value')}</th>${before && html`<th scope="col">${t('pinned_value')}</th><th scope="col">${t('difference')}</th>`}<th scope="col">${t('unit')}</th></tr></thead>
         <tbody>${rows.filter(row => row.group === group).map(row => {
           const other = before?.get(row.path.join('/'));
-          return html`<tr key=${row.path.join('/')}><th scope="row" title=${row.description}>${row.label}</th><td>${shownValue(row.value, row.schema)}</td>
+          return html`<tr key=${row.path.join('/')}><th scope="row" title=${row.description}>${row.label}</th><td>${row.spread ? withSpread(row.value, row.spread.spread) : shownValue(row.value, row.schema)}</td>
             ${before && html`<td>${other === undefined ? '' : shownValue(other, row.schema)}</td><td>${typeof other === 'number' && typeof row.value === 'number' ? `${row.value > other ? '+' : ''}${number(row.value - other, 3)}` : ''}</td>`}
             <td class="unit">${row.unit}</td></tr>`;
         })}</tbody>
@@ -180,13 +234,15 @@ function Tables({ answerKey, id, labels }) {
   if (tables.length === 0) return html`<p class="quiet">${t('no_table')}</p>`;
   const table = tables[Math.min(chosen, tables.length - 1)];
   const count = Math.max(0, ...table.columns.map(({ cells }) => cells.length));
+  const spreads = spreadColumns(table.columns);
+  const cell = (value, spread) => (value === null || value === undefined ? '' : typeof value !== 'number' ? humanised(String(value)) : spread ? withSpread(value, spread, false) : number(value, 6));
   return html`
     <div class="bar">${tables.length > 1 && html`<label>${t('table')} <select value=${chosen} onChange=${event => { setChosen(Number(event.currentTarget.value)); setRows(TABLE_ROWS); }}>${tables.map(({ id: name }, index) => html`<option value=${index}>${titled(name)}</option>`)}</select></label>`}
       <span class="quiet">${plural('rows', count)}</span>
       <button type="button" onClick=${async () => save(await api.file(answerKey, 'text/csv', `?table=${table.id}`), `${id}-${table.id}.csv`)}>CSV</button></div>
     <div class="grid-scroll tall" tabindex="0" role="region" aria-label=${titled(table.id)}><table class="grid still">
       <thead><tr>${table.columns.map(({ text, unit }) => html`<th scope="col">${capital(text)} <span class="unit">${unitSymbol(unit)}</span></th>`)}</tr></thead>
-      <tbody>${Array.from({ length: Math.min(rows, count) }, (_, row) => html`<tr key=${row}>${table.columns.map(({ cells, unit }) => html`<td class=${unit === '' ? 'word' : ''}>${cells[row] === null || cells[row] === undefined ? '' : typeof cells[row] === 'number' ? number(cells[row], 6) : humanised(String(cells[row]))}</td>`)}</tr>`)}</tbody>
+      <tbody>${Array.from({ length: Math.min(rows, count) }, (_, row) => html`<tr key=${row}>${table.columns.map(({ cells, unit }, at) => html`<td class=${unit === '' ? 'word' : ''}>${cell(cells[row], spreads[at]?.[row])}</td>`)}</tr>`)}</tbody>
     </table></div>
     ${count > rows && html`<button type="button" class="more" onClick=${() => setRows(rows + 1000)}>${t('more_rows', { count: count - rows })}</button>`}`;
 }
@@ -215,14 +271,14 @@ function Basis({ body, description }) {
     </dl>`;
 }
 
-function RequestView({ id, job, answer }) {
+export function RequestView({ id, job, answer, link = `#/${id}?result=${answer.key}` }) {
   const text = JSON.stringify(job, null, 2);
   const line = `curl -sS ${location.origin}/v1/${id} -H 'Content-Type: application/json' -d '${JSON.stringify(job).replace(/'/g, "'\\''")}'`;
   const short_ = line.length > 20000 ? `${line.slice(0, 2000)} …` : line;
   return html`
     <p>${t('curl_line')}</p><div class="code-box"><${Copy} text=${line} /><pre class="wrapped" tabindex="0" aria-label=${t('curl_line')}>${short_}</pre></div>
     <p>${t('job_json')}</p><div class="code-box"><${Copy} text=${text} /><pre tabindex="0" aria-label=${t('job_json')}>${text.slice(0, 40000)}</pre></div>
-    <p>${t('kept_under')} <a href=${`#/${id}?result=${answer.key}`}>${t('share_link')}</a></p>`;
+    <p>${t('kept_under')} <a href=${link}>${t('share_link')}</a></p>`;
 }
 
 function Copy({ text }) {

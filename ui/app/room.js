@@ -1,10 +1,12 @@
 // The page of one calculator or evaluation: the form, the picture that follows it, and the state in the URL.
 import { html, useState, useEffect, useRef, useMemo, useCallback, debounced } from './lib.js';
-import { t, duration, language } from './text.js';
+import { t, language } from './text.js';
 import * as api from './api.js';
 import { Form, goTo } from './form.js';
 import { Result } from './result.js';
-import { resolve, kindOf, stem, difference, changed, parts } from './schema.js';
+import { difference, changed, parts } from './schema.js';
+import { pickOf } from './pick.js';
+import { Progress, Trouble } from './status.js';
 
 /** Longer addresses name the kept result instead of the changes. */
 const LONGEST_QUERY = 1600;
@@ -18,7 +20,7 @@ const LONGEST_PAUSE_MS = 15000;
 const OWN = ['example', 'result', 'run', 'pin', 'model'];
 
 /** The job that an address stands for. */
-async function jobOf(description, query) {
+export async function jobOf(description, query) {
   const key = query.get('result');
   if (key) {
     const kept = await api.jobOf(key);
@@ -50,20 +52,8 @@ function queryOf({ base, baseName }, job, key, run, pin) {
 /** Slashes of pointers are legible in an address. */
 const written = query => query.toString().replace(/%2F/g, '/').replace(/%3A/g, ':');
 
-/** Fields of the job that the axes of a figure show: `[pointer of x, pointer of y]`, to be set by a click. */
-function fieldsOfAxes(figure, schema, job) {
-  if (!figure || figure.frame !== 'stacked' || figure.panels.length !== 1) return null;
-  const leaves = [];
-  const walk = (part, value, path) => {
-    const whole = resolve(part, schema);
-    if (kindOf(whole) === 'object') for (const [name, inner] of Object.entries(whole.properties)) walk(inner, value?.[name], [...path, name]);
-    else if (kindOf(whole) === 'number' && typeof value === 'number') leaves.push({ path, unit: whole['x-unit'], stem: stem(path.at(-1), whole['x-unit']), schema: whole });
-  };
-  walk(schema, job, []);
-  const find = axis => leaves.find(({ unit, stem: name }) => unit === axis.unit && (name === axis.label || axis.label.startsWith(`${name}_`)));
-  const [x, y] = [find(figure.x), find(figure.panels[0].y)];
-  return x && y && x !== y ? [x, y] : null;
-}
+/** The last state of each calculator's page, by its id: what a study of it begins with. */
+export const lastQuery = new Map();
 
 export function Room({ id, query, replace, push, models, refreshJobs }) {
   const [description, setDescription] = useState(null);
@@ -91,6 +81,7 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
   const tell = useCallback((job, key, run, how) => {
     if (how === 'replace' && isUnwritten.current) return;
     const next = written(queryOf(now.current.state, job, key, run, now.current.pinned?.key));
+    lastQuery.set(id, next);
     if (next === ownQuery.current) return;
     ownQuery.current = next;
     (how === 'push' ? push : replace)(next);
@@ -277,15 +268,8 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
     }
     tell(state.job, answer?.key, running?.id, 'replace');
   };
-  const onPick = (figure, x, y) => {
-    const axes = fieldsOfAxes(figure, description.input_schema, state.job);
-    if (!axes) return;
-    const round = (value, schema) => (schema.type === 'integer' ? Math.round(value) : Number(value.toPrecision(3)));
-    let job = changed(state.job, axes[0].path, round(x, axes[0].schema));
-    job = changed(job, axes[1].path, round(y, axes[1].schema));
-    change(job, 'run');
-  };
-  const canPick = figure => fieldsOfAxes(figure, description.input_schema, state.job);
+  const picking = (figure, result) => pickOf(id, figure, description.input_schema, state.job, result);
+  const study = answer && `#/studies?calculator=${id}&${written(queryOf(state, state.job, answer.key))}`;
   const faults = problem?.errors || [];
   const isBusy = pending || running;
   return html`
@@ -302,7 +286,7 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
             ${state.baseName.result && html`<option value="">${t('kept_result')}</option>`}
             ${description.examples.map(({ id: name, title: text }) => html`<option value=${name}>${text}</option>`)}
           </select>
-          <button type="button" class=${`primary ${waiting ? 'calling' : ''}`} onClick=${() => { runLater.cancel(); run(state.job); }} title="Ctrl+Enter">${waiting ? t('run_changed') : t('run')}</button>
+          <button type="button" class=${`primary ${waiting ? 'calling' : ''}`} onClick=${() => { runLater.cancel(); setPane('picture'); run(state.job); }} title="Ctrl+Enter">${waiting ? t('run_changed') : t('run')}</button>
         </div>
         <${Form} key=${`${id} ${asked.includes('result=') ? 'kept' : state.baseName.example}`} schema=${description.input_schema} value=${state.job} filled=${answer?.answer.input} onChange=${change} errors=${faults} examples=${description.jobs} libraries=${libraries} calculator=${id} models=${models} />
       </section>
@@ -311,7 +295,7 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
         <header class="room-head"><h1>${description.question}</h1><p class="summary">${description.title}</p></header>
         ${running && html`<${Progress} running=${running} stop=${stop} />`}
         ${problem && html`<${Trouble} problem=${problem} onGo=${place => { setPane('form'); setTimeout(() => goTo(place), 30); }} />`}
-        <${Result} ...${{ id, description, answer, problem, running, pinned, pin, job: state.job, models, canPick, onPick, stale: Boolean(answer && (problem || waiting)) }} />
+        <${Result} ...${{ id, description, answer, problem, running, pinned, pin, job: state.job, models, study, pickOf: picking, onApply: next => change(next, 'run'), stale: Boolean(answer && (problem || waiting)) }} />
       </section>
     </main>`;
 }
@@ -320,32 +304,3 @@ async function pinOf(key) {
   const [answer, figures] = await Promise.all([api.result(key), api.figures(key)]);
   return { key, answer, figures };
 }
-
-/** How far a job is, and a way to stop it. */
-function Progress({ running, stop }) {
-  const [isStopping, setStopping] = useState(false);
-  const share = Math.round(100 * (running.progress || 0));
-  return html`
-    <div class="progress-box" role="group" aria-label=${t('job_progress')}>
-      <div class="progress-text"><span><strong>${t(`state_${running.state}`)}</strong>${running.stage ? ` – ${running.stage}` : ''}</span>
-        <span>${share} %${running.remaining_ms ? ` · ${t('time_left', { time: duration(running.remaining_ms) })}` : ''}</span></div>
-      <progress max="100" value=${share} aria-label=${t('job_progress')}></progress>
-      <div class="actions"><button type="button" id="cancel-job" disabled=${isStopping} onClick=${() => { setStopping(true); stop(); }}>${t('cancel_job')}</button><a href="#/jobs">${t('all_jobs')}</a></div>
-    </div>`;
-}
-
-/** What is wrong: the service's words, and the way to each field. */
-function Trouble({ problem, onGo }) {
-  const errors = problem.errors || [];
-  return html`
-    <div class="problem" role="alert">
-      <p><strong>${problem.title}</strong></p>
-      ${problem.detail && errors.length === 0 && html`<p>${capital(problem.detail)}</p>`}
-      ${errors.length > 0 && html`<ul>${errors.map(({ pointer: place, detail }) => html`<li key=${place + detail}>
-        ${place ? html`<button type="button" class="link" onClick=${() => onGo(place)}><code>${place}</code></button> ` : ''}${detail}</li>`)}</ul>`}
-      ${problem.code && problem.type && html`<p class="quiet"><a href=${problem.type} target="_blank" rel="noopener">${t('what_it_means')}</a></p>`}
-    </div>`;
-}
-
-/** Names of fields keep their small letters. */
-const capital = text => (/^[a-z]+_/.test(text) ? text : text.charAt(0).toUpperCase() + text.slice(1));

@@ -125,3 +125,15 @@ export function valueAt(xs, ys, x, isLine = true) {
   const share = xs[index + 1] === xs[index] ? 0 : (x - xs[index]) / (xs[index + 1] - xs[index]);
   return a + share * (b - a);
 }
+
+/** The number of a map at a place; `null` outside it and where it is blank. */
+export function cellAt(item, x, y) {
+  const index = (list, value) => {
+    const near = list.reduce((best, middle, at) => (Math.abs(middle - value) < Math.abs(list[best] - value) ? at : best), 0);
+    const [before, after] = [list[near] - (list[near - 1] ?? list[near]), (list[near + 1] ?? list[near]) - list[near]];
+    const reach = Math.max(before, after) * 0.501;
+    return list.length === 1 || Math.abs(list[near] - value) <= reach ? near : -1;
+  };
+  const [column, row] = [index(item.x, x), index(item.y, y)];
+  return column < 0 || row < 0 ? null : item.values[row * item.x.length + column];
+}

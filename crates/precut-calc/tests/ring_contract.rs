@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
 use crate::ring_support::{codes, faults, run, try_run};
-use precut_calc::calculator::{Calculator, Failure};
+use precut_calc::calculator::{Calculator, Failure, Glyph, Item};
 use precut_calc::ring_roundness::{Outcome, RingRoundness};
 use serde_json::{Value, json};
 
@@ -338,6 +338,44 @@ fn search_says_what_is_out_of_reach_and_what_would_help() {
     });
     let found = run(&job).output.roundness_um.unwrap();
     assert!((found - best.roundness_um).abs() < 1e-9, "{found} {best:?}");
+}
+
+/// The end of the cut is a step of the surface: cut on one side, a revolution older on the other. It is there that the
+/// picture has to draw the tool, also where the ring stops after a part of a revolution and whichever way it turns.
+#[test]
+fn the_tool_is_drawn_at_the_step_where_the_cut_ends() {
+    // Opposite to a support: elsewhere lobes grow, with steps of their own.
+    for (rotation, x_mm) in [("counter_clockwise", 100.0), ("clockwise", -100.0)] {
+        for revolutions in [70.0, 70.3, 70.85] {
+            let job = json!({
+                "ring": { "radius_mm": 150 },
+                "supports": { "distance_mm": 200, "depth_mm": 111 },
+                "tool": { "x_mm": x_mm, "y_mm": 113.5, "feed_mm_per_rev": 0.02, "revolutions": revolutions },
+                "rotation": rotation,
+                "profile_points": 3600
+            });
+            let outcome = run(&job).output;
+            let profile = &outcome.simulation.as_ref().unwrap().profile;
+            let radii = &profile.end_radius_mm;
+            let jump = |i: usize| (radii[(i + 1) % radii.len()] - radii[i]).abs();
+            let step = (0..radii.len()).max_by(|a, b| jump(*a).total_cmp(&jump(*b))).unwrap();
+            let figures = RingRoundness::figures(&serde_json::from_value(job).unwrap(), &outcome);
+            let tools: Vec<(f64, f64)> = figures[0].panels[0]
+                .items
+                .iter()
+                .filter_map(|item| match item {
+                    Item::Glyph { glyph: Glyph::Tool, x, y } => Some((*x, *y)),
+                    _ => None,
+                })
+                .collect();
+            let [(x, y)] = tools[..] else { panic!("{tools:?}") };
+            let apart = (x - profile.angle_deg[step] + 180.0).rem_euclid(360.0) - 180.0;
+            // The profile has a point every 0.1 degrees; the step lies between two of them.
+            assert!(apart.abs() < 0.25, "{rotation} {x_mm} {revolutions}: {apart} deg off");
+            let near = (0..radii.len()).filter(|i| (profile.angle_deg[*i] - x).abs() < 0.11);
+            assert!(near.into_iter().any(|i| (profile.end_deviation_um[i] - y).abs() < 1e-9), "{x} {y}");
+        }
+    }
 }
 
 mod any {

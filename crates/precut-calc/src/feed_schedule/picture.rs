@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use crate::calculator::{Axis, Column, Figure, Frame, Glyph, Item, Message, Panel, Role, Table};
 use crate::shaft::Support;
 
-use super::input::Job;
+use super::input::{Job, Zone};
 use super::output::{Outcome, ZoneOutcome};
 use super::toolpath::path_table;
 
@@ -23,6 +23,7 @@ pub(super) const LABEL_CODES: &[&str] = &[
     "feed",
     "cutting_speed",
     "radial_deflection",
+    "height_of_roughness",
     "limit_gain",
     "scheduled_feed",
     "constant_feed",
@@ -30,6 +31,8 @@ pub(super) const LABEL_CODES: &[&str] = &[
     "scheduled_speed",
     "zone_deflection",
     "deflection_limit",
+    "zone_roughness",
+    "roughness_limit",
     "schedule_figure",
     "trade_off_figure",
     "zones_found_figure",
@@ -54,6 +57,9 @@ pub(super) fn figures(job: &Job, outcome: &Outcome) -> Vec<Figure> {
     let mut panels = vec![outline(job, outcome, 0.8), feeds(outcome, 1.0), speeds(outcome, 0.6)];
     if outcome.zones.iter().any(|zone| zone.deflection_um.is_some()) {
         panels.push(deflections(job, outcome, 0.9));
+    }
+    if outcome.zones.iter().any(|zone| zone.roughness_um.is_some()) {
+        panels.push(roughnesses(job, outcome, 0.7));
     }
     panels.push(bindings(outcome, 0.9));
     let stacked = |id, title, x, panels| Figure { id, title: Message::new(title), frame: Frame::Stacked, x, panels };
@@ -169,19 +175,27 @@ fn speeds(outcome: &Outcome, height: f64) -> Panel {
     Panel { y: Axis::linear("cutting_speed", "m/min"), height, items }
 }
 
+/// The zone of the job that a zone of the answer lies in.
+fn own_zone<'j>(job: &'j Job, zone: &ZoneOutcome) -> Option<&'j Zone> {
+    job.zones.iter().find(|own| own.z_start_mm <= zone.z_start_mm + 1e-6 && own.z_end_mm >= zone.z_end_mm - 1e-6)
+}
+
 fn deflections(job: &Job, outcome: &Outcome, height: f64) -> Panel {
     let zones = shown(outcome);
-    let limit_of = |zone: &ZoneOutcome| {
-        job.zones
-            .iter()
-            .find(|own| own.z_start_mm <= zone.z_start_mm + 1e-6 && own.z_end_mm >= zone.z_end_mm - 1e-6)
-            .and_then(|own| own.deflection_max_um)
-    };
-    let (x, y) = steps(&zones, limit_of);
+    let (x, y) = steps(&zones, |zone| own_zone(job, zone)?.deflection_max_um);
     let mut items = vec![Item::Line { name: "deflection_limit", x, y, role: Role::Limit }];
     let (x, y) = steps(&zones, |zone| zone.deflection_um);
     items.push(Item::Line { name: "zone_deflection", x, y, role: Role::After });
     Panel { y: Axis::linear("radial_deflection", "um"), height, items }
+}
+
+fn roughnesses(job: &Job, outcome: &Outcome, height: f64) -> Panel {
+    let zones = shown(outcome);
+    let (x, y) = steps(&zones, |zone| own_zone(job, zone)?.roughness_max_um);
+    let mut items = vec![Item::Line { name: "roughness_limit", x, y, role: Role::Limit }];
+    let (x, y) = steps(&zones, |zone| zone.roughness_um);
+    items.push(Item::Line { name: "zone_roughness", x, y, role: Role::After });
+    Panel { y: Axis::linear("height_of_roughness", "um"), height, items }
 }
 
 /// What kind of limit a name stands for.

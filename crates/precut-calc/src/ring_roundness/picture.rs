@@ -1,9 +1,12 @@
 //! Figures and tables of an answer. What the job does not ask for leaves its figure without curves.
 
-use crate::calculator::{Axis, Column, Figure, Frame, Item, Message, Panel, Role, Table};
+use crate::calculator::{Axis, Column, Figure, Frame, Glyph, Item, Message, Panel, Role, Table};
 
 use super::input::Job;
-use super::output::{HistoryColumns, MapOutcome, Outcome, ProfileColumns, SimulationOutcome, SpectrumColumns};
+use super::output::{
+    HistoryColumns, MapOutcome, Outcome, ProfileColumns, SettingOutcome, SimulationOutcome, SpectrumColumns,
+};
+use super::scene::Scene;
 
 pub(super) const FIGURE_IDS: &[&str] = &["polar", "profile", "history", "spectrum", "map", "search"];
 pub(super) const TABLE_IDS: &[&str] =
@@ -79,7 +82,13 @@ pub(super) fn figures(job: &Job, outcome: &Outcome) -> Vec<Figure> {
     let simulation = outcome.simulation.as_ref();
     let figure = |id, title, frame, x, panels| Figure { id, title: Message::new(title), frame, x, panels };
     vec![
-        figure("polar", "ring_polar", Frame::Polar, Axis::linear("body_angle", "deg"), vec![polar(simulation)]),
+        figure(
+            "polar",
+            "ring_polar",
+            Frame::Polar,
+            Axis::linear("body_angle", "deg"),
+            vec![polar(job, simulation, &outcome.setting)],
+        ),
         figure(
             "profile",
             "ring_profile",
@@ -106,7 +115,7 @@ pub(super) fn figures(job: &Job, outcome: &Outcome) -> Vec<Figure> {
     ]
 }
 
-fn polar(simulation: Option<&SimulationOutcome>) -> Panel {
+fn polar(job: &Job, simulation: Option<&SimulationOutcome>, setting: &SettingOutcome) -> Panel {
     let mut items = Vec::new();
     if let Some(simulation) = simulation
         && let Some(end) = &simulation.end
@@ -118,11 +127,28 @@ fn polar(simulation: Option<&SimulationOutcome>) -> Panel {
         }
         items.push(closed("ring_after", &profile.angle_deg, &profile.end_deviation_um, Role::After));
         items.push(closed("ring_after_filtered", &profile.angle_deg, &profile.end_filtered_um, Role::Plain));
+        items.extend(contacts(job, profile, setting));
     } else if let Some(simulation) = simulation {
         let profile = &simulation.profile;
         items.push(closed("ring_before", &profile.angle_deg, &profile.start_deviation_um, Role::Before));
     }
     Panel { y: Axis::linear("deviation", "um"), height: 1.0, items }
+}
+
+/// Tool and supports where they touch the ring as it stops, in the frame of the body.
+fn contacts(job: &Job, profile: &ProfileColumns, setting: &SettingOutcome) -> Vec<Item> {
+    let scene = Scene::of(job, &job.effects);
+    let turns = (scene.setting.revolutions + scene.setting.spark_out_revolutions) * (1.0 - scene.setting.motion.slip);
+    let sense = if scene.mirrored { -1.0 } else { 1.0 };
+    let half = setting.support_half_angle_deg;
+    [(Glyph::SteadyRest, 270.0 - half), (Glyph::SteadyRest, 270.0 + half), (Glyph::Tool, setting.tool_angle_deg)]
+        .into_iter()
+        .filter_map(|(glyph, in_space)| {
+            let x = (in_space - sense * 360.0 * turns.fract()).rem_euclid(360.0);
+            let nearest = profile.angle_deg.iter().rposition(|angle| *angle <= x)?;
+            Some(Item::Glyph { glyph, x, y: *profile.end_deviation_um.get(nearest)? })
+        })
+        .collect()
 }
 
 fn unrolled(profile: Option<&ProfileColumns>) -> Vec<Panel> {

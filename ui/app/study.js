@@ -1,0 +1,333 @@
+// Parameter studies: one to three fields of a calculator's job are varied, every point an answer of its own.
+import { html, useState, useEffect, useRef, useMemo } from './lib.js';
+import { t, number, typed, parsed, unitSymbol, plural, language } from './text.js';
+import * as api from './api.js';
+import { jobOf, lastQuery } from './room.js';
+import { Progress, Trouble } from './status.js';
+import { Picture } from './figure.js';
+import { Downloads, RequestView, Warnings, usePictureHeight, short, capital } from './result.js';
+import { parts } from './schema.js';
+import { leavesOf, outputsOf, proposed, pointsOf, relabelled } from './vary.js';
+
+const MOST_VARIED = 3;
+const ROWS_SHOWN = 100;
+/** Words of the address that belong to the study, not to the job. */
+const OWN = ['calculator', 'vary', 'combine', 'outputs', 'study', 'run'];
+/** What the list of downloads wants to know of a calculator. */
+const DECLARED = { media_types: ['application/json', 'text/csv', 'image/svg+xml'] };
+
+const read = (query, name, otherwise) => {
+  try { return query.get(name) ? JSON.parse(query.get(name)) : otherwise; } catch { return otherwise; }
+};
+const jobPart = query => new URLSearchParams([...query].filter(([name]) => !OWN.includes(name) && name !== 'pin'));
+const written = query => query.toString().replace(/%2F/g, '/').replace(/%3A/g, ':').replace(/%2C/g, ',');
+
+/** The page: which calculator and which job, then what is made of them. */
+export function Study({ calculators, query, push, replace, refreshJobs }) {
+  const [opened, setOpened] = useState(null);
+  const [missing, setMissing] = useState(null);
+  // The address as this page wrote it: what it says is shown already.
+  const own = useRef(null);
+  const kept = query.get('study');
+  const run = query.get('run');
+  const part = written(jobPart(query));
+  const asked = written(query);
+  const spoken = language();
+  useEffect(() => {
+    let gone = false;
+    const isOwn = own.current === asked && opened;
+    if (isOwn && opened.spoken === spoken) return undefined;
+    (async () => {
+      try {
+        if (isOwn) {
+          const description = await api.calculator(opened.description.id);
+          if (!gone) setOpened({ ...opened, description, spoken });
+          return;
+        }
+        // A kept study brings its job with it; a running one was put down by the page that started it.
+        const stored = kept ? (await api.jobOf(kept)).job : run ? storedRun(run) : null;
+        const description = await api.calculator(stored?.calculator || query.get('calculator') || calculators[0].id);
+        const job = stored ? stored.job : (await jobOf(description, new URLSearchParams(part))).job;
+        if (gone) return;
+        own.current = asked;
+        setOpened({ description, job, stored, part, spoken, query, serial: (opened?.serial ?? 0) + 1 });
+        setMissing(null);
+      } catch (error) { if (!gone) setMissing(error); }
+    })();
+    return () => { gone = true; };
+  }, [asked, spoken]);
+  const tell = next => { own.current = next; replace(next); };
+  const choose = id => push(`calculator=${id}${lastQuery.get(id) ? `&${written(jobPart(new URLSearchParams(lastQuery.get(id))))}` : ''}`);
+  if (missing) return html`<main class="plain" id="main" tabindex="-1"><h1>${missing.problem?.title || t('trouble_title')}</h1><p>${missing.problem?.detail || missing.message}</p><p><a href="#/studies" onClick=${() => setMissing(null)}>${t('start_over')}</a></p></main>`;
+  if (!opened) return html`<main class="plain quiet-start" id="main" tabindex="-1"><p>${t('loading')}</p></main>`;
+  return html`<${Board} key=${opened.serial} ...${{ ...opened, calculators, choose, tell, refreshJobs }} />`;
+}
+
+const storedRun = id => {
+  try { return JSON.parse(sessionStorage.getItem(`precut-run-${id}`)); } catch { return null; }
+};
+
+function Board({ description, job, stored, part, query, calculators, choose, tell: write, refreshJobs }) {
+  const leaves = useMemo(() => leavesOf(description.input_schema, job), [description, job]);
+  const outputs = useMemo(() => outputsOf(description.output_schema, description.study_outputs), [description]);
+  const [vary, setVary] = useState(() => stored?.vary || read(query, 'vary', null) || proposed(leaves).map(({ range }) => range));
+  const [combine, setCombine] = useState(() => stored?.combine || query.get('combine') || 'grid');
+  const [wished, setWished] = useState(() => stored?.outputs || read(query, 'outputs', null) || description.study_outputs);
+  const [answer, setAnswer] = useState(null);
+  const [problem, setProblem] = useState(null);
+  const [running, setRunning] = useState(null);
+  const [pending, setPending] = useState(false);
+  const [pane, setPane] = useState('picture');
+  const control = useRef(null);
+  const stop = useRef(null);
+  useEffect(() => () => { control.current?.abort(); stop.current?.(); }, []);
+  const body = { calculator: description.id, job, vary, ...(vary.length > 1 && { combine }), outputs: wished };
+  const tell = extra => write(written(new URLSearchParams([['calculator', description.id], ...new URLSearchParams(part), ['vary', JSON.stringify(vary)], ...(vary.length > 1 ? [['combine', combine]] : []), ...(wished.join() === description.study_outputs.join() ? [] : [['outputs', JSON.stringify(wished)]]), ...extra])));
+
+  const fail = error => {
+    if (error.name === 'AbortError') return;
+    setPending(false);
+    setRunning(null);
+    if (error instanceof api.Refused) setProblem(error.problem);
+    else setProblem({ title: t('offline_title'), detail: error.message, code: 'offline' });
+  };
+  const show = async (key, whole, asked) => {
+    const [result, figures] = await Promise.all([whole ?? api.result(key, control.current?.signal), api.figures(key, control.current?.signal)]);
+    setAnswer({ key, answer: result, figures, asked });
+    setPending(false);
+    setProblem(null);
+  };
+  const watch = (record, asked) => {
+    setRunning({ ...record, interim: null });
+    refreshJobs();
+    stop.current = api.follow(record.id, {
+      onState: next => setRunning(old => (old?.id === next.id ? { ...old, ...next } : old)),
+      onProgress: progress => setRunning(old => old && { ...old, ...progress }),
+      onInterim: interim => setRunning(old => old && { ...old, interim }),
+      onTrouble: fail,
+      onDone: async done => {
+        refreshJobs();
+        setRunning(null);
+        try {
+          if (done.state === 'succeeded' && !asked) location.hash = `#/studies?study=${done.key}`;
+          else if (done.state === 'succeeded') { await show(done.key, null, asked); tell([['study', done.key]]); } else { setPending(false); setProblem(done.problem || { title: t(`state_${done.state}`), code: done.state }); }
+        } catch (error) { fail(error); }
+      },
+    });
+  };
+  const start = async event => {
+    event?.preventDefault();
+    control.current?.abort();
+    stop.current?.();
+    if (running) api.cancel(running.id).catch(() => {});
+    control.current = new AbortController();
+    const { signal } = control.current;
+    setPending(true);
+    setProblem(null);
+    setRunning(null);
+    setPane('picture');
+    try {
+      const { answer: whole, job: record } = await api.solve('studies', body, { signal });
+      if (signal.aborted) return;
+      if (record) {
+        try { sessionStorage.setItem(`precut-run-${record.id}`, JSON.stringify(body)); } catch { /* a reload then begins anew */ }
+        tell([['run', record.id]]);
+        watch(record, body);
+      } else { await show(whole.key, whole, body); tell([['study', whole.key]]); }
+    } catch (error) { fail(error); }
+  };
+  // A study of the address: kept, or on its way.
+  useEffect(() => {
+    control.current = new AbortController();
+    const [kept, run] = [query.get('study'), query.get('run')];
+    if (kept) { setPending(true); show(kept, null, stored).catch(fail); }
+    else if (run) {
+      setPending(true);
+      api.job(run).then(record => {
+        if (['queued', 'running', 'succeeded'].includes(record.state)) watch(record, stored);
+        else { setPending(false); setProblem(record.problem || { title: t(`state_${record.state}`), code: record.state }); }
+      }, fail);
+    }
+  }, []);
+  // The words of the service in another language.
+  const spoken = useRef(language());
+  useEffect(() => {
+    if (spoken.current === language()) return;
+    spoken.current = language();
+    if (answer) show(answer.key, null, answer.asked).catch(fail);
+  }, [language()]);
+
+  const faults = problem?.errors || [];
+  const below = place => faults.filter(fault => fault.pointer === place || fault.pointer?.startsWith(`${place}/`));
+  const points = pointsOf(vary, combine);
+  const go = place => {
+    setPane('form');
+    const index = /^\/vary\/(\d+)/.exec(place)?.[1];
+    setTimeout(() => document.getElementById(index === undefined ? 'study-calculator' : `vary-${index}`)?.focus(), 30);
+  };
+  // A kept study has no page of its job, but its points have.
+  const ofPoint = answer?.answer.result.rows.find(({ status }) => status === 'succeeded')?.key;
+  const page = !stored ? `#/${description.id}${part ? `?${part}` : ''}` : ofPoint && `#/${description.id}?result=${ofPoint}`;
+  return html`
+    <main class="room" data-pane=${pane} id="main" tabindex="-1">
+      <div class="pane-switch" role="group" aria-label=${t('panes')}>
+        <button type="button" aria-pressed=${pane === 'form'} onClick=${() => setPane('form')}>${t('inputs')}${faults.length > 0 && html` <span class="badge">${faults.length}</span>`}</button>
+        <button type="button" aria-pressed=${pane === 'picture'} onClick=${() => setPane('picture')}>${t('result')}</button>
+      </div>
+      <section class="form-pane" aria-label=${t('inputs')}>
+        <h1 class="hidden narrow-title">${t('study_question')}</h1>
+        <div class="form-head">
+          <label for="study-calculator">${t('calculator')}</label>
+          <select id="study-calculator" value=${description.id} onChange=${event => choose(event.currentTarget.value)}>${calculators.map(({ id, title }) => html`<option value=${id}>${title}</option>`)}</select>
+          <button type="button" id="run-study" class="primary" onClick=${start} disabled=${vary.length === 0} title="Ctrl+Enter">${t('run')}</button>
+        </div>
+        <form class="form study-form" onSubmit=${start} novalidate aria-label=${t('inputs')}>
+          <div class="sections">
+            <section class="fold open"><div class="fold-body study-part">
+              <p>${stored ? t('job_of_study') : t('job_of_page')} ${page && html`<a href=${page}>${t('change_job')}</a>`}</p>
+            </div></section>
+            <section class="fold open"><div class="fold-head"><h2 class="study-head">${t('varied')}</h2></div><div class="fold-body study-part">
+              ${vary.map((variable, index) => html`<${Varied} key=${index} ...${{ index, variable, leaves, taken: vary.map(one => one.pointer), faults: below(`/vary/${index}`) }}
+                set=${next => setVary(vary.map((one, other) => (other === index ? next : one)))} remove=${vary.length > 1 ? () => setVary(vary.filter((_, other) => other !== index)) : null} />`)}
+              ${vary.length < Math.min(MOST_VARIED, leaves.length) && html`<button type="button" class="more" id="add-varied" onClick=${() => setVary([...vary, proposed(leaves, vary.map(one => one.pointer))[0].range])}>${t('vary_another')}</button>`}
+              ${vary.length > 1 && html`<div class="study-field"><label for="combine">${t('combine')}</label><select id="combine" value=${combine} onChange=${event => setCombine(event.currentTarget.value)}><option value="grid">${t('combine_grid')}</option><option value="zip">${t('combine_zip')}</option></select></div>`}
+              <p class="quiet" id="study-points">${plural('points', points)}</p>
+              ${faults.filter(({ pointer: place }) => place === '/vary').map(({ detail }) => html`<p class="fault"><span>${capital(detail)}</span></p>`)}
+            </div></section>
+            <section class="fold open"><div class="fold-head"><h2 class="study-head">${t('read_off')}</h2></div><div class="fold-body study-part">
+              <div class="ticks" id="study-outputs">${outputs.map(output => html`<label key=${output.pointer} title=${output.description}><input type="checkbox" checked=${wished.includes(output.pointer)} onChange=${event => setWished(event.currentTarget.checked ? [...wished, output.pointer] : wished.filter(one => one !== output.pointer))} /> ${output.label} <span class="unit">${output.unit}</span></label>`)}</div>
+              ${below('/outputs').map(({ detail }) => html`<p class="fault"><span>${capital(detail)}</span></p>`)}
+            </div></section>
+          </div>
+          <div class="help" aria-hidden="true"><p class="quiet">${t('study_hint')}</p></div>
+        </form>
+      </section>
+      <section class="result-pane" aria-label=${t('result')} aria-busy=${pending || running ? 'true' : 'false'}>
+        <div class=${`work-line ${pending && !running ? 'on' : ''}`} aria-hidden="true"></div>
+        <header class="room-head"><h1>${t('study_question')}</h1><p class="summary">${description.title}</p></header>
+        ${running && html`<${Progress} running=${running} stop=${() => api.cancel(running.id).catch(fail)} />`}
+        ${problem && html`<${Trouble} problem=${problem} onGo=${go} />`}
+        ${!answer && !running?.interim ? html`<div class="empty">${problem || running ? '' : html`<p>${pending ? t('first_answer') : t('study_empty')}</p>`}</div>`
+          : html`<${Findings} ...${{ answer, interim: running?.interim, asked: body, leaves, outputs, calculator: description.id }} stale=${Boolean(answer && JSON.stringify(answer.asked) !== JSON.stringify(body) && !stored)} />`}
+      </section>
+    </main>`;
+}
+
+/** One field and its values: a range, or a list. */
+function Varied({ index, variable, leaves, taken, faults, set, remove }) {
+  const leaf = leaves.find(one => one.pointer === variable.pointer);
+  const isList = Boolean(variable.values);
+  const [draft, setDraft] = useState({});
+  const groups = [...new Set(leaves.map(({ group }) => group))];
+  const pick = place => { setDraft({}); set(proposed(leaves.filter(one => one.pointer === place))[0].range); };
+  const take = (name, text) => {
+    setDraft({ ...draft, [name]: text });
+    const value = parsed(text);
+    if (value !== null && !Number.isNaN(value)) set({ ...variable, [name]: value });
+  };
+  const takeList = text => {
+    setDraft({ ...draft, values: text });
+    const words = text.split(leaf?.kind === 'number' ? /[;\s]+/ : /[;,\s]+/).filter(Boolean);
+    const values = leaf?.kind === 'number' ? words.map(parsed) : leaf?.kind === 'boolean' ? words.map(word => word === 'true') : words;
+    if (values.length > 0 && !values.some(Number.isNaN)) set({ pointer: variable.pointer, values });
+  };
+  const id = name => `vary-${index}-${name}`;
+  const field = (name, label) => html`<label class="study-field">${label}<input id=${id(name)} type="text" inputmode="decimal" autocomplete="off" value=${draft[name] ?? typed(variable[name])} aria-invalid=${faults.some(({ pointer: place }) => place.endsWith(`/${name}`)) ? 'true' : undefined} onInput=${event => take(name, event.currentTarget.value)} onBlur=${() => setDraft({})} /></label>`;
+  const range = { pointer: variable.pointer, from: leaf?.range?.from ?? 0, to: leaf?.range?.to ?? 1, count: 5 };
+  return html`
+    <fieldset class="item varied">
+      <legend><span>${t('field')} ${index + 1}</span>${remove && html`<button type="button" class="icon" aria-label=${`${t('remove')}: ${t('field')} ${index + 1}`} onClick=${remove}>×</button>`}</legend>
+      <select id=${`vary-${index}`} aria-label=${`${t('field')} ${index + 1}`} value=${variable.pointer} onChange=${event => pick(event.currentTarget.value)}>
+        ${!leaf && html`<option value=${variable.pointer}>${variable.pointer}</option>`}
+        ${groups.map(group => html`<optgroup label=${group || t('inputs')}>${leaves.filter(one => one.group === group).map(one => html`<option value=${one.pointer} disabled=${one.pointer !== variable.pointer && taken.includes(one.pointer)}>${one.label}${one.unit ? `, ${one.unit}` : ''}</option>`)}</optgroup>`)}
+      </select>
+      ${leaf?.kind === 'number' && html`<div class="study-way" role="group" aria-label=${t('values_of', { name: leaf.label })}>
+        <label><input type="radio" name=${id('way')} checked=${!isList} onChange=${() => { setDraft({}); set(range); }} /> ${t('a_range')}</label>
+        <label><input type="radio" name=${id('way')} checked=${isList} onChange=${() => { setDraft({}); set({ pointer: variable.pointer, values: valuesOf(variable) }); }} /> ${t('a_list')}</label></div>`}
+      ${isList ? html`<input id=${id('values')} type="text" aria-label=${t('values_of', { name: leaf?.label || variable.pointer })} placeholder=${t('numbers_hint')} value=${draft.values ?? variable.values.map(value => (typeof value === 'number' ? typed(value) : String(value))).join('; ')} onInput=${event => takeList(event.currentTarget.value)} onBlur=${() => setDraft({})} />`
+        : html`<div class="study-range">${field('from', t('from'))}${field('to', t('to'))}${field('count', t('how_many'))}
+          <label class="study-field">${t('spacing')}<select id=${id('spacing')} value=${variable.spacing || 'linear'} onChange=${event => set({ ...variable, spacing: event.currentTarget.value })}><option value="linear">${t('spacing_linear')}</option><option value="log">${t('spacing_log')}</option></select></label></div>`}
+      ${leaf && html`<p class="quiet study-now">${t('value_now')} ${typeof leaf.value === 'number' ? number(leaf.value, 6) : leaf.value === undefined ? t('not_set') : String(leaf.value)} ${leaf.unit}</p>`}
+      ${faults.map(({ detail }) => html`<p class="fault" role="alert"><span>${capital(detail)}</span></p>`)}
+    </fieldset>`;
+}
+
+/** A range as the list that it stands for, to begin with. */
+function valuesOf({ from, to, count, spacing }) {
+  const number_ = Math.min(Math.max(count || 2, 2), 50);
+  const share = index => index / (number_ - 1);
+  return Array.from({ length: number_ }, (_, index) => Number((spacing === 'log' ? from * (to / from) ** share(index) : from + (to - from) * share(index)).toPrecision(6)));
+}
+
+/** What came out: pictures, a sentence, one row per point. */
+function Findings({ answer, interim, asked, leaves, outputs, calculator, stale }) {
+  const [chosen, setChosen] = useState(null);
+  const [picked, setPicked] = useState(null);
+  const result = answer?.answer.result;
+  // What is so far is drawn of the study that was asked.
+  const drawn = interim ? { variables: asked.vary.map(one => ({ pointer: one.pointer, values: one.values || [one.from, one.to] })), outputs: asked.outputs.map(one => ({ pointer: one })) } : result;
+  const all = (interim ? [interim] : answer?.figures || []).map(figure => relabelled(figure, drawn, leaves, outputs));
+  const figure = all.find(({ id }) => id === chosen) || all[0];
+  const isEmpty = figure && !figure.panels.some(panel => panel.items.some(item => (item.values || item.y).some(value => value !== null)));
+  const height = usePictureHeight(figure?.panels.length || 1);
+  const pick = figure?.id === 'map' && result && result.variables.length === 2 ? (x, y) => setPicked(nearestRow(result, x, y)) : null;
+  // The service names fields by their pointers; here they are called as in the forms.
+  const spoken = text => [...leaves, ...outputs].filter(one => text.includes(one.pointer)).sort((a, b) => b.pointer.length - a.pointer.length)
+    .reduce((words, one) => words.split(one.pointer).join(lowered(one.label)), text);
+  const [first, ...others] = (answer?.answer.explanation || []).map(one => ({ ...one, text: spoken(one.text) }));
+  return html`
+    <div class=${`result ${stale ? 'stale' : ''}`}>
+      ${all.length > 1 && html`<div class="figure-choice" role="group" aria-label=${t('figures')}>${all.map(({ id, title }) => html`<button type="button" key=${id} aria-pressed=${figure.id === id} onClick=${() => setChosen(id)}>${id === 'map' ? t('study_map') : id === 'curves' ? t('study_curves') : short(title.text)}</button>`)}</div>`}
+      <div class="picture-and-words">
+        <div class="picture-box">
+          ${figure && !isEmpty ? html`<${Picture} key=${figure.id} figure=${figure} height=${height} onPick=${pick} main />` : html`<p class="quiet">${t('no_figure')}</p>`}
+          ${stale && html`<p class="stale-note" role="status">${t('stale_note')}</p>`}
+          ${interim && html`<p class="quiet hint">${t('so_far')}</p>`}
+          ${pick && !isEmpty && picked === null && html`<p class="quiet hint">${t('click_for_row')}</p>`}
+          ${result && picked !== null && html`<${Point} result=${result} index=${picked} calculator=${calculator} />`}
+        </div>
+        ${result && html`<div class="words">
+          ${first && html`<p class="verdict" aria-live="polite">${capital(first.text)}</p>`}
+          <${Warnings} key=${answer.key} list=${answer.answer.warnings} />
+          <ul class="explanation">${others.map(({ code, text }, index) => html`<li key=${code + index}>${text}</li>`)}</ul>
+        </div>`}
+      </div>
+      ${result && html`
+        <div class="bar"><span class="quiet">${plural('points', result.points)}${result.failed > 0 ? `, ${t('without_answer', { count: result.failed })}` : ''}</span><${Downloads} id="studies" description=${DECLARED} answer=${answer} figure=${figure} /></div>
+        <${Rows} ...${{ result, leaves, outputs, calculator, picked }} />
+        ${answer.asked && html`<details class="tabs request"><summary>${t('tab_request')}</summary><div><${RequestView} id="studies" job=${answer.asked} answer=${answer} link=${`#/studies?study=${answer.key}`} /></div></details>`}`}
+    </div>`;
+}
+
+/** As inside a sentence; abbreviations keep their capitals. */
+const lowered = label => label.split(' · ').map(part => (/^[^\s]?[A-ZА-Я]/.test(part.slice(1)) ? part : part.charAt(0).toLowerCase() + part.slice(1))).join(' · ');
+
+/** Why a point has no answer. */
+const WHY = { invalid: 'why_invalid', infeasible: 'why_infeasible', out_of_model: 'why_out_of_model', not_converged: 'why_not_converged', failed: 'why_failed' };
+const shownSetting = value => (typeof value === 'number' ? number(value, 6) : value === true ? t('yes') : value === false ? t('no') : String(value));
+const nearestRow = ({ variables, rows }, x, y) => {
+  const near = (list, value) => list.reduce((best, one) => (Math.abs(one - value) < Math.abs(best - value) ? one : best));
+  const [a, b] = [near(variables[0].values, x), near(variables[1].values, y)];
+  return rows.findIndex(({ values }) => values[0] === a && values[1] === b);
+};
+
+function Point({ result, index, calculator }) {
+  const row = result.rows[index];
+  if (!row) return null;
+  return html`<p class="hint" role="status">${t('row')} ${index + 1}: ${row.values.map(shownSetting).join('; ')} → ${row.status === 'succeeded' ? row.outputs.map(value => number(value, 5)).join('; ') : capital(row.detail || row.code)} ${row.key && row.status === 'succeeded' && html`<a href=${`#/${calculator}?result=${row.key}`}>${t('open_point')}</a>`}</p>`;
+}
+
+/** One row per point; what has no answer says why. */
+function Rows({ result, leaves, outputs, calculator, picked }) {
+  const [shown, setShown] = useState(ROWS_SHOWN);
+  const { variables, outputs: read_, rows } = result;
+  const named = (list, place) => list.find(one => one.pointer === place)?.label || capital(parts(place).join(' ').replace(/_/g, ' '));
+  return html`
+    <div class="grid-scroll tall tabs" tabindex="0" role="region" aria-label=${t('table')}><table class="grid still study-rows">
+      <thead><tr>${variables.map(({ pointer: place, unit }) => html`<th scope="col">${named(leaves, place)} <span class="unit">${unitSymbol(unit)}</span></th>`)}${read_.map(({ pointer: place, unit }) => html`<th scope="col">${named(outputs, place)} <span class="unit">${unitSymbol(unit)}</span></th>`)}<th><span class="hidden">${t('actions')}</span></th></tr></thead>
+      <tbody>${rows.slice(0, shown).map((row, index) => html`<tr key=${index} class=${index === picked ? 'picked' : ''}>${row.values.map(value => html`<td>${shownSetting(value)}</td>`)}
+        ${row.status === 'succeeded' ? row.outputs.map(value => html`<td>${value === null ? '' : number(value, 5)}</td>`) : html`<td class="word reason" colspan=${read_.length}><span class="state failed">${t(WHY[row.status])}</span> ${capital(row.detail || row.code || '')}</td>`}
+        <td>${row.key && row.status === 'succeeded' ? html`<a href=${`#/${calculator}?result=${row.key}`}>${t('open_point')}<span class="hidden"> ${index + 1}</span></a>` : ''}</td></tr>`)}</tbody>
+    </table></div>
+    ${rows.length > shown && html`<button type="button" class="more" onClick=${() => setShown(shown + 1000)}>${t('more_rows', { count: rows.length - shown })}</button>`}`;
+}
