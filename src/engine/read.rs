@@ -50,7 +50,7 @@ pub(crate) fn read_with(
     let mut job = json::parse(job)?;
     let misfit = given.and_then(|given| model::impose(models.registry, entry, &mut job, given));
     if let Some(misfit) = misfit {
-        return Err(Found { total: 1, findings: vec![misfit] }.with_rules(entry, &job));
+        return Err(Found::of(vec![misfit]).with_rules(entry, &job));
     }
     let names_a_model = model::named(models.registry, entry, &mut job).is_some();
     let of_model = model::extend(models, entry, &mut job);
@@ -71,7 +71,7 @@ fn read_extended(
 ) -> Result<Ready, Error> {
     match check_schema(entry, &mut job, parts) {
         Ok(()) if of_model.is_empty() => prepared(entry, &job),
-        Ok(()) => Err(Found { total: of_model.len(), findings: of_model, unread: Vec::new() }.with_rules(entry, &job)),
+        Ok(()) => Err(Found::of(of_model).with_rules(entry, &job)),
         Err(found) => Err(found.and(of_model).with_rules(entry, &job)),
     }
 }
@@ -111,6 +111,10 @@ struct Found {
 }
 
 impl Found {
+    fn of(findings: Vec<Finding>) -> Self {
+        Self { total: findings.len(), findings, unread: Vec::new() }
+    }
+
     /// With more; the first fault at a place is enough.
     fn and(mut self, more: Vec<Finding>) -> Self {
         for finding in more {
