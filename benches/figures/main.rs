@@ -6,6 +6,7 @@
 //! same bytes, measured in turns in the same run. Nothing fails here: the table is for reading.
 
 mod deflection;
+mod diagnosis;
 mod feed;
 mod fitting;
 mod fixture;

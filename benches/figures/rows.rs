@@ -7,6 +7,7 @@ use precut_calc::calculator::{
 
 use crate::Row;
 use crate::deflection;
+use crate::diagnosis;
 use crate::feed;
 use crate::fitting;
 use crate::fixture;
@@ -127,6 +128,13 @@ pub(crate) fn all() -> Vec<Row> {
             None,
             None,
             fixture::search,
+        ),
+        row(
+            "diagnosis of deflection, 500 points, all causes and pairs, held out, CPU of all cores",
+            Unit::Time,
+            us(300_000.0),
+            us(100_000.0),
+            || diagnosis::deflection(100),
         ),
         row("CSV, 10,000 rows of 8 numbers", Unit::Time, None, None, csv),
         row("G-code, 10,000 cuts", Unit::Time, None, None, gcode),

@@ -9,9 +9,9 @@ use serde::Deserialize;
 use serde::de::IgnoredAny;
 use serde_json::json;
 
-use super::{Failed, JobArgs, SolveArgs, print, print_json};
-use crate::engine::{Body, Error, STUDIES, SyntaxFault, check_now, solve_now};
-use crate::http::{Media, written};
+use super::{Failed, JobArgs, SolveArgs, entry, print, print_json};
+use crate::engine::{Body, Error, ModelFile, STUDIES, SyntaxFault, TablePart, check_with, solve_with};
+use crate::http::{Media, Problem, written};
 use crate::registry::{Entry, Registry};
 use crate::text::Language;
 
@@ -41,13 +41,13 @@ impl From<Form> for Media {
 
 /// `precut solve`
 pub(super) fn solve(arguments: &SolveArgs, registry: &Registry, language: Language) -> Result<(), Failed> {
-    let (calculator, body) = read(&arguments.job)?;
+    let (calculator, body, model) = read(&arguments.job, registry)?;
     let part = match arguments.format {
         Form::Csv => arguments.table.as_deref(),
         Form::Svg => arguments.figure.as_deref(),
         Form::Json | Form::Gcode => None,
     };
-    let stored = solve_now(registry, &calculator, body, &Unwatched)?;
+    let stored = solve_with(registry, &calculator, body, model.as_ref(), &Unwatched)?;
     let bytes = written(&stored, arguments.format.into(), part, language)?;
     match &arguments.output {
         Some(path) => std::fs::write(path, &bytes).map_err(|error| Failed::Machine(named(path, &error))),
@@ -58,8 +58,8 @@ pub(super) fn solve(arguments: &SolveArgs, registry: &Registry, language: Langua
 
 /// `precut check`
 pub(super) fn check(arguments: &JobArgs, registry: &Registry) -> Result<(), Failed> {
-    let (calculator, body) = read(arguments)?;
-    let checked = check_now(registry, &calculator, body)?;
+    let (calculator, body, model) = read(arguments, registry)?;
+    let checked = check_with(registry, &calculator, body, model.as_ref())?;
     print_json(&json!({
         "calculator": calculator,
         "key": checked.key.to_string(),
@@ -88,8 +88,8 @@ pub(super) fn example(entry: &Entry, id: Option<&str>, bare: bool) -> Result<(),
     }
 }
 
-/// The calculator's name and the job's bytes.
-fn read(arguments: &JobArgs) -> Result<(String, Body), Failed> {
+/// The calculator's name, the job with its tables, and the model that it takes.
+fn read(arguments: &JobArgs, registry: &Registry) -> Result<(String, Body, Option<ModelFile>), Failed> {
     let bytes = if arguments.file.as_os_str() == "-" {
         if io::stdin().is_terminal() {
             eprintln!("reading the job from standard input; end it with Ctrl-D");
@@ -104,7 +104,48 @@ fn read(arguments: &JobArgs) -> Result<(String, Body), Failed> {
         Some(calculator) => (calculator.clone(), bytes.into()),
         None => job_file(bytes)?,
     };
-    Ok((calculator, Body::Json(job)))
+    let model = arguments.model.as_ref().map(|path| model_file(path, registry)).transpose()?;
+    if arguments.data.is_empty() {
+        return Ok((calculator, Body::Json(job), model));
+    }
+    let names = entry(registry, &calculator)?.table_names();
+    let tables = arguments.data.iter().map(|given| table(given, &calculator, &names)).collect::<Result<_, _>>()?;
+    Ok((calculator, Body::Parts { job, tables }, model))
+}
+
+/// A model as `GET /v1/models/{name}` gave it.
+fn model_file(path: &Path, registry: &Registry) -> Result<ModelFile, Failed> {
+    let bytes = std::fs::read(path).map_err(|error| Failed::Machine(named(path, &error)))?;
+    Ok(ModelFile::read(registry, &bytes).map_err(Problem::from)?)
+}
+
+/// What was measured stands in this field of a job that has other tables, too.
+const MEASUREMENTS: &str = "measurements";
+
+/// A measured table from `FILE`: the only one of the job, else its measurements; from `FIELD=FILE` any.
+fn table(given: &str, calculator: &str, names: &[String]) -> Result<TablePart, Failed> {
+    let (name, path) = match given.split_once('=').filter(|(name, _)| names.iter().any(|known| is_field(known, name))) {
+        Some((name, path)) => (name.to_owned(), Path::new(path)),
+        None => match names {
+            [only] => (only.clone(), Path::new(given)),
+            [] => return Err(Failed::Usage(format!("a job of {calculator} takes no measured table"))),
+            several if several.iter().any(|known| known == MEASUREMENTS) => (MEASUREMENTS.to_owned(), Path::new(given)),
+            several => {
+                let known = several.join(", ");
+                let example = several[0].as_str();
+                return Err(Failed::Usage(format!(
+                    "a job of {calculator} takes several measured tables ({known}): say which one, as in --data {example}=FILE"
+                )));
+            }
+        },
+    };
+    let text = std::fs::read(path).map_err(|error| Failed::Machine(named(path, &error)))?;
+    Ok(TablePart { name, text: text.into() })
+}
+
+/// Whether the name of a table is this one, or ends with it.
+fn is_field(known: &str, name: &str) -> bool {
+    known == name || known.strip_suffix(name).is_some_and(|rest| rest.ends_with('.'))
 }
 
 /// A job file: a job with its calculator, or a parameter study.

@@ -27,6 +27,8 @@ Examples:
   precut example deflection-compensation          a complete job file, ready to run
   precut example deflection-compensation | precut solve -
   precut solve job.json --format gcode -o shaft.nc
+  precut solve diagnosis.json --data shaft.csv    what was measured, from a file beside the job
+  precut solve job.json --model lathe-7.json      with the causes that a diagnosis found
   precut check job.json                           every fault of a job at once
   precut solve job.json --lang ru                 the same in Russian
   precut example studies | precut solve - --format csv
@@ -120,6 +122,13 @@ struct JobArgs {
     /// The file is the bare job of this calculator
     #[arg(long, short, value_name = "NAME")]
     calculator: Option<String>,
+    /// What was measured, as a CSV file with units in its header, instead of rows in the job; `FIELD=FILE` for another
+    /// table of the job
+    #[arg(long, value_name = "FILE")]
+    data: Vec<String>,
+    /// Stored model that extends the job, as `GET /v1/models/NAME` exported it; the job may name it
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -151,6 +160,8 @@ fn spoken(tag: &str) -> Result<Language, String> {
 enum Failed {
     /// The command line or the job.
     Problem(Problem),
+    /// The command line, in words.
+    Usage(String),
     /// The machine, in words.
     Machine(String),
     /// The reader of our output has gone: nobody is left to tell.
@@ -187,6 +198,10 @@ pub fn main(
         registry().map_err(|error| Failed::Machine(error.to_string())).and_then(|registry| run(cli, &registry));
     match outcome {
         Ok(()) | Err(Failed::NobodyListens) => ExitCode::SUCCESS,
+        Err(Failed::Usage(message)) => {
+            let _ = writeln!(io::stderr(), "precut: {message}");
+            ExitCode::from(2)
+        }
         Err(Failed::Machine(message)) => {
             let _ = writeln!(io::stderr(), "precut: {message}");
             ExitCode::FAILURE

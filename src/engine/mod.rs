@@ -5,6 +5,7 @@
 //! one calculation becomes a job.
 
 mod answer;
+mod compare;
 mod csv_table;
 mod envelope;
 mod error;
@@ -27,10 +28,11 @@ pub use crate::key::{BadKey, ENGINE_VERSION, Key};
 pub use crate::store::OpenError;
 pub use crate::store::jobs::{JobId, JobKind, JobQuery, JobRecord, JobState, Priority};
 pub use answer::{Body, CacheState, Checked, Solved, Stored, TablePart, Timings};
+pub use compare::{ModelComparison, Sides};
 pub use error::{Error, SyntaxFault};
 pub use jobs::{Answered, Ask, Feed, Job};
 pub use model::ModelContent;
-pub use models::{ModelAnswer, ModelError, ModelSource, StoredModel};
+pub use models::{ModelAnswer, ModelError, ModelFile, ModelSource, StoredModel};
 pub use progress::Interim;
 pub use settings::EngineSettings;
 pub use study::STUDIES;
@@ -423,13 +425,47 @@ fn compute(ready: &Ready, monitor: &dyn Monitor) -> Result<Stored, Error> {
 /// [`Engine::check`] without an engine.
 #[allow(clippy::needless_pass_by_value)] // a body is handed over, here as to an engine
 pub fn check_now(registry: &Registry, calculator: &str, body: Body) -> Result<Checked, Error> {
+    check_with(registry, calculator, body, None)
+}
+
+/// The same with a model from a file.
+#[allow(clippy::needless_pass_by_value)]
+pub fn check_with(
+    registry: &Registry,
+    calculator: &str,
+    body: Body,
+    model: Option<&ModelFile>,
+) -> Result<Checked, Error> {
     let entry = entry(registry, calculator)?;
-    guarded(|| read::read(&entry, &body, &Models { registry, found: None })?.into_checked())
+    guarded(|| with_model(registry, &entry, &body, model)?.into_checked())
+}
+
+/// Reads a job without a store: the only model that it can have is that of a file.
+fn with_model(
+    registry: &Registry,
+    entry: &Arc<Entry>,
+    body: &Body,
+    model: Option<&ModelFile>,
+) -> Result<read::Ready, Error> {
+    let found = model.map(|file| model::Found::Model(Box::new(file.kept().clone())));
+    read::read_with(entry, body, &Models { registry, found }, model.map(ModelFile::kept))
 }
 
 /// The answer to a job in this thread, without cache, store or limit of cost: for the command line.
 #[allow(clippy::needless_pass_by_value)]
 pub fn solve_now(registry: &Registry, calculator: &str, body: Body, monitor: &dyn Monitor) -> Result<Stored, Error> {
+    solve_with(registry, calculator, body, None, monitor)
+}
+
+/// The same with a model from a file.
+#[allow(clippy::needless_pass_by_value)]
+pub fn solve_with(
+    registry: &Registry,
+    calculator: &str,
+    body: Body,
+    model: Option<&ModelFile>,
+    monitor: &dyn Monitor,
+) -> Result<Stored, Error> {
     let entry = entry(registry, calculator)?;
-    guarded(|| compute(&read::read(&entry, &body, &Models { registry, found: None })?, monitor))
+    guarded(|| compute(&with_model(registry, &entry, &body, model)?, monitor))
 }

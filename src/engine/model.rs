@@ -123,6 +123,33 @@ pub(crate) fn named(registry: &Registry, entry: &Entry, job: &mut Value) -> Opti
     Some(within(job, &places.model)?.get(MODEL)?.as_str()?.to_owned())
 }
 
+/// Puts the name of a model into a job that names none. A fault where the job names another, or cannot name one.
+pub(crate) fn impose(registry: &Registry, entry: &Entry, job: &mut Value, given: &KeptModel) -> Option<Finding> {
+    let Some(places) = places(registry, entry, job) else {
+        let finding = Finding::new("job_without_model", "").with("name", given.name.clone());
+        return Some(finding.with("calculator", entry.meta().id));
+    };
+    let at = pointer(&places.model, MODEL);
+    // What is no object is the schema's to refuse.
+    let fields = within(job, &places.model)?;
+    match fields.get(MODEL).and_then(Value::as_str) {
+        None => {
+            fields.insert(MODEL.to_owned(), json!(given.name));
+            None
+        }
+        Some(named) => {
+            let same = asked(named).is_some_and(|(name, revision)| {
+                name == given.name && revision.is_none_or(|revision| revision == given.revision)
+            });
+            (!same).then(|| {
+                Finding::new("model_not_given", at)
+                    .with("name", named.to_owned())
+                    .with("given", format!("{}@{}", given.name, given.revision))
+            })
+        }
+    }
+}
+
 /// What may be asked about models while a job is read.
 pub(crate) struct Models<'a> {
     pub(crate) registry: &'a Registry,

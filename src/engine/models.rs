@@ -7,9 +7,10 @@ use precut_calc::calculator::Finding;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
+use super::compare::{self, ModelComparison};
 use super::model::{self, Found, ModelContent};
 use super::{Body, Engine, Error, Inner, Key, Stored, json as read_json};
-use crate::registry::{Entry, Faults, ModelUse, canonical, nearest};
+use crate::registry::{Entry, Faults, ModelUse, Registry, canonical, nearest};
 use crate::store::jobs::JobId;
 use crate::store::models::{KeptModel, NewModel};
 
@@ -142,14 +143,13 @@ impl Engine {
             }
             ModelSource::Job(id) => content_of(&*self.job_result(id).await?, "/from_job")?,
             ModelSource::Exported { content, sha256 } => {
-                let is_whole = sha256.is_none_or(|sha256| sha256 == model::sha256(&content.canonical()));
-                if !is_whole {
+                if !is_whole(&content, sha256.as_deref()) {
                     return Err(ModelError::Invalid(vec![Finding::new("model_damaged", "/sha256")]));
                 }
                 content
             }
         };
-        let findings = inner.faults_of_model(&content);
+        let findings = faults_of_model(&inner.registry, &content);
         if !findings.is_empty() {
             return Err(ModelError::Invalid(findings));
         }
@@ -187,6 +187,11 @@ impl Engine {
             .filter_map(|kept| Some((ModelContent::read(&kept)?, kept)))
             .map(|(c, k)| stored(k, c))
             .collect())
+    }
+
+    /// Two models, each by `name` or `name@revision`, beside each other.
+    pub async fn compare_models(&self, asked: &str, with: &str) -> Result<ModelComparison, ModelError> {
+        compare::compare(&self.model(asked).await?, &self.model(with).await?)
     }
 
     /// Deletes every revision of a model. Jobs that were accepted with it are not touched.
@@ -230,27 +235,71 @@ impl Inner {
         let nearest = nearest(plain, names.iter().map(String::as_str)).map(str::to_owned);
         Ok(ModelError::Unknown { name: name.to_owned(), nearest })
     }
+}
 
-    /// What is wrong with a model: its calculator, or effects that the calculator does not know.
-    fn faults_of_model(&self, content: &ModelContent) -> Vec<Finding> {
-        let entry = self.registry.entry(&content.calculator).filter(|entry| entry.model_use() == ModelUse::OfJob);
-        let Some(entry) = entry else {
-            let known: Vec<String> = self
-                .registry
-                .entries()
-                .iter()
-                .filter(|entry| entry.model_use() == ModelUse::OfJob)
-                .map(|entry| entry.meta().id.to_owned())
-                .collect();
-            let finding = Finding::new("calculator_without_models", "/calculator");
-            return vec![finding.with("name", content.calculator.clone()).with("known", known)];
+/// What is wrong with a model: its calculator, or effects that the calculator does not know.
+fn faults_of_model(registry: &Registry, content: &ModelContent) -> Vec<Finding> {
+    let entry = registry.entry(&content.calculator).filter(|entry| entry.model_use() == ModelUse::OfJob);
+    let Some(entry) = entry else {
+        let known: Vec<String> = registry
+            .entries()
+            .iter()
+            .filter(|entry| entry.model_use() == ModelUse::OfJob)
+            .map(|entry| entry.meta().id.to_owned())
+            .collect();
+        let finding = Finding::new("calculator_without_models", "/calculator");
+        return vec![finding.with("name", content.calculator.clone()).with("known", known)];
+    };
+    if content.effects.is_empty() {
+        return vec![Finding::new("model_without_effects", "/effects")];
+    }
+    let mut faults = Faults::default();
+    entry.validate_effects(&json!(content.effects), &mut faults);
+    faults.listed
+}
+
+/// Whether an exported model is the one that its hash is of.
+fn is_whole(content: &ModelContent, sha256: Option<&str>) -> bool {
+    sha256.is_none_or(|sha256| sha256 == model::sha256(&content.canonical()))
+}
+
+/// A model that was exported, for jobs that are solved without a store.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModelFile(KeptModel);
+
+impl ModelFile {
+    /// What `GET /v1/models/{name}` gave.
+    pub fn read(registry: &Registry, document: &[u8]) -> Result<Self, ModelError> {
+        let refuse = |code, pointer: &str| Err(ModelError::Invalid(vec![Finding::new(code, pointer)]));
+        let ModelSource::Exported { content, sha256 } = ModelSource::read(document)? else {
+            return refuse("model_not_exported", "");
         };
-        if content.effects.is_empty() {
-            return vec![Finding::new("model_without_effects", "/effects")];
+        if !is_whole(&content, sha256.as_deref()) {
+            return refuse("model_damaged", "/sha256");
         }
-        let mut faults = Faults::default();
-        entry.validate_effects(&json!(content.effects), &mut faults);
-        faults.listed
+        let findings = faults_of_model(registry, &content);
+        if !findings.is_empty() {
+            return Err(ModelError::Invalid(findings));
+        }
+        let fields = read_json::parse(document)?;
+        let name = fields["name"].as_str().unwrap_or("exported").to_owned();
+        if !model::is_name(&name) {
+            return Err(ModelError::Invalid(vec![Finding::new("bad_model_name", "/name").with("name", name)]));
+        }
+        let revision = fields["revision"].as_u64().and_then(|revision| u32::try_from(revision).ok()).unwrap_or(1);
+        let text = content.canonical();
+        Ok(Self(KeptModel {
+            name,
+            revision,
+            calculator: content.calculator,
+            sha256: model::sha256(&text),
+            content: text,
+            created_ms: 0,
+        }))
+    }
+
+    pub(super) fn kept(&self) -> &KeptModel {
+        &self.0
     }
 }
 

@@ -217,11 +217,14 @@ fn drawn(figure: &Figure, language: Language) -> String {
 }
 
 /// What a figure calls an axis or a curve. Names that no table of texts has, such as those of a study's variables,
-/// stand in the title's values.
+/// stand in the title's values; names of causes and fields are those of the contract.
 pub(super) fn label(figure: &Figure, code: &str, language: Language) -> String {
     match figure.title.values.get(code) {
         Some(Value::Text(name)) => name.clone().into_owned(),
-        _ => Texts::shared().word(language, "label", code, &Values::new()),
+        _ if Texts::shared().has(language, "label", code) => {
+            Texts::shared().word(language, "label", code, &Values::new())
+        }
+        _ => Glossary::of(language).name(code),
     }
 }
 

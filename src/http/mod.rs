@@ -153,6 +153,7 @@ fn routes(app: &App, health: Router<App>) -> Router<App> {
         .route("/v1/jobs/{id}/result", get(jobs::result))
         .route("/v1/jobs/{id}/events", get(events::follow))
         .route("/v1/models", get(models::list))
+        .route("/v1/models/{name}/comparison", get(models::compare))
         .route("/v1/models/{name}", get(models::read).put(models::store).delete(models::delete))
         .route("/v1/results", get(results::list))
         .route("/v1/results/{key}", get(results::read))

@@ -57,6 +57,9 @@ pub(super) struct ModelLinks {
     /// The newest revision.
     #[schema(example = "/v1/models/lathe-7-winter")]
     newest: String,
+    /// How it differs from another: put the other's name behind it.
+    #[schema(example = "/v1/models/lathe-7-winter@3/comparison?with=")]
+    comparison: String,
     /// The diagnosis that it comes from, while its result is kept; null where it comes from none.
     #[schema(example = "/v1/results/b3:5d41402abc4b2a76b9719d911017c5925d41402abc4b2a76b9719d911017c592")]
     diagnosis: Option<String>,
@@ -116,6 +119,7 @@ fn document(model: StoredModel) -> ModelDocument {
         links: ModelLinks {
             this: format!("/v1/models/{}@{}", model.name, model.revision),
             newest: format!("/v1/models/{}", model.name),
+            comparison: format!("/v1/models/{}@{}/comparison?with=", model.name, model.revision),
             diagnosis: diagnosis.map(|key| format!("/v1/results/{key}")),
         },
         name: model.name,
@@ -163,6 +167,19 @@ pub(super) async fn list(State(app): State<App>, uri: Uri) -> Result<Response, P
 /// `GET /v1/models/{name}`
 pub(super) async fn read(State(app): State<App>, Path(name): Path<String>) -> Result<Response, Problem> {
     Ok(answered(StatusCode::OK, &document(app.engine.model(&name).await?)))
+}
+
+/// The query of a comparison.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CompareQuery {
+    with: String,
+}
+
+/// `GET /v1/models/{name}/comparison`
+pub(super) async fn compare(State(app): State<App>, Path(name): Path<String>, uri: Uri) -> Result<Response, Problem> {
+    let Query(query) = Query::<CompareQuery>::try_from_uri(&uri).map_err(|error| Problem::query(error.body_text()))?;
+    Ok(answered(StatusCode::OK, &app.engine.compare_models(&name, &query.with).await?))
 }
 
 /// `PUT /v1/models/{name}`

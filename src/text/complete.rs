@@ -81,6 +81,7 @@ const LATIN: &[&str] = &[
     // Values of fields, and an example of a name.
     "around",
     "common",
+    "quadratic",
     "If-None-Match",
     "lathe-7",
     "regression",

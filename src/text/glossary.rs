@@ -108,6 +108,25 @@ impl Glossary {
         self.get("word", word).or_else(|| self.get("said", word)).map_or_else(|| word.replace('_', " "), str::to_owned)
     }
 
+    /// What a value of a choice or a field is called where it stands alone: its word, else the field's label.
+    pub(crate) fn name(&self, code: &str) -> String {
+        let own = self.get("word", code).or_else(|| self.get("said", code)).map(capitalised);
+        own.unwrap_or_else(|| self.label("", code, None))
+    }
+
+    /// The same within a sentence.
+    pub(crate) fn name_within(&self, code: &str) -> String {
+        let name = self.name(code);
+        let mut letters = name.chars();
+        match (letters.next(), letters.next()) {
+            // An abbreviation or a name keeps its capitals.
+            (Some(first), Some(second)) if second.is_lowercase() => {
+                first.to_lowercase().chain([second]).chain(letters).collect()
+            }
+            _ => name,
+        }
+    }
+
     /// A part of a form.
     pub(crate) fn group(&self, group: &str) -> String {
         self.get("group", group).map_or_else(|| capitalised(&group.replace('_', " ")), str::to_owned)

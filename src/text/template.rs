@@ -1,5 +1,6 @@
 //! What templates may do with their values, each in the language of the template.
 
+use minijinja::value::ValueKind;
 use minijinja::{Environment, Error, State, UndefinedBehavior, Value};
 
 use super::glossary::Glossary;
@@ -29,6 +30,12 @@ pub(super) fn environment() -> Environment<'static> {
     environment.add_filter("unit", |state: &State<'_, '_>, unit: &str| Glossary::of(language_of(state)).unit(unit));
     environment.add_filter("word", |state: &State<'_, '_>, word: &str| Glossary::of(language_of(state)).word(word));
     environment.add_filter("words", words);
+    environment.add_filter("field", |state: &State<'_, '_>, name: &str| {
+        let said: Vec<String> =
+            name.split(", ").map(|name| Glossary::of(language_of(state)).name_within(name)).collect();
+        said.join(", ")
+    });
+    environment.add_filter("labelled", labelled);
     environment.add_filter("reason", |state: &State<'_, '_>, text: &str| Glossary::of(language_of(state)).reason(text));
     environment.add_filter("list", list);
     environment.add_filter("plural", plural);
@@ -64,14 +71,42 @@ fn list(state: &State<'_, '_>, items: Vec<Value>) -> String {
     said.join(if ambiguous { "; " } else { ", " })
 }
 
-/// Words of the contract in the language of the sentence: one, or several with commas between them.
+/// Words of the contract in the language of the sentence: one, or several with commas between them; a list in the list
+/// is a set, its words with a plus between them and semicolons between the sets.
 #[allow(clippy::needless_pass_by_value)]
 fn words(state: &State<'_, '_>, words: Value) -> Result<String, Error> {
     let glossary = Glossary::of(language_of(state));
     if let Some(word) = words.as_str() {
         return Ok(glossary.word(word));
     }
-    let said: Vec<String> = words.try_iter()?.map(|word| glossary.word(&word.to_string())).collect();
+    let mut said = Vec::new();
+    let mut has_sets = false;
+    for word in words.try_iter()? {
+        has_sets |= word.kind() == ValueKind::Seq;
+        said.push(match word.kind() {
+            ValueKind::Seq => {
+                let own: Vec<String> = word.try_iter()?.map(|word| glossary.word(&word.to_string())).collect();
+                own.join(" + ")
+            }
+            _ => glossary.word(&word.to_string()),
+        });
+    }
+    Ok(said.join(if has_sets { "; " } else { ", " }))
+}
+
+/// Words of the contract, each with its own label in brackets where it has one.
+#[allow(clippy::needless_pass_by_value)]
+fn labelled(state: &State<'_, '_>, words: Value, labels: Value) -> Result<String, Error> {
+    let glossary = Glossary::of(language_of(state));
+    let labels = labels.try_iter()?.map(|label| label.to_string());
+    let said: Vec<String> = words
+        .try_iter()?
+        .zip(labels)
+        .map(|(word, label)| match (glossary.word(&word.to_string()), label.as_str()) {
+            (word, "") => word,
+            (word, label) => format!("{word} ({label})"),
+        })
+        .collect();
     Ok(said.join(", "))
 }
 

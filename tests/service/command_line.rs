@@ -204,3 +204,100 @@ fn the_command_line_speaks_the_language_asked_for() {
     assert_eq!(unknown.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&unknown.stderr).contains("en, ru"));
 }
+
+/// The example of a diagnosis without its rows, and the rows as a table.
+fn diagnosis_and_table() -> (Value, String) {
+    let mut file: Value = serde_json::from_str(&said(&precut(&["example", "diagnosis"]))).unwrap();
+    let rows = file["job"].as_object_mut().unwrap().remove("measurements").unwrap();
+    let mut table = "run;trace;z [mm];diameter_deviation [um]\n".to_owned();
+    for row in rows.as_array().unwrap() {
+        let cell = |name: &str| row[name].to_string().replace('.', ",");
+        let cells = ["run", "trace", "z_mm", "diameter_deviation_um"].map(cell);
+        table.push_str(&format!("{}\n", cells.join(";")));
+    }
+    (file, table)
+}
+
+#[test]
+fn measurements_come_from_a_file_beside_the_job() {
+    let folder = tempfile::tempdir().unwrap();
+    let (file, table) = diagnosis_and_table();
+    let path = folder.path().join("shaft.csv");
+    std::fs::write(&path, table).unwrap();
+    let path = path.to_str().unwrap();
+    let whole = precut(&["example", "diagnosis"]);
+    let expected: Value = serde_json::from_str(&said(&feed_precut(&["check"], &said(&whole)))).unwrap();
+    // The same data give the same key however they came, with the name of the field or without.
+    for data in [path.to_owned(), format!("measurements={path}")] {
+        let output = feed_precut(&["check", "--data", &data], &file.to_string());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let checked: Value = serde_json::from_str(&said(&output)).unwrap();
+        assert_eq!(checked["key"], expected["key"]);
+    }
+    let bare = file["job"].to_string();
+    let solved = feed_precut(&["solve", "--calculator", "diagnosis", "--data", path], &bare);
+    let answer: Value = serde_json::from_str(&said(&solved)).unwrap();
+    assert_eq!(answer["result"]["verdict"], "named");
+    assert_eq!(answer["key"], expected["key"]);
+
+    // Rows in the job and in a file, a file that is not there, a job that takes none.
+    let twice = feed_precut(&["check", "--data", path], &said(&whole));
+    assert_eq!(complaint(&twice)["errors"][0]["code"], "table_given_twice");
+    let absent = feed_precut(&["check", "--data", "/nowhere/shaft.csv"], &file.to_string());
+    assert_eq!(absent.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&absent.stderr).contains("/nowhere/shaft.csv"));
+    let example = said(&precut(&["example", "ring-roundness"]));
+    let none = feed_precut(&["check", "--data", path], &example);
+    assert_eq!(none.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&none.stderr).contains("takes no measured table"), "{none:?}");
+    let example = said(&precut(&["example", "deflection-compensation"]));
+    let several = feed_precut(&["check", "--data", path], &example);
+    assert_eq!(several.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&several.stderr).contains("force.rows"), "{several:?}");
+}
+
+#[test]
+fn an_exported_model_extends_a_job() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("lathe-7.json");
+    let write = |document: &Value| std::fs::write(&path, document.to_string()).unwrap();
+    let model = serde_json::json!({
+        "name": "lathe-7", "revision": 3, "calculator": "deflection-compensation",
+        "effects": [{ "kind": "headstock_compliance", "delta_um_per_n": 0.022 }], "provenance": null
+    });
+    write(&model);
+    let example = said(&precut(&["example", "deflection-compensation"]));
+    let solve = |job: &str| feed_precut(&["solve", "--model", path.to_str().unwrap()], job);
+    let answer: Value = serde_json::from_str(&said(&solve(&example))).unwrap();
+    assert_eq!((&answer["model"]["name"], &answer["model"]["revision"]), (&"lathe-7".into(), &3.into()));
+    assert_eq!(answer["effects"][0]["kind"], "headstock_compliance");
+    assert!(answer["explanation"].as_array().unwrap().iter().any(|said| said["code"] == "model_changed"));
+
+    // A job may name it, any other name is a fault.
+    let naming = |name: &str| {
+        let mut file: Value = serde_json::from_str(&example).unwrap();
+        file["job"]["model"] = name.into();
+        file.to_string()
+    };
+    for name in ["lathe-7", "lathe-7@3"] {
+        let named: Value = serde_json::from_str(&said(&solve(&naming(name)))).unwrap();
+        assert_eq!(named["key"], answer["key"], "{name}");
+    }
+    for name in ["lathe-8", "lathe-7@2"] {
+        let output = solve(&naming(name));
+        assert_eq!(output.status.code(), Some(2));
+        let fault = &complaint(&output)["errors"][0];
+        assert_eq!((&fault["code"], &fault["pointer"]), (&"model_not_given".into(), &"/model".into()), "{name}");
+    }
+    // Of another calculator, damaged, no model at all, a job that takes none.
+    let ring = said(&precut(&["example", "ring-roundness"]));
+    assert_eq!(complaint(&solve(&ring))["errors"][0]["code"], "model_of_another_calculator");
+    let evaluation = said(&precut(&["example", "roundness-evaluation"]));
+    assert_eq!(complaint(&solve(&evaluation))["errors"][0]["code"], "job_without_model");
+    let mut damaged = model.clone();
+    damaged["sha256"] = "0".repeat(64).into();
+    write(&damaged);
+    assert_eq!(complaint(&solve(&example))["errors"][0]["code"], "model_damaged");
+    write(&serde_json::json!({ "from_result": format!("b3:{}", "0".repeat(64)) }));
+    assert_eq!(complaint(&solve(&example))["errors"][0]["code"], "model_not_exported");
+}

@@ -12,6 +12,7 @@ mod events;
 mod jobs;
 mod language;
 mod limits;
+mod models;
 mod negotiation;
 mod process;
 mod results;

@@ -100,9 +100,78 @@ fn figures_and_tables_hold_every_row() {
     let result = answered(&example()).output;
     let tables = Deflection::tables(&job, &result);
     assert_eq!(tables.iter().map(|t| t.id).collect::<Vec<_>>(), Deflection::META.tables);
-    let figures = Deflection::figures(&job, &result);
-    assert_eq!(figures.iter().map(|f| f.id).collect::<Vec<_>>(), Deflection::META.figures);
+    let ids = |job: &Value| -> Vec<&'static str> {
+        let result = answered(job).output;
+        let job: <Deflection as Calculator>::Input = serde_json::from_value(job.clone()).unwrap();
+        Deflection::figures(&job, &result).iter().map(|figure| figure.id).collect()
+    };
+    // What has a name has profiles, what has none a remainder.
+    let declared = |left: &[&str]| -> Vec<&'static str> {
+        Deflection::META.figures.iter().copied().filter(|id| !left.contains(id)).collect()
+    };
+    assert_eq!(ids(&example()), declared(&["remainder", "remainder_spectrum"]));
+    let unknown = serde_json::from_str(DeflectionCompensation::DIAGNOSES[1].job).unwrap();
+    assert_eq!(ids(&unknown), declared(&["profiles"]));
     assert_eq!(result.rows.row.len(), example()["measurements"].as_array().unwrap().len());
+}
+
+#[test]
+fn a_shape_without_a_name_is_drawn_with_its_band_and_its_waves() {
+    let result = answered(&serde_json::from_str(DeflectionCompensation::DIAGNOSES[1].job).unwrap()).output;
+    assert_eq!(result.verdict, VerdictClass::Unknown);
+    let remainder = result.remainder.unwrap();
+    assert_eq!(
+        (remainder.value.len(), remainder.standard_deviation.len()),
+        (result.rows.row.len(), remainder.value.len())
+    );
+    // The guideway is S-shaped over the length of the part, 5 um on the radius: of all waves those of two to four half
+    // waves carry it.
+    let energy = |orders: std::ops::RangeInclusive<u32>| -> f64 {
+        let of = remainder.orders.iter().zip(&remainder.amplitudes);
+        of.filter(|(order, _)| orders.contains(&(order.round() as u32))).map(|(_, a)| a * a).sum()
+    };
+    assert!(energy(1..=4) > 0.8 * energy(0..=24));
+    // Known better than a single row is measured, almost everywhere.
+    assert!(remainder.standard_deviation.iter().all(|sd| *sd > 0.0 && *sd < result.noise.standard_deviation * 2.0));
+}
+
+#[test]
+fn parameters_have_profiles_that_agree_with_their_intervals() {
+    let result = answered(&example()).output;
+    assert_eq!(result.profiles.len(), 1);
+    let (profile, parameter) = (&result.profiles[0], &result.named[0].parameters[0]);
+    assert_eq!((&profile.kind, &profile.parameter), (&result.named[0].kind, &parameter.name));
+    // A compliance acts almost in proportion: the profile is the parabola.
+    assert_eq!(parameter.interval_from.as_deref(), Some("quadratic"));
+    for (x, rise) in profile.deviations.iter().zip(&profile.rise) {
+        assert!((rise - x * x).abs() < 0.2 * x * x + 0.05, "{x} {rise}");
+    }
+    // Measured rows lie in the band about their prediction as often as 95 % promise.
+    let rows = &result.rows;
+    let inside = (0..rows.row.len())
+        .filter(|&i| (rows.measured[i] - rows.extended[i].unwrap()).abs() < 1.96 * rows.extended_deviation[i].unwrap())
+        .count() as f64;
+    // Two binomial standard deviations of the number of rows.
+    let n = rows.row.len() as f64;
+    assert!(inside / n > 0.95 - 2.0 * (0.95 * 0.05 / n).sqrt(), "{inside} of {n}");
+}
+
+/// A set lies as near as one likes to what it extends: only rivals are held against each other.
+#[test]
+fn rivals_are_held_against_each_other_and_not_against_what_extends_them() {
+    let result = answered(&example()).output;
+    let sets: Vec<&Vec<String>> = result.signatures.iter().map(|signature| &signature.causes).collect();
+    assert_eq!(sets[0], &["headstock_compliance"]);
+    for (index, set) in sets.iter().enumerate() {
+        assert!(sets[..index].iter().all(|other| !other.iter().all(|kind| set.contains(kind))), "{set:?}");
+    }
+    assert_eq!(result.separations.len(), sets.len() * (sets.len() - 1) / 2);
+    // Its change is what the extended model does to the prediction.
+    for (change, (base, extended)) in
+        result.signatures[0].change.iter().zip(result.rows.base.iter().zip(&result.rows.extended))
+    {
+        assert!((change - (extended.unwrap() - base.unwrap())).abs() < 1e-9);
+    }
 }
 
 #[test]

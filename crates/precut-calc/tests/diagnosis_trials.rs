@@ -1,81 +1,25 @@
 //! Blind trials of the diagnosis: effects hidden by a generator that shares no code with the calculators.
-//!
-//! On a fixed set of seeds the goals are asserted, two binomial standard deviations below. Other seeds and
-//! sizes: `PRECUT_TRIALS=300 PRECUT_TRIAL_SEED=12345 cargo test --release -p precut-calc diagnosis_trials -- --nocapture`.
-#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, missing_docs)]
+#![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
-use precut_calc::calculator::{Calculator, Check, Unwatched, Violations};
 use precut_calc::deflection_compensation::DeflectionCompensation;
-use precut_calc::diagnosis::{Diagnosis, NamedCause, VerdictClass};
-use precut_trials::score::{Said, Score};
-use precut_trials::{Class, Trial, deflection};
-use serde_json::json;
+use precut_trials::score::Score;
+use precut_trials::{Class, deflection};
 
-fn number(name: &str, default: u64) -> u64 {
-    std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
-}
-
-fn kinds(causes: &[NamedCause]) -> Vec<String> {
-    causes.iter().map(|cause| cause.kind.clone()).collect()
-}
-
-fn answer(trial: &Trial) -> Said {
-    let mut request = trial.request.clone();
-    request["options"] = json!({ "held_out": false });
-    let mut job: <Diagnosis<DeflectionCompensation> as Calculator>::Input = serde_json::from_value(request).unwrap();
-    let mut violations = Violations::default();
-    job.check(&mut violations);
-    assert!(violations.is_empty(), "{:?}", violations.into_vec());
-    Diagnosis::<DeflectionCompensation>::fill(&mut job);
-    let result = Diagnosis::<DeflectionCompensation>::run(&job, &Unwatched).unwrap().output;
-    let covered = trial
-        .truth
-        .causes
-        .iter()
-        .filter_map(|hidden| {
-            let named = result.named.iter().find(|cause| cause.kind == hidden.kind)?;
-            let [low, high] = named.parameters[0].interval_95?;
-            Some((low..=high).contains(&hidden.size))
-        })
-        .collect();
-    let verdict = match result.verdict {
-        VerdictClass::Adequate => "adequate",
-        VerdictClass::Named => "named",
-        VerdictClass::Confounded => "confounded",
-        VerdictClass::Unknown => "unknown",
-        VerdictClass::Refused => "refused",
-    };
-    let first = result.sets.iter().find(|set| !set.causes.is_empty() && !set.with_remainder);
-    Said {
-        verdict: verdict.to_owned(),
-        named: kinds(&result.named),
-        likely: result.likely_sets.iter().map(|set| kinds(&set.causes)).collect(),
-        first: first.map_or_else(Vec::new, |set| kinds(&set.causes)),
-        covered,
-    }
-}
+use crate::blind_trials;
 
 fn score(class: Class, snr: f64, seed: u64, count: u64) -> Score {
-    let mut score = Score::default();
-    for k in 0..count {
-        let trial = deflection::draw(class, snr, seed.wrapping_mul(1_000_003).wrapping_add(k));
-        score.add(&trial.truth, &answer(&trial));
-    }
-    println!("{class:?}, signal to noise {snr}, {count} draws from seed {seed}\n{score}");
-    score
+    blind_trials::score::<DeflectionCompensation>(deflection::draw, class, snr, seed, count)
 }
 
 #[test]
 fn nothing_hidden_raises_no_alarm() {
-    let count = number("PRECUT_TRIALS", 40);
-    let score = score(Class::Nothing, 0.0, number("PRECUT_TRIAL_SEED", 1), count);
+    let score = score(Class::Nothing, 0.0, 1, 40);
     assert!(score.quiet.reaches(0.97), "{}", score.quiet);
 }
 
 #[test]
 fn one_hidden_cause_is_named_right_or_not_at_all() {
-    let count = number("PRECUT_TRIALS", 60);
-    let score = score(Class::One, 3.0, number("PRECUT_TRIAL_SEED", 2), count);
+    let score = score(Class::One, 3.0, 2, 60);
     assert!(score.first_right.reaches(0.90), "{}", score.first_right);
     assert!(score.named_right.reaches(0.96), "{}", score.named_right);
     assert!(score.truth_listed.reaches(0.95), "{}", score.truth_listed);
@@ -84,14 +28,12 @@ fn one_hidden_cause_is_named_right_or_not_at_all() {
 
 #[test]
 fn two_hidden_causes_are_in_what_is_said() {
-    let count = number("PRECUT_TRIALS", 30);
-    let score = score(Class::Two, 3.0, number("PRECUT_TRIAL_SEED", 3), count);
+    let score = score(Class::Two, 3.0, 3, 30);
     assert!(score.truth_listed.reaches(0.85), "{}", score.truth_listed);
 }
 
 #[test]
 fn what_the_catalogue_lacks_is_unknown() {
-    let count = number("PRECUT_TRIALS", 30);
-    let score = score(Class::Outside, 3.0, number("PRECUT_TRIAL_SEED", 4), count);
+    let score = score(Class::Outside, 3.0, 4, 30);
     assert!(score.unknown.reaches(0.93), "{}", score.unknown);
 }

@@ -1,100 +1,25 @@
 //! Blind trials of the diagnosis on cutting trials: effects hidden by a generator that shares no code with the calculator.
-//!
-//! More and others: `PRECUT_TRIALS=300 PRECUT_TRIAL_SEED=12345 cargo test --release -p precut-calc feed_diagnosis_trials --
-//! --nocapture`; what every answer says: `PRECUT_TRIAL_TALK=1`.
-#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, missing_docs)]
+#![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
-use precut_calc::calculator::{Calculator, Check, Unwatched, Violations};
-use precut_calc::diagnosis::{Diagnosis, NamedCause, VerdictClass};
 use precut_calc::feed_schedule::FeedSchedule;
-use precut_trials::score::{Said, Score};
-use precut_trials::{Class, Trial, machinability};
-use serde_json::json;
+use precut_trials::score::Score;
+use precut_trials::{Class, machinability};
 
-fn number(name: &str, default: u64) -> u64 {
-    std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
-}
-
-fn kinds(causes: &[NamedCause]) -> Vec<String> {
-    causes.iter().map(|cause| cause.kind.clone()).collect()
-}
-
-fn answer(trial: &Trial) -> Said {
-    let mut request = trial.request.clone();
-    request["options"] = json!({ "held_out": false });
-    let mut job: <Diagnosis<FeedSchedule> as Calculator>::Input = serde_json::from_value(request).unwrap();
-    let mut violations = Violations::default();
-    job.check(&mut violations);
-    assert!(violations.is_empty(), "{:?}", violations.into_vec());
-    Diagnosis::<FeedSchedule>::fill(&mut job);
-    let result = Diagnosis::<FeedSchedule>::run(&job, &Unwatched).unwrap().output;
-    let covered = trial
-        .truth
-        .causes
-        .iter()
-        .filter_map(|hidden| {
-            let named = result.named.iter().find(|cause| cause.kind == hidden.kind)?;
-            let [low, high] = named.parameters[0].interval_95?;
-            Some((low..=high).contains(&hidden.size))
-        })
-        .collect();
-    let verdict = match result.verdict {
-        VerdictClass::Adequate => "adequate",
-        VerdictClass::Named => "named",
-        VerdictClass::Confounded => "confounded",
-        VerdictClass::Unknown => "unknown",
-        VerdictClass::Refused => "refused",
-    };
-    if std::env::var("PRECUT_TRIAL_TALK").is_ok() {
-        let names = |causes: &[NamedCause]| {
-            let each = |c: &NamedCause| {
-                let values: Vec<String> = c.parameters.iter().map(|p| format!("{:.4}", p.value)).collect();
-                format!("{} {} [{}]", c.kind, c.label, values.join(" "))
-            };
-            causes.iter().map(each).collect::<Vec<_>>().join(" + ")
-        };
-        println!(
-            "truth {:?} sigma {:.4} found {:.4} -> {verdict}",
-            trial.truth.causes, trial.sigma, result.noise.standard_deviation
-        );
-        for set in result.sets.iter().take(4) {
-            println!(
-                "     {:.2e} {} {}",
-                set.posterior,
-                if set.with_remainder { "+rest" } else { "" },
-                names(&set.causes)
-            );
-        }
-    }
-    let first = result.sets.iter().find(|set| !set.causes.is_empty() && !set.with_remainder);
-    Said {
-        verdict: verdict.to_owned(),
-        named: kinds(&result.named),
-        likely: result.likely_sets.iter().map(|set| kinds(&set.causes)).collect(),
-        first: first.map_or_else(Vec::new, |set| kinds(&set.causes)),
-        covered,
-    }
-}
+use crate::blind_trials;
 
 fn score(class: Class, snr: f64, seed: u64, count: u64) -> Score {
-    let mut score = Score::default();
-    for k in 0..count {
-        let trial = machinability::draw(class, snr, seed.wrapping_mul(1_000_003).wrapping_add(k));
-        score.add(&trial.truth, &answer(&trial));
-    }
-    println!("{class:?}, signal to noise {snr}, {count} draws from seed {seed}\n{score}");
-    score
+    blind_trials::score::<FeedSchedule>(machinability::draw, class, snr, seed, count)
 }
 
 #[test]
 fn nothing_hidden_raises_no_alarm() {
-    let score = score(Class::Nothing, 0.0, number("PRECUT_TRIAL_SEED", 1), number("PRECUT_TRIALS", 30));
+    let score = score(Class::Nothing, 0.0, 1, 30);
     assert!(score.quiet.reaches(0.99), "{}", score.quiet);
 }
 
 #[test]
 fn one_hidden_cause_is_named_right_or_not_at_all() {
-    let score = score(Class::One, 3.0, number("PRECUT_TRIAL_SEED", 2), number("PRECUT_TRIALS", 40));
+    let score = score(Class::One, 3.0, 2, 40);
     assert!(score.first_right.reaches(0.97), "{}", score.first_right);
     assert!(score.named_right.reaches(0.96), "{}", score.named_right);
     assert!(score.truth_listed.reaches(0.95), "{}", score.truth_listed);
@@ -103,13 +28,13 @@ fn one_hidden_cause_is_named_right_or_not_at_all() {
 
 #[test]
 fn two_hidden_causes_are_found() {
-    let score = score(Class::Two, 3.0, number("PRECUT_TRIAL_SEED", 3), number("PRECUT_TRIALS", 20));
+    let score = score(Class::Two, 3.0, 3, 20);
     assert!(score.pair_right.reaches(0.85), "{}", score.pair_right);
     assert!(score.truth_listed.reaches(0.85), "{}", score.truth_listed);
 }
 
 #[test]
 fn what_the_catalogue_lacks_is_unknown() {
-    let score = score(Class::Outside, 3.0, number("PRECUT_TRIAL_SEED", 4), number("PRECUT_TRIALS", 20));
+    let score = score(Class::Outside, 3.0, 4, 20);
     assert!(score.unknown.reaches(0.93), "{}", score.unknown);
 }

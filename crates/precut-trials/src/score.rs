@@ -17,6 +17,9 @@ pub struct Said {
     pub first: Vec<String>,
     /// Whether the 95 % intervals hold the hidden sizes, for those causes that are named and right.
     pub covered: Vec<bool>,
+    /// Share of what could be explained on data held back that was, where the gain was asked for and there is something to
+    /// explain.
+    pub explained_share: Option<f64>,
 }
 
 /// How many of how many.
@@ -69,6 +72,8 @@ pub struct Score {
     pub unknown: Share,
     /// 95 % intervals that hold the truth.
     pub coverage: Share,
+    /// Explained shares of the answers that have one, of trials with causes of the catalogue.
+    pub explained_shares: Vec<f64>,
     /// Verdict by hidden cause.
     pub confusion: BTreeMap<String, BTreeMap<String, usize>>,
 }
@@ -111,6 +116,17 @@ impl Score {
             }
         }
         said.covered.iter().for_each(|held| self.coverage.add(*held));
+        if matches!(truth.class, Class::One | Class::Two) {
+            self.explained_shares.extend(said.explained_share);
+        }
+    }
+
+    /// Median of the explained shares; `None` where there are none.
+    pub fn explained_share(&self) -> Option<f64> {
+        let mut shares = self.explained_shares.clone();
+        shares.sort_by(f64::total_cmp);
+        let (low, high) = (shares.get(shares.len().checked_sub(1)? / 2)?, shares.get(shares.len() / 2)?);
+        Some(f64::midpoint(*low, *high))
     }
 }
 
@@ -128,6 +144,10 @@ impl std::fmt::Display for Score {
             if share.of > 0 {
                 writeln!(f, "{what:<42}{share}")?;
             }
+        }
+        if let Some(median) = self.explained_share() {
+            let count = self.explained_shares.len();
+            writeln!(f, "{:<42}{median:.3} (median of {count})", "explained on data held back")?;
         }
         for (truth, answers) in &self.confusion {
             let answers: Vec<String> = answers.iter().map(|(answer, count)| format!("{answer} {count}")).collect();

@@ -9,6 +9,7 @@ use utoipa::openapi::schema::{ObjectBuilder, SchemaType, Type};
 use utoipa::openapi::{Ref, RefOr, Required, Schema};
 
 use super::parts;
+use crate::engine::ModelComparison;
 use crate::http::models;
 
 const NAME: &str = "^[a-z0-9][a-z0-9_-]{0,63}$";
@@ -19,12 +20,21 @@ pub(super) fn paths() -> Vec<(&'static str, PathItem)> {
     let mut one = PathItem::new(HttpMethod::Get, read());
     one.put = Some(store().build());
     one.delete = Some(delete().build());
-    vec![("/v1/models", PathItem::new(HttpMethod::Get, list())), ("/v1/models/{name}", one)]
+    vec![
+        ("/v1/models", PathItem::new(HttpMethod::Get, list())),
+        ("/v1/models/{name}", one),
+        ("/v1/models/{name}/comparison", PathItem::new(HttpMethod::Get, compare())),
+    ]
 }
 
 /// Schemas of what they take and answer.
 pub(super) fn schemas() -> Vec<(String, RefOr<Schema>)> {
-    [super::schemas_of::<models::ModelList>(), super::schemas_of::<models::SourceDocument>()].concat()
+    [
+        super::schemas_of::<models::ModelList>(),
+        super::schemas_of::<models::SourceDocument>(),
+        super::schemas_of::<ModelComparison>(),
+    ]
+    .concat()
 }
 
 fn name(pattern: &str, text: &str) -> Parameter {
@@ -63,6 +73,20 @@ fn read() -> OperationBuilder {
     .parameter(name(REVISION, "Name of the model, or name and revision."))
     .response("200", document("The model."));
     parts::guarded(operation, &[404, 507])
+}
+
+fn compare() -> OperationBuilder {
+    let with = ObjectBuilder::new().schema_type(SchemaType::new(Type::String)).pattern(Some(REVISION)).build();
+    let operation = operation(
+        "compare_models",
+        "What has changed between two models?",
+        "Two stored models of one calculator beside each other: which causes both have, how far the sizes lie apart, and \
+         whether their 95 % intervals still meet. Two revisions of one name can be compared, too.",
+    )
+    .parameter(name(REVISION, "Name of the model, or name and revision."))
+    .parameter(parts::parameter("with", ParameterIn::Query, "The other model, or one revision of it.", with).required(Required::True))
+    .response("200", parts::success("Both.", "application/json", parts::json_of("ModelComparison")));
+    parts::guarded(operation, &[400, 404, 422, 507])
 }
 
 fn store() -> OperationBuilder {

@@ -273,11 +273,18 @@ impl ForwardModel for DeflectionCompensation {
 impl Diagnosable for DeflectionCompensation {
     type Row = DeflectionMeasurement;
 
-    const DIAGNOSES: &'static [Example] = &[Example {
-        id: "headstock",
-        title: "Five runs of a slender shaft: the headstock is softer than assumed",
-        job: include_str!("examples/diagnosis_headstock.json"),
-    }];
+    const DIAGNOSES: &'static [Example] = &[
+        Example {
+            id: "headstock",
+            title: "Five runs of a slender shaft: the headstock is softer than assumed",
+            job: include_str!("examples/diagnosis_headstock.json"),
+        },
+        Example {
+            id: "guideway",
+            title: "Five runs on a worn guideway: a shape that no cause of the catalogue has",
+            job: include_str!("examples/diagnosis_guideway.json"),
+        },
+    ];
 
     fn hypotheses(prepared: &PreparedDeflection) -> Hypotheses {
         Experiment { job: &prepared.job, runs: &prepared.conditions_of_runs }.hypotheses()

@@ -6,7 +6,7 @@ use super::base::Bound;
 use super::data::{Data, Layout};
 use super::input::{DiagnosisJob, MAX_RUNS};
 use super::output::DiagnosisResult;
-use super::{picture, report};
+use super::{picture, report, said};
 use crate::calculator::{
     Answer, Calculator, CalculatorKind, Check, Codes, Cost, Diagnosable, Failure, Figure, Finding, ForwardModel,
     MeasuredRow, Measurement, Message, Meta, Monitor, PrepareError, Rows, Table, Violations,
@@ -40,7 +40,7 @@ impl<M: Diagnosable> Calculator for Diagnosis<M> {
     const META: Meta = Meta {
         id: "diagnosis",
         kind: CalculatorKind::Calculator,
-        version: 1,
+        version: 2,
         title: "Diagnosis",
         question: "What does the simulation get wrong, why, and what is gained by mending it?",
         summary: "Measurements of what was really cut against a calculator's job: whether anything is wrong beyond \
@@ -82,7 +82,8 @@ impl<M: Diagnosable> Calculator for Diagnosis<M> {
         let runs = if job.runs.is_empty() { vec![M::Run::default()] } else { job.runs.clone() };
         let places: Rows<M::Run, M::Point> =
             Rows { points: used.iter().map(|&row| (rows[row].run() as usize - 1, rows[row].point())).collect(), runs };
-        let prepared = M::prepare(&job.job, &places, &job.quantity, monitor).map_err(unprepared)?;
+        let prepared =
+            M::prepare(&job.job, &places, &job.quantity, monitor).map_err(|error| unprepared(error, &used))?;
         let design = M::design(&prepared);
         let data = data::<M>(job, &used, design);
         let bound = Bound::<M>::new(prepared, job.allowances.clone(), &job.quantity, job.options.causes.as_deref());
@@ -90,7 +91,7 @@ impl<M: Diagnosable> Calculator for Diagnosis<M> {
     }
 
     fn figures(job: &Self::Input, output: &Self::Output) -> Vec<Figure> {
-        picture::figures(&job.quantity, output)
+        picture::figures::<M>(&job.quantity, output)
     }
 
     fn tables(_job: &Self::Input, output: &Self::Output) -> Vec<Table> {
@@ -102,8 +103,8 @@ impl<M: Diagnosable> Calculator for Diagnosis<M> {
 const CODES: Codes = Codes {
     faults: &[FAULT_CODES],
     failures: &[FAULT_CODES],
-    warnings: &[report::WARNING_CODES],
-    explanations: &[report::EXPLANATION_CODES],
+    warnings: &[said::WARNING_CODES],
+    explanations: &[said::EXPLANATION_CODES],
     stages: &[report::STAGE_CODES],
     labels: &[picture::LABEL_CODES],
 };
@@ -111,14 +112,21 @@ const CODES: Codes = Codes {
 /// Faults of a diagnosis beside those of the base's own job.
 pub(super) const FAULT_CODES: &[&str] = &["too_few_measurements", "unknown_run", "unknown_quantity", "unknown_cause"];
 
-fn unprepared(error: PrepareError) -> Failure {
-    match error {
-        PrepareError::Failed(failure) => failure,
-        PrepareError::Invalid(findings) => findings
-            .into_iter()
-            .next()
-            .map_or_else(|| Failure::Internal("rows without a reason".to_owned()), Failure::OutOfModel),
+/// The first reason; a row by its number in the job, where rows without a value count, too.
+fn unprepared(error: PrepareError, used: &[usize]) -> Failure {
+    let findings = match error {
+        PrepareError::Failed(failure) => return failure,
+        PrepareError::Invalid(findings) => findings,
+    };
+    let Some(mut finding) = findings.into_iter().next() else {
+        return Failure::Internal("rows without a reason".to_owned());
+    };
+    let parts = finding.pointer.strip_prefix("/measurements/").and_then(|rest| rest.split_once('/'));
+    let row = parts.and_then(|(row, field)| Some((used.get(row.parse::<usize>().ok()?)?, field)));
+    if let Some((row, field)) = row {
+        finding.pointer = format!("/measurements/{row}/{field}");
     }
+    Failure::OutOfModel(finding)
 }
 
 /// Rows that have a value, sweep by sweep.
@@ -189,12 +197,14 @@ where
         violations.require((1..=runs.min(MAX_RUNS)).contains(&(row.run() as usize)), || {
             Finding::new("unknown_run", format!("/measurements/{index}/run"))
                 .measured(f64::from(row.run()), runs as f64, "1")
-                .with("runs", runs)
+                .with("run", f64::from(row.run()))
         });
     }
     let used = rows.iter().filter(|row| !row.excluded() && row.value(&job.quantity).is_some()).count();
     violations.require(used >= LEAST_ROWS, || {
-        Finding::new("too_few_measurements", "/measurements").measured(used as f64, LEAST_ROWS as f64, "1")
+        Finding::new("too_few_measurements", "/measurements")
+            .measured(used as f64, LEAST_ROWS as f64, "1")
+            .with("quantity", job.quantity.clone())
     });
     for (index, kind) in job.options.causes.iter().flatten().enumerate() {
         violations.require(causes.iter().any(|cause| cause.kind == kind), || {

@@ -29,6 +29,8 @@ pub(super) struct Kind {
     pub(super) name: &'static str,
     /// Its columns on the rows, for the picture of the remainder.
     pub(super) columns: Vec<Vec<f64>>,
+    /// Order of every column, where the columns are waves: along a part half waves, round it whole ones.
+    pub(super) orders: Option<Vec<f64>>,
     white: Vec<White>,
     gram: DMatrix<f64>,
     /// Prior standard deviations of the amplitudes for every correlation length, at a size of one.
@@ -43,6 +45,8 @@ pub(super) struct Remainder {
     /// The best single one: kind, amplitudes, and their factor.
     pub(super) kind: usize,
     pub(super) amplitudes: Vec<f64>,
+    /// Standard deviations of their priors at the best length and size.
+    pub(super) prior_sd: Vec<f64>,
 }
 
 /// The kinds of remainder that these rows can show.
@@ -123,7 +127,11 @@ impl Kind {
             let variance: f64 = of_each_order.iter().map(|&k| share(k) * shape(k) * shape(k)).sum();
             orders.iter().map(|&k| sigma * shape(k) / variance.sqrt()).collect()
         });
-        Self::new(name, columns, spreads.to_vec(), whitener)
+        let halved = |order: &f64| if name == "around" { 0.5 * order } else { *order };
+        Self {
+            orders: Some(orders.iter().map(halved).collect()),
+            ..Self::new(name, columns, spreads.to_vec(), whitener)
+        }
     }
 
     fn levels(name: &'static str, columns: Vec<Vec<f64>>, whitener: &Whitener, sigma: f64) -> Self {
@@ -142,7 +150,7 @@ impl Kind {
                 gram[(j, i)] = product;
             }
         }
-        Self { name, columns, white, gram, spreads }
+        Self { name, columns, orders: None, white, gram, spreads }
     }
 }
 
@@ -157,7 +165,7 @@ pub(super) fn beside(
 ) -> Option<Remainder> {
     let own = Normal::of(columns, residual);
     let mut all = Vec::new();
-    let mut best: Option<(f64, usize, Vec<f64>)> = None;
+    let mut best: Option<(f64, Remainder)> = None;
     for (index, kind) in kinds.iter().enumerate() {
         let joint = kind.joined(&own, columns, residual);
         for spread in &kind.spreads {
@@ -165,18 +173,37 @@ pub(super) fn beside(
                 let scales: Vec<f64> =
                     std::iter::repeat_n(1.0, columns.len()).chain(spread.iter().map(|s| s * size)).collect();
                 let (log_z, t) = scaled_evidence(&joint, &scales, sides, scale, rows)?;
-                if best.as_ref().is_none_or(|(most, _, _)| log_z > *most) {
+                if best.as_ref().is_none_or(|(most, _)| log_z > *most) {
                     let amplitudes = t.iter().zip(&scales).skip(columns.len()).map(|(t, s)| t * s).collect();
-                    best = Some((log_z, index, amplitudes));
+                    let prior_sd = scales[columns.len()..].to_vec();
+                    best = Some((log_z, Remainder { log_z, kind: index, amplitudes, prior_sd }));
                 }
                 all.push(log_z);
             }
         }
     }
-    best.map(|(_, kind, amplitudes)| Remainder { log_z: log_mean_exp(&all), kind, amplitudes })
+    best.map(|(_, remainder)| Remainder { log_z: log_mean_exp(&all), ..remainder })
 }
 
 impl Kind {
+    /// Posterior standard deviation of a remainder at every row, beside causes with these columns.
+    pub(super) fn deviation(&self, remainder: &Remainder, columns: &[&White], residual: &White) -> Option<Vec<f64>> {
+        let joint = self.joined(&Normal::of(columns, residual), columns, residual);
+        let causes = columns.len();
+        let scale = |i: usize| if i < causes { 1.0 } else { remainder.prior_sd[i - causes] };
+        let count = joint.right.len();
+        let a = DMatrix::from_fn(count, count, |i, j| {
+            joint.gram[(i, j)] * scale(i) * scale(j) + f64::from(u8::from(i == j))
+        });
+        let factor = Cholesky::new(a)?;
+        let rows = self.columns.first().map_or(0, Vec::len);
+        let of_row = |row: usize| {
+            let of = |i: usize| if i < causes { 0.0 } else { self.columns[i - causes][row] * scale(i) };
+            factor.l_dirty().solve_lower_triangular(&DVector::from_fn(count, |i, _| of(i))).map(|half| half.norm())
+        };
+        (0..rows).map(of_row).collect()
+    }
+
     fn joined(&self, own: &Normal, columns: &[&White], residual: &White) -> Normal {
         let (causes, free) = (columns.len(), self.white.len());
         let mut gram = DMatrix::zeros(causes + free, causes + free);

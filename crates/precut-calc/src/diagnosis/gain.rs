@@ -161,9 +161,7 @@ fn summary(errors: Vec<(f64, f64)>, whole: &Weighing<'_>, held: &[usize], seed: 
 fn ceiling(whole: &Weighing<'_>) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for row in (0..whole.keep.len()).filter(|&row| whole.keep[row]) {
-        let sigma = whole.noise.per_row.as_ref().map_or(whole.noise.sigma, |own| own[row]);
-        let allowed: f64 = whole.foundation.nuisances.iter().map(|column| column[row] * column[row]).sum();
-        sum += sigma * sigma + allowed;
+        sum += whole.own_variance(row);
         count += 1.0;
     }
     if count > 0.0 { (sum / count).sqrt() } else { 0.0 }

@@ -43,6 +43,8 @@ pub fn twins(weighing: &Weighing<'_>) -> Vec<(usize, usize)> {
 pub struct Signature {
     /// Hypotheses.
     pub members: Vec<usize>,
+    /// What it changes in the prediction of every row, in the unit of the rows; 0 where that is not known.
+    pub change: Vec<f64>,
     whole: White,
     directions: Vec<White>,
 }
@@ -54,16 +56,16 @@ impl Signature {
         let change: Vec<f64> = with
             .iter()
             .zip(&weighing.foundation.base)
-            .zip(&weighing.keep)
-            .map(|((with, base), keep)| if *keep { with.map_or(0.0, |with| with - base) } else { 0.0 })
+            .map(|(with, base)| with.map_or(0.0, |with| with - base))
             .collect();
         let directions = weighing.fit(members).map_or_else(Vec::new, |fit| fit.columns.clone());
-        Ok(Self { members: members.to_vec(), whole: weighing.whitener.white(&change), directions })
+        Ok(Self { members: members.to_vec(), whole: weighing.whitener.white(&change), change, directions })
     }
 
     /// Of no effect at all, beside another.
     pub(super) fn nothing(beside: &Self) -> Self {
-        Self { members: Vec::new(), whole: beside.whole.minus(&beside.whole), directions: Vec::new() }
+        let change = vec![0.0; beside.change.len()];
+        Self { members: Vec::new(), change, whole: beside.whole.minus(&beside.whole), directions: Vec::new() }
     }
 
     /// Of settings under other rows than those that were weighed.
@@ -94,7 +96,7 @@ impl Signature {
         }
         let directions = subject.jacobian(settings, &of)?.iter().map(|column| whitener.white(column)).collect();
         let members = settings.iter().map(|setting| setting.hypothesis).collect();
-        Ok(Self { members, whole: whitener.white(&change), directions })
+        Ok(Self { members, whole: whitener.white(&change), change, directions })
     }
 
     /// Length in sigmas: how visible it is against nothing.

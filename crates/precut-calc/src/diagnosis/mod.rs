@@ -7,7 +7,8 @@
 //! - `whiten`: scatter and allowances as one covariance (`diagnosis/3.2`);
 //! - `evidence`, `discrepancy`, `search`, `refine`: how well each set of causes, alone or with an unnamed
 //!   smooth remainder, explains the rows (`diagnosis/3.4`, `diagnosis/3.5`);
-//! - `weigh`: posterior weights and the verdict (`diagnosis/3.5`, `diagnosis/3.7`).
+//! - `weigh`: posterior weights and the verdict (`diagnosis/3.5`, `diagnosis/3.7`);
+//! - `profile`: intervals where a likelihood is not quadratic (`diagnosis/3.6`).
 
 mod adequacy;
 mod base;
@@ -25,12 +26,16 @@ mod noise;
 mod outlier;
 mod output;
 mod picture;
+mod profile;
 mod refine;
+mod refuse;
 mod remainder;
 mod report;
+mod said;
 mod search;
 mod subject;
 mod suspect;
+mod view;
 mod weigh;
 mod whiten;
 
@@ -46,7 +51,8 @@ pub use next::NextMeasurement;
 pub use noise::{Noise, NoiseSource};
 pub use outlier::Outliers;
 pub use output::*;
+pub use profile::Profile;
 pub use remainder::{RemainderShape, remainder_shape};
 pub use subject::{Setting, Subject};
-pub use suspect::{SuspectedFactor, copied_traces, suspected_factor};
+pub use suspect::{SuspectedFactor, copied_traces, repeated_rows, suspected_factor, suspected_offset, swapped_columns};
 pub use weigh::{Effort, SetWeight, Verdict, Weighing};

@@ -33,6 +33,9 @@ pub struct NextMeasurement<R> {
     pub leader: Vec<usize>,
     /// Hypotheses of its strongest rival; none for the base.
     pub rival: Vec<usize>,
+    /// Every run that was looked at: the condition that it changes, its conditions, and the separation with it measured
+    /// too, sigmas.
+    pub candidates: Vec<(&'static str, R, f64)>,
 }
 
 /// The run that parts the leader from its strongest rival best; `None` where there is no rival or no run.
@@ -50,12 +53,14 @@ pub(super) fn next_measurement<M: Diagnosable>(
         None => Signature::nothing(&now),
     };
     let separation_now = now.separation(&other);
+    let mut candidates = Vec::new();
     for candidate in M::next_runs(&job.job, rows) {
         checkpoint(monitor)?;
         let Some(separation_then) = separation_with::<M>(job, rows, &candidate, weighing, leader, rival)? else {
             continue;
         };
         let gained = separation_then * separation_then - separation_now * separation_now;
+        candidates.push((candidate.changes, candidate.run.clone(), separation_then));
         if best.as_ref().is_none_or(|best| separation_then > best.separation_then) {
             best = Some(NextMeasurement {
                 changes: candidate.changes,
@@ -63,14 +68,20 @@ pub(super) fn next_measurement<M: Diagnosable>(
                 run: candidate.run,
                 separation_now,
                 separation_then,
-                bayes_factor: (0.5 * gained.max(0.0)).min(600.0).exp(),
+                bayes_factor: bayes_factor(separation_now, separation_then),
                 rows_needed: rows_needed(gained, candidate.points.len()),
                 leader: leader.members.clone(),
                 rival: rival.map_or_else(Vec::new, |rival| rival.members.clone()),
+                candidates: Vec::new(),
             });
         }
     }
-    Ok(best)
+    Ok(best.map(|best| NextMeasurement { candidates, ..best }))
+}
+
+/// To be expected from what a run adds to the separation; no larger than a number can say.
+pub(super) fn bayes_factor(now: f64, then: f64) -> f64 {
+    (0.5 * (then * then - now * now).max(0.0)).min(600.0).exp()
 }
 
 /// Rows in proportion to what a whole run gains: odds grow as exp(d^2/2), d^2 with the number of rows.

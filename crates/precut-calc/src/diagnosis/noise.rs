@@ -61,7 +61,10 @@ impl Noise {
         let mut noise = Self::of_rows(data, residual, keep);
         // Equal values in all rows say nothing of the scatter; the resolution does.
         let floor = resolution(&data.value, keep) / 12.0_f64.sqrt();
-        noise.sigma = noise.sigma.max(floor).max(f64::MIN_POSITIVE.sqrt());
+        // Where all values are equal even that is nothing: then the last digits of a number are.
+        let largest =
+            data.value.iter().zip(keep).filter(|(_, keep)| **keep).fold(0.0, |most: f64, (v, _)| most.max(v.abs()));
+        noise.sigma = noise.sigma.max(floor).max(1e-9 * largest).max(1e-12);
         noise
     }
 

@@ -35,6 +35,10 @@ pub struct DiagnosisResult<E: ToSchema, R: ToSchema> {
     pub twins: Vec<CausePair>,
     /// How well leading sets can be told apart, sigmas.
     pub separations: Vec<SeparationReport>,
+    /// What each leading set changes in the prediction, likeliest first; of sets that extend none that is likelier.
+    pub signatures: Vec<SignatureReport>,
+    /// Profile likelihoods of the parameters of the set that is named, of a `confounded` answer of its likeliest.
+    pub profiles: Vec<ProfileReport>,
     /// Shape of what the catalogue does not explain.
     pub remainder: Option<RemainderReport>,
     /// The effects that extend the base model; empty where none is named.
@@ -101,6 +105,8 @@ pub struct ParameterReport {
     /// 95 % interval.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub interval_95: Option<[f64; 2]>,
+    /// Where the intervals come from: `quadratic`, or `profile` where the likelihood is not; absent for what is stated.
+    pub interval_from: Option<String>,
     /// Whether it lies at its physical limit.
     pub at_limit: bool,
 }
@@ -118,7 +124,7 @@ pub struct LikelySet {
 /// Why the data cannot be judged.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Refusal {
-    /// Code of the reason: `unit_suspected`, `too_few_rows`, `base_fails`.
+    /// Code of the reason: `unit_suspected`, `absolute_values`, `constant_values`, `too_few_rows`, `base_fails`.
     pub reason: String,
     /// For a suspected unit: the factor that it would leave.
     #[schema(extensions(("x-unit" = json!("1"))))]
@@ -226,6 +232,41 @@ pub struct SeparationReport {
     pub sigmas: f64,
 }
 
+/// What a set of causes changes in the prediction.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct SignatureReport {
+    /// Kinds of the set.
+    pub causes: Vec<String>,
+    /// Prediction with its fit minus that of the base, row by row, in the unit of the measured values of `rows`.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub change: Vec<f64>,
+}
+
+/// Profile likelihood of a parameter: all others of its set fitted anew at every value.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ProfileReport {
+    /// Kind of the effect.
+    pub kind: String,
+    /// Which of several effects of one kind; empty where there is one.
+    pub label: String,
+    /// Name of the parameter with its unit.
+    pub parameter: String,
+    /// Its unit.
+    pub unit: String,
+    /// Its values, ascending, in that unit.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub value: Vec<f64>,
+    /// Distance from the best of them, standard deviations of the fit.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub deviations: Vec<f64>,
+    /// Rise of the misfit above its least; of a quadratic likelihood the square of `deviations`.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub rise: Vec<f64>,
+    /// Rise at the edges of the 95 % interval.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub rise_at_95: f64,
+}
+
 /// Shape of what the catalogue does not explain.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct RemainderReport {
@@ -237,6 +278,18 @@ pub struct RemainderReport {
     /// Row where it is largest, from 1.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub largest_at_row: u32,
+    /// Row by row, in the order of `rows`, in the unit of the quantity.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub value: Vec<f64>,
+    /// Posterior standard deviation of `value`; empty where it has more than 200 free sizes.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub standard_deviation: Vec<f64>,
+    /// Orders of its waves: half waves over the length or the order of testing, whole ones round a part; empty for levels.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub orders: Vec<f64>,
+    /// Amplitude of every order, in the unit of the quantity; of several runs the root mean square.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub amplitudes: Vec<f64>,
     /// Share of the mean square left by the named part that it explains.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub explained_share: f64,
@@ -296,6 +349,26 @@ pub struct NextReport<R: ToSchema> {
     /// Rows of this kind that would bring odds of 20 to 1; absent where no number would.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub rows_needed: Option<u32>,
+    /// Every run that was looked at, with what it would part.
+    #[schema(inline)]
+    pub candidates: Vec<CandidateReport<R>>,
+}
+
+/// A run that was looked at.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(bound(serialize = "R: Serialize", deserialize = "R: Deserialize<'de>"))]
+pub struct CandidateReport<R: ToSchema> {
+    /// The condition that it changes.
+    pub changes: String,
+    /// Its conditions.
+    #[schema(inline)]
+    pub run: R,
+    /// Separation of leader and rival with this run measured too, sigmas.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub separation_sigmas: f64,
+    /// Bayes factor to be expected from this run.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub bayes_factor: f64,
 }
 
 /// Row by row, in the order of the measurements; values in the unit of the quantity (logarithms where it is logarithmic).
@@ -319,6 +392,9 @@ pub struct RowColumns {
     /// Prediction of the extended model: the leading set.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub extended: Vec<Option<f64>>,
+    /// Standard deviation of a row about the extended prediction: scatter, allowances, fit; absent where nothing is named.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub extended_deviation: Vec<Option<f64>>,
     /// Whether the row counted.
     pub used: Vec<bool>,
 }

@@ -1,11 +1,11 @@
 //! Gauss-Newton about the model itself for the sets that lead (`diagnosis/3.4`, refinement).
 
-use nalgebra::DMatrix;
+use nalgebra::{Cholesky, DMatrix};
 
 use super::evidence::{Normal, Scale, Side};
 use super::subject::{Setting, Subject};
 use super::whiten::{White, Whitener};
-use crate::calculator::{Failure, Hypothesis, Shape, Treatment, Variable};
+use crate::calculator::{Failure, Hypothesis, Range, Shape, Treatment, Variable};
 
 /// Steps where only amplitudes are free.
 const STEPS: usize = 4;
@@ -25,6 +25,8 @@ pub(super) struct Fit {
     pub(super) settings: Vec<Setting>,
     /// What is free: member of the set and its variable.
     pub(super) free: Vec<(usize, usize)>,
+    /// Their Gaussian coordinates.
+    pub(super) coordinates: Vec<Coordinate>,
     /// Laplace evidence.
     pub(super) log_z: f64,
     /// Covariance of the free values, in their units.
@@ -47,9 +49,14 @@ pub(super) struct Fit {
 }
 
 /// A free value and its Gaussian coordinate t ~ N(0, 1).
-#[derive(Debug, Clone, Copy)]
-enum Coordinate {
-    Amplitude { sd: f64 },
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Coordinate {
+    /// t = value / sd.
+    Amplitude {
+        /// Prior standard deviation.
+        sd: f64,
+    },
+    /// About the mean of a shape's prior.
     Shape(Shape),
 }
 
@@ -62,7 +69,7 @@ impl Coordinate {
         }
     }
 
-    fn t(self, value: f64) -> f64 {
+    pub(super) fn t(self, value: f64) -> f64 {
         match self {
             Self::Amplitude { sd } => value / sd,
             Self::Shape(Shape { mean, sd, logarithmic: true }) => (value.ln() - mean) / sd,
@@ -70,7 +77,7 @@ impl Coordinate {
         }
     }
 
-    fn value(self, t: f64) -> f64 {
+    pub(super) fn value(self, t: f64) -> f64 {
         match self {
             Self::Amplitude { sd } => sd * t,
             Self::Shape(Shape { mean, sd, logarithmic: true }) => (mean + sd * t).exp(),
@@ -79,11 +86,16 @@ impl Coordinate {
     }
 
     /// d value / d t.
-    fn slope(self, value: f64) -> f64 {
+    pub(super) fn slope(self, value: f64) -> f64 {
         match self {
             Self::Shape(Shape { sd, logarithmic: true, .. }) => sd * value,
             Self::Amplitude { sd } | Self::Shape(Shape { sd, logarithmic: false, .. }) => sd,
         }
+    }
+
+    /// The value at t, inside its range.
+    pub(super) fn moved(self, t: f64, range: Range) -> f64 {
+        self.value(t).clamp(range.lower, range.upper)
     }
 }
 
@@ -141,7 +153,7 @@ impl Refinement<'_> {
                 let before = coordinate.t(*value);
                 let wanted = before + (evidence.t[k] - before).clamp(-LONGEST_STEP, LONGEST_STEP);
                 // Projected on the bounds: a reflection would swing to and fro about an optimum at a bound.
-                *value = coordinate.value(wanted).clamp(ranges[k].lower, ranges[k].upper);
+                *value = coordinate.moved(wanted, ranges[k]);
                 let posterior_sd = evidence.covariance[(k, k)].sqrt();
                 longest = longest.max((coordinate.t(*value) - before).abs() / posterior_sd.clamp(0.05, 1.0));
             }
@@ -158,6 +170,7 @@ impl Refinement<'_> {
                 return Ok(Some(Fit {
                     settings,
                     free,
+                    coordinates,
                     log_z: evidence.log_z,
                     covariance,
                     t: evidence.t,
@@ -173,23 +186,55 @@ impl Refinement<'_> {
         }
     }
 
+    /// The declaration of a free value.
+    pub(super) fn variable(&self, fit: &Fit, k: usize) -> &Variable {
+        let (member, variable) = fit.free[k];
+        &self.subject.hypotheses()[fit.settings[member].hypothesis].variables[variable]
+    }
+
+    /// y - f, whitened; `None` where the model has no value for a row that counts.
+    pub(super) fn residual(&self, settings: &[Setting]) -> Result<Option<White>, Failure> {
+        Ok(self.raw_residual(settings)?.map(|raw| self.whitener.white(&raw)))
+    }
+
+    fn raw_residual(&self, settings: &[Setting]) -> Result<Option<Vec<f64>>, Failure> {
+        let predicted = self.subject.predict(settings)?;
+        let rows = self.value.iter().zip(predicted).zip(self.keep);
+        Ok(rows.map(|((y, f), keep)| if *keep { f.ok().map(|f| y - f) } else { Some(0.0) }).collect())
+    }
+
+    /// One Gauss-Newton step of all free values but one, with the columns of the fit.
+    pub(super) fn move_others(
+        &self,
+        fit: &Fit,
+        settings: &mut [Setting],
+        t: &[f64],
+        residual: &White,
+        fixed: Option<usize>,
+    ) {
+        let others: Vec<usize> = (0..fit.free.len()).filter(|k| Some(*k) != fixed).collect();
+        let columns: Vec<&White> = others.iter().map(|&k| &fit.columns[k]).collect();
+        let Normal { mut gram, mut right, .. } = Normal::of(&columns, residual);
+        for (i, &k) in others.iter().enumerate() {
+            gram[(i, i)] += 1.0;
+            right[i] -= t[k];
+        }
+        let Some(factor) = Cholesky::new(gram) else { return };
+        let step = factor.solve(&right);
+        for (i, &k) in others.iter().enumerate() {
+            let (member, variable) = fit.free[k];
+            let moved = t[k] + step[i].clamp(-LONGEST_STEP, LONGEST_STEP);
+            settings[member].values[variable] = fit.coordinates[k].moved(moved, self.variable(fit, k).range);
+        }
+    }
+
     fn linearise(
         &self,
         settings: &[Setting],
         free: &[(usize, usize)],
         coordinates: &[Coordinate],
     ) -> Result<Option<Here>, Failure> {
-        let predicted = self.subject.predict(settings)?;
-        let Some(mut residual) = self
-            .value
-            .iter()
-            .zip(predicted)
-            .zip(self.keep)
-            .map(|((y, f), keep)| if *keep { f.ok().map(|f| y - f) } else { Some(0.0) })
-            .collect::<Option<Vec<f64>>>()
-        else {
-            return Ok(None);
-        };
+        let Some(mut residual) = self.raw_residual(settings)? else { return Ok(None) };
         let slopes = self.subject.jacobian(settings, free)?;
         let mut columns = Vec::with_capacity(free.len());
         for ((&(member, variable), coordinate), slope) in free.iter().zip(coordinates).zip(&slopes) {

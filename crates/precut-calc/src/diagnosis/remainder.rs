@@ -10,6 +10,11 @@ pub struct RemainderShape {
     pub kind: &'static str,
     /// One value per row, in the unit of the rows.
     pub value: Vec<f64>,
+    /// Its posterior standard deviation at every row; empty where it has too many free sizes.
+    pub deviation: Vec<f64>,
+    /// Orders of its waves with the amplitude of each: along a part half waves over its length, round it whole ones, of
+    /// several runs the root mean square over them. Empty where it has levels.
+    pub spectrum: Vec<(f64, f64)>,
     /// Its root mean square over the rows that count.
     pub rms: f64,
     /// Row where it is largest in magnitude.
@@ -28,6 +33,7 @@ pub fn remainder_shape(weighing: &Weighing<'_>) -> Option<RemainderShape> {
     for (column, amplitude) in kind.columns.iter().zip(&remainder.amplitudes) {
         value.iter_mut().zip(column).for_each(|(v, c)| *v += amplitude * c);
     }
+    let deviation = weighing.remainder_deviation(set, kind, remainder).unwrap_or_default();
     let named = weighing.foundation.subject.predict(&set.settings).ok()?;
     let left = |row: usize| weighing.foundation.data.value[row] - named[row].unwrap_or(weighing.foundation.base[row]);
     let kept: Vec<usize> = (0..rows).filter(|&row| weighing.keep[row]).collect();
@@ -37,5 +43,26 @@ pub fn remainder_shape(weighing: &Weighing<'_>) -> Option<RemainderShape> {
     let after = mean(&|row| (left(row) - value[row]).powi(2));
     let extreme_row = kept.iter().copied().max_by(|&a, &b| value[a].abs().total_cmp(&value[b].abs()))?;
     let explained = if before > 0.0 { (1.0 - after / before).clamp(0.0, 1.0) } else { 0.0 };
-    Some(RemainderShape { kind: kind.name, value, rms, extreme_row, explained })
+    let spectrum = kind.orders.as_ref().map_or_else(Vec::new, |orders| spectrum(orders, &remainder.amplitudes));
+    Some(RemainderShape { kind: kind.name, value, deviation, spectrum, rms, extreme_row, explained })
+}
+
+/// Amplitude of every order: cosine and sine of one order together, of several runs the root mean square.
+fn spectrum(orders: &[f64], amplitudes: &[f64]) -> Vec<(f64, f64)> {
+    let mut known: Vec<f64> = orders.to_vec();
+    known.sort_by(f64::total_cmp);
+    known.dedup();
+    // Neighbours of one order are a wave's cosine and sine.
+    let pairs = orders.len() > 1 && orders[0].total_cmp(&orders[1]).is_eq();
+    let of_order = |order: f64| {
+        let squares: Vec<f64> = orders
+            .iter()
+            .zip(amplitudes)
+            .filter(|(of, _)| of.total_cmp(&order).is_eq())
+            .map(|(_, amplitude)| amplitude * amplitude)
+            .collect();
+        let waves = if pairs { squares.len() as f64 / 2.0 } else { squares.len() as f64 };
+        (squares.iter().sum::<f64>() / waves).sqrt()
+    };
+    known.into_iter().map(|order| (order, of_order(order))).collect()
 }

@@ -1,6 +1,7 @@
 //! Blunders in the data, looked for before any physics is blamed (`diagnosis/8`).
 
 use super::data::Data;
+use crate::calculator::{Quantity, Smooth};
 
 /// Factors that a wrong unit, a wrong sign or a radius for a diameter leaves.
 const FACTORS: [f64; 11] = [2.0, 0.5, -1.0, -2.0, -0.5, 1000.0, 0.001, 25.4, 1.0 / 25.4, 39.37, 1.0 / 39.37];
@@ -51,6 +52,72 @@ pub fn suspected_factor(measured: &[f64], base: &[f64], keep: &[bool]) -> Option
     }
     let near = |factor: &&f64| (fitted / **factor - 1.0).abs() < NEAR;
     FACTORS.iter().find(near).map(|&factor| SuspectedFactor { factor, fitted, explained })
+}
+
+/// Factors that a wrong unit leaves in what is compared by its logarithm: mm or inches for um, microinches, inches for mm.
+const UNITS: [f64; 6] = [1000.0, 0.001, 25.4, 1.0 / 25.4, 39.37, 1.0 / 39.37];
+/// The same in forces: kilogram-force, kilonewton, pound-force.
+const FORCE_UNITS: [f64; 6] = [9.80665, 1.0 / 9.80665, 1000.0, 0.001, 4.44822, 1.0 / 4.44822];
+/// The same in amplitudes, where half of the peak-to-peak is given for the whole.
+const AMPLITUDES: [f64; 8] = [2.0, 0.5, 1000.0, 0.001, 25.4, 1.0 / 25.4, 39.37, 1.0 / 39.37];
+
+/// The same of what is compared by its logarithm: a wrong unit shifts all rows by ln q, and leaves exponents alone.
+///
+/// The shift is looked for where it explains four fifths of the mean square of the residuals. Twice or half is a blunder of
+/// amplitudes only: a surface twice as rough as expected is no wrong unit.
+pub fn suspected_offset(quantity: &Quantity, measured: &[f64], base: &[f64], keep: &[bool]) -> Option<SuspectedFactor> {
+    let rows = measured.iter().zip(base).zip(keep).filter(|(_, keep)| **keep);
+    let gaps: Vec<f64> = rows.map(|((y, f), _)| y - f).collect();
+    let count = gaps.len() as f64;
+    let (sum, square) = gaps.iter().fold((0.0, 0.0), |(sum, square), gap| (sum + gap, square + gap * gap));
+    let mean = sum / count;
+    if gaps.len() < 3 || square <= 0.0 || count * mean * mean <= EXPLAINED * square {
+        return None;
+    }
+    let factors = match quantity {
+        Quantity { unit: "N", .. } => FORCE_UNITS.as_slice(),
+        Quantity { name, .. } if name.contains("peak_to_peak") => AMPLITUDES.as_slice(),
+        Quantity { unit: "um" | "mm", .. } => UNITS.as_slice(),
+        _ => &[],
+    };
+    // As a share of the variance about the mean of the rows, which is what causes are held against.
+    let centre = measured.iter().zip(keep).filter(|(_, keep)| **keep).map(|(y, _)| y).sum::<f64>() / count;
+    let spread: f64 =
+        measured.iter().zip(keep).filter(|(_, keep)| **keep).map(|(y, _)| (y - centre) * (y - centre)).sum();
+    let left: f64 = gaps.iter().map(|gap| (gap - mean) * (gap - mean)).sum();
+    let explained = if spread > 0.0 { 1.0 - left / spread } else { 0.0 };
+    let near = |factor: &&f64| (mean.exp() / **factor - 1.0).abs() < NEAR;
+    factors.iter().find(near).map(|&factor| SuspectedFactor { factor, fitted: mean.exp(), explained })
+}
+
+/// Rows of a sweep that repeat an earlier one digit for digit, place and value: written twice, not measured twice.
+pub fn repeated_rows(data: &Data) -> Vec<usize> {
+    if data.layout.design.smooth == Smooth::None {
+        return Vec::new();
+    }
+    let same = |a: usize, b: usize| {
+        data.layout.design.cell[a] == data.layout.design.cell[b] && data.value[a].to_bits() == data.value[b].to_bits()
+    };
+    let mut repeated = Vec::new();
+    for rows in &data.layout.traces {
+        let mut sorted = rows.clone();
+        sorted.sort_by_key(|&row| (data.layout.design.cell[row], data.value[row].to_bits(), row));
+        repeated.extend(sorted.windows(2).filter(|pair| same(pair[0], pair[1])).map(|pair| pair[1]));
+    }
+    repeated.sort_unstable();
+    repeated
+}
+
+/// Whether every sweep has values that go one way from row to row, and places that do not.
+pub fn swapped_columns(data: &Data) -> bool {
+    let Smooth::Along(places) = &data.layout.design.smooth else { return false };
+    let goes_one_way = |of: &dyn Fn(usize) -> f64, rows: &[usize]| {
+        let steps = || rows.windows(2).map(|pair| of(pair[1]) - of(pair[0]));
+        steps().all(|step| step > 0.0) || steps().all(|step| step < 0.0)
+    };
+    let mut sweeps = data.layout.traces.iter().filter(|rows| rows.len() > 4).peekable();
+    sweeps.peek().is_some()
+        && sweeps.all(|rows| goes_one_way(&|row| data.value[row], rows) && !goes_one_way(&|row| places[row], rows))
 }
 
 /// Traces of one run that repeat each other digit for digit: copied, not measured again.

@@ -4,6 +4,7 @@ use super::discrepancy::{self, Kind, Remainder};
 use super::evidence::{Scale, Side, log_sum_exp};
 use super::foundation::Foundation;
 use super::noise::Noise;
+use super::profile::{Profile, Profiler};
 use super::refine::{Fit, Refinement};
 use super::search::{Candidate, Linear, by_weight};
 use super::subject::Setting;
@@ -28,6 +29,10 @@ const NAMED: f64 = 0.8;
 const NAMED_IF_COMMON: f64 = 0.5;
 /// Share of the named posterior that the list of likely sets holds.
 const LIKELY: f64 = 0.95;
+
+/// Free sizes of a remainder up to which its band is computed: beyond, a triangular solution for every row takes longer
+/// than everything else.
+const MOST_FREE_SIZES: usize = 200;
 
 /// How far the search goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -177,6 +182,66 @@ impl<'a> Weighing<'a> {
         self.ranking.fit(members)
     }
 
+    /// What every fitted value of a set costs when the others are fitted anew, out to `reach` posterior standard
+    /// deviations. Not of values that a grid of shapes widens: there the fit knows a point of the grid only. Nor of a set
+    /// that was not refined.
+    pub fn profiles(
+        &self,
+        set: &SetWeight,
+        reach: f64,
+        dear: bool,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Profile>, Failure> {
+        let Some(fit) = self.fit(&set.members) else { return Ok(Vec::new()) };
+        let refinement = Refinement {
+            subject: self.foundation.subject,
+            value: &self.foundation.data.value,
+            keep: &self.keep,
+            whitener: &self.whitener,
+            scale: self.linear.scale,
+            nonlinear: dear,
+        };
+        let of_fit = |k: &usize| {
+            let (member, variable) = fit.free[*k];
+            set.standard_deviations[member][variable] <= fit.covariance[(*k, *k)].sqrt() * (1.0 + 1e-9)
+        };
+        let free: Vec<usize> = (0..fit.free.len()).filter(of_fit).collect();
+        Profiler { refinement: &refinement, fit, dear }.profiles(&free, reach, monitor)
+    }
+
+    /// Standard deviation of a measured row about the prediction of a set: scatter, allowances, and what the fitted
+    /// values leave open. `None` where the set was not refined.
+    pub fn deviation(&self, set: &SetWeight) -> Option<Vec<f64>> {
+        let fit = self.fit(&set.members)?;
+        let count = fit.free.len();
+        let of_row = |row: usize| {
+            let slope = |k: usize| fit.slopes[k][row];
+            let fitted: f64 = (0..count)
+                .flat_map(|i| (0..count).map(move |j| (i, j)))
+                .map(|(i, j)| slope(i) * fit.covariance[(i, j)] * slope(j))
+                .sum();
+            (self.own_variance(row) + fitted.max(0.0)).sqrt()
+        };
+        Some((0..self.keep.len()).map(of_row).collect())
+    }
+
+    /// Posterior standard deviation of a set's remainder at every row; `None` where it has too many free sizes for it.
+    pub(super) fn remainder_deviation(&self, set: &SetWeight, kind: &Kind, remainder: &Remainder) -> Option<Vec<f64>> {
+        if kind.columns.len() > MOST_FREE_SIZES {
+            return None;
+        }
+        let candidate = self.ranking.candidates.iter().find(|candidate| candidate.members == set.members)?;
+        let (columns, residual, _) = self.ranking.parts(&self.linear, candidate);
+        kind.deviation(remainder, &columns, &residual)
+    }
+
+    /// Variance of a row: scatter and allowances.
+    pub(super) fn own_variance(&self, row: usize) -> f64 {
+        let sigma = self.noise.per_row.as_ref().map_or(self.noise.sigma, |own| own[row]);
+        let allowed: f64 = self.foundation.nuisances.iter().map(|column| column[row] * column[row]).sum();
+        sigma * sigma + allowed
+    }
+
     /// Sets without a remainder, heaviest first.
     pub fn named_sets(&self) -> impl Iterator<Item = &SetWeight> {
         self.sets.iter().filter(|set| set.remainder.is_none() && !set.members.is_empty())
@@ -270,14 +335,17 @@ impl Ranking {
     }
 
     fn beside(&self, linear: &Linear<'_>, kinds: &[Kind], candidate: &Candidate) -> Option<Remainder> {
-        let (columns, residual, sides): (Vec<&White>, White, Vec<Side>) =
-            if let Some(fit) = self.fit(&candidate.members) {
-                (fit.columns.iter().collect(), fit.residual.clone(), fit.sides.clone())
-            } else {
-                let (columns, sides, residual) = linear.parts(&candidate.members, &candidate.variants);
-                (columns, residual, sides)
-            };
+        let (columns, residual, sides) = self.parts(linear, candidate);
         discrepancy::beside(kinds, &columns, &residual, &sides, linear.scale, linear.rows)
+    }
+
+    /// Columns of a set, the residual that they are to explain, and their sides: about the fit where it was made.
+    fn parts<'b>(&'b self, linear: &'b Linear<'_>, candidate: &Candidate) -> (Vec<&'b White>, White, Vec<Side>) {
+        if let Some(fit) = self.fit(&candidate.members) {
+            return (fit.columns.iter().collect(), fit.residual.clone(), fit.sides.clone());
+        }
+        let (columns, sides, residual) = linear.parts(&candidate.members, &candidate.variants);
+        (columns, residual, sides)
     }
 
     fn set(&self, linear: &Linear<'_>, candidate: &Candidate, remainder: Option<Remainder>) -> SetWeight {

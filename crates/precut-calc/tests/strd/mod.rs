@@ -2,14 +2,17 @@
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, dead_code, unreachable_pub, missing_docs)]
 
 use std::f64::consts::PI;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use precut_calc::num::lsq::{Fit, NoFit, Parameter, Settings, fit, from_fn};
 use serde_json::Value;
 
 /// Where the tables lie; `None`, after saying so, where they are absent and may be.
 pub fn folder() -> Option<PathBuf> {
-    let folder = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/reference/nist"));
+    // Beside the repository's root, which is this package's folder or two above it.
+    let package = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let root = package.ancestors().find(|folder| folder.join("Cargo.lock").is_file()).unwrap_or(package);
+    let folder = root.join("../shared/reference/nist");
     if folder.join("strd_index.json").is_file() {
         return Some(folder);
     }

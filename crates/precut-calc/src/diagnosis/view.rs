@@ -1,0 +1,250 @@
+//! The verdict and the sets behind it in the words of the contract.
+
+use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
+
+use super::identify::{Signature, separations};
+use super::next::{NextMeasurement, bayes_factor};
+use super::output::{
+    CandidateReport, CauseReport, LikelySet, NamedCause, NextReport, ParameterReport, ProfileReport, SeparationReport,
+    SetReport, SignatureReport, VerdictClass,
+};
+use super::profile::Profile;
+use super::subject::Setting;
+use super::weigh::{SetWeight, Verdict, Weighing};
+use crate::calculator::{Failure, Hypothesis, Monitor, Treatment};
+
+/// Leading sets whose signatures and separations are given: those that extend no likelier one.
+const SEPARATED_SETS: usize = 6;
+/// How far the edges of an interval may differ from those of a quadratic likelihood, as a share of their distance from
+/// the fit, before the profile takes their place.
+const AGREE: f64 = 0.2;
+
+/// What the verdict is made of.
+pub(super) struct View<'a> {
+    pub(super) hypotheses: &'a [Hypothesis],
+    pub(super) weighing: &'a Weighing<'a>,
+    /// Of the set whose parameters are reported.
+    profiles: Vec<Profile>,
+}
+
+impl<'a> View<'a> {
+    /// With profiles of the parameters that are reported: of the set that is named, or of the likeliest. Of data that are
+    /// not judged there are none.
+    pub(super) fn of(
+        hypotheses: &'a [Hypothesis],
+        weighing: &'a Weighing<'a>,
+        judged: bool,
+        dear: bool,
+        monitor: &dyn Monitor,
+    ) -> Result<Self, Failure> {
+        let mut view = Self { hypotheses, weighing, profiles: Vec::new() };
+        if let Some(set) = view.profiled().filter(|_| judged) {
+            view.profiles = weighing.profiles(set, quantile(0.95, weighing.noise.dof), dear, monitor)?;
+        }
+        Ok(view)
+    }
+
+    /// The set whose parameters have profiles. Beside a remainder a fit has more free sizes than its own.
+    fn profiled(&self) -> Option<&'a SetWeight> {
+        match &self.weighing.verdict {
+            Verdict::Named(members) => self.weighing.named_sets().find(|set| set.members == *members),
+            Verdict::Confounded(likely) => {
+                let first = likely.first()?;
+                self.weighing.named_sets().find(|set| set.members == *first)
+            }
+            Verdict::Adequate | Verdict::Unknown(_) => None,
+        }
+    }
+
+    pub(super) fn kind(&self, hypothesis: usize) -> &'static str {
+        self.hypotheses[hypothesis].cause.kind
+    }
+
+    pub(super) fn class(&self) -> VerdictClass {
+        match self.weighing.verdict {
+            Verdict::Adequate => VerdictClass::Adequate,
+            Verdict::Named(_) => VerdictClass::Named,
+            Verdict::Confounded(_) => VerdictClass::Confounded,
+            Verdict::Unknown(_) => VerdictClass::Unknown,
+        }
+    }
+
+    /// The set whose causes are named.
+    pub(super) fn leading(&self) -> Option<&'a SetWeight> {
+        let of = |members: &[usize], with_remainder: bool| {
+            self.weighing.sets.iter().find(|set| set.members == members && set.remainder.is_some() == with_remainder)
+        };
+        match &self.weighing.verdict {
+            Verdict::Named(members) => of(members, false),
+            Verdict::Unknown(members) => of(members, true),
+            _ => None,
+        }
+    }
+
+    pub(super) fn named(&self) -> Vec<NamedCause> {
+        self.leading().map_or_else(Vec::new, |set| self.set(set))
+    }
+
+    pub(super) fn likely_sets(&self) -> Vec<LikelySet> {
+        let Verdict::Confounded(likely) = &self.weighing.verdict else { return Vec::new() };
+        let sets = likely.iter().filter_map(|members| self.weighing.named_sets().find(|set| set.members == *members));
+        sets.map(|set| LikelySet { causes: self.set(set), posterior: set.posterior }).collect()
+    }
+
+    pub(super) fn set_report(&self, set: &SetWeight) -> SetReport {
+        SetReport { causes: self.set(set), posterior: set.posterior, with_remainder: set.remainder.is_some() }
+    }
+
+    fn set(&self, set: &SetWeight) -> Vec<NamedCause> {
+        let each = set.settings.iter().zip(&set.standard_deviations);
+        each.map(|(setting, deviations)| {
+            let hypothesis = &self.hypotheses[setting.hypothesis];
+            let parameters = 0..hypothesis.variables.len();
+            NamedCause {
+                kind: hypothesis.cause.kind.to_owned(),
+                label: hypothesis.label.clone(),
+                parameters: parameters.map(|index| self.parameter(set, setting, index, deviations[index])).collect(),
+            }
+        })
+        .collect()
+    }
+
+    fn parameter(&self, set: &SetWeight, setting: &Setting, index: usize, sd: f64) -> ParameterReport {
+        let variable = &self.hypotheses[setting.hypothesis].variables[index];
+        let (value, range) = (setting.values[index], variable.range);
+        let fitted = sd > 0.0 && !matches!(variable.treatment, Treatment::Stated { .. });
+        let dof = self.weighing.noise.dof;
+        let quadratic = |share: f64| {
+            let half = quantile(share, dof) * sd;
+            [value - half, value + half].map(|edge| edge.clamp(range.lower, range.upper))
+        };
+        // Where both agree the simpler one stands.
+        let profile = self.profile(set, setting.hypothesis, index).filter(|profile| {
+            let reach = quantile(0.95, dof);
+            !profile.agrees(value, quadratic(0.95), reach, AGREE)
+        });
+        let interval = |share: f64| {
+            let own = || profile.map_or_else(|| quadratic(share), |profile| profile.interval(quantile(share, dof)));
+            fitted.then(own)
+        };
+        let from = if profile.is_some() { "profile" } else { "quadratic" };
+        let span = range.upper - range.lower;
+        ParameterReport {
+            name: variable.name.to_owned(),
+            unit: variable.unit.to_owned(),
+            value,
+            standard_deviation: fitted.then_some(sd),
+            interval_50: interval(0.50),
+            interval_90: interval(0.90),
+            interval_95: interval(0.95),
+            interval_from: fitted.then(|| from.to_owned()),
+            at_limit: fitted && (value - range.lower < 1e-9 * span || range.upper - value < 1e-9 * span),
+        }
+    }
+
+    fn profile(&self, set: &SetWeight, hypothesis: usize, variable: usize) -> Option<&Profile> {
+        if set.remainder.is_some() || self.profiled().is_none_or(|profiled| profiled.members != set.members) {
+            return None;
+        }
+        self.profiles.iter().find(|profile| profile.hypothesis == hypothesis && profile.variable == variable)
+    }
+
+    pub(super) fn profiles(&self) -> Vec<ProfileReport> {
+        let Some(set) = self.profiled() else { return Vec::new() };
+        let reach = quantile(0.95, self.weighing.noise.dof);
+        let report = |profile: &Profile| {
+            let hypothesis = &self.hypotheses[profile.hypothesis];
+            let variable = &hypothesis.variables[profile.variable];
+            let member = set.settings.iter().position(|setting| setting.hypothesis == profile.hypothesis)?;
+            let (fit, sd) =
+                (set.settings[member].values[profile.variable], set.standard_deviations[member][profile.variable]);
+            Some(ProfileReport {
+                kind: hypothesis.cause.kind.to_owned(),
+                label: hypothesis.label.clone(),
+                parameter: variable.name.to_owned(),
+                unit: variable.unit.to_owned(),
+                value: profile.value.clone(),
+                deviations: profile.value.iter().map(|value| (value - fit) / sd).collect(),
+                rise: profile.rise.clone(),
+                rise_at_95: reach * reach,
+            })
+        };
+        self.profiles.iter().filter_map(report).collect()
+    }
+
+    pub(super) fn causes(&self) -> Vec<CauseReport> {
+        let mut causes: Vec<CauseReport> = self
+            .hypotheses
+            .iter()
+            .zip(&self.weighing.inclusion)
+            .map(|(hypothesis, &probability)| CauseReport {
+                kind: hypothesis.cause.kind.to_owned(),
+                label: hypothesis.label.clone(),
+                probability,
+                confounded_with: hypothesis.cause.confounded_with.iter().map(|&kind| kind.to_owned()).collect(),
+            })
+            .collect();
+        causes.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+        causes
+    }
+
+    pub(super) fn next_report<R: utoipa::ToSchema>(&self, next: NextMeasurement<R>) -> NextReport<R> {
+        let kinds = |members: &[usize]| members.iter().map(|&h| self.kind(h).to_owned()).collect();
+        let count = |rows: usize| u32::try_from(rows).unwrap_or(u32::MAX);
+        NextReport {
+            changes: next.changes.to_owned(),
+            run: next.run,
+            rows: count(next.rows),
+            leader: kinds(&next.leader),
+            rival: kinds(&next.rival),
+            separation_now_sigmas: next.separation_now,
+            separation_then_sigmas: next.separation_then,
+            bayes_factor: next.bayes_factor,
+            rows_needed: next.rows_needed.map(count),
+            candidates: next
+                .candidates
+                .into_iter()
+                .map(|(changes, run, separation)| CandidateReport {
+                    changes: changes.to_owned(),
+                    run,
+                    separation_sigmas: separation,
+                    bayes_factor: bayes_factor(next.separation_now, separation),
+                })
+                .collect(),
+        }
+    }
+
+    /// What leading sets change, and how well they can be told apart.
+    pub(super) fn signatures(&self) -> Result<(Vec<SignatureReport>, Vec<SeparationReport>), Failure> {
+        let mut signatures: Vec<Signature> = Vec::new();
+        for set in self.weighing.named_sets() {
+            // A set lies as near as one likes to what it extends.
+            if signatures.iter().any(|likelier| likelier.members.iter().all(|h| set.members.contains(h))) {
+                continue;
+            }
+            signatures.push(Signature::of(self.weighing, &set.members, &set.settings)?);
+            if signatures.len() == SEPARATED_SETS {
+                break;
+            }
+        }
+        let kinds = |members: &[usize]| members.iter().map(|&h| self.kind(h).to_owned()).collect();
+        let apart = separations(&signatures)
+            .into_iter()
+            .map(|pair| SeparationReport { a: kinds(&pair.a), b: kinds(&pair.b), sigmas: pair.sigmas })
+            .collect();
+        let changes = signatures
+            .into_iter()
+            .map(|signature| SignatureReport { causes: kinds(&signature.members), change: signature.change })
+            .collect();
+        Ok((changes, apart))
+    }
+}
+
+/// Two-sided quantile of Student's t, or of the normal distribution where the scatter is known.
+pub(super) fn quantile(share: f64, dof: f64) -> f64 {
+    let p = f64::midpoint(1.0, share);
+    match StudentsT::new(0.0, 1.0, dof) {
+        Ok(student) if dof.is_finite() => student.inverse_cdf(p),
+        _ => Normal::standard().inverse_cdf(p),
+    }
+}

@@ -1,0 +1,105 @@
+//! Stored models: exported, stored, compared, deleted.
+
+use precut::registry::Registry;
+use serde_json::{Value, json};
+
+use crate::support::{Server, problem};
+
+async fn server() -> Server {
+    Server::start_of(Registry::standard().unwrap(), |_| {}).await
+}
+
+fn lathe(delta: f64, low: f64, high: f64) -> Value {
+    json!({
+        "calculator": "deflection-compensation",
+        "effects": [{ "kind": "headstock_compliance", "delta_um_per_n": delta }],
+        "provenance": {
+            "quantity": "diameter_deviation_um",
+            "causes": [{ "kind": "headstock_compliance", "label": "",
+                "parameters": [{ "name": "delta_um_per_n", "interval_95": [low, high] }] }]
+        }
+    })
+}
+
+async fn put(server: &Server, name: &str, model: &Value) -> u16 {
+    let request = server.client.put(server.url(&format!("/v1/models/{name}")));
+    request.header("content-type", "application/json").body(model.to_string()).send().await.unwrap().status().as_u16()
+}
+
+async fn got(server: &Server, path: &str) -> Value {
+    server.get(path).send().await.unwrap().json().await.unwrap()
+}
+
+#[tokio::test]
+async fn two_models_are_compared_cause_by_cause() {
+    let server = server().await;
+    assert_eq!(put(&server, "winter", &lathe(0.022, 0.020, 0.024)).await, 201);
+    let mut summer = lathe(0.030, 0.027, 0.033);
+    summer["effects"].as_array_mut().unwrap().push(json!({ "kind": "tailstock_offset", "offset_um": 5.0 }));
+    assert_eq!(put(&server, "summer", &summer).await, 201);
+
+    let model = got(&server, "/v1/models/winter").await;
+    let address = format!("{}summer", model["links"]["comparison"].as_str().unwrap());
+    let both = got(&server, &address).await;
+    assert_eq!(both["calculator"], "deflection-compensation");
+    assert_eq!((&both["model"]["name"], &both["other"]["name"]), (&json!("winter"), &json!("summer")));
+    assert_eq!(both["identical"], false);
+    let delta = &both["effects"][0]["parameters"][0];
+    assert_eq!(
+        (&delta["name"], &delta["model"], &delta["other"]),
+        (&json!("delta_um_per_n"), &json!(0.022), &json!(0.03))
+    );
+    assert_eq!(delta["apart"], true);
+    assert_eq!(
+        (&both["effects"][1]["kind"], &both["effects"][1]["has"]),
+        (&json!("tailstock_offset"), &json!("other"))
+    );
+
+    // Two revisions of one name; the same one twice.
+    assert_eq!(put(&server, "winter", &lathe(0.023, 0.021, 0.025)).await, 200);
+    let revisions = got(&server, "/v1/models/winter@1/comparison?with=winter").await;
+    assert_eq!(revisions["other"]["revision"], 2);
+    assert_eq!(revisions["effects"][0]["parameters"][0]["apart"], false);
+    assert_eq!(got(&server, "/v1/models/winter/comparison?with=winter@2").await["identical"], true);
+}
+
+#[tokio::test]
+async fn what_cannot_be_compared_says_why() {
+    let server = server().await;
+    assert_eq!(put(&server, "winter", &lathe(0.022, 0.020, 0.024)).await, 201);
+    let ring =
+        json!({ "calculator": "ring-roundness", "effects": [{ "kind": "tool_push_off", "push_off_ratio": 0.4 }] });
+    assert_eq!(put(&server, "ring", &ring).await, 201);
+    for (path, status, code) in [
+        ("/v1/models/winter/comparison?with=ring", 422, "invalid_model"),
+        ("/v1/models/winter/comparison?with=wintr", 404, "unknown_model"),
+        ("/v1/models/wintr/comparison?with=winter", 404, "unknown_model"),
+        ("/v1/models/winter/comparison", 400, "bad_query"),
+        ("/v1/models/winter/comparison?with=ring&x=1", 400, "bad_query"),
+    ] {
+        let response = server.get(path).send().await.unwrap();
+        problem(response, status, code).await;
+    }
+}
+
+#[tokio::test]
+async fn an_exported_model_is_stored_elsewhere_as_it_was_and_deleted() {
+    let server = server().await;
+    assert_eq!(put(&server, "winter", &lathe(0.022, 0.020, 0.024)).await, 201);
+    let exported = got(&server, "/v1/models/winter").await;
+    assert_eq!(put(&server, "copy", &exported).await, 201);
+    assert_eq!(got(&server, "/v1/models/copy").await["sha256"], exported["sha256"]);
+    let names: Vec<Value> = got(&server, "/v1/models").await["items"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|model| model["name"].clone())
+        .collect();
+    assert_eq!(names, ["copy", "winter"]);
+    let gone = server.client.delete(server.url("/v1/models/copy")).send().await.unwrap();
+    assert_eq!(gone.status(), 204);
+    assert_eq!(server.get("/v1/models/copy").send().await.unwrap().status(), 404);
+    let mut damaged = exported;
+    damaged["effects"][0]["delta_um_per_n"] = json!(0.5);
+    assert_eq!(put(&server, "other", &damaged).await, 422);
+}
