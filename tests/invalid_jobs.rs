@@ -11,7 +11,11 @@ use support::{cases, translate};
 
 /// Code and pointer of every fault.
 fn faults(registry: &Registry, job: &Value) -> Vec<(String, String)> {
-    match check_now(registry, "deflection-compensation", Body::Json(job.to_string().into())) {
+    faults_of(registry, "deflection-compensation", job)
+}
+
+fn faults_of(registry: &Registry, calculator: &str, job: &Value) -> Vec<(String, String)> {
+    match check_now(registry, calculator, Body::Json(job.to_string().into())) {
         Err(Error::Invalid { findings, .. }) => findings.into_iter().map(|f| (f.code.to_owned(), f.pointer)).collect(),
         Err(error) => panic!("{error:?}"),
         Ok(_) => panic!("accepted: {job}"),
@@ -157,4 +161,28 @@ fn all_faults_come_at_once() {
     ] {
         assert!(codes.contains(&code), "{code} is not among {codes:?}");
     }
+}
+
+/// A table that cannot be read is one fault: nothing is said of a job without it, or with an empty one.
+#[test]
+fn a_cell_that_cannot_be_read_is_the_only_fault() {
+    let registry = Registry::standard().unwrap();
+    let rows = |bad: u32| -> String {
+        (0..72).map(|i| format!("{},{}\n", 5 * i, if i == bad { "x" } else { "150" })).collect()
+    };
+    let mut job = json!({
+        "measured_profile": { "csv": format!("angle_deg,radius_mm\n{}", rows(7)) },
+        "supports": { "distance_mm": 200, "depth_mm": 111 },
+        "tool": { "x_mm": 100, "y_mm": 113.5, "feed_mm_per_rev": 0.0234375, "revolutions": 107 },
+    });
+    let of = |job: &Value| faults_of(&registry, "ring-roundness", job);
+    assert_eq!(of(&job), [("bad_cell".to_owned(), "/measured_profile/7/radius_mm".to_owned())]);
+    // Without any table the rule speaks, and other rules are broken whatever became of the table.
+    let mut without = job.clone();
+    without.as_object_mut().unwrap().remove("measured_profile");
+    assert!(of(&without).iter().any(|(code, _)| code == "ring_or_profile"));
+    job["effects"] = json!([{ "kind": "spark_out_missing", "spark_out_revolutions": 0 },
+        { "kind": "spark_out_missing", "spark_out_revolutions": 0 }]);
+    let codes: Vec<String> = of(&job).into_iter().map(|(code, _)| code).collect();
+    assert!(codes.contains(&"bad_cell".to_owned()) && codes.contains(&"duplicate_effect".to_owned()), "{codes:?}");
 }

@@ -50,7 +50,7 @@ pub(crate) fn read_with(
     let mut job = json::parse(job)?;
     let misfit = given.and_then(|given| model::impose(models.registry, entry, &mut job, given));
     if let Some(misfit) = misfit {
-        return Err(Found { total: 1, findings: vec![misfit] }.with_rules(entry, &job));
+        return Err(Found::of(vec![misfit]).with_rules(entry, &job));
     }
     let names_a_model = model::named(models.registry, entry, &mut job).is_some();
     let of_model = model::extend(models, entry, &mut job);
@@ -71,7 +71,7 @@ fn read_extended(
 ) -> Result<Ready, Error> {
     match check_schema(entry, &mut job, parts) {
         Ok(()) if of_model.is_empty() => prepared(entry, &job),
-        Ok(()) => Err(Found { total: of_model.len(), findings: of_model }.with_rules(entry, &job)),
+        Ok(()) => Err(Found::of(of_model).with_rules(entry, &job)),
         Err(found) => Err(found.and(of_model).with_rules(entry, &job)),
     }
 }
@@ -106,9 +106,15 @@ pub(crate) fn prepared(entry: &Arc<Entry>, job: &Value) -> Result<Ready, Error> 
 struct Found {
     findings: Vec<Finding>,
     total: usize,
+    /// Pointers of tables that could not be read.
+    unread: Vec<String>,
 }
 
 impl Found {
+    fn of(findings: Vec<Finding>) -> Self {
+        Self { total: findings.len(), findings, unread: Vec::new() }
+    }
+
     /// With more; the first fault at a place is enough.
     fn and(mut self, more: Vec<Finding>) -> Self {
         for finding in more {
@@ -128,7 +134,7 @@ impl Found {
         let overlong = self.findings.iter().any(|finding| general_code(finding) == "too_many_items");
         if !overlong && self.total <= Error::MOST_FAULTS {
             let (job, model) = model::split(entry, job);
-            for rule in entry.broken_rules(&job) {
+            for rule in rules_whatever_is_unread(entry, &job, &self.unread) {
                 let rule = model::pointed_at_model(entry, &job, model.as_ref(), rule);
                 match self.findings.iter_mut().find(|finding| finding.pointer == rule.pointer) {
                     Some(finding) if finding.code == general_code(finding) => *finding = rule,
@@ -142,6 +148,23 @@ impl Found {
         }
         invalid(self.findings, self.total)
     }
+}
+
+/// The rules that a job breaks whether a table that could not be read were absent or empty: a rule that one of the two
+/// breaks would speak of the table, whose fault is listed already.
+fn rules_whatever_is_unread(entry: &Entry, job: &Value, unread: &[String]) -> Vec<Finding> {
+    let mut broken = entry.broken_rules(job);
+    if !unread.is_empty() && !broken.is_empty() {
+        let mut empty = job.clone();
+        for pointer in unread {
+            if let Some(table) = empty.pointer_mut(pointer) {
+                *table = Value::Array(Vec::new());
+            }
+        }
+        let also = entry.broken_rules(&empty);
+        broken.retain(|rule| also.iter().any(|other| (other.code, &other.pointer) == (rule.code, &rule.pointer)));
+    }
+    broken
 }
 
 /// The general code of a schema's fault, whatever code its field has of its own.
@@ -169,7 +192,7 @@ fn check_schema(entry: &Entry, job: &mut Value, parts: &[TablePart]) -> Result<(
         .collect();
     let total = schema_faults.total - (listed - findings.len()) + table_faults.total;
     findings.extend(table_faults.listed);
-    if total == 0 { Ok(()) } else { Err(Found { findings, total }) }
+    if total == 0 { Ok(()) } else { Err(Found { findings, total, unread: tables.into_unread() }) }
 }
 
 /// What the schema alone finds wrong with a job.

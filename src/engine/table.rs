@@ -50,6 +50,11 @@ impl Tables {
         self.unread.contains(&finding.pointer)
     }
 
+    /// Pointers of tables that could not be read and are null in the job.
+    pub(crate) fn into_unread(self) -> Vec<String> {
+        self.unread
+    }
+
     /// A fault in a row that came as CSV also says on which line the row stood.
     pub(crate) fn located(&self, finding: Finding) -> Finding {
         let line = self.sources.iter().find_map(|source| {

@@ -6,6 +6,8 @@ use serde_json::{Value, json};
 use crate::chromium::Page;
 use crate::{DRAWN, SETTLED, both};
 
+const LIMIT: &str = "#field-zones-0-deflection_max_um";
+
 /// The result behind the key that the page shows under "Basis".
 fn shown_result(page: &mut Page) -> Value {
     page.click("#tab-basis");
@@ -118,7 +120,6 @@ fn the_point_of_the_trade_off_is_dragged_and_stepped_and_its_tolerance_goes_into
     // The schedule shows roughness against its limit, too.
     page.until("[...document.querySelectorAll('.axis-name')].some(it => it.textContent.startsWith('Roughness'))");
     choose(&mut page, "Objective over");
-    const LIMIT: &str = "#field-zones-0-deflection_max_um";
     assert_eq!(page.value(LIMIT), "10");
     page.until("document.querySelector('.preview')?.dataset.factor === '1' && document.querySelector('#use-tolerance').disabled");
 
@@ -178,6 +179,7 @@ fn the_clamp_force_is_shown_as_asked_and_as_set() {
     assert!(number(&bars, "/3") > number(&bars, "/1") && number(&bars, "/1") > number(&bars, "/0"), "{bars}");
     // Set too low it is said.
     page.fill("#field-fixture-clamp_force_n", "300");
+    page.click(".form-head .primary");
     page.until(&format!("document.querySelector('.clamp')?.textContent.includes('not enough') && {SETTLED}"));
     page.assert_calm();
 }

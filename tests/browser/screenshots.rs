@@ -8,7 +8,7 @@ use crate::chromium::Page;
 use crate::{SETTLED, both};
 
 /// Name, place, width, height, whether dark.
-const SHOTS: [(&str, &str, u32, u32, bool); 17] = [
+const SHOTS: [(&str, &str, u32, u32, bool); 18] = [
     ("deflection", "deflection-compensation", 1440, 900, false),
     ("deflection-ru", "deflection-compensation?example=stepped_with_rest", 1440, 900, false),
     ("lobes", "fixture-stability?example=lobes", 1440, 900, true),
@@ -22,6 +22,7 @@ const SHOTS: [(&str, &str, u32, u32, bool); 17] = [
     ("diagnosis-phone", "diagnosis", 360, 740, true),
     ("diagnosis-wide", "diagnosis", 2560, 1300, false),
     ("models", "models", 1024, 600, false),
+    ("models-phone", "models", 360, 740, true),
     ("trials", "machinability-fit", 1920, 1080, false),
     ("tablet", "roundness-evaluation", 1024, 600, true),
     ("phone", "fixture-stability?example=lobes", 360, 740, false),

@@ -13,9 +13,17 @@ use std::path::Path;
 use console::Console;
 use markdown::{Document, documents};
 
-/// The README's figure and the command that draws it.
-const FIGURE: &str = "docs/figures/shaft-90x2000.svg";
-const DRAW: &str = "precut example deflection-compensation | precut solve --format svg";
+/// The README's figures of examples and the commands that draw them.
+const FIGURES: [(&str, &str); 2] = [
+    ("docs/figures/shaft-90x2000.svg", "precut example deflection-compensation | precut solve --format svg"),
+    (
+        "docs/figures/diagnosis-headstock.svg",
+        "precut example diagnosis | precut solve --format svg --figure residuals_along",
+    ),
+];
+/// The README's ring and the command that draws it from the job above it.
+const RING: &str = "docs/figures/ring-300.svg";
+const DRAW_RING: &str = "precut solve --calculator ring-roundness --format svg ring.json";
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -85,12 +93,29 @@ fn every_link_leads_somewhere() {
 }
 
 #[test]
-fn the_figure_is_what_the_command_line_draws() {
-    let drawn = Console::without_server().output(DRAW);
-    let kept = std::fs::read_to_string(root().join(FIGURE)).unwrap();
-    assert!(drawn.trim_end() == kept.trim_end(), "{FIGURE} is stale: {DRAW} --output {FIGURE}");
+fn the_figures_are_what_the_command_line_draws() {
     let readme = Document::read(root(), "README.md").text;
-    assert!(readme.contains(FIGURE) && readme.contains(DRAW), "the README shows the figure and how to draw it");
+    for (figure, draw) in FIGURES {
+        let drawn = Console::without_server().output(draw);
+        let kept = std::fs::read_to_string(root().join(figure)).unwrap_or_default();
+        assert!(drawn.trim_end() == kept.trim_end(), "{figure} is stale: {draw} --output {figure}");
+        assert!(readme.contains(figure) && readme.contains(draw), "the README shows {figure} and how to draw it");
+    }
+}
+
+/// The README's ring, from the job that stands above it.
+#[test]
+fn the_ring_is_what_the_command_line_draws() {
+    let readme = Document::read(root(), "README.md");
+    let job = readme.blocks().into_iter().find(|block| block.role() == "file=ring.json").unwrap().text;
+    let mut console = Console::without_server();
+    console.file("ring.json", &job).unwrap();
+    let drawn = console.output(DRAW_RING);
+    let kept = std::fs::read_to_string(root().join(RING)).unwrap();
+    assert!(drawn.trim_end() == kept.trim_end(), "{RING} is stale: {DRAW_RING} --output {RING}");
+    assert!(readme.text.contains(RING), "the README shows the ring");
+    let shown = DRAW_RING.replace("--format svg", "--format svg --output ring.svg");
+    assert!(readme.text.contains(&shown), "the README shows how to draw it");
 }
 
 #[test]

@@ -57,7 +57,7 @@ export function Causes({ result, schema, unit }) {
         return html` · ${field ? labelOf(one.name, field) : humanised(one.name, one.unit)} ${one.standard_deviation ? withSpread(one.value, one.standard_deviation) : number(one.value, 4)} ${field ? unitOf(field) : unitSymbol(one.unit)}${one.at_limit ? ` (${t('at_limit')})` : ''}`;
       })}</li>`)}</ul>`}
       ${like.map(({ key, name, like: others }) => html`<p key=${key} class="quiet">${t('looks_like', { cause: name, others: others.map(spoken).join(', ') })}</p>`)}
-      ${gain && html`<${Gain} ...${{ gain, unit }} noise=${result.noise?.standard_deviation} />`}
+      ${gain && html`<${Gain} ...${{ gain, unit }} />`}
       ${next && html`<h3>${t('next_measurement')}</h3>
         <p class="run">${Object.entries(next.run).map(([name, value]) => html`<span key=${name} class=${name === next.changes ? 'changed' : ''}>${fields.get(name) ? labelOf(name, fields.get(name)) : humanised(name)} ${typeof value === 'number' ? number(value, 4) : fields.get(name) ? wordOf(fields.get(name), value).toLowerCase() : String(value)} ${unitOf(fields.get(name))}</span>`)}</p>
         <p class="quiet">${t('next_separates', { leader: next.leader.map(spoken).join(' + '), rival: next.rival.map(spoken).join(' + '), now: number(next.separation_now_sigmas, 2), then: number(next.separation_then_sigmas, 2) })}</p>`}
@@ -66,9 +66,9 @@ export function Causes({ result, schema, unit }) {
 
 const percent = share => (share > 0 && share < 0.001 ? `< ${number(0.1)} %` : `${number(100 * share, share > 0.1 && share < 0.995 ? 2 : 3)} %`);
 
-/** The error on held-back data before and after, against what the scatter leaves. */
-function Gain({ gain, noise, unit }) {
-  const rows = [['base', t('error_base'), gain.rmse_base], ['extended', t('error_extended'), gain.rmse_extended], ...(noise ? [['noise', t('error_noise'), noise]] : [])];
+/** The error on held-back data before and after, against what scatter and allowances leave to any model. */
+function Gain({ gain, unit }) {
+  const rows = [['base', t('error_base'), gain.rmse_base], ['extended', t('error_extended'), gain.rmse_extended], ...(typeof gain.noise_ceiling === 'number' ? [['noise', t('error_noise'), gain.noise_ceiling]] : [])];
   const most = Math.max(...rows.map(row => row[2]));
   return html`
     <h3>${t('held_back')}</h3>

@@ -28,6 +28,7 @@ mod feed_reference;
 mod feed_support;
 mod fixture_diagnosis;
 mod fixture_diagnosis_trials;
+mod fixture_drive;
 mod fixture_effects;
 mod fixture_identification;
 mod fixture_methods;

@@ -4,90 +4,54 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::FeedSchedule;
+use super::conditions::with_conditions;
 use super::forward::MachinabilityPoint;
 use crate::calculator::{MeasuredRow, Measurement};
 use crate::effects::FactorLevel;
 
-/// What was measured in a cut, with the cut; what the row leaves out is taken from its run, then from the job.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub struct MachinabilityMeasurement {
-    /// Number of the run whose conditions it shares, from 1 in the order of `runs`.
-    #[serde(default = "one")]
-    #[schema(minimum = 1, maximum = 10_000, default = 1, example = 1, extensions(("x-symbol" = json!("i")), ("x-unit" = json!("1"))))]
-    pub run: u32,
-    /// Cutting speed.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-2, maximum = 20_000.0, example = 60.0, extensions(("x-unit" = json!("m/min")), ("x-symbol" = json!("V"))))]
-    pub speed_m_per_min: Option<f64>,
-    /// Feed.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-4, maximum = 20.0, example = 0.2, extensions(("x-unit" = json!("mm/rev")), ("x-symbol" = json!("S"))))]
-    pub feed_mm_per_rev: Option<f64>,
-    /// Depth of cut.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-4, maximum = 1000.0, example = 0.5, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("t"))))]
-    pub depth_mm: Option<f64>,
-    /// Major cutting edge angle.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1.0, maximum = 179.0, example = 75.0, extensions(("x-unit" = json!("deg")), ("x-symbol" = json!("phi"))))]
-    pub cutting_edge_angle_deg: Option<f64>,
-    /// Nose radius of the insert.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 0.01, maximum = 100.0, example = 0.8, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("r"))))]
-    pub nose_radius_mm: Option<f64>,
-    /// Flank wear of the edge: a condition of the cut, or, as the quantity, what was measured.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 0.0, maximum = 10.0, example = 0.2, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("VB"))))]
-    pub flank_wear_mm: Option<f64>,
-    /// Batch of the material.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(max_length = 64, example = "B")]
-    pub batch: Option<String>,
-    /// Levels of named factors.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    #[schema(max_items = 20)]
-    pub factors: Vec<FactorLevel>,
-    /// Place in the order of the tests.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 0.0, maximum = 1e9, example = 7.0, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("test"))))]
-    pub test: Option<f64>,
-    /// Time that the edge had been in the cut.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 0.0, maximum = 1e6, example = 5.0, extensions(("x-unit" = json!("min")), ("x-symbol" = json!("T"))))]
-    pub time_min: Option<f64>,
-    /// Measured main (tangential) force.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-9, maximum = 1e9, example = 480.0, extensions(("x-symbol" = json!("F_z")), ("x-unit" = json!("N"))))]
-    pub force_z_n: Option<f64>,
-    /// Measured passive (radial) force.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-9, maximum = 1e9, example = 210.0, extensions(("x-symbol" = json!("F_y")), ("x-unit" = json!("N"))))]
-    pub force_y_n: Option<f64>,
-    /// Measured tool life.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-9, maximum = 1e9, example = 42.0, extensions(("x-symbol" = json!("T")), ("x-unit" = json!("min"))))]
-    pub tool_life_min: Option<f64>,
-    /// Measured roughness.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-9, maximum = 1e6, example = 1.6, extensions(("x-symbol" = json!("Ra")), ("x-unit" = json!("um"))))]
-    pub roughness_um: Option<f64>,
-    /// Measured degree of hardening.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-9, maximum = 1e6, example = 25.0, extensions(("x-symbol" = json!("N")), ("x-unit" = json!("percent"))))]
-    pub hardening_percent: Option<f64>,
-    /// Measured depth of hardening.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-9, maximum = 1e6, example = 80.0, extensions(("x-symbol" = json!("h_c")), ("x-unit" = json!("um"))))]
-    pub hardening_depth_um: Option<f64>,
-    /// Standard uncertainty of the values of this row, as a share of them.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-9, maximum = 10.0, example = 0.05, extensions(("x-symbol" = json!("u")), ("x-unit" = json!("1"))))]
-    pub uncertainty_rel: Option<f64>,
-    /// Whether the row is set aside: listed, not used.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    #[schema(default = false, example = false)]
-    pub excluded: bool,
+with_conditions! {
+    /// What was measured in a cut, with the cut; what the row leaves out is taken from its run, then from the job.
+    #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+    #[serde(deny_unknown_fields)]
+    MachinabilityMeasurement, wear: "Flank wear of the edge: a condition of the cut, or, as the quantity, what was measured.", {
+        /// Number of the run whose conditions it shares, from 1 in the order of `runs`.
+        #[serde(default = "one")]
+        #[schema(minimum = 1, maximum = 10_000, default = 1, example = 1, extensions(("x-symbol" = json!("i")), ("x-unit" = json!("1"))))]
+        pub run: u32,
+    } conditions {
+        /// Measured main (tangential) force.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schema(minimum = 1e-9, maximum = 1e9, example = 480.0, extensions(("x-symbol" = json!("F_z")), ("x-unit" = json!("N"))))]
+        pub force_z_n: Option<f64>,
+        /// Measured passive (radial) force.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schema(minimum = 1e-9, maximum = 1e9, example = 210.0, extensions(("x-symbol" = json!("F_y")), ("x-unit" = json!("N"))))]
+        pub force_y_n: Option<f64>,
+        /// Measured tool life.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schema(minimum = 1e-9, maximum = 1e9, example = 42.0, extensions(("x-symbol" = json!("T")), ("x-unit" = json!("min"))))]
+        pub tool_life_min: Option<f64>,
+        /// Measured roughness.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schema(minimum = 1e-9, maximum = 1e6, example = 1.6, extensions(("x-symbol" = json!("Ra")), ("x-unit" = json!("um"))))]
+        pub roughness_um: Option<f64>,
+        /// Measured degree of hardening.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schema(minimum = 1e-9, maximum = 1e6, example = 25.0, extensions(("x-symbol" = json!("N")), ("x-unit" = json!("percent"))))]
+        pub hardening_percent: Option<f64>,
+        /// Measured depth of hardening.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schema(minimum = 1e-9, maximum = 1e6, example = 80.0, extensions(("x-symbol" = json!("h_c")), ("x-unit" = json!("um"))))]
+        pub hardening_depth_um: Option<f64>,
+        /// Standard uncertainty of the values of this row, as a share of them.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schema(minimum = 1e-9, maximum = 10.0, example = 0.05, extensions(("x-symbol" = json!("u")), ("x-unit" = json!("1"))))]
+        pub uncertainty_rel: Option<f64>,
+        /// Whether the row is set aside: listed, not used.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        #[schema(default = false, example = false)]
+        pub excluded: bool,
+    }
 }
 
 fn one() -> u32 {

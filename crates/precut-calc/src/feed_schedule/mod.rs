@@ -21,6 +21,7 @@ mod case;
 mod check;
 mod compensated;
 mod compliance;
+mod conditions;
 mod continuous;
 mod design;
 mod effects;

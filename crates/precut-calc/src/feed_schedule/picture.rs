@@ -125,6 +125,16 @@ fn outline(job: &Job, outcome: &Outcome, height: f64) -> Panel {
             role: Role::Stock,
         });
     }
+    let radius_at = |z_mm: f64| {
+        let segments = job.shaft.iter().flat_map(|shaft| &shaft.segments);
+        let mut right = 0.0;
+        let ends = segments.map(|segment| {
+            right += segment.length_mm;
+            (right, segment.diameter_mm / 2.0)
+        });
+        let ends: Vec<(f64, f64)> = ends.collect();
+        ends.iter().find(|(right, _)| z_mm <= *right).or(ends.last()).map_or(0.0, |(_, radius)| *radius)
+    };
     for (i, support) in job.supports.iter().enumerate() {
         let glyph = match support {
             Support::Centre { .. } if i == 0 => Glyph::CentreLeft,
@@ -134,7 +144,9 @@ fn outline(job: &Job, outcome: &Outcome, height: f64) -> Panel {
             Support::FollowRest { .. } => Glyph::FollowRest,
         };
         if let (Some(z), Some(_)) = (support.station_mm(), &job.shaft) {
-            items.push(Item::Glyph { glyph, x: z, y: 0.0 });
+            // Centres and jaws hold the axis; a rest bears on the surface.
+            let on_surface = matches!(glyph, Glyph::SteadyRest | Glyph::FollowRest);
+            items.push(Item::Glyph { glyph, x: z, y: if on_surface { radius_at(z) } else { 0.0 } });
         }
     }
     Panel { y: Axis::linear("radius", "mm"), height, items }

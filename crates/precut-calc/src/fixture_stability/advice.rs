@@ -3,6 +3,7 @@
 use crate::calculator::{Finding, Message};
 
 use super::answer::Study;
+use super::input::Spindle;
 use super::output::{ChatterKind, FirstLimit, FixtureOutcome, FixtureState, OpenJoint};
 
 /// Distance of the tooth frequency (or a harmonic) from a natural frequency that is worth a warning.
@@ -13,6 +14,8 @@ const NEAR_CHATTER: f64 = 0.9;
 const MERGED_LOBES: f64 = 50.0;
 /// Difference of the zeroth-order limit that is worth saying.
 const ZEROTH_OFF: f64 = 0.05;
+/// Steps per oscillation below which a run is not even a screening (`fixture/5.5`).
+const COARSEST_STEPS: f64 = 24.0;
 /// Damping ratio below which a limit hangs on its damping alone.
 const UNDAMPED: f64 = 1e-6;
 
@@ -30,6 +33,10 @@ pub(super) const WARNING_CODES: &[&str] = &[
     "multiplier_not_converged",
     "depth_not_examined",
     "verdict_by_simulation",
+    "spindle_power_exceeded",
+    "spindle_torque_exceeded",
+    "spindle_speed_outside_table",
+    "simulation_too_coarse",
 ];
 
 /// Codes of the explanations made here.
@@ -38,11 +45,14 @@ pub(super) const EXPLANATION_CODES: &[&str] = &[
     "fixture_chatters",
     "fixture_chip_lost",
     "fixture_joint_opens",
+    "fixture_spindle_overloaded",
     "chatter_limit_is",
     "no_chatter_limit",
     "better_speed_is",
     "lowest_limit_is",
     "first_limit_is",
+    "spindle_suffices",
+    "spindle_limits_depth",
     "clamp_force_needed",
     "clamp_force_only_inertia",
     "opening_is_unstable",
@@ -102,6 +112,16 @@ pub(super) fn warnings(study: &Study<'_>, outcome: &FixtureOutcome) -> Vec<Findi
     if outcome.simulation.diverged {
         found.push(Finding::new("simulation_diverged", "/simulation"));
     }
+    let highest = outcome.modes.last().map_or(0.0, |mode| mode.natural_frequency_hz);
+    let per_oscillation = f64::from(outcome.simulation.steps_per_tooth) * tooth / highest;
+    if per_oscillation < COARSEST_STEPS {
+        found.push(Finding::new("simulation_too_coarse", "/simulation/steps_per_tooth").measured(
+            per_oscillation,
+            COARSEST_STEPS,
+            "1",
+        ));
+    }
+    spindle_warnings(study, outcome, &mut found);
     let multiplier = &outcome.multiplier;
     if (multiplier.modulus - 1.0).abs() < multiplier.modulus_error {
         found.push(Finding::new("multiplier_not_converged", "/cut").measured(
@@ -121,6 +141,30 @@ pub(super) fn warnings(study: &Study<'_>, outcome: &FixtureOutcome) -> Vec<Findi
         ));
     }
     found
+}
+
+fn spindle_warnings(study: &Study<'_>, outcome: &FixtureOutcome, found: &mut Vec<Finding>) {
+    let (job, drive) = (study.job, &outcome.drive);
+    if let Some(limit) = drive.power_limit_kw
+        && drive.motor_power_kw > limit
+    {
+        found.push(Finding::new("spindle_power_exceeded", "/cut/depth_mm").measured(drive.motor_power_kw, limit, "kW"));
+    }
+    if let Some(limit) = drive.torque_limit_n_m
+        && drive.torque_mean_n_m > limit
+    {
+        let asked = drive.torque_mean_n_m;
+        found.push(Finding::new("spindle_torque_exceeded", "/cut/depth_mm").measured(asked, limit, "N m"));
+    }
+    if let Some((from, to)) = job.spindle.as_ref().and_then(Spindle::tabled_rpm) {
+        let speed = study.case.working.spindle_rpm;
+        if speed < from || speed > to {
+            let end = if speed < from { from } else { to };
+            found.push(
+                Finding::new("spindle_speed_outside_table", "/cut/spindle_speed_rpm").measured(speed, end, "rev/min"),
+            );
+        }
+    }
 }
 
 fn joint_name(joint: Option<OpenJoint>) -> &'static str {
@@ -151,6 +195,9 @@ pub(super) fn explanation(study: &Study<'_>, outcome: &FixtureOutcome) -> Vec<Me
             .with("time_s", verdict.first_opening_s.unwrap_or(0.0))
             .with("share", verdict.open_share)
             .with("peak_to_peak_um", verdict.peak_to_peak_um),
+        FixtureState::SpindleOverloaded => Message::new("fixture_spindle_overloaded")
+            .with("margin", verdict.drive_margin.unwrap_or(0.0))
+            .with("peak_to_peak_um", verdict.peak_to_peak_um),
     }];
     said.push(match study.chatter_mm {
         Some(limit) => Message::new("chatter_limit_is")
@@ -158,12 +205,15 @@ pub(super) fn explanation(study: &Study<'_>, outcome: &FixtureOutcome) -> Vec<Me
             .with("spindle_speed_rpm", study.case.working.spindle_rpm),
         None => Message::new("no_chatter_limit").with("depth_mm", study.examined_mm),
     });
+    said.extend(of_spindle(outcome));
     if let Some(lobes) = &outcome.lobes {
         if let Some(better) = lobes.better_speeds.first() {
+            let chatter = better.chatter_mm.unwrap_or(study.examined_mm);
+            let allowed = better.drive_mm.map_or(chatter, |drive| drive.min(chatter));
             said.push(
                 Message::new("better_speed_is")
                     .with("spindle_speed_rpm", better.spindle_speed_rpm)
-                    .with("depth_mm", better.chatter_mm.unwrap_or(study.examined_mm)),
+                    .with("depth_mm", allowed),
             );
         }
         if let Some(lowest) = &lobes.lowest {
@@ -212,4 +262,25 @@ pub(super) fn explanation(study: &Study<'_>, outcome: &FixtureOutcome) -> Vec<Me
     said.push(Message::new("no_surface_location_error"));
     said.push(Message::new("fixture_not_modelled"));
     said
+}
+
+/// What the spindle allows at this speed, where something is known of it.
+fn of_spindle(outcome: &FixtureOutcome) -> Option<Message> {
+    let drive = &outcome.drive;
+    let margin = outcome.verdict.drive_margin?;
+    let (power, torque) = (drive.power_depth_mm, drive.torque_depth_mm);
+    let depth = [power, torque].into_iter().flatten().reduce(f64::min)?;
+    let what = if power.is_some_and(|power| power <= depth) { "power" } else { "torque" };
+    let code = match outcome.chatter_depth_mm {
+        Some(chatter) if chatter < depth => "spindle_suffices",
+        _ => "spindle_limits_depth",
+    };
+    Some(
+        Message::new(code)
+            .with("what", what)
+            .with("depth_mm", depth)
+            .with("power_kw", drive.motor_power_kw)
+            .with("torque_n_m", drive.torque_mean_n_m)
+            .with("margin", margin),
+    )
 }

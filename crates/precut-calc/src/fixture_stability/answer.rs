@@ -7,15 +7,17 @@ use rayon::prelude::*;
 use crate::calculator::{Failure, Message, Monitor, checkpoint};
 
 use super::acting::Case;
+use super::drive::{self, DriveDepths};
 use super::floquet::{Multiplier, Working};
 use super::holding::Closed;
 use super::input::{Analysis, FixtureJob};
 use super::lobes::{Plane, Point, Rules, boundary, by_states, critical_depth, map, point};
 use super::march::{Marched, Plan, Step};
 use super::output::{
-    AmplitudeCurve, ArcProfile, ChatterKind, ClampForce, DepthLimits, Engagement, FirstLimit, FixtureOutcome,
-    FixtureState, FixtureVerdict, FloquetMultiplier, ForcedMotion, Histories, LobeBoundary, LobeDiagram, LobeMap,
-    OpenJoint, Oscillogram, QuasiStatic, Simulated, SpeedLimit, TextbookForce, VibrationMode, ZerothOrder,
+    AmplitudeCurve, ArcProfile, ChatterKind, ClampForce, CuttingDrive, DepthLimits, Engagement, FirstLimit,
+    FixtureOutcome, FixtureState, FixtureVerdict, FloquetMultiplier, ForcedMotion, Histories, LobeBoundary,
+    LobeDiagram, LobeMap, OpenJoint, Oscillogram, QuasiStatic, Simulated, SpeedLimit, TextbookForce, VibrationMode,
+    ZerothOrder,
 };
 use super::parts::plane_of;
 use super::picture::lobes_so_far;
@@ -57,6 +59,12 @@ impl<'a> Study<'a> {
 
     fn stable(&self) -> bool {
         self.point.multiplier.modulus < 1.0
+    }
+
+    /// Depths at which the spindle of the job gives out at a speed; none without one.
+    fn drive_depths(&self, spindle_rpm: f64) -> DriveDepths {
+        let working = Working { spindle_rpm, ..self.case.working };
+        self.job.spindle.as_ref().map_or_else(DriveDepths::default, |of| drive::depths(&self.case, of, working))
     }
 
     /// Runs the cut in time at the working point.
@@ -119,10 +127,12 @@ pub(super) fn outcome(study: &Study<'_>) -> Result<FixtureOutcome, Failure> {
     let lobes = if job.asks(Analysis::Lobes) { Some(lobes(study)?) } else { None };
     let history = keep.then(|| histories(study, &run_));
     let zeroth_order = zeroth_order(study);
+    let drive = cutting_drive(study);
     Ok(FixtureOutcome {
-        verdict: verdict(study, &simulation, &run_),
+        verdict: verdict(study, &simulation, &run_, drive.margin()),
         engagement: engagement(study),
         quasi_static: quasi_static(case),
+        drive,
         modes: case
             .holding
             .modes()
@@ -183,6 +193,36 @@ fn quasi_static(case: &Case) -> QuasiStatic {
         stiffness_n_per_mm: stiffness,
         displacement_max_um: high / stiffness * UM_PER_MM,
         displacement_min_um: low / stiffness * UM_PER_MM,
+    }
+}
+
+/// What the cut asks of the spindle (`fixture/5.8`).
+fn cutting_drive(study: &Study<'_>) -> CuttingDrive {
+    let Study { case, job, .. } = study;
+    let working = case.working;
+    let torque = drive::mean_torque_n_m(&case.cutting, working.feed_mm, working.depth_mm);
+    let power_kw = drive::power_kw(torque, working.spindle_rpm);
+    let available = job.spindle.as_ref().map(|spindle| spindle.available(working.spindle_rpm));
+    let depths = study.drive_depths(working.spindle_rpm);
+    CuttingDrive {
+        torque_mean_n_m: torque,
+        torque_max_n_m: case.cutting.tangential_max_n(working.feed_mm, working.depth_mm) * case.cutting.radius_mm
+            / 1000.0,
+        power_kw,
+        motor_power_kw: power_kw / job.spindle.as_ref().map_or(1.0, |spindle| spindle.efficiency),
+        power_limit_kw: available.and_then(|of| of.power_kw),
+        torque_limit_n_m: available.and_then(|of| of.torque_n_m),
+        power_depth_mm: depths.power_mm,
+        torque_depth_mm: depths.torque_mm,
+    }
+}
+
+impl CuttingDrive {
+    /// What the spindle gives over what the cut asks, the lesser of power and torque.
+    fn margin(&self) -> Option<f64> {
+        let of = |limit: Option<f64>, asked: f64| limit.filter(|_| asked > 0.0).map(|limit| limit / asked);
+        let both = [of(self.power_limit_kw, self.motor_power_kw), of(self.torque_limit_n_m, self.torque_mean_n_m)];
+        both.into_iter().flatten().reduce(f64::min)
     }
 }
 
@@ -286,7 +326,7 @@ fn simulation(study: &Study<'_>, plan: &Plan, run: &Marched) -> Simulated {
     }
 }
 
-fn verdict(study: &Study<'_>, simulated: &Simulated, run: &Marched) -> FixtureVerdict {
+fn verdict(study: &Study<'_>, simulated: &Simulated, run: &Marched, drive_margin: Option<f64>) -> FixtureVerdict {
     let case = &study.case;
     let opened = (run.first_open_left_s, run.first_open_right_s);
     let joint = match opened {
@@ -299,12 +339,15 @@ fn verdict(study: &Study<'_>, simulated: &Simulated, run: &Marched) -> FixtureVe
         FixtureState::JointOpen
     } else if !study.stable() || !simulated.settled {
         FixtureState::Chatter
+    } else if drive_margin.is_some_and(|margin| margin < 1.0) {
+        FixtureState::SpindleOverloaded
     } else if run.lost_cut > 0.0 {
         FixtureState::ChipLost
     } else {
         FixtureState::Stable
     };
-    let exact = state == FixtureState::Stable;
+    // The spindle does not shake the workpiece: what it could not drive would still move as the forced motion does.
+    let exact = matches!(state, FixtureState::Stable | FixtureState::SpindleOverloaded) && run.lost_cut <= 0.0;
     let range = if exact { study.forced.x_mm } else { run.x_mm };
     let span_um = range.span() * UM_PER_MM;
     let asked = study.forced.left_n.high.max(study.forced.right_n.high).max(0.0);
@@ -320,6 +363,7 @@ fn verdict(study: &Study<'_>, simulated: &Simulated, run: &Marched) -> FixtureVe
         displacement_max_um: range.high.abs().max(range.low.abs()) * UM_PER_MM,
         depth_margin: study.chatter_mm.filter(|_| case.working.depth_mm > 0.0).map(|h| h / case.working.depth_mm),
         clamp_margin: case.holding.clamp_force_n.filter(|_| exact && asked > 0.0).map(|force| force / asked),
+        drive_margin,
     }
 }
 
@@ -436,11 +480,14 @@ fn limits(study: &Study<'_>) -> Result<DepthLimits, Failure> {
     let amplitude_mm = reach(&|at| at.span_mm, case.working.feed_mm)?;
     let movable_opens_mm = force.map(|force| reach(&|at| at.left_n, force)).transpose()?.flatten();
     let fixed_opens_mm = force.map(|force| reach(&|at| at.right_n, force)).transpose()?.flatten();
+    let drive = study.drive_depths(case.working.spindle_rpm);
     let candidates = [
         (FirstLimit::Chatter, study.chatter_mm),
         (FirstLimit::MovableOpens, movable_opens_mm),
         (FirstLimit::FixedOpens, fixed_opens_mm),
         (FirstLimit::Amplitude, amplitude_mm),
+        (FirstLimit::Power, drive.power_mm),
+        (FirstLimit::Torque, drive.torque_mm),
     ];
     // At one depth the earlier of the list is the cause of the later.
     let first = candidates
@@ -452,7 +499,8 @@ fn limits(study: &Study<'_>) -> Result<DepthLimits, Failure> {
         checkpoint(study.monitor)?;
         let working = Working { spindle_rpm: speed.0, ..case.working };
         let chatter_mm = critical_depth(&study.rules, &case.holding, &case.cutting, working, study.examined_mm)?;
-        at_speeds.push(SpeedLimit { spindle_speed_rpm: speed.0, chatter_mm });
+        let drive_mm = study.drive_depths(speed.0).least_mm();
+        at_speeds.push(SpeedLimit { spindle_speed_rpm: speed.0, chatter_mm, drive_mm });
     }
     let column = |of: &dyn Fn(&AtDepth) -> f64| found.iter().map(of).collect::<Vec<f64>>();
     Ok(DepthLimits {
@@ -460,6 +508,8 @@ fn limits(study: &Study<'_>) -> Result<DepthLimits, Failure> {
         amplitude_mm,
         movable_opens_mm,
         fixed_opens_mm,
+        power_mm: drive.power_mm,
+        torque_mm: drive.torque_mm,
         first: first.map(|(what, _)| what),
         first_mm: first.map(|(_, depth)| depth),
         removal_rate_cm3_per_min: first.map(|(_, depth)| removal_rate(case, depth)),
@@ -540,7 +590,11 @@ fn lobes(study: &Study<'_>) -> Result<LobeDiagram, Failure> {
     let boundary = beside(study, &plane, &points)?;
     let limits: Vec<SpeedLimit> = points
         .iter()
-        .map(|p| SpeedLimit { spindle_speed_rpm: p.spindle_rpm, chatter_mm: p.crossings_mm.first().copied() })
+        .map(|p| SpeedLimit {
+            spindle_speed_rpm: p.spindle_rpm,
+            chatter_mm: p.crossings_mm.first().copied(),
+            drive_mm: study.drive_depths(p.spindle_rpm).least_mm(),
+        })
         .collect();
     let lowest = limits
         .iter()
@@ -584,6 +638,8 @@ fn beside(study: &Study<'_>, plane: &Plane, points: &[super::lobes::BoundaryPoin
         study.monitor.progress(0.9 + 0.09 * done, Message::new("stage_boundary"));
     }
     let column = |which: usize| rows.iter().map(|row| row[which]).collect::<Vec<_>>();
+    let drive: Vec<DriveDepths> = points.iter().map(|p| study.drive_depths(p.spindle_rpm)).collect();
+    let shown = |depth: Option<f64>| depth.filter(|depth| *depth <= plane.most_mm);
     Ok(LobeBoundary {
         spindle_speed_rpm: points.iter().map(|p| p.spindle_rpm).collect(),
         chatter_mm: points.iter().map(|p| p.crossings_mm.first().copied()).collect(),
@@ -591,14 +647,18 @@ fn beside(study: &Study<'_>, plane: &Plane, points: &[super::lobes::BoundaryPoin
         amplitude_mm: column(0),
         movable_opens_mm: column(1),
         fixed_opens_mm: column(2),
+        power_mm: drive.iter().map(|of| shown(of.power_mm)).collect(),
+        torque_mm: drive.iter().map(|of| shown(of.torque_mm)).collect(),
         zeroth_order_mm: column(3),
     })
 }
 
-/// Peaks of the boundary that lie deeper than the limit at the working speed, nearest first.
+/// Peaks of what chatter and the spindle allow that lie deeper than at the working speed, nearest first.
 fn better_speeds(study: &Study<'_>, limits: &[SpeedLimit], most_mm: f64) -> Vec<SpeedLimit> {
-    let depth = |limit: &SpeedLimit| limit.chatter_mm.unwrap_or(most_mm);
-    let here = study.chatter_mm.unwrap_or(most_mm);
+    let allowed =
+        |chatter: Option<f64>, drive: Option<f64>| chatter.unwrap_or(most_mm).min(drive.unwrap_or(f64::INFINITY));
+    let depth = |limit: &SpeedLimit| allowed(limit.chatter_mm, limit.drive_mm);
+    let here = allowed(study.chatter_mm, study.drive_depths(study.case.working.spindle_rpm).least_mm());
     let mut peaks: Vec<SpeedLimit> = (0..limits.len())
         .filter(|&i| {
             let at = depth(&limits[i]);

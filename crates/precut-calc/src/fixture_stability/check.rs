@@ -20,6 +20,9 @@ pub(super) const CODES: &[&str] = &[
     "speeds_reversed",
     "too_many_map_points",
     "steady_beyond_run",
+    "spindle_without_limit",
+    "spindle_row_without_limit",
+    "spindle_speeds_unordered",
     "duplicate_effect",
     "condition_missing",
     "effect_without_jaw",
@@ -34,6 +37,7 @@ const FEEDS_AGREE: f64 = 0.01;
 impl Check for FixtureJob {
     fn check(&self, violations: &mut Violations) {
         check_cut(self, violations);
+        check_spindle(self, violations);
         check_lobes(self, violations);
         check_simulation(self, violations);
         check_effects(self, violations);
@@ -63,6 +67,24 @@ fn check_cut(job: &FixtureJob, violations: &mut Violations) {
             Finding::new("feeds_disagree", "/cut/feed_mm_per_min")
                 .measured(table, wanted, "mm/min")
                 .with("feed_mm_per_tooth", per_tooth)
+        });
+    }
+}
+
+fn check_spindle(job: &FixtureJob, violations: &mut Violations) {
+    let Some(spindle) = &job.spindle else { return };
+    let limits = spindle.power_kw.is_some() || spindle.torque_n_m.is_some() || !spindle.characteristic.is_empty();
+    violations.require(limits, || Finding::new("spindle_without_limit", "/spindle"));
+    for (i, row) in spindle.characteristic.iter().enumerate() {
+        violations.require(row.power_kw.is_some() || row.torque_n_m.is_some(), || {
+            Finding::new("spindle_row_without_limit", format!("/spindle/characteristic/{i}"))
+        });
+    }
+    for (i, pair) in spindle.characteristic.windows(2).enumerate() {
+        let (before, here) = (pair[0].spindle_speed_rpm, pair[1].spindle_speed_rpm);
+        violations.require(before < here, || {
+            Finding::new("spindle_speeds_unordered", format!("/spindle/characteristic/{}/spindle_speed_rpm", i + 1))
+                .measured(here, before, "rev/min")
         });
     }
 }

@@ -174,6 +174,26 @@ impl Cutting {
 
     /// Largest and smallest force along the feed with a smooth chip, N, signed: positive toward the movable jaw.
     pub(super) fn static_extremes_n(&self, feed_mm: f64, depth_mm: f64) -> (f64, f64) {
+        let (high, low) = self.extremes(|stretch, since, phase| self.smooth_force(stretch, since, phase, feed_mm));
+        let level = self.level(depth_mm);
+        if self.direction > 0.0 { (high * level, low * level) } else { (-low * level, -high * level) }
+    }
+
+    /// Largest tangential force of all teeth in cut together with a smooth chip, N.
+    pub(super) fn tangential_max_n(&self, feed_mm: f64, depth_mm: f64) -> f64 {
+        let (high, _) = self.extremes(|stretch, since, phase| {
+            (0..stretch.teeth)
+                .map(|j| {
+                    let chip = self.chip_mm(feed_mm, self.tooth_number(phase, j));
+                    self.chip_power(chip * self.angle_rad(since, j).sin())
+                })
+                .sum()
+        });
+        high * self.level(depth_mm)
+    }
+
+    /// Largest and smallest value over a period of the force, one-sided limits at entries and exits included.
+    fn extremes(&self, value: impl Fn(&Stretch, f64, usize) -> f64) -> (f64, f64) {
         let (mut high, mut low) = (f64::NEG_INFINITY, f64::INFINITY);
         let mut take = |value: f64| {
             high = high.max(value);
@@ -182,7 +202,7 @@ impl Cutting {
         for phase in 0..self.phases() {
             for stretch in self.stretches() {
                 let step = stretch.length_rad() / f64::from(PIECE_SAMPLES);
-                let at = |s: f64| self.smooth_force(&stretch, stretch.from_rad + s * step, phase, feed_mm);
+                let at = |s: f64| value(&stretch, stretch.from_rad + s * step, phase);
                 let (mut before, mut here) = (at(0.0), at(1.0));
                 take(before);
                 for s in 2..=PIECE_SAMPLES {
@@ -198,8 +218,7 @@ impl Cutting {
                 take(here);
             }
         }
-        let level = self.level(depth_mm);
-        if self.direction > 0.0 { (high * level, low * level) } else { (-low * level, -high * level) }
+        (high, low)
     }
 
     /// z/(2 pi) times the integral of the shape over the arc: the mean directional factor a0 (`fixture/5.3`).

@@ -242,6 +242,7 @@ fn modes<const N: usize>(system: &System<N>) -> Vec<Mode> {
 
 impl<const N: usize> System<N> {
     /// x', mm/s.
+    #[inline]
     pub(super) fn velocity(&self, q: &[f64; N], mass: usize) -> f64 {
         q[2 * mass + 1] * self.scale[2 * mass + 1]
     }

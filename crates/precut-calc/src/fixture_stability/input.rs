@@ -28,6 +28,10 @@ pub struct FixtureJob {
     /// The vise with the workpiece.
     #[schema(extensions(("x-group" = json!("machine"))))]
     pub fixture: Vise,
+    /// What the spindle can give; without it power and torque limit nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(extensions(("x-group" = json!("machine"))))]
+    pub spindle: Option<Spindle>,
     /// What is asked beside the verdict.
     #[serde(default = "only_verdict")]
     #[schema(max_items = 5, default = json!(["verdict"]), example = json!(["verdict", "clamp_force", "lobes"]), extensions(("x-group" = json!("numerics"))))]
@@ -223,6 +227,49 @@ pub struct ConstantForce {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 0.0, maximum = 1e8, example = 2000.0, extensions(("x-unit" = json!("N")), ("x-symbol" = json!("F_3")), ("x-code" = json!("bad_clamp_force"))))]
     pub clamp_force_n: Option<f64>,
+}
+
+/// What the spindle can give. What is stated for all speeds and what the table says both hold: the least counts.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Spindle {
+    /// Power of the motor, at every speed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-6, maximum = 10_000.0, example = 7.5, extensions(("x-unit" = json!("kW")), ("x-symbol" = json!("P_max"))))]
+    pub power_kw: Option<f64>,
+    /// Torque at the spindle, at every speed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-6, maximum = 1e7, example = 120.0, extensions(("x-unit" = json!("N m")), ("x-symbol" = json!("M_max"))))]
+    pub torque_n_m: Option<f64>,
+    /// Share of the motor's power that reaches the cutter.
+    #[serde(default = "whole_power")]
+    #[schema(exclusive_minimum = 0.0, maximum = 1.0, default = 1.0, example = 0.85, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("eta"))))]
+    pub efficiency: f64,
+    /// Power and torque over the spindle speed, by rising speed, straight lines between; nothing is known of speeds outside.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schema(max_items = 200)]
+    pub characteristic: Vec<SpindlePoint>,
+}
+
+fn whole_power() -> f64 {
+    1.0
+}
+
+/// What the spindle can give at a speed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SpindlePoint {
+    /// Spindle speed.
+    #[schema(minimum = 0.1, maximum = 200_000.0, example = 1500.0, extensions(("x-unit" = json!("rev/min")), ("x-symbol" = json!("n"))))]
+    pub spindle_speed_rpm: f64,
+    /// Power of the motor.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-6, maximum = 10_000.0, example = 7.5, extensions(("x-unit" = json!("kW")), ("x-symbol" = json!("P_max"))))]
+    pub power_kw: Option<f64>,
+    /// Torque at the spindle.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-6, maximum = 1e7, example = 48.0, extensions(("x-unit" = json!("N m")), ("x-symbol" = json!("M_max"))))]
+    pub torque_n_m: Option<f64>,
 }
 
 /// A question.

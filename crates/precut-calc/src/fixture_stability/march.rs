@@ -86,7 +86,6 @@ pub(super) struct Marched {
     /// From the start on.
     pub left_entry_n: f64,
     pub right_entry_n: f64,
-    pub x_all_mm: Range,
     /// Share of tooth-steps in the arc without a chip, over the steady periods.
     pub lost_cut: f64,
     pub open: Open,
@@ -157,10 +156,16 @@ impl<const N: usize> Flow<N> {
         Self { a: system.a, constant, phi: exponential(&system.a, h), shift, start, end }
     }
 
+    /// What a step is without the force at its end, which is added by [`Self::ended`].
     #[inline]
-    fn step(&self, q: &[f64; N], from_n: f64, to_n: f64) -> [f64; N] {
+    fn begun(&self, q: &[f64; N], from_n: f64) -> [f64; N] {
         let moved = times(&self.phi, q);
-        std::array::from_fn(|i| moved[i] + self.shift[i] + self.start[i] * from_n + self.end[i] * to_n)
+        std::array::from_fn(|i| moved[i] + self.shift[i] + self.start[i] * from_n)
+    }
+
+    #[inline]
+    fn ended(&self, begun: &[f64; N], to_n: f64) -> [f64; N] {
+        std::array::from_fn(|i| begun[i] + self.end[i] * to_n)
     }
 
     /// The same over a part t of the step, the force rising with `slope`: the Taylor series to round-off.
@@ -246,6 +251,17 @@ impl Grid {
     }
 }
 
+/// A place of the arc at which teeth stand at a step.
+#[derive(Clone, Copy)]
+struct Cell {
+    /// Share of a tooth in the force over its chip's power.
+    share: f64,
+    /// Along the feed, as the last tooth left it (its own passing being 0).
+    surface: f64,
+    /// Effective feed of the last pass.
+    chip: f64,
+}
+
 /// Everything that moves.
 struct State<'a, const N: usize> {
     cutting: &'a Cutting,
@@ -253,18 +269,19 @@ struct State<'a, const N: usize> {
     system: System<N>,
     plan: &'a Plan,
     grid: Grid,
-    /// Share of a tooth in the force over its chip's power, per cell.
-    share: Vec<f64>,
-    /// Surface per cell, along the feed, as the last tooth left it (its own passing being 0).
-    surface: Vec<f64>,
-    /// Effective feed of the last pass per cell.
-    chip: Vec<f64>,
+    cells: Vec<Cell>,
     /// Force of the teeth in cut, by their place.
     of_tooth: Vec<f64>,
     /// Flows by stretch and by what is closed.
     flows: Vec<Flow<N>>,
     level: f64,
     damping: f64,
+    hardening: f64,
+    /// What each step asks of the job, at hand.
+    feed_mm: f64,
+    direction: f64,
+    clamp_force_n: f64,
+    uneven: bool,
     closed: Closed,
     q: [f64; N],
     tooth_period: usize,
@@ -293,8 +310,15 @@ pub(super) fn march<const N: usize>(
         }
         state.tooth_period = period;
         record.samples_mm.push(state.q[0]);
-        for i in 0..state.grid.steps {
-            state.advance(i, &mut record);
+        if state.is_plain(&record) {
+            let (leave, steps) = (state.grid.leave, state.grid.steps);
+            state.sweep(0..leave, &mut record);
+            state.sweep(leave..steps, &mut record);
+            state.enter_next();
+        } else {
+            for i in 0..state.grid.steps {
+                state.advance(i, &mut record);
+            }
         }
         if !state.q.iter().all(|v| v.is_finite()) || state.q[0].abs() > DIVERGED_MM {
             record.diverged = true;
@@ -328,20 +352,22 @@ impl<'a, const N: usize> State<'a, N> {
                 Flow::new(&of, constant, h)
             })
             .collect();
-        let share = (0..grid.cells)
-            .map(|cell| cutting.shape((cutting.entry_rad + grid.angle_rad(cutting, cell)).min(PI)))
-            .collect();
+        let share = |cell| cutting.shape((cutting.entry_rad + grid.angle_rad(cutting, cell)).min(PI));
+        let cells = (0..grid.cells).map(|cell| Cell { share: share(cell), surface: 0.0, chip: 0.0 }).collect();
         Self {
             cutting,
             holding,
             plan,
-            share,
-            surface: vec![0.0; grid.cells],
-            chip: vec![0.0; grid.cells],
+            cells,
             of_tooth: vec![0.0; grid.teeth_before + 1],
             flows,
             level: cutting.direction * cutting.level(plan.working.depth_mm),
             damping: process_damping(cutting, &plan.working),
+            hardening: holding.hardening_per_mm2,
+            feed_mm: plan.working.feed_mm,
+            direction: cutting.direction,
+            clamp_force_n: holding.clamp_force_n.unwrap_or(0.0),
+            uneven: cutting.uneven(),
             closed: Closed::BOTH,
             q: [0.0; N],
             tooth_period: 0,
@@ -375,13 +401,13 @@ impl<'a, const N: usize> State<'a, N> {
     /// Effective feed of tooth j at a cell when the workpiece is at x (`fixture/3.2`).
     #[inline]
     fn feed(&self, j: usize, cell: usize, x_mm: f64) -> f64 {
-        let stands_out = if self.cutting.uneven() && self.cutting.tooth_number(self.tooth_period, j) == 0 {
+        let stands_out = if self.uneven && self.cutting.tooth_number(self.tooth_period, j) == 0 {
             self.cutting.runout_mm
         } else {
             0.0
         };
-        let tip = stands_out - self.cutting.direction * x_mm;
-        tip - (self.surface[cell] - self.plan.working.feed_mm)
+        let tip = stands_out - self.direction * x_mm;
+        tip - (self.cells[cell].surface - self.feed_mm)
     }
 
     #[inline]
@@ -390,7 +416,7 @@ impl<'a, const N: usize> State<'a, N> {
             return 0.0;
         }
         let power = if self.cutting.chip_exponent > 0.0 { feed.powf(1.0 - self.cutting.chip_exponent) } else { feed };
-        self.level * self.share[cell] * power
+        self.level * self.cells[cell].share * power
     }
 
     /// Leaves the surface that tooth j makes at a cell and gives its force.
@@ -406,12 +432,12 @@ impl<'a, const N: usize> State<'a, N> {
     #[inline]
     fn leave(&mut self, cell: usize, feed: f64) {
         // Seen from the next tooth, which is one feed further on.
-        let before = self.surface[cell] - self.plan.working.feed_mm;
-        self.surface[cell] = match self.plan.surface {
+        let before = self.cells[cell].surface - self.feed_mm;
+        self.cells[cell].surface = match self.plan.surface {
             Surface::Multiple => before + feed.max(0.0),
             Surface::Single => before + feed,
         };
-        self.chip[cell] = feed.max(0.0);
+        self.cells[cell].chip = feed.max(0.0);
     }
 
     /// Forces that depend on the motion itself: process damping of the cutting teeth, hardening of closed joints.
@@ -421,7 +447,7 @@ impl<'a, const N: usize> State<'a, N> {
         if self.damping > 0.0 {
             force -= self.damping * cutting_teeth * self.system.velocity(q, 0);
         }
-        if self.holding.hardening_per_mm2 > 0.0 {
+        if self.hardening > 0.0 {
             force -= self.holding.hardening_n_per_mm3(self.closed) * q[0].powi(3);
         }
         force
@@ -432,17 +458,20 @@ impl<'a, const N: usize> State<'a, N> {
     }
 
     /// One step of the tooth period.
+    #[inline]
     fn advance(&mut self, i: usize, record: &mut Record) {
         let after = usize::from(i >= self.grid.leave);
         let teeth = if after == 0 { self.grid.teeth_before } else { self.grid.teeth_after };
         let step_s = self.grid.step_s[after];
         let cut: f64 = self.of_tooth[..teeth].iter().sum();
-        let from = cut + self.own_force(self.cutting_teeth(teeth), &self.q);
+        let alone = self.damping <= 0.0 && self.hardening <= 0.0;
+        let from = if alone { cut } else { cut + self.own_force(self.cutting_teeth(teeth), &self.q) };
         record.take(self, i, teeth, cut, step_s);
         let before = (self.q[0], self.system.velocity(&self.q, 0));
         let which = 4 * after + index(self.closed);
         // The force at the end from the position that the force at the start gives: wrong by the fifth power of the step.
-        let guess = self.flows[which].step(&self.q, from, from);
+        let begun = self.flows[which].begun(&self.q, from);
+        let guess = self.flows[which].ended(&begun, from);
         let mut to = 0.0;
         let mut cutting = 0.0;
         for j in 0..teeth {
@@ -453,8 +482,10 @@ impl<'a, const N: usize> State<'a, N> {
             to += force;
             self.of_tooth[j] = force;
         }
-        to += self.own_force(cutting, &guess);
-        let moved = self.flows[which].step(&self.q, from, to);
+        if !alone {
+            to += self.own_force(cutting, &guess);
+        }
+        let moved = self.flows[which].ended(&begun, to);
         if self.plan.unilateral && self.carrying(&moved) != self.closed {
             self.switch(4 * after, from, to, step_s, record);
         } else {
@@ -471,21 +502,80 @@ impl<'a, const N: usize> State<'a, N> {
         }
         record.time_s += step_s;
         if i + 1 == self.grid.steps {
-            // The teeth move up by a pitch, and a new one enters.
-            self.tooth_period += 1;
-            self.limit_arc();
-            for j in (1..self.grid.teeth_before).rev() {
-                self.of_tooth[j] = self.of_tooth[j - 1];
-            }
-            if self.grid.teeth_before > 0 {
-                self.of_tooth[0] = self.cut(0, 0, x);
-            }
+            self.enter_next();
         }
+    }
+
+    /// The teeth move up by a pitch, and a new one enters.
+    fn enter_next(&mut self) {
+        self.tooth_period += 1;
+        self.limit_arc();
+        for j in (1..self.grid.teeth_before).rev() {
+            self.of_tooth[j] = self.of_tooth[j - 1];
+        }
+        if self.grid.teeth_before > 0 {
+            self.of_tooth[0] = self.cut(0, 0, self.q[0]);
+        }
+    }
+
+    /// Whether nothing acts in this tooth period but even teeth on a bonded, linear vise, and no step is kept: the case of
+    /// searches and curves, which [`Self::sweep`] runs through by the same operations without asking at every step.
+    fn is_plain(&self, record: &Record) -> bool {
+        let kept = self.tooth_period < record.keep_first || self.tooth_period >= record.keep_from;
+        let alone = self.damping <= 0.0 && self.hardening <= 0.0;
+        alone && !kept && !self.plan.unilateral && !self.uneven && self.reached == self.grid.cells
+    }
+
+    /// The steps of a stretch of a plain tooth period.
+    fn sweep(&mut self, range: std::ops::Range<usize>, record: &mut Record) {
+        let after = usize::from(range.start >= self.grid.leave);
+        let teeth = if after == 0 { self.grid.teeth_before } else { self.grid.teeth_after };
+        let (steps, step_s) = (self.grid.steps, self.grid.step_s[after]);
+        let steady = self.tooth_period >= record.steady_from;
+        let multiple = self.plan.surface == Surface::Multiple;
+        let (linear, power) = (self.cutting.chip_exponent <= 0.0, 1.0 - self.cutting.chip_exponent);
+        let (feed_mm, direction, level) = (self.feed_mm, self.direction, self.level);
+        let flow = &self.flows[4 * after + index(Closed::BOTH)];
+        let mut q = self.q;
+        for i in range {
+            let mut cut = 0.0;
+            for force in &self.of_tooth[..teeth] {
+                cut += force;
+            }
+            record.seen(q[0], demands(&self.system, self.holding, &q), cut, steady, step_s);
+            let before = (q[0], self.system.velocity(&q, 0));
+            let begun = flow.begun(&q, cut);
+            let guess = begun[0] + flow.end[0] * cut;
+            let mut to = 0.0;
+            for j in 0..teeth {
+                let [here, next] = &self.cells[j * steps + i..][..2] else { break };
+                record.tooth(here.chip, steady);
+                let feed = -direction * guess - (next.surface - feed_mm);
+                let force =
+                    if feed <= 0.0 { 0.0 } else { level * next.share * if linear { feed } else { feed.powf(power) } };
+                to += force;
+                self.of_tooth[j] = force;
+            }
+            q = flow.ended(&begun, to);
+            let velocity = self.system.velocity(&q, 0);
+            if steady && before.1 * velocity < 0.0 {
+                record.x_mm.take_cubic(step_s, (before.0, q[0]), (before.1, velocity));
+            }
+            for j in 0..teeth {
+                let next = &mut self.cells[j * steps + i + 1];
+                let older = next.surface - feed_mm;
+                let feed = -direction * q[0] - older;
+                next.chip = feed.max(0.0);
+                next.surface = older + if multiple { next.chip } else { feed };
+            }
+            record.time_s += step_s;
+        }
+        self.q = q;
     }
 
     /// Which joints carry in a state: compressed, and not pulled apart by their damping.
     fn carrying(&self, q: &[f64; N]) -> Closed {
-        let force = self.holding.clamp_force_n.unwrap_or(0.0);
+        let force = self.clamp_force_n;
         let [left, right, left_elastic, right_elastic] = demands(&self.system, self.holding, q);
         Closed { left: force > left.max(left_elastic), right: force > right.max(right_elastic) }
     }
@@ -529,7 +619,8 @@ struct Record {
     keep_first: usize,
     keep_from: usize,
     x_mm: Range,
-    x_all_mm: Range,
+    /// Before the steady periods.
+    x_early_mm: Range,
     force_n: Range,
     feed_mm: Range,
     demand: [Range; 4],
@@ -548,9 +639,15 @@ struct Record {
 
 const NOTHING: Range = Range { low: f64::INFINITY, high: f64::NEG_INFINITY };
 
+#[inline]
 fn take(range: &mut Range, value: f64) {
-    range.low = range.low.min(value);
-    range.high = range.high.max(value);
+    // Plain comparisons: the library's minimum asks each time whether a value is a number. What is none ends the run.
+    if value < range.low {
+        range.low = value;
+    }
+    if value > range.high {
+        range.high = value;
+    }
 }
 
 impl Record {
@@ -562,7 +659,7 @@ impl Record {
             keep_first: plan.keep_first,
             keep_from: plan.tooth_periods.saturating_sub(plan.keep_last),
             x_mm: NOTHING,
-            x_all_mm: NOTHING,
+            x_early_mm: NOTHING,
             force_n: NOTHING,
             feed_mm: NOTHING,
             demand: [NOTHING; 4],
@@ -580,30 +677,54 @@ impl Record {
         }
     }
 
-    /// The state before a step.
+    /// Position, demands on the clamp force and force before a step.
     #[inline]
-    fn take<const N: usize>(&mut self, state: &State<'_, N>, i: usize, teeth: usize, cut_n: f64, step_s: f64) {
+    fn seen(&mut self, x_mm: f64, demand: [f64; 4], cut_n: f64, steady: bool, step_s: f64) {
         self.steps += 1;
-        let demand = demands(&state.system, state.holding, &state.q);
-        take(&mut self.x_all_mm, state.q[0]);
-        self.entry[0] = self.entry[0].max(demand[0]);
-        self.entry[1] = self.entry[1].max(demand[1]);
-        let force = state.holding.clamp_force_n.unwrap_or(0.0);
-        if state.plan.unilateral {
-            for (side, elastic) in [demand[2], demand[3]].into_iter().enumerate() {
-                if elastic >= force && self.first_open[side].is_none() {
-                    self.first_open[side] = Some(self.time_s);
-                }
+        for (most, value) in self.entry.iter_mut().zip(demand) {
+            if value > *most {
+                *most = value;
             }
         }
-        if state.tooth_period >= self.steady_from {
-            take(&mut self.x_mm, state.q[0]);
+        if steady {
+            take(&mut self.x_mm, x_mm);
             take(&mut self.force_n, cut_n);
             for (range, value) in self.demand.iter_mut().zip(demand) {
                 take(range, value);
             }
             self.steady_s += step_s;
-            if state.plan.unilateral {
+        } else {
+            take(&mut self.x_early_mm, x_mm);
+        }
+    }
+
+    /// The effective feed of a tooth in the arc.
+    #[inline]
+    fn tooth(&mut self, feed_mm: f64, steady: bool) {
+        if feed_mm <= 0.0 && self.first_lost.is_none() {
+            self.first_lost = Some(self.time_s);
+        }
+        if steady {
+            take(&mut self.feed_mm, feed_mm);
+            self.tooth_steps += 1;
+            self.lost += usize::from(feed_mm <= 0.0);
+        }
+    }
+
+    /// The state before a step.
+    #[inline]
+    fn take<const N: usize>(&mut self, state: &State<'_, N>, i: usize, teeth: usize, cut_n: f64, step_s: f64) {
+        let demand = demands(&state.system, state.holding, &state.q);
+        let steady = state.tooth_period >= self.steady_from;
+        self.seen(state.q[0], demand, cut_n, steady, step_s);
+        if state.plan.unilateral {
+            let force = state.clamp_force_n;
+            for (side, elastic) in [demand[2], demand[3]].into_iter().enumerate() {
+                if elastic >= force && self.first_open[side].is_none() {
+                    self.first_open[side] = Some(self.time_s);
+                }
+            }
+            if steady {
                 let (left, right) = (demand[2] >= force, demand[3] >= force);
                 self.open[0] += if left { step_s } else { 0.0 };
                 self.open[1] += if right { step_s } else { 0.0 };
@@ -612,17 +733,8 @@ impl Record {
         }
         for j in 0..teeth {
             let cell = j * state.grid.steps + i;
-            if cell >= state.reached {
-                continue;
-            }
-            let feed = state.chip[cell];
-            if feed <= 0.0 && self.first_lost.is_none() {
-                self.first_lost = Some(self.time_s);
-            }
-            if state.tooth_period >= self.steady_from {
-                take(&mut self.feed_mm, feed);
-                self.tooth_steps += 1;
-                self.lost += usize::from(feed <= 0.0);
+            if cell < state.reached {
+                self.tooth(state.cells[cell].chip, steady);
             }
         }
         let early = state.tooth_period < self.keep_first;
@@ -633,7 +745,7 @@ impl Record {
                 velocity_mm_per_s: state.system.velocity(&state.q, 0),
                 jaw_mm: state.system.jaw.map(|jaw| state.q[jaw]),
                 force_n: cut_n,
-                feed_mm: (teeth > 0).then(|| state.chip[i]),
+                feed_mm: (teeth > 0).then(|| state.cells[i].chip),
                 left_demand_n: demand[0],
                 right_demand_n: demand[1],
             };
@@ -652,7 +764,7 @@ impl Record {
 
     /// A joint has opened or closed inside a step, at `done` after its start.
     fn event<const N: usize>(&mut self, state: &State<'_, N>, done: f64) {
-        let force = state.holding.clamp_force_n.unwrap_or(0.0);
+        let force = state.clamp_force_n;
         let [_, _, left, right] = demands(&state.system, state.holding, &state.q);
         for (side, elastic) in [left, right].into_iter().enumerate() {
             if elastic >= force && self.first_open[side].is_none() {
@@ -664,21 +776,20 @@ impl Record {
     fn finish<const N: usize>(self, state: &State<'_, N>) -> Marched {
         let share = |part: f64| if self.steady_s > 0.0 { part / self.steady_s } else { 0.0 };
         let arc = (0..state.grid.cells)
-            .map(|cell| (state.cutting.entry_rad + state.grid.angle_rad(state.cutting, cell), state.chip[cell]))
+            .map(|cell| (state.cutting.entry_rad + state.grid.angle_rad(state.cutting, cell), state.cells[cell].chip))
             .collect();
         // A run that ended early has no steady part: what it did until then stands for it.
-        let or_all = |range: Range, all: Range| if range.low <= range.high { range } else { all };
+        let or_early = |range: Range, early: Range| if range.low <= range.high { range } else { early };
         let zero = Range { low: 0.0, high: 0.0 };
         Marched {
             diverged: self.diverged,
-            x_mm: or_all(self.x_mm, self.x_all_mm),
-            x_all_mm: self.x_all_mm,
-            force_n: or_all(self.force_n, zero),
-            feed_mm: or_all(self.feed_mm, zero),
-            left_n: or_all(self.demand[0], zero),
-            right_n: or_all(self.demand[1], zero),
-            left_elastic_n: or_all(self.demand[2], zero),
-            right_elastic_n: or_all(self.demand[3], zero),
+            x_mm: or_early(self.x_mm, self.x_early_mm),
+            force_n: or_early(self.force_n, zero),
+            feed_mm: or_early(self.feed_mm, zero),
+            left_n: or_early(self.demand[0], zero),
+            right_n: or_early(self.demand[1], zero),
+            left_elastic_n: or_early(self.demand[2], zero),
+            right_elastic_n: or_early(self.demand[3], zero),
             left_entry_n: self.entry[0],
             right_entry_n: self.entry[1],
             lost_cut: if self.tooth_steps > 0 { self.lost as f64 / self.tooth_steps as f64 } else { 0.0 },

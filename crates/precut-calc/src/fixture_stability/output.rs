@@ -13,6 +13,8 @@ pub struct FixtureOutcome {
     pub engagement: Engagement,
     /// Force and displacement if nothing moved fast.
     pub quasi_static: QuasiStatic,
+    /// What the cut asks of the spindle, and what that gives.
+    pub drive: CuttingDrive,
     /// Modes of the closed vise without cutting, rising.
     pub modes: Vec<VibrationMode>,
     /// The largest Floquet multiplier of the motion with both joints closed.
@@ -73,6 +75,9 @@ pub struct FixtureVerdict {
     /// Clamp force over what the steady motion asks, where a force is given and some is asked.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub clamp_margin: Option<f64>,
+    /// What the spindle gives over what smooth chips ask of it, the lesser of power and torque, where a limit is known at this speed.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub drive_margin: Option<f64>,
 }
 
 /// The worst of what happens.
@@ -87,6 +92,8 @@ pub enum FixtureState {
     Chatter,
     /// A joint opens.
     JointOpen,
+    /// The workpiece would hold still, but the spindle has not the power or the torque for the cut.
+    SpindleOverloaded,
 }
 
 impl FixtureState {
@@ -97,6 +104,7 @@ impl FixtureState {
             Self::ChipLost => "chip_lost",
             Self::Chatter => "chatter",
             Self::JointOpen => "joint_open",
+            Self::SpindleOverloaded => "spindle_overloaded",
         }
     }
 }
@@ -172,6 +180,35 @@ pub struct QuasiStatic {
     /// Displacement by the smallest force.
     #[schema(extensions(("x-unit" = json!("um"))))]
     pub displacement_min_um: f64,
+}
+
+/// What the cut asks of the spindle with smooth chips, as every stable cut leaves them, and what that gives at this speed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct CuttingDrive {
+    /// Mean torque on the cutter.
+    #[schema(extensions(("x-unit" = json!("N m"))))]
+    pub torque_mean_n_m: f64,
+    /// Its largest value from tooth to tooth, which the inertia of the spindle carries.
+    #[schema(extensions(("x-unit" = json!("N m"))))]
+    pub torque_max_n_m: f64,
+    /// Mean power at the cutter.
+    #[schema(extensions(("x-unit" = json!("kW"))))]
+    pub power_kw: f64,
+    /// Mean power of the motor, with the efficiency of the spindle; that at the cutter where no spindle is given.
+    #[schema(extensions(("x-unit" = json!("kW"))))]
+    pub motor_power_kw: f64,
+    /// Power that the motor has at this speed; null where nothing is said of it.
+    #[schema(extensions(("x-unit" = json!("kW"))))]
+    pub power_limit_kw: Option<f64>,
+    /// Torque that the spindle has at this speed; null where nothing is said of it.
+    #[schema(extensions(("x-unit" = json!("N m"))))]
+    pub torque_limit_n_m: Option<f64>,
+    /// Depth at which the power gives out at this speed.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub power_depth_mm: Option<f64>,
+    /// Depth at which the torque gives out at this speed.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub torque_depth_mm: Option<f64>,
 }
 
 /// A mode of the closed vise without cutting.
@@ -437,6 +474,12 @@ pub struct DepthLimits {
     /// That at the fixed jaw.
     #[schema(extensions(("x-unit" = json!("mm"))))]
     pub fixed_opens_mm: Option<f64>,
+    /// The power of the spindle gives out.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub power_mm: Option<f64>,
+    /// The torque of the spindle gives out.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub torque_mm: Option<f64>,
     /// Which comes first; null where nothing gives out up to the depth examined.
     pub first: Option<FirstLimit>,
     /// Its depth.
@@ -463,6 +506,10 @@ pub enum FirstLimit {
     MovableOpens,
     /// The joint at the fixed jaw opens.
     FixedOpens,
+    /// The power of the spindle gives out.
+    Power,
+    /// The torque of the spindle gives out.
+    Torque,
 }
 
 impl FirstLimit {
@@ -473,11 +520,13 @@ impl FirstLimit {
             Self::Amplitude => "amplitude",
             Self::MovableOpens => "movable_opens",
             Self::FixedOpens => "fixed_opens",
+            Self::Power => "power",
+            Self::Torque => "torque",
         }
     }
 }
 
-/// Chatter limit at a speed.
+/// Limits at a speed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct SpeedLimit {
     /// Spindle speed.
@@ -486,6 +535,9 @@ pub struct SpeedLimit {
     /// Depth at which chatter begins; null where none begins up to the depth examined.
     #[schema(extensions(("x-unit" = json!("mm"))))]
     pub chatter_mm: Option<f64>,
+    /// Depth at which the power or the torque of the spindle gives out; null where nothing is said of them.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub drive_mm: Option<f64>,
 }
 
 /// One entry per depth.
@@ -518,7 +570,7 @@ pub struct LobeDiagram {
     pub boundary: LobeBoundary,
     /// Lowest limit on it.
     pub lowest: Option<SpeedLimit>,
-    /// Speeds with deeper limits than the working speed has, nearest first.
+    /// Speeds at which one may cut deeper than at the working speed before chatter begins or the spindle gives out, nearest first.
     pub better_speeds: Vec<SpeedLimit>,
     /// |multiplier| over the plane, where it was asked for.
     pub map: Option<LobeMap>,
@@ -545,6 +597,12 @@ pub struct LobeBoundary {
     /// That at the fixed jaw.
     #[schema(extensions(("x-unit" = json!("mm"))))]
     pub fixed_opens_mm: Vec<Option<f64>>,
+    /// Depth at which the power of the spindle gives out, up to the greatest depth.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub power_mm: Vec<Option<f64>>,
+    /// Depth at which the torque of the spindle gives out, up to the greatest depth.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub torque_mm: Vec<Option<f64>>,
     /// The zeroth-order approximation.
     #[schema(extensions(("x-unit" = json!("mm"))))]
     pub zeroth_order_mm: Vec<Option<f64>>,

@@ -4,6 +4,7 @@ use crate::calculator::{Failure, Monitor};
 
 use super::acting::Case;
 use super::answer::forced;
+use super::drive::depths;
 use super::floquet::Working;
 use super::holding::Closed;
 use super::input::FixtureJob;
@@ -53,7 +54,15 @@ pub fn lobe_boundary(job: &FixtureJob, monitor: &dyn Monitor) -> Result<Vec<Spee
     let points = boundary(&Rules::new(), &case.holding, &case.cutting, &plane, monitor, &mut |_, _| {})?;
     Ok(points
         .into_iter()
-        .map(|p| SpeedLimit { spindle_speed_rpm: p.spindle_rpm, chatter_mm: p.crossings_mm.first().copied() })
+        .map(|p| {
+            let working = Working { spindle_rpm: p.spindle_rpm, ..case.working };
+            let drive = job.spindle.as_ref().map(|spindle| depths(&case, spindle, working));
+            SpeedLimit {
+                spindle_speed_rpm: p.spindle_rpm,
+                chatter_mm: p.crossings_mm.first().copied(),
+                drive_mm: drive.and_then(|of| of.least_mm()),
+            }
+        })
         .collect())
 }
 

@@ -27,6 +27,8 @@ pub(super) const LABEL_CODES: &[&str] = &[
     "amplitude_limit",
     "movable_joint_limit",
     "fixed_joint_limit",
+    "spindle_power_limit",
+    "spindle_torque_limit",
     "refined_boundary",
     "working_point",
     "working_depth",
@@ -130,6 +132,8 @@ fn lobes(job: &FixtureJob, outcome: &FixtureOutcome) -> Vec<Item> {
         ("amplitude_limit", &of.amplitude_mm, 0),
         ("movable_joint_limit", &of.movable_opens_mm, 1),
         ("fixed_joint_limit", &of.fixed_opens_mm, 2),
+        ("spindle_power_limit", &of.power_mm, 3),
+        ("spindle_torque_limit", &of.torque_mm, 4),
     ] {
         if values.iter().any(Option::is_some) {
             items.push(line(name, x, values.clone(), Role::Series(series)));
@@ -247,6 +251,8 @@ pub(super) fn tables(outcome: &FixtureOutcome) -> Vec<Table> {
                 Column::optional("amplitude", "mm", &of.amplitude_mm),
                 Column::optional("movable_opens", "mm", &of.movable_opens_mm),
                 Column::optional("fixed_opens", "mm", &of.fixed_opens_mm),
+                Column::optional("power", "mm", &of.power_mm),
+                Column::optional("torque", "mm", &of.torque_mm),
                 Column::optional("zeroth_order", "mm", &of.zeroth_order_mm),
             ],
         },

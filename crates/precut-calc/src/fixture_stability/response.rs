@@ -455,6 +455,7 @@ impl<'a, const N: usize> Elements<'a, N> {
 }
 
 /// What the joints ask of the clamp force, N: left and right with damping, left and right without (`fixture/5.6`).
+#[inline]
 pub(super) fn demands<const N: usize>(system: &System<N>, holding: &Holding, q: &[f64; N]) -> [f64; 4] {
     let (x, v) = (q[0], system.velocity(q, 0));
     let (jaw_x, jaw_v) = system.jaw.map_or((0.0, 0.0), |jaw| (q[jaw], system.velocity(q, jaw / 2)));

@@ -25,6 +25,7 @@ pub use power::{CoefficientOrigin, MeasuredRange, PowerLaw, PowerTerm};
 pub use table::{ForceRow, ForceTable};
 
 pub(crate) use schema::choice;
+pub(crate) use sine_integral::SineIntegral;
 
 use crate::calculator::{Basis, Finding, Violations};
 use serde::{Deserialize, Serialize};

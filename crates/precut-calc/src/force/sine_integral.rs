@@ -1,4 +1,4 @@
-//! The integral of a power of the sine, as it occurs along a tool's nose.
+//! The integral of a power of the sine, as it occurs along a tool's nose and over the arc of a face mill.
 
 /// Terms of the series: at phi = 90 degrees each halves the remainder, 2^-50 of it is left.
 const TERMS: usize = 50;
@@ -10,7 +10,7 @@ const TERMS: usize = 50;
 /// converges at least like 2^-k. Expected relative error 2e-15. Any u is welcome, however small,
 /// since no angle is formed.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct SineIntegral {
+pub(crate) struct SineIntegral {
     /// b + 1
     exponent: f64,
     coefficients: [f64; TERMS],
@@ -18,7 +18,7 @@ pub(super) struct SineIntegral {
 
 impl SineIntegral {
     /// For sin^`power`.
-    pub(super) fn new(power: f64) -> Self {
+    pub(crate) fn new(power: f64) -> Self {
         let b = 0.5 * (power - 1.0);
         let mut coefficients = [0.0; TERMS];
         let (mut binomial, mut k) = (power.exp2(), 0.0);
@@ -31,7 +31,7 @@ impl SineIntegral {
     }
 
     /// I(phi) for u = sin²(phi/2), 0 < u <= 1/2.
-    pub(super) fn at(&self, u: f64) -> f64 {
+    pub(crate) fn at(&self, u: f64) -> f64 {
         // Even and odd terms apart: two chains that the processor runs at the same time.
         let square = u * u;
         let (mut even, mut odd) = (0.0, 0.0);

@@ -1,4 +1,4 @@
-//! Gauss-Legendre quadrature and Lagrange polynomials on its points.
+//! Gauss-Legendre quadrature.
 
 /// Points and weights of Gauss-Legendre quadrature on 0..1, ascending. Exact for polynomials up to degree 2n-1.
 ///
@@ -16,7 +16,9 @@ pub fn gauss_legendre(count: usize) -> (Vec<f64>, Vec<f64>) {
             slope = derivative;
             let step = value / derivative;
             x -= step;
-            if step.abs() < 1e-16 {
+            // The step after this one would be of the order of its square.
+            if step.abs() < 1e-10 {
+                slope = legendre(count, x).1;
                 break;
             }
         }
@@ -37,11 +39,6 @@ fn legendre(order: usize, x: f64) -> (f64, f64) {
         (before, value) = (value, ((2.0 * k - 1.0) * x * value - (k - 1.0) * before) / k);
     }
     (value, order as f64 * (before - x * value) / (1.0 - x * x))
-}
-
-/// The value at x of the Lagrange polynomial that is 1 at `points[j]` and 0 at the others.
-pub fn lagrange(points: &[f64], j: usize, x: f64) -> f64 {
-    points.iter().enumerate().filter(|(k, _)| *k != j).map(|(_, other)| (x - other) / (points[j] - other)).product()
 }
 
 /// Integral of `f` from `a` to `b` on `count` Gauss points.

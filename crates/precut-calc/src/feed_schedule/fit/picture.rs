@@ -16,16 +16,34 @@ pub(super) const LABEL_CODES: &[&str] = &[
     "fit_residuals",
     "fit_measured",
     "fit_measured_over_mean",
-    "fit_predicted",
-    "fit_predicted_over_mean",
     "fit_trial_number",
-    "fit_studentised",
     "fit_perfect",
     "fit_of_all",
     "fit_held_out",
     "fit_outlier_limit",
     "fit_zero",
     "fit_residual_points",
+    "fit_predicted_force_z",
+    "fit_over_mean_force_z",
+    "fit_studentised_force_z",
+    "fit_predicted_force_y",
+    "fit_over_mean_force_y",
+    "fit_studentised_force_y",
+    "fit_predicted_tool_life",
+    "fit_over_mean_tool_life",
+    "fit_studentised_tool_life",
+    "fit_predicted_roughness",
+    "fit_over_mean_roughness",
+    "fit_studentised_roughness",
+    "fit_predicted_hardening",
+    "fit_over_mean_hardening",
+    "fit_studentised_hardening",
+    "fit_predicted_hardening_depth",
+    "fit_over_mean_hardening_depth",
+    "fit_studentised_hardening_depth",
+    "fit_predicted_further",
+    "fit_over_mean_further",
+    "fit_studentised_further",
 ];
 
 pub(super) fn figures(job: &FitJob, outcome: &FitOutcome) -> Vec<Figure> {
@@ -62,6 +80,34 @@ fn static_unit(unit: &str) -> &'static str {
     UNITS.into_iter().find(|known| *known == unit).unwrap_or("1")
 }
 
+/// Labels that name an output.
+struct Labels {
+    predicted: &'static str,
+    over_mean: &'static str,
+    studentised: &'static str,
+}
+
+fn labels(output: &OutputFit) -> Labels {
+    macro_rules! labels {
+        ($name:literal) => {
+            Labels {
+                predicted: concat!("fit_predicted_", $name),
+                over_mean: concat!("fit_over_mean_", $name),
+                studentised: concat!("fit_studentised_", $name),
+            }
+        };
+    }
+    match output.name.as_str() {
+        "force_z" => labels!("force_z"),
+        "force_y" => labels!("force_y"),
+        "tool_life" => labels!("tool_life"),
+        "roughness" => labels!("roughness"),
+        "hardening" => labels!("hardening"),
+        "hardening_depth" => labels!("hardening_depth"),
+        _ => labels!("further"),
+    }
+}
+
 fn comparison(outcome: &FitOutcome, output: &OutputFit) -> Panel {
     let rows = &output.rows;
     let mean = rows.measured.iter().map(|v| v.abs()).sum::<f64>() / rows.measured.len().max(1) as f64;
@@ -72,7 +118,7 @@ fn comparison(outcome: &FitOutcome, output: &OutputFit) -> Panel {
     let seen: Vec<(f64, f64)> =
         measured.iter().zip(&rows.held_out).filter_map(|(m, h)| h.map(|h| (*m, h * scale))).collect();
     Panel {
-        y: axis(outcome, "fit_predicted", "fit_predicted_over_mean"),
+        y: axis(outcome, labels(output).predicted, labels(output).over_mean),
         height: 1.0,
         items: vec![
             Item::Line { name: "fit_perfect", x: vec![low, high], y: vec![Some(low), Some(high)], role: Role::Nominal },
@@ -112,7 +158,7 @@ fn residuals(job: &FitJob, output: &OutputFit) -> Panel {
         y: points.iter().map(|p| p.1).collect(),
         role: Role::Plain,
     });
-    Panel { y: Axis::linear("fit_studentised", "1"), height: 1.0, items }
+    Panel { y: Axis::linear(labels(output).studentised, "1"), height: 1.0, items }
 }
 
 pub(super) fn tables(job: &FitJob, outcome: &FitOutcome) -> Vec<Table> {

@@ -1,6 +1,6 @@
 //! Tables of an element: Gauss points, and moments of the Lagrange polynomials on them.
 
-use crate::num::quadrature::{gauss_legendre, lagrange};
+use crate::num::quadrature::gauss_legendre;
 
 /// Terms of the Taylor series of the matrix exponential over one element. With norm(A) h up to 8 the last is below
 /// 8^48/48! = 2e-18 of the first.
@@ -19,33 +19,65 @@ pub struct Rule<const P: usize> {
 }
 
 impl<const P: usize> Rule<P> {
-    /// The tables. About 0.2 ms of work for P = 12: to be made once per job.
+    /// The tables: some 230 000 products for P = 12, to be made once per job.
     pub fn new() -> Self {
         let (gauss, _) = gauss_legendre(P);
         let mut points = [0.0; P];
         points.copy_from_slice(&gauss);
+        let basis = Lagrange::new(points);
         // Of degree TERMS + P - 1 at most: exact on so many points.
         let (fine, weight) = gauss_legendre(usize::midpoint(TERMS, P) + 1);
         let mut moment = vec![[[0.0; P]; P]; TERMS];
         let mut moment_end = vec![[0.0; P]; TERMS];
-        let fill = |end: f64, row: &mut dyn FnMut(usize, usize, f64)| {
+        // Integrals from 0 to `end`: one row of P for every m.
+        let integrals = |end: f64, add: &mut dyn FnMut(usize, &[f64; P])| {
             for (c, w) in fine.iter().zip(&weight) {
                 let s = c * end;
-                let basis: [f64; P] = std::array::from_fn(|j| lagrange(&points, j, s));
-                let mut power = w * end;
+                let mut row = basis.at(s).map(|l| l * w * end);
                 for m in 0..TERMS {
-                    for (j, l) in basis.iter().enumerate() {
-                        row(m, j, power * l);
-                    }
-                    power *= (end - s) / (m + 1) as f64;
+                    add(m, &row);
+                    let factor = (end - s) / (m + 1) as f64;
+                    row = row.map(|value| value * factor);
                 }
             }
         };
+        let sum = |into: &mut [f64; P], row: &[f64; P]| {
+            for (total, value) in into.iter_mut().zip(row) {
+                *total += value;
+            }
+        };
         for (i, &c) in points.iter().enumerate() {
-            fill(c, &mut |m, j, value| moment[m][i][j] += value);
+            integrals(c, &mut |m, row| sum(&mut moment[m][i], row));
         }
-        fill(1.0, &mut |m, j, value| moment_end[m][j] += value);
+        integrals(1.0, &mut |m, row| sum(&mut moment_end[m], row));
         Self { points, moment, moment_end }
+    }
+}
+
+/// The Lagrange polynomials on the points, all at once.
+struct Lagrange<const P: usize> {
+    points: [f64; P],
+    /// Over the product of the distances of each point from the others.
+    inverse: [f64; P],
+}
+
+impl<const P: usize> Lagrange<P> {
+    fn new(points: [f64; P]) -> Self {
+        let distances = |j: usize| -> f64 { (0..P).filter(|&k| k != j).map(|k| points[j] - points[k]).product() };
+        Self { points, inverse: std::array::from_fn(|j| 1.0 / distances(j)) }
+    }
+
+    /// l_j(x): products of the distances to the points before and after the j-th.
+    fn at(&self, x: f64) -> [f64; P] {
+        let mut values = self.inverse;
+        let (mut before, mut after) = (1.0, 1.0);
+        for j in 0..P {
+            values[j] *= before;
+            before *= x - self.points[j];
+            values[P - 1 - j] *= after;
+            after *= x - self.points[P - 1 - j];
+        }
+        values
     }
 }
 
