@@ -209,13 +209,12 @@ fn the_command_line_speaks_the_language_asked_for() {
 fn diagnosis_and_table() -> (Value, String) {
     let mut file: Value = serde_json::from_str(&said(&precut(&["example", "diagnosis"]))).unwrap();
     let rows = file["job"].as_object_mut().unwrap().remove("measurements").unwrap();
-    let mut table = "run;trace;z [mm];diameter_deviation [um]\n".to_owned();
-    for row in rows.as_array().unwrap() {
+    let line = |row: &Value| {
         let cell = |name: &str| row[name].to_string().replace('.', ",");
-        let cells = ["run", "trace", "z_mm", "diameter_deviation_um"].map(cell);
-        table.push_str(&format!("{}\n", cells.join(";")));
-    }
-    (file, table)
+        ["run", "trace", "z_mm", "diameter_deviation_um"].map(cell).join(";")
+    };
+    let lines: Vec<String> = rows.as_array().unwrap().iter().map(line).collect();
+    (file, format!("run;trace;z [mm];diameter_deviation [um]\n{}\n", lines.join("\n")))
 }
 
 #[test]
