@@ -106,22 +106,6 @@ pub(crate) fn table() -> Result<Measured, String> {
     cpu_time(|| FixtureIdentification::run(&job, &Unwatched))
 }
 
-/// A short search over that table, divided by the sets that it tried. Both laws.
-pub(crate) fn search() -> Result<Measured, String> {
-    let mut job = paper()?;
-    job["peak_force"] = json!({ "force_n": 500, "depth_mm": 3, "teeth": 8, "feed_mm_per_tooth": 0.039 });
-    job["unknowns"] = json!({
-        "stiffness_n_per_mm": [20_000, 90_000], "natural_frequency_hz": [250, 1000], "damping_ratio": [0.02, 0.2],
-        "chip_thickness_exponent": [0.0, 0.5], "spindle_speed_rpm": [100, 800]
-    });
-    job["search"] = json!({ "members": 8, "generations": 3 });
-    let job: IdentificationJob = serde_json::from_value(job).map_err(|error| error.to_string())?;
-    let answer = FixtureIdentification::run(&job, &Unwatched).map_err(|error| error.to_string())?;
-    let sets = answer.output.evaluations as f64;
-    let all = cpu_time(|| FixtureIdentification::run(&job, &Unwatched))?;
-    Ok(Measured { median: all.median / sets, low: all.low / sets, high: all.high / sets })
-}
-
 /// The textbook on the map of [`map`]: first-order semi-discretisation, 40 intervals, a matrix exponential for every
 /// interval and depth, dense matrices multiplied up, all eigenvalues. On every twentieth speed and tenth depth, times 200.
 pub(crate) fn textbook(immersion: f64) -> Result<Measured, String> {

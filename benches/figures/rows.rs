@@ -123,13 +123,6 @@ pub(crate) fn all() -> Vec<Row> {
             fixture::table()
         }),
         row(
-            "identification: one set of a search over it (25 rows, 5 unknowns)",
-            Unit::Time,
-            None,
-            None,
-            fixture::search,
-        ),
-        row(
             "diagnosis of deflection, 500 points, all causes and pairs, held out, CPU of all cores",
             Unit::Time,
             us(300_000.0),

@@ -35,7 +35,7 @@ fn power_of_a_linear_law_is_the_coefficient_times_the_removal_rate() {
 /// Half a turn of sqrt(sin): sqrt(pi) Gamma(3/4)/Gamma(5/4).
 #[test]
 fn torque_of_a_slot_has_its_gamma_functions() {
-    let (three_quarters, five_quarters) = (1.225_416_702_465_177_6, 0.906_402_477_055_477_1);
+    let (three_quarters, five_quarters) = (1.225_416_702_465_177_6, 0.906_402_477_055_477);
     let mut job = reference_job(1);
     job["force"] = json!({ "coefficient": 900, "chip_thickness_exponent": 0.5, "depth_exponent": 0.25 });
     job["cut"]["width_mm"] = json!(100);

@@ -160,7 +160,8 @@ impl Krylov {
             }
             self.projected[k * ld + k + 1] = below;
             self.size = k + 1;
-            let tested = if self.kept > 0 { self.size % TEST_EVERY == 0 } else { self.size >= 5 && self.size % 2 == 1 };
+            let tested =
+                if self.kept > 0 { self.size.is_multiple_of(TEST_EVERY) } else { self.size >= 5 && self.size % 2 == 1 };
             if below <= 0.0 || tested || self.size == limit {
                 let found = self.ritz(below);
                 let settled =
