@@ -70,18 +70,18 @@ export function Jobs({ calculators, refreshJobs }) {
   return html`
     <main class="plain" id="main" tabindex="-1"><h1>${t('jobs')}</h1><p class="quiet">${t('jobs_about')}</p>
       <${ListState} items=${items} trouble=${trouble} empty=${t('no_jobs')} />
-      ${items && items.length > 0 && html`<div class="grid-scroll" tabindex="0" role="region" aria-label=${t('jobs')}><table class="list">
-        <thead><tr><th scope="col">${t('calculator')}</th><th scope="col">${t('state')}</th><th scope="col">${t('progress')}</th><th scope="col">${t('started')}</th><th scope="col"><span class="hidden">${t('actions')}</span></th></tr></thead>
-        <tbody>${items.map(item => {
+      ${items && items.length > 0 && html`<div class="grid-scroll" tabindex="0" role="region" aria-label=${t('jobs')}><table class="list" role="table">
+        <thead role="rowgroup"><tr role="row"><th scope="col" role="columnheader">${t('calculator')}</th><th scope="col" role="columnheader">${t('state')}</th><th scope="col" role="columnheader">${t('progress')}</th><th scope="col" role="columnheader">${t('started')}</th><th scope="col" role="columnheader"><span class="hidden">${t('actions')}</span></th></tr></thead>
+        <tbody role="rowgroup">${items.map(item => {
           const isOpen = item.state === 'queued' || item.state === 'running';
           const name = titleOf(calculators, item.calculator);
-          return html`<tr key=${item.id}>
-            <th scope="row">${!known.has(item.calculator) ? name : item.state === 'succeeded' ? html`<a href=${addressOf(item)}>${name}</a>` : isOpen ? html`<a href=${`#/${item.calculator}?run=${item.id}`}>${name}</a>` : name}</th>
-            <td><span class=${`state ${item.state}`}>${t(`state_${item.state}`)}</span>${item.problem ? html`<span class="quiet"> ${item.problem.detail || item.problem.title}</span>` : ''}</td>
-            <td class="progress-cell">${isOpen ? html`<progress max="1" value=${item.progress} aria-label=${`${name}: ${t('progress')}`}></progress><span class="quiet">${item.stage || ''}${item.remaining_ms ? ` · ${t('time_left', { time: duration(item.remaining_ms) })}` : ''}</span>`
+          return html`<tr role="row" key=${item.id}>
+            <th scope="row" role="rowheader">${!known.has(item.calculator) ? name : item.state === 'succeeded' ? html`<a href=${addressOf(item)}>${name}</a>` : isOpen ? html`<a href=${`#/${item.calculator}?run=${item.id}`}>${name}</a>` : name}</th>
+            <td role="cell"><span class=${`state ${item.state}`}>${t(`state_${item.state}`)}</span>${item.problem ? html`<span class="quiet"> ${item.problem.detail || item.problem.title}</span>` : ''}</td>
+            <td role="cell" class="progress-cell">${isOpen ? html`<progress max="1" value=${item.progress} aria-label=${`${name}: ${t('progress')}`}></progress><span class="quiet">${item.stage || ''}${item.remaining_ms ? ` · ${t('time_left', { time: duration(item.remaining_ms) })}` : ''}</span>`
               : item.started_at && item.finished_at ? duration(new Date(item.finished_at) - new Date(item.started_at)) : ''}</td>
-            <td class="when">${moment(item.created_at)}</td>
-            <td>${isOpen && html`<button type="button" onClick=${() => stop(item.id)}>${t('cancel_job')}<span class="hidden"> ${name}</span></button>`}</td></tr>`;
+            <td role="cell" class="when">${moment(item.created_at)}</td>
+            <td role="cell">${isOpen && html`<button type="button" onClick=${() => stop(item.id)}>${t('cancel_job')}<span class="hidden"> ${name}</span></button>`}</td></tr>`;
         })}</tbody></table></div>`}
       ${next && html`<button type="button" class="more" onClick=${more}>${t('older')}</button>`}
     </main>`;
@@ -113,12 +113,12 @@ function ResultList({ calculators, wanted, replace }) {
       <p><label>${t('calculator')} <select value=${wanted} onChange=${event => replace(event.currentTarget.value ? `calculator=${event.currentTarget.value}` : '')}>
         <option value="">${t('all_calculators')}</option>${calculators.map(({ id, title }) => html`<option value=${id}>${title}</option>`)}<option value="studies">${t('studies')}</option></select></label></p>
       <${ListState} items=${items} trouble=${trouble} empty=${t('no_results')} />
-      ${items && items.length > 0 && html`<div class="grid-scroll" tabindex="0" role="region" aria-label=${t('results')}><table class="list">
-        <thead><tr><th scope="col">${t('calculator')}</th><th scope="col">${t('computed')}</th><th scope="col">${t('key')}</th><th scope="col">${t('size')}</th></tr></thead>
-        <tbody>${inBursts(items).flatMap(([item, ...rest]) => [item, ...(opened.has(item.key) ? rest : [])].map((one, place) => ({ item: one, folded: place === 0 && !opened.has(item.key) ? rest.length : 0 }))).map(({ item, folded }) => html`<tr key=${item.key}>
-          <th scope="row">${known.has(item.calculator) ? html`<a href=${addressOf(item)}>${titleOf(calculators, item.calculator)}</a>` : titleOf(calculators, item.calculator)}
+      ${items && items.length > 0 && html`<div class="grid-scroll" tabindex="0" role="region" aria-label=${t('results')}><table class="list" role="table">
+        <thead role="rowgroup"><tr role="row"><th scope="col" role="columnheader">${t('calculator')}</th><th scope="col" role="columnheader">${t('computed')}</th><th scope="col" role="columnheader">${t('key')}</th><th scope="col" role="columnheader">${t('size')}</th></tr></thead>
+        <tbody role="rowgroup">${inBursts(items).flatMap(([item, ...rest]) => [item, ...(opened.has(item.key) ? rest : [])].map((one, place) => ({ item: one, folded: place === 0 && !opened.has(item.key) ? rest.length : 0 }))).map(({ item, folded }) => html`<tr role="row" key=${item.key}>
+          <th scope="row" role="rowheader">${known.has(item.calculator) ? html`<a href=${addressOf(item)}>${titleOf(calculators, item.calculator)}</a>` : titleOf(calculators, item.calculator)}
             ${folded > 0 && html` <button type="button" class="quiet-button" onClick=${() => setOpened(new Set([...opened, item.key]))}>${t('and_more', { count: folded })}<span class="hidden">: ${titleOf(calculators, item.calculator)}</span></button>`}</th>
-          <td class="when">${moment(item.created_at)}</td><td><code>${item.key.slice(3, 15)}…</code></td><td class="number">${number(item.bytes / 1024, 3)} ${t('kilobytes')}</td></tr>`)}</tbody></table></div>`}
+          <td role="cell" class="when">${moment(item.created_at)}</td><td role="cell"><code>${item.key.slice(3, 15)}…</code></td><td role="cell" class="number">${number(item.bytes / 1024, 3)} ${t('kilobytes')}</td></tr>`)}</tbody></table></div>`}
       ${next && html`<button type="button" class="more" onClick=${more}>${t('older')}</button>`}
     </main>`;
 }
@@ -139,10 +139,10 @@ export function Models({ calculators, models, refreshModels }) {
     <main class="plain" id="main" tabindex="-1"><h1>${t('models')}</h1><p class="quiet">${t('models_about')}</p>
       ${trouble && html`<p class="problem" role="alert">${trouble}</p>`}
       ${models === null ? html`<p class="empty-list">${t('models_absent')}</p>` : html`
-        ${models.length === 0 ? html`<p class="empty-list">${t('no_models')}</p>` : html`<div class="grid-scroll" tabindex="0" role="region" aria-label=${t('models')}><table class="list">
-          <thead><tr><th scope="col">${t('name')}</th><th scope="col">${t('calculator')}</th><th scope="col">${t('revision')}</th><th scope="col">${t('created')}</th><th scope="col"><span class="hidden">${t('actions')}</span></th></tr></thead>
-          <tbody>${models.map(({ name, calculator, revision, created_at: created }) => html`<tr key=${name}><th scope="row">${name}</th><td>${titleOf(calculators, calculator)}</td><td class="number">${revision}</td><td class="when">${created ? moment(created) : ''}</td>
-            <td class="actions"><a class="button" href=${`#/${calculator}?model=${name}`}>${t('use_model')}<span class="hidden"> ${name}</span></a>
+        ${models.length === 0 ? html`<p class="empty-list">${t('no_models')}</p>` : html`<div class="grid-scroll" tabindex="0" role="region" aria-label=${t('models')}><table class="list" role="table">
+          <thead role="rowgroup"><tr role="row"><th scope="col" role="columnheader">${t('name')}</th><th scope="col" role="columnheader">${t('calculator')}</th><th scope="col" role="columnheader">${t('revision')}</th><th scope="col" role="columnheader">${t('created')}</th><th scope="col" role="columnheader"><span class="hidden">${t('actions')}</span></th></tr></thead>
+          <tbody role="rowgroup">${models.map(({ name, calculator, revision, created_at: created }) => html`<tr role="row" key=${name}><th scope="row" role="rowheader">${name}</th><td role="cell">${titleOf(calculators, calculator)}</td><td role="cell" class="number">${revision}</td><td role="cell" class="when">${created ? moment(created) : ''}</td>
+            <td role="cell" class="actions"><a class="button" href=${`#/${calculator}?model=${name}`}>${t('use_model')}<span class="hidden"> ${name}</span></a>
               <button type="button" onClick=${() => fetchDocument(name)}>JSON<span class="hidden"> ${name}</span></button>
               <button type="button" onClick=${() => drop(name)}>${t('delete')}<span class="hidden"> ${name}</span></button></td></tr>`)}</tbody></table></div>`}
         <p><label class="button">${t('import_model')} <input type="file" class="hidden" accept=".json,application/json" onChange=${event => load(event.currentTarget.files)} /></label></p>`}

@@ -77,7 +77,7 @@ export function Result({ id, description, answer, problem, running, pinned, pin,
     <div class=${`result ${stale ? 'stale' : ''}`}>
       ${figures.length > 1 && !interim && html`
         <div class="figure-choice" role="group" aria-label=${t('figures')}>
-          ${figures.map(({ id: name, title }) => html`<button type="button" key=${name} aria-pressed=${figure.id === name} onClick=${() => setChosen(name)}>${short(title.text)}</button>`)}
+          ${figures.map(({ id: name, title }) => html`<button type="button" key=${name} aria-pressed=${figure.id === name} onClick=${() => setChosen(name)}>${figures.filter(other => short(other.title.text) === short(title.text)).length > 1 ? title.text : short(title.text)}</button>`)}
         </div>`}
       <div class="picture-and-words">
         <div class="picture-box">
