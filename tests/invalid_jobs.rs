@@ -168,12 +168,13 @@ fn all_faults_come_at_once() {
 fn a_cell_that_cannot_be_read_is_the_only_fault() {
     let registry = Registry::standard().unwrap();
     let rows = |bad: u32| -> String {
-        (0..72).map(|i| format!("{},{}\n", 5 * i, if i == bad { "x" } else { "150" })).collect()
+        let row = |i: u32| format!("{},{}", 5 * i, if i == bad { "x" } else { "150" });
+        (0..72).map(row).collect::<Vec<_>>().join("\n")
     };
     let mut job = json!({
         "measured_profile": { "csv": format!("angle_deg,radius_mm\n{}", rows(7)) },
         "supports": { "distance_mm": 200, "depth_mm": 111 },
-        "tool": { "x_mm": 100, "y_mm": 113.5, "feed_mm_per_rev": 0.0234375, "revolutions": 107 },
+        "tool": { "x_mm": 100, "y_mm": 113.5, "feed_mm_per_rev": 0.023_437_5, "revolutions": 107 },
     });
     let of = |job: &Value| faults_of(&registry, "ring-roundness", job);
     assert_eq!(of(&job), [("bad_cell".to_owned(), "/measured_profile/7/radius_mm".to_owned())]);

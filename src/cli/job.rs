@@ -105,11 +105,11 @@ fn read(arguments: &JobArgs, registry: &Registry) -> Result<(String, Body, Optio
         None => job_file(bytes)?,
     };
     let model = arguments.model.as_ref().map(|path| model_file(path, registry)).transpose()?;
-    if arguments.data.is_empty() {
+    if arguments.measured.is_empty() {
         return Ok((calculator, Body::Json(job), model));
     }
     let names = entry(registry, &calculator)?.table_names();
-    let tables = arguments.data.iter().map(|given| table(given, &calculator, &names)).collect::<Result<_, _>>()?;
+    let tables = arguments.measured.iter().map(|given| table(given, &calculator, &names)).collect::<Result<_, _>>()?;
     Ok((calculator, Body::Parts { job, tables }, model))
 }
 
@@ -134,7 +134,7 @@ fn table(given: &str, calculator: &str, names: &[String]) -> Result<TablePart, F
                 let known = several.join(", ");
                 let example = several[0].as_str();
                 return Err(Failed::Usage(format!(
-                    "a job of {calculator} takes several measured tables ({known}): say which one, as in --data {example}=FILE"
+                    "a job of {calculator} takes several measured tables ({known}): say which one, as in --measured {example}=FILE"
                 )));
             }
         },

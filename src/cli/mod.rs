@@ -27,7 +27,7 @@ Examples:
   precut example deflection-compensation          a complete job file, ready to run
   precut example deflection-compensation | precut solve -
   precut solve job.json --format gcode -o shaft.nc
-  precut solve diagnosis.json --data shaft.csv    what was measured, from a file beside the job
+  precut solve diagnosis.json --measured shaft.csv    what was measured, from a file beside the job
   precut solve job.json --model lathe-7.json      with the causes that a diagnosis found
   precut check job.json                           every fault of a job at once
   precut solve job.json --lang ru                 the same in Russian
@@ -125,7 +125,7 @@ struct JobArgs {
     /// What was measured, as a CSV file with units in its header, instead of rows in the job; `FIELD=FILE` for another
     /// table of the job
     #[arg(long, value_name = "FILE")]
-    data: Vec<String>,
+    measured: Vec<String>,
     /// Stored model that extends the job, as `GET /v1/models/NAME` exported it; the job may name it
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,

@@ -228,29 +228,29 @@ fn measurements_come_from_a_file_beside_the_job() {
     let expected: Value = serde_json::from_str(&said(&feed_precut(&["check"], &said(&whole)))).unwrap();
     // The same data give the same key however they came, with the name of the field or without.
     for data in [path.to_owned(), format!("measurements={path}")] {
-        let output = feed_precut(&["check", "--data", &data], &file.to_string());
+        let output = feed_precut(&["check", "--measured", &data], &file.to_string());
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         let checked: Value = serde_json::from_str(&said(&output)).unwrap();
         assert_eq!(checked["key"], expected["key"]);
     }
     let bare = file["job"].to_string();
-    let solved = feed_precut(&["solve", "--calculator", "diagnosis", "--data", path], &bare);
+    let solved = feed_precut(&["solve", "--calculator", "diagnosis", "--measured", path], &bare);
     let answer: Value = serde_json::from_str(&said(&solved)).unwrap();
     assert_eq!(answer["result"]["verdict"], "named");
     assert_eq!(answer["key"], expected["key"]);
 
     // Rows in the job and in a file, a file that is not there, a job that takes none.
-    let twice = feed_precut(&["check", "--data", path], &said(&whole));
+    let twice = feed_precut(&["check", "--measured", path], &said(&whole));
     assert_eq!(complaint(&twice)["errors"][0]["code"], "table_given_twice");
-    let absent = feed_precut(&["check", "--data", "/nowhere/shaft.csv"], &file.to_string());
+    let absent = feed_precut(&["check", "--measured", "/nowhere/shaft.csv"], &file.to_string());
     assert_eq!(absent.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&absent.stderr).contains("/nowhere/shaft.csv"));
     let example = said(&precut(&["example", "fixture-stability"]));
-    let none = feed_precut(&["check", "--data", path], &example);
+    let none = feed_precut(&["check", "--measured", path], &example);
     assert_eq!(none.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&none.stderr).contains("takes no measured table"), "{none:?}");
     let example = said(&precut(&["example", "deflection-compensation"]));
-    let several = feed_precut(&["check", "--data", path], &example);
+    let several = feed_precut(&["check", "--measured", path], &example);
     assert_eq!(several.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&several.stderr).contains("force.rows"), "{several:?}");
 }
