@@ -190,7 +190,7 @@ mod tests {
     use crate::engine::ModelContent;
     use serde_json::json;
 
-    fn model(effects: Value, causes: Value) -> StoredModel {
+    fn model(effects: Value, causes: &Value) -> StoredModel {
         let provenance = json!({ "quantity": "roughness_um", "causes": causes });
         let effects: Vec<Value> = serde_json::from_value(effects).unwrap();
         let content = ModelContent { calculator: "feed-schedule".to_owned(), effects, provenance };
@@ -209,8 +209,8 @@ mod tests {
         let shift = |batch: &str, by: f64| json!({ "kind": "batch_shift", "batch": batch, "delta_ln": by });
         let (a_wear, a_cause) = wear(0.010, 0.008, 0.012);
         let (b_wear, b_cause) = wear(0.015, 0.013, 0.017);
-        let a = model(json!([a_wear, shift("A", 0.1)]), json!([a_cause]));
-        let b = model(json!([shift("B", 0.2), b_wear]), json!([b_cause]));
+        let a = model(json!([a_wear, shift("A", 0.1)]), &json!([a_cause]));
+        let b = model(json!([shift("B", 0.2), b_wear]), &json!([b_cause]));
         let found = compare(&a, &b).unwrap();
         assert!(!found.identical);
         let sides: Vec<(&str, Sides)> = found.effects.iter().map(|e| (e.kind.as_str(), e.has)).collect();
@@ -226,7 +226,7 @@ mod tests {
     #[test]
     fn a_model_is_identical_to_itself() {
         let (effect, cause) = wear(0.010, 0.008, 0.012);
-        let a = model(json!([effect]), json!([cause]));
+        let a = model(json!([effect]), &json!([cause]));
         let found = compare(&a, &a.clone()).unwrap();
         assert!(found.identical && found.effects[0].parameters[0].apart == Some(false));
         assert_eq!(found.effects[0].parameters[0].difference, Some(0.0));
@@ -235,7 +235,7 @@ mod tests {
     #[test]
     fn models_of_two_calculators_are_not_compared() {
         let (effect, cause) = wear(0.010, 0.008, 0.012);
-        let a = model(json!([effect]), json!([cause]));
+        let a = model(json!([effect]), &json!([cause]));
         let mut b = a.clone();
         b.content.calculator = "ring-roundness".to_owned();
         let Err(ModelError::Invalid(findings)) = compare(&a, &b) else { unreachable!("they are compared") };

@@ -209,13 +209,12 @@ fn the_command_line_speaks_the_language_asked_for() {
 fn diagnosis_and_table() -> (Value, String) {
     let mut file: Value = serde_json::from_str(&said(&precut(&["example", "diagnosis"]))).unwrap();
     let rows = file["job"].as_object_mut().unwrap().remove("measurements").unwrap();
-    let mut table = "run;trace;z [mm];diameter_deviation [um]\n".to_owned();
-    for row in rows.as_array().unwrap() {
+    let line = |row: &Value| {
         let cell = |name: &str| row[name].to_string().replace('.', ",");
-        let cells = ["run", "trace", "z_mm", "diameter_deviation_um"].map(cell);
-        table.push_str(&format!("{}\n", cells.join(";")));
-    }
-    (file, table)
+        ["run", "trace", "z_mm", "diameter_deviation_um"].map(cell).join(";")
+    };
+    let lines: Vec<String> = rows.as_array().unwrap().iter().map(line).collect();
+    (file, format!("run;trace;z [mm];diameter_deviation [um]\n{}\n", lines.join("\n")))
 }
 
 #[test]
@@ -246,7 +245,7 @@ fn measurements_come_from_a_file_beside_the_job() {
     let absent = feed_precut(&["check", "--data", "/nowhere/shaft.csv"], &file.to_string());
     assert_eq!(absent.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&absent.stderr).contains("/nowhere/shaft.csv"));
-    let example = said(&precut(&["example", "ring-roundness"]));
+    let example = said(&precut(&["example", "fixture-stability"]));
     let none = feed_precut(&["check", "--data", path], &example);
     assert_eq!(none.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&none.stderr).contains("takes no measured table"), "{none:?}");

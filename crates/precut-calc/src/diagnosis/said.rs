@@ -126,7 +126,8 @@ pub(super) fn explanation<E: utoipa::ToSchema, R: utoipa::ToSchema>(
             .with("labels", labels(&output.named))
             .with("probability", output.sets.first().map_or(0.0, |set| set.posterior)),
         VerdictClass::Confounded => {
-            let mut sets = folded(output.likely_sets.iter().map(|set| kinds(&set.causes)).collect());
+            let all: Vec<Vec<String>> = output.likely_sets.iter().map(|set| kinds(&set.causes)).collect();
+            let mut sets = folded(&all);
             let more = sets.len().saturating_sub(SAID_SETS);
             sets.truncate(SAID_SETS);
             Message::new("diagnosis_confounded")
@@ -167,7 +168,7 @@ pub(super) fn explanation<E: utoipa::ToSchema, R: utoipa::ToSchema>(
 }
 
 /// Sets without those that only extend another of them.
-fn folded(sets: Vec<Vec<String>>) -> Vec<Vec<String>> {
+fn folded(sets: &[Vec<String>]) -> Vec<Vec<String>> {
     let extends =
         |set: &Vec<String>, other: &Vec<String>| other.len() < set.len() && other.iter().all(|kind| set.contains(kind));
     sets.iter().filter(|set| !sets.iter().any(|other| extends(set, other))).cloned().collect()
