@@ -31,9 +31,10 @@ fn a_diagnosis_is_saved_as_a_model_and_used_in_another_form() {
     ));
     // A bad name is refused before it is sent, a good one makes a revision.
     page.fill("#model-name", "lathe-7-winter");
-    page.click(".save-model button");
+    page.press("Enter");
     page.until("/lathe-7-winter.*1/.test(document.querySelector('#model-name-hint').textContent)");
-    page.click(".save-model button");
+    page.evaluate("document.querySelector('#model-name').focus()");
+    page.press("Enter");
     page.until("/lathe-7-winter.*2/.test(document.querySelector('#model-name-hint').textContent)");
 
     page.open(&service.page("models"));
