@@ -27,7 +27,7 @@ Examples:
   precut example deflection-compensation          a complete job file, ready to run
   precut example deflection-compensation | precut solve -
   precut solve job.json --format gcode -o shaft.nc
-  precut solve diagnosis.json --measured shaft.csv    what was measured, from a file beside the job
+  precut solve diag.json --measured shaft.csv     what was measured, from a file beside the job
   precut solve job.json --model lathe-7.json      with the causes that a diagnosis found
   precut check job.json                           every fault of a job at once
   precut solve job.json --lang ru                 the same in Russian
