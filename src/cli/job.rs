@@ -10,7 +10,9 @@ use serde::de::IgnoredAny;
 use serde_json::json;
 
 use super::{Failed, JobArgs, SolveArgs, entry, print, print_json};
-use crate::engine::{Body, Error, ModelFile, STUDIES, SyntaxFault, TablePart, check_with, solve_with};
+use crate::engine::{
+    Body, Error, GivenModel, ModelFile, NoShelf, STUDIES, SyntaxFault, TablePart, check_with, solve_with,
+};
 use crate::http::{Media, Problem, written};
 use crate::registry::{Entry, Registry};
 use crate::text::Language;
@@ -47,7 +49,7 @@ pub(super) fn solve(arguments: &SolveArgs, registry: &Registry, language: Langua
         Form::Svg => arguments.figure.as_deref(),
         Form::Json | Form::Gcode => None,
     };
-    let stored = solve_with(registry, &calculator, body, model.as_ref(), &Unwatched)?;
+    let stored = solve_with(registry, &calculator, body, &model, &Unwatched)?;
     let bytes = written(&stored, arguments.format.into(), part, language)?;
     match &arguments.output {
         Some(path) => std::fs::write(path, &bytes).map_err(|error| Failed::Machine(named(path, &error))),
@@ -59,7 +61,7 @@ pub(super) fn solve(arguments: &SolveArgs, registry: &Registry, language: Langua
 /// `precut check`
 pub(super) fn check(arguments: &JobArgs, registry: &Registry) -> Result<(), Failed> {
     let (calculator, body, model) = read(arguments, registry)?;
-    let checked = check_with(registry, &calculator, body, model.as_ref())?;
+    let checked = check_with(registry, &calculator, body, &model)?;
     print_json(&json!({
         "calculator": calculator,
         "key": checked.key.to_string(),
@@ -89,7 +91,7 @@ pub(super) fn example(entry: &Entry, id: Option<&str>, bare: bool) -> Result<(),
 }
 
 /// The calculator's name, the job with its tables, and the model that it takes.
-fn read(arguments: &JobArgs, registry: &Registry) -> Result<(String, Body, Option<ModelFile>), Failed> {
+fn read(arguments: &JobArgs, registry: &Registry) -> Result<(String, Body, GivenModel), Failed> {
     let bytes = if arguments.file.as_os_str() == "-" {
         if io::stdin().is_terminal() {
             eprintln!("reading the job from standard input; end it with Ctrl-D");
@@ -104,13 +106,29 @@ fn read(arguments: &JobArgs, registry: &Registry) -> Result<(String, Body, Optio
         Some(calculator) => (calculator.clone(), bytes.into()),
         None => job_file(bytes)?,
     };
-    let model = arguments.model.as_ref().map(|path| model_file(path, registry)).transpose()?;
-    if arguments.measured.is_empty() {
-        return Ok((calculator, Body::Json(job), model));
-    }
-    let names = entry(registry, &calculator)?.table_names();
-    let tables = arguments.measured.iter().map(|given| table(given, &calculator, &names)).collect::<Result<_, _>>()?;
-    Ok((calculator, Body::Parts { job, tables }, model))
+    let body = if arguments.measured.is_empty() {
+        Body::Json(job)
+    } else {
+        let names = entry(registry, &calculator)?.table_names();
+        let tables = arguments.measured.iter().map(|given| table(given, &calculator, &names));
+        Body::Parts { job, tables: tables.collect::<Result<_, _>>()? }
+    };
+    let model = match (&arguments.model, &arguments.data) {
+        (Some(file), _) => GivenModel::File(model_file(file, registry)?),
+        (None, Some(folder)) => stored_model(registry, &calculator, &body, folder)?,
+        (None, None) => GivenModel::None,
+    };
+    Ok((calculator, body, model))
+}
+
+/// The model that the job names, from the database of a data folder.
+fn stored_model(registry: &Registry, calculator: &str, body: &Body, folder: &Path) -> Result<GivenModel, Failed> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+    let runtime = runtime.map_err(|error| Failed::Machine(format!("the threads cannot be started: {error}")))?;
+    runtime.block_on(GivenModel::stored(registry, calculator, body, folder)).map_err(|error| match error {
+        NoShelf::Folder(error) => Failed::Machine(error.to_string()),
+        NoShelf::Asked(error) => error.into(),
+    })
 }
 
 /// A model as `GET /v1/models/{name}` gave it.

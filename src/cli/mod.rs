@@ -29,6 +29,7 @@ Examples:
   precut solve job.json --format gcode -o shaft.nc
   precut solve diag.json --measured shaft.csv     what was measured, from a file beside the job
   precut solve job.json --model lathe-7.json      with the causes that a diagnosis found
+  precut solve job.json --data ./data             the same by the name in the job, from the service's database
   precut check job.json                           every fault of a job at once
   precut solve job.json --lang ru                 the same in Russian
   precut example studies | precut solve - --format csv
@@ -129,6 +130,9 @@ struct JobArgs {
     /// Stored model that extends the job, as `GET /v1/models/NAME` exported it; the job may name it
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
+    /// Data folder that has the stored model which the job names; a service may be using it
+    #[arg(long, value_name = "DIR", conflicts_with = "model")]
+    data: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

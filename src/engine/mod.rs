@@ -32,7 +32,7 @@ pub use compare::{ModelComparison, Sides};
 pub use error::{Error, SyntaxFault};
 pub use jobs::{Answered, Ask, Feed, Job};
 pub use model::ModelContent;
-pub use models::{ModelAnswer, ModelError, ModelFile, ModelSource, StoredModel};
+pub use models::{GivenModel, ModelAnswer, ModelError, ModelFile, ModelSource, NoShelf, OnShelf, StoredModel};
 pub use progress::Interim;
 pub use settings::EngineSettings;
 pub use study::STUDIES;
@@ -425,45 +425,34 @@ fn compute(ready: &Ready, monitor: &dyn Monitor) -> Result<Stored, Error> {
 /// [`Engine::check`] without an engine.
 #[allow(clippy::needless_pass_by_value)] // a body is handed over, here as to an engine
 pub fn check_now(registry: &Registry, calculator: &str, body: Body) -> Result<Checked, Error> {
-    check_with(registry, calculator, body, None)
+    check_with(registry, calculator, body, &GivenModel::None)
 }
 
-/// The same with a model from a file.
+/// The same with a stored model.
 #[allow(clippy::needless_pass_by_value)]
-pub fn check_with(
-    registry: &Registry,
-    calculator: &str,
-    body: Body,
-    model: Option<&ModelFile>,
-) -> Result<Checked, Error> {
+pub fn check_with(registry: &Registry, calculator: &str, body: Body, model: &GivenModel) -> Result<Checked, Error> {
     let entry = entry(registry, calculator)?;
     guarded(|| with_model(registry, &entry, &body, model)?.into_checked())
 }
 
-/// Reads a job without a store: the only model that it can have is that of a file.
-fn with_model(
-    registry: &Registry,
-    entry: &Arc<Entry>,
-    body: &Body,
-    model: Option<&ModelFile>,
-) -> Result<read::Ready, Error> {
-    let found = model.map(|file| model::Found::Model(Box::new(file.kept().clone())));
-    read::read_with(entry, body, &Models { registry, found }, model.map(ModelFile::kept))
+/// Reads a job without a service.
+fn with_model(registry: &Registry, entry: &Arc<Entry>, body: &Body, model: &GivenModel) -> Result<read::Ready, Error> {
+    read::read_with(entry, body, &Models { registry, found: model.found() }, model.imposed())
 }
 
 /// The answer to a job in this thread, without cache, store or limit of cost: for the command line.
 #[allow(clippy::needless_pass_by_value)]
 pub fn solve_now(registry: &Registry, calculator: &str, body: Body, monitor: &dyn Monitor) -> Result<Stored, Error> {
-    solve_with(registry, calculator, body, None, monitor)
+    solve_with(registry, calculator, body, &GivenModel::None, monitor)
 }
 
-/// The same with a model from a file.
+/// The same with a stored model.
 #[allow(clippy::needless_pass_by_value)]
 pub fn solve_with(
     registry: &Registry,
     calculator: &str,
     body: Body,
-    model: Option<&ModelFile>,
+    model: &GivenModel,
     monitor: &dyn Monitor,
 ) -> Result<Stored, Error> {
     let entry = entry(registry, calculator)?;

@@ -158,6 +158,7 @@ pub(crate) struct Models<'a> {
 }
 
 /// What the store knows of a name.
+#[derive(Debug, Clone)]
 pub(crate) enum Found {
     /// This one.
     Model(Box<KeptModel>),

@@ -1,5 +1,6 @@
 //! Stored models: made of what a diagnosis found, listed, read, deleted, and found for the jobs that name them.
 
+use std::path::Path;
 use std::str::FromStr;
 use std::sync::Arc;
 
@@ -11,8 +12,10 @@ use super::compare::{self, ModelComparison};
 use super::model::{self, Found, ModelContent};
 use super::{Body, Engine, Error, Inner, Key, Stored, json as read_json};
 use crate::registry::{Entry, Faults, ModelUse, Registry, canonical, nearest};
+use crate::store::OpenError;
 use crate::store::jobs::JobId;
-use crate::store::models::{KeptModel, NewModel};
+use crate::store::models::{KeptModel, ModelShelf, NewModel};
+use crate::store::sqlite_models::SqliteShelf;
 
 /// The calculator whose results can become models.
 const DIAGNOSIS: &str = "diagnosis";
@@ -207,34 +210,99 @@ impl Engine {
 impl Inner {
     /// What the store knows of the model that a job names; nothing where it names none.
     pub(super) async fn find_model(&self, entry: &Arc<Entry>, body: &Body) -> Result<Option<Found>, Error> {
-        /// Looked for before anything is parsed: hardly any job has it.
-        const FIELD: &[u8] = b"\"model\"";
-        let job = match body {
-            Body::Json(job) | Body::Parts { job, .. } => job,
-        };
-        if entry.model_use() == ModelUse::None || !job.windows(FIELD.len()).any(|bytes| bytes == FIELD) {
-            return Ok(None);
-        }
-        let mut job = read_json::parse(job)?;
-        let Some(name) = model::named(&self.registry, entry, &mut job) else { return Ok(None) };
-        let Some((plain, revision)) = model::asked(&name) else { return Ok(None) };
-        Ok(Some(match self.models.model(plain, revision).await? {
-            Some(kept) => Found::Model(Box::new(kept)),
-            None => Found::Unknown(self.near_names().await?),
-        }))
-    }
-
-    async fn near_names(&self) -> Result<Vec<String>, Error> {
-        let models = self.models.models(String::new(), NEAR_NAMES).await?;
-        Ok(models.into_iter().map(|model| model.name).collect())
+        find_on(&*self.models, &self.registry, entry, body).await
     }
 
     async fn unknown_model(&self, name: &str) -> Result<ModelError, Error> {
-        let names = self.near_names().await?;
+        let names = names_on(&*self.models).await?;
         let plain = name.split('@').next().unwrap_or_default();
         let nearest = nearest(plain, names.iter().map(String::as_str)).map(str::to_owned);
         Ok(ModelError::Unknown { name: name.to_owned(), nearest })
     }
+}
+
+/// What a shelf has of the model that a job names; nothing where it names none.
+async fn find_on<S: ModelShelf + ?Sized>(
+    shelf: &S,
+    registry: &Registry,
+    entry: &Entry,
+    body: &Body,
+) -> Result<Option<Found>, Error> {
+    /// Looked for before anything is parsed: hardly any job has it.
+    const FIELD: &[u8] = b"\"model\"";
+    let job = match body {
+        Body::Json(job) | Body::Parts { job, .. } => job,
+    };
+    if entry.model_use() == ModelUse::None || !job.windows(FIELD.len()).any(|bytes| bytes == FIELD) {
+        return Ok(None);
+    }
+    let mut job = read_json::parse(job)?;
+    let Some(name) = model::named(registry, entry, &mut job) else { return Ok(None) };
+    let Some((plain, revision)) = model::asked(&name) else { return Ok(None) };
+    Ok(Some(match shelf.model(plain, revision).await? {
+        Some(kept) => Found::Model(Box::new(kept)),
+        None => Found::Unknown(names_on(shelf).await?),
+    }))
+}
+
+async fn names_on<S: ModelShelf + ?Sized>(shelf: &S) -> Result<Vec<String>, Error> {
+    let models = shelf.models(String::new(), NEAR_NAMES).await?;
+    Ok(models.into_iter().map(|model| model.name).collect())
+}
+
+/// The stored model of a job that is solved without a service.
+#[derive(Debug, Default)]
+pub enum GivenModel {
+    /// It has none.
+    #[default]
+    None,
+    /// That of a file, which the job takes whether it names it or not.
+    File(ModelFile),
+    /// What a data folder has of the name in the job.
+    Stored(OnShelf),
+}
+
+/// What a data folder has of a name.
+#[derive(Debug)]
+pub struct OnShelf(Option<Found>);
+
+impl GivenModel {
+    /// Looks for the model that a job names in a data folder, from which a service may be serving meanwhile.
+    pub async fn stored(registry: &Registry, calculator: &str, body: &Body, data: &Path) -> Result<Self, NoShelf> {
+        let entry = super::entry(registry, calculator)?;
+        let shelf = SqliteShelf::open(data).await?;
+        let found = find_on(&shelf, registry, &entry, body).await;
+        shelf.close().await;
+        Ok(Self::Stored(OnShelf(found?)))
+    }
+
+    /// What is known of the name in the job.
+    pub(super) fn found(&self) -> Option<Found> {
+        match self {
+            Self::None => None,
+            Self::File(file) => Some(Found::Model(Box::new(file.kept().clone()))),
+            Self::Stored(OnShelf(found)) => found.clone(),
+        }
+    }
+
+    /// The model that the job takes whatever it names.
+    pub(super) fn imposed(&self) -> Option<&KeptModel> {
+        match self {
+            Self::File(file) => Some(file.kept()),
+            Self::None | Self::Stored(_) => None,
+        }
+    }
+}
+
+/// Why no model was looked for.
+#[derive(Debug, thiserror::Error)]
+pub enum NoShelf {
+    /// The data folder.
+    #[error(transparent)]
+    Folder(#[from] OpenError),
+    /// The job, or the database in the folder.
+    #[error("{0:?}")]
+    Asked(#[from] Error),
 }
 
 /// What is wrong with a model: its calculator, or effects that the calculator does not know.

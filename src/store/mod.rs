@@ -9,7 +9,7 @@ mod queue;
 mod row;
 pub mod sqlite;
 mod sqlite_jobs;
-mod sqlite_models;
+pub(crate) mod sqlite_models;
 mod sqlite_studies;
 #[cfg(test)]
 mod suite;

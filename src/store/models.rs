@@ -36,15 +36,19 @@ pub struct NewModel {
     pub only_new: bool,
 }
 
-/// Where models are kept.
-pub trait ModelStore: Send + Sync + 'static {
-    /// Keeps a model as the next revision of its name, on the disk on return; `None` where the name is taken and only a
-    /// new one was wanted.
-    fn put_model(&self, model: NewModel) -> BoxFuture<'_, Result<Option<KeptModel>, StoreError>>;
+/// Where models are found.
+pub trait ModelShelf: Send + Sync + 'static {
     /// A revision of a model, or its newest.
     fn model(&self, name: String, revision: Option<u32>) -> BoxFuture<'_, Result<Option<KeptModel>, StoreError>>;
     /// The newest revisions of up to `limit` models whose names follow `after`, by name.
     fn models(&self, after: String, limit: u32) -> BoxFuture<'_, Result<Vec<KeptModel>, StoreError>>;
+}
+
+/// Where models are kept.
+pub trait ModelStore: ModelShelf {
+    /// Keeps a model as the next revision of its name, on the disk on return; `None` where the name is taken and only a
+    /// new one was wanted.
+    fn put_model(&self, model: NewModel) -> BoxFuture<'_, Result<Option<KeptModel>, StoreError>>;
     /// Deletes every revision of a model; whether there was one.
     fn delete_model(&self, name: String) -> BoxFuture<'_, Result<bool, StoreError>>;
 }

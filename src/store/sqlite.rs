@@ -25,10 +25,10 @@ fn migrations() -> Migrator {
     sqlx::migrate!("./migrations")
 }
 
-const DATABASE: &str = "precut.db";
+pub(super) const DATABASE: &str = "precut.db";
 const LOCK: &str = "precut.lock";
 const READERS: u32 = 4;
-const BUSY_TIMEOUT: Duration = Duration::from_secs(5);
+pub(super) const BUSY_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// How much is kept, and how long.
 #[derive(Debug, Clone, Copy)]

@@ -1,10 +1,81 @@
 //! Stored models in the SQLite file.
 
-use futures_util::future::BoxFuture;
+use std::path::Path;
 
-use super::models::{KeptModel, ModelRow, ModelStore, NewModel, column};
-use super::sqlite::SqliteStore;
-use super::{StoreError, now_ms};
+use futures_util::future::BoxFuture;
+use sqlx::sqlite::{SqliteConnectOptions, SqlitePool, SqlitePoolOptions};
+
+use super::models::{KeptModel, ModelRow, ModelShelf, ModelStore, NewModel, column};
+use super::sqlite::{BUSY_TIMEOUT, DATABASE, SqliteStore};
+use super::{OpenError, StoreError, now_ms};
+
+impl ModelShelf for SqliteStore {
+    fn model(&self, name: String, revision: Option<u32>) -> BoxFuture<'_, Result<Option<KeptModel>, StoreError>> {
+        Box::pin(model_in(&self.readers, name, revision))
+    }
+
+    fn models(&self, after: String, limit: u32) -> BoxFuture<'_, Result<Vec<KeptModel>, StoreError>> {
+        Box::pin(models_in(&self.readers, after, limit))
+    }
+}
+
+/// The models in the database of a data folder, for reading: whoever serves from the folder is not disturbed.
+pub(crate) struct SqliteShelf(SqlitePool);
+
+impl SqliteShelf {
+    pub(crate) async fn open(folder: &Path) -> Result<Self, OpenError> {
+        let options = SqliteConnectOptions::new()
+            .filename(folder.join(DATABASE))
+            .create_if_missing(false)
+            .busy_timeout(BUSY_TIMEOUT)
+            .pragma("query_only", "ON");
+        let opened = SqlitePoolOptions::new().max_connections(1).acquire_timeout(BUSY_TIMEOUT).connect_with(options);
+        let unusable =
+            |error: sqlx::Error| OpenError::Unusable { folder: folder.to_owned(), reason: error.to_string() };
+        opened.await.map(Self).map_err(unusable)
+    }
+
+    pub(crate) async fn close(self) {
+        self.0.close().await;
+    }
+}
+
+impl ModelShelf for SqliteShelf {
+    fn model(&self, name: String, revision: Option<u32>) -> BoxFuture<'_, Result<Option<KeptModel>, StoreError>> {
+        Box::pin(model_in(&self.0, name, revision))
+    }
+
+    fn models(&self, after: String, limit: u32) -> BoxFuture<'_, Result<Vec<KeptModel>, StoreError>> {
+        Box::pin(models_in(&self.0, after, limit))
+    }
+}
+
+async fn model_in(pool: &SqlitePool, name: String, revision: Option<u32>) -> Result<Option<KeptModel>, StoreError> {
+    let row: Option<ModelRow> = sqlx::query_as(
+        "SELECT name, revision, calculator, content, sha256, created_ms FROM models
+         WHERE name = ?1 AND content IS NOT NULL AND (?2 IS NULL OR revision = ?2)
+         ORDER BY revision DESC LIMIT 1",
+    )
+    .bind(name)
+    .bind(column(revision))
+    .fetch_optional(pool)
+    .await?;
+    Ok(row.and_then(ModelRow::model))
+}
+
+async fn models_in(pool: &SqlitePool, after: String, limit: u32) -> Result<Vec<KeptModel>, StoreError> {
+    let rows: Vec<ModelRow> = sqlx::query_as(
+        "SELECT name, revision, calculator, content, sha256, created_ms FROM models AS one
+         WHERE name > ?1 AND content IS NOT NULL
+           AND revision = (SELECT max(revision) FROM models WHERE name = one.name AND content IS NOT NULL)
+         ORDER BY name LIMIT ?2",
+    )
+    .bind(after)
+    .bind(limit)
+    .fetch_all(pool)
+    .await?;
+    Ok(rows.into_iter().filter_map(ModelRow::model).collect())
+}
 
 impl ModelStore for SqliteStore {
     fn put_model(&self, model: NewModel) -> BoxFuture<'_, Result<Option<KeptModel>, StoreError>> {
@@ -33,37 +104,6 @@ impl ModelStore for SqliteStore {
                 })
                 .await?;
             Ok(row.and_then(ModelRow::model))
-        })
-    }
-
-    fn model(&self, name: String, revision: Option<u32>) -> BoxFuture<'_, Result<Option<KeptModel>, StoreError>> {
-        Box::pin(async move {
-            let row: Option<ModelRow> = sqlx::query_as(
-                "SELECT name, revision, calculator, content, sha256, created_ms FROM models
-                 WHERE name = ?1 AND content IS NOT NULL AND (?2 IS NULL OR revision = ?2)
-                 ORDER BY revision DESC LIMIT 1",
-            )
-            .bind(name)
-            .bind(column(revision))
-            .fetch_optional(&self.readers)
-            .await?;
-            Ok(row.and_then(ModelRow::model))
-        })
-    }
-
-    fn models(&self, after: String, limit: u32) -> BoxFuture<'_, Result<Vec<KeptModel>, StoreError>> {
-        Box::pin(async move {
-            let rows: Vec<ModelRow> = sqlx::query_as(
-                "SELECT name, revision, calculator, content, sha256, created_ms FROM models AS one
-                 WHERE name > ?1 AND content IS NOT NULL
-                   AND revision = (SELECT max(revision) FROM models WHERE name = one.name AND content IS NOT NULL)
-                 ORDER BY name LIMIT ?2",
-            )
-            .bind(after)
-            .bind(limit)
-            .fetch_all(&self.readers)
-            .await?;
-            Ok(rows.into_iter().filter_map(ModelRow::model).collect())
         })
     }
 

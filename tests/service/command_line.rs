@@ -300,3 +300,41 @@ fn an_exported_model_extends_a_job() {
     write(&serde_json::json!({ "from_result": format!("b3:{}", "0".repeat(64)) }));
     assert_eq!(complaint(&solve(&example))["errors"][0]["code"], "model_not_exported");
 }
+
+#[tokio::test]
+async fn a_job_names_a_model_of_a_data_folder_whoever_serves_from_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path().to_str().unwrap().to_owned();
+    let mut service = precut_command(&["serve", "--listen", "127.0.0.1:0", "--data", &data]).spawn().unwrap();
+    let address = crate::support::address_of(&mut service);
+    let model = serde_json::json!({
+        "calculator": "deflection-compensation",
+        "effects": [{ "kind": "headstock_compliance", "delta_um_per_n": 0.022 }]
+    });
+    let put = reqwest::Client::new().put(format!("http://{address}/v1/models/lathe-7"));
+    let stored = put.header("content-type", "application/json").body(model.to_string()).send().await.unwrap();
+    assert!(stored.status().is_success(), "{}", stored.text().await.unwrap());
+
+    let mut file: Value = serde_json::from_str(&said(&precut(&["example", "deflection-compensation"]))).unwrap();
+    let mut solve = |name: &str| {
+        file["job"]["model"] = name.into();
+        feed_precut(&["solve", "--data", &data], &file.to_string())
+    };
+    let beside: Value = serde_json::from_str(&said(&solve("lathe-7"))).unwrap();
+    assert_eq!(beside["model"]["name"], "lathe-7");
+    assert_eq!(beside["effects"][0]["kind"], "headstock_compliance");
+    service.kill().unwrap();
+    service.wait().unwrap();
+    let alone: Value = serde_json::from_str(&said(&solve("lathe-7@1"))).unwrap();
+    assert_eq!(alone["key"], beside["key"]);
+    // A name that is not there comes with the nearest; a folder without a database is said, and left as it was.
+    let unknown = complaint(&solve("lathe-8"));
+    assert_eq!(unknown["errors"][0]["code"], "unknown_model");
+    assert!(unknown["errors"][0]["detail"].as_str().unwrap().contains("lathe-7"), "{unknown:#}");
+    let empty = tempfile::tempdir().unwrap();
+    let place = empty.path().to_str().unwrap();
+    let refused = feed_precut(&["solve", "--data", place], &file.to_string());
+    assert_eq!(refused.status.code(), Some(1), "{refused:?}");
+    assert!(String::from_utf8_lossy(&refused.stderr).contains(place), "{refused:?}");
+    assert_eq!(std::fs::read_dir(place).unwrap().count(), 0);
+}

@@ -4,7 +4,39 @@ use futures_util::future::BoxFuture;
 
 use super::PostgresStore;
 use crate::store::StoreError;
-use crate::store::models::{KeptModel, ModelRow, ModelStore, NewModel, column};
+use crate::store::models::{KeptModel, ModelRow, ModelShelf, ModelStore, NewModel, column};
+
+impl ModelShelf for PostgresStore {
+    fn model(&self, name: String, revision: Option<u32>) -> BoxFuture<'_, Result<Option<KeptModel>, StoreError>> {
+        Box::pin(async move {
+            let row: Option<ModelRow> = sqlx::query_as(
+                "SELECT name, revision, calculator, content, sha256, created_ms FROM precut.models
+                 WHERE name = $1 AND content IS NOT NULL AND ($2::integer IS NULL OR revision = $2)
+                 ORDER BY revision DESC LIMIT 1",
+            )
+            .bind(name)
+            .bind(column(revision))
+            .fetch_optional(&self.pool)
+            .await?;
+            Ok(row.and_then(ModelRow::model))
+        })
+    }
+
+    fn models(&self, after: String, limit: u32) -> BoxFuture<'_, Result<Vec<KeptModel>, StoreError>> {
+        Box::pin(async move {
+            let rows: Vec<ModelRow> = sqlx::query_as(
+                "SELECT DISTINCT ON (name COLLATE \"C\") name, revision, calculator, content, sha256, created_ms FROM precut.models
+                 WHERE name COLLATE \"C\" > $1 AND content IS NOT NULL
+                 ORDER BY name COLLATE \"C\", revision DESC LIMIT $2",
+            )
+            .bind(after)
+            .bind(i64::from(limit))
+            .fetch_all(&self.pool)
+            .await?;
+            Ok(rows.into_iter().filter_map(ModelRow::model).collect())
+        })
+    }
+}
 
 impl ModelStore for PostgresStore {
     fn put_model(&self, model: NewModel) -> BoxFuture<'_, Result<Option<KeptModel>, StoreError>> {
@@ -35,36 +67,6 @@ impl ModelStore for PostgresStore {
                 })
                 .await?;
             Ok(row.and_then(ModelRow::model))
-        })
-    }
-
-    fn model(&self, name: String, revision: Option<u32>) -> BoxFuture<'_, Result<Option<KeptModel>, StoreError>> {
-        Box::pin(async move {
-            let row: Option<ModelRow> = sqlx::query_as(
-                "SELECT name, revision, calculator, content, sha256, created_ms FROM precut.models
-                 WHERE name = $1 AND content IS NOT NULL AND ($2::integer IS NULL OR revision = $2)
-                 ORDER BY revision DESC LIMIT 1",
-            )
-            .bind(name)
-            .bind(column(revision))
-            .fetch_optional(&self.pool)
-            .await?;
-            Ok(row.and_then(ModelRow::model))
-        })
-    }
-
-    fn models(&self, after: String, limit: u32) -> BoxFuture<'_, Result<Vec<KeptModel>, StoreError>> {
-        Box::pin(async move {
-            let rows: Vec<ModelRow> = sqlx::query_as(
-                "SELECT DISTINCT ON (name COLLATE \"C\") name, revision, calculator, content, sha256, created_ms FROM precut.models
-                 WHERE name COLLATE \"C\" > $1 AND content IS NOT NULL
-                 ORDER BY name COLLATE \"C\", revision DESC LIMIT $2",
-            )
-            .bind(after)
-            .bind(i64::from(limit))
-            .fetch_all(&self.pool)
-            .await?;
-            Ok(rows.into_iter().filter_map(ModelRow::model).collect())
         })
     }
 
