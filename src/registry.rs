@@ -37,7 +37,6 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use precut_calc::calculator::{Calculator, Diagnosable, ForwardModel, Registrar};
-use serde_json::Value;
 use utoipa::openapi::{RefOr, Schema};
 
 /// Names under `/v1/` that the service itself uses: no calculator may have one of them.
@@ -103,7 +102,7 @@ impl Registry {
         let mut entries = offered.entries.into_iter().collect::<Result<Vec<_>, _>>()?;
         entries.extend(Entry::family(offered.diagnoses.into_iter().collect::<Result<Vec<_>, _>>()?)?);
         let mut by_id = BTreeMap::new();
-        let mut components: BTreeMap<&str, &Value> = BTreeMap::new();
+        let mut components: BTreeMap<&str, _> = BTreeMap::new();
         for (index, entry) in entries.iter().enumerate() {
             let id = entry.meta().id;
             if by_id.insert(id, index).is_some() {
@@ -138,10 +137,10 @@ impl Registry {
     pub fn components(&self) -> Vec<(String, RefOr<Schema>)> {
         let mut all = BTreeMap::new();
         for entry in self.entries.iter() {
-            all.extend(entry.output_components().iter().cloned());
+            all.extend(entry.output_components());
         }
         for entry in self.entries.iter() {
-            all.extend(entry.input_components().iter().cloned());
+            all.extend(entry.input_components());
         }
         all.into_iter().collect()
     }

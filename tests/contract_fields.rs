@@ -50,7 +50,7 @@ fn every_number_of_a_job_has_unit_symbol_range_and_example() {
     for entry in Registry::standard().unwrap().entries() {
         let document = entry.input_document();
         let mut numbers = 0;
-        walk(document, document, entry.meta().id, &mut Vec::new(), &mut |path, node| {
+        walk(&document, &document, entry.meta().id, &mut Vec::new(), &mut |path, node| {
             if !is_number(node) {
                 return;
             }
@@ -70,7 +70,7 @@ fn every_number_of_a_job_has_unit_symbol_range_and_example() {
 fn every_number_of_a_result_has_its_unit() {
     for entry in Registry::standard().unwrap().entries() {
         let document = entry.output_document();
-        walk(document, document, entry.meta().id, &mut Vec::new(), &mut |path, node| {
+        walk(&document, &document, entry.meta().id, &mut Vec::new(), &mut |path, node| {
             assert!(!is_number(node) || node["x-unit"].is_string(), "{path} has no unit");
         });
     }
@@ -85,7 +85,7 @@ fn printed_defaults_are_the_real_ones() {
         let filled = precut::engine::check_now(&Registry::standard().unwrap(), id, body).unwrap().input;
         let example: Value = serde_json::from_str(entry.meta().examples[0].job).unwrap();
         let document = entry.input_document();
-        compare_defaults(document, document, &filled, Some(&example), id);
+        compare_defaults(&document, &document, &filled, Some(&example), id);
     }
 }
 

@@ -240,7 +240,7 @@ fn run(cli: Cli, registry: &Registry) -> Result<(), Failed> {
         Some(Command::Schema { calculator, result }) => {
             let entry = entry(registry, &calculator)?;
             let document = if result { entry.output_document() } else { entry.input_document() };
-            print_json(&text::described(document, entry.meta().id, language))
+            print_json(&text::described(&document, entry.meta().id, language))
         }
         Some(Command::Example { calculator, id, job }) => {
             job::example(&*entry(registry, &calculator)?, id.as_deref(), job)

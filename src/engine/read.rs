@@ -513,7 +513,7 @@ mod tests {
         #[test]
         fn the_verdict_is_that_of_the_published_schema(job in any_job()) {
             let entry = toy();
-            let published = jsonschema::draft202012::new(entry.input_document()).unwrap();
+            let published = jsonschema::draft202012::new(&entry.input_document()).unwrap();
             let parsed = json::parse(job.to_string().as_bytes()).unwrap();
             let mut faults = Faults::default();
             entry.validate(&parsed, &mut faults);

@@ -431,7 +431,7 @@ fn conforms(registry: &Registry, entry: &Entry) {
             }
         }
         let answer = envelope(&stored);
-        let output = jsonschema::draft202012::new(entry.output_document()).unwrap();
+        let output = jsonschema::draft202012::new(&entry.output_document()).unwrap();
         assert!(output.is_valid(&answer["result"]), "{}: {:?}", meta.id, output.validate(&answer["result"]));
         let again = read::read(
             &registry.entry(meta.id).unwrap().clone(),

@@ -266,8 +266,8 @@ pub(super) fn described(entry: &Entry, language: Language) -> CalculatorDescript
         study_outputs: meta.study_outputs,
         codes: meta.codes.all().collect(),
         labels: labels(meta, language),
-        input_schema: text::described(entry.input_document(), meta.id, language),
-        output_schema: text::described(entry.output_document(), meta.id, language),
+        input_schema: text::described(&entry.input_document(), meta.id, language),
+        output_schema: text::described(&entry.output_document(), meta.id, language),
         jobs: Value::Object(jobs.collect()),
     }
 }

@@ -60,14 +60,36 @@ pub(super) struct Member {
     pub(super) entry: Entry,
 }
 
-/// A type's schema, in the forms in which it is asked for.
+/// A type's schema, in the forms in which it is asked for. What is asked for now and then is kept as JSON text: as
+/// values all these would take most of the memory of a service at rest.
 pub(super) struct Contract {
-    schema: RefOr<Schema>,
-    components: Vec<(String, RefOr<Schema>)>,
-    document: Value,
+    schema: Text,
+    components: Vec<(String, Text)>,
+    document: Text,
     /// Before objects were closed: what makes two types of one name the same type.
-    open: Components,
+    open: BTreeMap<String, Text>,
     strict: Value,
+}
+
+/// A schema as JSON.
+#[derive(Clone, PartialEq, Eq)]
+pub(super) struct Text(Box<str>);
+
+impl Text {
+    fn of(value: &Value) -> Self {
+        Self(value.to_string().into())
+    }
+
+    /// Of a schema that the types of the OpenAPI document hold.
+    fn of_schema(value: &Value) -> Result<Self, RegistryError> {
+        let text = Self::of(value);
+        serde_json::from_str::<RefOr<Schema>>(&text.0).map_err(|error| RegistryError::BadSchema(error.to_string()))?;
+        Ok(text)
+    }
+
+    fn read<T: DeserializeOwned>(&self) -> T {
+        serde_json::from_str(&self.0).expect("it was read when it was written")
+    }
 }
 
 impl Entry {
@@ -101,7 +123,9 @@ impl Entry {
             family::offer_model(job);
         })?;
         let output = Contract::of::<ResultOf<M>>(base.id, false, |_| {})?;
-        let mut entry = Self::from_contracts(<Diagnosis<M> as Calculator>::META, input, output, calculation)?;
+        // Its jobs are checked by the family's schema, which holds this one.
+        let checker = Checker::new(Value::Object(serde_json::Map::new()))?;
+        let mut entry = Self::checked_by(checker, <Diagnosis<M> as Calculator>::META, input, output, calculation);
         // A diagnosis refuses a base job in the words of the base.
         let of_base = [base.codes.faults, base.codes.failures].into_iter().flatten().copied().flatten();
         entry.model_use = ModelUse::OfBase;
@@ -125,6 +149,9 @@ impl Entry {
         entry.own_codes = own_codes.into_iter().collect();
         entry.model_use = ModelUse::OfBase;
         entry.members = members;
+        for member in &mut entry.members {
+            (member.entry.input, member.entry.output) = (Contract::none(), Contract::none());
+        }
         Ok(Some(entry))
     }
 
@@ -176,12 +203,23 @@ impl Entry {
         output: Contract,
         calculation: Box<dyn Calculation>,
     ) -> Result<Self, RegistryError> {
+        let checker = Checker::new(input.strict.clone())?;
+        Ok(Self::checked_by(checker, meta, input, output, calculation))
+    }
+
+    fn checked_by(
+        checker: Checker,
+        meta: Meta,
+        input: Contract,
+        output: Contract,
+        calculation: Box<dyn Calculation>,
+    ) -> Self {
         let mut own_codes = BTreeSet::new();
         codes_in(&input.strict, &mut own_codes);
-        Ok(Self {
+        Self {
             meta,
             tables: table_places(&input.strict),
-            checker: Checker::new(input.strict.clone())?,
+            checker,
             own_codes: own_codes.into_iter().collect(),
             input,
             output,
@@ -190,7 +228,7 @@ impl Entry {
             model_use: ModelUse::None,
             members: Vec::new(),
             answer_bytes: AtomicUsize::new(0),
-        })
+        }
     }
 
     /// What stands on the door.
@@ -198,32 +236,32 @@ impl Entry {
         &self.meta
     }
     /// Schema of the job for the OpenAPI document; refers to [`Entry::components`].
-    pub fn input_schema(&self) -> &RefOr<Schema> {
-        &self.input.schema
+    pub fn input_schema(&self) -> RefOr<Schema> {
+        self.input.schema.read()
     }
     /// Schema of the result for the OpenAPI document; refers to [`Entry::components`].
-    pub fn output_schema(&self) -> &RefOr<Schema> {
-        &self.output.schema
+    pub fn output_schema(&self) -> RefOr<Schema> {
+        self.output.schema.read()
     }
     /// Every component that either schema refers to, by name, each name once; where both do, as the job has it.
     pub fn components(&self) -> Vec<(String, RefOr<Schema>)> {
-        let mut all: BTreeMap<_, _> = self.output.components.iter().cloned().collect();
-        all.extend(self.input.components.iter().cloned());
+        let mut all: BTreeMap<_, _> = self.output_components().collect();
+        all.extend(self.input_components());
         all.into_iter().collect()
     }
-    pub(super) fn input_components(&self) -> &[(String, RefOr<Schema>)] {
-        &self.input.components
+    pub(super) fn input_components(&self) -> impl Iterator<Item = (String, RefOr<Schema>)> + '_ {
+        read_components(&self.input.components)
     }
-    pub(super) fn output_components(&self) -> &[(String, RefOr<Schema>)] {
-        &self.output.components
+    pub(super) fn output_components(&self) -> impl Iterator<Item = (String, RefOr<Schema>)> + '_ {
+        read_components(&self.output.components)
     }
     /// Self-contained JSON Schema (2020-12) of the job.
-    pub fn input_document(&self) -> &Value {
-        &self.input.document
+    pub fn input_document(&self) -> Value {
+        self.input.document.read()
     }
     /// Self-contained JSON Schema (2020-12) of the result.
-    pub fn output_document(&self) -> &Value {
-        &self.output.document
+    pub fn output_document(&self) -> Value {
+        self.output.document.read()
     }
     /// Whether the job takes measured tables (CSV in place, or file parts).
     pub fn takes_tables(&self) -> bool {
@@ -277,7 +315,7 @@ impl Entry {
     pub(crate) fn strict_output(&self) -> &Value {
         &self.output.strict
     }
-    pub(super) fn open_components(&self) -> impl Iterator<Item = (&String, &Value)> {
+    pub(super) fn open_components(&self) -> impl Iterator<Item = (&String, &Text)> {
         self.input.open.iter().chain(&self.output.open)
     }
 
@@ -366,45 +404,51 @@ impl Contract {
             components.values_mut().for_each(schema::close);
         }
         Ok(Self {
-            schema: serde_json::from_value(root.clone()).map_err(broken)?,
-            components: components
-                .iter()
-                .map(|(name, part)| Ok((name.clone(), serde_json::from_value(part.clone())?)))
-                .collect::<Result<_, serde_json::Error>>()
-                .map_err(broken)?,
-            document: schema::standing_alone(&root, &components),
+            schema: Text::of_schema(&root)?,
+            components: of_components(&components)?,
+            document: Text::of(&schema::standing_alone(&root, &components)),
             strict: schema::strict(&root, &components)?,
-            open,
+            open: open.iter().map(|(name, part)| (name.clone(), Text::of(part))).collect(),
         })
+    }
+
+    /// What is left of a contract that was joined with others.
+    fn none() -> Self {
+        let empty = || Text("{}".into());
+        let (schema, document) = (empty(), empty());
+        Self { schema, components: Vec::new(), document, open: BTreeMap::new(), strict: Value::Null }
     }
 
     /// One of several contracts, by what stands in the field `calculator` of a job.
     fn joined<'a>(parts: impl Iterator<Item = (String, &'a Self)>, told_apart: bool) -> Result<Self, RegistryError> {
-        let broken = |error: serde_json::Error| RegistryError::BadSchema(error.to_string());
         let mut components = Components::new();
-        let mut open = Components::new();
+        let mut open = BTreeMap::new();
         let mut names = Vec::new();
         for (name, part) in parts {
             for (name, component) in &part.components {
-                components.insert(name.clone(), serde_json::to_value(component).map_err(broken)?);
+                components.insert(name.clone(), component.read());
             }
             open.extend(part.open.clone());
-            components.insert(name.clone(), serde_json::to_value(&part.schema).map_err(broken)?);
+            components.insert(name.clone(), part.schema.read());
             names.push(name);
         }
         let root = family::one_of(&names, &components, told_apart);
         Ok(Self {
-            schema: serde_json::from_value(root.clone()).map_err(broken)?,
-            components: components
-                .iter()
-                .map(|(name, part)| Ok((name.clone(), serde_json::from_value(part.clone())?)))
-                .collect::<Result<_, serde_json::Error>>()
-                .map_err(broken)?,
-            document: schema::standing_alone(&root, &components),
+            schema: Text::of_schema(&root)?,
+            components: of_components(&components)?,
+            document: Text::of(&schema::standing_alone(&root, &components)),
             strict: schema::strict(&root, &components)?,
             open,
         })
     }
+}
+
+fn of_components(components: &Components) -> Result<Vec<(String, Text)>, RegistryError> {
+    components.iter().map(|(name, part)| Ok((name.clone(), Text::of_schema(part)?))).collect()
+}
+
+fn read_components(components: &[(String, Text)]) -> impl Iterator<Item = (String, RefOr<Schema>)> + '_ {
+    components.iter().map(|(name, part)| (name.clone(), part.read()))
 }
 
 /// A job that can run.

@@ -92,7 +92,8 @@ fn every_object_of_a_job_is_closed_in_the_published_schema() {
     for registry in [Registry::standard().unwrap(), toy::registry()] {
         for entry in registry.entries() {
             let mut found = Vec::new();
-            objects(entry.input_document(), &mut found);
+            let document = entry.input_document();
+            objects(&document, &mut found);
             for object in found {
                 assert!(object.get("additionalProperties").is_some(), "{}: {object}", entry.meta().id);
             }
@@ -115,12 +116,13 @@ fn a_newtype_variant_is_one_object_with_its_tag() {
 fn the_document_stands_alone_and_the_contract_says_the_same() {
     let registry = toy::registry();
     let entry = registry.entry("toy-bar").unwrap();
-    let text = entry.input_document().to_string();
+    let document = entry.input_document();
+    let text = document.to_string();
     assert!(!text.contains("#/components"), "{text}");
     for (name, component) in registry.components() {
         let component =
             serde_json::to_value(component).unwrap().to_string().replace("#/components/schemas/", "#/$defs/");
-        let defined = &entry.input_document()["$defs"][&name];
+        let defined = &document["$defs"][&name];
         // The order of extensions is lost in utoipa's hash map.
         assert_eq!(serde_json::from_str::<Value>(&component).unwrap(), *defined, "{name}");
     }

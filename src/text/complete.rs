@@ -232,7 +232,7 @@ impl Asked {
                 asked.word.insert((*id).to_owned(), meta.id.to_owned());
             }
             for document in [entry.input_document(), entry.output_document()] {
-                asked.walk(document, meta.id, meta.id);
+                asked.walk(&document, meta.id, meta.id);
             }
         }
         for material in material::library() {

@@ -50,8 +50,8 @@ fn operation(entry: &Entry, name: &str, tag: &str, examples: &[Example]) -> Room
     let meta = entry.meta();
     let (job, result, answer) = (format!("{name}Job"), format!("{name}Result"), format!("{name}Answer"));
     let mut schemas = entry.components();
-    schemas.push((job.clone(), entry.input_schema().clone()));
-    schemas.push((result.clone(), entry.output_schema().clone()));
+    schemas.push((job.clone(), entry.input_schema()));
+    schemas.push((result.clone(), entry.output_schema()));
     schemas.push((answer.clone(), envelope(meta, &result).into()));
     let operation = OperationBuilder::new()
         .tag(tag)
