@@ -89,7 +89,7 @@ fn bound(sketch: &Value) -> (Bound<DeflectionCompensation>, Data) {
         design,
     };
     let value = rows.iter().map(|row| row["diameter_deviation_um"].as_f64().unwrap()).collect();
-    (Bound::new(prepared, allowances, quantity, None), Data { value, uncertainty: None, layout })
+    (Bound::new(prepared, allowances, quantity, None), Data { value, uncertainty: None, sides: None, layout })
 }
 
 struct Case {

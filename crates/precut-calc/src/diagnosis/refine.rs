@@ -2,9 +2,10 @@
 
 use nalgebra::{Cholesky, DMatrix};
 
-use super::evidence::{Normal, Scale, Side};
+use super::evidence::{Normal, Side};
+use super::likelihood::Likelihood;
 use super::subject::{Setting, Subject};
-use super::whiten::{White, Whitener};
+use super::whiten::White;
 use crate::calculator::{Failure, Hypothesis, Range, Shape, Treatment, Variable};
 
 /// Steps where only amplitudes are free.
@@ -104,8 +105,7 @@ pub(super) struct Refinement<'a> {
     pub(super) subject: &'a dyn Subject,
     pub(super) value: &'a [f64],
     pub(super) keep: &'a [bool],
-    pub(super) whitener: &'a Whitener,
-    pub(super) scale: Scale,
+    pub(super) likelihood: &'a Likelihood,
     /// Whether the model is far from linear in its sizes.
     pub(super) nonlinear: bool,
 }
@@ -141,11 +141,7 @@ impl Refinement<'_> {
         loop {
             let Some(here) = self.linearise(&settings, &free, &coordinates)? else { return Ok(None) };
             let columns: Vec<&White> = here.columns.iter().collect();
-            let Some(evidence) =
-                Normal::of(&columns, &here.residual).evidence(&sides, self.scale, self.whitener.rows())
-            else {
-                return Ok(None);
-            };
+            let Some(evidence) = self.likelihood.evidence(&columns, &here.residual, &sides) else { return Ok(None) };
             let mut longest: f64 = 0.0;
             for (k, coordinate) in coordinates.iter().enumerate() {
                 let (member, variable) = free[k];
@@ -194,7 +190,7 @@ impl Refinement<'_> {
 
     /// y - f, whitened; `None` where the model has no value for a row that counts.
     pub(super) fn residual(&self, settings: &[Setting]) -> Result<Option<White>, Failure> {
-        Ok(self.raw_residual(settings)?.map(|raw| self.whitener.white(&raw)))
+        Ok(self.raw_residual(settings)?.map(|raw| self.likelihood.white(&raw)))
     }
 
     fn raw_residual(&self, settings: &[Setting]) -> Result<Option<Vec<f64>>, Failure> {
@@ -214,7 +210,7 @@ impl Refinement<'_> {
     ) {
         let others: Vec<usize> = (0..fit.free.len()).filter(|k| Some(*k) != fixed).collect();
         let columns: Vec<&White> = others.iter().map(|&k| &fit.columns[k]).collect();
-        let Normal { mut gram, mut right, .. } = Normal::of(&columns, residual);
+        let Some(Normal { mut gram, mut right, .. }) = self.likelihood.normal(&columns, residual) else { return };
         for (i, &k) in others.iter().enumerate() {
             gram[(i, i)] += 1.0;
             right[i] -= t[k];
@@ -243,9 +239,9 @@ impl Refinement<'_> {
             let column: Vec<f64> = slope.iter().map(|s| s * by).collect();
             let t = coordinate.t(value);
             residual.iter_mut().zip(&column).for_each(|(r, c)| *r += c * t);
-            columns.push(self.whitener.white(&column));
+            columns.push(self.likelihood.white(&column));
         }
-        Ok(Some(Here { residual: self.whitener.white(&residual), columns, slopes }))
+        Ok(Some(Here { residual: self.likelihood.white(&residual), columns, slopes }))
     }
 }
 

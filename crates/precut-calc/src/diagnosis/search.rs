@@ -2,9 +2,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::evidence::{Evidence, Normal, Scale, Side, log_mean_exp, log_sum_exp};
+use super::evidence::{Evidence, Normal, Side, log_mean_exp, log_sum_exp};
+use super::likelihood::Likelihood;
 use super::subject::{Setting, Subject};
-use super::whiten::{White, Whitener};
+use super::whiten::White;
 use crate::calculator::{Failure, Hypothesis, Monitor, Treatment, checkpoint};
 
 /// Singles that may have partners.
@@ -152,8 +153,7 @@ pub(super) struct Linear<'a> {
     gram: DMatrix<f64>,
     right: DVector<f64>,
     square: f64,
-    pub(super) scale: Scale,
-    pub(super) rows: f64,
+    pub(super) likelihood: Likelihood,
     /// Hypotheses that these rows can see.
     pub(super) visible: Vec<usize>,
 }
@@ -188,12 +188,12 @@ impl<'a> Linear<'a> {
     pub(super) fn new(
         hypotheses: &'a [Hypothesis],
         signatures: &'a Signatures,
-        whitener: &Whitener,
+        likelihood: Likelihood,
         residual: &[f64],
-        scale: Scale,
     ) -> Self {
-        let white: Vec<White> = signatures.columns.iter().map(|column| whitener.white(column)).collect();
-        let residual = whitener.white(residual);
+        let white: Vec<White> = signatures.columns.iter().map(|column| likelihood.white(column)).collect();
+        let residual = likelihood.white(residual);
+        // Of classes as if every row stood on the boundary, where it says most.
         let Normal { gram, right, square } = Normal::of(&white.iter().collect::<Vec<_>>(), &residual);
         let seen = |h: &usize| {
             signatures.variants[*h].iter().any(|variant| {
@@ -202,8 +202,7 @@ impl<'a> Linear<'a> {
             })
         };
         let visible = (0..hypotheses.len()).filter(seen).collect();
-        let rows = whitener.rows();
-        Self { hypotheses, signatures, white, residual, gram, right, square, scale, rows, visible }
+        Self { hypotheses, signatures, white, residual, gram, right, square, likelihood, visible }
     }
 
     pub(super) fn variant(&self, hypothesis: usize, variant: usize) -> &Variant {
@@ -251,6 +250,10 @@ impl<'a> Linear<'a> {
     }
 
     fn evidence(&self, members: &[usize], variants: &[usize]) -> Option<Evidence> {
+        let Likelihood::Gaussian { whitener, scale } = &self.likelihood else {
+            let (columns, sides, residual) = self.parts(members, variants);
+            return self.likelihood.evidence(&columns, &residual, &sides);
+        };
         let (mut columns, mut sides, mut offsets) = (Vec::new(), Vec::new(), Vec::new());
         for (&h, &v) in members.iter().zip(variants) {
             let variant = self.variant(h, v);
@@ -268,7 +271,7 @@ impl<'a> Linear<'a> {
             square -= 2.0 * self.right[o];
             square += offsets.iter().map(|&p| self.gram[(o, p)]).sum::<f64>();
         }
-        Normal { gram, right, square }.evidence(&sides, self.scale, self.rows)
+        Normal { gram, right, square }.evidence(&sides, *scale, whitener.rows())
     }
 
     /// A set of causes: mean evidence over the product of the grids, and the best point.

@@ -47,8 +47,11 @@ impl Experiment<'_> {
             }
             "tooth_runout" => nothing(base.cutting.teeth > 1),
             "jaw_mass" => nothing(base.holding.jaw.is_some()),
-            // Stable amplitudes and limits are those of closed joints: only a history shows one that opens.
-            "preload_loss" if *measure != Measure::Displacement || base.holding.clamp_force_n.is_none() => {
+            // Stable amplitudes and limits are those of closed joints: a history shows one that opens, and a class.
+            "preload_loss"
+                if !matches!(measure, Measure::Displacement | Measure::Regime)
+                    || base.holding.clamp_force_n.is_none() =>
+            {
                 nothing(false)
             }
             "preload_loss" if rows.iter().any(|row| row.time_since_clamping_min.is_none()) => {
@@ -160,7 +163,7 @@ pub(super) fn design(prepared: &PreparedFixture) -> Design {
     let at_depth = |row: &PreparedRow| if limit { 0 } else { depth(row) };
     let cell = numbered(&|row| {
         let (speed, feed, clamped) = row.regime();
-        [speed, feed, clamped, at_depth(row), 0]
+        [speed, feed, clamped, at_depth(row), row.margin as u64]
     });
     let per_speed = numbered(&|row| [speed(row), 0, 0, 0, 0]);
     let mut groupings = vec![Grouping { name: "per_speed", group: per_speed.clone() }];
