@@ -223,11 +223,18 @@ impl ForwardModel for FixtureStability {
 impl Diagnosable for FixtureStability {
     type Row = FixtureMeasurement;
 
-    const DIAGNOSES: &'static [Example] = &[Example {
-        id: "fixture",
-        title: "Amplitudes at four speeds and six depths: the vise is softer than stated",
-        job: include_str!("examples/diagnosis_stiffness.json"),
-    }];
+    const DIAGNOSES: &'static [Example] = &[
+        Example {
+            id: "fixture",
+            title: "Amplitudes at four speeds and six depths: the vise is softer than stated",
+            job: include_str!("examples/diagnosis_stiffness.json"),
+        },
+        Example {
+            id: "fixture_classes",
+            title: "Cuts at five speeds, each stable, chattering, or with a joint that opened",
+            job: include_str!("examples/diagnosis_classes.json"),
+        },
+    ];
 
     fn hypotheses(prepared: &PreparedFixture) -> Hypotheses {
         Experiment { prepared }.hypotheses()

@@ -57,7 +57,7 @@ impl PreparedFixture {
     ) -> Result<Vec<(usize, Prediction)>, Failure> {
         let asks = |margin: RegimeMargin| rows.iter().any(|&row| self.rows[row].margin == margin);
         let chatter = if asks(RegimeMargin::Chatter) {
-            Ok(-self.log_modulus(case, case.working)? / steepness)
+            or_missing(self.log_modulus(case, case.working))?.map(|ln| -ln / steepness)
         } else {
             Err(Missing::NoSolution)
         };
@@ -98,19 +98,35 @@ impl PreparedFixture {
     }
 }
 
+/// Joints that harden may have no forced motion about which to ask.
+fn or_missing<T>(found: Result<T, Failure>) -> Result<Result<T, Missing>, Failure> {
+    match found {
+        Ok(value) => Ok(Ok(value)),
+        Err(Failure::OutOfModel(_) | Failure::NotConverged { .. }) => Ok(Err(Missing::NoSolution)),
+        Err(other) => Err(other),
+    }
+}
+
 /// ln of the clamp force over what the forced motion in closed joints asks for. `unit` is the motion at 1 mm of depth, where
 /// it goes with H^(1-mu).
 fn opening(case: &Case, unit: &mut Option<Response>) -> Result<Prediction, Failure> {
     let Some(force) = case.holding.clamp_force_n else { return Ok(Err(Missing::NoSolution)) };
     let asked = |forced: &Response| forced.left_elastic_n.high.max(forced.right_elastic_n.high);
+    let forced = |working| or_missing(forced(case, working));
     let asked = if case.is_linear() {
         let unit = match unit {
             Some(unit) => unit,
-            None => unit.insert(forced(case, case.at_depth(1.0))?),
+            None => match forced(case.at_depth(1.0))? {
+                Ok(response) => unit.insert(response),
+                Err(missing) => return Ok(Err(missing)),
+            },
         };
         asked(unit) * case.cutting.depth_power(case.working.depth_mm)
     } else {
-        asked(&forced(case, case.working)?)
+        match forced(case.working)? {
+            Ok(response) => asked(&response),
+            Err(missing) => return Ok(Err(missing)),
+        }
     };
     if asked <= 0.0 {
         return Ok(Err(Missing::NoCut));
