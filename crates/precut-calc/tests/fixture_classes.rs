@@ -39,7 +39,8 @@ fn margins(job: &FixtureJob, speed: f64, depths: &[f64], margin: RegimeMargin, e
 
 fn limit(job: &FixtureJob, speed: f64) -> f64 {
     let run = FixtureRun { spindle_speed_rpm: Some(speed), ..FixtureRun::default() };
-    let rows = Rows { runs: vec![run], points: vec![(0, FixturePoint::default())] };
+    let rows =
+        Rows { runs: vec![run], points: vec![(0, FixturePoint { depth_mm: Some(10.0), ..FixturePoint::default() })] };
     let Ok(prepared) = FixtureStability::prepare(job, &rows, "depth_limit_mm", &Unwatched) else { panic!() };
     FixtureStability::predict(&prepared, &[]).unwrap()[0].unwrap()
 }
@@ -157,6 +158,7 @@ fn classes_that_the_base_foresees_are_no_finding() {
     let held_out = result.classes.unwrap().held_out.unwrap();
     assert!((held_out.log_score_base - held_out.log_score_extended).abs() < 0.05);
     // One wrong label far inside: it is pointed at.
+    request["options"] = json!({ "held_out": false, "most_causes": 1 });
     let stable = request["measurements"].as_array().unwrap().iter().position(|row| row["regime"] != "chatter").unwrap();
     request["measurements"][stable]["regime"] = json!("chatter");
     let mut job: <Vises as Calculator>::Input = serde_json::from_value(request).unwrap();
