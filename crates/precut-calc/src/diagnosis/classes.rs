@@ -1,5 +1,5 @@
 //! Rows that are classes: what each model says of them, where the limits run, and how both fare on rows held back
-//! (`diagnosis/3.9`).
+//! (`diagnosis/3.11`).
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;

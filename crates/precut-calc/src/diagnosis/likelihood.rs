@@ -1,5 +1,5 @@
 //! What rows say about a prediction: values that scatter about it, or classes on either side of a margin
-//! (`diagnosis/3.4`, `diagnosis/3.9`). The one place where a diagnosis knows the difference.
+//! (`diagnosis/3.4`, `diagnosis/3.11`). The one place where a diagnosis knows the difference.
 
 use super::data::Data;
 use super::evidence::{Evidence, Normal, Scale, Side};

@@ -1,4 +1,4 @@
-//! Classes on either side of a margin: the probit likelihood, its mode and its evidence (`diagnosis/3.9`).
+//! Classes on either side of a margin: the probit likelihood, its mode and its evidence (`diagnosis/3.11`).
 
 use std::f64::consts::PI;
 
