@@ -14,7 +14,7 @@
 //! other texts are what the code says.
 
 use std::collections::BTreeMap;
-use std::sync::LazyLock;
+use std::sync::{LazyLock, OnceLock};
 
 use super::{FIELDS, Language, TextError, files};
 use crate::units;
@@ -25,12 +25,7 @@ pub(crate) struct Glossary {
     sections: BTreeMap<String, BTreeMap<String, String>>,
 }
 
-static SHARED: LazyLock<[Glossary; Language::ALL.len()]> = LazyLock::new(|| {
-    Language::ALL.map(|language| {
-        let own: Vec<_> = files().filter(|(path, _)| language.owns(path) && path.contains(FIELDS)).collect();
-        Glossary::from_files(&own).expect("the words in the binary are tested")
-    })
-});
+static SHARED: [OnceLock<Glossary>; Language::ALL.len()] = [const { OnceLock::new() }; Language::ALL.len()];
 
 /// Ends of names that only say the unit, longest first.
 static SUFFIXES: LazyLock<Vec<String>> = LazyLock::new(|| {
@@ -45,7 +40,10 @@ static SUFFIXES: LazyLock<Vec<String>> = LazyLock::new(|| {
 impl Glossary {
     /// That of a language.
     pub(crate) fn of(language: Language) -> &'static Self {
-        &SHARED[language.index()]
+        SHARED[language.index()].get_or_init(|| {
+            let own: Vec<_> = files().filter(|(path, _)| language.owns(path) && path.contains(FIELDS)).collect();
+            Self::from_files(&own).expect("the words in the binary are tested")
+        })
     }
 
     pub(super) fn from_files(files: &[(String, String)]) -> Result<Self, TextError> {
