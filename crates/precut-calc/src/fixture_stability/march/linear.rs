@@ -6,7 +6,7 @@
 //! `begun' = (phi begun + shift) + (phi end + start) F1`, and the position that its feed is taken at is the same with
 //! `phi end + start + end`: two operations from one force to the next feed instead of seven (`fixture/3.2`).
 
-use super::{Record, State, Surface, demands, index, take};
+use super::{Cell, Record, State, Surface, demands, index, take};
 use crate::num::dde::times;
 
 use super::super::holding::Closed;
@@ -47,18 +47,12 @@ impl<const N: usize> State<'_, N> {
 
         let mut chips: [f64; K] = std::array::from_fn(|j| self.cells[j * pitch + first].chip);
         let mut forces = [0.0; K];
-        let mut rest = &mut self.cells[first + 1..];
-        // A tooth's cells end where those of the tooth before it begin.
-        let rows: [_; K] = std::array::from_fn(|_| {
-            let row = rest.len().min(pitch);
-            let (row, after) = std::mem::take(&mut rest).split_at_mut(row);
-            rest = after;
-            &mut row[..steps]
-        });
+        let rows: [_; K] = rows(&mut self.cells[first + 1..], pitch, steps);
         let mut entry = record.entry;
         let (mut x_mm, mut x_early_mm, mut force_n) = (record.x_mm, record.x_early_mm, record.force_n);
         let (mut feeds_mm, mut asked) = (record.feed_mm, record.demand);
         let (mut time_s, mut steady_s, mut lost) = (record.time_s, record.steady_s, record.lost);
+        #[allow(clippy::needless_range_loop)] // the same place in the row of every tooth
         for s in 0..steps {
             let demand = demands(&self.system, self.holding, &q);
             let velocity = self.system.velocity(&q, 0);
@@ -131,4 +125,14 @@ impl<const N: usize> State<'_, N> {
         self.of_tooth[..K].copy_from_slice(&forces);
         self.q = q;
     }
+}
+
+/// The next cells of `K` teeth: those of a tooth end where those of the tooth before it begin.
+fn rows<const K: usize>(mut cells: &mut [Cell], pitch: usize, steps: usize) -> [&mut [Cell]; K] {
+    std::array::from_fn(|_| {
+        let row = cells.len().min(pitch);
+        let (row, after) = std::mem::take(&mut cells).split_at_mut(row);
+        cells = after;
+        &mut row[..steps]
+    })
 }
