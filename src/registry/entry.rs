@@ -82,8 +82,11 @@ pub(super) struct Member {
     pub(super) entry: Entry,
 }
 
-/// Contracts follow from types alone, and [`Entry::verify`] makes every one of them in every build that tests.
-const FOLLOWS: &str = "the contract of a type is made by every test";
+/// What is made of a contract. Contracts follow from types alone, and [`Entry::verify`] makes all that is made of them in
+/// every build that tests.
+fn follows<T>(made: Result<T, RegistryError>) -> T {
+    made.expect("the contract of a type is made by every test")
+}
 
 impl Entry {
     /// The entry of a calculator.
@@ -210,23 +213,23 @@ impl Entry {
     }
 
     fn input(&self) -> Contract {
-        self.made_input().expect(FOLLOWS)
+        follows(self.made_input())
     }
     fn output(&self) -> Contract {
-        self.made_output().expect(FOLLOWS)
+        follows(self.made_output())
     }
 
     /// What jobs are held against; where the tables stand is read off the same schema.
     fn checker(&self) -> &Checker {
         let made = || match self.members() {
             [] => {
-                let strict = self.input().strict().expect(FOLLOWS);
+                let strict = follows(self.input().strict());
                 self.tables.get_or_init(|| table_places(&strict));
                 Checker::new(strict)
             }
             members => of_members(members),
         };
-        self.checker.get_or_init(|| made().expect(FOLLOWS))
+        self.checker.get_or_init(|| follows(made()))
     }
 
     /// Makes all that is made on demand, so that what cannot be made is known at once; `components` are those of the
@@ -263,20 +266,20 @@ impl Entry {
     }
     /// What the OpenAPI document says of job and result.
     pub fn schemas(&self) -> Schemas {
-        let (input, output) = (self.input(), self.output());
-        let mut components = output.components().expect(FOLLOWS);
-        components.extend(input.components().expect(FOLLOWS));
-        Schemas {
-            input: input.schema().expect(FOLLOWS),
-            output: output.schema().expect(FOLLOWS),
-            components: components.into_iter().collect(),
-        }
+        let made = || {
+            let (input, output) = (self.made_input()?, self.made_output()?);
+            let mut components = output.components()?;
+            components.extend(input.components()?);
+            let components = components.into_iter().collect();
+            Ok(Schemas { input: input.schema()?, output: output.schema()?, components })
+        };
+        follows(made())
     }
     pub(super) fn input_components(&self) -> BTreeMap<String, RefOr<Schema>> {
-        self.input().components().expect(FOLLOWS)
+        follows(self.input().components())
     }
     pub(super) fn output_components(&self) -> BTreeMap<String, RefOr<Schema>> {
-        self.output().components().expect(FOLLOWS)
+        follows(self.output().components())
     }
     /// Self-contained JSON Schema (2020-12) of the job.
     pub fn input_document(&self) -> Value {
@@ -295,7 +298,7 @@ impl Entry {
         self.tables().iter().map(TablePlace::dotted).collect()
     }
     fn tables(&self) -> &[TablePlace] {
-        self.tables.get_or_init(|| table_places(&self.input().strict().expect(FOLLOWS)))
+        self.tables.get_or_init(|| table_places(&follows(self.input().strict())))
     }
     /// Every code that it may utter: those of its declaration and those of its fields.
     pub fn codes(&self) -> BTreeSet<String> {
@@ -344,11 +347,11 @@ impl Entry {
     }
     /// Schema of the job with references followed and unions told apart.
     pub(crate) fn strict_input(&self) -> &Value {
-        self.strict_input.get_or_init(|| self.input().strict().expect(FOLLOWS))
+        self.strict_input.get_or_init(|| follows(self.input().strict()))
     }
     /// Schema of the result in the same form.
     pub(crate) fn strict_output(&self) -> &Value {
-        self.strict_output.get_or_init(|| self.output().strict().expect(FOLLOWS))
+        self.strict_output.get_or_init(|| follows(self.output().strict()))
     }
 
     /// Adds every violation of the schema. Measured tables must be rows by now.
