@@ -13,6 +13,7 @@ mod nearest;
 mod place;
 mod result_text;
 mod schema;
+mod way;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]
@@ -32,6 +33,7 @@ pub(crate) use nearest::nearest;
 pub(crate) use place::FreeColumns;
 pub(crate) use place::{CellKind, Step, TableColumn, TablePlace};
 pub(crate) use result_text::{Unwritable, append as append_result};
+pub(crate) use way::way;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -4,6 +4,7 @@ use minijinja::value::ValueKind;
 use minijinja::{Environment, Error, State, UndefinedBehavior, Value};
 
 use super::glossary::Glossary;
+use super::named::{amount, named};
 use super::number;
 use super::{Language, significant};
 
@@ -36,6 +37,12 @@ pub(super) fn environment() -> Environment<'static> {
         said.join(", ")
     });
     environment.add_filter("labelled", labelled);
+    environment.add_filter("names", |state: &State<'_, '_>, ways: Value| names(state, &ways, false));
+    environment.add_filter("names_within", |state: &State<'_, '_>, ways: Value| names(state, &ways, true));
+    environment.add_filter("amount", |state: &State<'_, '_>, x: f64, digits: usize, unit: &str| {
+        let language = language_of(state);
+        amount(&number::spoken(&significant(x, digits), language), unit, language)
+    });
     environment.add_filter("reason", |state: &State<'_, '_>, text: &str| Glossary::of(language_of(state)).reason(text));
     environment.add_filter("list", list);
     environment.add_filter("plural", plural);
@@ -45,6 +52,15 @@ pub(super) fn environment() -> Environment<'static> {
 /// Templates are called `{language}/{section}.{code}`.
 fn language_of(state: &State<'_, '_>) -> Language {
     Language::ALL.into_iter().find(|language| language.owns(state.name())).unwrap_or_default()
+}
+
+/// Names of fields by their ways through the contract, with commas between them; with semicolons where commas stand in
+/// the numbers.
+fn names(state: &State<'_, '_>, ways: &Value, within: bool) -> Result<String, Error> {
+    let language = language_of(state);
+    let joint = if language.decimal() == ',' { "; " } else { ", " };
+    named(ways, joint, within, language)
+        .ok_or_else(|| Error::new(minijinja::ErrorKind::InvalidOperation, "names are asked for of what are no ways"))
 }
 
 fn as_number(value: &Value) -> Option<f64> {

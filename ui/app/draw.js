@@ -40,6 +40,65 @@ export function styles(figure) {
   return item => known.get(`${role(item.role).name} ${item.name}`) || role(item.role).name;
 }
 
+/** The letter and the pattern of a ribbon's role: those of its number in the family. */
+export const letterOf = of => String.fromCharCode(65 + (typeof of === 'object' ? of.series % 26 : 0));
+const WEAVES = 6;
+const weaveOf = of => (typeof of === 'object' ? of.series % WEAVES : 0);
+/** Lines and dots over a colour, so that it is not told by colour alone. */
+export const weaves = id => [
+  html`<pattern id=${`${id}-1`} width="7" height="7" patternUnits="userSpaceOnUse" patternTransform="rotate(45)"><path d="M0 0V7" /></pattern>`,
+  html`<pattern id=${`${id}-2`} width="7" height="7" patternUnits="userSpaceOnUse" patternTransform="rotate(-45)"><path d="M0 0V7" /></pattern>`,
+  html`<pattern id=${`${id}-3`} width="6" height="6" patternUnits="userSpaceOnUse"><path d="M2 3H4" /></pattern>`,
+  html`<pattern id=${`${id}-4`} width="6" height="6" patternUnits="userSpaceOnUse"><path d="M0 3H6" /></pattern>`,
+  html`<pattern id=${`${id}-5`} width="6" height="6" patternUnits="userSpaceOnUse"><path d="M3 0V6" /></pattern>`,
+];
+export const hasRibbons = panel => panel.items.some(item => item.kind === 'ribbon');
+/** The lightest of several ribbons over one stretch still has this share of the height. */
+const LEAST_SHARE = 0.24;
+/** Room that a letter needs, and about one of a name. */
+const LETTER = 12;
+const GLYPH_WIDTH = 6.4;
+
+/** Where the pieces of a ribbon lie in the height of their panel, from 0 above to 1: by weight, the heaviest above. */
+function sharesOf(panel, item) {
+  const ribbons = panel.items.filter(({ kind }) => kind === 'ribbon');
+  return item.x.map(from => {
+    const here = ribbons.map(one => ({ name: one.name, weight: one.weight[one.x.indexOf(from)] })).filter(({ weight }) => weight > 0).sort((a, b) => b.weight - a.weight);
+    const sum = here.reduce((total, { weight }) => total + weight, 0);
+    const raised = here.map(({ weight }) => Math.max(weight / sum, LEAST_SHARE));
+    const whole = raised.reduce((total, share) => total + share, 0);
+    const place = here.findIndex(({ name }) => name === item.name);
+    const above = raised.slice(0, place).reduce((total, share) => total + share, 0);
+    return [above / whole, (above + raised[place]) / whole];
+  });
+}
+
+/** The stretch of a ribbon at a place: its name and its weight; `null` where it has none. */
+export function stretchAt(item, x) {
+  const at = item.x.findIndex((from, index) => x >= from && (x < item.x_end[index] || (x === item.x_end[index] && !item.x.includes(x))));
+  return at < 0 ? null : { place: item.places[at], weight: item.weight[at] };
+}
+
+function ribbon(panel, item, { x, frame, id }, look, ghost) {
+  // A run that is compared lies as a strip below the present one.
+  const [top, height] = ghost ? [frame.top + frame.height * 0.74, frame.height * 0.26] : [frame.top, frame.height * (frame.hasGhost ? 0.7 : 1)];
+  const shares = sharesOf(panel, item);
+  return item.x.map((from, index) => {
+    const [left, right] = [x(from), x(item.x_end[index])];
+    if (!(right > left)) return null;
+    const [high, low] = [top + shares[index][0] * height, top + shares[index][1] * height];
+    const box = { x: px(left), y: px(high), width: px(right - left), height: px(low - high) };
+    const weave = weaveOf(item.role);
+    const said = [item.text, letterOf(item.role)].find(text => text.length * GLYPH_WIDTH + 8 <= right - left);
+    return html`<g key=${item.name + index}><title>${`${item.places[index]}: ${item.text}`}</title>
+      <rect class=${`ribbon ${look}`} ...${box} />${weave > 0 && html`<rect class="weave" fill=${`url(#${id}-${weave})`} ...${box} />`}
+      ${said && low - high >= LETTER && html`<text class="said" x=${px((Math.max(left, frame.left) + Math.min(right, frame.left + frame.width)) / 2)} y=${px((high + low) / 2 + 4)} text-anchor="middle">${said}</text>`}</g>`;
+  });
+}
+
+/** A piece of a ribbon with its letter, for a legend. */
+export const ribbonSample = (item, look, id) => html`<rect class=${`ribbon ${look}`} x="1" y="1" width="26" height="12" />${weaveOf(item.role) > 0 && html`<rect class="weave" fill=${`url(#${id}-${weaveOf(item.role)})`} x="1" y="1" width="26" height="12" />`}<text class="said" x="14" y="11" text-anchor="middle">${letterOf(item.role)}</text>`;
+
 const px = value => Math.round(value * 10) / 10;
 
 /** A curve as a path. Where there are many more points than pixels, the extremes of each pixel stand for them. */
@@ -182,6 +241,7 @@ export function items(panel, plane, { style, hidden, ghost }) {
         return html`<path key=${index} class=${`bars ${look}`} d=${d} />`;
       }
       case 'heat_map': return ghost || !x ? null : html`<g key=${index}>${mapImage(item, x, y, frame)}</g>`;
+      case 'ribbon': return x ? html`<g key=${index}>${ribbon(panel, item, plane, look, ghost)}</g>` : null;
       case 'outline': return html`<path key=${index} class=${`outline ${look}`} d=${`${ring(item.x, item.y, place)}z`} />`;
       case 'glyph': return ghost ? null : html`<g key=${index}>${glyph(item, place, stance(item))}</g>`;
       default: return null;

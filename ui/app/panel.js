@@ -3,7 +3,7 @@
 import { html } from './lib.js';
 import { t, number, unitSymbol } from './text.js';
 import { extent, valueAt, cellAt } from './scale.js';
-import { role } from './draw.js';
+import { role, stretchAt, ribbonSample, weaves } from './draw.js';
 import { colouring } from './palette.js';
 
 export const axisName = (axis, factor) => {
@@ -29,7 +29,7 @@ const edges = (x, isLog) => {
 
 export function abscissae(figure) {
   const isLog = figure.x.scale === 'logarithmic';
-  return figure.panels.flatMap(panel => panel.items.flatMap(item => (item.kind === 'glyph' ? [] : item.kind === 'heat_map' ? edges(item.x, isLog) : item.x)));
+  return figure.panels.flatMap(panel => panel.items.flatMap(item => (item.kind === 'glyph' ? [] : item.kind === 'ribbon' ? [...item.x, ...item.x_end] : item.kind === 'heat_map' ? edges(item.x, isLog) : item.x)));
 }
 
 export function ordinates(panel, view) {
@@ -72,14 +72,19 @@ export function Head({ panel, ghost, style, hidden, toggle, at, over = null, fac
       const [low, high] = [valueAt(twin.x, twin.lower, at), valueAt(twin.x, twin.upper, at)];
       return low === null || low === undefined ? null : `${readDigits(low, span)} … ${readDigits(high, span)}`;
     }
+    if (twin.kind === 'ribbon') {
+      const stretch = stretchAt(twin, at);
+      return stretch && `${number(stretch.weight, 3)} ${unitSymbol(panel.y.unit)}`;
+    }
     if (!['line', 'bars', 'points'].includes(twin.kind)) return null;
     const read = valueAt(twin.x, twin.y, at, twin.kind === 'line');
     return read === null || read === undefined ? null : readDigits(read, span);
   };
   const map = panel.items.find(item => item.kind === 'heat_map');
+  const stretch = at === null ? null : panel.items.filter(({ kind }) => kind === 'ribbon').map(item => stretchAt(item, at)).find(Boolean);
   return html`
     <div class="panel-head">
-      <span class="axis-name">${polar ? t('magnified', { name: axisName(panel.y, factor) }) : axisName(panel.y, factor)}</span>
+      <span class="axis-name">${polar ? t('magnified', { name: axisName(panel.y, factor) }) : axisName(panel.y, factor)}${stretch && html` <output class="stretch">${stretch.place}</output>`}</span>
       ${named.map(item => {
         const now = value(panel, item);
         const before = ghost ? value(ghost, item) : null;
@@ -93,6 +98,7 @@ export function Head({ panel, ghost, style, hidden, toggle, at, over = null, fac
 }
 
 function Swatch({ item, look }) {
+  if (item.kind === 'ribbon') return html`<svg class="swatch" width="28" height="14" viewBox="0 0 28 14" aria-hidden="true"><defs>${weaves(`legend-${item.name}`)}</defs>${ribbonSample(item, look, `legend-${item.name}`)}</svg>`;
   const shape = {
     line: html`<path class=${`line ${look}`} d="M1 7H27" />`,
     band: html`<rect class=${`band ${look}`} x="1" y="2" width="26" height="10" />`,
@@ -114,7 +120,8 @@ function Key({ item, now }) {
 
 /** A panel in words, for those who cannot see it. */
 export function describe(panel, figure) {
-  const spans = panel.items.filter(item => item.name && (item.y || item.lower)).map(item => {
+  const spans = panel.items.filter(item => item.name && (item.y || item.lower || item.places)).map(item => {
+    if (item.places) return `${item.text} ${item.places.join(' ')}`;
     const span = extent(item.y || [...item.lower, ...item.upper], 'linear');
     return span ? `${item.text} ${number(span[0], 3)} … ${number(span[1], 3)}` : item.text;
   });

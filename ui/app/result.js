@@ -65,7 +65,7 @@ export function Result({ id, description, answer, problem, running, pinned, pin,
   const subtracted = twin && difference ? differenceOf(figure, twin) : null;
   const body = answer?.answer;
   const isOwn = figure && body && !interim && !subtracted;
-  const picks = isOwn ? pickOf(figure, body.result) : null;
+  const picks = isOwn ? pickOf(figure, body) : null;
   const replays = isOwn && canReplay(id, figure, body.result);
   const trades = isOwn && canTrade(id, figure, answer.job);
   const pick = (x, y) => { const next = picks.jobAt(x, y); if (next) onApply(next); };

@@ -92,13 +92,17 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
     if (alive.current && current) tell(current.job, shown?.job === current.job ? shown.key : null, run?.id, 'push');
   }, HISTORY_PAUSE_MS), [tell]);
 
-  const show = async (key, body, job, signal) => {
-    const [whole, figures] = await Promise.all([body ?? api.result(key, signal), api.figures(key, signal)]);
-    if (signal?.aborted || !alive.current) return;
-    setAnswer({ key, answer: whole, figures, job, language: language() });
+  // `said` is the language in which a body was asked for: by now it may be another one.
+  const show = async (key, body, job, signal, said = language()) => {
+    const asked = language();
+    const [whole, figures] = await Promise.all([said === asked && body ? body : api.result(key, signal), api.figures(key, signal)]);
+    if (signal?.aborted || !alive.current) return undefined;
+    if (asked !== language()) return show(key, null, job, signal);
+    setAnswer({ key, answer: whole, figures, job, language: asked });
     setProblem(null);
     setPending(false);
     setWaiting(false);
+    return undefined;
   };
 
   const watch = useCallback((record, job) => {
@@ -147,6 +151,7 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
     setPending(true);
     setWaiting(false);
     const start = performance.now();
+    const said = language();
     try {
       const { answer: body, job: record } = await api.solve(id, job, { signal });
       if (signal.aborted) return;
@@ -161,7 +166,7 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
         return;
       }
       isLive.current = performance.now() - start < LIVE_LIMIT_MS;
-      await show(body.key, body, job, signal);
+      await show(body.key, body, job, signal, said);
       if (!signal.aborted && now.current.state?.job === job) tell(job, body.key, null, 'replace');
     } catch (error) {
       if (error instanceof api.Refused && error.status === 503 && again < 5) {
@@ -268,7 +273,7 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
     }
     tell(state.job, answer?.key, running?.id, 'replace');
   };
-  const picking = (figure, result) => pickOf(id, figure, description.input_schema, state.job, result);
+  const picking = (figure, body) => pickOf(id, figure, description.input_schema, state.job, body);
   const study = answer && `#/studies?calculator=${id}&${written(queryOf(state, state.job, answer.key))}`;
   const faults = problem?.errors || [];
   const isBusy = pending || running;

@@ -7,7 +7,7 @@ import { Progress, Trouble } from './status.js';
 import { Picture } from './figure.js';
 import { Downloads, RequestView, Warnings, usePictureHeight, short, capital } from './result.js';
 import { parts } from './schema.js';
-import { leavesOf, outputsOf, proposed, pointsOf, relabelled } from './vary.js';
+import { leavesOf, outputsOf, proposed, pointsOf } from './vary.js';
 
 const MOST_VARIED = 3;
 const ROWS_SHOWN = 100;
@@ -91,8 +91,10 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
     if (error instanceof api.Refused) setProblem(error.problem);
     else setProblem({ title: t('offline_title'), detail: error.message, code: 'offline' });
   };
-  const show = async (key, whole, asked) => {
-    const [result, figures] = await Promise.all([whole ?? api.result(key, control.current?.signal), api.figures(key, control.current?.signal)]);
+  const show = async (key, whole, asked, said = language()) => {
+    const now = language();
+    const [result, figures] = await Promise.all([said === now && whole ? whole : api.result(key, control.current?.signal), api.figures(key, control.current?.signal)]);
+    if (now !== language()) { await show(key, null, asked); return; }
     setAnswer({ key, answer: result, figures, asked });
     setPending(false);
     setProblem(null);
@@ -126,6 +128,7 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
     setProblem(null);
     setRunning(null);
     setPane('picture');
+    const said = language();
     try {
       const { answer: whole, job: record } = await api.solve('studies', body, { signal });
       if (signal.aborted) return;
@@ -133,7 +136,7 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
         try { sessionStorage.setItem(`precut-run-${record.id}`, JSON.stringify(body)); } catch { /* a reload then begins anew */ }
         tell([['run', record.id]]);
         watch(record, body);
-      } else { await show(whole.key, whole, body); tell([['study', whole.key]]); }
+      } else { await show(whole.key, whole, body, said); tell([['study', whole.key]]); }
     } catch (error) { fail(error); }
   };
   // A study of the address: kept, or on its way.
@@ -208,7 +211,7 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
         ${running && html`<${Progress} running=${running} stop=${() => api.cancel(running.id).catch(fail)} />`}
         ${problem && html`<${Trouble} problem=${problem} onGo=${go} />`}
         ${!answer && !running?.interim ? html`<div class="empty">${problem || running ? '' : html`<p>${pending ? t('first_answer') : t('study_empty')}</p>`}</div>`
-          : html`<${Findings} ...${{ answer, interim: running?.interim, asked: body, leaves, outputs, calculator: description.id }} stale=${Boolean(answer && JSON.stringify(answer.asked) !== JSON.stringify(body) && !stored)} />`}
+          : html`<${Findings} ...${{ answer, interim: running?.interim, leaves, outputs, calculator: description.id }} stale=${Boolean(answer && JSON.stringify(answer.asked) !== JSON.stringify(body) && !stored)} />`}
       </section>
     </main>`;
 }
@@ -260,21 +263,16 @@ function valuesOf({ from, to, count, spacing }) {
 }
 
 /** What came out: pictures, a sentence, one row per point. */
-function Findings({ answer, interim, asked, leaves, outputs, calculator, stale }) {
+function Findings({ answer, interim, leaves, outputs, calculator, stale }) {
   const [chosen, setChosen] = useState(null);
   const [picked, setPicked] = useState(null);
   const result = answer?.answer.result;
-  // What is so far is drawn of the study that was asked.
-  const drawn = interim ? { variables: asked.vary.map(one => ({ pointer: one.pointer, values: one.values || [one.from, one.to] })), outputs: asked.outputs.map(one => ({ pointer: one })) } : result;
-  const all = (interim ? [interim] : answer?.figures || []).map(figure => relabelled(figure, drawn, leaves, outputs));
+  const all = interim ? [interim] : answer?.figures || [];
   const figure = all.find(({ id }) => id === chosen) || all[0];
   const isEmpty = figure && !figure.panels.some(panel => panel.items.some(item => (item.values || item.y).some(value => value !== null)));
   const height = usePictureHeight(figure?.panels.length || 1);
   const pick = figure?.id === 'map' && result && result.variables.length === 2 ? (x, y) => setPicked(nearestRow(result, x, y)) : null;
-  // The service names fields by their pointers; here they are called as in the forms.
-  const spoken = text => [...leaves, ...outputs].filter(one => text.includes(one.pointer)).sort((a, b) => b.pointer.length - a.pointer.length)
-    .reduce((words, one) => words.split(one.pointer).join(lowered(one.label)), text);
-  const [first, ...others] = (answer?.answer.explanation || []).map(one => ({ ...one, text: spoken(one.text) }));
+  const [first, ...others] = answer?.answer.explanation || [];
   return html`
     <div class=${`result ${stale ? 'stale' : ''}`}>
       ${all.length > 1 && html`<div class="figure-choice" role="group" aria-label=${t('figures')}>${all.map(({ id, title }) => html`<button type="button" key=${id} aria-pressed=${figure.id === id} onClick=${() => setChosen(id)}>${id === 'map' ? t('study_map') : id === 'curves' ? t('study_curves') : short(title.text)}</button>`)}</div>`}
@@ -289,7 +287,7 @@ function Findings({ answer, interim, asked, leaves, outputs, calculator, stale }
         ${result && html`<div class="words">
           ${first && html`<p class="verdict" aria-live="polite">${capital(first.text)}</p>`}
           <${Warnings} key=${answer.key} list=${answer.answer.warnings} />
-          <ul class="explanation">${others.map(({ code, text }, index) => html`<li key=${code + index}>${text}</li>`)}</ul>
+          <ul class="explanation">${others.map(({ code, text }, index) => html`<li key=${code + index}>${capital(text)}</li>`)}</ul>
         </div>`}
       </div>
       ${result && html`
@@ -298,9 +296,6 @@ function Findings({ answer, interim, asked, leaves, outputs, calculator, stale }
         ${answer.asked && html`<details class="tabs request"><summary>${t('tab_request')}</summary><div><${RequestView} id="studies" job=${answer.asked} answer=${answer} link=${`#/studies?study=${answer.key}`} /></div></details>`}`}
     </div>`;
 }
-
-/** As inside a sentence; abbreviations keep their capitals. */
-const lowered = label => label.split(' · ').map(part => (/^[^\s]?[A-ZА-Я]/.test(part.slice(1)) ? part : part.charAt(0).toLowerCase() + part.slice(1))).join(' · ');
 
 /** Why a point has no answer. */
 const WHY = { invalid: 'why_invalid', infeasible: 'why_infeasible', out_of_model: 'why_out_of_model', not_converged: 'why_not_converged', failed: 'why_failed' };

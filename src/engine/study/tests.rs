@@ -399,7 +399,9 @@ fn every_label_of_a_picture_has_its_words_in_the_title_or_a_text() {
         let stored = solve_now(&toy::registry(), STUDIES, body(&study(vary.into())), &Unwatched).unwrap();
         for figure in stored.figures().unwrap() {
             let title = Texts::shared().message(Language::En, "figure", &figure.title);
-            assert!(title.contains("deflections 0"), "{title}");
+            assert!(title.contains("Deflections 1"), "{title}");
+            let russian = Texts::shared().message(Language::Ru, "figure", &figure.title);
+            assert!(russian.contains("; ") && !russian.contains(" over "), "{russian}");
             let mut codes = vec![figure.x.label];
             for panel in &figure.panels {
                 codes.push(panel.y.label);
@@ -429,17 +431,25 @@ fn tables_have_a_line_for_each_point_and_one_for_each_output() {
     let tables = stored.tables().unwrap();
     let answer: Value = serde_json::from_slice(&stored.body).unwrap();
     let key = |row: usize| answer["result"]["rows"][row]["key"].as_str().unwrap().to_owned();
+    let detail = |row: usize| {
+        let said = answer["result"]["rows"][row]["detail"].as_str().unwrap();
+        assert!(said.len() > 10, "{said}");
+        if said.contains(',') { format!("\"{said}\"") } else { said.to_owned() }
+    };
     let csv = crate::render::csv(&tables[0]);
     let expected = format!(
-        "length [mm],mode,status,code,deflections.0 [um],key\n\
-         100,plain,succeeded,,33.333333333333336,{}\n100,infeasible,infeasible,no_solution_here,,{}\n\
-         10,plain,invalid,thicker_than_long,,\n10,infeasible,invalid,thicker_than_long,,\n",
+        "length [mm],mode,status,code,detail,deflections.0 [um],key\n\
+         100,plain,succeeded,,,33.333333333333336,{}\n100,infeasible,infeasible,no_solution_here,{},,{}\n\
+         10,plain,invalid,thicker_than_long,{},,\n10,infeasible,invalid,thicker_than_long,{},,\n",
         key(0),
-        key(1)
+        detail(1),
+        key(1),
+        detail(2),
+        detail(3),
     );
     assert_eq!(csv, expected);
     let extremes = crate::render::csv(&tables[1]);
-    assert!(extremes.starts_with("output,unit,least,least_row,largest,largest_row,least at /length_mm,"), "{extremes}");
+    assert!(extremes.starts_with("output,unit,least,least_row,largest,largest_row,least_at.length [mm],"), "{extremes}");
     assert!(extremes.contains("/deflections_um/0,um,33.333333333333336,0,"), "{extremes}");
     let ids: Vec<&str> = tables.iter().map(|table| table.id).collect();
     assert_eq!(ids, super::table::TABLES);
