@@ -33,7 +33,11 @@ export function Row({ name, schema, path, value, required, context, control: Con
   const id = fieldId(path);
   const label = labelOf(name, schema);
   const faults = context.errorsAt(path);
-  const description = [schema.description, defaultText(schema)].filter(Boolean).join(' ');
+  const filled = value === undefined ? context.filledAt(path) : undefined;
+  const own = defaultText(schema);
+  // A number that the service takes from elsewhere says from where.
+  const from = typeof filled === 'number' && filled !== schema.default ? `${number(filled)} ${unitOf(schema)}: ${context.sourceAt(path)}`.replace(/ +:/, ':') : '';
+  const description = [schema.description, own, from].filter(Boolean).join(' ');
   const allowed = kindOf(schema) === 'number' ? rangeText(schema) : '';
   const show = () => context.setHelp({ label, symbol: schema['x-symbol'], range: allowed, description });
   const [wrong, setWrong] = useState(null);

@@ -3,12 +3,15 @@
 import { html, useState, useRef, useMemo, useLayoutEffect, useEffect, unique } from './lib.js';
 import { t, number, unitSymbol } from './text.js';
 import { scale, extent, aired, ticks, labels, valueAt, cellAt } from './scale.js';
-import { items, styles, weaves, hasRibbons, stretchAt } from './draw.js';
+import { items, styles, weaves, hasRibbons, stretchAt, barStep } from './draw.js';
 import { axisName, readDigits, abscissae, ordinates, Head, describe } from './panel.js';
 import { Polar } from './polar.js';
 
 const LEAST_PANEL = 78;
 const LEAST_RIBBON = 44;
+/** So many panels are each a little lower. */
+const MANY_PANELS = 5;
+const LEAST_OF_MANY = 62;
 const AXIS_ROOM = 40;
 const END_GLYPHS = ['centre_left', 'centre_right', 'chuck'];
 const GLYPH_ROOM = 36;
@@ -29,14 +32,20 @@ function useWidth() {
   return [ref, width];
 }
 
-/** Draws again when the colour scheme changes: maps are pictures of pixels. */
+/** Draws again when the colour scheme changes, on paper too: maps are pictures of pixels. */
 function useScheme() {
   const [scheme, setScheme] = useState(0);
   useEffect(() => {
     const query = matchMedia('(prefers-color-scheme: dark)');
     const change = () => setScheme(count => count + 1);
     query.addEventListener('change', change);
-    return () => query.removeEventListener('change', change);
+    addEventListener('beforeprint', change);
+    addEventListener('afterprint', change);
+    return () => {
+      query.removeEventListener('change', change);
+      removeEventListener('beforeprint', change);
+      removeEventListener('afterprint', change);
+    };
   }, []);
   return scheme;
 }
@@ -93,6 +102,9 @@ export function Picture({ figure, pinned, height = 460, onPick, handle, main }) 
     const hasWide = figure.panels.some(panel => panel.items.some(item => item.kind === 'bars'));
     const kinds = new Set(figure.panels.flatMap(panel => panel.items.map(item => item.kind)));
     const scatter = kinds.has('points') && !kinds.has('outline') && !kinds.has('heat_map');
+    // Bars need half their distance on either side.
+    const half = Math.max(0, ...figure.panels.map(panel => barStep(panel))) / 2;
+    if (hasWide && span && half > 0 && figure.x.scale !== 'logarithmic') return [span[0] - half, span[1] + half];
     return hasWide || scatter || !span || span[0] === span[1] ? aired(span, figure.x.scale, hasWide ? 0.03 : 0.04) : span;
   }, [figure, pinned]);
   const shown = view || full;
@@ -208,7 +220,7 @@ function Stacked({ figure, pinned, width, style, hidden, toggle, at, setAt, over
   const count = width < 480 ? 4 : 6;
   const panels = visible.map((panel, index) => {
     const isRibbon = hasRibbons(panel);
-    const tall = Math.max(isRibbon ? LEAST_RIBBON : LEAST_PANEL, Math.round((height * panel.height) / shares));
+    const tall = Math.max(isRibbon ? LEAST_RIBBON : visible.length >= MANY_PANELS ? LEAST_OF_MANY : LEAST_PANEL, Math.round((height * panel.height) / shares));
     const span = extent([...ordinates(panel, view), ...(ghosts[index] ? ordinates(ghosts[index], view) : [])], panel.y.scale);
     const isMap = panel.items.some(item => item.kind === 'heat_map');
     const domain = isMap ? span : aired(span, panel.y.scale);
@@ -325,7 +337,7 @@ function Stacked({ figure, pinned, width, style, hidden, toggle, at, setAt, over
             </g>
             <rect class="frame" x=${left} y="6" width=${Math.max(1, right - left)} height=${tall} />
             <g class="tick-labels" text-anchor="end">${places.map((place, tick) => html`<text x=${left - 6} y=${y(place) + 4}>${texts[tick]}</text>`)}</g>
-            ${last && html`<g class="tick-labels" text-anchor="middle">${xPlaces.map((place, tick) => html`<text x=${Math.min(Math.max(x(place), 12), width - 14)} y=${tall + 22}>${xLabels.texts[tick]}</text>`)}</g>
+            ${last && html`<g class="tick-labels" text-anchor="middle">${xPlaces.map((place, tick) => html`<text x=${Math.min(Math.max(x(place), 12), width - 3 - 3.4 * xLabels.texts[tick].length)} y=${tall + 22}>${xLabels.texts[tick]}</text>`)}</g>
               <text class="x-name" x=${(left + right) / 2} y=${tall + 39} text-anchor="middle">${axisName(figure.x, xLabels.factor)}${at !== null ? ` = ${readDigits(at, shown[1] - shown[0])}` : ''}</text>`}
             ${drag && Math.abs(drag.to - drag.from) > 4 && html`<rect class="selection" x=${Math.min(drag.from, drag.to)} y="6" width=${Math.abs(drag.to - drag.from)} height=${tall} />`}
             ${over !== null && over >= domain[0] && over <= domain[1] && html`<path class="cursor" d=${`M${left} ${y(over).toFixed(1)}H${right}`} />`}

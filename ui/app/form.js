@@ -11,6 +11,13 @@ class Context {
   constructor(fields) { Object.assign(this, fields); }
   /** What the service filled in where nothing was given. */
   filledAt(path) { return this.filled ? at(this.filled, path) : undefined; }
+  /** Where that comes from: the source of the material that is named beside it, or the service. */
+  sourceAt(path) {
+    const beside = at(this.value, path.slice(0, -1)) || {};
+    const material = this.libraries?.materials?.find(({ id }) => Object.values(beside).includes(id));
+    const entry = material?.[path.at(-1)];
+    return entry?.source ? t('from_material', { name: material.title, source: entry.source }) : t('filled_in');
+  }
   errorsAt(path) { return this.errors.get(pointer(path)) || []; }
   /** Faults of everything below a path, and of the path itself. */
   errorsBelow(path) {
@@ -32,7 +39,7 @@ export function Form({ calculator, schema, value, filled, onChange, errors, libr
   }, [errors]);
   // Models extend the jobs of one calculator: of the one whose job stands in this one, if there is such.
   const owner = typeof value.calculator === 'string' ? value.calculator : calculator;
-  const context = new Context({ root, filled, errors: byPointer, libraries, models: (models || []).filter(model => model.calculator === owner), setHelp, disabled, set: (path, part, how) => onChange(changed(value, path, part), how) });
+  const context = new Context({ root, value, filled, errors: byPointer, libraries, models: (models || []).filter(model => model.calculator === owner), setHelp, disabled, set: (path, part, how) => onChange(changed(value, path, part), how) });
   const whole = resolve(schema, root);
   // A family of jobs, told apart by one field.
   const family = kindOf(whole) === 'choice' ? variants(whole, root) : null;

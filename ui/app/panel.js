@@ -3,7 +3,7 @@
 import { html } from './lib.js';
 import { t, number, unitSymbol } from './text.js';
 import { extent, valueAt, cellAt } from './scale.js';
-import { role, stretchAt, ribbonSample, weaves } from './draw.js';
+import { markerOf, stretchAt, ribbonSample, weaves } from './draw.js';
 import { colouring } from './palette.js';
 
 export const axisName = (axis, factor) => {
@@ -102,7 +102,7 @@ function Swatch({ item, look }) {
   const shape = {
     line: html`<path class=${`line ${look}`} d="M1 7H27" />`,
     band: html`<rect class=${`band ${look}`} x="1" y="2" width="26" height="10" />`,
-    points: html`<path class=${`points ${look}`} d=${`M14 7${role(item.role).marker}`} />`,
+    points: html`<path class=${`points ${look}`} d=${item.x.length > 150 ? `M8 9${markerOf(item)}M14 7${markerOf(item)}M20 5${markerOf(item)}` : `M14 7${markerOf(item)}`} />`,
     bars: html`<rect class=${`bars ${look}`} x="8" y="2" width="12" height="10" />`,
     outline: html`<rect class=${`outline ${look}`} x="2" y="2" width="24" height="10" />`,
   }[item.kind];

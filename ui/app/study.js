@@ -5,7 +5,7 @@ import * as api from './api.js';
 import { jobOf, lastQuery } from './room.js';
 import { Progress, Trouble } from './status.js';
 import { Picture } from './figure.js';
-import { Downloads, RequestView, Warnings, usePictureHeight, short, capital } from './result.js';
+import { Downloads, RequestView, Warnings, Sheet, usePictureHeight, short, capital } from './result.js';
 import { parts } from './schema.js';
 import { leavesOf, outputsOf, proposed, pointsOf } from './vary.js';
 
@@ -211,7 +211,7 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
         ${running && html`<${Progress} running=${running} stop=${() => api.cancel(running.id).catch(fail)} />`}
         ${problem && html`<${Trouble} problem=${problem} onGo=${go} />`}
         ${!answer && !running?.interim ? html`<div class="empty">${problem || running ? '' : html`<p>${pending ? t('first_answer') : t('study_empty')}</p>`}</div>`
-          : html`<${Findings} ...${{ answer, interim: running?.interim, leaves, outputs, calculator: description.id }} stale=${Boolean(answer && JSON.stringify(answer.asked) !== JSON.stringify(body) && !stored)} />`}
+          : html`<${Findings} ...${{ answer, interim: running?.interim, leaves, outputs, description }} stale=${Boolean(answer && JSON.stringify(answer.asked) !== JSON.stringify(body) && !stored)} />`}
       </section>
     </main>`;
 }
@@ -263,7 +263,8 @@ function valuesOf({ from, to, count, spacing }) {
 }
 
 /** What came out: pictures, a sentence, one row per point. */
-function Findings({ answer, interim, leaves, outputs, calculator, stale }) {
+function Findings({ answer, interim, leaves, outputs, description, stale }) {
+  const calculator = description.id;
   const [chosen, setChosen] = useState(null);
   const [picked, setPicked] = useState(null);
   const result = answer?.answer.result;
@@ -293,7 +294,8 @@ function Findings({ answer, interim, leaves, outputs, calculator, stale }) {
       ${result && html`
         <div class="bar"><span class="quiet">${plural('points', result.points)}${result.failed > 0 ? `, ${t('without_answer', { count: result.failed })}` : ''}</span><${Downloads} id="studies" description=${DECLARED} answer=${answer} figure=${figure} /></div>
         <${Rows} ...${{ result, leaves, outputs, calculator, picked }} />
-        ${answer.asked && html`<details class="tabs request"><summary>${t('tab_request')}</summary><div><${RequestView} id="studies" job=${answer.asked} answer=${answer} link=${`#/studies?study=${answer.key}`} /></div></details>`}`}
+        ${answer.asked && html`<details class="tabs request"><summary>${t('tab_request')}</summary><div><${RequestView} id="studies" job=${answer.asked} answer=${answer} link=${`#/studies?study=${answer.key}`} /></div></details>`}
+        <${Sheet} description=${description} body=${answer.answer} job=${answer.answer.input.job} />`}
     </div>`;
 }
 

@@ -199,19 +199,20 @@ fn roughnesses(job: &Job, outcome: &Outcome, height: f64) -> Panel {
     Panel { y: Axis::linear("height_of_roughness", "um"), height, items }
 }
 
-/// What kind of limit a name stands for.
+/// What kind of limit a name stands for. Eight numbers have colours of their own: the kinds that share one hardly ever
+/// bind together.
 fn family(constraint: &str) -> (&'static str, u8) {
     match constraint {
         "deflection" => ("binds_deflection", 0),
         "deflection_spread" => ("binds_spread", 1),
         "roughness" | "hardening" | "hardening_depth" => ("binds_surface", 2),
         "tool_usage" | "tool_life_min" => ("binds_edge", 3),
-        "time_max" => ("binds_time", 4),
+        "speed_min" | "speed_max" => ("binds_speed_bound", 4),
         "power" | "torque" | "rpm_min" | "rpm_max" | "feed_rate_max" => ("binds_machine", 5),
-        "force_z" | "force_y" => ("binds_force", 6),
+        "feed_step" => ("binds_feed_step", 6),
         "feed_min" | "feed_max" => ("binds_feed_bound", 7),
-        "speed_min" | "speed_max" => ("binds_speed_bound", 8),
-        "feed_step" => ("binds_feed_step", 9),
+        "time_max" => ("binds_time", 8),
+        "force_z" | "force_y" => ("binds_force", 9),
         _ => ("binds_other", 10),
     }
 }

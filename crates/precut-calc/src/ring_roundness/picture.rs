@@ -219,9 +219,10 @@ fn map(map: Option<&MapOutcome>) -> Vec<Panel> {
             values,
             diverging,
         };
-        // The logarithm: growth and decay weigh alike.
-        let ln = map.worst_factor_per_revolution.iter().map(|factor| factor.map(f64::ln)).collect();
-        growth.push(heat(Axis::linear("growth_per_revolution", "1"), ln, true));
+        // By its logarithm: growth and decay weigh alike. What is gone within the revolution has none.
+        let positive = |values: &[Option<f64>]| values.iter().map(|value| value.filter(|v| *v > 0.0)).collect();
+        let factors = positive(&map.worst_factor_per_revolution);
+        growth.push(heat(Axis::logarithmic("growth_per_revolution", "1"), factors, true));
         let here = |items: &mut Vec<Item>| {
             items.push(Item::Points {
                 name: "this_setting",
@@ -232,8 +233,8 @@ fn map(map: Option<&MapOutcome>) -> Vec<Panel> {
         };
         here(&mut growth);
         // Near the edge of decay the revolutions go to infinity: their logarithm shows the rest, too.
-        let values = map.revolutions_to_target.iter().map(|turns| turns.map(f64::log10)).collect();
-        revolutions.push(heat(Axis::linear("revolutions_to_target", "1"), values, false));
+        let values = positive(&map.revolutions_to_target);
+        revolutions.push(heat(Axis::logarithmic("revolutions_to_target", "1"), values, false));
         here(&mut revolutions);
     }
     vec![
