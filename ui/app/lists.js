@@ -1,8 +1,8 @@
 // Lists and tables of a job: names to tick, lines of numbers, grids, parts, values by name.
 import { html, useState, useEffect } from './lib.js';
 import { t, typed, parsed, unitOf } from './text.js';
-import { resolve, kindOf, variants, variantOf, variantName, blank, labelOf } from './schema.js';
-import { fieldId, isLeaf, nudged, rangeText, defaultText, optionText, Faults } from './fields.js';
+import { resolve, kindOf, variants, variantOf, variantName, blank, labelOf, spoken } from './schema.js';
+import { fieldId, isLeaf, nudged, rangeText, defaultText, optionText, sentence, Faults } from './fields.js';
 import { Body, Field } from './form.js';
 
 /** Most columns of a list that is shown as a grid. */
@@ -42,7 +42,7 @@ export function List({ name, schema, path, value, context }) {
       <fieldset class="item" key=${index} id=${fieldId([...path, index])}>
         <legend><span><span class="hidden">${labelOf(name, schema)} </span>${index + 1}${kindOf(items) === 'choice' ? ` · ${variantName(variantOf(variants(items, context.root), item), context.root) ?? ''}` : ''}</span>
           <button type="button" class="icon" disabled=${value.length <= (schema.minItems || 0)} aria-label=${`${t('remove')}: ${label(index)}`} onClick=${() => remove(index)}>×</button></legend>
-        <${Faults} faults=${context.errorsAt([...path, index])} id=${`${fieldId([...path, index])}-item`} />
+        <${Faults} faults=${context.errorsAt([...path, index])} id=${`${fieldId([...path, index])}-item`} names=${context.names} />
         <${Body} name=${name} schema=${items} path=${[...path, index]} value=${item} context=${context} />
       </fieldset>`)}
     ${value.length > shown.length && html`<button type="button" class="more" onClick=${() => setWhole(true)}>${t('show_all', { count: value.length })}</button>`}
@@ -51,9 +51,9 @@ export function List({ name, schema, path, value, context }) {
 
 /** What is wrong in a row of a grid: below it, as wide as the grid, so that no column moves. */
 function RowFaults({ plain, path, context }) {
-  const found = [...context.errorsAt(path).map(fault => ({ ...fault, id: fieldId(path) })), ...plain.flatMap(field => context.errorsAt([...path, field.name]).map(fault => ({ ...fault, id: fieldId([...path, field.name]), label: labelOf(field.name, field.schema) })))];
+  const found = [...context.errorsAt(path).map(fault => ({ ...fault, id: fieldId(path) })), ...plain.flatMap(field => context.errorsAt([...path, field.name]).map(fault => ({ ...fault, id: fieldId([...path, field.name]) })))];
   if (found.length === 0) return null;
-  return html`<tr class="row-faults"><td colspan=${plain.length + 1}>${found.map(({ id, label, detail }, index) => html`<p class="fault" key=${index} id=${`${id}-fault`}>${label ? html`<strong>${label}:</strong> ` : ''}${detail}</p>`)}</td></tr>`;
+  return html`<tr class="row-faults"><td colspan=${plain.length + 1}>${found.map(({ id, detail }, index) => html`<p class="fault" key=${index} id=${`${id}-fault`}>${sentence(spoken(detail, context.names))}</p>`)}</td></tr>`;
 }
 
 /** A number in a grid: its name is that of row and column. */

@@ -60,6 +60,9 @@ export function ordinates(panel, view) {
   return found;
 }
 
+/** What has a value at the cursor: its room is there before the value, so that nothing moves. */
+const READ = ['line', 'bars', 'points', 'band', 'ribbon'];
+
 /** Name of the axis and of each curve, with its value at the cursor. */
 export function Head({ panel, ghost, style, hidden, toggle, at, over = null, factor, span, polar }) {
   const seen = new Set();
@@ -84,13 +87,13 @@ export function Head({ panel, ghost, style, hidden, toggle, at, over = null, fac
   const stretch = at === null ? null : panel.items.filter(({ kind }) => kind === 'ribbon').map(item => stretchAt(item, at)).find(Boolean);
   return html`
     <div class="panel-head">
-      <span class="axis-name">${polar ? t('magnified', { name: axisName(panel.y, factor) }) : axisName(panel.y, factor)}${stretch && html` <output class="stretch">${stretch.place}</output>`}</span>
+      <span class="axis-name">${polar ? t('magnified', { name: axisName(panel.y, factor) }) : axisName(panel.y, factor)}${panel.items.some(({ kind }) => kind === 'ribbon') && html` <output class="stretch">${stretch?.place}</output>`}</span>
       ${named.map(item => {
         const now = value(panel, item);
         const before = ghost ? value(ghost, item) : null;
         return html`<button type="button" key=${item.name} class="series" aria-pressed=${!hidden.has(item.name)} onClick=${() => toggle(item.name)}>
           <${Swatch} item=${item} look=${style(item)} /><span>${item.text}</span>
-          ${now !== null && html`<output>${now}${before !== null && html`<small> (${before})</small>`}</output>`}
+          ${READ.includes(item.kind) && html`<output class=${`${item.kind} ${ghost ? 'two' : ''}`}>${now}${now !== null && before !== null && html`<small> (${before})</small>`}</output>`}
         </button>`;
       })}
       ${map && html`<${Key} item=${map} now=${at !== null && over !== null ? cellAt(map, at, over) : null} />`}

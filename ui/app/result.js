@@ -3,7 +3,7 @@ import { html, useState, useEffect, useMemo, useRef } from './lib.js';
 import { t, number, unitSymbol, unitOf, plural, moment } from './text.js';
 import * as api from './api.js';
 import { Picture, differenceOf } from './figure.js';
-import { resolve, humanised, labelOf, wordOf } from './schema.js';
+import { resolve, humanised, labelOf, wordOf, namesOf, spoken } from './schema.js';
 import { spreadOf, spreadColumns, withSpread } from './digits.js';
 import { canReplay, Replay } from './replay.js';
 import { canTrade, spanOf, TradeOff } from './tradeoff.js';
@@ -63,7 +63,7 @@ export function Result({ id, description, answer, problem, running, pinned, pin,
   const figure = interim || figures.find(({ id: name }) => name === chosen) || figures.find(isTelling) || figures[0];
   const height = usePictureHeight(figure?.panels.length || 1);
   if (!answer && !interim) {
-    return html`<div class="empty">${problem || running ? '' : html`<p class="late">${t('first_answer')}</p>`}</div>`;
+    return html`<div class="empty">${running ? '' : problem ? html`<p>${t('picture_waits')}</p>` : html`<p class="late">${t('first_answer')}</p>`}</div>`;
   }
   const twin = pinned && !interim && pinned.key !== answer?.key ? pinned.figures.find(({ id: name }) => name === figure?.id) : null;
   const subtracted = twin && difference ? differenceOf(figure, twin) : null;
@@ -97,7 +97,7 @@ export function Result({ id, description, answer, problem, running, pinned, pin,
         ${body && html`
         <div class="words">
           ${first && html`<p class="verdict" aria-live="polite">${capital(first.text)}</p>`}
-          <${Warnings} key=${answer.key} list=${body.warnings} />
+          <${Warnings} key=${answer.key} list=${body.warnings} names=${namesOf(description.input_schema)} />
           ${hasClamp(id, body.result) && html`<${ClampBars} result=${body.result} input=${body.input} schema=${description.output_schema} />`}
           ${hasCauses(id, body.result) && html`<${Causes} result=${body.result} schema=${description.input_schema} unit=${unitSymbol(figures.find(one => one.id === 'residuals')?.panels[0]?.y.unit)} />`}
           ${others.length > 0 && html`<ul class="explanation">${others.map(({ code, text }, index) => html`<li key=${code + index}>${capital(text)}</li>`)}</ul>`}
@@ -132,7 +132,7 @@ function FigurePick({ figures, figure, choose }) {
 }
 
 /** Warnings; of many the first few until all are asked for, and all on paper. */
-export function Warnings({ list }) {
+export function Warnings({ list, names }) {
   const [asked, setAsked] = useState(list.length <= FEW_WARNINGS + 1);
   const [printed, setPrinted] = useState(false);
   useEffect(() => {
@@ -145,7 +145,7 @@ export function Warnings({ list }) {
   const whole = asked || printed;
   if (list.length === 0) return null;
   return html`
-    <ul class="warnings" aria-label=${t('warnings')}>${(whole ? list : list.slice(0, FEW_WARNINGS)).map(({ code, detail, pointer }, index) => html`<li key=${code + pointer + index}><span class="sign" aria-hidden="true">!</span><span>${capital(detail)}</span></li>`)}</ul>
+    <ul class="warnings" aria-label=${t('warnings')}>${(whole ? list : list.slice(0, FEW_WARNINGS)).map(({ code, detail, pointer }, index) => html`<li key=${code + pointer + index}><span class="sign" aria-hidden="true">!</span><span>${capital(spoken(detail, names))}</span></li>`)}</ul>
     ${!whole && html`<button type="button" class="more" onClick=${() => setAsked(true)}>${t('and_more', { count: list.length - FEW_WARNINGS })}</button>`}`;
 }
 
@@ -233,17 +233,6 @@ function flat(schema, value, root, path = [], out = [], names = [], spread = nul
 const worded = (text, names) => names?.get(text) ?? (/^[a-z]+(_[a-z0-9]+)+$/.test(text) ? humanised(text) : text);
 const shownValue = (value, schema, names) => (typeof value === 'number' ? number(value, 5) : value === true ? t('yes') : value === false ? t('no') : schema?.enum ? wordOf(schema, value) : worded(String(value), names));
 
-/** What every field of a schema is called, by its name. */
-function namesOf(schema) {
-  const names = new Map();
-  const walk = part => {
-    if (!part || typeof part !== 'object') return;
-    for (const [name, field] of Object.entries(part.properties || {})) if (field.title && !names.has(name)) names.set(name, labelOf(name, field));
-    Object.values(part).forEach(walk);
-  };
-  walk(schema);
-  return names;
-}
 
 function Values({ schema, inputs, result, pinned }) {
   const names = useMemo(() => namesOf(inputs), [inputs]);

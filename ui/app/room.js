@@ -3,8 +3,9 @@ import { html, useState, useEffect, useRef, useMemo, useCallback, debounced } fr
 import { t, language } from './text.js';
 import * as api from './api.js';
 import { Form, goTo } from './form.js';
+import { sentence } from './fields.js';
 import { Result } from './result.js';
-import { difference, changed, parts } from './schema.js';
+import { difference, changed, parts, namesOf } from './schema.js';
 import { pickOf } from './pick.js';
 import { Progress, Trouble } from './status.js';
 
@@ -242,7 +243,7 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
   }, [description && id, asked]);
 
   if (missing) {
-    return html`<main class="plain" id="main" tabindex="-1"><h1>${missing.problem?.title || t('trouble_title')}</h1><p>${missing.problem?.detail || missing.message}</p>
+    return html`<main class="plain" id="main" tabindex="-1"><h1>${missing.problem?.title || t('trouble_title')}</h1><p>${sentence(missing.problem?.detail || missing.message)}</p>
       <p><a href=${`#/${id}`} onClick=${() => setTimeout(() => location.reload(), 0)}>${t('start_over')}</a></p></main>`;
   }
   if (!description || !state) return html`<main class="plain quiet-start" id="main" tabindex="-1"><p>${t('loading')}</p></main>`;
@@ -299,7 +300,7 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
         <div class=${`work-line ${pending && !running ? 'on' : ''}`} aria-hidden="true"></div>
         <header class="room-head"><h1>${description.question}</h1><p class="summary">${description.title}</p></header>
         ${running && html`<${Progress} running=${running} stop=${stop} />`}
-        ${problem && html`<${Trouble} problem=${problem} onGo=${place => { setPane('form'); setTimeout(() => goTo(place), 30); }} />`}
+        ${problem && !(problem.code === 'offline' && answer) && html`<${Trouble} problem=${problem} names=${namesOf(description.input_schema)} over=${Boolean(answer)} onGo=${place => { setPane('form'); setTimeout(() => goTo(place), 30); }} />`}
         <${Result} ...${{ id, description, answer, problem, running, pinned, pin, job: state.job, models, study, pickOf: picking, onApply: next => change(next, 'run'), stale: Boolean(answer && (problem || waiting)) }} />
       </section>
     </main>`;

@@ -3,10 +3,11 @@ import { html, useState, useEffect, useRef, useMemo } from './lib.js';
 import { t, number, typed, parsed, unitSymbol, plural, language } from './text.js';
 import * as api from './api.js';
 import { jobOf, lastQuery } from './room.js';
+import { sentence } from './fields.js';
 import { Progress, Trouble } from './status.js';
 import { Picture } from './figure.js';
 import { Downloads, RequestView, Warnings, Sheet, usePictureHeight, short, capital } from './result.js';
-import { parts } from './schema.js';
+import { parts, namesOf } from './schema.js';
 import { leavesOf, outputsOf, proposed, pointsOf } from './vary.js';
 
 const MOST_VARIED = 3;
@@ -58,7 +59,7 @@ export function Study({ calculators, query, push, replace, refreshJobs }) {
   }, [asked, spoken]);
   const tell = next => { own.current = next; replace(next); };
   const choose = id => push(`calculator=${id}${lastQuery.get(id) ? `&${written(jobPart(new URLSearchParams(lastQuery.get(id))))}` : ''}`);
-  if (missing) return html`<main class="plain" id="main" tabindex="-1"><h1>${missing.problem?.title || t('trouble_title')}</h1><p>${missing.problem?.detail || missing.message}</p><p><a href="#/studies" onClick=${() => setMissing(null)}>${t('start_over')}</a></p></main>`;
+  if (missing) return html`<main class="plain" id="main" tabindex="-1"><h1>${missing.problem?.title || t('trouble_title')}</h1><p>${sentence(missing.problem?.detail || missing.message)}</p><p><a href="#/studies" onClick=${() => setMissing(null)}>${t('start_over')}</a></p></main>`;
   if (!opened) return html`<main class="plain quiet-start" id="main" tabindex="-1"><p>${t('loading')}</p></main>`;
   return html`<${Board} key=${opened.serial} ...${{ ...opened, calculators, choose, tell, refreshJobs }} />`;
 }
@@ -209,7 +210,7 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
         <div class=${`work-line ${pending && !running ? 'on' : ''}`} aria-hidden="true"></div>
         <header class="room-head"><h1>${t('study_question')}</h1><p class="summary">${description.title}</p></header>
         ${running && html`<${Progress} running=${running} stop=${() => api.cancel(running.id).catch(fail)} />`}
-        ${problem && html`<${Trouble} problem=${problem} onGo=${go} />`}
+        ${problem && html`<${Trouble} problem=${problem} names=${namesOf(description.input_schema)} over=${Boolean(answer)} onGo=${go} />`}
         ${!answer && !running?.interim ? html`<div class="empty">${problem || running ? '' : html`<p>${pending ? t('first_answer') : t('study_empty')}</p>`}</div>`
           : html`<${Findings} ...${{ answer, interim: running?.interim, leaves, outputs, description }} stale=${Boolean(answer && JSON.stringify(answer.asked) !== JSON.stringify(body) && !stored)} />`}
       </section>
@@ -287,7 +288,7 @@ function Findings({ answer, interim, leaves, outputs, description, stale }) {
         </div>
         ${result && html`<div class="words">
           ${first && html`<p class="verdict" aria-live="polite">${capital(first.text)}</p>`}
-          <${Warnings} key=${answer.key} list=${answer.answer.warnings} />
+          <${Warnings} key=${answer.key} list=${answer.answer.warnings} names=${namesOf(description.input_schema)} />
           <ul class="explanation">${others.map(({ code, text }, index) => html`<li key=${code + index}>${capital(text)}</li>`)}</ul>
         </div>`}
       </div>

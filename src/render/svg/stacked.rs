@@ -294,7 +294,8 @@ fn grid(page: &mut Page, placed: &Placed<'_>, layout: &Layout<'_>, class: &str) 
 fn axes(page: &mut Page, placed: &Placed<'_>, layout: &Layout<'_>) {
     let Frame { left, right, top, bottom, plane, .. } = placed.frame;
     grid(page, placed, layout, "");
-    if let Some(zero) = plane.along_y().at(0.0).filter(|zero| *zero > top + 1.0 && *zero < bottom - 1.0) {
+    let zero = (!placed.ticks.marks.is_empty()).then(|| plane.along_y().at(0.0)).flatten();
+    if let Some(zero) = zero.filter(|zero| *zero > top + 1.0 && *zero < bottom - 1.0) {
         put!(page, "<path class=\"zero\" d=\"M{} {}H{}\"/>", Px(left), Px(zero), Px(right));
     }
     let (width, height) = (Px(right - left), Px(bottom - top));

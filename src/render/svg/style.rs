@@ -111,14 +111,7 @@ pattern[id^=precut-weave] path{stroke:#1a1d21;stroke-width:1;stroke-opacity:.4}\
 .precut-figure .n6{color:#aab2bd}\
 .precut-figure .n7{color:#ab9ff2}\
 .precut-figure .over{stroke:#e8eaed}\
-.precut-figure .halo,.precut-figure .ribbon{fill:currentColor;fill-opacity:.24;stroke:currentColor;stroke-width:1;stroke-dasharray:none}\
-.precut-figure .weave-1,.precut-figure .weave-2,.precut-figure .weave-3,.precut-figure .weave-4,.precut-figure .weave-5{stroke:none}\
-.precut-figure .weave-1{fill:url(#precut-weave-1)}\
-.precut-figure .weave-2{fill:url(#precut-weave-2)}\
-.precut-figure .weave-3{fill:url(#precut-weave-3)}\
-.precut-figure .weave-4{fill:url(#precut-weave-4)}\
-.precut-figure .weave-5{fill:url(#precut-weave-5)}\
-.precut-figure .casing{stroke:#15181c}\
+.precut-figure .halo,.precut-figure .casing{stroke:#15181c}\
 #precut-hatch path,pattern[id^=precut-weave] path{stroke:#fff}\
 .precut-figure .plain.v1{color:#62bdf5}\
 .precut-figure .plain.v2{color:#ff8f45}\
