@@ -91,7 +91,7 @@ fn ribbons_say_what_holds_by_colour_pattern_letter_and_name() {
         .split("<rect class=\"ribbon ")
         .skip(1)
         .map(|rect| rect.split("height=\"").nth(1).unwrap().split('"').next().unwrap().parse().unwrap())
-        .filter(|height| (*height - 12.0_f64).abs() > 1e-9)
+        .filter(|height: &f64| (height - 12.0).abs() > 1e-9)
         .collect();
     let [whole, upper, lower] = heights[..] else { panic!("{heights:?}") };
     assert!((upper + lower - whole).abs() < 0.02 && upper > 2.0 * lower && lower > 0.2 * whole, "{heights:?}");
