@@ -69,7 +69,7 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
   const [pinned, setPinned] = useState(null);
   const [pane, setPane] = useState('picture');
   const now = useRef({});
-  now.current = { state, answer, running, description, pinned };
+  now.current = { state, answer, running, description, pinned, problem };
   const control = useRef(null);
   const stopFollowing = useRef(null);
   const isLive = useRef(true);
@@ -178,6 +178,8 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
         fail(error);
         await new Promise(resolve_ => setTimeout(resolve_, Math.min(1000 * 2 ** again, LONGEST_PAUSE_MS)));
         if (!signal.aborted && alive.current) return run(job, again + 1);
+      } else if (error instanceof api.Refused && said !== language() && again < 5) {
+        if (!signal.aborted) return run(job, again + 1);
       } else fail(error);
     }
   }, [id, watch, tell]);
@@ -185,6 +187,7 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
 
   // The description, again in each language; the rest of the state stays.
   const spoken = language();
+  const spokenBefore = useRef(spoken);
   useEffect(() => {
     let gone = false;
     (async () => {
@@ -193,6 +196,9 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
         if (gone) return;
         setDescription(found);
         if (JSON.stringify(found.input_schema).includes('"x-library"')) api.materials().then(({ items }) => !gone && setLibraries({ materials: items })).catch(() => {});
+        // What was refused is refused again, in the other language.
+        if (spokenBefore.current !== spoken && now.current.problem?.status === 422 && isLive.current && now.current.state) run(now.current.state.job);
+        spokenBefore.current = spoken;
         if (now.current.answer && now.current.answer.language !== spoken) {
           const { key, job } = now.current.answer;
           await show(key, null, job);

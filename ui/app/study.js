@@ -158,7 +158,8 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
   useEffect(() => {
     if (spoken.current === language()) return;
     spoken.current = language();
-    if (answer) show(answer.key, null, answer.asked).catch(fail);
+    if (problem?.errors) start();
+    else if (answer) show(answer.key, null, answer.asked).catch(fail);
   }, [language()]);
 
   const faults = problem?.errors || [];

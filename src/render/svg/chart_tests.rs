@@ -71,8 +71,8 @@ fn ribbons_say_what_holds_by_colour_pattern_letter_and_name() {
         role,
     };
     let ribbons = vec![
-        ribbon("deflection", Role::Series(0), &[(0.0, 60.0, 0.4, "z1"), (60.0, 100.0, 0.09, "z2")]),
-        ribbon("a_name_far_too_long_for_its_stretch_of_the_shaft", Role::Series(2), &[(60.0, 100.0, 0.01, "z2")]),
+        ribbon("deflection", Role::Series(0), &[(0.0, 90.0, 0.4, "z1"), (90.0, 100.0, 0.09, "z2")]),
+        ribbon("a_name_far_too_long_for_its_stretch_of_the_shaft", Role::Series(2), &[(90.0, 100.0, 0.01, "z2")]),
     ];
     let panels = vec![
         Panel { y: Axis::linear("radius", "mm"), height: 1.0, items: vec![outline] },

@@ -189,12 +189,10 @@ fn spectrum(spectrum: Option<&SpectrumColumns>, outcome: &Outcome) -> Vec<Panel>
     let (mut bars, mut factors) = (Vec::new(), Vec::new());
     if let Some(spectrum) = spectrum {
         let order: Vec<f64> = spectrum.order.iter().copied().map(f64::from).collect();
-        let points = |name, values: &[f64], role| {
-            let (x, y) = order.iter().zip(values).filter(|(_, value)| **value >= LEAST_UM).unzip();
-            Item::Points { name, x, y, role }
-        };
-        bars.push(points("ring_before", &spectrum.start_um, Role::Before));
-        bars.push(points("ring_after", &spectrum.end_um, Role::After));
+        let waves =
+            |name, values: &[f64], role| Item::Bars { name, x: order.clone(), y: above_rounding(values), role };
+        bars.push(waves("ring_before", &spectrum.start_um, Role::Before));
+        bars.push(waves("ring_after", &spectrum.end_um, Role::After));
     }
     if let Some(linear) = &outcome.linear_theory {
         let order: Vec<f64> = linear.orders.iter().map(|o| f64::from(o.order)).collect();
