@@ -13,11 +13,11 @@ mod nearest;
 mod place;
 mod result_text;
 mod schema;
-mod way;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]
 pub(crate) mod toy;
+mod way;
 
 use entry::Member;
 

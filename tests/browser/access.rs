@@ -98,8 +98,7 @@ fn no_page_is_wider_than_its_window() {
 #[test]
 fn long_faults_move_no_column() {
     let Some((_turn, mut page, service)) = both() else { return };
-    let columns =
-        "[...document.querySelectorAll('.form .grid thead th')].map(it => Math.round(it.getBoundingClientRect().width))";
+    let columns = "[...document.querySelectorAll('.form .grid thead th')].map(it => Math.round(it.getBoundingClientRect().width))";
     for (width, height) in [(360, 740), (1024, 600), (2560, 1300)] {
         page.screen(width, height, false);
         page.open(&service.page("deflection-compensation?example=stepped_with_rest"));

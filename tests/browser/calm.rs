@@ -77,7 +77,10 @@ fn the_printed_sheet_has_inputs_picture_words_key_and_versions() {
             assert!(sheet.contains(input), "{room}: {input} is not in {sheet}");
         }
         assert!(sheet.contains("b3:") && sheet.contains(&format!("{room} version")), "{sheet}");
-        assert_eq!(shown(&mut page, ".form-pane, .shell, .bar, [role=tablist], .figure-choice, .tools, .words .more"), 0);
+        assert_eq!(
+            shown(&mut page, ".form-pane, .shell, .bar, [role=tablist], .figure-choice, .tools, .words .more"),
+            0
+        );
         assert!(shown(&mut page, ".picture svg.chart") >= 4 && shown(&mut page, ".verdict") == 1);
         // Of warnings that are folded on the screen none is missing on paper.
         let told = page.evaluate("fetch('/v1/results/' + document.querySelector('.sheet').textContent.match(/b3:[0-9a-f]+/)[0]).then(it => it.json()).then(it => it.warnings.length)");

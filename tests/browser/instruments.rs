@@ -159,7 +159,8 @@ fn what_binds_is_a_ribbon_along_the_shaft_that_says_its_zone() {
     let end = |at: usize| ends[at].as_f64().unwrap();
     assert!((end(0) - end(2)).abs() < 2.5 && (end(1) - end(3)).abs() < 2.5, "{ends}");
     // Not by colour alone: a letter or the name in every piece, the same letters in the legend, patterns.
-    let said = page.evaluate("[...document.querySelectorAll('.picture.main .chart text.said')].map(it => it.textContent)");
+    let said =
+        page.evaluate("[...document.querySelectorAll('.picture.main .chart text.said')].map(it => it.textContent)");
     let letters = page.evaluate("[...document.querySelectorAll('.panel-head .said')].map(it => it.textContent)");
     assert!(!said.as_array().unwrap().is_empty() && letters.as_array().unwrap().len() >= 3, "{said} {letters}");
     assert!(page.evaluate("document.querySelectorAll('.picture.main rect.weave').length").as_u64().unwrap() > 0);

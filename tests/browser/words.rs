@@ -107,13 +107,17 @@ fn the_page_speaks_russian_and_english() {
 
     // What is refused is refused in the language of the page, also after a switch.
     page.open(&service.page("feed-schedule?/limits/tool_usage_max=0.001"));
-    page.until("document.documentElement.lang === 'ru' && /[а-я]/.test(document.querySelector('.problem li').textContent)");
+    page.until(
+        "document.documentElement.lang === 'ru' && /[а-я]/.test(document.querySelector('.problem li').textContent)",
+    );
     let said = page.text(".problem li");
     assert!(said.contains("прогиб (z5)") && !said.contains('@') && !said.contains('_'), "{said}");
     page.click_on("EN");
     page.until("document.documentElement.lang === 'en' && /deflection \\(z5\\)/.test(document.querySelector('.problem li').textContent)");
     page.click_on("RU");
-    page.until("document.documentElement.lang === 'ru' && /прогиб/.test(document.querySelector('.problem li').textContent)");
+    page.until(
+        "document.documentElement.lang === 'ru' && /прогиб/.test(document.querySelector('.problem li').textContent)",
+    );
 
     // It is remembered.
     page.open(&service.page(""));

@@ -279,15 +279,15 @@ fn an_exported_model_extends_a_job() {
     assert!(!english.is_empty());
     for said in &english {
         let text = said["text"].as_str().unwrap();
-        assert!(!text.split_whitespace().any(|word| word.starts_with('/')) && text.contains("the stored model lathe-7@3"), "{text}");
+        assert!(
+            !text.split_whitespace().any(|word| word.starts_with('/')) && text.contains("the stored model lathe-7@3"),
+            "{text}"
+        );
         assert_ne!(said["values"]["with"], said["values"]["without"], "{text}");
     }
     let first = english[0]["text"].as_str().unwrap();
     assert!(first.starts_with("Form error is ") && first.contains(" µm; without"), "{first}");
-    let russian = said(&feed_precut(
-        &["solve", "--lang", "ru", "--model", path.to_str().unwrap()],
-        &example,
-    ));
+    let russian = said(&feed_precut(&["solve", "--lang", "ru", "--model", path.to_str().unwrap()], &example));
     let russian = changed(&serde_json::from_str(&russian).unwrap());
     assert_eq!(russian.len(), english.len());
     let first = russian[0]["text"].as_str().unwrap();

@@ -118,7 +118,7 @@ export function NumberInput({ id, schema, value, filled, set, setWrong, describe
   const placeholder = standIn === undefined || standIn === null ? '' : typed(Number(standIn.toPrecision(7)));
   return html`
     <label for=${id} class="label draggable" ...${drag}>${label}</label>
-    <span class="control"><input id=${id} type="text" inputmode="decimal" autocomplete="off" spellcheck=${false} value=${shown} placeholder=${placeholder}
+    <span class="control"><input id=${id} type="text" inputmode="decimal" autocomplete="off" spellcheck=${false} value=${shown} placeholder=${placeholder} title=${rangeText(schema)}
       disabled=${context.disabled} aria-describedby=${described} aria-invalid=${invalid ? 'true' : undefined} aria-required=${required ? 'true' : undefined}
       onInput=${event => take(event.currentTarget.value)} onBlur=${leave} onKeyDown=${key} onFocus=${event => { const field = event.currentTarget; setFocused(true); setTimeout(() => { if (document.activeElement === field) field.select(); }, 0); }} /></span>
     <span class="unit" aria-hidden="true">${unit}</span>`;

@@ -82,7 +82,7 @@ function Cell({ field, path, value, required, context, row }) {
   };
   return html`
     <input id=${id} type="text" inputmode="decimal" autocomplete="off" value=${draft ?? typed(value)} aria-label=${`${row}: ${label}`} onFocus=${event => { show(); event.currentTarget.select(); }} onMouseEnter=${show}
-      placeholder=${field.schema.default !== undefined ? typed(field.schema.default) : ''} aria-invalid=${faults.length || wrong ? 'true' : undefined} aria-describedby=${faults.length ? `${id}-fault` : undefined}
+      title=${rangeText(field.schema)} placeholder=${field.schema.default !== undefined ? typed(field.schema.default) : ''} aria-invalid=${faults.length || wrong ? 'true' : undefined} aria-describedby=${faults.length ? `${id}-fault` : undefined}
       onInput=${event => take(event.currentTarget.value)} onBlur=${() => { if (!wrong) setDraft(null); }} onKeyDown=${key} />`;
 }
 

@@ -504,7 +504,8 @@ fn a_replay_shows_what_the_history_says_and_what_a_shorter_run_leaves() {
         assert_eq!(replay.angle_deg.len(), 360);
         for frame in &replay.frames {
             assert_eq!(frame.deviation_um.len(), 360);
-            let entry = whole.history.revolution.iter().position(|turns| (turns - frame.revolution).abs() < 1e-9).unwrap();
+            let entry =
+                whole.history.revolution.iter().position(|turns| (turns - frame.revolution).abs() < 1e-9).unwrap();
             let noted = whole.history.roundness_um[entry];
             let fold = |by: fn(f64, f64) -> f64| frame.deviation_um.iter().copied().reduce(by).unwrap();
             let span = fold(f64::max) - fold(f64::min);

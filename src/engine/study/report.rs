@@ -175,9 +175,7 @@ fn explanation(plan: &Plan, result: &StudyResult) -> Vec<Message> {
         for (code, extreme) in [("study_least_at_end", least), ("study_largest_at_end", largest)] {
             if index == 0 && !extreme.at_end_of.is_empty() {
                 let at_end = names.of_variables(result, &extreme.at_end_of);
-                said.push(
-                    message(code).with("variables", extreme.at_end_of.clone()).with("variable_names", at_end),
-                );
+                said.push(message(code).with("variables", extreme.at_end_of.clone()).with("variable_names", at_end));
             }
         }
     }

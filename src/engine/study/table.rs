@@ -66,7 +66,10 @@ fn extremes(result: &StudyResult) -> Table {
             columns.push(if variable.values.iter().all(|value| value.number().is_some()) {
                 numbers(name, unit, at.into_iter().map(|setting| setting?.number()).collect())
             } else {
-                words(name, at.into_iter().map(|setting| setting.map(ToString::to_string).unwrap_or_default()).collect())
+                words(
+                    name,
+                    at.into_iter().map(|setting| setting.map(ToString::to_string).unwrap_or_default()).collect(),
+                )
             });
         }
     }

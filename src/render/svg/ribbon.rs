@@ -87,7 +87,12 @@ pub(super) fn draw(page: &mut Page, panel: &Panel, frame: &Frame, item: &Item, c
         put!(page, "{} {}</title>", Escaped(&rough(*weight, wording.decimal)), Escaped(&unit));
         let (wide, tall) = (Px(right - left), Px(bottom - top));
         for class in classes(class, *role) {
-            put!(page, "<rect class=\"{class}\" x=\"{}\" y=\"{}\" width=\"{wide}\" height=\"{tall}\"/>", Px(left), Px(top));
+            put!(
+                page,
+                "<rect class=\"{class}\" x=\"{}\" y=\"{}\" width=\"{wide}\" height=\"{tall}\"/>",
+                Px(left),
+                Px(top)
+            );
         }
         let letter = role.letter().to_string();
         let said = [text.as_str(), letter.as_str()].into_iter().find(|said| width(said, SIZE) + 8.0 <= right - left);

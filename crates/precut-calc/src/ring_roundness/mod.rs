@@ -38,7 +38,8 @@ pub use measurement::RingMeasurement;
 pub use output::{
     CausesOutcome, CircleValues, Evaluated, Fate, HistoryColumns, LinearOutcome, MapCell, MapOutcome, OrderOutcome,
     Outcome, PathColumns, ProfileColumns, ReactionsOutcome, ReplayFrame, ReplayOutcome, RootOutcome, SearchOutcome,
-    SearchSetting, SearchStatus, SecondStage, SettingOutcome, SimulationOutcome, SpectrumColumns, TriedColumns, WaveColumn,
+    SearchSetting, SearchStatus, SecondStage, SettingOutcome, SimulationOutcome, SpectrumColumns, TriedColumns,
+    WaveColumn,
 };
 
 use crate::calculator::{

@@ -189,8 +189,7 @@ fn spectrum(spectrum: Option<&SpectrumColumns>, outcome: &Outcome) -> Vec<Panel>
     let (mut bars, mut factors) = (Vec::new(), Vec::new());
     if let Some(spectrum) = spectrum {
         let order: Vec<f64> = spectrum.order.iter().copied().map(f64::from).collect();
-        let waves =
-            |name, values: &[f64], role| Item::Bars { name, x: order.clone(), y: above_rounding(values), role };
+        let waves = |name, values: &[f64], role| Item::Bars { name, x: order.clone(), y: above_rounding(values), role };
         bars.push(waves("ring_before", &spectrum.start_um, Role::Before));
         bars.push(waves("ring_after", &spectrum.end_um, Role::After));
     }
@@ -201,10 +200,12 @@ fn spectrum(spectrum: Option<&SpectrumColumns>, outcome: &Outcome) -> Vec<Panel>
         factors.push(Item::Bars { name: "factor_per_revolution", x: order, y: factor, role: Role::Plain });
         factors.push(line("neutral", &ends, &[1.0, 1.0], Role::Limit));
     }
-    vec![
-        Panel { y: Axis::logarithmic("amplitude", "um"), height: 1.0, items: bars },
-        Panel { y: Axis::linear("factor_per_revolution", "1"), height: 0.7, items: factors },
-    ]
+    let mut panels = vec![Panel { y: Axis::logarithmic("amplitude", "um"), height: 1.0, items: bars }];
+    // Without the theory its panel would only take room.
+    if !factors.is_empty() {
+        panels.push(Panel { y: Axis::linear("factor_per_revolution", "1"), height: 0.7, items: factors });
+    }
+    panels
 }
 
 fn map(map: Option<&MapOutcome>) -> Vec<Panel> {
