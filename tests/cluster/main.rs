@@ -19,7 +19,9 @@ mod dice;
 mod small_disk;
 
 mod across;
+mod backup;
 mod chaos;
+mod clocks;
 mod database;
 mod full;
 mod process;

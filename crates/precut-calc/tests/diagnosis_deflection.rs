@@ -7,8 +7,8 @@ use precut_calc::deflection_compensation::{
     DeflectionAllowances, DeflectionCompensation, DeflectionPoint, DeflectionRun, Job,
 };
 use precut_calc::diagnosis::{
-    Bound, CONFOUNDED_BELOW, Data, Effort, Foundation, Layout, Signature, Subject, Verdict, Weighing, adequacy, gain,
-    remainder_shape, separations, suspected_factor,
+    Bound, CONFOUNDED_BELOW, Data, DiagnosisOptions, Effort, Foundation, Layout, Signature, Subject, Verdict, Weighing,
+    adequacy, gain, remainder_shape, separations, suspected_factor,
 };
 use serde_json::{Value, json};
 
@@ -89,7 +89,10 @@ fn bound(sketch: &Value) -> (Bound<DeflectionCompensation>, Data) {
         design,
     };
     let value = rows.iter().map(|row| row["diameter_deviation_um"].as_f64().unwrap()).collect();
-    (Bound::new(prepared, allowances, quantity, None), Data { value, uncertainty: None, layout })
+    (
+        Bound::new(prepared, allowances, quantity, &DiagnosisOptions::default()),
+        Data { value, uncertainty: None, layout },
+    )
 }
 
 struct Case {

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
 use precut_calc::calculator::{
-    Answer, Calculator, Check, Diagnosable, Failure, ForwardModel, Inapplicability, PrepareError, Rows, Smooth,
+    Answer, Calculator, Check, Diagnosable, Failure, ForwardModel, Inapplicability, PrepareError, Ranges, Rows, Smooth,
     Treatment, Unwatched, Violations,
 };
 use precut_calc::diagnosis::{Diagnosis, DiagnosisResult, VerdictClass};
@@ -208,7 +208,7 @@ fn a_run_is_a_ring_with_its_own_settings() {
 fn next_rings_can_be_turned() {
     let job = job(&short());
     let rows = Rows { runs: vec![RingRun::default()], points: all_round(72, 0).collect() };
-    let next = RingRoundness::next_runs(&job, &rows);
+    let next = RingRoundness::next_runs(&job, &rows, Ranges(&[]));
     let changes: Vec<&str> = next.iter().map(|run| run.changes).collect();
     assert_eq!(
         changes,

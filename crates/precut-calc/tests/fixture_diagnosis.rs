@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
 use precut_calc::calculator::{
-    Calculator, Check, Diagnosable, ForwardModel, Inapplicability, Prediction, PrepareError, Rows, Smooth, Treatment,
-    Unwatched, Violations,
+    Calculator, Check, Diagnosable, ForwardModel, Inapplicability, Prediction, PrepareError, Ranges, Rows, Smooth,
+    Treatment, Unwatched, Violations,
 };
 use precut_calc::diagnosis::{Diagnosis, DiagnosisResult, VerdictClass};
 use precut_calc::effects::{FIXTURE_CAUSES, FixtureEffect};
@@ -326,7 +326,7 @@ fn less_damping_shows_in_depth_limits() {
 fn next_runs_can_be_cut() {
     let job = job();
     let rows = grid(&[300.0, 640.0], &[0.5, 1.0]);
-    let next = FixtureStability::next_runs(&job, &rows);
+    let next = FixtureStability::next_runs(&job, &rows, Ranges(&[]));
     let of = |condition: &str| next.iter().filter(|run| run.changes == condition).count();
     // Both ends and four speeds near a lobe.
     assert_eq!((of("spindle_speed_rpm"), of("feed_mm_per_tooth"), of("depth_mm")), (6, 2, 2));

@@ -18,6 +18,7 @@ mod diagnosis_refusals;
 mod diagnosis_ring;
 mod diagnosis_ring_trials;
 mod diagnosis_trials;
+mod diagnosis_worth;
 mod feed_benchmarks;
 mod feed_claims;
 mod feed_diagnosis;

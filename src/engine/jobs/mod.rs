@@ -59,7 +59,6 @@ use crate::store::jobs::{
     Accepted, Changed, Idempotency, JobId, JobKind, JobPage, JobQuery, JobRecord, JobState, JobStore, MOST_ATTEMPTS,
     NewJob, News, Priority, Timing,
 };
-use crate::store::now_ms;
 use estimate::Estimates;
 use feeds::Feeds;
 use running::Computations;
@@ -357,8 +356,8 @@ impl Job {
         left.clamp(RETRY_JOB.0, RETRY_JOB.1)
     }
 
-    /// Whether its result is kept no longer.
-    pub fn is_expired(&self) -> bool {
-        self.record.expires_ms.is_some_and(|at| at <= now_ms())
+    /// Whether its result is kept no longer, by the store's clock: processes may disagree by minutes.
+    pub fn is_expired(&self, now_ms: i64) -> bool {
+        self.record.expires_ms.is_some_and(|at| at <= now_ms)
     }
 }

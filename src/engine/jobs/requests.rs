@@ -102,7 +102,7 @@ impl Engine {
     async fn result_of(&self, job: Job) -> Result<Arc<Stored>, Error> {
         let state = job.record.state;
         let not_finished = |retry_after| Error::JobNotFinished { state, retry_after };
-        if job.is_expired() {
+        if job.is_expired(self.now_ms()) {
             return Err(Error::JobExpired);
         }
         match state {

@@ -4,7 +4,8 @@ use serde::{Serialize, de::DeserializeOwned};
 use utoipa::ToSchema;
 
 use super::{
-    Calculator, Design, Example, Failure, ForwardModel, Hypotheses, Hypothesis, MeasuredRow, Prediction, Rows,
+    Calculator, Consequence, Design, Example, Failure, ForwardModel, Hypotheses, Hypothesis, MeasuredRow, Prediction,
+    Ranges, Rows,
 };
 
 /// A calculator whose model can be compared with measurements, cause by cause.
@@ -35,7 +36,24 @@ pub trait Diagnosable:
 
     /// Runs that could be measured next, each with its rows: every condition moved to the ends of its
     /// range, or started afresh. None where a job has no runs.
-    fn next_runs(job: &Self::Job, rows: &Rows<Self::Run, Self::Point>) -> Vec<NextRun<Self::Run, Self::Point>>;
+    fn next_runs(
+        job: &Self::Job,
+        rows: &Rows<Self::Run, Self::Point>,
+        ranges: Ranges<'_>,
+    ) -> Vec<NextRun<Self::Run, Self::Point>>;
+
+    /// What comes of the decision that the job's user makes with the effects `believed` (the path that is compensated, the
+    /// schedule, the depth), where each of `acting` is what really acts; both stand beside the job's own effects. What
+    /// the job leaves to its runs is as in the first. Empty where the job decides nothing.
+    fn consequences(
+        _job: &Self::Job,
+        _quantity: &str,
+        _runs: &[Self::Run],
+        _believed: &[Self::Effect],
+        _acting: &[Vec<Self::Effect>],
+    ) -> Result<Vec<Consequence>, Failure> {
+        Ok(Vec::new())
+    }
 
     /// How many times rows are held back: for the time that it takes.
     fn folds(_rows: usize, runs: usize) -> usize {

@@ -25,6 +25,8 @@ pub trait ForwardModel {
     const CAUSES: &'static [Cause];
     /// What it predicts.
     const QUANTITIES: &'static [Quantity];
+    /// Conditions of a run that may be set to any value of a range.
+    const CONDITIONS: &'static [&'static str];
 
     /// Everything that no effect parameter changes, once per diagnosis. Faults of the rows are all given at once.
     fn prepare(

@@ -5,6 +5,7 @@
 //! with named numbers ([`Message`], [`Finding`]), never in sentences: the service words them.
 
 mod conflict;
+mod consequence;
 mod design;
 mod diagnosable;
 mod figure;
@@ -13,9 +14,11 @@ mod forward;
 mod hypothesis;
 mod measured;
 mod program;
+mod ranges;
 mod table;
 
 pub use conflict::{Conflict, ConstraintName, ElasticScope, Infeasible, Relaxation};
+pub use consequence::{Allowed, Consequence};
 pub use design::{Design, Grouping, Smooth};
 pub use diagnosable::{Diagnosable, Measurement, NextRun};
 pub use figure::{Axis, Figure, Frame, Glyph, Item, Panel, Role, Spacing};
@@ -24,6 +27,7 @@ pub use forward::{Column as JacobianColumn, ForwardModel, Missing, Prediction, P
 pub use hypothesis::{Hypotheses, Hypothesis, Inapplicability, Inapplicable, Range, Shape, Treatment, Variable};
 pub use measured::{Measured, MeasuredRow};
 pub use program::{Block, Dialect, Program};
+pub use ranges::{ConditionRange, Ranges};
 pub use table::{Cells, Column, Table};
 
 use serde::{Serialize, de::DeserializeOwned};

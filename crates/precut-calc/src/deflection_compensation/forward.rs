@@ -4,14 +4,15 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::calculator::{
-    Cost, Design, Diagnosable, Example, Failure, Finding, ForwardModel, Hypotheses, Hypothesis, JacobianColumn,
-    Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Rows, checkpoint,
+    Consequence, Cost, Design, Diagnosable, Example, Failure, Finding, ForwardModel, Hypotheses, Hypothesis,
+    JacobianColumn, Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows, checkpoint,
 };
 use crate::effects::{Cause, DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect};
 use crate::num::beam::Profile;
 
 use super::DeflectionCompensation;
 use super::acting::{Acting, StructureChange};
+use super::consequence::consequences;
 use super::equilibrium::Engagement;
 use super::grid::{Grid, interpolate};
 use super::hypotheses::{Experiment, chuck_scale_n_mm_per_rad, design};
@@ -196,6 +197,7 @@ impl ForwardModel for DeflectionCompensation {
 
     const CAUSES: &'static [Cause] = DEFLECTION_CAUSES;
     const QUANTITIES: &'static [Quantity] = QUANTITIES;
+    const CONDITIONS: &'static [&'static str] = &["depth_mm", "feed_mm_per_rev", "speed_m_per_min"];
 
     fn prepare(
         job: &Job,
@@ -309,11 +311,22 @@ impl Diagnosable for DeflectionCompensation {
         design(&prepared.job, &prepared.places)
     }
 
+    fn consequences(
+        job: &Job,
+        _quantity: &str,
+        runs: &[DeflectionRun],
+        believed: &[DeflectionEffect],
+        acting: &[Vec<DeflectionEffect>],
+    ) -> Result<Vec<Consequence>, Failure> {
+        consequences(job, runs, believed, acting)
+    }
+
     fn next_runs(
         job: &Job,
         rows: &Rows<DeflectionRun, DeflectionPoint>,
+        ranges: Ranges<'_>,
     ) -> Vec<NextRun<DeflectionRun, DeflectionPoint>> {
-        next_runs(job, rows)
+        next_runs(job, rows, ranges)
     }
 }
 

@@ -16,6 +16,7 @@ mod acting;
 mod advice;
 mod check;
 mod columns;
+mod consequence;
 mod cut;
 mod equilibrium;
 mod extremes;

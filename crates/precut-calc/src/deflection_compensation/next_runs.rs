@@ -2,32 +2,33 @@
 
 use super::forward::{DeflectionPoint, DeflectionRun};
 use super::input::{FeedDirection, Job};
-use crate::calculator::{NextRun, Rows};
+use crate::calculator::{NextRun, Ranges, Rows};
 
-/// How far beyond the observed range of a condition a next run may go, on either side.
-const WIDENED: f64 = 1.5;
-
-/// One more run for every condition at either end of its widened range, the other conditions as in the run
+/// One more run for every condition at either end of its range, the other conditions as in the run
 /// in the middle; the other feed direction; a fresh edge; a cold machine.
 pub(super) fn next_runs(
     job: &Job,
     rows: &Rows<DeflectionRun, DeflectionPoint>,
+    ranges: Ranges<'_>,
 ) -> Vec<NextRun<DeflectionRun, DeflectionPoint>> {
     let Some(typical) = rows.runs.get(rows.runs.len() / 2) else { return Vec::new() };
     let points = longest_run(rows);
     let depth = |run: &DeflectionRun| run.depth_mm;
     let feed = |run: &DeflectionRun| Some(run.feed_mm_per_rev.unwrap_or(job.cut.feed_mm_per_rev));
     let speed = |run: &DeflectionRun| run.speed_m_per_min.or(job.cut.speed_m_per_min);
+    let ends = |condition: &str, of: &dyn Fn(&DeflectionRun) -> Option<f64>| {
+        ranges.ends(condition, rows.runs.iter().filter_map(of)).into_iter().flatten()
+    };
     let mut next = Vec::new();
     let mut add = |changes, run| next.push(NextRun { changes, run, points: points.clone() });
-    for value in ends(rows, depth) {
+    for value in ends("depth_mm", &depth) {
         add("depth_mm", DeflectionRun { depth_mm: Some(value), ..typical.clone() });
     }
-    for value in ends(rows, feed) {
+    for value in ends("feed_mm_per_rev", &feed) {
         add("feed_mm_per_rev", DeflectionRun { feed_mm_per_rev: Some(value), ..typical.clone() });
     }
     if typical.spindle_speed_rpm.is_none() {
-        for value in ends(rows, speed) {
+        for value in ends("speed_m_per_min", &speed) {
             add("speed_m_per_min", DeflectionRun { speed_m_per_min: Some(value), ..typical.clone() });
         }
     }
@@ -39,14 +40,6 @@ pub(super) fn next_runs(
     add("tool_path_at_start_m", DeflectionRun { tool_path_at_start_m: Some(0.0), ..typical.clone() });
     add("warm_time_at_start_min", DeflectionRun { warm_time_at_start_min: Some(0.0), ..typical.clone() });
     next
-}
-
-/// Both ends of a condition's observed range, widened by a factor; none where it is not stated.
-fn ends(rows: &Rows<DeflectionRun, DeflectionPoint>, of: impl Fn(&DeflectionRun) -> Option<f64>) -> Vec<f64> {
-    let values: Vec<f64> = rows.runs.iter().filter_map(of).collect();
-    let low = values.iter().copied().reduce(f64::min);
-    let high = values.iter().copied().reduce(f64::max);
-    low.map(|v| v / WIDENED).into_iter().chain(high.map(|v| v * WIDENED)).collect()
 }
 
 /// Places of the run with the most rows.

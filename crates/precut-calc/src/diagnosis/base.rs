@@ -4,6 +4,7 @@ use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
+use super::input::{DiagnosisOptions, PriorWeight};
 use super::subject::{Setting, Subject};
 use crate::calculator::{
     Diagnosable, Failure, Hypotheses, Hypothesis, Inapplicability, Inapplicable, JacobianColumn, Missing, Prediction,
@@ -33,17 +34,18 @@ pub struct Bound<M: Diagnosable> {
 
 impl<M: Diagnosable> Bound<M> {
     /// `quantity` decides whether residuals are taken of the value or of its logarithm.
-    /// `asked_for` leaves out all other kinds of causes.
-    pub fn new(prepared: M::Prepared, allowances: M::Allowances, quantity: &str, asked_for: Option<&[String]>) -> Self {
+    /// `options` leave out kinds of causes that are not asked for, and weigh those that are.
+    pub fn new(prepared: M::Prepared, allowances: M::Allowances, quantity: &str, options: &DiagnosisOptions) -> Self {
         let logarithmic = M::QUANTITIES.iter().any(|known| known.name == quantity && known.logarithmic);
         let mut hypotheses = M::hypotheses(&prepared);
-        if let Some(asked_for) = asked_for {
+        if let Some(asked_for) = &options.causes {
             let (kept, left): (Vec<Hypothesis>, Vec<Hypothesis>) =
                 hypotheses.applicable.into_iter().partition(|h| asked_for.iter().any(|kind| kind == h.cause.kind));
             hypotheses.applicable = kept;
             let reason = Inapplicability::NotAskedFor;
             hypotheses.inapplicable.extend(left.into_iter().map(|h| Inapplicable { cause: h.cause, reason }));
         }
+        weigh(&mut hypotheses.applicable, &options.prior_weights);
         let dear = M::predict_cost(&prepared).ms > DEAR_MS;
         Self { prepared, allowances, hypotheses, logarithmic, dear, coarse_base: OnceLock::new() }
     }
@@ -143,6 +145,16 @@ impl<M: Diagnosable> Bound<M> {
                 _ => 0.0,
             })
             .collect())
+    }
+}
+
+/// Prior weights as stated, together as many as there are hypotheses: a set of causes stays as likely as before.
+fn weigh(hypotheses: &mut [Hypothesis], stated: &[PriorWeight]) {
+    let weight = |kind: &str| stated.iter().find(|of| of.kind == kind).map_or(1.0, |of| of.weight);
+    let total: f64 = hypotheses.iter().map(|hypothesis| weight(hypothesis.cause.kind)).sum();
+    let count = hypotheses.len() as f64;
+    for hypothesis in hypotheses {
+        hypothesis.prior_weight *= weight(hypothesis.cause.kind) * count / total;
     }
 }
 

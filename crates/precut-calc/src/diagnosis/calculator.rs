@@ -86,7 +86,7 @@ impl<M: Diagnosable> Calculator for Diagnosis<M> {
             M::prepare(&job.job, &places, &job.quantity, monitor).map_err(|error| unprepared(error, &used))?;
         let design = M::design(&prepared);
         let data = data::<M>(job, &used, design);
-        let bound = Bound::<M>::new(prepared, job.allowances.clone(), &job.quantity, job.options.causes.as_deref());
+        let bound = Bound::<M>::new(prepared, job.allowances.clone(), &job.quantity, &job.options);
         report::answer::<M>(job, &places, &used, &bound, &data, monitor)
     }
 
@@ -110,7 +110,14 @@ const CODES: Codes = Codes {
 };
 
 /// Faults of a diagnosis beside those of the base's own job.
-pub(super) const FAULT_CODES: &[&str] = &["too_few_measurements", "unknown_run", "unknown_quantity", "unknown_cause"];
+pub(super) const FAULT_CODES: &[&str] = &[
+    "too_few_measurements",
+    "unknown_run",
+    "unknown_quantity",
+    "unknown_cause",
+    "unknown_condition",
+    "range_reversed",
+];
 
 /// The first reason; a row by its number in the job, where rows without a value count, too.
 fn unprepared(error: PrepareError, used: &[usize]) -> Failure {
@@ -206,12 +213,27 @@ where
             .measured(used as f64, LEAST_ROWS as f64, "1")
             .with("quantity", job.quantity.clone())
     });
-    for (index, kind) in job.options.causes.iter().flatten().enumerate() {
+    let options = &job.options;
+    let asked_for = options.causes.iter().flatten().enumerate().map(|(i, kind)| (format!("/options/causes/{i}"), kind));
+    let weighed = options.prior_weights.iter().enumerate();
+    let weighed = weighed.map(|(i, weight)| (format!("/options/prior_weights/{i}/kind"), &weight.kind));
+    for (pointer, kind) in asked_for.chain(weighed) {
         violations.require(causes.iter().any(|cause| cause.kind == kind), || {
             let known: Vec<&'static str> = causes.iter().map(|cause| cause.kind).collect();
-            Finding::new("unknown_cause", format!("/options/causes/{index}"))
-                .with("kind", kind.clone())
-                .with("known", known)
+            Finding::new("unknown_cause", pointer).with("kind", kind.clone()).with("known", known)
+        });
+    }
+    for (index, range) in options.ranges.iter().enumerate() {
+        let conditions = W::Model::CONDITIONS;
+        violations.require(conditions.contains(&range.condition.as_str()), || {
+            Finding::new("unknown_condition", format!("/options/ranges/{index}/condition"))
+                .with("condition", range.condition.clone())
+                .with("known", conditions.to_vec())
+        });
+        violations.require(range.to > range.from, || {
+            Finding::new("range_reversed", format!("/options/ranges/{index}/to"))
+                .measured(range.to, range.from, "1")
+                .with("name", range.condition.clone())
         });
     }
 }

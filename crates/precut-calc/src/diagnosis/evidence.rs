@@ -96,6 +96,29 @@ impl Normal {
         Self { gram, right, square: residual.inner(residual) }
     }
 
+    /// Where |r - X t|^2 is least, without priors; `None` where columns depend on each other.
+    pub(super) fn least_squares(&self) -> Option<DVector<f64>> {
+        Cholesky::new(self.gram.clone()).map(|factor| factor.solve(&self.right))
+    }
+
+    /// Least of |r - X t|^2 over all t, without priors.
+    pub(super) fn misfit(&self) -> f64 {
+        if self.right.is_empty() {
+            return self.square;
+        }
+        let eigen = self.gram.clone().symmetric_eigen();
+        let largest = eigen.eigenvalues.iter().fold(0.0_f64, |most, value| most.max(*value));
+        let along = eigen.eigenvectors.tr_mul(&self.right);
+        // Directions that no row sees explain nothing: round-off of a product of n terms stays far below this.
+        let explained: f64 = along
+            .iter()
+            .zip(eigen.eigenvalues.iter())
+            .filter(|(_, value)| **value > 1e-12 * largest)
+            .map(|(part, value)| part * part / value)
+            .sum();
+        (self.square - explained).max(0.0)
+    }
+
     /// log Z = -1/2 log|A| + l(Q) + sum of ln 2 Phi(s_i t_i / sd_i), A = X'X + I.
     ///
     /// r ~ N(X t, I) and t ~ N(0, I) give r ~ N(0, I + X X'), whose determinant is |A| and whose quadratic

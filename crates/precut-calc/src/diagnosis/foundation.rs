@@ -18,6 +18,8 @@ pub struct Foundation<'a> {
     pub predicted: Vec<bool>,
     /// Measured minus base, 0 where the base predicts nothing.
     pub residual: Vec<f64>,
+    /// Standard deviation of every row, where the scatter has heavy tails.
+    pub heavy_tails: Option<Vec<f64>>,
     pub(super) signatures: Signatures,
     pub(super) nuisances: Vec<Vec<f64>>,
 }
@@ -32,7 +34,7 @@ impl<'a> Foundation<'a> {
         let nuisances = subject.nuisances()?;
         let rows = data.value.iter().zip(&base).zip(&predicted);
         let residual = rows.map(|((y, f), ok)| if *ok { y - f } else { 0.0 }).collect();
-        Ok(Self { subject, data, base, predicted, residual, signatures, nuisances })
+        Ok(Self { subject, data, base, predicted, residual, heavy_tails: None, signatures, nuisances })
     }
 
     /// Rows that stand alone.

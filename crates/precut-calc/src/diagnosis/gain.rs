@@ -5,6 +5,8 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64;
 
 use super::foundation::Foundation;
+use super::noise::between_sweeps;
+use super::outlying::{HeldRun, OutlyingRun, outlying};
 use super::weigh::{Effort, SetWeight, Verdict, Weighing};
 use crate::calculator::{Failure, Monitor, checkpoint};
 
@@ -12,6 +14,9 @@ use crate::calculator::{Failure, Monitor, checkpoint};
 const RESAMPLES: usize = 2000;
 /// Leading sets over which a prediction is averaged where none holds enough.
 const AVERAGED: usize = 6;
+/// Leading sets that have an error of their own; fewer where every prediction is a simulation.
+const SCORED: usize = 6;
+const SCORED_DEAR: usize = 2;
 /// Posterior from which on one set predicts alone.
 const ALONE: f64 = 0.8;
 /// The base is at the ceiling within this share: then there is nothing to explain.
@@ -36,6 +41,11 @@ pub struct Gain {
     pub folds: usize,
     /// Errors by row, of the base and of the extended model; 0 where no fold held the row.
     pub errors: Vec<(f64, f64)>,
+    /// Root mean square errors of the leading sets, fitted anew in every fold and not chosen anew; of those that every
+    /// fold had found.
+    pub of_sets: Vec<(Vec<usize>, f64)>,
+    /// Runs that the others do not lead one to expect.
+    pub outlying: Vec<OutlyingRun>,
 }
 
 /// Held-back error with causes chosen anew in every fold (`nested`), or with those of the whole data.
@@ -58,6 +68,9 @@ pub fn gain(
         return Ok(None);
     }
     let mut errors = vec![(0.0, 0.0); fold.len()];
+    let most = if effort.nonlinear { SCORED_DEAR } else { SCORED };
+    let mut runs = Vec::new();
+    let mut scores: Vec<Score> = whole.named_sets().take(most).map(|set| Score::of(&set.members)).collect();
     for &f in &held {
         checkpoint(monitor)?;
         let keep: Vec<bool> = whole.keep.iter().zip(fold).map(|(keep, of)| *keep && *of != f).collect();
@@ -65,7 +78,12 @@ pub fn gain(
             foundation.base.clone()
         } else {
             let without = Weighing::of(foundation, keep, effort, monitor)?;
-            prediction(foundation, &without, (!nested).then_some(whole))?
+            for score in &mut scores {
+                score.add(&without, |row| fold[row] == f && whole.keep[row])?;
+            }
+            let predicted = prediction(foundation, &without, (!nested).then_some(whole))?;
+            runs.extend(HeldRun::of(&without, &predicted, |row| fold[row] == f && whole.keep[row]));
+            predicted
         };
         for row in 0..fold.len() {
             if fold[row] == f && whole.keep[row] {
@@ -74,7 +92,42 @@ pub fn gain(
             }
         }
     }
-    Ok(Some(summary(errors, whole, &held, seed)))
+    let of_sets = scores.into_iter().filter_map(Score::rmse).collect();
+    Ok(Some(Gain { of_sets, outlying: outlying(runs, held.len()), ..summary(errors, whole, &held, seed) }))
+}
+
+/// Squared errors of one set on what was held back.
+struct Score {
+    members: Vec<usize>,
+    /// Their sum and number; `None` once a fold had not found the set, or predicts nothing with it.
+    sum: Option<(f64, f64)>,
+}
+
+impl Score {
+    fn of(members: &[usize]) -> Self {
+        Self { members: members.to_vec(), sum: Some((0.0, 0.0)) }
+    }
+
+    fn add(&mut self, without: &Weighing<'_>, held: impl Fn(usize) -> bool) -> Result<(), Failure> {
+        let Some((sum, count)) = self.sum.take() else { return Ok(()) };
+        let Some(set) = without.named_sets().find(|set| set.members == self.members) else { return Ok(()) };
+        let foundation = without.foundation;
+        let predicted = foundation.subject.predict(&set.settings)?;
+        let errors = (0..predicted.len()).filter(|&row| held(row)).map(|row| {
+            let error = foundation.data.value[row] - predicted[row].ok()?;
+            Some(error * error)
+        });
+        self.sum = errors.sum::<Option<f64>>().map(|own| {
+            let rows = (0..predicted.len()).filter(|&row| held(row)).count();
+            (sum + own, count + rows as f64)
+        });
+        Ok(())
+    }
+
+    fn rmse(self) -> Option<(Vec<usize>, f64)> {
+        let (sum, count) = self.sum.filter(|(_, count)| *count > 0.0)?;
+        Some((self.members, (sum / count).sqrt()))
+    }
 }
 
 /// Prediction of the sets that lead without the fold: the base where nothing is wrong, the leader where it
@@ -154,14 +207,23 @@ fn summary(errors: Vec<(f64, f64)>, whole: &Weighing<'_>, held: &[usize], seed: 
         explained_share,
         folds: held.len(),
         errors,
+        of_sets: Vec::new(),
+        outlying: Vec::new(),
     }
 }
 
-/// Root mean square of sqrt(diag C): scatter and allowances.
+/// Root mean square of sqrt(diag C): scatter and allowances. Scatter between sweeps, where there are several, is all that no
+/// model can foresee: what they share is structure, however fine.
 fn ceiling(whole: &Weighing<'_>) -> f64 {
+    let foundation = whole.foundation;
+    let between = between_sweeps(foundation.data, &foundation.residual, &whole.keep);
+    let finer = between.filter(|_| whole.noise.per_row.is_none()).map_or(0.0, |(sigma, _)| {
+        let own = whole.noise.sigma;
+        (own * own - sigma * sigma).max(0.0)
+    });
     let (mut sum, mut count) = (0.0, 0.0);
     for row in (0..whole.keep.len()).filter(|&row| whole.keep[row]) {
-        sum += whole.own_variance(row);
+        sum += whole.own_variance(row) - finer;
         count += 1.0;
     }
     if count > 0.0 { (sum / count).sqrt() } else { 0.0 }

@@ -117,6 +117,9 @@ impl Signature {
             return None;
         }
         let length: Vec<f64> = self.directions.iter().map(|d| d.inner(d).sqrt()).collect();
+        if length.iter().any(|length| *length <= 0.0) {
+            return None;
+        }
         let unit = |i: usize, j: usize| self.directions[i].inner(&self.directions[j]) / (length[i] * length[j]);
         let least = DMatrix::from_fn(count, count, unit).symmetric_eigenvalues().min();
         Some(1.0 / least.max(1e-12).sqrt())

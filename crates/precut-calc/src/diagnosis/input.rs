@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::{PartialSchema, ToSchema};
 
-use crate::calculator::{Measured, MeasuredRow};
+use crate::calculator::{ConditionRange, Measured, MeasuredRow};
 
 /// Most runs of one diagnosis.
 pub const MAX_RUNS: usize = 500;
@@ -49,6 +49,19 @@ pub struct DiagnosisOptions {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(min_items = 1, max_items = 64, example = json!(["headstock_compliance", "tailstock_offset"]))]
     pub causes: Option<Vec<String>>,
+    /// How much likelier than the others single kinds of causes are before anything is measured; 1 where not given.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schema(max_items = 64)]
+    pub prior_weights: Vec<PriorWeight>,
+    /// In which ranges a next run may lie; other conditions may go 1.5 times beyond what was observed, on either side.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schema(max_items = 16)]
+    pub ranges: Vec<ConditionRange>,
+    /// Change of the prediction, root mean square in the unit of the quantity (a share where it is logarithmic), below
+    /// which a cause does not matter: what is below it and below half the scatter is called negligible.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.0, maximum = 1e9, example = 0.5, extensions(("x-symbol" = json!("delta")), ("x-unit" = json!("1"))))]
+    pub negligible_below: Option<f64>,
     /// Most causes at the same time.
     #[schema(minimum = 1, maximum = 3, default = 3, example = 3, extensions(("x-symbol" = json!("k")), ("x-unit" = json!("1"))))]
     pub most_causes: u8,
@@ -69,10 +82,25 @@ pub struct DiagnosisOptions {
     pub seed: u32,
 }
 
+/// How much likelier a kind of cause is than the others, before anything is measured.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PriorWeight {
+    /// Kind of the cause.
+    #[schema(max_length = 64, example = "tool_wear")]
+    pub kind: String,
+    /// Its weight: 2 is twice as likely as a cause that is not listed.
+    #[schema(minimum = 0.001, maximum = 1000.0, example = 2.0, extensions(("x-symbol" = json!("w")), ("x-unit" = json!("1"))))]
+    pub weight: f64,
+}
+
 impl Default for DiagnosisOptions {
     fn default() -> Self {
         Self {
             causes: None,
+            prior_weights: Vec::new(),
+            ranges: Vec::new(),
+            negligible_below: None,
             most_causes: 3,
             level: 0.01,
             leave_outliers_out: true,

@@ -8,7 +8,9 @@
 //! - `evidence`, `discrepancy`, `search`, `refine`: how well each set of causes, alone or with an unnamed
 //!   smooth remainder, explains the rows (`diagnosis/3.4`, `diagnosis/3.5`);
 //! - `weigh`: posterior weights and the verdict (`diagnosis/3.5`, `diagnosis/3.7`);
-//! - `profile`: intervals where a likelihood is not quadratic (`diagnosis/3.6`).
+//! - `profile`: intervals where a likelihood is not quadratic (`diagnosis/3.6`);
+//! - `gain`, `downstream`: what the extended model is worth, on data held back and in what is decided with it
+//!   (`diagnosis/3.8`, `diagnosis/3.9`).
 
 mod adequacy;
 mod base;
@@ -16,6 +18,7 @@ mod basis;
 mod calculator;
 mod data;
 mod discrepancy;
+mod downstream;
 mod evidence;
 mod foundation;
 mod gain;
@@ -24,6 +27,7 @@ mod input;
 mod next;
 mod noise;
 mod outlier;
+mod outlying;
 mod output;
 mod picture;
 mod profile;
@@ -46,10 +50,11 @@ pub use data::{Data, Layout};
 pub use foundation::Foundation;
 pub use gain::{Gain, gain};
 pub use identify::{COLLINEAR_ABOVE, CONFOUNDED_BELOW, Separation, Signature, separations, twins};
-pub use input::{DiagnosisJob, DiagnosisOptions, MAX_RUNS};
+pub use input::{DiagnosisJob, DiagnosisOptions, MAX_RUNS, PriorWeight};
 pub use next::NextMeasurement;
 pub use noise::{Noise, NoiseSource};
 pub use outlier::Outliers;
+pub use outlying::OutlyingRun;
 pub use output::*;
 pub use profile::Profile;
 pub use remainder::{RemainderShape, remainder_shape};

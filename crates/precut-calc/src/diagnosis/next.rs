@@ -4,10 +4,11 @@ use super::base::Bound;
 use super::calculator::JobOf;
 use super::data::{Data, Layout};
 use super::identify::Signature;
+use super::input::DiagnosisOptions;
 use super::subject::{Setting, Subject};
 use super::weigh::{SetWeight, Verdict, Weighing};
 use super::whiten::Whitener;
-use crate::calculator::{Diagnosable, Failure, Monitor, NextRun, Rows, checkpoint};
+use crate::calculator::{Diagnosable, Failure, Monitor, NextRun, Ranges, Rows, checkpoint};
 
 /// Odds that settle a question.
 const SETTLING_ODDS: f64 = 20.0;
@@ -54,7 +55,7 @@ pub(super) fn next_measurement<M: Diagnosable>(
     };
     let separation_now = now.separation(&other);
     let mut candidates = Vec::new();
-    for candidate in M::next_runs(&job.job, rows) {
+    for candidate in M::next_runs(&job.job, rows, Ranges(&job.options.ranges)) {
         checkpoint(monitor)?;
         let Some(separation_then) = separation_with::<M>(job, rows, &candidate, weighing, leader, rival)? else {
             continue;
@@ -135,7 +136,9 @@ fn separation_with<M: Diagnosable>(
         per_row.resize(all.points.len(), noise.sigma);
     }
     let data = Data { value: vec![0.0; all.points.len()], uncertainty: None, layout };
-    let bound = Bound::<M>::new(prepared, job.allowances.clone(), &job.quantity, None);
+    // Every cause: the sets are found in it by kind.
+    let every = DiagnosisOptions::default();
+    let bound = Bound::<M>::new(prepared, job.allowances.clone(), &job.quantity, &every);
     let translated = |set: &SetWeight| -> Option<Vec<Setting>> {
         set.settings
             .iter()

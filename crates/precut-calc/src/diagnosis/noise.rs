@@ -1,5 +1,7 @@
 //! Scatter of the rows, from what was stated, from repeats, or from the rows themselves (`diagnosis/3.1`).
 
+use std::collections::BTreeMap;
+
 use super::basis::{dot, orthonormal, smooth_columns};
 use super::data::Data;
 use crate::calculator::Smooth;
@@ -56,9 +58,15 @@ pub(super) fn smooth_order(smooth: &Smooth, rows: usize) -> usize {
 }
 
 impl Noise {
-    /// Scatter of the kept rows about the base; `residual` is measured minus base.
-    pub fn of(data: &Data, residual: &[f64], keep: &[bool]) -> Self {
+    /// Scatter of the kept rows about the base; `residual` is measured minus base. `heavy_tails`: standard deviations of the
+    /// rows where their scatter is not Gaussian; what was stated stands before them.
+    pub fn of(data: &Data, residual: &[f64], keep: &[bool], heavy_tails: Option<&[f64]>) -> Self {
         let mut noise = Self::of_rows(data, residual, keep);
+        if let (Some(own), None) = (heavy_tails, &noise.per_row) {
+            // The scale of Student's t; the rows' own deviations are larger the farther they lie from their trace.
+            let least = own.iter().copied().fold(f64::INFINITY, f64::min);
+            noise = Self { sigma: least, per_row: Some(own.to_vec()), ..noise };
+        }
         // Equal values in all rows say nothing of the scatter; the resolution does.
         let floor = resolution(&data.value, keep) / 12.0_f64.sqrt();
         // Where all values are equal even that is nothing: then the last digits of a number are.
@@ -130,6 +138,43 @@ pub(super) fn pure_error(data: &Data, residual: &[f64], keep: &[bool]) -> (f64, 
         let within: f64 = group.iter().map(|r| (r - mean) * (r - mean)).sum();
         (sum + within, dof + group.len() as f64 - 1.0)
     })
+}
+
+/// Standard deviation of single rows from the differences between sweeps of one run over the same places, and its degrees
+/// of freedom: means of sweeps and of places taken out. `None` without such sweeps.
+///
+/// Structure that all sweeps share, however fine, is no part of it.
+pub(super) fn between_sweeps(data: &Data, residual: &[f64], keep: &[bool]) -> Option<(f64, f64)> {
+    if data.layout.design.smooth == Smooth::None {
+        return None;
+    }
+    let sweeps = data.layout.kept_traces(keep);
+    let mut runs: Vec<usize> = sweeps.iter().map(|(run, _)| *run).collect();
+    runs.dedup();
+    let (mut sum, mut dof) = (0.0, 0.0);
+    for run in runs {
+        let own: Vec<BTreeMap<usize, f64>> = sweeps
+            .iter()
+            .filter(|(of, _)| *of == run)
+            .map(|(_, rows)| rows.iter().map(|&row| (data.layout.design.cell[row], residual[row])).collect())
+            .collect();
+        let Some((first, others)) = own.split_first() else { continue };
+        let shared: Vec<usize> =
+            first.keys().copied().filter(|cell| others.iter().all(|sweep| sweep.contains_key(cell))).collect();
+        if others.is_empty() || shared.len() < 2 {
+            continue;
+        }
+        let (many, places) = (own.len() as f64, shared.len() as f64);
+        let of_sweep = |sweep: &BTreeMap<usize, f64>| shared.iter().map(|cell| sweep[cell]).sum::<f64>() / places;
+        let of_place = |cell: usize| own.iter().map(|sweep| sweep[&cell]).sum::<f64>() / many;
+        let mean = own.iter().map(&of_sweep).sum::<f64>() / many;
+        for sweep in &own {
+            let level = of_sweep(sweep);
+            sum += shared.iter().map(|&cell| (sweep[&cell] - level - of_place(cell) + mean).powi(2)).sum::<f64>();
+        }
+        dof += (many - 1.0) * (places - 1.0);
+    }
+    (dof > 0.0).then(|| ((sum / dof).sqrt(), dof))
 }
 
 /// Restricted maximum likelihood over sigma and rho after taking smooth columns out of every trace.

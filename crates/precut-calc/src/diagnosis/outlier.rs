@@ -19,15 +19,16 @@ const ONE_IN: usize = 20;
 pub struct Outliers {
     /// Their numbers, worst first.
     pub rows: Vec<usize>,
-    /// Whether there are too many to be called outliers: then none is left out.
-    pub too_many: bool,
+    /// Where there are too many to be called outliers none is left out: standard deviation of every row under scatter with
+    /// heavy tails, that of a row far from its trace being large.
+    pub heavy_tails: Option<Vec<f64>>,
 }
 
 impl Outliers {
     /// Which rows stay.
     pub fn keep(&self, rows: usize) -> Vec<bool> {
         let mut keep = vec![true; rows];
-        if !self.too_many {
+        if self.heavy_tails.is_none() {
             self.rows.iter().for_each(|&row| keep[row] = false);
         }
         keep
@@ -76,13 +77,58 @@ pub(super) fn outliers(data: &Data, residual: &[f64]) -> Outliers {
             fit.out[place] = true;
             fit.refit();
             if flagged.len() > most {
-                return Outliers { rows: flagged, too_many: true };
+                return Outliers { rows: flagged, heavy_tails: Some(heavy_tails(&traces, residual.len())) };
             }
         } else {
             fit.structure[place] = true;
         }
     }
-    Outliers { rows: flagged, too_many: false }
+    Outliers { rows: flagged, heavy_tails: None }
+}
+
+/// Degrees of freedom of scatter with heavy tails.
+const TAILS: f64 = 5.0;
+/// Rounds of reweighting; the scale settles to a thousandth in ten.
+const ROUNDS: usize = 20;
+
+/// Standard deviations of the rows by iteratively reweighted fits of their traces: under Student's t with nu degrees of
+/// freedom and scale s a row at distance r counts as a Gaussian one of variance s^2/w, w = (nu + 1)/(nu + r^2/s^2).
+fn heavy_tails(traces: &[Fit], rows: usize) -> Vec<f64> {
+    let mut weights: Vec<Vec<f64>> = traces.iter().map(|fit| vec![1.0; fit.rows.len()]).collect();
+    let mut scale = 0.0;
+    for _ in 0..ROUNDS {
+        let left: Vec<Vec<f64>> =
+            traces.iter().zip(&weights).map(|(fit, own)| weighted_residuals(&fit.columns, &fit.value, own)).collect();
+        let fitted: usize = traces.iter().map(|fit| fit.columns.len().min(fit.rows.len())).sum();
+        let squares: f64 = left.iter().flatten().zip(weights.iter().flatten()).map(|(r, w)| w * r * r).sum();
+        scale = (squares / (rows.saturating_sub(fitted)).max(1) as f64).sqrt();
+        if scale <= 0.0 {
+            break;
+        }
+        for (own, left) in weights.iter_mut().zip(&left) {
+            for (weight, r) in own.iter_mut().zip(left) {
+                *weight = (TAILS + 1.0) / (TAILS + (r / scale).powi(2));
+            }
+        }
+    }
+    let mut deviations = vec![scale; rows];
+    for (fit, own) in traces.iter().zip(&weights) {
+        for (&row, weight) in fit.rows.iter().zip(own) {
+            deviations[row] = scale / weight.sqrt();
+        }
+    }
+    deviations
+}
+
+/// What weighted least squares by the columns leaves.
+fn weighted_residuals(columns: &[Vec<f64>], value: &[f64], weights: &[f64]) -> Vec<f64> {
+    let scaled = |column: &[f64]| -> Vec<f64> { column.iter().zip(weights).map(|(c, w)| c * w.sqrt()).collect() };
+    let mut left = scaled(value);
+    for column in &orthonormal(columns.iter().map(|column| scaled(column)).collect()) {
+        let along = dot(column, &left);
+        left.iter_mut().zip(column).for_each(|(r, c)| *r -= along * c);
+    }
+    left.iter().zip(weights).map(|(r, w)| r / w.sqrt()).collect()
 }
 
 fn robust_sd(values: impl Iterator<Item = f64>) -> f64 {

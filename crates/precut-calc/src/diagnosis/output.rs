@@ -15,6 +15,12 @@ pub struct DiagnosisResult<E: ToSchema, R: ToSchema> {
     pub likely_sets: Vec<LikelySet>,
     /// Why nothing is said about physics, for `refused`.
     pub refusal: Option<Refusal>,
+    /// What each of the causes named changes in the prediction.
+    pub contributions: Vec<ContributionReport>,
+    /// Collinearity index of the causes named (Brun and Reichert): above 20 they cannot be fitted together; absent for one
+    /// cause alone.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub collinearity: Option<f64>,
     /// Posterior probability that nothing is wrong that these rows could show.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub none_probability: f64,
@@ -46,11 +52,16 @@ pub struct DiagnosisResult<E: ToSchema, R: ToSchema> {
     pub effects: Vec<E>,
     /// Error on data held back, base against extended.
     pub gain: Option<GainReport>,
+    /// What comes of deciding with either model, where the extended one is right; empty where none is named, or where the
+    /// job decides nothing.
+    pub downstream: Vec<DownstreamReport>,
     /// The run that would best part the leading set from its strongest rival.
     #[schema(inline)]
     pub next_measurement: Option<NextReport<R>>,
     /// Row by row.
     pub rows: RowColumns,
+    /// Whole runs that the others do not lead one to expect, and what the rows say without each.
+    pub outlying_runs: Vec<OutlyingRunReport>,
     /// Rows left out because they stand alone, by their number from 1.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub outliers: Vec<u32>,
@@ -111,6 +122,36 @@ pub struct ParameterReport {
     pub at_limit: bool,
 }
 
+/// What a cause changes in the prediction.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ContributionReport {
+    /// Kind of the effect.
+    pub kind: String,
+    /// Which of several effects of one kind; empty where there is one.
+    pub label: String,
+    /// Prediction with the set that is named, minus that without this cause: root mean square over the rows that count, in
+    /// the unit of the quantity (a share where it is logarithmic).
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub change_rms: f64,
+    /// Whether that is below half the scatter and below what the job calls negligible.
+    pub negligible: bool,
+}
+
+/// A whole run that the others do not lead one to expect.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct OutlyingRunReport {
+    /// Number of the run, from 1.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub run: u32,
+    /// Squared Mahalanobis distance from what the others predict, per row: about 1 where nothing is odd.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub misfit_per_row: f64,
+    /// What the rows say without it.
+    pub verdict_without: VerdictClass,
+    /// Kinds of the causes that they name without it, or of the sets that they cannot tell apart.
+    pub sets_without: Vec<Vec<String>>,
+}
+
 /// A set of causes in the list of a confounded answer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct LikelySet {
@@ -154,6 +195,13 @@ pub struct NoiseReport {
     /// Scatter of the rows in units of what was stated.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub scatter_factor: Option<f64>,
+    /// Standard deviation from the differences between sweeps of one run over the same places, in the unit of the quantity:
+    /// what no model can foresee; absent without such sweeps.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub between_sweeps: Option<f64>,
+    /// Its degrees of freedom.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub between_sweeps_degrees_of_freedom: Option<f64>,
 }
 
 /// A test of the base.
@@ -184,6 +232,13 @@ pub struct SetReport {
     pub posterior: f64,
     /// Whether an unnamed remainder stands beside them.
     pub with_remainder: bool,
+    /// Bayesian information criterion, n ln(RSS/n) + k ln n; absent beside a remainder, whose sizes are as many as one likes.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub bic: Option<f64>,
+    /// Root mean square error on data held back, this set fitted anew without each part, in the unit of the quantity;
+    /// absent for sets that do not lead, or where nothing was held back.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub held_out_rmse: Option<f64>,
 }
 
 /// A cause and the probability that it takes part.
@@ -293,6 +348,29 @@ pub struct RemainderReport {
     /// Share of the mean square left by the named part that it explains.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub explained_share: f64,
+    /// Along a part: where a line with one step fits best.
+    pub step: Option<StepReport>,
+    /// Of one shape in all runs: how its size goes with what the base predicts there. 0: the same in all runs; 1: in proportion,
+    /// as what comes of the force.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub proportional_to_base: Option<f64>,
+    /// Standard deviation of that.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub proportional_to_base_deviation: Option<f64>,
+}
+
+/// A step along a part.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct StepReport {
+    /// Place, as a share of the length.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub place: f64,
+    /// What lies beyond it, above what lies before it, in the unit of the quantity.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub size: f64,
+    /// Log likelihood of a line with this step, above that of a line without.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub log_likelihood: f64,
 }
 
 /// Error on data held back.
@@ -319,6 +397,37 @@ pub struct GainReport {
     /// Share of what could be explained that was; absent where the base is at the ceiling already.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub explained_share: Option<f64>,
+}
+
+/// What comes of deciding with either model (the path that is compensated, the schedule, the depth), where the extended
+/// one is right within what the rows leave open.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct DownstreamReport {
+    /// What is judged, with its unit: `form_error_um`, `largest_error_um`, `limit_use`, `depth_margin_percent`.
+    pub outcome: String,
+    /// Its unit.
+    pub unit: String,
+    /// Draws from the fit of the extended model.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub draws: u32,
+    /// Decided with the base.
+    pub base: DecisionReport,
+    /// Decided with the extended model.
+    pub extended: DecisionReport,
+}
+
+/// How a decision turns out.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct DecisionReport {
+    /// Mean over the draws, in the unit of the outcome.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub mean: f64,
+    /// 95 % interval over the draws.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub interval_95: [f64; 2],
+    /// Share of the draws within what the job allows; absent where it says nothing.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub share_allowed: Option<f64>,
 }
 
 /// A run worth measuring.

@@ -1,6 +1,8 @@
 //! The shape of what the catalogue does not explain (`diagnosis/3.7`, unknown remainder).
 
+use super::evidence::Normal;
 use super::weigh::Weighing;
+use crate::calculator::Smooth;
 
 /// A remainder without a name, at its posterior mean.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,6 +23,22 @@ pub struct RemainderShape {
     pub extreme_row: usize,
     /// Share of the mean square of the residuals, those of the named part taken out, that it explains.
     pub explained: f64,
+    /// Where one step explains most of it, along a part.
+    pub step: Option<Step>,
+    /// How its size goes from run to run with what the base predicts there, where it has one shape in all runs: 0 where it
+    /// is the same in all, 1 where it is in proportion; with its standard deviation.
+    pub with_base: Option<(f64, f64)>,
+}
+
+/// A step along a part.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    /// Place, as a share of the length.
+    pub place: f64,
+    /// What is beyond it, above what is before it, in the unit of the rows.
+    pub size: f64,
+    /// How much likelier a line with this step is than a line without: difference of log likelihoods.
+    pub log_likelihood: f64,
 }
 
 /// Of the heaviest set that has a remainder beside it; `None` where none was weighed.
@@ -44,7 +62,62 @@ pub fn remainder_shape(weighing: &Weighing<'_>) -> Option<RemainderShape> {
     let extreme_row = kept.iter().copied().max_by(|&a, &b| value[a].abs().total_cmp(&value[b].abs()))?;
     let explained = if before > 0.0 { (1.0 - after / before).clamp(0.0, 1.0) } else { 0.0 };
     let spectrum = kind.orders.as_ref().map_or_else(Vec::new, |orders| spectrum(orders, &remainder.amplitudes));
-    Some(RemainderShape { kind: kind.name, value, deviation, spectrum, rms, extreme_row, explained })
+    let left: Vec<f64> = (0..rows).map(left).collect();
+    let step = step(weighing, &left, &kept);
+    let with_base = (kind.name == "common").then(|| with_base(weighing, &left, &value, &kept)).flatten();
+    Some(RemainderShape { kind: kind.name, value, deviation, spectrum, rms, extreme_row, explained, step, with_base })
+}
+
+/// Places at which a step is tried.
+const STEP_PLACES: u32 = 49;
+
+/// The likeliest step: whitened least squares of a line, with and without it.
+fn step(weighing: &Weighing<'_>, left: &[f64], kept: &[usize]) -> Option<Step> {
+    let Smooth::Along(place) = &weighing.foundation.data.layout.design.smooth else { return None };
+    let white = |of: &dyn Fn(usize) -> f64| weighing.whitener.white(&(0..left.len()).map(of).collect::<Vec<_>>());
+    let (residual, level, slope) = (weighing.whitener.white(left), white(&|_| 1.0), white(&|row| place[row]));
+    let line = Normal::of(&[&level, &slope], &residual).misfit();
+    let ends = kept.iter().map(|&row| place[row]).fold((1.0_f64, 0.0_f64), |(l, h), u| (l.min(u), h.max(u)));
+    let tried = (1..=STEP_PLACES).map(|k| ends.0 + (ends.1 - ends.0) * f64::from(k) / f64::from(STEP_PLACES + 1));
+    let of_place = |at: f64| {
+        let jump = white(&|row| f64::from(u8::from(place[row] > at)));
+        let normal = Normal::of(&[&level, &slope, &jump], &residual);
+        let size = normal.least_squares()?[2];
+        let rows = kept.len() as f64;
+        Some(Step { place: at, size, log_likelihood: 0.5 * rows * (line / normal.misfit().max(1e-300)).ln() })
+    };
+    tried.filter_map(of_place).max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))
+}
+
+/// Regression of the size of a common shape in every run, a_i, on what the base predicts there, F_i:
+/// a_i = a (1 + p (F_i/F - 1)), F the mean of F_i; p and its standard deviation.
+fn with_base(weighing: &Weighing<'_>, left: &[f64], shape: &[f64], kept: &[usize]) -> Option<(f64, f64)> {
+    let foundation = weighing.foundation;
+    let mut runs: Vec<(f64, f64, f64, f64)> = Vec::new();
+    for run in 0..foundation.data.layout.run_of_trace.iter().max()? + 1 {
+        let rows: Vec<usize> = weighing.rows_of_run(run).into_iter().filter(|row| kept.contains(row)).collect();
+        let sum = |of: &dyn Fn(usize) -> f64| rows.iter().map(|&row| of(row)).sum::<f64>();
+        // Set-ups differ from run to run: levels are taken out.
+        let count = rows.len() as f64;
+        let (mean_shape, mean_left) = (sum(&|row| shape[row]) / count, sum(&|row| left[row]) / count);
+        let square = sum(&|row| (shape[row] - mean_shape).powi(2));
+        if rows.len() < 3 || square <= 0.0 {
+            continue;
+        }
+        let size = sum(&|row| (shape[row] - mean_shape) * (left[row] - mean_left)) / square;
+        let base = (sum(&|row| foundation.base[row].powi(2)) / count).sqrt();
+        runs.push((base, size, square, count));
+    }
+    let weight: f64 = runs.iter().map(|run| run.2).sum();
+    let mean = |of: &dyn Fn(&(f64, f64, f64, f64)) -> f64| runs.iter().map(|run| run.2 * of(run)).sum::<f64>() / weight;
+    let (base, size) = (mean(&|run| run.0), mean(&|run| run.1));
+    let spread: f64 = runs.iter().map(|run| run.2 * (run.0 / base - 1.0).powi(2)).sum();
+    // Bases that differ by less than a tenth say nothing.
+    if runs.len() < 3 || base <= 0.0 || size.abs() <= 0.0 || spread < 0.01 * weight {
+        return None;
+    }
+    let slope = runs.iter().map(|run| run.2 * (run.0 / base - 1.0) * (run.1 - size)).sum::<f64>() / spread;
+    Some((slope / size, weighing.noise.sigma / spread.sqrt() / size.abs()))
 }
 
 /// Amplitude of every order: cosine and sine of one order together, of several runs the root mean square.

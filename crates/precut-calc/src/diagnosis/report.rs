@@ -4,18 +4,19 @@ use super::adequacy::{TestKind, adequacy};
 use super::base::Bound;
 use super::calculator::{JobOf, ResultOf, stage};
 use super::data::Data;
+use super::downstream::downstream;
 use super::foundation::Foundation;
 use super::gain::{Gain, gain};
 use super::identify::twins;
 use super::next::next_measurement;
-use super::noise::{Noise, NoiseSource};
+use super::noise::{NoiseSource, between_sweeps};
 use super::output::{
-    CausePair, DiagnosisResult, GainReport, NoiseReport, NotApplicable, RemainderReport, RowColumns, TestReport,
-    VerdictClass,
+    CausePair, DiagnosisResult, GainReport, NoiseReport, NotApplicable, RemainderReport, RowColumns, StepReport,
+    TestReport, VerdictClass,
 };
 use super::refuse::{most_causes, refusal};
 use super::remainder::{RemainderShape, remainder_shape};
-use super::said::{basis, explanation, warnings};
+use super::said::{basis, doubts, explanation, warnings};
 use super::subject::{Setting, Subject};
 use super::view::View;
 use super::weigh::{Effort, Verdict, Weighing};
@@ -39,8 +40,11 @@ pub(super) fn answer<M: Diagnosable>(
     monitor: &dyn Monitor,
 ) -> Result<Answer<ResultOf<M>>, Failure> {
     stage(monitor, 0.05, "diagnosis_stage_signatures");
-    let foundation = Foundation::of(bound, data, monitor)?;
+    let mut foundation = Foundation::of(bound, data, monitor)?;
     let found = foundation.outliers();
+    if job.options.leave_outliers_out {
+        foundation.heavy_tails.clone_from(&found.heavy_tails);
+    }
     let keep = if job.options.leave_outliers_out { foundation.keep(&found) } else { foundation.predicted.clone() };
     stage(monitor, 0.2, "diagnosis_stage_search");
     let most_causes = most_causes(usize::from(job.options.most_causes), used.len());
@@ -67,7 +71,14 @@ pub(super) fn answer<M: Diagnosable>(
         prediction: leading.map(|_| bound.predict(settings)).transpose()?,
         deviation: leading.and_then(|set| weighing.deviation(set)),
     };
-    let warnings = warnings(&job.options, &weighing, &found, used, refusal.is_none(), gain.is_some());
+    let downstream = if matches!(view.class(), VerdictClass::Named) && refusal.is_none() {
+        downstream(job, &places.runs, bound, &weighing, leading, monitor)?
+    } else {
+        Vec::new()
+    };
+    let (contributions, collinearity) =
+        if refusal.is_none() { view.contributions(job.options.negligible_below)? } else { (Vec::new(), None) };
+    let mut warnings = warnings(&job.options, &weighing, &found, used, refusal.is_none(), gain.is_some());
     let (signatures, separations) = view.signatures()?;
     let output = DiagnosisResult {
         verdict: if refusal.is_some() { VerdictClass::Refused } else { view.class() },
@@ -75,7 +86,9 @@ pub(super) fn answer<M: Diagnosable>(
         likely_sets: if refusal.is_some() { Vec::new() } else { view.likely_sets() },
         none_probability: weighing.none,
         unnamed_probability: weighing.unnamed,
-        noise: noise_report(&weighing.noise),
+        contributions,
+        collinearity,
+        noise: noise_report(&weighing),
         tests: adequacy(&weighing)
             .into_iter()
             .map(|test| TestReport {
@@ -86,7 +99,7 @@ pub(super) fn answer<M: Diagnosable>(
                 rejects: test.p_holm < job.options.level,
             })
             .collect(),
-        sets: weighing.sets.iter().take(LISTED_SETS).map(|set| view.set_report(set)).collect(),
+        sets: weighing.sets.iter().take(LISTED_SETS).map(|set| view.set_report(set, gain.as_ref())).collect(),
         causes: view.causes(),
         not_applicable: not_applicable(bound, &weighing),
         twins: twins(&weighing)
@@ -102,13 +115,18 @@ pub(super) fn answer<M: Diagnosable>(
             .map(|shape| remainder_report(shape, used)),
         effects,
         gain: gain.as_ref().map(gain_report),
+        downstream,
         next_measurement: next.map(|next| view.next_report(next)),
         rows: row_columns::<M>(job, used, &foundation, &weighing, &extended),
+        outlying_runs: view.outlying(gain.as_ref()),
         outliers: found.rows.iter().map(|&row| row_number(used[row])).collect(),
         refusal,
     };
     let quantity = M::QUANTITIES.iter().find(|known| known.name == job.quantity);
     let quantity = quantity.ok_or_else(|| Failure::Internal(format!("{} is no quantity", job.quantity)))?;
+    if output.refusal.is_none() {
+        warnings.extend(doubts(&output));
+    }
     let explanation = explanation(&output, quantity);
     stage(monitor, 1.0, "stage_done");
     Ok(Answer { output, warnings, explanation, basis: basis() })
@@ -132,6 +150,13 @@ fn remainder_report(shape: RemainderShape, used: &[usize]) -> RemainderReport {
         orders,
         amplitudes,
         explained_share: shape.explained,
+        step: shape.step.map(|step| StepReport {
+            place: step.place,
+            size: step.size,
+            log_likelihood: step.log_likelihood,
+        }),
+        proportional_to_base: shape.with_base.map(|(slope, _)| slope),
+        proportional_to_base_deviation: shape.with_base.map(|(_, deviation)| deviation),
     }
 }
 
@@ -148,7 +173,9 @@ fn test_name(kind: TestKind) -> &'static str {
     }
 }
 
-fn noise_report(noise: &Noise) -> NoiseReport {
+fn noise_report(weighing: &Weighing<'_>) -> NoiseReport {
+    let (noise, foundation) = (&weighing.noise, weighing.foundation);
+    let between = between_sweeps(foundation.data, &foundation.residual, &weighing.keep);
     let (source, scatter_factor) = match noise.source {
         NoiseSource::Stated { scatter_factor } => ("stated", Some(scatter_factor)),
         NoiseSource::Repeats => ("repeats", None),
@@ -161,6 +188,8 @@ fn noise_report(noise: &Noise) -> NoiseReport {
         degrees_of_freedom: noise.dof.is_finite().then_some(noise.dof),
         source: source.to_owned(),
         scatter_factor,
+        between_sweeps: between.map(|(sigma, _)| sigma),
+        between_sweeps_degrees_of_freedom: between.map(|(_, dof)| dof),
     }
 }
 

@@ -1,15 +1,21 @@
 //! What is said about an answer: warnings, and the verdict in a sentence.
 
-use super::identify::CONFOUNDED_BELOW;
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+use super::identify::{COLLINEAR_ABOVE, CONFOUNDED_BELOW};
 use super::input::DiagnosisOptions;
 use super::noise::NoiseSource;
 use super::outlier::Outliers;
-use super::output::{DiagnosisResult, NamedCause, Refusal, VerdictClass};
+use super::output::{DiagnosisResult, NamedCause, Refusal, SetReport, VerdictClass};
 use super::refuse::{most_causes, rows_for};
 use super::suspect::{copied_traces, repeated_rows, swapped_columns};
 use super::weigh::Weighing;
 use crate::calculator::{Basis, Finding, Message, Quantity, Smooth};
 
+/// Probability of a scatter so much larger than between sweeps by chance, below which rows have structure that sweeps share.
+const FINER: f64 = 0.01;
+/// Difference of the information criterion that is more than a bare mention (Raftery).
+const BIC_MATTERS: f64 = 2.0;
 /// Sets that the sentence of a confounded answer names.
 const SAID_SETS: usize = 6;
 
@@ -24,6 +30,10 @@ pub(super) const WARNING_CODES: &[&str] = &[
     "swapped_columns",
     "rows_for_causes",
     "nothing_held_back",
+    "finer_structure",
+    "collinear_causes",
+    "outlying_run",
+    "rankings_disagree",
 ];
 pub(super) const EXPLANATION_CODES: &[&str] = &[
     "diagnosis_adequate",
@@ -38,6 +48,8 @@ pub(super) const EXPLANATION_CODES: &[&str] = &[
     "diagnosis_base_fails",
     "diagnosis_gain",
     "diagnosis_next",
+    "diagnosis_negligible",
+    "diagnosis_downstream",
 ];
 
 /// What is odd about the rows, and what was asked for and not done.
@@ -85,7 +97,7 @@ fn odd_rows(leave_out: bool, weighing: &Weighing<'_>, found: &Outliers, used: &[
     if missing > 0 {
         warnings.push(Finding::new("rows_not_predicted", "/measurements").with("count", missing));
     }
-    if found.too_many {
+    if found.heavy_tails.is_some() {
         warnings.push(Finding::new("too_many_outliers", "/measurements").with("count", found.rows.len()));
     } else if leave_out && !found.rows.is_empty() {
         let rows: Vec<usize> = found.rows.iter().map(|&row| used[row] + 1).collect();
@@ -106,6 +118,70 @@ fn odd_rows(leave_out: bool, weighing: &Weighing<'_>, found: &Outliers, used: &[
         warnings.push(finding.with("count", repeated.len()).with("rows", repeated));
     }
     warnings
+}
+
+/// What speaks against taking the verdict as it stands.
+pub(super) fn doubts<E: utoipa::ToSchema, R: utoipa::ToSchema>(output: &DiagnosisResult<E, R>) -> Vec<Finding> {
+    let mut doubts = Vec::new();
+    let noise = &output.noise;
+    if let (Some(between), Some(dof), Some(of_rows)) =
+        (noise.between_sweeps, noise.between_sweeps_degrees_of_freedom, noise.degrees_of_freedom)
+        && between > 0.0
+        && FisherSnedecor::new(of_rows, dof)
+            .is_ok_and(|law| law.sf((noise.standard_deviation / between).powi(2)) < FINER)
+    {
+        doubts.push(
+            Finding::new("finer_structure", "/measurements")
+                .with("sigma", noise.standard_deviation)
+                .with("between", between),
+        );
+    }
+    if let Some(index) = output.collinearity.filter(|index| *index > COLLINEAR_ABOVE) {
+        doubts.push(
+            Finding::new("collinear_causes", "/measurements")
+                .measured(index, COLLINEAR_ABOVE, "1")
+                .with("causes", kinds(&output.named)),
+        );
+    }
+    doubts.extend(output.outlying_runs.iter().map(|odd| {
+        Finding::new("outlying_run", format!("/runs/{}", odd.run.saturating_sub(1)))
+            .value(odd.misfit_per_row, "1")
+            .with("run", f64::from(odd.run))
+            .with("verdict", class_name(odd.verdict_without))
+            .with("sets", odd.sets_without.clone())
+    }));
+    doubts.extend(disagreement(output));
+    doubts
+}
+
+/// Where posterior, information criterion and data held back favour different sets, each by more than its own scatter.
+fn disagreement<E: utoipa::ToSchema, R: utoipa::ToSchema>(output: &DiagnosisResult<E, R>) -> Option<Finding> {
+    let leader = output.sets.first().filter(|set| !set.with_remainder)?;
+    let least = |of: &dyn Fn(&SetReport) -> Option<f64>| {
+        let scored = output.sets.iter().filter_map(|set| Some((of(set)?, set)));
+        scored.min_by(|a, b| a.0.total_cmp(&b.0))
+    };
+    let (bic, by_bic) = least(&|set| set.bic)?;
+    let (rmse, by_held_out) = least(&|set| set.held_out_rmse)?;
+    let rows = output.rows.used.iter().filter(|used| **used).count() as f64;
+    let bic_differs = leader.bic.is_some_and(|own| own - bic > BIC_MATTERS);
+    let held_out_differs = leader.held_out_rmse.is_some_and(|own| own > rmse * (1.0 + 1.0 / (2.0 * rows).sqrt()));
+    (bic_differs || held_out_differs).then(|| {
+        Finding::new("rankings_disagree", "/measurements")
+            .with("posterior", kinds(&leader.causes))
+            .with("bic", kinds(&by_bic.causes))
+            .with("held_out", kinds(&by_held_out.causes))
+    })
+}
+
+fn class_name(class: VerdictClass) -> &'static str {
+    match class {
+        VerdictClass::Adequate => "adequate",
+        VerdictClass::Named => "named",
+        VerdictClass::Confounded => "confounded",
+        VerdictClass::Unknown => "unknown",
+        VerdictClass::Refused => "refused",
+    }
 }
 
 /// Most important first: the verdict, then the gain.
@@ -142,6 +218,15 @@ pub(super) fn explanation<E: utoipa::ToSchema, R: utoipa::ToSchema>(
             .with("named", kinds(&output.named)),
         VerdictClass::Refused => refused(output.refusal.as_ref(), output.rows.row.len()),
     }];
+    let negligible: Vec<String> = output
+        .contributions
+        .iter()
+        .filter(|contribution| contribution.negligible)
+        .map(|contribution| contribution.kind.clone())
+        .collect();
+    if !negligible.is_empty() {
+        said.push(Message::new("diagnosis_negligible").with("causes", negligible));
+    }
     // A run that parts nothing is not worth a sentence.
     if let Some(next) = output.next_measurement.as_ref().filter(|next| next.rows_needed.is_some()) {
         said.push(
@@ -164,6 +249,15 @@ pub(super) fn explanation<E: utoipa::ToSchema, R: utoipa::ToSchema>(
                 .with("unit", if quantity.logarithmic { "" } else { quantity.unit }),
         );
     }
+    said.extend(output.downstream.iter().map(|downstream| {
+        Message::new("diagnosis_downstream")
+            .with("outcome", downstream.outcome.clone())
+            .with("unit", downstream.unit.clone())
+            .with("base", downstream.base.mean)
+            .with("extended", downstream.extended.mean)
+            .with("low", downstream.extended.interval_95[0])
+            .with("high", downstream.extended.interval_95[1])
+    }));
     said
 }
 

@@ -2,11 +2,13 @@
 
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
+use super::gain::Gain;
 use super::identify::{Signature, separations};
 use super::next::{NextMeasurement, bayes_factor};
+use super::outlying::OutlyingRun;
 use super::output::{
-    CandidateReport, CauseReport, LikelySet, NamedCause, NextReport, ParameterReport, ProfileReport, SeparationReport,
-    SetReport, SignatureReport, VerdictClass,
+    CandidateReport, CauseReport, ContributionReport, LikelySet, NamedCause, NextReport, OutlyingRunReport,
+    ParameterReport, ProfileReport, SeparationReport, SetReport, SignatureReport, VerdictClass,
 };
 use super::profile::Profile;
 use super::subject::Setting;
@@ -18,6 +20,9 @@ const SEPARATED_SETS: usize = 6;
 /// How far the edges of an interval may differ from those of a quadratic likelihood, as a share of their distance from
 /// the fit, before the profile takes their place.
 const AGREE: f64 = 0.2;
+
+/// A change of the prediction below this share of the scatter is not seen in single rows.
+const NEGLIGIBLE: f64 = 0.5;
 
 /// What the verdict is made of.
 pub(super) struct View<'a> {
@@ -61,12 +66,7 @@ impl<'a> View<'a> {
     }
 
     pub(super) fn class(&self) -> VerdictClass {
-        match self.weighing.verdict {
-            Verdict::Adequate => VerdictClass::Adequate,
-            Verdict::Named(_) => VerdictClass::Named,
-            Verdict::Confounded(_) => VerdictClass::Confounded,
-            Verdict::Unknown(_) => VerdictClass::Unknown,
-        }
+        class_of(&self.weighing.verdict)
     }
 
     /// The set whose causes are named.
@@ -85,14 +85,75 @@ impl<'a> View<'a> {
         self.leading().map_or_else(Vec::new, |set| self.set(set))
     }
 
+    /// What each cause that is named changes, and the collinearity of all of them.
+    pub(super) fn contributions(
+        &self,
+        negligible_below: Option<f64>,
+    ) -> Result<(Vec<ContributionReport>, Option<f64>), Failure> {
+        let Some(set) = self.leading().filter(|set| !set.members.is_empty()) else { return Ok((Vec::new(), None)) };
+        let foundation = self.weighing.foundation;
+        let whole = foundation.subject.predict(&set.settings)?;
+        let report = |member: usize| {
+            let others: Vec<Setting> =
+                (0..set.settings.len()).filter(|k| *k != member).map(|k| set.settings[k].clone()).collect();
+            let without = if others.is_empty() {
+                foundation.subject.predict(&[])?
+            } else {
+                foundation.subject.predict(&others)?
+            };
+            let kept = (0..whole.len()).filter(|&row| self.weighing.keep[row]);
+            let changes = kept.filter_map(|row| Some(whole[row].ok()? - without[row].ok()?));
+            let (sum, count) = changes.fold((0.0, 0.0), |(sum, count), change| (sum + change * change, count + 1.0));
+            let change_rms = if count > 0.0 { f64::sqrt(sum / count) } else { 0.0 };
+            let hypothesis = &self.hypotheses[set.members[member]];
+            let unseen = change_rms < NEGLIGIBLE * self.weighing.noise.sigma;
+            Ok(ContributionReport {
+                kind: hypothesis.cause.kind.to_owned(),
+                label: hypothesis.label.clone(),
+                change_rms,
+                negligible: unseen && negligible_below.is_some_and(|limit| change_rms < limit),
+            })
+        };
+        let all = (0..set.settings.len()).map(report).collect::<Result<Vec<_>, Failure>>()?;
+        let signature = Signature::of(self.weighing, &set.members, &set.settings)?;
+        let collinearity = if all.len() > 1 { signature.collinearity() } else { None };
+        Ok((all, collinearity))
+    }
+
+    /// Runs that the others do not lead one to expect.
+    pub(super) fn outlying(&self, gain: Option<&Gain>) -> Vec<OutlyingRunReport> {
+        let kinds = |members: &Vec<usize>| members.iter().map(|&h| self.kind(h).to_owned()).collect::<Vec<_>>();
+        let report = |odd: &OutlyingRun| OutlyingRunReport {
+            run: u32::try_from(odd.run + 1).unwrap_or(u32::MAX),
+            misfit_per_row: odd.misfit_per_row,
+            verdict_without: class_of(&odd.without),
+            sets_without: match &odd.without {
+                Verdict::Adequate => Vec::new(),
+                Verdict::Named(members) | Verdict::Unknown(members) => vec![kinds(members)],
+                Verdict::Confounded(sets) => sets.iter().map(kinds).collect(),
+            },
+        };
+        gain.map_or_else(Vec::new, |gain| gain.outlying.iter().map(report).collect())
+    }
+
     pub(super) fn likely_sets(&self) -> Vec<LikelySet> {
         let Verdict::Confounded(likely) = &self.weighing.verdict else { return Vec::new() };
         let sets = likely.iter().filter_map(|members| self.weighing.named_sets().find(|set| set.members == *members));
         sets.map(|set| LikelySet { causes: self.set(set), posterior: set.posterior }).collect()
     }
 
-    pub(super) fn set_report(&self, set: &SetWeight) -> SetReport {
-        SetReport { causes: self.set(set), posterior: set.posterior, with_remainder: set.remainder.is_some() }
+    pub(super) fn set_report(&self, set: &SetWeight, gain: Option<&Gain>) -> SetReport {
+        let held_out = |gain: &Gain| match set.members.as_slice() {
+            [] => Some(gain.rmse_base),
+            members => gain.of_sets.iter().find(|(of, _)| of == members).map(|(_, rmse)| *rmse),
+        };
+        SetReport {
+            causes: self.set(set),
+            posterior: set.posterior,
+            with_remainder: set.remainder.is_some(),
+            bic: self.weighing.bic(set),
+            held_out_rmse: gain.filter(|_| set.remainder.is_none()).and_then(held_out),
+        }
     }
 
     fn set(&self, set: &SetWeight) -> Vec<NamedCause> {
@@ -237,6 +298,15 @@ impl<'a> View<'a> {
             .map(|signature| SignatureReport { causes: kinds(&signature.members), change: signature.change })
             .collect();
         Ok((changes, apart))
+    }
+}
+
+fn class_of(verdict: &Verdict) -> VerdictClass {
+    match verdict {
+        Verdict::Adequate => VerdictClass::Adequate,
+        Verdict::Named(_) => VerdictClass::Named,
+        Verdict::Confounded(_) => VerdictClass::Confounded,
+        Verdict::Unknown(_) => VerdictClass::Unknown,
     }
 }
 

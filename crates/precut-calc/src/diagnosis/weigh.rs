@@ -1,7 +1,7 @@
 //! From rows to posterior weights and a verdict (`diagnosis/3.5`, `diagnosis/3.7`).
 
 use super::discrepancy::{self, Kind, Remainder};
-use super::evidence::{Scale, Side, log_sum_exp};
+use super::evidence::{Normal, Scale, Side, log_sum_exp};
 use super::foundation::Foundation;
 use super::noise::Noise;
 use super::profile::{Profile, Profiler};
@@ -139,7 +139,7 @@ impl<'a> Weighing<'a> {
         monitor: &dyn Monitor,
     ) -> Result<Self, Failure> {
         let Foundation { subject, data, residual, nuisances, signatures, .. } = foundation;
-        let noise = Noise::of(data, residual, &keep);
+        let noise = Noise::of(data, residual, &keep, foundation.heavy_tails.as_deref());
         let whitener = Whitener::new(data, &noise, nuisances, &keep);
         let scale = Scale::of(&noise);
         let linear = Linear::new(subject.hypotheses(), signatures, &whitener, residual, scale);
@@ -209,6 +209,16 @@ impl<'a> Weighing<'a> {
         Profiler { refinement: &refinement, fit, dear }.profiles(&free, reach, monitor)
     }
 
+    /// n ln(RSS/n) + k ln n of a set without a remainder, RSS whitened and at the fit without priors. Where it has a
+    /// remainder its sizes are as many as one likes, and there is none.
+    pub(super) fn bic(&self, set: &SetWeight) -> Option<f64> {
+        let candidate = self.ranking.candidates.iter().find(|candidate| candidate.members == set.members)?;
+        let (columns, residual, _) = self.ranking.parts(&self.linear, candidate);
+        let misfit = Normal::of(&columns, &residual).misfit().max(f64::MIN_POSITIVE);
+        let rows = self.linear.rows;
+        set.remainder.is_none().then(|| rows * (misfit / rows).ln() + columns.len() as f64 * rows.ln())
+    }
+
     /// Standard deviation of a measured row about the prediction of a set: scatter, allowances, and what the fitted
     /// values leave open. `None` where the set was not refined.
     pub fn deviation(&self, set: &SetWeight) -> Option<Vec<f64>> {
@@ -240,6 +250,12 @@ impl<'a> Weighing<'a> {
         let sigma = self.noise.per_row.as_ref().map_or(self.noise.sigma, |own| own[row]);
         let allowed: f64 = self.foundation.nuisances.iter().map(|column| column[row] * column[row]).sum();
         sigma * sigma + allowed
+    }
+
+    /// Rows of a run that count.
+    pub(super) fn rows_of_run(&self, run: usize) -> Vec<usize> {
+        let sweeps = self.foundation.data.layout.kept_traces(&self.keep);
+        sweeps.into_iter().filter(|(of, _)| *of == run).flat_map(|(_, rows)| rows).collect()
     }
 
     /// Sets without a remainder, heaviest first.

@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::calculator::{
-    Cost, Design, Diagnosable, Example, Failure, Finding, ForwardModel, Hypotheses, Hypothesis, JacobianColumn,
-    Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Rows,
+    Consequence, Cost, Design, Diagnosable, Example, Failure, Finding, ForwardModel, Hypotheses, Hypothesis,
+    JacobianColumn, Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows,
 };
 use crate::effects::{
     Cause, FactorLevel, MACHINABILITY_CAUSES, MachinabilityConditions, MachinabilityEffect as Effect,
@@ -15,6 +15,7 @@ use crate::machinability::{MachinabilityModel, ModelForm};
 use super::FeedSchedule;
 use super::acting::ActingModel;
 use super::conditions::with_conditions;
+use super::consequence::consequences;
 use super::design::{MOST_FOLDS, design};
 use super::hypotheses::expansions;
 use super::input::{Job, Reference};
@@ -118,6 +119,8 @@ impl ForwardModel for FeedSchedule {
 
     const CAUSES: &'static [Cause] = MACHINABILITY_CAUSES;
     const QUANTITIES: &'static [Quantity] = QUANTITIES;
+    const CONDITIONS: &'static [&'static str] =
+        &["speed_m_per_min", "feed_mm_per_rev", "depth_mm", "time_min", "flank_wear_mm"];
 
     fn prepare(
         job: &Job,
@@ -217,10 +220,21 @@ impl Diagnosable for FeedSchedule {
     fn next_runs(
         job: &Job,
         rows: &Rows<MachinabilityRun, MachinabilityPoint>,
+        ranges: Ranges<'_>,
     ) -> Vec<NextRun<MachinabilityRun, MachinabilityPoint>> {
         let cuts: Vec<Row> =
             rows.points.iter().filter_map(|(run, point)| row(job, rows.runs.get(*run)?, point).ok()).collect();
-        next_runs(&cuts)
+        next_runs(&cuts, ranges)
+    }
+
+    fn consequences(
+        job: &Job,
+        quantity: &str,
+        runs: &[MachinabilityRun],
+        believed: &[Effect],
+        acting: &[Vec<Effect>],
+    ) -> Result<Vec<Consequence>, Failure> {
+        consequences(job, quantity, runs, believed, acting)
     }
 
     fn folds(rows: usize, _runs: usize) -> usize {

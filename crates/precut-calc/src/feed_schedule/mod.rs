@@ -22,6 +22,7 @@ mod check;
 mod compensated;
 mod compliance;
 mod conditions;
+mod consequence;
 mod continuous;
 mod design;
 mod effects;

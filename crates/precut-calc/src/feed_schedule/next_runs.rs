@@ -1,18 +1,16 @@
 //! Cuts that could be made and measured next to tell causes apart.
 
-use crate::calculator::NextRun;
+use crate::calculator::{NextRun, Ranges};
 
 use super::forward::{MachinabilityPoint, MachinabilityRun, Row};
 use super::hypotheses::condition;
 
-/// How far beyond the observed range of a condition a next cut may go, on either side.
-const WIDENED: f64 = 1.5;
 /// Repeats of a next cut.
 const REPEATS: usize = 4;
 
-/// A regime in the middle with one or two conditions at an end of their widened ranges, and a fresh or a worn edge in a
+/// A regime in the middle with one or two conditions at an end of their ranges, and a fresh or a worn edge in a
 /// light or a heavy cut.
-pub(super) fn next_runs(rows: &[Row]) -> Vec<NextRun<MachinabilityRun, MachinabilityPoint>> {
+pub(super) fn next_runs(rows: &[Row], ranges: Ranges<'_>) -> Vec<NextRun<MachinabilityRun, MachinabilityPoint>> {
     let Some(typical) = typical(rows) else { return Vec::new() };
     let mut next = Vec::new();
     let mut add = |changes: &'static str, moved: &[(&str, f64)]| {
@@ -22,7 +20,7 @@ pub(super) fn next_runs(rows: &[Row]) -> Vec<NextRun<MachinabilityRun, Machinabi
         }
         next.push(NextRun { changes, run, points: vec![MachinabilityPoint::default(); REPEATS] });
     };
-    let ends = |field: &str| ends(rows, field);
+    let ends = |field: &str| ranges.ends(field, rows.iter().filter_map(|row| condition(row, field)));
     for field in ["speed_m_per_min", "feed_mm_per_rev", "depth_mm", "time_min"] {
         for end in ends(field).into_iter().flatten() {
             add(field, &[(field, end)]);
@@ -82,12 +80,4 @@ fn set(run: &mut MachinabilityRun, field: &str, value: f64) {
         _ => &mut run.time_min,
     };
     *place = Some(value);
-}
-
-/// Both ends of a condition's observed range, widened; `None` where it is not stated.
-fn ends(rows: &[Row], field: &str) -> Option<[f64; 2]> {
-    let values: Vec<f64> = rows.iter().filter_map(|row| condition(row, field)).collect();
-    let low = values.iter().copied().reduce(f64::min)?;
-    let high = values.iter().copied().reduce(f64::max)?;
-    Some([low / WIDENED, high * WIDENED])
 }

@@ -4,13 +4,14 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::calculator::{
-    Cost, Design, Diagnosable, Example, Failure, Finding, ForwardModel, Hypotheses, Hypothesis, JacobianColumn,
-    Monitor, NextRun, Prediction, PrepareError, Quantity, Rows, checkpoint,
+    Consequence, Cost, Design, Diagnosable, Example, Failure, Finding, ForwardModel, Hypotheses, Hypothesis,
+    JacobianColumn, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows, checkpoint,
 };
 use crate::effects::{Cause, FIXTURE_CAUSES, FixtureEffect};
 
 use super::FixtureStability;
 use super::acting::Case;
+use super::consequence::consequences;
 use super::floquet::Working;
 use super::hypotheses::{Experiment, design, effects, expansions};
 use super::input::FixtureJob;
@@ -115,6 +116,7 @@ impl ForwardModel for FixtureStability {
 
     const CAUSES: &'static [Cause] = FIXTURE_CAUSES;
     const QUANTITIES: &'static [Quantity] = QUANTITIES;
+    const CONDITIONS: &'static [&'static str] = &["spindle_speed_rpm", "feed_mm_per_tooth", "depth_mm"];
 
     fn prepare(
         job: &FixtureJob,
@@ -209,8 +211,22 @@ impl Diagnosable for FixtureStability {
         design(prepared)
     }
 
-    fn next_runs(job: &FixtureJob, rows: &Rows<FixtureRun, FixturePoint>) -> Vec<NextRun<FixtureRun, FixturePoint>> {
-        next_runs(job, rows)
+    fn next_runs(
+        job: &FixtureJob,
+        rows: &Rows<FixtureRun, FixturePoint>,
+        ranges: Ranges<'_>,
+    ) -> Vec<NextRun<FixtureRun, FixturePoint>> {
+        next_runs(job, rows, ranges)
+    }
+
+    fn consequences(
+        job: &FixtureJob,
+        _quantity: &str,
+        runs: &[FixtureRun],
+        believed: &[FixtureEffect],
+        acting: &[Vec<FixtureEffect>],
+    ) -> Result<Vec<Consequence>, Failure> {
+        consequences(job, runs, believed, acting)
     }
 
     fn expansions(_prepared: &PreparedFixture, hypothesis: &Hypothesis) -> Vec<f64> {

@@ -13,6 +13,7 @@ mod acting;
 mod advice;
 mod answer;
 mod check;
+mod consequence;
 mod cutting;
 mod drive;
 mod floquet;

@@ -3,37 +3,37 @@
 use super::acting::Case;
 use super::forward::{FixturePoint, FixtureRun};
 use super::input::FixtureJob;
-use crate::calculator::{NextRun, Rows};
+use crate::calculator::{NextRun, Ranges, Rows};
 
-/// How far beyond the observed range of a condition a next run may go, on either side.
-const WIDENED: f64 = 1.5;
 /// Speeds at which a tooth passes once in so many oscillations of a mode, that are tried.
 const LOBES: usize = 4;
 /// Minutes after which a clamped workpiece has settled.
 const SETTLED_MIN: f64 = 60.0;
 
-/// One more run at either end of the widened range of speed, feed and depth, at the speeds near a lobe within that of the
+/// One more run at either end of the range of speed, feed and depth, at the speeds near a lobe within that of the
 /// speed, and long after clamping; the other conditions as in the run in the middle.
 pub(super) fn next_runs(
     job: &FixtureJob,
     rows: &Rows<FixtureRun, FixturePoint>,
+    ranges: Ranges<'_>,
 ) -> Vec<NextRun<FixtureRun, FixturePoint>> {
     let (Some(typical), Some(base)) = (rows.runs.get(rows.runs.len() / 2), Case::of(job)) else { return Vec::new() };
     let points = longest_run(rows);
     let mut next = Vec::new();
     let mut add = |changes, run, points: &[FixturePoint]| next.push(NextRun { changes, run, points: points.to_vec() });
-    let (slowest, fastest) =
-        widened(rows.runs.iter().map(|run| run.spindle_speed_rpm.unwrap_or(base.working.spindle_rpm)));
-    for speed in [slowest, fastest].into_iter().chain(near_lobes(&base, slowest, fastest)) {
-        add("spindle_speed_rpm", FixtureRun { spindle_speed_rpm: Some(speed), ..typical.clone() }, &points);
+    let speeds = rows.runs.iter().map(|run| run.spindle_speed_rpm.unwrap_or(base.working.spindle_rpm));
+    if let Some([slowest, fastest]) = ranges.ends("spindle_speed_rpm", speeds) {
+        for speed in [slowest, fastest].into_iter().chain(near_lobes(&base, slowest, fastest)) {
+            add("spindle_speed_rpm", FixtureRun { spindle_speed_rpm: Some(speed), ..typical.clone() }, &points);
+        }
     }
-    let (thin, thick) = widened(rows.runs.iter().map(|run| run.feed_mm_per_tooth.unwrap_or(base.working.feed_mm)));
-    for feed in [thin, thick] {
+    let feeds = rows.runs.iter().map(|run| run.feed_mm_per_tooth.unwrap_or(base.working.feed_mm));
+    for feed in ranges.ends("feed_mm_per_tooth", feeds).into_iter().flatten() {
         add("feed_mm_per_tooth", FixtureRun { feed_mm_per_tooth: Some(feed), ..typical.clone() }, &points);
     }
     let depths = rows.points.iter().filter_map(|(run, point)| point.depth_mm.or(rows.runs.get(*run)?.depth_mm));
-    let (shallow, deep) = widened(depths.chain([typical.depth_mm.unwrap_or(base.working.depth_mm)]));
-    for depth in [shallow, deep] {
+    let depths = depths.chain([typical.depth_mm.unwrap_or(base.working.depth_mm)]);
+    for depth in ranges.ends("depth_mm", depths).into_iter().flatten() {
         // The points of the new run are all at its depth.
         let there: Vec<FixturePoint> = points.iter().map(|point| FixturePoint { depth_mm: None, ..*point }).collect();
         add("depth_mm", FixtureRun { depth_mm: Some(depth), ..typical.clone() }, &there);
@@ -53,11 +53,6 @@ fn near_lobes(base: &Case, slowest: f64, fastest: f64) -> Vec<f64> {
         (1..=100_u32).map(move |swings| one / f64::from(swings))
     });
     of_mode.filter(|speed| (slowest..=fastest).contains(speed)).take(LOBES).collect()
-}
-
-fn widened(values: impl Iterator<Item = f64>) -> (f64, f64) {
-    let (low, high) = values.fold((f64::INFINITY, 0.0_f64), |(low, high), v| (low.min(v), high.max(v)));
-    (low / WIDENED, high * WIDENED)
 }
 
 /// Places of the run with the most rows.

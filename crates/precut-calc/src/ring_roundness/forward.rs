@@ -8,7 +8,7 @@ use utoipa::ToSchema;
 
 use crate::calculator::{
     Check, Cost, Design, Diagnosable, Example, Failure, Finding, ForwardModel, Hypotheses, Hypothesis, JacobianColumn,
-    Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Rows, Violations, checkpoint,
+    Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows, Violations, checkpoint,
 };
 use crate::effects::{Cause, RING_CAUSES, RingEffect};
 
@@ -155,6 +155,7 @@ impl ForwardModel for RingRoundness {
 
     const CAUSES: &'static [Cause] = RING_CAUSES;
     const QUANTITIES: &'static [Quantity] = QUANTITIES;
+    const CONDITIONS: &'static [&'static str] = &["spark_out_revolutions"];
 
     fn prepare(
         job: &Job,
@@ -268,8 +269,8 @@ impl Diagnosable for RingRoundness {
         design(&prepared.places)
     }
 
-    fn next_runs(job: &Job, rows: &Rows<RingRun, RingPoint>) -> Vec<NextRun<RingRun, RingPoint>> {
-        next_runs(job, rows)
+    fn next_runs(job: &Job, rows: &Rows<RingRun, RingPoint>, ranges: Ranges<'_>) -> Vec<NextRun<RingRun, RingPoint>> {
+        next_runs(job, rows, ranges)
     }
 
     fn expansions(_prepared: &PreparedRing, hypothesis: &Hypothesis) -> Vec<f64> {

@@ -2,7 +2,7 @@
 
 use super::forward::{RingPoint, RingRun};
 use super::input::Job;
-use crate::calculator::{NextRun, Rows};
+use crate::calculator::{NextRun, Ranges, Rows};
 
 /// Revolutions that a longer spark-out has more.
 const LONGER_SPARK_OUT: f64 = 3.0;
@@ -13,7 +13,11 @@ const ANGLES: u32 = 180;
 
 /// Another ring with one setting of the machine changed: no spark-out and a longer one, half the feed over twice the
 /// revolutions, the tool moved across its own direction to either side.
-pub(super) fn next_runs(job: &Job, rows: &Rows<RingRun, RingPoint>) -> Vec<NextRun<RingRun, RingPoint>> {
+pub(super) fn next_runs(
+    job: &Job,
+    rows: &Rows<RingRun, RingPoint>,
+    ranges: Ranges<'_>,
+) -> Vec<NextRun<RingRun, RingPoint>> {
     let typical = rows.runs.first().cloned().unwrap_or_default();
     let points: Vec<RingPoint> =
         (0..ANGLES).map(|k| RingPoint { angle_deg: 360.0 * f64::from(k) / f64::from(ANGLES) }).collect();
@@ -21,10 +25,12 @@ pub(super) fn next_runs(job: &Job, rows: &Rows<RingRun, RingPoint>) -> Vec<NextR
     let mut next = Vec::new();
     let mut add = |changes, run| next.push(NextRun { changes, run, points: points.clone() });
     let spark_out = |revolutions| RingRun { spark_out_revolutions: Some(revolutions), ..typical.clone() };
-    if tool.spark_out_revolutions > 0.0 {
-        add("spark_out_revolutions", spark_out(0.0));
+    let other = [0.0, tool.spark_out_revolutions + LONGER_SPARK_OUT];
+    for revolutions in ranges.stated("spark_out_revolutions").unwrap_or(other) {
+        if (revolutions - tool.spark_out_revolutions).abs() > 0.0 {
+            add("spark_out_revolutions", spark_out(revolutions));
+        }
     }
-    add("spark_out_revolutions", spark_out(tool.spark_out_revolutions + LONGER_SPARK_OUT));
     add(
         "feed_mm_per_rev",
         RingRun {

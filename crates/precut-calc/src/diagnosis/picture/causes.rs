@@ -30,6 +30,10 @@ const CONDITIONS: &[&str] = &[
     "time_min",
 ];
 
+/// What decisions are judged by, with the unit.
+const OUTCOMES: &[(&str, &str)] =
+    &[("form_error_um", "um"), ("largest_error_um", "um"), ("limit_use", "1"), ("depth_margin_percent", "percent")];
+
 /// A cause's own name where the catalogue has it: pictures take words that live as long as the program.
 fn kind_of<M: Diagnosable>(kind: &str) -> &'static str {
     M::CAUSES.iter().find(|cause| cause.kind == kind).map_or("diagnosis_candidate", |cause| cause.kind)
@@ -122,6 +126,34 @@ pub(super) fn held_back<E: ToSchema, R: ToSchema>(
     ];
     let y = Axis::linear("diagnosis_error", unit);
     Some(figure("held_back", "diagnosis_held_back", Axis::linear("diagnosis_model", "1"), vec![panel(y, items)]))
+}
+
+/// What comes of deciding with either model, an outcome in each panel.
+pub(super) fn downstream<E: ToSchema, R: ToSchema>(output: &DiagnosisResult<E, R>) -> Option<Figure> {
+    let panels: Vec<Panel> = output
+        .downstream
+        .iter()
+        .filter_map(|downstream| {
+            let (name, unit) = *OUTCOMES.iter().find(|(name, _)| *name == downstream.outcome)?;
+            let bar = |name, x, y, role| Item::Bars { name, x: vec![x], y: vec![Some(y)], role };
+            let spread = |x: f64, [low, high]: [f64; 2]| Item::Line {
+                name: "diagnosis_interval",
+                x: vec![x, x],
+                y: vec![Some(low), Some(high)],
+                role: Role::Plain,
+            };
+            let (base, extended) = (&downstream.base, &downstream.extended);
+            let items = vec![
+                bar("diagnosis_base_residual", 1.0, base.mean, Role::Before),
+                bar("diagnosis_extended_residual", 2.0, extended.mean, Role::After),
+                spread(1.0, base.interval_95),
+                spread(2.0, extended.interval_95),
+            ];
+            Some(panel(Axis::linear(name, unit), items))
+        })
+        .collect();
+    (!panels.is_empty())
+        .then(|| figure("downstream", "diagnosis_downstream", Axis::linear("diagnosis_decided_with", "1"), panels))
 }
 
 /// What every run that could be measured next would part, as the power of ten of the Bayes factor to be expected.

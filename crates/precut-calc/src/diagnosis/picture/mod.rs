@@ -20,6 +20,7 @@ pub(super) const FIGURE_IDS: &[&str] = &[
     "separations",
     "profiles",
     "held_back",
+    "downstream",
     "next_measurement",
     "remainder",
     "remainder_spectrum",
@@ -35,6 +36,7 @@ pub(super) const LABEL_CODES: &[&str] = &[
     "diagnosis_separations",
     "diagnosis_profiles",
     "diagnosis_held_back",
+    "diagnosis_downstream",
     "diagnosis_next_measurement",
     "diagnosis_remainder",
     "diagnosis_remainder_spectrum",
@@ -69,6 +71,7 @@ pub(super) const LABEL_CODES: &[&str] = &[
     "diagnosis_model",
     "diagnosis_ceiling",
     "diagnosis_interval",
+    "diagnosis_decided_with",
     "diagnosis_candidate",
     "diagnosis_candidate_rank",
     "diagnosis_bayes_factor",
@@ -88,6 +91,7 @@ pub(super) fn figures<M: Diagnosable>(quantity: &str, output: &DiagnosisResult<M
     all.extend(causes::separations(output));
     all.extend(causes::profiles::<M>(output));
     all.extend(causes::held_back(output, unit));
+    all.extend(causes::downstream(output));
     all.extend(causes::next_measurement(output));
     all.extend(rows::remainder(output, unit));
     all

@@ -1,0 +1,319 @@
+//! What an extended model is worth, what speaks against it, and what the user may ask of a diagnosis.
+#![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
+
+use precut_calc::calculator::{
+    Allowed, Answer, Calculator, Check, ConditionRange, Diagnosable, ForwardModel, Ranges, Rows, Unwatched, Violations,
+};
+use precut_calc::deflection_compensation::{DeflectionCompensation, DeflectionPoint, DeflectionRun, Job};
+use precut_calc::diagnosis::{Diagnosis, ResultOf, VerdictClass};
+use precut_calc::effects::{DeflectionEffect, FixtureEffect, MachinabilityEffect};
+use precut_calc::feed_schedule::FeedSchedule;
+use precut_calc::fixture_stability::FixtureStability;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use serde_json::{Value, json};
+
+/// A checked and filled job.
+fn job<C: Calculator>(value: Value) -> C::Input {
+    let mut job: C::Input = serde_json::from_value(value).unwrap();
+    let mut violations = Violations::default();
+    job.check(&mut violations);
+    assert_eq!(violations.into_vec(), []);
+    C::fill(&mut job);
+    job
+}
+
+fn answered(value: &Value) -> Answer<ResultOf<DeflectionCompensation>> {
+    let job = job::<Diagnosis<DeflectionCompensation>>(value.clone());
+    Diagnosis::<DeflectionCompensation>::run(&job, &Unwatched).unwrap()
+}
+
+fn headstock() -> Value {
+    serde_json::from_str(DeflectionCompensation::DIAGNOSES[0].job).unwrap()
+}
+
+fn warned(answer: &Answer<ResultOf<DeflectionCompensation>>, code: &str) -> bool {
+    answer.warnings.iter().any(|warning| warning.code == code)
+}
+
+const SIGMA_UM: f64 = 0.6;
+
+/// The example's shaft and runs, `sweeps` times over twenty places in each (or as many as are told), as the base model predicts it with a normal
+/// scatter, and `extra(run, place, sweep, predicted)` on top.
+fn measured(sweeps: usize, seed: u64, extra: impl Fn(usize, f64, usize, f64) -> f64) -> Value {
+    measured_on(headstock(), (sweeps, 20), seed, extra)
+}
+
+fn measured_on(
+    mut value: Value,
+    (sweeps, places): (usize, u32),
+    seed: u64,
+    extra: impl Fn(usize, f64, usize, f64) -> f64,
+) -> Value {
+    let base: Job = job::<DeflectionCompensation>(value["job"].clone());
+    let runs: Vec<DeflectionRun> = serde_json::from_value(value["runs"].clone()).unwrap();
+    let places: Vec<f64> = (0..places).map(|k| 15.0 + 540.0 * f64::from(k) / f64::from(places - 1)).collect();
+    let mut at = Vec::new();
+    for run in 0..runs.len() {
+        for sweep in 0..sweeps {
+            at.extend(places.iter().map(|z| (run, sweep, *z)));
+        }
+    }
+    let points = at.iter().map(|(run, _, z)| (*run, DeflectionPoint { z_mm: *z })).collect();
+    let rows = Rows { runs, points };
+    let prepared = DeflectionCompensation::prepare(&base, &rows, "diameter_deviation_um", &Unwatched).unwrap();
+    let predicted = DeflectionCompensation::predict(&prepared, &[]).unwrap();
+    let mut random = Pcg64::seed_from_u64(seed);
+    // The sum of twelve uniform numbers: normal to 4 standard deviations.
+    let mut normal = || (0..12).map(|_| random.random_range(0.0..1.0)).sum::<f64>() - 6.0;
+    let rows = at.iter().zip(predicted).map(|((run, sweep, z), predicted)| {
+        let predicted = predicted.unwrap();
+        let value = predicted + extra(*run, z / 570.0, *sweep, predicted) + SIGMA_UM * normal();
+        json!({ "run": run + 1, "trace": sweep + 1, "z_mm": z, "diameter_deviation_um": value })
+    });
+    value["measurements"] = rows.collect();
+    value
+}
+
+#[test]
+fn a_path_that_leaves_out_an_error_of_the_machine_leaves_it_on_the_shaft() {
+    let job = job::<DeflectionCompensation>(headstock()["job"].clone());
+    let runs: Vec<DeflectionRun> = serde_json::from_value(headstock()["runs"].clone()).unwrap();
+    let judged = |believed: &[DeflectionEffect], acting: DeflectionEffect| {
+        let of = DeflectionCompensation::consequences(&job, "", &runs, believed, &[vec![acting]]).unwrap();
+        (of[0].values[0].unwrap(), of[1].values[0].unwrap())
+    };
+    let taper = DeflectionEffect::TailstockOffset { offset_um: 10.0 };
+    // The gap opens by 10 um on the radius at one end. The lighter cut gives back the share C dF/dt: there, of 0.056 um/N
+    // and 266 N/mm (0.9 of the force at 1 mm), 1.5 %.
+    let (form, largest) = judged(&[], taper.clone());
+    assert!((19.6..=20.0).contains(&form), "{form}");
+    assert!((19.6..=20.0).contains(&largest), "{largest}");
+    // Known, it is compensated: what is left is the path between its 65 places.
+    let (form, largest) = judged(std::slice::from_ref(&taper), taper.clone());
+    assert!(form < 0.01 && largest < 0.01, "{form} {largest}");
+    // A wrong size is no error of form, but for what the lighter cut gives back in the middle: with L^3/(48 E I) = 0.36 um/N
+    // and the supports' 0.05, 11 %.
+    let (form, largest) = judged(&[], DeflectionEffect::SizeOffset { offset_um: 10.0 });
+    assert!(form < 2.2 && (19.6..=20.0).contains(&largest), "{form} {largest}");
+}
+
+#[test]
+fn a_depth_chosen_for_too_soft_a_material_chatters_by_the_ratio_of_the_forces() {
+    let value: Value = serde_json::from_str(FixtureStability::DIAGNOSES[0].job).unwrap();
+    let job = job::<FixtureStability>(value["job"].clone());
+    let acting = vec![vec![FixtureEffect::ForceCoefficient { factor: 1.25 }], Vec::new()];
+    let judged = FixtureStability::consequences(&job, "peak_to_peak_um", &[], &[], &acting).unwrap();
+    // The limit is where Cp H^(1-mu) reaches a value, and this job has mu = 0; found to 1e-4 of the depth.
+    let margin = |k: usize| judged[0].values[k].unwrap();
+    assert!((margin(0) + 20.0).abs() < 0.03, "{}", margin(0));
+    assert!(margin(1).abs() < 1e-9);
+    assert_eq!(judged[0].allowed, Some(Allowed::AtLeast(0.0)));
+}
+
+#[test]
+fn a_schedule_made_with_too_smooth_a_model_oversteps_its_roughness_by_the_shift() {
+    let paper = FeedSchedule::META.examples.iter().find(|example| example.id == "paper").unwrap();
+    let mut value: Value = serde_json::from_str(paper.job).unwrap();
+    for zone in value["zones"].as_array_mut().unwrap() {
+        // Roughness alone limits the feed.
+        zone["roughness_max_um"] = json!(2.0);
+        zone["deflection_max_um"] = json!(1000.0);
+    }
+    let job = job::<FeedSchedule>(value);
+    let shift = MachinabilityEffect::LevelShift { delta_ln: 0.2, output: Some("roughness".to_owned()) };
+    let used = |believed: &[MachinabilityEffect]| {
+        let acting = [vec![shift.clone()]];
+        FeedSchedule::consequences(&job, "roughness_um", &[], believed, &acting).unwrap()[0].values[0].unwrap()
+    };
+    // The programme is solved to 1e-8 of its objective; a limit that binds holds to some 1e-6.
+    assert!((used(&[]) - 0.2_f64.exp()).abs() < 1e-4, "{}", used(&[]));
+    assert!((used(std::slice::from_ref(&shift)) - 1.0).abs() < 1e-4);
+}
+
+#[test]
+fn the_example_says_what_its_model_saves_on_the_next_shaft() {
+    let answer = answered(&headstock());
+    let [form, largest] = &answer.output.downstream[..] else { panic!("{:?}", answer.output.downstream) };
+    assert_eq!((form.outcome.as_str(), largest.outcome.as_str()), ("form_error_um", "largest_error_um"));
+    for of in [form, largest] {
+        assert!(of.extended.mean < 0.3 * of.base.mean, "{of:?}");
+        assert!(of.extended.interval_95[0] <= of.extended.mean && of.extended.mean <= of.extended.interval_95[1]);
+        assert_eq!(of.base.share_allowed, None);
+    }
+    assert!(answer.explanation.iter().any(|said| said.code == "diagnosis_downstream"));
+    // A tolerance between both: the base breaks it, the extended model keeps it.
+    let mut with_tolerance = headstock();
+    with_tolerance["job"]["tolerance"] = json!({ "form_um": f64::midpoint(form.base.mean, form.extended.mean) });
+    let form = answered(&with_tolerance).output.downstream[0].clone();
+    assert!(form.base.share_allowed.unwrap() < 0.1 && form.extended.share_allowed.unwrap() > 0.9, "{form:?}");
+}
+
+#[test]
+fn the_information_criterion_is_that_of_whitened_least_squares() {
+    // Stated scatter and no allowances: whitened residuals are residuals over the scatter.
+    let of_seed = |seed| {
+        // With shear: else what it leaves out stands among the allowances.
+        let mut with_shear = headstock();
+        with_shear["job"]["shaft"]["theory"] = json!("timoshenko");
+        let mut value = measured_on(with_shear, (1, 20), seed, |_, _, _, _| 0.0);
+        for row in value["measurements"].as_array_mut().unwrap() {
+            row["uncertainty_um"] = json!(SIGMA_UM);
+        }
+        value["allowances"] = json!({ "force_level_rel": 0.0, "force_per_run_rel": 0.0, "bending_rel": 0.0,
+                                      "setup_diameter_um": 0.0, "gauge_position_mm": 0.0 });
+        answered(&value)
+    };
+    // The first whose rows show no correlation: else neighbours are whitened together.
+    let answer = (1..20).map(of_seed).find(|answer| answer.output.noise.correlation <= 0.0).unwrap();
+    let base = answer.output.sets.iter().find(|set| set.causes.is_empty() && !set.with_remainder).unwrap();
+    let rows = &answer.output.rows;
+    let n = rows.row.len() as f64;
+    let squares = rows.measured.iter().zip(&rows.base).map(|(y, f)| ((y - f.unwrap()) / SIGMA_UM).powi(2)).sum::<f64>();
+    let expected = n * (squares / n).ln();
+    assert!((base.bic.unwrap() - expected).abs() < 1e-9 * expected.abs().max(1.0), "{:?} {expected}", base.bic);
+    // One more size of no use costs ln n, less what it fits by chance.
+    for set in answer.output.sets.iter().filter(|set| set.causes.len() == 1 && !set.with_remainder) {
+        assert!(set.bic.unwrap() > expected - 6.0 && set.bic.unwrap() < expected + 3.0 * n.ln(), "{set:?}");
+    }
+}
+
+#[test]
+fn weights_of_causes_turn_the_odds_by_their_ratio() {
+    let odds = |weight: f64| {
+        let mut value = headstock();
+        value["options"] = json!({ "held_out": false, "most_causes": 1,
+            "causes": ["headstock_compliance", "hardness_gradient"],
+            "prior_weights": [{ "kind": "hardness_gradient", "weight": weight }] });
+        let answer = answered(&value);
+        let single = |kind: &str| {
+            let of = |set: &&precut_calc::diagnosis::SetReport| {
+                set.causes.len() == 1 && set.causes[0].kind == kind && !set.with_remainder
+            };
+            answer.output.sets.iter().find(of).unwrap().posterior
+        };
+        single("hardness_gradient") / single("headstock_compliance")
+    };
+    let ratio = odds(4.0) / odds(1.0);
+    assert!((ratio / 4.0 - 1.0).abs() < 1e-9, "{ratio}");
+}
+
+#[test]
+fn a_run_that_the_others_do_not_lead_one_to_expect_is_told_with_the_verdict_without_it() {
+    let odd = |run: usize, place: f64| if run == 2 { 25.0 * (place - 0.5) } else { 0.0 };
+    let answer = answered(&measured(2, 11, |run, place, _, _| odd(run, place)));
+    let [found] = &answer.output.outlying_runs[..] else { panic!("{:?}", answer.output.outlying_runs) };
+    assert_eq!((found.run, found.verdict_without), (3, VerdictClass::Adequate));
+    assert!(found.misfit_per_row > 10.0 && warned(&answer, "outlying_run"));
+    let clean = answered(&measured(2, 11, |_, _, _, _| 0.0));
+    assert!(clean.output.outlying_runs.is_empty() && clean.output.verdict == VerdictClass::Adequate);
+}
+
+#[test]
+fn structure_that_all_sweeps_share_is_no_scatter() {
+    // Twelve waves along the shaft, in all sweeps: finer than what is taken out for smooth.
+    let waves = |place: f64| 6.0 * (2.0 * std::f64::consts::PI * 7.5 * place).sin();
+    let answer = answered(&measured(4, 3, |_, place, _, _| waves(place)));
+    let noise = &answer.output.noise;
+    let between = noise.between_sweeps.unwrap();
+    // 5 runs x 3 x 19 differences: 6 % for one standard deviation.
+    assert!((noise.between_sweeps_degrees_of_freedom.unwrap() - 285.0).abs() < 1e-9);
+    assert!((between / SIGMA_UM - 1.0).abs() < 0.18, "{between}");
+    assert!(noise.standard_deviation > 3.0 * between && warned(&answer, "finer_structure"));
+    let clean = answered(&measured(4, 3, |_, _, _, _| 0.0));
+    assert!(!warned(&clean, "finer_structure"), "{:?}", clean.output.noise);
+}
+
+#[test]
+fn a_remainder_says_where_it_jumps_and_whether_it_goes_with_the_force() {
+    let step = |place: f64| if place > 0.62 { 9.0 } else { 0.0 };
+    let mut value = measured(2, 7, |_, place, _, _| step(place));
+    // Causes that imitate part of it are left out.
+    value["options"] = json!({ "causes": ["size_offset"] });
+    let answer = answered(&value);
+    let remainder = answer.output.remainder.as_ref().unwrap();
+    let found = remainder.step.as_ref().unwrap();
+    // Places lie a twentieth apart.
+    assert!((found.place - 0.62).abs() < 0.06, "{found:?}");
+    // The line beside it takes a share of so short a step's size only by chance: 200 rows, half on either side.
+    assert!((found.size - 9.0).abs() < 1.0 && found.log_likelihood > 50.0, "{found:?}");
+    let (slope, deviation) =
+        (remainder.proportional_to_base.unwrap(), remainder.proportional_to_base_deviation.unwrap());
+    assert!(slope.abs() < 4.0 * deviation, "{slope} {deviation}");
+    // A soft spot gives way with the force.
+    let spot = |place: f64, predicted: f64| 0.3 * predicted * (-((place - 0.3) / 0.07).powi(2)).exp();
+    let answer = answered(&measured(2, 7, |_, place, _, predicted| spot(place, predicted)));
+    let remainder = answer.output.remainder.as_ref().unwrap();
+    let (slope, deviation) =
+        (remainder.proportional_to_base.unwrap(), remainder.proportional_to_base_deviation.unwrap());
+    assert!((slope - 1.0).abs() < 4.0 * deviation.max(0.05) && slope > 4.0 * deviation, "{slope} {deviation}");
+}
+
+#[test]
+fn what_is_too_small_to_matter_is_said_to_be() {
+    // Many rows make a small error sure.
+    let value = measured(12, 21, |_, place, _, _| 1.6 * (place - 0.5));
+    let mut asked = value.clone();
+    asked["options"] = json!({ "held_out": false, "negligible_below": 1.0 });
+    asked["allowances"]["setup_diameter_um"] = json!(0.05);
+    let answer = answered(&asked);
+    assert_ne!(answer.output.verdict, VerdictClass::Adequate);
+    for contribution in &answer.output.contributions {
+        let small = contribution.change_rms < 0.5 * answer.output.noise.standard_deviation;
+        assert_eq!(contribution.negligible, small && contribution.change_rms < 1.0, "{contribution:?}");
+    }
+    // The example's headstock matters.
+    let [headstock] = &answered(&headstock()).output.contributions[..] else { panic!() };
+    assert!(!headstock.negligible && headstock.change_rms > 1.0);
+}
+
+#[test]
+fn next_runs_keep_to_the_ranges_that_are_stated() {
+    let value = headstock();
+    let base: Job = job::<DeflectionCompensation>(value["job"].clone());
+    let runs: Vec<DeflectionRun> = serde_json::from_value(value["runs"].clone()).unwrap();
+    let rows = Rows { runs, points: vec![(0, DeflectionPoint { z_mm: 100.0 })] };
+    let depths = |ranges: &[ConditionRange]| -> Vec<f64> {
+        let next = DeflectionCompensation::next_runs(&base, &rows, Ranges(ranges));
+        next.into_iter().filter(|run| run.changes == "depth_mm").filter_map(|run| run.run.depth_mm).collect()
+    };
+    // Observed 0.3 to 1.2 mm.
+    assert_eq!(depths(&[]), [0.3 / 1.5, 1.2 * 1.5]);
+    let stated = ConditionRange { condition: "depth_mm".to_owned(), from: 0.4, to: 1.0 };
+    assert_eq!(depths(&[stated]), [0.4, 1.0]);
+    // Faults of ranges and weights are told with all others.
+    let mut wrong = value;
+    wrong["options"] = json!({ "ranges": [{ "condition": "coolant", "from": 1.0, "to": 0.5 }],
+                               "prior_weights": [{ "kind": "gremlins", "weight": 2.0 }] });
+    let wrong: <Diagnosis<DeflectionCompensation> as Calculator>::Input = serde_json::from_value(wrong).unwrap();
+    let mut violations = Violations::default();
+    wrong.check(&mut violations);
+    let found: Vec<(&str, String)> = violations.into_vec().into_iter().map(|f| (f.code, f.pointer)).collect();
+    assert_eq!(
+        found,
+        [
+            ("unknown_cause", "/options/prior_weights/0/kind".to_owned()),
+            ("unknown_condition", "/options/ranges/0/condition".to_owned()),
+            ("range_reversed", "/options/ranges/0/to".to_owned()),
+        ]
+    );
+}
+
+#[test]
+fn rows_far_away_in_great_number_count_little_and_the_cause_is_found_beside_them() {
+    // A taper; and every eleventh row reads 12 um too much or too little.
+    let far = |place: f64, sweep: usize| {
+        let number = ((place - 15.0 / 570.0) * 59.0 * 570.0 / 540.0).round() as usize + 4 * sweep;
+        if number.is_multiple_of(11) { if number.is_multiple_of(2) { 12.0 } else { -12.0 } } else { 0.0 }
+    };
+    let value = measured_on(headstock(), (3, 60), 31, |_, place, sweep, _| 16.0 * place + far(place, sweep));
+    let answer = answered(&value);
+    assert!(warned(&answer, "too_many_outliers"), "{:?}", answer.warnings);
+    assert_eq!(answer.output.verdict, VerdictClass::Named);
+    assert_eq!(answer.output.named[0].kind, "tailstock_offset");
+    let offset = &answer.output.named[0].parameters[0];
+    // 8 um on the radius; the lighter cut gives back 1.5 % (see above), and the set-ups of five runs are 1 um each.
+    assert!((offset.value - 8.1).abs() < 0.7, "{offset:?}");
+    // The scatter is that of the rows that belong together, not of the far ones: 12 um in one of eleven would be 3.6 um.
+    assert!(answer.output.noise.standard_deviation < 2.0 * SIGMA_UM, "{:?}", answer.output.noise);
+}
