@@ -116,7 +116,8 @@ fn open(
     );
     put!(page, "<title>{}</title>\n", Escaped(&(wording.message)(&figure.title)));
     put!(page, "<desc>{}</desc>\n", Escaped(&description(figure, wording)));
-    put!(page, "<style>{}", style::CSS);
+    let has_ribbons = ribbon::any(&figure.panels);
+    put!(page, "<style>{}{}", style::CSS, if has_ribbons { style::RIBBONS } else { "" });
     for diverging in [false, true] {
         if keys.iter().flatten().any(|key| key.diverging == diverging) {
             colour::css(page, diverging);
@@ -126,7 +127,7 @@ fn open(
     if style::has_hatching(figure) {
         put!(page, "{}", style::HATCH);
     }
-    if ribbon::any(&figure.panels) {
+    if has_ribbons {
         put!(page, "{}", ribbon::WEAVES);
     }
     put!(page, "<rect class=\"paper\" width=\"960\" height=\"{height}\"/>\n");

@@ -67,19 +67,11 @@ pub(super) const CSS: &str = "\
 .precut-figure .bars{fill:currentColor;fill-opacity:.85;stroke:currentColor;stroke-width:.8}\
 .precut-figure .bars.nominal,.precut-figure .bars.before,.precut-figure .bars.comparison,.precut-figure .bars.n1,\
 .precut-figure .bars.n3,.precut-figure .bars.n5,.precut-figure .bars.n7{fill-opacity:.2}\
-.precut-figure .ribbon{fill:currentColor;fill-opacity:.24;stroke:currentColor;stroke-width:1;stroke-dasharray:none}\
-.precut-figure .weave-1,.precut-figure .weave-2,.precut-figure .weave-3,.precut-figure .weave-4,.precut-figure .weave-5{stroke:none}\
-.precut-figure .weave-1{fill:url(#precut-weave-1)}\
-.precut-figure .weave-2{fill:url(#precut-weave-2)}\
-.precut-figure .weave-3{fill:url(#precut-weave-3)}\
-.precut-figure .weave-4{fill:url(#precut-weave-4)}\
-.precut-figure .weave-5{fill:url(#precut-weave-5)}\
 .precut-figure .casing{stroke:#fff;stroke-width:4.6;stroke-opacity:.7}\
 .precut-figure .hatch{fill:url(#precut-hatch)}\
 .precut-figure .over{stroke:#1a1d21;stroke-opacity:.14}\
 .precut-figure .halo{stroke:#fff;stroke-width:3;stroke-linejoin:round;paint-order:stroke}\
 #precut-hatch path{stroke:#1a1d21;stroke-width:.7;stroke-opacity:.45}\
-pattern[id^=precut-weave] path{stroke:#1a1d21;stroke-width:1;stroke-opacity:.4}\
 @media screen and (prefers-color-scheme:dark){\
 .precut-figure .paper{fill:#15181c}\
 .precut-figure text{fill:#e8eaed}\
@@ -112,13 +104,25 @@ pattern[id^=precut-weave] path{stroke:#1a1d21;stroke-width:1;stroke-opacity:.4}\
 .precut-figure .n7{color:#ab9ff2}\
 .precut-figure .over{stroke:#e8eaed}\
 .precut-figure .halo,.precut-figure .casing{stroke:#15181c}\
-#precut-hatch path,pattern[id^=precut-weave] path{stroke:#fff}\
+#precut-hatch path{stroke:#fff}\
 .precut-figure .plain.v1{color:#62bdf5}\
 .precut-figure .plain.v2{color:#ff8f45}\
 .precut-figure .plain.v3{color:#2fc79a}\
 .precut-figure .plain.v4{color:#e59ac4}\
 .precut-figure .plain.v5{color:#dba63a}\
 }";
+
+/// Where there are ribbons.
+pub(super) const RIBBONS: &str = "\
+.precut-figure .ribbon{fill:currentColor;fill-opacity:.24;stroke:currentColor;stroke-width:1;stroke-dasharray:none}\
+.precut-figure .weave-1,.precut-figure .weave-2,.precut-figure .weave-3,.precut-figure .weave-4,.precut-figure .weave-5{stroke:none}\
+.precut-figure .weave-1{fill:url(#precut-weave-1)}\
+.precut-figure .weave-2{fill:url(#precut-weave-2)}\
+.precut-figure .weave-3{fill:url(#precut-weave-3)}\
+.precut-figure .weave-4{fill:url(#precut-weave-4)}\
+.precut-figure .weave-5{fill:url(#precut-weave-5)}\
+pattern[id^=precut-weave] path{stroke:#1a1d21;stroke-opacity:.4}\
+@media screen and (prefers-color-scheme:dark){pattern[id^=precut-weave] path{stroke:#fff}}";
 
 /// A thin line across everything that is so filled.
 pub(super) const HATCH: &str = "<defs><pattern id=\"precut-hatch\" width=\"7\" height=\"7\" \
