@@ -23,21 +23,19 @@ pub(crate) fn way(document: &Value, root: &str, tokens: &[String]) -> Way {
             nodes.iter().flat_map(|&(node, component)| forms(document, node, component, 0)).collect();
         let item = token.parse::<usize>().ok();
         let of_list = || forms.iter().filter(|(form, _)| form["items"].is_object());
-        let step = match item.filter(|_| of_list().next().is_some()) {
-            Some(index) => {
-                nodes = of_list().map(|&(form, component)| (&form["items"], component)).collect();
-                (index + 1).to_string()
-            }
-            None => {
-                let fields: Vec<_> = forms
-                    .iter()
-                    .filter_map(|&(form, component)| Some((form["properties"].get(token)?, component)))
-                    .collect();
-                let component = fields.first().map_or("", |(_, component)| component);
-                let step = format!("{component}.{}", token.replace(['/', '.'], " "));
-                nodes = fields;
-                step
-            }
+        let listed = item.filter(|_| of_list().next().is_some());
+        let step = if let Some(index) = listed {
+            nodes = of_list().map(|&(form, component)| (&form["items"], component)).collect();
+            (index + 1).to_string()
+        } else {
+            let fields: Vec<_> = forms
+                .iter()
+                .filter_map(|&(form, component)| Some((form["properties"].get(token)?, component)))
+                .collect();
+            let component = fields.first().map_or("", |(_, component)| component);
+            let step = format!("{component}.{}", token.replace(['/', '.'], " "));
+            nodes = fields;
+            step
         };
         steps.push(step);
     }

@@ -123,12 +123,11 @@ impl Glossary {
     pub(super) fn way(&self, way: &str) -> String {
         let mut said: Vec<String> = Vec::new();
         for step in way.split('/') {
-            match (step.parse::<usize>(), said.last_mut()) {
-                (Ok(item), Some(list)) => *list = format!("{list} {item}"),
-                _ => {
-                    let (component, field) = step.split_once('.').unwrap_or(("", step));
-                    said.push(capitalised(&self.label(component, field, None)));
-                }
+            if let (Ok(item), Some(list)) = (step.parse::<usize>(), said.last_mut()) {
+                *list = format!("{list} {item}");
+            } else {
+                let (component, field) = step.split_once('.').unwrap_or(("", step));
+                said.push(capitalised(&self.label(component, field, None)));
             }
         }
         said.join(" · ")
