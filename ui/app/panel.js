@@ -93,7 +93,7 @@ export function Head({ panel, ghost, style, hidden, toggle, at, over = null, fac
         const before = ghost ? value(ghost, item) : null;
         return html`<button type="button" key=${item.name} class="series" aria-pressed=${!hidden.has(item.name)} onClick=${() => toggle(item.name)}>
           <${Swatch} item=${item} look=${style(item)} /><span>${item.text}</span>
-          ${READ.includes(item.kind) && html`<output class=${`${item.kind} ${ghost ? 'two' : ''}`}>${now}${now !== null && before !== null && html`<small> (${before})</small>`}</output>`}
+          ${READ.includes(item.kind) && html`<output class=${`of-${item.kind} ${ghost ? 'two' : ''}`}>${now}${now !== null && before !== null && html`<small> (${before})</small>`}</output>`}
         </button>`;
       })}
       ${map && html`<${Key} item=${map} now=${at !== null && over !== null ? cellAt(map, at, over) : null} />`}
