@@ -18,6 +18,7 @@ mod schema;
 mod tests;
 #[cfg(test)]
 pub(crate) mod toy;
+mod way;
 
 use entry::Member;
 
@@ -33,6 +34,7 @@ pub(crate) use nearest::nearest;
 pub(crate) use place::FreeColumns;
 pub(crate) use place::{CellKind, Step, TableColumn, TablePlace};
 pub(crate) use result_text::{Unwritable, append as append_result};
+pub(crate) use way::way;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -11,6 +11,7 @@ mod described;
 mod glossary;
 mod kept;
 mod language;
+mod named;
 mod notice;
 mod number;
 mod template;
@@ -196,6 +197,11 @@ impl Texts {
             return self.word(language, "label", name, &Values::new());
         }
         Glossary::of(language).column(name, unit)
+    }
+
+    /// What a list of ways through the contract says: the labels of their fields, and what those are set to.
+    pub(crate) fn names(language: Language, value: &Value) -> Option<String> {
+        named::named(&template_value(value), "; ", false, language)
     }
 
     /// The sentence of a message in `section`.

@@ -121,7 +121,7 @@ impl Calculation for Studies {
     }
 
     fn figures(&self, _input: &[u8], envelope: &[u8]) -> Result<Vec<Figure>, UnreadableResult> {
-        Ok(figure::of_result(&read(envelope)?))
+        Ok(figure::of_result(&self.registry, &read(envelope)?))
     }
 
     fn tables(&self, _input: &[u8], envelope: &[u8]) -> Result<Vec<Table>, UnreadableResult> {
