@@ -91,7 +91,7 @@ fn bound(sketch: &Value) -> (Bound<DeflectionCompensation>, Data) {
     let value = rows.iter().map(|row| row["diameter_deviation_um"].as_f64().unwrap()).collect();
     (
         Bound::new(prepared, allowances, quantity, &DiagnosisOptions::default()),
-        Data { value, uncertainty: None, layout },
+        Data { value, uncertainty: None, sides: None, layout },
     )
 }
 

@@ -77,7 +77,7 @@ fn data(curves: &Curves, truth: &[f64]) -> Data {
         fold: vec![0; count],
     };
     let layout = Layout { traces: vec![(0..count).collect()], run_of_trace: vec![0], design };
-    Data { value, uncertainty: Some(vec![SIGMA; count]), layout }
+    Data { value, uncertainty: Some(vec![SIGMA; count]), sides: None, layout }
 }
 
 /// |y - f(theta)|^2 / sigma^2 + |theta|^2 / prior^2, in plain sums.

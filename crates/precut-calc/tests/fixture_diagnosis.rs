@@ -337,13 +337,3 @@ fn next_runs_can_be_cut() {
         assert!(predicted.iter().all(Result::is_ok), "{}", run.changes);
     }
 }
-
-#[test]
-fn a_regime_is_no_measured_value() {
-    let (mut request, _) = reference();
-    request["quantity"] = json!("regime");
-    let job: <Vises as Calculator>::Input = serde_json::from_value(request).unwrap();
-    let mut violations = Violations::default();
-    job.check(&mut violations);
-    assert!(violations.into_vec().iter().any(|fault| fault.code == "unknown_quantity"));
-}

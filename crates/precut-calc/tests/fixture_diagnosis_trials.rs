@@ -31,3 +31,20 @@ fn what_the_catalogue_lacks_is_unknown() {
     let score = score(Class::Outside, 5.0, 4, 1);
     assert!(score.unknown.reaches(0.93), "{}", score.unknown);
 }
+
+/// A joint that gives way from some swing on.
+#[test]
+fn a_jaw_that_slips_is_unknown() {
+    let draw = |_, snr, seed| fixture::draw_hiding("jaw_slip", snr, seed);
+    let score = blind_trials::score::<FixtureStability>(draw, Class::Outside, 5.0, 6, 1);
+    assert!(score.unknown.reaches(0.93), "{}", score.unknown);
+}
+
+/// A mass that swings on the workpiece is named right or not at all.
+#[test]
+fn a_second_mode_is_named_right_or_not_at_all() {
+    let draw = |_, snr, seed| fixture::draw_hiding("second_mode", snr, seed);
+    let score = blind_trials::score::<FixtureStability>(draw, Class::One, 5.0, 7, 1);
+    assert!(score.named_right.reaches(0.96), "{}", score.named_right);
+    assert!(score.truth_listed.reaches(0.90), "{}", score.truth_listed);
+}

@@ -1,6 +1,6 @@
 //! What turns a forward model into one that can be diagnosed.
 
-use serde::{Serialize, de::DeserializeOwned};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use utoipa::ToSchema;
 
 use super::{
@@ -33,6 +33,17 @@ pub trait Diagnosable:
 
     /// How the rows hang together.
     fn design(prepared: &Self::Prepared) -> Design;
+
+    /// Of a quantity that is a class: how much the margin of every row scatters from cut to cut, in its unit. `None` where
+    /// rows are values.
+    fn spreads(_prepared: &Self::Prepared, _allowances: &Self::Allowances) -> Option<Vec<f64>> {
+        None
+    }
+
+    /// Of a quantity that is a class: where the rows stand and where the limit runs with these effects.
+    fn class_limits(_prepared: &Self::Prepared, _effects: &[Self::Effect]) -> Result<Option<ClassLimits>, Failure> {
+        Ok(None)
+    }
 
     /// Runs that could be measured next, each with its rows: every condition moved to the ends of its
     /// range, or started afresh. None where a job has no runs.
@@ -90,6 +101,44 @@ pub struct NextRun<R, P> {
     pub points: Vec<P>,
 }
 
+/// Rows that are classes in the plane of spindle speed and depth of cut.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ClassLimits {
+    /// Spindle speed of every row, rev/min.
+    pub spindle_speed_rpm: Vec<f64>,
+    /// Its depth of cut, mm.
+    pub depth_mm: Vec<f64>,
+    /// The limit, of every feed its own.
+    pub curves: Vec<LimitCurve>,
+}
+
+/// Largest depth without chatter over the spindle speed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct LimitCurve {
+    /// Feed per tooth at which it holds.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub feed_mm_per_tooth: f64,
+    /// Spindle speeds.
+    #[schema(extensions(("x-unit" = json!("rev/min"))))]
+    pub spindle_speed_rpm: Vec<f64>,
+    /// Depth at which chatter begins; absent where there is none up to twice the largest depth measured.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub depth_mm: Vec<Option<f64>>,
+}
+
+/// What a measured row says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reading<P> {
+    /// Of which prediction.
+    pub point: P,
+    /// The value; of a class the side of zero on which the margin lay, +1 or -1.
+    pub value: f64,
+    /// The class that was seen; empty for a value.
+    pub class: &'static str,
+    /// Which margin this is about; empty for a value.
+    pub asks: &'static str,
+}
+
 /// A row of measurements.
 pub trait Measurement {
     /// Whose rows these are.
@@ -103,6 +152,15 @@ pub trait Measurement {
     fn point(&self) -> <Self::Model as ForwardModel>::Point;
     /// The value of a quantity, in the quantity's unit; `None` where this row has none.
     fn value(&self, quantity: &str) -> Option<f64>;
+    /// What the row says of a quantity under a job: nothing, one value, or of a class every margin that it speaks about.
+    fn readings(
+        &self,
+        _job: &<Self::Model as ForwardModel>::Job,
+        quantity: &str,
+    ) -> Vec<Reading<<Self::Model as ForwardModel>::Point>> {
+        let value = self.value(quantity);
+        value.map(|value| Reading { point: self.point(), value, class: "", asks: "" }).into_iter().collect()
+    }
     /// Standard uncertainty, in the quantity's unit.
     fn uncertainty(&self) -> Option<f64>;
     /// Standard uncertainty of one quantity, where a row has several.

@@ -20,7 +20,7 @@ mod table;
 pub use conflict::{Conflict, ConstraintName, ElasticScope, Infeasible, Relaxation};
 pub use consequence::{Allowed, Consequence};
 pub use design::{Design, Grouping, Smooth};
-pub use diagnosable::{Diagnosable, Measurement, NextRun};
+pub use diagnosable::{ClassLimits, Diagnosable, LimitCurve, Measurement, NextRun, Reading};
 pub use figure::{Axis, Figure, Frame, Glyph, Item, Panel, Role, Spacing};
 pub use finding::{Finding, Message, Value, Values, Violations};
 pub use forward::{Column as JacobianColumn, ForwardModel, Missing, Prediction, PrepareError, Quantity, Rows};

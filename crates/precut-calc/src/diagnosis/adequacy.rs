@@ -1,9 +1,12 @@
 //! Is anything wrong beyond the scatter? Classical tests beside the posterior (`diagnosis/3.3`).
 
 use nalgebra::{Cholesky, DMatrix, DVector};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, Normal};
 
 use super::basis::{dot, smooth_columns};
+use super::evidence::log_normal_cdf;
 use super::noise::pure_error;
 use super::weigh::Weighing;
 use crate::calculator::Smooth;
@@ -34,10 +37,15 @@ pub enum TestKind {
     LjungBox,
     /// Number of runs of one sign (Wald-Wolfowitz, normal).
     Runs,
+    /// Of classes: minus twice the log-probability of those seen, against classes drawn from the base.
+    Deviance,
 }
 
 /// All tests that these rows allow.
 pub fn adequacy(weighing: &Weighing<'_>) -> Vec<Test> {
+    if let Some(sides) = &weighing.foundation.data.sides {
+        return deviance(weighing, sides).into_iter().collect();
+    }
     let mut tests: Vec<Test> =
         [lack_of_fit(weighing), smooth_directions(weighing), ljung_box(weighing), runs(weighing)]
             .into_iter()
@@ -61,6 +69,39 @@ fn holm(tests: &mut [Test]) {
 
 fn test(kind: TestKind, statistic: f64, dof: (f64, Option<f64>), p: f64) -> Option<Test> {
     (statistic.is_finite() && p.is_finite()).then_some(Test { kind, statistic, dof, p, p_holm: p })
+}
+
+/// Draws behind the p-value of a deviance: it is known to a hundredth where it is 0.1.
+const DRAWS: usize = 2000;
+
+/// D = -2 sum of ln Phi(s m/sigma) of the base's margins. Its distribution is no chi-squared one for single classes, so it is
+/// drawn: allowances from their prior, classes from the margins under them.
+fn deviance(weighing: &Weighing<'_>, sides: &[f64]) -> Option<Test> {
+    let foundation = weighing.foundation;
+    let rows: Vec<usize> = (0..weighing.keep.len()).filter(|&row| weighing.keep[row]).collect();
+    let of = |side: f64, row: usize| -2.0 * log_normal_cdf(side * foundation.base[row] / weighing.scatter(row));
+    let found: f64 = rows.iter().map(|&row| of(sides[row], row)).sum();
+    let mut random = Pcg64::seed_from_u64(1);
+    let normal = Normal::standard();
+    let mut larger = 0.0;
+    for _ in 0..DRAWS {
+        let sizes: Vec<f64> = foundation
+            .nuisances
+            .iter()
+            .map(|_| normal.inverse_cdf(random.random::<f64>().clamp(1e-12, 1.0 - 1e-12)))
+            .collect();
+        let drawn: f64 = rows
+            .iter()
+            .map(|&row| {
+                let moved: f64 = sizes.iter().zip(&foundation.nuisances).map(|(size, column)| size * column[row]).sum();
+                let positive = normal.cdf((foundation.base[row] + moved) / weighing.scatter(row));
+                of(if random.random::<f64>() < positive { 1.0 } else { -1.0 }, row)
+            })
+            .sum();
+        larger += f64::from(u8::from(drawn >= found));
+    }
+    // Counted with the rows themselves, so that it is never 0.
+    test(TestKind::Deviance, found, (rows.len() as f64, None), (larger + 1.0) / (DRAWS as f64 + 1.0))
 }
 
 /// F = [SS_lof/c] / [SS_pe/(n - c)], c distinct conditions; the base has no fitted parameter. Of rows

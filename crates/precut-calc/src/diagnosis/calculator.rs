@@ -8,8 +8,8 @@ use super::input::{DiagnosisJob, MAX_RUNS};
 use super::output::DiagnosisResult;
 use super::{picture, report, said};
 use crate::calculator::{
-    Answer, Calculator, CalculatorKind, Check, Codes, Cost, Diagnosable, Failure, Figure, Finding, ForwardModel,
-    MeasuredRow, Measurement, Message, Meta, Monitor, PrepareError, Rows, Table, Violations,
+    Answer, Calculator, CalculatorKind, Check, Codes, Cost, Design, Diagnosable, Failure, Figure, Finding,
+    ForwardModel, MeasuredRow, Measurement, Message, Meta, Monitor, PrepareError, Reading, Rows, Table, Violations,
 };
 
 /// Rows from which on at least adequacy can be judged.
@@ -40,7 +40,7 @@ impl<M: Diagnosable> Calculator for Diagnosis<M> {
     const META: Meta = Meta {
         id: "diagnosis",
         kind: CalculatorKind::Calculator,
-        version: 2,
+        version: 3,
         title: "Diagnosis",
         question: "What does the simulation get wrong, why, and what is gained by mending it?",
         summary: "Measurements of what was really cut against a calculator's job: whether anything is wrong beyond \
@@ -77,17 +77,31 @@ impl<M: Diagnosable> Calculator for Diagnosis<M> {
 
     fn run(job: &Self::Input, monitor: &dyn Monitor) -> Result<Answer<Self::Output>, Failure> {
         let rows = job.measurements.rows();
-        let used: Vec<usize> =
-            (0..rows.len()).filter(|&row| !rows[row].excluded() && rows[row].value(&job.quantity).is_some()).collect();
+        let of_row = |row: usize| {
+            let readings = if rows[row].excluded() { Vec::new() } else { rows[row].readings(&job.job, &job.quantity) };
+            readings.into_iter().map(move |reading| (row, reading))
+        };
+        let (used, readings): (Vec<usize>, Vec<Reading<M::Point>>) = (0..rows.len()).flat_map(of_row).unzip();
         let runs = if job.runs.is_empty() { vec![M::Run::default()] } else { job.runs.clone() };
-        let places: Rows<M::Run, M::Point> =
-            Rows { points: used.iter().map(|&row| (rows[row].run() as usize - 1, rows[row].point())).collect(), runs };
+        let run_of = |row: usize| rows[row].run() as usize - 1;
+        let points = used.iter().zip(&readings).map(|(&row, reading)| (run_of(row), reading.point.clone())).collect();
+        let places: Rows<M::Run, M::Point> = Rows { points, runs };
         let prepared =
             M::prepare(&job.job, &places, &job.quantity, monitor).map_err(|error| unprepared(error, &used))?;
         let design = M::design(&prepared);
-        let data = data::<M>(job, &used, design);
+        let raw: Vec<f64> = readings.iter().map(|reading| reading.value).collect();
+        let data = match M::spreads(&prepared, &job.allowances) {
+            None => data::<M>(job, &used, raw, design),
+            spreads => Data {
+                value: vec![0.0; raw.len()],
+                uncertainty: spreads,
+                sides: Some(raw),
+                layout: layout::<M>(job, &used, design),
+            },
+        };
         let bound = Bound::<M>::new(prepared, job.allowances.clone(), &job.quantity, &job.options);
-        report::answer::<M>(job, &places, &used, &bound, &data, monitor)
+        let seen = readings.into_iter().map(|reading| Seen { class: reading.class, asks: reading.asks }).collect();
+        report::answer::<M>(job, &Measured { places, used, seen }, &bound, &data, monitor)
     }
 
     fn figures(job: &Self::Input, output: &Self::Output) -> Vec<Figure> {
@@ -136,16 +150,38 @@ fn unprepared(error: PrepareError, used: &[usize]) -> Failure {
     Failure::OutOfModel(finding)
 }
 
-/// Rows that have a value, sweep by sweep.
-fn data<M: Diagnosable>(job: &JobOf<M>, used: &[usize], design: crate::calculator::Design) -> Data {
+/// What was measured, reading by reading.
+pub(super) struct Measured<R, P> {
+    /// Runs and places.
+    pub(super) places: Rows<R, P>,
+    /// Number of the row of every reading.
+    pub(super) used: Vec<usize>,
+    /// What was seen of classes.
+    pub(super) seen: Vec<Seen>,
+}
+
+/// A class, and the margin that a reading of it is about; both empty where values were measured.
+pub(super) struct Seen {
+    pub(super) class: &'static str,
+    pub(super) asks: &'static str,
+}
+
+/// Rows that have a value.
+fn data<M: Diagnosable>(job: &JobOf<M>, used: &[usize], raw: Vec<f64>, design: Design) -> Data {
     let rows = job.measurements.rows();
     let logarithmic = M::QUANTITIES.iter().any(|known| known.name == job.quantity && known.logarithmic);
-    let raw: Vec<f64> = used.iter().map(|&row| rows[row].value(&job.quantity).unwrap_or(0.0)).collect();
     let stated: Option<Vec<f64>> = used.iter().map(|&row| rows[row].uncertainty_of(&job.quantity)).collect();
     let uncertainty = stated.filter(|_| !used.is_empty()).map(|stated| {
         let relative = |(u, value): (f64, &f64)| if logarithmic { u / value.abs() } else { u };
         stated.into_iter().zip(&raw).map(relative).collect()
     });
+    let value = raw.into_iter().map(|y| if logarithmic { y.max(f64::MIN_POSITIVE).ln() } else { y }).collect();
+    Data { value, uncertainty, sides: None, layout: layout::<M>(job, used, design) }
+}
+
+/// Sweep by sweep.
+fn layout<M: Diagnosable>(job: &JobOf<M>, used: &[usize], design: Design) -> Layout {
+    let rows = job.measurements.rows();
     let mut sweeps: Vec<((u32, u32), Vec<usize>)> = Vec::new();
     for (index, &row) in used.iter().enumerate() {
         let id = (rows[row].run(), rows[row].trace());
@@ -156,13 +192,11 @@ fn data<M: Diagnosable>(job: &JobOf<M>, used: &[usize], design: crate::calculato
     }
     // By number, so that the order of the sweeps among the rows changes nothing.
     sweeps.sort_by_key(|(id, _)| *id);
-    let layout = Layout {
+    Layout {
         run_of_trace: sweeps.iter().map(|((run, _), _)| *run as usize - 1).collect(),
         traces: sweeps.into_iter().map(|(_, members)| members).collect(),
         design,
-    };
-    let value = raw.into_iter().map(|y| if logarithmic { y.max(f64::MIN_POSITIVE).ln() } else { y }).collect();
-    Data { value, uncertainty, layout }
+    }
 }
 
 impl<J, R, W, A> Check for DiagnosisJob<J, R, W, A>

@@ -9,6 +9,9 @@ pub struct Data {
     pub value: Vec<f64>,
     /// Standard uncertainties of the rows, in the same unit, where stated.
     pub uncertainty: Option<Vec<f64>>,
+    /// Of classes: the side of zero, +1 or -1, on which the margin of every row lay. Then `value` is 0, the boundary, and
+    /// `uncertainty` the spread of the margins.
+    pub sides: Option<Vec<f64>>,
     /// How the rows hang together.
     pub layout: Layout,
 }

@@ -7,7 +7,8 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use super::basis::cosine;
 use super::data::Data;
 use super::evidence::{Normal, Scale, Side, log_mean_exp};
-use super::whiten::{White, Whitener};
+use super::likelihood::Likelihood;
+use super::whiten::White;
 use crate::calculator::Smooth;
 
 /// Cosines common to all runs.
@@ -45,19 +46,21 @@ pub(super) struct Remainder {
     /// The best single one: kind, amplitudes, and their factor.
     pub(super) kind: usize,
     pub(super) amplitudes: Vec<f64>,
+    /// Sizes of the causes beside it there, in units of their priors.
+    pub(super) of_causes: Vec<f64>,
     /// Standard deviations of their priors at the best length and size.
     pub(super) prior_sd: Vec<f64>,
 }
 
 /// The kinds of remainder that these rows can show.
-pub(super) fn kinds(data: &Data, whitener: &Whitener, sigma: f64) -> Vec<Kind> {
+pub(super) fn kinds(data: &Data, likelihood: &Likelihood, sigma: f64) -> Vec<Kind> {
     let rows = data.value.len();
     let mut kinds = Vec::new();
     match &data.layout.design.smooth {
         Smooth::Along(u) => {
             let common = (0..COMMON_ORDERS).map(|k| u.iter().map(|u| cosine(k, *u)).collect()).collect();
             let orders: Vec<f64> = (0..COMMON_ORDERS).map(|k| k as f64).collect();
-            kinds.push(Kind::smooth("common", common, &orders, whitener, sigma));
+            kinds.push(Kind::smooth("common", common, &orders, likelihood, sigma));
             let runs: Vec<Vec<usize>> = runs(data);
             if runs.len() > 1 {
                 let mut columns = Vec::new();
@@ -72,7 +75,7 @@ pub(super) fn kinds(data: &Data, whitener: &Whitener, sigma: f64) -> Vec<Kind> {
                         orders.push(k as f64);
                     }
                 }
-                kinds.push(Kind::smooth("per_run", columns, &orders, whitener, sigma));
+                kinds.push(Kind::smooth("per_run", columns, &orders, likelihood, sigma));
             }
         }
         Smooth::Around(angle) => {
@@ -84,19 +87,19 @@ pub(super) fn kinds(data: &Data, whitener: &Whitener, sigma: f64) -> Vec<Kind> {
                 // Once round is two lengths of the cosines along a part.
                 orders.extend([2.0 * k as f64; 2]);
             }
-            kinds.push(Kind::smooth("around", columns, &orders, whitener, sigma));
+            kinds.push(Kind::smooth("around", columns, &orders, likelihood, sigma));
         }
         Smooth::None => {}
     }
     for grouping in &data.layout.design.groupings {
         let count = grouping.group.iter().copied().max().map_or(0, |most| most + 1);
         let level = |g: usize| grouping.group.iter().map(|&of| f64::from(u8::from(of == g))).collect();
-        kinds.push(Kind::levels(grouping.name, (0..count).map(level).collect(), whitener, sigma));
+        kinds.push(Kind::levels(grouping.name, (0..count).map(level).collect(), likelihood, sigma));
     }
     if let Some(order) = &data.layout.design.order {
         let columns = TEST_ORDERS.map(|k| order.iter().map(|u| cosine(k, *u)).collect()).collect();
         let orders: Vec<f64> = TEST_ORDERS.map(|k| k as f64).collect();
-        kinds.push(Kind::smooth("test_order", columns, &orders, whitener, sigma));
+        kinds.push(Kind::smooth("test_order", columns, &orders, likelihood, sigma));
     }
     kinds
 }
@@ -114,7 +117,7 @@ fn runs(data: &Data) -> Vec<Vec<usize>> {
 impl Kind {
     /// Amplitudes with standard deviations proportional to exp(-(k pi l)^2 / 2), so that the pointwise
     /// variance (order 0 counts 1, the others 1/2 each) is sigma^2.
-    fn smooth(name: &'static str, columns: Vec<Vec<f64>>, orders: &[f64], whitener: &Whitener, sigma: f64) -> Self {
+    fn smooth(name: &'static str, columns: Vec<Vec<f64>>, orders: &[f64], likelihood: &Likelihood, sigma: f64) -> Self {
         let mut of_each_order: Vec<f64> = orders.to_vec();
         of_each_order.dedup();
         of_each_order.sort_by(f64::total_cmp);
@@ -130,17 +133,17 @@ impl Kind {
         let halved = |order: &f64| if name == "around" { 0.5 * order } else { *order };
         Self {
             orders: Some(orders.iter().map(halved).collect()),
-            ..Self::new(name, columns, spreads.to_vec(), whitener)
+            ..Self::new(name, columns, spreads.to_vec(), likelihood)
         }
     }
 
-    fn levels(name: &'static str, columns: Vec<Vec<f64>>, whitener: &Whitener, sigma: f64) -> Self {
+    fn levels(name: &'static str, columns: Vec<Vec<f64>>, likelihood: &Likelihood, sigma: f64) -> Self {
         let spreads = vec![vec![sigma; columns.len()]];
-        Self::new(name, columns, spreads, whitener)
+        Self::new(name, columns, spreads, likelihood)
     }
 
-    fn new(name: &'static str, columns: Vec<Vec<f64>>, spreads: Vec<Vec<f64>>, whitener: &Whitener) -> Self {
-        let white: Vec<White> = columns.iter().map(|column| whitener.white(column)).collect();
+    fn new(name: &'static str, columns: Vec<Vec<f64>>, spreads: Vec<Vec<f64>>, likelihood: &Likelihood) -> Self {
+        let white: Vec<White> = columns.iter().map(|column| likelihood.white(column)).collect();
         let count = white.len();
         let mut gram = DMatrix::zeros(count, count);
         for i in 0..count {
@@ -160,23 +163,23 @@ pub(super) fn beside(
     columns: &[&White],
     residual: &White,
     sides: &[Side],
-    scale: Scale,
-    rows: f64,
+    likelihood: &Likelihood,
 ) -> Option<Remainder> {
     let own = Normal::of(columns, residual);
     let mut all = Vec::new();
     let mut best: Option<(f64, Remainder)> = None;
     for (index, kind) in kinds.iter().enumerate() {
-        let joint = kind.joined(&own, columns, residual);
+        let explained = kind.explained(&own, columns, residual, sides, likelihood);
         for spread in &kind.spreads {
             for size in SIZES {
                 let scales: Vec<f64> =
                     std::iter::repeat_n(1.0, columns.len()).chain(spread.iter().map(|s| s * size)).collect();
-                let (log_z, t) = scaled_evidence(&joint, &scales, sides, scale, rows)?;
+                let (log_z, t) = explained(&scales)?;
                 if best.as_ref().is_none_or(|(most, _)| log_z > *most) {
                     let amplitudes = t.iter().zip(&scales).skip(columns.len()).map(|(t, s)| t * s).collect();
                     let prior_sd = scales[columns.len()..].to_vec();
-                    best = Some((log_z, Remainder { log_z, kind: index, amplitudes, prior_sd }));
+                    let of_causes = t[..columns.len()].to_vec();
+                    best = Some((log_z, Remainder { log_z, kind: index, amplitudes, of_causes, prior_sd }));
                 }
                 all.push(log_z);
             }
@@ -186,10 +189,48 @@ pub(super) fn beside(
 }
 
 impl Kind {
+    /// Evidence of causes and of this remainder with all columns scaled, and the sizes found.
+    fn explained<'a>(
+        &'a self,
+        own: &Normal,
+        columns: &'a [&White],
+        residual: &'a White,
+        sides: &'a [Side],
+        likelihood: &'a Likelihood,
+    ) -> Box<dyn Fn(&[f64]) -> Option<(f64, Vec<f64>)> + 'a> {
+        if let Likelihood::Gaussian { whitener, scale } = likelihood {
+            let joint = self.joined(own, columns, residual);
+            return Box::new(move |scales| scaled_evidence(&joint, scales, sides, *scale, whitener.rows()));
+        }
+        Box::new(move |scales| {
+            let all = columns.iter().copied().chain(&self.white);
+            let scaled: Vec<White> = all.zip(scales).map(|(column, scale)| column.times(*scale)).collect();
+            let evidence = likelihood.evidence(&scaled.iter().collect::<Vec<_>>(), residual, sides)?;
+            Some((evidence.log_z, evidence.t))
+        })
+    }
+
     /// Posterior standard deviation of a remainder at every row, beside causes with these columns.
-    pub(super) fn deviation(&self, remainder: &Remainder, columns: &[&White], residual: &White) -> Option<Vec<f64>> {
-        let joint = self.joined(&Normal::of(columns, residual), columns, residual);
+    pub(super) fn deviation(
+        &self,
+        remainder: &Remainder,
+        columns: &[&White],
+        residual: &White,
+        likelihood: &Likelihood,
+    ) -> Option<Vec<f64>> {
         let causes = columns.len();
+        let joint = match likelihood {
+            Likelihood::Gaussian { .. } => self.joined(&Normal::of(columns, residual), columns, residual),
+            Likelihood::Probit(_) => {
+                let all: Vec<&White> = columns.iter().copied().chain(&self.white).collect();
+                let sizes = remainder.of_causes.iter().chain(&remainder.amplitudes);
+                let left = all
+                    .iter()
+                    .zip(sizes)
+                    .fold(residual.clone(), |left, (column, size)| left.minus(&column.times(*size)));
+                likelihood.normal(&all, &left)?
+            }
+        };
         let scale = |i: usize| if i < causes { 1.0 } else { remainder.prior_sd[i - causes] };
         let count = joint.right.len();
         let a = DMatrix::from_fn(count, count, |i, j| {

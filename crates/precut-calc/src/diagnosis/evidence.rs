@@ -17,7 +17,7 @@ pub(super) enum Scale {
 impl Scale {
     pub(super) fn of(noise: &Noise) -> Self {
         match noise.source {
-            NoiseSource::Stated { .. } => Self::Known,
+            NoiseSource::Stated { .. } | NoiseSource::Spread => Self::Known,
             _ => Self::SameRows,
         }
     }
@@ -135,15 +135,19 @@ impl Normal {
         let q = (self.square - self.right.dot(&t)).max(0.0);
         let log_det: f64 = factor.l_dirty().diagonal().iter().map(|d| 2.0 * d.ln()).sum();
         let covariance = factor.inverse();
-        let constrained: f64 = sides
-            .iter()
-            .enumerate()
-            .filter_map(|(i, side)| side.sign().map(|s| s * t[i] / covariance[(i, i)].sqrt()))
-            .map(|z| std::f64::consts::LN_2 + log_normal_cdf(z))
-            .sum();
-        let log_z = -0.5 * log_det + scale.log_likelihood(q, rows) + constrained;
+        let log_z = -0.5 * log_det + scale.log_likelihood(q, rows) + one_sided(sides, t.as_slice(), &covariance);
         Some(Evidence { log_z, t: t.as_slice().to_vec(), covariance, q })
     }
+}
+
+/// Sum of ln 2 Phi(s_i t_i / sd_i) over the sizes that lie on one side of zero only.
+pub(super) fn one_sided(sides: &[Side], t: &[f64], covariance: &DMatrix<f64>) -> f64 {
+    sides
+        .iter()
+        .enumerate()
+        .filter_map(|(i, side)| side.sign().map(|s| s * t[i] / covariance[(i, i)].sqrt()))
+        .map(|z| std::f64::consts::LN_2 + log_normal_cdf(z))
+        .sum()
 }
 
 /// ln Phi(z), also far down the lower tail where Phi underflows.

@@ -39,6 +39,10 @@ impl<'a> Foundation<'a> {
 
     /// Rows that stand alone.
     pub fn outliers(&self) -> Outliers {
+        if self.data.sides.is_some() {
+            // A class stands on one of two sides: none stands alone.
+            return Outliers::default();
+        }
         outliers(self.data, &self.residual)
     }
 

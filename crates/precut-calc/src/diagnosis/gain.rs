@@ -70,6 +70,9 @@ pub fn gain(
     let mut errors = vec![(0.0, 0.0); fold.len()];
     let most = if effort.nonlinear { SCORED_DEAR } else { SCORED };
     let mut runs = Vec::new();
+    // Of classes a square means nothing.
+    let values = foundation.data.sides.is_none();
+    let most = if values { most } else { 0 };
     let mut scores: Vec<Score> = whole.named_sets().take(most).map(|set| Score::of(&set.members)).collect();
     for &f in &held {
         checkpoint(monitor)?;
@@ -82,7 +85,8 @@ pub fn gain(
                 score.add(&without, |row| fold[row] == f && whole.keep[row])?;
             }
             let predicted = prediction(foundation, &without, (!nested).then_some(whole))?;
-            runs.extend(HeldRun::of(&without, &predicted, |row| fold[row] == f && whole.keep[row]));
+            let own = || HeldRun::of(&without, &predicted, |row| fold[row] == f && whole.keep[row]);
+            runs.extend(if values { own() } else { None });
             predicted
         };
         for row in 0..fold.len() {

@@ -58,7 +58,7 @@ impl Signature {
             .zip(&weighing.foundation.base)
             .map(|(with, base)| with.map_or(0.0, |with| with - base))
             .collect();
-        let directions = weighing.fit(members).map_or_else(Vec::new, |fit| fit.columns.clone());
+        let directions = weighing.fit(members).map_or_else(Vec::new, |fit| weighing.directions(fit));
         Ok(Self { members: members.to_vec(), whole: weighing.whitener.white(&change), change, directions })
     }
 

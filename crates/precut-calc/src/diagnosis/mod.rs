@@ -5,6 +5,7 @@
 //!
 //! - `outlier`, `noise`: what the rows say about their own scatter (`diagnosis/3.1`);
 //! - `whiten`: scatter and allowances as one covariance (`diagnosis/3.2`);
+//! - `likelihood`, `probit`: values that scatter about a prediction, classes on either side of it (`diagnosis/3.11`);
 //! - `evidence`, `discrepancy`, `search`, `refine`: how well each set of causes, alone or with an unnamed
 //!   smooth remainder, explains the rows (`diagnosis/3.4`, `diagnosis/3.5`);
 //! - `weigh`: posterior weights and the verdict (`diagnosis/3.5`, `diagnosis/3.7`);
@@ -16,6 +17,7 @@ mod adequacy;
 mod base;
 mod basis;
 mod calculator;
+mod classes;
 mod data;
 mod discrepancy;
 mod downstream;
@@ -24,12 +26,14 @@ mod foundation;
 mod gain;
 mod identify;
 mod input;
+mod likelihood;
 mod next;
 mod noise;
 mod outlier;
 mod outlying;
 mod output;
 mod picture;
+mod probit;
 mod profile;
 mod refine;
 mod refuse;
@@ -46,6 +50,7 @@ mod whiten;
 pub use adequacy::{Test, TestKind, adequacy};
 pub use base::Bound;
 pub use calculator::{Diagnosis, JobOf, ResultOf};
+pub use classes::{ClassHeldOut, ClassReport};
 pub use data::{Data, Layout};
 pub use foundation::Foundation;
 pub use gain::{Gain, gain};

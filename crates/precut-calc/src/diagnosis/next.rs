@@ -135,7 +135,8 @@ fn separation_with<M: Diagnosable>(
     if let Some(per_row) = &mut noise.per_row {
         per_row.resize(all.points.len(), noise.sigma);
     }
-    let data = Data { value: vec![0.0; all.points.len()], uncertainty: None, layout };
+    let classes = old.sides.is_some();
+    let data = Data { value: vec![0.0; all.points.len()], uncertainty: None, sides: None, layout };
     // Every cause: the sets are found in it by kind.
     let every = DiagnosisOptions::default();
     let bound = Bound::<M>::new(prepared, job.allowances.clone(), &job.quantity, &every);
@@ -156,6 +157,12 @@ fn separation_with<M: Diagnosable>(
     keep.resize(all.points.len(), true);
     // Nor one that the model cannot run.
     let Ok(nuisances) = bound.nuisances() else { return Ok(None) };
+    if classes {
+        // About the leader, as it is taken to be right.
+        let with = bound.predict(&of_leader)?;
+        // What has no margin tells nothing.
+        noise = noise.informed(&with.iter().map(|margin| margin.unwrap_or(f64::MAX)).collect::<Vec<_>>());
+    }
     let whitener = Whitener::new(&data, &noise, &nuisances, &keep);
     let a = Signature::anew(&bound, &whitener, &keep, &of_leader)?;
     let b = Signature::anew(&bound, &whitener, &keep, &of_rival)?;

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::basis::{dot, orthonormal, smooth_columns};
 use super::data::Data;
+use super::probit::information;
 use crate::calculator::Smooth;
 
 /// Correlations from row to row that are tried.
@@ -44,6 +45,8 @@ pub enum NoiseSource {
     Profile,
     /// From what a regression without physics leaves.
     Regression,
+    /// Of classes: granted to their margins.
+    Spread,
 }
 
 /// How many smooth columns a trace of so many rows can lose.
@@ -61,6 +64,9 @@ impl Noise {
     /// Scatter of the kept rows about the base; `residual` is measured minus base. `heavy_tails`: standard deviations of the
     /// rows where their scatter is not Gaussian; what was stated stands before them.
     pub fn of(data: &Data, residual: &[f64], keep: &[bool], heavy_tails: Option<&[f64]>) -> Self {
+        if let (Some(_), Some(spread)) = (&data.sides, &data.uncertainty) {
+            return Self::granted(spread, keep);
+        }
         let mut noise = Self::of_rows(data, residual, keep);
         if let (Some(own), None) = (heavy_tails, &noise.per_row) {
             // The scale of Student's t; the rows' own deviations are larger the farther they lie from their trace.
@@ -74,6 +80,22 @@ impl Noise {
             data.value.iter().zip(keep).filter(|(_, keep)| **keep).fold(0.0, |most: f64, (v, _)| most.max(v.abs()));
         noise.sigma = noise.sigma.max(floor).max(1e-9 * largest).max(1e-12);
         noise
+    }
+
+    /// Of classes with these margins: what a Gaussian row would scatter that said as much of its margin.
+    pub(super) fn informed(&self, margin: &[f64]) -> Self {
+        let own = |row: usize| self.per_row.as_ref().map_or(self.sigma, |own| own[row]);
+        // A class far from the boundary says nothing; its row stays finite.
+        let of_row = |(row, margin): (usize, &f64)| own(row) / information(margin / own(row)).max(1e-12).sqrt();
+        Self { per_row: Some(margin.iter().enumerate().map(of_row).collect()), ..self.clone() }
+    }
+
+    /// Of the margins of classes, which say too little to find it from them.
+    fn granted(spread: &[f64], keep: &[bool]) -> Self {
+        let kept = || spread.iter().zip(keep).filter(|(_, keep)| **keep).map(|(spread, _)| spread * spread);
+        let sigma = (kept().sum::<f64>() / kept().count().max(1) as f64).sqrt();
+        let (per_row, source) = (Some(spread.to_vec()), NoiseSource::Spread);
+        Self { sigma, per_row, rho: 0.0, dof: f64::INFINITY, source }
     }
 
     fn of_rows(data: &Data, residual: &[f64], keep: &[bool]) -> Self {

@@ -15,7 +15,7 @@ const MAD_TO_SD: f64 = 1.482_602_218_505_602;
 const ONE_IN: usize = 20;
 
 /// Rows that stand alone.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Outliers {
     /// Their numbers, worst first.
     pub rows: Vec<usize>,

@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::classes::ClassReport;
+
 /// What the measurements say about the base model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(bound(serialize = "E: Serialize, R: Serialize", deserialize = "E: Deserialize<'de>, R: Deserialize<'de>"))]
@@ -50,8 +52,10 @@ pub struct DiagnosisResult<E: ToSchema, R: ToSchema> {
     /// The effects that extend the base model; empty where none is named.
     #[schema(inline)]
     pub effects: Vec<E>,
-    /// Error on data held back, base against extended.
+    /// Error on data held back, base against extended; of classes see `classes`.
     pub gain: Option<GainReport>,
+    /// Where the quantity is a class: what each model says of every row, and where the limits run.
+    pub classes: Option<ClassReport>,
     /// What comes of deciding with either model, where the extended one is right; empty where none is named, or where the
     /// job decides nothing.
     pub downstream: Vec<DownstreamReport>,
@@ -190,7 +194,7 @@ pub struct NoiseReport {
     /// Degrees of freedom; absent where the scatter was stated.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub degrees_of_freedom: Option<f64>,
-    /// Where it comes from: `stated`, `repeats`, `profile`, `regression`.
+    /// Where it comes from: `stated`, `repeats`, `profile`, `regression`; of classes `spread`: granted to their margins.
     pub source: String,
     /// Scatter of the rows in units of what was stated.
     #[schema(extensions(("x-unit" = json!("1"))))]
@@ -207,7 +211,7 @@ pub struct NoiseReport {
 /// A test of the base.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct TestReport {
-    /// `lack_of_fit`, `smooth_directions`, `ljung_box`, `runs`.
+    /// `lack_of_fit`, `smooth_directions`, `ljung_box`, `runs`, of classes `deviance`.
     pub test: String,
     /// Its statistic.
     #[schema(extensions(("x-unit" = json!("1"))))]
@@ -492,7 +496,7 @@ pub struct RowColumns {
     /// Where along the part, as a share of its length or of a turn; absent for rows without a place.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub place: Vec<Option<f64>>,
-    /// Measured.
+    /// Measured; of classes the side of zero on which the margin lay, 1 or -1.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub measured: Vec<f64>,
     /// Prediction of the base.

@@ -147,7 +147,7 @@ impl Profiler<'_> {
                     self.fit.coordinates[k].t(settings[member].values[variable])
                 })
                 .collect();
-            let cost = residual.inner(&residual) + t.iter().map(|t| t * t).sum::<f64>();
+            let cost = self.refinement.likelihood.misfit(&residual) + t.iter().map(|t| t * t).sum::<f64>();
             if least.as_ref().is_none_or(|(known, _)| cost < *known) {
                 least = Some((cost, settings.to_vec()));
             }

@@ -2,9 +2,10 @@
 
 use nalgebra::{Cholesky, DMatrix};
 
-use super::evidence::{Normal, Scale, Side};
+use super::evidence::{Normal, Side};
+use super::likelihood::Likelihood;
 use super::subject::{Setting, Subject};
-use super::whiten::{White, Whitener};
+use super::whiten::White;
 use crate::calculator::{Failure, Hypothesis, Range, Shape, Treatment, Variable};
 
 /// Steps where only amplitudes are free.
@@ -15,6 +16,8 @@ const STEPS_WITH_SHAPES: usize = 6;
 const STEPS_NONLINEAR: usize = 8;
 /// Longest step, prior standard deviations.
 const LONGEST_STEP: f64 = 2.0;
+/// Shares of a step that are tried where the whole one leads astray.
+const SHORTENED: [f64; 3] = [0.4, 0.15, 0.05];
 /// A step shorter than this changes nothing that is reported: a hundredth of a prior standard deviation,
 /// or of a posterior one where that is smaller.
 const SETTLED: f64 = 0.01;
@@ -104,8 +107,7 @@ pub(super) struct Refinement<'a> {
     pub(super) subject: &'a dyn Subject,
     pub(super) value: &'a [f64],
     pub(super) keep: &'a [bool],
-    pub(super) whitener: &'a Whitener,
-    pub(super) scale: Scale,
+    pub(super) likelihood: &'a Likelihood,
     /// Whether the model is far from linear in its sizes.
     pub(super) nonlinear: bool,
 }
@@ -141,23 +143,37 @@ impl Refinement<'_> {
         loop {
             let Some(here) = self.linearise(&settings, &free, &coordinates)? else { return Ok(None) };
             let columns: Vec<&White> = here.columns.iter().collect();
-            let Some(evidence) =
-                Normal::of(&columns, &here.residual).evidence(&sides, self.scale, self.whitener.rows())
-            else {
-                return Ok(None);
+            let Some(evidence) = self.likelihood.evidence(&columns, &here.residual, &sides) else { return Ok(None) };
+            let before = settings.clone();
+            let moved = |share: f64| {
+                let mut longest: f64 = 0.0;
+                let mut settings = before.clone();
+                for (k, coordinate) in coordinates.iter().enumerate() {
+                    let (member, variable) = free[k];
+                    let value = &mut settings[member].values[variable];
+                    let before = coordinate.t(*value);
+                    let wanted = before + share * (evidence.t[k] - before).clamp(-LONGEST_STEP, LONGEST_STEP);
+                    // Projected on the bounds: a reflection would swing to and fro about an optimum at a bound.
+                    *value = coordinate.moved(wanted, ranges[k]);
+                    let posterior_sd = evidence.covariance[(k, k)].sqrt();
+                    longest = longest.max((coordinate.t(*value) - before).abs() / posterior_sd.clamp(0.05, 1.0));
+                }
+                (settings, longest)
             };
-            let mut longest: f64 = 0.0;
-            for (k, coordinate) in coordinates.iter().enumerate() {
-                let (member, variable) = free[k];
-                let value = &mut settings[member].values[variable];
-                let before = coordinate.t(*value);
-                let wanted = before + (evidence.t[k] - before).clamp(-LONGEST_STEP, LONGEST_STEP);
-                // Projected on the bounds: a reflection would swing to and fro about an optimum at a bound.
-                *value = coordinate.moved(wanted, ranges[k]);
-                let posterior_sd = evidence.covariance[(k, k)].sqrt();
-                longest = longest.max((coordinate.t(*value) - before).abs() / posterior_sd.clamp(0.05, 1.0));
-            }
+            let (next, longest) = moved(1.0);
+            settings = next;
             step += 1;
+            // Where shapes are free a step may pass by the resonance that it is looking for: then it is shortened.
+            if self.nonlinear && with_shapes && longest >= SETTLED && step < most {
+                let cost = |settings: &[Setting]| self.cost(settings, &free, &coordinates);
+                let here = cost(&before)?.unwrap_or(f64::INFINITY);
+                for share in SHORTENED {
+                    if cost(&settings)?.is_some_and(|cost| cost <= here) {
+                        break;
+                    }
+                    settings = moved(share).0;
+                }
+            }
             let settled = longest < SETTLED;
             if settled || step >= most {
                 let scale: Vec<f64> = free
@@ -192,9 +208,24 @@ impl Refinement<'_> {
         &self.subject.hypotheses()[fit.settings[member].hypothesis].variables[variable]
     }
 
+    /// Twice minus the log-posterior, up to a constant; `None` where the model has no value for a row that counts.
+    fn cost(
+        &self,
+        settings: &[Setting],
+        free: &[(usize, usize)],
+        coordinates: &[Coordinate],
+    ) -> Result<Option<f64>, Failure> {
+        let prior: f64 = free
+            .iter()
+            .zip(coordinates)
+            .map(|(&(member, variable), coordinate)| coordinate.t(settings[member].values[variable]).powi(2))
+            .sum();
+        Ok(self.residual(settings)?.map(|residual| self.likelihood.misfit(&residual) + prior))
+    }
+
     /// y - f, whitened; `None` where the model has no value for a row that counts.
     pub(super) fn residual(&self, settings: &[Setting]) -> Result<Option<White>, Failure> {
-        Ok(self.raw_residual(settings)?.map(|raw| self.whitener.white(&raw)))
+        Ok(self.raw_residual(settings)?.map(|raw| self.likelihood.white(&raw)))
     }
 
     fn raw_residual(&self, settings: &[Setting]) -> Result<Option<Vec<f64>>, Failure> {
@@ -214,7 +245,7 @@ impl Refinement<'_> {
     ) {
         let others: Vec<usize> = (0..fit.free.len()).filter(|k| Some(*k) != fixed).collect();
         let columns: Vec<&White> = others.iter().map(|&k| &fit.columns[k]).collect();
-        let Normal { mut gram, mut right, .. } = Normal::of(&columns, residual);
+        let Some(Normal { mut gram, mut right, .. }) = self.likelihood.normal(&columns, residual) else { return };
         for (i, &k) in others.iter().enumerate() {
             gram[(i, i)] += 1.0;
             right[i] -= t[k];
@@ -243,9 +274,9 @@ impl Refinement<'_> {
             let column: Vec<f64> = slope.iter().map(|s| s * by).collect();
             let t = coordinate.t(value);
             residual.iter_mut().zip(&column).for_each(|(r, c)| *r += c * t);
-            columns.push(self.whitener.white(&column));
+            columns.push(self.likelihood.white(&column));
         }
-        Ok(Some(Here { residual: self.whitener.white(&residual), columns, slopes }))
+        Ok(Some(Here { residual: self.likelihood.white(&residual), columns, slopes }))
     }
 }
 

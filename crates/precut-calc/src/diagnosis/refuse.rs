@@ -38,6 +38,9 @@ pub(super) fn refusal<M: Diagnosable>(
     if predicted < LEAST_PREDICTED * count {
         return Some(plain("base_fails"));
     }
+    if foundation.data.sides.is_some() {
+        return too_few(kept(weighing).count());
+    }
     let values: Vec<f64> = kept(weighing).map(|row| foundation.data.value[row]).collect();
     if values.windows(2).all(|pair| pair[0].to_bits() == pair[1].to_bits()) {
         return Some(plain("constant_values"));
@@ -51,8 +54,16 @@ pub(super) fn refusal<M: Diagnosable>(
             return Some(Refusal { factor, fitted_factor, ..plain("unit_suspected") });
         }
     }
-    (values.len() < LEAST_TO_NAME)
-        .then(|| Refusal { rows_needed: u32::try_from(LEAST_TO_NAME).ok(), ..plain("too_few_rows") })
+    too_few(values.len())
+}
+
+fn too_few(rows: usize) -> Option<Refusal> {
+    (rows < LEAST_TO_NAME).then(|| Refusal {
+        reason: "too_few_rows".to_owned(),
+        factor: None,
+        fitted_factor: None,
+        rows_needed: u32::try_from(LEAST_TO_NAME).ok(),
+    })
 }
 
 fn kept<'a>(weighing: &'a Weighing<'_>) -> impl Iterator<Item = usize> + 'a {

@@ -21,7 +21,7 @@ pub struct RemainderShape {
     pub rms: f64,
     /// Row where it is largest in magnitude.
     pub extreme_row: usize,
-    /// Share of the mean square of the residuals, those of the named part taken out, that it explains.
+    /// Share of the mean square of the residuals (of classes: of the deviance) that it explains, the named part taken out.
     pub explained: f64,
     /// Where one step explains most of it, along a part.
     pub step: Option<Step>,
@@ -57,8 +57,8 @@ pub fn remainder_shape(weighing: &Weighing<'_>) -> Option<RemainderShape> {
     let kept: Vec<usize> = (0..rows).filter(|&row| weighing.keep[row]).collect();
     let mean = |of: &dyn Fn(usize) -> f64| kept.iter().map(|&row| of(row)).sum::<f64>() / kept.len().max(1) as f64;
     let rms = mean(&|row| value[row] * value[row]).sqrt();
-    let before = mean(&|row| left(row) * left(row));
-    let after = mean(&|row| (left(row) - value[row]).powi(2));
+    let before = mean(&|row| weighing.loss(row, left(row)));
+    let after = mean(&|row| weighing.loss(row, left(row) - value[row]));
     let extreme_row = kept.iter().copied().max_by(|&a, &b| value[a].abs().total_cmp(&value[b].abs()))?;
     let explained = if before > 0.0 { (1.0 - after / before).clamp(0.0, 1.0) } else { 0.0 };
     let spectrum = kind.orders.as_ref().map_or_else(Vec::new, |orders| spectrum(orders, &remainder.amplitudes));

@@ -2,7 +2,8 @@
 
 use super::adequacy::{TestKind, adequacy};
 use super::base::Bound;
-use super::calculator::{JobOf, ResultOf, stage};
+use super::calculator::{JobOf, Measured, ResultOf, stage};
+use super::classes;
 use super::data::Data;
 use super::downstream::downstream;
 use super::foundation::Foundation;
@@ -20,9 +21,7 @@ use super::said::{basis, doubts, explanation, warnings};
 use super::subject::{Setting, Subject};
 use super::view::View;
 use super::weigh::{Effort, Verdict, Weighing};
-use crate::calculator::{
-    Answer, Diagnosable, Failure, Inapplicability, Measurement, Monitor, Prediction, Rows, Smooth,
-};
+use crate::calculator::{Answer, Diagnosable, Failure, Inapplicability, Measurement, Monitor, Prediction, Smooth};
 
 /// Sets that are listed.
 const LISTED_SETS: usize = 20;
@@ -33,12 +32,12 @@ pub(super) const STAGE_CODES: &[&str] =
 /// The whole answer.
 pub(super) fn answer<M: Diagnosable>(
     job: &JobOf<M>,
-    places: &Rows<M::Run, M::Point>,
-    used: &[usize],
+    measured: &Measured<M::Run, M::Point>,
     bound: &Bound<M>,
     data: &Data,
     monitor: &dyn Monitor,
 ) -> Result<Answer<ResultOf<M>>, Failure> {
+    let Measured { places, used, .. } = measured;
     stage(monitor, 0.05, "diagnosis_stage_signatures");
     let mut foundation = Foundation::of(bound, data, monitor)?;
     let found = foundation.outliers();
@@ -80,6 +79,9 @@ pub(super) fn answer<M: Diagnosable>(
         if refusal.is_none() { view.contributions(job.options.negligible_below)? } else { (Vec::new(), None) };
     let mut warnings = warnings(&job.options, &weighing, &found, used, refusal.is_none(), gain.is_some());
     let (signatures, separations) = view.signatures()?;
+    let classes = classes::report(bound, &weighing, measured, extended.prediction.as_deref(), &effects, gain.as_ref())?;
+    // Of classes a root mean square means nothing.
+    let gain = gain.filter(|_| classes.is_none());
     let output = DiagnosisResult {
         verdict: if refusal.is_some() { VerdictClass::Refused } else { view.class() },
         named,
@@ -115,6 +117,7 @@ pub(super) fn answer<M: Diagnosable>(
             .map(|shape| remainder_report(shape, used)),
         effects,
         gain: gain.as_ref().map(gain_report),
+        classes,
         downstream,
         next_measurement: next.map(|next| view.next_report(next)),
         rows: row_columns::<M>(job, used, &foundation, &weighing, &extended),
@@ -170,6 +173,7 @@ fn test_name(kind: TestKind) -> &'static str {
         TestKind::SmoothDirections => "smooth_directions",
         TestKind::LjungBox => "ljung_box",
         TestKind::Runs => "runs",
+        TestKind::Deviance => "deviance",
     }
 }
 
@@ -181,6 +185,7 @@ fn noise_report(weighing: &Weighing<'_>) -> NoiseReport {
         NoiseSource::Repeats => ("repeats", None),
         NoiseSource::Profile => ("profile", None),
         NoiseSource::Regression => ("regression", None),
+        NoiseSource::Spread => ("spread", None),
     };
     NoiseReport {
         standard_deviation: noise.sigma,
@@ -248,7 +253,7 @@ fn row_columns<M: Diagnosable>(
         row: used.iter().map(|&row| row_number(row)).collect(),
         run: used.iter().map(|&row| rows[row].run()).collect(),
         place: all.clone().map(place).collect(),
-        measured: foundation.data.value.clone(),
+        measured: foundation.data.sides.as_ref().unwrap_or(&foundation.data.value).clone(),
         base: all.clone().map(base).collect(),
         extended: all
             .clone()

@@ -2,6 +2,7 @@
 
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
+use super::classes;
 use super::identify::{COLLINEAR_ABOVE, CONFOUNDED_BELOW};
 use super::input::DiagnosisOptions;
 use super::noise::NoiseSource;
@@ -30,6 +31,8 @@ pub(super) const WARNING_CODES: &[&str] = &[
     "swapped_columns",
     "rows_for_causes",
     "nothing_held_back",
+    "one_class",
+    "classes_against_all",
     "finer_structure",
     "collinear_causes",
     "outlying_run",
@@ -47,6 +50,7 @@ pub(super) const EXPLANATION_CODES: &[&str] = &[
     "diagnosis_too_few_rows",
     "diagnosis_base_fails",
     "diagnosis_gain",
+    "diagnosis_class_gain",
     "diagnosis_next",
     "diagnosis_negligible",
     "diagnosis_downstream",
@@ -109,6 +113,11 @@ fn odd_rows(leave_out: bool, weighing: &Weighing<'_>, found: &Outliers, used: &[
         warnings.push(Finding::new("scatter_unlike_stated", "/measurements").value(scatter_factor, "1"));
     }
     let data = foundation.data;
+    if data.sides.is_some() {
+        // Equal classes are no copies of each other.
+        warnings.extend(classes::warnings(weighing, used));
+        return warnings;
+    }
     warnings.extend(copied_traces(data).into_iter().map(|(first, second)| {
         Finding::new("copied_sweeps", "/measurements").with("first", first + 1).with("second", second + 1)
     }));
@@ -247,6 +256,15 @@ pub(super) fn explanation<E: utoipa::ToSchema, R: utoipa::ToSchema>(
                 .with("quantity", quantity.name)
                 // Errors of logarithms are shares.
                 .with("unit", if quantity.logarithmic { "" } else { quantity.unit }),
+        );
+    }
+    if let Some(held_out) = output.classes.as_ref().and_then(|classes| classes.held_out.as_ref()) {
+        said.push(
+            Message::new("diagnosis_class_gain")
+                .with("base", held_out.share_right_base)
+                .with("extended", held_out.share_right_extended)
+                .with("base_score", held_out.log_score_base)
+                .with("extended_score", held_out.log_score_extended),
         );
     }
     said.extend(output.downstream.iter().map(|downstream| {

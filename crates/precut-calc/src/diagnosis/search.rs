@@ -2,9 +2,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::evidence::{Evidence, Normal, Scale, Side, log_mean_exp, log_sum_exp};
+use super::evidence::{Evidence, Normal, Side, log_sum_exp};
+use super::likelihood::Likelihood;
 use super::subject::{Setting, Subject};
-use super::whiten::{White, Whitener};
+use super::whiten::White;
 use crate::calculator::{Failure, Hypothesis, Monitor, Treatment, checkpoint};
 
 /// Singles that may have partners.
@@ -13,6 +14,8 @@ const LEADING_SINGLES: usize = 6;
 const LEADING_PAIRS: usize = 6;
 /// A signature shorter than this, whitened and at one prior standard deviation, cannot be seen.
 const VISIBLE: f64 = 0.05;
+/// Variants of a hypothesis that are tried beside another, where every evidence takes Newton's method.
+const NARROWED: usize = 3;
 /// Prior weights of none, one, two, three causes together.
 const PRIOR: [f64; 4] = [0.5, 0.38, 0.10, 0.02];
 
@@ -152,10 +155,11 @@ pub(super) struct Linear<'a> {
     gram: DMatrix<f64>,
     right: DVector<f64>,
     square: f64,
-    pub(super) scale: Scale,
-    pub(super) rows: f64,
+    pub(super) likelihood: Likelihood,
     /// Hypotheses that these rows can see.
     pub(super) visible: Vec<usize>,
+    /// Of classes, whose evidence takes Newton's method: the variants of every hypothesis that explain most alone.
+    narrowed: Vec<Vec<usize>>,
 }
 
 /// A set of causes and how well it explains the rows.
@@ -188,12 +192,12 @@ impl<'a> Linear<'a> {
     pub(super) fn new(
         hypotheses: &'a [Hypothesis],
         signatures: &'a Signatures,
-        whitener: &Whitener,
+        likelihood: Likelihood,
         residual: &[f64],
-        scale: Scale,
     ) -> Self {
-        let white: Vec<White> = signatures.columns.iter().map(|column| whitener.white(column)).collect();
-        let residual = whitener.white(residual);
+        let white: Vec<White> = signatures.columns.iter().map(|column| likelihood.white(column)).collect();
+        let residual = likelihood.white(residual);
+        // Of classes as if every row stood on the boundary, where it says most.
         let Normal { gram, right, square } = Normal::of(&white.iter().collect::<Vec<_>>(), &residual);
         let seen = |h: &usize| {
             signatures.variants[*h].iter().any(|variant| {
@@ -202,8 +206,24 @@ impl<'a> Linear<'a> {
             })
         };
         let visible = (0..hypotheses.len()).filter(seen).collect();
-        let rows = whitener.rows();
-        Self { hypotheses, signatures, white, residual, gram, right, square, scale, rows, visible }
+        let narrowed = Vec::new();
+        let mut linear =
+            Self { hypotheses, signatures, white, residual, gram, right, square, likelihood, visible, narrowed };
+        if matches!(linear.likelihood, Likelihood::Probit(_)) {
+            linear.narrowed = (0..hypotheses.len()).map(|h| linear.most_telling(h)).collect();
+        }
+        linear
+    }
+
+    /// The variants of a hypothesis that explain most alone, ascending; at most [`NARROWED`].
+    fn most_telling(&self, hypothesis: usize) -> Vec<usize> {
+        let count = self.signatures.variants[hypothesis].len();
+        let alone = |v: usize| self.evidence(&[hypothesis], &[v]).map_or(f64::NEG_INFINITY, |found| found.log_z);
+        let mut ranked: Vec<(f64, usize)> = (0..count).map(|v| (alone(v), v)).collect();
+        ranked.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let mut kept: Vec<usize> = ranked.into_iter().take(NARROWED).map(|(_, v)| v).collect();
+        kept.sort_unstable();
+        kept
     }
 
     pub(super) fn variant(&self, hypothesis: usize, variant: usize) -> &Variant {
@@ -251,6 +271,10 @@ impl<'a> Linear<'a> {
     }
 
     fn evidence(&self, members: &[usize], variants: &[usize]) -> Option<Evidence> {
+        let Likelihood::Gaussian { whitener, scale } = &self.likelihood else {
+            let (columns, sides, residual) = self.parts(members, variants);
+            return self.likelihood.evidence(&columns, &residual, &sides);
+        };
         let (mut columns, mut sides, mut offsets) = (Vec::new(), Vec::new(), Vec::new());
         for (&h, &v) in members.iter().zip(variants) {
             let variant = self.variant(h, v);
@@ -268,15 +292,22 @@ impl<'a> Linear<'a> {
             square -= 2.0 * self.right[o];
             square += offsets.iter().map(|&p| self.gram[(o, p)]).sum::<f64>();
         }
-        Normal { gram, right, square }.evidence(&sides, self.scale, self.rows)
+        Normal { gram, right, square }.evidence(&sides, *scale, whitener.rows())
     }
 
     /// A set of causes: mean evidence over the product of the grids, and the best point.
     pub(super) fn candidate(&self, members: Vec<usize>, log_prior: f64) -> Option<Candidate> {
         let mut points: Vec<Vec<usize>> = vec![Vec::new()];
+        let mut of_all = 1.0;
         for &h in &members {
             let count = self.signatures.variants[h].len();
-            points = points.into_iter().flat_map(|p| (0..count).map(move |v| [p.as_slice(), &[v]].concat())).collect();
+            of_all *= count as f64;
+            let tried = self.narrowed.get(h).filter(|_| members.len() > 1).cloned();
+            let tried = tried.unwrap_or_else(|| (0..count).collect());
+            points = points
+                .into_iter()
+                .flat_map(|p| tried.iter().map(move |&v| [p.as_slice(), &[v]].concat()).collect::<Vec<_>>())
+                .collect();
         }
         let mut found = Vec::with_capacity(points.len());
         for point in points {
@@ -289,7 +320,8 @@ impl<'a> Linear<'a> {
         let (variants, evidence) = found.swap_remove(best);
         Some(Candidate {
             members,
-            log_z: log_mean_exp(&all),
+            // Points of the product that are not tried add nothing to speak of to the mean over all of it.
+            log_z: log_sum_exp(&all) - of_all.ln(),
             best_log_z: evidence.log_z,
             log_prior,
             variants,

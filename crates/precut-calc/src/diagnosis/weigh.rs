@@ -1,8 +1,9 @@
 //! From rows to posterior weights and a verdict (`diagnosis/3.5`, `diagnosis/3.7`).
 
 use super::discrepancy::{self, Kind, Remainder};
-use super::evidence::{Normal, Scale, Side, log_sum_exp};
+use super::evidence::{Normal, Side, log_normal_cdf, log_sum_exp};
 use super::foundation::Foundation;
+use super::likelihood::Likelihood;
 use super::noise::Noise;
 use super::profile::{Profile, Profiler};
 use super::refine::{Fit, Refinement};
@@ -114,6 +115,7 @@ pub struct Weighing<'a> {
     pub keep: Vec<bool>,
     /// Scatter of the rows.
     pub noise: Noise,
+    /// Distances between predictions in standard deviations; of classes about the leading set.
     pub(super) whitener: Whitener,
     pub(super) linear: Linear<'a>,
     ranking: Ranking,
@@ -140,16 +142,14 @@ impl<'a> Weighing<'a> {
     ) -> Result<Self, Failure> {
         let Foundation { subject, data, residual, nuisances, signatures, .. } = foundation;
         let noise = Noise::of(data, residual, &keep, foundation.heavy_tails.as_deref());
-        let whitener = Whitener::new(data, &noise, nuisances, &keep);
-        let scale = Scale::of(&noise);
-        let linear = Linear::new(subject.hypotheses(), signatures, &whitener, residual, scale);
+        let likelihood = Likelihood::of(data, &noise, nuisances, &keep);
+        let linear = Linear::new(subject.hypotheses(), signatures, likelihood, residual);
         let candidates = linear.search(effort.most_causes, monitor)?;
         let refinement = Refinement {
             subject: *subject,
             value: &data.value,
             keep: &keep,
-            whitener: &whitener,
-            scale,
+            likelihood: &linear.likelihood,
             nonlinear: effort.nonlinear,
         };
         let mut ranking = Ranking { candidates, fits: Vec::new() };
@@ -157,7 +157,7 @@ impl<'a> Weighing<'a> {
         for _ in 0..effort.rounds {
             ranking.refine(&linear, &refinement, effort.late_leaders, [0; 4], monitor)?;
         }
-        let kinds = discrepancy::kinds(data, &whitener, noise.sigma);
+        let kinds = discrepancy::kinds(data, &linear.likelihood, noise.sigma);
         let mut weighed = ranking.weigh(&linear, &kinds, monitor)?;
         let total = log_sum_exp(&weighed.iter().map(|set| set.0).collect::<Vec<_>>());
         weighed.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.1.members.cmp(&b.1.members)));
@@ -171,6 +171,10 @@ impl<'a> Weighing<'a> {
         let none = sum(&|set| set.members.is_empty() && set.remainder.is_none());
         let unnamed = sum(&|set| set.remainder.is_some());
         let inclusion = (0..subject.hypotheses().len()).map(|h| sum(&|set| set.members.contains(&h))).collect();
+        let whitener = match &linear.likelihood {
+            Likelihood::Gaussian { whitener, .. } => whitener.clone(),
+            Likelihood::Probit(_) => about_leader(foundation, &sets, &noise, &keep)?,
+        };
         let at_limit =
             |set: &SetWeight| ranking.fit(&set.members).is_some_and(|fit| at_limit(fit, subject.hypotheses()));
         let verdict = verdict(&sets, none, unnamed, &at_limit);
@@ -197,8 +201,7 @@ impl<'a> Weighing<'a> {
             subject: self.foundation.subject,
             value: &self.foundation.data.value,
             keep: &self.keep,
-            whitener: &self.whitener,
-            scale: self.linear.scale,
+            likelihood: &self.linear.likelihood,
             nonlinear: dear,
         };
         let of_fit = |k: &usize| {
@@ -210,12 +213,13 @@ impl<'a> Weighing<'a> {
     }
 
     /// n ln(RSS/n) + k ln n of a set without a remainder, RSS whitened and at the fit without priors. Where it has a
-    /// remainder its sizes are as many as one likes, and there is none.
+    /// remainder its sizes are as many as one likes, and there is none; nor of classes.
     pub(super) fn bic(&self, set: &SetWeight) -> Option<f64> {
+        let Likelihood::Gaussian { whitener, .. } = &self.linear.likelihood else { return None };
         let candidate = self.ranking.candidates.iter().find(|candidate| candidate.members == set.members)?;
         let (columns, residual, _) = self.ranking.parts(&self.linear, candidate);
         let misfit = Normal::of(&columns, &residual).misfit().max(f64::MIN_POSITIVE);
-        let rows = self.linear.rows;
+        let rows = whitener.rows();
         set.remainder.is_none().then(|| rows * (misfit / rows).ln() + columns.len() as f64 * rows.ln())
     }
 
@@ -242,7 +246,20 @@ impl<'a> Weighing<'a> {
         }
         let candidate = self.ranking.candidates.iter().find(|candidate| candidate.members == set.members)?;
         let (columns, residual, _) = self.ranking.parts(&self.linear, candidate);
-        kind.deviation(remainder, &columns, &residual)
+        kind.deviation(remainder, &columns, &residual, &self.linear.likelihood)
+    }
+
+    /// What a row costs a prediction that leaves so much: the square; of a class twice minus the log-probability of it.
+    pub(super) fn loss(&self, row: usize, left: f64) -> f64 {
+        match &self.foundation.data.sides {
+            None => left * left,
+            Some(sides) => -2.0 * log_normal_cdf(-sides[row] * left / self.scatter(row)),
+        }
+    }
+
+    /// Standard deviation of a row about its prediction, without allowances.
+    pub(super) fn scatter(&self, row: usize) -> f64 {
+        self.noise.per_row.as_ref().map_or(self.noise.sigma, |own| own[row])
     }
 
     /// Variance of a row: scatter and allowances.
@@ -250,6 +267,14 @@ impl<'a> Weighing<'a> {
         let sigma = self.noise.per_row.as_ref().map_or(self.noise.sigma, |own| own[row]);
         let allowed: f64 = self.foundation.nuisances.iter().map(|column| column[row] * column[row]).sum();
         sigma * sigma + allowed
+    }
+
+    /// Columns of a fit in the coordinates of `whitener`, each up to a factor.
+    pub(super) fn directions(&self, fit: &Fit) -> Vec<White> {
+        match &self.linear.likelihood {
+            Likelihood::Gaussian { .. } => fit.columns.clone(),
+            Likelihood::Probit(_) => fit.slopes.iter().map(|slope| self.whitener.white(slope)).collect(),
+        }
     }
 
     /// Rows of a run that count.
@@ -262,6 +287,24 @@ impl<'a> Weighing<'a> {
     pub fn named_sets(&self) -> impl Iterator<Item = &SetWeight> {
         self.sets.iter().filter(|set| set.remainder.is_none() && !set.members.is_empty())
     }
+}
+
+/// What classes tell of margins near those of the leading set.
+fn about_leader(
+    foundation: &Foundation<'_>,
+    sets: &[SetWeight],
+    noise: &Noise,
+    keep: &[bool],
+) -> Result<Whitener, Failure> {
+    let leader = sets.iter().find(|set| set.remainder.is_none() && !set.members.is_empty());
+    let margin: Vec<f64> = match leader {
+        Some(set) => {
+            let with = foundation.subject.predict(&set.settings)?;
+            with.iter().zip(&foundation.base).map(|(with, base)| with.unwrap_or(*base)).collect()
+        }
+        None => foundation.base.clone(),
+    };
+    Ok(Whitener::new(foundation.data, &noise.informed(&margin), &foundation.nuisances, keep))
 }
 
 /// Candidates, and the fits of those that were refined.
@@ -352,7 +395,7 @@ impl Ranking {
 
     fn beside(&self, linear: &Linear<'_>, kinds: &[Kind], candidate: &Candidate) -> Option<Remainder> {
         let (columns, residual, sides) = self.parts(linear, candidate);
-        discrepancy::beside(kinds, &columns, &residual, &sides, linear.scale, linear.rows)
+        discrepancy::beside(kinds, &columns, &residual, &sides, &linear.likelihood)
     }
 
     /// Columns of a set, the residual that they are to explain, and their sides: about the fit where it was made.

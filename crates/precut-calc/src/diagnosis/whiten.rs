@@ -27,6 +27,21 @@ pub(super) struct White {
 }
 
 impl White {
+    /// Without correlation and allowances.
+    pub(super) fn plain(own: Vec<f64>) -> Self {
+        Self { own, allowed: Vec::new() }
+    }
+
+    /// Row by row.
+    pub(super) fn own(&self) -> &[f64] {
+        &self.own
+    }
+
+    pub(super) fn times(&self, factor: f64) -> Self {
+        let of = |values: &[f64]| values.iter().map(|v| factor * v).collect();
+        Self { own: of(&self.own), allowed: of(&self.allowed) }
+    }
+
     /// a' C^-1 b.
     pub(super) fn inner(&self, other: &Self) -> f64 {
         dot(&self.own, &other.own) - dot(&self.allowed, &other.allowed)

@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::calculator::{
-    Consequence, Cost, Design, Diagnosable, Example, Failure, Finding, ForwardModel, Hypotheses, Hypothesis,
-    JacobianColumn, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows, checkpoint,
+    ClassLimits, Consequence, Cost, Design, Diagnosable, Example, Failure, Finding, ForwardModel, Hypotheses,
+    Hypothesis, JacobianColumn, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows, checkpoint,
 };
 use crate::effects::{Cause, FIXTURE_CAUSES, FixtureEffect};
 
@@ -27,6 +27,12 @@ pub struct FixtureAllowances {
     /// Level of all amplitudes (calibration of the gauge, force level), as a share.
     #[schema(minimum = 0.0, maximum = 1.0, example = 0.005, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("s_A"))))]
     pub amplitude_level_rel: f64,
+    /// Scatter from cut to cut of the depth at which chatter begins, as a share: what makes a class uncertain near the limit.
+    #[schema(minimum = 0.001, maximum = 1.0, example = 0.05, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("s_H"))))]
+    pub limit_scatter_rel: f64,
+    /// Scatter from cut to cut of the clamp force over what the cut asks for, as a share.
+    #[schema(minimum = 0.001, maximum = 1.0, example = 0.1, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("s_F"))))]
+    pub clamp_scatter_rel: f64,
     /// Zero of the time of each history.
     #[schema(minimum = 0.0, maximum = 1000.0, example = 0.05, extensions(("x-unit" = json!("ms")), ("x-symbol" = json!("s_t"))))]
     pub time_zero_ms: f64,
@@ -34,7 +40,7 @@ pub struct FixtureAllowances {
 
 impl Default for FixtureAllowances {
     fn default() -> Self {
-        Self { amplitude_level_rel: 0.005, time_zero_ms: 0.05 }
+        Self { amplitude_level_rel: 0.005, limit_scatter_rel: 0.05, clamp_scatter_rel: 0.1, time_zero_ms: 0.05 }
     }
 }
 
@@ -76,6 +82,28 @@ pub struct FixturePoint {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 0.0, maximum = 1000.0, example = 0.05, extensions(("x-unit" = json!("s")), ("x-symbol" = json!("t"))))]
     pub time_s: Option<f64>,
+    /// Of a class: the margin that is asked for.
+    #[serde(skip)]
+    pub margin: RegimeMargin,
+}
+
+/// What decides how a cut goes.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum RegimeMargin {
+    /// Distance from chatter (`fixture/7.1`).
+    #[default]
+    Chatter,
+    /// Distance from a joint that opens (`fixture/7.2`).
+    Opening,
+}
+
+impl RegimeMargin {
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Chatter => "chatter",
+            Self::Opening => "opening",
+        }
+    }
 }
 
 /// What was measured.
@@ -91,6 +119,8 @@ const QUANTITIES: &[Quantity] = &[
     Quantity { name: "peak_to_peak_um", unit: "um", logarithmic: true },
     Quantity { name: "displacement_um", unit: "um", logarithmic: false },
     Quantity { name: "depth_limit_mm", unit: "mm", logarithmic: true },
+    // A class: what is predicted is its margin, a difference of logarithms.
+    Quantity { name: "regime", unit: "1", logarithmic: false },
 ];
 
 impl Measure {
@@ -98,7 +128,6 @@ impl Measure {
         match name {
             "peak_to_peak_um" => Some(Self::PeakToPeak),
             "displacement_um" => Some(Self::Displacement),
-            // A margin, not a value that anything reads off a machine: for comparing, not for measured rows.
             "regime" => Some(Self::Regime),
             "depth_limit_mm" => Some(Self::DepthLimit),
             _ => None,
@@ -145,6 +174,9 @@ impl ForwardModel for FixtureStability {
             if measure == Measure::Displacement && point.time_s.is_none() {
                 faults.push(Finding::new("time_missing", format!("/measurements/{row}/time_s")));
             }
+            if point.margin == RegimeMargin::Opening && base.holding.clamp_force_n.is_none() {
+                faults.push(Finding::new("opened_without_clamp_force", format!("/measurements/{row}/regime")));
+            }
             prepared.push(PreparedRow {
                 run: *run,
                 working: Working {
@@ -154,12 +186,13 @@ impl ForwardModel for FixtureStability {
                 },
                 time_since_clamping_min: of.time_since_clamping_min.or(job.conditions.time_since_clamping_min),
                 time_s: point.time_s.unwrap_or(0.0),
+                margin: point.margin,
             });
         }
         if !faults.is_empty() {
             return Err(PrepareError::Invalid(faults));
         }
-        Ok(PreparedFixture::new(job.clone(), base, prepared, measure, Rules::new()))
+        PreparedFixture::new(job.clone(), base, prepared, measure, Rules::new()).map_err(PrepareError::Failed)
     }
 
     fn predict(prepared: &PreparedFixture, effects: &[FixtureEffect]) -> Result<Vec<Prediction>, Failure> {
@@ -174,14 +207,13 @@ impl ForwardModel for FixtureStability {
         let level = allowances.amplitude_level_rel;
         match prepared.measure {
             // A level moves every logarithm alike.
-            Measure::PeakToPeak | Measure::DepthLimit => Ok(vec![vec![level; prepared.rows.len()]]),
+            Measure::PeakToPeak | Measure::DepthLimit | Measure::Regime => Ok(vec![vec![level; prepared.rows.len()]]),
             Measure::Displacement => {
                 let base = prepared.predicted(&[], Ask::default())?;
                 let mut columns = vec![base.iter().map(|value| value.map_or(0.0, |value| level * value)).collect()];
                 columns.extend(prepared.late_by_ms(allowances.time_zero_ms)?);
                 Ok(columns)
             }
-            Measure::Regime => Ok(Vec::new()),
         }
     }
 
@@ -193,11 +225,18 @@ impl ForwardModel for FixtureStability {
 impl Diagnosable for FixtureStability {
     type Row = FixtureMeasurement;
 
-    const DIAGNOSES: &'static [Example] = &[Example {
-        id: "fixture",
-        title: "Amplitudes at four speeds and six depths: the vise is softer than stated",
-        job: include_str!("examples/diagnosis_stiffness.json"),
-    }];
+    const DIAGNOSES: &'static [Example] = &[
+        Example {
+            id: "fixture",
+            title: "Amplitudes at four speeds and six depths: the vise is softer than stated",
+            job: include_str!("examples/diagnosis_stiffness.json"),
+        },
+        Example {
+            id: "fixture_classes",
+            title: "Cuts at five speeds, each stable, chattering, or with a joint that opened",
+            job: include_str!("examples/diagnosis_classes.json"),
+        },
+    ];
 
     fn hypotheses(prepared: &PreparedFixture) -> Hypotheses {
         Experiment { prepared }.hypotheses()
@@ -209,6 +248,18 @@ impl Diagnosable for FixtureStability {
 
     fn design(prepared: &PreparedFixture) -> Design {
         design(prepared)
+    }
+
+    fn spreads(prepared: &PreparedFixture, allowances: &FixtureAllowances) -> Option<Vec<f64>> {
+        let of = |row: &PreparedRow| match row.margin {
+            RegimeMargin::Chatter => allowances.limit_scatter_rel,
+            RegimeMargin::Opening => allowances.clamp_scatter_rel,
+        };
+        (prepared.measure == Measure::Regime).then(|| prepared.rows.iter().map(of).collect())
+    }
+
+    fn class_limits(prepared: &PreparedFixture, effects: &[FixtureEffect]) -> Result<Option<ClassLimits>, Failure> {
+        if prepared.measure == Measure::Regime { prepared.class_limits(effects).map(Some) } else { Ok(None) }
     }
 
     fn next_runs(

@@ -3,7 +3,7 @@
 use super::forward::Measure;
 use super::predict::{PreparedFixture, PreparedRow};
 use crate::calculator::{
-    Design, Grouping, Hypotheses, Hypothesis, Inapplicability, Inapplicable, Range, Smooth, Treatment, Variable,
+    Design, Grouping, Hypotheses, Hypothesis, Inapplicability, Inapplicable, Range, Shape, Smooth, Treatment, Variable,
 };
 use crate::effects::{Cause, FIXTURE_CAUSES, Fit, FixtureEffect, Parameter};
 
@@ -15,6 +15,20 @@ const RUNOUT_SHARE: f64 = 0.9;
 const NO_MASS_KG: f64 = 1e-4;
 /// Sizes about which a runout is linearised, prior standard deviations.
 const EXPANSIONS: [f64; 4] = [0.25, 0.5, 1.0, 2.0];
+/// Prior standard deviation of a mass that swings on the workpiece, as a share of the workpiece's.
+const HUNG_SHARE: f64 = 0.1;
+/// Sizes about which it is linearised, prior standard deviations: a resonance splits in two by the root of the ratio of the
+/// masses, which is more than its width from a hundredth of the workpiece on.
+const HUNG_EXPANSIONS: [f64; 2] = [0.1, 0.4];
+/// Its frequencies, as shares of those of the vise: from below the lowest to where it is but one more mass.
+const HUNG_FREQUENCIES: (f64, f64) = (0.7, 2.2);
+/// From one frequency to the next: the width of a resonance of 5 % damping.
+const HUNG_STEP: f64 = 1.1;
+/// Most frequencies, where the vise has two modes far apart.
+const MOST_FREQUENCIES: usize = 24;
+/// Prior of the frequency's logarithm about 1.2 times the middle of the vise's, of the damping ratio's about 0.03.
+const HUNG_FREQUENCY_SD: f64 = 0.35;
+const HUNG_DAMPING: Shape = Shape { mean: -3.506_557_897_319_982, sd: 0.4, logarithmic: true };
 
 /// What decides which causes rows can speak about.
 pub(super) struct Experiment<'a> {
@@ -47,8 +61,11 @@ impl Experiment<'_> {
             }
             "tooth_runout" => nothing(base.cutting.teeth > 1),
             "jaw_mass" => nothing(base.holding.jaw.is_some()),
-            // Stable amplitudes and limits are those of closed joints: only a history shows one that opens.
-            "preload_loss" if *measure != Measure::Displacement || base.holding.clamp_force_n.is_none() => {
+            // Stable amplitudes and limits are those of closed joints: a history shows one that opens, and a class.
+            "preload_loss"
+                if !matches!(measure, Measure::Displacement | Measure::Regime)
+                    || base.holding.clamp_force_n.is_none() =>
+            {
                 nothing(false)
             }
             "preload_loss" if rows.iter().any(|row| row.time_since_clamping_min.is_none()) => {
@@ -80,9 +97,10 @@ impl Experiment<'_> {
                 upper = feeds.fold(upper, |least, feed| least.min(RUNOUT_SHARE * feed));
                 lower = -upper;
             }
-            // The catalogue's least mass keeps an effect of a job finite; here none is none.
-            "second_mode" if parameter.name == "mass_kg" => lower = 0.0,
             _ => {}
+        }
+        if cause.kind == "second_mode" {
+            return self.hung(parameter, Range { lower, upper });
         }
         let treatment = match parameter.fit {
             Fit::Amplitude | Fit::Factor => Treatment::Amplitude { prior_sd: parameter.prior_sd },
@@ -98,6 +116,33 @@ impl Experiment<'_> {
             }
             _ => Variable { name: parameter.name, unit: parameter.unit, treatment, range: Range { lower, upper } },
         }
+    }
+}
+
+impl Experiment<'_> {
+    /// What swings on the workpiece, in the measures of workpiece and vise: beside a resonance it shows only near its own
+    /// frequency, so a grid that does not follow the vise passes it by.
+    fn hung(&self, parameter: &Parameter, range: Range) -> Variable {
+        let holding = &self.prepared.base.holding;
+        let modes = holding.modes();
+        let (lowest, highest) = modes
+            .iter()
+            .fold((f64::INFINITY, 0.0_f64), |(low, high), mode| (low.min(mode.natural_hz), high.max(mode.natural_hz)));
+        let treatment = match parameter.name {
+            "mass_kg" => Treatment::Amplitude { prior_sd: HUNG_SHARE * holding.mass_kg },
+            "frequency_hz" => {
+                let (from, to) = (HUNG_FREQUENCIES.0 * lowest, HUNG_FREQUENCIES.1 * highest);
+                let steps = std::iter::successors(Some(from), |hz| Some(hz * HUNG_STEP));
+                let prior =
+                    Shape { mean: (1.2 * (lowest * highest).sqrt()).ln(), sd: HUNG_FREQUENCY_SD, logarithmic: true };
+                let grid = steps.take_while(|hz| *hz <= to).take(MOST_FREQUENCIES).collect();
+                Treatment::Shape { grid, prior: Some(prior) }
+            }
+            _ => Treatment::Shape { grid: vec![HUNG_DAMPING.mean.exp()], prior: Some(HUNG_DAMPING) },
+        };
+        // The catalogue's least mass keeps an effect of a job finite; here none is none.
+        let lower = if parameter.name == "mass_kg" { 0.0 } else { range.lower };
+        Variable { name: parameter.name, unit: parameter.unit, treatment, range: Range { lower, ..range } }
     }
 }
 
@@ -120,7 +165,7 @@ pub(super) fn effects(hypothesis: &Hypothesis, values: &[f64]) -> Option<Vec<Fix
 }
 
 /// Sizes about which a hypothesis is linearised beside 0: the amplitude of a cutter grows with a tooth that stands out to
-/// either side, so that a straight line through none of it shows nothing.
+/// either side, so that a straight line through none of it shows nothing; and a mass that swings splits a resonance.
 pub(super) fn expansions(hypothesis: &Hypothesis) -> Vec<f64> {
     match (hypothesis.cause.kind, hypothesis.variables.as_slice()) {
         ("tooth_runout", [Variable { treatment: Treatment::Amplitude { prior_sd }, range, .. }]) => EXPANSIONS
@@ -129,6 +174,9 @@ pub(super) fn expansions(hypothesis: &Hypothesis) -> Vec<f64> {
             .filter(|size| *size < range.upper)
             .flat_map(|size| [size, -size])
             .collect(),
+        ("second_mode", [Variable { treatment: Treatment::Amplitude { prior_sd }, .. }, ..]) => {
+            HUNG_EXPANSIONS.iter().map(|share| share * prior_sd).collect()
+        }
         _ => Vec::new(),
     }
 }
@@ -160,7 +208,7 @@ pub(super) fn design(prepared: &PreparedFixture) -> Design {
     let at_depth = |row: &PreparedRow| if limit { 0 } else { depth(row) };
     let cell = numbered(&|row| {
         let (speed, feed, clamped) = row.regime();
-        [speed, feed, clamped, at_depth(row), 0]
+        [speed, feed, clamped, at_depth(row), row.margin as u64]
     });
     let per_speed = numbered(&|row| [speed(row), 0, 0, 0, 0]);
     let mut groupings = vec![Grouping { name: "per_speed", group: per_speed.clone() }];

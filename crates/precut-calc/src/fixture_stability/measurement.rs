@@ -4,10 +4,11 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::FixtureStability;
-use super::forward::FixturePoint;
-use crate::calculator::{MeasuredRow, Measurement};
+use super::forward::{FixturePoint, RegimeMargin};
+use super::input::FixtureJob;
+use crate::calculator::{MeasuredRow, Measurement, Reading};
 
-/// An amplitude at a depth, a point of a history, or a depth at which chatter began.
+/// An amplitude at a depth, a point of a history, a depth at which chatter began, or how a cut went.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FixtureMeasurement {
@@ -39,6 +40,10 @@ pub struct FixtureMeasurement {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 0.000_001, maximum = 1000.0, example = 3.2, extensions(("x-symbol" = json!("a_lim")), ("x-unit" = json!("mm"))))]
     pub depth_limit_mm: Option<f64>,
+    /// How the cut at this depth went.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(inline, example = "stable")]
+    pub regime: Option<ObservedRegime>,
     /// Standard uncertainty of an amplitude or a displacement.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-9, maximum = 1e6, example = 0.2, extensions(("x-symbol" = json!("u")), ("x-unit" = json!("um"))))]
@@ -51,6 +56,40 @@ pub struct FixtureMeasurement {
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     #[schema(default = false, example = false)]
     pub excluded: bool,
+}
+
+/// How a cut went.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ObservedRegime {
+    /// The workpiece moved with the teeth alone, in closed joints.
+    Stable,
+    /// It swung up by itself, whatever the joints did then.
+    Chatter,
+    /// A joint opened in a cut that had not begun to chatter.
+    Opened,
+}
+
+impl ObservedRegime {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Stable => "stable",
+            Self::Chatter => "chatter",
+            Self::Opened => "opened",
+        }
+    }
+
+    /// The margins that this class speaks about, with the side of zero on which each lay. Of a chattering cut nobody knows
+    /// whether the forced motion alone would have opened a joint.
+    fn sides(self, has_clamp_force: bool) -> Vec<(RegimeMargin, f64)> {
+        let quiet = (RegimeMargin::Chatter, 1.0);
+        match self {
+            Self::Chatter => vec![(RegimeMargin::Chatter, -1.0)],
+            Self::Opened => vec![quiet, (RegimeMargin::Opening, -1.0)],
+            Self::Stable if has_clamp_force => vec![quiet, (RegimeMargin::Opening, 1.0)],
+            Self::Stable => vec![quiet],
+        }
+    }
 }
 
 fn one() -> u32 {
@@ -73,7 +112,8 @@ impl Measurement for FixtureMeasurement {
     }
 
     fn point(&self) -> FixturePoint {
-        FixturePoint { depth_mm: self.depth_mm, repeat: Some(self.repeat), time_s: self.time_s }
+        let margin = RegimeMargin::default();
+        FixturePoint { depth_mm: self.depth_mm, repeat: Some(self.repeat), time_s: self.time_s, margin }
     }
 
     fn value(&self, quantity: &str) -> Option<f64> {
@@ -81,8 +121,25 @@ impl Measurement for FixtureMeasurement {
             "peak_to_peak_um" => self.peak_to_peak_um,
             "displacement_um" => self.displacement_um,
             "depth_limit_mm" => self.depth_limit_mm,
+            "regime" => self.regime.map(|class| if class == ObservedRegime::Stable { 1.0 } else { -1.0 }),
             _ => None,
         }
+    }
+
+    fn readings(&self, job: &FixtureJob, quantity: &str) -> Vec<Reading<FixturePoint>> {
+        let Some(class) = self.regime.filter(|_| quantity == "regime") else {
+            let value = self.value(quantity);
+            return value
+                .map(|value| Reading { point: self.point(), value, class: "", asks: "" })
+                .into_iter()
+                .collect();
+        };
+        let (_, _, _, clamp_force_n) = job.fixture.common();
+        let of = |(margin, value): (RegimeMargin, f64)| {
+            let point = FixturePoint { margin, ..self.point() };
+            Reading { point, value, class: class.name(), asks: margin.name() }
+        };
+        class.sides(clamp_force_n.is_some()).into_iter().map(of).collect()
     }
 
     fn uncertainty(&self) -> Option<f64> {

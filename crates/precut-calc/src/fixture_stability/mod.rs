@@ -24,6 +24,7 @@ pub mod identification;
 mod input;
 mod lobes;
 mod march;
+mod margins;
 mod measurement;
 mod next_runs;
 mod output;
@@ -34,13 +35,13 @@ mod response;
 mod simulate;
 mod zeroth;
 
-pub use forward::{FixtureAllowances, FixturePoint, FixtureRun};
+pub use forward::{FixtureAllowances, FixturePoint, FixtureRun, RegimeMargin};
 pub use input::{
     Analysis, ConstantForce, Entry, FaceMill, FeedToward, FixtureJob, LimitSettings, LimitSpeed, LobeSettings,
     MAX_MAP_POINTS, MillingCut, MillingForce, Regeneration, SelfLocking, SimulationSettings, Spindle, SpindlePoint,
     Vise, ViseJoint,
 };
-pub use measurement::FixtureMeasurement;
+pub use measurement::{FixtureMeasurement, ObservedRegime};
 pub use output::{
     AmplitudeCurve, ArcProfile, ChatterKind, ClampForce, CuttingDrive, DepthLimits, Engagement, FirstLimit,
     FixtureOutcome, FixtureState, FixtureVerdict, FloquetMultiplier, ForcedMotion, Histories, LobeBoundary,
@@ -220,7 +221,7 @@ fn basis(job: &FixtureJob) -> Vec<Basis> {
 
 /// Everything that this calculator may utter, from where it is said.
 const CODES: Codes = Codes {
-    faults: &[check::CODES, &["time_missing"]],
+    faults: &[check::CODES, &["time_missing", "opened_without_clamp_force"]],
     failures: &[&["undamped_resonance"]],
     warnings: &[advice::WARNING_CODES],
     explanations: &[advice::EXPLANATION_CODES],

@@ -11,7 +11,7 @@ use super::acting::Case;
 use super::answer::{UM_PER_MM, forced};
 use super::check;
 use super::floquet::Working;
-use super::forward::Measure;
+use super::forward::{Measure, RegimeMargin};
 use super::holding::Closed;
 use super::input::FixtureJob;
 use super::lobes::{Rules, critical_depth, point};
@@ -36,9 +36,11 @@ pub struct PreparedFixture {
     pub(super) base: Case,
     pub(super) rows: Vec<PreparedRow>,
     pub(super) measure: Measure,
-    rules: Rules,
+    pub(super) rules: Rules,
     /// Rows of one speed, feed and time since clamping.
     groups: Vec<Vec<usize>>,
+    /// Of classes: growth of ln|mu| with the logarithm of the depth where chatter begins in the base, by group.
+    pub(super) steepness: Vec<f64>,
 }
 
 /// A measured row's working point.
@@ -50,6 +52,8 @@ pub(super) struct PreparedRow {
     pub time_since_clamping_min: Option<f64>,
     /// Of a history.
     pub time_s: f64,
+    /// Of a class.
+    pub margin: RegimeMargin,
 }
 
 impl PreparedRow {
@@ -76,12 +80,25 @@ impl Default for Ask {
 }
 
 impl PreparedFixture {
-    pub(super) fn new(job: FixtureJob, base: Case, rows: Vec<PreparedRow>, measure: Measure, rules: Rules) -> Self {
+    pub(super) fn new(
+        job: FixtureJob,
+        base: Case,
+        rows: Vec<PreparedRow>,
+        measure: Measure,
+        rules: Rules,
+    ) -> Result<Self, Failure> {
         let mut groups: BTreeMap<_, Vec<usize>> = BTreeMap::new();
         for (index, row) in rows.iter().enumerate() {
             groups.entry(row.regime()).or_default().push(index);
         }
-        Self { job, base, rows, measure, rules, groups: groups.into_values().collect() }
+        let groups = groups.into_values().collect();
+        let mut prepared = Self { job, base, rows, measure, rules, groups, steepness: Vec::new() };
+        if measure == Measure::Regime {
+            let each: Result<Vec<f64>, Failure> =
+                prepared.groups.par_iter().map(|rows| prepared.steepness_of(rows)).collect();
+            prepared.steepness = each?;
+        }
+        Ok(prepared)
     }
 
     /// One value per row.
@@ -89,7 +106,7 @@ impl PreparedFixture {
         let mut all = self.job.effects.clone();
         all.extend_from_slice(effects);
         let of_groups: Vec<Vec<(usize, Prediction)>> =
-            self.groups.par_iter().map(|rows| self.group(rows, &all, ask)).collect::<Result<_, _>>()?;
+            (0..self.groups.len()).into_par_iter().map(|g| self.group(g, &all, ask)).collect::<Result<_, _>>()?;
         let mut predicted = vec![Err(Missing::NoSolution); self.rows.len()];
         for (row, prediction) in of_groups.into_iter().flatten() {
             predicted[row] = prediction;
@@ -97,7 +114,8 @@ impl PreparedFixture {
         Ok(predicted)
     }
 
-    fn group(&self, rows: &[usize], effects: &[FixtureEffect], ask: Ask) -> Result<Vec<(usize, Prediction)>, Failure> {
+    fn group(&self, group: usize, effects: &[FixtureEffect], ask: Ask) -> Result<Vec<(usize, Prediction)>, Failure> {
+        let rows = &self.groups[group];
         let first = &self.rows[rows[0]];
         let conditions = FixtureConditions { time_since_clamping_min: first.time_since_clamping_min };
         let case = Case::with(&self.job, effects, &conditions)
@@ -117,9 +135,14 @@ impl PreparedFixture {
                 predicted.extend(self.history(&case, &rows, ask)?);
                 continue;
             }
+            if self.measure == Measure::Regime {
+                predicted.extend(self.margins(&case, &rows, self.steepness[group], &mut unit)?);
+                continue;
+            }
             let prediction = match self.measure {
-                Measure::PeakToPeak => self.peak_to_peak(&case, &mut unit, ask)?,
-                Measure::Regime | Measure::Displacement => self.margin(&case)?,
+                Measure::PeakToPeak | Measure::Regime | Measure::Displacement => {
+                    self.peak_to_peak(&case, &mut unit, ask)?
+                }
                 Measure::DepthLimit => {
                     let most = 4.0 * working.depth_mm.max(2.5);
                     critical_depth(&self.rules, &case.holding, &case.cutting, working, most)?.ok_or(Missing::NoSolution)
@@ -151,17 +174,6 @@ impl PreparedFixture {
             None => unit.insert(forced(case, case.at_depth(1.0))?).x_mm.span(),
         };
         Ok(Ok(span * case.cutting.depth_power(case.working.depth_mm) * UM_PER_MM))
-    }
-
-    /// -ln |mu|, or the relative reserve of the clamp force where that is smaller.
-    fn margin(&self, case: &Case) -> Result<Prediction, Failure> {
-        let growth = -self.modulus(case)?.max(1e-300).ln();
-        let Some(force) = case.holding.clamp_force_n.filter(|_| growth > 0.0) else { return Ok(Ok(growth)) };
-        let forced = forced(case, case.working)?;
-        let asked = forced.left_elastic_n.high.max(forced.right_elastic_n.high).max(0.0);
-        // At no clamp force any demand opens: the reserve is then as bad as it gets.
-        let reserve = if asked <= 0.0 { f64::INFINITY } else { ((force - asked) / asked).max(-1.0) };
-        Ok(Ok(growth.min(reserve)))
     }
 
     /// x at the times of these rows after the entry: one cut in time, as long as the last row within it asks.
@@ -228,7 +240,7 @@ impl PreparedFixture {
         let (groups, cells) = (self.groups.len() as f64, cells.len() as f64);
         match self.measure {
             Measure::PeakToPeak => FORCED_MS * groups + (MULTIPLIER_MS + NOT_LINEAR_MS) * cells,
-            Measure::Regime => (FORCED_MS + MULTIPLIER_MS) * cells,
+            Measure::Regime => FORCED_MS * groups + (MULTIPLIER_MS + NOT_LINEAR_MS) * cells,
             Measure::DepthLimit => LIMIT_MS * cells,
             Measure::Displacement => (FORCED_MS + MULTIPLIER_MS) * cells + KEPT_STEP_MS * self.steps(),
         }

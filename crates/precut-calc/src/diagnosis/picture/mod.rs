@@ -1,6 +1,7 @@
 //! Pictures and tables of a diagnosis.
 
 mod causes;
+mod classes;
 mod rows;
 mod tables;
 
@@ -10,6 +11,7 @@ use crate::calculator::{Axis, Diagnosable, Figure, Frame, Message, Panel, Quanti
 pub(super) use tables::{TABLE_IDS, tables};
 
 pub(super) const FIGURE_IDS: &[&str] = &[
+    "classes",
     "residuals",
     "residuals_along",
     "residuals_by_run",
@@ -26,6 +28,14 @@ pub(super) const FIGURE_IDS: &[&str] = &[
     "remainder_spectrum",
 ];
 pub(super) const LABEL_CODES: &[&str] = &[
+    "diagnosis_classes",
+    "diagnosis_spindle_speed",
+    "diagnosis_depth",
+    "diagnosis_stable",
+    "diagnosis_chatter",
+    "diagnosis_opened",
+    "diagnosis_limit_base",
+    "diagnosis_limit_extended",
     "diagnosis_residuals",
     "diagnosis_residuals_along",
     "diagnosis_residuals_by_run",
@@ -84,10 +94,17 @@ pub(super) const LABEL_CODES: &[&str] = &[
 pub(super) fn figures<M: Diagnosable>(quantity: &str, output: &DiagnosisResult<M::Effect, M::Run>) -> Vec<Figure> {
     let quantity = M::QUANTITIES.iter().find(|known| known.name == quantity);
     let unit = unit_of(quantity);
-    let mut all = rows::residuals(output, unit);
-    all.push(causes::evidence::<M>(output));
-    all.extend(rows::predictions(output, unit));
-    all.extend(rows::signatures(output, unit));
+    let mut all = Vec::new();
+    // A class leaves no residual.
+    if let Some(classes) = &output.classes {
+        all.push(classes::plane(classes));
+        all.push(causes::evidence::<M>(output));
+    } else {
+        all.extend(rows::residuals(output, unit));
+        all.push(causes::evidence::<M>(output));
+        all.extend(rows::predictions(output, unit));
+        all.extend(rows::signatures(output, unit));
+    }
     all.extend(causes::separations(output));
     all.extend(causes::profiles::<M>(output));
     all.extend(causes::held_back(output, unit));

@@ -2,10 +2,11 @@
 
 use std::borrow::Cow;
 
+use super::super::classes::ClassReport;
 use super::super::output::{DiagnosisResult, NamedCause, ParameterReport, SetReport};
 use crate::calculator::{Column, Table};
 
-pub(in super::super) const TABLE_IDS: &[&str] = &["rows", "sets", "causes", "parameters", "next_runs"];
+pub(in super::super) const TABLE_IDS: &[&str] = &["rows", "sets", "causes", "parameters", "next_runs", "classes"];
 
 pub(in super::super) fn tables<E: utoipa::ToSchema, R: utoipa::ToSchema>(output: &DiagnosisResult<E, R>) -> Vec<Table> {
     let rows = &output.rows;
@@ -55,7 +56,32 @@ pub(in super::super) fn tables<E: utoipa::ToSchema, R: utoipa::ToSchema>(output:
         },
         parameters(output),
         next_runs(output),
+        classes(output),
     ]
+}
+
+/// Rows that are classes: what each model says of them.
+fn classes<E: utoipa::ToSchema, R: utoipa::ToSchema>(output: &DiagnosisResult<E, R>) -> Table {
+    let none = ClassReport::default();
+    let (classes, count) = output.classes.as_ref().map_or((&none, 0), |classes| (classes, output.rows.row.len()));
+    let words = |of: &[String]| of.iter().map(|word| Cow::Owned(word.clone())).collect::<Vec<_>>();
+    let numbers = |of: &[u32]| of.iter().take(count).map(|v| f64::from(*v)).collect::<Vec<f64>>();
+    let margins = |of: &[Option<f64>]| of.iter().take(count).copied().collect::<Vec<_>>();
+    Table {
+        id: "classes",
+        columns: vec![
+            Column::numbers("row", "1", &numbers(&output.rows.row)),
+            Column::numbers("run", "1", &numbers(&output.rows.run)),
+            Column::words("class", words(&classes.class)),
+            Column::words("margin", words(&classes.margin)),
+            Column::numbers("spindle_speed_rpm", "rev/min", &classes.spindle_speed_rpm),
+            Column::numbers("depth_mm", "mm", &classes.depth_mm),
+            Column::optional("margin_base", "1", &margins(&output.rows.base)),
+            Column::optional("margin_extended", "1", &margins(&output.rows.extended)),
+            Column::optional("probability_base", "1", &classes.probability_base),
+            Column::optional("probability_extended", "1", &classes.probability_extended),
+        ],
+    }
 }
 
 /// Fitted and stated values of the causes named, or of the sets that cannot be told apart.

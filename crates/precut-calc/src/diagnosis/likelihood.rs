@@ -1,0 +1,65 @@
+//! What rows say about a prediction: values that scatter about it, or classes on either side of a margin
+//! (`diagnosis/3.4`, `diagnosis/3.11`). The one place where a diagnosis knows the difference.
+
+use super::data::Data;
+use super::evidence::{Evidence, Normal, Scale, Side};
+use super::noise::Noise;
+use super::probit::Probit;
+use super::whiten::{White, Whitener};
+
+/// How well a prediction explains the rows.
+pub(super) enum Likelihood {
+    /// Values: C = sigma^2 R(rho) + N N'.
+    Gaussian {
+        /// C^-1 as an inner product.
+        whitener: Whitener,
+        /// How sure sigma is.
+        scale: Scale,
+    },
+    /// Classes: the probability of each is that of a scattering margin on its side of zero.
+    Probit(Probit),
+}
+
+impl Likelihood {
+    /// Of the rows that are kept; `nuisances` at one standard deviation of every allowance, in the unit of the rows.
+    pub(super) fn of(data: &Data, noise: &Noise, nuisances: &[Vec<f64>], keep: &[bool]) -> Self {
+        match &data.sides {
+            None => Self::Gaussian { whitener: Whitener::new(data, noise, nuisances, keep), scale: Scale::of(noise) },
+            Some(sides) => Self::Probit(Probit::new(sides, noise, nuisances, keep)),
+        }
+    }
+
+    /// A column of all rows in the coordinates of [`Self::evidence`].
+    pub(super) fn white(&self, column: &[f64]) -> White {
+        match self {
+            Self::Gaussian { whitener, .. } => whitener.white(column),
+            Self::Probit(probit) => probit.white(column),
+        }
+    }
+
+    /// Evidence of causes with these columns for what is left without them.
+    pub(super) fn evidence(&self, columns: &[&White], residual: &White, sides: &[Side]) -> Option<Evidence> {
+        match self {
+            Self::Gaussian { whitener, scale } => {
+                Normal::of(columns, residual).evidence(sides, *scale, whitener.rows())
+            }
+            Self::Probit(probit) => probit.evidence(columns, residual, sides),
+        }
+    }
+
+    /// The quadratic about what is left: curvature and slope of the log-likelihood along the columns.
+    pub(super) fn normal(&self, columns: &[&White], residual: &White) -> Option<Normal> {
+        match self {
+            Self::Gaussian { .. } => Some(Normal::of(columns, residual)),
+            Self::Probit(probit) => probit.normal(columns, residual),
+        }
+    }
+
+    /// Minus twice the log-likelihood of what is left, allowances at their most probable, up to a constant.
+    pub(super) fn misfit(&self, residual: &White) -> f64 {
+        match self {
+            Self::Gaussian { .. } => residual.inner(residual),
+            Self::Probit(probit) => probit.misfit(residual),
+        }
+    }
+}
