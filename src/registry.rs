@@ -5,6 +5,7 @@
 
 mod canonical;
 mod checker;
+mod contract;
 mod entry;
 mod family;
 mod fault;
@@ -17,10 +18,11 @@ mod schema;
 mod tests;
 #[cfg(test)]
 pub(crate) mod toy;
+mod way;
 
 use entry::Member;
 
-pub use entry::{Entry, Prepared, ResultNotes, UnreadableResult};
+pub use entry::{Entry, Prepared, ResultNotes, Schemas, UnreadableResult};
 
 pub(crate) use canonical::canonical;
 pub(crate) use checker::{Faults, by_pointer, child};
@@ -32,6 +34,7 @@ pub(crate) use nearest::nearest;
 pub(crate) use place::FreeColumns;
 pub(crate) use place::{CellKind, Step, TableColumn, TablePlace};
 pub(crate) use result_text::{Unwritable, append as append_result};
+pub(crate) use way::way;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -100,19 +103,18 @@ impl Registry {
         let mut offered = Offered { entries: Vec::new(), diagnoses: Vec::new() };
         offer(&mut offered);
         let mut entries = offered.entries.into_iter().collect::<Result<Vec<_>, _>>()?;
-        entries.extend(Entry::family(offered.diagnoses.into_iter().collect::<Result<Vec<_>, _>>()?)?);
+        entries.extend(Entry::family(offered.diagnoses));
         let mut by_id = BTreeMap::new();
-        let mut components: BTreeMap<&str, _> = BTreeMap::new();
         for (index, entry) in entries.iter().enumerate() {
             let id = entry.meta().id;
             if by_id.insert(id, index).is_some() {
                 return Err(RegistryError::Twice(id));
             }
-            for (name, component) in entry.open_components() {
-                if components.insert(name, component).is_some_and(|other| other != component) {
-                    return Err(RegistryError::ComponentClash { component: name.clone(), calculator: id });
-                }
-            }
+        }
+        if cfg!(debug_assertions) {
+            // Contracts are the same in every build of the same types: those that are tested are in order.
+            let mut components = BTreeMap::new();
+            entries.iter().try_for_each(|entry| entry.verify(&mut components))?;
         }
         Ok(Self { entries: Arc::new(entries.into_iter().map(Arc::new).collect()), by_id: Arc::new(by_id) })
     }
@@ -149,7 +151,7 @@ impl Registry {
 /// Takes calculators in.
 pub struct Offered {
     entries: Vec<Result<Entry, RegistryError>>,
-    diagnoses: Vec<Result<Member, RegistryError>>,
+    diagnoses: Vec<Member>,
 }
 
 impl Registrar for Offered {
@@ -161,6 +163,6 @@ impl Registrar for Offered {
     }
     fn diagnosable<C: Diagnosable>(&mut self) {
         self.with_forward_model::<C>();
-        self.diagnoses.push(Entry::of_diagnosis::<C>().map(|entry| Member { calculator: C::META.id, entry }));
+        self.diagnoses.push(Member { calculator: C::META.id, entry: Entry::of_diagnosis::<C>() });
     }
 }

@@ -11,6 +11,7 @@ mod described;
 mod glossary;
 mod kept;
 mod language;
+mod named;
 mod notice;
 mod number;
 mod template;
@@ -23,7 +24,7 @@ pub use notice::{Notice, Remark};
 pub(crate) use number::significant;
 
 use std::collections::BTreeMap;
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock, OnceLock};
 
 use minijinja::Environment;
 use precut_calc::calculator::{Finding, Message, Value, Values};
@@ -67,13 +68,36 @@ pub enum TextError {
 
 /// The texts of every language.
 pub struct Texts {
+    sources: Arc<Sources>,
+    /// Compiles a template when it is first asked for: a compiled one takes ten kilobytes, and few are ever asked for.
     environment: Environment<'static>,
 }
 
-static SHARED: LazyLock<Texts> = LazyLock::new(|| {
-    let files: Vec<(String, String)> = embedded();
-    Texts::from_files(&files).expect("the texts in the binary are tested")
-});
+/// Templates by name.
+type Templates = BTreeMap<String, String>;
+
+/// The templates of every language; those in the binary are read when a language is first spoken.
+#[derive(Default)]
+struct Sources([OnceLock<Templates>; Language::ALL.len()]);
+
+impl Sources {
+    fn of(&self, language: Language) -> &Templates {
+        self.0[language.index()].get_or_init(|| {
+            let own: Vec<_> = embedded().into_iter().filter(|(path, _)| language.owns(path)).collect();
+            templates(&own).expect("the texts in the binary are tested")
+        })
+    }
+
+    fn get(&self, name: &str) -> Option<&String> {
+        self.of(Language::ALL.into_iter().find(|language| language.owns(name))?).get(name)
+    }
+
+    fn iter(&self) -> impl Iterator<Item = (&String, &String)> {
+        Language::ALL.into_iter().flat_map(|language| self.of(language))
+    }
+}
+
+static SHARED: LazyLock<Texts> = LazyLock::new(|| Texts::of(Sources::default()));
 
 /// Folder of the glossary's files, below that of the language: words and names, which are no templates.
 const FIELDS: &str = "fields/";
@@ -124,31 +148,30 @@ impl Texts {
 
     /// The texts of some files: path `{language}/{room}.toml` and content.
     pub fn from_files(files: &[(String, String)]) -> Result<Self, TextError> {
-        let mut sources: BTreeMap<String, String> = BTreeMap::new();
-        for (file, content) in files {
-            let bad = |reason: String| TextError::BadFile { file: file.clone(), reason };
-            let language = file.split('/').next().unwrap_or_default();
-            let table: toml::Table = content.parse().map_err(|error: toml::de::Error| bad(error.to_string()))?;
-            let mut flat = Vec::new();
-            flatten(language, "/", &table, &mut flat).map_err(bad)?;
-            for (name, source) in flat {
-                if sources.insert(name.clone(), source.clone()).is_some_and(|other| other != source) {
-                    return Err(TextError::Twice { name });
-                }
-            }
+        let sources = Sources::default();
+        for language in Language::ALL {
+            let own: Vec<_> = files.iter().filter(|(path, _)| language.owns(path)).cloned().collect();
+            let _ = sources.0[language.index()].set(templates(&own)?);
         }
+        let texts = Self::of(sources);
+        for (name, source) in texts.sources.iter() {
+            let compiled = texts.environment.template_from_named_str(name, source);
+            compiled.map_err(|error| TextError::BadTemplate { name: name.clone(), reason: error.to_string() })?;
+        }
+        Ok(texts)
+    }
+
+    fn of(sources: Sources) -> Self {
+        let sources = Arc::new(sources);
         let mut environment = template::environment();
-        for (name, source) in sources {
-            environment
-                .add_template_owned(name.clone(), source)
-                .map_err(|error| TextError::BadTemplate { name, reason: error.to_string() })?;
-        }
-        Ok(Self { environment })
+        let by_name = Arc::clone(&sources);
+        environment.set_loader(move |name| Ok(by_name.get(name).cloned()));
+        Self { sources, environment }
     }
 
     /// Whether there is a text.
     pub fn has(&self, language: Language, section: &str, code: &str) -> bool {
-        self.environment.get_template(&name(language, section, code)).is_ok()
+        self.sources.get(&name(language, section, code)).is_some()
     }
 
     /// The text of `code` in `section`. A code without text, or whose text asks for a value that is not there, comes
@@ -174,6 +197,11 @@ impl Texts {
             return self.word(language, "label", name, &Values::new());
         }
         Glossary::of(language).column(name, unit)
+    }
+
+    /// What a list of ways through the contract says: the labels of their fields, and what those are set to.
+    pub(crate) fn names(language: Language, value: &Value) -> Option<String> {
+        named::named(&template_value(value), "; ", false, language)
     }
 
     /// The sentence of a message in `section`.
@@ -261,13 +289,35 @@ impl Texts {
         context: BTreeMap<&'static str, minijinja::Value>,
     ) -> Result<String, TextError> {
         let name = name(language, section, code);
-        let Ok(template) = self.environment.get_template(&name) else { return Err(TextError::Missing { name }) };
-        template.render(context).map_err(|error| TextError::BadTemplate { name, reason: error.to_string() })
+        if self.sources.get(&name).is_none() {
+            return Err(TextError::Missing { name });
+        }
+        let said = self.environment.get_template(&name).and_then(|template| template.render(context));
+        said.map_err(|error| TextError::BadTemplate { name, reason: error.to_string() })
     }
 }
 
 fn name(language: Language, section: &str, code: &str) -> String {
     format!("{}/{section}.{code}", language.tag())
+}
+
+/// The templates of some files by name.
+fn templates(files: &[(String, String)]) -> Result<Templates, TextError> {
+    let mut templates = Templates::new();
+    for (file, content) in files {
+        let bad = |reason: String| TextError::BadFile { file: file.clone(), reason };
+        let language = file.split('/').next().unwrap_or_default();
+        let table: toml::Table = content.parse().map_err(|error: toml::de::Error| bad(error.to_string()))?;
+        let mut flat = Vec::new();
+        flatten(language, "/", &table, &mut flat).map_err(bad)?;
+        for (name, source) in flat {
+            if templates.get(&name).is_some_and(|other| *other != source) {
+                return Err(TextError::Twice { name });
+            }
+            templates.insert(name, source);
+        }
+    }
+    Ok(templates)
 }
 
 /// `en/section.code` and the template, for every text of a table.
@@ -331,7 +381,7 @@ mod tests {
     #[test]
     fn every_problem_has_title_and_detail() {
         let texts = Texts::shared();
-        let names: Vec<&str> = texts.environment.templates().map(|(name, _)| name).collect();
+        let names: Vec<&str> = texts.sources.iter().map(|(name, _)| name.as_str()).collect();
         for name in names.iter().filter(|name| name.contains("/problem.")) {
             let stem = name.strip_suffix(".title").or_else(|| name.strip_suffix(".detail")).unwrap();
             for part in ["title", "detail"] {

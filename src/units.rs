@@ -120,6 +120,7 @@ pub fn suffix(spelling: &str) -> String {
     let words: String = match spelling {
         "" | "1" | "money" => return String::new(),
         "%" => "percent".to_owned(),
+        "rev/min" => "rpm".to_owned(),
         other => other.replace('/', " per ").replace(['(', ')'], "").to_lowercase(),
     };
     words.split_whitespace().fold(String::new(), |suffix, word| format!("{suffix}_{word}"))
@@ -220,6 +221,7 @@ mod tests {
             ("um/(m K)", "_um_per_m_k"),
             ("mm/rev", "_mm_per_rev"),
             ("%", "_percent"),
+            ("rev/min", "_rpm"),
             ("1", ""),
         ] {
             assert_eq!(suffix(unit), expected);

@@ -138,6 +138,11 @@ impl Stored {
     pub fn tables(&self) -> Result<Vec<Table>, Error> {
         self.entry.result_tables(&model::without_model(&self.entry, &self.input), &self.body).map_err(outdated)
     }
+    /// The same with what stands in them as sentences in that language.
+    pub fn tables_in(&self, language: Language) -> Result<Vec<Table>, Error> {
+        let body = self.body_in(language);
+        self.entry.result_tables(&model::without_model(&self.entry, &self.input), &body).map_err(outdated)
+    }
     /// Its program for the machine: `None` if the calculator has none, `Err` if this answer has none.
     pub fn program(&self) -> Result<Option<Program>, Error> {
         self.entry

@@ -10,8 +10,9 @@ use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
 
 use super::read::Ready;
-use crate::registry::{Entry, ModelUse, Prepared, Registry, canonical, child, nearest};
+use crate::registry::{Entry, ModelUse, Prepared, Registry, canonical, child, nearest, way};
 use crate::store::models::KeptModel;
+use crate::text::significant;
 
 /// The field of a job that names a model.
 const MODEL: &str = "model";
@@ -303,25 +304,43 @@ pub(crate) fn base(entry: &Entry, job: &Value, held: &Held) -> Option<Prepared> 
     entry.prepare(&job).ok()
 }
 
-/// What the model changed: the numbers that a study would show, with it and without it.
+/// Digits in which numbers with and without a model are told.
+const DIGITS_TOLD: usize = 4;
+
+/// A unit that another field of the result says (`as objective_unit says`), or the unit itself.
+fn said_beside(result: &Value, pointer: &str, unit: String) -> String {
+    let Some(name) = unit.strip_prefix("as ").and_then(|rest| rest.strip_suffix(" says")) else { return unit };
+    let place = pointer.rsplit_once('/').map_or("", |(parent, _)| parent);
+    result.pointer(&child(place, name)).and_then(Value::as_str).unwrap_or("1").to_owned()
+}
+
+/// What the model changed: the numbers that a study would show, with it and without it, where they differ.
 pub(crate) fn changes(ready: &Ready, result: &[u8]) -> Vec<Message> {
     let (Some(held), Some(base)) = (&ready.model, &ready.base) else { return Vec::new() };
     let name = format!("{}@{}", held.name, held.revision);
-    let Ok(with) = serde_json::from_slice::<Value>(result) else { return Vec::new() };
+    let Ok(result) = serde_json::from_slice::<Value>(result) else { return Vec::new() };
     let mut text = Vec::new();
     if base.run(&Unwatched, &mut text).is_err() {
         return vec![Message::new("model_alone_answers").with("model", name)];
     }
     let Ok(without) = serde_json::from_slice::<Value>(&text) else { return Vec::new() };
-    let number = |result: &Value, pointer: &str| result.pointer(pointer).and_then(Value::as_f64);
-    let outputs = ready.entry.meta().study_outputs.iter();
-    outputs
-        .filter_map(|pointer| {
-            let (with, without) = (number(&with, pointer)?, number(&without, pointer)?);
-            let message = Message::new("model_changed").with("model", name.clone());
-            Some(message.with("output", (*pointer).to_owned()).with("with", with).with("without", without))
-        })
-        .collect()
+    let document = ready.entry.output_document();
+    let changed = |pointer: &&'static str| {
+        let number = |result: &Value| result.pointer(pointer).and_then(Value::as_f64);
+        let (with, without) = (number(&result)?, number(&without)?);
+        // What is the same in the digits that are told did not change.
+        if significant(with, DIGITS_TOLD) == significant(without, DIGITS_TOLD) {
+            return None;
+        }
+        let tokens: Vec<String> = pointer.split('/').skip(1).map(str::to_owned).collect();
+        let message = Message::new("model_changed").with("model", name.clone()).with("output", *pointer);
+        let way = way(&document, ready.entry.meta().id, &tokens);
+        let message = message.with("name", way.steps.join("/"));
+        let unit = way.unit.map_or_else(|| "1".to_owned(), |unit| said_beside(&result, pointer, unit));
+        Some(message.with("unit", unit).with("with", with).with("without", without))
+    };
+    let said: Vec<Message> = ready.entry.meta().study_outputs.iter().filter_map(changed).collect();
+    if said.is_empty() { vec![Message::new("model_changed_nothing").with("model", name)] } else { said }
 }
 
 #[cfg(test)]

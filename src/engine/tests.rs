@@ -387,7 +387,7 @@ fn conforms(registry: &Registry, entry: &Entry) {
     for language in Language::ALL {
         for code in entry.codes() {
             let worded = Texts::SECTIONS.iter().any(|section| {
-                texts.has(language, section, code) || texts.has(language, section, &format!("{code}.detail"))
+                texts.has(language, section, &code) || texts.has(language, section, &format!("{code}.detail"))
             });
             assert!(worded, "{} utters {code}, which has no {} text", meta.id, language.tag());
         }

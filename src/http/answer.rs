@@ -174,7 +174,7 @@ fn rendered(stored: &Stored, view: &View) -> Result<Bytes, Problem> {
     let text = match view.media {
         Media::Json => return Ok(stored.body_in(view.language)),
         Media::Csv => {
-            let tables = stored.tables()?;
+            let tables = stored.tables_in(view.language)?;
             let table = tables.iter().find(|table| wanted(table.id));
             render::csv(table.ok_or_else(|| absent("unknown_table", view, tables.iter().map(|table| table.id)))?)
         }
@@ -216,11 +216,12 @@ fn drawn(figure: &Figure, language: Language) -> String {
     )
 }
 
-/// What a figure calls an axis or a curve. Names that no table of texts has, such as those of a study's variables,
-/// stand in the title's values; names of causes and fields are those of the contract.
+/// What a figure calls an axis or a curve. Names that no table of texts has stand in the title's values: as text, or, of
+/// a study's variables, as their ways through the contract; names of causes and fields are those of the contract.
 pub(super) fn label(figure: &Figure, code: &str, language: Language) -> String {
     match figure.title.values.get(code) {
         Some(Value::Text(name)) => name.clone().into_owned(),
+        Some(ways @ Value::List(_)) => Texts::names(language, ways).unwrap_or_else(|| code.to_owned()),
         _ if Texts::shared().has(language, "label", code) => {
             Texts::shared().word(language, "label", code, &Values::new())
         }

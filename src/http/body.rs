@@ -20,9 +20,9 @@ use crate::engine::{Body, TablePart};
 /// Parts of a multipart body beside `job`; a job has fewer tables.
 const MOST_TABLES: usize = 16;
 
-/// The job in the body of a request.
-pub(super) async fn job(request: Request, takes_tables: bool, limits: &Limits) -> Result<Body, Problem> {
-    let kind = Kind::of(request.headers(), takes_tables)?;
+/// The job in the body of a request; whether its measured tables may come as files is asked where that matters.
+pub(super) async fn job(request: Request, takes_tables: impl Fn() -> bool, limits: &Limits) -> Result<Body, Problem> {
+    let kind = Kind::of(request.headers(), &takes_tables)?;
     let limit = match kind {
         Kind::Json => limits.json_bytes,
         Kind::Multipart => limits.multipart_bytes,
@@ -60,8 +60,8 @@ enum Kind {
 }
 
 impl Kind {
-    fn of(headers: &HeaderMap, takes_tables: bool) -> Result<Self, Problem> {
-        let refused = |received: &str| Err(Problem::media_type(received, takes_tables));
+    fn of(headers: &HeaderMap, takes_tables: &impl Fn() -> bool) -> Result<Self, Problem> {
+        let refused = |received: &str| Err(Problem::media_type(received, takes_tables()));
         if let Some(encoding) = headers.get(CONTENT_ENCODING)
             && !encoding.as_bytes().eq_ignore_ascii_case(b"identity")
         {
@@ -74,7 +74,7 @@ impl Kind {
         let Ok(sent) = sent.to_str() else { return refused("?") };
         let mut parameters = sent.split(';').map(str::trim);
         let essence = parameters.next().unwrap_or_default();
-        if essence.eq_ignore_ascii_case("multipart/form-data") && takes_tables {
+        if essence.eq_ignore_ascii_case("multipart/form-data") && takes_tables() {
             return Ok(Self::Multipart);
         }
         let other_charset = parameters.filter_map(|parameter| parameter.split_once('=')).any(|(name, value)| {

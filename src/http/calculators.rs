@@ -80,7 +80,7 @@ pub(super) async fn solve(app: App, room: Arc<Room>, request: Request) -> Result
     for tag in headers.get_all(IF_NONE_MATCH) {
         condition.append(IF_NONE_MATCH, tag.clone());
     }
-    let job = body::job(request, room.entry.takes_tables(), &app.limits).await?;
+    let job = body::job(request, || room.entry.takes_tables(), &app.limits).await?;
     let solved = match app.engine.submit(room.id(), job, ask).await? {
         Answered::Solved(solved) => solved,
         Answered::Job(job) => return Ok(jobs::accepted(&job, preference, language)),
@@ -124,9 +124,8 @@ fn deadline(s: f64) -> Result<Duration, Problem> {
 }
 
 /// `GET /v1/calculators`
-pub(super) async fn list(State(app): State<App>, headers: HeaderMap) -> Result<Response, Problem> {
-    let document = app.documents.calculators(negotiate::language(&headers)).ok_or_else(Problem::internal)?;
-    Ok(document.respond(&headers))
+pub(super) async fn list(State(app): State<App>, headers: HeaderMap) -> Response {
+    app.documents.calculators(negotiate::language(&headers)).respond(&headers)
 }
 
 /// `GET /v1/calculators/{id}`

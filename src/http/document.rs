@@ -12,6 +12,7 @@ use bytes::Bytes;
 
 use precut_calc::material;
 
+use super::problem::Problem;
 use super::{App, calculators, materials, negotiate, openapi};
 use crate::registry::Registry;
 use crate::text::Language;
@@ -60,42 +61,39 @@ impl Document {
     }
 }
 
-/// The documents that are made once.
+/// A document in every language.
+type InLanguages = [OnceLock<Document>; Language::ALL.len()];
+
+/// The documents that are made once, when they are first asked for: most of them never are.
 pub(super) struct Documents {
-    openapi: Document,
-    calculators: Vec<(Language, Document)>,
-    /// Made when they are first asked for: most languages of most calculators never are.
-    calculator: BTreeMap<&'static str, [OnceLock<Document>; Language::ALL.len()]>,
+    openapi: OnceLock<Document>,
+    calculators: InLanguages,
+    calculator: BTreeMap<&'static str, InLanguages>,
     registry: Registry,
-    materials: Vec<(Language, Document)>,
-    material: BTreeMap<&'static str, Vec<(Language, Document)>>,
+    materials: InLanguages,
+    material: BTreeMap<&'static str, InLanguages>,
 }
 
 impl Documents {
     pub(super) fn new(registry: &Registry) -> Self {
-        let each_language = |make: &dyn Fn(Language) -> Document| Language::ALL.map(|tag| (tag, make(tag))).into();
-        let calculators =
-            each_language(&|language| Document::json(&calculators::listed(registry, language), Some(language)));
-        let calculator =
-            registry.entries().iter().map(|entry| (entry.meta().id, Language::ALL.map(|_| OnceLock::new()))).collect();
         Self {
-            openapi: Document::new(openapi::json(registry), "application/json", None),
-            calculators,
-            calculator,
+            openapi: OnceLock::new(),
+            calculators: InLanguages::default(),
+            calculator: registry.entries().iter().map(|entry| (entry.meta().id, InLanguages::default())).collect(),
             registry: registry.clone(),
-            materials: each_language(&|language| Document::json(&materials::listed(language), Some(language))),
-            material: material::library()
-                .iter()
-                .map(|material| {
-                    let make = |language| Document::json(&materials::said(material, language), Some(language));
-                    (material.id, each_language(&make))
-                })
-                .collect(),
+            materials: InLanguages::default(),
+            material: material::library().iter().map(|material| (material.id, InLanguages::default())).collect(),
         }
     }
 
-    pub(super) fn calculators(&self, language: Language) -> Option<&Document> {
-        in_language(&self.calculators, language)
+    fn openapi(&self) -> &Document {
+        let make = || Document::new(openapi::json(&self.registry), "application/json", None);
+        self.openapi.get_or_init(make)
+    }
+
+    pub(super) fn calculators(&self, language: Language) -> &Document {
+        let make = || Document::json(&calculators::listed(&self.registry, language), Some(language));
+        self.calculators[language.index()].get_or_init(make)
     }
 
     pub(super) fn calculator(&self, id: &str, language: Language) -> Option<&Document> {
@@ -103,23 +101,22 @@ impl Documents {
         let make = || Document::json(&calculators::described(entry, language), Some(language));
         Some(made[language.index()].get_or_init(make))
     }
-}
 
-impl Documents {
-    pub(super) fn materials(&self, language: Language) -> Option<&Document> {
-        in_language(&self.materials, language)
+    pub(super) fn materials(&self, language: Language) -> &Document {
+        let make = || Document::json(&materials::listed(language), Some(language));
+        self.materials[language.index()].get_or_init(make)
     }
 
     pub(super) fn material(&self, id: &str, language: Language) -> Option<&Document> {
-        in_language(self.material.get(id)?, language)
+        let material = material::library().iter().find(|material| material.id == id)?;
+        let make = || Document::json(&materials::said(material, language), Some(language));
+        Some(self.material.get(id)?[language.index()].get_or_init(make))
     }
 }
 
-fn in_language(documents: &[(Language, Document)], language: Language) -> Option<&Document> {
-    documents.iter().find(|(tag, _)| *tag == language).map(|(_, document)| document)
-}
-
 /// `GET /openapi.json`
-pub(super) async fn openapi(State(app): State<App>, headers: HeaderMap) -> Response {
-    app.documents.openapi.respond(&headers)
+pub(super) async fn openapi(State(app): State<App>, headers: HeaderMap) -> Result<Response, Problem> {
+    // Away from the threads that move bytes: the first time it is made.
+    let respond = move || app.documents.openapi().respond(&headers);
+    tokio::task::spawn_blocking(respond).await.map_err(|_| Problem::internal())
 }

@@ -53,9 +53,8 @@ pub(super) fn listed(language: Language) -> MaterialList {
 }
 
 /// `GET /v1/materials`
-pub(super) async fn list(State(app): State<App>, headers: HeaderMap) -> Result<Response, Problem> {
-    let document = app.documents.materials(negotiate::language(&headers)).ok_or_else(Problem::internal)?;
-    Ok(document.respond(&headers))
+pub(super) async fn list(State(app): State<App>, headers: HeaderMap) -> Response {
+    app.documents.materials(negotiate::language(&headers)).respond(&headers)
 }
 
 /// `GET /v1/materials/{id}`

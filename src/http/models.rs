@@ -189,7 +189,7 @@ pub(super) async fn store(
     request: Request,
 ) -> Result<Response, Problem> {
     let only_new = wants_new(request.headers());
-    let Body::Json(sent) = body::job(request, false, &app.limits).await? else { return Err(Problem::internal()) };
+    let Body::Json(sent) = body::job(request, || false, &app.limits).await? else { return Err(Problem::internal()) };
     let ModelAnswer { model, is_new } = app.engine.put_model(&name, ModelSource::read(&sent)?, only_new).await?;
     let location = format!("/v1/models/{}@{}", model.name, model.revision);
     let status = if is_new { StatusCode::CREATED } else { StatusCode::OK };

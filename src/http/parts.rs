@@ -95,7 +95,7 @@ pub(super) async fn tables(
 ) -> Result<Response, Problem> {
     let language = negotiate::language(&headers);
     let document = made(&app, &name, move |stored| {
-        let items = stored.tables()?.into_iter().map(|table| shown(table, language)).collect();
+        let items = stored.tables_in(language)?.into_iter().map(|table| shown(table, language)).collect();
         Ok(Document::json(&TableList { items }, Some(language)))
     });
     Ok(private(document.await?.respond(&headers)))

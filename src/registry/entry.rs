@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::marker::PhantomData;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use precut_calc::calculator::{
@@ -17,27 +18,39 @@ use utoipa::openapi::{RefOr, Schema};
 
 use super::canonical::canonical;
 use super::checker::{Checker, Faults};
+use super::contract::{self, Contract, Make};
 use super::family;
 use super::place::{TablePlace, table_places};
-use super::schema::{self, Components};
+use super::schema::Components;
 use super::{RESERVED, RegistryError, Unwritable, append_result, child, non_finite_place};
 
 /// One calculator with its types closed over.
 pub struct Entry {
     meta: Meta,
-    input: Contract,
-    output: Contract,
-    checker: Checker,
-    tables: Vec<TablePlace>,
-    own_codes: Vec<String>,
+    contracts: Contracts,
+    /// What jobs are held against, and where their tables stand: made for the first job.
+    checker: OnceLock<Checker>,
+    tables: OnceLock<Vec<TablePlace>>,
+    /// Schemas of job and result with references followed and unions told apart: made for the first who asks.
+    strict_input: OnceLock<Value>,
+    strict_output: OnceLock<Value>,
+    /// Codes that another calculator declares.
+    more_codes: Vec<&'static str>,
     calculation: Box<dyn Calculation>,
     composed: bool,
     model_use: ModelUse,
-    /// Where the calculator of a job stands in the job: one entry for each of them, in the order of their names' place
-    /// in the contract.
-    members: Vec<Member>,
     /// Bytes of the answer written last.
     answer_bytes: AtomicUsize,
+}
+
+/// Schemas of job and result for the OpenAPI document.
+pub struct Schemas {
+    /// Of the job; refers to the components.
+    pub input: RefOr<Schema>,
+    /// Of the result; refers to the components.
+    pub output: RefOr<Schema>,
+    /// Every component that either schema refers to, by name, each name once; where both do, as the job has it.
+    pub components: Vec<(String, RefOr<Schema>)>,
 }
 
 /// Whether a job may name a stored model, and what of it the model extends.
@@ -53,6 +66,15 @@ pub(crate) enum ModelUse {
     Within,
 }
 
+/// Where the contracts of jobs and results come from.
+enum Contracts {
+    /// From the types of one calculator.
+    Types { input: Make, output: Make },
+    /// From those of several, one of which stands in the job: one entry for each of them, in the order of their names'
+    /// place in the contract.
+    Members(Vec<Member>),
+}
+
 /// One calculator's form of a question that is asked of several.
 pub(super) struct Member {
     /// Whose jobs it takes.
@@ -60,41 +82,25 @@ pub(super) struct Member {
     pub(super) entry: Entry,
 }
 
-/// A type's schema, in the forms in which it is asked for. What is asked for now and then is kept as JSON text: as
-/// values all these would take most of the memory of a service at rest.
-pub(super) struct Contract {
-    schema: Text,
-    components: Vec<(String, Text)>,
-    document: Text,
-    /// Before objects were closed: what makes two types of one name the same type.
-    open: BTreeMap<String, Text>,
-    strict: Value,
-}
-
-/// A schema as JSON.
-#[derive(Clone, PartialEq, Eq)]
-pub(super) struct Text(Box<str>);
-
-impl Text {
-    fn of(value: &Value) -> Self {
-        Self(value.to_string().into())
-    }
-
-    /// Of a schema that the types of the OpenAPI document hold.
-    fn of_schema(value: &Value) -> Result<Self, RegistryError> {
-        let text = Self::of(value);
-        serde_json::from_str::<RefOr<Schema>>(&text.0).map_err(|error| RegistryError::BadSchema(error.to_string()))?;
-        Ok(text)
-    }
-
-    fn read<T: DeserializeOwned>(&self) -> T {
-        serde_json::from_str(&self.0).expect("it was read when it was written")
-    }
+/// What is made of a contract. Contracts follow from types alone, and [`Entry::verify`] makes all that is made of them in
+/// every build that tests.
+fn follows<T>(made: Result<T, RegistryError>) -> T {
+    made.expect("the contract of a type is made by every test")
 }
 
 impl Entry {
     /// The entry of a calculator.
     pub(super) fn of<C: Calculator>() -> Result<Self, RegistryError> {
+        Self::with_input::<C>(contract::of::<C::Input>(C::META.id, true, |_| {}))
+    }
+
+    /// The entry of a calculator whose jobs may name a stored model.
+    pub(super) fn with_model<C: Calculator>() -> Result<Self, RegistryError> {
+        let entry = Self::with_input::<C>(contract::of::<C::Input>(C::META.id, true, family::offer_model))?;
+        Ok(Self { model_use: ModelUse::OfJob, ..entry })
+    }
+
+    fn with_input<C: Calculator>(input: Make) -> Result<Self, RegistryError> {
         let meta = C::META;
         let fits = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
         if !meta.id.starts_with(|c: char| c.is_ascii_lowercase()) || !meta.id.chars().all(fits) {
@@ -103,73 +109,81 @@ impl Entry {
         if RESERVED.contains(&meta.id) {
             return Err(RegistryError::Reserved(meta.id));
         }
-        Self::made::<C::Input, C::Output>(meta, Box::new(Typed::<C>(PhantomData)), false)
-    }
-
-    /// The entry of a calculator whose jobs may name a stored model.
-    pub(super) fn with_model<C: Calculator>() -> Result<Self, RegistryError> {
-        let entry = Self::of::<C>()?;
-        let input = Contract::of::<C::Input>(C::META.id, true, family::offer_model)?;
-        let made = Self::from_contracts(entry.meta, input, entry.output, entry.calculation)?;
-        Ok(Self { model_use: ModelUse::OfJob, ..made })
+        let output = contract::of::<C::Output>(meta.id, false, |_| {});
+        Ok(Self::new(meta, Contracts::Types { input, output }, Box::new(Typed::<C>(PhantomData))))
     }
 
     /// The entry of the diagnosis of one calculator.
-    pub(super) fn of_diagnosis<M: Diagnosable>() -> Result<Self, RegistryError> {
+    pub(super) fn of_diagnosis<M: Diagnosable>() -> Self {
         let base = M::META;
         let calculation = Box::new(NumbersOf { meta: base, calculation: Typed::<Diagnosis<M>>(PhantomData) });
-        let input = Contract::of::<JobOf<M>>(base.id, true, |job| {
+        let input = contract::of::<JobOf<M>>(base.id, true, move |job| {
             family::name_calculator(job, base.id);
             family::offer_model(job);
-        })?;
-        let output = Contract::of::<ResultOf<M>>(base.id, false, |_| {})?;
-        // Its jobs are checked by the family's schema, which holds this one.
-        let checker = Checker::new(Value::Object(serde_json::Map::new()))?;
-        let mut entry = Self::checked_by(checker, <Diagnosis<M> as Calculator>::META, input, output, calculation);
+        });
+        let output = contract::of::<ResultOf<M>>(base.id, false, |_| {});
+        let entry = Self::new(<Diagnosis<M> as Calculator>::META, Contracts::Types { input, output }, calculation);
         // A diagnosis refuses a base job in the words of the base.
         let of_base = [base.codes.faults, base.codes.failures].into_iter().flatten().copied().flatten();
-        entry.model_use = ModelUse::OfBase;
-        entry.own_codes.extend(of_base.map(|code| (*code).to_owned()));
-        Ok(entry)
+        Self { model_use: ModelUse::OfBase, more_codes: of_base.copied().collect(), ..entry }
     }
 
     /// One question that is asked of several calculators, each with its own form of job and answer.
-    pub(super) fn family(members: Vec<Member>) -> Result<Option<Self>, RegistryError> {
-        let Some(first) = members.first() else { return Ok(None) };
+    pub(super) fn family(members: Vec<Member>) -> Option<Self> {
         let examples: Vec<_> = members.iter().flat_map(|member| member.entry.meta.examples).copied().collect();
         // A registry lives as long as the process.
-        let meta = Meta { examples: Vec::leak(examples), ..first.entry.meta };
-        let parts = |suffix: &'static str, contract: fn(&Self) -> &Contract| {
-            members.iter().map(move |of| (family::type_name(of.calculator, suffix), contract(&of.entry)))
-        };
-        let input = Contract::joined(parts("DiagnosisJob", |entry| &entry.input), true)?;
-        let output = Contract::joined(parts("DiagnosisResult", |entry| &entry.output), false)?;
-        let own_codes: BTreeSet<String> = members.iter().flat_map(|of| of.entry.own_codes.iter().cloned()).collect();
-        let mut entry = Self::from_contracts(meta, input, output, Box::new(NoCalculator))?;
-        entry.own_codes = own_codes.into_iter().collect();
-        entry.model_use = ModelUse::OfBase;
-        entry.members = members;
-        for member in &mut entry.members {
-            (member.entry.input, member.entry.output) = (Contract::none(), Contract::none());
+        let meta = Meta { examples: Vec::leak(examples), ..members.first()?.entry.meta };
+        let entry = Self::new(meta, Contracts::Members(members), Box::new(NoCalculator));
+        Some(Self { model_use: ModelUse::OfBase, ..entry })
+    }
+
+    /// The entry of something that is asked like a calculator and made of other calculators' jobs. It has a route of
+    /// the service's own and stands in no registry.
+    pub(crate) fn composed<I: ToSchema, O: ToSchema>(meta: Meta, calculation: Box<dyn Calculation>) -> Self {
+        let input = contract::of::<I>(meta.id, true, |_| {});
+        let output = contract::of::<O>(meta.id, false, |_| {});
+        let entry = Self::new(meta, Contracts::Types { input, output }, calculation);
+        Self { composed: true, model_use: ModelUse::Within, ..entry }
+    }
+
+    fn new(meta: Meta, contracts: Contracts, calculation: Box<dyn Calculation>) -> Self {
+        Self {
+            meta,
+            contracts,
+            checker: OnceLock::new(),
+            tables: OnceLock::new(),
+            strict_input: OnceLock::new(),
+            strict_output: OnceLock::new(),
+            more_codes: Vec::new(),
+            calculation,
+            composed: false,
+            model_use: ModelUse::None,
+            answer_bytes: AtomicUsize::new(0),
         }
-        Ok(Some(entry))
+    }
+
+    fn members(&self) -> &[Member] {
+        match &self.contracts {
+            Contracts::Types { .. } => &[],
+            Contracts::Members(members) => members,
+        }
     }
 
     /// The form of a family's job that a job has, by the calculator that it names; this entry where it is no family.
     pub(crate) fn of_job(&self, job: &Value) -> Option<&Self> {
-        match self.members.as_slice() {
+        match self.members() {
             [] => Some(self),
             _ => self.member(job.get(family::CALCULATOR)?.as_str()?),
         }
     }
 
     fn member(&self, calculator: &str) -> Option<&Self> {
-        self.members.iter().find(|of| of.calculator == calculator).map(|of| &of.entry)
+        self.members().iter().find(|of| of.calculator == calculator).map(|of| &of.entry)
     }
 
     /// The same for a kept job.
     fn of_kept_job(&self, input: &[u8]) -> Result<&Self, UnreadableResult> {
-        if self.members.is_empty() {
+        if self.members().is_empty() {
             return Ok(self);
         }
         let unreadable = |error: String| UnreadableResult(error);
@@ -177,103 +191,124 @@ impl Entry {
         self.member(&named.calculator).ok_or_else(|| unreadable(format!("no calculator {}", named.calculator)))
     }
 
-    /// The entry of something that is asked like a calculator and made of other calculators' jobs. It has a route of
-    /// the service's own and stands in no registry.
-    pub(crate) fn composed<I: ToSchema, O: ToSchema>(
-        meta: Meta,
-        calculation: Box<dyn Calculation>,
-    ) -> Result<Self, RegistryError> {
-        Self::made::<I, O>(meta, calculation, true)
-    }
-
-    fn made<I: ToSchema, O: ToSchema>(
-        meta: Meta,
-        calculation: Box<dyn Calculation>,
-        composed: bool,
-    ) -> Result<Self, RegistryError> {
-        let input = Contract::of::<I>(meta.id, true, |_| {})?;
-        let output = Contract::of::<O>(meta.id, false, |_| {})?;
-        let model_use = if composed { ModelUse::Within } else { ModelUse::None };
-        Ok(Self { composed, model_use, ..Self::from_contracts(meta, input, output, calculation)? })
-    }
-
-    fn from_contracts(
-        meta: Meta,
-        input: Contract,
-        output: Contract,
-        calculation: Box<dyn Calculation>,
-    ) -> Result<Self, RegistryError> {
-        let checker = Checker::new(input.strict.clone())?;
-        Ok(Self::checked_by(checker, meta, input, output, calculation))
-    }
-
-    fn checked_by(
-        checker: Checker,
-        meta: Meta,
-        input: Contract,
-        output: Contract,
-        calculation: Box<dyn Calculation>,
-    ) -> Self {
-        let mut own_codes = BTreeSet::new();
-        codes_in(&input.strict, &mut own_codes);
-        Self {
-            meta,
-            tables: table_places(&input.strict),
-            checker,
-            own_codes: own_codes.into_iter().collect(),
-            input,
-            output,
-            calculation,
-            composed: false,
-            model_use: ModelUse::None,
-            members: Vec::new(),
-            answer_bytes: AtomicUsize::new(0),
+    fn made_input(&self) -> Result<Contract, RegistryError> {
+        match &self.contracts {
+            Contracts::Types { input, .. } => input(),
+            Contracts::Members(members) => {
+                let part = |of: &Member| Ok((family::type_name(of.calculator, "DiagnosisJob"), of.entry.made_input()?));
+                Contract::joined(members.iter().map(part), true)
+            }
         }
+    }
+
+    fn made_output(&self) -> Result<Contract, RegistryError> {
+        match &self.contracts {
+            Contracts::Types { output, .. } => output(),
+            Contracts::Members(members) => {
+                let part =
+                    |of: &Member| Ok((family::type_name(of.calculator, "DiagnosisResult"), of.entry.made_output()?));
+                Contract::joined(members.iter().map(part), false)
+            }
+        }
+    }
+
+    fn input(&self) -> Contract {
+        follows(self.made_input())
+    }
+    fn output(&self) -> Contract {
+        follows(self.made_output())
+    }
+
+    /// What jobs are held against; where the tables stand is read off the same schema.
+    fn checker(&self) -> &Checker {
+        let made = || match self.members() {
+            [] => {
+                let strict = follows(self.input().strict());
+                self.tables.get_or_init(|| table_places(&strict));
+                Checker::new(strict)
+            }
+            members => of_members(members),
+        };
+        self.checker.get_or_init(|| follows(made()))
+    }
+
+    /// Makes all that is made on demand, so that what cannot be made is known at once; `components` are those of the
+    /// entries before.
+    pub(super) fn verify(&self, components: &mut Components) -> Result<(), RegistryError> {
+        for member in self.members() {
+            member.entry.verify(components)?;
+        }
+        let (input, output) = (self.made_input()?, self.made_output()?);
+        for contract in [&input, &output] {
+            contract.schema()?;
+            contract.components()?;
+        }
+        let strict = input.strict()?;
+        let _ = self.tables.set(table_places(&strict));
+        let checker = match self.members() {
+            [] => Checker::new(strict),
+            members => of_members(members),
+        };
+        let _ = self.checker.set(checker?);
+        let _ = self.strict_output.set(output.strict()?);
+        for (name, component) in input.into_open().into_iter().chain(output.into_open()) {
+            if components.get(&name).is_some_and(|other| *other != component) {
+                return Err(RegistryError::ComponentClash { component: name, calculator: self.meta.id });
+            }
+            components.insert(name, component);
+        }
+        Ok(())
     }
 
     /// What stands on the door.
     pub fn meta(&self) -> &Meta {
         &self.meta
     }
-    /// Schema of the job for the OpenAPI document; refers to [`Entry::components`].
-    pub fn input_schema(&self) -> RefOr<Schema> {
-        self.input.schema.read()
+    /// What the OpenAPI document says of job and result.
+    pub fn schemas(&self) -> Schemas {
+        let made = || {
+            let (input, output) = (self.made_input()?, self.made_output()?);
+            let mut components = output.components()?;
+            components.extend(input.components()?);
+            let components = components.into_iter().collect();
+            Ok(Schemas { input: input.schema()?, output: output.schema()?, components })
+        };
+        follows(made())
     }
-    /// Schema of the result for the OpenAPI document; refers to [`Entry::components`].
-    pub fn output_schema(&self) -> RefOr<Schema> {
-        self.output.schema.read()
+    pub(super) fn input_components(&self) -> BTreeMap<String, RefOr<Schema>> {
+        follows(self.input().components())
     }
-    /// Every component that either schema refers to, by name, each name once; where both do, as the job has it.
-    pub fn components(&self) -> Vec<(String, RefOr<Schema>)> {
-        let mut all: BTreeMap<_, _> = self.output_components().collect();
-        all.extend(self.input_components());
-        all.into_iter().collect()
-    }
-    pub(super) fn input_components(&self) -> impl Iterator<Item = (String, RefOr<Schema>)> + '_ {
-        read_components(&self.input.components)
-    }
-    pub(super) fn output_components(&self) -> impl Iterator<Item = (String, RefOr<Schema>)> + '_ {
-        read_components(&self.output.components)
+    pub(super) fn output_components(&self) -> BTreeMap<String, RefOr<Schema>> {
+        follows(self.output().components())
     }
     /// Self-contained JSON Schema (2020-12) of the job.
     pub fn input_document(&self) -> Value {
-        self.input.document.read()
+        self.input().document()
     }
     /// Self-contained JSON Schema (2020-12) of the result.
     pub fn output_document(&self) -> Value {
-        self.output.document.read()
+        self.output().document()
     }
     /// Whether the job takes measured tables (CSV in place, or file parts).
     pub fn takes_tables(&self) -> bool {
-        !self.tables.is_empty()
+        !self.tables().is_empty()
     }
     /// Names of the file parts that the job takes, with dots from the root.
     pub fn table_names(&self) -> Vec<String> {
-        self.tables.iter().map(TablePlace::dotted).collect()
+        self.tables().iter().map(TablePlace::dotted).collect()
+    }
+    fn tables(&self) -> &[TablePlace] {
+        self.tables.get_or_init(|| table_places(&follows(self.input().strict())))
     }
     /// Every code that it may utter: those of its declaration and those of its fields.
-    pub fn codes(&self) -> impl Iterator<Item = &str> {
-        self.meta.codes.all().map(|code| -> &str { code }).chain(self.own_codes.iter().map(String::as_str))
+    pub fn codes(&self) -> BTreeSet<String> {
+        let mut codes: BTreeSet<String> =
+            self.meta.codes.all().chain(self.more_codes.iter().copied()).map(str::to_owned).collect();
+        for member in self.members() {
+            codes.extend(member.entry.more_codes.iter().map(|code| (*code).to_owned()));
+        }
+        codes_in(self.strict_input(), &mut codes);
+        codes
     }
 
     /// A buffer for the next answer, about as large as the last one was.
@@ -297,7 +332,10 @@ impl Entry {
 
     /// Where the measured tables of a job stand; nowhere where it cannot be told what job it is.
     pub(crate) fn tables_of(&self, job: &Value) -> &[TablePlace] {
-        self.of_job(job).map_or(&[], |entry| &entry.tables)
+        let Some(entry) = self.of_job(job) else { return &[] };
+        // Who asks for the tables of a job checks it next.
+        entry.checker();
+        entry.tables()
     }
     /// Whether a job may name a stored model.
     pub(crate) fn model_use(&self) -> ModelUse {
@@ -309,19 +347,16 @@ impl Entry {
     }
     /// Schema of the job with references followed and unions told apart.
     pub(crate) fn strict_input(&self) -> &Value {
-        &self.input.strict
+        self.strict_input.get_or_init(|| follows(self.input().strict()))
     }
     /// Schema of the result in the same form.
     pub(crate) fn strict_output(&self) -> &Value {
-        &self.output.strict
-    }
-    pub(super) fn open_components(&self) -> impl Iterator<Item = (&String, &Text)> {
-        self.input.open.iter().chain(&self.output.open)
+        self.strict_output.get_or_init(|| follows(self.output().strict()))
     }
 
     /// Adds every violation of the schema. Measured tables must be rows by now.
     pub(crate) fn validate(&self, job: &Value, faults: &mut Faults) {
-        self.checker.check(job, "", faults);
+        self.of_job(job).unwrap_or(self).checker().check(job, "", faults);
     }
     /// Adds what is wrong with effects that are to act in jobs of this calculator.
     pub(crate) fn validate_effects(&self, effects: &Value, faults: &mut Faults) {
@@ -362,6 +397,12 @@ impl std::fmt::Debug for Entry {
     }
 }
 
+/// What a job is held against that names no member. One that does is held against that member's own schema: all of them
+/// in one would be the largest schema of all.
+fn of_members(members: &[Member]) -> Result<Checker, RegistryError> {
+    Checker::new(family::told_apart(members.iter().map(|of| of.calculator)))
+}
+
 fn codes_in(schema: &Value, codes: &mut BTreeSet<String>) {
     match schema {
         Value::Object(map) => {
@@ -373,82 +414,6 @@ fn codes_in(schema: &Value, codes: &mut BTreeSet<String>) {
         Value::Array(parts) => parts.iter().for_each(|part| codes_in(part, codes)),
         _ => {}
     }
-}
-
-impl Contract {
-    /// The contract of a type. `adapt` may change its root before objects are closed.
-    fn of<T: ToSchema>(
-        calculator: &'static str,
-        closed: bool,
-        adapt: impl FnOnce(&mut Value),
-    ) -> Result<Self, RegistryError> {
-        let broken = |error: serde_json::Error| RegistryError::BadSchema(error.to_string());
-        let mut parts = Vec::new();
-        T::schemas(&mut parts);
-        let mut raw = Components::new();
-        for (name, part) in parts {
-            let part = serde_json::to_value(&part).map_err(broken)?;
-            if raw.insert(name.clone(), part.clone()).is_some_and(|other| other != part) {
-                return Err(RegistryError::ComponentClash { component: name, calculator });
-            }
-        }
-        let mut root = schema::tidy(&serde_json::to_value(T::schema()).map_err(broken)?, &raw);
-        adapt(&mut root);
-        let tidied: Components = raw.iter().map(|(name, part)| (name.clone(), schema::tidy(part, &raw))).collect();
-        // Parts that were joined into others are no components of their own any more.
-        let mut open = Components::new();
-        schema::collect(&root, &tidied, &mut open);
-        let mut components = open.clone();
-        if closed {
-            schema::close(&mut root);
-            components.values_mut().for_each(schema::close);
-        }
-        Ok(Self {
-            schema: Text::of_schema(&root)?,
-            components: of_components(&components)?,
-            document: Text::of(&schema::standing_alone(&root, &components)),
-            strict: schema::strict(&root, &components)?,
-            open: open.iter().map(|(name, part)| (name.clone(), Text::of(part))).collect(),
-        })
-    }
-
-    /// What is left of a contract that was joined with others.
-    fn none() -> Self {
-        let empty = || Text("{}".into());
-        let (schema, document) = (empty(), empty());
-        Self { schema, components: Vec::new(), document, open: BTreeMap::new(), strict: Value::Null }
-    }
-
-    /// One of several contracts, by what stands in the field `calculator` of a job.
-    fn joined<'a>(parts: impl Iterator<Item = (String, &'a Self)>, told_apart: bool) -> Result<Self, RegistryError> {
-        let mut components = Components::new();
-        let mut open = BTreeMap::new();
-        let mut names = Vec::new();
-        for (name, part) in parts {
-            for (name, component) in &part.components {
-                components.insert(name.clone(), component.read());
-            }
-            open.extend(part.open.clone());
-            components.insert(name.clone(), part.schema.read());
-            names.push(name);
-        }
-        let root = family::one_of(&names, &components, told_apart);
-        Ok(Self {
-            schema: Text::of_schema(&root)?,
-            components: of_components(&components)?,
-            document: Text::of(&schema::standing_alone(&root, &components)),
-            strict: schema::strict(&root, &components)?,
-            open,
-        })
-    }
-}
-
-fn of_components(components: &Components) -> Result<Vec<(String, Text)>, RegistryError> {
-    components.iter().map(|(name, part)| Ok((name.clone(), Text::of_schema(part)?))).collect()
-}
-
-fn read_components(components: &[(String, Text)]) -> impl Iterator<Item = (String, RefOr<Schema>)> + '_ {
-    components.iter().map(|(name, part)| (name.clone(), part.read()))
 }
 
 /// A job that can run.

@@ -40,6 +40,17 @@ pub(super) fn type_name(calculator: &str, suffix: &str) -> String {
     calculator.split('-').map(capital).chain([suffix.to_owned()]).collect()
 }
 
+/// What a job is held against that names none of these calculators: the tag of a tagged union.
+pub(super) fn told_apart(calculators: impl Iterator<Item = &'static str>) -> Value {
+    let names: Vec<&str> = calculators.collect();
+    json!({
+        "type": "object",
+        "x-tag": CALCULATOR,
+        "required": [CALCULATOR],
+        "properties": { CALCULATOR: { "type": "string", "enum": names } },
+    })
+}
+
 /// The schema that takes one of the named components; with the discriminator where their jobs name a calculator.
 pub(super) fn one_of(names: &[String], components: &Components, told_apart: bool) -> Value {
     let place = |name: &str| format!("#/components/schemas/{name}");

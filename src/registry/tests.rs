@@ -160,3 +160,38 @@ fn every_rule_of_a_schema_has_its_code_and_its_words() {
         assert!(words.contains("field") && !words.contains("  "), "{words}");
     }
 }
+
+/// A job that names a calculator is held against that calculator's form alone; the published schema is one of them all.
+#[test]
+fn the_members_of_a_family_find_what_its_whole_schema_finds() {
+    let registry = Registry::standard().unwrap();
+    let family = registry.entry("diagnosis").unwrap();
+    let whole = checker::Checker::new(family.strict_input().clone()).unwrap();
+    let listed = |faults: Faults| {
+        let mut listed = faults.listed;
+        listed.sort_by(by_pointer);
+        (listed, faults.total)
+    };
+    let mut jobs = vec![json!(null), json!([1]), json!({}), json!({"calculator": 3}), json!({"calculator": "shaft"})];
+    for example in family.meta().examples {
+        let job: Value = serde_json::from_str(example.job).unwrap();
+        let fields: Vec<String> = job.as_object().unwrap().keys().cloned().collect();
+        for field in fields {
+            for value in [json!(null), json!(-1), json!("x"), json!({}), json!([{"kind": "none"}])] {
+                let mut changed = job.clone();
+                changed[&field] = value;
+                jobs.push(changed);
+            }
+            let mut without = job.clone();
+            without.as_object_mut().unwrap().remove(&field);
+            jobs.push(without);
+        }
+        jobs.push(job);
+    }
+    for job in jobs {
+        let (mut by_member, mut by_whole) = (Faults::default(), Faults::default());
+        family.validate(&job, &mut by_member);
+        whole.check(&job, "", &mut by_whole);
+        assert_eq!(listed(by_member), listed(by_whole), "{job}");
+    }
+}

@@ -96,9 +96,9 @@ const LATIN: &[&str] = &[
 
 /// Names of templates without their language, by language.
 fn codes(language: Language) -> BTreeSet<String> {
-    let environment = &Texts::shared().environment;
     let tag = format!("{}/", language.tag());
-    environment.templates().filter_map(|(name, _)| Some(name.strip_prefix(&tag)?.to_owned())).collect()
+    let templates = Texts::shared().sources.of(language);
+    templates.keys().filter_map(|name| Some(name.strip_prefix(&tag)?.to_owned())).collect()
 }
 
 fn source(language: Language, name: &str) -> String {

@@ -14,7 +14,7 @@
 //! other texts are what the code says.
 
 use std::collections::BTreeMap;
-use std::sync::LazyLock;
+use std::sync::{LazyLock, OnceLock};
 
 use super::{FIELDS, Language, TextError, files};
 use crate::units;
@@ -25,12 +25,7 @@ pub(crate) struct Glossary {
     sections: BTreeMap<String, BTreeMap<String, String>>,
 }
 
-static SHARED: LazyLock<[Glossary; Language::ALL.len()]> = LazyLock::new(|| {
-    Language::ALL.map(|language| {
-        let own: Vec<_> = files().filter(|(path, _)| language.owns(path) && path.contains(FIELDS)).collect();
-        Glossary::from_files(&own).expect("the words in the binary are tested")
-    })
-});
+static SHARED: [OnceLock<Glossary>; Language::ALL.len()] = [const { OnceLock::new() }; Language::ALL.len()];
 
 /// Ends of names that only say the unit, longest first.
 static SUFFIXES: LazyLock<Vec<String>> = LazyLock::new(|| {
@@ -45,7 +40,10 @@ static SUFFIXES: LazyLock<Vec<String>> = LazyLock::new(|| {
 impl Glossary {
     /// That of a language.
     pub(crate) fn of(language: Language) -> &'static Self {
-        &SHARED[language.index()]
+        SHARED[language.index()].get_or_init(|| {
+            let own: Vec<_> = files().filter(|(path, _)| language.owns(path) && path.contains(FIELDS)).collect();
+            Self::from_files(&own).expect("the words in the binary are tested")
+        })
     }
 
     pub(super) fn from_files(files: &[(String, String)]) -> Result<Self, TextError> {
@@ -93,7 +91,7 @@ impl Glossary {
 
     /// What a column of that name and unit is called: as the field, or in its own words.
     pub(crate) fn column(&self, name: &str, unit: &str) -> String {
-        let suffix = if unit == "rev/min" { "_rpm".to_owned() } else { units::suffix(unit) };
+        let suffix = units::suffix(unit);
         let as_field = self.get("label", &format!("{name}{suffix}")).or_else(|| self.get("label", name));
         as_field.map_or_else(|| self.word(name), str::to_owned)
     }
@@ -116,15 +114,21 @@ impl Glossary {
 
     /// The same within a sentence.
     pub(crate) fn name_within(&self, code: &str) -> String {
-        let name = self.name(code);
-        let mut letters = name.chars();
-        match (letters.next(), letters.next()) {
-            // An abbreviation or a name keeps its capitals.
-            (Some(first), Some(second)) if second.is_lowercase() => {
-                first.to_lowercase().chain([second]).chain(letters).collect()
+        within(&self.name(code))
+    }
+
+    /// The labels along a way through the contract, items after the list that they belong to.
+    pub(super) fn way(&self, way: &str) -> String {
+        let mut said: Vec<String> = Vec::new();
+        for step in way.split('/') {
+            if let (Ok(item), Some(list)) = (step.parse::<usize>(), said.last_mut()) {
+                *list = format!("{list} {item}");
+            } else {
+                let (component, field) = step.split_once('.').unwrap_or(("", step));
+                said.push(capitalised(&self.label(component, field, None)));
             }
-            _ => name,
         }
+        said.join(" · ")
     }
 
     /// A part of a form.
@@ -171,6 +175,17 @@ impl Glossary {
             }
         }
         printed
+    }
+}
+
+/// A name as inside a sentence: an abbreviation or a name keeps its capitals.
+pub(super) fn within(name: &str) -> String {
+    let mut letters = name.chars();
+    match (letters.next(), letters.next()) {
+        (Some(first), Some(second)) if second.is_lowercase() => {
+            first.to_lowercase().chain([second]).chain(letters).collect()
+        }
+        _ => name.to_owned(),
     }
 }
 

@@ -4,6 +4,7 @@ use minijinja::value::ValueKind;
 use minijinja::{Environment, Error, State, UndefinedBehavior, Value};
 
 use super::glossary::Glossary;
+use super::named::{amount, named};
 use super::number;
 use super::{Language, significant};
 
@@ -36,6 +37,13 @@ pub(super) fn environment() -> Environment<'static> {
         said.join(", ")
     });
     environment.add_filter("labelled", labelled);
+    environment.add_filter("limits", limits);
+    environment.add_filter("names", |state: &State<'_, '_>, ways: Value| names(state, &ways, false));
+    environment.add_filter("names_within", |state: &State<'_, '_>, ways: Value| names(state, &ways, true));
+    environment.add_filter("amount", |state: &State<'_, '_>, x: f64, digits: usize, unit: &str| {
+        let language = language_of(state);
+        amount(&number::spoken(&significant(x, digits), language), unit, language)
+    });
     environment.add_filter("reason", |state: &State<'_, '_>, text: &str| Glossary::of(language_of(state)).reason(text));
     environment.add_filter("list", list);
     environment.add_filter("plural", plural);
@@ -45,6 +53,30 @@ pub(super) fn environment() -> Environment<'static> {
 /// Templates are called `{language}/{section}.{code}`.
 fn language_of(state: &State<'_, '_>) -> Language {
     Language::ALL.into_iter().find(|language| language.owns(state.name())).unwrap_or_default()
+}
+
+/// Limits by name and place (`deflection@z5`): one, or several with commas between them.
+#[allow(clippy::needless_pass_by_value)]
+fn limits(state: &State<'_, '_>, limits: Value) -> Result<String, Error> {
+    let glossary = Glossary::of(language_of(state));
+    let said = |limit: &str| match limit.split_once('@') {
+        Some((name, place)) => format!("{} ({})", glossary.name_within(name), glossary.word(place)),
+        None => glossary.name_within(limit),
+    };
+    if let Some(limit) = limits.as_str() {
+        return Ok(said(limit));
+    }
+    let all: Vec<String> = limits.try_iter()?.map(|limit| said(&limit.to_string())).collect();
+    Ok(all.join(", "))
+}
+
+/// Names of fields by their ways through the contract, with commas between them; with semicolons where commas stand in
+/// the numbers.
+fn names(state: &State<'_, '_>, ways: &Value, within: bool) -> Result<String, Error> {
+    let language = language_of(state);
+    let joint = if language.decimal() == ',' { "; " } else { ", " };
+    named(ways, joint, within, language)
+        .ok_or_else(|| Error::new(minijinja::ErrorKind::InvalidOperation, "names are asked for of what are no ways"))
 }
 
 fn as_number(value: &Value) -> Option<f64> {

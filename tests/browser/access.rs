@@ -94,6 +94,43 @@ fn no_page_is_wider_than_its_window() {
     }
 }
 
+/// Three faults in one row of a grid: their texts stand below it, and neither a column nor the page gets wider.
+#[test]
+fn long_faults_move_no_column() {
+    let Some((_turn, mut page, service)) = both() else { return };
+    let columns = "[...document.querySelectorAll('.form .grid thead th')].map(it => Math.round(it.getBoundingClientRect().width))";
+    for (width, height) in [(360, 740), (1024, 600), (2560, 1300)] {
+        page.screen(width, height, false);
+        page.open(&service.page("deflection-compensation?example=stepped_with_rest"));
+        page.until(SETTLED);
+        if width < 861 {
+            page.click(".pane-switch button");
+        }
+        page.click_on("RU");
+        page.until("document.documentElement.lang === 'ru'");
+        page.wait_for(".form .grid thead th");
+        let before = page.evaluate(columns);
+        page.fill("#field-shaft-segments-0-diameter_mm", "900000");
+        page.fill("#field-shaft-segments-0-length_mm", "-5");
+        page.fill("#field-shaft-segments-1-diameter_mm", "0");
+        // On a phone the form and its faults are one pane, the result another.
+        page.until("document.querySelectorAll('.row-faults .fault').length >= 3");
+        assert_eq!(page.evaluate(columns), before, "{width}");
+        let fits = page.evaluate(
+            "[...document.querySelectorAll('.form .grid-scroll, .sections')].every(it => it.scrollWidth <= it.clientWidth + 1) && document.documentElement.scrollWidth <= innerWidth",
+        );
+        assert_eq!(fits, true, "{width}");
+        // The field says where its fault stands.
+        let told = page.evaluate(
+            "document.getElementById(document.querySelector('#field-shaft-segments-0-diameter_mm').getAttribute('aria-describedby'))?.textContent",
+        );
+        assert!(told.as_str().is_some_and(|told| told.len() > 20), "{told}");
+        page.click_on("EN");
+        page.until("document.documentElement.lang === 'en'");
+    }
+    page.assert_calm();
+}
+
 #[test]
 fn the_keyboard_alone_is_enough() {
     let Some((_turn, mut page, service)) = both() else { return };

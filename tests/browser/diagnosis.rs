@@ -74,6 +74,9 @@ fn measurements_are_dropped_on_a_diagnosis() {
     ));
     page.wait_for(".matching .primary:not(:disabled)");
     page.click(".matching .primary");
+    // What took longer than a blink is not followed by itself.
+    page.until("!document.querySelector('.matching')");
+    page.click(".form-head .primary");
     page.until(&format!(
         "document.querySelector('.verdict').textContent !== {} && {SETTLED}",
         serde_json::json!(before)

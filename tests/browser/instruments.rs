@@ -50,17 +50,27 @@ fn the_history_of_a_ring_is_gone_through_revolution_by_revolution() {
     page.until("document.querySelector('.picture h2').textContent.includes('revolution 20 of')");
     assert_ne!(page.evaluate(DRAWN), blank);
     assert_eq!(page.evaluate("document.querySelectorAll('.polar .glyph').length"), 3);
-    // The state shown is an answer of its own; its roundness is the one that the whole run noted there.
-    let frame = page.evaluate(
-        "(async () => { const asked = performance.getEntriesByType('resource').map(it => it.name).filter(name => name.endsWith('/figures')); \
-         return (await (await fetch(asked.at(-1).replace('/figures', ''))).json()).result })()",
-    );
+    // All states came with one answer: one job for the page, one for the replay, and nothing for each step.
+    let asked = |ending: &str| {
+        format!(
+            "performance.getEntriesByType('resource').filter(it => new URL(it.name).pathname.endsWith('{ending}')).length"
+        )
+    };
+    assert_eq!(page.evaluate(&asked("/v1/ring-roundness")), 2);
+    assert_eq!(page.evaluate(&asked("/figures")), 1);
+    // The deviation drawn is the one that the whole run noted there: a tenth of a pixel of the chart is two in a thousand.
     let whole = shown_result(&mut page);
     let noted = number(&whole, "/simulation/history/roundness_um/19");
-    let own = number(&frame, "/simulation/end/unfiltered/least_squares_um");
     assert!((number(&whole, "/simulation/history/revolution/19") - 20.0).abs() < 0.01);
-    // Both are the same sum over the same nodes; one node more or less at the stop moves it by a few parts in 1e4.
-    assert!((own / noted - 1.0).abs() < 1e-3, "{own} against {noted}");
+    page.click("[aria-label='As a table']");
+    let drawn = page.evaluate(
+        "(() => { const all = [...document.querySelectorAll('.numbers tbody tr')].map(row => Number([...row.querySelectorAll('td')].at(-1).textContent.replace('−', '-'))); \
+         return Math.max(...all) - Math.min(...all) })()",
+    );
+    // The table shows every third of the 360 angles.
+    let drawn = drawn.as_f64().unwrap();
+    assert!(drawn <= 1.003 * noted && drawn > 0.8 * noted, "{drawn} against {noted}");
+    page.click("[aria-label='As a table']");
     // It plays to the end by itself.
     page.click(".scrubber button");
     page.until("document.querySelector('#replay').value === document.querySelector('#replay').max");
@@ -71,10 +81,30 @@ fn the_history_of_a_ring_is_gone_through_revolution_by_revolution() {
 #[test]
 fn a_cell_of_the_set_up_map_puts_its_angles_into_the_form_by_click_and_by_key() {
     let Some((_turn, mut page, service)) = both() else { return };
-    page.open(&service.page("ring-roundness?example=set_up"));
+    try_set_ups(&mut page, &service.page("ring-roundness?example=set_up"));
+    page.assert_calm();
+}
+
+/// A support and a tool that stand beside their places in the job: the form gets what makes them really stand there.
+#[test]
+fn a_set_up_from_the_map_allows_for_known_shifts_of_support_and_tool() {
+    let Some((_turn, mut page, service)) = both() else { return };
+    let effects = json!([
+        { "kind": "support_position", "support_b_shift_mm": 0.8 },
+        { "kind": "tool_off_line", "tangential_offset_mm": -0.6 },
+    ]);
+    let effects = effects.to_string().replace('"', "%22");
+    try_set_ups(&mut page, &service.page(&format!("ring-roundness?example=set_up&/effects={effects}")));
+    assert!(page.text(".hint").contains("Known shifts"));
+    page.assert_calm();
+}
+
+/// Tries two cells of the map, by click and by key; the real set-up is the one that was pointed at.
+fn try_set_ups(page: &mut Page, address: &str) {
+    page.open(address);
     page.until(SETTLED);
-    choose(&mut page, "Worst wave");
-    let before = shown_result(&mut page);
+    choose(page, "Worst wave");
+    let before = shown_result(page);
     let picked = |page: &mut Page, was: &str| {
         page.until(&format!(
             "document.querySelector('#field-supports-distance_mm').value !== {} && !document.querySelector('.problem') && {SETTLED}",
@@ -95,7 +125,7 @@ fn a_cell_of_the_set_up_map_puts_its_angles_into_the_form_by_click_and_by_key() 
     let was = page.value("#field-supports-distance_mm");
     let (x, y) = page.middle("svg.chart[data-panel='0']");
     page.drag((x + 90.0, y + 20.0), (x + 91.0, y + 20.0));
-    let clicked = picked(&mut page, &was);
+    let clicked = picked(page, &was);
     page.until("location.hash.includes('/supports/distance_mm=')");
 
     // From there two cells up and one to the right.
@@ -107,8 +137,59 @@ fn a_cell_of_the_set_up_map_puts_its_angles_into_the_form_by_click_and_by_key() 
     }
     page.until("document.querySelector('.picture [role=status]').textContent.includes('support half angle')");
     page.press("Enter");
-    let typed = picked(&mut page, &was);
+    let typed = picked(page, &was);
     assert!(typed.1 > clicked.1 && typed.0 >= clicked.0, "{clicked:?} then {typed:?}");
+}
+
+#[test]
+fn what_binds_is_a_ribbon_along_the_shaft_that_says_its_zone() {
+    let Some((_turn, mut page, service)) = both() else { return };
+    page.open(&service.page("feed-schedule"));
+    page.until(SETTLED);
+    let pieces = "document.querySelectorAll('.picture.main rect.ribbon').length";
+    assert!(page.evaluate(pieces).as_u64().unwrap() >= 8);
+    // It begins and ends with the shaft's zones, on the same axis as the feed above it.
+    let ends = page.evaluate(
+        "(() => { const ends = boxes => [Math.min(...boxes.map(it => it.left)), Math.max(...boxes.map(it => it.right))]; \
+         const panels = [...document.querySelectorAll('.picture.main svg.chart')]; \
+         const ribbon = panels.find(it => it.querySelector('rect.ribbon')); \
+         return [...ends([...ribbon.querySelectorAll('g rect.ribbon')].map(it => it.getBoundingClientRect())), \
+                 ...ends([...panels[1].querySelectorAll('path.line.command')].map(it => it.getBoundingClientRect()))] })()",
+    );
+    let end = |at: usize| ends[at].as_f64().unwrap();
+    assert!((end(0) - end(2)).abs() < 2.5 && (end(1) - end(3)).abs() < 2.5, "{ends}");
+    // Not by colour alone: a letter or the name in every piece, the same letters in the legend, patterns.
+    let said =
+        page.evaluate("[...document.querySelectorAll('.picture.main .chart text.said')].map(it => it.textContent)");
+    let letters = page.evaluate("[...document.querySelectorAll('.panel-head .said')].map(it => it.textContent)");
+    assert!(!said.as_array().unwrap().is_empty() && letters.as_array().unwrap().len() >= 3, "{said} {letters}");
+    assert!(page.evaluate("document.querySelectorAll('.picture.main rect.weave').length").as_u64().unwrap() > 0);
+    // The mouse reads the zone, so do the keys.
+    let place = page.middle("svg.chart:has(rect.ribbon)");
+    page.point(place);
+    page.until("/^z\\d/.test(document.querySelector('.stretch').textContent) && [...document.querySelectorAll('.series output')].some(it => it.textContent.includes('%'))");
+    page.evaluate("document.querySelector('.plot').focus()");
+    page.press("ArrowRight");
+    page.until("/z\\d+: .* %/.test(document.querySelector('.picture [role=status]').textContent)");
+    // As a table.
+    page.click("[aria-label='As a table']");
+    page.until("[...document.querySelectorAll('.numbers thead th')].some(it => /deflection/.test(it.textContent) && /%/.test(it.textContent))");
+    // A name hides its pieces.
+    let before = page.evaluate(pieces);
+    page.click(".series:has(.ribbon)");
+    page.until(&format!("{pieces} < {before}"));
+    // The same in the printed form of the picture, in both languages.
+    page.click("#tab-basis");
+    page.wait_for(".key-text");
+    for (language, word) in [("en", "roughness, hardening"), ("ru", "шероховатость, наклёп")] {
+        let svg = page.evaluate(&format!(
+            "fetch('/v1/results/' + document.querySelector('.key-text').textContent, {{headers: {{Accept: 'image/svg+xml', 'Accept-Language': '{language}'}}}}).then(it => it.text())"
+        ));
+        let svg = svg.as_str().unwrap();
+        for part in ["class=\"ribbon n0\"", "url(#precut-weave-2)", word, ">A</text>", "<title>z5: "] {
+            assert!(svg.contains(part), "{language}: {part}");
+        }
+    }
     page.assert_calm();
 }
 

@@ -7,6 +7,7 @@
 
 mod access;
 mod assets;
+mod calm;
 mod chromium;
 mod diagnosis;
 mod instruments;

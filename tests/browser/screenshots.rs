@@ -79,7 +79,7 @@ fn stage(page: &mut Page, name: &str) {
             for _ in 0..3 {
                 page.press("ArrowRight");
             }
-            page.until("document.querySelector('.picture h2').textContent.includes('revolution 3 of')");
+            page.until("document.querySelector('.picture h2').textContent.includes('revolution 9 of')");
         }
         "ring-map" => {
             page.click_on("Worst wave");

@@ -75,6 +75,50 @@ fn the_page_speaks_russian_and_english() {
     assert_eq!(page.value("#field-cut-feed_mm_per_rev"), "0,5");
     page.fill("#field-cut-feed_mm_per_rev", "0.75");
     page.until("location.hash.includes('/cut/feed_mm_per_rev=0.75')");
+    // A picture of a study carries the labels of the form, also in its printed form.
+    page.open(&service.page("studies"));
+    page.wait_for("#run-study");
+    page.click("#add-varied");
+    page.click("#run-study");
+    page.until("document.querySelector('.study-rows tbody tr') && location.hash.includes('study=b3:')");
+    let verdict = page.text(".verdict");
+    let has_pointer = verdict.split_whitespace().any(|word| word.starts_with('/') || word.contains('_'));
+    assert!(!has_pointer && cyrillic(&verdict), "{verdict}");
+    for selector in [".axis-name", ".x-name", ".picture h2"] {
+        let text = page.text(selector);
+        let latin = text.chars().filter(char::is_ascii_alphabetic).count();
+        assert!(cyrillic(&text) && latin == 0, "{selector}: {text}");
+    }
+    let svg = page.evaluate(
+        "fetch('/v1/results/' + location.hash.match(/b3:[0-9a-f]+/)[0], {headers: {Accept: 'image/svg+xml', 'Accept-Language': 'ru'}}).then(it => it.text())",
+    );
+    let svg = svg.as_str().unwrap();
+    let words = svg.split("<text").skip(1).filter_map(|part| part.split('>').nth(1)?.split('<').next());
+    let words: Vec<&str> = words.filter(|word| word.chars().any(|c| c.is_ascii_alphabetic())).collect();
+    assert!(words.is_empty(), "{words:?}");
+
+    // Whoever switches before the answer is there gets it in the new language.
+    page.open(&service.page("fixture-stability?example=lobes"));
+    page.click_on("EN");
+    page.until(&format!("document.documentElement.lang === 'en' && {SETTLED}"));
+    page.until("/^The /.test(document.querySelector('.verdict').textContent)");
+    page.click_on("RU");
+    page.until("document.documentElement.lang === 'ru'");
+
+    // What is refused is refused in the language of the page, also after a switch.
+    page.open(&service.page("feed-schedule?/limits/tool_usage_max=0.001"));
+    page.until(
+        "document.documentElement.lang === 'ru' && /[а-я]/.test(document.querySelector('.problem li').textContent)",
+    );
+    let said = page.text(".problem li");
+    assert!(said.contains("прогиб (z5)") && !said.contains('@') && !said.contains('_'), "{said}");
+    page.click_on("EN");
+    page.until("document.documentElement.lang === 'en' && /deflection \\(z5\\)/.test(document.querySelector('.problem li').textContent)");
+    page.click_on("RU");
+    page.until(
+        "document.documentElement.lang === 'ru' && /прогиб/.test(document.querySelector('.problem li').textContent)",
+    );
+
     // It is remembered.
     page.open(&service.page(""));
     page.until("document.documentElement.lang === 'ru' && document.querySelector('.questions')");

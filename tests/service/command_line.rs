@@ -270,7 +270,28 @@ fn an_exported_model_extends_a_job() {
     let answer: Value = serde_json::from_str(&said(&solve(&example))).unwrap();
     assert_eq!((&answer["model"]["name"], &answer["model"]["revision"]), (&"lathe-7".into(), &3.into()));
     assert_eq!(answer["effects"][0]["kind"], "headstock_compliance");
-    assert!(answer["explanation"].as_array().unwrap().iter().any(|said| said["code"] == "model_changed"));
+    // Results are called by their labels, with their units, and only where they changed.
+    let changed = |answer: &Value| -> Vec<Value> {
+        let said = answer["explanation"].as_array().unwrap().iter();
+        said.filter(|said| said["code"] == "model_changed").cloned().collect()
+    };
+    let english = changed(&answer);
+    assert!(!english.is_empty());
+    for said in &english {
+        let text = said["text"].as_str().unwrap();
+        assert!(
+            !text.split_whitespace().any(|word| word.starts_with('/')) && text.contains("the stored model lathe-7@3"),
+            "{text}"
+        );
+        assert_ne!(said["values"]["with"], said["values"]["without"], "{text}");
+    }
+    let first = english[0]["text"].as_str().unwrap();
+    assert!(first.starts_with("Form error is ") && first.contains(" µm; without"), "{first}");
+    let russian = said(&feed_precut(&["solve", "--lang", "ru", "--model", path.to_str().unwrap()], &example));
+    let russian = changed(&serde_json::from_str(&russian).unwrap());
+    assert_eq!(russian.len(), english.len());
+    let first = russian[0]["text"].as_str().unwrap();
+    assert!(first.starts_with("Погрешность формы: ") && first.contains(" мкм; без"), "{first}");
 
     // A job may name it, any other name is a fault.
     let naming = |name: &str| {

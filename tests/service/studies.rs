@@ -51,12 +51,12 @@ async fn a_small_study_is_answered_at_once_in_every_form() {
     assert_eq!(header(&again, "precut-cache"), "hit");
     assert_eq!(post().header("if-none-match", tag).send().await.unwrap().status(), 304);
     let csv = post().header("accept", "text/csv").send().await.unwrap().text().await.unwrap();
-    assert_eq!(csv.lines().next(), Some("length [mm],load [N],status,code,max_sag [um],key"));
+    assert_eq!(csv.lines().next(), Some("length [mm],load [N],status,code,detail,max_sag [um],key"));
     assert_eq!(csv.lines().count(), 10);
     let extremes = server.get(&format!("{place}?table=extremes")).header("accept", "text/csv").send().await.unwrap();
     assert!(extremes.text().await.unwrap().contains("/max_sag_um,um,"));
     for (figure, words) in
-        [("", "max sag over length and load"), ("?figure=map", "load"), ("?figure=curves", "load = 10 N")]
+        [("", "Max sag over length and load"), ("?figure=map", "load"), ("?figure=curves", "Load = 10 N")]
     {
         let drawn = server.get(&format!("{place}{figure}")).header("accept", "image/svg+xml").send().await.unwrap();
         let drawn = drawn.text().await.unwrap();
@@ -137,7 +137,7 @@ async fn a_long_study_is_one_job_with_one_progress_and_pictures_on_the_way() {
     let result: Value = server.get(&format!("{address}/result")).send().await.unwrap().json().await.unwrap();
     assert_eq!(result["result"]["succeeded"], 60);
     let events = events.await.unwrap().unwrap().text().await.unwrap();
-    assert!(events.contains("event: interim") && events.contains("\"study_x\":\"length\""), "{events}");
+    assert!(events.contains("event: interim") && events.contains("\"text\":\"Length\""), "{events}");
     assert!(events.contains("event: done"), "{events}");
     let listed: Value = server.get("/v1/jobs?calculator=studies").send().await.unwrap().json().await.unwrap();
     assert_eq!(listed["items"].as_array().unwrap().len(), 1);

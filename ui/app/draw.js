@@ -40,6 +40,65 @@ export function styles(figure) {
   return item => known.get(`${role(item.role).name} ${item.name}`) || role(item.role).name;
 }
 
+/** The letter and the pattern of a ribbon's role: those of its number in the family. */
+export const letterOf = of => String.fromCharCode(65 + (typeof of === 'object' ? of.series % 26 : 0));
+const WEAVES = 6;
+const weaveOf = of => (typeof of === 'object' ? of.series % WEAVES : 0);
+/** Lines and dots over a colour, so that it is not told by colour alone. */
+export const weaves = id => [
+  html`<pattern id=${`${id}-1`} width="7" height="7" patternUnits="userSpaceOnUse" patternTransform="rotate(45)"><path d="M0 0V7" /></pattern>`,
+  html`<pattern id=${`${id}-2`} width="7" height="7" patternUnits="userSpaceOnUse" patternTransform="rotate(-45)"><path d="M0 0V7" /></pattern>`,
+  html`<pattern id=${`${id}-3`} width="6" height="6" patternUnits="userSpaceOnUse"><path d="M2 3H4" /></pattern>`,
+  html`<pattern id=${`${id}-4`} width="6" height="6" patternUnits="userSpaceOnUse"><path d="M0 3H6" /></pattern>`,
+  html`<pattern id=${`${id}-5`} width="6" height="6" patternUnits="userSpaceOnUse"><path d="M3 0V6" /></pattern>`,
+];
+export const hasRibbons = panel => panel.items.some(item => item.kind === 'ribbon');
+/** The lightest of several ribbons over one stretch still has this share of the height. */
+const LEAST_SHARE = 0.24;
+/** Room that a letter needs, and about that of a name. */
+const LETTER = 12;
+const widthOf = text => [...text].reduce((sum, letter) => sum + (/[а-яёА-ЯЁA-Zmw]/.test(letter) ? 7.6 : 6.3), 0);
+
+/** Where the pieces of a ribbon lie in the height of their panel, from 0 above to 1: by weight, the heaviest above. */
+function sharesOf(panel, item) {
+  const ribbons = panel.items.filter(({ kind }) => kind === 'ribbon');
+  return item.x.map(from => {
+    const here = ribbons.map(one => ({ name: one.name, weight: one.weight[one.x.indexOf(from)] })).filter(({ weight }) => weight > 0).sort((a, b) => b.weight - a.weight);
+    const sum = here.reduce((total, { weight }) => total + weight, 0);
+    const raised = here.map(({ weight }) => Math.max(weight / sum, LEAST_SHARE));
+    const whole = raised.reduce((total, share) => total + share, 0);
+    const place = here.findIndex(({ name }) => name === item.name);
+    const above = raised.slice(0, place).reduce((total, share) => total + share, 0);
+    return [above / whole, (above + raised[place]) / whole];
+  });
+}
+
+/** The stretch of a ribbon at a place: its name and its weight; `null` where it has none. */
+export function stretchAt(item, x) {
+  const at = item.x.findIndex((from, index) => x >= from && (x < item.x_end[index] || (x === item.x_end[index] && !item.x.includes(x))));
+  return at < 0 ? null : { place: item.places[at], weight: item.weight[at] };
+}
+
+function ribbon(panel, item, { x, frame, id }, look, ghost) {
+  // A run that is compared lies as a strip below the present one.
+  const [top, height] = ghost ? [frame.top + frame.height * 0.74, frame.height * 0.26] : [frame.top, frame.height * (frame.hasGhost ? 0.7 : 1)];
+  const shares = sharesOf(panel, item);
+  return item.x.map((from, index) => {
+    const [left, right] = [x(from), x(item.x_end[index])];
+    if (!(right > left)) return null;
+    const [high, low] = [top + shares[index][0] * height, top + shares[index][1] * height];
+    const box = { x: px(left), y: px(high), width: px(right - left), height: px(low - high) };
+    const weave = weaveOf(item.role);
+    const said = [item.text, letterOf(item.role)].find(text => widthOf(text) + 8 <= right - left);
+    return html`<g key=${item.name + index}><title>${`${item.places[index]}: ${item.text}`}</title>
+      <rect class=${`ribbon ${look}`} ...${box} />${weave > 0 && html`<rect class="weave" fill=${`url(#${id}-${weave})`} ...${box} />`}
+      ${said && low - high >= LETTER && html`<text class="said" x=${px((Math.max(left, frame.left) + Math.min(right, frame.left + frame.width)) / 2)} y=${px((high + low) / 2 + 4)} text-anchor="middle">${said}</text>`}</g>`;
+  });
+}
+
+/** A piece of a ribbon with its letter, for a legend. */
+export const ribbonSample = (item, look, id) => html`<rect class=${`ribbon ${look}`} x="1" y="1" width="26" height="12" />${weaveOf(item.role) > 0 && html`<rect class="weave" fill=${`url(#${id}-${weaveOf(item.role)})`} x="1" y="1" width="26" height="12" />`}<text class="said" x="14" y="11" text-anchor="middle">${letterOf(item.role)}</text>`;
+
 const px = value => Math.round(value * 10) / 10;
 
 /** A curve as a path. Where there are many more points than pixels, the extremes of each pixel stand for them. */
@@ -147,6 +206,20 @@ function glyph(item, place, { mirrored, turn = 0, reach = 12 }) {
   return html`<g class="glyph" transform=${`translate(${px(h)} ${px(v)}) rotate(${turn}) scale(${across} ${up})`}>${shape}</g>`;
 }
 
+const has = (item, x) => { const at = below(item.x, x); return item.x[at] === x && item.y[at] !== null; };
+
+/** The least distance of neighbouring bars of a panel, all names together, by `place`; 0 where there is one abscissa. */
+export function barStep(panel, place = x => x) {
+  const places = [...new Set(panel.items.filter(({ kind }) => kind === 'bars').flatMap(item => item.x.filter((_, at) => item.y[at] !== null)))].map(place).sort((a, b) => a - b);
+  const steps = places.slice(1).map((one, at) => one - places[at]);
+  return steps.length > 0 ? Math.min(...steps) : 0;
+}
+
+/** More points than these are drawn small: they stand for a curve. */
+const DENSE = 150;
+const smaller = marker => (marker === MARKERS.circle ? 'm-1.5 0a1.5 1.5 0 1 0 3 0a1.5 1.5 0 1 0-3 0' : marker.replace(/-?\d*\.?\d+/g, number => `${Number(number) * 0.5} `));
+export const markerOf = item => (item.x.length > DENSE ? smaller(role(item.role).marker) : role(item.role).marker);
+
 /** Draws the items of a panel. `plane` has `place(x, y)`, the scales, the frame, and how symbols stand. */
 export function items(panel, plane, { style, hidden, ghost }) {
   const { place, x, y, frame, stance } = plane;
@@ -162,26 +235,27 @@ export function items(panel, plane, { style, hidden, ghost }) {
         return html`<g key=${index}><path class=${`band ${look}`} d=${`${edge}z`} />${lines}</g>`;
       }
       case 'points': {
-        const marker = role(item.role).marker;
+        const marker = markerOf(item);
         const d = item.x.map((value, at) => place(value, item.y[at])).filter(point => point.every(Number.isFinite)).map(([h, v]) => `M${px(h)} ${px(v)}${marker}`).join('');
         return html`<path key=${index} class=${`points ${look}`} d=${d} />`;
       }
       case 'bars': {
         if (ghost && !x) return null;
-        const at = barNames.indexOf(item.name);
-        const step = item.x.length > 1 ? Math.abs(x(item.x[1]) - x(item.x[0])) : frame.width / 3;
-        const whole = Math.min(step * 0.8, 60);
-        const width = Math.max(whole / barNames.length, 1);
+        const whole = Math.min(barStep(panel, x) * 0.8 || frame.width / 4, 60);
         const zero = y.spacing === 'logarithmic' ? frame.top + frame.height : Math.min(Math.max(y(0), frame.top), frame.top + frame.height);
         const d = item.x.map((value, place_) => {
           if (item.y[place_] === null || !Number.isFinite(y(item.y[place_]))) return '';
-          const left = x(value) - whole / 2 + at * width;
+          // Those of several names over one abscissa stand side by side.
+          const here = barNames.filter(name => panel.items.some(other => other.kind === 'bars' && other.name === name && has(other, value)));
+          const width = Math.max(whole / here.length, 1);
+          const left = x(value) - whole / 2 + here.indexOf(item.name) * width;
           const tip = y(item.y[place_]);
           return `M${px(left)} ${px(zero)}V${px(tip)}h${px(width * 0.94)}V${px(zero)}z`;
         }).join('');
         return html`<path key=${index} class=${`bars ${look}`} d=${d} />`;
       }
       case 'heat_map': return ghost || !x ? null : html`<g key=${index}>${mapImage(item, x, y, frame)}</g>`;
+      case 'ribbon': return x ? html`<g key=${index}>${ribbon(panel, item, plane, look, ghost)}</g>` : null;
       case 'outline': return html`<path key=${index} class=${`outline ${look}`} d=${`${ring(item.x, item.y, place)}z`} />`;
       case 'glyph': return ghost ? null : html`<g key=${index}>${glyph(item, place, stance(item))}</g>`;
       default: return null;

@@ -1,7 +1,7 @@
 // Fields of a single value: label, control, unit, and the words of the service where the value is at fault.
 import { html, useState, useEffect, useRef } from './lib.js';
 import { t, typed, parsed, number, unitOf } from './text.js';
-import { kindOf, labelOf, wordOf, symbolParts, range, pointer } from './schema.js';
+import { kindOf, labelOf, wordOf, symbolParts, range, pointer, spoken } from './schema.js';
 
 export const fieldId = path => `field${pointer(path).replace(/[^A-Za-z0-9_]/g, '-')}`;
 
@@ -33,7 +33,11 @@ export function Row({ name, schema, path, value, required, context, control: Con
   const id = fieldId(path);
   const label = labelOf(name, schema);
   const faults = context.errorsAt(path);
-  const description = [schema.description, defaultText(schema)].filter(Boolean).join(' ');
+  const filled = value === undefined ? context.filledAt(path) : undefined;
+  const own = defaultText(schema);
+  // A number that the service takes from elsewhere says from where.
+  const from = typeof filled === 'number' && filled !== schema.default ? `${number(filled)} ${unitOf(schema)}: ${context.sourceAt(path)}`.replace(/ +:/, ':') : '';
+  const description = [schema.description, own, from].filter(Boolean).join(' ');
   const allowed = kindOf(schema) === 'number' ? rangeText(schema) : '';
   const show = () => context.setHelp({ label, symbol: schema['x-symbol'], range: allowed, description });
   const [wrong, setWrong] = useState(null);
@@ -51,17 +55,17 @@ export function Row({ name, schema, path, value, required, context, control: Con
     <div class=${`row ${faults.length || wrong ? 'faulty' : ''} ${compact ? 'compact' : ''}`} onMouseEnter=${show} onFocusIn=${show}>
       <${Control} ...${common} label=${html`<span>${label}</span>${schema['x-symbol'] && schema['x-symbol'].toLowerCase() !== label.toLowerCase() && html` <${Symbol} symbol=${schema['x-symbol']} />`}`} unit=${unit} plain=${label} />
       <span id=${`${id}-about`} class="hidden">${[unit && t('in_unit', { unit }), allowed, description].filter(Boolean).join('. ')}</span>
-      <${Faults} faults=${wrong ? [{ detail: wrong }] : faults} id=${`${id}-fault`} />
+      <${Faults} faults=${wrong ? [{ detail: wrong }] : faults} id=${`${id}-fault`} names=${context.names} />
     </div>`;
 }
 
-export function Faults({ faults, id }) {
+export function Faults({ faults, id, names }) {
   if (!faults || faults.length === 0) return null;
-  return html`<p class="fault" id=${id}>${faults.map(fault => html`<span>${sentence(fault.detail)}</span>`)}</p>`;
+  return html`<p class="fault" id=${id}>${faults.map(fault => html`<span>${sentence(spoken(fault.detail, names))}</span>`)}</p>`;
 }
 
 /** Names of fields keep their small letters. */
-const sentence = text => (!text || /^[a-z]+_/.test(text) ? text : text.charAt(0).toUpperCase() + text.slice(1));
+export const sentence = text => (!text || /^[a-z]+_/.test(text) ? text : text.charAt(0).toUpperCase() + text.slice(1));
 
 /** Steps of the arrow keys: a hundredth of the value's size, a tenth with shift. */
 export function nudged(value, schema, direction, shift) {
@@ -114,7 +118,7 @@ export function NumberInput({ id, schema, value, filled, set, setWrong, describe
   const placeholder = standIn === undefined || standIn === null ? '' : typed(Number(standIn.toPrecision(7)));
   return html`
     <label for=${id} class="label draggable" ...${drag}>${label}</label>
-    <span class="control"><input id=${id} type="text" inputmode="decimal" autocomplete="off" spellcheck=${false} value=${shown} placeholder=${placeholder}
+    <span class="control"><input id=${id} type="text" inputmode="decimal" autocomplete="off" spellcheck=${false} value=${shown} placeholder=${placeholder} title=${rangeText(schema)}
       disabled=${context.disabled} aria-describedby=${described} aria-invalid=${invalid ? 'true' : undefined} aria-required=${required ? 'true' : undefined}
       onInput=${event => take(event.currentTarget.value)} onBlur=${leave} onKeyDown=${key} onFocus=${event => { const field = event.currentTarget; setFocused(true); setTimeout(() => { if (document.activeElement === field) field.select(); }, 0); }} /></span>
     <span class="unit" aria-hidden="true">${unit}</span>`;

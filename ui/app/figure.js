@@ -3,11 +3,15 @@
 import { html, useState, useRef, useMemo, useLayoutEffect, useEffect, unique } from './lib.js';
 import { t, number, unitSymbol } from './text.js';
 import { scale, extent, aired, ticks, labels, valueAt, cellAt } from './scale.js';
-import { items, styles } from './draw.js';
+import { items, styles, weaves, hasRibbons, stretchAt, barStep } from './draw.js';
 import { axisName, readDigits, abscissae, ordinates, Head, describe } from './panel.js';
 import { Polar } from './polar.js';
 
 const LEAST_PANEL = 78;
+const LEAST_RIBBON = 44;
+/** So many panels are each a little lower. */
+const MANY_PANELS = 5;
+const LEAST_OF_MANY = 62;
 const AXIS_ROOM = 40;
 const END_GLYPHS = ['centre_left', 'centre_right', 'chuck'];
 const GLYPH_ROOM = 36;
@@ -28,14 +32,20 @@ function useWidth() {
   return [ref, width];
 }
 
-/** Draws again when the colour scheme changes: maps are pictures of pixels. */
+/** Draws again when the colour scheme changes, on paper too: maps are pictures of pixels. */
 function useScheme() {
   const [scheme, setScheme] = useState(0);
   useEffect(() => {
     const query = matchMedia('(prefers-color-scheme: dark)');
     const change = () => setScheme(count => count + 1);
     query.addEventListener('change', change);
-    return () => query.removeEventListener('change', change);
+    addEventListener('beforeprint', change);
+    addEventListener('afterprint', change);
+    return () => {
+      query.removeEventListener('change', change);
+      removeEventListener('beforeprint', change);
+      removeEventListener('afterprint', change);
+    };
   }, []);
   return scheme;
 }
@@ -92,6 +102,9 @@ export function Picture({ figure, pinned, height = 460, onPick, handle, main }) 
     const hasWide = figure.panels.some(panel => panel.items.some(item => item.kind === 'bars'));
     const kinds = new Set(figure.panels.flatMap(panel => panel.items.map(item => item.kind)));
     const scatter = kinds.has('points') && !kinds.has('outline') && !kinds.has('heat_map');
+    // Bars need half their distance on either side.
+    const half = Math.max(0, ...figure.panels.map(panel => barStep(panel))) / 2;
+    if (hasWide && span && half > 0 && figure.x.scale !== 'logarithmic') return [span[0] - half, span[1] + half];
     return hasWide || scatter || !span || span[0] === span[1] ? aired(span, figure.x.scale, hasWide ? 0.03 : 0.04) : span;
   }, [figure, pinned]);
   const shown = view || full;
@@ -173,6 +186,8 @@ function readings(figure, x, y = null) {
         const value = cellAt(item, x, y);
         if (value !== null) list.push({ text: item.value.text, value, unit: unitSymbol(item.value.unit) });
       }
+      const stretch = item.kind === 'ribbon' && stretchAt(item, x);
+      if (stretch) list.push({ text: `${stretch.place}: ${item.text}`, value: stretch.weight, unit: unitSymbol(panel.y.unit) });
       if (!['line', 'bars', 'points'].includes(item.kind) || (y !== null && item.kind === 'points')) continue;
       const value = valueAt(item.x, item.y, x, item.kind === 'line');
       if (value !== null && value !== undefined) list.push({ text: item.text, value, unit: unitSymbol(panel.y.unit) });
@@ -185,13 +200,13 @@ function readings(figure, x, y = null) {
 function Numbers({ figure, samples }) {
   const stride = Math.max(1, Math.ceil(samples.length / TABLE_ROWS));
   const xs = samples.filter((_, index) => index % stride === 0);
-  const columns = figure.panels.flatMap(panel => panel.items.filter(item => ['line', 'bars', 'points'].includes(item.kind)).map(item => ({ item, unit: panel.y.unit })));
+  const columns = figure.panels.flatMap(panel => panel.items.filter(item => ['line', 'bars', 'points', 'ribbon'].includes(item.kind)).map(item => ({ item, unit: panel.y.unit })));
   if (columns.length === 0) return html`<p class="quiet">${t('see_tables')}</p>`;
   return html`
     <div class="grid-scroll numbers" tabindex="0" role="region" aria-label=${figure.title.text}><table class="grid still">
       <thead><tr><th scope="col">${figure.x.text} <span class="unit">${unitSymbol(figure.x.unit)}</span></th>${columns.map(({ item, unit }) => html`<th scope="col">${item.text} <span class="unit">${unitSymbol(unit)}</span></th>`)}</tr></thead>
       <tbody>${xs.map(x => html`<tr key=${x}><th scope="row">${number(x, 6)}</th>${columns.map(({ item }) => {
-        const value = valueAt(item.x, item.y, x, item.kind === 'line');
+        const value = item.kind === 'ribbon' ? stretchAt(item, x)?.weight : valueAt(item.x, item.y, x, item.kind === 'line');
         return html`<td>${value === null || value === undefined ? '' : number(value, 5)}</td>`;
       })}</tr>`)}</tbody>
     </table></div>`;
@@ -204,11 +219,12 @@ function Stacked({ figure, pinned, width, style, hidden, toggle, at, setAt, over
   const visible = figure.panels.map(panel => ({ ...panel, items: panel.items.filter(item => !item.name || !hidden.has(item.name)) }));
   const count = width < 480 ? 4 : 6;
   const panels = visible.map((panel, index) => {
-    const tall = Math.max(LEAST_PANEL, Math.round((height * panel.height) / shares));
+    const isRibbon = hasRibbons(panel);
+    const tall = Math.max(isRibbon ? LEAST_RIBBON : visible.length >= MANY_PANELS ? LEAST_OF_MANY : LEAST_PANEL, Math.round((height * panel.height) / shares));
     const span = extent([...ordinates(panel, view), ...(ghosts[index] ? ordinates(ghosts[index], view) : [])], panel.y.scale);
     const isMap = panel.items.some(item => item.kind === 'heat_map');
     const domain = isMap ? span : aired(span, panel.y.scale);
-    const places = ticks(panel.y.scale, domain, Math.max(3, Math.round(tall / 42)));
+    const places = isRibbon ? [] : ticks(panel.y.scale, domain, Math.max(3, Math.round(tall / 42)));
     return { panel, ghost: ghosts[index], tall, domain, places, ...labels(panel.y.scale, places), span: span ? span[1] - span[0] : 0 };
   });
   const left = Math.max(34, ...panels.map(({ texts }) => 12 + 6.6 * Math.max(0, ...texts.map(text => text.length))));
@@ -299,29 +315,29 @@ function Stacked({ figure, pinned, width, style, hidden, toggle, at, setAt, over
         const above = own.some(item => !END_GLYPHS.includes(item.glyph) && item.y >= 0) ? GLYPH_ROOM : own.length ? 14 : 0;
         const under = own.some(item => !END_GLYPHS.includes(item.glyph) && item.y < 0) ? GLYPH_ROOM : own.length ? 14 : 0;
         const y = scale(panel.y.scale, domain, [6 + tall - Math.min(under, tall / 4), 6 + Math.min(above, tall / 4)]);
-        const frame = { left, top: 6, width: right - left, height: tall };
+        const frame = { left, top: 6, width: right - left, height: tall, hasGhost: Boolean(ghost) };
         const clip = `clip-${figure.id}-${index}`;
         const stance = item => {
           const outline = panel.items.find(other => other.kind === 'outline' && other.role === 'part');
           const radius = outline ? Math.max(...outline.y.filter((_, place) => Math.abs(outline.x[place] - item.x) <= (shown[1] - shown[0]) / 50 + 1e-9), 0) : 0;
           return { mirrored: item.glyph === 'chuck' ? item.x > (shown[0] + shown[1]) / 2 : item.y < 0, reach: Math.abs(y(0) - y(radius || domain[1] * 0.5)) };
         };
-        const plane = { x, y, frame, stance, place: (h, v) => [x(h), y(v)] };
+        const plane = { x, y, frame, stance, id: `${clip}-weave`, place: (h, v) => [x(h), y(v)] };
         const cursor = at !== null && at >= shown[0] && at <= shown[1] ? x(at) : null;
         const svgHeight = 6 + tall + (last ? AXIS_ROOM : 8);
         return html`
           <${Head} key=${`head-${index}`} ...${{ panel: figure.panels[index], ghost, style, hidden, toggle, at, over, factor, span }} />
           <svg key=${`panel-${index}`} data-panel=${index} class="chart" width=${width} height=${svgHeight} viewBox=${`0 0 ${width} ${svgHeight}`} role="img" aria-label=${describe(panel, figure)}>
-            <defs><clipPath id=${clip}><rect x=${left} y="6" width=${Math.max(1, right - left)} height=${tall} /></clipPath></defs>
+            <defs><clipPath id=${clip}><rect x=${left} y="6" width=${Math.max(1, right - left)} height=${tall} /></clipPath>${hasRibbons(panel) && weaves(`${clip}-weave`)}</defs>
             <g class="grid">${places.map(place => html`<path d=${`M${left} ${y(place).toFixed(1)}H${right}`} />`)}${xPlaces.map(place => html`<path d=${`M${x(place).toFixed(1)} 6V${6 + tall}`} />`)}</g>
-            ${domain[0] < 0 && domain[1] > 0 && panel.y.scale === 'linear' && html`<path class="zero" d=${`M${left} ${y(0).toFixed(1)}H${right}`} />`}
+            ${places.length > 0 && domain[0] < 0 && domain[1] > 0 && panel.y.scale === 'linear' && html`<path class="zero" d=${`M${left} ${y(0).toFixed(1)}H${right}`} />`}
             <g clip-path=${`url(#${clip})`}>
               ${ghost && items(ghost, plane, { style, hidden, ghost: true })}
               ${items(panel, plane, { style, hidden })}
             </g>
             <rect class="frame" x=${left} y="6" width=${Math.max(1, right - left)} height=${tall} />
             <g class="tick-labels" text-anchor="end">${places.map((place, tick) => html`<text x=${left - 6} y=${y(place) + 4}>${texts[tick]}</text>`)}</g>
-            ${last && html`<g class="tick-labels" text-anchor="middle">${xPlaces.map((place, tick) => html`<text x=${Math.min(Math.max(x(place), 12), width - 14)} y=${tall + 22}>${xLabels.texts[tick]}</text>`)}</g>
+            ${last && html`<g class="tick-labels" text-anchor="middle">${xPlaces.map((place, tick) => html`<text x=${Math.min(Math.max(x(place), 12), width - 3 - 3.4 * xLabels.texts[tick].length)} y=${tall + 22}>${xLabels.texts[tick]}</text>`)}</g>
               <text class="x-name" x=${(left + right) / 2} y=${tall + 39} text-anchor="middle">${axisName(figure.x, xLabels.factor)}${at !== null ? ` = ${readDigits(at, shown[1] - shown[0])}` : ''}</text>`}
             ${drag && Math.abs(drag.to - drag.from) > 4 && html`<rect class="selection" x=${Math.min(drag.from, drag.to)} y="6" width=${Math.abs(drag.to - drag.from)} height=${tall} />`}
             ${over !== null && over >= domain[0] && over <= domain[1] && html`<path class="cursor" d=${`M${left} ${y(over).toFixed(1)}H${right}`} />`}

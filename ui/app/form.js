@@ -1,7 +1,7 @@
 // A form from a schema. Nothing here knows a calculator.
 import { html, useState, useEffect, useMemo, unique } from './lib.js';
 import { t, number, unitOf } from './text.js';
-import { resolve, kindOf, variants, variantOf, variantName, blank, labelOf, wordOf, pointer, at, changed } from './schema.js';
+import { resolve, namesOf, kindOf, variants, variantOf, variantName, blank, labelOf, wordOf, pointer, at, changed } from './schema.js';
 import { fieldId, isLeaf, Symbol, Faults, Row, NumberInput, TextInput, Enum, Switch, Library, ModelChoice } from './fields.js';
 import { List, MapFields } from './lists.js';
 import { TableInput } from './table-input.js';
@@ -11,6 +11,13 @@ class Context {
   constructor(fields) { Object.assign(this, fields); }
   /** What the service filled in where nothing was given. */
   filledAt(path) { return this.filled ? at(this.filled, path) : undefined; }
+  /** Where that comes from: the source of the material that is named beside it, or the service. */
+  sourceAt(path) {
+    const beside = at(this.value, path.slice(0, -1)) || {};
+    const material = this.libraries?.materials?.find(({ id }) => Object.values(beside).includes(id));
+    const entry = material?.[path.at(-1)];
+    return entry?.source ? t('from_material', { name: material.title, source: entry.source }) : t('filled_in');
+  }
   errorsAt(path) { return this.errors.get(pointer(path)) || []; }
   /** Faults of everything below a path, and of the path itself. */
   errorsBelow(path) {
@@ -32,7 +39,7 @@ export function Form({ calculator, schema, value, filled, onChange, errors, libr
   }, [errors]);
   // Models extend the jobs of one calculator: of the one whose job stands in this one, if there is such.
   const owner = typeof value.calculator === 'string' ? value.calculator : calculator;
-  const context = new Context({ root, filled, errors: byPointer, libraries, models: (models || []).filter(model => model.calculator === owner), setHelp, disabled, set: (path, part, how) => onChange(changed(value, path, part), how) });
+  const context = new Context({ root, value, names: namesOf(root), filled, errors: byPointer, libraries, models: (models || []).filter(model => model.calculator === owner), setHelp, disabled, set: (path, part, how) => onChange(changed(value, path, part), how) });
   const whole = resolve(schema, root);
   // A family of jobs, told apart by one field.
   const family = kindOf(whole) === 'choice' ? variants(whole, root) : null;
@@ -113,7 +120,7 @@ function Section({ name, schema, path, value, open, required, context }) {
   const direct = context.errorsAt(path);
   return html`
     <${Fold} title=${label} open=${open} errors=${context.errorsBelow(path)} summary=${summary(schema, value, context.root)} action=${remove} description=${schema.description}>
-      <${Faults} faults=${kind === 'table' ? [] : direct} id=${fieldId(path)} />
+      <${Faults} faults=${kind === 'table' ? [] : direct} id=${fieldId(path)} names=${context.names} />
       ${isThere || required || kind === 'table' || (kind === 'object' && !schema.optional) || kind === 'array' || kind === 'map'
         ? html`<${Body} name=${name} schema=${schema} path=${path} value=${value} context=${context} />`
         : html`<p class="absent"><span>${schema.description}</span><button type="button" onClick=${add}>${t('add')}<span class="hidden"> ${label}</span></button></p>`}
@@ -145,7 +152,7 @@ export function Body({ name, schema, path, value, context }) {
     case 'choice': return html`<${Choice} schema=${schema} path=${path} value=${value} context=${context} />`;
     case 'array': return html`<${List} name=${name} schema=${schema} path=${path} value=${value || []} context=${context} />`;
     case 'map': return html`<${MapFields} name=${name} schema=${schema} path=${path} value=${value || {}} context=${context} />`;
-    case 'table': return html`<${TableInput} name=${name} schema=${schema} root=${context.root} value=${value}
+    case 'table': return html`<${TableInput} name=${name} schema=${schema} root=${context.root} value=${value} names=${context.names}
       faults=${context.errorsAt(path)} below=${[...context.errors].filter(([place]) => place.startsWith(`${pointer(path)}/`)).flatMap(([, faults]) => faults)}
       onChange=${part => context.set(path, part)} />`;
     default: return html`<${JsonField} name=${name} schema=${schema} path=${path} value=${value} context=${context} />`;
@@ -192,7 +199,7 @@ export function Field(props) {
       <legend>${label}
         ${isThere && !required && html`<button type="button" class="quiet-button" onClick=${() => set(undefined)}>${t('remove')}<span class="hidden"> ${label}</span></button>`}
       </legend>
-      <${Faults} faults=${context.errorsAt(path)} id=${`${fieldId(path)}-part`} />
+      <${Faults} faults=${context.errorsAt(path)} id=${`${fieldId(path)}-part`} names=${context.names} />
       ${isThere || required || kind === 'array'
         ? html`<${Body} name=${name} schema=${schema} path=${path} value=${value} context=${context} />`
         : html`<p class="absent"><span>${schema.description}</span><button type="button" onClick=${() => set(blank({ ...schema, optional: false }, context.root))}>${t('add')}<span class="hidden"> ${label}</span></button></p>`}

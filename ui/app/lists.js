@@ -1,8 +1,8 @@
 // Lists and tables of a job: names to tick, lines of numbers, grids, parts, values by name.
 import { html, useState, useEffect } from './lib.js';
 import { t, typed, parsed, unitOf } from './text.js';
-import { resolve, kindOf, variants, variantOf, variantName, blank, labelOf } from './schema.js';
-import { fieldId, isLeaf, nudged, rangeText, defaultText, optionText, Faults } from './fields.js';
+import { resolve, kindOf, variants, variantOf, variantName, blank, labelOf, spoken } from './schema.js';
+import { fieldId, isLeaf, nudged, rangeText, defaultText, optionText, sentence, Faults } from './fields.js';
 import { Body, Field } from './form.js';
 
 /** Most columns of a list that is shown as a grid. */
@@ -33,20 +33,27 @@ export function List({ name, schema, path, value, context }) {
     ${isGrid && value.length > 0 ? html`
       <div class="grid-scroll"><table class="grid">
         <thead><tr>${plain.map(field => html`<th scope="col" title=${field.schema.description}>${labelOf(field.name, field.schema)}<span class="unit">${unitOf(field.schema)}</span></th>`)}<th><span class="hidden">${t('remove')}</span></th></tr></thead>
-        <tbody>${shown.map((row, index) => html`<tr key=${index}>
+        <tbody>${shown.flatMap((row, index) => [html`<tr key=${index}>
           ${plain.map(field => html`<td><${Cell} field=${field} path=${[...path, index, field.name]} value=${row[field.name]} required=${(items.required || []).includes(field.name)} context=${context} row=${label(index)} /></td>`)}
           <td><button type="button" class="icon" disabled=${value.length <= (schema.minItems || 0)} aria-label=${`${t('remove')}: ${label(index)}`} onClick=${() => remove(index)}>×</button></td>
-        </tr>`)}</tbody>
+        </tr>`, html`<${RowFaults} key=${`faults ${index}`} ...${{ plain, path: [...path, index], context }} />`])}</tbody>
       </table></div>`
     : shown.map((item, index) => html`
       <fieldset class="item" key=${index} id=${fieldId([...path, index])}>
         <legend><span><span class="hidden">${labelOf(name, schema)} </span>${index + 1}${kindOf(items) === 'choice' ? ` · ${variantName(variantOf(variants(items, context.root), item), context.root) ?? ''}` : ''}</span>
           <button type="button" class="icon" disabled=${value.length <= (schema.minItems || 0)} aria-label=${`${t('remove')}: ${label(index)}`} onClick=${() => remove(index)}>×</button></legend>
-        <${Faults} faults=${context.errorsAt([...path, index])} id=${`${fieldId([...path, index])}-item`} />
+        <${Faults} faults=${context.errorsAt([...path, index])} id=${`${fieldId([...path, index])}-item`} names=${context.names} />
         <${Body} name=${name} schema=${items} path=${[...path, index]} value=${item} context=${context} />
       </fieldset>`)}
     ${value.length > shown.length && html`<button type="button" class="more" onClick=${() => setWhole(true)}>${t('show_all', { count: value.length })}</button>`}
     <button type="button" class="more" disabled=${full} onClick=${add}>${t('add_item')}<span class="hidden"> ${labelOf(name, schema)}</span></button>`;
+}
+
+/** What is wrong in a row of a grid: below it, as wide as the grid, so that no column moves. */
+function RowFaults({ plain, path, context }) {
+  const found = [...context.errorsAt(path).map(fault => ({ ...fault, id: fieldId(path) })), ...plain.flatMap(field => context.errorsAt([...path, field.name]).map(fault => ({ ...fault, id: fieldId([...path, field.name]) })))];
+  if (found.length === 0) return null;
+  return html`<tr class="row-faults"><td colspan=${plain.length + 1}>${found.map(({ id, detail }, index) => html`<p class="fault" key=${index} id=${`${id}-fault`}>${sentence(spoken(detail, context.names))}</p>`)}</td></tr>`;
 }
 
 /** A number in a grid: its name is that of row and column. */
@@ -75,9 +82,8 @@ function Cell({ field, path, value, required, context, row }) {
   };
   return html`
     <input id=${id} type="text" inputmode="decimal" autocomplete="off" value=${draft ?? typed(value)} aria-label=${`${row}: ${label}`} onFocus=${event => { show(); event.currentTarget.select(); }} onMouseEnter=${show}
-      placeholder=${field.schema.default !== undefined ? typed(field.schema.default) : ''} aria-invalid=${faults.length || wrong ? 'true' : undefined} aria-describedby=${faults.length ? `${id}-fault` : undefined}
-      onInput=${event => take(event.currentTarget.value)} onBlur=${() => { if (!wrong) setDraft(null); }} onKeyDown=${key} />
-    <${Faults} faults=${faults} id=${`${id}-fault`} />`;
+      title=${rangeText(field.schema)} placeholder=${field.schema.default !== undefined ? typed(field.schema.default) : ''} aria-invalid=${faults.length || wrong ? 'true' : undefined} aria-describedby=${faults.length ? `${id}-fault` : undefined}
+      onInput=${event => take(event.currentTarget.value)} onBlur=${() => { if (!wrong) setDraft(null); }} onKeyDown=${key} />`;
 }
 
 /** Which of several things are wanted. */

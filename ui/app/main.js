@@ -105,7 +105,7 @@ function App() {
   return html`
     <a class="skip" href="#main" onClick=${event => { event.preventDefault(); document.getElementById('main')?.focus(); }}>${t('skip')}</a>
     <${Header} ...${{ page, calculators, running, models, known }} />
-    ${!isOnline && html`<p class="banner" role="status">${t('offline_title')}. ${t('offline_detail')}</p>`}
+    ${!isOnline && html`<p class="banner away" role="status">${t('offline_title')}. ${t('offline_detail')}</p>`}
     ${needsKey && html`<${KeyForm} key=${attempt} refused=${needsKey === 'refused'} done=${() => setAttempt(attempt + 1)} />`}
     <${Guard} key=${page}>
       ${!calculators && needsKey ? html`<main class="plain" id="main" tabindex="-1"><h1>${t('slogan')}</h1><p>${t('key_why')}</p></main>`

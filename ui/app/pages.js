@@ -79,7 +79,7 @@ export function Jobs({ calculators, refreshJobs }) {
             <th scope="row" role="rowheader">${!known.has(item.calculator) ? name : item.state === 'succeeded' ? html`<a href=${addressOf(item)}>${name}</a>` : isOpen ? html`<a href=${`#/${item.calculator}?run=${item.id}`}>${name}</a>` : name}</th>
             <td role="cell"><span class=${`state ${item.state}`}>${t(`state_${item.state}`)}</span>${item.problem ? html`<span class="quiet"> ${item.problem.detail || item.problem.title}</span>` : ''}</td>
             <td role="cell" class="progress-cell">${isOpen ? html`<progress max="1" value=${item.progress} aria-label=${`${name}: ${t('progress')}`}></progress><span class="quiet">${item.stage || ''}${item.remaining_ms ? ` · ${t('time_left', { time: duration(item.remaining_ms) })}` : ''}</span>`
-              : item.started_at && item.finished_at ? duration(new Date(item.finished_at) - new Date(item.started_at)) : ''}</td>
+              : item.started_at && item.finished_at ? html`<span class="took">${duration(new Date(item.finished_at) - new Date(item.started_at))}</span>` : ''}</td>
             <td role="cell" class="when">${moment(item.created_at)}</td>
             <td role="cell">${isOpen && html`<button type="button" onClick=${() => stop(item.id)}>${t('cancel_job')}<span class="hidden"> ${name}</span></button>`}</td></tr>`;
         })}</tbody></table></div>`}

@@ -3,7 +3,7 @@
 import { html } from './lib.js';
 import { t, number, unitSymbol } from './text.js';
 import { extent, valueAt, cellAt } from './scale.js';
-import { role } from './draw.js';
+import { markerOf, stretchAt, ribbonSample, weaves } from './draw.js';
 import { colouring } from './palette.js';
 
 export const axisName = (axis, factor) => {
@@ -29,7 +29,7 @@ const edges = (x, isLog) => {
 
 export function abscissae(figure) {
   const isLog = figure.x.scale === 'logarithmic';
-  return figure.panels.flatMap(panel => panel.items.flatMap(item => (item.kind === 'glyph' ? [] : item.kind === 'heat_map' ? edges(item.x, isLog) : item.x)));
+  return figure.panels.flatMap(panel => panel.items.flatMap(item => (item.kind === 'glyph' ? [] : item.kind === 'ribbon' ? [...item.x, ...item.x_end] : item.kind === 'heat_map' ? edges(item.x, isLog) : item.x)));
 }
 
 export function ordinates(panel, view) {
@@ -60,6 +60,9 @@ export function ordinates(panel, view) {
   return found;
 }
 
+/** What has a value at the cursor: its room is there before the value, so that nothing moves. */
+const READ = ['line', 'bars', 'points', 'band', 'ribbon'];
+
 /** Name of the axis and of each curve, with its value at the cursor. */
 export function Head({ panel, ghost, style, hidden, toggle, at, over = null, factor, span, polar }) {
   const seen = new Set();
@@ -72,20 +75,25 @@ export function Head({ panel, ghost, style, hidden, toggle, at, over = null, fac
       const [low, high] = [valueAt(twin.x, twin.lower, at), valueAt(twin.x, twin.upper, at)];
       return low === null || low === undefined ? null : `${readDigits(low, span)} … ${readDigits(high, span)}`;
     }
+    if (twin.kind === 'ribbon') {
+      const stretch = stretchAt(twin, at);
+      return stretch && `${number(stretch.weight, 3)} ${unitSymbol(panel.y.unit)}`;
+    }
     if (!['line', 'bars', 'points'].includes(twin.kind)) return null;
     const read = valueAt(twin.x, twin.y, at, twin.kind === 'line');
     return read === null || read === undefined ? null : readDigits(read, span);
   };
   const map = panel.items.find(item => item.kind === 'heat_map');
+  const stretch = at === null ? null : panel.items.filter(({ kind }) => kind === 'ribbon').map(item => stretchAt(item, at)).find(Boolean);
   return html`
     <div class="panel-head">
-      <span class="axis-name">${polar ? t('magnified', { name: axisName(panel.y, factor) }) : axisName(panel.y, factor)}</span>
+      <span class="axis-name">${polar ? t('magnified', { name: axisName(panel.y, factor) }) : axisName(panel.y, factor)}${panel.items.some(({ kind }) => kind === 'ribbon') && html` <output class="stretch">${stretch?.place}</output>`}</span>
       ${named.map(item => {
         const now = value(panel, item);
         const before = ghost ? value(ghost, item) : null;
         return html`<button type="button" key=${item.name} class="series" aria-pressed=${!hidden.has(item.name)} onClick=${() => toggle(item.name)}>
           <${Swatch} item=${item} look=${style(item)} /><span>${item.text}</span>
-          ${now !== null && html`<output>${now}${before !== null && html`<small> (${before})</small>`}</output>`}
+          ${READ.includes(item.kind) && html`<output class=${`of-${item.kind} ${ghost ? 'two' : ''}`}>${now}${now !== null && before !== null && html`<small> (${before})</small>`}</output>`}
         </button>`;
       })}
       ${map && html`<${Key} item=${map} now=${at !== null && over !== null ? cellAt(map, at, over) : null} />`}
@@ -93,10 +101,11 @@ export function Head({ panel, ghost, style, hidden, toggle, at, over = null, fac
 }
 
 function Swatch({ item, look }) {
+  if (item.kind === 'ribbon') return html`<svg class="swatch" width="28" height="14" viewBox="0 0 28 14" aria-hidden="true"><defs>${weaves(`legend-${item.name}`)}</defs>${ribbonSample(item, look, `legend-${item.name}`)}</svg>`;
   const shape = {
     line: html`<path class=${`line ${look}`} d="M1 7H27" />`,
     band: html`<rect class=${`band ${look}`} x="1" y="2" width="26" height="10" />`,
-    points: html`<path class=${`points ${look}`} d=${`M14 7${role(item.role).marker}`} />`,
+    points: html`<path class=${`points ${look}`} d=${item.x.length > 150 ? `M8 9${markerOf(item)}M14 7${markerOf(item)}M20 5${markerOf(item)}` : `M14 7${markerOf(item)}`} />`,
     bars: html`<rect class=${`bars ${look}`} x="8" y="2" width="12" height="10" />`,
     outline: html`<rect class=${`outline ${look}`} x="2" y="2" width="24" height="10" />`,
   }[item.kind];
@@ -114,7 +123,8 @@ function Key({ item, now }) {
 
 /** A panel in words, for those who cannot see it. */
 export function describe(panel, figure) {
-  const spans = panel.items.filter(item => item.name && (item.y || item.lower)).map(item => {
+  const spans = panel.items.filter(item => item.name && (item.y || item.lower || item.places)).map(item => {
+    if (item.places) return `${item.text} ${item.places.join(' ')}`;
     const span = extent(item.y || [...item.lower, ...item.upper], 'linear');
     return span ? `${item.text} ${number(span[0], 3)} … ${number(span[1], 3)}` : item.text;
   });

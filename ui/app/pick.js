@@ -34,10 +34,29 @@ const RAD = Math.PI / 180;
 const LEAST_APPROACH = 0.3;
 const rounded = (value, digits) => Number(value.toFixed(digits));
 
-/** The job whose tool and supports stand at these angles when the feed ends. Size and radius taken off per revolution
- *  stay what they were, so that nothing but the angles differs: the circle through the tip that touches both supports
- *  has the same radius, and the feed is scaled by what it takes off the radius there (`ring/2.3`, `ring/5.1`). */
-export function ringAt(job, setting, toolDeg, halfDeg) {
+/** By how much the machine stands beside what the job says: the right support to the right, the tip across its direction
+ *  from the origin. */
+function shiftsOf(effects) {
+  const sum = (kind, field) => effects.filter(effect => effect.kind === kind).reduce((total, effect) => total + effect[field], 0);
+  return { support: sum('support_position', 'support_b_shift_mm'), tip: sum('tool_off_line', 'tangential_offset_mm') };
+}
+
+/** The point that stands there once it is moved across its direction from the origin: on the same circle less the way. */
+function beforeShift([x, y], by) {
+  const reach = Math.hypot(x, y);
+  if (by === 0 || reach <= Math.abs(by)) return [x, y];
+  // A right angle at the point that is looked for: reach² = its own² + by².
+  const own = Math.sqrt(reach * reach - by * by);
+  const turn = Math.atan2(y, x) - Math.atan2(by, own);
+  return [own * Math.cos(turn), own * Math.sin(turn)];
+}
+
+/** The job whose tool and supports really stand at these angles when the feed ends. Size and radius taken off per
+ *  revolution stay what they were, so that nothing but the angles differs: the circle through the tip that touches both
+ *  supports has the same radius, and the feed is scaled by what it takes off the radius there (`ring/2.3`, `ring/5.1`).
+ *  Effects that put a support or the tip beside their places in the job are taken off these places. */
+export function ringAt(job, setting, toolDeg, halfDeg, effects = []) {
+  const shifts = shiftsOf(effects);
   const [tool, half] = [toolDeg * RAD, halfDeg * RAD];
   const radius = setting.circumradius_mm;
   const reach = radius + (job.supports.roller_radius_mm ?? 0);
@@ -50,34 +69,38 @@ export function ringAt(job, setting, toolDeg, halfDeg) {
   if (!(perFeed > 0) || !(setting.radius_per_feed > 0)) return null;
   const feed = Number((job.tool.feed_mm_per_rev * (setting.radius_per_feed / perFeed)).toPrecision(6));
   const fed = feed * job.tool.revolutions;
-  const centre = reach * Math.cos(half) - job.supports.depth_mm;
+  // The ring stands over the middle of the supports as they really are.
+  const centre = [shifts.support / 2, reach * Math.cos(half) - job.supports.depth_mm];
+  const tip = [centre[0] + radius * toTip[0] - fed * Math.cos(direction * RAD), centre[1] + radius * toTip[1] - fed * Math.sin(direction * RAD)];
+  const [x, y] = beforeShift(tip, shifts.tip);
   return {
     ...job,
-    supports: { ...job.supports, distance_mm: rounded(2 * reach * Math.sin(half), 4) },
+    supports: { ...job.supports, distance_mm: rounded(2 * reach * Math.sin(half) - shifts.support, 4) },
     tool: {
       ...job.tool,
-      x_mm: rounded(radius * toTip[0] - fed * Math.cos(direction * RAD), 5),
-      y_mm: rounded(centre + radius * toTip[1] - fed * Math.sin(direction * RAD), 5),
+      x_mm: rounded(x, 5),
+      y_mm: rounded(y, 5),
       feed_mm_per_rev: feed,
       ...(direction !== own && { feed_direction_deg: direction }),
     },
   };
 }
 
-function byMap(figure, job, result) {
+function byMap(job, { result, effects }) {
   const map = result.setup_map;
   if (!map) return null;
   const near = (list, value) => list.reduce((best, one) => (Math.abs(one - value) < Math.abs(best - value) ? one : best));
+  const { support, tip } = shiftsOf(effects);
   return {
-    hint: t('click_to_set_up'),
+    hint: `${t('click_to_set_up')}${support !== 0 || tip !== 0 ? ` ${t('shifts_allowed_for')}` : ''}`,
     at: [map.here.tool_angle_deg, map.here.support_half_angle_deg],
-    jobAt: (x, y) => ringAt(job, result.setting, near(map.tool_angle_deg, x), near(map.support_half_angle_deg, y)),
+    jobAt: (x, y) => ringAt(job, result.setting, near(map.tool_angle_deg, x), near(map.support_half_angle_deg, y), effects),
   };
 }
 
 /** What a point of a figure stands for: `{ hint, at: [x, y], jobAt(x, y) }`, or `null`. */
-export function pickOf(id, figure, schema, job, result) {
+export function pickOf(id, figure, schema, job, body) {
   if (!figure) return null;
-  if (id === 'ring-roundness' && figure.id === 'map') return byMap(figure, job, result);
+  if (id === 'ring-roundness' && figure.id === 'map') return byMap(job, body);
   return byAxes(figure, schema, job);
 }

@@ -13,7 +13,7 @@ export function Polar({ figure, pinned, width, height, style, hidden, toggle, at
   const hasGlyphs = panel.items.some(item => item.kind === 'glyph');
   const centre = [width / 2, size / 2];
   // The angles at the sides need their width.
-  const radius = Math.min(size / 2 - (hasGlyphs ? 46 : 26), width / 2 - (hasGlyphs ? 56 : 34));
+  const radius = Math.max(20, Math.min(size / 2 - (hasGlyphs ? 46 : 26), width / 2 - (hasGlyphs ? 56 : 34)));
   const span = extent([...ordinates(panel), ...(ghost ? ordinates(ghost) : [])], panel.y.scale);
   const domain = aired(span, panel.y.scale, 0.04);
   const r = scale(panel.y.scale, domain, [radius * 0.4, radius]);

@@ -8,8 +8,9 @@ const KEPT = 400;
 const MOST_TRIES = 5;
 
 /** Follows a job as fast as the service answers; one that is passed by before its turn is never sent. `tag` names the
- *  job, `null` asks for none. Gives the last answer found: `{ tag, answer, figures }` or `{ tag, problem }`. */
-export function useProbe(id, tag, job) {
+ *  job, `null` asks for none. `bare` answers come
+ *  without their figures. Gives the last answer found: `{ tag, answer, figures }` or `{ tag, problem }`. */
+export function useProbe(id, tag, job, { bare } = {}) {
   const [found, setFound] = useState(null);
   const line = useRef(null);
   if (!line.current) line.current = { wanted: null, busy: false, gone: false, kept: new Map(), control: new AbortController() };
@@ -28,7 +29,7 @@ export function useProbe(id, tag, job) {
       own.wanted = null;
       let answer = own.kept.get(asked.tag);
       if (!answer) {
-        answer = await fetched(id, asked, own.control.signal);
+        answer = await fetched(id, asked, own.control.signal, bare);
         if (!answer) break;
         if (own.kept.size >= KEPT) own.kept.delete(own.kept.keys().next().value);
         if (!answer.problem) own.kept.set(asked.tag, answer);
@@ -40,16 +41,16 @@ export function useProbe(id, tag, job) {
   return found;
 }
 
-async function fetched(id, { tag, job }, signal, again = 0) {
+async function fetched(id, { tag, job }, signal, bare, again = 0) {
   try {
     const answer = await api.answered(id, job, signal);
-    return { tag, answer, figures: await api.figures(answer.key, signal) };
+    return { tag, answer, figures: bare ? [] : await api.figures(answer.key, signal) };
   } catch (error) {
     if (error.name === 'AbortError') return null;
     if ((error.status === 429 || error.status === 503) && again < MOST_TRIES) {
       // Too many at once: asked again when the service says.
       await new Promise(resolve => setTimeout(resolve, 1000 * (error.retryAfter || 1)));
-      return signal.aborted ? null : fetched(id, { tag, job }, signal, again + 1);
+      return signal.aborted ? null : fetched(id, { tag, job }, signal, bare, again + 1);
     }
     return { tag, problem: error.problem || { title: error.message } };
   }

@@ -3,7 +3,7 @@ import { html, useState, useEffect, useMemo, useRef } from './lib.js';
 import { t, number, unitSymbol, unitOf, plural, moment } from './text.js';
 import * as api from './api.js';
 import { Picture, differenceOf } from './figure.js';
-import { resolve, humanised, labelOf, wordOf } from './schema.js';
+import { resolve, humanised, labelOf, wordOf, namesOf, spoken } from './schema.js';
 import { spreadOf, spreadColumns, withSpread } from './digits.js';
 import { canReplay, Replay } from './replay.js';
 import { canTrade, spanOf, TradeOff } from './tradeoff.js';
@@ -14,6 +14,10 @@ import { hasCauses, Causes } from './cause.js';
 const TRADE_HEIGHT = 260;
 /** More warnings than these are folded. */
 const FEW_WARNINGS = 3;
+/** More pictures than these are chosen from a list. */
+const MOST_BUTTONS = 6;
+/** Items of a list that the printed sheet has. */
+const PRINTED_ITEMS = 40;
 /** Rows of a table shown at once. */
 const TABLE_ROWS = 200;
 
@@ -59,13 +63,13 @@ export function Result({ id, description, answer, problem, running, pinned, pin,
   const figure = interim || figures.find(({ id: name }) => name === chosen) || figures.find(isTelling) || figures[0];
   const height = usePictureHeight(figure?.panels.length || 1);
   if (!answer && !interim) {
-    return html`<div class="empty">${problem || running ? '' : html`<p class="late">${t('first_answer')}</p>`}</div>`;
+    return html`<div class="empty">${running ? '' : problem ? html`<p>${t('picture_waits')}</p>` : html`<p class="late">${t('first_answer')}</p>`}</div>`;
   }
   const twin = pinned && !interim && pinned.key !== answer?.key ? pinned.figures.find(({ id: name }) => name === figure?.id) : null;
   const subtracted = twin && difference ? differenceOf(figure, twin) : null;
   const body = answer?.answer;
   const isOwn = figure && body && !interim && !subtracted;
-  const picks = isOwn ? pickOf(figure, body.result) : null;
+  const picks = isOwn ? pickOf(figure, body) : null;
   const replays = isOwn && canReplay(id, figure, body.result);
   const trades = isOwn && canTrade(id, figure, answer.job);
   const pick = (x, y) => { const next = picks.jobAt(x, y); if (next) onApply(next); };
@@ -75,7 +79,8 @@ export function Result({ id, description, answer, problem, running, pinned, pin,
   const [first, ...others] = body?.explanation || [];
   return html`
     <div class=${`result ${stale ? 'stale' : ''}`}>
-      ${figures.length > 1 && !interim && html`
+      ${figures.length > MOST_BUTTONS && !interim && html`<${FigurePick} ...${{ figures, figure, choose: setChosen }} />`}
+      ${figures.length > 1 && figures.length <= MOST_BUTTONS && !interim && html`
         <div class="figure-choice" role="group" aria-label=${t('figures')}>
           ${figures.map(({ id: name, title }) => html`<button type="button" key=${name} aria-pressed=${figure.id === name} onClick=${() => setChosen(name)}>${figures.filter(other => short(other.title.text) === short(title.text)).length > 1 ? title.text : short(title.text)}</button>`)}
         </div>`}
@@ -91,11 +96,11 @@ export function Result({ id, description, answer, problem, running, pinned, pin,
         </div>
         ${body && html`
         <div class="words">
-          ${first && html`<p class="verdict" aria-live="polite">${first.text}</p>`}
-          <${Warnings} key=${answer.key} list=${body.warnings} />
+          ${first && html`<p class="verdict" aria-live="polite">${capital(first.text)}</p>`}
+          <${Warnings} key=${answer.key} list=${body.warnings} names=${namesOf(description.input_schema)} />
           ${hasClamp(id, body.result) && html`<${ClampBars} result=${body.result} input=${body.input} schema=${description.output_schema} />`}
           ${hasCauses(id, body.result) && html`<${Causes} result=${body.result} schema=${description.input_schema} unit=${unitSymbol(figures.find(one => one.id === 'residuals')?.panels[0]?.y.unit)} />`}
-          ${others.length > 0 && html`<ul class="explanation">${others.map(({ code, text }, index) => html`<li key=${code + index}>${text}</li>`)}</ul>`}
+          ${others.length > 0 && html`<ul class="explanation">${others.map(({ code, text }, index) => html`<li key=${code + index}>${capital(text)}</li>`)}</ul>`}
         </div>`}
       </div>
       ${body && html`
@@ -113,18 +118,40 @@ export function Result({ id, description, answer, problem, running, pinned, pin,
     </div>`;
 }
 
-/** Warnings; of many the first few until all are asked for. */
-export function Warnings({ list }) {
-  const [whole, setWhole] = useState(list.length <= FEW_WARNINGS + 1);
+/** Many pictures: a list, and the way to the next and the one before. */
+function FigurePick({ figures, figure, choose }) {
+  const at = figures.indexOf(figure);
+  const go = step => choose(figures[(at + step + figures.length) % figures.length].id);
+  return html`
+    <div class="figure-pick" role="group" aria-label=${t('figures')}>
+      <button type="button" class="icon" aria-label=${t('picture_before')} title=${t('picture_before')} onClick=${() => go(-1)}>‹</button>
+      <select id="figure" aria-label=${t('figures')} value=${figure.id} onChange=${event => choose(event.currentTarget.value)}>${figures.map(({ id, title }) => html`<option value=${id}>${title.text}</option>`)}</select>
+      <button type="button" class="icon" aria-label=${t('picture_after')} title=${t('picture_after')} onClick=${() => go(1)}>›</button>
+      <span class="quiet">${at + 1} / ${figures.length}</span>
+    </div>`;
+}
+
+/** Warnings; of many the first few until all are asked for, and all on paper. */
+export function Warnings({ list, names }) {
+  const [asked, setAsked] = useState(list.length <= FEW_WARNINGS + 1);
+  const [printed, setPrinted] = useState(false);
+  useEffect(() => {
+    const before = () => setPrinted(true);
+    const after = () => setPrinted(false);
+    addEventListener('beforeprint', before);
+    addEventListener('afterprint', after);
+    return () => { removeEventListener('beforeprint', before); removeEventListener('afterprint', after); };
+  }, []);
+  const whole = asked || printed;
   if (list.length === 0) return null;
   return html`
-    <ul class="warnings" aria-label=${t('warnings')}>${(whole ? list : list.slice(0, FEW_WARNINGS)).map(({ code, detail, pointer }, index) => html`<li key=${code + pointer + index}><span class="sign" aria-hidden="true">!</span><span>${capital(detail)}</span></li>`)}</ul>
-    ${!whole && html`<button type="button" class="more" onClick=${() => setWhole(true)}>${t('and_more', { count: list.length - FEW_WARNINGS })}</button>`}`;
+    <ul class="warnings" aria-label=${t('warnings')}>${(whole ? list : list.slice(0, FEW_WARNINGS)).map(({ code, detail, pointer }, index) => html`<li key=${code + pointer + index}><span class="sign" aria-hidden="true">!</span><span>${capital(spoken(detail, names))}</span></li>`)}</ul>
+    ${!whole && html`<button type="button" class="more" onClick=${() => setAsked(true)}>${t('and_more', { count: list.length - FEW_WARNINGS })}</button>`}`;
 }
 
 /** Names of fields keep their small letters. */
 export const capital = text => (/^[a-z]+_/.test(text) ? text : text.charAt(0).toUpperCase() + text.slice(1));
-export const short = text => { const head = text.split(/[:;,(–]/)[0].trim(); return head.length > 34 ? `${head.slice(0, 32)}…` : head; };
+export const short = text => text.split(/[:;,(–]/)[0].trim();
 
 export function Downloads({ id, description, answer, figure }) {
   const [trouble, setTrouble] = useState(null);
@@ -163,7 +190,7 @@ function Tabs({ id, description, answer, pinned, job }) {
         ${names.map(name => html`<button type="button" role="tab" key=${name} id=${`tab-${name}`} aria-selected=${name === current} aria-controls="tab-panel" tabindex=${name === current ? 0 : -1} onClick=${() => setOpen(name)}>${t(`tab_${name}`)}</button>`)}
       </div>
       <div role="tabpanel" id="tab-panel" aria-labelledby=${`tab-${current}`} tabindex="0">
-        ${current === 'values' && html`<${Values} schema=${description.output_schema} result=${answer.answer.result} pinned=${pinned && pinned.key !== answer.key ? pinned.answer.result : null} />`}
+        ${current === 'values' && html`<${Values} schema=${description.output_schema} inputs=${description.input_schema} result=${answer.answer.result} pinned=${pinned && pinned.key !== answer.key ? pinned.answer.result : null} />`}
         ${current === 'tables' && html`<${Tables} answerKey=${answer.key} id=${id} labels=${description.labels} />`}
         ${current === 'program' && html`<${Program} answerKey=${answer.key} />`}
         ${current === 'basis' && html`<${Basis} body=${answer.answer} description=${description} />`}
@@ -180,22 +207,35 @@ function saidUnit(schema, beside) {
 }
 
 /** The single numbers and words of a result, by groups. */
-function flat(schema, value, root, path = [], out = [], names = [], spread = null, beside = [{}]) {
+function flat(schema, value, root, path = [], out = [], names = [], spread = null, beside = [{}], lists = false) {
   const whole = resolve(schema || {}, root);
-  if (value === null || value === undefined || Array.isArray(value)) return out;
+  if (value === null || value === undefined) return out;
+  if (Array.isArray(value)) {
+    if (!lists || whole['x-table']) return out;
+    if (value.every(item => typeof item !== 'object')) {
+      if (value.length > 0) out.push({ path, value: value.slice(0, PRINTED_ITEMS).map(item => shownValue(item, resolve(whole.items || {}, root))).join('; '), unit: unitOf(whole['x-unit'] ? whole : whole.items), schema: {}, label: labelOf(path.at(-1), whole), group: names.slice(0, -1).join(' · ') });
+      return out;
+    }
+    value.slice(0, PRINTED_ITEMS).forEach((item, index) => flat(whole.items, item, root, [...path, index], out, [...names.slice(0, -1), `${names.at(-1)} ${index + 1}`, ''], spread, beside, lists));
+    return out;
+  }
   if (typeof value === 'object') {
     const forms = whole.oneOf || whole.anyOf;
     const shape = forms?.map(form => resolve(form, root)).find(form => Object.keys(value).every(name => form.properties?.[name])) || whole;
-    for (const [name, part] of Object.entries(value)) flat(shape.properties?.[name], part, root, [...path, name], out, [...names, labelOf(name, resolve(shape.properties?.[name] || {}, root))], spread, [value, ...beside]);
+    for (const [name, part] of Object.entries(value)) flat(shape.properties?.[name], part, root, [...path, name], out, [...names, labelOf(name, resolve(shape.properties?.[name] || {}, root))].filter(Boolean), spread, [value, ...beside], lists);
     return out;
   }
   out.push({ path, value, spread: spread?.(path), unit: saidUnit(whole, beside) ?? unitOf(whole), description: whole.description, schema: whole, label: labelOf(path.at(-1), whole), group: names.slice(0, -1).join(' · ') });
   return out;
 }
 
-const shownValue = (value, schema) => (typeof value === 'number' ? number(value, 5) : value === true ? t('yes') : value === false ? t('no') : schema?.enum ? wordOf(schema, value) : String(value));
+/** A name of a field or a kind in the words of the form; `names` has those of its fields. */
+const worded = (text, names) => names?.get(text) ?? (/^[a-z]+(_[a-z0-9]+)+$/.test(text) ? humanised(text) : text);
+const shownValue = (value, schema, names) => (typeof value === 'number' ? number(value, 5) : value === true ? t('yes') : value === false ? t('no') : schema?.enum ? wordOf(schema, value) : worded(String(value), names));
 
-function Values({ schema, result, pinned }) {
+
+function Values({ schema, inputs, result, pinned }) {
+  const names = useMemo(() => namesOf(inputs), [inputs]);
   const rows = useMemo(() => {
     const all = flat(schema, result, schema, [], [], [], path => spreadOf(result, path));
     // An uncertainty stands behind its number, not once more in a line of its own.
@@ -211,8 +251,8 @@ function Values({ schema, result, pinned }) {
         <thead class=${before ? '' : 'hidden'}><tr><th scope="col">${t('name')}</th><th scope="col">${t('value')}</th>${before && html`<th scope="col">${t('pinned_value')}</th><th scope="col">${t('difference')}</th>`}<th scope="col">${t('unit')}</th></tr></thead>
         <tbody>${rows.filter(row => row.group === group).map(row => {
           const other = before?.get(row.path.join('/'));
-          return html`<tr key=${row.path.join('/')}><th scope="row" title=${row.description}>${row.label}</th><td>${row.spread ? withSpread(row.value, row.spread.spread) : shownValue(row.value, row.schema)}</td>
-            ${before && html`<td>${other === undefined ? '' : shownValue(other, row.schema)}</td><td>${typeof other === 'number' && typeof row.value === 'number' ? `${row.value > other ? '+' : ''}${number(row.value - other, 3)}` : ''}</td>`}
+          return html`<tr key=${row.path.join('/')}><th scope="row" title=${row.description}>${row.label}</th><td>${row.spread ? withSpread(row.value, row.spread.spread) : shownValue(row.value, row.schema, names)}</td>
+            ${before && html`<td>${other === undefined ? '' : shownValue(other, row.schema, names)}</td><td>${typeof other === 'number' && typeof row.value === 'number' ? `${row.value > other ? '+' : ''}${number(row.value - other, 3)}` : ''}</td>`}
             <td class="unit">${row.unit}</td></tr>`;
         })}</tbody>
       </table>`)}</div>`;
@@ -319,13 +359,16 @@ function SaveModel({ resultKey }) {
     </form>`;
 }
 
-/** What only the printed sheet shows: inputs, key and versions. */
-function Sheet({ description, body, job }) {
-  const rows = flat(description.input_schema, job, description.input_schema);
+/** What only the printed sheet shows: inputs, those of one group in one line, key and versions. */
+export function Sheet({ description, body, job }) {
+  const rows = flat(description.input_schema, job, description.input_schema, [], [], [], null, [{}], true);
+  const groups = [...new Set(rows.map(({ group }) => group))];
+  const names = useMemo(() => namesOf(description.output_schema), [description]);
+  const said = row => `${row.label} ${shownValue(row.value, row.schema, names)}${row.unit ? ` ${row.unit}` : ''}`;
   return html`
     <section class="sheet" aria-hidden="true">
       <h2>${t('inputs')}</h2>
-      <ul>${rows.slice(0, 120).map(row => html`<li key=${row.path.join('/')}>${row.group ? `${row.group}: ` : ''}${row.label} ${shownValue(row.value, row.schema)} ${row.unit}</li>`)}</ul>
+      <ul>${groups.map(group => html`<li key=${group}>${group && html`<strong>${group}:</strong> `}${rows.filter(row => row.group === group).map(said).join(', ')}</li>`)}</ul>
       <p>precut ${body.engine} · ${body.calculator} ${t('version')} ${body.version} · ${body.key} · ${moment(new Date().toISOString())}</p>
     </section>`;
 }

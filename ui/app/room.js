@@ -3,8 +3,9 @@ import { html, useState, useEffect, useRef, useMemo, useCallback, debounced } fr
 import { t, language } from './text.js';
 import * as api from './api.js';
 import { Form, goTo } from './form.js';
+import { sentence } from './fields.js';
 import { Result } from './result.js';
-import { difference, changed, parts } from './schema.js';
+import { difference, changed, parts, namesOf } from './schema.js';
 import { pickOf } from './pick.js';
 import { Progress, Trouble } from './status.js';
 
@@ -68,7 +69,7 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
   const [pinned, setPinned] = useState(null);
   const [pane, setPane] = useState('picture');
   const now = useRef({});
-  now.current = { state, answer, running, description, pinned };
+  now.current = { state, answer, running, description, pinned, problem };
   const control = useRef(null);
   const stopFollowing = useRef(null);
   const isLive = useRef(true);
@@ -92,13 +93,17 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
     if (alive.current && current) tell(current.job, shown?.job === current.job ? shown.key : null, run?.id, 'push');
   }, HISTORY_PAUSE_MS), [tell]);
 
-  const show = async (key, body, job, signal) => {
-    const [whole, figures] = await Promise.all([body ?? api.result(key, signal), api.figures(key, signal)]);
-    if (signal?.aborted || !alive.current) return;
-    setAnswer({ key, answer: whole, figures, job, language: language() });
+  // `said` is the language in which a body was asked for: by now it may be another one.
+  const show = async (key, body, job, signal, said = language()) => {
+    const asked = language();
+    const [whole, figures] = await Promise.all([said === asked && body ? body : api.result(key, signal), api.figures(key, signal)]);
+    if (signal?.aborted || !alive.current) return undefined;
+    if (asked !== language()) return show(key, null, job, signal);
+    setAnswer({ key, answer: whole, figures, job, language: asked });
     setProblem(null);
     setPending(false);
     setWaiting(false);
+    return undefined;
   };
 
   const watch = useCallback((record, job) => {
@@ -147,6 +152,7 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
     setPending(true);
     setWaiting(false);
     const start = performance.now();
+    const said = language();
     try {
       const { answer: body, job: record } = await api.solve(id, job, { signal });
       if (signal.aborted) return;
@@ -161,7 +167,7 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
         return;
       }
       isLive.current = performance.now() - start < LIVE_LIMIT_MS;
-      await show(body.key, body, job, signal);
+      await show(body.key, body, job, signal, said);
       if (!signal.aborted && now.current.state?.job === job) tell(job, body.key, null, 'replace');
     } catch (error) {
       if (error instanceof api.Refused && error.status === 503 && again < 5) {
@@ -172,6 +178,8 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
         fail(error);
         await new Promise(resolve_ => setTimeout(resolve_, Math.min(1000 * 2 ** again, LONGEST_PAUSE_MS)));
         if (!signal.aborted && alive.current) return run(job, again + 1);
+      } else if (error instanceof api.Refused && said !== language() && again < 5) {
+        if (!signal.aborted) return run(job, again + 1);
       } else fail(error);
     }
   }, [id, watch, tell]);
@@ -179,6 +187,7 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
 
   // The description, again in each language; the rest of the state stays.
   const spoken = language();
+  const spokenBefore = useRef(spoken);
   useEffect(() => {
     let gone = false;
     (async () => {
@@ -187,6 +196,9 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
         if (gone) return;
         setDescription(found);
         if (JSON.stringify(found.input_schema).includes('"x-library"')) api.materials().then(({ items }) => !gone && setLibraries({ materials: items })).catch(() => {});
+        // What was refused is refused again, in the other language.
+        if (spokenBefore.current !== spoken && now.current.problem?.status === 422 && isLive.current && now.current.state) run(now.current.state.job);
+        spokenBefore.current = spoken;
         if (now.current.answer && now.current.answer.language !== spoken) {
           const { key, job } = now.current.answer;
           await show(key, null, job);
@@ -237,7 +249,7 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
   }, [description && id, asked]);
 
   if (missing) {
-    return html`<main class="plain" id="main" tabindex="-1"><h1>${missing.problem?.title || t('trouble_title')}</h1><p>${missing.problem?.detail || missing.message}</p>
+    return html`<main class="plain" id="main" tabindex="-1"><h1>${missing.problem?.title || t('trouble_title')}</h1><p>${sentence(missing.problem?.detail || missing.message)}</p>
       <p><a href=${`#/${id}`} onClick=${() => setTimeout(() => location.reload(), 0)}>${t('start_over')}</a></p></main>`;
   }
   if (!description || !state) return html`<main class="plain quiet-start" id="main" tabindex="-1"><p>${t('loading')}</p></main>`;
@@ -268,7 +280,7 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
     }
     tell(state.job, answer?.key, running?.id, 'replace');
   };
-  const picking = (figure, result) => pickOf(id, figure, description.input_schema, state.job, result);
+  const picking = (figure, body) => pickOf(id, figure, description.input_schema, state.job, body);
   const study = answer && `#/studies?calculator=${id}&${written(queryOf(state, state.job, answer.key))}`;
   const faults = problem?.errors || [];
   const isBusy = pending || running;
@@ -294,7 +306,7 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
         <div class=${`work-line ${pending && !running ? 'on' : ''}`} aria-hidden="true"></div>
         <header class="room-head"><h1>${description.question}</h1><p class="summary">${description.title}</p></header>
         ${running && html`<${Progress} running=${running} stop=${stop} />`}
-        ${problem && html`<${Trouble} problem=${problem} onGo=${place => { setPane('form'); setTimeout(() => goTo(place), 30); }} />`}
+        ${problem && !(problem.code === 'offline' && answer) && html`<${Trouble} problem=${problem} names=${namesOf(description.input_schema)} over=${Boolean(answer)} onGo=${place => { setPane('form'); setTimeout(() => goTo(place), 30); }} />`}
         <${Result} ...${{ id, description, answer, problem, running, pinned, pin, job: state.job, models, study, pickOf: picking, onApply: next => change(next, 'run'), stale: Boolean(answer && (problem || waiting)) }} />
       </section>
     </main>`;

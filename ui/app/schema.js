@@ -132,6 +132,27 @@ const capital = text => text.charAt(0).toUpperCase() + text.slice(1);
 /** What a field is called: the service's own label, or its name. */
 export const labelOf = (name, schema) => (schema.title ? capital(schema.title) : humanised(name, schema['x-unit']));
 
+const namesBySchema = new WeakMap();
+/** What every field of a schema is called, by its name. */
+export function namesOf(schema) {
+  if (namesBySchema.has(schema)) return namesBySchema.get(schema);
+  const names = new Map();
+  const walk = part => {
+    if (!part || typeof part !== 'object') return;
+    for (const [name, field] of Object.entries(part.properties || {})) if (field?.title && !names.has(name)) names.set(name, labelOf(name, field));
+    Object.values(part).forEach(walk);
+  };
+  walk(schema);
+  namesBySchema.set(schema, names);
+  return names;
+}
+
+/** As inside a sentence: abbreviations and single letters keep their capitals. */
+export const within = label => (/^.[^A-ZА-ЯЁ\s]/.test(label) && !/^\w+'s /.test(label) ? label.charAt(0).toLowerCase() + label.slice(1) : label);
+
+/** A sentence of the service with the labels of the form in place of the names of fields. */
+export const spoken = (text, names) => (text || '').replace(/`?\b[a-z][a-z0-9]*(?:_[a-z0-9]+)+\b`?/g, word => { const label = names?.get(word.replace(/`/g, '')); return label ? within(label) : word; });
+
 /** What a word of an enumeration is called. */
 export const wordOf = (schema, word) => capital(schema?.['x-labels']?.[word] || humanised(String(word)));
 

@@ -1,6 +1,7 @@
 // How far a job is, and what is wrong with one.
 import { html, useState } from './lib.js';
 import { t, duration } from './text.js';
+import { parts, humanised, spoken } from './schema.js';
 
 /** How far a job is, and a way to stop it. */
 export function Progress({ running, stop }) {
@@ -15,17 +16,21 @@ export function Progress({ running, stop }) {
     </div>`;
 }
 
-/** What is wrong: the service's words, and the way to each field. */
-export function Trouble({ problem, onGo }) {
+/** The names of the fields on the way to a place of the job, items counted from 1. */
+const wayOf = (place, names) => parts(place).map(part => (/^\d+$/.test(part) ? String(Number(part) + 1) : names?.get(part) ?? humanised(part)))
+  .reduce((way, part) => (/^\d+$/.test(part) && way.length > 0 ? [...way.slice(0, -1), `${way.at(-1)} ${part}`] : [...way, part]), []).join(' · ');
+
+/** What is wrong: the service's words, and the way to each field. `over` what is there already, so that nothing moves. */
+export function Trouble({ problem, onGo, names, over }) {
   const errors = problem.errors || [];
   return html`
-    <div class="problem" role="alert">
+    <div class=${over ? 'over-slot' : ''}><div class=${`problem ${over ? 'over' : ''}`} role="alert">
       <p><strong>${problem.title}</strong></p>
-      ${problem.detail && errors.length === 0 && html`<p>${capital(problem.detail)}</p>`}
+      ${problem.detail && errors.length === 0 && html`<p>${capital(spoken(problem.detail, names))}</p>`}
       ${errors.length > 0 && html`<ul>${errors.map(({ pointer: place, detail }) => html`<li key=${place + detail}>
-        ${place ? html`<button type="button" class="link" onClick=${() => onGo(place)}><code>${place}</code></button> ` : ''}${detail}</li>`)}</ul>`}
+        ${place ? html`<button type="button" class="link" title=${place} onClick=${() => onGo(place)}>${wayOf(place, names)}</button>: ` : ''}${place ? spoken(detail, names) : capital(spoken(detail, names))}</li>`)}</ul>`}
       ${problem.code && problem.type && html`<p class="quiet"><a href=${problem.type} target="_blank" rel="noopener">${t('what_it_means')}</a></p>`}
-    </div>`;
+    </div></div>`;
 }
 
 /** Names of fields keep their small letters. */

@@ -3,11 +3,12 @@ import { html, useState, useEffect, useRef, useMemo } from './lib.js';
 import { t, number, typed, parsed, unitSymbol, plural, language } from './text.js';
 import * as api from './api.js';
 import { jobOf, lastQuery } from './room.js';
+import { sentence } from './fields.js';
 import { Progress, Trouble } from './status.js';
 import { Picture } from './figure.js';
-import { Downloads, RequestView, Warnings, usePictureHeight, short, capital } from './result.js';
-import { parts } from './schema.js';
-import { leavesOf, outputsOf, proposed, pointsOf, relabelled } from './vary.js';
+import { Downloads, RequestView, Warnings, Sheet, usePictureHeight, short, capital } from './result.js';
+import { parts, namesOf } from './schema.js';
+import { leavesOf, outputsOf, proposed, pointsOf } from './vary.js';
 
 const MOST_VARIED = 3;
 const ROWS_SHOWN = 100;
@@ -58,7 +59,7 @@ export function Study({ calculators, query, push, replace, refreshJobs }) {
   }, [asked, spoken]);
   const tell = next => { own.current = next; replace(next); };
   const choose = id => push(`calculator=${id}${lastQuery.get(id) ? `&${written(jobPart(new URLSearchParams(lastQuery.get(id))))}` : ''}`);
-  if (missing) return html`<main class="plain" id="main" tabindex="-1"><h1>${missing.problem?.title || t('trouble_title')}</h1><p>${missing.problem?.detail || missing.message}</p><p><a href="#/studies" onClick=${() => setMissing(null)}>${t('start_over')}</a></p></main>`;
+  if (missing) return html`<main class="plain" id="main" tabindex="-1"><h1>${missing.problem?.title || t('trouble_title')}</h1><p>${sentence(missing.problem?.detail || missing.message)}</p><p><a href="#/studies" onClick=${() => setMissing(null)}>${t('start_over')}</a></p></main>`;
   if (!opened) return html`<main class="plain quiet-start" id="main" tabindex="-1"><p>${t('loading')}</p></main>`;
   return html`<${Board} key=${opened.serial} ...${{ ...opened, calculators, choose, tell, refreshJobs }} />`;
 }
@@ -91,8 +92,10 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
     if (error instanceof api.Refused) setProblem(error.problem);
     else setProblem({ title: t('offline_title'), detail: error.message, code: 'offline' });
   };
-  const show = async (key, whole, asked) => {
-    const [result, figures] = await Promise.all([whole ?? api.result(key, control.current?.signal), api.figures(key, control.current?.signal)]);
+  const show = async (key, whole, asked, said = language()) => {
+    const now = language();
+    const [result, figures] = await Promise.all([said === now && whole ? whole : api.result(key, control.current?.signal), api.figures(key, control.current?.signal)]);
+    if (now !== language()) { await show(key, null, asked); return; }
     setAnswer({ key, answer: result, figures, asked });
     setPending(false);
     setProblem(null);
@@ -126,6 +129,7 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
     setProblem(null);
     setRunning(null);
     setPane('picture');
+    const said = language();
     try {
       const { answer: whole, job: record } = await api.solve('studies', body, { signal });
       if (signal.aborted) return;
@@ -133,7 +137,7 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
         try { sessionStorage.setItem(`precut-run-${record.id}`, JSON.stringify(body)); } catch { /* a reload then begins anew */ }
         tell([['run', record.id]]);
         watch(record, body);
-      } else { await show(whole.key, whole, body); tell([['study', whole.key]]); }
+      } else { await show(whole.key, whole, body, said); tell([['study', whole.key]]); }
     } catch (error) { fail(error); }
   };
   // A study of the address: kept, or on its way.
@@ -154,7 +158,8 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
   useEffect(() => {
     if (spoken.current === language()) return;
     spoken.current = language();
-    if (answer) show(answer.key, null, answer.asked).catch(fail);
+    if (problem?.errors) start();
+    else if (answer) show(answer.key, null, answer.asked).catch(fail);
   }, [language()]);
 
   const faults = problem?.errors || [];
@@ -206,9 +211,9 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
         <div class=${`work-line ${pending && !running ? 'on' : ''}`} aria-hidden="true"></div>
         <header class="room-head"><h1>${t('study_question')}</h1><p class="summary">${description.title}</p></header>
         ${running && html`<${Progress} running=${running} stop=${() => api.cancel(running.id).catch(fail)} />`}
-        ${problem && html`<${Trouble} problem=${problem} onGo=${go} />`}
+        ${problem && html`<${Trouble} problem=${problem} names=${namesOf(description.input_schema)} over=${Boolean(answer)} onGo=${go} />`}
         ${!answer && !running?.interim ? html`<div class="empty">${problem || running ? '' : html`<p>${pending ? t('first_answer') : t('study_empty')}</p>`}</div>`
-          : html`<${Findings} ...${{ answer, interim: running?.interim, asked: body, leaves, outputs, calculator: description.id }} stale=${Boolean(answer && JSON.stringify(answer.asked) !== JSON.stringify(body) && !stored)} />`}
+          : html`<${Findings} ...${{ answer, interim: running?.interim, leaves, outputs, description }} stale=${Boolean(answer && JSON.stringify(answer.asked) !== JSON.stringify(body) && !stored)} />`}
       </section>
     </main>`;
 }
@@ -260,21 +265,17 @@ function valuesOf({ from, to, count, spacing }) {
 }
 
 /** What came out: pictures, a sentence, one row per point. */
-function Findings({ answer, interim, asked, leaves, outputs, calculator, stale }) {
+function Findings({ answer, interim, leaves, outputs, description, stale }) {
+  const calculator = description.id;
   const [chosen, setChosen] = useState(null);
   const [picked, setPicked] = useState(null);
   const result = answer?.answer.result;
-  // What is so far is drawn of the study that was asked.
-  const drawn = interim ? { variables: asked.vary.map(one => ({ pointer: one.pointer, values: one.values || [one.from, one.to] })), outputs: asked.outputs.map(one => ({ pointer: one })) } : result;
-  const all = (interim ? [interim] : answer?.figures || []).map(figure => relabelled(figure, drawn, leaves, outputs));
+  const all = interim ? [interim] : answer?.figures || [];
   const figure = all.find(({ id }) => id === chosen) || all[0];
   const isEmpty = figure && !figure.panels.some(panel => panel.items.some(item => (item.values || item.y).some(value => value !== null)));
   const height = usePictureHeight(figure?.panels.length || 1);
   const pick = figure?.id === 'map' && result && result.variables.length === 2 ? (x, y) => setPicked(nearestRow(result, x, y)) : null;
-  // The service names fields by their pointers; here they are called as in the forms.
-  const spoken = text => [...leaves, ...outputs].filter(one => text.includes(one.pointer)).sort((a, b) => b.pointer.length - a.pointer.length)
-    .reduce((words, one) => words.split(one.pointer).join(lowered(one.label)), text);
-  const [first, ...others] = (answer?.answer.explanation || []).map(one => ({ ...one, text: spoken(one.text) }));
+  const [first, ...others] = answer?.answer.explanation || [];
   return html`
     <div class=${`result ${stale ? 'stale' : ''}`}>
       ${all.length > 1 && html`<div class="figure-choice" role="group" aria-label=${t('figures')}>${all.map(({ id, title }) => html`<button type="button" key=${id} aria-pressed=${figure.id === id} onClick=${() => setChosen(id)}>${id === 'map' ? t('study_map') : id === 'curves' ? t('study_curves') : short(title.text)}</button>`)}</div>`}
@@ -288,19 +289,17 @@ function Findings({ answer, interim, asked, leaves, outputs, calculator, stale }
         </div>
         ${result && html`<div class="words">
           ${first && html`<p class="verdict" aria-live="polite">${capital(first.text)}</p>`}
-          <${Warnings} key=${answer.key} list=${answer.answer.warnings} />
-          <ul class="explanation">${others.map(({ code, text }, index) => html`<li key=${code + index}>${text}</li>`)}</ul>
+          <${Warnings} key=${answer.key} list=${answer.answer.warnings} names=${namesOf(description.input_schema)} />
+          <ul class="explanation">${others.map(({ code, text }, index) => html`<li key=${code + index}>${capital(text)}</li>`)}</ul>
         </div>`}
       </div>
       ${result && html`
         <div class="bar"><span class="quiet">${plural('points', result.points)}${result.failed > 0 ? `, ${t('without_answer', { count: result.failed })}` : ''}</span><${Downloads} id="studies" description=${DECLARED} answer=${answer} figure=${figure} /></div>
         <${Rows} ...${{ result, leaves, outputs, calculator, picked }} />
-        ${answer.asked && html`<details class="tabs request"><summary>${t('tab_request')}</summary><div><${RequestView} id="studies" job=${answer.asked} answer=${answer} link=${`#/studies?study=${answer.key}`} /></div></details>`}`}
+        ${answer.asked && html`<details class="tabs request"><summary>${t('tab_request')}</summary><div><${RequestView} id="studies" job=${answer.asked} answer=${answer} link=${`#/studies?study=${answer.key}`} /></div></details>`}
+        <${Sheet} description=${description} body=${answer.answer} job=${answer.answer.input.job} />`}
     </div>`;
 }
-
-/** As inside a sentence; abbreviations keep their capitals. */
-const lowered = label => label.split(' · ').map(part => (/^[^\s]?[A-ZА-Я]/.test(part.slice(1)) ? part : part.charAt(0).toLowerCase() + part.slice(1))).join(' · ');
 
 /** Why a point has no answer. */
 const WHY = { invalid: 'why_invalid', infeasible: 'why_infeasible', out_of_model: 'why_out_of_model', not_converged: 'why_not_converged', failed: 'why_failed' };

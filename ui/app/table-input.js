@@ -2,7 +2,7 @@
 // shown for confirmation. What is sent is CSV with the headers that the service knows: the service converts units.
 import { html, useState, useRef, useMemo, unique } from './lib.js';
 import { t, plural, number, unitSymbol, unitOf } from './text.js';
-import { resolve, labelOf } from './schema.js';
+import { resolve, labelOf, spoken } from './schema.js';
 
 /** Units of one dimension: the service converts between them. */
 const DIMENSIONS = [
@@ -104,7 +104,7 @@ function matched(file, columns, matches) {
   return `${[line(used.map(title)), ...file.rows.map(row => line(used.map(({ name }) => row[matches[name].index] ?? '')))].join('\n')}\n`;
 }
 
-export function TableInput({ name, schema, root, value, onChange, faults, below }) {
+export function TableInput({ name, schema, root, value, onChange, faults, below, names }) {
   const [draft, setDraft] = useState(null);
   const [over, setOver] = useState(false);
   const [pasting, setPasting] = useState(false);
@@ -129,7 +129,7 @@ export function TableInput({ name, schema, root, value, onChange, faults, below 
     <div class=${`table-input ${over ? 'over' : ''}`}
       onDragOver=${event => { event.preventDefault(); setOver(true); }} onDragLeave=${() => setOver(false)}
       onDrop=${event => { event.preventDefault(); setOver(false); take(event.dataTransfer.files); }}>
-      ${list.length > 0 && html`<p class="fault" id=${`${id}-fault`}>${list.slice(0, 6).map(fault => html`<span>${fault.pointer ? `${fault.pointer.split('/').slice(2).join(' ')} ` : ''}${fault.detail}</span>`)}
+      ${list.length > 0 && html`<p class="fault" id=${`${id}-fault`}>${list.slice(0, 6).map(fault => html`<span>${spoken(fault.detail, names)}</span>`)}
         ${list.length > 6 && html`<span>${t('and_more', { count: list.length - 6 })}</span>`}</p>`}
       ${trouble && html`<p class="fault" role="alert"><span>${trouble}</span></p>`}
       ${draft ? html`<${Matching} ...${{ draft, setDraft, columns, missing, accept, label }} cancel=${() => setDraft(null)} />` : html`

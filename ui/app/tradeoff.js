@@ -8,8 +8,8 @@ import { useProbe } from './probe.js';
 import { Picture } from './figure.js';
 
 const STEPS = 100;
-const PREVIEW_HEIGHT = 300;
-const PREVIEWED = ['feed', 'cutting_speed', 'radial_deflection', 'height_of_roughness'];
+const PREVIEW_HEIGHT = 330;
+const PREVIEWED = ['feed', 'cutting_speed', 'limit_gain', 'radial_deflection', 'height_of_roughness'];
 
 /** Where the limits of each kind stand: `[list of objects, field]`, or one path. */
 const PLACES = {
@@ -69,7 +69,7 @@ export function TradeOff({ id, figure, answer, job, figures, factor, setFactor, 
     <div class="preview" data-factor=${isHere ? 1 : found?.tag.split(' ')[1]}>${there && html`<${Picture} figure=${there} pinned=${isHere ? null : partOf(own)} height=${PREVIEW_HEIGHT} />`}</div>`;
 }
 
-/** Of the schedule what a tolerance changes: feed, speed, deflection, roughness. */
+/** Of the schedule what a tolerance changes: feed, speed, what binds, deflection, roughness. */
 const partOf = figure => figure && { ...figure, panels: figure.panels.filter(({ y }) => PREVIEWED.includes(y.label)) };
 
 /** The factor at a step of the slider; the job's own limits are always one of them. */

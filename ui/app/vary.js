@@ -99,30 +99,3 @@ export function pointsOf(vary, combine) {
   const counts = vary.map(({ values, count }) => values?.length ?? count ?? 0);
   return combine === 'zip' ? Math.min(...counts) : counts.reduce((product, count) => product * count, 1);
 }
-
-/** A figure of a study with the labels of the forms in place of the names of fields. */
-export function relabelled(figure, { variables, outputs: read }, leaves, outputs) {
-  const isAxis = ({ values }) => values.length > 1 && values.every(value => typeof value === 'number');
-  const order = [...variables.filter(isAxis), ...variables.filter(variable => !isAxis(variable))];
-  const nameOf = (list, place) => list.find(one => one.pointer === place)?.label;
-  const names = order.map(variable => nameOf(leaves, variable.pointer));
-  const reads = read.map(output => nameOf(outputs, output.pointer));
-  const tail = (text, name) => (name && text?.includes(' = ') ? `${name} = ${text.split(' = ').slice(1).join(' = ')}` : text);
-  const code = text => Number(/_(\d+)$/.exec(text || '')?.[1] ?? -1);
-  const axis = one => {
-    if (one.label === 'study_x') return { ...one, text: names[0] ?? one.text };
-    if (one.label === 'study_y') return { ...one, text: names[1] ?? one.text };
-    if (one.label?.startsWith('study_value_')) return { ...one, text: reads[code(one.label)] ?? one.text };
-    if (one.label?.startsWith('study_slice_')) return { ...one, text: `${(figure.id === 'map' ? names[1] : reads[0]) ?? ''}; ${tail(one.text.split('; ').at(-1), names[2])}` };
-    return one;
-  };
-  const item = one => ({
-    ...one,
-    ...(one.value && { value: axis(one.value) }),
-    ...(one.name?.startsWith('study_value_') && { text: reads[code(one.name)] ?? one.text }),
-    ...(one.name?.startsWith('study_curve_') && { text: tail(one.text, names[1]) }),
-    ...(one.name?.startsWith('study_slice_') && { text: reads[0] ?? one.text }),
-  });
-  const title = { ...figure.title, text: reads.filter(Boolean).slice(0, figure.panels.length).join('; ') || figure.title.text };
-  return { ...figure, title, x: axis(figure.x), panels: figure.panels.map(panel => ({ ...panel, y: axis(panel.y), items: panel.items.map(item) })) };
-}

@@ -164,6 +164,14 @@ fn figure_is_sound(figure: &Figure, labels: &BTreeSet<&'static str>, at: &str) {
                     assert!([x, y].iter().all(|m| m.is_sorted_by(|a, b| a < b)), "{at}: {}", value.label);
                     assert!(values.iter().flatten().chain(x).chain(y).all(|v| v.is_finite()), "{at}: {}", value.label);
                 }
+                Item::Ribbon { name, x, x_end, weight, places, .. } => {
+                    known(name);
+                    assert_eq!([x.len(); 3], [x_end.len(), weight.len(), places.len()], "{at}: {name}");
+                    assert!(x.iter().zip(x_end).all(|(from, to)| from < to), "{at}: {name} is inside out");
+                    assert!(weight.iter().all(|weight| weight.is_finite() && *weight > 0.0), "{at}: {name}");
+                    let ribbons = panel.items.iter().all(|item| matches!(item, Item::Ribbon { .. }));
+                    assert!(ribbons, "{at}: ribbons stand in a panel of their own");
+                }
                 Item::Glyph { x, y, .. } => assert!(x.is_finite() && y.is_finite(), "{at}"),
             }
         }

@@ -488,3 +488,52 @@ proptest::proptest! {
         }
     }
 }
+
+/// Frames of a replay are the surface on the way: what their history says, and what a run that stops there leaves.
+#[test]
+fn a_replay_shows_what_the_history_says_and_what_a_shorter_run_leaves() {
+    for (rotation, x_mm) in [("counter_clockwise", 100.0), ("clockwise", -100.0)] {
+        let mut job = short();
+        job["rotation"] = json!(rotation);
+        job["tool"]["x_mm"] = json!(x_mm);
+        job["replay_frames"] = json!(11);
+        let whole = run(&job).output.simulation.unwrap();
+        let replay = whole.replay.as_ref().unwrap();
+        // 33 revolutions, one in three.
+        assert_eq!(replay.frames.len(), 11);
+        assert_eq!(replay.angle_deg.len(), 360);
+        for frame in &replay.frames {
+            assert_eq!(frame.deviation_um.len(), 360);
+            let entry =
+                whole.history.revolution.iter().position(|turns| (turns - frame.revolution).abs() < 1e-9).unwrap();
+            let noted = whole.history.roundness_um[entry];
+            let fold = |by: fn(f64, f64) -> f64| frame.deviation_um.iter().copied().reduce(by).unwrap();
+            let span = fold(f64::max) - fold(f64::min);
+            // Rounding adds the grain of each end at most, 0.05 %; the peak may lie between two of every fourth node.
+            assert!(span <= 1.001 * noted && span > 0.9 * noted, "{rotation} {}: {span} {noted}", frame.revolution);
+        }
+        // The run that stops after the fourth frame: 12 revolutions.
+        job["tool"]["revolutions"] = json!(12);
+        job["tool"]["spark_out_revolutions"] = json!(0);
+        job["replay_frames"] = json!(0);
+        job["profile_points"] = json!(360);
+        let outcome = run(&job).output;
+        let stopped = outcome.simulation.as_ref().unwrap();
+        assert!(stopped.replay.is_none());
+        let frame = &replay.frames[3];
+        assert!((frame.revolution - 12.0).abs() < 0.01, "{}", frame.revolution);
+        let grain = 1e-3 * stopped.end.as_ref().unwrap().unfiltered.least_squares_um;
+        let deviations = frame.deviation_um.iter().zip(&stopped.profile.end_deviation_um);
+        // Both are the same nodes; one step more or less at the stop moves the one where the cut ends.
+        let apart = deviations.filter(|(a, b)| (*a - *b).abs() > grain).count();
+        assert!(apart <= 2, "{rotation}: {apart} of 360 differ");
+        let figures = RingRoundness::figures(&serde_json::from_value(job).unwrap(), &outcome);
+        let tool = figures[0].panels[0].items.iter().find_map(|item| match item {
+            Item::Glyph { glyph: Glyph::Tool, x, .. } => Some(*x),
+            _ => None,
+        });
+        // The tool angle in space changes a little while the ring gets smaller.
+        let off = (tool.unwrap() - frame.tool_angle_deg + 180.0).rem_euclid(360.0) - 180.0;
+        assert!(off.abs() < 2.0, "{rotation}: {off}");
+    }
+}

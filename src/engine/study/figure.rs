@@ -1,15 +1,15 @@
 //! Pictures of a study: a map over two numbers, curves over one.
 //!
-//! Labels are made of field names, which no table of texts has: the title's values hold them under the codes that the
-//! axes and curves have.
+//! Labels are those of fields: the title's values hold the ways to them through the contract, under the codes that the
+//! axes and curves have, and the reader's language calls them by their names.
 
-use precut_calc::calculator::{Axis, Figure, Frame, Item, Message, Panel, Role};
+use precut_calc::calculator::{Axis, Figure, Frame, Item, Message, Panel, Role, Value};
 
 use super::input::{Combine, Spacing};
-use super::label::labels;
+use super::label::{Side, ways};
 use super::plan::Plan;
 use super::result::{Row, Setting, StudyResult};
-use crate::registry::interned;
+use crate::registry::{Entry, Registry, interned};
 
 /// `id`s of the figures.
 pub(crate) const FIGURES: &[&str] = &["map", "curves"];
@@ -43,14 +43,14 @@ struct Board<'s> {
 }
 
 struct Variable {
-    label: String,
+    way: String,
     unit: Option<String>,
     spacing: Option<Spacing>,
     values: Vec<Setting>,
 }
 
 struct Output {
-    label: String,
+    way: String,
     unit: Option<String>,
 }
 
@@ -61,17 +61,19 @@ pub(super) fn of_plan(plan: &Plan, rows: &[Option<&Row>]) -> Option<Figure> {
         (one.pointer.as_str(), one.unit.as_deref(), one.spacing, values)
     });
     let outputs = plan.outputs.iter().map(|one| (one.pointer.as_str(), one.unit.as_deref()));
-    let board = Board::new(plan.input.combine, variables.collect(), &outputs.collect::<Vec<_>>(), rows);
+    let parts = (variables.collect(), outputs.collect::<Vec<_>>());
+    let board = Board::new(Some(&plan.entry), plan.input.combine, parts, rows);
     board.map().or_else(|| board.curves())
 }
 
 /// The pictures of a study; the first is the main one.
-pub(super) fn of_result(result: &StudyResult) -> Vec<Figure> {
+pub(super) fn of_result(registry: &Registry, result: &StudyResult) -> Vec<Figure> {
     let rows: Vec<Option<&Row>> = result.rows.iter().map(Some).collect();
     let variables =
         result.variables.iter().map(|one| (one.pointer.as_str(), one.unit.as_deref(), one.spacing, one.values.clone()));
     let outputs = result.outputs.iter().map(|one| (one.pointer.as_str(), one.unit.as_deref()));
-    let board = Board::new(result.combine, variables.collect(), &outputs.collect::<Vec<_>>(), &rows);
+    let entry = registry.entry(&result.calculator).map(|entry| &**entry);
+    let board = Board::new(entry, result.combine, (variables.collect(), outputs.collect()), &rows);
     board.map().into_iter().chain(board.curves()).collect()
 }
 
@@ -79,22 +81,21 @@ type VariableParts<'p> = (&'p str, Option<&'p str>, Option<Spacing>, Vec<Setting
 
 impl<'s> Board<'s> {
     fn new(
+        entry: Option<&Entry>,
         combine: Combine,
-        variables: Vec<VariableParts<'_>>,
-        outputs: &[(&str, Option<&str>)],
+        (variables, outputs): (Vec<VariableParts<'_>>, Vec<(&str, Option<&str>)>),
         rows: &'s [Option<&'s Row>],
     ) -> Self {
-        let fields: Vec<_> = variables.iter().map(|(pointer, unit, ..)| (*pointer, *unit)).collect();
-        let names = labels(&fields);
-        let variables = variables.into_iter().zip(names).map(|((_, unit, spacing, values), label)| Variable {
-            label,
+        let fields: Vec<_> = variables.iter().map(|(pointer, ..)| *pointer).collect();
+        let names = ways(entry, Side::Job, &fields);
+        let variables = variables.into_iter().zip(names).map(|((_, unit, spacing, values), way)| Variable {
+            way,
             unit: unit.map(str::to_owned),
             spacing,
             values,
         });
-        let names = labels(outputs);
-        let outputs =
-            outputs.iter().zip(names).map(|((_, unit), label)| Output { label, unit: unit.map(str::to_owned) });
+        let names = ways(entry, Side::Result, &outputs.iter().map(|(pointer, _)| *pointer).collect::<Vec<_>>());
+        let outputs = outputs.iter().zip(names).map(|((_, unit), way)| Output { way, unit: unit.map(str::to_owned) });
         Self { combine, variables: variables.collect(), outputs: outputs.collect(), rows }
     }
 
@@ -122,24 +123,24 @@ impl<'s> Board<'s> {
         if !fits {
             return None;
         }
-        let names = self.outputs.iter().take(VALUES.len()).map(|output| output.label.clone()).collect::<Vec<_>>();
+        let names = self.outputs.iter().take(VALUES.len()).map(|output| output.way.clone()).collect::<Vec<_>>();
         let mut title = Message::new("study_map")
-            .with(X, self.variables[x].label.clone())
-            .with(Y, self.variables[y].label.clone())
+            .with(X, self.variables[x].name())
+            .with(Y, self.variables[y].name())
             .with("outputs", if rest.is_empty() { names.clone() } else { names[..1].to_vec() });
         let panels = if let [third] = rest {
-            title = title.with(VALUES[0], names[0].clone());
+            title = title.with(VALUES[0], vec![names[0].clone()]);
             let slices = &self.variables[*third];
             let chosen = chosen(slices.values.len(), SLICES.len());
             let mut panels = Vec::new();
             for (code, place) in SLICES.into_iter().zip(chosen) {
-                title = title.with(code, format!("{}; {}", self.variables[y].label, slices.is(place)));
+                title = title.with(code, Value::List(vec![self.variables[y].way.clone().into(), slices.is(place)]));
                 panels.push(self.map_panel(0, (x, y), Some((*third, place)), code));
             }
             panels
         } else {
             for (code, name) in VALUES.into_iter().zip(&names) {
-                title = title.with(code, name.clone());
+                title = title.with(code, vec![name.clone()]);
             }
             (0..names.len()).map(|output| self.map_panel(output, (x, y), None, Y)).collect()
         };
@@ -186,9 +187,9 @@ impl<'s> Board<'s> {
         let family = if self.combine == Combine::Zip { &[] } else { rest };
         let variable = &self.variables[x];
         let mut title = Message::new("study_curves");
-        let mut outputs: Vec<String> = self.outputs.iter().take(VALUES.len()).map(|one| one.label.clone()).collect();
+        let mut outputs: Vec<String> = self.outputs.iter().take(VALUES.len()).map(|one| one.way.clone()).collect();
         let along: Vec<(f64, usize)> = if variable.is_axis() {
-            title = title.with(X, variable.label.clone());
+            title = title.with(X, variable.name());
             variable.ascending()
         } else {
             (0..variable.values.len()).map(|place| (place as f64, place)).collect()
@@ -197,7 +198,7 @@ impl<'s> Board<'s> {
         match family {
             [] | [_] => {
                 for (output, code) in (0..self.outputs.len()).zip(VALUES) {
-                    title = title.with(code, outputs[output].clone());
+                    title = title.with(code, vec![outputs[output].clone()]);
                     let items = self.lines(output, x, &along, family.first().copied(), None, code);
                     let y = Axis::linear(code, self.outputs[output].unit());
                     panels.push(Panel { y, height: 1.0, items });
@@ -207,7 +208,7 @@ impl<'s> Board<'s> {
                 outputs.truncate(1);
                 let slices = &self.variables[*third];
                 for (code, place) in SLICES.into_iter().zip(chosen(slices.values.len(), SLICES.len())) {
-                    title = title.with(code, format!("{}; {}", outputs[0], slices.is(place)));
+                    title = title.with(code, Value::List(vec![outputs[0].clone().into(), slices.is(place)]));
                     let items = self.lines(0, x, &along, Some(*second), Some((*third, place)), code);
                     let y = Axis::linear(code, self.outputs[0].unit());
                     panels.push(Panel { y, height: 1.0, items });
@@ -217,7 +218,7 @@ impl<'s> Board<'s> {
         if let Some(&second) = family.first() {
             let second = &self.variables[second];
             for (code, place) in CURVES.into_iter().zip(chosen(second.values.len(), CURVES.len())) {
-                title = title.with(code, second.is(place));
+                title = title.with(code, Value::List(vec![second.is(place)]));
             }
         }
         title = title.with("outputs", outputs);
@@ -290,12 +291,20 @@ impl Variable {
         }
     }
 
-    /// `feed = 0.2 mm/rev`
-    fn is(&self, place: usize) -> String {
-        let unit = self.unit.as_deref().map(crate::render::unit_symbol).unwrap_or_default();
-        let unit = if unit.is_empty() { unit } else { format!(" {unit}") };
-        format!("{} = {}{unit}", self.label, self.values[place])
+    fn name(&self) -> Value {
+        vec![self.way.clone()].into()
     }
+
+    /// What it is set to: way, value, unit.
+    fn is(&self, place: usize) -> Value {
+        set(&self.way, &self.values[place], self.unit.as_deref())
+    }
+}
+
+/// A field that is set, as the texts take it: way, value, unit.
+pub(super) fn set(way: &str, setting: &Setting, unit: Option<&str>) -> Value {
+    let value = setting.number().map_or_else(|| setting.to_string().into(), Value::Number);
+    Value::List(vec![way.to_owned().into(), value, unit.unwrap_or("1").to_owned().into()])
 }
 
 impl Output {

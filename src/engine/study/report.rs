@@ -2,9 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use precut_calc::calculator::{Basis, Finding, Message};
+use precut_calc::calculator::{Basis, Finding, Message, Value};
 
+use super::figure::set;
 use super::input::Combine;
+use super::label::{Side, ways};
 use super::pick::Cited;
 use super::plan::Plan;
 use super::point::{Shard, Warnings};
@@ -145,38 +147,35 @@ fn explanation(plan: &Plan, result: &StudyResult) -> Vec<Message> {
         said.push(Message::new("study_no_answers").with("points", result.points).with("reasons", reasons));
         return said;
     }
+    let names = Names::of(plan, result);
     for (index, output) in result.outputs.iter().take(OUTPUTS_SPOKEN_OF).enumerate() {
         let (Some(least), Some(largest)) = (&output.least, &output.largest) else { continue };
         let unit = output.unit.clone().unwrap_or_else(|| "1".to_owned());
         let message = |code| {
-            let message = Message::new(code).with("output", output.pointer.clone()).with("unit", unit.clone());
-            message.with("least", least.value)
+            let name = names.outputs[index].clone();
+            Message::new(code).with("output", output.pointer.clone()).with("name", name)
         };
+        let with_least = |code| message(code).with("unit", unit.clone()).with("least", least.value);
         if least.value.total_cmp(&largest.value).is_eq() {
-            said.push(message("study_constant"));
+            said.push(with_least("study_constant"));
             continue;
         }
         said.push(
-            message("study_extremes")
-                .with("least_at", named(result, &least.at))
+            with_least("study_extremes")
+                .with("least_at", names.settings(result, &least.at))
                 .with("largest", largest.value)
-                .with("largest_at", named(result, &largest.at)),
+                .with("largest_at", names.settings(result, &largest.at)),
         );
         if let Some((variable, share)) = dominant(plan, result, index) {
+            let (pointer, way) = (result.variables[variable].pointer.clone(), names.variables[variable].clone());
             said.push(
-                Message::new("study_dominant")
-                    .with("output", output.pointer.clone())
-                    .with("variable", variable)
-                    .with("share", share),
+                message("study_dominant").with("variable", pointer).with("variable_name", way).with("share", share),
             );
         }
         for (code, extreme) in [("study_least_at_end", least), ("study_largest_at_end", largest)] {
             if index == 0 && !extreme.at_end_of.is_empty() {
-                said.push(
-                    Message::new(code)
-                        .with("output", output.pointer.clone())
-                        .with("variables", extreme.at_end_of.clone()),
-                );
+                let at_end = names.of_variables(result, &extreme.at_end_of);
+                said.push(message(code).with("variables", extreme.at_end_of.clone()).with("variable_names", at_end));
             }
         }
     }
@@ -192,14 +191,37 @@ fn explanation(plan: &Plan, result: &StudyResult) -> Vec<Message> {
     said
 }
 
-/// `/cut/feed_mm_per_rev = 0.2` for every variable.
-fn named(result: &StudyResult, at: &[Setting]) -> Vec<String> {
-    result.variables.iter().zip(at).map(|(variable, setting)| format!("{} = {setting}", variable.pointer)).collect()
+/// The ways to what is varied and read off, to be called by their labels.
+struct Names {
+    variables: Vec<String>,
+    outputs: Vec<String>,
+}
+
+impl Names {
+    fn of(plan: &Plan, result: &StudyResult) -> Self {
+        let variables: Vec<&str> = result.variables.iter().map(|one| one.pointer.as_str()).collect();
+        let outputs: Vec<&str> = result.outputs.iter().map(|one| one.pointer.as_str()).collect();
+        Self {
+            variables: ways(Some(&plan.entry), Side::Job, &variables),
+            outputs: ways(Some(&plan.entry), Side::Result, &outputs),
+        }
+    }
+
+    /// What every variable is set to.
+    fn settings(&self, result: &StudyResult, at: &[Setting]) -> Value {
+        let each = result.variables.iter().zip(&self.variables).zip(at);
+        Value::List(each.map(|((variable, way), setting)| set(way, setting, variable.unit.as_deref())).collect())
+    }
+
+    fn of_variables(&self, result: &StudyResult, pointers: &[String]) -> Vec<String> {
+        let each = result.variables.iter().zip(&self.variables);
+        each.filter(|(variable, _)| pointers.contains(&variable.pointer)).map(|(_, way)| way.clone()).collect()
+    }
 }
 
 /// The variable that alone explains most of how an output varies over a complete grid, and which share of the variance
 /// the means over the others have.
-fn dominant(plan: &Plan, result: &StudyResult, output: usize) -> Option<(String, f64)> {
+fn dominant(plan: &Plan, result: &StudyResult, output: usize) -> Option<(usize, f64)> {
     if plan.input.combine != Combine::Grid || plan.variables.len() < 2 {
         return None;
     }
@@ -215,7 +237,7 @@ fn dominant(plan: &Plan, result: &StudyResult, output: usize) -> Option<(String,
             sum.1 += 1;
         }
         let between: f64 = sums.iter().map(|(sum, count)| (sum / *count as f64 - mean).powi(2)).sum();
-        (variable.pointer.clone(), between / sums.len() as f64 / variance)
+        (index, between / sums.len() as f64 / variance)
     });
     shares.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, share)| share.is_finite())
 }

@@ -31,6 +31,7 @@ fn points(result: &StudyResult) -> Table {
     }
     columns.push(words("status", rows.iter().map(|row| row.status.name().to_owned()).collect()));
     columns.push(words("code", rows.iter().map(|row| row.code.clone().unwrap_or_default()).collect()));
+    columns.push(words("detail", rows.iter().map(|row| row.detail.clone().unwrap_or_default()).collect()));
     for (index, output) in result.outputs.iter().enumerate() {
         let values = rows.iter().map(|row| row.outputs.get(index).copied().flatten()).collect();
         columns.push(numbers(column(&output.pointer, output.unit.as_deref()), output.unit.as_deref(), values));
@@ -53,20 +54,26 @@ fn extremes(result: &StudyResult) -> Table {
         numbers("largest_row", None, each(row, |output| &output.largest)),
     ];
     for (index, variable) in result.variables.iter().enumerate() {
+        let unit = variable.unit.as_deref();
         for which in ["least", "largest"] {
-            let at = result.outputs.iter().map(|output| {
-                let extreme = if which == "least" { &output.least } else { &output.largest };
-                extreme.as_ref().and_then(|extreme| extreme.at.get(index)).map(exact).unwrap_or_default()
+            let at: Vec<Option<&Setting>> = result
+                .outputs
+                .iter()
+                .map(|output| if which == "least" { &output.least } else { &output.largest })
+                .map(|extreme| extreme.as_ref()?.at.get(index))
+                .collect();
+            let name = format!("{which}_at.{}", column(&variable.pointer, unit));
+            columns.push(if variable.values.iter().all(|value| value.number().is_some()) {
+                numbers(name, unit, at.into_iter().map(|setting| setting?.number()).collect())
+            } else {
+                words(
+                    name,
+                    at.into_iter().map(|setting| setting.map(ToString::to_string).unwrap_or_default()).collect(),
+                )
             });
-            columns.push(words(format!("{which} at {}", variable.pointer), at.collect()));
         }
     }
     Table { id: "extremes", columns }
-}
-
-/// A value with all its digits.
-fn exact(setting: &Setting) -> String {
-    setting.number().map_or_else(|| setting.to_string(), |number| number.to_string())
 }
 
 fn numbers(name: impl Into<Cow<'static, str>>, unit: Option<&str>, cells: Vec<Option<f64>>) -> Column {

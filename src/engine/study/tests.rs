@@ -386,6 +386,26 @@ fn pictures_are_a_map_over_two_and_curves_over_one() {
 }
 
 #[test]
+fn pictures_of_the_examples_are_labelled_in_the_language_of_the_reader() {
+    let registry = Registry::standard().unwrap();
+    for example in super::EXAMPLES {
+        let stored = solve_now(&registry, STUDIES, Body::Json(example.job.into()), &Unwatched).unwrap();
+        for figure in stored.figures().unwrap() {
+            for (code, value) in figure.title.values.iter() {
+                let [english, russian] =
+                    [Language::En, Language::Ru].map(|language| Texts::names(language, value).unwrap());
+                let is_name = |word: &str| word.contains('_') || word.starts_with('/');
+                assert!(!english.split_whitespace().any(is_name), "{code}: {english}");
+                let left = crate::text::complete::english_in(&russian);
+                assert!(left.is_empty() && russian != english, "{}: {code}: {russian}: {left:?}", example.id);
+            }
+            let title = Texts::shared().message(Language::Ru, "figure", &figure.title);
+            assert!(crate::text::complete::english_in(&title).is_empty(), "{title}");
+        }
+    }
+}
+
+#[test]
 fn every_label_of_a_picture_has_its_words_in_the_title_or_a_text() {
     let vary = [
         json!({"pointer": "/length_mm", "from": 100, "to": 400, "count": 3}),
@@ -399,7 +419,9 @@ fn every_label_of_a_picture_has_its_words_in_the_title_or_a_text() {
         let stored = solve_now(&toy::registry(), STUDIES, body(&study(vary.into())), &Unwatched).unwrap();
         for figure in stored.figures().unwrap() {
             let title = Texts::shared().message(Language::En, "figure", &figure.title);
-            assert!(title.contains("deflections 0"), "{title}");
+            assert!(title.contains("Deflections 1"), "{title}");
+            let russian = Texts::shared().message(Language::Ru, "figure", &figure.title);
+            assert!(!russian.contains(" over "), "{russian}");
             let mut codes = vec![figure.x.label];
             for panel in &figure.panels {
                 codes.push(panel.y.label);
@@ -429,17 +451,34 @@ fn tables_have_a_line_for_each_point_and_one_for_each_output() {
     let tables = stored.tables().unwrap();
     let answer: Value = serde_json::from_slice(&stored.body).unwrap();
     let key = |row: usize| answer["result"]["rows"][row]["key"].as_str().unwrap().to_owned();
+    let detail = |row: usize| {
+        let said = answer["result"]["rows"][row]["detail"].as_str().unwrap();
+        assert!(said.len() > 10, "{said}");
+        if said.contains(',') { format!("\"{said}\"") } else { said.to_owned() }
+    };
     let csv = crate::render::csv(&tables[0]);
     let expected = format!(
-        "length [mm],mode,status,code,deflections.0 [um],key\n\
-         100,plain,succeeded,,33.333333333333336,{}\n100,infeasible,infeasible,no_solution_here,,{}\n\
-         10,plain,invalid,thicker_than_long,,\n10,infeasible,invalid,thicker_than_long,,\n",
+        "length [mm],mode,status,code,detail,deflections.0 [um],key\n\
+         100,plain,succeeded,,,33.333333333333336,{}\n100,infeasible,infeasible,no_solution_here,{},,{}\n\
+         10,plain,invalid,thicker_than_long,{},,\n10,infeasible,invalid,thicker_than_long,{},,\n",
         key(0),
-        key(1)
+        detail(1),
+        key(1),
+        detail(2),
+        detail(3),
     );
     assert_eq!(csv, expected);
+    // The sentence of a failed row is in the language of the reader; nothing else changes.
+    let russian = crate::render::csv(&stored.tables_in(Language::Ru).unwrap()[0]);
+    let differ = csv.lines().zip(russian.lines()).filter(|(english, russian)| english != russian);
+    let differ: Vec<_> = differ.map(|(_, russian)| russian).collect();
+    assert_eq!(differ.len(), 3, "{russian}");
+    assert!(differ.iter().all(|line| line.chars().any(|c| ('а'..='я').contains(&c))), "{russian}");
     let extremes = crate::render::csv(&tables[1]);
-    assert!(extremes.starts_with("output,unit,least,least_row,largest,largest_row,least at /length_mm,"), "{extremes}");
+    assert!(
+        extremes.starts_with("output,unit,least,least_row,largest,largest_row,least_at.length [mm],"),
+        "{extremes}"
+    );
     assert!(extremes.contains("/deflections_um/0,um,33.333333333333336,0,"), "{extremes}");
     let ids: Vec<&str> = tables.iter().map(|table| table.id).collect();
     assert_eq!(ids, super::table::TABLES);

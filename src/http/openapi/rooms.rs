@@ -18,7 +18,7 @@ use super::{jobs, parts};
 use crate::engine;
 use crate::http::answer::offered;
 use crate::http::negotiate::Media;
-use crate::registry::{Entry, Registry};
+use crate::registry::{Entry, Registry, Schemas};
 
 /// A calculator's part of the contract.
 pub(super) struct Room {
@@ -49,9 +49,9 @@ pub(super) fn studies(registry: &Registry) -> Room {
 fn operation(entry: &Entry, name: &str, tag: &str, examples: &[Example]) -> Room {
     let meta = entry.meta();
     let (job, result, answer) = (format!("{name}Job"), format!("{name}Result"), format!("{name}Answer"));
-    let mut schemas = entry.components();
-    schemas.push((job.clone(), entry.input_schema()));
-    schemas.push((result.clone(), entry.output_schema()));
+    let Schemas { input, output, components: mut schemas } = entry.schemas();
+    schemas.push((job.clone(), input));
+    schemas.push((result.clone(), output));
     schemas.push((answer.clone(), envelope(meta, &result).into()));
     let operation = OperationBuilder::new()
         .tag(tag)

@@ -53,6 +53,53 @@ fn ring(samples: u32) -> Figure {
     figure(Frame::Polar, "roundness_before_and_after", Axis::linear("angle", "deg"), vec![panel])
 }
 
+/// A shaft with what binds below it: one limit in the first zone, two in the second.
+#[test]
+fn ribbons_say_what_holds_by_colour_pattern_letter_and_name() {
+    let outline = Item::Outline {
+        name: "part",
+        x: vec![0.0, 100.0, 100.0, 0.0],
+        y: vec![-5.0, -5.0, 5.0, 5.0],
+        role: Role::Part,
+    };
+    let ribbon = |name, role, stretches: &[(f64, f64, f64, &str)]| Item::Ribbon {
+        name,
+        x: stretches.iter().map(|stretch| stretch.0).collect(),
+        x_end: stretches.iter().map(|stretch| stretch.1).collect(),
+        weight: stretches.iter().map(|stretch| stretch.2).collect(),
+        places: stretches.iter().map(|stretch| stretch.3.to_owned()).collect(),
+        role,
+    };
+    let ribbons = vec![
+        ribbon("deflection", Role::Series(0), &[(0.0, 90.0, 0.4, "z1"), (90.0, 100.0, 0.09, "z2")]),
+        ribbon("a_name_far_too_long_for_its_stretch_of_the_shaft", Role::Series(2), &[(90.0, 100.0, 0.01, "z2")]),
+    ];
+    let panels = vec![
+        Panel { y: Axis::linear("radius", "mm"), height: 1.0, items: vec![outline] },
+        Panel { y: Axis::linear("gain", "percent"), height: 0.5, items: ribbons },
+    ];
+    let text = drawn("ribbon", &figure(Frame::Stacked, "what_binds", Axis::linear("station", "mm"), panels));
+    let count = |piece: &str| text.matches(piece).count();
+    // Three pieces; two entries of the legend.
+    assert_eq!((count("class=\"ribbon n0\""), count("class=\"ribbon n2\"")), (3, 2));
+    assert_eq!((count("class=\"weave-2 n2\""), count("class=\"weave-0")), (2, 0), "a pattern, but for the plain one");
+    assert_eq!(count(">deflection</text>"), 3, "the name where it has room, and in the legend");
+    assert_eq!(count(">C</text>"), 2, "the letter where the name has none, and in the legend");
+    assert!(text.contains("<title>z2: deflection, 0.09"), "{text}");
+    // Weights of 9 to 1: the lightest still has a readable share, the heaviest lies above it.
+    let heights: Vec<f64> = text
+        .split("<rect class=\"ribbon ")
+        .skip(1)
+        .map(|rect| rect.split("height=\"").nth(1).unwrap().split('"').next().unwrap().parse().unwrap())
+        .filter(|height: &f64| (height - 12.0).abs() > 1e-9)
+        .collect();
+    let [whole, upper, lower] = heights[..] else { panic!("{heights:?}") };
+    assert!((upper + lower - whole).abs() < 0.02 && upper > 2.0 * lower && lower > 0.2 * whole, "{heights:?}");
+    // No numbers beside ribbons: what they weigh is no height.
+    let numbers = text.split("<g class=\"number\" text-anchor=\"end\">").last().unwrap().split("</g>").next().unwrap();
+    assert_eq!(numbers, "");
+}
+
 #[test]
 fn a_roundness_chart_says_its_scale_and_closes() {
     let text = drawn("ring", &ring(3600));

@@ -8,7 +8,7 @@ use super::map::Key;
 use super::page::{Escaped, Page, Px, put};
 use super::plane::{Place, Plane};
 use super::style::{Styles, is_hatched, role_class};
-use super::{Wording, thin};
+use super::{Wording, ribbon, thin};
 
 /// A drawing area, px.
 #[derive(Debug, Clone, Copy)]
@@ -38,6 +38,7 @@ pub(super) fn items(
             | Item::Band { name, .. }
             | Item::Points { name, .. }
             | Item::Bars { name, .. }
+            | Item::Ribbon { name, .. }
             | Item::Outline { name, .. } => *name,
             Item::HeatMap { value, .. } => value.label,
             Item::Glyph { glyph, .. } => glyph::label(*glyph),
@@ -60,6 +61,9 @@ pub(super) fn items(
                 points(page, plane, x, y, (&styles.class(name, *role), role_class(*role).1));
             }
             Item::Bars { name, x, y, role } => stand.draw(page, plane, (x, y), &styles.class(name, *role)),
+            Item::Ribbon { name, role, .. } => {
+                ribbon::draw(page, panel, frame, item, &styles.class(name, *role), wording);
+            }
             Item::HeatMap { .. } => {
                 if let Some(key) = key {
                     key.draw(page, plane, (x, panel.y.scale));

@@ -6,6 +6,7 @@ use super::Wording;
 use super::glyph::{self, Stance};
 use super::map::Key;
 use super::page::{Escaped, Page, Px, put, width};
+use super::ribbon;
 use super::style::{Styles, identity, is_hatched, role_class};
 
 /// Height of a line, px.
@@ -119,6 +120,9 @@ fn sample(page: &mut Page, sample: &Sample<'_>, x: f64, y: f64, styles: &Styles)
         Sample::Item(Item::Points { name, role, .. }) => {
             let (class, marker) = (class(name, *role), role_class(*role).1);
             put!(page, "<path class=\"points {class}\" d=\"M{} {}{marker}\"/>", Px(x + SAMPLE / 2.0), Px(y));
+        }
+        Sample::Item(Item::Ribbon { name, role, .. }) => {
+            ribbon::sample(page, (x, y - 6.0), (SAMPLE, 12.0), &class(name, *role), *role);
         }
         // The map has an entry of its own.
         Sample::Item(Item::HeatMap { .. }) => {}

@@ -13,6 +13,7 @@ mod legend;
 mod map;
 mod page;
 mod plane;
+mod ribbon;
 mod round;
 mod scale;
 mod stacked;
@@ -85,6 +86,8 @@ fn ordinates(item: &Item) -> Box<dyn Iterator<Item = f64> + '_> {
         Item::Band { lower, upper, .. } => Box::new(lower.iter().chain(upper).copied()),
         Item::Points { y, .. } | Item::Outline { y, .. } => Box::new(y.iter().copied()),
         Item::HeatMap { values, .. } => Box::new(values.iter().copied().flatten()),
+        // What it weighs is no place on the ordinate.
+        Item::Ribbon { .. } => Box::new(std::iter::empty()),
         Item::Glyph { y, .. } => Box::new(std::iter::once(*y)),
     }
 }
@@ -113,7 +116,8 @@ fn open(
     );
     put!(page, "<title>{}</title>\n", Escaped(&(wording.message)(&figure.title)));
     put!(page, "<desc>{}</desc>\n", Escaped(&description(figure, wording)));
-    put!(page, "<style>{}", style::CSS);
+    let has_ribbons = ribbon::any(&figure.panels);
+    put!(page, "<style>{}{}", style::CSS, if has_ribbons { style::RIBBONS } else { "" });
     for diverging in [false, true] {
         if keys.iter().flatten().any(|key| key.diverging == diverging) {
             colour::css(page, diverging);
@@ -122,6 +126,9 @@ fn open(
     put!(page, "</style>\n");
     if style::has_hatching(figure) {
         put!(page, "{}", style::HATCH);
+    }
+    if has_ribbons {
+        put!(page, "{}", ribbon::WEAVES);
     }
     put!(page, "<rect class=\"paper\" width=\"960\" height=\"{height}\"/>\n");
     for (index, line) in title.iter().enumerate() {
@@ -137,6 +144,9 @@ fn description(figure: &Figure, wording: &Wording<'_>) -> String {
         unit => format!("{}, {unit}", (wording.label)(axis.label)),
     };
     let span = |item: &Item| {
+        if let Item::Ribbon { name, places, .. } = item {
+            return Some(format!("{} {}", (wording.label)(name), places.join(" ")));
+        }
         let name = match item {
             Item::HeatMap { value, .. } => value.label,
             item => identity(item)?.0,

@@ -11,7 +11,7 @@ use super::page::{Escaped, Page, Px, put, width};
 use super::plane::Plane;
 use super::scale::{Range, Scale, Ticks, coordinate};
 use super::style::Styles;
-use super::{MARGIN, WIDTH, Wording, axis_name, counted, ordinates};
+use super::{MARGIN, WIDTH, Wording, axis_name, counted, ordinates, ribbon};
 
 const NUMBER_SIZE: f64 = 12.5;
 /// Between a panel and the legend of the next.
@@ -178,7 +178,11 @@ impl VerticalAxis {
         // A drawing to scale and a map fill their panel.
         let is_full = |item: &Item| matches!(item, Item::Glyph { .. } | Item::HeatMap { .. });
         let range = if panel.items.iter().any(is_full) { data } else { data.roomy(spacing) };
-        let ticks = y_ticks(spacing, range, height - room_top - room_bottom, decimal);
+        let ticks = if ribbon::is_only(panel) {
+            Ticks { marks: Vec::new(), minor: Vec::new(), power: 0, step: None }
+        } else {
+            y_ticks(spacing, range, height - room_top - room_bottom, decimal)
+        };
         Self { spacing, range, ticks, room_top, room_bottom, glyph_size }
     }
 
@@ -235,6 +239,9 @@ fn across(panel: &Panel, spacing: Spacing) -> Vec<f64> {
                 taken.extend(x.iter().filter_map(|x| coordinate(spacing, *x)));
             }
             Item::Bars { x, .. } => taken.extend(stand.ends(x)),
+            Item::Ribbon { x, x_end, .. } => {
+                taken.extend(x.iter().chain(x_end).filter_map(|x| coordinate(spacing, *x)));
+            }
             Item::HeatMap { x, .. } => taken.extend(ends(spacing, x)),
             Item::Glyph { x, .. } => taken.extend(coordinate(spacing, *x)),
         }
@@ -287,7 +294,8 @@ fn grid(page: &mut Page, placed: &Placed<'_>, layout: &Layout<'_>, class: &str) 
 fn axes(page: &mut Page, placed: &Placed<'_>, layout: &Layout<'_>) {
     let Frame { left, right, top, bottom, plane, .. } = placed.frame;
     grid(page, placed, layout, "");
-    if let Some(zero) = plane.along_y().at(0.0).filter(|zero| *zero > top + 1.0 && *zero < bottom - 1.0) {
+    let zero = (!placed.ticks.marks.is_empty()).then(|| plane.along_y().at(0.0)).flatten();
+    if let Some(zero) = zero.filter(|zero| *zero > top + 1.0 && *zero < bottom - 1.0) {
         put!(page, "<path class=\"zero\" d=\"M{} {}H{}\"/>", Px(left), Px(zero), Px(right));
     }
     let (width, height) = (Px(right - left), Px(bottom - top));

@@ -112,6 +112,18 @@ pub(super) const CSS: &str = "\
 .precut-figure .plain.v5{color:#dba63a}\
 }";
 
+/// Where there are ribbons.
+pub(super) const RIBBONS: &str = "\
+.precut-figure .ribbon{fill:currentColor;fill-opacity:.24;stroke:currentColor;stroke-width:1;stroke-dasharray:none}\
+.precut-figure .weave-1,.precut-figure .weave-2,.precut-figure .weave-3,.precut-figure .weave-4,.precut-figure .weave-5{stroke:none}\
+.precut-figure .weave-1{fill:url(#precut-weave-1)}\
+.precut-figure .weave-2{fill:url(#precut-weave-2)}\
+.precut-figure .weave-3{fill:url(#precut-weave-3)}\
+.precut-figure .weave-4{fill:url(#precut-weave-4)}\
+.precut-figure .weave-5{fill:url(#precut-weave-5)}\
+pattern[id^=precut-weave] path{stroke:#1a1d21;stroke-opacity:.4}\
+@media screen and (prefers-color-scheme:dark){pattern[id^=precut-weave] path{stroke:#fff}}";
+
 /// A thin line across everything that is so filled.
 pub(super) const HATCH: &str = "<defs><pattern id=\"precut-hatch\" width=\"7\" height=\"7\" \
 patternUnits=\"userSpaceOnUse\" patternTransform=\"rotate(45)\"><path d=\"M0 0V7\"/></pattern></defs>\n";
@@ -161,6 +173,7 @@ pub(super) fn identity(item: &Item) -> Option<(&'static str, Role)> {
         | Item::Band { name, role, .. }
         | Item::Points { name, role, .. }
         | Item::Bars { name, role, .. }
+        | Item::Ribbon { name, role, .. }
         | Item::Outline { name, role, .. } => Some((name, role)),
         Item::HeatMap { .. } | Item::Glyph { .. } => None,
     }

@@ -138,6 +138,22 @@ pub enum Item {
         /// from low to high.
         diverging: bool,
     },
+    /// What holds along stretches of the abscissa: a coloured and lettered ribbon as high as its panel. Where several
+    /// names hold over one stretch, they share its height by weight. A panel of ribbons alone has no numbers at its side.
+    Ribbon {
+        /// Code of the entry in the legend: what holds.
+        name: &'static str,
+        /// Where the stretches begin.
+        x: Vec<f64>,
+        /// Where they end.
+        x_end: Vec<f64>,
+        /// How much it weighs on each, above zero, in the unit of the panel's axis.
+        weight: Vec<f64>,
+        /// What each stretch is called.
+        places: Vec<String>,
+        /// What it stands for.
+        role: Role,
+    },
     /// A closed, filled outline (the section of a part), in the units of the axes.
     Outline {
         /// Code of the entry in the legend.
@@ -192,6 +208,16 @@ pub enum Role {
     Series(u8),
     /// A neutral curve.
     Plain,
+}
+
+impl Role {
+    /// The letter in a ribbon of this role: that of its number in the family, `A` for a single one.
+    pub fn letter(self) -> char {
+        match self {
+            Self::Series(n) => char::from(b'A' + n % 26),
+            _ => 'A',
+        }
+    }
 }
 
 /// Symbols of workholding and tool.

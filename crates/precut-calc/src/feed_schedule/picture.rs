@@ -1,6 +1,7 @@
 //! Figures and tables of an answer.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 
 use crate::calculator::{Axis, Column, Figure, Frame, Glyph, Item, Message, Panel, Role, Table};
 use crate::shaft::Support;
@@ -55,13 +56,13 @@ pub(super) const LABEL_CODES: &[&str] = &[
 
 pub(super) fn figures(job: &Job, outcome: &Outcome) -> Vec<Figure> {
     let mut panels = vec![outline(job, outcome, 0.8), feeds(outcome, 1.0), speeds(outcome, 0.6)];
+    panels.extend(bindings(job, outcome, 0.45));
     if outcome.zones.iter().any(|zone| zone.deflection_um.is_some()) {
         panels.push(deflections(job, outcome, 0.9));
     }
     if outcome.zones.iter().any(|zone| zone.roughness_um.is_some()) {
         panels.push(roughnesses(job, outcome, 0.7));
     }
-    panels.push(bindings(outcome, 0.9));
     let stacked = |id, title, x, panels| Figure { id, title: Message::new(title), frame: Frame::Stacked, x, panels };
     let mut figures = vec![stacked("schedule", "schedule_figure", Z, panels)];
     if !outcome.trade_off.is_empty() {
@@ -198,43 +199,63 @@ fn roughnesses(job: &Job, outcome: &Outcome, height: f64) -> Panel {
     Panel { y: Axis::linear("height_of_roughness", "um"), height, items }
 }
 
-/// What kind of limit a name stands for.
+/// What kind of limit a name stands for. Eight numbers have colours of their own: the kinds that share one hardly ever
+/// bind together.
 fn family(constraint: &str) -> (&'static str, u8) {
     match constraint {
         "deflection" => ("binds_deflection", 0),
         "deflection_spread" => ("binds_spread", 1),
         "roughness" | "hardening" | "hardening_depth" => ("binds_surface", 2),
         "tool_usage" | "tool_life_min" => ("binds_edge", 3),
-        "time_max" => ("binds_time", 4),
+        "speed_min" | "speed_max" => ("binds_speed_bound", 4),
         "power" | "torque" | "rpm_min" | "rpm_max" | "feed_rate_max" => ("binds_machine", 5),
-        "force_z" | "force_y" => ("binds_force", 6),
+        "feed_step" => ("binds_feed_step", 6),
         "feed_min" | "feed_max" => ("binds_feed_bound", 7),
-        "speed_min" | "speed_max" => ("binds_speed_bound", 8),
-        "feed_step" => ("binds_feed_step", 9),
+        "time_max" => ("binds_time", 8),
+        "force_z" | "force_y" => ("binds_force", 9),
         _ => ("binds_other", 10),
     }
 }
 
-/// Which limits bind where, and what one percent more of each buys.
-fn bindings(outcome: &Outcome, height: f64) -> Panel {
+/// The stretches over which a limit holds, by the name of its place: its zones, those of its surface, or the part.
+fn holds_over(job: &Job, zones: &[ZoneOutcome], place: &str) -> Vec<usize> {
+    let over = |test: &dyn Fn(&ZoneOutcome) -> bool| -> Vec<usize> {
+        zones.iter().enumerate().filter(|(_, zone)| test(zone)).map(|(at, _)| at).collect()
+    };
+    let named = over(&|zone| place.split('|').any(|part| part == zone.id));
+    let on_surface = || over(&|zone| own_zone(job, zone).is_some_and(|own| own.surface.as_deref() == Some(place)));
+    match (named.is_empty(), place) {
+        (false, _) => named,
+        (true, "part") => over(&|_| true),
+        (true, _) => on_surface(),
+    }
+}
+
+/// Which limits bind where, and what one percent more of each buys; `None` where no limit is known to.
+fn bindings(job: &Job, outcome: &Outcome, height: f64) -> Option<Panel> {
     let zones = shown(outcome);
-    let mut items: Vec<Item> = Vec::new();
-    let mut families: Vec<(&'static str, u8)> = outcome.binding.iter().map(|b| family(&b.constraint)).collect();
-    families.sort_by_key(|family| family.1);
-    families.dedup();
-    for (name, series) in families {
-        let of = |zone: &ZoneOutcome| {
-            let all = outcome.binding.iter().filter(|b| family(&b.constraint).0 == name);
-            let here: f64 = all.filter(|b| b.zone.split('|').any(|part| part == zone.id)).map(|b| b.gain_percent).sum();
-            (here > 0.0).then_some(here)
-        };
-        let x: Vec<f64> = zones.iter().map(|zone| 0.5 * (zone.z_start_mm + zone.z_end_mm)).collect();
-        let y: Vec<Option<f64>> = zones.iter().map(of).collect();
-        if y.iter().any(Option::is_some) {
-            items.push(Item::Bars { name, x, y, role: Role::Series(series) });
+    // By kind, what its limits buy over each zone.
+    let mut kinds: BTreeMap<(u8, &'static str), Vec<f64>> = BTreeMap::new();
+    for bound in outcome.binding.iter().filter(|bound| bound.gain_percent > 0.0) {
+        let (name, series) = family(&bound.constraint);
+        let gains = kinds.entry((series, name)).or_insert_with(|| vec![0.0; zones.len()]);
+        for at in holds_over(job, &zones, &bound.zone) {
+            gains[at] += bound.gain_percent;
         }
     }
-    Panel { y: Axis::linear("limit_gain", "percent"), height, items }
+    let ribbon = |((series, name), gains): ((u8, &'static str), Vec<f64>)| {
+        let held: Vec<(&ZoneOutcome, f64)> = zones.iter().zip(gains).filter(|(_, gain)| *gain > 0.0).collect();
+        (!held.is_empty()).then(|| Item::Ribbon {
+            name,
+            x: held.iter().map(|(zone, _)| zone.z_start_mm).collect(),
+            x_end: held.iter().map(|(zone, _)| zone.z_end_mm).collect(),
+            weight: held.iter().map(|(_, gain)| *gain).collect(),
+            places: held.iter().map(|(zone, _)| zone.id.clone()).collect(),
+            role: Role::Series(series),
+        })
+    };
+    let items: Vec<Item> = kinds.into_iter().filter_map(ribbon).collect();
+    (!items.is_empty()).then(|| Panel { y: Axis::linear("limit_gain", "percent"), height, items })
 }
 
 fn trade_off(outcome: &Outcome) -> Panel {

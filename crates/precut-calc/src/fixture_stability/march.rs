@@ -5,6 +5,8 @@
 //! opens or closes inside a step, the moment is solved for and the step is continued with the other system. Second
 //! order in the step; the surface is stored where teeth stand at the steps (`fixture/3.2`).
 
+mod linear;
+
 use std::f64::consts::PI;
 
 use crate::calculator::{Failure, Monitor, checkpoint};
@@ -14,6 +16,7 @@ use super::cutting::Cutting;
 use super::floquet::{Working, process_damping};
 use super::holding::{Closed, Holding, System};
 use super::response::{Range, demands};
+use linear::Stretch;
 
 /// A displacement beyond this, mm, ends a run: the force law has left everything real.
 const DIVERGED_MM: f64 = 10.0;
@@ -100,6 +103,22 @@ pub(super) struct Marched {
     /// Angle, rad, and effective feed, mm, of the last pass over every place of the arc.
     pub arc: Vec<(f64, f64)>,
     pub steps: usize,
+}
+
+impl<const N: usize> System<N> {
+    /// A state as it is kept.
+    fn step(&self, q: &[f64; N], time_s: f64, force_n: f64, feed_mm: Option<f64>, demand: [f64; 4]) -> Step {
+        Step {
+            time_s,
+            x_mm: q[0],
+            velocity_mm_per_s: self.velocity(q, 0),
+            jaw_mm: self.jaw.map(|jaw| q[jaw]),
+            force_n,
+            feed_mm,
+            left_demand_n: demand[0],
+            right_demand_n: demand[1],
+        }
+    }
 }
 
 /// Propagation over one step: q -> phi q + shift + start F0 + end F1.
@@ -310,7 +329,7 @@ pub(super) fn march<const N: usize>(
         }
         state.tooth_period = period;
         record.samples_mm.push(state.q[0]);
-        if state.is_plain(&record) {
+        if state.is_plain() {
             let (leave, steps) = (state.grid.leave, state.grid.steps);
             state.sweep(0..leave, &mut record);
             state.sweep(leave..steps, &mut record);
@@ -518,12 +537,11 @@ impl<'a, const N: usize> State<'a, N> {
         }
     }
 
-    /// Whether nothing acts in this tooth period but even teeth on a bonded, linear vise, and no step is kept: the case of
-    /// searches and curves, which [`Self::sweep`] runs through by the same operations without asking at every step.
-    fn is_plain(&self, record: &Record) -> bool {
-        let kept = self.tooth_period < record.keep_first || self.tooth_period >= record.keep_from;
+    /// Whether nothing acts in this tooth period but even teeth on a bonded, linear vise: the case of searches and curves,
+    /// which [`Self::sweep`] runs through without asking at every step.
+    fn is_plain(&self) -> bool {
         let alone = self.damping <= 0.0 && self.hardening <= 0.0;
-        alone && !kept && !self.plan.unilateral && !self.uneven && self.reached == self.grid.cells
+        alone && !self.plan.unilateral && !self.uneven && self.reached == self.grid.cells
     }
 
     /// The steps of a stretch of a plain tooth period.
@@ -532,8 +550,21 @@ impl<'a, const N: usize> State<'a, N> {
         let teeth = if after == 0 { self.grid.teeth_before } else { self.grid.teeth_after };
         let (steps, step_s) = (self.grid.steps, self.grid.step_s[after]);
         let steady = self.tooth_period >= record.steady_from;
-        let multiple = self.plan.surface == Surface::Multiple;
         let (linear, power) = (self.cutting.chip_exponent <= 0.0, 1.0 - self.cutting.chip_exponent);
+        if linear {
+            let stretch = Stretch { first: range.start, steps: range.len(), after };
+            match (teeth, steady) {
+                (1, false) => return self.linear::<1, false>(stretch, record),
+                (1, true) => return self.linear::<1, true>(stretch, record),
+                (2, false) => return self.linear::<2, false>(stretch, record),
+                (2, true) => return self.linear::<2, true>(stretch, record),
+                (3, false) => return self.linear::<3, false>(stretch, record),
+                (3, true) => return self.linear::<3, true>(stretch, record),
+                _ => {}
+            }
+        }
+        let multiple = self.plan.surface == Surface::Multiple;
+        let (kept, period) = (record.keeps(self.tooth_period), self.tooth_period);
         let (feed_mm, direction, level) = (self.feed_mm, self.direction, self.level);
         let flow = &self.flows[4 * after + index(Closed::BOTH)];
         let mut q = self.q;
@@ -542,7 +573,12 @@ impl<'a, const N: usize> State<'a, N> {
             for force in &self.of_tooth[..teeth] {
                 cut += force;
             }
-            record.seen(q[0], demands(&self.system, self.holding, &q), cut, steady, step_s);
+            let demand = demands(&self.system, self.holding, &q);
+            record.seen(q[0], demand, cut, steady, step_s);
+            if kept {
+                let chip = (teeth > 0).then(|| self.cells[i].chip);
+                record.keep(period, self.system.step(&q, record.time_s, cut, chip, demand));
+            }
             let before = (q[0], self.system.velocity(&q, 0));
             let begun = flow.begun(&q, cut);
             let guess = begun[0] + flow.end[0] * cut;
@@ -737,20 +773,19 @@ impl Record {
                 self.tooth(state.cells[cell].chip, steady);
             }
         }
-        let early = state.tooth_period < self.keep_first;
-        if early || state.tooth_period >= self.keep_from {
-            let step = Step {
-                time_s: self.time_s,
-                x_mm: state.q[0],
-                velocity_mm_per_s: state.system.velocity(&state.q, 0),
-                jaw_mm: state.system.jaw.map(|jaw| state.q[jaw]),
-                force_n: cut_n,
-                feed_mm: (teeth > 0).then(|| state.cells[i].chip),
-                left_demand_n: demand[0],
-                right_demand_n: demand[1],
-            };
-            if early { self.first.push(step) } else { self.last.push(step) }
+        if self.keeps(state.tooth_period) {
+            let chip = (teeth > 0).then(|| state.cells[i].chip);
+            self.keep(state.tooth_period, state.system.step(&state.q, self.time_s, cut_n, chip, demand));
         }
+    }
+
+    /// Whether every step of a tooth period is kept.
+    fn keeps(&self, period: usize) -> bool {
+        period < self.keep_first || period >= self.keep_from
+    }
+
+    fn keep(&mut self, period: usize, step: Step) {
+        if period < self.keep_first { self.first.push(step) } else { self.last.push(step) }
     }
 
     /// A turn of the motion between two steps, by the cubic through them.

@@ -62,14 +62,14 @@ fn figure(id: &'static str, title: &'static str, x: Axis, panels: Vec<Panel>) ->
     Figure { id, title: Message::new(title), frame: Frame::Stacked, x, panels }
 }
 
-/// ln |mu|: decay below 0, growth above.
+/// |mu| by its logarithm: decay below 1, growth above.
 fn heat(speeds: &[f64], depths: &[f64], modulus: &[f64]) -> Item {
     Item::HeatMap {
-        value: Axis::linear("multiplier_modulus", "1"),
+        value: Axis::logarithmic("multiplier_modulus", "1"),
         x: speeds.to_vec(),
         y: depths.to_vec(),
         // A map that is still growing has zeros where nothing was computed yet.
-        values: modulus.iter().map(|m| (*m > 0.0).then(|| m.ln())).collect(),
+        values: modulus.iter().map(|m| (*m > 0.0).then_some(*m)).collect(),
         diverging: true,
     }
 }

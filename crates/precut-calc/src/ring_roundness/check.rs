@@ -171,6 +171,7 @@ fn check_machine(job: &Job, violations: &mut Violations) {
         refuse(job.supports.roller_radius_mm > 0.0, "/supports/roller_radius_mm");
         refuse(job.tool.wheel_radius_mm.is_some(), "/tool/wheel_radius_mm");
         refuse(!job.effects.is_empty(), "/effects");
+        refuse(job.replay_frames > 0, "/replay_frames");
     }
 }
 

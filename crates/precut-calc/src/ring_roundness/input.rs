@@ -68,6 +68,10 @@ pub struct Job {
     #[serde(default = "profile_points")]
     #[schema(minimum = 36, maximum = 20_000, default = 720, example = 720, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("m")), ("x-group" = json!("numerics")), ("x-advanced" = json!(true))))]
     pub profile_points: u32,
+    /// Surfaces on the way that the answer keeps at most, evenly over the revolutions, for a replay; 0 keeps none. Exact contact only.
+    #[serde(default)]
+    #[schema(minimum = 0, maximum = 200, default = 0, example = 120, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("n_f")), ("x-group" = json!("numerics")), ("x-advanced" = json!(true))))]
+    pub replay_frames: u32,
     /// Highest order of waves in spectrum and linear theory.
     #[serde(default = "highest_order")]
     #[schema(minimum = 3, maximum = 100, default = 50, example = 50, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("k_max")), ("x-group" = json!("evaluation")), ("x-advanced" = json!(true))))]

@@ -20,6 +20,7 @@ mod measurement;
 mod next_runs;
 mod output;
 mod picture;
+mod replay;
 mod sampling;
 mod scene;
 mod search;
@@ -36,8 +37,9 @@ pub use input::{
 pub use measurement::RingMeasurement;
 pub use output::{
     CausesOutcome, CircleValues, Evaluated, Fate, HistoryColumns, LinearOutcome, MapCell, MapOutcome, OrderOutcome,
-    Outcome, PathColumns, ProfileColumns, ReactionsOutcome, RootOutcome, SearchOutcome, SearchSetting, SearchStatus,
-    SecondStage, SettingOutcome, SimulationOutcome, SpectrumColumns, TriedColumns, WaveColumn,
+    Outcome, PathColumns, ProfileColumns, ReactionsOutcome, ReplayFrame, ReplayOutcome, RootOutcome, SearchOutcome,
+    SearchSetting, SearchStatus, SecondStage, SettingOutcome, SimulationOutcome, SpectrumColumns, TriedColumns,
+    WaveColumn,
 };
 
 use crate::calculator::{
@@ -173,7 +175,8 @@ fn cost(job: &Job) -> Cost {
         ms += search;
     }
     let rows = job.measured_profile.as_ref().map_or(0, |profile| profile.rows().len());
-    let bytes = 200_000 + u64::from(sampling::samples_of(job)) * 400 + rows as u64 * 100;
+    let frames = u64::from(job.replay_frames) * replay::MOST_POINTS * 16;
+    let bytes = 200_000 + u64::from(sampling::samples_of(job)) * 400 + rows as u64 * 100 + frames;
     Cost { ms, bytes, driver }
 }
 

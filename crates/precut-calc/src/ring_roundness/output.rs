@@ -150,6 +150,8 @@ pub struct SimulationOutcome {
     pub history: HistoryColumns,
     /// Profiles by body angle.
     pub profile: ProfileColumns,
+    /// The surface on the way; null unless `replay_frames` asks for it, and with `nearest_samples`.
+    pub replay: Option<ReplayOutcome>,
     /// Where the ring's origin went in the last revolution: what an indicator at the tool shows.
     pub centre_path: PathColumns,
     /// What exact contact gives with the same job, beside `nearest_samples`.
@@ -298,6 +300,33 @@ pub struct ProfileColumns {
     /// The same after the filter.
     #[schema(extensions(("x-unit" = json!("um"))))]
     pub end_filtered_um: Vec<f64>,
+}
+
+/// The surface on the way, to be looked at: thinned out to at most 360 angles and rounded to a two-thousandth of its
+/// deviation or finer. What is to be measured stands in `history`, from all nodes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingReplayOutcome)]
+pub struct ReplayOutcome {
+    /// Body angles of every frame.
+    #[schema(extensions(("x-unit" = json!("deg"))))]
+    pub angle_deg: Vec<f64>,
+    /// In the order of the revolutions, the last one among them.
+    pub frames: Vec<ReplayFrame>,
+}
+
+/// The surface after so many revolutions.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingReplayFrame)]
+pub struct ReplayFrame {
+    /// Revolutions turned.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub revolution: f64,
+    /// Body angle at which the tool stands then.
+    #[schema(extensions(("x-unit" = json!("deg"))))]
+    pub tool_angle_deg: f64,
+    /// Deviation from the least-squares circle at each of the angles, unfiltered.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub deviation_um: Vec<f64>,
 }
 
 /// The path of the ring's origin in the last revolution, about its mean.

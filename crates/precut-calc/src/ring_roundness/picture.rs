@@ -189,12 +189,9 @@ fn spectrum(spectrum: Option<&SpectrumColumns>, outcome: &Outcome) -> Vec<Panel>
     let (mut bars, mut factors) = (Vec::new(), Vec::new());
     if let Some(spectrum) = spectrum {
         let order: Vec<f64> = spectrum.order.iter().copied().map(f64::from).collect();
-        let points = |name, values: &[f64], role| {
-            let (x, y) = order.iter().zip(values).filter(|(_, value)| **value >= LEAST_UM).unzip();
-            Item::Points { name, x, y, role }
-        };
-        bars.push(points("ring_before", &spectrum.start_um, Role::Before));
-        bars.push(points("ring_after", &spectrum.end_um, Role::After));
+        let waves = |name, values: &[f64], role| Item::Bars { name, x: order.clone(), y: above_rounding(values), role };
+        bars.push(waves("ring_before", &spectrum.start_um, Role::Before));
+        bars.push(waves("ring_after", &spectrum.end_um, Role::After));
     }
     if let Some(linear) = &outcome.linear_theory {
         let order: Vec<f64> = linear.orders.iter().map(|o| f64::from(o.order)).collect();
@@ -203,10 +200,12 @@ fn spectrum(spectrum: Option<&SpectrumColumns>, outcome: &Outcome) -> Vec<Panel>
         factors.push(Item::Bars { name: "factor_per_revolution", x: order, y: factor, role: Role::Plain });
         factors.push(line("neutral", &ends, &[1.0, 1.0], Role::Limit));
     }
-    vec![
-        Panel { y: Axis::logarithmic("amplitude", "um"), height: 1.0, items: bars },
-        Panel { y: Axis::linear("factor_per_revolution", "1"), height: 0.7, items: factors },
-    ]
+    let mut panels = vec![Panel { y: Axis::logarithmic("amplitude", "um"), height: 1.0, items: bars }];
+    // Without the theory its panel would only take room.
+    if !factors.is_empty() {
+        panels.push(Panel { y: Axis::linear("factor_per_revolution", "1"), height: 0.7, items: factors });
+    }
+    panels
 }
 
 fn map(map: Option<&MapOutcome>) -> Vec<Panel> {
@@ -219,9 +218,10 @@ fn map(map: Option<&MapOutcome>) -> Vec<Panel> {
             values,
             diverging,
         };
-        // The logarithm: growth and decay weigh alike.
-        let ln = map.worst_factor_per_revolution.iter().map(|factor| factor.map(f64::ln)).collect();
-        growth.push(heat(Axis::linear("growth_per_revolution", "1"), ln, true));
+        // By its logarithm: growth and decay weigh alike. What is gone within the revolution has none.
+        let positive = |values: &[Option<f64>]| values.iter().map(|value| value.filter(|v| *v > 0.0)).collect();
+        let factors = positive(&map.worst_factor_per_revolution);
+        growth.push(heat(Axis::logarithmic("growth_per_revolution", "1"), factors, true));
         let here = |items: &mut Vec<Item>| {
             items.push(Item::Points {
                 name: "this_setting",
@@ -232,8 +232,8 @@ fn map(map: Option<&MapOutcome>) -> Vec<Panel> {
         };
         here(&mut growth);
         // Near the edge of decay the revolutions go to infinity: their logarithm shows the rest, too.
-        let values = map.revolutions_to_target.iter().map(|turns| turns.map(f64::log10)).collect();
-        revolutions.push(heat(Axis::linear("revolutions_to_target", "1"), values, false));
+        let values = positive(&map.revolutions_to_target);
+        revolutions.push(heat(Axis::logarithmic("revolutions_to_target", "1"), values, false));
         here(&mut revolutions);
     }
     vec![

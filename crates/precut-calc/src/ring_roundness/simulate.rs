@@ -9,8 +9,10 @@ use super::input::{ErrorEstimate, Job, Method};
 use super::linear::grows;
 use super::lobing::{Lobing, of_order};
 use super::output::{
-    CausesOutcome, HistoryColumns, PathColumns, ProfileColumns, SimulationOutcome, SpectrumColumns, WaveColumn,
+    CausesOutcome, HistoryColumns, PathColumns, ProfileColumns, ReplayOutcome, SimulationOutcome, SpectrumColumns,
+    WaveColumn,
 };
+use super::replay::Recorder;
 use super::sampling::{samples_for_teeth, samples_of};
 use super::scene::{Scene, mirrored_rad};
 use super::stance::Stance;
@@ -67,6 +69,7 @@ pub(super) struct Run {
     pub uncut_share: f64,
     pub blank_mm: Vec<f64>,
     pub history: HistoryColumns,
+    pub replay: Option<ReplayOutcome>,
 }
 
 /// Runs the exact method with `n` nodes; `with_history` also follows the surface.
@@ -81,6 +84,8 @@ pub(super) fn run_exact(
     let blank = scene.blank_mm(job, n as usize).map_err(unevaluable)?;
     let grid = Grid::new(n as usize).map_err(unevaluable)?;
     let mut follower = Follower::new(total);
+    let frames = if with_history { job.replay_frames } else { 0 };
+    follower.recorder = Recorder::new(scene, frames, total);
     let turned = turn::<Failure>(&blank, &scene.setting, &mut |revolution, radii| {
         checkpoint(share.monitor)?;
         let done = revolution.turned_revolutions;
@@ -102,6 +107,7 @@ pub(super) fn run_exact(
         turned: Turned { radii_mm: radii, ..turned },
         blank_mm,
         history: follower.columns,
+        replay: follower.recorder.map(|recorder| recorder.replay(n as usize)),
     })
 }
 
@@ -110,8 +116,9 @@ fn stage(done: f64, total: f64) -> Message {
 }
 
 /// Follows the surface revolution by revolution.
-struct Follower {
+struct Follower<'s> {
     columns: HistoryColumns,
+    recorder: Option<Recorder<'s>>,
     every: u64,
     seen: u64,
     total: f64,
@@ -120,11 +127,12 @@ struct Follower {
     since: f64,
 }
 
-impl Follower {
+impl Follower<'_> {
     fn new(total: f64) -> Self {
         let waves = (2..=FOLLOWED).map(|order| WaveColumn { order, amplitude_um: Vec::new() }).collect();
         Self {
             columns: HistoryColumns { waves, ..HistoryColumns::default() },
+            recorder: None,
             every: every(total),
             seen: 0,
             total,
@@ -140,6 +148,9 @@ impl Follower {
         self.cutting += revolution.cutting_share;
         self.since += 1.0;
         let last = revolution.turned_revolutions > self.total - 1.5 / radii.len() as f64;
+        if let Some(recorder) = &mut self.recorder {
+            recorder.see((self.seen, last), revolution.turned_revolutions, radii, grid)?;
+        }
         if !self.seen.is_multiple_of(self.every) && !last {
             return Ok(());
         }
@@ -202,6 +213,7 @@ fn exact(job: &Job, scene: &Scene, end: &Stance, share: Share<'_>) -> Result<Sim
         profile: profile(job, &main.blank_mm, &main.start, Some((&main.turned.radii_mm, &main.surface))),
         centre_path: path(&main.turned.path, scene.mirrored),
         history: main.history,
+        replay: main.replay,
         exact_contact: None,
     })
 }
@@ -258,6 +270,7 @@ fn nearest(job: &Job, scene: &Scene, end: &Stance, share: Share<'_>) -> Result<S
         profile: profile(job, &blank_mm, &start, after),
         centre_path: PathColumns::default(),
         history: HistoryColumns::default(),
+        replay: None,
         exact_contact: Some(exact.surface.evaluated.clone()),
         end: surface.map(|surface| surface.evaluated),
     })
