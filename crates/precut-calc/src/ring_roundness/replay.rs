@@ -48,6 +48,10 @@ impl<'s> Recorder<'s> {
         if !seen.is_multiple_of(self.every) && !is_last {
             return Ok(());
         }
+        // A run may end a node behind a whole revolution: that is the same frame.
+        if is_last && self.frames.last().is_some_and(|frame| turned - frame.revolution < 2.0 / radii_mm.len() as f64) {
+            self.frames.pop();
+        }
         let radii_mm = self.scene.unmirrored(radii_mm.to_vec());
         let section = grid.section(&radii_mm).map_err(unevaluable)?;
         let circle = least_squares(&section).map_err(unevaluable)?.circle;
