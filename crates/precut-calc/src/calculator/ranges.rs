@@ -14,10 +14,10 @@ pub struct ConditionRange {
     #[schema(max_length = 64, example = "depth_mm")]
     pub condition: String,
     /// Least value, in the unit of the condition.
-    #[schema(minimum = 0.0, maximum = 1e9, example = 0.3, extensions(("x-unit" = json!("as condition says"))))]
+    #[schema(minimum = 0.0, maximum = 1e9, example = 0.3, extensions(("x-symbol" = json!("c_min")), ("x-unit" = json!("as condition says"))))]
     pub from: f64,
     /// Largest value, in the unit of the condition.
-    #[schema(exclusive_minimum = 0.0, maximum = 1e9, example = 2.0, extensions(("x-unit" = json!("as condition says"))))]
+    #[schema(exclusive_minimum = 0.0, maximum = 1e9, example = 2.0, extensions(("x-symbol" = json!("c_max")), ("x-unit" = json!("as condition says"))))]
     pub to: f64,
 }
 

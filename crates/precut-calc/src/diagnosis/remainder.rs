@@ -89,12 +89,22 @@ fn step(weighing: &Weighing<'_>, left: &[f64], kept: &[usize]) -> Option<Step> {
     tried.filter_map(of_place).max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))
 }
 
+/// A common shape in one run.
+struct RunSize {
+    /// Root mean square of what the base predicts there.
+    base: f64,
+    /// How large the shape is.
+    size: f64,
+    /// Mean square of the shape times the rows.
+    weight: f64,
+}
+
 /// Regression of the size of a common shape in every run, a_i, on what the base predicts there, F_i:
 /// a_i = a (1 + p (F_i/F - 1)), F the mean of F_i; p and its standard deviation.
 fn with_base(weighing: &Weighing<'_>, left: &[f64], shape: &[f64], kept: &[usize]) -> Option<(f64, f64)> {
     let foundation = weighing.foundation;
-    let mut runs: Vec<(f64, f64, f64, f64)> = Vec::new();
-    for run in 0..foundation.data.layout.run_of_trace.iter().max()? + 1 {
+    let mut runs: Vec<RunSize> = Vec::new();
+    for run in 0..=*foundation.data.layout.run_of_trace.iter().max()? {
         let rows: Vec<usize> = weighing.rows_of_run(run).into_iter().filter(|row| kept.contains(row)).collect();
         let sum = |of: &dyn Fn(usize) -> f64| rows.iter().map(|&row| of(row)).sum::<f64>();
         // Set-ups differ from run to run: levels are taken out.
@@ -106,17 +116,18 @@ fn with_base(weighing: &Weighing<'_>, left: &[f64], shape: &[f64], kept: &[usize
         }
         let size = sum(&|row| (shape[row] - mean_shape) * (left[row] - mean_left)) / square;
         let base = (sum(&|row| foundation.base[row].powi(2)) / count).sqrt();
-        runs.push((base, size, square, count));
+        runs.push(RunSize { base, size, weight: square });
     }
-    let weight: f64 = runs.iter().map(|run| run.2).sum();
-    let mean = |of: &dyn Fn(&(f64, f64, f64, f64)) -> f64| runs.iter().map(|run| run.2 * of(run)).sum::<f64>() / weight;
-    let (base, size) = (mean(&|run| run.0), mean(&|run| run.1));
-    let spread: f64 = runs.iter().map(|run| run.2 * (run.0 / base - 1.0).powi(2)).sum();
+    let weight: f64 = runs.iter().map(|run| run.weight).sum();
+    let mean = |of: fn(&RunSize) -> f64| runs.iter().map(|run| run.weight * of(run)).sum::<f64>() / weight;
+    let (base, size) = (mean(|run| run.base), mean(|run| run.size));
+    let spread: f64 = runs.iter().map(|run| run.weight * (run.base / base - 1.0).powi(2)).sum();
     // Bases that differ by less than a tenth say nothing.
     if runs.len() < 3 || base <= 0.0 || size.abs() <= 0.0 || spread < 0.01 * weight {
         return None;
     }
-    let slope = runs.iter().map(|run| run.2 * (run.0 / base - 1.0) * (run.1 - size)).sum::<f64>() / spread;
+    let along = |run: &RunSize| run.weight * (run.base / base - 1.0) * (run.size - size);
+    let slope = runs.iter().map(along).sum::<f64>() / spread;
     Some((slope / size, weighing.noise.sigma / spread.sqrt() / size.abs()))
 }
 

@@ -163,7 +163,8 @@ pub(super) fn response<const N: usize>(
     Ok(elements.record(&start, &known, hardening))
 }
 
-/// Steps per tooth pitch, first and most tooth periods of a run that is to settle, and how well.
+/// Steps per tooth pitch, first and most tooth periods of a run that is to settle, and how well. A run that has not come to rest
+/// says by its decay how long the next must be.
 const SETTLING_STEPS: f64 = 400.0;
 const FIRST_PERIODS: usize = 160;
 const MOST_PERIODS: usize = 5120;
@@ -180,6 +181,7 @@ fn settled<const N: usize>(
     let highest = holding.modes().last().map_or(0.0, |mode| mode.natural_hz);
     let steps = count((80.0 * highest * cutting.tooth_period_s(working.spindle_rpm)).clamp(SETTLING_STEPS, 8000.0));
     let mut periods = FIRST_PERIODS;
+    let mut decayed = true;
     while periods <= MOST_PERIODS {
         let whole = periods.div_ceil(cutting.teeth).max(3) * cutting.teeth;
         let plan = Plan {
@@ -197,17 +199,36 @@ fn settled<const N: usize>(
         if run.diverged {
             return Ok(None);
         }
-        let (last, before) = (whole - cutting.teeth, whole - 2 * cutting.teeth);
-        let change = (0..cutting.teeth)
-            .map(|i| (run.samples_mm[last + i] - run.samples_mm[before + i]).abs())
-            .fold(0.0, f64::max);
-        if change <= AT_REST * working.feed_mm {
+        // From one revolution to the next, after so many.
+        let change = |revolutions: usize| {
+            let (last, before) = ((revolutions - 1) * cutting.teeth, (revolutions - 2) * cutting.teeth);
+            (0..cutting.teeth)
+                .map(|i| (run.samples_mm[last + i] - run.samples_mm[before + i]).abs())
+                .fold(0.0, f64::max)
+        };
+        let revolutions = whole / cutting.teeth;
+        let (half, now, rest) = ((revolutions / 2).max(2), change(revolutions), AT_REST * working.feed_mm);
+        if now <= rest {
             return Ok(Some(of_run(cutting, working, &run)));
         }
-        periods *= 4;
+        let decay = (change(half) / now).ln() / (revolutions - half).max(1) as f64;
+        if decay > SLOWEST_DECAY {
+            decayed = true;
+            // A tenth more: two modes may beat.
+            periods = whole + count(1.1 * (now / rest).ln() / decay + 2.0) * cutting.teeth;
+        } else if decayed {
+            // A hard entry may hide it once.
+            decayed = false;
+            periods *= 4;
+        } else {
+            break;
+        }
     }
     Ok(None)
 }
+
+/// Decay per revolution below which a run settles in no reasonable time: a factor of e in a thousand revolutions.
+const SLOWEST_DECAY: f64 = 1e-3;
 
 /// The last revolution of a settled run.
 fn of_run(cutting: &Cutting, working: Working, run: &Marched) -> Response {
