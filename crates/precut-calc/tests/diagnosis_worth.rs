@@ -303,8 +303,12 @@ fn next_runs_keep_to_the_ranges_that_are_stated() {
 fn rows_far_away_in_great_number_count_little_and_the_cause_is_found_beside_them() {
     // A taper; and every eleventh row reads 12 um too much or too little.
     let far = |place: f64, sweep: usize| {
-        let number = ((place - 15.0 / 570.0) * 59.0 * 570.0 / 540.0).round() as usize + 4 * sweep;
-        if number.is_multiple_of(11) { if number.is_multiple_of(2) { 12.0 } else { -12.0 } } else { 0.0 }
+        let number = ((place - 15.0 / 570.0) * 59.0 * 570.0 / 540.0).round() + 4.0 * sweep as f64;
+        match (number % 11.0 < 0.5, number % 2.0 < 0.5) {
+            (true, true) => 12.0,
+            (true, false) => -12.0,
+            _ => 0.0,
+        }
     };
     let value = measured_on(headstock(), (3, 60), 31, |_, place, sweep, _| 16.0 * place + far(place, sweep));
     let answer = answered(&value);

@@ -85,7 +85,7 @@ impl<M: Diagnosable> Calculator for Diagnosis<M> {
         let runs = if job.runs.is_empty() { vec![M::Run::default()] } else { job.runs.clone() };
         let run_of = |row: usize| rows[row].run() as usize - 1;
         let points = used.iter().zip(&readings).map(|(&row, reading)| (run_of(row), reading.point.clone())).collect();
-        let places: Rows<M::Run, M::Point> = Rows { points, runs };
+        let places: Rows<M::Run, M::Point> = Rows { runs, points };
         let prepared =
             M::prepare(&job.job, &places, &job.quantity, monitor).map_err(|error| unprepared(error, &used))?;
         let design = M::design(&prepared);

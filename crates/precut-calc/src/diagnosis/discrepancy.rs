@@ -188,6 +188,9 @@ pub(super) fn beside(
     best.map(|(_, remainder)| Remainder { log_z: log_mean_exp(&all), ..remainder })
 }
 
+/// Evidence with all columns scaled by what is given, and the sizes found.
+type Explained<'a> = Box<dyn Fn(&[f64]) -> Option<(f64, Vec<f64>)> + 'a>;
+
 impl Kind {
     /// Evidence of causes and of this remainder with all columns scaled, and the sizes found.
     fn explained<'a>(
@@ -197,7 +200,7 @@ impl Kind {
         residual: &'a White,
         sides: &'a [Side],
         likelihood: &'a Likelihood,
-    ) -> Box<dyn Fn(&[f64]) -> Option<(f64, Vec<f64>)> + 'a> {
+    ) -> Explained<'a> {
         if let Likelihood::Gaussian { whitener, scale } = likelihood {
             let joint = self.joined(own, columns, residual);
             return Box::new(move |scales| scaled_evidence(&joint, scales, sides, *scale, whitener.rows()));

@@ -239,8 +239,7 @@ impl PreparedFixture {
         cells.dedup();
         let (groups, cells) = (self.groups.len() as f64, cells.len() as f64);
         match self.measure {
-            Measure::PeakToPeak => FORCED_MS * groups + (MULTIPLIER_MS + NOT_LINEAR_MS) * cells,
-            Measure::Regime => FORCED_MS * groups + (MULTIPLIER_MS + NOT_LINEAR_MS) * cells,
+            Measure::PeakToPeak | Measure::Regime => FORCED_MS * groups + (MULTIPLIER_MS + NOT_LINEAR_MS) * cells,
             Measure::DepthLimit => LIMIT_MS * cells,
             Measure::Displacement => (FORCED_MS + MULTIPLIER_MS) * cells + KEPT_STEP_MS * self.steps(),
         }
