@@ -19,8 +19,11 @@ const ONE_IN: usize = 20;
 pub struct Outliers {
     /// Their numbers, worst first.
     pub rows: Vec<usize>,
-    /// Where there are too many to be called outliers none is left out: standard deviation of every row under scatter with
-    /// heavy tails, that of a row far from its trace being large.
+    /// Whether there are too many to be called outliers: then none is left out.
+    pub too_many: bool,
+    /// Of too many along sweeps: standard deviation of every row under scatter with heavy tails, that of a row far from its
+    /// sweep being large. `None` for rows without an order: there nothing tells a blunder from an island that the model
+    /// lacks, and what is weighed down is not found.
     pub heavy_tails: Option<Vec<f64>>,
 }
 
@@ -28,7 +31,7 @@ impl Outliers {
     /// Which rows stay.
     pub fn keep(&self, rows: usize) -> Vec<bool> {
         let mut keep = vec![true; rows];
-        if self.heavy_tails.is_none() {
+        if !self.too_many {
             self.rows.iter().for_each(|&row| keep[row] = false);
         }
         keep
@@ -48,12 +51,12 @@ pub(super) fn outliers(data: &Data, residual: &[f64]) -> Outliers {
             .iter()
             .map(|rows| {
                 let count = smooth_order(&data.layout.design.smooth, rows.len());
-                Fit::of(rows, smooth_columns(&data.layout.design.smooth, rows, count), residual)
+                Fit::of(rows, smooth_columns(&data.layout.design.smooth, rows, count), residual, None)
             })
             .collect()
     } else {
         let rows: Vec<usize> = (0..residual.len()).collect();
-        vec![Fit::of(&rows, data.layout.design.regressors.clone(), residual)]
+        vec![Fit::of(&rows, data.layout.design.regressors.clone(), residual, Some(&data.layout.design.cell))]
     };
     let mut flagged = Vec::new();
     let most = (residual.len() / ONE_IN).max(1);
@@ -72,18 +75,19 @@ pub(super) fn outliers(data: &Data, residual: &[f64]) -> Outliers {
             break;
         }
         let fit = &mut traces[trace];
-        if fit.stands_alone(place, AT_PEACE * spread, ordered) {
+        if fit.stands_alone(place, AT_PEACE * spread) {
             flagged.push(fit.rows[place]);
             fit.out[place] = true;
             fit.refit();
             if flagged.len() > most {
-                return Outliers { rows: flagged, heavy_tails: Some(heavy_tails(&traces, residual.len())) };
+                let heavy_tails = ordered.then(|| heavy_tails(&traces, residual.len()));
+                return Outliers { rows: flagged, too_many: true, heavy_tails };
             }
         } else {
             fit.structure[place] = true;
         }
     }
-    Outliers { rows: flagged, heavy_tails: None }
+    Outliers { rows: flagged, too_many: false, heavy_tails: None }
 }
 
 /// Degrees of freedom of scatter with heavy tails.
@@ -148,6 +152,8 @@ struct Fit {
     rows: Vec<usize>,
     columns: Vec<Vec<f64>>,
     value: Vec<f64>,
+    /// Condition of every row, for rows without an order: those with one condition are repeats.
+    cell: Option<Vec<usize>>,
     /// Taken out.
     out: Vec<bool>,
     /// Looked at, and found to be part of a structure.
@@ -157,13 +163,14 @@ struct Fit {
 }
 
 impl Fit {
-    fn of(rows: &[usize], columns: Vec<Vec<f64>>, residual: &[f64]) -> Self {
+    fn of(rows: &[usize], columns: Vec<Vec<f64>>, residual: &[f64], cell: Option<&[usize]>) -> Self {
         let value: Vec<f64> = rows.iter().map(|&row| residual[row]).collect();
         let count = rows.len();
         let mut fit = Self {
             rows: rows.to_vec(),
             columns,
             value,
+            cell: cell.map(|cell| rows.iter().map(|&row| cell[row]).collect()),
             out: vec![false; count],
             structure: vec![false; count],
             t: vec![0.0; count],
@@ -188,10 +195,12 @@ impl Fit {
             .max_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    /// Whether, with this row out, its neighbours in measuring order fit.
-    fn stands_alone(&self, place: usize, peace: f64, ordered: bool) -> bool {
-        if !ordered {
-            return true;
+    /// Whether, with this row out, its neighbours in measuring order fit. Of rows without an order: whether no repeat lies
+    /// where it lies, for repeats that agree are witnesses, however far the regression runs from them.
+    fn stands_alone(&self, place: usize, peace: f64) -> bool {
+        if let Some(cell) = &self.cell {
+            let agrees = |i: usize| cell[i] == cell[place] && (self.value[i] - self.value[place]).abs() < peace;
+            return !(0..cell.len()).any(|i| i != place && !self.out[i] && agrees(i));
         }
         let mut out = self.out.clone();
         out[place] = true;

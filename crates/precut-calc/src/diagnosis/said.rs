@@ -101,8 +101,13 @@ fn odd_rows(leave_out: bool, weighing: &Weighing<'_>, found: &Outliers, used: &[
     if missing > 0 {
         warnings.push(Finding::new("rows_not_predicted", "/measurements").with("count", missing));
     }
-    if found.heavy_tails.is_some() {
-        warnings.push(Finding::new("too_many_outliers", "/measurements").with("count", found.rows.len()));
+    if found.too_many {
+        let weighed = u8::from(leave_out && found.heavy_tails.is_some());
+        warnings.push(
+            Finding::new("too_many_outliers", "/measurements")
+                .with("count", found.rows.len())
+                .with("weighed", f64::from(weighed)),
+        );
     } else if leave_out && !found.rows.is_empty() {
         let rows: Vec<usize> = found.rows.iter().map(|&row| used[row] + 1).collect();
         warnings.push(Finding::new("outliers_left_out", "/measurements").with("count", rows.len()).with("rows", rows));
