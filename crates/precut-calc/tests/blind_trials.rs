@@ -13,7 +13,7 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use precut_calc::calculator::{Calculator, Check, Diagnosable, Unwatched, Violations};
-use precut_calc::diagnosis::{Diagnosis, NamedCause, ResultOf, VerdictClass};
+use precut_calc::diagnosis::{Diagnosis, NamedCause, ResultOf};
 use precut_trials::score::{Said, Score};
 use precut_trials::{Class, Trial};
 use serde_json::json;
@@ -51,7 +51,7 @@ fn answer<M: Diagnosable>(trial: &Trial) -> Said {
     }
     let first = result.sets.iter().find(|set| !set.causes.is_empty() && !set.with_remainder);
     Said {
-        verdict: verdict(result.verdict).to_owned(),
+        verdict: result.verdict.name().to_owned(),
         named: kinds(&result.named),
         likely: result.likely_sets.iter().map(|set| kinds(&set.causes)).collect(),
         first: first.map_or_else(Vec::new, |set| kinds(&set.causes)),
@@ -74,16 +74,6 @@ fn kinds(causes: &[NamedCause]) -> Vec<String> {
     causes.iter().map(|cause| cause.kind.clone()).collect()
 }
 
-fn verdict(class: VerdictClass) -> &'static str {
-    match class {
-        VerdictClass::Adequate => "adequate",
-        VerdictClass::Named => "named",
-        VerdictClass::Confounded => "confounded",
-        VerdictClass::Unknown => "unknown",
-        VerdictClass::Refused => "refused",
-    }
-}
-
 fn talk<M: Diagnosable>(trial: &Trial, result: &ResultOf<M>) {
     let each = |cause: &NamedCause| {
         let values: Vec<String> = cause.parameters.iter().map(|p| format!("{:.4}", p.value)).collect();
@@ -94,7 +84,7 @@ fn talk<M: Diagnosable>(trial: &Trial, result: &ResultOf<M>) {
         trial.truth.causes,
         trial.sigma,
         result.noise.standard_deviation,
-        verdict(result.verdict)
+        result.verdict.name()
     );
     for set in result.sets.iter().take(4) {
         let rest = if set.with_remainder { "+rest" } else { "" };

@@ -284,7 +284,9 @@ fn next_runs_keep_to_the_ranges_that_are_stated() {
     // Faults of ranges and weights are told with all others.
     let mut wrong = value;
     wrong["options"] = json!({ "ranges": [{ "condition": "coolant", "from": 1.0, "to": 0.5 }],
-                               "prior_weights": [{ "kind": "gremlins", "weight": 2.0 }] });
+                               "prior_weights": [{ "kind": "gremlins", "weight": 2.0 },
+                                                 { "kind": "tool_wear", "weight": 2.0 },
+                                                 { "kind": "tool_wear", "weight": 3.0 }] });
     let wrong: <Diagnosis<DeflectionCompensation> as Calculator>::Input = serde_json::from_value(wrong).unwrap();
     let mut violations = Violations::default();
     wrong.check(&mut violations);
@@ -293,6 +295,7 @@ fn next_runs_keep_to_the_ranges_that_are_stated() {
         found,
         [
             ("unknown_cause", "/options/prior_weights/0/kind".to_owned()),
+            ("duplicate_items", "/options/prior_weights".to_owned()),
             ("unknown_condition", "/options/ranges/0/condition".to_owned()),
             ("range_reversed", "/options/ranges/0/to".to_owned()),
         ]

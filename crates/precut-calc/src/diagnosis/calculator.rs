@@ -131,6 +131,7 @@ pub(super) const FAULT_CODES: &[&str] = &[
     "unknown_cause",
     "unknown_condition",
     "range_reversed",
+    "duplicate_items",
 ];
 
 /// The first reason; a row by its number in the job, where rows without a value count, too.
@@ -255,6 +256,15 @@ where
         violations.require(causes.iter().any(|cause| cause.kind == kind), || {
             let known: Vec<&'static str> = causes.iter().map(|cause| cause.kind).collect();
             Finding::new("unknown_cause", pointer).with("kind", kind.clone()).with("known", known)
+        });
+    }
+    let mut kinds: Vec<&str> = options.prior_weights.iter().map(|weight| weight.kind.as_str()).collect();
+    let mut conditions: Vec<&str> = options.ranges.iter().map(|range| range.condition.as_str()).collect();
+    // Of two for one name only the first could count.
+    for (field, names) in [("prior_weights", &mut kinds), ("ranges", &mut conditions)] {
+        names.sort_unstable();
+        violations.require(names.windows(2).all(|pair| pair[0] != pair[1]), || {
+            Finding::new("duplicate_items", format!("/options/{field}"))
         });
     }
     for (index, range) in options.ranges.iter().enumerate() {

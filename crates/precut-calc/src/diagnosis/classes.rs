@@ -86,6 +86,7 @@ pub(super) fn report<M: Diagnosable>(
     extended: Option<&[Prediction]>,
     effects: &[M::Effect],
     gain: Option<&Gain>,
+    seed: u64,
 ) -> Result<Option<ClassReport>, Failure> {
     let foundation = weighing.foundation;
     let Some(sides) = &foundation.data.sides else { return Ok(None) };
@@ -117,14 +118,14 @@ pub(super) fn report<M: Diagnosable>(
         probability_extended: probability(&with),
         share_right_base: right(&base),
         share_right_extended: right(&with),
-        held_out: gain.map(|gain| held_out(weighing, sides, gain)),
+        held_out: gain.map(|gain| held_out(weighing, sides, gain, seed)),
         limits_base: places.curves,
         limits_extended,
     }))
 }
 
 /// From what every held-back row left: minus the margin, as the boundary stands for its value.
-fn held_out(weighing: &Weighing<'_>, sides: &[f64], gain: &Gain) -> ClassHeldOut {
+fn held_out(weighing: &Weighing<'_>, sides: &[f64], gain: &Gain, seed: u64) -> ClassHeldOut {
     let fold = &weighing.foundation.data.layout.design.fold;
     let folds: Vec<usize> = (0..fold.iter().copied().max().map_or(0, |most| most + 1))
         .filter(|f| fold.iter().zip(&weighing.keep).any(|(of, keep)| of == f && *keep))
@@ -145,7 +146,7 @@ fn held_out(weighing: &Weighing<'_>, sides: &[f64], gain: &Gain) -> ClassHeldOut
         [sum[0] / sum[2], sum[1] / sum[2]]
     };
     let [base, extended] = mean(&mut (0..sums.len()));
-    let mut random = Pcg64::seed_from_u64(1);
+    let mut random = Pcg64::seed_from_u64(seed);
     let mut gains: Vec<f64> = (0..RESAMPLES)
         .map(|_| {
             let [base, extended] = mean(&mut (0..sums.len()).map(|_| random.random_range(0..sums.len())));

@@ -54,9 +54,10 @@ pub(super) fn answer<M: Diagnosable>(
     };
     let weighing = Weighing::of(&foundation, keep, effort, monitor)?;
     let refusal = refusal::<M>(job, &foundation, &weighing);
+    let seed = u64::from(job.options.seed);
     let gain = if job.options.held_out && refusal.is_none() {
         stage(monitor, 0.5, "diagnosis_stage_gain");
-        gain(&foundation, &weighing, fold_effort, true, u64::from(job.options.seed), monitor)?
+        gain(&foundation, &weighing, fold_effort, true, seed, monitor)?
     } else {
         None
     };
@@ -79,7 +80,8 @@ pub(super) fn answer<M: Diagnosable>(
         if refusal.is_none() { view.contributions(job.options.negligible_below)? } else { (Vec::new(), None) };
     let mut warnings = warnings(&job.options, &weighing, &found, used, refusal.is_none(), gain.is_some());
     let (signatures, separations) = view.signatures()?;
-    let classes = classes::report(bound, &weighing, measured, extended.prediction.as_deref(), &effects, gain.as_ref())?;
+    let with = extended.prediction.as_deref();
+    let classes = classes::report(bound, &weighing, measured, with, &effects, gain.as_ref(), seed)?;
     // Of classes a root mean square means nothing.
     let gain = gain.filter(|_| classes.is_none());
     let output = DiagnosisResult {

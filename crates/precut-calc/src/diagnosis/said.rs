@@ -161,7 +161,7 @@ pub(super) fn doubts<E: utoipa::ToSchema, R: utoipa::ToSchema>(output: &Diagnosi
         Finding::new("outlying_run", format!("/runs/{}", odd.run.saturating_sub(1)))
             .value(odd.misfit_per_row, "1")
             .with("run", f64::from(odd.run))
-            .with("verdict", class_name(odd.verdict_without))
+            .with("verdict", odd.verdict_without.name())
             .with("sets", odd.sets_without.clone())
     }));
     doubts.extend(disagreement(output));
@@ -186,16 +186,6 @@ fn disagreement<E: utoipa::ToSchema, R: utoipa::ToSchema>(output: &DiagnosisResu
             .with("bic", kinds(&by_bic.causes))
             .with("held_out", kinds(&by_held_out.causes))
     })
-}
-
-fn class_name(class: VerdictClass) -> &'static str {
-    match class {
-        VerdictClass::Adequate => "adequate",
-        VerdictClass::Named => "named",
-        VerdictClass::Confounded => "confounded",
-        VerdictClass::Unknown => "unknown",
-        VerdictClass::Refused => "refused",
-    }
 }
 
 /// Most important first: the verdict, then the gain.
