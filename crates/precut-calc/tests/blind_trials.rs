@@ -8,9 +8,14 @@
 //! - `PRECUT_TRIAL_GAIN=1`: the gain on data held back, too, which takes many times as long;
 //! - `PRECUT_TRIAL_TALK=1`: what every answer says.
 //!
+//! The draws that stand in the tests are kept with their confusion matrices in `tests/trials`: a change that moves an answer is
+//! seen there. `PRECUT_WRITE_TRIALS=1` writes them anew.
+//!
 //! `PRECUT_TRIALS=300 PRECUT_TRIAL_SEED=12345 cargo test --release -p precut-calc diagnosis_trials -- --nocapture`
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
+
+use std::path::Path;
 
 use precut_calc::calculator::{Calculator, Check, Diagnosable, Unwatched, Violations};
 use precut_calc::diagnosis::{Diagnosis, NamedCause, ResultOf};
@@ -19,18 +24,45 @@ use precut_trials::{Class, Trial};
 use serde_json::json;
 
 /// Draws trial number `seed` of a class at a ratio of signal to noise.
-type Draw = fn(Class, f64, u64) -> Trial;
+pub(crate) type Draw = fn(Class, f64, u64) -> Trial;
+
+/// What is hidden: how, how strongly, from which seed, and how many times.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Trials {
+    /// Name of the file that keeps the score.
+    pub(crate) name: &'static str,
+    pub(crate) draw: Draw,
+    pub(crate) class: Class,
+    pub(crate) snr: f64,
+    pub(crate) seed: u64,
+    pub(crate) count: u64,
+}
 
 /// The score of the diagnosis of `M` on so many draws; printed with its confusion matrix.
-pub(crate) fn score<M: Diagnosable>(draw: Draw, class: Class, snr: f64, seed: u64, count: u64) -> Score {
-    let (seed, count) = (number("PRECUT_TRIAL_SEED", seed), number("PRECUT_TRIALS", count));
+pub(crate) fn score<M: Diagnosable>(trials: Trials) -> Score {
+    let Trials { name, draw, class, snr, .. } = trials;
+    let (seed, count) = (number("PRECUT_TRIAL_SEED", trials.seed), number("PRECUT_TRIALS", trials.count));
     let mut score = Score::default();
     for k in 0..count {
         let trial = draw(class, snr, seed.wrapping_mul(1_000_003).wrapping_add(k));
         score.add(&trial.truth, &answer::<M>(&trial));
     }
-    println!("{}: {class:?}, signal to noise {snr}, {count} draws from seed {seed}\n{score}", M::META.id);
+    let text = format!("{}: {class:?}, signal to noise {snr}, {count} draws from seed {seed}\n{score}", M::META.id);
+    println!("{text}");
+    if (seed, count) == (trials.seed, trials.count) && std::env::var("PRECUT_TRIAL_GAIN").is_err() {
+        keep(name, &text);
+    }
     score
+}
+
+/// Compares with the score that is kept under a name, or keeps this one.
+fn keep(name: &str, text: &str) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/trials").join(name).with_extension("txt");
+    if std::env::var_os("PRECUT_WRITE_TRIALS").is_some() {
+        std::fs::write(&path, text).unwrap();
+    }
+    let kept = std::fs::read_to_string(&path).unwrap_or_default();
+    assert_eq!(kept, text, "{} is another: see what moved, then PRECUT_WRITE_TRIALS=1", path.display());
 }
 
 fn number(name: &str, default: u64) -> u64 {

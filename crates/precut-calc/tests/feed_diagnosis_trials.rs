@@ -5,21 +5,21 @@ use precut_calc::feed_schedule::FeedSchedule;
 use precut_trials::score::Score;
 use precut_trials::{Class, machinability};
 
-use crate::blind_trials;
+use crate::blind_trials::{self, Trials};
 
-fn score(class: Class, snr: f64, seed: u64, count: u64) -> Score {
-    blind_trials::score::<FeedSchedule>(machinability::draw, class, snr, seed, count)
+fn score(name: &'static str, class: Class, snr: f64, seed: u64, count: u64) -> Score {
+    blind_trials::score::<FeedSchedule>(Trials { name, draw: machinability::draw, class, snr, seed, count })
 }
 
 #[test]
 fn nothing_hidden_raises_no_alarm() {
-    let score = score(Class::Nothing, 0.0, 1, 30);
+    let score = score("machinability-nothing", Class::Nothing, 0.0, 1, 30);
     assert!(score.quiet.reaches(0.99), "{}", score.quiet);
 }
 
 #[test]
 fn one_hidden_cause_is_named_right_or_not_at_all() {
-    let score = score(Class::One, 3.0, 2, 40);
+    let score = score("machinability-one", Class::One, 3.0, 2, 40);
     assert!(score.first_right.reaches(0.97), "{}", score.first_right);
     assert!(score.named_right.reaches(0.96), "{}", score.named_right);
     assert!(score.truth_listed.reaches(0.95), "{}", score.truth_listed);
@@ -28,13 +28,13 @@ fn one_hidden_cause_is_named_right_or_not_at_all() {
 
 #[test]
 fn two_hidden_causes_are_found() {
-    let score = score(Class::Two, 3.0, 3, 20);
+    let score = score("machinability-two", Class::Two, 3.0, 3, 20);
     assert!(score.pair_right.reaches(0.85), "{}", score.pair_right);
     assert!(score.truth_listed.reaches(0.85), "{}", score.truth_listed);
 }
 
 #[test]
 fn what_the_catalogue_lacks_is_unknown() {
-    let score = score(Class::Outside, 3.0, 4, 20);
+    let score = score("machinability-outside", Class::Outside, 3.0, 4, 20);
     assert!(score.unknown.reaches(0.93), "{}", score.unknown);
 }

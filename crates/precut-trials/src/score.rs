@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use statrs::distribution::{Beta, ContinuousCDF};
+
 use crate::{Class, Truth};
 
 /// What a diagnosis said of a trial.
@@ -49,9 +51,24 @@ impl Share {
     }
 }
 
+impl Share {
+    /// 95 % interval of the share after Clopper and Pearson.
+    pub fn interval_95(self) -> [f64; 2] {
+        let quantile = |a: usize, b: usize, p: f64| {
+            Beta::new(a as f64, b as f64).map_or(f64::NAN, |distribution| distribution.inverse_cdf(p))
+        };
+        let misses = self.of - self.hits;
+        let lower = if self.hits == 0 { 0.0 } else { quantile(self.hits, misses + 1, 0.025) };
+        let upper = if misses == 0 { 1.0 } else { quantile(self.hits + 1, misses, 0.975) };
+        [lower, upper]
+    }
+}
+
 impl std::fmt::Display for Share {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}/{} ({:.1} %)", self.hits, self.of, 100.0 * self.share())
+        let [lower, upper] = self.interval_95();
+        let percent = format!("{:.1} %, {:.1} to {:.1}", 100.0 * self.share(), 100.0 * lower, 100.0 * upper);
+        write!(f, "{}/{} ({percent})", self.hits, self.of)
     }
 }
 
@@ -154,5 +171,28 @@ impl std::fmt::Display for Score {
             writeln!(f, "  {:<42}{}", if truth.is_empty() { "(nothing)" } else { truth }, answers.join(", "))?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn intervals_are_those_of_clopper_and_pearson() {
+        // Closed forms where all or none hit: 1 - (0.025)^(1/n) from the end.
+        let [lower, upper] = Share { hits: 20, of: 20 }.interval_95();
+        assert!((lower - 0.025_f64.powf(0.05)).abs() < 1e-9 && upper >= 1.0, "{lower} {upper}");
+        let [lower, upper] = Share { hits: 0, of: 20 }.interval_95();
+        assert!(lower <= 0.0 && (upper - (1.0 - 0.025_f64.powf(0.05))).abs() < 1e-9, "{lower} {upper}");
+        // The definition: so few hits or fewer have the probability of 2.5 % at the upper end.
+        let [lower, upper] = Share { hits: 2, of: 10 }.interval_95();
+        let at_most = |hits: usize, p: f64| -> f64 {
+            let ways = [1.0, 10.0, 45.0];
+            let of = |(k, ways): (i32, &f64)| ways * p.powi(k) * (1.0 - p).powi(10 - k);
+            (0..).zip(&ways[..=hits]).map(of).sum()
+        };
+        assert!((at_most(2, upper) - 0.025).abs() < 1e-9, "{upper}");
+        assert!((1.0 - at_most(1, lower) - 0.025).abs() < 1e-9, "{lower}");
     }
 }
