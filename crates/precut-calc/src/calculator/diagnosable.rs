@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use utoipa::ToSchema;
 
 use super::{
-    Calculator, Consequence, Design, Example, Failure, ForwardModel, Hypotheses, Hypothesis, MeasuredRow, Prediction,
-    Ranges, Rows,
+    Calculator, Consequence, Design, Example, Expansions, Failure, ForwardModel, Hypotheses, Hypothesis, MeasuredRow,
+    Prediction, Ranges, Rows,
 };
 
 /// A calculator whose model can be compared with measurements, cause by cause.
@@ -20,6 +20,10 @@ pub trait Diagnosable:
 {
     /// A measured row: its place, its run, and the value under the name of its quantity.
     type Row: MeasuredRow + Measurement<Model = Self> + PartialEq + std::fmt::Debug;
+
+    /// Predictions of every run that a diagnosis makes, where they are dear: signatures, the sets refined, the next run, the
+    /// folds.
+    const PREDICTIONS: f64 = 300.0;
 
     /// Complete diagnoses that really run.
     const DIAGNOSES: &'static [Example];
@@ -71,10 +75,9 @@ pub trait Diagnosable:
         runs.clamp(1, 30)
     }
 
-    /// Values of a hypothesis' first size about which the model is linearised, too, beside 0: where what the size does is
-    /// far from proportional to it.
-    fn expansions(_prepared: &Self::Prepared, _hypothesis: &Hypothesis) -> Vec<f64> {
-        Vec::new()
+    /// Sizes of a hypothesis about which the model is linearised, too, beside 0.
+    fn expansions(_prepared: &Self::Prepared, _hypothesis: &Hypothesis) -> Expansions {
+        Expansions::default()
     }
 
     /// The prediction as divided differences need it: where a prediction is dear, with coarser numerics, whose own error

@@ -55,7 +55,60 @@ pub struct Hypothesis {
 impl Hypothesis {
     /// Whether it has a size of its own, rather than being there or not.
     pub fn has_amplitude(&self) -> bool {
-        self.variables.iter().any(|v| matches!(v.treatment, Treatment::Amplitude { .. }))
+        self.amplitudes().next().is_some()
+    }
+
+    /// Its sizes: index of the variable and standard deviation of its prior.
+    pub fn amplitudes(&self) -> impl Iterator<Item = (usize, f64)> {
+        self.variables.iter().enumerate().filter_map(|(index, variable)| match variable.treatment {
+            Treatment::Amplitude { prior_sd } => Some((index, prior_sd)),
+            _ => None,
+        })
+    }
+
+    /// Indices of its shapes.
+    pub fn shapes(&self) -> impl Iterator<Item = usize> {
+        let is_shape = |v: &Variable| matches!(v.treatment, Treatment::Shape { .. });
+        self.variables.iter().enumerate().filter(move |(_, v)| is_shape(v)).map(|(index, _)| index)
+    }
+
+    /// Indices of the shapes that are fitted beyond their grid, with the spacing of the grid.
+    pub fn fitted_shapes(&self) -> impl Iterator<Item = (usize, f64)> {
+        self.variables.iter().enumerate().filter_map(|(index, variable)| match &variable.treatment {
+            Treatment::Shape { grid, prior: Some(_) } => {
+                let ends = grid.first().zip(grid.last()).map_or(0.0, |(first, last)| last - first);
+                Some((index, ends / (grid.len().saturating_sub(1).max(1)) as f64))
+            }
+            _ => None,
+        })
+    }
+}
+
+/// Sizes of a hypothesis about which the model is linearised, too, beside 0: where what it does is far from proportional to
+/// them.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Expansions {
+    /// One value for every size of the hypothesis, in the order of its variables; at every point of the grid of its shapes.
+    pub places: Vec<Vec<f64>>,
+    /// How many of all of them are used: those where the model comes nearest to the rows.
+    pub nearest: usize,
+    /// Into how many parts a step of the grid of a fitted shape is divided where the nearest are looked for.
+    pub parts: u32,
+}
+
+impl Expansions {
+    /// All of these values of a hypothesis' only size.
+    pub fn along(values: impl IntoIterator<Item = f64>) -> Self {
+        Self { places: values.into_iter().map(|value| vec![value]).collect(), nearest: usize::MAX, parts: 1 }
+    }
+
+    /// So many of the places that lie farthest from 0, spread over their order.
+    pub fn outermost(&self, count: usize) -> Vec<Vec<f64>> {
+        let distance = |place: &[f64]| place.iter().map(|value| value * value).sum::<f64>().sqrt();
+        let farthest = self.places.iter().map(|place| distance(place)).fold(0.0, f64::max);
+        let rim: Vec<&[f64]> =
+            self.places.iter().map(Vec::as_slice).filter(|place| distance(place) > 0.999 * farthest).collect();
+        rim.iter().step_by((rim.len() / count.max(1)).max(1)).map(|place| place.to_vec()).collect()
     }
 }
 
@@ -79,6 +132,13 @@ pub struct Range {
     pub lower: f64,
     /// Largest value.
     pub upper: f64,
+}
+
+impl Range {
+    /// The value itself, or the bound that it passes.
+    pub fn clamp(self, value: f64) -> f64 {
+        value.clamp(self.lower, self.upper)
+    }
 }
 
 /// How a variable is treated.

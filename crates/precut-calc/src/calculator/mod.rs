@@ -24,7 +24,9 @@ pub use diagnosable::{ClassLimits, Diagnosable, LimitCurve, Measurement, NextRun
 pub use figure::{Axis, Figure, Frame, Glyph, Item, Panel, Role, Spacing};
 pub use finding::{Finding, Message, Value, Values, Violations};
 pub use forward::{Column as JacobianColumn, ForwardModel, Missing, Prediction, PrepareError, Quantity, Rows};
-pub use hypothesis::{Hypotheses, Hypothesis, Inapplicability, Inapplicable, Range, Shape, Treatment, Variable};
+pub use hypothesis::{
+    Expansions, Hypotheses, Hypothesis, Inapplicability, Inapplicable, Range, Shape, Treatment, Variable,
+};
 pub use measured::{Measured, MeasuredRow};
 pub use program::{Block, Dialect, Program};
 pub use ranges::{ConditionRange, Ranges};

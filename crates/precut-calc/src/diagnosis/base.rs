@@ -7,8 +7,8 @@ use rayon::prelude::*;
 use super::input::{DiagnosisOptions, PriorWeight};
 use super::subject::{Setting, Subject};
 use crate::calculator::{
-    Diagnosable, Failure, Hypotheses, Hypothesis, Inapplicability, Inapplicable, JacobianColumn, Missing, Prediction,
-    Treatment, Variable,
+    Diagnosable, Expansions, Failure, Hypotheses, Hypothesis, Inapplicability, Inapplicable, JacobianColumn, Missing,
+    Prediction, Treatment, Variable,
 };
 
 /// From this time of one prediction on, ms, divided differences are one-sided and fewer sets are refined.
@@ -183,7 +183,7 @@ where
         self.centre(settings)
     }
 
-    fn expansions(&self, hypothesis: usize) -> Vec<f64> {
+    fn expansions(&self, hypothesis: usize) -> Expansions {
         M::expansions(&self.prepared, &self.hypotheses.applicable[hypothesis])
     }
 

@@ -15,9 +15,6 @@ use crate::calculator::{
 /// Rows from which on at least adequacy can be judged.
 pub(super) const LEAST_ROWS: usize = 8;
 
-/// Predictions of every run where they are dear: signatures, the sets refined, the next run, the folds.
-const PREDICTIONS: f64 = 300.0;
-
 /// The diagnosis of one base.
 #[derive(Debug, Clone, Copy)]
 pub struct Diagnosis<M>(PhantomData<M>);
@@ -40,7 +37,7 @@ impl<M: Diagnosable> Calculator for Diagnosis<M> {
     const META: Meta = Meta {
         id: "diagnosis",
         kind: CalculatorKind::Calculator,
-        version: 3,
+        version: 4,
         title: "Diagnosis",
         question: "What does the simulation get wrong, why, and what is gained by mending it?",
         summary: "Measurements of what was really cut against a calculator's job: whether anything is wrong beyond \
@@ -69,7 +66,7 @@ impl<M: Diagnosable> Calculator for Diagnosis<M> {
         let held_out = if job.options.held_out { M::folds(job.measurements.rows().len(), job.runs.len()) } else { 0 };
         let folds = 1.0 + held_out as f64;
         let bytes = 1_000_000 + 8 * 400 * job.measurements.rows().len() as u64;
-        let predictions = M::predict_ms(&job.job) * job.runs.len().max(1) as f64 * PREDICTIONS;
+        let predictions = M::predict_ms(&job.job) * job.runs.len().max(1) as f64 * M::PREDICTIONS;
         let statistics = 1.0 + 0.08 * rows * folds;
         let driver = if predictions > statistics { "/job" } else { "/measurements" };
         Cost { ms: statistics + predictions, bytes, driver }

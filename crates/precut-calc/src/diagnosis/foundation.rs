@@ -2,7 +2,7 @@
 
 use super::data::Data;
 use super::outlier::{Outliers, outliers};
-use super::search::Signatures;
+use super::signatures::Signatures;
 use super::subject::Subject;
 use crate::calculator::{Failure, Monitor};
 
@@ -30,10 +30,10 @@ impl<'a> Foundation<'a> {
         let base = subject.predict(&[])?;
         let predicted: Vec<bool> = base.iter().map(Result::is_ok).collect();
         let base: Vec<f64> = base.into_iter().map(|f| f.unwrap_or(0.0)).collect();
-        let signatures = Signatures::of(subject, &base, monitor)?;
-        let nuisances = subject.nuisances()?;
         let rows = data.value.iter().zip(&base).zip(&predicted);
-        let residual = rows.map(|((y, f), ok)| if *ok { y - f } else { 0.0 }).collect();
+        let residual: Vec<f64> = rows.map(|((y, f), ok)| if *ok { y - f } else { 0.0 }).collect();
+        let signatures = Signatures::of(subject, &base, &residual, monitor)?;
+        let nuisances = subject.nuisances()?;
         Ok(Self { subject, data, base, predicted, residual, heavy_tails: None, signatures, nuisances })
     }
 

@@ -6,6 +6,7 @@
 //! - `outlier`, `noise`: what the rows say about their own scatter (`diagnosis/3.1`);
 //! - `whiten`: scatter and allowances as one covariance (`diagnosis/3.2`);
 //! - `likelihood`, `probit`: values that scatter about a prediction, classes on either side of it (`diagnosis/3.11`);
+//! - `signatures`, `survey`: what each hypothesis does to the rows, about 0 and where it comes nearest to them;
 //! - `evidence`, `discrepancy`, `search`, `refine`: how well each set of causes, alone or with an unnamed
 //!   smooth remainder, explains the rows (`diagnosis/3.4`, `diagnosis/3.5`);
 //! - `weigh`: posterior weights and the verdict (`diagnosis/3.5`, `diagnosis/3.7`);
@@ -41,7 +42,9 @@ mod remainder;
 mod report;
 mod said;
 mod search;
+mod signatures;
 mod subject;
+mod survey;
 mod suspect;
 mod view;
 mod weigh;

@@ -64,11 +64,19 @@ pub(super) enum Coordinate {
 }
 
 impl Coordinate {
-    fn of(variable: &Variable) -> Option<Self> {
+    pub(super) fn of(variable: &Variable) -> Option<Self> {
         match &variable.treatment {
             Treatment::Amplitude { prior_sd } => Some(Self::Amplitude { sd: *prior_sd }),
             Treatment::Shape { prior: Some(prior), .. } => Some(Self::Shape(*prior)),
             _ => None,
+        }
+    }
+
+    /// On which side of 0 it may lie.
+    pub(super) fn side(self, range: Range) -> Side {
+        match self {
+            Self::Amplitude { .. } => Side::of(range),
+            Self::Shape(_) => Side::Both,
         }
     }
 
@@ -122,14 +130,7 @@ impl Refinement<'_> {
             &hypotheses[start[member].hypothesis].variables[variable]
         };
         let ranges: Vec<_> = (0..free.len()).map(|k| variable(k).range).collect();
-        let sides: Vec<Side> = coordinates
-            .iter()
-            .zip(&ranges)
-            .map(|(coordinate, range)| match coordinate {
-                Coordinate::Amplitude { .. } => Side::of(*range),
-                Coordinate::Shape(_) => Side::Both,
-            })
-            .collect();
+        let sides: Vec<Side> = coordinates.iter().zip(&ranges).map(|(c, range)| c.side(*range)).collect();
         let with_shapes = coordinates.iter().any(|c| matches!(c, Coordinate::Shape(_)));
         let most = if self.nonlinear {
             STEPS_NONLINEAR
@@ -140,8 +141,18 @@ impl Refinement<'_> {
         };
         let mut settings = start;
         let mut step = 0;
+        // Of the settings, where the step before has predicted it.
+        let mut known: Option<Vec<f64>> = None;
         loop {
-            let Some(here) = self.linearise(&settings, &free, &coordinates)? else { return Ok(None) };
+            let raw = match known.take() {
+                Some(raw) => raw,
+                None => match self.raw_residual(&settings)? {
+                    Some(raw) => raw,
+                    None => return Ok(None),
+                },
+            };
+            let cost_here = self.cost(&raw, &settings, &free, &coordinates);
+            let here = self.linearise(raw, &settings, &free, &coordinates)?;
             let columns: Vec<&White> = here.columns.iter().collect();
             let Some(evidence) = self.likelihood.evidence(&columns, &here.residual, &sides) else { return Ok(None) };
             let before = settings.clone();
@@ -165,12 +176,13 @@ impl Refinement<'_> {
             step += 1;
             // Where shapes are free a step may pass by the resonance that it is looking for: then it is shortened.
             if self.nonlinear && with_shapes && longest >= SETTLED && step < most {
-                let cost = |settings: &[Setting]| self.cost(settings, &free, &coordinates);
-                let here = cost(&before)?.unwrap_or(f64::INFINITY);
                 for share in SHORTENED {
-                    if cost(&settings)?.is_some_and(|cost| cost <= here) {
+                    known = self.raw_residual(&settings)?;
+                    let cost = known.as_ref().map(|raw| self.cost(raw, &settings, &free, &coordinates));
+                    if cost.is_some_and(|cost| cost <= cost_here) {
                         break;
                     }
+                    known = None;
                     settings = moved(share).0;
                 }
             }
@@ -208,19 +220,14 @@ impl Refinement<'_> {
         &self.subject.hypotheses()[fit.settings[member].hypothesis].variables[variable]
     }
 
-    /// Twice minus the log-posterior, up to a constant; `None` where the model has no value for a row that counts.
-    fn cost(
-        &self,
-        settings: &[Setting],
-        free: &[(usize, usize)],
-        coordinates: &[Coordinate],
-    ) -> Result<Option<f64>, Failure> {
+    /// Twice minus the log-posterior, up to a constant, at settings that leave this of the rows.
+    fn cost(&self, raw: &[f64], settings: &[Setting], free: &[(usize, usize)], coordinates: &[Coordinate]) -> f64 {
         let prior: f64 = free
             .iter()
             .zip(coordinates)
             .map(|(&(member, variable), coordinate)| coordinate.t(settings[member].values[variable]).powi(2))
             .sum();
-        Ok(self.residual(settings)?.map(|residual| self.likelihood.misfit(&residual) + prior))
+        self.likelihood.misfit(&self.likelihood.white(raw)) + prior
     }
 
     /// y - f, whitened; `None` where the model has no value for a row that counts.
@@ -259,13 +266,14 @@ impl Refinement<'_> {
         }
     }
 
+    /// About settings that leave `residual` of the rows.
     fn linearise(
         &self,
+        mut residual: Vec<f64>,
         settings: &[Setting],
         free: &[(usize, usize)],
         coordinates: &[Coordinate],
-    ) -> Result<Option<Here>, Failure> {
-        let Some(mut residual) = self.raw_residual(settings)? else { return Ok(None) };
+    ) -> Result<Here, Failure> {
         let slopes = self.subject.jacobian(settings, free)?;
         let mut columns = Vec::with_capacity(free.len());
         for ((&(member, variable), coordinate), slope) in free.iter().zip(coordinates).zip(&slopes) {
@@ -276,7 +284,7 @@ impl Refinement<'_> {
             residual.iter_mut().zip(&column).for_each(|(r, c)| *r += c * t);
             columns.push(self.likelihood.white(&column));
         }
-        Ok(Some(Here { residual: self.likelihood.white(&residual), columns, slopes }))
+        Ok(Here { residual: self.likelihood.white(&residual), columns, slopes })
     }
 }
 

@@ -4,7 +4,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::evidence::{Evidence, Normal, Side, log_sum_exp};
 use super::likelihood::Likelihood;
-use super::subject::{Setting, Subject};
+use super::signatures::{Signatures, Variant};
+use super::subject::Setting;
 use super::whiten::White;
 use crate::calculator::{Failure, Hypothesis, Monitor, Treatment, checkpoint};
 
@@ -18,133 +19,6 @@ const VISIBLE: f64 = 0.05;
 const NARROWED: usize = 3;
 /// Prior weights of none, one, two, three causes together.
 const PRIOR: [f64; 4] = [0.5, 0.38, 0.10, 0.02];
-
-/// A hypothesis at one point of the grid of its shapes, linearised about one size.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Variant {
-    /// Values with every amplitude at 0, or where it is linearised.
-    pub(super) setting: Setting,
-    /// Its amplitudes: index of the variable, prior standard deviation, side, column among all.
-    pub(super) amplitudes: Vec<Amplitude>,
-    /// Column of what it does without an amplitude of its own, or of what a straight line through the place of its
-    /// linearisation does at 0.
-    offset: Option<usize>,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Amplitude {
-    pub(super) variable: usize,
-    pub(super) prior_sd: f64,
-    pub(super) side: Side,
-    column: usize,
-}
-
-/// Signatures of a hypothesis before they are whitened: what a fold can use again.
-pub(super) struct Signatures {
-    /// Variants of every hypothesis; the points of its grid first.
-    variants: Vec<Vec<Variant>>,
-    /// How many of them are points of its grid.
-    grid_points: Vec<usize>,
-    /// Columns at one prior standard deviation.
-    columns: Vec<Vec<f64>>,
-}
-
-impl Signatures {
-    /// One Jacobian column for every amplitude at every point of the grids.
-    pub(super) fn of(subject: &dyn Subject, base: &[f64], monitor: &dyn Monitor) -> Result<Self, Failure> {
-        let mut signatures = Self { variants: Vec::new(), grid_points: Vec::new(), columns: Vec::new() };
-        for (index, hypothesis) in subject.hypotheses().iter().enumerate() {
-            checkpoint(monitor)?;
-            let mut variants = Vec::new();
-            let grid = grid(hypothesis);
-            let size = hypothesis.variables.iter().position(|v| matches!(v.treatment, Treatment::Amplitude { .. }));
-            for values in &grid {
-                let setting = Setting { hypothesis: index, values: values.clone() };
-                variants.push(signatures.variant(subject, base, setting)?);
-            }
-            for (value, values) in subject.expansions(index).into_iter().flat_map(|v| grid.iter().map(move |g| (v, g)))
-            {
-                checkpoint(monitor)?;
-                let Some(size) = size else { break };
-                let mut values = values.clone();
-                values[size] = value;
-                variants.extend(signatures.expansion(subject, Setting { hypothesis: index, values })?);
-            }
-            signatures.variants.push(variants);
-            signatures.grid_points.push(grid.len());
-        }
-        Ok(signatures)
-    }
-
-    /// Linearised about a size: f(theta) = f(0) + (f(theta_0) - f(0) - J theta_0) + J theta. `None` where the model has no
-    /// value there.
-    fn expansion(&mut self, subject: &dyn Subject, setting: Setting) -> Result<Option<Variant>, Failure> {
-        let (without, with) =
-            (subject.predict_coarsely(&[])?, subject.predict_coarsely(std::slice::from_ref(&setting))?);
-        let change: Option<Vec<f64>> = with
-            .iter()
-            .zip(&without)
-            .map(|(with, without)| match (with, without) {
-                (Ok(with), Ok(without)) => Some(with - without),
-                (Err(_), Ok(_)) => None,
-                _ => Some(0.0),
-            })
-            .collect();
-        let Some(mut offset) = change else { return Ok(None) };
-        let values = setting.values.clone();
-        let mut variant = self.variant(subject, &[], setting)?;
-        for amplitude in &variant.amplitudes {
-            let t = values[amplitude.variable] / amplitude.prior_sd;
-            offset.iter_mut().zip(&self.columns[amplitude.column]).for_each(|(o, c)| *o -= c * t);
-        }
-        self.columns.push(offset);
-        variant.offset = Some(self.columns.len() - 1);
-        Ok(Some(variant))
-    }
-
-    fn variant(&mut self, subject: &dyn Subject, base: &[f64], setting: Setting) -> Result<Variant, Failure> {
-        let hypothesis = &subject.hypotheses()[setting.hypothesis];
-        let sizes: Vec<(usize, f64)> = hypothesis
-            .variables
-            .iter()
-            .enumerate()
-            .filter_map(|(variable, v)| match v.treatment {
-                Treatment::Amplitude { prior_sd } => Some((variable, prior_sd)),
-                _ => None,
-            })
-            .collect();
-        let mut offset = None;
-        if sizes.is_empty() {
-            let with = subject.predict(std::slice::from_ref(&setting))?;
-            self.columns.push(with.iter().zip(base).map(|(with, base)| with.map_or(0.0, |with| with - base)).collect());
-            offset = Some(self.columns.len() - 1);
-        }
-        let of: Vec<(usize, usize)> = sizes.iter().map(|(variable, _)| (0, *variable)).collect();
-        let slopes = subject.jacobian(std::slice::from_ref(&setting), &of)?;
-        let mut amplitudes = Vec::new();
-        for ((variable, prior_sd), slope) in sizes.into_iter().zip(slopes) {
-            self.columns.push(slope.iter().map(|x| x * prior_sd).collect());
-            let side = Side::of(hypothesis.variables[variable].range);
-            amplitudes.push(Amplitude { variable, prior_sd, side, column: self.columns.len() - 1 });
-        }
-        Ok(Variant { setting, amplitudes, offset })
-    }
-}
-
-/// Product grid of a hypothesis' shapes, amplitudes at 0.
-fn grid(hypothesis: &Hypothesis) -> Vec<Vec<f64>> {
-    hypothesis.variables.iter().fold(vec![Vec::new()], |points, variable| {
-        let choices = match &variable.treatment {
-            Treatment::Amplitude { .. } => vec![0.0],
-            Treatment::Shape { grid, .. } => grid.clone(),
-            Treatment::Stated { value } => vec![*value],
-        };
-        points
-            .into_iter()
-            .flat_map(|point| choices.iter().map(move |choice| [point.as_slice(), &[*choice]].concat()))
-            .collect()
-    })
-}
 
 /// All inner products that the sets are made of.
 pub(super) struct Linear<'a> {
@@ -160,6 +34,16 @@ pub(super) struct Linear<'a> {
     pub(super) visible: Vec<usize>,
     /// Of classes, whose evidence takes Newton's method: the variants of every hypothesis that explain most alone.
     narrowed: Vec<Vec<usize>>,
+}
+
+/// A set of causes at one point of its grids.
+#[derive(Debug, Clone)]
+struct Found {
+    /// Variant of every member.
+    point: Vec<usize>,
+    /// Logarithm of the evidence times the share of the set's weight that this point has.
+    weighed: f64,
+    evidence: Evidence,
 }
 
 /// A set of causes and how well it explains the rows.
@@ -201,7 +85,7 @@ impl<'a> Linear<'a> {
         let Normal { gram, right, square } = Normal::of(&white.iter().collect::<Vec<_>>(), &residual);
         let seen = |h: &usize| {
             signatures.variants[*h].iter().any(|variant| {
-                let mut columns = variant.amplitudes.iter().map(|a| a.column).chain(variant.offset);
+                let mut columns = variant.free.iter().map(|free| free.column).chain(variant.offset);
                 columns.any(|column| gram[(column, column)] > VISIBLE * VISIBLE)
             })
         };
@@ -245,8 +129,8 @@ impl<'a> Linear<'a> {
 
     /// Cosine of the angle between the signatures of two hypotheses with one amplitude and no grid.
     pub(super) fn alike(&self, a: usize, b: usize) -> Option<f64> {
-        let column = |h: usize| match self.signatures.variants[h][0].amplitudes.as_slice() {
-            [amplitude] if self.has_no_grid(h) => Some(amplitude.column),
+        let column = |h: usize| match self.signatures.variants[h][0].free.as_slice() {
+            [only] if self.has_no_grid(h) => Some(only.column),
             _ => None,
         };
         let (a, b) = (column(a)?, column(b)?);
@@ -259,9 +143,9 @@ impl<'a> Linear<'a> {
         let (mut columns, mut sides) = (Vec::new(), Vec::new());
         for (&h, &v) in members.iter().zip(variants) {
             let variant = self.variant(h, v);
-            for amplitude in &variant.amplitudes {
-                columns.push(&self.white[amplitude.column]);
-                sides.push(amplitude.side);
+            for free in &variant.free {
+                columns.push(&self.white[free.column]);
+                sides.push(free.side);
             }
             if let Some(offset) = variant.offset {
                 residual = residual.minus(&self.white[offset]);
@@ -278,8 +162,8 @@ impl<'a> Linear<'a> {
         let (mut columns, mut sides, mut offsets) = (Vec::new(), Vec::new(), Vec::new());
         for (&h, &v) in members.iter().zip(variants) {
             let variant = self.variant(h, v);
-            columns.extend(variant.amplitudes.iter().map(|a| a.column));
-            sides.extend(variant.amplitudes.iter().map(|a| a.side));
+            columns.extend(variant.free.iter().map(|free| free.column));
+            sides.extend(variant.free.iter().map(|free| free.side));
             offsets.extend(variant.offset);
         }
         let count = columns.len();
@@ -295,63 +179,105 @@ impl<'a> Linear<'a> {
         Normal { gram, right, square }.evidence(&sides, *scale, whitener.rows())
     }
 
-    /// A set of causes: mean evidence over the product of the grids, and the best point.
+    /// A set of causes: mean evidence over the product of the grids, and the best point. Of several places about which one
+    /// point of the grid is linearised that counts which explains most; a cause that was found off its grid has half of its
+    /// weight there.
     pub(super) fn candidate(&self, members: Vec<usize>, log_prior: f64) -> Option<Candidate> {
         let mut points: Vec<Vec<usize>> = vec![Vec::new()];
-        let mut of_all = 1.0;
         for &h in &members {
-            let count = self.signatures.variants[h].len();
-            of_all *= count as f64;
             let tried = self.narrowed.get(h).filter(|_| members.len() > 1).cloned();
-            let tried = tried.unwrap_or_else(|| (0..count).collect());
+            let tried = tried.unwrap_or_else(|| (0..self.signatures.variants[h].len()).collect());
             points = points
                 .into_iter()
                 .flat_map(|p| tried.iter().map(move |&v| [p.as_slice(), &[v]].concat()).collect::<Vec<_>>())
                 .collect();
         }
-        let mut found = Vec::with_capacity(points.len());
+        let cells: usize = members.iter().map(|&h| self.signatures.grid_points[h] + 1).product();
+        let mut found: Vec<Option<Found>> = vec![None; cells];
         for point in points {
             let evidence = self.evidence(&members, &point)?;
-            found.push((point, evidence));
+            let weighed = evidence.log_z + members.iter().zip(&point).map(|(&h, &v)| self.log_share(h, v)).sum::<f64>();
+            let cell = &mut found[self.cell(&members, &point)];
+            if cell.as_ref().is_none_or(|known| weighed > known.weighed) {
+                *cell = Some(Found { point, weighed, evidence });
+            }
         }
-        let all: Vec<f64> = found.iter().map(|(_, evidence)| evidence.log_z).collect();
+        // Points of the product that are not tried add nothing to speak of to the mean over all of it.
+        let mut found: Vec<Found> = found.into_iter().flatten().collect();
+        let all: Vec<f64> = found.iter().map(|found| found.weighed).collect();
         let best = (0..found.len()).rev().max_by(|&a, &b| all[a].total_cmp(&all[b]))?;
         let spread = if found.len() > 1 { self.spread(&members, &found, best) } else { Vec::new() };
-        let (variants, evidence) = found.swap_remove(best);
+        let Found { point, evidence, .. } = found.swap_remove(best);
         Some(Candidate {
             members,
-            // Points of the product that are not tried add nothing to speak of to the mean over all of it.
-            log_z: log_sum_exp(&all) - of_all.ln(),
+            log_z: log_sum_exp(&all),
             best_log_z: evidence.log_z,
             log_prior,
-            variants,
+            variants: point,
             t: evidence.t,
             spread,
         })
     }
 
-    fn spread(&self, members: &[usize], found: &[(Vec<usize>, Evidence)], best: usize) -> Vec<Vec<f64>> {
-        let total = log_sum_exp(&found.iter().map(|(_, evidence)| evidence.log_z).collect::<Vec<_>>());
+    /// Number of a point in the product of the grids; off a grid comes after all of its points.
+    fn cell(&self, members: &[usize], point: &[usize]) -> usize {
+        members.iter().zip(point).fold(0, |cell, (&h, &v)| {
+            let count = self.signatures.grid_points[h];
+            cell * (count + 1) + self.variant(h, v).grid_point.unwrap_or(count)
+        })
+    }
+
+    /// Logarithm of the share of a hypothesis' weight that its cell has.
+    fn log_share(&self, hypothesis: usize, variant: usize) -> f64 {
+        let halved = if self.signatures.is_off_grid[hypothesis] { 0.5 } else { 1.0 };
+        let points =
+            self.variant(hypothesis, variant).grid_point.map_or(1, |_| self.signatures.grid_points[hypothesis]);
+        (halved / points as f64).ln()
+    }
+
+    /// Whether a member stands off its grid at the best point: its shapes are free there.
+    pub(super) fn is_off_grid(&self, candidate: &Candidate) -> bool {
+        candidate.members.iter().zip(&candidate.variants).any(|(&h, &v)| self.variant(h, v).grid_point.is_none())
+    }
+
+    fn spread(&self, members: &[usize], found: &[Found], best: usize) -> Vec<Vec<f64>> {
+        let total = log_sum_exp(&found.iter().map(|found| found.weighed).collect::<Vec<_>>());
         let mut squares: Vec<Vec<f64>> =
             members.iter().map(|&h| vec![0.0; self.hypotheses[h].variables.len()]).collect();
-        for (point, evidence) in found {
-            let weight = (evidence.log_z - total).exp();
+        let of_best = self.values(members, &found[best]);
+        for here in found {
+            let weight = (here.weighed - total).exp();
+            let values = self.values(members, here);
             let mut column = 0;
             for (member, &h) in members.iter().enumerate() {
-                let (here, there) = (self.variant(h, point[member]), self.variant(h, found[best].0[member]));
-                let shapes = here.setting.values.iter().zip(&there.setting.values);
-                for (square, (value, best)) in squares[member].iter_mut().zip(shapes) {
-                    *square += weight * (value - best) * (value - best);
+                for (square, (value, of_best)) in
+                    squares[member].iter_mut().zip(values[member].iter().zip(&of_best[member]))
+                {
+                    *square += weight * (value - of_best) * (value - of_best);
                 }
-                for amplitude in &here.amplitudes {
-                    let gap = evidence.t[column] - found[best].1.t[column];
-                    let square = evidence.covariance[(column, column)] + gap * gap;
-                    squares[member][amplitude.variable] += weight * square * amplitude.prior_sd * amplitude.prior_sd;
+                for free in &self.variant(h, here.point[member]).free {
+                    let slope = free.coordinate.slope(values[member][free.variable]);
+                    squares[member][free.variable] +=
+                        weight * here.evidence.covariance[(column, column)] * slope * slope;
                     column += 1;
                 }
             }
         }
         squares.into_iter().map(|member| member.into_iter().map(f64::sqrt).collect()).collect()
+    }
+
+    /// Values of every member at the fit of a point.
+    fn values(&self, members: &[usize], found: &Found) -> Vec<Vec<f64>> {
+        let mut t = found.evidence.t.iter();
+        let of_member = |(&h, &v): (&usize, &usize)| {
+            let variant = self.variant(h, v);
+            let mut values = variant.setting.values.clone();
+            for free in &variant.free {
+                values[free.variable] = free.coordinate.value(t.next().copied().unwrap_or(0.0));
+            }
+            values
+        };
+        members.iter().zip(&found.point).map(of_member).collect()
     }
 
     fn log_prior(&self, members: &[usize]) -> f64 {
@@ -417,10 +343,9 @@ impl<'a> Linear<'a> {
             .map(|(&h, &v)| {
                 let variant = self.variant(h, v);
                 let mut setting = variant.setting.clone();
-                for amplitude in &variant.amplitudes {
-                    let range = self.hypotheses[h].variables[amplitude.variable].range;
-                    let size = t.next().map_or(0.0, |t| t * amplitude.prior_sd);
-                    setting.values[amplitude.variable] = size.clamp(range.lower, range.upper);
+                for free in &variant.free {
+                    let range = self.hypotheses[h].variables[free.variable].range;
+                    setting.values[free.variable] = free.coordinate.moved(t.next().copied().unwrap_or(0.0), range);
                 }
                 setting
             })

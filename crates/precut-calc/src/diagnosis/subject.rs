@@ -1,6 +1,6 @@
 //! What a diagnosis sees of a base model: hypotheses that can be switched on, and predictions with them.
 
-use crate::calculator::{Failure, Hypothesis, JacobianColumn, Prediction};
+use crate::calculator::{Expansions, Failure, Hypothesis, JacobianColumn, Prediction};
 
 /// A base model under measured rows.
 pub trait Subject: Sync {
@@ -16,9 +16,9 @@ pub trait Subject: Sync {
         self.predict(effects)
     }
 
-    /// Values of a hypothesis' first size about which the model is linearised, too, beside 0.
-    fn expansions(&self, _hypothesis: usize) -> Vec<f64> {
-        Vec::new()
+    /// Sizes of a hypothesis about which the model is linearised, too, beside 0.
+    fn expansions(&self, _hypothesis: usize) -> Expansions {
+        Expansions::default()
     }
 
     /// d predict / d variable: one column per entry of `of`, which names an entry of `effects` and one of its variables.

@@ -347,24 +347,12 @@ impl Ranking {
                 continue;
             }
             let start = linear.settings(candidate);
-            let free = if linear.has_free_shapes(&candidate.members) {
-                refinement.fit(start.clone(), true)?.filter(|fit| fit.with_shapes && fit.settled)
+            let fit = if linear.is_off_grid(candidate) {
+                // Its shapes were free before, and have paid for it.
+                let free = refinement.fit(start, true)?;
+                free.inspect(|free| candidate.log_z += free.log_z - candidate.best_log_z)
             } else {
-                None
-            };
-            // Where free shapes explain less than the mean over the grid, the grid stays.
-            let fit = match free.filter(|free| free.log_z >= candidate.log_z) {
-                Some(free) => {
-                    candidate.log_z = free.log_z;
-                    Some(free)
-                }
-                None => refinement.fit(start, false)?.inspect(|plain| {
-                    if candidate.members.iter().all(|&h| linear.has_no_grid(h)) {
-                        candidate.log_z = plain.log_z;
-                    } else if refinement.nonlinear {
-                        candidate.log_z += plain.log_z - candidate.best_log_z;
-                    }
-                }),
+                refine_from_grid(candidate, start, linear, refinement)?
             };
             self.fits.push((candidate.members.clone(), fit));
         }
@@ -431,6 +419,29 @@ impl Ranking {
             remainder,
         }
     }
+}
+
+/// Refines from a point of the grids: with free shapes where that explains more than the mean over the grid, else on it.
+fn refine_from_grid(
+    candidate: &mut Candidate,
+    start: Vec<Setting>,
+    linear: &Linear<'_>,
+    refinement: &Refinement<'_>,
+) -> Result<Option<Fit>, Failure> {
+    if linear.has_free_shapes(&candidate.members) {
+        let free = refinement.fit(start.clone(), true)?.filter(|fit| fit.with_shapes && fit.settled);
+        if let Some(free) = free.filter(|free| free.log_z >= candidate.log_z) {
+            candidate.log_z = free.log_z;
+            return Ok(Some(free));
+        }
+    }
+    Ok(refinement.fit(start, false)?.inspect(|plain| {
+        if candidate.members.iter().all(|&h| linear.has_no_grid(h)) {
+            candidate.log_z = plain.log_z;
+        } else if refinement.nonlinear {
+            candidate.log_z += plain.log_z - candidate.best_log_z;
+        }
+    }))
 }
 
 /// Whether the size of a cause lies at its physical limit; absent, at 0, is no limit, and of several sizes

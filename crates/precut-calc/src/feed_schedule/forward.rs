@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::calculator::{
-    Consequence, Cost, Design, Diagnosable, Example, Failure, Finding, ForwardModel, Hypotheses, Hypothesis,
-    JacobianColumn, Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows,
+    Consequence, Cost, Design, Diagnosable, Example, Expansions, Failure, Finding, ForwardModel, Hypotheses,
+    Hypothesis, JacobianColumn, Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows,
 };
 use crate::effects::{
     Cause, FactorLevel, MACHINABILITY_CAUSES, MachinabilityConditions, MachinabilityEffect as Effect,
@@ -241,7 +241,7 @@ impl Diagnosable for FeedSchedule {
         rows.min(MOST_FOLDS)
     }
 
-    fn expansions(_prepared: &PreparedMachinability, hypothesis: &Hypothesis) -> Vec<f64> {
+    fn expansions(_prepared: &PreparedMachinability, hypothesis: &Hypothesis) -> Expansions {
         expansions(hypothesis)
     }
 }

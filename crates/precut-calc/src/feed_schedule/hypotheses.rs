@@ -1,6 +1,8 @@
 //! The causes of the catalogue as they stand for a model and its measured cuts.
 
-use crate::calculator::{Hypotheses, Hypothesis, Inapplicability, Inapplicable, Range, Shape, Treatment, Variable};
+use crate::calculator::{
+    Expansions, Hypotheses, Hypothesis, Inapplicability, Inapplicable, Range, Shape, Treatment, Variable,
+};
 use crate::effects::{Cause, Fit, MACHINABILITY_CAUSES, MachinabilityEffect as Effect, Parameter};
 use crate::machinability::ModelForm;
 
@@ -213,11 +215,11 @@ fn shape_prior(name: &str) -> Option<Shape> {
 }
 
 /// Sizes about which a hypothesis is linearised beside 0: a wear-in stands in place of the model and has no value at 0.
-pub(super) fn expansions(hypothesis: &Hypothesis) -> Vec<f64> {
+pub(super) fn expansions(hypothesis: &Hypothesis) -> Expansions {
     match (hypothesis.cause.kind, hypothesis.variables.first()) {
         ("wear_in", Some(Variable { treatment: Treatment::Amplitude { prior_sd }, .. })) => {
-            [0.5, 1.0, 2.0].map(|share| share * prior_sd).to_vec()
+            Expansions::along([0.5, 1.0, 2.0].map(|share| share * prior_sd))
         }
-        _ => Vec::new(),
+        _ => Expansions::default(),
     }
 }

@@ -4,8 +4,9 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::calculator::{
-    ClassLimits, Consequence, Cost, Design, Diagnosable, Example, Failure, Finding, ForwardModel, Hypotheses,
-    Hypothesis, JacobianColumn, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows, checkpoint,
+    ClassLimits, Consequence, Cost, Design, Diagnosable, Example, Expansions, Failure, Finding, ForwardModel,
+    Hypotheses, Hypothesis, JacobianColumn, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows,
+    checkpoint,
 };
 use crate::effects::{Cause, FIXTURE_CAUSES, FixtureEffect};
 
@@ -280,7 +281,7 @@ impl Diagnosable for FixtureStability {
         consequences(job, runs, believed, acting)
     }
 
-    fn expansions(_prepared: &PreparedFixture, hypothesis: &Hypothesis) -> Vec<f64> {
+    fn expansions(_prepared: &PreparedFixture, hypothesis: &Hypothesis) -> Expansions {
         expansions(hypothesis)
     }
 

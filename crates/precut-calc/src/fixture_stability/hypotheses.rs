@@ -3,7 +3,8 @@
 use super::forward::Measure;
 use super::predict::{PreparedFixture, PreparedRow};
 use crate::calculator::{
-    Design, Grouping, Hypotheses, Hypothesis, Inapplicability, Inapplicable, Range, Shape, Smooth, Treatment, Variable,
+    Design, Expansions, Grouping, Hypotheses, Hypothesis, Inapplicability, Inapplicable, Range, Shape, Smooth,
+    Treatment, Variable,
 };
 use crate::effects::{Cause, FIXTURE_CAUSES, Fit, FixtureEffect, Parameter};
 
@@ -166,18 +167,19 @@ pub(super) fn effects(hypothesis: &Hypothesis, values: &[f64]) -> Option<Vec<Fix
 
 /// Sizes about which a hypothesis is linearised beside 0: the amplitude of a cutter grows with a tooth that stands out to
 /// either side, so that a straight line through none of it shows nothing; and a mass that swings splits a resonance.
-pub(super) fn expansions(hypothesis: &Hypothesis) -> Vec<f64> {
+pub(super) fn expansions(hypothesis: &Hypothesis) -> Expansions {
     match (hypothesis.cause.kind, hypothesis.variables.as_slice()) {
-        ("tooth_runout", [Variable { treatment: Treatment::Amplitude { prior_sd }, range, .. }]) => EXPANSIONS
-            .iter()
-            .map(|share| share * prior_sd)
-            .filter(|size| *size < range.upper)
-            .flat_map(|size| [size, -size])
-            .collect(),
+        ("tooth_runout", [Variable { treatment: Treatment::Amplitude { prior_sd }, range, .. }]) => Expansions::along(
+            EXPANSIONS
+                .iter()
+                .map(|share| share * prior_sd)
+                .filter(|size| *size < range.upper)
+                .flat_map(|size| [size, -size]),
+        ),
         ("second_mode", [Variable { treatment: Treatment::Amplitude { prior_sd }, .. }, ..]) => {
-            HUNG_EXPANSIONS.iter().map(|share| share * prior_sd).collect()
+            Expansions::along(HUNG_EXPANSIONS.iter().map(|share| share * prior_sd))
         }
-        _ => Vec::new(),
+        _ => Expansions::default(),
     }
 }
 

@@ -7,8 +7,9 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::calculator::{
-    Check, Cost, Design, Diagnosable, Example, Failure, Finding, ForwardModel, Hypotheses, Hypothesis, JacobianColumn,
-    Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows, Violations, checkpoint,
+    Check, Cost, Design, Diagnosable, Example, Expansions, Failure, Finding, ForwardModel, Hypotheses, Hypothesis,
+    JacobianColumn, Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows, Violations,
+    checkpoint,
 };
 use crate::effects::{Cause, RING_CAUSES, RingEffect};
 
@@ -251,6 +252,9 @@ impl ForwardModel for RingRoundness {
 impl Diagnosable for RingRoundness {
     type Row = RingMeasurement;
 
+    /// Half of them the search for the places of waves, which is made of coarse ones.
+    const PREDICTIONS: f64 = 800.0;
+
     const DIAGNOSES: &'static [Example] = &[Example {
         id: "roller",
         title: "Two traces of a ring: its left roller runs out",
@@ -261,8 +265,8 @@ impl Diagnosable for RingRoundness {
         hypotheses(&prepared.rings.iter().map(|ring| &ring.job).collect::<Vec<_>>())
     }
 
-    fn effects(_prepared: &PreparedRing, hypothesis: &Hypothesis, values: &[f64]) -> Option<Vec<RingEffect>> {
-        effects(hypothesis, values)
+    fn effects(prepared: &PreparedRing, hypothesis: &Hypothesis, values: &[f64]) -> Option<Vec<RingEffect>> {
+        effects(hypothesis, values, &prepared.rings.iter().map(|ring| &ring.job).collect::<Vec<_>>())
     }
 
     fn design(prepared: &PreparedRing) -> Design {
@@ -273,7 +277,7 @@ impl Diagnosable for RingRoundness {
         next_runs(job, rows, ranges)
     }
 
-    fn expansions(_prepared: &PreparedRing, hypothesis: &Hypothesis) -> Vec<f64> {
+    fn expansions(_prepared: &PreparedRing, hypothesis: &Hypothesis) -> Expansions {
         expansions(hypothesis)
     }
 

@@ -5,7 +5,8 @@ use std::f64::consts::TAU;
 use super::input::Job;
 use super::scene::Scene;
 use crate::calculator::{
-    Design, Hypotheses, Hypothesis, Inapplicability, Inapplicable, Range, Smooth, Treatment, Variable,
+    Design, Expansions, Hypotheses, Hypothesis, Inapplicability, Inapplicable, Range, Shape, Smooth, Treatment,
+    Variable,
 };
 use crate::effects::{Cause, Fit, Parameter, RING_CAUSES, RingEffect};
 
@@ -20,6 +21,18 @@ const PARTS_OF_A_RATIO: u32 = 2;
 const EXPANSION_STEP: f64 = 0.2;
 /// How many of them to either side: three prior standard deviations.
 const EXPANSIONS: u32 = 15;
+
+/// What a roller's ratio may be where nothing is known of it.
+const RATIO: Shape = Shape { mean: 7.0, sd: 3.0, logarithmic: false };
+/// Amplitudes of a wave of the blank about which it is linearised, prior standard deviations, and at how many phases.
+const WAVES: &[(f64, u32)] = &[(0.15, 6), (0.4, 8), (0.8, 12), (1.4, 16)];
+/// The same of a roller that runs out.
+const RUNOUTS: &[(f64, u32)] = &[(0.5, 6), (1.2, 8), (2.2, 12), (3.5, 16)];
+/// Parts of a step of the ratio where it is looked for: some hundredths more already beat otherwise from revolution to
+/// revolution.
+const RATIO_PARTS: u32 = 10;
+/// How many of them, where the model comes nearest to the rows.
+const WAVES_TRIED: usize = 8;
 
 /// The catalogue, sorted by whether traces of these rings can speak about a cause.
 ///
@@ -73,14 +86,14 @@ fn hypotheses_of(cause: &'static Cause, rings: &[&Job]) -> Vec<Hypothesis> {
             let stated = |order: f64| Treatment::Stated { value: order };
             orders
                 .map(|&order| {
-                    let mut variables = quadratures(cause);
+                    let mut variables = quadratures(cause, ["amplitude_cos_phase_mm", "amplitude_sin_phase_mm"]);
                     variables.push(variable(parameter(cause, "order"), stated(order)));
                     of(format!("order {order}"), variables, share)
                 })
                 .collect()
         }
         "roller_runout" => {
-            let mut variables = quadratures(cause);
+            let mut variables = quadratures(cause, ["amplitude_cos_end_phase_mm", "amplitude_sin_end_phase_mm"]);
             variables.push(variable(parameter(cause, "ratio"), ratio(cause, rings)));
             vec![of(String::new(), variables, 1.0)]
         }
@@ -105,9 +118,9 @@ fn hypotheses_of(cause: &'static Cause, rings: &[&Job]) -> Vec<Hypothesis> {
 }
 
 /// A cos ph and A sin ph of a wave, each with the prior of the amplitude.
-fn quadratures(cause: &Cause) -> Vec<Variable> {
+fn quadratures(cause: &Cause, names: [&'static str; 2]) -> Vec<Variable> {
     let size = parameter(cause, "amplitude_mm");
-    ["amplitude_cos_phase_mm", "amplitude_sin_phase_mm"]
+    names
         .into_iter()
         .map(|name| Variable { name, ..variable(size, Treatment::Amplitude { prior_sd: size.prior_sd }) })
         .collect()
@@ -119,8 +132,10 @@ fn ratio(cause: &Cause, rings: &[&Job]) -> Treatment {
         let end = Scene::of(job, &job.effects).end()?;
         Some(end.radius_mm / job.supports.roller_radius_mm)
     });
-    let grid = known.map_or_else(|| finer(grid_of(cause, "ratio")), |ratio| vec![ratio]);
-    Treatment::Shape { grid, prior: None }
+    match known {
+        Some(ratio) => Treatment::Shape { grid: vec![ratio], prior: None },
+        None => Treatment::Shape { grid: finer(grid_of(cause, "ratio")), prior: Some(RATIO) },
+    }
 }
 
 /// A grid with its steps divided.
@@ -150,24 +165,50 @@ fn grid_of(cause: &Cause, name: &str) -> &'static [f64] {
 }
 
 /// Sizes about which a hypothesis is linearised beside 0.
-pub(super) fn expansions(hypothesis: &Hypothesis) -> Vec<f64> {
+pub(super) fn expansions(hypothesis: &Hypothesis) -> Expansions {
     match (hypothesis.cause.kind, hypothesis.variables.as_slice()) {
         (
             "tool_off_line" | "support_position" | "work_slip",
             [Variable { treatment: Treatment::Amplitude { prior_sd }, .. }],
-        ) => {
-            (1..=EXPANSIONS).map(|k| EXPANSION_STEP * f64::from(k) * prior_sd).flat_map(|size| [size, -size]).collect()
+        ) => Expansions::along(
+            (1..=EXPANSIONS).map(|k| EXPANSION_STEP * f64::from(k) * prior_sd).flat_map(|size| [size, -size]),
+        ),
+        ("initial_harmonic", [Variable { treatment: Treatment::Amplitude { prior_sd }, .. }, ..]) => {
+            Expansions { places: rosette(WAVES, *prior_sd), nearest: WAVES_TRIED, parts: 1 }
         }
-        _ => Vec::new(),
+        ("roller_runout", [Variable { treatment: Treatment::Amplitude { prior_sd }, .. }, ..]) => {
+            Expansions { places: rosette(RUNOUTS, *prior_sd), nearest: WAVES_TRIED, parts: RATIO_PARTS }
+        }
+        _ => Expansions::default(),
     }
 }
 
+/// Waves of several amplitudes and all phases, as A cos ph and A sin ph.
+fn rosette(waves: &[(f64, u32)], prior_sd: f64) -> Vec<Vec<f64>> {
+    let of = |&(share, phases): &(f64, u32)| {
+        let amplitude = share * prior_sd;
+        (0..phases).map(move |k| {
+            let (sin, cos) = (TAU * f64::from(k) / f64::from(phases)).sin_cos();
+            vec![amplitude * cos, amplitude * sin]
+        })
+    };
+    waves.iter().flat_map(of).collect()
+}
+
 /// The effects that a hypothesis stands for at these values of its variables.
-pub(super) fn effects(hypothesis: &Hypothesis, values: &[f64]) -> Option<Vec<RingEffect>> {
+///
+/// The phase of a roller is fitted as it stands when the ring is finished, since it is the last revolutions that show: about
+/// the start, a hundredth more of the ratio would turn everything that is seen.
+pub(super) fn effects(hypothesis: &Hypothesis, values: &[f64], rings: &[&Job]) -> Option<Vec<RingEffect>> {
     let cause = hypothesis.cause;
     let effect = match (cause.kind, values) {
-        ("initial_harmonic" | "roller_runout", &[cos, sin, form]) => {
-            RingEffect::from_parameters(cause, &[cos.hypot(sin), sin.atan2(cos), form])?
+        ("initial_harmonic", &[cos, sin, order]) => {
+            RingEffect::from_parameters(cause, &[cos.hypot(sin), sin.atan2(cos), order])?
+        }
+        ("roller_runout", &[cos, sin, ratio]) => {
+            let turned = rings.first().map_or(0.0, |job| TAU * (job.tool.revolutions + job.tool.spark_out_revolutions));
+            let phase = (sin.atan2(cos) - ratio * turned).rem_euclid(TAU);
+            RingEffect::from_parameters(cause, &[cos.hypot(sin), phase, ratio])?
         }
         _ => RingEffect::from_parameters(cause, values)?,
     };

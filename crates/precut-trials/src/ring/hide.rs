@@ -54,13 +54,23 @@ impl Scaled {
         TAU * self.form[0]
     }
 
-    /// The first value that a diagnosis fits: of a wave with a phase A cos ph.
-    pub(crate) fn first_value(&self) -> f64 {
+    /// The first value that a diagnosis fits: of a wave with a phase A cos ph, of a roller with the phase at the end.
+    pub(crate) fn first_value(&self, rig: &Rig) -> f64 {
         match self.cause.kind {
-            "initial_harmonic" | "roller_runout" => self.size * self.phase().cos(),
+            "initial_harmonic" => self.size * self.phase().cos(),
+            "roller_runout" => {
+                let turned = TAU * (rig.revolutions + rig.spark_out);
+                self.size * (self.ratio() * turned + self.phase()).cos()
+            }
             "spark_out_missing" => 0.0,
             _ => self.size,
         }
+    }
+
+    /// Of a roller, whole in six of ten.
+    fn ratio(&self) -> f64 {
+        let ratio = 3.0 + 7.0 * self.form[1];
+        if self.form[2] < 0.6 { ratio.round() } else { ratio }
     }
 
     /// Adds what it does while the ring is turned. `None` where it has nothing to act on.
@@ -73,12 +83,7 @@ impl Scaled {
             "tool_off_line" => acting.tool_aside_mm += self.size,
             "support_position" => acting.support_b_mm += self.size,
             "support_wear" => acting.wear_mm_per_rev += 1e-3 * self.size,
-            "roller_runout" => {
-                // Whole in six of ten.
-                let ratio = 3.0 + 7.0 * self.form[1];
-                let ratio = if self.form[2] < 0.6 { ratio.round() } else { ratio };
-                acting.runout = (self.size, ratio, self.phase());
-            }
+            "roller_runout" => acting.runout = (self.size, self.ratio(), self.phase()),
             "tool_push_off" => acting.push_off += self.size,
             "spark_out_missing" => {
                 if rig.spark_out <= 0.0 {

@@ -97,7 +97,7 @@ fn attempt(class: Class, snr: f64, random: &mut Random) -> Option<Trial> {
             rows.push(json!({ "trace": trace, "angle_deg": place, "radial_deviation_um": round(value, 2) }));
         }
     }
-    let causes = hidden.iter().map(|h| Hidden { kind: h.cause.kind, size: h.first_value(), snr }).collect();
+    let causes = hidden.iter().map(|h| Hidden { kind: h.cause.kind, size: h.first_value(&rig), snr }).collect();
     Some(Trial { request: request(&rig, &rows), truth: Truth { class, causes }, sigma })
 }
 
