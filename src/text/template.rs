@@ -1,5 +1,7 @@
 //! What templates may do with their values, each in the language of the template.
 
+use std::collections::BTreeMap;
+
 use minijinja::value::ValueKind;
 use minijinja::{Environment, Error, State, UndefinedBehavior, Value};
 
@@ -46,6 +48,7 @@ pub(super) fn environment() -> Environment<'static> {
     });
     environment.add_filter("reason", |state: &State<'_, '_>, text: &str| Glossary::of(language_of(state)).reason(text));
     environment.add_filter("list", list);
+    environment.add_filter("warning", warning);
     environment.add_filter("plural", plural);
     environment
 }
@@ -53,6 +56,19 @@ pub(super) fn environment() -> Environment<'static> {
 /// Templates are called `{language}/{section}.{code}`.
 fn language_of(state: &State<'_, '_>) -> Language {
     Language::ALL.into_iter().find(|language| language.owns(state.name())).unwrap_or_default()
+}
+
+/// The sentence of another warning: its numbers and names as `[name, value]`, its code, and the field it is about.
+#[allow(clippy::needless_pass_by_value)]
+fn warning(state: &State<'_, '_>, said: Value, code: &str, pointer: &str) -> Result<String, Error> {
+    let mut context: BTreeMap<String, Value> = BTreeMap::new();
+    for pair in said.try_iter()? {
+        context.insert(pair.get_item_by_index(0)?.to_string(), pair.get_item_by_index(1)?);
+    }
+    context.insert("pointer".to_owned(), pointer.into());
+    context.insert("field".to_owned(), super::field(pointer).into());
+    let name = super::name(language_of(state), "warning", code);
+    state.env().get_template(&name)?.render(context)
 }
 
 /// Limits by name and place (`deflection@z5`): one, or several with commas between them.

@@ -159,6 +159,7 @@ impl Calculator for Bar {
         summary: "A bar on two supports under a load.",
         references: &["A textbook."],
         examples: &[Example { id: "plain", title: "A plain bar", job: JOB }],
+        hallmarks: &[],
         study_outputs: &["/max_sag_um"],
         codes: Codes {
             faults: &[&["load_too_large"]],

@@ -53,7 +53,7 @@ export function Row({ name, schema, path, value, required, context, control: Con
   };
   return html`
     <div class=${`row ${faults.length || wrong ? 'faulty' : ''} ${compact ? 'compact' : ''}`} onMouseEnter=${show} onFocusIn=${show}>
-      <${Control} ...${common} label=${html`<span>${label}</span>${schema['x-symbol'] && schema['x-symbol'].toLowerCase() !== label.toLowerCase() && html` <${Symbol} symbol=${schema['x-symbol']} />`}`} unit=${unit} plain=${label} />
+      <${Control} ...${common} label=${html`<span>${label}</span>${schema['x-symbol'] && schema['x-symbol'].toLowerCase() !== label.toLowerCase() && html`\u00a0<${Symbol} symbol=${schema['x-symbol']} />`}`} unit=${unit} plain=${label} />
       <span id=${`${id}-about`} class="hidden">${[unit && t('in_unit', { unit }), allowed, description].filter(Boolean).join('. ')}</span>
       <${Faults} faults=${wrong ? [{ detail: wrong }] : faults} id=${`${id}-fault`} names=${context.names} />
     </div>`;

@@ -55,6 +55,8 @@ export function Form({ calculator, schema, value, filled, onChange, errors, libr
     loose.set(group, [...(loose.get(group) || []), entry]);
   }
   const asked = sections.filter(({ name, schema: part }) => required.has(name) || value[name] !== undefined && !part['x-advanced']);
+  // What was measured comes first where nothing can be said without it.
+  asked.sort((a, b) => Number(Boolean(b.schema['x-table'] && required.has(b.name))) - Number(Boolean(a.schema['x-table'] && required.has(a.name))));
   const usual = sections.filter(entry => !asked.includes(entry) && entry.schema['x-table']);
   const further = sections.filter(entry => !asked.includes(entry) && !usual.includes(entry));
   const section = ({ name, schema: part }, open) => html`

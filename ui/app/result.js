@@ -49,7 +49,7 @@ const shownOf = figures => { const some = figures.filter(figure => drawn(figure)
 /** Whether a picture shows more than a single point. */
 const isTelling = figure => drawn(figure).some(({ kind, x }) => kind !== 'points' || x.length > 1);
 
-export function Result({ id, description, answer, problem, running, pinned, pin, job, models, pickOf, onApply, study, stale }) {
+export function Result({ id, description, answer, problem, trouble, running, pinned, pin, job, models, pickOf, onApply, study, stale, isCancelled }) {
   const [chosen, setChosen] = useState(null);
   const [difference, setDifference] = useState(false);
   // An earlier state of the same run, in place of its end.
@@ -63,7 +63,7 @@ export function Result({ id, description, answer, problem, running, pinned, pin,
   const figure = interim || figures.find(({ id: name }) => name === chosen) || figures.find(isTelling) || figures[0];
   const height = usePictureHeight(figure?.panels.length || 1);
   if (!answer && !interim) {
-    return html`<div class="empty">${running ? '' : problem ? html`<p>${t('picture_waits')}</p>` : html`<p class="late">${t('first_answer')}</p>`}</div>`;
+    return html`<div class="empty">${running ? '' : problem ? html`<div class="no-answer">${trouble}<p>${isCancelled ? t('cancelled_waits') : t('picture_waits')}</p></div>` : html`<p class="late">${t('first_answer')}</p>`}</div>`;
   }
   const twin = pinned && !interim && pinned.key !== answer?.key ? pinned.figures.find(({ id: name }) => name === figure?.id) : null;
   const subtracted = twin && difference ? differenceOf(figure, twin) : null;
@@ -88,11 +88,10 @@ export function Result({ id, description, answer, problem, running, pinned, pin,
         <div class="picture-box">
           ${figure ? html`<${Picture} key=${figure.id} figure=${subtracted && subtracted.panels.length ? subtracted : (replays && earlier) || figure} pinned=${subtracted ? null : twin} height=${trades ? Math.min(height, TRADE_HEIGHT) : height} main onPick=${picks ? pick : null} handle=${handle} />`
             : html`<p class="quiet">${t('no_figure')}</p>`}
+          <div class="under">${(interim || stale) && html`<p class="stale-note" role="status">${interim ? t('so_far') : `${isCancelled ? `${t('state_cancelled')}. ` : ''}${t('stale_note')}`}</p>`}</div>
           ${replays && html`<${Replay} key=${answer.key} id=${id} answer=${body} job=${answer.job} figures=${figures} onShow=${setEarlier} />`}
           ${trades && html`<${TradeOff} key=${answer.key} ...${{ id, figure, factor, setFactor, figures }} answer=${body} job=${answer.job} schema=${description.input_schema} apply=${onApply} />`}
-          ${stale && html`<p class="stale-note" role="status">${t('stale_note')}</p>`}
           ${picks && html`<p class="quiet hint">${picks.hint}</p>`}
-          ${interim && html`<p class="quiet hint">${t('so_far')}</p>`}
         </div>
         ${body && html`
         <div class="words">

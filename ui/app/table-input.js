@@ -104,6 +104,14 @@ function matched(file, columns, matches) {
   return `${[line(used.map(title)), ...file.rows.map(row => line(used.map(({ name }) => row[matches[name].index] ?? '')))].join('\n')}\n`;
 }
 
+/** The columns of a kept CSV, by their labels. */
+function headings(csv, columns) {
+  return readCsv(csv)?.header.map(title => {
+    const column = columns.find(({ name, schema }) => norm(title) === norm(name) || norm(headed(title).name) === norm(name).replace(new RegExp(`_${norm(schema['x-unit'] || '-')}$`), ''));
+    return column ? labelOf(column.name, column.schema) : title;
+  }).join(', ');
+}
+
 export function TableInput({ name, schema, root, value, onChange, faults, below, names }) {
   const [draft, setDraft] = useState(null);
   const [over, setOver] = useState(false);
@@ -134,7 +142,7 @@ export function TableInput({ name, schema, root, value, onChange, faults, below,
       ${trouble && html`<p class="fault" role="alert"><span>${trouble}</span></p>`}
       ${draft ? html`<${Matching} ...${{ draft, setDraft, columns, missing, accept, label }} cancel=${() => setDraft(null)} />` : html`
         ${rows > 0
-          ? html`<p class="table-state"><strong>${plural('rows', rows)}</strong> <span class="quiet">${(value.csv ? value.csv.split('\n')[0] : Object.keys(value[0]).join(', ')).slice(0, 160)}</span></p>
+          ? html`<p class="table-state"><strong>${plural('rows', rows)}</strong>${value.csv && html` <span class="quiet">${headings(value.csv, columns)}</span>`}</p>
             ${Array.isArray(value) && html`<${Preview} rows=${value} columns=${columns} label=${label} />`}`
           : html`<p class="quiet">${schema.description}</p>`}
         <div class="actions">

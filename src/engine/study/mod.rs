@@ -74,6 +74,7 @@ const META: Meta = Meta {
               fields, curves over one, slices over three.",
     references: &[],
     examples: EXAMPLES,
+    hallmarks: &[],
     study_outputs: &[],
     codes: Codes {
         faults: &[faults::FAULTS],
