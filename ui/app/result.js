@@ -228,9 +228,12 @@ function flat(schema, value, root, path = [], out = [], names = [], spread = nul
   return out;
 }
 
+/** An error of the numbers is known to two digits. */
+const digitsOf = ({ path }) => (/(^|_)(numerical_error|uncertainty)(_[a-z]+)*$/.test(String(path.at(-1))) ? 2 : 5);
+
 /** A name of a field or a kind in the words of the form; `names` has those of its fields. */
 const worded = (text, names) => names?.get(text) ?? (/^[a-z]+(_[a-z0-9]+)+$/.test(text) ? humanised(text) : text);
-const shownValue = (value, schema, names) => (typeof value === 'number' ? number(value, 5) : value === true ? t('yes') : value === false ? t('no') : schema?.enum ? wordOf(schema, value) : worded(String(value), names));
+const shownValue = (value, schema, names, digits = 5) => (typeof value === 'number' ? number(value, digits) : value === true ? t('yes') : value === false ? t('no') : schema?.enum ? wordOf(schema, value) : worded(String(value), names));
 
 
 function Values({ schema, inputs, result, pinned }) {
@@ -250,8 +253,8 @@ function Values({ schema, inputs, result, pinned }) {
         <thead class=${before ? '' : 'hidden'}><tr><th scope="col">${t('name')}</th><th scope="col">${t('value')}</th>${before && html`<th scope="col">${t('pinned_value')}</th><th scope="col">${t('difference')}</th>`}<th scope="col">${t('unit')}</th></tr></thead>
         <tbody>${rows.filter(row => row.group === group).map(row => {
           const other = before?.get(row.path.join('/'));
-          return html`<tr key=${row.path.join('/')}><th scope="row" title=${row.description}>${row.label}</th><td>${row.spread ? withSpread(row.value, row.spread.spread) : shownValue(row.value, row.schema, names)}</td>
-            ${before && html`<td>${other === undefined ? '' : shownValue(other, row.schema, names)}</td><td>${typeof other === 'number' && typeof row.value === 'number' ? `${row.value > other ? '+' : ''}${number(row.value - other, 3)}` : ''}</td>`}
+          return html`<tr key=${row.path.join('/')}><th scope="row" title=${row.description}>${row.label}</th><td class=${typeof row.value === 'number' ? 'number' : ''}>${row.spread ? withSpread(row.value, row.spread.spread) : shownValue(row.value, row.schema, names, digitsOf(row))}</td>
+            ${before && html`<td class=${typeof other === 'number' ? 'number' : ''}>${other === undefined ? '' : shownValue(other, row.schema, names, digitsOf(row))}</td><td>${typeof other === 'number' && typeof row.value === 'number' ? `${row.value > other ? '+' : ''}${number(row.value - other, 3)}` : ''}</td>`}
             <td class="unit">${row.unit}</td></tr>`;
         })}</tbody>
       </table>`)}</div>`;
