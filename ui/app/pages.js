@@ -128,7 +128,9 @@ function ResultList({ calculators, wanted, replace }) {
 
 export function Models({ calculators, models, refreshModels }) {
   const [trouble, setTrouble] = useState(null);
-  const drop = async name => { setTrouble(null); try { await api.dropModel(name); await refreshModels(); } catch (error) { setTrouble(error.problem?.detail || error.message); } };
+  // Whose deletion waits for a second click.
+  const [asked, setAsked] = useState(null);
+  const drop = async name => { setTrouble(null); setAsked(null); try { await api.dropModel(name); await refreshModels(); } catch (error) { setTrouble(error.problem?.detail || error.message); } };
   const fetchDocument = async name => save(new Blob([JSON.stringify(await api.model(name), null, 2)], { type: 'application/json' }), `${name}.json`);
   const load = async files => {
     setTrouble(null);
@@ -147,7 +149,7 @@ export function Models({ calculators, models, refreshModels }) {
           <tbody role="rowgroup">${models.map(({ name, calculator, revision, created_at: created }) => html`<tr role="row" key=${name}><th scope="row" role="rowheader">${name}</th><td role="cell">${titleOf(calculators, calculator)}</td><td role="cell" class="number">${revision}</td><td role="cell" class="when">${created ? moment(created) : ''}</td>
             <td role="cell" class="actions"><a class="button" href=${`#/${calculator}?model=${name}`}>${t('use_model')}<span class="hidden"> ${name}</span></a>
               <button type="button" onClick=${() => fetchDocument(name)}>JSON<span class="hidden"> ${name}</span></button>
-              <button type="button" onClick=${() => drop(name)}>${t('delete')}<span class="hidden"> ${name}</span></button></td></tr>`)}</tbody></table></div>`}
+              <button type="button" class=${asked === name ? 'sure' : ''} onBlur=${() => setAsked(null)} onKeyDown=${event => { if (event.key === 'Escape') setAsked(null); }} onClick=${() => (asked === name ? drop(name) : setAsked(name))}>${asked === name ? t('delete_sure') : t('delete')}<span class="hidden"> ${name}</span></button></td></tr>`)}</tbody></table></div>`}
         <p><label class="button">${t('import_model')} <input type="file" class="hidden" accept=".json,application/json" onChange=${event => load(event.currentTarget.files)} /></label></p>`}
     </main>`;
 }

@@ -16,6 +16,8 @@ const TRADE_HEIGHT = 260;
 const FEW_WARNINGS = 3;
 /** More pictures than these are chosen from a list. */
 const MOST_BUTTONS = 6;
+/** What the picture of the causes tells already. */
+const SHOWN_BY_CAUSES = ['diagnosis_next', 'diagnosis_gain'];
 /** Items of a list that the printed sheet has. */
 const PRINTED_ITEMS = 40;
 /** Rows of a table shown at once. */
@@ -76,7 +78,7 @@ export function Result({ id, description, answer, problem, trouble, running, pin
   const held = ([low, high], value) => Math.min(Math.max(value, low), high);
   const handle = trades ? { x: factor, onMove: x => setFactor(Number(held(spanOf(figure), x).toPrecision(4))), onDrop: () => {} }
     : picks?.at ? { x: (grabbed || picks.at)[0], y: (grabbed || picks.at)[1], onMove: (x, y) => setGrabbed([x, y]), onDrop: (x, y) => { setGrabbed(null); pick(x, y); } } : null;
-  const [first, ...others] = body?.explanation || [];
+  const [first, ...others] = body?.explanation.filter(({ code }) => !(hasCauses(id, body.result) && SHOWN_BY_CAUSES.includes(code))) || [];
   return html`
     <div class=${`result ${stale ? 'stale' : ''}`}>
       ${figures.length > MOST_BUTTONS && !interim && html`<${FigurePick} ...${{ figures, figure, choose: setChosen }} />`}
@@ -247,14 +249,14 @@ function Values({ schema, inputs, result, pinned }) {
   const before = pinned ? new Map(flat(schema, pinned, schema).map(row => [row.path.join('/'), row.value])) : null;
   const groups = [...new Set(rows.map(({ group }) => group))];
   return html`
-    <div class="values">${groups.map(group => html`
+    <div class=${`values ${before ? 'compared' : ''}`}>${groups.map(group => html`
       <table key=${group} class="value-table">
         <caption>${group || t('main_values')}</caption>
         <thead class=${before ? '' : 'hidden'}><tr><th scope="col">${t('name')}</th><th scope="col">${t('value')}</th>${before && html`<th scope="col">${t('pinned_value')}</th><th scope="col">${t('difference')}</th>`}<th scope="col">${t('unit')}</th></tr></thead>
         <tbody>${rows.filter(row => row.group === group).map(row => {
           const other = before?.get(row.path.join('/'));
           return html`<tr key=${row.path.join('/')}><th scope="row" title=${row.description}>${row.label}</th><td class=${typeof row.value === 'number' ? 'number' : ''}>${row.spread ? withSpread(row.value, row.spread.spread) : shownValue(row.value, row.schema, names, digitsOf(row))}</td>
-            ${before && html`<td class=${typeof other === 'number' ? 'number' : ''}>${other === undefined ? '' : shownValue(other, row.schema, names, digitsOf(row))}</td><td>${typeof other === 'number' && typeof row.value === 'number' ? `${row.value > other ? '+' : ''}${number(row.value - other, 3)}` : ''}</td>`}
+            ${before && html`<td class=${typeof other === 'number' ? 'number' : ''}>${other === undefined ? '' : shownValue(other, row.schema, names, digitsOf(row))}</td><td class="number">${typeof other === 'number' && typeof row.value === 'number' ? `${row.value > other ? '+' : ''}${number(row.value - other, 3)}` : ''}</td>`}
             <td class="unit">${row.unit}</td></tr>`;
         })}</tbody>
       </table>`)}</div>`;
