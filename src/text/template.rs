@@ -10,6 +10,9 @@ use super::named::{amount, named};
 use super::number;
 use super::{Language, significant};
 
+/// A probability beyond this is told as that.
+const MOST_CERTAIN: f64 = 0.99;
+
 /// An environment that knows the filters of the texts and no text yet.
 pub(super) fn environment() -> Environment<'static> {
     let mut environment = Environment::new();
@@ -27,6 +30,15 @@ pub(super) fn environment() -> Environment<'static> {
     });
     environment.add_filter("percent", |state: &State<'_, '_>, share: f64| {
         format!("{} %", number::spoken(&significant(100.0 * share, 3), language_of(state)))
+    });
+    environment.add_filter("chance", |state: &State<'_, '_>, probability: f64| {
+        // No finite data make anything certain.
+        let (sign, shown) = match probability {
+            high if high > MOST_CERTAIN => ("> ", MOST_CERTAIN),
+            low if low < 1.0 - MOST_CERTAIN => ("< ", 1.0 - MOST_CERTAIN),
+            between => ("", between),
+        };
+        format!("{sign}{}", number::spoken(&significant(shown, 2), language_of(state)))
     });
     environment.add_filter("um", |state: &State<'_, '_>, value: f64| measured(state, value, 3, "um"));
     environment.add_filter("mm", |state: &State<'_, '_>, value: f64| measured(state, value, 6, "mm"));

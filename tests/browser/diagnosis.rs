@@ -49,6 +49,10 @@ fn a_diagnosis_is_saved_as_a_model_and_used_in_another_form() {
     page.open(&service.page("models"));
     page.wait_for(".list tbody tr");
     page.click(".list tbody tr td:last-child button:last-child");
+    // The first click asks, the second one does it.
+    page.until("document.querySelector('.list .sure')");
+    assert_eq!(page.evaluate("document.querySelectorAll('.list tbody tr').length"), 1);
+    page.click(".list tbody tr td:last-child button:last-child");
     page.until("!document.querySelector('.list tbody tr')");
     page.assert_calm();
 }

@@ -48,7 +48,7 @@ export function styles(figure) {
       if (known.has(key)) continue;
       counts[base] = (counts[base] ?? -1) + 1;
       const variant = counts[base] % VARIANTS;
-      known.set(key, `${variant ? `${base} v${variant}` : base}${isDense(item) ? ' dense' : ''}`);
+      known.set(key, `${variant ? `${base} v${variant}` : base}${figure.frame !== 'polar' && isDense(item) ? ' dense' : ''}`);
     }
   }
   return item => known.get(`${role(item.role).name} ${item.name}`) || role(item.role).name;
