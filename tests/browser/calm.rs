@@ -6,6 +6,8 @@ use serde_json::json;
 use crate::{SETTLED, both};
 
 const PLACE: &str = "(() => { const box = document.querySelector('.picture.main').getBoundingClientRect(); return [box.top + scrollY, box.height] })()";
+/// Where the picture stands in the page, and the links of the shell.
+const ALL: &str = "[...document.querySelectorAll('.picture.main, .shell a, .figure-choice')].map(it => { const box = it.getBoundingClientRect(); return [it.className, Math.round(box.left), Math.round(box.top + scrollY), Math.round(box.width)] })";
 
 #[test]
 fn neither_a_reading_nor_a_fault_nor_a_lost_service_moves_the_picture() {
@@ -55,8 +57,6 @@ fn neither_a_reading_nor_a_fault_nor_a_lost_service_moves_the_picture() {
 #[test]
 fn a_long_job_moves_nothing() {
     let Some((_turn, mut page, service)) = both() else { return };
-    // Where the picture stands in the page, and the links of the shell.
-    const ALL: &str = "[...document.querySelectorAll('.picture.main, .shell a, .figure-choice')].map(it => { const box = it.getBoundingClientRect(); return [it.className, Math.round(box.left), Math.round(box.top + scrollY), Math.round(box.width)] })";
     for (order, (width, height, language)) in
         [(1440, 900, "en"), (1024, 600, "ru"), (360, 740, "ru"), (360, 740, "en")].into_iter().enumerate()
     {
