@@ -65,6 +65,8 @@ fn a_table_with_headings_in_russian_is_matched() {
     page.until(SETTLED);
     page.click_on("RU");
     page.until(&format!("document.documentElement.lang === 'ru' && {SETTLED}"));
+    // The form follows a moment after the page's own words.
+    page.until("document.querySelector('.sections').textContent.includes('Отклонение диаметра')");
     let csv = page.evaluate(
         "(async () => { const room = await (await fetch('/v1/calculators/diagnosis')).json(); \
          const rows = room.jobs[room.examples[0].id].measurements; const said = number => String(number).replace('.', ','); \
