@@ -65,7 +65,8 @@ export function Causes({ result, schema, unit }) {
     </section>`;
 }
 
-const percent = share => (share > 0 && share < 0.001 ? `< ${number(0.1)} %` : `${number(100 * share, share > 0.99 && share < 0.9995 ? 3 : 2)} %`);
+// No finite data make anything certain.
+const percent = share => (share > 0.999 ? `> ${number(99.9)} %` : share > 0 && share < 0.001 ? `< ${number(0.1)} %` : `${number(100 * share, share > 0.99 ? 3 : 2)} %`);
 
 /** The error on held-back data before and after, against what scatter and allowances leave to any model. */
 function Gain({ gain, unit }) {

@@ -3,7 +3,7 @@ import { html, useState, useEffect, useMemo, useRef } from './lib.js';
 import { t, number, unitSymbol, unitOf, plural, moment } from './text.js';
 import * as api from './api.js';
 import { Picture, differenceOf } from './figure.js';
-import { resolve, humanised, labelOf, wordOf, namesOf, spoken } from './schema.js';
+import { resolve, humanised, labelOf, wordOf, namesOf, vocabularyOf, spoken } from './schema.js';
 import { spreadOf, spreadColumns, withSpread } from './digits.js';
 import { canReplay, Replay } from './replay.js';
 import { canTrade, spanOf, TradeOff } from './tradeoff.js';
@@ -239,7 +239,7 @@ const shownValue = (value, schema, names, digits = 5) => (typeof value === 'numb
 
 
 function Values({ schema, inputs, result, pinned }) {
-  const names = useMemo(() => namesOf(inputs), [inputs]);
+  const names = useMemo(() => vocabularyOf(schema, inputs), [schema, inputs]);
   const rows = useMemo(() => {
     const all = flat(schema, result, schema, [], [], [], path => spreadOf(result, path));
     // An uncertainty stands behind its number, not once more in a line of its own.
@@ -367,7 +367,7 @@ function SaveModel({ resultKey }) {
 export function Sheet({ description, body, job }) {
   const rows = flat(description.input_schema, job, description.input_schema, [], [], [], null, [{}], true);
   const groups = [...new Set(rows.map(({ group }) => group))];
-  const names = useMemo(() => namesOf(description.output_schema), [description]);
+  const names = useMemo(() => vocabularyOf(description.output_schema, description.input_schema), [description]);
   const said = row => `${row.label} ${shownValue(row.value, row.schema, names)}${row.unit ? ` ${row.unit}` : ''}`;
   return html`
     <section class="sheet" aria-hidden="true">
