@@ -11,6 +11,7 @@ mod described;
 mod glossary;
 mod kept;
 mod language;
+mod mark;
 mod named;
 mod notice;
 mod number;
@@ -18,8 +19,9 @@ mod template;
 
 pub(crate) use described::described;
 pub(crate) use glossary::Glossary;
-pub(crate) use kept::{reworded, reworded_rows};
+pub(crate) use kept::{datum, reworded, reworded_rows};
 pub use language::Language;
+pub(crate) use mark::{Mark, Said, told};
 pub use notice::{Notice, Remark};
 pub(crate) use number::significant;
 

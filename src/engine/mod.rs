@@ -20,6 +20,7 @@ mod progress;
 mod read;
 mod settings;
 mod study;
+mod summary;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -36,6 +37,7 @@ pub use models::{GivenModel, ModelAnswer, ModelError, ModelFile, ModelSource, No
 pub use progress::Interim;
 pub use settings::EngineSettings;
 pub use study::STUDIES;
+pub(crate) use summary::Summary;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -53,6 +55,7 @@ use jobs::Jobs;
 use memory::{Kept, Memory, fingerprint};
 use model::Models;
 use read::Ready;
+use summary::Summaries;
 
 /// Bodies up to this size are read where they arrive, larger ones on the pool: about 1 ms of reading.
 const READ_AT_ONCE: usize = 32 << 10;
@@ -77,6 +80,7 @@ pub(crate) struct Inner {
     jobs: Jobs,
     /// Parameter studies: asked like a calculator, made of the registry's.
     studies: Arc<Entry>,
+    summaries: Summaries,
     closed: AtomicBool,
 }
 
@@ -111,8 +115,20 @@ impl Engine {
         let jobs = Jobs::new(jobs);
         let host = Arc::new(study::InEngine::default());
         let studies = Arc::new(study::entry(&registry, settings.study_points, Arc::<study::InEngine>::clone(&host)));
-        let inner =
-            Arc::new(Inner { registry, settings, memory, flights, cores, store, models, jobs, studies, closed });
+        let summaries = Summaries::default();
+        let inner = Arc::new(Inner {
+            registry,
+            settings,
+            memory,
+            flights,
+            cores,
+            store,
+            models,
+            jobs,
+            studies,
+            summaries,
+            closed,
+        });
         host.move_in(&inner);
         Jobs::start(&inner).await;
         Ok(Self { inner })

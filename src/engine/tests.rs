@@ -4,6 +4,7 @@
 
 use std::time::{Duration, Instant};
 
+use bytes::Bytes;
 use futures_util::future::BoxFuture;
 use precut_calc::calculator::{Failure, Finding, Unwatched};
 use serde_json::{Value, json};
@@ -336,6 +337,9 @@ impl ResultStore for BrokenStore {
     }
     fn put(&self, _result: KeptResult) {}
     fn list(&self, _query: ResultQuery) -> BoxFuture<'_, Result<ResultPage, StoreError>> {
+        Box::pin(async { Err(StoreError::Failed("disk I/O error".to_owned())) })
+    }
+    fn inputs(&self, _keys: Vec<Key>, _most: usize) -> BoxFuture<'_, Result<Vec<(Key, Bytes)>, StoreError>> {
         Box::pin(async { Err(StoreError::Failed("disk I/O error".to_owned())) })
     }
     fn ping(&self) -> BoxFuture<'_, Result<(), StoreError>> {

@@ -13,7 +13,7 @@ use super::negotiate;
 use super::prefer::{PREFERENCE_APPLIED, Preference};
 use super::problem::{Problem, ProblemDocument};
 use crate::engine::{CacheState, Error, Job, JobId, JobQuery, JobState, Priority, Timings};
-use crate::text::{Language, Texts};
+use crate::text::{Language, Texts, told};
 
 /// Most jobs of one page.
 pub(super) const MOST_ITEMS: u32 = 500;
@@ -135,10 +135,21 @@ pub(super) struct JobLinks {
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct JobList {
     /// The jobs, newest first.
-    items: Vec<JobDocument>,
+    items: Vec<ListedJob>,
     /// Address of the next page; null on the last.
     #[schema(example = "/v1/jobs?limit=50&after=0198c5f1-8a3e-7c40-b0a1-5e2d9f4c6b7a")]
     next: Option<String>,
+}
+
+/// A job in a list.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct ListedJob {
+    #[serde(flatten)]
+    job: JobDocument,
+    /// What is computed: whose job it is and its main numbers, in the language asked for; null where the job has
+    /// expired or is too large to be read for a list.
+    #[schema(example = "Diameter 90 mm · length 2000 mm · feed 0.5 mm/rev")]
+    summary: Option<String>,
 }
 
 /// The job in words.
@@ -250,8 +261,15 @@ pub(super) async fn list(State(app): State<App>, uri: Uri, headers: HeaderMap) -
     let filter = state.map(|state| format!("&state={}", state.word())).unwrap_or_default()
         + &query.calculator.map(|id| format!("&calculator={id}")).unwrap_or_default();
     let language = negotiate::language(&headers);
+    let asked: Vec<_> =
+        jobs.iter().map(|Job { record, .. }| (record.id, record.key, record.calculator.clone())).collect();
+    let summaries = app.engine.job_summaries(&asked).await;
+    let listed = |job: &Job| ListedJob {
+        job: document(job, language),
+        summary: summaries.get(&job.record.key).map(|marks| told(language, marks)),
+    };
     let list = JobList {
-        items: jobs.iter().map(|job| document(job, language)).collect(),
+        items: jobs.iter().map(listed).collect(),
         next: next.map(|next| format!("/v1/jobs?limit={limit}{filter}&after={next}")),
     };
     let body = serde_json::to_vec(&list).expect("jobs have only finite numbers and words");

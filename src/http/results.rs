@@ -1,10 +1,11 @@
 //! Kept results: listed, and read again without computing.
 
+use std::collections::HashMap;
 use std::str::FromStr;
 use std::sync::Arc;
 
 use axum::extract::{Path, Query, State};
-use axum::http::header::{CACHE_CONTROL, HeaderValue};
+use axum::http::header::{CACHE_CONTROL, CONTENT_LANGUAGE, HeaderValue, VARY};
 use axum::http::{HeaderMap, StatusCode, Uri};
 use axum::response::{IntoResponse, Json, Response};
 use serde::{Deserialize, Serialize};
@@ -12,9 +13,10 @@ use utoipa::ToSchema;
 
 use super::answer::{self, View};
 use super::problem::Problem;
-use super::{App, CACHE_STATE};
-use crate::engine::{Error, Key, Stored};
+use super::{App, CACHE_STATE, negotiate};
+use crate::engine::{Error, Key, Stored, Summary};
 use crate::store::{Cursor, ResultPage, ResultQuery, ResultSummary};
+use crate::text::{Language, told};
 
 /// Most results of one page.
 pub(super) const MOST_ITEMS: u32 = 500;
@@ -55,6 +57,10 @@ pub(super) struct ResultItem {
     /// Which version of the engine.
     #[schema(example = "0.1.0")]
     engine: String,
+    /// What was computed: whose job it was and its main numbers, in the language asked for; null where the job is not
+    /// readable or too large to be read for a list.
+    #[schema(example = "Diameter 90 mm · length 2000 mm · feed 0.5 mm/rev")]
+    summary: Option<String>,
     /// What it takes in the database, bytes.
     #[schema(minimum = 0, example = 18230)]
     bytes: u64,
@@ -74,7 +80,7 @@ pub(super) struct ResultLinks {
 }
 
 /// `GET /v1/results`
-pub(super) async fn list(State(app): State<App>, uri: Uri) -> Result<Response, Problem> {
+pub(super) async fn list(State(app): State<App>, uri: Uri, headers: HeaderMap) -> Result<Response, Problem> {
     let Query(query) = Query::<ListQuery>::try_from_uri(&uri).map_err(|error| Problem::query(error.body_text()))?;
     let limit = query.limit.unwrap_or(DEFAULT_ITEMS);
     if !(1..=MOST_ITEMS).contains(&limit) {
@@ -91,8 +97,13 @@ pub(super) async fn list(State(app): State<App>, uri: Uri) -> Result<Response, P
     let after = after.transpose()?;
     let page =
         app.engine.results(ResultQuery { calculator: query.calculator.clone(), limit: Some(limit), after }).await?;
-    let list = page_of(page, limit, query.calculator.as_deref());
-    Ok(([(CACHE_CONTROL, "no-store")], Json(list)).into_response())
+    let asked: Vec<_> = page.items.iter().map(|item| (item.key, item.calculator.clone())).collect();
+    let summaries = app.engine.summaries(&asked).await;
+    let language = negotiate::language(&headers);
+    let list = page_of(page, &summaries, language, limit, query.calculator.as_deref());
+    let headers =
+        [(CACHE_CONTROL, "no-store"), (CONTENT_LANGUAGE, language.tag()), (VARY, "Accept-Language, Accept-Encoding")];
+    Ok((headers, Json(list)).into_response())
 }
 
 /// `GET /v1/results/{key}`
@@ -112,23 +123,31 @@ pub(super) async fn read(
     Ok(response)
 }
 
-fn page_of(page: ResultPage, limit: u32, calculator: Option<&str>) -> ResultList {
+fn page_of(
+    page: ResultPage,
+    summaries: &HashMap<Key, Summary>,
+    language: Language,
+    limit: u32,
+    calculator: Option<&str>,
+) -> ResultList {
+    let said = |item: &ResultSummary| summaries.get(&item.key).map(|marks| told(language, marks));
     let filter = calculator.map(|id| format!("&calculator={id}")).unwrap_or_default();
     ResultList {
         next: page.next.map(|next| format!("/v1/results?limit={limit}{filter}&after={next}")),
-        items: page.items.into_iter().map(item).collect(),
+        items: page.items.into_iter().map(|one| item(said(&one), one)).collect(),
     }
 }
 
-fn item(summary: ResultSummary) -> ResultItem {
-    let created_at = jiff::Timestamp::from_millisecond(summary.created_ms).unwrap_or_default();
+fn item(summary: Option<String>, result: ResultSummary) -> ResultItem {
+    let created_at = jiff::Timestamp::from_millisecond(result.created_ms).unwrap_or_default();
     ResultItem {
-        key: summary.key.to_string(),
-        links: ResultLinks { this: format!("/v1/results/{}", summary.key) },
-        calculator: summary.calculator,
-        version: summary.version,
-        engine: summary.engine,
-        bytes: summary.bytes,
+        key: result.key.to_string(),
+        links: ResultLinks { this: format!("/v1/results/{}", result.key) },
+        calculator: result.calculator,
+        version: result.version,
+        engine: result.engine,
+        summary,
+        bytes: result.bytes,
         created_at: format!("{created_at:.3}"),
     }
 }

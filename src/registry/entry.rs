@@ -110,7 +110,7 @@ impl Entry {
             return Err(RegistryError::Reserved(meta.id));
         }
         let output = contract::of::<C::Output>(meta.id, false, |_| {});
-        Ok(Self::new(meta, Contracts::Types { input, output }, Box::new(Typed::<C>(PhantomData))))
+        Ok(Self::new(&meta, Contracts::Types { input, output }, Box::new(Typed::<C>(PhantomData))))
     }
 
     /// The entry of the diagnosis of one calculator.
@@ -122,7 +122,7 @@ impl Entry {
             family::offer_model(job);
         });
         let output = contract::of::<ResultOf<M>>(base.id, false, |_| {});
-        let entry = Self::new(<Diagnosis<M> as Calculator>::META, Contracts::Types { input, output }, calculation);
+        let entry = Self::new(&<Diagnosis<M> as Calculator>::META, Contracts::Types { input, output }, calculation);
         // A diagnosis refuses a base job in the words of the base.
         let of_base = [base.codes.faults, base.codes.failures].into_iter().flatten().copied().flatten();
         Self { model_use: ModelUse::OfBase, more_codes: of_base.copied().collect(), ..entry }
@@ -133,22 +133,22 @@ impl Entry {
         let examples: Vec<_> = members.iter().flat_map(|member| member.entry.meta.examples).copied().collect();
         // A registry lives as long as the process.
         let meta = Meta { examples: Vec::leak(examples), ..members.first()?.entry.meta };
-        let entry = Self::new(meta, Contracts::Members(members), Box::new(NoCalculator));
+        let entry = Self::new(&meta, Contracts::Members(members), Box::new(NoCalculator));
         Some(Self { model_use: ModelUse::OfBase, ..entry })
     }
 
     /// The entry of something that is asked like a calculator and made of other calculators' jobs. It has a route of
     /// the service's own and stands in no registry.
-    pub(crate) fn composed<I: ToSchema, O: ToSchema>(meta: Meta, calculation: Box<dyn Calculation>) -> Self {
+    pub(crate) fn composed<I: ToSchema, O: ToSchema>(meta: &Meta, calculation: Box<dyn Calculation>) -> Self {
         let input = contract::of::<I>(meta.id, true, |_| {});
         let output = contract::of::<O>(meta.id, false, |_| {});
         let entry = Self::new(meta, Contracts::Types { input, output }, calculation);
         Self { composed: true, model_use: ModelUse::Within, ..entry }
     }
 
-    fn new(meta: Meta, contracts: Contracts, calculation: Box<dyn Calculation>) -> Self {
+    fn new(meta: &Meta, contracts: Contracts, calculation: Box<dyn Calculation>) -> Self {
         Self {
-            meta,
+            meta: *meta,
             contracts,
             checker: OnceLock::new(),
             tables: OnceLock::new(),
@@ -432,8 +432,8 @@ impl Prepared {
         Self { cost, canonical, numbers_of: None, job }
     }
     /// The same with numbers that another calculator makes: its version counts, too.
-    pub(crate) fn with_numbers_of(self, meta: Meta) -> Self {
-        Self { numbers_of: Some(meta), ..self }
+    pub(crate) fn with_numbers_of(self, meta: &Meta) -> Self {
+        Self { numbers_of: Some(*meta), ..self }
     }
     /// The job with every default filled in.
     pub fn input(&self) -> Result<Value, Failure> {
@@ -511,7 +511,7 @@ struct NumbersOf<T> {
 
 impl<T: Calculation> Calculation for NumbersOf<T> {
     fn prepare(&self, job: &Value) -> Result<Prepared, Unprepared> {
-        Ok(self.calculation.prepare(job)?.with_numbers_of(self.meta))
+        Ok(self.calculation.prepare(job)?.with_numbers_of(&self.meta))
     }
     fn broken_rules(&self, job: &Value) -> Vec<Finding> {
         self.calculation.broken_rules(job)

@@ -213,6 +213,7 @@ impl Calculator for Toy {
             title: "Plain",
             job: r#"{"length_mm": 500, "segments": [{"diameter_mm": 20}]}"#,
         }],
+        hallmarks: &[],
         study_outputs: &["/deflections_um/0"],
         codes: Codes {
             faults: &[&["toy_bad_length", "toy_no_segments", "unknown_support", "thicker_than_long"]],

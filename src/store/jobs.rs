@@ -405,6 +405,9 @@ pub trait JobStore: Send + Sync + 'static {
     fn job(&self, id: JobId) -> BoxFuture<'_, Result<Option<JobRecord>, StoreError>>;
     /// The jobs, newest first.
     fn jobs(&self, query: JobQuery) -> BoxFuture<'_, Result<JobPage, StoreError>>;
+    /// What jobs need to run, compressed, as far as it takes no more than so many bytes; those that have none any more
+    /// are left out.
+    fn job_inputs(&self, ids: Vec<JobId>, most: usize) -> BoxFuture<'_, Result<Vec<(JobId, Bytes)>, StoreError>>;
     /// How many wait and run.
     fn counts(&self) -> BoxFuture<'_, Result<JobCounts, StoreError>>;
     /// Starts charged to the job's computation so far, if it waits.

@@ -91,6 +91,9 @@ pub trait ResultStore: Send + Sync + 'static {
     fn put(&self, result: KeptResult);
     /// The results, newest first, those just put among them.
     fn list(&self, query: ResultQuery) -> BoxFuture<'_, Result<ResultPage, StoreError>>;
+    /// The filled jobs of kept results, compressed, as far as they take no more than so many bytes; those that are not
+    /// there are left out.
+    fn inputs(&self, keys: Vec<Key>, most: usize) -> BoxFuture<'_, Result<Vec<(Key, Bytes)>, StoreError>>;
     /// Whether it answers.
     fn ping(&self) -> BoxFuture<'_, Result<(), StoreError>>;
     /// Writes what waits and closes.

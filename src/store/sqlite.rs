@@ -8,9 +8,9 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use futures_util::future::BoxFuture;
-use sqlx::Connection;
 use sqlx::migrate::{MigrateError, Migrator};
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous};
+use sqlx::{Connection, QueryBuilder, Sqlite};
 
 use super::OpenError;
 use super::ledger::Ledger;
@@ -181,6 +181,18 @@ impl SqliteStore {
         let next = items.last().filter(|_| more).map(|last| Cursor { created_ms: last.created_ms, key: last.key });
         Ok(ResultPage { items, next })
     }
+
+    async fn some_inputs(&self, keys: Vec<Key>, most: usize) -> Result<Vec<(Key, Bytes)>, StoreError> {
+        let mut statement = QueryBuilder::<Sqlite>::new("SELECT key, input FROM results WHERE length(input) <= ");
+        statement.push_bind(i64::try_from(most).unwrap_or(i64::MAX)).push(" AND key IN (");
+        let mut places = statement.separated(", ");
+        for key in keys {
+            places.push_bind(key.as_bytes().to_vec());
+        }
+        statement.push(")");
+        let rows: Vec<(Vec<u8>, Vec<u8>)> = statement.build_query_as().fetch_all(&self.readers).await?;
+        Ok(rows.into_iter().filter_map(|(key, input)| Some((Key::from_bytes(&key)?, input.into()))).collect())
+    }
 }
 
 impl ResultStore for SqliteStore {
@@ -192,6 +204,9 @@ impl ResultStore for SqliteStore {
     }
     fn list(&self, query: ResultQuery) -> BoxFuture<'_, Result<ResultPage, StoreError>> {
         Box::pin(self.page(query))
+    }
+    fn inputs(&self, keys: Vec<Key>, most: usize) -> BoxFuture<'_, Result<Vec<(Key, Bytes)>, StoreError>> {
+        Box::pin(self.some_inputs(keys, most))
     }
     fn ping(&self) -> BoxFuture<'_, Result<(), StoreError>> {
         Box::pin(async {

@@ -150,7 +150,8 @@ impl Glossary {
 
     /// A unit of the contract as it is printed: `µm/N` for `um/N`, nothing for `1`.
     pub(crate) fn unit(&self, unit: &str) -> String {
-        if unit == "1" {
+        // A unit that another field says is not known here.
+        if unit == "1" || unit.starts_with("as ") {
             return String::new();
         }
         if let Some(own) = self.get("unit", unit) {
@@ -197,7 +198,7 @@ fn derived(field: &str, unit: Option<&str>) -> String {
     capitalised(&bare.unwrap_or(field).replace('_', " "))
 }
 
-fn capitalised(text: &str) -> String {
+pub(super) fn capitalised(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }

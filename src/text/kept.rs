@@ -69,7 +69,8 @@ fn values(item: Option<&Value>) -> Option<Values> {
     map.iter().try_fold(Values::new(), |values, (name, value)| Some(values.with(interned(name), datum(value)?)))
 }
 
-fn datum(value: &Value) -> Option<Datum> {
+/// A number, a name or a list of them as it stands in documents.
+pub(crate) fn datum(value: &Value) -> Option<Datum> {
     Some(match value {
         Value::Number(number) => Datum::Number(number.as_f64()?),
         Value::String(text) => Datum::Text(text.clone().into()),

@@ -39,9 +39,7 @@ fn setting(name: &str, set: &Value, unit: &str, language: Language) -> String {
 
 /// A number that is written already with its unit, where it has one.
 pub(super) fn amount(number: &str, unit: &str, language: Language) -> String {
-    // A unit that another field says is not known here.
-    let known = if unit.starts_with("as ") { "1" } else { unit };
-    match Glossary::of(language).unit(known) {
+    match Glossary::of(language).unit(unit) {
         unit if unit.is_empty() => number.to_owned(),
         unit => format!("{number} {unit}"),
     }

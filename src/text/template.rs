@@ -1,5 +1,7 @@
 //! What templates may do with their values, each in the language of the template.
 
+use std::collections::BTreeMap;
+
 use minijinja::value::ValueKind;
 use minijinja::{Environment, Error, State, UndefinedBehavior, Value};
 
@@ -7,6 +9,9 @@ use super::glossary::Glossary;
 use super::named::{amount, named};
 use super::number;
 use super::{Language, significant};
+
+/// A probability beyond this is told as that.
+const MOST_CERTAIN: f64 = 0.99;
 
 /// An environment that knows the filters of the texts and no text yet.
 pub(super) fn environment() -> Environment<'static> {
@@ -25,6 +30,15 @@ pub(super) fn environment() -> Environment<'static> {
     });
     environment.add_filter("percent", |state: &State<'_, '_>, share: f64| {
         format!("{} %", number::spoken(&significant(100.0 * share, 3), language_of(state)))
+    });
+    environment.add_filter("chance", |state: &State<'_, '_>, probability: f64| {
+        // No finite data make anything certain.
+        let (sign, shown) = match probability {
+            high if high > MOST_CERTAIN => ("> ", MOST_CERTAIN),
+            low if low < 1.0 - MOST_CERTAIN => ("< ", 1.0 - MOST_CERTAIN),
+            between => ("", between),
+        };
+        format!("{sign}{}", number::spoken(&significant(shown, 2), language_of(state)))
     });
     environment.add_filter("um", |state: &State<'_, '_>, value: f64| measured(state, value, 3, "um"));
     environment.add_filter("mm", |state: &State<'_, '_>, value: f64| measured(state, value, 6, "mm"));
@@ -46,6 +60,7 @@ pub(super) fn environment() -> Environment<'static> {
     });
     environment.add_filter("reason", |state: &State<'_, '_>, text: &str| Glossary::of(language_of(state)).reason(text));
     environment.add_filter("list", list);
+    environment.add_filter("warning", warning);
     environment.add_filter("plural", plural);
     environment
 }
@@ -53,6 +68,19 @@ pub(super) fn environment() -> Environment<'static> {
 /// Templates are called `{language}/{section}.{code}`.
 fn language_of(state: &State<'_, '_>) -> Language {
     Language::ALL.into_iter().find(|language| language.owns(state.name())).unwrap_or_default()
+}
+
+/// The sentence of another warning: its numbers and names as `[name, value]`, its code, and the field it is about.
+#[allow(clippy::needless_pass_by_value)]
+fn warning(state: &State<'_, '_>, said: Value, code: &str, pointer: &str) -> Result<String, Error> {
+    let mut context: BTreeMap<String, Value> = BTreeMap::new();
+    for pair in said.try_iter()? {
+        context.insert(pair.get_item_by_index(0)?.to_string(), pair.get_item_by_index(1)?);
+    }
+    context.insert("pointer".to_owned(), pointer.into());
+    context.insert("field".to_owned(), super::field(pointer).into());
+    let name = super::name(language_of(state), "warning", code);
+    state.env().get_template(&name)?.render(context)
 }
 
 /// Limits by name and place (`deflection@z5`): one, or several with commas between them.

@@ -121,12 +121,53 @@ fn long_faults_move_no_column() {
         );
         assert_eq!(fits, true, "{width}");
         // The field says where its fault stands.
-        let told = page.evaluate(
-            "document.getElementById(document.querySelector('#field-shaft-segments-0-diameter_mm').getAttribute('aria-describedby'))?.textContent",
+        page.until(
+            "document.getElementById(document.querySelector('#field-shaft-segments-0-diameter_mm').getAttribute('aria-describedby'))?.textContent.length > 20",
         );
-        assert!(told.as_str().is_some_and(|told| told.len() > 20), "{told}");
         page.click_on("EN");
         page.until("document.documentElement.lang === 'en'");
+    }
+    page.assert_calm();
+}
+
+/// Every word of headings, labels and names stands on one line, whatever the width and the language; and nothing lies
+/// below the end of the page.
+#[test]
+fn no_word_is_broken_and_no_page_ends_in_emptiness() {
+    let Some((_turn, mut page, service)) = both() else { return };
+    let rooms = rooms(&mut page, &service);
+    let broken = "(() => { const broken = new Set(); \
+        for (const it of document.querySelectorAll('.form .grid:not(.still) th, .row .label, .fold-title, legend, .figure-choice button, .panel-head span, [role=tab], .value-table th, .value-table td, .shell a')) { \
+          if (!it.checkVisibility()) continue; \
+          const walk = document.createTreeWalker(it, NodeFilter.SHOW_TEXT); \
+          for (let text = walk.nextNode(); text; text = walk.nextNode()) for (const word of text.data.matchAll(/[^\\s\\u00a0-]+/g)) { \
+            const range = document.createRange(); range.setStart(text, word.index); range.setEnd(text, word.index + word[0].length); \
+            const lines = new Set([...range.getClientRects()].filter(box => box.width > 0.5).map(box => Math.round(box.top))); \
+            if (lines.size > 1) broken.add(word[0]); } } \
+        return [...broken] })()";
+    for (width, height) in [(360, 740), (1024, 600), (1440, 900)] {
+        page.screen(width, height, false);
+        for language in ["EN", "RU"] {
+            page.open(&service.page(""));
+            page.click_on(language);
+            page.until(&format!("document.documentElement.lang === '{}'", language.to_lowercase()));
+            for room in &rooms {
+                page.open(&service.page(room));
+                page.until(SETTLED);
+                page.wait_for(".value-table");
+                assert_eq!(page.evaluate(broken), json!([]), "{room} at {width}, {language}");
+                let below = "document.documentElement.scrollHeight - Math.max(innerHeight, Math.round(document.querySelector('.result-pane').getBoundingClientRect().bottom + scrollY))";
+                assert_eq!(page.evaluate(&format!("{below} <= 2")), true, "{room} at {width}, {language}");
+                if width < 861 {
+                    page.click(".pane-switch button");
+                }
+                page.evaluate(
+                    "document.querySelectorAll('.fold-head button[aria-expanded=false]').forEach(it => it.click())",
+                );
+                page.until("!document.querySelector('.fold-head button[aria-expanded=false]')");
+                assert_eq!(page.evaluate(broken), json!([]), "form of {room} at {width}, {language}");
+            }
+        }
     }
     page.assert_calm();
 }

@@ -6,6 +6,8 @@ use serde_json::json;
 use crate::{SETTLED, both};
 
 const PLACE: &str = "(() => { const box = document.querySelector('.picture.main').getBoundingClientRect(); return [box.top + scrollY, box.height] })()";
+/// Where the picture stands in the page, and the links of the shell.
+const ALL: &str = "[...document.querySelectorAll('.picture.main, .shell a, .figure-choice')].map(it => { const box = it.getBoundingClientRect(); return [it.className, Math.round(box.left), Math.round(box.top + scrollY), Math.round(box.width)] })";
 
 #[test]
 fn neither_a_reading_nor_a_fault_nor_a_lost_service_moves_the_picture() {
@@ -48,6 +50,37 @@ fn neither_a_reading_nor_a_fault_nor_a_lost_service_moves_the_picture() {
     assert_eq!(page.evaluate("document.querySelectorAll('.problem').length"), 0, "it is said once");
     offline(&mut page, false);
     page.until(&format!("!document.querySelector('.banner') && location.hash.includes('feed_mm_per_rev=0.3') && !document.querySelector('.stale-note') && {SETTLED}"));
+    page.assert_calm();
+}
+
+/// A long job is told in room that is there before it begins: nothing moves when it begins, gets on, or is cancelled.
+#[test]
+fn a_long_job_moves_nothing() {
+    let Some((_turn, mut page, service)) = both() else { return };
+    for (order, (width, height, language)) in
+        [(1440, 900, "en"), (1024, 600, "ru"), (360, 740, "ru"), (360, 740, "en")].into_iter().enumerate()
+    {
+        page.screen(width, height, false);
+        page.open(&service.page("ring-roundness?example=set_up"));
+        page.click_on(&language.to_uppercase());
+        page.until(&format!("document.documentElement.lang === '{language}' && {SETTLED}"));
+        page.until("document.querySelector('.verdict')");
+        let still = page.evaluate(ALL);
+        let highest = 57 + order;
+        page.evaluate(&format!("location.hash = '#/ring-roundness?example=set_up&/setup_map/tool_angles=721&/setup_map/support_angles=361&/setup_map/highest_order={highest}'"));
+        page.wait_for(".shell .count");
+        page.until("document.querySelector('.progress-box').checkVisibility({visibilityProperty: true})");
+        assert_eq!(page.evaluate(ALL), still, "{width} {language}: begun");
+        // It is all there: nothing of it is cut off, nothing wider than the page.
+        assert_eq!(page.evaluate("document.documentElement.scrollWidth <= innerWidth"), true);
+        let inside = "(() => { const head = document.querySelector('.room-head').getBoundingClientRect(); return ['.progress-text .left', '#cancel-job', '.progress-box progress'].every(part => { const box = document.querySelector(part).getBoundingClientRect(); return box.left >= head.left - 1 && box.right <= head.right + 1 && box.top >= head.top - 2 && box.bottom <= head.bottom + 2 }) })()";
+        assert_eq!(page.evaluate(inside), true, "{width} {language}: its words are inside the head");
+        page.click("#cancel-job");
+        page.until("!document.querySelector('.progress-box') && document.querySelector('.stale-note')");
+        page.until("!document.querySelector('.shell .count')");
+        assert_eq!(page.evaluate(ALL), still, "{width} {language}: cancelled");
+        assert_eq!(page.evaluate("document.querySelectorAll('.problem').length"), 0, "a cancel is no fault");
+    }
     page.assert_calm();
 }
 

@@ -191,9 +191,12 @@ impl Page {
         value.as_str().unwrap_or_default().to_owned()
     }
 
-    /// Middle of an element, px, after bringing it into sight.
+    /// Middle of an element, px, after bringing it into sight. What shows itself only after a moment is waited for.
     pub fn middle(&mut self, selector: &str) -> (f64, f64) {
-        self.wait_for(selector);
+        self.until(&format!(
+            "document.querySelector({}).checkVisibility({{visibilityProperty: true}})",
+            json!(selector)
+        ));
         let found = self.evaluate(&format!(
             "(() => {{ const it = document.querySelector({}); it.scrollIntoView({{block: 'center'}}); \
              const box = it.getBoundingClientRect(); return [box.x + box.width / 2, box.y + box.height / 2] }})()",

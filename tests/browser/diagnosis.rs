@@ -49,7 +49,42 @@ fn a_diagnosis_is_saved_as_a_model_and_used_in_another_form() {
     page.open(&service.page("models"));
     page.wait_for(".list tbody tr");
     page.click(".list tbody tr td:last-child button:last-child");
+    // The first click asks, the second one does it.
+    page.until("document.querySelector('.list .sure')");
+    assert_eq!(page.evaluate("document.querySelectorAll('.list tbody tr').length"), 1);
+    page.click(".list tbody tr td:last-child button:last-child");
     page.until("!document.querySelector('.list tbody tr')");
+    page.assert_calm();
+}
+
+/// The headings of the shop's own table are understood where they are the form's words.
+#[test]
+fn a_table_with_headings_in_russian_is_matched() {
+    let Some((_turn, mut page, service)) = both() else { return };
+    page.open(&service.page("diagnosis"));
+    page.until(SETTLED);
+    page.click_on("RU");
+    page.until(&format!("document.documentElement.lang === 'ru' && {SETTLED}"));
+    // The form follows a moment after the page's own words.
+    page.until("document.querySelector('.sections').textContent.includes('Отклонение диаметра')");
+    let csv = page.evaluate(
+        "(async () => { const room = await (await fetch('/v1/calculators/diagnosis')).json(); \
+         const rows = room.jobs[room.examples[0].id].measurements; const said = number => String(number).replace('.', ','); \
+         return ['Опыт;Z, мм;Отклонение диаметра (мкм);Примечание', ...rows.map(row => [row.run, said(row.z_mm), said(row.diameter_deviation_um), 'норма'].join(';'))].join('\\n') })()",
+    );
+    page.evaluate(&format!(
+        "(() => {{ const data = new DataTransfer(); data.items.add(new File([{csv}], 'вал.csv', {{type: 'text/csv'}})); \
+         document.querySelector('.table-input').dispatchEvent(new DragEvent('drop', {{bubbles: true, cancelable: true, dataTransfer: data}})) }})()"
+    ));
+    page.wait_for(".matching .primary:not(:disabled)");
+    let matched = "[...document.querySelectorAll('.matching tbody tr')].map(row => row.querySelector('select').value).filter(Boolean).join()";
+    assert_eq!(page.evaluate(matched), "0,1,2");
+    page.click(".matching .primary");
+    page.until("!document.querySelector('.matching')");
+    let state = page.text(".table-state");
+    assert!(state.contains("110") && state.contains("Отклонение диаметра") && !state.contains('_'), "{state}");
+    page.click_on("EN");
+    page.until("document.documentElement.lang === 'en'");
     page.assert_calm();
 }
 

@@ -24,6 +24,7 @@ fn a_long_job_shows_its_progress_survives_a_reload_and_is_cancelled() {
 
     page.open(&service.page("jobs"));
     page.until("document.querySelector('.state.cancelled')");
+    page.until("/^Radius .* mm · .*feed/.test(document.querySelector('.told').textContent)");
     page.assert_calm();
 }
 
@@ -35,6 +36,12 @@ fn kept_results_are_listed_and_opened_without_computing() {
     let verdict = page.text(".verdict");
     page.open(&service.page("results"));
     page.wait_for(".list tbody a");
+    // It says what it is a result of, in the language of the page.
+    page.until("/^Diameter 100 mm · .*depth 3 mm/.test(document.querySelector('.told').textContent)");
+    page.click_on("RU");
+    page.until("/^Диаметр 100 мм · .*глубина резания 3 мм/.test(document.querySelector('.told')?.textContent)");
+    page.click_on("EN");
+    page.until("/^Diameter/.test(document.querySelector('.told')?.textContent)");
     page.click(".list tbody a");
     page.until(&format!("{SETTLED} && location.hash.includes('result=b3:')"));
     assert_eq!(page.text(".verdict"), verdict);

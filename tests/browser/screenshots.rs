@@ -8,7 +8,7 @@ use crate::chromium::Page;
 use crate::{SETTLED, both};
 
 /// Name, place, width, height, whether dark.
-const SHOTS: [(&str, &str, u32, u32, bool); 18] = [
+const SHOTS: [(&str, &str, u32, u32, bool); 20] = [
     ("deflection", "deflection-compensation", 1440, 900, false),
     ("deflection-ru", "deflection-compensation?example=stepped_with_rest", 1440, 900, false),
     ("lobes", "fixture-stability?example=lobes", 1440, 900, true),
@@ -21,6 +21,8 @@ const SHOTS: [(&str, &str, u32, u32, bool); 18] = [
     ("diagnosis", "diagnosis", 1920, 1080, false),
     ("diagnosis-phone", "diagnosis", 360, 740, true),
     ("diagnosis-wide", "diagnosis", 2560, 1300, false),
+    ("progress", "ring-roundness?example=set_up", 1440, 900, false),
+    ("results", "results", 1440, 900, false),
     ("models", "models", 1024, 600, false),
     ("models-phone", "models", 360, 740, true),
     ("trials", "machinability-fit", 1920, 1080, false),
@@ -52,7 +54,7 @@ fn the_documentation_shows_the_workbench_as_it_is() {
         page.click_on(&language.to_uppercase());
         page.until(&format!("document.documentElement.lang === {}", json!(language)));
         match place {
-            "models" => page.wait_for(".list tbody tr"),
+            "models" | "results" => page.wait_for(".list tbody tr"),
             "studies" => page.wait_for("#run-study"),
             _ => page.until(SETTLED),
         }
@@ -80,6 +82,11 @@ fn stage(page: &mut Page, name: &str) {
                 page.press("ArrowRight");
             }
             page.until("document.querySelector('.picture h2').textContent.includes('revolution 9 of')");
+        }
+        "progress" => {
+            page.evaluate("location.hash = '#/ring-roundness?example=set_up&/setup_map/tool_angles=721&/setup_map/support_angles=361&/setup_map/highest_order=60'");
+            page.wait_for(".shell .count");
+            page.until("parseFloat(document.querySelector('.progress-text .left')?.textContent) >= 20");
         }
         "ring-map" => {
             page.click_on("Worst wave");

@@ -57,6 +57,55 @@ async fn results_are_listed_by_pages_without_gap_or_repetition() {
     assert_eq!(seen, keys);
 }
 
+/// What was computed stands in the lists, in the reader's language, and costs no answer its place.
+#[tokio::test]
+async fn results_and_jobs_are_told_apart_in_lists() {
+    let server = Server::start_of(precut::registry::Registry::standard().unwrap(), |_| {}).await;
+    let entry = precut::registry::Registry::standard().unwrap();
+    let mut job: Value =
+        serde_json::from_str(entry.entry("deflection-compensation").unwrap().meta().examples[0].job).unwrap();
+    let ask = |job: &Value| server.post_to("/v1/deflection-compensation", job.to_string());
+    assert_eq!(ask(&job).send().await.unwrap().status(), 200);
+    job["cut"]["feed_mm_per_rev"] = 0.25.into();
+    assert_eq!(ask(&job).header("prefer", "respond-async").send().await.unwrap().status(), 202);
+    let all = listed(&server, "/v1/results", 2).await;
+    assert_eq!(all["items"].as_array().unwrap().len(), 2);
+    for (language, first, second) in [
+        ("en", "Diameter 90 mm · length 2000 mm · feed 0.25 mm/rev · ", "feed 0.5 mm/rev"),
+        ("ru", "Диаметр 90 мм · длина 2000 мм · подача 0,25 мм/об · ", "подача 0,5 мм/об"),
+    ] {
+        for (path, count) in [("/v1/results", 2), ("/v1/jobs", 1)] {
+            // Twice: read, then remembered.
+            for _ in 0..2 {
+                let response = server.get(path).header("accept-language", language).send().await.unwrap();
+                assert_eq!(header(&response, "content-language"), language);
+                let list: Value = response.json().await.unwrap();
+                let items = list["items"].as_array().unwrap();
+                assert_eq!(items.len(), count, "{path}");
+                assert!(items[0]["summary"].as_str().unwrap().starts_with(first), "{path}: {}", items[0]);
+                assert!(count == 1 || items[1]["summary"].as_str().unwrap().contains(second), "{}", items[1]);
+            }
+        }
+    }
+    // A job that is too large to be read for a list has its line all the same.
+    let server = Server::start().await;
+    let mut noise = 1_u32;
+    let rows: Vec<Value> = (0..10_000)
+        .map(|_| {
+            noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            serde_json::json!({"z_mm": f64::from(noise % 1_000_000) / 1e3, "sag_um": f64::from(noise >> 9) / 1e3})
+        })
+        .collect();
+    let job = serde_json::json!({"length_mm": 321, "load_n": 5, "measurements": rows});
+    assert_eq!(server.post(job.to_string()).send().await.unwrap().status(), 200);
+    assert_eq!(server.post(toy::JOB).send().await.unwrap().status(), 200);
+    let all = listed(&server, "/v1/results", 2).await;
+    // Written in one group they have one time.
+    let mut told: Vec<_> = all["items"].as_array().unwrap().iter().map(|item| item["summary"].as_str()).collect();
+    told.sort_unstable();
+    assert_eq!(told, [None, Some("Length 500 mm · quick")]);
+}
+
 #[tokio::test]
 async fn a_result_is_read_in_every_form_without_computing() {
     let server = Server::start().await;

@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 use precut::registry::Registry;
 use precut_calc::calculator::{
     Answer, Axis, Basis, Block, Calculator, CalculatorKind, Check, Codes, Column, Cost, Dialect, Example, Failure,
-    Figure, Finding, Frame, Item, Measured, MeasuredRow, Message, Meta, Monitor, Panel, Program, Registrar, Role,
-    Table, Violations, checkpoint,
+    Figure, Finding, Frame, Hallmark, Item, Measured, MeasuredRow, Message, Meta, Monitor, Panel, Program, Registrar,
+    Role, Table, Violations, checkpoint,
 };
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -159,6 +159,7 @@ impl Calculator for Bar {
         summary: "A bar on two supports under a load.",
         references: &["A textbook."],
         examples: &[Example { id: "plain", title: "A plain bar", job: JOB }],
+        hallmarks: &[Hallmark::Of("/length_mm"), Hallmark::Count("/measurements"), Hallmark::Of("/behaviour")],
         study_outputs: &["/max_sag_um"],
         codes: Codes {
             faults: &[&["load_too_large"]],

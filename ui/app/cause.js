@@ -52,6 +52,7 @@ export function Causes({ result, schema, unit }) {
       <table><tbody>${bars.map(({ key, name, share, isNamed }) => html`<tr key=${key} class=${isNamed ? 'named' : ''}><th scope="row">${name}</th>
         <td class="clamp-bar"><svg viewBox=${`0 0 ${WIDTH} 14`} preserveAspectRatio="none" aria-hidden="true"><rect class=${isNamed ? 'clamp-given' : 'clamp-statics'} x="0" y="1" width=${Math.max(WIDTH * share, 2)} height="12" /></svg></td>
         <td class="number">${percent(share)}</td></tr>`)}</tbody></table>
+      <p class="quiet">${t('share_means')}</p>
       ${result.named.length > 0 && html`<ul class="sizes">${result.named.map(({ kind, label, parameters }) => html`<li key=${kind + label}><strong>${nameOf(kind, label)}</strong>${parameters.map(one => {
         const field = kinds.get(kind)?.properties[one.name];
         return html` · ${field ? labelOf(one.name, field) : humanised(one.name, one.unit)} ${one.standard_deviation ? withSpread(one.value, one.standard_deviation) : number(one.value, 4)} ${field ? unitOf(field) : unitSymbol(one.unit)}${one.at_limit ? ` (${t('at_limit')})` : ''}`;
@@ -64,7 +65,8 @@ export function Causes({ result, schema, unit }) {
     </section>`;
 }
 
-const percent = share => (share > 0 && share < 0.001 ? `< ${number(0.1)} %` : `${number(100 * share, share > 0.1 && share < 0.995 ? 2 : 3)} %`);
+// No finite data make anything certain.
+const percent = share => (share > 0.999 ? `> ${number(99.9)} %` : share > 0 && share < 0.001 ? `< ${number(0.1)} %` : `${number(100 * share, share > 0.99 ? 3 : 2)} %`);
 
 /** The error on held-back data before and after, against what scatter and allowances leave to any model. */
 function Gain({ gain, unit }) {

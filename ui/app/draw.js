@@ -23,6 +23,20 @@ export function role(of) {
   return { name: of, marker: MARKERS[BY_ROLE[of] || 'circle'] };
 }
 
+/** A curve that turns more often than this is a solid band: dashes would break it up. */
+const MOST_TURNS = 60;
+function isDense(item) {
+  if (item.kind !== 'line' || item.x.length < 2 * MOST_TURNS) return false;
+  let turns = 0;
+  let before = 0;
+  for (let index = 1; index < item.y.length; index += 1) {
+    const step = Math.sign(item.y[index] - item.y[index - 1]);
+    if (step && before && step !== before) turns += 1;
+    if (step) before = step;
+  }
+  return turns > MOST_TURNS;
+}
+
 /** The classes of every name: equal names look equal in all panels, different names of one role differ. */
 export function styles(figure) {
   const counts = {};
@@ -34,7 +48,7 @@ export function styles(figure) {
       if (known.has(key)) continue;
       counts[base] = (counts[base] ?? -1) + 1;
       const variant = counts[base] % VARIANTS;
-      known.set(key, variant ? `${base} v${variant}` : base);
+      known.set(key, `${variant ? `${base} v${variant}` : base}${figure.frame !== 'polar' && isDense(item) ? ' dense' : ''}`);
     }
   }
   return item => known.get(`${role(item.role).name} ${item.name}`) || role(item.role).name;

@@ -37,7 +37,7 @@ export function Row({ name, schema, path, value, required, context, control: Con
   const own = defaultText(schema);
   // A number that the service takes from elsewhere says from where.
   const from = typeof filled === 'number' && filled !== schema.default ? `${number(filled)} ${unitOf(schema)}: ${context.sourceAt(path)}`.replace(/ +:/, ':') : '';
-  const description = [schema.description, own, from].filter(Boolean).join(' ');
+  const description = spoken([schema.description, own, from].filter(Boolean).join(' '), context.names);
   const allowed = kindOf(schema) === 'number' ? rangeText(schema) : '';
   const show = () => context.setHelp({ label, symbol: schema['x-symbol'], range: allowed, description });
   const [wrong, setWrong] = useState(null);
@@ -53,7 +53,7 @@ export function Row({ name, schema, path, value, required, context, control: Con
   };
   return html`
     <div class=${`row ${faults.length || wrong ? 'faulty' : ''} ${compact ? 'compact' : ''}`} onMouseEnter=${show} onFocusIn=${show}>
-      <${Control} ...${common} label=${html`<span>${label}</span>${schema['x-symbol'] && schema['x-symbol'].toLowerCase() !== label.toLowerCase() && html` <${Symbol} symbol=${schema['x-symbol']} />`}`} unit=${unit} plain=${label} />
+      <${Control} ...${common} label=${html`<span>${label}</span>${schema['x-symbol'] && schema['x-symbol'].toLowerCase() !== label.toLowerCase() && html`\u00a0<${Symbol} symbol=${schema['x-symbol']} />`}`} unit=${unit} plain=${label} />
       <span id=${`${id}-about`} class="hidden">${[unit && t('in_unit', { unit }), allowed, description].filter(Boolean).join('. ')}</span>
       <${Faults} faults=${wrong ? [{ detail: wrong }] : faults} id=${`${id}-fault`} names=${context.names} />
     </div>`;
@@ -152,7 +152,7 @@ function useDrag(value, schema, set) {
 export function TextInput({ id, value, schema, set, described, invalid, label, required, context }) {
   return html`
     <label for=${id} class="label">${label}</label>
-    <span class="control wide"><input id=${id} type="text" autocomplete="off" value=${value ?? ''} placeholder=${schema.default ?? ''} disabled=${context.disabled}
+    <span class="control wide">${context.names?.has(value) && html`<span class="called">${context.names.get(value)}</span>`}<input id=${id} type="text" autocomplete="off" value=${value ?? ''} placeholder=${schema.default ?? ''} disabled=${context.disabled}
       aria-describedby=${described} aria-invalid=${invalid ? 'true' : undefined} aria-required=${required ? 'true' : undefined}
       onChange=${event => set(event.currentTarget.value === '' && !required ? undefined : event.currentTarget.value)} /></span>`;
 }

@@ -1,7 +1,7 @@
 // A form from a schema. Nothing here knows a calculator.
 import { html, useState, useEffect, useMemo, unique } from './lib.js';
 import { t, number, unitOf } from './text.js';
-import { resolve, namesOf, kindOf, variants, variantOf, variantName, blank, labelOf, wordOf, pointer, at, changed } from './schema.js';
+import { resolve, namesOf, kindOf, variants, variantOf, variantName, blank, labelOf, wordOf, spoken, pointer, at, changed } from './schema.js';
 import { fieldId, isLeaf, Symbol, Faults, Row, NumberInput, TextInput, Enum, Switch, Library, ModelChoice } from './fields.js';
 import { List, MapFields } from './lists.js';
 import { TableInput } from './table-input.js';
@@ -55,6 +55,8 @@ export function Form({ calculator, schema, value, filled, onChange, errors, libr
     loose.set(group, [...(loose.get(group) || []), entry]);
   }
   const asked = sections.filter(({ name, schema: part }) => required.has(name) || value[name] !== undefined && !part['x-advanced']);
+  // What was measured comes first where nothing can be said without it.
+  asked.sort((a, b) => Number(Boolean(b.schema['x-table'] && required.has(b.name))) - Number(Boolean(a.schema['x-table'] && required.has(a.name))));
   const usual = sections.filter(entry => !asked.includes(entry) && entry.schema['x-table']);
   const further = sections.filter(entry => !asked.includes(entry) && !usual.includes(entry));
   const section = ({ name, schema: part }, open) => html`
@@ -123,7 +125,7 @@ function Section({ name, schema, path, value, open, required, context }) {
       <${Faults} faults=${kind === 'table' ? [] : direct} id=${fieldId(path)} names=${context.names} />
       ${isThere || required || kind === 'table' || (kind === 'object' && !schema.optional) || kind === 'array' || kind === 'map'
         ? html`<${Body} name=${name} schema=${schema} path=${path} value=${value} context=${context} />`
-        : html`<p class="absent"><span>${schema.description}</span><button type="button" onClick=${add}>${t('add')}<span class="hidden"> ${label}</span></button></p>`}
+        : html`<p class="absent"><span>${spoken(schema.description, context.names)}</span><button type="button" onClick=${add}>${t('add')}<span class="hidden"> ${label}</span></button></p>`}
     <//>`;
 }
 
@@ -202,7 +204,7 @@ export function Field(props) {
       <${Faults} faults=${context.errorsAt(path)} id=${`${fieldId(path)}-part`} names=${context.names} />
       ${isThere || required || kind === 'array'
         ? html`<${Body} name=${name} schema=${schema} path=${path} value=${value} context=${context} />`
-        : html`<p class="absent"><span>${schema.description}</span><button type="button" onClick=${() => set(blank({ ...schema, optional: false }, context.root))}>${t('add')}<span class="hidden"> ${label}</span></button></p>`}
+        : html`<p class="absent"><span>${spoken(schema.description, context.names)}</span><button type="button" onClick=${() => set(blank({ ...schema, optional: false }, context.root))}>${t('add')}<span class="hidden"> ${label}</span></button></p>`}
     </fieldset>`;
 }
 

@@ -1,6 +1,6 @@
 // The pages beside the calculators: what there is to ask, jobs, kept results, stored models.
 import { html, useState, useEffect, useRef } from './lib.js';
-import { t, number, duration, moment } from './text.js';
+import { t, number, duration, moment, language } from './text.js';
 import * as api from './api.js';
 import { save } from './result.js';
 
@@ -62,6 +62,9 @@ function ListState({ items, trouble, empty }) {
 const addressOf = ({ calculator, key }) => (calculator === 'studies' ? `#/studies?study=${key}` : `#/${calculator}?result=${key}`);
 const titleOf = (calculators, id) => (id === 'studies' ? t('study') : calculators.find(item => item.id === id)?.title || id);
 
+/** What a job was: its main numbers. */
+const Told = ({ item }) => item.summary && html`<span class="told">${item.summary.split(' · ').map((mark, index, all) => html`<span key=${index}>${mark}${index < all.length - 1 ? ' ·' : ''}</span> `)}</span>`;
+
 export function Jobs({ calculators, refreshJobs }) {
   const [first] = useState(() => () => api.jobs({ limit: 50 }));
   const { items, next, more, trouble, load } = usePages(first, LOOK_MS);
@@ -76,12 +79,12 @@ export function Jobs({ calculators, refreshJobs }) {
           const isOpen = item.state === 'queued' || item.state === 'running';
           const name = titleOf(calculators, item.calculator);
           return html`<tr role="row" key=${item.id}>
-            <th scope="row" role="rowheader">${!known.has(item.calculator) ? name : item.state === 'succeeded' ? html`<a href=${addressOf(item)}>${name}</a>` : isOpen ? html`<a href=${`#/${item.calculator}?run=${item.id}`}>${name}</a>` : name}</th>
+            <th scope="row" role="rowheader">${!known.has(item.calculator) ? name : item.state === 'succeeded' ? html`<a href=${addressOf(item)}>${name}</a>` : isOpen ? html`<a href=${`#/${item.calculator}?run=${item.id}`}>${name}</a>` : name}<${Told} item=${item} /></th>
             <td role="cell"><span class=${`state ${item.state}`}>${t(`state_${item.state}`)}</span>${item.problem ? html`<span class="quiet"> ${item.problem.detail || item.problem.title}</span>` : ''}</td>
             <td role="cell" class="progress-cell">${isOpen ? html`<progress max="1" value=${item.progress} aria-label=${`${name}: ${t('progress')}`}></progress><span class="quiet">${item.stage || ''}${item.remaining_ms ? ` · ${t('time_left', { time: duration(item.remaining_ms) })}` : ''}</span>`
               : item.started_at && item.finished_at ? html`<span class="took">${duration(new Date(item.finished_at) - new Date(item.started_at))}</span>` : ''}</td>
             <td role="cell" class="when">${moment(item.created_at)}</td>
-            <td role="cell">${isOpen && html`<button type="button" onClick=${() => stop(item.id)}>${t('cancel_job')}<span class="hidden"> ${name}</span></button>`}</td></tr>`;
+            <td role="cell">${isOpen && html`<button type="button" onClick=${() => stop(item.id)}>${t('cancel_job')}<span class="hidden"> ${name}${item.summary ? `, ${item.summary}` : ''}</span></button>`}</td></tr>`;
         })}</tbody></table></div>`}
       ${next && html`<button type="button" class="more" onClick=${more}>${t('older')}</button>`}
     </main>`;
@@ -89,7 +92,7 @@ export function Jobs({ calculators, refreshJobs }) {
 
 export function Results({ calculators, query, replace }) {
   const wanted = query.get('calculator') || '';
-  return html`<${ResultList} key=${wanted} ...${{ calculators, wanted, replace }} />`;
+  return html`<${ResultList} key=${`${wanted} ${language()}`} ...${{ calculators, wanted, replace }} />`;
 }
 
 /** Results of one calculator in a row: of a slider, a study, a number that was nudged. */
@@ -114,18 +117,20 @@ function ResultList({ calculators, wanted, replace }) {
         <option value="">${t('all_calculators')}</option>${calculators.map(({ id, title }) => html`<option value=${id}>${title}</option>`)}<option value="studies">${t('studies')}</option></select></label></p>
       <${ListState} items=${items} trouble=${trouble} empty=${t('no_results')} />
       ${items && items.length > 0 && html`<div class="grid-scroll" tabindex="0" role="region" aria-label=${t('results')}><table class="list" role="table">
-        <thead role="rowgroup"><tr role="row"><th scope="col" role="columnheader">${t('calculator')}</th><th scope="col" role="columnheader">${t('computed')}</th><th scope="col" role="columnheader">${t('key')}</th><th scope="col" role="columnheader">${t('size')}</th></tr></thead>
+        <thead role="rowgroup"><tr role="row"><th scope="col" role="columnheader">${t('calculator')}</th><th scope="col" role="columnheader">${t('computed')}</th><th scope="col" role="columnheader" class="number">${t('size')}</th></tr></thead>
         <tbody role="rowgroup">${inBursts(items).flatMap(([item, ...rest]) => [item, ...(opened.has(item.key) ? rest : [])].map((one, place) => ({ item: one, folded: place === 0 && !opened.has(item.key) ? rest.length : 0 }))).map(({ item, folded }) => html`<tr role="row" key=${item.key}>
-          <th scope="row" role="rowheader">${known.has(item.calculator) ? html`<a href=${addressOf(item)}>${titleOf(calculators, item.calculator)}</a>` : titleOf(calculators, item.calculator)}
+          <th scope="row" role="rowheader">${known.has(item.calculator) ? html`<a href=${addressOf(item)} title=${item.key}>${titleOf(calculators, item.calculator)}</a>` : titleOf(calculators, item.calculator)}<${Told} item=${item} />
             ${folded > 0 && html` <button type="button" class="quiet-button" onClick=${() => setOpened(new Set([...opened, item.key]))}>${t('and_more', { count: folded })}<span class="hidden">: ${titleOf(calculators, item.calculator)}</span></button>`}</th>
-          <td role="cell" class="when">${moment(item.created_at)}</td><td role="cell"><code>${item.key.slice(3, 15)}…</code></td><td role="cell" class="number">${number(item.bytes / 1024, 3)} ${t('kilobytes')}</td></tr>`)}</tbody></table></div>`}
+          <td role="cell" class="when">${moment(item.created_at)}</td><td role="cell" class="number">${number(item.bytes / 1024, 3)} ${t('kilobytes')}</td></tr>`)}</tbody></table></div>`}
       ${next && html`<button type="button" class="more" onClick=${more}>${t('older')}</button>`}
     </main>`;
 }
 
 export function Models({ calculators, models, refreshModels }) {
   const [trouble, setTrouble] = useState(null);
-  const drop = async name => { setTrouble(null); try { await api.dropModel(name); await refreshModels(); } catch (error) { setTrouble(error.problem?.detail || error.message); } };
+  // Whose deletion waits for a second click.
+  const [asked, setAsked] = useState(null);
+  const drop = async name => { setTrouble(null); setAsked(null); try { await api.dropModel(name); await refreshModels(); } catch (error) { setTrouble(error.problem?.detail || error.message); } };
   const fetchDocument = async name => save(new Blob([JSON.stringify(await api.model(name), null, 2)], { type: 'application/json' }), `${name}.json`);
   const load = async files => {
     setTrouble(null);
@@ -140,11 +145,11 @@ export function Models({ calculators, models, refreshModels }) {
       ${trouble && html`<p class="problem" role="alert">${trouble}</p>`}
       ${models === null ? html`<p class="empty-list">${t('models_absent')}</p>` : html`
         ${models.length === 0 ? html`<p class="empty-list">${t('no_models')}</p>` : html`<div class="grid-scroll" tabindex="0" role="region" aria-label=${t('models')}><table class="list" role="table">
-          <thead role="rowgroup"><tr role="row"><th scope="col" role="columnheader">${t('name')}</th><th scope="col" role="columnheader">${t('calculator')}</th><th scope="col" role="columnheader">${t('revision')}</th><th scope="col" role="columnheader">${t('created')}</th><th scope="col" role="columnheader"><span class="hidden">${t('actions')}</span></th></tr></thead>
+          <thead role="rowgroup"><tr role="row"><th scope="col" role="columnheader">${t('name')}</th><th scope="col" role="columnheader">${t('calculator')}</th><th scope="col" role="columnheader" class="number">${t('revision')}</th><th scope="col" role="columnheader">${t('created')}</th><th scope="col" role="columnheader"><span class="hidden">${t('actions')}</span></th></tr></thead>
           <tbody role="rowgroup">${models.map(({ name, calculator, revision, created_at: created }) => html`<tr role="row" key=${name}><th scope="row" role="rowheader">${name}</th><td role="cell">${titleOf(calculators, calculator)}</td><td role="cell" class="number">${revision}</td><td role="cell" class="when">${created ? moment(created) : ''}</td>
             <td role="cell" class="actions"><a class="button" href=${`#/${calculator}?model=${name}`}>${t('use_model')}<span class="hidden"> ${name}</span></a>
               <button type="button" onClick=${() => fetchDocument(name)}>JSON<span class="hidden"> ${name}</span></button>
-              <button type="button" onClick=${() => drop(name)}>${t('delete')}<span class="hidden"> ${name}</span></button></td></tr>`)}</tbody></table></div>`}
+              <button type="button" class=${asked === name ? 'sure' : ''} onBlur=${() => setAsked(null)} onKeyDown=${event => { if (event.key === 'Escape') setAsked(null); }} onClick=${() => (asked === name ? drop(name) : setAsked(name))}>${asked === name ? t('delete_sure') : t('delete')}<span class="hidden"> ${name}</span></button></td></tr>`)}</tbody></table></div>`}
         <p><label class="button">${t('import_model')} <input type="file" class="hidden" accept=".json,application/json" onChange=${event => load(event.currentTarget.files)} /></label></p>`}
     </main>`;
 }

@@ -3,7 +3,7 @@ import { html, useState, useEffect, useMemo, useRef } from './lib.js';
 import { t, number, unitSymbol, unitOf, plural, moment } from './text.js';
 import * as api from './api.js';
 import { Picture, differenceOf } from './figure.js';
-import { resolve, humanised, labelOf, wordOf, namesOf, spoken } from './schema.js';
+import { resolve, humanised, labelOf, wordOf, namesOf, vocabularyOf, spoken } from './schema.js';
 import { spreadOf, spreadColumns, withSpread } from './digits.js';
 import { canReplay, Replay } from './replay.js';
 import { canTrade, spanOf, TradeOff } from './tradeoff.js';
@@ -16,6 +16,8 @@ const TRADE_HEIGHT = 260;
 const FEW_WARNINGS = 3;
 /** More pictures than these are chosen from a list. */
 const MOST_BUTTONS = 6;
+/** What the picture of the causes tells already. */
+const SHOWN_BY_CAUSES = ['diagnosis_next', 'diagnosis_gain'];
 /** Items of a list that the printed sheet has. */
 const PRINTED_ITEMS = 40;
 /** Rows of a table shown at once. */
@@ -49,7 +51,7 @@ const shownOf = figures => { const some = figures.filter(figure => drawn(figure)
 /** Whether a picture shows more than a single point. */
 const isTelling = figure => drawn(figure).some(({ kind, x }) => kind !== 'points' || x.length > 1);
 
-export function Result({ id, description, answer, problem, running, pinned, pin, job, models, pickOf, onApply, study, stale }) {
+export function Result({ id, description, answer, problem, trouble, running, pinned, pin, job, models, pickOf, onApply, study, stale, isCancelled }) {
   const [chosen, setChosen] = useState(null);
   const [difference, setDifference] = useState(false);
   // An earlier state of the same run, in place of its end.
@@ -63,7 +65,7 @@ export function Result({ id, description, answer, problem, running, pinned, pin,
   const figure = interim || figures.find(({ id: name }) => name === chosen) || figures.find(isTelling) || figures[0];
   const height = usePictureHeight(figure?.panels.length || 1);
   if (!answer && !interim) {
-    return html`<div class="empty">${running ? '' : problem ? html`<p>${t('picture_waits')}</p>` : html`<p class="late">${t('first_answer')}</p>`}</div>`;
+    return html`<div class="empty">${running ? '' : problem ? html`<div class="no-answer">${trouble}<p>${isCancelled ? t('cancelled_waits') : t('picture_waits')}</p></div>` : html`<p class="late">${t('first_answer')}</p>`}</div>`;
   }
   const twin = pinned && !interim && pinned.key !== answer?.key ? pinned.figures.find(({ id: name }) => name === figure?.id) : null;
   const subtracted = twin && difference ? differenceOf(figure, twin) : null;
@@ -76,7 +78,7 @@ export function Result({ id, description, answer, problem, running, pinned, pin,
   const held = ([low, high], value) => Math.min(Math.max(value, low), high);
   const handle = trades ? { x: factor, onMove: x => setFactor(Number(held(spanOf(figure), x).toPrecision(4))), onDrop: () => {} }
     : picks?.at ? { x: (grabbed || picks.at)[0], y: (grabbed || picks.at)[1], onMove: (x, y) => setGrabbed([x, y]), onDrop: (x, y) => { setGrabbed(null); pick(x, y); } } : null;
-  const [first, ...others] = body?.explanation || [];
+  const [first, ...others] = body?.explanation.filter(({ code }) => !(hasCauses(id, body.result) && SHOWN_BY_CAUSES.includes(code))) || [];
   return html`
     <div class=${`result ${stale ? 'stale' : ''}`}>
       ${figures.length > MOST_BUTTONS && !interim && html`<${FigurePick} ...${{ figures, figure, choose: setChosen }} />`}
@@ -88,11 +90,10 @@ export function Result({ id, description, answer, problem, running, pinned, pin,
         <div class="picture-box">
           ${figure ? html`<${Picture} key=${figure.id} figure=${subtracted && subtracted.panels.length ? subtracted : (replays && earlier) || figure} pinned=${subtracted ? null : twin} height=${trades ? Math.min(height, TRADE_HEIGHT) : height} main onPick=${picks ? pick : null} handle=${handle} />`
             : html`<p class="quiet">${t('no_figure')}</p>`}
+          <div class="under">${(interim || stale) && html`<p class="stale-note" role="status">${interim ? t('so_far') : `${isCancelled ? `${t('state_cancelled')}. ` : ''}${t('stale_note')}`}</p>`}</div>
           ${replays && html`<${Replay} key=${answer.key} id=${id} answer=${body} job=${answer.job} figures=${figures} onShow=${setEarlier} />`}
           ${trades && html`<${TradeOff} key=${answer.key} ...${{ id, figure, factor, setFactor, figures }} answer=${body} job=${answer.job} schema=${description.input_schema} apply=${onApply} />`}
-          ${stale && html`<p class="stale-note" role="status">${t('stale_note')}</p>`}
           ${picks && html`<p class="quiet hint">${picks.hint}</p>`}
-          ${interim && html`<p class="quiet hint">${t('so_far')}</p>`}
         </div>
         ${body && html`
         <div class="words">
@@ -229,13 +230,16 @@ function flat(schema, value, root, path = [], out = [], names = [], spread = nul
   return out;
 }
 
+/** An error of the numbers is known to two digits. */
+const digitsOf = ({ path }) => (/(^|_)(numerical_error|uncertainty)(_[a-z]+)*$/.test(String(path.at(-1))) ? 2 : 5);
+
 /** A name of a field or a kind in the words of the form; `names` has those of its fields. */
 const worded = (text, names) => names?.get(text) ?? (/^[a-z]+(_[a-z0-9]+)+$/.test(text) ? humanised(text) : text);
-const shownValue = (value, schema, names) => (typeof value === 'number' ? number(value, 5) : value === true ? t('yes') : value === false ? t('no') : schema?.enum ? wordOf(schema, value) : worded(String(value), names));
+const shownValue = (value, schema, names, digits = 5) => (typeof value === 'number' ? number(value, digits) : value === true ? t('yes') : value === false ? t('no') : schema?.enum ? wordOf(schema, value) : worded(String(value), names));
 
 
 function Values({ schema, inputs, result, pinned }) {
-  const names = useMemo(() => namesOf(inputs), [inputs]);
+  const names = useMemo(() => vocabularyOf(schema, inputs), [schema, inputs]);
   const rows = useMemo(() => {
     const all = flat(schema, result, schema, [], [], [], path => spreadOf(result, path));
     // An uncertainty stands behind its number, not once more in a line of its own.
@@ -245,14 +249,14 @@ function Values({ schema, inputs, result, pinned }) {
   const before = pinned ? new Map(flat(schema, pinned, schema).map(row => [row.path.join('/'), row.value])) : null;
   const groups = [...new Set(rows.map(({ group }) => group))];
   return html`
-    <div class="values">${groups.map(group => html`
+    <div class=${`values ${before ? 'compared' : ''}`}>${groups.map(group => html`
       <table key=${group} class="value-table">
         <caption>${group || t('main_values')}</caption>
         <thead class=${before ? '' : 'hidden'}><tr><th scope="col">${t('name')}</th><th scope="col">${t('value')}</th>${before && html`<th scope="col">${t('pinned_value')}</th><th scope="col">${t('difference')}</th>`}<th scope="col">${t('unit')}</th></tr></thead>
         <tbody>${rows.filter(row => row.group === group).map(row => {
           const other = before?.get(row.path.join('/'));
-          return html`<tr key=${row.path.join('/')}><th scope="row" title=${row.description}>${row.label}</th><td>${row.spread ? withSpread(row.value, row.spread.spread) : shownValue(row.value, row.schema, names)}</td>
-            ${before && html`<td>${other === undefined ? '' : shownValue(other, row.schema, names)}</td><td>${typeof other === 'number' && typeof row.value === 'number' ? `${row.value > other ? '+' : ''}${number(row.value - other, 3)}` : ''}</td>`}
+          return html`<tr key=${row.path.join('/')}><th scope="row" title=${row.description}>${row.label}</th><td class=${typeof row.value === 'number' ? 'number' : ''}>${row.spread ? withSpread(row.value, row.spread.spread) : shownValue(row.value, row.schema, names, digitsOf(row))}</td>
+            ${before && html`<td class=${typeof other === 'number' ? 'number' : ''}>${other === undefined ? '' : shownValue(other, row.schema, names, digitsOf(row))}</td><td class="number">${typeof other === 'number' && typeof row.value === 'number' ? `${row.value > other ? '+' : ''}${number(row.value - other, 3)}` : ''}</td>`}
             <td class="unit">${row.unit}</td></tr>`;
         })}</tbody>
       </table>`)}</div>`;
@@ -363,7 +367,7 @@ function SaveModel({ resultKey }) {
 export function Sheet({ description, body, job }) {
   const rows = flat(description.input_schema, job, description.input_schema, [], [], [], null, [{}], true);
   const groups = [...new Set(rows.map(({ group }) => group))];
-  const names = useMemo(() => namesOf(description.output_schema), [description]);
+  const names = useMemo(() => vocabularyOf(description.output_schema, description.input_schema), [description]);
   const said = row => `${row.label} ${shownValue(row.value, row.schema, names)}${row.unit ? ` ${row.unit}` : ''}`;
   return html`
     <section class="sheet" aria-hidden="true">

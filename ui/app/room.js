@@ -108,7 +108,7 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
 
   const watch = useCallback((record, job) => {
     stopFollowing.current?.();
-    setRunning({ ...record, interim: null });
+    setRunning({ ...record, interim: null, language: language() });
     refreshJobs?.();
     stopFollowing.current = api.follow(record.id, {
       onState: next => setRunning(old => (old?.id === next.id ? { ...old, ...next } : old)),
@@ -199,6 +199,8 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
         // What was refused is refused again, in the other language.
         if (spokenBefore.current !== spoken && now.current.problem?.status === 422 && isLive.current && now.current.state) run(now.current.state.job);
         spokenBefore.current = spoken;
+        // What a job is doing is told from now on in this language.
+        if (now.current.running && now.current.running.language !== spoken) watch(now.current.running, now.current.state.job);
         if (now.current.answer && now.current.answer.language !== spoken) {
           const { key, job } = now.current.answer;
           await show(key, null, job);
@@ -284,6 +286,7 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
   const study = answer && `#/studies?calculator=${id}&${written(queryOf(state, state.job, answer.key))}`;
   const faults = problem?.errors || [];
   const isBusy = pending || running;
+  const trouble = problem && !(['offline', 'cancelled'].includes(problem.code) && answer) && html`<${Trouble} problem=${problem} names=${namesOf(description.input_schema)} over=${Boolean(answer)} onGo=${place => { setPane('form'); setTimeout(() => goTo(place), 30); }} />`;
   return html`
     <main class="room" data-pane=${pane} id="main" tabindex="-1">
       <div class="pane-switch" role="group" aria-label=${t('panes')}>
@@ -304,10 +307,9 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
       </section>
       <section class="result-pane" aria-label=${t('result')} aria-busy=${isBusy ? 'true' : 'false'}>
         <div class=${`work-line ${pending && !running ? 'on' : ''}`} aria-hidden="true"></div>
-        <header class="room-head"><h1>${description.question}</h1><p class="summary">${description.title}</p></header>
-        ${running && html`<${Progress} running=${running} stop=${stop} />`}
-        ${problem && !(problem.code === 'offline' && answer) && html`<${Trouble} problem=${problem} names=${namesOf(description.input_schema)} over=${Boolean(answer)} onGo=${place => { setPane('form'); setTimeout(() => goTo(place), 30); }} />`}
-        <${Result} ...${{ id, description, answer, problem, running, pinned, pin, job: state.job, models, study, pickOf: picking, onApply: next => change(next, 'run'), stale: Boolean(answer && (problem || waiting)) }} />
+        <header class="room-head"><h1>${description.question}</h1><p class="summary">${description.title}</p>${running && html`<${Progress} running=${running} stop=${stop} />`}</header>
+        ${answer && trouble}
+        <${Result} ...${{ id, description, answer, problem, trouble, running, pinned, pin, job: state.job, models, study, pickOf: picking, onApply: next => change(next, 'run'), stale: Boolean(answer && (problem || waiting)), isCancelled: problem?.code === 'cancelled' }} />
       </section>
     </main>`;
 }

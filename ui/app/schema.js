@@ -147,6 +147,18 @@ export function namesOf(schema) {
   return names;
 }
 
+/** What the words and fields of some schemas are called, for values that are told without a schema of their own. */
+export function vocabularyOf(...schemas) {
+  const words = new Map();
+  const walk = part => {
+    if (!part || typeof part !== 'object') return;
+    for (const [word, label] of Object.entries(part['x-labels'] || {})) if (!words.has(word)) words.set(word, capital(label));
+    Object.values(part).forEach(walk);
+  };
+  schemas.forEach(walk);
+  return new Map([...words, ...schemas.flatMap(schema => [...namesOf(schema)])]);
+}
+
 /** As inside a sentence: abbreviations and single letters keep their capitals. */
 export const within = label => (/^.[^A-ZА-ЯЁ\s]/.test(label) && !/^\w+'s /.test(label) ? label.charAt(0).toLowerCase() + label.slice(1) : label);
 

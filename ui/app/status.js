@@ -3,16 +3,16 @@ import { html, useState } from './lib.js';
 import { t, duration } from './text.js';
 import { parts, humanised, spoken } from './schema.js';
 
-/** How far a job is, and a way to stop it. */
+/** How far a job is, and a way to stop it: in the head of the page, whose room is there before and after. */
 export function Progress({ running, stop }) {
   const [isStopping, setStopping] = useState(false);
   const share = Math.round(100 * (running.progress || 0));
   return html`
     <div class="progress-box" role="group" aria-label=${t('job_progress')}>
-      <div class="progress-text"><span><strong>${t(`state_${running.state}`)}</strong>${running.stage ? ` – ${running.stage}` : ''}</span>
-        <span>${share} %${running.remaining_ms ? ` · ${t('time_left', { time: duration(running.remaining_ms) })}` : ''}</span></div>
+      <p class="progress-text"><span class="doing"><strong>${t(`state_${running.state}`)}</strong>${running.stage ? ` – ${running.stage}` : ''}</span>
+        <span class="left">${share} %${running.remaining_ms ? ` · ${t('time_left', { time: duration(running.remaining_ms) })}` : ''}</span></p>
+      <button type="button" id="cancel-job" disabled=${isStopping} onClick=${() => { setStopping(true); stop(); }}>${t('cancel_job')}</button><a href="#/jobs">${t('all_jobs')}</a>
       <progress max="100" value=${share} aria-label=${t('job_progress')}></progress>
-      <div class="actions"><button type="button" id="cancel-job" disabled=${isStopping} onClick=${() => { setStopping(true); stop(); }}>${t('cancel_job')}</button><a href="#/jobs">${t('all_jobs')}</a></div>
     </div>`;
 }
 
@@ -24,7 +24,7 @@ const wayOf = (place, names) => parts(place).map(part => (/^\d+$/.test(part) ? S
 export function Trouble({ problem, onGo, names, over }) {
   const errors = problem.errors || [];
   return html`
-    <div class=${over ? 'over-slot' : ''}><div class=${`problem ${over ? 'over' : ''}`} role="alert">
+    <div class=${over ? 'over-slot' : ''}><div class=${`problem ${over ? 'over' : ''} ${problem.code === 'cancelled' ? 'calm' : ''}`} role="alert">
       <p><strong>${problem.title}</strong></p>
       ${problem.detail && errors.length === 0 && html`<p>${capital(spoken(problem.detail, names))}</p>`}
       ${errors.length > 0 && html`<ul>${errors.map(({ pointer: place, detail }) => html`<li key=${place + detail}>

@@ -173,6 +173,7 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
   // A kept study has no page of its job, but its points have.
   const ofPoint = answer?.answer.result.rows.find(({ status }) => status === 'succeeded')?.key;
   const page = !stored ? `#/${description.id}${part ? `?${part}` : ''}` : ofPoint && `#/${description.id}?result=${ofPoint}`;
+  const trouble = problem && html`<${Trouble} problem=${problem} names=${namesOf(description.input_schema)} over=${Boolean(answer)} onGo=${go} />`;
   return html`
     <main class="room" data-pane=${pane} id="main" tabindex="-1">
       <div class="pane-switch" role="group" aria-label=${t('panes')}>
@@ -209,10 +210,9 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
       </section>
       <section class="result-pane" aria-label=${t('result')} aria-busy=${pending || running ? 'true' : 'false'}>
         <div class=${`work-line ${pending && !running ? 'on' : ''}`} aria-hidden="true"></div>
-        <header class="room-head"><h1>${t('study_question')}</h1><p class="summary">${description.title}</p></header>
-        ${running && html`<${Progress} running=${running} stop=${() => api.cancel(running.id).catch(fail)} />`}
-        ${problem && html`<${Trouble} problem=${problem} names=${namesOf(description.input_schema)} over=${Boolean(answer)} onGo=${go} />`}
-        ${!answer && !running?.interim ? html`<div class="empty">${problem || running ? '' : html`<p>${pending ? t('first_answer') : t('study_empty')}</p>`}</div>`
+        <header class="room-head"><h1>${t('study_question')}</h1><p class="summary">${description.title}</p>${running && html`<${Progress} running=${running} stop=${() => api.cancel(running.id).catch(fail)} />`}</header>
+        ${answer && trouble}
+        ${!answer && !running?.interim ? html`<div class="empty">${problem ? html`<div class="no-answer">${trouble}</div>` : running ? '' : html`<p>${pending ? t('first_answer') : t('study_empty')}</p>`}</div>`
           : html`<${Findings} ...${{ answer, interim: running?.interim, leaves, outputs, description }} stale=${Boolean(answer && JSON.stringify(answer.asked) !== JSON.stringify(body) && !stored)} />`}
       </section>
     </main>`;
@@ -282,8 +282,7 @@ function Findings({ answer, interim, leaves, outputs, description, stale }) {
       <div class="picture-and-words">
         <div class="picture-box">
           ${figure && !isEmpty ? html`<${Picture} key=${figure.id} figure=${figure} height=${height} onPick=${pick} main />` : html`<p class="quiet">${t('no_figure')}</p>`}
-          ${stale && html`<p class="stale-note" role="status">${t('stale_note')}</p>`}
-          ${interim && html`<p class="quiet hint">${t('so_far')}</p>`}
+          <div class="under">${(interim || stale) && html`<p class="stale-note" role="status">${interim ? t('so_far') : t('stale_note')}</p>`}</div>
           ${pick && !isEmpty && picked === null && html`<p class="quiet hint">${t('click_for_row')}</p>`}
           ${result && picked !== null && html`<${Point} result=${result} index=${picked} calculator=${calculator} />`}
         </div>

@@ -16,7 +16,7 @@ const DIMENSIONS = [
   ['percent', '1'],
 ];
 const alike = unit => DIMENSIONS.find(units => units.includes(unit)) || [unit];
-const norm = text => text.toLowerCase().replace(/µ|μ/g, 'u').replace(/мкм/g, 'um').replace(/мм/g, 'mm').replace(/град|°/g, 'deg').replace(/[^a-z0-9]+/g, '_').replace(/^_|_$/g, '');
+const norm = text => (text ?? '').toLowerCase().replace(/µ|μ/g, 'u').replace(/мкм/g, 'um').replace(/мм/g, 'mm').replace(/град|°/g, 'deg').replace(/ё/g, 'е').replace(/[^a-z0-9а-я]+/g, '_').replace(/^_|_$/g, '');
 
 /** The cells of one line; quotes protect separators. */
 function cells(line, separator) {
@@ -75,12 +75,17 @@ function guess(columns, header) {
     const stem = norm(column.name).replace(new RegExp(`_${unit}$`), '');
     take(column, ({ title, name }) => norm(title) === norm(column.name) || norm(name) === stem || norm(name) === norm(column.name));
     take(column, ({ name }) => alike(column.schema['x-unit']).some(other => norm(name) === `${stem}_${norm(other)}`));
+    // As the form calls it, in its language.
+    take(column, ({ title, name }) => [norm(title), norm(name)].includes(norm(labelOf(column.name, column.schema))));
   }
   for (const column of columns) {
     const symbol = norm(column.schema['x-symbol'] || '');
     const words = norm(column.name).split('_').filter(word => word.length > 3);
     if (symbol) take(column, ({ name }) => norm(name) === symbol);
     take(column, ({ name }) => words.length > 0 && words.every(word => norm(name).includes(word) || word === norm(column.schema['x-unit'] || '')));
+    // Endings differ: the beginnings of the label's words are enough.
+    const said = norm(labelOf(column.name, column.schema)).split('_').filter(word => word.length > 3).map(word => word.slice(0, -2));
+    take(column, ({ name }) => said.length > 0 && said.every(word => norm(name).includes(word)));
   }
   for (const column of columns.filter(({ required }) => required)) {
     take(column, ({ name }) => norm(column.name).split('_').some(word => word.length > 3 && norm(name).includes(word)));
@@ -102,6 +107,14 @@ function matched(file, columns, matches) {
   };
   const line = parts => parts.map(part => quote(part, file.separator)).join(file.separator);
   return `${[line(used.map(title)), ...file.rows.map(row => line(used.map(({ name }) => row[matches[name].index] ?? '')))].join('\n')}\n`;
+}
+
+/** The columns of a kept CSV, by their labels. */
+function headings(csv, columns) {
+  return readCsv(csv)?.header.map(title => {
+    const column = columns.find(({ name, schema }) => norm(title) === norm(name) || norm(headed(title).name) === norm(name).replace(new RegExp(`_${norm(schema['x-unit'] || '-')}$`), ''));
+    return column ? labelOf(column.name, column.schema) : title;
+  }).join(', ');
 }
 
 export function TableInput({ name, schema, root, value, onChange, faults, below, names }) {
@@ -134,7 +147,7 @@ export function TableInput({ name, schema, root, value, onChange, faults, below,
       ${trouble && html`<p class="fault" role="alert"><span>${trouble}</span></p>`}
       ${draft ? html`<${Matching} ...${{ draft, setDraft, columns, missing, accept, label }} cancel=${() => setDraft(null)} />` : html`
         ${rows > 0
-          ? html`<p class="table-state"><strong>${plural('rows', rows)}</strong> <span class="quiet">${(value.csv ? value.csv.split('\n')[0] : Object.keys(value[0]).join(', ')).slice(0, 160)}</span></p>
+          ? html`<p class="table-state"><strong>${plural('rows', rows)}</strong>${value.csv && html` <span class="quiet">${headings(value.csv, columns)}</span>`}</p>
             ${Array.isArray(value) && html`<${Preview} rows=${value} columns=${columns} label=${label} />`}`
           : html`<p class="quiet">${schema.description}</p>`}
         <div class="actions">
@@ -185,7 +198,7 @@ function Matching({ draft, setDraft, columns, missing, accept, cancel, label }) 
               <option value="">${t('no_column')}</option>
               ${file.header.map((title, index) => html`<option value=${index}>${title || `${index + 1}`}${file.rows[0]?.[index] ? ` (${file.rows[0][index]} …)` : ''}</option>`)}
             </select></td>
-            <td>${schema['x-unit'] && match && (units.length > 1 ? html`<select aria-label=${`${labelOf(name, schema)}: ${t('unit')}`} value=${match.unit} onChange=${event => set(name, { ...match, unit: event.currentTarget.value })}>
+            <td class="unit-cell">${schema['x-unit'] && schema.type !== 'integer' && match && (units.length > 1 ? html`<select aria-label=${`${labelOf(name, schema)}: ${t('unit')}`} value=${match.unit} onChange=${event => set(name, { ...match, unit: event.currentTarget.value })}>
               ${units.map(unit => html`<option value=${unit}>${unitSymbol(unit) || '1'}</option>`)}</select>` : unitOf(schema))}</td>
           </tr>`;
         })}</tbody></table>

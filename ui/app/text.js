@@ -96,7 +96,8 @@ const RUSSIAN = {
 
 /** The symbol of a unit of the contract: `um/N` becomes `µm/N` or `мкм/Н`, `N/mm2` becomes `N/mm²`. */
 export function unitSymbol(unit) {
-  if (!unit || unit === '1') return '';
+  // A unit that another field says is not known here.
+  if (!unit || unit === '1' || unit.startsWith('as ')) return '';
   if (unit === 'percent') return '%';
   const spell = word => (current === 'ru' && RUSSIAN[word]) || SYMBOLS[word] || word;
   return unit

@@ -74,6 +74,7 @@ const META: Meta = Meta {
               fields, curves over one, slices over three.",
     references: &[],
     examples: EXAMPLES,
+    hallmarks: &[],
     study_outputs: &[],
     codes: Codes {
         faults: &[faults::FAULTS],
@@ -91,7 +92,7 @@ const META: Meta = Meta {
 /// The entry of studies over the calculators of a registry.
 pub(crate) fn entry(registry: &Registry, most_points: u64, host: Arc<dyn Host>) -> Entry {
     let studies = Studies { registry: registry.clone(), most_points, host };
-    Entry::composed::<StudyInput, StudyResult>(META, Box::new(studies))
+    Entry::composed::<StudyInput, StudyResult>(&META, Box::new(studies))
 }
 
 /// Studies over the calculators of a registry.
@@ -112,7 +113,7 @@ impl Calculation for Studies {
         let key = Key::of(&META, Some(&numbers_of), &canonical);
         let study = Study { plan: Arc::new(plan), host: Arc::clone(&self.host), key };
         let cost = study.plan.cost;
-        Ok(Prepared::new(cost, canonical, Box::new(study)).with_numbers_of(numbers_of))
+        Ok(Prepared::new(cost, canonical, Box::new(study)).with_numbers_of(&numbers_of))
     }
 
     fn broken_rules(&self, job: &Value) -> Vec<Finding> {

@@ -5,6 +5,7 @@ use std::fmt;
 
 use serde::Deserialize;
 use serde::de::{DeserializeSeed, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
+use serde_json::{Map, Value};
 
 /// Where the wanted numbers stand.
 #[derive(Debug, Clone, Default)]
@@ -20,17 +21,20 @@ pub(crate) struct Wanted {
 pub(crate) struct Picked {
     /// The wanted numbers, `None` where there is none.
     pub(crate) numbers: Vec<Option<f64>>,
-    /// Codes and pointers of its warnings.
+    /// Its warnings.
     pub(crate) warnings: Vec<Warning>,
     /// The equations that it cites.
     pub(crate) basis: Vec<Cited>,
 }
 
 /// A warning of an answer.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
 pub(crate) struct Warning {
     pub(crate) code: String,
     pub(crate) pointer: String,
+    /// What its sentence says, as it stands in the answer.
+    #[serde(flatten)]
+    pub(crate) said: Map<String, Value>,
 }
 
 /// An equation that an answer cites.
@@ -194,7 +198,8 @@ mod tests {
         });
         let found = picked(&envelope, &["/e/a", "/a", "/b/0/c", "/b/1/c", "/b/2/c", "/d", "/a"]);
         assert_eq!(found.numbers, [Some(-3.0), Some(1.5), Some(2.0), None, None, None, Some(1.5)]);
-        assert_eq!(found.warnings, [Warning { code: "w".to_owned(), pointer: "/p".to_owned() }]);
+        let said = json!({"detail": "..", "value": 1}).as_object().cloned().unwrap();
+        assert_eq!(found.warnings, [Warning { code: "w".to_owned(), pointer: "/p".to_owned(), said }]);
         assert_eq!(found.basis, [Cited { equation: "toy/1".to_owned(), source: "s".to_owned() }]);
     }
 

@@ -1,5 +1,6 @@
 //! One point of a study: its job looked up or computed, and what the table says of it.
 
+use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Instant;
@@ -21,21 +22,36 @@ use crate::text::{Language, Texts};
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Shard {
     pub(crate) rows: Vec<Row>,
-    /// Warnings of their answers, and how many have each.
-    pub(crate) warnings: Vec<(String, String, usize)>,
+    /// Warnings of their answers.
+    pub(crate) warnings: Vec<Warned>,
     pub(crate) basis: BTreeSet<Cited>,
+}
+
+/// A warning, and how many points have it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Warned {
+    pub(crate) code: String,
+    pub(crate) pointer: String,
+    pub(crate) points: usize,
+    /// What it says of the first of them.
+    pub(crate) first: serde_json::Map<String, serde_json::Value>,
 }
 
 /// Counts warnings by code and pointer.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Warnings(BTreeMap<(String, String), usize>);
+pub(crate) struct Warnings(BTreeMap<(String, String), Warned>);
 
 impl Warnings {
-    pub(crate) fn add(&mut self, code: String, pointer: String, points: usize) {
-        *self.0.entry((code, pointer)).or_default() += points;
+    /// Adds what points warn of that come after all before.
+    pub(crate) fn add(&mut self, warned: Warned) {
+        let place = (warned.code.clone(), warned.pointer.clone());
+        match self.0.entry(place) {
+            Entry::Vacant(place) => drop(place.insert(warned)),
+            Entry::Occupied(mut known) => known.get_mut().points += warned.points,
+        }
     }
-    pub(crate) fn into_list(self) -> Vec<(String, String, usize)> {
-        self.0.into_iter().map(|((code, pointer), points)| (code, pointer, points)).collect()
+    pub(crate) fn into_list(self) -> Vec<Warned> {
+        self.0.into_values().collect()
     }
 }
 
@@ -57,9 +73,13 @@ impl Shard {
             let (row, picked) = compute(plan, point, host, monitor)?;
             shard.rows.push(row);
             // Once per point, however many places of its answer warn of the same.
-            let own: BTreeSet<Warning> = picked.warnings.into_iter().collect();
-            for Warning { code, pointer } in own {
-                warnings.add(code, pointer, 1);
+            let mut own = BTreeSet::new();
+            for Warning { code, pointer, mut said } in picked.warnings {
+                if own.insert((code.clone(), pointer.clone())) {
+                    // It is worded when it is read.
+                    said.shift_remove("detail");
+                    warnings.add(Warned { code, pointer, points: 1, first: said });
+                }
             }
             shard.basis.extend(picked.basis);
             done();

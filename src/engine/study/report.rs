@@ -3,15 +3,17 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use precut_calc::calculator::{Basis, Finding, Message, Value};
+use serde_json::{Map, Value as Json};
 
 use super::figure::set;
 use super::input::Combine;
 use super::label::{Side, ways};
 use super::pick::Cited;
 use super::plan::Plan;
-use super::point::{Shard, Warnings};
+use super::point::{Shard, Warned, Warnings};
 use super::result::{Extreme, FailureCount, OutputField, Row, Setting, Status, StudyResult, VariedField};
 use crate::registry::{ResultNotes, interned};
+use crate::text::datum;
 
 /// Codes of what a study explains.
 pub(crate) const EXPLANATIONS: &[&str] = &[
@@ -29,6 +31,8 @@ pub(crate) const WARNINGS: &[&str] = &["study_points_warn"];
 
 /// So many outputs are spoken of.
 const OUTPUTS_SPOKEN_OF: usize = 4;
+/// Values that differ by no more than this share of their size are the same to the reader: what is left is rounding.
+const SAME: f64 = 1e-5;
 /// So many reasons are named.
 const REASONS_NAMED: usize = 5;
 
@@ -39,8 +43,8 @@ pub(crate) fn report(plan: &Plan, shards: Vec<Shard>) -> (StudyResult, ResultNot
     let mut basis: BTreeSet<Cited> = BTreeSet::new();
     for shard in shards {
         rows.extend(shard.rows);
-        for (code, pointer, points) in shard.warnings {
-            warnings.add(code, pointer, points);
+        for warned in shard.warnings {
+            warnings.add(warned);
         }
         basis.extend(shard.basis);
     }
@@ -78,8 +82,23 @@ pub(crate) fn report(plan: &Plan, shards: Vec<Shard>) -> (StudyResult, ResultNot
     (result, notes)
 }
 
-fn warned((code, pointer, points): (String, String, usize), of: usize) -> Finding {
-    Finding::new("study_points_warn", format!("/job{pointer}")).with("code", code).with("points", points).with("of", of)
+fn warned(warned: Warned, of: usize) -> Finding {
+    let Warned { code, pointer, points, first } = warned;
+    Finding::new("study_points_warn", format!("/job{pointer}"))
+        .with("code", code)
+        .with("points", points)
+        .with("of", of)
+        .with("first", told(&first))
+}
+
+/// What a warning says, so that its sentence can be said inside another one, in any language: `[name, value]` of each
+/// of its numbers and names.
+fn told(said: &Map<String, Json>) -> Value {
+    let own = ["value", "limit", "unit"].into_iter().filter_map(|name| Some((name, said.get(name)?)));
+    let further = said.get("values").and_then(Json::as_object).into_iter().flatten();
+    let pairs = own.chain(further.map(|(name, value)| (name.as_str(), value)));
+    let pair = |(name, value): (&str, &Json)| Some(Value::List(vec![name.to_owned().into(), datum(value)?]));
+    Value::List(pairs.filter_map(pair).collect())
 }
 
 fn outputs(plan: &Plan, rows: &[Row]) -> Vec<OutputField> {
@@ -156,7 +175,7 @@ fn explanation(plan: &Plan, result: &StudyResult) -> Vec<Message> {
             Message::new(code).with("output", output.pointer.clone()).with("name", name)
         };
         let with_least = |code| message(code).with("unit", unit.clone()).with("least", least.value);
-        if least.value.total_cmp(&largest.value).is_eq() {
+        if (largest.value - least.value).abs() <= SAME * largest.value.abs().max(least.value.abs()) {
             said.push(with_least("study_constant"));
             continue;
         }

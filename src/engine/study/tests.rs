@@ -123,7 +123,15 @@ fn a_grid_has_a_row_for_each_combination_and_each_is_the_ordinary_job() {
     );
     assert_eq!(answer["explanation"][1]["values"]["variable"], "/length_mm");
     assert_eq!(answer["explanation"][1]["values"]["share"], 1.0);
-    assert_eq!(answer["warnings"][0]["values"], json!({"code": "toy_is_slender", "of": 6.0, "points": 6.0}));
+    let warning = &answer["warnings"][0];
+    let values = ["code", "of", "points"].map(|name| warning["values"][name].clone());
+    assert_eq!(values, [json!("toy_is_slender"), json!(6.0), json!(6.0)]);
+    // It says what the first of them says.
+    let detail = warning["detail"].as_str().unwrap();
+    let (value, limit) = (&warning["values"]["first"][0], &warning["values"]["first"][1]);
+    assert_eq!((&value[0], &limit[0]), (&json!("value"), &json!("limit")));
+    let first = format!("{} mm is above {} mm", value[1], limit[1]).replace(".0 ", " ");
+    assert!(detail.starts_with("6 of 6 answers warn here") && detail.ends_with(&first), "{detail}");
     assert_eq!(answer["warnings"][0]["pointer"], "/job/length_mm");
     assert_eq!(answer["basis"], json!([{"equation": "toy/1", "source": "none"}]));
     assert_eq!(answer["input"]["outputs"], json!(["/deflections_um/0"]));

@@ -36,6 +36,9 @@ impl ResultStore for PostgresStore {
     fn list(&self, query: ResultQuery) -> BoxFuture<'_, Result<ResultPage, StoreError>> {
         Box::pin(self.page(query))
     }
+    fn inputs(&self, keys: Vec<Key>, most: usize) -> BoxFuture<'_, Result<Vec<(Key, Bytes)>, StoreError>> {
+        Box::pin(self.some_inputs(keys, most))
+    }
     fn ping(&self) -> BoxFuture<'_, Result<(), StoreError>> {
         Box::pin(async {
             sqlx::query("SELECT 1").execute(&self.pool).await?;
@@ -151,6 +154,19 @@ impl JobStore for PostgresStore {
     }
     fn jobs(&self, query: JobQuery) -> BoxFuture<'_, Result<JobPage, StoreError>> {
         Box::pin(self.list_jobs(query))
+    }
+    fn job_inputs(&self, ids: Vec<JobId>, most: usize) -> BoxFuture<'_, Result<Vec<(JobId, Bytes)>, StoreError>> {
+        Box::pin(async move {
+            let ids: Vec<String> = ids.iter().map(JobId::to_string).collect();
+            let rows: Vec<(String, Vec<u8>)> = sqlx::query_as(
+                "SELECT id, input FROM precut.jobs WHERE id = ANY($1) AND octet_length(input) BETWEEN 1 AND $2",
+            )
+            .bind(ids)
+            .bind(i32::try_from(most).unwrap_or(i32::MAX))
+            .fetch_all(&self.pool)
+            .await?;
+            Ok(rows.into_iter().filter_map(|(id, input)| Some((id.parse().ok()?, input.into()))).collect())
+        })
     }
     fn counts(&self) -> BoxFuture<'_, Result<JobCounts, StoreError>> {
         Box::pin(async {

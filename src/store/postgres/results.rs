@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use bytes::Bytes;
 use sqlx::QueryBuilder;
 use sqlx::postgres::{PgConnection, PgPool, Postgres};
 
@@ -80,6 +81,17 @@ impl PostgresStore {
         items.truncate(limit as usize);
         let next = items.last().filter(|_| more).map(|last| Cursor { created_ms: last.created_ms, key: last.key });
         Ok(ResultPage { items, next })
+    }
+
+    pub(super) async fn some_inputs(&self, keys: Vec<Key>, most: usize) -> Result<Vec<(Key, Bytes)>, StoreError> {
+        let keys: Vec<Vec<u8>> = keys.iter().map(|key| key.as_bytes().to_vec()).collect();
+        let rows: Vec<(Vec<u8>, Vec<u8>)> =
+            sqlx::query_as("SELECT key, input FROM precut.results WHERE key = ANY($1) AND octet_length(input) <= $2")
+                .bind(keys)
+                .bind(i32::try_from(most).unwrap_or(i32::MAX))
+                .fetch_all(&self.pool)
+                .await?;
+        Ok(rows.into_iter().filter_map(|(key, input)| Some((Key::from_bytes(&key)?, input.into()))).collect())
     }
 }
 

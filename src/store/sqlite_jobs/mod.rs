@@ -10,6 +10,7 @@ mod tests;
 
 use std::sync::Arc;
 
+use bytes::Bytes;
 use futures_util::future::BoxFuture;
 use sqlx::QueryBuilder;
 use sqlx::sqlite::Sqlite;
@@ -112,6 +113,19 @@ impl JobStore for SqliteStore {
     }
     fn jobs(&self, query: JobQuery) -> BoxFuture<'_, Result<JobPage, StoreError>> {
         Box::pin(self.list_jobs(query))
+    }
+    fn job_inputs(&self, ids: Vec<JobId>, most: usize) -> BoxFuture<'_, Result<Vec<(JobId, Bytes)>, StoreError>> {
+        Box::pin(async move {
+            let rows: Vec<(String, Vec<u8>)> = sqlx::query_as(
+                "SELECT id, input FROM precut_jobs
+                 WHERE id IN (SELECT value FROM json_each(?1)) AND length(input) BETWEEN 1 AND ?2",
+            )
+            .bind(json_list(&ids))
+            .bind(i64::try_from(most).unwrap_or(i64::MAX))
+            .fetch_all(&self.readers)
+            .await?;
+            Ok(rows.into_iter().filter_map(|(id, input)| Some((id.parse().ok()?, input.into()))).collect())
+        })
     }
     fn counts(&self) -> BoxFuture<'_, Result<JobCounts, StoreError>> {
         Box::pin(self.count_jobs())

@@ -247,6 +247,16 @@ pub(in crate::store) async fn what_a_kept_job_points_to_stays_and_what_is_expire
     assert_eq!(place.store().job(id).await.unwrap(), None);
 }
 
+pub(in crate::store) async fn what_some_jobs_need_is_read_at_once<P: Place>() {
+    let place = P::new().await;
+    let [first, second] = [place.accept(job(1)).await.id, place.accept(job(2)).await.id];
+    let read = place.store().job_inputs(vec![second, JobId::new()], 1000).await.unwrap();
+    assert_eq!(read.len(), 1);
+    assert_eq!((read[0].0, zstd::decode_all(&*read[0].1).unwrap()), (second, br#"{"number":2}"#.to_vec()));
+    assert_eq!(place.store().job_inputs(vec![first, second], 1000).await.unwrap().len(), 2);
+    assert_eq!(place.store().job_inputs(vec![first, second], 5).await.unwrap(), [], "larger ones are left out");
+}
+
 pub(in crate::store) async fn timings_are_kept_newest_first<P: Place>() {
     let place = P::new().await;
     for ms in [1.0, 2.0, 3.0] {

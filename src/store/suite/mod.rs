@@ -125,6 +125,7 @@ macro_rules! suite {
             deadlines_end_what_is_late_and_nothing_else
             a_lost_task_is_given_again_and_no_other
             what_a_kept_job_points_to_stays_and_what_is_expired_goes
+            what_some_jobs_need_is_read_at_once
             timings_are_kept_newest_first
             the_queue_hands_out_each_task_once_and_no_more_than_there_are_places
         }
@@ -138,6 +139,7 @@ macro_rules! suite {
             the_list_is_paged_newest_first_and_filtered
             the_total_stays_below_the_limit_and_the_last_used_stay
             what_is_old_is_forgotten_at_the_next_start
+            the_jobs_of_some_results_are_read_at_once
             parts_of_a_study_are_put_down_and_forgotten
         }
     };

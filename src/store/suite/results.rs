@@ -115,6 +115,25 @@ pub(in crate::store) async fn what_is_old_is_forgotten_at_the_next_start<P: Plac
     assert_eq!(second.store().get(result(1, "a").key).await.unwrap(), None);
 }
 
+pub(in crate::store) async fn the_jobs_of_some_results_are_read_at_once<P: Place>() {
+    let place = P::new().await;
+    let jobs = ["{\"a\":1}", "{\"a\":2}", "{\"a\":3}"];
+    let kept = |number: u32, job: &str| KeptResult { input: job.to_owned().into(), ..result(number, "a") };
+    for (number, job) in (0..).zip(jobs) {
+        place.store().put(kept(number, job));
+    }
+    // What waits to be written is written by then.
+    let all = list(place.store(), None, 10, None).await;
+    assert_eq!(all.items.len(), 3);
+    let keys = vec![result(2, "a").key, result(9, "a").key, result(0, "a").key];
+    let mut found = place.store().inputs(keys.clone(), 1000).await.unwrap();
+    found.sort_by_key(|(key, _)| *key != result(0, "a").key);
+    let read: Vec<_> = found.iter().map(|(key, packed)| (*key, zstd::decode_all(&**packed).unwrap())).collect();
+    assert_eq!(read, [(keys[2], jobs[0].into()), (keys[0], jobs[2].into())]);
+    assert_eq!(place.store().inputs(keys, 5).await.unwrap(), [], "larger ones are left out");
+    assert_eq!(place.store().inputs(Vec::new(), 1000).await.unwrap(), []);
+}
+
 pub(in crate::store) async fn parts_of_a_study_are_put_down_and_forgotten<P: Place>() {
     let place = P::new().await;
     let (study, other) = (super::key(1), super::key(2));

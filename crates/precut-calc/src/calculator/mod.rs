@@ -119,6 +119,8 @@ pub struct Meta {
     pub references: &'static [&'static str],
     /// Complete jobs that really run; the first is the source paper's own.
     pub examples: &'static [Example],
+    /// By what of a job a person knows it again in a list, the most telling first.
+    pub hallmarks: &'static [Hallmark],
     /// Pointers into the result that a parameter study shows unless asked for others.
     pub study_outputs: &'static [&'static str],
     /// Everything that this calculator may utter. A test holds that each code has a text, and that
@@ -130,6 +132,27 @@ pub struct Meta {
     pub tables: &'static [&'static str],
     /// Whether it can make a program for a machine.
     pub has_program: bool,
+}
+
+/// Something of a job by which a person knows it again. Pointers lead into the filled job; `*` stands for every item of
+/// a list. Where a job has nothing there, nothing is said.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Hallmark {
+    /// A number or a word; of several numbers the least and the largest.
+    Of(&'static str),
+    /// The sum of several numbers.
+    Sum(&'static str),
+    /// How many items a list or a measured table has.
+    Count(&'static str),
+}
+
+impl Hallmark {
+    /// Where it stands.
+    pub const fn pointer(self) -> &'static str {
+        match self {
+            Self::Of(pointer) | Self::Sum(pointer) | Self::Count(pointer) => pointer,
+        }
+    }
 }
 
 /// Codes by what they are used for, in the lists of the modules that utter them.

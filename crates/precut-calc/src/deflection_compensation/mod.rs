@@ -52,8 +52,8 @@ pub use output::{
 };
 
 use crate::calculator::{
-    Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Finding, Message, Meta, Monitor,
-    Program, Table,
+    Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Finding, Hallmark, Message, Meta,
+    Monitor, Program, Table,
 };
 use crate::force;
 
@@ -109,6 +109,14 @@ impl Calculator for DeflectionCompensation {
                 title: "Roughing and finishing a crooked blank: what is copied",
                 job: include_str!("examples/two_passes.json"),
             },
+        ],
+        hallmarks: &[
+            Hallmark::Of("/shaft/segments/*/diameter_mm"),
+            Hallmark::Sum("/shaft/segments/*/length_mm"),
+            Hallmark::Of("/cut/feed_mm_per_rev"),
+            Hallmark::Of("/cut/speed_m_per_min"),
+            Hallmark::Of("/cut/spindle_speed_rpm"),
+            Hallmark::Of("/tolerance/form_um"),
         ],
         study_outputs: &["/form_error_um", "/form_error_after_um", "/largest_error_um", "/cutting_time_min"],
         codes: CODES,

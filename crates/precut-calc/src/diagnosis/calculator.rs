@@ -9,7 +9,8 @@ use super::output::DiagnosisResult;
 use super::{picture, report, said};
 use crate::calculator::{
     Answer, Calculator, CalculatorKind, Check, Codes, Cost, Design, Diagnosable, Failure, Figure, Finding,
-    ForwardModel, MeasuredRow, Measurement, Message, Meta, Monitor, PrepareError, Reading, Rows, Table, Violations,
+    ForwardModel, Hallmark, MeasuredRow, Measurement, Message, Meta, Monitor, PrepareError, Reading, Rows, Table,
+    Violations,
 };
 
 /// Rows from which on at least adequacy can be judged.
@@ -49,6 +50,7 @@ impl<M: Diagnosable> Calculator for Diagnosis<M> {
             "Brun, Reichert, Kuensch, Practical identifiability analysis of large environmental simulation models, Water Resour. Res. 37 (2001) 1015-1030",
         ],
         examples: M::DIAGNOSES,
+        hallmarks: &[Hallmark::Count("/measurements"), Hallmark::Of("/quantity"), Hallmark::Count("/runs")],
         study_outputs: &["/none_probability", "/unnamed_probability"],
         codes: CODES,
         figures: picture::FIGURE_IDS,

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
+use utoipa::openapi::Object;
+use utoipa::openapi::schema::{ObjectBuilder, SchemaType, Type};
 
 use super::classes::ClassReport;
 
@@ -208,6 +210,7 @@ pub struct NoiseReport {
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub degrees_of_freedom: Option<f64>,
     /// Where it comes from: `stated`, `repeats`, `profile`, `regression`; of classes `spread`: granted to their margins.
+    #[schema(schema_with = noise_sources)]
     pub source: String,
     /// Scatter of the rows in units of what was stated.
     #[schema(extensions(("x-unit" = json!("1"))))]
@@ -219,6 +222,17 @@ pub struct NoiseReport {
     /// Its degrees of freedom.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub between_sweeps_degrees_of_freedom: Option<f64>,
+}
+
+fn noise_sources() -> Object {
+    ObjectBuilder::new()
+        .schema_type(SchemaType::new(Type::String))
+        .description(Some(
+            "Where it comes from: `stated`, `repeats`, `profile`, `regression`; of classes `spread`: granted to their \
+             margins.",
+        ))
+        .enum_values(Some(["stated", "repeats", "profile", "regression", "spread"]))
+        .build()
 }
 
 /// A test of the base.

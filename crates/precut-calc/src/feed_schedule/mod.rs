@@ -60,7 +60,7 @@ pub use output::{
 pub use plan::{Compensation, EqualTarget, Method, PassPlan, TradeOff, TradedLimit};
 
 use crate::calculator::{
-    Answer, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Meta, Monitor, Program, Table,
+    Answer, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Hallmark, Meta, Monitor, Program, Table,
 };
 use crate::{force, shaft};
 
@@ -127,6 +127,14 @@ impl Calculator for FeedSchedule {
                 title: "Number of passes and depth of the last for least cost (Shin-Joo, Chen-Tsai)",
                 job: include_str!("examples/passes.json"),
             },
+        ],
+        hallmarks: &[
+            Hallmark::Of("/shaft/segments/*/diameter_mm"),
+            Hallmark::Sum("/shaft/segments/*/length_mm"),
+            Hallmark::Count("/zones"),
+            Hallmark::Of("/zones/*/depth_mm"),
+            Hallmark::Of("/zones/*/deflection_max_um"),
+            Hallmark::Of("/zones/*/roughness_max_um"),
         ],
         study_outputs: &["/objective", "/cutting_time_min", "/tool_usage", "/largest_deflection_um"],
         codes: CODES,

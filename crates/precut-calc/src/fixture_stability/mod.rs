@@ -52,8 +52,8 @@ pub use output::{
 pub use parts::{TimeRun, forced_motion, lobe_boundary, lobe_map, multiplier_modulus, run_in_time};
 
 use crate::calculator::{
-    Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Message, Meta, Monitor, Table,
-    checkpoint,
+    Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Hallmark, Message, Meta, Monitor,
+    Table, checkpoint,
 };
 
 use acting::Case;
@@ -104,6 +104,15 @@ impl Calculator for FixtureStability {
                 title: "Clamped too loosely: a stable cut opens a joint and starts to chatter",
                 job: include_str!("examples/opening.json"),
             },
+        ],
+        hallmarks: &[
+            Hallmark::Of("/cutter/diameter_mm"),
+            Hallmark::Of("/cutter/teeth"),
+            Hallmark::Of("/cut/depth_mm"),
+            Hallmark::Of("/cut/width_mm"),
+            Hallmark::Of("/cut/spindle_speed_rpm"),
+            Hallmark::Of("/cut/feed_mm_per_tooth"),
+            Hallmark::Of("/fixture/clamp_force_n"),
         ],
         study_outputs: &[
             "/multiplier/modulus",

@@ -43,8 +43,8 @@ pub use output::{
 };
 
 use crate::calculator::{
-    Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Finding, Message, Meta, Monitor,
-    Table, checkpoint,
+    Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Finding, Hallmark, Message, Meta,
+    Monitor, Table, checkpoint,
 };
 
 use scene::Scene;
@@ -104,6 +104,13 @@ impl Calculator for RingRoundness {
                 job: include_str!("examples/set_up.json"),
             },
         ],
+        hallmarks: &[
+            Hallmark::Of("/ring/radius_mm"),
+            Hallmark::Of("/ring/ellipticity_mm"),
+            Hallmark::Of("/supports/distance_mm"),
+            Hallmark::Of("/tool/feed_mm_per_rev"),
+            Hallmark::Of("/tool/revolutions"),
+        ],
         study_outputs: &["/roundness_um", "/roundness_unfiltered_um", "/mean_radius_mm", "/setting/coefficient_sum"],
         codes: CODES,
         figures: picture::FIGURE_IDS,
@@ -132,51 +139,62 @@ impl Calculator for RingRoundness {
     }
 }
 
+/// What the parts of a job take, ms.
+struct Work {
+    simulation: f64,
+    theory: f64,
+    map: f64,
+    search: f64,
+}
+
 /// Measured on one core: 60 to 110 ns per step, rollers 0.3 to 0.5 us, the paper's algorithm 6 ns per step and point,
 /// a map's cell 30 us.
-fn cost(job: &Job) -> Cost {
+fn work(job: &Job) -> Work {
     let n = f64::from(sampling::samples_of(job));
     let turns = job.tool.revolutions + job.tool.spark_out_revolutions;
     let step_ns = if job.supports.roller_radius_mm > 0.0 { 400.0 } else { 90.0 };
-    let mut ms = 1.0;
-    let mut driver = if n > 7200.0 { "/samples" } else { "/tool/revolutions" };
+    let mut work = Work { simulation: 0.0, theory: 0.0, map: 0.0, search: 0.0 };
     if job.asks(Analysis::Simulation) {
         let runs = match job.error_estimate {
             ErrorEstimate::HalfSamples => 1.5,
             ErrorEstimate::DoubleSamples => 3.0,
         };
-        ms += 1e-6
-            * turns
-            * match job.method {
-                Method::ExactContact => runs * n * step_ns,
-                Method::NearestSamples => 7.0 * n * n + 3600.0 * step_ns,
-            };
+        let per_turn = match job.method {
+            Method::ExactContact => runs * n * step_ns,
+            Method::NearestSamples => 7.0 * n * n + 3600.0 * step_ns,
+        };
         // The history fits a circle per entry.
-        ms += 3e-5 * n * turns.min(400.0) + 1e-3 * n;
+        work.simulation = 1e-6 * turns * per_turn + 3e-5 * n * turns.min(400.0) + 1e-3 * n;
     }
     if job.asks(Analysis::LinearTheory) {
-        ms += 5.0;
+        work.theory = 5.0;
     }
     if job.asks(Analysis::SetupMap) {
         let cells = f64::from(job.setup_map.tool_angles) * f64::from(job.setup_map.support_angles);
-        let map = 2e-3 * cells * f64::from(job.setup_map.highest_order);
-        if map > ms {
-            driver = "/setup_map/tool_angles";
-        }
-        ms += map;
+        work.map = 2e-3 * cells * f64::from(job.setup_map.highest_order);
     }
     if let (true, Some(range)) = (job.asks(Analysis::SettingsSearch), &job.settings_search) {
         let nodes = if job.filter == LongWave::None { n } else { n.min(1800.0) };
         // A scan in steps of 5 % sums to 21 times its largest run.
-        let search = 1e-6 * step_ns * (21.0 * nodes + 6.0 * n) * range.revolutions_max.min(2000.0);
-        if search > ms {
-            driver = "/settings_search/revolutions_max";
+        work.search = 1e-6 * step_ns * (21.0 * nodes + 6.0 * n) * range.revolutions_max.min(2000.0);
+    }
+    work
+}
+
+fn cost(job: &Job) -> Cost {
+    let work = work(job);
+    let samples = sampling::samples_of(job);
+    let mut ms = 1.0 + work.simulation + work.theory;
+    let mut driver = if samples > 7200 { "/samples" } else { "/tool/revolutions" };
+    for (part, field) in [(work.map, "/setup_map/tool_angles"), (work.search, "/settings_search/revolutions_max")] {
+        if part > ms {
+            driver = field;
         }
-        ms += search;
+        ms += part;
     }
     let rows = job.measured_profile.as_ref().map_or(0, |profile| profile.rows().len());
     let frames = u64::from(job.replay_frames) * replay::MOST_POINTS * 16;
-    let bytes = 200_000 + u64::from(sampling::samples_of(job)) * 400 + rows as u64 * 100 + frames;
+    let bytes = 200_000 + u64::from(samples) * 400 + rows as u64 * 100 + frames;
     Cost { ms, bytes, driver }
 }
 
@@ -198,9 +216,13 @@ fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
         settings_search: None,
     };
     let whole = Share { monitor, from: 0.0, to: 1.0 };
+    // Each part has the share of the progress that it is expected to take of the time.
+    let work = work(job);
+    let total = work.simulation + work.theory + work.map + work.search;
+    let after = |done: f64| if total > 0.0 { done / total } else { 0.0 };
+    let [simulated, mapped] = [work.simulation, work.simulation + work.theory + work.map].map(after);
     if job.asks(Analysis::Simulation) {
-        let to = if job.asks(Analysis::SettingsSearch) { 0.4 } else { 0.8 };
-        let simulated = simulate::simulate(job, &scene, &end, whole.part(0.0, to))?;
+        let simulated = simulate::simulate(job, &scene, &end, whole.part(0.0, simulated))?;
         if let (Some(end), Some(error)) = (&simulated.end, &simulated.end_error) {
             outcome.roundness_um = Some(end.filtered.least_squares_um);
             outcome.roundness_error_um = Some(error.filtered.least_squares_um);
@@ -215,11 +237,10 @@ fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
         outcome.linear_theory = Some(linear::theory(job, &scene, &end));
     }
     if job.asks(Analysis::SetupMap) {
-        outcome.setup_map = Some(linear::map(job, &scene, &end, whole.part(0.8, 0.9))?);
+        outcome.setup_map = Some(linear::map(job, &scene, &end, whole.part(simulated, mapped))?);
     }
     if let (true, Some(range)) = (job.asks(Analysis::SettingsSearch), &job.settings_search) {
-        let from = if outcome.setup_map.is_some() { 0.9 } else { 0.4 };
-        outcome.settings_search = Some(search::search(job, range, &scene, whole.part(from, 1.0))?);
+        outcome.settings_search = Some(search::search(job, range, &scene, whole.part(mapped, 1.0))?);
     }
     let warnings = advice::warnings(job, &scene, &end, &outcome);
     let explanation = advice::explanation(job, &scene, &outcome);

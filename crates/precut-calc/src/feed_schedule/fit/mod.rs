@@ -25,8 +25,8 @@ pub use output::{
 };
 
 use crate::calculator::{
-    Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Finding, Message, Meta, Monitor,
-    Table, checkpoint,
+    Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Finding, Hallmark, Message, Meta,
+    Monitor, Table, checkpoint,
 };
 use crate::num::stats::GENERATOR;
 
@@ -68,6 +68,12 @@ impl Calculator for MachinabilityFit {
                 title: "Roughness with a further variable and a factor, smallest sufficient model, a prediction outside the trials",
                 job: include_str!("examples/batches_and_nose_radius.json"),
             },
+        ],
+        hallmarks: &[
+            Hallmark::Count("/trials"),
+            Hallmark::Of("/outputs/*"),
+            Hallmark::Of("/trials/*/speed_m_per_min"),
+            Hallmark::Of("/trials/*/feed_mm_per_rev"),
         ],
         study_outputs: &["/worst_held_out_error_percent", "/design/hull_share"],
         codes: CODES,

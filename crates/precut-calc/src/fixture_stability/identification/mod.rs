@@ -29,8 +29,8 @@ pub use output::{
 };
 
 use crate::calculator::{
-    Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Message, Meta, Monitor, Table,
-    checkpoint,
+    Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Hallmark, Message, Meta, Monitor,
+    Table, checkpoint,
 };
 use crate::num::evolve::Member;
 
@@ -80,6 +80,13 @@ impl Calculator for FixtureIdentification {
                 title: "Stiffness and damping of a clamped part of known mass, from ten cuts",
                 job: include_str!("examples/stiffness_and_damping.json"),
             },
+        ],
+        hallmarks: &[
+            Hallmark::Count("/measurements"),
+            Hallmark::Of("/fixture/kind"),
+            Hallmark::Of("/cutter/diameter_mm"),
+            Hallmark::Of("/cut/width_mm"),
+            Hallmark::Of("/cut/spindle_speed_rpm"),
         ],
         study_outputs: &["/fit/objective", "/fit/rms_log", "/fit/median_log"],
         codes: CODES,

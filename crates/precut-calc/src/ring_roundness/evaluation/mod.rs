@@ -21,7 +21,7 @@ pub use output::{
 };
 
 use crate::calculator::{
-    Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Meta, Monitor, Table,
+    Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Hallmark, Meta, Monitor, Table,
 };
 
 /// The evaluation.
@@ -64,6 +64,15 @@ impl Calculator for RoundnessEvaluation {
                 title: "Waviness of a ground ring: radii, band pass 15 to 60",
                 job: include_str!("examples/waviness.json"),
             },
+        ],
+        hallmarks: &[
+            Hallmark::Of("/nominal_radius_mm"),
+            Hallmark::Count("/deviations"),
+            Hallmark::Count("/radii"),
+            Hallmark::Count("/points"),
+            Hallmark::Of("/filter/kind"),
+            Hallmark::Of("/filter/cutoff_upr"),
+            Hallmark::Of("/tolerance_um"),
         ],
         study_outputs: &[
             "/roundness_um",
