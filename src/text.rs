@@ -28,7 +28,7 @@ pub(crate) use number::significant;
 use std::collections::BTreeMap;
 use std::sync::{Arc, LazyLock, OnceLock};
 
-use minijinja::Environment;
+use minijinja::{Environment, ErrorKind};
 use precut_calc::calculator::{Finding, Message, Value, Values};
 
 #[derive(rust_embed::RustEmbed)]
@@ -291,10 +291,11 @@ impl Texts {
         context: BTreeMap<&'static str, minijinja::Value>,
     ) -> Result<String, TextError> {
         let name = name(language, section, code);
-        if self.sources.get(&name).is_none() {
-            return Err(TextError::Missing { name });
-        }
-        let said = self.environment.get_template(&name).and_then(|template| template.render(context));
+        let template = match self.environment.get_template(&name) {
+            Err(error) if error.kind() == ErrorKind::TemplateNotFound => return Err(TextError::Missing { name }),
+            template => template,
+        };
+        let said = template.and_then(|template| template.render(context));
         said.map_err(|error| TextError::BadTemplate { name, reason: error.to_string() })
     }
 }
