@@ -66,12 +66,6 @@ impl Hypothesis {
         })
     }
 
-    /// Indices of its shapes.
-    pub fn shapes(&self) -> impl Iterator<Item = usize> {
-        let is_shape = |v: &Variable| matches!(v.treatment, Treatment::Shape { .. });
-        self.variables.iter().enumerate().filter(move |(_, v)| is_shape(v)).map(|(index, _)| index)
-    }
-
     /// Indices of the shapes that are fitted beyond their grid, with the spacing of the grid.
     pub fn fitted_shapes(&self) -> impl Iterator<Item = (usize, f64)> {
         self.variables.iter().enumerate().filter_map(|(index, variable)| match &variable.treatment {
@@ -102,7 +96,7 @@ impl Expansions {
         Self { places: values.into_iter().map(|value| vec![value]).collect(), nearest: usize::MAX, parts: 1 }
     }
 
-    /// So many of the places that lie farthest from 0, spread over their order.
+    /// About so many of the places that lie farthest from 0, spread over their order.
     pub fn outermost(&self, count: usize) -> Vec<Vec<f64>> {
         let distance = |place: &[f64]| place.iter().map(|value| value * value).sum::<f64>().sqrt();
         let farthest = self.places.iter().map(|place| distance(place)).fold(0.0, f64::max);

@@ -106,7 +106,7 @@ impl Coordinate {
 
     /// The value at t, inside its range.
     pub(super) fn moved(self, t: f64, range: Range) -> f64 {
-        self.value(t).clamp(range.lower, range.upper)
+        range.clamp(self.value(t))
     }
 }
 
@@ -151,8 +151,7 @@ impl Refinement<'_> {
                     None => return Ok(None),
                 },
             };
-            let cost_here = self.cost(&raw, &settings, &free, &coordinates);
-            let here = self.linearise(raw, &settings, &free, &coordinates)?;
+            let here = self.linearise(&raw, &settings, &free, &coordinates)?;
             let columns: Vec<&White> = here.columns.iter().collect();
             let Some(evidence) = self.likelihood.evidence(&columns, &here.residual, &sides) else { return Ok(None) };
             let before = settings.clone();
@@ -176,6 +175,7 @@ impl Refinement<'_> {
             step += 1;
             // Where shapes are free a step may pass by the resonance that it is looking for: then it is shortened.
             if self.nonlinear && with_shapes && longest >= SETTLED && step < most {
+                let cost_here = self.cost(&raw, &before, &free, &coordinates);
                 for share in SHORTENED {
                     known = self.raw_residual(&settings)?;
                     let cost = known.as_ref().map(|raw| self.cost(raw, &settings, &free, &coordinates));
@@ -266,14 +266,15 @@ impl Refinement<'_> {
         }
     }
 
-    /// About settings that leave `residual` of the rows.
+    /// About settings that leave `raw` of the rows.
     fn linearise(
         &self,
-        mut residual: Vec<f64>,
+        raw: &[f64],
         settings: &[Setting],
         free: &[(usize, usize)],
         coordinates: &[Coordinate],
     ) -> Result<Here, Failure> {
+        let mut residual = raw.to_vec();
         let slopes = self.subject.jacobian(settings, free)?;
         let mut columns = Vec::with_capacity(free.len());
         for ((&(member, variable), coordinate), slope) in free.iter().zip(coordinates).zip(&slopes) {

@@ -244,10 +244,10 @@ impl<'a> Linear<'a> {
         let total = log_sum_exp(&found.iter().map(|found| found.weighed).collect::<Vec<_>>());
         let mut squares: Vec<Vec<f64>> =
             members.iter().map(|&h| vec![0.0; self.hypotheses[h].variables.len()]).collect();
-        let of_best = self.values(members, &found[best]);
+        let of_best = self.values(members, &found[best].point, &found[best].evidence.t);
         for here in found {
             let weight = (here.weighed - total).exp();
-            let values = self.values(members, here);
+            let values = self.values(members, &here.point, &here.evidence.t);
             let mut column = 0;
             for (member, &h) in members.iter().enumerate() {
                 for (square, (value, of_best)) in
@@ -266,9 +266,9 @@ impl<'a> Linear<'a> {
         squares.into_iter().map(|member| member.into_iter().map(f64::sqrt).collect()).collect()
     }
 
-    /// Values of every member at the fit of a point.
-    fn values(&self, members: &[usize], found: &Found) -> Vec<Vec<f64>> {
-        let mut t = found.evidence.t.iter();
+    /// Values of every member at a point of the grids and these coordinates.
+    fn values(&self, members: &[usize], point: &[usize], t: &[f64]) -> Vec<Vec<f64>> {
+        let mut t = t.iter();
         let of_member = |(&h, &v): (&usize, &usize)| {
             let variant = self.variant(h, v);
             let mut values = variant.setting.values.clone();
@@ -277,7 +277,7 @@ impl<'a> Linear<'a> {
             }
             values
         };
-        members.iter().zip(&found.point).map(of_member).collect()
+        members.iter().zip(point).map(of_member).collect()
     }
 
     fn log_prior(&self, members: &[usize]) -> f64 {
@@ -337,17 +337,15 @@ impl<'a> Linear<'a> {
 
     /// Full settings of a candidate at the best point of its grids.
     pub(super) fn settings(&self, candidate: &Candidate) -> Vec<Setting> {
-        let mut t = candidate.t.iter();
-        let members = candidate.members.iter().zip(&candidate.variants);
+        let all = self.values(&candidate.members, &candidate.variants, &candidate.t);
+        let members = candidate.members.iter().zip(&candidate.variants).zip(all);
         members
-            .map(|(&h, &v)| {
-                let variant = self.variant(h, v);
-                let mut setting = variant.setting.clone();
-                for free in &variant.free {
-                    let range = self.hypotheses[h].variables[free.variable].range;
-                    setting.values[free.variable] = free.coordinate.moved(t.next().copied().unwrap_or(0.0), range);
+            .map(|((&hypothesis, &variant), mut values)| {
+                for free in &self.variant(hypothesis, variant).free {
+                    let range = self.hypotheses[hypothesis].variables[free.variable].range;
+                    values[free.variable] = range.clamp(values[free.variable]);
                 }
-                setting
+                Setting { hypothesis, values }
             })
             .collect()
     }
