@@ -63,6 +63,49 @@ fn one_tooth_that_stands_out_makes_a_revolution_of_the_period() {
     assert!((chips.0 - 0.0293).abs() < 6e-3 && (chips.1 - 0.0493).abs() < 6e-3, "{chips:?}");
 }
 
+/// Where the force answers to the motion it is found as a periodic solution; the run in time comes to it with the square of its
+/// step, with one mode and two, uneven teeth, joints that harden, and both.
+#[test]
+fn the_run_in_time_comes_to_the_motion_to_which_the_force_answers() {
+    let runout = json!({ "kind": "tooth_runout", "runout_mm": 0.008 });
+    let hardening = json!({ "kind": "contact_hardening", "cubic_per_mm2": 800.0 });
+    let cases = [
+        (1, json!([runout])),
+        (2, json!([runout])),
+        (1, json!([hardening])),
+        (2, json!([hardening])),
+        (1, json!([runout, hardening])),
+    ];
+    for (kind, effects) in cases {
+        let base = with(&reference_job(kind), "/effects", effects.clone());
+        let limits = json!({ "depth_max_mm": 1.5 });
+        let job = with(&with(&base, "/cut/depth_mm", json!(1.0)), "/limits", limits);
+        let error = |steps: u32| {
+            let settings = json!({ "steps_per_tooth": steps, "tooth_periods": 240, "steady_tooth_periods": 16 });
+            let got = outcome(&with(&job, "/simulation", settings));
+            (got.simulation.peak_to_peak_um / got.forced.peak_to_peak_um - 1.0).abs()
+        };
+        let (coarse, fine) = (error(200), error(800));
+        // Of order 2 with four times the steps: 16 times less; half of that leaves room for the next order.
+        assert!(coarse < 5e-3, "{kind} {effects}: {coarse}");
+        assert!(fine < coarse / 8.0 + 1e-6, "{kind} {effects}: {coarse} {fine}");
+    }
+}
+
+/// k = 0: what a tooth that stands out adds to the motion is proportional to how far it does. The largest displacement is where
+/// the motion turns, so its place moves and adds the square of the run-out: 1e-3 of it between 1 and 2 um.
+#[test]
+fn with_a_linear_law_the_motion_is_linear_in_the_run_out() {
+    let base = with(&reference_job(2), "/force/chip_thickness_exponent", json!(0));
+    let at = |runout_mm: f64| {
+        let job = with(&base, "/cut/depth_mm", json!(0.8));
+        outcome(&under(&job, json!({ "kind": "tooth_runout", "runout_mm": runout_mm }))).forced.displacement_max_um
+    };
+    let (none, small, large) = (at(0.0), at(0.001), at(0.002));
+    assert!((small - none).abs() > 0.05, "{none} {small}");
+    assert!(((large - none) / (small - none) - 2.0).abs() < 5e-3, "{none} {small} {large}");
+}
+
 #[test]
 fn process_damping_raises_the_limit_at_low_speed_more() {
     let base = reference_job(1);

@@ -21,7 +21,7 @@ use super::output::{
 };
 use super::parts::plane_of;
 use super::picture::lobes_so_far;
-use super::response::{Response, response};
+use super::response::{Response, response, span_mm};
 use super::simulate::{count, plan, run, scatter, small};
 use super::zeroth::{at_speed, depth_mm, zeroth};
 
@@ -83,6 +83,11 @@ impl<'a> Study<'a> {
 
 pub(super) fn forced(case: &Case, working: Working) -> Result<Response, Failure> {
     by_states!(case.holding, response(&case.holding, &case.cutting, working))
+}
+
+/// Peak-to-peak displacement of the forced motion, mm.
+pub(super) fn forced_span_mm(case: &Case, working: Working) -> Result<f64, Failure> {
+    by_states!(case.holding, span_mm(&case.holding, &case.cutting, working))
 }
 
 /// How deep limits are looked for: as the job says, else well above the zeroth-order limit and the working depth.

@@ -164,7 +164,7 @@ pub(super) fn process_damping(cutting: &Cutting, working: &Working) -> f64 {
 }
 
 /// Lengths of the elements of a stretch, rad, in order.
-fn elements(cutting: &Cutting, stretch: &Stretch, seconds_per_rad: f64, radius_rad_per_s: f64) -> Vec<f64> {
+pub(super) fn elements(cutting: &Cutting, stretch: &Stretch, seconds_per_rad: f64, radius_rad_per_s: f64) -> Vec<f64> {
     let length = stretch.length_rad();
     let longest = (LONGEST / (radius_rad_per_s * seconds_per_rad)).min(LONGEST_RAD);
     let count = (length / longest).ceil().max(1.0);

@@ -99,7 +99,7 @@ impl PreparedFixture {
 }
 
 /// Joints that harden may have no forced motion about which to ask.
-fn or_missing<T>(found: Result<T, Failure>) -> Result<Result<T, Missing>, Failure> {
+pub(super) fn or_missing<T>(found: Result<T, Failure>) -> Result<Result<T, Missing>, Failure> {
     match found {
         Ok(value) => Ok(Ok(value)),
         Err(Failure::OutOfModel(_) | Failure::NotConverged { .. }) => Ok(Err(Missing::NoSolution)),

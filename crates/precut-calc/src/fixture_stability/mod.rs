@@ -12,6 +12,7 @@
 mod acting;
 mod advice;
 mod answer;
+mod answering;
 mod check;
 mod consequence;
 mod cutting;
@@ -32,6 +33,7 @@ mod parts;
 mod picture;
 mod predict;
 mod response;
+mod settled;
 mod simulate;
 mod zeroth;
 
@@ -70,7 +72,7 @@ impl Calculator for FixtureStability {
     const META: Meta = Meta {
         id: "fixture-stability",
         kind: CalculatorKind::Calculator,
-        version: 3,
+        version: 4,
         title: "Fixture stability",
         question: "How deep can this face mill cut in this vise before chatter or a joint opens, and how hard must one clamp?",
         summary: "A face mill shakes the workpiece in its vise: teeth enter and leave, each cuts what earlier ones left, \

@@ -8,14 +8,14 @@ use crate::calculator::{Failure, JacobianColumn, Missing, Prediction, Unwatched}
 use crate::effects::{FixtureConditions, FixtureEffect};
 
 use super::acting::Case;
-use super::answer::{UM_PER_MM, forced};
+use super::answer::{UM_PER_MM, forced, forced_span_mm};
 use super::check;
 use super::floquet::Working;
 use super::forward::{Measure, RegimeMargin};
 use super::holding::Closed;
 use super::input::FixtureJob;
 use super::lobes::{Rules, critical_depth, point};
-use super::response::Response;
+use super::margins::or_missing;
 use super::simulate::{count, plan, run as simulate, steps_per_tooth};
 
 /// Step of a difference over time, s: below a tenth of a period of any vise.
@@ -126,7 +126,7 @@ impl PreparedFixture {
         for &row in rows {
             by_depth.entry(self.rows[row].working.depth_mm.to_bits()).or_default().push(row);
         }
-        let mut unit = None;
+        let (mut unit, mut unit_mm) = (None, None);
         let mut predicted = Vec::with_capacity(rows.len());
         for rows in by_depth.into_values() {
             let working = self.rows[rows[0]].working;
@@ -141,11 +141,12 @@ impl PreparedFixture {
             }
             let prediction = match self.measure {
                 Measure::PeakToPeak | Measure::Regime | Measure::Displacement => {
-                    self.peak_to_peak(&case, &mut unit, ask)?
+                    self.peak_to_peak(&case, &mut unit_mm, ask)?
                 }
                 Measure::DepthLimit => {
                     let most = 4.0 * working.depth_mm.max(2.5);
-                    critical_depth(&self.rules, &case.holding, &case.cutting, working, most)?.ok_or(Missing::NoSolution)
+                    or_missing(critical_depth(&self.rules, &case.holding, &case.cutting, working, most))?
+                        .and_then(|limit| limit.ok_or(Missing::NoSolution))
                 }
             };
             predicted.extend(rows.into_iter().map(|row| (row, prediction)));
@@ -153,33 +154,44 @@ impl PreparedFixture {
         Ok(predicted)
     }
 
-    fn modulus(&self, case: &Case) -> Result<f64, Failure> {
-        Ok(point(&self.rules, &case.holding, &case.cutting, case.working, Closed::BOTH)?.multiplier.modulus)
+    /// Why a point has no amplitude, where it has none: it chatters, or there is no motion to ask about.
+    fn instability(&self, case: &Case) -> Result<Option<Missing>, Failure> {
+        Ok(match or_missing(point(&self.rules, &case.holding, &case.cutting, case.working, Closed::BOTH))? {
+            Ok(point) => (point.multiplier.modulus >= 1.0).then_some(Missing::Unstable),
+            Err(missing) => Some(missing),
+        })
     }
 
-    /// The exact forced motion; a chattering point has no amplitude that a small change moves a little. `unit` is the
-    /// motion at 1 mm of depth, where the motion goes with H^(1-mu).
-    fn peak_to_peak(&self, case: &Case, unit: &mut Option<Response>, ask: Ask) -> Result<Prediction, Failure> {
+    /// The exact forced motion; a chattering point has no amplitude that a small change moves a little. `unit_mm` is
+    /// the amplitude at 1 mm of depth, where the motion goes with H^(1-mu).
+    fn peak_to_peak(&self, case: &Case, unit_mm: &mut Option<f64>, ask: Ask) -> Result<Prediction, Failure> {
         if case.working.depth_mm <= 0.0 {
             return Ok(Err(Missing::NoCut));
         }
-        if ask.whether_stable && self.modulus(case)? >= 1.0 {
-            return Ok(Err(Missing::Unstable));
+        if ask.whether_stable
+            && let Some(missing) = self.instability(case)?
+        {
+            return Ok(Err(missing));
         }
         if !case.is_linear() {
-            return Ok(Ok(forced(case, case.working)?.x_mm.span() * UM_PER_MM));
+            return Ok(or_missing(forced_span_mm(case, case.working))?.map(|span_mm| span_mm * UM_PER_MM));
         }
-        let span = match unit {
-            Some(unit) => unit.x_mm.span(),
-            None => unit.insert(forced(case, case.at_depth(1.0))?).x_mm.span(),
+        let span_mm = match unit_mm {
+            Some(span_mm) => *span_mm,
+            None => match or_missing(forced_span_mm(case, case.at_depth(1.0)))? {
+                Ok(span_mm) => *unit_mm.insert(span_mm),
+                Err(missing) => return Ok(Err(missing)),
+            },
         };
-        Ok(Ok(span * case.cutting.depth_power(case.working.depth_mm) * UM_PER_MM))
+        Ok(Ok(span_mm * case.cutting.depth_power(case.working.depth_mm) * UM_PER_MM))
     }
 
     /// x at the times of these rows after the entry: one cut in time, as long as the last row within it asks.
     fn history(&self, case: &Case, rows: &[usize], ask: Ask) -> Result<Vec<(usize, Prediction)>, Failure> {
-        if ask.whether_stable && self.modulus(case)? >= 1.0 {
-            return Ok(rows.iter().map(|&row| (row, Err(Missing::Unstable))).collect());
+        if ask.whether_stable
+            && let Some(missing) = self.instability(case)?
+        {
+            return Ok(rows.iter().map(|&row| (row, Err(missing))).collect());
         }
         let tau = case.cutting.tooth_period_s(case.working.spindle_rpm);
         let mut plan = plan(case, &self.job.simulation, case.working, 0.5);
@@ -189,8 +201,9 @@ impl PreparedFixture {
         let mut predicted = Vec::with_capacity(rows.len());
         if !late.is_empty() {
             // Long after the entry: the forced motion, in step with the tooth that entered at the start.
-            let forced = forced(case, case.working)?;
-            predicted.extend(late.into_iter().map(|row| (row, Ok(forced.x_at(time(row)) * UM_PER_MM))));
+            let forced = or_missing(forced(case, case.working))?;
+            let at = |row: usize| forced.as_ref().map(|motion| motion.x_at(time(row)) * UM_PER_MM).map_err(|why| *why);
+            predicted.extend(late.into_iter().map(|row| (row, at(row))));
         }
         let Some(wanted) = early.iter().map(|&row| periods(row)).max() else { return Ok(predicted) };
         plan.tooth_periods = wanted;

@@ -1,17 +1,19 @@
 //! The forced motion while both joints stay closed: exact.
 //!
 //! Any motion of the tooth period leaves every chip as it is, so the stable forced motion is the periodic solution of
-//! the plain linear system under the smooth-feed force (`fixture/5.2`). With joints that harden it is found by Newton's
-//! method on the same elements.
+//! the plain linear system under the smooth-feed force (`fixture/5.2`). Where the force answers to the motion, it is first
+//! found with it (`answering`), and the curves are those of the linear system under it.
 
-use crate::calculator::{Failure, Unwatched};
+use nalgebra::{DMatrix, DVector};
+
+use crate::calculator::{Failure, Finding};
 use crate::num::dde::{Matrix, Propagator, Rule, times};
 
+use super::answering::{AnsweringMotion, NoMotion, answering_motion};
 use super::cutting::{Cutting, Stretch};
 use super::floquet::{Working, damped};
 use super::holding::{Closed, Holding, System};
-use super::march::{Marched, Plan, Surface, march};
-use super::simulate::count;
+use super::settled::settled;
 
 /// Points of an element; with elements of a fiftieth of the fastest oscillation their error is round-off.
 const POINTS: usize = 4;
@@ -19,9 +21,6 @@ const POINTS: usize = 4;
 const LEAST_ELEMENTS: f64 = 240.0;
 /// Elements per period of the fastest oscillation.
 const PER_OSCILLATION: f64 = 48.0;
-/// Relative change at which Newton's method ends, and its steps.
-const SETTLED: f64 = 1e-10;
-const NEWTON_STEPS: u32 = 40;
 
 /// Largest and smallest value of a curve.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -105,13 +104,22 @@ impl Response {
     }
 }
 
+/// Forces at a moment, N.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Forces {
+    /// Of all teeth in cut.
+    pub chips_n: f64,
+    /// With what joints that harden take away: what drives the linear vise.
+    pub acting_n: f64,
+}
+
 struct Piece<const N: usize> {
     propagator: usize,
     stretch: Stretch,
     from_rad: f64,
-    /// Force at the points, and at the two ends, N.
-    force_n: [f64; POINTS],
-    ends_n: (f64, f64),
+    /// What acts at the points, N, and all forces at both ends.
+    acting_n: [f64; POINTS],
+    ends: (Forces, Forces),
 }
 
 /// The elements of a whole period of the force.
@@ -125,154 +133,73 @@ struct Elements<'a, const N: usize> {
     seconds_per_rad: f64,
 }
 
-/// x at the points of every element of the last sweep: what Newton's method linearises about.
-type Known = Vec<[f64; POINTS]>;
-
 pub(super) fn response<const N: usize>(
     holding: &Holding,
     cutting: &Cutting,
     working: Working,
 ) -> Result<Response, Failure> {
+    let system = holding.system::<N>(Closed::BOTH);
+    let level = cutting.direction * cutting.level(working.depth_mm);
+    let smooth = |stretch: &Stretch, since: f64, phase: usize| {
+        let chips_n = level * cutting.smooth_force(stretch, since, phase, working.feed_mm);
+        Forces { chips_n, acting_n: chips_n }
+    };
+    let under_smooth = || Elements::new(&system, holding, cutting, working, smooth).response();
+    let why = match answering::<N>(&system, holding, cutting, working)? {
+        Ok(motion) => {
+            let response = if cutting.uneven() || holding.hardening_per_mm2 > 0.0 {
+                let forces = |stretch: &Stretch, since: f64, phase: usize| motion.forces_n(stretch, since, phase);
+                Elements::new(&system, holding, cutting, working, forces).response()?
+            } else {
+                under_smooth()?
+            };
+            return Ok(Response { x_mm: motion.range_mm(), ..response });
+        }
+        Err(why) => why,
+    };
     if cutting.uneven()
         && let Some(settled) = settled::<N>(holding, cutting, working)?
     {
         return Ok(settled);
     }
-    let system = holding.system::<N>(Closed::BOTH);
-    let elements = Elements::new(&system, holding, cutting, working);
-    let hardening = holding.hardening_n_per_mm3(Closed::BOTH);
-    let mut known: Known = vec![[0.0; POINTS]; elements.pieces.len()];
-    let mut start = elements.periodic(&known, hardening)?;
-    if hardening > 0.0 {
-        let mut change = f64::INFINITY;
-        for _ in 0..NEWTON_STEPS {
-            let next = elements.points(&start, &known, hardening);
-            let size = next.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
-            change = next.iter().flatten().zip(known.iter().flatten()).fold(0.0, |m: f64, (a, b)| m.max((a - b).abs()));
-            known = next;
-            start = elements.periodic(&known, hardening)?;
-            if change <= SETTLED * size {
-                break;
-            }
-        }
-        if !change.is_finite() || change > 1e-6 {
+    match why {
+        NoMotion::Unsettled { residual_mm, steps } if holding.hardening_per_mm2 > 0.0 => {
             let what = "forced motion with hardening joints";
-            return Err(Failure::NotConverged { what, residual: change, iterations: NEWTON_STEPS });
+            Err(Failure::NotConverged { what, residual: residual_mm, iterations: steps })
         }
+        NoMotion::Unsettled { .. } | NoMotion::CutLost => under_smooth(),
     }
-    Ok(elements.record(&start, &known, hardening))
 }
 
-/// Steps per tooth pitch, first and most tooth periods of a run that is to settle, and how well. A run that has not come to rest
-/// says by its decay how long the next must be.
-const SETTLING_STEPS: f64 = 400.0;
-const FIRST_PERIODS: usize = 160;
-const MOST_PERIODS: usize = 5120;
-const AT_REST: f64 = 1e-6;
+/// Largest less smallest x of the forced motion, mm: that of [`response`], without its curves.
+pub(super) fn span_mm<const N: usize>(holding: &Holding, cutting: &Cutting, working: Working) -> Result<f64, Failure> {
+    match answering::<N>(&holding.system(Closed::BOTH), holding, cutting, working)? {
+        Ok(motion) => Ok(motion.range_mm().span()),
+        Err(_) => Ok(response::<N>(holding, cutting, working)?.x_mm.span()),
+    }
+}
 
-/// The forced motion of uneven teeth: its period is a revolution, in which x(t) and x(t - tau) differ, so the chips do
-/// answer to it. It is the run in time that has settled; `None` where it does not (chatter), for which the motion
-/// with undisturbed chips stands.
-fn settled<const N: usize>(
+fn answering<'a, const N: usize>(
+    system: &System<N>,
     holding: &Holding,
-    cutting: &Cutting,
+    cutting: &'a Cutting,
     working: Working,
-) -> Result<Option<Response>, Failure> {
-    let highest = holding.modes().last().map_or(0.0, |mode| mode.natural_hz);
-    let steps = count((80.0 * highest * cutting.tooth_period_s(working.spindle_rpm)).clamp(SETTLING_STEPS, 8000.0));
-    let mut periods = FIRST_PERIODS;
-    let mut decayed = true;
-    while periods <= MOST_PERIODS {
-        let whole = periods.div_ceil(cutting.teeth).max(3) * cutting.teeth;
-        let plan = Plan {
-            working,
-            steps_per_tooth: steps,
-            tooth_periods: whole,
-            steady_periods: cutting.teeth,
-            surface: Surface::Multiple,
-            gradual: false,
-            unilateral: false,
-            keep_first: 0,
-            keep_last: cutting.teeth,
-        };
-        let run = march::<N>(holding, cutting, &plan, &Unwatched)?;
-        if run.diverged {
-            return Ok(None);
-        }
-        // From one revolution to the next, after so many.
-        let change = |revolutions: usize| {
-            let (last, before) = ((revolutions - 1) * cutting.teeth, (revolutions - 2) * cutting.teeth);
-            (0..cutting.teeth)
-                .map(|i| (run.samples_mm[last + i] - run.samples_mm[before + i]).abs())
-                .fold(0.0, f64::max)
-        };
-        let revolutions = whole / cutting.teeth;
-        let (half, now, rest) = ((revolutions / 2).max(2), change(revolutions), AT_REST * working.feed_mm);
-        if now <= rest {
-            return Ok(Some(of_run(cutting, working, &run)));
-        }
-        let decay = (change(half) / now).ln() / (revolutions - half).max(1) as f64;
-        if decay > SLOWEST_DECAY {
-            decayed = true;
-            // A tenth more: two modes may beat.
-            periods = whole + count(1.1 * (now / rest).ln() / decay + 2.0) * cutting.teeth;
-        } else if decayed {
-            // A hard entry may hide it once.
-            decayed = false;
-            periods *= 4;
-        } else {
-            break;
-        }
-    }
-    Ok(None)
-}
-
-/// Decay per revolution below which a run settles in no reasonable time: a factor of e in a thousand revolutions.
-const SLOWEST_DECAY: f64 = 1e-3;
-
-/// The last revolution of a settled run.
-fn of_run(cutting: &Cutting, working: Working, run: &Marched) -> Response {
-    let tau = cutting.tooth_period_s(working.spindle_rpm);
-    let start = run.last.first().map_or(0.0, |step| step.time_s);
-    let rad_per_s = cutting.pitch_rad() / tau;
-    let mut moments: Vec<Moment> = run
-        .last
-        .iter()
-        .map(|step| Moment {
-            time_s: step.time_s - start,
-            since_entry_rad: ((step.time_s - start) % tau) * rad_per_s,
-            x_mm: step.x_mm,
-            velocity_mm_per_s: step.velocity_mm_per_s,
-            force_n: step.force_n,
-        })
-        .collect();
-    let period_s = tau * cutting.teeth as f64;
-    moments.extend(moments.first().map(|first| Moment { time_s: period_s, ..*first }));
-    let first = moments.first().map_or(0.0, |moment| moment.x_mm);
-    let mut response = Response {
-        moments,
-        x_mm: run.x_mm,
-        left_n: run.left_n,
-        right_n: run.right_n,
-        left_elastic_n: run.left_elastic_n,
-        right_elastic_n: run.right_elastic_n,
-        x_at_entry_mm: first,
-        x_at_exit_mm: first,
-        period_s,
-    };
-    if let [before, _] = cutting.stretches()[..] {
-        response.x_at_exit_mm = response.x_at(before.length_rad() / rad_per_s);
-    }
-    response
+) -> Result<Result<AnsweringMotion<'a, N>, NoMotion>, Failure> {
+    answering_motion(system, cutting, working, holding.hardening_n_per_mm3(Closed::BOTH))
 }
 
 impl<'a, const N: usize> Elements<'a, N> {
-    fn new(system: &'a System<N>, holding: &'a Holding, cutting: &Cutting, working: Working) -> Self {
+    fn new(
+        system: &'a System<N>,
+        holding: &'a Holding,
+        cutting: &Cutting,
+        working: Working,
+        forces: impl Fn(&Stretch, f64, usize) -> Forces,
+    ) -> Self {
         let rule = Rule::<POINTS>::new();
         let tau = cutting.tooth_period_s(working.spindle_rpm);
         let seconds_per_rad = tau / cutting.pitch_rad();
         let per_period = LEAST_ELEMENTS.max(PER_OSCILLATION * system.radius_rad_per_s * tau / std::f64::consts::TAU);
-        let level = cutting.direction * cutting.level(working.depth_mm);
         let stretches = cutting.stretches();
         let (mut propagators, mut matrices, mut pieces) = (Vec::new(), Vec::new(), Vec::new());
         let counts: Vec<(f64, usize)> = stretches
@@ -290,7 +217,7 @@ impl<'a, const N: usize> Elements<'a, N> {
             .collect();
         for phase in 0..cutting.phases() {
             for (kind, (stretch, &(length, count))) in stretches.iter().zip(&counts).enumerate() {
-                let force = |since: f64| level * cutting.smooth_force(stretch, since, phase, working.feed_mm);
+                let force = |since: f64| forces(stretch, since, phase);
                 let mut end = force(stretch.from_rad);
                 for i in 0..count {
                     let from_rad = stretch.from_rad + i as f64 * length;
@@ -300,8 +227,8 @@ impl<'a, const N: usize> Elements<'a, N> {
                         propagator: kind,
                         stretch: *stretch,
                         from_rad,
-                        force_n: std::array::from_fn(|j| force(from_rad + rule.points[j] * length)),
-                        ends_n: (start, end),
+                        acting_n: std::array::from_fn(|j| force(from_rad + rule.points[j] * length).acting_n),
+                        ends: (start, end),
                     });
                 }
             }
@@ -309,124 +236,69 @@ impl<'a, const N: usize> Elements<'a, N> {
         Self { system, holding, propagators, matrices, pieces, seconds_per_rad }
     }
 
-    /// Points and end of an element from its start; `known` is linearised about, with the cubic stiffness `hardening`.
-    fn step(
-        &self,
-        index: usize,
-        q: &[f64; N],
-        force_share: f64,
-        known: &[f64; POINTS],
-        hardening: f64,
-    ) -> ([f64; POINTS], [f64; N]) {
-        let piece = &self.pieces[index];
-        let propagator = &self.propagators[piece.propagator];
-        let mut x: [f64; POINTS] = std::array::from_fn(|i| {
-            let mut sum = 0.0;
-            #[allow(clippy::needless_range_loop)] // indices as in the formula
-            for k in 0..N {
-                sum += propagator.at_points[i][k] * q[k];
-            }
-            #[allow(clippy::needless_range_loop)] // indices as in the formula
-            for j in 0..POINTS {
-                let fixed = force_share * (piece.force_n[j] + 2.0 * hardening * known[j].powi(3));
-                sum += propagator.points_by_force[i][j] * fixed;
-            }
-            sum
-        });
-        if hardening > 0.0 {
-            // (1 + K s) x = what stands there: the elements are so short that a few fixed-point steps are exact.
-            let right = x;
-            for _ in 0..12 {
-                x = std::array::from_fn(|i| {
-                    let mut sum = right[i];
-                    for j in 0..POINTS {
-                        sum -= propagator.points_by_force[i][j] * 3.0 * hardening * known[j] * known[j] * x[j];
-                    }
-                    sum
-                });
-            }
-        }
-        let mut end = times(&propagator.whole, q);
-        for j in 0..POINTS {
-            let own = 3.0 * hardening * known[j] * known[j] * x[j];
-            let force = force_share * (piece.force_n[j] + 2.0 * hardening * known[j].powi(3)) - own;
-            #[allow(clippy::needless_range_loop)] // indices as in the formula
-            for k in 0..N {
-                end[k] += propagator.end_by_force[j][k] * force;
-            }
-        }
-        (x, end)
-    }
-
-    fn sweep(&self, start: &[f64; N], force_share: f64, known: &Known, hardening: f64) -> [f64; N] {
-        let mut q = *start;
-        #[allow(clippy::needless_range_loop)] // indices as in the formula
-        for index in 0..self.pieces.len() {
-            q = self.step(index, &q, force_share, &known[index], hardening).1;
-        }
-        q
-    }
-
-    /// The state that comes back after a period.
-    fn periodic(&self, known: &Known, hardening: f64) -> Result<[f64; N], Failure> {
-        let forced = self.sweep(&[0.0; N], 1.0, known, hardening);
-        let mut matrix = nalgebra::DMatrix::<f64>::identity(N, N);
+    /// The motion that comes back after a period.
+    fn response(&self) -> Result<Response, Failure> {
+        let forced = self.sweep(&[0.0; N], 1.0);
+        let mut matrix = DMatrix::<f64>::identity(N, N);
         for column in 0..N {
             let mut unit = [0.0; N];
             unit[column] = 1.0;
-            let end = self.sweep(&unit, 0.0, known, hardening);
+            let end = self.sweep(&unit, 0.0);
             for row in 0..N {
                 matrix[(row, column)] -= end[row];
             }
         }
-        let right = nalgebra::DVector::from_column_slice(&forced);
+        let right = DVector::from_column_slice(&forced);
         let solution = matrix.lu().solve(&right).filter(|s| s.iter().all(|value| value.is_finite()));
-        let solution = solution.ok_or_else(|| {
-            Failure::OutOfModel(crate::calculator::Finding::new("undamped_resonance", "/cut/spindle_speed_rpm"))
-        })?;
-        Ok(std::array::from_fn(|i| solution[i]))
+        let start = solution
+            .ok_or_else(|| Failure::OutOfModel(Finding::new("undamped_resonance", "/cut/spindle_speed_rpm")))?;
+        Ok(self.record(&std::array::from_fn(|i| start[i])))
     }
 
-    fn points(&self, start: &[f64; N], known: &Known, hardening: f64) -> Known {
-        let mut q = *start;
-        (0..self.pieces.len())
-            .map(|index| {
-                let (x, end) = self.step(index, &q, 1.0, &known[index], hardening);
-                q = end;
-                x
-            })
-            .collect()
+    /// State at the end of an element from that at its start. `driven` is 1, or 0 for what the start alone does.
+    fn step(&self, piece: &Piece<N>, q: &[f64; N], driven: f64) -> [f64; N] {
+        let propagator = &self.propagators[piece.propagator];
+        let mut end = times(&propagator.whole, q);
+        for (force, by_force) in piece.acting_n.iter().zip(&propagator.end_by_force) {
+            for k in 0..N {
+                end[k] += by_force[k] * driven * force;
+            }
+        }
+        end
+    }
+
+    fn sweep(&self, start: &[f64; N], driven: f64) -> [f64; N] {
+        self.pieces.iter().fold(*start, |q, piece| self.step(piece, &q, driven))
     }
 
     fn moment(&self, time_s: f64, since_entry_rad: f64, q: &[f64; N], force_n: f64) -> Moment {
         Moment { time_s, since_entry_rad, x_mm: q[0], velocity_mm_per_s: self.system.velocity(q, 0), force_n }
     }
 
-    fn record(&self, start: &[f64; N], known: &Known, hardening: f64) -> Response {
+    fn record(&self, start: &[f64; N]) -> Response {
         let mut moments = Vec::with_capacity(self.pieces.len() + 1);
         let (mut x, mut demand) = (Range::NONE, [Range::NONE; 4]);
         let (mut q, mut time) = (*start, 0.0);
         let mut at_exit = start[0];
         let mut before: Option<usize> = None;
         for (index, piece) in self.pieces.iter().enumerate() {
-            moments.push(self.moment(time, piece.from_rad, &q, piece.ends_n.0));
+            moments.push(self.moment(time, piece.from_rad, &q, piece.ends.0.chips_n));
             if before.is_some_and(|teeth| teeth > piece.stretch.teeth) {
                 at_exit = q[0];
             }
             before = Some(piece.stretch.teeth);
-            let (_, end) = self.step(index, &q, 1.0, &known[index], hardening);
+            let end = self.step(piece, &q, 1.0);
             let (a, length) = &self.matrices[piece.propagator];
             let step = length * self.seconds_per_rad;
             let rate = |q: &[f64; N], force: f64| -> [f64; N] {
                 let mut rate = times(a, q);
-                let spring = hardening * q[0].powi(3);
                 #[allow(clippy::needless_range_loop)] // indices as in the formula
                 for k in 0..N {
-                    rate[k] += self.system.b[k] * (force - spring);
+                    rate[k] += self.system.b[k] * force;
                 }
                 rate
             };
-            let (r0, r1) = (rate(&q, piece.ends_n.0), rate(&end, piece.ends_n.1));
+            let (r0, r1) = (rate(&q, piece.ends.0.acting_n), rate(&end, piece.ends.1.acting_n));
             x.take_cubic(step, (q[0], end[0]), (r0[0], r1[0]));
             for (which, range) in demand.iter_mut().enumerate() {
                 let (f0, f1) = (self.demand(which, &q), self.demand(which, &end));
@@ -437,7 +309,7 @@ impl<'a, const N: usize> Elements<'a, N> {
             q = end;
             time += step;
             if index + 1 == self.pieces.len() {
-                moments.push(self.moment(time, piece.from_rad + length, &q, piece.ends_n.1));
+                moments.push(self.moment(time, piece.from_rad + length, &q, piece.ends.1.chips_n));
             }
         }
         // A slot whose last tooth leaves where the next one enters has its exit at the period's end.

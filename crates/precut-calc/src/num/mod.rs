@@ -4,6 +4,7 @@ pub mod beam;
 pub mod dde;
 pub mod dense;
 pub mod evolve;
+pub mod gmres;
 pub mod gp;
 pub mod hull;
 pub mod lsq;
