@@ -118,6 +118,11 @@ fn talk<M: Diagnosable>(trial: &Trial, result: &ResultOf<M>) {
         result.noise.standard_deviation,
         result.verdict.name()
     );
+    for hidden in &trial.truth.causes {
+        let Some(named) = result.named.iter().find(|cause| cause.kind == hidden.kind) else { continue };
+        let first = &named.parameters[0];
+        println!("     {} hidden {:.5} fitted {:.5} in {:?}", hidden.kind, hidden.size, first.value, first.interval_95);
+    }
     for set in result.sets.iter().take(4) {
         let rest = if set.with_remainder { "+rest" } else { "" };
         let names: Vec<String> = set.causes.iter().map(each).collect();

@@ -30,6 +30,7 @@ mod input;
 mod likelihood;
 mod next;
 mod noise;
+mod optima;
 mod outlier;
 mod outlying;
 mod output;

@@ -135,8 +135,13 @@ pub struct ParameterReport {
     /// 95 % interval.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub interval_95: Option<[f64; 2]>,
-    /// Where the intervals come from: `quadratic`, or `profile` where the likelihood is not; absent for what is stated.
+    /// Where the intervals come from: `quadratic`, `profile` where the likelihood is not, or `several_optima` where the rows fit
+    /// other values nearly as well; absent for what is stated.
     pub interval_from: Option<String>,
+    /// Its values at other optima that the rows fit nearly as well. The intervals are then those of all together, each
+    /// with its share of the posterior.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub other_values: Vec<f64>,
     /// Whether it lies at its physical limit.
     pub at_limit: bool,
 }

@@ -51,6 +51,17 @@ pub(super) struct Fit {
     pub(super) q: f64,
 }
 
+impl Fit {
+    /// Posterior standard deviations of the values of every member, 0 of what is not free.
+    pub(super) fn standard_deviations(&self) -> Vec<Vec<f64>> {
+        let mut deviations: Vec<Vec<f64>> = self.settings.iter().map(|s| vec![0.0; s.values.len()]).collect();
+        for (k, &(member, variable)) in self.free.iter().enumerate() {
+            deviations[member][variable] = self.covariance[(k, k)].sqrt();
+        }
+        deviations
+    }
+}
+
 /// A free value and its Gaussian coordinate t ~ N(0, 1).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Coordinate {

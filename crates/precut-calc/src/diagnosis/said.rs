@@ -53,6 +53,7 @@ pub(super) const EXPLANATION_CODES: &[&str] = &[
     "diagnosis_class_gain",
     "diagnosis_next",
     "diagnosis_negligible",
+    "diagnosis_several_values",
     "diagnosis_downstream",
 ];
 
@@ -231,6 +232,7 @@ pub(super) fn explanation<E: utoipa::ToSchema, R: utoipa::ToSchema>(
     if !negligible.is_empty() {
         said.push(Message::new("diagnosis_negligible").with("causes", negligible));
     }
+    said.extend(output.named.iter().filter_map(several_values));
     // A run that parts nothing is not worth a sentence.
     if let Some(next) = output.next_measurement.as_ref().filter(|next| next.rows_needed.is_some()) {
         said.push(
@@ -272,6 +274,18 @@ pub(super) fn explanation<E: utoipa::ToSchema, R: utoipa::ToSchema>(
             .with("high", downstream.extended.interval_95[1])
     }));
     said
+}
+
+/// Where the rows fit another value of a cause nearly as well.
+fn several_values(cause: &NamedCause) -> Option<Message> {
+    let (parameter, other) = cause.parameters.iter().find_map(|own| Some((own, own.other_values.first()?)))?;
+    Some(
+        Message::new("diagnosis_several_values")
+            .with("cause", cause.kind.clone())
+            .with("value", parameter.value)
+            .with("other", *other)
+            .with("unit", parameter.unit.clone()),
+    )
 }
 
 /// Sets without those that only extend another of them.

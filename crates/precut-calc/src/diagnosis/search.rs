@@ -183,15 +183,7 @@ impl<'a> Linear<'a> {
     /// point of the grid is linearised that counts which explains most; a cause that was found off its grid has half of its
     /// weight there.
     pub(super) fn candidate(&self, members: Vec<usize>, log_prior: f64) -> Option<Candidate> {
-        let mut points: Vec<Vec<usize>> = vec![Vec::new()];
-        for &h in &members {
-            let tried = self.narrowed.get(h).filter(|_| members.len() > 1).cloned();
-            let tried = tried.unwrap_or_else(|| (0..self.signatures.variants[h].len()).collect());
-            points = points
-                .into_iter()
-                .flat_map(|p| tried.iter().map(move |&v| [p.as_slice(), &[v]].concat()).collect::<Vec<_>>())
-                .collect();
-        }
+        let points = self.points(&members);
         let cells: usize = members.iter().map(|&h| self.signatures.grid_points[h] + 1).product();
         let mut found: Vec<Option<Found>> = vec![None; cells];
         for point in points {
@@ -217,6 +209,30 @@ impl<'a> Linear<'a> {
             t: evidence.t,
             spread,
         })
+    }
+
+    /// The product of the variants of these hypotheses, as far as they are tried together.
+    fn points(&self, members: &[usize]) -> Vec<Vec<usize>> {
+        members.iter().fold(vec![Vec::new()], |points, &h| {
+            let tried = self.narrowed.get(h).filter(|_| members.len() > 1).cloned();
+            let tried = tried.unwrap_or_else(|| (0..self.signatures.variants[h].len()).collect());
+            points
+                .into_iter()
+                .flat_map(|p| tried.iter().map(move |&v| [p.as_slice(), &[v]].concat()).collect::<Vec<_>>())
+                .collect()
+        })
+    }
+
+    /// The settings that a set has about each of its places, and the evidence there, largest first.
+    pub(super) fn starts(&self, members: &[usize]) -> Vec<(Vec<Setting>, f64)> {
+        let of = |point: Vec<usize>| {
+            let evidence = self.evidence(members, &point)?;
+            let values = self.values(members, &point, &evidence.t);
+            Some((self.within_bounds(members, &point, values), evidence.log_z))
+        };
+        let mut starts: Vec<_> = self.points(members).into_iter().filter_map(of).collect();
+        starts.sort_by(|a, b| b.1.total_cmp(&a.1));
+        starts
     }
 
     /// Number of a point in the product of the grids; off a grid comes after all of its points.
@@ -337,17 +353,19 @@ impl<'a> Linear<'a> {
 
     /// Full settings of a candidate at the best point of its grids.
     pub(super) fn settings(&self, candidate: &Candidate) -> Vec<Setting> {
-        let all = self.values(&candidate.members, &candidate.variants, &candidate.t);
-        let members = candidate.members.iter().zip(&candidate.variants).zip(all);
-        members
-            .map(|((&hypothesis, &variant), mut values)| {
-                for free in &self.variant(hypothesis, variant).free {
-                    let range = self.hypotheses[hypothesis].variables[free.variable].range;
-                    values[free.variable] = range.clamp(values[free.variable]);
-                }
-                Setting { hypothesis, values }
-            })
-            .collect()
+        let Candidate { members, variants, t, .. } = candidate;
+        self.within_bounds(members, variants, self.values(members, variants, t))
+    }
+
+    fn within_bounds(&self, members: &[usize], variants: &[usize], values: Vec<Vec<f64>>) -> Vec<Setting> {
+        let of_member = |((&hypothesis, &variant), mut values): ((&usize, &usize), Vec<f64>)| {
+            for free in &self.variant(hypothesis, variant).free {
+                let range = self.hypotheses[hypothesis].variables[free.variable].range;
+                values[free.variable] = range.clamp(values[free.variable]);
+            }
+            Setting { hypothesis, values }
+        };
+        members.iter().zip(variants).zip(values).map(of_member).collect()
     }
 }
 

@@ -5,6 +5,7 @@ use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 use super::gain::Gain;
 use super::identify::{Signature, separations};
 use super::next::{NextMeasurement, bayes_factor};
+use super::optima::{Peak, mixture_interval};
 use super::outlying::OutlyingRun;
 use super::output::{
     CandidateReport, CauseReport, ContributionReport, LikelySet, NamedCause, NextReport, OutlyingRunReport,
@@ -157,20 +158,20 @@ impl<'a> View<'a> {
     }
 
     fn set(&self, set: &SetWeight) -> Vec<NamedCause> {
-        let each = set.settings.iter().zip(&set.standard_deviations);
-        each.map(|(setting, deviations)| {
-            let hypothesis = &self.hypotheses[setting.hypothesis];
+        let of_member = |member: usize| {
+            let hypothesis = &self.hypotheses[set.settings[member].hypothesis];
             let parameters = 0..hypothesis.variables.len();
             NamedCause {
                 kind: hypothesis.cause.kind.to_owned(),
                 label: hypothesis.label.clone(),
-                parameters: parameters.map(|index| self.parameter(set, setting, index, deviations[index])).collect(),
+                parameters: parameters.map(|index| self.parameter(set, member, index)).collect(),
             }
-        })
-        .collect()
+        };
+        (0..set.settings.len()).map(of_member).collect()
     }
 
-    fn parameter(&self, set: &SetWeight, setting: &Setting, index: usize, sd: f64) -> ParameterReport {
+    fn parameter(&self, set: &SetWeight, member: usize, index: usize) -> ParameterReport {
+        let (setting, sd) = (&set.settings[member], set.standard_deviations[member][index]);
         let variable = &self.hypotheses[setting.hypothesis].variables[index];
         let (value, range) = (setting.values[index], variable.range);
         let fitted = sd > 0.0 && !matches!(variable.treatment, Treatment::Stated { .. });
@@ -184,11 +185,26 @@ impl<'a> View<'a> {
             let reach = quantile(0.95, dof);
             !profile.agrees(value, quadratic(0.95), reach, AGREE)
         });
+        let mut peaks = vec![Peak { value, standard_deviation: sd, weight: 1.0 }];
+        peaks.extend(set.others.iter().filter(|_| fitted).map(|other| Peak {
+            value: other.settings[member].values[index],
+            standard_deviation: other.standard_deviations[member][index],
+            weight: other.odds,
+        }));
+        let several = peaks.len() > 1;
         let interval = |share: f64| {
-            let own = || profile.map_or_else(|| quadratic(share), |profile| profile.interval(quantile(share, dof)));
+            let own = || match profile {
+                _ if several => mixture_interval(&peaks, share, dof).map(|edge| edge.clamp(range.lower, range.upper)),
+                Some(profile) => profile.interval(quantile(share, dof)),
+                None => quadratic(share),
+            };
             fitted.then(own)
         };
-        let from = if profile.is_some() { "profile" } else { "quadratic" };
+        let from = match profile {
+            _ if several => "several_optima",
+            Some(_) => "profile",
+            None => "quadratic",
+        };
         let span = range.upper - range.lower;
         ParameterReport {
             name: variable.name.to_owned(),
@@ -199,6 +215,7 @@ impl<'a> View<'a> {
             interval_90: interval(0.90),
             interval_95: interval(0.95),
             interval_from: fitted.then(|| from.to_owned()),
+            other_values: peaks[1..].iter().map(|other| other.value).collect(),
             at_limit: fitted && (value - range.lower < 1e-9 * span || range.upper - value < 1e-9 * span),
         }
     }

@@ -5,6 +5,7 @@ use super::evidence::{Normal, Side, log_normal_cdf, log_sum_exp};
 use super::foundation::Foundation;
 use super::likelihood::Likelihood;
 use super::noise::Noise;
+use super::optima::{Optimum, elsewhere};
 use super::profile::{Profile, Profiler};
 use super::refine::{Fit, Refinement};
 use super::search::{Candidate, Linear, by_weight};
@@ -52,6 +53,8 @@ pub struct Effort {
     /// Whether the model is far from linear in its sizes: then a refinement takes more steps, and what it changes at
     /// the best point of a grid corrects the whole grid.
     pub nonlinear: bool,
+    /// Whether other optima of the leading set are looked for.
+    pub other_optima: bool,
 }
 
 impl Effort {
@@ -64,17 +67,34 @@ impl Effort {
             rounds: 1,
             late_leaders: LATE_LEADERS,
             nonlinear: false,
+            other_optima: true,
         }
     }
 
     /// Where every prediction is a simulation: fewer sets.
     pub fn dear(most_causes: usize) -> Self {
-        Self { most_causes, leaders: 1, of_each_size: [0, 4, 2, 1], rounds: 3, late_leaders: 2, nonlinear: true }
+        Self {
+            most_causes,
+            leaders: 1,
+            of_each_size: [0, 4, 2, 1],
+            rounds: 3,
+            late_leaders: 2,
+            nonlinear: true,
+            other_optima: true,
+        }
     }
 
     /// The same in a fold.
     pub fn dear_fold(most_causes: usize) -> Self {
-        Self { most_causes, leaders: 1, of_each_size: [0, 2, 1, 0], rounds: 1, late_leaders: 1, nonlinear: true }
+        Self {
+            most_causes,
+            leaders: 1,
+            of_each_size: [0, 2, 1, 0],
+            rounds: 1,
+            late_leaders: 1,
+            nonlinear: true,
+            other_optima: false,
+        }
     }
 }
 
@@ -106,6 +126,8 @@ pub struct SetWeight {
     pub refined: bool,
     /// The remainder beside them, where there is one.
     pub(super) remainder: Option<Remainder>,
+    /// Other optima that the rows fit nearly as well, as far as they were looked for.
+    pub(super) others: Vec<Optimum>,
 }
 
 /// All sets of causes weighed against each other, against nothing, and against a remainder without a name.
@@ -152,10 +174,13 @@ impl<'a> Weighing<'a> {
             likelihood: &linear.likelihood,
             nonlinear: effort.nonlinear,
         };
-        let mut ranking = Ranking { candidates, fits: Vec::new() };
+        let mut ranking = Ranking { candidates, fits: Vec::new(), others: (Vec::new(), Vec::new()) };
         ranking.refine(&linear, &refinement, effort.leaders, effort.of_each_size, monitor)?;
         for _ in 0..effort.rounds {
             ranking.refine(&linear, &refinement, effort.late_leaders, [0; 4], monitor)?;
+        }
+        if effort.other_optima {
+            ranking.look_elsewhere(&linear, &refinement)?;
         }
         let kinds = discrepancy::kinds(data, &linear.likelihood, noise.sigma);
         let mut weighed = ranking.weigh(&linear, &kinds, monitor)?;
@@ -311,6 +336,8 @@ fn about_leader(
 struct Ranking {
     candidates: Vec<Candidate>,
     fits: Vec<(Vec<usize>, Option<Fit>)>,
+    /// Of the set that led then: its members, and the fits at its other optima.
+    others: (Vec<usize>, Vec<Fit>),
 }
 
 impl Ranking {
@@ -360,6 +387,22 @@ impl Ranking {
         Ok(())
     }
 
+    /// Looks for other optima of the leading set; the best one is its fit from then on.
+    fn look_elsewhere(&mut self, linear: &Linear<'_>, refinement: &Refinement<'_>) -> Result<(), Failure> {
+        let leader = self.candidates.iter_mut().find(|candidate| !candidate.members.is_empty());
+        let Some(leader) = leader else { return Ok(()) };
+        let of_leader = self.fits.iter_mut().find(|(of, _)| *of == leader.members);
+        let Some(fit) = of_leader.and_then(|(_, fit)| fit.as_mut()) else { return Ok(()) };
+        let mut others = elsewhere(leader, fit, linear, refinement)?;
+        if let Some(best) = others.first_mut().filter(|best| best.log_z > fit.log_z) {
+            leader.log_z += best.log_z - fit.log_z;
+            std::mem::swap(fit, best);
+        }
+        self.others = (leader.members.clone(), others);
+        by_weight(&mut self.candidates);
+        Ok(())
+    }
+
     /// Log weight of every set, alone and, where it leads, beside a remainder.
     fn weigh(
         &self,
@@ -398,18 +441,20 @@ impl Ranking {
     fn set(&self, linear: &Linear<'_>, candidate: &Candidate, remainder: Option<Remainder>) -> SetWeight {
         let fit = self.fit(&candidate.members);
         let settings = fit.map_or_else(|| linear.settings(candidate), |fit| fit.settings.clone());
-        let mut standard_deviations: Vec<Vec<f64>> = settings.iter().map(|s| vec![0.0; s.values.len()]).collect();
-        if let Some(fit) = fit {
-            for (k, &(member, variable)) in fit.free.iter().enumerate() {
-                standard_deviations[member][variable] = fit.covariance[(k, k)].sqrt();
-            }
-        }
+        let nothing = || settings.iter().map(|s| vec![0.0; s.values.len()]).collect();
+        let mut standard_deviations: Vec<Vec<f64>> = fit.map_or_else(nothing, Fit::standard_deviations);
         // A shape that stays on its grid is uncertain, too, and widens the sizes.
         if fit.is_none_or(|fit| !fit.with_shapes) {
             for (own, spread) in standard_deviations.iter_mut().zip(&candidate.spread) {
                 own.iter_mut().zip(spread).for_each(|(own, spread)| *own = own.max(*spread));
             }
         }
+        let others = match (fit, &self.others) {
+            (Some(fit), (of, others)) if *of == candidate.members && remainder.is_none() => {
+                others.iter().map(|other| Optimum::beside(fit, other)).collect()
+            }
+            _ => Vec::new(),
+        };
         SetWeight {
             members: candidate.members.clone(),
             posterior: 0.0,
@@ -417,6 +462,7 @@ impl Ranking {
             standard_deviations,
             refined: fit.is_some(),
             remainder,
+            others,
         }
     }
 }
