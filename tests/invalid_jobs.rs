@@ -187,3 +187,30 @@ fn a_cell_that_cannot_be_read_is_the_only_fault() {
     let codes: Vec<String> = of(&job).into_iter().map(|(code, _)| code).collect();
     assert!(codes.contains(&"bad_cell".to_owned()) && codes.contains(&"duplicate_effect".to_owned()), "{codes:?}");
 }
+
+/// Classes of cuts as a table with another separator and unit are those of the rows; one that is misspelt is named with its row.
+#[test]
+fn classes_come_as_a_table_too_and_one_that_is_none_is_its_only_fault() {
+    let registry = Registry::standard().unwrap();
+    let diagnosis = registry.entry("diagnosis").unwrap().meta();
+    let example = diagnosis.examples.iter().find(|example| example.id == "fixture_classes").unwrap();
+    let mut job: Value = serde_json::from_str(example.job).unwrap();
+    let rows = job["measurements"].as_array().unwrap().clone();
+    let line = |row: &Value| {
+        let depth_um = 1e3 * row["depth_mm"].as_f64().unwrap();
+        format!("{};{depth_um:.0},0;{}", row["run"], row["regime"].as_str().unwrap())
+    };
+    let table = |rows: &[Value]| {
+        let lines: Vec<String> = rows.iter().map(line).collect();
+        json!({ "csv": format!("run;depth [um];regime\n{}", lines.join("\n")) })
+    };
+    let of = |job: &Value| faults_of(&registry, "diagnosis", job);
+    let key = |job: &Value| check_now(&registry, "diagnosis", Body::Json(job.to_string().into())).unwrap().key;
+    let of_rows = key(&job);
+    job["measurements"] = table(&rows);
+    assert_eq!(key(&job), of_rows);
+    let mut misspelt = rows.clone();
+    misspelt[4]["regime"] = json!("chater");
+    job["measurements"] = table(&misspelt);
+    assert_eq!(of(&job), [("not_one_of".to_owned(), "/measurements/4/regime".to_owned())]);
+}

@@ -6,7 +6,7 @@ use rand_pcg::Pcg64;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, Normal};
 
 use super::basis::{dot, smooth_columns};
-use super::evidence::log_normal_cdf;
+use super::link;
 use super::noise::pure_error;
 use super::weigh::Weighing;
 use crate::calculator::Smooth;
@@ -74,12 +74,12 @@ fn test(kind: TestKind, statistic: f64, dof: (f64, Option<f64>), p: f64) -> Opti
 /// Draws behind the p-value of a deviance: it is known to a hundredth where it is 0.1.
 const DRAWS: usize = 2000;
 
-/// D = -2 sum of ln Phi(s m/sigma) of the base's margins. Its distribution is no chi-squared one for single classes, so it is
+/// D = -2 sum of ln F(s m/sigma) of the base's margins. Its distribution is no chi-squared one for single classes, so it is
 /// drawn: allowances from their prior, classes from the margins under them.
 fn deviance(weighing: &Weighing<'_>, sides: &[f64]) -> Option<Test> {
     let foundation = weighing.foundation;
     let rows: Vec<usize> = (0..weighing.keep.len()).filter(|&row| weighing.keep[row]).collect();
-    let of = |side: f64, row: usize| -2.0 * log_normal_cdf(side * foundation.base[row] / weighing.scatter(row));
+    let of = |side: f64, row: usize| -2.0 * link::log_probability(side * foundation.base[row] / weighing.scatter(row));
     let found: f64 = rows.iter().map(|&row| of(sides[row], row)).sum();
     let mut random = Pcg64::seed_from_u64(1);
     let normal = Normal::standard();
@@ -94,7 +94,7 @@ fn deviance(weighing: &Weighing<'_>, sides: &[f64]) -> Option<Test> {
             .iter()
             .map(|&row| {
                 let moved: f64 = sizes.iter().zip(&foundation.nuisances).map(|(size, column)| size * column[row]).sum();
-                let positive = normal.cdf((foundation.base[row] + moved) / weighing.scatter(row));
+                let positive = link::log_probability((foundation.base[row] + moved) / weighing.scatter(row)).exp();
                 of(if random.random::<f64>() < positive { 1.0 } else { -1.0 }, row)
             })
             .sum();

@@ -8,8 +8,8 @@ use utoipa::ToSchema;
 
 use super::base::Bound;
 use super::calculator::Measured;
-use super::evidence::log_normal_cdf;
 use super::gain::Gain;
+use super::link;
 use super::weigh::Weighing;
 use crate::calculator::{Diagnosable, Failure, Finding, LimitCurve, Prediction};
 
@@ -101,8 +101,9 @@ pub(super) fn report<M: Diagnosable>(
     let with: Vec<Option<f64>> =
         extended.map_or_else(|| base.clone(), |with| with.iter().map(|margin| margin.ok()).collect());
     let probability = |margins: &[Option<f64>]| -> Vec<Option<f64>> {
-        let of =
-            |row: usize| margins[row].map(|margin| log_normal_cdf(sides[row] * margin / weighing.scatter(row)).exp());
+        let of = |row: usize| {
+            margins[row].map(|margin| link::log_probability(sides[row] * margin / weighing.scatter(row)).exp())
+        };
         (0..count).map(of).collect()
     };
     let right = |margins: &[Option<f64>]| {
@@ -185,7 +186,8 @@ pub(super) fn warnings(weighing: &Weighing<'_>, used: &[usize]) -> Vec<Finding> 
             margins.push(with.into_iter().map(Result::ok).collect());
         }
     }
-    let unlikely = |row: usize, margin: f64| log_normal_cdf(sides[row] * margin / weighing.scatter(row)) < AGAINST.ln();
+    let unlikely =
+        |row: usize, margin: f64| link::log_probability(sides[row] * margin / weighing.scatter(row)) < AGAINST.ln();
     let mut rows: Vec<usize> = kept
         .into_iter()
         .filter(|&row| margins.iter().all(|of| of[row].is_some_and(|margin| unlikely(row, margin))))

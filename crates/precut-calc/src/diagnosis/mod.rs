@@ -28,6 +28,7 @@ mod gain;
 mod identify;
 mod input;
 mod likelihood;
+mod link;
 mod next;
 mod noise;
 mod optima;

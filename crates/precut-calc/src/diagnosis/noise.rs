@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::basis::{dot, orthonormal, smooth_columns};
 use super::data::Data;
-use super::probit::information;
+use super::link::information;
 use crate::calculator::Smooth;
 
 /// Correlations from row to row that are tried.

@@ -1,15 +1,14 @@
-//! Classes on either side of a margin: the probit likelihood, its mode and its evidence (`diagnosis/3.11`).
-
-use std::f64::consts::PI;
+//! Classes on either side of a margin: their likelihood, its mode and its evidence (`diagnosis/3.11`).
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::basis::dot;
-use super::evidence::{Evidence, Normal, Side, log_normal_cdf, one_sided};
+use super::evidence::{Evidence, Normal, Side, one_sided};
+use super::link;
 use super::noise::Noise;
 use super::whiten::White;
 
-/// Newton steps to the mode. The log-posterior is concave: a dozen suffice, halvings included.
+/// Newton steps to the mode. But for the far tails the log-posterior is concave: a dozen suffice, halvings included.
 const STEPS: usize = 60;
 /// Halvings of a step that overshoots.
 const HALVINGS: usize = 40;
@@ -18,7 +17,7 @@ const SETTLED: f64 = 1e-12;
 
 /// Rows of which only the side of zero is known on which their margin lay.
 ///
-/// P(side s) = Phi(s (f + N d)/sigma), d ~ N(0, I). A column is in units of sigma; "what is left" is minus the margin, as
+/// P(side s) = F(s (f + N d)/sigma), d ~ N(0, I), F as in `link`. A column is in units of sigma; "what is left" is minus the margin, as
 /// if every row had been measured to stand on the boundary: then what is left of any linear model is read as for values.
 pub(super) struct Probit {
     /// Rows that count.
@@ -102,7 +101,7 @@ impl Probit {
     }
 
     /// Newton's method with halved steps on the log-posterior of the sizes of these columns and of the allowances. It is
-    /// concave, so there is one mode, and it is found from anywhere.
+    /// concave where no class stands far on the wrong side; what bends it there is left out of the curvature.
     fn mode(&self, columns: &[&White], residual: &White) -> Option<Mode> {
         let design: Vec<&[f64]> =
             columns.iter().map(|column| column.own()).chain(self.nuisances.iter().map(Vec::as_slice)).collect();
@@ -115,14 +114,14 @@ impl Probit {
             margin
         };
         let log_likelihood = |margin: &[f64]| -> f64 {
-            margin.iter().zip(&self.sides).map(|(margin, side)| log_normal_cdf(side * margin)).sum()
+            margin.iter().zip(&self.sides).map(|(margin, side)| link::log_probability(side * margin)).sum()
         };
         let mut size = DVector::zeros(count);
         let mut here = margin(&size);
         let mut value = log_likelihood(&here);
         for step in 0.. {
             let (slope, weight): (Vec<f64>, Vec<f64>) =
-                here.iter().zip(&self.sides).map(|(margin, side)| derivatives(*margin, *side)).unzip();
+                here.iter().zip(&self.sides).map(|(margin, side)| at(*margin, *side)).unzip();
             let mut curvature = DMatrix::identity(count, count);
             for i in 0..count {
                 let weighted: Vec<f64> = design[i].iter().zip(&weight).map(|(c, w)| c * w).collect();
@@ -160,16 +159,8 @@ impl Probit {
     }
 }
 
-/// d ln Phi(s m)/dm and minus its second derivative, which lies between 0 and 1.
-fn derivatives(margin: f64, side: f64) -> (f64, f64) {
-    let z = side * margin;
-    // The inverse Mills ratio phi(z)/Phi(z).
-    let ratio = (-0.5 * z * z - 0.5 * (2.0 * PI).ln() - log_normal_cdf(z)).exp();
-    (side * ratio, (ratio * (ratio + z)).clamp(0.0, 1.0))
-}
-
-/// Fisher's information of a row on its margin, in units of its spread: phi^2/(Phi (1 - Phi)).
-pub(super) fn information(margin: f64) -> f64 {
-    let log_density = -0.5 * margin * margin - 0.5 * (2.0 * PI).ln();
-    (2.0 * log_density - log_normal_cdf(margin) - log_normal_cdf(-margin)).exp()
+/// d ln F(s m)/dm and minus its second derivative.
+fn at(margin: f64, side: f64) -> (f64, f64) {
+    let (slope, weight) = link::derivatives(side * margin);
+    (side * slope, weight)
 }

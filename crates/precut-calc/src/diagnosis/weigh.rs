@@ -1,9 +1,10 @@
 //! From rows to posterior weights and a verdict (`diagnosis/3.5`, `diagnosis/3.7`).
 
 use super::discrepancy::{self, Kind, Remainder};
-use super::evidence::{Normal, Side, log_normal_cdf, log_sum_exp};
+use super::evidence::{Normal, Side, log_sum_exp};
 use super::foundation::Foundation;
 use super::likelihood::Likelihood;
+use super::link;
 use super::noise::Noise;
 use super::optima::{Optimum, elsewhere};
 use super::profile::{Profile, Profiler};
@@ -278,7 +279,7 @@ impl<'a> Weighing<'a> {
     pub(super) fn loss(&self, row: usize, left: f64) -> f64 {
         match &self.foundation.data.sides {
             None => left * left,
-            Some(sides) => -2.0 * log_normal_cdf(-sides[row] * left / self.scatter(row)),
+            Some(sides) => -2.0 * link::log_probability(-sides[row] * left / self.scatter(row)),
         }
     }
 

@@ -18,7 +18,12 @@ const NO_MASS_KG: f64 = 1e-4;
 const EXPANSIONS: [f64; 4] = [0.25, 0.5, 1.0, 2.0];
 /// Prior standard deviation of a mass that swings on the workpiece, as a share of the workpiece's.
 const HUNG_SHARE: f64 = 0.1;
-/// Sizes about which it is linearised, prior standard deviations: a resonance splits in two by the root of the ratio of the
+/// Sizes about which what shifts a resonance is linearised, prior standard deviations: one of a tenth in frequency moves it by
+/// its own width, and a straight line through none of it ends long before.
+const SHIFTS: [f64; 3] = [0.5, 1.0, 1.5];
+/// The same of joints that harden: near the onset of chatter a little of it does as much as much of it does elsewhere.
+const HARDENINGS: [f64; 4] = [0.03, 0.1, 0.3, 1.0];
+/// Sizes about which a mass that swings is linearised, prior standard deviations: a resonance splits in two by the root of the ratio of the
 /// masses, which is more than its width from a hundredth of the workpiece on.
 const HUNG_EXPANSIONS: [f64; 2] = [0.1, 0.4];
 /// Its frequencies, as shares of those of the vise: from below the lowest to where it is but one more mass.
@@ -166,7 +171,8 @@ pub(super) fn effects(hypothesis: &Hypothesis, values: &[f64]) -> Option<Vec<Fix
 }
 
 /// Sizes about which a hypothesis is linearised beside 0: the amplitude of a cutter grows with a tooth that stands out to
-/// either side, so that a straight line through none of it shows nothing; and a mass that swings splits a resonance.
+/// either side, so that a straight line through none of it shows nothing; a mass that swings splits a resonance; and what
+/// shifts one, or makes joints stiffer where they move most, does not do so in a straight line.
 pub(super) fn expansions(hypothesis: &Hypothesis) -> Expansions {
     match (hypothesis.cause.kind, hypothesis.variables.as_slice()) {
         ("tooth_runout", [Variable { treatment: Treatment::Amplitude { prior_sd }, range, .. }]) => Expansions::along(
@@ -176,6 +182,13 @@ pub(super) fn expansions(hypothesis: &Hypothesis) -> Expansions {
                 .filter(|size| *size < range.upper)
                 .flat_map(|size| [size, -size]),
         ),
+        ("stiffness" | "mass" | "jaw_mass", [Variable { treatment: Treatment::Amplitude { prior_sd }, range, .. }]) => {
+            let sizes = SHIFTS.iter().flat_map(|share| [share * prior_sd, -share * prior_sd]);
+            Expansions::along(sizes.filter(|size| (range.lower..=range.upper).contains(size)))
+        }
+        ("contact_hardening", [Variable { treatment: Treatment::Amplitude { prior_sd }, .. }]) => {
+            Expansions::along(HARDENINGS.iter().map(|share| share * prior_sd))
+        }
         ("second_mode", [Variable { treatment: Treatment::Amplitude { prior_sd }, .. }, ..]) => {
             Expansions::along(HUNG_EXPANSIONS.iter().map(|share| share * prior_sd))
         }

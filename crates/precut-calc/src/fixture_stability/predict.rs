@@ -21,11 +21,11 @@ use super::simulate::{count, plan, run as simulate, steps_per_tooth};
 /// Step of a difference over time, s: below a tenth of a period of any vise.
 const TIME_STEP_S: f64 = 1e-5;
 /// Processor time on one core, ms, measured on a part of 4.4 kg at 400 Hz and six teeth at 300 to 640 rev/min: a forced
-/// motion, a multiplier, a limit, a kept step in time; a second mode adds a fifth to a half. A depth takes 2.4 ms with joints
-/// that harden and 4.8 ms with uneven teeth: a diagnosis asks for such motions once in a dozen predictions each.
-const FORCED_MS: f64 = 0.18;
-const MULTIPLIER_MS: f64 = 0.12;
-const NOT_LINEAR_MS: f64 = (2.4 + 4.8) / 12.0;
+/// motion, a multiplier, a limit, a kept step in time; a second mode adds a fifth to a half. A depth takes 1.0 ms with joints
+/// that harden and 0.8 ms with uneven teeth: a diagnosis asks for such motions once in a dozen predictions each.
+const FORCED_MS: f64 = 0.04;
+const MULTIPLIER_MS: f64 = 0.13;
+const NOT_LINEAR_MS: f64 = (1.0 + 0.8) / 12.0;
 const LIMIT_MS: f64 = 1.1;
 const KEPT_STEP_MS: f64 = 5e-5;
 
