@@ -53,6 +53,8 @@ impl Page {
             .args(["--force-color-profile=srgb", "--lang=en", "--remote-debugging-port=0", "--no-first-run"])
             .arg(format!("--user-data-dir={}", profile.path().display()))
             .arg("about:blank")
+            // It leaves what it keeps there behind when it is killed.
+            .env("TMPDIR", profile.path())
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             .stderr(Stdio::piped())

@@ -84,16 +84,18 @@ impl PreparedFixture {
         let Some(case) = Case::with(&self.job, &all, &self.job.conditions) else {
             return Ok(ClassLimits { spindle_speed_rpm: speeds, depth_mm: depths, curves: Vec::new() });
         };
-        let curve = |feed_mm: f64| -> Result<LimitCurve, Failure> {
+        // Where joints harden there may be no forced motion at some depth of some speed, and no limit to draw.
+        let curve = |feed_mm: f64| -> Result<Option<LimitCurve>, Failure> {
             let plane = Plane { from_rpm, to_rpm, speeds: SPEEDS, most_mm, depths: 2, feed_mm };
-            let found = boundary(&self.rules, &case.holding, &case.cutting, &plane, &Unwatched, &mut |_, _| {})?;
-            Ok(LimitCurve {
+            let found = boundary(&self.rules, &case.holding, &case.cutting, &plane, &Unwatched, &mut |_, _| {});
+            Ok(or_missing(found)?.ok().map(|found| LimitCurve {
                 feed_mm_per_tooth: feed_mm,
                 spindle_speed_rpm: found.iter().map(|point| point.spindle_rpm).collect(),
                 depth_mm: found.iter().map(|point| point.crossings_mm.first().copied()).collect(),
-            })
+            }))
         };
-        let curves = feeds.into_iter().take(MOST_FEEDS).map(curve).collect::<Result<_, _>>()?;
+        let curves = feeds.into_iter().take(MOST_FEEDS).map(curve).collect::<Result<Vec<_>, _>>()?;
+        let curves = curves.into_iter().flatten().collect();
         Ok(ClassLimits { spindle_speed_rpm: speeds, depth_mm: depths, curves })
     }
 }
