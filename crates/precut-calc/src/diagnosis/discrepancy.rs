@@ -224,7 +224,7 @@ impl Kind {
         let causes = columns.len();
         let joint = match likelihood {
             Likelihood::Gaussian { .. } => self.joined(&Normal::of(columns, residual), columns, residual),
-            Likelihood::Probit(_) => {
+            Likelihood::Classes(_) => {
                 let all: Vec<&White> = columns.iter().copied().chain(&self.white).collect();
                 let sizes = remainder.of_causes.iter().chain(&remainder.amplitudes);
                 let left = all

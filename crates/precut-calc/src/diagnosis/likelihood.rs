@@ -1,10 +1,10 @@
 //! What rows say about a prediction: values that scatter about it, or classes on either side of a margin
 //! (`diagnosis/3.4`, `diagnosis/3.11`). The one place where a diagnosis knows the difference.
 
+use super::class_likelihood::ClassLikelihood;
 use super::data::Data;
 use super::evidence::{Evidence, Normal, Scale, Side};
 use super::noise::Noise;
-use super::probit::Probit;
 use super::whiten::{White, Whitener};
 
 /// How well a prediction explains the rows.
@@ -17,7 +17,7 @@ pub(super) enum Likelihood {
         scale: Scale,
     },
     /// Classes: the probability of each is that of a scattering margin on its side of zero.
-    Probit(Probit),
+    Classes(ClassLikelihood),
 }
 
 impl Likelihood {
@@ -25,7 +25,7 @@ impl Likelihood {
     pub(super) fn of(data: &Data, noise: &Noise, nuisances: &[Vec<f64>], keep: &[bool]) -> Self {
         match &data.sides {
             None => Self::Gaussian { whitener: Whitener::new(data, noise, nuisances, keep), scale: Scale::of(noise) },
-            Some(sides) => Self::Probit(Probit::new(sides, noise, nuisances, keep)),
+            Some(sides) => Self::Classes(ClassLikelihood::new(sides, noise, nuisances, keep)),
         }
     }
 
@@ -33,7 +33,7 @@ impl Likelihood {
     pub(super) fn white(&self, column: &[f64]) -> White {
         match self {
             Self::Gaussian { whitener, .. } => whitener.white(column),
-            Self::Probit(probit) => probit.white(column),
+            Self::Classes(classes) => classes.white(column),
         }
     }
 
@@ -43,7 +43,7 @@ impl Likelihood {
             Self::Gaussian { whitener, scale } => {
                 Normal::of(columns, residual).evidence(sides, *scale, whitener.rows())
             }
-            Self::Probit(probit) => probit.evidence(columns, residual, sides),
+            Self::Classes(classes) => classes.evidence(columns, residual, sides),
         }
     }
 
@@ -51,7 +51,7 @@ impl Likelihood {
     pub(super) fn normal(&self, columns: &[&White], residual: &White) -> Option<Normal> {
         match self {
             Self::Gaussian { .. } => Some(Normal::of(columns, residual)),
-            Self::Probit(probit) => probit.normal(columns, residual),
+            Self::Classes(classes) => classes.normal(columns, residual),
         }
     }
 
@@ -59,7 +59,7 @@ impl Likelihood {
     pub(super) fn misfit(&self, residual: &White) -> f64 {
         match self {
             Self::Gaussian { .. } => residual.inner(residual),
-            Self::Probit(probit) => probit.misfit(residual),
+            Self::Classes(classes) => classes.misfit(residual),
         }
     }
 }

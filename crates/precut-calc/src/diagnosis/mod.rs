@@ -5,10 +5,12 @@
 //!
 //! - `outlier`, `noise`: what the rows say about their own scatter (`diagnosis/3.1`);
 //! - `whiten`: scatter and allowances as one covariance (`diagnosis/3.2`);
-//! - `likelihood`, `probit`: values that scatter about a prediction, classes on either side of it (`diagnosis/3.11`);
+//! - `likelihood`, `class_likelihood`, `link`: values that scatter about a prediction, classes on either side of it
+//!   (`diagnosis/3.11`);
 //! - `signatures`, `survey`: what each hypothesis does to the rows, about 0 and where it comes nearest to them;
 //! - `evidence`, `discrepancy`, `search`, `refine`: how well each set of causes, alone or with an unnamed
 //!   smooth remainder, explains the rows (`diagnosis/3.4`, `diagnosis/3.5`);
+//! - `optima`: other values that the rows fit nearly as well (`diagnosis/3.4`);
 //! - `weigh`: posterior weights and the verdict (`diagnosis/3.5`, `diagnosis/3.7`);
 //! - `profile`: intervals where a likelihood is not quadratic (`diagnosis/3.6`);
 //! - `gain`, `downstream`: what the extended model is worth, on data held back and in what is decided with it
@@ -18,6 +20,7 @@ mod adequacy;
 mod base;
 mod basis;
 mod calculator;
+mod class_likelihood;
 mod classes;
 mod data;
 mod discrepancy;
@@ -36,7 +39,6 @@ mod outlier;
 mod outlying;
 mod output;
 mod picture;
-mod probit;
 mod profile;
 mod refine;
 mod refuse;

@@ -93,7 +93,7 @@ impl<'a> Linear<'a> {
         let narrowed = Vec::new();
         let mut linear =
             Self { hypotheses, signatures, white, residual, gram, right, square, likelihood, visible, narrowed };
-        if matches!(linear.likelihood, Likelihood::Probit(_)) {
+        if matches!(linear.likelihood, Likelihood::Classes(_)) {
             linear.narrowed = (0..hypotheses.len()).map(|h| linear.most_telling(h)).collect();
         }
         linear

@@ -199,7 +199,7 @@ impl<'a> Weighing<'a> {
         let inclusion = (0..subject.hypotheses().len()).map(|h| sum(&|set| set.members.contains(&h))).collect();
         let whitener = match &linear.likelihood {
             Likelihood::Gaussian { whitener, .. } => whitener.clone(),
-            Likelihood::Probit(_) => about_leader(foundation, &sets, &noise, &keep)?,
+            Likelihood::Classes(_) => about_leader(foundation, &sets, &noise, &keep)?,
         };
         let at_limit =
             |set: &SetWeight| ranking.fit(&set.members).is_some_and(|fit| at_limit(fit, subject.hypotheses()));
@@ -299,7 +299,7 @@ impl<'a> Weighing<'a> {
     pub(super) fn directions(&self, fit: &Fit) -> Vec<White> {
         match &self.linear.likelihood {
             Likelihood::Gaussian { .. } => fit.columns.clone(),
-            Likelihood::Probit(_) => fit.slopes.iter().map(|slope| self.whitener.white(slope)).collect(),
+            Likelihood::Classes(_) => fit.slopes.iter().map(|slope| self.whitener.white(slope)).collect(),
         }
     }
 

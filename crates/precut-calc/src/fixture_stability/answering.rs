@@ -239,7 +239,7 @@ impl<'a, const N: usize> Period<'a, N> {
         Some(force_n)
     }
 
-    /// One sweep over the revolution from a state: x at the points, where they are asked for, x at the starts, and the last state.
+    /// One sweep over the period from a state to the last: `seen` is told where every element begins, and in which state.
     fn sweep(
         &self,
         start: &[f64; N],

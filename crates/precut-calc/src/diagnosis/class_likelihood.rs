@@ -19,7 +19,7 @@ const SETTLED: f64 = 1e-12;
 ///
 /// P(side s) = F(s (f + N d)/sigma), d ~ N(0, I), F as in `link`. A column is in units of sigma; "what is left" is minus the margin, as
 /// if every row had been measured to stand on the boundary: then what is left of any linear model is read as for values.
-pub(super) struct Probit {
+pub(super) struct ClassLikelihood {
     /// Rows that count.
     rows: Vec<usize>,
     /// +1 or -1.
@@ -40,18 +40,18 @@ struct Mode {
     weight: Vec<f64>,
 }
 
-impl Probit {
+impl ClassLikelihood {
     pub(super) fn new(sides: &[f64], noise: &Noise, nuisances: &[Vec<f64>], keep: &[bool]) -> Self {
         let rows: Vec<usize> = (0..keep.len()).filter(|&row| keep[row]).collect();
         let sigma = rows.iter().map(|&row| noise.per_row.as_ref().map_or(noise.sigma, |own| own[row])).collect();
         let sides = rows.iter().map(|&row| sides[row]).collect();
-        let mut probit = Self { rows, sides, sigma, nuisances: Vec::new() };
-        probit.nuisances = nuisances
+        let mut likelihood = Self { rows, sides, sigma, nuisances: Vec::new() };
+        likelihood.nuisances = nuisances
             .iter()
-            .map(|column| probit.scaled(column))
+            .map(|column| likelihood.scaled(column))
             .filter(|column| column.iter().any(|v| v.abs() > 0.0))
             .collect();
-        probit
+        likelihood
     }
 
     fn scaled(&self, column: &[f64]) -> Vec<f64> {
