@@ -6,6 +6,9 @@
 //! - `PRECUT_TRIALS`: how many;
 //! - `PRECUT_TRIAL_SEED`: from which seed;
 //! - `PRECUT_TRIAL_GAIN=1`: the gain on data held back, too, which takes many times as long;
+//! - `PRECUT_TRIAL_SNR`: at which ratio of signal to noise;
+//! - `PRECUT_TRIAL_APART=1`: how far hidden causes stand from the others also where that takes as long as a diagnosis, and
+//!   whether an observer finds them who knows what every cause would look like;
 //! - `PRECUT_TRIAL_TALK=1`: what every answer says.
 //!
 //! The draws that stand in the tests are kept with their confusion matrices in `tests/trials`: a change that moves an answer is
@@ -15,16 +18,22 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
+use std::fmt::Write;
 use std::path::Path;
 
-use precut_calc::calculator::{Calculator, Check, Diagnosable, Unwatched, Violations};
-use precut_calc::diagnosis::{Diagnosis, NamedCause, ResultOf};
-use precut_trials::score::{Said, Score};
-use precut_trials::{Class, Trial};
-use serde_json::json;
+use precut_calc::calculator::{Calculator, Check, Diagnosable, Measurement, Unwatched, Violations};
+use precut_calc::diagnosis::{
+    Diagnosis, JobOf, NamedCause, ResultOf, SetReport, residuals_with, separation_from, separations_of,
+};
+use precut_trials::score::{HeldOut, Said, Score};
+use precut_trials::{Class, Hidden, Trial};
+use serde_json::{Value, json};
 
 /// Draws trial number `seed` of a class at a ratio of signal to noise.
 pub(crate) type Draw = fn(Class, f64, u64) -> Trial;
+
+/// Whether an observer who knows what every cause would look like finds the one cause of a draw.
+pub(crate) type Ideal = fn(f64, u64) -> bool;
 
 /// What is hidden: how, how strongly, from which seed, and how many times.
 #[derive(Debug, Clone, Copy)]
@@ -32,6 +41,7 @@ pub(crate) struct Trials {
     /// Name of the file that keeps the score.
     pub(crate) name: &'static str,
     pub(crate) draw: Draw,
+    pub(crate) ideal: Option<Ideal>,
     pub(crate) class: Class,
     pub(crate) snr: f64,
     pub(crate) seed: u64,
@@ -40,16 +50,25 @@ pub(crate) struct Trials {
 
 /// The score of the diagnosis of `M` on so many draws; printed with its confusion matrix.
 pub(crate) fn score<M: Diagnosable>(trials: Trials) -> Score {
-    let Trials { name, draw, class, snr, .. } = trials;
+    let Trials { name, draw, class, .. } = trials;
+    let snr = number("PRECUT_TRIAL_SNR", trials.snr);
     let (seed, count) = (number("PRECUT_TRIAL_SEED", trials.seed), number("PRECUT_TRIALS", trials.count));
     let mut score = Score::default();
     for k in 0..count {
-        let trial = draw(class, snr, seed.wrapping_mul(1_000_003).wrapping_add(k));
-        score.add(&trial.truth, &answer::<M>(&trial));
+        let own_seed = seed.wrapping_mul(1_000_003).wrapping_add(k);
+        let trial = draw(class, snr, own_seed);
+        let ideal = trials
+            .ideal
+            .filter(|_| class == Class::One && asked_for("PRECUT_TRIAL_APART"))
+            .map(|ideal| ideal(snr, own_seed));
+        score.add(&trial.truth, &Said { ideal, ..answer::<M>(&trial) });
     }
     let text = format!("{}: {class:?}, signal to noise {snr}, {count} draws from seed {seed}\n{score}", M::META.id);
     println!("{text}");
-    if (seed, count) == (trials.seed, trials.count) && std::env::var("PRECUT_TRIAL_GAIN").is_err() {
+    if (seed, count) == (trials.seed, trials.count)
+        && !asked_for("PRECUT_TRIAL_GAIN")
+        && !asked_for("PRECUT_TRIAL_APART")
+    {
         keep(name, &text);
     }
     score
@@ -65,20 +84,29 @@ fn keep(name: &str, text: &str) {
     assert_eq!(kept, text, "{} is another: see what moved, then PRECUT_WRITE_TRIALS=1", path.display());
 }
 
-fn number(name: &str, default: u64) -> u64 {
+fn asked_for(name: &str) -> bool {
+    std::env::var_os(name).is_some()
+}
+
+fn number<T: std::str::FromStr>(name: &str, default: T) -> T {
     std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
 }
 
-fn answer<M: Diagnosable>(trial: &Trial) -> Said {
-    let mut request = trial.request.clone();
-    request["options"] = json!({ "held_out": std::env::var("PRECUT_TRIAL_GAIN").is_ok() });
-    let mut job: <Diagnosis<M> as Calculator>::Input = serde_json::from_value(request).unwrap();
+fn job<M: Diagnosable>(request: &Value, options: Value) -> JobOf<M> {
+    let mut request = request.clone();
+    request["options"] = options;
+    let mut job: JobOf<M> = serde_json::from_value(request).unwrap();
     let mut violations = Violations::default();
     job.check(&mut violations);
     assert!(violations.is_empty(), "{:?}", violations.into_vec());
     Diagnosis::<M>::fill(&mut job);
+    job
+}
+
+fn answer<M: Diagnosable>(trial: &Trial) -> Said {
+    let job = job::<M>(&trial.request, json!({ "held_out": asked_for("PRECUT_TRIAL_GAIN") }));
     let result = Diagnosis::<M>::run(&job, &Unwatched).unwrap().output;
-    if std::env::var("PRECUT_TRIAL_TALK").is_ok() {
+    if asked_for("PRECUT_TRIAL_TALK") {
         talk::<M>(trial, &result);
     }
     let first = result.sets.iter().find(|set| !set.causes.is_empty() && !set.with_remainder);
@@ -88,13 +116,99 @@ fn answer<M: Diagnosable>(trial: &Trial) -> Said {
         likely: result.likely_sets.iter().map(|set| kinds(&set.causes)).collect(),
         first: first.map_or_else(Vec::new, |set| kinds(&set.causes)),
         covered: covered(trial, &result.named),
-        explained_share: result.gain.and_then(|gain| gain.explained_share),
+        held_out: result.gain.as_ref().filter(|gain| gain.explained_share.is_some()).map(|gain| {
+            let square = |rmse: f64| (rmse / trial.sigma).powi(2);
+            let base = square(gain.rmse_base);
+            HeldOut { explained: base - square(gain.rmse_extended), explainable: base - square(gain.noise_ceiling) }
+        }),
+        separations: separations::<M>(trial, &job),
+        ideal: None,
+        later: later::<M>(trial, &result),
     }
+}
+
+/// What the extended model explains of rows that were measured afterwards.
+fn later<M: Diagnosable>(trial: &Trial, result: &ResultOf<M>) -> Option<HeldOut> {
+    let later = trial.later.as_ref()?;
+    let job = job::<M>(&later.request, json!({ "held_out": false }));
+    let square = |residuals: &[f64]| {
+        residuals.iter().map(|r| r * r).sum::<f64>() / (residuals.len() as f64 * trial.sigma * trial.sigma)
+    };
+    let base = residuals_with::<M>(&job, &[]).unwrap();
+    let extended = residuals_with::<M>(&job, &result.effects).unwrap();
+    let logarithmic = M::QUANTITIES.iter().any(|known| known.name == job.quantity && known.logarithmic);
+    let measured = job.measurements.rows().iter().map(|row| row.value(&job.quantity).unwrap());
+    let measured = measured.map(|value| if logarithmic { value.ln() } else { value });
+    let best: Vec<f64> = measured.zip(&later.best).map(|(measured, best)| measured - best).collect();
+    let explainable = square(&base) - square(&best);
+    Some(HeldOut { explained: square(&base) - square(&extended), explainable }).filter(|_| explainable > 0.0)
+}
+
+/// What is said of one hidden cause where the catalogue lacks it.
+#[derive(Debug, Default)]
+pub(crate) struct Mutated {
+    pub(crate) adequate: usize,
+    pub(crate) confounded: usize,
+    pub(crate) unknown: usize,
+    /// Of sets that are named in its place: how far the hidden cause stands from what they could make of the rows, sigmas.
+    pub(crate) twins: Vec<f64>,
+}
+
+/// The same draws of one cause each with the entry of that cause taken out of the catalogue.
+pub(crate) fn without_the_cause<M: Diagnosable>(trials: Trials) -> Mutated {
+    let (seed, count) = (number("PRECUT_TRIAL_SEED", trials.seed), number("PRECUT_TRIALS", trials.count));
+    let (mut mutated, mut text) = (Mutated::default(), String::new());
+    for k in 0..count {
+        let trial = (trials.draw)(Class::One, trials.snr, seed.wrapping_mul(1_000_003).wrapping_add(k));
+        let hidden = &trial.truth.causes[0];
+        let others: Vec<&str> = M::CAUSES.iter().map(|cause| cause.kind).filter(|kind| *kind != hidden.kind).collect();
+        let options = json!({ "held_out": false, "causes": others });
+        let result = Diagnosis::<M>::run(&job::<M>(&trial.request, options), &Unwatched).unwrap().output;
+        let mut said = result.verdict.name().to_owned();
+        match said.as_str() {
+            "adequate" => mutated.adequate += 1,
+            "confounded" => mutated.confounded += 1,
+            "unknown" => mutated.unknown += 1,
+            _ => {
+                let kinds = kinds(&result.named);
+                let whole = job::<M>(&trial.request, json!({ "held_out": false }));
+                let parameters = result.named.iter().flat_map(|cause| &cause.parameters);
+                let fitted = parameters.filter(|parameter| parameter.interval_95.is_some()).count();
+                let sigmas = separation_from::<M>(&whole, &hidden.signature, &result.effects, fitted).unwrap();
+                said = format!("{}, {sigmas:.1} sigmas away", kinds.join(" + "));
+                mutated.twins.push(sigmas);
+            }
+        }
+        writeln!(text, "{:<28}{said}", hidden.kind).unwrap();
+    }
+    println!("{}: without the hidden cause, {count} draws from seed {seed}\n{text}{mutated:?}", M::META.id);
+    if (seed, count) == (trials.seed, trials.count) {
+        keep(trials.name, &text);
+    }
+    mutated
+}
+
+impl Mutated {
+    /// Sets named in its place that these rows can tell from the hidden cause.
+    pub(crate) fn forced(&self) -> usize {
+        self.twins.iter().filter(|sigmas| **sigmas >= 4.0).count()
+    }
+}
+
+/// How far every hidden cause stands from the others; nothing where rows are classes, or where nobody asks for what takes as
+/// long as the diagnosis itself.
+fn separations<M: Diagnosable>(trial: &Trial, job: &JobOf<M>) -> Vec<f64> {
+    let is_dear = M::predict_ms(&job.job) > 0.0;
+    let changes: Vec<(&str, &[f64])> = trial.truth.causes.iter().map(|h| (h.kind, h.signature.as_slice())).collect();
+    if changes.iter().any(|(_, change)| change.is_empty()) || (is_dear && !asked_for("PRECUT_TRIAL_APART")) {
+        return Vec::new();
+    }
+    separations_of::<M>(job, &changes).unwrap()
 }
 
 /// Whether the 95 % interval of the first parameter of a named cause holds what was hidden, for every cause named right.
 fn covered(trial: &Trial, named: &[NamedCause]) -> Vec<bool> {
-    let of = |hidden: &precut_trials::Hidden| {
+    let of = |hidden: &Hidden| {
         let named = named.iter().find(|cause| cause.kind == hidden.kind)?;
         let [low, high] = named.parameters[0].interval_95?;
         Some((low..=high).contains(&hidden.size))
@@ -111,9 +225,10 @@ fn talk<M: Diagnosable>(trial: &Trial, result: &ResultOf<M>) {
         let values: Vec<String> = cause.parameters.iter().map(|p| format!("{:.4}", p.value)).collect();
         format!("{} {} [{}]", cause.kind, cause.label, values.join(" "))
     };
+    let causes = trial.truth.causes.iter().map(|hidden| format!("{} {:.5}", hidden.kind, hidden.size));
     println!(
-        "truth {:?} sigma {:.4} found {:.4} -> {}",
-        trial.truth.causes,
+        "truth [{}] sigma {:.4} found {:.4} -> {}",
+        causes.collect::<Vec<String>>().join(", "),
         trial.sigma,
         result.noise.standard_deviation,
         result.verdict.name()
@@ -123,7 +238,15 @@ fn talk<M: Diagnosable>(trial: &Trial, result: &ResultOf<M>) {
         let first = &named.parameters[0];
         println!("     {} hidden {:.5} fitted {:.5} in {:?}", hidden.kind, hidden.size, first.value, first.interval_95);
     }
-    for set in result.sets.iter().take(4) {
+    let mut hidden: Vec<&str> = trial.truth.causes.iter().map(|hidden| hidden.kind).collect();
+    hidden.sort_unstable();
+    let is_truth = |set: &&SetReport| {
+        let mut kinds = kinds(&set.causes);
+        kinds.sort_unstable();
+        !set.with_remainder && kinds == hidden
+    };
+    let beyond = result.sets.iter().skip(4).find(is_truth);
+    for set in result.sets.iter().take(4).chain(beyond) {
         let rest = if set.with_remainder { "+rest" } else { "" };
         let names: Vec<String> = set.causes.iter().map(each).collect();
         println!("     {:.2e} {rest} {}", set.posterior, names.join(" + "));

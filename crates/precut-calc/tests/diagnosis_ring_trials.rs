@@ -10,7 +10,7 @@ use precut_trials::{Class, ring};
 use crate::blind_trials::{self, Trials};
 
 fn score(name: &'static str, class: Class, snr: f64, seed: u64, count: u64) -> Score {
-    blind_trials::score::<RingRoundness>(Trials { name, draw: ring::draw, class, snr, seed, count })
+    blind_trials::score::<RingRoundness>(Trials { name, draw: ring::draw, ideal: None, class, snr, seed, count })
 }
 
 #[test]

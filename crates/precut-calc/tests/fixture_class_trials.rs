@@ -13,6 +13,7 @@ fn score(name: &'static str, class: Class, shift: f64, seed: u64, count: u64) ->
     blind_trials::score::<FixtureStability>(Trials {
         name,
         draw: fixture::draw_classes,
+        ideal: None,
         class,
         snr: shift,
         seed,

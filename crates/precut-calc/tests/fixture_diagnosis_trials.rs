@@ -10,7 +10,7 @@ use precut_trials::{Class, fixture};
 use crate::blind_trials::{self, Trials};
 
 fn score(name: &'static str, class: Class, snr: f64, seed: u64, count: u64) -> Score {
-    blind_trials::score::<FixtureStability>(Trials { name, draw: fixture::draw, class, snr, seed, count })
+    blind_trials::score::<FixtureStability>(Trials { name, draw: fixture::draw, ideal: None, class, snr, seed, count })
 }
 
 #[test]
@@ -39,6 +39,7 @@ fn a_jaw_that_slips_is_unknown() {
     let score = blind_trials::score::<FixtureStability>(Trials {
         name: "fixture-jaw-slip",
         draw,
+        ideal: None,
         class: Class::Outside,
         snr: 5.0,
         seed: 6,
@@ -54,6 +55,7 @@ fn a_second_mode_is_named_right_or_not_at_all() {
     let score = blind_trials::score::<FixtureStability>(Trials {
         name: "fixture-second-mode",
         draw,
+        ideal: None,
         class: Class::One,
         snr: 5.0,
         seed: 7,

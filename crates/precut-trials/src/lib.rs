@@ -9,6 +9,7 @@
 pub mod deflection;
 pub mod fixture;
 pub mod machinability;
+mod observer;
 mod random;
 pub mod ring;
 pub mod score;
@@ -26,6 +27,19 @@ pub struct Trial {
     pub truth: Truth,
     /// Standard deviation of the scatter, in the unit of the quantity.
     pub sigma: f64,
+    /// What was measured afterwards under other conditions, on the same machine with the same that is hidden; not of
+    /// simulations, which are dear.
+    pub later: Option<Later>,
+}
+
+/// Rows that no diagnosis has seen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Later {
+    /// The body of a request with these rows.
+    pub request: Value,
+    /// What a model would predict in every row that knows what is hidden, as residuals are taken (a logarithm where the
+    /// quantity has one).
+    pub best: Vec<f64>,
 }
 
 /// What is hidden in a trial.
@@ -59,4 +73,7 @@ pub struct Hidden {
     pub size: f64,
     /// Root mean square of its signature over the rows, standard deviations of the scatter.
     pub snr: f64,
+    /// Its signature: what it alone changes in every row, in the unit of residuals (a logarithm where the quantity has
+    /// one). Empty where rows are classes.
+    pub signature: Vec<f64>,
 }

@@ -19,9 +19,24 @@ pub struct Said {
     pub first: Vec<String>,
     /// Whether the 95 % intervals hold the hidden sizes, for those causes that are named and right.
     pub covered: Vec<bool>,
-    /// Share of what could be explained on data held back that was, where the gain was asked for and there is something to
-    /// explain.
-    pub explained_share: Option<f64>,
+    /// What was explained on data held back, where the gain was asked for and there is something to explain.
+    pub held_out: Option<HeldOut>,
+    /// Of every hidden cause, how far it stands from what any other single cause could make of the rows, sigmas; empty
+    /// where that was not looked at.
+    pub separations: Vec<f64>,
+    /// Whether an observer finds the one cause who knows what every cause would look like; `None` where nobody was asked.
+    pub ideal: Option<bool>,
+    /// What the extended model explains of rows that were measured afterwards under other conditions, where there are such.
+    pub later: Option<HeldOut>,
+}
+
+/// Mean squares on rows that no fit has seen, in squares of the scatter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HeldOut {
+    /// What the base leaves less what the extended model leaves.
+    pub explained: f64,
+    /// What the base leaves less what no model can explain.
+    pub explainable: f64,
 }
 
 /// How many of how many.
@@ -72,6 +87,24 @@ impl std::fmt::Display for Share {
     }
 }
 
+/// Upper ends of the classes of separation, sigmas; the last has none.
+const CLASSES: [f64; 3] = [3.0, 5.0, 8.0];
+/// Separation from which on a cause is told apart.
+const APART: f64 = 5.0;
+/// Separation from the whole catalogue from which on something that it lacks is told apart.
+const APART_FROM_ALL: f64 = 6.0;
+
+/// One cause, by how far it stands from the others.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Apart {
+    /// The heaviest set is it.
+    pub first_right: Share,
+    /// It is named, and rightly.
+    pub named_right: Share,
+    /// Something else is named.
+    pub named_wrong: usize,
+}
+
 /// Counts over many trials of one calculator.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Score {
@@ -89,8 +122,25 @@ pub struct Score {
     pub unknown: Share,
     /// 95 % intervals that hold the truth.
     pub coverage: Share,
-    /// Explained shares of the answers that have one, of trials with causes of the catalogue.
-    pub explained_shares: Vec<f64>,
+    /// One cause, by separation: below 3, 5, 8 sigmas, and beyond.
+    pub apart: [Apart; CLASSES.len() + 1],
+    /// One cause: an observer finds it who knows what every cause would look like.
+    pub ideal: Share,
+    /// Two causes, each told apart from every other: the heaviest set is they.
+    pub pair_apart: Share,
+    /// Outside the catalogue, told apart from all of it: `unknown`.
+    pub unknown_apart: Share,
+    /// What was explained on data held back, of trials with causes of the catalogue; of those that are told apart where that
+    /// was looked at.
+    pub held_out: Vec<HeldOut>,
+    /// What was explained of rows measured afterwards, of trials with causes of the catalogue that are told apart.
+    pub later: Vec<HeldOut>,
+    /// Sets in the lists of `confounded` answers.
+    pub listed: Vec<usize>,
+    /// One cause: the heaviest set is what the draw before hides, if that is another, as often as chance will have it.
+    pub permuted: Share,
+    /// What the draw before hides.
+    before: Vec<String>,
     /// Verdict by hidden cause.
     pub confusion: BTreeMap<String, BTreeMap<String, usize>>,
 }
@@ -110,16 +160,34 @@ impl Score {
             other => other.to_owned(),
         };
         *self.confusion.entry(kinds.join(" + ")).or_default().entry(answer).or_default() += 1;
+        let nearest = said.separations.iter().copied().reduce(f64::min);
+        let told_apart = |from: f64| nearest.is_some_and(|sigmas| sigmas >= from);
         match truth.class {
             Class::Nothing => self.quiet.add(said.verdict == "adequate"),
-            Class::Outside => self.unknown.add(said.verdict == "unknown"),
-            Class::One => {
-                self.first_right.add(same(&said.first));
-                if said.verdict == "named" {
-                    self.named_right.add(same(&said.named));
+            Class::Outside => {
+                self.unknown.add(said.verdict == "unknown");
+                if told_apart(APART_FROM_ALL) {
+                    self.unknown_apart.add(said.verdict == "unknown");
                 }
             }
+            Class::One => {
+                self.first_right.add(same(&said.first));
+                let is_named = said.verdict == "named";
+                if is_named {
+                    self.named_right.add(same(&said.named));
+                }
+                if let Some(sigmas) = nearest {
+                    let apart = &mut self.apart[CLASSES.iter().filter(|end| sigmas >= **end).count()];
+                    apart.first_right.add(same(&said.first));
+                    apart.named_right.add(is_named && same(&said.named));
+                    apart.named_wrong += usize::from(is_named && !same(&said.named));
+                }
+                said.ideal.into_iter().for_each(|found| self.ideal.add(found));
+            }
             Class::Two => {
+                if told_apart(APART) {
+                    self.pair_apart.add(same(&said.first));
+                }
                 if said.verdict == "named" {
                     self.pair_right.add(same(&said.named));
                 }
@@ -133,18 +201,39 @@ impl Score {
             }
         }
         said.covered.iter().for_each(|held| self.coverage.add(*held));
-        if matches!(truth.class, Class::One | Class::Two) {
-            self.explained_shares.extend(said.explained_share);
+        if said.verdict == "confounded" {
+            self.listed.push(said.likely.len());
+        }
+        if matches!(truth.class, Class::One | Class::Two) && nearest.is_none_or(|sigmas| sigmas >= APART) {
+            self.held_out.extend(said.held_out);
+            self.later.extend(said.later);
+        }
+        if truth.class == Class::One {
+            let before = std::mem::replace(&mut self.before, kinds.iter().map(|kind| (*kind).to_owned()).collect());
+            if !before.is_empty() && before != self.before {
+                self.permuted.add(said.first == before);
+            }
         }
     }
 
-    /// Median of the explained shares; `None` where there are none.
-    pub fn explained_share(&self) -> Option<f64> {
-        let mut shares = self.explained_shares.clone();
-        shares.sort_by(f64::total_cmp);
-        let (low, high) = (shares.get(shares.len().checked_sub(1)? / 2)?, shares.get(shares.len() / 2)?);
-        Some(f64::midpoint(*low, *high))
+    /// Median number of sets in the lists of `confounded` answers.
+    pub fn median_listed(&self) -> Option<f64> {
+        median(self.listed.iter().map(|count| *count as f64).collect())
     }
+}
+
+/// Of what could be explained of rows that no fit has seen: median over the answers, and all of them together. `None` where
+/// there are none.
+pub fn explained(rows: &[HeldOut]) -> Option<[f64; 2]> {
+    let shares = rows.iter().map(|one| one.explained / one.explainable);
+    let sum = |of: fn(&HeldOut) -> f64| rows.iter().map(of).sum::<f64>();
+    Some([median(shares.collect())?, sum(|one| one.explained) / sum(|one| one.explainable)])
+}
+
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    let (low, high) = (values.get(values.len().checked_sub(1)? / 2)?, values.get(values.len() / 2)?);
+    Some(f64::midpoint(*low, *high))
 }
 
 impl std::fmt::Display for Score {
@@ -155,16 +244,36 @@ impl std::fmt::Display for Score {
             ("one cause, of those named: right", self.named_right),
             ("one or two, truth in what was said", self.truth_listed),
             ("two causes, of those named: both right", self.pair_right),
+            ("two causes 5 sigmas apart, heaviest right", self.pair_apart),
             ("outside the catalogue, unknown", self.unknown),
+            ("... and 6 sigmas apart from all of it", self.unknown_apart),
             ("95 % intervals that hold the truth", self.coverage),
+            ("an observer who knows all signatures", self.ideal),
+            ("heaviest set of the draw before", self.permuted),
         ] {
             if share.of > 0 {
                 writeln!(f, "{what:<42}{share}")?;
             }
         }
-        if let Some(median) = self.explained_share() {
-            let count = self.explained_shares.len();
-            writeln!(f, "{:<42}{median:.3} (median of {count})", "explained on data held back")?;
+        for (k, apart) in self.apart.iter().enumerate().filter(|(_, apart)| apart.first_right.of > 0) {
+            let Apart { first_right, named_right, named_wrong } = apart;
+            let what = match CLASSES.get(k) {
+                Some(end) => format!("one cause, apart by less than {end} sigmas"),
+                None => format!("one cause, apart by {} sigmas or more", CLASSES[k - 1]),
+            };
+            let named = format!("named right {}, wrong {named_wrong}", named_right.hits);
+            writeln!(f, "{what:<42}heaviest right {first_right}, {named}")?;
+        }
+        if let Some(count) = self.median_listed() {
+            writeln!(f, "{:<42}{count} (median of {})", "sets in a list", self.listed.len())?;
+        }
+        for (what, rows) in
+            [("explained on data held back", &self.held_out), ("explained on rows measured later", &self.later)]
+        {
+            if let Some([median, pooled]) = explained(rows) {
+                let count = rows.len();
+                writeln!(f, "{what:<42}{median:.3} (median of {count}), {pooled:.3} (all together)")?;
+            }
         }
         for (truth, answers) in &self.confusion {
             let answers: Vec<String> = answers.iter().map(|(answer, count)| format!("{answer} {count}")).collect();

@@ -77,6 +77,11 @@ impl<M: Diagnosable> Bound<M> {
         Ok(effects)
     }
 
+    /// The base with these effects, in the unit in which residuals are taken.
+    pub(super) fn with_effects(&self, effects: &[M::Effect]) -> Result<Vec<Prediction>, Failure> {
+        Ok(self.in_unit(M::predict(&self.prepared, effects)?))
+    }
+
     fn coarsely(&self, settings: &[Setting]) -> Result<Vec<Prediction>, Failure> {
         Ok(self.in_unit(M::predict_coarsely(&self.prepared, &self.effects_of(settings)?)?))
     }
@@ -176,7 +181,7 @@ where
     }
 
     fn predict(&self, settings: &[Setting]) -> Result<Vec<Prediction>, Failure> {
-        Ok(self.in_unit(M::predict(&self.prepared, &self.effects_of(settings)?)?))
+        self.with_effects(&self.effects_of(settings)?)
     }
 
     fn predict_coarsely(&self, settings: &[Setting]) -> Result<Vec<Prediction>, Failure> {

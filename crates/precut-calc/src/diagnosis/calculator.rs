@@ -38,7 +38,7 @@ impl<M: Diagnosable> Calculator for Diagnosis<M> {
     const META: Meta = Meta {
         id: "diagnosis",
         kind: CalculatorKind::Calculator,
-        version: 5,
+        version: 6,
         title: "Diagnosis",
         question: "What does the simulation get wrong, why, and what is gained by mending it?",
         summary: "Measurements of what was really cut against a calculator's job: whether anything is wrong beyond \
@@ -75,32 +75,9 @@ impl<M: Diagnosable> Calculator for Diagnosis<M> {
     }
 
     fn run(job: &Self::Input, monitor: &dyn Monitor) -> Result<Answer<Self::Output>, Failure> {
-        let rows = job.measurements.rows();
-        let of_row = |row: usize| {
-            let readings = if rows[row].excluded() { Vec::new() } else { rows[row].readings(&job.job, &job.quantity) };
-            readings.into_iter().map(move |reading| (row, reading))
-        };
-        let (used, readings): (Vec<usize>, Vec<Reading<M::Point>>) = (0..rows.len()).flat_map(of_row).unzip();
-        let runs = if job.runs.is_empty() { vec![M::Run::default()] } else { job.runs.clone() };
-        let run_of = |row: usize| rows[row].run() as usize - 1;
-        let points = used.iter().zip(&readings).map(|(&row, reading)| (run_of(row), reading.point.clone())).collect();
-        let places: Rows<M::Run, M::Point> = Rows { runs, points };
-        let prepared =
-            M::prepare(&job.job, &places, &job.quantity, monitor).map_err(|error| unprepared(error, &used))?;
-        let design = M::design(&prepared);
-        let raw: Vec<f64> = readings.iter().map(|reading| reading.value).collect();
-        let data = match M::spreads(&prepared, &job.allowances) {
-            None => data::<M>(job, &used, raw, design),
-            spreads => Data {
-                value: vec![0.0; raw.len()],
-                uncertainty: spreads,
-                sides: Some(raw),
-                layout: layout::<M>(job, &used, design),
-            },
-        };
-        let bound = Bound::<M>::new(prepared, job.allowances.clone(), &job.quantity, &job.options);
-        let seen = readings.into_iter().map(|reading| Seen { class: reading.class, asks: reading.asks }).collect();
-        report::answer::<M>(job, &Measured { places, used, seen }, &bound, &data, monitor)
+        with_measured::<M, _>(job, monitor, |measured, bound, data| {
+            report::answer::<M>(job, measured, bound, data, monitor)
+        })
     }
 
     fn figures(job: &Self::Input, output: &Self::Output) -> Vec<Figure> {
@@ -110,6 +87,39 @@ impl<M: Diagnosable> Calculator for Diagnosis<M> {
     fn tables(_job: &Self::Input, output: &Self::Output) -> Vec<Table> {
         picture::tables(output)
     }
+}
+
+/// Hands the base model, bound to its rows, and what was measured there to who needs them.
+pub(super) fn with_measured<M: Diagnosable, T>(
+    job: &JobOf<M>,
+    monitor: &dyn Monitor,
+    then: impl FnOnce(&Measured<M::Run, M::Point>, &Bound<M>, &Data) -> Result<T, Failure>,
+) -> Result<T, Failure> {
+    let rows = job.measurements.rows();
+    let of_row = |row: usize| {
+        let readings = if rows[row].excluded() { Vec::new() } else { rows[row].readings(&job.job, &job.quantity) };
+        readings.into_iter().map(move |reading| (row, reading))
+    };
+    let (used, readings): (Vec<usize>, Vec<Reading<M::Point>>) = (0..rows.len()).flat_map(of_row).unzip();
+    let runs = if job.runs.is_empty() { vec![M::Run::default()] } else { job.runs.clone() };
+    let run_of = |row: usize| rows[row].run() as usize - 1;
+    let points = used.iter().zip(&readings).map(|(&row, reading)| (run_of(row), reading.point.clone())).collect();
+    let places: Rows<M::Run, M::Point> = Rows { runs, points };
+    let prepared = M::prepare(&job.job, &places, &job.quantity, monitor).map_err(|error| unprepared(error, &used))?;
+    let design = M::design(&prepared);
+    let raw: Vec<f64> = readings.iter().map(|reading| reading.value).collect();
+    let data = match M::spreads(&prepared, &job.allowances) {
+        None => data::<M>(job, &used, raw, design),
+        spreads => Data {
+            value: vec![0.0; raw.len()],
+            uncertainty: spreads,
+            sides: Some(raw),
+            layout: layout::<M>(job, &used, design),
+        },
+    };
+    let bound = Bound::<M>::new(prepared, job.allowances.clone(), &job.quantity, &job.options);
+    let seen = readings.into_iter().map(|reading| Seen { class: reading.class, asks: reading.asks }).collect();
+    then(&Measured { places, used, seen }, &bound, &data)
 }
 
 /// Everything that a diagnosis may utter.

@@ -107,7 +107,8 @@ impl Signature {
     /// min over the other's parameters of the distance between both, sigmas, in the smaller direction.
     pub fn separation(&self, other: &Self) -> f64 {
         let gap = self.whole.minus(&other.whole);
-        distance(&gap, &other.directions).min(distance(&gap, &self.directions))
+        let by = |signature: &Self| distance(&gap, &signature.directions.iter().collect::<Vec<_>>());
+        by(other).min(by(self))
     }
 
     /// 1/sqrt of the smallest eigenvalue of the Gram matrix of the unit directions.
@@ -126,16 +127,29 @@ impl Signature {
     }
 }
 
+/// How far a change of the rows stands from what causes of other kinds could make of it, each alone: the least distance over
+/// their sizes and the points of their grids, sigmas. Its own length where there are none.
+pub(super) fn from_others(weighing: &Weighing<'_>, change: &[f64], kind: &str) -> f64 {
+    let (linear, whole) = (&weighing.linear, weighing.whitener.white(change));
+    let of_others = linear.visible.iter().copied().filter(|&h| linear.hypotheses[h].cause.kind != kind);
+    let gaps = of_others.flat_map(|h| linear.variants(h)).map(|variant| {
+        let gap = variant.offset.map_or_else(|| whole.clone(), |offset| whole.minus(&linear.white[offset]));
+        let directions: Vec<&White> = variant.free.iter().map(|free| &linear.white[free.column]).collect();
+        distance(&gap, &directions)
+    });
+    gaps.fold(distance(&whole, &[]), f64::min)
+}
+
 /// Length of what the directions cannot explain of a gap.
-fn distance(gap: &White, directions: &[White]) -> f64 {
+fn distance(gap: &White, directions: &[&White]) -> f64 {
     let whole = gap.inner(gap);
     let count = directions.len();
     if count == 0 {
         return whole.max(0.0).sqrt();
     }
     let gram = DMatrix::from_fn(count, count, |i, j| {
-        let ridge = if i == j { 1e-10 * directions[i].inner(&directions[i]) + f64::MIN_POSITIVE } else { 0.0 };
-        directions[i].inner(&directions[j]) + ridge
+        let ridge = if i == j { 1e-10 * directions[i].inner(directions[i]) + f64::MIN_POSITIVE } else { 0.0 };
+        directions[i].inner(directions[j]) + ridge
     });
     let right = DVector::from_iterator(count, directions.iter().map(|d| d.inner(gap)));
     let explained = Cholesky::new(gram).map_or(0.0, |factor| factor.solve(&right).dot(&right));

@@ -14,7 +14,8 @@
 //! - `weigh`: posterior weights and the verdict (`diagnosis/3.5`, `diagnosis/3.7`);
 //! - `profile`: intervals where a likelihood is not quadratic (`diagnosis/3.6`);
 //! - `gain`, `downstream`: what the extended model is worth, on data held back and in what is decided with it
-//!   (`diagnosis/3.8`, `diagnosis/3.9`).
+//!   (`diagnosis/3.8`, `diagnosis/3.9`);
+//! - `trial`: what is asked where the truth is known.
 
 mod adequacy;
 mod base;
@@ -50,6 +51,7 @@ mod signatures;
 mod subject;
 mod survey;
 mod suspect;
+mod trial;
 mod view;
 mod weigh;
 mod whiten;
@@ -72,4 +74,5 @@ pub use profile::Profile;
 pub use remainder::{RemainderShape, remainder_shape};
 pub use subject::{Setting, Subject};
 pub use suspect::{SuspectedFactor, copied_traces, repeated_rows, suspected_factor, suspected_offset, swapped_columns};
+pub use trial::{residuals_with, separation_from, separations_of};
 pub use weigh::{Effort, SetWeight, Verdict, Weighing};

@@ -114,6 +114,10 @@ impl<'a> Linear<'a> {
         &self.signatures.variants[hypothesis][variant]
     }
 
+    pub(super) fn variants(&self, hypothesis: usize) -> &[Variant] {
+        &self.signatures.variants[hypothesis]
+    }
+
     /// Whether a hypothesis has a single form.
     pub(super) fn has_no_grid(&self, hypothesis: usize) -> bool {
         self.signatures.grid_points[hypothesis] == 1

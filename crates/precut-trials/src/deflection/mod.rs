@@ -2,10 +2,13 @@
 
 mod beam;
 mod hide;
+mod ideal;
+
+pub use ideal::is_found;
 
 use serde_json::{Value, json};
 
-use crate::{Class, Hidden, Random, Trial, Truth};
+use crate::{Class, Hidden, Later, Random, Trial, Truth};
 use hide::{CAUSES, OUTSIDE, Size};
 
 /// Depth, feed and speed at which the force is stated.
@@ -56,16 +59,52 @@ pub(crate) struct Acting {
 
 /// Draws a trial. `snr` is that of every hidden cause.
 pub fn draw(class: Class, snr: f64, seed: u64) -> Trial {
+    drawn(class, snr, seed).trial
+}
+
+/// A trial and what it was made of.
+struct Drawn {
+    trial: Trial,
+    lathe: Lathe,
+    runs: Vec<Run>,
+    places: Vec<f64>,
+    traces: usize,
+    hidden: Vec<Scaled>,
+    /// What was measured beside what the shaft would give without anything hidden, um.
+    residual_um: Vec<f64>,
+}
+
+impl Drawn {
+    /// Of one trace of every run, as often as it was measured.
+    fn by_trace(&self, column: &[f64]) -> Vec<f64> {
+        column.chunks(self.places.len()).flat_map(|run| run.repeat(self.traces)).collect()
+    }
+
+    /// Diameter deviations of one trace of every run without scatter, um; `bending` and `force` are factors.
+    fn clean_um(&self, hidden: &[Scaled], bending: f64, force: f64) -> Vec<f64> {
+        let stations = stations(&self.lathe, &self.places, hidden, bending);
+        deviations_um(&self.lathe, &self.runs, &stations, hidden, force)
+    }
+
+    /// What a cause alone changes in every row.
+    fn signature_um(&self, one: &Scaled) -> Vec<f64> {
+        let (with, without) = (self.clean_um(std::slice::from_ref(one), 1.0, 1.0), self.clean_um(&[], 1.0, 1.0));
+        let change: Vec<f64> = with.iter().zip(&without).map(|(with, without)| with - without).collect();
+        self.by_trace(&change)
+    }
+}
+
+fn drawn(class: Class, snr: f64, seed: u64) -> Drawn {
     let mut random = Random::new(seed);
     loop {
         // A cause that needs what this draw does not have (both directions, two depths) is drawn again.
-        if let Some(trial) = attempt(class, snr, &mut random) {
-            return trial;
+        if let Some(drawn) = attempt(class, snr, &mut random) {
+            return drawn;
         }
     }
 }
 
-fn attempt(class: Class, snr: f64, random: &mut Random) -> Option<Trial> {
+fn attempt(class: Class, snr: f64, random: &mut Random) -> Option<Drawn> {
     let lathe = lathe(random);
     let runs = runs(&lathe, random);
     let sigma = random.uniform(0.8, 1.8);
@@ -87,33 +126,68 @@ fn attempt(class: Class, snr: f64, random: &mut Random) -> Option<Trial> {
     for cause in &sizes {
         hidden.push(scaled(*cause, &lathe, &runs, &places, snr * sigma, random)?);
     }
-    let truth =
-        Truth { class, causes: hidden.iter().map(|h| Hidden { kind: h.cause.kind, size: h.size, snr }).collect() };
     let level = 1.0 + random.uniform_sd(FORCE_LEVEL_ALLOWANCE);
     let bending = 1.0 + random.uniform_sd(BENDING_ALLOWANCE);
-    let mut rows = Vec::new();
-    for (index, run) in runs.iter().enumerate() {
-        let force = level * (1.0 + random.uniform_sd(FORCE_PER_RUN_ALLOWANCE));
-        let setup_um = random.uniform_sd(SETUP_ALLOWANCE_UM);
-        for trace in 1..=traces {
-            let mut before = random.student_6();
-            for &place in &places {
-                let z = (place + random.uniform(-GAUGE_POSITION_MM, GAUGE_POSITION_MM)).clamp(0.0, lathe.length_mm);
-                let elastic = elastic_um_per_n(&lathe, z, &hidden, bending);
-                let clean = deviation_um(&lathe, run, index, (z, elastic), &hidden, force);
-                let fresh = random.student_6();
-                // A moving average with coefficient 0.2: correlated by 0.19 with its neighbour.
-                let noise = (fresh + 0.2 * before) / 1.04_f64.sqrt();
-                before = fresh;
-                let uneven = random.uniform(0.8, 1.2);
-                let value = clean + setup_um + sigma * uneven * noise;
-                rows.push(json!({
-                    "run": index + 1, "trace": trace, "z_mm": round(place, 3), "diameter_deviation_um": round(value, 2)
-                }));
+    let machine = Machine { lathe: &lathe, hidden: &hidden, level, bending, sigma };
+    let (rows, measured) = machine.measure(&runs, &places, traces, random);
+    let request_of = |runs: &[Run], rows: &[Value]| request(&lathe, runs, rows);
+    let trial_request = request_of(&runs, &rows);
+    // Another shift on the same machine.
+    let runs_later = self::runs(&lathe, random);
+    let (rows, _) = machine.measure(&runs_later, &places, 1, random);
+    let stations = stations(&lathe, &places, &hidden, 1.0);
+    let best = deviations_um(&lathe, &runs_later, &stations, &hidden, 1.0);
+    let later = Some(Later { request: request_of(&runs_later, &rows), best });
+    let truth = Truth { class, causes: Vec::new() };
+    let trial = Trial { request: trial_request, truth, sigma, later };
+    let mut drawn = Drawn { trial, lathe, runs, places, traces, hidden, residual_um: Vec::new() };
+    let of = |one: &Scaled| Hidden { kind: one.cause.kind, size: one.size, snr, signature: drawn.signature_um(one) };
+    let causes = drawn.hidden.iter().map(of).collect();
+    let plain = drawn.by_trace(&drawn.clean_um(&[], 1.0, 1.0));
+    drawn.residual_um = measured.iter().zip(plain).map(|(measured, plain)| measured - plain).collect();
+    drawn.trial.truth.causes = causes;
+    Some(drawn)
+}
+
+/// A lathe with what is hidden in it and what is off without being a finding.
+struct Machine<'a> {
+    lathe: &'a Lathe,
+    hidden: &'a [Scaled],
+    level: f64,
+    bending: f64,
+    sigma: f64,
+}
+
+impl Machine<'_> {
+    /// Rows of runs that are measured so many times, and their values.
+    fn measure(&self, runs: &[Run], places: &[f64], traces: usize, random: &mut Random) -> (Vec<Value>, Vec<f64>) {
+        let Self { lathe, hidden, level, bending, sigma } = *self;
+        let (mut rows, mut measured) = (Vec::new(), Vec::new());
+        for (index, run) in runs.iter().enumerate() {
+            let force = level * (1.0 + random.uniform_sd(FORCE_PER_RUN_ALLOWANCE));
+            let setup_um = random.uniform_sd(SETUP_ALLOWANCE_UM);
+            for trace in 1..=traces {
+                let mut before = random.student_6();
+                for &place in places {
+                    let z = (place + random.uniform(-GAUGE_POSITION_MM, GAUGE_POSITION_MM)).clamp(0.0, lathe.length_mm);
+                    let elastic = elastic_um_per_n(lathe, z, hidden, bending);
+                    let clean = deviation_um(lathe, run, index, (z, elastic), hidden, force);
+                    let fresh = random.student_6();
+                    // A moving average with coefficient 0.2: correlated by 0.19 with its neighbour.
+                    let noise = (fresh + 0.2 * before) / 1.04_f64.sqrt();
+                    before = fresh;
+                    let uneven = random.uniform(0.8, 1.2);
+                    let value = clean + setup_um + sigma * uneven * noise;
+                    measured.push(value);
+                    rows.push(json!({
+                        "run": index + 1, "trace": trace, "z_mm": round(place, 3),
+                        "diameter_deviation_um": round(value, 2)
+                    }));
+                }
             }
         }
+        (rows, measured)
     }
-    Some(Trial { request: request(&lathe, &runs, &rows), truth, sigma })
 }
 
 fn round(value: f64, digits: i32) -> f64 {
@@ -189,23 +263,16 @@ fn scaled(
     let sign = if cause.two_sided { random.sign() } else { 1.0 };
     let form = [random.uniform(0.0, 1.0), random.uniform(0.0, 1.0), random.uniform(0.0, 1.0)];
     let at = |size: f64| Scaled { cause, size: sign * size, form };
-    let elastic = |hidden: &[Scaled]| -> Vec<(f64, f64)> {
-        places.iter().map(|&z| (z, elastic_um_per_n(lathe, z, hidden, 1.0))).collect()
-    };
-    let bare = elastic(&[]);
-    let without: Vec<f64> = runs
-        .iter()
-        .enumerate()
-        .flat_map(|(index, run)| bare.iter().map(move |&place| deviation_um(lathe, run, index, place, &[], 1.0)))
-        .collect();
+    let bare = stations(lathe, places, &[], 1.0);
+    let without = deviations_um(lathe, runs, &bare, &[], 1.0);
     let rms = |size: f64| {
         let hidden = [at(size)];
-        let places = if hidden[0].changes_beam() { elastic(&hidden) } else { bare.clone() };
-        let with = runs.iter().enumerate().flat_map(|(index, run)| {
-            let hidden = &hidden;
-            places.iter().map(move |&place| deviation_um(lathe, run, index, place, hidden, 1.0))
-        });
-        let sum: f64 = with.zip(&without).map(|(with, without)| (with - without).powi(2)).sum();
+        let with = if hidden[0].changes_beam() {
+            deviations_um(lathe, runs, &stations(lathe, places, &hidden, 1.0), &hidden, 1.0)
+        } else {
+            deviations_um(lathe, runs, &bare, &hidden, 1.0)
+        };
+        let sum: f64 = with.iter().zip(&without).map(|(with, without)| (with - without).powi(2)).sum();
         (sum / without.len() as f64).sqrt()
     };
     let (mut low, mut high) = (0.0, cause.most());
@@ -217,6 +284,19 @@ fn scaled(
         if rms(middle) < rms_um { low = middle } else { high = middle }
     }
     Some(at(0.5 * (low + high)))
+}
+
+/// Every place with the compliance of shaft and centres there.
+fn stations(lathe: &Lathe, places: &[f64], hidden: &[Scaled], bending: f64) -> Vec<(f64, f64)> {
+    places.iter().map(|&z| (z, elastic_um_per_n(lathe, z, hidden, bending))).collect()
+}
+
+/// Diameter deviations of all runs at these stations, without scatter, um; `force` is a factor.
+fn deviations_um(lathe: &Lathe, runs: &[Run], stations: &[(f64, f64)], hidden: &[Scaled], force: f64) -> Vec<f64> {
+    let of_run = |(index, run): (usize, &Run)| -> Vec<f64> {
+        stations.iter().map(|&station| deviation_um(lathe, run, index, station, hidden, force)).collect()
+    };
+    runs.iter().enumerate().flat_map(of_run).collect()
 }
 
 /// Compliance of shaft and centres at a station; `bending` is a factor on the flexibility of the shaft.

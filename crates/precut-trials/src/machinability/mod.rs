@@ -4,10 +4,13 @@
 //! from what is written down; scatter is that of Student's t with six degrees of freedom, uneven from cut to cut.
 
 mod hide;
+mod ideal;
+
+pub use ideal::is_found;
 
 use serde_json::{Value, json};
 
-use crate::{Class, Hidden, Random, Trial, Truth};
+use crate::{Class, Hidden, Later, Random, Trial, Truth};
 use hide::{CAUSES, OUTSIDE, Scaled, Size};
 
 const SPEEDS: [f64; 5] = [20.0, 35.0, 60.0, 100.0, 160.0];
@@ -54,16 +57,38 @@ impl Output {
 
 /// Draws a trial. `snr` is that of every hidden cause.
 pub fn draw(class: Class, snr: f64, seed: u64) -> Trial {
+    drawn(class, snr, seed).trial
+}
+
+/// A trial and what it was made of.
+struct Drawn {
+    trial: Trial,
+    output: Output,
+    cuts: Vec<Cut>,
+    hidden: Vec<Scaled>,
+    /// Logarithm of what was measured over what the law alone would give.
+    residual: Vec<f64>,
+}
+
+impl Drawn {
+    /// What a cause alone changes in the logarithm of every row.
+    fn signature(&self, one: &Scaled) -> Vec<f64> {
+        let alone = std::slice::from_ref(one);
+        self.cuts.iter().map(|cut| (with(alone, &self.output, cut) / self.output.plain(cut)).ln()).collect()
+    }
+}
+
+fn drawn(class: Class, snr: f64, seed: u64) -> Drawn {
     let mut random = Random::new(seed);
     loop {
         // A cause that this draw cannot show is drawn again.
-        if let Some(trial) = attempt(class, snr, &mut random) {
-            return trial;
+        if let Some(drawn) = attempt(class, snr, &mut random) {
+            return drawn;
         }
     }
 }
 
-fn attempt(class: Class, snr: f64, random: &mut Random) -> Option<Trial> {
+fn attempt(class: Class, snr: f64, random: &mut Random) -> Option<Drawn> {
     let output = output(random);
     let cuts = cuts(random);
     let sigma = random.uniform(0.03, 0.06);
@@ -84,27 +109,47 @@ fn attempt(class: Class, snr: f64, random: &mut Random) -> Option<Trial> {
         hidden.push(scaled(cause, &output, &cuts, snr * sigma, random)?);
     }
     let level = 1.0 + random.uniform_sd(LEVEL);
-    let rows = cuts
-        .iter()
-        .map(|cut| {
-            let real = Cut {
-                speed: cut.speed * (1.0 + random.uniform(-SPEED_ERROR, SPEED_ERROR)),
-                depth: cut.depth * (1.0 + random.uniform(-DEPTH_ERROR, DEPTH_ERROR)),
-                ..*cut
-            };
-            let noise = sigma * random.uniform(0.8, 1.2) * random.student_6();
-            let value = level * with(&hidden, &output, &real) * noise.exp();
-            let mut row = json!({
-                "test": cut.test, "speed_m_per_min": cut.speed, "feed_mm_per_rev": cut.feed, "depth_mm": cut.depth,
-                "flank_wear_mm": cut.wear_mm, "batch": if cut.second_batch { "B" } else { "A" }
-            });
-            row[output.quantity] = json!(four_digits(value));
-            row
-        })
-        .collect();
-    let causes = hidden.iter().map(|h| Hidden { kind: h.cause.kind, size: h.size, snr }).collect();
+    let (rows, measured) = measure(&output, &hidden, &cuts, (level, sigma), random);
+    let residual = measured.iter().zip(&cuts).map(|(value, cut)| (value / output.plain(cut)).ln()).collect();
+    // Another day, other regimes, the same tool.
+    let cuts_later: Vec<Cut> =
+        self::cuts(random).iter().map(|cut| Cut { radius_mm: cuts[0].radius_mm, ..*cut }).collect();
+    let (rows_later, _) = measure(&output, &hidden, &cuts_later, (level, sigma), random);
+    let best = cuts_later.iter().map(|cut| with(&hidden, &output, cut).ln()).collect();
     let radius_mm = cuts.first().map_or(0.8, |cut| cut.radius_mm);
-    Some(Trial { request: request(&output, radius_mm, rows), truth: Truth { class, causes }, sigma })
+    let truth = Truth { class, causes: Vec::new() };
+    let later = Some(Later { request: request(&output, radius_mm, rows_later), best });
+    let trial = Trial { request: request(&output, radius_mm, rows), truth, sigma, later };
+    let mut drawn = Drawn { trial, output, cuts, hidden, residual };
+    let of = |one: &Scaled| Hidden { kind: one.cause.kind, size: one.size, snr, signature: drawn.signature(one) };
+    drawn.trial.truth.causes = drawn.hidden.iter().map(of).collect();
+    Some(drawn)
+}
+
+/// Rows of these cuts, and their values; `level` is a factor on all of them.
+fn measure(
+    output: &Output,
+    hidden: &[Scaled],
+    cuts: &[Cut],
+    (level, sigma): (f64, f64),
+    random: &mut Random,
+) -> (Vec<Value>, Vec<f64>) {
+    let mut measured = |cut: &Cut| {
+        let real = Cut {
+            speed: cut.speed * (1.0 + random.uniform(-SPEED_ERROR, SPEED_ERROR)),
+            depth: cut.depth * (1.0 + random.uniform(-DEPTH_ERROR, DEPTH_ERROR)),
+            ..*cut
+        };
+        let noise = sigma * random.uniform(0.8, 1.2) * random.student_6();
+        let value = level * with(hidden, output, &real) * noise.exp();
+        let mut row = json!({
+            "test": cut.test, "speed_m_per_min": cut.speed, "feed_mm_per_rev": cut.feed, "depth_mm": cut.depth,
+            "flank_wear_mm": cut.wear_mm, "batch": if cut.second_batch { "B" } else { "A" }
+        });
+        row[output.quantity] = json!(four_digits(value));
+        (row, value)
+    };
+    cuts.iter().map(&mut measured).unzip()
 }
 
 fn output(random: &mut Random) -> Output {

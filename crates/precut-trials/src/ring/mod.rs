@@ -97,8 +97,18 @@ fn attempt(class: Class, snr: f64, random: &mut Random) -> Option<Trial> {
             rows.push(json!({ "trace": trace, "angle_deg": place, "radial_deviation_um": round(value, 2) }));
         }
     }
-    let causes = hidden.iter().map(|h| Hidden { kind: h.cause.kind, size: h.first_value(&rig), snr }).collect();
-    Some(Trial { request: request(&rig, &rows), truth: Truth { class, causes }, sigma })
+    let mut causes = Vec::new();
+    for one in &hidden {
+        let with = clean_um(&rig, std::slice::from_ref(one), &angles)?;
+        let change: Vec<f64> = with.iter().zip(&base).map(|(with, base)| with - base).collect();
+        causes.push(Hidden {
+            kind: one.cause.kind,
+            size: one.first_value(&rig),
+            snr,
+            signature: change.repeat(traces),
+        });
+    }
+    Some(Trial { request: request(&rig, &rows), truth: Truth { class, causes }, sigma, later: None })
 }
 
 fn round(value: f64, digits: i32) -> f64 {
