@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::{PartialSchema, ToSchema};
 
+use super::weigh::LEVEL;
 use crate::calculator::{ConditionRange, Measured, MeasuredRow};
 
 /// Most runs of one diagnosis.
@@ -65,7 +66,7 @@ pub struct DiagnosisOptions {
     /// Most causes at the same time.
     #[schema(minimum = 1, maximum = 3, default = 3, example = 3, extensions(("x-symbol" = json!("k")), ("x-unit" = json!("1"))))]
     pub most_causes: u8,
-    /// Significance level of the tests.
+    /// Significance level of the tests; what the rows object to at this level is not named.
     #[schema(minimum = 1e-6, maximum = 0.2, default = 0.01, example = 0.01, extensions(("x-symbol" = json!("alpha")), ("x-unit" = json!("1"))))]
     pub level: f64,
     /// Whether single rows that stand alone are left out.
@@ -102,7 +103,7 @@ impl Default for DiagnosisOptions {
             ranges: Vec::new(),
             negligible_below: None,
             most_causes: 3,
-            level: 0.01,
+            level: LEVEL,
             leave_outliers_out: true,
             held_out: true,
             accept_suspected_unit: false,

@@ -10,7 +10,7 @@ use super::outlier::Outliers;
 use super::output::{DiagnosisResult, NamedCause, Refusal, SetReport, VerdictClass};
 use super::refuse::{most_causes, rows_for};
 use super::suspect::{copied_traces, repeated_rows, swapped_columns};
-use super::weigh::Weighing;
+use super::weigh::{UNNAMED, Weighing};
 use crate::calculator::{Basis, Finding, Message, Quantity, Smooth};
 
 /// Probability of a scatter so much larger than between sweeps by chance, below which rows have structure that sweeps share.
@@ -44,6 +44,7 @@ pub(super) const EXPLANATION_CODES: &[&str] = &[
     "diagnosis_named",
     "diagnosis_confounded",
     "diagnosis_unknown",
+    "diagnosis_objected",
     "diagnosis_unit_suspected",
     "diagnosis_absolute_values",
     "diagnosis_constant_values",
@@ -216,6 +217,7 @@ pub(super) fn explanation<E: utoipa::ToSchema, R: utoipa::ToSchema>(
                 .with("more", more)
                 .with("limit_sigmas", CONFOUNDED_BELOW)
         }
+        VerdictClass::Unknown if output.unnamed_probability < UNNAMED => objected(&output.sets),
         VerdictClass::Unknown => Message::new("diagnosis_unknown")
             .with("probability", output.unnamed_probability)
             .with("rms", output.remainder.as_ref().map_or(0.0, |remainder| remainder.rms))
@@ -301,6 +303,14 @@ fn kinds(causes: &[NamedCause]) -> Vec<String> {
 
 fn labels(causes: &[NamedCause]) -> Vec<String> {
     causes.iter().map(|cause| cause.label.clone()).collect()
+}
+
+/// The best of the catalogue, to which the rows still object.
+fn objected(sets: &[SetReport]) -> Message {
+    let best = sets.iter().find(|set| !set.with_remainder && !set.causes.is_empty());
+    Message::new("diagnosis_objected")
+        .with("causes", best.map_or_else(Vec::new, |set| kinds(&set.causes)))
+        .with("probability", best.and_then(|set| set.lack_of_fit_p).unwrap_or(0.0))
 }
 
 fn refused(refusal: Option<&Refusal>, rows: usize) -> Message {

@@ -153,6 +153,7 @@ impl<'a> View<'a> {
             posterior: set.posterior,
             with_remainder: set.remainder.is_some(),
             bic: self.weighing.bic(set),
+            lack_of_fit_p: self.weighing.lack_of_fit(set),
             held_out_rmse: gain.filter(|_| set.remainder.is_none()).and_then(held_out),
         }
     }

@@ -1,11 +1,13 @@
 //! From rows to posterior weights and a verdict (`diagnosis/3.5`, `diagnosis/3.7`).
 
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
+
 use super::discrepancy::{self, Kind, Remainder};
 use super::evidence::{Normal, Side, log_sum_exp};
 use super::foundation::Foundation;
 use super::likelihood::Likelihood;
 use super::link;
-use super::noise::Noise;
+use super::noise::{Noise, NoiseSource};
 use super::optima::{Optimum, elsewhere};
 use super::profile::{Profile, Profiler};
 use super::refine::{Fit, Refinement};
@@ -25,7 +27,7 @@ const REMAINDER_PRIOR: f64 = 0.08;
 /// Below this posterior of "nothing", something is wrong: an alarm needs a Bayes factor of about nine.
 const ALARM: f64 = 0.1;
 /// Posterior of the remainder from which on the answer is "not in the catalogue".
-const UNNAMED: f64 = 0.5;
+pub(super) const UNNAMED: f64 = 0.5;
 /// Posterior from which on a set is named.
 const NAMED: f64 = 0.8;
 /// Posterior from which on a set is named if every likely set contains it.
@@ -38,7 +40,7 @@ const LIKELY: f64 = 0.95;
 const MOST_FREE_SIZES: usize = 200;
 
 /// How far the search goes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effort {
     /// Causes at the same time, 0 to 3.
     pub most_causes: usize,
@@ -56,7 +58,12 @@ pub struct Effort {
     pub nonlinear: bool,
     /// Whether other optima of the leading set are looked for.
     pub other_optima: bool,
+    /// Least probability of what a set leaves for it to be named.
+    pub level: f64,
 }
+
+/// Significance level of the tests unless another is asked for.
+pub(super) const LEVEL: f64 = 0.01;
 
 impl Effort {
     /// The whole search.
@@ -69,6 +76,7 @@ impl Effort {
             late_leaders: LATE_LEADERS,
             nonlinear: false,
             other_optima: true,
+            level: LEVEL,
         }
     }
 
@@ -82,6 +90,7 @@ impl Effort {
             late_leaders: 2,
             nonlinear: true,
             other_optima: true,
+            level: LEVEL,
         }
     }
 
@@ -95,6 +104,7 @@ impl Effort {
             late_leaders: 1,
             nonlinear: true,
             other_optima: false,
+            level: LEVEL,
         }
     }
 }
@@ -180,6 +190,7 @@ impl<'a> Weighing<'a> {
         for _ in 0..effort.rounds {
             ranking.refine(&linear, &refinement, effort.late_leaders, [0; 4], monitor)?;
         }
+        ranking.refine_parts(&linear, &refinement, monitor)?;
         if effort.other_optima {
             ranking.look_elsewhere(&linear, &refinement)?;
         }
@@ -203,7 +214,10 @@ impl<'a> Weighing<'a> {
         };
         let at_limit =
             |set: &SetWeight| ranking.fit(&set.members).is_some_and(|fit| at_limit(fit, subject.hypotheses()));
-        let verdict = verdict(&sets, none, unnamed, &at_limit);
+        let is_fair = |set: &SetWeight| {
+            ranking.lack_of_fit(&linear, &noise, &set.members).is_none_or(|probability| probability >= effort.level)
+        };
+        let verdict = verdict(&sets, none, unnamed, &at_limit, &is_fair);
         Ok(Self { foundation, keep, noise, whitener, linear, ranking, kinds, sets, none, unnamed, inclusion, verdict })
     }
 
@@ -236,6 +250,14 @@ impl<'a> Weighing<'a> {
         };
         let free: Vec<usize> = (0..fit.free.len()).filter(of_fit).collect();
         Profiler { refinement: &refinement, fit, dear }.profiles(&free, reach, monitor)
+    }
+
+    /// Probability that rows scatter so far from a set or farther, if nothing else acts; see [`Ranking::lack_of_fit`].
+    pub(super) fn lack_of_fit(&self, set: &SetWeight) -> Option<f64> {
+        if set.remainder.is_some() {
+            return None;
+        }
+        self.ranking.lack_of_fit(&self.linear, &self.noise, &set.members)
     }
 
     /// n ln(RSS/n) + k ln n of a set without a remainder, RSS whitened and at the fit without priors. Where it has a
@@ -368,12 +390,50 @@ impl Ranking {
         monitor: &dyn Monitor,
     ) -> Result<(), Failure> {
         let leaders = self.leaders(count, of_each_size);
-        for index in leaders {
+        self.refine_these(leaders, linear, refinement, monitor)
+    }
+
+    /// Refines the parts of the set that leads: what fits only beside others from where it is linearised may fit alone about
+    /// the model itself, and a companion that has nothing to do must not keep its place.
+    fn refine_parts(
+        &mut self,
+        linear: &Linear<'_>,
+        refinement: &Refinement<'_>,
+        monitor: &dyn Monitor,
+    ) -> Result<(), Failure> {
+        loop {
+            let Some(leader) = self.candidates.iter().find(|candidate| !candidate.members.is_empty()) else { break };
+            let is_part = |candidate: &Candidate| {
+                let fewer = (1..leader.members.len()).contains(&candidate.members.len());
+                fewer && candidate.members.iter().all(|h| leader.members.contains(h)) && !self.is_refined(candidate)
+            };
+            let parts: Vec<usize> =
+                (0..self.candidates.len()).filter(|&index| is_part(&self.candidates[index])).collect();
+            if parts.is_empty() {
+                break;
+            }
+            self.refine_these(parts, linear, refinement, monitor)?;
+        }
+        Ok(())
+    }
+
+    fn is_refined(&self, candidate: &Candidate) -> bool {
+        self.fits.iter().any(|(of, _)| *of == candidate.members)
+    }
+
+    fn refine_these(
+        &mut self,
+        indices: Vec<usize>,
+        linear: &Linear<'_>,
+        refinement: &Refinement<'_>,
+        monitor: &dyn Monitor,
+    ) -> Result<(), Failure> {
+        for index in indices {
             checkpoint(monitor)?;
-            let candidate = &mut self.candidates[index];
-            if candidate.members.is_empty() || self.fits.iter().any(|(of, _)| *of == candidate.members) {
+            if self.candidates[index].members.is_empty() || self.is_refined(&self.candidates[index]) {
                 continue;
             }
+            let candidate = &mut self.candidates[index];
             let start = linear.settings(candidate);
             let fit = if linear.is_off_grid(candidate) {
                 // Its shapes were free before, and have paid for it.
@@ -423,6 +483,27 @@ impl Ranking {
             }
         }
         Ok(weighed)
+    }
+
+    /// Probability that a set without priors leaves so much or more, if nothing else acts: of what it leaves, that part which
+    /// the scatter was not found from, against the scatter. `None` where there is no such part, and of classes.
+    fn lack_of_fit(&self, linear: &Linear<'_>, noise: &Noise, members: &[usize]) -> Option<f64> {
+        let Likelihood::Gaussian { whitener, .. } = &linear.likelihood else { return None };
+        let candidate = self.candidates.iter().find(|candidate| candidate.members == members)?;
+        let (columns, residual, _) = self.parts(linear, candidate);
+        let misfit = Normal::of(&columns, &residual).misfit();
+        let free = whitener.rows() - columns.len() as f64;
+        if let NoiseSource::Stated { scatter_factor } = noise.source {
+            // Where the rows scatter more than was stated that is what is said; shape is judged by their own scatter.
+            let misfit = misfit / scatter_factor.max(1.0).powi(2);
+            return Some(ChiSquared::new(free).ok()?.sf(misfit));
+        }
+        let beyond = free - noise.dof;
+        if beyond < 1.0 {
+            return None;
+        }
+        let ratio = (misfit - noise.dof).max(0.0) / beyond;
+        Some(FisherSnedecor::new(beyond, noise.dof).ok()?.sf(ratio))
     }
 
     fn beside(&self, linear: &Linear<'_>, kinds: &[Kind], candidate: &Candidate) -> Option<Remainder> {
@@ -505,7 +586,13 @@ fn at_limit(fit: &Fit, hypotheses: &[Hypothesis]) -> bool {
     })
 }
 
-fn verdict(sets: &[SetWeight], none: f64, unnamed: f64, at_limit: &dyn Fn(&SetWeight) -> bool) -> Verdict {
+fn verdict(
+    sets: &[SetWeight],
+    none: f64,
+    unnamed: f64,
+    at_limit: &dyn Fn(&SetWeight) -> bool,
+    is_fair: &dyn Fn(&SetWeight) -> bool,
+) -> Verdict {
     if none >= ALARM {
         return Verdict::Adequate;
     }
@@ -528,6 +615,10 @@ fn verdict(sets: &[SetWeight], none: f64, unnamed: f64, at_limit: &dyn Fn(&SetWe
         let in_all = likely.iter().all(|set| leader.members.iter().all(|h| set.members.contains(h)));
         let sure = leader.posterior >= NAMED || (leader.posterior >= NAMED_IF_COMMON && in_all);
         // At its limit a size is not what the data ask for: something else acts, or the limit is wrong.
+        if sure && !is_fair(leader) {
+            // The best of the catalogue, and the rows still object.
+            return Verdict::Unknown(Vec::new());
+        }
         if sure && !at_limit(leader) {
             return Verdict::Named(leader.members.clone());
         }
