@@ -89,7 +89,9 @@ mod tests {
         let (sigma, correlation) = (1.5, 0.3);
         let allowances = [[0.7, 0.7, 0.0, 0.0], [0.2, -0.4, 0.9, 1.1]];
         let mut covariance = Covariance::new(sigma, correlation, 2);
-        allowances.iter().for_each(|column| covariance.allow(column));
+        for column in &allowances {
+            covariance.allow(column);
+        }
         let c = |i: usize, j: usize| {
             let own = match (i == j, i / 2 == j / 2) {
                 (true, _) => 1.0,

@@ -401,8 +401,7 @@ impl Ranking {
         refinement: &Refinement<'_>,
         monitor: &dyn Monitor,
     ) -> Result<(), Failure> {
-        loop {
-            let Some(leader) = self.candidates.iter().find(|candidate| !candidate.members.is_empty()) else { break };
+        while let Some(leader) = self.candidates.iter().find(|candidate| !candidate.members.is_empty()) {
             let is_part = |candidate: &Candidate| {
                 let fewer = (1..leader.members.len()).contains(&candidate.members.len());
                 fewer && candidate.members.iter().all(|h| leader.members.contains(h)) && !self.is_refined(candidate)
