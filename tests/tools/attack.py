@@ -44,11 +44,36 @@ def address(process: subprocess.Popen, log: pathlib.Path) -> str:
     sys.exit(f"FAULT the service did not start:\n{log.read_text(errors='replace')}")
 
 
-def operations(url: str) -> list[str]:
-    """Every operation of the contract by its id, in order."""
+def operations(url: str) -> dict[str, int]:
+    """Every operation of the contract by its id, with the size of what can be sent to it: about what attacking it takes."""
     with urllib.request.urlopen(f"{url}/openapi.json") as answer:
-        paths = json.load(answer)["paths"]
-    return [operation["operationId"] for path in paths.values() for operation in path.values() if "operationId" in operation]
+        contract = json.load(answer)
+
+    def size(node: object, met: set[str]) -> int:
+        if isinstance(node, list):
+            return sum(size(item, met) for item in node)
+        if not isinstance(node, dict):
+            return 1
+        own = sum(size(item, met) for item in node.values())
+        ref = node.get("$ref")
+        if not isinstance(ref, str) or ref in met:
+            return own
+        met.add(ref)
+        there = contract
+        for step in ref.removeprefix("#/").split("/"):
+            there = there[step]
+        return own + size(there, met)
+
+    every = [operation for path in contract["paths"].values() for operation in path.values() if "operationId" in operation]
+    return {one["operationId"]: 1 + size([one.get("requestBody"), one.get("parameters")], set()) for one in every}
+
+
+def dealt(sizes: dict[str, int], hands: int) -> list[list[str]]:
+    """The largest first, each to the hand that holds least."""
+    held: list[list[str]] = [[] for _ in range(hands)]
+    for id in sorted(sizes, key=lambda id: -sizes[id]):
+        min(held, key=lambda hand: sum(sizes[id] for id in hand)).append(id)
+    return held
 
 
 def attack(schemathesis: str, url: str, examples: int, further: list[str], folder: str) -> list[str]:
@@ -66,7 +91,7 @@ def attack(schemathesis: str, url: str, examples: int, further: list[str], folde
 
     every = operations(url)
     runs = max(1, min(MOST_RUNS, os.cpu_count() or 1))
-    hands = [every[first::runs] for first in range(runs)]
+    hands = dealt(every, runs)
     assert sorted(sum(hands, [])) == sorted(every)
     chosen = [[part for id in hand for part in ("--include-operation-id", id)] for hand in hands]
     with ThreadPoolExecutor(runs) as pool:
