@@ -12,20 +12,13 @@ use serde_json::ser::{CharEscape, CompactFormatter, Formatter, Serializer};
 
 /// The canonical JSON of `value`, whose numbers must be finite.
 pub(crate) fn canonical<T: Serialize + ?Sized>(value: &T) -> serde_json::Result<Vec<u8>> {
-    let mut page = Page {
-        text: Vec::with_capacity(ROOM),
-        members: Vec::with_capacity(ROOM / 32),
-        objects: Vec::with_capacity(ROOM / 256),
-        sorted: Vec::with_capacity(ROOM),
-    };
+    let mut page = Page::default();
     value.serialize(&mut Serializer::with_formatter(io::sink(), OnPage(&mut page)))?;
     Ok(page.text)
 }
 
-/// Bytes of a common job: buffers of that size need not grow step by step.
-const ROOM: usize = 2048;
-
 /// What is written so far.
+#[derive(Default)]
 struct Page {
     text: Vec<u8>,
     /// The members of all objects that have not ended, those of the innermost last.
