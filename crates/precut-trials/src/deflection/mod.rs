@@ -130,16 +130,14 @@ fn attempt(class: Class, snr: f64, random: &mut Random) -> Option<Drawn> {
     let bending = 1.0 + random.uniform_sd(BENDING_ALLOWANCE);
     let machine = Machine { lathe: &lathe, hidden: &hidden, level, bending, sigma };
     let (rows, measured) = machine.measure(&runs, &places, traces, random);
-    let request_of = |runs: &[Run], rows: &[Value]| request(&lathe, runs, rows);
-    let trial_request = request_of(&runs, &rows);
     // Another shift on the same machine.
     let runs_later = self::runs(&lathe, random);
-    let (rows, _) = machine.measure(&runs_later, &places, 1, random);
+    let (rows_later, _) = machine.measure(&runs_later, &places, 1, random);
     let stations = stations(&lathe, &places, &hidden, 1.0);
     let best = deviations_um(&lathe, &runs_later, &stations, &hidden, 1.0);
-    let later = Some(Later { request: request_of(&runs_later, &rows), best });
+    let later = Some(Later { request: request(&lathe, &runs_later, &rows_later), best });
     let truth = Truth { class, causes: Vec::new() };
-    let trial = Trial { request: trial_request, truth, sigma, later };
+    let trial = Trial { request: request(&lathe, &runs, &rows), truth, sigma, later };
     let mut drawn = Drawn { trial, lathe, runs, places, traces, hidden, residual_um: Vec::new() };
     let of = |one: &Scaled| Hidden { kind: one.cause.kind, size: one.size, snr, signature: drawn.signature_um(one) };
     let causes = drawn.hidden.iter().map(of).collect();
