@@ -52,7 +52,7 @@ pub(super) fn answer<M: Diagnosable>(
     } else {
         (Effort::full(most_causes), Effort::full(most_causes))
     };
-    let effort = Effort { level: job.options.level, ..effort };
+    let [effort, fold_effort] = [effort, fold_effort].map(|effort| Effort { level: job.options.level, ..effort });
     let weighing = Weighing::of(&foundation, keep, effort, monitor)?;
     let refusal = refusal::<M>(job, &foundation, &weighing);
     let seed = u64::from(job.options.seed);

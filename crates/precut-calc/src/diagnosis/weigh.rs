@@ -39,7 +39,7 @@ const LIKELY: f64 = 0.95;
 /// than everything else.
 const MOST_FREE_SIZES: usize = 200;
 
-/// How far the search goes.
+/// How far the search goes, and how badly a set may fit that is named.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effort {
     /// Causes at the same time, 0 to 3.
@@ -613,11 +613,11 @@ fn verdict(
     if let Some(leader) = likely.first() {
         let in_all = likely.iter().all(|set| leader.members.iter().all(|h| set.members.contains(h)));
         let sure = leader.posterior >= NAMED || (leader.posterior >= NAMED_IF_COMMON && in_all);
-        // At its limit a size is not what the data ask for: something else acts, or the limit is wrong.
+        // The best of the catalogue, and the rows still object.
         if sure && !is_fair(leader) {
-            // The best of the catalogue, and the rows still object.
             return Verdict::Unknown(Vec::new());
         }
+        // At its limit a size is not what the data ask for: something else acts, or the limit is wrong.
         if sure && !at_limit(leader) {
             return Verdict::Named(leader.members.clone());
         }
