@@ -55,7 +55,7 @@ pub(crate) fn score<M: Diagnosable>(trials: Trials) -> Score {
     let (seed, count) = (number("PRECUT_TRIAL_SEED", trials.seed), number("PRECUT_TRIALS", trials.count));
     let mut score = Score::default();
     for k in 0..count {
-        let own_seed = seed.wrapping_mul(1_000_003).wrapping_add(k);
+        let own_seed = seed_of(seed, k);
         let trial = draw(class, snr, own_seed);
         let ideal = trials
             .ideal
@@ -84,6 +84,11 @@ fn keep(name: &str, text: &str) {
     assert_eq!(kept, text, "{} is another: see what moved, then PRECUT_WRITE_TRIALS=1", path.display());
 }
 
+/// Seed of the k-th draw of a series.
+pub(crate) fn seed_of(series: u64, k: u64) -> u64 {
+    series.wrapping_mul(1_000_003).wrapping_add(k)
+}
+
 fn asked_for(name: &str) -> bool {
     std::env::var_os(name).is_some()
 }
@@ -92,7 +97,8 @@ fn number<T: std::str::FromStr>(name: &str, default: T) -> T {
     std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
 }
 
-fn job<M: Diagnosable>(request: &Value, options: Value) -> JobOf<M> {
+/// A request with these options, read and filled.
+pub(crate) fn job<M: Diagnosable>(request: &Value, options: Value) -> JobOf<M> {
     let mut request = request.clone();
     request["options"] = options;
     let mut job: JobOf<M> = serde_json::from_value(request).unwrap();
@@ -159,10 +165,9 @@ pub(crate) fn without_the_cause<M: Diagnosable>(trials: Trials) -> Mutated {
     let (seed, count) = (number("PRECUT_TRIAL_SEED", trials.seed), number("PRECUT_TRIALS", trials.count));
     let (mut mutated, mut text) = (Mutated::default(), String::new());
     for k in 0..count {
-        let trial = (trials.draw)(Class::One, trials.snr, seed.wrapping_mul(1_000_003).wrapping_add(k));
+        let trial = (trials.draw)(Class::One, trials.snr, seed_of(seed, k));
         let hidden = &trial.truth.causes[0];
-        let others: Vec<&str> = M::CAUSES.iter().map(|cause| cause.kind).filter(|kind| *kind != hidden.kind).collect();
-        let options = json!({ "held_out": false, "causes": others });
+        let options = json!({ "held_out": false, "causes": all_but::<M>(hidden.kind) });
         let result = Diagnosis::<M>::run(&job::<M>(&trial.request, options), &Unwatched).unwrap().output;
         let mut said = result.verdict.name().to_owned();
         match said.as_str() {
@@ -186,6 +191,11 @@ pub(crate) fn without_the_cause<M: Diagnosable>(trials: Trials) -> Mutated {
         keep(trials.name, &text);
     }
     mutated
+}
+
+/// The kinds of the catalogue without one.
+pub(crate) fn all_but<M: Diagnosable>(kind: &str) -> Vec<&'static str> {
+    M::CAUSES.iter().map(|cause| cause.kind).filter(|known| *known != kind).collect()
 }
 
 impl Mutated {

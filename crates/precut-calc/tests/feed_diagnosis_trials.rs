@@ -1,9 +1,12 @@
 //! Blind trials of the diagnosis on cutting trials: effects hidden by a generator that shares no code with the calculator.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
+use precut_calc::calculator::{Calculator, Unwatched};
+use precut_calc::diagnosis::{Diagnosis, VerdictClass};
 use precut_calc::feed_schedule::FeedSchedule;
 use precut_trials::score::{Score, explained};
 use precut_trials::{Class, machinability};
+use serde_json::json;
 
 use crate::blind_trials::{self, Trials};
 
@@ -54,4 +57,25 @@ fn what_is_taken_out_of_the_catalogue_is_not_forced_on_another() {
         blind_trials::without_the_cause::<FeedSchedule>(trials("machinability-mutated", Class::One, 3.0, 5, 24));
     assert!(mutated.forced() <= 3, "{mutated:?}");
     assert!(mutated.unknown + mutated.confounded >= 10, "{mutated:?}");
+}
+
+/// A set that leads is not named where the rows object to it at the level that is asked for.
+#[test]
+fn what_the_rows_object_to_is_not_named() {
+    let trial = machinability::draw(Class::One, 3.0, blind_trials::seed_of(15, 9));
+    let causes = blind_trials::all_but::<FeedSchedule>(trial.truth.causes[0].kind);
+    let diagnosed = |level: f64| {
+        let options = json!({ "held_out": false, "causes": causes, "level": level });
+        Diagnosis::<FeedSchedule>::run(&blind_trials::job::<FeedSchedule>(&trial.request, options), &Unwatched).unwrap()
+    };
+    let strict = diagnosed(0.01);
+    let leader = &strict.output.sets[0];
+    let p = leader.lack_of_fit_p.unwrap();
+    assert!(p > 1e-4 && p < 0.01 && !leader.with_remainder && leader.posterior > 0.8, "{leader:?}");
+    assert_eq!(strict.output.verdict, VerdictClass::Unknown);
+    assert!(strict.output.named.is_empty() && strict.output.effects.is_empty());
+    assert_eq!(strict.explanation[0].code, "diagnosis_objected");
+    let lenient = diagnosed(1e-4);
+    assert_eq!(lenient.output.verdict, VerdictClass::Named);
+    assert_eq!(lenient.output.named.len(), leader.causes.len());
 }
