@@ -177,9 +177,7 @@ pub(crate) fn without_the_cause<M: Diagnosable>(trials: Trials) -> Mutated {
             _ => {
                 let kinds = kinds(&result.named);
                 let whole = job::<M>(&trial.request, json!({ "held_out": false }));
-                let parameters = result.named.iter().flat_map(|cause| &cause.parameters);
-                let fitted = parameters.filter(|parameter| parameter.interval_95.is_some()).count();
-                let sigmas = separation_from::<M>(&whole, &hidden.signature, &result.effects, fitted).unwrap();
+                let sigmas = separation_from::<M>(&whole, &hidden.signature, &result.named).unwrap();
                 said = format!("{}, {sigmas:.1} sigmas away", kinds.join(" + "));
                 mutated.twins.push(sigmas);
             }

@@ -141,7 +141,7 @@ pub(super) fn from_others(weighing: &Weighing<'_>, change: &[f64], kind: &str) -
 }
 
 /// Length of what the directions cannot explain of a gap.
-fn distance(gap: &White, directions: &[&White]) -> f64 {
+pub(super) fn distance(gap: &White, directions: &[&White]) -> f64 {
     let whole = gap.inner(gap);
     let count = directions.len();
     if count == 0 {

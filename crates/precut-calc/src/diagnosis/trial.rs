@@ -4,9 +4,12 @@
 use super::base::Bound;
 use super::calculator::{JobOf, with_measured};
 use super::foundation::Foundation;
-use super::identify::from_others;
+use super::identify::{distance, from_others};
+use super::output::NamedCause;
+use super::subject::{Setting, Subject};
 use super::weigh::{Effort, Weighing};
-use crate::calculator::{Diagnosable, Failure, Unwatched};
+use super::whiten::White;
+use crate::calculator::{Diagnosable, Failure, Hypothesis, Unwatched};
 
 /// How far changes of all rows, each of a cause of its kind, stand from what every other single cause of the catalogue could
 /// make of them under a job's scatter and allowances, sigmas (`diagnosis/3.6`). In the order of `changes`; a kind that the
@@ -17,22 +20,43 @@ pub fn separations_of<M: Diagnosable>(job: &JobOf<M>, changes: &[(&str, &[f64])]
     })
 }
 
-/// How far a change of all rows stands from what effects change that were fitted to them, sigmas, less what scatter makes of
-/// so many fitted values: its square is theirs in number on average.
-pub fn separation_from<M: Diagnosable>(
-    job: &JobOf<M>,
-    change: &[f64],
-    effects: &[M::Effect],
-    fitted: usize,
-) -> Result<f64, Failure> {
+/// How far a change of all rows stands from what named causes could make of it, sigmas: the least distance over all their
+/// parameters, linearised where they were fitted, or over the size of the change, whichever is less (`diagnosis/3.6`).
+pub fn separation_from<M: Diagnosable>(job: &JobOf<M>, change: &[f64], named: &[NamedCause]) -> Result<f64, Failure> {
     with_base_weighed::<M, _>(job, |bound, weighing| {
-        let with = bound.with_effects(effects)?;
-        let rows = change.iter().zip(with).zip(&weighing.foundation.base);
-        let gap: Vec<f64> =
-            rows.map(|((change, with), base)| with.map_or(0.0, |with| change - (with - base))).collect();
-        let gap = weighing.whitener.white(&gap);
-        Ok((gap.inner(&gap) - fitted as f64).max(0.0).sqrt())
+        let settings: Vec<Setting> = named.iter().filter_map(|cause| setting_of(bound, cause)).collect();
+        let base = &weighing.foundation.base;
+        let with = bound.predict(&settings)?;
+        let gap: Vec<f64> = change
+            .iter()
+            .zip(with.iter().zip(base))
+            .map(|(change, (with, base))| with.map_or(0.0, |with| change - (with - base)))
+            .collect();
+        let white = |rows: &[f64]| weighing.whitener.white(rows);
+        let of_named: Vec<White> =
+            bound.jacobian(&settings, &fitted(bound, &settings))?.iter().map(|rows| white(rows)).collect();
+        let gap = white(&gap);
+        let from_named = distance(&gap, &of_named.iter().collect::<Vec<_>>());
+        Ok(from_named.min(distance(&gap, &[&white(change)])))
     })
+}
+
+/// The hypothesis of a named cause with its values.
+fn setting_of<M: Diagnosable>(bound: &Bound<M>, cause: &NamedCause) -> Option<Setting> {
+    let is_of = |hypothesis: &Hypothesis| hypothesis.cause.kind == cause.kind && hypothesis.label == cause.label;
+    let hypothesis = bound.hypotheses().iter().position(is_of)?;
+    Some(Setting { hypothesis, values: cause.parameters.iter().map(|parameter| parameter.value).collect() })
+}
+
+/// Which variables of settings are fitted: sizes, and shapes that have a prior.
+fn fitted<M: Diagnosable>(bound: &Bound<M>, settings: &[Setting]) -> Vec<(usize, usize)> {
+    let of_setting = |(member, setting): (usize, &Setting)| {
+        let hypothesis = &bound.hypotheses()[setting.hypothesis];
+        let sizes = hypothesis.amplitudes().map(|(variable, _)| variable);
+        let all: Vec<usize> = sizes.chain(hypothesis.fitted_shapes().map(|(variable, _)| variable)).collect();
+        all.into_iter().map(move |variable| (member, variable))
+    };
+    settings.iter().enumerate().flat_map(of_setting).collect()
 }
 
 /// Scatter, allowances and signatures of a job's rows, without a search.
