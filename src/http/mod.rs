@@ -9,6 +9,7 @@ mod document;
 mod events;
 mod gate;
 mod health;
+mod in_place;
 mod jobs;
 mod materials;
 mod metrics;

@@ -18,6 +18,7 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{Semaphore, mpsc, watch};
 use tower::Service;
 
+use super::in_place::in_place;
 use super::{App, Peer, body};
 use crate::config::seconds;
 
@@ -45,10 +46,10 @@ pub async fn serve(listener: TcpListener, app: App, mut stop: watch::Receiver<bo
         };
         let Some((stream, peer, place)) = accepted else { continue };
         let (router, stop, open) = (router.clone(), stop.clone(), open.clone());
-        tokio::spawn(async move {
+        tokio::spawn(in_place(async move {
             connection(stream, peer, router, header_timeout, Some(stop)).await;
             drop((place, open));
-        });
+        }));
     }
     app.stop();
     drop(open);
@@ -66,10 +67,10 @@ pub async fn serve(listener: TcpListener, app: App, mut stop: watch::Receiver<bo
             accepted = accept(&listener, &places) => {
                 let Some((stream, peer, place)) = accepted else { continue };
                 let router = router.clone();
-                tokio::spawn(async move {
+                tokio::spawn(in_place(async move {
                     connection(stream, peer, router, header_timeout, None).await;
                     drop(place);
-                });
+                }));
             }
         }
     }
