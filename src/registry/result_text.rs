@@ -29,12 +29,38 @@ impl ser::Error for Unwritable {
 
 /// Appends `value` as `serde_json` would write it; a number that is not finite stops the writing.
 pub(crate) fn append<T: Serialize + ?Sized>(text: &mut Vec<u8>, value: &T) -> Result<(), Unwritable> {
-    value.serialize(Pen { text })
+    value.serialize(Pen { page: &mut Page { text, last: None } })
+}
+
+/// What is written on.
+struct Page<'a> {
+    text: &'a mut Vec<u8>,
+    last: Option<Written>,
+}
+
+/// The number written last: columns often repeat one, whose text is then copied and not found again.
+#[derive(Clone, Copy)]
+struct Written {
+    bits: u64,
+    begin: usize,
+    end: usize,
+}
+
+impl Page<'_> {
+    /// As `serde_json` does: the shortest text that reads back bit for bit.
+    fn number(&mut self, value: f64) {
+        let (bits, begin) = (value.to_bits(), self.text.len());
+        match self.last.filter(|last| last.bits == bits) {
+            Some(last) => self.text.extend_from_within(last.begin..last.end),
+            None => self.text.extend_from_slice(zmij::Buffer::new().format_finite(value).as_bytes()),
+        }
+        self.last = Some(Written { bits, begin, end: self.text.len() });
+    }
 }
 
 /// Writes one value.
-struct Pen<'a> {
-    text: &'a mut Vec<u8>,
+struct Pen<'a, 'p> {
+    page: &'a mut Page<'p>,
 }
 
 /// What `serde_json` writes: whole numbers, texts that may need escapes.
@@ -56,20 +82,20 @@ fn word(text: &mut Vec<u8>, name: &str) -> Result<(), Unwritable> {
 
 macro_rules! whole {
     ($($method:ident: $type:ty),* $(,)?) => {
-        $(fn $method(self, value: $type) -> Result<(), Unwritable> { plainly(self.text, &value) })*
+        $(fn $method(self, value: $type) -> Result<(), Unwritable> { plainly(self.page.text, &value) })*
     };
 }
 
-impl<'a> Serializer for Pen<'a> {
+impl<'a, 'p> Serializer for Pen<'a, 'p> {
     type Ok = ();
     type Error = Unwritable;
-    type SerializeSeq = List<'a>;
-    type SerializeTuple = List<'a>;
-    type SerializeTupleStruct = List<'a>;
-    type SerializeTupleVariant = List<'a>;
-    type SerializeMap = List<'a>;
-    type SerializeStruct = List<'a>;
-    type SerializeStructVariant = List<'a>;
+    type SerializeSeq = List<'a, 'p>;
+    type SerializeTuple = List<'a, 'p>;
+    type SerializeTupleStruct = List<'a, 'p>;
+    type SerializeTupleVariant = List<'a, 'p>;
+    type SerializeMap = List<'a, 'p>;
+    type SerializeStruct = List<'a, 'p>;
+    type SerializeStructVariant = List<'a, 'p>;
 
     whole! {
         serialize_i8: i8, serialize_i16: i16, serialize_i32: i32, serialize_i64: i64, serialize_u8: u8,
@@ -78,18 +104,17 @@ impl<'a> Serializer for Pen<'a> {
     }
 
     fn serialize_bool(self, value: bool) -> Result<(), Unwritable> {
-        self.text.extend_from_slice(if value { b"true" } else { b"false" });
+        self.page.text.extend_from_slice(if value { b"true" } else { b"false" });
         Ok(())
     }
     fn serialize_f32(self, value: f32) -> Result<(), Unwritable> {
-        if value.is_finite() { plainly(self.text, &value) } else { Err(Unwritable::NotFinite) }
+        if value.is_finite() { plainly(self.page.text, &value) } else { Err(Unwritable::NotFinite) }
     }
     fn serialize_f64(self, value: f64) -> Result<(), Unwritable> {
         if !value.is_finite() {
             return Err(Unwritable::NotFinite);
         }
-        // As `serde_json` does: the shortest text that reads back bit for bit.
-        self.text.extend_from_slice(zmij::Buffer::new().format_finite(value).as_bytes());
+        self.page.number(value);
         Ok(())
     }
     fn serialize_none(self) -> Result<(), Unwritable> {
@@ -99,14 +124,14 @@ impl<'a> Serializer for Pen<'a> {
         value.serialize(self)
     }
     fn serialize_unit(self) -> Result<(), Unwritable> {
-        self.text.extend_from_slice(b"null");
+        self.page.text.extend_from_slice(b"null");
         Ok(())
     }
     fn serialize_unit_struct(self, _: &'static str) -> Result<(), Unwritable> {
         self.serialize_unit()
     }
     fn serialize_unit_variant(self, _: &'static str, _: u32, variant: &'static str) -> Result<(), Unwritable> {
-        word(self.text, variant)
+        word(self.page.text, variant)
     }
     fn serialize_newtype_struct<T: Serialize + ?Sized>(self, _: &'static str, value: &T) -> Result<(), Unwritable> {
         value.serialize(self)
@@ -118,21 +143,21 @@ impl<'a> Serializer for Pen<'a> {
         variant: &'static str,
         value: &T,
     ) -> Result<(), Unwritable> {
-        self.text.push(b'{');
-        word(self.text, variant)?;
-        self.text.push(b':');
-        append(self.text, value)?;
-        self.text.push(b'}');
+        self.page.text.push(b'{');
+        word(self.page.text, variant)?;
+        self.page.text.push(b':');
+        value.serialize(Pen { page: self.page })?;
+        self.page.text.push(b'}');
         Ok(())
     }
-    fn serialize_seq(self, _: Option<usize>) -> Result<List<'a>, Unwritable> {
-        Ok(List::open(self.text, b'[', "]"))
+    fn serialize_seq(self, _: Option<usize>) -> Result<List<'a, 'p>, Unwritable> {
+        Ok(List::open(self.page, b'[', "]"))
     }
-    fn serialize_tuple(self, _: usize) -> Result<List<'a>, Unwritable> {
-        Ok(List::open(self.text, b'[', "]"))
+    fn serialize_tuple(self, _: usize) -> Result<List<'a, 'p>, Unwritable> {
+        Ok(List::open(self.page, b'[', "]"))
     }
-    fn serialize_tuple_struct(self, _: &'static str, _: usize) -> Result<List<'a>, Unwritable> {
-        Ok(List::open(self.text, b'[', "]"))
+    fn serialize_tuple_struct(self, _: &'static str, _: usize) -> Result<List<'a, 'p>, Unwritable> {
+        Ok(List::open(self.page, b'[', "]"))
     }
     fn serialize_tuple_variant(
         self,
@@ -140,17 +165,17 @@ impl<'a> Serializer for Pen<'a> {
         _: u32,
         variant: &'static str,
         _: usize,
-    ) -> Result<List<'a>, Unwritable> {
-        self.text.push(b'{');
-        word(self.text, variant)?;
-        self.text.push(b':');
-        Ok(List::open(self.text, b'[', "]}"))
+    ) -> Result<List<'a, 'p>, Unwritable> {
+        self.page.text.push(b'{');
+        word(self.page.text, variant)?;
+        self.page.text.push(b':');
+        Ok(List::open(self.page, b'[', "]}"))
     }
-    fn serialize_map(self, _: Option<usize>) -> Result<List<'a>, Unwritable> {
-        Ok(List::open(self.text, b'{', "}"))
+    fn serialize_map(self, _: Option<usize>) -> Result<List<'a, 'p>, Unwritable> {
+        Ok(List::open(self.page, b'{', "}"))
     }
-    fn serialize_struct(self, _: &'static str, _: usize) -> Result<List<'a>, Unwritable> {
-        Ok(List::open(self.text, b'{', "}"))
+    fn serialize_struct(self, _: &'static str, _: usize) -> Result<List<'a, 'p>, Unwritable> {
+        Ok(List::open(self.page, b'{', "}"))
     }
     fn serialize_struct_variant(
         self,
@@ -158,54 +183,54 @@ impl<'a> Serializer for Pen<'a> {
         _: u32,
         variant: &'static str,
         _: usize,
-    ) -> Result<List<'a>, Unwritable> {
-        self.text.push(b'{');
-        word(self.text, variant)?;
-        self.text.push(b':');
-        Ok(List::open(self.text, b'{', "}}"))
+    ) -> Result<List<'a, 'p>, Unwritable> {
+        self.page.text.push(b'{');
+        word(self.page.text, variant)?;
+        self.page.text.push(b':');
+        Ok(List::open(self.page, b'{', "}}"))
     }
 }
 
 /// Writes the items of an array or the members of an object.
-struct List<'a> {
-    text: &'a mut Vec<u8>,
+struct List<'a, 'p> {
+    page: &'a mut Page<'p>,
     is_first: bool,
     end: &'static str,
 }
 
-impl<'a> List<'a> {
-    fn open(text: &'a mut Vec<u8>, begin: u8, end: &'static str) -> Self {
-        text.push(begin);
-        Self { text, is_first: true, end }
+impl<'a, 'p> List<'a, 'p> {
+    fn open(page: &'a mut Page<'p>, begin: u8, end: &'static str) -> Self {
+        page.text.push(begin);
+        Self { page, is_first: true, end }
     }
 
     fn next(&mut self) {
         if !self.is_first {
-            self.text.push(b',');
+            self.page.text.push(b',');
         }
         self.is_first = false;
     }
 
     fn item<T: Serialize + ?Sized>(&mut self, value: &T) -> Result<(), Unwritable> {
         self.next();
-        append(self.text, value)
+        value.serialize(Pen { page: self.page })
     }
 
     fn member<T: Serialize + ?Sized>(&mut self, name: &str, value: &T) -> Result<(), Unwritable> {
         self.next();
-        word(self.text, name)?;
-        self.text.push(b':');
-        append(self.text, value)
+        word(self.page.text, name)?;
+        self.page.text.push(b':');
+        value.serialize(Pen { page: self.page })
     }
 
     fn close(self) {
-        self.text.extend_from_slice(self.end.as_bytes());
+        self.page.text.extend_from_slice(self.end.as_bytes());
     }
 }
 
 macro_rules! lists {
     ($($form:ident: $method:ident),* $(,)?) => {
-        $(impl $form for List<'_> {
+        $(impl $form for List<'_, '_> {
             type Ok = ();
             type Error = Unwritable;
             fn $method<T: Serialize + ?Sized>(&mut self, value: &T) -> Result<(), Unwritable> {
@@ -226,7 +251,7 @@ lists! {
 
 macro_rules! objects {
     ($($form:ident),* $(,)?) => {
-        $(impl $form for List<'_> {
+        $(impl $form for List<'_, '_> {
             type Ok = ();
             type Error = Unwritable;
             fn serialize_field<T: Serialize + ?Sized>(
@@ -246,21 +271,21 @@ macro_rules! objects {
 
 objects! { SerializeStruct, SerializeStructVariant }
 
-impl SerializeMap for List<'_> {
+impl SerializeMap for List<'_, '_> {
     type Ok = ();
     type Error = Unwritable;
     fn serialize_key<T: Serialize + ?Sized>(&mut self, key: &T) -> Result<(), Unwritable> {
         self.next();
         let key = serde_json::to_value(key).map_err(|error| Unwritable::Other(error.to_string()))?;
         match key {
-            serde_json::Value::String(name) => word(self.text, &name),
-            serde_json::Value::Number(_) | serde_json::Value::Bool(_) => word(self.text, &key.to_string()),
+            serde_json::Value::String(name) => word(self.page.text, &name),
+            serde_json::Value::Number(_) | serde_json::Value::Bool(_) => word(self.page.text, &key.to_string()),
             _ => Err(Unwritable::Other("a key is neither text nor number".to_owned())),
         }
     }
     fn serialize_value<T: Serialize + ?Sized>(&mut self, value: &T) -> Result<(), Unwritable> {
-        self.text.push(b':');
-        append(self.text, value)
+        self.page.text.push(b':');
+        value.serialize(Pen { page: self.page })
     }
     fn end(self) -> Result<(), Unwritable> {
         self.close();
@@ -312,6 +337,14 @@ mod tests {
         absent: Option<f64>,
         #[serde(flatten)]
         rest: BTreeMap<String, f64>,
+    }
+
+    #[test]
+    fn a_number_that_comes_again_is_written_again() {
+        let column = [90.0, 90.0, 0.1 + 0.2, 0.1 + 0.2, 0.0, -0.0, -0.0, 1e-7, 1e300, 1e300];
+        let value = (column, Some(1e300), "1e300", 1e300, [[1e300], [2.0]]);
+        assert_eq!(text(&value).unwrap(), serde_json::to_string(&value).unwrap());
+        assert_eq!(text(&[1.0, f64::NAN, f64::NAN]), Err(Unwritable::NotFinite));
     }
 
     /// Everything that serde knows.
