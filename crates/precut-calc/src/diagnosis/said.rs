@@ -10,7 +10,7 @@ use super::outlier::Outliers;
 use super::output::{DiagnosisResult, NamedCause, Refusal, SetReport, VerdictClass};
 use super::refuse::{most_causes, rows_for};
 use super::suspect::{copied_traces, repeated_rows, swapped_columns};
-use super::weigh::{UNNAMED, Weighing};
+use super::weigh::{UNNAMED, UNNAMED_MATTERS, Weighing};
 use crate::calculator::{Basis, Finding, Message, Quantity, Smooth};
 
 /// Probability of a scatter so much larger than between sweeps by chance, below which rows have structure that sweeps share.
@@ -215,6 +215,11 @@ pub(super) fn explanation<E: utoipa::ToSchema, R: utoipa::ToSchema>(
             Message::new("diagnosis_confounded")
                 .with("sets", sets)
                 .with("more", more)
+                .with("likely", all.len())
+                .with(
+                    "unnamed",
+                    if output.unnamed_probability < UNNAMED_MATTERS { 0.0 } else { output.unnamed_probability },
+                )
                 .with("limit_sigmas", CONFOUNDED_BELOW)
         }
         VerdictClass::Unknown if output.unnamed_probability < UNNAMED => objected(&output.sets),

@@ -32,8 +32,11 @@ pub(super) const UNNAMED: f64 = 0.5;
 const NAMED: f64 = 0.8;
 /// Posterior from which on a set is named if every likely set contains it.
 const NAMED_IF_COMMON: f64 = 0.5;
-/// Share of the named posterior that the list of likely sets holds.
+/// Share of the named posterior that the list of likely sets holds; of the whole posterior that sets without a remainder
+/// hold where one of them is named.
 const LIKELY: f64 = 0.95;
+/// Posterior of the remainder from which on it is among what is likely.
+pub(super) const UNNAMED_MATTERS: f64 = 1.0 - LIKELY;
 
 /// Free sizes of a remainder up to which its band is computed: beyond, a triangular solution for every row takes longer
 /// than everything else.
@@ -612,9 +615,10 @@ fn verdict(
     }
     if let Some(leader) = likely.first() {
         let in_all = likely.iter().all(|set| leader.members.iter().all(|h| set.members.contains(h)));
-        let sure = leader.posterior >= NAMED || (leader.posterior >= NAMED_IF_COMMON && in_all);
+        let leads = leader.posterior >= NAMED || (leader.posterior >= NAMED_IF_COMMON && in_all);
+        let sure = leads && unnamed < UNNAMED_MATTERS;
         // The best of the catalogue, and the rows still object.
-        if sure && !is_fair(leader) {
+        if leads && !is_fair(leader) {
             return Verdict::Unknown(Vec::new());
         }
         // At its limit a size is not what the data ask for: something else acts, or the limit is wrong.
