@@ -118,3 +118,28 @@ fn measurements_are_dropped_on_a_diagnosis() {
     ));
     page.assert_calm();
 }
+
+/// Where the rows object to the best of the catalogue its share is not read as a name.
+#[test]
+fn shares_of_what_the_rows_object_to_are_said_to_mean_little() {
+    let Some((_turn, mut page, service)) = both() else { return };
+    page.open(&service.page("diagnosis?example=built_up_edge"));
+    page.until(SETTLED);
+    assert!(page.text(".causes").contains("How likely each of them takes part"));
+    // Every second value a little larger, the others smaller; and a level at which that is too much.
+    let key = page.evaluate(
+        "(async () => { const room = await (await fetch('/v1/calculators/diagnosis')).json(); const job = room.jobs.built_up_edge; \
+         job.measurements.forEach((row, i) => { row.roughness_um *= i % 2 ? 1.03 : 0.97; }); job.options = { level: 0.2, held_out: false }; \
+         const answer = await fetch('/v1/diagnosis', { method: 'POST', headers: { 'content-type': 'application/json' }, body: JSON.stringify(job) }); \
+         return (await answer.json()).key })()",
+    );
+    let key = key.as_str().unwrap();
+    page.open(&service.page(&format!("diagnosis?result={key}")));
+    page.until(&format!(
+        "document.querySelector('.verdict')?.textContent.includes('nothing in the catalogue') && {SETTLED}"
+    ));
+    let found = page.text(".causes");
+    assert!(found.contains("does not fit these rows: none is named"), "{found}");
+    assert_eq!(page.evaluate("document.querySelectorAll('.causes tr.named').length"), 0);
+    page.assert_calm();
+}

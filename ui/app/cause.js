@@ -33,6 +33,9 @@ function wordsOf(schema) {
 /** Whether the result is that of a diagnosis. */
 export const hasCauses = (id, result) => id === 'diagnosis' && Array.isArray(result?.causes);
 
+/** Whether the heaviest set is one of the catalogue, and the rows object to it. */
+const isObjected = ({ verdict, sets, unnamed_probability: unnamed }) => verdict === 'unknown' && sets[0]?.posterior > unnamed;
+
 export function Causes({ result, schema, unit }) {
   const { kinds, fields } = useMemo(() => wordsOf(schema), [schema]);
   const nameOf = (kind, label) => `${kinds.get(kind)?.text ?? humanised(kind)}${label ? ` ${label}` : ''}`;
@@ -52,7 +55,7 @@ export function Causes({ result, schema, unit }) {
       <table><tbody>${bars.map(({ key, name, share, isNamed }) => html`<tr key=${key} class=${isNamed ? 'named' : ''}><th scope="row">${name}</th>
         <td class="clamp-bar"><svg viewBox=${`0 0 ${WIDTH} 14`} preserveAspectRatio="none" aria-hidden="true"><rect class=${isNamed ? 'clamp-given' : 'clamp-statics'} x="0" y="1" width=${Math.max(WIDTH * share, 2)} height="12" /></svg></td>
         <td class="number">${percent(share)}</td></tr>`)}</tbody></table>
-      <p class="quiet">${t('share_means')}</p>
+      <p class="quiet">${t(isObjected(result) ? 'share_objected' : 'share_means')}</p>
       ${result.named.length > 0 && html`<ul class="sizes">${result.named.map(({ kind, label, parameters }) => html`<li key=${kind + label}><strong>${nameOf(kind, label)}</strong>${parameters.map(one => {
         const field = kinds.get(kind)?.properties[one.name];
         return html` · ${field ? labelOf(one.name, field) : humanised(one.name, one.unit)} ${one.standard_deviation ? withSpread(one.value, one.standard_deviation) : number(one.value, 4)} ${field ? unitOf(field) : unitSymbol(one.unit)}${one.at_limit ? ` (${t('at_limit')})` : ''}`;
