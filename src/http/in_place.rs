@@ -139,7 +139,7 @@ mod tests {
             sender.send(number).await.unwrap();
         }
         drop(sender);
-        let sum = tokio::time::timeout(Duration::from_secs(60), heard).await.unwrap().unwrap();
+        let sum = tokio::time::timeout(Duration::from_mins(1), heard).await.unwrap().unwrap();
         assert_eq!(sum, 9999 * 10_000 / 2);
     }
 }
