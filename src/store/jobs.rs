@@ -184,8 +184,9 @@ pub struct NewJob {
     pub idempotency: Option<Idempotency>,
     /// Estimated work, ms.
     pub estimate_ms: f64,
-    /// When it is of no use any more, ms UTC.
-    pub deadline_ms: Option<i64>,
+    /// For how long after it is accepted it is of use, ms. Its deadline is set where it is accepted, by the same reading
+    /// of the same clock: whoever asks may have another.
+    pub useful_for_ms: Option<i64>,
     /// Its result, where it is there already.
     pub result: Option<KeptResult>,
 }

@@ -226,12 +226,7 @@ impl Jobs {
         queue_limit: u64,
     ) -> Result<(JobRecord, bool), Error> {
         let idempotency = ask.idempotency_key.clone().map(|key| Idempotency { key, body_hash: request.body_hash });
-        let deadline_ms = ask.deadline.map(|after| {
-            self.store
-                .now_ms()
-                .saturating_add(i64::try_from(after.as_millis()).unwrap_or(i64::MAX / 2))
-                .min(i64::MAX / 2)
-        });
+        let useful_for_ms = ask.deadline.map(|after| i64::try_from(after.as_millis()).unwrap_or(i64::MAX));
         let job = NewJob {
             id: JobId::at(self.store.now_ms()),
             kind: request.kind,
@@ -243,13 +238,13 @@ impl Jobs {
             owner: ask.owner.clone(),
             idempotency,
             estimate_ms: request.estimate_ms,
-            deadline_ms,
+            useful_for_ms,
             result: request.result.map(|stored| stored.kept()),
         };
         match self.store.submit(job, queue_limit).await? {
             Accepted::New(record) => {
                 metrics::counter!("precut_jobs_accepted_total", "calculator" => request.calculator).increment(1);
-                if deadline_ms.is_some() {
+                if useful_for_ms.is_some() {
                     self.new_deadline.notify_one();
                 }
                 Ok((record, true))

@@ -119,7 +119,7 @@ pub(super) async fn submit(
     .bind(now)
     .bind(started_ms.or(finished))
     .bind(finished)
-    .bind(job.deadline_ms)
+    .bind(job.useful_for_ms.map(|after| now.saturating_add(after)))
     .bind(finished.map(|at| at.saturating_add(keep_ms)))
     .fetch_optional(&mut *connection)
     .await?;

@@ -277,7 +277,7 @@ shared! {
             place.store.clock.skew(skew_ms);
             place.store.sweep(Arc::new(Vec::new)).await.unwrap();
             assert!((place.store.now_ms() - before).abs() < 60_000, "{}", place.store.now_ms() - before);
-            let due = NewJob { deadline_ms: Some(place.store.now_ms() + 60_000), ..job(1) };
+            let due = NewJob { useful_for_ms: Some(60_000), ..job(1) };
             let accepted = place.accept(due).await;
             assert!((accepted.created_ms - before).abs() < 60_000);
             assert_eq!(place.line().await.len(), 1, "a task is not held back by the clock of whoever pushes it");

@@ -197,16 +197,17 @@ pub(in crate::store) async fn the_line_is_fair_between_owners_and_keeps_prioriti
 
 pub(in crate::store) async fn deadlines_end_what_is_late_and_nothing_else<P: Place>() {
     let place = P::new().await;
-    let now = now_ms();
-    let due = |number: u32, ms: i64| NewJob { deadline_ms: Some(now + ms), ..job(number) };
-    let late = place.accept(due(1, -10)).await.id;
-    let running = place.accept(due(2, -5)).await.id;
-    let later = place.accept(due(3, 60_000)).await.id;
+    let due = |number: u32, ms: i64| NewJob { useful_for_ms: Some(ms), ..job(number) };
+    let late = place.accept(due(1, 0)).await.id;
+    let running = place.accept(due(2, 0)).await.id;
+    let later = place.accept(due(3, 60_000)).await;
+    let (later, due_at) = (later.id, later.created_ms + 60_000);
+    assert_eq!(place.record(later).await.deadline_ms, Some(due_at), "it counts from when the job was accepted");
     let claim = place.run(running).await;
     let (changed, next) = place.store().expire_deadlines(PROBLEM.to_owned()).await.unwrap();
     let mut jobs = changed.jobs;
     jobs.sort();
-    assert_eq!((jobs, changed.unwanted, next), (vec![late, running], vec![claim.lease], Some(now + 60_000)));
+    assert_eq!((jobs, changed.unwanted, next), (vec![late, running], vec![claim.lease], Some(due_at)));
     for id in [late, running] {
         let record = place.record(id).await;
         assert_eq!((record.state, record.problem.as_deref()), (JobState::Failed, Some(PROBLEM)));

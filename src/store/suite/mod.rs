@@ -82,7 +82,7 @@ pub(in crate::store) fn job(number: u32) -> NewJob {
         owner: "one".to_owned(),
         idempotency: None,
         estimate_ms: 10.0,
-        deadline_ms: None,
+        useful_for_ms: None,
         result: None,
     }
 }
