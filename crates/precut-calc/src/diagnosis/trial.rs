@@ -24,7 +24,7 @@ pub fn separations_of<M: Diagnosable>(job: &JobOf<M>, changes: &[(&str, &[f64])]
 /// parameters, linearised where they were fitted, or over the size of the change, whichever is less (`diagnosis/3.6`).
 pub fn separation_from<M: Diagnosable>(job: &JobOf<M>, change: &[f64], named: &[NamedCause]) -> Result<f64, Failure> {
     with_base_weighed::<M, _>(job, |bound, weighing| {
-        let settings: Vec<Setting> = named.iter().filter_map(|cause| setting_of(bound, cause)).collect();
+        let settings: Vec<Setting> = named.iter().map(|cause| setting_of(bound, cause)).collect::<Result<_, _>>()?;
         let base = &weighing.foundation.base;
         let with = bound.predict(&settings)?;
         let gap: Vec<f64> = change
@@ -42,10 +42,11 @@ pub fn separation_from<M: Diagnosable>(job: &JobOf<M>, change: &[f64], named: &[
 }
 
 /// The hypothesis of a named cause with its values.
-fn setting_of<M: Diagnosable>(bound: &Bound<M>, cause: &NamedCause) -> Option<Setting> {
+fn setting_of<M: Diagnosable>(bound: &Bound<M>, cause: &NamedCause) -> Result<Setting, Failure> {
     let is_of = |hypothesis: &Hypothesis| hypothesis.cause.kind == cause.kind && hypothesis.label == cause.label;
-    let hypothesis = bound.hypotheses().iter().position(is_of)?;
-    Some(Setting { hypothesis, values: cause.parameters.iter().map(|parameter| parameter.value).collect() })
+    let hypothesis = bound.hypotheses().iter().position(is_of);
+    let hypothesis = hypothesis.ok_or_else(|| Failure::Internal(format!("no hypothesis {}", cause.kind)))?;
+    Ok(Setting { hypothesis, values: cause.parameters.iter().map(|parameter| parameter.value).collect() })
 }
 
 /// Which variables of settings are fitted: sizes, and shapes that have a prior.
