@@ -316,17 +316,9 @@ fn rows_far_away_in_great_number_count_little_and_the_cause_is_found_beside_them
     let value = measured_on(headstock(), (3, 60), 31, |_, place, sweep, _| 16.0 * place + far(place, sweep));
     let answer = answered(&value);
     assert!(warned(&answer, "too_many_outliers"), "{:?}", answer.warnings);
-    // The far rows come in an order that no catalogue holds: what they leave to something unnamed keeps the answer from
-    // more than "best, but not surely".
-    let output = &answer.output;
-    assert!(
-        matches!(output.verdict, VerdictClass::Named | VerdictClass::Confounded) && output.unnamed_probability < 0.1
-    );
-    let is_offset = |cause: &precut_calc::diagnosis::NamedCause| cause.kind == "tailstock_offset";
-    assert!(output.likely_sets.iter().all(|set| set.causes.iter().any(is_offset)), "{:?}", output.likely_sets);
-    let [cause] = output.sets[0].causes.as_slice() else { panic!("{:?}", output.sets[0]) };
-    assert!(is_offset(cause) && output.sets[0].posterior > 0.8, "{:?}", output.sets[0]);
-    let offset = &cause.parameters[0];
+    assert_eq!(answer.output.verdict, VerdictClass::Named);
+    assert_eq!(answer.output.named[0].kind, "tailstock_offset");
+    let offset = &answer.output.named[0].parameters[0];
     // 8 um on the radius; the lighter cut gives back 1.5 % (see above), and the set-ups of five runs are 1 um each.
     assert!((offset.value - 8.1).abs() < 0.7, "{offset:?}");
     // The scatter is that of the rows that belong together, not of the far ones: 12 um in one of eleven would be 3.6 um.

@@ -35,8 +35,8 @@ const NAMED_IF_COMMON: f64 = 0.5;
 /// Share of the named posterior that the list of likely sets holds; of the whole posterior that sets without a remainder
 /// hold where one of them is named.
 const LIKELY: f64 = 0.95;
-/// Posterior of the remainder from which on it is among what is likely.
-pub(super) const UNNAMED_MATTERS: f64 = 1.0 - LIKELY;
+/// Posterior of the remainder from which on no set is named: one in ten, as much as "nothing" may have in an alarm.
+pub(super) const UNNAMED_MATTERS: f64 = ALARM;
 
 /// Free sizes of a remainder up to which its band is computed: beyond, a triangular solution for every row takes longer
 /// than everything else.
