@@ -197,6 +197,11 @@ pub(crate) fn all_but<M: Diagnosable>(kind: &str) -> Vec<&'static str> {
 }
 
 impl Mutated {
+    /// How many draws there were.
+    pub(crate) fn drawn(&self) -> usize {
+        self.adequate + self.confounded + self.unknown + self.twins.len()
+    }
+
     /// Sets named in its place that these rows can tell from the hidden cause.
     pub(crate) fn forced(&self) -> usize {
         self.twins.iter().filter(|sigmas| **sigmas >= 4.0).count()

@@ -51,6 +51,7 @@ fn what_the_catalogue_lacks_is_unknown() {
 fn what_is_taken_out_of_the_catalogue_is_not_forced_on_another() {
     let mutated =
         blind_trials::without_the_cause::<DeflectionCompensation>(trials("deflection-mutated", Class::One, 3.0, 5, 24));
-    assert!(mutated.forced() <= 3, "{mutated:?}");
-    assert!(mutated.unknown + mutated.confounded >= 10, "{mutated:?}");
+    // Three of the 24 that are drawn unless another number is asked for.
+    assert!(8 * mutated.forced() <= mutated.drawn(), "{mutated:?}");
+    assert!(12 * (mutated.unknown + mutated.confounded) >= 5 * mutated.drawn(), "{mutated:?}");
 }

@@ -103,20 +103,28 @@ impl Normal {
 
     /// Least of |r - X t|^2 over all t, without priors.
     pub(super) fn misfit(&self) -> f64 {
-        if self.right.is_empty() {
-            return self.square;
+        (self.square - self.explained().iter().sum::<f64>()).max(0.0)
+    }
+
+    /// Number of directions among the columns that rows see.
+    pub(super) fn rank(&self) -> usize {
+        self.explained().len()
+    }
+
+    /// What is explained along every principal direction of the columns, each of length one, that rows see.
+    fn explained(&self) -> Vec<f64> {
+        let length: Vec<f64> = self.gram.diagonal().iter().map(|square| square.sqrt()).collect();
+        let seen: Vec<usize> = (0..length.len()).filter(|&i| length[i] > 0.0).collect();
+        if seen.is_empty() {
+            return Vec::new();
         }
-        let eigen = self.gram.clone().symmetric_eigen();
-        let largest = eigen.eigenvalues.iter().fold(0.0_f64, |most, value| most.max(*value));
-        let along = eigen.eigenvectors.tr_mul(&self.right);
+        let unit = |i: usize, j: usize| self.gram[(seen[i], seen[j])] / (length[seen[i]] * length[seen[j]]);
+        let eigen = DMatrix::from_fn(seen.len(), seen.len(), unit).symmetric_eigen();
+        let right = DVector::from_iterator(seen.len(), seen.iter().map(|&i| self.right[i] / length[i]));
+        let along = eigen.eigenvectors.tr_mul(&right);
+        let parts = along.iter().zip(eigen.eigenvalues.iter());
         // Directions that no row sees explain nothing: round-off of a product of n terms stays far below this.
-        let explained: f64 = along
-            .iter()
-            .zip(eigen.eigenvalues.iter())
-            .filter(|(_, value)| **value > 1e-12 * largest)
-            .map(|(part, value)| part * part / value)
-            .sum();
-        (self.square - explained).max(0.0)
+        parts.filter(|(_, value)| **value > 1e-12).map(|(part, value)| part * part / value).collect()
     }
 
     /// log Z = -1/2 log|A| + l(Q) + sum of ln 2 Phi(s_i t_i / sd_i), A = X'X + I.

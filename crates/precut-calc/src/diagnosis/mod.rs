@@ -27,6 +27,7 @@ mod data;
 mod discrepancy;
 mod downstream;
 mod evidence;
+mod fairness;
 mod foundation;
 mod gain;
 mod identify;

@@ -271,8 +271,9 @@ pub struct SetReport {
     /// Bayesian information criterion, n ln(RSS/n) + k ln n; absent beside a remainder, whose sizes are as many as one likes.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub bic: Option<f64>,
-    /// Probability that rows scatter so far from this set or farther if nothing else acts, by an F test of that part of what
-    /// it leaves which the scatter was not found from; below the level a set is not named. Absent where there is no such part.
+    /// Probability that rows scatter so far from this set or farther if nothing else acts: the lesser one of two F tests, of
+    /// that part of what it leaves which the scatter was not found from, and, without an order, of what goes smoothly with the
+    /// conditions; below the level a set is not named. Absent where there is nothing to test.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub lack_of_fit_p: Option<f64>,
     /// Root mean square error on data held back, this set fitted anew without each part, in the unit of the quantity;

@@ -1,13 +1,12 @@
 //! From rows to posterior weights and a verdict (`diagnosis/3.5`, `diagnosis/3.7`).
 
-use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
-
 use super::discrepancy::{self, Kind, Remainder};
 use super::evidence::{Normal, Side, log_sum_exp};
+use super::fairness::Left;
 use super::foundation::Foundation;
 use super::likelihood::Likelihood;
 use super::link;
-use super::noise::{Noise, NoiseSource};
+use super::noise::Noise;
 use super::optima::{Optimum, elsewhere};
 use super::profile::{Profile, Profiler};
 use super::refine::{Fit, Refinement};
@@ -32,8 +31,7 @@ pub(super) const UNNAMED: f64 = 0.5;
 const NAMED: f64 = 0.8;
 /// Posterior from which on a set is named if every likely set contains it.
 const NAMED_IF_COMMON: f64 = 0.5;
-/// Share of the named posterior that the list of likely sets holds; of the whole posterior that sets without a remainder
-/// hold where one of them is named.
+/// Share of the named posterior that the list of likely sets holds.
 const LIKELY: f64 = 0.95;
 /// Posterior of the remainder from which on no set is named: one in ten, as much as "nothing" may have in an alarm.
 pub(super) const UNNAMED_MATTERS: f64 = ALARM;
@@ -154,6 +152,8 @@ pub struct Weighing<'a> {
     /// Distances between predictions in standard deviations; of classes about the leading set.
     pub(super) whitener: Whitener,
     pub(super) linear: Linear<'a>,
+    /// Whitened regressors of an unordered design.
+    low_order: Vec<White>,
     ranking: Ranking,
     pub(super) kinds: Vec<Kind>,
     /// All sets, heaviest first.
@@ -217,11 +217,28 @@ impl<'a> Weighing<'a> {
         };
         let at_limit =
             |set: &SetWeight| ranking.fit(&set.members).is_some_and(|fit| at_limit(fit, subject.hypotheses()));
+        let low_order: Vec<White> = data.layout.design.regressors.iter().map(|column| whitener.white(column)).collect();
         let is_fair = |set: &SetWeight| {
-            ranking.lack_of_fit(&linear, &noise, &set.members).is_none_or(|probability| probability >= effort.level)
+            ranking
+                .lack_of_fit(&linear, &noise, &low_order, &set.members)
+                .is_none_or(|probability| probability >= effort.level)
         };
         let verdict = verdict(&sets, none, unnamed, &at_limit, &is_fair);
-        Ok(Self { foundation, keep, noise, whitener, linear, ranking, kinds, sets, none, unnamed, inclusion, verdict })
+        Ok(Self {
+            foundation,
+            keep,
+            noise,
+            whitener,
+            linear,
+            low_order,
+            ranking,
+            kinds,
+            sets,
+            none,
+            unnamed,
+            inclusion,
+            verdict,
+        })
     }
 
     /// The fit of a set about the model itself, where it was made.
@@ -260,7 +277,7 @@ impl<'a> Weighing<'a> {
         if set.remainder.is_some() {
             return None;
         }
-        self.ranking.lack_of_fit(&self.linear, &self.noise, &set.members)
+        self.ranking.lack_of_fit(&self.linear, &self.noise, &self.low_order, &set.members)
     }
 
     /// n ln(RSS/n) + k ln n of a set without a remainder, RSS whitened and at the fit without priors. Where it has a
@@ -487,25 +504,12 @@ impl Ranking {
         Ok(weighed)
     }
 
-    /// Probability that a set without priors leaves so much or more, if nothing else acts: of what it leaves, that part which
-    /// the scatter was not found from, against the scatter. `None` where there is no such part, and of classes.
-    fn lack_of_fit(&self, linear: &Linear<'_>, noise: &Noise, members: &[usize]) -> Option<f64> {
+    /// Probability that a set leaves so much or more; see [`Left::probability`]. `None` of classes.
+    fn lack_of_fit(&self, linear: &Linear<'_>, noise: &Noise, low_order: &[White], members: &[usize]) -> Option<f64> {
         let Likelihood::Gaussian { whitener, .. } = &linear.likelihood else { return None };
         let candidate = self.candidates.iter().find(|candidate| candidate.members == members)?;
         let (columns, residual, _) = self.parts(linear, candidate);
-        let misfit = Normal::of(&columns, &residual).misfit();
-        let free = whitener.rows() - columns.len() as f64;
-        if let NoiseSource::Stated { scatter_factor } = noise.source {
-            // Where the rows scatter more than was stated that is what is said; shape is judged by their own scatter.
-            let misfit = misfit / scatter_factor.max(1.0).powi(2);
-            return Some(ChiSquared::new(free).ok()?.sf(misfit));
-        }
-        let beyond = free - noise.dof;
-        if beyond < 1.0 {
-            return None;
-        }
-        let ratio = (misfit - noise.dof).max(0.0) / beyond;
-        Some(FisherSnedecor::new(beyond, noise.dof).ok()?.sf(ratio))
+        Left { columns, residual: &residual, rows: whitener.rows(), noise }.probability(low_order)
     }
 
     fn beside(&self, linear: &Linear<'_>, kinds: &[Kind], candidate: &Candidate) -> Option<Remainder> {
