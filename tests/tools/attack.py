@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Lets schemathesis attack a running service from its own contract.
 
-    attack.py [--examples N] PRECUT SCHEMATHESIS [-- further arguments of `schemathesis run`]
+    attack.py [--examples N] [--thorough] PRECUT SCHEMATHESIS [-- further arguments of `schemathesis run`]
 
 Starts the program PRECUT on a free port with an empty data folder, runs every check of schemathesis against
 it (schemathesis.toml beside this file), and demands afterwards that the service is alive and never panicked.
@@ -9,6 +9,9 @@ The seed is fixed: a fault that was found once is found again.
 
 Making requests up takes longer than answering them, and it takes one core. So the operations are dealt to as many
 runs at the same time as there are cores; only what follows links from one operation to another is one run over all.
+
+A job that holds the jobs of the other operations has as many bounds as all of them together, and half of all requests would
+try these a second time. It is attacked with more random jobs instead; --thorough tries the bounds, too.
 """
 
 import argparse
@@ -29,6 +32,9 @@ SEED = 20240229
 START_S = 30
 MOST_RUNS = 4
 SINGLE_OPERATIONS = "examples,coverage,fuzzing"
+OF_OTHERS = ["solve_diagnosis"]
+WITHOUT_BOUNDS = "examples,fuzzing"
+MORE_EXAMPLES = 3
 LINKED_OPERATIONS = "stateful"
 
 
@@ -76,28 +82,31 @@ def dealt(sizes: dict[str, int], hands: int) -> list[list[str]]:
     return held
 
 
-def attack(schemathesis: str, url: str, examples: int, further: list[str], folder: str) -> list[str]:
+def attack(schemathesis: str, url: str, examples: int, thorough: bool, further: list[str], folder: str) -> list[str]:
     """The faults."""
     common = [str(pathlib.Path(schemathesis).absolute()), "--config-file", str(HERE / "schemathesis.toml"), "run", f"{url}/openapi.json"]
-    common += ["--seed", str(SEED), "--max-examples", str(examples), "--generation-database", "none", *further]
+    common += ["--seed", str(SEED), "--generation-database", "none", *further]
 
-    def run(name: str, arguments: list[str]) -> list[str]:
+    def run(name: str, examples: int, phases: str, only: list[str]) -> list[str]:
         # It leaves files where it runs.
         place = pathlib.Path(folder) / name
         place.mkdir()
+        arguments = ["--max-examples", str(examples), "--phases", phases]
+        arguments += [part for id in only for part in ("--include-operation-id", id)]
         done = subprocess.run(common + arguments, cwd=place, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace")
         print("+", *common, *arguments, f"\n{done.stdout}", flush=True)
         return [] if done.returncode == 0 else [f"schemathesis over {name} ends with {done.returncode}"]
 
     every = operations(url)
     runs = max(1, min(MOST_RUNS, os.cpu_count() or 1))
-    hands = dealt(every, runs)
-    assert sorted(sum(hands, [])) == sorted(every)
-    chosen = [[part for id in hand for part in ("--include-operation-id", id)] for hand in hands]
+    apart = [] if thorough else OF_OTHERS
+    hands = dealt({id: size for id, size in every.items() if id not in apart}, runs)
+    assert sorted(sum(hands, apart)) == sorted(every)
     with ThreadPoolExecutor(runs) as pool:
-        futures = [pool.submit(run, f"part {n + 1} of {runs}", [*only, "--phases", SINGLE_OPERATIONS]) for n, only in enumerate(chosen)]
+        futures = [pool.submit(run, f"part {n + 1} of {runs}", examples, SINGLE_OPERATIONS, hand) for n, hand in enumerate(hands)]
+        futures += [pool.submit(run, id, MORE_EXAMPLES * examples, WITHOUT_BOUNDS, [id]) for id in apart]
         faults = [fault for future in futures for fault in future.result()]
-    return faults + run("links", ["--phases", LINKED_OPERATIONS])
+    return faults + run("links", examples, LINKED_OPERATIONS, [])
 
 
 def stop(process: subprocess.Popen) -> None:
@@ -114,6 +123,7 @@ def main() -> int:
     parser.add_argument("precut")
     parser.add_argument("schemathesis")
     parser.add_argument("--examples", type=int, default=60)
+    parser.add_argument("--thorough", action="store_true")
     parser.add_argument("further", nargs="*")
     arguments = parser.parse_args()
 
@@ -124,7 +134,7 @@ def main() -> int:
             process = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT)
         try:
             url = address(process, log)
-            faults = attack(arguments.schemathesis, url, arguments.examples, arguments.further, folder)
+            faults = attack(arguments.schemathesis, url, arguments.examples, arguments.thorough, arguments.further, folder)
             if subprocess.run([arguments.precut, "health", "--url", url]).returncode != 0:
                 faults.append("the service is no longer ready")
         finally:
