@@ -231,8 +231,16 @@ impl Page {
         self.mouse("mouseReleased", to, 0);
     }
 
-    /// A real click in the middle of an element.
+    /// A real click in the middle of an element, once it holds still: what has just come may still push it aside.
     pub fn click(&mut self, selector: &str) {
+        self.middle(selector);
+        self.until(&format!(
+            "(async () => {{ const it = document.querySelector({}), at = () => JSON.stringify(it.getBoundingClientRect()); \
+             const before = it && at(); \
+             await new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done))); \
+             return it !== null && it.isConnected && at() === before }})()",
+            json!(selector)
+        ));
         let place = self.middle(selector);
         self.point(place);
         self.mouse("mousePressed", place, 1);

@@ -42,6 +42,8 @@ fn kept_results_are_listed_and_opened_without_computing() {
     page.until("/^Диаметр 100 мм · .*глубина резания 3 мм/.test(document.querySelector('.told')?.textContent)");
     page.click_on("EN");
     page.until("/^Diameter/.test(document.querySelector('.told')?.textContent)");
+    // Names of calculators come by themselves.
+    page.until("document.querySelector('.list tbody a').textContent === 'Fixture stability'");
     page.click(".list tbody a");
     page.until(&format!("{SETTLED} && location.hash.includes('result=b3:')"));
     assert_eq!(page.text(".verdict"), verdict);
