@@ -4,6 +4,7 @@ use std::time::{Duration, Instant};
 
 use precut::config::ApiKey;
 use precut::http::auth;
+use precut::registry::Registry;
 use reqwest::{RequestBuilder, Response};
 use serde_json::{Value, json};
 
@@ -384,6 +385,29 @@ async fn a_job_without_a_result_says_why() {
         for part in ["title", "detail", "errors"] {
             assert_eq!(document[part], failed["problem"][part]);
         }
+    }
+}
+
+/// A schedule whose limits conflict, asked directly and as a job: the same refusal, with the numbers of the conflict.
+#[tokio::test]
+async fn limits_that_conflict_are_told_of_a_job_as_they_are_directly() {
+    let server = Server::start_of(Registry::standard().unwrap(), |_| {}).await;
+    let entry = Registry::standard().unwrap().entry("feed-schedule").unwrap().clone();
+    let mut ask: Value = serde_json::from_str(entry.meta().examples[0].job).unwrap();
+    for zone in ask["zones"].as_array_mut().unwrap() {
+        zone["roughness_max_um"] = json!(0.05);
+    }
+    let post = || server.post_to("/v1/feed-schedule", ask.to_string());
+    let accepted = post().header("prefer", "respond-async").send().await.unwrap();
+    assert_eq!(accepted.status(), 202);
+    let address = header(&accepted, "location").to_owned();
+    until(&server, &address, &["failed"]).await;
+    let result = server.get(&format!("{address}/result")).send().await.unwrap();
+    let of_job = problem(result, 422, "infeasible_schedule").await;
+    let direct = problem(post().send().await.unwrap(), 422, "infeasible_schedule").await;
+    assert!(direct["infeasible"]["elastic_total"].as_f64().unwrap() > 0.0);
+    for part in ["title", "detail", "errors", "infeasible"] {
+        assert_eq!(of_job[part], direct[part], "{part}");
     }
 }
 

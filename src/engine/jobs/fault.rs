@@ -4,7 +4,7 @@ use std::collections::HashSet;
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-use precut_calc::calculator::{Failure, Finding, Message, Value as Datum, Values};
+use precut_calc::calculator::{Conflict, Failure, Finding, Message, Value as Datum, Values};
 use serde_json::{Map, Value, json};
 
 use crate::engine::Error;
@@ -12,11 +12,7 @@ use crate::engine::Error;
 /// Why a job failed, as it is kept.
 pub(super) fn written(error: &Error) -> String {
     let value = match error {
-        Error::Calculation(Failure::Infeasible(finding)) => json!({"kind": "infeasible", "finding": note(finding)}),
-        Error::Calculation(Failure::OutOfModel(finding)) => json!({"kind": "out_of_model", "finding": note(finding)}),
-        Error::Calculation(Failure::NotConverged { what, residual, iterations }) => {
-            json!({"kind": "not_converged", "what": what, "residual": residual, "iterations": iterations})
-        }
+        Error::Calculation(failure) => failed(failure),
         Error::Invalid { findings, total } => {
             let findings: Vec<Value> = findings.iter().map(note).collect();
             json!({"kind": "invalid", "findings": findings, "total": total})
@@ -25,10 +21,26 @@ pub(super) fn written(error: &Error) -> String {
         Error::DeadlineExceeded => json!({"kind": "deadline_exceeded"}),
         Error::CrashedRepeatedly { attempts } => json!({"kind": "crashed_repeatedly", "attempts": attempts}),
         Error::Crashed => json!({"kind": "crashed"}),
-        Error::Calculation(Failure::Internal(cause)) => json!({"kind": "internal", "cause": cause}),
         other => json!({"kind": "internal", "cause": other.to_string()}),
     };
     value.to_string()
+}
+
+fn failed(failure: &Failure) -> Value {
+    match failure {
+        Failure::Infeasible(finding) => json!({"kind": "infeasible", "finding": note(finding)}),
+        Failure::Conflicting(conflict) => {
+            json!({"kind": "conflicting", "finding": note(&conflict.finding), "infeasible": conflict.infeasible})
+        }
+        Failure::OutOfModel(finding) => json!({"kind": "out_of_model", "finding": note(finding)}),
+        // A residual that is no number becomes `null`.
+        Failure::NotConverged { what, residual, iterations } => {
+            json!({"kind": "not_converged", "what": what, "residual": residual, "iterations": iterations})
+        }
+        Failure::Internal(cause) => json!({"kind": "internal", "cause": cause}),
+        // A cancelled job did not fail.
+        Failure::Cancelled => json!({"kind": "internal", "cause": failure.to_string()}),
+    }
 }
 
 /// Why a job failed, read back. What is not understood is a fault of ours.
@@ -41,10 +53,14 @@ fn error_of(value: &Value) -> Option<Error> {
     let whole = |name: &str| value[name].as_u64().and_then(|number| u32::try_from(number).ok());
     Some(match value["kind"].as_str()? {
         "infeasible" => Error::Calculation(Failure::Infeasible(finding_of(&value["finding"])?)),
+        "conflicting" => Error::Calculation(Failure::Conflicting(Box::new(Conflict {
+            finding: finding_of(&value["finding"])?,
+            infeasible: serde_json::from_value(value["infeasible"].clone()).ok()?,
+        }))),
         "out_of_model" => Error::Calculation(Failure::OutOfModel(finding_of(&value["finding"])?)),
         "not_converged" => Error::Calculation(Failure::NotConverged {
             what: interned(value["what"].as_str()?),
-            residual: value["residual"].as_f64()?,
+            residual: value["residual"].as_f64().unwrap_or(f64::NAN),
             iterations: whole("iterations")?,
         }),
         "invalid" => Error::Invalid {
@@ -122,13 +138,22 @@ pub(super) fn pause(attempt: u32) -> Duration {
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
+    use precut_calc::calculator::{ConstraintName, ElasticScope, Infeasible, Relaxation};
+
     use super::*;
 
     #[test]
     fn what_is_written_reads_back() {
         let finding = Finding::new("too_thick", "/a/0").measured(3.5, 2.0, "mm").with("names", vec!["a", "b"]);
+        let infeasible = Infeasible {
+            elastic_total: 0.4,
+            elastic_scope: ElasticScope::All,
+            relaxations: vec![Relaxation { constraint: "power".to_owned(), zone: "z5".to_owned(), factor: 1.5 }],
+            conflict_set: vec![ConstraintName { constraint: "power".to_owned(), zone: "z5".to_owned() }],
+        };
         let errors = [
             Error::Calculation(Failure::Infeasible(finding.clone())),
+            Error::Calculation(Failure::Conflicting(Box::new(Conflict { finding: finding.clone(), infeasible }))),
             Error::Calculation(Failure::OutOfModel(Finding::new("outside", ""))),
             Error::Calculation(Failure::NotConverged { what: "chip", residual: 1e-3, iterations: 40 }),
             Error::Calculation(Failure::Internal("a cause".to_owned())),
@@ -141,6 +166,8 @@ mod tests {
         for error in errors {
             assert_eq!(read(&written(&error)), error);
         }
+        let nowhere = Error::Calculation(Failure::NotConverged { what: "dual", residual: f64::NAN, iterations: 0 });
+        assert_eq!(format!("{:?}", read(&written(&nowhere))), format!("{nowhere:?}"));
         let stage = Message::new("revolution").with("of", 96.0).with("unit", "mm");
         assert_eq!(read_stage(&written_stage(&stage)), Some(stage));
         assert!(matches!(read("nonsense"), Error::Calculation(Failure::Internal(_))));
