@@ -243,7 +243,16 @@ pub enum ConfigError {
 impl Config {
     /// Defaults < file < environment < flags.
     pub fn load(file: Option<&Path>, flags: &Flags) -> Result<Self, ConfigError> {
-        Self::from_sources(file, std::env::vars(), flags)
+        let (mut environment, mut faults) = (Vec::new(), Vec::new());
+        for (name, value) in std::env::vars_os() {
+            // What others have there need not be text.
+            let Some(name) = name.to_str().filter(|name| name.starts_with(PREFIX)) else { continue };
+            match value.into_string() {
+                Ok(value) => environment.push((name.to_owned(), value)),
+                Err(_) => faults.push(format!("environment variable {name} is not Unicode")),
+            }
+        }
+        if faults.is_empty() { Self::from_sources(file, environment, flags) } else { Err(ConfigError::Invalid(faults)) }
     }
 
     /// [`Config::load`] with the environment as it is given.
@@ -371,6 +380,16 @@ pub(crate) fn milliseconds(ms: f64) -> Duration {
     seconds(ms / 1e3)
 }
 
+/// What the names of settings in the environment begin with.
+const PREFIX: &str = "PRECUT_";
+/// Variables that the command line itself reads: the file, and the language of what it says.
+const OF_THE_COMMAND_LINE: [&str; 2] = ["config", "lang"];
+
+/// Whether Kubernetes put a variable there: it tells every container the addresses of a service called `precut`.
+fn is_of_the_cluster(key: &str, value: &str) -> bool {
+    key.starts_with("service_") || key.starts_with("port_") || (key == "port" && value.contains("://"))
+}
+
 /// A setting from the environment.
 struct Variable {
     name: String,
@@ -379,10 +398,10 @@ struct Variable {
 }
 
 impl Variable {
-    /// `None` for variables of others, and for the one that names the file itself.
+    /// `None` for variables that are no settings.
     fn new((name, value): (String, String)) -> Option<Self> {
-        let key = name.strip_prefix("PRECUT_")?.to_ascii_lowercase();
-        if key == "config" {
+        let key = name.strip_prefix(PREFIX)?.to_ascii_lowercase();
+        if OF_THE_COMMAND_LINE.contains(&key.as_str()) || is_of_the_cluster(&key, &value) {
             return None;
         }
         let sectioned = SECTIONS.iter().find_map(|section| {
@@ -458,6 +477,19 @@ mod tests {
         assert!(error.contains("json_byte") && error.contains("precut.toml"), "{error}");
         let error = load("", &[("PRECUT_LISTN", "127.0.0.1:1")], &Flags::default()).unwrap_err().to_string();
         assert!(error.contains("listn") && error.contains("PRECUT_LISTN"), "{error}");
+    }
+
+    #[test]
+    fn what_is_no_setting_is_left_alone() {
+        let others = [
+            ("PRECUT_LANG", "ru"),
+            ("PRECUT_SERVICE_HOST", "10.0.0.7"),
+            ("PRECUT_SERVICE_PORT_HTTP", "8080"),
+            ("PRECUT_PORT", "tcp://10.0.0.7:8080"),
+            ("PRECUT_PORT_8080_TCP_ADDR", "10.0.0.7"),
+        ];
+        assert_eq!(load("", &others, &Flags::default()).unwrap(), Config::default());
+        assert!(load("", &[("PRECUT_PORT", "8080")], &Flags::default()).is_err(), "the setting is `listen`");
     }
 
     #[test]
