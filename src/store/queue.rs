@@ -34,6 +34,9 @@ const ATTEMPTS: usize = 1_000_000;
 const DONE_FOR_S: i64 = 60;
 /// Pause after the queue failed.
 const PAUSE: Duration = Duration::from_secs(1);
+/// When a task may run: long ago. The queue would count seconds by the clock as it is when a task is pushed, and hold it
+/// back for as long as the clock is set back after that.
+const AT_ONCE_S: u64 = 1;
 /// Places in the order of one priority.
 const TURNS: i64 = 1 << 40;
 
@@ -64,6 +67,7 @@ pub(super) async fn push(connection: &mut SqliteConnection, jobs: &[String]) -> 
         let task = TaskBuilder::new(message)
             .priority(usize::try_from(rank).unwrap_or(0))
             .max_attempts(ATTEMPTS)
+            .run_at_timestamp(AT_ONCE_S)
             .idempotency_key(format!("{job}:{pushed}"))
             .build();
         apalis_sqlite::queries::push_tasks(&mut *connection, QUEUE, &[task]).await.map_err(failed)?;

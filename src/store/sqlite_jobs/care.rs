@@ -12,7 +12,7 @@ const TIMINGS: i64 = 1000;
 /// A finished job's record outlives its result by this share of the time that the result is kept.
 const TOMBSTONE: i64 = 1;
 /// Jobs forgotten in one transaction.
-const FORGOTTEN_AT_ONCE: i64 = 500;
+const FORGOTTEN_AT_ONCE: u32 = 500;
 
 pub(super) async fn expire_deadlines(
     connection: &mut SqliteConnection,
@@ -64,23 +64,35 @@ pub(super) async fn sweep(connection: &mut SqliteConnection, live: &[Lease]) -> 
     Ok(back)
 }
 
-pub(super) async fn forget_expired(connection: &mut SqliteConnection, keep_ms: i64, now: i64) -> Outcome<u64> {
+/// What one round of forgetting did.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Forgotten {
+    /// Records that are gone.
+    pub(super) records: u64,
+    /// Whether there may be more of what it looked for.
+    pub(super) is_more: bool,
+}
+
+pub(super) async fn forget_expired(connection: &mut SqliteConnection, keep_ms: i64, now: i64) -> Outcome<Forgotten> {
     // First the input, then, much later, the record: that a job was there is known longer than what it gave.
-    sqlx::query(
+    let emptied = sqlx::query(
         "UPDATE precut_jobs SET input = x'', idempotency = NULL, body_hash = NULL
-         WHERE id IN (SELECT id FROM precut_jobs WHERE expires_ms <= ?1 AND length(input) > 0 LIMIT ?2)",
+         WHERE id IN (SELECT id FROM precut_jobs INDEXED BY precut_jobs_by_expiry_of_input
+                      WHERE expires_ms <= ?1 AND length(input) > 0 LIMIT ?2)",
     )
     .bind(now)
     .bind(FORGOTTEN_AT_ONCE)
     .execute(&mut *connection)
-    .await?;
-    let gone =
+    .await?
+    .rows_affected();
+    let records =
         sqlx::query("DELETE FROM precut_jobs WHERE id IN (SELECT id FROM precut_jobs WHERE expires_ms <= ?1 LIMIT ?2)")
             .bind(now.saturating_sub(keep_ms.saturating_mul(TOMBSTONE)))
             .bind(FORGOTTEN_AT_ONCE)
             .execute(connection)
-            .await?;
-    Ok(gone.rows_affected())
+            .await?
+            .rows_affected();
+    Ok(Forgotten { records, is_more: emptied.max(records) >= u64::from(FORGOTTEN_AT_ONCE) })
 }
 
 pub(super) async fn note_timing(connection: &mut SqliteConnection, timing: &Timing, now: i64) -> Outcome<()> {

@@ -204,12 +204,23 @@ impl JobStore for SqliteStore {
     }
     fn forget_expired(&self) -> BoxFuture<'_, Result<u64, StoreError>> {
         let keep_ms = self.keep_ms;
-        Box::pin(self.ledger.write(move |connection| {
-            Box::pin(async move {
-                queue::forget_done(connection).await?;
-                forget_expired(connection, keep_ms, now_ms()).await
-            })
-        }))
+        Box::pin(async move {
+            let mut records = 0;
+            loop {
+                // One transaction after the other, so that jobs get in between.
+                let round = self.ledger.write(move |connection| {
+                    Box::pin(async move {
+                        queue::forget_done(connection).await?;
+                        forget_expired(connection, keep_ms, now_ms()).await
+                    })
+                });
+                let round = round.await?;
+                records += round.records;
+                if !round.is_more {
+                    return Ok(records);
+                }
+            }
+        })
     }
     fn note_timing(&self, timing: Timing) -> BoxFuture<'_, Result<(), StoreError>> {
         Box::pin(self.ledger.write(move |connection| {
