@@ -9,31 +9,41 @@ use crate::store::jobs::JobId;
 
 /// The jobs somebody waits for.
 #[derive(Default)]
-pub(crate) struct Feeds(Mutex<HashMap<JobId, watch::Sender<()>>>);
+pub(crate) struct Feeds(Mutex<HashMap<JobId, Line>>);
+
+/// Where those who wait for one job hear of it.
+struct Line {
+    news: watch::Sender<()>,
+    /// How many they are. Receivers are counted only after their feed has let go of the lock.
+    feeds: usize,
+}
 
 impl Feeds {
     /// News of a job from now on. Look at its record after this, not before.
     pub(crate) fn subscribe(self: &Arc<Self>, id: JobId) -> Feed {
-        let news = self.lock().entry(id).or_insert_with(|| watch::channel(()).0).subscribe();
+        let mut lines = self.lock();
+        let line = lines.entry(id).or_insert_with(|| Line { news: watch::channel(()).0, feeds: 0 });
+        line.feeds += 1;
+        let news = line.news.subscribe();
         Feed { feeds: Arc::clone(self), id, news }
     }
 
     /// Something about these jobs has changed.
     pub(crate) fn touch(&self, ids: &[JobId]) {
         let feeds = self.lock();
-        for sender in ids.iter().filter_map(|id| feeds.get(id)) {
-            sender.send_replace(());
+        for line in ids.iter().filter_map(|id| feeds.get(id)) {
+            line.news.send_replace(());
         }
     }
 
     /// Any job may have changed.
     pub(crate) fn touch_all(&self) {
-        for sender in self.lock().values() {
-            sender.send_replace(());
+        for line in self.lock().values() {
+            line.news.send_replace(());
         }
     }
 
-    fn lock(&self) -> MutexGuard<'_, HashMap<JobId, watch::Sender<()>>> {
+    fn lock(&self) -> MutexGuard<'_, HashMap<JobId, Line>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -55,9 +65,11 @@ impl Feed {
 
 impl Drop for Feed {
     fn drop(&mut self) {
-        let mut feeds = self.feeds.lock();
-        if feeds.get(&self.id).is_some_and(|sender| sender.receiver_count() <= 1) {
-            feeds.remove(&self.id);
+        let mut lines = self.feeds.lock();
+        let Some(line) = lines.get_mut(&self.id) else { return };
+        line.feeds -= 1;
+        if line.feeds == 0 {
+            lines.remove(&self.id);
         }
     }
 }
