@@ -9,29 +9,35 @@ use axum::http::header::{CACHE_CONTROL, CONTENT_TYPE};
 use axum::http::{Method, StatusCode};
 use axum::response::IntoResponse;
 use metrics::{Counter, Histogram};
-use metrics_exporter_prometheus::{PrometheusBuilder, PrometheusHandle};
+use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusHandle};
 
 use super::App;
 use super::gate::method_label;
 use crate::registry::Registry;
 
-/// Upper edges of the latency classes, s: from an answer out of memory to the largest job.
+/// Upper edges of the latency classes, s: from an answer out of memory to a slow one.
 const LATENCY_S: [f64; 14] =
     [0.000_1, 0.000_25, 0.000_5, 0.001, 0.002_5, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 1.0, 2.5, 10.0];
+/// Upper edges of the classes of a job's computation, s: up to the largest that is taken by default, and beyond.
+const JOB_S: [f64; 12] = [0.01, 0.1, 0.5, 1.0, 5.0, 15.0, 60.0, 300.0, 900.0, 1800.0, 3600.0, 14_400.0];
 
 const JOB: &str = "/v1/jobs/{id}";
 const JOB_RESULT: &str = "/v1/jobs/{id}/result";
 const JOB_EVENTS: &str = "/v1/jobs/{id}/events";
+const MODEL: &str = "/v1/models/{name}";
+const MODEL_COMPARISON: &str = "/v1/models/{name}/comparison";
 const RESULT: &str = "/v1/results/{key}";
 const RESULT_FIGURES: &str = "/v1/results/{key}/figures";
 const RESULT_TABLES: &str = "/v1/results/{key}/tables";
 const RESULT_JOB: &str = "/v1/results/{key}/job";
 
 /// Addresses with a variable part, as they are counted.
-const PATTERNS: [(&str, &str); 13] = [
+const PATTERNS: [(&str, &str); 15] = [
     ("/v1/jobs/", JOB),
     ("/v1/jobs/", JOB_RESULT),
     ("/v1/jobs/", JOB_EVENTS),
+    ("/v1/models/", MODEL),
+    ("/v1/models/", MODEL_COMPARISON),
     ("/v1/results/", RESULT),
     ("/v1/results/", RESULT_FIGURES),
     ("/v1/results/", RESULT_TABLES),
@@ -45,7 +51,7 @@ const PATTERNS: [(&str, &str); 13] = [
 ];
 
 /// Addresses without one, besides the calculators'.
-const PLAIN: [&str; 12] = [
+const PLAIN: [&str; 13] = [
     "/",
     "/docs",
     "/openapi.json",
@@ -54,6 +60,7 @@ const PLAIN: [&str; 12] = [
     "/metrics",
     "/v1/calculators",
     "/v1/jobs",
+    "/v1/models",
     "/v1/results",
     "/v1/materials",
     "/v1/studies",
@@ -140,6 +147,9 @@ fn pattern(path: &str) -> Option<&'static str> {
             _ => JOB,
         });
     }
+    if path.starts_with("/v1/models/") {
+        return Some(if path.ends_with("/comparison") { MODEL_COMPARISON } else { MODEL });
+    }
     if path.starts_with("/v1/results/") {
         let part = path.rsplit('/').next();
         return Some(match part {
@@ -178,7 +188,11 @@ pub(super) async fn get(State(app): State<App>) -> impl IntoResponse {
 fn recorder() -> &'static PrometheusHandle {
     static RECORDER: OnceLock<PrometheusHandle> = OnceLock::new();
     RECORDER.get_or_init(|| {
-        let builder = PrometheusBuilder::new().set_buckets(&LATENCY_S).expect("there are classes");
+        let of_jobs = Matcher::Full("precut_job_seconds".to_owned());
+        let builder = PrometheusBuilder::new()
+            .set_buckets(&LATENCY_S)
+            .and_then(|builder| builder.set_buckets_for_metric(of_jobs, &JOB_S))
+            .expect("there are classes");
         let recorder = builder.build_recorder();
         let handle = recorder.handle();
         if metrics::set_global_recorder(recorder).is_err() {
