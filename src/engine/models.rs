@@ -21,6 +21,9 @@ use crate::store::sqlite_models::SqliteShelf;
 const DIAGNOSIS: &str = "diagnosis";
 /// Names that are looked through for one like an unknown name.
 const NEAR_NAMES: u32 = 1000;
+/// Largest content of a model, bytes. What a diagnosis gives takes some thousands, and models are kept until somebody
+/// deletes them.
+const MOST_CONTENT: usize = 256 << 10;
 
 /// A stored model.
 #[derive(Debug, Clone, PartialEq)]
@@ -157,6 +160,12 @@ impl Engine {
             return Err(ModelError::Invalid(findings));
         }
         let text = content.canonical();
+        if text.len() > MOST_CONTENT {
+            let finding = Finding::new("model_too_large", "").with("bytes", text.len()).with("most", MOST_CONTENT);
+            return Err(ModelError::Invalid(vec![finding]));
+        }
+        // Revisions go on counting after a name was deleted.
+        let is_new = inner.models.model(name.to_owned(), None).await?.is_none();
         let new = NewModel {
             name: name.to_owned(),
             calculator: content.calculator.clone(),
@@ -165,7 +174,6 @@ impl Engine {
             only_new,
         };
         let kept = inner.models.put_model(new).await?.ok_or_else(|| ModelError::Exists(name.to_owned()))?;
-        let is_new = kept.revision == 1;
         Ok(ModelAnswer { model: stored(kept, content), is_new })
     }
 
@@ -246,8 +254,7 @@ async fn find_on<S: ModelShelf + ?Sized>(
 }
 
 async fn names_on<S: ModelShelf + ?Sized>(shelf: &S) -> Result<Vec<String>, Error> {
-    let models = shelf.models(String::new(), NEAR_NAMES).await?;
-    Ok(models.into_iter().map(|model| model.name).collect())
+    Ok(shelf.model_names(NEAR_NAMES).await?)
 }
 
 /// The stored model of a job that is solved without a service.
@@ -323,7 +330,23 @@ fn faults_of_model(registry: &Registry, content: &ModelContent) -> Vec<Finding> 
     }
     let mut faults = Faults::default();
     entry.validate_effects(&json!(content.effects), &mut faults);
+    if faults.listed.is_empty() {
+        for (index, effect) in content.effects.iter().enumerate() {
+            let again = content.effects[..index].iter().any(|before| told_apart_by(before) == told_apart_by(effect));
+            let kind = effect["kind"].as_str().filter(|_| again);
+            faults.listed.extend(kind.map(|kind| {
+                Finding::new("duplicate_effect", format!("/effects/{index}/kind")).with("kind", kind.to_owned())
+            }));
+        }
+    }
     faults.listed
+}
+
+/// The parts of an effect that may make two of one kind different ones: its words, and which wave it is.
+fn told_apart_by(effect: &Value) -> Vec<(&String, &Value)> {
+    const WAVES: [&str; 3] = ["order", "ratio", "waves_per_revolution"];
+    let fields = effect.as_object().into_iter().flatten();
+    fields.filter(|(name, value)| value.is_string() || WAVES.contains(&name.as_str())).collect()
 }
 
 /// Whether an exported model is the one that its hash is of.

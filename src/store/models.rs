@@ -42,6 +42,8 @@ pub trait ModelShelf: Send + Sync + 'static {
     fn model(&self, name: String, revision: Option<u32>) -> BoxFuture<'_, Result<Option<KeptModel>, StoreError>>;
     /// The newest revisions of up to `limit` models whose names follow `after`, by name.
     fn models(&self, after: String, limit: u32) -> BoxFuture<'_, Result<Vec<KeptModel>, StoreError>>;
+    /// The names of up to `limit` models, in order.
+    fn model_names(&self, limit: u32) -> BoxFuture<'_, Result<Vec<String>, StoreError>>;
 }
 
 /// Where models are kept.

@@ -17,6 +17,10 @@ impl ModelShelf for SqliteStore {
     fn models(&self, after: String, limit: u32) -> BoxFuture<'_, Result<Vec<KeptModel>, StoreError>> {
         Box::pin(models_in(&self.readers, after, limit))
     }
+
+    fn model_names(&self, limit: u32) -> BoxFuture<'_, Result<Vec<String>, StoreError>> {
+        Box::pin(names_in(&self.readers, limit))
+    }
 }
 
 /// The models in the database of a data folder, for reading: whoever serves from the folder is not disturbed.
@@ -48,6 +52,10 @@ impl ModelShelf for SqliteShelf {
     fn models(&self, after: String, limit: u32) -> BoxFuture<'_, Result<Vec<KeptModel>, StoreError>> {
         Box::pin(models_in(&self.0, after, limit))
     }
+
+    fn model_names(&self, limit: u32) -> BoxFuture<'_, Result<Vec<String>, StoreError>> {
+        Box::pin(names_in(&self.0, limit))
+    }
 }
 
 async fn model_in(pool: &SqlitePool, name: String, revision: Option<u32>) -> Result<Option<KeptModel>, StoreError> {
@@ -75,6 +83,11 @@ async fn models_in(pool: &SqlitePool, after: String, limit: u32) -> Result<Vec<K
     .fetch_all(pool)
     .await?;
     Ok(rows.into_iter().filter_map(ModelRow::model).collect())
+}
+
+async fn names_in(pool: &SqlitePool, limit: u32) -> Result<Vec<String>, StoreError> {
+    let names = sqlx::query_scalar("SELECT DISTINCT name FROM models WHERE content IS NOT NULL ORDER BY name LIMIT ?1");
+    Ok(names.bind(limit).fetch_all(pool).await?)
 }
 
 impl ModelStore for SqliteStore {

@@ -103,3 +103,62 @@ async fn an_exported_model_is_stored_elsewhere_as_it_was_and_deleted() {
     damaged["effects"][0]["delta_um_per_n"] = json!(0.5);
     assert_eq!(put(&server, "other", &damaged).await, 422);
 }
+
+#[tokio::test]
+async fn what_a_name_held_before_it_was_deleted_is_no_longer_there() {
+    let server = server().await;
+    assert_eq!(put(&server, "winter", &lathe(0.022, 0.020, 0.024)).await, 201);
+    assert_eq!(put(&server, "winter", &lathe(0.023, 0.020, 0.024)).await, 200);
+    let gone = server.client.delete(server.url("/v1/models/winter")).send().await.unwrap();
+    assert_eq!(gone.status(), 204);
+    assert_eq!(put(&server, "winter", &lathe(0.024, 0.020, 0.026)).await, 201);
+    // A revision never means two things.
+    assert_eq!(got(&server, "/v1/models/winter").await["revision"], 3);
+}
+
+#[tokio::test]
+async fn a_model_that_is_too_large_is_refused() {
+    let server = server().await;
+    let mut large = lathe(0.022, 0.020, 0.024);
+    large["provenance"]["note"] = "x".repeat(300_000).into();
+    let request = server.client.put(server.url("/v1/models/large")).header("content-type", "application/json");
+    let response = request.body(large.to_string()).send().await.unwrap();
+    let refused = problem(response, 422, "invalid_model").await;
+    assert_eq!(refused["errors"][0]["code"], "model_too_large");
+    assert!(refused["errors"][0]["detail"].as_str().unwrap().contains("262144"), "{refused}");
+}
+
+/// Its points would all be computed without any model.
+#[tokio::test]
+async fn a_study_does_not_vary_the_model() {
+    let server = server().await;
+    assert_eq!(put(&server, "winter", &lathe(0.022, 0.020, 0.024)).await, 201);
+    let example = Registry::standard().unwrap().entry("deflection-compensation").unwrap().meta().examples[0].job;
+    let job: Value = serde_json::from_str(example).unwrap();
+    let study = json!({
+        "calculator": "deflection-compensation", "job": job,
+        "vary": [{ "pointer": "/model", "values": ["winter", "summer"] }]
+    });
+    let refused =
+        problem(server.post_to("/v1/studies", study.to_string()).send().await.unwrap(), 422, "invalid_job").await;
+    let faults: Vec<_> =
+        refused["errors"].as_array().unwrap().iter().map(|fault| (&fault["code"], &fault["pointer"])).collect();
+    assert_eq!(faults, [(&json!("model_not_variable"), &json!("/vary/0/pointer"))]);
+}
+
+#[tokio::test]
+async fn a_model_has_each_effect_once() {
+    let server = server().await;
+    let mut twice = lathe(0.022, 0.020, 0.024);
+    let effect = twice["effects"][0].clone();
+    twice["effects"].as_array_mut().unwrap().push(effect);
+    let request = server.client.put(server.url("/v1/models/twice")).header("content-type", "application/json");
+    let refused = problem(request.body(twice.to_string()).send().await.unwrap(), 422, "invalid_model").await;
+    assert_eq!(refused["errors"][0]["code"], "duplicate_effect");
+    assert_eq!(refused["errors"][0]["pointer"], "/effects/1/kind");
+    // Waves of different orders are different effects.
+    let wave =
+        |order: u32| json!({ "kind": "initial_harmonic", "order": order, "amplitude_mm": 0.01, "phase_rad": 0.0 });
+    let waves = json!({ "calculator": "ring-roundness", "effects": [wave(3), wave(5)], "provenance": null });
+    assert_eq!(put(&server, "waves", &waves).await, 201);
+}

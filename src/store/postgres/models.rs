@@ -36,6 +36,16 @@ impl ModelShelf for PostgresStore {
             Ok(rows.into_iter().filter_map(ModelRow::model).collect())
         })
     }
+
+    fn model_names(&self, limit: u32) -> BoxFuture<'_, Result<Vec<String>, StoreError>> {
+        Box::pin(async move {
+            let names = sqlx::query_scalar(
+                "SELECT DISTINCT name COLLATE \"C\" AS name FROM precut.models WHERE content IS NOT NULL
+                 ORDER BY name LIMIT $1",
+            );
+            Ok(names.bind(i64::from(limit)).fetch_all(&self.pool).await?)
+        })
+    }
 }
 
 impl ModelStore for PostgresStore {
