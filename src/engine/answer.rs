@@ -114,6 +114,14 @@ impl Stored {
         }
         super::envelope::in_language(&self.body, language).into()
     }
+    /// A word or a number of the envelope itself, as text.
+    pub fn said(&self, name: &str) -> Option<String> {
+        let place = super::json::top_level_field(&self.body, name)?;
+        match serde_json::from_slice(&self.body[place]).ok()? {
+            Value::String(word) => Some(word),
+            other => Some(other.to_string()),
+        }
+    }
     /// Which calculator made it.
     pub fn entry(&self) -> &Arc<Entry> {
         &self.entry

@@ -17,7 +17,7 @@ use serde::Deserialize;
 use super::negotiate::{self, Media};
 use super::problem::Problem;
 use super::{CACHE_STATE, codes};
-use crate::engine::{CacheState, Stored, Timings};
+use crate::engine::{CacheState, ENGINE_VERSION, Stored, Timings};
 use crate::render;
 use crate::text::{Glossary, Language, Texts, fingerprint};
 
@@ -90,8 +90,12 @@ impl View {
         tag.push_str(stored.key.to_string().trim_start_matches("b3:"));
         let part = self.part.as_deref().unwrap_or_default();
         let _ = write!(tag, "-{}-{part}-{}", self.media.short(), self.language.tag());
-        // What is put into words when it is asked for changes with the words.
-        if self.media == Media::Svg || (self.media == Media::Json && self.language != Language::default()) {
+        // What is made when it is asked for changes with what makes it,
+        if self.media != Media::Json {
+            let _ = write!(tag, "-{ENGINE_VERSION}");
+        }
+        // and what is put into words then, with the words.
+        if self.media == Media::Svg || self.language != Language::default() {
             let _ = write!(tag, "-{}", fingerprint(self.language));
         }
         tag.push('"');
@@ -229,11 +233,11 @@ pub(super) fn label(figure: &Figure, code: &str, language: Language) -> String {
     }
 }
 
-/// Comments at the head of a program: what it is and where it comes from.
+/// Comments at the head of a program: what computed its path, perhaps long ago, and where it comes from.
 fn program_header(stored: &Stored) -> Vec<String> {
-    let meta = stored.entry().meta();
+    let said = |name| stored.said(name).unwrap_or_default();
     vec![
-        format!("precut {} {} version {}", env!("CARGO_PKG_VERSION"), meta.id, meta.version),
+        format!("precut {} {} version {}", said("engine"), said("calculator"), said("version")),
         format!("result {}", stored.key),
     ]
 }
