@@ -10,7 +10,7 @@ use super::faults;
 use super::input::{Combine, Spacing, StudyInput, Variable};
 use super::place;
 use super::plan::{Found, Output, Planned};
-use crate::engine::read;
+use crate::engine::{model, read};
 use crate::registry::Entry;
 
 /// What can be told without the calculator: how many values each variable has, and what is wrong with that.
@@ -93,6 +93,10 @@ fn variable(entry: &Entry, job: &Value, index: usize, variable: &Variable, found
         found.push(faults::bad_pointer(at, &variable.pointer));
         return None;
     };
+    if model::is_its_place(entry, &tokens) {
+        found.push(Finding::new("model_not_variable", at));
+        return None;
+    }
     let field = match place::field(entry.strict_input(), Some(job), &tokens) {
         Ok(field) if field.is_scalar() => field,
         Ok(_) => {

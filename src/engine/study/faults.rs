@@ -14,6 +14,7 @@ pub(crate) const FAULTS: &[&str] = &[
     "duplicate_variable",
     "empty_range",
     "log_not_positive",
+    "model_not_variable",
     "no_outputs",
     "no_such_field",
     "no_such_item",
