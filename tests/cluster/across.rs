@@ -123,3 +123,55 @@ async fn the_database_restarts_under_load_and_nothing_is_lost() {
     worker.stop();
     api.stop();
 }
+
+#[tokio::test]
+async fn what_is_computed_says_that_it_lives_whoever_is_waited_for() {
+    let Some(database) = Database::start() else { return };
+    let api = Member::start(&database, "api", &[]).await;
+    let worker = Member::start(&database, "worker", &[("PRECUT_JOBS_SLOTS", "2")]).await;
+    let mut addresses = Vec::new();
+    for length in [600, 601] {
+        let long = json!({"length_mm": length, "load_n": 10, "duration_ms": 120_000});
+        addresses.push(api.accepted(BAR, &long).await);
+    }
+    for address in &addresses {
+        api.job_in(address, "running").await;
+    }
+    // Somebody holds the lock of the first and does not get on, and its deadline passes: everyone waits for him.
+    let pool = database.pool().await;
+    let mut hold = pool.begin().await.unwrap();
+    let id = addresses[0].rsplit('/').next().unwrap();
+    sqlx::query("SELECT pg_advisory_xact_lock(precut.lock_of(key)) FROM precut.jobs WHERE id = $1")
+        .bind(id)
+        .execute(&mut *hold)
+        .await
+        .unwrap();
+    let passed = "UPDATE precut.jobs SET deadline_ms = precut.now_ms() WHERE id = $1";
+    sqlx::query(passed).bind(id).execute(&pool).await.unwrap();
+    until("both to wait", async || {
+        let waiting =
+            "SELECT count(*) FROM pg_stat_activity WHERE wait_event_type = 'Lock' AND wait_event = 'advisory'";
+        let waiting: i64 = sqlx::query_scalar(waiting).fetch_one(&pool).await.unwrap();
+        (waiting >= 2).then_some(())
+    })
+    .await;
+    let (begun, mut most_ms) = (Instant::now(), 0_i64);
+    // Longer than a lease.
+    while begun.elapsed() < Duration::from_secs(6) {
+        let silent = "SELECT max(precut.now_ms() - heartbeat_ms) FROM precut.jobs WHERE state = 'running'";
+        let silent: Option<i64> = sqlx::query_scalar(silent).fetch_one(&pool).await.unwrap();
+        most_ms = most_ms.max(silent.unwrap());
+        tokio::time::sleep(Duration::from_millis(100)).await;
+    }
+    println!("beats while everything else waits for a lock: silent for {most_ms} ms at most");
+    assert!(most_ms < 3500, "silent for {most_ms} ms");
+    hold.rollback().await.unwrap();
+    assert_eq!(api.job_in(&addresses[0], "failed").await["problem"]["code"], "deadline_exceeded");
+    let other = api.job(&addresses[1]).await;
+    assert_eq!((&other["state"], &other["attempt"]), (&json!("running"), &json!(1)));
+    // What is computed when its process is stopped is in line again at once, and not charged.
+    worker.stop();
+    let other = api.job(&addresses[1]).await;
+    assert_eq!((&other["state"], &other["attempt"]), (&json!("queued"), &json!(0)));
+    api.stop();
+}

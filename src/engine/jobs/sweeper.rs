@@ -10,6 +10,8 @@ use crate::engine::{Error, Inner};
 
 /// How often progress is written.
 const BEAT: Duration = Duration::from_secs(1);
+/// At the end, how often there is a look whether anything is still computed.
+const LOOK: Duration = Duration::from_millis(20);
 /// Beats between two looks for lost jobs. Where processes share a store every beat: one of them may have died.
 const SWEEP: u64 = 5;
 /// Beats between two counts.
@@ -22,9 +24,40 @@ const LONGEST_SLEEP: Duration = Duration::from_mins(1);
 const LONGEST_SLEEP_SHARED: Duration = Duration::from_secs(5);
 
 pub(super) async fn run(engine: Weak<Inner>) {
+    let beating = tokio::spawn(keep_beating(Weak::clone(&engine)));
+    look_after(engine).await;
+    let _ = beating.await;
+}
+
+/// Says of what is computed here that it lives, until the last of it is back in line. A task of its own: a lease lasts
+/// for a few beats, and the rest may wait for longer than that, for a lock that somebody holds who was stopped.
+async fn keep_beating(engine: Weak<Inner>) {
+    let mut beat = beat();
+    loop {
+        let Some(engine) = engine.upgrade() else { return };
+        tokio::select! {
+            () = ended(&engine) => return,
+            _ = beat.tick() => beats(&engine).await,
+        }
+    }
+}
+
+/// Waits until no more is taken up and nothing is computed any more.
+async fn ended(engine: &Arc<Inner>) {
+    engine.jobs.stopped().await;
+    while !engine.jobs.computations.leases().is_empty() {
+        tokio::time::sleep(LOOK).await;
+    }
+}
+
+fn beat() -> tokio::time::Interval {
     let mut beat = tokio::time::interval(BEAT);
     beat.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
-    let (mut count, mut due) = (0_u64, Instant::now());
+    beat
+}
+
+async fn look_after(engine: Weak<Inner>) {
+    let (mut beat, mut count, mut due) = (beat(), 0_u64, Instant::now());
     loop {
         let Some(engine) = engine.upgrade() else { return };
         let jobs = &engine.jobs;
@@ -32,7 +65,6 @@ pub(super) async fn run(engine: Weak<Inner>) {
             () = jobs.stopped() => return,
             _ = beat.tick() => {
                 count += 1;
-                beats(&engine).await;
                 if jobs.store.is_shared() || count.is_multiple_of(SWEEP) {
                     sweep(&engine).await;
                 }
