@@ -98,7 +98,8 @@ pub trait ResultStore: Send + Sync + 'static {
     fn ping(&self) -> BoxFuture<'_, Result<(), StoreError>>;
     /// Writes what waits and closes.
     fn close(&self) -> BoxFuture<'_, ()>;
-    /// Puts a part of a study down. On return it outlasts the process, and so do the results of its points.
+    /// Puts a part of a study down. On return it outlasts the process, and so do the results of its points; where they
+    /// are not written in time, it fails, and may be tried again.
     fn put_shard(&self, _study: Key, _shard: u32, _content: Bytes) -> BoxFuture<'_, Result<(), StoreError>> {
         Box::pin(async { Ok(()) })
     }

@@ -17,7 +17,7 @@ use super::ledger::Ledger;
 use super::queue::{self, Tasks};
 use super::row::ResultRow;
 use super::sqlite_jobs;
-use super::writer::{Limits, Writer};
+use super::writer::{LIST_PATIENCE, Limits, Writer};
 use super::{Cursor, KeptResult, ResultPage, ResultQuery, ResultStore, ResultSummary, StoreError};
 use crate::key::Key;
 
@@ -152,7 +152,7 @@ impl SqliteStore {
     }
 
     async fn page(&self, query: ResultQuery) -> Result<ResultPage, StoreError> {
-        self.writer.flush().await;
+        self.writer.flush(LIST_PATIENCE).await;
         let limit = query.limit.unwrap_or(ResultQuery::LIMIT).clamp(1, ResultQuery::MOST);
         let after = query.after.map(|cursor| (cursor.created_ms, cursor.key.as_bytes().to_vec()));
         let (created_ms, key) = after.unwrap_or((i64::MAX, vec![0xff; 32]));

@@ -4,6 +4,7 @@ use bytes::Bytes;
 
 use super::jobs::MOST_ATTEMPTS;
 use super::sqlite::SqliteStore;
+use super::writer::PART_PATIENCE;
 use super::{StoreError, now_ms};
 use crate::key::Key;
 
@@ -15,7 +16,9 @@ impl SqliteStore {
     pub(super) async fn put_down_shard(&self, study: Key, shard: u32, content: Bytes) -> Result<(), StoreError> {
         let packed = zstd::bulk::compress(&content, LEVEL).map_err(|error| StoreError::Failed(error.to_string()))?;
         let checksum = blake3::hash(&packed);
-        self.writer.flush().await;
+        if !self.writer.flush(PART_PATIENCE).await {
+            return Err(StoreError::Failed("the results of its points are not written yet".to_owned()));
+        }
         self.ledger
             .write(move |connection| {
                 let packed = packed.clone();

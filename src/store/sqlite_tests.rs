@@ -97,7 +97,7 @@ async fn a_locked_database_fails_no_put_and_no_get() {
     let folder = tempfile::tempdir().unwrap();
     let store = store(&folder, 1 << 30).await;
     store.put(result(1, "a"));
-    store.writer.flush().await;
+    assert!(store.writer.flush(Duration::from_mins(1)).await);
     let options = SqliteConnectOptions::new().filename(folder.path().join(DATABASE));
     let other = SqlitePool::connect_with(options).await.unwrap();
     let locked = other.begin_with("BEGIN EXCLUSIVE").await.unwrap();
@@ -106,6 +106,6 @@ async fn a_locked_database_fails_no_put_and_no_get() {
     assert_eq!(store.get(result(1, "a").key).await.unwrap(), Some(result(1, "a")));
     drop(locked);
     other.close().await;
-    store.writer.flush().await;
+    assert!(store.writer.flush(Duration::from_mins(1)).await);
     assert_eq!(store.get(result(2, "a").key).await.unwrap(), Some(result(2, "a")));
 }

@@ -31,8 +31,9 @@ const REST_PER_WORK: u32 = 4;
 const REST: (Duration, Duration) = (Duration::from_millis(20), Duration::from_millis(250));
 /// How often age is looked at.
 const SWEEP_EVERY: Duration = Duration::from_mins(10);
-/// How long a list waits for what is just being written.
-const FLUSH_TIMEOUT: Duration = Duration::from_secs(1);
+/// How long a list waits for what is just being written, and a part of a study for the results of its points.
+pub(super) const LIST_PATIENCE: Duration = Duration::from_secs(1);
+pub(super) const PART_PATIENCE: Duration = Duration::from_secs(5);
 /// Rows deleted in one transaction.
 const EVICTED_AT_ONCE: i64 = 256;
 /// Eviction goes down to this share of the limit, so that it does not run for every result.
@@ -87,7 +88,7 @@ enum Order {
     Put(Arc<KeptResult>),
     Touch(Key),
     Forget(Key),
-    Flush(oneshot::Sender<()>),
+    Flush(oneshot::Sender<bool>),
     Close,
 }
 
@@ -147,16 +148,18 @@ impl Writer {
         let _ = self.orders.try_send(Order::Forget(key));
     }
 
-    /// Waits until everything ordered so far is written, but not for a disk that does not get on.
-    pub(super) async fn flush(&self) {
+    /// Waits until everything ordered so far is written, but no longer than that: the disk may not get on. Whether it
+    /// is written.
+    pub(super) async fn flush(&self, most: Duration) -> bool {
         let (sender, done) = oneshot::channel();
         let written = async {
-            if self.orders.send(Order::Flush(sender)).await.is_ok() {
-                self.desk.hurry.notify_one();
-                let _ = done.await;
+            if self.orders.send(Order::Flush(sender)).await.is_err() {
+                return false;
             }
+            self.desk.hurry.notify_one();
+            done.await.unwrap_or(false)
         };
-        let _ = tokio::time::timeout(FLUSH_TIMEOUT, written).await;
+        tokio::time::timeout(most, written).await.unwrap_or(false)
     }
 
     pub(super) async fn close(&self) {
@@ -189,7 +192,7 @@ struct Group {
     put: Vec<Arc<KeptResult>>,
     touched: Vec<Key>,
     forgotten: Vec<Key>,
-    flushed: Vec<oneshot::Sender<()>>,
+    flushed: Vec<oneshot::Sender<bool>>,
     close: bool,
 }
 
@@ -238,9 +241,11 @@ impl Clerk {
 
     async fn carry_out(&mut self, group: Group) {
         let orders = group.put.len() + group.touched.len() + group.forgotten.len();
+        let mut written = true;
         if orders > 0
             && let Err(reason) = self.write(&group.put, &group.touched, &group.forgotten).await
         {
+            written = false;
             metrics::counter!("precut_store_failures_total", "operation" => "write").increment(1);
             tracing::warn!(orders, reason, "results are not kept");
         }
@@ -249,7 +254,7 @@ impl Clerk {
             self.report("evict", Self::evict).await;
         }
         for flushed in group.flushed {
-            let _ = flushed.send(());
+            let _ = flushed.send(written);
         }
     }
 

@@ -119,3 +119,35 @@ async fn a_study_survives_whoever_runs_it_and_whoever_helps() {
     }
     println!("a study that was cancelled: no part of it is put down later than {:.1?}", last.1.duration_since(begun));
 }
+
+#[tokio::test]
+async fn a_study_goes_on_after_the_database_was_away_for_longer_than_its_parts_wait() {
+    let Some(mut database) = Database::start() else { return };
+    let api = Member::start(&database, "api", &[]).await;
+    // One worker: nobody else takes what it could not put down.
+    let worker = Member::start(&database, "worker", &[("PRECUT_JOBS_SLOTS", "1")]).await;
+    let address = api.accepted(STUDIES, &study(60, 100)).await;
+    api.job_in(&address, "running").await;
+    let pool = database.pool().await;
+    until("some parts", async || {
+        let done = "SELECT count(*) FROM precut.studies WHERE points IS NOT NULL";
+        let done: i64 = sqlx::query_scalar(done).fetch_one(&pool).await.unwrap();
+        (done >= 2).then_some(())
+    })
+    .await;
+    pool.close().await;
+    database.stop("immediate");
+    tokio::time::sleep(Duration::from_secs(12)).await;
+    database.run_again();
+    let begun = Instant::now();
+    let job = api.job_in(&address, "succeeded").await;
+    println!("a study whose database was away: done {:.1?} after its return", begun.elapsed());
+    assert_eq!(job["attempt"], 1, "nobody was taken for dead: {job}");
+    let result: Value = api.get(&format!("{address}/result")).await.json().await.unwrap();
+    assert_eq!((&result["result"]["succeeded"], &result["result"]["failed"]), (&json!(60), &json!(0)));
+    let pool = database.pool().await;
+    let left: i64 = sqlx::query_scalar("SELECT count(*) FROM precut.studies").fetch_one(&pool).await.unwrap();
+    assert_eq!(left, 0, "what is done leaves no parts behind");
+    worker.stop();
+    api.stop();
+}

@@ -47,6 +47,9 @@ struct Work {
     crashed: AtomicBool,
     done: Mutex<Done>,
     changed: Condvar,
+    /// Parts that are done and in our hands, but could not be put down. That is tried again when another one was put
+    /// down or none is left to be taken; who gave them back at once would only be given them again.
+    owed: Mutex<Vec<usize>>,
 }
 
 struct Done {
@@ -59,13 +62,18 @@ impl Work {
         self.done.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    fn owed(&self) -> MutexGuard<'_, Vec<usize>> {
+        self.owed.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     fn is_large(&self) -> bool {
         self.plan.cost.ms >= LARGE_MS
     }
 
     fn add(&self, index: usize, shard: Shard) {
         let mut done = self.done();
-        if done.shards[index].replace(shard).is_none() {
+        // None is left where the study has been put together meanwhile.
+        if done.shards.get_mut(index).is_some_and(|place| place.replace(shard).is_none()) {
             done.missing -= 1;
         }
         drop(done);
@@ -85,6 +93,7 @@ impl Work {
             crashed: AtomicBool::new(false),
             done: Mutex::new(Done { shards: vec![None; shards], missing: shards }),
             changed: Condvar::new(),
+            owed: Mutex::default(),
         }
     }
 
@@ -99,10 +108,16 @@ impl Work {
                 return None;
             }
             let index = if self.shared {
+                if self.done().missing == 0 {
+                    return None;
+                }
                 let Ok(index) = self.host.take(&self.key, self.plan.shards()) else {
                     std::thread::sleep(PAUSE);
                     continue;
                 };
+                if index.is_none() {
+                    self.pay();
+                }
                 index?
             } else {
                 self.next.fetch_add(1, Ordering::Relaxed)
@@ -110,11 +125,32 @@ impl Work {
             if index >= self.plan.shards() {
                 return None;
             }
-            let held = Held { work: self, index, is_down: !self.shared };
-            if self.done().shards[index].is_none() {
-                return Some(held);
+            if self.done().shards.get(index).is_some_and(Option::is_none) {
+                return Some(Held { work: self, index, is_done: !self.shared });
+            }
+            if self.shared {
+                // Somebody else had it meanwhile and has given it up.
+                self.owed().push(index);
             }
         }
+    }
+
+    /// Puts a shard down; whether it is.
+    fn put(&self, index: usize, shard: &Shard) -> bool {
+        serde_json::to_vec(shard).is_ok_and(|content| self.host.put(&self.key, index, content.into()))
+    }
+
+    /// Puts down what could not be put down before, as far as that goes.
+    fn pay(&self) {
+        let mut owed = std::mem::take(&mut *self.owed());
+        while let Some(index) = owed.pop() {
+            let shard = self.done().shards.get(index).cloned().flatten();
+            if !shard.is_some_and(|shard| self.put(index, &shard)) {
+                owed.push(index);
+                break;
+            }
+        }
+        self.owed().append(&mut owed);
     }
 
     /// Computes shards until none is left, or until `go_on` says no; that is asked after each shard, and `told` is
@@ -132,13 +168,16 @@ impl Work {
                 self.changed.notify_all();
                 return false;
             };
-            if self.is_large()
-                && let Ok(content) = serde_json::to_vec(&shard)
-            {
-                held.is_down |= self.host.put(&self.key, index, content.into());
-            }
+            // Before it counts: with the last one the study is put together, and its parts are forgotten.
+            let is_down = self.is_large() && self.put(index, &shard);
+            held.is_done = true;
             drop(held);
             self.add(index, shard);
+            if is_down {
+                self.pay();
+            } else if self.is_large() {
+                self.owed().push(index);
+            }
             if !go_on() {
                 return false;
             }
@@ -227,16 +266,25 @@ impl Work {
     }
 }
 
-/// A shard in somebody's hands, until it is put down or given back.
+impl Drop for Work {
+    fn drop(&mut self) {
+        let owed = std::mem::take(&mut *self.owed());
+        for index in owed {
+            self.host.give_back(&self.key, index);
+        }
+    }
+}
+
+/// A shard in somebody's hands, until it is done or given back.
 struct Held<'w> {
     work: &'w Work,
     index: usize,
-    is_down: bool,
+    is_done: bool,
 }
 
 impl Drop for Held<'_> {
     fn drop(&mut self) {
-        if !self.is_down {
+        if !self.is_done {
             self.work.host.give_back(&self.work.key, self.index);
         }
     }
@@ -329,4 +377,154 @@ pub(crate) fn help(
 ) -> bool {
     let work = Work::new(plan, host, key);
     work.shared && !work.share(monitor, go_on, || {})
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use std::collections::{BTreeMap, BTreeSet};
+
+    use bytes::Bytes;
+    use precut_calc::calculator::Unwatched;
+    use serde_json::json;
+
+    use super::*;
+    use crate::engine::answer::Stored;
+    use crate::engine::error::Error;
+    use crate::engine::memory::Kept;
+    use crate::engine::read::Ready;
+    use crate::engine::study::Alone;
+    use crate::registry::toy;
+
+    const PARTS: usize = 3;
+
+    /// A store that several processes share, as one of them sees it.
+    #[derive(Default)]
+    struct Book {
+        free: BTreeSet<usize>,
+        down: BTreeMap<usize, Bytes>,
+        given_back: Vec<usize>,
+        taken: usize,
+        /// So many parts more are not taken down.
+        refused: usize,
+        /// What is said to be down counts for nothing, as somebody else has the part; he gives it up at once.
+        lost: Option<usize>,
+        /// A part in another's hands, who puts it down when that other one is down.
+        elsewhere: Option<(usize, Bytes, usize)>,
+    }
+
+    struct Shared(Mutex<Book>);
+
+    impl Shared {
+        fn with(book: Book) -> Arc<Self> {
+            let busy = book.elsewhere.as_ref().map(|(part, ..)| *part);
+            let free = (0..PARTS).filter(|part| Some(*part) != busy).collect();
+            Arc::new(Self(Mutex::new(Book { free, ..book })))
+        }
+
+        fn book(&self) -> MutexGuard<'_, Book> {
+            self.0.lock().unwrap()
+        }
+
+        /// Runs a study of three parts in it, each a point.
+        fn run(self: &Arc<Self>) -> Vec<Shard> {
+            let host: Arc<dyn Host> = Arc::<Self>::clone(self);
+            run(&plan(), &host, Key::from_bytes(&[7; 32]).unwrap(), &Unwatched).unwrap()
+        }
+    }
+
+    impl Host for Shared {
+        fn kept(&self, _key: &Key) -> Option<Kept> {
+            None
+        }
+        fn keep(&self, ready: &Ready, outcome: Result<Stored, Error>, took: Duration) -> Result<Arc<Stored>, Error> {
+            Alone.keep(ready, outcome, took)
+        }
+        fn help(&self, _most: usize, _work: &Arc<Help>) {}
+        fn put_down(&self, _study: &Key) -> Vec<(usize, Bytes)> {
+            Vec::new()
+        }
+        fn put(&self, _study: &Key, shard: usize, content: Bytes) -> bool {
+            let mut book = self.book();
+            if book.lost == Some(shard) {
+                book.lost = None;
+                book.free.insert(shard);
+                return true;
+            }
+            if book.refused > 0 {
+                book.refused -= 1;
+                return false;
+            }
+            book.down.insert(shard, content);
+            true
+        }
+        fn is_shared(&self) -> bool {
+            true
+        }
+        fn take(&self, _study: &Key, _of: usize) -> Result<Option<usize>, ()> {
+            let mut book = self.book();
+            book.taken += 1;
+            Ok(book.free.pop_first())
+        }
+        fn give_back(&self, _study: &Key, shard: usize) {
+            let mut book = self.book();
+            book.given_back.push(shard);
+            book.free.insert(shard);
+        }
+        fn collect(&self, _study: &Key, wanted: Vec<usize>) -> Vec<(usize, Bytes)> {
+            let book = self.book();
+            let put =
+                book.elsewhere.iter().filter(|(part, _, after)| wanted.contains(part) && book.down.contains_key(after));
+            put.map(|(part, content, _)| (*part, content.clone())).collect()
+        }
+        fn forget(&self, _study: &Key) {}
+    }
+
+    fn plan() -> Arc<Plan> {
+        let study = json!({
+            "calculator": "toy-bar",
+            "job": {"segments": [{"diameter_mm": 20}], "work_ms": 300},
+            "vary": [{"pointer": "/length_mm", "values": [100, 200, 300]}],
+        });
+        let plan = Plan::new(&toy::registry(), 100, serde_json::from_value(study).unwrap()).unwrap();
+        assert_eq!(plan.shards(), PARTS);
+        Arc::new(plan)
+    }
+
+    fn computed(index: usize) -> Shard {
+        let plan = plan();
+        Shard::compute(&plan, plan.shard(index), &Alone, &Unwatched, || {}).unwrap()
+    }
+
+    #[test]
+    fn parts_that_could_not_be_put_down_are_put_down_with_the_next() {
+        let shared = Shared::with(Book { refused: 2, ..Book::default() });
+        assert_eq!(shared.run(), (0..PARTS).map(computed).collect::<Vec<_>>());
+        let book = shared.book();
+        assert_eq!((book.down.len(), book.taken, book.given_back.len()), (PARTS, PARTS, 0));
+    }
+
+    #[test]
+    fn a_study_that_is_complete_ends_though_nothing_can_be_put_down() {
+        let shared = Shared::with(Book { refused: usize::MAX, ..Book::default() });
+        assert_eq!(shared.run().len(), PARTS);
+        let mut book = shared.book();
+        book.given_back.sort_unstable();
+        assert_eq!((book.down.len(), book.taken, book.given_back.as_slice()), (0, PARTS, &[0, 1, 2][..]));
+    }
+
+    #[test]
+    fn a_part_that_comes_back_when_it_is_done_is_put_down_again_without_haste() {
+        let elsewhere = (2, serde_json::to_vec(&computed(2)).unwrap().into(), 0);
+        let shared = Shared::with(Book { lost: Some(0), elsewhere: Some(elsewhere), ..Book::default() });
+        assert_eq!(shared.run(), (0..PARTS).map(computed).collect::<Vec<_>>());
+        assert!(shared.book().taken < 10, "{} asked for", shared.book().taken);
+        // The same where that fails at first: it is tried once a second.
+        let elsewhere = (2, serde_json::to_vec(&computed(2)).unwrap().into(), 0);
+        let shared = Shared::with(Book { lost: Some(0), elsewhere: Some(elsewhere), ..Book::default() });
+        shared.book().refused = 2;
+        let begun = Instant::now();
+        assert_eq!(shared.run(), (0..PARTS).map(computed).collect::<Vec<_>>());
+        assert!(begun.elapsed() >= RETAKE && shared.book().taken < 10, "{} asked for", shared.book().taken);
+    }
 }

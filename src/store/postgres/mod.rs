@@ -48,6 +48,8 @@ pub(crate) struct Patience {
     pub(crate) grace: Duration,
     /// Between two looks for jobs without a task.
     pub(crate) lost: Duration,
+    /// A part of a study waits so long for the results of its points to be written.
+    pub(crate) points: Duration,
 }
 
 impl Default for Patience {
@@ -57,6 +59,7 @@ impl Default for Patience {
             lease: Duration::from_secs(4),
             grace: Duration::from_secs(8),
             lost: Duration::from_secs(5),
+            points: Duration::from_secs(5),
         }
     }
 }

@@ -8,6 +8,7 @@ use sqlx::postgres::{PgConnection, PgPool, Postgres};
 
 use super::PostgresStore;
 use super::record::{Outcome, column, count};
+use super::writer::LIST_PATIENCE;
 use crate::key::Key;
 use crate::store::row::ResultRow;
 use crate::store::{Cursor, KeptResult, ResultPage, ResultQuery, ResultSummary, StoreError};
@@ -50,7 +51,7 @@ impl PostgresStore {
     }
 
     pub(super) async fn page(&self, query: ResultQuery) -> Result<ResultPage, StoreError> {
-        self.writer.flush().await;
+        self.writer.flush(LIST_PATIENCE).await;
         let limit = query.limit.unwrap_or(ResultQuery::LIMIT).clamp(1, ResultQuery::MOST);
         let mut statement = QueryBuilder::<Postgres>::new(
             "SELECT key, calculator, version, engine, bytes, created_ms FROM precut.results WHERE true",

@@ -111,11 +111,14 @@ impl PostgresStore {
         });
     }
 
-    /// Puts a part down, unless it was given to somebody else meanwhile. The results of its points are written before.
+    /// Puts a part down, unless it was given to somebody else meanwhile. The results of its points are written before: a
+    /// part that is down is not computed again, and so its points would have no answers.
     pub(super) async fn put_down(&self, study: Key, shard: u32, content: Bytes) -> Result<(), StoreError> {
         let packed = zstd::bulk::compress(&content, LEVEL).map_err(|error| StoreError::Failed(error.to_string()))?;
         let checksum = blake3::hash(&packed);
-        self.writer.flush().await;
+        if !self.writer.flush(self.patience.points).await {
+            return Err(StoreError::Failed("the results of its points are not written yet".to_owned()));
+        }
         sqlx::query(
             "INSERT INTO precut.studies AS part (study, shard, holder, beat_ms, points, checksum, created_ms)
              VALUES ($1, $2, $3, precut.now_ms(), $4, $5, precut.now_ms())

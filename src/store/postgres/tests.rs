@@ -22,6 +22,7 @@ const AT_ONCE: Patience = Patience {
     lease: Duration::from_secs(4),
     grace: Duration::ZERO,
     lost: Duration::ZERO,
+    points: Duration::from_secs(5),
 };
 
 fn server() -> Option<String> {
@@ -323,6 +324,30 @@ shared! {
         place.store.put_shard(study, 1, "one".into()).await.unwrap();
         other.put_shard(study, 1, "later".into()).await.unwrap();
         assert_eq!(place.store.shards(study).await.unwrap(), [(0, "zero".into()), (1, "one".into())]);
+    }
+
+    async fn a_part_of_a_study_is_not_put_down_before_the_results_of_its_points() {
+        let place = InDatabase::new().await;
+        let patience = Patience { points: Duration::from_millis(300), ..AT_ONCE };
+        let hasty = PostgresStore::open(&secret(&place.name), Use { patience, ..usage(place.keep) }).await.unwrap();
+        let study = key(1);
+        assert_eq!(hasty.take_shard(study, 1).await.unwrap(), Taken::Shard(0));
+        let mut hold = place.runtime_pool.begin().await.unwrap();
+        sqlx::query("LOCK TABLE precut.results IN EXCLUSIVE MODE").execute(&mut *hold).await.unwrap();
+        hasty.put(result(1));
+        assert!(matches!(hasty.put_shard(study, 0, "zero".into()).await, Err(StoreError::Failed(_))));
+        assert_eq!(place.store.shards(study).await.unwrap(), []);
+        assert!(hasty.held_parts().contains(&(study, 0)), "it is still in its hands");
+        assert_eq!(place.store.take_shard(study, 1).await.unwrap(), Taken::NoneLeft);
+        hold.rollback().await.unwrap();
+        let mut tried = 0;
+        while let Err(error) = hasty.put_shard(study, 0, "zero".into()).await {
+            tried += 1;
+            assert!(tried < 30, "{error}");
+        }
+        assert_eq!(place.store.shards(study).await.unwrap(), [(0, "zero".into())]);
+        assert_eq!(place.store.get(result(1).key).await.unwrap(), Some(result(1)));
+        assert!(hasty.held_parts().is_empty());
     }
 
     async fn jobs_of_an_earlier_version_are_taken_over_when_it_has_no_workers() {

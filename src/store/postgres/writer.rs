@@ -31,7 +31,7 @@ const REST: Duration = Duration::from_millis(10);
 const PAUSE: Duration = Duration::from_millis(500);
 const ATTEMPTS: u32 = 120;
 /// How long a list waits for what is just being written.
-const FLUSH_TIMEOUT: Duration = Duration::from_secs(1);
+pub(super) const LIST_PATIENCE: Duration = Duration::from_secs(1);
 /// How often there is a look at age and size, and after so many bytes of new results.
 const SWEEP_EVERY: Duration = Duration::from_mins(10);
 
@@ -121,15 +121,12 @@ impl Writer {
         let _ = self.orders.try_send(Order::Forget(key));
     }
 
-    /// Waits until everything ordered so far is written, but not for a database that does not get on.
-    pub(super) async fn flush(&self) {
+    /// Waits until everything ordered so far is written, but no longer than that: the database may not get on. Whether
+    /// it is written.
+    pub(super) async fn flush(&self, most: Duration) -> bool {
         let (sender, done) = oneshot::channel();
-        let written = async {
-            if self.orders.send(Order::Flush(sender)).await.is_ok() {
-                let _ = done.await;
-            }
-        };
-        let _ = tokio::time::timeout(FLUSH_TIMEOUT, written).await;
+        let written = async { self.orders.send(Order::Flush(sender)).await.is_ok() && done.await.unwrap_or(false) };
+        tokio::time::timeout(most, written).await.unwrap_or(false)
     }
 
     pub(super) async fn close(&self) {
