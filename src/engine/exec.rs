@@ -3,10 +3,15 @@
 //! Direct answers have a thread per core. Jobs have a pool of their own with one thread less: whatever a long
 //! calculation does in parallel, it cannot take all threads from the short ones, which would otherwise stand behind
 //! every piece of its work.
+//!
+//! A calculation begins where nothing else is under way. A thread that waits for pieces of its own calculation takes
+//! up whatever rayon has for it meanwhile, and returns when that is done: if it were another calculation, a short one
+//! would end with a long one. So calculations stand in a line of their own, and rayon has nothing but pieces.
 
+use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, TryAcquireError, oneshot};
@@ -15,11 +20,14 @@ use super::error::Error;
 
 /// When a client that found no slot should come again.
 const RETRY_AFTER: Duration = Duration::from_secs(1);
+/// So long after a thread was called for a calculation that nobody has begun yet the next one is called: the first may
+/// be at a piece of another.
+const CALL_AGAIN: Duration = Duration::from_micros(200);
 
 /// The pools of calculation threads with their slots.
 pub(crate) struct Cores {
-    pool: rayon::ThreadPool,
-    job_pool: rayon::ThreadPool,
+    pool: Pool,
+    job_pool: Pool,
     job_slots: Arc<Semaphore>,
     job_slot_count: u32,
     slots: Arc<Semaphore>,
@@ -34,15 +42,9 @@ pub(crate) struct Slot(#[allow(dead_code)] OwnedSemaphorePermit); // held, never
 impl Cores {
     /// Twice as many slots as cores: while one job ends, the next is there.
     pub(crate) fn new(cores: usize, job_slots: usize, patience: Duration) -> Result<Self, rayon::ThreadPoolBuildError> {
-        let pool = |name: &'static str, threads: usize| {
-            rayon::ThreadPoolBuilder::new()
-                .num_threads(threads)
-                .thread_name(move |index| format!("{name}-{index}"))
-                .build()
-        };
         let (cores, job_slots) = (cores.clamp(1, 1024), job_slots.clamp(1, 1024));
-        let (job_slot_count, job_pool) = (u32::try_from(job_slots).unwrap_or(1), pool("job", job_slots)?);
-        let pool = pool("calc", cores)?;
+        let (job_slot_count, job_pool) = (u32::try_from(job_slots).unwrap_or(1), Pool::new("job", job_slots)?);
+        let pool = Pool::new("calc", cores)?;
         let job_slots = Arc::new(Semaphore::new(job_slots));
         let slot_count = u32::try_from(2 * cores).unwrap_or(u32::MAX);
         let slots = Arc::new(Semaphore::new(2 * cores));
@@ -96,12 +98,12 @@ impl Cores {
 
     /// Runs `work` on the jobs' pool.
     pub(crate) fn spawn_job(&self, work: impl FnOnce() + Send + 'static) {
-        self.job_pool.spawn(work);
+        self.job_pool.line.push(work);
     }
 
     /// Runs `work` on the pool.
     pub(crate) fn spawn(&self, work: impl FnOnce() + Send + 'static) {
-        self.pool.spawn(work);
+        self.pool.line.push(work);
     }
 
     /// Runs `work` on the pool and waits for it.
@@ -111,7 +113,7 @@ impl Cores {
         work: impl FnOnce() -> Result<T, Error> + Send + 'static,
     ) -> Result<T, Error> {
         let (sender, receiver) = oneshot::channel();
-        self.pool.spawn(move || {
+        self.pool.line.push(move || {
             let outcome = guarded(work);
             drop(slot);
             // Nobody listens if the client has gone.
@@ -142,6 +144,109 @@ impl Drop for Place<'_> {
     }
 }
 
+/// Threads that calculate, and the line of what they are to begin.
+struct Pool {
+    line: Arc<Line>,
+    _threads: rayon::ThreadPool,
+}
+
+impl Pool {
+    fn new(name: &'static str, threads: usize) -> Result<Self, rayon::ThreadPoolBuildError> {
+        let line = Arc::new(Line::default());
+        let bell =
+            rayon::ThreadPoolBuilder::new().num_threads(1).thread_name(move |_| format!("{name}-bell")).build()?;
+        let attended = Arc::clone(&line);
+        let threads = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .thread_name(move |index| format!("{name}-{index}"))
+            .start_handler(move |_| attended.attend(&bell))
+            .build()
+            .inspect_err(|_| line.close())?;
+        Ok(Self { line, _threads: threads })
+    }
+}
+
+impl Drop for Pool {
+    fn drop(&mut self) {
+        self.line.close();
+    }
+}
+
+/// Calculations that nobody has begun, the oldest first.
+#[derive(Default)]
+struct Line {
+    standing: Mutex<Standing>,
+    came: Condvar,
+}
+
+#[derive(Default)]
+struct Standing {
+    work: VecDeque<Box<dyn FnOnce() + Send>>,
+    /// So many of them no thread was called for.
+    uncalled: usize,
+    closed: bool,
+}
+
+impl Line {
+    fn push(&self, work: impl FnOnce() + Send + 'static) {
+        let mut standing = self.lock();
+        standing.work.push_back(Box::new(work));
+        standing.uncalled += 1;
+        drop(standing);
+        self.came.notify_one();
+    }
+
+    /// What stands in line is still begun, and then no more.
+    fn close(&self) {
+        self.lock().closed = true;
+        self.came.notify_one();
+    }
+
+    /// What a thread of the pool does all its life: the next calculation, and while there is none, pieces of those of
+    /// others. These rayon finds for a thread of one pool that waits for another pool, here that of the bell.
+    fn attend(&self, bell: &rayon::ThreadPool) {
+        loop {
+            let mut standing = self.lock();
+            let (next, closed) = (standing.work.pop_front(), standing.closed);
+            standing.uncalled = standing.uncalled.min(standing.work.len());
+            drop(standing);
+            match next {
+                Some(work) => work(),
+                None if closed => return,
+                None => bell.install(|| self.call()),
+            }
+        }
+    }
+
+    /// Returns when the thread that waits for it is to look at the line. The bell has one thread: it calls one after
+    /// the other, and no more than there is work for.
+    fn call(&self) {
+        let mut standing = self.lock();
+        loop {
+            if standing.closed {
+                return;
+            }
+            if standing.uncalled > 0 {
+                standing.uncalled -= 1;
+                return;
+            }
+            if standing.work.is_empty() {
+                standing = self.came.wait(standing).unwrap_or_else(PoisonError::into_inner);
+                continue;
+            }
+            let (again, waited) = self.came.wait_timeout(standing, CALL_AGAIN).unwrap_or_else(PoisonError::into_inner);
+            standing = again;
+            if waited.timed_out() && !standing.work.is_empty() {
+                return;
+            }
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Standing> {
+        self.standing.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
 /// The outcome of `work`, a panic as [`Error::Crashed`]: on the pool a panic would end the process.
 pub(crate) fn guarded<T>(work: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
@@ -151,4 +256,95 @@ pub(crate) fn guarded<T>(work: impl FnOnce() -> Result<T, Error>) -> Result<T, E
         metrics::counter!("precut_panics_total").increment(1);
         Err(Error::Crashed)
     })
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use std::sync::Barrier;
+    use std::sync::atomic::AtomicBool;
+    use std::sync::mpsc::channel;
+    use std::thread::sleep;
+    use std::time::Instant;
+
+    use super::*;
+
+    const LONG: Duration = Duration::from_secs(10);
+
+    fn cores(threads: usize) -> Arc<Cores> {
+        Arc::new(Cores::new(threads, threads, Duration::ZERO).unwrap())
+    }
+
+    fn becomes(is_so: impl Fn() -> bool) -> bool {
+        let begun = Instant::now();
+        while !is_so() && begun.elapsed() < LONG {
+            sleep(Duration::from_millis(1));
+        }
+        is_so()
+    }
+
+    #[test]
+    fn a_calculation_that_waits_for_a_piece_takes_up_no_other() {
+        let cores = cores(2);
+        let ((over, is_over), (seen, sees)) = (channel(), channel());
+        let inside = Arc::clone(&cores);
+        cores.spawn_job(move || {
+            let begun = &Barrier::new(2);
+            // The other one comes while this one waits for its last piece, and goes on until this one is over.
+            let other = move || seen.send(is_over.recv_timeout(LONG).is_ok()).unwrap();
+            let last_piece = move || {
+                begun.wait();
+                inside.spawn_job(other);
+                sleep(Duration::from_millis(100));
+            };
+            rayon::join(|| begun.wait(), last_piece);
+            // Nobody listens if the other one is over.
+            let _ = over.send(());
+        });
+        assert!(sees.recv().unwrap(), "the first was over only after the other");
+    }
+
+    #[test]
+    fn a_calculation_begins_while_others_are_at_long_pieces() {
+        for _ in 0..20 {
+            let cores = cores(3);
+            let came = Arc::new(AtomicBool::new(false));
+            let (begin, begun) = channel();
+            let (seen, sees) = channel();
+            let awaited = Arc::clone(&came);
+            cores.spawn_job(move || {
+                let both = &Barrier::new(2);
+                let piece = || {
+                    both.wait();
+                    becomes(|| awaited.load(Ordering::Relaxed))
+                };
+                let first = || {
+                    both.wait();
+                    begin.send(()).unwrap();
+                    becomes(|| awaited.load(Ordering::Relaxed))
+                };
+                seen.send(rayon::join(first, piece)).unwrap();
+            });
+            begun.recv().unwrap();
+            cores.spawn_job(move || came.store(true, Ordering::Relaxed));
+            assert_eq!(sees.recv().unwrap(), (true, true));
+        }
+    }
+
+    #[test]
+    fn threads_end_when_what_stands_in_line_is_done() {
+        let cores = cores(1);
+        let lines = [&cores.pool.line, &cores.job_pool.line].map(Arc::downgrade);
+        let (done, all) = channel();
+        for index in 0..3 {
+            let done = done.clone();
+            cores.spawn(move || {
+                sleep(Duration::from_millis(20));
+                done.send(index).unwrap();
+            });
+        }
+        drop((cores, done));
+        assert_eq!(all.iter().collect::<Vec<_>>(), [0, 1, 2]);
+        assert!(becomes(|| lines.iter().all(|line| line.strong_count() == 0)));
+    }
 }
