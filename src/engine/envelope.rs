@@ -31,7 +31,7 @@ pub(crate) fn write(ready: &Ready, monitor: &dyn Monitor) -> Result<Vec<u8>, Fai
     name(&mut body, "result");
     let begin = body.len();
     let ResultNotes { warnings, mut explanation, basis } = ready.prepared.run(monitor, &mut body)?;
-    explanation.extend(model::changes(ready, &body[begin..]));
+    explanation.extend(model::changes(ready, &body[begin..], monitor)?);
     let texts = Texts::shared();
     let explanation: Vec<Remark> = explanation.iter().map(|message| texts.remark(Language::En, message)).collect();
     let warnings: Vec<Notice> = warnings.iter().map(|finding| texts.notice(Language::En, "warning", finding)).collect();

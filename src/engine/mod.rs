@@ -43,7 +43,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use precut_calc::calculator::{Cost, Failure, Monitor};
+use precut_calc::calculator::{Cost, Failure, Message, Monitor};
+use tokio::runtime::Handle;
 
 use crate::registry::{Entry, Registry};
 use crate::store::jobs::JobStore;
@@ -286,9 +287,9 @@ impl Inner {
     }
 
     /// Reads a job where that does no harm.
-    async fn read(&self, entry: &Arc<Entry>, body: Body) -> Result<Ready, Error> {
-        let found = self.find_model(entry, &body).await?;
+    async fn read(self: &Arc<Self>, entry: &Arc<Entry>, body: Body) -> Result<Ready, Error> {
         if body.len() <= READ_AT_ONCE && !entry.is_composed() {
+            let found = self.find_model(entry, &body).await?;
             let models = Models { registry: &self.registry, found };
             return guarded(|| read::read(entry, &body, &models));
         }
@@ -296,8 +297,12 @@ impl Inner {
             Some(slot) => slot,
             None => self.cores.slot().await?,
         };
-        let (entry, registry) = (Arc::clone(entry), self.registry.clone());
-        let work = move || read::read(&entry, &body, &Models { registry: &registry, found });
+        let (this, entry, runtime) = (Arc::clone(self), Arc::clone(entry), Handle::current());
+        let work = move || {
+            // The name of a model stands anywhere in the job. A thread of the pool may wait for the store.
+            let found = runtime.block_on(this.find_model(&entry, &body))?;
+            read::read(&entry, &body, &Models { registry: &this.registry, found })
+        };
         self.cores.run(slot, work).await
     }
 
@@ -436,6 +441,16 @@ fn compute(ready: &Ready, monitor: &dyn Monitor) -> Result<Stored, Error> {
         Err(Failure::Cancelled) => Err(Error::Cancelled),
         Err(failure) => Err(Error::Calculation(failure)),
     }
+}
+
+/// What a part of a calculation sees of the monitor: it may be cancelled, its progress is nobody's business.
+pub(crate) struct Quiet<'m>(pub(crate) &'m dyn Monitor);
+
+impl Monitor for Quiet<'_> {
+    fn cancelled(&self) -> bool {
+        self.0.cancelled()
+    }
+    fn progress(&self, _fraction: f64, _stage: Message) {}
 }
 
 /// [`Engine::check`] without an engine.

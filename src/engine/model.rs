@@ -4,11 +4,12 @@
 use std::borrow::Cow;
 use std::fmt::Write as _;
 
-use precut_calc::calculator::{Finding, Message, Unwatched, Violations};
+use precut_calc::calculator::{Failure, Finding, Message, Monitor, Violations};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
 
+use super::Quiet;
 use super::read::Ready;
 use crate::registry::{Entry, ModelUse, Prepared, Registry, canonical, child, nearest, way};
 use crate::store::models::KeptModel;
@@ -240,6 +241,12 @@ fn join(job: &mut Value, places: &Places, effects: Vec<Value>) -> Vec<Finding> {
     violations
 }
 
+/// Whether a way through a job leads to the model that it names, or into it.
+pub(crate) fn is_its_place(entry: &Entry, tokens: &[String]) -> bool {
+    matches!(entry.model_use(), ModelUse::OfJob | ModelUse::OfBase)
+        && tokens.first().is_some_and(|first| first == MODEL)
+}
+
 /// A job without its model, and that model where it is resolved.
 pub(crate) fn split<'a>(entry: &Entry, job: &'a Value) -> (Cow<'a, Value>, Option<Held>) {
     let names_one = matches!(entry.model_use(), ModelUse::OfJob | ModelUse::OfBase) && job.get(MODEL).is_some();
@@ -314,16 +321,19 @@ fn said_beside(result: &Value, pointer: &str, unit: String) -> String {
     result.pointer(&child(place, name)).and_then(Value::as_str).unwrap_or("1").to_owned()
 }
 
-/// What the model changed: the numbers that a study would show, with it and without it, where they differ.
-pub(crate) fn changes(ready: &Ready, result: &[u8]) -> Vec<Message> {
-    let (Some(held), Some(base)) = (&ready.model, &ready.base) else { return Vec::new() };
+/// What the model changed: the numbers that a study would show, with it and without it, where they differ. A failure
+/// only where nobody waits for it any more: a job without the model may take as long as with it.
+pub(crate) fn changes(ready: &Ready, result: &[u8], monitor: &dyn Monitor) -> Result<Vec<Message>, Failure> {
+    let (Some(held), Some(base)) = (&ready.model, &ready.base) else { return Ok(Vec::new()) };
     let name = format!("{}@{}", held.name, held.revision);
-    let Ok(result) = serde_json::from_slice::<Value>(result) else { return Vec::new() };
+    let Ok(result) = serde_json::from_slice::<Value>(result) else { return Ok(Vec::new()) };
     let mut text = Vec::new();
-    if base.run(&Unwatched, &mut text).is_err() {
-        return vec![Message::new("model_alone_answers").with("model", name)];
+    match base.run(&Quiet(monitor), &mut text) {
+        Ok(_) => {}
+        Err(Failure::Cancelled) => return Err(Failure::Cancelled),
+        Err(_) => return Ok(vec![Message::new("model_alone_answers").with("model", name)]),
     }
-    let Ok(without) = serde_json::from_slice::<Value>(&text) else { return Vec::new() };
+    let Ok(without) = serde_json::from_slice::<Value>(&text) else { return Ok(Vec::new()) };
     let document = ready.entry.output_document();
     let changed = |pointer: &&'static str| {
         let number = |result: &Value| result.pointer(pointer).and_then(Value::as_f64);
@@ -340,7 +350,7 @@ pub(crate) fn changes(ready: &Ready, result: &[u8]) -> Vec<Message> {
         Some(message.with("unit", unit).with("with", with).with("without", without))
     };
     let said: Vec<Message> = ready.entry.meta().study_outputs.iter().filter_map(changed).collect();
-    if said.is_empty() { vec![Message::new("model_changed_nothing").with("model", name)] } else { said }
+    Ok(if said.is_empty() { vec![Message::new("model_changed_nothing").with("model", name)] } else { said })
 }
 
 #[cfg(test)]

@@ -6,7 +6,8 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use futures_util::future::BoxFuture;
-use precut_calc::calculator::{Failure, Finding, Unwatched};
+use precut_calc::calculator::{Example, Failure, Finding, Unwatched};
+use rayon::prelude::*;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
@@ -380,7 +381,8 @@ fn in_its_language(language: Language, said: &str, names: &str) {
     if language != Language::En {
         let mut english = complete::english_in(said);
         // Products of powers of fields are formulas.
-        english.retain(|word| !names.contains(word) && !said.contains(&format!("^{word}")));
+        let is_power = |word: &str| ["^", "^-"].iter().any(|sign| said.contains(&format!("{sign}{word}")));
+        english.retain(|word| !names.contains(word) && !is_power(word));
         assert!(english.is_empty(), "{english:?} in {said:?}");
     }
 }
@@ -396,56 +398,139 @@ fn conforms(registry: &Registry, entry: &Entry) {
             assert!(worded, "{} utters {code}, which has no {} text", meta.id, language.tag());
         }
     }
-    let mut shown = std::collections::BTreeSet::new();
-    for example in meta.examples {
-        let body = || Body::Json(example.job.into());
-        let ready = read::read(&registry.entry(meta.id).unwrap().clone(), &body(), &Models { registry, found: None })
-            .unwrap_or_else(|error| panic!("{} of {}: {error:?}", example.id, meta.id));
-        let computed = ready.prepared.run(&Unwatched, &mut Vec::new()).unwrap();
-        let input = ready.prepared.input().unwrap();
-        assert_eq!(ready.canonical, serde_json_canonicalizer::to_vec(&input).unwrap());
-        let names = input.to_string();
-        for message in &computed.explanation {
-            for language in Language::ALL {
-                let said = texts.try_word(language, "explanation", message.code, &message.values).unwrap();
-                in_its_language(language, &said, &names);
-            }
-            assert!(meta.codes.contains(message.code), "{} utters the undeclared {}", meta.id, message.code);
-        }
-        for warning in &computed.warnings {
-            for language in Language::ALL {
-                let said = texts.try_finding(language, "warning", warning).unwrap();
-                in_its_language(language, &said, &names);
-            }
-            assert!(meta.codes.contains(warning.code), "{} utters the undeclared {}", meta.id, warning.code);
-        }
-        let stored = solve_now(registry, meta.id, body(), &Unwatched).unwrap();
-        assert_eq!(solve_now(registry, meta.id, body(), &Unwatched).unwrap().body, stored.body);
-        let figures: Vec<&str> = stored.figures().unwrap().iter().map(|figure| figure.id).collect();
-        let declared: Vec<&str> = meta.figures.iter().copied().filter(|id| figures.contains(id)).collect();
-        assert_eq!(figures, declared, "{}: declared, in their order", meta.id);
-        shown.extend(figures);
-        let tables: Vec<&str> = stored.tables().unwrap().iter().map(|table| table.id).collect();
-        let declared: Vec<&str> = meta.tables.iter().copied().filter(|id| tables.contains(id)).collect();
-        assert_eq!(tables, declared, "{}: declared, in their order", meta.id);
-        shown.extend(tables);
-        for column in stored.tables().unwrap().iter().flat_map(|table| &table.columns) {
-            for language in Language::ALL {
-                in_its_language(language, &texts.column(language, &column.name, column.unit), &names);
-            }
-        }
-        let answer = envelope(&stored);
-        let output = jsonschema::draft202012::new(&entry.output_document()).unwrap();
-        assert!(output.is_valid(&answer["result"]), "{}: {:?}", meta.id, output.validate(&answer["result"]));
-        let again = read::read(
-            &registry.entry(meta.id).unwrap().clone(),
-            &Body::Json(ready.canonical.clone()),
-            &Models { registry, found: None },
-        )
-        .unwrap();
-        assert_eq!(again.key, ready.key, "the filled job of {} has another key", meta.id);
-    }
+    // Some of them take seconds: side by side.
+    let shown: Vec<&str> =
+        meta.examples.par_iter().flat_map_iter(|example| example_conforms(registry, entry, example)).collect();
     for id in meta.figures.iter().chain(meta.tables) {
         assert!(shown.contains(id), "{} declares {id}, which no example has", meta.id);
     }
+}
+
+/// Returns the names of the figures and tables that its answer has.
+fn example_conforms(registry: &Registry, entry: &Entry, example: &Example) -> Vec<&'static str> {
+    let (texts, meta) = (Texts::shared(), entry.meta());
+    let body = || Body::Json(example.job.into());
+    let ready = read::read(&registry.entry(meta.id).unwrap().clone(), &body(), &Models { registry, found: None })
+        .unwrap_or_else(|error| panic!("{} of {}: {error:?}", example.id, meta.id));
+    let mut result = Vec::new();
+    let computed = ready.prepared.run(&Unwatched, &mut result).unwrap();
+    let input = ready.prepared.input().unwrap();
+    assert_eq!(ready.canonical, serde_json_canonicalizer::to_vec(&input).unwrap());
+    let names = input.to_string();
+    for message in &computed.explanation {
+        for language in Language::ALL {
+            let said = texts.try_word(language, "explanation", message.code, &message.values).unwrap();
+            in_its_language(language, &said, &names);
+        }
+        assert!(meta.codes.contains(message.code), "{} utters the undeclared {}", meta.id, message.code);
+    }
+    for warning in &computed.warnings {
+        for language in Language::ALL {
+            let said = texts.try_finding(language, "warning", warning).unwrap();
+            in_its_language(language, &said, &names);
+        }
+        assert!(meta.codes.contains(warning.code), "{} utters the undeclared {}", meta.id, warning.code);
+    }
+    let stored = solve_now(registry, meta.id, body(), &Unwatched).unwrap();
+    let place = json::top_level_field(&stored.body, "result").unwrap();
+    assert!(stored.body[place] == result, "{} of {} comes out another time differently", example.id, meta.id);
+    let figures: Vec<&str> = stored.figures().unwrap().iter().map(|figure| figure.id).collect();
+    let declared: Vec<&str> = meta.figures.iter().copied().filter(|id| figures.contains(id)).collect();
+    assert_eq!(figures, declared, "{}: declared, in their order", meta.id);
+    let tables: Vec<&str> = stored.tables().unwrap().iter().map(|table| table.id).collect();
+    let declared: Vec<&str> = meta.tables.iter().copied().filter(|id| tables.contains(id)).collect();
+    assert_eq!(tables, declared, "{}: declared, in their order", meta.id);
+    let shown = [figures, tables].concat();
+    for column in stored.tables().unwrap().iter().flat_map(|table| &table.columns) {
+        for language in Language::ALL {
+            in_its_language(language, &texts.column(language, &column.name, column.unit), &names);
+        }
+    }
+    let answer = envelope(&stored);
+    let output = jsonschema::draft202012::new(&entry.output_document()).unwrap();
+    assert!(output.is_valid(&answer["result"]), "{}: {:?}", meta.id, output.validate(&answer["result"]));
+    let again = read::read(
+        &registry.entry(meta.id).unwrap().clone(),
+        &Body::Json(ready.canonical.clone()),
+        &Models { registry, found: None },
+    )
+    .unwrap();
+    assert_eq!(again.key, ready.key, "the filled job of {} has another key", meta.id);
+    shown
+}
+
+/// A calculator whose jobs may name a model, its first example with more in it, and a model for it.
+const SHAFT: &str = "deflection-compensation";
+
+fn shaft(change: impl FnOnce(&mut Value)) -> Value {
+    let registry = Registry::standard().unwrap();
+    let mut job = serde_json::from_str(registry.entry(SHAFT).unwrap().meta().examples[0].job).unwrap();
+    change(&mut job);
+    job
+}
+
+fn soft_headstock() -> Value {
+    json!({"kind": "headstock_compliance", "delta_um_per_n": 0.022})
+}
+
+/// Cancels after it was asked so many times.
+struct Impatient {
+    looks: std::sync::atomic::AtomicUsize,
+    most: usize,
+    told: std::sync::atomic::AtomicUsize,
+}
+
+impl Monitor for Impatient {
+    fn cancelled(&self) -> bool {
+        self.looks.fetch_add(1, Ordering::Relaxed) >= self.most
+    }
+    fn progress(&self, _fraction: f64, _stage: Message) {
+        self.told.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
+#[test]
+fn a_cancel_is_heard_while_a_job_is_computed_without_its_model() {
+    let registry = Registry::standard().unwrap();
+    let model = json!({"name": "lathe", "calculator": SHAFT, "effects": [soft_headstock()]});
+    let model = GivenModel::File(ModelFile::read(&registry, model.to_string().as_bytes()).unwrap());
+    let solve = |job: &Value, model: &GivenModel, most: usize| {
+        let monitor = Impatient { looks: 0.into(), most, told: 0.into() };
+        let outcome = solve_with(&registry, SHAFT, Body::Json(job.to_string().into()), model, &monitor);
+        (outcome, monitor.looks.into_inner(), monitor.told.into_inner())
+    };
+    let own = shaft(|job| job["effects"] = json!([soft_headstock()]));
+    let (outcome, looks, told) = solve(&own, &GivenModel::None, usize::MAX);
+    outcome.unwrap();
+    let extended = shaft(|job| job["effects"] = json!([]));
+    let (outcome, more_looks, as_told) = solve(&extended, &model, usize::MAX);
+    outcome.unwrap();
+    assert!(more_looks > looks && as_told == told, "{more_looks} of {looks} looks, {as_told} of {told} told");
+    assert_eq!(solve(&extended, &model, looks).0.unwrap_err(), Error::Cancelled);
+}
+
+#[tokio::test]
+async fn a_large_body_that_names_a_model_is_read_when_there_is_a_core() {
+    let folder = tempfile::tempdir().unwrap();
+    let patience = Duration::from_millis(50);
+    let settings = EngineSettings { cores: 1, patience, ..EngineSettings::in_folder(folder.path()) };
+    let engine = Engine::open(Registry::standard().unwrap(), settings).await.unwrap();
+    let content = ModelContent { calculator: SHAFT.to_owned(), effects: vec![soft_headstock()], provenance: json!({}) };
+    engine.put_model("lathe", ModelSource::Exported { content, sha256: None }, true).await.unwrap();
+    let padded = |text: String| Body::Json((text + &" ".repeat(READ_AT_ONCE)).into());
+    let job = |name: &str| shaft(|job| job["model"] = name.into()).to_string();
+    let solved = engine.solve(SHAFT, padded(job("lathe"))).await.unwrap();
+    assert_eq!(envelope(&solved.stored)["model"]["name"], "lathe");
+    let small = engine.solve(SHAFT, Body::Json(job("lathe").into())).await.unwrap();
+    assert_eq!((small.cache, small.stored.key), (CacheState::Hit, solved.stored.key));
+    let Error::Invalid { findings, .. } = engine.solve(SHAFT, padded(job("lathes"))).await.unwrap_err() else {
+        panic!("a model that is not there")
+    };
+    assert_eq!((findings[0].code, findings[0].values.get("nearest")), ("unknown_model", Some(&"lathe".into())));
+    let broken = || padded(job("lathe") + "}");
+    assert!(matches!(engine.solve(SHAFT, broken()).await, Err(Error::Syntax(_))));
+    let inner = &engine.inner;
+    let _taken = [inner.cores.slot_now().unwrap(), inner.cores.slot_now().unwrap()];
+    let busy = engine.solve(SHAFT, broken()).await;
+    assert!(matches!(busy, Err(Error::Busy { .. })), "{busy:?}");
 }

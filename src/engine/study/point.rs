@@ -12,6 +12,7 @@ use super::host::Host;
 use super::pick::{Cited, Picked, Warning};
 use super::plan::Plan;
 use super::result::{Row, Status};
+use crate::engine::Quiet;
 use crate::engine::answer::Stored;
 use crate::engine::error::Error;
 use crate::engine::exec::guarded;
@@ -152,14 +153,4 @@ fn values_of(finding: &Finding) -> serde_json::Value {
         "pointer": finding.pointer, "value": finding.value, "limit": finding.limit, "unit": finding.unit,
         "values": finding.values,
     })
-}
-
-/// A point's view of the study's monitor: it may be cancelled, its progress is nobody's business.
-struct Quiet<'m>(&'m dyn Monitor);
-
-impl Monitor for Quiet<'_> {
-    fn cancelled(&self) -> bool {
-        self.0.cancelled()
-    }
-    fn progress(&self, _fraction: f64, _stage: precut_calc::calculator::Message) {}
 }
