@@ -28,6 +28,10 @@ const CLEAR: f64 = 12.0;
 const LAST_STEP_MM: f64 = 2e-5;
 /// More than ever needed: four are, where the profile tears.
 const MOST_ITERATIONS: u32 = 60;
+/// The same where a support climbs a flank of a node's width, on which the profile bends a thousand times more.
+const LAST_CLIMB_MM: f64 = 2e-8;
+/// Least share of a step of Newton's method that is tried.
+const LEAST_SHARE: f64 = 1e-9;
 /// Tangent of the angle from the fixed directions beyond which they are fixed anew; the series is then exact to 1e-13.
 const FAR: f64 = 0.05;
 /// A rolling contact computed so many steps ago still holds.
@@ -93,6 +97,17 @@ struct Solved<const L: usize> {
     centre: [Vec2; L],
     /// Rotation of the body.
     body_rad: [f64; L],
+}
+
+/// A place of the centre, looked at.
+#[derive(Debug, Clone, Copy)]
+struct Stand {
+    /// Rotation of the body that goes with it.
+    body_rad: f64,
+    /// How far the equations of the contacts are from being met.
+    gap_mm2: f64,
+    /// Where Newton's method would go, to be taken away from the place.
+    step: Vec2,
 }
 
 impl<'a, M: Machine> Stepper<'a, M> {
@@ -242,8 +257,18 @@ impl<'a, M: Machine> Stepper<'a, M> {
         Ok(log.turned(self.nodes.values().to_vec()))
     }
 
+    /// Takes up to `L` steps; how many.
     fn block<const L: usize>(&mut self, log: &mut Log) -> Result<usize, Stuck> {
-        let solved = self.solve::<L>()?;
+        Ok(match self.solve::<L>() {
+            Ok(solved) => self.advance(&solved, log),
+            Err(_) => {
+                let solved = self.climb()?;
+                self.advance(&solved, log)
+            }
+        })
+    }
+
+    fn advance<const L: usize>(&mut self, solved: &Solved<L>, log: &mut Log) -> usize {
         for lane in 0..L {
             let turned_rad = solved.body_rad[lane] * self.machine_per_body;
             if turned_rad > log.end_rad {
@@ -257,7 +282,7 @@ impl<'a, M: Machine> Stepper<'a, M> {
         }
         self.before = [solved.centre[L - 1], self.before[0], self.before[1]];
         self.body_rad = solved.body_rad[L - 1];
-        Ok(L)
+        L
     }
 
     /// Removes what the tip finds at the present node: r <- r - max(0, r - ρ_T)/(1+K).
@@ -368,6 +393,67 @@ impl<'a, M: Machine> Stepper<'a, M> {
             }
         }
         Err(Stuck { left_mm: left, iterations: MOST_ITERATIONS })
+    }
+
+    /// Centre and rotation of the next step where Newton's method jumps to and fro: a support stands at the foot of a
+    /// flank that is steeper than a node is wide. Its steps are halved until they bring the ring nearer, so that the
+    /// support climbs the flank.
+    fn climb(&mut self) -> Result<Solved<1>, Stuck> {
+        self.stale = true;
+        let mut centre = self.before[0];
+        let mut here = self.stand(centre);
+        for _ in 0..MOST_ITERATIONS {
+            let step = here.step;
+            if norm(step) < LAST_CLIMB_MM {
+                return Ok(Solved { centre: [centre], body_rad: [here.body_rad] });
+            }
+            let mut share = 1.0;
+            (centre, here) = loop {
+                let tried = sub(centre, scaled(step, share));
+                let there = self.stand(tried);
+                // What is no number is not nearer either.
+                if there.gap_mm2 < here.gap_mm2 {
+                    break (tried, there);
+                }
+                share *= 0.5;
+                if share < LEAST_SHARE {
+                    return Err(Stuck { left_mm: norm(step), iterations: MOST_ITERATIONS });
+                }
+            };
+        }
+        Err(Stuck { left_mm: norm(here.step), iterations: MOST_ITERATIONS })
+    }
+
+    /// What the next step finds with the centre at a place.
+    fn stand(&mut self, centre: Vec2) -> Stand {
+        let whole = self.nodes.len() as f64;
+        let mut body_rad = self.body_rad + self.step_rad;
+        let (mut turned_rad, mut vt) = (0.0, [0.0; 2]);
+        // The rotation follows from the tip, and the tip, which moves by thousandths of a degree, from the rotation.
+        for _ in 0..3 {
+            turned_rad = body_rad * self.machine_per_body;
+            vt = sub(self.machine.tip(turned_rad), centre);
+            let near = angle(vt);
+            let turns = ((self.frame.tip_rad - near) / TAU).round();
+            body_rad = near + turns * TAU - self.first_rad + self.step_rad * self.count as f64;
+        }
+        let (a, b) = self.machine.supports(turned_rad);
+        let (va, vb) = (sub(a, centre), sub(b, centre));
+        let place = |v: Vec2| {
+            let ahead = cross(vt, v).atan2(dot(vt, v)) * self.per_step;
+            Place::of(wrapped(self.node as f64 + ahead, whole), self.nodes.len())
+        };
+        let places = [place(va), place(vb)];
+        let ((ea, slope_a), (eb, slope_b)) = self.read(places, 0);
+        let tip = scaled(turned(vt), 1.0 / dot(vt, vt));
+        let row = |v: Vec2, e: f64, slope: f64| {
+            let by = e * slope * self.per_step;
+            let side = sub(scaled(turned(v), 1.0 / dot(v, v)), tip);
+            [by * side[0] - v[0], by * side[1] - v[1]]
+        };
+        let (gap_a, gap_b) = (half_gap(va, ea), half_gap(vb, eb));
+        let step = solve(row(va, ea, slope_a), row(vb, eb, slope_b), gap_a, gap_b);
+        Stand { body_rad, gap_mm2: gap_a.hypot(gap_b), step }
     }
 
     /// Distance of the contact and its slope per node, for one support and lane.

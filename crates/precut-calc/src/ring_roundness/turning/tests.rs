@@ -114,3 +114,16 @@ fn a_large_wheel_leaves_what_a_tip_leaves_but_for_the_teeth() {
     assert!(high <= tip_high + 1e-6 && low >= tip_low - 0.02, "{low} {high} {tip_low} {tip_high}");
     assert!(high - low > 1e-4);
 }
+
+/// Where nodes are narrow, the flank that the tip leaves at its first bite is a wall to a support that comes by.
+#[test]
+fn a_support_climbs_a_flank_that_is_steeper_than_a_node_is_wide() {
+    let setting = seed(112.5, 0.005_859_375, 256.0, 0.0);
+    let (coarse, fine) = (run(&ellipse(18_000), &setting), run(&ellipse(36_000), &setting));
+    // Where the cut ends there is a step of the feed, whose place is known to a node.
+    let mut apart: Vec<f64> =
+        coarse.radii_mm.iter().zip(fine.radii_mm.iter().step_by(2)).map(|(p, q)| (p - q).abs()).collect();
+    apart.sort_by(f64::total_cmp);
+    eprintln!("APART {:?}", [0.5, 0.9, 0.99, 0.999, 0.9999].map(|share| apart[(share * 18_000.0) as usize]));
+    assert!(apart[17_900] < 1e-4, "{} mm", apart[17_900]);
+}
