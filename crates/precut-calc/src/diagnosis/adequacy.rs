@@ -8,6 +8,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, Normal};
 use super::basis::{dot, smooth_columns};
 use super::link;
 use super::noise::pure_error;
+use super::sparse::Sparse;
 use super::weigh::Weighing;
 use crate::calculator::Smooth;
 
@@ -84,16 +85,14 @@ fn deviance(weighing: &Weighing<'_>, sides: &[f64]) -> Option<Test> {
     let mut random = Pcg64::seed_from_u64(1);
     let normal = Normal::standard();
     let mut larger = 0.0;
+    let nuisances: Vec<Vec<f64>> = foundation.nuisances.iter().map(Sparse::dense).collect();
     for _ in 0..DRAWS {
-        let sizes: Vec<f64> = foundation
-            .nuisances
-            .iter()
-            .map(|_| normal.inverse_cdf(random.random::<f64>().clamp(1e-12, 1.0 - 1e-12)))
-            .collect();
+        let sizes: Vec<f64> =
+            nuisances.iter().map(|_| normal.inverse_cdf(random.random::<f64>().clamp(1e-12, 1.0 - 1e-12))).collect();
         let drawn: f64 = rows
             .iter()
             .map(|&row| {
-                let moved: f64 = sizes.iter().zip(&foundation.nuisances).map(|(size, column)| size * column[row]).sum();
+                let moved: f64 = sizes.iter().zip(&nuisances).map(|(size, column)| size * column[row]).sum();
                 let positive = link::log_probability((foundation.base[row] + moved) / weighing.scatter(row)).exp();
                 of(if random.random::<f64>() < positive { 1.0 } else { -1.0 }, row)
             })

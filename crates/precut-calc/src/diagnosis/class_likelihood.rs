@@ -3,9 +3,10 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::basis::dot;
-use super::evidence::{Evidence, Normal, Side, one_sided};
+use super::evidence::{Evidence, Normal, Side, log_det, one_sided};
 use super::link;
 use super::noise::Noise;
+use super::sparse::Sparse;
 use super::whiten::White;
 
 /// Newton steps to the mode. But for the far tails the log-posterior is concave: a dozen suffice, halvings included.
@@ -41,14 +42,14 @@ struct Mode {
 }
 
 impl ClassLikelihood {
-    pub(super) fn new(sides: &[f64], noise: &Noise, nuisances: &[Vec<f64>], keep: &[bool]) -> Self {
+    pub(super) fn new(sides: &[f64], noise: &Noise, nuisances: &[Sparse], keep: &[bool]) -> Self {
         let rows: Vec<usize> = (0..keep.len()).filter(|&row| keep[row]).collect();
         let sigma = rows.iter().map(|&row| noise.per_row.as_ref().map_or(noise.sigma, |own| own[row])).collect();
         let sides = rows.iter().map(|&row| sides[row]).collect();
         let mut likelihood = Self { rows, sides, sigma, nuisances: Vec::new() };
         likelihood.nuisances = nuisances
             .iter()
-            .map(|column| likelihood.scaled(column))
+            .map(|column| likelihood.scaled(&column.dense()))
             .filter(|column| column.iter().any(|v| v.abs() > 0.0))
             .collect();
         likelihood
@@ -67,12 +68,11 @@ impl ClassLikelihood {
     /// log Z = l(t, d) - |t|^2/2 - |d|^2/2 - 1/2 log|I + D'WD|, D = [X N], W the curvatures of the rows.
     pub(super) fn evidence(&self, columns: &[&White], residual: &White, sides: &[Side]) -> Option<Evidence> {
         let Mode { size, factor, log_likelihood, .. } = self.mode(columns, residual)?;
-        let log_det: f64 = factor.l_dirty().diagonal().iter().map(|d| 2.0 * d.ln()).sum();
         let count = columns.len();
         let covariance = factor.inverse().view((0, 0), (count, count)).into_owned();
         let t: Vec<f64> = size.iter().copied().take(count).collect();
         let square = size.dot(&size);
-        let log_z = log_likelihood - 0.5 * square - 0.5 * log_det + one_sided(sides, &t, &covariance);
+        let log_z = log_likelihood - 0.5 * square - 0.5 * log_det(&factor) + one_sided(sides, &t, &covariance);
         Some(Evidence { log_z, t, covariance, q: square - 2.0 * log_likelihood })
     }
 

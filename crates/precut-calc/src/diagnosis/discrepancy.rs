@@ -5,11 +5,13 @@ use std::f64::consts::PI;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::basis::cosine;
+use super::blocks::Blocks;
 use super::data::Data;
-use super::evidence::{Normal, Scale, Side, log_mean_exp};
+use super::evidence::{Normal, Scale, Side, log_det, log_mean_exp};
 use super::likelihood::Likelihood;
+use super::sparse::Sparse;
 use super::whiten::White;
-use crate::calculator::Smooth;
+use crate::calculator::{Failure, Monitor, Smooth, checkpoint};
 
 /// Cosines common to all runs.
 const COMMON_ORDERS: usize = 25;
@@ -29,13 +31,22 @@ pub(super) struct Kind {
     /// What it is free over: `common`, `per_run`, `around`, a grouping's name, `test_order`.
     pub(super) name: &'static str,
     /// Its columns on the rows, for the picture of the remainder.
-    pub(super) columns: Vec<Vec<f64>>,
+    pub(super) columns: Vec<Sparse>,
     /// Order of every column, where the columns are waves: along a part half waves, round it whole ones.
     pub(super) orders: Option<Vec<f64>>,
-    white: Vec<White>,
-    gram: DMatrix<f64>,
+    form: Form,
     /// Prior standard deviations of the amplitudes for every correlation length, at a size of one.
     spreads: Vec<Vec<f64>>,
+}
+
+/// What evidence is made of.
+enum Form {
+    /// Columns that act on all rows: their inner products.
+    Whole { white: Vec<White>, gram: DMatrix<f64> },
+    /// Columns of which each acts in its block.
+    Blocks(Blocks),
+    /// Of classes.
+    Classes(Vec<White>),
 }
 
 /// A remainder fitted beside a set of causes.
@@ -53,28 +64,28 @@ pub(super) struct Remainder {
 }
 
 /// The kinds of remainder that these rows can show.
-pub(super) fn kinds(data: &Data, likelihood: &Likelihood, sigma: f64) -> Vec<Kind> {
+pub(super) fn kinds(
+    data: &Data,
+    likelihood: &Likelihood,
+    sigma: f64,
+    monitor: &dyn Monitor,
+) -> Result<Vec<Kind>, Failure> {
     let rows = data.value.len();
+    let on_all = |values: &dyn Fn(usize) -> f64| Sparse::new(rows, (0..rows).map(|row| (row, values(row))));
     let mut kinds = Vec::new();
+    checkpoint(monitor)?;
     match &data.layout.design.smooth {
         Smooth::Along(u) => {
-            let common = (0..COMMON_ORDERS).map(|k| u.iter().map(|u| cosine(k, *u)).collect()).collect();
+            let common = (0..COMMON_ORDERS).map(|k| on_all(&|row| cosine(k, u[row]))).collect();
             let orders: Vec<f64> = (0..COMMON_ORDERS).map(|k| k as f64).collect();
             kinds.push(Kind::smooth("common", common, &orders, likelihood, sigma));
             let runs: Vec<Vec<usize>> = runs(data);
             if runs.len() > 1 {
-                let mut columns = Vec::new();
-                let mut orders = Vec::new();
-                for run in &runs {
-                    for k in 0..RUN_ORDERS {
-                        let mut column = vec![0.0; rows];
-                        for &row in run {
-                            column[row] = cosine(k, u[row]);
-                        }
-                        columns.push(column);
-                        orders.push(k as f64);
-                    }
-                }
+                checkpoint(monitor)?;
+                let of_run =
+                    |run: &[usize], k: usize| Sparse::new(rows, run.iter().map(|&row| (row, cosine(k, u[row]))));
+                let columns = runs.iter().flat_map(|run| (0..RUN_ORDERS).map(|k| of_run(run, k))).collect();
+                let orders: Vec<f64> = runs.iter().flat_map(|_| (0..RUN_ORDERS).map(|k| k as f64)).collect();
                 kinds.push(Kind::smooth("per_run", columns, &orders, likelihood, sigma));
             }
         }
@@ -82,8 +93,8 @@ pub(super) fn kinds(data: &Data, likelihood: &Likelihood, sigma: f64) -> Vec<Kin
             let mut columns = Vec::new();
             let mut orders = Vec::new();
             for k in FOURIER {
-                columns.push(angle.iter().map(|a| (k as f64 * a).cos()).collect());
-                columns.push(angle.iter().map(|a| (k as f64 * a).sin()).collect());
+                columns.push(on_all(&|row| (k as f64 * angle[row]).cos()));
+                columns.push(on_all(&|row| (k as f64 * angle[row]).sin()));
                 // Once round is two lengths of the cosines along a part.
                 orders.extend([2.0 * k as f64; 2]);
             }
@@ -92,18 +103,24 @@ pub(super) fn kinds(data: &Data, likelihood: &Likelihood, sigma: f64) -> Vec<Kin
         Smooth::None => {}
     }
     for grouping in &data.layout.design.groupings {
-        let count = grouping.group.iter().copied().max().map_or(0, |most| most + 1);
-        let level = |g: usize| grouping.group.iter().map(|&of| f64::from(u8::from(of == g))).collect();
-        kinds.push(Kind::levels(grouping.name, (0..count).map(level).collect(), likelihood, sigma));
+        checkpoint(monitor)?;
+        let mut groups: Vec<Vec<usize>> = Vec::new();
+        for (row, &group) in grouping.group.iter().enumerate() {
+            groups.resize(groups.len().max(group + 1), Vec::new());
+            groups[group].push(row);
+        }
+        let levels = groups.iter().map(|group| Sparse::new(rows, group.iter().map(|&row| (row, 1.0)))).collect();
+        kinds.push(Kind::levels(grouping.name, levels, likelihood, sigma));
     }
     if let Some(order) = &data.layout.design.order {
-        let columns = TEST_ORDERS.map(|k| order.iter().map(|u| cosine(k, *u)).collect()).collect();
+        let columns = TEST_ORDERS.map(|k| on_all(&|row| cosine(k, order[row]))).collect();
         let orders: Vec<f64> = TEST_ORDERS.map(|k| k as f64).collect();
         kinds.push(Kind::smooth("test_order", columns, &orders, likelihood, sigma));
     }
-    kinds
+    Ok(kinds)
 }
 
+/// Rows of every run, ascending.
 fn runs(data: &Data) -> Vec<Vec<usize>> {
     let count = data.layout.run_of_trace.iter().copied().max().map_or(0, |most| most + 1);
     let mut runs = vec![Vec::new(); count];
@@ -111,13 +128,14 @@ fn runs(data: &Data) -> Vec<Vec<usize>> {
         runs[run].extend_from_slice(rows);
     }
     runs.retain(|rows| !rows.is_empty());
+    runs.iter_mut().for_each(|rows| rows.sort_unstable());
     runs
 }
 
 impl Kind {
     /// Amplitudes with standard deviations proportional to exp(-(k pi l)^2 / 2), so that the pointwise
     /// variance (order 0 counts 1, the others 1/2 each) is sigma^2.
-    fn smooth(name: &'static str, columns: Vec<Vec<f64>>, orders: &[f64], likelihood: &Likelihood, sigma: f64) -> Self {
+    fn smooth(name: &'static str, columns: Vec<Sparse>, orders: &[f64], likelihood: &Likelihood, sigma: f64) -> Self {
         let mut of_each_order: Vec<f64> = orders.to_vec();
         of_each_order.dedup();
         of_each_order.sort_by(f64::total_cmp);
@@ -137,13 +155,26 @@ impl Kind {
         }
     }
 
-    fn levels(name: &'static str, columns: Vec<Vec<f64>>, likelihood: &Likelihood, sigma: f64) -> Self {
+    fn levels(name: &'static str, columns: Vec<Sparse>, likelihood: &Likelihood, sigma: f64) -> Self {
         let spreads = vec![vec![sigma; columns.len()]];
         Self::new(name, columns, spreads, likelihood)
     }
 
-    fn new(name: &'static str, columns: Vec<Vec<f64>>, spreads: Vec<Vec<f64>>, likelihood: &Likelihood) -> Self {
-        let white: Vec<White> = columns.iter().map(|column| likelihood.white(column)).collect();
+    fn new(name: &'static str, columns: Vec<Sparse>, spreads: Vec<Vec<f64>>, likelihood: &Likelihood) -> Self {
+        let white = || columns.iter().map(|column| likelihood.white(&column.dense())).collect();
+        let form = match likelihood {
+            Likelihood::Classes(_) => Form::Classes(white()),
+            Likelihood::Gaussian { whitener, .. } => match Blocks::of(&columns, whitener) {
+                Some(blocks) => Form::Blocks(blocks),
+                None => Form::whole(white()),
+            },
+        };
+        Self { name, columns, orders: None, form, spreads }
+    }
+}
+
+impl Form {
+    fn whole(white: Vec<White>) -> Self {
         let count = white.len();
         let mut gram = DMatrix::zeros(count, count);
         for i in 0..count {
@@ -153,7 +184,7 @@ impl Kind {
                 gram[(j, i)] = product;
             }
         }
-        Self { name, columns, orders: None, white, gram, spreads }
+        Self::Whole { white, gram }
     }
 }
 
@@ -164,7 +195,8 @@ pub(super) fn beside(
     residual: &White,
     sides: &[Side],
     likelihood: &Likelihood,
-) -> Option<Remainder> {
+    monitor: &dyn Monitor,
+) -> Result<Option<Remainder>, Failure> {
     let own = Normal::of(columns, residual);
     let mut all = Vec::new();
     let mut best: Option<(f64, Remainder)> = None;
@@ -172,27 +204,27 @@ pub(super) fn beside(
         let explained = kind.explained(&own, columns, residual, sides, likelihood);
         for spread in &kind.spreads {
             for size in SIZES {
-                let scales: Vec<f64> =
-                    std::iter::repeat_n(1.0, columns.len()).chain(spread.iter().map(|s| s * size)).collect();
-                let (log_z, t) = explained(&scales)?;
+                checkpoint(monitor)?;
+                let prior_sd: Vec<f64> = spread.iter().map(|s| s * size).collect();
+                let Some((log_z, t)) = explained(&prior_sd) else { return Ok(None) };
                 if best.as_ref().is_none_or(|(most, _)| log_z > *most) {
-                    let amplitudes = t.iter().zip(&scales).skip(columns.len()).map(|(t, s)| t * s).collect();
-                    let prior_sd = scales[columns.len()..].to_vec();
-                    let of_causes = t[..columns.len()].to_vec();
+                    let (of_causes, of_kind) = t.split_at(columns.len());
+                    let amplitudes = of_kind.iter().zip(&prior_sd).map(|(t, s)| t * s).collect();
+                    let of_causes = of_causes.to_vec();
                     best = Some((log_z, Remainder { log_z, kind: index, amplitudes, of_causes, prior_sd }));
                 }
                 all.push(log_z);
             }
         }
     }
-    best.map(|(_, remainder)| Remainder { log_z: log_mean_exp(&all), ..remainder })
+    Ok(best.map(|(_, remainder)| Remainder { log_z: log_mean_exp(&all), ..remainder }))
 }
 
-/// Evidence with all columns scaled by what is given, and the sizes found.
+/// Evidence with the columns of a kind scaled by what is given, and the sizes of causes and columns.
 type Explained<'a> = Box<dyn Fn(&[f64]) -> Option<(f64, Vec<f64>)> + 'a>;
 
 impl Kind {
-    /// Evidence of causes and of this remainder with all columns scaled, and the sizes found.
+    /// Evidence of causes and of this remainder.
     fn explained<'a>(
         &'a self,
         own: &Normal,
@@ -201,16 +233,26 @@ impl Kind {
         sides: &'a [Side],
         likelihood: &'a Likelihood,
     ) -> Explained<'a> {
-        if let Likelihood::Gaussian { whitener, scale } = likelihood {
-            let joint = self.joined(own, columns, residual);
-            return Box::new(move |scales| scaled_evidence(&joint, scales, sides, *scale, whitener.rows()));
+        let all_scales = move |scales: &[f64]| [vec![1.0; columns.len()].as_slice(), scales].concat();
+        match (&self.form, likelihood) {
+            (Form::Blocks(blocks), Likelihood::Gaussian { scale, .. }) => {
+                let beside = blocks.beside(columns, residual);
+                Box::new(move |scales| beside.evidence(scales, sides, *scale))
+            }
+            (Form::Whole { white, gram }, Likelihood::Gaussian { whitener, scale }) => {
+                let joint = joined(white, gram, own, columns, residual);
+                Box::new(move |scales| scaled_evidence(&joint, &all_scales(scales), sides, *scale, whitener.rows()))
+            }
+            (Form::Classes(white) | Form::Whole { white, .. }, _) => Box::new(move |scales| {
+                let all = columns.iter().copied().chain(white);
+                let scaled: Vec<White> =
+                    all.zip(all_scales(scales)).map(|(column, scale)| column.times(scale)).collect();
+                let evidence = likelihood.evidence(&scaled.iter().collect::<Vec<_>>(), residual, sides)?;
+                Some((evidence.log_z, evidence.t))
+            }),
+            // Blocks are made of values only.
+            (Form::Blocks(_), Likelihood::Classes(_)) => Box::new(|_| None),
         }
-        Box::new(move |scales| {
-            let all = columns.iter().copied().chain(&self.white);
-            let scaled: Vec<White> = all.zip(scales).map(|(column, scale)| column.times(*scale)).collect();
-            let evidence = likelihood.evidence(&scaled.iter().collect::<Vec<_>>(), residual, sides)?;
-            Some((evidence.log_z, evidence.t))
-        })
     }
 
     /// Posterior standard deviation of a remainder at every row, beside causes with these columns.
@@ -222,10 +264,14 @@ impl Kind {
         likelihood: &Likelihood,
     ) -> Option<Vec<f64>> {
         let causes = columns.len();
-        let joint = match likelihood {
-            Likelihood::Gaussian { .. } => self.joined(&Normal::of(columns, residual), columns, residual),
-            Likelihood::Classes(_) => {
-                let all: Vec<&White> = columns.iter().copied().chain(&self.white).collect();
+        let rows = self.columns.first().map_or(0, Sparse::length);
+        let joint = match &self.form {
+            Form::Blocks(blocks) => {
+                return blocks.beside(columns, residual).deviation(&remainder.prior_sd, &self.columns, rows);
+            }
+            Form::Whole { white, gram } => joined(white, gram, &Normal::of(columns, residual), columns, residual),
+            Form::Classes(white) => {
+                let all: Vec<&White> = columns.iter().copied().chain(white).collect();
                 let sizes = remainder.of_causes.iter().chain(&remainder.amplitudes);
                 let left = all
                     .iter()
@@ -240,33 +286,33 @@ impl Kind {
             joint.gram[(i, j)] * scale(i) * scale(j) + f64::from(u8::from(i == j))
         });
         let factor = Cholesky::new(a)?;
-        let rows = self.columns.first().map_or(0, Vec::len);
         let of_row = |row: usize| {
-            let of = |i: usize| if i < causes { 0.0 } else { self.columns[i - causes][row] * scale(i) };
+            let of = |i: usize| if i < causes { 0.0 } else { self.columns[i - causes].at(row) * scale(i) };
             factor.l_dirty().solve_lower_triangular(&DVector::from_fn(count, |i, _| of(i))).map(|half| half.norm())
         };
         (0..rows).map(of_row).collect()
     }
+}
 
-    fn joined(&self, own: &Normal, columns: &[&White], residual: &White) -> Normal {
-        let (causes, free) = (columns.len(), self.white.len());
-        let mut gram = DMatrix::zeros(causes + free, causes + free);
-        gram.view_mut((0, 0), (causes, causes)).copy_from(&own.gram);
-        gram.view_mut((causes, causes), (free, free)).copy_from(&self.gram);
-        for (i, column) in columns.iter().enumerate() {
-            for (j, white) in self.white.iter().enumerate() {
-                let product = column.inner(white);
-                gram[(i, causes + j)] = product;
-                gram[(causes + j, i)] = product;
-            }
+/// Inner products of causes and of the columns of a remainder together.
+fn joined(white: &[White], gram: &DMatrix<f64>, own: &Normal, columns: &[&White], residual: &White) -> Normal {
+    let (causes, free) = (columns.len(), white.len());
+    let mut all = DMatrix::zeros(causes + free, causes + free);
+    all.view_mut((0, 0), (causes, causes)).copy_from(&own.gram);
+    all.view_mut((causes, causes), (free, free)).copy_from(gram);
+    for (i, column) in columns.iter().enumerate() {
+        for (j, white) in white.iter().enumerate() {
+            let product = column.inner(white);
+            all[(i, causes + j)] = product;
+            all[(causes + j, i)] = product;
         }
-        let mut right = DVector::zeros(causes + free);
-        right.rows_mut(0, causes).copy_from(&own.right);
-        for (j, white) in self.white.iter().enumerate() {
-            right[causes + j] = white.inner(residual);
-        }
-        Normal { gram, right, square: own.square }
     }
+    let mut right = DVector::zeros(causes + free);
+    right.rows_mut(0, causes).copy_from(&own.right);
+    for (j, white) in white.iter().enumerate() {
+        right[causes + j] = white.inner(residual);
+    }
+    Normal { gram: all, right, square: own.square }
 }
 
 /// [`Normal::evidence`] with every column scaled, and without the inverse of what nobody asks for.
@@ -285,8 +331,7 @@ fn scaled_evidence(
     let factor = Cholesky::new(a)?;
     let t = factor.solve(&right);
     let q = (normal.square - right.dot(&t)).max(0.0);
-    let log_det: f64 = factor.l_dirty().diagonal().iter().map(|d| 2.0 * d.ln()).sum();
-    let mut log_z = scale.log_likelihood(q, rows) - 0.5 * log_det;
+    let mut log_z = scale.log_likelihood(q, rows) - 0.5 * log_det(&factor);
     for (i, side) in sides.iter().enumerate() {
         if let Some(sign) = side.sign() {
             let mut unit = DVector::zeros(count);
@@ -296,4 +341,96 @@ fn scaled_evidence(
         }
     }
     Some((log_z, t.as_slice().to_vec()))
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::super::data::Layout;
+    use super::super::noise::{Noise, NoiseSource};
+    use super::super::whiten::Whitener;
+    use super::*;
+    use crate::calculator::{Design, Grouping};
+
+    const RUNS: usize = 4;
+    const ROWS: usize = 13 * RUNS;
+
+    fn wave(row: usize, frequency: f64) -> f64 {
+        (frequency * row as f64 + 0.3).sin()
+    }
+
+    /// Four runs of two sweeps each, rows in turn, with a grouping across the runs.
+    fn data() -> Data {
+        let run = |row: usize| row % RUNS;
+        let sweep = |k: usize| (0..ROWS).filter(|&row| run(row) == k / 2 && row / 20 == k % 2).collect();
+        let design = Design {
+            smooth: Smooth::Along((0..ROWS).map(|row| row as f64 / ROWS as f64).collect()),
+            cell: (0..ROWS).collect(),
+            regressors: Vec::new(),
+            groupings: vec![Grouping { name: "third", group: (0..ROWS).map(|row| row % 3).collect() }],
+            order: None,
+            fold: (0..ROWS).map(run).collect(),
+        };
+        let layout = Layout {
+            traces: (0..2 * RUNS).map(sweep).collect(),
+            run_of_trace: (0..2 * RUNS).map(|k| k / 2).collect(),
+            design,
+        };
+        Data { value: (0..ROWS).map(|row| wave(row, 0.7)).collect(), uncertainty: None, sides: None, layout }
+    }
+
+    /// A set-up of every run, one level of all runs, and one of two.
+    fn likelihood(data: &Data, rho: f64, keep: &[bool]) -> Likelihood {
+        let of = |acts: &dyn Fn(usize) -> bool, by: f64| {
+            Sparse::new(ROWS, (0..ROWS).filter(|row| acts(*row)).map(|row| (row, by * (1.0 + wave(row, 0.11)))))
+        };
+        let mut nuisances: Vec<Sparse> = (0..RUNS).map(|k| of(&|row| row % RUNS == k, 2.0)).collect();
+        nuisances.push(of(&|_| true, 0.7));
+        nuisances.push(of(&|row| row % RUNS < 2, 0.4));
+        let noise = Noise { sigma: 0.3, per_row: None, rho, dof: 20.0, source: NoiseSource::Profile };
+        Likelihood::Gaussian { whitener: Whitener::new(data, &noise, &nuisances, keep), scale: Scale::SameRows }
+    }
+
+    #[test]
+    fn block_by_block_is_what_it_is_as_a_whole() {
+        let data = data();
+        // One row is left out, and in the second case a whole run.
+        let cases: [(f64, fn(usize) -> bool); 2] = [(0.3, |row| row != 7), (0.0, |row| row % RUNS != 2)];
+        for (rho, keep) in cases {
+            let keep: Vec<bool> = (0..ROWS).map(keep).collect();
+            let likelihood = likelihood(&data, rho, &keep);
+            let white =
+                |frequency: f64| likelihood.white(&(0..ROWS).map(|row| wave(row, frequency)).collect::<Vec<_>>());
+            let (causes, residual) = ([white(0.05), white(0.4)], likelihood.white(&data.value));
+            let (causes, sides) = (causes.iter().collect::<Vec<_>>(), [Side::Positive, Side::Both]);
+            let own = Normal::of(&causes, &residual);
+            let kinds = kinds(&data, &likelihood, 0.3, &crate::calculator::Unwatched).unwrap();
+            let apart: Vec<&Kind> = kinds.iter().filter(|kind| matches!(kind.form, Form::Blocks(_))).collect();
+            // Levels of rows that a correlation ties together are one block.
+            assert_eq!(apart.len(), if rho > 0.0 { 1 } else { 2 });
+            for kind in apart {
+                let columns = || kind.columns.clone();
+                let form = Form::whole(columns().iter().map(|column| likelihood.white(&column.dense())).collect());
+                let spreads = kind.spreads.clone();
+                let whole = Kind { name: kind.name, columns: columns(), orders: None, form, spreads };
+                let prior_sd: Vec<f64> = (0..kind.columns.len()).map(|k| 0.5 + 0.4 * wave(k, 1.0)).collect();
+                let of = |kind: &Kind| {
+                    let (log_z, t) = kind.explained(&own, &causes, &residual, &sides, &likelihood)(&prior_sd).unwrap();
+                    let remainder = Remainder {
+                        log_z,
+                        kind: 0,
+                        amplitudes: Vec::new(),
+                        of_causes: Vec::new(),
+                        prior_sd: prior_sd.clone(),
+                    };
+                    let deviation = kind.deviation(&remainder, &causes, &residual, &likelihood).unwrap();
+                    [vec![log_z], t, deviation].concat()
+                };
+                let (blocks, whole) = (of(kind), of(&whole));
+                assert_eq!(blocks.len(), whole.len());
+                let near = blocks.iter().zip(&whole).all(|(a, b)| (a - b).abs() < 1e-10 * (1.0 + b.abs()));
+                assert!(near, "{}: {blocks:?} {whole:?}", kind.name);
+            }
+        }
+    }
 }

@@ -1,6 +1,6 @@
 //! Evidence of a linear Gaussian hypothesis (`diagnosis/3.4`).
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::noise::{Noise, NoiseSource};
 use super::whiten::White;
@@ -141,11 +141,16 @@ impl Normal {
         let factor = Cholesky::new(a)?;
         let t = factor.solve(&self.right);
         let q = (self.square - self.right.dot(&t)).max(0.0);
-        let log_det: f64 = factor.l_dirty().diagonal().iter().map(|d| 2.0 * d.ln()).sum();
         let covariance = factor.inverse();
-        let log_z = -0.5 * log_det + scale.log_likelihood(q, rows) + one_sided(sides, t.as_slice(), &covariance);
+        let log_z =
+            -0.5 * log_det(&factor) + scale.log_likelihood(q, rows) + one_sided(sides, t.as_slice(), &covariance);
         Some(Evidence { log_z, t: t.as_slice().to_vec(), covariance, q })
     }
+}
+
+/// ln |A|, by the factor of A.
+pub(super) fn log_det(factor: &Cholesky<f64, Dyn>) -> f64 {
+    factor.l_dirty().diagonal().iter().map(|d| 2.0 * d.ln()).sum()
 }
 
 /// Sum of ln 2 Phi(s_i t_i / sd_i) over the sizes that lie on one side of zero only.

@@ -3,6 +3,7 @@
 use super::data::Data;
 use super::outlier::{Outliers, outliers};
 use super::signatures::Signatures;
+use super::sparse::Sparse;
 use super::subject::Subject;
 use crate::calculator::{Failure, Monitor};
 
@@ -21,7 +22,10 @@ pub struct Foundation<'a> {
     /// Standard deviation of every row, where the scatter has heavy tails.
     pub heavy_tails: Option<Vec<f64>>,
     pub(super) signatures: Signatures,
-    pub(super) nuisances: Vec<Vec<f64>>,
+    /// One standard deviation of every allowance; most act in one run only.
+    pub(super) nuisances: Vec<Sparse>,
+    /// Variance of every row by all allowances.
+    pub(super) allowed: Vec<f64>,
 }
 
 impl<'a> Foundation<'a> {
@@ -33,8 +37,12 @@ impl<'a> Foundation<'a> {
         let rows = data.value.iter().zip(&base).zip(&predicted);
         let residual: Vec<f64> = rows.map(|((y, f), ok)| if *ok { y - f } else { 0.0 }).collect();
         let signatures = Signatures::of(subject, &base, &residual, monitor)?;
-        let nuisances = subject.nuisances()?;
-        Ok(Self { subject, data, base, predicted, residual, heavy_tails: None, signatures, nuisances })
+        let nuisances: Vec<Sparse> = subject.nuisances()?.iter().map(|column| Sparse::of(column)).collect();
+        let mut allowed = vec![0.0; data.value.len()];
+        for column in &nuisances {
+            column.entries().for_each(|(row, value)| allowed[row] += value * value);
+        }
+        Ok(Self { subject, data, base, predicted, residual, heavy_tails: None, signatures, nuisances, allowed })
     }
 
     /// Rows that stand alone.

@@ -5,6 +5,7 @@ use super::class_likelihood::ClassLikelihood;
 use super::data::Data;
 use super::evidence::{Evidence, Normal, Scale, Side};
 use super::noise::Noise;
+use super::sparse::Sparse;
 use super::whiten::{White, Whitener};
 
 /// How well a prediction explains the rows.
@@ -22,7 +23,7 @@ pub(super) enum Likelihood {
 
 impl Likelihood {
     /// Of the rows that are kept; `nuisances` at one standard deviation of every allowance, in the unit of the rows.
-    pub(super) fn of(data: &Data, noise: &Noise, nuisances: &[Vec<f64>], keep: &[bool]) -> Self {
+    pub(super) fn of(data: &Data, noise: &Noise, nuisances: &[Sparse], keep: &[bool]) -> Self {
         match &data.sides {
             None => Self::Gaussian { whitener: Whitener::new(data, noise, nuisances, keep), scale: Scale::of(noise) },
             Some(sides) => Self::Classes(ClassLikelihood::new(sides, noise, nuisances, keep)),

@@ -20,6 +20,7 @@
 mod adequacy;
 mod base;
 mod basis;
+mod blocks;
 mod calculator;
 mod class_likelihood;
 mod classes;
@@ -49,6 +50,7 @@ mod report;
 mod said;
 mod search;
 mod signatures;
+mod sparse;
 mod subject;
 mod survey;
 mod suspect;

@@ -5,6 +5,7 @@ use super::calculator::JobOf;
 use super::data::{Data, Layout};
 use super::identify::Signature;
 use super::input::DiagnosisOptions;
+use super::sparse::Sparse;
 use super::subject::{Setting, Subject};
 use super::weigh::{SetWeight, Verdict, Weighing};
 use super::whiten::Whitener;
@@ -157,6 +158,7 @@ fn separation_with<M: Diagnosable>(
     keep.resize(all.points.len(), true);
     // Nor one that the model cannot run.
     let Ok(nuisances) = bound.nuisances() else { return Ok(None) };
+    let nuisances: Vec<Sparse> = nuisances.iter().map(|column| Sparse::of(column)).collect();
     if classes {
         // About the leader, as it is taken to be right.
         let with = bound.predict(&of_leader)?;

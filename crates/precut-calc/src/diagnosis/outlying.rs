@@ -3,6 +3,7 @@
 use nalgebra::{Cholesky, DMatrix};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use super::sparse::Sparse;
 use super::weigh::{Verdict, Weighing};
 use super::whiten::Whitener;
 
@@ -61,7 +62,10 @@ impl HeldRun {
             let lower = Cholesky::new(fit.covariance.clone()).map_or_else(alone, Cholesky::unpack);
             allowed.extend((0..fit.free.len()).map(|k| {
                 let of_row = |row: usize| (k..fit.free.len()).map(|i| fit.slopes[i][row] * lower[(i, k)]).sum();
-                (0..predicted.len()).map(of_row).collect()
+                Sparse::new(
+                    predicted.len(),
+                    (0..predicted.len()).filter(|&row| keep[row]).map(|row| (row, of_row(row))),
+                )
             }));
         }
         let whitener = Whitener::new(foundation.data, &without.noise, &allowed, &keep);

@@ -6,7 +6,7 @@ use super::evidence::{Normal, Side};
 use super::likelihood::Likelihood;
 use super::subject::{Setting, Subject};
 use super::whiten::White;
-use crate::calculator::{Failure, Hypothesis, Range, Shape, Treatment, Variable};
+use crate::calculator::{Failure, Hypothesis, Monitor, Range, Shape, Treatment, Variable, checkpoint};
 
 /// Steps where only amplitudes are free.
 const STEPS: usize = 4;
@@ -129,6 +129,7 @@ pub(super) struct Refinement<'a> {
     pub(super) likelihood: &'a Likelihood,
     /// Whether the model is far from linear in its sizes.
     pub(super) nonlinear: bool,
+    pub(super) monitor: &'a dyn Monitor,
 }
 
 impl Refinement<'_> {
@@ -155,6 +156,7 @@ impl Refinement<'_> {
         // Of the settings, where the step before has predicted it.
         let mut known: Option<Vec<f64>> = None;
         loop {
+            checkpoint(self.monitor)?;
             let raw = match known.take() {
                 Some(raw) => raw,
                 None => match self.raw_residual(&settings)? {
@@ -188,6 +190,7 @@ impl Refinement<'_> {
             if self.nonlinear && with_shapes && longest >= SETTLED && step < most {
                 let cost_here = self.cost(&raw, &before, &free, &coordinates);
                 for share in SHORTENED {
+                    checkpoint(self.monitor)?;
                     known = self.raw_residual(&settings)?;
                     let cost = known.as_ref().map(|raw| self.cost(raw, &settings, &free, &coordinates));
                     if cost.is_some_and(|cost| cost <= cost_here) {

@@ -49,7 +49,7 @@ pub fn remainder_shape(weighing: &Weighing<'_>) -> Option<RemainderShape> {
     let rows = weighing.keep.len();
     let mut value = vec![0.0; rows];
     for (column, amplitude) in kind.columns.iter().zip(&remainder.amplitudes) {
-        value.iter_mut().zip(column).for_each(|(v, c)| *v += amplitude * c);
+        column.add_to(&mut value, *amplitude);
     }
     let deviation = weighing.remainder_deviation(set, kind, remainder).unwrap_or_default();
     let named = weighing.foundation.subject.predict(&set.settings).ok()?;
@@ -64,7 +64,7 @@ pub fn remainder_shape(weighing: &Weighing<'_>) -> Option<RemainderShape> {
     let spectrum = kind.orders.as_ref().map_or_else(Vec::new, |orders| spectrum(orders, &remainder.amplitudes));
     let left: Vec<f64> = (0..rows).map(left).collect();
     let step = step(weighing, &left, &kept);
-    let with_base = (kind.name == "common").then(|| with_base(weighing, &left, &value, &kept)).flatten();
+    let with_base = (kind.name == "common").then(|| with_base(weighing, &left, &value)).flatten();
     Some(RemainderShape { kind: kind.name, value, deviation, spectrum, rms, extreme_row, explained, step, with_base })
 }
 
@@ -101,11 +101,11 @@ struct RunSize {
 
 /// Regression of the size of a common shape in every run, a_i, on what the base predicts there, F_i:
 /// a_i = a (1 + p (F_i/F - 1)), F the mean of F_i; p and its standard deviation.
-fn with_base(weighing: &Weighing<'_>, left: &[f64], shape: &[f64], kept: &[usize]) -> Option<(f64, f64)> {
+fn with_base(weighing: &Weighing<'_>, left: &[f64], shape: &[f64]) -> Option<(f64, f64)> {
     let foundation = weighing.foundation;
     let mut runs: Vec<RunSize> = Vec::new();
     for run in 0..=*foundation.data.layout.run_of_trace.iter().max()? {
-        let rows: Vec<usize> = weighing.rows_of_run(run).into_iter().filter(|row| kept.contains(row)).collect();
+        let rows: Vec<usize> = weighing.rows_of_run(run);
         let sum = |of: &dyn Fn(usize) -> f64| rows.iter().map(|&row| of(row)).sum::<f64>();
         // Set-ups differ from run to run: levels are taken out.
         let count = rows.len() as f64;

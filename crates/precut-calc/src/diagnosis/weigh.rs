@@ -187,6 +187,7 @@ impl<'a> Weighing<'a> {
             keep: &keep,
             likelihood: &linear.likelihood,
             nonlinear: effort.nonlinear,
+            monitor,
         };
         let mut ranking = Ranking { candidates, fits: Vec::new(), others: (Vec::new(), Vec::new()) };
         ranking.refine(&linear, &refinement, effort.leaders, effort.of_each_size, monitor)?;
@@ -197,7 +198,7 @@ impl<'a> Weighing<'a> {
         if effort.other_optima {
             ranking.look_elsewhere(&linear, &refinement)?;
         }
-        let kinds = discrepancy::kinds(data, &linear.likelihood, noise.sigma);
+        let kinds = discrepancy::kinds(data, &linear.likelihood, noise.sigma, monitor)?;
         let mut weighed = ranking.weigh(&linear, &kinds, monitor)?;
         let total = log_sum_exp(&weighed.iter().map(|set| set.0).collect::<Vec<_>>());
         weighed.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.1.members.cmp(&b.1.members)));
@@ -263,6 +264,7 @@ impl<'a> Weighing<'a> {
             keep: &self.keep,
             likelihood: &self.linear.likelihood,
             nonlinear: dear,
+            monitor,
         };
         let of_fit = |k: &usize| {
             let (member, variable) = fit.free[*k];
@@ -333,8 +335,7 @@ impl<'a> Weighing<'a> {
     /// Variance of a row: scatter and allowances.
     pub(super) fn own_variance(&self, row: usize) -> f64 {
         let sigma = self.noise.per_row.as_ref().map_or(self.noise.sigma, |own| own[row]);
-        let allowed: f64 = self.foundation.nuisances.iter().map(|column| column[row] * column[row]).sum();
-        sigma * sigma + allowed
+        sigma * sigma + self.foundation.allowed[row]
     }
 
     /// Columns of a fit in the coordinates of `whitener`, each up to a factor.
@@ -495,8 +496,7 @@ impl Ranking {
         let empty = self.candidates.iter().filter(|c| c.members.is_empty());
         let leading = self.candidates.iter().filter(|c| !c.members.is_empty()).take(WITH_REMAINDER - 1);
         for candidate in empty.chain(leading) {
-            checkpoint(monitor)?;
-            if let Some(remainder) = self.beside(linear, kinds, candidate) {
+            if let Some(remainder) = self.beside(linear, kinds, candidate, monitor)? {
                 let log_weight = remainder.log_z + candidate.log_prior + REMAINDER_PRIOR.ln();
                 weighed.push((log_weight, self.set(linear, candidate, Some(remainder))));
             }
@@ -512,9 +512,15 @@ impl Ranking {
         Left { columns, residual: &residual, rows: whitener.rows(), noise }.probability(low_order)
     }
 
-    fn beside(&self, linear: &Linear<'_>, kinds: &[Kind], candidate: &Candidate) -> Option<Remainder> {
+    fn beside(
+        &self,
+        linear: &Linear<'_>,
+        kinds: &[Kind],
+        candidate: &Candidate,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<Remainder>, Failure> {
         let (columns, residual, sides) = self.parts(linear, candidate);
-        discrepancy::beside(kinds, &columns, &residual, &sides, &linear.likelihood)
+        discrepancy::beside(kinds, &columns, &residual, &sides, &linear.likelihood, monitor)
     }
 
     /// Columns of a set, the residual that they are to explain, and their sides: about the fit where it was made.

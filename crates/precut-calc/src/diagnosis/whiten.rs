@@ -4,16 +4,22 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::basis::dot;
 use super::data::Data;
+use super::evidence::log_det;
 use super::noise::{Noise, decorrelated};
+use super::sparse::Sparse;
 
 /// C^-1 as an inner product, without ever forming C: rows are decorrelated and divided by sigma, the few
 /// columns of N are then taken out by the identity (I + N N')^-1 = I - N (I + N'N)^-1 N'.
 #[derive(Debug, Clone)]
 pub(super) struct Whitener {
     traces: Vec<Vec<usize>>,
+    /// Trace of every row that counts.
+    trace_of: Vec<Option<usize>>,
+    /// Where every trace begins among the whitened rows.
+    starts: Vec<usize>,
     sigma: Vec<f64>,
     rho: f64,
-    nuisances: Vec<Vec<f64>>,
+    nuisances: Vec<Sparse>,
     factor: Option<Cholesky<f64, Dyn>>,
     rows: usize,
 }
@@ -55,23 +61,44 @@ impl White {
 
 impl Whitener {
     /// `nuisances`: one standard deviation of every allowance, in the unit of the rows.
-    pub(super) fn new(data: &Data, noise: &Noise, nuisances: &[Vec<f64>], keep: &[bool]) -> Self {
+    pub(super) fn new(data: &Data, noise: &Noise, nuisances: &[Sparse], keep: &[bool]) -> Self {
         let traces: Vec<Vec<usize>> = data.layout.kept_traces(keep).into_iter().map(|(_, rows)| rows).collect();
         let sigma = noise.per_row.clone().unwrap_or_else(|| vec![noise.sigma; data.value.len()]);
-        let rows = traces.iter().map(Vec::len).sum();
-        let mut whitener = Self { traces, sigma, rho: noise.rho, nuisances: Vec::new(), factor: None, rows };
-        let white: Vec<Vec<f64>> = nuisances
-            .iter()
-            .map(|column| whitener.decorrelate(column))
-            .filter(|column| dot(column, column) > 0.0)
-            .collect();
+        let mut trace_of = vec![None; data.value.len()];
+        let mut starts = Vec::with_capacity(traces.len());
+        let mut rows = 0;
+        for (trace, of_trace) in traces.iter().enumerate() {
+            of_trace.iter().for_each(|&row| trace_of[row] = Some(trace));
+            starts.push(rows);
+            rows += of_trace.len();
+        }
+        let rho = noise.rho;
+        let mut whitener = Self { traces, trace_of, starts, sigma, rho, nuisances: Vec::new(), factor: None, rows };
+        let white = nuisances.iter().map(|column| whitener.sparse(column));
+        let white: Vec<Sparse> = white.filter(|column| column.inner(column) > 0.0).collect();
         if !white.is_empty() {
             let count = white.len();
-            let gram = DMatrix::from_fn(count, count, |i, j| dot(&white[i], &white[j]) + f64::from(u8::from(i == j)));
+            let mut gram = DMatrix::identity(count, count);
+            for i in 0..count {
+                for j in 0..=i {
+                    gram[(i, j)] += white[i].inner(&white[j]);
+                    gram[(j, i)] = gram[(i, j)];
+                }
+            }
             whitener.factor = Cholesky::new(gram);
             whitener.nuisances = white;
         }
         whitener
+    }
+
+    /// The allowances, decorrelated and in units of the scatter.
+    pub(super) fn nuisances(&self) -> &[Sparse] {
+        &self.nuisances
+    }
+
+    /// ln |I + N'N|; `None` where it has no factor.
+    pub(super) fn log_det_allowances(&self) -> Option<f64> {
+        if self.nuisances.is_empty() { Some(0.0) } else { self.factor.as_ref().map(log_det) }
     }
 
     /// Number of rows that count.
@@ -89,13 +116,25 @@ impl Whitener {
             .collect()
     }
 
+    /// The same of a column that is 0 on most rows: other traces are not looked at.
+    pub(super) fn sparse(&self, column: &Sparse) -> Sparse {
+        let mut touched: Vec<usize> = column.rows().iter().filter_map(|&row| self.trace_of[row]).collect();
+        touched.sort_unstable();
+        touched.dedup();
+        let of_trace = |trace: usize| {
+            let scaled: Vec<f64> = self.traces[trace].iter().map(|&row| column.at(row) / self.sigma[row]).collect();
+            (self.starts[trace]..).zip(decorrelated(&scaled, self.rho))
+        };
+        Sparse::new(self.rows, touched.into_iter().flat_map(of_trace))
+    }
+
     /// A column trace by trace, in units of the scatter, less what the allowances most probably explain of it.
     pub(super) fn beyond_allowances(&self, column: &[f64]) -> Vec<Vec<f64>> {
         let White { mut own, allowed } = self.white(column);
         if let Some(factor) = &self.factor {
             let along = factor.l_dirty().tr_solve_lower_triangular(&DVector::from_vec(allowed));
             for (size, nuisance) in along.iter().flat_map(|v| v.iter()).zip(&self.nuisances) {
-                own.iter_mut().zip(nuisance).for_each(|(r, n)| *r -= size * n);
+                nuisance.add_to(&mut own, -size);
             }
         }
         let mut rest = own.into_iter();
@@ -104,7 +143,8 @@ impl Whitener {
 
     pub(super) fn white(&self, column: &[f64]) -> White {
         let own = self.decorrelate(column);
-        let along = DVector::from_iterator(self.nuisances.len(), self.nuisances.iter().map(|n| dot(n, &own)));
+        let along =
+            DVector::from_iterator(self.nuisances.len(), self.nuisances.iter().map(|nuisance| nuisance.dot(&own)));
         let allowed = self.factor.as_ref().map_or_else(Vec::new, |factor| {
             factor.l_dirty().solve_lower_triangular(&along).map_or_else(Vec::new, |p| p.as_slice().to_vec())
         });
