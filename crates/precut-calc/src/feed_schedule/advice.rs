@@ -1,8 +1,9 @@
 //! What binds, what would help, where not to trust: codes with numbers.
 
 use crate::calculator::{Basis, Finding, Message};
-use crate::machinability::{Conditions, MachinabilityModel};
+use crate::machinability::{Conditions, MachinabilityModel, ModelForm};
 
+use super::binding::is_lower;
 use super::case::Case;
 use super::input::{Goal, Job};
 use super::models::Output;
@@ -242,10 +243,12 @@ fn unused(job: &Job, out: &mut Vec<Finding>) {
 /// What is to be said of the answer, the most important first.
 pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
     let mut out = Vec::new();
-    let percent = if matches!(job.objective, Goal::Hardening {}) { "percentage points" } else { "percent" };
+    let hardening = matches!(job.objective, Goal::Hardening {});
+    let percent = if hardening { "percentage points" } else { "percent" };
     match outcome.binding.first() {
         Some(first) => out.push(
             Message::new("limit_costs_most")
+                .with("looser", if is_lower(job, first) { "less" } else { "more" })
                 .with("constraint", first.constraint.clone())
                 .with("zone", first.zone.clone())
                 .with("gain_percent", first.gain_percent)
@@ -321,9 +324,13 @@ pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
         out.push(Message::new("rule_has_no_optimum"));
     } else {
         let gap = outcome.certificate.duality_gap.max(1e-16);
+        // A semi-log objective is minimised as it stands.
+        let plain =
+            hardening && job.models.get(Output::Hardening).is_some_and(|model| model.form == ModelForm::SemiLog);
         out.push(
             Message::new("optimum_within")
                 .with("gap", gap)
+                .with("gap_of", if plain { "objective" } else { "logarithm" })
                 .with("iterations", f64::from(outcome.certificate.iterations)),
         );
     }

@@ -1,6 +1,7 @@
 //! Which limits bind and what they cost: multipliers read back (`feed/6.6`).
 
 use super::case::Case;
+use super::input::Job;
 use super::output::Binding;
 use super::program::{Label, Place};
 use super::solve::Solved;
@@ -15,34 +16,41 @@ pub(super) fn binding(case: &Case, solved: &Solved) -> Vec<Binding> {
     let solution = &solved.certificate;
     let mut found: Vec<Binding> = Vec::new();
     for (row, label) in solved.built.rows.iter().enumerate() {
-        let multiplier = solution.row_multipliers[row] * solved.elasticity;
-        if multiplier > LEAST && label.kind.is_limit() {
-            found.push(one(case, label, multiplier, has_parallel(solved, row)));
+        let price = solution.row_multipliers[row];
+        if price * solved.elasticity > LEAST && label.kind.is_limit() {
+            found.push(one(case, solved, label, price, has_parallel(solved, row)));
         }
     }
     for (sum, label) in solved.built.sums.iter().enumerate() {
-        let multiplier = solution.sum_multipliers[sum] * solved.elasticity;
-        if multiplier > LEAST && label.kind.is_limit() {
-            found.push(one(case, label, multiplier, false));
+        let price = solution.sum_multipliers[sum];
+        if price * solved.elasticity > LEAST && label.kind.is_limit() {
+            found.push(one(case, solved, label, price, false));
         }
     }
-    let found = merged(found);
-    let mut found = found;
+    let mut found = merged(found);
     found.sort_by(|a, b| b.gain_percent.total_cmp(&a.gain_percent));
     found
 }
 
-fn one(case: &Case, label: &Label, multiplier: f64, degenerate: bool) -> Binding {
+/// Whether it is a lower limit: one percent less of it gains, not one percent more.
+pub(super) fn is_lower(job: &Job, bound: &Binding) -> bool {
+    let least = |min: Option<f64>| min.is_some_and(|min| min.total_cmp(&bound.limit).is_eq());
+    matches!(bound.constraint.as_str(), "rpm_min" | "feed_min" | "speed_min" | "tool_life_min")
+        || job.custom.iter().any(|custom| custom.name == bound.constraint && least(custom.min))
+}
+
+fn one(case: &Case, solved: &Solved, label: &Label, price: f64, degenerate: bool) -> Binding {
     let name = label.name(case);
-    let gain_percent = if label.plain { multiplier * label.limit } else { multiplier };
+    // A semi-log limit has its price per unit; one percent of it is so many units.
+    let per_share = if label.plain { label.limit } else { 1.0 };
     Binding {
         constraint: name.constraint,
         zone: name.zone,
         limit: label.limit,
         unit: label.unit.to_owned(),
-        multiplier,
+        multiplier: price * solved.elasticity,
         per_unit: label.plain,
-        gain_percent,
+        gain_percent: price * per_share * solved.gain,
         degenerate,
     }
 }

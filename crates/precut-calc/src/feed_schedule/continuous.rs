@@ -121,7 +121,7 @@ fn case_of_points(base: &Case, grid: &Grid, held: Option<&Held>) -> Case {
 }
 
 /// Adds a piece of a zone with the zone's custom limits.
-fn add_zone(case: &mut Case, base: &Case, zone: usize, piece: ZoneCase) {
+pub(super) fn add_zone(case: &mut Case, base: &Case, zone: usize, piece: ZoneCase) {
     let at = case.zones.len();
     case.zones.push(piece);
     for custom in base.custom.iter().filter(|custom| custom.zone == zone) {
@@ -321,6 +321,7 @@ fn solve_cells(case: &Case, gradient: Option<f64>, monitor: &dyn Monitor) -> Res
         objective,
         certificate: solution,
         elasticity: 1.0,
+        gain: 1.0,
         tie_broken: false,
         parts_per_edge: None,
         linearisations: 0,

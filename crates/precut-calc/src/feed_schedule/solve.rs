@@ -20,8 +20,11 @@ pub(super) struct Solved {
     pub objective: f64,
     /// Multipliers, residuals and gap belong to this.
     pub certificate: Solution,
-    /// What one unit of the program's multipliers is worth in the whole objective's elasticity.
+    /// What one unit of the program's multipliers is worth in the whole objective's elasticity; with the objective
+    /// `hardening` in percentage points.
     pub elasticity: f64,
+    /// What it is worth where a limit gives by one percent, in percent of the objective or percentage points.
+    pub gain: f64,
     pub tie_broken: bool,
     pub parts_per_edge: Option<u32>,
     /// Successive linearisations; 0 where none was needed.
@@ -134,16 +137,22 @@ fn finish(
     parts_per_edge: Option<u32>,
     conic: bool,
 ) -> Solved {
-    let (objective, elasticity) = match case.goal {
+    let (objective, elasticity, gain) = match case.goal {
         Goal::Time { .. } | Goal::Cost { .. } => {
             let varying = certificate.objective.exp();
-            (varying + built.fixed, varying / (varying + built.fixed))
+            let share = varying / (varying + built.fixed);
+            (varying + built.fixed, share, share)
         }
-        Goal::Deflection {} | Goal::Roughness {} => (certificate.objective.exp(), 1.0),
+        Goal::Deflection {} | Goal::Roughness {} => (certificate.objective.exp(), 1.0, 1.0),
         Goal::Hardening {} => {
             let plain =
                 case.zones.iter().filter_map(|zone| zone.model(Output::Hardening)).all(|m| !m.form(0.0, 0.0).log_log);
-            (if plain { certificate.objective } else { certificate.objective.exp() }, 1.0)
+            // Prices are in percentage points whichever way it is minimised.
+            let (percent, points) = match certificate.objective {
+                degree if plain => (degree, 1.0),
+                logarithm => (logarithm.exp(), logarithm.exp()),
+            };
+            (percent, points, points / 100.0)
         }
     };
     Solved {
@@ -152,6 +161,7 @@ fn finish(
         objective,
         certificate,
         elasticity,
+        gain,
         tie_broken,
         parts_per_edge,
         linearisations: 0,

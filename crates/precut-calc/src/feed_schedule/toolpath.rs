@@ -8,8 +8,9 @@ use crate::path::round_to_increment;
 use crate::shaft::FeedDirection;
 
 use super::assess;
-use super::case::Case;
+use super::case::{Case, TOUCHING_MM, ZoneCase};
 use super::compliance::Held;
+use super::continuous::add_zone;
 use super::input::{Job, SpeedMode, Variables};
 use super::output::{Outcome, ZoneOutcome};
 use super::program::{Built, Place, Variation, build};
@@ -223,23 +224,21 @@ fn limits_of_zones(job: &Job, outcome: &Outcome, held: Option<&Held>) -> Result<
     let mut case = base.clone();
     case.variables = Variables::default();
     if outcome.continuous.is_some() {
-        // Found zones take over the limits of the zone that they lie in.
+        // Found zones take over the limits of the zone that they lie in, and keep their own names.
         case.custom.clear();
-        case.zones = outcome
-            .zones
-            .iter()
-            .filter_map(|given| {
-                let own = base
-                    .zones
-                    .iter()
-                    .find(|own| own.from_mm <= given.z_start_mm + 1e-6 && own.to_mm >= given.z_end_mm - 1e-6)?;
-                let mut piece = own.clone();
-                (piece.from_mm, piece.to_mm) = (given.z_start_mm, given.z_end_mm);
-                piece.compliance_um_per_n = given.compliance_um_per_n;
-                piece.touches_next = false;
-                Some(piece)
-            })
-            .collect();
+        case.zones.clear();
+        for (k, given) in outcome.zones.iter().enumerate() {
+            let lies_in = |own: &ZoneCase| own.from_mm <= given.z_start_mm + 1e-6 && own.to_mm >= given.z_end_mm - 1e-6;
+            let zone = base.zones.iter().position(lies_in);
+            let zone = zone.ok_or_else(|| Failure::Internal("a found zone lies in none of the job's".to_owned()))?;
+            let mut piece = base.zones[zone].clone();
+            piece.id.clone_from(&given.id);
+            (piece.from_mm, piece.to_mm) = (given.z_start_mm, given.z_end_mm);
+            piece.compliance_um_per_n = given.compliance_um_per_n;
+            let next = outcome.zones.get(k + 1);
+            piece.touches_next = next.is_some_and(|next| (next.z_start_mm - given.z_end_mm).abs() <= TOUCHING_MM);
+            add_zone(&mut case, &base, zone, piece);
+        }
     }
     case.limits.deflection_spread_ratio_max = None;
     let at: Vec<(f64, f64)> =
