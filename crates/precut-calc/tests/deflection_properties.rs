@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
 use crate::support::{prepared, solved};
-use precut_calc::calculator::{ForwardModel, Rows, Unwatched};
+use precut_calc::calculator::{Calculator, Check, Finding, ForwardModel, Rows, Unwatched, Violations};
 use precut_calc::deflection_compensation::{
     DeflectionCompensation, DeflectionPoint, DeflectionRun, Job, Outcome, StatusCompensated,
 };
@@ -234,4 +234,82 @@ fn the_printed_tailstock_term_breaks_mirror_symmetry() {
     let bending = built - right(x, w, 2.0 * w);
     // What is left is the bending of a nearly rigid shaft: the quadratic term was built.
     assert!(bending > 0.0 && bending < 0.02 * w, "{bending:e}");
+}
+
+/// The source paper's shaft with weight partly along the tool, and a rest more.
+fn paper(rest: Option<Value>) -> Value {
+    let example = DeflectionCompensation::META.examples.iter().find(|example| example.id == "paper").unwrap();
+    let mut job: Value = serde_json::from_str(example.job).unwrap();
+    job["gravity"] = json!({ "angle_deg": -30 });
+    job["supports"].as_array_mut().unwrap().extend(rest);
+    job
+}
+
+/// Largest change of the diameter along the nominal line.
+fn change_um(job: &Value, change: impl Fn(&mut Value)) -> f64 {
+    let mut other = job.clone();
+    change(&mut other);
+    let (before, after) = (solved(job.clone()).stations, solved(other).stations);
+    let pairs = before.diameter_error_uncompensated_um.iter().zip(&after.diameter_error_uncompensated_um);
+    pairs.map(|(a, b)| (a.unwrap() - b.unwrap()).abs()).fold(0.0, f64::max)
+}
+
+/// What an effect that is left out would change, against the job solved with it: with a one-sided rest closed an order
+/// of magnitude less than with all rests open. The depth gives back what is copied, so the size is above the change.
+#[test]
+fn effects_left_out_are_judged_with_the_rests_as_they_stand() {
+    let steady =
+        json!({ "kind": "steady_rest", "z_mm": 1000, "compliance_um_per_n": 0.02, "one_sided": true, "gap_um": 20 });
+    let follow = json!({ "kind": "follow_rest", "offset_mm": -30, "compliance_um_per_n": 0.02, "one_sided": true, "gap_um": 10 });
+    for (name, rest) in [("none", None), ("steady", Some(steady)), ("follow", Some(follow))] {
+        let job = paper(rest);
+        let sizes = solved(job.clone()).second_order.unwrap();
+        let held = |what: &str, size: Option<f64>, change: f64| {
+            let size = size.unwrap();
+            assert!(size > 0.99 * change && size < 1.3 * change + 0.01, "{name}, {what}: {size} for {change}");
+        };
+        held("weight", sizes.weight_um, change_um(&job, |job| job["include"] = json!({ "weight": true })));
+        held("partly turned", sizes.partly_turned_um, change_um(&job, |job| job["shaft"]["section"] = json!("mixed")));
+        held("shear", sizes.shear_um, change_um(&job, |job| job["shaft"]["theory"] = json!("timoshenko")));
+    }
+}
+
+fn warnings(job: Value) -> Vec<Finding> {
+    DeflectionCompensation::run(&prepared(job), &Unwatched).unwrap().warnings
+}
+
+fn left_out(job: Value) -> Vec<String> {
+    let found = warnings(job).into_iter().filter(|warning| warning.code == "effect_left_out");
+    found.map(|warning| format!("{:?}", warning.values.get("effect").unwrap())).collect()
+}
+
+/// What acts by an effect is not left out; what passes do not count is, whatever the job says of the section.
+#[test]
+fn an_effect_that_acts_is_not_called_left_out() {
+    let says = |job: Value, what: &str| left_out(job).iter().any(|effect| effect.contains(what));
+    let mut job = paper(None);
+    assert!(says(job.clone(), "partly_turned"));
+    job["effects"] = json!([{ "kind": "uncut_side_stiffness" }]);
+    assert!(!says(job, "partly_turned"));
+    let mut passes = paper(None);
+    passes["shaft"]["section"] = json!("mixed");
+    assert!(!says(passes.clone(), "partly_turned"));
+    passes["passes"] = json!([{ "diameter_mm": 90.4 }, { "diameter_mm": 90 }]);
+    passes["tolerance"]["form_um"] = json!(1);
+    assert!(says(passes, "partly_turned_in_passes"));
+}
+
+/// A station beside the shaft is told the end that it lies beyond.
+#[test]
+fn a_station_beside_the_shaft_has_the_nearer_end_as_its_limit() {
+    for (z, end) in [(-1.0, 0.0), (2001.0, 2000.0)] {
+        let mut job = paper(None);
+        job["stations"] = json!({ "kind": "list", "z_mm": [z] });
+        let job: Job = serde_json::from_value(job).unwrap();
+        let mut violations = Violations::default();
+        job.check(&mut violations);
+        let found = violations.into_vec();
+        assert!(matches!(&found[..], [fault] if fault.code == "station_outside_shaft"), "{found:?}");
+        assert_eq!((found[0].value, found[0].limit), (Some(z), Some(end)));
+    }
 }

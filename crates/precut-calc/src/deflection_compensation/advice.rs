@@ -10,6 +10,7 @@ use super::grid::Grid;
 use super::input::{Job, Segment, Support, Theory};
 use super::output::{OneMoreRest, Outcome, Shares, StatusCompensated};
 use super::regime::Speed;
+use super::second_order::left_out;
 use super::stage::Stage;
 use super::structure::Structure;
 use crate::shaft::elastic::ends;
@@ -222,14 +223,14 @@ fn dominating(shares: &Shares) -> Message {
 }
 
 /// Where an input leaves the range in which the model holds.
-pub(super) fn warnings(job: &Job, grid: &Grid, stage: &Stage, outcome: &Outcome) -> Vec<Finding> {
+pub(super) fn warnings(job: &Job, grid: &Grid, acting: &Acting, stage: &Stage, outcome: &Outcome) -> Vec<Finding> {
     let extremes = Extremes::of(stage);
     let mut found = deflection_warnings(job, grid, &extremes);
     found.extend(passed_supports(job, grid));
     found.extend(structure_warnings(job, stage, outcome));
     found.extend(command_warnings(job, &extremes, outcome));
     found.extend(force_warnings(job, stage, &extremes));
-    found.extend(outcome.second_order.iter().flat_map(|sizes| super::second_order::left_out(job, sizes)));
+    found.extend(outcome.second_order.iter().flat_map(|sizes| left_out(job, acting, stage, sizes)));
     if let (Some(limit), Some(form)) = (job.tolerance.form_um, outcome.form_error_after_um)
         && form > limit
     {

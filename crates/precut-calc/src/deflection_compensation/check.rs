@@ -86,9 +86,8 @@ fn check_stations(job: &Job, violations: &mut Violations) {
     match &job.stations {
         Stations::List { z_mm } => {
             for (i, z) in z_mm.iter().enumerate() {
-                violations.require((0.0..=length).contains(z), || {
-                    Finding::new("station_outside_shaft", format!("/stations/z_mm/{i}")).measured(*z, length, "mm")
-                });
+                violations
+                    .require((0.0..=length).contains(z), || outside_shaft(format!("/stations/z_mm/{i}"), *z, length));
                 violations.require(i == 0 || *z > z_mm[i - 1], || {
                     Finding::new("stations_not_ascending", format!("/stations/z_mm/{i}")).measured(
                         *z,
@@ -110,6 +109,12 @@ fn check_stations(job: &Job, violations: &mut Violations) {
             });
         }
     }
+}
+
+/// A station beside the shaft, with the end that it lies beyond as the limit.
+pub(super) fn outside_shaft(pointer: String, z_mm: f64, length_mm: f64) -> Finding {
+    let end = if z_mm < 0.0 { 0.0 } else { length_mm };
+    Finding::new("station_outside_shaft", pointer).measured(z_mm, end, "mm").with("length_mm", length_mm)
 }
 
 fn check_stock_profile(job: &Job, violations: &mut Violations) {

@@ -12,6 +12,7 @@ use crate::num::beam::Profile;
 
 use super::DeflectionCompensation;
 use super::acting::{Acting, StructureChange};
+use super::check::outside_shaft;
 use super::consequence::consequences;
 use super::equilibrium::Engagement;
 use super::grid::{Grid, interpolate};
@@ -339,7 +340,7 @@ fn faults_of_rows(job: &Job, rows: &Rows<DeflectionRun, DeflectionPoint>) -> Vec
         }
         if !(0.0..=length).contains(&point.z_mm) {
             let at = format!("/measurements/{row}/z_mm");
-            faults.push(Finding::new("station_outside_shaft", at).measured(point.z_mm, length, "mm"));
+            faults.push(outside_shaft(at, point.z_mm, length));
         }
     }
     for (k, run) in rows.runs.iter().enumerate() {

@@ -187,7 +187,7 @@ fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
     let errors = Errors::of(&stage, driven.as_ref().map(|driven| driven.produced_mm.as_slice()));
     let mut outcome =
         Assembly { job, grid: &grid, acting: &acting, stage: &stage }.outcome(driven, passes, &errors, monitor)?;
-    let warnings = advice::warnings(job, &grid, &stage, &outcome);
+    let warnings = advice::warnings(job, &grid, &acting, &stage, &outcome);
     outcome.stations = columns(job, &acting, grid.z_mm, stage, errors);
     let explanation = advice::explanation(job, &outcome);
     monitor.progress(1.0, Message::new("stage_done"));

@@ -95,8 +95,7 @@ impl Line {
         let include = &job.include;
         let Profile { radial_mm_per_n, couple_per_n, tangential_mm_per_n, sag_radial_mm, sag_tangential_mm, contacts } =
             profile;
-        // Fed to the headstock the tool pushes the work toward -z at u = -r_t: a couple -r_t P_x (`deflection/4.1`).
-        let sign = if regime.direction == FeedDirection::ToHeadstock { -1.0 } else { 1.0 };
+        let sign = couple_sign(regime.direction);
         let arm_mm: Vec<f64> =
             if include.axial_moment { radii.target.iter().map(|r| sign * r).collect() } else { Vec::new() };
         // Without the moment the beam was not asked for the couple: both are empty.
@@ -313,6 +312,12 @@ pub(super) fn wanted(job: &Job) -> Wanted {
 /// Whether the main force acts on anything that is computed.
 fn needs_main(include: &Include) -> bool {
     include.tangential
+}
+
+/// Sign of the feed force's couple: fed to the headstock the tool pushes the work toward -z at u = -r_t, a couple
+/// -r_t P_x (`deflection/4.1`).
+pub(super) fn couple_sign(direction: FeedDirection) -> f64 {
+    if direction == FeedDirection::ToHeadstock { -1.0 } else { 1.0 }
 }
 
 /// Gravity across and along the radial direction, relative to g. Exact at the multiples of 90 degrees.

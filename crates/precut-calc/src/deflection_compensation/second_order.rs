@@ -3,12 +3,13 @@
 use std::f64::consts::PI;
 
 use crate::calculator::{Failure, Finding};
-use crate::num::beam::{Profile, Wanted};
+use crate::num::beam::{Profile, ToolLoad, Wanted};
 
 use super::acting::Acting;
 use super::grid::Grid;
-use super::input::{Job, Section, Segment, Support, Theory};
-use super::model::gravity_components;
+use super::input::{Include, Job, Section, Segment, Support, Theory};
+use super::laws::Loads;
+use super::model::{at, couple_sign, gravity_components, wanted};
 use super::output::SecondOrder;
 use super::stage::Stage;
 use super::structure::Structure;
@@ -16,27 +17,34 @@ use super::structure::Structure;
 const UM_PER_MM: f64 = 1e3;
 /// Stations at which the estimates are made: extrema of smooth functions, to a percent.
 const SAMPLES: usize = 33;
+/// The same with one-sided rests: where one opens the shaft gives way many times as far within a few millimetres.
+const SAMPLES_WITH_CONTACTS: usize = 257;
 /// Share of the form tolerance above which an effect that was left out is warned of.
 const NOTICEABLE_SHARE: f64 = 0.1;
 
 /// Codes of the warnings about effects that were left out.
 pub(super) const WARNING_CODES: &[&str] = &["effect_left_out"];
 
-/// Largest change of the diameter by every effect of second order.
+/// Largest change of the diameter by every effect of second order: the state under the same loads with it and without
+/// it, one-sided rests as they stand in each.
 pub(super) fn second_order(job: &Job, grid: &Grid, acting: &Acting, stage: &Stage) -> Result<SecondOrder, Failure> {
     let sample = Sample::of(grid, stage);
-    let wanted = Wanted { tangential: true, couple: true, weight: true };
-    let profile = stage.structure.beam.profile(&sample.z_mm, wanted);
     let variant = stage.variant(job, acting);
+    let all = Wanted { tangential: true, couple: true, weight: true };
+    let state = State::of(job, stage, &stage.structure, &sample, all);
+    let include = &job.include;
+    let with_include = |change: fn(&mut Include)| {
+        let mut other = include.clone();
+        change(&mut other);
+        sample.largest(|place| state.moved_mm(place, &other) - state.moved_mm(place, include))
+    };
     let change_by = |section: Section, theory: Theory| -> Result<f64, Failure> {
         let mut other = variant;
         other.section = section;
         other.theory = theory;
         let structure = Structure::of(job, &other)?;
-        let none = Wanted { tangential: false, couple: false, weight: false };
-        let changed = structure.beam.profile(&sample.z_mm, none).radial_mm_per_n;
-        let against = stage.structure.beam.profile(&sample.z_mm, none).radial_mm_per_n;
-        Ok(sample.largest(|k| (changed[k] - against[k]) * sample.passive_n[k]))
+        let changed = State::of(job, stage, &structure, &sample, wanted(job));
+        Ok(sample.largest(|place| changed.moved_mm(place, include) - state.moved_mm(place, include)))
     };
     let other_theory = match job.shaft.theory {
         Theory::EulerBernoulli => Theory::Timoshenko,
@@ -44,69 +52,99 @@ pub(super) fn second_order(job: &Job, grid: &Grid, acting: &Acting, stage: &Stag
     };
     let section = variant.section;
     let other_section = if section == Section::Mixed { Section::Finished } else { Section::Mixed };
+    let (main, feed) = (job.force.has_main(), job.force.has_feed());
     Ok(SecondOrder {
-        tangential_um: job.force.has_main().then(|| tangential_um(stage, &sample, &profile)),
-        axial_moment_um: job
-            .force
-            .has_feed()
-            .then(|| sample.largest(|k| sample.target_mm[k] * sample.feed_n[k] * profile.couple_per_n[k])),
-        weight_um: Some(weight_um(job, &sample, &profile)),
+        tangential_um: main.then(|| with_include(|include| include.tangential = !include.tangential)),
+        axial_moment_um: feed.then(|| with_include(|include| include.axial_moment = !include.axial_moment)),
+        weight_um: Some(with_include(|include| include.weight = !include.weight)),
         partly_turned_um: Some(change_by(other_section, job.shaft.theory)?),
         shear_um: Some(change_by(section, other_theory)?),
-        thrust_ratio: job.force.has_feed().then(|| thrust_ratio(job, &sample)),
+        thrust_ratio: feed.then(|| thrust_ratio(job, &sample)),
     })
 }
 
-/// Stations, forces and radii at which the estimates are made.
+/// A held shaft at the stations of a sample.
+struct State {
+    profile: Profile,
+    /// Direction of the feed force's couple.
+    sign: f64,
+    carriage_tangential_mm_per_n: f64,
+    /// Gravity across and along the radial direction, relative.
+    gravity: (f64, f64),
+}
+
+impl State {
+    fn of(job: &Job, stage: &Stage, structure: &Structure, sample: &Sample, wanted: Wanted) -> Self {
+        Self {
+            profile: structure.beam.profile(&sample.z_mm, wanted),
+            sign: couple_sign(stage.regime.direction),
+            carriage_tangential_mm_per_n: structure.carriage_tangential_mm_per_n,
+            gravity: gravity_components(job),
+        }
+    }
+
+    /// How far the work moves away on the radius, mm: Y + Z²/(2 r_t), less what the carriage yields. The rests that
+    /// touch are found for this load.
+    fn moved_mm(&self, place: &Place, include: &Include) -> f64 {
+        let Place { k, target_mm, loads } = *place;
+        let profile = &self.profile;
+        let (across, along) = if include.weight { self.gravity } else { (0.0, 0.0) };
+        let load = ToolLoad {
+            force_n: loads.passive_n,
+            couple_n_mm: if include.axial_moment { self.sign * target_mm * loads.feed_n } else { 0.0 },
+            gravity_radial: along,
+        };
+        let y = match &profile.contacts {
+            Some(contacts) => contacts.respond(k, load).displacement_mm,
+            None => {
+                profile.radial_mm_per_n[k] * load.force_n
+                    + at(&profile.couple_per_n, k) * load.couple_n_mm
+                    + at(&profile.sag_radial_mm, k) * load.gravity_radial
+            }
+        };
+        let main_n = if include.tangential { loads.main_n } else { 0.0 };
+        let z = (at(&profile.tangential_mm_per_n, k) + self.carriage_tangential_mm_per_n) * main_n
+            + at(&profile.sag_tangential_mm, k) * across;
+        y + z * z / (2.0 * target_mm)
+    }
+}
+
+/// A station of a sample under some loads.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    /// Index in the sample.
+    k: usize,
+    target_mm: f64,
+    loads: Loads,
+}
+
+/// Stations, radii and loads at which the estimates are made.
 struct Sample {
     z_mm: Vec<f64>,
-    target_mm: Vec<f64>,
-    passive_n: Vec<f64>,
-    main_n: Vec<f64>,
-    feed_n: Vec<f64>,
+    /// Every station under the loads of the nominal depth. Where rests open and close they do so elsewhere at the depth
+    /// really cut along the nominal line: then its loads, too.
+    places: Vec<Place>,
 }
 
 impl Sample {
     fn of(grid: &Grid, stage: &Stage) -> Self {
-        let mut sample = Self {
-            z_mm: Vec::new(),
-            target_mm: Vec::new(),
-            passive_n: Vec::new(),
-            main_n: Vec::new(),
-            feed_n: Vec::new(),
-        };
-        for i in grid.sample(SAMPLES) {
-            let loads = stage.cut.loads.of(i);
-            sample.z_mm.push(grid.z_mm[i]);
-            sample.target_mm.push(stage.radii.target[i]);
-            sample.passive_n.push(loads.passive_n);
-            sample.main_n.push(loads.main_n);
-            sample.feed_n.push(loads.feed_n);
+        let contacts = stage.line.has_contacts();
+        let chosen = grid.sample(if contacts { SAMPLES_WITH_CONTACTS } else { SAMPLES });
+        let mut places = Vec::new();
+        for (k, &i) in chosen.iter().enumerate() {
+            let target_mm = stage.radii.target[i];
+            places.push(Place { k, target_mm, loads: stage.cut.loads.of(i) });
+            if let Some(cut_mm) = stage.cut.uncompensated_depth_mm[i].filter(|_| contacts) {
+                places.push(Place { k, target_mm, loads: stage.line.nominal_loads(i, cut_mm) });
+            }
         }
-        sample
+        Self { z_mm: chosen.iter().map(|&i| grid.z_mm[i]).collect(), places }
     }
 
     /// Largest change of the diameter, um, of a change of the radius in mm.
-    fn largest(&self, radius_mm: impl Fn(usize) -> f64) -> f64 {
-        (0..self.z_mm.len()).map(|k| (2.0 * radius_mm(k)).abs() * UM_PER_MM).fold(0.0, f64::max)
+    fn largest(&self, radius_mm: impl Fn(&Place) -> f64) -> f64 {
+        self.places.iter().map(|place| (2.0 * radius_mm(place)).abs() * UM_PER_MM).fold(0.0, f64::max)
     }
-}
-
-/// e_d grows by z²/r_t.
-fn tangential_um(stage: &Stage, sample: &Sample, profile: &Profile) -> f64 {
-    let carriage = stage.structure.carriage_tangential_mm_per_n;
-    sample.largest(|k| {
-        let z = (profile.tangential_mm_per_n[k] + carriage) * sample.main_n[k];
-        z * z / (2.0 * sample.target_mm[k])
-    })
-}
-
-fn weight_um(job: &Job, sample: &Sample, profile: &Profile) -> f64 {
-    let (across, along) = gravity_components(job);
-    sample.largest(|k| {
-        let z = across * profile.sag_tangential_mm[k];
-        along * profile.sag_radial_mm[k] + z * z / (2.0 * sample.target_mm[k])
-    })
 }
 
 /// N/N_cr with N_cr = pi² E J/l² between supports, a quarter of it for a chuck alone, J of the thinnest segment.
@@ -119,19 +157,25 @@ fn thrust_ratio(job: &Job, sample: &Sample) -> f64 {
     let cantilever = carrying < 2 && job.supports.iter().any(|s| matches!(s, Support::Chuck { .. }));
     let fixity = if cantilever { 0.25 } else { 1.0 };
     let critical = fixity * PI * PI * job.shaft.modulus() * j / (length * length);
-    sample.feed_n.iter().copied().fold(0.0, f64::max) / critical
+    sample.places.iter().map(|place| place.loads.feed_n).fold(0.0, f64::max) / critical
 }
 
 /// Warnings about effects that are switched off although they would take a noticeable share of the tolerance.
-pub(super) fn left_out(job: &Job, sizes: &SecondOrder) -> Vec<Finding> {
+pub(super) fn left_out(job: &Job, acting: &Acting, stage: &Stage, sizes: &SecondOrder) -> Vec<Finding> {
     let Some(form_um) = job.tolerance.form_um else { return Vec::new() };
     let limit = NOTICEABLE_SHARE * form_um;
-    let section_mixed = job.shaft.section == Section::Mixed;
+    // What bends is not always what the job says: an effect may change it, and passes have their own section.
+    let mixed = stage.variant(job, acting).section == Section::Mixed;
+    let (partly_turned, section) = if job.passes.is_empty() {
+        ("partly_turned", "/shaft/section")
+    } else {
+        ("partly_turned_in_passes", "/passes")
+    };
     [
         ("tangential", "/include/tangential", sizes.tangential_um, job.include.tangential),
         ("axial_moment", "/include/axial_moment", sizes.axial_moment_um, job.include.axial_moment),
         ("weight", "/include/weight", sizes.weight_um, job.include.weight),
-        ("partly_turned", "/shaft/section", sizes.partly_turned_um, section_mixed),
+        (partly_turned, section, sizes.partly_turned_um, mixed),
         ("shear", "/shaft/theory", sizes.shear_um, job.shaft.theory == Theory::Timoshenko),
     ]
     .into_iter()
