@@ -3,8 +3,8 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::fixture_support::{checked, outcome, reference_job, solve, with};
-use precut_calc::calculator::{Calculator, Item};
+use crate::fixture_support::{checked, example, outcome, reference_job, said, solve, with};
+use precut_calc::calculator::{Calculator, Item, Message, Value as Said};
 use precut_calc::fixture_stability::{FirstLimit, FixtureStability, FixtureState};
 use serde_json::{Value, json};
 
@@ -217,4 +217,80 @@ fn steps_too_coarse_for_a_mode_are_warned_of() {
     let per_tooth = coarse.output.modes[0].natural_frequency_hz / coarse.output.engagement.tooth_frequency_hz;
     close(at.value.unwrap(), 64.0 / per_tooth, EXACT);
     assert!(!solve(&reference_job(1)).warnings.iter().any(|warning| warning.code == "simulation_too_coarse"));
+}
+
+fn number(said: &Message, name: &str) -> f64 {
+    match said.values.get(name) {
+        Some(Said::Number(number)) => *number,
+        other => panic!("{name}: {other:?}"),
+    }
+}
+
+/// A speed that is advised is better by every limit that the service knows, and the cut that is advised there is a good one.
+#[test]
+fn an_advised_speed_keeps_its_promise() {
+    // Limited by the amplitude; by chatter; with joints that harden, where nothing goes with a power of H.
+    let pneumatic = with(&example("pneumatic"), "/analyses", json!(["limits", "lobes"]));
+    let mut chattering = reference_job(1);
+    chattering["analyses"] = json!(["limits", "lobes"]);
+    chattering["lobes"] = json!({ "from_rpm": 300, "to_rpm": 1200, "speeds": 60 });
+    chattering["limits"] = json!({ "depths": 4 });
+    let mut hardening = with(&chattering, "/lobes", json!({ "from_rpm": 340, "to_rpm": 480, "speeds": 4 }));
+    hardening["effects"] = json!([{ "kind": "contact_hardening", "cubic_per_mm2": 40.0 }]);
+    let mut limited_by = Vec::new();
+    for job in [pneumatic, chattering, hardening] {
+        let answer = solve(&job);
+        let got = &answer.output;
+        let diagram = got.lobes.as_ref().unwrap();
+        let here = got.limits.as_ref().unwrap().first_mm.unwrap_or(got.depth_examined_mm);
+        for better in &diagram.better_speeds {
+            let limits = [better.chatter_mm, better.amplitude_mm, better.movable_opens_mm, better.fixed_opens_mm];
+            let allowed = limits.into_iter().flatten().fold(got.depth_examined_mm, f64::min);
+            assert!(allowed > 1.01 * here, "{better:?} {here}");
+            // As posted: the limits of the speed are those that its own answer has.
+            let there = outcome(&with(&posted(&job, better.spindle_speed_rpm, 1.0), "/analyses", json!(["limits"])));
+            if let (Some(amplitude), true) = (better.amplitude_mm, job["effects"].is_null()) {
+                close(there.limits.unwrap().amplitude_mm.unwrap(), amplitude, 1e-3);
+            }
+        }
+        let Some(advice) = said(&answer, "better_speed_is") else { continue };
+        let (speed, depth) = (number(advice, "spindle_speed_rpm"), number(advice, "depth_mm"));
+        let there = outcome(&posted(&job, speed, depth));
+        assert_eq!(there.verdict.state, FixtureState::Stable, "{advice:?}");
+        assert!(there.verdict.peak_to_peak_over_feed <= 1.0 && depth <= number(advice, "limit_mm"), "{advice:?}");
+        assert!(there.verdict.depth_margin.is_none_or(|margin| margin > 1.0 / 0.9), "{advice:?}");
+        // It is said with the digits it has.
+        let is_whole = |number: f64| (number - number.round()).abs() < 1e-6;
+        assert!(is_whole(100.0 * speed) && is_whole(1000.0 * depth), "{advice:?}");
+        if let Some(Said::Text(what)) = advice.values.get("what") {
+            limited_by.push(what.to_string());
+        }
+    }
+    assert!(limited_by.contains(&"amplitude".to_owned()) && limited_by.len() >= 2, "{limited_by:?}");
+}
+
+/// The same job at another speed and depth, for the verdict alone.
+fn posted(job: &Value, rpm: f64, depth_mm: f64) -> Value {
+    let feed = checked(job).unwrap().cut.feed_mm_per_tooth;
+    let mut job = with(job, "/analyses", json!(["verdict"]));
+    let cut = job["cut"].as_object_mut().unwrap();
+    for other in ["speed_m_per_min", "feed_mm_per_min"] {
+        cut.remove(other);
+    }
+    job["cut"]["spindle_speed_rpm"] = json!(rpm);
+    job["cut"]["feed_mm_per_tooth"] = json!(feed);
+    job["cut"]["depth_mm"] = json!(depth_mm);
+    job
+}
+
+/// What a job does not ask for has no figure, and the first is one that has something.
+#[test]
+fn figures_without_data_are_absent() {
+    let shown = |job: &Value| -> Vec<&'static str> {
+        let checked = checked(job).unwrap();
+        FixtureStability::figures(&checked, &outcome(job)).iter().map(|figure| figure.id).collect()
+    };
+    assert_eq!(shown(&example("opening")), ["oscillogram", "chip"]);
+    assert_eq!(shown(&example("paper")), ["oscillogram", "chip", "amplitude"]);
+    assert_eq!(shown(&with(&example("paper"), "/analyses", json!(["verdict"]))), [""; 0]);
 }

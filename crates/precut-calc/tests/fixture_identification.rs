@@ -5,7 +5,9 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::fixture_support::{outcome, reference};
-use precut_calc::calculator::{Answer, Calculator, Check, Failure, Figure, Message, Monitor, Unwatched, Violations};
+use precut_calc::calculator::{
+    Answer, Calculator, Check, Failure, Figure, Item, Message, Monitor, Unwatched, Value as Said, Violations,
+};
 use precut_calc::fixture_stability::Regeneration;
 use precut_calc::fixture_stability::identification::{
     FixtureIdentification, IdentificationJob, IdentificationOutcome, IdentifiedParameter,
@@ -118,6 +120,77 @@ fn scattered_readings_are_met_to_their_scatter() {
     let asked = |row: usize| got.rows[row - 1].clamp_fixed_n.max(got.rows[row - 1].clamp_movable_n);
     assert!((1..=10).all(|row| stated.contains(&row) == (asked(row) > 5000.0)), "{clamp:?}");
     assert!(answer.explanation.iter().any(|m| m.code == "identification_clamp_above"));
+    combinations_are_as_well_known_as_they_are_said_to_be(&answer);
+}
+
+/// What is said of a combination is what the standard errors and their correlations make of the words.
+fn combinations_are_as_well_known_as_they_are_said_to_be(answer: &Answer<IdentificationOutcome>) {
+    let got = &answer.output;
+    let relative = |i: usize| got.parameters[i].standard_error.unwrap() / got.parameters[i].value;
+    let covariance = |i: usize, j: usize| {
+        let names = [&got.parameters[i].name, &got.parameters[j].name];
+        let of = |pair: &&precut_calc::fixture_stability::identification::ParameterPair| {
+            [&pair.first, &pair.second] == names || [&pair.second, &pair.first] == names
+        };
+        let correlation = if i == j { 1.0 } else { got.correlations.iter().find(of).unwrap().correlation };
+        correlation * relative(i) * relative(j)
+    };
+    for (code, named) in [("identification_known_best", 2), ("identification_known_least", 2)] {
+        let message = answer.explanation.iter().find(|said| said.code == code).unwrap();
+        let (Some(Said::Text(text)), Some(Said::Number(share))) =
+            (message.values.get("combination"), message.values.get("share"))
+        else {
+            panic!("{message:?}")
+        };
+        let powers: Vec<(usize, f64)> = text
+            .split(' ')
+            .map(|part| {
+                let (name, power) = part.split_once('^').unwrap();
+                (got.parameters.iter().position(|p| p.name == name).unwrap(), power.parse().unwrap())
+            })
+            .collect();
+        let terms = powers.iter().flat_map(|(i, p)| powers.iter().map(move |(j, q)| p * q * covariance(*i, *j)));
+        let square: f64 = terms.sum();
+        // Errors that nearly cancel: the share's own digits are what is left of them.
+        assert!((square.sqrt() / share - 1.0).abs() < 1e-6, "{text}: {}, said {share}", square.sqrt());
+        assert_eq!(powers.len(), named, "{text}");
+        if code == "identification_known_least" {
+            assert_eq!(message.values.get("parameters"), Some(&Said::from(powers.len())));
+        }
+    }
+}
+
+/// Every curve says whose it is: no two of a picture are called the same where the table has several numbers of teeth.
+#[test]
+fn curves_of_several_cutters_are_told_apart() {
+    let job = checked(&example("paper_screw_vise")).unwrap();
+    let outcome = FixtureIdentification::run(&job, &Unwatched).unwrap().output;
+    for figure in FixtureIdentification::figures(&job, &outcome) {
+        let mut words = Vec::new();
+        for item in &figure.panels[0].items {
+            let (Item::Line { name, .. } | Item::Points { name, .. }) = item else { panic!("{item:?}") };
+            match figure.title.values.get(name) {
+                Some(Said::List(parts)) => words.push(format!("{parts:?}")),
+                _ => assert!(["table_opened", "table_exact"].contains(name), "{}: {name}", figure.id),
+            }
+        }
+        let count = words.len();
+        for teeth in [8.0, 12.0, 16.0] {
+            let told = format!("{:?}", Said::List(vec!["teeth".into(), teeth.into(), "1".into()]));
+            assert_eq!(words.iter().filter(|said| said.contains(&told)).count(), count / 3, "{told}: {words:?}");
+        }
+        words.sort_unstable();
+        words.dedup();
+        assert_eq!((words.len(), count), (count, if figure.id == "ratio" { 3 } else { 9 }), "{words:?}");
+    }
+    // One cutter at one speed needs no number.
+    let mut single = example("paper_screw_vise");
+    single["measurements"].as_array_mut().unwrap().retain(|row| row["teeth"] == 8);
+    let job = checked(&single).unwrap();
+    let outcome = FixtureIdentification::run(&job, &Unwatched).unwrap().output;
+    for figure in FixtureIdentification::figures(&job, &outcome) {
+        assert!(figure.title.values.is_empty(), "{:?}", figure.title);
+    }
 }
 
 #[test]

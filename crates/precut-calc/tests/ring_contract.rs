@@ -2,7 +2,8 @@
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
 use crate::ring_support::{codes, faults, run, try_run};
-use precut_calc::calculator::{Calculator, Failure, Glyph, Item};
+use precut_calc::calculator::{Calculator, Failure, Figure, Glyph, Item, Role, Unwatched, Value as Said};
+use precut_calc::ring_roundness::evaluation::RoundnessEvaluation;
 use precut_calc::ring_roundness::{Outcome, RingRoundness};
 use serde_json::{Value, json};
 
@@ -338,6 +339,58 @@ fn search_says_what_is_out_of_reach_and_what_would_help() {
     });
     let found = run(&job).output.roundness_um.unwrap();
     assert!((found - best.roundness_um).abs() < 1e-9, "{found} {best:?}");
+}
+
+fn figures(job: &Value) -> Vec<Figure> {
+    let outcome = run(job).output;
+    RingRoundness::figures(&serde_json::from_value(job.clone()).unwrap(), &outcome)
+}
+
+/// What a job does not ask for has no figure, and no panel of a figure is an empty frame.
+#[test]
+fn figures_and_panels_without_data_are_absent() {
+    let ids = |job: &Value| figures(job).iter().map(|figure| figure.id).collect::<Vec<_>>();
+    let example = |id: &str| -> Value {
+        let example = RingRoundness::META.examples.iter().find(|example| example.id == id).unwrap();
+        serde_json::from_str(example.job).unwrap()
+    };
+    assert_eq!(ids(&example("clear_start")), ["polar", "profile", "history", "spectrum"]);
+    let mut job = short();
+    job["analyses"] = json!(["linear_theory"]);
+    assert_eq!(ids(&job), ["spectrum"]);
+    for figure in figures(&short()) {
+        assert!(figure.panels.iter().all(|panel| !panel.items.is_empty()), "{}", figure.id);
+    }
+}
+
+/// The symbol is that of a steady rest of a lathe; a ring has supports.
+#[test]
+fn the_supports_of_a_ring_are_called_so() {
+    let polar = &figures(&short())[0];
+    let supports =
+        polar.panels[0].items.iter().filter(|item| matches!(item, Item::Glyph { glyph: Glyph::SteadyRest, .. }));
+    assert_eq!((polar.id, supports.count()), ("polar", 2));
+    assert_eq!(polar.title.values.get("glyph_steady_rest"), Some(&Said::from(vec!["supports"])));
+}
+
+/// No two curves of a roundness chart have one colour with one dash: the measured profile is drawn as the second of a family
+/// would be.
+#[test]
+fn the_circles_of_a_roundness_chart_look_unlike_its_profiles() {
+    let mut job = serde_json::from_str(RoundnessEvaluation::META.examples[0].job).unwrap();
+    RoundnessEvaluation::fill(&mut job);
+    let outcome = RoundnessEvaluation::run(&job, &Unwatched).unwrap().output;
+    let role = |figure: &Figure, wanted: &str| {
+        let found = figure.panels[0].items.iter().find_map(|item| match item {
+            Item::Line { name, role, .. } if *name == wanted => Some(*role),
+            _ => None,
+        });
+        found.unwrap_or_else(|| panic!("no line {wanted}"))
+    };
+    for figure in &RoundnessEvaluation::figures(&job, &outcome)[..2] {
+        assert_eq!(role(figure, "measured_profile"), Role::Before, "{}", figure.id);
+        assert!(![Role::Before, Role::Series(1)].contains(&role(figure, "circumscribed_circle")), "{}", figure.id);
+    }
 }
 
 /// The end of the cut is a step of the surface: cut on one side, a revolution older on the other. It is there that the

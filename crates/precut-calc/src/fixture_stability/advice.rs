@@ -2,14 +2,13 @@
 
 use crate::calculator::{Finding, Message};
 
-use super::answer::Study;
+use super::answer::{Aside, NEAR_LIMIT, Study};
 use super::input::Spindle;
-use super::output::{ChatterKind, FirstLimit, FixtureOutcome, FixtureState, OpenJoint};
+use super::output::{ChatterKind, ClampForce, FirstLimit, FixtureOutcome, FixtureState, OpenJoint};
+use super::simulate::Steady;
 
 /// Distance of the tooth frequency (or a harmonic) from a natural frequency that is worth a warning.
 const NEAR_RESONANCE: f64 = 0.1;
-/// Working depth over chatter limit that is worth a warning.
-const NEAR_CHATTER: f64 = 0.9;
 /// Oscillations per tooth period above which lobes merge.
 const MERGED_LOBES: f64 = 50.0;
 /// Difference of the zeroth-order limit that is worth saying.
@@ -18,6 +17,8 @@ const ZEROTH_OFF: f64 = 0.05;
 const COARSEST_STEPS: f64 = 24.0;
 /// Damping ratio below which a limit hangs on its damping alone.
 const UNDAMPED: f64 = 1e-6;
+/// A multiplier beyond 1 by no more than this is 1 to round-off: of what has no damping.
+const ROUND_OFF: f64 = 1e-9;
 
 /// Codes of the warnings made here.
 pub(super) const WARNING_CODES: &[&str] = &[
@@ -30,6 +31,7 @@ pub(super) const WARNING_CODES: &[&str] = &[
     "directional_factor_reversed",
     "no_clamp_force",
     "simulation_diverged",
+    "simulation_thrown",
     "multiplier_not_converged",
     "depth_not_examined",
     "verdict_by_simulation",
@@ -55,6 +57,8 @@ pub(super) const EXPLANATION_CODES: &[&str] = &[
     "spindle_limits_depth",
     "clamp_force_needed",
     "clamp_force_only_inertia",
+    "clamp_force_in_chatter",
+    "clamp_force_unknown",
     "opening_is_unstable",
     "opening_stays_stable",
     "amplitude_over_feed",
@@ -62,7 +66,7 @@ pub(super) const EXPLANATION_CODES: &[&str] = &[
     "fixture_not_modelled",
 ];
 
-pub(super) fn warnings(study: &Study<'_>, outcome: &FixtureOutcome) -> Vec<Finding> {
+pub(super) fn warnings(study: &Study<'_>, outcome: &FixtureOutcome, aside: &Aside) -> Vec<Finding> {
     let (job, case) = (study.job, &study.case);
     let mut found = Vec::new();
     let diameter = job.cutter.diameter_mm;
@@ -92,7 +96,7 @@ pub(super) fn warnings(study: &Study<'_>, outcome: &FixtureOutcome) -> Vec<Findi
     }
     let depth = case.working.depth_mm;
     if let Some(limit) = study.chatter_mm
-        && depth >= NEAR_CHATTER * limit
+        && depth >= NEAR_LIMIT * limit
         && depth < limit
     {
         found.push(Finding::new("near_chatter_limit", "/cut/depth_mm").measured(depth, limit, "mm"));
@@ -109,8 +113,10 @@ pub(super) fn warnings(study: &Study<'_>, outcome: &FixtureOutcome) -> Vec<Findi
     if case.holding.clamp_force_n.is_some_and(|force| force <= 0.0) {
         found.push(Finding::new("no_clamp_force", "/fixture/clamp_force_n").measured(0.0, 0.0, "N"));
     }
-    if outcome.simulation.diverged {
-        found.push(Finding::new("simulation_diverged", "/simulation"));
+    found.extend(unsteady(aside.cut, "as_given"));
+    // Of a cut without a clamp force both are one run.
+    if outcome.simulation.unilateral || aside.cut == Steady::Reached {
+        found.extend(aside.bonded.and_then(|bonded| unsteady(bonded, "closed")));
     }
     let highest = outcome.modes.last().map_or(0.0, |mode| mode.natural_frequency_hz);
     let per_oscillation = f64::from(outcome.simulation.steps_per_tooth) * tooth / highest;
@@ -141,6 +147,19 @@ pub(super) fn warnings(study: &Study<'_>, outcome: &FixtureOutcome) -> Vec<Findi
         ));
     }
     found
+}
+
+/// A run without a steady state: of joints as the job has them, or closed in any case.
+fn unsteady(steady: Steady, joints: &'static str) -> Option<Finding> {
+    match steady {
+        Steady::Reached => None,
+        Steady::Diverged => Some(Finding::new("simulation_diverged", "/simulation").with("joints", joints)),
+        Steady::Thrown { farthest_mm, fed_mm } => Some(
+            Finding::new("simulation_thrown", "/simulation/tooth_periods")
+                .measured(farthest_mm, fed_mm, "mm")
+                .with("joints", joints),
+        ),
+    }
 }
 
 fn spindle_warnings(study: &Study<'_>, outcome: &FixtureOutcome, found: &mut Vec<Finding>) {
@@ -176,7 +195,7 @@ fn joint_name(joint: Option<OpenJoint>) -> &'static str {
     }
 }
 
-pub(super) fn explanation(study: &Study<'_>, outcome: &FixtureOutcome) -> Vec<Message> {
+pub(super) fn explanation(study: &Study<'_>, outcome: &FixtureOutcome, aside: &Aside) -> Vec<Message> {
     let verdict = &outcome.verdict;
     let multiplier = &outcome.multiplier;
     let feed_um = 1e3 * study.case.working.feed_mm;
@@ -207,13 +226,13 @@ pub(super) fn explanation(study: &Study<'_>, outcome: &FixtureOutcome) -> Vec<Me
     });
     said.extend(of_spindle(outcome));
     if let Some(lobes) = &outcome.lobes {
-        if let Some(better) = lobes.better_speeds.first() {
-            let chatter = better.chatter_mm.unwrap_or(study.examined_mm);
-            let allowed = better.drive_mm.map_or(chatter, |drive| drive.min(chatter));
+        if let Some(better) = &aside.better {
             said.push(
                 Message::new("better_speed_is")
-                    .with("spindle_speed_rpm", better.spindle_speed_rpm)
-                    .with("depth_mm", allowed),
+                    .with("spindle_speed_rpm", better.spindle_rpm)
+                    .with("depth_mm", better.depth_mm)
+                    .with("what", better.first.map_or("none", |(what, _)| what.name()))
+                    .with("limit_mm", better.first.map_or(better.depth_mm, |(_, depth)| depth)),
             );
         }
         if let Some(lowest) = &lobes.lowest {
@@ -235,22 +254,8 @@ pub(super) fn explanation(study: &Study<'_>, outcome: &FixtureOutcome) -> Vec<Me
         );
     }
     if let Some(clamp) = &outcome.clamp {
-        said.push(match clamp.factor_needed {
-            Some(factor) => Message::new("clamp_force_needed")
-                .with("least_n", clamp.least_n)
-                .with("entry_n", clamp.least_with_entry_n)
-                .with("joint", joint_name(clamp.binding_joint))
-                .with("factor", factor),
-            None => Message::new("clamp_force_only_inertia")
-                .with("least_n", clamp.least_n)
-                .with("entry_n", clamp.least_with_entry_n),
-        });
-        let open = match clamp.binding_joint {
-            Some(OpenJoint::Movable) => clamp.modulus_movable_open,
-            _ => clamp.modulus_fixed_open,
-        };
-        let code = if open >= 1.0 { "opening_is_unstable" } else { "opening_stays_stable" };
-        said.push(Message::new(code).with("joint", joint_name(clamp.binding_joint)).with("modulus", open));
+        said.push(of_clamp(clamp, aside));
+        said.extend(clamp.binding_joint.map(|joint| of_opening(clamp, joint, aside)));
     }
     if verdict.peak_to_peak_over_feed > 1.0 {
         said.push(
@@ -262,6 +267,41 @@ pub(super) fn explanation(study: &Study<'_>, outcome: &FixtureOutcome) -> Vec<Me
     said.push(Message::new("no_surface_location_error"));
     said.push(Message::new("fixture_not_modelled"));
     said
+}
+
+/// What the clamp has to give.
+fn of_clamp(clamp: &ClampForce, aside: &Aside) -> Message {
+    let Some(least) = clamp.least_n else {
+        let why = if aside.bonded == Some(Steady::Diverged) { "diverged" } else { "thrown" };
+        return Message::new("clamp_force_unknown").with("why", why);
+    };
+    // Nothing is asked: of no force either, so there is neither factor nor inertia to speak of.
+    let code = if least <= 0.0 {
+        "clamp_force_needed"
+    } else if !clamp.stable {
+        "clamp_force_in_chatter"
+    } else if clamp.factor_needed.is_some() {
+        "clamp_force_needed"
+    } else {
+        "clamp_force_only_inertia"
+    };
+    let mut message = Message::new(code).with("least_n", least).with("joint", joint_name(clamp.binding_joint));
+    for (name, value) in [("entry_n", clamp.least_with_entry_n), ("factor", clamp.factor_needed)] {
+        if let Some(value) = value {
+            message = message.with(name, value);
+        }
+    }
+    message
+}
+
+/// What becomes of the cut when the joint that gives first opens.
+fn of_opening(clamp: &ClampForce, joint: OpenJoint, aside: &Aside) -> Message {
+    let (modulus, error) = match joint {
+        OpenJoint::Movable => (clamp.modulus_movable_open, aside.open_errors[0]),
+        _ => (clamp.modulus_fixed_open, aside.open_errors[1]),
+    };
+    let code = if modulus - 1.0 > error.max(ROUND_OFF) { "opening_is_unstable" } else { "opening_stays_stable" };
+    Message::new(code).with("joint", joint_name(Some(joint))).with("modulus", modulus)
 }
 
 /// What the spindle allows at this speed, where something is known of it.

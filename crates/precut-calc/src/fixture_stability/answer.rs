@@ -10,7 +10,7 @@ use super::acting::Case;
 use super::drive::{self, DriveDepths};
 use super::floquet::{Multiplier, Working};
 use super::holding::Closed;
-use super::input::{Analysis, FixtureJob};
+use super::input::{Analysis, FixtureJob, SimulationSettings};
 use super::lobes::{Plane, Point, Rules, boundary, by_states, critical_depth, map, point};
 use super::march::{Marched, Plan, Step};
 use super::output::{
@@ -22,7 +22,7 @@ use super::output::{
 use super::parts::plane_of;
 use super::picture::lobes_so_far;
 use super::response::{Response, response, span_mm};
-use super::simulate::{count, plan, run, scatter, small};
+use super::simulate::{Observed, Steady, count, observed, plan, run, scatter, small};
 use super::zeroth::{at_speed, depth_mm, zeroth};
 
 pub(super) const UM_PER_MM: f64 = 1e3;
@@ -34,6 +34,14 @@ const TEXTBOOK_FACTORS: [f64; 4] = [1.5, 2.0, 2.5, 6.0];
 const OSCILLOGRAM: usize = 1200;
 /// Steps of the bracketing of a limit that only simulation gives: to 1/256 of a step of the curve.
 const BRACKETING: u32 = 8;
+/// The same of one that the forced motion of a vise that is not linear gives: to a 16 000 000th of the depth.
+const HALVINGS: u32 = 24;
+/// A limit of what grows with the depth is taken up to this share of it: what is advised is within, whatever is rounded.
+const WITHIN: f64 = 0.995;
+/// A depth above this share of the limit of chatter, or of the opening of a joint, is near it.
+pub(super) const NEAR_LIMIT: f64 = 0.9;
+/// Better speeds that are listed.
+const BETTER_SPEEDS: usize = 5;
 
 /// What the parts of an answer share.
 pub(super) struct Study<'a> {
@@ -45,6 +53,24 @@ pub(super) struct Study<'a> {
     pub forced: Response,
     pub examined_mm: f64,
     pub chatter_mm: Option<f64>,
+}
+
+/// What the advice asks beside the answer.
+pub(super) struct Aside {
+    /// What the cut as it was run shows, and what it does with joints that stay closed.
+    pub cut: Steady,
+    pub bonded: Option<Steady>,
+    /// Errors of the moduli with the joint at the movable and at the fixed jaw open.
+    pub open_errors: [f64; 2],
+    pub better: Option<Better>,
+}
+
+/// A speed with a depth that was tried there.
+pub(super) struct Better {
+    pub spindle_rpm: f64,
+    pub depth_mm: f64,
+    /// What gives out first at this speed, and at which depth.
+    pub first: Option<(FirstLimit, f64)>,
 }
 
 impl<'a> Study<'a> {
@@ -68,7 +94,7 @@ impl<'a> Study<'a> {
     }
 
     /// Runs the cut in time at the working point.
-    pub(super) fn simulated(&self, unilateral: bool, keep: bool) -> Result<(Plan, Marched), Failure> {
+    fn simulated(&self, unilateral: bool, keep: bool) -> Result<Observed, Failure> {
         let mut plan = plan(&self.case, &self.job.simulation, self.case.working, self.point.multiplier.modulus);
         plan.unilateral = unilateral;
         if keep {
@@ -76,8 +102,21 @@ impl<'a> Study<'a> {
             plan.keep_first = revolution.min(plan.tooth_periods / 2);
             plan.keep_last = revolution.min(plan.tooth_periods / 2);
         }
-        let run = run(&self.case, &plan, self.monitor)?;
-        Ok((plan, run))
+        observed(&self.case, &plan, self.monitor)
+    }
+
+    /// What limits the depth at a speed. Chatter begins at `chatter_mm`, or not up to `most_mm`.
+    fn speed_limit(&self, spindle_rpm: f64, chatter_mm: Option<f64>, most_mm: f64) -> Result<SpeedLimit, Failure> {
+        let [amplitude_mm, movable_opens_mm, fixed_opens_mm] =
+            forced_limits(&self.case, spindle_rpm, chatter_mm.unwrap_or(most_mm))?;
+        Ok(SpeedLimit {
+            spindle_speed_rpm: spindle_rpm,
+            chatter_mm,
+            amplitude_mm,
+            movable_opens_mm,
+            fixed_opens_mm,
+            drive_mm: self.drive_depths(spindle_rpm).least_mm(),
+        })
     }
 }
 
@@ -103,23 +142,59 @@ fn examined_mm(job: &FixtureJob, case: &Case) -> f64 {
     by_zeroth.unwrap_or(10.0).max(2.0 * case.working.depth_mm).clamp(0.001, 1000.0)
 }
 
+/// Depths up to `limit_mm` at which the forced motion at a speed exceeds the feed per tooth and opens the joint at the movable
+/// and that at the fixed jaw.
+fn forced_limits(case: &Case, spindle_rpm: f64, limit_mm: f64) -> Result<[Option<f64>; 3], Failure> {
+    let force = case.holding.clamp_force_n;
+    let most = [Some(case.working.feed_mm), force, force];
+    let at = |depth_mm: f64| -> Result<[f64; 3], Failure> {
+        match forced(case, Working { spindle_rpm, depth_mm, ..case.working }) {
+            Ok(of) => Ok([of.x_mm.span(), of.left_elastic_n.high, of.right_elastic_n.high]),
+            // No motion that repeats itself: it grows without end.
+            Err(Failure::OutOfModel(_) | Failure::NotConverged { .. }) => Ok([f64::INFINITY; 3]),
+            Err(why) => Err(why),
+        }
+    };
+    let mut reached = [None; 3];
+    if case.is_linear() {
+        // At 1 mm; the forced motion goes with H^(1-mu).
+        let (power, at_1_mm) = (1.0 / (1.0 - case.cutting.depth_exponent), at(1.0)?);
+        for (depth, (most, value)) in reached.iter_mut().zip(most.into_iter().zip(at_1_mm)) {
+            *depth = most.filter(|_| value > 0.0).map(|most| (most / value).powf(power)).filter(|d| *d <= limit_mm);
+        }
+        return Ok(reached);
+    }
+    let deepest = at(limit_mm)?;
+    for (which, depth) in reached.iter_mut().enumerate() {
+        let Some(most) = most[which].filter(|most| deepest[which] > *most) else { continue };
+        let (mut low, mut high) = (0.0, limit_mm);
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            if at(middle)?[which] > most { high = middle } else { low = middle }
+        }
+        *depth = Some(low);
+    }
+    Ok(reached)
+}
+
 /// Computes everything that the job asks.
-pub(super) fn outcome(study: &Study<'_>) -> Result<FixtureOutcome, Failure> {
+pub(super) fn outcome(study: &Study<'_>) -> Result<(FixtureOutcome, Aside), Failure> {
     let Study { job, case, monitor, .. } = study;
     checkpoint(*monitor)?;
     monitor.progress(0.05, Message::new("stage_simulation"));
     let keep = job.asks(Analysis::History);
-    let (plan, run_) = study.simulated(case.holding.clamp_force_n.is_some(), keep)?;
-    let mut simulation = simulation(study, &plan, &run_);
+    let cut = study.simulated(case.holding.clamp_force_n.is_some(), keep)?;
+    let mut simulation = simulation(study, &cut);
     if job.simulation.verified {
-        let finer = Plan { steps_per_tooth: 2 * plan.steps_per_tooth, keep_first: 0, keep_last: 0, ..plan };
+        let finer = Plan { steps_per_tooth: 2 * cut.plan.steps_per_tooth, keep_first: 0, keep_last: 0, ..cut.plan };
         let again = run(case, &finer, *monitor)?;
-        simulation.halved_step_change_um = Some((again.x_mm.span() - run_.x_mm.span()).abs() * UM_PER_MM);
+        simulation.halved_step_change_um = Some((again.x_mm.span() - cut.run.x_mm.span()).abs() * UM_PER_MM);
     }
     checkpoint(*monitor)?;
+    let mut aside = Aside { cut: cut.steady, bonded: None, open_errors: [0.0; 2], better: None };
     let clamp = if job.asks(Analysis::ClampForce) {
         monitor.progress(0.15, Message::new("stage_clamp_force"));
-        Some(clamp_force(study)?)
+        Some(clamp_force(study, &mut aside)?)
     } else {
         None
     };
@@ -129,12 +204,12 @@ pub(super) fn outcome(study: &Study<'_>) -> Result<FixtureOutcome, Failure> {
     } else {
         None
     };
-    let lobes = if job.asks(Analysis::Lobes) { Some(lobes(study)?) } else { None };
-    let history = keep.then(|| histories(study, &run_));
+    let lobes = if job.asks(Analysis::Lobes) { Some(lobes(study, &mut aside)?) } else { None };
+    let history = keep.then(|| histories(study, &cut.run));
     let zeroth_order = zeroth_order(study);
     let drive = cutting_drive(study);
-    Ok(FixtureOutcome {
-        verdict: verdict(study, &simulation, &run_, drive.margin()),
+    let outcome = FixtureOutcome {
+        verdict: verdict(study, &simulation, &cut.run, drive.margin()),
         engagement: engagement(study),
         quasi_static: quasi_static(case),
         drive,
@@ -158,7 +233,8 @@ pub(super) fn outcome(study: &Study<'_>) -> Result<FixtureOutcome, Failure> {
         limits,
         lobes,
         history,
-    })
+    };
+    Ok((outcome, aside))
 }
 
 fn engagement(study: &Study<'_>) -> Engagement {
@@ -301,7 +377,7 @@ fn forced_motion(study: &Study<'_>) -> ForcedMotion {
     }
 }
 
-fn simulation(study: &Study<'_>, plan: &Plan, run: &Marched) -> Simulated {
+fn simulation(study: &Study<'_>, Observed { plan, run, .. }: &Observed) -> Simulated {
     let (sample_scatter, settled) = scatter(&study.case, plan, run);
     Simulated {
         steps_per_tooth: small(plan.steps_per_tooth),
@@ -383,52 +459,64 @@ pub(super) fn static_clamp_n(case: &Case, high_n: f64, low_n: f64) -> (f64, f64)
     }
 }
 
-fn clamp_force(study: &Study<'_>) -> Result<ClampForce, Failure> {
+fn clamp_force(study: &Study<'_>, aside: &mut Aside) -> Result<ClampForce, Failure> {
     let case = &study.case;
     let stable = study.stable();
-    let (_, run) = study.simulated(false, false)?;
-    let (movable, fixed, movable_elastic, fixed_elastic) = if stable {
+    let Observed { run, steady, .. } = study.simulated(false, false)?;
+    aside.bonded = Some(steady);
+    let is_seen = steady == Steady::Reached;
+    let asked = if stable {
         let forced = &study.forced;
-        (forced.left_n.high, forced.right_n.high, forced.left_elastic_n.high, forced.right_elastic_n.high)
+        Some([forced.left_n, forced.right_n, forced.left_elastic_n, forced.right_elastic_n])
     } else {
-        (run.left_n.high, run.right_n.high, run.left_elastic_n.high, run.right_elastic_n.high)
+        // A run that shows no steady state says of no clamp force that it is enough.
+        is_seen.then_some([run.left_n, run.right_n, run.left_elastic_n, run.right_elastic_n])
     };
-    let (movable, fixed) = (movable.max(0.0), fixed.max(0.0));
-    let least_n = movable.max(fixed);
-    let least_with_entry_n = least_n.max(run.left_entry_n).max(run.right_entry_n);
+    let asked = asked.map(|ranges| ranges.map(|range| range.high.max(0.0)));
+    let least_n = asked.map(|[movable, fixed, ..]| movable.max(fixed));
+    let with_entry = |least: f64| least.max(run.left_entry_n).max(run.right_entry_n);
+    let least_with_entry_n = least_n.filter(|_| is_seen).map(with_entry);
     let (high, low) = case.cutting.static_extremes_n(case.working.feed_mm, case.working.depth_mm);
     let (static_movable_n, static_fixed_n) = static_clamp_n(case, high, low);
     let static_n = static_movable_n.max(static_fixed_n);
+    let over_static = |force: Option<f64>| force.filter(|_| static_n > 0.0).map(|force| force / static_n);
     let power = 1.0 / (1.0 - case.cutting.depth_exponent);
-    let given = case.holding.clamp_force_n.filter(|_| stable && least_n > 0.0 && case.is_linear());
-    let depth_for_given = given
-        .map(|force| case.working.depth_mm * (force / least_n).powf(power))
+    let depth_for = |(force, least): (f64, f64)| case.working.depth_mm * (force / least).powf(power);
+    let depth_for_given = case
+        .holding
+        .clamp_force_n
+        .zip(least_n.filter(|least| stable && *least > 0.0 && case.is_linear()))
+        .map(depth_for)
         .filter(|depth| *depth <= study.chatter_mm.unwrap_or(study.examined_mm));
-    let open = |closed: Closed| -> Result<f64, Failure> {
-        Ok(point(&study.rules, &case.holding, &case.cutting, case.working, closed)?.multiplier.modulus)
-    };
+    let open = |closed: Closed| point(&study.rules, &case.holding, &case.cutting, case.working, closed);
+    let movable_open = open(Closed { left: false, right: true })?;
+    let fixed_open = open(Closed { left: true, right: false })?;
+    aside.open_errors = [movable_open.error, fixed_open.error];
+    let of = |which: usize| asked.map(|asked| asked[which]);
     Ok(ClampForce {
         least_n,
         least_with_entry_n,
-        binding_joint: (least_n > 0.0).then_some(if movable > fixed { OpenJoint::Movable } else { OpenJoint::Fixed }),
-        movable_n: movable,
-        fixed_n: fixed,
-        movable_elastic_n: movable_elastic.max(0.0),
-        fixed_elastic_n: fixed_elastic.max(0.0),
+        binding_joint: asked
+            .filter(|[movable, fixed, ..]| movable.max(*fixed) > 0.0)
+            .map(|[movable, fixed, ..]| if movable > fixed { OpenJoint::Movable } else { OpenJoint::Fixed }),
+        movable_n: of(0),
+        fixed_n: of(1),
+        movable_elastic_n: of(2),
+        fixed_elastic_n: of(3),
         static_movable_n,
         static_fixed_n,
-        factor_needed: (static_n > 0.0).then(|| least_n / static_n),
-        factor_needed_with_entry: (static_n > 0.0).then(|| least_with_entry_n / static_n),
+        factor_needed: over_static(least_n),
+        factor_needed_with_entry: over_static(least_with_entry_n),
         stable,
         depth_for_given_force_mm: depth_for_given,
-        modulus_movable_open: open(Closed { left: false, right: true })?,
-        modulus_fixed_open: open(Closed { left: true, right: false })?,
+        modulus_movable_open: movable_open.multiplier.modulus,
+        modulus_fixed_open: fixed_open.multiplier.modulus,
         textbook: TEXTBOOK_FACTORS
             .iter()
             .map(|&factor| TextbookForce {
                 factor,
                 clamp_force_n: factor * static_n,
-                enough: factor * static_n >= least_n,
+                enough: least_n.is_some_and(|least| factor * static_n >= least),
             })
             .collect(),
     })
@@ -458,7 +546,8 @@ fn at_depth(study: &Study<'_>, depth: f64) -> Result<AtDepth, Failure> {
             lost: 0.0,
         });
     }
-    let run = run(case, &plan(case, &study.job.simulation, working, modulus), &crate::calculator::Unwatched)?;
+    let plan = plan(case, &study.job.simulation, working, modulus);
+    let run = observed(case, &plan, &crate::calculator::Unwatched)?.run;
     Ok(AtDepth {
         modulus,
         span_mm: run.x_mm.span(),
@@ -486,26 +575,20 @@ fn limits(study: &Study<'_>) -> Result<DepthLimits, Failure> {
     let movable_opens_mm = force.map(|force| reach(&|at| at.left_n, force)).transpose()?.flatten();
     let fixed_opens_mm = force.map(|force| reach(&|at| at.right_n, force)).transpose()?.flatten();
     let drive = study.drive_depths(case.working.spindle_rpm);
-    let candidates = [
+    let first = first_of([
         (FirstLimit::Chatter, study.chatter_mm),
         (FirstLimit::MovableOpens, movable_opens_mm),
         (FirstLimit::FixedOpens, fixed_opens_mm),
         (FirstLimit::Amplitude, amplitude_mm),
         (FirstLimit::Power, drive.power_mm),
         (FirstLimit::Torque, drive.torque_mm),
-    ];
-    // At one depth the earlier of the list is the cause of the later.
-    let first = candidates
-        .iter()
-        .filter_map(|(what, depth)| depth.map(|depth| (*what, depth)))
-        .reduce(|best, next| if next.1 < best.1 * (1.0 - 1e-6) { next } else { best });
+    ]);
     let mut at_speeds = Vec::with_capacity(study.job.limits.speeds_rpm.len());
     for speed in &study.job.limits.speeds_rpm {
         checkpoint(study.monitor)?;
         let working = Working { spindle_rpm: speed.0, ..case.working };
         let chatter_mm = critical_depth(&study.rules, &case.holding, &case.cutting, working, study.examined_mm)?;
-        let drive_mm = study.drive_depths(speed.0).least_mm();
-        at_speeds.push(SpeedLimit { spindle_speed_rpm: speed.0, chatter_mm, drive_mm });
+        at_speeds.push(study.speed_limit(speed.0, chatter_mm, study.examined_mm)?);
     }
     let column = |of: &dyn Fn(&AtDepth) -> f64| found.iter().map(of).collect::<Vec<f64>>();
     Ok(DepthLimits {
@@ -528,6 +611,12 @@ fn limits(study: &Study<'_>) -> Result<DepthLimits, Failure> {
             depth_mm: depths,
         },
     })
+}
+
+/// What gives out first: at one depth the earlier of the list is the cause of the later.
+fn first_of(limits: [(FirstLimit, Option<f64>); 6]) -> Option<(FirstLimit, f64)> {
+    let known = limits.into_iter().filter_map(|(what, depth)| depth.map(|depth| (what, depth)));
+    known.reduce(|best, next| if next.1 < best.1 * (1.0 - 1e-6) { next } else { best })
 }
 
 /// Smallest depth at which a quantity exceeds its limit: bracketed on the curve, split at the chatter limit where the
@@ -562,7 +651,7 @@ fn first_reached(
     Ok(Some(onset.unwrap_or(high)))
 }
 
-fn lobes(study: &Study<'_>) -> Result<LobeDiagram, Failure> {
+fn lobes(study: &Study<'_>, aside: &mut Aside) -> Result<LobeDiagram, Failure> {
     let case = &study.case;
     let settings = &study.job.lobes;
     let working = case.working;
@@ -593,26 +682,39 @@ fn lobes(study: &Study<'_>) -> Result<LobeDiagram, Failure> {
         None
     };
     let boundary = beside(study, &plane, &points)?;
-    let limits: Vec<SpeedLimit> = points
+    let limits: Vec<SpeedLimit> = boundary
+        .spindle_speed_rpm
         .iter()
-        .map(|p| SpeedLimit {
-            spindle_speed_rpm: p.spindle_rpm,
-            chatter_mm: p.crossings_mm.first().copied(),
-            drive_mm: study.drive_depths(p.spindle_rpm).least_mm(),
+        .enumerate()
+        .map(|(i, &spindle_speed_rpm)| SpeedLimit {
+            spindle_speed_rpm,
+            chatter_mm: boundary.chatter_mm[i],
+            amplitude_mm: boundary.amplitude_mm[i],
+            movable_opens_mm: boundary.movable_opens_mm[i],
+            fixed_opens_mm: boundary.fixed_opens_mm[i],
+            drive_mm: study.drive_depths(spindle_speed_rpm).least_mm(),
         })
         .collect();
     let lowest = limits
         .iter()
         .filter_map(|limit| limit.chatter_mm.map(|depth| (depth, *limit)))
         .reduce(|best, next| if next.0 < best.0 { next } else { best })
-        .map(|(_, limit)| limit);
-    Ok(LobeDiagram { lowest, better_speeds: better_speeds(study, &limits, plane.most_mm), boundary, map })
+        .map(|(_, limit)| whole_limit(study, limit, plane.most_mm))
+        .transpose()?;
+    let better_speeds = better_speeds(study, &limits, plane.most_mm)?;
+    for limit in &better_speeds {
+        checkpoint(monitor)?;
+        aside.better = tried(study, limit, plane.most_mm)?;
+        if aside.better.is_some() {
+            break;
+        }
+    }
+    Ok(LobeDiagram { boundary, lowest, better_speeds, map })
 }
 
 /// The boundary with the other limits over the same speeds.
 fn beside(study: &Study<'_>, plane: &Plane, points: &[super::lobes::BoundaryPoint]) -> Result<LobeBoundary, Failure> {
     let case = &study.case;
-    let power = 1.0 / (1.0 - case.cutting.depth_exponent);
     let factor = case.cutting.mean_factor();
     let one = |point: &super::lobes::BoundaryPoint| -> Result<[Option<f64>; 4], Failure> {
         let kappa = at_speed(&case.holding, &case.cutting, point.spindle_rpm);
@@ -620,19 +722,9 @@ fn beside(study: &Study<'_>, plane: &Plane, points: &[super::lobes::BoundaryPoin
         if !case.is_linear() {
             return Ok([None, None, None, zeroth]);
         }
-        // At 1 mm; the forced motion goes with H^(1-mu).
-        let forced = forced(case, Working { spindle_rpm: point.spindle_rpm, feed_mm: plane.feed_mm, depth_mm: 1.0 })?;
-        let limit = point.crossings_mm.first().copied().unwrap_or(plane.most_mm);
-        let reaches = |value: f64, most: Option<f64>| {
-            most.filter(|_| value > 0.0).map(|most| (most / value).powf(power)).filter(|depth| *depth <= limit)
-        };
-        let force = case.holding.clamp_force_n;
-        Ok([
-            reaches(forced.x_mm.span(), Some(plane.feed_mm)),
-            reaches(forced.left_elastic_n.high, force),
-            reaches(forced.right_elastic_n.high, force),
-            zeroth,
-        ])
+        let limit_mm = point.crossings_mm.first().copied().unwrap_or(plane.most_mm);
+        let [amplitude, movable, fixed] = forced_limits(case, point.spindle_rpm, limit_mm)?;
+        Ok([amplitude, movable, fixed, zeroth])
     };
     let mut rows = Vec::with_capacity(points.len());
     for (number, chunk) in points.chunks(32).enumerate() {
@@ -658,27 +750,83 @@ fn beside(study: &Study<'_>, plane: &Plane, points: &[super::lobes::BoundaryPoin
     })
 }
 
-/// Peaks of what chatter and the spindle allow that lie deeper than at the working speed, nearest first.
-fn better_speeds(study: &Study<'_>, limits: &[SpeedLimit], most_mm: f64) -> Vec<SpeedLimit> {
-    let allowed =
-        |chatter: Option<f64>, drive: Option<f64>| chatter.unwrap_or(most_mm).min(drive.unwrap_or(f64::INFINITY));
-    let depth = |limit: &SpeedLimit| allowed(limit.chatter_mm, limit.drive_mm);
-    let here = allowed(study.chatter_mm, study.drive_depths(study.case.working.spindle_rpm).least_mm());
-    let mut peaks: Vec<SpeedLimit> = (0..limits.len())
-        .filter(|&i| {
-            let at = depth(&limits[i]);
-            let left = i.checked_sub(1).is_none_or(|j| depth(&limits[j]) < at);
-            let right = limits.get(i + 1).is_none_or(|next| depth(next) <= at);
-            left && right && at > 1.02 * here
-        })
-        .map(|i| limits[i])
-        .collect();
+/// With the limits that the diagram does not trace where the forced motion does not go with H^(1-mu).
+fn whole_limit(study: &Study<'_>, limit: SpeedLimit, most_mm: f64) -> Result<SpeedLimit, Failure> {
+    if study.case.is_linear() {
+        return Ok(limit);
+    }
+    study.speed_limit(limit.spindle_speed_rpm, limit.chatter_mm, most_mm)
+}
+
+/// What one may cut at a speed: the least of its limits.
+fn allowed_mm(limit: &SpeedLimit, most_mm: f64) -> f64 {
+    let SpeedLimit { chatter_mm, amplitude_mm, movable_opens_mm, fixed_opens_mm, drive_mm, .. } = *limit;
+    let limits = [chatter_mm, amplitude_mm, movable_opens_mm, fixed_opens_mm, drive_mm];
+    limits.into_iter().flatten().fold(if chatter_mm.is_some() { f64::INFINITY } else { most_mm }, f64::min)
+}
+
+/// Peaks of what the limits allow that lie deeper than at the working speed, nearest first.
+fn better_speeds(study: &Study<'_>, limits: &[SpeedLimit], most_mm: f64) -> Result<Vec<SpeedLimit>, Failure> {
     let working = study.case.working.spindle_rpm;
+    let here = allowed_mm(&study.speed_limit(working, study.chatter_mm, most_mm)?, most_mm);
+    let depth = |i: usize| allowed_mm(&limits[i], most_mm);
+    let mut peaks = Vec::new();
+    for (i, limit) in limits.iter().enumerate() {
+        checkpoint(study.monitor)?;
+        let at = depth(i);
+        let left = i.checked_sub(1).is_none_or(|before| depth(before) < at);
+        let right = i + 1 == limits.len() || depth(i + 1) <= at;
+        if left && right && at > 1.02 * here {
+            let limit = whole_limit(study, *limit, most_mm)?;
+            peaks.extend((allowed_mm(&limit, most_mm) > 1.02 * here).then_some(limit));
+        }
+    }
     peaks.sort_by(|a, b| {
         (a.spindle_speed_rpm / working).ln().abs().total_cmp(&(b.spindle_speed_rpm / working).ln().abs())
     });
-    peaks.truncate(5);
-    peaks
+    peaks.truncate(BETTER_SPEEDS);
+    Ok(peaks)
+}
+
+/// What is to be said of a better speed, tried before it is said: not near chatter or an opening joint, within the other
+/// limits, as it is read. `None` where the cut then does not hold still after all (a large motion may stand beside the
+/// stable one, and the entry asks more of a joint than the steady cut).
+fn tried(study: &Study<'_>, limit: &SpeedLimit, most_mm: f64) -> Result<Option<Better>, Failure> {
+    let case = &study.case;
+    let short_of = [limit.chatter_mm, limit.movable_opens_mm, limit.fixed_opens_mm];
+    let depths = short_of.into_iter().flatten().map(|depth| NEAR_LIMIT * depth);
+    let within = [limit.amplitude_mm, limit.drive_mm].into_iter().flatten().map(|depth| WITHIN * depth);
+    let depth_mm = said(depths.chain(within).fold(most_mm, f64::min), 3, f64::floor);
+    let spindle_rpm = said(limit.spindle_speed_rpm, 4, f64::round);
+    let working = Working { spindle_rpm, depth_mm, ..case.working };
+    let modulus = point(&study.rules, &case.holding, &case.cutting, working, Closed::BOTH)?.multiplier.modulus;
+    if modulus >= 1.0 || forced_span_mm(case, working).map_or(true, |span_mm| span_mm > working.feed_mm) {
+        return Ok(None);
+    }
+    let SimulationSettings { regeneration, entry, .. } = study.job.simulation;
+    let settings = SimulationSettings { regeneration, entry, ..SimulationSettings::default() };
+    let plan = Plan { unilateral: case.holding.clamp_force_n.is_some(), ..plan(case, &settings, working, modulus) };
+    let run = run(case, &plan, study.monitor)?;
+    let opened = run.first_open_left_s.or(run.first_open_right_s).is_some();
+    if run.diverged || opened || run.lost_cut > 0.0 || !scatter(case, &plan, &run).1 {
+        return Ok(None);
+    }
+    let drive = study.drive_depths(limit.spindle_speed_rpm);
+    let first = first_of([
+        (FirstLimit::Chatter, limit.chatter_mm),
+        (FirstLimit::MovableOpens, limit.movable_opens_mm),
+        (FirstLimit::FixedOpens, limit.fixed_opens_mm),
+        (FirstLimit::Amplitude, limit.amplitude_mm),
+        (FirstLimit::Power, drive.power_mm),
+        (FirstLimit::Torque, drive.torque_mm),
+    ]);
+    Ok(Some(Better { spindle_rpm, depth_mm, first }))
+}
+
+/// A positive number with as many digits as a sentence says of it.
+fn said(value: f64, digits: i32, rounded: fn(f64) -> f64) -> f64 {
+    let scale = 10.0_f64.powf(f64::from(digits) - 1.0 - value.log10().floor());
+    rounded(value * scale) / scale
 }
 
 fn histories(study: &Study<'_>, run: &Marched) -> Histories {

@@ -132,8 +132,31 @@ impl<const N: usize, const P: usize> SpeedPlan<N, P> {
 
     /// The largest multiplier at the level, to `tolerance` in its residual.
     pub(super) fn multiplier(&self, level: f64, tolerance: f64) -> Option<Multiplier> {
+        self.largest(level, tolerance, |_| {})
+    }
+
+    /// The same of masses that no spring ties to the ground, without their shift as one body. That shift leaves every chip
+    /// as it is, so its multiplier is 1 in any cut and says nothing of this one.
+    pub(super) fn multiplier_but_of_shift(&self, level: f64, tolerance: f64) -> Option<Multiplier> {
+        // After every period everything is shifted back to x = 0: of the multipliers that one becomes 0, the others stay.
+        self.largest(level, tolerance, |vector| {
+            let shift = vector[0];
+            for (i, value) in vector.iter_mut().enumerate() {
+                let is_velocity = i < N && i % 2 == 1;
+                if !is_velocity {
+                    *value -= shift;
+                }
+            }
+        })
+    }
+
+    /// The largest multiplier of the period map with something done after it.
+    fn largest(&self, level: f64, tolerance: f64, after: impl Fn(&mut [f64])) -> Option<Multiplier> {
         let map = self.map(level)?;
-        let found = largest(map.dimension(), 8, tolerance, |vector| map.apply(vector));
+        let found = largest(map.dimension(), 8, tolerance, |vector| {
+            map.apply(vector);
+            after(vector);
+        });
         let modulus = if self.phases == 1 { found.modulus() } else { found.modulus().powf(1.0 / self.phases as f64) };
         modulus.is_finite().then_some(Multiplier {
             re: found.re,

@@ -68,7 +68,8 @@ fn unsolved() -> Failure {
     Failure::NotConverged { what: "largest Floquet multiplier", residual: 1.0, iterations: 0 }
 }
 
-/// The multiplier of a working point, converged, with the joints `closed`.
+/// The multiplier of a working point, converged, with the joints `closed`: of what cuts, without what drifts freely when a
+/// joint is open (the jaw by itself; jaw and workpiece as one body).
 pub(super) fn point(
     rules: &Rules,
     holding: &Holding,
@@ -76,7 +77,8 @@ pub(super) fn point(
     working: Working,
     closed: Closed,
 ) -> Result<Point, Failure> {
-    by_states!(holding, point_of(rules, holding, cutting, working, closed))
+    let in_touch = Holding { jaw: holding.jaw.filter(|_| closed.left), ..holding.clone() };
+    by_states!(in_touch, point_of(rules, &in_touch, cutting, working, closed))
 }
 
 fn point_of<const N: usize>(
@@ -111,7 +113,10 @@ fn at<const N: usize, const P: usize>(
     } else {
         SpeedPlan::new(rule, system, cutting, working, None)
     };
-    plan.multiplier(cutting.level(working.depth_mm), residual).ok_or_else(unsolved)
+    let level = cutting.level(working.depth_mm);
+    let is_free = holding.jaw.is_some() && !closed.right;
+    let found = if is_free { plan.multiplier_but_of_shift(level, residual) } else { plan.multiplier(level, residual) };
+    found.ok_or_else(unsolved)
 }
 
 /// The modulus over the depth at one speed.

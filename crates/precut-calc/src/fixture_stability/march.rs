@@ -78,6 +78,8 @@ pub(super) struct Open {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Marched {
     pub diverged: bool,
+    /// Largest displacement either way from the start on.
+    pub farthest_mm: f64,
     /// Over the steady periods.
     pub x_mm: Range,
     pub force_n: Range,
@@ -339,7 +341,9 @@ pub(super) fn march<const N: usize>(
                 state.advance(i, &mut record);
             }
         }
-        if !state.q.iter().all(|v| v.is_finite()) || state.q[0].abs() > DIVERGED_MM {
+        // What swings may be near the middle as the period ends: every step counts.
+        let farthest_mm = record.farthest_mm().max(state.q[0].abs());
+        if !state.q.iter().all(|v| v.is_finite()) || farthest_mm > DIVERGED_MM {
             record.diverged = true;
             break;
         }
@@ -797,6 +801,12 @@ impl Record {
         }
     }
 
+    /// Largest displacement either way so far.
+    fn farthest_mm(&self) -> f64 {
+        let of = |range: &Range| if range.low <= range.high { range.high.max(-range.low) } else { 0.0 };
+        of(&self.x_mm).max(of(&self.x_early_mm))
+    }
+
     /// A joint has opened or closed inside a step, at `done` after its start.
     fn event<const N: usize>(&mut self, state: &State<'_, N>, done: f64) {
         let force = state.clamp_force_n;
@@ -816,15 +826,18 @@ impl Record {
         // A run that ended early has no steady part: what it did until then stands for it.
         let or_early = |range: Range, early: Range| if range.low <= range.high { range } else { early };
         let zero = Range { low: 0.0, high: 0.0 };
+        // The elastic parts are not kept from the start on; those with damping stand for them.
+        let asked = |side: usize| Range { low: self.entry[side], high: self.entry[side] };
         Marched {
             diverged: self.diverged,
+            farthest_mm: self.farthest_mm(),
             x_mm: or_early(self.x_mm, self.x_early_mm),
             force_n: or_early(self.force_n, zero),
             feed_mm: or_early(self.feed_mm, zero),
-            left_n: or_early(self.demand[0], zero),
-            right_n: or_early(self.demand[1], zero),
-            left_elastic_n: or_early(self.demand[2], zero),
-            right_elastic_n: or_early(self.demand[3], zero),
+            left_n: or_early(self.demand[0], asked(0)),
+            right_n: or_early(self.demand[1], asked(1)),
+            left_elastic_n: or_early(self.demand[2], asked(0)),
+            right_elastic_n: or_early(self.demand[3], asked(1)),
             left_entry_n: self.entry[0],
             right_entry_n: self.entry[1],
             lost_cut: if self.tooth_steps > 0 { self.lost as f64 / self.tooth_steps as f64 } else { 0.0 },

@@ -149,9 +149,9 @@ impl Calculator for FixtureStability {
         checkpoint(monitor)?;
         let case = Case::of(job).ok_or_else(|| Failure::Internal("a job that the check refuses".to_owned()))?;
         let study = Study::new(job, case, monitor)?;
-        let outcome = outcome(&study)?;
-        let warnings = advice::warnings(&study, &outcome);
-        let explanation = advice::explanation(&study, &outcome);
+        let (outcome, aside) = outcome(&study)?;
+        let warnings = advice::warnings(&study, &outcome, &aside);
+        let explanation = advice::explanation(&study, &outcome, &aside);
         monitor.progress(1.0, Message::new("stage_fixture_done"));
         Ok(Answer { output: outcome, warnings, explanation, basis: basis(job) })
     }
@@ -177,8 +177,9 @@ fn cost(job: &FixtureJob) -> Cost {
     let steps =
         job.simulation.steps_per_tooth.map_or_else(|| simulate::steps_per_tooth(&case, working) as f64, f64::from);
     let run_ms = steps * job.simulation.tooth_periods.map_or(400.0, f64::from) * 6e-5;
-    let runs =
-        1.0 + f64::from(u8::from(job.simulation.verified)) * 2.0 + f64::from(u8::from(job.asks(Analysis::ClampForce)));
+    // A better speed is tried before it is named.
+    let more = [Analysis::ClampForce, Analysis::Lobes].into_iter().filter(|of| job.asks(*of)).count();
+    let runs = 1.0 + f64::from(u8::from(job.simulation.verified)) * 2.0 + more as f64;
     let mut parts =
         vec![(2.0 + 100.0 * point_ms(working), "/cut/spindle_speed_rpm"), (runs * run_ms, "/simulation/tooth_periods")];
     if job.asks(Analysis::Limits) {

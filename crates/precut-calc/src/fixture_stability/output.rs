@@ -399,33 +399,33 @@ pub struct Simulated {
 /// Least clamp force for a regime in which no joint opens.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct ClampForce {
-    /// Clamp force below which a joint opens in the steady state.
+    /// Clamp force below which a joint opens in the steady state; null where the cut chatters and its simulation shows no steady state.
     #[schema(extensions(("x-unit" = json!("N"))))]
-    pub least_n: f64,
+    pub least_n: Option<f64>,
     /// The same with the hard entry.
     #[schema(extensions(("x-unit" = json!("N"))))]
-    pub least_with_entry_n: f64,
+    pub least_with_entry_n: Option<f64>,
     /// Which joint asks for it; null where none asks for any.
     pub binding_joint: Option<OpenJoint>,
     /// Steady state: joint at the movable jaw, with its damping.
     #[schema(extensions(("x-unit" = json!("N"))))]
-    pub movable_n: f64,
+    pub movable_n: Option<f64>,
     /// Joint at the fixed jaw.
     #[schema(extensions(("x-unit" = json!("N"))))]
-    pub fixed_n: f64,
+    pub fixed_n: Option<f64>,
     /// Elastic part alone: joint at the movable jaw.
     #[schema(extensions(("x-unit" = json!("N"))))]
-    pub movable_elastic_n: f64,
+    pub movable_elastic_n: Option<f64>,
     /// Joint at the fixed jaw.
     #[schema(extensions(("x-unit" = json!("N"))))]
-    pub fixed_elastic_n: f64,
+    pub fixed_elastic_n: Option<f64>,
     /// What a textbook asks: the static force on the joint at the movable jaw, factor 1.
     #[schema(extensions(("x-unit" = json!("N"))))]
     pub static_movable_n: f64,
     /// On the joint at the fixed jaw.
     #[schema(extensions(("x-unit" = json!("N"))))]
     pub static_fixed_n: f64,
-    /// The safety factor that is really needed on the static force; null where the static force is 0.
+    /// The safety factor that is really needed on the static force; null where the static force is 0, or what is needed is not known.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub factor_needed: Option<f64>,
     /// The same with the hard entry.
@@ -436,7 +436,7 @@ pub struct ClampForce {
     /// Deepest cut that the given clamp force holds, where it is reached before chatter.
     #[schema(extensions(("x-unit" = json!("mm"))))]
     pub depth_for_given_force_mm: Option<f64>,
-    /// What happens if the joint at the movable jaw opens: modulus of the multiplier of what is left.
+    /// What happens if the joint at the movable jaw opens: modulus of the multiplier of what is left in the cut, a drift as one body left out.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub modulus_movable_open: f64,
     /// If that at the fixed jaw opens.
@@ -488,7 +488,7 @@ pub struct DepthLimits {
     /// Material removal rate there.
     #[schema(extensions(("x-unit" = json!("cm3/min"))))]
     pub removal_rate_cm3_per_min: Option<f64>,
-    /// Chatter limit at the speeds that were asked for.
+    /// Limits at the speeds that were asked for.
     pub at_speeds: Vec<SpeedLimit>,
     /// Amplitude and clamp force over the depth.
     pub curve: AmplitudeCurve,
@@ -535,6 +535,15 @@ pub struct SpeedLimit {
     /// Depth at which chatter begins; null where none begins up to the depth examined.
     #[schema(extensions(("x-unit" = json!("mm"))))]
     pub chatter_mm: Option<f64>,
+    /// Depth at which the forced peak-to-peak displacement exceeds the feed per tooth, without chatter.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub amplitude_mm: Option<f64>,
+    /// Depth at which the joint at the movable jaw opens at the given clamp force, without chatter.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub movable_opens_mm: Option<f64>,
+    /// That at the fixed jaw.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub fixed_opens_mm: Option<f64>,
     /// Depth at which the power or the torque of the spindle gives out; null where nothing is said of them.
     #[schema(extensions(("x-unit" = json!("mm"))))]
     pub drive_mm: Option<f64>,
@@ -570,7 +579,7 @@ pub struct LobeDiagram {
     pub boundary: LobeBoundary,
     /// Lowest limit on it.
     pub lowest: Option<SpeedLimit>,
-    /// Speeds at which one may cut deeper than at the working speed before chatter begins or the spindle gives out, nearest first.
+    /// Speeds at which one may cut deeper than at the working speed before the first of their limits, nearest first.
     pub better_speeds: Vec<SpeedLimit>,
     /// |multiplier| over the plane, where it was asked for.
     pub map: Option<LobeMap>,

@@ -60,6 +60,10 @@ pub fn lobe_boundary(job: &FixtureJob, monitor: &dyn Monitor) -> Result<Vec<Spee
             SpeedLimit {
                 spindle_speed_rpm: p.spindle_rpm,
                 chatter_mm: p.crossings_mm.first().copied(),
+                // The forced motion is no part of it.
+                amplitude_mm: None,
+                movable_opens_mm: None,
+                fixed_opens_mm: None,
                 drive_mm: drive.and_then(|of| of.least_mm()),
             }
         })

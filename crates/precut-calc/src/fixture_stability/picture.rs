@@ -5,7 +5,7 @@ use crate::calculator::{Axis, Column, Figure, Frame, Item, Message, Panel, Role,
 use super::floquet::Working;
 use super::input::FixtureJob;
 use super::lobes::Map;
-use super::output::{AmplitudeCurve, ArcProfile, FixtureOutcome, LobeBoundary, LobeMap, Oscillogram};
+use super::output::{AmplitudeCurve, ArcProfile, FixtureOutcome, LobeBoundary, LobeDiagram, LobeMap, Oscillogram};
 
 pub(super) const FIGURE_IDS: &[&str] = &["lobes", "oscillogram", "chip", "amplitude"];
 pub(super) const TABLE_IDS: &[&str] = &["boundary", "map", "amplitude", "entry", "steady", "arc"];
@@ -93,35 +93,32 @@ pub(super) fn lobes_so_far(boundary: &[(f64, Option<f64>)], map: Option<&Map>, w
     figure("lobes", "fixture_lobes", SPEED, vec![Panel { y: DEPTH, height: 1.0, items }])
 }
 
+/// Every figure that the analyses of the job have something for.
 pub(super) fn figures(job: &FixtureJob, outcome: &FixtureOutcome) -> Vec<Figure> {
-    let nothing = Oscillogram::default();
-    let steady = outcome.history.as_ref().map_or(&nothing, |history| &history.steady);
-    let entry = outcome.history.as_ref().map_or(&nothing, |history| &history.entry);
-    let no_arc = ArcProfile::default();
-    let arc = outcome.history.as_ref().map_or(&no_arc, |history| &history.arc);
-    vec![
-        figure("lobes", "fixture_lobes", SPEED, vec![Panel { y: DEPTH, height: 1.0, items: lobes(job, outcome) }]),
-        oscillograms(entry, steady),
-        figure(
-            "chip",
-            "fixture_chip",
-            Axis::linear("tooth_angle", "deg"),
-            vec![Panel {
-                y: Axis::linear("chip_thickness", "mm"),
-                height: 1.0,
-                items: vec![
-                    line("smooth_chip", &arc.angle_deg, some(&arc.smooth_chip_mm), Role::Nominal),
-                    line("actual_chip", &arc.angle_deg, some(&arc.chip_thickness_mm), Role::Plain),
-                ],
-            }],
-        ),
-        amplitude(job, outcome),
-    ]
+    let mut figures = Vec::new();
+    if let Some(diagram) = &outcome.lobes {
+        let items = lobes(job, outcome, diagram);
+        figures.push(figure("lobes", "fixture_lobes", SPEED, vec![Panel { y: DEPTH, height: 1.0, items }]));
+    }
+    if let Some(history) = &outcome.history {
+        figures.push(oscillograms(&history.entry, &history.steady));
+        figures.push(chip(&history.arc));
+    }
+    figures.extend(outcome.limits.as_ref().map(|limits| amplitude(job, outcome, &limits.curve)));
+    figures
 }
 
-fn lobes(job: &FixtureJob, outcome: &FixtureOutcome) -> Vec<Item> {
+fn chip(arc: &ArcProfile) -> Figure {
+    let items = vec![
+        line("smooth_chip", &arc.angle_deg, some(&arc.smooth_chip_mm), Role::Nominal),
+        line("actual_chip", &arc.angle_deg, some(&arc.chip_thickness_mm), Role::Plain),
+    ];
+    let panel = Panel { y: Axis::linear("chip_thickness", "mm"), height: 1.0, items };
+    figure("chip", "fixture_chip", Axis::linear("tooth_angle", "deg"), vec![panel])
+}
+
+fn lobes(job: &FixtureJob, outcome: &FixtureOutcome, lobes: &LobeDiagram) -> Vec<Item> {
     let working = working_point(outcome.engagement.spindle_speed_rpm, job.cut.depth_mm);
-    let Some(lobes) = &outcome.lobes else { return vec![working] };
     let mut items: Vec<Item> =
         lobes.map.iter().map(|map| heat(&map.spindle_speed_rpm, &map.depth_mm, &map.modulus)).collect();
     let LobeBoundary { spindle_speed_rpm: x, .. } = &lobes.boundary;
@@ -195,9 +192,7 @@ fn oscillograms(entry: &Oscillogram, steady: &Oscillogram) -> Figure {
     )
 }
 
-fn amplitude(job: &FixtureJob, outcome: &FixtureOutcome) -> Figure {
-    let nothing = AmplitudeCurve::default();
-    let curve = outcome.limits.as_ref().map_or(&nothing, |limits| &limits.curve);
+fn amplitude(job: &FixtureJob, outcome: &FixtureOutcome, curve: &AmplitudeCurve) -> Figure {
     let ends: Vec<f64> = curve.depth_mm.first().into_iter().chain(curve.depth_mm.last()).copied().collect();
     let level = |name, value: f64, role| line(name, &ends, vec![Some(value); ends.len()], role);
     let mut forces = vec![

@@ -76,6 +76,54 @@ pub(super) fn run(case: &Case, plan: &Plan, monitor: &dyn Monitor) -> Result<Mar
     by_states!(case.holding, march(&case.holding, &case.cutting, plan, monitor))
 }
 
+/// What the steady part of a run is worth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Steady {
+    /// It shows how the cut goes on.
+    Reached,
+    /// The displacement left everything real: there is none.
+    Diverged,
+    /// The workpiece was thrown further than the teeth are fed meanwhile: what it shows may be the pause until they meet.
+    Thrown { farthest_mm: f64, fed_mm: f64 },
+}
+
+/// A run with numbers that can be believed: of its steady part or, where that is worth nothing, of all of it.
+pub(super) struct Observed {
+    /// As it counts: with the tooth periods that the numbers are taken over.
+    pub plan: Plan,
+    pub run: Marched,
+    pub steady: Steady,
+}
+
+pub(super) fn observed(case: &Case, plan: &Plan, monitor: &dyn Monitor) -> Result<Observed, Failure> {
+    let first = run(case, plan, monitor)?;
+    let steady = steady(case, plan, &first);
+    if steady == Steady::Reached {
+        return Ok(Observed { plan: *plan, run: first, steady });
+    }
+    // Once more with every tooth period counted: a run does not keep as much of those before the steady ones.
+    let periods = first.samples_mm.len();
+    let kept = |wanted: usize| wanted.min(periods / 2);
+    let whole = Plan {
+        tooth_periods: periods,
+        steady_periods: periods,
+        keep_first: kept(plan.keep_first),
+        keep_last: kept(plan.keep_last),
+        ..*plan
+    };
+    Ok(Observed { plan: whole, run: run(case, &whole, monitor)?, steady })
+}
+
+fn steady(case: &Case, plan: &Plan, run: &Marched) -> Steady {
+    if run.diverged {
+        return Steady::Diverged;
+    }
+    let (farthest_mm, fed_mm) = (run.farthest_mm, plan.steady_periods as f64 * plan.working.feed_mm);
+    // A forced motion loses no cut however large it is.
+    let thrown = farthest_mm > fed_mm && run.first_lost_s.is_some() && !scatter(case, plan, run).1;
+    if thrown { Steady::Thrown { farthest_mm, fed_mm } } else { Steady::Reached }
+}
+
 /// Scatter of the once-per-tooth samples over the steady periods, and whether they have settled: small, or still falling fast.
 pub(super) fn scatter(case: &Case, plan: &Plan, run: &Marched) -> (f64, bool) {
     let whole = case.cutting.phases();

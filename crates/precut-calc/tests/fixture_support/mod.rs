@@ -5,7 +5,7 @@ pub(crate) mod semi;
 
 use std::path::Path;
 
-use precut_calc::calculator::{Answer, Calculator, Check, Unwatched, Violations};
+use precut_calc::calculator::{Answer, Calculator, Check, Message, Unwatched, Violations};
 use precut_calc::fixture_stability::{FixtureJob, FixtureOutcome, FixtureStability};
 use serde_json::{Value, json};
 
@@ -49,6 +49,17 @@ pub fn translate(input: &Value) -> Value {
         },
         "fixture": vise,
     })
+}
+
+/// The job of an example.
+pub fn example(id: &str) -> Value {
+    let example = FixtureStability::META.examples.iter().find(|example| example.id == id).unwrap();
+    serde_json::from_str(example.job).unwrap()
+}
+
+/// The explanation of that code, where it is given.
+pub fn said<'a, O>(answer: &'a Answer<O>, code: &str) -> Option<&'a Message> {
+    answer.explanation.iter().find(|said| said.code == code)
 }
 
 /// Teeth, speed, depth and the rest of the reference fixture, type 1 or 2.

@@ -14,8 +14,14 @@ const CORRELATED: f64 = 0.95;
 const LOOSE: f64 = 0.5;
 /// Change of an amplitude by half the step that says there are two motions.
 const TWO_MOTIONS: f64 = 0.15;
-/// Power in a combination that is worth naming.
-const NAMED_POWER: f64 = 0.2;
+/// Power in a combination that is worth naming in any case.
+const NAMED_POWER: f64 = 0.1;
+/// What a combination as it is worded is known to may be so many times what the combination itself is known to.
+const TRUE_TO: f64 = 1.1;
+/// Decimals of a power: so many where the words are then true, else more.
+const DECIMALS: std::ops::RangeInclusive<usize> = 2..=4;
+/// A share of a combination that the table does not see which is more than rounding.
+const SHARE: f64 = 1e-3;
 
 /// Codes of the warnings made here.
 pub(super) const WARNING_CODES: &[&str] = &[
@@ -176,24 +182,15 @@ pub(super) fn explanation(problem: &Problem<'_>, outcome: &IdentificationOutcome
                 .with("other_objective", second.fit.objective),
         );
     }
-    let words = |combination: &Combination| -> String {
-        let mut parts: Vec<(f64, &str)> = combination
-            .powers
-            .iter()
-            .zip(&outcome.parameters)
-            .filter(|(power, _)| power.abs() >= NAMED_POWER)
-            .map(|(power, parameter)| (*power, parameter.name.as_str()))
-            .collect();
-        parts.sort_by(|a, b| b.0.abs().total_cmp(&a.0.abs()));
-        parts.iter().map(|(power, name)| format!("{name}^{power:.2}")).collect::<Vec<_>>().join(" ")
-    };
     if let (Some(best), Some(least)) = (outcome.combinations.first(), outcome.combinations.last())
         && outcome.combinations.len() > 1
     {
+        let (best, least) = (Words::of(outcome, best), Words::of(outcome, least));
         if let Some(sd) = best.standard_deviation {
-            said.push(Message::new("identification_known_best").with("combination", words(best)).with("share", sd));
+            said.push(Message::new("identification_known_best").with("combination", best.text).with("share", sd));
         }
-        let message = Message::new("identification_known_least").with("combination", words(least));
+        let message =
+            Message::new("identification_known_least").with("combination", least.text).with("parameters", least.count);
         said.push(match least.standard_deviation {
             Some(sd) => message.with("share", sd),
             None => message,
@@ -209,4 +206,66 @@ pub(super) fn explanation(problem: &Problem<'_>, outcome: &IdentificationOutcome
     }
     said.push(Message::new("identification_not_unique"));
     said
+}
+
+/// A combination of parameters in words, and what is known of it as it is worded.
+struct Words {
+    text: String,
+    /// Parameters named.
+    count: usize,
+    standard_deviation: Option<f64>,
+}
+
+impl Words {
+    /// The largest powers, as many and with as many digits as it takes for the words to be known as well as what they stand
+    /// for: a small power of a parameter that is hardly known is no small part of it.
+    fn of(outcome: &IdentificationOutcome, combination: &Combination) -> Self {
+        let powers = &combination.powers;
+        let mut order: Vec<usize> = (0..powers.len()).collect();
+        order.sort_by(|&a, &b| powers[b].abs().total_cmp(&powers[a].abs()));
+        let least = order.iter().filter(|&&k| powers[k].abs() >= NAMED_POWER).count().max(1);
+        let tries = DECIMALS.flat_map(|decimals| (least..=order.len()).map(move |count| (decimals, count)));
+        let mut last = Self { text: String::new(), count: 0, standard_deviation: None };
+        for (decimals, count) in tries {
+            last = Self::with(outcome, powers, &order[..count], decimals);
+            let is_true = match (last.standard_deviation, combination.standard_deviation) {
+                (Some(said), Some(meant)) => said <= TRUE_TO * meant,
+                (said, meant) => said.is_none() && meant.is_none(),
+            };
+            if is_true {
+                break;
+            }
+        }
+        last
+    }
+
+    fn with(outcome: &IdentificationOutcome, powers: &[f64], named: &[usize], decimals: usize) -> Self {
+        let scale = (0..decimals).fold(1.0, |scale, _| 10.0 * scale);
+        let mut said = vec![0.0; powers.len()];
+        let mut parts = Vec::new();
+        for &k in named {
+            let power = (powers[k] * scale).round() / scale;
+            if power.abs() > 0.0 {
+                said[k] = power;
+                parts.push(format!("{}^{power:.decimals$}", outcome.parameters[k].name));
+            }
+        }
+        let standard_deviation = standard_deviation(&outcome.combinations, &said);
+        Self { text: parts.join(" "), count: parts.len(), standard_deviation }
+    }
+}
+
+/// Of a product of powers, from what is known of the combinations, which are independent of one another; `None` where the
+/// table does not see it.
+fn standard_deviation(combinations: &[Combination], powers: &[f64]) -> Option<f64> {
+    let mut square = 0.0;
+    for of in combinations {
+        let share: f64 = of.powers.iter().zip(powers).map(|(a, b)| a * b).sum();
+        match of.standard_deviation {
+            Some(sd) => square += (share * sd).powi(2),
+            None if share.abs() > SHARE => return None,
+            None => {}
+        }
+    }
+    Some(square.sqrt())
 }

@@ -1,11 +1,12 @@
 //! Figures and tables of an answer.
 
 use std::borrow::Cow;
+use std::collections::BTreeSet;
 
-use crate::calculator::{Axis, Column, Figure, Frame, Item, Message, Panel, Role, Table};
+use crate::calculator::{Axis, Column, Figure, Frame, Item, Message, Panel, Role, Table, Value};
 
 use super::input::{IdentificationJob, OpenedJoint};
-use super::output::{IdentificationOutcome, IdentifiedRow};
+use super::output::{HypothesisFit, IdentificationOutcome, IdentifiedRow};
 use super::report::Tried;
 
 pub(super) const FIGURE_IDS: &[&str] = &["amplitude", "ratio"];
@@ -23,7 +24,65 @@ pub(super) const LABEL_CODES: &[&str] = &[
     "table_exact",
     "identification_amplitude",
     "identification_ratio",
+    "table_measured_1",
+    "table_measured_2",
+    "table_measured_3",
+    "table_measured_4",
+    "table_measured_5",
+    "table_measured_6",
+    "table_measured_7",
+    "table_measured_8",
+    "table_simulated_1",
+    "table_simulated_2",
+    "table_simulated_3",
+    "table_simulated_4",
+    "table_simulated_5",
+    "table_simulated_6",
+    "table_simulated_7",
+    "table_simulated_8",
+    "table_other_law_1",
+    "table_other_law_2",
+    "table_other_law_3",
+    "table_other_law_4",
+    "table_other_law_5",
+    "table_other_law_6",
+    "table_other_law_7",
+    "table_other_law_8",
 ];
+
+/// What curves and points of a family of rows are called: by number, what the number means stands in the title's values.
+/// Families beyond these share one name.
+const MEASURED: [&str; FAMILIES] = [
+    "table_measured_1",
+    "table_measured_2",
+    "table_measured_3",
+    "table_measured_4",
+    "table_measured_5",
+    "table_measured_6",
+    "table_measured_7",
+    "table_measured_8",
+];
+const SIMULATED: [&str; FAMILIES] = [
+    "table_simulated_1",
+    "table_simulated_2",
+    "table_simulated_3",
+    "table_simulated_4",
+    "table_simulated_5",
+    "table_simulated_6",
+    "table_simulated_7",
+    "table_simulated_8",
+];
+const OTHER_LAW: [&str; FAMILIES] = [
+    "table_other_law_1",
+    "table_other_law_2",
+    "table_other_law_3",
+    "table_other_law_4",
+    "table_other_law_5",
+    "table_other_law_6",
+    "table_other_law_7",
+    "table_other_law_8",
+];
+const FAMILIES: usize = 8;
 
 const DEPTH: Axis = Axis::linear("depth_of_cut", "mm");
 
@@ -51,29 +110,90 @@ fn series(number: usize) -> Role {
     Role::Series(u8::try_from(number % 8).unwrap_or(0))
 }
 
+/// A field of the contract that is set, as names in pictures are given: the reader's language has its label.
+fn set(field: &'static str, value: impl Into<Value>, unit: &'static str) -> Value {
+    Value::List(vec![field.into(), value.into(), unit.into()])
+}
+
+type Field = (&'static str, fn(&IdentifiedRow) -> f64, &'static str);
+
+/// What tells every family from the others: of teeth, speed and feed as many as it takes; nothing of a single family.
+fn told_by(families: &[Vec<&IdentifiedRow>]) -> Vec<Vec<Value>> {
+    let fields: [Field; 3] = [
+        ("teeth", |row| f64::from(row.teeth), "1"),
+        ("spindle_speed_rpm", |row| row.spindle_speed_rpm, "rev/min"),
+        ("feed_mm_per_tooth", |row| row.feed_mm_per_tooth, "mm"),
+    ];
+    let firsts: Vec<&IdentifiedRow> = families.iter().filter_map(|family| family.first().copied()).collect();
+    let kinds = |of: &[Field]| -> usize {
+        let bits = |row: &&IdentifiedRow| of.iter().map(|(_, of, _)| of(row).to_bits()).collect::<Vec<u64>>();
+        firsts.iter().map(bits).collect::<BTreeSet<_>>().len()
+    };
+    let mut telling: Vec<Field> = Vec::new();
+    for field in fields {
+        if kinds(&telling) < firsts.len() && kinds(&[field]) > 1 {
+            telling.push(field);
+        }
+    }
+    let told = |row: &IdentifiedRow| telling.iter().map(|&(field, of, unit)| set(field, of(row), unit)).collect();
+    firsts.into_iter().map(told).collect()
+}
+
+/// What tells a law from the one that fits best.
+fn law_told_by(outcome: &IdentificationOutcome, other: &HypothesisFit) -> Vec<Value> {
+    let regeneration =
+        (other.regeneration != outcome.regeneration).then(|| set("regeneration", other.regeneration.name(), "1"));
+    let amplitude = (other.amplitude != outcome.amplitude).then(|| set("amplitude", other.amplitude.name(), "1"));
+    regeneration.into_iter().chain(amplitude).collect()
+}
+
+/// The name of a family's item, and what it means put into the title.
+fn named(
+    title: &mut Message,
+    (alone, names): (&'static str, &[&'static str; FAMILIES]),
+    number: usize,
+    what: Vec<Value>,
+    told: &[Value],
+) -> &'static str {
+    let Some(name) = names.get(number).copied().filter(|_| !told.is_empty()) else { return alone };
+    title.values = std::mem::take(&mut title.values).with(name, [what, told.to_vec()].concat());
+    name
+}
+
+/// The amplitudes, and of rows that were measured the ratios.
 pub(super) fn figures(_job: &IdentificationJob, outcome: &IdentificationOutcome) -> Vec<Figure> {
     let families = families(&outcome.rows);
-    let mut amplitudes = Vec::new();
-    let mut ratios = Vec::new();
+    let told = told_by(&families);
+    let (mut amplitude, mut ratio) = (Message::new("identification_amplitude"), Message::new("identification_ratio"));
+    let (mut amplitudes, mut ratios) = (Vec::new(), Vec::new());
     let other = outcome.hypotheses.get(1);
-    for (number, family) in families.iter().enumerate() {
+    for (number, (family, told)) in families.iter().zip(&told).enumerate() {
         let x: Vec<f64> = family.iter().map(|row| row.depth_mm).collect();
         if let Some(other) = other {
+            let law = law_told_by(outcome, other);
+            let name = named(&mut amplitude, ("table_other_law", &OTHER_LAW), number, law, told);
             let y = family.iter().map(|row| other.simulated_um.get(row.row - 1).copied()).collect();
-            amplitudes.push(Item::Line { name: "table_other_law", x: x.clone(), y, role: Role::Comparison });
+            amplitudes.push(Item::Line { name, x: x.clone(), y, role: Role::Comparison });
         }
+        let what = vec!["simulated_um".into()];
+        let name = named(&mut amplitude, ("table_simulated", &SIMULATED), number, what, told);
         let y = family.iter().map(|row| Some(row.simulated_um)).collect();
-        amplitudes.push(Item::Line { name: "table_simulated", x, y, role: series(number) });
+        amplitudes.push(Item::Line { name, x, y, role: series(number) });
         let measured: Vec<&&IdentifiedRow> = family.iter().filter(|row| row.measured_um.is_some()).collect();
+        if measured.is_empty() {
+            continue;
+        }
+        let depths: Vec<f64> = measured.iter().map(|row| row.depth_mm).collect();
+        let what = vec!["measured_um".into()];
         amplitudes.push(Item::Points {
-            name: "table_measured",
-            x: measured.iter().map(|row| row.depth_mm).collect(),
+            name: named(&mut amplitude, ("table_measured", &MEASURED), number, what, told),
+            x: depths.clone(),
             y: measured.iter().map(|row| row.measured_um.unwrap_or(0.0)).collect(),
             role: series(number),
         });
         ratios.push(Item::Points {
-            name: "simulated_over_measured",
-            x: measured.iter().map(|row| row.depth_mm).collect(),
+            name: named(&mut ratio, ("simulated_over_measured", &SIMULATED), number, Vec::new(), told),
+            x: depths,
             y: measured.iter().map(|row| row.ratio.unwrap_or(1.0)).collect(),
             role: series(number),
         });
@@ -87,23 +207,18 @@ pub(super) fn figures(_job: &IdentificationJob, outcome: &IdentificationOutcome)
             role: Role::Unstable,
         });
     }
-    let depths = || outcome.rows.iter().map(|row| row.depth_mm);
-    let ends = vec![depths().fold(f64::INFINITY, f64::min), depths().fold(0.0, f64::max)];
-    ratios.push(Item::Line { name: "table_exact", y: vec![Some(1.0); 2], x: ends, role: Role::Nominal });
-    vec![
-        figure("amplitude", "identification_amplitude", Axis::logarithmic("amplitude_of_table", "um"), amplitudes),
-        figure("ratio", "identification_ratio", Axis::logarithmic("simulated_over_measured", "1"), ratios),
-    ]
+    let mut figures = vec![figure("amplitude", amplitude, Axis::logarithmic("amplitude_of_table", "um"), amplitudes)];
+    if !ratios.is_empty() {
+        let depths = || outcome.rows.iter().map(|row| row.depth_mm);
+        let ends = vec![depths().fold(f64::INFINITY, f64::min), depths().fold(0.0, f64::max)];
+        ratios.push(Item::Line { name: "table_exact", y: vec![Some(1.0); 2], x: ends, role: Role::Nominal });
+        figures.push(figure("ratio", ratio, Axis::logarithmic("simulated_over_measured", "1"), ratios));
+    }
+    figures
 }
 
-fn figure(id: &'static str, title: &'static str, y: Axis, items: Vec<Item>) -> Figure {
-    Figure {
-        id,
-        title: Message::new(title),
-        frame: Frame::Stacked,
-        x: DEPTH,
-        panels: vec![Panel { y, height: 1.0, items }],
-    }
+fn figure(id: &'static str, title: Message, y: Axis, items: Vec<Item>) -> Figure {
+    Figure { id, title, frame: Frame::Stacked, x: DEPTH, panels: vec![Panel { y, height: 1.0, items }] }
 }
 
 /// Measured amplitudes and those of the laws searched so far.
@@ -126,7 +241,7 @@ pub(super) fn so_far(job: &IdentificationJob, tried: &[Tried]) -> Figure {
         y: measured().map(|(_, amplitude)| amplitude).collect(),
         role: Role::Plain,
     });
-    figure("amplitude", "identification_amplitude", Axis::logarithmic("amplitude_of_table", "um"), items)
+    figure("amplitude", Message::new("identification_amplitude"), Axis::logarithmic("amplitude_of_table", "um"), items)
 }
 
 pub(super) fn tables(outcome: &IdentificationOutcome) -> Vec<Table> {
