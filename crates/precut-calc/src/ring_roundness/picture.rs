@@ -1,4 +1,4 @@
-//! Figures and tables of an answer. What the job does not ask for leaves its figure without curves.
+//! Figures and tables of an answer. What the job does not ask for has no figure.
 
 use crate::calculator::{Axis, Column, Figure, Frame, Glyph, Item, Message, Panel, Role, Table};
 
@@ -78,17 +78,43 @@ fn closed(name: &'static str, angle_deg: &[f64], y: &[f64], role: Role) -> Item 
     Item::Line { name, x, y, role }
 }
 
+/// Whether there is anything to see of it.
+fn shows(item: &Item) -> bool {
+    match item {
+        Item::Line { y, .. } | Item::Bars { y, .. } => y.iter().any(Option::is_some),
+        Item::HeatMap { values, .. } => values.iter().any(Option::is_some),
+        Item::Band { x, .. } | Item::Points { x, .. } | Item::Ribbon { x, .. } | Item::Outline { x, .. } => {
+            !x.is_empty()
+        }
+        Item::Glyph { .. } => false,
+    }
+}
+
 pub(super) fn figures(job: &Job, outcome: &Outcome) -> Vec<Figure> {
+    let mut figures = drawn(job, outcome);
+    // An empty panel would stand on axes that nothing made.
+    for figure in &mut figures {
+        figure.panels.retain(|panel| panel.items.iter().any(shows));
+    }
+    figures.retain(|figure| !figure.panels.is_empty());
+    figures
+}
+
+fn drawn(job: &Job, outcome: &Outcome) -> Vec<Figure> {
     let simulation = outcome.simulation.as_ref();
     let figure = |id, title, frame, x, panels| Figure { id, title: Message::new(title), frame, x, panels };
     vec![
-        figure(
-            "polar",
-            "ring_polar",
-            Frame::Polar,
-            Axis::linear("body_angle", "deg"),
-            vec![polar(job, simulation, &outcome.setting)],
-        ),
+        Figure {
+            // Their symbol is that of a steady rest; here they are what the job calls them.
+            title: Message::new("ring_polar").with("glyph_steady_rest", vec!["supports"]),
+            ..figure(
+                "polar",
+                "ring_polar",
+                Frame::Polar,
+                Axis::linear("body_angle", "deg"),
+                vec![polar(job, simulation, &outcome.setting)],
+            )
+        },
         figure(
             "profile",
             "ring_profile",

@@ -66,7 +66,8 @@ fn circles(outcome: &Outcome) -> Vec<Item> {
         ("minimum_zone_circles", minimum_zone, minimum_zone.outer_radius_mm, Role::Limit),
         ("minimum_zone_inner", minimum_zone, minimum_zone.inner_radius_mm, Role::Limit),
         ("inscribed_circle", maximum_inscribed, maximum_inscribed.radius_mm, Role::Series(0)),
-        ("circumscribed_circle", minimum_circumscribed, minimum_circumscribed.radius_mm, Role::Series(1)),
+        // The next of the family has colour and dashes of the measured profile.
+        ("circumscribed_circle", minimum_circumscribed, minimum_circumscribed.radius_mm, Role::Series(3)),
     ]
     .into_iter()
     .map(|(name, circle, radius_mm, role)| {
