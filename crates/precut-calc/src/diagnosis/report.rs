@@ -1,6 +1,6 @@
 //! From the statistics to the answer: the verdict in the words of the contract, and every step behind it.
 
-use super::adequacy::{TestKind, adequacy};
+use super::adequacy::{Test, TestKind, adequacy};
 use super::base::Bound;
 use super::calculator::{JobOf, Measured, ResultOf, stage};
 use super::classes;
@@ -9,11 +9,11 @@ use super::downstream::downstream;
 use super::foundation::Foundation;
 use super::gain::{Gain, gain};
 use super::identify::twins;
-use super::next::next_measurement;
+use super::next::{NextMeasurement, next_measurement};
 use super::noise::{NoiseSource, between_sweeps};
 use super::output::{
-    CausePair, DiagnosisResult, GainReport, NoiseReport, NotApplicable, RemainderReport, RowColumns, StepReport,
-    TestReport, VerdictClass,
+    CausePair, DiagnosisResult, GainReport, NamedCause, NoiseReport, NotApplicable, RemainderReport, RowColumns,
+    StepReport, TestReport, VerdictClass,
 };
 use super::refuse::{most_causes, refusal};
 use super::remainder::{RemainderShape, remainder_shape};
@@ -21,7 +21,10 @@ use super::said::{basis, doubts, explanation, warnings};
 use super::subject::{Setting, Subject};
 use super::view::View;
 use super::weigh::{Effort, Verdict, Weighing};
-use crate::calculator::{Answer, Diagnosable, Failure, Inapplicability, Measurement, Monitor, Prediction, Smooth};
+use crate::calculator::{
+    Answer, Diagnosable, Failure, Hypothesis, Inapplicability, Measurement, Message, Monitor, Prediction, Quantity,
+    Smooth, Value,
+};
 
 /// Sets that are listed.
 const LISTED_SETS: usize = 20;
@@ -63,6 +66,7 @@ pub(super) fn answer<M: Diagnosable>(
         None
     };
     let next = if refusal.is_none() { next_measurement::<M>(job, places, &weighing, monitor)? } else { None };
+    let contenders = Contenders::of(next.as_ref(), bound.hypotheses());
     let view = View::of(bound.hypotheses(), &weighing, refusal.is_none(), bound.is_dear(), monitor)?;
     let named = if refusal.is_some() { Vec::new() } else { view.named() };
     let leading = view.leading().filter(|_| !named.is_empty());
@@ -94,16 +98,7 @@ pub(super) fn answer<M: Diagnosable>(
         contributions,
         collinearity,
         noise: noise_report(&weighing),
-        tests: adequacy(&weighing)
-            .into_iter()
-            .map(|test| TestReport {
-                test: test_name(test.kind).to_owned(),
-                statistic: test.statistic,
-                p: test.p,
-                p_holm: test.p_holm,
-                rejects: test.p_holm < job.options.level,
-            })
-            .collect(),
+        tests: test_reports(&weighing, job.options.level),
         sets: weighing.sets.iter().take(LISTED_SETS).map(|set| view.set_report(set, gain.as_ref())).collect(),
         causes: view.causes(),
         not_applicable: not_applicable(bound, &weighing),
@@ -134,8 +129,66 @@ pub(super) fn answer<M: Diagnosable>(
         warnings.extend(doubts(&output));
     }
     let explanation = explanation(&output, quantity);
+    let explanation =
+        explanation.into_iter().map(|message| in_particular(message, &output, &contenders, quantity)).collect();
     stage(monitor, 1.0, "stage_done");
     Ok(Answer { output, warnings, explanation, basis: basis() })
+}
+
+/// Labels of the causes that a next measurement parts.
+#[derive(Default)]
+struct Contenders {
+    leader: Vec<String>,
+    rival: Vec<String>,
+}
+
+impl Contenders {
+    fn of<R>(next: Option<&NextMeasurement<R>>, hypotheses: &[Hypothesis]) -> Self {
+        let labels = |members: &[usize]| members.iter().map(|&member| hypotheses[member].label.clone()).collect();
+        next.map_or_else(Self::default, |next| Self { leader: labels(&next.leader), rival: labels(&next.rival) })
+    }
+}
+
+/// A sentence that also says which cause of its kind is meant, as several waves or batches may act at once, and in
+/// which unit its numbers are.
+fn in_particular<E: utoipa::ToSchema, R: utoipa::ToSchema>(
+    message: Message,
+    output: &DiagnosisResult<E, R>,
+    contenders: &Contenders,
+    quantity: &Quantity,
+) -> Message {
+    let labels = |causes: &[NamedCause]| causes.iter().map(|cause| cause.label.clone()).collect::<Vec<_>>();
+    match message.code {
+        "diagnosis_next" => {
+            message.with("leader_labels", contenders.leader.clone()).with("rival_labels", contenders.rival.clone())
+        }
+        "diagnosis_unknown" => message
+            .with("labels", labels(&output.named))
+            // What is left of logarithms is a share.
+            .with("unit", if quantity.logarithmic { "" } else { quantity.unit }),
+        "diagnosis_objected" => {
+            let best = output.sets.iter().find(|set| !set.with_remainder && !set.causes.is_empty());
+            message.with("labels", best.map_or_else(Vec::new, |set| labels(&set.causes)))
+        }
+        "diagnosis_confounded" => {
+            let said: &[Value] = match message.values.get("sets") {
+                Some(Value::List(sets)) => sets,
+                _ => &[],
+            };
+            let kinds = |causes: &[NamedCause]| causes.iter().map(|cause| cause.kind.clone()).collect::<Vec<_>>();
+            let own = output.likely_sets.iter().filter(|set| said.contains(&Value::from(kinds(&set.causes))));
+            let own: Vec<Vec<String>> = own.take(said.len()).map(|set| labels(&set.causes)).collect();
+            message.with("labels", own)
+        }
+        "diagnosis_negligible" => {
+            let small = output.contributions.iter().filter(|contribution| contribution.negligible);
+            message.with("labels", small.map(|contribution| contribution.label.clone()).collect::<Vec<_>>())
+        }
+        "diagnosis_adequate_with_hint" => {
+            message.with("label", output.causes.first().map_or_else(String::new, |cause| cause.label.clone()))
+        }
+        _ => message,
+    }
 }
 
 /// The extended model on the rows, where causes are named.
@@ -168,6 +221,17 @@ fn remainder_report(shape: RemainderShape, used: &[usize]) -> RemainderReport {
 
 fn row_number(row: usize) -> u32 {
     u32::try_from(row + 1).unwrap_or(u32::MAX)
+}
+
+fn test_reports(weighing: &Weighing<'_>, level: f64) -> Vec<TestReport> {
+    let report = |test: Test| TestReport {
+        test: test_name(test.kind).to_owned(),
+        statistic: test.statistic,
+        p: test.p,
+        p_holm: test.p_holm,
+        rejects: test.p_holm < level,
+    };
+    adequacy(weighing).into_iter().map(report).collect()
 }
 
 fn test_name(kind: TestKind) -> &'static str {

@@ -3,7 +3,7 @@
 use utoipa::ToSchema;
 
 use super::super::identify::CONFOUNDED_BELOW;
-use super::super::output::{DiagnosisResult, ProfileReport};
+use super::super::output::{CauseReport, DiagnosisResult, ProfileReport, VerdictClass};
 use super::{figure, panel};
 use crate::calculator::{Axis, Diagnosable, Figure, Item, Panel, Role};
 
@@ -39,17 +39,32 @@ fn kind_of<M: Diagnosable>(kind: &str) -> &'static str {
     M::CAUSES.iter().find(|cause| cause.kind == kind).map_or("diagnosis_candidate", |cause| cause.kind)
 }
 
-/// The likeliest causes, nothing, and what has no name.
+/// The likeliest causes, nothing, and what has no name. Where that is the answer it comes first, and what of the catalogue
+/// only comes nearest stands last and pale: its share makes it no name.
 pub(super) fn evidence<M: Diagnosable>(output: &DiagnosisResult<M::Effect, M::Run>) -> Figure {
-    let bar = |name, x: usize, y, role| Item::Bars { name, x: vec![x as f64], y: vec![Some(y)], role };
-    let mut items = vec![bar("diagnosis_nothing", 0, output.none_probability, Role::Nominal)];
-    for (number, cause) in (0_u8..).zip(output.causes.iter().take(MOST_CAUSES)) {
-        let place = usize::from(number) + 1;
-        items.push(bar(kind_of::<M>(&cause.kind), place, cause.probability, Role::Series(number)));
-    }
-    items.push(bar("diagnosis_unnamed", items.len(), output.unnamed_probability, Role::Unstable));
+    let is_unknown = output.verdict == VerdictClass::Unknown;
+    let is_named =
+        |cause: &CauseReport| output.named.iter().any(|one| one.kind == cause.kind && one.label == cause.label);
+    let (own, nearest): (Vec<&CauseReport>, Vec<&CauseReport>) =
+        output.causes.iter().take(MOST_CAUSES).partition(|&cause| !is_unknown || is_named(cause));
+    let nothing = ("diagnosis_nothing", output.none_probability, Role::Nominal);
+    let unnamed = ("diagnosis_unnamed", output.unnamed_probability, Role::Unstable);
+    let own =
+        (0_u8..).zip(own).map(|(number, cause)| (kind_of::<M>(&cause.kind), cause.probability, Role::Series(number)));
+    let bars: Vec<(&'static str, f64, Role)> = if is_unknown {
+        let nearest = nearest.into_iter().map(|cause| (kind_of::<M>(&cause.kind), cause.probability, Role::Comparison));
+        [unnamed].into_iter().chain(own).chain([nothing]).chain(nearest).collect()
+    } else {
+        [nothing].into_iter().chain(own).chain([unnamed]).collect()
+    };
+    let items = bars
+        .into_iter()
+        .enumerate()
+        .map(|(place, (name, share, role))| Item::Bars { name, x: vec![place as f64], y: vec![Some(share)], role })
+        .collect();
+    let title = if is_unknown { "diagnosis_evidence_unknown" } else { "diagnosis_evidence" };
     let y = Axis::linear("diagnosis_probability", "1");
-    figure("evidence", "diagnosis_evidence", Axis::linear("diagnosis_cause_rank", "1"), vec![panel(y, items)])
+    figure("evidence", title, Axis::linear("diagnosis_cause_rank", "1"), vec![panel(y, items)])
 }
 
 /// How far leading sets lie apart, in units of the distance below which they are confounded.
@@ -118,9 +133,11 @@ pub(super) fn held_back<E: ToSchema, R: ToSchema>(
     let gain = output.gain.as_ref()?;
     let bar = |name, x, y, role| Item::Bars { name, x: vec![x], y: vec![Some(y)], role };
     let [low, high] = gain.gain_interval_95.map(|gain_at| (1.0 - gain_at) * gain.rmse_base);
+    // What foresees no better is no improvement.
+    let extended = if gain.rmse_extended < gain.rmse_base { Role::After } else { Role::Comparison };
     let items = vec![
         bar("diagnosis_base_residual", 1.0, gain.rmse_base, Role::Before),
-        bar("diagnosis_extended_residual", 2.0, gain.rmse_extended, Role::After),
+        bar("diagnosis_extended_residual", 2.0, gain.rmse_extended, extended),
         bar("diagnosis_ceiling", 3.0, gain.noise_ceiling, Role::Uncertainty),
         Item::Line { name: "diagnosis_interval", x: vec![2.0, 2.0], y: vec![Some(low), Some(high)], role: Role::Plain },
     ];

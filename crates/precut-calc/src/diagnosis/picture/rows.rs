@@ -4,10 +4,17 @@ use utoipa::ToSchema;
 
 use super::super::output::{DiagnosisResult, RowColumns};
 use super::{figure, panel};
-use crate::calculator::{Axis, Figure, Item, Panel, Role};
+use crate::calculator::{Axis, Figure, Item, Role, Value};
 
-/// Runs whose rows have a panel of their own at most; the first of them.
-const MOST_PANELS: usize = 6;
+/// Labels of the panels of single runs, whose number stands in the title's values; the first so many runs have one.
+const OF_RUNS: [&str; 6] = [
+    "diagnosis_measured_1",
+    "diagnosis_measured_2",
+    "diagnosis_measured_3",
+    "diagnosis_measured_4",
+    "diagnosis_measured_5",
+    "diagnosis_measured_6",
+];
 /// Sets whose signatures are drawn.
 const SET_NAMES: [&str; 4] = ["diagnosis_set_1", "diagnosis_set_2", "diagnosis_set_3", "diagnosis_set_4"];
 /// Of a normal distribution, two-sided.
@@ -126,19 +133,6 @@ fn abscissa(rows: &RowColumns, index: &[usize]) -> (Axis, Vec<f64>) {
 pub(super) fn predictions<E: ToSchema, R: ToSchema>(output: &DiagnosisResult<E, R>, unit: &'static str) -> Vec<Figure> {
     let rows = &output.rows;
     let shown = Residuals::of(rows).index;
-    let (x, _) = abscissa(rows, &shown);
-    // Without places the rows of all runs stand one after the other.
-    let of_runs: Vec<Vec<usize>> = if rows.place.iter().all(Option::is_some) {
-        let of = |run: u32| shown.iter().copied().filter(|&index| rows.run[index] == run).collect();
-        runs(rows).into_iter().take(MOST_PANELS).map(of).collect()
-    } else {
-        vec![shown.clone()]
-    };
-    let panels: Vec<Panel> = of_runs
-        .into_iter()
-        .filter(|index| !index.is_empty())
-        .map(|index| panel(Axis::linear("diagnosis_measured", unit), of_run(rows, index)))
-        .collect();
     let value = |column: &[Option<f64>]| -> Vec<f64> { shown.iter().filter_map(|&index| column[index]).collect() };
     let measured: Vec<f64> = shown.iter().map(|&index| rows.measured[index]).collect();
     let points = |name, x, role| Item::Points { name, x, y: measured.clone(), role };
@@ -155,7 +149,7 @@ pub(super) fn predictions<E: ToSchema, R: ToSchema>(output: &DiagnosisResult<E, 
         points("diagnosis_extended_residual", value(&rows.extended), Role::After),
     ];
     vec![
-        figure("prediction", "diagnosis_prediction", x, panels),
+        run_by_run(rows, &shown, unit),
         figure(
             "predicted_against_measured",
             "diagnosis_predicted_against_measured",
@@ -163,6 +157,26 @@ pub(super) fn predictions<E: ToSchema, R: ToSchema>(output: &DiagnosisResult<E, 
             vec![panel(Axis::linear("diagnosis_measured", unit), agreement)],
         ),
     ]
+}
+
+/// Measured with both predictions, a panel for each run. Without places the rows of all runs stand one after the other.
+fn run_by_run(rows: &RowColumns, shown: &[usize], unit: &'static str) -> Figure {
+    let (x, _) = abscissa(rows, shown);
+    let runs: Vec<u32> =
+        runs(rows).into_iter().filter(|run| shown.iter().any(|&index| rows.run[index] == *run)).collect();
+    let mut drawn = figure("prediction", "diagnosis_prediction", x, Vec::new());
+    if runs.len() < 2 || !rows.place.iter().all(Option::is_some) {
+        let all = Axis::linear("diagnosis_measured", unit);
+        drawn.panels.extend((!shown.is_empty()).then(|| panel(all, of_run(rows, shown.to_vec()))));
+        return drawn;
+    }
+    for (label, run) in OF_RUNS.into_iter().zip(runs) {
+        let own = shown.iter().copied().filter(|&index| rows.run[index] == run).collect();
+        drawn.panels.push(panel(Axis::linear(label, unit), of_run(rows, own)));
+        let measured_in: Vec<Value> = vec!["measured".into(), "run".into(), f64::from(run).into()];
+        drawn.title = drawn.title.with(label, vec![measured_in]);
+    }
+    drawn
 }
 
 fn of_run(rows: &RowColumns, mut index: Vec<usize>) -> Vec<Item> {
