@@ -1,6 +1,7 @@
 //! A measured table as CSV text into rows.
 
 use std::borrow::Cow;
+use std::collections::HashSet;
 
 use precut_calc::calculator::Finding;
 use serde_json::{Map, Value};
@@ -11,6 +12,8 @@ use crate::units;
 
 /// Longest name of a column that no field names.
 const LONGEST_NAME: usize = 64;
+/// Most columns beside those that fields name: each takes its time in every row.
+const MOST_FURTHER: usize = 64;
 /// Longest piece of a cell that is shown.
 const SHOWN_CHARS: usize = 40;
 
@@ -108,8 +111,14 @@ fn columns<'a>(
     faults: &mut Faults,
 ) -> Vec<CsvColumn<'a>> {
     let before = faults.total;
-    let mut found: Vec<CsvColumn<'a>> = Vec::new();
     let used = used_cells(header);
+    let most = place.columns.len() + MOST_FURTHER;
+    if used > most {
+        faults.add(Finding::new("too_many_columns", pointer).with("columns", used).with("maximum", most));
+        return Vec::new();
+    }
+    let mut found: Vec<CsvColumn<'a>> = Vec::new();
+    let mut filled: HashSet<String> = HashSet::new();
     for (index, cell) in header.iter().take(used).enumerate() {
         let fault = |code| Finding::new(code, pointer).with("column", shown(cell)).with("line", whole(lines.header));
         let read = match column(cell, place) {
@@ -119,8 +128,8 @@ fn columns<'a>(
             known => known,
         };
         match read {
-            Ok(column) if found.iter().any(|other| other.field.name == column.field.name) => {
-                faults.add(fault("duplicate_column").with("field", column.field.name.clone()));
+            Ok(column) if !filled.insert(column.field.name.clone()) => {
+                faults.add(fault("duplicate_column").with("fills", column.field.name.clone()));
             }
             Ok(column) => found.push(column),
             Err(BadHeader::Unknown { nearest: Some(nearest) }) => {
@@ -139,7 +148,7 @@ fn columns<'a>(
     let names_read = faults.total == before;
     for field in place.columns.iter().filter(|field| field.required) {
         // A column under a name that was not understood is not missing as well.
-        if names_read && !found.iter().any(|column| column.field.name == field.name) {
+        if names_read && !filled.contains(&field.name) {
             faults.add(Finding::new("missing_column", pointer).with("column", field.name.clone()));
         }
     }
@@ -157,7 +166,7 @@ fn free_column<'a>(cell: &str, index: usize, lines: &Lines<'_>, place: &'a Table
         return None;
     }
     let cells = || lines.records.iter().filter_map(|record| record.get(index)).filter(|cell| !cell.is_empty());
-    let numbers = cells().all(|cell| number(cell, lines.decimal_comma).is_some());
+    let numbers = cells().all(|cell| decimal(cell, lines.decimal_comma).is_some());
     let (within, kind) = match (&place.free.numbers, &place.free.words) {
         (Some(within), _) if numbers => (within, CellKind::Number),
         (_, Some(within)) => (within, CellKind::Word),
@@ -268,16 +277,20 @@ impl Table<'_> {
                 _ => None,
             },
             CellKind::Number | CellKind::Integer => {
-                let read = number(cell, self.decimal_comma)?;
+                let text = decimal(cell, self.decimal_comma)?;
                 let same = column.unit == column.field.unit;
-                json::number(if same { read } else { units::convert(read, &column.unit, &column.field.unit)? })
+                json::number(if same {
+                    text.parse().ok()?
+                } else {
+                    units::converted(&text, &column.unit, &column.field.unit)?
+                })
             }
         }
     }
 }
 
-/// A plain decimal number: no words such as `inf`, no thousands separators.
-fn number(cell: &str, decimal_comma: bool) -> Option<f64> {
+/// A plain decimal number as Rust and JSON write it: no words such as `inf`, no thousands separators.
+fn decimal(cell: &str, decimal_comma: bool) -> Option<String> {
     let plain = |c: char| c.is_ascii_digit() || matches!(c, '+' | '-' | '.' | 'e' | 'E');
     let read = if decimal_comma && cell.contains(',') {
         if cell.contains('.') {
@@ -292,7 +305,7 @@ fn number(cell: &str, decimal_comma: bool) -> Option<f64> {
     if !read.chars().all(plain) {
         return None;
     }
-    read.parse::<f64>().ok().filter(|number| number.is_finite())
+    read.parse::<f64>().is_ok_and(f64::is_finite).then_some(read)
 }
 
 /// How many cells a line has, empty ones at its end left out.
@@ -368,6 +381,31 @@ mod tests {
     }
 
     #[test]
+    fn numbers_in_another_unit_are_those_of_the_rows() {
+        for (text, z, deviation) in [
+            ("z [m],deviation [mm]\n0.0275,0.02757\n", "27.5", "27.57"),
+            ("z [cm];deviation [nm]\n1,15;-27570,3\n", "11.5", "-27.5703"),
+            ("z [in],deviation [uin]\n0.1,40\n", "2.54", "1.016"),
+            ("z_ft,deviation_thou\n0.25,-1.1\n", "76.2", "-27.94"),
+            ("z_m,deviation_mm\n1.1234567890123456,0.1234567890123456\n", "1123.4567890123456", "123.4567890123456"),
+        ] {
+            let read = rows(text);
+            for (name, expected) in [("z_mm", z), ("deviation_um", deviation)] {
+                let expected: f64 = expected.parse().unwrap();
+                assert_eq!(read[0][name].as_f64().map(f64::to_bits), Some(expected.to_bits()), "{text}: {name}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_column_that_comes_twice_names_the_field() {
+        let mut faults = Faults::default();
+        read("z_mm,z [m]\n1,2", &place(), "/measurements", &mut faults);
+        let said = Texts::shared().try_finding(Language::En, "fault", &faults.listed[0]).unwrap();
+        assert_eq!(said, "line 1: the column z [m] fills z_mm, which another column fills already");
+    }
+
+    #[test]
     fn columns_without_a_field_go_where_the_row_takes_them() {
         let mut place = place();
         place.free =
@@ -383,6 +421,32 @@ mod tests {
                 {"z_mm": 3, "deviation_um": 4, "further": {"nose_radius_mm": 1.2, "humidity": 0.5}, "factors": {"coolant": "7"}}
             ])
         );
+    }
+
+    #[test]
+    fn a_header_has_its_columns_and_so_many_more() {
+        let mut place = place();
+        place.free.numbers = Some("further".to_owned());
+        let further = |count: usize| (0..count).map(|i| format!("a{i}")).collect::<Vec<_>>().join(",");
+        let table = |count: usize| format!("z_mm,deviation_um,{}\n1,2{}\n", further(count), ",3".repeat(count));
+        let most = place.columns.len() + MOST_FURTHER;
+        let mut faults = Faults::default();
+        let rows = read(&table(most - 2), &place, "/measurements", &mut faults).unwrap().rows;
+        assert_eq!(rows[0]["further"].as_object().map(Map::len), Some(most - 2));
+        // Of a longer header nothing is read but its length.
+        for further in [most - 1, 100_000] {
+            let mut faults = Faults::default();
+            assert!(read(&table(further), &place, "/measurements", &mut faults).is_none());
+            let finding = &faults.listed[0];
+            assert_eq!((finding.code, faults.total), ("too_many_columns", 1));
+            let said = |language| Texts::shared().try_finding(language, "fault", finding).unwrap();
+            let columns = further + 2;
+            assert_eq!(
+                said(Language::En),
+                format!("the table measurements has {columns} columns, at most {most} are taken")
+            );
+            assert!(said(Language::Ru).contains("столб"), "{}", said(Language::Ru));
+        }
     }
 
     #[test]
