@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 use axum::body::{Body, HttpBody as _};
 use axum::extract::{Request, State};
 use axum::http::header::{
-    ACCEPT_ENCODING, ALLOW, CACHE_CONTROL, CONTENT_ENCODING, CONTENT_LANGUAGE, CONTENT_LENGTH, CONTENT_LOCATION,
+    ACCEPT_ENCODING, CACHE_CONTROL, CONTENT_ENCODING, CONTENT_LANGUAGE, CONTENT_LENGTH, CONTENT_LOCATION,
     CONTENT_SECURITY_POLICY, CONTENT_TYPE, ETAG, REFERRER_POLICY, VARY, WWW_AUTHENTICATE, X_CONTENT_TYPE_OPTIONS,
 };
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode};
@@ -47,6 +47,7 @@ pub(super) async fn gate(State(app): State<App>, mut request: Request, next: Nex
     let id = request_id(request.headers());
     let method = request.method().clone();
     let route = app.metrics.route(request.uri().path());
+    let allowed = allowed(&app, request.uri().path());
     let language = negotiate::language(request.headers());
     let encodings = request.headers_mut().remove(ACCEPT_ENCODING);
     let span = tracing::info_span!(
@@ -65,7 +66,7 @@ pub(super) async fn gate(State(app): State<App>, mut request: Request, next: Nex
             }),
             Err(problem) => problem.into_bare_response(),
         };
-        let response = compressed(worded(response, &method, language, &id), encodings).await;
+        let response = compressed(worded(response, &method, allowed, language, &id), encodings).await;
         log(&response, start.elapsed());
         response
     }
@@ -188,16 +189,27 @@ fn request_id(headers: &HeaderMap) -> HeaderValue {
     HeaderValue::from_str(id).unwrap_or(HeaderValue::from_static("0"))
 }
 
+/// Methods of an address. The router says them in `Allow`, too, but writes that header outside of this layer, when the
+/// problem is in words already.
+fn allowed(app: &App, path: &str) -> &'static str {
+    let Some((folder, name)) = path.strip_prefix("/v1/").map(|path| path.split_once('/').unwrap_or(("", path))) else {
+        return "GET, HEAD";
+    };
+    match folder {
+        "" if app.rooms.iter().any(|room| room.id() == name) => "POST",
+        "jobs" if !name.contains('/') => "GET, HEAD, DELETE",
+        "models" if !name.contains('/') => "GET, HEAD, PUT, DELETE",
+        _ => "GET, HEAD",
+    }
+}
+
 /// Puts a problem into words, the framework's own errors included.
-fn worded(mut response: Response, method: &Method, language: Language, id: &HeaderValue) -> Response {
+fn worded(mut response: Response, method: &Method, allowed: &str, language: Language, id: &HeaderValue) -> Response {
     let status = response.status();
     let problem = response.extensions_mut().remove::<Problem>();
     let problem = match problem {
         Some(problem) => problem,
-        None if status == StatusCode::METHOD_NOT_ALLOWED => {
-            let allowed = response.headers().get(ALLOW).and_then(|allowed| allowed.to_str().ok());
-            Problem::method(method.as_str(), allowed.unwrap_or_default())
-        }
+        None if status == StatusCode::METHOD_NOT_ALLOWED => Problem::method(method.as_str(), allowed),
         None if status.is_client_error() || status.is_server_error() => Problem::of_status(status),
         None => return response,
     };
@@ -288,6 +300,7 @@ pub(super) fn method_label(method: &Method) -> &'static str {
         "GET" => "GET",
         "HEAD" => "HEAD",
         "POST" => "POST",
+        "PUT" => "PUT",
         "DELETE" => "DELETE",
         "OPTIONS" => "OPTIONS",
         _ => "other",

@@ -84,6 +84,7 @@ const LATIN: &[&str] = &[
     "quadratic",
     "If-None-Match",
     "lathe-7",
+    "provenance",
     "regression",
     "repeats",
     "stated",

@@ -7,7 +7,8 @@ use minijinja::value::ValueKind;
 use super::glossary::Glossary;
 use super::{Language, number, significant};
 
-/// One way, or a list of parts: each a way, or `[way, value, unit]` of a field that is set.
+/// One way, or a list of parts: each a way, or `[way, value, unit]` of a field that is set, or `[way, item, number]`
+/// of a field that each of several items has.
 pub(super) fn named(value: &Value, joint: &str, within: bool, language: Language) -> Option<String> {
     let name = |way: &str| {
         let name = Glossary::of(language).way(way);
@@ -20,6 +21,11 @@ pub(super) fn named(value: &Value, joint: &str, within: bool, language: Language
         ValueKind::Seq => {
             let fields: Vec<Value> = part.try_iter().ok()?.collect();
             let [way, set, unit] = fields.as_slice() else { return None };
+            if unit.is_number() {
+                let item = lowered(&Glossary::of(language).way(set.as_str()?));
+                let number = number::spoken(&number::read(f64::try_from(unit.clone()).ok()?), language);
+                return Some(format!("{}, {item} {number}", name(way.as_str()?)));
+            }
             Some(setting(&name(way.as_str()?), set, unit.as_str()?, language))
         }
         _ => Some(name(part.as_str()?)),

@@ -2,6 +2,9 @@
 
 use super::Language;
 
+/// Beyond it, 2^53, whole numbers are rounded already.
+const WHOLE_BELOW: f64 = 9_007_199_254_740_992.0;
+
 /// `x` with `digits` significant digits, without trailing zeros; very large and very small numbers with an exponent.
 pub(crate) fn significant(x: f64, digits: usize) -> String {
     if x == 0.0 || !x.is_finite() {
@@ -21,6 +24,14 @@ pub(crate) fn significant(x: f64, digits: usize) -> String {
         Ok(exponent) => format!("{sign}{}.{}", &digits[..=exponent], &digits[exponent + 1..]),
         Err(_) => format!("{sign}0.{:0>1$}{digits}", "", usize::try_from(-1 - exponent).unwrap_or(0)),
     }
+}
+
+/// `x` as it is read where nothing says how: with six digits, a whole number with all of its digits.
+pub(super) fn read(x: f64) -> String {
+    let said = significant(x, 6);
+    let is_whole = x.fract() == 0.0 && (1e6..WHOLE_BELOW).contains(&x.abs());
+    let is_exact = said.parse::<f64>().is_ok_and(|said| said.total_cmp(&x).is_eq());
+    if is_whole && !is_exact { format!("{x:.0}") } else { said }
 }
 
 /// `x` with `decimals` digits after the point.
@@ -65,5 +76,22 @@ mod tests {
             assert_eq!(significant(x, digits), expected);
         }
         assert_eq!(fixed(1.005, 1), "1.0");
+    }
+
+    #[test]
+    fn whole_numbers_keep_their_digits() {
+        for (x, expected) in [
+            (8_388_608.0, "8388608"),
+            (-1_073_741_825.0, "-1073741825"),
+            (1e12, "1e12"),
+            (123_456.7, "123457"),
+            (1e300, "1e300"),
+            (1_234_567.5, "1234570"),
+            (0.0, "0"),
+            (-0.0, "0"),
+            (7.0, "7"),
+        ] {
+            assert_eq!(read(x), expected);
+        }
     }
 }

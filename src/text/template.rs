@@ -12,6 +12,8 @@ use super::{Language, significant};
 
 /// A probability beyond this is told as that.
 const MOST_CERTAIN: f64 = 0.99;
+/// Less of an angle than this is rounding.
+const LEAST_ANGLE_DEG: f64 = 1e-9;
 
 /// An environment that knows the filters of the texts and no text yet.
 pub(super) fn environment() -> Environment<'static> {
@@ -19,7 +21,7 @@ pub(super) fn environment() -> Environment<'static> {
     environment.set_undefined_behavior(UndefinedBehavior::Strict);
     environment.set_auto_escape_callback(|_| minijinja::AutoEscape::None);
     environment.set_formatter(|out, state, value| match as_number(value) {
-        Some(number) => Ok(out.write_str(&number::spoken(&significant(number, 6), language_of(state)))?),
+        Some(number) => Ok(out.write_str(&number::spoken(&number::read(number), language_of(state)))?),
         None => minijinja::escape_formatter(out, state, value),
     });
     environment.add_filter("sig", |state: &State<'_, '_>, x: f64, digits: usize| {
@@ -39,6 +41,10 @@ pub(super) fn environment() -> Environment<'static> {
             between => ("", between),
         };
         format!("{sign}{}", number::spoken(&significant(shown, 2), language_of(state)))
+    });
+    environment.add_filter("angle", |state: &State<'_, '_>, degrees: f64, digits: usize| {
+        let degrees = if degrees.abs() < LEAST_ANGLE_DEG { 0.0 } else { degrees };
+        format!("{}°", number::spoken(&significant(degrees, digits), language_of(state)))
     });
     environment.add_filter("um", |state: &State<'_, '_>, value: f64| measured(state, value, 3, "um"));
     environment.add_filter("mm", |state: &State<'_, '_>, value: f64| measured(state, value, 6, "mm"));
@@ -123,7 +129,7 @@ fn list(state: &State<'_, '_>, items: Vec<Value>) -> String {
     let said: Vec<String> = items
         .iter()
         .map(|item| match as_number(item) {
-            Some(number) => number::spoken(&significant(number, 6), language),
+            Some(number) => number::spoken(&number::read(number), language),
             None => item.to_string(),
         })
         .collect();
@@ -154,32 +160,71 @@ fn words(state: &State<'_, '_>, words: Value) -> Result<String, Error> {
     Ok(said.join(if has_sets { "; " } else { ", " }))
 }
 
-/// Words of the contract, each with its own label in brackets where it has one.
+/// Words of the contract as `words` says them, each with its own label in brackets where it has one.
 #[allow(clippy::needless_pass_by_value)]
 fn labelled(state: &State<'_, '_>, words: Value, labels: Value) -> Result<String, Error> {
-    let glossary = Glossary::of(language_of(state));
-    let labels = labels.try_iter()?.map(|label| label.to_string());
-    let said: Vec<String> = words
-        .try_iter()?
-        .zip(labels)
-        .map(|(word, label)| match (glossary.word(&word.to_string()), label.as_str()) {
-            (word, "") => word,
-            (word, label) => format!("{word} ({label})"),
-        })
-        .collect();
-    Ok(said.join(", "))
+    if let Some(word) = words.as_str() {
+        return with_label(state, word, labels.as_str().unwrap_or_default());
+    }
+    let mut labels = labels.try_iter()?;
+    let mut said = Vec::new();
+    let mut has_sets = false;
+    for word in words.try_iter()? {
+        let label = labels.next().unwrap_or_default();
+        has_sets |= word.kind() == ValueKind::Seq;
+        said.push(if word.kind() == ValueKind::Seq {
+            let own: Vec<Value> = label.try_iter().map(Iterator::collect).unwrap_or_default();
+            let label = |index: usize| own.get(index).and_then(Value::as_str).unwrap_or_default();
+            let each = word.try_iter()?.enumerate();
+            let each = each.map(|(index, word)| with_label(state, &word.to_string(), label(index)));
+            each.collect::<Result<Vec<_>, Error>>()?.join(" + ")
+        } else {
+            with_label(state, &word.to_string(), label.as_str().unwrap_or_default())?
+        });
+    }
+    Ok(said.join(if has_sets { "; " } else { ", " }))
+}
+
+/// A word and in brackets which of several it is: `order 5`, `300 mm`, or a name that the user gave.
+fn with_label(state: &State<'_, '_>, word: &str, label: &str) -> Result<String, Error> {
+    let language = language_of(state);
+    let word = Glossary::of(language).word(word);
+    let number = |text: &str| text.parse::<f64>().ok().map(|number| number::spoken(&number::read(number), language));
+    let label = match label.split_once(' ') {
+        None if label.is_empty() => return Ok(word),
+        Some(("order", order)) if number(order).is_some() => {
+            let name = super::name(language, "cause", "cause_of_order");
+            state.env().get_template(&name)?.render(BTreeMap::from([("order", number(order))]))?
+        }
+        Some((place, "mm")) => number(place).map_or_else(|| label.to_owned(), |place| amount(&place, "mm", language)),
+        _ => label.to_owned(),
+    };
+    Ok(format!("{word} ({label})"))
 }
 
 /// The form of a noun that a count asks for: two in English (1, all others), three in Russian (1 and 21; 2 to 4 and
-/// fractions; 0, 5 to 20 and so on).
+/// fractions; 0, 5 to 20 and so on). The count is a number, or one that is written already: what is read decides.
 #[allow(clippy::needless_pass_by_value)]
-fn plural(state: &State<'_, '_>, count: f64, one: String, few: String, many: Option<String>) -> String {
-    // What counts is the number as it is read, with six digits.
-    let said = significant(count.abs(), 6);
+fn plural(
+    state: &State<'_, '_>,
+    count: Value,
+    one: String,
+    few: String,
+    many: Option<String>,
+) -> Result<String, Error> {
+    let said = match (as_number(&count), count.as_str()) {
+        (Some(number), _) => number::read(number),
+        (None, Some(written)) => written.to_owned(),
+        (None, None) => {
+            return Err(Error::new(minijinja::ErrorKind::InvalidOperation, "a plural is asked for of no number"));
+        }
+    };
+    let said = said.trim_start_matches('-');
     let is_whole = said.bytes().all(|byte| byte.is_ascii_digit());
-    match (language_of(state), many) {
+    Ok(match (language_of(state), many) {
         (Language::Ru, Some(many)) => {
-            let last_two: u32 = said[said.len().saturating_sub(2)..].parse().unwrap_or(0);
+            let last_two =
+                said.get(said.len().saturating_sub(2)..).and_then(|end| end.parse::<u32>().ok()).unwrap_or(0);
             match (is_whole, last_two % 10, last_two) {
                 (false, ..) => few,
                 (true, 1, last) if last != 11 => one,
@@ -189,5 +234,122 @@ fn plural(state: &State<'_, '_>, count: f64, one: String, few: String, many: Opt
         }
         _ if said == "1" => one,
         _ => few,
+    })
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use precut_calc::calculator::{Finding, Message, Values};
+
+    use crate::text::{Language, Texts};
+
+    fn explained(message: &Message) -> [String; 2] {
+        let said = |language| Texts::shared().try_word(language, "explanation", message.code, &message.values).unwrap();
+        [said(Language::En), said(Language::Ru)]
+    }
+
+    /// What a template of a test's own says.
+    fn rendered(language: Language, template: &str, values: &Values) -> String {
+        let file = format!("[explanation]\nown = {template:?}");
+        let texts = Texts::from_files(&[(format!("{}/room.toml", language.tag()), file)]).unwrap();
+        texts.try_word(language, "explanation", "own", values).unwrap()
+    }
+
+    #[test]
+    fn the_gain_of_a_diagnosis_says_which_way_the_error_goes() {
+        let gain = |base: f64, extended: f64, unit: &'static str| {
+            let message = Message::new("diagnosis_gain").with("base", base).with("extended", extended);
+            explained(&message.with("ceiling", base / 2.0).with("quantity", "diameter_deviation_um").with("unit", unit))
+        };
+        for (base, extended, unit, english, russian) in [
+            (3.9, 1.5, "um", "falls from 3.9 to 1.5 µm; scatter", "падает с 3,9 до 1,5 мкм; разброс"),
+            (3.9, 4.78, "um", "rises from 3.9 to 4.78 µm: there the", "растёт с 3,9 до 4,78 мкм: на них"),
+            (1.511, 1.512, "um", "stays at 1.51 µm; scatter", "остаётся равной 1,51 мкм; разброс"),
+            (0.25, 0.35, "", "rises from 25 % to 35 %: there the", "растёт с 25 % до 35 %: на них"),
+            (0.25, 0.25, "", "stays at 25 %; scatter", "остаётся равной 25 %; разброс"),
+        ] {
+            let [in_english, in_russian] = gain(base, extended, unit);
+            assert!(in_english.contains(english), "{in_english}");
+            assert!(in_russian.contains(russian), "{in_russian}");
+        }
+    }
+
+    #[test]
+    fn causes_of_one_kind_are_told_apart() {
+        let message = Message::new("diagnosis_next")
+            .with("changes", "tool_x_mm")
+            .with("leader", vec!["roller_runout"])
+            .with("leader_labels", vec![""])
+            .with("rival", vec!["initial_harmonic", "initial_harmonic"])
+            .with("rival_labels", vec!["order 2", "order 3"])
+            .with("now", 18.39)
+            .with("then", 36.7);
+        let [english, russian] = explained(&message);
+        assert!(english.contains("from wave of the blank (order 2), wave of the blank (order 3) best: 18 sigmas now"));
+        assert!(russian.contains("(порядок 2), ") && russian.contains("(порядок 3)»"), "{russian}");
+        assert!(russian.contains("сейчас 18 сигм, тогда 37."), "{russian}");
+        let values = Values::new()
+            .with("sets", vec![vec!["batch_shift", "tool_wear"], vec!["steady_rest_offset"]])
+            .with("labels", vec![vec!["melt 7", ""], vec!["312.5 mm"]]);
+        let said = |language| rendered(language, "{{ sets | labelled(labels) }}", &values);
+        assert!(said(Language::En).contains(" (melt 7) + ") && said(Language::En).ends_with(" (312.5 mm)"));
+        assert!(said(Language::Ru).contains(" (melt 7) + ") && said(Language::Ru).ends_with(" (312,5 мм)"));
+    }
+
+    #[test]
+    fn a_plural_is_that_of_the_number_as_it_is_read() {
+        let template = "{{ x | sig(2) }} {{ x | sig(2) | plural('сигма', 'сигмы', 'сигм') }}";
+        for (x, expected) in
+            [(1.0, "1 сигма"), (2.71, "2,7 сигмы"), (18.4, "18 сигм"), (20.6, "21 сигма"), (3.04, "3 сигмы")]
+        {
+            assert_eq!(rendered(Language::Ru, template, &Values::new().with("x", x)), expected);
+        }
+        let template = "{{ n }} {{ n | plural('row', 'rows') }}";
+        for (n, expected) in [(1.0, "1 row"), (0.0, "0 rows"), (11.0, "11 rows"), (8_388_608.0, "8388608 rows")] {
+            assert_eq!(rendered(Language::En, template, &Values::new().with("n", n)), expected);
+        }
+    }
+
+    #[test]
+    fn an_angle_of_rounding_is_none() {
+        for (degrees, expected) in [(3.777e-13, "0°"), (-2e-12, "0°"), (12.345_67, "12,35°"), (1e-3, "0,001°")] {
+            let values = Values::new().with("x", degrees);
+            assert_eq!(rendered(Language::Ru, "{{ x | angle(4) }}", &values), expected);
+        }
+    }
+
+    #[test]
+    fn what_there_is_instead_follows_after_a_stop() {
+        let fault = |code, nearest: Option<&'static str>| {
+            let finding =
+                Finding::new(code, "/supports/0/kind").with("received", "nope").with("allowed", vec!["centre"]);
+            let finding = nearest.into_iter().fold(finding, |finding, nearest| finding.with("nearest", nearest));
+            [Language::En, Language::Ru]
+                .map(|language| Texts::shared().try_finding(language, "fault", &finding).unwrap())
+        };
+        for (code, nearest, english, russian) in [
+            (
+                "unknown_kind",
+                None,
+                "there is no kind nope; known: centre",
+                "kind = nope: такого варианта нет; есть: centre",
+            ),
+            (
+                "unknown_kind",
+                Some("centre"),
+                "there is no kind nope; did you mean centre? Known: centre",
+                "kind = nope: такого варианта нет; может быть, centre? Есть: centre",
+            ),
+            ("not_one_of", None, "kind is nope; allowed: centre", "kind = nope; допустимо: centre"),
+            (
+                "not_one_of",
+                Some("centre"),
+                "kind is nope; did you mean centre? Allowed: centre",
+                "kind = nope; может быть, centre? Допустимо: centre",
+            ),
+        ] {
+            assert_eq!(fault(code, nearest), [english, russian]);
+        }
     }
 }

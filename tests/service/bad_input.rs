@@ -174,6 +174,26 @@ async fn addresses_and_methods_that_do_not_exist_are_problems_too() {
 }
 
 #[tokio::test]
+async fn a_wrong_method_is_told_the_right_ones_at_every_address() {
+    let server = Server::start().await;
+    let contract: Value = server.get("/openapi.json").send().await.unwrap().json().await.unwrap();
+    let paths = contract["paths"].as_object().unwrap();
+    assert!(paths.len() > 20, "{} addresses", paths.len());
+    for (path, methods) in paths {
+        let place = path.replace(['{', '}'], "");
+        let request = server.client.request("PATCH".parse().unwrap(), server.url(&place));
+        let response = request.send().await.unwrap();
+        let allowed = header(&response, "allow").replace(',', ", ");
+        let document = problem(response, 405, "method_not_allowed").await;
+        assert_eq!(document["detail"], format!("PATCH is not allowed here; allowed: {allowed}"), "{path}");
+        for method in ["get", "put", "post", "delete"] {
+            let declared = methods.get(method).is_some();
+            assert_eq!(allowed.split(", ").any(|one| one.eq_ignore_ascii_case(method)), declared, "{method} {path}");
+        }
+    }
+}
+
+#[tokio::test]
 async fn a_head_request_has_the_headers_and_no_body() {
     let server = Server::start().await;
     let response = server.client.head(server.url("/v1/calculators")).send().await.unwrap();
@@ -262,7 +282,8 @@ async fn a_body_of_100_mb_is_refused_at_once() {
     let server = Server::start().await;
     let start = Instant::now();
     let response = server.post(vec![b' '; 100_000_000]).send().await.unwrap();
-    problem(response, 413, "body_too_large").await;
+    let document = problem(response, 413, "body_too_large").await;
+    assert_eq!(document["detail"], "at most 8388608 bytes are read here");
     // Without its length given, as it streams in.
     let chunk = Bytes::from(vec![b' '; 1_000_000]);
     let chunks = futures_util::stream::iter((0..100).map(move |_| Ok::<_, Infallible>(Frame::data(chunk.clone()))));

@@ -176,7 +176,14 @@ fn explanation(plan: &Plan, result: &StudyResult) -> Vec<Message> {
         };
         let with_least = |code| message(code).with("unit", unit.clone()).with("least", least.value);
         if (largest.value - least.value).abs() <= SAME * largest.value.abs().max(least.value.abs()) {
-            said.push(with_least("study_constant"));
+            let without_influence = seen_varied(result, index);
+            said.push(
+                with_least("study_constant")
+                    .with("points", result.points)
+                    .with("answered", result.rows.iter().filter(|row| row.outputs[index].is_some()).count())
+                    .with("variable_names", names.of_variables(result, &without_influence))
+                    .with("variables", without_influence),
+            );
             continue;
         }
         said.push(
@@ -208,6 +215,14 @@ fn explanation(plan: &Plan, result: &StudyResult) -> Vec<Message> {
     }
     said.push(Message::new("study_own_error"));
     said
+}
+
+/// The variables that differ among the points that have this output: of others nothing can be said.
+fn seen_varied(result: &StudyResult, output: usize) -> Vec<String> {
+    let answered: Vec<&Row> = result.rows.iter().filter(|row| row.outputs[output].is_some()).collect();
+    let differs = |variable: usize| answered.iter().any(|row| row.values[variable] != answered[0].values[variable]);
+    let varied = (0..result.variables.len()).filter(|variable| differs(*variable));
+    varied.map(|variable| result.variables[variable].pointer.clone()).collect()
 }
 
 /// The ways to what is varied and read off, to be called by their labels.
@@ -259,4 +274,63 @@ fn dominant(plan: &Plan, result: &StudyResult, output: usize) -> Option<(usize, 
         (index, between / sums.len() as f64 / variance)
     });
     shares.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, share)| share.is_finite())
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use precut_calc::calculator::Unwatched;
+    use serde_json::json;
+
+    use super::Json;
+    use crate::engine::{Body, solve_now};
+    use crate::registry::toy;
+    use crate::text::{Language, reworded};
+
+    /// What a study of an output that is the same everywhere says first, in both languages.
+    fn said(vary: &Json) -> [String; 2] {
+        let job = json!({"length_mm": 500, "segments": [{"diameter_mm": 20}]});
+        let study = json!({"calculator": "toy-bar", "job": job, "vary": vary, "outputs": ["/rows"]});
+        let stored =
+            solve_now(&toy::registry(), super::super::STUDIES, Body::Json(study.to_string().into()), &Unwatched);
+        let answer: Json = serde_json::from_slice(&stored.unwrap().body).unwrap();
+        let english = serde_json::to_vec(&answer["explanation"]).unwrap();
+        let russian: Json = serde_json::from_slice(&reworded("explanation", &english, Language::Ru).unwrap()).unwrap();
+        assert_eq!(answer["explanation"][0]["code"], "study_constant");
+        [&answer["explanation"], &russian].map(|said| said[0]["text"].as_str().unwrap().to_owned())
+    }
+
+    #[test]
+    fn without_influence_is_only_what_differs_among_the_answers() {
+        let diameters = |values: &[f64]| json!({"pointer": "/segments/0/diameter_mm", "values": values});
+        let stations = |values: &[u8]| json!({"pointer": "/stations", "values": values});
+        for (vary, english, russian) in [
+            (
+                json!([diameters(&[20.0, 30.0])]),
+                "Rows is 0 at every point: segments 1 · diameter has no influence on it",
+                "во всех точках 0; не влияет: ",
+            ),
+            (json!([diameters(&[20.0])]), "Rows is 0 at the only point", "в единственной точке 0"),
+            // Thicker than the bar is long: there is no answer.
+            (
+                json!([diameters(&[20.0, 600.0])]),
+                "Rows is 0 at the only point that has an answer",
+                "в единственной точке, где есть ответ, 0",
+            ),
+            (
+                json!([diameters(&[20.0, 30.0, 600.0])]),
+                "Rows is 0 at every point that has an answer: segments 1 · diameter has no influence on it there",
+                "во всех точках, где есть ответ, 0; там не влияет: ",
+            ),
+            (
+                json!([diameters(&[20.0, 600.0]), stations(&[2, 4])]),
+                "Rows is 0 at every point that has an answer: stations has no influence on it there",
+                "во всех точках, где есть ответ, 0; там не влияет: ",
+            ),
+        ] {
+            let [in_english, in_russian] = said(&vary);
+            assert_eq!(in_english, english);
+            assert!(in_russian.contains(russian), "{in_russian}");
+        }
+    }
 }
