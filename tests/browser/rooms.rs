@@ -98,6 +98,51 @@ fn a_fault_stands_at_its_field_in_the_words_of_the_service() {
 }
 
 #[test]
+fn what_cannot_be_read_makes_the_result_an_old_one_and_is_computed_only_once_it_can() {
+    let Some((_turn, mut page, service)) = both() else { return };
+    page.open(&service.page("deflection-compensation"));
+    page.until(SETTLED);
+    page.fill(FEED, "0,5 mm");
+    page.wait_for(".stale-note");
+    assert!(page.text("#field-cut-feed_mm_per_rev-fault").contains("not a number"));
+    assert!(page.text(".pane-switch .badge").starts_with('1'));
+    page.evaluate("document.activeElement.blur()");
+    page.click(".form-head .primary");
+    page.until(&format!("document.activeElement === document.querySelector('{FEED}')"));
+    assert_eq!(page.value(FEED), "0,5 mm");
+    // It is said in the language of the page, also after a switch.
+    page.click_on("RU");
+    page.until("/[а-я]/.test(document.querySelector('#field-cut-feed_mm_per_rev-fault').textContent)");
+    page.click_on("EN");
+    page.until("document.documentElement.lang === 'en'");
+    page.fill(FEED, "0.3");
+    page.until(&format!(
+        "!document.querySelector('.stale-note, .pane-switch .badge') && location.hash.includes('feed_mm_per_rev=0.3') && {SETTLED}"
+    ));
+    page.assert_calm();
+}
+
+#[test]
+fn a_service_with_too_much_to_do_is_asked_again() {
+    let Some((_turn, mut page, service)) = both() else { return };
+    page.open(&service.page("deflection-compensation"));
+    page.until(SETTLED);
+    page.evaluate(
+        "(() => { const own = window.fetch; window.refused = 0; window.fetch = (path, options) => { \
+         const isTurn = options?.method === 'POST' ? refused === 0 : path.endsWith('/figures') && refused === 1; \
+         if (!isTurn) return own(path, options); \
+         refused += 1; \
+         return Promise.resolve(new Response('{\"title\": \"Too many requests\"}', {status: 429, headers: {'Retry-After': '1'}})) } })()",
+    );
+    page.fill(FEED, "0.35");
+    page.until(&format!(
+        "refused === 2 && location.hash.includes('feed_mm_per_rev=0.35') && !document.querySelector('.stale-note') && {SETTLED}"
+    ));
+    assert_eq!(page.evaluate("document.querySelectorAll('.problem').length"), 0);
+    page.assert_calm();
+}
+
+#[test]
 fn a_run_is_pinned_compared_and_read() {
     let Some((_turn, mut page, service)) = both() else { return };
     page.open(&service.page("deflection-compensation"));

@@ -1,11 +1,14 @@
 // The only file that talks to the service.
-import { language } from './text.js';
+import { language, t } from './text.js';
 import { cell } from './lib.js';
 
 /** Whether the service answers. */
 export const online = cell(true);
 /** Set when the service asks for a key: `refused` if the one that was sent is not known to it. */
 export const keyAsked = cell(null);
+
+/** Times that a busy service is asked again. */
+const MOST_TRIES = 6;
 
 const KEY = 'precut-key';
 const storedKey = () => {
@@ -41,13 +44,38 @@ async function ask(path, { headers = {}, ...options } = {}) {
   } catch (error) {
     if (error.name === 'AbortError') throw error;
     online.set(false);
-    throw new Unreachable(error.message);
+    throw new Unreachable(t('offline_title'));
   }
   if (!online.get()) online.set(true);
   if (response.ok) return response;
   if (response.status === 401 && !keyAsked.get()) keyAsked.set(key ? 'refused' : 'wanted');
   const problem = await response.json().catch(() => ({ title: response.statusText }));
   throw new Refused(response.status, problem, Number(response.headers.get('Retry-After')) || null);
+}
+
+/** Whether the service has no room just now, and asks to be asked again. */
+export const isBusy = error => error instanceof Refused && [429, 503].includes(error.status);
+/** What the service answers once it has room: asked again when it says, ever more rarely. */
+export async function patient(question, signal, again = 0) {
+  try {
+    return await question();
+  } catch (error) {
+    if (!isBusy(error) || again >= MOST_TRIES) throw error;
+    await new Promise(resolve => setTimeout(resolve, 1000 * Math.max(error.retryAfter || 1, 2 ** again / 2)));
+    signal?.throwIfAborted();
+    return patient(question, signal, again + 1);
+  }
+}
+/** Calls `task` when asking again is of use: when the service is back, or has room again. Returns how to give that up;
+ *  `null` where it will say the same again. */
+export function whenBack(error, task) {
+  if (isBusy(error)) {
+    const timer = setTimeout(task, 1000 * (error.retryAfter || 1));
+    return () => clearTimeout(timer);
+  }
+  if (!(error instanceof Unreachable)) return null;
+  const stop = online.watch(isUp => { if (isUp) { stop(); task(); } });
+  return stop;
 }
 
 const json = async (path, options) => (await ask(path, options)).json();

@@ -2,7 +2,7 @@
 // gained on data that was held back, and the measurement worth making next.
 import { html, useMemo } from './lib.js';
 import { t, number, unitSymbol, unitOf } from './text.js';
-import { humanised, wordOf, labelOf, resolve } from './schema.js';
+import { humanised, labelOf, resolve, variants, within } from './schema.js';
 import { withSpread } from './digits.js';
 
 const WIDTH = 1000;
@@ -10,74 +10,147 @@ const WIDTH = 1000;
 const MOST_BARS = 6;
 /** A cause less likely than this is not drawn. */
 const LEAST_SHARE = 0.005;
+const UM_PER_MM = 1000;
 
-/** The words that the forms have for effects and fields, by their names. */
-function wordsOf(schema) {
-  const kinds = new Map();
-  const fields = new Map();
-  const walk = part => {
-    if (Array.isArray(part)) part.forEach(walk);
-    if (!part || typeof part !== 'object' || Array.isArray(part)) return;
-    for (const [name, own] of Object.entries(part.properties || {})) {
-      const field = own.$ref || own.allOf ? resolve(own, schema) : own;
-      const kind = name === 'kind' && field.enum?.length === 1 ? field.enum[0] : null;
-      if (kind && !kinds.has(kind)) kinds.set(kind, { text: wordOf(field, kind), properties: part.properties });
-      if (!fields.has(name) && field.title) fields.set(name, field);
-    }
-    Object.values(part).forEach(walk);
-  };
-  walk(schema);
-  return { kinds, fields };
+/** A word of a choice as it stands in a sentence. */
+const labelled = (schema, word) => schema?.['x-labels']?.[word] ?? humanised(word).toLowerCase();
+const capital = text => text.charAt(0).toUpperCase() + text.slice(1);
+
+/** What a diagnosis of this calculator answers: one of the schemas that all diagnoses have together. */
+export function answerSchema({ input_schema: inputs, output_schema: outputs }, calculator) {
+  const jobs = inputs.oneOf || [];
+  const at = variants({ oneOf: jobs }, inputs).findIndex(({ tag, value }) => tag === 'calculator' && value === calculator);
+  const answers = outputs.oneOf || outputs.anyOf || [outputs];
+  const twin = jobs[at]?.$ref?.replace(/Job$/, 'Result');
+  return resolve(answers.find(({ $ref }) => $ref && $ref === twin) || answers[at] || answers[0], outputs);
 }
 
-/** Whether the result is that of a diagnosis. */
-export const hasCauses = (id, result) => id === 'diagnosis' && Array.isArray(result?.causes);
+/** What the diagnosis of this calculator has words for: its effects by their kinds, and the conditions of a run. */
+function wordsOf(description, calculator) {
+  const root = description.output_schema;
+  const own = answerSchema(description, calculator).properties;
+  const effects = variants(resolve(resolve(own.effects, root).items, root), root);
+  const next = resolve(own.next_measurement, root).properties;
+  return {
+    kinds: new Map(effects.map(({ schema, tag, value }) => [value, { text: labelled(resolve(schema.properties[tag], root), value), properties: schema.properties }])),
+    conditions: new Map(Object.entries(resolve(next.run, root).properties || {}).map(([name, field]) => [name, resolve(field, root)])),
+  };
+}
+
+/** Whether the result is that of a diagnosis that says anything of causes. */
+export const hasCauses = (id, result) => id === 'diagnosis' && Array.isArray(result?.causes) && result.verdict !== 'refused';
 
 /** Whether the heaviest set is one of the catalogue, and the rows object to it. */
 const isObjected = ({ verdict, sets, unnamed_probability: unnamed }) => verdict === 'unknown' && sets[0]?.posterior > unnamed;
 
-export function Causes({ result, schema, unit }) {
-  const { kinds, fields } = useMemo(() => wordsOf(schema), [schema]);
-  const nameOf = (kind, label) => `${kinds.get(kind)?.text ?? humanised(kind)}${label ? ` ${label}` : ''}`;
+const isSame = (one, other) => one.kind === other.kind && one.label === other.label;
+
+/** Two parts of one wave, `..._cos_...` and `..._sin_...`, as its amplitude. */
+function amplitudeOf(cos, sin, field) {
+  const value = Math.hypot(cos.value, sin.value);
+  const spread = Math.hypot(cos.value * (cos.standard_deviation || 0), sin.value * (sin.standard_deviation || 0)) / (value || 1);
+  return { name: field ? labelOf('amplitude_mm', field) : humanised('amplitude'), value, spread, unit: cos.unit, isFine: true, atLimit: cos.at_limit || sin.at_limit };
+}
+
+/** The sizes of a cause as they are told: a logarithm as the factor that it is, the two parts of a wave as one amplitude,
+ *  what a wave or a run-out measures in µm. `unit` is that of the quantity, empty where it is judged by its logarithm. */
+export function sizesOf(parameters, properties, unit) {
+  const twins = new Map(parameters.filter(({ name }) => name.includes('_cos_')).map(cos => [cos, parameters.find(({ name }) => name === cos.name.replace('_cos_', '_sin_'))]).filter(([, sin]) => sin));
+  const parts = [...twins.values()];
+  return parameters.filter(one => !parts.includes(one)).map(one => {
+    if (twins.has(one)) return amplitudeOf(one, twins.get(one), properties?.amplitude_mm);
+    const field = properties?.[one.name];
+    const told = { name: field ? labelOf(one.name, field) : one.name === 'kappa' ? t('size_share') : humanised(one.name, one.unit), value: one.value, spread: one.standard_deviation, unit: one.unit, shown: field && unitOf(field), isFine: /^(amplitude|runout)_/.test(one.name), atLimit: one.at_limit };
+    const isLog = one.name.startsWith('ln_') || one.name.endsWith('_ln');
+    if (!isLog) return told;
+    // A model that is no power law takes the same number as an addition to its output.
+    if (one.name.endsWith('_ln') && unit) return { ...told, name: t('size_change'), unit, shown: unit };
+    const factor = Math.exp(one.value);
+    return { ...told, name: t(one.name === 'hump_ln' ? 'size_factor_largest' : 'size_factor'), value: factor, spread: factor * one.standard_deviation, shown: '' };
+  }).map(size => (size.isFine && size.unit === 'mm' ? { ...size, value: UM_PER_MM * size.value, spread: UM_PER_MM * size.spread, unit: 'um', shown: undefined } : size));
+}
+
+const said = ({ name, value, spread, unit, shown, atLimit }) => `${name} ${[spread ? withSpread(value, spread) : number(value, 4), shown ?? unitSymbol(unit)].filter(Boolean).join(' ')}${atLimit ? ` (${t('at_limit')})` : ''}`;
+
+/** A condition of a run as it is told; what the user named keeps its letters. */
+function conditionOf(name, value, field) {
+  const label = field ? labelOf(name, field) : humanised(name);
+  if (Array.isArray(value)) return value.map(one => (one.factor ? `${one.factor} ${one.level}` : String(one))).join(', ');
+  const text = typeof value === 'number' ? number(value, 4) : typeof value === 'boolean' ? t(value ? 'yes' : 'no') : field?.enum ? labelled(field, value) : String(value);
+  return [label, text, unitOf(field)].filter(Boolean).join(' ');
+}
+
+export function Causes({ result, description, calculator, unit }) {
+  const { kinds, conditions } = useMemo(() => wordsOf(description, calculator), [description, calculator]);
+  // Which of several of its kind: an order, a place, or a name that the user gave.
+  const whichOf = (kind, label) => {
+    const [, order] = /^order ([\d.]+)$/.exec(label) || [];
+    const [, place] = /^([\d.]+) mm$/.exec(label) || [];
+    const field = order && kinds.get(kind)?.properties.order;
+    return field ? `${within(labelOf('order', field))} ${number(Number(order))}` : place ? `${number(Number(place))} ${unitSymbol('mm')}` : label;
+  };
   // As inside a sentence.
-  const spoken = kind => { const name = nameOf(kind); return name.charAt(0).toLowerCase() + name.slice(1); };
-  const bars = [
-    ...result.causes.filter(({ probability }) => probability >= LEAST_SHARE).sort((a, b) => b.probability - a.probability).slice(0, MOST_BARS)
-      .map(({ kind, label, probability, confounded_with: like }) => ({ key: kind + label, name: nameOf(kind, label), share: probability, like, isNamed: result.named.some(one => one.kind === kind && one.label === label) })),
-    { key: 'nothing', name: t('cause_none'), share: result.none_probability },
-    { key: 'unknown', name: t('cause_unknown'), share: result.unnamed_probability },
-  ];
-  const like = bars.filter(({ isNamed, like: others }) => isNamed && others?.length > 0);
+  const spoken = kind => kinds.get(kind)?.text ?? labelled(null, kind);
+  const nameOf = (kind, label) => `${capital(spoken(kind))}${label ? ` (${whichOf(kind, label)})` : ''}`;
+  const times = (kind, list) => { const count = list.filter(other => other === kind).length; return count > 1 ? `${count} × ${spoken(kind)}` : spoken(kind); };
+  const set = list => (list.length > 0 ? [...new Set(list)].map(kind => times(kind, list)).join(' + ') : t('the_base'));
+  const isUnknown = result.verdict === 'unknown';
+  const isDenied = isObjected(result);
+  const likely = result.causes.slice().sort((a, b) => b.probability - a.probability)
+    .map(cause => ({ ...cause, key: cause.kind + cause.label, name: nameOf(cause.kind, cause.label), share: cause.probability, like: cause.confounded_with, isNamed: result.named.some(one => isSame(one, cause)) }));
+  const named = likely.filter(({ isNamed }) => isNamed);
+  const others = likely.filter(({ isNamed, share }) => !isNamed && share >= LEAST_SHARE).slice(0, Math.max(0, MOST_BARS - named.length));
+  const none = { key: 'nothing', name: t('cause_none'), share: result.none_probability, isAnswer: result.verdict === 'adequate' };
+  const unnamed = { key: 'unknown', name: t('cause_unknown'), share: isDenied ? null : result.unnamed_probability, isAnswer: isUnknown };
+  const bars = isUnknown ? [unnamed, ...named, none] : [...named, ...others, none, unnamed];
+  const nearest = isUnknown ? others.map(bar => ({ ...bar, length: bar.share, share: null })) : [];
+  const like = named.filter(bar => bar.like?.length > 0);
   const { gain, next_measurement: next } = result;
+  const exact = result.verdict === 'named' && result.sets.find(({ causes, with_remainder: rest }) => !rest && causes.length === named.length && causes.every(one => result.named.some(other => isSame(one, other))));
   return html`
     <section class="picture causes" aria-label=${t('causes_found')}>
       <h2>${t('causes_found')}</h2>
-      <table><tbody>${bars.map(({ key, name, share, isNamed }) => html`<tr key=${key} class=${isNamed ? 'named' : ''}><th scope="row">${name}</th>
-        <td class="clamp-bar"><svg viewBox=${`0 0 ${WIDTH} 14`} preserveAspectRatio="none" aria-hidden="true"><rect class=${isNamed ? 'clamp-given' : 'clamp-statics'} x="0" y="1" width=${Math.max(WIDTH * share, 2)} height="12" /></svg></td>
-        <td class="number">${percent(share)}</td></tr>`)}</tbody></table>
-      <p class="quiet">${t(isObjected(result) ? 'share_objected' : 'share_means')}</p>
-      ${result.named.length > 0 && html`<ul class="sizes">${result.named.map(({ kind, label, parameters }) => html`<li key=${kind + label}><strong>${nameOf(kind, label)}</strong>${parameters.map(one => {
-        const field = kinds.get(kind)?.properties[one.name];
-        return html` · ${field ? labelOf(one.name, field) : humanised(one.name, one.unit)} ${one.standard_deviation ? withSpread(one.value, one.standard_deviation) : number(one.value, 4)} ${field ? unitOf(field) : unitSymbol(one.unit)}${one.at_limit ? ` (${t('at_limit')})` : ''}`;
-      })}</li>`)}</ul>`}
-      ${like.map(({ key, name, like: others }) => html`<p key=${key} class="quiet">${t('looks_like', { cause: name, others: others.map(spoken).join(', ') })}</p>`)}
-      ${gain && html`<${Gain} ...${{ gain, unit }} />`}
-      ${next && html`<h3>${t('next_measurement')}</h3>
-        <p class="run">${Object.entries(next.run).map(([name, value]) => html`<span key=${name} class=${name === next.changes ? 'changed' : ''}>${fields.get(name) ? labelOf(name, fields.get(name)) : humanised(name)} ${typeof value === 'number' ? number(value, 4) : fields.get(name) ? wordOf(fields.get(name), value).toLowerCase() : String(value)} ${unitOf(fields.get(name))}</span>`)}</p>
-        <p class="quiet">${t('next_separates', { leader: next.leader.map(spoken).join(' + '), rival: next.rival.map(spoken).join(' + '), now: number(next.separation_now_sigmas, 2), then: number(next.separation_then_sigmas, 2) })}</p>`}
+      <table>
+        <tbody>${bars.map(bar => html`<${Bar} key=${bar.key} ...${bar} />`)}</tbody>
+        ${nearest.length > 0 && html`<tbody class="nearest"><tr><th scope="rowgroup" colspan="3">${t('nearest_listed')}</th></tr>${nearest.map(bar => html`<${Bar} key=${bar.key} ...${bar} />`)}</tbody>`}
+      </table>
+      <p class="quiet">${isDenied ? t('share_objected') : nearest.length > 0 ? t('share_unnamed') : t('share_means')}${exact && exact.posterior < 0.999 ? ` ${t('share_exact', { share: percent(exact.posterior) })}` : ''}</p>
+      ${result.named.length > 0 && html`<ul class="sizes">${result.named.map(({ kind, label, parameters }) => html`<li key=${kind + label}><strong>${nameOf(kind, label)}</strong>${sizesOf(parameters, kinds.get(kind)?.properties, unit).map(size => ` · ${said(size)}`)}</li>`)}</ul>`}
+      ${like.map(({ key, name, like: twins }) => html`<p key=${key} class="quiet">${t('looks_like', { cause: name, others: twins.map(spoken).join(', ') })}</p>`)}
+      ${gain && html`<${Gain} ...${{ gain, unit, isNamed: named.length > 0 }} />`}
+      ${next && (!isUnknown || named.length > 0) && html`<h3>${t('next_measurement')}</h3>
+        <p class="run">${Object.entries(next.run).filter(([, value]) => value !== null && !(Array.isArray(value) && value.length === 0)).map(([name, value]) => html`<span key=${name} class=${name === next.changes ? 'changed' : ''}>${conditionOf(name, value, conditions.get(name))}</span>`)}</p>
+        <p class="quiet">${t('next_separates', { leader: set(next.leader), rival: set(next.rival), now: number(next.separation_now_sigmas, 2), then: number(next.separation_then_sigmas, 2) })}</p>`}
     </section>`;
+}
+
+/** A share as a bar: solid for what the answer names, hollow for all else; of what only comes near no number is told. */
+function Bar({ name, share, length = share ?? 1, isNamed = false, isAnswer = false }) {
+  const isSolid = isNamed || isAnswer;
+  return html`
+    <tr class=${isNamed ? 'named' : isAnswer ? 'answer' : ''}><th scope="row">${name}</th>
+      <td class="clamp-bar"><svg viewBox=${`0 0 ${WIDTH} 14`} preserveAspectRatio="none" aria-hidden="true"><rect class=${isNamed ? 'clamp-given' : isAnswer ? 'share-answer' : 'share-hollow'} x="0" y="1" width=${Math.max(WIDTH * length, isSolid ? 2 : 6)} height="12" vector-effect="non-scaling-stroke" /></svg></td>
+      <td class="number">${share === null ? '' : percent(share)}</td></tr>`;
 }
 
 // No finite data make anything certain.
 const percent = share => (share > 0.999 ? `> ${number(99.9)} %` : share > 0 && share < 0.001 ? `< ${number(0.1)} %` : `${number(100 * share, share > 0.99 ? 3 : 2)} %`);
 
-/** The error on held-back data before and after, against what scatter and allowances leave to any model. */
-function Gain({ gain, unit }) {
-  const rows = [['base', t('error_base'), gain.rmse_base], ['extended', t('error_extended'), gain.rmse_extended], ...(typeof gain.noise_ceiling === 'number' ? [['noise', t('error_noise'), gain.noise_ceiling]] : [])];
+/** The error on held-back data before and after, against what scatter and allowances leave to any model. `unit` is empty
+ *  where the quantity is judged by its logarithm: its errors are shares then. */
+function Gain({ gain, unit, isNamed }) {
+  const isWorse = gain.rmse_extended >= gain.rmse_base;
+  const rows = [
+    ['clamp-entry', t('error_base'), gain.rmse_base],
+    [isWorse ? 'gain-none' : isNamed ? 'clamp-given' : 'clamp-dynamics', t(isNamed ? 'error_extended' : 'error_chosen'), gain.rmse_extended],
+    ...(typeof gain.noise_ceiling === 'number' ? [['clamp-statics', t('error_noise'), gain.noise_ceiling]] : []),
+  ];
   const most = Math.max(...rows.map(row => row[2]));
+  const told = error => (unit === '' ? `${number(100 * error, 3)} %` : `${number(error, 3)} ${unit ?? ''}`);
   return html`
     <h3>${t('held_back')}</h3>
-    <table><tbody>${rows.map(([kind, name, error]) => html`<tr key=${kind}><th scope="row">${name}</th>
-      <td class="clamp-bar"><svg viewBox=${`0 0 ${WIDTH} 14`} preserveAspectRatio="none" aria-hidden="true"><rect class=${{ base: 'clamp-entry', extended: 'clamp-given', noise: 'clamp-statics' }[kind]} x="0" y="1" width=${Math.max((WIDTH * error) / most, 2)} height="12" /></svg></td>
-      <td class="number">${number(error, 3)} ${unit}</td></tr>`)}</tbody></table>`;
+    <table><tbody>${rows.map(([look, name, error]) => html`<tr key=${look}><th scope="row">${name}</th>
+      <td class="clamp-bar"><svg viewBox=${`0 0 ${WIDTH} 14`} preserveAspectRatio="none" aria-hidden="true"><rect class=${look} x="0" y="1" width=${Math.max((WIDTH * error) / most, 2)} height="12" /></svg></td>
+      <td class="number">${told(error)}</td></tr>`)}</tbody></table>
+    ${isWorse && html`<p class="quiet">${t('gain_none')}</p>`}`;
 }

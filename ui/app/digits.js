@@ -59,7 +59,7 @@ export function withSpread(value, spread, isSaid = true) {
   const digits = order - place + 1;
   // Known to no digit at all, it is written as ever.
   const text = digits >= 1 ? padded(value, digits, place) : number(value, 5);
-  return isSaid ? `${text} ± ${number(spread, 2)}` : text;
+  return isSaid ? `${text} ± ${padded(spread, 2, Math.floor(Math.log10(Number(spread.toPrecision(2)))) - 1)}` : text;
 }
 
 /** All the digits that the uncertainty leaves, zeros at the end too. */

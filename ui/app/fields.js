@@ -1,9 +1,19 @@
 // Fields of a single value: label, control, unit, and the words of the service where the value is at fault.
-import { html, useState, useEffect, useRef } from './lib.js';
+import { html, useState, useEffect, useRef, cell } from './lib.js';
 import { t, typed, parsed, number, unitOf } from './text.js';
 import { kindOf, labelOf, wordOf, symbolParts, range, pointer, spoken } from './schema.js';
 
 export const fieldId = path => `field${pointer(path).replace(/[^A-Za-z0-9_]/g, '-')}`;
+
+/** The fields of the form whose text is no value, by their ids: what is computed without them is not what is typed. */
+export const unread = cell(new Set());
+function mark(id, isUnread) {
+  if (unread.get().has(id) === isUnread) return;
+  const ids = new Set(unread.get());
+  if (isUnread) ids.add(id);
+  else ids.delete(id);
+  unread.set(ids);
+}
 
 /** Whether one control is enough for it. */
 export const isLeaf = schema => ['number', 'string', 'boolean', 'enum'].includes(kindOf(schema));
@@ -40,7 +50,12 @@ export function Row({ name, schema, path, value, required, context, control: Con
   const description = spoken([schema.description, own, from].filter(Boolean).join(' '), context.names);
   const allowed = kindOf(schema) === 'number' ? rangeText(schema) : '';
   const show = () => context.setHelp({ label, symbol: schema['x-symbol'], range: allowed, description });
+  // A code: it is worded anew in each language.
   const [wrong, setWrong] = useState(null);
+  useEffect(() => {
+    mark(id, wrong !== null);
+    return () => mark(id, false);
+  }, [id, wrong !== null]);
   const unit = unitOf(schema);
   const common = {
     id, schema, value, context, label,
@@ -55,7 +70,7 @@ export function Row({ name, schema, path, value, required, context, control: Con
     <div class=${`row ${faults.length || wrong ? 'faulty' : ''} ${compact ? 'compact' : ''}`} onMouseEnter=${show} onFocusIn=${show}>
       <${Control} ...${common} label=${html`<span>${label}</span>${schema['x-symbol'] && schema['x-symbol'].toLowerCase() !== label.toLowerCase() && html`\u00a0<${Symbol} symbol=${schema['x-symbol']} />`}`} unit=${unit} plain=${label} />
       <span id=${`${id}-about`} class="hidden">${[unit && t('in_unit', { unit }), allowed, description].filter(Boolean).join('. ')}</span>
-      <${Faults} faults=${wrong ? [{ detail: wrong }] : faults} id=${`${id}-fault`} names=${context.names} />
+      <${Faults} faults=${wrong ? [{ detail: t(wrong) }] : faults} id=${`${id}-fault`} names=${context.names} />
     </div>`;
 }
 
@@ -86,25 +101,27 @@ export function NumberInput({ id, schema, value, filled, set, setWrong, describe
   const [isFocused, setFocused] = useState(false);
   // The value may change under a draft: by the way back, by a click in the picture.
   useEffect(() => {
-    const read = draft === null ? null : parsed(draft);
-    if (draft !== null && !Number.isNaN(read) && !Object.is(read ?? undefined, value)) setDraft(null);
+    if (draft === null || Object.is(parsed(draft) ?? undefined, value)) return;
+    setDraft(null);
+    setWrong(null);
   }, [value]);
   // All digits only while they may be edited.
   const shown = draft ?? (isFocused || typeof value !== 'number' ? typed(value) : typed(Number(value.toPrecision(7))));
+  const faultOf = read => {
+    if (Number.isNaN(read)) return 'not_a_number';
+    if (read === null) return required ? 'needed' : null;
+    return schema.type === 'integer' && !Number.isInteger(read) ? 'not_whole' : null;
+  };
   const take = text => {
     setDraft(text);
     const read = parsed(text);
-    if (Number.isNaN(read)) setWrong(t('not_a_number'));
-    else if (read === null && required) setWrong(t('needed'));
-    else if (read !== null && schema.type === 'integer' && !Number.isInteger(read)) setWrong(t('not_whole'));
-    else {
-      setWrong(null);
-      if (!Object.is(read ?? undefined, value)) set(read === null ? undefined : read, 'typing');
-    }
+    const fault = faultOf(read);
+    setWrong(fault);
+    if (fault === null && !Object.is(read ?? undefined, value)) set(read ?? undefined, 'typing');
   };
   const leave = () => {
     setFocused(false);
-    if (draft !== null && !Number.isNaN(parsed(draft)) && !(parsed(draft) === null && required)) setDraft(null);
+    if (draft !== null && faultOf(parsed(draft)) === null) setDraft(null);
   };
   const key = event => {
     if (event.key !== 'ArrowUp' && event.key !== 'ArrowDown') return;

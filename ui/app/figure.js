@@ -1,6 +1,6 @@
 // A figure of the service, drawn to be read: hover or arrow keys read a station through all panels, dragging zooms,
 // a pinned run lies under the present one. What to draw comes as data; nothing here knows a calculator.
-import { html, useState, useRef, useMemo, useLayoutEffect, useEffect, unique } from './lib.js';
+import { html, useState, useRef, useMemo, useLayoutEffect, useEffect, usePrinting, unique } from './lib.js';
 import { t, number, unitSymbol } from './text.js';
 import { scale, extent, aired, ticks, labels, valueAt, cellAt } from './scale.js';
 import { items, styles, weaves, hasRibbons, stretchAt, barStep } from './draw.js';
@@ -12,11 +12,35 @@ const LEAST_RIBBON = 44;
 /** So many panels are each a little lower. */
 const MANY_PANELS = 5;
 const LEAST_OF_MANY = 62;
+const LEAST_POLAR = 380;
 const AXIS_ROOM = 40;
+/** The same on a low screen. */
+const LOW = { panel: 46, ofMany: 30, ribbon: 36, polar: 260 };
+/** On paper a picture has the room that the words and the inputs leave on the same sheet: its width, that of the sheet in
+ *  CSS pixels, what of the sheet's height is not taken anyway, and what a letter and the names above a panel take of it. */
+const PAPER_WIDTH = 960;
+const SHEET_WIDTH = 703;
+const SHEET_ROOM = 840;
+const OF_WORDS = 0.2;
+const OF_INPUTS = 0.17;
+const OF_NAMES = 22;
+const LEAST_PAPER = 170;
+const MOST_PAPER = 520;
+const LEAST_ON_PAPER = 32;
 const END_GLYPHS = ['centre_left', 'centre_right', 'chuck'];
 const GLYPH_ROOM = 36;
 /** Rows of the table that says what the picture shows. */
 const TABLE_ROWS = 120;
+
+/** A shop tablet, a small window: every line of its height counts. */
+export const isLowScreen = () => innerWidth > 860 && innerHeight < 700;
+
+function paperHeight({ frame, panels }) {
+  const letters = selector => document.querySelector(selector)?.textContent.length || 0;
+  const room = SHEET_ROOM - OF_WORDS * letters('.words') - OF_INPUTS * letters('.sheet') - OF_NAMES * panels.length;
+  const axes = frame === 'polar' ? 0 : 14 * panels.length + AXIS_ROOM - 8;
+  return Math.round(Math.max(LEAST_PAPER, Math.min((room * PAPER_WIDTH) / SHEET_WIDTH - axes, MOST_PAPER)));
+}
 
 /** The width of an element, as it changes. */
 function useWidth() {
@@ -32,20 +56,14 @@ function useWidth() {
   return [ref, width];
 }
 
-/** Draws again when the colour scheme changes, on paper too: maps are pictures of pixels. */
+/** Draws again when the colour scheme changes: maps are pictures of pixels. */
 function useScheme() {
   const [scheme, setScheme] = useState(0);
   useEffect(() => {
     const query = matchMedia('(prefers-color-scheme: dark)');
     const change = () => setScheme(count => count + 1);
     query.addEventListener('change', change);
-    addEventListener('beforeprint', change);
-    addEventListener('afterprint', change);
-    return () => {
-      query.removeEventListener('change', change);
-      removeEventListener('beforeprint', change);
-      removeEventListener('afterprint', change);
-    };
+    return () => query.removeEventListener('change', change);
   }, []);
   return scheme;
 }
@@ -77,8 +95,13 @@ const evenly = ([low, high], isLog) => Array.from({ length: CROSS_STEPS + 1 }, (
 
 /** The picture. `onPick(x, y)` where a click in it, or Enter at the cross, means something; `handle` is a point that
  *  can be dragged: `{ x, y, onMove(x, y), onDrop(x, y) }`, without `y` along the first curve. */
-export function Picture({ figure, pinned, height = 460, onPick, handle, main }) {
-  const [ref, width] = useWidth();
+export function Picture({ figure, pinned, height: screenHeight = 460, onPick, handle, main }) {
+  const [ref, screenWidth] = useWidth();
+  const isPrinting = usePrinting();
+  const [paper, setPaper] = useState(LEAST_PAPER);
+  // After what else changes on paper: all warnings are there then.
+  useLayoutEffect(() => { if (isPrinting) queueMicrotask(() => setPaper(paperHeight(figure))); }, [isPrinting]);
+  const [width, height] = isPrinting ? [PAPER_WIDTH, paper] : [screenWidth, screenHeight];
   const [view, setView] = useState(null);
   const [at, setAt] = useState(null);
   // Where the cross is, in a picture that is read in both directions.
@@ -155,7 +178,8 @@ export function Picture({ figure, pinned, height = 460, onPick, handle, main }) 
     event.preventDefault();
     act();
   };
-  const common = { figure, pinned, width, style, hidden, toggle, at, over: isPlane ? over : null, shown, view, height };
+  const least = isLowScreen() || isPrinting ? LOW.polar : LEAST_POLAR;
+  const common = { figure, pinned, width, style, hidden, toggle, at, over: isPlane ? over : null, shown, view, height, isPrinting };
   const tools = html`
     <div class="tools" role="group" aria-label=${t('picture_tools')}>
       ${!isPolar && html`<button type="button" class="icon" aria-label=${t('zoom_in')} title=${t('zoom_in')} onClick=${() => zoom(0.5)}>+</button>
@@ -168,7 +192,7 @@ export function Picture({ figure, pinned, height = 460, onPick, handle, main }) 
       <figcaption><h2 id=${`${id}-title`}>${figure.title.text}</h2>${tools}</figcaption>
       <div ref=${ref} class="plot" tabindex="0" role="application" aria-label=${`${figure.title.text}. ${t('picture_keys')}${onPick ? ` ${t('pick_keys')}` : ''}`} onKeyDown=${key}>
         ${width > 0 && (isPolar
-          ? html`<${Polar} ...${common} setAt=${setAt} />`
+          ? html`<${Polar} ...${common} least=${least} setAt=${setAt} />`
           : html`<${Stacked} ...${common} ...${{ setAt, setOver, setView, drag, setDrag, onPick, handle }} />`)}
       </div>
       <p class="hidden" role="status">${spoken}</p>
@@ -213,18 +237,19 @@ function Numbers({ figure, samples }) {
 }
 
 /** Panels under each other over one abscissa. */
-function Stacked({ figure, pinned, width, style, hidden, toggle, at, setAt, over, setOver, shown, view, setView, height, drag, setDrag, onPick, handle }) {
+function Stacked({ figure, pinned, width, isPrinting, style, hidden, toggle, at, setAt, over, setOver, shown, view, setView, height, drag, setDrag, onPick, handle }) {
   const shares = figure.panels.reduce((sum, panel) => sum + panel.height, 0) || 1;
   const ghosts = figure.panels.map((panel, index) => pinned?.panels[index] || null);
   const visible = figure.panels.map(panel => ({ ...panel, items: panel.items.filter(item => !item.name || !hidden.has(item.name)) }));
-  const count = width < 480 ? 4 : 6;
+  const isMany = visible.length >= MANY_PANELS;
+  const least = isPrinting ? { panel: LEAST_ON_PAPER, ofMany: LEAST_ON_PAPER, ribbon: LEAST_RIBBON } : isLowScreen() ? LOW : { panel: LEAST_PANEL, ofMany: LEAST_OF_MANY, ribbon: LEAST_RIBBON };
   const panels = visible.map((panel, index) => {
     const isRibbon = hasRibbons(panel);
-    const tall = Math.max(isRibbon ? LEAST_RIBBON : visible.length >= MANY_PANELS ? LEAST_OF_MANY : LEAST_PANEL, Math.round((height * panel.height) / shares));
+    const tall = Math.max(isRibbon ? least.ribbon : isMany ? least.ofMany : least.panel, Math.round((height * panel.height) / shares));
     const span = extent([...ordinates(panel, view), ...(ghosts[index] ? ordinates(ghosts[index], view) : [])], panel.y.scale);
     const isMap = panel.items.some(item => item.kind === 'heat_map');
     const domain = isMap ? span : aired(span, panel.y.scale);
-    const places = isRibbon ? [] : ticks(panel.y.scale, domain, Math.max(3, Math.round(tall / 42)));
+    const places = isRibbon ? [] : ticks(panel.y.scale, domain, Math.max(tall < 36 ? 2 : 3, Math.round(tall / 42)));
     return { panel, ghost: ghosts[index], tall, domain, places, ...labels(panel.y.scale, places), span: span ? span[1] - span[0] : 0 };
   });
   const left = Math.max(34, ...panels.map(({ texts }) => 12 + 6.6 * Math.max(0, ...texts.map(text => text.length))));

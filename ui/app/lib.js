@@ -2,6 +2,8 @@
 import { h, render, Component, Fragment } from './vendor/preact.module.js';
 import htm from './vendor/htm.module.js';
 
+import { useState, useEffect } from './vendor/hooks.module.js';
+
 export { useState, useEffect, useLayoutEffect, useMemo, useRef, useCallback, useReducer } from './vendor/hooks.module.js';
 export { h, render, Component, Fragment };
 export const html = htm.bind(h);
@@ -31,6 +33,19 @@ export function cell(value) {
       return () => watchers.delete(watcher);
     },
   };
+}
+
+/** Whether the page is being put on paper. */
+export function usePrinting() {
+  const [isPrinting, setPrinting] = useState(false);
+  useEffect(() => {
+    const before = () => setPrinting(true);
+    const after = () => setPrinting(false);
+    addEventListener('beforeprint', before);
+    addEventListener('afterprint', after);
+    return () => { removeEventListener('beforeprint', before); removeEventListener('afterprint', after); };
+  }, []);
+  return isPrinting;
 }
 
 let counter = 0;

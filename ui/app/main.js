@@ -60,10 +60,10 @@ function App() {
     return () => { removeEventListener('hashchange', move); removeEventListener('popstate', move); };
   }, []);
   useEffect(() => {
-    api.calculators().then(({ items }) => setCalculators(items), error => { if (!(error instanceof api.Unreachable) && error.status !== 401) complain(error); });
+    api.patient(api.calculators).then(({ items }) => setCalculators(items), error => { if (!(error instanceof api.Unreachable) && error.status !== 401) complain(error); });
   }, [spoken, attempt, isOnline]);
   const refreshModels = useCallback(() => api.models().then(setModels, () => {}), []);
-  useEffect(() => { refreshModels(); }, [page, attempt]);
+  useEffect(() => { refreshModels(); }, [page, attempt, isOnline]);
   const refreshJobs = useCallback(async () => {
     try {
       const [active, queued] = await Promise.all(['running', 'queued'].map(state => api.jobs({ state, limit: 100 })));
@@ -150,7 +150,7 @@ function Header({ page, calculators, running, models, known }) {
         <a href="/docs" class="docs-link">${t('docs')}</a>
       </nav>
       <div class="languages" role="group" aria-label=${t('language')}>
-        ${languages.map(tag => html`<button type="button" key=${tag} lang=${tag} aria-pressed=${language() === tag} onClick=${() => speak(tag).catch(() => location.reload())}>${tag.toUpperCase()}</button>`)}
+        ${languages.map(tag => html`<button type="button" key=${tag} lang=${tag} aria-pressed=${language() === tag} onClick=${() => speak(tag).catch(() => api.alive().then(() => location.reload(), () => {}))}>${tag.toUpperCase()}</button>`)}
       </div>
     </header>`;
 }

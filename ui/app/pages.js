@@ -28,13 +28,19 @@ function usePages(first, look) {
   const [next, setNext] = useState(null);
   const [trouble, setTrouble] = useState(null);
   const grown = useRef(false);
+  const stopWaiting = useRef(null);
+  useEffect(() => () => stopWaiting.current?.(), []);
   const load = async () => {
     try {
       const page = await first();
       if (grown.current) setItems(old => [...page.items, ...(old || []).filter(item => !page.items.some(fresh => (fresh.id || fresh.key) === (item.id || item.key)))]);
       else { setItems(page.items); setNext(page.next); }
       setTrouble(null);
-    } catch (error) { setTrouble(error); }
+    } catch (error) {
+      setTrouble(error);
+      // What is not looked at again anyway is asked for once more.
+      if (!look) stopWaiting.current = api.whenBack(error, load);
+    }
   };
   const more = async () => {
     grown.current = true;
@@ -53,7 +59,7 @@ function usePages(first, look) {
 }
 
 function ListState({ items, trouble, empty }) {
-  if (trouble) return html`<p class="problem" role="alert">${trouble.problem?.detail || trouble.message}</p>`;
+  if (trouble) return html`<p class="problem" role="alert">${trouble instanceof api.Unreachable ? t('offline_title') : trouble.problem?.detail || trouble.message}</p>`;
   if (!items) return html`<p class="late">${t('loading')}</p>`;
   if (items.length === 0) return html`<p class="empty-list">${empty}</p>`;
   return null;

@@ -6,10 +6,10 @@ import { items } from './draw.js';
 import { ordinates, Head, describe } from './panel.js';
 
 /** A roundness chart: deviations magnified outward from a base circle. */
-export function Polar({ figure, pinned, width, height, style, hidden, toggle, at, setAt }) {
+export function Polar({ figure, pinned, width, height, least, style, hidden, toggle, at, setAt }) {
   const panel = { ...figure.panels[0], items: figure.panels[0].items.filter(item => !item.name || !hidden.has(item.name)) };
   const ghost = pinned?.panels[0];
-  const size = Math.max(240, Math.min(width, Math.max(height, 380)));
+  const size = Math.max(240, Math.min(width, Math.max(height, least)));
   const hasGlyphs = panel.items.some(item => item.kind === 'glyph');
   const centre = [width / 2, size / 2];
   // The angles at the sides need their width.

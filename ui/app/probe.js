@@ -4,8 +4,6 @@ import * as api from './api.js';
 
 /** Answers kept while the page is open. */
 const KEPT = 400;
-/** Times that a busy service is asked again. */
-const MOST_TRIES = 5;
 
 /** Follows a job as fast as the service answers; one that is passed by before its turn is never sent. `tag` names the
  *  job, `null` asks for none. `bare` answers come
@@ -41,17 +39,13 @@ export function useProbe(id, tag, job, { bare } = {}) {
   return found;
 }
 
-async function fetched(id, { tag, job }, signal, bare, again = 0) {
+async function fetched(id, { tag, job }, signal, bare) {
   try {
-    const answer = await api.answered(id, job, signal);
-    return { tag, answer, figures: bare ? [] : await api.figures(answer.key, signal) };
+    // Too many at once: asked again when the service says.
+    const answer = await api.patient(() => api.answered(id, job, signal), signal);
+    return { tag, answer, figures: bare ? [] : await api.patient(() => api.figures(answer.key, signal), signal) };
   } catch (error) {
     if (error.name === 'AbortError') return null;
-    if ((error.status === 429 || error.status === 503) && again < MOST_TRIES) {
-      // Too many at once: asked again when the service says.
-      await new Promise(resolve => setTimeout(resolve, 1000 * (error.retryAfter || 1)));
-      return signal.aborted ? null : fetched(id, { tag, job }, signal, bare, again + 1);
-    }
     return { tag, problem: error.problem || { title: error.message } };
   }
 }

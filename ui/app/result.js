@@ -1,14 +1,14 @@
 // What a run gave: the picture, a sentence, and everything else behind tabs.
-import { html, useState, useEffect, useMemo, useRef } from './lib.js';
+import { html, useState, useEffect, useLayoutEffect, useMemo, useRef, usePrinting } from './lib.js';
 import { t, number, unitSymbol, unitOf, plural, moment } from './text.js';
 import * as api from './api.js';
-import { Picture, differenceOf } from './figure.js';
-import { resolve, humanised, labelOf, wordOf, namesOf, vocabularyOf, spoken } from './schema.js';
+import { Picture, differenceOf, isLowScreen } from './figure.js';
+import { resolve, humanised, labelOf, wordOf, namesOf, vocabularyOf, spoken, within } from './schema.js';
 import { spreadOf, spreadColumns, withSpread } from './digits.js';
 import { canReplay, Replay } from './replay.js';
 import { canTrade, spanOf, TradeOff } from './tradeoff.js';
 import { hasClamp, ClampBars } from './clamp.js';
-import { hasCauses, Causes } from './cause.js';
+import { hasCauses, Causes, answerSchema } from './cause.js';
 
 /** The curve above a schedule leaves room for it. */
 const TRADE_HEIGHT = 260;
@@ -20,6 +20,13 @@ const MOST_BUTTONS = 6;
 const SHOWN_BY_CAUSES = ['diagnosis_next', 'diagnosis_gain'];
 /** Items of a list that the printed sheet has. */
 const PRINTED_ITEMS = 40;
+/** On a low screen: what the panels have before it is measured, and at least; what a chart needs around its panel, the last
+ *  one for the axis, and what is left free below. */
+const LOW_ROOM = 260;
+const LEAST_LOW_ROOM = 100;
+const CHART_ROOM = 14;
+const AXIS_ROOM = 32;
+const END_ROOM = 10;
 /** Rows of a table shown at once. */
 const TABLE_ROWS = 200;
 
@@ -33,21 +40,43 @@ export function save(blob, name) {
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }
 
-/** The height that the panels of a picture may have: what is left beside titles, names and a first sentence. */
+/** The height that the panels of a picture may have: what is left beside titles, names and a first sentence. On a low
+ *  screen it is measured: the picture ends where the screen does. */
 export function usePictureHeight(panels) {
   const [size, setSize] = useState([innerWidth, innerHeight]);
+  const [room, setRoom] = useState(LOW_ROOM);
   useEffect(() => {
     const change = () => setSize([innerWidth, innerHeight]);
     addEventListener('resize', change);
     return () => removeEventListener('resize', change);
   }, []);
-  const around = size[0] <= 860 ? 290 : size[1] < 700 ? 220 : 330;
+  const isLow = isLowScreen();
+  // Names stand above the panels in as many lines as they need: what they leave does not depend on the panels.
+  useLayoutEffect(() => {
+    const plot = isLow && document.querySelector('.picture.main .plot');
+    if (!plot) return undefined;
+    const measure = () => {
+      const charts = [...plot.querySelectorAll('svg.chart')];
+      if (charts.length === 0) return;
+      const box = plot.getBoundingClientRect();
+      const charted = charts.reduce((sum, chart) => sum + chart.getBoundingClientRect().height, 0);
+      const axes = charts[0].classList.contains('polar') ? 0 : CHART_ROOM * charts.length + AXIS_ROOM;
+      setRoom(Math.round(innerHeight - (box.top + scrollY) - (box.height - charted) - axes - END_ROOM));
+    };
+    const observer = new ResizeObserver(measure);
+    observer.observe(plot);
+    return () => observer.disconnect();
+  });
+  if (isLow) return Math.max(LEAST_LOW_ROOM, room);
+  const around = size[0] <= 860 ? 290 : 330;
   return Math.round(Math.max(240, Math.min(size[1] - around - 34 * panels, 900)));
 }
 
 const drawn = figure => figure.panels.flatMap(panel => panel.items).filter(({ kind, x }) => kind !== 'glyph' && x.length > 0);
 /** Pictures of what the job did not ask for are empty: they are not offered. */
 const shownOf = figures => { const some = figures.filter(figure => drawn(figure).length > 0); return some.length > 0 ? some : figures.slice(0, 1); };
+/** The unit of what a diagnosis judges, empty for logarithms. */
+const residualUnit = figures => { const unit = figures.find(({ id }) => id === 'residuals')?.panels[0]?.y.unit; return unit === undefined ? undefined : unitSymbol(unit); };
 /** Whether a picture shows more than a single point. */
 const isTelling = figure => drawn(figure).some(({ kind, x }) => kind !== 'points' || x.length > 1);
 
@@ -100,7 +129,7 @@ export function Result({ id, description, answer, problem, trouble, running, pin
           ${first && html`<p class="verdict" aria-live="polite">${capital(first.text)}</p>`}
           <${Warnings} key=${answer.key} list=${body.warnings} names=${namesOf(description.input_schema)} />
           ${hasClamp(id, body.result) && html`<${ClampBars} result=${body.result} input=${body.input} schema=${description.output_schema} />`}
-          ${hasCauses(id, body.result) && html`<${Causes} result=${body.result} schema=${description.input_schema} unit=${unitSymbol(figures.find(one => one.id === 'residuals')?.panels[0]?.y.unit)} />`}
+          ${hasCauses(id, body.result) && html`<${Causes} result=${body.result} description=${description} calculator=${body.input.calculator} unit=${residualUnit(figures)} />`}
           ${others.length > 0 && html`<ul class="explanation">${others.map(({ code, text }, index) => html`<li key=${code + index}>${capital(text)}</li>`)}</ul>`}
         </div>`}
       </div>
@@ -113,7 +142,7 @@ export function Result({ id, description, answer, problem, trouble, running, pin
           ${study && html`<a class="button" id="vary" href=${study}>${t('vary_fields')}</a>`}
           <${Downloads} ...${{ id, description, answer, figure }} />
         </div>
-        ${id === 'diagnosis' && models && html`<${SaveModel} resultKey=${answer.key} />`}
+        ${id === 'diagnosis' && models && body.result.named?.length > 0 && html`<${SaveModel} resultKey=${answer.key} />`}
         <${Tabs} ...${{ id, description, answer, pinned, job }} />
         <${Sheet} ...${{ description, body, job }} />`}
     </div>`;
@@ -135,15 +164,8 @@ function FigurePick({ figures, figure, choose }) {
 /** Warnings; of many the first few until all are asked for, and all on paper. */
 export function Warnings({ list, names }) {
   const [asked, setAsked] = useState(list.length <= FEW_WARNINGS + 1);
-  const [printed, setPrinted] = useState(false);
-  useEffect(() => {
-    const before = () => setPrinted(true);
-    const after = () => setPrinted(false);
-    addEventListener('beforeprint', before);
-    addEventListener('afterprint', after);
-    return () => { removeEventListener('beforeprint', before); removeEventListener('afterprint', after); };
-  }, []);
-  const whole = asked || printed;
+  const isPrinting = usePrinting();
+  const whole = asked || isPrinting;
   if (list.length === 0) return null;
   return html`
     <ul class="warnings" aria-label=${t('warnings')}>${(whole ? list : list.slice(0, FEW_WARNINGS)).map(({ code, detail, pointer }, index) => html`<li key=${code + pointer + index}><span class="sign" aria-hidden="true">!</span><span>${capital(spoken(detail, names))}</span></li>`)}</ul>
@@ -191,8 +213,8 @@ function Tabs({ id, description, answer, pinned, job }) {
         ${names.map(name => html`<button type="button" role="tab" key=${name} id=${`tab-${name}`} aria-selected=${name === current} aria-controls="tab-panel" tabindex=${name === current ? 0 : -1} onClick=${() => setOpen(name)}>${t(`tab_${name}`)}</button>`)}
       </div>
       <div role="tabpanel" id="tab-panel" aria-labelledby=${`tab-${current}`} tabindex="0">
-        ${current === 'values' && html`<${Values} schema=${description.output_schema} inputs=${description.input_schema} result=${answer.answer.result} pinned=${pinned && pinned.key !== answer.key ? pinned.answer.result : null} />`}
-        ${current === 'tables' && html`<${Tables} answerKey=${answer.key} id=${id} labels=${description.labels} />`}
+        ${current === 'values' && html`<${Values} root=${description.output_schema} own=${id === 'diagnosis' ? answerSchema(description, answer.answer.input.calculator) : description.output_schema} inputs=${description.input_schema} result=${answer.answer.result} pinned=${pinned && pinned.key !== answer.key ? pinned.answer.result : null} />`}
+        ${current === 'tables' && html`<${Tables} answerKey=${answer.key} id=${id} description=${description} />`}
         ${current === 'program' && html`<${Program} answerKey=${answer.key} />`}
         ${current === 'basis' && html`<${Basis} body=${answer.answer} description=${description} />`}
         ${current === 'request' && html`<${RequestView} id=${id} job=${job} answer=${answer} />`}
@@ -210,7 +232,7 @@ function saidUnit(schema, beside) {
 /** The single numbers and words of a result, by groups. */
 function flat(schema, value, root, path = [], out = [], names = [], spread = null, beside = [{}], lists = false) {
   const whole = resolve(schema || {}, root);
-  if (value === null || value === undefined) return out;
+  if (value === null || value === undefined || (!lists && whole['x-advanced'])) return out;
   if (Array.isArray(value)) {
     if (!lists || whole['x-table']) return out;
     if (value.every(item => typeof item !== 'object')) {
@@ -233,20 +255,47 @@ function flat(schema, value, root, path = [], out = [], names = [], spread = nul
 /** An error of the numbers is known to two digits. */
 const digitsOf = ({ path }) => (/(^|_)(numerical_error|uncertainty)(_[a-z]+)*$/.test(String(path.at(-1))) ? 2 : 5);
 
-/** A name of a field or a kind in the words of the form; `names` has those of its fields. */
-const worded = (text, names) => names?.get(text) ?? (/^[a-z]+(_[a-z0-9]+)+$/.test(text) ? humanised(text) : text);
-const shownValue = (value, schema, names, digits = 5) => (typeof value === 'number' ? number(value, digits) : value === true ? t('yes') : value === false ? t('no') : schema?.enum ? wordOf(schema, value) : worded(String(value), names));
+/** Words of results that no schema lists. */
+const SAID = {
+  quadratic: 'said_quadratic', several_optima: 'said_several_optima', opening: 'said_opening', rpm_min: 'said_rpm_min', rpm_max: 'said_rpm_max', ln_factor: 'said_ln_factor', kappa: 'size_share',
+  common: 'said_common', per_run: 'said_per_run', around: 'said_around', test_order: 'said_test_order', per_speed: 'said_per_speed', per_depth: 'said_per_depth', per_cell: 'said_per_cell', speed_and_depth: 'said_per_cell',
+  'fitted to trials': 'said_fitted', 'pcg64 (XSL RR 128/64), Lemire\'s multiplication without rejection': 'said_generator',
+  amplitude_cos_phase_mm: 'said_cosine', amplitude_sin_phase_mm: 'said_sine', amplitude_cos_end_phase_mm: 'said_cosine', amplitude_sin_end_phase_mm: 'said_sine',
+};
+/** Columns and fields in which names stand that the user gave: they are nobody's words. */
+const OWN_NAMES = ['zone', 'id', 'label', 'batch', 'level', 'of_level'];
+const isCode = text => /^[a-z][a-z0-9_.]*$/.test(text);
 
+/** A name of a field or a kind, or several of them, in the words of the form; what is none of them stays as it is. */
+function worded(text, names) {
+  const one = word => names?.get(word) ?? (SAID[word] && t(SAID[word]));
+  const own = one(text);
+  if (own) return capital(own);
+  for (const joint of [' + ', ', ', '|', ' ']) {
+    const parts = text.split(joint);
+    // Between words of a sentence there are spaces, too.
+    const isList = joint === ' ' ? parts.every(part => one(part) || part.includes('_')) : parts.every(isCode);
+    if (parts.length > 1 && isList && parts.some(one)) return capital(parts.map(part => (one(part) ? within(one(part)) : part)).join(joint === ' ' ? ', ' : joint));
+  }
+  const [field, ...value] = text.split(' = ');
+  return value.length > 0 && one(field) ? `${one(field)} = ${value.join(' = ')}` : text;
+}
 
-function Values({ schema, inputs, result, pinned }) {
-  const names = useMemo(() => vocabularyOf(schema, inputs), [schema, inputs]);
+const ANSWERS = { true: 'yes', yes: 'yes', false: 'no', no: 'no' };
+/** A word under the name of its field or column. */
+const wordUnder = (name, text, names) => (name === 'unit' || name.endsWith('_unit') ? unitSymbol(text) : OWN_NAMES.includes(name) ? text : ANSWERS[text] ? t(ANSWERS[text]) : worded(text, names));
+const shownValue = (value, schema, names, digits = 5, name = '') => (typeof value === 'number' ? number(value, digits) : value === true ? t('yes') : value === false ? t('no') : schema?.enum ? wordOf(schema, value) : wordUnder(name, String(value), names));
+
+/** `own` is the schema of this result, one of those that `root` has. */
+function Values({ root, own, inputs, result, pinned }) {
+  const names = useMemo(() => vocabularyOf(root, inputs), [root, inputs]);
   const rows = useMemo(() => {
-    const all = flat(schema, result, schema, [], [], [], path => spreadOf(result, path));
+    const all = flat(own, result, root, [], [], [], path => spreadOf(result, path));
     // An uncertainty stands behind its number, not once more in a line of its own.
     const said = new Set(all.filter(({ spread, value }) => spread && typeof value === 'number').map(({ spread }) => spread.path.join('/')));
     return all.filter(({ path }) => !said.has(path.join('/')));
-  }, [schema, result]);
-  const before = pinned ? new Map(flat(schema, pinned, schema).map(row => [row.path.join('/'), row.value])) : null;
+  }, [root, result]);
+  const before = pinned ? new Map(flat(own, pinned, root).map(row => [row.path.join('/'), row.value])) : null;
   const groups = [...new Set(rows.map(({ group }) => group))];
   return html`
     <div class=${`values ${before ? 'compared' : ''}`}>${groups.map(group => html`
@@ -255,14 +304,16 @@ function Values({ schema, inputs, result, pinned }) {
         <thead class=${before ? '' : 'hidden'}><tr><th scope="col">${t('name')}</th><th scope="col">${t('value')}</th>${before && html`<th scope="col">${t('pinned_value')}</th><th scope="col">${t('difference')}</th>`}<th scope="col">${t('unit')}</th></tr></thead>
         <tbody>${rows.filter(row => row.group === group).map(row => {
           const other = before?.get(row.path.join('/'));
-          return html`<tr key=${row.path.join('/')}><th scope="row" title=${row.description}>${row.label}</th><td class=${typeof row.value === 'number' ? 'number' : ''}>${row.spread ? withSpread(row.value, row.spread.spread) : shownValue(row.value, row.schema, names, digitsOf(row))}</td>
-            ${before && html`<td class=${typeof other === 'number' ? 'number' : ''}>${other === undefined ? '' : shownValue(other, row.schema, names, digitsOf(row))}</td><td class="number">${typeof other === 'number' && typeof row.value === 'number' ? `${row.value > other ? '+' : ''}${number(row.value - other, 3)}` : ''}</td>`}
+          return html`<tr key=${row.path.join('/')}><th scope="row" title=${row.description}>${row.label}</th><td class=${typeof row.value === 'number' ? 'number' : ''}>${row.spread ? withSpread(row.value, row.spread.spread) : shownValue(row.value, row.schema, names, digitsOf(row), String(row.path.at(-1)))}</td>
+            ${before && html`<td class=${typeof other === 'number' ? 'number' : ''}>${other === undefined ? '' : shownValue(other, row.schema, names, digitsOf(row), String(row.path.at(-1)))}</td><td class="number">${typeof other === 'number' && typeof row.value === 'number' ? `${row.value > other ? '+' : ''}${number(row.value - other, 3)}` : ''}</td>`}
             <td class="unit">${row.unit}</td></tr>`;
         })}</tbody>
       </table>`)}</div>`;
 }
 
-function Tables({ answerKey, id, labels }) {
+function Tables({ answerKey, id, description }) {
+  const { labels } = description;
+  const names = useMemo(() => vocabularyOf(description.output_schema, description.input_schema), [description]);
   const titled = name => (labels?.[name] ? capital(labels[name]) : humanised(name));
   const [tables, setTables] = useState(null);
   const [chosen, setChosen] = useState(0);
@@ -270,7 +321,8 @@ function Tables({ answerKey, id, labels }) {
   const [trouble, setTrouble] = useState(null);
   useEffect(() => {
     const control = new AbortController();
-    api.tables(answerKey, control.signal).then(setTables, error => error.name !== 'AbortError' && setTrouble(error.message));
+    // What the job did not ask for has a table without rows.
+    api.tables(answerKey, control.signal).then(all => setTables(all.filter(({ columns }) => columns.some(({ cells }) => cells.length > 0))), error => error.name !== 'AbortError' && setTrouble(error.message));
     return () => control.abort();
   }, [answerKey]);
   if (trouble) return html`<p class="fault"><span>${trouble}</span></p>`;
@@ -279,14 +331,19 @@ function Tables({ answerKey, id, labels }) {
   const table = tables[Math.min(chosen, tables.length - 1)];
   const count = Math.max(0, ...table.columns.map(({ cells }) => cells.length));
   const spreads = spreadColumns(table.columns);
-  const cell = (value, spread) => (value === null || value === undefined ? '' : typeof value !== 'number' ? humanised(String(value)) : spread ? withSpread(value, spread, false) : number(value, 6));
+  const cell = (name, value, spread) => {
+    if (value === null || value === undefined) return '';
+    if (typeof value === 'number') return spread ? withSpread(value, spread, false) : number(value, 6);
+    // A set without causes is the model itself.
+    return value === '' && name === 'causes' ? capital(t('the_base')) : wordUnder(name, String(value), names);
+  };
   return html`
     <div class="bar">${tables.length > 1 && html`<label>${t('table')} <select value=${chosen} onChange=${event => { setChosen(Number(event.currentTarget.value)); setRows(TABLE_ROWS); }}>${tables.map(({ id: name }, index) => html`<option value=${index}>${titled(name)}</option>`)}</select></label>`}
       <span class="quiet">${plural('rows', count)}</span>
       <button type="button" onClick=${async () => save(await api.file(answerKey, 'text/csv', `?table=${table.id}`), `${id}-${table.id}.csv`)}>CSV</button></div>
     <div class="grid-scroll tall" tabindex="0" role="region" aria-label=${titled(table.id)}><table class="grid still">
-      <thead><tr>${table.columns.map(({ text, unit }) => html`<th scope="col">${capital(text)} <span class="unit">${unitSymbol(unit)}</span></th>`)}</tr></thead>
-      <tbody>${Array.from({ length: Math.min(rows, count) }, (_, row) => html`<tr key=${row}>${table.columns.map(({ cells, unit }, at) => html`<td class=${unit === '' ? 'word' : ''}>${cell(cells[row], spreads[at]?.[row])}</td>`)}</tr>`)}</tbody>
+      <thead><tr>${table.columns.map(({ text, unit }) => html`<th scope="col" class=${unit === '' ? 'word' : ''}>${capital(text)} <span class="unit">${unitSymbol(unit)}</span></th>`)}</tr></thead>
+      <tbody>${Array.from({ length: Math.min(rows, count) }, (_, row) => html`<tr key=${row}>${table.columns.map(({ name, cells, unit }, at) => html`<td class=${unit === '' ? 'word' : ''}>${cell(name, cells[row], spreads[at]?.[row])}</td>`)}</tr>`)}</tbody>
     </table></div>
     ${count > rows && html`<button type="button" class="more" onClick=${() => setRows(rows + 1000)}>${t('more_rows', { count: count - rows })}</button>`}`;
 }
@@ -363,16 +420,43 @@ function SaveModel({ resultKey }) {
     </form>`;
 }
 
-/** What only the printed sheet shows: inputs, those of one group in one line, key and versions. */
+/** Lists of alike objects among the rows: the items of each, `[{ title, rows }]`, as they would be lines of their own. */
+function listsOf(rows) {
+  const lists = new Map();
+  for (const row of rows) {
+    if (typeof row.path.at(-2) !== 'number') continue;
+    const place = row.path.slice(0, -2).join('/');
+    const items = lists.get(place) || lists.set(place, new Map()).get(place);
+    const item = items.get(row.group) || items.set(row.group, []).get(row.group);
+    item.push(row);
+  }
+  return [...lists.values()].filter(items => items.size > 1).map(items => [...items].map(([title, own]) => ({ title, rows: own })));
+}
+
+/** What only the printed sheet shows: inputs, those of one group in one line, alike ones as tables; key and versions. */
 export function Sheet({ description, body, job }) {
   const rows = flat(description.input_schema, job, description.input_schema, [], [], [], null, [{}], true);
-  const groups = [...new Set(rows.map(({ group }) => group))];
   const names = useMemo(() => vocabularyOf(description.output_schema, description.input_schema), [description]);
-  const said = row => `${row.label} ${shownValue(row.value, row.schema, names)}${row.unit ? ` ${row.unit}` : ''}`;
+  const lists = listsOf(rows);
+  const inTables = new Set(lists.flatMap(items => items.flatMap(item => item.rows)));
+  const others = rows.filter(row => !inTables.has(row));
+  const groups = [...new Set(others.map(({ group }) => group))];
+  const value = row => shownValue(row.value, row.schema, names, 5, String(row.path.at(-1)));
+  const said = row => `${row.label} ${value(row)}${row.unit ? ` ${row.unit}` : ''}`;
   return html`
     <section class="sheet" aria-hidden="true">
       <h2>${t('inputs')}</h2>
-      <ul>${groups.map(group => html`<li key=${group}>${group && html`<strong>${group}:</strong> `}${rows.filter(row => row.group === group).map(said).join(', ')}</li>`)}</ul>
+      ${lists.map(items => {
+        const columns = [...new Map(items.flatMap(item => item.rows.map(row => [row.path.at(-1), row]))).values()];
+        return html`<table key=${items[0].title}>
+          <thead><tr><th></th>${columns.map(({ label, unit, value: one }) => html`<th class=${typeof one === 'number' ? 'number' : ''}>${label}${unit ? `, ${unit}` : ''}</th>`)}</tr></thead>
+          <tbody>${items.map(({ title, rows: own }) => html`<tr key=${title}><th>${title}:</th>${columns.map(({ path }) => {
+            const row = own.find(one => one.path.at(-1) === path.at(-1));
+            return html`<td class=${typeof row?.value === 'number' ? 'number' : ''}>${row && value(row)}</td>`;
+          })}</tr>`)}</tbody>
+        </table>`;
+      })}
+      <ul>${groups.map(group => html`<li key=${group}>${group && html`<strong>${group}:</strong> `}${others.filter(row => row.group === group).map(said).join(', ')}</li>`)}</ul>
       <p>precut ${body.engine} · ${body.calculator} ${t('version')} ${body.version} · ${body.key} · ${moment(new Date().toISOString())}</p>
     </section>`;
 }

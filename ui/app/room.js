@@ -3,7 +3,7 @@ import { html, useState, useEffect, useRef, useMemo, useCallback, debounced } fr
 import { t, language } from './text.js';
 import * as api from './api.js';
 import { Form, goTo } from './form.js';
-import { sentence } from './fields.js';
+import { sentence, unread } from './fields.js';
 import { Result } from './result.js';
 import { difference, changed, parts, namesOf } from './schema.js';
 import { pickOf } from './pick.js';
@@ -17,6 +17,8 @@ const TYPING_PAUSE_MS = 220;
 const HISTORY_PAUSE_MS = 900;
 /** Between two attempts to reach a service that is away. */
 const LONGEST_PAUSE_MS = 15000;
+/** Times that a job is sent again in another language. */
+const MOST_TRIES = 5;
 /** Words of the address that are no pointers. */
 const OWN = ['example', 'result', 'run', 'pin', 'model'];
 
@@ -72,6 +74,12 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
   now.current = { state, answer, running, description, pinned, problem };
   const control = useRef(null);
   const stopFollowing = useRef(null);
+  // Fields whose text is no number: the answer shown is not one to what is typed.
+  const [unreadable, setUnreadable] = useState(unread.get());
+  useEffect(() => unread.watch(setUnreadable), []);
+  // Count the times that the service is asked anew for what it owes.
+  const [asking, setAsking] = useState(0);
+  const [opening, setOpening] = useState(0);
   const isLive = useRef(true);
   const ownQuery = useRef(null);
   const alive = useRef(true);
@@ -96,7 +104,7 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
   // `said` is the language in which a body was asked for: by now it may be another one.
   const show = async (key, body, job, signal, said = language()) => {
     const asked = language();
-    const [whole, figures] = await Promise.all([said === asked && body ? body : api.result(key, signal), api.figures(key, signal)]);
+    const [whole, figures] = await Promise.all([said === asked && body ? body : api.patient(() => api.result(key, signal), signal), api.patient(() => api.figures(key, signal), signal)]);
     if (signal?.aborted || !alive.current) return undefined;
     if (asked !== language()) return show(key, null, job, signal);
     setAnswer({ key, answer: whole, figures, job, language: asked });
@@ -151,10 +159,13 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
     }
     setPending(true);
     setWaiting(false);
-    const start = performance.now();
+    let start;
     const said = language();
     try {
-      const { answer: body, job: record } = await api.solve(id, job, { signal });
+      const { answer: body, job: record } = await api.patient(() => {
+        start = performance.now();
+        return api.solve(id, job, { signal });
+      }, signal);
       if (signal.aborted) return;
       if (record) {
         isLive.current = false;
@@ -170,15 +181,12 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
       await show(body.key, body, job, signal, said);
       if (!signal.aborted && now.current.state?.job === job) tell(job, body.key, null, 'replace');
     } catch (error) {
-      if (error instanceof api.Refused && error.status === 503 && again < 5) {
-        await new Promise(resolve_ => setTimeout(resolve_, 1000 * (error.retryAfter || 1)));
-        if (!signal.aborted) return run(job, again + 1);
-      } else if (error instanceof api.Unreachable) {
+      if (error instanceof api.Unreachable) {
         // Asked again ever more rarely: what was typed is computed when the service is back.
         fail(error);
         await new Promise(resolve_ => setTimeout(resolve_, Math.min(1000 * 2 ** again, LONGEST_PAUSE_MS)));
         if (!signal.aborted && alive.current) return run(job, again + 1);
-      } else if (error instanceof api.Refused && said !== language() && again < 5) {
+      } else if (error instanceof api.Refused && said !== language() && again < MOST_TRIES) {
         if (!signal.aborted) return run(job, again + 1);
       } else fail(error);
     }
@@ -190,6 +198,7 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
   const spokenBefore = useRef(spoken);
   useEffect(() => {
     let gone = false;
+    let stopWaiting = null;
     (async () => {
       try {
         const found = await api.calculator(id);
@@ -206,16 +215,21 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
           await show(key, null, job);
           if (now.current.pinned) setPinned(await pinOf(now.current.pinned.key));
         }
-      } catch (error) { if (!gone) setMissing(error); }
+      } catch (error) {
+        if (gone) return;
+        stopWaiting = api.whenBack(error, () => setAsking(count => count + 1));
+        if (!stopWaiting) setMissing(error);
+      }
     })();
-    return () => { gone = true; };
-  }, [id, spoken]);
+    return () => { gone = true; stopWaiting?.(); };
+  }, [id, spoken, asking]);
 
   // The state of the address: at the start, and when the user goes back or forward.
   const asked = query.toString();
   useEffect(() => {
     if (!description || written(query) === ownQuery.current) return;
     let gone = false;
+    let stopWaiting = null;
     ownQuery.current = written(query);
     (async () => {
       try {
@@ -243,12 +257,18 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
         } else run(next.job);
       } catch (error) {
         if (gone) return;
-        if (error instanceof api.Refused || error instanceof SyntaxError) setMissing(error);
-        else fail(error);
+        stopWaiting = api.whenBack(error, () => {
+          // What was typed meanwhile is computed by itself.
+          if (isUnwritten.current) return;
+          ownQuery.current = null;
+          setOpening(count => count + 1);
+        });
+        if (!stopWaiting && (error instanceof api.Refused || error instanceof SyntaxError)) setMissing(error);
+        else if (!api.isBusy(error)) fail(error);
       }
     })();
-    return () => { gone = true; };
-  }, [description && id, asked]);
+    return () => { gone = true; stopWaiting?.(); };
+  }, [description && id, asked, opening]);
 
   if (missing) {
     return html`<main class="plain" id="main" tabindex="-1"><h1>${missing.problem?.title || t('trouble_title')}</h1><p>${sentence(missing.problem?.detail || missing.message)}</p>
@@ -267,6 +287,14 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
     if (how === 'typing') runLater(job);
     else { runLater.cancel(); run(job); }
   };
+  /** Computes what is typed: not before all of it can be read. */
+  const compute = next => {
+    const first = [...document.querySelectorAll('.form input')].find(field => unreadable.has(field.id));
+    runLater.cancel();
+    if (!first) { setPane(next); run(state.job); return; }
+    setPane('form');
+    setTimeout(() => { first.scrollIntoView({ block: 'center' }); first.focus(); }, 30);
+  };
   const pickExample = name => {
     isLive.current = true;
     push(written(new URLSearchParams({ example: name })));
@@ -284,13 +312,13 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
   };
   const picking = (figure, body) => pickOf(id, figure, description.input_schema, state.job, body);
   const study = answer && `#/studies?calculator=${id}&${written(queryOf(state, state.job, answer.key))}`;
-  const faults = problem?.errors || [];
+  const faultCount = (problem?.errors || []).length + unreadable.size;
   const isBusy = pending || running;
   const trouble = problem && !(['offline', 'cancelled'].includes(problem.code) && answer) && html`<${Trouble} problem=${problem} names=${namesOf(description.input_schema)} over=${Boolean(answer)} onGo=${place => { setPane('form'); setTimeout(() => goTo(place), 30); }} />`;
   return html`
     <main class="room" data-pane=${pane} id="main" tabindex="-1">
       <div class="pane-switch" role="group" aria-label=${t('panes')}>
-        <button type="button" aria-pressed=${pane === 'form'} onClick=${() => setPane('form')}>${t('inputs')}${faults.length > 0 && html` <span class="badge">${faults.length}</span>`}</button>
+        <button type="button" aria-pressed=${pane === 'form'} onClick=${() => setPane('form')}>${t('inputs')}${faultCount > 0 && html` <span class="badge">${faultCount}<span class="hidden"> ${t('faults_here')}</span></span>`}</button>
         <button type="button" aria-pressed=${pane === 'picture'} onClick=${() => setPane('picture')}>${t('result')}</button>
       </div>
       <section class="form-pane" aria-label=${t('inputs')}>
@@ -301,15 +329,15 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
             ${state.baseName.result && html`<option value="">${t('kept_result')}</option>`}
             ${description.examples.map(({ id: name, title: text }) => html`<option value=${name}>${text}</option>`)}
           </select>
-          <button type="button" class=${`primary ${waiting ? 'calling' : ''}`} onClick=${() => { runLater.cancel(); setPane('picture'); run(state.job); }} title="Ctrl+Enter">${waiting ? t('run_changed') : t('run')}</button>
+          <button type="button" class=${`primary ${waiting ? 'calling' : ''}`} onClick=${() => compute('picture')} title="Ctrl+Enter">${waiting ? t('run_changed') : t('run')}</button>
         </div>
-        <${Form} key=${`${id} ${asked.includes('result=') ? 'kept' : state.baseName.example}`} schema=${description.input_schema} value=${state.job} filled=${answer?.answer.input} onChange=${change} errors=${faults} examples=${description.jobs} libraries=${libraries} calculator=${id} models=${models} />
+        <${Form} key=${`${id} ${asked.includes('result=') ? 'kept' : state.baseName.example}`} schema=${description.input_schema} value=${state.job} filled=${answer?.answer.input} onChange=${(job, how) => (how === 'run' ? compute(pane) : change(job, how))} errors=${problem?.errors} examples=${description.jobs} libraries=${libraries} calculator=${id} models=${models} />
       </section>
       <section class="result-pane" aria-label=${t('result')} aria-busy=${isBusy ? 'true' : 'false'}>
         <div class=${`work-line ${pending && !running ? 'on' : ''}`} aria-hidden="true"></div>
         <header class="room-head"><h1>${description.question}</h1><p class="summary">${description.title}</p>${running && html`<${Progress} running=${running} stop=${stop} />`}</header>
         ${answer && trouble}
-        <${Result} ...${{ id, description, answer, problem, trouble, running, pinned, pin, job: state.job, models, study, pickOf: picking, onApply: next => change(next, 'run'), stale: Boolean(answer && (problem || waiting)), isCancelled: problem?.code === 'cancelled' }} />
+        <${Result} ...${{ id, description, answer, problem, trouble, running, pinned, pin, job: state.job, models, study, pickOf: picking, onApply: next => change(next, 'run'), stale: Boolean(answer && (problem || waiting || unreadable.size > 0)), isCancelled: problem?.code === 'cancelled' }} />
       </section>
     </main>`;
 }

@@ -143,27 +143,64 @@ export function namesOf(schema) {
     Object.values(part).forEach(walk);
   };
   walk(schema);
+  names.of = schema;
   namesBySchema.set(schema, names);
   return names;
 }
 
-/** What the words and fields of some schemas are called, for values that are told without a schema of their own. */
+/** What the words and fields of some schemas are called, for values that are told without a schema of their own; a field
+ *  also by its name without the unit. */
 export function vocabularyOf(...schemas) {
   const words = new Map();
+  const stems = new Map();
   const walk = part => {
     if (!part || typeof part !== 'object') return;
     for (const [word, label] of Object.entries(part['x-labels'] || {})) if (!words.has(word)) words.set(word, capital(label));
+    for (const [name, field] of Object.entries(part.properties || {})) {
+      const short = field?.title && field['x-unit'] ? stem(name, field['x-unit']) : name;
+      if (short !== name && !stems.has(short)) stems.set(short, labelOf(name, field));
+    }
     Object.values(part).forEach(walk);
   };
   schemas.forEach(walk);
-  return new Map([...words, ...schemas.flatMap(schema => [...namesOf(schema)])]);
+  return new Map([...stems, ...words, ...schemas.flatMap(schema => [...namesOf(schema)])]);
 }
 
 /** As inside a sentence: abbreviations and single letters keep their capitals. */
 export const within = label => (/^.[^A-ZА-ЯЁ\s]/.test(label) && !/^\w+'s /.test(label) ? label.charAt(0).toLowerCase() + label.slice(1) : label);
 
-/** A sentence of the service with the labels of the form in place of the names of fields. */
-export const spoken = (text, names) => (text || '').replace(/`?\b[a-z][a-z0-9]*(?:_[a-z0-9]+)+\b`?/g, word => { const label = names?.get(word.replace(/`/g, '')); return label ? within(label) : word; });
+const wordsBySchema = new WeakMap();
+/** What the words of every choice of a schema are called, as inside a sentence. */
+function wordsIn(schema) {
+  if (wordsBySchema.has(schema)) return wordsBySchema.get(schema);
+  const words = new Map();
+  const walk = part => {
+    if (!part || typeof part !== 'object') return;
+    for (const [word, label] of Object.entries(part['x-labels'] || {})) if (!words.has(word)) words.set(word, label);
+    Object.values(part).forEach(walk);
+  };
+  walk(schema);
+  wordsBySchema.set(schema, words);
+  return words;
+}
+
+/** A sentence of the service with the labels of the form in place of the names of fields: of `feed_mm_per_rev`, and of
+ *  what stands as code between backticks, `models.further` or `detail: full`. Code that is none of them stays without
+ *  them. `names` are those of `namesOf`. */
+export function spoken(text, names) {
+  const words = names?.of && wordsIn(names.of);
+  const field = name => { const label = names?.get(name); return label && within(label); };
+  const name = code => field(code) ?? words?.get(code);
+  // Where nouns are declined a label stands as a quotation.
+  const quoted = label => (/[а-яё]/i.test(label) ? `«${label}»` : label);
+  const said = code => {
+    const [head, value, ...more] = code.split(': ');
+    if (value !== undefined && more.length === 0 && field(head)) return quoted(`${field(head)}: ${words?.get(value) ?? value}`);
+    const way = code.split('.');
+    return name(code) ? quoted(name(code)) : way.length > 1 && way.every(field) ? quoted(way.map(field).join(' · ')) : code;
+  };
+  return (text || '').replace(/`([^`]+)`/g, (_, code) => said(code)).replace(/\b[a-z][a-z0-9]*(?:_[a-z0-9]+)+\b/g, word => field(word) ?? word);
+}
 
 /** What a word of an enumeration is called. */
 export const wordOf = (schema, word) => capital(schema?.['x-labels']?.[word] || humanised(String(word)));

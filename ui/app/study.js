@@ -7,13 +7,15 @@ import { sentence } from './fields.js';
 import { Progress, Trouble } from './status.js';
 import { Picture } from './figure.js';
 import { Downloads, RequestView, Warnings, Sheet, usePictureHeight, short, capital } from './result.js';
-import { parts, namesOf } from './schema.js';
+import { parts, namesOf, spoken as labelled, within } from './schema.js';
 import { leavesOf, outputsOf, proposed, pointsOf } from './vary.js';
 
 const MOST_VARIED = 3;
 const ROWS_SHOWN = 100;
 /** Words of the address that belong to the study, not to the job. */
 const OWN = ['calculator', 'vary', 'combine', 'outputs', 'study', 'run'];
+/** What the words of a varied field are called on this page. */
+const OF_VARIED = new Map([['from', 'from'], ['to', 'to'], ['count', 'number_of_values'], ['values', 'value'], ['spacing', 'spacing']]);
 /** What the list of downloads wants to know of a calculator. */
 const DECLARED = { media_types: ['application/json', 'text/csv', 'image/svg+xml'] };
 
@@ -27,6 +29,8 @@ const written = query => query.toString().replace(/%2F/g, '/').replace(/%3A/g, '
 export function Study({ calculators, query, push, replace, refreshJobs }) {
   const [opened, setOpened] = useState(null);
   const [missing, setMissing] = useState(null);
+  // Counts the times that the service is asked anew.
+  const [asking, setAsking] = useState(0);
   // The address as this page wrote it: what it says is shown already.
   const own = useRef(null);
   const kept = query.get('study');
@@ -36,6 +40,7 @@ export function Study({ calculators, query, push, replace, refreshJobs }) {
   const spoken = language();
   useEffect(() => {
     let gone = false;
+    let stopWaiting = null;
     const isOwn = own.current === asked && opened;
     if (isOwn && opened.spoken === spoken) return undefined;
     (async () => {
@@ -53,10 +58,14 @@ export function Study({ calculators, query, push, replace, refreshJobs }) {
         own.current = asked;
         setOpened({ description, job, stored, part, spoken, query, serial: (opened?.serial ?? 0) + 1 });
         setMissing(null);
-      } catch (error) { if (!gone) setMissing(error); }
+      } catch (error) {
+        if (gone) return;
+        stopWaiting = api.whenBack(error, () => setAsking(count => count + 1));
+        if (!stopWaiting) setMissing(error);
+      }
     })();
-    return () => { gone = true; };
-  }, [asked, spoken]);
+    return () => { gone = true; stopWaiting?.(); };
+  }, [asked, spoken, asking]);
   const tell = next => { own.current = next; replace(next); };
   const choose = id => push(`calculator=${id}${lastQuery.get(id) ? `&${written(jobPart(new URLSearchParams(lastQuery.get(id))))}` : ''}`);
   if (missing) return html`<main class="plain" id="main" tabindex="-1"><h1>${missing.problem?.title || t('trouble_title')}</h1><p>${sentence(missing.problem?.detail || missing.message)}</p><p><a href="#/studies" onClick=${() => setMissing(null)}>${t('start_over')}</a></p></main>`;
@@ -81,6 +90,7 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
   const [pane, setPane] = useState('picture');
   const control = useRef(null);
   const stop = useRef(null);
+  const latest = useRef(null);
   useEffect(() => () => { control.current?.abort(); stop.current?.(); }, []);
   const body = { calculator: description.id, job, vary, ...(vary.length > 1 && { combine }), outputs: wished };
   const tell = extra => write(written(new URLSearchParams([['calculator', description.id], ...new URLSearchParams(part), ['vary', JSON.stringify(vary)], ...(vary.length > 1 ? [['combine', combine]] : []), ...(wished.join() === description.study_outputs.join() ? [] : [['outputs', JSON.stringify(wished)]]), ...extra])));
@@ -90,11 +100,13 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
     setPending(false);
     setRunning(null);
     if (error instanceof api.Refused) setProblem(error.problem);
-    else setProblem({ title: t('offline_title'), detail: error.message, code: 'offline' });
+    else if (error instanceof api.Unreachable) setProblem({ title: t('offline_title'), detail: t('offline_detail'), code: 'offline' });
+    else throw error;
   };
   const show = async (key, whole, asked, said = language()) => {
     const now = language();
-    const [result, figures] = await Promise.all([said === now && whole ? whole : api.result(key, control.current?.signal), api.figures(key, control.current?.signal)]);
+    const signal = control.current?.signal;
+    const [result, figures] = await Promise.all([said === now && whole ? whole : api.patient(() => api.result(key, signal), signal), api.patient(() => api.figures(key, signal), signal)]);
     if (now !== language()) { await show(key, null, asked); return; }
     setAnswer({ key, answer: result, figures, asked });
     setPending(false);
@@ -118,8 +130,7 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
       },
     });
   };
-  const start = async event => {
-    event?.preventDefault();
+  const start = async () => {
     control.current?.abort();
     stop.current?.();
     if (running) api.cancel(running.id).catch(() => {});
@@ -131,27 +142,46 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
     setPane('picture');
     const said = language();
     try {
-      const { answer: whole, job: record } = await api.solve('studies', body, { signal });
+      const { answer: whole, job: record } = await api.patient(() => api.solve('studies', body, { signal }), signal);
       if (signal.aborted) return;
       if (record) {
         try { sessionStorage.setItem(`precut-run-${record.id}`, JSON.stringify(body)); } catch { /* a reload then begins anew */ }
         tell([['run', record.id]]);
         watch(record, body);
       } else { await show(whole.key, whole, body, said); tell([['study', whole.key]]); }
-    } catch (error) { fail(error); }
+    } catch (error) {
+      fail(error);
+      if (error instanceof api.Unreachable) api.whenBack(error, () => { if (!signal.aborted) latest.current(); });
+    }
+  };
+  latest.current = start;
+  /** Computes the study: not before all of it can be read. */
+  const compute = event => {
+    event.preventDefault();
+    const first = document.querySelector('.study-form [data-unread]');
+    if (!first) { start(); return; }
+    setPane('form');
+    setTimeout(() => { first.scrollIntoView({ block: 'center' }); first.focus(); }, 30);
   };
   // A study of the address: kept, or on its way.
   useEffect(() => {
     control.current = new AbortController();
+    const { signal } = control.current;
     const [kept, run] = [query.get('study'), query.get('run')];
-    if (kept) { setPending(true); show(kept, null, stored).catch(fail); }
-    else if (run) {
+    const again = error => {
+      const waits = api.whenBack(error, () => { if (!signal.aborted) open(); });
+      if (!waits || !api.isBusy(error)) fail(error);
+    };
+    const open = () => {
+      if (!kept && !run) return;
       setPending(true);
+      if (kept) { show(kept, null, stored).catch(again); return; }
       api.job(run).then(record => {
         if (['queued', 'running', 'succeeded'].includes(record.state)) watch(record, stored);
         else { setPending(false); setProblem(record.problem || { title: t(`state_${record.state}`), code: record.state }); }
-      }, fail);
-    }
+      }, again);
+    };
+    open();
   }, []);
   // The words of the service in another language.
   const spoken = useRef(language());
@@ -162,7 +192,15 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
     else if (answer) show(answer.key, null, answer.asked).catch(fail);
   }, [language()]);
 
-  const faults = problem?.errors || [];
+  const names = useMemo(() => new Map([...namesOf(description.input_schema), ...[['job', 'inputs'], ['vary', 'field'], ['outputs', 'read_off'], ...OF_VARIED].map(([name, code]) => [name, t(code)])]), [description, language()]);
+  // The service names what is varied by the names of the contract.
+  const named = fault => {
+    const index = /^\/vary\/(\d+)/.exec(fault.pointer)?.[1];
+    const leaf = index !== undefined && leaves.find(one => one.pointer === vary[index]?.pointer);
+    const detail = fault.detail.replace(/^(\w+)(?:\.\d+)?(?= (?:=|is) )/, (word, name) => (name === 'vary' && leaf ? within(leaf.label.split(' · ').at(-1)) : OF_VARIED.has(name) ? within(t(OF_VARIED.get(name))) : word));
+    return { ...fault, detail: labelled(detail, names) };
+  };
+  const faults = (problem?.errors || []).map(named);
   const below = place => faults.filter(fault => fault.pointer === place || fault.pointer?.startsWith(`${place}/`));
   const points = pointsOf(vary, combine);
   const go = place => {
@@ -173,11 +211,11 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
   // A kept study has no page of its job, but its points have.
   const ofPoint = answer?.answer.result.rows.find(({ status }) => status === 'succeeded')?.key;
   const page = !stored ? `#/${description.id}${part ? `?${part}` : ''}` : ofPoint && `#/${description.id}?result=${ofPoint}`;
-  const trouble = problem && html`<${Trouble} problem=${problem} names=${namesOf(description.input_schema)} over=${Boolean(answer)} onGo=${go} />`;
+  const trouble = problem && html`<${Trouble} problem=${problem.errors ? { ...problem, errors: faults } : problem} names=${names} over=${Boolean(answer)} onGo=${go} />`;
   return html`
     <main class="room" data-pane=${pane} id="main" tabindex="-1">
       <div class="pane-switch" role="group" aria-label=${t('panes')}>
-        <button type="button" aria-pressed=${pane === 'form'} onClick=${() => setPane('form')}>${t('inputs')}${faults.length > 0 && html` <span class="badge">${faults.length}</span>`}</button>
+        <button type="button" aria-pressed=${pane === 'form'} onClick=${() => setPane('form')}>${t('inputs')}${faults.length > 0 && html` <span class="badge">${faults.length}<span class="hidden"> ${t('faults_here')}</span></span>`}</button>
         <button type="button" aria-pressed=${pane === 'picture'} onClick=${() => setPane('picture')}>${t('result')}</button>
       </div>
       <section class="form-pane" aria-label=${t('inputs')}>
@@ -185,9 +223,9 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
         <div class="form-head">
           <label for="study-calculator">${t('calculator')}</label>
           <select id="study-calculator" value=${description.id} onChange=${event => choose(event.currentTarget.value)}>${calculators.map(({ id, title }) => html`<option value=${id}>${title}</option>`)}</select>
-          <button type="button" id="run-study" class="primary" onClick=${start} disabled=${vary.length === 0} title="Ctrl+Enter">${t('run')}</button>
+          <button type="button" id="run-study" class="primary" onClick=${compute} disabled=${vary.length === 0} title="Ctrl+Enter">${t('run')}</button>
         </div>
-        <form class="form study-form" onSubmit=${start} novalidate aria-label=${t('inputs')}>
+        <form class="form study-form" onSubmit=${compute} novalidate aria-label=${t('inputs')}>
           <div class="sections">
             <section class="fold open"><div class="fold-body study-part">
               <p>${stored ? t('job_of_study') : t('job_of_page')} ${page && html`<a href=${page}>${t('change_job')}</a>`}</p>
@@ -223,21 +261,36 @@ function Varied({ index, variable, leaves, taken, faults, set, remove }) {
   const leaf = leaves.find(one => one.pointer === variable.pointer);
   const isList = Boolean(variable.values);
   const [draft, setDraft] = useState({});
+  useEffect(() => setDraft({}), [variable.pointer]);
   const groups = [...new Set(leaves.map(({ group }) => group))];
   const pick = place => { setDraft({}); set(proposed(leaves.filter(one => one.pointer === place))[0].range); };
   const take = (name, text) => {
     setDraft({ ...draft, [name]: text });
-    const value = parsed(text);
-    if (value !== null && !Number.isNaN(value)) set({ ...variable, [name]: value });
+    if (faultOf(name, text) === null) set({ ...variable, [name]: parsed(text) });
+  };
+  const listed = text => {
+    const words = text.split(leaf?.kind === 'number' ? /[;\s]+/ : /[;,\s]+/).filter(Boolean);
+    return leaf?.kind === 'number' ? words.map(parsed) : leaf?.kind === 'boolean' ? words.map(word => word === 'true') : words;
+  };
+  const faultOf = (name, text) => {
+    const values = name === 'values' ? listed(text) : [parsed(text)].filter(value => value !== null);
+    if (values.length === 0) return 'needed';
+    return values.some(Number.isNaN) ? 'not_a_number' : null;
   };
   const takeList = text => {
     setDraft({ ...draft, values: text });
-    const words = text.split(leaf?.kind === 'number' ? /[;\s]+/ : /[;,\s]+/).filter(Boolean);
-    const values = leaf?.kind === 'number' ? words.map(parsed) : leaf?.kind === 'boolean' ? words.map(word => word === 'true') : words;
-    if (values.length > 0 && !values.some(Number.isNaN)) set({ pointer: variable.pointer, values });
+    if (faultOf('values', text) === null) set({ pointer: variable.pointer, values: listed(text) });
   };
   const id = name => `vary-${index}-${name}`;
-  const field = (name, label) => html`<label class="study-field">${label}<input id=${id(name)} type="text" inputmode="decimal" autocomplete="off" value=${draft[name] ?? typed(variable[name])} aria-invalid=${faults.some(({ pointer: place }) => place.endsWith(`/${name}`)) ? 'true' : undefined} onInput=${event => take(name, event.currentTarget.value)} onBlur=${() => setDraft({})} /></label>`;
+  // A draft that is no value stays, and says so.
+  const unread = Object.keys(draft).map(name => [name, faultOf(name, draft[name])]).filter(([, fault]) => fault !== null);
+  const leave = name => { if (!unread.some(([other]) => other === name)) setDraft(({ [name]: done, ...others }) => others); };
+  const about = name => {
+    const isUnread = unread.some(([other]) => other === name);
+    const isRefused = faults.some(({ pointer: place }) => place.split('/')[3] === name);
+    return { 'aria-invalid': isUnread || isRefused ? 'true' : undefined, 'aria-describedby': isUnread ? id(`${name}-fault`) : undefined, 'data-unread': isUnread ? '' : undefined, onBlur: () => leave(name) };
+  };
+  const field = (name, label) => html`<label class="study-field">${label}<input id=${id(name)} type="text" inputmode="decimal" autocomplete="off" value=${draft[name] ?? typed(variable[name])} ...${about(name)} onInput=${event => take(name, event.currentTarget.value)} /></label>`;
   const range = { pointer: variable.pointer, from: leaf?.range?.from ?? 0, to: leaf?.range?.to ?? 1, count: 5 };
   return html`
     <fieldset class="item varied">
@@ -249,10 +302,11 @@ function Varied({ index, variable, leaves, taken, faults, set, remove }) {
       ${leaf?.kind === 'number' && html`<div class="study-way" role="group" aria-label=${t('values_of', { name: leaf.label })}>
         <label><input type="radio" name=${id('way')} checked=${!isList} onChange=${() => { setDraft({}); set(range); }} /> ${t('a_range')}</label>
         <label><input type="radio" name=${id('way')} checked=${isList} onChange=${() => { setDraft({}); set({ pointer: variable.pointer, values: valuesOf(variable) }); }} /> ${t('a_list')}</label></div>`}
-      ${isList ? html`<input id=${id('values')} type="text" aria-label=${t('values_of', { name: leaf?.label || variable.pointer })} placeholder=${t('numbers_hint')} value=${draft.values ?? variable.values.map(value => (typeof value === 'number' ? typed(value) : String(value))).join('; ')} onInput=${event => takeList(event.currentTarget.value)} onBlur=${() => setDraft({})} />`
+      ${isList ? html`<input id=${id('values')} type="text" aria-label=${t('values_of', { name: leaf?.label || variable.pointer })} placeholder=${t('numbers_hint')} value=${draft.values ?? variable.values.map(value => (typeof value === 'number' ? typed(value) : String(value))).join('; ')} ...${about('values')} onInput=${event => takeList(event.currentTarget.value)} />`
         : html`<div class="study-range">${field('from', t('from'))}${field('to', t('to'))}${field('count', t('how_many'))}
           <label class="study-field">${t('spacing')}<select id=${id('spacing')} value=${variable.spacing || 'linear'} onChange=${event => set({ ...variable, spacing: event.currentTarget.value })}><option value="linear">${t('spacing_linear')}</option><option value="log">${t('spacing_log')}</option></select></label></div>`}
       ${leaf && html`<p class="quiet study-now">${t('value_now')} ${typeof leaf.value === 'number' ? number(leaf.value, 6) : leaf.value === undefined ? t('not_set') : String(leaf.value)} ${leaf.unit}</p>`}
+      ${unread.map(([name, fault]) => html`<p class="fault" key=${name} id=${id(`${name}-fault`)}><span>${name === 'values' ? '' : `${t(OF_VARIED.get(name))}: `}${t(fault)}</span></p>`)}
       ${faults.map(({ detail }) => html`<p class="fault" role="alert"><span>${capital(detail)}</span></p>`)}
     </fieldset>`;
 }
@@ -284,7 +338,7 @@ function Findings({ answer, interim, leaves, outputs, description, stale }) {
           ${figure && !isEmpty ? html`<${Picture} key=${figure.id} figure=${figure} height=${height} onPick=${pick} main />` : html`<p class="quiet">${t('no_figure')}</p>`}
           <div class="under">${(interim || stale) && html`<p class="stale-note" role="status">${interim ? t('so_far') : t('stale_note')}</p>`}</div>
           ${pick && !isEmpty && picked === null && html`<p class="quiet hint">${t('click_for_row')}</p>`}
-          ${result && picked !== null && html`<${Point} result=${result} index=${picked} calculator=${calculator} />`}
+          ${result && picked !== null && html`<${Point} result=${result} index=${picked} calculator=${calculator} names=${namesOf(description.input_schema)} />`}
         </div>
         ${result && html`<div class="words">
           ${first && html`<p class="verdict" aria-live="polite">${capital(first.text)}</p>`}
@@ -294,7 +348,7 @@ function Findings({ answer, interim, leaves, outputs, description, stale }) {
       </div>
       ${result && html`
         <div class="bar"><span class="quiet">${plural('points', result.points)}${result.failed > 0 ? `, ${t('without_answer', { count: result.failed })}` : ''}</span><${Downloads} id="studies" description=${DECLARED} answer=${answer} figure=${figure} /></div>
-        <${Rows} ...${{ result, leaves, outputs, calculator, picked }} />
+        <${Rows} ...${{ result, leaves, outputs, calculator, picked }} names=${namesOf(description.input_schema)} />
         ${answer.asked && html`<details class="tabs request"><summary>${t('tab_request')}</summary><div><${RequestView} id="studies" job=${answer.asked} answer=${answer} link=${`#/studies?study=${answer.key}`} /></div></details>`}
         <${Sheet} description=${description} body=${answer.answer} job=${answer.answer.input.job} />`}
     </div>`;
@@ -309,14 +363,14 @@ const nearestRow = ({ variables, rows }, x, y) => {
   return rows.findIndex(({ values }) => values[0] === a && values[1] === b);
 };
 
-function Point({ result, index, calculator }) {
+function Point({ result, index, calculator, names }) {
   const row = result.rows[index];
   if (!row) return null;
-  return html`<p class="hint" role="status">${t('row')} ${index + 1}: ${row.values.map(shownSetting).join('; ')} → ${row.status === 'succeeded' ? row.outputs.map(value => number(value, 5)).join('; ') : capital(row.detail || row.code)} ${row.key && row.status === 'succeeded' && html`<a href=${`#/${calculator}?result=${row.key}`}>${t('open_point')}</a>`}</p>`;
+  return html`<p class="hint" role="status">${t('row')} ${index + 1}: ${row.values.map(shownSetting).join('; ')} → ${row.status === 'succeeded' ? row.outputs.map(value => number(value, 5)).join('; ') : capital(labelled(row.detail, names) || t(WHY[row.status]))} ${row.key && row.status === 'succeeded' && html`<a href=${`#/${calculator}?result=${row.key}`}>${t('open_point')}</a>`}</p>`;
 }
 
 /** One row per point; what has no answer says why. */
-function Rows({ result, leaves, outputs, calculator, picked }) {
+function Rows({ result, leaves, outputs, calculator, picked, names }) {
   const [shown, setShown] = useState(ROWS_SHOWN);
   const { variables, outputs: read_, rows } = result;
   const named = (list, place) => list.find(one => one.pointer === place)?.label || capital(parts(place).join(' ').replace(/_/g, ' '));
@@ -324,7 +378,7 @@ function Rows({ result, leaves, outputs, calculator, picked }) {
     <div class="grid-scroll tall tabs" tabindex="0" role="region" aria-label=${t('table')}><table class="grid still study-rows">
       <thead><tr>${variables.map(({ pointer: place, unit }) => html`<th scope="col">${named(leaves, place)} <span class="unit">${unitSymbol(unit)}</span></th>`)}${read_.map(({ pointer: place, unit }) => html`<th scope="col">${named(outputs, place)} <span class="unit">${unitSymbol(unit)}</span></th>`)}<th><span class="hidden">${t('actions')}</span></th></tr></thead>
       <tbody>${rows.slice(0, shown).map((row, index) => html`<tr key=${index} class=${index === picked ? 'picked' : ''}>${row.values.map(value => html`<td>${shownSetting(value)}</td>`)}
-        ${row.status === 'succeeded' ? row.outputs.map(value => html`<td>${value === null ? '' : number(value, 5)}</td>`) : html`<td class="word reason" colspan=${read_.length}><span class="state failed">${t(WHY[row.status])}</span> ${capital(row.detail || row.code || '')}</td>`}
+        ${row.status === 'succeeded' ? row.outputs.map(value => html`<td>${value === null ? '' : number(value, 5)}</td>`) : html`<td class="word reason" colspan=${read_.length}><span class="state failed">${t(WHY[row.status])}</span> ${capital(labelled(row.detail, names))}</td>`}
         <td>${row.key && row.status === 'succeeded' ? html`<a href=${`#/${calculator}?result=${row.key}`}>${t('open_point')}<span class="hidden"> ${index + 1}</span></a>` : ''}</td></tr>`)}</tbody>
     </table></div>
     ${rows.length > shown && html`<button type="button" class="more" onClick=${() => setShown(shown + 1000)}>${t('more_rows', { count: rows.length - shown })}</button>`}`;

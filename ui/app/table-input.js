@@ -2,7 +2,7 @@
 // shown for confirmation. What is sent is CSV with the headers that the service knows: the service converts units.
 import { html, useState, useRef, useMemo, unique } from './lib.js';
 import { t, plural, number, unitSymbol, unitOf } from './text.js';
-import { resolve, labelOf, spoken } from './schema.js';
+import { resolve, kindOf, labelOf, wordOf, spoken } from './schema.js';
 
 /** Units of one dimension: the service converts between them. */
 const DIMENSIONS = [
@@ -169,10 +169,15 @@ function Preview({ rows, columns, label }) {
   const [all, setAll] = useState(false);
   const used = columns.filter(({ name }) => rows.some(row => row[name] !== undefined && row[name] !== null));
   const shown = all ? rows.slice(0, 500) : rows.slice(0, 4);
+  const cell = (value, schema) => {
+    if (typeof value === 'number') return number(value);
+    if (typeof value === 'boolean') return value ? t('yes') : t('no');
+    return typeof value === 'string' && kindOf(schema) === 'enum' ? wordOf(schema, value) : value ?? '';
+  };
   return html`
     <div class="grid-scroll" tabindex="0" role="region" aria-label=${label}><table class="grid still">
       <thead><tr>${used.map(({ name, schema }) => html`<th scope="col" title=${schema.description}>${labelOf(name, schema)} <span class="unit">${unitOf(schema)}</span></th>`)}</tr></thead>
-      <tbody>${shown.map((row, index) => html`<tr key=${index}>${used.map(({ name }) => html`<td>${typeof row[name] === 'number' ? number(row[name]) : row[name] === true ? t('yes') : row[name] ?? ''}</td>`)}</tr>`)}</tbody>
+      <tbody>${shown.map((row, index) => html`<tr key=${index}>${used.map(({ name, schema }) => html`<td>${cell(row[name], schema)}</td>`)}</tr>`)}</tbody>
     </table></div>
     ${rows.length > shown.length && html`<button type="button" class="more" onClick=${() => setAll(true)}>${t('show_all', { count: Math.min(rows.length, 500) })}</button>`}`;
 }

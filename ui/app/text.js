@@ -91,7 +91,7 @@ export const moment = text => new Date(text).toLocaleString(current, { dateStyle
 const SYMBOLS = { um: 'µm', us: 'µs', urad: 'µrad', deg: '°' };
 const RUSSIAN = {
   mm: 'мм', um: 'мкм', m: 'м', N: 'Н', kN: 'кН', W: 'Вт', kW: 'кВт', s: 'с', ms: 'мс', us: 'мкс', min: 'мин', h: 'ч', rpm: 'об/мин',
-  rev: 'об', tooth: 'зуб', kg: 'кг', Hz: 'Гц', rad: 'рад', urad: 'мкрад', K: 'К', mK: 'мК', km: 'км', MPa: 'МПа', GPa: 'ГПа', g: 'г', J: 'Дж',
+  rev: 'об', tooth: 'зуб', kg: 'кг', Hz: 'Гц', rad: 'рад', urad: 'мкрад', K: 'К', mK: 'мК', km: 'км', MPa: 'МПа', GPa: 'ГПа', g: 'г', J: 'Дж', money: 'ден.\u00a0ед.',
 };
 
 /** The symbol of a unit of the contract: `um/N` becomes `µm/N` or `мкм/Н`, `N/mm2` becomes `N/mm²`. */
