@@ -346,11 +346,13 @@ fn scaled_evidence(
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
     use super::super::data::Layout;
     use super::super::noise::{Noise, NoiseSource};
     use super::super::whiten::Whitener;
     use super::*;
-    use crate::calculator::{Design, Grouping};
+    use crate::calculator::{Design, Grouping, Message, Unwatched};
 
     const RUNS: usize = 4;
     const ROWS: usize = 13 * RUNS;
@@ -391,6 +393,35 @@ mod tests {
         Likelihood::Gaussian { whitener: Whitener::new(data, &noise, &nuisances, keep), scale: Scale::SameRows }
     }
 
+    /// Cancels at a look.
+    struct CancelAt {
+        looks: AtomicUsize,
+        at: usize,
+    }
+
+    impl Monitor for CancelAt {
+        fn cancelled(&self) -> bool {
+            self.looks.fetch_add(1, Ordering::Relaxed) >= self.at
+        }
+
+        fn progress(&self, _fraction: f64, _stage: Message) {}
+    }
+
+    #[test]
+    fn every_size_is_preceded_by_a_look() {
+        let data = data();
+        let likelihood = likelihood(&data, 0.3, &[true; ROWS]);
+        let kinds = kinds(&data, &likelihood, 0.3, &Unwatched).unwrap();
+        let sizes: usize = kinds.iter().map(|kind| kind.spreads.len() * SIZES.len()).sum();
+        let residual = likelihood.white(&data.value);
+        for at in [0, sizes - 1, sizes] {
+            let monitor = CancelAt { looks: AtomicUsize::new(0), at };
+            let found = beside(&kinds, &[], &residual, &[], &likelihood, &monitor);
+            assert_eq!(found.is_ok_and(|remainder| remainder.is_some()), at == sizes, "{at} of {sizes}");
+            assert_eq!(monitor.looks.into_inner(), sizes.min(at + 1));
+        }
+    }
+
     #[test]
     fn block_by_block_is_what_it_is_as_a_whole() {
         let data = data();
@@ -404,7 +435,7 @@ mod tests {
             let (causes, residual) = ([white(0.05), white(0.4)], likelihood.white(&data.value));
             let (causes, sides) = (causes.iter().collect::<Vec<_>>(), [Side::Positive, Side::Both]);
             let own = Normal::of(&causes, &residual);
-            let kinds = kinds(&data, &likelihood, 0.3, &crate::calculator::Unwatched).unwrap();
+            let kinds = kinds(&data, &likelihood, 0.3, &Unwatched).unwrap();
             let apart: Vec<&Kind> = kinds.iter().filter(|kind| matches!(kind.form, Form::Blocks(_))).collect();
             // Levels of rows that a correlation ties together are one block.
             assert_eq!(apart.len(), if rho > 0.0 { 1 } else { 2 });
