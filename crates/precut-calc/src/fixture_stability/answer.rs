@@ -791,14 +791,22 @@ fn better_speeds(study: &Study<'_>, limits: &[SpeedLimit], most_mm: f64) -> Resu
 /// What is to be said of a better speed, tried before it is said: not near chatter or an opening joint, within the other
 /// limits, as it is read. `None` where the cut then does not hold still after all (a large motion may stand beside the
 /// stable one, and the entry asks more of a joint than the steady cut).
-fn tried(study: &Study<'_>, limit: &SpeedLimit, most_mm: f64) -> Result<Option<Better>, Failure> {
+fn tried(study: &Study<'_>, better: &SpeedLimit, most_mm: f64) -> Result<Option<Better>, Failure> {
     let case = &study.case;
+    // The peaks of lobes are sharp: the limits are those of the speed that is read.
+    let spindle_rpm = said(better.spindle_speed_rpm, 4, f64::round);
+    let there = Working { spindle_rpm, ..case.working };
+    let chatter_mm = critical_depth(&study.rules, &case.holding, &case.cutting, there, most_mm)?;
+    let limit = study.speed_limit(spindle_rpm, chatter_mm, most_mm)?;
     let short_of = [limit.chatter_mm, limit.movable_opens_mm, limit.fixed_opens_mm];
     let depths = short_of.into_iter().flatten().map(|depth| NEAR_LIMIT * depth);
     let within = [limit.amplitude_mm, limit.drive_mm].into_iter().flatten().map(|depth| WITHIN * depth);
-    let depth_mm = said(depths.chain(within).fold(most_mm, f64::min), 3, f64::floor);
-    let spindle_rpm = said(limit.spindle_speed_rpm, 4, f64::round);
-    let working = Working { spindle_rpm, depth_mm, ..case.working };
+    let allowed_mm = depths.chain(within).fold(most_mm, f64::min);
+    if allowed_mm <= 0.0 {
+        return Ok(None);
+    }
+    let depth_mm = said(allowed_mm, 3, f64::floor);
+    let working = Working { depth_mm, ..there };
     let modulus = point(&study.rules, &case.holding, &case.cutting, working, Closed::BOTH)?.multiplier.modulus;
     if modulus >= 1.0 || forced_span_mm(case, working).map_or(true, |span_mm| span_mm > working.feed_mm) {
         return Ok(None);
@@ -811,7 +819,7 @@ fn tried(study: &Study<'_>, limit: &SpeedLimit, most_mm: f64) -> Result<Option<B
     if run.diverged || opened || run.lost_cut > 0.0 || !scatter(case, &plan, &run).1 {
         return Ok(None);
     }
-    let drive = study.drive_depths(limit.spindle_speed_rpm);
+    let drive = study.drive_depths(spindle_rpm);
     let first = first_of([
         (FirstLimit::Chatter, limit.chatter_mm),
         (FirstLimit::MovableOpens, limit.movable_opens_mm),
