@@ -14,7 +14,7 @@ use super::whiten::{White, Whitener};
 
 /// Free columns block by block.
 pub(super) struct Blocks {
-    blocks: Vec<Block>,
+    each: Vec<Block>,
     /// Allowances that act on several blocks.
     shared: Vec<Sparse>,
     /// ln |I + N'N|.
@@ -51,14 +51,13 @@ impl Blocks {
                 None => shared.push(nuisance.clone()),
             }
         }
-        let blocks =
-            members.into_iter().zip(alone).filter(|(columns, _)| !columns.is_empty()).map(|(columns, alone)| {
-                let own: Vec<Sparse> = columns.iter().map(|&index| &own[index]).chain(alone).cloned().collect();
-                let gram = DMatrix::from_fn(own.len(), own.len(), |i, j| own[i].inner(&own[j]));
-                Block { columns, own, gram }
-            });
-        let blocks = blocks.collect();
-        Some(Self { blocks, shared, log_det_allowances, columns: columns.len(), rows: whitener.rows() })
+        let each = members.into_iter().zip(alone).filter(|(columns, _)| !columns.is_empty()).map(|(columns, alone)| {
+            let own: Vec<Sparse> = columns.iter().map(|&index| &own[index]).chain(alone).cloned().collect();
+            let gram = DMatrix::from_fn(own.len(), own.len(), |i, j| own[i].inner(&own[j]));
+            Block { columns, own, gram }
+        });
+        let each = each.collect();
+        Some(Self { each, shared, log_det_allowances, columns: columns.len(), rows: whitener.rows() })
     }
 
     /// With causes that explain a residual.
@@ -86,7 +85,7 @@ impl Blocks {
         Beside {
             blocks: self,
             causes: count,
-            of_blocks: self.blocks.iter().map(of_block).collect(),
+            of_blocks: self.each.iter().map(of_block).collect(),
             gram,
             right: DVector::from_fn(border, |i, _| along(i)),
             square: dot(residual, residual),
@@ -180,7 +179,7 @@ impl Beside<'_> {
         let log_det = log_det_blocks + log_det(&border) - self.blocks.log_det_allowances;
         let mut t: Vec<f64> = of_border.iter().copied().take(self.causes).collect();
         t.resize(self.causes + self.blocks.columns, 0.0);
-        for (block, FactoredBlock { own, coupled, half }) in self.blocks.blocks.iter().zip(&of_blocks) {
+        for (block, FactoredBlock { own, coupled, half }) in self.blocks.each.iter().zip(&of_blocks) {
             let sizes = own.l_dirty().tr_solve_lower_triangular(&(half - coupled * &of_border))?;
             block.columns.iter().zip(&sizes).for_each(|(&column, size)| t[self.causes + column] = *size);
         }
@@ -193,7 +192,7 @@ impl Beside<'_> {
         let factored = self.factored(scales)?;
         let of_row = |row: usize| {
             let (mut square, mut on_border) = (0.0, DVector::zeros(self.gram.nrows()));
-            for (block, FactoredBlock { own, coupled, .. }) in self.blocks.blocks.iter().zip(&factored.of_blocks) {
+            for (block, FactoredBlock { own, coupled, .. }) in self.blocks.each.iter().zip(&factored.of_blocks) {
                 let of =
                     |i: usize| block.columns.get(i).map_or(0.0, |&column| columns[column].at(row) * scales[column]);
                 let along = DVector::from_fn(block.own.len(), |i, _| of(i));
@@ -214,7 +213,7 @@ impl Beside<'_> {
         (0..border.nrows()).for_each(|i| border[(i, i)] += 1.0);
         let mut right = self.right.clone();
         let mut of_blocks = Vec::with_capacity(self.of_blocks.len());
-        for (block, products) in self.blocks.blocks.iter().zip(&self.of_blocks) {
+        for (block, products) in self.blocks.each.iter().zip(&self.of_blocks) {
             // Allowances have their scale.
             let scale = |i: usize| block.columns.get(i).map_or(1.0, |&column| scales[column]);
             let count = block.own.len();

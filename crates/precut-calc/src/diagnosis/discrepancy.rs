@@ -128,7 +128,9 @@ fn runs(data: &Data) -> Vec<Vec<usize>> {
         runs[run].extend_from_slice(rows);
     }
     runs.retain(|rows| !rows.is_empty());
-    runs.iter_mut().for_each(|rows| rows.sort_unstable());
+    for rows in &mut runs {
+        rows.sort_unstable();
+    }
     runs
 }
 
@@ -357,6 +359,9 @@ mod tests {
     const RUNS: usize = 4;
     const ROWS: usize = 13 * RUNS;
 
+    /// Whether a row counts.
+    type Kept = fn(usize) -> bool;
+
     fn wave(row: usize, frequency: f64) -> f64 {
         (frequency * row as f64 + 0.3).sin()
     }
@@ -426,7 +431,7 @@ mod tests {
     fn block_by_block_is_what_it_is_as_a_whole() {
         let data = data();
         // One row is left out, and in the second case a whole run.
-        let cases: [(f64, fn(usize) -> bool); 2] = [(0.3, |row| row != 7), (0.0, |row| row % RUNS != 2)];
+        let cases: [(f64, Kept); 2] = [(0.3, |row| row != 7), (0.0, |row| row % RUNS != 2)];
         for (rho, keep) in cases {
             let keep: Vec<bool> = (0..ROWS).map(keep).collect();
             let likelihood = likelihood(&data, rho, &keep);

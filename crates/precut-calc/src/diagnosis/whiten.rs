@@ -68,7 +68,9 @@ impl Whitener {
         let mut starts = Vec::with_capacity(traces.len());
         let mut rows = 0;
         for (trace, of_trace) in traces.iter().enumerate() {
-            of_trace.iter().for_each(|&row| trace_of[row] = Some(trace));
+            for &row in of_trace {
+                trace_of[row] = Some(trace);
+            }
             starts.push(rows);
             rows += of_trace.len();
         }

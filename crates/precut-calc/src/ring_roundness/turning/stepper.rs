@@ -259,13 +259,11 @@ impl<'a, M: Machine> Stepper<'a, M> {
 
     /// Takes up to `L` steps; how many.
     fn block<const L: usize>(&mut self, log: &mut Log) -> Result<usize, Stuck> {
-        Ok(match self.solve::<L>() {
-            Ok(solved) => self.advance(&solved, log),
-            Err(_) => {
-                let solved = self.climb()?;
-                self.advance(&solved, log)
-            }
-        })
+        if let Ok(solved) = self.solve::<L>() {
+            return Ok(self.advance(&solved, log));
+        }
+        let solved = self.climb()?;
+        Ok(self.advance(&solved, log))
     }
 
     fn advance<const L: usize>(&mut self, solved: &Solved<L>, log: &mut Log) -> usize {
