@@ -57,6 +57,27 @@ fn every_word_of_the_page_exists_in_both_languages_and_is_used() {
     }
 }
 
+/// The shown answer, asked for in another language, comes after what was typed meanwhile has been refused.
+#[test]
+fn words_that_come_late_hide_no_fault() {
+    let Some((_turn, mut page, service)) = both() else { return };
+    page.open(&service.page("deflection-compensation"));
+    page.until(SETTLED);
+    page.evaluate(
+        "(() => { const real = fetch; const gate = new Promise(open => { window.openGate = open; }); \
+        window.fetch = async (path, ...rest) => { const answer = await real(path, ...rest); \
+        if (String(path).includes('/v1/results/')) await gate; return answer; }; })()",
+    );
+    page.click_on("RU");
+    page.until("document.documentElement.lang === 'ru'");
+    page.fill("#field-cut-feed_mm_per_rev", "900");
+    page.wait_for(".problem[role=alert]");
+    page.evaluate("openGate()");
+    page.until("/[а-я]/.test(document.querySelector('.verdict').textContent)");
+    page.wait_for(".problem[role=alert]");
+    page.assert_calm();
+}
+
 #[test]
 fn the_page_speaks_russian_and_english() {
     let Some((_turn, mut page, service)) = both() else { return };

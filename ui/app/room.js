@@ -101,17 +101,25 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
     if (alive.current && current) tell(current.job, shown?.job === current.job ? shown.key : null, run?.id, 'push');
   }, HISTORY_PAUSE_MS), [tell]);
 
-  // `said` is the language in which a body was asked for: by now it may be another one.
-  const show = async (key, body, job, signal, said = language()) => {
+  /** A kept answer with its figures, in the language of now; `said` is the one in which a body was asked for. */
+  const worded = async (key, body, signal, said = language()) => {
     const asked = language();
     const [whole, figures] = await Promise.all([said === asked && body ? body : api.patient(() => api.result(key, signal), signal), api.patient(() => api.figures(key, signal), signal)]);
     if (signal?.aborted || !alive.current) return undefined;
-    if (asked !== language()) return show(key, null, job, signal);
-    setAnswer({ key, answer: whole, figures, job, language: asked });
+    return asked === language() ? { answer: whole, figures, language: asked } : worded(key, null, signal);
+  };
+  const show = async (key, body, job, signal, said) => {
+    const found = await worded(key, body, signal, said);
+    if (!found) return;
+    setAnswer({ key, job, ...found });
     setProblem(null);
     setPending(false);
     setWaiting(false);
-    return undefined;
+  };
+  /** Says the answer that is shown in another language. What was asked or refused meanwhile stays as it is. */
+  const reword = async key => {
+    const found = await worded(key);
+    if (found) setAnswer(old => (old?.key === key ? { ...old, ...found } : old));
   };
 
   const watch = useCallback((record, job) => {
@@ -211,8 +219,7 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
         // What a job is doing is told from now on in this language.
         if (now.current.running && now.current.running.language !== spoken) watch(now.current.running, now.current.state.job);
         if (now.current.answer && now.current.answer.language !== spoken) {
-          const { key, job } = now.current.answer;
-          await show(key, null, job);
+          await reword(now.current.answer.key);
           if (now.current.pinned) setPinned(await pinOf(now.current.pinned.key));
         }
       } catch (error) {
