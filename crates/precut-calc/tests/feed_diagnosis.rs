@@ -120,6 +120,47 @@ fn an_open_case_with_a_chatter_island_is_unknown() {
     assert_eq!(result.remainder.unwrap().kind, "speed_and_depth");
 }
 
+/// Rows that lie above the base by what the allowance of its level explains: the lack of fit is that of C = s^2 I + a^2 11', whose
+/// inverse is written down here.
+#[test]
+fn what_an_allowance_explains_is_no_lack_of_fit() {
+    const REPEATS: f64 = 3.0;
+    let (level, allowed) = (0.05, 0.06);
+    let (mut rows, mut residuals) = (Vec::new(), Vec::new());
+    for (i, (speed, feed)) in
+        [(80.0, 0.1), (100.0, 0.2), (120.0, 0.15), (140.0, 0.3), (160.0, 0.12), (180.0, 0.25)].into_iter().enumerate()
+    {
+        let of_repeats = [0.0, 1.0, 2.0].map(|j: f64| level + 0.004 * (7.0 * i as f64 + 3.0 * j).sin());
+        for residual in of_repeats {
+            let ln = 1.5 + 0.8_f64 * f64::ln(feed) + residual;
+            rows.push(
+                json!({ "speed_m_per_min": speed, "feed_mm_per_rev": feed, "depth_mm": 0.5, "roughness_um": ln.exp() }),
+            );
+        }
+        residuals.push(of_repeats);
+    }
+    let request = json!({
+        "calculator": "feed-schedule",
+        "job": { "models": { "roughness": { "form": "log_log", "constant": 1.5, "feed_exponent": 0.8 } } },
+        "quantity": "roughness_um", "measurements": rows, "allowances": { "level_rel": allowed }
+    });
+    let result = answered(&request).unwrap().output;
+    assert_eq!((result.verdict, result.noise.source.as_str()), (VerdictClass::Adequate, "repeats"));
+    let means: Vec<f64> = residuals.iter().map(|of| of.iter().sum::<f64>() / REPEATS).collect();
+    let within: f64 =
+        residuals.iter().zip(&means).flat_map(|(of, mean)| of.iter().map(move |r| (r - mean).powi(2))).sum();
+    let (conditions, n) = (means.len() as f64, REPEATS * means.len() as f64);
+    let variance = within / (n - conditions);
+    let (sum, squares) =
+        means.iter().fold((0.0, 0.0), |(sum, squares), m| (sum + REPEATS * m, squares + REPEATS * m * m));
+    let explained = allowed * allowed * sum * sum / (variance + n * allowed * allowed);
+    let want = (squares - explained) / conditions / variance;
+    let test = result.tests.iter().find(|test| test.test == "lack_of_fit").unwrap();
+    // exp and ln of the rows round to 1e-15 of residuals whose scatter is 1e-3.
+    assert!((test.statistic / want - 1.0).abs() < 1e-9, "{} {want}", test.statistic);
+    assert!(!test.rejects && squares / conditions / variance > 100.0, "{test:?}");
+}
+
 /// Every case asks of the catalogue what it has, and every entry of it answers: fitted, or why not.
 #[test]
 fn every_cause_is_a_hypothesis_or_says_why_not() {

@@ -104,20 +104,23 @@ fn deviance(weighing: &Weighing<'_>, sides: &[f64]) -> Option<Test> {
 }
 
 /// F = [SS_lof/c] / [SS_pe/(n - c)], c distinct conditions; the base has no fitted parameter. Of rows
-/// without an order: in a trace neighbours are no repeats of each other, and its set-up is an allowance.
+/// without an order: in a trace neighbours are no repeats of each other.
+///
+/// SS_lof is what of r' C^-1 r lies between the conditions: what an allowance explains is no lack of fit. Repeats of a
+/// condition share its allowances, so SS_pe holds none.
 fn lack_of_fit(weighing: &Weighing<'_>) -> Option<Test> {
     let (data, residual) = (weighing.foundation.data, &weighing.foundation.residual);
     if data.layout.design.smooth != Smooth::None {
         return None;
     }
-    let (within, dof) = pure_error(data, residual, &weighing.keep);
+    let scaled: Vec<f64> = residual.iter().enumerate().map(|(row, r)| r / weighing.scatter(row)).collect();
+    let (within, dof) = pure_error(data, &scaled, &weighing.keep);
     if dof < 1.0 || within <= 0.0 {
         return None;
     }
-    let kept = residual.iter().zip(&weighing.keep).filter(|(_, keep)| **keep);
-    let (count, all) = kept.fold((0.0, 0.0), |(n, sum), (r, _)| (n + 1.0, sum + r * r));
-    let conditions: f64 = count - dof;
-    let f = ((all - within) / conditions) / (within / dof);
+    let white = &weighing.linear.residual;
+    let conditions: f64 = weighing.whitener.rows() - dof;
+    let f = ((white.inner(white) - within) / conditions) / (within / dof);
     let p = FisherSnedecor::new(conditions, dof).ok()?.sf(f.max(0.0));
     test(TestKind::LackOfFit, f, (conditions, Some(dof)), p)
 }
