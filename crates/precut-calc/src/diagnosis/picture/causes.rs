@@ -49,8 +49,12 @@ pub(super) fn evidence<M: Diagnosable>(output: &DiagnosisResult<M::Effect, M::Ru
         output.causes.iter().take(MOST_CAUSES).partition(|&cause| !is_unknown || is_named(cause));
     let nothing = ("diagnosis_nothing", output.none_probability, Role::Nominal);
     let unnamed = ("diagnosis_unnamed", output.unnamed_probability, Role::Unstable);
-    let own =
-        (0_u8..).zip(own).map(|(number, cause)| (kind_of::<M>(&cause.kind), cause.probability, Role::Series(number)));
+    // Every second series is drawn pale, too: beside what only comes near none of them is taken.
+    let step = if is_unknown { 2 } else { 1 };
+    let own = (0_u8..)
+        .step_by(step)
+        .zip(own)
+        .map(|(number, cause)| (kind_of::<M>(&cause.kind), cause.probability, Role::Series(number)));
     let bars: Vec<(&'static str, f64, Role)> = if is_unknown {
         let nearest = nearest.into_iter().map(|cause| (kind_of::<M>(&cause.kind), cause.probability, Role::Comparison));
         [unnamed].into_iter().chain(own).chain([nothing]).chain(nearest).collect()
