@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use crate::fixture_support::{checked, outcome, reference_job, with};
+use crate::fixture_support::{checked, outcome, reference_job, solve, with};
 use precut_calc::calculator::{ForwardModel, Missing, Rows, Unwatched};
 use precut_calc::effects::{FIXTURE_CAUSES, FixtureEffect};
 use precut_calc::fixture_stability::{FixtureAllowances, FixturePoint, FixtureRun, FixtureStability};
@@ -133,6 +133,44 @@ fn joints_that_harden_move_less_and_both_ways_of_computing_agree() {
     assert!((got.simulation.peak_to_peak_um / got.forced.peak_to_peak_um - 1.0).abs() < 3e-3, "{got:?}");
     // Growth about a motion that stiffens is slower.
     assert!(got.multiplier.modulus < soft.multiplier.modulus);
+}
+
+/// A depth that nobody cuts has no forced motion on joints that harden: what is asked about has its answer all the same, and
+/// how deep limits could be looked for is said. With uneven teeth the search would take minutes if it had to end.
+#[test]
+fn a_cut_on_hardening_joints_is_answered_whatever_a_deeper_one_does() {
+    let mut job = reference_job(1);
+    job["cutter"] = json!({ "diameter_mm": 63.34, "teeth": 1 });
+    job["force"] =
+        json!({ "coefficient": 1521.9, "chip_thickness_exponent": 0.4, "depth_exponent": 0, "radial_ratio": 0 });
+    job["cut"] = json!({
+        "width_mm": 54.23, "offset_mm": 4.554, "depth_mm": 2.67, "spindle_speed_rpm": 7179.4, "feed_mm_per_tooth": 0.0265,
+        "feed_toward": "fixed_jaw"
+    });
+    job["fixture"] = json!({
+        "kind": "self_locking", "workpiece_mass_kg": 3.818, "clamp_force_n": 1e7,
+        "movable_joint": { "stiffness_n_per_mm": 3280.8, "damping_n_s_per_mm": 0.38416 },
+        "fixed_joint": { "stiffness_n_per_mm": 9913.4, "damping_n_s_per_mm": 0.40823 }
+    });
+    job["analyses"] = json!(["verdict"]);
+    let hardening = json!({ "kind": "contact_hardening", "cubic_per_mm2": 318.76 });
+    let milled = with(&job, "/effects", json!([hardening, { "kind": "tooth_runout", "runout_mm": 0.01325 }]));
+    let mut slow = with(&milled, "/cutter", json!({ "diameter_mm": 59.87, "teeth": 20 }));
+    slow["cut"] = json!({
+        "width_mm": 25.384, "offset_mm": -15.8044, "depth_mm": 0.84, "spindle_speed_rpm": 318.87,
+        "feed_mm_per_tooth": 0.19354, "feed_toward": "fixed_jaw"
+    });
+    slow["force"]["radial_ratio"] = json!(0.6);
+    slow["fixture"]["workpiece_mass_kg"] = json!(0.38566);
+    slow["effects"][0]["cubic_per_mm2"] = json!(2514.1);
+    slow["effects"][1]["runout_mm"] = json!(0.0967);
+    for job in [milled, slow] {
+        let far = solve(&job);
+        assert!(far.warnings.iter().any(|said| said.code == "no_forced_motion_beyond"), "{:?}", far.warnings);
+        let near = outcome(&with(&job, "/limits/depth_max_mm", json!(1.05 * job["cut"]["depth_mm"].as_f64().unwrap())));
+        assert!(far.output.depth_examined_mm >= near.depth_examined_mm);
+        assert_eq!((far.output.multiplier, far.output.forced), (near.multiplier, near.forced));
+    }
 }
 
 #[test]

@@ -9,6 +9,9 @@ use super::floquet::Working;
 use super::holding::{Holding, Hung, Jaw, Joint, MM_PER_S2};
 use super::input::{FeedToward, FixtureJob, Vise, ViseJoint};
 
+/// Share of the forces of all teeth that is round-off where they cancel: a sum of some thousand steps and harmonics.
+const CANCELLED: f64 = 1e-12;
+
 /// Everything that the physics needs of a job.
 #[derive(Debug, Clone)]
 pub(super) struct Case {
@@ -110,6 +113,13 @@ impl Case {
                 }
             }
         }
+    }
+
+    /// A force on a joint, N: 0 where it is negative, or no more than the forces of teeth that cancel leave by round-off.
+    pub(super) fn above_round_off_n(&self, force_n: f64) -> f64 {
+        let Working { feed_mm, depth_mm, .. } = self.working;
+        let teeth_n = self.cutting.teeth as f64 * self.cutting.level(depth_mm) * self.cutting.chip_power(feed_mm);
+        if force_n > CANCELLED * teeth_n { force_n } else { 0.0 }
     }
 
     /// The same at another depth.

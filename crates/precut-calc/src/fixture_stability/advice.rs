@@ -34,6 +34,7 @@ pub(super) const WARNING_CODES: &[&str] = &[
     "simulation_thrown",
     "multiplier_not_converged",
     "depth_not_examined",
+    "no_forced_motion_beyond",
     "verdict_by_simulation",
     "spindle_power_exceeded",
     "spindle_torque_exceeded",
@@ -136,7 +137,10 @@ pub(super) fn warnings(study: &Study<'_>, outcome: &FixtureOutcome, aside: &Asid
             "1",
         ));
     }
-    if depth > study.examined_mm {
+    if study.chatter_mm.is_none() && study.examined_mm < study.asked_mm {
+        let (reached, asked) = (study.examined_mm, study.asked_mm);
+        found.push(Finding::new("no_forced_motion_beyond", "/effects").measured(reached, asked, "mm"));
+    } else if depth > study.examined_mm {
         found.push(Finding::new("depth_not_examined", "/limits/depth_max_mm").measured(depth, study.examined_mm, "mm"));
     }
     if outcome.verdict.state == FixtureState::Chatter && multiplier.modulus < 1.0 {
@@ -255,7 +259,8 @@ pub(super) fn explanation(study: &Study<'_>, outcome: &FixtureOutcome, aside: &A
     }
     if let Some(clamp) = &outcome.clamp {
         said.push(of_clamp(clamp, aside));
-        said.extend(clamp.binding_joint.map(|joint| of_opening(clamp, joint, aside)));
+        // What chatters already does not begin to.
+        said.extend(clamp.binding_joint.filter(|_| clamp.stable).map(|joint| of_opening(clamp, joint, aside)));
     }
     if verdict.peak_to_peak_over_feed > 1.0 {
         said.push(

@@ -11,7 +11,7 @@ use super::drive::{self, DriveDepths};
 use super::floquet::{Multiplier, Working};
 use super::holding::Closed;
 use super::input::{Analysis, FixtureJob, SimulationSettings};
-use super::lobes::{Plane, Point, Rules, boundary, by_states, critical_depth, map, point};
+use super::lobes::{ChatterLimit, Plane, Point, Rules, boundary, by_states, critical_depth, map, point};
 use super::march::{Marched, Plan, Step};
 use super::output::{
     AmplitudeCurve, ArcProfile, ChatterKind, ClampForce, CuttingDrive, DepthLimits, Engagement, FirstLimit,
@@ -21,7 +21,7 @@ use super::output::{
 };
 use super::parts::plane_of;
 use super::picture::lobes_so_far;
-use super::response::{Response, response, span_mm};
+use super::response::{Response, response, span_mm, unbroken};
 use super::simulate::{Observed, Steady, count, observed, plan, run, scatter, small};
 use super::zeroth::{at_speed, depth_mm, zeroth};
 
@@ -51,6 +51,8 @@ pub(super) struct Study<'a> {
     pub monitor: &'a dyn Monitor,
     pub point: Point,
     pub forced: Response,
+    /// How deep limits were to be looked for, and how deep they could be.
+    pub asked_mm: f64,
     pub examined_mm: f64,
     pub chatter_mm: Option<f64>,
 }
@@ -78,9 +80,10 @@ impl<'a> Study<'a> {
         let rules = Rules::new();
         let point = point(&rules, &case.holding, &case.cutting, case.working, Closed::BOTH)?;
         let forced = forced(&case, case.working)?;
-        let examined_mm = examined_mm(job, &case);
-        let chatter_mm = critical_depth(&rules, &case.holding, &case.cutting, case.working, examined_mm)?;
-        Ok(Self { job, case, rules, monitor, point, forced, examined_mm, chatter_mm })
+        let asked_mm = examined_mm(job, &case);
+        let limit = critical_depth(&rules, &case.holding, &case.cutting, case.working, asked_mm)?;
+        let ChatterLimit { depth_mm: chatter_mm, examined_mm } = limit;
+        Ok(Self { job, case, rules, monitor, point, forced, asked_mm, examined_mm, chatter_mm })
     }
 
     fn stable(&self) -> bool {
@@ -124,6 +127,12 @@ pub(super) fn forced(case: &Case, working: Working) -> Result<Response, Failure>
     by_states!(case.holding, response(&case.holding, &case.cutting, working))
 }
 
+/// Whether there is a motion about which to ask: away from the working point there may be none where joints harden.
+fn has_motion(case: &Case, working: Working) -> bool {
+    let found = || by_states!(case.holding, unbroken(&case.holding, &case.cutting, working));
+    case.holding.hardening_per_mm2 <= 0.0 || found().is_some()
+}
+
 /// Peak-to-peak displacement of the forced motion, mm.
 pub(super) fn forced_span_mm(case: &Case, working: Working) -> Result<f64, Failure> {
     by_states!(case.holding, span_mm(&case.holding, &case.cutting, working))
@@ -148,7 +157,11 @@ fn forced_limits(case: &Case, spindle_rpm: f64, limit_mm: f64) -> Result<[Option
     let force = case.holding.clamp_force_n;
     let most = [Some(case.working.feed_mm), force, force];
     let at = |depth_mm: f64| -> Result<[f64; 3], Failure> {
-        match forced(case, Working { spindle_rpm, depth_mm, ..case.working }) {
+        let working = Working { spindle_rpm, depth_mm, ..case.working };
+        if !has_motion(case, working) {
+            return Ok([f64::INFINITY; 3]);
+        }
+        match forced(case, working) {
             Ok(of) => Ok([of.x_mm.span(), of.left_elastic_n.high, of.right_elastic_n.high]),
             // No motion that repeats itself: it grows without end.
             Err(Failure::OutOfModel(_) | Failure::NotConverged { .. }) => Ok([f64::INFINITY; 3]),
@@ -431,7 +444,7 @@ fn verdict(study: &Study<'_>, simulated: &Simulated, run: &Marched, drive_margin
     let exact = matches!(state, FixtureState::Stable | FixtureState::SpindleOverloaded) && run.lost_cut <= 0.0;
     let range = if exact { study.forced.x_mm } else { run.x_mm };
     let span_um = range.span() * UM_PER_MM;
-    let asked = study.forced.left_n.high.max(study.forced.right_n.high).max(0.0);
+    let asked = case.above_round_off_n(study.forced.left_n.high.max(study.forced.right_n.high));
     FixtureVerdict {
         state,
         joint,
@@ -451,7 +464,7 @@ fn verdict(study: &Study<'_>, simulated: &Simulated, run: &Marched, drive_margin
 /// Static force on the joints at the movable and the fixed jaw (`fixture/5.7`).
 pub(super) fn static_clamp_n(case: &Case, high_n: f64, low_n: f64) -> (f64, f64) {
     let (left, right) = (case.holding.left.stiffness_n_per_mm, case.holding.right.stiffness_n_per_mm);
-    let (toward_movable, toward_fixed) = (high_n.max(0.0), (-low_n).max(0.0));
+    let (toward_movable, toward_fixed) = (case.above_round_off_n(high_n), case.above_round_off_n(-low_n));
     if case.holding.jaw.is_some() {
         (0.0, toward_movable)
     } else {
@@ -472,9 +485,11 @@ fn clamp_force(study: &Study<'_>, aside: &mut Aside) -> Result<ClampForce, Failu
         // A run that shows no steady state says of no clamp force that it is enough.
         is_seen.then_some([run.left_n, run.right_n, run.left_elastic_n, run.right_elastic_n])
     };
-    let asked = asked.map(|ranges| ranges.map(|range| range.high.max(0.0)));
+    let asked = asked.map(|ranges| ranges.map(|range| case.above_round_off_n(range.high)));
     let least_n = asked.map(|[movable, fixed, ..]| movable.max(fixed));
-    let with_entry = |least: f64| least.max(run.left_entry_n).max(run.right_entry_n);
+    let with_entry = |least: f64| {
+        [run.left_entry_n, run.right_entry_n].map(|n| case.above_round_off_n(n)).into_iter().fold(least, f64::max)
+    };
     let least_with_entry_n = least_n.filter(|_| is_seen).map(with_entry);
     let (high, low) = case.cutting.static_extremes_n(case.working.feed_mm, case.working.depth_mm);
     let (static_movable_n, static_fixed_n) = static_clamp_n(case, high, low);
@@ -532,43 +547,48 @@ struct AtDepth {
     lost: f64,
 }
 
-fn at_depth(study: &Study<'_>, depth: f64) -> Result<AtDepth, Failure> {
+/// `None` where joints harden and no forced motion is found.
+fn at_depth(study: &Study<'_>, depth: f64) -> Result<Option<AtDepth>, Failure> {
     let case = &study.case;
     let working = case.at_depth(depth);
+    if !has_motion(case, working) {
+        return Ok(None);
+    }
     let modulus = point(&study.rules, &case.holding, &case.cutting, working, Closed::BOTH)?.multiplier.modulus;
     if modulus < 1.0 {
         let forced = forced(case, working)?;
-        return Ok(AtDepth {
+        return Ok(Some(AtDepth {
             modulus,
             span_mm: forced.x_mm.span(),
             left_n: forced.left_elastic_n.high.max(0.0),
             right_n: forced.right_elastic_n.high.max(0.0),
             lost: 0.0,
-        });
+        }));
     }
     let plan = plan(case, &study.job.simulation, working, modulus);
     let run = observed(case, &plan, &crate::calculator::Unwatched)?.run;
-    Ok(AtDepth {
+    Ok(Some(AtDepth {
         modulus,
         span_mm: run.x_mm.span(),
         left_n: run.left_elastic_n.high.max(0.0),
         right_n: run.right_elastic_n.high.max(0.0),
         lost: run.lost_cut,
-    })
+    }))
 }
 
 fn limits(study: &Study<'_>) -> Result<DepthLimits, Failure> {
     let case = &study.case;
     let wanted = study.job.limits.depths;
-    let depths: Vec<f64> = (1..=wanted).map(|i| study.examined_mm * f64::from(i) / f64::from(wanted)).collect();
+    let mut depths: Vec<f64> = (1..=wanted).map(|i| study.examined_mm * f64::from(i) / f64::from(wanted)).collect();
     let mut found: Vec<AtDepth> = Vec::with_capacity(depths.len());
     for chunk in depths.chunks(8) {
         checkpoint(study.monitor)?;
-        let part: Result<Vec<AtDepth>, Failure> = chunk.par_iter().map(|&depth| at_depth(study, depth)).collect();
-        found.extend(part?);
+        let part: Result<Vec<_>, Failure> = chunk.par_iter().map(|&depth| at_depth(study, depth)).collect();
+        found.extend(part?.into_iter().map_while(std::convert::identity));
         let done = found.len() as f64 / depths.len() as f64;
         study.monitor.progress(0.2 + 0.2 * done, Message::new("stage_limits"));
     }
+    depths.truncate(found.len());
     let force = case.holding.clamp_force_n;
     let reach = |of: &(dyn Fn(&AtDepth) -> f64 + Sync), limit: f64| first_reached(study, &depths, &found, of, limit);
     let amplitude_mm = reach(&|at| at.span_mm, case.working.feed_mm)?;
@@ -587,7 +607,8 @@ fn limits(study: &Study<'_>) -> Result<DepthLimits, Failure> {
     for speed in &study.job.limits.speeds_rpm {
         checkpoint(study.monitor)?;
         let working = Working { spindle_rpm: speed.0, ..case.working };
-        let chatter_mm = critical_depth(&study.rules, &case.holding, &case.cutting, working, study.examined_mm)?;
+        let chatter_mm =
+            critical_depth(&study.rules, &case.holding, &case.cutting, working, study.examined_mm)?.depth_mm;
         at_speeds.push(study.speed_limit(speed.0, chatter_mm, study.examined_mm)?);
     }
     let column = |of: &dyn Fn(&AtDepth) -> f64| found.iter().map(of).collect::<Vec<f64>>();
@@ -630,20 +651,21 @@ fn first_reached(
 ) -> Result<Option<f64>, Failure> {
     let Some(above) = found.iter().position(|at| of(at) > limit) else { return Ok(None) };
     let (mut low, mut high) = (if above == 0 { 0.0 } else { depths[above - 1] }, depths[above]);
+    let exceeds =
+        |depth: f64| Ok::<_, Failure>(at_depth(study, depth)?.as_ref().is_none_or(|reached| of(reached) > limit));
     if let Some(chatter) = study.chatter_mm.filter(|chatter| *chatter > low && *chatter < high) {
-        let just_below = at_depth(study, chatter * (1.0 - 1e-7))?;
-        if of(&just_below) > limit { high = chatter } else { low = chatter }
+        if exceeds(chatter * (1.0 - 1e-7))? { high = chatter } else { low = chatter }
     }
     // Proportional to H^(1-mu) where the motion is the forced one.
     if study.case.is_linear() && study.chatter_mm.is_none_or(|chatter| high <= chatter) {
-        let value = of(&at_depth(study, high * (1.0 - 1e-7))?);
+        let value = at_depth(study, high * (1.0 - 1e-7))?.as_ref().map_or(0.0, of);
         let power = 1.0 / (1.0 - study.case.cutting.depth_exponent);
         return Ok((value > 0.0).then(|| high * (limit / value).powf(power)));
     }
     for _ in 0..BRACKETING {
         checkpoint(study.monitor)?;
         let middle = 0.5 * (low + high);
-        if of(&at_depth(study, middle)?) > limit { high = middle } else { low = middle }
+        if exceeds(middle)? { high = middle } else { low = middle }
     }
     // A jump at the onset of chatter is at the onset.
     let onset =
@@ -796,7 +818,7 @@ fn tried(study: &Study<'_>, better: &SpeedLimit, most_mm: f64) -> Result<Option<
     // The peaks of lobes are sharp: the limits are those of the speed that is read.
     let spindle_rpm = said(better.spindle_speed_rpm, 4, f64::round);
     let there = Working { spindle_rpm, ..case.working };
-    let chatter_mm = critical_depth(&study.rules, &case.holding, &case.cutting, there, most_mm)?;
+    let chatter_mm = critical_depth(&study.rules, &case.holding, &case.cutting, there, most_mm)?.depth_mm;
     let limit = study.speed_limit(spindle_rpm, chatter_mm, most_mm)?;
     let short_of = [limit.chatter_mm, limit.movable_opens_mm, limit.fixed_opens_mm];
     let depths = short_of.into_iter().flatten().map(|depth| NEAR_LIMIT * depth);
@@ -807,6 +829,9 @@ fn tried(study: &Study<'_>, better: &SpeedLimit, most_mm: f64) -> Result<Option<
     }
     let depth_mm = said(allowed_mm, 3, f64::floor);
     let working = Working { depth_mm, ..there };
+    if !has_motion(case, working) {
+        return Ok(None);
+    }
     let modulus = point(&study.rules, &case.holding, &case.cutting, working, Closed::BOTH)?.multiplier.modulus;
     if modulus >= 1.0 || forced_span_mm(case, working).map_or(true, |span_mm| span_mm > working.feed_mm) {
         return Ok(None);

@@ -12,6 +12,7 @@ use nalgebra::DMatrix;
 
 use crate::calculator::{Failure, Finding};
 use crate::num::dde::{Matrix, Propagator, Rule, product, times};
+use crate::num::dense::length;
 use crate::num::gmres::gmres;
 
 use super::cutting::{Cutting, Stretch};
@@ -25,14 +26,19 @@ const POINTS: usize = 10;
 const PARTS_WITH_HARDENING: u32 = 3;
 /// A solution satisfies its equation to this share of the feed per tooth.
 const SETTLED: f64 = 1e-10;
-const NEWTON_STEPS: u32 = 20;
-/// Newton's method has gone astray where it misses by so many times what it missed at first.
-const ASTRAY: f64 = 1e3;
+const NEWTON_STEPS: u32 = 30;
+/// Least share of a step of Newton's method.
+const LEAST_SHARE: f64 = 1.0 / 64.0;
 /// Steps in which the load is raised where it cannot be put on at once.
 const LOADS: u32 = 16;
 /// What a step of Newton's method leaves of its linear equation, and how many applications of G it may take.
 const LINEAR_RESIDUAL: f64 = 1e-3;
 const LINEAR_STEPS: usize = 400;
+/// Products that the linear equations of a motion may take: of one that is asked for, and of one that is but looked for, at
+/// depths that nobody may want to cut. Some seconds, and a tenth of one; with six uneven teeth a motion takes a millionth of the
+/// first.
+const ASKED_FOR: f64 = 1e10;
+const LOOKED_FOR: f64 = 2e8;
 /// Places within an element between which an extreme is looked for, and how far from it they are in the second look.
 const PLACES: usize = 16;
 const NEARER: f64 = 0.01;
@@ -137,14 +143,28 @@ pub(super) enum NoMotion {
     Unsettled { residual_mm: f64, steps: u32 },
 }
 
+/// How much a motion is worth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Effort {
+    /// Of a cut that is asked about.
+    Asked,
+    /// Of one among many depths at which a limit is looked for.
+    Looked,
+}
+
 /// The forced motion.
 pub(super) fn answering_motion<'a, const N: usize>(
     system: &System<N>,
     cutting: &'a Cutting,
     working: Working,
     hardening_n_per_mm3: f64,
+    effort: Effort,
 ) -> Result<Result<AnsweringMotion<'a, N>, NoMotion>, Failure> {
-    Ok(Period::new(system, cutting, working, hardening_n_per_mm3)?.motion())
+    let products = match effort {
+        Effort::Asked => ASKED_FOR,
+        Effort::Looked => LOOKED_FOR,
+    };
+    Ok(Period::new(system, cutting, working, hardening_n_per_mm3)?.motion(products))
 }
 
 impl<'a, const N: usize> Period<'a, N> {
@@ -281,58 +301,111 @@ impl<'a, const N: usize> Period<'a, N> {
         (x_mm, ends_mm)
     }
 
-    fn motion(self) -> Result<AnsweringMotion<'a, N>, NoMotion> {
-        let mut x_mm = vec![0.0; self.points()];
-        let mut found = self.newton(&mut x_mm, 1.0);
+    /// `products` that its linear equations may take.
+    fn motion(self, products: f64) -> Result<AnsweringMotion<'a, N>, NoMotion> {
+        let mut left = products;
+        let still = || vec![0.0; self.points()];
+        let mut found = self.newton(still(), 1.0, &mut left);
         if found.is_err() {
-            x_mm.fill(0.0);
-            for step in 1..=LOADS {
-                found = self.newton(&mut x_mm, f64::from(step) / f64::from(LOADS));
-                if found.is_err() {
-                    break;
-                }
-            }
+            let raised = |step: u32| f64::from(step) / f64::from(LOADS);
+            found = (2..=LOADS).fold(self.newton(still(), raised(1), &mut left), |found, step| {
+                found.and_then(|balance| self.newton(balance.answer_mm, raised(step), &mut left))
+            });
         }
-        let (force_n, acting_n, ends_mm) = found?;
-        Ok(AnsweringMotion { period: self, x_mm, ends_mm, force_n, acting_n })
+        let Balance { answer_mm, force_n, acting_n, ends_mm, .. } = found?;
+        Ok(AnsweringMotion { period: self, x_mm: answer_mm, ends_mm, force_n, acting_n })
     }
 
-    /// Newton's method from x under a share of the force: the force of the chips, that which acts, and x at the ends of the elements.
-    fn newton(&self, x_mm: &mut Field, load: f64) -> Result<(Field, Field, Vec<f64>), NoMotion> {
-        let (points, pitch) = (self.points(), self.points_per_pitch());
-        let mut slope_n_per_mm = vec![0.0; points];
-        let (mut first, mut residual_mm) = (None, 0.0);
-        for step in 1..=NEWTON_STEPS {
-            let force_n = self.force_n(x_mm, load, &mut slope_n_per_mm).ok_or(NoMotion::CutLost)?;
-            let acting_n: Field =
-                force_n.iter().zip(&*x_mm).map(|(force, x)| force - self.hardening_n_per_mm3 * x.powi(3)).collect();
-            let (answer, ends_mm) = self.answer(&acting_n);
-            let missing: Field = answer.iter().zip(&*x_mm).map(|(answer, x)| answer - x).collect();
-            let largest = missing.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
-            if largest <= SETTLED * self.working.feed_mm {
-                *x_mm = answer;
-                return Ok((force_n, acting_n, ends_mm));
-            }
-            if !largest.is_finite() || largest > ASTRAY * *first.get_or_insert(largest) {
-                return Err(NoMotion::Unsettled { residual_mm: largest, steps: step });
-            }
-            residual_mm = largest;
-            // (1 - G (slope (1 - S) - 3 K x^2)) step = what is missing, with S the shift by a tooth pitch.
-            let step = gmres(&missing, LINEAR_RESIDUAL, LINEAR_STEPS, |v| {
-                let force_of = |i: usize| {
-                    let own = 3.0 * self.hardening_n_per_mm3 * x_mm[i] * x_mm[i] * v[i];
-                    slope_n_per_mm[i] * (v[i] - v[(i + points - pitch) % points]) - own
-                };
-                let force: Field = (0..points).map(force_of).collect();
-                let (by_force, _) = self.answer(&force);
-                v.iter().zip(&by_force).map(|(v, g)| v - g).collect()
-            });
-            for (x, step) in x_mm.iter_mut().zip(&step.x) {
-                *x += step;
-            }
-        }
-        Err(NoMotion::Unsettled { residual_mm, steps: NEWTON_STEPS })
+    /// What holds of a motion under a share of the force; `None` where a tooth loses the cut.
+    fn balance(&self, x_mm: Field, load: f64) -> Option<Balance> {
+        let mut slope_n_per_mm = vec![0.0; x_mm.len()];
+        let force_n = self.force_n(&x_mm, load, &mut slope_n_per_mm)?;
+        let acting_n: Field =
+            force_n.iter().zip(&x_mm).map(|(force, x)| force - self.hardening_n_per_mm3 * x.powi(3)).collect();
+        let (answer_mm, ends_mm) = self.answer(&acting_n);
+        let missing_mm = answer_mm.iter().zip(&x_mm).map(|(answer, x)| answer - x).collect();
+        Some(Balance { x_mm, force_n, slope_n_per_mm, acting_n, answer_mm, ends_mm, missing_mm })
     }
+
+    /// Newton's method from x under a share of the force. Steps are halved where a tooth would lose the cut, or more be missing
+    /// than before. What it takes comes off the products that are `left`.
+    fn newton(&self, from_mm: Field, load: f64, left: &mut f64) -> Result<Balance, NoMotion> {
+        let mut now = self.balance(from_mm, load).ok_or(NoMotion::CutLost)?;
+        for steps in 1..=NEWTON_STEPS {
+            let residual_mm = now.largest_mm();
+            if residual_mm <= SETTLED * self.working.feed_mm {
+                return Ok(now);
+            }
+            let unsettled = NoMotion::Unsettled { residual_mm, steps };
+            let step = self.step(&now, left).ok_or(unsettled)?;
+            let moved = |share: f64| {
+                let x_mm = now.x_mm.iter().zip(&step).map(|(x, step)| x + share * step).collect();
+                self.balance(x_mm, load)
+            };
+            let (mut share, mut next) = (1.0, moved(1.0));
+            let is_nearer = |next: &Balance| next.length_mm() < now.length_mm();
+            while !next.as_ref().is_some_and(is_nearer) {
+                share *= 0.5;
+                if share < LEAST_SHARE {
+                    return Err(if next.is_none() { NoMotion::CutLost } else { unsettled });
+                }
+                next = moved(share);
+            }
+            now = next.ok_or(NoMotion::CutLost)?;
+        }
+        Err(NoMotion::Unsettled { residual_mm: now.largest_mm(), steps: NEWTON_STEPS })
+    }
+
+    /// (1 - G (slope (1 - S) - 3 K x^2)) step = what is missing, with S the shift by a tooth pitch; `None` where that is more than
+    /// the products `left` allow.
+    fn step(&self, now: &Balance, left: &mut f64) -> Option<Field> {
+        let (points, pitch) = (self.points(), self.points_per_pitch());
+        let most = affordable(*left, points);
+        let found = gmres(&now.missing_mm, LINEAR_RESIDUAL, most, |v| {
+            let force_of = |i: usize| {
+                let own = 3.0 * self.hardening_n_per_mm3 * now.x_mm[i] * now.x_mm[i] * v[i];
+                now.slope_n_per_mm[i] * (v[i] - v[(i + points - pitch) % points]) - own
+            };
+            let force: Field = (0..points).map(force_of).collect();
+            let (by_force, _) = self.answer(&force);
+            v.iter().zip(&by_force).map(|(v, g)| v - g).collect()
+        });
+        *left -= products(found.steps, points);
+        (found.residual <= LINEAR_RESIDUAL || most == LINEAR_STEPS).then_some(found.x)
+    }
+}
+
+/// A motion with what it asks and gets.
+struct Balance {
+    x_mm: Field,
+    /// Of the chips, its slope over x(t) - x(t - tau), and with what the hardening takes away.
+    force_n: Field,
+    slope_n_per_mm: Field,
+    acting_n: Field,
+    /// How the vise moves under it: at the points, and at the start of every element and the end of the last.
+    answer_mm: Field,
+    ends_mm: Vec<f64>,
+    missing_mm: Field,
+}
+
+impl Balance {
+    fn largest_mm(&self) -> f64 {
+        self.missing_mm.iter().fold(0.0, |most: f64, value| most.max(value.abs()))
+    }
+
+    fn length_mm(&self) -> f64 {
+        length(&self.missing_mm)
+    }
+}
+
+/// Products that so many directions take, each made orthogonal to those before it.
+fn products(directions: usize, points: usize) -> f64 {
+    (directions * directions * points) as f64
+}
+
+/// The most directions that so many products allow.
+fn affordable(left: f64, points: usize) -> usize {
+    (0..=LINEAR_STEPS).rev().find(|&directions| products(directions, points) <= left).unwrap_or(0)
 }
 
 fn identity<const N: usize>() -> Matrix<N> {

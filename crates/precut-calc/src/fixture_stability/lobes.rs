@@ -10,7 +10,7 @@ use crate::num::dde::Rule;
 use super::cutting::Cutting;
 use super::floquet::{Multiplier, SpeedPlan, Working};
 use super::holding::{Closed, Holding, System};
-use super::response::response;
+use super::response::{Response, response, unbroken};
 
 /// Points of an element for maps: |mu| to 2e-5 near 1; and for single points: to about 1e-10.
 const COARSE: usize = 8;
@@ -28,6 +28,9 @@ const FINE_DEPTH: f64 = 1e-8;
 /// Neighbours on the boundary that differ by more than this share are looked at more closely, so often at most.
 const NEIGHBOURS: f64 = 0.05;
 const ROUNDS: u32 = 3;
+/// Halvings of the depth up to which there is a forced motion: from the deepest down to one that has one, and back up.
+const DOWN: u32 = 30;
+const UP: u32 = 5;
 /// Multiplier evaluations between two looks whether anybody still waits.
 const POINTS_PER_LOOK: usize = 256;
 
@@ -107,9 +110,7 @@ fn at<const N: usize, const P: usize>(
 ) -> Result<Multiplier, Failure> {
     let hardening = holding.hardening_n_per_mm3(closed);
     let plan = if hardening > 0.0 && closed == Closed::BOTH {
-        let forced = response::<N>(holding, cutting, working)?;
-        let stiffness = |t: f64| 3.0 * hardening * forced.x_at(t).powi(2);
-        SpeedPlan::new(rule, system, cutting, working, Some(&stiffness))
+        about(rule, system, holding, cutting, working, &response::<N>(holding, cutting, working)?)
     } else {
         SpeedPlan::new(rule, system, cutting, working, None)
     };
@@ -117,6 +118,36 @@ fn at<const N: usize, const P: usize>(
     let is_free = holding.jaw.is_some() && !closed.right;
     let found = if is_free { plan.multiplier_but_of_shift(level, residual) } else { plan.multiplier(level, residual) };
     found.ok_or_else(unsolved)
+}
+
+/// The vise stiffened by the motion about which it is asked whether a small change decays.
+fn about<const N: usize, const P: usize>(
+    rule: &Rule<P>,
+    system: &System<N>,
+    holding: &Holding,
+    cutting: &Cutting,
+    working: Working,
+    forced: &Response,
+) -> SpeedPlan<N, P> {
+    let hardening = holding.hardening_n_per_mm3(Closed::BOTH);
+    let stiffness = |t: f64| 3.0 * hardening * forced.x_at(t).powi(2);
+    SpeedPlan::new(rule, system, cutting, working, Some(&stiffness))
+}
+
+/// Where the modulus crosses 1 over the depth, from the bottom, and how deep could be looked.
+#[derive(Debug, Clone, PartialEq)]
+struct Crossings {
+    depths_mm: Vec<f64>,
+    up_to_mm: f64,
+}
+
+/// Where chatter begins.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct ChatterLimit {
+    /// `None` where it does not up to the depth examined.
+    pub depth_mm: Option<f64>,
+    /// How deep was looked: less than was asked where joints harden and a deeper cut has no forced motion that could be found.
+    pub examined_mm: f64,
 }
 
 /// The modulus over the depth at one speed.
@@ -145,27 +176,69 @@ impl<'a, const N: usize, const P: usize> Column<'a, N, P> {
         Self { rule, system, holding, cutting, working, plan, residual }
     }
 
-    fn modulus(&self, depth_mm: f64) -> Result<f64, Failure> {
+    /// `None` where joints harden and no forced motion is found about which to ask.
+    fn modulus(&self, depth_mm: f64) -> Result<Option<f64>, Failure> {
+        let level = self.cutting.level(depth_mm);
         let found = if let Some(plan) = &self.plan {
-            plan.multiplier(self.cutting.level(depth_mm), self.residual).ok_or_else(unsolved)?
+            plan.multiplier(level, self.residual)
         } else {
             let working = Working { depth_mm, ..self.working };
-            at(self.rule, self.system, self.holding, self.cutting, working, Closed::BOTH, self.residual)?
+            let plan = if self.hardens() {
+                let Some(forced) = unbroken::<N>(self.holding, self.cutting, working) else { return Ok(None) };
+                about(self.rule, self.system, self.holding, self.cutting, working, &forced)
+            } else {
+                SpeedPlan::new(self.rule, self.system, self.cutting, working, None)
+            };
+            plan.multiplier(level, self.residual)
         };
-        Ok(found.modulus)
+        Ok(Some(found.ok_or_else(unsolved)?.modulus))
+    }
+
+    fn on_map(&self, depth_mm: f64) -> Result<f64, Failure> {
+        Ok(self.modulus(depth_mm)?.unwrap_or(f64::NAN))
+    }
+
+    fn hardens(&self) -> bool {
+        self.holding.hardening_per_mm2 > 0.0
+    }
+
+    /// Depth up to which there is a forced motion: `most`, or less where joints harden.
+    fn reach_mm(&self, most_mm: f64) -> f64 {
+        let has_motion =
+            |depth_mm: f64| unbroken::<N>(self.holding, self.cutting, Working { depth_mm, ..self.working }).is_some();
+        if !self.hardens() || has_motion(most_mm) {
+            return most_mm;
+        }
+        let (mut low, mut high) = (0.5 * most_mm, most_mm);
+        for _ in 0..DOWN {
+            if has_motion(low) {
+                break;
+            }
+            (low, high) = (0.5 * low, low);
+        }
+        for _ in 0..UP {
+            let middle = 0.5 * (low + high);
+            if has_motion(middle) { low = middle } else { high = middle }
+        }
+        low
     }
 
     /// Depths at which the modulus crosses 1 up to `most`, from the bottom: a scan, then bracketing.
-    fn crossings(&self, most_mm: f64, relative: f64, only_first: bool) -> Result<Vec<f64>, Failure> {
-        let mut found = Vec::new();
-        let mut before = (0.0, self.modulus(0.0)?.ln());
+    fn crossings(&self, most_mm: f64, relative: f64, only_first: bool) -> Result<Crossings, Failure> {
+        let reach_mm = self.reach_mm(most_mm);
+        let mut found = Crossings { depths_mm: Vec::new(), up_to_mm: 0.0 };
+        let Some(free) = self.modulus(0.0)? else { return Ok(found) };
+        let mut before = (0.0, free.ln());
         for step in 1..=SCAN {
-            let depth = most_mm * f64::from(step) / f64::from(SCAN);
-            let here = (depth, self.modulus(depth)?.ln());
+            let depth = reach_mm * f64::from(step) / f64::from(SCAN);
+            let Some(modulus) = self.modulus(depth)? else { continue };
+            let here = (depth, modulus.ln());
+            found.up_to_mm = depth;
             // The free vise decays; without any damping its modulus is 1 to round-off and counts as stable.
             if (before.1 < 1e-9) != (here.1 < 1e-9) {
-                found.push(self.root(before, here, relative)?);
+                found.depths_mm.push(self.root(before, here, relative)?);
                 if only_first {
+                    found.up_to_mm = reach_mm;
                     break;
                 }
             }
@@ -186,7 +259,8 @@ impl<'a, const N: usize, const P: usize> Column<'a, N, P> {
             if !(middle > low && middle < high) {
                 middle = 0.5 * (low + high);
             }
-            let value = self.modulus(middle)?.ln();
+            let Some(modulus) = self.modulus(middle)? else { break };
+            let value = modulus.ln();
             if value.abs() < 0.1 * relative {
                 return Ok(middle);
             }
@@ -208,14 +282,14 @@ impl<'a, const N: usize, const P: usize> Column<'a, N, P> {
     }
 }
 
-/// Depth at which chatter begins at a speed, looking up to `most_mm`; `None` where there is no limit up to there.
+/// Depth at which chatter begins at a speed, looking up to `most_mm`.
 pub(super) fn critical_depth(
     rules: &Rules,
     holding: &Holding,
     cutting: &Cutting,
     working: Working,
     most_mm: f64,
-) -> Result<Option<f64>, Failure> {
+) -> Result<ChatterLimit, Failure> {
     by_states!(holding, critical_of(rules, holding, cutting, working, most_mm))
 }
 
@@ -225,13 +299,14 @@ fn critical_of<const N: usize>(
     cutting: &Cutting,
     working: Working,
     most_mm: f64,
-) -> Result<Option<f64>, Failure> {
+) -> Result<ChatterLimit, Failure> {
     let system = holding.system::<N>(Closed::BOTH);
     let column = Column::new(&rules.fine, &system, holding, cutting, working, FINE_RESIDUAL);
-    Ok(column.crossings(most_mm, FINE_DEPTH, true)?.first().copied())
+    let Crossings { depths_mm, up_to_mm } = column.crossings(most_mm, FINE_DEPTH, true)?;
+    Ok(ChatterLimit { depth_mm: depths_mm.first().copied(), examined_mm: up_to_mm })
 }
 
-/// |mu| at several depths of one speed, to the accuracy of maps.
+/// |mu| at several depths of one speed, to the accuracy of maps; NaN where no forced motion is found about which to ask.
 pub(super) fn moduli(
     rules: &Rules,
     holding: &Holding,
@@ -251,7 +326,7 @@ fn moduli_of<const N: usize>(
 ) -> Result<Vec<f64>, Failure> {
     let system = holding.system::<N>(Closed::BOTH);
     let column = Column::new(&rules.coarse, &system, holding, cutting, working, COARSE_RESIDUAL);
-    depths_mm.iter().map(|&depth| column.modulus(depth)).collect()
+    depths_mm.iter().map(|&depth| column.on_map(depth)).collect()
 }
 
 /// A speed on the boundary.
@@ -307,7 +382,7 @@ fn boundary_of<const N: usize>(
     let at = |spindle_rpm: f64| -> Result<BoundaryPoint, Failure> {
         let working = plane.working(spindle_rpm);
         let column = Column::new(&rules.coarse, &system, holding, cutting, working, COARSE_RESIDUAL);
-        Ok(BoundaryPoint { spindle_rpm, crossings_mm: column.crossings(plane.most_mm, COARSE_DEPTH, false)? })
+        Ok(BoundaryPoint { spindle_rpm, crossings_mm: column.crossings(plane.most_mm, COARSE_DEPTH, false)?.depths_mm })
     };
     let last = plane.speeds.saturating_sub(1).max(1) as f64;
     let mut wanted: Vec<f64> = (0..plane.speeds).map(|i| plane.speed_rpm(i as f64 / last)).collect();
@@ -346,7 +421,8 @@ fn differ(a: &BoundaryPoint, b: &BoundaryPoint) -> bool {
     }
 }
 
-/// |mu| over speed and depth, row by row (a row is a depth), and points of the boundary where the map was refined.
+/// |mu| over speed and depth, row by row (a row is a depth; NaN where no forced motion is found about which to ask), and
+/// points of the boundary where the map was refined.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Map {
     pub speeds_rpm: Vec<f64>,
@@ -404,7 +480,7 @@ fn map_of<const N: usize>(
             .map(|block| {
                 let working = plane.working(map.speeds_rpm[block.column]);
                 let column = Column::new(&rules.coarse, &system, holding, cutting, working, COARSE_RESIDUAL);
-                map.depths_mm[block.rows.clone()].iter().map(|&depth| column.modulus(depth)).collect()
+                map.depths_mm[block.rows.clone()].iter().map(|&depth| column.on_map(depth)).collect()
             })
             .collect();
         for (block, values) in chunk.iter().zip(found?) {
@@ -483,7 +559,7 @@ fn refine<'a, const N: usize>(
                 .par_iter()
                 .map(|(i, rows)| {
                     let column = column(place(&map.speeds_rpm, *i));
-                    rows.iter().map(|&j| column.modulus(place(&map.depths_mm, j))).collect()
+                    rows.iter().map(|&j| column.on_map(place(&map.depths_mm, j))).collect()
                 })
                 .collect();
             for ((i, rows), values) in chunk.iter().zip(found?) {
@@ -502,7 +578,7 @@ fn refine<'a, const N: usize>(
             ((i + 1, j), (i + 1, j + 1), false),
         ] {
             let (a, b) = (known[&p].ln(), known[&q].ln());
-            if (a < 0.0) != (b < 0.0) {
+            if (a < 0.0) != (b < 0.0) && (a - b).is_finite() {
                 let share = a / (a - b);
                 let between = |values: &[f64], from: usize, to: usize| {
                     let (from, to) = (place(values, from), place(values, to));

@@ -38,7 +38,7 @@ impl PreparedFixture {
         let Some(working) = rows.first().map(of) else { return Ok(1.0) };
         let Case { holding, cutting, .. } = &self.base;
         for times in LOOKED_FOR {
-            if let Some(limit) = critical_depth(&self.rules, holding, cutting, working, times * deepest)? {
+            if let Some(limit) = critical_depth(&self.rules, holding, cutting, working, times * deepest)?.depth_mm {
                 let at =
                     |shift: f64| self.log_modulus(&self.base, Working { depth_mm: limit * shift.exp(), ..working });
                 return Ok(((at(STEP)? - at(-STEP)?) / (2.0 * STEP)).max(FLATTEST));

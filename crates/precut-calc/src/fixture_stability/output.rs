@@ -626,9 +626,9 @@ pub struct LobeMap {
     /// Depths of the rows.
     #[schema(extensions(("x-unit" = json!("mm"))))]
     pub depth_mm: Vec<f64>,
-    /// Modulus per tooth period, row by row.
+    /// Modulus per tooth period, row by row; null where joints harden and no forced motion is found about which to ask.
     #[schema(extensions(("x-unit" = json!("1"))))]
-    pub modulus: Vec<f64>,
+    pub modulus: Vec<Option<f64>>,
     /// Points of the boundary found by halving cells, spindle speeds.
     #[schema(extensions(("x-unit" = json!("rev/min"))))]
     pub refined_speed_rpm: Vec<f64>,
@@ -643,7 +643,7 @@ impl LobeMap {
         Self {
             spindle_speed_rpm: map.speeds_rpm,
             depth_mm: map.depths_mm,
-            modulus: map.modulus,
+            modulus: map.modulus.into_iter().map(|modulus| Some(modulus).filter(|m| m.is_finite())).collect(),
             refined_speed_rpm,
             refined_depth_mm,
         }

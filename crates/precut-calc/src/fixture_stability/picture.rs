@@ -63,13 +63,13 @@ fn figure(id: &'static str, title: &'static str, x: Axis, panels: Vec<Panel>) ->
 }
 
 /// |mu| by its logarithm: decay below 1, growth above.
-fn heat(speeds: &[f64], depths: &[f64], modulus: &[f64]) -> Item {
+fn heat(speeds: &[f64], depths: &[f64], modulus: impl Iterator<Item = Option<f64>>) -> Item {
     Item::HeatMap {
         value: Axis::logarithmic("multiplier_modulus", "1"),
         x: speeds.to_vec(),
         y: depths.to_vec(),
         // A map that is still growing has zeros where nothing was computed yet.
-        values: modulus.iter().map(|m| (*m > 0.0).then_some(*m)).collect(),
+        values: modulus.map(|modulus| modulus.filter(|m| *m > 0.0)).collect(),
         diverging: true,
     }
 }
@@ -80,7 +80,10 @@ fn working_point(spindle_rpm: f64, depth_mm: f64) -> Item {
 
 /// The lobe diagram while it is computed.
 pub(super) fn lobes_so_far(boundary: &[(f64, Option<f64>)], map: Option<&Map>, working: Working) -> Figure {
-    let mut items: Vec<Item> = map.map(|map| heat(&map.speeds_rpm, &map.depths_mm, &map.modulus)).into_iter().collect();
+    let mut items: Vec<Item> = map
+        .map(|map| heat(&map.speeds_rpm, &map.depths_mm, map.modulus.iter().copied().map(Some)))
+        .into_iter()
+        .collect();
     let mut points: Vec<(f64, Option<f64>)> = boundary.to_vec();
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (x, y): (Vec<f64>, Vec<Option<f64>>) = points.into_iter().unzip();
@@ -120,7 +123,7 @@ fn chip(arc: &ArcProfile) -> Figure {
 fn lobes(job: &FixtureJob, outcome: &FixtureOutcome, lobes: &LobeDiagram) -> Vec<Item> {
     let working = working_point(outcome.engagement.spindle_speed_rpm, job.cut.depth_mm);
     let mut items: Vec<Item> =
-        lobes.map.iter().map(|map| heat(&map.spindle_speed_rpm, &map.depth_mm, &map.modulus)).collect();
+        lobes.map.iter().map(|map| heat(&map.spindle_speed_rpm, &map.depth_mm, map.modulus.iter().copied())).collect();
     let LobeBoundary { spindle_speed_rpm: x, .. } = &lobes.boundary;
     let of = &lobes.boundary;
     items.push(line("chatter_limit", x, of.chatter_mm.clone(), Role::Limit));
@@ -292,7 +295,7 @@ fn map_table(map: Option<&LobeMap>) -> Table {
         columns: vec![
             Column::numbers("spindle_speed", "rev/min", &speed),
             Column::numbers("depth", "mm", &depth),
-            Column::numbers("modulus", "1", &modulus),
+            Column::optional("modulus", "1", &modulus),
         ],
     }
 }

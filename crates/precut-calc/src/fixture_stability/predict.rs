@@ -146,7 +146,7 @@ impl PreparedFixture {
                 Measure::DepthLimit => {
                     let most = 4.0 * working.depth_mm.max(2.5);
                     or_missing(critical_depth(&self.rules, &case.holding, &case.cutting, working, most))?
-                        .and_then(|limit| limit.ok_or(Missing::NoSolution))
+                        .and_then(|limit| limit.depth_mm.ok_or(Missing::NoSolution))
                 }
             };
             predicted.extend(rows.into_iter().map(|row| (row, prediction)));

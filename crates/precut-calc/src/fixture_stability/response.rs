@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::calculator::{Failure, Finding};
 use crate::num::dde::{Matrix, Propagator, Rule, times};
 
-use super::answering::{AnsweringMotion, NoMotion, answering_motion};
+use super::answering::{AnsweringMotion, Effort, NoMotion, answering_motion};
 use super::cutting::{Cutting, Stretch};
 use super::floquet::{Working, damped};
 use super::holding::{Closed, Holding, System};
@@ -145,7 +145,7 @@ pub(super) fn response<const N: usize>(
         Forces { chips_n, acting_n: chips_n }
     };
     let under_smooth = || Elements::new(&system, holding, cutting, working, smooth).response();
-    let why = match answering::<N>(&system, holding, cutting, working)? {
+    let why = match answering::<N>(&system, holding, cutting, working, Effort::Asked)? {
         Ok(motion) => {
             let response = if cutting.uneven() || holding.hardening_per_mm2 > 0.0 {
                 let forces = |stretch: &Stretch, since: f64, phase: usize| motion.forces_n(stretch, since, phase);
@@ -171,9 +171,18 @@ pub(super) fn response<const N: usize>(
     }
 }
 
+/// The forced motion of a cut that no tooth loses; `None` where none is found.
+pub(super) fn unbroken<const N: usize>(holding: &Holding, cutting: &Cutting, working: Working) -> Option<Response> {
+    let system = holding.system::<N>(Closed::BOTH);
+    let motion = answering::<N>(&system, holding, cutting, working, Effort::Looked).ok()?.ok()?;
+    let forces = |stretch: &Stretch, since: f64, phase: usize| motion.forces_n(stretch, since, phase);
+    let response = Elements::new(&system, holding, cutting, working, forces).response().ok()?;
+    Some(Response { x_mm: motion.range_mm(), ..response })
+}
+
 /// Largest less smallest x of the forced motion, mm: that of [`response`], without its curves.
 pub(super) fn span_mm<const N: usize>(holding: &Holding, cutting: &Cutting, working: Working) -> Result<f64, Failure> {
-    match answering::<N>(&holding.system(Closed::BOTH), holding, cutting, working)? {
+    match answering::<N>(&holding.system(Closed::BOTH), holding, cutting, working, Effort::Asked)? {
         Ok(motion) => Ok(motion.range_mm().span()),
         Err(_) => Ok(response::<N>(holding, cutting, working)?.x_mm.span()),
     }
@@ -184,8 +193,9 @@ fn answering<'a, const N: usize>(
     holding: &Holding,
     cutting: &'a Cutting,
     working: Working,
+    effort: Effort,
 ) -> Result<Result<AnsweringMotion<'a, N>, NoMotion>, Failure> {
-    answering_motion(system, cutting, working, holding.hardening_n_per_mm3(Closed::BOTH))
+    answering_motion(system, cutting, working, holding.hardening_n_per_mm3(Closed::BOTH), effort)
 }
 
 impl<'a, const N: usize> Elements<'a, N> {
