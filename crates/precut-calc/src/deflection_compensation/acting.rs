@@ -110,7 +110,7 @@ pub(super) struct Passage {
     pub between_centres: f64,
     /// Diameter produced, mm.
     pub diameter_mm: f64,
-    /// Path cut in this pass before the station, m.
+    /// Path that this edge has cut in the job before the station, in earlier passes and in this one, m.
     pub path_m: f64,
     /// Time in the cut before the station, min.
     pub time_min: f64,

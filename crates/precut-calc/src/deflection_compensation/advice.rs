@@ -141,7 +141,7 @@ pub(super) fn one_more_rest(
     });
     let radii = stage.radii.at(&chosen);
     let sampled = grid.at(&chosen);
-    let held = Stage::of(&with_rest, &sampled, acting, stage.regime, stage.pass_mm, radii, monitor)?;
+    let held = Stage::of(&with_rest, &sampled, acting, stage.regime, stage.step, radii, monitor)?;
     let form = Form::of(&sampled.z_mm, &held.cut.uncompensated_errors_um(&held.radii));
     Ok(form.form_error_um.map(|form_error_um| OneMoreRest { z_mm, compliance_um_per_n, form_error_um }))
 }

@@ -21,7 +21,7 @@ use super::input::{FeedDirection, Job, Stations, Theory};
 use super::measurement::DeflectionMeasurement;
 use super::model::{Ingredients, Line, Radii, rest_shapes, wanted};
 use super::next_runs::next_runs;
-use super::regime::{Regime, passages, section_of_pass};
+use super::regime::{Regime, Step, passages, section_of_pass};
 use super::structure::{Structure, Variant};
 
 const UM_PER_MM: f64 = 1e3;
@@ -397,8 +397,12 @@ impl PreparedRun {
         } else {
             structure.beam.profile(&self.grid.z_mm, wanted(&self.job))
         };
-        let passages =
-            if acting.has_errors() { passages(&self.job, &self.grid, &self.regime, None) } else { Vec::new() };
+        // A run is one cut: its clocks start with the conditions that it states.
+        let passages = if acting.has_errors() {
+            passages(&self.job, &self.grid, &self.regime, &Step::default())
+        } else {
+            Vec::new()
+        };
         let shapes = rest_shapes(&all, &self.job, &self.grid, &structure)?;
         let ingredients = Ingredients {
             job: &self.job,

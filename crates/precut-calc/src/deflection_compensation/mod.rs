@@ -229,15 +229,6 @@ impl Assembly<'_> {
         let full = job.detail == Detail::Full;
         let before = Form::of(&grid.z_mm, &errors.uncompensated_um);
         let after = errors.compensated_um.as_ref().map(|errors| Form::of(&grid.z_mm, errors));
-        let time = if job.passes.is_empty() {
-            regime::cutting_time_min(job, &stage.regime, None)
-        } else {
-            let base = regime::Regime::of(&job.cut);
-            job.passes
-                .iter()
-                .map(|pass| regime::cutting_time_min(job, &base.of_pass(pass), Some(pass.diameter_mm)))
-                .sum()
-        };
         let most_deflected = advice::most_deflected(stage);
         let largest_mm = model::at(&stage.cut.y_mm, most_deflected).abs();
         Ok(Outcome {
@@ -245,7 +236,7 @@ impl Assembly<'_> {
             form_error_after_um: after.as_ref().and_then(|form| form.form_error_um),
             largest_error_um: largest(&before),
             largest_error_after_um: after.as_ref().and_then(largest),
-            cutting_time_min: time,
+            cutting_time_min: regime::cutting_time_min(job, &stage.regime, &stage.step),
             before,
             after,
             path: driven.map(|driven| driven.path),

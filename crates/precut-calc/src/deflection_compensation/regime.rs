@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use super::acting::Passage;
 use super::grid::Grid;
-use super::input::{Cut, FeedDirection, Job, Pass, Section, SpeedDiameter};
+use super::input::{Cut, FeedDirection, Job, Pass, Section, Segment, SpeedDiameter};
 use super::structure::pass_diameter_mm;
 use crate::shaft::elastic::ends;
 
@@ -79,27 +79,76 @@ impl Regime {
     }
 }
 
-/// When and where the tool passes every station of a cut (`diagnosis/4`: s and tau).
-pub(super) fn passages(job: &Job, grid: &Grid, regime: &Regime, pass_mm: Option<f64>) -> Vec<Passage> {
-    let segments = &job.shaft.segments;
-    let pace: Vec<(f64, f64)> = segments
-        .iter()
-        .map(|segment| {
-            let target = pass_diameter_mm(segment, pass_mm);
-            let turned = job.stock_profile.is_some() || segment.stock_mm() > target;
-            if turned { regime.pace(target) } else { (0.0, 0.0) }
-        })
-        .collect();
-    // Time and path of whole segments before the tool reaches segment i's near end.
-    let whole = |range: std::ops::Range<usize>| {
-        range.fold((0.0, 0.0), |sum: (f64, f64), i| {
-            (sum.0 + pace[i].0 * segments[i].length_mm, sum.1 + pace[i].1 * segments[i].length_mm)
-        })
+/// A cut as a step of a job: what it turns to and what came before. The default is a job of one cut.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Step {
+    /// Diameter that the pass aims at, where it is one of several.
+    pub pass_mm: Option<f64>,
+    /// That of the pass before, where there is one.
+    pub before_mm: Option<f64>,
+    /// Path that the edge has cut in the passes before, m.
+    pub path_before_m: f64,
+    /// Time in the cut of the passes before, min.
+    pub time_before_min: f64,
+}
+
+impl Step {
+    /// The pass that follows this cut, with the same edge on the same blank and without a pause.
+    pub(super) fn next(&self, job: &Job, regime: &Regime, pass_mm: f64) -> Self {
+        let (time_min, path_m) = whole(job, &paces(job, regime, self));
+        Self {
+            pass_mm: Some(pass_mm),
+            before_mm: self.pass_mm,
+            path_before_m: self.path_before_m + path_m,
+            time_before_min: self.time_before_min + time_min,
+        }
+    }
+
+    /// The first of several passes.
+    pub(super) fn first(pass_mm: f64) -> Self {
+        Self { pass_mm: Some(pass_mm), ..Self::default() }
+    }
+
+    /// Whether the cut takes anything off a segment: what the pass before left, or else the blank, is thicker than
+    /// what this one turns to. A measured blank may be thicker anywhere.
+    fn turns(&self, job: &Job, segment: &Segment) -> bool {
+        let target = pass_diameter_mm(segment, self.pass_mm);
+        let blank = if job.stock_profile.is_some() { f64::INFINITY } else { segment.stock_mm() };
+        let before = self.before_mm.map_or(blank, |before| pass_diameter_mm(segment, Some(before)).min(blank));
+        before > target
+    }
+}
+
+/// Time and path per length in every segment, (min/mm, m/mm); 0 where nothing is cut.
+fn paces(job: &Job, regime: &Regime, step: &Step) -> Vec<(f64, f64)> {
+    let pace = |segment: &Segment| {
+        let target = pass_diameter_mm(segment, step.pass_mm);
+        if step.turns(job, segment) { regime.pace(target) } else { (0.0, 0.0) }
     };
+    job.shaft.segments.iter().map(pace).collect()
+}
+
+/// Time and path of a whole cut.
+fn whole(job: &Job, paces: &[(f64, f64)]) -> (f64, f64) {
+    along(&job.shaft.segments, paces, 0..paces.len())
+}
+
+/// Time and path over whole segments.
+fn along(segments: &[Segment], paces: &[(f64, f64)], range: std::ops::Range<usize>) -> (f64, f64) {
+    range.fold((0.0, 0.0), |(time, path), i| {
+        (time + paces[i].0 * segments[i].length_mm, path + paces[i].1 * segments[i].length_mm)
+    })
+}
+
+/// When and where the tool passes every station of a cut (`diagnosis/4`: p and tau).
+pub(super) fn passages(job: &Job, grid: &Grid, regime: &Regime, step: &Step) -> Vec<Passage> {
+    let segments = &job.shaft.segments;
+    let pace = paces(job, regime, step);
+    // Time and path of whole segments before the tool reaches segment i's near end.
     let before: Vec<(f64, f64)> = (0..segments.len())
         .map(|i| match regime.direction {
-            FeedDirection::ToHeadstock => whole(i + 1..segments.len()),
-            FeedDirection::ToTailstock => whole(0..i),
+            FeedDirection::ToHeadstock => along(segments, &pace, i + 1..segments.len()),
+            FeedDirection::ToTailstock => along(segments, &pace, 0..i),
         })
         .collect();
     let (head, tail) = ends(&job.supports);
@@ -117,23 +166,17 @@ pub(super) fn passages(job: &Job, grid: &Grid, regime: &Regime, pass_mm: Option<
             Passage {
                 u: z / grid.length_mm,
                 between_centres: (z - z_head) / (z_tail - z_head),
-                diameter_mm: pass_diameter_mm(&segments[i], pass_mm),
-                time_min: before[i].0 + pace[i].0 * into,
-                path_m: before[i].1 + pace[i].1 * into,
+                diameter_mm: pass_diameter_mm(&segments[i], step.pass_mm),
+                time_min: step.time_before_min + before[i].0 + pace[i].0 * into,
+                path_m: step.path_before_m + before[i].1 + pace[i].1 * into,
             }
         })
         .collect()
 }
 
-/// Time in the cut over all turned zones, min.
-pub(super) fn cutting_time_min(job: &Job, regime: &Regime, pass_mm: Option<f64>) -> f64 {
-    job.shaft
-        .segments
-        .iter()
-        .map(|segment| (segment, pass_diameter_mm(segment, pass_mm)))
-        .filter(|(segment, target)| job.stock_profile.is_some() || segment.stock_mm() > *target)
-        .map(|(segment, target)| regime.pace(target).0 * segment.length_mm)
-        .sum()
+/// Time in the cut over all turned zones, of this cut and of the passes before it, min.
+pub(super) fn cutting_time_min(job: &Job, regime: &Regime, step: &Step) -> f64 {
+    step.time_before_min + whole(job, &paces(job, regime, step)).0
 }
 
 /// Section that bends in a pass: passes are computed with the finished section of the pass.

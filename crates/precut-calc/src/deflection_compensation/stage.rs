@@ -9,7 +9,7 @@ use super::grid::{Grid, interpolate};
 use super::input::Job;
 use super::model::{Ingredients, Line, Radii, rest_shapes, wanted};
 use super::output::PassOutcome;
-use super::regime::{Regime, passages, section_of_pass};
+use super::regime::{Regime, Step, passages, section_of_pass};
 use super::structure::{Structure, Variant, pass_diameter_mm};
 
 const UM_PER_MM: f64 = 1e3;
@@ -21,8 +21,8 @@ pub(super) struct Stage {
     pub radii: Radii,
     pub line: Line,
     pub cut: CutLine,
-    /// Diameter that the pass aims at, where it is one of several.
-    pub pass_mm: Option<f64>,
+    /// Which of the job's cuts it is.
+    pub step: Step,
 }
 
 impl Stage {
@@ -32,12 +32,12 @@ impl Stage {
         grid: &Grid,
         acting: &Acting,
         regime: Regime,
-        pass_mm: Option<f64>,
+        step: Step,
         radii: Radii,
         monitor: &dyn Monitor,
     ) -> Result<Self, Failure> {
-        let structure = Structure::of(job, &variant(job, acting, &regime, pass_mm))?;
-        let passages = if acting.has_errors() { passages(job, grid, &regime, pass_mm) } else { Vec::new() };
+        let structure = Structure::of(job, &variant(job, acting, &regime, step.pass_mm))?;
+        let passages = if acting.has_errors() { passages(job, grid, &regime, &step) } else { Vec::new() };
         let rest_shapes = rest_shapes(&job.effects, job, grid, &structure)?;
         let ingredients = Ingredients {
             job,
@@ -51,12 +51,12 @@ impl Stage {
         };
         let line = Line::of(&ingredients, structure.beam.profile(&grid.z_mm, wanted(job)));
         let cut = CutLine::of(&line, &radii, monitor)?;
-        Ok(Self { regime, structure, radii, line, cut, pass_mm })
+        Ok(Self { regime, structure, radii, line, cut, step })
     }
 
     /// How the structure of this cut differs from the job as it stands.
     pub(super) fn variant<'a>(&self, job: &Job, acting: &'a Acting) -> Variant<'a> {
-        variant(job, acting, &self.regime, self.pass_mm)
+        variant(job, acting, &self.regime, self.step.pass_mm)
     }
 
     /// Deviation that the cut leaves on the radius when the path is followed that the pass asks for.
@@ -70,7 +70,7 @@ impl Stage {
         let produced: Option<Vec<f64>> = produced.into_iter().collect();
         let produced = produced.ok_or_else(|| {
             Failure::OutOfModel(
-                Finding::new("pass_without_command", "/passes").with("diameter_mm", self.pass_mm.unwrap_or(0.0)),
+                Finding::new("pass_without_command", "/passes").with("diameter_mm", self.step.pass_mm.unwrap_or(0.0)),
             )
         })?;
         Ok((produced, commands))
@@ -116,21 +116,24 @@ pub(super) fn all_cuts(
     if job.passes.is_empty() {
         // The stock of a single cut is known: depth and speed follow it.
         let radii = Radii { target: target_radii_mm(job, grid, None), stock, planned: None };
-        return Ok((Stage::of(job, grid, acting, base, None, radii, monitor)?, Vec::new()));
+        return Ok((Stage::of(job, grid, acting, base, Step::default(), radii, monitor)?, Vec::new()));
     }
     let mut planned = nominal_stock_radii_mm(job, grid);
     let mut outcomes: Vec<PassOutcome> = Vec::new();
-    let mut last = None;
+    let mut last: Option<Stage> = None;
     for (k, pass) in job.passes.iter().enumerate() {
         let share = |k: usize| k as f64 / job.passes.len() as f64;
         monitor.progress(share(k), Message::new("stage_pass").with("pass", k + 1).with("of", job.passes.len()));
         let regime = base.of_pass(pass);
-        let pass_mm = Some(pass.diameter_mm);
+        let step = match &last {
+            None => Step::first(pass.diameter_mm),
+            Some(before) => before.step.next(job, &before.regime, pass.diameter_mm),
+        };
         // Where the blank is thinner than the pass there is nothing to be cut.
         let target: Vec<f64> =
-            target_radii_mm(job, grid, pass_mm).iter().zip(&planned).map(|(t, p)| t.min(*p)).collect();
+            target_radii_mm(job, grid, step.pass_mm).iter().zip(&planned).map(|(t, p)| t.min(*p)).collect();
         let radii = Radii { target: target.clone(), stock, planned: Some(planned) };
-        let mut stage = Stage::of(job, grid, acting, regime, pass_mm, radii, monitor)?;
+        let mut stage = Stage::of(job, grid, acting, regime, step, radii, monitor)?;
         let (produced, commands) = stage.outcome(pass.compensated, monitor)?;
         outcomes.push(pass_outcome(&stage, pass.compensated, &produced, &commands, outcomes.last()));
         stock = produced;
@@ -173,7 +176,7 @@ fn pass_outcome(
     let high = error.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let low = error.iter().copied().fold(f64::INFINITY, f64::min);
     PassOutcome {
-        diameter_mm: stage.pass_mm.unwrap_or(0.0),
+        diameter_mm: stage.step.pass_mm.unwrap_or(0.0),
         compensated,
         produced_diameter_mm: produced.iter().map(|r| 2.0 * r).collect(),
         diameter_error_um: error,

@@ -73,7 +73,7 @@ pub enum DeflectionEffect {
         #[schema(minimum = 0.05, maximum = 1000.0, example = 7.5, extensions(("x-unit" = json!("min")), ("x-symbol" = json!("T"))))]
         time_constant_min: f64,
     },
-    /// The workpiece warms during this cut and is gauged cold: e -= (d/2) alpha q (1 - exp(-`tau_c`/T)).
+    /// The workpiece warms in the cut, pass after pass, and is gauged cold: e -= (d/2) alpha q (1 - exp(-`tau_c`/T)).
     WorkpieceHeating {
         /// Temperature rise of the work when warm.
         #[schema(minimum = 0.0, maximum = 500.0, example = 6.0, extensions(("x-unit" = json!("K")), ("x-symbol" = json!("q"))))]
@@ -273,11 +273,11 @@ impl DeflectionEffect {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DeflectionConditions {
-    /// Path that this edge has cut when the pass begins; needed by `tool_wear`.
+    /// Path that this edge has cut when the job begins, before its first pass; needed by `tool_wear`.
     #[serde(default)]
     #[schema(minimum = 0.0, maximum = 1e6, example = 120.0, extensions(("x-unit" = json!("m")), ("x-symbol" = json!("s")), ("x-group" = json!("effects"))))]
     pub tool_path_at_start_m: Option<f64>,
-    /// Time since the machine was cold when the pass begins; needed by `thermal_growth`.
+    /// Time since the machine was cold when the job begins, before its first pass; needed by `thermal_growth`.
     #[serde(default)]
     #[schema(minimum = 0.0, maximum = 1e5, example = 15.0, extensions(("x-unit" = json!("min")), ("x-symbol" = json!("tau")), ("x-group" = json!("effects"))))]
     pub warm_time_at_start_min: Option<f64>,
