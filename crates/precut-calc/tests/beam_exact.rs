@@ -3,7 +3,7 @@
 
 use crate::beam_support::exact::{Acting, Exact, Plane};
 use crate::beam_support::random::{Case, cases};
-use precut_calc::num::beam::{Beam, Profile, State, Support, ToolLoad, Wanted};
+use precut_calc::num::beam::{Beam, Offset, Profile, State, Support, ToolLoad, Wanted};
 use proptest::prelude::*;
 
 const ALL: Wanted = Wanted { tangential: true, couple: true, weight: true };
@@ -42,6 +42,19 @@ fn scale(case: &Case, profile: &Profile, of: fn(&Profile) -> &[f64]) -> f64 {
 
 fn index(grid: &[f64], tool: f64) -> usize {
     grid.iter().position(|z| (z - tool).abs() <= 0.0).unwrap()
+}
+
+/// Whether a follow rest stands where another support does, with the tool at this place.
+fn meets_a_support(case: &Case, tool: f64) -> bool {
+    let places: Vec<f64> = case
+        .supports
+        .iter()
+        .map(|support| match *support {
+            Support::Centre { z_mm, .. } | Support::Chuck { z_mm, .. } | Support::SteadyRest { z_mm, .. } => z_mm,
+            Support::FollowRest { offset_mm, .. } => tool + offset_mm,
+        })
+        .collect();
+    (0..places.len()).any(|i| places[..i].iter().any(|place| (place - places[i]).abs() < 1e-9))
 }
 
 macro_rules! close {
@@ -113,6 +126,32 @@ proptest! {
                     || (slope - got.coupling_per_n).abs() <= rounding + RELATIVE * scale(&case, &profile, |p| &p.couple_per_n));
             }
         }
+    }
+
+    #[test]
+    fn supports_set_off_the_axis(
+        case in cases(true, 2),
+        share in 0.0..1.0_f64,
+        offsets in prop::collection::vec(-0.1..0.1_f64, 12),
+        force in -500.0..2000.0_f64,
+    ) {
+        let (beam, grid, profile) = whole(&case);
+        let tool = case.place(share);
+        let (i, n) = (index(&grid, tool), case.supports.len());
+        let set_off: Vec<Offset> = (0..n).map(|support| Offset { support, offset_mm: offsets[support] }).collect();
+        let displaced = beam.displaced(&grid, &set_off);
+        let mut exact = Exact::new(&case.segments, &case.supports, case.state, Plane::Radial, tool, &[]);
+        exact.displace(&offsets[..n]);
+        // Two rigid supports at one place that are set off by different amounts contradict each other.
+        if meets_a_support(&case, tool) { return Err(TestCaseError::reject("a follow rest at a support")) }
+        let scale_mm = largest(&displaced.work_mm).max(0.1);
+        close!("open", displaced.work_mm[i], exact.displacement(&exact.open(tool, Acting::default(), n), tool), scale_mm, OF_FORCES);
+        let Some(mut contacts) = profile.contacts.clone() else { return Ok(()) };
+        contacts.displace(displaced.rests_mm);
+        let got = contacts.respond(i, ToolLoad { force_n: force, ..ToolLoad::default() });
+        let (expected, _) = exact.in_contact(tool, Acting { force, ..Acting::default() }, n);
+        let moved = scale(&case, &profile, |p| &p.radial_mm_per_n) * force.abs() + scale_mm;
+        close!("Y", got.displacement_mm + displaced.work_mm[i], exact.displacement(&expected, tool), moved, OF_FORCES);
     }
 
     #[test]

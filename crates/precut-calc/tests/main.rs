@@ -12,6 +12,7 @@ mod deflection_clocks;
 mod deflection_effects;
 mod deflection_properties;
 mod deflection_reference;
+mod deflection_set_off;
 mod diagnosis_answers;
 mod diagnosis_classes;
 mod diagnosis_deflection;

@@ -9,6 +9,8 @@ use super::input::FeedDirection;
 pub(super) struct Acting {
     pub structure: StructureChange,
     pub force: ForceChange,
+    /// Supports that are set off the axis.
+    pub set_off: Vec<SetOff>,
     errors: Vec<ErrorTerm>,
     /// Standard deviation of the radius from trace to trace, mm.
     pub scatter_mm: f64,
@@ -89,16 +91,23 @@ impl ForceChange {
     }
 }
 
-/// A term of the extra radial error e.
+/// A support that is set off the axis; positive away from the tool.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum SetOff {
+    /// The rightmost carrying support.
+    Tailstock { offset_mm: f64 },
+    /// The steady rest at a station, by what it moves the shaft that it holds.
+    SteadyRest { station_mm: f64, offset_mm: f64 },
+}
+
+/// A term of the extra radial error e that depends on nothing but where and when the tool passes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum ErrorTerm {
     Constant { error_mm: f64 },
-    Taper { at_tailstock_mm: f64 },
     Bow { at_middle_mm: f64 },
     Wear { rate_mm_per_m: f64, wear_in_mm: f64, wear_in_path_m: f64, path_at_start_m: f64 },
     Growth { growth_mm: f64, time_constant_min: f64, warm_at_start_min: f64 },
     Heating { strain: f64, time_constant_min: f64 },
-    Rest { rest: usize, offset_mm: f64 },
 }
 
 /// Where and when the tool passes a station.
@@ -106,13 +115,11 @@ enum ErrorTerm {
 pub(super) struct Passage {
     /// z/L.
     pub u: f64,
-    /// Station between headstock (0) and tailstock (1).
-    pub between_centres: f64,
     /// Diameter produced, mm.
     pub diameter_mm: f64,
     /// Path that this edge has cut in the job before the station, in earlier passes and in this one, m.
     pub path_m: f64,
-    /// Time in the cut before the station, min.
+    /// Time in the cut before the station, likewise, min.
     pub time_min: f64,
 }
 
@@ -121,8 +128,13 @@ const MM_PER_UM: f64 = 1e-3;
 impl Acting {
     /// What `effects` change. A condition that is absent counts as 0; [`super::check`] has refused it where it matters.
     pub(super) fn of(effects: &[Effect], conditions: &DeflectionConditions, direction: FeedDirection) -> Self {
-        let mut acting =
-            Self { structure: StructureChange::NONE, force: ForceChange::NONE, errors: Vec::new(), scatter_mm: 0.0 };
+        let mut acting = Self {
+            structure: StructureChange::NONE,
+            force: ForceChange::NONE,
+            set_off: Vec::new(),
+            errors: Vec::new(),
+            scatter_mm: 0.0,
+        };
         for effect in effects {
             acting.add(effect, conditions, direction);
         }
@@ -159,7 +171,7 @@ impl Acting {
             Effect::PloughingForce { force_n } => force.added_passive_n += force_n,
             Effect::SpindleScatter { sd_um } => self.scatter_mm = sd_um * MM_PER_UM,
             Effect::TailstockOffset { offset_um } => {
-                self.errors.push(ErrorTerm::Taper { at_tailstock_mm: offset_um * MM_PER_UM });
+                self.set_off.push(SetOff::Tailstock { offset_mm: offset_um * MM_PER_UM });
             }
             Effect::GuidewayBow { bow_um } => self.errors.push(ErrorTerm::Bow { at_middle_mm: bow_um * MM_PER_UM }),
             Effect::ReversalBacklash { backlash_um } => {
@@ -187,34 +199,27 @@ impl Acting {
                     time_constant_min,
                 });
             }
-            Effect::SteadyRestOffset { offset_um, .. } => {
-                let rest = self.rests();
-                self.errors.push(ErrorTerm::Rest { rest, offset_mm: offset_um * MM_PER_UM });
+            Effect::SteadyRestOffset { station_mm, offset_um } => {
+                self.set_off.push(SetOff::SteadyRest { station_mm, offset_mm: offset_um * MM_PER_UM });
             }
         }
     }
 
-    fn rests(&self) -> usize {
-        self.errors.iter().filter(|term| matches!(term, ErrorTerm::Rest { .. })).count()
-    }
-
     /// Whether any effect adds a radial error.
     pub(super) fn has_errors(&self) -> bool {
-        !self.errors.is_empty()
+        !(self.errors.is_empty() && self.set_off.is_empty())
     }
 
-    /// Extra radial error e at a station, mm, positive = oversize. `rest_shapes` holds, for every
-    /// displaced rest in the order of the effects, the shape phi of the shaft there.
-    pub(super) fn error_mm(&self, at: Passage, rest_shapes: &[f64]) -> f64 {
-        self.errors.iter().map(|term| term.error_mm(at, rest_shapes)).sum()
+    /// Extra radial error e at a station, mm, positive = oversize; without what supports do that are set off.
+    pub(super) fn error_mm(&self, at: Passage) -> f64 {
+        self.errors.iter().map(|term| term.error_mm(at)).sum()
     }
 }
 
 impl ErrorTerm {
-    fn error_mm(self, at: Passage, rest_shapes: &[f64]) -> f64 {
+    fn error_mm(self, at: Passage) -> f64 {
         match self {
             Self::Constant { error_mm } => error_mm,
-            Self::Taper { at_tailstock_mm } => at_tailstock_mm * at.between_centres,
             Self::Bow { at_middle_mm } => 4.0 * at_middle_mm * at.u * (1.0 - at.u),
             Self::Wear { rate_mm_per_m, wear_in_mm, wear_in_path_m, path_at_start_m } => {
                 let path = path_at_start_m + at.path_m;
@@ -226,7 +231,6 @@ impl ErrorTerm {
             Self::Heating { strain, time_constant_min } => {
                 0.5 * at.diameter_mm * strain * (-at.time_min / time_constant_min).exp_m1()
             }
-            Self::Rest { rest, offset_mm } => offset_mm * rest_shapes.get(rest).copied().unwrap_or(0.0),
         }
     }
 }

@@ -19,7 +19,7 @@ use super::grid::{Grid, interpolate};
 use super::hypotheses::{Experiment, chuck_scale_n_mm_per_rad, design};
 use super::input::{FeedDirection, Job, Stations, Theory};
 use super::measurement::DeflectionMeasurement;
-use super::model::{Ingredients, Line, Radii, rest_shapes, wanted};
+use super::model::{Ingredients, Line, Radii, wanted};
 use super::next_runs::next_runs;
 use super::regime::{Regime, Step, passages, section_of_pass};
 use super::structure::{Structure, Variant};
@@ -403,7 +403,7 @@ impl PreparedRun {
         } else {
             Vec::new()
         };
-        let shapes = rest_shapes(&all, &self.job, &self.grid, &structure)?;
+        let displaced = structure.displaced(&self.job, &acting.set_off, &self.grid.z_mm)?;
         let ingredients = Ingredients {
             job: &self.job,
             grid: &self.grid,
@@ -412,7 +412,7 @@ impl PreparedRun {
             regime: &self.regime,
             radii: &self.radii,
             passages: &passages,
-            rest_shapes: &shapes,
+            displaced: displaced.as_ref(),
         };
         let line = Line::of(&ingredients, profile);
         let mut solver = line.solver();

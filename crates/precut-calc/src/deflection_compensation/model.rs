@@ -1,8 +1,6 @@
 //! The model along the shaft: how far the gap opens under the forces of an engaged depth.
 
-use crate::calculator::Failure;
-use crate::effects::DeflectionEffect as Effect;
-use crate::num::beam::{BeamError, Contacts, Profile, ToolLoad, Wanted};
+use crate::num::beam::{Contacts, Displaced, Profile, ToolLoad, Wanted};
 
 use super::acting::{Acting, Passage};
 use super::equilibrium::{Engagement, Opening, engage};
@@ -25,7 +23,7 @@ pub(super) struct Line {
     tangential_mm_per_n: Vec<f64>,
     /// Sag in the radial direction, mm.
     sag_mm: Vec<f64>,
-    /// Stated errors, mm.
+    /// Stated errors, and what supports do that are set off, one-sided rests open, mm.
     error_mm: Vec<f64>,
     /// Sag across it, mm.
     tangential_offset_mm: Vec<f64>,
@@ -83,9 +81,10 @@ pub(super) struct Ingredients<'a> {
     pub structure: &'a Structure,
     pub regime: &'a Regime,
     pub radii: &'a Radii,
+    /// At every station, or none where no effect asks for them.
     pub passages: &'a [Passage],
-    /// Shape of every displaced rest at the stations.
-    pub rest_shapes: &'a [Vec<f64>],
+    /// What supports do that are set off.
+    pub displaced: Option<&'a Displaced>,
 }
 
 impl Line {
@@ -93,8 +92,17 @@ impl Line {
     pub(super) fn of(from: &Ingredients<'_>, profile: Profile) -> Self {
         let Ingredients { job, acting, structure, regime, radii, .. } = *from;
         let include = &job.include;
-        let Profile { radial_mm_per_n, couple_per_n, tangential_mm_per_n, sag_radial_mm, sag_tangential_mm, contacts } =
-            profile;
+        let Profile {
+            radial_mm_per_n,
+            couple_per_n,
+            tangential_mm_per_n,
+            sag_radial_mm,
+            sag_tangential_mm,
+            mut contacts,
+        } = profile;
+        if let (Some(contacts), Some(displaced)) = (&mut contacts, from.displaced) {
+            contacts.displace(displaced.rests_mm.clone());
+        }
         let sign = couple_sign(regime.direction);
         let arm_mm: Vec<f64> =
             if include.axial_moment { radii.target.iter().map(|r| sign * r).collect() } else { Vec::new() };
@@ -270,10 +278,19 @@ impl Line {
         engage(stock_radius_mm, command_mm, start_mm, at_zero, |t| self.opening_at(i, t))
     }
 
-    /// Share of the radial opening that force makes, mm: all but stated errors.
+    /// Share of the radial opening that force makes, mm: all but stated errors and what supports do that are set off.
     #[inline]
     pub(super) fn elastic_mm(&self, i: usize, y_mm: f64) -> f64 {
-        y_mm - at(&self.error_mm, i)
+        y_mm - at(&self.error_mm, i) - self.held_back_mm(i)
+    }
+
+    /// By how much rests that touch with nothing cut hold back a shaft whose supports are set off, mm, <= 0.
+    #[inline]
+    fn held_back_mm(&self, i: usize) -> f64 {
+        match &self.contacts {
+            Some(contacts) if contacts.are_displaced() => contacts.respond(i, ToolLoad::default()).displacement_mm,
+            _ => 0.0,
+        }
     }
 }
 
@@ -339,43 +356,14 @@ pub(super) fn gravity_components(job: &Job) -> (f64, f64) {
     angle.to_radians().sin_cos()
 }
 
+/// Stated errors at every station, mm, with what supports do that are set off; empty where there are none.
 fn errors_mm(from: &Ingredients<'_>) -> Vec<f64> {
-    if !from.acting.has_errors() {
-        return Vec::new();
+    let mut errors: Vec<f64> = from.passages.iter().map(|at| from.acting.error_mm(*at)).collect();
+    if let Some(displaced) = from.displaced {
+        errors.resize(displaced.work_mm.len(), 0.0);
+        for (error, moved) in errors.iter_mut().zip(&displaced.work_mm) {
+            *error += moved;
+        }
     }
-    let mut shapes = vec![0.0; from.rest_shapes.len()];
-    from.passages
-        .iter()
-        .enumerate()
-        .map(|(i, at)| {
-            for (shape, along) in shapes.iter_mut().zip(from.rest_shapes) {
-                *shape = along[i];
-            }
-            from.acting.error_mm(*at, &shapes)
-        })
-        .collect()
-}
-
-/// Shape phi of the shaft for every displaced rest: G(z, z_s)/G(z_s, z_s) without the rest (`diagnosis/4.20`).
-pub(super) fn rest_shapes(
-    effects: &[Effect],
-    job: &Job,
-    grid: &Grid,
-    structure: &Structure,
-) -> Result<Vec<Vec<f64>>, Failure> {
-    effects
-        .iter()
-        .filter_map(|effect| match effect {
-            Effect::SteadyRestOffset { station_mm, .. } => Some(*station_mm),
-            _ => None,
-        })
-        .map(|station_mm| {
-            let rest = super::check::steady_at(job, station_mm)
-                .ok_or_else(|| Failure::Internal("a displaced rest that is no support".to_owned()))?;
-            let unstable = |error: BeamError| Failure::Internal(format!("without the displaced rest: {error}"));
-            let at_rest = structure.beam.influence(station_mm, &[station_mm], Some(rest)).map_err(unstable)?;
-            let along = structure.beam.influence(station_mm, &grid.z_mm, Some(rest)).map_err(unstable)?;
-            Ok(along.into_iter().map(|g| g / at_rest[0]).collect())
-        })
-        .collect()
+    errors
 }

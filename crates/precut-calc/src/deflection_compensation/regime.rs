@@ -6,7 +6,6 @@ use super::acting::Passage;
 use super::grid::Grid;
 use super::input::{Cut, FeedDirection, Job, Pass, Section, Segment, SpeedDiameter};
 use super::structure::pass_diameter_mm;
-use crate::shaft::elastic::ends;
 
 /// Feed, speed and direction of one cut.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -151,10 +150,6 @@ pub(super) fn passages(job: &Job, grid: &Grid, regime: &Regime, step: &Step) -> 
             FeedDirection::ToTailstock => along(segments, &pace, 0..i),
         })
         .collect();
-    let (head, tail) = ends(&job.supports);
-    let station =
-        |support: Option<usize>, other: f64| support.and_then(|i| job.supports[i].station_mm()).unwrap_or(other);
-    let (z_head, z_tail) = (station(head, 0.0), station(tail, grid.length_mm));
     grid.z_mm
         .iter()
         .zip(&grid.segment)
@@ -165,7 +160,6 @@ pub(super) fn passages(job: &Job, grid: &Grid, regime: &Regime, step: &Step) -> 
             };
             Passage {
                 u: z / grid.length_mm,
-                between_centres: (z - z_head) / (z_tail - z_head),
                 diameter_mm: pass_diameter_mm(&segments[i], step.pass_mm),
                 time_min: step.time_before_min + before[i].0 + pace[i].0 * into,
                 path_m: step.path_before_m + before[i].1 + pace[i].1 * into,

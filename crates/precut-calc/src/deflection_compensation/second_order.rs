@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::calculator::{Failure, Finding};
-use crate::num::beam::{Profile, ToolLoad, Wanted};
+use crate::num::beam::{Displaced, Profile, ToolLoad, Wanted};
 
 use super::acting::Acting;
 use super::grid::Grid;
@@ -31,7 +31,7 @@ pub(super) fn second_order(job: &Job, grid: &Grid, acting: &Acting, stage: &Stag
     let sample = Sample::of(grid, stage);
     let variant = stage.variant(job, acting);
     let all = Wanted { tangential: true, couple: true, weight: true };
-    let state = State::of(job, stage, &stage.structure, &sample, all);
+    let state = State::of(job, acting, stage, &stage.structure, &sample, all)?;
     let include = &job.include;
     let with_include = |change: fn(&mut Include)| {
         let mut other = include.clone();
@@ -43,7 +43,7 @@ pub(super) fn second_order(job: &Job, grid: &Grid, acting: &Acting, stage: &Stag
         other.section = section;
         other.theory = theory;
         let structure = Structure::of(job, &other)?;
-        let changed = State::of(job, stage, &structure, &sample, wanted(job));
+        let changed = State::of(job, acting, stage, &structure, &sample, wanted(job))?;
         Ok(sample.largest(|place| changed.moved_mm(place, include) - state.moved_mm(place, include)))
     };
     let other_theory = match job.shaft.theory {
@@ -66,6 +66,8 @@ pub(super) fn second_order(job: &Job, grid: &Grid, acting: &Acting, stage: &Stag
 /// A held shaft at the stations of a sample.
 struct State {
     profile: Profile,
+    /// What supports do that are set off.
+    displaced: Displaced,
     /// Direction of the feed force's couple.
     sign: f64,
     carriage_tangential_mm_per_n: f64,
@@ -74,13 +76,26 @@ struct State {
 }
 
 impl State {
-    fn of(job: &Job, stage: &Stage, structure: &Structure, sample: &Sample, wanted: Wanted) -> Self {
-        Self {
-            profile: structure.beam.profile(&sample.z_mm, wanted),
+    fn of(
+        job: &Job,
+        acting: &Acting,
+        stage: &Stage,
+        structure: &Structure,
+        sample: &Sample,
+        wanted: Wanted,
+    ) -> Result<Self, Failure> {
+        let mut profile = structure.beam.profile(&sample.z_mm, wanted);
+        let displaced = structure.displaced(job, &acting.set_off, &sample.z_mm)?.unwrap_or_default();
+        if let Some(contacts) = &mut profile.contacts {
+            contacts.displace(displaced.rests_mm.clone());
+        }
+        Ok(Self {
+            profile,
+            displaced,
             sign: couple_sign(stage.regime.direction),
             carriage_tangential_mm_per_n: structure.carriage_tangential_mm_per_n,
             gravity: gravity_components(job),
-        }
+        })
     }
 
     /// How far the work moves away on the radius, mm: Y + Z²/(2 r_t), less what the carriage yields. The rests that
@@ -105,7 +120,7 @@ impl State {
         let main_n = if include.tangential { loads.main_n } else { 0.0 };
         let z = (at(&profile.tangential_mm_per_n, k) + self.carriage_tangential_mm_per_n) * main_n
             + at(&profile.sag_tangential_mm, k) * across;
-        y + z * z / (2.0 * target_mm)
+        y + at(&self.displaced.work_mm, k) + z * z / (2.0 * target_mm)
     }
 }
 

@@ -7,7 +7,7 @@ use super::cut::CutLine;
 use super::equilibrium::copying_factor;
 use super::grid::{Grid, interpolate};
 use super::input::Job;
-use super::model::{Ingredients, Line, Radii, rest_shapes, wanted};
+use super::model::{Ingredients, Line, Radii, wanted};
 use super::output::PassOutcome;
 use super::regime::{Regime, Step, passages, section_of_pass};
 use super::structure::{Structure, Variant, pass_diameter_mm};
@@ -38,7 +38,7 @@ impl Stage {
     ) -> Result<Self, Failure> {
         let structure = Structure::of(job, &variant(job, acting, &regime, step.pass_mm))?;
         let passages = if acting.has_errors() { passages(job, grid, &regime, &step) } else { Vec::new() };
-        let rest_shapes = rest_shapes(&job.effects, job, grid, &structure)?;
+        let displaced = structure.displaced(job, &acting.set_off, &grid.z_mm)?;
         let ingredients = Ingredients {
             job,
             grid,
@@ -47,7 +47,7 @@ impl Stage {
             regime: &regime,
             radii: &radii,
             passages: &passages,
-            rest_shapes: &rest_shapes,
+            displaced: displaced.as_ref(),
         };
         let line = Line::of(&ingredients, structure.beam.profile(&grid.z_mm, wanted(job)));
         let cut = CutLine::of(&line, &radii, monitor)?;

@@ -1,10 +1,11 @@
 //! From the job's shaft and supports to the elastic structure.
 
 use crate::calculator::Failure;
-use crate::num::beam::{self, Beam};
+use crate::num::beam::{self, Beam, Displaced, Offset};
 use crate::shaft::elastic::{self, ends};
 
-use super::acting::StructureChange;
+use super::acting::{SetOff, StructureChange};
+use super::check::steady_at;
 use super::input::{FeedDirection, Job, Section, Segment, Theory};
 
 const MM_PER_UM: f64 = 1e-3;
@@ -95,6 +96,36 @@ impl Structure {
                 .max(0.0),
             carriage_tangential_mm_per_n: job.carriage.tangential_compliance_um_per_n * MM_PER_UM,
         })
+    }
+}
+
+impl Structure {
+    /// What supports that are set off do along the shaft, with the tool at every station (`diagnosis/4.5`,
+    /// `diagnosis/4.20`); `None` where all stand on the axis.
+    pub(super) fn displaced(&self, job: &Job, set_off: &[SetOff], z_mm: &[f64]) -> Result<Option<Displaced>, Failure> {
+        if set_off.is_empty() {
+            return Ok(None);
+        }
+        let offsets = set_off.iter().map(|set_off| self.offset(job, *set_off)).collect::<Result<Vec<Offset>, _>>()?;
+        Ok(Some(self.beam.displaced(z_mm, &offsets)))
+    }
+
+    fn offset(&self, job: &Job, set_off: SetOff) -> Result<Offset, Failure> {
+        let missing = |what: &str| Failure::Internal(format!("a checked job has no {what} to set off"));
+        match set_off {
+            SetOff::Tailstock { offset_mm } => {
+                let support = ends(&job.supports).1.ok_or_else(|| missing("tailstock"))?;
+                Ok(Offset { support, offset_mm })
+            }
+            SetOff::SteadyRest { station_mm, offset_mm } => {
+                let support = steady_at(job, station_mm).ok_or_else(|| missing("steady rest"))?;
+                let unstable = |error| Failure::Internal(format!("without the rest that is set off: {error}"));
+                Ok(Offset {
+                    support,
+                    offset_mm: offset_mm * self.beam.offset_per_displacement(support).map_err(unstable)?,
+                })
+            }
+        }
     }
 }
 

@@ -166,7 +166,7 @@ pub enum DeflectionEffect {
         /// Where the steady rest stands; one of the job's supports.
         #[schema(minimum = 0.0, maximum = 100_000.0, example = 310.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("z_s"))))]
         station_mm: f64,
-        /// Offset of the rest, positive away from the tool.
+        /// How far the rest holds the shaft off its axis while nothing is cut, positive away from the tool.
         #[schema(minimum = -1000.0, maximum = 1000.0, example = 8.0, extensions(("x-unit" = json!("um")), ("x-symbol" = json!("delta"))))]
         offset_um: f64,
     },

@@ -144,6 +144,13 @@ impl Exact {
         self.holds.push(hold);
     }
 
+    /// Sets supports off, in the order in which they were given: `displacement - compliance * force = gap + offset`.
+    pub(crate) fn displace(&mut self, offsets: &[f64]) {
+        for hold in self.holds.iter_mut().chain(&mut self.rests).filter(|hold| hold.freedom.is_multiple_of(2)) {
+            hold.gap += offsets[hold.support];
+        }
+    }
+
     pub(crate) fn node(&self, z: f64) -> usize {
         self.nodes.iter().position(|node| (node - z).abs() <= 0.0).unwrap()
     }

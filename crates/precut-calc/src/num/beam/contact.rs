@@ -24,6 +24,8 @@ pub struct Contacts {
     /// Displacement of the rests by each other and by the full weight; one for all stations or one for each.
     pub(super) matrix: Vec<f64>,
     pub(super) rest_sag: Vec<f64>,
+    /// Displacement of the work at the rests, away from them, by supports that are set off; likewise, or empty.
+    pub(super) displaced: Vec<f64>,
 }
 
 /// The state of the shaft under a complete load.
@@ -69,12 +71,25 @@ impl Contacts {
         &self.supports
     }
 
+    /// Puts the rests where supports that are set off leave them: [`super::Displaced::rests_mm`].
+    ///
+    /// Only what touches changes: [`Self::respond`] gives the displacement less [`super::Displaced::work_mm`].
+    pub fn displace(&mut self, rests_mm: Vec<f64>) {
+        self.displaced = rests_mm;
+    }
+
+    /// Whether supports are set off, so that rests may touch without a load.
+    pub fn are_displaced(&self) -> bool {
+        !self.displaced.is_empty()
+    }
+
     /// The complete answer to a load with the tool at a station.
     ///
     /// `Y = W P + G M + sag - sum h_k r_k` with the rests' forces `r >= 0` from the linear complementarity problem
-    /// `s = (H + C) r - (d - gap) >= 0`, `r s = 0`; `d` is the displacement of the rests by the load. `H + C` is
-    /// positive definite, so the solution is unique, and Murty's least-index pivoting finds it in finitely many steps.
-    /// K. G. Murty, Opsearch 11 (1974) 113-135. A station that does not exist answers zero.
+    /// `s = (H + C) r - (d - gap) >= 0`, `r s = 0`; `d` is the displacement of the rests by the load and by supports
+    /// that are set off. `H + C` is positive definite, so the solution is unique, and Murty's least-index pivoting
+    /// finds it in finitely many steps. K. G. Murty, Opsearch 11 (1974) 113-135. A station that does not exist answers
+    /// zero.
     pub fn respond(&self, station: usize, load: ToolLoad) -> Response {
         let count = self.supports.len();
         let at = |values: &[f64]| values.get(station).copied().unwrap_or(0.0);
@@ -94,6 +109,7 @@ impl Contacts {
         let influence = entries(&self.influence, station, count);
         let turned = entries(&self.couple_influence, station, count);
         let sag = entries(&self.rest_sag, station, count);
+        let displaced = entries(&self.displaced, station, count);
         let matrix = entries(&self.matrix, station, count * count);
         let (mut excess, mut scale) = (ZEROS, ZEROS);
         for rest in 0..count {
@@ -101,6 +117,7 @@ impl Contacts {
                 influence[rest] * load.force_n,
                 turned[rest] * load.couple_n_mm,
                 sag[rest] * load.gravity_radial,
+                displaced[rest],
                 -self.gaps_mm[rest],
             ];
             excess[rest] = parts.iter().sum();

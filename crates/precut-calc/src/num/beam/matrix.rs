@@ -92,4 +92,18 @@ impl Symmetric {
         }
         forces
     }
+
+    /// After [`Self::eliminate`]: a further column with the eliminated unknowns in place, as if it had been a column of
+    /// the matrix. Of each unknown of `which` the value divided by the root of its pivot is left, and returned.
+    pub(super) fn reduce_column(&self, which: &[usize], pivots: &[f64], column: &mut [f64]) -> Vec<f64> {
+        let mut eliminated = Vec::with_capacity(which.len());
+        for (&e, &inverse) in which.iter().zip(pivots) {
+            let value = column[e] * inverse;
+            for (entry, factor) in column.iter_mut().zip(self.row(e)) {
+                *entry -= factor * value;
+            }
+            eliminated.push(value);
+        }
+        eliminated
+    }
 }

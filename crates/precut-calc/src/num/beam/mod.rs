@@ -19,6 +19,7 @@
 
 mod bending;
 mod contact;
+mod displaced;
 mod form;
 mod frame;
 mod matrix;
@@ -33,6 +34,7 @@ mod tables;
 mod turning;
 
 pub use contact::{Contacts, MAX_ONE_SIDED_RESTS, Response, ToolLoad};
+pub use displaced::{Displaced, Offset};
 pub use model::{BeamError, Contact, Segment, Side, Springs, State, Support};
 pub use profile::{Profile, Wanted};
 pub use section::{Material, Section, Theory, area_mm2, cowper_shear_coefficient, second_moment_mm4};

@@ -70,6 +70,17 @@ impl Pieces<'_> {
         self.held(k, form)
     }
 
+    /// Displacement at the tool, mm, by supports that are set off: those of the base by `base_mm`, and the redundants so
+    /// that `eliminated` is left of their column ([`super::matrix::Symmetric::reduce_column`]).
+    pub(super) fn displaced(&self, k: usize, base_mm: [f64; 2], eliminated: &[f64]) -> Raised {
+        let mut form = self.bending.reaction(k, 0).scaled(base_mm[0]);
+        form = form.plus(self.bending.reaction(k, 1).scaled(base_mm[1]));
+        for (g, value) in self.reduced(|column| self.influence(k, column)).0.iter().zip(eliminated) {
+            form = form.plus(g.scaled(-value));
+        }
+        form.raised()
+    }
+
     /// Displacement at the tool by a unit load of a fixed unknown that is not eliminated, mm/N.
     pub(super) fn at_rest(&self, k: usize, column: usize) -> Raised {
         let (_, open) = self.reduced(|column| self.influence(k, column));

@@ -174,7 +174,7 @@ impl Beam {
     }
 
     /// Rows of the one-sided rests: fixed ones, then follow rests.
-    fn one_sided(&self) -> Vec<usize> {
+    pub(super) fn one_sided(&self) -> Vec<usize> {
         let one_sided = |support: usize| self.supports[support].gap_mm().is_some();
         let fixed =
             (0..self.unknowns.len()).filter(|&i| !self.unknowns[i].couple && one_sided(self.unknowns[i].support));
@@ -230,16 +230,16 @@ fn scatter(into: &mut Vec<f64>, values: Vec<f64>, slot: usize, count: usize) {
 
 /// Room for the elimination at one station.
 #[derive(Default)]
-struct Reduction {
-    matrix: Symmetric,
-    redundants: Vec<usize>,
-    pivots: Vec<f64>,
+pub(super) struct Reduction {
+    pub(super) matrix: Symmetric,
+    pub(super) redundants: Vec<usize>,
+    pub(super) pivots: Vec<f64>,
     /// Diagonal before the elimination.
     original: Vec<f64>,
 }
 
 impl Reduction {
-    fn reduce(&mut self, works: &Works<'_>, plane: &Plane) {
+    pub(super) fn reduce(&mut self, works: &Works<'_>, plane: &Plane) {
         works.sprung(plane, &mut self.matrix);
         works.redundants(plane, &mut self.redundants);
         self.original.clear();
@@ -248,7 +248,7 @@ impl Reduction {
     }
 
     /// A rest that cannot act: beside the shaft, or at a place that is held rigidly already.
-    fn idle(&self, works: &Works<'_>, plane: &Plane, row: usize) -> bool {
+    pub(super) fn idle(&self, works: &Works<'_>, plane: &Plane, row: usize) -> bool {
         let own = plane.fixed.iter().chain(&plane.follow).nth(row).copied().unwrap_or(0.0);
         works.is_absent(row) || self.matrix.at(row, row) - own <= VANISHING * self.original[row]
     }
