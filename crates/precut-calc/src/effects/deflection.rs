@@ -38,9 +38,9 @@ pub enum DeflectionEffect {
         #[schema(minimum = -0.9, maximum = 5.0, example = 0.12, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("k"))))]
         delta: f64,
     },
-    /// Tailstock set off the spindle axis in the direction of the tool: e += a u, a taper.
+    /// Tailstock set off the axis away from the tool: e += a u between centres, a taper; else as the held shaft bends.
     TailstockOffset {
-        /// Radial error at the tailstock.
+        /// Offset of the tailstock, positive away from the tool: thick at the tailstock.
         #[schema(minimum = -1000.0, maximum = 1000.0, example = 5.0, extensions(("x-unit" = json!("um")), ("x-symbol" = json!("a"))))]
         offset_um: f64,
     },
