@@ -1,10 +1,11 @@
-//! Tailstocks and rests that are set off the axis against the closed forms of the held beam.
+//! Tailstocks and rests that are set off the axis, and headstocks that clamp, against the closed forms of the held beam.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
 use std::f64::consts::PI;
 
-use crate::support::solved;
-use precut_calc::deflection_compensation::Outcome;
+use crate::support::{prepared, solved};
+use precut_calc::calculator::{Check, Finding, Violations};
+use precut_calc::deflection_compensation::{Job, Outcome};
 use serde_json::{Value, json};
 
 const L: f64 = 600.0;
@@ -173,4 +174,38 @@ fn the_state_of_the_blank_shapes_what_a_rest_does() {
     let expected = 2.0 * 10.0 * work(z, b) / work(b, b);
     let found = errors_um(&solved(job))[0];
     assert!((found - expected).abs() < TOLERANCE_UM, "{found} instead of {expected}");
+}
+
+fn faults(job: Value) -> Vec<Finding> {
+    let job: Job = serde_json::from_value(job).unwrap();
+    let mut violations = Violations::default();
+    job.check(&mut violations);
+    violations.into_vec()
+}
+
+#[test]
+fn a_clamping_headstock_is_the_chuck_and_no_rest() {
+    let (p, k) = (150.0, 2.4e7);
+    let clamps = json!({ "kind": "chuck_rotational_stiffness", "ktheta_n_mm_per_rad": k });
+    let chuck =
+        |rotational: f64| json!({ "kind": "chuck", "z_mm": 120.0, "rotational_compliance_rad_per_n_mm": rotational });
+    // The rest stands left of the chuck.
+    let by_effect = solved(job(&[rest(30.0), chuck(1e-6), centre(L)], p, std::slice::from_ref(&clamps)));
+    let stated = solved(job(&[rest(30.0), chuck(1.0 / k), centre(L)], p, &[]));
+    assert_eq!(errors_um(&by_effect), errors_um(&stated));
+    // A centre right of a rest becomes a chuck.
+    let centred = solved(job(&[rest(30.0), centre(120.0), centre(L)], p, std::slice::from_ref(&clamps)));
+    assert_eq!(errors_um(&centred), errors_um(&stated));
+    // Whatever the order in which the supports are given.
+    let reversed = solved(job(&[centre(L), centre(120.0), rest(30.0)], p, std::slice::from_ref(&clamps)));
+    for (a, b) in errors_um(&reversed).iter().zip(errors_um(&stated)) {
+        assert!((a - b).abs() < TOLERANCE_UM);
+    }
+    // Nothing to clamp: rests alone, or rests and a tailstock.
+    for supports in [vec![rest(30.0), rest(L)], vec![rest(0.0), centre(L)]] {
+        let found = faults(job(&supports, p, std::slice::from_ref(&clamps)));
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert_eq!((found[0].code, found[0].pointer.as_str()), ("effect_without_headstock", "/effects/0"));
+    }
+    assert_eq!(prepared(job(&[chuck(0.0)], p, &[clamps])).supports.len(), 1);
 }

@@ -5,7 +5,7 @@ use crate::effects::DeflectionEffect as Effect;
 
 use super::grid::station_count;
 use super::input::{Job, MAX_STATIONS, Stations, Support};
-use crate::shaft::{self, elastic::ends};
+use crate::shaft::{self, elastic::clamping, elastic::ends};
 
 /// Codes of the faults found here.
 pub(super) const CODES: &[&str] = &[
@@ -22,6 +22,7 @@ pub(super) const CODES: &[&str] = &[
     "duplicate_effect",
     "condition_missing",
     "effect_beyond_base",
+    "effect_without_headstock",
     "effect_without_tailstock",
     "effect_without_rest",
     "effect_of_carrying_rest",
@@ -181,6 +182,9 @@ fn check_effect_on_structure(job: &Job, effect: &Effect, at: &dyn Fn(&str) -> St
         Effect::CarriageCompliance { delta_um_per_n } => softens(job.carriage.compliance_um_per_n, delta_um_per_n),
         Effect::TailstockCompliance { .. } | Effect::TailstockOffset { .. } if tail.is_none() => {
             violations.add(Finding::new("effect_without_tailstock", at("")).with("kind", kind));
+        }
+        Effect::ChuckRotationalStiffness { .. } if clamping(&job.supports).is_none() => {
+            violations.add(Finding::new("effect_without_headstock", at("")).with("kind", kind));
         }
         Effect::SteadyRestOffset { station_mm, .. } => match steady_at(job, station_mm) {
             None => violations.add(Finding::new("effect_without_rest", at("/station_mm")).value(station_mm, "mm")),

@@ -8,6 +8,7 @@ use crate::calculator::{
 };
 use crate::effects::{Cause, DEFLECTION_CAUSES, Fit, Parameter};
 use crate::num::beam::second_moment_mm4;
+use crate::shaft::elastic::{clamping, ends};
 
 /// What decides which causes runs can speak about.
 pub(super) struct Experiment<'a> {
@@ -50,9 +51,7 @@ impl Experiment<'_> {
             "steady_rest_offset" if !supports.iter().any(|s| matches!(s, Support::SteadyRest { .. })) => {
                 Some(Inapplicability::NothingToActOn)
             }
-            "chuck_rotational_stiffness" if !matches!(supports.first(), Some(Support::Centre { .. })) => {
-                Some(Inapplicability::NothingToActOn)
-            }
+            "chuck_rotational_stiffness" if !self.headstock_is_centre() => Some(Inapplicability::NothingToActOn),
             "tailstock_compliance" | "tailstock_offset" if self.tailstock_um_per_n().is_none() => {
                 Some(Inapplicability::NothingToActOn)
             }
@@ -89,13 +88,18 @@ impl Experiment<'_> {
         self.runs.windows(2).any(|pair| direction(&pair[0]) != direction(&pair[1]))
     }
 
+    /// A chuck has a rotational compliance of its own, stated in the job.
+    fn headstock_is_centre(&self) -> bool {
+        let head = clamping(&self.job.supports).map(|i| &self.job.supports[i]);
+        matches!(head, Some(Support::Centre { .. }))
+    }
+
     fn headstock_um_per_n(&self) -> Option<f64> {
-        self.job.supports.first().and_then(compliance_um_per_n)
+        ends(&self.job.supports).0.and_then(|i| compliance_um_per_n(&self.job.supports[i]))
     }
 
     fn tailstock_um_per_n(&self) -> Option<f64> {
-        let ends = self.job.supports.iter().filter(|s| matches!(s, Support::Centre { .. } | Support::Chuck { .. }));
-        ends.skip(1).last().and_then(compliance_um_per_n)
+        ends(&self.job.supports).1.and_then(|i| compliance_um_per_n(&self.job.supports[i]))
     }
 
     fn hypotheses_of(&self, cause: &'static Cause) -> Vec<Hypothesis> {

@@ -2,7 +2,7 @@
 
 use crate::calculator::Failure;
 use crate::num::beam::{self, Beam, Displaced, Offset};
-use crate::shaft::elastic::{self, ends};
+use crate::shaft::elastic::{self, clamping, ends};
 
 use super::acting::{SetOff, StructureChange};
 use super::check::steady_at;
@@ -58,6 +58,7 @@ impl Structure {
         let segments: Vec<beam::Segment> =
             job.shaft.segments.iter().map(|segment| beam_segment(job, segment, variant)).collect();
         let (head, tail) = ends(&job.supports);
+        let clamped = clamping(&job.supports);
         let mut supports: Vec<beam::Support> = job
             .supports
             .iter()
@@ -71,7 +72,7 @@ impl Structure {
                 } else {
                     0.0
                 };
-                let rotation = change.headstock_rotation_rad_per_n_mm.filter(|_| Some(i) == head);
+                let rotation = change.headstock_rotation_rad_per_n_mm.filter(|_| Some(i) == clamped);
                 elastic::support(support, added, rotation)
             })
             .collect();

@@ -16,6 +16,21 @@ pub(crate) fn ends(supports: &[Support]) -> (Option<usize>, Option<usize>) {
     (left, right.filter(|right| Some(*right) != left))
 }
 
+/// Index of the support that may hold the shaft against rotation at the headstock: the leftmost chuck or centre. A
+/// steady rest does not clamp, and a centre that is the tailstock is not the headstock.
+pub(crate) fn clamping(supports: &[Support]) -> Option<usize> {
+    let clamps = |s: &Support| matches!(s, Support::Chuck { .. } | Support::Centre { .. });
+    let (index, first) = supports
+        .iter()
+        .enumerate()
+        .filter(|(_, s)| clamps(s))
+        .filter_map(|(i, s)| s.station_mm().map(|z| (i, z)))
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .map(|(i, _)| (i, &supports[i]))?;
+    let is_tailstock = matches!(first, Support::Centre { .. }) && ends(supports).1 == Some(index);
+    (!is_tailstock).then_some(index)
+}
+
 /// Flexibilities and weight of a section (`deflection/3.2`).
 ///
 /// `flexibility` scales bending and shear alike; `gravity_m_per_s2` makes the weight.
