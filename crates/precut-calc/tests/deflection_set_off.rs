@@ -118,6 +118,16 @@ fn a_rest_holds_the_shaft_of_a_tailstock_set_off() {
 }
 
 #[test]
+fn a_rest_on_the_overhang_is_not_taken_for_the_tailstock() {
+    let chuck = json!({ "kind": "chuck", "z_mm": 0.0 });
+    let supports = [chuck, centre(400.0)];
+    let tried = |effects: &[Value]| solved(job(&supports, 100.0, effects)).one_more_rest.is_some();
+    assert!(tried(&[]));
+    assert!(!tried(&[tailstock(20.0)]));
+    assert!(!tried(&[json!({ "kind": "tailstock_compliance", "delta_um_per_n": 0.05 })]));
+}
+
+#[test]
 fn a_one_sided_rest_pushes_and_never_pulls() {
     let with_gap = |gap: f64| [centre(0.0), one_sided(300.0, gap), centre(L)];
     // Set off away from the tool, or toward it by less than its gap, it leaves the shaft alone.

@@ -210,6 +210,13 @@ impl Acting {
         !(self.errors.is_empty() && self.set_off.is_empty())
     }
 
+    /// Whether any effect acts on the outermost carrying supports as such.
+    pub(super) fn changes_an_end(&self) -> bool {
+        let StructureChange { headstock_mm_per_n, tailstock_mm_per_n, .. } = self.structure;
+        let set_off = self.set_off.iter().any(|set_off| matches!(set_off, SetOff::Tailstock { .. }));
+        set_off || headstock_mm_per_n.abs() + tailstock_mm_per_n.abs() > 0.0
+    }
+
     /// Extra radial error e at a station, mm, positive = oversize; without what supports do that are set off.
     pub(super) fn error_mm(&self, at: Passage) -> f64 {
         self.errors.iter().map(|term| term.error_mm(at)).sum()

@@ -114,7 +114,8 @@ pub(super) fn most_deflected(stage: &Stage) -> usize {
 }
 
 /// What a bilateral steady rest would do where the shaft gives way most, as compliant as the stiffest support that
-/// carries: the same cut with it, at a sample of the stations. `None` where the rest would stand at a support.
+/// carries: the same cut with it, at a sample of the stations. `None` where the rest would stand at a support, or beyond
+/// the one that an effect calls headstock or tailstock: it would be taken for that one.
 pub(super) fn one_more_rest(
     job: &Job,
     grid: &Grid,
@@ -139,6 +140,9 @@ pub(super) fn one_more_rest(
         one_sided: false,
         gap_um: 0.0,
     });
+    if acting.changes_an_end() && ends(&with_rest.supports) != ends(&job.supports) {
+        return Ok(None);
+    }
     let radii = stage.radii.at(&chosen);
     let sampled = grid.at(&chosen);
     let held = Stage::of(&with_rest, &sampled, acting, stage.regime, stage.step, radii, monitor)?;
