@@ -168,3 +168,26 @@ fn twice_the_roughness_is_judged() {
     assert_eq!(answered::<FeedSchedule>(&cuts(1.0)).output.verdict, VerdictClass::Named);
     assert_ne!(answered::<FeedSchedule>(&cuts(2.0)).output.verdict, VerdictClass::Refused);
 }
+
+#[test]
+fn rows_and_runs_that_cannot_be_are_told_all_at_once_before_anything_runs() {
+    let mut job = shaft(|index, row| match index {
+        2 => row["z_mm"] = json!(-3.0),
+        5 => row["z_mm"] = json!(5000.0),
+        // Set aside, so nobody asks where it lies.
+        7 => (row["z_mm"], row["excluded"]) = (json!(6000.0), json!(true)),
+        _ => {}
+    });
+    let point = |z: f64| json!({ "z_mm": z, "diameter_mm": 40.0 });
+    job["runs"][0]["commanded_path"] = json!([point(0.0), point(200.0), point(100.0)]);
+    let job: <Diagnosis<DeflectionCompensation> as Calculator>::Input = serde_json::from_value(job).unwrap();
+    let mut violations = Violations::default();
+    job.check(&mut violations);
+    let found: Vec<(&str, String)> = violations.into_vec().into_iter().map(|f| (f.code, f.pointer)).collect();
+    let expected = [
+        ("station_outside_shaft", "/measurements/2/z_mm"),
+        ("station_outside_shaft", "/measurements/5/z_mm"),
+        ("stations_not_ascending", "/runs/0/commanded_path/2/z_mm"),
+    ];
+    assert_eq!(found, expected.map(|(code, pointer)| (code, pointer.to_owned())));
+}

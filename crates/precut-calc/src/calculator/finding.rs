@@ -125,6 +125,12 @@ impl Finding {
     pub fn new(code: &'static str, pointer: impl Into<String>) -> Self {
         Self { code, pointer: pointer.into(), value: None, limit: None, unit: None, values: Values::new() }
     }
+    /// The same about a field of what stands at `pointer`.
+    #[must_use]
+    pub fn under(mut self, pointer: &str) -> Self {
+        self.pointer.insert_str(0, pointer);
+        self
+    }
     /// With the value and the limit that it passed, both in `unit`.
     #[must_use]
     pub fn measured(mut self, value: f64, limit: f64, unit: &'static str) -> Self {

@@ -28,6 +28,17 @@ pub trait ForwardModel {
     /// Conditions of a run that may be set to any value of a range.
     const CONDITIONS: &'static [&'static str];
 
+    /// What is wrong with a measured place and shows without computing: told with all other faults of a job, before
+    /// anything runs. Pointers from the row.
+    fn faults_of_point(_job: &Self::Job, _point: &Self::Point) -> Vec<Finding> {
+        Vec::new()
+    }
+
+    /// Likewise of the conditions of a run; pointers from the run.
+    fn faults_of_run(_run: &Self::Run) -> Vec<Finding> {
+        Vec::new()
+    }
+
     /// Everything that no effect parameter changes, once per diagnosis. Faults of the rows are all given at once.
     fn prepare(
         job: &Self::Job,

@@ -200,6 +200,27 @@ impl ForwardModel for DeflectionCompensation {
     const QUANTITIES: &'static [Quantity] = QUANTITIES;
     const CONDITIONS: &'static [&'static str] = &["depth_mm", "feed_mm_per_rev", "speed_m_per_min"];
 
+    fn faults_of_point(job: &Job, point: &DeflectionPoint) -> Vec<Finding> {
+        let length = job.shaft.length_mm();
+        // Of a shaft without segments that alone is told.
+        let beside = length > 0.0 && !(0.0..=length).contains(&point.z_mm);
+        beside.then(|| outside_shaft("/z_mm".to_owned(), point.z_mm, length)).into_iter().collect()
+    }
+
+    fn faults_of_run(run: &DeflectionRun) -> Vec<Finding> {
+        let mut faults = Vec::new();
+        if run.speed_m_per_min.is_some() && run.spindle_speed_rpm.is_some() {
+            faults.push(Finding::new("speed_or_rpm", "").with("given", "both"));
+        }
+        for (i, pair) in run.commanded_path.windows(2).enumerate() {
+            if pair[1].z_mm <= pair[0].z_mm {
+                let at = format!("/commanded_path/{}/z_mm", i + 1);
+                faults.push(Finding::new("stations_not_ascending", at).measured(pair[1].z_mm, pair[0].z_mm, "mm"));
+            }
+        }
+        faults
+    }
+
     fn prepare(
         job: &Job,
         rows: &Rows<DeflectionRun, DeflectionPoint>,
@@ -332,24 +353,17 @@ impl Diagnosable for DeflectionCompensation {
 }
 
 fn faults_of_rows(job: &Job, rows: &Rows<DeflectionRun, DeflectionPoint>) -> Vec<Finding> {
-    let length: f64 = job.shaft.segments.iter().map(|s| s.length_mm).sum();
     let mut faults = Vec::new();
     for (row, (run, point)) in rows.points.iter().enumerate() {
         if *run >= rows.runs.len() {
             faults.push(Finding::new("unknown_run", format!("/measurements/{row}/run")).with("run", *run));
         }
-        if !(0.0..=length).contains(&point.z_mm) {
-            let at = format!("/measurements/{row}/z_mm");
-            faults.push(outside_shaft(at, point.z_mm, length));
-        }
+        let of_point = DeflectionCompensation::faults_of_point(job, point);
+        faults.extend(of_point.into_iter().map(|fault| fault.under(&format!("/measurements/{row}"))));
     }
     for (k, run) in rows.runs.iter().enumerate() {
-        if run.speed_m_per_min.is_some() && run.spindle_speed_rpm.is_some() {
-            faults.push(Finding::new("speed_or_rpm", format!("/runs/{k}")).with("given", "both"));
-        }
-        if run.commanded_path.windows(2).any(|pair| pair[1].z_mm <= pair[0].z_mm) {
-            faults.push(Finding::new("stations_not_ascending", format!("/runs/{k}/commanded_path")));
-        }
+        let of_run = DeflectionCompensation::faults_of_run(run);
+        faults.extend(of_run.into_iter().map(|fault| fault.under(&format!("/runs/{k}"))));
     }
     faults
 }

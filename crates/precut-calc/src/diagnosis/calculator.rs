@@ -226,17 +226,17 @@ impl<J, R, W, A> Check for DiagnosisJob<J, R, W, A>
 where
     J: Check + utoipa::ToSchema,
     R: utoipa::ToSchema,
-    W: MeasuredRow + Measurement,
+    W: MeasuredRow + Measurement<Model: ForwardModel<Job = J, Run = R>>,
     A: utoipa::ToSchema,
 {
     fn check(&self, violations: &mut Violations) {
         let mut of_base = Violations::default();
         self.job.check(&mut of_base);
-        for mut finding in of_base.into_vec() {
-            finding.pointer = format!("/job{}", finding.pointer);
-            violations.add(finding);
+        for finding in of_base.into_vec() {
+            violations.add(finding.under("/job"));
         }
         check_rows(self, violations);
+        check_places(self, violations);
     }
 }
 
@@ -301,6 +301,27 @@ where
                 .measured(range.to, range.from, "1")
                 .with("name", range.condition.clone())
         });
+    }
+}
+
+/// Faults of single rows that are used and of single runs, as the base tells them.
+fn check_places<J, R, W, A>(job: &DiagnosisJob<J, R, W, A>, violations: &mut Violations)
+where
+    J: utoipa::ToSchema,
+    R: utoipa::ToSchema,
+    W: MeasuredRow + Measurement<Model: ForwardModel<Job = J, Run = R>>,
+    A: utoipa::ToSchema,
+{
+    let rows = job.measurements.rows().iter().enumerate();
+    for (index, row) in rows.filter(|(_, row)| !row.excluded() && row.value(&job.quantity).is_some()) {
+        for fault in W::Model::faults_of_point(&job.job, &row.point()) {
+            violations.add(fault.under(&format!("/measurements/{index}")));
+        }
+    }
+    for (index, run) in job.runs.iter().enumerate() {
+        for fault in W::Model::faults_of_run(run) {
+            violations.add(fault.under(&format!("/runs/{index}")));
+        }
     }
 }
 
