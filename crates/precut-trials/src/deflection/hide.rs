@@ -98,8 +98,16 @@ impl Scaled {
         self.is("chuck_rotational_stiffness").then(|| self.size / (1.0 - self.size) * unit)
     }
 
-    /// Adds what it does at a station of a run.
-    pub(crate) fn act(&self, lathe: &Lathe, run: &Run, index: usize, z: f64, acting: &mut Acting) {
+    /// Adds what it does at a station of a run; `rotation_n_mm_per_rad` is what clamps the shaft at the headstock.
+    pub(crate) fn act(
+        &self,
+        lathe: &Lathe,
+        run: &Run,
+        index: usize,
+        z: f64,
+        rotation_n_mm_per_rad: Option<f64>,
+        acting: &mut Acting,
+    ) {
         let (size, u) = (self.size, z / lathe.length_mm);
         let travelled = if run.to_headstock { lathe.length_mm - z } else { z };
         let cut_m = PI * lathe.diameter_mm * travelled / (1000.0 * run.feed_mm_per_rev);
@@ -111,7 +119,11 @@ impl Scaled {
             "headstock_compliance" => acting.compliance += size * (1.0 - u).powi(2),
             "tailstock_compliance" => acting.compliance += size * u * u,
             "carriage_compliance" => acting.compliance += size,
-            "tailstock_offset" => acting.error_um += size * u,
+            // A shaft between centres follows as a stiff one; one that is clamped bends.
+            "tailstock_offset" => {
+                let clamped = |rotation| super::beam::carried_by_tailstock(lathe, z, Some(rotation));
+                acting.error_um += size * rotation_n_mm_per_rad.map_or(u, clamped);
+            }
             "guideway_bow" => acting.error_um += 4.0 * size * u * (1.0 - u),
             "tool_wear" => {
                 let wear_in = size * 1.5 * form[0];

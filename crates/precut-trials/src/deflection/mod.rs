@@ -300,8 +300,12 @@ fn deviations_um(lathe: &Lathe, runs: &[Run], stations: &[(f64, f64)], hidden: &
 /// Compliance of shaft and centres at a station; `bending` is a factor on the flexibility of the shaft.
 fn elastic_um_per_n(lathe: &Lathe, z: f64, hidden: &[Scaled], bending: f64) -> f64 {
     let change: f64 = hidden.iter().map(Scaled::bending_change).sum();
-    let rotation = hidden.iter().find_map(|effect| effect.chuck_n_mm_per_rad(lathe));
-    beam::compliance_um_per_n(lathe, z, bending * (1.0 + change), rotation)
+    beam::compliance_um_per_n(lathe, z, bending * (1.0 + change), rotation_n_mm_per_rad(lathe, hidden))
+}
+
+/// What clamps the shaft at the headstock, where that is hidden.
+fn rotation_n_mm_per_rad(lathe: &Lathe, hidden: &[Scaled]) -> Option<f64> {
+    hidden.iter().find_map(|effect| effect.chuck_n_mm_per_rad(lathe))
 }
 
 /// Diameter deviation at a station with its compliance, um: the depth that the tool keeps is found by
@@ -315,8 +319,9 @@ fn deviation_um(
     force: f64,
 ) -> f64 {
     let mut acting = Acting::default();
+    let rotation = rotation_n_mm_per_rad(lathe, hidden);
     for effect in hidden {
-        effect.act(lathe, run, index, z, &mut acting);
+        effect.act(lathe, run, index, z, rotation, &mut acting);
     }
     let compliance = elastic + lathe.carriage_um_per_n + acting.compliance;
     let (x, p, n) = lathe.exponents;
