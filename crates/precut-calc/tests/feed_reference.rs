@@ -1,9 +1,10 @@
 //! The reference cases of the feed schedule, in full.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
+use crate::feed_support;
 use crate::feed_support::{conflict, multipliers, near, of_zone, reference, solve, solved, translate};
 use precut_calc::calculator::{Failure, Unwatched};
-use precut_calc::feed_schedule::Outcome;
+use precut_calc::feed_schedule::{Outcome, zone_compliances};
 use serde_json::{Value, json};
 
 /// Objective, totals, zones and multipliers of a file with its own tolerances.
@@ -389,4 +390,65 @@ fn continuous_feed() {
         near("smooth feed", at(&outcome, z), point["feed_mm_per_rev"].as_f64().unwrap(), 1e-6, 0.0);
     }
     let _ = Unwatched;
+}
+
+/// Largest compliance of zones that begin anywhere: the middle of a uniform shaft between rigid centres has l^3/(48 E J),
+/// whether a point that is looked at falls on it or not. Promised is 1e-9.
+#[test]
+fn the_largest_compliance_of_a_zone_is_found_wherever_the_zone_begins() {
+    let (length, diameter, modulus) = (1000.0, 40.0, 210_000.0);
+    let inertia = std::f64::consts::PI * f64::powi(diameter, 4) / 64.0;
+    let of = |from: f64, to: f64| {
+        let job = feed_support::job(json!({
+            "shaft": { "youngs_modulus_n_per_mm2": modulus, "segments": [{ "length_mm": length, "diameter_mm": diameter }] },
+            "supports": [{ "kind": "centre", "z_mm": 0.0 }, { "kind": "centre", "z_mm": length }],
+            "zones": [{ "id": "z1", "z_start_mm": from, "z_end_mm": to, "diameter_mm": diameter, "depth_mm": 1.0 }],
+            "models": {},
+            "limits": { "feed_min_mm_per_rev": 0.1, "feed_max_mm_per_rev": 0.2, "speed_min_m_per_min": 10.0, "speed_max_m_per_min": 20.0 },
+            "objective": { "kind": "time" },
+        }));
+        zone_compliances(&job).unwrap()[0]
+    };
+    let exact = |z: f64| 1000.0 * (z * (length - z)).powi(2) / (3.0 * modulus * inertia * length);
+    for step in 0..=99 {
+        let from = 5.0 * f64::from(step);
+        near(&format!("from {from}"), of(from, length), exact(500.0), 1e-9, 0.0);
+        near(&format!("to {}", length - from), of(0.0, length - from), exact(500.0), 1e-9, 0.0);
+    }
+    // The maximum so near to an end that a point beside the end is beyond it; and ends that are the maximum.
+    for beside in [1e-9, 1e-6, 1e-4, 3e-4, 1e-3, 0.1] {
+        near(&format!("{beside} beside"), of(500.0 - beside, length), exact(500.0), 1e-9, 0.0);
+    }
+    near("falling", of(500.0 + 0.1, length), exact(500.1), 1e-9, 0.0);
+    near("rising", of(0.0, 250.0), exact(250.0), 1e-9, 0.0);
+}
+
+/// A steady rest leaves a maximum on either side of it, a follow rest a jump where it leaves the shaft; the highest counts,
+/// found against short zones.
+#[test]
+fn the_highest_of_several_maxima_of_the_compliance_counts() {
+    let zone = |from: f64, to: f64| json!({ "id": format!("z{from}"), "z_start_mm": from, "z_end_mm": to, "diameter_mm": 40.0, "depth_mm": 1.0 });
+    let steady = |z: f64| json!({ "kind": "steady_rest", "z_mm": z, "compliance_um_per_n": 0.05 });
+    let follow = |offset: f64| json!({ "kind": "follow_rest", "offset_mm": offset, "compliance_um_per_n": 0.1 });
+    let with = |zones: Vec<Value>, rest: &Value| {
+        let job = feed_support::job(json!({
+            "shaft": { "youngs_modulus_n_per_mm2": 210_000.0, "segments": [{ "length_mm": 400.0, "diameter_mm": 40.0 }, { "length_mm": 600.0, "diameter_mm": 50.0 }] },
+            "supports": [{ "kind": "centre", "z_mm": 0.0 }, rest, { "kind": "centre", "z_mm": 1000.0 }],
+            "zones": zones,
+            "models": {},
+            "limits": { "feed_min_mm_per_rev": 0.1, "feed_max_mm_per_rev": 0.2, "speed_min_m_per_min": 10.0, "speed_max_m_per_min": 20.0 },
+            "objective": { "kind": "time" },
+        }));
+        zone_compliances(&job).unwrap()
+    };
+    for rest in [steady(300.0), steady(470.0), steady(640.0), follow(15.0), follow(-70.0)] {
+        // The maximum over 400 zones of 2.5 mm must be that over the whole.
+        let place = |k: u32| 2.5 * f64::from(k);
+        let fine = with((0..400).map(|k| zone(place(k), place(k + 1))).collect(), &rest);
+        for from in [0, 28, 112, 176, 208] {
+            let expected = fine[from as usize..].iter().copied().fold(0.0, f64::max);
+            let found = with(vec![zone(place(from), 1000.0)], &rest)[0];
+            near(&format!("{rest}, from {from}"), found, expected, 1e-9, 0.0);
+        }
+    }
 }
