@@ -24,6 +24,7 @@ mod diagnosis_trials;
 mod diagnosis_worth;
 mod feed_benchmarks;
 mod feed_claims;
+mod feed_continuous;
 mod feed_diagnosis;
 mod feed_diagnosis_trials;
 mod feed_effects;

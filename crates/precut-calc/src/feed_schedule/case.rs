@@ -44,6 +44,8 @@ pub(super) struct ZoneCase {
     pub hardening_max_percent: Option<f64>,
     pub hardening_depth_max_um: Option<f64>,
     pub feed_max_mm_per_rev: f64,
+    /// What a limit on the feed's gradient leaves to a zone that was found.
+    pub ceiling: Option<Ceiling>,
     /// Whether the next zone touches this one: a link in the chain of feed steps.
     pub touches_next: bool,
     /// Exponent of the depth in the passive force.
@@ -52,6 +54,15 @@ pub(super) struct ZoneCase {
     pub models: [Option<ActingModel>; 6],
     /// Further outputs, in the job's order.
     pub further: Vec<ActingModel>,
+}
+
+/// The least of the continuous schedule over a zone: what the zone may not exceed where its feed may change along the
+/// shaft by no more than a gradient.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Ceiling {
+    pub feed_mm_per_rev: f64,
+    /// Feed per time, where the speed is free.
+    pub feed_rate_mm_per_min: Option<f64>,
 }
 
 /// A custom limit in one zone.
@@ -169,6 +180,7 @@ impl<'a> Resolver<'a> {
             hardening_max_percent: zone.hardening_max_percent,
             hardening_depth_max_um: zone.hardening_depth_max_um,
             feed_max_mm_per_rev: zone.feed_max_mm_per_rev.map_or(general, |own| own.min(general)),
+            ceiling: None,
             touches_next: next.is_some_and(|next| (next.z_start_mm - zone.z_end_mm).abs() <= TOUCHING_MM),
             force_depth_exponent: self.job.models.force_y.as_ref().map_or(0.0, |model| model.depth_exponent),
             models: self.models(depth_mm),

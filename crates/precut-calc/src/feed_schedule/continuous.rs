@@ -4,7 +4,7 @@ use crate::calculator::{Failure, Message, Monitor, checkpoint};
 use crate::num::gp;
 
 use super::acting::Bend;
-use super::case::{Case, ZoneCase};
+use super::case::{Case, Ceiling, ZoneCase};
 use super::compliance::Held;
 use super::input::{Goal, Job, SpeedMode, UsageScope};
 use super::models::Output;
@@ -22,23 +22,45 @@ pub(super) struct Asked {
     pub gradient_per_mm: Option<f64>,
 }
 
+/// Zones that were found, with their schedule.
+pub(super) struct Zoned {
+    pub case: Case,
+    pub solved: Solved,
+    pub outcome: Continuous,
+    /// What made them, where a gradient ties their feeds to the limits at other places.
+    pub smooth: Option<Smooth>,
+}
+
+/// Zones under a limit on the gradient, to be asked for under other limits.
+pub(super) struct Smooth {
+    base: Case,
+    grid: Grid,
+    cut: segments::Cut,
+    gradient_per_mm: f64,
+}
+
+impl Smooth {
+    /// The same zones under changed limits; `None` where no continuous schedule keeps these.
+    pub(super) fn changed(
+        &self,
+        change: &dyn Fn(&mut Case),
+        held: Option<&Held>,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<Case>, Failure> {
+        let mut base = self.base.clone();
+        change(&mut base);
+        let field = field(&base, &self.grid, held, Some(self.gradient_per_mm), monitor)?;
+        Ok(field.map(|field| case_of_cut(&base, &self.grid, &self.cut, field.ceilings.as_ref(), held)))
+    }
+}
+
 /// The found zones with their schedule.
-pub(super) fn find(
-    job: &Job,
-    asked: &Asked,
-    held: Option<&Held>,
-    monitor: &dyn Monitor,
-) -> Result<(Case, Solved, Continuous), Unsolved> {
+pub(super) fn find(job: &Job, asked: &Asked, held: Option<&Held>, monitor: &dyn Monitor) -> Result<Zoned, Unsolved> {
     let base = Case::of(job, held, None)?;
     let grid = points(&base, job, asked.grid_points);
     monitor.progress(0.1, Message::new("stage_continuous"));
-    let field = if is_explicit(&base) {
-        match explicit(&base, &grid, held, asked.gradient_per_mm) {
-            Some(field) => field,
-            None => return Err(none(&base, monitor)),
-        }
-    } else {
-        by_program(&base, &grid, held, asked.gradient_per_mm, monitor)?
+    let Some(field) = field(&base, &grid, held, asked.gradient_per_mm, monitor)? else {
+        return Err(none(&base, monitor));
     };
     monitor.progress(0.5, Message::new("stage_segments"));
     let cuts = segments::cut(&grid, &field.cost, asked.segments_max, monitor)?;
@@ -53,7 +75,21 @@ pub(super) fn find(
         )
         .into());
     }
-    choose(&base, &grid, &field, &cuts, asked, held, monitor)
+    choose(base, grid, &field, &cuts, asked, held, monitor)
+}
+
+/// The continuous schedule; `None` where no schedule keeps the limits.
+fn field(
+    base: &Case,
+    grid: &Grid,
+    held: Option<&Held>,
+    gradient: Option<f64>,
+    monitor: &dyn Monitor,
+) -> Result<Option<Field>, Failure> {
+    if is_explicit(base) {
+        return Ok(explicit(base, grid, held, gradient));
+    }
+    by_program(base, grid, held, gradient, monitor)
 }
 
 /// The continuous schedule on the grid.
@@ -66,6 +102,39 @@ struct Field {
     cost: Vec<f64>,
     /// The times of the cuts are final: speed is given and nothing couples the zones.
     exact_cuts: bool,
+    /// What a gradient leaves to zones.
+    ceilings: Option<Ceilings>,
+}
+
+/// The continuous schedule under a gradient over every cell, each named by its right point.
+///
+/// A zone has one feed, and feeds that change in steps have no gradient: what can be kept of it is that they nowhere
+/// exceed a schedule that has none steeper. So the zones honour it too where they are few, and cannot be faster.
+struct Ceilings {
+    ln_feed: Vec<f64>,
+    /// ln(feed times speed), where the speed is free.
+    ln_rate: Option<Vec<f64>>,
+}
+
+impl Ceilings {
+    /// What is left to a zone over points from one to another.
+    fn over(&self, (first, last): (usize, usize), diameter_mm: f64) -> Ceiling {
+        let least = |of: &[f64]| (of[first + 1..=last].iter().copied().fold(f64::INFINITY, f64::min) + ABOVE).exp();
+        let per_speed = 1000.0 / (std::f64::consts::PI * diameter_mm);
+        Ceiling {
+            feed_mm_per_rev: least(&self.ln_feed),
+            feed_rate_mm_per_min: self.ln_rate.as_ref().map(|ln_rate| per_speed * least(ln_rate)),
+        }
+    }
+}
+
+/// How far above the continuous schedule a ceiling stands, in logarithms: where a zone's own limits allow no more than
+/// the schedule has there, it is they that bind, and have the price. Zones may be faster by this share at most.
+const ABOVE: f64 = 1e-6;
+
+/// The lesser of both ends of every cell, by its right point.
+fn of_cells(points: &[f64]) -> Vec<f64> {
+    (0..points.len()).map(|k| if k == 0 { points[0] } else { points[k - 1].min(points[k]) }).collect()
 }
 
 /// No limit couples the points and the speed is given: the feed is explicit.
@@ -197,12 +266,16 @@ fn explicit(base: &Case, grid: &Grid, held: Option<&Held>, gradient: Option<f64>
         return None;
     }
     let cost: Vec<f64> = works.iter().zip(&ln_feed).map(|(w, x)| w / (speed * x.exp())).collect();
+    // A usage limit is the zones' own affair: at one speed and depth its cap on the feed is one number, no steeper than
+    // anything, so zones below what the other limits leave are not faster than the continuous schedule with it.
+    let ceilings = gradient.map(|_| Ceilings { ln_feed: of_cells(&enveloped(f64::INFINITY)), ln_rate: None });
     Some(Field {
         time_min: grid.integral(&cost),
         ln_feed,
         speed_m_per_min: Some(speed),
         cost,
-        exact_cuts: usage_max.is_none() && base.limits.feed_step_ratio_max.is_none() && gradient.is_none(),
+        exact_cuts: usage_max.is_none() && base.limits.feed_step_ratio_max.is_none(),
+        ceilings,
     })
 }
 
@@ -236,7 +309,7 @@ fn by_program(
     held: Option<&Held>,
     gradient: Option<f64>,
     monitor: &dyn Monitor,
-) -> Result<Field, Unsolved> {
+) -> Result<Option<Field>, Failure> {
     let compliance = held.map(|held| held.at(&grid.z_mm));
     let mut case = base.clone();
     case.zones = Vec::new();
@@ -259,10 +332,11 @@ fn by_program(
         of_cell.push(k);
         add_zone(&mut case, base, zone, cell);
     }
-    let solved = solve_cells(&case, gradient, monitor).map_err(|unsolved| match unsolved {
-        Unsolved::Infeasible(_) => none(base, monitor),
-        Unsolved::Failed(failure) => Unsolved::Failed(failure),
-    })?;
+    let solved = match solve_cells(&case, gradient, monitor) {
+        Ok(solved) => solved,
+        Err(Unsolved::Infeasible(_)) => return Ok(None),
+        Err(Unsolved::Failed(failure)) => return Err(failure),
+    };
     let mut ln_feed = vec![f64::INFINITY; grid.z_mm.len()];
     let mut ln_speed = vec![0.0; grid.z_mm.len()];
     for (cell, &k) in of_cell.iter().enumerate() {
@@ -280,13 +354,24 @@ fn by_program(
         })
         .collect();
     let common = matches!(base.variables.speed, SpeedMode::ConstantSpeed | SpeedMode::Fixed);
-    Ok(Field {
+    Ok(Some(Field {
         time_min: super::assess::cutting_time_min(&case, &solved.at),
         speed_m_per_min: common.then(|| ln_speed[0].exp()),
+        ceilings: gradient.map(|_| ceilings_of_cells(base, grid, &of_cell, &solved.at)),
         ln_feed,
         cost,
         exact_cuts: false,
-    })
+    }))
+}
+
+/// The solved cells as ceilings.
+fn ceilings_of_cells(base: &Case, grid: &Grid, of_cell: &[usize], at: &[(f64, f64)]) -> Ceilings {
+    let mut ln_feed = vec![f64::INFINITY; grid.z_mm.len()];
+    let mut ln_rate = ln_feed.clone();
+    for (&k, &(u, x)) in of_cell.iter().zip(at) {
+        (ln_feed[k], ln_rate[k]) = (x, u + x);
+    }
+    Ceilings { ln_feed, ln_rate: (base.variables.speed != SpeedMode::Fixed).then_some(ln_rate) }
 }
 
 /// Solves the cells, with the gradient as a feed step between the middles of neighbours.
@@ -344,35 +429,35 @@ fn none(base: &Case, monitor: &dyn Monitor) -> Unsolved {
 
 /// The fewest zones within the loss, with their schedule.
 fn choose(
-    base: &Case,
-    grid: &Grid,
+    base: Case,
+    grid: Grid,
     field: &Field,
     cuts: &[segments::Cut],
     asked: &Asked,
     held: Option<&Held>,
     monitor: &dyn Monitor,
-) -> Result<(Case, Solved, Continuous), Unsolved> {
+) -> Result<Zoned, Unsolved> {
     let allowed = field.time_min * (1.0 + asked.loss_percent / 100.0);
     let loss = |time: f64| 100.0 * (time / field.time_min - 1.0);
     let mut by_segments = Vec::with_capacity(cuts.len());
-    let mut chosen: Option<(Case, Solved)> = None;
+    let mut chosen: Option<(&segments::Cut, Case, Solved)> = None;
     let mut reached = false;
     for cut in cuts {
         checkpoint(monitor)?;
-        let boundaries_mm: Vec<f64> = segments::boundaries(grid, cut);
+        let boundaries_mm: Vec<f64> = segments::boundaries(&grid, cut);
         let mut time = cut.cost;
         // With given speed and no coupling the cut's own time is the optimum; only the zones answered are solved.
         let last = cut.segments == cuts[cuts.len() - 1].segments;
         let wanted = !reached && (!field.exact_cuts || time <= allowed || last);
         if wanted {
-            let case = case_of_cut(base, grid, cut, held);
+            let case = case_of_cut(&base, &grid, cut, field.ceilings.as_ref(), held);
             match solve(&case, false, monitor) {
                 Ok(solved) => {
                     if !field.exact_cuts {
                         time = super::assess::cutting_time_min(&case, &solved.at);
                     }
                     reached = time <= allowed * (1.0 + 1e-12);
-                    chosen = Some((case, solved));
+                    chosen = Some((cut, case, solved));
                 }
                 Err(Unsolved::Infeasible(_)) => continue,
                 Err(failed) => return Err(failed),
@@ -385,7 +470,7 @@ fn choose(
             boundaries_mm,
         });
     }
-    let Some((case, solved)) = chosen else { return Err(none(base, monitor)) };
+    let Some((cut, case, solved)) = chosen else { return Err(none(&base, monitor)) };
     let time = super::assess::cutting_time_min(&case, &solved.at);
     let outcome = Continuous {
         cutting_time_min: field.time_min,
@@ -397,11 +482,18 @@ fn choose(
         feed_mm_per_rev: field.ln_feed.iter().map(|x| x.exp()).collect(),
         by_segments,
     };
-    Ok((case, solved, outcome))
+    let smooth = asked.gradient_per_mm.map(|gradient_per_mm| Smooth { base, grid, cut: cut.clone(), gradient_per_mm });
+    Ok(Zoned { case, solved, outcome, smooth })
 }
 
 /// The case of the zones of a cut.
-fn case_of_cut(base: &Case, grid: &Grid, cut: &segments::Cut, held: Option<&Held>) -> Case {
+fn case_of_cut(
+    base: &Case,
+    grid: &Grid,
+    cut: &segments::Cut,
+    ceilings: Option<&Ceilings>,
+    held: Option<&Held>,
+) -> Case {
     let mut case = base.clone();
     case.zones = Vec::with_capacity(cut.pieces.len());
     case.custom.clear();
@@ -419,6 +511,7 @@ fn case_of_cut(base: &Case, grid: &Grid, cut: &segments::Cut, held: Option<&Held
         {
             piece.compliance_um_per_n = Some(c[k]);
         }
+        piece.ceiling = ceilings.map(|ceilings| ceilings.over(cut.pieces[k], piece.diameter_mm));
         piece.touches_next = stretches.get(k + 1).is_some_and(|next| (next.0 - to).abs() <= super::case::TOUCHING_MM);
         add_zone(&mut case, base, zone, piece);
     }

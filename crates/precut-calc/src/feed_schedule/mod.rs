@@ -89,7 +89,7 @@ impl Calculator for FeedSchedule {
     const META: Meta = Meta {
         id: "feed-schedule",
         kind: CalculatorKind::Calculator,
-        version: 2,
+        version: 3,
         title: "Feed schedule",
         question: "Which feed and speed in which zone: fastest within tolerance, roughness, tool life and power?",
         summary: "From a shaft in its supports, models of force, tool life and surface, and limits: feed and speed of \
@@ -172,9 +172,13 @@ impl Calculator for FeedSchedule {
             ms += zones * (0.2 + 0.004 * f64::from(wanted.stations_per_zone));
         }
         let mut driver = "/zones";
-        if let Method::Continuous { grid_points, segments_max, .. } = &job.method {
+        if let Method::Continuous { grid_points, segments_max, feed_gradient_per_mm, .. } = &job.method {
             let (points, segments) = (f64::from(*grid_points), f64::from(*segments_max));
             ms += points * points * segments * 1e-6 + points * 0.05 + segments * segments * 0.02;
+            // Every point of a trade-off has a continuous schedule of its own.
+            if let (Some(wanted), Some(_)) = (&job.trade_off, feed_gradient_per_mm) {
+                ms += points * 0.05 * f64::from(wanted.count);
+            }
             driver = "/method/grid_points";
         }
         if !job.effects.is_empty() {

@@ -209,7 +209,7 @@ fn family(constraint: &str) -> (&'static str, u8) {
         "tool_usage" | "tool_life_min" => ("binds_edge", 3),
         "speed_min" | "speed_max" => ("binds_speed_bound", 4),
         "power" | "torque" | "rpm_min" | "rpm_max" | "feed_rate_max" => ("binds_machine", 5),
-        "feed_step" => ("binds_feed_step", 6),
+        "feed_step" | "feed_gradient" => ("binds_feed_step", 6),
         "feed_min" | "feed_max" => ("binds_feed_bound", 7),
         "time_max" => ("binds_time", 8),
         "force_z" | "force_y" => ("binds_force", 9),

@@ -42,7 +42,8 @@ pub enum Method {
         #[serde(default = "most_segments")]
         #[schema(minimum = 1, maximum = 60, default = 24, example = 24, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("K"))))]
         segments_max: u32,
-        /// Largest change of ln(feed) along the shaft, for the surface's sake.
+        /// Largest change of ln(feed) along the shaft, for the surface's sake: zones are steps below the schedule that
+        /// keeps it.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schema(minimum = 1e-9, maximum = 100.0, example = 0.004, extensions(("x-unit" = json!("1/mm")), ("x-symbol" = json!("g"))))]
         feed_gradient_per_mm: Option<f64>,

@@ -34,6 +34,7 @@ pub(super) enum Kind {
     SpeedMin,
     SpeedMax,
     FeedStep,
+    FeedGradient,
     Custom(String),
     Coupling(String),
     /// A step of successive linearisation may not go further.
@@ -65,6 +66,7 @@ impl Kind {
             Self::SpeedMin => "speed_min",
             Self::SpeedMax => "speed_max",
             Self::FeedStep => "feed_step",
+            Self::FeedGradient => "feed_gradient",
             Self::Custom(name) | Self::Coupling(name) => return Cow::Owned(name.clone()),
             Self::Trust => "trust",
             Self::Epigraph => "largest",
@@ -364,6 +366,13 @@ impl Builder<'_> {
         let (low, high) = (limits.speed_min_m_per_min, limits.speed_max_m_per_min);
         self.row(i, -1.0, 0.0, low.ln(), Kind::SpeedMin, low, "m/min", false);
         self.row(i, 1.0, 0.0, -high.ln(), Kind::SpeedMax, high, "m/min", false);
+        if let Some(ceiling) = zone.ceiling {
+            let most = ceiling.feed_mm_per_rev;
+            self.row(i, 0.0, 1.0, -most.ln(), Kind::FeedGradient, most, "mm/rev", false);
+            if let Some(rate) = ceiling.feed_rate_mm_per_min {
+                self.row(i, 1.0, 1.0, per_speed - rate.ln(), Kind::FeedGradient, rate, "mm/min", false);
+            }
+        }
     }
 
     fn custom(&mut self, i: usize) {

@@ -10,7 +10,7 @@ use super::binding::binding;
 use super::case::Case;
 use super::compensated;
 use super::compliance::Held;
-use super::continuous::{self, Asked};
+use super::continuous::{self, Asked, Smooth};
 use super::infeasible::Infeasibility;
 use super::input::{FeedMode, Goal, Job};
 use super::models::Output;
@@ -31,6 +31,7 @@ struct Found {
     at: Vec<(f64, f64)>,
     rule: Option<EqualDeflection>,
     continuous: Option<Continuous>,
+    smooth: Option<Smooth>,
     passes: Option<PassesOutcome>,
 }
 
@@ -51,7 +52,7 @@ pub(super) fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, F
     let mut outcome = outcome(job, &found, zones);
     outcome.comparison = comparison(&found, outcome.cutting_time_min, monitor)?;
     if let Some(wanted) = &job.trade_off {
-        outcome.trade_off = trade_off(&found.case, wanted, monitor)?;
+        outcome.trade_off = trade_off(&found, wanted, held.as_ref(), monitor)?;
     }
     if let Some(wanted) = &job.compensation {
         monitor.progress(0.9, Message::new("stage_path"));
@@ -67,14 +68,22 @@ fn by_method(job: &Job, held: Option<&Held>, monitor: &dyn Monitor) -> Result<Fo
     if let Some(plan) = &job.passes {
         let (case, solved, passes) = passes::best(job, plan, held, monitor)?;
         let at = solved.at.clone();
-        return Ok(Found { case, solved: Some(solved), at, rule: None, continuous: None, passes: Some(passes) });
+        return Ok(Found {
+            case,
+            solved: Some(solved),
+            at,
+            rule: None,
+            continuous: None,
+            smooth: None,
+            passes: Some(passes),
+        });
     }
     match &job.method {
         Method::Optimal => {
             let case = Case::of(job, held, None)?;
             let solved = solve(&case, true, monitor)?;
             let at = solved.at.clone();
-            Ok(Found { case, solved: Some(solved), at, rule: None, continuous: None, passes: None })
+            Ok(Found { case, solved: Some(solved), at, rule: None, continuous: None, smooth: None, passes: None })
         }
         Method::EqualDeflection { target, target_um, reference_feed_mm_per_rev, speed_m_per_min } => {
             let case = Case::of(job, held, None)?;
@@ -82,7 +91,7 @@ fn by_method(job: &Job, held: Option<&Held>, monitor: &dyn Monitor) -> Result<Fo
             let target = Target::of(*target, *target_um);
             let (at, rule) = rule::equal_deflection(&case, &speeds, *reference_feed_mm_per_rev, target)
                 .ok_or_else(|| Failure::OutOfModel(Finding::new("nothing_bends", "/zones")))?;
-            Ok(Found { case, solved: None, at, rule: Some(rule), continuous: None, passes: None })
+            Ok(Found { case, solved: None, at, rule: Some(rule), continuous: None, smooth: None, passes: None })
         }
         Method::Continuous { grid_points, loss_percent, segments_max, feed_gradient_per_mm } => {
             let asked = Asked {
@@ -91,9 +100,16 @@ fn by_method(job: &Job, held: Option<&Held>, monitor: &dyn Monitor) -> Result<Fo
                 segments_max: *segments_max as usize,
                 gradient_per_mm: *feed_gradient_per_mm,
             };
-            let (case, solved, continuous) = continuous::find(job, &asked, held, monitor)?;
-            let at = solved.at.clone();
-            Ok(Found { case, solved: Some(solved), at, rule: None, continuous: Some(continuous), passes: None })
+            let zoned = continuous::find(job, &asked, held, monitor)?;
+            Ok(Found {
+                case: zoned.case,
+                at: zoned.solved.at.clone(),
+                solved: Some(zoned.solved),
+                rule: None,
+                continuous: Some(zoned.outcome),
+                smooth: zoned.smooth,
+                passes: None,
+            })
         }
     }
 }
@@ -238,6 +254,8 @@ fn comparison(found: &Found, time_min: f64, monitor: &dyn Monitor) -> Result<Com
     let mut constant_feed = None;
     if case.variables.feed != FeedMode::Fixed {
         case.variables.feed = FeedMode::Constant;
+        // A single feed has no gradient.
+        case.zones.iter_mut().for_each(|zone| zone.ceiling = None);
         match solve(&case, false, monitor) {
             Ok(solved) => {
                 let time = assess::cutting_time_min(&case, &solved.at);
@@ -268,25 +286,20 @@ fn comparison(found: &Found, time_min: f64, monitor: &dyn Monitor) -> Result<Com
 }
 
 /// The same zones with all limits of one kind multiplied by a factor that runs over a range.
-fn trade_off(case: &Case, wanted: &TradeOff, monitor: &dyn Monitor) -> Result<Vec<TradePoint>, Failure> {
+fn trade_off(
+    found: &Found,
+    wanted: &TradeOff,
+    held: Option<&Held>,
+    monitor: &dyn Monitor,
+) -> Result<Vec<TradePoint>, Failure> {
     let last = f64::from(wanted.count - 1);
     (0..wanted.count)
         .map(|k| {
             checkpoint(monitor)?;
             let share = f64::from(k) / last;
             let factor = (wanted.factor_from.ln() * (1.0 - share) + wanted.factor_to.ln() * share).exp();
-            let mut scaled = case.clone();
-            let times = |limit: &mut Option<f64>| {
-                if let Some(limit) = limit {
-                    *limit *= factor;
-                }
-            };
-            match wanted.limit {
-                TradedLimit::Deflection => scaled.zones.iter_mut().for_each(|zone| times(&mut zone.deflection_max_um)),
-                TradedLimit::Roughness => scaled.zones.iter_mut().for_each(|zone| times(&mut zone.roughness_max_um)),
-                TradedLimit::ToolUsage => times(&mut scaled.limits.tool_usage_max),
-                TradedLimit::Time => times(&mut scaled.limits.time_max_min),
-            }
+            let none = TradePoint { factor, objective: None, cutting_time_min: None, tool_usage: None };
+            let Some(scaled) = scaled(found, wanted.limit, factor, held, monitor)? else { return Ok(none) };
             match solve(&scaled, false, monitor) {
                 Ok(solved) => {
                     let usage: Option<f64> = scaled
@@ -305,10 +318,44 @@ fn trade_off(case: &Case, wanted: &TradeOff, monitor: &dyn Monitor) -> Result<Ve
                     })
                 }
                 Err(Unsolved::Failed(Failure::Cancelled)) => Err(Failure::Cancelled),
-                Err(_) => Ok(TradePoint { factor, objective: None, cutting_time_min: None, tool_usage: None }),
+                Err(_) => Ok(none),
             }
         })
         .collect()
+}
+
+/// The found zones with all limits of one kind multiplied by a factor; `None` where they then have no schedule.
+fn scaled(
+    found: &Found,
+    limit: TradedLimit,
+    factor: f64,
+    held: Option<&Held>,
+    monitor: &dyn Monitor,
+) -> Result<Option<Case>, Failure> {
+    let change = |case: &mut Case| {
+        let times = |limit: &mut Option<f64>| {
+            if let Some(limit) = limit {
+                *limit *= factor;
+            }
+        };
+        match limit {
+            TradedLimit::Deflection => case.zones.iter_mut().for_each(|zone| times(&mut zone.deflection_max_um)),
+            TradedLimit::Roughness => case.zones.iter_mut().for_each(|zone| times(&mut zone.roughness_max_um)),
+            TradedLimit::ToolUsage => times(&mut case.limits.tool_usage_max),
+            TradedLimit::Time => times(&mut case.limits.time_max_min),
+        }
+    };
+    let Some(smooth) = &found.smooth else {
+        let mut case = found.case.clone();
+        change(&mut case);
+        return Ok(Some(case));
+    };
+    match smooth.changed(&change, held, monitor) {
+        Ok(case) => Ok(case),
+        Err(Failure::Cancelled) => Err(Failure::Cancelled),
+        // As where the zones' own program finds nothing: the point stays empty.
+        Err(_) => Ok(None),
+    }
 }
 
 /// Limits that a schedule breaks, with what it reaches: for schedules that no program made.
