@@ -180,3 +180,32 @@ fn zones_under_a_gradient_are_never_faster_than_the_continuous_schedule() {
         }
     }
 }
+
+/// One usage limit over two depths has no one cap on the feed: then the points are a program. Nothing else varies along
+/// the zones, so two zones lose nothing, and the optimum over the given zones is the same.
+#[test]
+fn a_usage_limit_over_several_depths_has_a_continuous_schedule() {
+    let zone = |id: &str, z: f64, depth: f64| json!({ "id": id, "z_start_mm": z, "z_end_mm": z + 200.0, "diameter_mm": 60.0, "depth_mm": depth, "roughness_max_um": 20.0 });
+    let mut job = json!({
+        "zones": [zone("a", 0.0, 0.5), zone("b", 200.0, 2.0)],
+        "models": {
+            "tool_life": { "form": "log_log", "constant": 14.0, "speed_exponent": -2.5, "feed_exponent": -1.6, "depth_exponent": -0.7 },
+            "roughness": { "form": "log_log", "constant": 4.0, "feed_exponent": 0.9 },
+        },
+        "limits": { "feed_min_mm_per_rev": 0.01, "feed_max_mm_per_rev": 2.0, "speed_min_m_per_min": 50.0, "speed_max_m_per_min": 200.0, "tool_usage_max": 0.02 },
+        "variables": { "speed": "fixed", "fixed_speed_m_per_min": 100.0 },
+        "objective": { "kind": "time" },
+    });
+    let given = solved(job.clone());
+    assert!(
+        given.tool_usage.unwrap() > 0.02 * (1.0 - 1e-6)
+            && given.zones[0].feed_mm_per_rev > given.zones[1].feed_mm_per_rev * 1.1
+    );
+    job["method"] = json!({ "kind": "continuous", "grid_points": 41 });
+    let outcome = solved(job);
+    let found = outcome.continuous.as_ref().unwrap();
+    assert_eq!(found.segments, 2);
+    // Both programs are solved to a gap of 1e-9.
+    near("continuous", found.cutting_time_min, given.cutting_time_min, 1e-7, 0.0);
+    near("zones", outcome.cutting_time_min, given.cutting_time_min, 1e-7, 0.0);
+}

@@ -86,10 +86,11 @@ fn field(
     gradient: Option<f64>,
     monitor: &dyn Monitor,
 ) -> Result<Option<Field>, Failure> {
-    if is_explicit(base) {
-        return Ok(explicit(base, grid, held, gradient));
+    let explicit = if is_explicit(base) { explicit(base, grid, held, gradient) } else { None };
+    match explicit {
+        Some(field) => Ok(Some(field)),
+        None => by_program(base, grid, held, gradient, monitor),
     }
-    by_program(base, grid, held, gradient, monitor)
 }
 
 /// The continuous schedule on the grid.
