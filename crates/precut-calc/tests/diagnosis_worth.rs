@@ -131,6 +131,36 @@ fn a_schedule_made_with_too_smooth_a_model_oversteps_its_roughness_by_the_shift(
     assert!((used(std::slice::from_ref(&shift)) - 1.0).abs() < 1e-4);
 }
 
+/// Zones that were found, and passes, have names that the job does not: what comes of them is judged by the limits of the
+/// zone that they lie in, and a roughing pass has none on its surface.
+#[test]
+fn what_comes_of_zones_and_passes_that_were_found_is_told_as_of_given_ones() {
+    let paper = FeedSchedule::META.examples.iter().find(|example| example.id == "paper").unwrap();
+    let mut base: Value = serde_json::from_str(paper.job).unwrap();
+    for (k, zone) in base["zones"].as_array_mut().unwrap().iter_mut().enumerate() {
+        // Roughness alone limits the feed, in each zone by its own limit; names that only look like pieces of another.
+        zone["roughness_max_um"] = json!(2.0 + 0.2 * k as f64);
+        zone["deflection_max_um"] = json!(1000.0);
+        zone["id"] = json!(if k == 0 { "z".to_owned() } else { format!("z.{k}") });
+        zone.as_object_mut().unwrap().remove("surface");
+    }
+    base["limits"].as_object_mut().unwrap().remove("tool_usage_max");
+    let mut found = base.clone();
+    found["method"] = json!({ "kind": "continuous", "grid_points": 61, "segments_max": 24 });
+    found["objective"] = json!({ "kind": "time" });
+    let mut passes = base;
+    passes["passes"] =
+        json!({ "total_depth_mm": 0.6, "roughing_passes_max": 1, "depth_min_mm": 0.1, "depth_max_mm": 0.5 });
+    let shift = MachinabilityEffect::LevelShift { delta_ln: 0.2, output: Some("roughness".to_owned()) };
+    for value in [found, passes] {
+        let job = job::<FeedSchedule>(value);
+        let told =
+            FeedSchedule::consequences(&job, "roughness_um", &[], &[], &[vec![shift.clone()]]).unwrap()[0].values[0];
+        // The programme is solved to 1e-8 of its objective; a limit that binds holds to some 1e-6.
+        assert!((told.unwrap() - 0.2_f64.exp()).abs() < 1e-4, "{told:?}");
+    }
+}
+
 #[test]
 fn the_example_says_what_its_model_saves_on_the_next_shaft() {
     let answer = answered(&headstock());

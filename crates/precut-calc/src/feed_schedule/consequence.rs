@@ -7,7 +7,7 @@ use super::FeedSchedule;
 use super::forward::{MachinabilityPoint, MachinabilityRun};
 use super::input::{Job, Zone};
 
-/// The measured output in the zone where it comes closest to its limit, as a share of the limit, for each of `acting`.
+/// The measured output in the zone, given or found, where it comes closest to its limit, as a share of the limit, for each of `acting`.
 /// Empty where the job has no zones, no limit of that output, or no schedule with `believed`.
 pub(super) fn consequences(
     job: &Job,
@@ -44,7 +44,10 @@ pub(super) fn consequences(
     let Ok(prepared) = FeedSchedule::prepare(job, &rows, quantity, &Unwatched) else { return Ok(Vec::new()) };
     let limits: Vec<Option<Limit>> = zones
         .iter()
-        .map(|cut| job.zones.iter().find(|zone| zone.id == cut.id).and_then(|zone| limit_of(job, zone, quantity)))
+        .map(|cut| {
+            let zone = cut.zone_of(job)?;
+            if cut.is_rough(zone) { general_limit(job, quantity) } else { limit_of(job, zone, quantity) }
+        })
         .collect();
     let values = acting
         .iter()
@@ -75,14 +78,21 @@ impl Limit {
 }
 
 fn limit_of(job: &Job, zone: &Zone, quantity: &str) -> Option<Limit> {
-    let general = job.limits.as_ref();
     match quantity {
         "roughness_um" => zone.roughness_max_um.map(Limit::Upper),
         "hardening_percent" => zone.hardening_max_percent.map(Limit::Upper),
         "hardening_depth_um" => zone.hardening_depth_max_um.map(Limit::Upper),
-        "force_z_n" => general?.force_z_max_n.map(Limit::Upper),
-        "force_y_n" => general?.force_y_max_n.map(Limit::Upper),
-        "tool_life_min" => general?.tool_life_min_min.map(Limit::Lower),
+        _ => general_limit(job, quantity),
+    }
+}
+
+/// Limits that hold for every cut; those of a zone's surface hold for the last one.
+fn general_limit(job: &Job, quantity: &str) -> Option<Limit> {
+    let general = job.limits.as_ref()?;
+    match quantity {
+        "force_z_n" => general.force_z_max_n.map(Limit::Upper),
+        "force_y_n" => general.force_y_max_n.map(Limit::Upper),
+        "tool_life_min" => general.tool_life_min_min.map(Limit::Lower),
         _ => None,
     }
 }

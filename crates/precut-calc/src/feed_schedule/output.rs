@@ -6,6 +6,8 @@ use utoipa::openapi::Schema;
 use utoipa::openapi::extensions::Extensions;
 use utoipa::openapi::schema::{ArrayBuilder, ObjectBuilder, SchemaType, Type};
 
+use super::input::{Job, Zone};
+
 /// Feed and speed of every zone, what they give, which limits bind, and how sure it is.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
@@ -192,6 +194,18 @@ pub struct SurfaceUsage {
     /// Share of a cutting edge.
     #[schema(example = 0.4, extensions(("x-unit" = json!("1"))))]
     pub tool_usage: f64,
+}
+
+impl ZoneOutcome {
+    /// The zone of the job that it lies in: passes and zones that were found have names of their own.
+    pub(super) fn zone_of<'j>(&self, job: &'j Job) -> Option<&'j Zone> {
+        job.zones.iter().find(|zone| zone.z_start_mm <= self.z_start_mm && zone.z_end_mm >= self.z_end_mm)
+    }
+
+    /// Whether it is a zone's roughing pass, whose surface is cut off again.
+    pub(super) fn is_rough(&self, zone: &Zone) -> bool {
+        self.id.strip_suffix(":rough") == Some(zone.id.as_str())
+    }
 }
 
 /// What one cutting edge cuts.

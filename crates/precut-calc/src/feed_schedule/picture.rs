@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use crate::calculator::{Axis, Column, Figure, Frame, Glyph, Item, Message, Panel, Role, Table};
 use crate::shaft::Support;
 
-use super::input::{Job, Zone};
+use super::input::Job;
 use super::output::{Outcome, ZoneOutcome};
 use super::toolpath::path_table;
 
@@ -176,14 +176,9 @@ fn speeds(outcome: &Outcome, height: f64) -> Panel {
     Panel { y: Axis::linear("cutting_speed", "m/min"), height, items }
 }
 
-/// The zone of the job that a zone of the answer lies in.
-fn own_zone<'j>(job: &'j Job, zone: &ZoneOutcome) -> Option<&'j Zone> {
-    job.zones.iter().find(|own| own.z_start_mm <= zone.z_start_mm + 1e-6 && own.z_end_mm >= zone.z_end_mm - 1e-6)
-}
-
 fn deflections(job: &Job, outcome: &Outcome, height: f64) -> Panel {
     let zones = shown(outcome);
-    let (x, y) = steps(&zones, |zone| own_zone(job, zone)?.deflection_max_um);
+    let (x, y) = steps(&zones, |zone| zone.zone_of(job)?.deflection_max_um);
     let mut items = vec![Item::Line { name: "deflection_limit", x, y, role: Role::Limit }];
     let (x, y) = steps(&zones, |zone| zone.deflection_um);
     items.push(Item::Line { name: "zone_deflection", x, y, role: Role::After });
@@ -192,7 +187,7 @@ fn deflections(job: &Job, outcome: &Outcome, height: f64) -> Panel {
 
 fn roughnesses(job: &Job, outcome: &Outcome, height: f64) -> Panel {
     let zones = shown(outcome);
-    let (x, y) = steps(&zones, |zone| own_zone(job, zone)?.roughness_max_um);
+    let (x, y) = steps(&zones, |zone| zone.zone_of(job)?.roughness_max_um);
     let mut items = vec![Item::Line { name: "roughness_limit", x, y, role: Role::Limit }];
     let (x, y) = steps(&zones, |zone| zone.roughness_um);
     items.push(Item::Line { name: "zone_roughness", x, y, role: Role::After });
@@ -223,7 +218,7 @@ fn holds_over(job: &Job, zones: &[ZoneOutcome], place: &str) -> Vec<usize> {
         zones.iter().enumerate().filter(|(_, zone)| test(zone)).map(|(at, _)| at).collect()
     };
     let named = over(&|zone| place.split('|').any(|part| part == zone.id));
-    let on_surface = || over(&|zone| own_zone(job, zone).is_some_and(|own| own.surface.as_deref() == Some(place)));
+    let on_surface = || over(&|zone| zone.zone_of(job).is_some_and(|own| own.surface.as_deref() == Some(place)));
     match (named.is_empty(), place) {
         (false, _) => named,
         (true, "part") => over(&|_| true),
