@@ -268,20 +268,11 @@ pub(super) fn explanation(fits: &[Fit<'_>], outcome: &FitOutcome, job: &FitJob) 
             let sets: Vec<String> = output.rivals.iter().take(3).map(|rival| rival.columns.join(", ")).collect();
             said.push(of("fit_rivals").with("sets", sets).with("count", output.rivals.len()));
         }
-        let missing: Vec<String> = output
-            .missing_terms
-            .iter()
-            .filter(|term| term.p_value < 0.05)
-            .map(|term| {
-                if term.column == term.with {
-                    format!("{} squared", term.column)
-                } else {
-                    format!("{} x {}", term.column, term.with)
-                }
-            })
-            .collect();
-        if !missing.is_empty() {
-            said.push(of("fit_terms_missing").with("terms", missing));
+        let missing = || output.missing_terms.iter().filter(|term| term.p_value < 0.05);
+        let columns: Vec<String> = missing().map(|term| term.column.clone()).collect();
+        if !columns.is_empty() {
+            let with_columns: Vec<String> = missing().map(|term| term.with.clone()).collect();
+            said.push(of("fit_terms_missing").with("columns", columns).with("with_columns", with_columns));
         }
         match (&output.lack_of_fit, &output.pure_error) {
             (Some(test), Some(_)) if test.p_value >= LEVEL => {
