@@ -397,6 +397,18 @@ mod tests {
         }
     }
 
+    /// A field's name ends in its unit, so that the header may leave it to the bracket: `feed [mm/tooth]` as `feed [mm/rev]`.
+    #[test]
+    fn a_feed_per_tooth_has_its_own_unit() {
+        let registry = crate::registry::Registry::standard().unwrap();
+        let place = registry.entry("fixture-identification").unwrap().tables_of(&Value::Null)[0].clone();
+        for header in ["feed [mm/tooth]", "feed [um/tooth]", "feed_mm_per_tooth", "feed_um_per_tooth"] {
+            let column = column(header, &place).ok().unwrap();
+            assert_eq!(column.field.name, "feed_mm_per_tooth", "{header}");
+        }
+        assert!(matches!(column("feed [mm/rev]", &place), Err(BadHeader::WrongUnit { .. })));
+    }
+
     #[test]
     fn a_column_that_comes_twice_names_the_field() {
         let mut faults = Faults::default();

@@ -55,7 +55,7 @@ pub struct FixtureRun {
     pub spindle_speed_rpm: Option<f64>,
     /// Feed per tooth.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 0.000_01, maximum = 10.0, example = 0.05, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("S_z"))))]
+    #[schema(minimum = 0.000_01, maximum = 10.0, example = 0.05, extensions(("x-unit" = json!("mm/tooth")), ("x-symbol" = json!("S_z"))))]
     pub feed_mm_per_tooth: Option<f64>,
     /// Axial depth of cut.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -123,7 +123,7 @@ pub struct MillingCut {
     pub speed_m_per_min: Option<f64>,
     /// Feed per tooth; or give the table feed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 0.000_01, maximum = 10.0, example = 0.0393, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("S_z")), ("x-code" = json!("bad_feed_per_tooth"))))]
+    #[schema(minimum = 0.000_01, maximum = 10.0, example = 0.0393, extensions(("x-unit" = json!("mm/tooth")), ("x-symbol" = json!("S_z")), ("x-code" = json!("bad_feed_per_tooth"))))]
     pub feed_mm_per_tooth: Option<f64>,
     /// Table feed; or give the feed per tooth. Where both are given they must agree to 1 %. The echoed job has the feed per tooth.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -149,7 +149,7 @@ pub struct Engagement {
     #[schema(extensions(("x-unit" = json!("m/min"))))]
     pub speed_m_per_min: f64,
     /// Feed per tooth.
-    #[schema(extensions(("x-unit" = json!("mm"))))]
+    #[schema(extensions(("x-unit" = json!("mm/tooth"))))]
     pub feed_mm_per_tooth: f64,
     /// Table feed.
     #[schema(extensions(("x-unit" = json!("mm/min"))))]

@@ -108,7 +108,7 @@ pub struct PeakForce {
     #[schema(minimum = 1, maximum = 200, example = 8, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("z"))))]
     pub teeth: u32,
     /// Feed per tooth.
-    #[schema(minimum = 0.000_01, maximum = 10.0, example = 0.039, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("S_z")), ("x-code" = json!("bad_feed_per_tooth"))))]
+    #[schema(minimum = 0.000_01, maximum = 10.0, example = 0.039, extensions(("x-unit" = json!("mm/tooth")), ("x-symbol" = json!("S_z")), ("x-code" = json!("bad_feed_per_tooth"))))]
     pub feed_mm_per_tooth: f64,
 }
 
@@ -129,7 +129,7 @@ pub struct CutOfTable {
     pub spindle_speed_rpm: Option<f64>,
     /// Feed per tooth of rows that state none; or give the table feed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 0.000_01, maximum = 10.0, example = 0.039, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("S_z")), ("x-code" = json!("bad_feed_per_tooth"))))]
+    #[schema(minimum = 0.000_01, maximum = 10.0, example = 0.039, extensions(("x-unit" = json!("mm/tooth")), ("x-symbol" = json!("S_z")), ("x-code" = json!("bad_feed_per_tooth"))))]
     pub feed_mm_per_tooth: Option<f64>,
     /// Table feed of rows that state no feed per tooth.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -155,7 +155,7 @@ pub struct AmplitudeRow {
     pub spindle_speed_rpm: Option<f64>,
     /// Feed per tooth.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 0.000_01, maximum = 10.0, example = 0.039, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("S_z")), ("x-code" = json!("bad_feed_per_tooth"))))]
+    #[schema(minimum = 0.000_01, maximum = 10.0, example = 0.039, extensions(("x-unit" = json!("mm/tooth")), ("x-symbol" = json!("S_z")), ("x-code" = json!("bad_feed_per_tooth"))))]
     pub feed_mm_per_tooth: Option<f64>,
     /// Axial depth of cut.
     #[schema(minimum = 0.001, maximum = 1000.0, example = 3.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("H"))))]

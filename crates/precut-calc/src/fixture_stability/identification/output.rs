@@ -111,7 +111,7 @@ pub struct IdentifiedRow {
     #[schema(extensions(("x-unit" = json!("rev/min"))))]
     pub spindle_speed_rpm: f64,
     /// Feed per tooth.
-    #[schema(extensions(("x-unit" = json!("mm"))))]
+    #[schema(extensions(("x-unit" = json!("mm/tooth"))))]
     pub feed_mm_per_tooth: f64,
     /// Axial depth of cut.
     #[schema(extensions(("x-unit" = json!("mm"))))]
@@ -157,7 +157,7 @@ pub struct OnsetFit {
     #[schema(extensions(("x-unit" = json!("rev/min"))))]
     pub spindle_speed_rpm: f64,
     /// Feed per tooth.
-    #[schema(extensions(("x-unit" = json!("mm"))))]
+    #[schema(extensions(("x-unit" = json!("mm/tooth"))))]
     pub feed_mm_per_tooth: f64,
     /// Deepest cut of the table without a jump of the amplitude.
     #[schema(extensions(("x-unit" = json!("mm"))))]

@@ -122,7 +122,7 @@ fn told_by(families: &[Vec<&IdentifiedRow>]) -> Vec<Vec<Value>> {
     let fields: [Field; 3] = [
         ("teeth", |row| f64::from(row.teeth), "1"),
         ("spindle_speed_rpm", |row| row.spindle_speed_rpm, "rev/min"),
-        ("feed_mm_per_tooth", |row| row.feed_mm_per_tooth, "mm"),
+        ("feed_mm_per_tooth", |row| row.feed_mm_per_tooth, "mm/tooth"),
     ];
     let firsts: Vec<&IdentifiedRow> = families.iter().filter_map(|family| family.first().copied()).collect();
     let kinds = |of: &[Field]| -> usize {
@@ -271,7 +271,7 @@ fn rows(outcome: &IdentificationOutcome) -> Table {
             Column::numbers("row", "1", &numbers(|row| row.row as f64)),
             Column::numbers("teeth", "1", &numbers(|row| f64::from(row.teeth))),
             Column::numbers("spindle_speed", "rev/min", &numbers(|row| row.spindle_speed_rpm)),
-            Column::numbers("feed_per_tooth", "mm", &numbers(|row| row.feed_mm_per_tooth)),
+            Column::numbers("feed_per_tooth", "mm/tooth", &numbers(|row| row.feed_mm_per_tooth)),
             Column::numbers("depth", "mm", &numbers(|row| row.depth_mm)),
             Column::optional("measured", "um", &optional(|row| row.measured_um)),
             Column::words("opened", words(all.iter().map(opened))),
@@ -309,7 +309,7 @@ fn onsets(outcome: &IdentificationOutcome) -> Table {
         columns: vec![
             Column::numbers("teeth", "1", &all.iter().map(|o| f64::from(o.teeth)).collect::<Vec<_>>()),
             Column::numbers("spindle_speed", "rev/min", &all.iter().map(|o| o.spindle_speed_rpm).collect::<Vec<_>>()),
-            Column::numbers("feed_per_tooth", "mm", &all.iter().map(|o| o.feed_mm_per_tooth).collect::<Vec<_>>()),
+            Column::numbers("feed_per_tooth", "mm/tooth", &all.iter().map(|o| o.feed_mm_per_tooth).collect::<Vec<_>>()),
             Column::optional("table_stable", "mm", &all.iter().map(|o| o.table_stable_mm).collect::<Vec<_>>()),
             Column::optional("table_chatter", "mm", &all.iter().map(|o| o.table_chatter_mm).collect::<Vec<_>>()),
             Column::optional("predicted", "mm", &all.iter().map(|o| o.predicted_mm).collect::<Vec<_>>()),
