@@ -187,6 +187,10 @@ fn lack_of_fit_and_the_missing_term_are_found() {
     near(first.coefficient, 0.5, 0.1);
     assert!(first.p_value < 1e-6 && first.error_with.unwrap() < 0.5 * output.cross_validation.error.unwrap());
     assert!(codes(&answer.warnings).contains(&"fit_lack_of_fit"));
+    // The columns by their names, for any language to word.
+    let said = answer.explanation.iter().find(|said| said.code == "fit_terms_missing").unwrap();
+    let values = serde_json::to_value(&said.values).unwrap();
+    assert_eq!([&values["columns"][0], &values["with_columns"][0]], ["feed_mm_per_rev", "feed_mm_per_rev"]);
     // Without curvature neither is claimed.
     let answer = solve(json!({ "trials": factorial(2, scattered(10, 0.03)), "form": "log_log", "resamples": 0 }));
     let output = &answer.output.outputs[0];
