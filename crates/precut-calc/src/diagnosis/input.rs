@@ -1,10 +1,12 @@
 //! The job of a diagnosis: a base model, what was measured, and what may be off without being a finding.
 
 use serde::{Deserialize, Serialize};
+use utoipa::openapi::RefOr;
+use utoipa::openapi::schema::{ObjectBuilder, Schema, SchemaType, Type};
 use utoipa::{PartialSchema, ToSchema};
 
 use super::weigh::LEVEL;
-use crate::calculator::{ConditionRange, Measured, MeasuredRow};
+use crate::calculator::{ConditionRange, ForwardModel, Measured, MeasuredRow, Measurement};
 
 /// Most runs of one diagnosis.
 pub const MAX_RUNS: usize = 500;
@@ -16,7 +18,7 @@ pub const MAX_RUNS: usize = 500;
     serialize = "J: Serialize, R: Serialize, A: Serialize",
     deserialize = "J: Deserialize<'de>, R: Deserialize<'de>, A: Deserialize<'de> + Default"
 ))]
-pub struct DiagnosisJob<J: ToSchema, R: ToSchema, W: MeasuredRow, A: ToSchema> {
+pub struct DiagnosisJob<J: ToSchema, R: ToSchema, W: MeasuredRow + Measurement, A: ToSchema> {
     /// Whose job this is.
     #[schema(example = "deflection-compensation")]
     pub calculator: String,
@@ -28,7 +30,7 @@ pub struct DiagnosisJob<J: ToSchema, R: ToSchema, W: MeasuredRow, A: ToSchema> {
     #[schema(inline, max_items = 500)]
     pub runs: Vec<R>,
     /// Name of the quantity that was measured.
-    #[schema(example = "diameter_deviation_um", max_length = 64)]
+    #[schema(schema_with = quantity::<W>)]
     pub quantity: String,
     /// The measured rows.
     #[schema(schema_with = Measured::<W>::schema)]
@@ -40,6 +42,17 @@ pub struct DiagnosisJob<J: ToSchema, R: ToSchema, W: MeasuredRow, A: ToSchema> {
     /// What is looked for, and how far.
     #[serde(default)]
     pub options: DiagnosisOptions,
+}
+
+/// One of those that the calculator predicts.
+fn quantity<W: Measurement>() -> RefOr<Schema> {
+    let known = <W::Model as ForwardModel>::QUANTITIES.iter().map(|quantity| quantity.name);
+    ObjectBuilder::new()
+        .schema_type(SchemaType::new(Type::String))
+        .description(Some("Name of the quantity that was measured."))
+        .examples(known.clone().take(1))
+        .enum_values(Some(known))
+        .into()
 }
 
 /// What is looked for, and how far.
