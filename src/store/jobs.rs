@@ -270,8 +270,6 @@ pub struct Claim {
     pub input: Bytes,
     /// Starts charged, this one among them.
     pub attempt: u32,
-    /// Estimated work, ms.
-    pub estimate_ms: f64,
 }
 
 /// What came of a task.

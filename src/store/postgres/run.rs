@@ -17,7 +17,6 @@ struct TakenRow {
     attempt: i32,
     kind: String,
     calculator: String,
-    estimate_ms: f64,
     /// Of one of them only: they are equal.
     input: Option<Vec<u8>>,
 }
@@ -45,7 +44,7 @@ pub(super) async fn claim(
              expires_ms = CASE WHEN starts < $3 THEN NULL ELSE $5::bigint + $7 END,
              progress = 0, stage = NULL
          FROM line, charged WHERE job.id = line.id AND job.state = 'queued'
-         RETURNING job.id, job.state, job.attempt, job.kind, job.calculator, job.estimate_ms,
+         RETURNING job.id, job.state, job.attempt, job.kind, job.calculator,
              CASE WHEN job.id = $2 THEN job.input END AS input",
     )
     .bind(key.as_bytes().as_slice())
@@ -60,7 +59,7 @@ pub(super) async fn claim(
     if taken.is_empty() {
         // The answer to a claim may be lost on its way: who asks again has it already.
         taken = sqlx::query_as(
-            "SELECT id, state, attempt, kind, calculator, estimate_ms, CASE WHEN id = $2 THEN input END AS input
+            "SELECT id, state, attempt, kind, calculator, CASE WHEN id = $2 THEN input END AS input
              FROM precut.jobs WHERE lease = $1 AND state = 'running'",
         )
         .bind(lease.to_string())
@@ -82,7 +81,6 @@ pub(super) async fn claim(
         // A damaged input is nothing that can be run: who claims it finds that out and says so on the record.
         input: zstd::decode_all(job.input.unwrap_or_default().as_slice()).unwrap_or_default().into(),
         attempt: count(job.attempt),
-        estimate_ms: job.estimate_ms,
     }))
 }
 

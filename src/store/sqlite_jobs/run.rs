@@ -15,7 +15,6 @@ struct Waiting {
     kind: String,
     calculator: String,
     input: Vec<u8>,
-    estimate_ms: f64,
 }
 
 pub(super) async fn claim(
@@ -26,13 +25,12 @@ pub(super) async fn claim(
     keep_ms: i64,
     now: i64,
 ) -> Outcome<Claimed> {
-    let waiting: Option<Waiting> = sqlx::query_as(
-        "SELECT key, kind, calculator, input, estimate_ms FROM precut_jobs WHERE id = ?1 AND state = 'queued'",
-    )
-    .bind(id.to_string())
-    .fetch_optional(&mut *connection)
-    .await?;
-    let Some(Waiting { key, kind, calculator, input, estimate_ms }) = waiting else { return Ok(Claimed::Nothing) };
+    let waiting: Option<Waiting> =
+        sqlx::query_as("SELECT key, kind, calculator, input FROM precut_jobs WHERE id = ?1 AND state = 'queued'")
+            .bind(id.to_string())
+            .fetch_optional(&mut *connection)
+            .await?;
+    let Some(Waiting { key, kind, calculator, input }) = waiting else { return Ok(Claimed::Nothing) };
     let charged: u32 = sqlx::query_scalar("SELECT max(attempt) FROM precut_jobs WHERE key = ?1 AND state = 'queued'")
         .bind(&key)
         .fetch_one(&mut *connection)
@@ -65,7 +63,7 @@ pub(super) async fn claim(
     let input = zstd::decode_all(&*input).unwrap_or_default();
     let kind = JobKind::of_word(&kind).ok_or_else(|| unreadable("kind"))?;
     let jobs = ids(&jobs)?;
-    Ok(Claimed::Run(Claim { lease, jobs, kind, calculator, input: input.into(), attempt: charged + 1, estimate_ms }))
+    Ok(Claimed::Run(Claim { lease, jobs, kind, calculator, input: input.into(), attempt: charged + 1 }))
 }
 
 pub(super) async fn finish(

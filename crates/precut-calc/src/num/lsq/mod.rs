@@ -77,14 +77,12 @@ pub struct Parameter {
     pub upper: f64,
     /// Gaussian prior: mean and standard deviation.
     pub prior: Option<(f64, f64)>,
-    /// A change of it that matters, where its start (0, say) does not tell.
-    pub typical: Option<f64>,
 }
 
 impl Parameter {
     /// Without bounds or prior.
     pub const fn free(start: f64) -> Self {
-        Self { start, lower: f64::NEG_INFINITY, upper: f64::INFINITY, prior: None, typical: None }
+        Self { start, lower: f64::NEG_INFINITY, upper: f64::INFINITY, prior: None }
     }
     /// The same within bounds.
     #[must_use]
@@ -99,12 +97,6 @@ impl Parameter {
         self.prior = Some((mean, sd));
         self
     }
-    /// The same with a change that matters.
-    #[must_use]
-    pub const fn with_typical(mut self, typical: f64) -> Self {
-        self.typical = Some(typical);
-        self
-    }
     /// The same held at a value.
     #[must_use]
     pub const fn held(mut self, value: f64) -> Self {
@@ -113,10 +105,9 @@ impl Parameter {
         self.upper = value;
         self
     }
-    /// Size against which changes are measured: of the start, the prior, or what was stated; 1 if all are 0.
+    /// Size against which changes are measured: of the prior or the start; 1 if both are 0.
     fn scale(&self) -> f64 {
-        let stated = self.typical.or(self.prior.map(|(_, sd)| sd)).unwrap_or(0.0).abs();
-        let size = if stated > 0.0 { stated } else { self.start.abs() };
+        let size = self.prior.map_or(self.start.abs(), |(_, sd)| sd.abs());
         if size > 0.0 && size.is_finite() { size } else { 1.0 }
     }
 }

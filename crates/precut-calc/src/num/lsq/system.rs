@@ -44,12 +44,11 @@ pub(super) struct Tangent {
 impl<'a> System<'a> {
     pub(super) fn new(model: &'a dyn Model, parameters: &'a [Parameter], loss: Loss) -> Result<Self, NoFit> {
         for (index, parameter) in parameters.iter().enumerate() {
-            let Parameter { start, lower, upper, prior, typical } = *parameter;
+            let Parameter { start, lower, upper, prior } = *parameter;
             let sound = start.is_finite()
                 && lower <= start
                 && start <= upper
-                && prior.is_none_or(|(mean, sd)| mean.is_finite() && sd.is_finite() && sd > 0.0)
-                && typical.is_none_or(f64::is_finite);
+                && prior.is_none_or(|(mean, sd)| mean.is_finite() && sd.is_finite() && sd > 0.0);
             if !sound {
                 return Err(NoFit::BadParameter(index));
             }
