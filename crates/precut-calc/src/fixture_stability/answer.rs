@@ -581,10 +581,16 @@ fn limits(study: &Study<'_>) -> Result<DepthLimits, Failure> {
     let wanted = study.job.limits.depths;
     let mut depths: Vec<f64> = (1..=wanted).map(|i| study.examined_mm * f64::from(i) / f64::from(wanted)).collect();
     let mut found: Vec<AtDepth> = Vec::with_capacity(depths.len());
+    let mut looked_at = 0;
     for chunk in depths.chunks(8) {
         checkpoint(study.monitor)?;
         let part: Result<Vec<_>, Failure> = chunk.par_iter().map(|&depth| at_depth(study, depth)).collect();
         found.extend(part?.into_iter().map_while(std::convert::identity));
+        looked_at += chunk.len();
+        if found.len() < looked_at {
+            // What lies beyond a depth without a motion is no part of the curve.
+            break;
+        }
         let done = found.len() as f64 / depths.len() as f64;
         study.monitor.progress(0.2 + 0.2 * done, Message::new("stage_limits"));
     }

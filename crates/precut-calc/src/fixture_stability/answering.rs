@@ -333,7 +333,8 @@ impl<'a, const N: usize> Period<'a, N> {
         let mut now = self.balance(from_mm, load).ok_or(NoMotion::CutLost)?;
         for steps in 1..=NEWTON_STEPS {
             let residual_mm = now.largest_mm();
-            if residual_mm <= SETTLED * self.working.feed_mm {
+            // Of numbers that are none the largest is 0, but the length is none either.
+            if residual_mm <= SETTLED * self.working.feed_mm && now.length_mm().is_finite() {
                 return Ok(now);
             }
             let unsettled = NoMotion::Unsettled { residual_mm, steps };
