@@ -204,23 +204,30 @@ impl<'a, const N: usize, const P: usize> Column<'a, N, P> {
 
     /// Depth up to which there is a forced motion: `most`, or less where joints harden.
     fn reach_mm(&self, most_mm: f64) -> f64 {
-        let has_motion =
-            |depth_mm: f64| unbroken::<N>(self.holding, self.cutting, Working { depth_mm, ..self.working }).is_some();
-        if !self.hardens() || has_motion(most_mm) {
+        if !self.hardens() || self.has_motion(most_mm) {
             return most_mm;
         }
         let (mut low, mut high) = (0.5 * most_mm, most_mm);
         for _ in 0..DOWN {
-            if has_motion(low) {
+            if self.has_motion(low) {
                 break;
             }
             (low, high) = (0.5 * low, low);
         }
+        self.last_motion_mm(low, high)
+    }
+
+    fn has_motion(&self, depth_mm: f64) -> bool {
+        unbroken::<N>(self.holding, self.cutting, Working { depth_mm, ..self.working }).is_some()
+    }
+
+    /// How far beyond a depth with a forced motion there still is one, short of a depth without.
+    fn last_motion_mm(&self, mut with_mm: f64, mut without_mm: f64) -> f64 {
         for _ in 0..UP {
-            let middle = 0.5 * (low + high);
-            if has_motion(middle) { low = middle } else { high = middle }
+            let middle = 0.5 * (with_mm + without_mm);
+            if self.has_motion(middle) { with_mm = middle } else { without_mm = middle }
         }
-        low
+        with_mm
     }
 
     /// Depths at which the modulus crosses 1 up to `most`, from the bottom: a scan, then bracketing.
@@ -230,8 +237,15 @@ impl<'a, const N: usize, const P: usize> Column<'a, N, P> {
         let Some(free) = self.modulus(0.0)? else { return Ok(found) };
         let mut before = (0.0, free.ln());
         for step in 1..=SCAN {
-            let depth = reach_mm * f64::from(step) / f64::from(SCAN);
-            let Some(modulus) = self.modulus(depth)? else { continue };
+            let mut depth = reach_mm * f64::from(step) / f64::from(SCAN);
+            let mut modulus = self.modulus(depth)?;
+            // A motion that comes back deeper down is another one: between both nothing crosses 1.
+            let is_last = modulus.is_none();
+            if is_last {
+                depth = self.last_motion_mm(before.0, depth);
+                modulus = self.modulus(depth)?;
+            }
+            let Some(modulus) = modulus else { break };
             let here = (depth, modulus.ln());
             found.up_to_mm = depth;
             // The free vise decays; without any damping its modulus is 1 to round-off and counts as stable.
@@ -241,6 +255,9 @@ impl<'a, const N: usize, const P: usize> Column<'a, N, P> {
                     found.up_to_mm = reach_mm;
                     break;
                 }
+            }
+            if is_last {
+                break;
             }
             before = here;
         }
