@@ -226,17 +226,17 @@ impl From<Error> for Problem {
             Error::Syntax(fault) => {
                 #[allow(clippy::cast_precision_loss)] // lines and columns of a body of some megabytes
                 let (line, column) = (fault.line as f64, fault.column as f64);
-                let place = |values: Values| {
-                    values
+                let place = || {
+                    Values::new()
                         .with("line", line)
                         .with("column", column)
                         .with("reason", fault.message.clone())
                         .with("pointer", fault.pointer.clone())
                 };
                 let mut finding = Finding::new(fault.code, fault.pointer.clone());
-                finding.values = place(Values::new());
+                finding.values = place();
                 let mut problem = Self::new(StatusCode::BAD_REQUEST, fault.code).findings(vec![finding], 1);
-                problem.0.values = place(Values::new());
+                problem.0.values = place();
                 problem
             }
             Error::Invalid { findings, total } => Self::new(StatusCode::UNPROCESSABLE_ENTITY, "invalid_job")
