@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::fixture_support::{checked, outcome, reference_job, solve, with};
 use precut_calc::calculator::{ForwardModel, Missing, Rows, Unwatched};
 use precut_calc::effects::{FIXTURE_CAUSES, FixtureEffect};
-use precut_calc::fixture_stability::{FixtureAllowances, FixturePoint, FixtureRun, FixtureStability};
+use precut_calc::fixture_stability::{FixtureAllowances, FixturePoint, FixtureRun, FixtureStability, LobeBoundary};
 use serde_json::{Value, json};
 
 #[allow(clippy::needless_pass_by_value)] // called with `json!`
@@ -164,7 +164,7 @@ fn a_cut_on_hardening_joints_is_answered_whatever_a_deeper_one_does() {
     slow["fixture"]["workpiece_mass_kg"] = json!(0.38566);
     slow["effects"][0]["cubic_per_mm2"] = json!(2514.1);
     slow["effects"][1]["runout_mm"] = json!(0.0967);
-    for job in [milled, slow] {
+    for job in [milled, slow.clone()] {
         let far = solve(&job);
         assert!(far.warnings.iter().any(|said| said.code == "no_forced_motion_beyond"), "{:?}", far.warnings);
         // Where the motion ends is no limit of chatter.
@@ -173,6 +173,15 @@ fn a_cut_on_hardening_joints_is_answered_whatever_a_deeper_one_does() {
         assert!(far.output.depth_examined_mm >= near.depth_examined_mm);
         assert_eq!((far.output.multiplier, far.output.forced), (near.multiplier, near.forced));
     }
+    // The diagram says for every speed how deep it looked.
+    let speed_rpm = slow["cut"]["spindle_speed_rpm"].as_f64().unwrap();
+    let verdict = outcome(&slow);
+    slow["analyses"] = json!(["lobes"]);
+    slow["lobes"] = json!({ "from_rpm": 0.9 * speed_rpm, "to_rpm": 1.1 * speed_rpm, "speeds": 3, "map": false });
+    let LobeBoundary { depth_examined_mm, chatter_mm, .. } = outcome(&slow).lobes.unwrap().boundary;
+    assert_eq!((chatter_mm, depth_examined_mm.len()), (vec![None; 3], 3));
+    assert!(depth_examined_mm[1].total_cmp(&verdict.depth_examined_mm).is_eq(), "{depth_examined_mm:?}");
+    assert!(depth_examined_mm.iter().all(|depth| *depth < 1.0), "{depth_examined_mm:?}");
 }
 
 #[test]

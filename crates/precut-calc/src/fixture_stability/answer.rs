@@ -86,6 +86,11 @@ impl<'a> Study<'a> {
         Ok(Self { job, case, rules, monitor, point, forced, asked_mm, examined_mm, chatter_mm })
     }
 
+    /// Where chatter begins at the working speed.
+    fn chatter(&self) -> ChatterLimit {
+        ChatterLimit { depth_mm: self.chatter_mm, examined_mm: self.examined_mm }
+    }
+
     fn stable(&self) -> bool {
         self.point.multiplier.modulus < 1.0
     }
@@ -108,13 +113,14 @@ impl<'a> Study<'a> {
         observed(&self.case, &plan, self.monitor)
     }
 
-    /// What limits the depth at a speed. Chatter begins at `chatter_mm`, or not up to `most_mm`.
-    fn speed_limit(&self, spindle_rpm: f64, chatter_mm: Option<f64>, most_mm: f64) -> Result<SpeedLimit, Failure> {
+    /// What limits the depth at a speed where chatter does so.
+    fn speed_limit(&self, spindle_rpm: f64, chatter: ChatterLimit) -> Result<SpeedLimit, Failure> {
         let [amplitude_mm, movable_opens_mm, fixed_opens_mm] =
-            forced_limits(&self.case, spindle_rpm, chatter_mm.unwrap_or(most_mm))?;
+            forced_limits(&self.case, spindle_rpm, chatter.depth_mm.unwrap_or(chatter.examined_mm))?;
         Ok(SpeedLimit {
             spindle_speed_rpm: spindle_rpm,
-            chatter_mm,
+            depth_examined_mm: chatter.examined_mm,
+            chatter_mm: chatter.depth_mm,
             amplitude_mm,
             movable_opens_mm,
             fixed_opens_mm,
@@ -613,9 +619,8 @@ fn limits(study: &Study<'_>) -> Result<DepthLimits, Failure> {
     for speed in &study.job.limits.speeds_rpm {
         checkpoint(study.monitor)?;
         let working = Working { spindle_rpm: speed.0, ..case.working };
-        let chatter_mm =
-            critical_depth(&study.rules, &case.holding, &case.cutting, working, study.examined_mm)?.depth_mm;
-        at_speeds.push(study.speed_limit(speed.0, chatter_mm, study.examined_mm)?);
+        let chatter = critical_depth(&study.rules, &case.holding, &case.cutting, working, study.asked_mm)?;
+        at_speeds.push(study.speed_limit(speed.0, chatter)?);
     }
     let column = |of: &dyn Fn(&AtDepth) -> f64| found.iter().map(of).collect::<Vec<f64>>();
     Ok(DepthLimits {
@@ -683,7 +688,7 @@ fn lobes(study: &Study<'_>, aside: &mut Aside) -> Result<LobeDiagram, Failure> {
     let case = &study.case;
     let settings = &study.job.lobes;
     let working = case.working;
-    let plane = plane_of(study.job, case, study.examined_mm);
+    let plane = plane_of(study.job, case, study.asked_mm);
     let monitor = study.monitor;
     let (from, share) = (0.4, if settings.map { 0.2 } else { 0.5 });
     let points = boundary(&study.rules, &case.holding, &case.cutting, &plane, monitor, &mut |part, points| {
@@ -716,6 +721,7 @@ fn lobes(study: &Study<'_>, aside: &mut Aside) -> Result<LobeDiagram, Failure> {
         .enumerate()
         .map(|(i, &spindle_speed_rpm)| SpeedLimit {
             spindle_speed_rpm,
+            depth_examined_mm: boundary.depth_examined_mm[i],
             chatter_mm: boundary.chatter_mm[i],
             amplitude_mm: boundary.amplitude_mm[i],
             movable_opens_mm: boundary.movable_opens_mm[i],
@@ -727,7 +733,7 @@ fn lobes(study: &Study<'_>, aside: &mut Aside) -> Result<LobeDiagram, Failure> {
         .iter()
         .filter_map(|limit| limit.chatter_mm.map(|depth| (depth, *limit)))
         .reduce(|best, next| if next.0 < best.0 { next } else { best })
-        .map(|(_, limit)| whole_limit(study, limit, plane.most_mm))
+        .map(|(_, limit)| whole_limit(study, limit))
         .transpose()?;
     let better_speeds = better_speeds(study, &limits, plane.most_mm)?;
     for limit in &better_speeds {
@@ -750,7 +756,7 @@ fn beside(study: &Study<'_>, plane: &Plane, points: &[super::lobes::BoundaryPoin
         if !case.is_linear() {
             return Ok([None, None, None, zeroth]);
         }
-        let limit_mm = point.crossings_mm.first().copied().unwrap_or(plane.most_mm);
+        let limit_mm = point.crossings_mm.first().copied().unwrap_or(point.examined_mm);
         let [amplitude, movable, fixed] = forced_limits(case, point.spindle_rpm, limit_mm)?;
         Ok([amplitude, movable, fixed, zeroth])
     };
@@ -767,7 +773,8 @@ fn beside(study: &Study<'_>, plane: &Plane, points: &[super::lobes::BoundaryPoin
     let shown = |depth: Option<f64>| depth.filter(|depth| *depth <= plane.most_mm);
     Ok(LobeBoundary {
         spindle_speed_rpm: points.iter().map(|p| p.spindle_rpm).collect(),
-        chatter_mm: points.iter().map(|p| p.crossings_mm.first().copied()).collect(),
+        depth_examined_mm: points.iter().map(|p| p.examined_mm).collect(),
+        chatter_mm: points.iter().map(|p| p.limit().depth_mm).collect(),
         stable_again_mm: points.iter().map(|p| p.crossings_mm.get(1).copied()).collect(),
         amplitude_mm: column(0),
         movable_opens_mm: column(1),
@@ -779,25 +786,33 @@ fn beside(study: &Study<'_>, plane: &Plane, points: &[super::lobes::BoundaryPoin
 }
 
 /// With the limits that the diagram does not trace where the forced motion does not go with H^(1-mu).
-fn whole_limit(study: &Study<'_>, limit: SpeedLimit, most_mm: f64) -> Result<SpeedLimit, Failure> {
+fn whole_limit(study: &Study<'_>, limit: SpeedLimit) -> Result<SpeedLimit, Failure> {
     if study.case.is_linear() {
         return Ok(limit);
     }
-    study.speed_limit(limit.spindle_speed_rpm, limit.chatter_mm, most_mm)
+    let chatter = ChatterLimit { depth_mm: limit.chatter_mm, examined_mm: limit.depth_examined_mm };
+    study.speed_limit(limit.spindle_speed_rpm, chatter)
 }
 
-/// What one may cut at a speed: the least of its limits.
-fn allowed_mm(limit: &SpeedLimit, most_mm: f64) -> f64 {
+/// What one may cut at a speed: the least of its limits, and no deeper than was looked.
+fn allowed_mm(limit: &SpeedLimit) -> f64 {
     let SpeedLimit { chatter_mm, amplitude_mm, movable_opens_mm, fixed_opens_mm, drive_mm, .. } = *limit;
     let limits = [chatter_mm, amplitude_mm, movable_opens_mm, fixed_opens_mm, drive_mm];
-    limits.into_iter().flatten().fold(if chatter_mm.is_some() { f64::INFINITY } else { most_mm }, f64::min)
+    limits.into_iter().flatten().fold(limit.depth_examined_mm, f64::min)
 }
 
-/// Peaks of what the limits allow that lie deeper than at the working speed, nearest first.
+/// Peaks of what the limits allow that lie deeper than at the working speed, nearest first. `limits` were looked for up to
+/// `most_mm`.
 fn better_speeds(study: &Study<'_>, limits: &[SpeedLimit], most_mm: f64) -> Result<Vec<SpeedLimit>, Failure> {
-    let working = study.case.working.spindle_rpm;
-    let here = allowed_mm(&study.speed_limit(working, study.chatter_mm, most_mm)?, most_mm);
-    let depth = |i: usize| allowed_mm(&limits[i], most_mm);
+    let Study { case, rules, .. } = study;
+    let working = case.working.spindle_rpm;
+    // Elsewhere was looked no deeper than here.
+    let chatter = match study.chatter() {
+        known if known.depth_mm.is_some() || known.examined_mm >= most_mm => known,
+        _ => critical_depth(rules, &case.holding, &case.cutting, case.working, most_mm)?,
+    };
+    let here = allowed_mm(&study.speed_limit(working, chatter)?);
+    let depth = |i: usize| allowed_mm(&limits[i]);
     let mut peaks = Vec::new();
     for (i, limit) in limits.iter().enumerate() {
         checkpoint(study.monitor)?;
@@ -805,8 +820,8 @@ fn better_speeds(study: &Study<'_>, limits: &[SpeedLimit], most_mm: f64) -> Resu
         let left = i.checked_sub(1).is_none_or(|before| depth(before) < at);
         let right = i + 1 == limits.len() || depth(i + 1) <= at;
         if left && right && at > 1.02 * here {
-            let limit = whole_limit(study, *limit, most_mm)?;
-            peaks.extend((allowed_mm(&limit, most_mm) > 1.02 * here).then_some(limit));
+            let limit = whole_limit(study, *limit)?;
+            peaks.extend((allowed_mm(&limit) > 1.02 * here).then_some(limit));
         }
     }
     peaks.sort_by(|a, b| {
@@ -824,12 +839,12 @@ fn tried(study: &Study<'_>, better: &SpeedLimit, most_mm: f64) -> Result<Option<
     // The peaks of lobes are sharp: the limits are those of the speed that is read.
     let spindle_rpm = said(better.spindle_speed_rpm, 4, f64::round);
     let there = Working { spindle_rpm, ..case.working };
-    let chatter_mm = critical_depth(&study.rules, &case.holding, &case.cutting, there, most_mm)?.depth_mm;
-    let limit = study.speed_limit(spindle_rpm, chatter_mm, most_mm)?;
+    let chatter = critical_depth(&study.rules, &case.holding, &case.cutting, there, most_mm)?;
+    let limit = study.speed_limit(spindle_rpm, chatter)?;
     let short_of = [limit.chatter_mm, limit.movable_opens_mm, limit.fixed_opens_mm];
     let depths = short_of.into_iter().flatten().map(|depth| NEAR_LIMIT * depth);
     let within = [limit.amplitude_mm, limit.drive_mm].into_iter().flatten().map(|depth| WITHIN * depth);
-    let allowed_mm = depths.chain(within).fold(most_mm, f64::min);
+    let allowed_mm = depths.chain(within).fold(limit.depth_examined_mm, f64::min);
     if allowed_mm <= 0.0 {
         return Ok(None);
     }

@@ -352,6 +352,14 @@ pub(super) struct BoundaryPoint {
     pub spindle_rpm: f64,
     /// Where |mu| crosses 1, from the bottom; the first is the limit.
     pub crossings_mm: Vec<f64>,
+    /// How deep was looked.
+    pub examined_mm: f64,
+}
+
+impl BoundaryPoint {
+    pub(super) fn limit(&self) -> ChatterLimit {
+        ChatterLimit { depth_mm: self.crossings_mm.first().copied(), examined_mm: self.examined_mm }
+    }
 }
 
 /// The plane that is looked at.
@@ -399,7 +407,8 @@ fn boundary_of<const N: usize>(
     let at = |spindle_rpm: f64| -> Result<BoundaryPoint, Failure> {
         let working = plane.working(spindle_rpm);
         let column = Column::new(&rules.coarse, &system, holding, cutting, working, COARSE_RESIDUAL);
-        Ok(BoundaryPoint { spindle_rpm, crossings_mm: column.crossings(plane.most_mm, COARSE_DEPTH, false)?.depths_mm })
+        let Crossings { depths_mm, up_to_mm } = column.crossings(plane.most_mm, COARSE_DEPTH, false)?;
+        Ok(BoundaryPoint { spindle_rpm, crossings_mm: depths_mm, examined_mm: up_to_mm })
     };
     let last = plane.speeds.saturating_sub(1).max(1) as f64;
     let mut wanted: Vec<f64> = (0..plane.speeds).map(|i| plane.speed_rpm(i as f64 / last)).collect();

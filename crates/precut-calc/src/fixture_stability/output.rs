@@ -532,6 +532,10 @@ pub struct SpeedLimit {
     /// Spindle speed.
     #[schema(extensions(("x-unit" = json!("rev/min"))))]
     pub spindle_speed_rpm: f64,
+    /// Depth up to which limits are looked for at this speed; less than at others where joints harden and no forced motion
+    /// is found in a deeper cut.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub depth_examined_mm: f64,
     /// Depth at which chatter begins; null where none begins up to the depth examined.
     #[schema(extensions(("x-unit" = json!("mm"))))]
     pub chatter_mm: Option<f64>,
@@ -591,7 +595,11 @@ pub struct LobeBoundary {
     /// Spindle speed.
     #[schema(extensions(("x-unit" = json!("rev/min"))))]
     pub spindle_speed_rpm: Vec<f64>,
-    /// Depth at which chatter begins; null where none begins up to the greatest depth.
+    /// Depth up to which limits are looked for: the greatest of the diagram; less where joints harden and no forced motion
+    /// is found in a deeper cut.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub depth_examined_mm: Vec<f64>,
+    /// Depth at which chatter begins; null where none begins up to the depth examined.
     #[schema(extensions(("x-unit" = json!("mm"))))]
     pub chatter_mm: Vec<Option<f64>>,
     /// Depth at which it ends again (above an island), where it does.
@@ -615,6 +623,18 @@ pub struct LobeBoundary {
     /// The zeroth-order approximation.
     #[schema(extensions(("x-unit" = json!("mm"))))]
     pub zeroth_order_mm: Vec<Option<f64>>,
+}
+
+impl LobeBoundary {
+    /// How deep was looked where no chatter begins; `None` where that is the same at every speed.
+    pub(super) fn examined_without_chatter_mm(&self) -> Option<Vec<Option<f64>>> {
+        /// Of the depth; beyond the round-off of a depth, which is a share of the greatest.
+        const SAME: f64 = 1e-9;
+        let greatest = self.depth_examined_mm.iter().copied().fold(0.0, f64::max);
+        let without = self.depth_examined_mm.iter().zip(&self.chatter_mm);
+        let depths: Vec<Option<f64>> = without.map(|(depth, chatter)| chatter.is_none().then_some(*depth)).collect();
+        depths.iter().flatten().any(|depth| *depth < (1.0 - SAME) * greatest).then_some(depths)
+    }
 }
 
 /// |multiplier| over speed and depth.

@@ -59,7 +59,8 @@ pub fn lobe_boundary(job: &FixtureJob, monitor: &dyn Monitor) -> Result<Vec<Spee
             let drive = job.spindle.as_ref().map(|spindle| depths(&case, spindle, working));
             SpeedLimit {
                 spindle_speed_rpm: p.spindle_rpm,
-                chatter_mm: p.crossings_mm.first().copied(),
+                depth_examined_mm: p.examined_mm,
+                chatter_mm: p.limit().depth_mm,
                 // The forced motion is no part of it.
                 amplitude_mm: None,
                 movable_opens_mm: None,

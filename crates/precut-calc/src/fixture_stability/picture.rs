@@ -127,6 +127,9 @@ fn lobes(job: &FixtureJob, outcome: &FixtureOutcome, lobes: &LobeDiagram) -> Vec
     let LobeBoundary { spindle_speed_rpm: x, .. } = &lobes.boundary;
     let of = &lobes.boundary;
     items.push(line("chatter_limit", x, of.chatter_mm.clone(), Role::Limit));
+    if let Some(depths) = of.examined_without_chatter_mm() {
+        items.push(line("examined_up_to", x, depths, Role::Unstable));
+    }
     items.push(line("zeroth_order_limit", x, of.zeroth_order_mm.clone(), Role::Comparison));
     for (name, values, series) in [
         ("amplitude_limit", &of.amplitude_mm, 0),
