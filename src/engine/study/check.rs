@@ -31,10 +31,12 @@ pub(super) fn structure(input: &StudyInput, most_points: u64) -> (Vec<u64>, Vec<
         let lengths: Vec<String> = known.iter().map(ToString::to_string).collect();
         found.push(Finding::new("unequal_lengths", "/vary").with("lengths", lengths));
     } else if all_known {
-        let points = Shape::new(known.clone(), input.combine).points();
+        // A variable without values is told of elsewhere, and makes no other one's values fewer.
+        let lengths: Vec<u64> = known.iter().map(|&length| length.max(1)).collect();
+        let points = Shape::new(lengths.clone(), input.combine).points();
         if points > u128::from(most_points) {
             // Printed with six digits; a product of three counts may be beyond every whole number type.
-            let lengths = known.iter().map(|&length| length as f64);
+            let lengths = lengths.iter().map(|&length| length as f64);
             let points = if input.combine == Combine::Zip { points as f64 } else { lengths.product() };
             let limit = most_points as f64;
             found.push(Finding::new("too_many_points", "/vary").measured(points, limit, "1"));

@@ -189,6 +189,18 @@ fn a_study_of_a_billion_points_is_refused_with_limit_and_count() {
 }
 
 #[test]
+fn a_variable_without_values_hides_no_other_that_has_too_many() {
+    let vast = json!({"pointer": "/work_ms", "from": 1, "to": 2, "count": 1_u64 << 53});
+    for (empty, fault) in [
+        (json!({"pointer": "/length_mm", "values": []}), ("too_few_items", "/vary/0/values")),
+        (json!({"pointer": "/length_mm", "from": 1, "to": 2, "count": 0}), ("out_of_range", "/vary/0/count")),
+    ] {
+        let study = study(json!([empty, vast]));
+        assert_eq!(faults(&study), expected(&[("too_many_points", "/vary"), fault]));
+    }
+}
+
+#[test]
 fn every_fault_of_a_study_is_listed_at_once() {
     let study = json!({
         "calculator": "toy-bar",
