@@ -59,7 +59,7 @@ pub struct EffectComparison {
     /// Its kind.
     #[schema(example = "headstock_compliance")]
     pub kind: String,
-    /// What tells it from others of its kind: batch, factor and level; empty where there is one.
+    /// What tells it from others of its kind: batch, factor and level, the order of a wave; empty where there is one.
     #[schema(value_type = Object)]
     pub of: Map<String, Value>,
     /// Who has it.
@@ -126,10 +126,12 @@ fn head(model: &StoredModel) -> ModelHead {
     }
 }
 
-/// What tells an effect from others: its kind, and words beside it.
-fn identity(effect: &Value) -> Map<String, Value> {
+/// What tells an effect from others: its kind and other words, and which wave it is.
+pub(super) fn identity(effect: &Value) -> Map<String, Value> {
+    const WAVES: [&str; 3] = ["order", "ratio", "waves_per_revolution"];
     let fields = effect.as_object().into_iter().flatten();
-    fields.filter(|(_, value)| value.is_string()).map(|(name, value)| (name.clone(), value.clone())).collect()
+    let apart = fields.filter(|(name, value)| value.is_string() || WAVES.contains(&name.as_str()));
+    apart.map(|(name, value)| (name.clone(), value.clone())).collect()
 }
 
 type Side<'a> = Option<(&'a StoredModel, &'a Value)>;
@@ -142,7 +144,7 @@ fn effect_of(sides: [Side<'_>; 2]) -> EffectComparison {
     for (_, effect) in sides.iter().flatten() {
         let fields = effect.as_object().into_iter().flatten();
         for (name, _) in fields.filter(|(_, value)| value.is_number()) {
-            if !names.contains(&name) {
+            if !names.contains(&name) && !of.contains_key(name) {
                 names.push(name);
             }
         }
@@ -152,13 +154,13 @@ fn effect_of(sides: [Side<'_>; 2]) -> EffectComparison {
         [Some(_), None] => Sides::Model,
         [None, _] => Sides::Other,
     };
-    let parameters = names.into_iter().map(|name| parameter_of(&kind, &of, name, sides)).collect();
+    let parameters = names.into_iter().map(|name| parameter_of(name, sides)).collect();
     EffectComparison { kind, of, has, parameters }
 }
 
-fn parameter_of(kind: &str, of: &Map<String, Value>, name: &str, sides: [Side<'_>; 2]) -> ParameterComparison {
+fn parameter_of(name: &str, sides: [Side<'_>; 2]) -> ParameterComparison {
     let [model, other] = sides.map(|side| side.and_then(|(_, effect)| effect[name].as_f64()));
-    let [mine, its] = sides.map(|side| side.and_then(|(model, _)| interval(model, kind, of, name)));
+    let [mine, its] = sides.map(|side| side.and_then(|(model, effect)| interval(model, effect, name)));
     ParameterComparison {
         name: name.to_owned(),
         model,
@@ -170,13 +172,22 @@ fn parameter_of(kind: &str, of: &Map<String, Value>, name: &str, sides: [Side<'_
     }
 }
 
-/// As the diagnosis gave it.
-fn interval(model: &StoredModel, kind: &str, of: &Map<String, Value>, name: &str) -> Option<[f64; 2]> {
+/// Of a parameter, between what a diagnosis says of it and its effect.
+const ROUND_OFF: f64 = 1e-9;
+
+/// As the diagnosis gave it; not that of an effect that was changed since.
+fn interval(model: &StoredModel, effect: &Value, name: &str) -> Option<[f64; 2]> {
     let causes = model.content.provenance["causes"].as_array()?;
-    // The label of a cause is made of the words that tell it apart.
+    // What a cause is called is for people; its kind and the values of its parameters are those of its effect.
+    let is_its = |parameter: &Value| {
+        let value = parameter["name"].as_str().and_then(|name| effect[name].as_f64());
+        value
+            .zip(parameter["value"].as_f64())
+            .is_some_and(|(its, found)| (its - found).abs() <= ROUND_OFF * found.abs())
+    };
     let same = |cause: &&Value| {
-        let label = cause["label"].as_str().unwrap_or_default();
-        cause["kind"] == kind && of.values().filter_map(Value::as_str).all(|word| label.contains(word))
+        let parameters = cause["parameters"].as_array().map_or(&[][..], Vec::as_slice);
+        cause["kind"] == effect["kind"] && parameters.iter().all(is_its)
     };
     let parameters = causes.iter().find(same)?["parameters"].as_array()?;
     let ends = &parameters.iter().find(|parameter| parameter["name"] == name)?["interval_95"];
@@ -200,7 +211,7 @@ mod tests {
 
     fn wear(rate: f64, low: f64, high: f64) -> (Value, Value) {
         let cause = json!({ "kind": "wear_in", "label": "",
-            "parameters": [{ "name": "rate_mm_per_min", "interval_95": [low, high] }] });
+            "parameters": [{ "name": "rate_mm_per_min", "value": rate, "interval_95": [low, high] }] });
         (json!({ "kind": "wear_in", "rate_mm_per_min": rate }), cause)
     }
 
@@ -221,6 +232,31 @@ mod tests {
         assert!((rate.difference.unwrap() - 0.005).abs() < 1e-15);
         assert_eq!(found.effects[2].of["batch"], "B");
         assert_eq!(found.effects[2].parameters[0].apart, None);
+    }
+
+    #[test]
+    fn batches_and_waves_are_compared_with_their_own_and_what_was_changed_has_no_interval() {
+        let shift = |batch: &str, by: f64| json!({ "kind": "batch_shift", "batch": batch, "delta_ln": by });
+        let found = |batch: &str, by: f64| {
+            json!({ "kind": "batch_shift", "label": batch,
+                "parameters": [{ "name": "delta_ln", "value": by, "interval_95": [by - 0.01, by + 0.01] }] })
+        };
+        let wave = |order: u32, by: f64| json!({ "kind": "initial_harmonic", "order": order, "amplitude_mm": by });
+        let a = model(
+            json!([shift("10", 0.3), shift("1", 0.1), wave(3, 0.01)]),
+            &json!([found("10", 0.3), found("1", 0.1)]),
+        );
+        let b = model(json!([shift("1", 0.2), wave(5, 0.02), wave(3, 0.03)]), &json!([found("1", 0.25)]));
+        let comparison = compare(&a, &b).unwrap();
+        let of = |index: usize| &comparison.effects[index];
+        assert_eq!(
+            (of(0).has, of(1).has, of(2).has, of(3).has),
+            (Sides::Model, Sides::Both, Sides::Both, Sides::Other)
+        );
+        assert_eq!(of(1).parameters[0].model_interval_95, Some([0.1 - 0.01, 0.1 + 0.01]));
+        assert_eq!(of(1).parameters[0].other_interval_95, None, "0.2 is not what was found");
+        assert_eq!((&of(2).of["order"], &of(3).of["order"]), (&json!(3), &json!(5)));
+        assert_eq!((of(2).parameters.len(), of(2).parameters[0].other), (1, Some(0.03)));
     }
 
     #[test]

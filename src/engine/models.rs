@@ -332,7 +332,8 @@ fn faults_of_model(registry: &Registry, content: &ModelContent) -> Vec<Finding> 
     entry.validate_effects(&json!(content.effects), &mut faults);
     if faults.listed.is_empty() {
         for (index, effect) in content.effects.iter().enumerate() {
-            let again = content.effects[..index].iter().any(|before| told_apart_by(before) == told_apart_by(effect));
+            let again =
+                content.effects[..index].iter().any(|before| compare::identity(before) == compare::identity(effect));
             let kind = effect["kind"].as_str().filter(|_| again);
             faults.listed.extend(kind.map(|kind| {
                 Finding::new("duplicate_effect", format!("/effects/{index}/kind")).with("kind", kind.to_owned())
@@ -340,13 +341,6 @@ fn faults_of_model(registry: &Registry, content: &ModelContent) -> Vec<Finding> 
         }
     }
     faults.listed
-}
-
-/// The parts of an effect that may make two of one kind different ones: its words, and which wave it is.
-fn told_apart_by(effect: &Value) -> Vec<(&String, &Value)> {
-    const WAVES: [&str; 3] = ["order", "ratio", "waves_per_revolution"];
-    let fields = effect.as_object().into_iter().flatten();
-    fields.filter(|(name, value)| value.is_string() || WAVES.contains(&name.as_str())).collect()
 }
 
 /// Whether an exported model is the one that its hash is of.

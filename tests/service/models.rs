@@ -16,7 +16,7 @@ fn lathe(delta: f64, low: f64, high: f64) -> Value {
         "provenance": {
             "quantity": "diameter_deviation_um",
             "causes": [{ "kind": "headstock_compliance", "label": "",
-                "parameters": [{ "name": "delta_um_per_n", "interval_95": [low, high] }] }]
+                "parameters": [{ "name": "delta_um_per_n", "value": delta, "interval_95": [low, high] }] }]
         }
     })
 }
