@@ -4,7 +4,6 @@ use std::fmt::Write as _;
 use std::sync::Arc;
 
 use axum::body::Body;
-use axum::extract::Query;
 use axum::http::header::{
     CACHE_CONTROL, CONTENT_LANGUAGE, CONTENT_LOCATION, CONTENT_TYPE, ETAG, HeaderName, HeaderValue, VARY,
 };
@@ -12,10 +11,10 @@ use axum::http::{HeaderMap, StatusCode, Uri};
 use axum::response::Response;
 use bytes::Bytes;
 use precut_calc::calculator::{Figure, Meta, Value, Values};
-use serde::Deserialize;
 
 use super::negotiate::{self, Media};
 use super::problem::Problem;
+use super::query::Query;
 use super::{CACHE_STATE, codes};
 use crate::engine::{CacheState, ENGINE_VERSION, Stored, Timings};
 use crate::render;
@@ -32,12 +31,20 @@ pub(super) struct View {
     language: Language,
 }
 
-/// The query of a request for an answer.
-#[derive(Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
+/// Which table and figure of an answer are asked for, whichever of them its form then needs.
+#[derive(Debug, Default)]
 pub(super) struct Parts {
-    pub(super) table: Option<String>,
-    pub(super) figure: Option<String>,
+    table: Option<String>,
+    figure: Option<String>,
+}
+
+impl Parts {
+    /// Its parameters.
+    pub(super) const KNOWN: &[&str] = &["table", "figure"];
+
+    pub(super) fn of(query: &mut Query) -> Self {
+        Self { table: query.text("table"), figure: query.text("figure") }
+    }
 }
 
 /// The forms in which a calculator's answers exist.
@@ -49,19 +56,10 @@ pub(super) fn offered(meta: &Meta) -> Vec<Media> {
     offered
 }
 
-/// What stands behind the question mark.
-pub(super) fn query<T: Default + serde::de::DeserializeOwned>(uri: &Uri) -> Result<T, Problem> {
-    if uri.query().is_none_or(str::is_empty) {
-        return Ok(T::default());
-    }
-    let Query(query) = Query::try_from_uri(uri).map_err(|error| Problem::query(error.body_text()))?;
-    Ok(query)
-}
-
 impl View {
     /// What a request asks for; refused if there is no such thing.
     pub(super) fn of(uri: &Uri, headers: &HeaderMap, meta: &Meta, offered: &[Media]) -> Result<Self, Problem> {
-        Self::of_parts(query(uri)?, headers, meta, offered)
+        Self::of_parts(Parts::of(&mut Query::of(uri, Parts::KNOWN)?), headers, meta, offered)
     }
 
     /// The same of a query that was read already.

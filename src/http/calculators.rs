@@ -9,16 +9,17 @@ use axum::http::HeaderMap;
 use axum::http::header::{ACCEPT, IF_NONE_MATCH};
 use axum::response::Response;
 use precut_calc::calculator::{CalculatorKind, Meta};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
 
 use super::answer::{self, Parts, View};
-use super::jobs::{self, Precedence};
+use super::jobs;
 use super::metrics::CacheCounters;
 use super::negotiate::{self, Media};
 use super::prefer::{self, Preference};
 use super::problem::Problem;
+use super::query::Query;
 use super::{App, body, gate};
 use crate::engine::{Answered, Ask, CacheState, Error, Priority};
 use crate::registry::{Entry, Registry};
@@ -47,21 +48,16 @@ pub(super) const MOST_DEADLINE_S: f64 = 31_536_000.0;
 /// Shortest deadline, s.
 pub(super) const LEAST_DEADLINE_S: f64 = 0.001;
 
-/// The query of a request for an answer: which part of it, and how it is to be computed.
-#[derive(Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct SolveQuery {
-    table: Option<String>,
-    figure: Option<String>,
-    priority: Option<Precedence>,
-    deadline_s: Option<f64>,
-}
+/// Of a request for an answer: which part of it, and how it is to be computed.
+const PARAMETERS: &[&str] = &["table", "figure", "priority", "deadline_s"];
 
 /// `POST /v1/{calculator}`
 pub(super) async fn solve(app: App, room: Arc<Room>, request: Request) -> Result<Response, Problem> {
-    let SolveQuery { table, figure, priority, deadline_s } = answer::query(request.uri())?;
+    let mut query = Query::of(request.uri(), PARAMETERS)?;
+    let priority = query.one_of("priority", Priority::ALL, Priority::word)?;
+    let deadline_s = query.number("deadline_s", &(LEAST_DEADLINE_S..=MOST_DEADLINE_S))?;
     let headers = request.headers();
-    let view = View::of_parts(Parts { table, figure }, headers, room.entry.meta(), &room.offered)?;
+    let view = View::of_parts(Parts::of(&mut query), headers, room.entry.meta(), &room.offered)?;
     let mut preference = Preference::of(headers);
     // Those who wait are requests in work: they leave room for those who do not.
     let waiting = preference.wait_s.map(|_| Waiting::new(&app));
@@ -69,8 +65,8 @@ pub(super) async fn solve(app: App, room: Arc<Room>, request: Request) -> Result
         preference.wait_s = Some(0);
     }
     let ask = Ask {
-        priority: priority.map_or(Priority::Normal, Into::into),
-        deadline: deadline_s.map(deadline).transpose()?,
+        priority: priority.unwrap_or(Priority::Normal),
+        deadline: deadline_s.map(Duration::from_secs_f64),
         idempotency_key: prefer::idempotency_key(headers)?,
         wait: preference.wait(),
         ..Ask::plain(gate::owner(&app, &request))
@@ -114,13 +110,6 @@ impl Drop for Waiting<'_> {
     fn drop(&mut self) {
         self.app.waiting.fetch_sub(1, Ordering::Relaxed);
     }
-}
-
-fn deadline(s: f64) -> Result<Duration, Problem> {
-    if (LEAST_DEADLINE_S..=MOST_DEADLINE_S).contains(&s) {
-        return Ok(Duration::from_secs_f64(s));
-    }
-    Err(Problem::query(format!("deadline_s {s} is not between {LEAST_DEADLINE_S} and {MOST_DEADLINE_S}")))
 }
 
 /// `GET /v1/calculators`

@@ -1,10 +1,10 @@
 //! Jobs: listed, watched, cancelled, and their results.
 
-use axum::extract::{Path, Query, State};
+use axum::extract::{Path, State};
 use axum::http::header::{CACHE_CONTROL, CONTENT_LANGUAGE, CONTENT_TYPE, HeaderValue, LOCATION, RETRY_AFTER, VARY};
 use axum::http::{HeaderMap, StatusCode, Uri};
 use axum::response::Response;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::App;
@@ -12,6 +12,7 @@ use super::answer::{self, View};
 use super::negotiate;
 use super::prefer::{PREFERENCE_APPLIED, Preference};
 use super::problem::{Problem, ProblemDocument};
+use super::query::Query;
 use crate::engine::{CacheState, Error, Job, JobId, JobQuery, JobState, Priority, Timings};
 use crate::text::{Language, Texts, told};
 
@@ -94,7 +95,7 @@ enum Progression {
 }
 
 /// Which jobs go first.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 #[schema(as = Priority)]
 pub(super) enum Precedence {
@@ -104,16 +105,6 @@ pub(super) enum Precedence {
     Normal,
     /// Before all others.
     High,
-}
-
-impl From<Precedence> for Priority {
-    fn from(priority: Precedence) -> Self {
-        match priority {
-            Precedence::Low => Self::Low,
-            Precedence::Normal => Self::Normal,
-            Precedence::High => Self::High,
-        }
-    }
 }
 
 /// Addresses of a job.
@@ -227,39 +218,21 @@ pub(super) fn apply(response: &mut Response, preference: Preference) {
     }
 }
 
-/// The query of the list.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct ListQuery {
-    state: Option<String>,
-    calculator: Option<String>,
-    limit: Option<u32>,
-    after: Option<String>,
-}
-
 /// `GET /v1/jobs`
 pub(super) async fn list(State(app): State<App>, uri: Uri, headers: HeaderMap) -> Result<Response, Problem> {
-    let Query(query) = Query::<ListQuery>::try_from_uri(&uri).map_err(|error| Problem::query(error.body_text()))?;
-    let limit = query.limit.unwrap_or(DEFAULT_ITEMS);
-    if !(1..=MOST_ITEMS).contains(&limit) {
-        return Err(Problem::query(format!("limit {limit} is not between 1 and {MOST_ITEMS}")));
-    }
-    if let Some(id) = &query.calculator
+    let mut query = Query::of(&uri, &["state", "calculator", "limit", "after"])?;
+    let limit = query.number("limit", &(1..=MOST_ITEMS))?.unwrap_or(DEFAULT_ITEMS);
+    let state = query.one_of("state", JobState::ALL, JobState::word)?;
+    let before = query.after()?;
+    let calculator = query.text("calculator");
+    if let Some(id) = &calculator
         && app.engine.entry(id).is_none()
     {
         return Err(Error::unknown(app.engine.registry(), id).into());
     }
-    let state = query.state.as_deref().map(|word| {
-        let known: Vec<_> = JobState::ALL.iter().map(|state| state.word()).collect();
-        JobState::of_word(word).ok_or_else(|| Problem::query(format!("state {word} is none of {}", known.join(", "))))
-    });
-    let before = query.after.as_deref().map(|text| {
-        text.parse().map_err(|_| Problem::query("after: take it from `next` of the page before".to_owned()))
-    });
-    let (state, before) = (state.transpose()?, before.transpose()?);
-    let (jobs, next) = app.engine.jobs(JobQuery { state, calculator: query.calculator.clone(), limit, before }).await?;
+    let (jobs, next) = app.engine.jobs(JobQuery { state, calculator: calculator.clone(), limit, before }).await?;
     let filter = state.map(|state| format!("&state={}", state.word())).unwrap_or_default()
-        + &query.calculator.map(|id| format!("&calculator={id}")).unwrap_or_default();
+        + &calculator.map(|id| format!("&calculator={id}")).unwrap_or_default();
     let language = negotiate::language(&headers);
     let asked: Vec<_> =
         jobs.iter().map(|Job { record, .. }| (record.id, record.key, record.calculator.clone())).collect();

@@ -20,6 +20,7 @@ mod pages;
 mod parts;
 mod prefer;
 mod problem;
+mod query;
 mod rate;
 mod results;
 mod server;

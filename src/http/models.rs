@@ -1,15 +1,16 @@
 //! Stored models: what a diagnosis found, under a name that later jobs ask for.
 
 use axum::body::Body as HttpBody;
-use axum::extract::{Path, Query, Request, State};
+use axum::extract::{Path, Request, State};
 use axum::http::header::{CACHE_CONTROL, CONTENT_TYPE, IF_NONE_MATCH, LOCATION};
 use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri};
 use axum::response::Response;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
 
 use super::problem::Problem;
+use super::query::Query;
 use super::{App, body};
 use crate::engine::{Body, ModelAnswer, ModelError, ModelSource, StoredModel};
 
@@ -141,23 +142,12 @@ fn answered(status: StatusCode, value: &impl Serialize) -> Response {
     response
 }
 
-/// The query of the list.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct ListQuery {
-    limit: Option<u32>,
-    after: Option<String>,
-}
-
 /// `GET /v1/models`
 pub(super) async fn list(State(app): State<App>, uri: Uri) -> Result<Response, Problem> {
-    let Query(query) = Query::<ListQuery>::try_from_uri(&uri).map_err(|error| Problem::query(error.body_text()))?;
-    let limit = query.limit.unwrap_or(DEFAULT_ITEMS);
-    if !(1..=MOST_ITEMS).contains(&limit) {
-        return Err(Problem::query(format!("limit {limit} is not between 1 and {MOST_ITEMS}")));
-    }
+    let mut query = Query::of(&uri, &["limit", "after"])?;
+    let limit = query.number("limit", &(1..=MOST_ITEMS))?.unwrap_or(DEFAULT_ITEMS);
     // One more than asked for tells whether there is another page.
-    let mut models = app.engine.models(query.after.unwrap_or_default(), limit + 1).await?;
+    let mut models = app.engine.models(query.text("after").unwrap_or_default(), limit + 1).await?;
     let more = models.len() > limit as usize;
     models.truncate(limit as usize);
     let next = models.last().filter(|_| more).map(|last| format!("/v1/models?limit={limit}&after={}", last.name));
@@ -169,17 +159,10 @@ pub(super) async fn read(State(app): State<App>, Path(name): Path<String>) -> Re
     Ok(answered(StatusCode::OK, &document(app.engine.model(&name).await?)))
 }
 
-/// The query of a comparison.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct CompareQuery {
-    with: String,
-}
-
 /// `GET /v1/models/{name}/comparison`
 pub(super) async fn compare(State(app): State<App>, Path(name): Path<String>, uri: Uri) -> Result<Response, Problem> {
-    let Query(query) = Query::<CompareQuery>::try_from_uri(&uri).map_err(|error| Problem::query(error.body_text()))?;
-    Ok(answered(StatusCode::OK, &app.engine.compare_models(&name, &query.with).await?))
+    let with = Query::of(&uri, &["with"])?.needed("with")?;
+    Ok(answered(StatusCode::OK, &app.engine.compare_models(&name, &with).await?))
 }
 
 /// `PUT /v1/models/{name}`

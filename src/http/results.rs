@@ -4,15 +4,16 @@ use std::collections::HashMap;
 use std::str::FromStr;
 use std::sync::Arc;
 
-use axum::extract::{Path, Query, State};
+use axum::extract::{Path, State};
 use axum::http::header::{CACHE_CONTROL, CONTENT_LANGUAGE, HeaderValue, VARY};
 use axum::http::{HeaderMap, StatusCode, Uri};
 use axum::response::{IntoResponse, Json, Response};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::answer::{self, View};
 use super::problem::Problem;
+use super::query::Query;
 use super::{App, CACHE_STATE, negotiate};
 use crate::engine::{Error, Key, Stored, Summary};
 use crate::store::{Cursor, ResultPage, ResultQuery, ResultSummary};
@@ -22,15 +23,6 @@ use crate::text::{Language, told};
 pub(super) const MOST_ITEMS: u32 = 500;
 /// Results of one page unless asked for more or fewer.
 pub(super) const DEFAULT_ITEMS: u32 = 50;
-
-/// The query of the list.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct ListQuery {
-    calculator: Option<String>,
-    limit: Option<u32>,
-    after: Option<String>,
-}
 
 /// A page of kept results.
 #[derive(Debug, Serialize, ToSchema)]
@@ -81,26 +73,20 @@ pub(super) struct ResultLinks {
 
 /// `GET /v1/results`
 pub(super) async fn list(State(app): State<App>, uri: Uri, headers: HeaderMap) -> Result<Response, Problem> {
-    let Query(query) = Query::<ListQuery>::try_from_uri(&uri).map_err(|error| Problem::query(error.body_text()))?;
-    let limit = query.limit.unwrap_or(DEFAULT_ITEMS);
-    if !(1..=MOST_ITEMS).contains(&limit) {
-        return Err(Problem::query(format!("limit {limit} is not between 1 and {MOST_ITEMS}")));
-    }
-    if let Some(id) = &query.calculator
+    let mut query = Query::of(&uri, &["calculator", "limit", "after"])?;
+    let limit = query.number("limit", &(1..=MOST_ITEMS))?.unwrap_or(DEFAULT_ITEMS);
+    let after = query.after::<Cursor>()?;
+    let calculator = query.text("calculator");
+    if let Some(id) = &calculator
         && app.engine.entry(id).is_none()
     {
         return Err(Error::unknown(app.engine.registry(), id).into());
     }
-    let after = query.after.as_deref().map(|text| {
-        text.parse::<Cursor>().map_err(|_| Problem::query("after: take it from `next` of the page before".to_owned()))
-    });
-    let after = after.transpose()?;
-    let page =
-        app.engine.results(ResultQuery { calculator: query.calculator.clone(), limit: Some(limit), after }).await?;
+    let page = app.engine.results(ResultQuery { calculator: calculator.clone(), limit: Some(limit), after }).await?;
     let asked: Vec<_> = page.items.iter().map(|item| (item.key, item.calculator.clone())).collect();
     let summaries = app.engine.summaries(&asked).await;
     let language = negotiate::language(&headers);
-    let list = page_of(page, &summaries, language, limit, query.calculator.as_deref());
+    let list = page_of(page, &summaries, language, limit, calculator.as_deref());
     let headers =
         [(CACHE_CONTROL, "no-store"), (CONTENT_LANGUAGE, language.tag()), (VARY, "Accept-Language, Accept-Encoding")];
     Ok((headers, Json(list)).into_response())
