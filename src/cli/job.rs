@@ -1,13 +1,14 @@
 //! Job files: read, checked, solved without a server.
 
 use std::io::{self, IsTerminal, Read};
+use std::ops::Range;
 use std::path::Path;
 
 use bytes::Bytes;
 use precut_calc::calculator::Unwatched;
 use serde::Deserialize;
-use serde::de::IgnoredAny;
 use serde_json::json;
+use serde_json::value::RawValue;
 
 use super::{Failed, JobArgs, SolveArgs, entry, print, print_json};
 use crate::engine::{
@@ -79,7 +80,7 @@ pub(super) fn example(entry: &Entry, id: Option<&str>, bare: bool) -> Result<(),
     };
     let Some(example) = example else {
         let known: Vec<_> = meta.examples.iter().map(|example| example.id).collect();
-        return Err(Failed::Machine(format!("{} has these examples: {}", meta.id, known.join(", "))));
+        return Err(Failed::Usage(format!("{} has these examples: {}", meta.id, known.join(", "))));
     };
     let job: serde_json::Value =
         serde_json::from_str(example.job).map_err(|error| Failed::Machine(error.to_string()))?;
@@ -169,25 +170,25 @@ fn is_field(known: &str, name: &str) -> bool {
 /// A job file: a job with its calculator, or a parameter study.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct JobFile {
+struct JobFile<'a> {
     calculator: Option<String>,
-    #[serde(default, deserialize_with = "present")]
-    job: bool,
-    #[serde(default, deserialize_with = "present")]
-    study: bool,
+    #[serde(default, borrow, deserialize_with = "present")]
+    job: Option<&'a RawValue>,
+    #[serde(default, borrow, deserialize_with = "present")]
+    study: Option<&'a RawValue>,
 }
 
 /// Whatever is there, be it null, is there.
-fn present<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<bool, D::Error> {
-    IgnoredAny::deserialize(deserializer).map(|_| true)
+fn present<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<&'de RawValue>, D::Error> {
+    Deserialize::deserialize(deserializer).map(Some)
 }
 
-impl JobFile {
-    /// Whose job it is, and which member it is.
-    fn parts(self) -> Option<(String, &'static [u8])> {
+impl<'a> JobFile<'a> {
+    /// Whose job it is, and its text.
+    fn parts(self) -> Option<(String, &'a str)> {
         match (self.calculator, self.job, self.study) {
-            (Some(calculator), true, false) => Some((calculator, b"job")),
-            (None, false, true) => Some((STUDIES.to_owned(), b"study")),
+            (Some(calculator), Some(job), None) => Some((calculator, job.get())),
+            (None, None, Some(study)) => Some((STUDIES.to_owned(), study.get())),
             _ => None,
         }
     }
@@ -196,26 +197,16 @@ impl JobFile {
 /// Takes a job file apart. The job keeps its bytes, and its place: whatever stands around it becomes blank, so that
 /// lines and columns of a fault are those of the file.
 fn job_file(mut bytes: Vec<u8>) -> Result<(String, Bytes), Failed> {
-    let fault = |message: &str, line, column| {
-        Error::Syntax(SyntaxFault {
-            code: "bad_syntax",
-            pointer: String::new(),
-            line,
-            column,
-            message: format!(
-                "{message}; a job file is {{\"calculator\": \"...\", \"job\": {{...}}}} or {{\"study\": {{...}}}}"
-            ),
-        })
+    if bytes.starts_with(BYTE_ORDER_MARK) {
+        bytes.drain(..BYTE_ORDER_MARK.len());
+    }
+    let (calculator, job) = match serde_json::from_slice(&bytes).map(JobFile::parts) {
+        Ok(Some((calculator, job))) => (calculator, place_of(job, &bytes)),
+        Err(error) if !error.is_data() => return Err(no_json(&error)),
+        Ok(None) | Err(_) => return Err(Failed::Usage(NO_JOB_FILE.to_owned())),
     };
-    let file: JobFile = serde_json::from_slice(&bytes).map_err(|error| {
-        let message = error.to_string();
-        let message = message.rsplit_once(" at line ").map_or(message.as_str(), |(message, _)| message);
-        fault(message, error.line(), error.column())
-    })?;
-    let (calculator, name) = file.parts().ok_or_else(|| fault("this is neither a job nor a study", 1, 1))?;
-    let (start, end) = member(&bytes, name).unwrap_or((0, bytes.len()));
-    bytes.truncate(end);
-    for byte in &mut bytes[..start] {
+    bytes.truncate(job.end);
+    for byte in &mut bytes[..job.start] {
         if *byte != b'\n' {
             *byte = b' ';
         }
@@ -223,52 +214,24 @@ fn job_file(mut bytes: Vec<u8>) -> Result<(String, Bytes), Failed> {
     Ok((calculator, bytes.into()))
 }
 
-/// Where the value of a member of the outermost object stands, in text that is known to be JSON.
-fn member(json: &[u8], name: &[u8]) -> Option<(usize, usize)> {
-    let mut depth = 0_usize;
-    let mut key: Option<&[u8]> = None;
-    let mut value_start = None;
-    let mut at = 0;
-    while at < json.len() {
-        match json[at] {
-            b'"' => {
-                let end = string_end(json, at);
-                if depth == 1 && value_start.is_none() {
-                    key = json.get(at + 1..end - 1);
-                }
-                at = end;
-                continue;
-            }
-            b':' if depth == 1 && value_start.is_none() => {
-                value_start = Some(at + 1);
-            }
-            b'{' | b'[' => depth += 1,
-            byte @ (b'}' | b']' | b',') if depth == 1 => {
-                if key == Some(name) {
-                    return value_start.map(|start| (start, at));
-                }
-                value_start = None;
-                depth -= usize::from(byte != b',');
-            }
-            b'}' | b']' => depth = depth.saturating_sub(1),
-            _ => {}
-        }
-        at += 1;
-    }
-    None
+/// Editors of Windows write it.
+const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
+
+const NO_JOB_FILE: &str = "this is no job file: that is {\"calculator\": \"NAME\", \"job\": {...}} or \
+                           {\"study\": {...}}; if it is the bare job of a calculator, say which: --calculator NAME \
+                           (`precut list` tells them)";
+
+fn no_json(error: &serde_json::Error) -> Failed {
+    let message = error.to_string();
+    let message = message.rsplit_once(" at line ").map_or(message.as_str(), |(message, _)| message).to_owned();
+    let (line, column) = (error.line(), error.column());
+    Error::Syntax(SyntaxFault { code: "bad_syntax", pointer: String::new(), line, column, message }).into()
 }
 
-/// Just behind the string that begins at `start`.
-fn string_end(json: &[u8], start: usize) -> usize {
-    let mut at = start + 1;
-    while at < json.len() {
-        match json[at] {
-            b'"' => return at + 1,
-            b'\\' => at += 2,
-            _ => at += 1,
-        }
-    }
-    json.len()
+/// Where a part of the text stands in it.
+fn place_of(part: &str, whole: &[u8]) -> Range<usize> {
+    let start = part.as_ptr().addr() - whole.as_ptr().addr();
+    start..start + part.len()
 }
 
 fn named(path: &Path, error: &io::Error) -> String {
@@ -312,19 +275,32 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_job_file_is_said_with_its_place() {
+    fn a_byte_order_mark_is_no_part_of_it() {
+        let (calculator, job) = job_of("\u{feff}{\"calculator\": \"beam\", \"job\": {}}");
+        assert_eq!((calculator.as_str(), job.trim(), job.find('{')), ("beam", "{}", Some(30)));
+    }
+
+    #[test]
+    fn what_is_no_json_is_said_with_its_place() {
+        for text in ["", "{", "{\"calculator\" 1}"] {
+            let Err(Failed::Problem(problem)) = job_file(text.as_bytes().to_vec()) else { unreachable!("{text}") };
+            assert_eq!(problem.code(), "bad_syntax", "{text}");
+        }
+    }
+
+    #[test]
+    fn what_is_json_and_no_job_file_is_told_how_to_be_read() {
         for text in [
-            "",
-            "{",
             "[]",
             "{}",
             "{\"study\":{},\"job\":{}}",
             "{\"job\":{}}",
             "{\"calculator\":\"x\"}",
             "{\"calculator\":\"x\",\"job\":{},\"jobs\":1}",
+            "{\"shaft\":{\"segments\":[]}}",
         ] {
-            let Err(Failed::Problem(problem)) = job_file(text.as_bytes().to_vec()) else { unreachable!("{text}") };
-            assert_eq!(problem.code(), "bad_syntax", "{text}");
+            let Err(Failed::Usage(said)) = job_file(text.as_bytes().to_vec()) else { unreachable!("{text}") };
+            assert!(said.contains("--calculator"), "{text}");
         }
     }
 }

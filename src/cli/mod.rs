@@ -222,7 +222,7 @@ pub fn main(
 /// As the help says.
 fn exit_code(problem: &Problem) -> u8 {
     match (problem.status().as_u16(), problem.code()) {
-        (422, "invalid_job" | "too_expensive") => 2,
+        (422, "invalid_job" | "invalid_model" | "too_expensive") => 2,
         (422, _) => 3,
         (400..=499, _) => 2,
         _ => 1,
@@ -265,9 +265,7 @@ fn hash_key() -> Result<(), Failed> {
     io::stdin().read_to_string(&mut key).map_err(|error| Failed::Machine(format!("standard input: {error}")))?;
     let key = key.trim();
     if key.len() < 16 {
-        return Err(Failed::Machine(
-            "a key has at least 16 characters; make one with `openssl rand -hex 32`".to_owned(),
-        ));
+        return Err(Failed::Usage("a key has at least 16 characters; make one with `openssl rand -hex 32`".to_owned()));
     }
     print(format!("{}\n", auth::hash(key)).as_bytes())
 }
