@@ -61,15 +61,13 @@ impl SqliteStore {
         Ok(sound.filter_map(|(shard, packed, _)| Some((shard, zstd::decode_all(&*packed).ok()?.into()))).collect())
     }
 
-    /// Forgets the parts of a study, and those of studies that nobody took up again for as long as jobs are kept.
+    /// Forgets the parts of a study.
     pub(super) async fn forget_shards_of(&self, study: Key) -> Result<(), StoreError> {
-        let before = now_ms().saturating_sub(self.keep_ms);
         self.ledger
             .write(move |connection| {
                 Box::pin(async move {
-                    sqlx::query("DELETE FROM studies WHERE study = ?1 OR created_ms < ?2")
+                    sqlx::query("DELETE FROM studies WHERE study = ?1")
                         .bind(study.as_bytes().as_slice())
-                        .bind(before)
                         .execute(connection)
                         .await?;
                     Ok(())

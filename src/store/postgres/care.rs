@@ -252,14 +252,15 @@ async fn forget(connection: &mut PgConnection, keep_ms: i64) -> Outcome<u64> {
     .bind(TIMINGS)
     .execute(&mut *connection)
     .await?;
-    sqlx::query("DELETE FROM precut.shared_studies WHERE created_ms < precut.now_ms() - $1")
-        .bind(keep_ms)
-        .execute(&mut *connection)
-        .await?;
-    sqlx::query("DELETE FROM precut.studies WHERE created_ms < precut.now_ms() - $1")
-        .bind(keep_ms)
-        .execute(connection)
-        .await?;
+    // Parts of studies that no job waits for.
+    for deserted in [
+        "DELETE FROM precut.shared_studies WHERE created_ms < precut.now_ms() - $1 AND NOT EXISTS (
+             SELECT FROM precut.jobs WHERE key = study AND state IN ('queued', 'running'))",
+        "DELETE FROM precut.studies WHERE created_ms < precut.now_ms() - $1 AND NOT EXISTS (
+             SELECT FROM precut.jobs WHERE key = study AND state IN ('queued', 'running'))",
+    ] {
+        sqlx::query(deserted).bind(keep_ms).execute(&mut *connection).await?;
+    }
     Ok(gone.rows_affected())
 }
 

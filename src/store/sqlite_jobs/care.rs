@@ -89,10 +89,28 @@ pub(super) async fn forget_expired(connection: &mut SqliteConnection, keep_ms: i
         sqlx::query("DELETE FROM precut_jobs WHERE id IN (SELECT id FROM precut_jobs WHERE expires_ms <= ?1 LIMIT ?2)")
             .bind(now.saturating_sub(keep_ms.saturating_mul(TOMBSTONE)))
             .bind(FORGOTTEN_AT_ONCE)
-            .execute(connection)
+            .execute(&mut *connection)
             .await?
             .rows_affected();
-    Ok(Forgotten { records, is_more: emptied.max(records) >= u64::from(FORGOTTEN_AT_ONCE) })
+    let parts = forget_deserted_parts(connection, now.saturating_sub(keep_ms)).await?;
+    let most = emptied.max(records).max(parts);
+    Ok(Forgotten { records, is_more: most >= u64::from(FORGOTTEN_AT_ONCE) })
+}
+
+/// Parts of studies that were put down before, and that no job waits for.
+async fn forget_deserted_parts(connection: &mut SqliteConnection, before: i64) -> Outcome<u64> {
+    let deserted = sqlx::query(
+        "DELETE FROM studies WHERE (study, shard) IN (
+             SELECT study, shard FROM studies INDEXED BY studies_by_time
+             WHERE created_ms < ?1 AND NOT EXISTS (
+                 SELECT 1 FROM precut_jobs WHERE key = study AND state IN ('queued', 'running'))
+             LIMIT ?2)",
+    )
+    .bind(before)
+    .bind(FORGOTTEN_AT_ONCE)
+    .execute(connection)
+    .await?;
+    Ok(deserted.rows_affected())
 }
 
 pub(super) async fn note_timing(connection: &mut SqliteConnection, timing: &Timing, now: i64) -> Outcome<()> {

@@ -141,6 +141,7 @@ macro_rules! suite {
             what_is_old_is_forgotten_at_the_next_start
             the_jobs_of_some_results_are_read_at_once
             parts_of_a_study_are_put_down_and_forgotten
+            parts_of_a_study_that_no_job_waits_for_go_in_time
         }
     };
     ($place:ty, $part:ident: $($test:ident)+) => {

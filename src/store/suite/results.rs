@@ -149,3 +149,18 @@ pub(in crate::store) async fn parts_of_a_study_are_put_down_and_forgotten<P: Pla
     assert_eq!(place.store().shards(study).await.unwrap(), []);
     assert_eq!(place.store().shards(other).await.unwrap().len(), 1);
 }
+
+pub(in crate::store) async fn parts_of_a_study_that_no_job_waits_for_go_in_time<P: Place>() {
+    let place = P::with(super::keep(Duration::from_millis(200))).await;
+    let (deserted, wanted) = (super::key(1), super::key(2));
+    for study in [deserted, wanted] {
+        place.store().put_shard(study, 0, "part".into()).await.unwrap();
+    }
+    place.accept(super::job(2)).await;
+    place.store().forget_expired().await.unwrap();
+    assert_eq!(place.store().shards(deserted).await.unwrap().len(), 1, "somebody may ask for it again");
+    tokio::time::sleep(Duration::from_millis(250)).await;
+    place.store().forget_expired().await.unwrap();
+    assert_eq!(place.store().shards(deserted).await.unwrap(), []);
+    assert_eq!(place.store().shards(wanted).await.unwrap().len(), 1);
+}
