@@ -44,8 +44,8 @@ async fn serve(config: &Config, registry: Registry) -> Result<(), Failed> {
     tracing::info!(%address, data = %config.data.display(), store = %config.store, role = ?config.role, "serving");
     let (stop, stopped) = watch::channel(false);
     tokio::spawn(watch_signals(stop));
-    http::serve(listener, app, stopped, seconds(config.shutdown.grace_s)).await;
-    engine.close().await;
+    let left = http::serve(listener, app, stopped, seconds(config.shutdown.grace_s)).await;
+    engine.close(left).await;
     tracing::info!("stopped");
     Ok(())
 }

@@ -265,11 +265,11 @@ impl Engine {
 
     /// Takes no more jobs, lets running calculations end within the grace or cancels them, writes what waits to be
     /// written, closes the store.
-    pub async fn close(&self) {
+    pub async fn close(&self, grace: Duration) {
         self.refuse_jobs();
         let inner = &self.inner;
         inner.jobs.close().await;
-        if !inner.cores.drain(inner.settings.grace).await {
+        if !inner.cores.drain(grace).await {
             inner.flights.cancel_all();
         }
         inner.store.close().await;

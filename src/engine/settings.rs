@@ -45,8 +45,6 @@ pub struct EngineSettings {
     pub study_points: u64,
     /// How long a job may stand in line for a core.
     pub patience: Duration,
-    /// How long running calculations may go on when the engine is closed.
-    pub grace: Duration,
 }
 
 impl EngineSettings {
@@ -71,7 +69,6 @@ impl EngineSettings {
             job_age: Duration::from_hours(30 * 24),
             study_points: super::study::MOST_POINTS,
             patience: Duration::from_millis(250),
-            grace: Duration::from_secs(20),
         }
     }
 
@@ -97,7 +94,6 @@ impl EngineSettings {
             job_age: Duration::from_secs(u64::from(config.jobs.days) * 24 * 3600),
             study_points: config.limits.study_points,
             patience: Duration::from_millis(config.limits.queue_ms),
-            grace: seconds(config.shutdown.grace_s),
         }
     }
 

@@ -18,6 +18,8 @@ use crate::store::{KeptResult, StoreError};
 use crate::text::{Language, Texts, complete};
 
 const TOY: &str = "toy-bar";
+/// Longer than what the tests compute.
+const GRACE: Duration = Duration::from_secs(20);
 
 async fn engine_with(change: impl FnOnce(&mut EngineSettings)) -> (Engine, TempDir) {
     let folder = tempfile::tempdir().unwrap();
@@ -106,7 +108,7 @@ async fn the_same_job_is_computed_once_however_it_is_spelled() {
 async fn answers_outlive_the_engine() {
     let (engine, folder) = engine().await;
     let first = engine.solve(TOY, job(|_| {})).await.unwrap();
-    engine.close().await;
+    engine.close(GRACE).await;
     assert_eq!(engine.solve(TOY, job(|_| {})).await.unwrap_err(), Error::ShuttingDown);
     assert_eq!(engine.ready().await, Err(Error::ShuttingDown));
     drop(engine);
@@ -205,14 +207,14 @@ async fn a_full_line_is_refused_and_not_queued() {
 
 #[tokio::test]
 async fn closing_waits_for_what_runs_and_cancels_what_runs_too_long() {
-    let (engine, _folder) = engine_with(|settings| settings.grace = Duration::from_millis(300)).await;
+    let (engine, _folder) = engine().await;
     let spawn = |body: Body| {
         let engine = engine.clone();
         tokio::spawn(async move { engine.solve(TOY, body).await })
     };
     let (slow, endless) = (spawn(mode("slow")), spawn(mode("endless")));
     tokio::time::sleep(Duration::from_millis(20)).await;
-    engine.close().await;
+    engine.close(Duration::from_millis(300)).await;
     assert!(slow.await.unwrap().is_ok());
     assert_eq!(endless.await.unwrap().unwrap_err(), Error::Cancelled);
 }
@@ -305,7 +307,7 @@ async fn a_damaged_result_of_a_job_is_computed_again() {
     let id = accepted(&engine, job(|_| {})).await;
     over(&engine, id).await;
     let before = engine.job_result(id).await.unwrap();
-    engine.close().await;
+    engine.close(GRACE).await;
     drop(engine);
     // A bit falls over in everything that is compressed.
     let file = folder.path().join("precut.db");

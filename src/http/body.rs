@@ -39,18 +39,11 @@ pub(super) async fn job(request: Request, takes_tables: impl Fn() -> bool, limit
         }
     };
     let time = seconds(limits.body_timeout_s);
-    let result = tokio::time::timeout(time, read).await.unwrap_or_else(|_| Err(Problem::too_slow(time)));
-    if result.is_err() {
-        mark(unread.as_deref());
-    }
-    result
-}
-
-/// Tells the connection that the client may still be sending.
-fn mark(unread: Option<&AtomicBool>) {
+    let body = tokio::time::timeout(time, read).await.unwrap_or_else(|_| Err(Problem::too_slow(time)))?;
     if let Some(unread) = unread {
-        unread.store(true, Ordering::Relaxed);
+        unread.store(false, Ordering::Relaxed);
     }
+    Ok(body)
 }
 
 #[derive(Clone, Copy)]
@@ -158,5 +151,6 @@ pub(super) async fn linger(io: &mut tokio::net::TcpStream, time: Duration) {
     let _ = tokio::time::timeout(time, drain).await;
 }
 
-/// Whether a client may still be sending a body that nobody reads; shared by a connection's requests.
+/// Whether a client may still be sending a body that nobody reads: so from the arrival of a request with a body until it is
+/// read; shared by a connection's requests.
 pub(super) type Unread = Arc<AtomicBool>;

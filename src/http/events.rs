@@ -247,7 +247,9 @@ impl Follower {
 
     fn push(&mut self, name: &str, job: &Job, data: &impl Serialize) {
         let since = u64::try_from(self.engine.now_ms() - job.record.created_ms).unwrap_or(0);
-        self.number = if job.record.state.is_final() { self.number + 1 } else { since.max(self.number + 1) };
+        // A client may say that it saw the last number that there is.
+        let next = self.number.saturating_add(1);
+        self.number = if job.record.state.is_final() { next } else { since.max(next) };
         let event = Event::default().event(name).id(self.number.to_string());
         match event.json_data(data) {
             Ok(event) => self.waiting.push_back(event),

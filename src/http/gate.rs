@@ -213,6 +213,9 @@ fn worded(mut response: Response, method: &Method, allowed: &str, language: Lang
         None if status.is_client_error() || status.is_server_error() => Problem::of_status(status),
         None => return response,
     };
+    if let Some(cause) = problem.cause() {
+        tracing::error!(cause, "a fault of ours");
+    }
     let document = problem.document(language, id.to_str().ok().map(ToOwned::to_owned));
     let body = serde_json::to_vec(&document).expect("a document has only finite numbers and words");
     let (mut head, _) = response.into_parts();

@@ -32,6 +32,8 @@ struct Inner {
     by_finding: Option<&'static str>,
     header: Option<(HeaderName, HeaderValue)>,
     infeasible: Option<Infeasible>,
+    /// For the log alone.
+    cause: Option<String>,
 }
 
 /// A problem document (RFC 9457).
@@ -82,6 +84,7 @@ impl Problem {
             by_finding: None,
             header: None,
             infeasible: None,
+            cause: None,
         }))
     }
 
@@ -145,10 +148,6 @@ impl Problem {
         Self::new(StatusCode::BAD_REQUEST, "bad_multipart").with("reason", reason)
     }
 
-    pub(super) fn query(reason: String) -> Self {
-        Self::new(StatusCode::BAD_REQUEST, "bad_query").with("reason", reason)
-    }
-
     pub(super) fn not_found(path: &str) -> Self {
         Self::new(StatusCode::NOT_FOUND, "not_found").with("path", path.to_owned())
     }
@@ -177,6 +176,11 @@ impl Problem {
     /// Stable name of the problem.
     pub fn code(&self) -> &'static str {
         self.0.code
+    }
+
+    /// What went wrong inside, which nobody outside is told.
+    pub(super) fn cause(&self) -> Option<&str> {
+        self.0.cause.as_deref()
     }
 
     pub(super) fn extra_header(&self) -> Option<&(HeaderName, HeaderValue)> {
@@ -322,8 +326,9 @@ impl From<Failure> for Problem {
                 if residual.is_finite() { problem.with("residual", residual) } else { problem }
             }
             Failure::Internal(cause) => {
-                tracing::error!(cause, "a calculation failed");
-                Self::new(StatusCode::INTERNAL_SERVER_ERROR, "internal")
+                let mut problem = Self::new(StatusCode::INTERNAL_SERVER_ERROR, "internal");
+                problem.0.cause = Some(cause);
+                problem
             }
         }
     }

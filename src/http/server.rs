@@ -5,10 +5,10 @@ use std::future::poll_fn;
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use axum::Router;
-use axum::body::Body;
+use axum::body::{Body, HttpBody as _};
 use axum::http::Request;
 use hyper::body::Incoming;
 use hyper::server::conn::http1;
@@ -29,9 +29,9 @@ const ACCEPT_PAUSE: Duration = Duration::from_millis(50);
 /// How often samples of latency are folded.
 const UPKEEP: Duration = Duration::from_secs(5);
 
-/// Serves until `stop` says so, then lets requests in work finish for `grace`. Until they have, newcomers are
-/// answered, too: that the service is shutting down.
-pub async fn serve(listener: TcpListener, app: App, mut stop: watch::Receiver<bool>, grace: Duration) {
+/// Serves until `stop` says so, then lets requests in work finish for `grace`; what is left of it. Until they have,
+/// newcomers are answered, too: that the service is shutting down.
+pub async fn serve(listener: TcpListener, app: App, mut stop: watch::Receiver<bool>, grace: Duration) -> Duration {
     let router = super::router(&app);
     let places = Arc::new(Semaphore::new(app.limits.connections));
     let header_timeout = seconds(app.limits.header_timeout_s);
@@ -53,6 +53,7 @@ pub async fn serve(listener: TcpListener, app: App, mut stop: watch::Receiver<bo
     }
     app.stop();
     drop(open);
+    let end = Instant::now() + grace;
     let drained = tokio::time::timeout(grace, all_closed.recv());
     tokio::pin!(drained);
     loop {
@@ -75,6 +76,7 @@ pub async fn serve(listener: TcpListener, app: App, mut stop: watch::Receiver<bo
         }
     }
     upkeep.abort();
+    end.saturating_duration_since(Instant::now())
 }
 
 async fn accept(
@@ -107,6 +109,7 @@ async fn connection(
     let peer = Peer { ip: address.ip(), unread: unread.clone() };
     let service = service_fn(move |request: Request<Incoming>| {
         let mut request = request.map(Body::new);
+        peer.unread.store(!request.body().is_end_stream(), Ordering::Relaxed);
         request.extensions_mut().insert(peer.clone());
         router.clone().call(request)
     });

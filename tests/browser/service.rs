@@ -38,8 +38,8 @@ impl Service {
                 let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
                 tell.send(listener.local_addr().unwrap()).unwrap();
                 let app = App::new(engine.clone(), &config);
-                http::serve(listener, app, stopped, Duration::from_millis(200)).await;
-                engine.close().await;
+                let left = http::serve(listener, app, stopped, Duration::from_millis(200)).await;
+                engine.close(left).await;
             });
         });
         Self { address: told.recv().unwrap(), stop, thread: Some(thread) }

@@ -51,8 +51,8 @@ impl Server {
         let app = App::new(engine.clone(), &config);
         let (stop, stopped) = watch::channel(false);
         let task = tokio::spawn(async move {
-            http::serve(listener, app, stopped, Duration::from_secs(5)).await;
-            engine.close().await;
+            let left = http::serve(listener, app, stopped, Duration::from_secs(5)).await;
+            engine.close(left).await;
         });
         Self {
             address,
