@@ -189,7 +189,7 @@ pub struct Auth {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ApiKey {
-    /// Whose it is; stands in the log and counts for the rate limit.
+    /// Whose it is: requests with it count together for the rate limit, jobs for the fair order.
     pub name: String,
     /// BLAKE3 of the key, 64 hexadecimal digits.
     pub hash: String,

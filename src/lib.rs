@@ -1,8 +1,9 @@
 //! Precut: what to know before the cut. The service around the pure compute core `precut_calc`.
 //!
-//! Layers, each of which knows only those before it: [`registry`] (calculators by name), [`text`] (codes
-//! into sentences), [`render`] (answers into CSV, G-code, SVG), [`store`] (kept results), [`engine`] (bytes
-//! into answers), [`http`] (the service) and [`cli`] (the command line), both run by [`config`].
+//! Layers, each of which knows only those before it: [`units`] and [`key`] (units by name, the address of an answer),
+//! [`registry`] (calculators by name), [`text`] (codes into sentences), [`render`] (answers into CSV, G-code, SVG),
+//! [`store`] (kept results, and which of them [`config`] asks for), [`engine`] (bytes into answers), [`http`] (the
+//! service) and [`cli`] (the command line).
 
 pub mod cli;
 pub mod config;

@@ -58,9 +58,9 @@ impl Kind {
         if let Some(encoding) = headers.get(CONTENT_ENCODING)
             && !encoding.as_bytes().eq_ignore_ascii_case(b"identity")
         {
-            return refused(&format!("content encoding {}", encoding.to_str().unwrap_or("?")));
+            return Err(Problem::encoded(encoding.to_str().unwrap_or("?"), takes_tables()));
         }
-        let Some(sent) = headers.get(CONTENT_TYPE) else { return refused("none") };
+        let Some(sent) = headers.get(CONTENT_TYPE) else { return refused("") };
         if sent == "application/json" {
             return Ok(Self::Json);
         }

@@ -220,7 +220,8 @@ async fn other_media_types_are_refused() {
     let without = server.client.post(&url).body(toy::JOB);
     problem(without.send().await.unwrap(), 415, "unsupported_media_type").await;
     let zipped = server.post(toy::JOB).header("content-encoding", "gzip");
-    problem(zipped.send().await.unwrap(), 415, "unsupported_media_type").await;
+    let document = problem(zipped.send().await.unwrap(), 415, "unsupported_media_type").await;
+    assert!(document["detail"].as_str().unwrap().contains("Content-Encoding gzip"), "{document}");
     for kind in ["application/json; charset=utf-8", "Application/JSON", "application/json;charset=\"UTF-8\""] {
         let request = server.client.post(&url).header("content-type", kind).body(toy::JOB);
         assert_eq!(request.send().await.unwrap().status(), 200, "{kind}");
@@ -235,6 +236,19 @@ async fn queries_that_are_not_understood_are_refused() {
     {
         problem(server.get(&format!("/v1/results{query}")).send().await.unwrap(), 400, "bad_query").await;
     }
+    for (query, said) in [
+        ("limit=501", "limit is 501, allowed are numbers from 1 to 500"),
+        ("limit=1&limit=2", "the parameter limit stands there twice"),
+        ("limits=1", "there is no parameter limits here; did you mean limit?"),
+        ("colour=red", "there is no parameter colour here; there are state, calculator, limit, after"),
+        ("state=done", "state is done, allowed are queued, running, succeeded, failed, cancelled"),
+    ] {
+        let document = problem(server.get(&format!("/v1/jobs?{query}")).send().await.unwrap(), 400, "bad_query").await;
+        assert_eq!(document["detail"], said);
+    }
+    let russian = server.get("/v1/jobs?limit=x").header("accept-language", "ru").send().await.unwrap();
+    let document = problem(russian, 400, "bad_query").await;
+    assert_eq!(document["detail"], "limit = x, допускаются числа от 1 до 500");
     problem(server.get("/v1/results?calculator=none").send().await.unwrap(), 404, "unknown_calculator").await;
     for query in ["?unknown=1", "?table=stations&table=stations"] {
         let path = format!("/v1/sagging-bar{query}");
@@ -305,6 +319,23 @@ async fn a_client_that_only_announces_too_much_is_answered_before_it_sends() {
     stream.write_all(head.as_bytes()).await.unwrap();
     let answer = read_some(&mut stream).await;
     assert!(answer.starts_with("HTTP/1.1 413 "), "{answer}");
+}
+
+#[tokio::test]
+async fn who_is_refused_at_the_door_can_send_the_rest_and_read_why() {
+    let server = Server::start().await;
+    // More than the buffers of both ends hold.
+    let body = vec![b' '; 32 << 20];
+    let mut stream = TcpStream::connect(server.address).await.unwrap();
+    let head = format!(
+        "POST /v1/sagging-bar HTTP/1.1\r\nHost: x\r\nContent-Type: text/plain\r\nContent-Length: {}\r\n\r\n",
+        body.len()
+    );
+    stream.write_all(head.as_bytes()).await.unwrap();
+    stream.write_all(&body).await.expect("the connection is not reset");
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).await.expect("the connection is not reset");
+    assert!(answer.starts_with("HTTP/1.1 415 ") && answer.contains("unsupported_media_type"), "{answer}");
 }
 
 #[tokio::test]

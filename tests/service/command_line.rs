@@ -101,14 +101,12 @@ fn exit_codes_tell_whose_fault_it_is() {
 
 #[test]
 fn a_check_computes_nothing_and_says_what_would_be_computed() {
-    let slow = r#"{"calculator": "sagging-bar", "job": {"length_mm": 500, "load_n": 1, "behaviour": "slow"}}"#;
-    let start = std::time::Instant::now();
-    let output = run(&["check", "-"], slow);
+    let fatal = r#"{"calculator": "sagging-bar", "job": {"length_mm": 500, "load_n": 1, "behaviour": "abort"}}"#;
+    let output = run(&["check", "-"], fatal);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let checked: Value = serde_json::from_str(&said(&output)).unwrap();
     assert_eq!(checked["input"]["stations"], 10);
     assert!(checked["key"].as_str().unwrap().starts_with("b3:"));
-    assert!(start.elapsed() < std::time::Duration::from_millis(900), "{:?}", start.elapsed());
     let output = run(&["check"], r#"{"calculator": "sagging-bar", "job": {"length_mm": -1}}"#);
     assert_eq!(complaint(&output)["errors_total"], 2);
 }

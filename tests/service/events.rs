@@ -86,6 +86,15 @@ async fn a_client_that_comes_back_gets_what_it_has_not_had() {
 }
 
 #[tokio::test]
+async fn a_client_that_claims_to_have_seen_nearly_all_numbers_is_told_the_end() {
+    let server = Server::start().await;
+    let address = sent(&server, lasting(111, 400)).await;
+    let request = server.get(&format!("{address}/events")).header("last-event-id", (u64::MAX - 1).to_string());
+    let events = events(request.send().await.unwrap()).await;
+    assert_eq!(events.last().unwrap().name, "done");
+}
+
+#[tokio::test]
 async fn a_cancel_ends_the_stream() {
     let server = Server::start().await;
     let address = sent(&server, lasting(120, 60_000)).await;

@@ -119,8 +119,8 @@ pub(super) async fn finish(
     Ok(ended)
 }
 
-/// Puts the running jobs of a lease back in line: `charged` says whether the start counts, `silent_since` that it has to
-/// have been silent since then. One that was charged twice goes behind all others.
+/// Puts the running jobs of a lease back in line: `charged` says whether the start counts, `silent_for_ms` that it has
+/// to have been silent for so long. One that was charged twice goes behind all others.
 pub(super) async fn requeue(
     connection: &mut PgConnection,
     lease: Lease,
