@@ -150,15 +150,6 @@ impl Engine {
         self.inner.entry(name)
     }
 
-    /// Everything but the calculation.
-    #[allow(clippy::needless_pass_by_value)] // a body is handed over, as everywhere
-    pub fn check(&self, calculator: &str, body: Body) -> Result<Checked, Error> {
-        let inner = &self.inner;
-        let entry = inner.known(calculator)?;
-        let models = Models { registry: &inner.registry, found: None };
-        guarded(|| read::read(&entry, &body, &models)?.into_checked())
-    }
-
     /// The answer to a job, from the cache or computed. Dropping the future cancels the calculation unless another
     /// request waits for the same one.
     pub async fn solve(&self, calculator: &str, body: Body) -> Result<Solved, Error> {
