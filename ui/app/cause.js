@@ -1,7 +1,7 @@
 // What a diagnosis found, at a glance: how likely each cause is, its size, what the data cannot tell apart, what is
 // gained on data that was held back, and the measurement worth making next.
 import { html, useMemo } from './lib.js';
-import { t, number, unitSymbol, unitOf } from './text.js';
+import { t, capital, number, unitSymbol, unitOf } from './text.js';
 import { humanised, labelOf, resolve, variants, within } from './schema.js';
 import { withSpread } from './digits.js';
 
@@ -14,7 +14,6 @@ const UM_PER_MM = 1000;
 
 /** A word of a choice as it stands in a sentence. */
 const labelled = (schema, word) => schema?.['x-labels']?.[word] ?? humanised(word).toLowerCase();
-const capital = text => text.charAt(0).toUpperCase() + text.slice(1);
 
 /** What a diagnosis of this calculator answers: one of the schemas that all diagnoses have together. */
 export function answerSchema({ input_schema: inputs, output_schema: outputs }, calculator) {

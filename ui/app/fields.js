@@ -1,6 +1,6 @@
 // Fields of a single value: label, control, unit, and the words of the service where the value is at fault.
 import { html, useState, useEffect, useRef, cell } from './lib.js';
-import { t, typed, parsed, number, unitOf } from './text.js';
+import { t, capital, typed, parsed, number, unitOf } from './text.js';
 import { kindOf, labelOf, wordOf, symbolParts, range, pointer, spoken } from './schema.js';
 
 export const fieldId = path => `field${pointer(path).replace(/[^A-Za-z0-9_]/g, '-')}`;
@@ -76,13 +76,10 @@ export function Row({ name, schema, path, value, required, context, control: Con
 
 export function Faults({ faults, id, names }) {
   if (!faults || faults.length === 0) return null;
-  return html`<p class="fault" id=${id}>${faults.map(fault => html`<span>${sentence(spoken(fault.detail, names))}</span>`)}</p>`;
+  return html`<p class="fault" id=${id}>${faults.map(fault => html`<span>${capital(spoken(fault.detail, names))}</span>`)}</p>`;
 }
 
-/** Names of fields keep their small letters. */
-export const sentence = text => (!text || /^[a-z]+_/.test(text) ? text : text.charAt(0).toUpperCase() + text.slice(1));
-
-/** Steps of the arrow keys: a hundredth of the value's size, a tenth with shift. */
+/** Steps of the arrow keys: one in the second significant digit, with shift in the first; whole numbers by 1 or 10. */
 export function nudged(value, schema, direction, shift) {
   const { low, high } = range(schema);
   if (schema.type === 'integer') {

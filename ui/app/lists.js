@@ -1,8 +1,8 @@
 // Lists and tables of a job: names to tick, lines of numbers, grids, parts, values by name.
 import { html, useState, useEffect } from './lib.js';
-import { t, typed, parsed, unitOf } from './text.js';
+import { t, capital, typed, parsed, unitOf } from './text.js';
 import { resolve, kindOf, variants, variantOf, variantName, blank, labelOf, spoken } from './schema.js';
-import { fieldId, isLeaf, nudged, rangeText, defaultText, optionText, sentence, Faults } from './fields.js';
+import { fieldId, isLeaf, nudged, rangeText, defaultText, optionText, Faults } from './fields.js';
 import { Body, Field } from './form.js';
 
 /** Most columns of a list that is shown as a grid. */
@@ -53,7 +53,7 @@ export function List({ name, schema, path, value, context }) {
 function RowFaults({ plain, path, context }) {
   const found = [...context.errorsAt(path).map(fault => ({ ...fault, id: fieldId(path) })), ...plain.flatMap(field => context.errorsAt([...path, field.name]).map(fault => ({ ...fault, id: fieldId([...path, field.name]) })))];
   if (found.length === 0) return null;
-  return html`<tr class="row-faults"><td colspan=${plain.length + 1}>${found.map(({ id, detail }, index) => html`<p class="fault" key=${index} id=${`${id}-fault`}>${sentence(spoken(detail, context.names))}</p>`)}</td></tr>`;
+  return html`<tr class="row-faults"><td colspan=${plain.length + 1}>${found.map(({ id, detail }, index) => html`<p class="fault" key=${index} id=${`${id}-fault`}>${capital(spoken(detail, context.names))}</p>`)}</td></tr>`;
 }
 
 /** A number in a grid: its name is that of row and column. */

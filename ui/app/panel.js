@@ -1,14 +1,14 @@
 // What every panel of a figure has, whatever its frame: the axis with its name, the curves with theirs, the numbers
 // that it spans.
 import { html } from './lib.js';
-import { t, number, unitSymbol } from './text.js';
+import { capital, t, number, unitSymbol } from './text.js';
 import { extent, valueAt, cellAt } from './scale.js';
 import { markerOf, stretchAt, ribbonSample, weaves } from './draw.js';
 import { colouring } from './palette.js';
 
 export const axisName = (axis, factor) => {
   const unit = [factor, unitSymbol(axis.unit)].filter(Boolean).join(' ');
-  const text = axis.text.charAt(0).toUpperCase() + axis.text.slice(1);
+  const text = capital(axis.text);
   return unit ? `${text}, ${unit}` : text;
 };
 

@@ -1,6 +1,6 @@
 // What a run gave: the picture, a sentence, and everything else behind tabs.
 import { html, useState, useEffect, useLayoutEffect, useMemo, useRef, usePrinting } from './lib.js';
-import { t, number, unitSymbol, unitOf, plural, moment } from './text.js';
+import { t, capital, number, unitSymbol, unitOf, plural, moment } from './text.js';
 import * as api from './api.js';
 import { Picture, differenceOf, isLowScreen } from './figure.js';
 import { resolve, humanised, labelOf, wordOf, namesOf, vocabularyOf, spoken, within } from './schema.js';
@@ -172,8 +172,6 @@ export function Warnings({ list, names }) {
     ${!whole && html`<button type="button" class="more" onClick=${() => setAsked(true)}>${t('and_more', { count: list.length - FEW_WARNINGS })}</button>`}`;
 }
 
-/** Names of fields keep their small letters. */
-export const capital = text => (/^[a-z]+_/.test(text) ? text : text.charAt(0).toUpperCase() + text.slice(1));
 export const short = text => text.split(/[:;,(–]/)[0].trim();
 
 export function Downloads({ id, description, answer, figure }) {

@@ -1,9 +1,9 @@
 // The page of one calculator or evaluation: the form, the picture that follows it, and the state in the URL.
 import { html, useState, useEffect, useRef, useMemo, useCallback, debounced } from './lib.js';
-import { t, language } from './text.js';
+import { t, capital, language } from './text.js';
 import * as api from './api.js';
 import { Form, goTo } from './form.js';
-import { sentence, unread } from './fields.js';
+import { unread } from './fields.js';
 import { Result } from './result.js';
 import { difference, changed, parts, namesOf } from './schema.js';
 import { pickOf } from './pick.js';
@@ -19,8 +19,6 @@ const HISTORY_PAUSE_MS = 900;
 const LONGEST_PAUSE_MS = 15000;
 /** Times that a job is sent again in another language. */
 const MOST_TRIES = 5;
-/** Words of the address that are no pointers. */
-const OWN = ['example', 'result', 'run', 'pin', 'model'];
 
 /** The job that an address stands for. */
 export async function jobOf(description, query) {
@@ -278,7 +276,7 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
   }, [description && id, asked, opening]);
 
   if (missing) {
-    return html`<main class="plain" id="main" tabindex="-1"><h1>${missing.problem?.title || t('trouble_title')}</h1><p>${sentence(missing.problem?.detail || missing.message)}</p>
+    return html`<main class="plain" id="main" tabindex="-1"><h1>${missing.problem?.title || t('trouble_title')}</h1><p>${capital(missing.problem?.detail || missing.message)}</p>
       <p><a href=${`#/${id}`} onClick=${() => setTimeout(() => location.reload(), 0)}>${t('start_over')}</a></p></main>`;
   }
   if (!description || !state) return html`<main class="plain quiet-start" id="main" tabindex="-1"><p>${t('loading')}</p></main>`;

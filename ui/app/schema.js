@@ -1,5 +1,7 @@
 // What a form can learn from a JSON Schema (2020-12) as the service writes them.
 
+import { capital } from './text.js';
+
 const REFERENCE = '#/$defs/';
 
 /** The schema that is meant: references followed, `null` as one of the choices taken off and noted. */
@@ -123,11 +125,8 @@ export function stem(name, unit) {
 
 /** A field's name as words, without its unit. */
 export function humanised(name, unit) {
-  const words = stem(name, unit).replace(/_/g, ' ');
-  return words.charAt(0).toUpperCase() + words.slice(1);
+  return capital(stem(name, unit).replace(/_/g, ' '));
 }
-
-const capital = text => text.charAt(0).toUpperCase() + text.slice(1);
 
 /** What a field is called: the service's own label, or its name. */
 export const labelOf = (name, schema) => (schema.title ? capital(schema.title) : humanised(name, schema['x-unit']));

@@ -1,6 +1,6 @@
 // How far a job is, and what is wrong with one.
 import { html, useState } from './lib.js';
-import { t, duration } from './text.js';
+import { t, capital, duration } from './text.js';
 import { parts, humanised, spoken } from './schema.js';
 
 /** How far a job is, and a way to stop it: in the head of the page, whose room is there before and after. */
@@ -32,6 +32,3 @@ export function Trouble({ problem, onGo, names, over }) {
       ${problem.code && problem.type && html`<p class="quiet"><a href=${problem.type} target="_blank" rel="noopener">${t('what_it_means')}</a></p>`}
     </div></div>`;
 }
-
-/** Names of fields keep their small letters. */
-const capital = text => (/^[a-z]+_/.test(text) ? text : text.charAt(0).toUpperCase() + text.slice(1));

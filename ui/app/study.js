@@ -1,12 +1,11 @@
 // Parameter studies: one to three fields of a calculator's job are varied, every point an answer of its own.
 import { html, useState, useEffect, useRef, useMemo } from './lib.js';
-import { t, number, typed, parsed, unitSymbol, plural, language } from './text.js';
+import { t, capital, number, typed, parsed, unitSymbol, plural, language } from './text.js';
 import * as api from './api.js';
 import { jobOf, lastQuery } from './room.js';
-import { sentence } from './fields.js';
 import { Progress, Trouble } from './status.js';
 import { Picture } from './figure.js';
-import { Downloads, RequestView, Warnings, Sheet, usePictureHeight, short, capital } from './result.js';
+import { Downloads, RequestView, Warnings, Sheet, usePictureHeight, short } from './result.js';
 import { parts, namesOf, spoken as labelled, within } from './schema.js';
 import { leavesOf, outputsOf, proposed, pointsOf } from './vary.js';
 
@@ -68,7 +67,7 @@ export function Study({ calculators, query, push, replace, refreshJobs }) {
   }, [asked, spoken, asking]);
   const tell = next => { own.current = next; replace(next); };
   const choose = id => push(`calculator=${id}${lastQuery.get(id) ? `&${written(jobPart(new URLSearchParams(lastQuery.get(id))))}` : ''}`);
-  if (missing) return html`<main class="plain" id="main" tabindex="-1"><h1>${missing.problem?.title || t('trouble_title')}</h1><p>${sentence(missing.problem?.detail || missing.message)}</p><p><a href="#/studies" onClick=${() => setMissing(null)}>${t('start_over')}</a></p></main>`;
+  if (missing) return html`<main class="plain" id="main" tabindex="-1"><h1>${missing.problem?.title || t('trouble_title')}</h1><p>${capital(missing.problem?.detail || missing.message)}</p><p><a href="#/studies" onClick=${() => setMissing(null)}>${t('start_over')}</a></p></main>`;
   if (!opened) return html`<main class="plain quiet-start" id="main" tabindex="-1"><p>${t('loading')}</p></main>`;
   return html`<${Board} key=${opened.serial} ...${{ ...opened, calculators, choose, tell, refreshJobs }} />`;
 }

@@ -19,6 +19,9 @@ export function t(code, values = {}) {
   return text.replace(/\{(\w+)\}/g, (whole, name) => (name in values ? values[name] : whole));
 }
 
+/** As a sentence or a label begins. Names of fields keep their small letters. */
+export const capital = text => (!text || /^[a-z]+_/.test(text) ? text : text.charAt(0).toUpperCase() + text.slice(1));
+
 /** The text for a count: forms by the language's own plural rules, `code.one`, `code.few`, `code.many`, `code.other`. */
 export function plural(code, count, values = {}) {
   const rule = new Intl.PluralRules(current).select(count);
