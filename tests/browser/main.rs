@@ -16,6 +16,7 @@ mod keys;
 mod rooms;
 mod screenshots;
 mod service;
+mod shell;
 mod studies;
 mod words;
 

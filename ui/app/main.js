@@ -23,10 +23,15 @@ function complain(error) {
 addEventListener('error', event => complain(event.error || event.message));
 addEventListener('unhandledrejection', event => complain(event.reason));
 
+/** A name of the address in plain letters. One that is no encoding of any stays as it is, and is the name of no page. */
+function decoded(name) {
+  try { return decodeURIComponent(name); } catch { return name; }
+}
+
 /** The page and the state in the address: `#/page?query`. */
 function place() {
   const [path, query = ''] = location.hash.replace(/^#\/?/, '').split(/\?(.*)/s);
-  return { page: decodeURIComponent(path), query: new URLSearchParams(query) };
+  return { page: decoded(path), query: new URLSearchParams(query) };
 }
 
 class Guard extends Component {
