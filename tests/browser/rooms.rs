@@ -6,6 +6,10 @@ use serde_json::{Value, json};
 
 use crate::{DRAWN, SETTLED, both};
 
+/// What stands along the abscissa of the main picture.
+const TICKS: &str = "[...document.querySelectorAll('.picture.main .tick-labels[text-anchor=middle] text')].map(it => it.textContent)";
+/// Whether the picture shows all of it.
+const WHOLE: &str = "document.querySelector('[aria-label^=\"Show all\"]').disabled";
 const FEED: &str = "#field-cut-feed_mm_per_rev";
 
 #[test]
@@ -174,6 +178,38 @@ fn a_run_is_pinned_compared_and_read() {
     // The same as numbers.
     page.click("[aria-label='As a table']");
     page.until("document.querySelectorAll('.numbers tbody tr').length > 20");
+    page.assert_calm();
+}
+
+/// A wheel turned for ever shows neither more than there is nor so little of it that no number can be told from the next.
+#[test]
+fn the_wheel_zooms_between_all_of_the_picture_and_the_smallest_part_of_it() {
+    let Some((_turn, mut page, service)) = both() else { return };
+    // A linear axis, a logarithmic one, a map.
+    for room in ["deflection-compensation", "feed-schedule", "fixture-stability?example=lobes"] {
+        page.open(&service.page(room));
+        page.until(SETTLED);
+        let turned = |times: u32, by: i32| {
+            format!(
+                "(async () => {{ const stack = document.querySelector('.stack'), box = stack.getBoundingClientRect(); \
+                 for (let turn = 0; turn < {times}; turn += 1) {{ \
+                 stack.dispatchEvent(new WheelEvent('wheel', {{deltaY: {by}, ctrlKey: true, bubbles: true, cancelable: true, clientX: box.x + 0.4 * box.width, clientY: box.y + 90}})); \
+                 await new Promise(done => setTimeout(done)) }} }})()"
+            )
+        };
+        let whole = page.evaluate(TICKS);
+        page.evaluate(&turned(150, -1));
+        let near = page.evaluate(TICKS);
+        assert_ne!(near, whole, "{room}");
+        let texts: std::collections::BTreeSet<&str> = near.as_array().unwrap().iter().filter_map(Value::as_str).collect();
+        assert!(texts.len() >= 2, "{room}: {near}");
+        assert!(!page.evaluate(DRAWN).as_str().unwrap().contains("NaN"), "{room}");
+        // As many turns back as lead from the smallest part to the whole.
+        page.evaluate(&turned(45, 1));
+        assert_eq!(page.evaluate(WHOLE), true, "{room}: {}", page.evaluate(TICKS));
+        page.evaluate(&turned(5, 1));
+        assert_eq!(page.evaluate(TICKS), whole, "{room}");
+    }
     page.assert_calm();
 }
 

@@ -86,6 +86,28 @@ export function differenceOf(figure, other) {
   return { ...figure, panels: panels.filter(panel => panel.items.length > 0) };
 }
 
+/** The smallest part of an axis that is shown, a share of the whole: its numbers can still be told apart. */
+const LEAST_PART = 1e-4;
+const bent = kind => (kind === 'logarithmic' ? { bend: Math.log10, straight: value => 10 ** value } : { bend: value => value, straight: value => value });
+
+/** A part of an axis as it can be shown: with its ends inside the whole, and not too small; `null` for the whole. */
+function partOf(ends, full, kind) {
+  const { bend, straight } = bent(kind);
+  const [start, end] = full.map(bend);
+  const [a, b] = ends.map(bend);
+  const span = Math.max(b - a, LEAST_PART * (end - start));
+  if (!(span < (1 - 1e-9) * (end - start))) return null;
+  const from = Math.min(Math.max((a + b - span) / 2, start), end - span);
+  return [straight(from), straight(from + span)];
+}
+
+/** The part of an axis that is so many times the one shown, with the value `about` at its place. */
+function zoomed(shown, about, factor, full, kind) {
+  const { bend, straight } = bent(kind);
+  const middle = bend(about);
+  return partOf(shown.map(end => straight(middle + (bend(end) - middle) * factor)), full, kind);
+}
+
 /** Places along an axis at which a cross may stand where nothing is drawn that has places of its own. */
 const CROSS_STEPS = 60;
 const evenly = ([low, high], isLog) => Array.from({ length: CROSS_STEPS + 1 }, (_, index) => {
@@ -139,14 +161,10 @@ export function Picture({ figure, pinned, height: screenHeight = 460, onPick, ha
   }, [figure]);
 
   const zoom = factor => {
-    const log = figure.x.scale === 'logarithmic';
-    const bend = log ? Math.log10 : value => value;
-    const straight = log ? value => 10 ** value : value => value;
+    const { bend, straight } = bent(figure.x.scale);
     const [a, b] = shown.map(bend);
-    const middle = at !== null && at >= shown[0] && at <= shown[1] ? bend(at) : (a + b) / 2;
-    const next = [straight(middle - (middle - a) * factor), straight(middle + (b - middle) * factor)];
-    const clipped = [Math.max(next[0], full[0]), Math.min(next[1], full[1])];
-    setView(clipped[0] <= full[0] && clipped[1] >= full[1] ? null : clipped);
+    const about = at !== null && at >= shown[0] && at <= shown[1] ? at : straight((a + b) / 2);
+    setView(zoomed(shown, about, factor, full, figure.x.scale));
   };
   const step = (count, far) => {
     if (samples.length === 0) return;
@@ -193,7 +211,7 @@ export function Picture({ figure, pinned, height: screenHeight = 460, onPick, ha
       <div ref=${ref} class="plot" tabindex="0" role="application" aria-label=${`${figure.title.text}. ${t('picture_keys')}${onPick ? ` ${t('pick_keys')}` : ''}`} onKeyDown=${key}>
         ${width > 0 && (isPolar
           ? html`<${Polar} ...${common} least=${least} setAt=${setAt} />`
-          : html`<${Stacked} ...${common} ...${{ setAt, setOver, setView, drag, setDrag, onPick, handle }} />`)}
+          : html`<${Stacked} ...${common} ...${{ full, setAt, setOver, setView, drag, setDrag, onPick, handle }} />`)}
       </div>
       <p class="hidden" role="status">${spoken}</p>
       ${tabled && html`<${Numbers} figure=${figure} samples=${samples} />`}
@@ -237,7 +255,7 @@ function Numbers({ figure, samples }) {
 }
 
 /** Panels under each other over one abscissa. */
-function Stacked({ figure, pinned, width, isPrinting, style, hidden, toggle, at, setAt, over, setOver, shown, view, setView, height, drag, setDrag, onPick, handle }) {
+function Stacked({ figure, pinned, width, isPrinting, style, hidden, toggle, at, setAt, over, setOver, full, shown, view, setView, height, drag, setDrag, onPick, handle }) {
   const shares = figure.panels.reduce((sum, panel) => sum + panel.height, 0) || 1;
   const ghosts = figure.panels.map((panel, index) => pinned?.panels[index] || null);
   const visible = figure.panels.map(panel => ({ ...panel, items: panel.items.filter(item => !item.name || !hidden.has(item.name)) }));
@@ -319,18 +337,14 @@ function Stacked({ figure, pinned, width, isPrinting, style, hidden, toggle, at,
     }
     const ends = [held.current.from, held.current.to].sort((a, b) => a - b);
     hold(null);
-    if (ends[1] - ends[0] > 8) { setView(ends.map(x.back)); return; }
+    if (ends[1] - ends[0] > 8) { setView(partOf(ends.map(x.back), full, figure.x.scale)); return; }
     if (!onPick) return;
     onPick(where(event).value, spot(event));
   };
   const wheel = event => {
     if (!event.ctrlKey && !event.metaKey) return;
     event.preventDefault();
-    const { value } = where(event);
-    const factor = event.deltaY > 0 ? 1.25 : 0.8;
-    if (figure.x.scale === 'logarithmic') return;
-    const next = [value - (value - shown[0]) * factor, value + (shown[1] - value) * factor];
-    setView(next[1] - next[0] > 0 ? next : view);
+    if (event.deltaY !== 0) setView(zoomed(shown, where(event).value, event.deltaY > 0 ? 1.25 : 0.8, full, figure.x.scale));
   };
   return html`
     <div class=${`stack ${onPick ? 'pickable' : ''}`} onPointerMove=${move} onPointerDown=${down} onPointerUp=${up} onPointerCancel=${() => hold(null)} onPointerLeave=${() => { if (!held.current) { setAt(null); setOver(null); } }} onDblClick=${() => setView(null)} onWheel=${wheel}>

@@ -47,6 +47,8 @@ export function ordinates(panel, view) {
         } else if (view && item.kind !== 'points') {
           // The point next to the view on either side: the curve enters from there.
           if (index > 0 && inside(item.x[index - 1])) found.push(side[index]);
+          // Of a view between two points the curve is all that there is.
+          else if (index > 0 && item.x[index - 1] < view[0] && item.x[index] > view[1]) found.push(side[index - 1], side[index]);
           before = side[index];
         }
       }
