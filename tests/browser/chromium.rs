@@ -282,6 +282,14 @@ impl Page {
         ));
     }
 
+    /// Chooses a file as a person does: a field that has it already says nothing.
+    pub fn choose_file(&mut self, selector: &str, file: &std::path::Path) {
+        self.wait_for(selector);
+        let found = self.call("Runtime.evaluate", json!({"expression": format!("document.querySelector({})", json!(selector))}));
+        let field = &found["result"]["objectId"];
+        self.call("DOM.setFileInputFiles", json!({"files": [file.to_str().unwrap()], "objectId": field}));
+    }
+
     /// Presses a key.
     pub fn press(&mut self, key: &str) {
         let code = match key {

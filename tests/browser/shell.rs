@@ -16,3 +16,23 @@ fn an_address_that_is_no_encoding_is_the_address_of_no_page() {
     page.wait_for(".questions li");
     page.assert_calm();
 }
+
+/// A model that was refused is mended in its file and chosen again, under the same name.
+#[test]
+fn the_same_file_is_imported_a_second_time() {
+    let Some((_turn, mut page, service)) = both() else { return };
+    page.open(&service.page("models"));
+    page.wait_for("input[type=file]");
+    page.evaluate(
+        "(() => { const own = window.fetch; window.sent = 0; window.fetch = (path, options) => { \
+         if (options?.method === 'PUT') window.sent += 1; return own(path, options) } })()",
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("lathe-7.json");
+    std::fs::write(&file, "{\"name\": \"lathe-7\"}").unwrap();
+    for times in 1..=2 {
+        page.choose_file("input[type=file]", &file);
+        page.until(&format!("sent === {times} && document.querySelector('.problem[role=alert]')"));
+    }
+    page.assert_calm();
+}

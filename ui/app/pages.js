@@ -137,12 +137,19 @@ export function Models({ calculators, models, refreshModels }) {
   // Whose deletion waits for a second click.
   const [asked, setAsked] = useState(null);
   const drop = async name => { setTrouble(null); setAsked(null); try { await api.dropModel(name); await refreshModels(); } catch (error) { setTrouble(error.problem?.detail || error.message); } };
+  const take = event => {
+    const field = event.currentTarget;
+    const [file] = field.files;
+    // A field that keeps its file does not tell that the same one is chosen again.
+    field.value = '';
+    if (file) load(file);
+  };
   const fetchDocument = async name => save(new Blob([JSON.stringify(await api.model(name), null, 2)], { type: 'application/json' }), `${name}.json`);
-  const load = async files => {
+  const load = async file => {
     setTrouble(null);
     try {
-      const document = JSON.parse(await files[0].text());
-      await api.saveModel(document.name || files[0].name.replace(/\.json$/, '').toLowerCase(), document);
+      const document = JSON.parse(await file.text());
+      await api.saveModel(document.name || file.name.replace(/\.json$/, '').toLowerCase(), document);
       await refreshModels();
     } catch (error) { setTrouble(error.problem?.detail || error.message); }
   };
@@ -156,6 +163,6 @@ export function Models({ calculators, models, refreshModels }) {
             <td role="cell" class="actions"><a class="button" href=${`#/${calculator}?model=${name}`}>${t('use_model')}<span class="hidden"> ${name}</span></a>
               <button type="button" onClick=${() => fetchDocument(name)}>JSON<span class="hidden"> ${name}</span></button>
               <button type="button" class=${asked === name ? 'sure' : ''} onBlur=${() => setAsked(null)} onKeyDown=${event => { if (event.key === 'Escape') setAsked(null); }} onClick=${() => (asked === name ? drop(name) : setAsked(name))}>${asked === name ? t('delete_sure') : t('delete')}<span class="hidden"> ${name}</span></button></td></tr>`)}</tbody></table></div>`}
-        <p><label class="button">${t('import_model')} <input type="file" class="hidden" accept=".json,application/json" onChange=${event => load(event.currentTarget.files)} /></label></p>`}
+        <p><label class="button">${t('import_model')} <input type="file" class="hidden" accept=".json,application/json" onChange=${take} /></label></p>`}
     </main>`;
 }
