@@ -7,6 +7,8 @@ import { Study } from './study.js';
 import { Home, Jobs, Results, Models } from './pages.js';
 
 const JOBS_LOOK_MS = 4000;
+/** So many jobs of a state are counted. */
+const MOST_COUNTED = 100;
 const trouble = document.getElementById('trouble');
 
 /** Whatever goes wrong in the page is said, not swallowed. */
@@ -48,11 +50,21 @@ function useCell(cell) {
   return value;
 }
 
+/** How many jobs wait or run, with a `+` where there are more than are counted; empty for none. */
+async function openJobs() {
+  // One after the other: a job that begins meanwhile is in both lists rather than in none.
+  const queued = await api.jobs({ state: 'queued', limit: MOST_COUNTED });
+  const running = await api.jobs({ state: 'running', limit: MOST_COUNTED });
+  const count = new Set([...queued.items, ...running.items].map(({ id }) => id)).size;
+  return count > 0 ? `${count}${queued.next || running.next ? '+' : ''}` : '';
+}
+
 function App() {
   const [{ page, query }, setPlace] = useState(place);
   const [calculators, setCalculators] = useState(null);
   const [models, setModels] = useState(null);
-  const [running, setRunning] = useState(0);
+  const [running, setRunning] = useState('');
+  const looks = useRef(0);
   const spoken = useCell(languageChanged);
   const isOnline = useCell(api.online);
   const needsKey = useCell(api.keyAsked);
@@ -70,16 +82,22 @@ function App() {
   const refreshModels = useCallback(() => api.models().then(setModels, () => {}), []);
   useEffect(() => { refreshModels(); }, [page, attempt, isOnline]);
   const refreshJobs = useCallback(async () => {
+    looks.current += 1;
+    const look = looks.current;
     try {
-      const [active, queued] = await Promise.all(['running', 'queued'].map(state => api.jobs({ state, limit: 100 })));
-      setRunning(active.items.length + queued.items.length);
+      const found = await openJobs();
+      // What was asked before something else is not newer because it took longer.
+      if (look === looks.current) setRunning(found);
     } catch { /* the count is of no use then, and the next look tells */ }
   }, []);
   useEffect(() => {
+    const look = () => { if (!document.hidden) refreshJobs(); };
     refreshJobs();
-    const timer = setInterval(() => { if (!document.hidden) refreshJobs(); }, JOBS_LOOK_MS);
-    return () => clearInterval(timer);
-  }, [attempt]);
+    const timer = setInterval(look, JOBS_LOOK_MS);
+    // What was not looked at while the page was hidden is long past.
+    document.addEventListener('visibilitychange', look);
+    return () => { clearInterval(timer); document.removeEventListener('visibilitychange', look); };
+  }, [attempt, isOnline]);
   // While the service is away, it is asked now and then whether it is back.
   useEffect(() => {
     if (isOnline) return undefined;
@@ -149,7 +167,7 @@ function Header({ page, calculators, running, models, known }) {
       </div>
       <nav class="places" aria-label=${t('places')}>
         ${link('studies', t('studies'))}
-        ${link('jobs', t('jobs'), running > 0 && html`<span class="count"><span aria-hidden="true">${running}</span><span class="hidden">, ${running} ${t('open_jobs')}</span></span>`)}
+        ${link('jobs', t('jobs'), running && html`<span class="count"><span aria-hidden="true">${running}</span><span class="hidden">, ${running} ${t('open_jobs')}</span></span>`)}
         ${link('results', t('results'))}
         ${(models !== null || page === 'models') && link('models', t('models'))}
         <a href="/docs" class="docs-link">${t('docs')}</a>

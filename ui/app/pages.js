@@ -71,9 +71,14 @@ const titleOf = (calculators, id) => (id === 'studies' ? t('study') : calculator
 /** What a job was: its main numbers. */
 const Told = ({ item }) => item.summary && html`<span class="told">${item.summary.split(' · ').map((mark, index, all) => html`<span key=${index}>${mark}${index < all.length - 1 ? ' ·' : ''}</span> `)}</span>`;
 
+const isOpen = ({ state }) => state === 'queued' || state === 'running';
+
 export function Jobs({ calculators, refreshJobs }) {
   const [first] = useState(() => () => api.jobs({ limit: 50 }));
   const { items, next, more, trouble, load } = usePages(first, LOOK_MS);
+  // The count above is of the jobs listed here.
+  const open = (items || []).filter(isOpen).map(({ id }) => id).join();
+  useEffect(() => { if (items) refreshJobs(); }, [open]);
   const stop = async id => { try { await api.cancel(id); } finally { load(); refreshJobs(); } };
   const known = new Set([...calculators.map(({ id }) => id), 'studies']);
   return html`
@@ -82,15 +87,15 @@ export function Jobs({ calculators, refreshJobs }) {
       ${items && items.length > 0 && html`<div class="grid-scroll" tabindex="0" role="region" aria-label=${t('jobs')}><table class="list" role="table">
         <thead role="rowgroup"><tr role="row"><th scope="col" role="columnheader">${t('calculator')}</th><th scope="col" role="columnheader">${t('state')}</th><th scope="col" role="columnheader">${t('progress')}</th><th scope="col" role="columnheader">${t('started')}</th><th scope="col" role="columnheader"><span class="hidden">${t('actions')}</span></th></tr></thead>
         <tbody role="rowgroup">${items.map(item => {
-          const isOpen = item.state === 'queued' || item.state === 'running';
+          const isActive = isOpen(item);
           const name = titleOf(calculators, item.calculator);
           return html`<tr role="row" key=${item.id}>
-            <th scope="row" role="rowheader">${!known.has(item.calculator) ? name : item.state === 'succeeded' ? html`<a href=${addressOf(item)}>${name}</a>` : isOpen ? html`<a href=${`#/${item.calculator}?run=${item.id}`}>${name}</a>` : name}<${Told} item=${item} /></th>
+            <th scope="row" role="rowheader">${!known.has(item.calculator) ? name : item.state === 'succeeded' ? html`<a href=${addressOf(item)}>${name}</a>` : isActive ? html`<a href=${`#/${item.calculator}?run=${item.id}`}>${name}</a>` : name}<${Told} item=${item} /></th>
             <td role="cell"><span class=${`state ${item.state}`}>${t(`state_${item.state}`)}</span>${item.problem ? html`<span class="quiet"> ${item.problem.detail || item.problem.title}</span>` : ''}</td>
-            <td role="cell" class="progress-cell">${isOpen ? html`<progress max="1" value=${item.progress} aria-label=${`${name}: ${t('progress')}`}></progress><span class="quiet">${item.stage || ''}${item.remaining_ms ? ` · ${t('time_left', { time: duration(item.remaining_ms) })}` : ''}</span>`
+            <td role="cell" class="progress-cell">${isActive ? html`<progress max="1" value=${item.progress} aria-label=${`${name}: ${t('progress')}`}></progress><span class="quiet">${item.stage || ''}${item.remaining_ms ? ` · ${t('time_left', { time: duration(item.remaining_ms) })}` : ''}</span>`
               : item.started_at && item.finished_at ? html`<span class="took">${duration(new Date(item.finished_at) - new Date(item.started_at))}</span>` : ''}</td>
             <td role="cell" class="when">${moment(item.created_at)}</td>
-            <td role="cell">${isOpen && html`<button type="button" onClick=${() => stop(item.id)}>${t('cancel_job')}<span class="hidden"> ${name}${item.summary ? `, ${item.summary}` : ''}</span></button>`}</td></tr>`;
+            <td role="cell">${isActive && html`<button type="button" onClick=${() => stop(item.id)}>${t('cancel_job')}<span class="hidden"> ${name}${item.summary ? `, ${item.summary}` : ''}</span></button>`}</td></tr>`;
         })}</tbody></table></div>`}
       ${next && html`<button type="button" class="more" onClick=${more}>${t('older')}</button>`}
     </main>`;
