@@ -64,6 +64,42 @@ fn kept_results_are_listed_and_opened_without_computing() {
     page.assert_calm();
 }
 
+/// What was asked of one result and comes after that of the next one is not shown as the next one's.
+#[test]
+fn a_program_that_comes_late_replaces_no_newer_one() {
+    let Some((_turn, mut page, service)) = both() else { return };
+    page.open(&service.page("deflection-compensation"));
+    page.until(SETTLED);
+    page.click("#tab-program");
+    page.wait_for("[role=tabpanel] pre");
+    // The next program hangs on its way; none that is asked for after it.
+    page.evaluate(
+        "(() => { const own = window.fetch; const gate = new Promise(open => { window.openGate = open }); window.held = null; \
+         window.fetch = (path, options) => { const asked = own(path, options); \
+         if (options?.headers?.Accept !== 'text/x-gcode' || window.held) return asked; \
+         window.held = asked.then(async answer => { const text = await answer.text(); await gate; return new Response(text) }); \
+         return window.held } })()",
+    );
+    page.fill("#field-cut-feed_mm_per_rev", "0.4");
+    page.until("held && location.hash.includes('feed_mm_per_rev=0.4')");
+    // Until it is there the one before is not offered as its own.
+    page.until("document.querySelector('[role=tabpanel] .copy').disabled");
+    page.fill("#field-cut-feed_mm_per_rev", "0.3");
+    page.until(&format!("location.hash.includes('feed_mm_per_rev=0.3') && {SETTLED}"));
+    page.until("document.querySelector('[role=tabpanel] .copy').disabled === false");
+    let shown = page.text("[role=tabpanel] pre");
+    page.evaluate("(openGate(), held.catch(() => {}).then(() => new Promise(done => setTimeout(done, 50))))");
+    assert_eq!(page.text("[role=tabpanel] pre"), shown);
+    page.click("#tab-basis");
+    page.wait_for("[role=tabpanel] .key-text");
+    let own = page.evaluate(
+        "fetch('/v1/results/' + document.querySelector('.key-text').textContent, {headers: {Accept: 'text/x-gcode'}}).then(it => it.text())",
+    );
+    let first = |text: &str| text.lines().take(100).map(str::to_owned).collect::<Vec<_>>();
+    assert_eq!(first(&shown), first(own.as_str().unwrap()));
+    page.assert_calm();
+}
+
 #[test]
 fn a_service_that_goes_away_is_said_and_nothing_typed_is_lost() {
     let Some((_turn, mut page, service)) = both() else { return };

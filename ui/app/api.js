@@ -128,8 +128,8 @@ export async function answered(id, body, signal) {
 export async function file(key, accept, query = '') {
   return (await ask(`/v1/results/${key}${query}`, { headers: { Accept: accept } })).blob();
 }
-export async function program(key) {
-  return (await ask(`/v1/results/${key}`, { headers: { Accept: 'text/x-gcode' } })).text();
+export async function program(key, signal) {
+  return (await ask(`/v1/results/${key}`, { signal, headers: { Accept: 'text/x-gcode' } })).text();
 }
 
 /** Stored models: `null` where the service keeps none. */

@@ -212,8 +212,8 @@ function Tabs({ id, description, answer, pinned, job }) {
       </div>
       <div role="tabpanel" id="tab-panel" aria-labelledby=${`tab-${current}`} tabindex="0">
         ${current === 'values' && html`<${Values} root=${description.output_schema} own=${id === 'diagnosis' ? answerSchema(description, answer.answer.input.calculator) : description.output_schema} inputs=${description.input_schema} result=${answer.answer.result} pinned=${pinned && pinned.key !== answer.key ? pinned.answer.result : null} />`}
-        ${current === 'tables' && html`<${Tables} answerKey=${answer.key} id=${id} description=${description} />`}
-        ${current === 'program' && html`<${Program} answerKey=${answer.key} />`}
+        ${current === 'tables' && html`<${Tables} answerKey=${answer.key} said=${answer.language} id=${id} description=${description} />`}
+        ${current === 'program' && html`<${Program} answerKey=${answer.key} said=${answer.language} />`}
         ${current === 'basis' && html`<${Basis} body=${answer.answer} description=${description} />`}
         ${current === 'request' && html`<${RequestView} id=${id} job=${job} answer=${answer} />`}
       </div>
@@ -309,22 +309,33 @@ function Values({ root, own, inputs, result, pinned }) {
       </table>`)}</div>`;
 }
 
-function Tables({ answerKey, id, description }) {
+/** What the service gives for the answer of that key, in that language: `{ value }` or `{ trouble }`, `null` before the
+ *  first. Until it is there what was shown before stays, `isOld`: nothing moves. What comes late is nobody's. */
+function useFetched(fetched, key, said) {
+  const [found, setFound] = useState(null);
+  useEffect(() => {
+    const control = new AbortController();
+    const tell = what => { if (!control.signal.aborted) setFound({ key, ...what }); };
+    api.patient(() => fetched(key, control.signal), control.signal)
+      .then(value => tell({ value }), error => tell({ trouble: error.problem?.detail || error.message }));
+    return () => control.abort();
+  }, [key, said]);
+  return found && { ...found, isOld: found.key !== key };
+}
+
+/** The tables of an answer; what the job did not ask for has one without rows. */
+const filledTables = async (key, signal) => (await api.tables(key, signal)).filter(({ columns }) => columns.some(({ cells }) => cells.length > 0));
+
+function Tables({ answerKey, said, id, description }) {
   const { labels } = description;
   const names = useMemo(() => vocabularyOf(description.output_schema, description.input_schema), [description]);
   const titled = name => (labels?.[name] ? capital(labels[name]) : humanised(name));
-  const [tables, setTables] = useState(null);
+  const found = useFetched(filledTables, answerKey, said);
   const [chosen, setChosen] = useState(0);
   const [rows, setRows] = useState(TABLE_ROWS);
-  const [trouble, setTrouble] = useState(null);
-  useEffect(() => {
-    const control = new AbortController();
-    // What the job did not ask for has a table without rows.
-    api.tables(answerKey, control.signal).then(all => setTables(all.filter(({ columns }) => columns.some(({ cells }) => cells.length > 0))), error => error.name !== 'AbortError' && setTrouble(error.message));
-    return () => control.abort();
-  }, [answerKey]);
-  if (trouble) return html`<p class="fault"><span>${trouble}</span></p>`;
-  if (!tables) return html`<p class="late">${t('loading')}</p>`;
+  if (!found) return html`<p class="late">${t('loading')}</p>`;
+  if (found.trouble) return html`<p class="fault"><span>${found.trouble}</span></p>`;
+  const { value: tables, isOld } = found;
   if (tables.length === 0) return html`<p class="quiet">${t('no_table')}</p>`;
   const table = tables[Math.min(chosen, tables.length - 1)];
   const count = Math.max(0, ...table.columns.map(({ cells }) => cells.length));
@@ -338,25 +349,21 @@ function Tables({ answerKey, id, description }) {
   return html`
     <div class="bar">${tables.length > 1 && html`<label>${t('table')} <select value=${chosen} onChange=${event => { setChosen(Number(event.currentTarget.value)); setRows(TABLE_ROWS); }}>${tables.map(({ id: name }, index) => html`<option value=${index}>${titled(name)}</option>`)}</select></label>`}
       <span class="quiet">${plural('rows', count)}</span>
-      <button type="button" onClick=${async () => save(await api.file(answerKey, 'text/csv', `?table=${table.id}`), `${id}-${table.id}.csv`)}>CSV</button></div>
-    <div class="grid-scroll tall" tabindex="0" role="region" aria-label=${titled(table.id)}><table class="grid still">
+      <button type="button" disabled=${isOld} onClick=${async () => save(await api.file(answerKey, 'text/csv', `?table=${table.id}`), `${id}-${table.id}.csv`)}>CSV</button></div>
+    <div class=${`grid-scroll tall ${isOld ? 'old' : ''}`} aria-busy=${isOld ? 'true' : undefined} tabindex="0" role="region" aria-label=${titled(table.id)}><table class="grid still">
       <thead><tr>${table.columns.map(({ text, unit }) => html`<th scope="col" class=${unit === '' ? 'word' : ''}>${capital(text)} <span class="unit">${unitSymbol(unit)}</span></th>`)}</tr></thead>
       <tbody>${Array.from({ length: Math.min(rows, count) }, (_, row) => html`<tr key=${row}>${table.columns.map(({ name, cells, unit }, at) => html`<td class=${unit === '' ? 'word' : ''}>${cell(name, cells[row], spreads[at]?.[row])}</td>`)}</tr>`)}</tbody>
     </table></div>
     ${count > rows && html`<button type="button" class="more" onClick=${() => setRows(rows + 1000)}>${t('more_rows', { count: count - rows })}</button>`}`;
 }
 
-function Program({ answerKey }) {
-  const [text, setText] = useState(null);
-  const [trouble, setTrouble] = useState(null);
-  useEffect(() => {
-    setTrouble(null);
-    api.program(answerKey).then(setText, error => setTrouble(error.problem?.detail || error.message));
-  }, [answerKey]);
-  if (trouble) return html`<p class="fault"><span>${trouble}</span></p>`;
-  if (text === null) return html`<p class="late">${t('loading')}</p>`;
+function Program({ answerKey, said }) {
+  const found = useFetched(api.program, answerKey, said);
+  if (!found) return html`<p class="late">${t('loading')}</p>`;
+  if (found.trouble) return html`<p class="fault"><span>${found.trouble}</span></p>`;
+  const { value: text, isOld } = found;
   const lines = text.split('\n');
-  return html`<div class="code-box"><${Copy} text=${text} /><pre tabindex="0" aria-label=${t('tab_program')}>${lines.slice(0, 400).join('\n')}${lines.length > 400 ? `\n… ${lines.length - 400}` : ''}</pre></div>`;
+  return html`<div class=${`code-box ${isOld ? 'old' : ''}`} aria-busy=${isOld ? 'true' : undefined}><${Copy} text=${text} disabled=${isOld} /><pre tabindex="0" aria-label=${t('tab_program')}>${lines.slice(0, 400).join('\n')}${lines.length > 400 ? `\n… ${lines.length - 400}` : ''}</pre></div>`;
 }
 
 function Basis({ body, description }) {
@@ -380,7 +387,7 @@ export function RequestView({ id, job, answer, link = `#/${id}?result=${answer.k
     <p>${t('kept_under')} <a href=${link}>${t('share_link')}</a></p>`;
 }
 
-function Copy({ text }) {
+function Copy({ text, disabled }) {
   const [done, setDone] = useState(false);
   const area = useRef(null);
   const copy = async () => {
@@ -395,7 +402,7 @@ function Copy({ text }) {
     setDone(true);
     setTimeout(() => setDone(false), 1500);
   };
-  return html`<button type="button" class="copy" onClick=${copy}>${done ? t('copied') : t('copy')}</button><textarea ref=${area} hidden aria-hidden="true" tabindex="-1"></textarea>`;
+  return html`<button type="button" class="copy" disabled=${disabled} onClick=${copy}>${done ? t('copied') : t('copy')}</button><textarea ref=${area} hidden aria-hidden="true" tabindex="-1"></textarea>`;
 }
 
 /** The extended model of a diagnosis, under a name of the user's own. */
