@@ -131,6 +131,24 @@ fn the_printed_sheet_has_inputs_picture_words_key_and_versions() {
     page.assert_calm();
 }
 
+/// While the inputs are those of no answer yet, the sheet and the request are still those of the answer that is shown.
+#[test]
+fn the_sheet_and_the_request_have_the_inputs_of_the_answer_shown() {
+    let Some((_turn, mut page, service)) = both() else { return };
+    page.open(&service.page("deflection-compensation?/cut/feed_mm_per_rev=0.37"));
+    page.until(SETTLED);
+    page.click("#tab-request");
+    page.until("document.querySelector('[role=tabpanel] pre')?.textContent.includes('0.37')");
+    let (sheet, request) = (page.text(".sheet ul"), page.text("[role=tabpanel]"));
+    assert!(sheet.contains("0.37 mm/rev"), "{sheet}");
+    page.fill("#field-cut-feed_mm_per_rev", "888");
+    page.wait_for(".problem[role=alert]");
+    page.wait_for(".stale-note");
+    assert_eq!(page.text(".sheet ul"), sheet);
+    assert_eq!(page.text("[role=tabpanel]"), request);
+    page.assert_calm();
+}
+
 #[test]
 fn a_default_says_where_it_comes_from_and_many_pictures_are_a_list() {
     let Some((_turn, mut page, service)) = both() else { return };

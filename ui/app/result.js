@@ -80,7 +80,7 @@ const residualUnit = figures => { const unit = figures.find(({ id }) => id === '
 /** Whether a picture shows more than a single point. */
 const isTelling = figure => drawn(figure).some(({ kind, x }) => kind !== 'points' || x.length > 1);
 
-export function Result({ id, description, answer, problem, trouble, running, pinned, pin, job, models, pickOf, onApply, study, stale, isCancelled }) {
+export function Result({ id, description, answer, problem, trouble, running, pinned, pin, models, pickOf, onApply, study, stale, isCancelled }) {
   const [chosen, setChosen] = useState(null);
   const [difference, setDifference] = useState(false);
   // An earlier state of the same run, in place of its end.
@@ -143,8 +143,8 @@ export function Result({ id, description, answer, problem, trouble, running, pin
           <${Downloads} ...${{ id, description, answer, figure }} />
         </div>
         ${id === 'diagnosis' && models && body.result.named?.length > 0 && html`<${SaveModel} resultKey=${answer.key} />`}
-        <${Tabs} ...${{ id, description, answer, pinned, job }} />
-        <${Sheet} ...${{ description, body, job }} />`}
+        <${Tabs} ...${{ id, description, answer, pinned }} />
+        <${Sheet} ...${{ description, body, job: answer.job }} />`}
     </div>`;
 }
 
@@ -193,7 +193,7 @@ export function Downloads({ id, description, answer, figure }) {
     ${trouble && html`<p class="fault" role="alert"><span>${trouble}</span></p>`}`;
 }
 
-function Tabs({ id, description, answer, pinned, job }) {
+function Tabs({ id, description, answer, pinned }) {
   const names = ['values', ...(description.tables.length ? ['tables'] : []), ...(description.media_types.includes('text/x-gcode') ? ['program'] : []), 'basis', 'request'];
   const [open, setOpen] = useState('values');
   const current = names.includes(open) ? open : names[0];
@@ -215,7 +215,7 @@ function Tabs({ id, description, answer, pinned, job }) {
         ${current === 'tables' && html`<${Tables} answerKey=${answer.key} said=${answer.language} id=${id} description=${description} />`}
         ${current === 'program' && html`<${Program} answerKey=${answer.key} said=${answer.language} />`}
         ${current === 'basis' && html`<${Basis} body=${answer.answer} description=${description} />`}
-        ${current === 'request' && html`<${RequestView} id=${id} job=${job} answer=${answer} />`}
+        ${current === 'request' && html`<${RequestView} id=${id} job=${answer.job} answer=${answer} />`}
       </div>
     </div>`;
 }

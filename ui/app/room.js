@@ -342,7 +342,7 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
         <div class=${`work-line ${pending && !running ? 'on' : ''}`} aria-hidden="true"></div>
         <header class="room-head"><h1>${description.question}</h1><p class="summary">${description.title}</p>${running && html`<${Progress} running=${running} stop=${stop} />`}</header>
         ${answer && trouble}
-        <${Result} ...${{ id, description, answer, problem, trouble, running, pinned, pin, job: state.job, models, study, pickOf: picking, onApply: next => change(next, 'run'), stale: Boolean(answer && (problem || waiting || unreadable.size > 0)), isCancelled: problem?.code === 'cancelled' }} />
+        <${Result} ...${{ id, description, answer, problem, trouble, running, pinned, pin, models, study, pickOf: picking, onApply: next => change(next, 'run'), stale: Boolean(answer && (problem || waiting || unreadable.size > 0)), isCancelled: problem?.code === 'cancelled' }} />
       </section>
     </main>`;
 }
