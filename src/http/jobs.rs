@@ -9,7 +9,9 @@ use utoipa::ToSchema;
 
 use super::App;
 use super::answer::{self, View};
+use super::document::Document;
 use super::negotiate;
+use super::parts::{JobFile, private};
 use super::prefer::{PREFERENCE_APPLIED, Preference};
 use super::problem::{Problem, ProblemDocument};
 use super::query::Query;
@@ -268,6 +270,18 @@ pub(super) async fn read(
 ) -> Result<Response, Problem> {
     let job = app.engine.job(named(&id)?).await?;
     Ok(answered(&job, StatusCode::OK, negotiate::language(&headers)))
+}
+
+/// `GET /v1/jobs/{id}/job`
+pub(super) async fn input(
+    State(app): State<App>,
+    Path(id): Path<String>,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    let (record, input) = app.engine.job_input(named(&id)?).await?;
+    let job = serde_json::from_slice(&input).map_err(|_| Problem::internal())?;
+    let document = Document::json(&JobFile { calculator: record.calculator, job }, None);
+    Ok(private(document.respond(&headers)))
 }
 
 /// `DELETE /v1/jobs/{id}`

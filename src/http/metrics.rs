@@ -23,6 +23,7 @@ const JOB_S: [f64; 12] = [0.01, 0.1, 0.5, 1.0, 5.0, 15.0, 60.0, 300.0, 900.0, 18
 
 const JOB: &str = "/v1/jobs/{id}";
 const JOB_RESULT: &str = "/v1/jobs/{id}/result";
+const JOB_INPUT: &str = "/v1/jobs/{id}/job";
 const JOB_EVENTS: &str = "/v1/jobs/{id}/events";
 const MODEL: &str = "/v1/models/{name}";
 const MODEL_COMPARISON: &str = "/v1/models/{name}/comparison";
@@ -32,9 +33,10 @@ const RESULT_TABLES: &str = "/v1/results/{key}/tables";
 const RESULT_JOB: &str = "/v1/results/{key}/job";
 
 /// Addresses with a variable part, as they are counted.
-const PATTERNS: [(&str, &str); 15] = [
+const PATTERNS: [(&str, &str); 16] = [
     ("/v1/jobs/", JOB),
     ("/v1/jobs/", JOB_RESULT),
+    ("/v1/jobs/", JOB_INPUT),
     ("/v1/jobs/", JOB_EVENTS),
     ("/v1/models/", MODEL),
     ("/v1/models/", MODEL_COMPARISON),
@@ -143,6 +145,7 @@ fn pattern(path: &str) -> Option<&'static str> {
         let part = path.rsplit('/').next();
         return Some(match part {
             Some("result") => JOB_RESULT,
+            Some("job") => JOB_INPUT,
             Some("events") => JOB_EVENTS,
             _ => JOB,
         });

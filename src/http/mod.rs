@@ -153,6 +153,7 @@ fn routes(app: &App, health: Router<App>) -> Router<App> {
         .route("/v1/jobs", get(jobs::list))
         .route("/v1/jobs/{id}", get(jobs::read).delete(jobs::cancel))
         .route("/v1/jobs/{id}/result", get(jobs::result))
+        .route("/v1/jobs/{id}/job", get(jobs::input))
         .route("/v1/jobs/{id}/events", get(events::follow))
         .route("/v1/models", get(models::list))
         .route("/v1/models/{name}/comparison", get(models::compare))

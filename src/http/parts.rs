@@ -62,15 +62,15 @@ pub(super) struct ResultColumn {
     cells: Vec<Value>,
 }
 
-/// The job of an answer.
+/// The job of an answer, or one that is still computed.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct JobFile {
-    /// Which calculator made the answer.
+    /// Whose job it is.
     #[schema(example = "deflection-compensation")]
-    calculator: &'static str,
+    pub(super) calculator: String,
     /// The job with every default filled in and its measured tables as rows; sent again it gives the same answer.
     #[schema(value_type = Object)]
-    job: Value,
+    pub(super) job: Value,
 }
 
 /// `GET /v1/results/{key}/figures`
@@ -109,7 +109,7 @@ pub(super) async fn job(
 ) -> Result<Response, Problem> {
     let document = made(&app, &name, |stored| {
         let job = serde_json::from_slice(&stored.input).map_err(|_| Problem::internal())?;
-        Ok(Document::json(&JobFile { calculator: stored.entry().meta().id, job }, None))
+        Ok(Document::json(&JobFile { calculator: stored.entry().meta().id.to_owned(), job }, None))
     });
     Ok(private(document.await?.respond(&headers)))
 }
@@ -126,7 +126,7 @@ async fn made(
     tokio::task::spawn_blocking(move || make(&stored)).await.map_err(|_| Problem::internal())?
 }
 
-fn private(mut response: Response) -> Response {
+pub(super) fn private(mut response: Response) -> Response {
     response.headers_mut().insert(CACHE_CONTROL, HeaderValue::from_static("private, no-cache"));
     response
 }

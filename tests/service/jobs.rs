@@ -64,6 +64,9 @@ async fn a_long_job_is_accepted_computed_and_read() {
     problem(early, 409, "job_not_finished").await;
     let running = until(&server, &address, &["running"]).await;
     assert_eq!(running["attempt"], 1);
+    // What it computes is there before its result, and the same as the result's own.
+    let asked: Value = server.get(&format!("{address}/job")).send().await.unwrap().json().await.unwrap();
+    assert_eq!(asked["calculator"], toy::BAR);
     let done = until(&server, &address, &["succeeded"]).await;
     assert_eq!(done["progress"], 1.0);
     assert!(done["expires_at"].is_string() && done["problem"].is_null());
@@ -77,6 +80,8 @@ async fn a_long_job_is_accepted_computed_and_read() {
     assert_eq!((again.status().as_u16(), header(&again, "precut-cache")), (200, "hit"));
     assert_eq!(again.bytes().await.unwrap(), result);
     assert_eq!(server.get(&place).send().await.unwrap().bytes().await.unwrap(), result);
+    let made: Value = server.get(&format!("{place}/job")).send().await.unwrap().json().await.unwrap();
+    assert_eq!(made, asked);
 }
 
 #[tokio::test]
@@ -300,6 +305,7 @@ async fn an_unknown_job_is_404_whatever_is_asked_of_it() {
         for request in [
             server.get(&format!("/v1/jobs/{id}")),
             server.get(&format!("/v1/jobs/{id}/result")),
+            server.get(&format!("/v1/jobs/{id}/job")),
             server.get(&format!("/v1/jobs/{id}/events")),
             server.client.delete(server.url(&format!("/v1/jobs/{id}"))),
         ] {

@@ -93,6 +93,18 @@ impl Engine {
         self.inner.jobs.feed(id)
     }
 
+    /// What a job computes: the filled job, as JSON. Its calculator stands in the record.
+    pub(crate) async fn job_input(&self, id: JobId) -> Result<(JobRecord, Vec<u8>), Error> {
+        let record = self.inner.jobs.job(id).await?.record;
+        let mut found = self.inner.jobs.store.job_inputs(vec![id], usize::MAX).await?;
+        let (_, packed) = found.pop().ok_or(Error::JobExpired)?;
+        let unreadable = |error: std::io::Error| Error::internal(format!("the input of job {id}: {error}"));
+        // A large job takes milliseconds to unpack.
+        let read = tokio::task::spawn_blocking(move || zstd::decode_all(&*packed));
+        let input = read.await.map_err(|error| Error::internal(error.to_string()))?.map_err(unreadable)?;
+        Ok((record, input))
+    }
+
     /// What a job came to.
     pub async fn job_result(&self, id: JobId) -> Result<Arc<Stored>, Error> {
         let job = self.inner.jobs.job(id).await?;

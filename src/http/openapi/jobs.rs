@@ -27,6 +27,7 @@ pub(super) fn paths(registry: &Registry) -> Vec<(&'static str, PathItem)> {
         ("/v1/jobs", get(list(registry))),
         ("/v1/jobs/{id}", one),
         ("/v1/jobs/{id}/result", get(result())),
+        ("/v1/jobs/{id}/job", get(input())),
         ("/v1/jobs/{id}/events", get(follow())),
     ]
 }
@@ -146,6 +147,21 @@ fn read() -> OperationBuilder {
         .parameter(id())
         .response("200", the_job("The job."));
     parts::guarded(languages(operation), &[404])
+}
+
+fn input() -> OperationBuilder {
+    let operation = operation(
+        "read_job_input",
+        "What does that job compute?",
+        "The job as it was accepted, with every default filled in and its measured tables as rows: to be looked at while \
+         it is computed, or changed and sent again.",
+    )
+    .parameter(id())
+    .response(
+        "200",
+        parts::tagged(parts::success("What it computes.", "application/json", parts::json_of("JobFile"))),
+    );
+    parts::guarded(parts::conditional(operation), &[404, 410])
 }
 
 fn cancel() -> OperationBuilder {
