@@ -285,7 +285,8 @@ impl Page {
     /// Chooses a file as a person does: a field that has it already says nothing.
     pub fn choose_file(&mut self, selector: &str, file: &std::path::Path) {
         self.wait_for(selector);
-        let found = self.call("Runtime.evaluate", json!({"expression": format!("document.querySelector({})", json!(selector))}));
+        let found = self
+            .call("Runtime.evaluate", json!({"expression": format!("document.querySelector({})", json!(selector))}));
         let field = &found["result"]["objectId"];
         self.call("DOM.setFileInputFiles", json!({"files": [file.to_str().unwrap()], "objectId": field}));
     }

@@ -28,6 +28,55 @@ fn a_long_job_shows_its_progress_survives_a_reload_and_is_cancelled() {
     page.assert_calm();
 }
 
+/// A link of a colleague: the form has the inputs of that job, and whatever is done with them, it goes on.
+#[test]
+fn a_job_that_somebody_else_started_is_shown_with_its_own_inputs_and_never_cancelled() {
+    let Some((_turn, mut page, service)) = both() else { return };
+    page.open(&service.page(""));
+    let id = page.evaluate(
+        "(async () => { const room = await (await fetch('/v1/calculators/ring-roundness')).json(); const job = room.jobs.set_up; \
+         Object.assign(job.setup_map, { tool_angles: 721, support_angles: 361, highest_order: 59 }); \
+         const answer = await fetch('/v1/ring-roundness', { method: 'POST', body: JSON.stringify(job), \
+         headers: { 'Content-Type': 'application/json', Prefer: 'respond-async' } }); return (await answer.json()).id })()",
+    );
+    let id = id.as_str().unwrap();
+    let state = format!("fetch('/v1/jobs/{id}').then(it => it.json()).then(it => it.state)");
+    page.open(&service.page(&format!("ring-roundness?run={id}")));
+    page.wait_for(".progress-box progress");
+    assert_eq!(page.value("#field-setup_map-highest_order"), "59");
+    assert_eq!(page.value("#field-setup_map-tool_angles"), "721");
+
+    // What takes long is not begun anew with every letter, and theirs is still the one that is watched.
+    page.fill("#field-setup_map-highest_order", "58");
+    page.wait_for(".form-head .calling");
+    assert!(page.evaluate("location.hash").as_str().unwrap().contains(id));
+    page.click(".form-head .primary");
+    page.until(&format!("/run=/.test(location.hash) && !location.hash.includes('{id}')"));
+    page.wait_for("#cancel-job");
+    assert_ne!(page.evaluate(&state), "cancelled");
+    // The one that was started here ends when it is not wanted any more.
+    page.evaluate("window.own = location.hash.match(/run=([0-9a-f-]+)/)[1]");
+    page.fill("#field-setup_map-highest_order", "57");
+    page.wait_for(".form-head .calling");
+    page.click(".form-head .primary");
+    page.until("!location.hash.includes(own)");
+    let over = "(async () => { for (let state = ''; !['cancelled', 'succeeded'].includes(state);) state = (await (await fetch(`/v1/jobs/${own}`)).json()).state; return 'over' })()";
+    assert_eq!(page.evaluate(over), "over");
+    assert_eq!(page.evaluate("fetch(`/v1/jobs/${own}`).then(it => it.json()).then(it => it.state)"), "cancelled");
+    assert_ne!(page.evaluate(&state), "cancelled");
+    page.evaluate(&format!("fetch('/v1/jobs/{id}', {{ method: 'DELETE' }}).then(() => null)"));
+    page.wait_for("#cancel-job");
+    page.click("#cancel-job");
+    page.until("document.querySelector('.problem')?.textContent.includes('Cancelled')");
+
+    // Cancelled by its owner it is told so, with its inputs, and not begun anew.
+    page.open(&service.page(&format!("ring-roundness?run={id}")));
+    page.until("document.querySelector('.problem')?.textContent.includes('Cancelled')");
+    assert_eq!(page.value("#field-setup_map-highest_order"), "59");
+    assert_eq!(page.evaluate("document.querySelector('.progress-box')"), serde_json::Value::Null);
+    page.assert_calm();
+}
+
 #[test]
 fn kept_results_are_listed_and_opened_without_computing() {
     let Some((_turn, mut page, service)) = both() else { return };

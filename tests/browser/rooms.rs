@@ -7,7 +7,8 @@ use serde_json::{Value, json};
 use crate::{DRAWN, SETTLED, both};
 
 /// What stands along the abscissa of the main picture.
-const TICKS: &str = "[...document.querySelectorAll('.picture.main .tick-labels[text-anchor=middle] text')].map(it => it.textContent)";
+const TICKS: &str =
+    "[...document.querySelectorAll('.picture.main .tick-labels[text-anchor=middle] text')].map(it => it.textContent)";
 /// Whether the picture shows all of it.
 const WHOLE: &str = "document.querySelector('[aria-label^=\"Show all\"]').disabled";
 const FEED: &str = "#field-cut-feed_mm_per_rev";
@@ -201,7 +202,8 @@ fn the_wheel_zooms_between_all_of_the_picture_and_the_smallest_part_of_it() {
         page.evaluate(&turned(150, -1));
         let near = page.evaluate(TICKS);
         assert_ne!(near, whole, "{room}");
-        let texts: std::collections::BTreeSet<&str> = near.as_array().unwrap().iter().filter_map(Value::as_str).collect();
+        let texts: std::collections::BTreeSet<&str> =
+            near.as_array().unwrap().iter().filter_map(Value::as_str).collect();
         assert!(texts.len() >= 2, "{room}: {near}");
         assert!(!page.evaluate(DRAWN).as_str().unwrap().contains("NaN"), "{room}");
         // As many turns back as lead from the smallest part to the whole.

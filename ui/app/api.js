@@ -92,6 +92,7 @@ export const tables = async (key, signal) => (await json(`/v1/results/${key}/tab
 export const jobOf = key => json(`/v1/results/${key}/job`);
 export const jobs = query => json(`/v1/jobs?${new URLSearchParams(query)}`);
 export const job = id => json(`/v1/jobs/${enc(id)}`);
+export const jobInput = id => json(`/v1/jobs/${enc(id)}/job`);
 export const cancel = id => json(`/v1/jobs/${enc(id)}`, { method: 'DELETE' });
 export const alive = async () => { await ask('/health/live'); };
 

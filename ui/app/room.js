@@ -8,6 +8,7 @@ import { Result } from './result.js';
 import { difference, changed, parts, namesOf } from './schema.js';
 import { pickOf } from './pick.js';
 import { Progress, Trouble } from './status.js';
+import { keepRun, keptRun, inputOf } from './runs.js';
 
 /** Longer addresses name the kept result instead of the changes. */
 const LONGEST_QUERY = 1600;
@@ -38,17 +39,36 @@ export async function jobOf(description, query) {
   return { job, base, baseName: { example: name }, key: null };
 }
 
-/** The address of a job: its base with what differs, or its kept result where that is too long. */
-function queryOf({ base, baseName }, job, key, run, pin) {
-  const query = new URLSearchParams(baseName.example ? { example: baseName.example } : {});
-  const changes = baseName.example ? difference(base, job) : [];
-  for (const [place, value] of changes) query.set(place, value === undefined ? '' : JSON.stringify(value));
-  const isLong = query.toString().length > LONGEST_QUERY || (baseName.result && difference(base, job).length > 0);
-  const kept = isLong && key ? new URLSearchParams({ result: key }) : baseName.result && !isLong ? new URLSearchParams({ result: baseName.result }) : query;
-  if (run) kept.set('run', run);
-  if (pin) kept.set('pin', pin);
-  return kept;
+/** What an address stands for that names a run: the job as it was typed if it was started here, else as the service was
+ *  given it. */
+async function openedBy(description, query) {
+  const run = query.get('run');
+  const typed = run && keptRun(run);
+  if (typed) return { ...await jobOf(description, query), job: typed, isOwnRun: true };
+  const given = run && await inputOf(run);
+  if (!given || given.calculator !== description.id) return jobOf(description, query);
+  return { job: given.job, base: given.job, baseName: { run }, key: null, isOwnRun: false };
 }
+
+/** The address of a job: its base with what differs, or its kept result where that is too long. */
+function queryOf(state, job, key, run, pin) {
+  const query = addressOf(state, difference(state.base, job), key);
+  if (run) query.set('run', run);
+  if (pin) query.set('pin', pin);
+  return query;
+}
+
+function addressOf({ baseName }, changes, key) {
+  const kept = key ? { result: key } : {};
+  // A kept result or a run stands for its own job alone.
+  if (!baseName.example) return new URLSearchParams(changes.length > 0 ? kept : baseName);
+  const query = new URLSearchParams(baseName);
+  for (const [place, value] of changes) query.set(place, value === undefined ? '' : JSON.stringify(value));
+  return key && query.toString().length > LONGEST_QUERY ? new URLSearchParams(kept) : query;
+}
+
+/** Why a job has no result. */
+const endOf = record => record.problem || { title: t(`state_${record.state}`), code: record.state };
 
 /** Slashes of pointers are legible in an address. */
 const written = query => query.toString().replace(/%2F/g, '/').replace(/%3A/g, ':');
@@ -112,7 +132,8 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
     setAnswer({ key, job, ...found });
     setProblem(null);
     setPending(false);
-    setWaiting(false);
+    // What was changed while this was computed is not computed by itself.
+    setWaiting(!isLive.current && now.current.state?.job !== job);
   };
   /** Says the answer that is shown in another language. What was asked or refused meanwhile stays as it is. */
   const reword = async key => {
@@ -120,25 +141,45 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
     if (found) setAnswer(old => (old?.key === key ? { ...old, ...found } : old));
   };
 
-  const watch = useCallback((record, job) => {
+  /** Follows the run no longer. One that was started here for an older state is of no use any more; what somebody else
+   *  started goes on. */
+  const leaveRun = () => {
+    const before = now.current.running;
+    if (!before) return;
     stopFollowing.current?.();
-    setRunning({ ...record, interim: null, language: language() });
+    setRunning(null);
+    if (before.isOwn) api.cancel(before.id).catch(() => {}).then(() => refreshJobs?.());
+  };
+  /** The answer of a run has an address of its own, also where the job was known by its run alone. */
+  const settle = (run, key, job) => {
+    const current = now.current.state;
+    if (!current) return;
+    if (current.baseName.run === run) {
+      now.current.state = { ...current, baseName: { result: key } };
+      setState(now.current.state);
+    }
+    tell(current.job, current.job === job ? key : null, null, 'replace');
+  };
+  /** Follows a run; `isOwn` one that was started here. */
+  const watch = useCallback((record, job, isOwn) => {
+    stopFollowing.current?.();
+    // What takes so long is not begun anew with every letter.
+    isLive.current = false;
+    setRunning({ ...record, asked: job, isOwn, interim: null, language: language() });
     refreshJobs?.();
     stopFollowing.current = api.follow(record.id, {
       onState: next => setRunning(old => (old?.id === next.id ? { ...old, ...next } : old)),
       onProgress: progress => setRunning(old => old && { ...old, ...progress }),
       onInterim: interim => setRunning(old => old && { ...old, interim }),
-      onTrouble: error => { setRunning(null); setPending(false); setProblem(error.problem); },
+      onTrouble: error => { refreshJobs?.(); setRunning(null); setPending(false); setProblem(error.problem); },
       onDone: async done => {
         refreshJobs?.();
         if (!alive.current) return;
         try {
           if (done.state === 'succeeded') {
             await show(done.key, null, job, control.current?.signal);
-            if (now.current.state) tell(now.current.state.job, done.key, null, 'replace');
-          } else {
-            setProblem(done.problem || { title: t(`state_${done.state}`), code: done.state });
-          }
+            settle(done.id, done.key, job);
+          } else setProblem(endOf(done));
         } catch (error) { fail(error); } finally { setRunning(null); setPending(false); }
       },
     });
@@ -156,13 +197,7 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
     control.current?.abort();
     control.current = new AbortController();
     const { signal } = control.current;
-    const before = now.current.running;
-    if (before) {
-      // A run that was started for an older state is of no use any more.
-      stopFollowing.current?.();
-      setRunning(null);
-      api.cancel(before.id).catch(() => {}).then(() => refreshJobs?.());
-    }
+    leaveRun();
     setPending(true);
     setWaiting(false);
     let start;
@@ -174,11 +209,10 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
       }, signal);
       if (signal.aborted) return;
       if (record) {
-        isLive.current = false;
         setProblem(null);
-        watch(record, job);
+        watch(record, job, true);
         if (now.current.state) {
-          try { sessionStorage.setItem(`precut-run-${record.id}`, JSON.stringify(job)); } catch { /* too large to keep: the form then shows the base */ }
+          keepRun(record.id, job);
           tell(now.current.state.job, null, record.id, 'replace');
         }
         return;
@@ -215,7 +249,8 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
         if (spokenBefore.current !== spoken && now.current.problem?.status === 422 && isLive.current && now.current.state) run(now.current.state.job);
         spokenBefore.current = spoken;
         // What a job is doing is told from now on in this language.
-        if (now.current.running && now.current.running.language !== spoken) watch(now.current.running, now.current.state.job);
+        const { running: run_ } = now.current;
+        if (run_ && run_.language !== spoken) watch(run_, run_.asked, run_.isOwn);
         if (now.current.answer && now.current.answer.language !== spoken) {
           await reword(now.current.answer.key);
           if (now.current.pinned) setPinned(await pinOf(now.current.pinned.key));
@@ -238,10 +273,8 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
     ownQuery.current = written(query);
     (async () => {
       try {
-        const next = await jobOf(description, query);
+        const next = await openedBy(description, query);
         const runId = query.get('run');
-        const kept = runId && sessionStorage.getItem(`precut-run-${runId}`);
-        if (kept) next.job = JSON.parse(kept);
         if (gone) return;
         setState(next);
         now.current.state = next;
@@ -249,13 +282,18 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
         const pin = query.get('pin');
         if (pin && now.current.pinned?.key !== pin) pinOf(pin).then(setPinned, () => {});
         if (runId) {
+          control.current?.abort();
+          control.current = new AbortController();
           try {
             const record = await api.job(runId);
             if (gone) return;
-            if (['queued', 'running', 'succeeded'].includes(record.state)) { setPending(true); watch(record, next.job); return; }
+            if (['queued', 'running', 'succeeded'].includes(record.state)) { setPending(true); watch(record, next.job, next.isOwnRun); return; }
+            // What became of somebody else's job is said; it is not begun anew.
+            if (next.baseName.run) { leaveRun(); setPending(false); setProblem(endOf(record)); return; }
           } catch (error) { if (!(error instanceof api.Refused)) throw error; }
         }
         if (next.key) {
+          leaveRun();
           control.current?.abort();
           control.current = new AbortController();
           await show(next.key, null, next.job, control.current.signal);
@@ -331,12 +369,12 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
         <div class="form-head">
           <label for="example">${t('example')}</label>
           <select id="example" value=${state.baseName.example || ''} onChange=${event => pickExample(event.currentTarget.value)}>
-            ${state.baseName.result && html`<option value="">${t('kept_result')}</option>`}
+            ${!state.baseName.example && html`<option value="">${state.baseName.result ? t('kept_result') : t('job_of_link')}</option>`}
             ${description.examples.map(({ id: name, title: text }) => html`<option value=${name}>${text}</option>`)}
           </select>
           <button type="button" class=${`primary ${waiting ? 'calling' : ''}`} onClick=${() => compute('picture')} title="Ctrl+Enter">${waiting ? t('run_changed') : t('run')}</button>
         </div>
-        <${Form} key=${`${id} ${asked.includes('result=') ? 'kept' : state.baseName.example}`} schema=${description.input_schema} value=${state.job} filled=${answer?.answer.input} onChange=${(job, how) => (how === 'run' ? compute(pane) : change(job, how))} errors=${problem?.errors} examples=${description.jobs} libraries=${libraries} calculator=${id} models=${models} />
+        <${Form} key=${`${id} ${state.baseName.example ?? 'kept'}`} schema=${description.input_schema} value=${state.job} filled=${answer?.answer.input} onChange=${(job, how) => (how === 'run' ? compute(pane) : change(job, how))} errors=${problem?.errors} examples=${description.jobs} libraries=${libraries} calculator=${id} models=${models} />
       </section>
       <section class="result-pane" aria-label=${t('result')} aria-busy=${isBusy ? 'true' : 'false'}>
         <div class=${`work-line ${pending && !running ? 'on' : ''}`} aria-hidden="true"></div>

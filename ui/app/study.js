@@ -3,6 +3,7 @@ import { html, useState, useEffect, useRef, useMemo } from './lib.js';
 import { t, capital, number, typed, parsed, unitSymbol, plural, language } from './text.js';
 import * as api from './api.js';
 import { jobOf, lastQuery } from './room.js';
+import { keepRun, keptRun, inputOf } from './runs.js';
 import { Progress, Trouble } from './status.js';
 import { Picture } from './figure.js';
 import { Downloads, RequestView, Warnings, Sheet, usePictureHeight, short } from './result.js';
@@ -49,8 +50,8 @@ export function Study({ calculators, query, push, replace, refreshJobs }) {
           if (!gone) setOpened({ ...opened, description, spoken });
           return;
         }
-        // A kept study brings its job with it; a running one was put down by the page that started it.
-        const stored = kept ? (await api.jobOf(kept)).job : run ? storedRun(run) : null;
+        // A kept study brings its job with it; a running one was put down by the page that started it, or the service has it.
+        const stored = kept ? (await api.jobOf(kept)).job : run ? keptRun(run) ?? (await inputOf(run))?.job : null;
         const description = await api.calculator(stored?.calculator || query.get('calculator') || calculators[0].id);
         const job = stored ? stored.job : (await jobOf(description, new URLSearchParams(part))).job;
         if (gone) return;
@@ -71,10 +72,6 @@ export function Study({ calculators, query, push, replace, refreshJobs }) {
   if (!opened) return html`<main class="plain quiet-start" id="main" tabindex="-1"><p>${t('loading')}</p></main>`;
   return html`<${Board} key=${opened.serial} ...${{ ...opened, calculators, choose, tell, refreshJobs }} />`;
 }
-
-const storedRun = id => {
-  try { return JSON.parse(sessionStorage.getItem(`precut-run-${id}`)); } catch { return null; }
-};
 
 function Board({ description, job, stored, part, query, calculators, choose, tell: write, refreshJobs }) {
   const leaves = useMemo(() => leavesOf(description.input_schema, job), [description, job]);
@@ -111,8 +108,8 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
     setPending(false);
     setProblem(null);
   };
-  const watch = (record, asked) => {
-    setRunning({ ...record, interim: null });
+  const watch = (record, asked, isOwn) => {
+    setRunning({ ...record, isOwn, interim: null });
     refreshJobs();
     stop.current = api.follow(record.id, {
       onState: next => setRunning(old => (old?.id === next.id ? { ...old, ...next } : old)),
@@ -132,7 +129,8 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
   const start = async () => {
     control.current?.abort();
     stop.current?.();
-    if (running) api.cancel(running.id).catch(() => {});
+    // What somebody else started goes on.
+    if (running?.isOwn) api.cancel(running.id).catch(() => {}).then(refreshJobs);
     control.current = new AbortController();
     const { signal } = control.current;
     setPending(true);
@@ -144,9 +142,9 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
       const { answer: whole, job: record } = await api.patient(() => api.solve('studies', body, { signal }), signal);
       if (signal.aborted) return;
       if (record) {
-        try { sessionStorage.setItem(`precut-run-${record.id}`, JSON.stringify(body)); } catch { /* a reload then begins anew */ }
+        keepRun(record.id, body);
         tell([['run', record.id]]);
-        watch(record, body);
+        watch(record, body, true);
       } else { await show(whole.key, whole, body, said); tell([['study', whole.key]]); }
     } catch (error) {
       fail(error);
@@ -176,7 +174,7 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
       setPending(true);
       if (kept) { show(kept, null, stored).catch(again); return; }
       api.job(run).then(record => {
-        if (['queued', 'running', 'succeeded'].includes(record.state)) watch(record, stored);
+        if (['queued', 'running', 'succeeded'].includes(record.state)) watch(record, stored, keptRun(run) !== null);
         else { setPending(false); setProblem(record.problem || { title: t(`state_${record.state}`), code: record.state }); }
       }, again);
     };
