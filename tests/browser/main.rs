@@ -18,6 +18,7 @@ mod screenshots;
 mod service;
 mod shell;
 mod studies;
+mod tables;
 mod words;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};

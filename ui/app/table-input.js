@@ -1,21 +1,14 @@
 // A measured table: dropped, chosen or pasted as CSV; its columns and units are matched with what is needed and
-// shown for confirmation. What is sent is CSV with the headers that the service knows: the service converts units.
+// shown for confirmation. What is sent is CSV with the headers that the service knows: the service converts units. No unit
+// is guessed, and no column is left without saying so.
 import { html, useState, useRef, useMemo, unique } from './lib.js';
 import { t, plural, number, unitSymbol, unitOf } from './text.js';
 import { resolve, kindOf, labelOf, wordOf, spoken } from './schema.js';
+import { named, choicesOf, unitIn, stemOf, endsOf } from './units.js';
 
-/** Units of one dimension: the service converts between them. */
-const DIMENSIONS = [
-  ['um', 'mm', 'm', 'nm', 'in'],
-  ['deg', 'rad'],
-  ['N', 'kN'],
-  ['s', 'ms', 'min', 'h'],
-  ['rpm'],
-  ['m/min', 'mm/min', 'm/s'],
-  ['mm/rev', 'um/rev'],
-  ['percent', '1'],
-];
-const alike = unit => DIMENSIONS.find(units => units.includes(unit)) || [unit];
+/** Longest name of a column that no field has, as the service takes it. */
+const LONGEST_NAME = 64;
+
 const norm = text => (text ?? '').toLowerCase().replace(/µ|μ/g, 'u').replace(/мкм/g, 'um').replace(/мм/g, 'mm').replace(/град|°/g, 'deg').replace(/ё/g, 'е').replace(/[^a-z0-9а-я]+/g, '_').replace(/^_|_$/g, '');
 
 /** The cells of one line; quotes protect separators. */
@@ -32,29 +25,60 @@ function cells(line, separator) {
   return found;
 }
 
+/** What separates cells is the first of these that the header has outside quotes, as the service has it. */
+const SEPARATORS = ['\t', ';', ','];
+const separatorOf = header => SEPARATORS.find(c => cells(header, c).length > 1) ?? '\t';
+
 /** A CSV as its header and rows. */
 export function readCsv(text) {
   const lines = text.replace(/^\ufeff/, '').split(/\r\n|\n|\r/).filter(line => line.trim() !== '' && !line.startsWith('#'));
   if (lines.length < 2) return null;
-  const count = c => lines[0].split(c).length - 1;
-  const separator = ['\t', ';', ','].sort((a, b) => count(b) - count(a))[0];
+  const separator = separatorOf(lines[0]);
   const header = cells(lines[0], separator);
   return { separator, header, rows: lines.slice(1).map(line => cells(line, separator)) };
 }
 
 /** Name and unit in a header: `diameter [um]`, `diameter (um)`, `diameter, um`. */
 function headed(title) {
-  const found = /^(.*?)\s*(?:[[(]\s*([^\])]+)\s*[\])]|,\s*(\S+))\s*$/.exec(title);
-  return found ? { name: found[1], unit: (found[2] || found[3]).replace(/µ|μ/g, 'u') } : { name: title, unit: null };
+  const found = /^(.*?)\s*(?:\[([^\]]+)\]|\(([^)]+)\)|,\s*(\S+))\s*$/.exec(title);
+  return found ? { name: found[1], unit: (found[2] || found[3] || found[4]).trim() } : { name: title, unit: null };
 }
 
-/** The columns that the table may have. */
-function wanted(schema, root) {
+/** What a row of the table may hold. */
+function rowFields(schema, root) {
   const rows = resolve((schema.oneOf || schema.anyOf).find(form => resolve(form, root).type === 'array'), root);
   const item = resolve(rows.items, root);
   return Object.entries(item.properties || {})
-    .map(([name, part]) => ({ name, schema: resolve(part, root), required: (item.required || []).includes(name) }))
-    .filter(({ schema: part }) => ['number', 'integer', 'string', 'boolean'].includes(part.type));
+    .map(([name, part]) => ({ name, schema: resolve(part, root), required: (item.required || []).includes(name) }));
+}
+
+/** The columns that the table may have. */
+const wanted = fields => fields.filter(({ schema }) => ['number', 'integer', 'string', 'boolean'].includes(schema.type));
+
+/** Of which cells the rows take columns that no field has. */
+const freeOf = fields => new Set(fields.map(({ schema }) => schema['x-free-columns']).filter(Boolean));
+
+/** Whether the numbers of a column may be in one unit or another. */
+const hasUnit = schema => schema.type === 'number' && Boolean(schema['x-unit']);
+
+/** The unit of a column of the file whose numbers go into this field: by its first spelling, `null` where the heading names
+ *  none, or `said`, which is none of the field's. */
+function unitRead(title, schema) {
+  const own = schema['x-unit'];
+  if (!hasUnit(schema)) return { unit: own ?? null, said: null };
+  const { name, unit: said } = headed(title);
+  if (said !== null) return { unit: unitIn(said, own), said };
+  const end = endsOf(own).find(one => norm(name).endsWith(`_${one.end}`));
+  const isPlain = own === '1' || choicesOf(own).length === 1;
+  return { unit: end?.unit ?? (isPlain ? named(own) : null), said: null };
+}
+
+/** Whether a heading names the field as the service understands it: by its name, its stem, or its stem and a unit. */
+function isNamed(column, title) {
+  const bare = norm(stemOf(column.name, column.schema['x-unit']));
+  const heading = norm(headed(title).name);
+  return norm(title) === norm(column.name) || [bare, norm(column.name)].includes(heading)
+    || endsOf(column.schema['x-unit'] ?? '').some(({ end }) => heading === `${bare}_${end}`);
 }
 
 /** Which column of the file goes where, as far as names and units tell. */
@@ -66,15 +90,10 @@ function guess(columns, header) {
     const found = left.find(test);
     if (!found) return;
     left.splice(left.indexOf(found), 1);
-    const unit = column.schema['x-unit'];
-    const own = alike(unit).find(other => norm(other) === norm(found.unit ?? '') || (found.unit === null && norm(found.name).endsWith(`_${norm(other)}`)));
-    matches[column.name] = { index: found.index, unit: own ?? unit };
+    matches[column.name] = { index: found.index, ...unitRead(found.title, column.schema) };
   };
   for (const column of columns) {
-    const unit = norm(column.schema['x-unit'] || '');
-    const stem = norm(column.name).replace(new RegExp(`_${unit}$`), '');
-    take(column, ({ title, name }) => norm(title) === norm(column.name) || norm(name) === stem || norm(name) === norm(column.name));
-    take(column, ({ name }) => alike(column.schema['x-unit']).some(other => norm(name) === `${stem}_${norm(other)}`));
+    take(column, ({ title }) => isNamed(column, title));
     // As the form calls it, in its language.
     take(column, ({ title, name }) => [norm(title), norm(name)].includes(norm(labelOf(column.name, column.schema))));
   }
@@ -93,26 +112,44 @@ function guess(columns, header) {
   return matches;
 }
 
-const quote = (text, separator) => (text.includes(separator) || text.includes('"') ? `"${text.replace(/"/g, '""')}"` : text);
+/** Whether the service reads the cell as a number; with a decimal comma where that separates no cells. */
+function isNumber(cell, separator) {
+  const isComma = separator !== ',' && cell.includes(',');
+  const text = (isComma ? cell.replaceAll('.', ' ').replaceAll(',', '.') : cell).replaceAll('−', '-');
+  return /^[\d+\-.eE]+$/.test(text) && Number.isFinite(Number(text));
+}
 
-/** The file with the columns that were matched, under the names that the service knows. */
-function matched(file, columns, matches) {
+/** The columns that no field takes: those that the rows keep beside their fields, and those that are left. */
+function othersOf(file, columns, matches, free) {
+  const taken = new Set(Object.values(matches).filter(Boolean).map(({ index }) => index));
+  const others = file.header.map((title, index) => ({ title, index, texts: file.rows.map(row => row[index] ?? '').filter(Boolean) }))
+    .filter(({ title, index, texts }) => !taken.has(index) && (title !== '' || texts.length > 0));
+  const isKept = ({ title, texts }) => title !== '' && title.length <= LONGEST_NAME && !columns.some(column => isNamed(column, title))
+    && (free.has('words') || (free.has('numbers') && texts.every(text => isNumber(text, file.separator))));
+  return { kept: others.filter(isKept), left: others.filter(other => !isKept(other)) };
+}
+
+/** A cell with whatever could be taken for a separator in quotes. */
+const quote = (text, separators) => ([...separators, '"'].some(c => text.includes(c)) ? `"${text.replace(/"/g, '""')}"` : text);
+
+/** The file with the columns that were matched, under the names that the service knows, and those that are kept besides. */
+function matched(file, columns, matches, kept) {
   const used = columns.filter(({ name }) => matches[name]);
   const title = ({ name, schema }) => {
-    const unit = matches[name].unit;
+    const { unit } = matches[name];
     const own = schema['x-unit'];
-    if (!unit || unit === own || own === undefined) return name;
-    const tail = `_${own.toLowerCase().replace(/\//g, '_per_')}`;
-    return `${name.endsWith(tail) ? name.slice(0, -tail.length) : name} [${unit}]`;
+    return !hasUnit(schema) || unit === named(own) ? name : `${stemOf(name, own)} [${unit}]`;
   };
-  const line = parts => parts.map(part => quote(part, file.separator)).join(file.separator);
-  return `${[line(used.map(title)), ...file.rows.map(row => line(used.map(({ name }) => row[matches[name].index] ?? '')))].join('\n')}\n`;
+  const line = (parts, separators) => parts.map(part => quote(part, separators)).join(file.separator);
+  const places = [...used.map(({ name }) => matches[name].index), ...kept.map(({ index }) => index)];
+  const header = [...used.map(title), ...kept.map(other => other.title)];
+  return `${[line(header, SEPARATORS), ...file.rows.map(row => line(places.map(index => row[index] ?? ''), [file.separator]))].join('\n')}\n`;
 }
 
 /** The columns of a kept CSV, by their labels. */
 function headings(csv, columns) {
   return readCsv(csv)?.header.map(title => {
-    const column = columns.find(({ name, schema }) => norm(title) === norm(name) || norm(headed(title).name) === norm(name).replace(new RegExp(`_${norm(schema['x-unit'] || '-')}$`), ''));
+    const column = columns.find(one => isNamed(one, title));
     return column ? labelOf(column.name, column.schema) : title;
   }).join(', ');
 }
@@ -124,7 +161,8 @@ export function TableInput({ name, schema, root, value, onChange, faults, below,
   const [trouble, setTrouble] = useState(null);
   const picker = useRef(null);
   const id = useMemo(() => unique('table'), []);
-  const columns = useMemo(() => wanted(schema, root), [schema, root]);
+  const fields = useMemo(() => rowFields(schema, root), [schema, root]);
+  const columns = useMemo(() => wanted(fields), [fields]);
   const label = labelOf(name, schema);
   const open = (text, file) => {
     const read = readCsv(text);
@@ -135,7 +173,8 @@ export function TableInput({ name, schema, root, value, onChange, faults, below,
   };
   const take = async files => { if (files?.[0]) open(await files[0].text(), files[0].name); };
   const missing = draft ? columns.filter(({ name: column, required }) => required && !draft.matches[column]) : [];
-  const accept = () => { onChange({ csv: matched(draft.file, columns, draft.matches) }); setDraft(null); };
+  const others = draft && othersOf(draft.file, columns, draft.matches, freeOf(fields));
+  const accept = () => { onChange({ csv: matched(draft.file, columns, draft.matches, others.kept) }); setDraft(null); };
   const rows = Array.isArray(value) ? value.length : value?.csv ? value.csv.trim().split('\n').length - 1 : 0;
   const list = [...(faults || []), ...(below || [])];
   return html`
@@ -145,7 +184,7 @@ export function TableInput({ name, schema, root, value, onChange, faults, below,
       ${list.length > 0 && html`<p class="fault" id=${`${id}-fault`}>${list.slice(0, 6).map(fault => html`<span>${spoken(fault.detail, names)}</span>`)}
         ${list.length > 6 && html`<span>${t('and_more', { count: list.length - 6 })}</span>`}</p>`}
       ${trouble && html`<p class="fault" role="alert"><span>${trouble}</span></p>`}
-      ${draft ? html`<${Matching} ...${{ draft, setDraft, columns, missing, accept, label }} cancel=${() => setDraft(null)} />` : html`
+      ${draft ? html`<${Matching} ...${{ draft, setDraft, columns, missing, others, accept, label }} cancel=${() => setDraft(null)} />` : html`
         ${rows > 0
           ? html`<p class="table-state"><strong>${plural('rows', rows)}</strong>${value.csv && html` <span class="quiet">${headings(value.csv, columns)}</span>`}</p>
             ${Array.isArray(value) && html`<${Preview} rows=${value} columns=${columns} label=${label} />`}`
@@ -183,12 +222,16 @@ function Preview({ rows, columns, label }) {
 }
 
 /** Columns and units of a file, to be confirmed. */
-function Matching({ draft, setDraft, columns, missing, accept, cancel, label }) {
+function Matching({ draft, setDraft, columns, missing, others, accept, cancel, label }) {
   const { file, matches } = draft;
   const set = (column, match) => setDraft({ ...draft, matches: { ...matches, [column]: match } });
   const sure = columns.filter(({ name, required }) => required || matches[name]);
   const [all, setAll] = useState(sure.length === 0);
   const shown = all ? columns : sure;
+  const isUnitless = ({ name, schema }) => Boolean(matches[name]) && hasUnit(schema) && matches[name].unit === null;
+  const unitless = columns.filter(isUnitless);
+  const unitFault = ({ name, schema }) => (matches[name].said === null ? t('unit_missing', { name: labelOf(name, schema) }) : t('unit_unknown', { name: labelOf(name, schema), unit: matches[name].said }));
+  const titles = list => list.map(({ title, index }) => title || `${index + 1}`).join('; ');
   return html`
     <div class="matching" role="group" aria-label=${t('match_columns')}>
       <p><strong>${draft.source}</strong> <span class="quiet">${plural('rows', file.rows.length)}, ${plural('columns', file.header.length)}</span></p>
@@ -196,20 +239,25 @@ function Matching({ draft, setDraft, columns, missing, accept, cancel, label }) 
       <table class="grid still match"><thead><tr><th scope="col">${t('needed_column')}</th><th scope="col">${t('file_column')}</th><th scope="col">${t('unit')}</th></tr></thead>
         <tbody>${shown.map(({ name, schema, required }) => {
           const match = matches[name];
-          const units = alike(schema['x-unit']).filter(Boolean);
-          return html`<tr key=${name} class=${required && !match ? 'faulty' : ''}>
+          const units = hasUnit(schema) ? choicesOf(schema['x-unit']) : [];
+          const isOpen = isUnitless({ name, schema });
+          return html`<tr key=${name} class=${(required && !match) || isOpen ? 'faulty' : ''}>
             <th scope="row" title=${schema.description}>${labelOf(name, schema)}${required && html`<span aria-hidden="true"> *</span>`}</th>
-            <td><select aria-label=${`${labelOf(name, schema)}: ${t('file_column')}`} value=${match ? match.index : ''} onChange=${event => set(name, event.currentTarget.value === '' ? undefined : { index: Number(event.currentTarget.value), unit: matches[name]?.unit ?? headed(file.header[Number(event.currentTarget.value)]).unit ?? schema['x-unit'] })}>
+            <td><select aria-label=${`${labelOf(name, schema)}: ${t('file_column')}`} value=${match ? match.index : ''} onChange=${event => set(name, event.currentTarget.value === '' ? undefined : { index: Number(event.currentTarget.value), ...unitRead(file.header[Number(event.currentTarget.value)], schema) })}>
               <option value="">${t('no_column')}</option>
               ${file.header.map((title, index) => html`<option value=${index}>${title || `${index + 1}`}${file.rows[0]?.[index] ? ` (${file.rows[0][index]} …)` : ''}</option>`)}
             </select></td>
-            <td class="unit-cell">${schema['x-unit'] && schema.type !== 'integer' && match && (units.length > 1 ? html`<select aria-label=${`${labelOf(name, schema)}: ${t('unit')}`} value=${match.unit} onChange=${event => set(name, { ...match, unit: event.currentTarget.value })}>
+            <td class="unit-cell">${match && (units.length > 1 ? html`<select aria-label=${`${labelOf(name, schema)}: ${t('unit')}`} aria-invalid=${isOpen ? 'true' : undefined} value=${match.unit ?? ''} onChange=${event => set(name, { ...match, unit: event.currentTarget.value })}>
+              ${match.unit === null && html`<option value="" disabled>${t('choose_unit')}</option>`}
               ${units.map(unit => html`<option value=${unit}>${unitSymbol(unit) || '1'}</option>`)}</select>` : unitOf(schema))}</td>
           </tr>`;
         })}</tbody></table>
       ${!all && columns.length > shown.length && html`<button type="button" class="more" onClick=${() => setAll(true)}>${t('more_fields', { count: columns.length - shown.length })}</button>`}
       ${missing.length > 0 && html`<p class="fault"><span>${t('columns_missing', { names: missing.map(({ name, schema }) => labelOf(name, schema)).join(', ') })}</span></p>`}
-      <div class="actions"><button type="button" class="primary" disabled=${missing.length > 0 || Object.values(matches).filter(Boolean).length === 0} onClick=${accept}>${t('use_table')}<span class="hidden">: ${label}</span></button>
+      ${unitless.length > 0 && html`<p class="fault" role="alert">${unitless.map(column => html`<span key=${column.name}>${unitFault(column)}</span>`)}</p>`}
+      ${others.kept.length > 0 && html`<p class="columns-kept">${t('columns_kept', { names: titles(others.kept) })}</p>`}
+      ${others.left.length > 0 && html`<p class="columns-left">${t('columns_left', { names: titles(others.left) })}</p>`}
+      <div class="actions"><button type="button" class="primary" disabled=${missing.length > 0 || unitless.length > 0 || Object.values(matches).filter(Boolean).length === 0} onClick=${accept}>${t('use_table')}<span class="hidden">: ${label}</span></button>
         <button type="button" onClick=${cancel}>${t('cancel')}</button></div>
     </div>`;
 }

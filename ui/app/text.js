@@ -94,7 +94,7 @@ export const moment = text => new Date(text).toLocaleString(current, { dateStyle
 const SYMBOLS = { um: 'µm', us: 'µs', urad: 'µrad', deg: '°' };
 const RUSSIAN = {
   mm: 'мм', um: 'мкм', m: 'м', N: 'Н', kN: 'кН', W: 'Вт', kW: 'кВт', s: 'с', ms: 'мс', us: 'мкс', min: 'мин', h: 'ч', rpm: 'об/мин',
-  rev: 'об', tooth: 'зуб', kg: 'кг', Hz: 'Гц', rad: 'рад', urad: 'мкрад', K: 'К', mK: 'мК', km: 'км', MPa: 'МПа', GPa: 'ГПа', g: 'г', J: 'Дж', money: 'ден.\u00a0ед.',
+  rev: 'об', tooth: 'зуб', kg: 'кг', Hz: 'Гц', rad: 'рад', urad: 'мкрад', K: 'К', mK: 'мК', km: 'км', MPa: 'МПа', GPa: 'ГПа', g: 'г', J: 'Дж', nm: 'нм', cm: 'см', inch: 'дюйм', money: 'ден.\u00a0ед.',
 };
 
 /** The symbol of a unit of the contract: `um/N` becomes `µm/N` or `мкм/Н`, `N/mm2` becomes `N/mm²`. */
@@ -107,6 +107,12 @@ export function unitSymbol(unit) {
     .replace(/([A-Za-zµ]+)(-?\d*)/g, (_, word, power) => spell(word) + superscript(power))
     .replace(/[* ]/g, '·');
 }
+
+// Who writes milli does not mean mega: of that no capitals are mixed up.
+const spellings = symbol => (symbol.startsWith('М') ? [symbol] : [symbol, symbol.toLowerCase()]);
+const WORDS = new Map([...Object.entries(RUSSIAN).flatMap(([word, symbol]) => spellings(symbol).map(text => [text, word])), ['град', 'deg']]);
+/** A unit with the words of the contract, as far as it is written with those of print: `мкм/об` becomes `um/rev`. */
+export const unitWords = unit => unit.replace(/[а-яё]+/gi, word => WORDS.get(word) ?? WORDS.get(word.toLowerCase()) ?? word);
 
 /** The unit of a field as it is printed. */
 export const unitOf = schema => schema?.['x-unit-label'] ?? unitSymbol(schema?.['x-unit']);
