@@ -141,3 +141,23 @@ fn a_large_study_is_a_job_that_survives_a_reload_and_is_cancelled() {
     assert!(page.text(".list tbody th").contains("Parameter study"));
     page.assert_calm();
 }
+
+/// A link to a study on its way that somebody else started: the page has its fields, not those of a new one.
+#[test]
+fn a_study_that_somebody_else_started_is_shown_with_its_own_fields() {
+    let Some((_turn, mut page, service)) = both() else { return };
+    page.open(&service.page(""));
+    let id = page.evaluate(
+        "(async () => { const { jobs, examples } = await (await fetch('/v1/calculators/deflection-compensation')).json(); \
+         const study = { calculator: 'deflection-compensation', job: jobs[examples[0].id], vary: [{ pointer: '/cut/spindle_speed_rpm', from: 100, to: 300, count: 23 }] }; \
+         const answer = await fetch('/v1/studies', { method: 'POST', body: JSON.stringify(study), \
+         headers: { 'Content-Type': 'application/json', Prefer: 'respond-async' } }); return (await answer.json()).id })()",
+    );
+    page.open(&service.page(&format!("studies?run={}", id.as_str().unwrap())));
+    page.wait_for("#vary-0");
+    assert_eq!(page.value("#vary-0"), "/cut/spindle_speed_rpm");
+    assert!(page.text("#study-points").starts_with("23 "));
+    page.until(DONE);
+    assert_eq!(page.evaluate("document.querySelectorAll('.study-rows tbody tr').length"), 23);
+    page.assert_calm();
+}

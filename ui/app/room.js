@@ -354,7 +354,9 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
     tell(state.job, answer?.key, running?.id, 'replace');
   };
   const picking = (figure, body) => pickOf(id, figure, description.input_schema, state.job, body);
-  const study = answer && `#/studies?calculator=${id}&${written(queryOf(state, state.job, answer.key))}`;
+  // A run of this calculator is none of a study.
+  const ofStudy = state.baseName.run ? new URLSearchParams({ result: answer?.key }) : queryOf(state, state.job, answer?.key);
+  const study = answer && `#/studies?calculator=${id}&${written(ofStudy)}`;
   const faultCount = (problem?.errors || []).length + unreadable.size;
   const isBusy = pending || running;
   const trouble = problem && !(['offline', 'cancelled'].includes(problem.code) && answer) && html`<${Trouble} problem=${problem} names=${namesOf(description.input_schema)} over=${Boolean(answer)} onGo=${place => { setPane('form'); setTimeout(() => goTo(place), 30); }} />`;

@@ -51,7 +51,7 @@ export function Study({ calculators, query, push, replace, refreshJobs }) {
           return;
         }
         // A kept study brings its job with it; a running one was put down by the page that started it, or the service has it.
-        const stored = kept ? (await api.jobOf(kept)).job : run ? keptRun(run) ?? (await inputOf(run))?.job : null;
+        const stored = kept ? (await api.jobOf(kept)).job : run ? keptRun(run) ?? await givenStudy(run) : null;
         const description = await api.calculator(stored?.calculator || query.get('calculator') || calculators[0].id);
         const job = stored ? stored.job : (await jobOf(description, new URLSearchParams(part))).job;
         if (gone) return;
@@ -71,6 +71,12 @@ export function Study({ calculators, query, push, replace, refreshJobs }) {
   if (missing) return html`<main class="plain" id="main" tabindex="-1"><h1>${missing.problem?.title || t('trouble_title')}</h1><p>${capital(missing.problem?.detail || missing.message)}</p><p><a href="#/studies" onClick=${() => setMissing(null)}>${t('start_over')}</a></p></main>`;
   if (!opened) return html`<main class="plain quiet-start" id="main" tabindex="-1"><p>${t('loading')}</p></main>`;
   return html`<${Board} key=${opened.serial} ...${{ ...opened, calculators, choose, tell, refreshJobs }} />`;
+}
+
+/** The study that the service was given under that id. */
+async function givenStudy(id) {
+  const given = await inputOf(id);
+  return given?.calculator === 'studies' ? given.job : null;
 }
 
 function Board({ description, job, stored, part, query, calculators, choose, tell: write, refreshJobs }) {
