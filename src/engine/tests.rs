@@ -245,7 +245,10 @@ async fn unknown_names_come_with_the_nearest() {
     let (engine, _folder) = engine().await;
     let error = engine.solve("toy-baar", job(|_| {})).await.unwrap_err();
     assert_eq!(error, Error::UnknownCalculator { name: "toy-baar".to_owned(), nearest: Some(TOY) });
-    assert_eq!(check_now(&toy::registry(), TOY, job(|_| {})).unwrap().key, engine.solve(TOY, job(|_| {})).await.unwrap().stored.key);
+    assert_eq!(
+        check_now(&toy::registry(), TOY, job(|_| {})).unwrap().key,
+        engine.solve(TOY, job(|_| {})).await.unwrap().stored.key
+    );
 }
 
 fn asynchronously() -> Ask {

@@ -233,14 +233,17 @@ impl Page {
 
     /// A real click in the middle of an element, once it holds still: what has just come may still push it aside.
     pub fn click(&mut self, selector: &str) {
-        self.middle(selector);
-        self.until(&format!(
-            "(async () => {{ const it = document.querySelector({}), at = () => JSON.stringify(it.getBoundingClientRect()); \
-             const before = it && at(); \
-             await new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done))); \
-             return it !== null && it.isConnected && at() === before }})()",
-            json!(selector)
-        ));
+        let start = Instant::now();
+        let at = format!("JSON.stringify(document.querySelector({})?.getBoundingClientRect())", json!(selector));
+        loop {
+            self.middle(selector);
+            let before = self.evaluate(&at);
+            self.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => done())))");
+            if self.evaluate(&at) == before {
+                break;
+            }
+            assert!(start.elapsed() < PATIENCE, "{selector} never holds still");
+        }
         let place = self.middle(selector);
         self.point(place);
         self.mouse("mousePressed", place, 1);
