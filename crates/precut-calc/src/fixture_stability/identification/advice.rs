@@ -187,10 +187,9 @@ pub(super) fn explanation(problem: &Problem<'_>, outcome: &IdentificationOutcome
     {
         let (best, least) = (Words::of(outcome, best), Words::of(outcome, least));
         if let Some(sd) = best.standard_deviation {
-            said.push(Message::new("identification_known_best").with("combination", best.text).with("share", sd));
+            said.push(best.message("identification_known_best").with("share", sd));
         }
-        let message =
-            Message::new("identification_known_least").with("combination", least.text).with("parameters", least.count);
+        let message = least.message("identification_known_least");
         said.push(match least.standard_deviation {
             Some(sd) => message.with("share", sd),
             None => message,
@@ -208,11 +207,12 @@ pub(super) fn explanation(problem: &Problem<'_>, outcome: &IdentificationOutcome
     said
 }
 
-/// A combination of parameters in words, and what is known of it as it is worded.
+/// A combination of parameters as it is worded: a product of powers, and what is known of it.
+#[derive(Default)]
 struct Words {
-    text: String,
-    /// Parameters named.
-    count: usize,
+    /// Parameters, with their powers.
+    names: Vec<String>,
+    powers: Vec<f64>,
     standard_deviation: Option<f64>,
 }
 
@@ -225,7 +225,7 @@ impl Words {
         order.sort_by(|&a, &b| powers[b].abs().total_cmp(&powers[a].abs()));
         let least = order.iter().filter(|&&k| powers[k].abs() >= NAMED_POWER).count().max(1);
         let tries = DECIMALS.flat_map(|decimals| (least..=order.len()).map(move |count| (decimals, count)));
-        let mut last = Self { text: String::new(), count: 0, standard_deviation: None };
+        let mut last = Self::default();
         for (decimals, count) in tries {
             last = Self::with(outcome, powers, &order[..count], decimals);
             let is_true = match (last.standard_deviation, combination.standard_deviation) {
@@ -242,16 +242,21 @@ impl Words {
     fn with(outcome: &IdentificationOutcome, powers: &[f64], named: &[usize], decimals: usize) -> Self {
         let scale = (0..decimals).fold(1.0, |scale, _| 10.0 * scale);
         let mut said = vec![0.0; powers.len()];
-        let mut parts = Vec::new();
+        let mut words = Self::default();
         for &k in named {
             let power = (powers[k] * scale).round() / scale;
             if power.abs() > 0.0 {
                 said[k] = power;
-                parts.push(format!("{}^{power:.decimals$}", outcome.parameters[k].name));
+                words.names.push(outcome.parameters[k].name.clone());
+                words.powers.push(power);
             }
         }
-        let standard_deviation = standard_deviation(&outcome.combinations, &said);
-        Self { text: parts.join(" "), count: parts.len(), standard_deviation }
+        words.standard_deviation = standard_deviation(&outcome.combinations, &said);
+        words
+    }
+
+    fn message(&self, code: &'static str) -> Message {
+        Message::new(code).with("names", self.names.clone()).with("powers", self.powers.clone())
     }
 }
 

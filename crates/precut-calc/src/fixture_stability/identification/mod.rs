@@ -51,7 +51,7 @@ impl Calculator for FixtureIdentification {
     const META: Meta = Meta {
         id: "fixture-identification",
         kind: CalculatorKind::Evaluation,
-        version: 3,
+        version: 4,
         title: "Fixture parameters from a table",
         question: "Which stiffness, damping and mass explain my table of amplitude against depth, and how far does it fix them?",
         summary: "From amplitudes measured at several depths: stiffness, natural frequency, damping and force parameters of \
