@@ -6,6 +6,8 @@ mod support;
 
 use precut::engine::{Body, Error, check_now};
 use precut::registry::Registry;
+use precut::text::{Language, Texts};
+use precut_calc::calculator::{Finding, Value as Said};
 use serde_json::{Value, json};
 use support::{cases, translate};
 
@@ -15,8 +17,12 @@ fn faults(registry: &Registry, job: &Value) -> Vec<(String, String)> {
 }
 
 fn faults_of(registry: &Registry, calculator: &str, job: &Value) -> Vec<(String, String)> {
+    findings_of(registry, calculator, job).into_iter().map(|f| (f.code.to_owned(), f.pointer)).collect()
+}
+
+fn findings_of(registry: &Registry, calculator: &str, job: &Value) -> Vec<Finding> {
     match check_now(registry, calculator, Body::Json(job.to_string().into())) {
-        Err(Error::Invalid { findings, .. }) => findings.into_iter().map(|f| (f.code.to_owned(), f.pointer)).collect(),
+        Err(Error::Invalid { findings, .. }) => findings,
         Err(error) => panic!("{error:?}"),
         Ok(_) => panic!("accepted: {job}"),
     }
@@ -143,6 +149,7 @@ fn all_faults_come_at_once() {
             "supports": [{ "kind": "centre", "z_mm": 0, "compliance_um_per_n": -1 }],
             "force": { "kind": "power_law", "passive": { "coefficient": -1, "depth_exponent": 0.9, "feed_exponent": 0.6, "speed_exponent": -0.3 } },
             "cut": { "feed_mm_per_rev": 0 },
+            "effects": [{ "kind": "force_level", "delta": 0.1 }, { "kind": "force_level", "delta": 0.1 }],
             "stations": { "kind": "list", "z_mm": [600] }
         }),
     );
@@ -157,9 +164,129 @@ fn all_faults_come_at_once() {
         "bad_power_law",
         "bad_feed",
         "speed_or_rpm",
-        "station_outside_shaft",
+        "duplicate_effect",
     ] {
         assert!(codes.contains(&code), "{code} is not among {codes:?}");
+    }
+    // Beside a shaft of no possible length stands nothing.
+    assert!(!codes.contains(&"station_outside_shaft"), "{codes:?}");
+}
+
+/// A job with one thing changed.
+fn changed(place: &str, value: &Value) -> Value {
+    let mut job = json!({
+        "shaft": { "segments": [{ "length_mm": 500, "diameter_mm": 30, "stock_diameter_mm": 32 }], "youngs_modulus_n_per_mm2": 210_000 },
+        "supports": [{ "kind": "centre", "z_mm": 0 }, { "kind": "centre", "z_mm": 500 }],
+        "force": { "kind": "constant", "passive_n": 100 },
+        "cut": { "feed_mm_per_rev": 0.3, "speed_m_per_min": 120 }
+    });
+    let (parent, name) = place.rsplit_once('/').unwrap();
+    job.pointer_mut(parent).unwrap()[name] = value.clone();
+    job
+}
+
+/// Too low or too high: both ends of what is allowed are said, in numbers and in words of every language.
+#[test]
+fn a_number_out_of_its_range_is_told_both_ends() {
+    let registry = Registry::standard().unwrap();
+    let kienzle = |field: &str, value: f64| {
+        let mut force = json!({
+            "kind": "kienzle", "cutting_edge_angle_deg": 75, "nose_radius_mm": 0.8,
+            "specific_cutting_force_n_per_mm2": 2000, "cutting_exponent": 0.2,
+            "specific_normal_force_n_per_mm2": 900, "normal_exponent": 0.35
+        });
+        force[field] = json!(value);
+        force
+    };
+    let power = |field: &str, value: f64| {
+        let mut force = json!({ "kind": "power_law", "passive": { "coefficient": 2430, "depth_exponent": 0.9, "feed_exponent": 0.6 } });
+        force["passive"][field] = json!(value);
+        force
+    };
+    let of_force = |force: Value| ("/force", force);
+    let cases = [
+        (("/shaft/segments/0/length_mm", json!(1e308)), "bad_length", ["0.001", "100000"]),
+        (("/shaft/segments/0/diameter_mm", json!(10_001)), "bad_diameter", ["0.01", "10000"]),
+        (("/shaft/segments/0/diameter_mm", json!(-30)), "bad_diameter", ["0.01", "10000"]),
+        (("/shaft/segments/0/bore_diameter_mm", json!(-1)), "bad_bore", ["0", "10000"]),
+        (("/shaft/segments/0/bore_diameter_mm", json!(20_000)), "bad_bore", ["0", "30"]),
+        (("/shaft/segments/0/stock_diameter_mm", json!(20_000)), "bad_diameter", ["0.01", "10000"]),
+        (("/shaft/youngs_modulus_n_per_mm2", json!(1)), "bad_modulus", ["1000", "2000000"]),
+        (("/shaft/poisson_ratio", json!(0.5)), "bad_poisson", ["-1", "0.5"]),
+        (("/supports/0/compliance_um_per_n", json!(1e300)), "negative_compliance", ["0", "1000 µm/N"]),
+        (("/supports/0/compliance_um_per_n", json!(-1)), "negative_compliance", ["0", "1000 µm/N"]),
+        (("/supports/0/z_mm", json!(-1)), "support_outside_shaft", ["0", "500"]),
+        (("/supports/0/z_mm", json!(1e6)), "support_outside_shaft", ["0", "500"]),
+        (("/cut/feed_mm_per_rev", json!(0)), "bad_feed", ["0.0001", "20"]),
+        (("/cut/speed_m_per_min", json!(1e9)), "bad_speed", ["0.01", "20000 m/min"]),
+        (("/force/passive_n", json!(-1)), "bad_constant_force", ["0", "1000000 N"]),
+        (("/force/passive_n", json!(1e300)), "out_of_range", ["0", "1000000 N"]),
+        (("/force/wear_factor", json!(0)), "bad_wear_factor", ["0", "10"]),
+        (of_force(kienzle("cutting_edge_angle_deg", 91.0)), "bad_lead_angle", ["0", "90"]),
+        (of_force(kienzle("nose_radius_mm", -1.0)), "bad_nose_radius", ["0", "50 mm"]),
+        (of_force(kienzle("specific_normal_force_n_per_mm2", 0.0)), "bad_kienzle", ["0", "100000 N/mm²"]),
+        (of_force(kienzle("normal_exponent", 1.0)), "bad_kienzle", ["0", "1"]),
+        (of_force(power("coefficient", 0.0)), "bad_power_law", ["0", "10000000"]),
+        (of_force(power("depth_exponent", -0.1)), "bad_power_law", ["0", "3"]),
+    ];
+    for ((place, value), code, ends) in cases {
+        let found = findings_of(&registry, "deflection-compensation", &changed(place, &value));
+        let [finding] = &found[..] else { panic!("{place} = {value}: {found:?}") };
+        assert_eq!(finding.code, code, "{place} = {value}");
+        let stated = |names: [&str; 2]| names.iter().any(|name| matches!(finding.values.get(name), Some(Said::Number(_))));
+        assert!(stated(["minimum", "above"]) && stated(["maximum", "below"]) && finding.unit.is_some(), "{finding:?}");
+        let english = Texts::shared().try_finding(Language::En, "fault", finding).unwrap();
+        assert!(ends.iter().all(|end| english.contains(end)), "{english}");
+        let russian = Texts::shared().try_finding(Language::Ru, "fault", finding).unwrap();
+        let numbers = ends.map(|end| end.split(' ').next().unwrap_or_default().replace('.', ","));
+        assert!(numbers.iter().all(|end| russian.contains(end.as_str())), "{russian}");
+    }
+}
+
+/// The ends that the rules of the force models know are those of the schema.
+#[test]
+fn rules_and_schema_agree_on_the_ends() {
+    let registry = Registry::standard().unwrap();
+    let ends = |finding: &Finding| -> Vec<(&str, f64)> {
+        let names = ["minimum", "above", "maximum", "below"].into_iter();
+        let stated = names.filter_map(|name| match finding.values.get(name) {
+            Some(Said::Number(end)) => Some((name, *end)),
+            _ => None,
+        });
+        stated.collect()
+    };
+    let constant = json!({ "kind": "constant", "passive_n": 100, "rubbing": { "passive_n": 1 } });
+    let handbook = json!({ "kind": "handbook", "work_material": "steel", "tool_material": "carbide",
+        "tensile_strength_n_per_mm2": 600, "cutting_edge_angle_deg": 45 });
+    let kienzle = json!({ "kind": "kienzle", "cutting_edge_angle_deg": 75, "nose_radius_mm": 0.8,
+        "specific_cutting_force_n_per_mm2": 2000, "cutting_exponent": 0.2,
+        "specific_normal_force_n_per_mm2": 900, "normal_exponent": 0.35 });
+    let power = json!({ "kind": "power_law", "passive": { "coefficient": 2430, "depth_exponent": 0.9, "feed_exponent": 0.6 } });
+    for (force, place) in [
+        (&constant, "/force/passive_n"),
+        (&constant, "/force/rubbing/passive_n"),
+        (&constant, "/force/wear_factor"),
+        (&handbook, "/force/nose_radius_mm"),
+        (&handbook, "/force/cutting_edge_angle_deg"),
+        (&handbook, "/force/tensile_strength_n_per_mm2"),
+        (&kienzle, "/force/cutting_edge_angle_deg"),
+        (&kienzle, "/force/nose_radius_mm"),
+        (&kienzle, "/force/specific_normal_force_n_per_mm2"),
+        (&kienzle, "/force/normal_exponent"),
+        (&power, "/force/passive/coefficient"),
+        (&power, "/force/passive/depth_exponent"),
+        (&power, "/force/passive/correction_factor"),
+        (&power, "/force/passive/constant_n"),
+    ] {
+        let at = |value: f64| {
+            let mut job = changed("/force", force);
+            let (parent, name) = place.rsplit_once('/').unwrap();
+            job.pointer_mut(parent).unwrap()[name] = json!(value);
+            let found = findings_of(&registry, "deflection-compensation", &job);
+            found.into_iter().find(|finding| finding.pointer == place).unwrap_or_else(|| panic!("{place} takes {value}"))
+        };
+        // Below, a rule speaks; far above, for most of them the schema alone.
+        assert_eq!(ends(&at(-1.0)), ends(&at(1e12)), "{place} of {force}");
     }
 }
 

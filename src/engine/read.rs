@@ -128,7 +128,7 @@ impl Found {
 
     /// With the faults that the rules between fields find in a job that is readable although it breaks its schema.
     ///
-    /// A rule's fault replaces the schema's at the same place: it knows more. Arrays beyond their most are not looked
+    /// A rule's fault replaces the schema's at the same place, and takes over what only the schema knows. Arrays beyond their most are not looked
     /// at: their length is what is wrong, and rules may cost more than their length.
     fn with_rules(mut self, entry: &Entry, job: &Value) -> Error {
         let overlong = self.findings.iter().any(|finding| general_code(finding) == "too_many_items");
@@ -137,7 +137,9 @@ impl Found {
             for rule in rules_whatever_is_unread(entry, &job, &self.unread) {
                 let rule = model::pointed_at_model(entry, &job, model.as_ref(), rule);
                 match self.findings.iter_mut().find(|finding| finding.pointer == rule.pointer) {
-                    Some(finding) if finding.code == general_code(finding) => *finding = rule,
+                    Some(finding) if finding.code == general_code(finding) || finding.code == rule.code => {
+                        *finding = with_schema(rule, finding);
+                    }
                     Some(_) => {}
                     None => {
                         self.findings.push(rule);
@@ -148,6 +150,19 @@ impl Found {
         }
         invalid(self.findings, self.total)
     }
+}
+
+/// The rule's fault with what the schema says of the place besides: unit, ends of the range, another unit that was meant.
+fn with_schema(mut rule: Finding, schema: &Finding) -> Finding {
+    const ENDS: [[&str; 2]; 2] = [["minimum", "above"], ["maximum", "below"]];
+    rule.unit = rule.unit.or(schema.unit);
+    for (name, value) in schema.values.iter().filter(|(name, _)| *name != "rule") {
+        let same = ENDS.iter().find(|end| end.contains(&name)).map_or([name, name], |end| *end);
+        if same.iter().all(|name| rule.values.get(name).is_none()) {
+            rule = rule.with(name, value.clone());
+        }
+    }
+    rule
 }
 
 /// The rules that a job breaks whether a table that could not be read were absent or empty: a rule that one of the two

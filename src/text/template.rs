@@ -66,6 +66,7 @@ pub(super) fn environment() -> Environment<'static> {
     });
     environment.add_filter("reason", |state: &State<'_, '_>, text: &str| Glossary::of(language_of(state)).reason(text));
     environment.add_filter("list", list);
+    environment.add_function("allowed_range", allowed_range);
     environment.add_filter("warning", warning);
     environment.add_filter("plural", plural);
     environment
@@ -87,6 +88,14 @@ fn warning(state: &State<'_, '_>, said: Value, code: &str, pointer: &str) -> Res
     context.insert("field".to_owned(), super::field(pointer).into());
     let name = super::name(language_of(state), "warning", code);
     state.env().get_template(&name)?.render(context)
+}
+
+/// What is allowed, with its unit: from `minimum` or `above`, and `maximum` or `below`, of the sentence that asks.
+fn allowed_range(state: &State<'_, '_>) -> Result<String, Error> {
+    let names = ["minimum", "above", "maximum", "below", "unit"];
+    let context: BTreeMap<&str, Value> =
+        names.into_iter().filter_map(|name| Some((name, state.lookup(name)?))).collect();
+    state.env().get_template(&super::name(language_of(state), "range", "allowed"))?.render(context)
 }
 
 /// Limits by name and place (`deflection@z5`): one, or several with commas between them.

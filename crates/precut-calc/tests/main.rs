@@ -10,6 +10,7 @@ mod blind_trials;
 mod conformance;
 mod deflection_clocks;
 mod deflection_effects;
+mod deflection_faults;
 mod deflection_properties;
 mod deflection_reference;
 mod deflection_set_off;

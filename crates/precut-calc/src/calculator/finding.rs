@@ -131,6 +131,12 @@ impl Finding {
         self.pointer.insert_str(0, pointer);
         self
     }
+    /// With both ends of what is allowed, in the unit of the value. An end that is not allowed itself is named `above` or
+    /// `below` instead.
+    #[must_use]
+    pub fn within(self, minimum: f64, maximum: f64) -> Self {
+        self.with("minimum", minimum).with("maximum", maximum)
+    }
     /// With the value and the limit that it passed, both in `unit`.
     #[must_use]
     pub fn measured(mut self, value: f64, limit: f64, unit: &'static str) -> Self {

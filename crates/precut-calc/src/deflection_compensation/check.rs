@@ -4,8 +4,13 @@ use crate::calculator::{Check, Finding, Violations};
 use crate::effects::DeflectionEffect as Effect;
 
 use super::grid::station_count;
-use super::input::{Job, MAX_STATIONS, Stations, Support};
-use crate::shaft::{self, elastic::clamping, elastic::ends};
+use super::input::{Job, MAX_STATIONS, Segment, Stations, Support};
+use crate::shaft::{self, DIAMETER_MM, elastic::clamping, elastic::ends};
+
+/// Largest change of a compliance that the schemas of the effects allow, to either side of what a support has, um/N.
+const COMPLIANCE_CHANGE_UM_PER_N: std::ops::RangeInclusive<f64> = -1.0..=10.0;
+/// Stations of a measured blank that the schema allows, mm.
+const PROFILE_STATION_MM: std::ops::RangeInclusive<f64> = -100_000.0..=100_000.0;
 
 /// Codes of the faults found here.
 pub(super) const CODES: &[&str] = &[
@@ -42,10 +47,6 @@ impl Check for Job {
     }
 }
 
-fn length_mm(job: &Job) -> f64 {
-    job.shaft.segments.iter().map(|s| s.length_mm).sum()
-}
-
 fn check_cut(job: &Job, violations: &mut Violations) {
     let cut = &job.cut;
     violations.require(cut.speed_m_per_min.is_some() != cut.spindle_speed_rpm.is_some(), || {
@@ -60,49 +61,37 @@ fn check_passes(job: &Job, violations: &mut Violations) {
         violations.require(pass.speed_m_per_min.is_none() || pass.spindle_speed_rpm.is_none(), || {
             Finding::new("speed_or_rpm", format!("/passes/{i}")).with("given", "both")
         });
+        // A diameter that cannot be says nothing of the next one.
+        if !DIAMETER_MM.contains(&pass.diameter_mm) {
+            continue;
+        }
         violations.require(pass.diameter_mm < before, || {
-            Finding::new("passes_not_descending", format!("/passes/{i}/diameter_mm")).measured(
-                pass.diameter_mm,
-                before,
-                "mm",
-            )
+            Finding::new("passes_not_descending", format!("/passes/{i}/diameter_mm"))
+                .measured(pass.diameter_mm, before, "mm")
+                .with("minimum", *DIAMETER_MM.start())
+                .with("below", before)
         });
         before = pass.diameter_mm;
     }
-    let turned = job.shaft.segments.iter().filter(|s| s.stock_mm() > s.diameter_mm).map(|s| s.diameter_mm);
-    let least = turned.fold(f64::INFINITY, f64::min);
-    if let Some(last) = job.passes.last() {
+    let turned = job.shaft.segments.iter().filter(|s| s.has_stock() && s.stock_mm() > s.diameter_mm);
+    let least = turned.map(|s| s.diameter_mm).fold(f64::INFINITY, f64::min);
+    if let Some(last) = job.passes.last().filter(|last| DIAMETER_MM.contains(&last.diameter_mm)) {
         violations.require(last.diameter_mm <= least || least.is_infinite(), || {
-            Finding::new("passes_incomplete", format!("/passes/{}/diameter_mm", job.passes.len() - 1)).measured(
-                last.diameter_mm,
-                least,
-                "mm",
-            )
+            Finding::new("passes_incomplete", format!("/passes/{}/diameter_mm", job.passes.len() - 1))
+                .measured(last.diameter_mm, least, "mm")
+                .within(*DIAMETER_MM.start(), least)
         });
     }
 }
 
 fn check_stations(job: &Job, violations: &mut Violations) {
-    let length = length_mm(job);
     match &job.stations {
-        Stations::List { z_mm } => {
-            for (i, z) in z_mm.iter().enumerate() {
-                violations
-                    .require((0.0..=length).contains(z), || outside_shaft(format!("/stations/z_mm/{i}"), *z, length));
-                violations.require(i == 0 || *z > z_mm[i - 1], || {
-                    Finding::new("stations_not_ascending", format!("/stations/z_mm/{i}")).measured(
-                        *z,
-                        z_mm[i.saturating_sub(1)],
-                        "mm",
-                    )
-                });
-            }
-        }
+        Stations::List { z_mm } => check_station_list(job, z_mm, violations),
         Stations::PerZone { .. } => {
             let count = station_count(job);
-            violations.require(count > 0 || job.shaft.segments.is_empty(), || {
-                Finding::new("nothing_to_turn", "/shaft/segments")
-            });
+            // Diameters that cannot be may be what keeps a segment from being turned.
+            let judged = !job.shaft.segments.is_empty() && job.shaft.segments.iter().all(Segment::has_stock);
+            violations.require(count > 0 || !judged, || Finding::new("nothing_to_turn", "/shaft/segments"));
             violations.require(count <= MAX_STATIONS, || {
                 let (count, most) =
                     (crate::calculator::Value::from(count), crate::calculator::Value::from(MAX_STATIONS));
@@ -112,32 +101,55 @@ fn check_stations(job: &Job, violations: &mut Violations) {
     }
 }
 
+fn check_station_list(job: &Job, z_mm: &[f64], violations: &mut Violations) {
+    let length = job.shaft.known_length_mm();
+    let mut before: Option<f64> = None;
+    for (i, &z) in z_mm.iter().enumerate() {
+        let at = || format!("/stations/z_mm/{i}");
+        // What stands beside the shaft is told that, and says nothing of the order of the others.
+        if let Some(length) = length.filter(|length| !(0.0..=*length).contains(&z)) {
+            violations.add(outside_shaft(at(), z, length));
+            continue;
+        }
+        if let Some(before) = before {
+            violations.require(z > before, || {
+                let finding = Finding::new("stations_not_ascending", at()).measured(z, before, "mm");
+                let finding = finding.with("above", before);
+                length.into_iter().fold(finding, |finding, length| finding.with("maximum", length))
+            });
+        }
+        before = Some(z);
+    }
+}
+
 /// A station beside the shaft, with the end that it lies beyond as the limit.
 pub(super) fn outside_shaft(pointer: String, z_mm: f64, length_mm: f64) -> Finding {
-    let end = if z_mm < 0.0 { 0.0 } else { length_mm };
-    Finding::new("station_outside_shaft", pointer).measured(z_mm, end, "mm").with("length_mm", length_mm)
+    shaft::check::beside("station_outside_shaft", pointer, z_mm, length_mm).with("length_mm", length_mm)
 }
 
 fn check_stock_profile(job: &Job, violations: &mut Violations) {
     let Some(profile) = &job.stock_profile else { return };
     violations.require(!profile.is_empty(), || Finding::new("stock_profile_empty", "/stock_profile"));
     for (i, pair) in profile.rows().windows(2).enumerate() {
-        violations.require(pair[1].z_mm > pair[0].z_mm, || {
-            Finding::new("stock_profile_not_ascending", format!("/stock_profile/{}/z_mm", i + 1)).measured(
-                pair[1].z_mm,
-                pair[0].z_mm,
-                "mm",
-            )
+        let possible = pair.iter().all(|row| PROFILE_STATION_MM.contains(&row.z_mm));
+        violations.require(pair[1].z_mm > pair[0].z_mm || !possible, || {
+            Finding::new("stock_profile_not_ascending", format!("/stock_profile/{}/z_mm", i + 1))
+                .measured(pair[1].z_mm, pair[0].z_mm, "mm")
+                .with("above", pair[0].z_mm)
+                .with("maximum", *PROFILE_STATION_MM.end())
         });
     }
-    let bore = job.shaft.segments.iter().map(|s| s.bore_diameter_mm).fold(0.0, f64::max);
+    let bores = job.shaft.segments.iter().filter(|s| s.has_diameter() && s.bore_diameter_mm < s.diameter_mm);
+    let bore = bores.map(|s| s.bore_diameter_mm).fold(0.0, f64::max);
     for (i, row) in profile.rows().iter().enumerate() {
         violations.require(row.diameter_mm > bore, || {
-            Finding::new("bad_diameter", format!("/stock_profile/{i}/diameter_mm")).measured(
-                row.diameter_mm,
-                bore,
-                "mm",
-            )
+            let finding = Finding::new("bad_diameter", format!("/stock_profile/{i}/diameter_mm"));
+            let finding = finding.measured(row.diameter_mm, bore, "mm").with("maximum", *DIAMETER_MM.end());
+            if bore < *DIAMETER_MM.start() {
+                finding.with("minimum", *DIAMETER_MM.start())
+            } else {
+                finding.with("above", bore)
+            }
         });
     }
 }
@@ -170,8 +182,12 @@ fn check_effect_on_structure(job: &Job, effect: &Effect, at: &dyn Fn(&str) -> St
     let kind = effect.kind();
     let mut softens = |base_um_per_n: f64, delta: f64| {
         violations.require(base_um_per_n + delta >= 0.0, || {
+            let (least, most) = COMPLIANCE_CHANGE_UM_PER_N.into_inner();
+            // Not `-base`: that of nothing is -0.
+            let least = (0.0 - base_um_per_n).max(least);
             Finding::new("effect_beyond_base", at("/delta_um_per_n"))
-                .measured(delta, -base_um_per_n, "um/N")
+                .measured(delta, least, "um/N")
+                .within(least, most)
                 .with("kind", kind)
         });
     };
@@ -206,7 +222,7 @@ fn held_without(job: &Job, left_out: usize) -> bool {
 
 /// Index of the steady rest that stands at a station.
 pub(super) fn steady_at(job: &Job, station_mm: f64) -> Option<usize> {
-    let tolerance = shaft::check::SAME_STATION * length_mm(job).max(1.0);
+    let tolerance = shaft::check::SAME_STATION * job.shaft.length_mm().max(1.0);
     job.supports
         .iter()
         .position(|s| matches!(s, Support::SteadyRest { z_mm, .. } if (z_mm - station_mm).abs() <= tolerance))

@@ -8,6 +8,9 @@ use crate::material::{self, Certainty};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+/// Largest specific force that the schema allows, N/mm2.
+const MOST_SPECIFIC_FORCE_N_PER_MM2: f64 = 100_000.0;
+
 /// Specific force over local chip thickness along the edge and its nose. Equation `deflection/6.2`.
 ///
 /// Valid for a lead angle up to 90 degrees and a feed well below the nose radius; the trailing edge
@@ -63,15 +66,10 @@ impl Kienzle {
     pub(super) fn check(&self, pointer: &str, violations: &mut Violations) {
         let angle = self.cutting_edge_angle_deg;
         violations.require(rules::positive(angle) && angle <= 90.0, || {
-            let limit = if angle > 90.0 { 90.0 } else { 0.0 };
-            Finding::new("bad_lead_angle", format!("{pointer}/cutting_edge_angle_deg")).measured(angle, limit, "deg")
+            rules::bad_lead_angle(angle, format!("{pointer}/cutting_edge_angle_deg"))
         });
         violations.require(rules::not_negative(self.nose_radius_mm), || {
-            Finding::new("bad_nose_radius", format!("{pointer}/nose_radius_mm")).measured(
-                self.nose_radius_mm,
-                0.0,
-                "mm",
-            )
+            rules::bad_nose_radius(self.nose_radius_mm, "minimum", format!("{pointer}/nose_radius_mm"))
         });
         self.check_constants(pointer, violations);
         rules::check_rubbing(self.rubbing.as_ref(), pointer, violations);
@@ -140,13 +138,18 @@ impl Kienzle {
 }
 
 fn check_specific(value: f64, pointer: &str, violations: &mut Violations) {
-    violations.require(rules::positive(value), || Finding::new("bad_kienzle", pointer).measured(value, 0.0, "N/mm2"));
+    violations.require(rules::positive(value), || {
+        Finding::new("bad_kienzle", pointer)
+            .measured(value, 0.0, "N/mm2")
+            .with("above", 0.0)
+            .with("maximum", MOST_SPECIFIC_FORCE_N_PER_MM2)
+    });
 }
 
 fn check_exponent(value: f64, pointer: &str, violations: &mut Violations) {
     violations.require(rules::not_negative(value) && value < 1.0, || {
         let limit = if value >= 1.0 { 1.0 } else { 0.0 };
-        Finding::new("bad_kienzle", pointer).measured(value, limit, "1")
+        Finding::new("bad_kienzle", pointer).measured(value, limit, "1").with("minimum", 0.0).with("below", 1.0)
     });
 }
 

@@ -7,6 +7,10 @@ use crate::material::Certainty;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+/// Largest coefficient, exponent (of either sign) and correction factor that the schema allows.
+const MOST_COEFFICIENT_N: f64 = 10_000_000.0;
+const MOST_EXPONENT: f64 = 3.0;
+const MOST_CORRECTION: f64 = 100.0;
 /// Least depth that the handbook's law was measured for, mm.
 const LEAST_DEPTH_MM: f64 = 0.1;
 /// Least feed that the handbook's law was measured for, mm/rev.
@@ -52,17 +56,28 @@ pub struct PowerTerm {
 
 impl PowerTerm {
     pub(super) fn check(&self, pointer: &str, violations: &mut Violations) {
-        let mut require = |holds: bool, field: &str, value: f64, limit: f64, unit: &'static str| {
-            violations.require(holds, || {
-                Finding::new("bad_power_law", format!("{pointer}/{field}")).measured(value, limit, unit)
-            });
+        let bad = |field: &str, value: f64, unit: &'static str, (least, most): (f64, f64)| {
+            let limit = if value > most { most } else { least };
+            let finding = Finding::new("bad_power_law", format!("{pointer}/{field}")).measured(value, limit, unit);
+            finding.with("maximum", most)
         };
-        require(rules::positive(self.coefficient), "coefficient", self.coefficient, 0.0, "N");
-        require(rules::not_negative(self.depth_exponent), "depth_exponent", self.depth_exponent, 0.0, "1");
-        require(self.feed_exponent.is_finite(), "feed_exponent", self.feed_exponent, 3.0, "1");
-        require(self.speed_exponent.is_finite(), "speed_exponent", self.speed_exponent, 3.0, "1");
-        require(rules::positive(self.correction_factor), "correction_factor", self.correction_factor, 0.0, "1");
-        require(rules::not_negative(self.constant_n), "constant_n", self.constant_n, 0.0, "N");
+        for (field, value, unit, most) in [
+            ("coefficient", self.coefficient, "N", MOST_COEFFICIENT_N),
+            ("correction_factor", self.correction_factor, "1", MOST_CORRECTION),
+        ] {
+            violations.require(rules::positive(value), || bad(field, value, unit, (0.0, most)).with("above", 0.0));
+        }
+        for (field, value, unit, most) in [
+            ("depth_exponent", self.depth_exponent, "1", MOST_EXPONENT),
+            ("constant_n", self.constant_n, "N", rules::MOST_FORCE_N),
+        ] {
+            violations
+                .require(rules::not_negative(value), || bad(field, value, unit, (0.0, most)).with("minimum", 0.0));
+        }
+        for (field, value) in [("feed_exponent", self.feed_exponent), ("speed_exponent", self.speed_exponent)] {
+            let ends = (-MOST_EXPONENT, MOST_EXPONENT);
+            violations.require(value.is_finite(), || bad(field, value, "1", ends).with("minimum", ends.0));
+        }
     }
 
     fn at(&self, feed_mm_per_rev: f64, speed_m_per_min: f64) -> Power {
@@ -250,13 +265,15 @@ pub(super) fn outside(
 impl MeasuredRange {
     fn check(&self, pointer: &str, violations: &mut Violations) {
         let ranges = [
-            ("largest_depth_mm", self.least_depth_mm, self.largest_depth_mm, "mm"),
-            ("largest_feed_mm_per_rev", self.least_feed_mm_per_rev, self.largest_feed_mm_per_rev, "mm/rev"),
-            ("largest_speed_m_per_min", self.least_speed_m_per_min, self.largest_speed_m_per_min, "m/min"),
+            ("largest_depth_mm", self.least_depth_mm, self.largest_depth_mm, "mm", 100.0),
+            ("largest_feed_mm_per_rev", self.least_feed_mm_per_rev, self.largest_feed_mm_per_rev, "mm/rev", 20.0),
+            ("largest_speed_m_per_min", self.least_speed_m_per_min, self.largest_speed_m_per_min, "m/min", 10_000.0),
         ];
-        for (field, least, largest, unit) in ranges {
+        for (field, least, largest, unit, most) in ranges {
             violations.require(rules::not_negative(least) && largest.is_finite() && least <= largest, || {
-                Finding::new("bad_power_law", format!("{pointer}/{field}")).measured(largest, least, unit)
+                Finding::new("bad_power_law", format!("{pointer}/{field}"))
+                    .measured(largest, least, unit)
+                    .within(least, most)
             });
         }
     }

@@ -6,6 +6,9 @@ use crate::calculator::{Basis, Finding, Measured, MeasuredRow, Violations};
 use serde::{Deserialize, Serialize};
 use utoipa::{PartialSchema, ToSchema};
 
+/// Largest depth that the schema allows, mm.
+const MOST_DEPTH_MM: f64 = 100.0;
+
 /// Forces measured at one depth of cut.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
@@ -65,7 +68,9 @@ impl ForceTable {
             let above = if index == 0 { 0.0 } else { rows[index - 1].depth_mm };
             let ascending = row.depth_mm > above || (index == 0 && rules::not_negative(row.depth_mm));
             violations.require(row.depth_mm.is_finite() && ascending, || {
-                Finding::new("bad_force_table", format!("{at}/depth_mm")).measured(row.depth_mm, above, "mm")
+                let finding = Finding::new("bad_force_table", format!("{at}/depth_mm"));
+                let finding = finding.measured(row.depth_mm, above, "mm").with("maximum", MOST_DEPTH_MM);
+                finding.with(if index == 0 { "minimum" } else { "above" }, above)
             });
         }
         violations.require(rows.last().is_some_and(|row| row.depth_mm > 0.0), || {

@@ -1,6 +1,6 @@
 //! Rules between the fields of a shaft and what holds it.
 
-use super::{Segment, Shaft, Support};
+use super::{DIAMETER_MM, Segment, Shaft, Support};
 use crate::calculator::{Finding, Violations};
 use crate::material;
 
@@ -38,37 +38,48 @@ pub(crate) fn shaft(shaft: &Shaft, violations: &mut Violations) {
     }
 }
 
+/// What a diameter that cannot be leaves open is no fault of bore or blank.
 fn check_segment(i: usize, segment: &Segment, violations: &mut Violations) {
+    if !segment.has_diameter() {
+        return;
+    }
     let at = |field: &str| format!("/shaft/segments/{i}/{field}");
     violations.require(segment.bore_diameter_mm < segment.diameter_mm, || {
-        Finding::new("bad_bore", at("bore_diameter_mm")).measured(segment.bore_diameter_mm, segment.diameter_mm, "mm")
+        Finding::new("bad_bore", at("bore_diameter_mm"))
+            .measured(segment.bore_diameter_mm, segment.diameter_mm, "mm")
+            .with("minimum", 0.0)
+            .with("below", segment.diameter_mm)
     });
     violations.require(segment.stock_mm() >= segment.diameter_mm, || {
-        Finding::new("stock_below_finish", at("stock_diameter_mm")).measured(
-            segment.stock_mm(),
-            segment.diameter_mm,
-            "mm",
-        )
+        Finding::new("stock_below_finish", at("stock_diameter_mm"))
+            .measured(segment.stock_mm(), segment.diameter_mm, "mm")
+            .within(segment.diameter_mm, *DIAMETER_MM.end())
     });
 }
 
 /// Faults of the supports, which stand at `/supports`.
 pub(crate) fn supports(shaft: &Shaft, supports: &[Support], violations: &mut Violations) {
-    let length = shaft.length_mm();
+    // Where a length is impossible nobody knows what stands beside the shaft.
+    let length = shaft.known_length_mm();
+    let apart = SAME_STATION * length.unwrap_or(0.0);
     let mut seen: Vec<f64> = Vec::new();
     for (i, support) in supports.iter().enumerate() {
         if let Support::SteadyRest { one_sided: false, gap_um, .. }
         | Support::FollowRest { one_sided: false, gap_um, .. } = support
         {
             violations.require(*gap_um <= 0.0, || {
-                Finding::new("gap_of_two_sided_rest", format!("/supports/{i}/gap_um")).measured(*gap_um, 0.0, "um")
+                Finding::new("gap_of_two_sided_rest", format!("/supports/{i}/gap_um"))
+                    .measured(*gap_um, 0.0, "um")
+                    .within(0.0, 0.0)
             });
         }
         let Some(z) = support.station_mm() else { continue };
-        violations.require((0.0..=length).contains(&z), || {
-            Finding::new("support_outside_shaft", format!("/supports/{i}/z_mm")).measured(z, length, "mm")
-        });
-        violations.require(seen.iter().all(|other| (other - z).abs() > SAME_STATION * length), || {
+        if let Some(length) = length {
+            violations.require((0.0..=length).contains(&z), || {
+                beside("support_outside_shaft", format!("/supports/{i}/z_mm"), z, length)
+            });
+        }
+        violations.require(seen.iter().all(|other| (other - z).abs() > apart), || {
             Finding::new("duplicate_support", format!("/supports/{i}/z_mm")).value(z, "mm")
         });
         seen.push(z);
@@ -77,4 +88,10 @@ pub(crate) fn supports(shaft: &Shaft, supports: &[Support], violations: &mut Vio
     let carrying = supports.iter().filter(|s| s.carries()).count();
     violations
         .require(chuck || carrying >= 2, || Finding::new("unstable_support", "/supports").with("carrying", carrying));
+}
+
+/// What stands beside the shaft, with the end that it lies beyond as the limit.
+pub(crate) fn beside(code: &'static str, pointer: String, z_mm: f64, length_mm: f64) -> Finding {
+    let end = if z_mm < 0.0 { 0.0 } else { length_mm };
+    Finding::new(code, pointer).measured(z_mm, end, "mm").within(0.0, length_mm)
 }

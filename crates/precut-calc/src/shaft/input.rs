@@ -1,5 +1,7 @@
 //! The shaft and what holds it, as they stand in a job.
 
+use std::ops::RangeInclusive;
+
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -7,6 +9,10 @@ use crate::material;
 
 /// Poisson's ratio where neither job nor material states one (steel).
 const DEFAULT_POISSON_RATIO: f64 = 0.3;
+/// Lengths of a segment that the schema allows, mm.
+const LENGTH_MM: RangeInclusive<f64> = 0.001..=100_000.0;
+/// Diameters that the schema allows, mm.
+pub(crate) const DIAMETER_MM: RangeInclusive<f64> = 0.01..=10_000.0;
 /// Density where neither job nor material states one (steel), kg/m³.
 const DEFAULT_DENSITY_KG_PER_M3: f64 = 7850.0;
 
@@ -50,7 +56,14 @@ pub struct Shaft {
 impl Shaft {
     /// Length of all segments.
     pub fn length_mm(&self) -> f64 {
-        self.segments.iter().map(|segment| segment.length_mm).sum()
+        // Not `sum`: that of nothing is -0.
+        self.segments.iter().fold(0.0, |length, segment| length + segment.length_mm)
+    }
+
+    /// Length of all segments, where every one has a length that it may have: nothing can be held against another.
+    pub(crate) fn known_length_mm(&self) -> Option<f64> {
+        let known = !self.segments.is_empty() && self.segments.iter().all(|s| LENGTH_MM.contains(&s.length_mm));
+        known.then(|| self.length_mm())
     }
 
     /// Takes the elastic constants that are not stated from the material, where one is named.
@@ -110,6 +123,16 @@ impl Segment {
     /// Diameter of the blank.
     pub fn stock_mm(&self) -> f64 {
         self.stock_diameter_mm.unwrap_or(self.diameter_mm)
+    }
+
+    /// Whether the drawing diameter is one that a shaft may have.
+    pub(crate) fn has_diameter(&self) -> bool {
+        DIAMETER_MM.contains(&self.diameter_mm)
+    }
+
+    /// Whether drawing and blank fit together, so that something follows from both.
+    pub(crate) fn has_stock(&self) -> bool {
+        self.has_diameter() && DIAMETER_MM.contains(&self.stock_mm()) && self.stock_mm() >= self.diameter_mm
     }
 }
 
@@ -283,4 +306,21 @@ pub enum FeedDirection {
     ToHeadstock,
     /// From the headstock to the tailstock.
     ToTailstock,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use utoipa::PartialSchema;
+
+    #[test]
+    fn ranges_are_those_of_the_schema() {
+        let schema = serde_json::to_value(Segment::schema()).unwrap_or_default();
+        for (field, range) in
+            [("length_mm", LENGTH_MM), ("diameter_mm", DIAMETER_MM), ("stock_diameter_mm", DIAMETER_MM)]
+        {
+            let end = |name: &str| schema["properties"][field][name].as_f64();
+            assert_eq!((end("minimum"), end("maximum")), (Some(*range.start()), Some(*range.end())), "{field}");
+        }
+    }
 }

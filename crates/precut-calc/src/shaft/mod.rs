@@ -4,4 +4,5 @@ pub(crate) mod check;
 pub(crate) mod elastic;
 mod input;
 
+pub(crate) use input::DIAMETER_MM;
 pub use input::{Carriage, FeedDirection, Section, Segment, Shaft, Support, Theory};

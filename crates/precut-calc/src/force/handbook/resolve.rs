@@ -7,6 +7,10 @@ use crate::calculator::{Finding, Violations};
 use crate::force::{CoefficientOrigin, Forces, PowerLaw, PowerTerm, ToolMaterial, rules};
 use crate::material::{self, Certainty};
 
+/// Largest strength and hardness that the schema allows.
+const MOST_STRENGTH_N_PER_MM2: f64 = 3000.0;
+const MOST_HARDNESS: f64 = 700.0;
+
 /// Correction factors with the least certain of their certainties.
 type Factors = (Triple, Certainty);
 
@@ -138,7 +142,9 @@ impl Reader<'_> {
         match value {
             Some(value) if needed && rules::positive(value) => return Some(value),
             Some(value) if needed => {
-                self.add(Finding::new("bad_work_material", self.at(field)).measured(value, 0.0, unit));
+                let most = if unit == "1" { MOST_HARDNESS } else { MOST_STRENGTH_N_PER_MM2 };
+                let finding = Finding::new("bad_work_material", self.at(field)).measured(value, 0.0, unit);
+                self.add(finding.with("above", 0.0).with("maximum", most));
             }
             None if needed => self.fault("bad_work_material", field),
             Some(_) => self.fault("factor_not_tabulated", field),
@@ -157,7 +163,8 @@ impl Reader<'_> {
             }
             Some(factor) => {
                 let limit = if factor > largest { largest } else { least };
-                self.add(finding("material_factor_outside_table", at).measured(factor, limit, "1"));
+                let finding = finding("material_factor_outside_table", at).measured(factor, limit, "1");
+                self.add(finding.within(least, largest));
             }
         }
         None
@@ -170,12 +177,11 @@ impl Reader<'_> {
         let angle = choice.cutting_edge_angle_deg;
         let angle_ok = angle > 0.0 && angle <= 90.0;
         if !angle_ok {
-            let limit = if angle > 90.0 { 90.0 } else { 0.0 };
-            self.add(Finding::new("bad_lead_angle", self.at("cutting_edge_angle_deg")).measured(angle, limit, "deg"));
+            self.add(rules::bad_lead_angle(angle, self.at("cutting_edge_angle_deg")));
         }
         let radius = choice.nose_radius_mm.filter(|&radius| rules::not_negative(radius));
         if let (None, Some(bad)) = (radius, choice.nose_radius_mm) {
-            self.add(Finding::new("bad_nose_radius", self.at("nose_radius_mm")).measured(bad, 0.0, "mm"));
+            self.add(rules::bad_nose_radius(bad, "above", self.at("nose_radius_mm")));
         }
         let (phi, gamma) = match choice.tool_material {
             ToolMaterial::Carbide => (&factors::LEAD_ANGLE_CARBIDE[..], &factors::RAKE_CARBIDE[..]),
@@ -216,7 +222,7 @@ impl Reader<'_> {
             let limit = if value > largest { largest } else { least };
             let unit = if reading == Reading::LogLog { "mm" } else { "deg" };
             let finding = Finding::new("outside_handbook_table", self.at(field)).measured(value, limit, unit);
-            self.add(finding.with("least", least).with("largest", largest));
+            self.add(finding.within(least, largest).with("least", least).with("largest", largest));
         }
         found
     }
@@ -267,8 +273,10 @@ impl Reader<'_> {
             }
             (None, Some(ratio)) => {
                 let at = self.at(&format!("{field}_to_main_ratio"));
-                self.violations
-                    .require(rules::positive(ratio), || Finding::new("bad_power_law", at).measured(ratio, 0.0, "1"));
+                self.violations.require(rules::positive(ratio), || {
+                    let finding = Finding::new("bad_power_law", at).measured(ratio, 0.0, "1");
+                    finding.with("above", 0.0).with("maximum", rules::MOST_FACTOR)
+                });
                 Some(PowerTerm { coefficient: ratio * main.coefficient, ..*main })
             }
             (None, None) => tabulated,
