@@ -11,6 +11,7 @@ mod conformance;
 mod deflection_clocks;
 mod deflection_effects;
 mod deflection_faults;
+mod deflection_program;
 mod deflection_properties;
 mod deflection_reference;
 mod deflection_set_off;

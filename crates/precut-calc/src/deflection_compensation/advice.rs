@@ -4,6 +4,7 @@ use crate::calculator::{Failure, Finding, Message, Monitor};
 use crate::force::Reached;
 
 use super::acting::Acting;
+use super::encounters::{Reach, body, met};
 use super::extremes::Extremes;
 use super::form::Form;
 use super::grid::Grid;
@@ -13,6 +14,7 @@ use super::regime::Speed;
 use super::second_order::left_out;
 use super::stage::Stage;
 use super::structure::Structure;
+use super::toolpath::{drawn, plunges};
 use crate::shaft::elastic::ends;
 
 const UM_PER_MM: f64 = 1e3;
@@ -29,6 +31,8 @@ const THRUST_RATIO: f64 = 0.05;
 const SLENDER: f64 = 10.0;
 /// Stations at which one more rest is tried.
 const REST_SAMPLES: usize = 65;
+/// Stations at which rests are tried for touching the shaft.
+const CONTACT_SAMPLES: usize = 1025;
 /// A depth beyond so many nominal depths is worth a look.
 const DEPTH_RATIO: f64 = 2.0;
 
@@ -62,6 +66,10 @@ pub(super) const WARNING_CODES: &[&str] = &[
     "command_doubles_depth",
     "blank_undersize",
     "tool_passes_support",
+    "tool_reaches_support",
+    "tool_hits_chuck",
+    "plunge_at_shoulder",
+    "rest_never_touches",
     "form_tolerance_missed",
 ];
 
@@ -230,7 +238,9 @@ fn dominating(shares: &Shares) -> Message {
 pub(super) fn warnings(job: &Job, grid: &Grid, acting: &Acting, stage: &Stage, outcome: &Outcome) -> Vec<Finding> {
     let extremes = Extremes::of(stage);
     let mut found = deflection_warnings(job, grid, &extremes);
-    found.extend(passed_supports(job, grid));
+    found.extend(met_supports(job, grid, outcome));
+    found.extend(plunge_warnings(job, outcome));
+    found.extend(idle_rests(job, grid, stage));
     found.extend(structure_warnings(job, stage, outcome));
     found.extend(command_warnings(job, &extremes, outcome));
     found.extend(force_warnings(job, stage, &extremes));
@@ -266,27 +276,78 @@ fn deflection_warnings(job: &Job, grid: &Grid, extremes: &Extremes) -> Vec<Findi
     found
 }
 
-/// Chucks and steady rests with turned segments on both sides: the tool has to pass them.
-fn passed_supports(job: &Job, grid: &Grid) -> Vec<Finding> {
+/// Chucks and steady rests that the tool comes near to or would have to pass: on the way that the program takes it, or
+/// from one turned segment to another.
+fn met_supports(job: &Job, grid: &Grid, outcome: &Outcome) -> Vec<Finding> {
+    let turned = turned_span(job, grid);
+    let reach = outcome.path.as_ref().map(|path| Reach::of(job, &drawn(job, path)));
+    let between = |i: usize, support: &Support| {
+        let (kind, z_mm) = body(support)?;
+        let finding = Finding::new("tool_passes_support", format!("/supports/{i}/z_mm")).value(z_mm, "mm");
+        (turned[0] < z_mm && z_mm < turned[1]).then(|| finding.with("kind", kind))
+    };
+    let meets = |i: usize, support: &Support| reach.as_ref().and_then(|reach| met(reach, i, support));
+    let supports = job.supports.iter().enumerate();
+    supports.filter_map(|(i, support)| meets(i, support).or_else(|| between(i, support))).collect()
+}
+
+/// First and last station of the turned segments, mm.
+fn turned_span(job: &Job, grid: &Grid) -> [f64; 2] {
     let turned = |s: &Segment| job.stock_profile.is_some() || s.stock_mm() > s.diameter_mm;
     let ends = grid.steps_mm.windows(2).zip(&job.shaft.segments).filter(|(_, s)| turned(s)).map(|(ends, _)| ends);
-    let (mut from, mut to) = (f64::INFINITY, f64::NEG_INFINITY);
-    for ends in ends {
-        from = from.min(ends[0]);
-        to = to.max(ends[1]);
+    ends.fold([f64::INFINITY, f64::NEG_INFINITY], |span, ends| [span[0].min(ends[0]), span[1].max(ends[1])])
+}
+
+/// Where the program feeds the tool in radially.
+fn plunge_warnings(job: &Job, outcome: &Outcome) -> Vec<Finding> {
+    let plunges = outcome.path.iter().flat_map(|path| plunges(job, path));
+    plunges
+        .map(|plunge| {
+            Finding::new("plunge_at_shoulder", "/shaft/segments")
+                .value(plunge.z_mm, "mm")
+                .with("z_program_mm", plunge.z_program_mm)
+                .with("diameter_mm", plunge.diameter_mm)
+        })
+        .collect()
+}
+
+/// Rests that the shaft never touches while something is cut: beside the shaft, or open under the nominal forces, which
+/// are those of the compensated cut.
+fn idle_rests(job: &Job, grid: &Grid, stage: &Stage) -> Vec<Finding> {
+    let may_idle = |support: &Support| !support.carries();
+    if !job.supports.iter().any(may_idle) {
+        return Vec::new();
     }
-    let passed = |support: &Support| match *support {
-        Support::Chuck { z_mm, .. } => Some(("chuck", z_mm)),
-        Support::SteadyRest { z_mm, .. } => Some(("steady_rest", z_mm)),
-        Support::Centre { .. } | Support::FollowRest { .. } => None,
-    };
-    job.supports
-        .iter()
-        .enumerate()
-        .filter_map(|(i, support)| passed(support).map(|(kind, z_mm)| (i, kind, z_mm)))
-        .filter(|(_, _, z_mm)| from < *z_mm && *z_mm < to)
-        .map(|(i, kind, z_mm)| {
-            Finding::new("tool_passes_support", format!("/supports/{i}/z_mm")).value(z_mm, "mm").with("kind", kind)
+    let mut cut = grid.sample(CONTACT_SAMPLES);
+    cut.retain(|&i| stage.radii.planned()[i] > stage.radii.target[i]);
+    if cut.is_empty() {
+        return Vec::new();
+    }
+    let mut touching: Vec<usize> = cut.iter().flat_map(|&i| stage.line.touching(i, &stage.cut.loads.of(i))).collect();
+    touching.sort_unstable();
+    touching.dedup();
+    let beside = |offset_mm: f64| !cut.iter().any(|&i| (0.0..=grid.length_mm).contains(&(grid.z_mm[i] + offset_mm)));
+    let rests = job.supports.iter().enumerate().filter(|(_, support)| may_idle(support));
+    rests
+        .filter_map(|(i, support)| {
+            let (kind, offset_mm, one_sided, gap_um) = match *support {
+                Support::FollowRest { offset_mm, one_sided, gap_um, .. } => {
+                    ("follow_rest", Some(offset_mm), one_sided, gap_um)
+                }
+                Support::SteadyRest { one_sided, gap_um, .. } => ("steady_rest", None, one_sided, gap_um),
+                Support::Centre { .. } | Support::Chuck { .. } => return None,
+            };
+            let finding = |field: &str, cause| {
+                let finding = Finding::new("rest_never_touches", format!("/supports/{i}/{field}"));
+                finding.with("kind", kind).with("cause", cause)
+            };
+            match offset_mm.filter(|offset_mm| beside(*offset_mm)) {
+                Some(offset_mm) => Some(finding("offset_mm", "place").value(offset_mm, "mm")),
+                None if one_sided && touching.binary_search(&i).is_err() => {
+                    Some(finding("gap_um", "gap").value(gap_um, "um"))
+                }
+                None => None,
+            }
         })
         .collect()
 }

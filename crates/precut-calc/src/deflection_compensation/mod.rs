@@ -9,7 +9,7 @@
 //!
 //! The way of a job: `input` -> `check` -> `grid` (stations), `acting` (effects),
 //! `structure` (beam) -> `model` (opening over depth) -> `cut` -> `stage` (passes) ->
-//! `toolpath`, `form`, `second_order`, `advice` -> `output`, `picture`.
+//! `toolpath` and what it meets (`encounters`), `form`, `second_order`, `advice` -> `output`, `picture`.
 //! `forward` gives the same model to the diagnosis.
 
 mod acting;
@@ -18,6 +18,7 @@ mod check;
 mod columns;
 mod consequence;
 mod cut;
+mod encounters;
 mod equilibrium;
 mod extremes;
 mod form;
@@ -76,7 +77,7 @@ impl Calculator for DeflectionCompensation {
     const META: Meta = Meta {
         id: "deflection-compensation",
         kind: CalculatorKind::Calculator,
-        version: 3,
+        version: 4,
         title: "Deflection compensation",
         question: "Where must the tool go so that the slender shaft comes out straight?",
         summary: "A slender shaft bends away from the tool, so less is cut than commanded. From shaft, supports, \
@@ -277,7 +278,13 @@ fn basis(job: &Job) -> Vec<Basis> {
 /// Everything that this calculator may utter, from where it is said.
 const CODES: Codes = Codes {
     faults: &[check::CODES, crate::shaft::check::CODES, force::FAULT_CODES],
-    failures: &[&["path_incomplete", "path_not_computed", "pass_without_command", "numbers_out_of_reach"]],
+    failures: &[&[
+        "path_incomplete",
+        "path_not_computed",
+        "pass_without_command",
+        "numbers_out_of_reach",
+        "tool_hits_chuck",
+    ]],
     warnings: &[advice::WARNING_CODES, second_order::WARNING_CODES, force::WARNING_CODES],
     explanations: &[advice::EXPLANATION_CODES],
     stages: &[&["stage_pass", "stage_path", "stage_advice", "stage_done"]],

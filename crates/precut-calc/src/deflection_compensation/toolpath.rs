@@ -3,6 +3,7 @@
 use crate::calculator::{Block, Column, Failure, Finding, Monitor, Program, Table};
 use crate::path::{round_to_increment, simplified};
 
+use super::encounters::hit_chuck;
 use super::grid::{Grid, Zone};
 use super::input::{FeedDirection, Job, ProgramZero, Segment};
 use super::output::{Outcome, Path, PathZone, StatusCompensated};
@@ -79,7 +80,7 @@ fn path_zone(zone: &Zone, z_mm: Vec<f64>, commanded_diameter_mm: Vec<f64>, incre
     PathZone { diameter_mm: zone.diameter_mm, z_mm, commanded_diameter_mm, delta_x_um }
 }
 
-/// The program of the (last) cut: every zone with its own approach and retract, in the order of the feed.
+/// The program of the (last) cut; none for a path with gaps, and none that would take the tool through a chuck.
 pub(super) fn program(job: &Job, outcome: &Outcome) -> Result<Program, Failure> {
     let Some(path) = &outcome.path else {
         return Err(Failure::OutOfModel(Finding::new("path_not_computed", "/detail")));
@@ -94,8 +95,43 @@ pub(super) fn program(job: &Job, outcome: &Outcome) -> Result<Program, Failure> 
             Finding::new("path_incomplete", "/stations").with("stations", without).with("first_z_mm", z),
         ));
     }
-    let regime = job.passes.last().map_or_else(|| Regime::of(&job.cut), |pass| Regime::of(&job.cut).of_pass(pass));
-    Ok(Writer::new(job, &regime).write(path))
+    let program = drawn(job, path);
+    match hit_chuck(job, &program) {
+        Some(chuck) => Err(Failure::OutOfModel(chuck)),
+        None => Ok(program),
+    }
+}
+
+/// The moves along a path: every zone with its own approach and retract, in the order of the feed.
+pub(super) fn drawn(job: &Job, path: &Path) -> Program {
+    Writer::new(job, &last_regime(job)).write(path)
+}
+
+fn last_regime(job: &Job) -> Regime {
+    job.passes.last().map_or_else(|| Regime::of(&job.cut), |pass| Regime::of(&job.cut).of_pass(pass))
+}
+
+/// Where the tool feeds in radially because something stands before the cut.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Plunge {
+    /// Station, mm.
+    pub z_mm: f64,
+    /// The same as the program has it, mm.
+    pub z_program_mm: f64,
+    /// Diameter that the tool feeds down to, mm.
+    pub diameter_mm: f64,
+}
+
+/// Every plunge of the program along a path.
+pub(super) fn plunges(job: &Job, path: &Path) -> Vec<Plunge> {
+    let regime = last_regime(job);
+    let writer = Writer::new(job, &regime);
+    let zones = corners_in_feed_order(path, regime.direction);
+    let starts = zones.iter().enumerate().filter_map(|(k, corners)| Some((k, *corners.first()?)));
+    starts
+        .filter(|(k, (z_mm, x_mm))| writer.is_blocked_before(*z_mm, *x_mm, &zones[..*k]))
+        .map(|(_, (z_mm, diameter_mm))| Plunge { z_mm, z_program_mm: writer.programmed_z(z_mm), diameter_mm })
+        .collect()
 }
 
 struct Writer<'a> {
@@ -103,6 +139,8 @@ struct Writer<'a> {
     regime: &'a Regime,
     length_mm: f64,
     increment_mm: f64,
+    /// Largest diameter of the blank.
+    widest_mm: f64,
     retract_mm: f64,
     blocks: Vec<Block>,
 }
@@ -117,6 +155,7 @@ impl<'a> Writer<'a> {
             regime,
             length_mm: job.shaft.segments.iter().map(|s| s.length_mm).sum(),
             increment_mm,
+            widest_mm: widest,
             retract_mm: round_to_increment(widest + job.program.clearance_x_mm, increment_mm),
             blocks: vec![Block::Modes],
         }
@@ -130,16 +169,18 @@ impl<'a> Writer<'a> {
             }
         });
         let mut feed = Some(self.regime.feed_mm_per_rev);
-        for zone in corners_in_feed_order(path, self.regime.direction) {
-            self.zone(&zone, &mut feed);
+        let zones = corners_in_feed_order(path, self.regime.direction);
+        for (k, corners) in zones.iter().enumerate() {
+            self.zone(corners, &zones[..k], &mut feed);
         }
         self.blocks.push(Block::End);
         Program { dialect: self.job.program.dialect, increment_mm: self.increment_mm, blocks: self.blocks }
     }
 
-    fn zone(&mut self, corners: &[(f64, f64)], feed: &mut Option<f64>) {
+    fn zone(&mut self, corners: &[(f64, f64)], done: &[Corners], feed: &mut Option<f64>) {
         let Some(&(first_z, first_x)) = corners.first() else { return };
-        let clear = self.clearance_before(first_z, first_x);
+        // The tool feeds in radially where it cannot come down before the cut.
+        let clear = if self.is_blocked_before(first_z, first_x, done) { 0.0 } else { self.clearance() };
         let approach_z = self.programmed_z(first_z + clear);
         self.blocks.push(Block::Rapid { x_diameter_mm: Some(self.retract_mm), z_mm: Some(approach_z) });
         if clear.abs() > 0.0 {
@@ -152,23 +193,39 @@ impl<'a> Writer<'a> {
         self.blocks.push(Block::Rapid { x_diameter_mm: Some(self.retract_mm), z_mm: None });
     }
 
-    /// How far before the zone the tool may go down to the start of the cut; 0 where a thicker neighbour
-    /// stands there, and the tool then feeds in radially at the shoulder.
-    fn clearance_before(&self, z_mm: f64, x_mm: f64) -> f64 {
+    /// Signed distance of the approach before a cut along Z.
+    fn clearance(&self) -> f64 {
         let sign = if self.regime.direction == FeedDirection::ToHeadstock { 1.0 } else { -1.0 };
-        let clearance = sign * self.job.program.clearance_z_mm;
-        let (from, to) = (z_mm.min(z_mm + clearance), z_mm.max(z_mm + clearance));
+        sign * self.job.program.clearance_z_mm
+    }
+
+    /// Whether something as thick as the cut stands where the tool would come down before it; `done` are the zones
+    /// that are cut by then.
+    fn is_blocked_before(&self, z_mm: f64, x_mm: f64, done: &[Corners]) -> bool {
+        let beyond = z_mm + self.clearance();
+        let (from, to) = (z_mm.min(beyond) + self.increment_mm, z_mm.max(beyond) - self.increment_mm);
         let mut left = 0.0;
-        for segment in &self.job.shaft.segments {
+        self.job.shaft.segments.iter().any(|segment| {
             let right = left + segment.length_mm;
-            // Neighbours on the side of the approach have been turned already where they are to be.
-            let beyond = right > from + self.increment_mm && left < to - self.increment_mm;
-            if beyond && segment.diameter_mm >= x_mm {
-                return 0.0;
-            }
+            let stands = [from.max(left), to.min(right)];
             left = right;
+            stands[0] < stands[1] && self.thickness_mm(segment, stands, done) >= x_mm
+        })
+    }
+
+    /// Diameter of a segment between two stations: the drawing's where a zone is cut already, else the blank's.
+    fn thickness_mm(&self, segment: &Segment, [from, to]: [f64; 2], done: &[Corners]) -> f64 {
+        let is_cut = done.iter().any(|corners| {
+            let ends = corners.first().zip(corners.last());
+            ends.is_some_and(|(a, b)| a.0.min(b.0) <= from && to <= a.0.max(b.0))
+        });
+        if is_cut {
+            segment.diameter_mm
+        } else if self.job.stock_profile.is_some() {
+            self.widest_mm
+        } else {
+            segment.stock_mm()
         }
-        clearance
     }
 
     fn programmed_z(&self, z_mm: f64) -> f64 {
@@ -185,9 +242,12 @@ fn programmed_z_mm(job: &Job, length_mm: f64, z_mm: f64) -> f64 {
     round_to_increment(z_mm - zero, job.path.increment_um / UM_PER_MM)
 }
 
-/// Station and commanded diameter of every corner, zone by zone as the tool passes them.
-fn corners_in_feed_order(path: &Path, direction: FeedDirection) -> Vec<Vec<(f64, f64)>> {
-    let mut zones: Vec<Vec<(f64, f64)>> = path
+/// Station and commanded diameter of a zone's corners.
+type Corners = Vec<(f64, f64)>;
+
+/// The corners of every zone, as the tool passes them.
+fn corners_in_feed_order(path: &Path, direction: FeedDirection) -> Vec<Corners> {
+    let mut zones: Vec<Corners> = path
         .zones
         .iter()
         .map(|zone| zone.z_mm.iter().copied().zip(zone.commanded_diameter_mm.iter().copied()).collect())
