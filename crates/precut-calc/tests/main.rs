@@ -8,6 +8,7 @@ mod beam_properties;
 mod beam_support;
 mod blind_trials;
 mod conformance;
+mod deflection_advice;
 mod deflection_clocks;
 mod deflection_effects;
 mod deflection_faults;

@@ -33,6 +33,8 @@ const SLENDER: f64 = 10.0;
 const REST_SAMPLES: usize = 65;
 /// Stations at which rests are tried for touching the shaft.
 const CONTACT_SAMPLES: usize = 1025;
+/// Share of the form error that one more rest must take away to be worth naming.
+const WORTHWHILE: f64 = 0.2;
 /// A depth beyond so many nominal depths is worth a look.
 const DEPTH_RATIO: f64 = 2.0;
 
@@ -177,15 +179,7 @@ pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
             .with("force_percent", job.uncertainty.force_percent)
             .with("stiffness_percent", job.uncertainty.stiffness_percent),
     );
-    if let Some(rest) = &outcome.one_more_rest {
-        said.push(
-            Message::new("one_more_rest_buys")
-                .with("z_mm", rest.z_mm)
-                .with("form_error_um", rest.form_error_um)
-                .with("compliance_um_per_n", rest.compliance_um_per_n)
-                .with("before_um", outcome.form_error_um.unwrap_or(0.0)),
-        );
-    }
+    said.extend(worthwhile_rest(job, outcome));
     let overcut =
         outcome.one_step.iter().flat_map(|step| &step.diameter_error_um).flatten().copied().fold(0.0, f64::min);
     if overcut < 0.0 {
@@ -200,6 +194,18 @@ pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
     }
     said.push(Message::new("not_modelled"));
     said
+}
+
+/// One more rest, where it takes away a good part of the form error and more than the control can make.
+fn worthwhile_rest(job: &Job, outcome: &Outcome) -> Option<Message> {
+    let (rest, before_um) = (outcome.one_more_rest.as_ref()?, outcome.form_error_um?);
+    let gain_um = before_um - rest.form_error_um;
+    let message = Message::new("one_more_rest_buys")
+        .with("z_mm", rest.z_mm)
+        .with("form_error_um", rest.form_error_um)
+        .with("compliance_um_per_n", rest.compliance_um_per_n)
+        .with("before_um", before_um);
+    (gain_um > WORTHWHILE * before_um && gain_um > job.path.increment_um).then_some(message)
 }
 
 /// The largest value above 0. By comparison: `f64::max` also settles signed zeros and NaN, at three times the cost.
