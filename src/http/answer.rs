@@ -231,11 +231,22 @@ pub(super) fn label(figure: &Figure, code: &str, language: Language) -> String {
     }
 }
 
-/// Comments at the head of a program: what computed its path, perhaps long ago, and where it comes from.
+/// Comments at the head of a program: what computed its path, perhaps long ago, where it comes from, and what the answer
+/// warns of: whoever stands at the machine has the program alone.
 fn program_header(stored: &Stored) -> Vec<String> {
     let said = |name| stored.said(name).unwrap_or_default();
-    vec![
+    let mut header = vec![
         format!("precut {} {} version {}", said("engine"), said("calculator"), said("version")),
         format!("result {}", stored.key),
-    ]
+    ];
+    let warnings: Vec<Warning> = serde_json::from_str(&said("warnings")).unwrap_or_default();
+    header.extend(warnings.iter().map(|warning| format!("WARNING {}: {}", warning.code, warning.detail)));
+    header
+}
+
+/// A warning as it stands in an answer.
+#[derive(Deserialize)]
+struct Warning {
+    code: String,
+    detail: String,
 }

@@ -2,21 +2,24 @@
 //!
 //! The choices per dialect:
 //!
-//! | | Fanuc (lathe, G-code system B) | Siemens (Sinumerik, ISO mode off) | LinuxCNC |
+//! | | Fanuc (lathe) | Siemens (Sinumerik, ISO mode off) | LinuxCNC |
 //! |---|---|---|---|
 //! | frame | `%` at both ends, as the controls read in; no `O`: the number is chosen at the machine | none | none |
 //! | comment | `(...)` | `; ...` | `(...)` |
 //! | millimetres | `G21` | `G710`, `G21` is unknown there | `G21` |
+//! | absolute, per revolution | system B: `G90 G95`; system A: by the letters X and Z, `G99` | `G90 G95` | `G90 G95` |
 //! | diameters | always | `DIAMON` | `G7` |
 //! | path | exact enough by default | exact enough by default | `G64 P` one increment: bare `G64` may cut corners |
-//! | speed limit | `G92 S` | `LIMS=` | `G96 D` |
+//! | speed limit | system B: `G92 S`; system A: `G50 S` | `LIMS=` | `G96 D` |
 //! | end | `M30` | `M30` | `M2` |
+//!
+//! In the other of Fanuc's two systems `G90`, `G92` and `G50` mean something else, so the program says which one it is for.
 
 use precut_calc::calculator::{Block, Dialect, Program};
 
 use super::number::{at_most, decimals_of};
 
-/// Longest comment: every control reads lines of this length.
+/// Longest line of a comment: every control reads lines of this length.
 const COMMENT_LENGTH: usize = 96;
 
 /// Decimals of a feed in mm/rev.
@@ -30,7 +33,7 @@ const ACTIVE: [&str; 9] = ["abort", "axis", "debug", "log", "msg", "preview", "p
 /// changes. Coordinates are rounded to the program's increment, halves away from zero.
 pub fn gcode(program: &Program, header: &[String]) -> String {
     let mut writer = Writer::new(program);
-    if program.dialect == Dialect::Fanuc {
+    if writer.is_fanuc() {
         writer.line("%");
     }
     for text in header {
@@ -39,7 +42,7 @@ pub fn gcode(program: &Program, header: &[String]) -> String {
     for block in &program.blocks {
         writer.block(block);
     }
-    if program.dialect == Dialect::Fanuc {
+    if writer.is_fanuc() {
         writer.line("%");
     }
     writer.text
@@ -69,11 +72,18 @@ impl Writer {
         self.text.push('\n');
     }
 
+    fn is_fanuc(&self) -> bool {
+        matches!(self.dialect, Dialect::Fanuc | Dialect::FanucA)
+    }
+
+    /// A comment, on as many lines as it takes.
     fn comment(&mut self, text: &str) {
-        let text = plain(text, self.dialect);
-        match self.dialect {
-            Dialect::Siemens => self.line(&format!("; {text}")),
-            Dialect::Fanuc | Dialect::LinuxCnc => self.line(&format!("({text})")),
+        for text in lines(&plain(text)) {
+            let text = inactive(text, self.dialect);
+            match self.dialect {
+                Dialect::Siemens => self.line(&format!("; {text}")),
+                Dialect::Fanuc | Dialect::FanucA | Dialect::LinuxCnc => self.line(&format!("({text})")),
+            }
         }
     }
 
@@ -108,7 +118,14 @@ impl Writer {
 
     fn modes(&mut self) {
         match self.dialect {
-            Dialect::Fanuc => self.line("G21 G18 G40 G90 G95"),
+            Dialect::Fanuc => {
+                self.comment("for G-code system B: G90 absolute, G95 feed per revolution, G92 S speed limit");
+                self.line("G21 G18 G40 G90 G95");
+            }
+            Dialect::FanucA => {
+                self.comment("for G-code system A: X Z absolute, G99 feed per revolution, G50 S speed limit");
+                self.line("G21 G18 G40 G99");
+            }
             Dialect::Siemens => {
                 self.line("G710 G18 G40 G90 G95");
                 self.line("DIAMON");
@@ -131,6 +148,10 @@ impl Writer {
                 self.line(&format!("G92 S{limit}"));
                 self.line(&format!("G96 S{speed} M3"));
             }
+            Dialect::FanucA => {
+                self.line(&format!("G50 S{limit}"));
+                self.line(&format!("G96 S{speed} M3"));
+            }
             Dialect::Siemens => self.line(&format!("G96 S{speed} LIMS={limit} M3")),
             Dialect::LinuxCnc => self.line(&format!("G96 D{limit} S{speed} M3")),
         }
@@ -139,7 +160,7 @@ impl Writer {
     /// Of the spindle, rev/min or m/min. Many Fanuc controls know whole ones only.
     fn speed(&self, value: f64) -> String {
         match self.dialect {
-            Dialect::Fanuc => at_most(value.max(1.0), 0),
+            Dialect::Fanuc | Dialect::FanucA => at_most(value.max(1.0), 0),
             Dialect::Siemens | Dialect::LinuxCnc => at_most(value, 3),
         }
     }
@@ -182,24 +203,48 @@ fn with_point(mut number: String) -> String {
 }
 
 /// What stands in a comment and ends neither it nor the program: printable ASCII without `( ) % ;`.
-fn plain(text: &str, dialect: Dialect) -> String {
-    let mut plain: String = text
-        .chars()
-        .map(|c| match c {
-            '(' => '[',
-            ')' => ']',
-            '%' | ';' => ' ',
-            c if c.is_whitespace() => ' ',
-            c if c.is_ascii_graphic() => c,
-            _ => '?',
-        })
-        .take(COMMENT_LENGTH)
-        .collect();
-    let first = plain.trim_start().to_ascii_lowercase();
-    if dialect == Dialect::LinuxCnc && ACTIVE.iter().any(|word| first.starts_with(word)) {
-        plain = format!("- {plain}");
+fn plain(text: &str) -> String {
+    let mut plain = String::new();
+    for c in text.chars() {
+        match c {
+            '(' => plain.push('['),
+            ')' => plain.push(']'),
+            ';' => plain.push(','),
+            '%' => plain.push_str("percent"),
+            'µ' | 'μ' => plain.push('u'),
+            '²' => plain.push('2'),
+            '³' => plain.push('3'),
+            '°' => plain.push_str(" deg"),
+            '–' | '—' | '−' => plain.push('-'),
+            c if c.is_whitespace() => plain.push(' '),
+            c if c.is_ascii_graphic() => plain.push(c),
+            _ => plain.push('?'),
+        }
     }
-    plain.trim_end().to_owned()
+    plain
+}
+
+/// Words on lines that every control reads; a word that fits on none is cut short.
+fn lines(text: &str) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split_ascii_whitespace() {
+        let word = word.get(..COMMENT_LENGTH).unwrap_or(word);
+        match lines.last_mut().filter(|line| line.len() + 1 + word.len() <= COMMENT_LENGTH) {
+            Some(line) => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            None => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}
+
+/// The line such that no control takes it for a command.
+fn inactive(line: String, dialect: Dialect) -> String {
+    let first = line.to_ascii_lowercase();
+    let acts = dialect == Dialect::LinuxCnc && ACTIVE.iter().any(|word| first.starts_with(word));
+    if acts { format!("- {line}") } else { line }
 }
 
 #[cfg(test)]
@@ -231,6 +276,8 @@ mod tests {
     const PATH: [&str; 6] =
         ["G0 X96. Z2.", "G0 X89.967", "G1 Z0. F0.5", "G1 X89.885 Z-1000.", "G1 X89.978 Z-2000.", "G0 X96."];
 
+    const SYSTEM_B: &str = "(for G-code system B: G90 absolute, G95 feed per revolution, G92 S speed limit)";
+
     fn expected(before: &[&str], after: &[&str]) -> String {
         [before, &PATH, after].concat().join("\n") + "\n"
     }
@@ -240,10 +287,35 @@ mod tests {
         assert_eq!(
             gcode(&example(Dialect::Fanuc), &["key b3:0af9".to_owned(), "part Shaft (left)".to_owned()]),
             expected(
-                &["%", "(key b3:0af9)", "(part Shaft [left])", "G21 G18 G40 G90 G95", "G97 S500 M3"],
+                &["%", "(key b3:0af9)", "(part Shaft [left])", SYSTEM_B, "G21 G18 G40 G90 G95", "G97 S500 M3"],
                 &["M5", "M30", "%"]
             )
         );
+    }
+
+    /// G90 would be a turning cycle there, G95 unknown, and G92 a thread.
+    #[test]
+    fn fanuc_of_system_a() {
+        let text = gcode(&example(Dialect::FanucA), &[]);
+        let system = "(for G-code system A: X Z absolute, G99 feed per revolution, G50 S speed limit)";
+        assert_eq!(text, expected(&["%", system, "G21 G18 G40 G99", "G97 S500 M3"], &["M5", "M30", "%"]));
+    }
+
+    #[test]
+    fn a_long_comment_goes_on_over_lines_and_keeps_what_it_says() {
+        let warning = "WARNING a_code: it gives way by 104 µm, 30 % of the depth; ".repeat(4) + "probe it";
+        for dialect in [Dialect::Fanuc, Dialect::Siemens, Dialect::LinuxCnc] {
+            let text = gcode(&Program { dialect, increment_mm: 0.001, blocks: vec![] }, std::slice::from_ref(&warning));
+            let lines: Vec<_> = text.lines().filter(|line| *line != "%").collect();
+            assert!(lines.len() > 2 && lines.iter().all(|line| line.is_ascii() && line.len() <= COMMENT_LENGTH + 4));
+            let inside = |line: &&str| line.trim_start_matches(['(', ';', ' ']).trim_end_matches(')').to_owned();
+            let said = lines.iter().map(inside).collect::<Vec<_>>().join(" ");
+            assert!(
+                said.starts_with("WARNING a_code: it gives way by 104 um, 30 percent of the depth, WARNING"),
+                "{said}"
+            );
+            assert!(said.ends_with("probe it"), "{said}");
+        }
     }
 
     #[test]
@@ -268,6 +340,7 @@ mod tests {
             gcode(&Program { dialect, increment_mm: 0.001, blocks }, &[])
         };
         assert_eq!(lines(Dialect::Fanuc), "%\nG92 S2500\nG96 S141 M3\n%\n");
+        assert_eq!(lines(Dialect::FanucA), "%\nG50 S2500\nG96 S141 M3\n%\n");
         assert_eq!(lines(Dialect::Siemens), "G96 S141.372 LIMS=2500 M3\n");
         assert_eq!(lines(Dialect::LinuxCnc), "G96 D2500 S141.372 M3\n");
     }
@@ -282,7 +355,7 @@ mod tests {
 
     #[test]
     fn nothing_in_a_comment_acts() {
-        for dialect in [Dialect::Fanuc, Dialect::Siemens, Dialect::LinuxCnc] {
+        for dialect in [Dialect::Fanuc, Dialect::FanucA, Dialect::Siemens, Dialect::LinuxCnc] {
             let program = Program { dialect, increment_mm: 0.001, blocks: vec![] };
             let text = gcode(&program, &["MSG, x)\nG0 X0 (%; Вал µ".to_owned(), "m".repeat(500)]);
             let lines: Vec<_> = text.lines().filter(|line| *line != "%").collect();

@@ -73,6 +73,39 @@ async fn pictures_are_labelled_in_the_language_and_tables_are_the_same_in_all() 
     assert_eq!(ask("text/x-gcode", "ru").await, ask("text/x-gcode", "en").await);
 }
 
+/// Whoever stands at the machine has the program alone.
+#[tokio::test]
+async fn a_program_says_what_the_answer_warns_of() {
+    let server = standard().await;
+    for dialect in ["fanuc", "fanuc_a", "siemens", "linuxcnc"] {
+        let mut slender: Value = serde_json::from_str(job()).unwrap();
+        slender["shaft"]["segments"] = serde_json::json!([
+            { "length_mm": 900, "diameter_mm": 30, "stock_diameter_mm": 33 },
+            { "length_mm": 200, "diameter_mm": 25, "stock_diameter_mm": 33 },
+            { "length_mm": 900, "diameter_mm": 30, "stock_diameter_mm": 33 }
+        ]);
+        slender["program"] = serde_json::json!({ "dialect": dialect });
+        let ask = async |accept: &str| {
+            let request = server.post_to(ROOM, &slender.to_string()).header("accept", accept);
+            request.send().await.unwrap().text().await.unwrap()
+        };
+        let answer: Value = serde_json::from_str(&ask("application/json").await).unwrap();
+        let warnings = answer["warnings"].as_array().unwrap();
+        let codes: Vec<&str> = warnings.iter().map(|warning| warning["code"].as_str().unwrap()).collect();
+        for code in ["plunge_at_shoulder", "linear_theory_exceeded", "deflection_over_depth"] {
+            assert!(codes.contains(&code), "{codes:?}");
+        }
+        let program = ask("text/x-gcode").await;
+        assert!(program.is_ascii(), "{program}");
+        let header: Vec<&str> = program.lines().take_while(|line| !line.starts_with('G')).collect();
+        let said = |code: &&str| header.iter().any(|line| line.contains(&format!("WARNING {code}: ")));
+        assert!(codes.iter().all(|code| said(&code)), "{program}");
+        assert!(header.iter().any(|line| line.contains("Z-900")), "{program}");
+        let system = |letter: &str| header.iter().any(|line| line.contains(&format!("G-code system {letter}")));
+        assert_eq!((system("A"), system("B")), (dialect == "fanuc_a", dialect == "fanuc"));
+    }
+}
+
 #[tokio::test]
 async fn faults_are_said_in_the_language_of_the_request() {
     let server = standard().await;

@@ -7,9 +7,13 @@ use utoipa::ToSchema;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Dialect {
-    /// Fanuc G-code system A lathe with G90/G95 as here printed (system B): X is a diameter by default.
+    /// Fanuc lathe with G-code system B: `G90` absolute, `G95` per revolution, `G92 S` limits the spindle. X is a diameter
+    /// by default.
     #[default]
     Fanuc,
+    /// The same with G-code system A, where `G90` is a cycle: X and Z are absolute by their letters, `G99` per
+    /// revolution, `G50 S` limits the spindle.
+    FanucA,
     /// Siemens: `DIAMON` switches X to diameters.
     Siemens,
     /// LinuxCNC: `G7` switches X to diameters.
