@@ -233,7 +233,8 @@ fn a_number_out_of_its_range_is_told_both_ends() {
         let found = findings_of(&registry, "deflection-compensation", &changed(place, &value));
         let [finding] = &found[..] else { panic!("{place} = {value}: {found:?}") };
         assert_eq!(finding.code, code, "{place} = {value}");
-        let stated = |names: [&str; 2]| names.iter().any(|name| matches!(finding.values.get(name), Some(Said::Number(_))));
+        let stated =
+            |names: [&str; 2]| names.iter().any(|name| matches!(finding.values.get(name), Some(Said::Number(_))));
         assert!(stated(["minimum", "above"]) && stated(["maximum", "below"]) && finding.unit.is_some(), "{finding:?}");
         let english = Texts::shared().try_finding(Language::En, "fault", finding).unwrap();
         assert!(ends.iter().all(|end| english.contains(end)), "{english}");
@@ -261,7 +262,8 @@ fn rules_and_schema_agree_on_the_ends() {
     let kienzle = json!({ "kind": "kienzle", "cutting_edge_angle_deg": 75, "nose_radius_mm": 0.8,
         "specific_cutting_force_n_per_mm2": 2000, "cutting_exponent": 0.2,
         "specific_normal_force_n_per_mm2": 900, "normal_exponent": 0.35 });
-    let power = json!({ "kind": "power_law", "passive": { "coefficient": 2430, "depth_exponent": 0.9, "feed_exponent": 0.6 } });
+    let power =
+        json!({ "kind": "power_law", "passive": { "coefficient": 2430, "depth_exponent": 0.9, "feed_exponent": 0.6 } });
     for (force, place) in [
         (&constant, "/force/passive_n"),
         (&constant, "/force/rubbing/passive_n"),
@@ -283,7 +285,10 @@ fn rules_and_schema_agree_on_the_ends() {
             let (parent, name) = place.rsplit_once('/').unwrap();
             job.pointer_mut(parent).unwrap()[name] = json!(value);
             let found = findings_of(&registry, "deflection-compensation", &job);
-            found.into_iter().find(|finding| finding.pointer == place).unwrap_or_else(|| panic!("{place} takes {value}"))
+            found
+                .into_iter()
+                .find(|finding| finding.pointer == place)
+                .unwrap_or_else(|| panic!("{place} takes {value}"))
         };
         // Below, a rule speaks; far above, for most of them the schema alone.
         assert_eq!(ends(&at(-1.0)), ends(&at(1e12)), "{place} of {force}");

@@ -10,7 +10,7 @@ fn answer(job: Value) -> Answer<Outcome> {
     DeflectionCompensation::run(&prepared(job), &Unwatched).unwrap()
 }
 
-fn job(supports: Value) -> Value {
+fn job(supports: &Value) -> Value {
     json!({
         "shaft": {
             "segments": [{ "length_mm": 800.0, "diameter_mm": 40.0, "stock_diameter_mm": 42.0 }],
@@ -34,7 +34,7 @@ fn advised(answer: &Answer<Outcome>) -> Option<&Message> {
 #[test]
 fn one_more_rest_is_advised_with_the_compliance_that_its_figure_is_for() {
     for compliance in [0.0, 0.02] {
-        let answer = answer(job(centres(compliance)));
+        let answer = answer(job(&centres(compliance)));
         let message = advised(&answer).unwrap();
         assert_eq!(message.values.get("compliance_um_per_n"), Some(&Said::from(compliance)));
     }
@@ -50,11 +50,11 @@ fn gain_um(answer: &Answer<Outcome>) -> f64 {
 #[test]
 fn one_more_rest_is_not_advised_where_it_is_not_worth_it() {
     // Ends about as soft as the middle of the shaft: held in the middle it comes out as a saddle.
-    let soft = answer(job(centres(0.65)));
+    let soft = answer(job(&centres(0.65)));
     assert!(gain_um(&soft) < -1.0, "{:?}", soft.output.one_more_rest);
     assert_eq!(advised(&soft), None);
     // A stout shaft: all that could be gained is below a step of the control.
-    let mut stout = job(centres(0.0));
+    let mut stout = job(&centres(0.0));
     stout["shaft"]["segments"][0]["diameter_mm"] = json!(300.0);
     stout["shaft"]["segments"][0]["stock_diameter_mm"] = json!(302.0);
     let stout = answer(stout);
@@ -62,7 +62,7 @@ fn one_more_rest_is_not_advised_where_it_is_not_worth_it() {
     assert_eq!(advised(&stout), None);
 }
 
-fn idle(supports: Value) -> Vec<Finding> {
+fn idle(supports: &Value) -> Vec<Finding> {
     answer(job(supports)).warnings.into_iter().filter(|warning| warning.code == "rest_never_touches").collect()
 }
 
@@ -85,7 +85,7 @@ fn a_rest_that_never_touches_the_shaft_is_warned_of() {
             "gap",
         ),
     ] {
-        let found = idle(with(rest.clone()));
+        let found = idle(&with(rest.clone()));
         let [finding] = &found[..] else { panic!("{rest}: {found:?}") };
         assert_eq!((finding.pointer.as_str(), finding.values.get("cause")), (pointer, Some(&Said::from(cause))));
         assert!(finding.value.is_some() && finding.unit.is_some());
@@ -96,6 +96,6 @@ fn a_rest_that_never_touches_the_shaft_is_warned_of() {
         follow(15.0, true, 10.0),
         json!({ "kind": "steady_rest", "z_mm": 300.0, "one_sided": true, "gap_um": 10.0 }),
     ] {
-        assert_eq!(idle(with(rest.clone())), [], "{rest}");
+        assert_eq!(idle(&with(rest.clone())), [], "{rest}");
     }
 }

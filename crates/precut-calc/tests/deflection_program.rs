@@ -14,7 +14,7 @@ fn programmed(job: Value) -> (Vec<Finding>, Result<Program, Failure>) {
     (answer.warnings, program)
 }
 
-fn job(segments: Value, supports: Value, feed_direction: &str) -> Value {
+fn job(segments: &Value, supports: &Value, feed_direction: &str) -> Value {
     json!({
         "shaft": { "segments": segments, "youngs_modulus_n_per_mm2": 210_000.0 },
         "supports": supports,
@@ -31,7 +31,7 @@ fn held_at(chuck_mm: f64, feed_direction: &str) -> Value {
         { "length_mm": 450.0, "diameter_mm": 40.0, "stock_diameter_mm": 42.0 }
     ]);
     let supports = json!([{ "kind": "chuck", "z_mm": chuck_mm }, { "kind": "centre", "z_mm": 500.0 }]);
-    job(segments, supports, feed_direction)
+    job(&segments, &supports, feed_direction)
 }
 
 fn named<'a>(warnings: &'a [Finding], code: &str) -> Vec<&'a Finding> {
@@ -45,7 +45,7 @@ fn number(finding: &Finding, name: &str) -> f64 {
     }
 }
 
-fn assert_refused(job: Value, motion: &'static str) {
+fn assert_refused(job: &Value, motion: &'static str) {
     let (warnings, program) = programmed(job.clone());
     let Err(Failure::OutOfModel(fault)) = program else { panic!("{job} has a program: {program:?}") };
     for finding in [&fault, named(&warnings, "tool_hits_chuck")[0]] {
@@ -59,18 +59,18 @@ fn assert_refused(job: Value, motion: &'static str) {
 #[test]
 fn no_program_takes_the_tool_through_a_chuck() {
     // The approach begins beyond the chuck, at it, and the cut passes it.
-    assert_refused(held_at(50.0, "to_tailstock"), "rapid");
-    assert_refused(held_at(48.5, "to_tailstock"), "rapid");
-    assert_refused(held_at(48.0, "to_tailstock"), "rapid");
-    assert_refused(held_at(100.0, "to_headstock"), "cut");
-    assert_refused(held_at(100.0, "to_tailstock"), "cut");
+    assert_refused(&held_at(50.0, "to_tailstock"), "rapid");
+    assert_refused(&held_at(48.5, "to_tailstock"), "rapid");
+    assert_refused(&held_at(48.0, "to_tailstock"), "rapid");
+    assert_refused(&held_at(100.0, "to_headstock"), "cut");
+    assert_refused(&held_at(100.0, "to_tailstock"), "cut");
     // Held in the middle: the tool goes from one turned segment to the other past the jaws.
     let segments = json!([
         { "length_mm": 200.0, "diameter_mm": 40.0, "stock_diameter_mm": 42.0 },
         { "length_mm": 100.0, "diameter_mm": 50.0 },
         { "length_mm": 200.0, "diameter_mm": 40.0, "stock_diameter_mm": 42.0 }
     ]);
-    assert_refused(job(segments, json!([{ "kind": "chuck", "z_mm": 250.0 }]), "to_headstock"), "rapid");
+    assert_refused(&job(&segments, &json!([{ "kind": "chuck", "z_mm": 250.0 }]), "to_headstock"), "rapid");
 }
 
 /// The whole length turned, from the chuck on and up to it.
@@ -78,8 +78,8 @@ fn no_program_takes_the_tool_through_a_chuck() {
 fn a_chuck_at_the_end_of_the_shaft_counts() {
     let segments = json!([{ "length_mm": 500.0, "diameter_mm": 40.0, "stock_diameter_mm": 42.0 }]);
     let supports = json!([{ "kind": "chuck", "z_mm": 0.0 }, { "kind": "centre", "z_mm": 500.0 }]);
-    assert_refused(job(segments.clone(), supports.clone(), "to_tailstock"), "rapid");
-    let (warnings, program) = programmed(job(segments, supports, "to_headstock"));
+    assert_refused(&job(&segments, &supports, "to_tailstock"), "rapid");
+    let (warnings, program) = programmed(job(&segments, &supports, "to_headstock"));
     assert!(program.is_ok());
     let near = named(&warnings, "tool_reaches_support");
     assert!(matches!(near[..], [near] if near.value == Some(0.0) && near.pointer == "/supports/0/z_mm"), "{near:?}");
@@ -119,7 +119,7 @@ fn stepped(diameters_mm: [f64; 3], feed_direction: &str) -> Value {
         .map(|d| json!({ "length_mm": 300.0, "diameter_mm": d, "stock_diameter_mm": 64.0 }))
         .collect();
     let centres = json!([{ "kind": "centre", "z_mm": 0.0 }, { "kind": "centre", "z_mm": 900.0 }]);
-    job(json!(segments), centres, feed_direction)
+    job(&json!(segments), &centres, feed_direction)
 }
 
 #[test]
@@ -146,7 +146,7 @@ fn a_plunge_behind_a_shoulder_is_told_with_its_place() {
 fn the_tool_does_not_come_down_rapidly_into_the_blank() {
     let centres = json!([{ "kind": "centre", "z_mm": 0.0 }, { "kind": "centre", "z_mm": 500.0 }]);
     let segments = json!([{ "length_mm": 500.0, "diameter_mm": 40.0, "stock_diameter_mm": 42.0 }]);
-    let mut inside = job(segments, centres, "to_headstock");
+    let mut inside = job(&segments, &centres, "to_headstock");
     inside["stations"] = json!({ "kind": "list", "z_mm": [100.0, 200.0, 300.0] });
     // The tailstock stands 0.2 mm toward the tool: the command lies outside the drawing's diameter.
     inside["effects"] = json!([{ "kind": "tailstock_offset", "offset_um": -400.0 }]);

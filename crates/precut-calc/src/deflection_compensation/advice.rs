@@ -320,8 +320,7 @@ fn plunge_warnings(job: &Job, outcome: &Outcome) -> Vec<Finding> {
 /// Rests that the shaft never touches while something is cut: beside the shaft, or open under the nominal forces, which
 /// are those of the compensated cut.
 fn idle_rests(job: &Job, grid: &Grid, stage: &Stage) -> Vec<Finding> {
-    let may_idle = |support: &Support| !support.carries();
-    if !job.supports.iter().any(may_idle) {
+    if job.supports.iter().all(Support::carries) {
         return Vec::new();
     }
     let mut cut = grid.sample(CONTACT_SAMPLES);
@@ -332,30 +331,26 @@ fn idle_rests(job: &Job, grid: &Grid, stage: &Stage) -> Vec<Finding> {
     let mut touching: Vec<usize> = cut.iter().flat_map(|&i| stage.line.touching(i, &stage.cut.loads.of(i))).collect();
     touching.sort_unstable();
     touching.dedup();
-    let beside = |offset_mm: f64| !cut.iter().any(|&i| (0.0..=grid.length_mm).contains(&(grid.z_mm[i] + offset_mm)));
-    let rests = job.supports.iter().enumerate().filter(|(_, support)| may_idle(support));
-    rests
-        .filter_map(|(i, support)| {
-            let (kind, offset_mm, one_sided, gap_um) = match *support {
-                Support::FollowRest { offset_mm, one_sided, gap_um, .. } => {
-                    ("follow_rest", Some(offset_mm), one_sided, gap_um)
-                }
-                Support::SteadyRest { one_sided, gap_um, .. } => ("steady_rest", None, one_sided, gap_um),
-                Support::Centre { .. } | Support::Chuck { .. } => return None,
-            };
-            let finding = |field: &str, cause| {
-                let finding = Finding::new("rest_never_touches", format!("/supports/{i}/{field}"));
-                finding.with("kind", kind).with("cause", cause)
-            };
-            match offset_mm.filter(|offset_mm| beside(*offset_mm)) {
-                Some(offset_mm) => Some(finding("offset_mm", "place").value(offset_mm, "mm")),
-                None if one_sided && touching.binary_search(&i).is_err() => {
-                    Some(finding("gap_um", "gap").value(gap_um, "um"))
-                }
-                None => None,
-            }
-        })
-        .collect()
+    let is_beside = |offset_mm: f64| !cut.iter().any(|&i| (0.0..=grid.length_mm).contains(&(grid.z_mm[i] + offset_mm)));
+    let rests = job.supports.iter().enumerate();
+    rests.filter_map(|(i, support)| idle_rest(i, support, is_beside, touching.binary_search(&i).is_ok())).collect()
+}
+
+/// A rest that stands beside the shaft, or is open where it bears on one side only.
+fn idle_rest(index: usize, rest: &Support, is_beside: impl Fn(f64) -> bool, touches: bool) -> Option<Finding> {
+    let (kind, offset_mm, one_sided, gap_um) = match *rest {
+        Support::FollowRest { offset_mm, one_sided, gap_um, .. } => ("follow_rest", Some(offset_mm), one_sided, gap_um),
+        Support::SteadyRest { one_sided, gap_um, .. } => ("steady_rest", None, one_sided, gap_um),
+        Support::Centre { .. } | Support::Chuck { .. } => return None,
+    };
+    let finding = |field: &str, cause| {
+        let finding = Finding::new("rest_never_touches", format!("/supports/{index}/{field}"));
+        finding.with("kind", kind).with("cause", cause)
+    };
+    match offset_mm.filter(|offset_mm| is_beside(*offset_mm)) {
+        Some(offset_mm) => Some(finding("offset_mm", "place").value(offset_mm, "mm")),
+        None => (one_sided && !touches).then(|| finding("gap_um", "gap").value(gap_um, "um")),
+    }
 }
 
 fn structure_warnings(job: &Job, stage: &Stage, outcome: &Outcome) -> Vec<Finding> {

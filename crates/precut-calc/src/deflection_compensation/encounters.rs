@@ -127,6 +127,6 @@ pub(super) fn met(reach: &Reach, index: usize, support: &Support) -> Option<Find
 /// The first chuck that a program would take the tool through.
 pub(super) fn hit_chuck(job: &Job, program: &Program) -> Option<Finding> {
     let reach = Reach::of(job, program);
-    let found = job.supports.iter().enumerate().filter_map(|(i, support)| met(&reach, i, support));
-    found.into_iter().find(|finding| finding.code == "tool_hits_chuck")
+    let mut found = job.supports.iter().enumerate().filter_map(|(i, support)| met(&reach, i, support));
+    found.find(|finding| finding.code == "tool_hits_chuck")
 }
