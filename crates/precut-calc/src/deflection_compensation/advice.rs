@@ -245,7 +245,7 @@ pub(super) fn warnings(job: &Job, grid: &Grid, acting: &Acting, stage: &Stage, o
     let extremes = Extremes::of(stage);
     let mut found = deflection_warnings(job, grid, &extremes);
     found.extend(met_supports(job, grid, outcome));
-    found.extend(plunge_warnings(job, outcome));
+    found.extend(outcome.path.iter().flat_map(|path| plunges(job, path)));
     found.extend(idle_rests(job, grid, stage));
     found.extend(structure_warnings(job, stage, outcome));
     found.extend(command_warnings(job, &extremes, outcome));
@@ -302,19 +302,6 @@ fn turned_span(job: &Job, grid: &Grid) -> [f64; 2] {
     let turned = |s: &Segment| job.stock_profile.is_some() || s.stock_mm() > s.diameter_mm;
     let ends = grid.steps_mm.windows(2).zip(&job.shaft.segments).filter(|(_, s)| turned(s)).map(|(ends, _)| ends);
     ends.fold([f64::INFINITY, f64::NEG_INFINITY], |span, ends| [span[0].min(ends[0]), span[1].max(ends[1])])
-}
-
-/// Where the program feeds the tool in radially.
-fn plunge_warnings(job: &Job, outcome: &Outcome) -> Vec<Finding> {
-    let plunges = outcome.path.iter().flat_map(|path| plunges(job, path));
-    plunges
-        .map(|plunge| {
-            Finding::new("plunge_at_shoulder", "/shaft/segments")
-                .value(plunge.z_mm, "mm")
-                .with("z_program_mm", plunge.z_program_mm)
-                .with("diameter_mm", plunge.diameter_mm)
-        })
-        .collect()
 }
 
 /// Rests that the shaft never touches while something is cut: beside the shaft, or open under the nominal forces, which

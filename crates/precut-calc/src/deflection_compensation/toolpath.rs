@@ -111,26 +111,21 @@ fn last_regime(job: &Job) -> Regime {
     job.passes.last().map_or_else(|| Regime::of(&job.cut), |pass| Regime::of(&job.cut).of_pass(pass))
 }
 
-/// Where the tool feeds in radially because something stands before the cut.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Plunge {
-    /// Station, mm.
-    pub z_mm: f64,
-    /// The same as the program has it, mm.
-    pub z_program_mm: f64,
-    /// Diameter that the tool feeds down to, mm.
-    pub diameter_mm: f64,
-}
-
-/// Every plunge of the program along a path.
-pub(super) fn plunges(job: &Job, path: &Path) -> Vec<Plunge> {
+/// Warns of every place where the program along a path feeds the tool in radially.
+pub(super) fn plunges(job: &Job, path: &Path) -> Vec<Finding> {
     let regime = last_regime(job);
     let writer = Writer::new(job, &regime);
     let zones = corners_in_feed_order(path, regime.direction);
     let starts = zones.iter().enumerate().filter_map(|(k, corners)| Some((k, *corners.first()?)));
+    let plunge = |z_mm: f64, diameter_mm: f64| {
+        Finding::new("plunge_at_shoulder", "/shaft/segments")
+            .value(z_mm, "mm")
+            .with("z_program_mm", writer.programmed_z(z_mm))
+            .with("diameter_mm", diameter_mm)
+    };
     starts
         .filter(|(k, (z_mm, x_mm))| writer.is_blocked_before(*z_mm, *x_mm, &zones[..*k]))
-        .map(|(_, (z_mm, diameter_mm))| Plunge { z_mm, z_program_mm: writer.programmed_z(z_mm), diameter_mm })
+        .map(|(_, (z_mm, x_mm))| plunge(z_mm, x_mm))
         .collect()
 }
 
