@@ -11,6 +11,7 @@ use axum::http::{HeaderMap, StatusCode, Uri};
 use axum::response::Response;
 use bytes::Bytes;
 use precut_calc::calculator::{Figure, Meta, Value, Values};
+use serde::Deserialize;
 
 use super::negotiate::{self, Media};
 use super::problem::Problem;
