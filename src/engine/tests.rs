@@ -198,7 +198,9 @@ async fn who_waits_too_long_for_a_core_is_sent_away() {
     let refused = endless_on(&engine, 2).await.unwrap().unwrap_err();
     assert!(matches!(refused, Error::Busy { retry_after } if retry_after > Duration::ZERO), "{refused:?}");
     assert!(begun.elapsed() >= patience);
-    running.into_iter().for_each(|task| task.abort());
+    for task in running {
+        task.abort();
+    }
 }
 
 #[tokio::test]
@@ -210,7 +212,9 @@ async fn a_full_line_is_refused_and_not_queued() {
     tokio::time::sleep(Duration::from_millis(50)).await;
     assert!(matches!(endless_on(&engine, 4).await.unwrap(), Err(Error::Busy { .. })));
     assert!(held.iter().all(|task| !task.is_finished()));
-    held.into_iter().for_each(|task| task.abort());
+    for task in held {
+        task.abort();
+    }
 }
 
 #[tokio::test]
