@@ -444,7 +444,7 @@ impl Monitor for Quiet<'_> {
     fn progress(&self, _fraction: f64, _stage: Message) {}
 }
 
-/// [`Engine::check`] without an engine.
+/// Everything but the calculation, without an engine.
 #[allow(clippy::needless_pass_by_value)] // a body is handed over, here as to an engine
 pub fn check_now(registry: &Registry, calculator: &str, body: Body) -> Result<Checked, Error> {
     check_with(registry, calculator, body, &GivenModel::None)
