@@ -236,6 +236,8 @@ impl From<Error> for Problem {
             Error::Syntax(fault) => {
                 #[allow(clippy::cast_precision_loss)] // lines and columns of a body of some megabytes
                 let (line, column) = (fault.line as f64, fault.column as f64);
+                // Without an argument: optimised, a closure that is called twice with the same constant gives both calls one
+                // moved value (rust-lang/rust#155241).
                 let place = || {
                     Values::new()
                         .with("line", line)
