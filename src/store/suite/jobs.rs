@@ -278,13 +278,15 @@ pub(in crate::store) async fn the_queue_hands_out_each_task_once_and_no_more_tha
     let place = P::new().await;
     let (seen, now, most) =
         (Arc::new(Mutex::new(Vec::new())), Arc::new(AtomicUsize::new(0)), Arc::new(AtomicUsize::new(0)));
+    // Each task ends together with another one only: with one place, none would end.
+    let pair = Arc::new(tokio::sync::Barrier::new(2));
     let run: RunTask = {
         let (seen, now, most) = (Arc::clone(&seen), Arc::clone(&now), Arc::clone(&most));
         Arc::new(move |id| {
-            let (seen, now, most) = (Arc::clone(&seen), Arc::clone(&now), Arc::clone(&most));
+            let (seen, now, most, pair) = (Arc::clone(&seen), Arc::clone(&now), Arc::clone(&most), Arc::clone(&pair));
             Box::pin(async move {
                 most.fetch_max(now.fetch_add(1, Ordering::SeqCst) + 1, Ordering::SeqCst);
-                tokio::time::sleep(Duration::from_millis(5)).await;
+                pair.wait().await;
                 now.fetch_sub(1, Ordering::SeqCst);
                 seen.lock().unwrap().push(id);
             })
@@ -296,12 +298,13 @@ pub(in crate::store) async fn the_queue_hands_out_each_task_once_and_no_more_tha
     for number in 0..20 {
         expected.push(place.accept(job(number)).await.id);
     }
-    for _ in 0..500 {
-        if seen.lock().unwrap().len() == expected.len() {
-            break;
+    tokio::time::timeout(Duration::from_secs(60), async {
+        while seen.lock().unwrap().len() < expected.len() {
+            tokio::time::sleep(Duration::from_millis(10)).await;
         }
-        tokio::time::sleep(Duration::from_millis(10)).await;
-    }
+    })
+    .await
+    .expect("all tasks end");
     stop.send_replace(true);
     working.await.unwrap();
     let mut seen = seen.lock().unwrap().clone();
