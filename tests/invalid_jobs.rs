@@ -4,6 +4,8 @@
 #[path = "../crates/precut-calc/tests/support/mod.rs"]
 mod support;
 
+use std::collections::BTreeSet;
+
 use precut::engine::{Body, Error, check_now};
 use precut::registry::Registry;
 use precut::text::{Language, Texts};
@@ -241,6 +243,58 @@ fn a_number_out_of_its_range_is_told_both_ends() {
         let russian = Texts::shared().try_finding(Language::Ru, "fault", finding).unwrap();
         let numbers = ends.map(|end| end.split(' ').next().unwrap_or_default().replace('.', ","));
         assert!(numbers.iter().all(|end| russian.contains(end.as_str())), "{russian}");
+    }
+}
+
+/// Pointers of the numbers of a job: of a list, those of its first row.
+fn numbers(job: &Value, at: &str, found: &mut Vec<String>) {
+    match job {
+        Value::Number(_) => found.push(at.to_owned()),
+        Value::Object(fields) => fields.iter().for_each(|(name, field)| numbers(field, &format!("{at}/{name}"), found)),
+        Value::Array(items) => items.iter().take(1).for_each(|item| numbers(item, &format!("{at}/0"), found)),
+        _ => {}
+    }
+}
+
+/// Whatever the sentence of a number beyond its range says, it says the whole range: in every calculator's examples,
+/// with all defaults filled in, in every language.
+#[test]
+fn every_number_beyond_its_range_is_told_the_whole_range() {
+    let registry = Registry::standard().unwrap();
+    let said = |language: Language, finding: &Finding| Texts::shared().try_finding(language, "fault", finding).unwrap();
+    let mut seen = BTreeSet::new();
+    for entry in registry.entries() {
+        let id = entry.meta().id;
+        for example in entry.meta().examples {
+            let checked = check_now(&registry, id, Body::Json(example.job.into())).unwrap();
+            let mut places = Vec::new();
+            numbers(&checked.input, "", &mut places);
+            // The same field of another row or example is the same field.
+            places.retain(|place| seen.insert((id, place.clone())));
+            for (place, value) in places.iter().flat_map(|place| [(place, -1e30), (place, 1e30)]) {
+                let mut job = checked.input.clone();
+                *job.pointer_mut(place).unwrap() = json!(value);
+                let Err(Error::Invalid { findings, .. }) = check_now(&registry, id, Body::Json(job.to_string().into()))
+                else {
+                    panic!("{id} takes {place} = {value}");
+                };
+                for finding in findings.iter().filter(|finding| finding.pointer == *place) {
+                    let of_schema =
+                        matches!(finding.values.get("rule"), Some(Said::Text(rule)) if rule == "out_of_range");
+                    if !of_schema {
+                        continue;
+                    }
+                    for language in Language::ALL {
+                        let plain = Finding { code: "out_of_range", ..finding.clone() };
+                        let plain = said(language, &plain);
+                        let range = plain.split("; ").nth(1).unwrap().split_once(' ').unwrap().1;
+                        let range = range.strip_prefix("is ").unwrap_or(range);
+                        let sentence = said(language, finding);
+                        assert!(sentence.contains(range), "{id} {place}: {range} is not said in: {sentence}");
+                    }
+                }
+            }
+        }
     }
 }
 

@@ -8,7 +8,7 @@ use super::case::TOUCHING_MM;
 use super::effects;
 use super::input::{FeedMode, Goal, Job, Limits, SpeedMode, UsageScope, Zone};
 use super::models::Output;
-use super::plan::Method;
+use super::plan::{Method, PassPlan};
 
 /// Codes of the faults found here.
 pub(super) const CODES: &[&str] = &[
@@ -105,19 +105,24 @@ fn check_model(job: &Job, model: &MachinabilityModel, at: &str, violations: &mut
     violations.require(!model.needs_angle() || job.cutting_edge_angle_deg.is_some(), || {
         Finding::new("edge_angle_missing", "/cutting_edge_angle_deg").with("model", at.to_owned())
     });
-    for further in &model.further {
-        violations.require(further.value > 0.0, || {
-            Finding::new("absurd_exponent", format!("{at}/further")).with("field", further.name.clone())
-        });
-    }
 }
 
 fn check_zones(job: &Job, violations: &mut Violations) {
-    let length = job.shaft.as_ref().map_or(f64::INFINITY, shaft::Shaft::length_mm);
+    // Beside a shaft of no possible length stands nothing.
+    let length = job.shaft.as_ref().and_then(shaft::Shaft::known_length_mm).unwrap_or(f64::INFINITY);
     let mut seen: Vec<&str> = Vec::new();
     let mut before: Option<&Zone> = None;
     for (i, zone) in job.zones.iter().enumerate() {
         let at = format!("/zones/{i}");
+        violations.require(!seen.contains(&zone.id.as_str()), || {
+            Finding::new("duplicate_zone", format!("{at}/id")).with("zone", zone.id.clone())
+        });
+        seen.push(&zone.id);
+        // Where a zone lies at no possible place nobody knows what it overlaps.
+        if !zone.has_place() {
+            before = None;
+            continue;
+        }
         violations.require(zone.z_end_mm > zone.z_start_mm, || {
             Finding::new("bad_zone", at.clone())
                 .measured(zone.z_end_mm, zone.z_start_mm, "mm")
@@ -137,10 +142,6 @@ fn check_zones(job: &Job, violations: &mut Violations) {
                 .measured(zone.z_end_mm, length, "mm")
                 .with("zone", zone.id.clone())
         });
-        violations.require(!seen.contains(&zone.id.as_str()), || {
-            Finding::new("duplicate_zone", format!("{at}/id")).with("zone", zone.id.clone())
-        });
-        seen.push(&zone.id);
         before = Some(zone);
     }
 }
@@ -304,20 +305,7 @@ fn check_named(job: &Job, violations: &mut Violations) {
 fn check_method(job: &Job, violations: &mut Violations) {
     let together = |other: &'static str| Finding::new("method_not_together", "/method").with("other", other);
     if let Some(plan) = &job.passes {
-        violations.require(plan.depth_min_mm <= plan.depth_max_mm, || {
-            Finding::new("bad_pass_depths", "/passes/depth_min_mm").measured(plan.depth_min_mm, plan.depth_max_mm, "mm")
-        });
-        let most = plan.depth_max_mm * f64::from(plan.roughing_passes_max + 1);
-        violations.require(plan.total_depth_mm <= most * (1.0 + 1e-12), || {
-            Finding::new("bad_pass_depths", "/passes/total_depth_mm").measured(plan.total_depth_mm, most, "mm")
-        });
-        violations.require(plan.total_depth_mm >= plan.depth_min_mm, || {
-            Finding::new("bad_pass_depths", "/passes/total_depth_mm").measured(
-                plan.total_depth_mm,
-                plan.depth_min_mm,
-                "mm",
-            )
-        });
+        check_passes(plan, violations);
         violations.require(job.method == Method::Optimal, || together("passes"));
         violations.require(job.compensation.is_none(), || together("passes and compensation"));
     }
@@ -330,4 +318,22 @@ fn check_method(job: &Job, violations: &mut Violations) {
         let whole = job.limits.as_ref().is_some_and(|limits| limits.whole_parts_per_edge);
         violations.require(!whole, || together("whole parts per edge"));
     }
+}
+
+/// The depths and the number of passes leave at least one split of the stock.
+fn check_passes(plan: &PassPlan, violations: &mut Violations) {
+    let fault = |field: &str, value: f64, limit: f64| {
+        Finding::new("bad_pass_depths", format!("/passes/{field}")).measured(value, limit, "mm")
+    };
+    if plan.depth_min_mm > plan.depth_max_mm {
+        let fault = fault("depth_min_mm", plan.depth_min_mm, plan.depth_max_mm);
+        violations.add(fault.with("maximum", plan.depth_max_mm));
+        return;
+    }
+    let total = plan.total_depth_mm;
+    let most = plan.depth_max_mm * f64::from(plan.roughing_passes_max + 1);
+    let limit = if total < plan.depth_min_mm { plan.depth_min_mm } else { most };
+    violations.require(total >= plan.depth_min_mm && total <= most * (1.0 + 1e-12), || {
+        fault("total_depth_mm", total, limit).within(plan.depth_min_mm, most)
+    });
 }

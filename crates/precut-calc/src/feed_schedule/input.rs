@@ -1,5 +1,7 @@
 //! The job: zones of a shaft, models of what comes out of a cut, limits, and what is to be least.
 
+use std::ops::RangeInclusive;
+
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -12,6 +14,8 @@ use crate::shaft::{Carriage, FeedDirection, Shaft, Support};
 
 /// Most zones of a job.
 pub const MAX_ZONES: usize = 400;
+/// Places of a zone's ends that the schema allows, mm.
+const ZONE_MM: RangeInclusive<f64> = 0.0..=1e6;
 
 /// Zones to be turned, and what is to be known of them before feed and speed are chosen.
 ///
@@ -162,6 +166,13 @@ pub struct Zone {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-4, maximum = 20.0, example = 0.12, extensions(("x-unit" = json!("mm/rev")), ("x-symbol" = json!("S_max"))))]
     pub feed_max_mm_per_rev: Option<f64>,
+}
+
+impl Zone {
+    /// Whether it lies where a zone may lie, so that something follows from its place.
+    pub(super) fn has_place(&self) -> bool {
+        ZONE_MM.contains(&self.z_start_mm) && ZONE_MM.contains(&self.z_end_mm)
+    }
 }
 
 fn one_u32() -> u32 {
@@ -510,4 +521,19 @@ pub struct Reference {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1.0, maximum = 179.0, example = 75.0, extensions(("x-unit" = json!("deg")), ("x-symbol" = json!("phi_r"))))]
     pub cutting_edge_angle_deg: Option<f64>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use utoipa::PartialSchema;
+
+    #[test]
+    fn ranges_are_those_of_the_schema() {
+        let schema = serde_json::to_value(Zone::schema()).unwrap_or_default();
+        for field in ["z_start_mm", "z_end_mm"] {
+            let end = |name: &str| schema["properties"][field][name].as_f64();
+            assert_eq!((end("minimum"), end("maximum")), (Some(*ZONE_MM.start()), Some(*ZONE_MM.end())), "{field}");
+        }
+    }
 }

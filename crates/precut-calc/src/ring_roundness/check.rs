@@ -138,10 +138,13 @@ fn check_numerics(job: &Job, violations: &mut Violations) {
     let samples = f64::from(samples_of(job));
     match (job.method, job.samples) {
         (Method::ExactContact, Some(n)) => violations.require(n >= LEAST_SAMPLES && n.is_multiple_of(4), || {
-            Finding::new("bad_samples", "/samples").measured(f64::from(n), f64::from(LEAST_SAMPLES), "1")
+            let fault = Finding::new("bad_samples", "/samples").measured(f64::from(n), f64::from(LEAST_SAMPLES), "1");
+            fault.with("method", "exact_contact").with("minimum", f64::from(LEAST_SAMPLES))
         }),
         (Method::NearestSamples, Some(n)) => violations.require(n <= MOST_NEAREST_SAMPLES, || {
-            Finding::new("bad_samples", "/samples").measured(f64::from(n), f64::from(MOST_NEAREST_SAMPLES), "1")
+            let most = f64::from(MOST_NEAREST_SAMPLES);
+            let fault = Finding::new("bad_samples", "/samples").measured(f64::from(n), most, "1");
+            fault.with("method", "nearest_samples").with("maximum", most)
         }),
         (_, None) => {}
     }
