@@ -1,5 +1,6 @@
 //! The configuration: one struct, one source of defaults (`config.default.toml`), one order of precedence.
 
+use std::collections::BTreeSet;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -232,10 +233,7 @@ pub struct Flags {
 /// Why there is no configuration.
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
-    /// A setting is unknown or of the wrong type; says which and where it came from.
-    #[error("{0}")]
-    Read(Box<figment::Error>),
-    /// Settings that make no sense; all of them.
+    /// Settings that are of the wrong type or make no sense, all of them; after an unknown one nothing is read.
     #[error("{}", .0.join("\n"))]
     Invalid(Vec<String>),
 }
@@ -278,8 +276,32 @@ impl Config {
         if let Some(format) = &flags.log_format {
             figment = figment.merge(("log.format", format));
         }
-        let config: Self = figment.extract().map_err(|error| ConfigError::Read(Box::new(error)))?;
-        config.validated()
+        Self::read(figment)
+    }
+
+    /// The configuration, or everything that is wrong with it: a setting that cannot be read takes its default, so that
+    /// the next one shows.
+    fn read(mut figment: Figment) -> Result<Self, ConfigError> {
+        let defaults = Figment::from(Toml::string(DEFAULTS));
+        let mut faults = Vec::new();
+        let mut mended = BTreeSet::new();
+        loop {
+            let error = match figment.extract::<Self>() {
+                Ok(config) => {
+                    faults.extend(config.faults());
+                    return if faults.is_empty() { Ok(config) } else { Err(ConfigError::Invalid(faults)) };
+                }
+                Err(error) => error,
+            };
+            faults.push(error.to_string());
+            let place = error.path.join(".");
+            match defaults.find_value(&place) {
+                Ok(value) if value.as_dict().is_none() && mended.insert(place.clone()) => {
+                    figment = figment.merge((place, value));
+                }
+                _ => return Err(ConfigError::Invalid(faults)),
+            }
+        }
     }
 
     /// The configuration as TOML, without secrets.
@@ -297,7 +319,8 @@ impl Config {
         self.listen.ip().is_loopback()
     }
 
-    fn validated(self) -> Result<Self, ConfigError> {
+    /// Settings that make no sense.
+    fn faults(&self) -> Vec<String> {
         let mut faults = Vec::new();
         let limits = &self.limits;
         for (name, seconds) in [
@@ -360,7 +383,7 @@ impl Config {
                 faults.push(format!("cors.origins: \"{origin}\" is no origin such as https://cam.example.com"));
             }
         }
-        if faults.is_empty() { Ok(self) } else { Err(ConfigError::Invalid(faults)) }
+        faults
     }
 }
 
@@ -500,6 +523,16 @@ mod tests {
         for name in ["json_bytes", "body_timeout_s", "cors.origins", "auth.keys[0]", "log.level"] {
             assert!(error.contains(name), "{name} missing in: {error}");
         }
+    }
+
+    #[test]
+    fn settings_of_the_wrong_type_are_reported_with_all_others() {
+        let file = "cpu = \"many\"\n[limits]\njson_bytes = \"big\"\nburst = 0.5\n[log]\nformat = \"xml\"";
+        let error = load(file, &[("PRECUT_LISTEN", "here")], &Flags::default()).unwrap_err().to_string();
+        for name in ["cpu", "limits.json_bytes", "limits.burst", "log.format", "PRECUT_LISTEN"] {
+            assert!(error.contains(name), "{name} missing in: {error}");
+        }
+        assert_eq!(error.lines().count(), 5, "{error}");
     }
 
     #[test]
