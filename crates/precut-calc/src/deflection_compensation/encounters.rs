@@ -7,8 +7,6 @@ use crate::calculator::{Block, Finding, Program};
 
 use super::input::{Job, ProgramZero, Support};
 
-const UM_PER_MM: f64 = 1e3;
-
 /// How the tool meets a support.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Encounter {
@@ -29,7 +27,7 @@ impl Encounter {
 
 /// Where along the shaft a program takes the tool; stations, mm.
 #[derive(Debug)]
-pub(super) struct Reach {
+pub(crate) struct Reach {
     from: f64,
     to: f64,
     /// First and last station of every run of cuts, the way from the approach left out.
@@ -43,26 +41,31 @@ pub(super) struct Reach {
 impl Reach {
     /// Of a program of the job.
     pub(super) fn of(job: &Job, program: &Program) -> Self {
-        let zero = match job.program.zero {
+        let zero_mm = match job.program.zero {
             ProgramZero::RightFace => job.shaft.length_mm(),
             ProgramZero::LeftFace => 0.0,
         };
+        Self::along(program, zero_mm, job.program.clearance_z_mm)
+    }
+
+    /// Of a program whose zero lies at a station, with the clearance of its approaches, mm.
+    pub(crate) fn along(program: &Program, zero_mm: f64, clearance_mm: f64) -> Self {
         let mut reach = Self {
             from: f64::INFINITY,
             to: f64::NEG_INFINITY,
             cuts: Vec::new(),
             approaches: Vec::new(),
-            clearance_mm: job.program.clearance_z_mm,
-            increment_mm: job.path.increment_um / UM_PER_MM,
+            clearance_mm,
+            increment_mm: program.increment_mm,
         };
         let mut cutting = false;
         for block in &program.blocks {
             match *block {
                 Block::Rapid { z_mm: Some(z), .. } => {
-                    reach.come_to(z + zero);
-                    reach.approaches.push(z + zero);
+                    reach.come_to(z + zero_mm);
+                    reach.approaches.push(z + zero_mm);
                 }
-                Block::Cut { z_mm, .. } => reach.cut_to(z_mm + zero, cutting),
+                Block::Cut { z_mm, .. } => reach.cut_to(z_mm + zero_mm, cutting),
                 _ => {}
             }
             cutting = matches!(block, Block::Cut { .. });
@@ -108,7 +111,7 @@ pub(super) fn body(support: &Support) -> Option<(&'static str, f64)> {
 }
 
 /// The tool at or in a chuck or steady rest; `None` where they do not meet.
-pub(super) fn met(reach: &Reach, index: usize, support: &Support) -> Option<Finding> {
+pub(crate) fn met(reach: &Reach, index: usize, support: &Support) -> Option<Finding> {
     let (kind, z_mm) = body(support)?;
     let encounter = reach.meets(z_mm)?;
     let finding = |code| Finding::new(code, format!("/supports/{index}/z_mm")).value(z_mm, "mm");
@@ -126,7 +129,11 @@ pub(super) fn met(reach: &Reach, index: usize, support: &Support) -> Option<Find
 
 /// The first chuck that a program would take the tool through.
 pub(super) fn hit_chuck(job: &Job, program: &Program) -> Option<Finding> {
-    let reach = Reach::of(job, program);
-    let mut found = job.supports.iter().enumerate().filter_map(|(i, support)| met(&reach, i, support));
+    chuck_in_the_way(&Reach::of(job, program), &job.supports)
+}
+
+/// The first chuck of those supports through which the tool would go.
+pub(crate) fn chuck_in_the_way(reach: &Reach, supports: &[Support]) -> Option<Finding> {
+    let mut found = supports.iter().enumerate().filter_map(|(i, support)| met(reach, i, support));
     found.find(|finding| finding.code == "tool_hits_chuck")
 }

@@ -39,6 +39,7 @@ mod stage;
 mod structure;
 mod toolpath;
 
+pub(crate) use encounters::{Reach, chuck_in_the_way, met};
 pub use form::{Deviation, Extremum, ExtremumKind, Form, FormClass};
 pub use forward::{DeflectionAllowances, DeflectionPoint, DeflectionRun};
 pub use input::{

@@ -10,6 +10,7 @@ use super::models::Output;
 use super::output::Outcome;
 use super::plan::Method;
 use super::run::broken;
+use super::toolpath::encounters;
 
 /// Codes of the warnings made here.
 pub(super) const WARNING_CODES: &[&str] = &[
@@ -25,6 +26,12 @@ pub(super) const WARNING_CODES: &[&str] = &[
     "loss_not_reached",
     "compensation_needed",
     "unconfirmed_model",
+    "plunge_at_shoulder",
+    "pass_thicker_than_counted",
+    "surface_wears_out_its_edge",
+    "tool_passes_support",
+    "tool_reaches_support",
+    "tool_hits_chuck",
 ];
 
 /// Codes of the explanations made here.
@@ -73,6 +80,12 @@ pub(super) fn warnings(job: &Job, case: &Case, outcome: &Outcome, at: &[(f64, f6
         );
     }
     unused(job, &mut out);
+    out.extend(encounters(job, outcome));
+    out.extend(outcome.edges.iter().filter_map(|edge| {
+        let alone = edge.surfaces.first().filter(|_| edge.tool_usage > 1.0 + 1e-9)?;
+        let finding = Finding::new("surface_wears_out_its_edge", "/limits/tool_usage_max");
+        Some(finding.measured(edge.tool_usage, 1.0, "1").with("surface", alone.clone()))
+    }));
     if matches!(job.method, Method::EqualDeflection { .. }) {
         for (name, factor) in broken(case, at).into_iter().take(20) {
             out.push(
@@ -225,6 +238,7 @@ fn unused(job: &Job, out: &mut Vec<Finding>) {
         }
     };
     idle(job.shaft.is_none() && !job.supports.is_empty(), "/supports");
+    idle(job.force.as_ref().is_some_and(|force| job.models.ignore(force)), "/force");
     idle(
         job.variables.fixed_feed_mm_per_rev.is_some() && job.variables.feed != super::input::FeedMode::Fixed,
         "/variables/fixed_feed_mm_per_rev",

@@ -308,7 +308,12 @@ fn check_method(job: &Job, violations: &mut Violations) {
         check_passes(plan, violations);
         violations.require(job.method == Method::Optimal, || together("passes"));
         violations.require(job.compensation.is_none(), || together("passes and compensation"));
+        violations
+            .require(job.zones.iter().all(|zone| zone.repeat == 1), || together("passes and a zone's own repeat"));
     }
+    // What is left by the first of several passes is not what the next one is to correct.
+    let repeats = job.zones.iter().any(|zone| zone.repeat > 1);
+    violations.require(!(repeats && job.compensation.is_some()), || together("compensation and a zone's repeat"));
     if matches!(job.method, Method::Continuous { .. }) {
         violations.require(matches!(job.objective, Goal::Time { .. }), || together("another objective than time"));
         violations.require(job.variables.feed == FeedMode::PerZone, || together("a common feed"));

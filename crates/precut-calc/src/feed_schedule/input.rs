@@ -128,13 +128,13 @@ pub struct Zone {
     /// Where it ends.
     #[schema(minimum = 0.0, maximum = 1e6, example = 150.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("z_2")), ("x-code" = json!("bad_zone"))))]
     pub z_end_mm: f64,
-    /// Diameter by which speed, time and torque are counted.
+    /// Diameter that it is turned to; speed, time and torque are counted at it.
     #[schema(minimum = 0.01, maximum = 10_000.0, example = 80.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("D")), ("x-code" = json!("bad_diameter"))))]
     pub diameter_mm: f64,
-    /// Depth of cut on the radius.
+    /// Depth of cut on the radius, of every pass.
     #[schema(minimum = 1e-4, maximum = 1000.0, example = 0.3, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("t"))))]
     pub depth_mm: f64,
-    /// How often the pass is repeated.
+    /// Passes over the zone, each by the depth of cut; the last one ends at the diameter.
     #[serde(default = "one_u32")]
     #[schema(minimum = 1, maximum = 1000, default = 1, example = 1, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("r"))))]
     pub repeat: u32,

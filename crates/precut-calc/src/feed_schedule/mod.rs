@@ -17,6 +17,7 @@ mod acting;
 mod advice;
 mod assess;
 mod binding;
+mod blank;
 mod case;
 mod check;
 mod compensated;
@@ -89,7 +90,7 @@ impl Calculator for FeedSchedule {
     const META: Meta = Meta {
         id: "feed-schedule",
         kind: CalculatorKind::Calculator,
-        version: 3,
+        version: 4,
         title: "Feed schedule",
         question: "Which feed and speed in which zone: fastest within tolerance, roughness, tool life and power?",
         summary: "From a shaft in its supports, models of force, tool life and surface, and limits: feed and speed of \
@@ -218,6 +219,9 @@ const CODES: Codes = Codes {
         "no_pass_split",
         "too_few_segments",
         "gradient_with_bending_model",
+        "zone_off_drawing",
+        "zone_off_blank",
+        "tool_hits_chuck",
     ]],
     warnings: &[advice::WARNING_CODES],
     explanations: &[advice::EXPLANATION_CODES],

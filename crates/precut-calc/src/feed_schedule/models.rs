@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::force::ForceModel;
-use crate::machinability::{self, MachinabilityModel};
+use crate::force::{ForceModel, MeasuredRange};
+use crate::machinability::{self, MachinabilityModel, ModelRange};
 
 /// What comes out of a cut. A model that is not given is taken from the library's set where one is named.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
@@ -143,6 +143,12 @@ impl Models {
             .or_else(|| force.and_then(|force| of_force(force, output)))
     }
 
+    /// Whether the job's force model says nothing, because the models of the forces are given otherwise.
+    pub(super) fn ignore(&self, force: &ForceModel) -> bool {
+        let laws = [Output::ForceY, Output::ForceZ].map(|output| (self.get(output), of_force(force, output)));
+        laws.iter().all(|(model, law)| law.is_none() || model.map(law_of) != law.as_ref().map(law_of))
+    }
+
     fn of_library(&self, output: Output) -> Option<MachinabilityModel> {
         let set = self.library.as_deref().and_then(machinability::find_set)?;
         set.models.iter().find(|model| model.output == output.name()).map(machinability::LibraryModel::model)
@@ -169,6 +175,11 @@ impl Models {
     }
 }
 
+/// The numbers of a model of first order.
+fn law_of(model: &MachinabilityModel) -> [f64; 5] {
+    [model.constant, model.speed_exponent, model.feed_exponent, model.depth_exponent, model.angle_exponent]
+}
+
 /// The power law of a force component, where the force model is one without a constant part (`deflection/6.1`).
 fn of_force(force: &ForceModel, output: Output) -> Option<MachinabilityModel> {
     let component = match output {
@@ -184,5 +195,20 @@ fn of_force(force: &ForceModel, output: Output) -> Option<MachinabilityModel> {
         power.depth_exponent,
     );
     model.source = Some("force model of the job".to_owned());
+    model.range = force.measured_range().as_ref().map(range_of);
     Some(model)
+}
+
+/// The ranges of a force law's trials as those of a model; from 0 on is no least value.
+fn range_of(measured: &MeasuredRange) -> ModelRange {
+    let above_none = |least: f64| (least > 0.0).then_some(least);
+    ModelRange {
+        least_speed_m_per_min: above_none(measured.least_speed_m_per_min),
+        largest_speed_m_per_min: Some(measured.largest_speed_m_per_min),
+        least_feed_mm_per_rev: above_none(measured.least_feed_mm_per_rev),
+        largest_feed_mm_per_rev: Some(measured.largest_feed_mm_per_rev),
+        least_depth_mm: above_none(measured.least_depth_mm),
+        largest_depth_mm: Some(measured.largest_depth_mm),
+        ..ModelRange::default()
+    }
 }

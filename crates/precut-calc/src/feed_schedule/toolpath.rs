@@ -2,12 +2,13 @@
 
 use std::borrow::Cow;
 
-use crate::calculator::{Block, Column, Failure, Program, Table};
-use crate::deflection_compensation::ProgramZero;
+use crate::calculator::{Block, Column, Failure, Finding, Program, Table};
+use crate::deflection_compensation::{ProgramZero, Reach, chuck_in_the_way, met};
 use crate::path::round_to_increment;
 use crate::shaft::FeedDirection;
 
 use super::assess;
+use super::blank::{Blank, Turned, zones_fit_the_shaft};
 use super::case::{Case, TOUCHING_MM, ZoneCase};
 use super::compliance::Held;
 use super::continuous::add_zone;
@@ -19,6 +20,8 @@ use super::program::{Built, Place, Variation, build};
 const INCREMENT_MM: f64 = 0.001;
 /// Step of the feed, mm/rev.
 const FEED_STEP: f64 = 0.001;
+/// Share of a diameter by which a pass may differ from the one that its zone is counted at without a word.
+const COUNTED: f64 = 0.02;
 /// A limit may be passed by this much in logarithms: the rounding of the schedule itself.
 const KEPT: f64 = 1e-9;
 
@@ -36,30 +39,98 @@ struct Words {
 #[derive(Debug, Clone, PartialEq)]
 struct Pass {
     zone: usize,
+    turned: Turned,
     /// Diameter and station from program zero.
     corners: Vec<(f64, f64)>,
-    /// Where the tool goes down before it; at the first corner itself beside a thicker neighbour.
+    /// Station of its begin.
+    begins_mm: f64,
+    /// Where the tool goes down before it; at the first corner itself beside what is as thick.
     approach_mm: Option<f64>,
     /// It goes on where the cut before it ended: the tool stays in the work.
     goes_on: bool,
 }
 
-/// The program of an answer.
+/// The program of an answer; none that would cut what the job's shaft says otherwise, and none through a chuck.
 pub(super) fn program(job: &Job, outcome: &Outcome) -> Result<Program, Failure> {
+    let passes = passes(job, outcome);
+    let cuts: Vec<Turned> = passes.iter().map(|pass| pass.turned).collect();
+    zones_fit_the_shaft(job, outcome, &cuts)?;
+    let program = written(job, outcome, &passes)?;
+    match chuck_in_the_way(&reach(job, outcome, &program), &job.supports) {
+        Some(chuck) => Err(Failure::OutOfModel(chuck)),
+        None => Ok(program),
+    }
+}
+
+/// What the program of an answer meets on its way: places where the tool feeds in radially, chucks and steady rests,
+/// passes far from the diameter that they are counted at.
+pub(super) fn encounters(job: &Job, outcome: &Outcome) -> Vec<Finding> {
+    let passes = passes(job, outcome);
+    let retract = retract_mm(job, &passes);
+    let mut blocks = Vec::new();
+    for (k, pass) in passes.iter().enumerate() {
+        moves(&mut blocks, pass, passes.get(k + 1), None, retract);
+    }
+    let program = Program { dialect: job.program.dialect, increment_mm: INCREMENT_MM, blocks };
+    let reach = reach(job, outcome, &program);
+    let mut found = plunges(&passes);
+    found.extend(job.supports.iter().enumerate().filter_map(|(i, support)| met(&reach, i, support)));
+    found.extend(thicker(job, outcome, &passes));
+    found
+}
+
+/// Places where the tool goes down beside what is as thick as the cut, once each with the smallest diameter.
+fn plunges(passes: &[Pass]) -> Vec<Finding> {
+    let mut starts: Vec<(f64, f64, f64)> = Vec::new();
+    for pass in passes.iter().filter(|pass| pass.approach_mm.is_none() && !pass.goes_on) {
+        let Some(&(diameter_mm, z_program_mm)) = pass.corners.first() else { continue };
+        match starts.iter_mut().find(|(z_mm, ..)| (*z_mm - pass.begins_mm).abs() < INCREMENT_MM) {
+            Some((.., least_mm)) => *least_mm = least_mm.min(diameter_mm),
+            None => starts.push((pass.begins_mm, z_program_mm, diameter_mm)),
+        }
+    }
+    let warning = |(z_mm, z_program_mm, diameter_mm): (f64, f64, f64)| {
+        Finding::new("plunge_at_shoulder", "/zones")
+            .value(z_mm, "mm")
+            .with("z_program_mm", z_program_mm)
+            .with("diameter_mm", diameter_mm)
+    };
+    starts.into_iter().map(warning).collect()
+}
+
+/// The pass that is the farthest from the diameter at which its zone's time, wear and torque are counted.
+fn thicker(job: &Job, outcome: &Outcome, passes: &[Pass]) -> Option<Finding> {
+    let ratio = |pass: &Pass| pass.turned.diameter_mm / outcome.zones[pass.zone].diameter_mm;
+    let most = passes.iter().max_by(|a, b| ratio(a).total_cmp(&ratio(b)))?;
+    let zone = &outcome.zones[most.zone];
+    (ratio(most) > 1.0 + COUNTED).then(|| {
+        let keeps_speed =
+            matches!(job.variables.speed, SpeedMode::PerZone | SpeedMode::Fixed | SpeedMode::ConstantSpeed);
+        Finding::new("pass_thicker_than_counted", "/zones")
+            .measured(most.turned.diameter_mm, zone.diameter_mm, "mm")
+            .with("zone", zone.id.clone())
+            .with("percent", 100.0 * (ratio(most) - 1.0))
+            .with("speed", if keeps_speed { "kept" } else { "faster" })
+    })
+}
+
+fn reach(job: &Job, outcome: &Outcome, program: &Program) -> Reach {
+    Reach::along(program, zero_mm(job, outcome), job.program.clearance_z_mm)
+}
+
+fn written(job: &Job, outcome: &Outcome, passes: &[Pass]) -> Result<Program, Failure> {
     let surface = job.variables.speed == SpeedMode::ConstantSpeed;
     let held = Held::of(job)?;
     let (case, built) = limits_of_zones(job, outcome, held.as_ref())?;
     let words = words_of_zones(job, &built, outcome, surface);
     let at: Vec<(f64, f64)> =
         outcome.zones.iter().zip(&words).map(|(zone, words)| logs(zone, words, surface)).collect();
-    let widest = outcome.zones.iter().map(|zone| zone.diameter_mm + 2.0 * zone.depth_mm * f64::from(zone.passes));
-    let retract = round_to_increment(widest.fold(0.0, f64::max) + job.program.clearance_x_mm, INCREMENT_MM);
+    let retract = retract_mm(job, passes);
     let mut blocks = vec![Block::Modes];
     blocks.extend(passed(&case, &built, &at).into_iter().map(Block::Note));
     let (mut spoken, mut noted): (Option<f64>, Option<usize>) = (None, None);
-    let passes = passes(job, outcome);
     for (k, pass) in passes.iter().enumerate() {
-        let words = &words[pass.zone];
+        let words = &at_diameter(words[pass.zone], &outcome.zones[pass.zone], pass.turned.diameter_mm, job);
         if noted != Some(pass.zone) {
             let rounded = assess::zone_outcome(&case, job, pass.zone, at[pass.zone]);
             blocks.push(Block::Note(note(&rounded, words)));
@@ -73,10 +144,7 @@ pub(super) fn program(job: &Job, outcome: &Outcome) -> Result<Program, Failure> 
             });
             spoken = Some(words.speed);
         }
-        cut(&mut blocks, pass, words, retract);
-        if !passes.get(k + 1).is_some_and(|next| next.goes_on) {
-            blocks.push(Block::Rapid { x_diameter_mm: Some(retract), z_mm: None });
-        }
+        moves(&mut blocks, pass, passes.get(k + 1), Some(words.feed_mm_per_rev), retract);
     }
     blocks.push(Block::End);
     Ok(Program { dialect: job.program.dialect, increment_mm: INCREMENT_MM, blocks })
@@ -102,16 +170,29 @@ pub(super) fn path_table(job: &Job, outcome: &Outcome) -> Table {
     }
 }
 
+/// Diameter at which the tool travels: beyond everything that stands.
+fn retract_mm(job: &Job, passes: &[Pass]) -> f64 {
+    let cuts: Vec<Turned> = passes.iter().map(|pass| pass.turned).collect();
+    round_to_increment(Blank::of(job, &cuts).widest_mm() + job.program.clearance_x_mm, INCREMENT_MM)
+}
+
+/// Station of the program's zero.
+fn zero_mm(job: &Job, outcome: &Outcome) -> f64 {
+    let length = || {
+        job.shaft.as_ref().map_or_else(
+            || outcome.zones.iter().map(|zone| zone.z_end_mm).fold(0.0, f64::max),
+            crate::shaft::Shaft::length_mm,
+        )
+    };
+    match job.program.zero {
+        ProgramZero::RightFace => length(),
+        ProgramZero::LeftFace => 0.0,
+    }
+}
+
 /// The cuts in their order: zones in the direction of cutting, all roughing before the finish.
 fn passes(job: &Job, outcome: &Outcome) -> Vec<Pass> {
-    let length = job.shaft.as_ref().map_or_else(
-        || outcome.zones.iter().map(|zone| zone.z_end_mm).fold(0.0, f64::max),
-        crate::shaft::Shaft::length_mm,
-    );
-    let zero = match job.program.zero {
-        ProgramZero::RightFace => length,
-        ProgramZero::LeftFace => 0.0,
-    };
+    let zero = zero_mm(job, outcome);
     let mut order: Vec<usize> = (0..outcome.zones.len()).collect();
     if job.feed_direction == FeedDirection::ToHeadstock {
         order.reverse();
@@ -128,7 +209,22 @@ fn passes(job: &Job, outcome: &Outcome) -> Vec<Pass> {
             all.push(next);
         }
     }
+    let cuts: Vec<Turned> = all.iter().map(|pass| pass.turned).collect();
+    let mut blank = Blank::of(job, &cuts);
+    for pass in &mut all {
+        let away = job.program.clearance_z_mm * away(job.feed_direction);
+        // Beside what is as thick the tool goes down at the cut's begin itself.
+        let stands_mm = blank.widest_between_mm(pass.begins_mm, pass.begins_mm + away);
+        let is_free = stands_mm < pass.turned.diameter_mm - 1e-9;
+        pass.approach_mm = is_free.then(|| round_to_increment(pass.begins_mm + away - zero, INCREMENT_MM));
+        blank.turn(&pass.turned);
+    }
     all
+}
+
+/// Which way along the shaft the tool comes from.
+fn away(direction: FeedDirection) -> f64 {
+    if direction == FeedDirection::ToHeadstock { 1.0 } else { -1.0 }
 }
 
 /// Lets a cut go on where the one before it ended, if both are the only cuts of zones that touch: the feed changes in the
@@ -143,13 +239,11 @@ fn join(before: &Pass, next: &mut Pass, outcome: &Outcome) {
     }
 }
 
-/// Diameters that the passes of a zone turn down to. Repeats of a finish are spark-out passes at its diameter.
+/// Diameters that the passes of a zone turn down to, every one by the zone's depth.
 fn diameters(outcome: &Outcome, zone: &ZoneOutcome) -> Vec<f64> {
-    let Some(bare) = zone.id.strip_suffix(":rough") else {
-        return vec![zone.diameter_mm; zone.passes as usize];
-    };
-    let finish = outcome.zones.iter().find(|other| other.id.strip_suffix(":finish") == Some(bare));
-    let rest = finish.map_or(0.0, |finish| finish.depth_mm);
+    let bare = zone.id.strip_suffix(":rough");
+    let is_finish = |other: &&ZoneOutcome| bare.is_some() && other.id.strip_suffix(":finish") == bare;
+    let rest = outcome.zones.iter().find(is_finish).map_or(0.0, |finish| finish.depth_mm);
     (0..zone.passes).rev().map(|k| zone.diameter_mm + 2.0 * (rest + f64::from(k) * zone.depth_mm)).collect()
 }
 
@@ -165,19 +259,26 @@ fn pass(job: &Job, outcome: &Outcome, index: usize, x_mm: f64, zero: f64) -> Pas
         corners.reverse();
     }
     let place = |z: f64| round_to_increment(z - zero, INCREMENT_MM);
-    let (first_x, first_z) = corners[0];
-    let sign = if to_headstock { 1.0 } else { -1.0 };
-    let approach = first_z + sign * job.program.clearance_z_mm;
-    // Beside a thicker neighbour the tool goes down at the shoulder itself.
-    let blocked = outcome.zones.iter().any(|other| {
-        let (low, high) = (approach.min(first_z), approach.max(first_z));
-        other.z_end_mm > low + 1e-6 && other.z_start_mm < high - 1e-6 && other.diameter_mm >= first_x - 1e-9
-    });
+    let turned = Turned { from_mm: zone.z_start_mm, to_mm: zone.z_end_mm, diameter_mm: x_mm, depth_mm: zone.depth_mm };
     Pass {
         goes_on: false,
         zone: index,
-        approach_mm: (!blocked).then(|| place(approach)),
+        turned,
+        begins_mm: if to_headstock { zone.z_end_mm } else { zone.z_start_mm },
+        approach_mm: None,
         corners: corners.into_iter().map(|(x, z)| (round_to_increment(x, INCREMENT_MM), place(z))).collect(),
+    }
+}
+
+/// The words of a zone for a pass at another diameter: the same speed at the cut, where a pass may have a speed of
+/// its own.
+fn at_diameter(words: Words, zone: &ZoneOutcome, diameter_mm: f64, job: &Job) -> Words {
+    match job.variables.speed {
+        SpeedMode::ConstantSpeed | SpeedMode::ConstantRpm => words,
+        SpeedMode::PerZone | SpeedMode::Fixed => {
+            let speed = words.speed * zone.diameter_mm / diameter_mm;
+            Words { speed: if speed < words.speed { speed.floor().max(1.0) } else { words.speed }, ..words }
+        }
     }
 }
 
@@ -200,16 +301,19 @@ fn note(zone: &ZoneOutcome, words: &Words) -> String {
     text
 }
 
-fn cut(blocks: &mut Vec<Block>, pass: &Pass, words: &Words, retract: f64) {
+/// To a cut, along it, and away from it unless the next one goes on.
+fn moves(blocks: &mut Vec<Block>, pass: &Pass, next: Option<&Pass>, mut feed: Option<f64>, retract: f64) {
     if let (Some(&(first_x, first_z)), false) = (pass.corners.first(), pass.goes_on) {
         blocks.push(Block::Rapid { x_diameter_mm: Some(retract), z_mm: Some(pass.approach_mm.unwrap_or(first_z)) });
         if pass.approach_mm.is_some() {
             blocks.push(Block::Rapid { x_diameter_mm: Some(first_x), z_mm: None });
         }
     }
-    let mut feed = Some(words.feed_mm_per_rev);
     for &(x_diameter_mm, z_mm) in &pass.corners {
         blocks.push(Block::Cut { x_diameter_mm, z_mm, feed_mm_per_rev: feed.take() });
+    }
+    if !next.is_some_and(|next| next.goes_on) {
+        blocks.push(Block::Rapid { x_diameter_mm: Some(retract), z_mm: None });
     }
 }
 

@@ -1,6 +1,6 @@
 //! A force as one product of powers, where it is one: what a geometric program can hold.
 
-use super::{Component, ForceModel, PowerLaw, PowerTerm};
+use super::{Component, ForceModel, MeasuredRange, PowerLaw, PowerTerm};
 
 /// A force K t^x s^y v^n, N, with t in mm, s in mm/rev, v in m/min.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,6 +21,15 @@ impl ForceModel {
         match self {
             Self::PowerLaw(law) => of_law(law, component),
             Self::Handbook(handbook) => of_law(&handbook.resolve("").ok()?, component),
+            Self::Kienzle(_) | Self::Constant(_) | Self::Table(_) => None,
+        }
+    }
+
+    /// What the trials behind a power law covered, where it is stated.
+    pub fn measured_range(&self) -> Option<MeasuredRange> {
+        match self {
+            Self::PowerLaw(law) => law.measured_range.clone(),
+            Self::Handbook(handbook) => handbook.resolve("").ok()?.measured_range,
             Self::Kienzle(_) | Self::Constant(_) | Self::Table(_) => None,
         }
     }

@@ -1,7 +1,7 @@
 //! Whether any point satisfies the limits: phase 1 and its certificate.
 
 use super::interior::{Failed, Settings};
-use super::{Affines, Layout, Objective, Program};
+use super::{Affines, Layout, Objective, Program, conic};
 
 /// What phase 1 found.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,15 +24,16 @@ const TOLERANCE: f64 = 1e-7;
 /// Half-width of the box that keeps every variable bounded when bounds are left out, in logarithms.
 const BOX: f64 = 12.0;
 
-/// Minimises the common relaxation t >= -0.5 of the chosen rows and sums (`feed/6.5`); the others are left out.
+/// Minimises the common relaxation t >= -0.5 of the chosen rows and sums (`feed/6.5`); the others are left out. Where the
+/// program's own method comes to nothing, by the general conic solver.
 ///
 /// # Errors
-/// [`Failed::Stalled`] where the method came to nothing.
+/// [`Failed::Stalled`] where both came to nothing.
 pub fn feasibility(program: &Program, rows: &[usize], sums: &[usize]) -> Result<Verdict, Failed> {
     let relaxed = relaxed(program, rows, sums);
-    let layout = Layout::new(&relaxed).ok_or(Failed::NotChained)?;
     let settings = Settings { gap: 1e-9, enough: Some(-1e-6), iterations: 120, ..Settings::default() };
-    let solution = layout.minimise(&settings)?;
+    let own = Layout::new(&relaxed).ok_or(Failed::NotChained).and_then(|layout| layout.minimise(&settings));
+    let solution = own.or_else(|failed| conic::minimise(&relaxed, settings.gap).map_err(|_| failed))?;
     if solution.objective <= TOLERANCE {
         return Ok(Verdict::Feasible);
     }

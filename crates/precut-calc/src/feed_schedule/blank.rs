@@ -1,0 +1,152 @@
+//! What stands of the workpiece while the program runs: where it is too thick the tool may not come in rapid motion.
+
+use crate::calculator::{Failure, Finding};
+
+use super::input::Job;
+use super::output::Outcome;
+
+/// Stretches shorter than this are rounding, mm.
+const LEAST_MM: f64 = 1e-6;
+/// Diameters that differ by less are one, mm: half a step of the control.
+const SAME_MM: f64 = 0.0005;
+
+/// A cut along a zone, as far as the blank is concerned.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Turned {
+    pub from_mm: f64,
+    pub to_mm: f64,
+    /// Diameter that is left.
+    pub diameter_mm: f64,
+    /// Depth on the radius that is taken.
+    pub depth_mm: f64,
+}
+
+/// Diameters along the shaft as they stand now.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Blank {
+    /// Ends of the stretches, ascending.
+    edges_mm: Vec<f64>,
+    /// One for every stretch; 0 where nothing is known to stand.
+    diameters_mm: Vec<f64>,
+}
+
+impl Blank {
+    /// Before all cuts: the shaft's blank, and what the cuts need where that is more.
+    pub(super) fn of(job: &Job, cuts: &[Turned]) -> Self {
+        let segments = segments(job);
+        let mut edges_mm: Vec<f64> = segments.iter().flat_map(|segment| [segment.from_mm, segment.to_mm]).collect();
+        edges_mm.extend(cuts.iter().flat_map(|cut| [cut.from_mm, cut.to_mm]));
+        edges_mm.sort_by(f64::total_cmp);
+        edges_mm.dedup_by(|a, b| (*a - *b).abs() < LEAST_MM);
+        let mut blank = Self { diameters_mm: vec![0.0; edges_mm.len().saturating_sub(1)], edges_mm };
+        for segment in &segments {
+            blank.change(segment.from_mm, segment.to_mm, |_| segment.stock_mm);
+        }
+        for cut in cuts {
+            blank.change(cut.from_mm, cut.to_mm, |there| there.max(cut.diameter_mm + 2.0 * cut.depth_mm));
+        }
+        blank
+    }
+
+    /// Largest diameter.
+    pub(super) fn widest_mm(&self) -> f64 {
+        self.diameters_mm.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// Largest diameter between two stations.
+    pub(super) fn widest_between_mm(&self, a_mm: f64, b_mm: f64) -> f64 {
+        self.touched(a_mm.min(b_mm), a_mm.max(b_mm)).map(|k| self.diameters_mm[k]).fold(0.0, f64::max)
+    }
+
+    /// After a cut.
+    pub(super) fn turn(&mut self, cut: &Turned) {
+        self.change(cut.from_mm, cut.to_mm, |there| there.min(cut.diameter_mm));
+    }
+
+    fn change(&mut self, from_mm: f64, to_mm: f64, to: impl Fn(f64) -> f64) {
+        for k in self.touched(from_mm, to_mm).collect::<Vec<_>>() {
+            self.diameters_mm[k] = to(self.diameters_mm[k]);
+        }
+    }
+
+    /// Stretches of which more than rounding lies between two stations.
+    fn touched(&self, from_mm: f64, to_mm: f64) -> impl Iterator<Item = usize> + '_ {
+        let ends = self.edges_mm.windows(2).enumerate();
+        ends.filter(move |(_, ends)| ends[0].max(from_mm) + LEAST_MM < ends[1].min(to_mm)).map(|(k, _)| k)
+    }
+}
+
+/// A segment of the job's shaft by its stations.
+struct Placed {
+    from_mm: f64,
+    to_mm: f64,
+    diameter_mm: f64,
+    stock_mm: f64,
+}
+
+fn segments(job: &Job) -> Vec<Placed> {
+    let mut from_mm = 0.0;
+    let shaft = job.shaft.iter().flat_map(|shaft| &shaft.segments);
+    shaft
+        .map(|segment| {
+            let to_mm = from_mm + segment.length_mm;
+            let placed = Placed { from_mm, to_mm, diameter_mm: segment.diameter_mm, stock_mm: segment.stock_mm() };
+            from_mm = to_mm;
+            placed
+        })
+        .collect()
+}
+
+/// A program turns zones to their diameters by their depths: refused where the job's own shaft has another drawing there,
+/// or a blank that leaves more to cut than the schedule counts with.
+pub(super) fn zones_fit_the_shaft(job: &Job, outcome: &Outcome, cuts: &[Turned]) -> Result<(), Failure> {
+    let segments = segments(job);
+    for zone in &outcome.zones {
+        let (from_mm, to_mm) = (zone.z_start_mm, zone.z_end_mm);
+        let cut = |segment: &&Placed| segment.from_mm.max(from_mm) + LEAST_MM < segment.to_mm.min(to_mm);
+        // Roughing passes and finish lie over one stretch.
+        let over =
+            cuts.iter().filter(|cut| (cut.from_mm - from_mm).abs() < LEAST_MM && (cut.to_mm - to_mm).abs() < LEAST_MM);
+        let depth_mm: f64 = over.map(|cut| cut.depth_mm).sum();
+        for segment in segments.iter().filter(cut) {
+            let fault = |code, value_mm: f64, limit_mm: f64| {
+                Finding::new(code, "/zones")
+                    .measured(value_mm, limit_mm, "mm")
+                    .with("zone", zone.id.clone())
+                    .with("from_mm", segment.from_mm.max(from_mm))
+                    .with("to_mm", segment.to_mm.min(to_mm))
+            };
+            if (zone.diameter_mm - segment.diameter_mm).abs() > SAME_MM {
+                return Err(Failure::OutOfModel(fault("zone_off_drawing", zone.diameter_mm, segment.diameter_mm)));
+            }
+            let needed_mm = (segment.stock_mm - segment.diameter_mm) / 2.0;
+            if needed_mm > depth_mm + SAME_MM {
+                return Err(Failure::OutOfModel(fault("zone_off_blank", depth_mm, needed_mm)));
+            }
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cut(from_mm: f64, to_mm: f64, diameter_mm: f64, depth_mm: f64) -> Turned {
+        Turned { from_mm, to_mm, diameter_mm, depth_mm }
+    }
+
+    #[test]
+    fn what_stands_is_what_no_cut_has_taken() {
+        let cuts = [cut(0.0, 100.0, 52.0, 1.0), cut(0.0, 100.0, 50.0, 1.0), cut(100.0, 150.0, 60.0, 0.5)];
+        let job: Job = serde_json::from_str("{}").unwrap_or_else(|_| unreachable!("every field has a default"));
+        let mut blank = Blank::of(&job, &cuts);
+        assert_eq!((blank.widest_mm(), blank.widest_between_mm(20.0, 10.0)), (61.0, 54.0));
+        blank.turn(&cuts[0]);
+        assert_eq!(blank.widest_between_mm(10.0, 100.0), 52.0);
+        assert_eq!(blank.widest_between_mm(10.0, 100.1), 61.0);
+        assert_eq!(blank.widest_between_mm(150.0, 170.0), 0.0, "nothing stands beyond the end");
+        blank.turn(&cuts[1]);
+        assert_eq!(blank.widest_between_mm(0.0, 100.0), 50.0);
+    }
+}

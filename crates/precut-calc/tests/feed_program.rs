@@ -1,0 +1,229 @@
+//! Programs of schedules, driven over a blank: what they cut, and that no rapid motion goes through what stands.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use precut_calc::calculator::{Answer, Block, Calculator, Failure, Unwatched, Violations};
+use precut_calc::feed_schedule::{FeedSchedule, Job, Outcome};
+use serde_json::{Value, json};
+
+use crate::feed_support;
+
+/// Length of a cell of the blank, mm: every station of these tests lies between two.
+const CELL_MM: f64 = 0.5;
+
+/// A shaft of steel between centres, zones without a limit on the deflection, segments as (length, drawing, blank).
+fn job(segments: &[(f64, f64, f64)], zones: Value) -> Value {
+    let length: f64 = segments.iter().map(|segment| segment.0).sum();
+    let segments: Vec<Value> = segments
+        .iter()
+        .map(|(length, d, stock)| json!({ "length_mm": length, "diameter_mm": d, "stock_diameter_mm": stock }))
+        .collect();
+    json!({
+        "shaft": { "youngs_modulus_n_per_mm2": 210_000, "segments": segments },
+        "supports": [{ "kind": "centre", "z_mm": 0 }, { "kind": "centre", "z_mm": length }],
+        "zones": zones,
+        "models": { "tool_life": { "form": "log_log", "constant": 9, "speed_exponent": -1.5, "feed_exponent": -0.3 } },
+        "limits": {
+            "feed_min_mm_per_rev": 0.05, "feed_max_mm_per_rev": 0.4,
+            "speed_min_m_per_min": 10, "speed_max_m_per_min": 80, "tool_life_min_min": 20
+        },
+        "objective": { "kind": "time" },
+    })
+}
+
+fn zone(id: &str, from: f64, to: f64, diameter: f64, depth: f64) -> Value {
+    json!({ "id": id, "z_start_mm": from, "z_end_mm": to, "diameter_mm": diameter, "depth_mm": depth })
+}
+
+fn answered(job: &Value) -> (Job, Answer<Outcome>) {
+    let job = feed_support::job(job.clone());
+    let answer = FeedSchedule::run(&job, &Unwatched).unwrap();
+    (job, answer)
+}
+
+fn program(job: &Value) -> Result<Vec<Block>, Failure> {
+    let (job, answer) = answered(job);
+    FeedSchedule::program(&job, &answer.output).unwrap().map(|program| program.blocks)
+}
+
+fn refused(job: &Value) -> &'static str {
+    match program(job) {
+        Err(Failure::OutOfModel(finding)) => finding.code,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn warned(job: &Value) -> Vec<&'static str> {
+    answered(job).1.warnings.iter().map(|warning| warning.code).collect()
+}
+
+/// A turned blank by cells.
+struct Driven {
+    diameters_mm: Vec<f64>,
+    /// Deepest cut on the radius.
+    deepest_mm: f64,
+}
+
+/// Drives a program whose zero is the right face over a blank. Every rapid motion must be clear of what stands.
+fn driven(blocks: &[Block], segments: &[(f64, f64, f64)]) -> Driven {
+    let mut diameters_mm = Vec::new();
+    let mut length = 0.0;
+    for (part, _, stock) in segments {
+        diameters_mm.extend(vec![*stock; (part / CELL_MM).round() as usize]);
+        length += part;
+    }
+    let mut turned = Driven { diameters_mm, deepest_mm: 0.0 };
+    let mut at: Option<(f64, f64)> = None;
+    for block in blocks {
+        match *block {
+            Block::Rapid { x_diameter_mm, z_mm } => {
+                let from = at.unwrap_or_else(|| (f64::INFINITY, z_mm.unwrap() + length));
+                let to = (x_diameter_mm.unwrap_or(from.0), z_mm.map_or(from.1, |z| z + length));
+                let lowest = from.0.min(to.0);
+                for d in turned.between(from.1, to.1) {
+                    assert!(*d < lowest, "rapid from {from:?} to {to:?} through {d}");
+                }
+                at = Some(to);
+            }
+            Block::Cut { x_diameter_mm, z_mm, .. } => {
+                let from = at.unwrap();
+                let to = (x_diameter_mm, z_mm + length);
+                let mut deepest = turned.deepest_mm;
+                for d in turned.between(from.1, to.1) {
+                    assert!((from.0 - to.0).abs() < 1e-9, "these programs have no tapers");
+                    deepest = f64::max(deepest, (*d - to.0) / 2.0);
+                    *d = d.min(to.0);
+                }
+                turned.deepest_mm = deepest;
+                at = Some(to);
+            }
+            _ => {}
+        }
+    }
+    turned
+}
+
+impl Driven {
+    fn between(&mut self, a: f64, b: f64) -> impl Iterator<Item = &mut f64> {
+        let cell = |z: f64| (z / CELL_MM).round().max(0.0) as usize;
+        let (low, high) = (cell(a.min(b)), cell(a.max(b)).min(self.diameters_mm.len()));
+        self.diameters_mm[low.min(high)..high].iter_mut()
+    }
+
+    fn at(&self, z: f64) -> f64 {
+        self.diameters_mm[(z / CELL_MM) as usize]
+    }
+}
+
+fn each_way(job: &Value) -> [Value; 2] {
+    ["to_headstock", "to_tailstock"].map(|direction| {
+        let mut job = job.clone();
+        job["feed_direction"] = json!(direction);
+        job
+    })
+}
+
+#[test]
+fn no_rapid_motion_goes_through_a_collar_that_no_zone_cuts() {
+    let groove = [(300.0, 60.0, 60.0), (300.0, 50.0, 51.0), (300.0, 60.0, 60.0)];
+    let flange = [(300.0, 50.0, 51.0), (100.0, 120.0, 120.0), (300.0, 50.0, 51.0)];
+    let of_groove = job(&groove, json!([zone("m", 300.0, 600.0, 50.0, 0.5)]));
+    let of_flange = job(&flange, json!([zone("a", 0.0, 300.0, 50.0, 0.5), zone("b", 400.0, 700.0, 50.0, 0.5)]));
+    for (of, segments, plunges) in [(of_groove, &groove, true), (of_flange, &flange, true)] {
+        for job in each_way(&of) {
+            let turned = driven(&program(&job).unwrap(), segments);
+            let mut from = 0.0;
+            for (length, drawing, _) in segments {
+                assert_eq!(turned.at(from + length / 2.0), *drawing);
+                from += length;
+            }
+            assert!((turned.deepest_mm - 0.5).abs() < 1e-9, "{}", turned.deepest_mm);
+            assert_eq!(warned(&job).contains(&"plunge_at_shoulder"), plunges);
+        }
+    }
+}
+
+/// Three steps down to a middle and up again, each with a blank half a millimetre thicker on the radius.
+#[test]
+fn stepped_shafts_are_turned_to_their_drawing() {
+    let steps = [(100.0, 40.0, 41.0), (150.0, 50.0, 51.0), (80.0, 44.0, 45.0), (120.0, 60.0, 61.0)];
+    let mut from = 0.0;
+    let mut zones = Vec::new();
+    for (i, (length, d, _)) in steps.iter().enumerate() {
+        zones.push(zone(&format!("z{i}"), from, from + length, *d, 0.5));
+        from += length;
+    }
+    for job in each_way(&job(&steps, json!(zones))) {
+        let turned = driven(&program(&job).unwrap(), &steps);
+        assert!((turned.deepest_mm - 0.5).abs() < 1e-9, "{}", turned.deepest_mm);
+        assert_eq!([50.0, 200.0, 300.0, 400.0].map(|z| turned.at(z)), [40.0, 50.0, 44.0, 60.0]);
+    }
+}
+
+#[test]
+fn every_pass_takes_its_own_depth_at_its_own_speed() {
+    let bar = [(300.0, 50.0, 62.0)];
+    let plain = zone("a", 0.0, 300.0, 50.0, 2.0);
+    let mut repeated = plain.clone();
+    repeated["repeat"] = json!(3);
+    let mut planned = job(&bar, json!([plain]));
+    planned["passes"] =
+        json!({ "total_depth_mm": 6.0, "depth_min_mm": 1.0, "depth_max_mm": 2.5, "roughing_passes_max": 4 });
+    for of in [job(&bar, json!([repeated])), planned] {
+        for job in each_way(&of) {
+            let blocks = program(&job).unwrap();
+            let turned = driven(&blocks, &bar);
+            assert!(turned.deepest_mm <= 2.5 + 1e-9 && turned.at(150.0) == 50.0, "{}", turned.deepest_mm);
+            // 80 m/min at most, at whatever diameter.
+            let mut rpm = 0.0;
+            for block in &blocks {
+                match *block {
+                    Block::SpindleSpeed { rpm: next } => rpm = next,
+                    Block::Cut { x_diameter_mm, .. } => {
+                        assert!(std::f64::consts::PI * x_diameter_mm * rpm / 1000.0 <= 80.0 * (1.0 + 1e-9));
+                    }
+                    Block::Rapid { x_diameter_mm: Some(x), .. } => assert!(x == 67.0 || x < 62.0, "{x}"),
+                    _ => {}
+                }
+            }
+            assert!(warned(&job).contains(&"pass_thicker_than_counted"));
+        }
+    }
+}
+
+#[test]
+fn what_the_shaft_says_otherwise_is_not_cut() {
+    let two = [(300.0, 60.0, 61.0), (300.0, 50.0, 51.0)];
+    assert_eq!(refused(&job(&two, json!([zone("a", 0.0, 600.0, 50.0, 0.5)]))), "zone_off_drawing");
+    assert_eq!(refused(&job(&two, json!([zone("a", 300.0, 600.0, 49.9, 0.5)]))), "zone_off_drawing");
+    assert_eq!(refused(&job(&two, json!([zone("a", 300.0, 600.0, 50.0, 0.3)]))), "zone_off_blank");
+    assert!(program(&job(&two, json!([zone("a", 300.0, 600.0, 50.0, 0.6)]))).is_ok(), "some of it in air");
+}
+
+#[test]
+fn chucks_and_rests_are_met() {
+    let bar = [(600.0, 50.0, 51.0)];
+    let mut held = job(&bar, json!([zone("a", 0.0, 600.0, 50.0, 0.5)]));
+    held["supports"] = json!([
+        { "kind": "chuck", "z_mm": 200 }, { "kind": "steady_rest", "z_mm": 450 }, { "kind": "centre", "z_mm": 600 }
+    ]);
+    assert_eq!(refused(&held), "tool_hits_chuck");
+    let said = warned(&held);
+    assert!(said.contains(&"tool_hits_chuck") && said.contains(&"tool_passes_support"), "{said:?}");
+    held["zones"] = json!([zone("a", 250.0, 440.0, 50.0, 0.5)]);
+    assert!(program(&held).is_ok());
+}
+
+/// A compensated path belongs to one pass: driven again it would cut what the first one left on purpose.
+#[test]
+fn no_path_is_compensated_for_passes_that_come_again() {
+    let mut twice = zone("a", 0.0, 600.0, 50.0, 0.5);
+    twice["repeat"] = json!(2);
+    let mut of = job(&[(600.0, 50.0, 52.0)], json!([twice]));
+    of["compensation"] = json!({});
+    of["models"]["force_y"] = json!({ "form": "log_log", "constant": 6.0, "feed_exponent": 0.6 });
+    let parsed: Job = serde_json::from_value(of).unwrap();
+    let mut violations = Violations::default();
+    precut_calc::calculator::Check::check(&parsed, &mut violations);
+    let codes: Vec<&str> = violations.into_vec().iter().map(|finding| finding.code).collect();
+    assert_eq!(codes, ["method_not_together"]);
+}
