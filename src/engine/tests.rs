@@ -147,7 +147,7 @@ async fn a_calculation_ends_when_the_last_who_waits_has_gone() {
     second.abort();
     // The only core is free again for the next job.
     engine.solve(TOY, job(|_| {})).await.unwrap();
-    assert!(begun.elapsed() < Duration::from_secs(5), "cancelled after {:?}", begun.elapsed());
+    assert!(begun.elapsed() < Duration::from_secs(30), "cancelled after {:?}", begun.elapsed());
 }
 
 #[tokio::test]
@@ -219,16 +219,19 @@ async fn a_full_line_is_refused_and_not_queued() {
 
 #[tokio::test]
 async fn closing_waits_for_what_runs_and_cancels_what_runs_too_long() {
-    let (engine, _folder) = engine().await;
-    let spawn = |body: Body| {
-        let engine = engine.clone();
-        tokio::spawn(async move { engine.solve(TOY, body).await })
-    };
-    let (slow, endless) = (spawn(mode("slow")), spawn(mode("endless")));
-    tokio::time::sleep(Duration::from_millis(20)).await;
-    engine.close(Duration::from_millis(300)).await;
-    assert!(slow.await.unwrap().is_ok());
-    assert_eq!(endless.await.unwrap().unwrap_err(), Error::Cancelled);
+    for (name, grace, ends) in [("slow", GRACE, true), ("endless", Duration::ZERO, false)] {
+        let (engine, _folder) = engine().await;
+        let running = tokio::spawn({
+            let engine = engine.clone();
+            async move { engine.solve(TOY, mode(name)).await }
+        });
+        tokio::time::sleep(Duration::from_millis(20)).await;
+        engine.close(grace).await;
+        match running.await.unwrap() {
+            Ok(_) => assert!(ends, "{name}"),
+            Err(error) => assert_eq!((error, ends), (Error::Cancelled, false), "{name}"),
+        }
+    }
 }
 
 #[tokio::test]
@@ -268,7 +271,7 @@ async fn accepted(engine: &Engine, body: Body) -> JobId {
 
 async fn over(engine: &Engine, id: JobId) -> Job {
     let record = engine.job(id).await.unwrap().record;
-    engine.inner.jobs.wait(record, Duration::from_secs(20)).await.unwrap()
+    engine.inner.jobs.wait(record, Duration::from_mins(1)).await.unwrap()
 }
 
 #[tokio::test]
@@ -305,11 +308,12 @@ async fn a_job_computes_what_a_direct_request_found_no_core_for() {
 
 #[tokio::test]
 async fn the_result_of_a_job_goes_when_its_time_is_over() {
-    let (engine, _folder) = engine_with(|settings| settings.job_age = Duration::from_millis(300)).await;
+    let life = Duration::from_secs(4);
+    let (engine, _folder) = engine_with(|settings| settings.job_age = life).await;
     let id = accepted(&engine, job(|_| {})).await;
     assert_eq!(over(&engine, id).await.record.state, JobState::Succeeded);
     engine.job_result(id).await.unwrap();
-    tokio::time::sleep(Duration::from_millis(350)).await;
+    tokio::time::sleep(life).await;
     assert_eq!(engine.job_result(id).await.unwrap_err(), Error::JobExpired);
     assert_eq!(engine.job(id).await.unwrap().record.state, JobState::Succeeded, "that it was is still known");
 }

@@ -14,7 +14,7 @@ use tungstenite::{Message, WebSocket};
 /// Names under which it is found; Debian's package has the first.
 const NAMES: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
 /// Longest wait for something on the page. The machine may be busy.
-const PATIENCE: Duration = Duration::from_mins(1);
+const PATIENCE: Duration = Duration::from_mins(3);
 /// Between two looks.
 const LOOK: Duration = Duration::from_millis(40);
 
@@ -87,6 +87,8 @@ impl Page {
         for domain in ["Page", "Runtime", "Log"] {
             page.call(&format!("{domain}.enable"), json!({}));
         }
+        // A page computes while one types only where answers come at once; here they always do, by its clock.
+        page.call("Page.addScriptToEvaluateOnNewDocument", json!({"source": "performance.now = () => 0;"}));
         page.screen(1440, 900, false);
         Some(page)
     }

@@ -10,7 +10,7 @@ use crate::watch::{Service, until};
 async fn a_thousand_streams_are_bounded_and_where_they_are_allowed_all_hear_the_end() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(folder.path(), &[]).await;
-    let address = service.accepted(&json!({"length_mm": 100, "load_n": 1, "duration_ms": 60_000})).await;
+    let address = service.accepted(&json!({"length_mm": 100, "load_n": 1, "duration_ms": 600_000})).await;
     let events = format!("{address}/events");
     let (mut open, mut refused) = (Vec::new(), 0);
     for _ in 0..1000 {

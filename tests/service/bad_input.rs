@@ -1,7 +1,9 @@
 //! Whatever is sent, the answer is a problem document that says what is wrong and where.
 
 use std::convert::Infallible;
-use std::time::{Duration, Instant};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
 
 use bytes::Bytes;
 use http_body_util::StreamBody;
@@ -294,19 +296,24 @@ async fn a_form_without_a_proper_job_is_refused() {
 #[tokio::test]
 async fn a_body_of_100_mb_is_refused_at_once() {
     let server = Server::start().await;
-    let start = Instant::now();
     let response = server.post(vec![b' '; 100_000_000]).send().await.unwrap();
     let document = problem(response, 413, "body_too_large").await;
     assert_eq!(document["detail"], "at most 8388608 bytes are read here");
     // Without its length given, as it streams in.
     let chunk = Bytes::from(vec![b' '; 1_000_000]);
-    let chunks = futures_util::stream::iter((0..100).map(move |_| Ok::<_, Infallible>(Frame::data(chunk.clone()))));
+    let taken = Arc::new(AtomicUsize::new(0));
+    let counted = Arc::clone(&taken);
+    let chunks = futures_util::stream::iter((0..100).map(move |_| {
+        counted.fetch_add(1, Ordering::Relaxed);
+        Ok::<_, Infallible>(Frame::data(chunk.clone()))
+    }));
     let response = server.post(reqwest::Body::wrap(StreamBody::new(chunks))).send().await.unwrap();
     problem(response, 413, "body_too_large").await;
+    let sent_mb = taken.load(Ordering::Relaxed);
+    assert!(sent_mb < 60, "{sent_mb} MB were sent before it was refused");
     let form = Form::new().part("job", Part::bytes(vec![b' '; 100_000_000]));
     let response = server.client.post(server.url("/v1/sagging-bar")).multipart(form).send().await.unwrap();
     problem(response, 413, "body_too_large").await;
-    assert!(start.elapsed() < Duration::from_secs(5), "{:?}", start.elapsed());
     assert_eq!(server.post(toy::JOB).send().await.unwrap().status(), 200);
 }
 
@@ -362,7 +369,7 @@ async fn a_body_that_never_ends_times_out_or_grows_too_large() {
         }
     });
     let mut answer = vec![0; 4096];
-    let count = tokio::time::timeout(Duration::from_secs(3), reader.read(&mut answer)).await.unwrap().unwrap();
+    let count = tokio::time::timeout(Duration::from_mins(1), reader.read(&mut answer)).await.unwrap().unwrap();
     let answer = String::from_utf8_lossy(&answer[..count]).into_owned();
     assert!(answer.starts_with("HTTP/1.1 408 "), "{answer}");
     dripping.abort();
@@ -407,11 +414,11 @@ async fn requests_that_are_no_http_or_too_long_are_refused() {
     assert_eq!(server.post(toy::JOB).send().await.unwrap().status(), 200);
 }
 
-/// What arrives first, at most for some seconds; empty at the end of the connection.
+/// What arrives first, at most for a minute; empty at the end of the connection.
 async fn read_some(stream: &mut TcpStream) -> String {
     let mut answer = vec![0; 8192];
     let read =
-        tokio::time::timeout(Duration::from_secs(5), stream.read(&mut answer)).await.expect("an answer or an end");
+        tokio::time::timeout(Duration::from_mins(1), stream.read(&mut answer)).await.expect("an answer or an end");
     let count = read.unwrap_or(0);
     String::from_utf8_lossy(&answer[..count]).into_owned()
 }

@@ -85,9 +85,14 @@ async fn with_too_many_requests_in_work_more_are_refused_at_once_and_health_answ
         stream.write_all(head.as_bytes()).await.unwrap();
         held.push(stream);
     }
-    tokio::time::sleep(Duration::from_millis(200)).await;
-    // The others are still held: nobody waits for them.
-    let refused = server.post(toy::JOB).send().await.unwrap();
+    // As soon as both are in work: nobody waits for them.
+    let refused = loop {
+        let response = server.post(toy::JOB).send().await.unwrap();
+        if response.status() != 200 {
+            break response;
+        }
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    };
     assert!(!header(&refused, "retry-after").is_empty());
     problem(refused, 503, "overloaded").await;
     assert_eq!(server.get("/health/ready").send().await.unwrap().status(), 200);
@@ -95,7 +100,7 @@ async fn with_too_many_requests_in_work_more_are_refused_at_once_and_health_answ
     drop(held);
     let start = Instant::now();
     while server.post(toy::JOB).send().await.unwrap().status() != 200 {
-        assert!(start.elapsed() < Duration::from_secs(5), "the places become free again");
+        assert!(start.elapsed() < Duration::from_mins(1), "the places become free again");
         tokio::time::sleep(Duration::from_millis(20)).await;
     }
 }
@@ -106,7 +111,7 @@ async fn a_header_that_never_ends_costs_its_connection() {
     let mut stream = TcpStream::connect(server.address).await.unwrap();
     stream.write_all(b"GET / HTTP/1.1\r\nHost:").await.unwrap();
     let mut rest = Vec::new();
-    let read = tokio::time::timeout(Duration::from_secs(5), stream.read_to_end(&mut rest)).await;
+    let read = tokio::time::timeout(Duration::from_mins(1), stream.read_to_end(&mut rest)).await;
     assert!(read.is_ok(), "the connection is closed");
 }
 
@@ -120,7 +125,7 @@ async fn connections_beyond_the_limit_wait_for_their_turn() {
     let waiting = tokio::time::timeout(Duration::from_millis(200), second.read(&mut answer)).await;
     assert!(waiting.is_err(), "there is one place");
     drop(first);
-    let count = tokio::time::timeout(Duration::from_secs(5), second.read(&mut answer)).await.unwrap().unwrap();
+    let count = tokio::time::timeout(Duration::from_mins(1), second.read(&mut answer)).await.unwrap().unwrap();
     assert!(answer[..count].starts_with(b"HTTP/1.1 200 "));
 }
 

@@ -21,68 +21,101 @@ fn request(method: &str, path: &str, body: &str) -> String {
     )
 }
 
+/// How long anything may take that does come to an end.
+const PATIENCE: Duration = Duration::from_mins(1);
+
 fn ask(address: std::net::SocketAddr, text: &str) -> std::io::Result<String> {
     let mut stream = TcpStream::connect(address)?;
-    stream.set_read_timeout(Some(Duration::from_secs(10)))?;
+    stream.set_read_timeout(Some(PATIENCE))?;
     stream.write_all(text.as_bytes())?;
     let mut answer = String::new();
     stream.read_to_string(&mut answer)?;
     Ok(answer)
 }
 
+/// Waits until it is so.
+#[cfg(unix)]
+fn wait_until(what: &str, is_so: impl Fn() -> bool) {
+    let start = Instant::now();
+    while !is_so() {
+        assert!(start.elapsed() < PATIENCE, "{what}");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// Waits until the service has a request in work besides the one that asks.
+#[cfg(unix)]
+fn wait_for_work(address: std::net::SocketAddr) {
+    wait_until("a request in work", || {
+        let metrics = ask(address, &request("GET", "/metrics", "")).unwrap();
+        let in_work = metrics.lines().find_map(|line| line.strip_prefix("http_requests_in_flight "));
+        in_work.is_some_and(|count| count.trim().parse::<f64>().unwrap() >= 2.0)
+    });
+}
+
+/// Waits until the service has heard that it is to end.
+#[cfg(unix)]
+fn wait_for_the_end_to_begin(address: std::net::SocketAddr) {
+    let ready = request("GET", "/health/ready", "");
+    wait_until("no longer ready", || ask(address, &ready).unwrap().starts_with("HTTP/1.1 503 "));
+}
+
 #[cfg(unix)]
 #[test]
 fn a_request_in_work_is_finished_before_the_process_ends() {
     for signal in ["TERM", "INT"] {
-        let mut process = Process::start();
+        let folder = tempfile::tempdir().unwrap();
+        let gate = folder.path().join("gate");
+        let settings = [(toy::HELD_MM, "100"), (toy::GATE, gate.to_str().unwrap()), ("PRECUT_SHUTDOWN_GRACE_S", "600")];
+        let mut process = Process::start_with(&folder.path().join("data"), &settings);
         let address = process.address;
-        let job = r#"{"length_mm": 100, "load_n": 1, "behaviour": "slow"}"#;
+        let job = r#"{"length_mm": 100, "load_n": 1, "work_ms": 400}"#;
         let slow = std::thread::spawn(move || ask(address, &request("POST", "/v1/sagging-bar", job)));
-        std::thread::sleep(Duration::from_millis(300));
+        wait_for_work(address);
         process.signal(signal);
-        std::thread::sleep(Duration::from_millis(100));
-        // Not ready at once, and nothing new is begun.
-        let ready = ask(address, &request("GET", "/health/ready", "")).unwrap();
-        assert!(ready.starts_with("HTTP/1.1 503 "), "{ready}");
+        wait_for_the_end_to_begin(address);
+        // Nothing new is begun.
         let refused = ask(address, &request("POST", "/v1/sagging-bar", toy::JOB)).unwrap();
         assert!(refused.starts_with("HTTP/1.1 503 ") && refused.contains("shutting_down"), "{refused}");
+        std::fs::write(&gate, "").unwrap();
         let answer = slow.join().unwrap().unwrap();
         assert!(answer.starts_with("HTTP/1.1 200 "), "{answer}");
-        assert_eq!(process.wait(Duration::from_secs(10)), Some(0), "{signal}");
-        assert!(ask(address, &request("GET", "/health/live", "")).is_err(), "nobody listens any more");
+        assert_eq!(process.wait(PATIENCE), Some(0), "{signal}");
     }
 }
 
 #[cfg(unix)]
 #[test]
 fn idle_connections_do_not_hold_the_process_up() {
-    let mut process = Process::start();
+    let folder = tempfile::tempdir().unwrap();
+    let mut process = Process::start_with(folder.path(), &[("PRECUT_SHUTDOWN_GRACE_S", "600")]);
     let mut idle = TcpStream::connect(process.address).unwrap();
     idle.write_all(b"GET /health/live HTTP/1.1\r\nHost: x\r\n\r\n").unwrap();
     let mut some = [0; 512];
     assert!(idle.read(&mut some).unwrap() > 0);
     let silent = TcpStream::connect(process.address).unwrap();
-    let start = Instant::now();
     process.signal("TERM");
-    assert_eq!(process.wait(Duration::from_secs(10)), Some(0));
-    assert!(start.elapsed() < Duration::from_secs(3), "{:?}", start.elapsed());
+    // Long before those have to go who have something in work.
+    assert_eq!(process.wait(PATIENCE), Some(0));
     drop(silent);
 }
 
 #[cfg(unix)]
 #[test]
 fn a_second_signal_ends_the_process_at_once() {
-    let mut process = Process::start();
+    let folder = tempfile::tempdir().unwrap();
+    let settings = [("PRECUT_SHUTDOWN_GRACE_S", "600"), ("PRECUT_LIMITS_BODY_TIMEOUT_S", "600")];
+    let mut process = Process::start_with(folder.path(), &settings);
     // A request whose body stands in the middle: the first signal waits for it.
     let mut held = TcpStream::connect(process.address).unwrap();
     let head =
         "POST /v1/sagging-bar HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: 36\r\n\r\n{";
     held.write_all(head.as_bytes()).unwrap();
-    std::thread::sleep(Duration::from_millis(200));
+    wait_for_work(process.address);
     process.signal("TERM");
-    std::thread::sleep(Duration::from_millis(100));
+    wait_for_the_end_to_begin(process.address);
     process.signal("TERM");
-    let code = process.wait(Duration::from_secs(5));
+    let code = process.wait(PATIENCE);
     assert!(code.is_some_and(|code| code != 0), "{code:?}");
 }
 
@@ -98,7 +131,7 @@ fn results_survive_a_restart() {
         assert!(answer.starts_with("HTTP/1.1 200 "), "{answer}");
         caches.push(answer.lines().find(|line| line.starts_with("precut-cache")).unwrap().to_owned());
         process.signal("TERM");
-        assert_eq!(process.wait(Duration::from_secs(10)), Some(0));
+        assert_eq!(process.wait(PATIENCE), Some(0));
     }
     assert_eq!(caches, ["precut-cache: miss", "precut-cache: hit"]);
 }
@@ -107,26 +140,14 @@ fn results_survive_a_restart() {
 #[test]
 fn a_killed_job_is_finished_by_the_next_process() {
     let folder = tempfile::tempdir().unwrap();
-    let job = r#"{"length_mm": 100, "load_n": 1, "duration_ms": 800}"#;
-    let mut process = Process::start_in(folder.path());
-    let accepted = ask(process.address, &request("POST", "/v1/sagging-bar", job)).unwrap();
-    assert!(accepted.starts_with("HTTP/1.1 202 "), "{accepted}");
-    let address = accepted.lines().find_map(|line| line.strip_prefix("location: ")).unwrap().to_owned();
-    std::thread::sleep(Duration::from_millis(300));
+    let job = r#"{"length_mm": 100, "load_n": 1, "duration_ms": 600}"#;
+    let mut process = Process::start_with(folder.path(), &[(toy::HELD_MM, "100")]);
+    let address = accepted(&process, job);
+    until(&process, &address, "running");
     process.signal("KILL");
-    process.wait(Duration::from_secs(5));
+    process.wait(PATIENCE);
     let process = Process::start_in(folder.path());
-    let start = Instant::now();
-    loop {
-        let answer = ask(process.address, &request("GET", &address, "")).unwrap();
-        assert!(answer.starts_with("HTTP/1.1 200 "), "{answer}");
-        if answer.contains("\"state\":\"succeeded\"") {
-            assert!(answer.contains("\"attempt\":2"), "{answer}");
-            break;
-        }
-        assert!(start.elapsed() < Duration::from_secs(10), "{answer}");
-        std::thread::sleep(Duration::from_millis(20));
-    }
+    assert_eq!(until(&process, &address, "succeeded")["attempt"], 2);
     let result = ask(process.address, &request("GET", &format!("{address}/result"), "")).unwrap();
     assert!(result.starts_with("HTTP/1.1 200 ") && result.contains("max_sag_um"), "{result}");
 }
@@ -154,7 +175,7 @@ fn until(process: &Process, address: &str, state: &str) -> serde_json::Value {
         if job["state"] == state {
             return job;
         }
-        assert!(start.elapsed() < Duration::from_secs(20), "{job:#}");
+        assert!(start.elapsed() < PATIENCE, "{job:#}");
         std::thread::sleep(Duration::from_millis(10));
     }
 }
@@ -163,11 +184,11 @@ fn until(process: &Process, address: &str, state: &str) -> serde_json::Value {
 #[test]
 fn a_job_that_a_shutdown_interrupts_is_put_back_without_a_charge() {
     let folder = tempfile::tempdir().unwrap();
-    let mut process = Process::start_in(folder.path());
-    let address = accepted(&process, r#"{"length_mm": 100, "load_n": 1, "duration_ms": 1500}"#);
+    let mut process = Process::start_with(folder.path(), &[(toy::HELD_MM, "100")]);
+    let address = accepted(&process, r#"{"length_mm": 100, "load_n": 1, "duration_ms": 600}"#);
     assert_eq!(until(&process, &address, "running")["attempt"], 1);
     process.signal("TERM");
-    assert_eq!(process.wait(Duration::from_secs(10)), Some(0));
+    assert_eq!(process.wait(PATIENCE), Some(0));
     let process = Process::start_in(folder.path());
     assert_eq!(until(&process, &address, "succeeded")["attempt"], 1);
 }
@@ -176,17 +197,28 @@ fn a_job_that_a_shutdown_interrupts_is_put_back_without_a_charge() {
 #[test]
 fn a_job_that_ends_its_process_each_time_is_given_up_and_its_neighbours_are_not() {
     let folder = tempfile::tempdir().unwrap();
-    let mut process = Process::start_in(folder.path());
+    let slots = ("PRECUT_JOBS_SLOTS", "1");
+    let gate = folder.path().join("gate");
+    let held = [(toy::HELD_MM, "101"), (toy::GATE, gate.to_str().unwrap()), slots];
+    let data = folder.path().join("data");
+    let mut process = Process::start_with(&data, &held);
     let waiting = accepted(&process, r#"{"length_mm": 101, "load_n": 1, "duration_ms": 600}"#);
     let deadly = r#"{"length_mm": 100, "load_n": 1, "behaviour": "abort", "duration_ms": 501}"#;
     let deadly = accepted(&process, deadly);
     let after = accepted(&process, r#"{"length_mm": 102, "load_n": 1, "duration_ms": 600}"#);
+    std::fs::write(&gate, "").unwrap();
     let mut deaths = 0;
     let failed = loop {
-        if process.wait(Duration::from_millis(1)).is_some() || process.child.try_wait().unwrap().is_some() {
+        if process.child.try_wait().unwrap().is_some() {
             deaths += 1;
-            assert!(deaths <= 3, "it is given up after three");
-            process = Process::start_in(folder.path());
+            process = loop {
+                assert!(deaths <= 3, "it is given up after three");
+                // It may die before it says where it listens.
+                match Process::try_start_with(&data, &[slots]) {
+                    Some(next) => break next,
+                    None => deaths += 1,
+                }
+            };
         }
         let answer = ask(process.address, &request("GET", &deadly, "")).unwrap_or_default();
         if answer.contains("\"state\":\"failed\"") {

@@ -1,5 +1,7 @@
 //! Kept results.
 
+use std::time::{Duration, Instant};
+
 use serde_json::Value;
 
 use crate::support::{Server, header, problem, toy};
@@ -16,15 +18,15 @@ async fn fill(server: &Server, count: u32) -> Vec<String> {
 
 /// Results reach the database behind the answer.
 async fn listed(server: &Server, path: &str, count: usize) -> Value {
-    let mut list = Value::Null;
-    for _ in 0..100 {
-        list = server.get(path).send().await.unwrap().json().await.unwrap();
+    let begun = Instant::now();
+    loop {
+        let list: Value = server.get(path).send().await.unwrap().json().await.unwrap();
         if list["items"].as_array().is_some_and(|items| items.len() >= count) {
-            break;
+            return list;
         }
-        tokio::time::sleep(std::time::Duration::from_millis(20)).await;
+        assert!(begun.elapsed() < Duration::from_mins(1), "{list:#}");
+        tokio::time::sleep(Duration::from_millis(20)).await;
     }
-    list
 }
 
 #[tokio::test]
@@ -66,6 +68,7 @@ async fn results_and_jobs_are_told_apart_in_lists() {
         serde_json::from_str(entry.entry("deflection-compensation").unwrap().meta().examples[0].job).unwrap();
     let ask = |job: &Value| server.post_to("/v1/deflection-compensation", job.to_string());
     assert_eq!(ask(&job).send().await.unwrap().status(), 200);
+    listed(&server, "/v1/results", 1).await;
     job["cut"]["feed_mm_per_rev"] = 0.25.into();
     assert_eq!(ask(&job).header("prefer", "respond-async").send().await.unwrap().status(), 202);
     let all = listed(&server, "/v1/results", 2).await;
@@ -134,7 +137,6 @@ async fn a_result_is_read_in_every_form_without_computing() {
 async fn equal_jobs_at_the_same_time_share_one_computation() {
     let server = Server::start().await;
     let job = r#"{"length_mm": 322, "load_n": 5, "behaviour": "slow"}"#;
-    let start = std::time::Instant::now();
     let asked: Vec<_> = (0..8).map(|_| tokio::spawn(server.post(job).send())).collect();
     let mut bodies = Vec::new();
     for answer in asked {
@@ -143,7 +145,7 @@ async fn equal_jobs_at_the_same_time_share_one_computation() {
         bodies.push(response.bytes().await.unwrap());
     }
     assert!(bodies.windows(2).all(|pair| pair[0] == pair[1]));
-    assert!(start.elapsed() < std::time::Duration::from_secs(3), "{:?}", start.elapsed());
+    assert_eq!(toy::runs(322), 1);
 }
 
 #[tokio::test]
@@ -158,7 +160,7 @@ async fn a_place_in_the_list_is_written_in_one_way_only() {
         if page["next"].is_string() {
             break page;
         }
-        tokio::time::sleep(std::time::Duration::from_millis(10)).await;
+        tokio::time::sleep(Duration::from_millis(10)).await;
     };
     let next = page["next"].as_str().unwrap();
     assert_eq!(server.get(next).send().await.unwrap().status(), 200);

@@ -51,7 +51,7 @@ impl Server {
         let app = App::new(engine.clone(), &config);
         let (stop, stopped) = watch::channel(false);
         let task = tokio::spawn(async move {
-            let left = http::serve(listener, app, stopped, Duration::from_secs(5)).await;
+            let left = http::serve(listener, app, stopped, Duration::from_mins(1)).await;
             engine.close(left).await;
         });
         Self {

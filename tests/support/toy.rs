@@ -1,5 +1,8 @@
 //! A calculator with one of everything that the service has to carry: a bar that sags.
 
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use precut::registry::Registry;
@@ -110,13 +113,67 @@ pub struct BarResult {
     pub max_sag_um: f64,
 }
 
+/// Bars, by the bits of their lengths, whose computation does not end before they are let go.
+static HELD: Mutex<BTreeSet<u64>> = Mutex::new(BTreeSet::new());
+/// How often bars of a length were computed.
+static RUNS: Mutex<BTreeMap<u64, u32>> = Mutex::new(BTreeMap::new());
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Bars of a length are being computed as long as it lives.
+pub struct Held(u64);
+
+/// Holds the computation of bars of a length, one that no other test of this program has.
+#[allow(dead_code)] // not every program of tests holds one
+pub fn hold(length_mm: u32) -> Held {
+    let length = bits(length_mm.into());
+    lock(&HELD).insert(length);
+    Held(length)
+}
+
+impl Drop for Held {
+    fn drop(&mut self) {
+        lock(&HELD).remove(&self.0);
+    }
+}
+
+/// How often bars of a length were computed in this process.
+#[allow(dead_code)] // not every program of tests asks
+pub fn runs(length_mm: u32) -> u32 {
+    lock(&RUNS).get(&bits(length_mm.into())).copied().unwrap_or(0)
+}
+
+/// Length of the bars that a process holds whose environment says so, until the file that it names is there.
+pub const HELD_MM: &str = "TOY_HELD_MM";
+/// Name of that file.
+pub const GATE: &str = "TOY_GATE";
+
+/// A length as a name.
+fn bits(length_mm: f64) -> u64 {
+    length_mm.to_bits()
+}
+
+fn is_held(length_mm: f64) -> bool {
+    let told = || std::env::var(HELD_MM).is_ok_and(|held| held.parse() == Ok(length_mm));
+    let open = || std::env::var_os(GATE).is_some_and(|gate| Path::new(&gate).exists());
+    lock(&HELD).contains(&bits(length_mm)) || (told() && !open())
+}
+
 /// Takes the time that the job asks for, telling how far it is and what the bar looks like so far.
 fn take_time(input: &BarJob, monitor: &dyn Monitor) -> Result<(), Failure> {
     let (start, whole) = (Instant::now(), Duration::from_secs_f64(input.duration_ms / 1e3));
     let mut pictures = 0;
-    while start.elapsed() < whole {
+    loop {
+        let held = is_held(input.length_mm);
+        if start.elapsed() >= whole && !held {
+            return Ok(());
+        }
         checkpoint(monitor)?;
-        let share = start.elapsed().as_secs_f64() / whole.as_secs_f64();
+        let elapsed_s = start.elapsed().as_secs_f64();
+        // Nobody knows when what is held ends: it gets on, and never arrives.
+        let share = elapsed_s / if held { elapsed_s + 1.0 } else { whole.as_secs_f64() };
         monitor.progress(share.min(1.0), Message::new("bar_sags").with("percent", (100.0 * share).floor()));
         if share >= 0.25 * f64::from(pictures) {
             pictures += 1;
@@ -124,7 +181,6 @@ fn take_time(input: &BarJob, monitor: &dyn Monitor) -> Result<(), Failure> {
         }
         std::thread::sleep(Duration::from_millis(5));
     }
-    Ok(())
 }
 
 fn figure(id: &'static str, x: &[f64], y: &[f64]) -> Figure {
@@ -184,6 +240,7 @@ impl Calculator for Bar {
     }
 
     fn run(input: &BarJob, monitor: &dyn Monitor) -> Result<Answer<BarResult>, Failure> {
+        *lock(&RUNS).entry(bits(input.length_mm)).or_default() += 1;
         take_time(input, monitor)?;
         match input.behaviour {
             Behaviour::Slow => {

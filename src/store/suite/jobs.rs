@@ -227,8 +227,11 @@ pub(in crate::store) async fn a_lost_task_is_given_again_and_no_other<P: Place>(
     assert_eq!(line, [lost, kept]);
 }
 
+/// How long a job's result lives in the next test: long beside what the test does meanwhile.
+const LIFE: Duration = Duration::from_secs(5);
+
 pub(in crate::store) async fn what_a_kept_job_points_to_stays_and_what_is_expired_goes<P: Place>() {
-    let place = P::with(Keep { bytes: 1, age: Duration::ZERO, jobs: Duration::from_millis(1500) }).await;
+    let place = P::with(Keep { bytes: 1, age: Duration::ZERO, jobs: LIFE }).await;
     let id = place.accept(NewJob { result: Some(result(1)), ..job(1) }).await.id;
     place.store().put(KeptResult { body: vec![b' '; 4000].into(), ..result(2) });
     place.store().list(crate::store::ResultQuery::default()).await.unwrap();
@@ -237,13 +240,13 @@ pub(in crate::store) async fn what_a_kept_job_points_to_stays_and_what_is_expire
     assert_eq!(place.store().get(key(2)).await.unwrap(), None, "what no job points to is evicted");
     assert_eq!(place.store().get(key(1)).await.unwrap(), Some(result(1)));
     assert_eq!(place.store().forget_expired().await.unwrap(), 0);
-    tokio::time::sleep(Duration::from_millis(1550)).await;
+    tokio::time::sleep(LIFE + Duration::from_millis(50)).await;
     assert_eq!(place.store().forget_expired().await.unwrap(), 0, "its record is known for as long again");
     assert!(place.record(id).await.expires_ms.unwrap() <= now_ms());
     place.store().put(KeptResult { body: vec![b' '; 4000].into(), ..result(4) });
     place.store().list(crate::store::ResultQuery::default()).await.unwrap();
     assert_eq!(place.store().get(key(1)).await.unwrap(), None);
-    tokio::time::sleep(Duration::from_millis(1500)).await;
+    tokio::time::sleep(LIFE).await;
     assert_eq!(place.store().forget_expired().await.unwrap(), 1);
     assert_eq!(place.store().job(id).await.unwrap(), None);
 }
@@ -298,7 +301,7 @@ pub(in crate::store) async fn the_queue_hands_out_each_task_once_and_no_more_tha
     for number in 0..20 {
         expected.push(place.accept(job(number)).await.id);
     }
-    tokio::time::timeout(Duration::from_secs(60), async {
+    tokio::time::timeout(Duration::from_mins(1), async {
         while seen.lock().unwrap().len() < expected.len() {
             tokio::time::sleep(Duration::from_millis(10)).await;
         }

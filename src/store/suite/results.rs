@@ -1,6 +1,6 @@
 //! What every store has to do with results and parts of studies.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use super::{Place, keep, list};
 use crate::key::Key;
@@ -17,6 +17,22 @@ fn result(number: u32, calculator: &str) -> KeptResult {
         engine: "0.0.0".to_owned(),
         input: vec![b' '; 100].into(),
         body: body.into(),
+    }
+}
+
+/// How long anything may take that does come to an end.
+const PATIENCE: Duration = Duration::from_mins(1);
+
+/// Waits until so many results are listed, which are written behind the back of who puts them.
+async fn listed<P: Place>(place: &P, count: usize) {
+    let begun = Instant::now();
+    loop {
+        let items = list(place.store(), None, 500, None).await.items;
+        if items.len() == count {
+            return;
+        }
+        assert!(begun.elapsed() < PATIENCE, "{} are listed, not {count}", items.len());
+        tokio::time::sleep(Duration::from_millis(10)).await;
     }
 }
 
@@ -41,9 +57,9 @@ pub(in crate::store) async fn what_is_too_much_to_wait_is_not_kept_and_does_no_h
         place.store().put(large(number));
     }
     assert_eq!(place.store().get(large(4).key).await.unwrap(), None);
-    assert_eq!(list(place.store(), None, 10, None).await.items.len(), 3);
+    listed(&place, 3).await;
     place.store().put(large(4));
-    assert_eq!(list(place.store(), None, 10, None).await.items.len(), 4);
+    listed(&place, 4).await;
     assert_eq!(place.store().get(large(4).key).await.unwrap(), Some(large(4)));
 }
 
@@ -57,7 +73,7 @@ pub(in crate::store) async fn a_damaged_row_is_not_served_and_goes_away<P: Place
     assert_eq!(list(place.store(), None, 10, None).await.items, []);
     // It can be kept again.
     place.store().put(kept.clone());
-    assert_eq!(list(place.store(), None, 10, None).await.items.len(), 1);
+    listed(&place, 1).await;
     assert_eq!(place.store().get(kept.key).await.unwrap(), Some(kept));
 }
 
@@ -69,6 +85,7 @@ pub(in crate::store) async fn the_list_is_paged_newest_first_and_filtered<P: Pla
             tokio::time::sleep(Duration::from_millis(5)).await;
         }
     }
+    listed(&place, 7).await;
     let whole = list(place.store(), None, 100, None).await;
     assert_eq!((whole.items.len(), whole.next), (7, None));
     assert!(whole.items.is_sorted_by(|a, b| (a.created_ms, a.key) > (b.created_ms, b.key)));
@@ -110,8 +127,11 @@ pub(in crate::store) async fn what_is_old_is_forgotten_at_the_next_start<P: Plac
     first.store().put(result(1, "a"));
     tokio::time::sleep(Duration::from_millis(20)).await;
     let second = first.again_with(Keep { age: Duration::from_millis(1), ..of_bytes(1 << 30) }).await;
-    tokio::time::sleep(Duration::from_millis(100)).await;
-    assert_eq!(list(second.store(), None, 10, None).await.items, []);
+    let begun = Instant::now();
+    while !list(second.store(), None, 10, None).await.items.is_empty() {
+        assert!(begun.elapsed() < PATIENCE, "it is still listed");
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
     assert_eq!(second.store().get(result(1, "a").key).await.unwrap(), None);
 }
 
@@ -123,8 +143,7 @@ pub(in crate::store) async fn the_jobs_of_some_results_are_read_at_once<P: Place
         place.store().put(kept(number, job));
     }
     // What waits to be written is written by then.
-    let all = list(place.store(), None, 10, None).await;
-    assert_eq!(all.items.len(), 3);
+    listed(&place, 3).await;
     let keys = vec![result(2, "a").key, result(9, "a").key, result(0, "a").key];
     let mut found = place.store().inputs(keys.clone(), 1000).await.unwrap();
     found.sort_by_key(|(key, _)| *key != result(0, "a").key);
@@ -151,7 +170,7 @@ pub(in crate::store) async fn parts_of_a_study_are_put_down_and_forgotten<P: Pla
 }
 
 pub(in crate::store) async fn parts_of_a_study_that_no_job_waits_for_go_in_time<P: Place>() {
-    let place = P::with(super::keep(Duration::from_millis(200))).await;
+    let place = P::new().await;
     let (deserted, wanted) = (super::key(1), super::key(2));
     for study in [deserted, wanted] {
         place.store().put_shard(study, 0, "part".into()).await.unwrap();
@@ -159,7 +178,8 @@ pub(in crate::store) async fn parts_of_a_study_that_no_job_waits_for_go_in_time<
     place.accept(super::job(2)).await;
     place.store().forget_expired().await.unwrap();
     assert_eq!(place.store().shards(deserted).await.unwrap().len(), 1, "somebody may ask for it again");
-    tokio::time::sleep(Duration::from_millis(250)).await;
+    let place = place.again_with(keep(Duration::from_millis(1))).await;
+    tokio::time::sleep(Duration::from_millis(5)).await;
     place.store().forget_expired().await.unwrap();
     assert_eq!(place.store().shards(deserted).await.unwrap(), []);
     assert_eq!(place.store().shards(wanted).await.unwrap().len(), 1);
