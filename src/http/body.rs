@@ -139,16 +139,16 @@ async fn parts(mut request: Request, limit: usize) -> Result<Body, Problem> {
 }
 
 /// Reads and forgets what a client still sends after it was refused, so that closing the connection does not reset
-/// it before the client has read why.
-pub(super) async fn linger(io: &mut tokio::net::TcpStream, time: Duration) {
+/// it before the client has read why: until it pauses for so long, and at most for so long in all.
+pub(super) async fn linger(io: &mut tokio::net::TcpStream, pause: Duration, most: Duration) {
     use tokio::io::{AsyncReadExt, AsyncWriteExt};
     let drain = async {
         let mut sink = vec![0_u8; 16 * 1024];
         if io.shutdown().await.is_ok() {
-            while io.read(&mut sink).await.is_ok_and(|count| count > 0) {}
+            while matches!(tokio::time::timeout(pause, io.read(&mut sink)).await, Ok(Ok(count)) if count > 0) {}
         }
     };
-    let _ = tokio::time::timeout(time, drain).await;
+    let _ = tokio::time::timeout(most, drain).await;
 }
 
 /// Whether a client may still be sending a body that nobody reads: so from the arrival of a request with a body until it is

@@ -22,8 +22,9 @@ use super::in_place::in_place;
 use super::{App, Peer, body};
 use crate::config::seconds;
 
-/// How long a refused client may go on sending before its connection is cut.
-const LINGER: Duration = Duration::from_secs(2);
+/// How long a refused client may go on sending before its connection is cut, and how long it may pause meanwhile.
+const LINGER: Duration = Duration::from_secs(30);
+const LINGER_PAUSE: Duration = Duration::from_secs(2);
 /// Pause after the system had no descriptor to spare.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(50);
 /// How often samples of latency are folded.
@@ -139,7 +140,7 @@ async fn connection(
     }
     let mut stream = connection.into_parts().io.into_inner();
     if unread.load(Ordering::Relaxed) {
-        body::linger(&mut stream, LINGER).await;
+        body::linger(&mut stream, LINGER_PAUSE, LINGER).await;
     }
 }
 
