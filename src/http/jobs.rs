@@ -116,6 +116,8 @@ pub(super) struct JobLinks {
     #[serde(rename = "self")]
     #[schema(example = "/v1/jobs/0198c5f1-8a3e-7c40-b0a1-5e2d9f4c6b7a")]
     this: String,
+    /// What was asked, as a job file.
+    input: String,
     /// Its result.
     result: String,
     /// Its server-sent events.
@@ -179,6 +181,7 @@ pub(super) fn document(job: &Job, language: Language) -> JobDocument {
         remaining_ms: job.remaining_ms.filter(|ms| ms.is_finite()),
         links: JobLinks {
             this: format!("/v1/jobs/{id}"),
+            input: format!("/v1/jobs/{id}/job"),
             result: format!("/v1/jobs/{id}/result"),
             events: format!("/v1/jobs/{id}/events"),
             cancel: format!("/v1/jobs/{id}"),
