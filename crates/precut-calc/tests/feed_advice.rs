@@ -72,3 +72,16 @@ fn a_surface_that_needs_more_than_one_edge_is_told() {
     worn["models"]["tool_life"] = json!({ "form": "log_log", "constant": 1.0, "speed_exponent": -0.5 });
     assert_eq!(of(&warnings(worn), "surface_wears_out_its_edge").len(), 2);
 }
+
+/// Constant cutting speed on a thin zone asks more of the spindle than the program lets it.
+#[test]
+fn a_spindle_limit_that_slows_the_cut_is_told() {
+    let mut thin = job();
+    for zone in thin["zones"].as_array_mut().unwrap() {
+        zone["diameter_mm"] = json!(8);
+    }
+    thin["variables"] = json!({ "speed": "constant_speed" });
+    assert_eq!(of(&warnings(thin.clone()), "spindle_limit_binds"), ["/program/spindle_limit_rpm"]);
+    thin["program"] = json!({ "spindle_limit_rpm": 10_000 });
+    assert!(of(&warnings(thin), "spindle_limit_binds").is_empty());
+}

@@ -29,6 +29,7 @@ pub(super) const WARNING_CODES: &[&str] = &[
     "plunge_at_shoulder",
     "pass_thicker_than_counted",
     "surface_wears_out_its_edge",
+    "spindle_limit_binds",
     "tool_passes_support",
     "tool_reaches_support",
     "tool_hits_chuck",

@@ -76,7 +76,27 @@ pub(super) fn encounters(job: &Job, outcome: &Outcome) -> Vec<Finding> {
     let mut found = plunges(&passes);
     found.extend(job.supports.iter().enumerate().filter_map(|(i, support)| met(&reach, i, support)));
     found.extend(thicker(job, outcome, &passes));
+    found.extend(beyond_the_spindle(job, outcome));
     found
+}
+
+/// Largest spindle speed of a program with constant cutting speed.
+fn spindle_limit_rpm(job: &Job) -> f64 {
+    job.machine.spindle_speed_max_rpm.unwrap_or(f64::INFINITY).min(job.program.spindle_limit_rpm)
+}
+
+/// The zone whose constant cutting speed the program's limit of the spindle cuts most.
+fn beyond_the_spindle(job: &Job, outcome: &Outcome) -> Option<Finding> {
+    let limit_rpm = spindle_limit_rpm(job);
+    let fastest = outcome.zones.iter().max_by(|a, b| a.spindle_speed_rpm.total_cmp(&b.spindle_speed_rpm))?;
+    let binds = job.variables.speed == SpeedMode::ConstantSpeed && fastest.spindle_speed_rpm > limit_rpm * (1.0 + 1e-9);
+    binds.then(|| {
+        Finding::new("spindle_limit_binds", "/program/spindle_limit_rpm")
+            .measured(fastest.spindle_speed_rpm, limit_rpm, "rev/min")
+            .with("diameter_mm", fastest.diameter_mm)
+            .with("wanted_m_per_min", fastest.speed_m_per_min)
+            .with("left_m_per_min", fastest.speed_m_per_min * limit_rpm / fastest.spindle_speed_rpm)
+    })
 }
 
 /// Places where the tool goes down beside what is as thick as the cut, once each with the smallest diameter.
@@ -138,7 +158,7 @@ fn written(job: &Job, outcome: &Outcome, passes: &[Pass]) -> Result<Program, Fai
         }
         if spoken.is_none_or(|last| (last - words.speed).abs() > 1e-9) {
             blocks.push(if surface {
-                Block::SurfaceSpeed { speed_m_per_min: words.speed, limit_rpm: job.program.spindle_limit_rpm }
+                Block::SurfaceSpeed { speed_m_per_min: words.speed, limit_rpm: spindle_limit_rpm(job) }
             } else {
                 Block::SpindleSpeed { rpm: words.speed }
             });
