@@ -156,6 +156,8 @@ fn stepped_shafts_are_turned_to_their_drawing() {
         let turned = driven(&program(&job).unwrap(), &steps);
         assert!((turned.deepest_mm - 0.5).abs() < 1e-9, "{}", turned.deepest_mm);
         assert_eq!([50.0, 200.0, 300.0, 400.0].map(|z| turned.at(z)), [40.0, 50.0, 44.0, 60.0]);
+        // Down to 44 or 40 beside 60 or 50, whichever way.
+        assert!(warned(&job).contains(&"plunge_at_shoulder"));
     }
 }
 

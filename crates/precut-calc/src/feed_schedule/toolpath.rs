@@ -102,7 +102,14 @@ fn beyond_the_spindle(job: &Job, outcome: &Outcome) -> Option<Finding> {
 /// Places where the tool goes down beside what is as thick as the cut, once each with the smallest diameter.
 fn plunges(passes: &[Pass]) -> Vec<Finding> {
     let mut starts: Vec<(f64, f64, f64)> = Vec::new();
-    for pass in passes.iter().filter(|pass| pass.approach_mm.is_none() && !pass.goes_on) {
+    for (k, pass) in passes.iter().enumerate() {
+        // A cut that goes on at a smaller diameter goes down beside the one before it.
+        let from_thicker =
+            || k.checked_sub(1).is_some_and(|before| passes[before].turned.diameter_mm > pass.turned.diameter_mm);
+        let plunges = if pass.goes_on { from_thicker() } else { pass.approach_mm.is_none() };
+        if !plunges {
+            continue;
+        }
         let Some(&(diameter_mm, z_program_mm)) = pass.corners.first() else { continue };
         match starts.iter_mut().find(|(z_mm, ..)| (*z_mm - pass.begins_mm).abs() < INCREMENT_MM) {
             Some((.., least_mm)) => *least_mm = least_mm.min(diameter_mm),
