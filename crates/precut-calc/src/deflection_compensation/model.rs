@@ -81,14 +81,6 @@ impl Radii {
     }
 }
 
-impl Radii {
-    /// The radii at some of the stations.
-    pub(super) fn at(&self, chosen: &[usize]) -> Self {
-        let of = |radii: &[f64]| -> Vec<f64> { chosen.iter().map(|&i| radii[i]).collect() };
-        Self { target: of(&self.target), stock: of(&self.stock), planned: self.planned.as_deref().map(of) }
-    }
-}
-
 /// What a [`Line`] is made of.
 pub(super) struct Ingredients<'a> {
     pub job: &'a Job,
