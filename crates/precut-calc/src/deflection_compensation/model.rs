@@ -44,6 +44,7 @@ pub(super) struct Line {
 /// What the loads at a station add to the radial opening, mm: every part scales with the compliances, the first two
 /// with the forces. What else opens the gap, stated errors and the gaps of rests, scales with neither.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(clippy::struct_field_names, reason = "the unit stands in every name")]
 pub(super) struct OpeningParts {
     /// By the passive force: W P_y.
     pub force_mm: f64,
