@@ -114,6 +114,9 @@ impl Grid {
     /// The stations with more among them for the path: from the first to the last one to both ends of whatever is turned
     /// between them, none farther from the next than the default would place it. `None` where nothing is to be added.
     pub(super) fn refined(&self, job: &Job) -> Option<Refined> {
+        if path_station_count(job) == 0 {
+            return None;
+        }
         let (&first, &last) = (self.z_mm.first()?, self.z_mm.last()?);
         let mut fine = Self {
             z_mm: Vec::with_capacity(self.len()),
