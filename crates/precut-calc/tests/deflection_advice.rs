@@ -99,3 +99,113 @@ fn a_rest_that_never_touches_the_shaft_is_warned_of() {
         assert_eq!(idle(&with(rest.clone())), [], "{rest}");
     }
 }
+
+fn number(values: &precut_calc::calculator::Values, name: &str) -> f64 {
+    match values.get(name) {
+        Some(Said::Number(number)) => *number,
+        other => panic!("{name} is {other:?}"),
+    }
+}
+
+/// A long shaft, thin for its weight.
+fn heavy(angle_deg: f64, passive_n: f64) -> Value {
+    let mut job = job(&centres(0.02));
+    job["shaft"]["segments"][0]["length_mm"] = json!(2000.0);
+    job["supports"][1]["z_mm"] = json!(2000.0);
+    job["include"] = json!({ "weight": true });
+    job["gravity"] = json!({ "angle_deg": angle_deg });
+    job["force"]["passive_n"] = json!(passive_n);
+    job
+}
+
+/// Sag toward the tool makes the shaft thin: what is named is the deviation of larger size, as in the answer.
+#[test]
+fn the_largest_deviation_is_the_largest_in_size() {
+    let answer = answer(heavy(180.0, 5.0));
+    let largest = answer.output.largest_error_um.unwrap();
+    assert!(largest < -100.0, "{largest}");
+    let said = answer.explanation.iter().find(|message| message.code == "nominal_path_leaves").unwrap();
+    assert!((number(&said.values, "largest_error_um") - largest).abs() < 1e-9, "{said:?}");
+    assert!((number(&said.values, "z_mm") - 1000.0).abs() < 1e-9, "{said:?}");
+}
+
+fn dominates(job: Value) -> Message {
+    let found: Vec<Message> =
+        answer(job).explanation.into_iter().filter(|message| message.code.ends_with("_dominates")).collect();
+    let [one] = &found[..] else { panic!("{found:?}") };
+    one.clone()
+}
+
+/// The shares are those of the compliance: they tell nothing of what no passive force makes.
+#[test]
+fn what_dominates_is_what_opens_the_gap_most() {
+    assert_eq!(dominates(job(&centres(0.0))).code, "work_dominates");
+    assert_eq!(dominates(heavy(-45.0, 2000.0)).code, "work_dominates");
+    let sag = dominates(heavy(-45.0, 5.0));
+    assert_eq!(sag.code, "weight_dominates");
+    let (part, force, all) =
+        (number(&sag.values, "part_um"), number(&sag.values, "force_um"), number(&sag.values, "deflection_um"));
+    assert!((part + force - all).abs() < 1e-9 * all && part > 5.0 * force, "{sag:?}");
+    let mut offset = job(&centres(0.0));
+    offset["effects"] = json!([{ "kind": "tailstock_offset", "offset_um": 5000.0 }]);
+    assert_eq!(dominates(offset).code, "offset_dominates");
+    let gap = json!({ "kind": "steady_rest", "z_mm": 400.0, "one_sided": true, "gap_um": 30.0 });
+    let held = dominates(job(&with(gap)));
+    assert_eq!(held.code, "offset_dominates", "{held:?}");
+    let mut couple = job(&centres(0.0));
+    couple["force"] = json!({ "kind": "constant", "passive_n": 1.0, "main_n": 100.0, "feed_n": 3000.0 });
+    couple["include"] = json!({ "axial_moment": true });
+    assert_eq!(dominates(couple).code, "couple_dominates");
+}
+
+fn warned(job: Value, code: &str) -> Option<Finding> {
+    answer(job).warnings.into_iter().find(|warning| warning.code == code)
+}
+
+/// Half of the tolerance of size to either side.
+#[test]
+fn a_missed_tolerance_of_size_is_warned_of() {
+    let mut coarse = job(&centres(0.02));
+    coarse["path"] = json!({ "chord_tolerance_um": 5.0 });
+    let left = answer(coarse.clone()).output.largest_error_after_um.unwrap().abs();
+    assert!(left > 1.0, "{left}");
+    for (share, missed) in [(1.99, true), (2.01, false)] {
+        coarse["tolerance"] = json!({ "diameter_um": share * left });
+        let found = warned(coarse.clone(), "size_tolerance_missed");
+        assert_eq!(found.is_some(), missed, "{share}");
+        assert!(found.is_none_or(|found| found.pointer == "/tolerance/diameter_um" && found.value == Some(left)));
+    }
+}
+
+/// The program lets the control go no faster than its limit; forces and time are those of the speed that was asked for.
+#[test]
+fn a_spindle_limit_that_binds_is_warned_of() {
+    let mut thin = job(&centres(0.02));
+    thin["shaft"]["segments"][0]["diameter_mm"] = json!(30.0);
+    let needed = 1000.0 * 100.0 / (std::f64::consts::PI * 30.0);
+    for (limit, binds) in [(0.99 * needed, true), (1.01 * needed, false)] {
+        thin["program"] = json!({ "spindle_limit_rpm": limit });
+        let found = warned(thin.clone(), "spindle_limit_binds");
+        assert_eq!(found.is_some(), binds, "{limit}");
+        let Some(found) = found else { continue };
+        assert!((found.value.unwrap() - needed).abs() < 1e-9 && found.limit == Some(limit), "{found:?}");
+        assert!((number(&found.values, "left_m_per_min") - 99.0).abs() < 1e-9, "{found:?}");
+    }
+    thin["program"] = json!({ "spindle_limit_rpm": 10.0 });
+    thin["cut"] = json!({ "feed_mm_per_rev": 0.2, "spindle_speed_rpm": 1000.0 });
+    assert_eq!(warned(thin, "spindle_limit_binds"), None);
+}
+
+/// One more rest holds the shaft in every pass, so the last one finds a straighter stock.
+#[test]
+fn one_more_rest_is_tried_in_all_passes() {
+    let mut passes = job(&centres(0.02));
+    passes["force"] = json!({ "kind": "power_law", "passive": { "coefficient": 2430.0, "depth_exponent": 0.9, "feed_exponent": 0.6, "speed_exponent": -0.3 } });
+    passes["passes"] = json!([{ "diameter_mm": 40.5 }, { "diameter_mm": 40.0 }]);
+    let tried = answer(passes.clone()).output.one_more_rest.unwrap();
+    let rest = json!({ "kind": "steady_rest", "z_mm": tried.z_mm, "compliance_um_per_n": tried.compliance_um_per_n });
+    passes["supports"].as_array_mut().unwrap().push(rest);
+    let held = answer(passes).output.form_error_um.unwrap();
+    // At 65 stations of 201.
+    assert!((tried.form_error_um - held).abs() < 1e-2 * held, "{} {held}", tried.form_error_um);
+}

@@ -158,3 +158,58 @@ fn the_tool_does_not_come_down_rapidly_into_the_blank() {
     assert!(first.unwrap() > 40.0, "{first:?}");
     assert_eq!(named(&warnings, "plunge_at_shoulder").len(), 1, "{warnings:?}");
 }
+
+fn held_in_centres(stations: &Value) -> Value {
+    let centres = json!([{ "kind": "centre", "z_mm": 0.0 }, { "kind": "centre", "z_mm": 900.0 }]);
+    let segments: Vec<Value> = [60.0, 50.0, 60.0]
+        .map(|d| json!({ "length_mm": 300.0, "diameter_mm": d, "stock_diameter_mm": d + 2.0 }))
+        .to_vec();
+    let mut job = job(&json!(segments), &centres, "to_tailstock");
+    job["force"]["passive_n"] = json!(1500.0);
+    job["stations"] = stations.clone();
+    job
+}
+
+fn list(z_mm: &[f64]) -> Value {
+    json!({ "kind": "list", "z_mm": z_mm })
+}
+
+/// Few stations ask for a short answer; the path goes through as many as ever.
+#[test]
+fn a_path_does_not_become_coarse_with_few_stations() {
+    let solved = |stations: &Value| crate::support::solved(held_in_centres(stations));
+    let few = solved(&list(&[0.0, 450.0, 900.0]));
+    assert_eq!(few.stations.z_mm, [0.0, 450.0, 900.0]);
+    let errors = few.stations.diameter_error_compensated_um.unwrap();
+    let chord = few.path.as_ref().unwrap().achieved_deviation_um.unwrap();
+    let after = few.after.unwrap();
+    for error in errors.iter().flatten().chain([&few.largest_error_after_um.unwrap()]) {
+        assert!(error.abs() <= 2.0 * chord && chord < 1.5, "{error} {chord}");
+    }
+    assert!(after.form_error_um.unwrap() > 0.5, "the worst lies between the stations: {after:?}");
+    // Every zone from end to end, though a list cannot name the left end of one behind a shoulder.
+    let ends = |path: &precut_calc::deflection_compensation::Path| -> Vec<[f64; 2]> {
+        path.zones.iter().map(|zone| [zone.z_mm[0], *zone.z_mm.last().unwrap()]).collect()
+    };
+    assert_eq!(ends(few.path.as_ref().unwrap()), [[0.0, 300.0], [300.0, 600.0], [600.0, 900.0]]);
+    let usual = solved(&json!({ "kind": "per_zone", "count": 201 }));
+    let sparse = solved(&json!({ "kind": "per_zone", "count": 3 }));
+    assert_eq!(usual.path, sparse.path);
+    assert_eq!(sparse.stations.z_mm.len(), 9);
+    // The same places, but for rounding.
+    assert!((usual.form_error_after_um.unwrap() - sparse.form_error_after_um.unwrap()).abs() < 1e-6);
+}
+
+#[test]
+fn what_the_stations_leave_out_is_told() {
+    let left_out = |stations: &Value| -> Vec<[f64; 2]> {
+        let (warnings, program) = programmed(held_in_centres(stations));
+        assert!(program.is_ok());
+        let found = named(&warnings, "stretch_stays_uncut");
+        found.iter().map(|finding| [number(finding, "from_mm"), number(finding, "to_mm")]).collect()
+    };
+    assert_eq!(left_out(&list(&[100.0, 450.0, 650.0])), [[0.0, 100.0], [650.0, 900.0]]);
+    assert_eq!(left_out(&list(&[350.0, 450.0])), [[0.0, 300.0], [300.0, 350.0], [450.0, 600.0], [600.0, 900.0]]);
+    assert!(left_out(&list(&[0.0, 900.0])).is_empty());
+    assert!(left_out(&json!({ "kind": "per_zone", "count": 2 })).is_empty());
+}

@@ -16,6 +16,7 @@ mod deflection_program;
 mod deflection_properties;
 mod deflection_reference;
 mod deflection_set_off;
+mod deflection_uncertainty;
 mod diagnosis_answers;
 mod diagnosis_classes;
 mod diagnosis_deflection;

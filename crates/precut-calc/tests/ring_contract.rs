@@ -590,3 +590,49 @@ fn a_replay_shows_what_the_history_says_and_what_a_shorter_run_leaves() {
         assert!(off.abs() < 2.0, "{rotation}: {off}");
     }
 }
+
+fn said(answer: &precut_calc::calculator::Answer<Outcome>, code: &str) -> bool {
+    answer.explanation.iter().any(|message| message.code == code)
+}
+
+/// A soft tool takes a large bite from both ends of a diameter: the less stays one-sided the softer it is.
+#[test]
+fn what_a_large_bite_leaves_falls_with_the_compliance() {
+    let mut job = paper();
+    job["samples"] = json!(1440);
+    job["tool"]["spark_out_revolutions"] = json!(8);
+    for k in [0.0_f64, 0.5, 3.0, 10.0] {
+        job["compliance_ratio"] = json!(k);
+        let answer = run(&job);
+        let (_, end) = ron(&answer.output);
+        let simulated = answer.output.simulation.as_ref().unwrap();
+        let left = simulated.causes.first_bite_um.unwrap();
+        // First order: the waves' sum is a little less.
+        assert!((0.9..1.02).contains(&(end / left)), "{k}: {left} stated, {end} left");
+        let even = answer.explanation.iter().find(|message| message.code == "opposite_to_support").unwrap();
+        assert_eq!(even.values.get("even_factor"), Some(&Said::from((k / (1.0 + k)).powi(2))));
+    }
+}
+
+/// Three lobes decay where the tool stands on top between close supports: nothing of it is locked in.
+#[test]
+fn odd_waves_are_locked_in_only_opposite_to_a_support() {
+    let mut job = paper();
+    job["ring"] = json!({ "radius_mm": 150, "harmonics": [{ "order": 3, "amplitude_um": 50, "angle_of_max_deg": 0 }] });
+    let beta = 20.0_f64.to_radians();
+    job["supports"] = json!({ "distance_mm": 300.0 * beta.sin(), "depth_mm": 150.0 * beta.cos() });
+    job["tool"] = json!({ "x_mm": 0, "y_mm": 150.35, "feed_direction_deg": 270, "feed_mm_per_rev": 0.04, "revolutions": 49, "spark_out_revolutions": 1 });
+    job["samples"] = json!(1440);
+    let answer = run(&job);
+    assert!(answer.output.setting.coefficient_sum > 1.02 && ron(&answer.output).0 < 10.0);
+    let causes = &answer.output.simulation.as_ref().unwrap().causes;
+    assert_eq!((causes.first_bite_um, causes.odd_lobes_um), (None, None));
+    for code in ["first_bite_stays", "start_clear", "odd_waves_stay", "opposite_to_support"] {
+        assert!(!said(&answer, code), "{code}");
+    }
+    // Begun well inside the ring it takes a large bite all the same.
+    job["tool"]["y_mm"] = json!(149.85);
+    let inside = run(&job);
+    assert!(inside.output.simulation.as_ref().unwrap().largest_bite_um.unwrap() > 150.0);
+    assert!(inside.warnings.iter().all(|w| w.code != "first_bite_too_large_odd_lobes_locked_in"));
+}

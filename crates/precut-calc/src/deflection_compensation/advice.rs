@@ -4,15 +4,17 @@ use crate::calculator::{Failure, Finding, Message, Monitor};
 use crate::force::Reached;
 
 use super::acting::Acting;
+use super::driven::Again;
 use super::encounters::{Reach, body, met};
 use super::extremes::Extremes;
 use super::form::Form;
 use super::grid::Grid;
 use super::input::{Job, Segment, Support, Theory};
+use super::model::{OpeningParts, at};
 use super::output::{OneMoreRest, Outcome, Shares, StatusCompensated};
-use super::regime::Speed;
+use super::regime::{Speed, spindle_speed_rpm};
 use super::second_order::left_out;
-use super::stage::Stage;
+use super::stage::{Stage, all_cuts};
 use super::structure::Structure;
 use super::toolpath::{drawn, plunges};
 use crate::shaft::elastic::ends;
@@ -45,6 +47,9 @@ pub(super) const EXPLANATION_CODES: &[&str] = &[
     "tailstock_dominates",
     "rests_dominate",
     "tool_dominates",
+    "weight_dominates",
+    "couple_dominates",
+    "offset_dominates",
     "nominal_path_leaves",
     "compensated_path_leaves",
     "path_has_gaps",
@@ -73,6 +78,9 @@ pub(super) const WARNING_CODES: &[&str] = &[
     "plunge_at_shoulder",
     "rest_never_touches",
     "form_tolerance_missed",
+    "size_tolerance_missed",
+    "spindle_limit_binds",
+    "stretch_stays_uncut",
 ];
 
 /// Who yields at the station that deflects most (`deflection/3.2`), one-sided rests as they stand there: by virtual
@@ -124,7 +132,7 @@ pub(super) fn most_deflected(stage: &Stage) -> usize {
 }
 
 /// What a bilateral steady rest would do where the shaft gives way most, as compliant as the stiffest support that
-/// carries: the same cut with it, at a sample of the stations. `None` where the rest would stand at a support, or beyond
+/// carries: the same cuts with it, at a sample of the stations. `None` where the rest would stand at a support, or beyond
 /// the one that an effect calls headstock or tailstock: it would be taken for that one.
 pub(super) fn one_more_rest(
     job: &Job,
@@ -153,16 +161,20 @@ pub(super) fn one_more_rest(
     if acting.changes_an_end() && ends(&with_rest.supports) != ends(&job.supports) {
         return Ok(None);
     }
-    let radii = stage.radii.at(&chosen);
     let sampled = grid.at(&chosen);
-    let held = Stage::of(&with_rest, &sampled, acting, stage.regime, stage.step, radii, monitor)?;
+    // All passes with it: the stock that the last one meets is thicker where the shaft was not held.
+    let held = match all_cuts(&with_rest, &sampled, acting, &Again(monitor)) {
+        Ok((held, _)) => held,
+        Err(Failure::OutOfModel(_)) => return Ok(None),
+        Err(failure) => return Err(failure),
+    };
     let form = Form::of(&sampled.z_mm, &held.cut.uncompensated_errors_um(&held.radii));
     Ok(form.form_error_um.map(|form_error_um| OneMoreRest { z_mm, compliance_um_per_n, form_error_um }))
 }
 
-/// The answer in words, most important first.
-pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
-    let mut said = vec![nominal_path(&outcome.before), dominating(&outcome.shares)];
+/// The answer in words, most important first; `dominating` says what dominates.
+pub(super) fn explanation(job: &Job, outcome: &Outcome, dominating: Message) -> Vec<Message> {
+    let mut said = vec![nominal_path(&outcome.before), dominating];
     if let Some(path) = &outcome.path {
         said.push(match (outcome.form_error_after_um, outcome.largest_error_after_um) {
             (Some(form), Some(largest)) => Message::new("compensated_path_leaves")
@@ -222,13 +234,36 @@ fn nominal_path(before: &Form) -> Message {
     let message = Message::new("nominal_path_leaves")
         .with("class", before.class.map_or("incomplete", super::form::FormClass::name));
     let message = message.with("form_error_um", before.form_error_um.unwrap_or(0.0));
-    match before.largest {
-        Some(largest) => message.with("largest_error_um", largest.diameter_error_um).with("z_mm", largest.z_mm),
+    match before.farthest() {
+        Some(farthest) => message.with("largest_error_um", farthest.diameter_error_um).with("z_mm", farthest.z_mm),
         None => message.with("largest_error_um", 0.0).with("z_mm", 0.0),
     }
 }
 
-fn dominating(shares: &Shares) -> Message {
+/// What opens the gap most where it opens most. Where that is the passive force, who yields to it: the shares are those
+/// of its compliance and say nothing of sag, couple and stated errors.
+pub(super) fn dominating(stage: &Stage, shares: &Shares) -> Message {
+    let i = most_deflected(stage);
+    let opening_mm = at(&stage.cut.y_mm, i);
+    let OpeningParts { force_mm, couple_mm, sag_mm } = stage.line.parts(i, &stage.cut.loads.of(i));
+    let others = [
+        ("weight_dominates", sag_mm),
+        ("couple_dominates", couple_mm),
+        ("offset_dominates", opening_mm - force_mm - couple_mm - sag_mm),
+    ];
+    let most = others.into_iter().fold(others[0], |a, b| if b.1.abs() > a.1.abs() { b } else { a });
+    if most.1.abs() <= force_mm.abs() {
+        return yielding(shares);
+    }
+    Message::new(most.0)
+        .with("z_mm", shares.z_mm)
+        .with("part_um", most.1 * UM_PER_MM)
+        .with("force_um", force_mm * UM_PER_MM)
+        .with("deflection_um", opening_mm * UM_PER_MM)
+}
+
+/// Who yields most to the passive force.
+fn yielding(shares: &Shares) -> Message {
     let parts = [
         ("work_dominates", shares.work),
         ("headstock_dominates", shares.headstock),
@@ -251,12 +286,53 @@ pub(super) fn warnings(job: &Job, grid: &Grid, acting: &Acting, stage: &Stage, o
     found.extend(command_warnings(job, &extremes, outcome));
     found.extend(force_warnings(job, stage, &extremes));
     found.extend(outcome.second_order.iter().flat_map(|sizes| left_out(job, acting, stage, sizes)));
-    if let (Some(limit), Some(form)) = (job.tolerance.form_um, outcome.form_error_after_um)
-        && form > limit
-    {
-        found.push(Finding::new("form_tolerance_missed", "/tolerance/form_um").measured(form, limit, "um"));
+    if outcome.path.is_some() {
+        found.extend(spindle_limit_binds(job, stage));
+        found.extend(grid.beyond(job).into_iter().map(stays_uncut));
     }
+    found.extend(missed_tolerances(job, outcome));
     found
+}
+
+/// Tolerances that even the compensated path does not keep. That of size allows half of it to either side.
+fn missed_tolerances(job: &Job, outcome: &Outcome) -> Vec<Finding> {
+    let missed = |code, pointer, value: Option<f64>, limit: Option<f64>| {
+        let (value, limit) = (value?, limit?);
+        (value > limit).then(|| Finding::new(code, pointer).measured(value, limit, "um"))
+    };
+    let tolerance = &job.tolerance;
+    let (form, size) = (outcome.form_error_after_um, outcome.largest_error_after_um.map(f64::abs));
+    let half = tolerance.diameter_um.map(|whole| whole / 2.0);
+    [
+        missed("form_tolerance_missed", "/tolerance/form_um", form, tolerance.form_um),
+        missed("size_tolerance_missed", "/tolerance/diameter_um", size, half),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
+}
+
+/// A stretch that should be turned and that the path does not reach.
+fn stays_uncut([from_mm, to_mm]: [f64; 2]) -> Finding {
+    let finding = Finding::new("stretch_stays_uncut", "/stations").value(to_mm - from_mm, "mm");
+    finding.with("from_mm", from_mm).with("to_mm", to_mm)
+}
+
+/// A spindle limit that the program states and the cut reaches: from there on the tool cuts slower than the forces and
+/// the time of the answer are counted with.
+fn spindle_limit_binds(job: &Job, stage: &Stage) -> Option<Finding> {
+    let Speed::Surface(wanted) = stage.regime.speed else { return None };
+    let limit_rpm = job.program.spindle_limit_rpm;
+    let cut = stage.radii.planned().iter().zip(&stage.radii.target).filter(|(planned, target)| planned > target);
+    let thinnest_mm = cut.map(|(_, target)| 2.0 * target).fold(f64::INFINITY, f64::min);
+    let needed_rpm = spindle_speed_rpm(wanted, thinnest_mm);
+    (needed_rpm > limit_rpm).then(|| {
+        Finding::new("spindle_limit_binds", "/program/spindle_limit_rpm")
+            .measured(needed_rpm, limit_rpm, "rev/min")
+            .with("diameter_mm", thinnest_mm)
+            .with("wanted_m_per_min", wanted)
+            .with("left_m_per_min", wanted * limit_rpm / needed_rpm)
+    })
 }
 
 fn deflection_warnings(job: &Job, grid: &Grid, extremes: &Extremes) -> Vec<Finding> {

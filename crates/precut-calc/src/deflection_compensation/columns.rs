@@ -4,9 +4,9 @@
 use super::UM_PER_MM;
 use super::acting::Acting;
 use super::cut::CutLine;
-use super::input::Job;
+use super::input::{Job, Uncertainty};
 use super::laws::Loads;
-use super::model::{Line, Radii};
+use super::model::{Line, Radii, at};
 use super::output::StationColumns;
 use super::stage::Stage;
 
@@ -19,18 +19,23 @@ pub(super) struct Errors {
 impl Errors {
     /// Of the cut along the nominal line, and of what the programmed path produces where that was computed.
     pub(super) fn of(stage: &Stage, produced_mm: Option<&[Option<f64>]>) -> Self {
-        let error = |(r, target): (&Option<f64>, &f64)| r.map(|r| 2.0 * (r - target) * UM_PER_MM);
         Self {
             uncompensated_um: stage.cut.uncompensated_errors_um(&stage.radii),
-            compensated_um: produced_mm.map(|r| r.iter().zip(&stage.radii.target).map(error).collect()),
+            compensated_um: produced_mm.map(|produced| errors_um(produced, &stage.radii)),
         }
     }
+}
+
+/// Diameter errors of produced radii, um.
+pub(super) fn errors_um(produced_mm: &[Option<f64>], radii: &Radii) -> Vec<Option<f64>> {
+    let error = |(r, target): (&Option<f64>, &f64)| r.map(|r| 2.0 * (r - target) * UM_PER_MM);
+    produced_mm.iter().zip(&radii.target).map(error).collect()
 }
 
 /// The columns of the answer; `z_mm` are the stations.
 pub(super) fn columns(job: &Job, acting: &Acting, z_mm: Vec<f64>, stage: Stage, errors: Errors) -> StationColumns {
     let Stage { line, radii, cut, .. } = stage;
-    let diameter_uncertainty_um = uncertainty_um(job, acting, &line, &cut);
+    let diameter_uncertainty_um = uncertainty_um(job, acting, &line, &radii, &cut);
     let force = |given: bool, component: fn(&Loads) -> f64| given.then(|| cut.loads.column(component));
     let moves_aside = line.moves_aside();
     let carriage = line.carriage_mm_per_n;
@@ -73,13 +78,47 @@ fn doubled(mut column: Vec<Option<f64>>) -> Vec<Option<f64>> {
     column
 }
 
-/// Standard uncertainty of the diameter, um (`deflection/7`): to first order about the compensated cut
-/// dr = Y_el sqrt(u_F² + u_W²)/(1 + S'), and the scatter from trace to trace.
-fn uncertainty_um(job: &Job, acting: &Acting, line: &Line, cut: &CutLine) -> Vec<f64> {
-    let relative = job.uncertainty.force_percent.hypot(job.uncertainty.stiffness_percent) / 100.0;
+/// Standard uncertainty of the diameter, um (`deflection/7`): to first order about the compensated cut, what force and
+/// compliances each make of the radius, and the scatter from trace to trace.
+fn uncertainty_um(job: &Job, acting: &Acting, line: &Line, radii: &Radii, cut: &CutLine) -> Vec<f64> {
+    let relative = Relative::of(&job.uncertainty);
     let scatter = 2.0 * acting.scatter_mm * UM_PER_MM;
-    let elastic = cut.y_mm.iter().enumerate().map(|(i, y)| line.elastic_mm(i, *y));
+    let radius_mm = cut.loads.along().enumerate().map(|(i, loads)| {
+        if line.only_radial() {
+            // All that scales is W P_y, with force and compliance alike.
+            line.compliance_mm_per_n(i) * loads.passive_n * relative.both
+        } else {
+            relative.radius_mm(line, i, loads, at(&cut.z_mm, i), radii.target[i])
+        }
+    });
     let systematic =
-        elastic.zip(&cut.planned_copying).map(|(y, copying)| 2.0 * y * relative * (1.0 - copying) * UM_PER_MM);
+        radius_mm.zip(&cut.planned_copying).map(|(radius, copying)| 2.0 * radius * (1.0 - copying) * UM_PER_MM);
     if scatter > 0.0 { systematic.map(|um| um.hypot(scatter)).collect() } else { systematic.map(f64::abs).collect() }
+}
+
+/// Relative standard uncertainties.
+struct Relative {
+    force: f64,
+    stiffness: f64,
+    both: f64,
+}
+
+impl Relative {
+    fn of(stated: &Uncertainty) -> Self {
+        let (force, stiffness) = (stated.force_percent / 100.0, stated.stiffness_percent / 100.0);
+        Self { force, stiffness, both: force.hypot(stiffness) }
+    }
+
+    /// What both make of the radius that an unchanged command gives at an unchanged depth, mm: with r = r_t,
+    /// dr = (cos dY + sin dZ) where the axis lies aside by sin = Z/r_t.
+    fn radius_mm(&self, line: &Line, i: usize, loads: &Loads, z_mm: f64, target_mm: f64) -> f64 {
+        let parts = line.parts(i, loads);
+        // Without a command the axis lies aside by more than the radius.
+        let sine = (z_mm / target_mm).clamp(-1.0, 1.0);
+        let cosine = ((1.0 - sine) * (1.0 + sine)).sqrt();
+        let by_force = parts.force_mm + parts.couple_mm;
+        let force = cosine * by_force + sine * line.tangential_by_force_mm(i, loads);
+        let stiffness = cosine * (by_force + parts.sag_mm) + sine * z_mm;
+        (self.force * force).hypot(self.stiffness * stiffness)
+    }
 }

@@ -268,8 +268,9 @@ impl CutLine {
         }
     }
 
+    /// Keeps the largest residual.
     #[inline]
-    fn note(&mut self, residual_mm: f64) {
+    pub(super) fn note(&mut self, residual_mm: f64) {
         if residual_mm.abs() > self.residual_mm {
             self.residual_mm = residual_mm.abs();
         }

@@ -136,6 +136,12 @@ impl Form {
         form.class = Some(classify(high - low, taper, &form.extrema));
         form
     }
+
+    /// The deviation of larger magnitude.
+    pub(super) fn farthest(&self) -> Option<Deviation> {
+        let (high, low) = (self.largest?, self.smallest?);
+        Some(if high.diameter_error_um.abs() >= low.diameter_error_um.abs() { high } else { low })
+    }
 }
 
 /// Indices of the first largest and the first smallest error.

@@ -2,6 +2,8 @@
 
 use super::input::{Job, Segment, Stations};
 
+const UM_PER_MM: f64 = 1e3;
+
 /// Stations, ascending in z (equal at a shoulder, where a zone ends and the next begins).
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Grid {
@@ -21,6 +23,18 @@ pub(super) struct Zone {
     pub first: usize,
     pub end: usize,
     pub diameter_mm: f64,
+}
+
+/// Most intervals between the stations of a zone that the path goes through, where the job's are fewer: those that a
+/// zone has by default.
+const PATH_INTERVALS: u32 = 200;
+/// By how much of an interval two stations may stand farther apart: rounding of evenly spaced ones.
+const SPACING_SLACK: f64 = 1e-6;
+
+/// Stations for the path, and which of them are the job's own.
+pub(super) struct Refined {
+    pub grid: Grid,
+    pub own: Vec<usize>,
 }
 
 /// Neighbouring segments `first..end` of one drawing diameter.
@@ -97,6 +111,94 @@ impl Grid {
         }
     }
 
+    /// The stations with more among them for the path: from the first to the last one to both ends of whatever is turned
+    /// between them, none farther from the next than the default would place it. `None` where nothing is to be added.
+    pub(super) fn refined(&self, job: &Job) -> Option<Refined> {
+        if path_station_count(job) == 0 {
+            return None;
+        }
+        let (&first, &last) = (self.z_mm.first()?, self.z_mm.last()?);
+        let mut fine = Self {
+            z_mm: Vec::with_capacity(self.len()),
+            segment: Vec::with_capacity(self.len()),
+            zones: Vec::new(),
+            length_mm: self.length_mm,
+            steps_mm: self.steps_mm.clone(),
+        };
+        let mut own = Vec::with_capacity(self.len());
+        let mut zones = self.zones.iter().peekable();
+        for run in runs_of_one_diameter(&job.shaft.segments) {
+            let stations = zones.next_if(|zone| self.segment[zone.first] < run.end).map(|zone| zone.first..zone.end);
+            let ends = [self.steps_mm[run.first], self.steps_mm[run.end]];
+            let reached = is_turned(job, &run).then_some(ends);
+            let reached = reached.map(|ends| ends.map(|z| (first <= z && z <= last).then_some(z)));
+            fine.add_run(self, &run, stations.unwrap_or(0..0), reached.unwrap_or_default(), job, &mut own);
+        }
+        (fine.len() > self.len()).then_some(Refined { grid: fine, own })
+    }
+
+    /// Adds the stations that `from` has of a run, its ends as far as they are reached, and more between.
+    fn add_run(
+        &mut self,
+        from: &Self,
+        run: &SegmentRun,
+        stations: std::ops::Range<usize>,
+        ends: [Option<f64>; 2],
+        job: &Job,
+        own: &mut Vec<usize>,
+    ) {
+        let increment_mm = job.path.increment_um / UM_PER_MM;
+        let (known, of) = (&from.z_mm[stations.clone()], &from.segment[stations]);
+        let is_new = |z: f64| known.iter().all(|known| (known - z).abs() > increment_mm);
+        let [left, right] = ends.map(|end| end.filter(|z| is_new(*z)));
+        let left = left.map(|z| (z, run.first, false));
+        let right = right.map(|z| (z, run.end - 1, false));
+        let known = known.iter().zip(of).map(|(&z, &segment)| (z, segment, true));
+        let all: Vec<(f64, usize, bool)> = left.into_iter().chain(known).chain(right).collect();
+        let (Some(&(from_mm, ..)), Some(&(to_mm, ..))) = (all.first(), all.last()) else { return };
+        let spacing_mm = (to_mm - from_mm) / f64::from(PATH_INTERVALS);
+        let first = self.len();
+        for (k, &(z, segment, is_own)) in all.iter().enumerate() {
+            if let Some(&(before, ..)) = k.checked_sub(1).and_then(|k| all.get(k)) {
+                self.fill_between(before, z, spacing_mm);
+            }
+            if is_own {
+                own.push(self.len());
+            }
+            self.z_mm.push(z);
+            self.segment.push(segment);
+        }
+        self.zones.push(Zone { first, end: self.len(), diameter_mm: job.shaft.segments[run.first].diameter_mm });
+    }
+
+    /// Adds stations after the last one and before `to_mm`, evenly, no farther apart than `spacing_mm`.
+    fn fill_between(&mut self, from_mm: f64, to_mm: f64, spacing_mm: f64) {
+        let gap_mm = to_mm - from_mm;
+        let steps = if gap_mm > 0.0 { (gap_mm / spacing_mm - SPACING_SLACK).ceil() } else { 0.0 };
+        let mut segment = self.segment.last().copied().unwrap_or(0);
+        let places = (1..=PATH_INTERVALS).map(f64::from).take_while(|k| *k < steps);
+        for z in places.map(|k| from_mm + gap_mm * (k / steps)) {
+            while z > self.steps_mm[segment + 1] {
+                segment += 1;
+            }
+            self.z_mm.push(z);
+            self.segment.push(segment);
+        }
+    }
+
+    /// Stretches of what is turned that lie before the first station or beyond the last, mm.
+    pub(super) fn beyond(&self, job: &Job) -> Vec<[f64; 2]> {
+        let (Some(&first), Some(&last)) = (self.z_mm.first(), self.z_mm.last()) else { return Vec::new() };
+        let increment_mm = job.path.increment_um / UM_PER_MM;
+        let runs = runs_of_one_diameter(&job.shaft.segments);
+        let turned = runs.iter().filter(|run| is_turned(job, run));
+        turned
+            .map(|run| [self.steps_mm[run.first], self.steps_mm[run.end]])
+            .flat_map(|[from, to]| [[from, to.min(first)], [from.max(last), to]])
+            .filter(|[from, to]| to - from > increment_mm)
+            .collect()
+    }
+
     /// Indices of at most about `count` stations, evenly, with the first and the last.
     pub(super) fn sample(&self, count: usize) -> Vec<usize> {
         let n = self.len();
@@ -130,6 +232,15 @@ pub(super) fn station_count(job: &Job) -> usize {
             let zones = runs_of_one_diameter(&job.shaft.segments).iter().filter(|run| is_turned(job, run)).count();
             zones * (*count as usize)
         }
+    }
+}
+
+/// At most how many stations the path goes through beside the job's own, without making them.
+pub(super) fn path_station_count(job: &Job) -> usize {
+    let runs = runs_of_one_diameter(&job.shaft.segments).len();
+    match &job.stations {
+        Stations::PerZone { count } if *count > PATH_INTERVALS => 0,
+        _ => runs * PATH_INTERVALS as usize,
     }
 }
 

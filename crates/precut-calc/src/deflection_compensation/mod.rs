@@ -9,7 +9,7 @@
 //!
 //! The way of a job: `input` -> `check` -> `grid` (stations), `acting` (effects),
 //! `structure` (beam) -> `model` (opening over depth) -> `cut` -> `stage` (passes) ->
-//! `toolpath` and what it meets (`encounters`), `form`, `second_order`, `advice` -> `output`, `picture`.
+//! `driven`: `toolpath` and what it gives and meets (`encounters`), `form`, `second_order`, `advice` -> `output`, `picture`.
 //! `forward` gives the same model to the diagnosis.
 
 mod acting;
@@ -18,6 +18,7 @@ mod check;
 mod columns;
 mod consequence;
 mod cut;
+mod driven;
 mod encounters;
 mod equilibrium;
 mod extremes;
@@ -54,16 +55,17 @@ pub use output::{
 };
 
 use crate::calculator::{
-    Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Finding, Hallmark, Message, Meta,
-    Monitor, Program, Table,
+    Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Hallmark, Message, Meta, Monitor,
+    Program, Table,
 };
 use crate::force;
 
 use acting::Acting;
 use columns::{Errors, columns};
 use cut::one_step;
-use grid::{Grid, station_count};
-use stage::{Stage, all_cuts};
+use driven::{Driven, drive};
+use grid::{Grid, path_station_count, station_count};
+use stage::{Stage, all_cuts, in_reach};
 
 const UM_PER_MM: f64 = 1e3;
 
@@ -78,7 +80,7 @@ impl Calculator for DeflectionCompensation {
     const META: Meta = Meta {
         id: "deflection-compensation",
         kind: CalculatorKind::Calculator,
-        version: 4,
+        version: 5,
         title: "Deflection compensation",
         question: "Where must the tool go so that the slender shaft comes out straight?",
         summary: "A slender shaft bends away from the tool, so less is cut than commanded. From shaft, supports, \
@@ -137,7 +139,8 @@ impl Calculator for DeflectionCompensation {
     }
 
     fn cost(job: &Job) -> Cost {
-        let stations = station_count(job) as f64;
+        let full = job.detail == Detail::Full;
+        let stations = (station_count(job) + if full { path_station_count(job) } else { 0 }) as f64;
         let passes = job.passes.len().max(1) as f64;
         // Measured: about 0.3 us per station and cut; each rest that opens and closes solves a contact problem anew.
         let contacts = job.supports.iter().filter(|s| !s.carries()).count() as f64;
@@ -175,14 +178,12 @@ fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
     let grid = Grid::of(job);
     let acting = Acting::of(&job.effects, &job.conditions, job.cut.feed_direction);
     let (mut stage, passes) = all_cuts(job, &grid, &acting, monitor)?;
-    if !stage.cut.is_in_reach() {
-        return Err(Failure::OutOfModel(Finding::new("numbers_out_of_reach", "")));
-    }
+    in_reach(&stage)?;
     let driven = match job.detail {
         Detail::Profile => None,
         Detail::Full => {
             monitor.progress(0.6, Message::new("stage_path"));
-            Some(drive(job, &grid, &mut stage, monitor)?)
+            Some(drive(job, &grid, &acting, &mut stage, monitor)?)
         }
     };
     monitor.progress(0.8, Message::new("stage_advice"));
@@ -190,24 +191,11 @@ fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
     let mut outcome =
         Assembly { job, grid: &grid, acting: &acting, stage: &stage }.outcome(driven, passes, &errors, monitor)?;
     let warnings = advice::warnings(job, &grid, &acting, &stage, &outcome);
+    let dominating = advice::dominating(&stage, &outcome.shares);
     outcome.stations = columns(job, &acting, grid.z_mm, stage, errors);
-    let explanation = advice::explanation(job, &outcome);
+    let explanation = advice::explanation(job, &outcome, dominating);
     monitor.progress(1.0, Message::new("stage_done"));
     Ok(Answer { output: outcome, warnings, explanation, basis: basis(job) })
-}
-
-/// The path as programmed and the radius that it produces, mm.
-struct Driven {
-    path: Path,
-    produced_mm: Vec<Option<f64>>,
-}
-
-/// Cuts the command into straight moves and predicts what they give.
-fn drive(job: &Job, grid: &Grid, stage: &mut Stage, monitor: &dyn Monitor) -> Result<Driven, Failure> {
-    let cut = &mut stage.cut;
-    let programmed = toolpath::programmed(job, grid, &cut.command_mm, &cut.status_compensated, monitor)?;
-    let produced_mm = cut.produced_mm(&stage.line, &stage.radii, &programmed.command_mm, monitor)?;
-    Ok(Driven { path: programmed.path, produced_mm })
 }
 
 /// What an outcome is put together from.
@@ -230,7 +218,7 @@ impl Assembly<'_> {
         let Self { job, grid, acting, stage } = *self;
         let full = job.detail == Detail::Full;
         let before = Form::of(&grid.z_mm, &errors.uncompensated_um);
-        let after = errors.compensated_um.as_ref().map(|errors| Form::of(&grid.z_mm, errors));
+        let (path, after) = driven.map(|driven| (driven.path, driven.after)).unzip();
         let most_deflected = advice::most_deflected(stage);
         let largest_mm = model::at(&stage.cut.y_mm, most_deflected).abs();
         Ok(Outcome {
@@ -241,7 +229,7 @@ impl Assembly<'_> {
             cutting_time_min: regime::cutting_time_min(job, &stage.regime, &stage.step),
             before,
             after,
-            path: driven.map(|driven| driven.path),
+            path,
             shares: advice::shares(job, grid, acting, stage, most_deflected)?,
             second_order: if full { Some(second_order::second_order(job, grid, acting, stage)?) } else { None },
             one_more_rest: if full { advice::one_more_rest(job, grid, acting, stage, monitor)? } else { None },
@@ -256,8 +244,7 @@ impl Assembly<'_> {
 
 fn largest(form: &Form) -> Option<f64> {
     form.form_error_um?;
-    let (high, low) = (form.largest?.diameter_error_um, form.smallest?.diameter_error_um);
-    Some(if high.abs() >= low.abs() { high } else { low })
+    Some(form.farthest()?.diameter_error_um)
 }
 
 /// The equations that acted.

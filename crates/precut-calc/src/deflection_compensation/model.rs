@@ -41,6 +41,23 @@ pub(super) struct Line {
     closed_at_zero: bool,
 }
 
+/// What the loads at a station add to the radial opening, mm: every part scales with the compliances, the first two
+/// with the forces. What else opens the gap, stated errors and the gaps of rests, scales with neither.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(clippy::struct_field_names, reason = "the unit stands in every name")]
+pub(super) struct OpeningParts {
+    /// By the passive force: W P_y.
+    pub force_mm: f64,
+    /// By the couple of the feed force: G_vt M.
+    pub couple_mm: f64,
+    /// By the weight.
+    pub sag_mm: f64,
+}
+
+/// The step by which gravity is varied, relative: Y is piecewise linear in it, so the difference is exact but for
+/// round-off.
+const GRAVITY_STEP: f64 = 1e-6;
+
 /// The entry of a column, 0 where the column was left empty.
 #[inline]
 pub(super) fn at(column: &[f64], i: usize) -> f64 {
@@ -62,14 +79,6 @@ impl Radii {
     /// Stock that the compensation is planned on.
     pub(super) fn planned(&self) -> &[f64] {
         self.planned.as_ref().unwrap_or(&self.stock)
-    }
-}
-
-impl Radii {
-    /// The radii at some of the stations.
-    pub(super) fn at(&self, chosen: &[usize]) -> Self {
-        let of = |radii: &[f64]| -> Vec<f64> { chosen.iter().map(|&i| radii[i]).collect() };
-        Self { target: of(&self.target), stock: of(&self.stock), planned: self.planned.as_deref().map(of) }
     }
 }
 
@@ -220,6 +229,29 @@ impl Line {
         (y, slope)
     }
 
+    /// What the loads add to the radial opening, with the one-sided rests as they stand under them.
+    pub(super) fn parts(&self, i: usize, loads: &Loads) -> OpeningParts {
+        let (work, coupling, sag_mm) = match &self.contacts {
+            None => (self.work_mm_per_n[i], None, at(&self.sag_mm, i)),
+            Some(contacts) => {
+                let load = self.tool_load(i, loads);
+                let response = contacts.respond(i, load);
+                (response.compliance_mm_per_n, Some(response.coupling_per_n), sag_in_contact_mm(contacts, i, load))
+            }
+        };
+        let couple_mm = match coupling {
+            None => at(&self.moment_mm_per_n, i) * loads.feed_n,
+            Some(coupling) => coupling * at(&self.arm_mm, i) * loads.feed_n,
+        };
+        OpeningParts { force_mm: (work + self.carriage_mm_per_n) * loads.passive_n, couple_mm, sag_mm }
+    }
+
+    /// Share of the tangential offset Z that the main force makes, mm; the rest is sag.
+    #[inline]
+    pub(super) fn tangential_by_force_mm(&self, i: usize, loads: &Loads) -> f64 {
+        at(&self.tangential_mm_per_n, i) * loads.main_n
+    }
+
     /// Sag and stated errors in the radial direction, mm.
     #[inline]
     fn offset_mm(&self, i: usize) -> f64 {
@@ -319,6 +351,18 @@ impl Solver<'_> {
         }
         line.engage(i, stock_radius_mm, command_mm, start_mm)
     }
+}
+
+/// Sag under weight of the shaft on the rests that touch under a load, mm: dY/d(gravity) times gravity.
+fn sag_in_contact_mm(contacts: &Contacts, i: usize, load: ToolLoad) -> f64 {
+    if load.gravity_radial.abs() <= 0.0 {
+        return 0.0;
+    }
+    let heavier = |by: f64| contacts.respond(i, ToolLoad { gravity_radial: load.gravity_radial * (1.0 + by), ..load });
+    let here = contacts.respond(i, load);
+    // Where a heavier shaft would open or close a rest, a lighter one leaves them as they stand.
+    let step = if heavier(GRAVITY_STEP).closed == here.closed { GRAVITY_STEP } else { -GRAVITY_STEP };
+    (heavier(step).displacement_mm - here.displacement_mm) / step
 }
 
 /// What of the beam's profile the job's physics needs.

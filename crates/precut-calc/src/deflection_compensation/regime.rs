@@ -78,6 +78,11 @@ impl Regime {
     }
 }
 
+/// Spindle speed that gives a cutting speed on a diameter, rev/min.
+pub(super) fn spindle_speed_rpm(speed_m_per_min: f64, diameter_mm: f64) -> f64 {
+    1000.0 * speed_m_per_min / (PI * diameter_mm)
+}
+
 /// A cut as a step of a job: what it turns to and what came before. The default is a job of one cut.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Step {

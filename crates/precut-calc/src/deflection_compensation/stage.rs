@@ -146,6 +146,14 @@ pub(super) fn all_cuts(
     }
 }
 
+/// Refuses a cut whose numbers overflow.
+pub(super) fn in_reach(stage: &Stage) -> Result<(), Failure> {
+    if stage.cut.is_in_reach() {
+        return Ok(());
+    }
+    Err(Failure::OutOfModel(Finding::new("numbers_out_of_reach", "")))
+}
+
 fn pass_outcome(
     stage: &Stage,
     compensated: bool,

@@ -90,7 +90,8 @@ pub(super) fn program(job: &Job, outcome: &Outcome) -> Result<Program, Failure> 
         let without =
             status.iter().filter(|s| !matches!(s, StatusCompensated::Ok | StatusCompensated::NoStock)).count();
         let first = status.iter().position(|s| !matches!(s, StatusCompensated::Ok | StatusCompensated::NoStock));
-        let z = first.map_or(0.0, |i| outcome.stations.z_mm[i]);
+        // Between the stations of the answer the path goes through others.
+        let z = first.map_or_else(|| first_without_path_mm(outcome, path), |i| outcome.stations.z_mm[i]);
         return Err(Failure::OutOfModel(
             Finding::new("path_incomplete", "/stations").with("stations", without).with("first_z_mm", z),
         ));
@@ -100,6 +101,16 @@ pub(super) fn program(job: &Job, outcome: &Outcome) -> Result<Program, Failure> 
         Some(chuck) => Err(Failure::OutOfModel(chuck)),
         None => Ok(program),
     }
+}
+
+/// The first station of the answer that no zone of the path reaches, mm; 0 where there is none.
+fn first_without_path_mm(outcome: &Outcome, path: &Path) -> f64 {
+    let reaches = |zone: &PathZone, z: f64| {
+        let ends = zone.z_mm.first().zip(zone.z_mm.last());
+        ends.is_some_and(|(from, to)| *from <= z && z <= *to)
+    };
+    let mut stations = outcome.stations.z_mm.iter().copied();
+    stations.find(|&z| !path.zones.iter().any(|zone| reaches(zone, z))).unwrap_or(0.0)
 }
 
 /// The moves along a path: every zone with its own approach and retract, in the order of the feed.

@@ -11,8 +11,6 @@ use super::turning::plane::{add, scaled};
 
 /// |a| + |b| above which lobes grow noticeably.
 const GAIN: f64 = 1.02;
-/// |a| + |b| up to which the tool counts as opposite to a support.
-const DIAMETRAL: f64 = 1.001;
 /// A bite is large above so many feeds and this share of the blank's deviation.
 const BITE_OVER_FEED: f64 = 3.0;
 const BITE_OVER_BLANK: f64 = 0.25;
@@ -107,7 +105,7 @@ pub(super) fn warnings(job: &Job, scene: &Scene, end: &Stance, outcome: &Outcome
         found.push(finding);
     }
     if let Some(simulation) = &outcome.simulation {
-        of_simulation(job, simulation, outcome, &mut found);
+        of_simulation(job, end, simulation, outcome, &mut found);
     }
     if outcome.linear_theory.as_ref().is_some_and(|linear| !linear.complete) {
         found.push(Finding::new("roots_incomplete", "/analyses"));
@@ -115,12 +113,13 @@ pub(super) fn warnings(job: &Job, scene: &Scene, end: &Stance, outcome: &Outcome
     found
 }
 
-fn of_simulation(job: &Job, simulation: &SimulationOutcome, outcome: &Outcome, found: &mut Vec<Finding>) {
+fn of_simulation(job: &Job, end: &Stance, simulation: &SimulationOutcome, outcome: &Outcome, found: &mut Vec<Finding>) {
     if simulation.uncut_share > 0.0 {
         found.push(Finding::new("not_cleaned_up", "/tool/revolutions").measured(simulation.uncut_share, 0.0, "1"));
     }
     let blank_um = simulation.start.unfiltered.least_squares_um;
-    if let Some(bite_um) = simulation.largest_bite_um {
+    // Elsewhere than opposite to a support the waves that a bite leaves decay or grow like any others.
+    if let Some(bite_um) = simulation.largest_bite_um.filter(|_| end.copying().is_diametral()) {
         let limit = (BITE_OVER_FEED * job.tool.feed_mm_per_rev * UM_PER_MM).max(BITE_OVER_BLANK * blank_um);
         if bite_um > limit {
             found.push(
@@ -160,17 +159,19 @@ fn of_simulation(job: &Job, simulation: &SimulationOutcome, outcome: &Outcome, f
 }
 
 /// What to say, most important first.
-pub(super) fn explanation(job: &Job, scene: &Scene, outcome: &Outcome) -> Vec<Message> {
+pub(super) fn explanation(job: &Job, scene: &Scene, end: &Stance, outcome: &Outcome) -> Vec<Message> {
     let mut said = Vec::new();
     if let Some(simulation) = &outcome.simulation {
         of_run(job, scene, simulation, outcome, &mut said);
     }
     let setting = &outcome.setting;
-    let diametral = setting.coefficient_sum <= DIAMETRAL;
+    let diametral = end.copying().is_diametral();
+    let k = setting.compliance_ratio;
     said.push(
         Message::new(if diametral { "opposite_to_support" } else { "off_the_diameter" })
             .with("sum", setting.coefficient_sum)
             .with("half_turn_reduction_um", setting.half_turn_reduction_um)
+            .with("even_factor", (k / (1.0 + k)).powi(2))
             .with("support", if setting.coefficient_a.abs() >= setting.coefficient_b.abs() { "A" } else { "B" }),
     );
     if let Some(linear) = &outcome.linear_theory {
@@ -245,18 +246,18 @@ fn of_run(job: &Job, scene: &Scene, simulation: &SimulationOutcome, outcome: &Ou
     );
     let causes = &simulation.causes;
     let share = WORTH_NAMING * end.unfiltered.least_squares_um;
-    if causes.first_bite_um > share {
+    if let Some(left_um) = causes.first_bite_um.filter(|left_um| *left_um > share) {
         said.push(
             Message::new("first_bite_stays")
                 .with("bite_um", simulation.largest_bite_um.unwrap_or(0.0))
-                .with("left_um", causes.first_bite_um),
+                .with("left_um", left_um),
         );
         if let Some(back_mm) = back_off_mm(scene, simulation) {
             said.push(Message::new("start_clear").with("back_mm", back_mm));
         }
     }
-    if causes.odd_lobes_um > share {
-        said.push(Message::new("odd_waves_stay").with("odd_lobes_um", causes.odd_lobes_um));
+    if let Some(odd_lobes_um) = causes.odd_lobes_um.filter(|odd_lobes_um| *odd_lobes_um > share) {
+        said.push(Message::new("odd_waves_stay").with("odd_lobes_um", odd_lobes_um));
     }
     if causes.teeth_um > share {
         said.push(Message::new("teeth_of_feed").with("teeth_um", causes.teeth_um));

@@ -63,7 +63,7 @@ impl Calculator for RingRoundness {
     const META: Meta = Meta {
         id: "ring-roundness",
         kind: CalculatorKind::Calculator,
-        version: 1,
+        version: 2,
         title: "Ring roundness",
         question: "How round will a ring get that is turned while it rests on the surface being turned?",
         summary: "A ring or a journal rests with the surface being turned on two supports while a wide-edge tool is fed \
@@ -243,7 +243,7 @@ fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
         outcome.settings_search = Some(search::search(job, range, &scene, whole.part(mapped, 1.0))?);
     }
     let warnings = advice::warnings(job, &scene, &end, &outcome);
-    let explanation = advice::explanation(job, &scene, &outcome);
+    let explanation = advice::explanation(job, &scene, &end, &outcome);
     monitor.progress(1.0, Message::new("stage_done"));
     Ok(Answer { output: outcome, warnings, explanation, basis: basis(job) })
 }

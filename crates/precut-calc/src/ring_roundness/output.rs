@@ -208,12 +208,14 @@ pub struct CausesOutcome {
     /// Bound of the teeth that the feed leaves.
     #[schema(extensions(("x-unit" = json!("um"))))]
     pub teeth_um: f64,
-    /// Half of what the largest bite takes above that, which stays as odd lobes; 0 where the tool starts clear.
+    /// What of the largest bite above that stays as odd lobes: half of it over 1 + 2 K; 0 where the tool starts clear,
+    /// null where it does not stand opposite to a support.
     #[schema(extensions(("x-unit" = json!("um"))))]
-    pub first_bite_um: f64,
-    /// Peak to valley of the odd waves (3, 5, ...) of the start profile, which a tool opposite to a support cannot see.
+    pub first_bite_um: Option<f64>,
+    /// Peak to valley of the odd waves (3, 5, ...) of the start profile, which a tool opposite to a support cannot see;
+    /// null where it does not stand so.
     #[schema(extensions(("x-unit" = json!("um"))))]
-    pub odd_lobes_um: f64,
+    pub odd_lobes_um: Option<f64>,
     /// Largest peak to valley at the end of a single wave that the linear theory says grows.
     #[schema(extensions(("x-unit" = json!("um"))))]
     pub growing_lobes_um: f64,

@@ -318,13 +318,38 @@ fn causes(job: &Job, scene: &Scene, end: &Stance, run: &Run) -> Result<CausesOut
         (false, true) => 0.0,
         (false, false) => 1.0,
     };
+    let odd = if end.copying().is_diametral() { Some(odd_causes(job, run, teeth_mm, k)?) } else { None };
     Ok(CausesOutcome {
         feed_step_um: step_left * teeth_mm * UM_PER_MM,
         teeth_um: teeth_mm * UM_PER_MM,
-        first_bite_um: 0.5 * (run.turned.largest_bite_mm - teeth_mm).max(0.0) * UM_PER_MM,
-        odd_lobes_um: roundness_um(&odd_waves_mm(&run.blank_mm), job.filter)?.0,
+        first_bite_um: odd.as_ref().map(|odd| odd.first_bite_um),
+        odd_lobes_um: odd.as_ref().map(|odd| odd.blank_um),
         growing_lobes_um,
     })
+}
+
+/// What stays as odd waves with a tool opposite to a support, which makes the diameter and sees no others. Everywhere
+/// else every wave grows or decays by a factor of its own.
+struct OddCauses {
+    /// Of the largest bite.
+    first_bite_um: f64,
+    /// Of the blank.
+    blank_um: f64,
+}
+
+fn odd_causes(job: &Job, run: &Run, teeth_mm: f64, compliance_ratio: f64) -> Result<OddCauses, Failure> {
+    let excess_mm = (run.turned.largest_bite_mm - teeth_mm).max(0.0);
+    Ok(OddCauses {
+        first_bite_um: one_sided_mm(excess_mm, compliance_ratio) * UM_PER_MM,
+        blank_um: roundness_um(&odd_waves_mm(&run.blank_mm), job.filter)?.0,
+    })
+}
+
+/// What a bite leaves as odd waves, mm. A soft tool takes b/(1+K) of it, half a revolution later q = K/(1+K) times as
+/// much from the other end of the diameter, then q² times from this one: together b, in the ratio of 1 to q. Half of the
+/// difference, b (1-q)/(1+q)/2 = b/(1+2K)/2, is odd.
+fn one_sided_mm(bite_mm: f64, compliance_ratio: f64) -> f64 {
+    0.5 * bite_mm / (1.0 + 2.0 * compliance_ratio)
 }
 
 fn spectrum(job: &Job, start: &Surface, end: Option<(&Surface, &Surface, f64)>) -> SpectrumColumns {

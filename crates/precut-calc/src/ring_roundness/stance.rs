@@ -102,6 +102,11 @@ impl Copying {
     pub(crate) fn gain(&self) -> f64 {
         self.a.abs() + self.b.abs()
     }
+
+    /// Whether the tool counts as opposite to a support, where it makes the diameter (`ring/5.4`).
+    pub(crate) fn is_diametral(&self) -> bool {
+        self.gain() <= DIAMETRAL
+    }
 }
 
 impl Stance {
@@ -168,6 +173,8 @@ pub(crate) fn reactions_n(stance: &Stance, load: &Load, rotation: f64, driven: b
 /// Half angle above which a ring jams, and below which it is laterally unstable.
 pub(crate) const JAMS_RAD: f64 = 75.0 / 180.0 * PI;
 pub(crate) const LOOSE_RAD: f64 = 15.0 / 180.0 * PI;
+/// |a| + |b| up to which the tool counts as opposite to a support.
+const DIAMETRAL: f64 = 1.001;
 /// Least angle between tool and support contact.
 pub(crate) const TOOL_CLEARANCE_RAD: f64 = FRAC_PI_2 / 18.0;
 
