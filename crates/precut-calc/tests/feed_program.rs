@@ -1,5 +1,5 @@
 //! Programs of schedules, driven over a blank: what they cut, and that no rapid motion goes through what stands.
-#![allow(clippy::unwrap_used, clippy::panic)]
+#![allow(clippy::unwrap_used, clippy::panic, clippy::float_cmp)] // diameters are cut to the very number
 
 use precut_calc::calculator::{Answer, Block, Calculator, Failure, Unwatched, Violations};
 use precut_calc::feed_schedule::{FeedSchedule, Job, Outcome};

@@ -12,6 +12,7 @@ const SAME_MM: f64 = 0.0005;
 
 /// A cut along a zone, as far as the blank is concerned.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(clippy::struct_field_names)] // all are lengths
 pub(super) struct Turned {
     pub from_mm: f64,
     pub to_mm: f64,
@@ -77,6 +78,7 @@ impl Blank {
 }
 
 /// A segment of the job's shaft by its stations.
+#[allow(clippy::struct_field_names)] // all are lengths
 struct Placed {
     from_mm: f64,
     to_mm: f64,
@@ -129,6 +131,7 @@ pub(super) fn zones_fit_the_shaft(job: &Job, outcome: &Outcome, cuts: &[Turned])
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp)] // what stands is what was given
 mod tests {
     use super::*;
 
@@ -143,10 +146,10 @@ mod tests {
         let mut blank = Blank::of(&job, &cuts);
         assert_eq!((blank.widest_mm(), blank.widest_between_mm(20.0, 10.0)), (61.0, 54.0));
         blank.turn(&cuts[0]);
-        assert_eq!(blank.widest_between_mm(10.0, 100.0), 52.0);
-        assert_eq!(blank.widest_between_mm(10.0, 100.1), 61.0);
-        assert_eq!(blank.widest_between_mm(150.0, 170.0), 0.0, "nothing stands beyond the end");
+        let between = |blank: &Blank, ends: [[f64; 2]; 3]| ends.map(|[a, b]| blank.widest_between_mm(a, b));
+        // Nothing stands beyond the end.
+        assert_eq!(between(&blank, [[10.0, 100.0], [10.0, 100.1], [150.0, 170.0]]), [52.0, 61.0, 0.0]);
         blank.turn(&cuts[1]);
-        assert_eq!(blank.widest_between_mm(0.0, 100.0), 50.0);
+        assert_eq!(between(&blank, [[0.0, 100.0], [0.0, 1.0], [99.0, 101.0]]), [50.0, 50.0, 61.0]);
     }
 }

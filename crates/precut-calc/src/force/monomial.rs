@@ -28,7 +28,7 @@ impl ForceModel {
     /// What the trials behind a power law covered, where it is stated.
     pub fn measured_range(&self) -> Option<MeasuredRange> {
         match self {
-            Self::PowerLaw(law) => law.measured_range.clone(),
+            Self::PowerLaw(law) => law.measured_range,
             Self::Handbook(handbook) => handbook.resolve("").ok()?.measured_range,
             Self::Kienzle(_) | Self::Constant(_) | Self::Table(_) => None,
         }
