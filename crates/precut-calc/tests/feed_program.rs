@@ -1,5 +1,7 @@
 //! Programs of schedules, driven over a blank: what they cut, and that no rapid motion goes through what stands.
-#![allow(clippy::unwrap_used, clippy::panic, clippy::float_cmp)] // diameters are cut to the very number
+#![allow(clippy::unwrap_used, clippy::panic)]
+#![allow(clippy::float_cmp, reason = "diameters are cut to the very number")]
+#![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "cells of a blank are few")]
 
 use precut_calc::calculator::{Answer, Block, Calculator, Failure, Unwatched, Violations};
 use precut_calc::feed_schedule::{FeedSchedule, Job, Outcome};
@@ -11,7 +13,7 @@ use crate::feed_support;
 const CELL_MM: f64 = 0.5;
 
 /// A shaft of steel between centres, zones without a limit on the deflection, segments as (length, drawing, blank).
-fn job(segments: &[(f64, f64, f64)], zones: Value) -> Value {
+fn job(segments: &[(f64, f64, f64)], zones: &Value) -> Value {
     let length: f64 = segments.iter().map(|segment| segment.0).sum();
     let segments: Vec<Value> = segments
         .iter()
@@ -126,8 +128,8 @@ fn each_way(job: &Value) -> [Value; 2] {
 fn no_rapid_motion_goes_through_a_collar_that_no_zone_cuts() {
     let groove = [(300.0, 60.0, 60.0), (300.0, 50.0, 51.0), (300.0, 60.0, 60.0)];
     let flange = [(300.0, 50.0, 51.0), (100.0, 120.0, 120.0), (300.0, 50.0, 51.0)];
-    let of_groove = job(&groove, json!([zone("m", 300.0, 600.0, 50.0, 0.5)]));
-    let of_flange = job(&flange, json!([zone("a", 0.0, 300.0, 50.0, 0.5), zone("b", 400.0, 700.0, 50.0, 0.5)]));
+    let of_groove = job(&groove, &json!([zone("m", 300.0, 600.0, 50.0, 0.5)]));
+    let of_flange = job(&flange, &json!([zone("a", 0.0, 300.0, 50.0, 0.5), zone("b", 400.0, 700.0, 50.0, 0.5)]));
     for (of, segments, plunges) in [(of_groove, &groove, true), (of_flange, &flange, true)] {
         for job in each_way(&of) {
             let turned = driven(&program(&job).unwrap(), segments);
@@ -152,7 +154,7 @@ fn stepped_shafts_are_turned_to_their_drawing() {
         zones.push(zone(&format!("z{i}"), from, from + length, *d, 0.5));
         from += length;
     }
-    for job in each_way(&job(&steps, json!(zones))) {
+    for job in each_way(&job(&steps, &json!(zones))) {
         let turned = driven(&program(&job).unwrap(), &steps);
         assert!((turned.deepest_mm - 0.5).abs() < 1e-9, "{}", turned.deepest_mm);
         assert_eq!([50.0, 200.0, 300.0, 400.0].map(|z| turned.at(z)), [40.0, 50.0, 44.0, 60.0]);
@@ -167,10 +169,10 @@ fn every_pass_takes_its_own_depth_at_its_own_speed() {
     let plain = zone("a", 0.0, 300.0, 50.0, 2.0);
     let mut repeated = plain.clone();
     repeated["repeat"] = json!(3);
-    let mut planned = job(&bar, json!([plain]));
+    let mut planned = job(&bar, &json!([plain]));
     planned["passes"] =
         json!({ "total_depth_mm": 6.0, "depth_min_mm": 1.0, "depth_max_mm": 2.5, "roughing_passes_max": 4 });
-    for of in [job(&bar, json!([repeated])), planned] {
+    for of in [job(&bar, &json!([repeated])), planned] {
         for job in each_way(&of) {
             let blocks = program(&job).unwrap();
             let turned = driven(&blocks, &bar);
@@ -195,16 +197,16 @@ fn every_pass_takes_its_own_depth_at_its_own_speed() {
 #[test]
 fn what_the_shaft_says_otherwise_is_not_cut() {
     let two = [(300.0, 60.0, 61.0), (300.0, 50.0, 51.0)];
-    assert_eq!(refused(&job(&two, json!([zone("a", 0.0, 600.0, 50.0, 0.5)]))), "zone_off_drawing");
-    assert_eq!(refused(&job(&two, json!([zone("a", 300.0, 600.0, 49.9, 0.5)]))), "zone_off_drawing");
-    assert_eq!(refused(&job(&two, json!([zone("a", 300.0, 600.0, 50.0, 0.3)]))), "zone_off_blank");
-    assert!(program(&job(&two, json!([zone("a", 300.0, 600.0, 50.0, 0.6)]))).is_ok(), "some of it in air");
+    assert_eq!(refused(&job(&two, &json!([zone("a", 0.0, 600.0, 50.0, 0.5)]))), "zone_off_drawing");
+    assert_eq!(refused(&job(&two, &json!([zone("a", 300.0, 600.0, 49.9, 0.5)]))), "zone_off_drawing");
+    assert_eq!(refused(&job(&two, &json!([zone("a", 300.0, 600.0, 50.0, 0.3)]))), "zone_off_blank");
+    assert!(program(&job(&two, &json!([zone("a", 300.0, 600.0, 50.0, 0.6)]))).is_ok(), "some of it in air");
 }
 
 #[test]
 fn chucks_and_rests_are_met() {
     let bar = [(600.0, 50.0, 51.0)];
-    let mut held = job(&bar, json!([zone("a", 0.0, 600.0, 50.0, 0.5)]));
+    let mut held = job(&bar, &json!([zone("a", 0.0, 600.0, 50.0, 0.5)]));
     held["supports"] = json!([
         { "kind": "chuck", "z_mm": 200 }, { "kind": "steady_rest", "z_mm": 450 }, { "kind": "centre", "z_mm": 600 }
     ]);
@@ -220,7 +222,7 @@ fn chucks_and_rests_are_met() {
 fn no_path_is_compensated_for_passes_that_come_again() {
     let mut twice = zone("a", 0.0, 600.0, 50.0, 0.5);
     twice["repeat"] = json!(2);
-    let mut of = job(&[(600.0, 50.0, 52.0)], json!([twice]));
+    let mut of = job(&[(600.0, 50.0, 52.0)], &json!([twice]));
     of["compensation"] = json!({});
     of["models"]["force_y"] = json!({ "form": "log_log", "constant": 6.0, "feed_exponent": 0.6 });
     let parsed: Job = serde_json::from_value(of).unwrap();
