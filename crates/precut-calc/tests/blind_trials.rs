@@ -122,6 +122,7 @@ fn answer<M: Diagnosable>(trial: &Trial) -> Said {
         likely: result.likely_sets.iter().map(|set| kinds(&set.causes)).collect(),
         first: first.map_or_else(Vec::new, |set| kinds(&set.causes)),
         covered: covered(trial, &result.named),
+        covered_shapes: covered_shapes(trial, &result.named),
         held_out: result.gain.as_ref().filter(|gain| gain.explained_share.is_some()).map(|gain| {
             let square = |rmse: f64| (rmse / trial.sigma).powi(2);
             let base = square(gain.rmse_base);
@@ -229,6 +230,19 @@ fn covered(trial: &Trial, named: &[NamedCause]) -> Vec<bool> {
     trial.truth.causes.iter().filter_map(of).collect()
 }
 
+/// Whether the 95 % intervals of the other parameters of the causes named right hold what was hidden.
+fn covered_shapes(trial: &Trial, named: &[NamedCause]) -> Vec<bool> {
+    let of = |hidden: &Hidden| -> Vec<bool> {
+        let Some(named) = named.iter().find(|cause| cause.kind == hidden.kind) else { return Vec::new() };
+        let holds = |(name, truth): &(&str, f64)| {
+            let [low, high] = named.parameters.iter().find(|parameter| parameter.name == *name)?.interval_95?;
+            Some((low..=high).contains(truth))
+        };
+        hidden.shapes.iter().filter_map(holds).collect()
+    };
+    trial.truth.causes.iter().flat_map(of).collect()
+}
+
 fn kinds(causes: &[NamedCause]) -> Vec<String> {
     causes.iter().map(|cause| cause.kind.clone()).collect()
 }
@@ -250,6 +264,13 @@ fn talk<M: Diagnosable>(trial: &Trial, result: &ResultOf<M>) {
         let Some(named) = result.named.iter().find(|cause| cause.kind == hidden.kind) else { continue };
         let first = &named.parameters[0];
         println!("     {} hidden {:.5} fitted {:.5} in {:?}", hidden.kind, hidden.size, first.value, first.interval_95);
+        for (name, truth) in &hidden.shapes {
+            let own = named.parameters.iter().find(|parameter| parameter.name == *name).unwrap();
+            println!(
+                "     {name} {truth:.5} fitted {:.5} in {:?}, {:?}",
+                own.value, own.interval_95, own.interval_from
+            );
+        }
     }
     let mut hidden: Vec<&str> = trial.truth.causes.iter().map(|hidden| hidden.kind).collect();
     hidden.sort_unstable();

@@ -71,6 +71,8 @@ pub struct Hidden {
     pub kind: &'static str,
     /// Its first parameter, in the catalogue's unit.
     pub size: f64,
+    /// Its other parameters, by their names in the catalogue, as far as it has such and they are known.
+    pub shapes: Vec<(&'static str, f64)>,
     /// Root mean square of its signature over the rows, standard deviations of the scatter.
     pub snr: f64,
     /// Its signature: what it alone changes in every row, in the unit of residuals (a logarithm where the quantity has

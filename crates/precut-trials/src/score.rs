@@ -19,6 +19,8 @@ pub struct Said {
     pub first: Vec<String>,
     /// Whether the 95 % intervals hold the hidden sizes, for those causes that are named and right.
     pub covered: Vec<bool>,
+    /// The same of their other parameters.
+    pub covered_shapes: Vec<bool>,
     /// What was explained on data held back, where the gain was asked for and there is something to explain.
     pub held_out: Option<HeldOut>,
     /// Of every hidden cause, how far it stands from what any other single cause could make of the rows, sigmas; empty
@@ -122,6 +124,8 @@ pub struct Score {
     pub unknown: Share,
     /// 95 % intervals that hold the truth.
     pub coverage: Share,
+    /// The same of the parameters beside the sizes.
+    pub shape_coverage: Share,
     /// One cause, by separation: below 3, 5, 8 sigmas, and beyond.
     pub apart: [Apart; CLASSES.len() + 1],
     /// One cause: an observer finds it who knows what every cause would look like.
@@ -201,6 +205,7 @@ impl Score {
             }
         }
         said.covered.iter().for_each(|held| self.coverage.add(*held));
+        said.covered_shapes.iter().for_each(|held| self.shape_coverage.add(*held));
         if said.verdict == "confounded" {
             self.listed.push(said.likely.len());
         }
@@ -248,6 +253,7 @@ impl std::fmt::Display for Score {
             ("outside the catalogue, unknown", self.unknown),
             ("... and 6 sigmas apart from all of it", self.unknown_apart),
             ("95 % intervals that hold the truth", self.coverage),
+            ("... of shapes", self.shape_coverage),
             ("an observer who knows all signatures", self.ideal),
             ("heaviest set of the draw before", self.permuted),
         ] {

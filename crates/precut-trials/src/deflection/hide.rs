@@ -81,6 +81,26 @@ impl Scaled {
         self.cause.kind == kind
     }
 
+    /// Time constant of a warming.
+    fn time_constant_min(&self) -> f64 {
+        (8.0_f64.ln() + 0.7 * (2.0 * self.form[0] - 1.0)).exp()
+    }
+
+    /// Centre and width of the dip of a built-up edge.
+    fn dip_m_per_min(&self) -> (f64, f64) {
+        (30.0 + 24.0 * self.form[0], 14.0 + 12.0 * self.form[1])
+    }
+
+    /// What the catalogue fits beside the size.
+    pub(crate) fn shapes(&self) -> Vec<(&'static str, f64)> {
+        let (centre, width) = self.dip_m_per_min();
+        match self.cause.kind {
+            "thermal_growth" => vec![("time_constant_min", self.time_constant_min())],
+            "built_up_edge" => vec![("centre_m_per_min", centre), ("width_m_per_min", width)],
+            _ => Vec::new(),
+        }
+    }
+
     /// Whether shaft and supports are others with it.
     pub(crate) fn changes_beam(&self) -> bool {
         self.is("bending_scale") || self.is("chuck_rotational_stiffness")
@@ -130,8 +150,7 @@ impl Scaled {
                 acting.error_um += wear_in * (1.0 - (-path_m / 400.0).exp()) + size * path_m / 1000.0;
             }
             "thermal_growth" => {
-                let time_constant = (8.0_f64.ln() + 0.7 * (2.0 * form[0] - 1.0)).exp();
-                acting.error_um -= size * (1.0 - (-warm_min / time_constant).exp());
+                acting.error_um -= size * (1.0 - (-warm_min / self.time_constant_min()).exp());
             }
             "force_level" => acting.factor = (1.0 + acting.factor) * (1.0 + size) - 1.0,
             "depth_exponent" => {
@@ -147,7 +166,7 @@ impl Scaled {
             }
             "hardness_gradient" => acting.factor = (1.0 + acting.factor) * (1.0 + size * (u - 0.5)) - 1.0,
             "built_up_edge" => {
-                let (centre, width) = (30.0 + 24.0 * form[0], 14.0 + 12.0 * form[1]);
+                let (centre, width) = self.dip_m_per_min();
                 let dip = size * (-((run.speed_m_per_min - centre) / width).powi(2)).exp();
                 acting.factor = (1.0 + acting.factor) * (1.0 - dip) - 1.0;
             }

@@ -139,7 +139,13 @@ fn attempt(class: Class, snr: f64, random: &mut Random) -> Option<Drawn> {
     let truth = Truth { class, causes: Vec::new() };
     let trial = Trial { request: request(&lathe, &runs, &rows), truth, sigma, later };
     let mut drawn = Drawn { trial, lathe, runs, places, traces, hidden, residual_um: Vec::new() };
-    let of = |one: &Scaled| Hidden { kind: one.cause.kind, size: one.size, snr, signature: drawn.signature_um(one) };
+    let of = |one: &Scaled| Hidden {
+        kind: one.cause.kind,
+        size: one.size,
+        shapes: one.shapes(),
+        snr,
+        signature: drawn.signature_um(one),
+    };
     let causes = drawn.hidden.iter().map(of).collect();
     let plain = drawn.by_trace(&drawn.clean_um(&[], 1.0, 1.0));
     drawn.residual_um = measured.iter().zip(plain).map(|(measured, plain)| measured - plain).collect();

@@ -63,6 +63,21 @@ pub(crate) struct Scaled {
 }
 
 impl Scaled {
+    /// Centre and width of the hump of a built-up edge.
+    fn hump_m_per_min(&self) -> (f64, f64) {
+        (28.0 + 22.0 * self.form[0], 13.0 + 12.0 * self.form[1])
+    }
+
+    /// What the catalogue fits beside the size.
+    pub(crate) fn shapes(&self) -> Vec<(&'static str, f64)> {
+        let (centre, width) = self.hump_m_per_min();
+        match self.cause.kind {
+            "built_up_edge" => vec![("centre_m_per_min", centre), ("width_m_per_min", width)],
+            "wear_force_additive" => vec![("depth_power", self.form[0])],
+            _ => Vec::new(),
+        }
+    }
+
     /// The factor on the output.
     pub(crate) fn times(&self, cut: &Cut) -> f64 {
         let [v, s, t] = [cut.speed / MIDDLE[0], cut.feed / MIDDLE[1], cut.depth / MIDDLE[2]];
@@ -80,7 +95,7 @@ impl Scaled {
             "feed_depth_interaction" => s.powf(size * t.ln()),
             "speed_depth_interaction" => v.powf(size * t.ln()),
             "built_up_edge" => {
-                let (centre, width) = (28.0 + 22.0 * self.form[0], 13.0 + 12.0 * self.form[1]);
+                let (centre, width) = self.hump_m_per_min();
                 (size * (-((cut.speed - centre) / width).powi(2)).exp()).exp()
             }
             "wear_multiplicative" => (size * cut.wear_mm).exp(),

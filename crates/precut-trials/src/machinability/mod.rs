@@ -121,7 +121,13 @@ fn attempt(class: Class, snr: f64, random: &mut Random) -> Option<Drawn> {
     let later = Some(Later { request: request(&output, radius_mm, rows_later), best });
     let trial = Trial { request: request(&output, radius_mm, rows), truth, sigma, later };
     let mut drawn = Drawn { trial, output, cuts, hidden, residual };
-    let of = |one: &Scaled| Hidden { kind: one.cause.kind, size: one.size, snr, signature: drawn.signature(one) };
+    let of = |one: &Scaled| Hidden {
+        kind: one.cause.kind,
+        size: one.size,
+        shapes: one.shapes(),
+        snr,
+        signature: drawn.signature(one),
+    };
     drawn.trial.truth.causes = drawn.hidden.iter().map(of).collect();
     Some(drawn)
 }

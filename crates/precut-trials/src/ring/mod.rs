@@ -104,6 +104,7 @@ fn attempt(class: Class, snr: f64, random: &mut Random) -> Option<Trial> {
         causes.push(Hidden {
             kind: one.cause.kind,
             size: one.first_value(&rig),
+            shapes: Vec::new(),
             snr,
             signature: change.repeat(traces),
         });
