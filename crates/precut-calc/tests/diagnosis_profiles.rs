@@ -4,7 +4,9 @@
 use precut_calc::calculator::{
     Design, Failure, Hypothesis, JacobianColumn, Prediction, Range, Smooth, Treatment, Unwatched, Variable,
 };
-use precut_calc::diagnosis::{Data, Effort, Foundation, Layout, Profile, SetWeight, Setting, Subject, Weighing};
+use precut_calc::diagnosis::{
+    Data, Effort, Foundation, Layout, Profile, SetWeight, Setting, Subject, Verdict, Weighing,
+};
 use precut_calc::effects::DEFLECTION_CAUSES;
 
 const SIGMA: f64 = 0.05;
@@ -15,6 +17,8 @@ struct Curves {
     hypotheses: Vec<Hypothesis>,
     x: Vec<f64>,
     shape: fn(usize, f64, f64) -> f64,
+    /// Where values do not act each by itself.
+    together: Option<fn(&[f64], f64) -> f64>,
 }
 
 impl Curves {
@@ -26,10 +30,13 @@ impl Curves {
         let hypothesis =
             Hypothesis { cause, label: String::new(), variables: vec![variable; sizes], prior_weight: 1.0 };
         let x = (0..40).map(|i| f64::from(i) / 39.0).collect();
-        Self { hypotheses: vec![hypothesis], x, shape }
+        Self { hypotheses: vec![hypothesis], x, shape, together: None }
     }
 
     fn at(&self, sizes: &[f64]) -> Vec<f64> {
+        if let Some(together) = self.together.filter(|_| !sizes.is_empty()) {
+            return self.x.iter().map(|x| together(sizes, *x)).collect();
+        }
         let of = |x: &f64| sizes.iter().enumerate().map(|(k, size)| (self.shape)(k, *size, *x)).sum();
         self.x.iter().map(of).collect()
     }
@@ -159,4 +166,58 @@ fn a_walk_ends_at_the_bound_and_so_does_the_interval() {
         // Wider than anything in reach: the bound, where no evidence says otherwise.
         assert!((profile.interval(1e6)[1] - 10.0).abs() < 1e-12);
     });
+}
+
+/// The Gaussian evidence of one column, written out: r ~ N(0, sigma^2 + x x'), and what it says of the size.
+fn of_one_column(data: &Data, column: &[f64]) -> (f64, f64, f64) {
+    let xx = 1.0 + column.iter().map(|x| (x / SIGMA).powi(2)).sum::<f64>();
+    let xr = column.iter().zip(&data.value).map(|(x, y)| x * y / SIGMA / SIGMA).sum::<f64>();
+    (-0.5 * xx.ln() + 0.5 * xr * xr / xx, xr / xx, xx.sqrt().recip())
+}
+
+const RATES: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
+
+/// A size that decays with a rate which is one of a grid.
+fn decay(rates: &[f64]) -> Curves {
+    let mut curves = Curves::new(2, WIDE, |_, _, _| 0.0);
+    let range = Range { lower: 0.0, upper: 1e9 };
+    let treatment = Treatment::Shape { grid: rates.to_vec(), prior: None };
+    curves.hypotheses[0].variables[1] = Variable { name: "rate", unit: "1", treatment, range };
+    curves.together = Some(|sizes, x| sizes[0] * (-sizes[1] * x).exp());
+    curves
+}
+
+#[test]
+fn of_a_shape_on_its_grid_every_point_has_its_share() {
+    let curves = decay(&RATES);
+    let data = data(&curves, &[0.12, 1.4]);
+    let foundation = Foundation::of(&curves, &data, &Unwatched).unwrap();
+    let weighing = Weighing::of(&foundation, vec![true; data.value.len()], Effort::full(1), &Unwatched).unwrap();
+    let set = weighing.named_sets().next().unwrap();
+    let peaks = weighing.peaks(set).unwrap();
+    let expected: Vec<(f64, f64, f64)> =
+        RATES.iter().map(|rate| of_one_column(&data, &curves.at(&[PRIOR_SD, *rate]))).collect();
+    let total: f64 = expected.iter().map(|(log_z, ..)| log_z.exp()).sum();
+    for (rate, (log_z, size, sd)) in RATES.iter().zip(&expected) {
+        let at = peaks[0][1].iter().position(|peak| (peak.value - rate).abs() < 1e-12).unwrap();
+        // Divided differences of a product with the size are exact to 1e-9.
+        let found = peaks[0][0][at];
+        assert!((found.weight - log_z.exp() / total).abs() < 1e-6, "{found:?} {}", log_z.exp() / total);
+        assert!((found.value - size).abs() < 1e-6 && (found.standard_deviation - sd).abs() < 1e-6, "{found:?}");
+    }
+    // A shape may be anywhere in its cell: half way to its neighbours, a uniform distribution.
+    let cell =
+        |rate: f64| peaks[0][1].iter().find(|peak| (peak.value - rate).abs() < 1e-12).unwrap().standard_deviation;
+    assert!((cell(1.0) - 0.75 / 12.0_f64.sqrt()).abs() < 1e-12 && (cell(4.0) - 2.0 / 12.0_f64.sqrt()).abs() < 1e-12);
+    // No single point has it all here, so no single point may give the interval.
+    assert!(peaks[0][0].iter().filter(|peak| peak.weight > 0.05).count() > 1);
+}
+
+#[test]
+fn a_point_of_a_grid_where_the_model_overflows_does_not_drop_its_cause() {
+    let curves = decay(&[-800.0, 1.0]);
+    let data = data(&curves, &[0.4, 1.0]);
+    let foundation = Foundation::of(&curves, &data, &Unwatched).unwrap();
+    let weighing = Weighing::of(&foundation, vec![true; data.value.len()], Effort::full(1), &Unwatched).unwrap();
+    assert_eq!(weighing.verdict, Verdict::Named(vec![0]));
 }

@@ -70,6 +70,7 @@ pub use identify::{COLLINEAR_ABOVE, CONFOUNDED_BELOW, Separation, Signature, sep
 pub use input::{DiagnosisJob, DiagnosisOptions, MAX_RUNS, PriorWeight};
 pub use next::NextMeasurement;
 pub use noise::{Noise, NoiseSource};
+pub use optima::Peak;
 pub use outlier::Outliers;
 pub use outlying::OutlyingRun;
 pub use output::*;

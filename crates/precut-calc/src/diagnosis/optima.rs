@@ -36,6 +36,15 @@ impl Optimum {
             odds: (other.log_z - best.log_z).exp(),
         }
     }
+
+    /// Where a value of a member lies there.
+    pub(super) fn peak(&self, member: usize, variable: usize) -> Peak {
+        Peak {
+            value: self.settings[member].values[variable],
+            standard_deviation: self.standard_deviations[member][variable],
+            weight: self.odds,
+        }
+    }
 }
 
 /// Optima of a refined set beside the one in `fit`, from the most promising of the other places about which its causes are
@@ -84,10 +93,13 @@ fn distance(fit: &Fit, settings: &[Setting]) -> f64 {
 
 /// A value, its posterior standard deviation, and its weight among others.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Peak {
-    pub(super) value: f64,
-    pub(super) standard_deviation: f64,
-    pub(super) weight: f64,
+pub struct Peak {
+    /// Where it lies, in the unit of the value.
+    pub value: f64,
+    /// How far it reaches, in the unit of the value.
+    pub standard_deviation: f64,
+    /// Its share, up to a common factor.
+    pub weight: f64,
 }
 
 /// The interval that holds `inside` of a mixture of Student distributions.

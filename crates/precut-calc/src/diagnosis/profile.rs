@@ -14,12 +14,22 @@ use crate::calculator::{Failure, Monitor, Range, checkpoint};
 const STEP: f64 = 0.5;
 /// The same where every prediction is dear; off by two hundredths.
 const DEAR_STEP: f64 = 1.0;
-/// Points on a side at most: four, and of dear ones eight, standard deviations beyond the 95 % interval of a quadratic.
-const MOST_POINTS: usize = 12;
+/// Steps of equal length on a side: twice, and of dear ones four times, as far as the 95 % interval of a quadratic reaches.
+const EQUAL_STEPS: usize = 8;
+/// From there on every step leads so many times as far from the fit as the one before: an edge that lies far away is read off
+/// no worse in proportion to its distance.
+const FARTHER: f64 = 1.25;
+/// Points on a side at most: 29 standard deviations, of dear ones 20.
+const MOST_POINTS: usize = 18;
+/// The same where every prediction is dear.
+const MOST_DEAR_POINTS: usize = 12;
 /// How far beyond the edge of the 95 % interval the walk goes, as a share of its distance.
 const BEYOND: f64 = 1.1;
 /// Gauss-Newton steps of the other parameters at a point, with the columns of the fit.
 const ROUNDS: usize = 2;
+/// The same where shapes are free, with columns made anew, as long as they help by so much.
+const BENT_ROUNDS: usize = 6;
+const WORTH_A_ROUND: f64 = 1e-3;
 /// The same where every prediction is dear.
 const DEAR_ROUNDS: usize = 1;
 
@@ -114,9 +124,11 @@ impl Profiler<'_> {
         let step = if self.dear { DEAR_STEP } else { STEP };
         let mut settings = self.fit.settings.clone();
         let mut points = Vec::new();
-        for count in 1..=MOST_POINTS {
+        let most = if self.dear { MOST_DEAR_POINTS } else { MOST_POINTS };
+        for count in 1..=most {
             checkpoint(monitor)?;
-            let t = coordinate.t(self.value(k)) + side * step * count as f64 * sd;
+            let steps = count.min(EQUAL_STEPS) as f64 * FARTHER.powi(count.saturating_sub(EQUAL_STEPS) as i32);
+            let t = coordinate.t(self.value(k)) + side * step * steps * sd;
             let value = coordinate.moved(t, range);
             let bound = if side < 0.0 { range.lower } else { range.upper };
             let before = points.last().map_or(self.value(k), |(value, _): &(f64, f64)| *value);
@@ -138,23 +150,29 @@ impl Profiler<'_> {
     /// none fixed at these settings. `None` where the model has no value for a row.
     fn least(&self, settings: &mut [Setting], fixed: Option<usize>) -> Result<Option<f64>, Failure> {
         let mut least: Option<(f64, Vec<Setting>)> = None;
-        let rounds = if self.dear { DEAR_ROUNDS } else { ROUNDS };
+        // A valley along a shape bends: there the columns are made anew.
+        let bends = self.fit.with_shapes && !self.dear;
+        let rounds = if self.dear {
+            DEAR_ROUNDS
+        } else if bends {
+            BENT_ROUNDS
+        } else {
+            ROUNDS
+        };
         for round in 0..=rounds {
             let Some(residual) = self.refinement.residual(settings)? else { break };
-            let t: Vec<f64> = (0..self.fit.free.len())
-                .map(|k| {
-                    let (member, variable) = self.fit.free[k];
-                    self.fit.coordinates[k].t(settings[member].values[variable])
-                })
-                .collect();
+            let t = self.refinement.coordinates_of(self.fit, settings);
             let cost = self.refinement.likelihood.misfit(&residual) + t.iter().map(|t| t * t).sum::<f64>();
-            if least.as_ref().is_none_or(|(known, _)| cost < *known) {
+            let gained = least.as_ref().map_or(f64::INFINITY, |(known, _)| known - cost);
+            if gained > 0.0 {
                 least = Some((cost, settings.to_vec()));
             }
-            if round == rounds || fixed.is_none() || self.fit.free.len() < 2 {
+            if round == rounds || gained < WORTH_A_ROUND || fixed.is_none() || self.fit.free.len() < 2 {
                 break;
             }
-            self.refinement.move_others(self.fit, settings, &t, &residual, fixed);
+            let anew = if bends { Some(self.refinement.columns_at(self.fit, settings)?) } else { None };
+            let columns = anew.as_ref().unwrap_or(&self.fit.columns);
+            self.refinement.move_others(self.fit, columns, settings, &residual, fixed);
         }
         Ok(least.map(|(cost, at)| {
             settings.clone_from_slice(&at);

@@ -255,18 +255,19 @@ impl Refinement<'_> {
         Ok(rows.map(|((y, f), keep)| if *keep { f.ok().map(|f| y - f) } else { Some(0.0) }).collect())
     }
 
-    /// One Gauss-Newton step of all free values but one, with the columns of the fit.
+    /// One Gauss-Newton step of all free values but one, with these columns.
     pub(super) fn move_others(
         &self,
         fit: &Fit,
+        columns: &[White],
         settings: &mut [Setting],
-        t: &[f64],
         residual: &White,
         fixed: Option<usize>,
     ) {
+        let t = self.coordinates_of(fit, settings);
         let others: Vec<usize> = (0..fit.free.len()).filter(|k| Some(*k) != fixed).collect();
-        let columns: Vec<&White> = others.iter().map(|&k| &fit.columns[k]).collect();
-        let Some(Normal { mut gram, mut right, .. }) = self.likelihood.normal(&columns, residual) else { return };
+        let of_others: Vec<&White> = others.iter().map(|&k| &columns[k]).collect();
+        let Some(Normal { mut gram, mut right, .. }) = self.likelihood.normal(&of_others, residual) else { return };
         for (i, &k) in others.iter().enumerate() {
             gram[(i, i)] += 1.0;
             right[i] -= t[k];
@@ -278,6 +279,20 @@ impl Refinement<'_> {
             let moved = t[k] + step[i].clamp(-LONGEST_STEP, LONGEST_STEP);
             settings[member].values[variable] = fit.coordinates[k].moved(moved, self.variable(fit, k).range);
         }
+    }
+
+    /// The free values of a fit at other settings, in units of their priors.
+    pub(super) fn coordinates_of(&self, fit: &Fit, settings: &[Setting]) -> Vec<f64> {
+        let of = |(&(member, variable), coordinate): (&(usize, usize), &Coordinate)| {
+            coordinate.t(settings[member].values[variable])
+        };
+        fit.free.iter().zip(&fit.coordinates).map(of).collect()
+    }
+
+    /// Columns of the free values of a fit about other settings.
+    pub(super) fn columns_at(&self, fit: &Fit, settings: &[Setting]) -> Result<Vec<White>, Failure> {
+        let nothing = vec![0.0; self.value.len()];
+        Ok(self.linearise(&nothing, settings, &fit.free, &fit.coordinates)?.columns)
     }
 
     /// About settings that leave `raw` of the rows.

@@ -4,10 +4,11 @@ use nalgebra::{DMatrix, DVector};
 
 use super::evidence::{Evidence, Normal, Side, log_sum_exp};
 use super::likelihood::Likelihood;
+use super::optima::Peak;
 use super::signatures::{Signatures, Variant};
 use super::subject::Setting;
 use super::whiten::White;
-use crate::calculator::{Failure, Hypothesis, Monitor, Treatment, checkpoint};
+use crate::calculator::{Failure, Hypothesis, Monitor, Treatment, Variable, checkpoint};
 
 /// Singles that may have partners.
 const LEADING_SINGLES: usize = 6;
@@ -183,26 +184,12 @@ impl<'a> Linear<'a> {
         Normal { gram, right, square }.evidence(&sides, *scale, whitener.rows())
     }
 
-    /// A set of causes: mean evidence over the product of the grids, and the best point. Of several places about which one
-    /// point of the grid is linearised that counts which explains most; a cause that was found off its grid has half of its
-    /// weight there.
+    /// A set of causes: mean evidence over the product of the grids, and the best point.
     pub(super) fn candidate(&self, members: Vec<usize>, log_prior: f64) -> Option<Candidate> {
-        let points = self.points(&members);
-        let cells: usize = members.iter().map(|&h| self.signatures.grid_points[h] + 1).product();
-        let mut found: Vec<Option<Found>> = vec![None; cells];
-        for point in points {
-            let evidence = self.evidence(&members, &point)?;
-            let weighed = evidence.log_z + members.iter().zip(&point).map(|(&h, &v)| self.log_share(h, v)).sum::<f64>();
-            let cell = &mut found[self.cell(&members, &point)];
-            if cell.as_ref().is_none_or(|known| weighed > known.weighed) {
-                *cell = Some(Found { point, weighed, evidence });
-            }
-        }
-        // Points of the product that are not tried add nothing to speak of to the mean over all of it.
-        let mut found: Vec<Found> = found.into_iter().flatten().collect();
+        let mut found = self.found(&members);
         let all: Vec<f64> = found.iter().map(|found| found.weighed).collect();
         let best = (0..found.len()).rev().max_by(|&a, &b| all[a].total_cmp(&all[b]))?;
-        let spread = if found.len() > 1 { self.spread(&members, &found, best) } else { Vec::new() };
+        let spread = if self.has_cells(&members) { self.spread(&members, &found, best) } else { Vec::new() };
         let Found { point, evidence, .. } = found.swap_remove(best);
         Some(Candidate {
             members,
@@ -213,6 +200,54 @@ impl<'a> Linear<'a> {
             t: evidence.t,
             spread,
         })
+    }
+
+    /// Whether a grid of these hypotheses has more than one point, or stands beside a place off it.
+    fn has_cells(&self, members: &[usize]) -> bool {
+        members.iter().any(|&h| self.signatures.grid_points[h] > 1 || self.signatures.is_off_grid[h])
+    }
+
+    /// A set of causes at every point of the product of its grids. Of several places about which one point is linearised
+    /// that counts which explains most; a cause that was found off its grid has half of its weight there. A point that has
+    /// no evidence, and one that is not tried, adds nothing to the mean over all of them.
+    fn found(&self, members: &[usize]) -> Vec<Found> {
+        let cells: usize = members.iter().map(|&h| self.signatures.grid_points[h] + 1).product();
+        let mut found: Vec<Option<Found>> = vec![None; cells];
+        for point in self.points(members) {
+            let Some(evidence) = self.evidence(members, &point) else { continue };
+            let weighed = evidence.log_z + members.iter().zip(&point).map(|(&h, &v)| self.log_share(h, v)).sum::<f64>();
+            let cell = &mut found[self.cell(members, &point)];
+            if cell.as_ref().is_none_or(|known| weighed > known.weighed) {
+                *cell = Some(Found { point, weighed, evidence });
+            }
+        }
+        found.into_iter().flatten().collect()
+    }
+
+    /// What every variable of every member may be, point by point of the product of the grids: a shape anywhere in its cell.
+    /// `None` where there are no grids. The best point comes first.
+    pub(super) fn peaks(&self, candidate: &Candidate) -> Option<Vec<Vec<Vec<Peak>>>> {
+        let members = &candidate.members;
+        if !self.has_cells(members) {
+            return None;
+        }
+        let mut found = self.found(members);
+        found.sort_by_key(|found| found.point != candidate.variants);
+        let total = log_sum_exp(&found.iter().map(|found| found.weighed).collect::<Vec<_>>());
+        let mut peaks: Vec<Vec<Vec<Peak>>> =
+            members.iter().map(|&h| vec![Vec::new(); self.hypotheses[h].variables.len()]).collect();
+        for here in &found {
+            let weight = (here.weighed - total).exp();
+            let values = self.values(members, &here.point, &here.evidence.t);
+            let variances = self.variances(members, here, &values);
+            for (member, own) in peaks.iter_mut().enumerate() {
+                for (variable, peaks) in own.iter_mut().enumerate() {
+                    let standard_deviation = variances[member][variable].sqrt();
+                    peaks.push(Peak { value: values[member][variable], standard_deviation, weight });
+                }
+            }
+        }
+        Some(peaks)
     }
 
     /// The product of the variants of these hypotheses, as far as they are tried together.
@@ -268,22 +303,31 @@ impl<'a> Linear<'a> {
         for here in found {
             let weight = (here.weighed - total).exp();
             let values = self.values(members, &here.point, &here.evidence.t);
-            let mut column = 0;
-            for (member, &h) in members.iter().enumerate() {
-                for (square, (value, of_best)) in
-                    squares[member].iter_mut().zip(values[member].iter().zip(&of_best[member]))
-                {
-                    *square += weight * (value - of_best) * (value - of_best);
-                }
-                for free in &self.variant(h, here.point[member]).free {
-                    let slope = free.coordinate.slope(values[member][free.variable]);
-                    squares[member][free.variable] +=
-                        weight * here.evidence.covariance[(column, column)] * slope * slope;
-                    column += 1;
+            let variances = self.variances(members, here, &values);
+            for (member, squares) in squares.iter_mut().enumerate() {
+                for (variable, square) in squares.iter_mut().enumerate() {
+                    let away = values[member][variable] - of_best[member][variable];
+                    *square += weight * (away * away + variances[member][variable]);
                 }
             }
         }
         squares.into_iter().map(|member| member.into_iter().map(f64::sqrt).collect()).collect()
+    }
+
+    /// Variance of every variable of every member at a point of the grids: of a shape that of a value anywhere in its cell.
+    fn variances(&self, members: &[usize], here: &Found, values: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let mut column = 0;
+        let of_member = |(member, &h): (usize, &usize)| {
+            let of_cell = |(variable, value): (&Variable, &f64)| cell_width(variable, *value).powi(2) / 12.0;
+            let mut own: Vec<f64> = self.hypotheses[h].variables.iter().zip(&values[member]).map(of_cell).collect();
+            for free in &self.variant(h, here.point[member]).free {
+                let slope = free.coordinate.slope(values[member][free.variable]);
+                own[free.variable] = here.evidence.covariance[(column, column)] * slope * slope;
+                column += 1;
+            }
+            own
+        };
+        members.iter().enumerate().map(of_member).collect()
     }
 
     /// Values of every member at a point of the grids and these coordinates.
@@ -370,6 +414,20 @@ impl<'a> Linear<'a> {
             Setting { hypothesis, values }
         };
         members.iter().zip(variants).zip(values).map(of_member).collect()
+    }
+}
+
+/// Width of the cell about a point of a shape's grid: half way to its neighbours, and as far beyond the ends.
+fn cell_width(variable: &Variable, value: f64) -> f64 {
+    let Treatment::Shape { grid, .. } = &variable.treatment else { return 0.0 };
+    let nearest = |side: f64| {
+        let gaps = grid.iter().map(|other| (other - value) * side).filter(|gap| *gap > 0.0);
+        gaps.min_by(f64::total_cmp)
+    };
+    match (nearest(-1.0), nearest(1.0)) {
+        (Some(below), Some(above)) => f64::midpoint(below, above),
+        (Some(gap), None) | (None, Some(gap)) => gap,
+        (None, None) => 0.0,
     }
 }
 

@@ -22,6 +22,9 @@ const SEPARATED_SETS: usize = 6;
 /// the fit, before the profile takes their place.
 const AGREE: f64 = 0.2;
 
+/// A point of a grid with less of the posterior changes no edge of an interval that is given.
+const UNSEEN_WEIGHT: f64 = 1e-4;
+
 /// A change of the prediction below this share of the scatter is not seen in single rows.
 const NEGLIGIBLE: f64 = 0.5;
 
@@ -159,19 +162,25 @@ impl<'a> View<'a> {
     }
 
     fn set(&self, set: &SetWeight) -> Vec<NamedCause> {
+        let on_grid = self.weighing.peaks(set);
         let of_member = |member: usize| {
             let hypothesis = &self.hypotheses[set.settings[member].hypothesis];
             let parameters = 0..hypothesis.variables.len();
             NamedCause {
                 kind: hypothesis.cause.kind.to_owned(),
                 label: hypothesis.label.clone(),
-                parameters: parameters.map(|index| self.parameter(set, member, index)).collect(),
+                parameters: parameters
+                    .map(|index| {
+                        self.parameter(set, member, index, on_grid.as_ref().map(|all| all[member][index].as_slice()))
+                    })
+                    .collect(),
             }
         };
         (0..set.settings.len()).map(of_member).collect()
     }
 
-    fn parameter(&self, set: &SetWeight, member: usize, index: usize) -> ParameterReport {
+    /// `on_grid`: what the value may be where its set has shapes that stay on their grid.
+    fn parameter(&self, set: &SetWeight, member: usize, index: usize, on_grid: Option<&[Peak]>) -> ParameterReport {
         let (setting, sd) = (&set.settings[member], set.standard_deviations[member][index]);
         let variable = &self.hypotheses[setting.hypothesis].variables[index];
         let (value, range) = (setting.values[index], variable.range);
@@ -181,30 +190,32 @@ impl<'a> View<'a> {
             let half = quantile(share, dof) * sd;
             [value - half, value + half].map(|edge| edge.clamp(range.lower, range.upper))
         };
+        let at_optimum = Peak { value, standard_deviation: sd, weight: 1.0 };
+        let others: Vec<Peak> = set.others.iter().filter(|_| fitted).map(|other| other.peak(member, index)).collect();
+        // Where one point of a grid has all of it, a size is known as if there were no other.
+        let is_shape = matches!(variable.treatment, Treatment::Shape { .. });
+        let on_grid: Vec<Peak> =
+            on_grid.unwrap_or_default().iter().copied().filter(|peak| peak.weight > UNSEEN_WEIGHT).collect();
         // Where both agree the simpler one stands.
         let profile = self.profile(set, setting.hypothesis, index).filter(|profile| {
             let reach = quantile(0.95, dof);
             !profile.agrees(value, quadratic(0.95), reach, AGREE)
         });
-        let mut peaks = vec![Peak { value, standard_deviation: sd, weight: 1.0 }];
-        peaks.extend(set.others.iter().filter(|_| fitted).map(|other| Peak {
-            value: other.settings[member].values[index],
-            standard_deviation: other.standard_deviations[member][index],
-            weight: other.odds,
-        }));
-        let several = peaks.len() > 1;
-        let interval = |share: f64| {
-            let own = || match profile {
-                _ if several => mixture_interval(&peaks, share, dof).map(|edge| edge.clamp(range.lower, range.upper)),
-                Some(profile) => profile.interval(quantile(share, dof)),
-                None => quadratic(share),
-            };
-            fitted.then(own)
+        let known = if !others.is_empty() {
+            Known::Peaks("several_optima", [vec![at_optimum], others.clone()].concat())
+        } else if on_grid.len() > 1 || (is_shape && !on_grid.is_empty()) {
+            Known::Peaks("grid", on_grid)
+        } else {
+            profile.map_or(Known::Quadratic, Known::Profile)
         };
-        let from = match profile {
-            _ if several => "several_optima",
-            Some(_) => "profile",
-            None => "quadratic",
+        let interval = |share: f64| {
+            fitted.then(|| match &known {
+                Known::Peaks(_, peaks) => {
+                    mixture_interval(peaks, share, dof).map(|edge| edge.clamp(range.lower, range.upper))
+                }
+                Known::Profile(profile) => profile.interval(quantile(share, dof)),
+                Known::Quadratic => quadratic(share),
+            })
         };
         let span = range.upper - range.lower;
         ParameterReport {
@@ -215,8 +226,8 @@ impl<'a> View<'a> {
             interval_50: interval(0.50),
             interval_90: interval(0.90),
             interval_95: interval(0.95),
-            interval_from: fitted.then(|| from.to_owned()),
-            other_values: peaks[1..].iter().map(|other| other.value).collect(),
+            interval_from: fitted.then(|| known.name().to_owned()),
+            other_values: others.iter().map(|other| other.value).collect(),
             at_limit: fitted && (value - range.lower < 1e-9 * span || range.upper - value < 1e-9 * span),
         }
     }
@@ -316,6 +327,26 @@ impl<'a> View<'a> {
             .map(|signature| SignatureReport { causes: kinds(&signature.members), change: signature.change })
             .collect();
         Ok((changes, apart))
+    }
+}
+
+/// What is known of a fitted value.
+enum Known<'a> {
+    /// A mixture, and where its parts come from.
+    Peaks(&'static str, Vec<Peak>),
+    /// A likelihood that is not quadratic.
+    Profile(&'a Profile),
+    /// One that is.
+    Quadratic,
+}
+
+impl Known<'_> {
+    fn name(&self) -> &'static str {
+        match self {
+            Self::Peaks(from, _) => from,
+            Self::Profile(_) => "profile",
+            Self::Quadratic => "quadratic",
+        }
     }
 }
 

@@ -7,7 +7,7 @@ use super::foundation::Foundation;
 use super::likelihood::Likelihood;
 use super::link;
 use super::noise::Noise;
-use super::optima::{Optimum, elsewhere};
+use super::optima::{Optimum, Peak, elsewhere};
 use super::profile::{Profile, Profiler};
 use super::refine::{Fit, Refinement};
 use super::search::{Candidate, Linear, by_weight};
@@ -240,6 +240,27 @@ impl<'a> Weighing<'a> {
             inclusion,
             verdict,
         })
+    }
+
+    /// What every value of every member of a set whose shapes stay on their grid may be, point by point of the grid; `None` of
+    /// other sets, and beside a remainder.
+    pub fn peaks(&self, set: &SetWeight) -> Option<Vec<Vec<Vec<Peak>>>> {
+        let fit = self.fit(&set.members);
+        if set.remainder.is_some() || fit.is_some_and(|fit| fit.with_shapes) {
+            return None;
+        }
+        let candidate = self.ranking.candidates.iter().find(|candidate| candidate.members == set.members)?;
+        let mut peaks = self.linear.peaks(candidate)?;
+        // About the model itself the best point is better known.
+        if let Some(fit) = fit {
+            for (k, &(member, variable)) in fit.free.iter().enumerate() {
+                if let Some(best) = peaks[member][variable].first_mut() {
+                    best.value = fit.settings[member].values[variable];
+                    best.standard_deviation = fit.covariance[(k, k)].sqrt();
+                }
+            }
+        }
+        Some(peaks)
     }
 
     /// The fit of a set about the model itself, where it was made.
