@@ -268,11 +268,20 @@ mod tests {
     #[test]
     fn the_gain_of_a_diagnosis_says_which_way_the_error_goes() {
         let gain = |base: f64, extended: f64, unit: &'static str| {
+            let chance = f64::from(u8::from((3.0..3.9).contains(&extended)));
             let message = Message::new("diagnosis_gain").with("base", base).with("extended", extended);
+            let message = message.with("chance", chance).with("low", -0.05).with("high", 0.31);
             explained(&message.with("ceiling", base / 2.0).with("quantity", "diameter_deviation_um").with("unit", unit))
         };
         for (base, extended, unit, english, russian) in [
             (3.9, 1.5, "um", "falls from 3.9 to 1.5 µm; scatter", "падает с 3,9 до 1,5 мкм; разброс"),
+            (
+                3.9,
+                3.5,
+                "um",
+                "to 3.5 µm, which may be chance: the share it falls by lies between -5 % and 31 % (95 %); scatter",
+                "до 3,5 мкм, что может быть случайностью: доля, на которую она падает, лежит между -5 % и 31 % (95 %); разброс",
+            ),
             (3.9, 4.78, "um", "rises from 3.9 to 4.78 µm: there the", "растёт с 3,9 до 4,78 мкм: на них"),
             (1.511, 1.512, "um", "stays at 1.51 µm; scatter", "остаётся равной 1,51 мкм; разброс"),
             (0.25, 0.35, "", "rises from 25 % to 35 %: there the", "растёт с 25 % до 35 %: на них"),

@@ -255,7 +255,7 @@ const digitsOf = ({ path }) => (/(^|_)(numerical_error|uncertainty)(_[a-z]+)*$/.
 
 /** Words of results that no schema lists. */
 const SAID = {
-  quadratic: 'said_quadratic', several_optima: 'said_several_optima', opening: 'said_opening', rpm_min: 'said_rpm_min', rpm_max: 'said_rpm_max', ln_factor: 'said_ln_factor', kappa: 'size_share',
+  quadratic: 'said_quadratic', grid: 'said_shape_grid', several_optima: 'said_several_optima', opening: 'said_opening', rpm_min: 'said_rpm_min', rpm_max: 'said_rpm_max', ln_factor: 'said_ln_factor', kappa: 'size_share',
   common: 'said_common', per_run: 'said_per_run', around: 'said_around', test_order: 'said_test_order', per_speed: 'said_per_speed', per_depth: 'said_per_depth', per_cell: 'said_per_cell', speed_and_depth: 'said_per_cell',
   'fitted to trials': 'said_fitted', 'pcg64 (XSL RR 128/64), Lemire\'s multiplication without rejection': 'said_generator',
   amplitude_cos_phase_mm: 'said_cosine', amplitude_sin_phase_mm: 'said_sine', amplitude_cos_end_phase_mm: 'said_cosine', amplitude_sin_end_phase_mm: 'said_sine',

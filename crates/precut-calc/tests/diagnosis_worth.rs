@@ -254,6 +254,82 @@ fn structure_that_all_sweeps_share_is_no_scatter() {
     assert!(!warned(&clean, "finer_structure"), "{:?}", clean.output.noise);
 }
 
+/// Rows of the base with a stated uncertainty of so many times their scatter.
+fn stated(times: f64) -> Value {
+    let mut value = measured(4, 5, |_, _, _, _| 0.0);
+    for row in value["measurements"].as_array_mut().unwrap() {
+        row["uncertainty_um"] = json!(times * SIGMA_UM);
+    }
+    value
+}
+
+#[test]
+fn rows_that_scatter_beyond_what_was_stated_count_as_they_scatter() {
+    let answer = answered(&stated(0.25));
+    let noise = &answer.output.noise;
+    assert_eq!((noise.source.as_str(), answer.output.verdict), ("scaled", VerdictClass::Adequate));
+    assert!(warned(&answer, "scatter_unlike_stated"));
+    // 5 runs x 3 x 19 differences between sweeps: 4 % for one standard deviation.
+    assert!((noise.scatter_factor.unwrap() / 4.0 - 1.0).abs() < 0.12, "{noise:?}");
+    assert!((noise.standard_deviation / SIGMA_UM - 1.0).abs() < 0.12, "{noise:?}");
+    assert!((noise.degrees_of_freedom.unwrap() - 285.0).abs() < 1e-9);
+}
+
+#[test]
+fn what_was_stated_stands_where_rows_do_not_contradict_it() {
+    for times in [1.0, 3.0] {
+        let answer = answered(&stated(times));
+        let noise = &answer.output.noise;
+        assert_eq!((noise.source.as_str(), answer.output.verdict), ("stated", VerdictClass::Adequate));
+        assert!(
+            (noise.standard_deviation / (times * SIGMA_UM) - 1.0).abs() < 1e-12 && noise.degrees_of_freedom.is_none()
+        );
+        // Stated three times too large it is told, and not taken away.
+        assert_eq!(warned(&answer, "scatter_unlike_stated"), times > 2.0);
+    }
+}
+
+/// Rows of the base at so many places, two of them side by side off by these shares of 15 um in the sweeps that are chosen.
+fn two_off(
+    places: u32,
+    shares: [f64; 2],
+    is_off: impl Fn(usize, usize) -> bool,
+) -> Answer<ResultOf<DeflectionCompensation>> {
+    let number = |place: f64| (place * 570.0 - 15.0) / 540.0 * f64::from(places - 1);
+    let at = |place: f64, wanted: f64| (number(place) - wanted).abs() < 0.5;
+    answered(&measured_on(headstock(), (2, places), 17, |run, place, sweep, _| {
+        let share = if at(place, 8.0) {
+            shares[0]
+        } else if at(place, 9.0) {
+            shares[1]
+        } else {
+            0.0
+        };
+        if is_off(run, sweep) { 15.0 * share } else { 0.0 }
+    }))
+}
+
+#[test]
+fn two_blunders_side_by_side_are_set_aside_where_another_sweep_saw_nothing() {
+    for shares in [[1.0, 1.0], [1.0, -1.0], [-1.0, -0.7], [0.8, 1.5]] {
+        let answer = two_off(20, shares, |run, sweep| (run, sweep) == (1, 1));
+        let mut outliers = answer.output.outliers.clone();
+        outliers.sort_unstable();
+        // Two sweeps of twenty rows before it, and the first sweep of its own run.
+        assert_eq!(outliers, [69, 70], "{shares:?}");
+        assert_eq!(answer.output.verdict, VerdictClass::Adequate);
+        assert!(!warned(&answer, "far_rows_kept"), "{shares:?} {:?}", answer.warnings);
+    }
+}
+
+#[test]
+fn a_narrow_structure_that_every_sweep_shows_stays_and_is_told() {
+    let answer = two_off(60, [1.0, 1.0], |_, _| true);
+    assert!(answer.output.outliers.is_empty(), "{:?}", answer.output.outliers);
+    assert_ne!(answer.output.verdict, VerdictClass::Adequate);
+    assert!(warned(&answer, "far_rows_kept"), "{:?}", answer.warnings);
+}
+
 #[test]
 fn a_remainder_says_where_it_jumps_and_whether_it_goes_with_the_force() {
     let step = |place: f64| if place > 0.62 { 9.0 } else { 0.0 };

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
 use super::basis::{dot, orthonormal, smooth_columns};
 use super::data::Data;
 use super::link::information;
@@ -15,6 +17,9 @@ const COSINES: usize = 8;
 const FOURIER_ORDERS: usize = 12;
 /// Pure-error degrees of freedom that suffice on their own.
 const ENOUGH_REPEATS: f64 = 10.0;
+
+/// Probability of so much scatter below which rows contradict what was stated.
+const BY_CHANCE: f64 = 0.01;
 
 /// Scatter of single rows.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,6 +41,11 @@ pub struct Noise {
 pub enum NoiseSource {
     /// Stated with the rows; what the rows themselves say, relative to it.
     Stated {
+        /// Scatter of the rows in units of what was stated.
+        scatter_factor: f64,
+    },
+    /// Stated, and multiplied by what the rows scatter beyond it: they cannot scatter so far by chance.
+    Scaled {
         /// Scatter of the rows in units of what was stated.
         scatter_factor: f64,
     },
@@ -104,19 +114,28 @@ impl Noise {
         match &data.uncertainty {
             None => own,
             Some(stated) => {
-                let kept = stated.iter().zip(keep).filter(|(_, keep)| **keep).map(|(u, _)| u * u);
-                let count = keep.iter().filter(|keep| **keep).count().max(1);
-                let sigma = (kept.sum::<f64>() / count as f64).sqrt();
-                Self {
-                    sigma,
-                    per_row: Some(stated.clone()),
-                    rho: own.rho,
-                    dof: f64::INFINITY,
-                    source: NoiseSource::Stated { scatter_factor: own.sigma / sigma },
-                }
+                let between = between_sweeps(data, residual, keep).filter(|(_, dof)| *dof >= ENOUGH_REPEATS);
+                let (scatter, dof) = between.unwrap_or((own.sigma, own.dof));
+                // What a regression without physics leaves may be a cause that it lacks: that contradicts nothing.
+                let is_scatter = between.is_some() || own.source != NoiseSource::Regression;
+                held_against_rows(stated, keep, Noise { sigma: scatter, dof, ..own }, is_scatter)
             }
         }
     }
+}
+
+/// What was stated; as much more as the rows scatter where their own scatter contradicts it.
+fn held_against_rows(stated: &[f64], keep: &[bool], own: Noise, is_scatter: bool) -> Noise {
+    let kept = || stated.iter().zip(keep).filter(|(_, keep)| **keep).map(|(u, _)| u * u);
+    let sigma = (kept().sum::<f64>() / kept().count().max(1) as f64).sqrt();
+    let scatter_factor = own.sigma / sigma;
+    let chance = ChiSquared::new(own.dof).map_or(1.0, |law| law.sf(own.dof * scatter_factor * scatter_factor));
+    if is_scatter && chance < BY_CHANCE {
+        let per_row = Some(stated.iter().map(|u| u * scatter_factor).collect());
+        return Noise { per_row, source: NoiseSource::Scaled { scatter_factor }, ..own };
+    }
+    let source = NoiseSource::Stated { scatter_factor };
+    Noise { sigma, per_row: Some(stated.to_vec()), rho: own.rho, dof: f64::INFINITY, source }
 }
 
 /// Smallest difference between two different values.

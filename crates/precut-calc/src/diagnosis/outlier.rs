@@ -25,6 +25,9 @@ pub struct Outliers {
     /// sweep being large. `None` for rows without an order: there nothing tells a blunder from an island that the model
     /// lacks, and what is weighed down is not found.
     pub heavy_tails: Option<Vec<f64>>,
+    /// Rows along sweeps that lie as far away and stay: nothing tells whether they are blunders side by side or belong to a
+    /// narrow structure. Ascending; none where there are too many outliers.
+    pub far_rows: Vec<usize>,
 }
 
 impl Outliers {
@@ -39,7 +42,8 @@ impl Outliers {
 }
 
 /// Worst first: a row is taken out, its trace fitted again without it, and flagged if its neighbours are
-/// then at peace; otherwise it is part of a structure and stays.
+/// then at peace. So are two neighbours that only come to peace together, where another sweep passed there and saw nothing
+/// of it. Otherwise the row is part of a structure and stays.
 ///
 /// The deletion is essential: in a fit that contains it, a spike of 20 sigma drags its neighbours beyond
 /// 3 sigma with it and would pass for structure.
@@ -59,9 +63,10 @@ pub(super) fn outliers(data: &Data, residual: &[f64]) -> Outliers {
         vec![Fit::of(&rows, data.layout.design.regressors.clone(), residual, Some(&data.layout.design.cell))]
     };
     let mut flagged = Vec::new();
+    let mut spread = 0.0;
     let most = (residual.len() / ONE_IN).max(1);
     loop {
-        let spread = robust_sd(traces.iter().flat_map(Fit::open_residuals));
+        spread = robust_sd(traces.iter().flat_map(Fit::open_residuals));
         if spread <= 0.0 {
             break;
         }
@@ -74,20 +79,59 @@ pub(super) fn outliers(data: &Data, residual: &[f64]) -> Outliers {
         if t < SUSPECT * spread {
             break;
         }
+        let blunders = if traces[trace].stands_alone(place, AT_PEACE * spread) {
+            vec![place]
+        } else {
+            two_blunders(&traces, &data.layout.design.smooth, trace, place, spread)
+        };
         let fit = &mut traces[trace];
-        if fit.stands_alone(place, AT_PEACE * spread) {
+        if blunders.is_empty() {
+            fit.structure[place] = true;
+            continue;
+        }
+        for place in blunders {
             flagged.push(fit.rows[place]);
             fit.out[place] = true;
-            fit.refit();
-            if flagged.len() > most {
-                let heavy_tails = ordered.then(|| heavy_tails(&traces, residual.len()));
-                return Outliers { rows: flagged, too_many: true, heavy_tails };
-            }
-        } else {
-            fit.structure[place] = true;
+        }
+        fit.refit();
+        // What they dragged with them is looked at anew.
+        fit.structure.fill(false);
+        if flagged.len() > most {
+            let heavy_tails = ordered.then(|| heavy_tails(&traces, residual.len()));
+            return Outliers { rows: flagged, too_many: true, heavy_tails, far_rows: Vec::new() };
         }
     }
-    Outliers { rows: flagged, too_many: false, heavy_tails: None }
+    let far = traces.iter().filter(|_| ordered).flat_map(|fit| fit.far_structure(SUSPECT * spread));
+    let mut far_rows: Vec<usize> = far.collect();
+    far_rows.sort_unstable();
+    Outliers { rows: flagged, too_many: false, heavy_tails: None, far_rows }
+}
+
+/// A far row and a neighbour as far away, if the rows beside both are at peace without them and every sweep that passed the
+/// place is, too: a structure of the part would show in it. With no other sweep there is no witness, and none is taken out.
+fn two_blunders(traces: &[Fit], smooth: &Smooth, trace: usize, place: usize, spread: f64) -> Vec<usize> {
+    let (Smooth::Along(along) | Smooth::Around(along)) = smooth else { return Vec::new() };
+    let fit = &traces[trace];
+    let pair = fit.beyond(place, &fit.out).into_iter().find(|&beside| {
+        let mut out = fit.out.clone();
+        out[place] = true;
+        let beside_alone = scaled_residuals(&fit.columns, &fit.value, &out)[beside];
+        out[beside] = true;
+        let without = scaled_residuals(&fit.columns, &fit.value, &out);
+        let edges = [fit.beyond(place, &out), fit.beyond(beside, &out)].concat();
+        beside_alone.abs() > SUSPECT * spread && edges.iter().all(|&i| without[i].abs() < AT_PEACE * spread)
+    });
+    let Some(beside) = pair else { return Vec::new() };
+    let far = [fit.rows[place], fit.rows[beside]];
+    let reach = (along[far[0]] - along[far[1]]).abs();
+    let witnesses: Vec<f64> = traces
+        .iter()
+        .enumerate()
+        .filter(|(other, _)| *other != trace)
+        .flat_map(|(_, other)| far.iter().filter_map(|&row| other.nearest(along, along[row], reach)))
+        .collect();
+    let undisturbed = witnesses.iter().all(|t| t.abs() < AT_PEACE * spread);
+    if !witnesses.is_empty() && undisturbed { vec![place, beside] } else { Vec::new() }
 }
 
 /// Degrees of freedom of scatter with heavy tails.
@@ -195,6 +239,13 @@ impl Fit {
             .max_by(|a, b| a.1.total_cmp(&b.1))
     }
 
+    /// Rows that were looked at, are part of a structure, and lie farther away than this.
+    fn far_structure(&self, from: f64) -> impl Iterator<Item = usize> + '_ {
+        (0..self.rows.len())
+            .filter(move |&place| self.structure[place] && self.t[place].abs() >= from)
+            .map(|place| self.rows[place])
+    }
+
     /// Whether, with this row out, its neighbours in measuring order fit. Of rows without an order: whether no repeat lies
     /// where it lies, for repeats that agree are witnesses, however far the regression runs from them.
     fn stands_alone(&self, place: usize, peace: f64) -> bool {
@@ -205,9 +256,21 @@ impl Fit {
         let mut out = self.out.clone();
         out[place] = true;
         let t = scaled_residuals(&self.columns, &self.value, &out);
+        self.beyond(place, &out).into_iter().all(|i| t[i].abs() < peace)
+    }
+
+    /// The next rows to either side that are in.
+    fn beyond(&self, place: usize, out: &[bool]) -> Vec<usize> {
         let before = (0..place).rev().find(|&i| !out[i]);
         let after = (place + 1..out.len()).find(|&i| !out[i]);
-        [before, after].into_iter().flatten().all(|i| t[i].abs() < peace)
+        [before, after].into_iter().flatten().collect()
+    }
+
+    /// Scaled residual of the row that is in and lies nearest to a position, within reach.
+    fn nearest(&self, along: &[f64], position: f64, reach: f64) -> Option<f64> {
+        let away = |place: &usize| (along[self.rows[*place]] - position).abs();
+        let within = (0..self.rows.len()).filter(|&place| !self.out[place] && away(&place) <= reach);
+        within.min_by(|a, b| away(a).total_cmp(&away(b))).map(|place| self.t[place])
     }
 }
 

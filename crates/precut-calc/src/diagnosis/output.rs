@@ -135,8 +135,8 @@ pub struct ParameterReport {
     /// 95 % interval.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub interval_95: Option<[f64; 2]>,
-    /// Where the intervals come from: `quadratic`, `profile` where the likelihood is not, or `several_optima` where the rows fit
-    /// other values nearly as well; absent for what is stated.
+    /// Where the intervals come from: `quadratic`, `profile` where the likelihood is not, `grid` where shapes are not fitted but
+    /// averaged over a grid, or `several_optima` where the rows fit other values nearly as well; absent for what is stated.
     pub interval_from: Option<String>,
     /// Its values at other optima that the rows fit nearly as well. The intervals are then those of all together, each
     /// with its share of the posterior.
@@ -211,10 +211,11 @@ pub struct NoiseReport {
     /// Correlation from one row of a sweep to the next.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub correlation: f64,
-    /// Degrees of freedom; absent where the scatter was stated.
+    /// Degrees of freedom; absent where the scatter is what was stated.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub degrees_of_freedom: Option<f64>,
-    /// Where it comes from: `stated`, `repeats`, `profile`, `regression`; of classes `spread`: granted to their margins.
+    /// Where it comes from: `stated`, or `scaled` where rows scatter beyond what was stated and count as they scatter; `repeats`,
+    /// `profile`, `regression`; of classes `spread`: granted to their margins.
     #[schema(schema_with = noise_sources)]
     pub source: String,
     /// Scatter of the rows in units of what was stated.
@@ -233,10 +234,10 @@ fn noise_sources() -> Object {
     ObjectBuilder::new()
         .schema_type(SchemaType::new(Type::String))
         .description(Some(
-            "Where it comes from: `stated`, `repeats`, `profile`, `regression`; of classes `spread`: granted to their \
-             margins.",
+            "Where it comes from: `stated`, or `scaled` where rows scatter beyond what was stated and count as they \
+             scatter; `repeats`, `profile`, `regression`; of classes `spread`: granted to their margins.",
         ))
-        .enum_values(Some(["stated", "repeats", "profile", "regression", "spread"]))
+        .enum_values(Some(["stated", "scaled", "repeats", "profile", "regression", "spread"]))
         .build()
 }
 

@@ -249,6 +249,7 @@ fn noise_report(weighing: &Weighing<'_>) -> NoiseReport {
     let between = between_sweeps(foundation.data, &foundation.residual, &weighing.keep);
     let (source, scatter_factor) = match noise.source {
         NoiseSource::Stated { scatter_factor } => ("stated", Some(scatter_factor)),
+        NoiseSource::Scaled { scatter_factor } => ("scaled", Some(scatter_factor)),
         NoiseSource::Repeats => ("repeats", None),
         NoiseSource::Profile => ("profile", None),
         NoiseSource::Regression => ("regression", None),

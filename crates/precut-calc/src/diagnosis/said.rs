@@ -24,6 +24,7 @@ pub(super) const WARNING_CODES: &[&str] = &[
     "rows_not_predicted",
     "outliers_left_out",
     "too_many_outliers",
+    "far_rows_kept",
     "copied_sweeps",
     "repeated_rows",
     "scatter_unlike_stated",
@@ -114,10 +115,19 @@ fn odd_rows(leave_out: bool, weighing: &Weighing<'_>, found: &Outliers, used: &[
         let rows: Vec<usize> = found.rows.iter().map(|&row| used[row] + 1).collect();
         warnings.push(Finding::new("outliers_left_out", "/measurements").with("count", rows.len()).with("rows", rows));
     }
-    if let NoiseSource::Stated { scatter_factor } = weighing.noise.source
-        && !(0.5..=2.0).contains(&scatter_factor)
-    {
-        warnings.push(Finding::new("scatter_unlike_stated", "/measurements").value(scatter_factor, "1"));
+    let unlike = |factor: f64, own: f64| {
+        Finding::new("scatter_unlike_stated", "/measurements").value(factor, "1").with("own", own)
+    };
+    match weighing.noise.source {
+        NoiseSource::Scaled { scatter_factor } => warnings.push(unlike(scatter_factor, 1.0)),
+        NoiseSource::Stated { scatter_factor } if !(0.5..=2.0).contains(&scatter_factor) => {
+            warnings.push(unlike(scatter_factor, 0.0));
+        }
+        _ => {}
+    }
+    if !found.far_rows.is_empty() {
+        let rows: Vec<usize> = found.far_rows.iter().map(|&row| used[row] + 1).collect();
+        warnings.push(Finding::new("far_rows_kept", "/measurements").with("count", rows.len()).with("rows", rows));
     }
     let data = foundation.data;
     if data.sides.is_some() {
@@ -257,6 +267,9 @@ pub(super) fn explanation<E: utoipa::ToSchema, R: utoipa::ToSchema>(
                 .with("base", gain.rmse_base)
                 .with("extended", gain.rmse_extended)
                 .with("ceiling", gain.noise_ceiling)
+                .with("chance", f64::from(u8::from(gain.gain_interval_95[0] <= 0.0)))
+                .with("low", gain.gain_interval_95[0])
+                .with("high", gain.gain_interval_95[1])
                 .with("quantity", quantity.name)
                 // Errors of logarithms are shares.
                 .with("unit", if quantity.logarithmic { "" } else { quantity.unit }),
