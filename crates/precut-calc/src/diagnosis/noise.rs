@@ -118,21 +118,21 @@ impl Noise {
                 let (scatter, dof) = between.unwrap_or((own.sigma, own.dof));
                 // What a regression without physics leaves may be a cause that it lacks: that contradicts nothing.
                 let is_scatter = between.is_some() || own.source != NoiseSource::Regression;
-                held_against_rows(stated, keep, Noise { sigma: scatter, dof, ..own }, is_scatter)
+                held_against_rows(stated, keep, &Noise { sigma: scatter, dof, ..own }, is_scatter)
             }
         }
     }
 }
 
 /// What was stated; as much more as the rows scatter where their own scatter contradicts it.
-fn held_against_rows(stated: &[f64], keep: &[bool], own: Noise, is_scatter: bool) -> Noise {
+fn held_against_rows(stated: &[f64], keep: &[bool], own: &Noise, is_scatter: bool) -> Noise {
     let kept = || stated.iter().zip(keep).filter(|(_, keep)| **keep).map(|(u, _)| u * u);
     let sigma = (kept().sum::<f64>() / kept().count().max(1) as f64).sqrt();
     let scatter_factor = own.sigma / sigma;
     let chance = ChiSquared::new(own.dof).map_or(1.0, |law| law.sf(own.dof * scatter_factor * scatter_factor));
     if is_scatter && chance < BY_CHANCE {
         let per_row = Some(stated.iter().map(|u| u * scatter_factor).collect());
-        return Noise { per_row, source: NoiseSource::Scaled { scatter_factor }, ..own };
+        return Noise { per_row, source: NoiseSource::Scaled { scatter_factor }, ..own.clone() };
     }
     let source = NoiseSource::Stated { scatter_factor };
     Noise { sigma, per_row: Some(stated.to_vec()), rho: own.rho, dof: f64::INFINITY, source }

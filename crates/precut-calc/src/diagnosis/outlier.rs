@@ -63,21 +63,20 @@ pub(super) fn outliers(data: &Data, residual: &[f64]) -> Outliers {
         vec![Fit::of(&rows, data.layout.design.regressors.clone(), residual, Some(&data.layout.design.cell))]
     };
     let mut flagged = Vec::new();
-    let mut spread = 0.0;
     let most = (residual.len() / ONE_IN).max(1);
-    loop {
-        spread = robust_sd(traces.iter().flat_map(Fit::open_residuals));
+    let spread = loop {
+        let spread = robust_sd(traces.iter().flat_map(Fit::open_residuals));
         if spread <= 0.0 {
-            break;
+            break spread;
         }
         let worst = traces
             .iter()
             .enumerate()
             .filter_map(|(k, fit)| fit.worst().map(|(place, t)| (k, place, t)))
             .max_by(|a, b| a.2.total_cmp(&b.2));
-        let Some((trace, place, t)) = worst else { break };
+        let Some((trace, place, t)) = worst else { break spread };
         if t < SUSPECT * spread {
-            break;
+            break spread;
         }
         let blunders = if traces[trace].stands_alone(place, AT_PEACE * spread) {
             vec![place]
@@ -100,7 +99,7 @@ pub(super) fn outliers(data: &Data, residual: &[f64]) -> Outliers {
             let heavy_tails = ordered.then(|| heavy_tails(&traces, residual.len()));
             return Outliers { rows: flagged, too_many: true, heavy_tails, far_rows: Vec::new() };
         }
-    }
+    };
     let far = traces.iter().filter(|_| ordered).flat_map(|fit| fit.far_structure(SUSPECT * spread));
     let mut far_rows: Vec<usize> = far.collect();
     far_rows.sort_unstable();
@@ -112,13 +111,13 @@ pub(super) fn outliers(data: &Data, residual: &[f64]) -> Outliers {
 fn two_blunders(traces: &[Fit], smooth: &Smooth, trace: usize, place: usize, spread: f64) -> Vec<usize> {
     let (Smooth::Along(along) | Smooth::Around(along)) = smooth else { return Vec::new() };
     let fit = &traces[trace];
-    let pair = fit.beyond(place, &fit.out).into_iter().find(|&beside| {
+    let pair = beyond(place, &fit.out).into_iter().find(|&beside| {
         let mut out = fit.out.clone();
         out[place] = true;
         let beside_alone = scaled_residuals(&fit.columns, &fit.value, &out)[beside];
         out[beside] = true;
         let without = scaled_residuals(&fit.columns, &fit.value, &out);
-        let edges = [fit.beyond(place, &out), fit.beyond(beside, &out)].concat();
+        let edges = [beyond(place, &out), beyond(beside, &out)].concat();
         beside_alone.abs() > SUSPECT * spread && edges.iter().all(|&i| without[i].abs() < AT_PEACE * spread)
     });
     let Some(beside) = pair else { return Vec::new() };
@@ -256,14 +255,7 @@ impl Fit {
         let mut out = self.out.clone();
         out[place] = true;
         let t = scaled_residuals(&self.columns, &self.value, &out);
-        self.beyond(place, &out).into_iter().all(|i| t[i].abs() < peace)
-    }
-
-    /// The next rows to either side that are in.
-    fn beyond(&self, place: usize, out: &[bool]) -> Vec<usize> {
-        let before = (0..place).rev().find(|&i| !out[i]);
-        let after = (place + 1..out.len()).find(|&i| !out[i]);
-        [before, after].into_iter().flatten().collect()
+        beyond(place, &out).into_iter().all(|i| t[i].abs() < peace)
     }
 
     /// Scaled residual of the row that is in and lies nearest to a position, within reach.
@@ -272,6 +264,13 @@ impl Fit {
         let within = (0..self.rows.len()).filter(|&place| !self.out[place] && away(&place) <= reach);
         within.min_by(|a, b| away(a).total_cmp(&away(b))).map(|place| self.t[place])
     }
+}
+
+/// The next rows to either side of a place that are in.
+fn beyond(place: usize, out: &[bool]) -> Vec<usize> {
+    let before = (0..place).rev().find(|&i| !out[i]);
+    let after = (place + 1..out.len()).find(|&i| !out[i]);
+    [before, after].into_iter().flatten().collect()
 }
 
 fn scaled_residuals(columns: &[Vec<f64>], value: &[f64], out: &[bool]) -> Vec<f64> {

@@ -127,7 +127,7 @@ impl Profiler<'_> {
         let most = if self.dear { MOST_DEAR_POINTS } else { MOST_POINTS };
         for count in 1..=most {
             checkpoint(monitor)?;
-            let steps = count.min(EQUAL_STEPS) as f64 * FARTHER.powi(count.saturating_sub(EQUAL_STEPS) as i32);
+            let steps = count.min(EQUAL_STEPS) as f64 * FARTHER.powf(count.saturating_sub(EQUAL_STEPS) as f64);
             let t = coordinate.t(self.value(k)) + side * step * steps * sd;
             let value = coordinate.moved(t, range);
             let bound = if side < 0.0 { range.lower } else { range.upper };
@@ -161,7 +161,7 @@ impl Profiler<'_> {
         };
         for round in 0..=rounds {
             let Some(residual) = self.refinement.residual(settings)? else { break };
-            let t = self.refinement.coordinates_of(self.fit, settings);
+            let t = self.fit.coordinates_at(settings);
             let cost = self.refinement.likelihood.misfit(&residual) + t.iter().map(|t| t * t).sum::<f64>();
             let gained = least.as_ref().map_or(f64::INFINITY, |(known, _)| known - cost);
             if gained > 0.0 {

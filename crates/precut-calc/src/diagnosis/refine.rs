@@ -60,6 +60,14 @@ impl Fit {
         }
         deviations
     }
+
+    /// The free values at other settings, in units of their priors.
+    pub(super) fn coordinates_at(&self, settings: &[Setting]) -> Vec<f64> {
+        let of = |(&(member, variable), coordinate): (&(usize, usize), &Coordinate)| {
+            coordinate.t(settings[member].values[variable])
+        };
+        self.free.iter().zip(&self.coordinates).map(of).collect()
+    }
 }
 
 /// A free value and its Gaussian coordinate t ~ N(0, 1).
@@ -264,7 +272,7 @@ impl Refinement<'_> {
         residual: &White,
         fixed: Option<usize>,
     ) {
-        let t = self.coordinates_of(fit, settings);
+        let t = fit.coordinates_at(settings);
         let others: Vec<usize> = (0..fit.free.len()).filter(|k| Some(*k) != fixed).collect();
         let of_others: Vec<&White> = others.iter().map(|&k| &columns[k]).collect();
         let Some(Normal { mut gram, mut right, .. }) = self.likelihood.normal(&of_others, residual) else { return };
@@ -279,14 +287,6 @@ impl Refinement<'_> {
             let moved = t[k] + step[i].clamp(-LONGEST_STEP, LONGEST_STEP);
             settings[member].values[variable] = fit.coordinates[k].moved(moved, self.variable(fit, k).range);
         }
-    }
-
-    /// The free values of a fit at other settings, in units of their priors.
-    pub(super) fn coordinates_of(&self, fit: &Fit, settings: &[Setting]) -> Vec<f64> {
-        let of = |(&(member, variable), coordinate): (&(usize, usize), &Coordinate)| {
-            coordinate.t(settings[member].values[variable])
-        };
-        fit.free.iter().zip(&fit.coordinates).map(of).collect()
     }
 
     /// Columns of the free values of a fit about other settings.
