@@ -207,7 +207,9 @@ impl<'a> Weighing<'a> {
             .map(|(log_weight, set)| SetWeight { posterior: (log_weight - total).exp(), ..set })
             .collect();
         let sum = |choose: &dyn Fn(&SetWeight) -> bool| -> f64 {
-            sets.iter().filter(|set| choose(set)).map(|set| set.posterior).sum()
+            let sum: f64 = sets.iter().filter(|set| choose(set)).map(|set| set.posterior).sum();
+            // The last digit of many shares may lie beyond all of them.
+            sum.min(1.0)
         };
         let none = sum(&|set| set.members.is_empty() && set.remainder.is_none());
         let unnamed = sum(&|set| set.remainder.is_some());
