@@ -231,3 +231,137 @@ fn no_path_is_compensated_for_passes_that_come_again() {
     let codes: Vec<&str> = violations.into_vec().iter().map(|finding| finding.code).collect();
     assert_eq!(codes, ["method_not_together"]);
 }
+
+fn faults(job: &Value) -> Vec<&'static str> {
+    let parsed: Job = serde_json::from_value(job.clone()).unwrap();
+    let mut violations = Violations::default();
+    precut_calc::calculator::Check::check(&parsed, &mut violations);
+    violations.into_vec().iter().map(|finding| finding.code).collect()
+}
+
+/// Without a clearance along the shaft there is no place to come down in: the tool feeds in where it begins.
+#[test]
+fn without_a_clearance_no_rapid_motion_ends_at_a_cut() {
+    let groove = [(100.0, 60.0, 60.0), (100.0, 44.0, 46.0), (100.0, 60.0, 60.0)];
+    let mut of = job(&groove, &json!([zone("m", 100.0, 200.0, 44.0, 1.0)]));
+    for clearance in [0.0, 1e-6, 2.0, 99.99] {
+        of["program"] = json!({ "clearance_z_mm": clearance });
+        for job in each_way(&of) {
+            let turned = driven(&program(&job).unwrap(), &groove);
+            assert_eq!([50.0, 150.0, 250.0].map(|z| turned.at(z)), [60.0, 44.0, 60.0]);
+            assert!(warned(&job).contains(&"plunge_at_shoulder"));
+        }
+    }
+}
+
+/// A compensated path begins deeper than the drawing: beside a neighbour at the drawing's size the tool feeds in.
+#[test]
+fn a_compensated_path_comes_down_clear_of_a_finished_neighbour() {
+    let step = [(400.0, 40.0, 42.0), (200.0, 39.98, 39.98)];
+    let mut of = job(&step, &json!([zone("a", 0.0, 400.0, 40.0, 1.0)]));
+    of["compensation"] = json!({});
+    of["models"]["force_y"] = json!({ "form": "log_log", "constant": 6.5, "feed_exponent": 0.6 });
+    let [to_headstock, _] = each_way(&of);
+    let blocks = program(&to_headstock).unwrap();
+    let first = blocks.iter().find_map(|block| match *block {
+        Block::Cut { x_diameter_mm, .. } => Some(x_diameter_mm),
+        _ => None,
+    });
+    assert!(first.unwrap() < 39.98, "{first:?}");
+    let down = blocks.iter().any(|block| matches!(*block, Block::Rapid { x_diameter_mm: Some(x), .. } if x < 42.0));
+    assert!(!down && warned(&to_headstock).contains(&"plunge_at_shoulder"));
+}
+
+#[test]
+fn a_zone_lies_on_its_shaft_and_a_compensated_one_bends_as_the_shaft_does() {
+    let mut beyond = zone("a", 0.0, 500.0, 50.0, 0.5);
+    beyond["compliance_um_per_n"] = json!(0.02);
+    let bar = [(400.0, 50.0, 51.0)];
+    assert_eq!(faults(&job(&bar, &json!([beyond]))), ["zone_outside_shaft"]);
+    let mut stated = zone("a", 0.0, 400.0, 50.0, 0.5);
+    stated["compliance_um_per_n"] = json!(0.5);
+    let mut of = job(&bar, &json!([stated]));
+    of["models"]["force_y"] = json!({ "form": "log_log", "constant": 5.0, "feed_exponent": 0.6 });
+    assert!(faults(&of).is_empty());
+    of["compensation"] = json!({});
+    assert_eq!(faults(&of), ["method_not_together"]);
+}
+
+/// Only the split into passes gives zones that are roughed; a user's own names mean nothing.
+#[test]
+fn the_name_of_a_zone_changes_nothing_in_its_path() {
+    let bar = [(300.0, 50.0, 51.0), (300.0, 50.0, 51.0)];
+    let of = |names: [&str; 2]| {
+        let zones = json!([zone(names[0], 0.0, 300.0, 50.0, 0.5), zone(names[1], 300.0, 600.0, 50.0, 0.5)]);
+        let blocks = program(&job(&bar, &zones)).unwrap();
+        blocks.into_iter().filter(|block| !matches!(block, Block::Note(_))).collect::<Vec<_>>()
+    };
+    assert_eq!(of(["left:rough", "left:finish"]), of(["a", "b"]));
+}
+
+fn spindle_speeds(blocks: &[Block]) -> Vec<f64> {
+    blocks.iter().filter_map(|b| if let Block::SpindleSpeed { rpm } = b { Some(*rpm) } else { None }).collect()
+}
+
+#[test]
+fn no_pass_turns_slower_than_the_spindle_does_and_what_that_passes_is_told() {
+    let mut repeated = zone("a", 0.0, 300.0, 50.0, 2.0);
+    repeated["repeat"] = json!(4);
+    let mut of = job(&[(300.0, 50.0, 66.0)], &json!([repeated]));
+    of["machine"] = json!({ "spindle_speed_min_rpm": 450 });
+    let told = |job: &Value| {
+        let warning = answered(job).1.warnings.into_iter().find(|w| w.code == "pass_thicker_than_counted").unwrap();
+        serde_json::to_value(&warning.values).unwrap()
+    };
+    let speeds = spindle_speeds(&program(&of).unwrap());
+    assert!(speeds.iter().all(|rpm| *rpm >= 450.0) && speeds[0] == 450.0, "{speeds:?}");
+    let said = told(&of);
+    assert_eq!((&said["speed"], &said["beyond"]), (&json!("least"), &json!(["speed_max"])), "{said}");
+    of["machine"] = json!({});
+    assert!(spindle_speeds(&program(&of).unwrap())[0] < 450.0);
+    assert_eq!(told(&of)["speed"], json!("kept"));
+    // One spindle speed for all: at the thickest pass the cutting speed is as much more as the diameter.
+    of["variables"] = json!({ "speed": "constant_rpm" });
+    let said = told(&of);
+    assert_eq!((&said["speed"], &said["beyond"]), (&json!("one_for_all"), &json!(["speed_max"])), "{said}");
+}
+
+/// 1556 rev/min at 29.9 mm, and nothing else: no digit is lost on the way.
+#[test]
+fn a_spindle_speed_that_is_whole_stays_whole() {
+    let mut of = job(&[(100.0, 29.9, 30.9)], &json!([zone("a", 0.0, 100.0, 29.9, 0.5)]));
+    of["machine"] = json!({ "spindle_speed_min_rpm": 1556, "spindle_speed_max_rpm": 1556 });
+    of["limits"]["speed_max_m_per_min"] = json!(300);
+    of["limits"].as_object_mut().unwrap().remove("tool_life_min_min");
+    assert_eq!(spindle_speeds(&program(&of).unwrap()), [1556.0]);
+}
+
+fn feeds(blocks: &[Block]) -> Vec<f64> {
+    blocks
+        .iter()
+        .filter_map(|b| if let Block::Cut { feed_mm_per_rev, .. } = b { *feed_mm_per_rev } else { None })
+        .collect()
+}
+
+#[test]
+fn one_feed_for_all_stays_one_and_a_given_one_stays_given() {
+    let bar = [(300.0, 50.0, 51.0), (300.0, 48.0, 49.0)];
+    let zones = json!([zone("a", 0.0, 300.0, 50.0, 0.5), zone("b", 300.0, 600.0, 48.0, 0.5)]);
+    for variables in
+        [json!({ "feed": "constant" }), json!({ "feed": "fixed", "fixed_feed_mm_per_rev": 0.15 }), json!({})]
+    {
+        let mut of = job(&bar, &zones);
+        of["variables"] = variables.clone();
+        let feeds = feeds(&program(&of).unwrap());
+        if variables["feed"] == "fixed" {
+            assert!(feeds.iter().all(|feed| *feed == 0.15), "{feeds:?}");
+        } else if variables["feed"] == "constant" {
+            assert!(feeds.iter().all(|feed| *feed == feeds[0]), "{feeds:?}");
+        }
+    }
+    // Below what a control's thousandth can say.
+    let mut of = job(&bar, &zones);
+    of["limits"]["feed_min_mm_per_rev"] = json!(0.0001);
+    of["limits"]["feed_max_mm_per_rev"] = json!(0.0005);
+    assert!(feeds(&program(&of).unwrap()).iter().all(|feed| *feed <= 0.0005));
+}

@@ -136,8 +136,7 @@ fn check_zones(job: &Job, violations: &mut Violations) {
                     .with("other", before.id.clone())
             });
         }
-        let needs_beam = zone.compliance_um_per_n.is_none();
-        violations.require(!needs_beam || zone.z_end_mm <= length + TOUCHING_MM, || {
+        violations.require(zone.z_end_mm <= length + TOUCHING_MM, || {
             Finding::new("zone_outside_shaft", at.clone())
                 .measured(zone.z_end_mm, length, "mm")
                 .with("zone", zone.id.clone())
@@ -314,6 +313,10 @@ fn check_method(job: &Job, violations: &mut Violations) {
     // What is left by the first of several passes is not what the next one is to correct.
     let repeats = job.zones.iter().any(|zone| zone.repeat > 1);
     violations.require(!(repeats && job.compensation.is_some()), || together("compensation and a zone's repeat"));
+    // The path follows the beam of shaft and supports: it would correct something else than what the schedule counts.
+    let stated = job.zones.iter().any(|zone| zone.compliance_um_per_n.is_some());
+    violations
+        .require(!(stated && job.compensation.is_some()), || together("compensation and a zone's own compliance"));
     if matches!(job.method, Method::Continuous { .. }) {
         violations.require(matches!(job.objective, Goal::Time { .. }), || together("another objective than time"));
         violations.require(job.variables.feed == FeedMode::PerZone, || together("a common feed"));

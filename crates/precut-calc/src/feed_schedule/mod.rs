@@ -46,6 +46,7 @@ mod run;
 mod segments;
 mod solve;
 mod toolpath;
+mod words;
 
 pub use forward::{MachinabilityAllowances, MachinabilityPoint, MachinabilityRun};
 pub use input::{

@@ -7,34 +7,17 @@ use crate::deflection_compensation::{ProgramZero, Reach, chuck_in_the_way, met};
 use crate::path::round_to_increment;
 use crate::shaft::FeedDirection;
 
-use super::assess;
 use super::blank::{Blank, Turned, zones_fit_the_shaft};
-use super::case::{Case, TOUCHING_MM, ZoneCase};
-use super::compliance::Held;
-use super::continuous::add_zone;
-use super::input::{Job, SpeedMode, Variables};
+use super::input::{Job, SpeedMode};
 use super::output::{Outcome, ZoneOutcome};
-use super::program::{Built, Place, Variation, build};
+use super::words::{Spoken, at_diameter, is_surface};
 
 /// Steps of the control, mm.
 const INCREMENT_MM: f64 = 0.001;
-/// Step of the feed, mm/rev.
-const FEED_STEP: f64 = 0.001;
+/// A tool that comes down in rapid motion keeps so far from what stands beside its place, mm.
+const BESIDE_MM: f64 = 0.1;
 /// Share of a diameter by which a pass may differ from the one that its zone is counted at without a word.
 const COUNTED: f64 = 0.02;
-/// A limit may be passed by this much in logarithms: the rounding of the schedule itself.
-const KEPT: f64 = 1e-9;
-
-/// Feed and speed as programmed.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Words {
-    feed_mm_per_rev: f64,
-    /// rev/min, or m/min with constant surface speed.
-    speed: f64,
-    /// No neighbouring pair of steps keeps all limits of the zone.
-    kept: bool,
-}
-
 /// One cut along a zone: where the tool turns, in the control's steps, in the order of the cut.
 #[derive(Debug, Clone, PartialEq)]
 struct Pass {
@@ -129,16 +112,38 @@ fn plunges(passes: &[Pass]) -> Vec<Finding> {
 fn thicker(job: &Job, outcome: &Outcome, passes: &[Pass]) -> Option<Finding> {
     let ratio = |pass: &Pass| pass.turned.diameter_mm / outcome.zones[pass.zone].diameter_mm;
     let most = passes.iter().max_by(|a, b| ratio(a).total_cmp(&ratio(b)))?;
-    let zone = &outcome.zones[most.zone];
-    (ratio(most) > 1.0 + COUNTED).then(|| {
-        let keeps_speed =
-            matches!(job.variables.speed, SpeedMode::PerZone | SpeedMode::Fixed | SpeedMode::ConstantSpeed);
+    let (zone, ratio) = (&outcome.zones[most.zone], ratio(most));
+    let least_rpm = job.machine.spindle_speed_min_rpm.unwrap_or(0.0);
+    let speed = match job.variables.speed {
+        SpeedMode::ConstantRpm => "one_for_all",
+        _ if zone.spindle_speed_rpm / ratio < least_rpm => "least",
+        SpeedMode::PerZone | SpeedMode::Fixed | SpeedMode::ConstantSpeed => "kept",
+    };
+    (ratio > 1.0 + COUNTED).then(|| {
         Finding::new("pass_thicker_than_counted", "/zones")
             .measured(most.turned.diameter_mm, zone.diameter_mm, "mm")
             .with("zone", zone.id.clone())
-            .with("percent", 100.0 * (ratio(most) - 1.0))
-            .with("speed", if keeps_speed { "kept" } else { "faster" })
+            .with("percent", 100.0 * (ratio - 1.0))
+            .with("speed", speed)
+            .with("least_rpm", least_rpm)
+            .with("beyond", if speed == "kept" { Vec::new() } else { beyond_at(job, zone, ratio) })
     })
+}
+
+/// Limits that a zone passes at the same spindle speed and so many times its diameter.
+fn beyond_at(job: &Job, zone: &ZoneOutcome, ratio: f64) -> Vec<&'static str> {
+    let passes = |value: Option<f64>, limit: Option<f64>| {
+        value.zip(limit).is_some_and(|(value, limit)| value * ratio > limit * (1.0 + 1e-9))
+    };
+    let speed_max = job.limits.as_ref().map(|limits| limits.speed_max_m_per_min);
+    [
+        ("speed_max", passes(Some(zone.speed_m_per_min), speed_max)),
+        ("power", passes(zone.power_kw, job.machine.power_kw)),
+        ("torque", passes(zone.torque_n_m, job.machine.torque_n_m)),
+    ]
+    .into_iter()
+    .filter_map(|(name, beyond)| beyond.then_some(name))
+    .collect()
 }
 
 fn reach(job: &Job, outcome: &Outcome, program: &Program) -> Reach {
@@ -146,25 +151,19 @@ fn reach(job: &Job, outcome: &Outcome, program: &Program) -> Reach {
 }
 
 fn written(job: &Job, outcome: &Outcome, passes: &[Pass]) -> Result<Program, Failure> {
-    let surface = job.variables.speed == SpeedMode::ConstantSpeed;
-    let held = Held::of(job)?;
-    let (case, built) = limits_of_zones(job, outcome, held.as_ref())?;
-    let words = words_of_zones(job, &built, outcome, surface);
-    let at: Vec<(f64, f64)> =
-        outcome.zones.iter().zip(&words).map(|(zone, words)| logs(zone, words, surface)).collect();
+    let said = Spoken::of(job, outcome)?;
     let retract = retract_mm(job, passes);
     let mut blocks = vec![Block::Modes];
-    blocks.extend(passed(&case, &built, &at).into_iter().map(Block::Note));
+    blocks.extend(said.passed.iter().cloned().map(Block::Note));
     let (mut spoken, mut noted): (Option<f64>, Option<usize>) = (None, None);
     for (k, pass) in passes.iter().enumerate() {
-        let words = &at_diameter(words[pass.zone], &outcome.zones[pass.zone], pass.turned.diameter_mm, job);
+        let words = &at_diameter(said.words[pass.zone], &outcome.zones[pass.zone], pass.turned.diameter_mm, job);
         if noted != Some(pass.zone) {
-            let rounded = assess::zone_outcome(&case, job, pass.zone, at[pass.zone]);
-            blocks.push(Block::Note(note(&rounded, words)));
+            blocks.push(Block::Note(said.note(job, pass.zone)));
             noted = Some(pass.zone);
         }
         if spoken.is_none_or(|last| (last - words.speed).abs() > 1e-9) {
-            blocks.push(if surface {
+            blocks.push(if is_surface(job) {
                 Block::SurfaceSpeed { speed_m_per_min: words.speed, limit_rpm: spindle_limit_rpm(job) }
             } else {
                 Block::SpindleSpeed { rpm: words.speed }
@@ -225,10 +224,10 @@ fn passes(job: &Job, outcome: &Outcome) -> Vec<Pass> {
         order.reverse();
     }
     // Roughing of a zone stands before its finish and is cut first, whichever way the tool travels.
-    order.sort_by_key(|&i| !outcome.zones[i].id.ends_with(":rough"));
+    order.sort_by_key(|&i| !is_roughing(outcome, i));
     let mut all: Vec<Pass> = Vec::new();
     for i in order {
-        for x_mm in diameters(outcome, &outcome.zones[i]) {
+        for x_mm in diameters(outcome, i) {
             let mut next = pass(job, outcome, i, x_mm, zero);
             if let Some(before) = all.last() {
                 join(before, &mut next, outcome);
@@ -239,11 +238,13 @@ fn passes(job: &Job, outcome: &Outcome) -> Vec<Pass> {
     let cuts: Vec<Turned> = all.iter().map(|pass| pass.turned).collect();
     let mut blank = Blank::of(job, &cuts);
     for pass in &mut all {
-        let away = job.program.clearance_z_mm * away(job.feed_direction);
-        // Beside what is as thick the tool goes down at the cut's begin itself.
-        let stands_mm = blank.widest_between_mm(pass.begins_mm, pass.begins_mm + away);
-        let is_free = stands_mm < pass.turned.diameter_mm - 1e-9;
-        pass.approach_mm = is_free.then(|| round_to_increment(pass.begins_mm + away - zero, INCREMENT_MM));
+        let (clearance_mm, side) = (job.program.clearance_z_mm, away(job.feed_direction));
+        // Beside what is as thick the tool goes down at the cut's begin itself; a compensated path begins deeper.
+        let first_mm = pass.corners.first().map_or(f64::INFINITY, |corner| corner.0).min(pass.turned.diameter_mm);
+        let stands_mm = blank.widest_between_mm(pass.begins_mm, pass.begins_mm + side * (clearance_mm + BESIDE_MM));
+        let is_free = clearance_mm >= INCREMENT_MM && stands_mm < first_mm - 1e-9;
+        let approach_mm = pass.begins_mm + side * clearance_mm - zero;
+        pass.approach_mm = is_free.then(|| round_to_increment(approach_mm, INCREMENT_MM));
         blank.turn(&pass.turned);
     }
     all
@@ -257,7 +258,7 @@ fn away(direction: FeedDirection) -> f64 {
 /// Lets a cut go on where the one before it ended, if both are the only cuts of zones that touch: the feed changes in the
 /// work and leaves no mark of a new start.
 fn join(before: &Pass, next: &mut Pass, outcome: &Outcome) {
-    let single = |pass: &Pass| outcome.zones[pass.zone].passes == 1 && !outcome.zones[pass.zone].id.ends_with(":rough");
+    let single = |pass: &Pass| outcome.zones[pass.zone].passes == 1 && !is_roughing(outcome, pass.zone);
     let (Some(&last), Some(&first)) = (before.corners.last(), next.corners.first()) else { return };
     let near = |a: f64, b: f64| (a - b).abs() < 0.5 * INCREMENT_MM;
     next.goes_on = before.zone != next.zone && single(before) && single(next) && near(last.1, first.1);
@@ -266,9 +267,16 @@ fn join(before: &Pass, next: &mut Pass, outcome: &Outcome) {
     }
 }
 
+/// Whether a zone of the answer is the roughing of one of the job's, which the split into passes has made. Names alone say
+/// nothing: a user's own may end alike.
+fn is_roughing(outcome: &Outcome, zone: usize) -> bool {
+    outcome.passes.is_some() && outcome.zones[zone].id.ends_with(":rough")
+}
+
 /// Diameters that the passes of a zone turn down to, every one by the zone's depth.
-fn diameters(outcome: &Outcome, zone: &ZoneOutcome) -> Vec<f64> {
-    let bare = zone.id.strip_suffix(":rough");
+fn diameters(outcome: &Outcome, index: usize) -> Vec<f64> {
+    let zone = &outcome.zones[index];
+    let bare = zone.id.strip_suffix(":rough").filter(|_| is_roughing(outcome, index));
     let is_finish = |other: &&ZoneOutcome| bare.is_some() && other.id.strip_suffix(":finish") == bare;
     let rest = outcome.zones.iter().find(is_finish).map_or(0.0, |finish| finish.depth_mm);
     (0..zone.passes).rev().map(|k| zone.diameter_mm + 2.0 * (rest + f64::from(k) * zone.depth_mm)).collect()
@@ -297,37 +305,6 @@ fn pass(job: &Job, outcome: &Outcome, index: usize, x_mm: f64, zero: f64) -> Pas
     }
 }
 
-/// The words of a zone for a pass at another diameter: the same speed at the cut, where a pass may have a speed of
-/// its own.
-fn at_diameter(words: Words, zone: &ZoneOutcome, diameter_mm: f64, job: &Job) -> Words {
-    match job.variables.speed {
-        SpeedMode::ConstantSpeed | SpeedMode::ConstantRpm => words,
-        SpeedMode::PerZone | SpeedMode::Fixed => {
-            let speed = words.speed * zone.diameter_mm / diameter_mm;
-            Words { speed: if speed < words.speed { speed.floor().max(1.0) } else { words.speed }, ..words }
-        }
-    }
-}
-
-fn note(zone: &ZoneOutcome, words: &Words) -> String {
-    use std::fmt::Write as _;
-    let mut text = format!("zone {}", zone.id);
-    // Writing to a string does not fail.
-    if let Some(deflection) = zone.deflection_um {
-        let _ = write!(text, " deflection {deflection:.1} um");
-    }
-    if let Some(roughness) = zone.roughness_um {
-        let _ = write!(text, " Ra {roughness:.2} um");
-    }
-    if let Some(usage) = zone.tool_usage {
-        let _ = write!(text, " edge {:.1} percent", 100.0 * usage);
-    }
-    if !words.kept {
-        text.push_str(" rounding breaks a limit of this zone");
-    }
-    text
-}
-
 /// To a cut, along it, and away from it unless the next one goes on.
 fn moves(blocks: &mut Vec<Block>, pass: &Pass, next: Option<&Pass>, mut feed: Option<f64>, retract: f64) {
     if let (Some(&(first_x, first_z)), false) = (pass.corners.first(), pass.goes_on) {
@@ -342,117 +319,4 @@ fn moves(blocks: &mut Vec<Block>, pass: &Pass, next: Option<&Pass>, mut feed: Op
     if !next.is_some_and(|next| next.goes_on) {
         blocks.push(Block::Rapid { x_diameter_mm: Some(retract), z_mm: None });
     }
-}
-
-/// The limits of every zone with feed and speed of its own, in the order of the answer's zones.
-fn limits_of_zones(job: &Job, outcome: &Outcome, held: Option<&Held>) -> Result<(Case, Built), Failure> {
-    let split = outcome.passes.as_ref().map(|passes| super::case::PassSplit {
-        roughing_passes: passes.roughing_passes,
-        roughing_mm: passes.roughing_depth_mm.unwrap_or(0.0),
-        finishing_mm: passes.finishing_depth_mm,
-    });
-    let base = Case::of(job, held, split.as_ref())?;
-    let mut case = base.clone();
-    case.variables = Variables::default();
-    if outcome.continuous.is_some() {
-        // Found zones take over the limits of the zone that they lie in, and keep their own names.
-        case.custom.clear();
-        case.zones.clear();
-        for (k, given) in outcome.zones.iter().enumerate() {
-            let lies_in = |own: &ZoneCase| own.from_mm <= given.z_start_mm + 1e-6 && own.to_mm >= given.z_end_mm - 1e-6;
-            let zone = base.zones.iter().position(lies_in);
-            let zone = zone.ok_or_else(|| Failure::Internal("a found zone lies in none of the job's".to_owned()))?;
-            let mut piece = base.zones[zone].clone();
-            piece.id.clone_from(&given.id);
-            (piece.from_mm, piece.to_mm) = (given.z_start_mm, given.z_end_mm);
-            piece.compliance_um_per_n = given.compliance_um_per_n;
-            let next = outcome.zones.get(k + 1);
-            piece.touches_next = next.is_some_and(|next| (next.z_start_mm - given.z_end_mm).abs() <= TOUCHING_MM);
-            add_zone(&mut case, &base, zone, piece);
-        }
-    }
-    case.limits.deflection_spread_ratio_max = None;
-    let at: Vec<(f64, f64)> =
-        outcome.zones.iter().map(|zone| (zone.speed_m_per_min.ln(), zone.feed_mm_per_rev.ln())).collect();
-    let built = build(&case, &Variation { parts_per_edge: outcome.parts_per_edge, about: Some((&at, f64::INFINITY)) });
-    Ok((case, built))
-}
-
-/// ln V and ln S as programmed.
-fn logs(zone: &ZoneOutcome, words: &Words, surface: bool) -> (f64, f64) {
-    (metres_per_min(zone, words.speed, surface).ln(), words.feed_mm_per_rev.ln())
-}
-
-fn metres_per_min(zone: &ZoneOutcome, speed: f64, surface: bool) -> f64 {
-    if surface { speed } else { speed * std::f64::consts::PI * zone.diameter_mm / 1000.0 }
-}
-
-/// The program's variables with these values in the zones.
-fn variables(built: &Built, at: impl Iterator<Item = (usize, (f64, f64))>) -> Vec<f64> {
-    let mut y = built.program.start.clone();
-    for (zone, (u, x)) in at {
-        for (source, value) in [(built.speed[zone], u), (built.feed[zone], x)] {
-            if let Some(variable) = source.variable {
-                y[variable] = value;
-            }
-        }
-    }
-    y
-}
-
-/// Whether all limits of the zone by itself hold.
-fn holds(built: &Built, zone: usize, at: (f64, f64)) -> bool {
-    let y = variables(built, std::iter::once((zone, at)));
-    built
-        .rows
-        .iter()
-        .enumerate()
-        .filter(|(_, label)| label.place == Place::Zone(zone) && label.kind.is_limit())
-        .all(|(row, _)| built.program.rows.value(row, &y) <= KEPT)
-}
-
-/// Limits over several zones or the part that the rounded words pass, each in words. A lower feed takes longer, and can
-/// use more of the edge.
-fn passed(case: &Case, built: &Built, at: &[(f64, f64)]) -> Vec<String> {
-    let y = variables(built, at.iter().copied().enumerate());
-    let rows = built.rows.iter().enumerate().map(|(row, label)| (label, built.program.rows.value(row, &y)));
-    let sums = built.sums.iter().zip(&built.program.sums).map(|(label, terms)| (label, terms.log_sum_exp(&y)));
-    rows.chain(sums)
-        .filter(|(label, value)| label.kind.is_limit() && !matches!(label.place, Place::Zone(_)) && *value > KEPT)
-        .map(|(label, value)| {
-            let name = label.name(case);
-            format!("rounded words pass {} of {} by {:.2} percent", name.constraint, name.zone, 100.0 * value.exp_m1())
-        })
-        .collect()
-}
-
-/// Feed rounded down and speed to a neighbouring whole number that keeps all limits: not always the lower one, since
-/// the passive force grows when the speed falls. Where neither does, the lower speed and one more step of feed down.
-/// A speed that is one for all zones stays one.
-fn words_of_zones(job: &Job, built: &Built, outcome: &Outcome, surface: bool) -> Vec<Words> {
-    let zones = &outcome.zones;
-    let exact = |zone: &ZoneOutcome| if surface { zone.speed_m_per_min } else { zone.spindle_speed_rpm };
-    let lower = |zone: &ZoneOutcome| (exact(zone) + 1e-9).floor().max(1.0);
-    let upper = |zone: &ZoneOutcome| (exact(zone) - 1e-9).ceil().max(1.0);
-    let down = |zone: &ZoneOutcome| ((zone.feed_mm_per_rev / FEED_STEP + 1e-9).floor() * FEED_STEP).max(FEED_STEP);
-    let keeps =
-        |i: usize, feed: f64, speed: f64| holds(built, i, (metres_per_min(&zones[i], speed, surface).ln(), feed.ln()));
-    let shared = matches!(job.variables.speed, SpeedMode::ConstantSpeed | SpeedMode::ConstantRpm);
-    let all_upper = shared && zones.iter().enumerate().all(|(i, zone)| keeps(i, down(zone), upper(zone)));
-    zones
-        .iter()
-        .enumerate()
-        .map(|(i, zone)| {
-            let feed = down(zone);
-            let slower = (feed - FEED_STEP).max(FEED_STEP);
-            let tries = match (shared, all_upper) {
-                (true, true) => vec![(feed, upper(zone))],
-                (true, false) => vec![(feed, lower(zone)), (slower, lower(zone))],
-                (false, _) => vec![(feed, upper(zone)), (feed, lower(zone)), (slower, lower(zone))],
-            };
-            let found = tries.iter().copied().find(|&(feed, speed)| keeps(i, feed, speed));
-            let (feed, speed) = found.unwrap_or((feed, lower(zone)));
-            Words { feed_mm_per_rev: round_to_increment(feed, FEED_STEP), speed, kept: found.is_some() }
-        })
-        .collect()
 }
