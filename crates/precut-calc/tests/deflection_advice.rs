@@ -209,3 +209,134 @@ fn one_more_rest_is_tried_in_all_passes() {
     // At 65 stations of 201.
     assert!((tried.form_error_um - held).abs() < 1e-2 * held, "{} {held}", tried.form_error_um);
 }
+
+/// Between three stations nobody sees what a rest leaves.
+#[test]
+fn of_a_few_stations_no_rest_is_advised() {
+    let mut few = job(&centres(0.02));
+    few["stations"] = json!({ "kind": "list", "z_mm": [0.0, 150.0, 600.0] });
+    assert!(answer(few.clone()).output.one_more_rest.is_none());
+    few["stations"] = json!({ "kind": "per_zone", "count": 9 });
+    assert!(answer(few).output.one_more_rest.is_some());
+}
+
+/// M = P l/4 in the middle however soft the tailstock is, though the shaft yields most at its end then; with the main force
+/// the moment is that of both.
+#[test]
+fn bending_stress_is_that_of_the_largest_moment() {
+    let stress = |main_n: f64, tailstock: f64| {
+        let mut job = job(&centres(0.0));
+        job["supports"][1]["compliance_um_per_n"] = json!(tailstock);
+        job["force"]["main_n"] = json!(main_n);
+        job["shaft"]["yield_strength_n_per_mm2"] = json!(1.0);
+        warned(job, "bending_stress_high").unwrap().value.unwrap()
+    };
+    let expected = |force_n: f64| force_n * 800.0 / 4.0 * 32.0 / (std::f64::consts::PI * 40.0_f64.powi(3));
+    for tailstock in [0.0, 5.0] {
+        assert!((stress(0.0, tailstock) / expected(200.0) - 1.0).abs() < 1e-9);
+        assert!((stress(480.0, tailstock) / expected(520.0) - 1.0).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn a_soft_tool_makes_no_form_error_only_where_the_force_is_even() {
+    let said = |deeper: bool| {
+        let mut job = job(&json!([{ "kind": "chuck", "z_mm": 0.0 }, { "kind": "chuck", "z_mm": 800.0 }]));
+        job["carriage"] = json!({ "compliance_um_per_n": 5.0 });
+        let half = |stock: f64| json!({ "length_mm": 400.0, "diameter_mm": 40.0, "stock_diameter_mm": stock });
+        job["shaft"]["segments"] = json!([half(42.0), half(if deeper { 46.0 } else { 42.0 })]);
+        job["force"] = json!({ "kind": "power_law", "passive": { "coefficient": 100.0, "depth_exponent": 1.0, "feed_exponent": 0.0, "speed_exponent": 0.0 } });
+        dominates(job)
+    };
+    for deeper in [false, true] {
+        let said = said(deeper);
+        let even = number(&said.values, "even") > 0.5;
+        assert_eq!((said.code, even), ("tool_dominates", !deeper));
+    }
+}
+
+#[test]
+fn where_nothing_yields_nobody_is_blamed() {
+    let mut rigid = job(&centres(0.0));
+    rigid["force"]["passive_n"] = json!(200.0);
+    rigid["shaft"]["segments"][0] = json!({ "length_mm": 1e-3, "diameter_mm": 40.0, "stock_diameter_mm": 42.0 });
+    rigid["supports"] = json!([{ "kind": "chuck", "z_mm": 0.0 }, { "kind": "chuck", "z_mm": 1e-3 }]);
+    rigid["stations"] = json!({ "kind": "list", "z_mm": [0.0, 1e-3] });
+    let said = answer(rigid).explanation;
+    assert!(said.iter().any(|message| message.code == "nothing_yields"), "{said:?}");
+}
+
+/// What the first of two passes does to insert, shaft and spindle is told with its number.
+#[test]
+fn passes_before_the_last_are_looked_at_too() {
+    let mut of = job(&centres(0.02));
+    of["shaft"]["segments"][0]["stock_diameter_mm"] = json!(46.0);
+    of["shaft"]["yield_strength_n_per_mm2"] = json!(1.0);
+    of["force"] = json!({
+        "kind": "power_law", "passive": { "coefficient": 800.0, "depth_exponent": 0.9, "feed_exponent": 0.0, "speed_exponent": 0.0 },
+        "measured_range": {
+            "least_depth_mm": 0.1, "largest_depth_mm": 2.0, "least_feed_mm_per_rev": 0.01, "largest_feed_mm_per_rev": 1.0,
+            "least_speed_m_per_min": 1.0, "largest_speed_m_per_min": 1000.0
+        }
+    });
+    of["limits"] = json!({ "depth_mm": 2.0 });
+    of["program"] = json!({ "spindle_limit_rpm": 900.0 });
+    of["passes"] = json!([
+        { "diameter_mm": 41.0, "speed_m_per_min": 200.0 }, { "diameter_mm": 40.0, "speed_m_per_min": 100.0 }
+    ]);
+    let of_first = |warning: &&Finding| warning.values.get("pass") == Some(&Said::Number(1.0));
+    let answer = answer(of);
+    let codes: Vec<&str> = answer.warnings.iter().filter(of_first).map(|warning| warning.code).collect();
+    assert_eq!(codes, ["command_too_deep", "extrapolated_force_model", "spindle_limit_binds"]);
+    // Both passes bend the shaft: that is told of the last one.
+    let stress: Vec<&Finding> = answer.warnings.iter().filter(|w| w.code == "bending_stress_high").collect();
+    assert!(matches!(stress[..], [one] if one.values.get("pass").is_none()), "{stress:?}");
+    let copied = answer.explanation.iter().find(|message| message.code == "stock_is_copied").unwrap();
+    let last = answer.output.passes.last().unwrap();
+    let most = last.copied_so_far.iter().flatten().copied().fold(0.0, f64::max);
+    assert!((number(&copied.values, "copying_factor") - most).abs() < 1e-12 && most < 0.1, "{most}");
+}
+
+/// A measured blank of which no nominal one is stated is what the first pass is planned on.
+#[test]
+fn passes_of_a_measured_blank_are_turned_to_their_diameters() {
+    let passes = |stock: Option<f64>| {
+        let mut of = job(&centres(0.02));
+        let mut segment = json!({ "length_mm": 800.0, "diameter_mm": 30.0 });
+        if let Some(stock) = stock {
+            segment["stock_diameter_mm"] = json!(stock);
+        }
+        of["shaft"]["segments"] = json!([segment]);
+        of["stock_profile"] = json!([{ "z_mm": 0.0, "diameter_mm": 40.0 }, { "z_mm": 800.0, "diameter_mm": 40.4 }]);
+        of["passes"] = json!([36.0, 33.0, 30.0].map(|d| json!({ "diameter_mm": d, "compensated": true })));
+        answer(of).output.passes
+    };
+    for stock in [None, Some(30.5), Some(40.0)] {
+        let produced: Vec<f64> = passes(stock).iter().map(|pass| pass.diameter_error_um[0].abs()).collect();
+        // The force is constant, so every command is right whatever it was planned on.
+        assert!(produced.iter().all(|error| *error < 1e-6), "{stock:?} {produced:?}");
+    }
+}
+
+/// A tool that is set too deep cuts with a command beyond the blank, too: t = a solves t + Y = t_c also where t_c < 0.
+#[test]
+fn a_command_beyond_the_blank_cuts_what_stands_towards_the_tool() {
+    for force in [
+        json!({ "kind": "constant", "passive_n": 5.0 }),
+        json!({ "kind": "power_law", "passive": { "coefficient": 60.0, "depth_exponent": 0.9, "feed_exponent": 0.0, "speed_exponent": 0.0 } }),
+    ] {
+        let mut of = job(&centres(0.01));
+        of["shaft"]["segments"][0]["stock_diameter_mm"] = json!(40.3);
+        of["force"] = force;
+        of["effects"] = json!([{ "kind": "size_offset", "offset_um": -600.0 }]);
+        of["path"] = json!({ "chord_tolerance_um": 0.1, "increment_um": 0.1 });
+        let answer = answer(of);
+        let stations = &answer.output.stations;
+        assert!(stations.commanded_diameter_mm.iter().flatten().all(|command| *command > 40.3));
+        assert!(
+            answer.output.largest_error_after_um.unwrap().abs() < 1.0,
+            "{:?}",
+            answer.output.largest_error_after_um
+        );
+    }
+}

@@ -141,6 +141,27 @@ fn a_plunge_behind_a_shoulder_is_told_with_its_place() {
     assert!(named(&warnings, "plunge_at_shoulder").is_empty(), "{warnings:?}");
 }
 
+/// However small the clearance is, a shoulder beside it is no place to come down at.
+#[test]
+fn a_small_clearance_hides_no_shoulder() {
+    for (increment_um, clearance_mm) in [(100.0, 0.2), (1.0, 0.002), (1.0, 0.0), (10.0, 250.0)] {
+        for feed_direction in ["to_headstock", "to_tailstock"] {
+            let mut of = stepped([60.0, 50.0, 60.0], feed_direction);
+            of["program"] = json!({ "clearance_z_mm": clearance_mm, "clearance_x_mm": 0.0 });
+            of["path"] = json!({ "increment_um": increment_um });
+            of["shaft"]["segments"][0]["stock_diameter_mm"] = json!(64.04);
+            let (warnings, program) = programmed(of);
+            assert_eq!(named(&warnings, "plunge_at_shoulder").len(), 1, "{warnings:?}");
+            for block in program.unwrap().blocks {
+                let Block::Rapid { x_diameter_mm: Some(x), .. } = block else { continue };
+                // To the first cut from outside, else beyond the blank.
+                assert!(x >= 64.04 || x > 59.0, "{x}");
+                assert!(x < 60.5 || x >= 64.04, "retracts into the blank: {x}");
+            }
+        }
+    }
+}
+
 /// Stations that begin inside the blank: what is not cut yet stands there as it came, however deep the command is.
 #[test]
 fn the_tool_does_not_come_down_rapidly_into_the_blank() {

@@ -121,7 +121,11 @@ fn a_rest_holds_the_shaft_of_a_tailstock_set_off() {
 fn a_rest_on_the_overhang_is_not_taken_for_the_tailstock() {
     let chuck = json!({ "kind": "chuck", "z_mm": 0.0 });
     let supports = [chuck, centre(400.0)];
-    let tried = |effects: &[Value]| solved(job(&supports, 100.0, effects)).one_more_rest.is_some();
+    let tried = |effects: &[Value]| {
+        let mut job = job(&supports, 100.0, effects);
+        job["stations"] = json!({ "kind": "per_zone", "count": 21 });
+        solved(job).one_more_rest.is_some()
+    };
     assert!(tried(&[]));
     assert!(!tried(&[tailstock(20.0)]));
     assert!(!tried(&[json!({ "kind": "tailstock_compliance", "delta_um_per_n": 0.05 })]));

@@ -33,6 +33,12 @@ const THRUST_RATIO: f64 = 0.05;
 const SLENDER: f64 = 10.0;
 /// Stations at which one more rest is tried.
 const REST_SAMPLES: usize = 65;
+/// Stations from which on a sample of them shows what a rest leaves.
+const REST_LEAST: usize = 9;
+/// Stations at which bending stress is looked at: of a smooth moment curve the largest is missed by less than a thousandth.
+const STRESS_SAMPLES: usize = 65;
+/// Share by which passive forces may differ and still make the same size everywhere.
+const EVEN: f64 = 0.01;
 /// Stations at which rests are tried for touching the shaft.
 const CONTACT_SAMPLES: usize = 1025;
 /// Share of the form error that one more rest must take away to be worth naming.
@@ -43,6 +49,7 @@ const DEPTH_RATIO: f64 = 2.0;
 /// Codes of the explanations made here.
 pub(super) const EXPLANATION_CODES: &[&str] = &[
     "work_dominates",
+    "nothing_yields",
     "headstock_dominates",
     "tailstock_dominates",
     "rests_dominate",
@@ -149,6 +156,10 @@ pub(super) fn one_more_rest(
     }
     let stiffest = job.supports.iter().filter(|s| s.carries()).map(Support::compliance_um_per_n);
     let compliance_um_per_n = stiffest.fold(f64::INFINITY, f64::min);
+    // Between a few stations far apart a rest may leave more than at them: of that nothing is said.
+    if grid.len() < REST_LEAST {
+        return Ok(None);
+    }
     let chosen = grid.sample(REST_SAMPLES);
     let mut with_rest = job.clone();
     with_rest.supports.push(Support::SteadyRest {
@@ -164,7 +175,7 @@ pub(super) fn one_more_rest(
     let sampled = grid.at(&chosen);
     // All passes with it: the stock that the last one meets is thicker where the shaft was not held.
     let held = match all_cuts(&with_rest, &sampled, acting, &Again(monitor)) {
-        Ok((held, _)) => held,
+        Ok(cuts) => cuts.last,
         Err(Failure::OutOfModel(_)) => return Ok(None),
         Err(failure) => return Err(failure),
     };
@@ -197,15 +208,25 @@ pub(super) fn explanation(job: &Job, outcome: &Outcome, dominating: Message) -> 
     if overcut < 0.0 {
         said.push(Message::new("one_step_overcuts").with("undersize_um", -overcut));
     }
-    let copied = largest(outcome.stations.copying_factor.iter().flatten().copied());
-    if copied > 0.0 {
-        said.push(Message::new("stock_is_copied").with("copying_factor", copied));
-    }
+    said.extend(copied(job, outcome));
     if !job.passes.is_empty() {
         said.push(Message::new("program_is_last_pass"));
     }
     said.push(Message::new("not_modelled"));
     said
+}
+
+/// How much of a deviation of the blank is left: after all passes, where there are several.
+fn copied(job: &Job, outcome: &Outcome) -> Option<Message> {
+    let of_all =
+        outcome.passes.last().map(|last| largest(last.copied_so_far.iter().flatten().map(|share| share.abs())));
+    let of_cut = || largest(outcome.stations.copying_factor.iter().flatten().copied());
+    let (cut, copied) = match of_all {
+        Some(copied) => ("passes", copied),
+        None if job.stock_profile.is_some() => ("measured", of_cut()),
+        None => ("nominal", of_cut()),
+    };
+    (copied > 0.0).then(|| Message::new("stock_is_copied").with("copying_factor", copied).with("cut", cut))
 }
 
 /// One more rest, where it takes away a good part of the form error and more than the control can make.
@@ -253,7 +274,7 @@ pub(super) fn dominating(stage: &Stage, shares: &Shares) -> Message {
     ];
     let most = others.into_iter().fold(others[0], |a, b| if b.1.abs() > a.1.abs() { b } else { a });
     if most.1.abs() <= force_mm.abs() {
-        return yielding(shares);
+        return yielding(stage, shares);
     }
     Message::new(most.0)
         .with("z_mm", shares.z_mm)
@@ -263,7 +284,7 @@ pub(super) fn dominating(stage: &Stage, shares: &Shares) -> Message {
 }
 
 /// Who yields most to the passive force.
-fn yielding(shares: &Shares) -> Message {
+fn yielding(stage: &Stage, shares: &Shares) -> Message {
     let parts = [
         ("work_dominates", shares.work),
         ("headstock_dominates", shares.headstock),
@@ -272,7 +293,23 @@ fn yielding(shares: &Shares) -> Message {
         ("tool_dominates", shares.tool),
     ];
     let most = parts.into_iter().fold(("work_dominates", f64::NEG_INFINITY), |a, b| if b.1 > a.1 { b } else { a });
-    Message::new(most.0).with("share", most.1).with("z_mm", shares.z_mm)
+    if most.1 <= 0.0 {
+        return Message::new("nothing_yields").with("z_mm", shares.z_mm);
+    }
+    let force = stage.cut.loads.distinct().map(|loads| loads.passive_n);
+    let [least, most_n] = force.fold([f64::INFINITY, 0.0], |[least, most], n| [least.min(n), most.max(n)]);
+    let is_even = u8::from(most_n <= least * (1.0 + EVEN));
+    Message::new(most.0).with("share", most.1).with("z_mm", shares.z_mm).with("even", f64::from(is_even))
+}
+
+/// Where a pass before the last leaves the range in which the model holds, or what insert and spindle take.
+pub(super) fn of_pass(job: &Job, grid: &Grid, stage: &Stage, number: usize) -> Vec<Finding> {
+    let extremes = Extremes::of(stage);
+    let mut found: Vec<Finding> = bending_stress(job, grid, stage).into_iter().collect();
+    found.extend(too_deep(job, &extremes));
+    found.extend(force_warnings(job, stage, &extremes));
+    found.extend(spindle_limit_binds(job, stage));
+    found.into_iter().map(|finding| finding.with("pass", number)).collect()
 }
 
 /// Where an input leaves the range in which the model holds.
@@ -282,7 +319,7 @@ pub(super) fn warnings(job: &Job, grid: &Grid, acting: &Acting, stage: &Stage, o
     found.extend(met_supports(job, grid, outcome));
     found.extend(outcome.path.iter().flat_map(|path| plunges(job, path)));
     found.extend(idle_rests(job, grid, stage));
-    found.extend(structure_warnings(job, stage, outcome));
+    found.extend(structure_warnings(job, grid, stage, outcome));
     found.extend(command_warnings(job, &extremes, outcome));
     found.extend(force_warnings(job, stage, &extremes));
     found.extend(outcome.second_order.iter().flat_map(|sizes| left_out(job, acting, stage, sizes)));
@@ -416,18 +453,8 @@ fn idle_rest(index: usize, rest: &Support, is_beside: impl Fn(f64) -> bool, touc
     }
 }
 
-fn structure_warnings(job: &Job, stage: &Stage, outcome: &Outcome) -> Vec<Finding> {
-    let mut found = Vec::new();
-    if let Some(yield_strength) = job.shaft.yield_strength_n_per_mm2 {
-        let stress = peak_stress_n_per_mm2(job, stage, outcome.shares.z_mm);
-        if stress > STRESS_SHARE * yield_strength {
-            found.push(Finding::new("bending_stress_high", "/shaft/yield_strength_n_per_mm2").measured(
-                stress,
-                STRESS_SHARE * yield_strength,
-                "N/mm2",
-            ));
-        }
-    }
+fn structure_warnings(job: &Job, grid: &Grid, stage: &Stage, outcome: &Outcome) -> Vec<Finding> {
+    let mut found: Vec<Finding> = bending_stress(job, grid, stage).into_iter().collect();
     if let Some(ratio) = outcome.second_order.as_ref().and_then(|s| s.thrust_ratio).filter(|r| *r > THRUST_RATIO) {
         found.push(Finding::new("thrust_near_buckling", "/force").measured(ratio, THRUST_RATIO, "1"));
     }
@@ -443,22 +470,34 @@ fn structure_warnings(job: &Job, stage: &Stage, outcome: &Outcome) -> Vec<Findin
     found
 }
 
-/// |M| d/(2J) with the largest moment under the tool at its worst station and the thinnest segment: an upper bound.
-fn peak_stress_n_per_mm2(job: &Job, stage: &Stage, z_mm: f64) -> f64 {
-    let force = stage.cut.loads.distinct().map(|l| l.passive_n).fold(0.0, f64::max);
-    let moment = force * stage.structure.beam.peak_bending_moment_mm(z_mm);
+fn bending_stress(job: &Job, grid: &Grid, stage: &Stage) -> Option<Finding> {
+    let limit = STRESS_SHARE * job.shaft.yield_strength_n_per_mm2?;
+    let stress = peak_stress_n_per_mm2(job, grid, stage);
+    (stress > limit).then(|| {
+        Finding::new("bending_stress_high", "/shaft/yield_strength_n_per_mm2").measured(stress, limit, "N/mm2")
+    })
+}
+
+/// |M| d/(2J) with the largest moment under the tool at a sample of its stations, by the largest of the passive and main
+/// forces together, and the thinnest segment: an upper bound.
+fn peak_stress_n_per_mm2(job: &Job, grid: &Grid, stage: &Stage) -> f64 {
+    let force = stage.cut.loads.distinct().map(|l| l.passive_n.hypot(l.main_n)).fold(0.0, f64::max);
+    let moment_mm = |i: usize| stage.structure.beam.peak_bending_moment_mm(grid.z_mm[i]);
+    let moment = force * grid.sample(STRESS_SAMPLES).into_iter().map(moment_mm).fold(0.0, f64::max);
     let stress = |s: &Segment| {
         moment * s.diameter_mm / (2.0 * crate::num::beam::second_moment_mm4(s.diameter_mm, s.bore_diameter_mm))
     };
     job.shaft.segments.iter().map(stress).fold(0.0, f64::max)
 }
 
-fn command_warnings(job: &Job, extremes: &Extremes, outcome: &Outcome) -> Vec<Finding> {
-    let mut found = Vec::new();
+fn too_deep(job: &Job, extremes: &Extremes) -> Option<Finding> {
     let deepest = extremes.commanded_mm;
-    if let Some(limit) = job.limits.depth_mm.filter(|limit| deepest > *limit) {
-        found.push(Finding::new("command_too_deep", "/limits/depth_mm").measured(deepest, limit, "mm"));
-    }
+    let limit = job.limits.depth_mm.filter(|limit| deepest > *limit)?;
+    Some(Finding::new("command_too_deep", "/limits/depth_mm").measured(deepest, limit, "mm"))
+}
+
+fn command_warnings(job: &Job, extremes: &Extremes, outcome: &Outcome) -> Vec<Finding> {
+    let mut found: Vec<Finding> = too_deep(job, extremes).into_iter().collect();
     let ratio = extremes.commanded_over_depth.value();
     if ratio > DEPTH_RATIO {
         found.push(Finding::new("command_doubles_depth", "/cut").measured(ratio, DEPTH_RATIO, "1"));

@@ -75,9 +75,6 @@ pub(crate) fn engage(
     opening: impl Fn(f64) -> Opening,
 ) -> Engagement {
     let commanded = stock_radius_mm - command_radius_mm;
-    if commanded <= 0.0 {
-        return Engagement::NoContact;
-    }
     // F(t) = t - t_c + Y + [sqrt((r_c+Y)² + Z²) - (r_c+Y)] without cancellation, and dF/dt = 1 + dS/dt.
     let residual = |t: f64, o: Opening| {
         let (radius_y, radius) = produced_radius(command_radius_mm, o);
@@ -85,12 +82,16 @@ pub(crate) fn engage(
         let slope = if radius > 0.0 { (radius_y * o.y_slope + o.z_mm * o.z_slope) / radius } else { o.y_slope };
         (t - commanded + o.y_mm + excess, 1.0 + slope)
     };
-    if residual(0.0, opening_at_zero).0 >= 0.0 {
-        return Engagement::NoCut;
+    // Where nothing is to be cut no tool comes, however the work stands.
+    let at_rest = if commanded == 0.0 { 0.0 } else { residual(0.0, opening_at_zero).0 };
+    if at_rest >= 0.0 {
+        return if commanded <= 0.0 { Engagement::NoContact } else { Engagement::NoCut };
     }
     let (mut low, mut high) = (0.0, stock_radius_mm);
     let scale = stock_radius_mm.min(commanded.max(opening_at_zero.y_mm.abs()));
-    let mut t = if start_mm > 0.0 && start_mm < high { start_mm } else { commanded.min(high) };
+    // Work that stands towards the tool is cut by a command beyond its blank, too.
+    let guess = if commanded > 0.0 { commanded } else { -at_rest };
+    let mut t = if start_mm > 0.0 && start_mm < high { start_mm } else { guess.min(high) };
     let mut state = opening(t);
     let mut last = f64::INFINITY;
     for _ in 0..MAX_STEPS {

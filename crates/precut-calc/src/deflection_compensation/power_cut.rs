@@ -83,7 +83,8 @@ impl PowerCut {
     pub(super) fn engage(&self, power: &mut NearbyPower) -> Option<Engagement> {
         let commanded = self.stock_radius_mm - self.command_radius_mm;
         if commanded <= 0.0 {
-            return Some(Engagement::NoContact);
+            let stands_towards_tool = commanded < 0.0 && self.offset_mm < commanded;
+            return (!stands_towards_tool).then_some(Engagement::NoContact);
         }
         // Only if the work stays on the tool's side of the axis the produced radius is r_c + Y, and the root unique.
         if self.command_radius_mm + self.offset_mm <= 0.0 {

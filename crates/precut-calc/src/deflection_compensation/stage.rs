@@ -3,6 +3,7 @@
 use crate::calculator::{Failure, Finding, Message, Monitor};
 
 use super::acting::Acting;
+use super::advice;
 use super::cut::CutLine;
 use super::equilibrium::copying_factor;
 use super::grid::{Grid, interpolate};
@@ -100,27 +101,48 @@ fn nominal_stock_radii_mm(job: &Job, grid: &Grid) -> Vec<f64> {
     grid.segment.iter().map(|&i| job.shaft.segments[i].stock_mm() / 2.0).collect()
 }
 
+/// The blank that the first of several passes is planned on: the nominal one; the measured one where none is stated, or
+/// where the stated one leaves nothing to a pass that the measured one does.
+fn planned_stock_radii_mm(job: &Job, grid: &Grid, measured: &[f64]) -> Vec<f64> {
+    let nominal = nominal_stock_radii_mm(job, grid);
+    if job.stock_profile.is_none() {
+        return nominal;
+    }
+    let first = target_radii_mm(job, grid, job.passes.first().and_then(|pass| Step::first(pass.diameter_mm).pass_mm));
+    let of = |i: usize| {
+        let is_stated = job.shaft.segments[grid.segment[i]].stock_diameter_mm.is_some();
+        if is_stated && nominal[i] > first[i] { nominal[i] } else { nominal[i].max(measured[i]) }
+    };
+    (0..nominal.len()).map(of).collect()
+}
+
 fn target_radii_mm(job: &Job, grid: &Grid, pass_mm: Option<f64>) -> Vec<f64> {
     grid.segment.iter().map(|&i| pass_diameter_mm(&job.shaft.segments[i], pass_mm) / 2.0).collect()
 }
 
+/// All cuts of a job.
+pub(super) struct Cuts {
+    pub(super) last: Stage,
+    /// None where there is one cut only.
+    pub(super) passes: Vec<PassOutcome>,
+    /// What is odd about the passes before the last.
+    pub(super) warnings: Vec<Finding>,
+}
+
 /// All cuts of a job: the passes before the last as outcomes, the last as a stage.
-pub(super) fn all_cuts(
-    job: &Job,
-    grid: &Grid,
-    acting: &Acting,
-    monitor: &dyn Monitor,
-) -> Result<(Stage, Vec<PassOutcome>), Failure> {
+pub(super) fn all_cuts(job: &Job, grid: &Grid, acting: &Acting, monitor: &dyn Monitor) -> Result<Cuts, Failure> {
     let base = Regime::of(&job.cut);
     let mut stock = stock_radii_mm(job, grid);
     if job.passes.is_empty() {
         // The stock of a single cut is known: depth and speed follow it.
         let radii = Radii { target: target_radii_mm(job, grid, None), stock, planned: None };
-        return Ok((Stage::of(job, grid, acting, base, Step::default(), radii, monitor)?, Vec::new()));
+        let last = Stage::of(job, grid, acting, base, Step::default(), radii, monitor)?;
+        return Ok(Cuts { last, passes: Vec::new(), warnings: Vec::new() });
     }
-    let mut planned = nominal_stock_radii_mm(job, grid);
+    let mut planned = planned_stock_radii_mm(job, grid, &stock);
     let mut outcomes: Vec<PassOutcome> = Vec::new();
     let mut last: Option<Stage> = None;
+    let mut warnings = Vec::new();
     for (k, pass) in job.passes.iter().enumerate() {
         let share = |k: usize| k as f64 / job.passes.len() as f64;
         monitor.progress(share(k), Message::new("stage_pass").with("pass", k + 1).with("of", job.passes.len()));
@@ -136,12 +158,15 @@ pub(super) fn all_cuts(
         let mut stage = Stage::of(job, grid, acting, regime, step, radii, monitor)?;
         let (produced, commands) = stage.outcome(pass.compensated, monitor)?;
         outcomes.push(pass_outcome(&stage, pass.compensated, &produced, &commands, outcomes.last()));
+        if k + 1 < job.passes.len() {
+            warnings.extend(advice::of_pass(job, grid, &stage, k + 1));
+        }
         stock = produced;
         planned = target;
         last = Some(stage);
     }
     match last {
-        Some(stage) => Ok((stage, outcomes)),
+        Some(last) => Ok(Cuts { last, passes: outcomes, warnings }),
         None => Err(Failure::Internal("no pass was computed".to_owned())),
     }
 }

@@ -30,6 +30,9 @@ pub(super) fn chord_tolerance_um(job: &Job) -> f64 {
     })
 }
 
+/// A tool that comes down in rapid motion keeps so far from what stands beside its place, mm.
+const BESIDE_MM: f64 = 0.1;
+
 /// Cuts the exact commands into the fewest straight moves, zone by zone; never across a shoulder.
 pub(super) fn programmed(
     job: &Job,
@@ -49,6 +52,10 @@ pub(super) fn programmed(
             status[stations.clone()].iter().all(|s| matches!(s, StatusCompensated::Ok | StatusCompensated::NoStock));
         let radii: Option<Vec<f64>> = exact_mm[stations.clone()].iter().copied().collect();
         let (true, Some(radii)) = (usable, radii) else { continue };
+        // Where no station has anything to be cut, the tool does not come.
+        if status[stations.clone()].iter().all(|s| matches!(s, StatusCompensated::NoStock)) {
+            continue;
+        }
         let z_mm = &grid.z_mm[stations];
         let chords = simplified(z_mm, &radii, tolerance_um / UM_PER_MM, increment_mm, monitor)?;
         let corners: Vec<f64> = chords.vertices.iter().map(|&v| z_mm[v]).collect();
@@ -162,7 +169,7 @@ impl<'a> Writer<'a> {
             length_mm: job.shaft.segments.iter().map(|s| s.length_mm).sum(),
             increment_mm,
             widest_mm: widest,
-            retract_mm: round_to_increment(widest + job.program.clearance_x_mm, increment_mm),
+            retract_mm: rounded_up(widest + job.program.clearance_x_mm, increment_mm),
             blocks: vec![Block::Modes],
         }
     }
@@ -201,15 +208,21 @@ impl<'a> Writer<'a> {
 
     /// Signed distance of the approach before a cut along Z.
     fn clearance(&self) -> f64 {
-        let sign = if self.regime.direction == FeedDirection::ToHeadstock { 1.0 } else { -1.0 };
-        sign * self.job.program.clearance_z_mm
+        self.clearance_sign() * self.job.program.clearance_z_mm
+    }
+
+    fn clearance_sign(&self) -> f64 {
+        if self.regime.direction == FeedDirection::ToHeadstock { 1.0 } else { -1.0 }
     }
 
     /// Whether something as thick as the cut stands where the tool would come down before it; `done` are the zones
     /// that are cut by then.
     fn is_blocked_before(&self, z_mm: f64, x_mm: f64, done: &[Corners]) -> bool {
-        let beyond = z_mm + self.clearance();
-        let (from, to) = (z_mm.min(beyond) + self.increment_mm, z_mm.max(beyond) - self.increment_mm);
+        let side = self.clearance_sign();
+        // Rounded corners may stand a step off a shoulder, and no tool is as thin as a line.
+        let (near, far) =
+            (z_mm + side * self.increment_mm, z_mm + side * (self.increment_mm + BESIDE_MM) + self.clearance());
+        let (from, to) = (near.min(far), near.max(far));
         let mut left = 0.0;
         self.job.shaft.segments.iter().any(|segment| {
             let right = left + segment.length_mm;
@@ -246,6 +259,12 @@ fn programmed_z_mm(job: &Job, length_mm: f64, z_mm: f64) -> f64 {
         ProgramZero::LeftFace => 0.0,
     };
     round_to_increment(z_mm - zero, job.path.increment_um / UM_PER_MM)
+}
+
+/// To the next increment that is no less.
+fn rounded_up(diameter_mm: f64, increment_mm: f64) -> f64 {
+    let near = round_to_increment(diameter_mm, increment_mm);
+    if near < diameter_mm - 1e-9 { round_to_increment(near + increment_mm, increment_mm) } else { near }
 }
 
 /// Station and commanded diameter of a zone's corners.

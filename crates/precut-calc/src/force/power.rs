@@ -253,9 +253,11 @@ pub(super) fn outside(
             .measured(value, limit, unit)
             .with("quantity", quantity)
     };
-    if reached.least < least {
+    // The digits of a difference of diameters are no depth.
+    let slack = 1e-9;
+    if reached.least < least * (1.0 - slack) {
         Some(finding(reached.least, least))
-    } else if reached.largest > largest {
+    } else if reached.largest > largest * (1.0 + slack) {
         Some(finding(reached.largest, largest))
     } else {
         None
