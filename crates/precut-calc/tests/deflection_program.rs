@@ -233,3 +233,26 @@ fn what_the_stations_leave_out_is_told() {
     assert!(left_out(&list(&[0.0, 900.0])).is_empty());
     assert!(left_out(&json!({ "kind": "per_zone", "count": 2 })).is_empty());
 }
+
+/// A journal that is not to be turned gets no move, whatever is set off, and leaves nothing undone: the rest of the answer stands.
+#[test]
+fn no_move_goes_where_nothing_is_to_be_cut() {
+    let segments = json!([
+        { "length_mm": 200.0, "diameter_mm": 60.0 },
+        { "length_mm": 400.0, "diameter_mm": 40.0, "stock_diameter_mm": 42.0 }
+    ]);
+    let centres = json!([{ "kind": "centre", "z_mm": 0.0 }, { "kind": "centre", "z_mm": 600.0 }]);
+    let mut of = job(&segments, &centres, "to_headstock");
+    of["stations"] = list(&[50.0, 150.0, 210.0, 300.0, 400.0, 500.0, 590.0]);
+    for offset_um in [15.0, -15.0] {
+        of["effects"] = json!([{ "kind": "size_offset", "offset_um": offset_um }]);
+        let answer = crate::support::solved(of.clone());
+        let path = answer.path.as_ref().unwrap();
+        assert!(path.complete && path.zones.iter().all(|zone| zone.diameter_mm < 50.0), "{path:?}");
+        assert!(answer.largest_error_after_um.unwrap().abs() < 3.0, "{:?}", answer.largest_error_after_um);
+        for block in programmed(of.clone()).1.unwrap().blocks {
+            let Block::Cut { x_diameter_mm, z_mm, .. } = block else { continue };
+            assert!(x_diameter_mm < 50.0 && z_mm > -400.1, "{x_diameter_mm} {z_mm}");
+        }
+    }
+}

@@ -189,8 +189,8 @@ pub(super) fn explanation(job: &Job, outcome: &Outcome, dominating: Message) -> 
     if let Some(path) = &outcome.path {
         said.push(match (outcome.form_error_after_um, outcome.largest_error_after_um) {
             (Some(form), Some(largest)) => Message::new("compensated_path_leaves")
-                .with("form_error_um", form)
-                .with("largest_error_um", largest.abs())
+                .with("form_error_um", seen(form, outcome))
+                .with("largest_error_um", seen(largest.abs(), outcome))
                 .with("moves", f64::from(path.moves)),
             _ => Message::new("path_has_gaps").with("stations", without_command(outcome)),
         });
@@ -244,6 +244,11 @@ fn worthwhile_rest(job: &Job, outcome: &Outcome) -> Option<Message> {
 /// The largest value above 0. By comparison: `f64::max` also settles signed zeros and NaN, at three times the cost.
 fn largest(values: impl Iterator<Item = f64>) -> f64 {
     values.fold(0.0, |most, value| if value > most { value } else { most })
+}
+
+/// A deviation as far as the numbers themselves are known.
+fn seen(deviation_um: f64, outcome: &Outcome) -> f64 {
+    if deviation_um < outcome.numerical_error_um { 0.0 } else { deviation_um }
 }
 
 fn without_command(outcome: &Outcome) -> usize {
@@ -407,7 +412,9 @@ fn met_supports(job: &Job, grid: &Grid, outcome: &Outcome) -> Vec<Finding> {
     };
     let meets = |i: usize, support: &Support| reach.as_ref().and_then(|reach| met(reach, i, support));
     let supports = job.supports.iter().enumerate();
-    supports.filter_map(|(i, support)| meets(i, support).or_else(|| between(i, support))).collect()
+    // Where there is a path its own way counts: stations may keep clear of what stands between turned segments.
+    let passed = |i: usize, support: &Support| if reach.is_some() { None } else { between(i, support) };
+    supports.filter_map(|(i, support)| meets(i, support).or_else(|| passed(i, support))).collect()
 }
 
 /// First and last station of the turned segments, mm.

@@ -52,8 +52,9 @@ pub(super) fn programmed(
             status[stations.clone()].iter().all(|s| matches!(s, StatusCompensated::Ok | StatusCompensated::NoStock));
         let radii: Option<Vec<f64>> = exact_mm[stations.clone()].iter().copied().collect();
         let (true, Some(radii)) = (usable, radii) else { continue };
-        // Where no station has anything to be cut, the tool does not come.
+        // Where no station has anything to be cut, the tool does not come: nothing is left undone there.
         if status[stations.clone()].iter().all(|s| matches!(s, StatusCompensated::NoStock)) {
+            command_mm[stations].copy_from_slice(&exact_mm[zone.first..zone.end]);
             continue;
         }
         let z_mm = &grid.z_mm[stations];

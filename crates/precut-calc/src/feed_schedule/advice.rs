@@ -5,7 +5,7 @@ use crate::machinability::{Conditions, MachinabilityModel, ModelForm};
 
 use super::binding::is_lower;
 use super::case::Case;
-use super::input::{Goal, Job};
+use super::input::{Goal, Job, Variables};
 use super::models::Output;
 use super::output::Outcome;
 use super::plan::Method;
@@ -248,6 +248,8 @@ fn unused(job: &Job, out: &mut Vec<Finding>) {
         job.variables.fixed_speed_m_per_min.is_some() && job.variables.speed != super::input::SpeedMode::Fixed,
         "/variables/fixed_speed_m_per_min",
     );
+    let is_rule = matches!(job.method, Method::EqualDeflection { .. });
+    idle(is_rule && job.variables != Variables::default(), "/variables");
     let limits = job.limits.as_ref();
     idle(
         limits.is_some_and(|limits| limits.feed_step_ratio_max.is_some()) && job.zones.len() < 2,
