@@ -365,3 +365,21 @@ fn one_feed_for_all_stays_one_and_a_given_one_stays_given() {
     of["limits"]["feed_max_mm_per_rev"] = json!(0.0005);
     assert!(feeds(&program(&of).unwrap()).iter().all(|feed| *feed <= 0.0005));
 }
+
+/// The rule has feeds of its own and one cutting speed: what `variables` say of them is told to be unused, and is.
+#[test]
+fn the_rule_of_equal_deflection_keeps_its_own_feeds() {
+    let bar = [(100.0, 50.0, 51.0), (400.0, 50.0, 51.0)];
+    let mut of = job(&bar, &json!([zone("a", 0.0, 100.0, 50.0, 0.5), zone("b", 100.0, 500.0, 50.0, 0.5)]));
+    of["models"]["force_y"] = json!({ "form": "log_log", "constant": 5.0, "feed_exponent": 0.6 });
+    of["method"] = json!({
+        "kind": "equal_deflection", "target": "minimum", "reference_feed_mm_per_rev": 0.3, "speed_m_per_min": 60
+    });
+    let plain = program(&of).unwrap();
+    assert!(feeds(&plain).windows(2).any(|pair| pair[0] != pair[1]), "{plain:?}");
+    of["variables"] = json!({ "feed": "fixed", "fixed_feed_mm_per_rev": 0.15, "speed": "constant_rpm" });
+    assert_eq!(program(&of).unwrap(), plain);
+    let warnings = answered(&of).1.warnings;
+    let unused: Vec<&str> = warnings.iter().filter(|w| w.code == "unused_input").map(|w| w.pointer.as_str()).collect();
+    assert_eq!(unused, ["/variables/feed", "/variables/speed"]);
+}

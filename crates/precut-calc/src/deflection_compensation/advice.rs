@@ -174,8 +174,8 @@ pub(super) fn one_more_rest(
     }
     let sampled = grid.at(&chosen);
     // All passes with it: the stock that the last one meets is thicker where the shaft was not held.
-    let held = match all_cuts(&with_rest, &sampled, acting, &Again(monitor)) {
-        Ok(cuts) => cuts.last,
+    let held = match all_cuts(&with_rest, &sampled, acting, &mut |_, _| (), &Again(monitor)) {
+        Ok((held, _)) => held,
         Err(Failure::OutOfModel(_)) => return Ok(None),
         Err(failure) => return Err(failure),
     };
@@ -315,6 +315,17 @@ pub(super) fn of_pass(job: &Job, grid: &Grid, stage: &Stage, number: usize) -> V
     found.extend(force_warnings(job, stage, &extremes));
     found.extend(spindle_limit_binds(job, stage));
     found.into_iter().map(|finding| finding.with("pass", number)).collect()
+}
+
+/// Warnings with those of passes before the last: each once, and what holds of the last pass, too, of that one.
+pub(super) fn with_earlier(mut warnings: Vec<Finding>, earlier: Vec<Finding>) -> Vec<Finding> {
+    let quantity = |finding: &Finding| finding.values.get("quantity").cloned();
+    for finding in earlier {
+        if !warnings.iter().any(|known| known.code == finding.code && quantity(known) == quantity(&finding)) {
+            warnings.push(finding);
+        }
+    }
+    warnings
 }
 
 /// Where an input leaves the range in which the model holds.

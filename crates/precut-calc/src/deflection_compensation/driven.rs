@@ -42,7 +42,7 @@ pub(super) fn drive(
     monitor: &dyn Monitor,
 ) -> Result<Driven, Failure> {
     let Some(Refined { grid: fine, own }) = grid.refined(job) else { return follow(job, grid, stage, monitor) };
-    let mut along = all_cuts(job, &fine, acting, &Again(monitor))?.last;
+    let (mut along, _) = all_cuts(job, &fine, acting, &mut |_, _| (), &Again(monitor))?;
     in_reach(&along)?;
     let driven = follow(job, &fine, &mut along, monitor)?;
     stage.cut.note(along.cut.residual_mm);

@@ -40,7 +40,7 @@ mod stage;
 mod structure;
 mod toolpath;
 
-pub(crate) use encounters::{Reach, chuck_in_the_way, met};
+pub(crate) use encounters::{BESIDE_MM, Reach, chuck_in_the_way, met};
 pub use form::{Deviation, Extremum, ExtremumKind, Form, FormClass};
 pub use forward::{DeflectionAllowances, DeflectionPoint, DeflectionRun};
 pub use input::{
@@ -55,8 +55,8 @@ pub use output::{
 };
 
 use crate::calculator::{
-    Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Finding, Hallmark, Message, Meta,
-    Monitor, Program, Table,
+    Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Hallmark, Message, Meta, Monitor,
+    Program, Table,
 };
 use crate::force;
 
@@ -65,7 +65,7 @@ use columns::{Errors, columns};
 use cut::one_step;
 use driven::{Driven, drive};
 use grid::{Grid, path_station_count, station_count};
-use stage::{Cuts, Stage, all_cuts, in_reach};
+use stage::{Stage, all_cuts, in_reach};
 
 const UM_PER_MM: f64 = 1e3;
 
@@ -177,7 +177,9 @@ fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
     crate::calculator::checkpoint(monitor)?;
     let grid = Grid::of(job);
     let acting = Acting::of(&job.effects, &job.conditions, job.cut.feed_direction);
-    let Cuts { last: mut stage, passes, warnings: of_passes } = all_cuts(job, &grid, &acting, monitor)?;
+    let mut of_passes = Vec::new();
+    let mut look = |stage: &Stage, number: usize| of_passes.extend(advice::of_pass(job, &grid, stage, number));
+    let (mut stage, passes) = all_cuts(job, &grid, &acting, &mut look, monitor)?;
     in_reach(&stage)?;
     let driven = match job.detail {
         Detail::Profile => None,
@@ -190,15 +192,8 @@ fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
     let errors = Errors::of(&stage, driven.as_ref().map(|driven| driven.produced_mm.as_slice()));
     let mut outcome =
         Assembly { job, grid: &grid, acting: &acting, stage: &stage }.outcome(driven, passes, &errors, monitor)?;
-    let mut warnings = advice::warnings(job, &grid, &acting, &stage, &outcome);
-    // What holds of the last pass, too, is told of it.
-    let is_new = |finding: &Finding| {
-        let quantity = |finding: &Finding| finding.values.get("quantity").cloned();
-        let same = |known: &Finding| known.code == finding.code && quantity(known) == quantity(finding);
-        !warnings.iter().any(same)
-    };
-    let of_passes: Vec<Finding> = of_passes.into_iter().filter(is_new).collect();
-    warnings.extend(of_passes);
+    let warnings = advice::warnings(job, &grid, &acting, &stage, &outcome);
+    let warnings = advice::with_earlier(warnings, of_passes);
     let dominating = advice::dominating(&stage, &outcome.shares);
     outcome.stations = columns(job, &acting, grid.z_mm, stage, errors);
     let explanation = advice::explanation(job, &outcome, dominating);

@@ -3,7 +3,6 @@
 use crate::calculator::{Failure, Finding, Message, Monitor};
 
 use super::acting::Acting;
-use super::advice;
 use super::cut::CutLine;
 use super::equilibrium::copying_factor;
 use super::grid::{Grid, interpolate};
@@ -120,29 +119,26 @@ fn target_radii_mm(job: &Job, grid: &Grid, pass_mm: Option<f64>) -> Vec<f64> {
     grid.segment.iter().map(|&i| pass_diameter_mm(&job.shaft.segments[i], pass_mm) / 2.0).collect()
 }
 
-/// All cuts of a job.
-pub(super) struct Cuts {
-    pub(super) last: Stage,
-    /// None where there is one cut only.
-    pub(super) passes: Vec<PassOutcome>,
-    /// What is odd about the passes before the last.
-    pub(super) warnings: Vec<Finding>,
-}
-
-/// All cuts of a job: the passes before the last as outcomes, the last as a stage.
-pub(super) fn all_cuts(job: &Job, grid: &Grid, acting: &Acting, monitor: &dyn Monitor) -> Result<Cuts, Failure> {
+/// All cuts of a job: all passes as outcomes, none where there is one cut only, and the last cut as a stage. `look` is shown
+/// every pass before the last, with its number.
+pub(super) fn all_cuts(
+    job: &Job,
+    grid: &Grid,
+    acting: &Acting,
+    look: &mut dyn FnMut(&Stage, usize),
+    monitor: &dyn Monitor,
+) -> Result<(Stage, Vec<PassOutcome>), Failure> {
     let base = Regime::of(&job.cut);
     let mut stock = stock_radii_mm(job, grid);
     if job.passes.is_empty() {
         // The stock of a single cut is known: depth and speed follow it.
         let radii = Radii { target: target_radii_mm(job, grid, None), stock, planned: None };
         let last = Stage::of(job, grid, acting, base, Step::default(), radii, monitor)?;
-        return Ok(Cuts { last, passes: Vec::new(), warnings: Vec::new() });
+        return Ok((last, Vec::new()));
     }
     let mut planned = planned_stock_radii_mm(job, grid, &stock);
     let mut outcomes: Vec<PassOutcome> = Vec::new();
     let mut last: Option<Stage> = None;
-    let mut warnings = Vec::new();
     for (k, pass) in job.passes.iter().enumerate() {
         let share = |k: usize| k as f64 / job.passes.len() as f64;
         monitor.progress(share(k), Message::new("stage_pass").with("pass", k + 1).with("of", job.passes.len()));
@@ -159,14 +155,14 @@ pub(super) fn all_cuts(job: &Job, grid: &Grid, acting: &Acting, monitor: &dyn Mo
         let (produced, commands) = stage.outcome(pass.compensated, monitor)?;
         outcomes.push(pass_outcome(&stage, pass.compensated, &produced, &commands, outcomes.last()));
         if k + 1 < job.passes.len() {
-            warnings.extend(advice::of_pass(job, grid, &stage, k + 1));
+            look(&stage, k + 1);
         }
         stock = produced;
         planned = target;
         last = Some(stage);
     }
     match last {
-        Some(last) => Ok(Cuts { last, passes: outcomes, warnings }),
+        Some(last) => Ok((last, outcomes)),
         None => Err(Failure::Internal("no pass was computed".to_owned())),
     }
 }

@@ -3,7 +3,7 @@
 use crate::calculator::{Block, Column, Failure, Finding, Monitor, Program, Table};
 use crate::path::{round_to_increment, simplified};
 
-use super::encounters::hit_chuck;
+use super::encounters::{BESIDE_MM, hit_chuck};
 use super::grid::{Grid, Zone};
 use super::input::{FeedDirection, Job, ProgramZero, Segment};
 use super::output::{Outcome, Path, PathZone, StatusCompensated};
@@ -29,9 +29,6 @@ pub(super) fn chord_tolerance_um(job: &Job) -> f64 {
         job.tolerance.form_um.map_or(DEFAULT_CHORD_UM, |form| (CHORD_SHARE * form).max(job.path.increment_um) / 2.0)
     })
 }
-
-/// A tool that comes down in rapid motion keeps so far from what stands beside its place, mm.
-const BESIDE_MM: f64 = 0.1;
 
 /// Cuts the exact commands into the fewest straight moves, zone by zone; never across a shoulder.
 pub(super) fn programmed(

@@ -5,7 +5,7 @@ use crate::machinability::{Conditions, MachinabilityModel, ModelForm};
 
 use super::binding::is_lower;
 use super::case::Case;
-use super::input::{Goal, Job, Variables};
+use super::input::{FeedMode, Goal, Job, SpeedMode};
 use super::models::Output;
 use super::output::Outcome;
 use super::plan::Method;
@@ -241,15 +241,17 @@ fn unused(job: &Job, out: &mut Vec<Finding>) {
     idle(job.shaft.is_none() && !job.supports.is_empty(), "/supports");
     idle(job.force.as_ref().is_some_and(|force| job.models.ignore(force)), "/force");
     idle(
-        job.variables.fixed_feed_mm_per_rev.is_some() && job.variables.feed != super::input::FeedMode::Fixed,
+        job.variables.fixed_feed_mm_per_rev.is_some() && job.variables.feed != FeedMode::Fixed,
         "/variables/fixed_feed_mm_per_rev",
     );
     idle(
-        job.variables.fixed_speed_m_per_min.is_some() && job.variables.speed != super::input::SpeedMode::Fixed,
+        job.variables.fixed_speed_m_per_min.is_some() && job.variables.speed != SpeedMode::Fixed,
         "/variables/fixed_speed_m_per_min",
     );
     let is_rule = matches!(job.method, Method::EqualDeflection { .. });
-    idle(is_rule && job.variables != Variables::default(), "/variables");
+    idle(is_rule && job.variables.feed != FeedMode::PerZone, "/variables/feed");
+    let of_speed = matches!(job.variables.speed, SpeedMode::ConstantRpm | SpeedMode::Fixed);
+    idle(is_rule && of_speed, "/variables/speed");
     let limits = job.limits.as_ref();
     idle(
         limits.is_some_and(|limits| limits.feed_step_ratio_max.is_some()) && job.zones.len() < 2,

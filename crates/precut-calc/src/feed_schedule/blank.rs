@@ -8,7 +8,7 @@ use super::output::Outcome;
 /// Stretches shorter than this are rounding, mm.
 const LEAST_MM: f64 = 1e-6;
 /// Diameters that differ by less are one, mm: half a step of the control.
-const SAME_MM: f64 = 0.0005;
+pub(super) const SAME_MM: f64 = 0.0005;
 
 /// A cut along a zone, as far as the blank is concerned.
 #[derive(Debug, Clone, Copy, PartialEq)]

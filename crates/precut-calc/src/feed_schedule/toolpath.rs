@@ -3,19 +3,17 @@
 use std::borrow::Cow;
 
 use crate::calculator::{Block, Column, Failure, Finding, Program, Table};
-use crate::deflection_compensation::{ProgramZero, Reach, chuck_in_the_way, met};
+use crate::deflection_compensation::{BESIDE_MM, ProgramZero, Reach, chuck_in_the_way, met};
 use crate::path::round_to_increment;
 use crate::shaft::FeedDirection;
 
 use super::blank::{Blank, Turned, zones_fit_the_shaft};
 use super::input::{Job, SpeedMode};
 use super::output::{Outcome, ZoneOutcome};
-use super::words::{Spoken, at_diameter, is_surface};
+use super::words::{Spoken, at_diameter, is_surface, modes};
 
 /// Steps of the control, mm.
 const INCREMENT_MM: f64 = 0.001;
-/// A tool that comes down in rapid motion keeps so far from what stands beside its place, mm.
-const BESIDE_MM: f64 = 0.1;
 /// Share of a diameter by which a pass may differ from the one that its zone is counted at without a word.
 const COUNTED: f64 = 0.02;
 /// One cut along a zone: where the tool turns, in the control's steps, in the order of the cut.
@@ -72,7 +70,7 @@ fn spindle_limit_rpm(job: &Job) -> f64 {
 fn beyond_the_spindle(job: &Job, outcome: &Outcome) -> Option<Finding> {
     let limit_rpm = spindle_limit_rpm(job);
     let fastest = outcome.zones.iter().max_by(|a, b| a.spindle_speed_rpm.total_cmp(&b.spindle_speed_rpm))?;
-    let binds = job.variables.speed == SpeedMode::ConstantSpeed && fastest.spindle_speed_rpm > limit_rpm * (1.0 + 1e-9);
+    let binds = is_surface(job) && fastest.spindle_speed_rpm > limit_rpm * (1.0 + 1e-9);
     binds.then(|| {
         Finding::new("spindle_limit_binds", "/program/spindle_limit_rpm")
             .measured(fastest.spindle_speed_rpm, limit_rpm, "rev/min")
@@ -114,10 +112,12 @@ fn thicker(job: &Job, outcome: &Outcome, passes: &[Pass]) -> Option<Finding> {
     let most = passes.iter().max_by(|a, b| ratio(a).total_cmp(&ratio(b)))?;
     let (zone, ratio) = (&outcome.zones[most.zone], ratio(most));
     let least_rpm = job.machine.spindle_speed_min_rpm.unwrap_or(0.0);
-    let speed = match job.variables.speed {
-        SpeedMode::ConstantRpm => "one_for_all",
-        _ if zone.spindle_speed_rpm / ratio < least_rpm => "least",
-        SpeedMode::PerZone | SpeedMode::Fixed | SpeedMode::ConstantSpeed => "kept",
+    // What the cutting speed there is times that of the zone.
+    let at_least = least_rpm * ratio / zone.spindle_speed_rpm;
+    let (speed, faster) = match modes(job).1 {
+        SpeedMode::ConstantRpm => ("one_for_all", ratio),
+        _ if at_least > 1.0 => ("least", at_least),
+        SpeedMode::PerZone | SpeedMode::Fixed | SpeedMode::ConstantSpeed => ("kept", 1.0),
     };
     (ratio > 1.0 + COUNTED).then(|| {
         Finding::new("pass_thicker_than_counted", "/zones")
@@ -126,20 +126,20 @@ fn thicker(job: &Job, outcome: &Outcome, passes: &[Pass]) -> Option<Finding> {
             .with("percent", 100.0 * (ratio - 1.0))
             .with("speed", speed)
             .with("least_rpm", least_rpm)
-            .with("beyond", if speed == "kept" { Vec::new() } else { beyond_at(job, zone, ratio) })
+            .with("beyond", beyond_at(job, zone, ratio, faster))
     })
 }
 
-/// Limits that a zone passes at the same spindle speed and so many times its diameter.
-fn beyond_at(job: &Job, zone: &ZoneOutcome, ratio: f64) -> Vec<&'static str> {
-    let passes = |value: Option<f64>, limit: Option<f64>| {
-        value.zip(limit).is_some_and(|(value, limit)| value * ratio > limit * (1.0 + 1e-9))
+/// Limits that a zone passes at so many times its diameter and its cutting speed.
+fn beyond_at(job: &Job, zone: &ZoneOutcome, ratio: f64, faster: f64) -> Vec<&'static str> {
+    let passes = |times: f64, value: Option<f64>, limit: Option<f64>| {
+        value.zip(limit).is_some_and(|(value, limit)| value * times > limit * (1.0 + 1e-9))
     };
     let speed_max = job.limits.as_ref().map(|limits| limits.speed_max_m_per_min);
     [
-        ("speed_max", passes(Some(zone.speed_m_per_min), speed_max)),
-        ("power", passes(zone.power_kw, job.machine.power_kw)),
-        ("torque", passes(zone.torque_n_m, job.machine.torque_n_m)),
+        ("speed_max", faster > 1.0 && passes(faster, Some(zone.speed_m_per_min), speed_max)),
+        ("power", faster > 1.0 && passes(faster, zone.power_kw, job.machine.power_kw)),
+        ("torque", passes(ratio, zone.torque_n_m, job.machine.torque_n_m)),
     ]
     .into_iter()
     .filter_map(|(name, beyond)| beyond.then_some(name))

@@ -4,11 +4,13 @@ use crate::calculator::Failure;
 use crate::path::round_to_increment;
 
 use super::assess;
+use super::blank::SAME_MM;
 use super::case::{Case, TOUCHING_MM, ZoneCase};
 use super::compliance::Held;
 use super::continuous::add_zone;
 use super::input::{FeedMode, Job, SpeedMode, Variables};
 use super::output::{Outcome, ZoneOutcome};
+use super::plan::Method;
 use super::program::{Built, Place, Variation, build};
 
 /// Step of the feed, mm/rev, and of feeds below twenty such steps.
@@ -18,8 +20,6 @@ const FINE_FEED_STEP: f64 = 0.0001;
 const KEPT: f64 = 1e-9;
 /// What a schedule is solved to, in logarithms: beyond it a limit was passed before anything was rounded.
 const SOLVED: f64 = 1e-6;
-/// Diameters that differ by less are one, mm: half a step of the control.
-const SAME_MM: f64 = 0.0005;
 
 /// Feed and speed as programmed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,7 +62,7 @@ impl Spoken {
         };
         let at: Vec<(f64, f64)> = outcome.zones.iter().zip(&words).map(logs).collect();
         let mut passed = passed(&case, &built, &at, &exact(outcome));
-        passed.extend(spread_passed(&case, job, &at));
+        passed.extend(spread_passed(&case, job, &at, &exact(outcome)));
         Ok(Self { case, words, at, passed })
     }
 
@@ -93,9 +93,19 @@ fn note(zone: &ZoneOutcome, words: Words) -> String {
     text
 }
 
+/// What is one for all zones in the program. The rule of equal deflection has feeds of its own and states one cutting speed,
+/// so of `variables` only G96 is left to it.
+pub(super) fn modes(job: &Job) -> (FeedMode, SpeedMode) {
+    match (&job.method, job.variables.speed) {
+        (Method::EqualDeflection { .. }, SpeedMode::ConstantSpeed) => (FeedMode::PerZone, SpeedMode::ConstantSpeed),
+        (Method::EqualDeflection { .. }, _) => (FeedMode::PerZone, SpeedMode::PerZone),
+        (_, speed) => (job.variables.feed, speed),
+    }
+}
+
 /// Whether one cutting speed is programmed for all zones.
 pub(super) fn is_surface(job: &Job) -> bool {
-    job.variables.speed == SpeedMode::ConstantSpeed
+    modes(job).1 == SpeedMode::ConstantSpeed
 }
 
 /// Speeds of the spindle that the machine has, whole rev/min.
@@ -108,7 +118,7 @@ fn spindle_rpm(job: &Job) -> (f64, f64) {
 /// its own and the machine turns so slowly.
 pub(super) fn at_diameter(words: Words, zone: &ZoneOutcome, diameter_mm: f64, job: &Job) -> Words {
     let is_counted = diameter_mm <= zone.diameter_mm + SAME_MM;
-    match job.variables.speed {
+    match modes(job).1 {
         SpeedMode::PerZone | SpeedMode::Fixed if !is_counted => {
             let wanted = (words.speed * zone.diameter_mm / diameter_mm + 1e-9).floor();
             Words { speed: wanted.max(spindle_rpm(job).0), ..words }
@@ -193,19 +203,27 @@ fn passed(case: &Case, built: &Built, at: &[(f64, f64)], exact: &[(f64, f64)]) -
         .filter(|(label, (value, _))| label.kind.is_limit() && !matches!(label.place, Place::Zone(_)) && *value > KEPT)
         .map(|(label, (value, before))| {
             let name = label.name(case);
-            let who = if before > SOLVED { "the schedule passes" } else { "rounded words pass" };
-            format!("{who} {} of {} by {:.2} percent", name.constraint, name.zone, 100.0 * value.exp_m1())
+            told(before, &name.constraint, &name.zone, value)
         })
         .collect()
 }
 
 /// The same of the spread of the deflections, which is no limit of one zone.
-fn spread_passed(case: &Case, job: &Job, at: &[(f64, f64)]) -> Option<String> {
+fn spread_passed(case: &Case, job: &Job, at: &[(f64, f64)], exact: &[(f64, f64)]) -> Option<String> {
     let limit = job.limits.as_ref()?.deflection_spread_ratio_max?;
-    let deflections: Vec<Option<f64>> =
-        at.iter().enumerate().map(|(zone, at)| assess::zone_outcome(case, job, zone, *at).deflection_um).collect();
-    let beyond = assess::spread(deflections.iter().copied())? / limit - 1.0;
-    (beyond > KEPT).then(|| format!("rounded words pass deflection_spread of part by {:.2} percent", 100.0 * beyond))
+    let beyond = |at: &[(f64, f64)]| {
+        let of = |(zone, at): (usize, &(f64, f64))| assess::zone_outcome(case, job, zone, *at).deflection_um;
+        let deflections: Vec<Option<f64>> = at.iter().enumerate().map(of).collect();
+        Some((assess::spread(deflections.iter().copied())? / limit).ln())
+    };
+    let (value, before) = (beyond(at)?, beyond(exact)?);
+    (value > KEPT).then(|| told(before, "deflection_spread", "part", value))
+}
+
+/// A limit that the words pass by so much in logarithms, and the schedule before them.
+fn told(before: f64, constraint: &str, place: &str, value: f64) -> String {
+    let who = if before > SOLVED { "the schedule passes" } else { "rounded words pass" };
+    format!("{who} {constraint} of {place} by {:.2} percent", 100.0 * value.exp_m1())
 }
 
 /// From a schedule to the words of its program.
@@ -253,11 +271,12 @@ impl Rounding<'_> {
     /// step of feed down. A speed or a feed that is one for all zones stays one, and a feed that is given stays given.
     fn words(&self) -> Vec<Words> {
         let feeds: Vec<f64> = self.zones.iter().map(|zone| down(zone.feed_mm_per_rev)).collect();
-        let shared = matches!(self.job.variables.speed, SpeedMode::ConstantSpeed | SpeedMode::ConstantRpm);
+        let (feed_mode, speed_mode) = modes(self.job);
+        let shared = matches!(speed_mode, SpeedMode::ConstantSpeed | SpeedMode::ConstantRpm);
         let all_upper = shared.then(|| (0..feeds.len()).all(|i| self.keeps(i, feeds[i], self.upper(i))));
         let all_keep = |feed: f64| (0..feeds.len()).all(|i| self.speed(i, feed, all_upper).is_some());
         let common = feeds.iter().copied().fold(f64::INFINITY, f64::min);
-        let tried = |i: usize| match self.job.variables.feed {
+        let tried = |i: usize| match feed_mode {
             FeedMode::PerZone => vec![feeds[i], slower(feeds[i])],
             FeedMode::Constant if !all_keep(common) && all_keep(slower(common)) => vec![slower(common)],
             FeedMode::Constant | FeedMode::Fixed => vec![common],
