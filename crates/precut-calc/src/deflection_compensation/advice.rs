@@ -500,8 +500,8 @@ fn bending_stress(job: &Job, grid: &Grid, stage: &Stage) -> Option<Finding> {
 /// forces together, and the thinnest segment: an upper bound.
 fn peak_stress_n_per_mm2(job: &Job, grid: &Grid, stage: &Stage) -> f64 {
     let force = stage.cut.loads.distinct().map(|l| l.passive_n.hypot(l.main_n)).fold(0.0, f64::max);
-    let moment_mm = |i: usize| stage.structure.beam.peak_bending_moment_mm(grid.z_mm[i]);
-    let moment = force * grid.sample(STRESS_SAMPLES).into_iter().map(moment_mm).fold(0.0, f64::max);
+    let tools_mm = grid.sample(STRESS_SAMPLES).into_iter().map(|i| grid.z_mm[i]);
+    let moment = force * stage.structure.beam.peak_bending_moment_mm(tools_mm);
     let stress = |s: &Segment| {
         moment * s.diameter_mm / (2.0 * crate::num::beam::second_moment_mm4(s.diameter_mm, s.bore_diameter_mm))
     };

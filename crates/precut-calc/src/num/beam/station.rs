@@ -129,8 +129,8 @@ impl<'a> Works<'a> {
         self.frame.locate(tool)
     }
 
-    /// Places, reactions and activity of what moves.
-    fn arrange(&mut self, tool: f64) {
+    /// Places, reactions and activity of what moves, for the tool at `tool`: enough where no works are wanted.
+    pub(super) fn arrange(&mut self, tool: f64) {
         let base = &self.frame.base;
         let columns = self.frame.columns();
         let end = self.frame.intervals.last().map_or(0.0, |interval| interval.end);
