@@ -12,10 +12,14 @@ use serde_json::ser::{CharEscape, CompactFormatter, Formatter, Serializer};
 
 /// The canonical JSON of `value`, whose numbers must be finite.
 pub(crate) fn canonical<T: Serialize + ?Sized>(value: &T) -> serde_json::Result<Vec<u8>> {
-    let mut page = Page::default();
+    let mut page =
+        Page { text: Vec::with_capacity(USUAL_BYTES), sorted: Vec::with_capacity(USUAL_BYTES), ..Page::default() };
     value.serialize(&mut Serializer::with_formatter(io::sink(), OnPage(&mut page)))?;
     Ok(page.text)
 }
+
+/// Room for the canonical JSON of a usual job.
+const USUAL_BYTES: usize = 2048;
 
 /// What is written so far.
 #[derive(Default)]
