@@ -101,6 +101,13 @@ fn every_fault_of_a_range_states_both_ends_and_the_unit() {
             [("minimum", 0.0), ("maximum", 10.0)],
             "um/N",
         ),
+        (
+            "/effects",
+            json!([{ "kind": "depth_exponent", "delta": -0.1, "reference_depth_mm": 1.0 }]),
+            "force_falls_with_depth",
+            [("minimum", 0.0), ("maximum", 3.0)],
+            "1",
+        ),
     ];
     for (pointer, value, code, ends, unit) in cases {
         let found = faults(changed(&[(pointer, value.clone())]));

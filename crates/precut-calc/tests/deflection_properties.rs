@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
 use crate::support::{prepared, solved};
-use precut_calc::calculator::{Calculator, Check, Finding, ForwardModel, Rows, Unwatched, Violations};
+use precut_calc::calculator::{Answer, Calculator, Check, Finding, ForwardModel, Rows, Unwatched, Violations};
 use precut_calc::deflection_compensation::{
     DeflectionCompensation, DeflectionPoint, DeflectionRun, Job, Outcome, StatusCompensated,
 };
@@ -164,22 +164,49 @@ proptest! {
         let straight = solved(case.job()).stations;
         let mut mirrored = solved(case.mirrored().job()).stations;
         mirrored.diameter_error_uncompensated_um.reverse();
-        mirrored.offset_um.reverse();
+        let (straight_offset_um, mut mirrored_offset_um) = (straight.offset_um.unwrap(), mirrored.offset_um.unwrap());
+        mirrored_offset_um.reverse();
         // Sums of lengths round differently from the other end: 1e-13 of 1000 mm, times the slope of the compliance.
         prop_assert!(close(&straight.diameter_error_uncompensated_um, &mirrored.diameter_error_uncompensated_um, 1e-6));
-        prop_assert!(close(&straight.offset_um, &mirrored.offset_um, 1e-6));
+        prop_assert!(close(&straight_offset_um, &mirrored_offset_um, 1e-6));
     }
 
-    /// The short answer holds the same numbers as the full one.
+    /// The short answer holds the same numbers as the full one, and says the same of uncertainty and copying; of the
+    /// columns that it leaves out three are differences of those that it has.
     #[test]
     fn the_profile_alone_has_the_same_numbers(case in case()) {
         let mut short = case.job();
         short["detail"] = json!("profile");
-        let (full, short) = (solved(case.job()), solved(short));
+        let answer = |job| DeflectionCompensation::run(&prepared(job), &Unwatched).unwrap();
+        let (full, short) = (answer(case.job()), answer(short));
+        let said = |answer: &Answer<Outcome>, code| answer.explanation.iter().find(|said| said.code == code).cloned();
+        for code in ["uncertain_by", "stock_is_copied"] {
+            prop_assert_eq!(said(&full, code), said(&short, code));
+        }
+        let (full, short) = (full.output, short.output);
         prop_assert_eq!(&full.stations.commanded_diameter_mm, &short.stations.commanded_diameter_mm);
         prop_assert_eq!(&full.stations.diameter_error_uncompensated_um, &short.stations.diameter_error_uncompensated_um);
         prop_assert_eq!(full.before, short.before);
         prop_assert!(short.path.is_none() && short.after.is_none() && short.one_step.is_none());
+        let (full, short) = (full.stations, short.stations);
+        prop_assert!(
+            short.work_compliance_um_per_n.is_none()
+                && short.depth_uncompensated_mm.is_none()
+                && short.offset_um.is_none()
+                && short.diameter_uncertainty_um.is_none()
+                && short.copying_factor.is_none()
+        );
+        let carriage = case.springs[2];
+        let work: Vec<_> = short.compliance_um_per_n.iter().map(|w| Some(w - carriage)).collect();
+        let full_work: Vec<_> = full.work_compliance_um_per_n.unwrap().into_iter().map(Some).collect();
+        prop_assert!(close(&full_work, &work, 1e-12));
+        let offset = |(c, d): (&Option<f64>, &f64)| c.map(|c| (c - d) / 2.0 * 1e3);
+        let offset: Vec<_> = short.commanded_diameter_mm.iter().zip(&short.diameter_mm).map(offset).collect();
+        // Round-off of diameters of 100 mm, in um.
+        prop_assert!(close(&full.offset_um.unwrap(), &offset, 1e-9));
+        let depth = |(error, depth): (&Option<f64>, &f64)| error.map(|error| depth - error / 2.0 / 1e3);
+        let depth: Vec<_> = short.diameter_error_uncompensated_um.iter().zip(&short.depth_mm).map(depth).collect();
+        prop_assert!(close(&full.depth_uncompensated_mm.unwrap(), &depth, 1e-12));
     }
 
     /// Passive force alone, no rests: the error lies between none and twice the deflection at the nominal depth
@@ -190,7 +217,7 @@ proptest! {
         case.rest = None;
         case.offset_um = 0.0;
         let stations = solved(case.job()).stations;
-        for ((error, y), copied) in stations.diameter_error_uncompensated_um.iter().zip(&stations.deflection_um).zip(&stations.copying_factor) {
+        for ((error, y), copied) in stations.diameter_error_uncompensated_um.iter().zip(&stations.deflection_um).zip(stations.copying_factor.as_ref().unwrap()) {
             let error = error.unwrap();
             prop_assert!(error >= -1e-9 && error <= 2.0 * y + 1e-9, "{error} for {y}");
             prop_assert!((0.0..1.0).contains(&copied.unwrap()));
@@ -228,7 +255,7 @@ fn the_printed_tailstock_term_breaks_mirror_symmetry() {
             "cut": { "feed_mm_per_rev": 0.1, "speed_m_per_min": 100.0 },
             "stations": { "kind": "list", "z_mm": [x] }
         }));
-        outcome.stations.work_compliance_um_per_n[0] / 1e3
+        outcome.stations.work_compliance_um_per_n.unwrap()[0] / 1e3
     };
     let built = job(w, 2.0 * w, x);
     let bending = built - right(x, w, 2.0 * w);

@@ -184,8 +184,8 @@ pub(super) fn one_more_rest(
 }
 
 /// The answer in words, most important first; `dominating` says what dominates.
-pub(super) fn explanation(job: &Job, outcome: &Outcome, dominating: Message) -> Vec<Message> {
-    let mut said = vec![nominal_path(&outcome.before), dominating];
+pub(super) fn explanation(job: &Job, outcome: &Outcome, seen_along: &SeenAlong) -> Vec<Message> {
+    let mut said = vec![nominal_path(&outcome.before), seen_along.dominating.clone()];
     if let Some(path) = &outcome.path {
         said.push(match (outcome.form_error_after_um, outcome.largest_error_after_um) {
             (Some(form), Some(largest)) => Message::new("compensated_path_leaves")
@@ -195,10 +195,9 @@ pub(super) fn explanation(job: &Job, outcome: &Outcome, dominating: Message) -> 
             _ => Message::new("path_has_gaps").with("stations", without_command(outcome)),
         });
     }
-    let uncertainty = largest(outcome.stations.diameter_uncertainty_um.iter().copied());
     said.push(
         Message::new("uncertain_by")
-            .with("uncertainty_um", uncertainty)
+            .with("uncertainty_um", seen_along.uncertainty_um)
             .with("force_percent", job.uncertainty.force_percent)
             .with("stiffness_percent", job.uncertainty.stiffness_percent),
     );
@@ -208,7 +207,7 @@ pub(super) fn explanation(job: &Job, outcome: &Outcome, dominating: Message) -> 
     if overcut < 0.0 {
         said.push(Message::new("one_step_overcuts").with("undersize_um", -overcut));
     }
-    said.extend(copied(job, outcome));
+    said.extend(copied(job, outcome, seen_along.copying_factor));
     if !job.passes.is_empty() {
         said.push(Message::new("program_is_last_pass"));
     }
@@ -217,14 +216,13 @@ pub(super) fn explanation(job: &Job, outcome: &Outcome, dominating: Message) -> 
 }
 
 /// How much of a deviation of the blank is left: after all passes, where there are several.
-fn copied(job: &Job, outcome: &Outcome) -> Option<Message> {
+fn copied(job: &Job, outcome: &Outcome, of_cut: f64) -> Option<Message> {
     let of_all =
         outcome.passes.last().map(|last| largest(last.copied_so_far.iter().flatten().map(|share| share.abs())));
-    let of_cut = || largest(outcome.stations.copying_factor.iter().flatten().copied());
     let (cut, copied) = match of_all {
         Some(copied) => ("passes", copied),
-        None if job.stock_profile.is_some() => ("measured", of_cut()),
-        None => ("nominal", of_cut()),
+        None if job.stock_profile.is_some() => ("measured", of_cut),
+        None => ("nominal", of_cut),
     };
     (copied > 0.0).then(|| Message::new("stock_is_copied").with("copying_factor", copied).with("cut", cut))
 }
@@ -266,9 +264,30 @@ fn nominal_path(before: &Form) -> Message {
     }
 }
 
+/// What the sentences need of the stations once their arrays have gone into the answer.
+pub(super) struct SeenAlong {
+    /// What opens the gap most.
+    dominating: Message,
+    /// The largest standard uncertainty of the diameter, um.
+    uncertainty_um: f64,
+    /// The largest share of a stock deviation that this cut leaves.
+    copying_factor: f64,
+}
+
+impl SeenAlong {
+    /// Of the last cut.
+    pub(super) fn of(stage: &Stage, shares: &Shares, uncertainty_um: &[f64]) -> Self {
+        Self {
+            dominating: dominating(stage, shares),
+            uncertainty_um: largest(uncertainty_um.iter().copied()),
+            copying_factor: largest(stage.cut.copying.iter().flatten().copied()),
+        }
+    }
+}
+
 /// What opens the gap most where it opens most. Where that is the passive force, who yields to it: the shares are those
 /// of its compliance and say nothing of sag, couple and stated errors.
-pub(super) fn dominating(stage: &Stage, shares: &Shares) -> Message {
+fn dominating(stage: &Stage, shares: &Shares) -> Message {
     let i = most_deflected(stage);
     let opening_mm = at(&stage.cut.y_mm, i);
     let OpeningParts { force_mm, couple_mm, sag_mm } = stage.line.parts(i, &stage.cut.loads.of(i));

@@ -5,10 +5,13 @@ use crate::effects::DeflectionEffect as Effect;
 
 use super::grid::station_count;
 use super::input::{Job, MAX_STATIONS, Segment, Stations, Support};
+use crate::force::ForceModel;
 use crate::shaft::{self, DIAMETER_MM, elastic::clamping, elastic::ends};
 
 /// Largest change of a compliance that the schemas of the effects allow, to either side of what a support has, um/N.
 const COMPLIANCE_CHANGE_UM_PER_N: std::ops::RangeInclusive<f64> = -1.0..=10.0;
+/// Largest change of the depth exponent that the schema of its effect allows.
+const LARGEST_EXPONENT_CHANGE: f64 = 3.0;
 /// Stations of a measured blank that the schema allows, mm.
 const PROFILE_STATION_MM: std::ops::RangeInclusive<f64> = -100_000.0..=100_000.0;
 
@@ -27,6 +30,7 @@ pub(super) const CODES: &[&str] = &[
     "duplicate_effect",
     "condition_missing",
     "effect_beyond_base",
+    "force_falls_with_depth",
     "effect_without_headstock",
     "effect_without_tailstock",
     "effect_without_rest",
@@ -174,6 +178,31 @@ fn check_effects(job: &Job, violations: &mut Violations) {
             });
         }
         check_effect_on_structure(job, effect, &at, violations);
+        check_effect_on_force(job, effect, &at, violations);
+    }
+}
+
+/// A force that falls with depth has no chip to begin with: it grows beyond all bounds as the depth goes to 0.
+fn check_effect_on_force(job: &Job, effect: &Effect, at: &dyn Fn(&str) -> String, violations: &mut Violations) {
+    if let Effect::DepthExponent { delta, .. } = *effect
+        && let Some(exponent) = passive_exponent(&job.force)
+    {
+        violations.require(exponent + delta >= 0.0, || {
+            // Not `-exponent`: that of nothing is -0.
+            Finding::new("force_falls_with_depth", at("/delta"))
+                .measured(delta, 0.0 - exponent, "1")
+                .within(0.0 - exponent, LARGEST_EXPONENT_CHANGE)
+                .with("exponent", exponent)
+        });
+    }
+}
+
+/// Exponent of the depth in the part of the passive force that depends on it, where that is a power.
+pub(super) fn passive_exponent(force: &ForceModel) -> Option<f64> {
+    match force {
+        ForceModel::PowerLaw(model) => Some(model.passive.depth_exponent),
+        // A model that is refused has no force.
+        other => other.at(1.0, 100.0).passive_power().filter(|(factor, _)| *factor > 0.0).map(|(_, exponent)| exponent),
     }
 }
 

@@ -3,8 +3,7 @@
 
 use super::UM_PER_MM;
 use super::acting::Acting;
-use super::cut::CutLine;
-use super::input::{Job, Uncertainty};
+use super::input::{Detail, Job, Uncertainty};
 use super::laws::Loads;
 use super::model::{Line, Radii, at};
 use super::output::StationColumns;
@@ -33,35 +32,45 @@ pub(super) fn errors_um(produced_mm: &[Option<f64>], radii: &Radii) -> Vec<Optio
 }
 
 /// The columns of the answer; `z_mm` are the stations.
-pub(super) fn columns(job: &Job, acting: &Acting, z_mm: Vec<f64>, stage: Stage, errors: Errors) -> StationColumns {
+pub(super) fn columns(
+    job: &Job,
+    z_mm: Vec<f64>,
+    stage: Stage,
+    errors: Errors,
+    diameter_uncertainty_um: Vec<f64>,
+) -> StationColumns {
     let Stage { line, radii, cut, .. } = stage;
-    let diameter_uncertainty_um = uncertainty_um(job, acting, &line, &radii, &cut);
     let force = |given: bool, component: fn(&Loads) -> f64| given.then(|| cut.loads.column(component));
     let moves_aside = line.moves_aside();
     let carriage = line.carriage_mm_per_n;
+    let full = job.detail == Detail::Full;
     let Radii { target, stock, .. } = radii;
     StationColumns {
         z_mm,
         passive_force_n: cut.loads.column(|loads| loads.passive_n),
         main_force_n: force(job.force.has_main(), |loads| loads.main_n),
         feed_force_n: force(job.force.has_feed(), |loads| loads.feed_n),
-        offset_um: cut.command_mm.iter().zip(&target).map(|(r, t)| r.map(|r| (r - t) * UM_PER_MM)).collect(),
+        offset_um: full.then(|| offsets_um(&cut.command_mm, &target)),
         commanded_diameter_mm: doubled(cut.command_mm),
         diameter_mm: scaled(target, 2.0),
         stock_diameter_mm: scaled(stock, 2.0),
         compliance_um_per_n: line.work_mm_per_n.iter().map(|w| (w + carriage) * UM_PER_MM).collect(),
-        work_compliance_um_per_n: scaled(line.work_mm_per_n, UM_PER_MM),
+        work_compliance_um_per_n: full.then(|| scaled(line.work_mm_per_n, UM_PER_MM)),
         depth_mm: cut.nominal_depth_mm,
         deflection_um: scaled(cut.y_mm, UM_PER_MM),
         tangential_deflection_um: moves_aside.then(|| scaled(cut.z_mm, UM_PER_MM)),
-        depth_uncompensated_mm: cut.uncompensated_depth_mm,
+        depth_uncompensated_mm: full.then_some(cut.uncompensated_depth_mm),
         diameter_error_uncompensated_um: errors.uncompensated_um,
         diameter_error_compensated_um: errors.compensated_um,
-        diameter_uncertainty_um,
-        copying_factor: cut.copying,
+        diameter_uncertainty_um: full.then_some(diameter_uncertainty_um),
+        copying_factor: full.then_some(cut.copying),
         status_uncompensated: cut.status_uncompensated,
         status_compensated: cut.status_compensated,
     }
+}
+
+fn offsets_um(command_mm: &[Option<f64>], target_mm: &[f64]) -> Vec<Option<f64>> {
+    command_mm.iter().zip(target_mm).map(|(r, t)| r.map(|r| (r - t) * UM_PER_MM)).collect()
 }
 
 fn scaled(mut column: Vec<f64>, by: f64) -> Vec<f64> {
@@ -80,7 +89,8 @@ fn doubled(mut column: Vec<Option<f64>>) -> Vec<Option<f64>> {
 
 /// Standard uncertainty of the diameter, um (`deflection/7`): to first order about the compensated cut, what force and
 /// compliances each make of the radius, and the scatter from trace to trace.
-fn uncertainty_um(job: &Job, acting: &Acting, line: &Line, radii: &Radii, cut: &CutLine) -> Vec<f64> {
+pub(super) fn uncertainty_um(job: &Job, acting: &Acting, stage: &Stage) -> Vec<f64> {
+    let Stage { line, radii, cut, .. } = stage;
     let relative = Relative::of(&job.uncertainty);
     let scatter = 2.0 * acting.scatter_mm * UM_PER_MM;
     let radius_mm = cut.loads.along().enumerate().map(|(i, loads)| {

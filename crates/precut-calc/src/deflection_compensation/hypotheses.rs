@@ -1,5 +1,6 @@
 //! The causes of the catalogue as they stand for a shaft and its measured runs.
 
+use super::check::passive_exponent;
 use super::forward::DeflectionRun;
 use super::input::{Job, Support};
 use super::regime::Regime;
@@ -137,6 +138,9 @@ impl Experiment<'_> {
             "headstock_compliance" => at_least(self.headstock_um_per_n()),
             "tailstock_compliance" => at_least(self.tailstock_um_per_n()),
             "carriage_compliance" => -self.job.carriage.compliance_um_per_n,
+            // A force that falls with depth is refused.
+            "depth_exponent" if parameter.name == "delta" => passive_exponent(&self.job.force)
+                .map_or(parameter.lower, |exponent| parameter.lower.max(0.0 - exponent)),
             _ => parameter.lower,
         };
         let treatment = match parameter.fit {

@@ -263,8 +263,8 @@ pub enum Detail {
     /// Everything: profile, command, path in straight moves with its prediction, comparison, advice.
     #[default]
     Full,
-    /// The profile along the shaft, the exact command and the form alone, for studies and live pictures: several
-    /// times faster, a third of the size.
+    /// The profile along the shaft, the exact command and the form alone, for studies and live pictures; of
+    /// uncertainty and copying only the largest, in words: several times faster, a fifth of the size.
     Profile,
 }
 

@@ -61,7 +61,8 @@ use crate::calculator::{
 use crate::force;
 
 use acting::Acting;
-use columns::{Errors, columns};
+use advice::SeenAlong;
+use columns::{Errors, columns, uncertainty_um};
 use cut::one_step;
 use driven::{Driven, drive};
 use grid::{Grid, path_station_count, station_count};
@@ -80,7 +81,7 @@ impl Calculator for DeflectionCompensation {
     const META: Meta = Meta {
         id: "deflection-compensation",
         kind: CalculatorKind::Calculator,
-        version: 5,
+        version: 6,
         title: "Deflection compensation",
         question: "Where must the tool go so that the slender shaft comes out straight?",
         summary: "A slender shaft bends away from the tool, so less is cut than commanded. From shaft, supports, \
@@ -194,9 +195,10 @@ fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
         Assembly { job, grid: &grid, acting: &acting, stage: &stage }.outcome(driven, passes, &errors, monitor)?;
     let warnings = advice::warnings(job, &grid, &acting, &stage, &outcome);
     let warnings = advice::with_earlier(warnings, of_passes);
-    let dominating = advice::dominating(&stage, &outcome.shares);
-    outcome.stations = columns(job, &acting, grid.z_mm, stage, errors);
-    let explanation = advice::explanation(job, &outcome, dominating);
+    let uncertainty_um = uncertainty_um(job, &acting, &stage);
+    let seen_along = SeenAlong::of(&stage, &outcome.shares, &uncertainty_um);
+    outcome.stations = columns(job, grid.z_mm, stage, errors, uncertainty_um);
+    let explanation = advice::explanation(job, &outcome, &seen_along);
     monitor.progress(1.0, Message::new("stage_done"));
     Ok(Answer { output: outcome, warnings, explanation, basis: basis(job) })
 }

@@ -48,7 +48,7 @@ pub struct Outcome {
     pub numerical_error_um: f64,
 }
 
-/// One entry per station, in the order of z.
+/// One entry per station, in the order of z. With `detail: profile` what the shaft does and where the tool must go.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct StationColumns {
     /// Station from the headstock end.
@@ -60,10 +60,11 @@ pub struct StationColumns {
     /// Diameter of the stock of this pass.
     #[schema(extensions(("x-unit" = json!("mm"))))]
     pub stock_diameter_mm: Vec<f64>,
-    /// Compliance of the held shaft at the cutting point, one-sided rests open.
+    /// Compliance of the held shaft at the cutting point, one-sided rests open; only with `detail: full`.
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(extensions(("x-unit" = json!("um/N"))))]
-    pub work_compliance_um_per_n: Vec<f64>,
-    /// The same with the carriage.
+    pub work_compliance_um_per_n: Option<Vec<f64>>,
+    /// Compliance of the held shaft and the carriage at the cutting point, one-sided rests open.
     #[schema(extensions(("x-unit" = json!("um/N"))))]
     pub compliance_um_per_n: Vec<f64>,
     /// Nominal depth of cut (radial).
@@ -87,15 +88,17 @@ pub struct StationColumns {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(extensions(("x-unit" = json!("um"))))]
     pub tangential_deflection_um: Option<Vec<f64>>,
-    /// Depth really cut if the tool follows the nominal line.
+    /// Depth really cut if the tool follows the nominal line; only with `detail: full`.
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(extensions(("x-unit" = json!("mm"))))]
-    pub depth_uncompensated_mm: Vec<Option<f64>>,
+    pub depth_uncompensated_mm: Option<Vec<Option<f64>>>,
     /// Diameter error if the tool follows the nominal line, positive = oversize.
     #[schema(extensions(("x-unit" = json!("um"))))]
     pub diameter_error_uncompensated_um: Vec<Option<f64>>,
-    /// Radial offset of the commanded path from the nominal line, positive away from the axis.
+    /// Radial offset of the commanded path from the nominal line, positive away from the axis; only with `detail: full`.
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(extensions(("x-unit" = json!("um"))))]
-    pub offset_um: Vec<Option<f64>>,
+    pub offset_um: Option<Vec<Option<f64>>>,
     /// Commanded diameter.
     #[schema(extensions(("x-unit" = json!("mm"))))]
     pub commanded_diameter_mm: Vec<Option<f64>>,
@@ -103,12 +106,14 @@ pub struct StationColumns {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(extensions(("x-unit" = json!("um"))))]
     pub diameter_error_compensated_um: Option<Vec<Option<f64>>>,
-    /// Standard uncertainty of the diameter from those of force and stiffness.
+    /// Standard uncertainty of the diameter from those of force and stiffness; only with `detail: full`.
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(extensions(("x-unit" = json!("um"))))]
-    pub diameter_uncertainty_um: Vec<f64>,
-    /// Share of a stock deviation that one uncompensated cut leaves.
+    pub diameter_uncertainty_um: Option<Vec<f64>>,
+    /// Share of a stock deviation that one uncompensated cut leaves; only with `detail: full`.
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(extensions(("x-unit" = json!("1"))))]
-    pub copying_factor: Vec<Option<f64>>,
+    pub copying_factor: Option<Vec<Option<f64>>>,
     /// What becomes of the nominal command.
     pub status_uncompensated: Vec<StatusUncompensated>,
     /// What becomes of the compensated command.

@@ -2,6 +2,7 @@
 
 use crate::calculator::{Axis, Column, Figure, Frame, Glyph, Item, Message, Panel, Role, Table};
 
+use super::UM_PER_MM;
 use super::input::{Job, Support};
 use super::output::{OneStep, Outcome, PathZone, StationColumns};
 use crate::shaft::elastic::ends;
@@ -126,14 +127,10 @@ fn outline(job: &Job, outcome: &Outcome, height: f64) -> Panel {
 
 fn compliance(stations: &StationColumns, height: f64) -> Panel {
     let line = |name, values: &[f64], role| Item::Line { name, x: stations.z_mm.clone(), y: some(values), role };
-    Panel {
-        y: Axis::linear("compliance", "um/N"),
-        height,
-        items: vec![
-            line("work_compliance", &stations.work_compliance_um_per_n, Role::Comparison),
-            line("total_compliance", &stations.compliance_um_per_n, Role::Plain),
-        ],
-    }
+    let work = stations.work_compliance_um_per_n.as_ref();
+    let work = work.map(|values| line("work_compliance", values, Role::Comparison));
+    let total = line("total_compliance", &stations.compliance_um_per_n, Role::Plain);
+    Panel { y: Axis::linear("compliance", "um/N"), height, items: work.into_iter().chain([total]).collect() }
 }
 
 fn errors(job: &Job, outcome: &Outcome, height: f64) -> Panel {
@@ -151,10 +148,9 @@ fn errors(job: &Job, outcome: &Outcome, height: f64) -> Panel {
         });
     }
     let after = stations.diameter_error_compensated_um.as_ref();
-    if let Some(after) = after.and_then(|after| after.iter().copied().collect::<Option<Vec<f64>>>()) {
-        let shifted = |sign: f64| -> Vec<f64> {
-            after.iter().zip(&stations.diameter_uncertainty_um).map(|(e, u)| e + sign * 2.0 * u).collect()
-        };
+    let whole = after.and_then(|after| after.iter().copied().collect::<Option<Vec<f64>>>());
+    if let (Some(after), Some(unsure)) = (whole, &stations.diameter_uncertainty_um) {
+        let shifted = |sign: f64| -> Vec<f64> { after.iter().zip(unsure).map(|(e, u)| e + sign * 2.0 * u).collect() };
         items.push(Item::Band {
             name: "uncertainty_band",
             x: stations.z_mm.clone(),
@@ -193,12 +189,19 @@ fn path(outcome: &Outcome, height: f64) -> Panel {
     items.push(Item::Line {
         name: "commanded_path",
         x: stations.z_mm.clone(),
-        y: stations.offset_um.clone(),
+        y: offsets_um(stations),
         role: Role::Command,
     });
     let (x, y) = vertices.into_iter().unzip();
     items.push(Item::Points { name: "programmed_vertices", x, y, role: Role::Command });
     Panel { y: Axis::linear("path_offset", "um"), height, items }
+}
+
+/// Of the commanded path from the nominal line, radial; with `detail: profile` from the diameters.
+fn offsets_um(stations: &StationColumns) -> Vec<Option<f64>> {
+    let difference = |(c, d): (&Option<f64>, &f64)| c.map(|c| (c - d) / 2.0 * UM_PER_MM);
+    let of_diameters = || stations.commanded_diameter_mm.iter().zip(&stations.diameter_mm).map(difference).collect();
+    stations.offset_um.clone().unwrap_or_else(of_diameters)
 }
 
 fn one_step(outcome: &Outcome, height: f64) -> Panel {
@@ -235,11 +238,14 @@ fn station_columns(stations: &StationColumns) -> Vec<Column> {
         Column::numbers("z", "mm", &stations.z_mm),
         Column::numbers("diameter", "mm", &stations.diameter_mm),
         Column::numbers("stock_diameter", "mm", &stations.stock_diameter_mm),
-        Column::numbers("work_compliance", "um/N", &stations.work_compliance_um_per_n),
+    ];
+    let work = stations.work_compliance_um_per_n.as_ref();
+    columns.extend(work.map(|values| Column::numbers("work_compliance", "um/N", values)));
+    columns.extend([
         Column::numbers("compliance", "um/N", &stations.compliance_um_per_n),
         Column::numbers("depth", "mm", &stations.depth_mm),
         Column::numbers("passive_force", "N", &stations.passive_force_n),
-    ];
+    ]);
     let acting = [
         ("main_force", "N", &stations.main_force_n),
         ("feed_force", "N", &stations.feed_force_n),
@@ -248,18 +254,23 @@ fn station_columns(stations: &StationColumns) -> Vec<Column> {
     for (name, unit, values) in acting {
         columns.extend(values.as_ref().map(|values| Column::numbers(name, unit, values)));
     }
+    columns.push(Column::numbers("deflection", "um", &stations.deflection_um));
+    let (error, command) = (&stations.diameter_error_uncompensated_um, &stations.commanded_diameter_mm);
+    let along = [
+        ("depth_uncompensated", "mm", stations.depth_uncompensated_mm.as_ref()),
+        ("diameter_error_uncompensated", "um", Some(error)),
+        ("offset", "um", stations.offset_um.as_ref()),
+        ("commanded_diameter", "mm", Some(command)),
+        ("diameter_error_compensated", "um", stations.diameter_error_compensated_um.as_ref()),
+    ];
+    for (name, unit, values) in along {
+        columns.extend(values.map(|values| Column::optional(name, unit, values)));
+    }
+    let unsure = stations.diameter_uncertainty_um.as_ref();
+    columns.extend(unsure.map(|values| Column::numbers("diameter_uncertainty", "um", values)));
+    let copying = stations.copying_factor.as_ref();
+    columns.extend(copying.map(|values| Column::optional("copying_factor", "1", values)));
     columns.extend([
-        Column::numbers("deflection", "um", &stations.deflection_um),
-        Column::optional("depth_uncompensated", "mm", &stations.depth_uncompensated_mm),
-        Column::optional("diameter_error_uncompensated", "um", &stations.diameter_error_uncompensated_um),
-        Column::optional("offset", "um", &stations.offset_um),
-        Column::optional("commanded_diameter", "mm", &stations.commanded_diameter_mm),
-    ]);
-    let after = stations.diameter_error_compensated_um.as_ref();
-    columns.extend(after.map(|after| Column::optional("diameter_error_compensated", "um", after)));
-    columns.extend([
-        Column::numbers("diameter_uncertainty", "um", &stations.diameter_uncertainty_um),
-        Column::optional("copying_factor", "1", &stations.copying_factor),
         Column::words("status_uncompensated", stations.status_uncompensated.iter().map(|s| s.name().into()).collect()),
         Column::words("status_compensated", stations.status_compensated.iter().map(|s| s.name().into()).collect()),
     ]);
