@@ -23,8 +23,12 @@ const PRECUT: &str = env!("CARGO_BIN_EXE_precut");
 const BARE: &str = "PRECUT_BENCH_BARE";
 /// What the bare server does for its answer.
 const WORK: &str = "PRECUT_BENCH_WORK";
-const ROUNDS: usize = 15;
-const REQUESTS: usize = 300;
+const ROUNDS: usize = 11;
+/// In one turn: enough that what is kept behind the first answers is written while the later ones are waited for.
+const REQUESTS: usize = 1000;
+/// After the requests of a turn both servers rest so long: what goes on behind the answers of the one neither takes a
+/// core from the other nor lets it and its client share one, and counts where it belongs.
+const REST: Duration = Duration::from_millis(400);
 
 /// What is asked, and whether each time the same.
 pub(crate) struct Exchange {
@@ -100,6 +104,7 @@ pub(crate) fn ratio(exchange: &Exchange, bare: Bare, clock: Clock) -> Result<Mea
             Ok(begun.elapsed().as_secs_f64())
         };
         let waits: Vec<f64> = bodies.iter().map(wait).collect::<Result<_, String>>()?;
+        std::thread::sleep(REST);
         Ok(clock.figure(waits, server.cpu_time()? - before))
     };
     block(&mut to_service, &service)?;
