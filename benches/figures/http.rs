@@ -23,9 +23,7 @@ const PRECUT: &str = env!("CARGO_BIN_EXE_precut");
 const BARE: &str = "PRECUT_BENCH_BARE";
 /// What the bare server does for its answer.
 const WORK: &str = "PRECUT_BENCH_WORK";
-const ROUNDS: usize = 11;
-/// In one turn: enough that what is kept behind the first answers is written while the later ones are waited for.
-const REQUESTS: usize = 1000;
+const ROUNDS: usize = 15;
 /// After the requests of a turn both servers rest so long: what goes on behind the answers of the one neither takes a
 /// core from the other nor lets it and its client share one, and counts where it belongs.
 const REST: Duration = Duration::from_millis(400);
@@ -61,22 +59,19 @@ impl Bare {
 pub(crate) enum Clock {
     /// Time on a core of all threads of the server.
     ServerCpu,
-    /// From the first byte of a request to the last of its answer, on the average.
-    MeanWait,
-    /// The same of the tenth that waits least: what a request takes where nothing else wants the cores.
-    LeastWait,
+    /// From the first byte of a request to the last of its answer.
+    Wait,
+    /// The same in turns so long that what is kept behind the first answers is written while the later ones are waited
+    /// for.
+    SustainedWait,
 }
 
 impl Clock {
-    /// The figure of some requests, from the wait of each and the server's time on a core for all.
-    fn figure(self, mut waits: Vec<f64>, cpu: f64) -> f64 {
+    /// Requests in one turn.
+    fn requests(self) -> usize {
         match self {
-            Self::ServerCpu => cpu,
-            Self::MeanWait => waits.iter().sum::<f64>() / waits.len() as f64,
-            Self::LeastWait => {
-                waits.sort_by(f64::total_cmp);
-                waits[waits.len() / 10]
-            }
+            Self::ServerCpu | Self::Wait => 300,
+            Self::SustainedWait => 1500,
         }
     }
 }
@@ -95,17 +90,18 @@ pub(crate) fn ratio(exchange: &Exchange, bare: Bare, clock: Clock) -> Result<Mea
     let mut sent = 0;
     let mut block = |client: &mut Client, server: &Server| -> Result<f64, String> {
         // The client makes its requests before the clock runs.
-        let bodies: Vec<Vec<u8>> = (0..REQUESTS).map(|number| (exchange.body)(sent + number + 1)).collect();
-        sent += REQUESTS;
-        let before = server.cpu_time()?;
-        let wait = |body: &Vec<u8>| {
-            let begun = Instant::now();
+        let bodies: Vec<Vec<u8>> = (0..clock.requests()).map(|number| (exchange.body)(sent + number + 1)).collect();
+        sent += bodies.len();
+        let (before, begun) = (server.cpu_time()?, Instant::now());
+        for body in &bodies {
             client.post(&exchange.path, body)?;
-            Ok(begun.elapsed().as_secs_f64())
-        };
-        let waits: Vec<f64> = bodies.iter().map(wait).collect::<Result<_, String>>()?;
+        }
+        let waited = begun.elapsed().as_secs_f64();
         std::thread::sleep(REST);
-        Ok(clock.figure(waits, server.cpu_time()? - before))
+        Ok(match clock {
+            Clock::ServerCpu => server.cpu_time()? - before,
+            Clock::Wait | Clock::SustainedWait => waited,
+        })
     };
     block(&mut to_service, &service)?;
     block(&mut to_bare, &bare)?;

@@ -135,19 +135,19 @@ pub(crate) fn all() -> Vec<Row> {
         row("SVG, 3 panels of 100,000 stations", Unit::Time, None, None, || svg(100_000)),
         row("cached answer over HTTP against a bare handler", Unit::Ratio, Some(2.5), Some(1.6), cached),
         row(
-            "fresh deflection profile over HTTP, the client's wait, quickest tenth, against a handler that parses the \
-             job and sends as many bytes",
+            "fresh deflection profile over HTTP, the client's wait in turns of 300, against a handler that parses \
+             the job and sends as many bytes",
             Unit::Ratio,
             Some(2.0),
             Some(1.3),
-            || fresh(Bare::Parses, Clock::LeastWait),
+            || fresh(Bare::Parses, Clock::Wait),
         ),
         row(
-            "the same fresh profile, the client's mean wait beside the server's own keeping of results",
+            "the same fresh profile in turns of 1500, while results are kept behind",
             Unit::Ratio,
             Some(2.0),
             Some(1.3),
-            || fresh(Bare::Parses, Clock::MeanWait),
+            || fresh(Bare::Parses, Clock::SustainedWait),
         ),
         row(
             "the same fresh profile, CPU time of the server with that of keeping the result",
@@ -157,12 +157,12 @@ pub(crate) fn all() -> Vec<Row> {
             || fresh(Bare::Parses, Clock::ServerCpu),
         ),
         row(
-            "fresh deflection profile, the client's mean wait, against a handler that parses the job and writes as many \
+            "fresh deflection profile, the client's wait, against a handler that parses the job and writes as many \
              numbers as JSON",
             Unit::Ratio,
             None,
             None,
-            || fresh(Bare::Writes, Clock::MeanWait),
+            || fresh(Bare::Writes, Clock::Wait),
         ),
         row(
             "the same fresh profile against that handler, CPU time of the server with that of keeping the result",
