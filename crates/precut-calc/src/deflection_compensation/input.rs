@@ -264,7 +264,7 @@ pub enum Detail {
     #[default]
     Full,
     /// The profile along the shaft, the exact command and the form alone, for studies and live pictures; of
-    /// uncertainty and copying only the largest, in words: several times faster, a fifth of the size.
+    /// uncertainty and copying only the largest, in words: several times faster, two fifths of the size.
     Profile,
 }
 
