@@ -45,14 +45,15 @@ pub(super) fn columns(
     let carriage = line.carriage_mm_per_n;
     let full = job.detail == Detail::Full;
     let Radii { target, stock, .. } = radii;
+    let (commanded_diameter_mm, diameter_mm) = (doubled(cut.command_mm), scaled(target, 2.0));
     StationColumns {
         z_mm,
         passive_force_n: cut.loads.column(|loads| loads.passive_n),
         main_force_n: force(job.force.has_main(), |loads| loads.main_n),
         feed_force_n: force(job.force.has_feed(), |loads| loads.feed_n),
-        offset_um: full.then(|| offsets_um(&cut.command_mm, &target)),
-        commanded_diameter_mm: doubled(cut.command_mm),
-        diameter_mm: scaled(target, 2.0),
+        offset_um: full.then(|| offsets_um(&commanded_diameter_mm, &diameter_mm)),
+        commanded_diameter_mm,
+        diameter_mm,
         stock_diameter_mm: scaled(stock, 2.0),
         compliance_um_per_n: line.work_mm_per_n.iter().map(|w| (w + carriage) * UM_PER_MM).collect(),
         work_compliance_um_per_n: full.then(|| scaled(line.work_mm_per_n, UM_PER_MM)),
@@ -69,8 +70,10 @@ pub(super) fn columns(
     }
 }
 
-fn offsets_um(command_mm: &[Option<f64>], target_mm: &[f64]) -> Vec<Option<f64>> {
-    command_mm.iter().zip(target_mm).map(|(r, t)| r.map(|r| (r - t) * UM_PER_MM)).collect()
+/// Radial offset of the commanded path from the nominal line, um.
+pub(super) fn offsets_um(commanded_diameter_mm: &[Option<f64>], diameter_mm: &[f64]) -> Vec<Option<f64>> {
+    let offset = |(c, d): (&Option<f64>, &f64)| c.map(|c| (c - d) / 2.0 * UM_PER_MM);
+    commanded_diameter_mm.iter().zip(diameter_mm).map(offset).collect()
 }
 
 fn scaled(mut column: Vec<f64>, by: f64) -> Vec<f64> {

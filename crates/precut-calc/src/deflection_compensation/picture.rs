@@ -2,7 +2,7 @@
 
 use crate::calculator::{Axis, Column, Figure, Frame, Glyph, Item, Message, Panel, Role, Table};
 
-use super::UM_PER_MM;
+use super::columns::offsets_um;
 use super::input::{Job, Support};
 use super::output::{OneStep, Outcome, PathZone, StationColumns};
 use crate::shaft::elastic::ends;
@@ -189,19 +189,12 @@ fn path(outcome: &Outcome, height: f64) -> Panel {
     items.push(Item::Line {
         name: "commanded_path",
         x: stations.z_mm.clone(),
-        y: offsets_um(stations),
+        y: offsets_um(&stations.commanded_diameter_mm, &stations.diameter_mm),
         role: Role::Command,
     });
     let (x, y) = vertices.into_iter().unzip();
     items.push(Item::Points { name: "programmed_vertices", x, y, role: Role::Command });
     Panel { y: Axis::linear("path_offset", "um"), height, items }
-}
-
-/// Of the commanded path from the nominal line, radial; with `detail: profile` from the diameters.
-fn offsets_um(stations: &StationColumns) -> Vec<Option<f64>> {
-    let difference = |(c, d): (&Option<f64>, &f64)| c.map(|c| (c - d) / 2.0 * UM_PER_MM);
-    let of_diameters = || stations.commanded_diameter_mm.iter().zip(&stations.diameter_mm).map(difference).collect();
-    stations.offset_um.clone().unwrap_or_else(of_diameters)
 }
 
 fn one_step(outcome: &Outcome, height: f64) -> Panel {
