@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
 use crate::support::prepared;
-use precut_calc::calculator::{Answer, Calculator, Finding, Message, Unwatched, Value as Said};
+use precut_calc::calculator::{Answer, Calculator, Finding, Item, Message, Unwatched, Value as Said};
 use precut_calc::deflection_compensation::{DeflectionCompensation, Outcome};
 use serde_json::{Value, json};
 
@@ -338,5 +338,28 @@ fn a_command_beyond_the_blank_cuts_what_stands_towards_the_tool() {
             "{:?}",
             answer.output.largest_error_after_um
         );
+    }
+}
+
+/// The picture of the short answer has the same computed path, and names nothing that it does not draw.
+#[test]
+fn the_picture_of_the_short_answer_shows_its_path_and_nothing_empty() {
+    let items = |detail: &str| -> Vec<Item> {
+        let mut of = job(&centres(0.02));
+        of["detail"] = json!(detail);
+        let job = prepared(of);
+        let outcome = DeflectionCompensation::run(&job, &Unwatched).unwrap().output;
+        let mut figures = DeflectionCompensation::figures(&job, &outcome);
+        figures.swap_remove(0).panels.into_iter().flat_map(|panel| panel.items).collect()
+    };
+    let path = |items: &[Item]| items.iter().find(|i| matches!(i, Item::Line { name: "commanded_path", .. })).cloned();
+    let (full, short) = (items("full"), items("profile"));
+    assert!(path(&full).is_some() && path(&full) == path(&short));
+    for item in short {
+        let drawn = match &item {
+            Item::Line { x, .. } | Item::Points { x, .. } => !x.is_empty(),
+            _ => true,
+        };
+        assert!(drawn, "{item:?}");
     }
 }

@@ -192,8 +192,10 @@ fn path(outcome: &Outcome, height: f64) -> Panel {
         y: offsets_um(&stations.commanded_diameter_mm, &stations.diameter_mm),
         role: Role::Command,
     });
-    let (x, y) = vertices.into_iter().unzip();
-    items.push(Item::Points { name: "programmed_vertices", x, y, role: Role::Command });
+    if outcome.path.is_some() {
+        let (x, y) = vertices.into_iter().unzip();
+        items.push(Item::Points { name: "programmed_vertices", x, y, role: Role::Command });
+    }
     Panel { y: Axis::linear("path_offset", "um"), height, items }
 }
 
