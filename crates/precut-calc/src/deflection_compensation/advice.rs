@@ -1,9 +1,10 @@
 //! What dominates, what would help, where not to trust: codes with numbers.
 
 use crate::calculator::{Failure, Finding, Message, Monitor};
-use crate::force::Reached;
+use crate::force::{Reached, ReachedCut};
 
 use super::acting::Acting;
+use super::auto::settled;
 use super::driven::Again;
 use super::encounters::{Reach, body, met};
 use super::extremes::Extremes;
@@ -11,12 +12,13 @@ use super::form::Form;
 use super::grid::Grid;
 use super::input::{Job, Segment, Support, Theory};
 use super::model::{OpeningParts, at};
-use super::output::{OneMoreRest, Outcome, Shares, StatusCompensated};
+use super::output::{AddedSupport, OneMoreRest, Outcome, Shares, StatusCompensated};
 use super::regime::{Speed, spindle_speed_rpm};
 use super::second_order::left_out;
+use super::soundness;
 use super::stage::{Stage, all_cuts};
 use super::structure::Structure;
-use super::toolpath::{drawn, plunges};
+use super::toolpath::Drawn;
 use crate::shaft::elastic::ends;
 
 const UM_PER_MM: f64 = 1e3;
@@ -31,8 +33,8 @@ const STRESS_SHARE: f64 = 0.5;
 const THRUST_RATIO: f64 = 0.05;
 /// Slenderness below which shear counts.
 const SLENDER: f64 = 10.0;
-/// Stations at which one more rest is tried.
-const REST_SAMPLES: usize = 65;
+/// Most stations at which one more rest is tried: so many that the form error between them is missed by nothing that counts.
+const REST_SAMPLES: usize = 1025;
 /// Stations from which on a sample of them shows what a rest leaves.
 const REST_LEAST: usize = 9;
 /// Stations at which bending stress is looked at: of a smooth moment curve the largest is missed by less than a thousandth.
@@ -62,10 +64,12 @@ pub(super) const EXPLANATION_CODES: &[&str] = &[
     "path_has_gaps",
     "one_more_rest_buys",
     "uncertain_by",
+    "tailstock_buys",
     "one_step_overcuts",
     "stock_is_copied",
-    "program_is_last_pass",
-    "not_modelled",
+    "stock_is_inverted",
+    "machine_taken_as_rigid",
+    "effect_acts_by_default",
 ];
 
 /// Codes of the warnings made here.
@@ -162,25 +166,52 @@ pub(super) fn one_more_rest(
     }
     let chosen = grid.sample(REST_SAMPLES);
     let mut with_rest = job.clone();
-    with_rest.supports.push(Support::SteadyRest {
-        z_mm,
-        compliance_um_per_n,
-        tangential_compliance_um_per_n: None,
-        one_sided: false,
-        gap_um: 0.0,
-    });
+    let (kind, z_mm) = placed(job, z_mm);
+    let mut added = match kind {
+        AddedSupport::SteadyRest => Support::SteadyRest {
+            z_mm,
+            compliance_um_per_n,
+            tangential_compliance_um_per_n: None,
+            one_sided: false,
+            gap_um: 0.0,
+        },
+        AddedSupport::Centre => Support::Centre { z_mm, compliance_um_per_n, tangential_compliance_um_per_n: None },
+    };
+    added.fill(&grid.steps_mm);
+    with_rest.supports.push(added);
+    // What acts by default may be other effects there.
+    let with_rest = match settled(&with_rest, monitor) {
+        Ok((with_rest, _)) => with_rest,
+        Err(Failure::OutOfModel(_)) => return Ok(None),
+        Err(failure) => return Err(failure),
+    };
     if acting.changes_an_end() && ends(&with_rest.supports) != ends(&job.supports) {
         return Ok(None);
     }
     let sampled = grid.at(&chosen);
+    let with_rest = &*with_rest;
     // All passes with it: the stock that the last one meets is thicker where the shaft was not held.
-    let held = match all_cuts(&with_rest, &sampled, acting, &mut |_, _| (), &Again(monitor)) {
+    let held = match all_cuts(with_rest, &sampled, acting, &mut |_, _, _| (), &Again(monitor)) {
         Ok((held, _)) => held,
         Err(Failure::OutOfModel(_)) => return Ok(None),
         Err(failure) => return Err(failure),
     };
     let form = Form::of(&sampled.z_mm, &held.cut.uncompensated_errors_um(&held.radii));
-    Ok(form.form_error_um.map(|form_error_um| OneMoreRest { z_mm, compliance_um_per_n, form_error_um }))
+    Ok(form.form_error_um.map(|form_error_um| OneMoreRest { kind, z_mm, compliance_um_per_n, form_error_um }))
+}
+
+/// What is put under the shaft where it gives way most, and where: beyond the last support it is the free end that gives
+/// way, and there belongs a tailstock.
+fn placed(job: &Job, z_mm: f64) -> (AddedSupport, f64) {
+    let carrying = || job.supports.iter().filter(|s| s.carries()).filter_map(Support::station_mm);
+    let (first, last) = (carrying().fold(f64::INFINITY, f64::min), carrying().fold(f64::NEG_INFINITY, f64::max));
+    if z_mm > last {
+        (AddedSupport::Centre, job.shaft.length_mm())
+    } else if z_mm < first {
+        (AddedSupport::Centre, 0.0)
+    } else {
+        (AddedSupport::SteadyRest, z_mm)
+    }
 }
 
 /// The answer in words, most important first; `dominating` says what dominates.
@@ -208,10 +239,10 @@ pub(super) fn explanation(job: &Job, outcome: &Outcome, seen_along: &SeenAlong) 
         said.push(Message::new("one_step_overcuts").with("undersize_um", -overcut));
     }
     said.extend(copied(job, outcome, seen_along.copying_factor));
-    if !job.passes.is_empty() {
-        said.push(Message::new("program_is_last_pass"));
+    if seen_along.least_copying_factor < 0.0 {
+        said.push(Message::new("stock_is_inverted").with("copying_factor", -seen_along.least_copying_factor));
     }
-    said.push(Message::new("not_modelled"));
+    said.extend(outcome.included_automatically.iter().map(|automatic| automatic.said(job)));
     said
 }
 
@@ -231,7 +262,11 @@ fn copied(job: &Job, outcome: &Outcome, of_cut: f64) -> Option<Message> {
 fn worthwhile_rest(job: &Job, outcome: &Outcome) -> Option<Message> {
     let (rest, before_um) = (outcome.one_more_rest.as_ref()?, outcome.form_error_um?);
     let gain_um = before_um - rest.form_error_um;
-    let message = Message::new("one_more_rest_buys")
+    let code = match rest.kind {
+        AddedSupport::SteadyRest => "one_more_rest_buys",
+        AddedSupport::Centre => "tailstock_buys",
+    };
+    let message = Message::new(code)
         .with("z_mm", rest.z_mm)
         .with("form_error_um", rest.form_error_um)
         .with("compliance_um_per_n", rest.compliance_um_per_n)
@@ -272,6 +307,8 @@ pub(super) struct SeenAlong {
     uncertainty_um: f64,
     /// The largest share of a stock deviation that this cut leaves.
     copying_factor: f64,
+    /// The least; below 0 where the force falls with the depth.
+    least_copying_factor: f64,
 }
 
 impl SeenAlong {
@@ -279,6 +316,12 @@ impl SeenAlong {
     pub(super) fn of(stage: &Stage, shares: &Shares, uncertainty_um: &[f64]) -> Self {
         Self {
             dominating: dominating(stage, shares),
+            // The moment of the feed force alone may make it negative, too: of that the sentence does not speak.
+            least_copying_factor: if stage.cut.loads.distinct().any(|loads| loads.passive_slope < 0.0) {
+                stage.cut.copying.iter().flatten().copied().fold(0.0, f64::min)
+            } else {
+                0.0
+            },
             uncertainty_um: largest(uncertainty_um.iter().copied()),
             copying_factor: largest(stage.cut.copying.iter().flatten().copied()),
         }
@@ -320,6 +363,11 @@ fn yielding(stage: &Stage, shares: &Shares) -> Message {
     if most.1 <= 0.0 {
         return Message::new("nothing_yields").with("z_mm", shares.z_mm);
     }
+    // What was not given cannot be judged.
+    let machine = shares.headstock + shares.tailstock + shares.rests + shares.tool;
+    if most.0 == "work_dominates" && machine <= 0.0 {
+        return Message::new("machine_taken_as_rigid").with("z_mm", shares.z_mm);
+    }
     let force = stage.cut.loads.distinct().map(|loads| loads.passive_n);
     let [least, most_n] = force.fold([f64::INFINITY, 0.0], |[least, most], n| [least.min(n), most.max(n)]);
     let is_even = u8::from(most_n <= least * (1.0 + EVEN));
@@ -348,11 +396,19 @@ pub(super) fn with_earlier(mut warnings: Vec<Finding>, earlier: Vec<Finding>) ->
 }
 
 /// Where an input leaves the range in which the model holds.
-pub(super) fn warnings(job: &Job, grid: &Grid, acting: &Acting, stage: &Stage, outcome: &Outcome) -> Vec<Finding> {
+pub(super) fn warnings(
+    job: &Job,
+    grid: &Grid,
+    acting: &Acting,
+    stage: &Stage,
+    outcome: &Outcome,
+    drawn: Option<&Drawn>,
+    uncertainty_um: &[f64],
+) -> Vec<Finding> {
     let extremes = Extremes::of(stage);
     let mut found = deflection_warnings(job, grid, &extremes);
-    found.extend(met_supports(job, grid, outcome));
-    found.extend(outcome.path.iter().flat_map(|path| plunges(job, path)));
+    found.extend(met_supports(job, grid, drawn));
+    found.extend(drawn.iter().flat_map(|drawn| drawn.plunges(job)));
     found.extend(idle_rests(job, grid, stage));
     found.extend(structure_warnings(job, grid, stage, outcome));
     found.extend(command_warnings(job, &extremes, outcome));
@@ -363,6 +419,7 @@ pub(super) fn warnings(job: &Job, grid: &Grid, acting: &Acting, stage: &Stage, o
         found.extend(grid.beyond(job).into_iter().map(stays_uncut));
     }
     found.extend(missed_tolerances(job, outcome));
+    found.extend(soundness::warnings(job, grid, stage, outcome, uncertainty_um));
     found
 }
 
@@ -432,9 +489,9 @@ fn deflection_warnings(job: &Job, grid: &Grid, extremes: &Extremes) -> Vec<Findi
 
 /// Chucks and steady rests that the tool comes near to or would have to pass: on the way that the program takes it, or
 /// from one turned segment to another.
-fn met_supports(job: &Job, grid: &Grid, outcome: &Outcome) -> Vec<Finding> {
+fn met_supports(job: &Job, grid: &Grid, drawn: Option<&Drawn>) -> Vec<Finding> {
     let turned = turned_span(job, grid);
-    let reach = outcome.path.as_ref().map(|path| Reach::of(job, &drawn(job, path)));
+    let reach = drawn.map(|drawn| Reach::of(job, &drawn.written.program));
     let between = |i: usize, support: &Support| {
         let (kind, z_mm) = body(support)?;
         let finding = Finding::new("tool_passes_support", format!("/supports/{i}/z_mm")).value(z_mm, "mm");
@@ -493,11 +550,18 @@ fn idle_rest(index: usize, rest: &Support, is_beside: impl Fn(f64) -> bool, touc
 fn structure_warnings(job: &Job, grid: &Grid, stage: &Stage, outcome: &Outcome) -> Vec<Finding> {
     let mut found: Vec<Finding> = bending_stress(job, grid, stage).into_iter().collect();
     if let Some(ratio) = outcome.second_order.as_ref().and_then(|s| s.thrust_ratio).filter(|r| *r > THRUST_RATIO) {
-        found.push(Finding::new("thrust_near_buckling", "/force").measured(ratio, THRUST_RATIO, "1"));
+        found.push(
+            Finding::new(
+                "thrust_near_buckling",
+                if job.tailstock_thrust_n.is_some() { "/tailstock_thrust_n" } else { "/force" },
+            )
+            .measured(ratio, THRUST_RATIO, "1")
+            .with("margin", ratio.recip()),
+        );
     }
     let length: f64 = job.shaft.segments.iter().map(|s| s.length_mm).sum();
     let thickest = job.shaft.segments.iter().map(|s| s.diameter_mm).fold(0.0, f64::max);
-    if job.shaft.theory == Theory::EulerBernoulli && length / thickest < SLENDER {
+    if job.shaft.theory() == Theory::EulerBernoulli && length / thickest < SLENDER {
         found.push(
             Finding::new("shear_neglected", "/shaft/theory")
                 .measured(length / thickest, SLENDER, "1")
@@ -545,6 +609,7 @@ fn command_warnings(job: &Job, extremes: &Extremes, outcome: &Outcome) -> Vec<Fi
             .iter()
             .flat_map(|path| &path.zones)
             .flat_map(|zone| zone.z_mm.windows(2).zip(zone.delta_x_um.windows(2)))
+            .filter(|(z, _)| z[1] > z[0])
             .map(|(z, x)| ((x[1] - x[0]) / 2.0 / UM_PER_MM / (z[1] - z[0])).abs())
             .fold(0.0, f64::max);
         if steepest > limit {
@@ -554,11 +619,10 @@ fn command_warnings(job: &Job, extremes: &Extremes, outcome: &Outcome) -> Vec<Fi
     found
 }
 
-/// Depth, feed and speed that the force law meets, held against the range it was measured in.
-fn force_warnings(job: &Job, stage: &Stage, extremes: &Extremes) -> Vec<Finding> {
-    let (least, largest) = (extremes.least_depth_mm, extremes.largest_depth_mm);
-    if least > largest {
-        return Vec::new();
+/// Depth, feed and speed of a cut; `None` where nothing is cut.
+fn reached(stage: &Stage, least: f64, largest: f64) -> Option<ReachedCut<'static>> {
+    if least > largest || largest <= 0.0 {
+        return None;
     }
     let speed_pointer = match stage.regime.speed {
         Speed::Surface(_) => "/cut/speed_m_per_min",
@@ -566,13 +630,26 @@ fn force_warnings(job: &Job, stage: &Stage, extremes: &Extremes) -> Vec<Finding>
     };
     let (slowest, fastest) = speed_range_m_per_min(stage);
     let feed = stage.regime.feed_mm_per_rev;
-    let mut found = job.force.extrapolations(
-        Reached { pointer: "/shaft/segments", least, largest },
-        Reached { pointer: "/cut/feed_mm_per_rev", least: feed, largest: feed },
-        Reached { pointer: speed_pointer, least: slowest, largest: fastest },
-    );
+    Some(ReachedCut {
+        depth_mm: Reached { pointer: "/shaft/segments", least, largest },
+        feed_mm_per_rev: Reached { pointer: "/cut/feed_mm_per_rev", least: feed, largest: feed },
+        speed_m_per_min: Reached { pointer: speed_pointer, least: slowest, largest: fastest },
+    })
+}
+
+/// Depth, feed and speed that the force law meets, held against the range it was measured in.
+fn force_warnings(job: &Job, stage: &Stage, extremes: &Extremes) -> Vec<Finding> {
+    let Some(cut) = reached(stage, extremes.least_depth_mm, extremes.largest_depth_mm) else { return Vec::new() };
+    let mut found = job.force.extrapolations(&cut);
     found.extend(job.force.cautions("/force"));
     found
+}
+
+/// Refuses a cut of which the force law says nothing any more.
+pub(super) fn within_reach_of_law(job: &Job, stage: &Stage) -> Result<(), Failure> {
+    let deepest = largest(stage.cut.nominal_depth_mm.iter().copied());
+    let far = reached(stage, deepest, deepest).and_then(|cut| job.force.far_beyond(&cut));
+    far.map_or(Ok(()), |finding| Err(Failure::OutOfModel(finding)))
 }
 
 fn speed_range_m_per_min(stage: &Stage) -> (f64, f64) {

@@ -3,10 +3,10 @@
 use crate::calculator::{Check, Finding, Violations};
 use crate::effects::DeflectionEffect as Effect;
 
-use super::grid::station_count;
-use super::input::{Job, MAX_STATIONS, Segment, Stations, Support};
+use super::grid::{interpolate, station_count};
+use super::input::{Job, MAX_STATIONS, Segment, Stations, StockRow, Support};
 use crate::force::ForceModel;
-use crate::shaft::{self, DIAMETER_MM, elastic::clamping, elastic::ends};
+use crate::shaft::{self, DIAMETER_MM, elastic::clamping, elastic::ends, places};
 
 /// Largest change of a compliance that the schemas of the effects allow, to either side of what a support has, um/N.
 const COMPLIANCE_CHANGE_UM_PER_N: std::ops::RangeInclusive<f64> = -1.0..=10.0;
@@ -107,11 +107,13 @@ fn check_stations(job: &Job, violations: &mut Violations) {
 
 fn check_station_list(job: &Job, z_mm: &[f64], violations: &mut Violations) {
     let length = job.shaft.known_length_mm();
+    let ends_mm = job.shaft.ends_mm();
     let mut before: Option<f64> = None;
     for (i, &z) in z_mm.iter().enumerate() {
         let at = || format!("/stations/z_mm/{i}");
+        let z = places::settled(z, &ends_mm);
         // What stands beside the shaft is told that, and says nothing of the order of the others.
-        if let Some(length) = length.filter(|length| !(0.0..=*length).contains(&z)) {
+        if let Some(length) = length.filter(|length| !places::within(z, [0.0, *length])) {
             violations.add(outside_shaft(at(), z, length));
             continue;
         }
@@ -143,18 +145,37 @@ fn check_stock_profile(job: &Job, violations: &mut Violations) {
                 .with("maximum", *PROFILE_STATION_MM.end())
         });
     }
-    let bores = job.shaft.segments.iter().filter(|s| s.has_diameter() && s.bore_diameter_mm < s.diameter_mm);
-    let bore = bores.map(|s| s.bore_diameter_mm).fold(0.0, f64::max);
-    for (i, row) in profile.rows().iter().enumerate() {
-        violations.require(row.diameter_mm > bore, || {
-            let finding = Finding::new("bad_diameter", format!("/stock_profile/{i}/diameter_mm"));
-            let finding = finding.measured(row.diameter_mm, bore, "mm").with("maximum", *DIAMETER_MM.end());
-            if bore < *DIAMETER_MM.start() {
-                finding.with("minimum", *DIAMETER_MM.start())
-            } else {
-                finding.with("above", bore)
-            }
-        });
+    check_bore(job, profile.rows(), violations);
+}
+
+/// A measured blank is thicker than the bore at that place: at every row, and where its straight line from row to row
+/// comes to the end of a segment.
+fn check_bore(job: &Job, rows: &[StockRow], violations: &mut Violations) {
+    let ends_mm = job.shaft.ends_mm();
+    let bore_mm = |segment: &Segment| if segment.has_bore() { segment.bore_diameter_mm } else { 0.0 };
+    let mut is_told = vec![false; rows.len()];
+    let mut require = |i: usize, diameter_mm: f64, bore_mm: f64| {
+        if diameter_mm > bore_mm || std::mem::replace(&mut is_told[i], true) {
+            return;
+        }
+        let finding = Finding::new("bad_diameter", format!("/stock_profile/{i}/diameter_mm"));
+        let finding = finding.measured(diameter_mm, bore_mm, "mm").with("maximum", *DIAMETER_MM.end());
+        let least = if bore_mm < *DIAMETER_MM.start() { ("minimum", *DIAMETER_MM.start()) } else { ("above", bore_mm) };
+        violations.add(finding.with(least.0, least.1));
+    };
+    for (i, row) in rows.iter().enumerate() {
+        let here = &job.shaft.segments[places::pieces_at(row.z_mm, &ends_mm)];
+        require(i, row.diameter_mm, here.iter().map(bore_mm).fold(0.0, f64::max));
+    }
+    if rows.is_empty() || rows.windows(2).any(|pair| pair[1].z_mm <= pair[0].z_mm) {
+        return;
+    }
+    let (z, d): (Vec<f64>, Vec<f64>) = rows.iter().map(|row| (row.z_mm, row.diameter_mm)).unzip();
+    for (segment, ends) in job.shaft.segments.iter().zip(ends_mm.windows(2)) {
+        for (end, diameter_mm) in ends.iter().zip(interpolate(&z, &d, ends)) {
+            let next = z.partition_point(|row| row < end).min(z.len() - 1);
+            require(next, diameter_mm, bore_mm(segment));
+        }
     }
 }
 
@@ -251,8 +272,6 @@ fn held_without(job: &Job, left_out: usize) -> bool {
 
 /// Index of the steady rest that stands at a station.
 pub(super) fn steady_at(job: &Job, station_mm: f64) -> Option<usize> {
-    let tolerance = shaft::check::SAME_STATION * job.shaft.length_mm().max(1.0);
-    job.supports
-        .iter()
-        .position(|s| matches!(s, Support::SteadyRest { z_mm, .. } if (z_mm - station_mm).abs() <= tolerance))
+    let stands = |s: &Support| matches!(s, Support::SteadyRest { z_mm, .. } if places::same(*z_mm, station_mm));
+    job.supports.iter().position(stands)
 }

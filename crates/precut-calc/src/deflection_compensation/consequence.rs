@@ -7,17 +7,17 @@ use crate::effects::DeflectionEffect;
 
 use super::DeflectionCompensation;
 use super::forward::{CommandedPoint, DeflectionPoint, DeflectionRun};
-use super::grid::Grid;
-use super::input::{Detail, Job, Stations};
+use super::input::{Detail, IncludeMode, Job};
 
-/// Stations along every diameter: a half-wave between them is missed by less than 0.03 % of its height,
-/// (pi/128)^2/2.
-const STATIONS: u32 = 65;
-/// A shoulder's second station, beyond the first by this share of the length: places of a path ascend.
+/// Places along every diameter at which the turned shaft is looked at, beside the corners of the path: a half-wave between
+/// them is missed by less than 0.03 % of its height, (pi/128)^2/2.
+const PLACES: u32 = 65;
+/// A shoulder's second place, beyond the first by this share of the length: places of a path ascend.
 const BESIDE: f64 = 1e-6;
 
 /// Form and size of the shaft that is cut along the path compensated with `believed`, for each of `acting`. The path is
-/// that of one cut from the stock, as the diagnosis predicts it. Empty where that path has gaps.
+/// the one that the calculator puts out for one cut from the stock: straight moves within its tolerance, corners rounded to the
+/// control's increment. Empty where that path has gaps.
 pub(super) fn consequences(
     job: &Job,
     runs: &[DeflectionRun],
@@ -26,7 +26,7 @@ pub(super) fn consequences(
 ) -> Result<Vec<Consequence>, Failure> {
     let conditions = runs.first().cloned().unwrap_or_default();
     let Some(path) = compensated(job, &conditions, believed)? else { return Ok(Vec::new()) };
-    let points = path.iter().map(|point| (0, DeflectionPoint { z_mm: point.z_mm })).collect();
+    let points = looked_at(&path).into_iter().map(|z_mm| (0, DeflectionPoint { z_mm })).collect();
     let run = DeflectionRun {
         tool_path_at_start_m: conditions.tool_path_at_start_m,
         warm_time_at_start_min: conditions.warm_time_at_start_min,
@@ -59,7 +59,7 @@ pub(super) fn consequences(
     ])
 }
 
-/// The path compensated with these effects beside the job's own; `None` where a station has no command.
+/// The corners of the path driven with these effects beside the job's own; `None` where it is not complete.
 fn compensated(
     job: &Job,
     conditions: &DeflectionRun,
@@ -67,22 +67,36 @@ fn compensated(
 ) -> Result<Option<Vec<CommandedPoint>>, Failure> {
     let mut job = job.clone();
     job.passes.clear();
-    job.detail = Detail::Profile;
-    job.stations = Stations::PerZone { count: STATIONS };
-    let grid = Grid::of(&job);
-    let mut z_mm = grid.z_mm.clone();
-    for zone in &grid.zones {
-        z_mm[zone.first] += BESIDE * grid.length_mm;
-    }
-    job.stations = Stations::List { z_mm };
+    job.detail = Detail::Full;
+    // The path of the model that predicts: it takes the switches as they stand.
+    job.include.mode = IncludeMode::AsStated;
     job.effects.extend_from_slice(believed);
     job.conditions.tool_path_at_start_m = job.conditions.tool_path_at_start_m.or(conditions.tool_path_at_start_m);
     job.conditions.warm_time_at_start_min = job.conditions.warm_time_at_start_min.or(conditions.warm_time_at_start_min);
-    let stations = match DeflectionCompensation::run(&job, &Unwatched) {
-        Ok(answer) => answer.output.stations,
+    let path = match DeflectionCompensation::run(&job, &Unwatched) {
+        Ok(answer) => answer.output.path,
         Err(Failure::OutOfModel(_)) => return Ok(None),
         Err(failure) => return Err(failure),
     };
-    let each = stations.z_mm.iter().zip(&stations.commanded_diameter_mm);
-    Ok(each.map(|(&z_mm, diameter)| diameter.map(|diameter_mm| CommandedPoint { z_mm, diameter_mm })).collect())
+    let Some(path) = path.filter(|path| path.complete) else { return Ok(None) };
+    let length_mm: f64 = job.shaft.segments.iter().map(|segment| segment.length_mm).sum();
+    let mut corners: Vec<CommandedPoint> = Vec::new();
+    for zone in &path.zones {
+        for (&z_mm, &diameter_mm) in zone.z_mm.iter().zip(&zone.commanded_diameter_mm) {
+            let after = corners.last().map_or(z_mm, |before| before.z_mm + BESIDE * length_mm);
+            corners.push(CommandedPoint { z_mm: z_mm.max(after), diameter_mm });
+        }
+    }
+    Ok(Some(corners))
+}
+
+/// The corners of a path and places between them, ascending.
+fn looked_at(path: &[CommandedPoint]) -> Vec<f64> {
+    let (Some(first), Some(last)) = (path.first(), path.last()) else { return Vec::new() };
+    let share = |k: u32| f64::from(k) / f64::from(PLACES - 1);
+    let mut places: Vec<f64> = path.iter().map(|corner| corner.z_mm).collect();
+    places.extend((0..PLACES).map(|k| first.z_mm + share(k) * (last.z_mm - first.z_mm)));
+    places.sort_by(f64::total_cmp);
+    places.dedup();
+    places
 }

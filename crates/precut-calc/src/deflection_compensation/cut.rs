@@ -168,15 +168,19 @@ impl CutLine {
 
     /// The explicit command for the wanted radius.
     fn plan(&mut self, line: &Line, radii: &Radii, i: usize) {
+        let loads = self.loads.next(line, self.nominal_depth_mm[i]);
+        self.plan_at(line, radii, i, &loads);
+    }
+
+    fn plan_at(&mut self, line: &Line, radii: &Radii, i: usize, loads: &Loads) {
         let (target, depth) = (radii.target[i], self.nominal_depth_mm[i]);
-        let loads = self.loads.next(line, depth);
-        let opening = line.opening(i, &loads);
+        let opening = line.opening(i, loads);
         let command = command_radius_mm(target, opening.y_mm, opening.z_mm);
-        let slope = match command {
-            // S = r_t in the wanted state, so S' = ((r_c + Y) Y' + Z Z')/r_t.
-            Some(r_c) => ((r_c + opening.y_mm) * opening.y_slope + opening.z_mm * opening.z_slope) / target,
-            None => 0.0,
-        };
+        // S = r_t in the wanted state, so S' = ((r_c + Y) Y' + Z Z')/r_t.
+        let slope_at = |r_c: f64| ((r_c + opening.y_mm) * opening.y_slope + opening.z_mm * opening.z_slope) / target;
+        // Where the force falls so steeply that the tool is drawn in by itself, no command holds the depth.
+        let command = command.filter(|r_c| 1.0 + slope_at(*r_c) > 0.0);
+        let slope = command.map_or(0.0, slope_at);
         self.status_compensated.push(match command {
             None => StatusCompensated::NoSolution,
             Some(r_c) => status_of(depth, r_c),
@@ -202,7 +206,11 @@ impl CutLine {
                 end += 1;
             }
             self.loads.stations = end;
-            self.plan_run(line, radii, first..end, &loads);
+            if loads.passive_slope < 0.0 {
+                (first..end).for_each(|i| self.plan_at(line, radii, i, &loads));
+            } else {
+                self.plan_run(line, radii, first..end, &loads);
+            }
             first = end;
         }
     }
@@ -229,7 +237,9 @@ impl CutLine {
         let (target, stock) = (radii.target[i], radii.stock[i]);
         let commanded = stock - target;
         let guess = self.guess_mm(i, commanded);
-        let engagement = if self.exponent.is_some() {
+        let engagement = if radii.is_idle(i) {
+            Engagement::NoContact
+        } else if self.exponent.is_some() {
             solver.engage(i, stock, target, guess)
         } else {
             let linear_loss = commanded - guess;
@@ -290,8 +300,12 @@ impl CutLine {
             if i % STATIONS_PER_CHECK == 0 {
                 checkpoint(monitor)?;
             }
+            let stock = radii.stock[i];
+            if radii.is_idle(i) {
+                produced.push(Some(stock));
+                continue;
+            }
             produced.push(command.map(|command| {
-                let stock = radii.stock[i];
                 let engagement = solver.engage(i, stock, command, self.guess_mm(i, stock - command));
                 if let Engagement::Cut { residual_mm, .. } = engagement {
                     self.note(residual_mm);

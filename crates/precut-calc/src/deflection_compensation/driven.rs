@@ -1,26 +1,38 @@
 //! The path as programmed, and what it gives: at the stations of the answer and between them.
 //!
 //! The stations say where an answer is wanted. The path must hold the drawing everywhere, so it goes through stations of
-//! its own where those of the answer are few ([`Grid::refined`]), and what it leaves is looked for at all of them.
+//! its own where those of the answer are few or see only one side of a jump ([`Grid::refined`]), every pass on what the
+//! moves of the one before have left, and what the last one leaves is looked for at all of them.
 
 use crate::calculator::{Failure, Message, Monitor};
+use crate::turning::Proof;
 
 use super::acting::Acting;
 use super::columns::errors_um;
 use super::form::Form;
 use super::grid::{Grid, Refined};
 use super::input::Job;
-use super::output::Path;
-use super::stage::{Stage, all_cuts, in_reach};
-use super::toolpath;
+use super::model::Radii;
+use super::output::{PassOutcome, Path};
+use super::stage::{Along, Cuts, Stage, in_reach};
+use super::toolpath::{Drawn, drawn};
 
-/// The path as programmed and what it gives.
+/// The paths as programmed and what they give.
 pub(super) struct Driven {
+    /// Of the last cut.
     pub path: Path,
-    /// Radius that it produces at the stations of the answer, mm.
+    /// Every pass of several, at the stations of the answer.
+    pub passes: Vec<PassOutcome>,
+    /// The last cut at the stations of the answer.
+    pub stage: Stage,
+    /// Radius that is left at the stations of the answer, mm.
     pub produced_mm: Vec<Option<f64>>,
-    /// Form and size of all that it produces.
+    /// Form and size of all that is left.
     pub after: Form,
+    /// The program, where every station has a command.
+    pub drawn: Option<Drawn>,
+    /// What the program was seen to do.
+    pub proof: Option<Proof>,
 }
 
 /// A monitor of a part that is computed once more: it may be cancelled, its stages have been told already.
@@ -33,27 +45,59 @@ impl Monitor for Again<'_> {
     fn progress(&self, _fraction: f64, _stage: Message) {}
 }
 
-/// Cuts the command into straight moves and predicts what they give.
+/// Cuts the commands into straight moves, predicts what they give, and drives the program of them over the blank.
 pub(super) fn drive(
     job: &Job,
     grid: &Grid,
     acting: &Acting,
-    stage: &mut Stage,
+    look: &mut dyn FnMut(&Grid, &Stage, usize),
     monitor: &dyn Monitor,
 ) -> Result<Driven, Failure> {
-    let Some(Refined { grid: fine, own }) = grid.refined(job) else { return follow(job, grid, stage, monitor) };
-    let (mut along, _) = all_cuts(job, &fine, acting, &mut |_, _| (), &Again(monitor))?;
-    in_reach(&along)?;
-    let driven = follow(job, &fine, &mut along, monitor)?;
-    stage.cut.note(along.cut.residual_mm);
-    let produced_mm = own.iter().map(|&i| driven.produced_mm[i]).collect();
-    Ok(Driven { produced_mm, ..driven })
+    let Refined { grid: fine, own } = grid.refined(job);
+    let Cuts { stages, passes, paths, produced_mm } = Cuts::of(job, &fine, acting, Along::Moves, look, monitor)?;
+    let (Some(last), Some(path)) = (stages.last(), paths.last()) else {
+        return Err(Failure::Internal("no cut was computed".to_owned()));
+    };
+    in_reach(last)?;
+    let at = |values: &[f64]| own.iter().map(|&i| values[i]).collect::<Vec<f64>>();
+    let radii = Radii {
+        target: at(&last.radii.target),
+        stock: at(&last.radii.stock),
+        planned: last.radii.planned.as_deref().map(at),
+        idle: if last.radii.idle.is_empty() { Vec::new() } else { own.iter().map(|&i| last.radii.idle[i]).collect() },
+    };
+    let mut stage = Stage::of(job, grid, acting, last.regime, last.step, radii, monitor)?;
+    stage.cut.note(last.cut.residual_mm);
+    let after = Form::of(&fine.z_mm, &errors_um(&produced_mm, &last.radii));
+    let complete = paths.iter().all(|path| path.complete);
+    let (drawn, proof) = if complete {
+        let (drawn, driven) = drawn(job, &fine, &stages, &paths);
+        let proof = driven.proof(|i| last.radii.target[i], |i| produced_mm[i]);
+        (Some(drawn), proof)
+    } else {
+        (None, None)
+    };
+    Ok(Driven {
+        path: path.clone(),
+        passes: passes.into_iter().map(|pass| at_stations(pass, &own)).collect(),
+        stage,
+        produced_mm: own.iter().map(|&i| produced_mm[i]).collect(),
+        after,
+        drawn,
+        proof,
+    })
 }
 
-fn follow(job: &Job, grid: &Grid, stage: &mut Stage, monitor: &dyn Monitor) -> Result<Driven, Failure> {
-    let cut = &mut stage.cut;
-    let programmed = toolpath::programmed(job, grid, &cut.command_mm, &cut.status_compensated, monitor)?;
-    let produced_mm = cut.produced_mm(&stage.line, &stage.radii, &programmed.command_mm, monitor)?;
-    let after = Form::of(&grid.z_mm, &errors_um(&produced_mm, &stage.radii));
-    Ok(Driven { path: programmed.path, produced_mm, after })
+/// A pass at some of its stations; its form error stays that of all.
+fn at_stations(pass: PassOutcome, own: &[usize]) -> PassOutcome {
+    let at = |values: Vec<f64>| own.iter().map(|&i| values[i]).collect();
+    let some = |values: Vec<Option<f64>>| own.iter().map(|&i| values[i]).collect();
+    PassOutcome {
+        produced_diameter_mm: at(pass.produced_diameter_mm),
+        diameter_error_um: at(pass.diameter_error_um),
+        commanded_diameter_mm: some(pass.commanded_diameter_mm),
+        copying_factor: some(pass.copying_factor),
+        copied_so_far: some(pass.copied_so_far),
+        ..pass
+    }
 }

@@ -7,9 +7,6 @@ use crate::calculator::{Block, Finding, Program};
 
 use super::input::{Job, ProgramZero, Support};
 
-/// A tool that comes down in rapid motion keeps so far from what stands beside its place, mm.
-pub(crate) const BESIDE_MM: f64 = 0.1;
-
 /// How the tool meets a support.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Encounter {

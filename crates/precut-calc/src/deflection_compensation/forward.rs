@@ -9,6 +9,7 @@ use crate::calculator::{
 };
 use crate::effects::{Cause, DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect};
 use crate::num::beam::Profile;
+use crate::shaft::places;
 
 use super::DeflectionCompensation;
 use super::acting::{Acting, StructureChange};
@@ -203,7 +204,7 @@ impl ForwardModel for DeflectionCompensation {
     fn faults_of_point(job: &Job, point: &DeflectionPoint) -> Vec<Finding> {
         let length = job.shaft.length_mm();
         // Of a shaft without segments that alone is told.
-        let beside = length > 0.0 && !(0.0..=length).contains(&point.z_mm);
+        let beside = length > 0.0 && !places::within(point.z_mm, [0.0, length]);
         beside.then(|| outside_shaft("/z_mm".to_owned(), point.z_mm, length)).into_iter().collect()
     }
 
@@ -240,7 +241,9 @@ impl ForwardModel for DeflectionCompensation {
             return Err(PrepareError::Invalid(faults));
         }
         checkpoint(monitor).map_err(PrepareError::Failed)?;
-        let places: Vec<(usize, f64)> = rows.points.iter().map(|(run, point)| (*run, point.z_mm)).collect();
+        let ends_mm = job.shaft.ends_mm();
+        let settled = |(run, point): &(usize, DeflectionPoint)| (*run, places::settled(point.z_mm, &ends_mm));
+        let places: Vec<(usize, f64)> = rows.points.iter().map(settled).collect();
         Ok(PreparedDeflection {
             runs: prepared_runs(job, &rows.runs, &places).map_err(PrepareError::Failed)?,
             rows: rows.points.len(),
@@ -309,6 +312,16 @@ impl Diagnosable for DeflectionCompensation {
             job: include_str!("examples/diagnosis_guideway.json"),
         },
     ];
+
+    fn allowed(allowances: &DeflectionAllowances, normal: &mut dyn FnMut() -> f64) -> Vec<DeflectionEffect> {
+        // The next cut is a run of its own.
+        let force = allowances.force_level_rel.hypot(allowances.force_per_run_rel);
+        vec![
+            DeflectionEffect::ForceLevel { delta: force * normal() },
+            DeflectionEffect::BendingScale { delta: allowances.bending_rel * normal() },
+            DeflectionEffect::SizeOffset { offset_um: 0.5 * allowances.setup_diameter_um * normal() },
+        ]
+    }
 
     fn hypotheses(prepared: &PreparedDeflection) -> Hypotheses {
         Experiment { job: &prepared.job, runs: &prepared.conditions_of_runs }.hypotheses()
@@ -389,7 +402,7 @@ impl PreparedRun {
         let base_change = Acting::of(&job.effects, &conditions, regime.direction).structure;
         let base_profile = structure(&job, &base_change, &regime)?.beam.profile(&grid.z_mm, wanted(&job));
         Ok(Self {
-            radii: Radii { target, stock, planned: None },
+            radii: Radii { target, stock, planned: None, idle: Vec::new() },
             row_of_station: places.into_iter().map(|p| p.0).collect(),
             job,
             conditions,
@@ -531,11 +544,11 @@ impl PreparedDeflection {
     /// What a base that bends without shear leaves out: known, so it is allowed for rather than found.
     /// `None` where the base has it.
     fn neglected_shear(&self) -> Result<Option<JacobianColumn>, Failure> {
-        if self.job.shaft.theory == Theory::Timoshenko {
+        if self.job.shaft.theory() == Theory::Timoshenko {
             return Ok(None);
         }
         let mut with_shear = self.job.clone();
-        with_shear.shaft.theory = Theory::Timoshenko;
+        with_shear.shaft.theory = Some(Theory::Timoshenko);
         let runs = prepared_runs(&with_shear, &self.conditions_of_runs, &self.places)?;
         let without = DeflectionCompensation::predict(self, &[])?;
         Ok(Some(difference(&without, &predict(&runs, self.rows, self.measure, &[])?, 1.0)))

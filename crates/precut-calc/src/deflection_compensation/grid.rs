@@ -1,6 +1,6 @@
 //! Stations along the shaft, and the segments and zones that they belong to.
 
-use super::input::{Job, Segment, Stations};
+use super::input::{Job, Segment, Stations, Support};
 
 const UM_PER_MM: f64 = 1e3;
 
@@ -37,6 +37,27 @@ pub(super) struct Refined {
     pub own: Vec<usize>,
 }
 
+/// A place that the path needs a station at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Mark {
+    z_mm: f64,
+    kind: MarkKind,
+}
+
+/// What a place is, in the order in which those of one place stand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum MarkKind {
+    /// A station of the job.
+    Own,
+    /// The course of the command turns.
+    Kink,
+    /// The command may jump, or the tool leaves the work.
+    Jump,
+}
+
+/// Half of the distance over which a follow rest comes to the shaft, mm.
+const SIDE_MM: f64 = 1e-6;
+
 /// Neighbouring segments `first..end` of one drawing diameter.
 struct SegmentRun {
     first: usize,
@@ -52,7 +73,7 @@ impl Grid {
             segment: Vec::new(),
             zones: Vec::new(),
             length_mm: 0.0,
-            steps_mm: step_positions(segments),
+            steps_mm: job.shaft.ends_mm(),
         };
         grid.length_mm = grid.steps_mm[segments.len()];
         let runs = runs_of_one_diameter(segments);
@@ -112,12 +133,9 @@ impl Grid {
     }
 
     /// The stations with more among them for the path: from the first to the last one to both ends of whatever is turned
-    /// between them, none farther from the next than the default would place it. `None` where nothing is to be added.
-    pub(super) fn refined(&self, job: &Job) -> Option<Refined> {
-        if path_station_count(job) == 0 {
-            return None;
-        }
-        let (&first, &last) = (self.z_mm.first()?, self.z_mm.last()?);
+    /// between them, wherever the compliance has a kink, and none farther from the next than the default would place it.
+    /// Where what is commanded may jump, two stations share the place and the zone ends: its path is a path of its own.
+    pub(super) fn refined(&self, job: &Job) -> Refined {
         let mut fine = Self {
             z_mm: Vec::with_capacity(self.len()),
             segment: Vec::with_capacity(self.len()),
@@ -126,64 +144,153 @@ impl Grid {
             steps_mm: self.steps_mm.clone(),
         };
         let mut own = Vec::with_capacity(self.len());
+        let (Some(&first), Some(&last)) = (self.z_mm.first(), self.z_mm.last()) else {
+            return Refined { grid: fine, own };
+        };
+        let breaks = self.breaks(job);
         let mut zones = self.zones.iter().peekable();
         for run in runs_of_one_diameter(&job.shaft.segments) {
             let stations = zones.next_if(|zone| self.segment[zone.first] < run.end).map(|zone| zone.first..zone.end);
+            let known = stations.unwrap_or(0..0);
             let ends = [self.steps_mm[run.first], self.steps_mm[run.end]];
             let reached = is_turned(job, &run).then_some(ends);
             let reached = reached.map(|ends| ends.map(|z| (first <= z && z <= last).then_some(z)));
-            fine.add_run(self, &run, stations.unwrap_or(0..0), reached.unwrap_or_default(), job, &mut own);
+            let marks = self.marks(known, &run, reached.unwrap_or_default(), &breaks, job);
+            fine.add_run(&run, &marks, job.shaft.segments[run.first].diameter_mm, &mut own);
         }
-        (fine.len() > self.len()).then_some(Refined { grid: fine, own })
+        Refined { grid: fine, own }
     }
 
-    /// Adds the stations that `from` has of a run, its ends as far as they are reached, and more between.
-    fn add_run(
-        &mut self,
-        from: &Self,
+    /// Where the command has a kink or may jump, ascending.
+    fn breaks(&self, job: &Job) -> Vec<Mark> {
+        let mark = |z_mm, kind| Mark { z_mm, kind };
+        let segments = &job.shaft.segments;
+        let mut breaks: Vec<Mark> = Vec::new();
+        for (i, pair) in segments.windows(2).enumerate() {
+            let jumps = pair[0].stock_mm().to_bits() != pair[1].stock_mm().to_bits();
+            breaks.push(mark(self.steps_mm[i + 1], if jumps { MarkKind::Jump } else { MarkKind::Kink }));
+        }
+        let side = job.cut.feed_direction.comes_from();
+        for support in &job.supports {
+            match *support {
+                Support::FollowRest { offset_mm, .. } => {
+                    let met = self.steps_mm.iter().map(|z| mark(z - offset_mm, MarkKind::Kink));
+                    breaks.extend(met);
+                    // There it comes to the shaft, or leaves it.
+                    for end in [0.0, self.length_mm] {
+                        breaks.push(mark(end - offset_mm - SIDE_MM, MarkKind::Jump));
+                        breaks.push(mark(end - offset_mm + SIDE_MM, MarkKind::Kink));
+                    }
+                }
+                Support::SteadyRest { z_mm, .. } => {
+                    breaks.push(mark(z_mm, MarkKind::Kink));
+                    breaks.push(mark(super::toolpath::stop_before_mm(job, self.length_mm, z_mm, side), MarkKind::Jump));
+                }
+                Support::Centre { z_mm, .. } | Support::Chuck { z_mm, .. } => breaks.push(mark(z_mm, MarkKind::Kink)),
+            }
+        }
+        if let Some(profile) = &job.stock_profile {
+            breaks.extend(profile.rows().iter().map(|row| mark(row.z_mm, MarkKind::Kink)));
+        }
+        breaks.sort_by(|a, b| a.z_mm.total_cmp(&b.z_mm));
+        breaks
+    }
+
+    /// The stations of a run of segments that the path needs, ascending: its known ones, its ends, and the breaks between.
+    fn marks(
+        &self,
+        known: std::ops::Range<usize>,
         run: &SegmentRun,
-        stations: std::ops::Range<usize>,
         ends: [Option<f64>; 2],
+        breaks: &[Mark],
         job: &Job,
-        own: &mut Vec<usize>,
-    ) {
+    ) -> Vec<Mark> {
         let increment_mm = job.path.increment_um / UM_PER_MM;
-        let (known, of) = (&from.z_mm[stations.clone()], &from.segment[stations]);
-        let is_new = |z: f64| known.iter().all(|known| (known - z).abs() > increment_mm);
-        let [left, right] = ends.map(|end| end.filter(|z| is_new(*z)));
-        let left = left.map(|z| (z, run.first, false));
-        let right = right.map(|z| (z, run.end - 1, false));
-        let known = known.iter().zip(of).map(|(&z, &segment)| (z, segment, true));
-        let all: Vec<(f64, usize, bool)> = left.into_iter().chain(known).chain(right).collect();
-        let (Some(&(from_mm, ..)), Some(&(to_mm, ..))) = (all.first(), all.last()) else { return };
-        let spacing_mm = (to_mm - from_mm) / f64::from(PATH_INTERVALS);
-        let first = self.len();
-        for (k, &(z, segment, is_own)) in all.iter().enumerate() {
-            if let Some(&(before, ..)) = k.checked_sub(1).and_then(|k| all.get(k)) {
-                self.fill_between(before, z, spacing_mm);
+        let mut marks: Vec<Mark> = known.map(|i| Mark { z_mm: self.z_mm[i], kind: MarkKind::Own }).collect();
+        let is_new = |z: f64| marks.iter().all(|mark| (mark.z_mm - z).abs() > increment_mm);
+        let ends: Vec<Mark> =
+            ends.into_iter().flatten().filter(|z| is_new(*z)).map(|z_mm| Mark { z_mm, kind: MarkKind::Kink }).collect();
+        marks.extend(ends);
+        marks.sort_by(|a, b| a.z_mm.total_cmp(&b.z_mm));
+        let (Some(&Mark { z_mm: from, .. }), Some(&Mark { z_mm: to, .. })) = (marks.first(), marks.last()) else {
+            return marks;
+        };
+        let (from, to) = (from.max(self.steps_mm[run.first]), to.min(self.steps_mm[run.end]));
+        let inside = breaks.iter().filter(|mark| from + increment_mm < mark.z_mm && mark.z_mm < to - increment_mm);
+        marks.extend(inside.copied());
+        // A jump stands after a station of the job at the same place.
+        marks.sort_by(|a, b| a.z_mm.total_cmp(&b.z_mm).then(a.kind.cmp(&b.kind)));
+        marks.dedup_by(|later, kept| {
+            let gap = later.z_mm - kept.z_mm;
+            match (kept.kind, later.kind) {
+                (_, MarkKind::Kink) | (MarkKind::Jump, MarkKind::Jump) => gap <= increment_mm,
+                _ => false,
             }
-            if is_own {
-                own.push(self.len());
-            }
-            self.z_mm.push(z);
-            self.segment.push(segment);
-        }
-        self.zones.push(Zone { first, end: self.len(), diameter_mm: job.shaft.segments[run.first].diameter_mm });
+        });
+        marks
     }
 
-    /// Adds stations after the last one and before `to_mm`, evenly, no farther apart than `spacing_mm`.
-    fn fill_between(&mut self, from_mm: f64, to_mm: f64, spacing_mm: f64) {
-        let gap_mm = to_mm - from_mm;
-        let steps = if gap_mm > 0.0 { (gap_mm / spacing_mm - SPACING_SLACK).ceil() } else { 0.0 };
-        let mut segment = self.segment.last().copied().unwrap_or(0);
-        let places = (1..=PATH_INTERVALS).map(f64::from).take_while(|k| *k < steps);
-        for z in places.map(|k| from_mm + gap_mm * (k / steps)) {
-            while z > self.steps_mm[segment + 1] {
-                segment += 1;
+    /// Adds the stations of a run: its marks, and more between.
+    fn add_run(&mut self, run: &SegmentRun, marks: &[Mark], diameter_mm: f64, own: &mut Vec<usize>) {
+        let (Some(&Mark { z_mm: from_mm, .. }), Some(&Mark { z_mm: to_mm, .. })) = (marks.first(), marks.last()) else {
+            return;
+        };
+        let spacing_mm = (to_mm - from_mm) / f64::from(PATH_INTERVALS);
+        let mut first = self.len();
+        let mut segment = run.first;
+        for (k, &Mark { z_mm: z, kind }) in marks.iter().enumerate() {
+            if let Some(before) = k.checked_sub(1).map(|k| marks[k].z_mm) {
+                let gap_mm = z - before;
+                let steps = if gap_mm > 0.0 { (gap_mm / spacing_mm - SPACING_SLACK).ceil() } else { 0.0 };
+                for at in (1..=PATH_INTERVALS)
+                    .map(f64::from)
+                    .take_while(|k| *k < steps)
+                    .map(|k| before + gap_mm * (k / steps))
+                {
+                    self.add(at, &mut segment, run);
+                }
             }
-            self.z_mm.push(z);
-            self.segment.push(segment);
+            let is_there = self.len() > first && self.z_mm.last().is_some_and(|last| last.to_bits() == z.to_bits());
+            if kind != MarkKind::Jump || !is_there {
+                self.add(z, &mut segment, run);
+            }
+            if kind == MarkKind::Own {
+                own.push(self.len() - 1);
+            }
+            if kind == MarkKind::Jump {
+                self.zones.push(Zone { first, end: self.len(), diameter_mm });
+                first = self.len();
+                // The other side belongs to the segment that begins there.
+                if z >= self.steps_mm[segment + 1] && segment + 1 < run.end {
+                    segment += 1;
+                }
+                self.z_mm.push(z);
+                self.segment.push(segment);
+            }
         }
+        self.zones.push(Zone { first, end: self.len(), diameter_mm });
+    }
+
+    fn add(&mut self, z_mm: f64, segment: &mut usize, run: &SegmentRun) {
+        while z_mm > self.steps_mm[*segment + 1] && *segment + 1 < run.end {
+            *segment += 1;
+        }
+        self.z_mm.push(z_mm);
+        self.segment.push(*segment);
+    }
+
+    /// Runs of stations in neighbouring segments of one drawing and one blank: the tool comes to a piece or does not.
+    pub(super) fn pieces(&self, segments: &[Segment]) -> Vec<std::ops::Range<usize>> {
+        let key = |segment: usize| (segments[segment].diameter_mm.to_bits(), segments[segment].stock_mm().to_bits());
+        let (mut pieces, mut first) = (Vec::new(), 0);
+        for (i, pair) in self.segment.windows(2).enumerate() {
+            if pair[0] != pair[1] && (pair[1] != pair[0] + 1 || key(pair[0]) != key(pair[1])) {
+                pieces.push(first..i + 1);
+                first = i + 1;
+            }
+        }
+        pieces.push(first..self.len());
+        pieces
     }
 
     /// Stretches of what is turned that lie before the first station or beyond the last, mm.
@@ -235,23 +342,15 @@ pub(super) fn station_count(job: &Job) -> usize {
     }
 }
 
-/// At most how many stations the path goes through beside the job's own, without making them.
+/// At most about how many stations the path goes through beside the job's own, without making them.
 pub(super) fn path_station_count(job: &Job) -> usize {
     let runs = runs_of_one_diameter(&job.shaft.segments).len();
-    match &job.stations {
+    let between = match &job.stations {
         Stations::PerZone { count } if *count > PATH_INTERVALS => 0,
         _ => runs * PATH_INTERVALS as usize,
-    }
-}
-
-fn step_positions(segments: &[Segment]) -> Vec<f64> {
-    let mut steps = vec![0.0];
-    let mut z = 0.0;
-    for segment in segments {
-        z += segment.length_mm;
-        steps.push(z);
-    }
-    steps
+    };
+    let rows = job.stock_profile.as_ref().map_or(0, |profile| profile.rows().len());
+    between + 2 * job.shaft.segments.len() + 4 * job.supports.len() + rows
 }
 
 /// Diameters are compared as the drawing has them: equal numbers are one zone.

@@ -221,6 +221,7 @@ pub(super) fn design(job: &Job, places: &[(usize, f64)]) -> Design {
         cell,
         regressors: Vec::new(),
         groupings: Vec::new(),
+        conditions: Vec::new(),
         order: None,
         fold: places.iter().map(|(run, _)| *run).collect(),
     }

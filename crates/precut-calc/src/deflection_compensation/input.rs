@@ -6,7 +6,7 @@ use utoipa::openapi::extensions::Extensions;
 use utoipa::openapi::schema::{ArrayBuilder, ObjectBuilder, SchemaType, Type};
 use utoipa::{PartialSchema, ToSchema};
 
-use crate::calculator::{Dialect, Measured, MeasuredRow};
+use crate::calculator::{Dialect, Measured, MeasuredRow, ProgramEnd};
 use crate::effects::{DeflectionConditions, DeflectionEffect};
 use crate::force::ForceModel;
 pub use crate::shaft::{Carriage, FeedDirection, Section, Segment, Shaft, Support, Theory};
@@ -80,6 +80,14 @@ pub struct Job {
     #[serde(default)]
     #[schema(extensions(("x-group" = json!("cut")), ("x-advanced" = json!(true))))]
     pub limits: Limits,
+    /// Axial force with which the tailstock presses; it adds to the feed force in the margin to buckling.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.0, maximum = 1_000_000.0, example = 1500.0, extensions(("x-unit" = json!("N")), ("x-symbol" = json!("F_t")), ("x-group" = json!("machine")), ("x-advanced" = json!(true))))]
+    pub tailstock_thrust_n: Option<f64>,
+    /// Whether the one-step formula of the source paper is shown beside the exact command, with what it would leave.
+    #[serde(default)]
+    #[schema(default = false, example = true, extensions(("x-group" = json!("numerics")), ("x-advanced" = json!(true))))]
+    pub compare_one_step: bool,
     /// Named physical effects that act beside the base model; a kind occurs once.
     #[serde(default)]
     #[schema(max_items = 22, extensions(("x-group" = json!("effects"))))]
@@ -130,18 +138,45 @@ pub enum SpeedDiameter {
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Include {
+    /// What becomes of the switches that are not said: these two, the shaft's section and its theory.
+    #[serde(default)]
+    #[schema(default = "auto", example = "auto")]
+    pub mode: IncludeMode,
     /// The main force bends the shaft across the radial direction.
-    #[serde(default)]
-    #[schema(default = false, example = true)]
-    pub tangential: bool,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = true)]
+    pub tangential: Option<bool>,
     /// The feed force bends the shaft by its moment about the axis.
-    #[serde(default)]
-    #[schema(default = false, example = true)]
-    pub axial_moment: bool,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = true)]
+    pub axial_moment: Option<bool>,
     /// The shaft sags under its own weight.
     #[serde(default)]
     #[schema(default = false, example = true)]
     pub weight: bool,
+}
+
+impl Include {
+    /// Whether the main force's bending acts.
+    pub(super) fn tangential(&self) -> bool {
+        self.tangential == Some(true)
+    }
+
+    /// Whether the feed force's moment acts.
+    pub(super) fn axial_moment(&self) -> bool {
+        self.axial_moment == Some(true)
+    }
+}
+
+/// What becomes of switches that a job does not say.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum IncludeMode {
+    /// On where the effect changes the diameter by more than a tenth of the tolerance, without one of the uncertainty.
+    #[default]
+    Auto,
+    /// Off.
+    AsStated,
 }
 
 /// Gravity as the lathe stands.
@@ -355,6 +390,33 @@ pub struct ProgramSettings {
     #[serde(default = "limit_rpm")]
     #[schema(minimum = 1.0, maximum = 200_000.0, default = 3000.0, example = 3000.0, extensions(("x-unit" = json!("rev/min")), ("x-symbol" = json!("n_max"))))]
     pub spindle_limit_rpm: f64,
+    /// Number of the tool and of its offset, called at the head of the program. Without it the program calls none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1, maximum = 99, example = 3, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("T"))))]
+    pub tool_number: Option<u32>,
+    /// Whether the program switches the coolant.
+    #[serde(default)]
+    #[schema(default = false, example = true)]
+    pub coolant: bool,
+    /// Where the tool goes at the begin, for stops and at the end. Without it the tool stays beside the work.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub safe_position: Option<SafePosition>,
+    /// How the program ends. Default: what the control expects, `M30`, for LinuxCNC `M2`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = "m30")]
+    pub end: Option<ProgramEnd>,
+}
+
+/// A place clear of work, chuck and tailstock, in the program's coordinates.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SafePosition {
+    /// X, a diameter.
+    #[schema(minimum = 0.0, maximum = 20_000.0, example = 250.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("X"))))]
+    pub x_diameter_mm: f64,
+    /// Z from the program's zero.
+    #[schema(minimum = -100_000.0, maximum = 100_000.0, example = 150.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("Z"))))]
+    pub z_mm: f64,
 }
 
 fn five_mm() -> f64 {
@@ -377,6 +439,10 @@ impl Default for ProgramSettings {
             clearance_x_mm: five_mm(),
             clearance_z_mm: two_mm(),
             spindle_limit_rpm: limit_rpm(),
+            tool_number: None,
+            coolant: false,
+            safe_position: None,
+            end: None,
         }
     }
 }

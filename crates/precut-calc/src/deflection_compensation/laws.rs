@@ -73,7 +73,9 @@ impl StationLaws {
             .iter()
             .map(|law| law.passive_power().filter(|(_, z)| same(*z)).map(|(factor, _)| factor))
             .collect();
-        (exponent > 0.0 && exponent <= MAX_EXPONENT).then_some(PowerLine { factors_n: factors_n?, exponent })
+        // Beyond an edge angle of 90 degrees a sharp corner is pulled in: that force falls.
+        let rises = self.laws.iter().all(|law| law.passive_power().is_some_and(|(factor, _)| factor >= 0.0));
+        (rises && exponent > 0.0 && exponent <= MAX_EXPONENT).then_some(PowerLine { factors_n: factors_n?, exponent })
     }
 
     #[inline]

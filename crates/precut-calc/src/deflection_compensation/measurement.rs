@@ -50,6 +50,7 @@ fn one() -> u32 {
 
 impl MeasuredRow for DeflectionMeasurement {
     const MAX_ROWS: usize = 20_000;
+    const MEASURED: &'static [&'static str] = &["diameter_deviation_um", "radius_deviation_um", "diameter_mm"];
 }
 
 impl Measurement for DeflectionMeasurement {

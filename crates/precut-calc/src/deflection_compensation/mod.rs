@@ -14,6 +14,7 @@
 
 mod acting;
 mod advice;
+mod auto;
 mod check;
 mod columns;
 mod consequence;
@@ -36,22 +37,25 @@ mod picture;
 mod power_cut;
 mod regime;
 mod second_order;
+mod soundness;
 mod stage;
 mod structure;
 mod toolpath;
 
-pub(crate) use encounters::{BESIDE_MM, Reach, chuck_in_the_way, met};
+pub use auto::Automatic;
+pub(crate) use encounters::{Reach, chuck_in_the_way, met};
+pub(crate) use equilibrium::{Opening, engage};
 pub use form::{Deviation, Extremum, ExtremumKind, Form, FormClass};
 pub use forward::{DeflectionAllowances, DeflectionPoint, DeflectionRun};
 pub use input::{
-    Carriage, Cut, Detail, FeedDirection, Gravity, Include, Job, Limits, MAX_STATIONS, Pass, PathSettings,
-    ProgramSettings, ProgramZero, Section, Segment, Shaft, SpeedDiameter, Stations, StockRow, Support, Theory,
-    Tolerance, Uncertainty,
+    Carriage, Cut, Detail, FeedDirection, Gravity, Include, IncludeMode, Job, Limits, MAX_STATIONS, Pass, PathSettings,
+    ProgramSettings, ProgramZero, SafePosition, Section, Segment, Shaft, SpeedDiameter, Stations, StockRow, Support,
+    Theory, Tolerance, Uncertainty,
 };
 pub use measurement::DeflectionMeasurement;
 pub use output::{
-    OneMoreRest, OneStep, Outcome, PassOutcome, Path, PathZone, SecondOrder, Shares, StationColumns, StatusCompensated,
-    StatusUncompensated,
+    AddedSupport, OneMoreRest, OneStep, Outcome, PassOutcome, Path, PathZone, SecondOrder, Shares, StationColumns,
+    StatusCompensated, StatusUncompensated,
 };
 
 use crate::calculator::{
@@ -59,6 +63,8 @@ use crate::calculator::{
     Program, Table,
 };
 use crate::force;
+use crate::shaft::places;
+use crate::turning::Proof;
 
 use acting::Acting;
 use advice::SeenAlong;
@@ -81,7 +87,7 @@ impl Calculator for DeflectionCompensation {
     const META: Meta = Meta {
         id: "deflection-compensation",
         kind: CalculatorKind::Calculator,
-        version: 6,
+        version: 7,
         title: "Deflection compensation",
         question: "Where must the tool go so that the slender shaft comes out straight?",
         summary: "A slender shaft bends away from the tool, so less is cut than commanded. From shaft, supports, \
@@ -132,8 +138,14 @@ impl Calculator for DeflectionCompensation {
 
     fn fill(job: &mut Job) {
         job.shaft.fill();
+        let ends_mm = job.shaft.ends_mm();
         for support in &mut job.supports {
-            support.fill();
+            support.fill(&ends_mm);
+        }
+        if let Stations::List { z_mm } = &mut job.stations {
+            for z in z_mm {
+                *z = places::settled(*z, &ends_mm);
+            }
         }
         job.path.chord_tolerance_um = Some(toolpath::chord_tolerance_um(job));
         job.force.fill();
@@ -176,26 +188,36 @@ const COMPLIANCE_ACCURACY: f64 = 1e-9;
 
 fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
     crate::calculator::checkpoint(monitor)?;
+    let asked = job;
+    let (job, included_automatically) = auto::settled(asked, monitor)?;
+    let job = &*job;
     let grid = Grid::of(job);
     let acting = Acting::of(&job.effects, &job.conditions, job.cut.feed_direction);
     let mut of_passes = Vec::new();
-    let mut look = |stage: &Stage, number: usize| of_passes.extend(advice::of_pass(job, &grid, stage, number));
-    let (mut stage, passes) = all_cuts(job, &grid, &acting, &mut look, monitor)?;
-    in_reach(&stage)?;
-    let driven = match job.detail {
-        Detail::Profile => None,
+    let mut look =
+        |grid: &Grid, stage: &Stage, number: usize| of_passes.extend(advice::of_pass(job, grid, stage, number));
+    let (stage, passes, driven) = match job.detail {
+        Detail::Profile => {
+            let (stage, passes) = all_cuts(job, &grid, &acting, &mut look, monitor)?;
+            (stage, passes, None)
+        }
         Detail::Full => {
-            monitor.progress(0.6, Message::new("stage_path"));
-            Some(drive(job, &grid, &acting, &mut stage, monitor)?)
+            let Driven { stage, passes, path, produced_mm, after, drawn, proof } =
+                drive(job, &grid, &acting, &mut look, monitor)?;
+            (stage, passes, Some(Along { path, produced_mm, after, drawn, proof }))
         }
     };
+    in_reach(&stage)?;
     monitor.progress(0.8, Message::new("stage_advice"));
     let errors = Errors::of(&stage, driven.as_ref().map(|driven| driven.produced_mm.as_slice()));
-    let mut outcome =
-        Assembly { job, grid: &grid, acting: &acting, stage: &stage }.outcome(driven, passes, &errors, monitor)?;
-    let warnings = advice::warnings(job, &grid, &acting, &stage, &outcome);
-    let warnings = advice::with_earlier(warnings, of_passes);
+    let (drawn, driven) = driven.map(|along| (along.drawn, (along.path, along.after, along.proof))).unzip();
+    let mut outcome = Assembly { asked, job, grid: &grid, acting: &acting, stage: &stage }
+        .outcome(driven, passes, &errors, monitor)?;
+    outcome.included_automatically = included_automatically;
     let uncertainty_um = uncertainty_um(job, &acting, &stage);
+    let drawn = drawn.flatten();
+    let warnings = advice::warnings(job, &grid, &acting, &stage, &outcome, drawn.as_ref(), &uncertainty_um);
+    let warnings = advice::with_earlier(warnings, of_passes);
     let seen_along = SeenAlong::of(&stage, &outcome.shares, &uncertainty_um);
     outcome.stations = columns(job, grid.z_mm, stage, errors, uncertainty_um);
     let explanation = advice::explanation(job, &outcome, &seen_along);
@@ -203,8 +225,19 @@ fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
     Ok(Answer { output: outcome, warnings, explanation, basis: basis(job) })
 }
 
+/// What is known of the program's path beside the cut at the stations of the answer.
+struct Along {
+    path: Path,
+    produced_mm: Vec<Option<f64>>,
+    after: Form,
+    drawn: Option<toolpath::Drawn>,
+    proof: Option<Proof>,
+}
+
 /// What an outcome is put together from.
 struct Assembly<'a> {
+    /// The job as it was asked, with the switches that it leaves open.
+    asked: &'a Job,
     job: &'a Job,
     grid: &'a Grid,
     acting: &'a Acting,
@@ -215,15 +248,18 @@ impl Assembly<'_> {
     /// All but the columns: they take over the arrays of the stage once nobody asks it any more.
     fn outcome(
         &self,
-        driven: Option<Driven>,
+        driven: Option<(Path, Form, Option<Proof>)>,
         passes: Vec<PassOutcome>,
         errors: &Errors,
         monitor: &dyn Monitor,
     ) -> Result<Outcome, Failure> {
-        let Self { job, grid, acting, stage } = *self;
+        let Self { asked, job, grid, acting, stage } = *self;
         let full = job.detail == Detail::Full;
         let before = Form::of(&grid.z_mm, &errors.uncompensated_um);
-        let (path, after) = driven.map(|driven| (driven.path, driven.after)).unzip();
+        let (path, after, proof) = match driven {
+            Some((path, after, proof)) => (Some(path), Some(after), proof),
+            None => (None, None, None),
+        };
         let most_deflected = advice::most_deflected(stage);
         let largest_mm = model::at(&stage.cut.y_mm, most_deflected).abs();
         Ok(Outcome {
@@ -235,10 +271,13 @@ impl Assembly<'_> {
             before,
             after,
             path,
+            proof,
             shares: advice::shares(job, grid, acting, stage, most_deflected)?,
             second_order: if full { Some(second_order::second_order(job, grid, acting, stage)?) } else { None },
-            one_more_rest: if full { advice::one_more_rest(job, grid, acting, stage, monitor)? } else { None },
-            one_step: (full && !stage.line.has_contacts())
+            one_more_rest: if full { advice::one_more_rest(asked, grid, acting, stage, monitor)? } else { None },
+            included_automatically: Vec::new(),
+            critical_speed_rpm: if full { soundness::critical_speed_rpm(job, stage)? } else { None },
+            one_step: (full && job.compare_one_step && !stage.line.has_contacts())
                 .then(|| one_step(&stage.line, &stage.radii, &stage.cut, job.force.depth_exponent())),
             passes,
             numerical_error_um: 2.0 * (stage.cut.residual_mm + COMPLIANCE_ACCURACY * largest_mm) * UM_PER_MM,
@@ -271,15 +310,13 @@ fn basis(job: &Job) -> Vec<Basis> {
 /// Everything that this calculator may utter, from where it is said.
 const CODES: Codes = Codes {
     faults: &[check::CODES, crate::shaft::check::CODES, force::FAULT_CODES],
-    failures: &[&[
-        "path_incomplete",
-        "path_not_computed",
-        "pass_without_command",
-        "numbers_out_of_reach",
-        "tool_hits_chuck",
-    ]],
-    warnings: &[advice::WARNING_CODES, second_order::WARNING_CODES, force::WARNING_CODES],
+    failures: &[
+        &["path_incomplete", "path_not_computed", "pass_without_command", "numbers_out_of_reach", "tool_hits_chuck"],
+        Proof::CODES,
+        force::FAILURE_CODES,
+    ],
+    warnings: &[advice::WARNING_CODES, soundness::WARNING_CODES, second_order::WARNING_CODES, force::WARNING_CODES],
     explanations: &[advice::EXPLANATION_CODES],
-    stages: &[&["stage_pass", "stage_path", "stage_advice", "stage_done"]],
+    stages: &[&["stage_pass", "stage_advice", "stage_done"]],
     labels: &[picture::LABEL_CODES],
 };

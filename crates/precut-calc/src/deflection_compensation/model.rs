@@ -73,9 +73,17 @@ pub(super) struct Radii {
     pub stock: Vec<f64>,
     /// Stock that the compensation is planned on, and the cutting speed counted with, where it is not the real one.
     pub planned: Option<Vec<f64>>,
+    /// Where the tool does not come, since nothing was planned to be cut; empty where it comes everywhere.
+    pub idle: Vec<bool>,
 }
 
 impl Radii {
+    /// Whether the tool does not come to a station.
+    #[inline]
+    pub(super) fn is_idle(&self, i: usize) -> bool {
+        self.idle.get(i).copied().unwrap_or(false)
+    }
+
     /// Stock that the compensation is planned on.
     pub(super) fn planned(&self) -> &[f64] {
         self.planned.as_ref().unwrap_or(&self.stock)
@@ -114,12 +122,12 @@ impl Line {
         }
         let sign = couple_sign(regime.direction);
         let arm_mm: Vec<f64> =
-            if include.axial_moment { radii.target.iter().map(|r| sign * r).collect() } else { Vec::new() };
+            if include.axial_moment() { radii.target.iter().map(|r| sign * r).collect() } else { Vec::new() };
         // Without the moment the beam was not asked for the couple: both are empty.
         let moment_mm_per_n = arm_mm.iter().zip(&couple_per_n).map(|(arm, g)| arm * g).collect();
         let carriage = structure.carriage_tangential_mm_per_n;
         let tangential_mm_per_n =
-            if include.tangential { tangential_mm_per_n.iter().map(|w| w + carriage).collect() } else { Vec::new() };
+            if include.tangential() { tangential_mm_per_n.iter().map(|w| w + carriage).collect() } else { Vec::new() };
         let (gravity_tangential, gravity_radial) = gravity_components(job);
         let error_mm = errors_mm(from);
         let (sag_mm, tangential_offset_mm) = if include.weight {
@@ -132,7 +140,7 @@ impl Line {
         };
         let laws = StationLaws::of(from);
         let closed_at_zero = !include.weight && !acting.has_errors() && laws.vanish_with_depth();
-        let only_passive = !include.tangential && !include.axial_moment && !include.weight && contacts.is_none();
+        let only_passive = !include.tangential() && !include.axial_moment() && !include.weight && contacts.is_none();
         let power = only_passive.then(|| laws.power()).flatten();
         Self {
             work_mm_per_n: radial_mm_per_n,
@@ -147,7 +155,7 @@ impl Line {
             arm_mm,
             laws,
             with_main: needs_main(include),
-            with_feed: include.axial_moment,
+            with_feed: include.axial_moment(),
             closed_at_zero,
             power,
         }
@@ -367,12 +375,12 @@ fn sag_in_contact_mm(contacts: &Contacts, i: usize, load: ToolLoad) -> f64 {
 
 /// What of the beam's profile the job's physics needs.
 pub(super) fn wanted(job: &Job) -> Wanted {
-    Wanted { tangential: job.include.tangential, couple: job.include.axial_moment, weight: job.include.weight }
+    Wanted { tangential: job.include.tangential(), couple: job.include.axial_moment(), weight: job.include.weight }
 }
 
 /// Whether the main force acts on anything that is computed.
 fn needs_main(include: &Include) -> bool {
-    include.tangential
+    include.tangential()
 }
 
 /// Sign of the feed force's couple: fed to the headstock the tool pushes the work toward -z at u = -r_t, a couple

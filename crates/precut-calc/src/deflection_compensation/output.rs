@@ -3,7 +3,9 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::auto::Automatic;
 use super::form::Form;
+use crate::turning::Proof;
 
 /// What will come out of the cut, and where the tool must go.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -30,16 +32,25 @@ pub struct Outcome {
     pub after: Option<Form>,
     /// Everything along the shaft; of the last pass where there are several.
     pub stations: StationColumns,
-    /// The commanded path in straight moves; only with `detail: full`.
+    /// The commanded path in straight moves, of the last pass where there are several; only with `detail: full`.
     pub path: Option<Path>,
+    /// The program of all passes, driven over the blank before it is given out; only with `detail: full`, and where there is a
+    /// program.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub proof: Option<Proof>,
     /// What yields, at the station that deflects most.
     pub shares: Shares,
     /// Effects of second order on the diameter, whether switched on or not; only with `detail: full`.
     pub second_order: Option<SecondOrder>,
-    /// What one more steady rest would do; only with `detail: full`.
+    /// Effects that act although the job does not say so.
+    pub included_automatically: Vec<Automatic>,
+    /// First critical speed of the held shaft in bending, rests that bear on one side away; only with `detail: full`.
+    #[schema(extensions(("x-unit" = json!("rev/min"))))]
+    pub critical_speed_rpm: Option<f64>,
+    /// What one more steady rest would do, or a tailstock where the end that yields most is free; only with `detail: full`.
     pub one_more_rest: Option<OneMoreRest>,
-    /// The one-step formula of the source paper beside the exact command; only with `detail: full` and without
-    /// one-sided rests, for which the formula has no compliance.
+    /// The one-step formula of the source paper beside the exact command; only with `compare_one_step`, `detail: full`
+    /// and without one-sided rests, for which the formula has no compliance.
     pub one_step: Option<OneStep>,
     /// Every pass where there are several.
     pub passes: Vec<PassOutcome>,
@@ -172,7 +183,7 @@ impl StatusCompensated {
 /// The commanded path in straight moves.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Path {
-    /// One polyline for every turned zone, along the shaft.
+    /// One polyline for every turned zone, along the shaft; a new one wherever the command may jump.
     pub zones: Vec<PathZone>,
     /// Moves in all zones.
     #[schema(extensions(("x-unit" = json!("1"))))]
@@ -187,7 +198,7 @@ pub struct Path {
     pub complete: bool,
 }
 
-/// Polyline of one zone of constant drawing diameter.
+/// Polyline of one zone of constant drawing diameter, or of a part of it between jumps.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct PathZone {
     /// Drawing diameter of the zone.
@@ -246,14 +257,16 @@ pub struct SecondOrder {
     /// Shear deformation.
     #[schema(extensions(("x-unit" = json!("um"))))]
     pub shear_um: Option<f64>,
-    /// Axial thrust over the buckling load.
+    /// Axial thrust, of the feed and of the tailstock, over the buckling load.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub thrust_ratio: Option<f64>,
 }
 
-/// A bilateral steady rest more, as compliant as the stiffest carrying support, where the shaft deflects most.
+/// One support more, as compliant as the stiffest carrying one, where the shaft deflects most.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct OneMoreRest {
+    /// A bilateral steady rest; a centre, the tailstock's, where the end that deflects most is free.
+    pub kind: AddedSupport,
     /// Where it would stand.
     #[schema(extensions(("x-unit" = json!("mm"))))]
     pub z_mm: f64,
@@ -263,6 +276,16 @@ pub struct OneMoreRest {
     /// Form error without compensation that it would leave.
     #[schema(extensions(("x-unit" = json!("um"))))]
     pub form_error_um: f64,
+}
+
+/// What is put under a shaft.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum AddedSupport {
+    /// A steady rest.
+    SteadyRest,
+    /// A centre at a free end.
+    Centre,
 }
 
 /// The paper's one-step formula t_calc = a + y i (`deflection/4.3`), and what it leaves.
@@ -311,4 +334,7 @@ pub struct PassOutcome {
     /// Copying factors of this and all passes before, multiplied: what is left of a deviation of the blank.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub copied_so_far: Vec<Option<f64>>,
+    /// The path of the pass in straight moves, as programmed; only with `detail: full`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub path: Option<Path>,
 }

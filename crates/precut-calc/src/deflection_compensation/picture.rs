@@ -221,7 +221,7 @@ fn with_compensation(stations: &StationColumns, after: &[Option<f64>]) -> Item {
 pub(super) fn tables(job: &Job, outcome: &Outcome) -> Vec<Table> {
     vec![
         Table { id: "stations", columns: station_columns(&outcome.stations) },
-        super::toolpath::path_table(job, outcome.path.as_ref()),
+        super::toolpath::path_table(job, outcome),
         increments_table(outcome),
         one_step_table(outcome),
         passes_table(outcome),

@@ -183,7 +183,7 @@ pub(super) fn section_of_pass(job: &Job, uncut_side: bool) -> Section {
     if uncut_side {
         Section::Mixed
     } else if job.passes.is_empty() {
-        job.shaft.section
+        job.shaft.section()
     } else {
         Section::Finished
     }

@@ -46,7 +46,7 @@ pub(super) fn second_order(job: &Job, grid: &Grid, acting: &Acting, stage: &Stag
         let changed = State::of(job, acting, stage, &structure, &sample, wanted(job))?;
         Ok(sample.largest(|place| changed.moved_mm(place, include) - state.moved_mm(place, include)))
     };
-    let other_theory = match job.shaft.theory {
+    let other_theory = match job.shaft.theory() {
         Theory::EulerBernoulli => Theory::Timoshenko,
         Theory::Timoshenko => Theory::EulerBernoulli,
     };
@@ -54,12 +54,12 @@ pub(super) fn second_order(job: &Job, grid: &Grid, acting: &Acting, stage: &Stag
     let other_section = if section == Section::Mixed { Section::Finished } else { Section::Mixed };
     let (main, feed) = (job.force.has_main(), job.force.has_feed());
     Ok(SecondOrder {
-        tangential_um: main.then(|| with_include(|include| include.tangential = !include.tangential)),
-        axial_moment_um: feed.then(|| with_include(|include| include.axial_moment = !include.axial_moment)),
+        tangential_um: main.then(|| with_include(|include| include.tangential = Some(!include.tangential()))),
+        axial_moment_um: feed.then(|| with_include(|include| include.axial_moment = Some(!include.axial_moment()))),
         weight_um: Some(with_include(|include| include.weight = !include.weight)),
-        partly_turned_um: Some(change_by(other_section, job.shaft.theory)?),
+        partly_turned_um: Some(change_by(other_section, job.shaft.theory())?),
         shear_um: Some(change_by(section, other_theory)?),
-        thrust_ratio: feed.then(|| thrust_ratio(job, &sample)),
+        thrust_ratio: (feed || job.tailstock_thrust_n.is_some()).then(|| thrust_ratio(job, &sample)),
     })
 }
 
@@ -106,7 +106,7 @@ impl State {
         let (across, along) = if include.weight { self.gravity } else { (0.0, 0.0) };
         let load = ToolLoad {
             force_n: loads.passive_n,
-            couple_n_mm: if include.axial_moment { self.sign * target_mm * loads.feed_n } else { 0.0 },
+            couple_n_mm: if include.axial_moment() { self.sign * target_mm * loads.feed_n } else { 0.0 },
             gravity_radial: along,
         };
         let y = match &profile.contacts {
@@ -117,7 +117,7 @@ impl State {
                     + at(&profile.sag_radial_mm, k) * load.gravity_radial
             }
         };
-        let main_n = if include.tangential { loads.main_n } else { 0.0 };
+        let main_n = if include.tangential() { loads.main_n } else { 0.0 };
         let z = (at(&profile.tangential_mm_per_n, k) + self.carriage_tangential_mm_per_n) * main_n
             + at(&profile.sag_tangential_mm, k) * across;
         y + at(&self.displaced.work_mm, k) + z * z / (2.0 * target_mm)
@@ -162,7 +162,7 @@ impl Sample {
     }
 }
 
-/// N/N_cr with N_cr = pi² E J/l² between supports, a quarter of it for a chuck alone, J of the thinnest segment.
+/// N/N_cr, N the feed force and the thrust of the tailstock together, with N_cr = pi² E J/l² between supports, a quarter of it for a chuck alone, J of the thinnest segment.
 fn thrust_ratio(job: &Job, sample: &Sample) -> f64 {
     let thinnest =
         |segment: &Segment| crate::num::beam::second_moment_mm4(segment.diameter_mm, segment.bore_diameter_mm);
@@ -172,7 +172,8 @@ fn thrust_ratio(job: &Job, sample: &Sample) -> f64 {
     let cantilever = carrying < 2 && job.supports.iter().any(|s| matches!(s, Support::Chuck { .. }));
     let fixity = if cantilever { 0.25 } else { 1.0 };
     let critical = fixity * PI * PI * job.shaft.modulus() * j / (length * length);
-    sample.places.iter().map(|place| place.loads.feed_n).fold(0.0, f64::max) / critical
+    let feed_n = sample.places.iter().map(|place| place.loads.feed_n).fold(0.0, f64::max);
+    (feed_n + job.tailstock_thrust_n.unwrap_or(0.0)) / critical
 }
 
 /// Warnings about effects that are switched off although they would take a noticeable share of the tolerance.
@@ -187,11 +188,11 @@ pub(super) fn left_out(job: &Job, acting: &Acting, stage: &Stage, sizes: &Second
         ("partly_turned_in_passes", "/passes")
     };
     [
-        ("tangential", "/include/tangential", sizes.tangential_um, job.include.tangential),
-        ("axial_moment", "/include/axial_moment", sizes.axial_moment_um, job.include.axial_moment),
+        ("tangential", "/include/tangential", sizes.tangential_um, job.include.tangential()),
+        ("axial_moment", "/include/axial_moment", sizes.axial_moment_um, job.include.axial_moment()),
         ("weight", "/include/weight", sizes.weight_um, job.include.weight),
         (partly_turned, section, sizes.partly_turned_um, mixed),
-        ("shear", "/shaft/theory", sizes.shear_um, job.shaft.theory == Theory::Timoshenko),
+        ("shear", "/shaft/theory", sizes.shear_um, job.shaft.theory() == Theory::Timoshenko),
     ]
     .into_iter()
     .filter_map(|(name, pointer, size, on)| {

@@ -3,14 +3,16 @@
 use crate::calculator::{Failure, Finding, Message, Monitor};
 
 use super::acting::Acting;
+use super::advice::within_reach_of_law;
 use super::cut::CutLine;
 use super::equilibrium::copying_factor;
 use super::grid::{Grid, interpolate};
 use super::input::Job;
 use super::model::{Ingredients, Line, Radii, wanted};
-use super::output::PassOutcome;
+use super::output::{PassOutcome, Path};
 use super::regime::{Regime, Step, passages, section_of_pass};
 use super::structure::{Structure, Variant, pass_diameter_mm};
+use super::toolpath::{Programmed, programmed};
 
 const UM_PER_MM: f64 = 1e3;
 
@@ -51,7 +53,9 @@ impl Stage {
         };
         let line = Line::of(&ingredients, structure.beam.profile(&grid.z_mm, wanted(job)));
         let cut = CutLine::of(&line, &radii, monitor)?;
-        Ok(Self { regime, structure, radii, line, cut, step })
+        let stage = Self { regime, structure, radii, line, cut, step };
+        within_reach_of_law(job, &stage)?;
+        Ok(stage)
     }
 
     /// How the structure of this cut differs from the job as it stands.
@@ -59,21 +63,14 @@ impl Stage {
         variant(job, acting, &self.regime, self.step.pass_mm)
     }
 
-    /// Deviation that the cut leaves on the radius when the path is followed that the pass asks for.
-    fn outcome(&mut self, compensated: bool, monitor: &dyn Monitor) -> Result<(Vec<f64>, Vec<Option<f64>>), Failure> {
-        let commands: Vec<Option<f64>> = if compensated {
-            self.cut.command_mm.clone()
-        } else {
-            self.radii.target.iter().copied().map(Some).collect()
-        };
-        let produced = self.cut.produced_mm(&self.line, &self.radii, &commands, monitor)?;
-        let produced: Option<Vec<f64>> = produced.into_iter().collect();
-        let produced = produced.ok_or_else(|| {
-            Failure::OutOfModel(
-                Finding::new("pass_without_command", "/passes").with("diameter_mm", self.step.pass_mm.unwrap_or(0.0)),
-            )
-        })?;
-        Ok((produced, commands))
+    /// Radius that the cut leaves along commands.
+    fn left_by(&mut self, commands: &[Option<f64>], monitor: &dyn Monitor) -> Result<Vec<Option<f64>>, Failure> {
+        self.cut.produced_mm(&self.line, &self.radii, commands, monitor)
+    }
+
+    /// Exact commands: compensated, or the nominal line.
+    fn commands(&self, compensated: bool) -> Vec<Option<f64>> {
+        if compensated { self.cut.command_mm.clone() } else { self.radii.target.iter().copied().map(Some).collect() }
     }
 }
 
@@ -119,52 +116,142 @@ fn target_radii_mm(job: &Job, grid: &Grid, pass_mm: Option<f64>) -> Vec<f64> {
     grid.segment.iter().map(|&i| pass_diameter_mm(&job.shaft.segments[i], pass_mm) / 2.0).collect()
 }
 
-/// All cuts of a job: all passes as outcomes, none where there is one cut only, and the last cut as a stage. `look` is shown
-/// every pass before the last, with its number.
+/// All cuts of a job along their exact commands: the last cut as a stage, and all passes as outcomes, none where there is one
+/// cut only. `look` is shown every pass before the last, with its number.
 pub(super) fn all_cuts(
     job: &Job,
     grid: &Grid,
     acting: &Acting,
-    look: &mut dyn FnMut(&Stage, usize),
+    look: &mut dyn FnMut(&Grid, &Stage, usize),
     monitor: &dyn Monitor,
 ) -> Result<(Stage, Vec<PassOutcome>), Failure> {
-    let base = Regime::of(&job.cut);
-    let mut stock = stock_radii_mm(job, grid);
-    if job.passes.is_empty() {
-        // The stock of a single cut is known: depth and speed follow it.
-        let radii = Radii { target: target_radii_mm(job, grid, None), stock, planned: None };
-        let last = Stage::of(job, grid, acting, base, Step::default(), radii, monitor)?;
-        return Ok((last, Vec::new()));
+    let mut cuts = Cuts::of(job, grid, acting, Along::Exact, look, monitor)?;
+    match cuts.stages.pop() {
+        Some(last) => Ok((last, cuts.passes)),
+        None => Err(Failure::Internal("no cut was computed".to_owned())),
     }
-    let mut planned = planned_stock_radii_mm(job, grid, &stock);
-    let mut outcomes: Vec<PassOutcome> = Vec::new();
-    let mut last: Option<Stage> = None;
-    for (k, pass) in job.passes.iter().enumerate() {
-        let share = |k: usize| k as f64 / job.passes.len() as f64;
-        monitor.progress(share(k), Message::new("stage_pass").with("pass", k + 1).with("of", job.passes.len()));
-        let regime = base.of_pass(pass);
-        let step = match &last {
-            None => Step::first(pass.diameter_mm),
-            Some(before) => before.step.next(job, &before.regime, pass.diameter_mm),
-        };
-        // Where the blank is thinner than the pass there is nothing to be cut.
-        let target: Vec<f64> =
-            target_radii_mm(job, grid, step.pass_mm).iter().zip(&planned).map(|(t, p)| t.min(*p)).collect();
-        let radii = Radii { target: target.clone(), stock, planned: Some(planned) };
-        let mut stage = Stage::of(job, grid, acting, regime, step, radii, monitor)?;
-        let (produced, commands) = stage.outcome(pass.compensated, monitor)?;
-        outcomes.push(pass_outcome(&stage, pass.compensated, &produced, &commands, outcomes.last()));
-        if k + 1 < job.passes.len() {
-            look(&stage, k + 1);
+}
+
+/// What the tool follows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Along {
+    /// The exact command of every station.
+    Exact,
+    /// The moves of the program.
+    Moves,
+}
+
+/// The cuts of a job, each on what the one before it has left.
+pub(super) struct Cuts {
+    pub stages: Vec<Stage>,
+    /// One for every pass of several.
+    pub passes: Vec<PassOutcome>,
+    /// One for every cut along moves.
+    pub paths: Vec<Path>,
+    /// Radius that the last cut leaves, mm.
+    pub produced_mm: Vec<Option<f64>>,
+}
+
+impl Cuts {
+    pub(super) fn of(
+        job: &Job,
+        grid: &Grid,
+        acting: &Acting,
+        along: Along,
+        look: &mut dyn FnMut(&Grid, &Stage, usize),
+        monitor: &dyn Monitor,
+    ) -> Result<Self, Failure> {
+        let base = Regime::of(&job.cut);
+        let mut stock = stock_radii_mm(job, grid);
+        let mut cuts = Self { stages: Vec::new(), passes: Vec::new(), paths: Vec::new(), produced_mm: Vec::new() };
+        if job.passes.is_empty() {
+            // The stock of a single cut is known: depth and speed follow it.
+            let target = target_radii_mm(job, grid, None);
+            let idle = idle(job, grid, &stock, &target);
+            let radii = Radii { target, stock, planned: None, idle };
+            let mut stage = Stage::of(job, grid, acting, base, Step::default(), radii, monitor)?;
+            if along == Along::Moves {
+                let commands = cuts.commands(job, grid, &stage, true, along, monitor)?;
+                cuts.produced_mm = stage.left_by(&commands, monitor)?;
+            }
+            cuts.stages.push(stage);
+            return Ok(cuts);
         }
-        stock = produced;
-        planned = target;
-        last = Some(stage);
+        let mut planned = planned_stock_radii_mm(job, grid, &stock);
+        for (k, pass) in job.passes.iter().enumerate() {
+            let share = |k: usize| k as f64 / job.passes.len() as f64;
+            monitor.progress(share(k), Message::new("stage_pass").with("pass", k + 1).with("of", job.passes.len()));
+            let regime = base.of_pass(pass);
+            let step = match cuts.stages.last() {
+                None => Step::first(pass.diameter_mm),
+                Some(before) => before.step.next(job, &before.regime, pass.diameter_mm),
+            };
+            // Where the blank is thinner than the pass there is nothing to be cut.
+            let target: Vec<f64> =
+                target_radii_mm(job, grid, step.pass_mm).iter().zip(&planned).map(|(t, p)| t.min(*p)).collect();
+            let idle = idle(job, grid, &planned, &target);
+            let radii = Radii { target: target.clone(), stock, planned: Some(planned), idle };
+            let mut stage = Stage::of(job, grid, acting, regime, step, radii, monitor)?;
+            let commands = cuts.commands(job, grid, &stage, pass.compensated, along, monitor)?;
+            cuts.produced_mm = stage.left_by(&commands, monitor)?;
+            let is_last = k + 1 == job.passes.len();
+            let produced = known(&cuts.produced_mm, &stage)?;
+            let mut outcome = pass_outcome(&stage, pass.compensated, &produced, &commands, cuts.passes.last());
+            outcome.path = cuts.paths.last().cloned();
+            cuts.passes.push(outcome);
+            if !is_last {
+                look(grid, &stage, k + 1);
+            }
+            stock = produced;
+            planned = target;
+            if along == Along::Exact {
+                cuts.stages.clear();
+            }
+            cuts.stages.push(stage);
+        }
+        Ok(cuts)
     }
-    match last {
-        Some(last) => Ok((last, outcomes)),
-        None => Err(Failure::Internal("no pass was computed".to_owned())),
+
+    /// What the tool is told in a cut: nothing where it does not come.
+    fn commands(
+        &mut self,
+        job: &Job,
+        grid: &Grid,
+        stage: &Stage,
+        compensated: bool,
+        along: Along,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Option<f64>>, Failure> {
+        let exact = stage.commands(compensated);
+        if along == Along::Exact {
+            return Ok(exact);
+        }
+        let Programmed { path, command_mm } = programmed(job, grid, stage, compensated, &exact, monitor)?;
+        self.paths.push(path);
+        Ok(command_mm)
     }
+}
+
+/// Stations to which the tool does not come in a cut: nothing is planned to be cut in all of their piece.
+fn idle(job: &Job, grid: &Grid, planned: &[f64], target: &[f64]) -> Vec<bool> {
+    let mut idle = vec![false; grid.len()];
+    let mut any = false;
+    for piece in grid.pieces(&job.shaft.segments) {
+        if piece.clone().all(|i| planned[i] <= target[i]) {
+            idle[piece].fill(true);
+            any = true;
+        }
+    }
+    if any { idle } else { Vec::new() }
+}
+
+/// What a pass leaves, where every station has a command.
+fn known(produced: &[Option<f64>], stage: &Stage) -> Result<Vec<f64>, Failure> {
+    produced.iter().copied().collect::<Option<Vec<f64>>>().ok_or_else(|| {
+        Failure::OutOfModel(
+            Finding::new("pass_without_command", "/passes").with("diameter_mm", stage.step.pass_mm.unwrap_or(0.0)),
+        )
+    })
 }
 
 /// Refuses a cut whose numbers overflow.
@@ -213,5 +300,6 @@ fn pass_outcome(
         copying_factor: copying,
         form_error_um: high - low,
         copied_so_far,
+        path: None,
     }
 }

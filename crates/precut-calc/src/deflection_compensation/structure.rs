@@ -35,11 +35,11 @@ pub(super) struct Variant<'a> {
 impl<'a> Variant<'a> {
     /// The job as it stands, with the structural effects in it.
     pub(super) fn of(job: &Job, change: &'a StructureChange) -> Self {
-        let section = if change.uncut_side { Section::Mixed } else { job.shaft.section };
+        let section = if change.uncut_side { Section::Mixed } else { job.shaft.section() };
         Self {
             change,
             section,
-            theory: job.shaft.theory,
+            theory: job.shaft.theory(),
             direction: job.cut.feed_direction,
             pass_diameter_mm: None,
             touching: &[],

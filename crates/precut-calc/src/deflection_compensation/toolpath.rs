@@ -1,19 +1,27 @@
 //! The commanded path in straight moves, and the program that drives it.
 
-use crate::calculator::{Block, Column, Failure, Finding, Monitor, Program, Table};
+use crate::calculator::{Column, Failure, Finding, Monitor, Program, Table, Unwatched};
 use crate::path::{round_to_increment, simplified};
+use crate::turning::{self, Limits, Point, Rest, Setting, Stretch, Surface, Written, Yielding};
 
-use super::encounters::{BESIDE_MM, hit_chuck};
-use super::grid::{Grid, Zone};
-use super::input::{FeedDirection, Job, ProgramZero, Segment};
+use super::acting::Acting;
+use super::auto;
+use super::driven::drive;
+use super::encounters::hit_chuck;
+use super::grid::{Grid, Zone, interpolate};
+use super::input::{FeedDirection, Job, ProgramSettings, ProgramZero, Support};
+use super::model::Solver;
 use super::output::{Outcome, Path, PathZone, StatusCompensated};
 use super::regime::{Regime, Speed};
+use super::stage::Stage;
 
 const UM_PER_MM: f64 = 1e3;
 /// Chord tolerance where the job states neither it nor a tolerance of form, um on the radius.
 const DEFAULT_CHORD_UM: f64 = 1.0;
 /// Share of the form tolerance that the chords may use up.
 const CHORD_SHARE: f64 = 0.1;
+/// Beside the increment, a program may be so far from the prediction: rounding of what both compute, um.
+const PREDICTED_UM: f64 = 0.1;
 
 /// The path and, per station, the radius that it really commands.
 pub(super) struct Programmed {
@@ -30,43 +38,45 @@ pub(super) fn chord_tolerance_um(job: &Job) -> f64 {
     })
 }
 
-/// Cuts the exact commands into the fewest straight moves, zone by zone; never across a shoulder.
+/// Cuts the commands of a cut into the fewest straight moves, zone by zone: never across a shoulder, nor where they jump.
 pub(super) fn programmed(
     job: &Job,
     grid: &Grid,
+    stage: &Stage,
+    compensated: bool,
     exact_mm: &[Option<f64>],
-    status: &[StatusCompensated],
     monitor: &dyn Monitor,
 ) -> Result<Programmed, Failure> {
     let tolerance_um = chord_tolerance_um(job);
     let increment_mm = job.path.increment_um / UM_PER_MM;
+    let status = &stage.cut.status_compensated;
+    let has_command =
+        |i: usize| !compensated || matches!(status[i], StatusCompensated::Ok | StatusCompensated::NoStock);
     let mut command_mm: Vec<Option<f64>> = vec![None; grid.len()];
     let mut zones = Vec::new();
     let mut achieved: Option<f64> = None;
+    let mut complete = true;
     for zone in &grid.zones {
         let stations = zone.first..zone.end;
-        let usable =
-            status[stations.clone()].iter().all(|s| matches!(s, StatusCompensated::Ok | StatusCompensated::NoStock));
-        let radii: Option<Vec<f64>> = exact_mm[stations.clone()].iter().copied().collect();
-        let (true, Some(radii)) = (usable, radii) else { continue };
-        // Where no station has anything to be cut, the tool does not come: nothing is left undone there.
-        if status[stations.clone()].iter().all(|s| matches!(s, StatusCompensated::NoStock)) {
-            command_mm[stations].copy_from_slice(&exact_mm[zone.first..zone.end]);
+        // Where nothing is planned to be cut the tool does not come: nothing is left undone there.
+        if stations.clone().all(|i| stage.radii.is_idle(i)) {
             continue;
         }
+        let radii: Option<Vec<f64>> = exact_mm[stations.clone()].iter().copied().collect();
+        let (true, Some(radii)) = (stations.clone().all(has_command), radii) else {
+            complete = false;
+            continue;
+        };
         let z_mm = &grid.z_mm[stations];
         let chords = simplified(z_mm, &radii, tolerance_um / UM_PER_MM, increment_mm, monitor)?;
         let corners: Vec<f64> = chords.vertices.iter().map(|&v| z_mm[v]).collect();
         let half: Vec<f64> = chords.diameters_mm.iter().map(|d| d / 2.0).collect();
         achieved = Some(achieved.map_or(chords.deviation_mm, |most| most.max(chords.deviation_mm)));
-        for (slot, r) in
-            command_mm[zone.first..zone.end].iter_mut().zip(super::grid::interpolate(&corners, &half, z_mm))
-        {
+        for (slot, r) in command_mm[zone.first..zone.end].iter_mut().zip(interpolate(&corners, &half, z_mm)) {
             *slot = Some(r);
         }
         zones.push(path_zone(zone, corners, chords.diameters_mm, job.path.increment_um));
     }
-    let complete = command_mm.iter().all(Option::is_some);
     let moves = zones.iter().map(|z| z.z_mm.len().saturating_sub(1)).sum::<usize>();
     let path = Path {
         zones,
@@ -85,7 +95,8 @@ fn path_zone(zone: &Zone, z_mm: Vec<f64>, commanded_diameter_mm: Vec<f64>, incre
     PathZone { diameter_mm: zone.diameter_mm, z_mm, commanded_diameter_mm, delta_x_um }
 }
 
-/// The program of the (last) cut; none for a path with gaps, and none that would take the tool through a chuck.
+/// The program of all cuts; none for a path with gaps, none that would take the tool through a chuck, and none that was
+/// not seen to do what the answer says.
 pub(super) fn program(job: &Job, outcome: &Outcome) -> Result<Program, Failure> {
     let Some(path) = &outcome.path else {
         return Err(Failure::OutOfModel(Finding::new("path_not_computed", "/detail")));
@@ -101,11 +112,19 @@ pub(super) fn program(job: &Job, outcome: &Outcome) -> Result<Program, Failure> 
             Finding::new("path_incomplete", "/stations").with("stations", without).with("first_z_mm", z),
         ));
     }
-    let program = drawn(job, path);
-    match hit_chuck(job, &program) {
-        Some(chuck) => Err(Failure::OutOfModel(chuck)),
-        None => Ok(program),
+    // With the effects that act in the answer, not only those that the job states.
+    let (job, _) = auto::settled(job, &Unwatched)?;
+    let job = &*job;
+    let acting = Acting::of(&job.effects, &job.conditions, job.cut.feed_direction);
+    let driven = drive(job, &Grid::of(job), &acting, &mut |_, _, _| (), &Unwatched)?;
+    let (Some(drawn), Some(proof)) = (driven.drawn, driven.proof) else {
+        return Err(Failure::Internal("a complete path has no program".to_owned()));
+    };
+    if let Some(chuck) = hit_chuck(job, &drawn.written.program) {
+        return Err(Failure::OutOfModel(chuck));
     }
+    proof.holds(&drawn.limits)?;
+    Ok(drawn.written.program)
 }
 
 /// The first station of the answer that no zone of the path reaches, mm; 0 where there is none.
@@ -118,189 +137,218 @@ fn first_without_path_mm(outcome: &Outcome, path: &Path) -> f64 {
     stations.find(|&z| !path.zones.iter().any(|zone| reaches(zone, z))).unwrap_or(0.0)
 }
 
-/// The moves along a path: every zone with its own approach and retract, in the order of the feed.
-pub(super) fn drawn(job: &Job, path: &Path) -> Program {
-    Writer::new(job, &last_regime(job)).write(path)
+/// The program along paths, and what it is held against.
+pub(super) struct Drawn {
+    pub written: Written,
+    pub limits: Limits,
+    stretches: Vec<Stretch>,
+    zero_mm: f64,
 }
 
-fn last_regime(job: &Job) -> Regime {
-    job.passes.last().map_or_else(|| Regime::of(&job.cut), |pass| Regime::of(&job.cut).of_pass(pass))
-}
-
-/// Warns of every place where the program along a path feeds the tool in radially.
-pub(super) fn plunges(job: &Job, path: &Path) -> Vec<Finding> {
-    let regime = last_regime(job);
-    let writer = Writer::new(job, &regime);
-    let zones = corners_in_feed_order(path, regime.direction);
-    let starts = zones.iter().enumerate().filter_map(|(k, corners)| Some((k, *corners.first()?)));
-    let plunge = |z_mm: f64, diameter_mm: f64| {
-        Finding::new("plunge_at_shoulder", "/shaft/segments")
-            .value(z_mm, "mm")
-            .with("z_program_mm", writer.programmed_z(z_mm))
-            .with("diameter_mm", diameter_mm)
-    };
-    starts
-        .filter(|(k, (z_mm, x_mm))| writer.is_blocked_before(*z_mm, *x_mm, &zones[..*k]))
-        .map(|(_, (z_mm, x_mm))| plunge(z_mm, x_mm))
-        .collect()
-}
-
-struct Writer<'a> {
-    job: &'a Job,
-    regime: &'a Regime,
-    length_mm: f64,
-    increment_mm: f64,
-    /// Largest diameter of the blank.
-    widest_mm: f64,
-    retract_mm: f64,
-    blocks: Vec<Block>,
-}
-
-impl<'a> Writer<'a> {
-    fn new(job: &'a Job, regime: &'a Regime) -> Self {
-        let increment_mm = job.path.increment_um / UM_PER_MM;
-        let profile = job.stock_profile.iter().flat_map(|p| p.rows().iter().map(|row| row.diameter_mm));
-        let widest = job.shaft.segments.iter().map(Segment::stock_mm).chain(profile).fold(0.0, f64::max);
-        Self {
-            job,
-            regime,
-            length_mm: job.shaft.segments.iter().map(|s| s.length_mm).sum(),
+impl ProgramSettings {
+    /// How a program of these settings is written, for a shaft of this length.
+    pub(crate) fn setting(
+        &self,
+        increment_mm: f64,
+        zero_mm: f64,
+        direction: FeedDirection,
+        supports: &[Support],
+    ) -> Setting {
+        let rest = |support: &Support| match *support {
+            Support::SteadyRest { z_mm, .. } => Some(Rest { z_mm }),
+            _ => None,
+        };
+        Setting {
+            dialect: self.dialect,
             increment_mm,
-            widest_mm: widest,
-            retract_mm: rounded_up(widest + job.program.clearance_x_mm, increment_mm),
-            blocks: vec![Block::Modes],
+            zero_mm,
+            clearance_x_mm: self.clearance_x_mm,
+            clearance_z_mm: self.clearance_z_mm,
+            side: direction.comes_from(),
+            rests: supports.iter().filter_map(rest).collect(),
+            tool_number: self.tool_number,
+            coolant: self.coolant,
+            safe_position: self.safe_position.map(|safe| (safe.x_diameter_mm, safe.z_mm)),
+            end: self.end,
         }
-    }
-
-    fn write(mut self, path: &Path) -> Program {
-        self.blocks.push(match self.regime.speed {
-            Speed::Spindle(rpm) => Block::SpindleSpeed { rpm },
-            Speed::Surface(speed_m_per_min) => {
-                Block::SurfaceSpeed { speed_m_per_min, limit_rpm: self.job.program.spindle_limit_rpm }
-            }
-        });
-        let mut feed = Some(self.regime.feed_mm_per_rev);
-        let zones = corners_in_feed_order(path, self.regime.direction);
-        for (k, corners) in zones.iter().enumerate() {
-            self.zone(corners, &zones[..k], &mut feed);
-        }
-        self.blocks.push(Block::End);
-        Program { dialect: self.job.program.dialect, increment_mm: self.increment_mm, blocks: self.blocks }
-    }
-
-    fn zone(&mut self, corners: &[(f64, f64)], done: &[Corners], feed: &mut Option<f64>) {
-        let Some(&(first_z, first_x)) = corners.first() else { return };
-        // The tool feeds in radially where it cannot come down before the cut.
-        let clear = if self.is_blocked_before(first_z, first_x, done) { 0.0 } else { self.clearance() };
-        let approach_z = self.programmed_z(first_z + clear);
-        self.blocks.push(Block::Rapid { x_diameter_mm: Some(self.retract_mm), z_mm: Some(approach_z) });
-        if clear.abs() > 0.0 {
-            self.blocks.push(Block::Rapid { x_diameter_mm: Some(first_x), z_mm: None });
-        }
-        for &(z, x) in corners {
-            let z_mm = self.programmed_z(z);
-            self.blocks.push(Block::Cut { x_diameter_mm: x, z_mm, feed_mm_per_rev: feed.take() });
-        }
-        self.blocks.push(Block::Rapid { x_diameter_mm: Some(self.retract_mm), z_mm: None });
-    }
-
-    /// Signed distance of the approach before a cut along Z.
-    fn clearance(&self) -> f64 {
-        self.clearance_sign() * self.job.program.clearance_z_mm
-    }
-
-    fn clearance_sign(&self) -> f64 {
-        if self.regime.direction == FeedDirection::ToHeadstock { 1.0 } else { -1.0 }
-    }
-
-    /// Whether something as thick as the cut stands where the tool would come down before it; `done` are the zones
-    /// that are cut by then.
-    fn is_blocked_before(&self, z_mm: f64, x_mm: f64, done: &[Corners]) -> bool {
-        let side = self.clearance_sign();
-        // Rounded corners may stand a step off a shoulder, and no tool is as thin as a line.
-        let (near, far) =
-            (z_mm + side * self.increment_mm, z_mm + side * (self.increment_mm + BESIDE_MM) + self.clearance());
-        let (from, to) = (near.min(far), near.max(far));
-        let mut left = 0.0;
-        self.job.shaft.segments.iter().any(|segment| {
-            let right = left + segment.length_mm;
-            let stands = [from.max(left), to.min(right)];
-            left = right;
-            stands[0] < stands[1] && self.thickness_mm(segment, stands, done) >= x_mm
-        })
-    }
-
-    /// Diameter of a segment between two stations: the drawing's where a zone is cut already, else the blank's.
-    fn thickness_mm(&self, segment: &Segment, [from, to]: [f64; 2], done: &[Corners]) -> f64 {
-        let is_cut = done.iter().any(|corners| {
-            let ends = corners.first().zip(corners.last());
-            ends.is_some_and(|(a, b)| a.0.min(b.0) <= from && to <= a.0.max(b.0))
-        });
-        if is_cut {
-            segment.diameter_mm
-        } else if self.job.stock_profile.is_some() {
-            self.widest_mm
-        } else {
-            segment.stock_mm()
-        }
-    }
-
-    fn programmed_z(&self, z_mm: f64) -> f64 {
-        programmed_z_mm(self.job, self.length_mm, z_mm)
     }
 }
 
-/// Z of the program at a station: from the program's zero, rounded to the increment.
-fn programmed_z_mm(job: &Job, length_mm: f64, z_mm: f64) -> f64 {
-    let zero = match job.program.zero {
+/// How the program of a job is written.
+fn setting(job: &Job, length_mm: f64) -> Setting {
+    let increment_mm = job.path.increment_um / UM_PER_MM;
+    job.program.setting(increment_mm, zero_mm(job, length_mm), job.cut.feed_direction, &job.supports)
+}
+
+/// Station at which the tool leaves the work before a rest that it is to pass, mm.
+pub(super) fn stop_before_mm(job: &Job, length_mm: f64, rest_mm: f64, side: f64) -> f64 {
+    let zero = zero_mm(job, length_mm);
+    let beside = setting(job, length_mm).beside_z_mm();
+    round_to_increment(rest_mm + side * beside - zero, job.path.increment_um / UM_PER_MM) + zero
+}
+
+/// Writes the program along the paths of all cuts, and drives it over the blank.
+pub(super) fn drawn(job: &Job, grid: &Grid, stages: &[Stage], paths: &[Path]) -> (Drawn, turning::Driven) {
+    let setting = setting(job, grid.length_mm);
+    let stretches = stretches(job, grid, stages, paths);
+    let blank = blank(job, grid, stages);
+    let mut work = Work { solvers: stages.iter().map(|stage| stage.line.solver()).collect() };
+    let written = turning::write(&setting, &blank, &mut work, Vec::new(), &stretches);
+    let driven = turning::drive(&written, &blank, setting.zero_mm, &mut work);
+    let limits = Limits {
+        clearance_mm: setting.beside_x_mm().min(setting.beside_z_mm()),
+        beside_prediction_um: job.path.increment_um + PREDICTED_UM,
+    };
+    (Drawn { written, limits, stretches, zero_mm: setting.zero_mm }, driven)
+}
+
+/// The shaft as it yields in every cut.
+struct Work<'a> {
+    solvers: Vec<Solver<'a>>,
+}
+
+impl Yielding for Work<'_> {
+    fn left_mm(&mut self, cut: usize, station: usize, stands_mm: f64, command_mm: f64) -> f64 {
+        let start_mm = stands_mm - command_mm;
+        stands_mm - self.solvers[cut].engage(station, stands_mm, command_mm, start_mm).depth_mm()
+    }
+}
+
+/// The blank: the stations of the path, and what is not turned beside them.
+fn blank(job: &Job, grid: &Grid, stages: &[Stage]) -> Surface {
+    let stock = stages.first().map_or(&[][..], |stage| &stage.radii.stock[..]);
+    let mut points: Vec<Point> = Vec::with_capacity(grid.len() + 2 * job.shaft.segments.len());
+    let mut covered = 0.0;
+    let fill = |points: &mut Vec<Point>, from: f64, to: f64| {
+        for (segment, ends) in job.shaft.segments.iter().zip(grid.steps_mm.windows(2)) {
+            let (left, right) = (ends[0].max(from), ends[1].min(to));
+            if left < right {
+                let radius = |z: f64| profile_radius_mm(job, z).unwrap_or(0.5 * segment.stock_mm());
+                let rows = job.stock_profile.iter().flat_map(crate::calculator::Measured::rows).map(|row| row.z_mm);
+                let inside = rows.filter(|z| left < *z && *z < right);
+                let places = std::iter::once(left).chain(inside).chain(std::iter::once(right));
+                points.extend(places.map(|z_mm| Point { z_mm, radius_mm: radius(z_mm), station: None }));
+            }
+        }
+    };
+    for zone in &grid.zones {
+        fill(&mut points, covered, grid.z_mm[zone.first]);
+        let stations = zone.first..zone.end;
+        points.extend(stations.map(|i| Point { z_mm: grid.z_mm[i], radius_mm: stock[i], station: Some(i) }));
+        covered = grid.z_mm[zone.end - 1];
+    }
+    fill(&mut points, covered, grid.length_mm);
+    Surface::new(points)
+}
+
+fn profile_radius_mm(job: &Job, z_mm: f64) -> Option<f64> {
+    let rows = job.stock_profile.as_ref()?.rows();
+    let after = rows.partition_point(|row| row.z_mm < z_mm).clamp(1, rows.len().max(2) - 1);
+    let near = &rows[after - 1..(after + 1).min(rows.len())];
+    let (z, d): (Vec<f64>, Vec<f64>) = near.iter().map(|row| (row.z_mm, row.diameter_mm)).unzip();
+    interpolate(&z, &d, &[z_mm]).first().map(|d| 0.5 * d)
+}
+
+/// What is cut in one go, in the order of the program: pass by pass, every zone of a path.
+fn stretches(job: &Job, grid: &Grid, stages: &[Stage], paths: &[Path]) -> Vec<Stretch> {
+    let increment_mm = job.path.increment_um / UM_PER_MM;
+    let side = job.cut.feed_direction.comes_from();
+    let rests = job.supports.iter().filter_map(|support| match *support {
+        Support::SteadyRest { z_mm, .. } => Some(stop_before_mm(job, grid.length_mm, z_mm, side)),
+        _ => None,
+    });
+    let stops: Vec<f64> = rests.collect();
+    let mut all: Vec<Stretch> = Vec::new();
+    for (cut, (stage, path)) in stages.iter().zip(paths).enumerate() {
+        let mut before: Option<(f64, f64)> = None;
+        for (drawing_mm, corners) in corners_in_feed_order(path, stage.regime.direction) {
+            let (Some(&(from, _)), Some(&(to, _))) = (corners.first(), corners.last()) else { continue };
+            let touches =
+                before.is_some_and(|(at, of)| (at - from).abs() <= increment_mm && (of - drawing_mm).abs() <= 0.0);
+            let is_stop = stops.iter().any(|stop| (stop - from).abs() <= increment_mm);
+            let first = before.is_none() && paths.len() > 1;
+            all.push(Stretch {
+                goes_on: touches && !is_stop,
+                feed_mm_per_rev: stage.regime.feed_mm_per_rev,
+                speed: speed(&stage.regime, job),
+                cut,
+                notes: if first { vec![format!("pass {} of {}", cut + 1, paths.len())] } else { Vec::new() },
+                stop: None,
+                corners,
+            });
+            before = Some((to, drawing_mm));
+        }
+    }
+    all
+}
+
+fn speed(regime: &Regime, job: &Job) -> turning::Speed {
+    match regime.speed {
+        Speed::Spindle(rpm) => turning::Speed::Spindle(rpm),
+        Speed::Surface(speed) => turning::Speed::Surface(speed, job.program.spindle_limit_rpm),
+    }
+}
+
+impl Drawn {
+    /// Warns of every place where the program feeds the tool in radially, once each with the smallest diameter.
+    pub(super) fn plunges(&self, job: &Job) -> Vec<Finding> {
+        let increment_mm = job.path.increment_um / UM_PER_MM;
+        let mut places: Vec<(f64, f64)> = Vec::new();
+        for &(z, x) in self.written.plunges.iter().filter_map(|&k| self.stretches[k].corners.first()) {
+            match places.iter_mut().find(|(known, _)| (*known - z).abs() <= increment_mm) {
+                Some((_, least)) => *least = least.min(x),
+                None => places.push((z, x)),
+            }
+        }
+        let plunge = |(z_mm, diameter_mm): (f64, f64)| {
+            Finding::new("plunge_at_shoulder", "/shaft/segments")
+                .value(z_mm, "mm")
+                .with("z_program_mm", round_to_increment(z_mm - self.zero_mm, increment_mm))
+                .with("diameter_mm", diameter_mm)
+        };
+        places.into_iter().map(plunge).collect()
+    }
+}
+
+/// Station of the program's zero, mm.
+fn zero_mm(job: &Job, length_mm: f64) -> f64 {
+    match job.program.zero {
         ProgramZero::RightFace => length_mm,
         ProgramZero::LeftFace => 0.0,
-    };
-    round_to_increment(z_mm - zero, job.path.increment_um / UM_PER_MM)
+    }
 }
 
-/// To the next increment that is no less.
-fn rounded_up(diameter_mm: f64, increment_mm: f64) -> f64 {
-    let near = round_to_increment(diameter_mm, increment_mm);
-    if near < diameter_mm - 1e-9 { round_to_increment(near + increment_mm, increment_mm) } else { near }
-}
-
-/// Station and commanded diameter of a zone's corners.
-type Corners = Vec<(f64, f64)>;
+/// Drawing diameter of a zone, and station and commanded diameter of its corners.
+type Corners = (f64, Vec<(f64, f64)>);
 
 /// The corners of every zone, as the tool passes them.
 fn corners_in_feed_order(path: &Path, direction: FeedDirection) -> Vec<Corners> {
-    let mut zones: Vec<Corners> = path
-        .zones
-        .iter()
-        .map(|zone| zone.z_mm.iter().copied().zip(zone.commanded_diameter_mm.iter().copied()).collect())
-        .collect();
+    let corners = |zone: &PathZone| zone.z_mm.iter().copied().zip(zone.commanded_diameter_mm.iter().copied()).collect();
+    let mut zones: Vec<Corners> = path.zones.iter().map(|zone| (zone.diameter_mm, corners(zone))).collect();
     if direction == FeedDirection::ToHeadstock {
         zones.reverse();
-        for corners in &mut zones {
+        for (_, corners) in &mut zones {
             corners.reverse();
         }
     }
     zones
 }
 
-/// The path as a table, in the order of the feed: station, drawing's diameter, and the program's X and Z.
-pub(super) fn path_table(job: &Job, path: Option<&Path>) -> Table {
-    let length_mm: f64 = job.shaft.segments.iter().map(|s| s.length_mm).sum();
+/// The paths of all passes as a table, in the order of the program: station, drawing's diameter, and the program's X and Z.
+pub(super) fn path_table(job: &Job, outcome: &Outcome) -> Table {
+    let zero_mm = zero_mm(job, job.shaft.length_mm());
+    let increment_mm = job.path.increment_um / UM_PER_MM;
+    let of_passes: Vec<&Path> = outcome.passes.iter().filter_map(|pass| pass.path.as_ref()).collect();
+    let paths = if of_passes.is_empty() { outcome.path.iter().collect() } else { of_passes };
     let (mut station, mut drawing, mut x, mut z) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    let empty =
-        Path { zones: Vec::new(), moves: 0, chord_tolerance_um: 0.0, achieved_deviation_um: None, complete: true };
-    let path = path.unwrap_or(&empty);
-    let mut diameters: Vec<f64> = path.zones.iter().map(|zone| zone.diameter_mm).collect();
-    if job.cut.feed_direction == FeedDirection::ToHeadstock {
-        diameters.reverse();
-    }
-    for (corners, diameter) in corners_in_feed_order(path, job.cut.feed_direction).into_iter().zip(diameters) {
-        for (at, commanded) in corners {
-            station.push(at);
-            drawing.push(diameter);
-            x.push(commanded);
-            z.push(programmed_z_mm(job, length_mm, at));
+    for path in paths {
+        for (diameter, corners) in corners_in_feed_order(path, job.cut.feed_direction) {
+            for (at, commanded) in corners {
+                station.push(at);
+                drawing.push(diameter);
+                x.push(commanded);
+                z.push(round_to_increment(at - zero_mm, increment_mm));
+            }
         }
     }
     Table {

@@ -2,24 +2,30 @@
 
 use super::law::{Component, DepthLaw, Law, Power};
 use super::sine_integral::SineIntegral;
-use super::{Forces, Reached, rules};
+use super::{Forces, Range, ReachedCut, rules};
 use crate::calculator::{Basis, Finding, Violations};
 use crate::material::{self, Certainty};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+/// Edge angles below this one are those of tools, degrees.
+const MOST_EDGE_ANGLE_DEG: f64 = 120.0;
+/// Beyond what the sources of specific forces cover: depth, mm (judgement: longer edges are not made), feed, mm/rev, and
+/// speed, m/min (the law does not know it; measured with carbide).
+const LARGEST: (f64, f64, f64) = (20.0, 2.5, 400.0);
 /// Largest specific force that the schema allows, N/mm2.
 const MOST_SPECIFIC_FORCE_N_PER_MM2: f64 = 100_000.0;
 
 /// Specific force over local chip thickness along the edge and its nose. Equation `deflection/6.2`.
 ///
-/// Valid for a lead angle up to 90 degrees and a feed well below the nose radius; the trailing edge
-/// and the scallop are left out. The force does not depend on the cutting speed.
+/// Valid for a lead angle below 120 degrees and a feed well below the nose radius; the trailing edge
+/// and the scallop are left out. Beyond 90 degrees the straight edge pulls the work towards the tool: the passive force
+/// falls with the depth. The force does not depend on the cutting speed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Kienzle {
     /// Lead angle (cutting edge angle) of the straight edge.
-    #[schema(exclusive_minimum = 0, maximum = 90, example = 75.0,
+    #[schema(exclusive_minimum = 0, exclusive_maximum = 120, example = 95.0,
         extensions(("x-unit" = json!("deg")), ("x-symbol" = json!("kappa")), ("x-group" = json!("cut"))))]
     pub cutting_edge_angle_deg: f64,
     /// Nose radius; 0 for a sharp corner.
@@ -65,8 +71,8 @@ pub struct Kienzle {
 impl Kienzle {
     pub(super) fn check(&self, pointer: &str, violations: &mut Violations) {
         let angle = self.cutting_edge_angle_deg;
-        violations.require(rules::positive(angle) && angle <= 90.0, || {
-            rules::bad_lead_angle(angle, format!("{pointer}/cutting_edge_angle_deg"))
+        violations.require(rules::positive(angle) && angle < MOST_EDGE_ANGLE_DEG, || {
+            rules::bad_lead_angle(angle, ("below", MOST_EDGE_ANGLE_DEG), format!("{pointer}/cutting_edge_angle_deg"))
         });
         violations.require(rules::not_negative(self.nose_radius_mm), || {
             rules::bad_nose_radius(self.nose_radius_mm, "minimum", format!("{pointer}/nose_radius_mm"))
@@ -117,12 +123,17 @@ impl Kienzle {
         DepthLaw::new(law.simplified(), self.wear_factor, self.rubbing.unwrap_or_default())
     }
 
-    pub(super) fn extrapolations(&self, feed: Reached) -> Vec<Finding> {
+    pub(super) fn extrapolations(&self, cut: &ReachedCut) -> Vec<Finding> {
         let radius = self.nose_radius_mm;
+        let feed = cut.feed_mm_per_rev;
         let exceeds = radius > 0.0 && feed.largest >= radius;
         let finding =
             || Finding::new("feed_exceeds_nose_radius", feed.pointer).measured(feed.largest, radius, "mm/rev");
-        exceeds.then(finding).into_iter().collect()
+        exceeds.then(finding).into_iter().chain(cut.outside(&Self::range())).collect()
+    }
+
+    pub(super) fn range() -> Range {
+        Range { depth_mm: (0.0, LARGEST.0), feed_mm_per_rev: (0.0, LARGEST.1), speed_m_per_min: (0.0, LARGEST.2) }
     }
 
     pub(super) fn cautions(&self, pointer: &str) -> Vec<Finding> {
@@ -188,7 +199,8 @@ impl KienzleLaw {
         let radius_mm = tool.nose_radius_mm;
         let half = (0.5 * tool.cutting_edge_angle_deg).to_radians().sin();
         // Exactly one half at 90 degrees, where the straight edge adds no passive force at all.
-        let u = if tool.cutting_edge_angle_deg >= 90.0 { 0.5 } else { half * half };
+        let is_square = (tool.cutting_edge_angle_deg - 90.0).abs() < f64::EPSILON;
+        let u = if is_square { 0.5 } else { half * half };
         let mut law = Self {
             radius_mm,
             nose_depth_mm: 2.0 * radius_mm * u,

@@ -11,6 +11,7 @@ mod kienzle;
 mod law;
 mod monomial;
 mod power;
+mod range;
 mod rules;
 mod schema;
 mod sine_integral;
@@ -22,8 +23,10 @@ pub use kienzle::Kienzle;
 pub use law::{Component, DepthLaw};
 pub use monomial::Monomial;
 pub use power::{CoefficientOrigin, MeasuredRange, PowerLaw, PowerTerm};
+pub use range::ReachedCut;
 pub use table::{ForceRow, ForceTable};
 
+use range::Range;
 pub(crate) use schema::choice;
 pub(crate) use sine_integral::SineIntegral;
 
@@ -60,8 +63,15 @@ pub const FAULT_CODES: &[&str] = &[
 ];
 
 /// Codes of the warnings of [`ForceModel::extrapolations`] and [`ForceModel::cautions`].
-pub const WARNING_CODES: &[&str] =
-    &["extrapolated_force_model", "feed_exceeds_nose_radius", "unconfirmed_force_coefficient"];
+pub const WARNING_CODES: &[&str] = &[
+    "extrapolated_force_model",
+    "feed_exceeds_nose_radius",
+    "edge_angle_beyond_table",
+    "unconfirmed_force_coefficient",
+];
+
+/// Codes of the refusals of [`ForceModel::far_beyond`].
+pub const FAILURE_CODES: &[&str] = &["far_beyond_force_model"];
 
 /// Material of the cutting edge, as the handbook's tables distinguish it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, ToSchema)]
@@ -228,21 +238,34 @@ impl ForceModel {
 
     /// Warnings where the cut leaves the range in which the model was measured (`deflection/6.1`,
     /// `deflection/10`). The answer is given all the same.
-    pub fn extrapolations(
-        &self,
-        depth_mm: Reached,
-        feed_mm_per_rev: Reached,
-        speed_m_per_min: Reached,
-    ) -> Vec<Finding> {
+    pub fn extrapolations(&self, cut: &ReachedCut) -> Vec<Finding> {
         match self {
-            Self::PowerLaw(model) => model.extrapolations(depth_mm, feed_mm_per_rev, speed_m_per_min),
-            Self::Handbook(model) => model
-                .resolve("")
-                .map(|law| law.extrapolations(depth_mm, feed_mm_per_rev, speed_m_per_min))
-                .unwrap_or_default(),
-            Self::Kienzle(model) => model.extrapolations(feed_mm_per_rev),
+            Self::PowerLaw(model) => cut.outside(&model.range()),
+            Self::Handbook(model) => model.resolve("").map(|law| cut.outside(&law.range())).unwrap_or_default(),
+            Self::Kienzle(model) => model.extrapolations(cut),
             Self::Constant(_) => Vec::new(),
-            Self::Table(model) => model.extrapolations(depth_mm),
+            Self::Table(model) => model.extrapolations(cut),
+        }
+    }
+
+    /// Depth or feed so far beyond the source of the law that no answer is given. What is measured by the user himself is
+    /// his to judge.
+    pub fn far_beyond(&self, cut: &ReachedCut) -> Option<Finding> {
+        match self {
+            Self::PowerLaw(model) if model.measured_range.is_none() => cut.far_beyond(&model.range()),
+            Self::Handbook(model) => cut.far_beyond(&model.resolve("").ok()?.range()),
+            Self::Kienzle(_) => cut.far_beyond(&Kienzle::range()),
+            Self::PowerLaw(_) | Self::Constant(_) | Self::Table(_) => None,
+        }
+    }
+
+    /// Angle of the straight edge to the direction of feed, where the model knows it, degrees.
+    pub fn cutting_edge_angle_deg(&self) -> Option<f64> {
+        match self {
+            Self::PowerLaw(model) => model.cutting_edge_angle_deg,
+            Self::Handbook(model) => Some(model.cutting_edge_angle_deg),
+            Self::Kienzle(model) => Some(model.cutting_edge_angle_deg),
+            Self::Constant(_) | Self::Table(_) => None,
         }
     }
 

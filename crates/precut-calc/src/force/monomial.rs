@@ -25,6 +25,30 @@ impl ForceModel {
         }
     }
 
+    /// The force component at a depth as a product of powers of feed and speed: a power law without a constant part, and
+    /// Kienzle's law without rubbing, whose nose arc does not depend on the feed (`library/2`). The depth is in the
+    /// coefficient; the passive force counts by its size.
+    pub fn monomial_at(&self, component: Component, depth_mm: f64) -> Option<Monomial> {
+        let Self::Kienzle(law) = self else {
+            let law = self.monomial(component)?;
+            let coefficient = law.coefficient * depth_mm.powf(law.depth_exponent);
+            return Some(Monomial { coefficient, depth_exponent: 0.0, ..law });
+        };
+        let mut filled = law.clone();
+        filled.fill();
+        let exponent = match component {
+            Component::Main => filled.cutting_exponent?,
+            Component::Passive | Component::Feed => filled.normal_exponent,
+        };
+        let (force_n, _) = filled.at(1.0).component_and_slope(component, depth_mm);
+        filled.rubbing.is_none().then_some(Monomial {
+            coefficient: force_n.abs(),
+            depth_exponent: 0.0,
+            feed_exponent: 1.0 - exponent,
+            speed_exponent: 0.0,
+        })
+    }
+
     /// What the trials behind a power law covered, where it is stated.
     pub fn measured_range(&self) -> Option<MeasuredRange> {
         match self {

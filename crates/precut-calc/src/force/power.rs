@@ -1,7 +1,7 @@
 //! The power law in depth, feed and speed.
 
 use super::law::{DepthLaw, Law, Power};
-use super::{Forces, Reached, ToolMaterial, rules};
+use super::{Forces, Range, ToolMaterial, rules};
 use crate::calculator::{Basis, Finding, Violations};
 use crate::material::Certainty;
 use serde::{Deserialize, Serialize};
@@ -11,10 +11,12 @@ use utoipa::ToSchema;
 const MOST_COEFFICIENT_N: f64 = 10_000_000.0;
 const MOST_EXPONENT: f64 = 3.0;
 const MOST_CORRECTION: f64 = 100.0;
-/// Least depth that the handbook's law was measured for, mm.
-const LEAST_DEPTH_MM: f64 = 0.1;
-/// Least feed that the handbook's law was measured for, mm/rev.
-const LEAST_FEED_MM_PER_REV: f64 = 0.05;
+/// Depths that the handbook's law was measured for, mm: its tables of cuts go to 12.
+const DEPTHS_MM: (f64, f64) = (0.1, 12.0);
+/// Feeds that the handbook's law was measured for, mm/rev: its tables of feeds go to 2.
+const FEEDS_MM_PER_REV: (f64, f64) = (0.05, 2.0);
+/// Speeds that high-speed steel stands, m/min (judgement): the law does not know the speed.
+const HSS_SPEEDS_M_PER_MIN: (f64, f64) = (0.0, 100.0);
 /// Speeds that the handbook's law for carbide was measured for, m/min.
 const CARBIDE_SPEEDS_M_PER_MIN: (f64, f64) = (30.0, 300.0);
 
@@ -150,7 +152,14 @@ pub struct PowerLaw {
     /// Tool material of the trials: decides which speeds count as measured where `measured_range` is left out.
     #[serde(default)]
     pub tool_material: ToolMaterial,
-    /// Range of the trials. Left out: that of the handbook, t >= 0.1 mm, s >= 0.05 mm/rev, for carbide v = 30 to 300 m/min.
+    /// Angle of the straight edge to the direction of feed, where it is known. Changes no force; says which shoulders the
+    /// tool can cut.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(exclusive_minimum = 0, exclusive_maximum = 120, example = 95.0,
+        extensions(("x-unit" = json!("deg")), ("x-symbol" = json!("kappa")), ("x-group" = json!("cut")), ("x-advanced" = json!(true))))]
+    pub cutting_edge_angle_deg: Option<f64>,
+    /// Range of the trials. Left out: that of the handbook, t = 0.1 to 12 mm, s = 0.05 to 2 mm/rev, for carbide v = 30 to
+    /// 300 m/min.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub measured_range: Option<MeasuredRange>,
     /// Where the coefficients come from; written by the service.
@@ -189,42 +198,40 @@ impl PowerLaw {
         self.terms().any(|(_, term)| term.speed_exponent.abs() > 0.0)
     }
 
-    pub(super) fn extrapolations(&self, depth: Reached, feed: Reached, speed: Reached) -> Vec<Finding> {
-        let (depths, feeds, speeds) = self.range();
-        [(depth, depths, "depth", "mm"), (feed, feeds, "feed", "mm/rev"), (speed, speeds, "speed", "m/min")]
-            .into_iter()
-            .filter_map(|(reached, range, quantity, unit)| outside(reached, range, quantity, unit))
-            .collect()
-    }
-
-    fn range(&self) -> ((f64, f64), (f64, f64), (f64, f64)) {
+    /// The trials' range where it is stated, else that of the handbook's tables.
+    pub(super) fn range(&self) -> Range {
         match (&self.measured_range, self.tool_material) {
-            (Some(range), _) => (
-                (range.least_depth_mm, range.largest_depth_mm),
-                (range.least_feed_mm_per_rev, range.largest_feed_mm_per_rev),
-                (range.least_speed_m_per_min, range.largest_speed_m_per_min),
-            ),
-            (None, tool) => (
-                (LEAST_DEPTH_MM, f64::INFINITY),
-                (LEAST_FEED_MM_PER_REV, f64::INFINITY),
-                match tool {
+            (Some(range), _) => Range {
+                depth_mm: (range.least_depth_mm, range.largest_depth_mm),
+                feed_mm_per_rev: (range.least_feed_mm_per_rev, range.largest_feed_mm_per_rev),
+                speed_m_per_min: (range.least_speed_m_per_min, range.largest_speed_m_per_min),
+            },
+            (None, tool) => Range {
+                depth_mm: DEPTHS_MM,
+                feed_mm_per_rev: FEEDS_MM_PER_REV,
+                speed_m_per_min: match tool {
                     ToolMaterial::Carbide => CARBIDE_SPEEDS_M_PER_MIN,
-                    ToolMaterial::Hss => (0.0, f64::INFINITY),
+                    ToolMaterial::Hss => HSS_SPEEDS_M_PER_MIN,
                 },
-            ),
+            },
         }
     }
 
     pub(super) fn cautions(&self, pointer: &str) -> Vec<Finding> {
-        self.terms()
-            .filter_map(|(name, term)| {
-                let certainty = term.certainty.filter(|certainty| certainty.needs_check())?;
-                Some(
-                    Finding::new("unconfirmed_force_coefficient", format!("{pointer}/{name}"))
-                        .with("certainty", certainty.name()),
-                )
-            })
-            .collect()
+        let last = super::handbook::LAST_EDGE_ANGLE_DEG;
+        let of_table = self.cutting_edge_angle_deg.filter(|_| self.origin == CoefficientOrigin::Handbook);
+        let beyond = of_table.filter(|angle| *angle > last).map(|angle| {
+            Finding::new("edge_angle_beyond_table", format!("{pointer}/cutting_edge_angle_deg"))
+                .measured(angle, last, "deg")
+        });
+        let unconfirmed = self.terms().filter_map(|(name, term)| {
+            let certainty = term.certainty.filter(|certainty| certainty.needs_check())?;
+            Some(
+                Finding::new("unconfirmed_force_coefficient", format!("{pointer}/{name}"))
+                    .with("certainty", certainty.name()),
+            )
+        });
+        beyond.into_iter().chain(unconfirmed).collect()
     }
 
     pub(super) fn basis(&self) -> Vec<Basis> {
@@ -239,29 +246,6 @@ impl PowerLaw {
 
 pub(super) fn handbook_basis() -> Vec<Basis> {
     vec![Basis { equation: "deflection/6.1", source: super::handbook::SOURCE }]
-}
-
-/// A warning if a quantity leaves its range, below before above.
-pub(super) fn outside(
-    reached: Reached,
-    (least, largest): (f64, f64),
-    quantity: &'static str,
-    unit: &'static str,
-) -> Option<Finding> {
-    let finding = |value, limit| {
-        Finding::new("extrapolated_force_model", reached.pointer)
-            .measured(value, limit, unit)
-            .with("quantity", quantity)
-    };
-    // The digits of a difference of diameters are no depth.
-    let slack = 1e-9;
-    if reached.least < least * (1.0 - slack) {
-        Some(finding(reached.least, least))
-    } else if reached.largest > largest * (1.0 + slack) {
-        Some(finding(reached.largest, largest))
-    } else {
-        None
-    }
 }
 
 impl MeasuredRange {

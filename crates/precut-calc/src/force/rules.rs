@@ -9,8 +9,6 @@ pub(super) const MOST_FORCE_N: f64 = 1_000_000.0;
 pub(super) const MOST_FACTOR: f64 = 10.0;
 /// Largest nose radius that the schemas allow, mm.
 const MOST_NOSE_RADIUS_MM: f64 = 50.0;
-/// A straight edge square to the axis, degrees.
-const SQUARE_DEG: f64 = 90.0;
 
 /// Finite and not negative.
 pub(super) fn not_negative(value: f64) -> bool {
@@ -32,13 +30,10 @@ pub(super) fn check_wear(factor: f64, pointer: &str, violations: &mut Violations
     });
 }
 
-/// A lead angle that is none.
-pub(super) fn bad_lead_angle(angle_deg: f64, pointer: String) -> Finding {
-    let limit = if angle_deg > SQUARE_DEG { SQUARE_DEG } else { 0.0 };
-    Finding::new("bad_lead_angle", pointer)
-        .measured(angle_deg, limit, "deg")
-        .with("above", 0.0)
-        .with("maximum", SQUARE_DEG)
+/// A lead angle that is none; `most` says how far they go, and whether that one is allowed (`maximum`) or not (`below`).
+pub(super) fn bad_lead_angle(angle_deg: f64, most: (&'static str, f64), pointer: String) -> Finding {
+    let limit = if angle_deg >= most.1 { most.1 } else { 0.0 };
+    Finding::new("bad_lead_angle", pointer).measured(angle_deg, limit, "deg").with("above", 0.0).with(most.0, most.1)
 }
 
 /// A nose radius that is none; `least` says whether 0 is one (`minimum`) or not (`above`).

@@ -3,7 +3,8 @@
 /// Terms of the series: at phi = 90 degrees each halves the remainder, 2^-50 of it is left.
 const TERMS: usize = 50;
 
-/// I(phi) = integral of sin^a from 0 to phi for 0 <= phi <= 90 degrees, a in (0, 2].
+/// I(phi) = integral of sin^a from 0 to phi for 0 <= phi <= 180 degrees, a in (0, 2]; beyond 90 degrees by
+/// I(phi) = 2 I(90°) - I(180° - phi).
 ///
 /// With u = sin²(phi/2) it is 2^a times the incomplete beta function of u with both parameters
 /// (a+1)/2, whose series u^(b+1) sum_k c_k u^k/(b+1+k), b = (a-1)/2, c_k = c_(k-1) (k-1-b)/k,
@@ -30,8 +31,13 @@ impl SineIntegral {
         Self { exponent: b + 1.0, coefficients }
     }
 
-    /// I(phi) for u = sin²(phi/2), 0 < u <= 1/2.
+    /// I(phi) for u = sin²(phi/2), 0 < u < 1.
     pub(crate) fn at(&self, u: f64) -> f64 {
+        if u > 0.5 { 2.0 * self.up_to_square(0.5) - self.up_to_square(1.0 - u) } else { self.up_to_square(u) }
+    }
+
+    /// The same for 0 < u <= 1/2.
+    fn up_to_square(&self, u: f64) -> f64 {
         // Even and odd terms apart: two chains that the processor runs at the same time.
         let square = u * u;
         let (mut even, mut odd) = (0.0, 0.0);

@@ -1,7 +1,7 @@
 //! Forces measured over depth.
 
 use super::law::{Component, DepthLaw, Law};
-use super::{Forces, Reached, power, rules};
+use super::{Forces, ReachedCut, range, rules};
 use crate::calculator::{Basis, Finding, Measured, MeasuredRow, Violations};
 use serde::{Deserialize, Serialize};
 use utoipa::{PartialSchema, ToSchema};
@@ -85,10 +85,10 @@ impl ForceTable {
         DepthLaw::new(law, self.wear_factor, self.rubbing.unwrap_or_default())
     }
 
-    pub(super) fn extrapolations(&self, depth: Reached) -> Vec<Finding> {
+    pub(super) fn extrapolations(&self, cut: &ReachedCut) -> Vec<Finding> {
         let last = self.rows.rows().last().map_or(0.0, |row| row.depth_mm);
         // Below the first row the origin is known as well.
-        power::outside(depth, (0.0, last), "depth", "mm").into_iter().collect()
+        range::outside(cut.depth_mm, (0.0, last), "depth", "mm").into_iter().collect()
     }
 }
 

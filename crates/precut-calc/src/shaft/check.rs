@@ -1,6 +1,6 @@
 //! Rules between the fields of a shaft and what holds it.
 
-use super::{DIAMETER_MM, Segment, Shaft, Support};
+use super::{DIAMETER_MM, Segment, Shaft, Support, places};
 use crate::calculator::{Finding, Violations};
 use crate::material;
 
@@ -16,9 +16,6 @@ pub(crate) const CODES: &[&str] = &[
     "duplicate_support",
     "unstable_support",
 ];
-
-/// Supports nearer than this share of the length stand at one station.
-pub(crate) const SAME_STATION: f64 = 1e-9;
 
 /// Faults of the shaft, which stands at `/shaft`.
 pub(crate) fn shaft(shaft: &Shaft, violations: &mut Violations) {
@@ -61,7 +58,6 @@ fn check_segment(i: usize, segment: &Segment, violations: &mut Violations) {
 pub(crate) fn supports(shaft: &Shaft, supports: &[Support], violations: &mut Violations) {
     // Where a length is impossible nobody knows what stands beside the shaft.
     let length = shaft.known_length_mm();
-    let apart = SAME_STATION * length.unwrap_or(0.0);
     let mut seen: Vec<f64> = Vec::new();
     for (i, support) in supports.iter().enumerate() {
         if let Support::SteadyRest { one_sided: false, gap_um, .. }
@@ -75,11 +71,11 @@ pub(crate) fn supports(shaft: &Shaft, supports: &[Support], violations: &mut Vio
         }
         let Some(z) = support.station_mm() else { continue };
         if let Some(length) = length {
-            violations.require((0.0..=length).contains(&z), || {
+            violations.require(places::within(z, [0.0, length]), || {
                 beside("support_outside_shaft", format!("/supports/{i}/z_mm"), z, length)
             });
         }
-        violations.require(seen.iter().all(|other| (other - z).abs() > apart), || {
+        violations.require(!seen.iter().any(|other| places::same(*other, z)), || {
             Finding::new("duplicate_support", format!("/supports/{i}/z_mm")).value(z, "mm")
         });
         seen.push(z);

@@ -5,6 +5,7 @@ use std::ops::RangeInclusive;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::places;
 use crate::material;
 
 /// Poisson's ratio where neither job nor material states one (steel).
@@ -43,21 +44,25 @@ pub struct Shaft {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1.0, maximum = 10_000.0, example = 360.0, extensions(("x-unit" = json!("N/mm2")), ("x-symbol" = json!("sigma_y"))))]
     pub yield_strength_n_per_mm2: Option<f64>,
-    /// Beam theory.
-    #[serde(default)]
-    #[schema(default = "euler_bernoulli", example = "euler_bernoulli")]
-    pub theory: Theory,
-    /// Which section bends.
-    #[serde(default)]
-    #[schema(default = "finished", example = "mixed")]
-    pub section: Section,
+    /// Beam theory; not said: bending alone, and with shear where `include.mode` lets it act.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = "euler_bernoulli")]
+    pub theory: Option<Theory>,
+    /// Which section bends; not said: the finished one, and the mixed one where `include.mode` lets it act.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = "mixed")]
+    pub section: Option<Section>,
 }
 
 impl Shaft {
+    /// Left ends of the segments, from 0 on, and the end of the shaft.
+    pub(crate) fn ends_mm(&self) -> Vec<f64> {
+        places::ends_mm(self.segments.iter().map(|segment| segment.length_mm))
+    }
+
     /// Length of all segments.
     pub fn length_mm(&self) -> f64 {
-        // Not `sum`: that of nothing is -0.
-        self.segments.iter().fold(0.0, |length, segment| length + segment.length_mm)
+        self.ends_mm().last().copied().unwrap_or(0.0)
     }
 
     /// Length of all segments, where every one has a length that it may have: nothing can be held against another.
@@ -81,6 +86,16 @@ impl Shaft {
         for segment in &mut self.segments {
             segment.stock_diameter_mm.get_or_insert(segment.diameter_mm);
         }
+    }
+
+    /// The beam theory that acts.
+    pub(crate) fn theory(&self) -> Theory {
+        self.theory.unwrap_or_default()
+    }
+
+    /// The section that bends.
+    pub(crate) fn section(&self) -> Section {
+        self.section.unwrap_or_default()
     }
 
     /// Young's modulus of a filled job; NaN, which no answer lets pass, of one that is not.
@@ -128,6 +143,11 @@ impl Segment {
     /// Whether the drawing diameter is one that a shaft may have.
     pub(crate) fn has_diameter(&self) -> bool {
         DIAMETER_MM.contains(&self.diameter_mm)
+    }
+
+    /// Whether its bore is one that it may have.
+    pub(crate) fn has_bore(&self) -> bool {
+        self.has_diameter() && self.bore_diameter_mm < self.diameter_mm
     }
 
     /// Whether drawing and blank fit together, so that something follows from both.
@@ -260,8 +280,12 @@ impl Support {
         }
     }
 
-    /// Writes out what follows from other fields: the compliance across the radial direction.
-    pub(crate) fn fill(&mut self) {
+    /// Writes out what follows from other fields: the compliance across the radial direction, and its place where that
+    /// is the end of a segment.
+    pub(crate) fn fill(&mut self, ends_mm: &[f64]) {
+        if let Self::Centre { z_mm, .. } | Self::Chuck { z_mm, .. } | Self::SteadyRest { z_mm, .. } = self {
+            *z_mm = places::settled(*z_mm, ends_mm);
+        }
         match self {
             Self::Centre { compliance_um_per_n: c, tangential_compliance_um_per_n: across, .. }
             | Self::Chuck { compliance_um_per_n: c, tangential_compliance_um_per_n: across, .. }
@@ -306,6 +330,13 @@ pub enum FeedDirection {
     ToHeadstock,
     /// From the headstock to the tailstock.
     ToTailstock,
+}
+
+impl FeedDirection {
+    /// The side along the shaft that the tool comes from: 1 from the tailstock, -1 from the headstock.
+    pub(crate) fn comes_from(self) -> f64 {
+        if self == Self::ToHeadstock { 1.0 } else { -1.0 }
+    }
 }
 
 #[cfg(test)]

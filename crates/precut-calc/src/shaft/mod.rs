@@ -3,6 +3,7 @@
 pub(crate) mod check;
 pub(crate) mod elastic;
 mod input;
+pub(crate) mod places;
 
 pub(crate) use input::DIAMETER_MM;
 pub use input::{Carriage, FeedDirection, Section, Segment, Shaft, Support, Theory};

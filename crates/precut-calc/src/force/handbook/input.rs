@@ -37,8 +37,9 @@ pub struct Handbook {
     #[schema(exclusive_minimum = 0, maximum = 10, example = 0.68,
         extensions(("x-unit" = json!("1")), ("x-symbol" = json!("K_m")), ("x-group" = json!("cut")), ("x-advanced" = json!(true))))]
     pub material_factor: Option<f64>,
-    /// Lead angle (cutting edge angle) of the straight edge; the table covers 30 to 90 degrees.
-    #[schema(exclusive_minimum = 0, maximum = 90, example = 45.0,
+    /// Lead angle (cutting edge angle) of the straight edge; the table covers 30 to 90 degrees, and up to 100 degrees its
+    /// factors of 90 are taken.
+    #[schema(exclusive_minimum = 0, maximum = 100, example = 45.0,
         extensions(("x-unit" = json!("deg")), ("x-symbol" = json!("phi")), ("x-group" = json!("cut"))))]
     pub cutting_edge_angle_deg: f64,
     /// Rake angle. The table covers -15 to 10 degrees for carbide (10 if left out), 12 to 25 for high-speed steel (20 if left out).

@@ -16,6 +16,7 @@ pub use factors::{
 };
 pub use input::Handbook;
 pub use material_factor::WorkMaterial;
+pub(super) use resolve::LAST_EDGE_ANGLE_DEG;
 pub use rows::{ALUMINIUM, COPPER, Coefficients, GREY_IRON, HandbookRow, MALLEABLE_IRON, STAINLESS, STEEL};
 
 /// The handbook.

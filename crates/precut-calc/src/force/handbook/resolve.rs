@@ -7,6 +7,9 @@ use crate::calculator::{Finding, Violations};
 use crate::force::{CoefficientOrigin, Forces, PowerLaw, PowerTerm, ToolMaterial, rules};
 use crate::material::{self, Certainty};
 
+/// Last edge angle of the table, degrees; up to the one below its factors are taken, with a warning.
+pub(in crate::force) const LAST_EDGE_ANGLE_DEG: f64 = 90.0;
+const MOST_EDGE_ANGLE_DEG: f64 = 100.0;
 /// Largest strength and hardness that the schema allows.
 const MOST_STRENGTH_N_PER_MM2: f64 = 3000.0;
 const MOST_HARDNESS: f64 = 700.0;
@@ -175,9 +178,10 @@ impl Reader<'_> {
         use Reading::{Linear, LogLog};
         let choice = self.choice;
         let angle = choice.cutting_edge_angle_deg;
-        let angle_ok = angle > 0.0 && angle <= 90.0;
+        let angle_ok = angle > 0.0 && angle <= MOST_EDGE_ANGLE_DEG;
         if !angle_ok {
-            self.add(rules::bad_lead_angle(angle, self.at("cutting_edge_angle_deg")));
+            let most = ("maximum", MOST_EDGE_ANGLE_DEG);
+            self.add(rules::bad_lead_angle(angle, most, self.at("cutting_edge_angle_deg")));
         }
         let radius = choice.nose_radius_mm.filter(|&radius| rules::not_negative(radius));
         if let (None, Some(bad)) = (radius, choice.nose_radius_mm) {
@@ -192,7 +196,7 @@ impl Reader<'_> {
             ToolMaterial::Hss => (None, Some(&factors::NOSE_RADIUS_HSS[..])),
         };
         let read = [
-            self.read("cutting_edge_angle_deg", Some(phi), angle_ok.then_some(angle), Linear),
+            self.read("cutting_edge_angle_deg", Some(phi), angle_ok.then_some(angle.min(LAST_EDGE_ANGLE_DEG)), Linear),
             self.read("rake_angle_deg", Some(gamma), choice.rake_angle_deg, Linear),
             self.read("inclination_deg", lambda, choice.inclination_deg, Linear),
             self.read("nose_radius_mm", nose, radius, LogLog),
@@ -248,6 +252,7 @@ impl Reader<'_> {
             feed: feed.map(|feed| with_constant(feed, feed_n)),
             wear_factor: choice.wear_factor,
             tool_material: choice.tool_material,
+            cutting_edge_angle_deg: Some(choice.cutting_edge_angle_deg),
             measured_range: None,
             origin: CoefficientOrigin::Handbook,
         })

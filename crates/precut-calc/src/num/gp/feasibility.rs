@@ -48,6 +48,19 @@ pub fn feasibility(program: &Program, rows: &[usize], sums: &[usize]) -> Result<
     Ok(Verdict::Infeasible { excess: solution.objective, rows: weights, sums: of_sums })
 }
 
+/// A point that satisfies all limits, with as much room as they leave up to a thousandth; `None` where none was found.
+pub fn inside(program: &Program) -> Option<Vec<f64>> {
+    let rows: Vec<usize> = (0..program.rows.len()).collect();
+    let sums: Vec<usize> = (0..program.sums.len()).collect();
+    let relaxed = relaxed(program, &rows, &sums);
+    let settings = Settings { gap: 1e-9, enough: Some(-1e-3), iterations: 200, ..Settings::default() };
+    let own = Layout::new(&relaxed).ok_or(Failed::NotChained).and_then(|layout| layout.minimise(&settings));
+    let solution = own.ok().or_else(|| conic::minimise(&relaxed, settings.gap).ok())?;
+    let mut y = solution.y;
+    y.truncate(program.variables());
+    (program.violation(&y) <= TOLERANCE).then_some(y)
+}
+
 fn relaxed(program: &Program, rows: &[usize], sums: &[usize]) -> Program {
     let t = program.variables();
     let mut all = program.rows.chosen(rows).with_entry(t, -1.0);

@@ -15,13 +15,16 @@ pub struct Settings {
     pub dual: f64,
     /// Most steps.
     pub iterations: u32,
+    /// The program's start satisfies all limits: slacks begin as they are there. Slower, and it keeps where limits leave
+    /// next to no room.
+    pub inside: bool,
     /// Stop as soon as a point satisfies every limit with an objective below this: for tests of feasibility.
     pub enough: Option<f64>,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { gap: 1e-10, primal: 1e-9, dual: 1e-8, iterations: 80, enough: None }
+        Self { gap: 1e-10, primal: 1e-9, dual: 1e-8, iterations: 80, inside: false, enough: None }
     }
 }
 
@@ -43,6 +46,8 @@ pub enum Failed {
 
 /// Multipliers above this say that no point is feasible.
 const BEYOND: f64 = 1e9;
+/// Slack of a limit that a start from inside touches.
+const LEAST_SLACK: f64 = 1e-9;
 /// Share of the way to the boundary.
 const TO_BOUNDARY: f64 = 0.99;
 /// Longest step of a log variable.
@@ -96,7 +101,7 @@ impl Method {
         if !layout.impossible.is_empty() {
             return Err(Failed::Infeasible);
         }
-        self.begin(layout);
+        self.begin(layout, settings.inside);
         let m = layout.limits() as f64;
         let curved = matches!(layout.objective, Objective::Sum(_)) || !layout.sums.is_empty();
         let mut worst = f64::INFINITY;
@@ -122,14 +127,15 @@ impl Method {
         Err(Failed::Stalled { iterations: settings.iterations, residual: worst })
     }
 
-    fn begin(&mut self, layout: &Layout) {
+    fn begin(&mut self, layout: &Layout, inside: bool) {
         let state = &mut self.state;
         state.y.clone_from(&layout.start);
         state.s = vec![0.0; layout.limits()];
         state.evaluate(layout);
         // With s = 0 the residual is the value of the limit.
-        state.s = state.residual.iter().map(|value| (-value).max(0.3)).collect();
-        state.z = state.s.iter().map(|s| 0.1 / s).collect();
+        let (least, product) = if inside { (LEAST_SLACK, 1.0 / layout.limits().max(1) as f64) } else { (0.3, 0.1) };
+        state.s = state.residual.iter().map(|value| (-value).max(least)).collect();
+        state.z = state.s.iter().map(|s| product / s).collect();
         state.evaluate(layout);
         self.ds = vec![0.0; layout.limits()];
         self.dz = vec![0.0; layout.limits()];

@@ -15,7 +15,7 @@ mod layout;
 mod newton;
 
 pub use affine::Affines;
-pub use feasibility::{Verdict, feasibility};
+pub use feasibility::{Verdict, feasibility, inside};
 pub use interior::{Failed, Settings, minimise};
 pub use layout::Layout;
 

@@ -1,6 +1,6 @@
 //! The minimum circumscribed reference circle, MCCI.
 
-use super::contact::resolution_mm;
+use super::contact::{hold_of_ties, resolution_mm};
 use super::section::square;
 use super::triangle::Held;
 use super::{Circle, RoundnessError, Section, Span};
@@ -21,6 +21,8 @@ pub struct MinimumCircumscribed {
     pub radius_error_mm: f64,
     /// Bound of the round-off in the centre, mm.
     pub centre_error_mm: f64,
+    /// How many points touch it, round-off aside.
+    pub touching: usize,
     /// Passes over all points, the certifying one included.
     pub scans: u32,
 }
@@ -114,6 +116,7 @@ impl Ball {
             contacts: self.contacts,
             stiffness: self.hold,
             radius_error_mm: round_off,
+            touching: hold_of_ties(section, self.centre, span.farthest_mm).1,
             // Two contacts: their middle, as exact as they are; three: round-off over stiffness, at worst a flat optimum's.
             centre_error_mm: if self.contacts.2.is_some() { (round_off / self.hold).min(wander) } else { round_off },
             scans,

@@ -39,6 +39,27 @@ pub(super) fn hold_of_three(directions: [[f64; 2]; 3]) -> f64 {
     inward.into_iter().fold(f64::INFINITY, f64::min)
 }
 
+/// How far outside its triangle the centre may lie by round-off alone: three of four contacts at right angles hold it
+/// with the fourth.
+pub(super) const FLAT: f64 = 1e-13;
+
+/// The same of all points that are as near to a centre as `radius_mm` (`roundness/5.6`): the cosine of half the widest
+/// angle between neighbours of them. Made profiles touch their circle at more than three points, of which no three need
+/// hold it. With how many they are.
+pub(super) fn hold_of_ties(section: &Section, centre: [f64; 2], radius_mm: f64) -> (f64, usize) {
+    let slack = 2.0 * resolution_mm(radius_mm);
+    let mut angles: Vec<f64> = (0..section.len())
+        .map(|index| section.from(centre, index))
+        .filter(|v| (square(*v).sqrt() - radius_mm).abs() <= slack)
+        .map(|[x, y]| y.atan2(x))
+        .collect();
+    angles.sort_by(f64::total_cmp);
+    let (Some(first), Some(last)) = (angles.first(), angles.last()) else { return (-1.0, 0) };
+    let around = first + std::f64::consts::TAU - last;
+    let gap = angles.windows(2).map(|pair| pair[1] - pair[0]).fold(around, f64::max);
+    ((0.5 * gap).cos(), angles.len())
+}
+
 /// Smallest, over all unit directions e, of the largest (u − v)·e over inner contacts u and outer contacts v: the
 /// distance of the origin from the sides of the parallelogram of the four differences, negative where it lies outside
 /// (`roundness/4.3`). Positive exactly where the two chords cross, that is, where the contacts alternate.

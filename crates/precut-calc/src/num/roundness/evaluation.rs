@@ -18,16 +18,24 @@ pub struct Circles {
     pub circumscribed: MinimumCircumscribed,
 }
 
-/// All four reference circles; at least four points that surround a centre.
+/// All four reference circles; at least three points that are not on a line. On an arc that surrounds no centre an
+/// inscribed circle grows without limit: the one about the least-squares centre stands in its place, unproven.
 pub fn circles(section: &Section) -> Result<Circles, RoundnessError> {
     let least_squares = least_squares(section)?;
     let centre = least_squares.circle.centre_mm;
     Ok(Circles {
         least_squares,
         minimum_zone: minimum_zone(section, centre)?,
-        inscribed: maximum_inscribed(section, centre)?,
+        inscribed: inscribed_or_about(section, centre)?,
         circumscribed: minimum_circumscribed(section, centre)?,
     })
+}
+
+fn inscribed_or_about(section: &Section, centre: [f64; 2]) -> Result<MaximumInscribed, RoundnessError> {
+    match maximum_inscribed(section, centre) {
+        Err(RoundnessError::NotSurrounding) => Ok(MaximumInscribed::unproven_about(section, centre)),
+        found => found,
+    }
 }
 
 /// Everything that is evaluated of one section.

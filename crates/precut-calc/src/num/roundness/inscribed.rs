@@ -1,6 +1,6 @@
 //! The maximum inscribed reference circle, MICI.
 
-use super::contact::{half_gap_cosine, reach_mm, resolution_mm};
+use super::contact::{FLAT, half_gap_cosine, hold_of_ties, reach_mm, resolution_mm};
 use super::section::square;
 use super::triangle::{Held, first_triple};
 use super::{Circle, RoundnessError, Section, Span};
@@ -29,8 +29,18 @@ pub struct MaximumInscribed {
     pub radius_error_mm: f64,
     /// Bound of the round-off in the centre, mm.
     pub centre_error_mm: f64,
+    /// How many points touch it, round-off aside: more than three on made profiles.
+    pub touching: usize,
     /// Passes over all points, the certifying ones included.
     pub scans: u32,
+}
+
+impl MaximumInscribed {
+    /// The largest circle about a given centre, unproven.
+    pub(super) fn unproven_about(section: &Section, centre_mm: [f64; 2]) -> Self {
+        let centre = section.inside(centre_mm);
+        about(section, centre, section.span_inside(centre))
+    }
 }
 
 /// Another inscribed circle of the same size.
@@ -45,7 +55,7 @@ pub struct OtherInscribed {
 /// Exchanges after which all triangles are tried. Profiles take 2 to 10.
 const MOST_EXCHANGES: u32 = 60;
 /// Passes over the points in the trial of all triangles, at most.
-const MOST_TRIALS: u32 = 300;
+const MOST_TRIALS: u32 = 2000;
 
 /// The maximum inscribed circle (`roundness/5.1`), at least three points; `start_mm` is the least-squares centre.
 ///
@@ -67,9 +77,10 @@ pub fn maximum_inscribed(section: &Section, start_mm: [f64; 2]) -> Result<Maximu
         Some(found) => found,
         None if half_gap_cosine(section, start).is_none() => return Err(RoundnessError::NotSurrounding),
         // The centre can be anywhere inside.
-        None => try_all(section, start, span.farthest_mm, None)
-            .map(|tried| tried.best)
-            .ok_or(RoundnessError::NotConverged { iterations: MOST_TRIALS, left_mm: span.width_mm() })?,
+        None => match try_all(section, start, span.farthest_mm, None) {
+            Some(tried) => tried.best,
+            None => return Ok(about(section, start, span)),
+        },
     };
     let Some(unproven) = Unproven::of(section, &found) else {
         return Ok(answer(section, &found, &[], None));
@@ -86,6 +97,17 @@ struct Empty {
     held: Held,
     span: Span,
     scans: u32,
+}
+
+impl Empty {
+    /// `None` where neither the three contacts nor all that tie with them hold the centre: a shift enlarges the circle.
+    fn new(section: &Section, held: Held, span: Span, scans: u32) -> Option<Self> {
+        if held.hold > FLAT {
+            return Some(Self { held, span, scans });
+        }
+        let (hold, _) = hold_of_ties(section, held.centre, held.radius_mm);
+        (hold > FLAT).then_some(Self { held: Held { hold, ..held }, span, scans })
+    }
 }
 
 /// Where larger circles could be that the proof of the one found does not reach.
@@ -128,7 +150,7 @@ fn exchange(section: &Section, start: [f64; 2], triple: [usize; 3]) -> Option<Em
         let span = section.span_inside(held.centre);
         let resolution = resolution_mm(span.farthest_mm);
         if span.nearest_mm >= held.radius_mm - resolution {
-            return Some(Empty { held, span, scans: scans + 2 });
+            return Empty::new(section, held, span, scans + 2);
         }
         let entering = span.nearest;
         let mut best: Option<Held> = None;
@@ -231,8 +253,9 @@ fn try_all(section: &Section, middle: [f64; 2], within_mm: f64, known: Option<&E
             return None;
         }
         if span.nearest_mm >= held.radius_mm - resolution_mm {
+            let Some(empty) = Empty::new(section, held, span, scans) else { continue };
             trial.floor_mm = trial.floor_mm.max(held.radius_mm);
-            found.push(Empty { held, span, scans });
+            found.push(empty);
         } else {
             trial.add(span.nearest);
         }
@@ -243,6 +266,14 @@ fn try_all(section: &Section, middle: [f64; 2], within_mm: f64, known: Option<&E
     let mut found = found.into_iter();
     let best = found.next()?;
     Some(Tried { best: Empty { scans, ..best }, others: found.collect(), is_global: bound.is_some() })
+}
+
+/// The circle about a centre that only the trial of all triangles could have bettered, which took too long: told as
+/// unproven, with what may be missing.
+fn about(section: &Section, centre: [f64; 2], span: Span) -> MaximumInscribed {
+    let held = Held { contacts: [span.nearest; 3], centre, radius_mm: span.nearest_mm, hold: 0.0 };
+    let gap_mm = span.width_mm();
+    answer(section, &Empty { held, span, scans: MOST_TRIALS }, &[], Some(Unproven { within_mm: gap_mm, gap_mm }))
 }
 
 /// Whether two circles are one: several triples touch it.
@@ -291,6 +322,7 @@ fn answer(section: &Section, found: &Empty, others: &[Empty], unproven: Option<U
             .collect(),
         radius_error_mm: resolution_mm(span.farthest_mm),
         centre_error_mm: centre_error_mm(&held),
+        touching: hold_of_ties(section, held.centre, span.nearest_mm).1,
         scans,
     }
 }

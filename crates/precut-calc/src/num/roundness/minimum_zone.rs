@@ -1,7 +1,8 @@
 //! The minimum-zone reference circles, MZCI.
 
 use super::contact::{
-    cross, equidistant, half_gap_cosine, hold_of_zone, order_from_gap, reach_mm, resolution_mm, sector, unit,
+    cross, equidistant, half_gap_cosine, hold_of_ties, hold_of_zone, order_from_gap, reach_mm, resolution_mm, sector,
+    unit,
 };
 use super::section::{Span, square};
 use super::{RoundnessError, Section};
@@ -38,6 +39,8 @@ pub struct MinimumZone {
     pub width_error_mm: f64,
     /// Bound of the round-off in the centre, mm; `None` where the zone is flat and the centre not determined.
     pub centre_error_mm: Option<f64>,
+    /// How many points touch the outer and the inner circle, round-off aside.
+    pub touching: [usize; 2],
     /// Passes over all points, the certifying one included.
     pub scans: u32,
 }
@@ -56,25 +59,43 @@ const LARGEST_CORE: usize = 40;
 /// Points with which that trial begins.
 const FIRST_CORE: usize = 8;
 
-/// The minimum-zone circles (`roundness/4.1`), at least four points; `start_mm` is the least-squares centre.
+/// The minimum-zone circles (`roundness/4.1`), at least three points, through which there is one circle; `start_mm` is the least-squares centre.
 ///
 /// Remez exchange with exact Euclidean contacts: the centre of four alternating contacts is the crossing of two
 /// perpendicular bisectors; the farthest and the nearest point of all replace the contact of their own kind between the
 /// same neighbours, until no point is outside the zone of the four. Where that does not end (deviations of the
 /// order of the radius), the best quadruple of the points met, with further points until no point is outside.
 pub fn minimum_zone(section: &Section, start_mm: [f64; 2]) -> Result<MinimumZone, RoundnessError> {
-    if section.len() < 4 {
-        return Err(RoundnessError::TooFewPoints { count: section.len(), needed: 4 });
+    if section.len() < 3 {
+        return Err(RoundnessError::TooFewPoints { count: section.len(), needed: 3 });
     }
     let start = section.inside(start_mm);
+    if section.len() == 3 {
+        return through_three(section, start);
+    }
     let found = opposite_extremes(section, start)
         .or_else(|| spread_reference(section, start))
         .and_then(|reference| exchange(section, start, reference))
         .or_else(|| cut_planes(section, start));
-    found.map(|holding| proven(section, holding)).ok_or(RoundnessError::NotConverged {
-        iterations: MOST_EXCHANGES,
-        left_mm: section.span_inside(start).width_mm(),
-    })
+    Ok(found.map_or_else(|| about(section, start), |holding| proven(section, holding)))
+}
+
+/// Three points lie on a circle.
+fn through_three(section: &Section, start: [f64; 2]) -> Result<MinimumZone, RoundnessError> {
+    let reference = Reference { outer: [0, 1], inner: [2, 0] };
+    let centre = equidistant(section, start, [0, 1], [1, 2]).ok_or(RoundnessError::NoCircle)?;
+    let span = section.span_inside(centre);
+    let zone = Zone { reference, centre, outer_mm: span.farthest_mm, inner_mm: span.nearest_mm };
+    Ok(Holding { zone, span, scans: 1 }.answer(section, true, true))
+}
+
+/// The zone about a centre, unproven: a narrower one was not found.
+fn about(section: &Section, centre: [f64; 2]) -> MinimumZone {
+    let span = section.span_inside(centre);
+    let reference = Reference { outer: [span.farthest; 2], inner: [span.nearest; 2] };
+    let zone = Zone { reference, centre, outer_mm: span.farthest_mm, inner_mm: span.nearest_mm };
+    let answer = Holding { zone, span, scans: MOST_EXCHANGES }.answer(section, false, false);
+    MinimumZone { lower_bound_mm: 0.0, certified_within_mm: 0.0, ..answer }
 }
 
 /// Four contacts, two of each kind.
@@ -328,6 +349,7 @@ impl Holding {
             is_global,
             is_unique,
             width_error_mm: (width - (zone.outer_mm - zone.inner_mm)).max(0.0) + round_off,
+            touching: [span.farthest_mm, span.nearest_mm].map(|mm| hold_of_ties(section, zone.centre, mm).1),
             centre_error_mm: (stiffness > f64::EPSILON.sqrt()).then(|| round_off / stiffness),
             scans,
         }

@@ -1,6 +1,6 @@
 //! Circles through three points that hold their centre.
 
-use super::contact::{cross, dot, equidistant, hold_of_three, order_from_gap, unit};
+use super::contact::{FLAT, cross, dot, equidistant, hold_of_three, order_from_gap, unit};
 use super::section::{Section, square};
 
 /// A circle through three points that are not in one half circle.
@@ -10,19 +10,19 @@ pub(super) struct Held {
     /// As the lists of the section have it.
     pub(super) centre: [f64; 2],
     pub(super) radius_mm: f64,
-    /// See [`hold_of_three`]; positive.
+    /// See [`hold_of_three`]; positive, but for [`FLAT`].
     pub(super) hold: f64,
 }
 
 impl Held {
-    /// The circle through three points; `None` where they lie in one half circle of it.
+    /// The circle through three points; `None` where they lie in one half circle of it by more than round-off.
     pub(super) fn through(section: &Section, near: [f64; 2], contacts: [usize; 3]) -> Option<Self> {
         let [i, j, k] = contacts;
         let centre = equidistant(section, near, [i, j], [i, k])?;
         let spokes = contacts.map(|index| section.from(centre, index));
         let hold = hold_of_three(spokes.map(unit));
         let radius_mm = spokes.map(|spoke| square(spoke).sqrt()).iter().sum::<f64>() / 3.0;
-        (hold > 0.0).then_some(Self { contacts, centre, radius_mm, hold })
+        (hold > -FLAT).then_some(Self { contacts, centre, radius_mm, hold })
     }
 
     /// Distance of a point from the centre, mm.
