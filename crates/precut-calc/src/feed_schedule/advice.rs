@@ -3,14 +3,14 @@
 use crate::calculator::{Basis, Finding, Message};
 use crate::machinability::{Conditions, MachinabilityModel, ModelForm};
 
-use super::binding::is_lower;
 use super::case::Case;
 use super::input::{FeedMode, Goal, Job, SpeedMode};
 use super::models::Output;
-use super::output::Outcome;
+use super::output::{ChangePlace, Looser, Outcome, Price};
 use super::plan::Method;
 use super::run::broken;
-use super::toolpath::encounters;
+use super::scatter;
+use super::toolpath::Made;
 
 /// Codes of the warnings made here.
 pub(super) const WARNING_CODES: &[&str] = &[
@@ -29,10 +29,13 @@ pub(super) const WARNING_CODES: &[&str] = &[
     "plunge_at_shoulder",
     "pass_thicker_than_counted",
     "surface_wears_out_its_edge",
+    "shares_of_edges_priced",
+    "half_fail",
     "spindle_limit_binds",
     "tool_passes_support",
     "tool_reaches_support",
     "tool_hits_chuck",
+    "no_program",
 ];
 
 /// Codes of the explanations made here.
@@ -49,6 +52,8 @@ pub(super) const EXPLANATION_CODES: &[&str] = &[
     "equal_deflection_clamped",
     "path_leaves",
     "optimum_within",
+    "optimum_of_shares",
+    "whole_edges_within",
     "rule_has_no_optimum",
 ];
 
@@ -60,7 +65,13 @@ const THIN_WALL: f64 = 0.1;
 const LEAST_FEED_MM_PER_REV: f64 = 0.03;
 
 /// All warnings.
-pub(super) fn warnings(job: &Job, case: &Case, outcome: &Outcome, at: &[(f64, f64)]) -> Vec<Finding> {
+pub(super) fn warnings(
+    job: &Job,
+    case: &Case,
+    outcome: &Outcome,
+    at: &[(f64, f64)],
+    made: Option<&Made>,
+) -> Vec<Finding> {
     let mut out = Vec::new();
     ranges(job, case, outcome, &mut out);
     lives(outcome, &mut out);
@@ -81,12 +92,19 @@ pub(super) fn warnings(job: &Job, case: &Case, outcome: &Outcome, at: &[(f64, f6
         );
     }
     unused(job, &mut out);
-    out.extend(encounters(job, outcome));
-    out.extend(outcome.edges.iter().filter_map(|edge| {
-        let alone = edge.surfaces.first().filter(|_| edge.tool_usage > 1.0 + 1e-9)?;
-        let finding = Finding::new("surface_wears_out_its_edge", "/limits/tool_usage_max");
-        Some(finding.measured(edge.tool_usage, 1.0, "1").with("surface", alone.clone()))
-    }));
+    out.extend(made.iter().flat_map(|made| made.encounters(job, outcome)));
+    worn_out_inside(case, outcome, &mut out);
+    out.extend(scatter::warnings(job, case, outcome));
+    if let (Some(whole), false) = (outcome.whole_edge_objective, is_of_whole_edges(job))
+        && whole > 1.01 * outcome.objective
+    {
+        out.push(
+            Finding::new("shares_of_edges_priced", "/limits/whole_edges")
+                .measured(whole, outcome.objective, job.objective.unit())
+                .with("objective", job.objective.name())
+                .with("edges", outcome.edges_per_part.unwrap_or(0.0)),
+        );
+    }
     if matches!(job.method, Method::EqualDeflection { .. }) {
         for (name, factor) in broken(case, at).into_iter().take(20) {
             out.push(
@@ -117,6 +135,41 @@ pub(super) fn warnings(job: &Job, case: &Case, outcome: &Outcome, at: &[(f64, f6
         out.push(Finding::new("compensation_needed", "/limits/deflection_residual_fraction").value(kappa, "1"));
     }
     out
+}
+
+/// Whether edges are counted in wholes by the job's own wish.
+fn is_of_whole_edges(job: &Job) -> bool {
+    job.limits.as_ref().is_some_and(|limits| limits.whole_parts_per_edge || limits.whole_edges)
+}
+
+/// Surfaces, and zones of none, inside which the tool has to be changed: they alone use more than an edge.
+fn worn_out_inside(case: &Case, outcome: &Outcome, out: &mut Vec<Finding>) {
+    let find = |id: &str| case.zones.iter().position(|zone| zone.id == id);
+    let mut told: Vec<(usize, bool)> = Vec::new();
+    for change in &outcome.tool_changes {
+        let (Some(after), Some(before)) = (find(&change.after_zone), find(&change.before_zone)) else { continue };
+        let (zone, other) = (&case.zones[before], &case.zones[after]);
+        let same = zone.names_surface && other.names_surface && zone.surface == other.surface;
+        let inside = match change.place {
+            ChangePlace::InsideZone => true,
+            ChangePlace::BetweenZones => same,
+            ChangePlace::BetweenParts => false,
+        };
+        let of = if zone.names_surface { (zone.surface, true) } else { (before, false) };
+        if !inside || told.contains(&of) || told.len() >= 20 {
+            continue;
+        }
+        told.push(of);
+        let is_of =
+            |i: &usize| if of.1 { case.zones[*i].names_surface && case.zones[*i].surface == of.0 } else { *i == of.0 };
+        let usage: f64 = (0..case.zones.len()).filter(is_of).filter_map(|i| outcome.zones[i].tool_usage).sum();
+        let name = if of.1 { &case.surfaces[of.0] } else { &zone.id };
+        out.push(
+            Finding::new("surface_wears_out_its_edge", "/limits/tool_usage_max")
+                .measured(usage, 1.0, "1")
+                .with("surface", name.clone()),
+        );
+    }
 }
 
 /// Variables that leave the range of the trials behind a model, the worst zone of each.
@@ -261,23 +314,7 @@ fn unused(job: &Job, out: &mut Vec<Finding>) {
 
 /// What is to be said of the answer, the most important first.
 pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
-    let mut out = Vec::new();
-    let hardening = matches!(job.objective, Goal::Hardening {});
-    let percent = if hardening { "percentage points" } else { "percent" };
-    match outcome.binding.first() {
-        Some(first) => out.push(
-            Message::new("limit_costs_most")
-                .with("looser", if is_lower(job, first) { "less" } else { "more" })
-                .with("constraint", first.constraint.clone())
-                .with("zone", first.zone.clone())
-                .with("gain_percent", first.gain_percent)
-                .with("gain_unit", percent)
-                .with("objective", job.objective.name())
-                .with("others", outcome.binding.len() - 1),
-        ),
-        None if outcome.equal_deflection.is_none() => out.push(Message::new("nothing_binds")),
-        None => {}
-    }
+    let mut out: Vec<Message> = costliest(job, outcome).into_iter().collect();
     if let Some(constant) = &outcome.comparison.constant_feed {
         out.push(
             Message::new("against_constant_feed")
@@ -314,8 +351,9 @@ pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
     if let (Some(parts), Some(usage)) = (outcome.parts_per_edge, outcome.tool_usage) {
         out.push(Message::new("whole_parts").with("parts", f64::from(parts)).with("usage", usage));
     }
-    if outcome.edges.len() > 1 {
-        out.push(Message::new("edge_changes").with("edges", outcome.edges.len()));
+    if let Some(edges) = outcome.edges_per_part.filter(|edges| *edges > 1.0) {
+        let inside = outcome.tool_changes.iter().filter(|change| change.place == ChangePlace::InsideZone).count();
+        out.push(Message::new("edge_changes").with("edges", edges).with("inside", inside));
     }
     if let Some(found) = &outcome.continuous {
         out.push(
@@ -339,21 +377,60 @@ pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
                 .with("after_um", path.largest_compensated_um),
         );
     }
-    if outcome.equal_deflection.is_some() {
-        out.push(Message::new("rule_has_no_optimum"));
-    } else {
-        let gap = outcome.certificate.duality_gap.max(1e-16);
-        // A semi-log objective is minimised as it stands.
-        let plain =
-            hardening && job.models.get(Output::Hardening).is_some_and(|model| model.form == ModelForm::SemiLog);
-        out.push(
-            Message::new("optimum_within")
-                .with("gap", gap)
-                .with("gap_of", if plain { "objective" } else { "logarithm" })
-                .with("iterations", f64::from(outcome.certificate.iterations)),
-        );
-    }
+    out.push(certified(job, outcome));
     out
+}
+
+/// The limit that costs most, or that none binds.
+fn costliest(job: &Job, outcome: &Outcome) -> Option<Message> {
+    // What the objective is measured by is no limit that binds, though it has its price.
+    let measures = |price: &Price| {
+        let mut binding = outcome.binding.iter();
+        price.constraint == job.objective.name()
+            && !binding.any(|bound| bound.constraint == price.constraint && bound.zone == price.zone)
+    };
+    let prices: Vec<&Price> = outcome.prices.iter().filter(|price| !measures(price)).collect();
+    let Some((first, gain_percent)) = prices.iter().find_map(|price| Some((price, price.gain_percent?))) else {
+        let nothing = outcome.equal_deflection.is_none() && outcome.binding.is_empty();
+        return nothing.then(|| Message::new("nothing_binds"));
+    };
+    let percent = if matches!(job.objective, Goal::Hardening {}) { "percentage points" } else { "percent" };
+    Some(
+        Message::new("limit_costs_most")
+            .with("looser", if first.looser == Looser::Less { "less" } else { "more" })
+            .with("constraint", first.constraint.clone())
+            .with("zone", first.zone.clone())
+            .with("gain_percent", gain_percent)
+            .with("gain_unit", percent)
+            .with("objective", job.objective.name())
+            .with("others", prices.len() - 1),
+    )
+}
+
+/// How near the optimum the answer is known to be, and what of.
+fn certified(job: &Job, outcome: &Outcome) -> Message {
+    if outcome.equal_deflection.is_some() {
+        return Message::new("rule_has_no_optimum");
+    }
+    if let Some(bound) = outcome.certificate.lower_bound {
+        return Message::new("whole_edges_within")
+            .with("objective", outcome.objective)
+            .with("bound", bound)
+            .with("unit", job.objective.unit())
+            .with("gap_percent", 100.0 * (1.0 - bound / outcome.objective).max(0.0));
+    }
+    // A semi-log objective is minimised as it stands.
+    let plain = matches!(job.objective, Goal::Hardening {})
+        && job.models.get(Output::Hardening).is_some_and(|model| model.form == ModelForm::SemiLog);
+    let shares = outcome
+        .whole_edge_objective
+        .filter(|whole| !is_of_whole_edges(job) && (whole - outcome.objective).abs() > 1e-6 * outcome.objective.abs());
+    Message::new(if shares.is_some() { "optimum_of_shares" } else { "optimum_within" })
+        .with("whole", shares.unwrap_or(outcome.objective))
+        .with("unit", job.objective.unit())
+        .with("gap", outcome.certificate.duality_gap.max(1e-16))
+        .with("gap_of", if plain { "objective" } else { "logarithm" })
+        .with("iterations", f64::from(outcome.certificate.iterations))
 }
 
 /// The equations that acted.

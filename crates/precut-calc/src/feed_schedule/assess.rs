@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use super::case::{Case, ZoneCase};
 use super::input::Job;
 use super::models::Output;
-use super::output::{EdgeUse, NamedValue, SurfaceUsage, ZoneOutcome};
+use super::output::{NamedValue, SurfaceUsage, ZoneOutcome};
 
 /// What a zone gives at ln V, ln S.
 pub(super) fn zone_outcome(case: &Case, job: &Job, i: usize, (u, x): (f64, f64)) -> ZoneOutcome {
@@ -75,26 +75,6 @@ pub(super) fn usage_by_surface(case: &Case, zones: &[ZoneOutcome]) -> Vec<Surfac
             usage.map(|tool_usage| SurfaceUsage { surface: surface.clone(), tool_usage })
         })
         .collect()
-}
-
-/// Surfaces per edge where the part needs several: filling every edge as far as it goes needs the fewest, because the
-/// surfaces come in a fixed order.
-pub(super) fn edges(by_surface: &[SurfaceUsage]) -> Vec<EdgeUse> {
-    let total: f64 = by_surface.iter().map(|surface| surface.tool_usage).sum();
-    if total <= 1.0 + 1e-9 {
-        return Vec::new();
-    }
-    let mut edges: Vec<EdgeUse> = Vec::new();
-    for surface in by_surface {
-        match edges.last_mut() {
-            Some(edge) if edge.tool_usage + surface.tool_usage <= 1.0 + 1e-9 => {
-                edge.surfaces.push(surface.surface.clone());
-                edge.tool_usage += surface.tool_usage;
-            }
-            _ => edges.push(EdgeUse { surfaces: vec![surface.surface.clone()], tool_usage: surface.tool_usage }),
-        }
-    }
-    edges
 }
 
 /// Largest of the values that are there.

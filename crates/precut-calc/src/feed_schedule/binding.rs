@@ -1,30 +1,27 @@
 //! Which limits bind and what they cost: multipliers read back (`feed/6.6`).
 
+use std::collections::HashMap;
+
 use super::case::Case;
-use super::input::Job;
+use super::dual::Active;
 use super::output::Binding;
-use super::program::{Label, Place};
+use super::program::{Kind, Label};
 use super::solve::Solved;
 
 /// Multipliers up to this are rounding.
 const LEAST: f64 = 1e-4;
-/// A limit nearer than this, in logarithms, binds.
-const NEAR: f64 = 1e-7;
 
 /// Binding limits of the job, the most costly first.
 pub(super) fn binding(case: &Case, solved: &Solved) -> Vec<Binding> {
     let solution = &solved.certificate;
+    let active = Active::of(solved);
+    let labels = solved.built.rows.iter().chain(&solved.built.sums);
+    let multipliers = solution.row_multipliers.iter().chain(&solution.sum_multipliers);
     let mut found: Vec<Binding> = Vec::new();
-    for (row, label) in solved.built.rows.iter().enumerate() {
-        let price = solution.row_multipliers[row];
+    for (row, (label, &price)) in labels.zip(multipliers).enumerate() {
         if price * solved.elasticity > LEAST && label.kind.is_limit() {
-            found.push(one(case, solved, label, price, has_parallel(solved, row)));
-        }
-    }
-    for (sum, label) in solved.built.sums.iter().enumerate() {
-        let price = solution.sum_multipliers[sum];
-        if price * solved.elasticity > LEAST && label.kind.is_limit() {
-            found.push(one(case, solved, label, price, false));
+            let degenerate = active.is_known() && !active.settles(&[(row, 1.0)]);
+            found.push(one(case, solved, label, price, degenerate));
         }
     }
     let mut found = merged(found);
@@ -32,15 +29,12 @@ pub(super) fn binding(case: &Case, solved: &Solved) -> Vec<Binding> {
     found
 }
 
-/// Whether it is a lower limit: one percent less of it gains, not one percent more.
-pub(super) fn is_lower(job: &Job, bound: &Binding) -> bool {
-    let least = |min: Option<f64>| min.is_some_and(|min| min.total_cmp(&bound.limit).is_eq());
-    matches!(bound.constraint.as_str(), "rpm_min" | "feed_min" | "speed_min" | "tool_life_min")
-        || job.custom.iter().any(|custom| custom.name == bound.constraint && least(custom.min))
-}
-
 fn one(case: &Case, solved: &Solved, label: &Label, price: f64, degenerate: bool) -> Binding {
-    let name = label.name(case);
+    let mut name = label.name(case);
+    if label.kind == Kind::WholeParts {
+        // It is a limit on the usage; that its number is no knob stands in the prices.
+        name.constraint = Kind::ToolUsage.name().into_owned();
+    }
     // A semi-log limit has its price per unit; one percent of it is so many units.
     let per_share = if label.plain { label.limit } else { 1.0 };
     Binding {
@@ -58,35 +52,16 @@ fn one(case: &Case, solved: &Solved, label: &Label, price: f64, degenerate: bool
 /// Rows of one name (both of a feed step, of a spread) are one limit: their multipliers add.
 fn merged(all: Vec<Binding>) -> Vec<Binding> {
     let mut out: Vec<Binding> = Vec::with_capacity(all.len());
+    let mut places: HashMap<(String, String, u64), usize> = HashMap::new();
     for next in all {
-        match out.iter_mut().find(|known| {
-            known.constraint == next.constraint && known.zone == next.zone && known.limit.total_cmp(&next.limit).is_eq()
-        }) {
-            Some(known) => {
-                known.multiplier += next.multiplier;
-                known.gain_percent += next.gain_percent;
-            }
-            None => out.push(next),
+        let key = (next.constraint.clone(), next.zone.clone(), next.limit.to_bits());
+        if let Some(&at) = places.get(&key) {
+            out[at].multiplier += next.multiplier;
+            out[at].gain_percent += next.gain_percent;
+        } else {
+            places.insert(key, out.len());
+            out.push(next);
         }
     }
     out
-}
-
-/// Whether another row binds at the same place with the same normal: only the sum of both multipliers is certain.
-fn has_parallel(solved: &Solved, row: usize) -> bool {
-    let rows = &solved.built.program.rows;
-    let Place::Zone(zone) = solved.built.rows[row].place else { return false };
-    let own: Vec<(usize, f64)> = rows.entries(row).collect();
-    let norm = |entries: &[(usize, f64)]| entries.iter().map(|(_, a)| a * a).sum::<f64>().sqrt();
-    (0..rows.len()).any(|other| {
-        if other == row || solved.built.rows[other].place != Place::Zone(zone) {
-            return false;
-        }
-        if solved.certificate.row_slacks[other] > NEAR {
-            return false;
-        }
-        let entries: Vec<(usize, f64)> = rows.entries(other).collect();
-        let dot: f64 = own.iter().map(|(i, a)| a * entries.iter().find(|(j, _)| i == j).map_or(0.0, |(_, b)| *b)).sum();
-        dot >= (1.0 - 1e-12) * norm(&own) * norm(&entries) && dot > 0.0
-    })
 }

@@ -1,4 +1,4 @@
-//! What stands of the workpiece while the program runs: where it is too thick the tool may not come in rapid motion.
+//! What stands of the workpiece before the program runs, and whether the zones fit it.
 
 use crate::calculator::{Failure, Finding};
 
@@ -22,7 +22,7 @@ pub(super) struct Turned {
     pub depth_mm: f64,
 }
 
-/// Diameters along the shaft as they stand now.
+/// Diameters along the shaft before the first cut.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Blank {
     /// Ends of the stretches, ascending.
@@ -32,11 +32,16 @@ pub(super) struct Blank {
 }
 
 impl Blank {
-    /// Before all cuts: the shaft's blank, and what the cuts need where that is more.
-    pub(super) fn of(job: &Job, cuts: &[Turned]) -> Self {
+    /// Before all cuts: the shaft's blank, and what the cuts need where that is more; with edges of their own at `further_mm`.
+    pub(super) fn of(job: &Job, cuts: &[Turned], further_mm: &[f64]) -> Self {
         let segments = segments(job);
         let mut edges_mm: Vec<f64> = segments.iter().flat_map(|segment| [segment.from_mm, segment.to_mm]).collect();
         edges_mm.extend(cuts.iter().flat_map(|cut| [cut.from_mm, cut.to_mm]));
+        if let (Some(least), Some(most)) =
+            (edges_mm.iter().copied().reduce(f64::min), edges_mm.iter().copied().reduce(f64::max))
+        {
+            edges_mm.extend(further_mm.iter().copied().filter(|z| least < *z && *z < most));
+        }
         edges_mm.sort_by(f64::total_cmp);
         edges_mm.dedup_by(|a, b| (*a - *b).abs() < LEAST_MM);
         let mut blank = Self { diameters_mm: vec![0.0; edges_mm.len().saturating_sub(1)], edges_mm };
@@ -49,19 +54,9 @@ impl Blank {
         blank
     }
 
-    /// Largest diameter.
-    pub(super) fn widest_mm(&self) -> f64 {
-        self.diameters_mm.iter().copied().fold(0.0, f64::max)
-    }
-
-    /// Largest diameter between two stations.
-    pub(super) fn widest_between_mm(&self, a_mm: f64, b_mm: f64) -> f64 {
-        self.touched(a_mm.min(b_mm), a_mm.max(b_mm)).map(|k| self.diameters_mm[k]).fold(0.0, f64::max)
-    }
-
-    /// After a cut.
-    pub(super) fn turn(&mut self, cut: &Turned) {
-        self.change(cut.from_mm, cut.to_mm, |there| there.min(cut.diameter_mm));
+    /// Ends and diameter of every stretch, along the shaft.
+    pub(super) fn stretches(&self) -> impl Iterator<Item = ([f64; 2], f64)> + '_ {
+        self.edges_mm.windows(2).map(|ends| [ends[0], ends[1]]).zip(self.diameters_mm.iter().copied())
     }
 
     fn change(&mut self, from_mm: f64, to_mm: f64, to: impl Fn(f64) -> f64) {
@@ -140,16 +135,12 @@ mod tests {
     }
 
     #[test]
-    fn what_stands_is_what_no_cut_has_taken() {
-        let cuts = [cut(0.0, 100.0, 52.0, 1.0), cut(0.0, 100.0, 50.0, 1.0), cut(100.0, 150.0, 60.0, 0.5)];
+    fn the_blank_is_what_the_cuts_need() {
+        let cuts = [cut(0.0, 100.0, 52.0, 1.0), cut(0.0, 100.0, 50.0, 1.0), cut(120.0, 150.0, 60.0, 0.5)];
         let job: Job = serde_json::from_str("{}").unwrap_or_else(|_| unreachable!("every field has a default"));
-        let mut blank = Blank::of(&job, &cuts);
-        assert_eq!((blank.widest_mm(), blank.widest_between_mm(20.0, 10.0)), (61.0, 54.0));
-        blank.turn(&cuts[0]);
-        let between = |blank: &Blank, ends: [[f64; 2]; 3]| ends.map(|[a, b]| blank.widest_between_mm(a, b));
-        // Nothing stands beyond the end.
-        assert_eq!(between(&blank, [[10.0, 100.0], [10.0, 100.1], [150.0, 170.0]]), [52.0, 61.0, 0.0]);
-        blank.turn(&cuts[1]);
-        assert_eq!(between(&blank, [[0.0, 100.0], [0.0, 1.0], [99.0, 101.0]]), [50.0, 50.0, 61.0]);
+        let blank: Vec<_> = Blank::of(&job, &cuts, &[50.0, 170.0]).stretches().collect();
+        // Nothing is known to stand between two cuts, and nothing stands beyond them.
+        let expected = [([0.0, 50.0], 54.0), ([50.0, 100.0], 54.0), ([100.0, 120.0], 0.0), ([120.0, 150.0], 61.0)];
+        assert_eq!(blank, expected);
     }
 }

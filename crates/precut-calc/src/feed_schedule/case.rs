@@ -2,6 +2,8 @@
 
 use crate::calculator::Failure;
 use crate::effects::MachinabilityEffect;
+use crate::force::Component;
+use crate::shaft::FeedDirection;
 
 use super::acting::{ActingModel, Bend, Form};
 use super::compliance::Held;
@@ -17,6 +19,8 @@ pub(super) struct Case {
     pub limits: Limits,
     pub variables: Variables,
     pub goal: Goal,
+    /// Which way the tool travels: the order in which edges wear.
+    pub direction: FeedDirection,
     pub custom: Vec<CustomCase>,
     pub couplings: Vec<CouplingCase>,
     /// Time of the passes beside the cut, min.
@@ -25,6 +29,7 @@ pub(super) struct Case {
 
 /// A zone, or one of its passes.
 #[derive(Debug, Clone)]
+#[allow(clippy::struct_excessive_bools, reason = "facts of a zone, none a state of another")]
 pub(super) struct ZoneCase {
     pub id: String,
     /// Index in the job.
@@ -35,6 +40,10 @@ pub(super) struct ZoneCase {
     pub depth_mm: f64,
     pub repeat: u32,
     pub surface: usize,
+    /// Whether the job names its surface.
+    pub names_surface: bool,
+    /// The roughing of a split into passes.
+    pub is_rough: bool,
     /// The compliance comes from the beam, not from the job.
     pub compliance_is_of_beam: bool,
     /// Largest radial compliance, um/N; `None` where nothing says it.
@@ -128,9 +137,9 @@ impl<'a> Resolver<'a> {
     /// The acting models of the known outputs at a depth.
     pub(super) fn models(&self, depth_mm: f64) -> [Option<ActingModel>; 6] {
         Output::ALL.map(|output| {
-            self.job.models.get(output).map(|model| {
+            self.job.models.at_depth(output, self.job.force.as_ref(), depth_mm).map(|model| {
                 ActingModel::of(
-                    model,
+                    &model,
                     self.effects(output.name()),
                     &self.job.conditions,
                     &self.reference,
@@ -160,6 +169,20 @@ impl<'a> Resolver<'a> {
             .collect()
     }
 
+    /// Exponent of the depth in the passive force at a depth.
+    fn depth_exponent(&self, depth_mm: f64) -> f64 {
+        if let Some(model) = &self.job.models.force_y {
+            return model.depth_exponent;
+        }
+        let Some(force) = &self.job.force else { return 0.0 };
+        let at = |depth_mm| force.monomial_at(Component::Passive, depth_mm).map(|power| power.coefficient.ln());
+        let step = 1e-4_f64;
+        match (at(depth_mm * (-step).exp()), at(depth_mm * step.exp())) {
+            (Some(low), Some(high)) if low.is_finite() && high.is_finite() => (high - low) / (2.0 * step),
+            _ => 0.0,
+        }
+    }
+
     fn zone(&self, index: usize, zone: &Zone, depth_mm: f64, surface: usize) -> ZoneCase {
         let limits = self.job.limits.as_ref();
         let general = limits.map_or(f64::INFINITY, |limits| limits.feed_max_mm_per_rev);
@@ -173,6 +196,8 @@ impl<'a> Resolver<'a> {
             depth_mm,
             repeat: zone.repeat,
             surface,
+            names_surface: zone.surface.is_some(),
+            is_rough: false,
             compliance_is_of_beam: zone.compliance_um_per_n.is_none(),
             compliance_um_per_n: zone.compliance_um_per_n,
             deflection_max_um: zone.deflection_max_um,
@@ -182,7 +207,7 @@ impl<'a> Resolver<'a> {
             feed_max_mm_per_rev: zone.feed_max_mm_per_rev.map_or(general, |own| own.min(general)),
             ceiling: None,
             touches_next: next.is_some_and(|next| (next.z_start_mm - zone.z_end_mm).abs() <= TOUCHING_MM),
-            force_depth_exponent: self.job.models.force_y.as_ref().map_or(0.0, |model| model.depth_exponent),
+            force_depth_exponent: self.depth_exponent(depth_mm),
             models: self.models(depth_mm),
             further: self.further(depth_mm),
         }
@@ -190,7 +215,7 @@ impl<'a> Resolver<'a> {
 }
 
 /// Zones nearer than this touch, mm.
-pub(super) const TOUCHING_MM: f64 = 1e-9;
+pub(super) use crate::shaft::places::SAME_MM as TOUCHING_MM;
 
 /// Names of the surfaces and the surface of every zone.
 fn surfaces(job: &Job) -> (Vec<String>, Vec<usize>) {
@@ -248,6 +273,7 @@ impl Case {
             limits,
             variables: job.variables.clone(),
             goal: job.objective.clone(),
+            direction: job.feed_direction,
             custom: Vec::new(),
             couplings: Vec::new(),
             passes_time_min: 0.0,
@@ -330,6 +356,7 @@ fn rough(resolver: &Resolver<'_>, finish: &ZoneCase, split: &PassSplit) -> ZoneC
     ZoneCase {
         id: format!("{}:rough", finish.id),
         depth_mm: split.roughing_mm,
+        is_rough: true,
         repeat: finish.repeat.saturating_mul(split.roughing_passes),
         deflection_max_um: None,
         roughness_max_um: None,

@@ -27,6 +27,7 @@ pub(super) const CODES: &[&str] = &[
     "duplicate_model_output",
     "fixed_value_missing",
     "whole_parts_per_surface",
+    "usage_above_an_edge",
     "nothing_to_minimise",
     "limit_without_bound",
     "unknown_zone",
@@ -160,6 +161,13 @@ fn check_limits(job: &Job, limits: &Limits, violations: &mut Violations) {
             order(limits.feed_min_mm_per_rev, own, &format!("/zones/{i}/feed_max_mm_per_rev"), "mm/rev");
         }
     }
+    violations.require(!(limits.whole_edges && limits.whole_parts_per_edge), || {
+        Finding::new("method_not_together", "/limits/whole_edges").with("other", "whole parts per edge")
+    });
+    let share = limits.tool_usage_max.filter(|share| limits.whole_edges && *share > 1.0);
+    violations.require(share.is_none(), || {
+        Finding::new("usage_above_an_edge", "/limits/tool_usage_max").measured(share.unwrap_or(1.0), 1.0, "1")
+    });
     violations.require(!(limits.whole_parts_per_edge && limits.tool_usage_scope == UsageScope::Surface), || {
         Finding::new("whole_parts_per_surface", "/limits/whole_parts_per_edge")
     });
@@ -187,6 +195,7 @@ fn check_needs(job: &Job, violations: &mut Violations) {
         need(limits.force_y_max_n.is_some(), Output::ForceY, "force_y_max_n");
         need(limits.tool_usage_max.is_some(), Output::ToolLife, "tool_usage_max");
         need(limits.whole_parts_per_edge, Output::ToolLife, "whole_parts_per_edge");
+        need(limits.whole_edges, Output::ToolLife, "whole_edges");
         need(limits.tool_life_min_min.is_some(), Output::ToolLife, "tool_life_min_min");
         need(limits.deflection_spread_ratio_max.is_some(), Output::ForceY, "deflection_spread_ratio_max");
     }
@@ -325,6 +334,8 @@ fn check_method(job: &Job, violations: &mut Violations) {
         violations.require(job.couplings.is_empty(), || together("couplings"));
         let whole = job.limits.as_ref().is_some_and(|limits| limits.whole_parts_per_edge);
         violations.require(!whole, || together("whole parts per edge"));
+        let whole = job.limits.as_ref().is_some_and(|limits| limits.whole_edges);
+        violations.require(!whole, || together("whole edges"));
     }
 }
 
@@ -338,10 +349,22 @@ fn check_passes(plan: &PassPlan, violations: &mut Violations) {
         violations.add(fault.with("maximum", plan.depth_max_mm));
         return;
     }
+    let (thinnest, thickest) = plan.finishing_mm();
+    if thinnest > thickest {
+        let named = plan.finishing_depth_min_mm.is_some();
+        let (field, value, limit) = if named {
+            ("finishing_depth_min_mm", thinnest, thickest)
+        } else {
+            ("finishing_depth_max_mm", thickest, thinnest)
+        };
+        let fault = fault(field, value, limit);
+        violations.add(if named { fault.with("maximum", limit) } else { fault.with("minimum", limit) });
+        return;
+    }
     let total = plan.total_depth_mm;
-    let most = plan.depth_max_mm * f64::from(plan.roughing_passes_max + 1);
-    let limit = if total < plan.depth_min_mm { plan.depth_min_mm } else { most };
-    violations.require(total >= plan.depth_min_mm && total <= most * (1.0 + 1e-12), || {
-        fault("total_depth_mm", total, limit).within(plan.depth_min_mm, most)
+    let most = plan.depth_max_mm * f64::from(plan.roughing_passes_max) + thickest;
+    let limit = if total < thinnest { thinnest } else { most };
+    violations.require(total >= thinnest && total <= most * (1.0 + 1e-12), || {
+        fault("total_depth_mm", total, limit).within(thinnest, most)
     });
 }

@@ -3,8 +3,8 @@
 
 use crate::calculator::{Calculator, Failure, Message, Monitor, checkpoint};
 use crate::deflection_compensation::{
-    self as deflection, Cut, DeflectionCompensation, Detail, Gravity, Include, PathSettings, SpeedDiameter, Stations,
-    Tolerance, Uncertainty,
+    self as deflection, Cut, DeflectionCompensation, Detail, Gravity, Include, IncludeMode, PathSettings,
+    SpeedDiameter, Stations, Tolerance, Uncertainty,
 };
 use crate::effects::DeflectionConditions;
 use crate::force::{CoefficientOrigin, ForceModel, PowerLaw, PowerTerm, ToolMaterial};
@@ -15,8 +15,9 @@ use super::models::Output;
 use super::output::{CompensatedPath, PathOfZone};
 use super::plan::Compensation;
 
-/// Stations keep this far from the ends of a zone, so that none stands on a shoulder of its neighbour, mm.
-const INSIDE_MM: f64 = 1e-6;
+/// Stations keep this far from the ends of a zone, so that none stands on a shoulder of its neighbour, mm: farther than a
+/// place that still counts as the end of a segment, much less than a step of a control.
+const INSIDE_MM: f64 = 1e-5;
 
 /// A zone's view of the schedule's monitor: it may be cancelled, its own progress is not the schedule's.
 struct OfZone<'m>(&'m dyn Monitor);
@@ -95,7 +96,7 @@ fn deflection_job(job: &Job, zone: &ZoneCase, u: f64, x: f64, wanted: &Compensat
             speed_diameter: SpeedDiameter::Finish,
             feed_direction: job.feed_direction,
         },
-        include: Include::default(),
+        include: Include { mode: IncludeMode::AsStated, ..Include::default() },
         gravity: Gravity::default(),
         stations: Stations::List { z_mm },
         stock_profile: None,
@@ -106,6 +107,8 @@ fn deflection_job(job: &Job, zone: &ZoneCase, u: f64, x: f64, wanted: &Compensat
         path: PathSettings { chord_tolerance_um: Some(wanted.chord_tolerance_um), increment_um: wanted.increment_um },
         program: job.program.clone(),
         limits: deflection::Limits::default(),
+        tailstock_thrust_n: None,
+        compare_one_step: false,
         effects: Vec::new(),
         conditions: DeflectionConditions::default(),
     })
@@ -132,6 +135,7 @@ fn force(zone: &ZoneCase, u: f64, x: f64) -> Option<ForceModel> {
         feed: None,
         wear_factor: 1.0,
         tool_material: ToolMaterial::Carbide,
+        cutting_edge_angle_deg: None,
         measured_range: None,
         origin: CoefficientOrigin::Given,
     }))

@@ -35,22 +35,22 @@ impl Held {
     pub(super) fn of(job: &Job) -> Result<Option<Self>, Failure> {
         let Some(shaft) = &job.shaft else { return Ok(None) };
         let beam = beam(shaft, &job.supports, job.feed_direction)?;
-        let mut breaks_mm = vec![0.0];
-        let mut z = 0.0;
-        for segment in &shaft.segments {
-            z += segment.length_mm;
-            breaks_mm.push(z);
-        }
+        let mut breaks_mm = shaft.ends_mm();
         breaks_mm.extend(job.supports.iter().filter_map(Support::station_mm));
         let follow = job.supports.iter().filter_map(|support| match support {
             Support::FollowRest { offset_mm, .. } => Some(*offset_mm),
             _ => None,
         });
         let of_follow: Vec<f64> =
-            follow.flat_map(|offset_mm| breaks_of_follow_rest(&breaks_mm, z, offset_mm)).collect();
+            follow.flat_map(|offset_mm| breaks_of_follow_rest(&breaks_mm, shaft.length_mm(), offset_mm)).collect();
         breaks_mm.extend(of_follow);
         breaks_mm.sort_by(f64::total_cmp);
         Ok(Some(Self { beam, carriage_um_per_n: job.carriage.compliance_um_per_n, breaks_mm }))
+    }
+
+    /// Steps and supports, where the compliance is not smooth, ascending, mm.
+    pub(super) fn breaks_mm(&self) -> impl Iterator<Item = f64> + '_ {
+        self.breaks_mm.iter().copied()
     }
 
     /// Compliance at ascending stations, um/N.
@@ -139,7 +139,7 @@ fn vertex(three: &[(f64, f64); 3]) -> Option<f64> {
 }
 
 fn beam(shaft: &Shaft, supports: &[Support], direction: FeedDirection) -> Result<Beam, Failure> {
-    let section = |diameter: f64, bore: f64| elastic::section(shaft, shaft.theory, 1.0, diameter, bore, 0.0);
+    let section = |diameter: f64, bore: f64| elastic::section(shaft, shaft.theory(), 1.0, diameter, bore, 0.0);
     let segments: Vec<beam::Segment> = shaft
         .segments
         .iter()
@@ -150,7 +150,7 @@ fn beam(shaft: &Shaft, supports: &[Support], direction: FeedDirection) -> Result
         })
         .collect();
     let supports: Vec<beam::Support> = supports.iter().map(|support| elastic::support(support, 0.0, None)).collect();
-    let state = match (shaft.section, direction) {
+    let state = match (shaft.section(), direction) {
         (Section::Finished, _) => beam::State::Finished,
         (Section::Stock, _) => beam::State::Stock,
         (Section::Mixed, FeedDirection::ToHeadstock) => beam::State::Mixed { stock_side: beam::Side::Left },

@@ -410,6 +410,8 @@ fn solve_cells(case: &Case, gradient: Option<f64>, monitor: &dyn Monitor) -> Res
         gain: 1.0,
         tie_broken: false,
         parts_per_edge: None,
+        one_part_more: None,
+        whole: None,
         linearisations: 0,
         local: false,
         conic: false,

@@ -1,6 +1,6 @@
 //! How measured cuts hang together: repeats, regressors without physics, groups, the order of testing.
 
-use crate::calculator::{Design, Grouping, Smooth};
+use crate::calculator::{Condition, Design, Grouping, Smooth};
 
 use super::forward::{PreparedMachinability, Row};
 use super::hypotheses::same;
@@ -19,23 +19,59 @@ pub(super) fn design(prepared: &PreparedMachinability) -> Design {
     let count = cell.iter().copied().max().map_or(0, |most| most + 1);
     let pairs: [(&'static str, Of, Of); 3] =
         [("speed_and_feed", speed, feed), ("speed_and_depth", speed, depth), ("feed_and_depth", feed, depth)];
-    let groupings = pairs
+    let mut groupings: Vec<Grouping> = pairs
         .into_iter()
-        .map(|(name, first, second)| Grouping { name, group: groups(rows, first, second) })
+        .map(|(name, first, second)| Grouping { name, over: Vec::new(), group: groups(rows, first, second) })
         // A level for every condition, or for none, would be scatter or a shift.
         .filter(|grouping| {
             let groups = grouping.group.iter().copied().max().map_or(0, |most| most + 1);
             groups > 1 && groups < count
         })
         .collect();
+    groupings.extend(levels(rows));
     Design {
         smooth: Smooth::None,
         fold: cell.iter().map(|cell| cell % MOST_FOLDS).collect(),
         cell,
         regressors: regressors(rows),
         groupings,
+        conditions: conditions(rows),
         order: order(rows),
     }
+}
+
+/// Levels of every factor, and of the batch, that has more than two: of two the second is shifted, which has a name.
+fn levels(rows: &[Row]) -> Vec<Grouping> {
+    let place = |levels: &[String], own: Option<&str>| levels.iter().position(|level| Some(level.as_str()) == own);
+    let of_batch = {
+        let levels = batches(rows);
+        let group = rows.iter().map(|row| place(&levels, row.conditions.batch.as_deref()).unwrap_or(0)).collect();
+        ("batch".to_owned(), levels, group)
+    };
+    let of_factor = |(name, levels): (String, Vec<String>)| {
+        let group = rows.iter().map(|row| place(&levels, row.conditions.level(&name)).unwrap_or(0)).collect();
+        (name, levels, group)
+    };
+    let all = std::iter::once(of_batch).chain(factors(rows).into_iter().map(of_factor));
+    let many = all.filter(|(_, levels, _): &(String, Vec<String>, Vec<usize>)| levels.len() > 2);
+    many.map(|(name, _, group)| Grouping { name: "factor", over: vec![name], group }).collect()
+}
+
+/// What every row states as a number and what differs between them.
+fn conditions(rows: &[Row]) -> Vec<Condition> {
+    type Stated = fn(&Row) -> Option<f64>;
+    let known: [(&'static str, Stated); 7] = [
+        ("speed", |row| Some(row.u)),
+        ("feed", |row| Some(row.x)),
+        ("depth", |row| Some(row.depth_mm.ln())),
+        ("edge_angle", |row| row.angle_deg),
+        ("nose_radius", |row| row.nose_radius_mm),
+        ("flank_wear", |row| row.conditions.flank_wear_mm),
+        ("time", |row| row.conditions.time_min),
+    ];
+    let stated =
+        known.into_iter().filter_map(|(name, of)| Some((name, rows.iter().map(of).collect::<Option<Vec<_>>>()?)));
+    stated.filter_map(|(name, values)| Condition::of(name, &values)).collect()
 }
 
 type Of = fn(&Row) -> f64;

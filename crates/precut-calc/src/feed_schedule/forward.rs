@@ -205,6 +205,10 @@ impl Diagnosable for FeedSchedule {
         job: include_str!("examples/diagnosis_built_up_edge.json"),
     }];
 
+    fn allowed(allowances: &MachinabilityAllowances, normal: &mut dyn FnMut() -> f64) -> Vec<Effect> {
+        vec![Effect::LevelShift { delta_ln: allowances.level_rel * normal(), output: None }]
+    }
+
     fn hypotheses(prepared: &PreparedMachinability) -> Hypotheses {
         prepared.hypotheses()
     }

@@ -5,7 +5,7 @@ use crate::num::gp::{self, Affines, Objective, Program, Verdict};
 
 use super::case::Case;
 use super::input::Goal;
-use super::program::{Built, Label, Variation, build};
+use super::program::{Built, Kind, Label, Variation, build};
 
 /// What stands against a schedule.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -36,29 +36,96 @@ pub(super) fn analyse(case: &Case, variation: &Variation<'_>) -> Result<Infeasib
 
 type Relaxed = (f64, bool, Vec<(ConstraintName, f64)>);
 
+/// Tolerances of the general solver, tried in turn.
+const TOLERANCES: [f64; 4] = [1e-9, 1e-8, 1e-7, 1e-6];
+/// What a user gives beyond what is told, in logarithms; half of it has to be enough.
+const BEYOND: f64 = 1e-3;
+
 fn relax(case: &Case, built: &Built) -> Result<Relaxed, Failure> {
-    for all in [false, true] {
-        let (program, labels) = elastic(built, all);
-        let Ok(solution) = gp::conic::minimise(&program, 1e-9) else { continue };
-        let first = built.program.variables();
-        let mut relaxations: Vec<(ConstraintName, f64)> = labels
-            .iter()
-            .zip(&solution.y[first..])
-            .filter(|(_, rho)| **rho > NONE)
-            .map(|(label, rho)| {
-                let factor = match (label.plain, label.lower) {
-                    (true, false) => 1.0 + rho,
-                    (true, true) => 1.0 - rho,
-                    (false, false) => rho.exp(),
-                    (false, true) => (-rho).exp(),
-                };
-                (label.name(case), factor)
-            })
-            .collect();
-        relaxations.sort_by(|a, b| b.1.ln().abs().total_cmp(&a.1.ln().abs()));
-        return Ok((solution.objective, all, relaxations));
+    let stalled = || Failure::NotConverged { what: "the least relaxation", residual: f64::INFINITY, iterations: 200 };
+    // Requirements give first; machine and data only where they alone leave nothing.
+    let hard = |labels: &[Label]| -> Vec<usize> {
+        let is_hard = |label: &Label| label.kind.is_limit() && !label.kind.is_requirement();
+        labels.iter().enumerate().filter(|(_, label)| is_hard(label)).map(|(k, _)| k).collect()
+    };
+    let verdict = gp::feasibility(&built.program, &hard(&built.rows), &hard(&built.sums)).map_err(|_| stalled())?;
+    let all = verdict != Verdict::Feasible;
+    let (program, labels) = elastic(built, all);
+    let first = built.program.variables();
+    let solution = TOLERANCES
+        .iter()
+        .find_map(|&tolerance| gp::conic::minimise(&program, tolerance).ok())
+        .or_else(|| gp::minimise(&program, &gp::Settings { iterations: 200, ..gp::Settings::default() }).ok())
+        .ok_or_else(stalled)?;
+    let rho = &solution.y[first..];
+    // What is told is tried: small relaxations are left out only where the others are enough without them.
+    let mut told: Vec<f64> = rho.to_vec();
+    for (least, more) in [(NONE, 0.0), (1e-9, 0.0), (1e-9, BEYOND), (0.0, 10.0 * BEYOND)] {
+        told = rho.iter().map(|rho| if *rho > least { rho + more } else { 0.0 }).collect();
+        if is_enough(built, all, &told) {
+            break;
+        }
     }
-    Err(Failure::NotConverged { what: "the least relaxation", residual: f64::INFINITY, iterations: 200 })
+    Ok((solution.objective, all, named(case, &labels, &told)))
+}
+
+/// Relaxations with names and factors, the largest first.
+fn named(case: &Case, labels: &[Label], rho: &[f64]) -> Vec<(ConstraintName, f64)> {
+    let mut relaxations: Vec<(ConstraintName, f64)> = Vec::new();
+    // A spread stands between any two zones: the one ratio gives by both largest shares.
+    let mut spread = [0.0_f64; 2];
+    let mut before: Option<&Label> = None;
+    for (label, &rho) in labels.iter().zip(rho) {
+        if label.kind == Kind::Spread {
+            let upper = usize::from(before == Some(label));
+            spread[upper] = spread[upper].max(rho);
+        } else if rho > 0.0 {
+            relaxations.push((label.name(case), factor(label, rho)));
+        }
+        before = Some(label);
+    }
+    if spread[0] + spread[1] > 0.0 {
+        let name = ConstraintName { constraint: Kind::Spread.name().into_owned(), zone: "part".to_owned() };
+        relaxations.push((name, (spread[0] + spread[1]).exp()));
+    }
+    relaxations.sort_by(|a, b| b.1.ln().abs().total_cmp(&a.1.ln().abs()));
+    relaxations
+}
+
+/// By what a limit is multiplied.
+fn factor(label: &Label, rho: f64) -> f64 {
+    match (label.plain, label.lower) {
+        (true, false) => 1.0 + rho,
+        (true, true) => 1.0 - rho,
+        (false, false) => rho.exp(),
+        (false, true) => (-rho).exp(),
+    }
+}
+
+/// Whether a limit may give.
+fn is_elastic(label: &Label, all: bool) -> bool {
+    label.kind.is_limit() && (all || label.kind.is_requirement())
+}
+
+/// Whether a schedule exists with these relaxations, each that is not nothing taken a little further.
+fn is_enough(built: &Built, all: bool, rho: &[f64]) -> bool {
+    let mut program = built.program.clone();
+    let mut next = rho.iter();
+    let mut give = |label: &Label| {
+        let rho = if is_elastic(label, all) { next.next().copied().unwrap_or(0.0) } else { 0.0 };
+        let scale = if label.plain { label.limit.abs() } else { 1.0 };
+        if rho > 0.0 { -scale * (rho + 0.5 * BEYOND) } else { 0.0 }
+    };
+    for (row, label) in built.rows.iter().enumerate() {
+        program.rows.shift(row, give(label));
+    }
+    for (sum, label) in built.sums.iter().enumerate() {
+        let by = give(label);
+        (0..program.sums[sum].len()).for_each(|term| program.sums[sum].shift(term, by));
+    }
+    let rows: Vec<usize> = (0..program.rows.len()).collect();
+    let sums: Vec<usize> = (0..program.sums.len()).collect();
+    matches!(gp::feasibility(&program, &rows, &sums), Ok(Verdict::Feasible))
 }
 
 /// Every elastic limit with a relaxation of its own; their sum is least.
@@ -67,10 +134,9 @@ fn elastic(built: &Built, all: bool) -> (Program, Vec<Label>) {
     let mut labels = Vec::new();
     let mut next = base.variables();
     let mut rows = Affines::new();
-    let elastic = |label: &Label| label.kind.is_limit() && (all || label.kind.is_requirement());
     for (row, label) in built.rows.iter().enumerate() {
         let mut entries: Vec<(usize, f64)> = base.rows.entries(row).collect();
-        if elastic(label) {
+        if is_elastic(label, all) {
             let scale = if label.plain { label.limit.abs() } else { 1.0 };
             entries.push((next, -scale));
             labels.push(label.clone());
@@ -80,7 +146,7 @@ fn elastic(built: &Built, all: bool) -> (Program, Vec<Label>) {
     }
     let mut sums = Vec::new();
     for (terms, label) in base.sums.iter().zip(&built.sums) {
-        if elastic(label) {
+        if is_elastic(label, all) {
             sums.push(terms.with_entry(next, -1.0));
             labels.push(label.clone());
             next += 1;
@@ -127,25 +193,39 @@ fn conflict(case: &Case, built: &Built) -> Result<Vec<ConstraintName>, Failure> 
     if test(&members)? == Verdict::Feasible {
         members = everything;
     }
-    let mut k = 0;
-    while k < members.len() {
-        let mut without = members.clone();
-        without.remove(k);
-        match test(&without)? {
-            Verdict::Feasible => k += 1,
-            Verdict::Infeasible { rows, sums, .. } => {
-                // The new certificate may leave out others behind this one as well; those before are needed.
-                let kept = supported(&without, &rows, &sums, count);
-                let still: Vec<usize> =
-                    without.iter().enumerate().filter(|(at, m)| *at < k || kept.contains(m)).map(|(_, m)| *m).collect();
-                let shrunk = still.len() < without.len() && matches!(test(&still)?, Verdict::Infeasible { .. });
-                members = if shrunk { still } else { without };
+    // Many at once first: of what is not needed most goes in few tests.
+    let mut size = (members.len() / 4).max(1);
+    loop {
+        let mut k = 0;
+        while k < members.len() {
+            let end = (k + size).min(members.len());
+            let without: Vec<usize> = [&members[..k], &members[end..]].concat();
+            match test(&without)? {
+                Verdict::Feasible => k = end,
+                Verdict::Infeasible { rows, sums, .. } => {
+                    // The new certificate may leave out others behind these as well; those before are needed.
+                    let kept = supported(&without, &rows, &sums, count);
+                    let still: Vec<usize> = without
+                        .iter()
+                        .enumerate()
+                        .filter(|(at, m)| *at < k || kept.contains(m))
+                        .map(|(_, m)| *m)
+                        .collect();
+                    let shrunk = still.len() < without.len() && matches!(test(&still)?, Verdict::Infeasible { .. });
+                    members = if shrunk { still } else { without };
+                }
             }
         }
+        if size == 1 {
+            break;
+        }
+        size = (size / 4).max(1);
     }
     let label = |k: usize| if k < program.rows.len() { &built.rows[k] } else { &built.sums[k - program.rows.len()] };
     members.sort_unstable();
-    Ok(members.into_iter().map(|k| label(k).name(case)).collect())
+    let mut names: Vec<ConstraintName> = members.into_iter().map(|k| label(k).name(case)).collect();
+    names.dedup();
+    Ok(names)
 }
 
 fn split(members: &[usize], rows: usize) -> (Vec<usize>, Vec<usize>) {

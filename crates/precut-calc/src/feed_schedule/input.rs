@@ -13,7 +13,7 @@ use crate::force::ForceModel;
 use crate::shaft::{Carriage, FeedDirection, Shaft, Support};
 
 /// Most zones of a job.
-pub const MAX_ZONES: usize = 400;
+pub const MAX_ZONES: usize = 2000;
 /// Places of a zone's ends that the schema allows, mm.
 const ZONE_MM: RangeInclusive<f64> = 0.0..=1e6;
 
@@ -38,7 +38,7 @@ pub struct Job {
     pub carriage: Carriage,
     /// Zones in order of z, without overlap; gaps are allowed and cut the chain of feed steps.
     #[serde(default)]
-    #[schema(max_items = 400, extensions(("x-group" = json!("workpiece"))))]
+    #[schema(max_items = 2000, extensions(("x-group" = json!("workpiece"))))]
     pub zones: Vec<Zone>,
     /// What comes out of a cut, as functions of speed, feed, depth and edge angle.
     #[serde(default)]
@@ -138,7 +138,8 @@ pub struct Zone {
     #[serde(default = "one_u32")]
     #[schema(minimum = 1, maximum = 1000, default = 1, example = 1, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("r"))))]
     pub repeat: u32,
-    /// Surface that it is part of: the tool is not changed inside one. Zones without form one, `part`.
+    /// Surface that it is part of: the tool is not changed inside one that an edge can cut. Zones without one stand each
+    /// by itself; with `tool_usage_scope` `surface` they form one, `part`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(min_length = 1, max_length = 64, example = "A")]
     pub surface: Option<String>,
@@ -255,6 +256,11 @@ pub struct Limits {
     #[serde(default)]
     #[schema(default = false, example = true)]
     pub whole_parts_per_edge: bool,
+    /// Edges are paid whole and changed between surfaces, or after a whole number of parts: where the changes fall is
+    /// found with the schedule. `tool_usage_max` is then the share of each edge that may be used, at most 1.
+    #[serde(default)]
+    #[schema(default = false, example = true)]
+    pub whole_edges: bool,
     /// Least tool life at the conditions of any zone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-6, maximum = 1e6, example = 15.0, extensions(("x-unit" = json!("min")), ("x-symbol" = json!("T_min"))))]

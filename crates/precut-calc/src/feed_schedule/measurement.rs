@@ -60,6 +60,8 @@ fn one() -> u32 {
 
 impl MeasuredRow for MachinabilityMeasurement {
     const MAX_ROWS: usize = 20_000;
+    const MEASURED: &'static [&'static str] =
+        &["force_z_n", "force_y_n", "tool_life_min", "roughness_um", "hardening_percent", "hardening_depth_um"];
 }
 
 impl Measurement for MachinabilityMeasurement {

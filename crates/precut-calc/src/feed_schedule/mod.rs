@@ -26,6 +26,9 @@ mod conditions;
 mod consequence;
 mod continuous;
 mod design;
+mod driven;
+mod dual;
+mod edges;
 mod effects;
 pub mod fit;
 mod forward;
@@ -40,12 +43,15 @@ mod output;
 mod passes;
 mod picture;
 mod plan;
+mod prices;
 mod program;
 mod rule;
 mod run;
+mod scatter;
 mod segments;
 mod solve;
 mod toolpath;
+mod whole;
 mod words;
 
 pub use forward::{MachinabilityAllowances, MachinabilityPoint, MachinabilityRun};
@@ -56,14 +62,16 @@ pub use input::{
 pub use measurement::MachinabilityMeasurement;
 pub use models::{FurtherModel, Models, Output};
 pub use output::{
-    Binding, Certificate, Comparison, CompensatedPath, ConstantFeed, Continuous, EdgeUse, EqualDeflection, NamedValue,
-    Outcome, PassTrial, PassesOutcome, PathOfZone, SegmentTime, Solver, SurfaceUsage, TradePoint, ZoneOutcome,
+    Binding, Certificate, ChangePlace, Comparison, CompensatedPath, ConstantFeed, Continuous, EdgeUse, EqualDeflection,
+    Looser, NamedValue, NextWhole, Outcome, PassTrial, PassesOutcome, PathOfZone, Price, PriceBasis, SegmentTime,
+    Solver, SurfaceUsage, ToolChange, TradePoint, ZoneOutcome,
 };
 pub use plan::{Compensation, EqualTarget, Method, PassPlan, TradeOff, TradedLimit};
 
 use crate::calculator::{
     Answer, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Hallmark, Meta, Monitor, Program, Table,
 };
+use crate::shaft::places;
 use crate::{force, shaft};
 
 /// The geometric program of a checked and filled job, as its solver gets it: for other solvers and for measurements.
@@ -91,7 +99,7 @@ impl Calculator for FeedSchedule {
     const META: Meta = Meta {
         id: "feed-schedule",
         kind: CalculatorKind::Calculator,
-        version: 4,
+        version: 5,
         title: "Feed schedule",
         question: "Which feed and speed in which zone: fastest within tolerance, roughness, tool life and power?",
         summary: "From a shaft in its supports, models of force, tool life and surface, and limits: feed and speed of \
@@ -146,11 +154,20 @@ impl Calculator for FeedSchedule {
     };
 
     fn fill(job: &mut Job) {
+        let mut ends_mm = Vec::new();
         if let Some(shaft) = &mut job.shaft {
             shaft.fill();
+            ends_mm = shaft.ends_mm();
         }
         for support in &mut job.supports {
-            support.fill();
+            support.fill(&ends_mm);
+        }
+        for zone in &mut job.zones {
+            let settled = [zone.z_start_mm, zone.z_end_mm].map(|z_mm| places::settled(z_mm, &ends_mm));
+            // A zone so short that both its ends are one end of a segment stays as it is: nothing of it would be left.
+            if settled[0] < settled[1] {
+                [zone.z_start_mm, zone.z_end_mm] = settled;
+            }
         }
         if let Some(force) = &mut job.force {
             force.fill();
@@ -189,6 +206,9 @@ impl Calculator for FeedSchedule {
         if job.limits.as_ref().is_some_and(|limits| limits.whole_parts_per_edge) {
             ms *= 10.0;
         }
+        if job.limits.as_ref().is_some_and(|limits| limits.whole_edges) {
+            ms *= whole::programs(job.zones.len()) as f64 / 8.0;
+        }
         Cost { ms, bytes: 1_000_000 + job.zones.len() as u64 * 20_000, driver }
     }
 
@@ -212,18 +232,21 @@ impl Calculator for FeedSchedule {
 /// Everything that this calculator may utter, from where it is said.
 const CODES: Codes = Codes {
     faults: &[check::CODES, effects::CODES, forward::CODES, shaft::check::CODES, force::FAULT_CODES],
-    failures: &[&[
-        "no_zones",
-        "nothing_bends",
-        "schedule_out_of_reach",
-        "infeasible_schedule",
-        "no_pass_split",
-        "too_few_segments",
-        "gradient_with_bending_model",
-        "zone_off_drawing",
-        "zone_off_blank",
-        "tool_hits_chuck",
-    ]],
+    failures: &[
+        &[
+            "no_zones",
+            "nothing_bends",
+            "schedule_out_of_reach",
+            "infeasible_schedule",
+            "no_pass_split",
+            "too_few_segments",
+            "gradient_with_bending_model",
+            "zone_off_drawing",
+            "zone_off_blank",
+            "tool_hits_chuck",
+        ],
+        crate::turning::Proof::CODES,
+    ],
     warnings: &[advice::WARNING_CODES],
     explanations: &[advice::EXPLANATION_CODES],
     stages: &[&["stage_passes", "stage_continuous", "stage_segments", "stage_comparison", "stage_path", "stage_done"]],

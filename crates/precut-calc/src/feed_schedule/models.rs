@@ -1,9 +1,11 @@
 //! The set of machinability models of a job.
 
+use std::borrow::Cow;
+
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::force::{ForceModel, MeasuredRange};
+use crate::force::{Component, ForceModel, MeasuredRange};
 use crate::machinability::{self, MachinabilityModel, ModelRange};
 
 /// What comes out of a cut. A model that is not given is taken from the library's set where one is named.
@@ -132,7 +134,25 @@ impl Models {
     pub(super) fn has(&self, output: Output, force: Option<&ForceModel>) -> bool {
         self.get(output).is_some()
             || self.of_library(output).is_some()
-            || force.is_some_and(|force| of_force(force, output).is_some())
+            || force.is_some_and(|force| of_force(force, output).is_some() || by_depth(force, output))
+    }
+
+    /// The model that acts at a depth: that of the job, or the job's force at this very depth. A force of none at all, as
+    /// the passive one of a sharp edge at 90 degrees, is none.
+    pub(super) fn at_depth(
+        &self,
+        output: Output,
+        force: Option<&ForceModel>,
+        depth_mm: f64,
+    ) -> Option<Cow<'_, MachinabilityModel>> {
+        if let Some(model) = self.get(output) {
+            return Some(Cow::Borrowed(model));
+        }
+        let power = force?.monomial_at(component_of(output)?, depth_mm)?;
+        (power.coefficient > 0.0).then(|| {
+            let (constant, speed, feed) = (power.coefficient.ln(), power.speed_exponent, power.feed_exponent);
+            Cow::Owned(MachinabilityModel::power_law(constant, speed, feed, 0.0))
+        })
     }
 
     /// The model that acts, whether given, of the library, or out of a force model.
@@ -145,6 +165,10 @@ impl Models {
 
     /// Whether the job's force model says nothing, because the models of the forces are given otherwise.
     pub(super) fn ignore(&self, force: &ForceModel) -> bool {
+        if [Output::ForceY, Output::ForceZ].iter().any(|&output| self.get(output).is_none() && by_depth(force, output))
+        {
+            return false;
+        }
         let laws = [Output::ForceY, Output::ForceZ].map(|output| (self.get(output), of_force(force, output)));
         laws.iter().all(|(model, law)| law.is_none() || model.map(law_of) != law.as_ref().map(law_of))
     }
@@ -180,14 +204,23 @@ fn law_of(model: &MachinabilityModel) -> [f64; 5] {
     [model.constant, model.speed_exponent, model.feed_exponent, model.depth_exponent, model.angle_exponent]
 }
 
+fn component_of(output: Output) -> Option<Component> {
+    match output {
+        Output::ForceY => Some(Component::Passive),
+        Output::ForceZ => Some(Component::Main),
+        _ => None,
+    }
+}
+
+/// Whether the force is a product of powers of feed and speed at every depth, but not over depths.
+fn by_depth(force: &ForceModel, output: Output) -> bool {
+    let at = |component| force.monomial(component).is_none() && force.monomial_at(component, 1.0).is_some();
+    component_of(output).is_some_and(at)
+}
+
 /// The power law of a force component, where the force model is one without a constant part (`deflection/6.1`).
 fn of_force(force: &ForceModel, output: Output) -> Option<MachinabilityModel> {
-    let component = match output {
-        Output::ForceY => crate::force::Component::Passive,
-        Output::ForceZ => crate::force::Component::Main,
-        _ => return None,
-    };
-    let power = force.monomial(component)?;
+    let power = force.monomial(component_of(output)?)?;
     let mut model = MachinabilityModel::power_law(
         power.coefficient.ln(),
         power.speed_exponent,

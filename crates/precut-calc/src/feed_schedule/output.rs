@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
+
+use crate::turning::Proof;
 use utoipa::openapi::Schema;
 use utoipa::openapi::extensions::Extensions;
 use utoipa::openapi::schema::{ArrayBuilder, ObjectBuilder, SchemaType, Type};
@@ -35,9 +37,20 @@ pub struct Outcome {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(example = 2, extensions(("x-unit" = json!("1"))))]
     pub parts_per_edge: Option<u32>,
-    /// Where the edge is changed, if the part needs several: contiguous surfaces per edge.
+    /// The edges of one part in the order in which they cut; at most the first 1000. Empty without a tool life.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub edges: Vec<EdgeUse>,
+    /// Edges that one part takes: below 1 where an edge serves several whole parts.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 2.0, extensions(("x-unit" = json!("1"))))]
+    pub edges_per_part: Option<f64>,
+    /// Where the tool is changed, in the order of the cut, the change between parts last; at most the first 1000.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tool_changes: Vec<ToolChange>,
+    /// What this very plan comes to with whole edges in place of shares of them, in the unit of `objective_unit`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 41.79, extensions(("x-unit" = json!("as objective_unit says"))))]
+    pub whole_edge_objective: Option<f64>,
     /// Largest radial deflection; the diameter error is twice that. Not reduced by compensation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(example = 10.0, extensions(("x-unit" = json!("um"))))]
@@ -58,6 +71,9 @@ pub struct Outcome {
     pub zones: Vec<ZoneOutcome>,
     /// Limits that bind, the most costly first.
     pub binding: Vec<Binding>,
+    /// What every number of the job that binds costs, one price for one number, the most costly first; whole numbers last.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub prices: Vec<Price>,
     /// How near to the optimum the answer provably is.
     pub certificate: Certificate,
     /// The same part with one feed, and by the source paper's rule.
@@ -74,6 +90,9 @@ pub struct Outcome {
     /// The curve of the objective over a tolerance, where one was asked for.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub trade_off: Vec<TradePoint>,
+    /// The program, driven over the blank before it is given out; absent where its zones do not fit the shaft.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub proof: Option<Proof>,
     /// The compensated path, where one was asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub compensated_path: Option<CompensatedPath>,
@@ -209,15 +228,60 @@ impl ZoneOutcome {
 }
 
 /// What one cutting edge cuts.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EdgeUse {
-    /// The surfaces, in order.
+    /// The surfaces, in the order of the cut.
     #[schema(example = json!(["A", "B"]))]
     pub surfaces: Vec<String>,
-    /// Share of the edge that they use; above 1 where one surface alone uses more.
+    /// The zones, in the order of the cut; one that wears out an edge goes on with the next.
+    #[schema(example = json!(["z1", "z2"]))]
+    pub zones: Vec<String>,
+    /// Share of the edge that one part uses.
     #[schema(example = 0.9, extensions(("x-unit" = json!("1"))))]
     pub tool_usage: f64,
+}
+
+/// A change of the tool.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ToolChange {
+    /// Where it falls.
+    #[schema(example = "between_zones")]
+    pub place: ChangePlace,
+    /// Which edge of the part begins here, from 1 in the order of the cut.
+    #[schema(example = 2, extensions(("x-unit" = json!("1"))))]
+    pub edge: u32,
+    /// The zone that the worn edge cut last.
+    #[schema(example = "z2")]
+    pub after_zone: String,
+    /// The zone that the fresh edge cuts first.
+    #[schema(example = "z3")]
+    pub before_zone: String,
+    /// The pass over that zone with which it begins, from 1.
+    #[schema(example = 1, extensions(("x-unit" = json!("1"))))]
+    pub pass: u32,
+    /// Where along the shaft it begins.
+    #[schema(example = 320.0, extensions(("x-unit" = json!("mm"))))]
+    pub z_mm: f64,
+    /// Share used of the edge that is taken out.
+    #[schema(example = 0.93, extensions(("x-unit" = json!("1"))))]
+    pub tool_usage: f64,
+    /// It falls on every so many parts.
+    #[schema(example = 1, extensions(("x-unit" = json!("1"))))]
+    pub every_parts: u32,
+}
+
+/// Where a change of the tool falls.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ChangePlace {
+    /// Before the first cut of a zone.
+    BetweenZones,
+    /// Inside a zone whose surface alone takes more than an edge: the cut is interrupted.
+    InsideZone,
+    /// After the part, before the next one.
+    BetweenParts,
 }
 
 /// A limit that binds and what it costs.
@@ -245,9 +309,83 @@ pub struct Binding {
     /// What one percent more of the limit takes off the objective, in percent of it; with the objective `hardening` in percentage points.
     #[schema(example = 0.34, extensions(("x-unit" = json!("percent"))))]
     pub gain_percent: f64,
-    /// Other limits that bind at the same place in the same way: only the sum of their multipliers is certain.
+    /// Other limits hold at the optimum beside it, so that its multiplier is one of several: alone it may buy nothing. `prices` has what numbers of the job buy.
     #[schema(example = false)]
     pub degenerate: bool,
+}
+
+/// What a number of the job costs, over all limits that it enters.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Price {
+    /// The number's place in the job.
+    #[schema(example = "/machine/power_kw")]
+    pub pointer: String,
+    /// The limit that it is called by.
+    #[schema(example = "power")]
+    pub constraint: String,
+    /// Where it holds: a zone, or `part`.
+    #[schema(example = "part")]
+    pub zone: String,
+    /// The number, in `unit`.
+    #[schema(example = 7.5, extensions(("x-unit" = json!("as unit says"))))]
+    pub limit: f64,
+    /// Its unit.
+    #[schema(example = "kW")]
+    pub unit: String,
+    /// Whether more or less of it is looser.
+    #[schema(example = "more")]
+    pub looser: Looser,
+    /// What one percent looser takes off the objective, in percent of it; with the objective `hardening` in percentage points. Absent for whole numbers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 0.893, extensions(("x-unit" = json!("percent"))))]
+    pub gain_percent: Option<f64>,
+    /// What one percent tighter adds to it, where that is something else.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 1.2, extensions(("x-unit" = json!("percent"))))]
+    pub loss_percent: Option<f64>,
+    /// What the price rests on.
+    #[schema(example = "multipliers")]
+    pub basis: PriceBasis,
+    /// What the next whole number comes to.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub next: Option<NextWhole>,
+}
+
+/// Which way a number gives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Looser {
+    /// More of it is looser.
+    More,
+    /// Less of it is looser.
+    Less,
+}
+
+/// What a price rests on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum PriceBasis {
+    /// The multipliers of the optimum, which settle it: the same both ways.
+    Multipliers,
+    /// A schedule solved anew with the number changed by a hundredth of a percent either way: looser and tighter differ.
+    SolvedAnew,
+    /// The multipliers of the optimum, which are one of several sets: not solved anew.
+    OneOfSeveral,
+    /// A whole number: it has a neighbour and no price.
+    Whole,
+}
+
+/// The next whole number.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NextWhole {
+    /// Parts per edge.
+    #[schema(example = 13, extensions(("x-unit" = json!("1"))))]
+    pub parts_per_edge: u32,
+    /// The objective with it.
+    #[schema(example = 39.1, extensions(("x-unit" = json!("as objective_unit says"))))]
+    pub objective: f64,
 }
 
 /// How near to the optimum the answer provably is.
@@ -263,6 +401,10 @@ pub struct Certificate {
     /// Largest violation of a limit, in logarithms, or in the unit of a semi-log limit.
     #[schema(example = 1e-12, extensions(("x-unit" = json!("1"))))]
     pub primal_residual: f64,
+    /// With whole edges: no plan of them comes below, in the unit of `objective_unit`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 34.876, extensions(("x-unit" = json!("as objective_unit says"))))]
+    pub lower_bound: Option<f64>,
     /// Newton steps.
     #[schema(example = 9, extensions(("x-unit" = json!("1"))))]
     pub iterations: u32,

@@ -68,13 +68,14 @@ pub(super) fn best(
 /// Least and largest depth of the finishing pass.
 fn range(plan: &PassPlan, roughing: u32) -> Option<(f64, f64)> {
     let (least, most, total) = (plan.depth_min_mm, plan.depth_max_mm, plan.total_depth_mm);
+    let (thinnest, thickest) = plan.finishing_mm();
     let slack = 1e-12 * total;
     if roughing == 0 {
-        return (total >= least - slack && total <= most + slack).then_some((total, total));
+        return (total >= thinnest - slack && total <= thickest + slack).then_some((total, total));
     }
     let k = f64::from(roughing);
-    let low = least.max(total - k * most);
-    let mut high = most.min(total - k * least);
+    let low = thinnest.max(total - k * most);
+    let mut high = thickest.min(total - k * least);
     if plan.finishing_not_deeper {
         high = high.min(total / (k + 1.0));
     }

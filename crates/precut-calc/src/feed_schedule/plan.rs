@@ -91,6 +91,14 @@ pub struct PassPlan {
     /// Largest depth of a pass.
     #[schema(minimum = 1e-3, maximum = 1000.0, example = 3.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("t_max"))))]
     pub depth_max_mm: f64,
+    /// Least depth of the finishing pass, where it is another than that of a roughing pass.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-3, maximum = 1000.0, example = 0.2, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("t_f,min"))))]
+    pub finishing_depth_min_mm: Option<f64>,
+    /// Largest depth of the finishing pass, where it is another than that of a roughing pass.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-3, maximum = 1000.0, example = 1.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("t_f,max"))))]
+    pub finishing_depth_max_mm: Option<f64>,
     /// Whether the finishing pass may not be deeper than a roughing pass.
     #[serde(default = "yes")]
     #[schema(default = true, example = true)]
@@ -99,6 +107,16 @@ pub struct PassPlan {
     #[serde(default)]
     #[schema(minimum = 0.0, maximum = 1e6, default = 0.0, example = 0.51, extensions(("x-unit" = json!("min")), ("x-symbol" = json!("t_p"))))]
     pub time_per_pass_min: f64,
+}
+
+impl PassPlan {
+    /// Least and largest depth of the finishing pass.
+    pub(super) fn finishing_mm(&self) -> (f64, f64) {
+        (
+            self.finishing_depth_min_mm.unwrap_or(self.depth_min_mm),
+            self.finishing_depth_max_mm.unwrap_or(self.depth_max_mm),
+        )
+    }
 }
 
 fn four() -> u32 {

@@ -21,6 +21,10 @@ pub(super) enum Kind {
     HardeningDepth,
     ToolLifeMin,
     ToolUsage,
+    /// A whole number of parts per edge.
+    WholeParts,
+    /// What one edge cuts, with whole edges.
+    WholeEdge,
     TimeMax,
     Power,
     Torque,
@@ -53,6 +57,8 @@ impl Kind {
             Self::HardeningDepth => "hardening_depth",
             Self::ToolLifeMin => "tool_life_min",
             Self::ToolUsage => "tool_usage",
+            Self::WholeParts => "whole_parts_per_edge",
+            Self::WholeEdge => "whole_edges",
             Self::TimeMax => "time_max",
             Self::Power => "power",
             Self::Torque => "torque",
@@ -83,6 +89,8 @@ impl Kind {
                 | Self::Hardening
                 | Self::HardeningDepth
                 | Self::ToolUsage
+                | Self::WholeParts
+                | Self::WholeEdge
                 | Self::ToolLifeMin
                 | Self::TimeMax
                 | Self::ForceZ
@@ -162,8 +170,19 @@ pub(super) struct Built {
 pub(super) struct Variation<'a> {
     /// A whole number of parts per edge.
     pub parts_per_edge: Option<u32>,
+    /// Whole edges, and what each may cut.
+    pub edges: Option<&'a EdgeLimits>,
     /// Where bending models are linearised: ln V, ln S per zone, and how far the step may go.
     pub about: Option<(&'a [(f64, f64)], f64)>,
+}
+
+/// Whole edges of a part, and limits on what some of them cut together.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct EdgeLimits {
+    /// Edges that one part takes.
+    pub per_part: f64,
+    /// Zones, and the share of edges that they may use together.
+    pub groups: Vec<(Vec<usize>, f64)>,
 }
 
 /// What the objective's terms are made of: money or minutes per minute in the cut and per edge, and fixed.
@@ -487,24 +506,29 @@ impl Builder<'_> {
         let case = self.case;
         let (mut sums, mut labels) = (Vec::new(), Vec::new());
         let label = |kind, place, limit, unit| Label { kind, place, limit, unit, plain: false, lower: false };
-        let parts = self.variation.parts_per_edge.map(|m| 1.0 / f64::from(m));
-        let most = match (case.limits.tool_usage_max, parts) {
-            (Some(u), Some(parts)) => Some(u.min(parts)),
-            (u, parts) => parts.or(u),
-        };
-        if let Some(most) = most {
-            let groups = case.usage_groups();
-            let of_part = groups.len() == 1 && groups[0].len() == case.zones.len();
-            for (s, group) in groups.iter().enumerate() {
-                let mut terms = Affines::with_capacity(group.len(), 2 * group.len());
-                for &i in group {
-                    self.usage_term(&mut terms, i, -most.ln());
-                }
-                let part = of_part && case.limits.tool_usage_scope == super::input::UsageScope::Part;
-                let place = if part { Place::Part } else { Place::Surface(s) };
-                sums.push(terms);
-                labels.push(label(Kind::ToolUsage, place, most, "1"));
+        let mut usage = |kind, group: &[usize], place, most: f64| {
+            let mut terms = Affines::with_capacity(group.len(), 2 * group.len());
+            for &i in group {
+                self.usage_term(&mut terms, i, -most.ln());
             }
+            sums.push(terms);
+            labels.push(label(kind, place, most, "1"));
+        };
+        let parts = self.variation.parts_per_edge.map(|m| 1.0 / f64::from(m));
+        if let Some(edges) = self.variation.edges {
+            for (group, most) in &edges.groups {
+                let ends: Vec<usize> = group.first().into_iter().chain(group.last()).copied().collect();
+                usage(Kind::WholeEdge, group, Place::Zones(ends), *most);
+            }
+        } else if let Some(most) = case.limits.tool_usage_max.filter(|most| parts.is_none_or(|parts| *most < parts)) {
+            for (s, group) in case.usage_groups().iter().enumerate() {
+                let of_part = case.limits.tool_usage_scope == super::input::UsageScope::Part;
+                usage(Kind::ToolUsage, group, if of_part { Place::Part } else { Place::Surface(s) }, most);
+            }
+        }
+        if let Some(parts) = parts {
+            let all: Vec<usize> = (0..case.zones.len()).collect();
+            usage(Kind::WholeParts, &all, Place::Part, parts);
         }
         if let Some(most) = case.limits.time_max_min {
             let mut terms = Affines::with_capacity(case.zones.len(), 2 * case.zones.len());
@@ -521,12 +545,13 @@ impl Builder<'_> {
             let mut terms = Affines::with_capacity(2 * n, 4 * n);
             (0..n).for_each(|i| self.time_term(&mut terms, i, rates.per_minute.ln()));
             let mut fixed = rates.fixed;
-            match self.variation.parts_per_edge {
-                Some(m) => fixed += rates.per_edge / f64::from(m),
-                None if rates.per_edge > 0.0 => {
+            match (self.variation.edges, self.variation.parts_per_edge) {
+                (Some(edges), _) => fixed += rates.per_edge * edges.per_part,
+                (None, Some(m)) => fixed += rates.per_edge / f64::from(m),
+                (None, None) if rates.per_edge > 0.0 => {
                     (0..n).for_each(|i| self.usage_term(&mut terms, i, rates.per_edge.ln()));
                 }
-                None => {}
+                (None, None) => {}
             }
             return (Objective::Sum(terms), fixed);
         }

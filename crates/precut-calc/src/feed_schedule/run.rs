@@ -1,5 +1,7 @@
 //! From a job to its answer.
 
+use std::collections::HashMap;
+
 use crate::calculator::{
     Answer, Conflict, ElasticScope, Failure, Finding, Infeasible, Message, Monitor, Relaxation, checkpoint,
 };
@@ -7,10 +9,11 @@ use crate::calculator::{
 use super::advice;
 use super::assess;
 use super::binding::binding;
-use super::case::Case;
+use super::case::{Case, PassSplit};
 use super::compensated;
 use super::compliance::Held;
 use super::continuous::{self, Asked, Smooth};
+use super::edges;
 use super::infeasible::Infeasibility;
 use super::input::{FeedMode, Goal, Job};
 use super::models::Output;
@@ -20,9 +23,11 @@ use super::output::{
 };
 use super::passes;
 use super::plan::{Method, TradeOff, TradedLimit};
+use super::prices::{self, Again};
 use super::program::{Rates, Variation, build};
 use super::rule::{self, Target};
 use super::solve::{Solved, Unsolved, solve};
+use super::toolpath::Made;
 
 /// What the chosen method gave.
 struct Found {
@@ -50,6 +55,16 @@ pub(super) fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, F
         return Err(Failure::OutOfModel(Finding::new("schedule_out_of_reach", "/models")));
     }
     let mut outcome = outcome(job, &found, zones);
+    edges::recount(&found.case, &mut outcome);
+    if let Some(solved) = &found.solved {
+        let split = found.passes.as_ref().map(|passes| PassSplit {
+            roughing_passes: passes.roughing_passes,
+            roughing_mm: passes.roughing_depth_mm.unwrap_or(0.0),
+            finishing_mm: passes.finishing_depth_mm,
+        });
+        let again = Again { job, held: held.as_ref(), split, is_possible: found.continuous.is_none() };
+        outcome.prices = prices::prices(&found.case, solved, &again, monitor)?;
+    }
     outcome.comparison = comparison(&found, outcome.cutting_time_min, monitor)?;
     if let Some(wanted) = &job.trade_off {
         outcome.trade_off = trade_off(&found, wanted, held.as_ref(), monitor)?;
@@ -58,10 +73,22 @@ pub(super) fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, F
         monitor.progress(0.9, Message::new("stage_path"));
         outcome.compensated_path = compensated::path(job, &found.case, &found.at, wanted, monitor)?;
     }
-    let warnings = advice::warnings(job, &found.case, &outcome, &found.at);
+    let (made, unwritten) = written(Made::of(job, &outcome))?;
+    outcome.proof = made.as_ref().and_then(Made::proof);
+    let mut warnings = advice::warnings(job, &found.case, &outcome, &found.at, made.as_ref());
+    warnings.extend(unwritten);
     let explanation = advice::explanation(job, &outcome);
     monitor.progress(1.0, Message::new("stage_done"));
     Ok(Answer { output: outcome, warnings, explanation, basis: advice::basis(job) })
+}
+
+/// The program, or why there is none: the schedule itself stands without it.
+fn written<T>(made: Result<T, Failure>) -> Result<(Option<T>, Option<Finding>), Failure> {
+    match made {
+        Ok(made) => Ok((Some(made), None)),
+        Err(Failure::Cancelled) => Err(Failure::Cancelled),
+        Err(failure) => Ok((None, Some(Finding::new("no_program", "/program").with("reason", failure.to_string())))),
+    }
 }
 
 fn by_method(job: &Job, held: Option<&Held>, monitor: &dyn Monitor) -> Result<Found, Unsolved> {
@@ -171,9 +198,14 @@ fn in_reach(zones: &[ZoneOutcome]) -> bool {
 fn outcome(job: &Job, found: &Found, mut zones: Vec<ZoneOutcome>) -> Outcome {
     let case = &found.case;
     let bound = found.solved.as_ref().map(|solved| binding(case, solved)).unwrap_or_default();
+    let mut active: HashMap<&str, Vec<String>> = HashMap::new();
+    for limit in &bound {
+        for part in limit.zone.split('|') {
+            active.entry(part).or_default().push(limit.constraint.clone());
+        }
+    }
     for zone in &mut zones {
-        let touches = |name: &str| name.split('|').any(|part| part == zone.id);
-        zone.active = bound.iter().filter(|b| touches(&b.zone)).map(|b| b.constraint.clone()).collect();
+        zone.active = active.remove(zone.id.as_str()).unwrap_or_default();
     }
     let by_surface = assess::usage_by_surface(case, &zones);
     let usage = zones.iter().map(|zone| zone.tool_usage).sum::<Option<f64>>();
@@ -185,7 +217,10 @@ fn outcome(job: &Job, found: &Found, mut zones: Vec<ZoneOutcome>) -> Outcome {
         objective_unit: job.objective.unit().to_owned(),
         cutting_time_min: zones.iter().map(|zone| zone.cutting_time_min).sum(),
         tool_usage: usage,
-        edges: assess::edges(&by_surface),
+        edges: Vec::new(),
+        edges_per_part: None,
+        tool_changes: Vec::new(),
+        whole_edge_objective: None,
         tool_usage_by_surface: by_surface,
         parts_per_edge: found.solved.as_ref().and_then(|solved| solved.parts_per_edge),
         largest_deflection_um: assess::largest(deflections()),
@@ -193,6 +228,7 @@ fn outcome(job: &Job, found: &Found, mut zones: Vec<ZoneOutcome>) -> Outcome {
         largest_roughness_um: assess::largest(roughnesses()),
         roughness_spread: assess::spread(roughnesses()),
         binding: bound,
+        prices: Vec::new(),
         certificate: certificate(found.solved.as_ref()),
         comparison: Comparison { constant_feed: None, equal_deflection: None },
         equal_deflection: found.rule.clone(),
@@ -200,6 +236,7 @@ fn outcome(job: &Job, found: &Found, mut zones: Vec<ZoneOutcome>) -> Outcome {
         passes: found.passes.clone(),
         trade_off: Vec::new(),
         compensated_path: None,
+        proof: None,
         zones,
     }
 }
@@ -228,6 +265,7 @@ fn certificate(solved: Option<&Solved>) -> Certificate {
             duality_gap: 0.0,
             kkt_residual: 0.0,
             primal_residual: 0.0,
+            lower_bound: None,
             iterations: 0,
             solver: Solver::Rule,
             linearisations: 0,
@@ -240,6 +278,7 @@ fn certificate(solved: Option<&Solved>) -> Certificate {
         duality_gap: found.gap,
         kkt_residual: found.dual_residual,
         primal_residual: found.primal_residual,
+        lower_bound: solved.whole.as_ref().map(|(_, bound)| *bound),
         iterations: found.iterations,
         solver: if solved.conic { Solver::Conic } else { Solver::InteriorPoint },
         linearisations: solved.linearisations,
@@ -362,7 +401,7 @@ fn scaled(
 pub(super) fn broken(case: &Case, at: &[(f64, f64)]) -> Vec<(crate::calculator::ConstraintName, f64)> {
     let mut free = case.clone();
     free.variables = super::input::Variables::default();
-    let built = build(&free, &Variation { parts_per_edge: None, about: Some((at, f64::INFINITY)) });
+    let built = build(&free, &Variation { about: Some((at, f64::INFINITY)), ..Variation::default() });
     let mut y = built.program.start.clone();
     for (i, &(u, x)) in at.iter().enumerate() {
         for (source, value) in [(built.speed[i], u), (built.feed[i], x)] {
@@ -380,4 +419,18 @@ pub(super) fn broken(case: &Case, at: &[(f64, f64)]) -> Vec<(crate::calculator::
             (label.name(case), factor)
         })
         .collect()
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_program_that_cannot_be_written_takes_no_schedule_away() {
+        assert_eq!(written(Ok(1)).unwrap(), (Some(1), None));
+        let (made, why) = written::<u8>(Err(Failure::Internal("a zone lies nowhere".to_owned()))).unwrap();
+        assert_eq!((made, why.map(|why| why.code)), (None, Some("no_program")));
+        assert!(matches!(written::<u8>(Err(Failure::Cancelled)), Err(Failure::Cancelled)));
+    }
 }

@@ -8,7 +8,8 @@ use super::case::Case;
 use super::infeasible::{self, Infeasibility};
 use super::input::Goal;
 use super::models::Output;
-use super::program::{Built, Rates, Variation, build, second_objective};
+use super::program::{Built, EdgeLimits, Label, Rates, Variation, build, second_objective};
+use super::whole;
 
 /// The schedule of a case with its certificate.
 #[derive(Debug, Clone)]
@@ -27,6 +28,10 @@ pub(super) struct Solved {
     pub gain: f64,
     pub tie_broken: bool,
     pub parts_per_edge: Option<u32>,
+    /// What it comes to with one part more per edge, where that was tried and has an answer.
+    pub one_part_more: Option<f64>,
+    /// With whole edges: the limits of the edges, and what no plan comes below.
+    pub whole: Option<(EdgeLimits, f64)>,
     /// Successive linearisations; 0 where none was needed.
     pub linearisations: u32,
     /// Whether only a local optimum is claimed.
@@ -61,27 +66,38 @@ const MOST_PARTS: u32 = 10_000;
 
 /// Solves a case; `why` decides whether an infeasible one is analysed.
 pub(super) fn solve(case: &Case, why: bool, monitor: &dyn Monitor) -> Result<Solved, Unsolved> {
+    if case.limits.whole_edges {
+        return whole::edges(case, why, monitor);
+    }
     if case.limits.whole_parts_per_edge {
         return whole_parts(case, why, monitor);
     }
-    solve_with(case, None, why, monitor)
+    solve_as(case, &Variation::default(), why, monitor)
 }
 
-fn solve_with(case: &Case, parts: Option<u32>, why: bool, monitor: &dyn Monitor) -> Result<Solved, Unsolved> {
+/// Solves a case with a number of parts per edge or with edges that are given, or as it stands.
+pub(super) fn solve_as(
+    case: &Case,
+    variation: &Variation<'_>,
+    why: bool,
+    monitor: &dyn Monitor,
+) -> Result<Solved, Unsolved> {
     checkpoint(monitor)?;
     if case.bends() {
-        return linearised(case, parts, why, monitor);
+        return linearised(case, variation, why, monitor);
     }
-    once(case, &Variation { parts_per_edge: parts, about: None }, why)
+    once(case, variation, why)
 }
 
 /// Scans whole numbers of parts per edge upward: the objective over ln m is convex, so the first rise ends it.
 fn whole_parts(case: &Case, why: bool, monitor: &dyn Monitor) -> Result<Solved, Unsolved> {
     let mut best: Option<Solved> = None;
     for m in 1..=MOST_PARTS {
-        match solve_with(case, Some(m), why && m == 1, monitor) {
+        let variation = Variation { parts_per_edge: Some(m), ..Variation::default() };
+        match solve_as(case, &variation, why && m == 1, monitor) {
             Ok(next) => {
-                if best.as_ref().is_some_and(|best| next.objective >= best.objective) {
+                if let Some(best) = best.as_mut().filter(|best| next.objective >= best.objective) {
+                    best.one_part_more = Some(next.objective);
                     break;
                 }
                 best = Some(next);
@@ -114,10 +130,9 @@ fn once(case: &Case, variation: &Variation<'_>, why: bool) -> Result<Solved, Uns
     let found = layout.as_ref().ok_or(Failed::NotChained).and_then(|layout| layout.minimise(&Settings::default()));
     let (certificate, conic) = match found {
         Ok(solution) => (solution, false),
-        Err(_) => match by_cones(&built.program) {
-            Ok(Some(solution)) => (solution, true),
-            Ok(None) => return Err(infeasible()),
-            Err(failure) => return Err(failure.into()),
+        Err(_) => match safer(&built.program)? {
+            Some(found) => found,
+            None => return Err(infeasible()),
         },
     };
     let flat = Rates::of(case).is_none()
@@ -125,7 +140,7 @@ fn once(case: &Case, variation: &Variation<'_>, why: bool) -> Result<Solved, Uns
     let second = if flat { broken_tie(case, &built, &certificate) } else { None };
     let y = second.as_ref().unwrap_or(&certificate.y);
     let at = (0..case.zones.len()).map(|i| (built.speed[i].at(y), built.feed[i].at(y))).collect();
-    Ok(finish(case, built, certificate, at, second.is_some(), variation.parts_per_edge, conic))
+    Ok(finish(case, built, certificate, at, second.is_some(), variation, conic))
 }
 
 fn finish(
@@ -134,7 +149,7 @@ fn finish(
     certificate: Solution,
     at: Vec<(f64, f64)>,
     tie_broken: bool,
-    parts_per_edge: Option<u32>,
+    variation: &Variation<'_>,
     conic: bool,
 ) -> Solved {
     let (objective, elasticity, gain) = match case.goal {
@@ -163,7 +178,9 @@ fn finish(
         elasticity,
         gain,
         tie_broken,
-        parts_per_edge,
+        parts_per_edge: variation.parts_per_edge,
+        one_part_more: None,
+        whole: None,
         linearisations: 0,
         local: false,
         conic,
@@ -193,21 +210,35 @@ fn fixed(
         dual_residual: 0.0,
         iterations: 0,
     };
-    Ok(finish(case, built, certificate, at, false, variation.parts_per_edge, false))
+    Ok(finish(case, built, certificate, at, false, variation, false))
 }
 
-/// The general solver, where the interior-point method gave nothing: the optimum, or `None` where there is no point.
-fn by_cones(program: &Program) -> Result<Option<Solution>, Failure> {
+/// Slower ways, where the interior-point method from the middle of the bounds gave nothing: from a point inside all limits,
+/// then the general solver; and whether that found it. `None` where there is no point.
+fn safer(program: &Program) -> Result<Option<(Solution, bool)>, Failure> {
     let rows: Vec<usize> = (0..program.rows.len()).collect();
     let sums: Vec<usize> = (0..program.sums.len()).collect();
     if matches!(gp::feasibility(program, &rows, &sums), Ok(Verdict::Infeasible { .. })) {
         return Ok(None);
     }
-    match gp::conic::minimise(program, 1e-9) {
-        Ok(solution) if solution.y.iter().all(|y| y.is_finite()) => Ok(Some(solution)),
-        Err(status) if status.0.contains("Infeasible") => Ok(None),
-        _ => Err(Failure::NotConverged { what: "the schedule", residual: f64::INFINITY, iterations: 200 }),
+    if let Some(start) = gp::inside(program) {
+        let from_inside = Program { start, ..program.clone() };
+        let settings = Settings { inside: true, iterations: 300, ..Settings::default() };
+        for gap in [settings.gap, 1e-8] {
+            if let Ok(solution) =
+                gp::minimise(&from_inside, &Settings { gap, dual: settings.dual.max(gap), ..settings })
+            {
+                return Ok(Some((solution, false)));
+            }
+        }
     }
+    for tolerance in [1e-9, 1e-8, 1e-7] {
+        match gp::conic::minimise(program, tolerance) {
+            Ok(solution) if solution.y.iter().all(|y| y.is_finite()) => return Ok(Some((solution, true))),
+            _ => {}
+        }
+    }
+    Err(Failure::NotConverged { what: "the schedule", residual: f64::INFINITY, iterations: 200 })
 }
 
 /// The best of all points that share the optimum, by the second objective.
@@ -236,30 +267,64 @@ fn broken_tie(case: &Case, built: &Built, first: &Solution) -> Option<Vec<f64>> 
         .or_else(|| gp::conic::minimise(&program, 1e-8).ok().map(|solution| solution.y))
 }
 
-/// Successive linearisation of the models that bend, with a bound on the step that shrinks where steps turn back.
+/// Where in the range of the speeds the linearisations of a problem that is not convex begin, in turn.
+const STARTS: [f64; 5] = [0.5, 0.9, 0.1, 0.7, 0.3];
+
+/// Successive linearisation of the models that bend. Where the problem is convex one start tells all; otherwise the first
+/// that leads to a schedule.
+fn linearised(case: &Case, given: &Variation<'_>, why: bool, monitor: &dyn Monitor) -> Result<Solved, Unsolved> {
+    let built = build(case, given);
+    let y = &built.program.start;
+    let middle: Vec<(f64, f64)> = (0..case.zones.len()).map(|i| (built.speed[i].at(y), built.feed[i].at(y))).collect();
+    let range = (case.limits.speed_max_m_per_min / case.limits.speed_min_m_per_min).ln();
+    let starts = if convex(case) { &STARTS[..1] } else { &STARTS[..] };
+    let mut failed = None;
+    for share in starts {
+        let shift = |i: usize| if built.speed[i].variable.is_some() { (share - 0.5) * range } else { 0.0 };
+        let at = middle.iter().enumerate().map(|(i, &(u, x))| (u + shift(i), x)).collect();
+        match from_start(case, given, at, monitor) {
+            Ok(solved) => return Ok(solved),
+            Err(Unsolved::Failed(Failure::Cancelled)) => return Err(Failure::Cancelled.into()),
+            // Not converged weighs more than infeasible: something may be there.
+            Err(unsolved @ Unsolved::Failed(_)) => failed = Some(unsolved),
+            Err(Unsolved::Infeasible(_)) => {}
+        }
+    }
+    match failed {
+        Some(failed) => Err(failed),
+        // Infeasible as linearised about the middle, and from everywhere else.
+        None => Err(once(case, given, why).err().unwrap_or_else(|| Unsolved::Infeasible(Box::default()))),
+    }
+}
+
+/// Linearisations from one start, with a bound on the step that shrinks where steps turn back. The best point on the way
+/// that keeps all limits stands in where they do not settle.
 ///
 /// A fixed point satisfies the conditions of the optimum of the problem itself. Where every bend is convex in its limit
 /// that problem is convex and the point its optimum; otherwise it is a local one.
-fn linearised(case: &Case, parts: Option<u32>, why: bool, monitor: &dyn Monitor) -> Result<Solved, Unsolved> {
-    let start = build(case, &Variation { parts_per_edge: parts, about: None });
-    let y = &start.program.start;
-    let mut at: Vec<(f64, f64)> = (0..case.zones.len()).map(|i| (start.speed[i].at(y), start.feed[i].at(y))).collect();
+fn from_start(
+    case: &Case,
+    given: &Variation<'_>,
+    mut at: Vec<(f64, f64)>,
+    monitor: &dyn Monitor,
+) -> Result<Solved, Unsolved> {
     let mut radius = f64::INFINITY;
     let mut before: Option<Vec<(f64, f64)>> = None;
+    let mut best: Option<(f64, Vec<(f64, f64)>)> = None;
     for round in 1..=LINEARISATIONS {
         checkpoint(monitor)?;
-        // The first program has no bound on its step: an infeasible one is infeasible as linearised about the middle.
-        let variation = Variation { parts_per_edge: parts, about: Some((&at, radius)) };
-        let mut solved = match once(case, &variation, why && round == 1) {
+        let variation = Variation { about: Some((&at, radius)), ..given.clone() };
+        let mut solved = match once(case, &variation, false) {
             Ok(solved) => solved,
             Err(Unsolved::Infeasible(_)) if round > 1 && radius.is_finite() => {
                 // The step was too short to reach a feasible point of the new linearisation.
                 radius *= 4.0;
                 if radius > 50.0 {
-                    return once(case, &Variation { parts_per_edge: parts, about: Some((&at, f64::INFINITY)) }, why);
+                    radius = f64::INFINITY;
                 }
                 continue;
             }
+            Err(Unsolved::Infeasible(_)) if best.is_some() => break,
             Err(unsolved) => return Err(unsolved),
         };
         let step: Vec<(f64, f64)> =
@@ -269,6 +334,9 @@ fn linearised(case: &Case, parts: Option<u32>, why: bool, monitor: &dyn Monitor)
             solved.linearisations = round;
             solved.local = !convex(case);
             return Ok(solved);
+        }
+        if best.as_ref().is_none_or(|(least, _)| solved.objective < *least) && keeps(case, given, &solved.at) {
+            best = Some((solved.objective, solved.at.clone()));
         }
         let turned = before
             .as_ref()
@@ -283,11 +351,31 @@ fn linearised(case: &Case, parts: Option<u32>, why: bool, monitor: &dyn Monitor)
         at.clone_from(&solved.at);
         before = Some(step);
     }
-    Err(Unsolved::Failed(Failure::NotConverged {
-        what: "the successive linearisation of the models",
-        residual: radius,
-        iterations: LINEARISATIONS,
-    }))
+    let stalled = || {
+        Unsolved::Failed(Failure::NotConverged {
+            what: "the successive linearisation of the models",
+            residual: radius,
+            iterations: LINEARISATIONS,
+        })
+    };
+    let (_, kept) = best.ok_or_else(stalled)?;
+    // The schedule itself, as the optimum of a program that may not leave it by more than a hair.
+    let mut solved = once(case, &Variation { about: Some((&kept, 1e-5)), ..given.clone() }, false)?;
+    solved.linearisations = LINEARISATIONS;
+    solved.local = true;
+    Ok(solved)
+}
+
+/// Whether a schedule keeps all limits by the models themselves: a linearisation is exact where it is made.
+fn keeps(case: &Case, given: &Variation<'_>, at: &[(f64, f64)]) -> bool {
+    let built = build(case, &Variation { about: Some((at, f64::INFINITY)), ..given.clone() });
+    let y = &built.program.start;
+    let limits = |labels: &[Label]| labels.iter().map(|label| label.kind.is_limit()).collect::<Vec<_>>();
+    let (of_rows, of_sums) = (limits(&built.rows), limits(&built.sums));
+    let rows = (0..built.program.rows.len()).filter(|&k| of_rows[k]).map(|k| built.program.rows.value(k, y));
+    let sums = built.program.sums.iter().zip(of_sums).filter(|(_, is)| *is).map(|(terms, _)| terms.log_sum_exp(y));
+    // A spread's auxiliary variable starts above all of its rows, so that a spread counts as not kept.
+    rows.chain(sums).all(|value| value <= 1e-7)
 }
 
 /// Whether every bent model stands only in limits that stay convex with it.

@@ -8,6 +8,7 @@ use super::blank::SAME_MM;
 use super::case::{Case, TOUCHING_MM, ZoneCase};
 use super::compliance::Held;
 use super::continuous::add_zone;
+use super::edges;
 use super::input::{FeedMode, Job, SpeedMode, Variables};
 use super::output::{Outcome, ZoneOutcome};
 use super::plan::Method;
@@ -42,7 +43,7 @@ enum Limits {
 
 /// The words of a program, and what is to be said of them.
 pub(super) struct Spoken {
-    case: Case,
+    pub(super) case: Case,
     /// In the order of the answer's zones.
     pub(super) words: Vec<Words>,
     /// ln V and ln S of the words.
@@ -161,7 +162,10 @@ fn limits_of_zones(job: &Job, outcome: &Outcome, held: Option<&Held>) -> Result<
     }
     case.limits.deflection_spread_ratio_max = None;
     let at = exact(outcome);
-    let built = build(&case, &Variation { parts_per_edge: outcome.parts_per_edge, about: Some((&at, f64::INFINITY)) });
+    let edges = outcome.certificate.lower_bound.map(|_| edges::limits_of(&case, outcome));
+    let about = Some((at.as_slice(), f64::INFINITY));
+    let variation = Variation { parts_per_edge: outcome.parts_per_edge, edges: edges.as_ref(), about };
+    let built = build(&case, &variation);
     Ok((case, built))
 }
 

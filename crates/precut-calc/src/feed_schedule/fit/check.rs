@@ -70,9 +70,10 @@ impl Names {
         violations.require(rows.len() <= MAX_TRIALS, || {
             Finding::new("too_many_trials", "/trials").measured(rows.len() as f64, MAX_TRIALS as f64, "1")
         });
-        violations.require(!self.outputs.is_empty(), || Finding::new("no_output", "/trials"));
+        violations
+            .require(!self.outputs.is_empty(), || Finding::new("no_output", "/trials").with("there", numbers(job)));
         violations.require(!self.variables.is_empty() || !job.factors.is_empty(), || {
-            Finding::new("nothing_varies", "/trials")
+            Finding::new("nothing_varies", "/trials").with("there", numbers(job))
         });
         let terms = self.variables.len() + job.factors.len();
         violations.require(terms <= MAX_TERMS, || {

@@ -174,6 +174,8 @@ fn is_false(value: &bool) -> bool {
 
 impl MeasuredRow for Trial {
     const MAX_ROWS: usize = MAX_TRIALS;
+    const MEASURED: &'static [&'static str] =
+        &["tool_life_min", "roughness_um", "force_y_n", "force_z_n", "hardening_percent", "hardening_depth_um"];
 }
 
 /// Values of what a schedule does not choose.
