@@ -38,8 +38,38 @@ pub enum TestKind {
     LjungBox,
     /// Number of runs of one sign (Wald-Wolfowitz, normal).
     Runs,
+    /// Squared errors of the base, of which no row is fitted, against what scatter and allowances leave to any model (F).
+    HeldOut,
     /// Of classes: minus twice the log-probability of those seen, against classes drawn from the base.
     Deviance,
+}
+
+impl TestKind {
+    /// Whether neighbours scatter independently is a question of the scatter: rows that are correlated otherwise than its one
+    /// number says are no error of the base.
+    const OF_SCATTER: [Self; 2] = [Self::LjungBox, Self::Runs];
+
+    /// Whether it holds the base against the scatter.
+    pub fn is_of_base(self) -> bool {
+        !Self::OF_SCATTER.contains(&self)
+    }
+
+    /// The same of a test by its name.
+    pub(super) fn names_one_of_base(name: &str) -> bool {
+        Self::OF_SCATTER.iter().all(|kind| kind.name() != name)
+    }
+
+    /// As it is called in the answer.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::LackOfFit => "lack_of_fit",
+            Self::SmoothDirections => "smooth_directions",
+            Self::LjungBox => "ljung_box",
+            Self::Runs => "runs",
+            Self::HeldOut => "held_out",
+            Self::Deviance => "deviance",
+        }
+    }
 }
 
 /// All tests that these rows allow.
@@ -48,7 +78,7 @@ pub fn adequacy(weighing: &Weighing<'_>) -> Vec<Test> {
         return deviance(weighing, sides).into_iter().collect();
     }
     let mut tests: Vec<Test> =
-        [lack_of_fit(weighing), smooth_directions(weighing), ljung_box(weighing), runs(weighing)]
+        [lack_of_fit(weighing), smooth_directions(weighing), ljung_box(weighing), runs(weighing), held_out(weighing)]
             .into_iter()
             .flatten()
             .collect();
@@ -125,6 +155,43 @@ fn lack_of_fit(weighing: &Weighing<'_>) -> Option<Test> {
     test(TestKind::LackOfFit, f, (conditions, Some(dof)), p)
 }
 
+/// F = r'r/tr C ~ F(m, nu), m = (tr C)^2/tr(C^2) (Satterthwaite): a sum of squares whose parts hang together through the
+/// allowances has fewer degrees of freedom than rows.
+///
+/// tr(C^2) with C = S + N N', S the scatter: tr(S^2) + 2 tr(N'SN) + |N'N|^2; over long sweeps a correlation rho multiplies
+/// the first by (1 + rho^2)/(1 - rho^2) and, of allowances that go smoothly along a sweep, the second by
+/// (1 + rho)/(1 - rho).
+fn held_out(weighing: &Weighing<'_>) -> Option<Test> {
+    let foundation = weighing.foundation;
+    let kept = || (0..weighing.keep.len()).filter(|&row| weighing.keep[row]);
+    let scatter = |row: usize| weighing.scatter(row).powi(2);
+    let rho = weighing.noise.rho;
+    let trace: f64 = kept().map(|row| weighing.own_variance(row)).sum();
+    let of_scatter: f64 = kept().map(|row| scatter(row).powi(2)).sum();
+    let allowed: Vec<Sparse> = foundation.nuisances.iter().map(|column| column.of_rows(&weighing.keep)).collect();
+    let of_both: f64 = allowed.iter().flat_map(Sparse::entries).map(|(row, value)| scatter(row) * value * value).sum();
+    let mut of_allowances = 0.0;
+    for (k, one) in allowed.iter().enumerate() {
+        of_allowances += one.inner(one).powi(2);
+        of_allowances += allowed[..k].iter().map(|other| 2.0 * one.inner(other).powi(2)).sum::<f64>();
+    }
+    let square =
+        of_scatter * (1.0 + rho * rho) / (1.0 - rho * rho) + 2.0 * of_both * (1.0 + rho) / (1.0 - rho) + of_allowances;
+    let left: f64 = kept().map(|row| foundation.residual[row].powi(2)).sum();
+    let f = left / trace;
+    p_of(TestKind::HeldOut, f, trace * trace / square, weighing.noise.dof)
+}
+
+/// The upper tail of F; of a scatter that is known, of chi-squared over its degrees of freedom.
+fn p_of(kind: TestKind, f: f64, directions: f64, nu: f64) -> Option<Test> {
+    let p = if nu.is_finite() {
+        FisherSnedecor::new(directions, nu).ok()?.sf(f.max(0.0))
+    } else {
+        ChiSquared::new(directions).ok()?.sf((f * directions).max(0.0))
+    };
+    test(kind, f, (directions, Some(nu)), p)
+}
+
 /// T = |Q'r|^2/m ~ F(m, nu), Q an orthonormal basis of the m smooth directions in whitened coordinates.
 fn smooth_directions(weighing: &Weighing<'_>) -> Option<Test> {
     let data = weighing.foundation.data;
@@ -144,13 +211,7 @@ fn smooth_directions(weighing: &Weighing<'_>) -> Option<Test> {
     let gram = DMatrix::from_fn(count, count, |i, j| white[i].inner(&white[j]));
     let right = DVector::from_iterator(count, white.iter().map(|column| column.inner(residual)));
     let t = Cholesky::new(gram)?.solve(&right).dot(&right) / count as f64;
-    let nu = weighing.noise.dof;
-    let p = if nu.is_finite() {
-        FisherSnedecor::new(count as f64, nu).ok()?.sf(t.max(0.0))
-    } else {
-        ChiSquared::new(count as f64).ok()?.sf((t * count as f64).max(0.0))
-    };
-    test(TestKind::SmoothDirections, t, (count as f64, Some(nu)), p)
+    p_of(TestKind::SmoothDirections, t, count as f64, weighing.noise.dof)
 }
 
 /// Residuals of every trace, decorrelated, in units of the scatter, less what the allowances explain.

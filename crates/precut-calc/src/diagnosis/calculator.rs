@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::marker::PhantomData;
 
 use super::base::Bound;
+use super::copies::{copies, digits_written};
 use super::data::{Data, Layout};
 use super::input::{DiagnosisJob, MAX_RUNS};
 use super::output::DiagnosisResult;
@@ -39,7 +40,7 @@ impl<M: Diagnosable> Calculator for Diagnosis<M> {
     const META: Meta = Meta {
         id: "diagnosis",
         kind: CalculatorKind::Calculator,
-        version: 9,
+        version: 10,
         title: "Diagnosis",
         question: "What does the simulation get wrong, why, and what is gained by mending it?",
         summary: "Measurements of what was really cut against a calculator's job: whether anything is wrong beyond \
@@ -113,14 +114,41 @@ pub(super) fn with_measured<M: Diagnosable, T>(
         let readings = if rows[row].excluded() { Vec::new() } else { rows[row].readings(&job.job, &job.quantity) };
         readings.into_iter().map(move |reading| (row, reading))
     };
-    let (used, readings): (Vec<usize>, Vec<Reading<M::Point>>) = (0..rows.len()).flat_map(of_row).unzip();
+    let all: Vec<(usize, Reading<M::Point>)> = (0..rows.len()).flat_map(of_row).collect();
+    let (mut measured, mut prepared, mut data) = laid_out::<M>(job, &all, monitor)?;
+    let runs = &measured.places.runs;
+    let raw: Vec<f64> = all.iter().map(|(_, reading)| reading.value).collect();
+    let relative = |(digit, value): (f64, &f64)| if is_logarithmic::<M>(job) { digit / value.abs() } else { digit };
+    let digits: Vec<f64> = digits_written(&raw).into_iter().zip(&raw).map(relative).collect();
+    let copies = copies(&data, &digits, |a, b| runs[a] == runs[b]);
+    if !copies.is_empty() {
+        let once: Vec<(usize, Reading<M::Point>)> = (0..all.len())
+            .filter(|index| copies.binary_search(index).is_err())
+            .map(|index| all[index].clone())
+            .collect();
+        (measured, prepared, data) = laid_out::<M>(job, &once, monitor)?;
+        measured.copies = copies.into_iter().map(|index| all[index].0).collect();
+    }
+    let bound = Bound::<M>::new(prepared, job.allowances.clone(), &job.quantity, &job.options);
+    then(&measured, &bound, &data)
+}
+
+/// Readings, each with its row, before the base model.
+#[allow(clippy::type_complexity, reason = "three parts that are made together")]
+fn laid_out<M: Diagnosable>(
+    job: &JobOf<M>,
+    readings: &[(usize, Reading<M::Point>)],
+    monitor: &dyn Monitor,
+) -> Result<(Measured<M::Run, M::Point>, M::Prepared, Data), Failure> {
+    let rows = job.measurements.rows();
+    let used: Vec<usize> = readings.iter().map(|(row, _)| *row).collect();
     let runs = if job.runs.is_empty() { vec![M::Run::default()] } else { job.runs.clone() };
     let run_of = |row: usize| rows[row].run() as usize - 1;
-    let points = used.iter().zip(&readings).map(|(&row, reading)| (run_of(row), reading.point.clone())).collect();
+    let points = readings.iter().map(|(row, reading)| (run_of(*row), reading.point.clone())).collect();
     let places: Rows<M::Run, M::Point> = Rows { runs, points };
     let prepared = M::prepare(&job.job, &places, &job.quantity, monitor).map_err(|error| unprepared(error, &used))?;
     let design = M::design(&prepared);
-    let raw: Vec<f64> = readings.iter().map(|reading| reading.value).collect();
+    let raw: Vec<f64> = readings.iter().map(|(_, reading)| reading.value).collect();
     let data = match M::spreads(&prepared, &job.allowances) {
         None => data::<M>(job, &used, raw, design),
         spreads => Data {
@@ -130,9 +158,8 @@ pub(super) fn with_measured<M: Diagnosable, T>(
             layout: layout::<M>(job, &used, design),
         },
     };
-    let bound = Bound::<M>::new(prepared, job.allowances.clone(), &job.quantity, &job.options);
-    let seen = readings.into_iter().map(|reading| Seen { class: reading.class, asks: reading.asks }).collect();
-    then(&Measured { places, used, seen }, &bound, &data)
+    let seen = readings.iter().map(|(_, reading)| Seen { class: reading.class, asks: reading.asks }).collect();
+    Ok((Measured { places, used, seen, copies: Vec::new() }, prepared, data))
 }
 
 /// Everything that a diagnosis may utter.
@@ -181,6 +208,8 @@ pub(super) struct Measured<R, P> {
     pub(super) used: Vec<usize>,
     /// What was seen of classes.
     pub(super) seen: Vec<Seen>,
+    /// Rows that are not used, as they copy an earlier one.
+    pub(super) copies: Vec<usize>,
 }
 
 /// A class, and the margin that a reading of it is about; both empty where values were measured.
@@ -189,10 +218,15 @@ pub(super) struct Seen {
     pub(super) asks: &'static str,
 }
 
+/// Whether residuals are taken of the logarithm of what was measured.
+fn is_logarithmic<M: Diagnosable>(job: &JobOf<M>) -> bool {
+    M::QUANTITIES.iter().any(|known| known.name == job.quantity && known.logarithmic)
+}
+
 /// Rows that have a value.
 fn data<M: Diagnosable>(job: &JobOf<M>, used: &[usize], raw: Vec<f64>, design: Design) -> Data {
     let rows = job.measurements.rows();
-    let logarithmic = M::QUANTITIES.iter().any(|known| known.name == job.quantity && known.logarithmic);
+    let logarithmic = is_logarithmic::<M>(job);
     let stated: Option<Vec<f64>> = used.iter().map(|&row| rows[row].uncertainty_of(&job.quantity)).collect();
     let uncertainty = stated.filter(|_| !used.is_empty()).map(|stated| {
         let relative = |(u, value): (f64, &f64)| if logarithmic { u / value.abs() } else { u };

@@ -11,7 +11,7 @@ use super::evidence::{Normal, Scale, Side, log_det, log_mean_exp};
 use super::likelihood::Likelihood;
 use super::sparse::Sparse;
 use super::whiten::White;
-use crate::calculator::{Failure, Monitor, Smooth, checkpoint};
+use crate::calculator::{Condition, Failure, Monitor, Smooth, checkpoint};
 
 /// Cosines common to all runs.
 const COMMON_ORDERS: usize = 25;
@@ -21,6 +21,9 @@ const RUN_ORDERS: usize = 8;
 const FOURIER: std::ops::RangeInclusive<usize> = 2..=60;
 /// Cosines over the order of testing.
 const TEST_ORDERS: std::ops::RangeInclusive<usize> = 1..=15;
+/// Cosines over a condition, and over each of a pair of conditions, at most.
+const CONDITION_ORDERS: usize = 7;
+const PAIR_ORDERS: usize = 3;
 /// Correlation lengths, share of the length.
 const LENGTHS: [f64; 3] = [0.0, 0.08, 0.2];
 /// Pointwise root mean square, in standard deviations of the scatter.
@@ -28,8 +31,11 @@ const SIZES: [f64; 4] = [1.0, 3.0, 10.0, 30.0];
 
 /// A kind of remainder.
 pub(super) struct Kind {
-    /// What it is free over: `common`, `per_run`, `around`, a grouping's name, `test_order`.
+    /// What it is free over: `common`, `per_run`, `around`, a grouping's name, `test_order`, `conditions`,
+    /// `pair_of_conditions`.
     pub(super) name: &'static str,
+    /// Which conditions or which factor, where the name does not say.
+    pub(super) over: Vec<String>,
     /// Its columns on the rows, for the picture of the remainder.
     pub(super) columns: Vec<Sparse>,
     /// Order of every column, where the columns are waves: along a part half waves, round it whole ones.
@@ -52,7 +58,7 @@ enum Form {
 /// A remainder fitted beside a set of causes.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Remainder {
-    /// Mean over kinds, lengths and sizes.
+    /// Mean over names, over the kinds of each, and over their lengths and sizes.
     pub(super) log_z: f64,
     /// The best single one: kind, amplitudes, and their factor.
     pub(super) kind: usize,
@@ -61,6 +67,25 @@ pub(super) struct Remainder {
     pub(super) of_causes: Vec<f64>,
     /// Standard deviations of their priors at the best length and size.
     pub(super) prior_sd: Vec<f64>,
+}
+
+/// A wave: its order, and which share of its squared amplitude is its pointwise variance.
+#[derive(Debug, Clone, Copy)]
+struct Wave {
+    order: f64,
+    share: f64,
+}
+
+impl Wave {
+    /// A cosine of an order.
+    fn of(order: usize) -> Self {
+        Self { order: order as f64, share: if order == 0 { 1.0 } else { 0.5 } }
+    }
+
+    /// The product of two.
+    fn times(self, other: Self) -> Self {
+        Self { order: self.order.hypot(other.order), share: self.share * other.share }
+    }
 }
 
 /// The kinds of remainder that these rows can show.
@@ -72,33 +97,36 @@ pub(super) fn kinds(
 ) -> Result<Vec<Kind>, Failure> {
     let rows = data.value.len();
     let on_all = |values: &dyn Fn(usize) -> f64| Sparse::new(rows, (0..rows).map(|row| (row, values(row))));
+    let smooth = |name, columns, waves: &[Wave]| Kind::smooth(name, columns, waves, likelihood, sigma);
     let mut kinds = Vec::new();
     checkpoint(monitor)?;
     match &data.layout.design.smooth {
         Smooth::Along(u) => {
             let common = (0..COMMON_ORDERS).map(|k| on_all(&|row| cosine(k, u[row]))).collect();
-            let orders: Vec<f64> = (0..COMMON_ORDERS).map(|k| k as f64).collect();
-            kinds.push(Kind::smooth("common", common, &orders, likelihood, sigma));
+            let waves: Vec<Wave> = (0..COMMON_ORDERS).map(Wave::of).collect();
+            kinds.push(smooth("common", common, &waves));
             let runs: Vec<Vec<usize>> = runs(data);
             if runs.len() > 1 {
                 checkpoint(monitor)?;
                 let of_run =
                     |run: &[usize], k: usize| Sparse::new(rows, run.iter().map(|&row| (row, cosine(k, u[row]))));
                 let columns = runs.iter().flat_map(|run| (0..RUN_ORDERS).map(|k| of_run(run, k))).collect();
-                let orders: Vec<f64> = runs.iter().flat_map(|_| (0..RUN_ORDERS).map(|k| k as f64)).collect();
-                kinds.push(Kind::smooth("per_run", columns, &orders, likelihood, sigma));
+                // A row lies in one run.
+                let of_one = |wave: Wave| Wave { share: wave.share / runs.len() as f64, ..wave };
+                let waves: Vec<Wave> = runs.iter().flat_map(|_| (0..RUN_ORDERS).map(|k| of_one(Wave::of(k)))).collect();
+                kinds.push(smooth("per_run", columns, &waves));
             }
         }
         Smooth::Around(angle) => {
             let mut columns = Vec::new();
-            let mut orders = Vec::new();
+            let mut waves = Vec::new();
             for k in FOURIER {
                 columns.push(on_all(&|row| (k as f64 * angle[row]).cos()));
                 columns.push(on_all(&|row| (k as f64 * angle[row]).sin()));
                 // Once round is two lengths of the cosines along a part.
-                orders.extend([2.0 * k as f64; 2]);
+                waves.extend([Wave::of(2 * k); 2]);
             }
-            kinds.push(Kind::smooth("around", columns, &orders, likelihood, sigma));
+            kinds.push(smooth("around", columns, &waves));
         }
         Smooth::None => {}
     }
@@ -110,12 +138,33 @@ pub(super) fn kinds(
             groups[group].push(row);
         }
         let levels = groups.iter().map(|group| Sparse::new(rows, group.iter().map(|&row| (row, 1.0)))).collect();
-        kinds.push(Kind::levels(grouping.name, levels, likelihood, sigma));
+        let kind = Kind::levels(grouping.name, levels, likelihood, sigma);
+        kinds.push(Kind { over: grouping.over.clone(), ..kind });
     }
     if let Some(order) = &data.layout.design.order {
         let columns = TEST_ORDERS.map(|k| on_all(&|row| cosine(k, order[row]))).collect();
-        let orders: Vec<f64> = TEST_ORDERS.map(|k| k as f64).collect();
-        kinds.push(Kind::smooth("test_order", columns, &orders, likelihood, sigma));
+        let waves: Vec<Wave> = TEST_ORDERS.map(Wave::of).collect();
+        kinds.push(smooth("test_order", columns, &waves));
+    }
+    let conditions = &data.layout.design.conditions;
+    for (index, first) in conditions.iter().enumerate() {
+        checkpoint(monitor)?;
+        // So many values allow no more waves.
+        let orders = 0..=CONDITION_ORDERS.min(first.levels - 1);
+        let columns = orders.clone().map(|k| on_all(&|row| cosine(k, first.place[row]))).collect();
+        let kind = smooth("conditions", columns, &orders.map(Wave::of).collect::<Vec<_>>());
+        kinds.push(Kind { over: vec![first.name.to_owned()], ..kind });
+        for second in &conditions[index + 1..] {
+            checkpoint(monitor)?;
+            let of_each = |condition: &Condition| 0..=PAIR_ORDERS.min(condition.levels - 1);
+            let both: Vec<(usize, usize)> = of_each(first).flat_map(|j| of_each(second).map(move |k| (j, k))).collect();
+            let product =
+                |&(j, k): &(usize, usize)| on_all(&|row| cosine(j, first.place[row]) * cosine(k, second.place[row]));
+            let waves: Vec<Wave> = both.iter().map(|&(j, k)| Wave::of(j).times(Wave::of(k))).collect();
+            let kind = smooth("pair_of_conditions", both.iter().map(product).collect(), &waves);
+            // Its waves run in two directions: there is no order by which they could be drawn.
+            kinds.push(Kind { over: vec![first.name.to_owned(), second.name.to_owned()], orders: None, ..kind });
+        }
     }
     Ok(kinds)
 }
@@ -136,23 +185,16 @@ fn runs(data: &Data) -> Vec<Vec<usize>> {
 
 impl Kind {
     /// Amplitudes with standard deviations proportional to exp(-(k pi l)^2 / 2), so that the pointwise
-    /// variance (order 0 counts 1, the others 1/2 each) is sigma^2.
-    fn smooth(name: &'static str, columns: Vec<Sparse>, orders: &[f64], likelihood: &Likelihood, sigma: f64) -> Self {
-        let mut of_each_order: Vec<f64> = orders.to_vec();
-        of_each_order.dedup();
-        of_each_order.sort_by(f64::total_cmp);
-        of_each_order.dedup();
+    /// variance is sigma^2.
+    fn smooth(name: &'static str, columns: Vec<Sparse>, waves: &[Wave], likelihood: &Likelihood, sigma: f64) -> Self {
         let spreads = LENGTHS.map(|length| {
-            let shape = |order: f64| (-0.5 * (order * PI * length).powi(2)).exp();
-            // A pair of Fourier columns of one order has pointwise variance sd^2; a cosine half of it.
-            let pairs = orders.len() > 1 && (orders[0] - orders[1]).abs() < 0.5;
-            let share = |order: f64| if order == 0.0 || pairs { 1.0 } else { 0.5 };
-            let variance: f64 = of_each_order.iter().map(|&k| share(k) * shape(k) * shape(k)).sum();
-            orders.iter().map(|&k| sigma * shape(k) / variance.sqrt()).collect()
+            let shape = |wave: &Wave| (-0.5 * (wave.order * PI * length).powi(2)).exp();
+            let variance: f64 = waves.iter().map(|wave| wave.share * shape(wave) * shape(wave)).sum();
+            waves.iter().map(|wave| sigma * shape(wave) / variance.sqrt()).collect()
         });
-        let halved = |order: &f64| if name == "around" { 0.5 * order } else { *order };
+        let halved = |wave: &Wave| if name == "around" { 0.5 * wave.order } else { wave.order };
         Self {
-            orders: Some(orders.iter().map(halved).collect()),
+            orders: Some(waves.iter().map(halved).collect()),
             ..Self::new(name, columns, spreads.to_vec(), likelihood)
         }
     }
@@ -171,7 +213,7 @@ impl Kind {
                 None => Form::whole(white()),
             },
         };
-        Self { name, columns, orders: None, form, spreads }
+        Self { name, over: Vec::new(), columns, orders: None, form, spreads }
     }
 }
 
@@ -200,9 +242,11 @@ pub(super) fn beside(
     monitor: &dyn Monitor,
 ) -> Result<Option<Remainder>, Failure> {
     let own = Normal::of(columns, residual);
-    let mut all = Vec::new();
     let mut best: Option<(f64, Remainder)> = None;
+    // Names with the evidence of their kinds: kinds of one name have the weight of one.
+    let mut named: Vec<(&'static str, Vec<f64>)> = Vec::new();
     for (index, kind) in kinds.iter().enumerate() {
+        let mut all = Vec::new();
         let explained = kind.explained(&own, columns, residual, sides, likelihood);
         for spread in &kind.spreads {
             for size in SIZES {
@@ -218,8 +262,14 @@ pub(super) fn beside(
                 all.push(log_z);
             }
         }
+        let log_z = log_mean_exp(&all);
+        match named.iter_mut().find(|(name, _)| *name == kind.name) {
+            Some((_, of_name)) => of_name.push(log_z),
+            None => named.push((kind.name, vec![log_z])),
+        }
     }
-    Ok(best.map(|(_, remainder)| Remainder { log_z: log_mean_exp(&all), ..remainder }))
+    let log_z = log_mean_exp(&named.iter().map(|(_, of_name)| log_mean_exp(of_name)).collect::<Vec<_>>());
+    Ok(best.map(|(_, remainder)| Remainder { log_z, ..remainder }))
 }
 
 /// Evidence with the columns of a kind scaled by what is given, and the sizes of causes and columns.
@@ -374,7 +424,12 @@ mod tests {
             smooth: Smooth::Along((0..ROWS).map(|row| row as f64 / ROWS as f64).collect()),
             cell: (0..ROWS).collect(),
             regressors: Vec::new(),
-            groupings: vec![Grouping { name: "third", group: (0..ROWS).map(|row| row % 3).collect() }],
+            groupings: vec![Grouping {
+                name: "third",
+                over: Vec::new(),
+                group: (0..ROWS).map(|row| row % 3).collect(),
+            }],
+            conditions: Vec::new(),
             order: None,
             fold: (0..ROWS).map(run).collect(),
         };
@@ -448,7 +503,7 @@ mod tests {
                 let columns = || kind.columns.clone();
                 let form = Form::whole(columns().iter().map(|column| likelihood.white(&column.dense())).collect());
                 let spreads = kind.spreads.clone();
-                let whole = Kind { name: kind.name, columns: columns(), orders: None, form, spreads };
+                let whole = Kind { name: kind.name, over: Vec::new(), columns: columns(), orders: None, form, spreads };
                 let prior_sd: Vec<f64> = (0..kind.columns.len()).map(|k| 0.5 + 0.4 * wave(k, 1.0)).collect();
                 let of = |kind: &Kind| {
                     let (log_z, t) = kind.explained(&own, &causes, &residual, &sides, &likelihood)(&prior_sd).unwrap();

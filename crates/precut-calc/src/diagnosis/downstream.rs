@@ -21,7 +21,8 @@ const LEAST: usize = DRAWS / 2;
 const NEARLY_NORMAL: f64 = 60.0;
 
 /// Decisions with the base and with the extended model, each judged where the extended model acts with what the rows leave
-/// open of its sizes. Empty where the leading set was not refined, or where the job decides nothing.
+/// open of its sizes and with what the job allows besides. Empty where the leading set was not refined, or where the job
+/// decides nothing.
 pub(super) fn downstream<M: Diagnosable>(
     job: &JobOf<M>,
     runs: &[M::Run],
@@ -33,10 +34,14 @@ pub(super) fn downstream<M: Diagnosable>(
     let Some((set, fit)) = leading.and_then(|set| Some((set, weighing.fit(&set.members)?))) else {
         return Ok(Vec::new());
     };
-    let Some(draws) = draws(bound, set, fit, weighing.noise.dof, u64::from(job.options.seed)) else {
+    let mut random = Gaussian { random: Pcg64::seed_from_u64(u64::from(job.options.seed)), normal: Normal::standard() };
+    let Some(draws) = draws(bound, set, fit, weighing.noise.dof, &mut random) else {
         return Ok(Vec::new());
     };
-    let acting = draws.iter().map(|settings| bound.effects_of(settings)).collect::<Result<Vec<_>, _>>()?;
+    let mut acting = draws.iter().map(|settings| bound.effects_of(settings)).collect::<Result<Vec<_>, _>>()?;
+    for effects in &mut acting {
+        effects.extend(M::allowed(&job.allowances, &mut || random.next()));
+    }
     let decided = |believed: &[M::Effect]| {
         checkpoint(monitor)?;
         M::consequences(&job.job, &job.quantity, runs, believed, &acting)
@@ -57,7 +62,13 @@ pub(super) fn downstream<M: Diagnosable>(
 
 /// Settings drawn from the posterior of a fit: Student's t about the optimum, cut at the bounds. What a grid of shapes
 /// widens is widened here, too.
-fn draws(subject: &dyn Subject, set: &SetWeight, fit: &Fit, dof: f64, seed: u64) -> Option<Vec<Vec<Setting>>> {
+fn draws(
+    subject: &dyn Subject,
+    set: &SetWeight,
+    fit: &Fit,
+    dof: f64,
+    random: &mut Gaussian,
+) -> Option<Vec<Vec<Setting>>> {
     let lower = Cholesky::new(fit.covariance.clone())?.unpack();
     let widened: Vec<f64> = fit
         .free
@@ -65,7 +76,6 @@ fn draws(subject: &dyn Subject, set: &SetWeight, fit: &Fit, dof: f64, seed: u64)
         .enumerate()
         .map(|(k, &(member, variable))| set.standard_deviations[member][variable] / fit.covariance[(k, k)].sqrt())
         .collect();
-    let mut random = Gaussian { random: Pcg64::seed_from_u64(seed), normal: Normal::standard() };
     let draw = |_| {
         let scale = random.student_scale(dof);
         let step = &lower * DVector::from_fn(fit.free.len(), |_, _| scale * random.next());

@@ -20,14 +20,18 @@ pub(super) struct Left<'a> {
 
 impl Left<'_> {
     /// Probability that so much or more is left if nothing else acts: the lesser one of all that is left and of what goes
-    /// with `low_order`, the whitened regressors of an unordered design. `None` where the scatter was found from all of it.
+    /// with `low_order`, the whitened regressors of an unordered design, doubled where both are asked, so that it is below a
+    /// level by chance no more often than that (Bonferroni). `None` where the scatter was found from all of it.
     ///
     /// What is missing most often goes smoothly with the conditions: among a few directions a test sees what it
     /// misses among many.
     pub(super) fn probability(&self, low_order: &[White]) -> Option<f64> {
         let alone = Normal::of(&self.columns, self.residual);
         let misfit = alone.misfit();
-        [self.of_all(misfit), self.of_low_order(misfit, alone.rank(), low_order)].into_iter().flatten().reduce(f64::min)
+        match (self.of_all(misfit), self.of_low_order(misfit, alone.rank(), low_order)) {
+            (Some(all), Some(low_order)) => Some((2.0 * all.min(low_order)).min(1.0)),
+            (one, other) => one.or(other),
+        }
     }
 
     /// Of what is left that part which the scatter was not found from.
@@ -83,18 +87,18 @@ mod tests {
     #[test]
     fn of_stated_scatter_the_tail_is_that_of_chi_squared() {
         let (few, many) = probability(NoiseSource::Stated { scatter_factor: 1.0 }, f64::INFINITY);
-        assert!((few / (-8.0_f64).exp() - 1.0).abs() < 1e-9, "{few}");
+        assert!((few / (2.0 * (-8.0_f64).exp()) - 1.0).abs() < 1e-9, "{few}");
         assert!((many - ChiSquared::new(19.0).unwrap().sf(16.0)).abs() < 1e-12 && many > 0.6, "{many}");
         // Rows that scatter twice as far as was stated: the same four are two.
         let (few, _) = probability(NoiseSource::Stated { scatter_factor: 2.0 }, f64::INFINITY);
-        assert!((few / (-2.0_f64).exp() - 1.0).abs() < 1e-9, "{few}");
+        assert!((few / (2.0 * (-2.0_f64).exp()) - 1.0).abs() < 1e-9, "{few}");
     }
 
     #[test]
     fn of_scatter_from_repeats_the_tail_is_that_of_f() {
         let nu = 12.0;
         let (few, many) = probability(NoiseSource::Repeats, nu);
-        assert!((few / (1.0 + 16.0 / nu).powf(-nu / 2.0) - 1.0).abs() < 1e-9, "{few}");
+        assert!((few / (2.0 * (1.0 + 16.0 / nu).powf(-nu / 2.0)) - 1.0).abs() < 1e-9, "{few}");
         // Of sixteen that are left twelve are the scatter's own.
         assert!((many - FisherSnedecor::new(7.0, nu).unwrap().sf(4.0 / 7.0)).abs() < 1e-12, "{many}");
     }

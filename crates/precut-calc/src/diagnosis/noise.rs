@@ -139,7 +139,7 @@ fn held_against_rows(stated: &[f64], keep: &[bool], own: &Noise, is_scatter: boo
 }
 
 /// Smallest difference between two different values.
-fn resolution(values: &[f64], keep: &[bool]) -> f64 {
+pub(super) fn resolution(values: &[f64], keep: &[bool]) -> f64 {
     let mut values: Vec<f64> = values.iter().zip(keep).filter(|(_, keep)| **keep).map(|(v, _)| *v).collect();
     values.sort_by(f64::total_cmp);
     values.windows(2).map(|pair| pair[1] - pair[0]).filter(|d| *d > 0.0).min_by(f64::total_cmp).unwrap_or(0.0)

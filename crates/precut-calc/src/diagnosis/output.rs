@@ -244,7 +244,7 @@ fn noise_sources() -> Object {
 /// A test of the base.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct TestReport {
-    /// `lack_of_fit`, `smooth_directions`, `ljung_box`, `runs`, of classes `deviance`.
+    /// `lack_of_fit`, `smooth_directions`, `ljung_box`, `runs`, `held_out`, of classes `deviance`.
     pub test: String,
     /// Its statistic.
     #[schema(extensions(("x-unit" = json!("1"))))]
@@ -367,8 +367,11 @@ pub struct ProfileReport {
 /// Shape of what the catalogue does not explain.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct RemainderReport {
-    /// What it is free over: `common` to all runs, `per_run`, `around` the part, `test_order`, or a grouping.
+    /// What it is free over: `common` to all runs, `per_run`, `around` the part, `test_order`, a grouping, the levels of a
+    /// `factor`, smooth in one of the `conditions` or in a `pair_of_conditions`.
     pub kind: String,
+    /// Of `factor`, `conditions` and `pair_of_conditions`: which.
+    pub over: Vec<String>,
     /// Root mean square over the rows, in the unit of the quantity.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub rms: f64,

@@ -8,8 +8,10 @@ use crate::calculator::Smooth;
 #[derive(Debug, Clone, PartialEq)]
 pub struct RemainderShape {
     /// What it is free over: `common` to all runs, `per_run`, `around` the part, over `test_order`, or the
-    /// levels of a grouping.
+    /// levels of a grouping, smooth in one of the `conditions` or in a `pair_of_conditions`.
     pub kind: &'static str,
+    /// Which conditions or which factor, where the kind does not say.
+    pub over: Vec<String>,
     /// One value per row, in the unit of the rows.
     pub value: Vec<f64>,
     /// Its posterior standard deviation at every row; empty where it has too many free sizes.
@@ -65,7 +67,8 @@ pub fn remainder_shape(weighing: &Weighing<'_>) -> Option<RemainderShape> {
     let left: Vec<f64> = (0..rows).map(left).collect();
     let step = step(weighing, &left, &kept);
     let with_base = (kind.name == "common").then(|| with_base(weighing, &left, &value)).flatten();
-    Some(RemainderShape { kind: kind.name, value, deviation, spectrum, rms, extreme_row, explained, step, with_base })
+    let (over, kind) = (kind.over.clone(), kind.name);
+    Some(RemainderShape { kind, over, value, deviation, spectrum, rms, extreme_row, explained, step, with_base })
 }
 
 /// Places at which a step is tried.

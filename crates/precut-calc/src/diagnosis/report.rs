@@ -1,6 +1,6 @@
 //! From the statistics to the answer: the verdict in the words of the contract, and every step behind it.
 
-use super::adequacy::{Test, TestKind, adequacy};
+use super::adequacy::Test;
 use super::base::Bound;
 use super::calculator::{JobOf, Measured, ResultOf, stage};
 use super::classes;
@@ -17,7 +17,7 @@ use super::output::{
 };
 use super::refuse::{most_causes, refusal};
 use super::remainder::{RemainderShape, remainder_shape};
-use super::said::{basis, doubts, explanation, warnings};
+use super::said::{basis, doubts, explanation, hinted, nearest, warnings};
 use super::subject::{Setting, Subject};
 use super::view::View;
 use super::weigh::{Effort, Verdict, Weighing};
@@ -40,7 +40,7 @@ pub(super) fn answer<M: Diagnosable>(
     data: &Data,
     monitor: &dyn Monitor,
 ) -> Result<Answer<ResultOf<M>>, Failure> {
-    let Measured { places, used, .. } = measured;
+    let Measured { places, used, copies, .. } = measured;
     stage(monitor, 0.05, "diagnosis_stage_signatures");
     let mut foundation = Foundation::of(bound, data, monitor)?;
     let found = foundation.outliers();
@@ -53,7 +53,7 @@ pub(super) fn answer<M: Diagnosable>(
     let (effort, fold_effort) = if bound.is_dear() {
         (Effort::dear(most_causes), Effort::dear_fold(most_causes))
     } else {
-        (Effort::full(most_causes), Effort::full(most_causes))
+        (Effort::full(most_causes), Effort::fold(most_causes))
     };
     let [effort, fold_effort] = [effort, fold_effort].map(|effort| Effort { level: job.options.level, ..effort });
     let weighing = Weighing::of(&foundation, keep, effort, monitor)?;
@@ -83,7 +83,7 @@ pub(super) fn answer<M: Diagnosable>(
     };
     let (contributions, collinearity) =
         if refusal.is_none() { view.contributions(job.options.negligible_below)? } else { (Vec::new(), None) };
-    let mut warnings = warnings(&job.options, &weighing, &found, used, refusal.is_none(), gain.is_some());
+    let mut warnings = warnings(&job.options, &weighing, &found, (used, copies), refusal.is_none(), gain.is_some());
     let (signatures, separations) = view.signatures()?;
     let with = extended.prediction.as_deref();
     let classes = classes::report(bound, &weighing, measured, with, &effects, gain.as_ref(), seed)?;
@@ -167,8 +167,7 @@ fn in_particular<E: utoipa::ToSchema, R: utoipa::ToSchema>(
             // What is left of logarithms is a share.
             .with("unit", if quantity.logarithmic { "" } else { quantity.unit }),
         "diagnosis_objected" => {
-            let best = output.sets.iter().find(|set| !set.with_remainder && !set.causes.is_empty());
-            message.with("labels", best.map_or_else(Vec::new, |set| labels(&set.causes)))
+            message.with("labels", nearest(output).map_or_else(Vec::new, |set| labels(&set.causes)))
         }
         "diagnosis_confounded" => {
             let said: &[Value] = match message.values.get("sets") {
@@ -185,7 +184,7 @@ fn in_particular<E: utoipa::ToSchema, R: utoipa::ToSchema>(
             message.with("labels", small.map(|contribution| contribution.label.clone()).collect::<Vec<_>>())
         }
         "diagnosis_adequate_with_hint" => {
-            message.with("label", output.causes.first().map_or_else(String::new, |cause| cause.label.clone()))
+            message.with("label", hinted(output).map_or_else(String::new, |cause| cause.label.clone()))
         }
         _ => message,
     }
@@ -202,6 +201,7 @@ fn remainder_report(shape: RemainderShape, used: &[usize]) -> RemainderReport {
     let (orders, amplitudes) = shape.spectrum.into_iter().unzip();
     RemainderReport {
         kind: shape.kind.to_owned(),
+        over: shape.over,
         rms: shape.rms,
         largest_at_row: row_number(used[shape.extreme_row]),
         value: shape.value,
@@ -225,23 +225,13 @@ fn row_number(row: usize) -> u32 {
 
 fn test_reports(weighing: &Weighing<'_>, level: f64) -> Vec<TestReport> {
     let report = |test: Test| TestReport {
-        test: test_name(test.kind).to_owned(),
+        test: test.kind.name().to_owned(),
         statistic: test.statistic,
         p: test.p,
         p_holm: test.p_holm,
         rejects: test.p_holm < level,
     };
-    adequacy(weighing).into_iter().map(report).collect()
-}
-
-fn test_name(kind: TestKind) -> &'static str {
-    match kind {
-        TestKind::LackOfFit => "lack_of_fit",
-        TestKind::SmoothDirections => "smooth_directions",
-        TestKind::LjungBox => "ljung_box",
-        TestKind::Runs => "runs",
-        TestKind::Deviance => "deviance",
-    }
+    weighing.tests.iter().copied().map(report).collect()
 }
 
 fn noise_report(weighing: &Weighing<'_>) -> NoiseReport {

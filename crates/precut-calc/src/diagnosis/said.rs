@@ -2,21 +2,24 @@
 
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
+use super::adequacy::TestKind;
 use super::classes;
 use super::identify::{COLLINEAR_ABOVE, CONFOUNDED_BELOW};
 use super::input::DiagnosisOptions;
 use super::noise::NoiseSource;
 use super::outlier::Outliers;
-use super::output::{DiagnosisResult, NamedCause, Refusal, SetReport, VerdictClass};
+use super::output::{CauseReport, DiagnosisResult, NamedCause, Refusal, SetReport, VerdictClass};
 use super::refuse::{most_causes, rows_for};
-use super::suspect::{copied_traces, repeated_rows, swapped_columns};
-use super::weigh::{UNNAMED, UNNAMED_MATTERS, Weighing};
+use super::suspect::swapped_columns;
+use super::weigh::{ALARM, UNNAMED, UNNAMED_MATTERS, Weighing};
 use crate::calculator::{Basis, Finding, Message, Quantity, Smooth};
 
 /// Probability of a scatter so much larger than between sweeps by chance, below which rows have structure that sweeps share.
 const FINER: f64 = 0.01;
 /// Difference of the information criterion that is more than a bare mention (Raftery).
 const BIC_MATTERS: f64 = 2.0;
+/// Copied rows that are named by their numbers.
+const SAID_ROWS: usize = 12;
 /// Sets that the sentence of a confounded answer names.
 const SAID_SETS: usize = 6;
 
@@ -25,7 +28,6 @@ pub(super) const WARNING_CODES: &[&str] = &[
     "outliers_left_out",
     "too_many_outliers",
     "far_rows_kept",
-    "copied_sweeps",
     "repeated_rows",
     "scatter_unlike_stated",
     "one_place",
@@ -64,12 +66,18 @@ pub(super) fn warnings(
     options: &DiagnosisOptions,
     weighing: &Weighing<'_>,
     found: &Outliers,
-    used: &[usize],
+    (used, copies): (&[usize], &[usize]),
     judged: bool,
     has_gain: bool,
 ) -> Vec<Finding> {
     let foundation = weighing.foundation;
-    let mut warnings = odd_rows(options.leave_outliers_out, weighing, found, used);
+    let mut warnings = Vec::new();
+    if let Some(first) = copies.first() {
+        let finding = Finding::new("repeated_rows", format!("/measurements/{first}")).with("count", copies.len());
+        let said: Vec<usize> = copies.iter().take(SAID_ROWS).map(|row| row + 1).collect();
+        warnings.push(finding.with("more", copies.len() - said.len()).with("rows", said));
+    }
+    warnings.extend(odd_rows(options.leave_outliers_out, weighing, found, used));
     let asked_for = usize::from(options.most_causes);
     if judged && most_causes(asked_for, used.len()) < asked_for {
         let needed = rows_for(asked_for) as f64;
@@ -131,17 +139,7 @@ fn odd_rows(leave_out: bool, weighing: &Weighing<'_>, found: &Outliers, used: &[
     }
     let data = foundation.data;
     if data.sides.is_some() {
-        // Equal classes are no copies of each other.
         warnings.extend(classes::warnings(weighing, used));
-        return warnings;
-    }
-    warnings.extend(copied_traces(data).into_iter().map(|(first, second)| {
-        Finding::new("copied_sweeps", "/measurements").with("first", first + 1).with("second", second + 1)
-    }));
-    let repeated: Vec<usize> = repeated_rows(data).into_iter().map(|row| used[row] + 1).collect();
-    if !repeated.is_empty() {
-        let finding = Finding::new("repeated_rows", format!("/measurements/{}", repeated[0] - 1));
-        warnings.push(finding.with("count", repeated.len()).with("rows", repeated));
     }
     warnings
 }
@@ -207,10 +205,11 @@ pub(super) fn explanation<E: utoipa::ToSchema, R: utoipa::ToSchema>(
 ) -> Vec<Message> {
     let mut said = vec![match output.verdict {
         VerdictClass::Adequate if output.none_probability < 0.5 => {
-            let hint = output.causes.first().map_or_else(String::new, |cause| cause.kind.clone());
+            let hint = hinted(output);
             Message::new("diagnosis_adequate_with_hint")
                 .with("probability_none", output.none_probability)
-                .with("cause", hint)
+                .with("cause", hint.map_or_else(String::new, |cause| cause.kind.clone()))
+                .with("probability", hint.map_or(output.unnamed_probability, |cause| cause.probability))
         }
         VerdictClass::Adequate => Message::new("diagnosis_adequate").with("probability_none", output.none_probability),
         VerdictClass::Named => Message::new("diagnosis_named")
@@ -232,11 +231,12 @@ pub(super) fn explanation<E: utoipa::ToSchema, R: utoipa::ToSchema>(
                 )
                 .with("limit_sigmas", CONFOUNDED_BELOW)
         }
-        VerdictClass::Unknown if output.unnamed_probability < UNNAMED => objected(&output.sets),
+        VerdictClass::Unknown if output.unnamed_probability < UNNAMED => objected(output),
         VerdictClass::Unknown => Message::new("diagnosis_unknown")
             .with("probability", output.unnamed_probability)
             .with("rms", output.remainder.as_ref().map_or(0.0, |remainder| remainder.rms))
             .with("kind", output.remainder.as_ref().map_or_else(String::new, |remainder| remainder.kind.clone()))
+            .with("over", output.remainder.as_ref().map_or_else(Vec::new, |remainder| remainder.over.clone()))
             .with("named", kinds(&output.named)),
         VerdictClass::Refused => refused(output.refusal.as_ref(), output.rows.row.len()),
     }];
@@ -323,12 +323,33 @@ fn labels(causes: &[NamedCause]) -> Vec<String> {
     causes.iter().map(|cause| cause.label.clone()).collect()
 }
 
-/// The best of the catalogue, to which the rows still object.
-fn objected(sets: &[SetReport]) -> Message {
-    let best = sets.iter().find(|set| !set.with_remainder && !set.causes.is_empty());
-    Message::new("diagnosis_objected")
-        .with("causes", best.map_or_else(Vec::new, |set| kinds(&set.causes)))
-        .with("probability", best.and_then(|set| set.lack_of_fit_p).unwrap_or(0.0))
+/// What a hint at something beside an adequate base names: the likeliest cause, where it is likelier than all that has no
+/// name.
+pub(super) fn hinted<E: utoipa::ToSchema, R: utoipa::ToSchema>(output: &DiagnosisResult<E, R>) -> Option<&CauseReport> {
+    output.causes.first().filter(|cause| cause.probability >= output.unnamed_probability)
+}
+
+/// What leads without fitting: the best of the catalogue, or, where that is not likely, the base.
+pub(super) fn nearest<E: utoipa::ToSchema, R: utoipa::ToSchema>(output: &DiagnosisResult<E, R>) -> Option<&SetReport> {
+    output.sets.iter().find(|set| !set.with_remainder && !set.causes.is_empty())
+}
+
+/// Rows object to the best of the catalogue, or to a base that nothing of the catalogue mends.
+fn objected<E: utoipa::ToSchema, R: utoipa::ToSchema>(output: &DiagnosisResult<E, R>) -> Message {
+    let nearest = nearest(output);
+    let base = output.sets.iter().find(|set| !set.with_remainder && set.causes.is_empty());
+    let of_base = output.tests.iter().filter(|test| TestKind::names_one_of_base(&test.test));
+    let of_tests = of_base.map(|test| test.p_holm);
+    let against_base = of_tests.chain(base.and_then(|set| set.lack_of_fit_p)).fold(1.0, f64::min);
+    let said = Message::new("diagnosis_objected")
+        .with("causes", nearest.map_or_else(Vec::new, |set| kinds(&set.causes)))
+        .with("likely", nearest.map_or(0.0, |set| set.posterior))
+        .with("unnamed", output.unnamed_probability);
+    // Of a base that is likely by its weight only the tests say that it is wrong.
+    match nearest.and_then(|set| set.lack_of_fit_p).filter(|_| output.none_probability < ALARM) {
+        Some(p) => said.with("of_base", 0.0).with("probability", p),
+        None => said.with("of_base", 1.0).with("probability", against_base),
+    }
 }
 
 fn refused(refusal: Option<&Refusal>, rows: usize) -> Message {

@@ -1,5 +1,7 @@
 //! Which sets of causes explain the rows, all from one matrix of inner products (`diagnosis/3.4`).
 
+use std::collections::BTreeSet;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::evidence::{Evidence, Normal, Side, log_sum_exp};
@@ -10,10 +12,6 @@ use super::subject::Setting;
 use super::whiten::White;
 use crate::calculator::{Failure, Hypothesis, Monitor, Treatment, Variable, checkpoint};
 
-/// Singles that may have partners.
-const LEADING_SINGLES: usize = 6;
-/// Pairs that may have a third.
-const LEADING_PAIRS: usize = 6;
 /// A signature shorter than this, whitened and at one prior standard deviation, cannot be seen.
 const VISIBLE: f64 = 0.05;
 /// Variants of a hypothesis that are tried beside another, where every evidence takes Newton's method.
@@ -357,7 +355,12 @@ impl<'a> Linear<'a> {
     }
 
     /// The empty set, all singles, pairs with a leading single in them, and leading pairs with a third.
-    pub(super) fn search(&self, most_causes: usize, monitor: &dyn Monitor) -> Result<Vec<Candidate>, Failure> {
+    pub(super) fn search(
+        &self,
+        most_causes: usize,
+        [leading_singles, leading_pairs]: [usize; 2],
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Candidate>, Failure> {
         let set = |members: Vec<usize>| {
             let log_prior = self.log_prior(&members);
             self.candidate(members, log_prior)
@@ -370,7 +373,7 @@ impl<'a> Linear<'a> {
         }
         let mut pairs = Vec::new();
         if most_causes >= 2 {
-            for (rank, single) in singles.iter().take(LEADING_SINGLES).enumerate() {
+            for (rank, single) in singles.iter().take(leading_singles).enumerate() {
                 checkpoint(monitor)?;
                 let leaders: Vec<usize> = singles[..rank].iter().map(|s| s.members[0]).collect();
                 let first = single.members[0];
@@ -380,13 +383,14 @@ impl<'a> Linear<'a> {
             by_weight(&mut pairs);
         }
         let mut triples: Vec<Candidate> = Vec::new();
+        let mut known: BTreeSet<Vec<usize>> = BTreeSet::new();
         if most_causes >= 3 {
-            for pair in pairs.iter().take(LEADING_PAIRS) {
+            for pair in pairs.iter().take(leading_pairs) {
                 checkpoint(monitor)?;
                 for &third in self.visible.iter().filter(|h| !pair.members.contains(h)) {
                     let mut members = [pair.members.as_slice(), &[third]].concat();
                     members.sort_unstable();
-                    if triples.iter().all(|triple| triple.members != members) {
+                    if known.insert(members.clone()) {
                         triples.extend(set(members));
                     }
                 }

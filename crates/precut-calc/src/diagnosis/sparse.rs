@@ -48,6 +48,11 @@ impl Sparse {
         self.rows.binary_search(&row).map_or(0.0, |place| self.values[place])
     }
 
+    /// The same of the rows that are kept.
+    pub(super) fn of_rows(&self, keep: &[bool]) -> Self {
+        Self::new(self.length, self.entries().filter(|(row, _)| keep[*row]))
+    }
+
     /// Adds it, times a factor.
     pub(super) fn add_to(&self, sum: &mut [f64], factor: f64) {
         self.entries().for_each(|(row, value)| sum[row] += factor * value);

@@ -90,24 +90,6 @@ pub fn suspected_offset(quantity: &Quantity, measured: &[f64], base: &[f64], kee
     factors.iter().find(near).map(|&factor| SuspectedFactor { factor, fitted: mean.exp(), explained })
 }
 
-/// Rows of a sweep that repeat an earlier one digit for digit, place and value: written twice, not measured twice.
-pub fn repeated_rows(data: &Data) -> Vec<usize> {
-    if data.layout.design.smooth == Smooth::None {
-        return Vec::new();
-    }
-    let same = |a: usize, b: usize| {
-        data.layout.design.cell[a] == data.layout.design.cell[b] && data.value[a].to_bits() == data.value[b].to_bits()
-    };
-    let mut repeated = Vec::new();
-    for rows in &data.layout.traces {
-        let mut sorted = rows.clone();
-        sorted.sort_by_key(|&row| (data.layout.design.cell[row], data.value[row].to_bits(), row));
-        repeated.extend(sorted.windows(2).filter(|pair| same(pair[0], pair[1])).map(|pair| pair[1]));
-    }
-    repeated.sort_unstable();
-    repeated
-}
-
 /// Whether every sweep has values that go one way from row to row, and places that do not.
 pub fn swapped_columns(data: &Data) -> bool {
     let Smooth::Along(places) = &data.layout.design.smooth else { return false };
@@ -118,26 +100,4 @@ pub fn swapped_columns(data: &Data) -> bool {
     let mut sweeps = data.layout.traces.iter().filter(|rows| rows.len() > 4).peekable();
     sweeps.peek().is_some()
         && sweeps.all(|rows| goes_one_way(&|row| data.value[row], rows) && !goes_one_way(&|row| places[row], rows))
-}
-
-/// Traces of one run that repeat each other digit for digit: copied, not measured again.
-pub fn copied_traces(data: &Data) -> Vec<(usize, usize)> {
-    let traces = &data.layout.traces;
-    let same = |a: &[usize], b: &[usize]| {
-        a.len() > 2
-            && a.len() == b.len()
-            && a.iter().zip(b).all(|(&i, &j)| {
-                data.value[i].to_bits() == data.value[j].to_bits()
-                    && data.layout.design.cell[i] == data.layout.design.cell[j]
-            })
-    };
-    let mut copied = Vec::new();
-    for (i, first) in traces.iter().enumerate() {
-        for (j, second) in traces.iter().enumerate().skip(i + 1) {
-            if same(first, second) {
-                copied.push((i, j));
-            }
-        }
-    }
-    copied
 }

@@ -11,6 +11,18 @@ use super::weigh::{Effort, Weighing};
 use super::whiten::White;
 use crate::calculator::{Diagnosable, Failure, Hypothesis, Unwatched};
 
+/// Logarithm of the largest evidence that the search finds under a job, up to a constant of its rows: comparable between
+/// jobs that differ only in the causes that they ask for.
+pub fn best_evidence<M: Diagnosable>(job: &JobOf<M>) -> Result<f64, Failure> {
+    with_measured::<M, _>(job, &Unwatched, |_, bound, data| {
+        let foundation = Foundation::of(bound, data, &Unwatched)?;
+        let most_causes = usize::from(job.options.most_causes);
+        let effort = if bound.is_dear() { Effort::dear(most_causes) } else { Effort::full(most_causes) };
+        let weighing = Weighing::of(&foundation, foundation.predicted.clone(), effort, &Unwatched)?;
+        Ok(weighing.best_evidence())
+    })
+}
+
 /// How far changes of all rows, each of a cause of its kind, stand from what every other single cause of the catalogue could
 /// make of them under a job's scatter and allowances, sigmas (`diagnosis/3.6`). In the order of `changes`; a kind that the
 /// catalogue lacks stands against all of it.

@@ -1,30 +1,33 @@
 //! From rows to posterior weights and a verdict (`diagnosis/3.5`, `diagnosis/3.7`).
 
+use super::adequacy::{Test, adequacy};
 use super::discrepancy::{self, Kind, Remainder};
-use super::evidence::{Normal, Side, log_sum_exp};
+use super::evidence::{Normal, log_sum_exp};
 use super::fairness::Left;
 use super::foundation::Foundation;
 use super::likelihood::Likelihood;
 use super::link;
 use super::noise::Noise;
-use super::optima::{Optimum, Peak, elsewhere};
+use super::optima::{Optimum, Peak};
 use super::profile::{Profile, Profiler};
+use super::ranking::Ranking;
 use super::refine::{Fit, Refinement};
-use super::search::{Candidate, Linear, by_weight};
+use super::search::Linear;
 use super::subject::Setting;
 use super::whiten::{White, Whitener};
-use crate::calculator::{Failure, Hypothesis, Monitor, Treatment, checkpoint};
+use crate::calculator::{Failure, Hypothesis, Monitor, Smooth, Treatment};
 
+/// Singles with which pairs are made, and pairs with which triples are, where a part of the rows is held back or every
+/// prediction is a simulation; of the whole all singles and more pairs are.
+const LEADING_SINGLES: usize = 6;
+const LEADING_PAIRS: usize = 6;
+const PAIRS_OF_WHOLE: usize = 20;
 /// Sets that are refined about the model itself.
 const LEADERS: usize = 12;
 /// Sets that lead only after the others were refined, and are then refined too.
 const LATE_LEADERS: usize = 6;
-/// Sets that are tried with an unnamed remainder beside them.
-const WITH_REMAINDER: usize = 5;
-/// Prior of the remainder beside a set, relative to the set.
-const REMAINDER_PRIOR: f64 = 0.08;
 /// Below this posterior of "nothing", something is wrong: an alarm needs a Bayes factor of about nine.
-const ALARM: f64 = 0.1;
+pub(super) const ALARM: f64 = 0.1;
 /// Posterior of the remainder from which on the answer is "not in the catalogue".
 pub(super) const UNNAMED: f64 = 0.5;
 /// Posterior from which on a set is named.
@@ -36,6 +39,11 @@ const LIKELY: f64 = 0.95;
 /// Posterior of the remainder from which on no set is named: one in ten, as much as "nothing" may have in an alarm.
 pub(super) const UNNAMED_MATTERS: f64 = ALARM;
 
+/// Of rows along or round a part the share of the level at which a test speaks against the base. How neighbours hang together is
+/// one number there, found from the rows: where it is a little too small, what goes smoothly looks many times less likely than
+/// it is. Two of forty shafts with nothing hidden are rejected at the level itself.
+const SHARE_OF_LEVEL: f64 = 1e-3;
+
 /// Free sizes of a remainder up to which its band is computed: beyond, a triangular solution for every row takes longer
 /// than everything else.
 const MOST_FREE_SIZES: usize = 200;
@@ -45,6 +53,8 @@ const MOST_FREE_SIZES: usize = 200;
 pub struct Effort {
     /// Causes at the same time, 0 to 3.
     pub most_causes: usize,
+    /// Heaviest singles that may have partners, and heaviest pairs that may have a third.
+    pub leading: [usize; 2],
     /// Sets that are refined about the model itself.
     pub leaders: usize,
     /// Of the sets of none, one, two and three causes those that are refined in any case: from the base a single cause
@@ -59,8 +69,10 @@ pub struct Effort {
     pub nonlinear: bool,
     /// Whether other optima of the leading set are looked for.
     pub other_optima: bool,
-    /// Least probability of what a set leaves for it to be named.
+    /// Least probability of what a set leaves for it to be named, and of what the base leaves for it to be adequate.
     pub level: f64,
+    /// Whether a part of the rows is held back: then of classes, whose test of the base draws thousands, it is not tested.
+    pub in_fold: bool,
 }
 
 /// Significance level of the tests unless another is asked for.
@@ -71,13 +83,25 @@ impl Effort {
     pub fn full(most_causes: usize) -> Self {
         Self {
             most_causes,
+            leading: [usize::MAX, PAIRS_OF_WHOLE],
             leaders: LEADERS,
-            of_each_size: [0; 4],
+            of_each_size: [0, usize::MAX, 0, 0],
             rounds: 1,
             late_leaders: LATE_LEADERS,
             nonlinear: false,
             other_optima: true,
             level: LEVEL,
+            in_fold: false,
+        }
+    }
+
+    /// The same in a fold.
+    pub fn fold(most_causes: usize) -> Self {
+        Self {
+            leading: [LEADING_SINGLES, LEADING_PAIRS],
+            of_each_size: [0; 4],
+            in_fold: true,
+            ..Self::full(most_causes)
         }
     }
 
@@ -85,6 +109,7 @@ impl Effort {
     pub fn dear(most_causes: usize) -> Self {
         Self {
             most_causes,
+            leading: [LEADING_SINGLES, LEADING_PAIRS],
             leaders: 1,
             of_each_size: [0, 4, 2, 1],
             rounds: 3,
@@ -92,6 +117,7 @@ impl Effort {
             nonlinear: true,
             other_optima: true,
             level: LEVEL,
+            in_fold: false,
         }
     }
 
@@ -99,6 +125,7 @@ impl Effort {
     pub fn dear_fold(most_causes: usize) -> Self {
         Self {
             most_causes,
+            leading: [LEADING_SINGLES, LEADING_PAIRS],
             leaders: 1,
             of_each_size: [0, 2, 1, 0],
             rounds: 1,
@@ -106,6 +133,7 @@ impl Effort {
             nonlinear: true,
             other_optima: false,
             level: LEVEL,
+            in_fold: true,
         }
     }
 }
@@ -164,6 +192,8 @@ pub struct Weighing<'a> {
     pub unnamed: f64,
     /// Posterior that a hypothesis takes part, for every hypothesis.
     pub inclusion: Vec<f64>,
+    /// Tests of the base.
+    pub tests: Vec<Test>,
     /// The verdict.
     pub verdict: Verdict,
 }
@@ -180,7 +210,7 @@ impl<'a> Weighing<'a> {
         let noise = Noise::of(data, residual, &keep, foundation.heavy_tails.as_deref());
         let likelihood = Likelihood::of(data, &noise, nuisances, &keep);
         let linear = Linear::new(subject.hypotheses(), signatures, likelihood, residual);
-        let candidates = linear.search(effort.most_causes, monitor)?;
+        let candidates = linear.search(effort.most_causes, effort.leading, monitor)?;
         let refinement = Refinement {
             subject: *subject,
             value: &data.value,
@@ -189,10 +219,13 @@ impl<'a> Weighing<'a> {
             nonlinear: effort.nonlinear,
             monitor,
         };
-        let mut ranking = Ranking { candidates, fits: Vec::new(), others: (Vec::new(), Vec::new()) };
+        let mut ranking = Ranking::new(candidates);
         ranking.refine(&linear, &refinement, effort.leaders, effort.of_each_size, monitor)?;
         for _ in 0..effort.rounds {
             ranking.refine(&linear, &refinement, effort.late_leaders, [0; 4], monitor)?;
+        }
+        if !effort.nonlinear && !effort.in_fold {
+            ranking.refine_beside_sizeless(&linear, &refinement, monitor)?;
         }
         ranking.refine_parts(&linear, &refinement, monitor)?;
         if effort.other_optima {
@@ -207,9 +240,8 @@ impl<'a> Weighing<'a> {
             .map(|(log_weight, set)| SetWeight { posterior: (log_weight - total).exp(), ..set })
             .collect();
         let sum = |choose: &dyn Fn(&SetWeight) -> bool| -> f64 {
-            let sum: f64 = sets.iter().filter(|set| choose(set)).map(|set| set.posterior).sum();
-            // The last digit of many shares may lie beyond all of them.
-            sum.min(1.0)
+            // An empty sum of floats is -0. The last digit of many shares may lie beyond all of them.
+            sets.iter().filter(|set| choose(set)).fold(0.0, |sum: f64, set| sum + set.posterior).min(1.0)
         };
         let none = sum(&|set| set.members.is_empty() && set.remainder.is_none());
         let unnamed = sum(&|set| set.remainder.is_some());
@@ -218,16 +250,8 @@ impl<'a> Weighing<'a> {
             Likelihood::Gaussian { whitener, .. } => whitener.clone(),
             Likelihood::Classes(_) => about_leader(foundation, &sets, &noise, &keep)?,
         };
-        let at_limit =
-            |set: &SetWeight| ranking.fit(&set.members).is_some_and(|fit| at_limit(fit, subject.hypotheses()));
         let low_order: Vec<White> = data.layout.design.regressors.iter().map(|column| whitener.white(column)).collect();
-        let is_fair = |set: &SetWeight| {
-            ranking
-                .lack_of_fit(&linear, &noise, &low_order, &set.members)
-                .is_none_or(|probability| probability >= effort.level)
-        };
-        let verdict = verdict(&sets, none, unnamed, &at_limit, &is_fair);
-        Ok(Self {
+        let mut weighing = Self {
             foundation,
             keep,
             noise,
@@ -240,8 +264,73 @@ impl<'a> Weighing<'a> {
             none,
             unnamed,
             inclusion,
-            verdict,
-        })
+            tests: Vec::new(),
+            verdict: Verdict::Adequate,
+        };
+        if data.sides.is_none() || !effort.in_fold {
+            weighing.tests = adequacy(&weighing);
+        }
+        weighing.verdict = weighing.judged(effort.level);
+        Ok(weighing)
+    }
+
+    /// Whether no test says that the base is wrong: neither one of the family, nor what it leaves.
+    fn base_stands(&self, level: f64) -> bool {
+        let is_ordered = self.foundation.data.layout.design.smooth != Smooth::None;
+        let level = if is_ordered { level * SHARE_OF_LEVEL } else { level };
+        let fits = self.sets.iter().find(|set| set.members.is_empty() && set.remainder.is_none());
+        let objects = |test: &Test| test.kind.is_of_base() && test.p_holm < level;
+        !self.tests.iter().any(objects) && fits.is_none_or(|base| self.is_fair(base, level))
+    }
+
+    /// Whether the rows do not object to a set.
+    fn is_fair(&self, set: &SetWeight, level: f64) -> bool {
+        self.lack_of_fit(set).is_none_or(|probability| probability >= level)
+    }
+
+    fn judged(&self, level: f64) -> Verdict {
+        let (none, unnamed) = (self.none, self.unnamed);
+        let quiet = none >= ALARM;
+        if quiet && self.base_stands(level) {
+            return Verdict::Adequate;
+        }
+        // Where rows object to a base that is likely, what is left to choose from is all else.
+        let whole = if quiet { 1.0 - none } else { 1.0 };
+        if unnamed >= UNNAMED * whole {
+            let leading = self.sets.iter().find(|set| set.remainder.is_some());
+            return Verdict::Unknown(leading.map_or_else(Vec::new, |set| set.members.clone()));
+        }
+        let of_named: f64 = self.named_sets().map(|set| set.posterior).sum();
+        let mut likely: Vec<&SetWeight> = Vec::new();
+        let mut held = 0.0;
+        for set in self.named_sets() {
+            if held >= LIKELY * of_named {
+                break;
+            }
+            held += set.posterior;
+            likely.push(set);
+        }
+        if let Some(leader) = likely.first() {
+            let in_all = likely.iter().all(|set| leader.members.iter().all(|h| set.members.contains(h)));
+            let leads = leader.posterior >= NAMED || (leader.posterior >= NAMED_IF_COMMON && in_all);
+            // The best of the catalogue, and the rows still object.
+            if leads && !self.is_fair(leader, level) {
+                return Verdict::Unknown(Vec::new());
+            }
+            // At its limit a size is not what the data ask for: something else acts, or the limit is wrong.
+            let at_limit =
+                self.fit(&leader.members).is_some_and(|fit| at_limit(fit, self.foundation.subject.hypotheses()));
+            if leads && unnamed < UNNAMED_MATTERS && !at_limit {
+                return Verdict::Named(leader.members.clone());
+            }
+        }
+        likely.retain(|set| self.is_fair(set, level));
+        let fair: f64 = likely.iter().map(|set| set.posterior).sum();
+        // Of what is likely by name more than half does not fit.
+        if fair < UNNAMED * held || likely.is_empty() {
+            return Verdict::Unknown(Vec::new());
+        }
+        Verdict::Confounded(likely.iter().map(|set| set.members.clone()).collect())
     }
 
     /// What every value of every member of a set whose shapes stay on their grid may be, point by point of the grid; `None` of
@@ -297,12 +386,14 @@ impl<'a> Weighing<'a> {
         Profiler { refinement: &refinement, fit, dear }.profiles(&free, reach, monitor)
     }
 
-    /// Probability that rows scatter so far from a set or farther, if nothing else acts; see [`Ranking::lack_of_fit`].
+    /// Probability that rows scatter so far from a set or farther, if nothing else acts; see [`Left::probability`]. `None`
+    /// of classes, and beside a remainder.
     pub(super) fn lack_of_fit(&self, set: &SetWeight) -> Option<f64> {
-        if set.remainder.is_some() {
-            return None;
-        }
-        self.ranking.lack_of_fit(&self.linear, &self.noise, &self.low_order, &set.members)
+        let Likelihood::Gaussian { whitener, .. } = &self.linear.likelihood else { return None };
+        let candidate = self.ranking.candidates.iter().find(|candidate| candidate.members == set.members)?;
+        let (columns, residual, _) = self.ranking.parts(&self.linear, candidate);
+        let left = Left { columns, residual: &residual, rows: whitener.rows(), noise: &self.noise };
+        if set.remainder.is_some() { None } else { left.probability(&self.low_order) }
     }
 
     /// n ln(RSS/n) + k ln n of a set without a remainder, RSS whitened and at the fit without priors. Where it has a
@@ -375,6 +466,11 @@ impl<'a> Weighing<'a> {
         sweeps.into_iter().filter(|(of, _)| *of == run).flat_map(|(_, rows)| rows).collect()
     }
 
+    /// Logarithm of the largest evidence that any set of causes has, the empty one among them, without its prior.
+    pub fn best_evidence(&self) -> f64 {
+        self.ranking.candidates.iter().map(|candidate| candidate.log_z).fold(f64::NEG_INFINITY, f64::max)
+    }
+
     /// Sets without a remainder, heaviest first.
     pub fn named_sets(&self) -> impl Iterator<Item = &SetWeight> {
         self.sets.iter().filter(|set| set.remainder.is_none() && !set.members.is_empty())
@@ -399,214 +495,6 @@ fn about_leader(
     Ok(Whitener::new(foundation.data, &noise.informed(&margin), &foundation.nuisances, keep))
 }
 
-/// Candidates, and the fits of those that were refined.
-struct Ranking {
-    candidates: Vec<Candidate>,
-    fits: Vec<(Vec<usize>, Option<Fit>)>,
-    /// Of the set that led then: its members, and the fits at its other optima.
-    others: (Vec<usize>, Vec<Fit>),
-}
-
-impl Ranking {
-    fn fit(&self, members: &[usize]) -> Option<&Fit> {
-        self.fits.iter().find(|(of, _)| of == members).and_then(|(_, fit)| fit.as_ref())
-    }
-
-    /// The heaviest sets: so many of all, and so many of each size.
-    fn leaders(&self, count: usize, of_each_size: [usize; 4]) -> Vec<usize> {
-        let mut met = [0; 4];
-        (0..self.candidates.len())
-            .filter(|&index| {
-                let size = self.candidates[index].members.len().min(3);
-                met[size] += 1;
-                index < count || met[size] <= of_each_size[size]
-            })
-            .collect()
-    }
-
-    /// Refines the heaviest sets that are not refined yet, and gives them the evidence found there.
-    fn refine(
-        &mut self,
-        linear: &Linear<'_>,
-        refinement: &Refinement<'_>,
-        count: usize,
-        of_each_size: [usize; 4],
-        monitor: &dyn Monitor,
-    ) -> Result<(), Failure> {
-        let leaders = self.leaders(count, of_each_size);
-        self.refine_these(leaders, linear, refinement, monitor)
-    }
-
-    /// Refines the parts of the set that leads: what fits only beside others from where it is linearised may fit alone about
-    /// the model itself, and a companion that has nothing to do must not keep its place.
-    fn refine_parts(
-        &mut self,
-        linear: &Linear<'_>,
-        refinement: &Refinement<'_>,
-        monitor: &dyn Monitor,
-    ) -> Result<(), Failure> {
-        while let Some(leader) = self.candidates.iter().find(|candidate| !candidate.members.is_empty()) {
-            let is_part = |candidate: &Candidate| {
-                let fewer = (1..leader.members.len()).contains(&candidate.members.len());
-                fewer && candidate.members.iter().all(|h| leader.members.contains(h)) && !self.is_refined(candidate)
-            };
-            let parts: Vec<usize> =
-                (0..self.candidates.len()).filter(|&index| is_part(&self.candidates[index])).collect();
-            if parts.is_empty() {
-                break;
-            }
-            self.refine_these(parts, linear, refinement, monitor)?;
-        }
-        Ok(())
-    }
-
-    fn is_refined(&self, candidate: &Candidate) -> bool {
-        self.fits.iter().any(|(of, _)| *of == candidate.members)
-    }
-
-    fn refine_these(
-        &mut self,
-        indices: Vec<usize>,
-        linear: &Linear<'_>,
-        refinement: &Refinement<'_>,
-        monitor: &dyn Monitor,
-    ) -> Result<(), Failure> {
-        for index in indices {
-            checkpoint(monitor)?;
-            if self.candidates[index].members.is_empty() || self.is_refined(&self.candidates[index]) {
-                continue;
-            }
-            let candidate = &mut self.candidates[index];
-            let start = linear.settings(candidate);
-            let fit = if linear.is_off_grid(candidate) {
-                // Its shapes were free before, and have paid for it.
-                let free = refinement.fit(start, true)?;
-                free.inspect(|free| candidate.log_z += free.log_z - candidate.best_log_z)
-            } else {
-                refine_from_grid(candidate, start, linear, refinement)?
-            };
-            self.fits.push((candidate.members.clone(), fit));
-        }
-        by_weight(&mut self.candidates);
-        Ok(())
-    }
-
-    /// Looks for other optima of the leading set; the best one is its fit from then on.
-    fn look_elsewhere(&mut self, linear: &Linear<'_>, refinement: &Refinement<'_>) -> Result<(), Failure> {
-        let leader = self.candidates.iter_mut().find(|candidate| !candidate.members.is_empty());
-        let Some(leader) = leader else { return Ok(()) };
-        let of_leader = self.fits.iter_mut().find(|(of, _)| *of == leader.members);
-        let Some(fit) = of_leader.and_then(|(_, fit)| fit.as_mut()) else { return Ok(()) };
-        let mut others = elsewhere(leader, fit, linear, refinement)?;
-        if let Some(best) = others.first_mut().filter(|best| best.log_z > fit.log_z) {
-            leader.log_z += best.log_z - fit.log_z;
-            std::mem::swap(fit, best);
-        }
-        self.others = (leader.members.clone(), others);
-        by_weight(&mut self.candidates);
-        Ok(())
-    }
-
-    /// Log weight of every set, alone and, where it leads, beside a remainder.
-    fn weigh(
-        &self,
-        linear: &Linear<'_>,
-        kinds: &[Kind],
-        monitor: &dyn Monitor,
-    ) -> Result<Vec<(f64, SetWeight)>, Failure> {
-        let mut weighed: Vec<(f64, SetWeight)> =
-            self.candidates.iter().map(|c| (c.log_weight(), self.set(linear, c, None))).collect();
-        let empty = self.candidates.iter().filter(|c| c.members.is_empty());
-        let leading = self.candidates.iter().filter(|c| !c.members.is_empty()).take(WITH_REMAINDER - 1);
-        for candidate in empty.chain(leading) {
-            if let Some(remainder) = self.beside(linear, kinds, candidate, monitor)? {
-                let log_weight = remainder.log_z + candidate.log_prior + REMAINDER_PRIOR.ln();
-                weighed.push((log_weight, self.set(linear, candidate, Some(remainder))));
-            }
-        }
-        Ok(weighed)
-    }
-
-    /// Probability that a set leaves so much or more; see [`Left::probability`]. `None` of classes.
-    fn lack_of_fit(&self, linear: &Linear<'_>, noise: &Noise, low_order: &[White], members: &[usize]) -> Option<f64> {
-        let Likelihood::Gaussian { whitener, .. } = &linear.likelihood else { return None };
-        let candidate = self.candidates.iter().find(|candidate| candidate.members == members)?;
-        let (columns, residual, _) = self.parts(linear, candidate);
-        Left { columns, residual: &residual, rows: whitener.rows(), noise }.probability(low_order)
-    }
-
-    fn beside(
-        &self,
-        linear: &Linear<'_>,
-        kinds: &[Kind],
-        candidate: &Candidate,
-        monitor: &dyn Monitor,
-    ) -> Result<Option<Remainder>, Failure> {
-        let (columns, residual, sides) = self.parts(linear, candidate);
-        discrepancy::beside(kinds, &columns, &residual, &sides, &linear.likelihood, monitor)
-    }
-
-    /// Columns of a set, the residual that they are to explain, and their sides: about the fit where it was made.
-    fn parts<'b>(&'b self, linear: &'b Linear<'_>, candidate: &Candidate) -> (Vec<&'b White>, White, Vec<Side>) {
-        if let Some(fit) = self.fit(&candidate.members) {
-            return (fit.columns.iter().collect(), fit.residual.clone(), fit.sides.clone());
-        }
-        let (columns, sides, residual) = linear.parts(&candidate.members, &candidate.variants);
-        (columns, residual, sides)
-    }
-
-    fn set(&self, linear: &Linear<'_>, candidate: &Candidate, remainder: Option<Remainder>) -> SetWeight {
-        let fit = self.fit(&candidate.members);
-        let settings = fit.map_or_else(|| linear.settings(candidate), |fit| fit.settings.clone());
-        let nothing = || settings.iter().map(|s| vec![0.0; s.values.len()]).collect();
-        let mut standard_deviations: Vec<Vec<f64>> = fit.map_or_else(nothing, Fit::standard_deviations);
-        // A shape that stays on its grid is uncertain, too, and widens the sizes.
-        if fit.is_none_or(|fit| !fit.with_shapes) {
-            for (own, spread) in standard_deviations.iter_mut().zip(&candidate.spread) {
-                own.iter_mut().zip(spread).for_each(|(own, spread)| *own = own.max(*spread));
-            }
-        }
-        let others = match (fit, &self.others) {
-            (Some(fit), (of, others)) if *of == candidate.members && remainder.is_none() => {
-                others.iter().map(|other| Optimum::beside(fit, other)).collect()
-            }
-            _ => Vec::new(),
-        };
-        SetWeight {
-            members: candidate.members.clone(),
-            posterior: 0.0,
-            settings,
-            standard_deviations,
-            refined: fit.is_some(),
-            remainder,
-            others,
-        }
-    }
-}
-
-/// Refines from a point of the grids: with free shapes where that explains more than the mean over the grid, else on it.
-fn refine_from_grid(
-    candidate: &mut Candidate,
-    start: Vec<Setting>,
-    linear: &Linear<'_>,
-    refinement: &Refinement<'_>,
-) -> Result<Option<Fit>, Failure> {
-    if linear.has_free_shapes(&candidate.members) {
-        let free = refinement.fit(start.clone(), true)?.filter(|fit| fit.with_shapes && fit.settled);
-        if let Some(free) = free.filter(|free| free.log_z >= candidate.log_z) {
-            candidate.log_z = free.log_z;
-            return Ok(Some(free));
-        }
-    }
-    Ok(refinement.fit(start, false)?.inspect(|plain| {
-        if candidate.members.iter().all(|&h| linear.has_no_grid(h)) {
-            candidate.log_z = plain.log_z;
-        } else if refinement.nonlinear {
-            candidate.log_z += plain.log_z - candidate.best_log_z;
-        }
-    }))
-}
-
 /// Whether the size of a cause lies at its physical limit; absent, at 0, is no limit, and of several sizes
 /// of one cause the first counts.
 fn at_limit(fit: &Fit, hypotheses: &[Hypothesis]) -> bool {
@@ -619,45 +507,4 @@ fn at_limit(fit: &Fit, hypotheses: &[Hypothesis]) -> bool {
             (near(variable.range.lower) && variable.range.lower < 0.0) || near(variable.range.upper)
         })
     })
-}
-
-fn verdict(
-    sets: &[SetWeight],
-    none: f64,
-    unnamed: f64,
-    at_limit: &dyn Fn(&SetWeight) -> bool,
-    is_fair: &dyn Fn(&SetWeight) -> bool,
-) -> Verdict {
-    if none >= ALARM {
-        return Verdict::Adequate;
-    }
-    if unnamed >= UNNAMED {
-        let leading = sets.iter().find(|set| set.remainder.is_some());
-        return Verdict::Unknown(leading.map_or_else(Vec::new, |set| set.members.clone()));
-    }
-    let named: Vec<&SetWeight> = sets.iter().filter(|set| set.remainder.is_none() && !set.members.is_empty()).collect();
-    let whole: f64 = named.iter().map(|set| set.posterior).sum();
-    let mut likely: Vec<&SetWeight> = Vec::new();
-    let mut held = 0.0;
-    for set in &named {
-        if held >= LIKELY * whole {
-            break;
-        }
-        held += set.posterior;
-        likely.push(set);
-    }
-    if let Some(leader) = likely.first() {
-        let in_all = likely.iter().all(|set| leader.members.iter().all(|h| set.members.contains(h)));
-        let leads = leader.posterior >= NAMED || (leader.posterior >= NAMED_IF_COMMON && in_all);
-        let sure = leads && unnamed < UNNAMED_MATTERS;
-        // The best of the catalogue, and the rows still object.
-        if leads && !is_fair(leader) {
-            return Verdict::Unknown(Vec::new());
-        }
-        // At its limit a size is not what the data ask for: something else acts, or the limit is wrong.
-        if sure && !at_limit(leader) {
-            return Verdict::Named(leader.members.clone());
-        }
-    }
-    Verdict::Confounded(likely.iter().map(|set| set.members.clone()).collect())
 }
