@@ -3,10 +3,11 @@
 use crate::calculator::{Finding, Message};
 
 use super::input::{Job, LongWave, Method};
-use super::output::{Fate, Outcome, SearchOutcome, SearchStatus, SimulationOutcome};
+use super::output::{CauseKind, Fate, Outcome, SearchOutcome, SearchStatus, SimulationOutcome};
 use super::scene::Scene;
 use super::stance::{LOOSE_RAD, Stance, through_tip};
 use super::surface::UM_PER_MM;
+use super::turning::Setting;
 use super::turning::plane::{add, scaled};
 
 /// |a| + |b| above which lobes grow noticeably.
@@ -28,6 +29,8 @@ pub(super) const WARNING_CODES: &[&str] = &[
     "first_bite_too_large_odd_lobes_locked_in",
     "supports_too_close_unstable",
     "ring_lifts_off",
+    "ring_slips",
+    "contacts_on_steps",
     "tip_starts_inside",
     "samples_below_cutoff",
     "teeth_unresolved",
@@ -44,11 +47,10 @@ pub(super) const EXPLANATION_CODES: &[&str] = &[
     "size_and_error",
     "opposite_to_support",
     "off_the_diameter",
-    "first_bite_stays",
+    "off_but_steady",
+    "without_it",
+    "no_single_cause",
     "start_clear",
-    "odd_waves_stay",
-    "teeth_of_feed",
-    "feed_step_stays",
     "growing_waves",
     "nearest_samples_explained",
     "worst_wave",
@@ -94,6 +96,10 @@ pub(super) fn warnings(job: &Job, scene: &Scene, end: &Stance, outcome: &Outcome
         let least = values.into_iter().chain(driven.into_iter().flatten()).fold(f64::INFINITY, f64::min);
         found.push(Finding::new("ring_lifts_off", "/forces").measured(least, 0.0, "N"));
     }
+    let friction = setting.reactions.as_ref().and_then(|reactions| reactions.friction_needed).zip(job.forces.as_ref());
+    if let Some((needed, forces)) = friction.filter(|(needed, forces)| *needed > forces.friction_available) {
+        found.push(Finding::new("ring_slips", "/forces/drive").measured(needed, forces.friction_available, "1"));
+    }
     if setting.gap_at_start_um < 0.0 {
         let bite = outcome.simulation.as_ref().and_then(|s| s.largest_bite_um);
         let mut finding = Finding::new("tip_starts_inside", "/tool/y_mm")
@@ -116,6 +122,9 @@ pub(super) fn warnings(job: &Job, scene: &Scene, end: &Stance, outcome: &Outcome
 fn of_simulation(job: &Job, end: &Stance, simulation: &SimulationOutcome, outcome: &Outcome, found: &mut Vec<Finding>) {
     if simulation.uncut_share > 0.0 {
         found.push(Finding::new("not_cleaned_up", "/tool/revolutions").measured(simulation.uncut_share, 0.0, "1"));
+    }
+    if simulation.location_error_um > 0.0 {
+        found.push(Finding::new("contacts_on_steps", "/samples").value(simulation.location_error_um, "um"));
     }
     let blank_um = simulation.start.unfiltered.least_squares_um;
     // Elsewhere than opposite to a support the waves that a bite leaves decay or grow like any others.
@@ -167,8 +176,16 @@ pub(super) fn explanation(job: &Job, scene: &Scene, end: &Stance, outcome: &Outc
     let setting = &outcome.setting;
     let diametral = end.copying().is_diametral();
     let k = setting.compliance_ratio;
+    let highest = f64::from(job.highest_order);
+    let growing = super::linear::lobing(scene, end).near_neutral(1.5, highest + 0.45).iter().any(super::linear::grows);
+    let code = match (diametral, growing) {
+        (true, _) => "opposite_to_support",
+        (false, true) => "off_the_diameter",
+        (false, false) => "off_but_steady",
+    };
     said.push(
-        Message::new(if diametral { "opposite_to_support" } else { "off_the_diameter" })
+        Message::new(code)
+            .with("highest_order", highest)
             .with("sum", setting.coefficient_sum)
             .with("half_turn_reduction_um", setting.half_turn_reduction_um)
             .with("even_factor", (k / (1.0 + k)).powi(2))
@@ -244,38 +261,41 @@ fn of_run(job: &Job, scene: &Scene, simulation: &SimulationOutcome, outcome: &Ou
             .with("unfiltered_error_um", error.unfiltered.least_squares_um)
             .with("samples", f64::from(simulation.samples)),
     );
+    of_causes(job, scene, simulation, said);
+}
+
+/// A cause is named where its own simulation says that it goes away with it.
+fn of_causes(job: &Job, scene: &Scene, simulation: &SimulationOutcome, said: &mut Vec<Message>) {
     let causes = &simulation.causes;
-    let share = WORTH_NAMING * end.unfiltered.least_squares_um;
-    if let Some(left_um) = causes.first_bite_um.filter(|left_um| *left_um > share) {
+    let named: Vec<_> = causes.switched_off.iter().filter(|cause| cause.share > WORTH_NAMING).collect();
+    for cause in &named {
+        let kind = cause.effect.and_then(|i| job.effects.get(i)).map_or(cause.cause.name(), |effect| effect.kind());
         said.push(
-            Message::new("first_bite_stays")
-                .with("bite_um", simulation.largest_bite_um.unwrap_or(0.0))
-                .with("left_um", left_um),
+            Message::new("without_it")
+                .with("cause", cause.cause.name())
+                .with("kind", kind)
+                .with("without_um", cause.roundness_without_um)
+                .with("share", cause.share),
         );
-        if let Some(back_mm) = back_off_mm(scene, simulation) {
-            said.push(Message::new("start_clear").with("back_mm", back_mm));
-        }
     }
-    if let Some(odd_lobes_um) = causes.odd_lobes_um.filter(|odd_lobes_um| *odd_lobes_um > share) {
-        said.push(Message::new("odd_waves_stay").with("odd_lobes_um", odd_lobes_um));
+    let is_named = |kind: CauseKind| named.iter().any(|cause| cause.cause == kind);
+    if is_named(CauseKind::FirstBite)
+        && let Some(back_mm) = back_off_mm(&scene.setting, &simulation.profile.start_radius_mm)
+    {
+        said.push(Message::new("start_clear").with("back_mm", back_mm));
     }
-    if causes.teeth_um > share {
-        said.push(Message::new("teeth_of_feed").with("teeth_um", causes.teeth_um));
-    }
-    if causes.feed_step_um > share {
-        said.push(Message::new("feed_step_stays").with("step_um", causes.feed_step_um));
-    }
-    if causes.growing_lobes_um > share {
+    if is_named(CauseKind::ToolOffLine) && causes.growing_lobes_um > 0.0 {
         said.push(Message::new("growing_waves").with("height_um", causes.growing_lobes_um));
+    }
+    if named.is_empty() && !causes.switched_off.is_empty() {
+        said.push(Message::new("no_single_cause").with("share", WORTH_NAMING));
     }
 }
 
-/// How much further back the tip must start to be clear of the largest diameter, mm along the feed.
-fn back_off_mm(scene: &Scene, simulation: &SimulationOutcome) -> Option<f64> {
-    let radii = &simulation.profile.start_radius_mm;
+/// How much further back the tip must start to be clear of the largest diameter of a profile, mm along the feed.
+pub(super) fn back_off_mm(setting: &Setting, radii: &[f64]) -> Option<f64> {
     let n = radii.len();
     let widest = (0..n).map(|i| radii[i] + radii[(i + n / 2) % n]).fold(0.0, f64::max);
-    let setting = &scene.setting;
     let radius = |back: f64| {
         through_tip(setting, add(setting.tip_start_mm, scaled(setting.feed_direction, -back))).map(|s| s.radius_mm)
     };
@@ -304,7 +324,8 @@ fn of_search(job: &Job, search: &SearchOutcome, said: &mut Vec<Message>) {
     };
     let mut message = Message::new(code)
         .with("target_um", target)
-        .with("tried", search.tried.revolutions.len())
+        .with("tried", search.tried.revolutions.len() + search.simulated)
+        .with("everywhere", search.simulated)
         .with("odd_lobes_um", search.odd_lobes_um)
         .with("odd_orders", search.odd_orders.iter().map(|order| f64::from(*order)).collect::<Vec<_>>());
     if let Some(best) = &search.best {
@@ -313,6 +334,14 @@ fn of_search(job: &Job, search: &SearchOutcome, said: &mut Vec<Message>) {
             .with("feed_mm_per_rev", best.feed_mm_per_rev)
             .with("x_mm", best.tool_x_mm)
             .with("y_mm", best.tool_y_mm)
+            .with("tool_angle_deg", best.tool_angle_deg)
+            .with("support_half_angle_deg", best.support_half_angle_deg)
+            .with("support_distance_mm", best.support_distance_mm)
+            .with("support_depth_mm", best.support_depth_mm)
+            .with("feed_direction_deg", best.feed_direction_deg)
+            .with("compliance_ratio", best.compliance_ratio)
+            .with("robust_share", best.robust_share)
+            .with("angle_error_deg", job.settings_search.map_or(0.0, |range| range.angle_error_deg))
             .with("roundness_um", best.roundness_um)
             .with("margin_um", best.margin_um);
     }
@@ -325,7 +354,11 @@ fn of_search(job: &Job, search: &SearchOutcome, said: &mut Vec<Message>) {
                 .with("feed_mm_per_rev", stage.feed_mm_per_rev)
                 .with("before_um", stage.before_um)
                 .with("after_um", stage.after_um)
-                .with("after_off_um", stage.after_off_um),
+                .with("tool_angle_deg", stage.tool_angle_deg)
+                .with("x_mm", stage.tool_x_mm)
+                .with("y_mm", stage.tool_y_mm)
+                .with("feed_direction_deg", stage.feed_direction_deg)
+                .with("robust_share", stage.robust_share),
         );
     }
 }

@@ -193,6 +193,10 @@ fn check_analyses(job: &Job, violations: &mut Violations) {
     if let Some(search) = &job.settings_search {
         let at = "/settings_search/feed_max_mm_per_rev";
         ascends(at, search.feed_min_mm_per_rev, search.feed_max_mm_per_rev, "mm/rev");
+        let at = "/settings_search/tool_angle_to_deg";
+        ascends(at, search.tool_angle_from_deg, search.tool_angle_to_deg, "deg");
+        let at = "/settings_search/support_angle_to_deg";
+        ascends(at, search.support_angle_from_deg, search.support_angle_to_deg, "deg");
     }
     violations.require(!job.asks(Analysis::SettingsSearch) || job.settings_search.is_some(), || {
         Finding::new("search_range_missing", "/settings_search")

@@ -236,6 +236,7 @@ pub(super) fn design(places: &[(usize, f64)]) -> Design {
         cell,
         regressors: Vec::new(),
         groupings: Vec::new(),
+        conditions: Vec::new(),
         order: None,
         fold: places.iter().map(|(_, angle)| block(turn(*angle) * 360.0) % FOLDS).collect(),
     }

@@ -60,7 +60,7 @@ pub struct Job {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 36, maximum = 200_000, example = 3600, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("N")), ("x-group" = json!("numerics")), ("x-code" = json!("bad_samples"))))]
     pub samples: Option<u32>,
-    /// With which other number of nodes the run is repeated, for the error of every result.
+    /// With which other numbers of nodes the run is repeated, for the error of every result.
     #[serde(default)]
     #[schema(default = "half_samples", example = "half_samples", extensions(("x-group" = json!("numerics")), ("x-advanced" = json!(true))))]
     pub error_estimate: ErrorEstimate,
@@ -262,10 +262,18 @@ pub struct Forces {
     /// Weight of the ring.
     #[schema(minimum = 0.0, maximum = 1e9, example = 100.0, extensions(("x-unit" = json!("N")), ("x-symbol" = json!("W"))))]
     pub weight_n: f64,
+    /// Coefficient of friction between rollers and ring that can be relied on; acts with `drive: rollers`.
+    #[serde(default = "friction")]
+    #[schema(minimum = 0.01, maximum = 2.0, default = 0.2, example = 0.2, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("mu")), ("x-advanced" = json!(true))))]
+    pub friction_available: f64,
     /// What turns the ring.
     #[serde(default)]
     #[schema(default = "torque", example = "torque")]
     pub drive: Drive,
+}
+
+fn friction() -> f64 {
+    0.2
 }
 
 /// What turns the ring.
@@ -327,15 +335,15 @@ pub enum Method {
     NearestSamples,
 }
 
-/// With which other number of nodes the run is repeated.
+/// With which other numbers of nodes the run is repeated.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 #[schema(as = RingErrorEstimate)]
 pub enum ErrorEstimate {
-    /// Half as many: costs half as much again; the difference is the error if it falls in proportion to the spacing.
+    /// Half and a third as many: the error is twice the larger difference.
     #[default]
     HalfSamples,
-    /// Twice as many: costs twice as much again; twice the difference is the error, and more to be trusted.
+    /// Twice and half as many: costs two and a half times as much again; more to be trusted.
     DoubleSamples,
 }
 
@@ -380,7 +388,11 @@ pub struct MapRange {
     /// Highest order looked at.
     #[schema(minimum = 3, maximum = 60, default = 20, example = 20, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("k_max"))))]
     pub highest_order: u32,
-    /// Peak to valley to which every wave of the start profile is to come down.
+    /// How many cells are simulated, those that the theory says need the fewest revolutions: only they can have a number
+    /// of revolutions to the target.
+    #[schema(minimum = 0, maximum = 10_000, default = 200, example = 200, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("n_c")), ("x-advanced" = json!(true))))]
+    pub simulated_cells: u32,
+    /// Roundness to which the ring is to come; by the theory every wave of the start profile.
     #[schema(minimum = 0.001, maximum = 10_000.0, default = 5.0, example = 5.0, extensions(("x-unit" = json!("um")), ("x-symbol" = json!("RONt"))))]
     pub target_um: f64,
 }
@@ -395,6 +407,7 @@ impl Default for MapRange {
             support_angle_to_deg: 75.0,
             support_angles: 61,
             highest_order: 20,
+            simulated_cells: 200,
             target_um: 5.0,
         }
     }
@@ -428,6 +441,30 @@ pub struct SearchRange {
     #[serde(default = "allowance")]
     #[schema(minimum = 0.0, maximum = 100.0, default = 0.05, example = 0.05, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("z"))))]
     pub allowance_mm: f64,
+    /// How far off the angles of tool and supports may be: over this the robustness of a setting is told.
+    #[serde(default = "half")]
+    #[schema(minimum = 0.0, maximum = 10.0, default = 0.5, example = 0.5, extensions(("x-unit" = json!("deg")), ("x-symbol" = json!("u_alpha"))))]
+    pub angle_error_deg: f64,
+    /// First tool angle that the machine allows, counter-clockwise from the right, seen from the ring's centre.
+    #[serde(default = "low_tool")]
+    #[schema(minimum = -60.0, maximum = 240.0, default = 20.0, example = 20.0, extensions(("x-unit" = json!("deg")), ("x-symbol" = json!("alpha_T")), ("x-advanced" = json!(true))))]
+    pub tool_angle_from_deg: f64,
+    /// Last tool angle that the machine allows.
+    #[serde(default = "high_tool")]
+    #[schema(minimum = -60.0, maximum = 240.0, default = 160.0, example = 160.0, extensions(("x-unit" = json!("deg")), ("x-symbol" = json!("alpha_T")), ("x-advanced" = json!(true))))]
+    pub tool_angle_to_deg: f64,
+    /// Smallest support half angle that the machine allows, from the downward vertical.
+    #[serde(default = "low_support")]
+    #[schema(minimum = 15.0, maximum = 75.0, default = 17.0, example = 17.0, extensions(("x-unit" = json!("deg")), ("x-symbol" = json!("beta")), ("x-advanced" = json!(true))))]
+    pub support_angle_from_deg: f64,
+    /// Largest support half angle that the machine allows.
+    #[serde(default = "high_support")]
+    #[schema(minimum = 15.0, maximum = 75.0, default = 60.0, example = 60.0, extensions(("x-unit" = json!("deg")), ("x-symbol" = json!("beta")), ("x-advanced" = json!(true))))]
+    pub support_angle_to_deg: f64,
+    /// Up to which compliance ratio the machine can be made softer; left out, it stays as it is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.0, maximum = 1000.0, example = 2.0, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("K")), ("x-advanced" = json!(true))))]
+    pub compliance_ratio_max: Option<f64>,
     /// Revolutions without feed at the end.
     #[serde(default = "one")]
     #[schema(minimum = 0.0, maximum = 100.0, default = 1.0, example = 1.0, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("n_s"))))]
@@ -448,6 +485,21 @@ fn clearance() -> f64 {
 }
 fn allowance() -> f64 {
     0.05
+}
+fn half() -> f64 {
+    0.5
+}
+fn low_tool() -> f64 {
+    20.0
+}
+fn high_tool() -> f64 {
+    160.0
+}
+fn low_support() -> f64 {
+    17.0
+}
+fn high_support() -> f64 {
+    60.0
 }
 fn one() -> f64 {
     1.0

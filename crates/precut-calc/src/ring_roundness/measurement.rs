@@ -46,6 +46,7 @@ fn one() -> u32 {
 
 impl MeasuredRow for RingMeasurement {
     const MAX_ROWS: usize = 20_000;
+    const MEASURED: &'static [&'static str] = &["radial_deviation_um", "radius_mm"];
 }
 
 impl Measurement for RingMeasurement {

@@ -9,6 +9,7 @@
 //! `simulate`, `linear`, `search` -> `output`, `advice`, `picture`. `forward` gives the same model to the diagnosis.
 
 mod advice;
+mod causes;
 mod check;
 pub mod evaluation;
 mod forward;
@@ -20,10 +21,12 @@ mod measurement;
 mod next_runs;
 mod output;
 mod picture;
+mod place;
 mod replay;
 mod sampling;
 mod scene;
 mod search;
+mod search_wide;
 mod simulate;
 mod stance;
 mod surface;
@@ -36,10 +39,10 @@ pub use input::{
 };
 pub use measurement::RingMeasurement;
 pub use output::{
-    CausesOutcome, CircleValues, Evaluated, Fate, HistoryColumns, LinearOutcome, MapCell, MapOutcome, OrderOutcome,
-    Outcome, PathColumns, ProfileColumns, ReactionsOutcome, ReplayFrame, ReplayOutcome, RootOutcome, SearchOutcome,
-    SearchSetting, SearchStatus, SecondStage, SettingOutcome, SimulationOutcome, SpectrumColumns, TriedColumns,
-    WaveColumn,
+    CauseKind, CauseOutcome, CausesOutcome, CircleValues, Evaluated, Fate, HistoryColumns, LinearOutcome, MapCell,
+    MapOutcome, OrderOutcome, Outcome, PathColumns, ProfileColumns, ReactionsOutcome, ReplayFrame, ReplayOutcome,
+    RootOutcome, SearchOutcome, SearchSetting, SearchStatus, SecondStage, SettingOutcome, SimulationOutcome,
+    SpectrumColumns, TriedColumns, WaveColumn,
 };
 
 use crate::calculator::{
@@ -63,7 +66,7 @@ impl Calculator for RingRoundness {
     const META: Meta = Meta {
         id: "ring-roundness",
         kind: CalculatorKind::Calculator,
-        version: 2,
+        version: 3,
         title: "Ring roundness",
         question: "How round will a ring get that is turned while it rests on the surface being turned?",
         summary: "A ring or a journal rests with the surface being turned on two supports while a wide-edge tool is fed \
@@ -156,13 +159,16 @@ fn work(job: &Job) -> Work {
     let mut work = Work { simulation: 0.0, theory: 0.0, map: 0.0, search: 0.0 };
     if job.asks(Analysis::Simulation) {
         let runs = match job.error_estimate {
-            ErrorEstimate::HalfSamples => 1.5,
-            ErrorEstimate::DoubleSamples => 3.0,
+            ErrorEstimate::HalfSamples => 1.84,
+            ErrorEstimate::DoubleSamples => 3.5,
         };
         let per_turn = match job.method {
             Method::ExactContact => runs * n * step_ns,
             Method::NearestSamples => 7.0 * n * n + 3600.0 * step_ns,
         };
+        // The causes: one run with everything, one with each term off, one of them with twice the revolutions.
+        let terms = 8.0 + job.effects.len() as f64;
+        let per_turn = per_turn + terms * f64::from(causes::nodes(job)) * step_ns;
         // The history fits a circle per entry.
         work.simulation = 1e-6 * turns * per_turn + 3e-5 * n * turns.min(400.0) + 1e-3 * n;
     }
@@ -171,12 +177,16 @@ fn work(job: &Job) -> Work {
     }
     if job.asks(Analysis::SetupMap) {
         let cells = f64::from(job.setup_map.tool_angles) * f64::from(job.setup_map.support_angles);
-        work.map = 2e-3 * cells * f64::from(job.setup_map.highest_order);
+        // A simulated cell takes its revolutions twice at most, some hundred.
+        let simulated = cells.min(f64::from(job.setup_map.simulated_cells));
+        let nodes = job.filter.cutoff_upr().map_or(n, |cutoff| f64::from(8 * cutoff).max(720.0));
+        work.map = 2e-3 * cells * f64::from(job.setup_map.highest_order) + simulated * 150.0 * nodes * 1e-6 * step_ns;
     }
     if let (true, Some(range)) = (job.asks(Analysis::SettingsSearch), &job.settings_search) {
         let nodes = if job.filter == LongWave::None { n } else { n.min(1800.0) };
         // A scan in steps of 5 % sums to 21 times its largest run.
-        work.search = 1e-6 * step_ns * (21.0 * nodes + 6.0 * n) * range.revolutions_max.min(2000.0);
+        work.search = 1e-6 * step_ns * (21.0 * nodes + 6.0 * n) * range.revolutions_max.min(2000.0)
+            + search_wide::work_ms(job, range, step_ns);
     }
     work
 }
@@ -314,6 +324,7 @@ fn basis(job: &Job) -> Vec<Basis> {
             ("ring/3.3", "node-aligned stepping"),
             ("ring/3.4", "wide-edge removal"),
             ("ring/6.1", "causes of the error, first order"),
+            ("ring/6.2", "causes switched off in turn"),
             ("ring/8.1", "repetition with another number of nodes"),
         ],
     );
@@ -339,6 +350,6 @@ const CODES: Codes = Codes {
     failures: &[simulate::FAILURE_CODES, &["no_end_position"]],
     warnings: &[advice::WARNING_CODES],
     explanations: &[advice::EXPLANATION_CODES],
-    stages: &[&["stage_revolution", "stage_setup_map", "stage_search", "stage_done"]],
+    stages: &[&["stage_revolution", "stage_setup_map", "stage_search", "stage_search_wide", "stage_done"]],
     labels: &[picture::LABEL_CODES],
 };

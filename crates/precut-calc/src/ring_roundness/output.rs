@@ -142,6 +142,10 @@ pub struct SimulationOutcome {
     /// Share of the surface that was never cut.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub uncut_share: f64,
+    /// Most by which a contact of the ring with a support was off, where both supports stood on steps steeper than the
+    /// nodes resolve; 0 where every step was located to a nanometre.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub location_error_um: f64,
     /// Where the error at the end comes from.
     pub causes: CausesOutcome,
     /// Waves before and after.
@@ -198,7 +202,7 @@ pub struct CircleValues {
     pub rms_um: f64,
 }
 
-/// Where the error at the end comes from, first order.
+/// Where the error at the end comes from: first order, and by simulation with one term of the job off after another.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[schema(as = RingCausesOutcome)]
 pub struct CausesOutcome {
@@ -219,6 +223,68 @@ pub struct CausesOutcome {
     /// Largest peak to valley at the end of a single wave that the linear theory says grows.
     #[schema(extensions(("x-unit" = json!("um"))))]
     pub growing_lobes_um: f64,
+    /// Nodes of the runs with a term off, and of the one with all terms that they are compared with.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub samples: u32,
+    /// The roundness without each term that makes waves, the one that matters most first. Shares need not add up to 1:
+    /// terms act on each other.
+    pub switched_off: Vec<CauseOutcome>,
+}
+
+/// What comes out with one term of the job off.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RingCauseOutcome)]
+pub struct CauseOutcome {
+    /// What was switched off.
+    pub cause: CauseKind,
+    /// Which of the job's effects, from 0; null where it is none.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub effect: Option<usize>,
+    /// Roundness deviation without it, filtered, least-squares circle.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub roundness_without_um: f64,
+    /// Share of the roundness that goes away with it; negative where it comes out worse without.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub share: f64,
+}
+
+/// A term of the job that makes waves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+#[schema(as = RingCauseKind)]
+pub enum CauseKind {
+    /// Waves of odd order of the blank: taken off it.
+    BlankOddWaves,
+    /// Waves of even order of the blank: taken off it.
+    BlankEvenWaves,
+    /// A start inside the largest diameter: moved back until clear.
+    FirstBite,
+    /// The feed per revolution: halved, with twice the revolutions.
+    Feed,
+    /// Too little spark-out: three revolutions more.
+    SparkOutMissing,
+    /// The give of machine and tool: made rigid.
+    Compliance,
+    /// A tool not opposite to a support: put opposite to the nearest.
+    ToolOffLine,
+    /// An effect of the job: left out.
+    Effect,
+}
+
+impl CauseKind {
+    /// Its name, as in the contract.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::BlankOddWaves => "blank_odd_waves",
+            Self::BlankEvenWaves => "blank_even_waves",
+            Self::FirstBite => "first_bite",
+            Self::Feed => "feed",
+            Self::SparkOutMissing => "spark_out_missing",
+            Self::Compliance => "compliance",
+            Self::ToolOffLine => "tool_off_line",
+            Self::Effect => "effect",
+        }
+    }
 }
 
 /// One entry per order from 2.
@@ -435,9 +501,13 @@ pub struct MapOutcome {
     /// Its lobes.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub worst_lobes: Vec<Option<f64>>,
-    /// Revolutions in which every wave of the start profile comes down to the target; null where one does not.
+    /// Revolutions with the job's feed and spark-out, from a start just clear of the ring, after which the simulation is
+    /// at the target; null where a wave grows or stays, and where no simulation says so.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub revolutions_to_target: Vec<Option<f64>>,
+    /// Roundness that the simulation gave there, filtered; null where the cell was not simulated.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub simulated_roundness_um: Vec<Option<f64>>,
     /// The cell whose worst wave decays most.
     pub best: Option<MapCell>,
     /// The job's own angles.
@@ -459,7 +529,8 @@ pub struct MapCell {
     pub worst_factor_per_revolution: Option<f64>,
 }
 
-/// Fewest revolutions to the target, the tool opposite to a support and fed straight down.
+/// Fewest revolutions to the target with the tool opposite to a support and fed straight down; where that does not reach it,
+/// the best of a search over all angles, feeds and, where allowed, compliance ratios, by theory first, then simulated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[schema(as = RingSearchOutcome)]
 pub struct SearchOutcome {
@@ -475,7 +546,10 @@ pub struct SearchOutcome {
     /// Orders of these waves, largest first.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub odd_orders: Vec<u32>,
-    /// Everything tried, by rising revolutions.
+    /// Settings simulated in the search over all angles; 0 where there was no need of it.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub simulated: usize,
+    /// Everything tried with the tool opposite to a support, by rising revolutions.
     pub tried: TriedColumns,
     /// A second stage that helps, by simulation of both; null where none is needed or none helps.
     pub second_stage: Option<SecondStage>,
@@ -486,17 +560,18 @@ pub struct SearchOutcome {
 #[serde(rename_all = "snake_case")]
 #[schema(as = RingSearchStatus)]
 pub enum SearchStatus {
-    /// Reached, and also with 5 %, at least one revolution, more and fewer.
+    /// Reached, and also with 5 %, at least one revolution, more and fewer; found in the search over all angles, in nine of
+    /// ten trials with everything a little off.
     Robust,
-    /// Reached, but not with all neighbours.
+    /// Reached, but not with all neighbours, or in fewer of the trials.
     Fragile,
-    /// Not within the machine's limits.
+    /// Not within the machine's limits: the search over all angles did not reach it either.
     BeyondLimits,
-    /// Not in this setting: the odd waves of the start profile alone are larger.
+    /// Likewise, and opposite to a support the odd waves of the start profile alone are larger, whatever the feed.
     OddLobes,
 }
 
-/// A setting of the search; fed straight down.
+/// A setting of the search.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[schema(as = RingSearchSetting)]
 pub struct SearchSetting {
@@ -506,6 +581,28 @@ pub struct SearchSetting {
     /// Tip at the start.
     #[schema(extensions(("x-unit" = json!("mm"))))]
     pub tool_y_mm: f64,
+    /// Direction of the feed, counter-clockwise from the x axis.
+    #[schema(extensions(("x-unit" = json!("deg"))))]
+    pub feed_direction_deg: f64,
+    /// Distance between the supports; of rollers between their centres.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub support_distance_mm: f64,
+    /// How far they lie below the origin of the machine.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub support_depth_mm: f64,
+    /// Support half angle at the end of the feed.
+    #[schema(extensions(("x-unit" = json!("deg"))))]
+    pub support_half_angle_deg: f64,
+    /// Tool angle at the end of the feed.
+    #[schema(extensions(("x-unit" = json!("deg"))))]
+    pub tool_angle_deg: f64,
+    /// Compliance ratio.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub compliance_ratio: f64,
+    /// Share of simulated trials in which the target is met with the angles off by up to `angle_error_deg`, the blank's
+    /// waves a fifth larger or smaller and the blank put in turned.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub robust_share: f64,
     /// Feed.
     #[schema(extensions(("x-unit" = json!("mm/rev"))))]
     pub feed_mm_per_rev: f64,
@@ -544,10 +641,22 @@ pub struct TriedColumns {
     pub roundness_um: Vec<f64>,
 }
 
-/// A second stage after the first: supports closer together, the tool on top.
+/// A second stage after the first, which has the tool opposite to a support.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[schema(as = RingSecondStage)]
 pub struct SecondStage {
+    /// Tip at the start.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub tool_x_mm: f64,
+    /// Tip at the start.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub tool_y_mm: f64,
+    /// Direction of the feed, counter-clockwise from the x axis.
+    #[schema(extensions(("x-unit" = json!("deg"))))]
+    pub feed_direction_deg: f64,
+    /// How far the supports lie below the origin of the machine.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub support_depth_mm: f64,
     /// Support half angle.
     #[schema(extensions(("x-unit" = json!("deg"))))]
     pub support_half_angle_deg: f64,
@@ -569,7 +678,7 @@ pub struct SecondStage {
     /// Roundness deviation after both.
     #[schema(extensions(("x-unit" = json!("um"))))]
     pub after_um: f64,
-    /// The same with the tool 0.1° off: how much the stage depends on the setting.
-    #[schema(extensions(("x-unit" = json!("um"))))]
-    pub after_off_um: f64,
+    /// Share of simulated trials, as for a setting of the search, in which the target is met after both.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub robust_share: f64,
 }

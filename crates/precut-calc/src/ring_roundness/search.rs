@@ -1,19 +1,24 @@
-//! The analysis `settings_search`: fewest revolutions to a target, by simulation.
+//! The analysis `settings_search`: fewest revolutions to a target, by simulation; where the tool opposite to a support does
+//! not reach it, over everything that can be set ([`super::search_wide`]), in one stage or two.
 //!
 //! By the theory (`ring/5.4`) the tool stands opposite to a support and is fed straight down, starts clear of the largest
 //! diameter and ends below the smallest; what is left then is the feed. The roundness does not fall steadily with the
 //! revolutions, so they are scanned in steps of 5 %, and a setting is preferred whose neighbours pass, too.
 
-use crate::calculator::{Failure, Message, checkpoint};
+use std::f64::consts::TAU;
+
+use crate::calculator::{Failure, Finding, Message, checkpoint};
 
 use super::input::{Job, LongWave, SearchRange};
 use super::output::{SearchOutcome, SearchSetting, SearchStatus, SecondStage, TriedColumns};
+use super::place::Angles;
 use super::sampling::samples_of;
-use super::scene::Scene;
+use super::scene::{Scene, mirrored_rad};
+use super::search_wide::{self, Tried, Wide};
 use super::simulate::Share;
 use super::stance::{Stance, at_radius, through_tip};
 use super::surface::{UM_PER_MM, odd_waves_mm, roundness_um, unevaluable};
-use super::turning::plane::{Vec2, add, direction, scaled, sub, unit};
+use super::turning::plane::{Vec2, add, angle, norm, scaled, sub, unit};
 use super::turning::{Setting, turn};
 
 /// Nodes of the scan where a filter hides the teeth: good to some nm.
@@ -25,12 +30,6 @@ const FROM: f64 = 0.25;
 const TO: f64 = 8.0;
 /// Odd orders named at most.
 const ORDERS: usize = 5;
-/// Support half angle and tool angle of the second stage.
-const SECOND_HALF_ANGLE_DEG: f64 = 20.0;
-/// Feeds tried in the second stage, mm/rev.
-const SECOND_FEEDS: [f64; 3] = [0.02, 0.04, 0.08];
-/// How far off the tool is put to see what that does, deg.
-const OFF_DEG: f64 = 0.1;
 /// Share of the error that a second stage must leave at most to be worth its name.
 const WORTH: f64 = 0.8;
 
@@ -65,21 +64,31 @@ pub(super) fn search(
         fewest: None,
         odd_lobes_um,
         odd_orders: odd_orders(&odd)?,
+        simulated: 0,
         tried: TriedColumns::default(),
         second_stage: None,
     };
     let Some(plan) = plan(range, scene, &blank) else { return Ok(outcome) };
     let finder = Finder { job, range, scene, plan, blank, share };
+    let mut first = None;
     if odd_lobes_um > range.target_um {
         outcome.status = SearchStatus::OddLobes;
-        let Some(revolutions) = finder.nearest_allowed(finder.plan.natural) else { return Ok(outcome) };
-        let first = finder.cut(&finder.setting(revolutions), &finder.blank)?;
-        outcome.note(revolutions, &finder, first.roundness_um);
-        outcome.best = Some(finder.verified(revolutions)?);
-        outcome.second_stage = finder.second_stage(&first)?;
+        if let Some(revolutions) = finder.nearest_allowed(finder.plan.natural) {
+            let cut = finder.cut(&finder.setting(revolutions), &finder.blank)?;
+            outcome.note(revolutions, &finder, cut.roundness_um);
+            outcome.best = Some(finder.verified(&finder.setting(revolutions))?);
+            first = Some(cut);
+        }
+    } else {
+        finder.scan(&mut outcome)?;
+    }
+    if matches!(outcome.status, SearchStatus::Robust | SearchStatus::Fragile) {
         return Ok(outcome);
     }
-    finder.scan(&mut outcome)?;
+    finder.everywhere(&mut outcome)?;
+    if let (SearchStatus::BeyondLimits | SearchStatus::OddLobes, Some(first)) = (outcome.status, first) {
+        outcome.second_stage = finder.second_stage(&first, &mut outcome.simulated)?;
+    }
     Ok(outcome)
 }
 
@@ -205,7 +214,7 @@ impl Finder<'_> {
             }
             if row >= 3 {
                 let middle = outcome.tried.revolutions[outcome.tried.revolutions.len() - 2];
-                let setting = self.verified(middle)?;
+                let setting = self.verified(&self.setting(middle))?;
                 if setting.margin_um >= 0.0 {
                     outcome.status = SearchStatus::Robust;
                     outcome.best = Some(setting);
@@ -215,13 +224,13 @@ impl Finder<'_> {
             n = (n * STEP).round().max(n + 1.0);
         }
         if let Some(fewest) = single {
-            let setting = self.verified(fewest)?;
+            let setting = self.verified(&self.setting(fewest))?;
             outcome.fewest = (setting.margin_um >= 0.0).then_some(setting);
         }
         if outcome.best.is_none()
             && let Some((n, _)) = nearest
         {
-            let setting = self.verified(n)?;
+            let setting = self.verified(&self.setting(n))?;
             outcome.status = if setting.margin_um >= 0.0 { SearchStatus::Fragile } else { SearchStatus::BeyondLimits };
             outcome.best = Some(setting);
         }
@@ -229,19 +238,29 @@ impl Finder<'_> {
     }
 
     /// The setting with the job's own nodes, and with half of them for the error.
-    fn verified(&self, revolutions: f64) -> Result<SearchSetting, Failure> {
-        let setting = self.setting(revolutions);
+    fn verified(&self, setting: &Setting) -> Result<SearchSetting, Failure> {
         let n = samples_of(self.job).max(super::input::DEFAULT_SAMPLES);
         let blank = |n: u32| self.scene.blank_mm(self.job, n as usize).map_err(unevaluable);
-        let full = self.cut(&setting, &blank(n)?)?;
-        let half = self.cut(&setting, &blank(n / 2)?)?;
+        let full = self.cut(setting, &blank(n)?)?;
+        let half = self.cut(setting, &blank(n / 2)?)?;
         let error = (full.roundness_um - half.roundness_um).abs();
-        let x = setting.tip_start_mm[0];
+        let coarse = blank(search_wide::nodes(self.job))?;
+        let end = through_tip(setting, setting.tip_end_mm())
+            .ok_or_else(|| Failure::OutOfModel(Finding::new("no_end_position", "/tool")))?;
+        let angles = Angles { half_angle_rad: end.half_angle_rad, tool_rad: end.tool_rad() };
+        let placed = self.as_placed(setting);
         Ok(SearchSetting {
-            tool_x_mm: if self.scene.mirrored { -x } else { x },
-            tool_y_mm: setting.tip_start_mm[1],
+            tool_x_mm: placed.x_mm,
+            tool_y_mm: placed.y_mm,
+            feed_direction_deg: placed.feed_direction_deg,
+            support_distance_mm: placed.distance_mm,
+            support_depth_mm: placed.depth_mm,
+            support_half_angle_deg: end.half_angle_rad.to_degrees(),
+            tool_angle_deg: mirrored_rad(end.tool_rad(), self.scene.mirrored).to_degrees(),
+            compliance_ratio: setting.compliance_ratio,
+            robust_share: self.wide(&coarse).robust_share(angles, setting)?,
             feed_mm_per_rev: setting.feed_mm_per_rev,
-            revolutions,
+            revolutions: setting.revolutions,
             spark_out_revolutions: setting.spark_out_revolutions,
             roundness_um: full.roundness_um,
             roundness_error_um: error,
@@ -250,52 +269,80 @@ impl Finder<'_> {
         })
     }
 
-    /// Supports closer together and the tool on top: three lobes and others that the first stage cannot see decay there
-    /// (`ring/5.5`). Given only where the simulation of both stages shows a gain.
-    fn second_stage(&self, first: &Cut) -> Result<Option<SecondStage>, Failure> {
-        let half_angle = SECOND_HALF_ANGLE_DEG.to_radians();
-        let radii = &first.radii_mm;
-        let (low, high) =
-            radii.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), radius| (low.min(*radius), high.max(*radius)));
-        let reach = first.mean_radius_mm + self.plan.setting.roller_radius_mm;
-        let half = reach * half_angle.sin();
-        let depth = -self.plan.setting.support_a_mm[1];
-        let at = |feed: f64, off_deg: f64| -> Option<Setting> {
-            let mut setting = self.plan.setting.clone();
-            (setting.support_a_mm, setting.support_b_mm) = ([-half, -depth], [half, -depth]);
-            let end_mm = low - self.range.allowance_mm;
-            let rest = at_radius(&setting, [0.0, 0.0], end_mm)?;
-            let tool = direction((90.0_f64 + off_deg).to_radians());
-            let tip_end = add(rest.centre_mm, scaled(tool, end_mm));
-            let travel_mm = travel(&setting, tip_end, high + self.range.clearance_mm)?;
-            setting.tip_start_mm = add(tip_end, [0.0, travel_mm]);
-            setting.revolutions = (travel_mm / feed).ceil();
-            setting.feed_mm_per_rev = travel_mm / setting.revolutions;
-            Some(setting)
-        };
-        let mut best: Option<SecondStage> = None;
-        for feed in SECOND_FEEDS {
-            let feed = feed.clamp(self.range.feed_min_mm_per_rev, self.range.feed_max_mm_per_rev);
-            let (Some(straight), Some(off)) = (at(feed, 0.0), at(feed, OFF_DEG)) else { continue };
-            if straight.revolutions > self.range.revolutions_max {
-                continue;
-            }
-            let after = self.cut(&straight, radii)?;
-            if best.as_ref().is_some_and(|best| best.after_um <= after.roundness_um) {
-                continue;
-            }
-            let after_off = self.cut(&off, radii)?;
-            best = Some(SecondStage {
-                support_half_angle_deg: SECOND_HALF_ANGLE_DEG,
-                tool_angle_deg: 90.0,
-                support_distance_mm: 2.0 * half,
-                feed_mm_per_rev: straight.feed_mm_per_rev,
-                revolutions: straight.revolutions,
-                before_um: first.roundness_um,
-                after_um: after.roundness_um,
-                after_off_um: after_off.roundness_um,
-            });
+    fn wide<'b>(&'b self, blank: &'b [f64]) -> Wide<'b> {
+        Wide {
+            job: self.job,
+            range: self.range,
+            base: &self.plan.setting,
+            mirrored: self.scene.mirrored,
+            blank,
+            share: self.share,
         }
-        Ok(best.filter(|stage| stage.after_um < WORTH * stage.before_um))
     }
+
+    /// The search over all angles; what it finds is taken where it is better.
+    fn everywhere(&self, outcome: &mut SearchOutcome) -> Result<(), Failure> {
+        let nodes = search_wide::nodes(self.job) as usize;
+        let blank = self.scene.blank_mm(self.job, nodes).map_err(unevaluable)?;
+        let Some(found) = self.wide(&blank).search()? else { return Ok(()) };
+        outcome.simulated += found.simulated;
+        let setting = self.verified(&found.best.setting)?;
+        if setting.margin_um >= 0.0 {
+            let robust = setting.robust_share >= search_wide::ROBUST;
+            outcome.status = if robust { SearchStatus::Robust } else { SearchStatus::Fragile };
+        }
+        if outcome.best.is_none_or(|best| setting.roundness_um < best.roundness_um) {
+            outcome.best = Some(setting);
+        }
+        Ok(())
+    }
+
+    /// Where tool and supports stand, as the job has it.
+    fn as_placed(&self, setting: &Setting) -> Placing {
+        let [x, y] = setting.tip_start_mm;
+        let direction_rad = angle(setting.feed_direction);
+        let mirrored = self.scene.mirrored;
+        Placing {
+            x_mm: if mirrored { -x } else { x },
+            y_mm: y,
+            feed_direction_deg: mirrored_rad(direction_rad, mirrored).rem_euclid(TAU).to_degrees(),
+            distance_mm: norm(sub(setting.support_b_mm, setting.support_a_mm)),
+            depth_mm: -setting.support_a_mm[1],
+        }
+    }
+
+    /// A second stage that begins with what the first leaves: the waves that the first does not see decay at other angles
+    /// (`ring/5.5`). Given only where the simulation of both shows a gain.
+    fn second_stage(&self, first: &Cut, simulated: &mut usize) -> Result<Option<SecondStage>, Failure> {
+        let wide = self.wide(&first.radii_mm);
+        let Some(found) = wide.search()? else { return Ok(None) };
+        *simulated += found.simulated;
+        let Tried { setting, angles, roundness_um, .. } = found.best;
+        let placed = self.as_placed(&setting);
+        let stage = SecondStage {
+            tool_x_mm: placed.x_mm,
+            tool_y_mm: placed.y_mm,
+            feed_direction_deg: placed.feed_direction_deg,
+            support_depth_mm: placed.depth_mm,
+            support_half_angle_deg: angles.half_angle_rad.to_degrees(),
+            tool_angle_deg: mirrored_rad(angles.tool_rad, self.scene.mirrored).to_degrees(),
+            support_distance_mm: placed.distance_mm,
+            feed_mm_per_rev: setting.feed_mm_per_rev,
+            revolutions: setting.revolutions,
+            before_um: first.roundness_um,
+            after_um: roundness_um,
+            robust_share: found.robust_share,
+        };
+        let alone = self.range.target_um.max(WORTH * first.roundness_um);
+        Ok(Some(stage).filter(|stage| stage.after_um < alone))
+    }
+}
+
+/// Where tool and supports stand, in the machine of the job.
+struct Placing {
+    x_mm: f64,
+    y_mm: f64,
+    feed_direction_deg: f64,
+    distance_mm: f64,
+    depth_mm: f64,
 }

@@ -77,22 +77,24 @@ fn values(circles: &Circles) -> CircleValues {
     }
 }
 
-/// |p - q| times a factor, value by value.
-pub(super) fn difference(p: &Evaluated, q: &Evaluated, factor: f64) -> Evaluated {
-    let by = |x: f64, y: f64| factor * (x - y).abs();
-    let circles = |p: &CircleValues, q: &CircleValues| CircleValues {
-        least_squares_um: by(p.least_squares_um, q.least_squares_um),
-        minimum_zone_um: by(p.minimum_zone_um, q.minimum_zone_um),
-        inscribed_um: by(p.inscribed_um, q.inscribed_um),
-        circumscribed_um: by(p.circumscribed_um, q.circumscribed_um),
-        peak_um: by(p.peak_um, q.peak_um),
-        valley_um: by(p.valley_um, q.valley_um),
-        rms_um: by(p.rms_um, q.rms_um),
+/// |p - q| times its factor, value by value: the largest over all q.
+pub(super) fn difference(p: &Evaluated, others: &[(&Evaluated, f64)]) -> Evaluated {
+    let by = |of: &dyn Fn(&Evaluated) -> f64| {
+        others.iter().map(|(q, factor)| factor * (of(p) - of(q)).abs()).fold(0.0, f64::max)
+    };
+    let circles = |of: &dyn Fn(&Evaluated) -> &CircleValues| CircleValues {
+        least_squares_um: by(&|e| of(e).least_squares_um),
+        minimum_zone_um: by(&|e| of(e).minimum_zone_um),
+        inscribed_um: by(&|e| of(e).inscribed_um),
+        circumscribed_um: by(&|e| of(e).circumscribed_um),
+        peak_um: by(&|e| of(e).peak_um),
+        valley_um: by(&|e| of(e).valley_um),
+        rms_um: by(&|e| of(e).rms_um),
     };
     Evaluated {
-        mean_radius_mm: by(p.mean_radius_mm, q.mean_radius_mm),
-        unfiltered: circles(&p.unfiltered, &q.unfiltered),
-        filtered: circles(&p.filtered, &q.filtered),
+        mean_radius_mm: by(&|e| e.mean_radius_mm),
+        unfiltered: circles(&|e| &e.unfiltered),
+        filtered: circles(&|e| &e.filtered),
     }
 }
 

@@ -18,11 +18,15 @@ pub(super) const EXPLANATION_CODES: &[&str] = &[
     "known_to",
     "tolerance_kept",
     "several_inscribed_circles",
+    "contacts_tied",
+    "repaired_in_reading",
 ];
 
 /// Codes of the warnings made here.
 pub(super) const WARNING_CODES: &[&str] = &[
     "too_few_points_for_filter",
+    "filter_not_applied",
+    "form_between_points_unknown",
     "finer_than_any_instrument",
     "radius_unlike_nominal",
     "spike_suspected",
@@ -52,11 +56,27 @@ pub(super) fn warnings(job: &Job, outcome: &Outcome) -> Vec<Finding> {
     let points = filter_points(job);
     if let Some((cutoff, field)) = job.filter.highest_cutoff()
         && points < POINTS_PER_WAVE * cutoff
+        && outcome.data.filter_applied
     {
         found.push(
             Finding::new("too_few_points_for_filter", format!("/filter/{field}"))
                 .measured(points, POINTS_PER_WAVE * cutoff, "1")
                 .with("cutoff_upr", cutoff),
+        );
+    }
+    if let (Some((cutoff, field)), false) = (job.filter.highest_cutoff(), outcome.data.filter_applied) {
+        let finding = Finding::new("filter_not_applied", format!("/filter/{field}"));
+        found.push(if outcome.spectrum.order.is_empty() {
+            finding.value(cutoff, "1").with("gap_deg", outcome.data.largest_gap_deg)
+        } else {
+            finding.measured(cutoff, (0.5 * points).floor(), "1")
+        });
+    }
+    if outcome.measured.least_squares.sampling_error_um.is_none() {
+        found.push(
+            Finding::new("form_between_points_unknown", format!("/{table}"))
+                .value(outcome.data.largest_gap_deg, "deg")
+                .with("points", outcome.data.points),
         );
     }
     found.extend(units(job, outcome, table));
@@ -107,7 +127,7 @@ fn units(job: &Job, outcome: &Outcome, table: &'static str) -> Vec<Finding> {
 
 /// One reading far from its neighbours: dirt, a scratch, a jump of the probe.
 fn spike(job: &Job, outcome: &Outcome, table: &'static str) -> Option<Finding> {
-    if !matches!(job.filter, RoundnessFilter::LowPass { .. }) {
+    if !matches!(job.filter, RoundnessFilter::LowPass { .. }) || !outcome.data.filter_applied {
         return None;
     }
     let profile = &outcome.profile;
@@ -152,10 +172,19 @@ fn tolerance(job: &Job, outcome: &Outcome) -> Option<Result<Message, Finding>> {
 
 /// What is known to be unknown of the roundness asked for: between the points, of the spline, of the round-off.
 fn error_um(job: &Job, outcome: &Outcome) -> f64 {
-    let sampling_um = judged(job, &outcome.measured, &outcome.filtered).sampling_error_um;
+    let sampling_um = sampling_um(job, outcome);
     // A peak and a valley, each with the error of the spline.
-    let spline_um = if job.filter == (RoundnessFilter::None {}) { 0.0 } else { outcome.data.interpolation_error_um };
+    let spline_um = if job.filter == (RoundnessFilter::None {}) || !outcome.data.filter_applied {
+        0.0
+    } else {
+        outcome.data.interpolation_error_um
+    };
     sampling_um + 2.0 * spline_um + outcome.numerical_error_um
+}
+
+/// What peaks between the points may add; nothing is known of it across a gap.
+fn sampling_um(job: &Job, outcome: &Outcome) -> f64 {
+    judged(job, outcome.data.filter_applied, &outcome.measured, &outcome.filtered).sampling_error_um.unwrap_or(0.0)
 }
 
 pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
@@ -163,7 +192,7 @@ pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
     said.extend(harmonic_dominates(outcome));
     let (measured, kept) =
         (of_reference(&outcome.measured, job.reference), of_reference(&outcome.filtered, job.reference));
-    if job.filter != (RoundnessFilter::None {}) && measured.ront_um > kept.ront_um {
+    if outcome.data.filter_applied && job.filter != (RoundnessFilter::None {}) && measured.ront_um > kept.ront_um {
         said.push(
             Message::new("filter_removed")
                 .with("measured_um", measured.ront_um)
@@ -171,7 +200,11 @@ pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
                 .with("share", 1.0 - kept.ront_um / measured.ront_um),
         );
     }
-    let shown = if job.filter == (RoundnessFilter::None {}) { &outcome.measured } else { &outcome.filtered };
+    let shown = if job.filter == (RoundnessFilter::None {}) || !outcome.data.filter_applied {
+        &outcome.measured
+    } else {
+        &outcome.filtered
+    };
     let (least_squares_um, zone_um) = (shown.least_squares.ront_um, shown.minimum_zone.ront_um);
     if least_squares_um > 0.0 {
         said.push(
@@ -185,7 +218,8 @@ pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
     // What the limaçon leaves of a true circle: a second harmonic of e²/4R, peak to valley e²/2R.
     let limacon_um = 1e3 * e * e / (2.0 * radius_mm);
     // Below a nanometre nobody can have set it up.
-    if job.points.is_none() && e > 1e-6 {
+    let is_centred = !matches!(Table::of(job).first(), Some(Table::Points | Table::File));
+    if is_centred && e > 1e-6 {
         said.push(
             Message::new("eccentricity_taken_out")
                 .with("eccentricity_um", 1e3 * e)
@@ -196,7 +230,7 @@ pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
     said.push(
         Message::new("known_to")
             .with("error_um", error_um(job, outcome))
-            .with("sampling_um", judged(job, &outcome.measured, &outcome.filtered).sampling_error_um)
+            .with("sampling_um", sampling_um(job, outcome))
             .with("interpolation_um", outcome.data.interpolation_error_um)
             .with("aliasing_um", outcome.data.aliasing_um),
     );
@@ -212,16 +246,35 @@ pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
                 .with("of_profile", of_profile + 1),
         );
     }
+    said.extend(contacts_tied(outcome));
+    said.extend(outcome.data.repairs.iter().map(|repair| {
+        Message::new("repaired_in_reading")
+            .with("kind", repair.kind.name())
+            .with("count", repair.count)
+            .with("change_um", repair.change_um)
+    }));
     said
 }
 
+/// A symmetric form touches its circles at more points than hold them: which of them are named is a matter of choice.
+fn contacts_tied(outcome: &Outcome) -> Option<Message> {
+    let circles = &outcome.measured;
+    let most = [(&circles.minimum_zone, 4), (&circles.maximum_inscribed, 3), (&circles.minimum_circumscribed, 3)];
+    let beyond = |(circle, held): &(&super::output::RoundnessCircle, usize)| circle.touching.is_some_and(|n| n > *held);
+    let told = |at: usize| most[at].0.touching.unwrap_or(0);
+    most.iter().any(beyond).then(|| {
+        Message::new("contacts_tied").with("zone", told(0)).with("inscribed", told(1)).with("circumscribed", told(2))
+    })
+}
+
 fn roundness_is(job: &Job, outcome: &Outcome) -> Message {
-    let circle = judged(job, &outcome.measured, &outcome.filtered);
+    let circle = judged(job, outcome.data.filter_applied, &outcome.measured, &outcome.filtered);
     let message = Message::new("roundness_is")
         .with("roundness_um", outcome.roundness_um)
         .with("reference", job.reference.name())
         .with("radius_mm", circle.radius_mm);
     match job.filter {
+        _ if !outcome.data.filter_applied => message,
         RoundnessFilter::None {} => message,
         RoundnessFilter::LowPass { cutoff_upr } => message.with("to_upr", cutoff_upr),
         RoundnessFilter::HighPass { cutoff_upr } => message.with("from_upr", cutoff_upr),

@@ -1,14 +1,16 @@
 //! From the points to the answer.
 
 use crate::calculator::{Failure, Finding, Message, Monitor, checkpoint};
-use crate::num::roundness::{Circles, Evaluation, Grid, PeriodicSpline, RoundnessError, circles, evaluate, refer};
+use crate::num::roundness::{
+    Circles, Evaluation, Filter, Grid, PeriodicSpline, RoundnessError, circles, evaluate, refer,
+};
 
 use super::input::{Job, ReferenceCircle, RoundnessFilter};
 use super::output::{
     ContactKind, OtherCircle, Outcome, RoundnessCircle, RoundnessCircles, RoundnessContact, RoundnessData,
     RoundnessProfile, RoundnessProof, RoundnessSpectrum,
 };
-use super::readings::{Readings, angles_deg};
+use super::readings::Readings;
 
 const UM_PER_MM: f64 = 1e3;
 /// Angles are uniform when they differ from uniform ones by less than this share of a step: printed decimals.
@@ -18,6 +20,9 @@ const DENSER: usize = 4;
 /// A spline of the third degree errs with the fourth power of the step.
 const ERROR_RATIO_OF_DOUBLE_STEP: f64 = 16.0;
 
+/// Fewest points of which every second one still makes a spline.
+const LEAST_FOR_HALF: usize = 6;
+
 /// Codes of a faultless job without answer.
 pub(super) const FAILURE_CODES: &[&str] = &["not_star_shaped", "points_without_circle"];
 
@@ -26,51 +31,104 @@ pub(super) fn outcome(job: &Job, monitor: &dyn Monitor) -> Result<Outcome, Failu
     checkpoint(monitor)?;
     monitor.progress(0.0, Message::new("stage_circles"));
     let readings = Readings::of(job).map_err(|error| failure(error, None))?;
+    let outcome = if readings.is_closed() { curve(job, &readings, monitor)? } else { scattered(job, &readings)? };
+    monitor.progress(1.0, Message::new("stage_done"));
+    Ok(outcome)
+}
+
+/// Points through which a curve can be laid: everything.
+fn curve(job: &Job, readings: &Readings, monitor: &dyn Monitor) -> Result<Outcome, Failure> {
     let n = job.profile_points.map_or(readings.section.len(), |points| usize::try_from(points).unwrap_or(usize::MAX));
-    let fail = |error| failure(error, Some(&readings));
+    let fail = |error| failure(error, Some(readings));
     let (grid, fine) = (Grid::new(n).map_err(fail)?, Grid::new(DENSER * n).map_err(fail)?);
     let highest = usize::try_from(job.highest_harmonic).unwrap_or(usize::MAX);
-    let found = evaluate(&readings.section, &grid, job.filter.filter(), n / 2).map_err(fail)?;
+    // Two points per wave at least.
+    let told = number(readings.section.len().min(n)) / 2.0;
+    let applies = job.filter.highest_cutoff().is_none_or(|(cutoff, _)| cutoff <= told);
+    let filter = if applies { job.filter.filter() } else { Filter::None };
+    let found = evaluate(&readings.section, &grid, filter, n / 2).map_err(fail)?;
     checkpoint(monitor)?;
     monitor.progress(0.5, Message::new("stage_denser"));
     let centre = found.unfiltered.least_squares.circle.centre_mm;
     let denser = refer(&readings.section, centre, DENSER * n).map_err(fail)?;
     let measured_denser = circles(&fine.section(&denser).map_err(fail)?).map_err(fail)?;
-    let filtered = grid.resampled(&found.referred_mm, job.filter.filter(), &fine).map_err(fail)?;
+    let filtered = grid.resampled(&found.referred_mm, filter, &fine).map_err(fail)?;
     let filtered_denser = circles(&fine.section(&filtered).map_err(fail)?).map_err(fail)?;
     checkpoint(monitor)?;
-    let rows = |index: usize| RoundnessContact {
-        kind: ContactKind::Peak,
-        angle_deg: readings.angles_deg[index],
-        row: Some(readings.rows[index]),
-    };
+    let rows = |index: usize| row_contact(readings, index);
     let step_deg = 360.0 / number(n);
     let places =
         |index: usize| RoundnessContact { kind: ContactKind::Peak, angle_deg: step_deg * number(index), row: None };
-    let measured = circles_out(&found.unfiltered, &measured_denser, &rows);
-    let filtered = circles_out(&found.filtered, &filtered_denser, &places);
-    let judged = judged(job, &measured, &filtered);
-    let outcome = Outcome {
+    let measured = circles_out(&found.unfiltered, Some(&measured_denser), &rows);
+    let filtered = circles_out(&found.filtered, Some(&filtered_denser), &places);
+    let judged = judged(job, applies, &measured, &filtered);
+    Ok(Outcome {
         roundness_um: judged.ront_um,
         numerical_error_um: judged.numerical_error_um.max(UM_PER_MM * numerical_error_mm(&found)),
-        data: data(job, &readings, &found)?,
+        data: RoundnessData { filter_applied: applies, ..data(job, readings, &found)? },
         measured,
         filtered,
         profile: profile(&found),
-        spectrum: spectrum(job, &found, highest),
-    };
-    monitor.progress(1.0, Message::new("stage_done"));
-    Ok(outcome)
+        spectrum: spectrum(&found, highest, filter),
+    })
+}
+
+/// Points with a gap that a curve would have to invent: an arc, a keyway, a few touches. Circles of the points alone.
+fn scattered(job: &Job, readings: &Readings) -> Result<Outcome, Failure> {
+    let found = circles(&readings.section).map_err(|error| failure(error, Some(readings)))?;
+    let measured = circles_out(&found, None, &|index| row_contact(readings, index));
+    let mut filtered = measured.clone();
+    let [x, y] = found.least_squares.circle.centre_mm;
+    for circle in filtered.all_mut() {
+        circle.centre_x_mm -= x;
+        circle.centre_y_mm -= y;
+    }
+    let radius_mm = found.least_squares.circle.radius_mm;
+    let off = readings.section.distances_mm([x, y]).into_iter().map(|mm| UM_PER_MM * (mm - radius_mm));
+    let mut places: Vec<(f64, f64)> = readings.angles_deg.iter().copied().zip(off).collect();
+    places.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (angle_deg, deviation_um): (Vec<f64>, Vec<f64>) = places.into_iter().unzip();
+    let judged = of_reference(&measured, job.reference);
+    Ok(Outcome {
+        roundness_um: judged.ront_um,
+        numerical_error_um: judged.numerical_error_um,
+        data: RoundnessData {
+            points: readings.section.len(),
+            largest_gap_deg: readings.largest_gap.0,
+            uniform: false,
+            eccentricity_mm: x.hypot(y),
+            eccentricity_angle_deg: y.atan2(x).to_degrees().rem_euclid(360.0),
+            filter_applied: job.filter == (RoundnessFilter::None {}),
+            repairs: readings.repairs.clone(),
+            interpolation_error_um: 0.0,
+            aliasing_um: 0.0,
+        },
+        measured,
+        filtered,
+        profile: RoundnessProfile {
+            angle_deg,
+            filtered_deviation_um: deviation_um.clone(),
+            radial_deviation_um: deviation_um,
+        },
+        spectrum: RoundnessSpectrum::default(),
+    })
+}
+
+/// A point of the job's table as a contact.
+fn row_contact(readings: &Readings, index: usize) -> RoundnessContact {
+    RoundnessContact { kind: ContactKind::Peak, angle_deg: readings.angles_deg[index], row: Some(readings.rows[index]) }
 }
 
 /// The circle that `roundness_um` is about.
 pub(super) fn judged<'a>(
     job: &Job,
+    filter_applied: bool,
     measured: &'a RoundnessCircles,
     filtered: &'a RoundnessCircles,
 ) -> &'a RoundnessCircle {
     // Without a filter there is no need to bring the points to uniform angles first.
-    of_reference(if job.filter == (RoundnessFilter::None {}) { measured } else { filtered }, job.reference)
+    let of_points = job.filter == (RoundnessFilter::None {}) || !filter_applied;
+    of_reference(if of_points { measured } else { filtered }, job.reference)
 }
 
 /// The circle that was asked for.
@@ -111,8 +169,11 @@ fn data(job: &Job, readings: &Readings, found: &Evaluation) -> Result<RoundnessD
     let [x, y] = found.unfiltered.least_squares.circle.centre_mm;
     let n = readings.section.len();
     let step_deg = 360.0 / number(n);
-    let angles = angles_deg(job).unwrap_or_else(|| readings.angles_deg.clone());
-    let off = |(index, angle): (usize, &f64)| (angle - angles[0] - step_deg * number(index)).abs();
+    let angles = &readings.angles_deg;
+    let off = |(index, angle): (usize, &f64)| {
+        let off = (angle - angles[0] - step_deg * number(index)).rem_euclid(360.0);
+        off.min(360.0 - off)
+    };
     let uniform = angles.iter().enumerate().map(off).fold(0.0, f64::max) <= UNIFORM * step_deg;
     let amplitudes = found.spectrum.iter().map(|harmonic| harmonic.amplitude_mm);
     // Of the harmonics that the points can tell apart, not those of a denser profile.
@@ -123,6 +184,8 @@ fn data(job: &Job, readings: &Readings, found: &Evaluation) -> Result<RoundnessD
         points: n,
         largest_gap_deg: readings.largest_gap.0,
         uniform,
+        filter_applied: true,
+        repairs: readings.repairs.clone(),
         eccentricity_mm: x.hypot(y),
         eccentricity_angle_deg: y.atan2(x).to_degrees().rem_euclid(360.0),
         interpolation_error_um: if uniform && is_at_grid(job, readings) {
@@ -149,6 +212,10 @@ fn is_at_grid(job: &Job, readings: &Readings) -> bool {
 /// What a spline through every second point misses at the others (root mean square), over sixteen.
 fn interpolation_error_um(readings: &Readings) -> Result<f64, Failure> {
     let distances = readings.section.distances_mm(readings.circle.circle.centre_mm);
+    if distances.len() < LEAST_FOR_HALF {
+        // Every second of so few is no curve; the form between them is as unknown as it is large.
+        return Ok(UM_PER_MM * readings.circle.span.width_mm());
+    }
     let first =
         (0..distances.len()).min_by(|&a, &b| readings.angles_deg[a].total_cmp(&readings.angles_deg[b])).unwrap_or(0);
     let n = distances.len();
@@ -174,9 +241,8 @@ fn profile(found: &Evaluation) -> RoundnessProfile {
     }
 }
 
-fn spectrum(job: &Job, found: &Evaluation, highest: usize) -> RoundnessSpectrum {
+fn spectrum(found: &Evaluation, highest: usize, filter: Filter) -> RoundnessSpectrum {
     let shown = || found.spectrum.iter().filter(|harmonic| (2..=highest).contains(&harmonic.order));
-    let filter = job.filter.filter();
     RoundnessSpectrum {
         order: shown().map(|harmonic| number(harmonic.order)).collect(),
         amplitude_um: shown().map(|harmonic| UM_PER_MM * harmonic.amplitude_mm).collect(),
@@ -186,26 +252,33 @@ fn spectrum(job: &Job, found: &Evaluation, highest: usize) -> RoundnessSpectrum 
 }
 
 /// Circles as the contract has them; `place` says where a point is.
-fn circles_out(found: &Circles, denser: &Circles, place: &dyn Fn(usize) -> RoundnessContact) -> RoundnessCircles {
+#[allow(clippy::too_many_lines)] // four circles, field by field
+fn circles_out(
+    found: &Circles,
+    denser: Option<&Circles>,
+    place: &dyn Fn(usize) -> RoundnessContact,
+) -> RoundnessCircles {
     let contact = |kind, index| RoundnessContact { kind, ..place(index) };
     let (ls, mz) = (&found.least_squares, &found.minimum_zone);
     let (mi, mc) = (&found.inscribed, &found.circumscribed);
-    let circle = |centre: [f64; 2], radius_mm: f64, inner_mm: f64, outer_mm: f64, denser_mm: f64| RoundnessCircle {
-        centre_x_mm: centre[0],
-        centre_y_mm: centre[1],
-        radius_mm,
-        inner_radius_mm: inner_mm,
-        outer_radius_mm: outer_mm,
-        ront_um: UM_PER_MM * (outer_mm - inner_mm),
-        ronp_um: None,
-        ronv_um: None,
-        ronq_um: None,
-        contacts: Vec::new(),
-        proof: None,
-        sampling_error_um: UM_PER_MM * (denser_mm - (outer_mm - inner_mm)).abs(),
-        numerical_error_um: 0.0,
-        centre_numerical_error_um: None,
-    };
+    let circle =
+        |centre: [f64; 2], radius_mm: f64, inner_mm: f64, outer_mm: f64, denser_mm: Option<f64>| RoundnessCircle {
+            centre_x_mm: centre[0],
+            centre_y_mm: centre[1],
+            radius_mm,
+            inner_radius_mm: inner_mm,
+            outer_radius_mm: outer_mm,
+            ront_um: UM_PER_MM * (outer_mm - inner_mm),
+            ronp_um: None,
+            ronv_um: None,
+            ronq_um: None,
+            contacts: Vec::new(),
+            proof: None,
+            sampling_error_um: denser_mm.map(|mm| UM_PER_MM * (mm - (outer_mm - inner_mm)).abs()),
+            touching: None,
+            numerical_error_um: 0.0,
+            centre_numerical_error_um: None,
+        };
     let um = |mm: f64| Some(UM_PER_MM * mm);
     // The far and the near end of a diameter move by the error of the centre, in opposite directions at worst.
     let about_centre = |distance_mm: f64, centre_mm: f64| UM_PER_MM * (distance_mm + 2.0 * centre_mm);
@@ -223,12 +296,13 @@ fn circles_out(found: &Circles, denser: &Circles, place: &dyn Fn(usize) -> Round
             ls.circle.radius_mm,
             ls.span.nearest_mm,
             ls.span.farthest_mm,
-            denser.least_squares.span.width_mm(),
+            denser.map(|denser| denser.least_squares.span.width_mm()),
         )
     };
     let middle_mm = f64::midpoint(mz.inner_radius_mm, mz.outer_radius_mm);
     let zone_contacts = mz.outer_contacts.iter().map(|&i| contact(outer, i));
     let minimum_zone = RoundnessCircle {
+        touching: Some(mz.touching.iter().sum()),
         contacts: zone_contacts.chain(mz.inner_contacts.iter().map(|&i| contact(inner, i))).collect(),
         proof: Some(RoundnessProof {
             bound_mm: mz.lower_bound_mm,
@@ -240,9 +314,16 @@ fn circles_out(found: &Circles, denser: &Circles, place: &dyn Fn(usize) -> Round
         }),
         numerical_error_um: UM_PER_MM * mz.width_error_mm,
         centre_numerical_error_um: mz.centre_error_mm.map(|mm| UM_PER_MM * mm),
-        ..circle(mz.centre_mm, middle_mm, mz.inner_radius_mm, mz.outer_radius_mm, denser.minimum_zone.width_mm())
+        ..circle(
+            mz.centre_mm,
+            middle_mm,
+            mz.inner_radius_mm,
+            mz.outer_radius_mm,
+            denser.map(|denser| denser.minimum_zone.width_mm()),
+        )
     };
     let maximum_inscribed = RoundnessCircle {
+        touching: Some(mi.touching),
         contacts: mi.contacts.iter().map(|&i| contact(inner, i)).chain([contact(peak, mi.span.farthest)]).collect(),
         proof: Some(RoundnessProof {
             bound_mm: mi.circle.radius_mm + mi.radius_gap_mm,
@@ -259,12 +340,13 @@ fn circles_out(found: &Circles, denser: &Circles, place: &dyn Fn(usize) -> Round
             mi.circle.radius_mm,
             mi.circle.radius_mm,
             mi.span.farthest_mm,
-            denser.inscribed.span.width_mm(),
+            denser.map(|denser| denser.inscribed.span.width_mm()),
         )
     };
     let (first, second, third) = mc.contacts;
     let held = [Some(first), Some(second), third].into_iter().flatten().map(|i| contact(outer, i));
     let minimum_circumscribed = RoundnessCircle {
+        touching: Some(mc.touching),
         contacts: held.chain([contact(valley, mc.span.nearest)]).collect(),
         proof: Some(RoundnessProof {
             bound_mm: mc.circle.radius_mm,
@@ -281,7 +363,7 @@ fn circles_out(found: &Circles, denser: &Circles, place: &dyn Fn(usize) -> Round
             mc.circle.radius_mm,
             mc.span.nearest_mm,
             mc.circle.radius_mm,
-            denser.circumscribed.span.width_mm(),
+            denser.map(|denser| denser.circumscribed.span.width_mm()),
         )
     };
     RoundnessCircles { least_squares, minimum_zone, maximum_inscribed, minimum_circumscribed }

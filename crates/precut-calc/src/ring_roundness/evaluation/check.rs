@@ -3,31 +3,28 @@
 use crate::calculator::{Check, Finding, Violations};
 
 use super::input::{Job, RoundnessFilter};
-use super::readings::{Readings, Table, angles_deg, count};
+use super::instrument::Unknown;
+use super::readings::{Readings, Table, count, file, given_angles_deg, has_deviations, nominal_mm};
 
 /// Codes of the faults found here.
 pub(super) const CODES: &[&str] = &[
     "profile_missing",
     "profile_given_twice",
+    "layout_unknown",
+    "section_missing",
     "nominal_radius_missing",
     "too_few_points",
-    "angles_not_ascending",
-    "duplicate_angle",
-    "angles_beyond_one_turn",
     "angles_look_like_radians",
-    "gap_too_wide",
     "points_on_a_line",
-    "duplicate_point",
     "deviation_below_centre",
     "not_round",
-    "cutoff_beyond_points",
     "band_inside_out",
 ];
 
 /// Fewest points of a profile.
-const FEWEST_POINTS: usize = 16;
-/// Widest gap between neighbouring points: half a wave of six lobes.
-const WIDEST_GAP_DEG: f64 = 30.0;
+const FEWEST_POINTS: usize = 3;
+/// Fewest rows whose angles can be told to be radians.
+const TELLING_ROWS: usize = 16;
 /// Largest deviation, half of peak to valley, over the radius.
 const LARGEST_DEVIATION: f64 = 0.05;
 
@@ -41,51 +38,60 @@ impl Check for Job {
             return;
         };
         let at = format!("/{}", table.name());
+        if table == Table::File && !check_file(self, violations) {
+            return;
+        }
         let points = count(self);
         violations.require(points >= FEWEST_POINTS, || {
             // Counts here are far below 2^53.
             #[allow(clippy::cast_precision_loss)]
             Finding::new("too_few_points", &at).measured(points as f64, FEWEST_POINTS as f64, "1")
         });
-        let in_order = angles_deg(self).is_none_or(|angles| check_angles(&at, &angles, violations));
-        let has_radius = table != Table::Deviations || check_nominal(self, violations);
+        let in_order = given_angles_deg(self).is_none_or(|angles| check_angles(&at, &angles, violations));
+        let has_radius = !has_deviations(self) || check_nominal(self, violations);
         if points >= FEWEST_POINTS && in_order && has_radius {
             check_form(self, &at, violations);
         }
     }
 }
 
-/// Ascending, none twice, within one turn. Whether they are.
+/// Angles in degrees. Whether they are.
 fn check_angles(at: &str, angles: &[f64], violations: &mut Violations) -> bool {
-    let mut in_order = true;
-    for (index, pair) in angles.windows(2).enumerate() {
-        let [before, angle] = [pair[0], pair[1]];
-        if angle <= before {
-            let code = if angle < before { "angles_not_ascending" } else { "duplicate_angle" };
-            violations.add(Finding::new(code, format!("{at}/{}/angle_deg", index + 1)).measured(angle, before, "deg"));
-            in_order = false;
+    let (low, high) = angles.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), a| (l.min(*a), h.max(*a)));
+    // A whole turn, one step short, in radians.
+    let in_radians = angles.len() >= TELLING_ROWS && (5.0..=std::f64::consts::TAU + 1e-9).contains(&(high - low));
+    if in_radians {
+        violations.add(Finding::new("angles_look_like_radians", at).value(high, "deg"));
+    }
+    !in_radians
+}
+
+/// A file must be understood, and hold the section that is asked for. Whether it does.
+fn check_file(job: &Job, violations: &mut Violations) -> bool {
+    match file(job) {
+        Some(Err(Unknown::NoNumbers)) => {
+            violations.add(Finding::new("layout_unknown", "/file/text"));
+            false
         }
+        Some(Err(Unknown::Columns(columns))) => {
+            violations.add(Finding::new("layout_unknown", "/file/columns").with("columns", columns));
+            false
+        }
+        Some(Ok(read)) => {
+            let asked = job.file.as_ref().map_or(1, |file| file.section) as usize;
+            let there = read.sections.len();
+            violations.require(asked <= there, || {
+                Finding::new("section_missing", "/file/section").with("asked", asked).with("there", there)
+            });
+            asked <= there
+        }
+        None => true,
     }
-    if let (true, Some(first), Some(last)) = (in_order, angles.first(), angles.last())
-        && last - first >= 360.0
-    {
-        let finding = Finding::new("angles_beyond_one_turn", format!("{at}/{}/angle_deg", angles.len() - 1));
-        violations.add(finding.measured(*last, first + 360.0, "deg"));
-        in_order = false;
-    } else if let (true, Some(first), Some(last)) = (in_order, angles.first(), angles.last())
-        && angles.len() >= FEWEST_POINTS
-        && (5.0..=std::f64::consts::TAU + 1e-9).contains(&(last - first))
-    {
-        // A whole turn, one step short, in radians.
-        violations.add(Finding::new("angles_look_like_radians", at).value(*last, "deg"));
-        in_order = false;
-    }
-    in_order
 }
 
 /// Deviations need what they are deviations from, and must leave a radius. Whether they have both.
 fn check_nominal(job: &Job, violations: &mut Violations) -> bool {
-    let Some(nominal_mm) = job.nominal_radius_mm else {
+    let Some(nominal_mm) = nominal_mm(job) else {
         violations.add(Finding::new("nominal_radius_missing", "/nominal_radius_mm"));
         return false;
     };
@@ -99,26 +105,12 @@ fn check_nominal(job: &Job, violations: &mut Violations) -> bool {
     inside.is_none()
 }
 
-/// What only the circle through the points shows: gaps, points in one direction, a form that is not round.
+/// What only the circle through the points shows: points on a line, a form that is not round.
 fn check_form(job: &Job, at: &str, violations: &mut Violations) {
     let Ok(readings) = Readings::of(job) else {
         violations.add(Finding::new("points_on_a_line", at));
         return;
     };
-    let row = |point: usize| format!("{at}/{}", readings.rows[point]);
-    let (gap_deg, after) = readings.largest_gap;
-    violations.require(gap_deg <= WIDEST_GAP_DEG, || {
-        Finding::new("gap_too_wide", row(after))
-            .measured(gap_deg, WIDEST_GAP_DEG, "deg")
-            .with("before_row", readings.rows[(after + readings.rows.len() - 1) % readings.rows.len()])
-    });
-    if job.points.is_some() {
-        let pairs = readings.angles_deg.windows(2).enumerate();
-        for (index, pair) in pairs.filter(|(_, pair)| pair[1] <= pair[0]) {
-            let finding = Finding::new("duplicate_point", row(index + 1)).value(pair[1], "deg");
-            violations.add(finding.with("other_row", readings.rows[index]));
-        }
-    }
     let radius_mm = readings.circle.circle.radius_mm;
     let deviation = 0.5 * readings.circle.span.width_mm() / radius_mm;
     violations.require(deviation <= LARGEST_DEVIATION, || {
@@ -130,15 +122,6 @@ fn check_filter(job: &Job, violations: &mut Violations) {
     if let RoundnessFilter::BandPass { from_upr, to_upr } = job.filter {
         violations.require(from_upr < to_upr, || {
             Finding::new("band_inside_out", "/filter/from_upr").measured(from_upr, to_upr, "1")
-        });
-    }
-    let points = filter_points(job);
-    if let Some((cutoff, field)) = job.filter.highest_cutoff()
-        && points > 0.0
-    {
-        violations.require(cutoff <= 0.5 * points, || {
-            let finding = Finding::new("cutoff_beyond_points", format!("/filter/{field}"));
-            finding.measured(cutoff, (0.5 * points).floor(), "1").with("points", points)
         });
     }
 }

@@ -26,6 +26,9 @@ pub struct Job {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(schema_with = Measured::<RoundnessPointRow>::schema, required = false)]
     pub points: Option<Measured<RoundnessPointRow>>,
+    /// A file as the instrument wrote it, in place of a table.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub file: Option<InstrumentFile>,
     /// Nominal radius: what `deviations` are deviations from; with `radii` and `points` it serves to find wrong units.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 0.01, maximum = 20_000.0, example = 149.4, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("R")), ("x-group" = json!("workpiece"))))]
@@ -51,6 +54,55 @@ pub struct Job {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 0.001, maximum = 100_000.0, example = 10.0, extensions(("x-unit" = json!("um")), ("x-symbol" = json!("t")), ("x-group" = json!("workpiece"))))]
     pub tolerance_um: Option<f64>,
+}
+
+/// The text of a file as a roundness tester or a coordinate machine wrote it: header text and comments in any language,
+/// decimal point or comma, separated by tab, semicolon, comma, bar or blanks; with or without angles; radii, diameters,
+/// deviations or points. What was done in reading it stands in `data.repairs`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+#[schema(as = RoundnessInstrumentFile)]
+pub struct InstrumentFile {
+    /// The text.
+    #[schema(max_length = 30_000_000, example = "Winkel [°];Abweichung [µm]\n0;1,2\n120;1,4\n240;1,1")]
+    pub text: String,
+    /// Which of the file's sections, from 1.
+    #[serde(default = "first_section")]
+    #[schema(minimum = 1, maximum = 10_000, default = 1, example = 1, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("i_s")), ("x-advanced" = json!(true))))]
+    pub section: u32,
+    /// What the columns hold, where the file does not say it or says it in words that are not known; from the first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schema(max_items = 64, extensions(("x-advanced" = json!(true))))]
+    pub columns: Vec<FileColumn>,
+}
+
+fn first_section() -> u32 {
+    1
+}
+
+/// What a column of a file holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+#[schema(as = RoundnessFileColumn)]
+pub enum FileColumn {
+    /// Angle in degrees.
+    AngleDeg,
+    /// Angle in radians.
+    AngleRad,
+    /// Distance from the axis in mm.
+    RadiusMm,
+    /// Twice that.
+    DiameterMm,
+    /// Deviation from the nominal radius in micrometres.
+    DeviationUm,
+    /// Deviation from the nominal radius in mm.
+    DeviationMm,
+    /// Coordinate in the plane of the section in mm.
+    XMm,
+    /// Coordinate square to it in mm.
+    YMm,
+    /// Something else.
+    Ignored,
 }
 
 fn highest_harmonic() -> u32 {

@@ -7,17 +7,21 @@
 mod advice;
 mod assess;
 mod check;
+mod columns;
+mod header;
 mod input;
+mod instrument;
 mod output;
 mod picture;
 mod readings;
 
 pub use input::{
-    Job, MAX_POINTS, ReferenceCircle, RoundnessDeviationRow, RoundnessFilter, RoundnessPointRow, RoundnessRadiusRow,
+    FileColumn, InstrumentFile, Job, MAX_POINTS, ReferenceCircle, RoundnessDeviationRow, RoundnessFilter,
+    RoundnessPointRow, RoundnessRadiusRow,
 };
 pub use output::{
-    ContactKind, OtherCircle, Outcome, RoundnessCircle, RoundnessCircles, RoundnessContact, RoundnessData,
-    RoundnessProfile, RoundnessProof, RoundnessSpectrum,
+    ContactKind, OtherCircle, Outcome, RepairKind, RoundnessCircle, RoundnessCircles, RoundnessContact, RoundnessData,
+    RoundnessProfile, RoundnessProof, RoundnessRepair, RoundnessSpectrum,
 };
 
 use crate::calculator::{
@@ -35,7 +39,7 @@ impl Calculator for RoundnessEvaluation {
     const META: Meta = Meta {
         id: "roundness-evaluation",
         kind: CalculatorKind::Evaluation,
-        version: 1,
+        version: 2,
         title: "Roundness evaluation",
         question: "How round is this measured section, about which circle, and what form has the error?",
         summary: "From measured radii, deviations or points of a round section: the least-squares, minimum-zone, \
@@ -99,6 +103,7 @@ impl Calculator for RoundnessEvaluation {
             Some(_) if angles > points => "/profile_points",
             Some(readings::Table::Deviations) => "/deviations",
             Some(readings::Table::Points) => "/points",
+            Some(readings::Table::File) => "/file",
             Some(readings::Table::Radii) | None => "/radii",
         };
         // Measured: about 0.3 us per point, and as much per place read, of which there are four times the uniform angles.

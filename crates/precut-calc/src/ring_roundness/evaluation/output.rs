@@ -14,7 +14,8 @@ pub struct Outcome {
     pub data: RoundnessData,
     /// Circles of the points as they are; centres in the coordinates of the job.
     pub measured: RoundnessCircles,
-    /// Circles of the filtered profile at uniform angles; centres relative to the least-squares centre of the points.
+    /// Circles of the filtered profile at uniform angles, or of the points where no filter acted; centres relative to the
+    /// least-squares centre of the points.
     pub filtered: RoundnessCircles,
     /// The profile about the least-squares centre of the points.
     pub profile: RoundnessProfile,
@@ -42,6 +43,12 @@ pub struct RoundnessData {
     /// Direction of the least-squares centre from the origin of the job.
     #[schema(extensions(("x-unit" = json!("deg"))))]
     pub eccentricity_angle_deg: f64,
+    /// Whether the filter of the job acted. It does not where the points leave a gap that a curve would have to invent, or
+    /// are fewer than two per wave of the cut-off: then the values are those of the points, and with a gap there is no
+    /// spectrum.
+    pub filter_applied: bool,
+    /// What was put right in reading.
+    pub repairs: Vec<RoundnessRepair>,
     /// Estimated error of the spline between the points (root mean square): a spline through every second point misses
     /// the others by sixteen times as much, if the form is smooth. Exact points have none.
     #[schema(extensions(("x-unit" = json!("um"))))]
@@ -50,6 +57,75 @@ pub struct RoundnessData {
     /// quarter of all harmonics.
     #[schema(extensions(("x-unit" = json!("um"))))]
     pub aliasing_um: f64,
+}
+
+/// What was put right in reading the table, and what it changes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct RoundnessRepair {
+    /// What was done.
+    pub kind: RepairKind,
+    /// To how many rows, places or turns.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub count: usize,
+    /// Largest difference of the readings that were left out or made one.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub change_um: f64,
+}
+
+impl RoundnessRepair {
+    pub(super) fn new(kind: RepairKind, count: usize, change_um: f64) -> Self {
+        Self { kind, count, change_um }
+    }
+}
+
+/// A repair made in reading.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RepairKind {
+    /// The last row stood where the first stands, a turn later: it was left out.
+    ClosingRowLeftOut,
+    /// The rows run through several turns: they were laid on each other.
+    TurnsLaidOnEachOther,
+    /// The angles did not ascend: the rows were sorted by angle. `count` is how often they fell.
+    RowsPutInOrder,
+    /// Several readings at one angle were averaged.
+    SameAngleAveraged,
+    /// Points given more than once were taken once.
+    SamePointLeftOut,
+    /// Numbers of the file have decimal commas.
+    DecimalCommaRead,
+    /// Lines of the file that are no rows of numbers: header, comments, results.
+    TextLinesSkipped,
+    /// Columns of the file that are no angle and no reading.
+    ColumnsLeftOut,
+    /// The file has no angles: its rows were spread evenly over one turn.
+    AnglesSpreadEvenly,
+    /// The file says that it runs clockwise: the signs of its angles were changed.
+    TurnedRound,
+    /// The file states a magnification, by which its deviations were divided.
+    MagnificationTakenOut,
+    /// The file states no unit of its deviations: they were taken for micrometres.
+    TakenAsUm,
+}
+
+impl RepairKind {
+    /// Its name, as in the contract.
+    pub(super) const fn name(self) -> &'static str {
+        match self {
+            Self::ClosingRowLeftOut => "closing_row_left_out",
+            Self::TurnsLaidOnEachOther => "turns_laid_on_each_other",
+            Self::RowsPutInOrder => "rows_put_in_order",
+            Self::SameAngleAveraged => "same_angle_averaged",
+            Self::SamePointLeftOut => "same_point_left_out",
+            Self::DecimalCommaRead => "decimal_comma_read",
+            Self::TextLinesSkipped => "text_lines_skipped",
+            Self::ColumnsLeftOut => "columns_left_out",
+            Self::AnglesSpreadEvenly => "angles_spread_evenly",
+            Self::TurnedRound => "turned_round",
+            Self::MagnificationTakenOut => "magnification_taken_out",
+            Self::TakenAsUm => "taken_as_um",
+        }
+    }
 }
 
 /// The four reference circles.
@@ -63,6 +139,12 @@ pub struct RoundnessCircles {
     pub maximum_inscribed: RoundnessCircle,
     /// MCCI.
     pub minimum_circumscribed: RoundnessCircle,
+}
+
+impl RoundnessCircles {
+    pub(super) fn all_mut(&mut self) -> [&mut RoundnessCircle; 4] {
+        [&mut self.least_squares, &mut self.minimum_zone, &mut self.maximum_inscribed, &mut self.minimum_circumscribed]
+    }
 }
 
 /// A reference circle and the roundness about it.
@@ -99,9 +181,14 @@ pub struct RoundnessCircle {
     pub contacts: Vec<RoundnessContact>,
     /// Why no other circle of its kind is better; absent for the least-squares circle, which is decided by all points.
     pub proof: Option<RoundnessProof>,
-    /// How much RONt changes when the profile is read four times as densely: peaks and valleys between the points.
+    /// How much RONt changes when the profile is read four times as densely: peaks and valleys between the points. Absent
+    /// where a gap leaves the form between the points unknown.
     #[schema(extensions(("x-unit" = json!("um"))))]
-    pub sampling_error_um: f64,
+    pub sampling_error_um: Option<f64>,
+    /// How many points the circle touches, round-off aside, on each of its circles together: more than its contacts where
+    /// the form is symmetric and the choice among them is free. Absent for the least-squares circle.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub touching: Option<usize>,
     /// Bound of the round-off in RONt: that of the distances, and of the centre where no value is least or largest at it.
     #[schema(extensions(("x-unit" = json!("um"))))]
     pub numerical_error_um: f64,

@@ -36,7 +36,12 @@ const ANGLE: Axis = Axis::linear("angle", "deg");
 const UM_PER_MM: f64 = 1e3;
 
 pub(super) fn figures(outcome: &Outcome) -> Vec<Figure> {
-    vec![polar(outcome), unrolled(outcome), spectrum(outcome)]
+    let mut figures = vec![polar(outcome), unrolled(outcome)];
+    // Across a gap there is no spectrum.
+    if !outcome.spectrum.order.is_empty() {
+        figures.push(spectrum(outcome));
+    }
+    figures
 }
 
 fn some(values: &[f64]) -> Vec<Option<f64>> {
@@ -225,7 +230,7 @@ fn circles_table(outcome: &Outcome) -> Table {
             numbers("ronp", "um", &|circle| circle.ronp_um),
             numbers("ronv", "um", &|circle| circle.ronv_um),
             numbers("ronq", "um", &|circle| circle.ronq_um),
-            numbers("sampling_error", "um", &|circle| Some(circle.sampling_error_um)),
+            numbers("sampling_error", "um", &|circle| circle.sampling_error_um),
             numbers("numerical_error", "um", &|circle| Some(circle.numerical_error_um)),
             numbers("stiffness", "1", &|circle| circle.proof.as_ref().map(|proof| proof.stiffness)),
             words("is_global", &proof(|proof| proof.is_global)),

@@ -76,9 +76,10 @@ impl Log {
         })
     }
 
-    pub(super) fn turned(self, radii_mm: Vec<f64>) -> Turned {
+    pub(super) fn turned(self, radii_mm: Vec<f64>, unmet_mm: f64) -> Turned {
         Turned {
             radii_mm,
+            unmet_mm,
             largest_bite_mm: self.deepest_mm.max(0.0),
             smallest_gap_mm: -self.deepest_mm,
             first_contact_rev: self.first_contact_rad.map(|rad| rad / TAU),

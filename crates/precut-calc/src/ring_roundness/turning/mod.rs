@@ -1,5 +1,6 @@
 //! The simulation: a ring that rests on the surface that is being turned.
 
+mod bracketing;
 mod envelope;
 mod log;
 mod nodes;
@@ -31,6 +32,8 @@ pub(crate) struct Turned {
     pub last_air_cut_rev: Option<f64>,
     /// Where the ring was during the last revolution.
     pub path: Vec<Place>,
+    /// Most by which a contact was not met, mm: 0 but where both supports stood on flanks steeper than nodes resolve.
+    pub unmet_mm: f64,
     /// Nodes cut, or found to be clear.
     pub steps: u64,
 }
@@ -56,11 +59,15 @@ pub(crate) struct Revolution {
 /// Hears of every revolution with the profile so far; an error ends the run.
 pub(crate) type After<'a, E> = dyn FnMut(&Revolution, &[f64]) -> Result<(), E> + 'a;
 
-/// The ring cannot be located.
+/// The ring falls between its supports: there is no place where both touch it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Stuck {
-    pub left_mm: f64,
-    pub iterations: u32,
+    /// When.
+    pub turned_revolutions: f64,
+    /// Distance between the supports, mm.
+    pub apart_mm: f64,
+    /// Largest distance that a ring of this size could span, mm.
+    pub reach_mm: f64,
 }
 
 /// Turns a ring whose radii at uniform body angles are `profile_mm`; `after` hears of every revolution with the profile

@@ -27,11 +27,7 @@ const CLEAR: f64 = 12.0;
 /// radius, and its product with the relative error of the frozen parts of the Jacobian, about 1e-5 at r'/r = 0.02.
 const LAST_STEP_MM: f64 = 2e-5;
 /// More than ever needed: four are, where the profile tears.
-const MOST_ITERATIONS: u32 = 60;
-/// The same where a support climbs a flank of a node's width, on which the profile bends a thousand times more.
-const LAST_CLIMB_MM: f64 = 2e-8;
-/// Least share of a step of Newton's method that is tried.
-const LEAST_SHARE: f64 = 1e-9;
+pub(super) const MOST_ITERATIONS: u32 = 60;
 /// Tangent of the angle from the fixed directions beyond which they are fixed anew; the series is then exact to 1e-13.
 const FAR: f64 = 0.05;
 /// A rolling contact computed so many steps ago still holds.
@@ -39,7 +35,7 @@ const FRESH_STEPS: u64 = 16;
 
 /// Directions fixed for about a revolution.
 #[derive(Debug, Clone, Copy)]
-struct Frame {
+pub(super) struct Frame {
     a: Vec2,
     b: Vec2,
     tip: Vec2,
@@ -47,7 +43,7 @@ struct Frame {
     to_a_rad: f64,
     to_b_rad: f64,
     /// Angle of the tip, continued over whole turns.
-    tip_rad: f64,
+    pub(super) tip_rad: f64,
     /// One over the squared distances.
     per_a2: f64,
     per_b2: f64,
@@ -65,49 +61,40 @@ fn arctangent(x: f64) -> f64 {
 
 /// The state between two steps.
 pub(super) struct Stepper<'a, M> {
-    machine: &'a M,
-    setting: &'a Setting,
-    nodes: Nodes,
+    pub(super) machine: &'a M,
+    pub(super) setting: &'a Setting,
+    pub(super) nodes: Nodes,
     envelope: Option<Envelope>,
-    per_step: f64,
-    step_rad: f64,
+    pub(super) per_step: f64,
+    pub(super) step_rad: f64,
     /// Rotation of the machine per rotation of the body.
-    machine_per_body: f64,
+    pub(super) machine_per_body: f64,
     /// Share of the depth that is removed.
     removed: f64,
-    frame: Frame,
+    pub(super) frame: Frame,
     /// Steps taken.
-    count: u64,
+    pub(super) count: u64,
     /// Node that is cut next, and body angle of the first.
-    node: usize,
-    first_rad: f64,
+    pub(super) node: usize,
+    pub(super) first_rad: f64,
     /// Centres after the last three blocks, newest first.
-    before: [Vec2; 3],
+    pub(super) before: [Vec2; 3],
     /// Rotation of the body after the last step.
-    body_rad: f64,
+    pub(super) body_rad: f64,
     /// Largest radius at the start of the revolution.
     highest_mm: f64,
     /// The directions are too far off.
-    stale: bool,
+    pub(super) stale: bool,
     ended: bool,
+    /// Most by which a contact was not met, where both supports stood on flanks, mm.
+    pub(super) unmet_mm: f64,
 }
 
 /// Steps solved side by side.
-struct Solved<const L: usize> {
-    centre: [Vec2; L],
+pub(super) struct Solved<const L: usize> {
+    pub(super) centre: [Vec2; L],
     /// Rotation of the body.
-    body_rad: [f64; L],
-}
-
-/// A place of the centre, looked at.
-#[derive(Debug, Clone, Copy)]
-struct Stand {
-    /// Rotation of the body that goes with it.
-    body_rad: f64,
-    /// How far the equations of the contacts are from being met.
-    gap_mm2: f64,
-    /// Where Newton's method would go, to be taken away from the place.
-    step: Vec2,
+    pub(super) body_rad: [f64; L],
 }
 
 impl<'a, M: Machine> Stepper<'a, M> {
@@ -149,6 +136,7 @@ impl<'a, M: Machine> Stepper<'a, M> {
             highest_mm: largest,
             stale: false,
             ended: false,
+            unmet_mm: 0.0,
         };
         stepper.start()?;
         Ok(stepper)
@@ -175,8 +163,10 @@ impl<'a, M: Machine> Stepper<'a, M> {
                 break;
             }
         }
+        // Waves too steep for that; or what is no number.
         if left.is_nan() || left > 1e-9 * mean {
-            return Err(Stuck { left_mm: left, iterations: MOST_ITERATIONS });
+            let upright = [middle[0] - along[1] * height, middle[1] + along[0] * height];
+            c = self.rest_slowly(a, b, upright)?;
         }
         self.before = [c; 3];
         let tip_rad = angle(sub(self.machine.tip(0.0), c)).rem_euclid(TAU);
@@ -193,7 +183,7 @@ impl<'a, M: Machine> Stepper<'a, M> {
     }
 
     /// Roller-centre distance, or radius, at a body angle.
-    fn at_angle(&mut self, body_rad: f64) -> f64 {
+    pub(super) fn at_angle(&mut self, body_rad: f64) -> f64 {
         let n = self.nodes.len();
         let place = Place::of(wrapped(body_rad * self.per_step, n as f64), n);
         match &mut self.envelope {
@@ -254,15 +244,15 @@ impl<'a, M: Machine> Stepper<'a, M> {
                 after(&revolution, self.nodes.values())?;
             }
         }
-        Ok(log.turned(self.nodes.values().to_vec()))
+        Ok(log.turned(self.nodes.values().to_vec(), self.unmet_mm))
     }
 
     /// Takes up to `L` steps; how many.
     fn block<const L: usize>(&mut self, log: &mut Log) -> Result<usize, Stuck> {
-        if let Ok(solved) = self.solve::<L>() {
+        if let Some(solved) = self.solve::<L>() {
             return Ok(self.advance(&solved, log));
         }
-        let solved = self.climb()?;
+        let solved = self.slowly()?;
         Ok(self.advance(&solved, log))
     }
 
@@ -321,7 +311,7 @@ impl<'a, M: Machine> Stepper<'a, M> {
     }
 
     /// Centre and rotation of the next steps.
-    fn solve<const L: usize>(&mut self) -> Result<Solved<L>, Stuck> {
+    fn solve<const L: usize>(&mut self) -> Option<Solved<L>> {
         let n = self.nodes.len();
         let whole = n as f64;
         let frame = self.frame;
@@ -342,7 +332,6 @@ impl<'a, M: Machine> Stepper<'a, M> {
         }
         let mut places = [[Place { node: 0, share: 0.0 }; 2]; L];
         let mut arms = [[[0.0; 2]; 3]; L];
-        let mut left = f64::INFINITY;
         for _ in 0..MOST_ITERATIONS {
             let mut far = 0.0_f64;
             for l in 0..L {
@@ -360,7 +349,7 @@ impl<'a, M: Machine> Stepper<'a, M> {
                 body_rad[l] = frame.tip_rad + tip - self.first_rad + self.step_rad * (self.count + l as u64) as f64;
                 arms[l] = [va, vb, vt];
             }
-            left = 0.0;
+            let mut left = 0.0;
             for l in 0..L {
                 let [va, vb, vt] = arms[l];
                 let ((ea, slope_a), (eb, slope_b)) = self.read(places[l], l);
@@ -384,79 +373,18 @@ impl<'a, M: Machine> Stepper<'a, M> {
             }
             if left < LAST_STEP_MM {
                 self.stale = far > FAR;
-                return Ok(Solved { centre, body_rad });
+                return Some(Solved { centre, body_rad });
             }
             if left.is_nan() {
                 break;
             }
         }
-        Err(Stuck { left_mm: left, iterations: MOST_ITERATIONS })
-    }
-
-    /// Centre and rotation of the next step where Newton's method jumps to and fro: a support stands at the foot of a
-    /// flank that is steeper than a node is wide. Its steps are halved until they bring the ring nearer, so that the
-    /// support climbs the flank.
-    fn climb(&mut self) -> Result<Solved<1>, Stuck> {
-        self.stale = true;
-        let mut centre = self.before[0];
-        let mut here = self.stand(centre);
-        for _ in 0..MOST_ITERATIONS {
-            let step = here.step;
-            if norm(step) < LAST_CLIMB_MM {
-                return Ok(Solved { centre: [centre], body_rad: [here.body_rad] });
-            }
-            let mut share = 1.0;
-            (centre, here) = loop {
-                let tried = sub(centre, scaled(step, share));
-                let there = self.stand(tried);
-                // What is no number is not nearer either.
-                if there.gap_mm2 < here.gap_mm2 {
-                    break (tried, there);
-                }
-                share *= 0.5;
-                if share < LEAST_SHARE {
-                    return Err(Stuck { left_mm: norm(step), iterations: MOST_ITERATIONS });
-                }
-            };
-        }
-        Err(Stuck { left_mm: norm(here.step), iterations: MOST_ITERATIONS })
-    }
-
-    /// What the next step finds with the centre at a place.
-    fn stand(&mut self, centre: Vec2) -> Stand {
-        let whole = self.nodes.len() as f64;
-        let mut body_rad = self.body_rad + self.step_rad;
-        let (mut turned_rad, mut vt) = (0.0, [0.0; 2]);
-        // The rotation follows from the tip, and the tip, which moves by thousandths of a degree, from the rotation.
-        for _ in 0..3 {
-            turned_rad = body_rad * self.machine_per_body;
-            vt = sub(self.machine.tip(turned_rad), centre);
-            let near = angle(vt);
-            let turns = ((self.frame.tip_rad - near) / TAU).round();
-            body_rad = near + turns * TAU - self.first_rad + self.step_rad * self.count as f64;
-        }
-        let (a, b) = self.machine.supports(turned_rad);
-        let (va, vb) = (sub(a, centre), sub(b, centre));
-        let place = |v: Vec2| {
-            let ahead = cross(vt, v).atan2(dot(vt, v)) * self.per_step;
-            Place::of(wrapped(self.node as f64 + ahead, whole), self.nodes.len())
-        };
-        let places = [place(va), place(vb)];
-        let ((ea, slope_a), (eb, slope_b)) = self.read(places, 0);
-        let tip = scaled(turned(vt), 1.0 / dot(vt, vt));
-        let row = |v: Vec2, e: f64, slope: f64| {
-            let by = e * slope * self.per_step;
-            let side = sub(scaled(turned(v), 1.0 / dot(v, v)), tip);
-            [by * side[0] - v[0], by * side[1] - v[1]]
-        };
-        let (gap_a, gap_b) = (half_gap(va, ea), half_gap(vb, eb));
-        let step = solve(row(va, ea, slope_a), row(vb, eb, slope_b), gap_a, gap_b);
-        Stand { body_rad, gap_mm2: gap_a.hypot(gap_b), step }
+        None
     }
 
     /// Distance of the contact and its slope per node, for one support and lane.
     #[inline]
-    fn read(&mut self, places: [Place; 2], lane: usize) -> ((f64, f64), (f64, f64)) {
+    pub(super) fn read(&mut self, places: [Place; 2], lane: usize) -> ((f64, f64), (f64, f64)) {
         let Some(envelope) = &mut self.envelope else {
             return (self.nodes.cubic(places[0]), self.nodes.cubic(places[1]));
         };
@@ -470,13 +398,13 @@ impl<'a, M: Machine> Stepper<'a, M> {
 
 /// ½(|v|² - e²), mm².
 #[inline]
-fn half_gap(v: Vec2, e: f64) -> f64 {
+pub(super) fn half_gap(v: Vec2, e: f64) -> f64 {
     0.5 * (dot(v, v) - e * e)
 }
 
 /// Solves two linear equations by their rows.
 #[inline]
-fn solve(a: Vec2, b: Vec2, fa: f64, fb: f64) -> Vec2 {
+pub(super) fn solve(a: Vec2, b: Vec2, fa: f64, fb: f64) -> Vec2 {
     let per_determinant = 1.0 / cross(a, b);
     [(fa * b[1] - fb * a[1]) * per_determinant, (fb * a[0] - fa * b[0]) * per_determinant]
 }
@@ -488,7 +416,7 @@ fn wrapped_once(x: f64, period: f64) -> f64 {
     if up >= period { up - period } else { up }
 }
 
-fn wrapped(x: f64, period: f64) -> f64 {
+pub(super) fn wrapped(x: f64, period: f64) -> f64 {
     wrapped_once(x.rem_euclid(period), period)
 }
 

@@ -1,0 +1,313 @@
+//! The search over everything that can be set: angles of tool and supports, feed, revolutions, compliance ratio.
+//!
+//! The linear theory ranks the cells of a grid of angles by what it leaves of the blank's waves; the best of them are
+//! simulated with several feeds, the best of these again beside themselves, and the one that is given with angles, blank
+//! and phase off by what a machine is off: how often the target is met then is its robustness (`ring/7.2`).
+
+use rayon::prelude::*;
+
+use crate::calculator::{Failure, Message, checkpoint};
+use crate::num::roundness::Grid;
+
+use super::input::{Job, SearchRange};
+use super::lobing::{Lobing, of_order};
+use super::place::{Angles, Placed, touched_mm};
+use super::simulate::{Share, or_none, side_by_side};
+use super::stance::{Copying, TOOL_CLEARANCE_RAD};
+use super::surface::{UM_PER_MM, roundness_um, unevaluable};
+use super::turning::{Setting, turn};
+
+/// Step of the grid of angles, deg.
+const TOOL_STEP_DEG: f64 = 2.0;
+const SUPPORT_STEP_DEG: f64 = 1.0;
+/// Cells that are simulated.
+const SIMULATED: usize = 64;
+/// Highest order that the ranking looks at.
+const HIGHEST: u32 = 24;
+/// What a wave that the blank does not have begins with, um: teeth of the feed.
+const SEED_UM: f64 = 0.02;
+/// Revolutions over which the ranking looks.
+const RANKED_REVOLUTIONS: f64 = 60.0;
+/// Feeds tried, as shares of the range between the machine's least and largest, on a logarithmic scale.
+const FEEDS: [f64; 4] = [0.15, 0.35, 0.5, 0.65];
+/// Best cells that are looked at again beside themselves, and by how much, deg.
+const REFINED: usize = 4;
+const BESIDE_DEG: [f64; 3] = [-0.5, 0.0, 0.5];
+/// Runs between two looks at the monitor.
+const AT_ONCE: usize = 16;
+/// Revolutions of spark-out that are tried beside those stated, in the second look.
+const MORE_SPARK_OUT: f64 = 3.0;
+/// Trials of the robustness.
+const TRIALS: u32 = 24;
+/// By how much the waves of the blank are larger or smaller in them.
+const WAVES_OFF: f64 = 0.2;
+/// Share of trials from which on a setting counts as robust.
+pub(super) const ROBUST: f64 = 0.9;
+
+/// What the search goes by.
+pub(super) struct Wide<'a> {
+    pub job: &'a Job,
+    pub range: &'a SearchRange,
+    /// The job's setting in the kernel's frame; its angles and feed are replaced.
+    pub base: &'a Setting,
+    pub mirrored: bool,
+    pub blank: &'a [f64],
+    pub share: Share<'a>,
+}
+
+/// A setting that was simulated.
+#[derive(Debug, Clone)]
+pub(super) struct Tried {
+    pub angles: Angles,
+    pub compliance_ratio: f64,
+    pub setting: Setting,
+    pub roundness_um: f64,
+}
+
+/// What came of it.
+pub(super) struct Found {
+    pub best: Tried,
+    /// Share of the trials with angles, waves and phase off in which the target is met.
+    pub robust_share: f64,
+    /// Settings simulated.
+    pub simulated: usize,
+}
+
+impl Wide<'_> {
+    /// The best setting; `None` where no cell holds the ring.
+    pub(super) fn search(&self) -> Result<Option<Found>, Failure> {
+        let waves = self.waves_um()?;
+        let mut cells: Vec<(f64, Angles, f64)> = self
+            .cells()
+            .into_par_iter()
+            .filter_map(|(angles, k)| Some((self.left_um(angles, k, &waves)?, angles, k)))
+            .collect();
+        cells.sort_by(|p, q| p.0.total_cmp(&q.0));
+        let cells = apart(cells);
+        let cells: Vec<(Angles, f64)> = cells.iter().map(|&(_, angles, k)| (angles, k)).collect();
+        let dwell = self.range.spark_out_revolutions;
+        let mut tried = self.simulate(&cells, &[dwell], 0.0, 0.6)?;
+        let mut simulated = tried.len();
+        tried.sort_by(|p, q| p.roundness_um.total_cmp(&q.roundness_um));
+        let mut beside: Vec<(Angles, f64)> = Vec::new();
+        for best in tried.iter().take(REFINED) {
+            for tool in BESIDE_DEG {
+                for support in BESIDE_DEG {
+                    let angles = Angles {
+                        tool_rad: best.angles.tool_rad + tool.to_radians(),
+                        half_angle_rad: best.angles.half_angle_rad + support.to_radians(),
+                    };
+                    if !beside.contains(&(angles, best.compliance_ratio)) {
+                        beside.push((angles, best.compliance_ratio));
+                    }
+                }
+            }
+        }
+        let more = self.simulate(&beside, &[dwell, dwell + MORE_SPARK_OUT], 0.6, 0.9)?;
+        simulated += more.len();
+        tried.extend(more);
+        tried.sort_by(|p, q| p.roundness_um.total_cmp(&q.roundness_um));
+        tried.dedup_by(|p, q| {
+            let runs =
+                |tried: &Tried| [tried.setting.revolutions, tried.setting.spark_out_revolutions].map(f64::to_bits);
+            p.angles == q.angles && runs(p) == runs(q)
+        });
+        // Of those that meet the target, the one that meets it most often when everything is a little off.
+        let mut best: Option<(f64, Tried)> = None;
+        for candidate in tried.into_iter().take(REFINED) {
+            checkpoint(self.share.monitor)?;
+            let robust = self.robust_share(candidate.angles, &candidate.setting)?;
+            simulated += TRIALS as usize;
+            if best.as_ref().is_none_or(|(share, _)| robust > *share) {
+                best = Some((robust, candidate));
+            }
+        }
+        Ok(best.map(|(robust_share, best)| Found { best, robust_share, simulated }))
+    }
+
+    /// Peak to valley of the blank's waves by order, from 2.
+    fn waves_um(&self) -> Result<Vec<(u32, f64)>, Failure> {
+        let grid = Grid::new(self.blank.len()).map_err(unevaluable)?;
+        let spectrum = grid.spectrum(self.blank, HIGHEST as usize).map_err(unevaluable)?;
+        Ok((2..=HIGHEST)
+            .filter_map(|order| {
+                spectrum.iter().find(|h| h.order == order as usize).map(|h| (order, 2.0 * h.amplitude_mm * UM_PER_MM))
+            })
+            .collect())
+    }
+
+    fn cells(&self) -> Vec<(Angles, f64)> {
+        let range = self.range;
+        let steps = |from: f64, to: f64, step: f64| {
+            let mut at = from;
+            std::iter::from_fn(move || {
+                let here = at;
+                at += step;
+                (here <= to + 1e-9).then_some(here)
+            })
+        };
+        let given = self.base.compliance_ratio;
+        let mut ratios = vec![given];
+        if let Some(most) = range.compliance_ratio_max.filter(|most| *most > given) {
+            ratios.extend([f64::midpoint(given, most), most]);
+        }
+        let mut cells = Vec::new();
+        for support in steps(range.support_angle_from_deg, range.support_angle_to_deg, SUPPORT_STEP_DEG) {
+            for tool in steps(range.tool_angle_from_deg, range.tool_angle_to_deg, TOOL_STEP_DEG) {
+                let tool_rad = super::scene::mirrored_rad(tool.to_radians(), self.mirrored);
+                let angles = Angles { half_angle_rad: support.to_radians(), tool_rad };
+                cells.extend(ratios.iter().map(|k| (angles, *k)));
+            }
+        }
+        cells
+    }
+
+    /// What the theory leaves, um: the worst that an error of the angles makes of it. `None` where the tool has no room.
+    fn left_um(&self, angles: Angles, compliance_ratio: f64, waves: &[(u32, f64)]) -> Option<f64> {
+        let error = self.range.angle_error_deg.to_radians();
+        let corners = [(0.0, 0.0), (error, error), (-error, error), (error, -error), (-error, -error)];
+        let corners = if error > 0.0 { &corners[..] } else { &corners[..1] };
+        let mut worst = 0.0_f64;
+        for (tool, support) in corners {
+            let copying = Copying::of_angles(angles.half_angle_rad + support, angles.tool_rad + tool);
+            let turn = std::f64::consts::TAU;
+            let near = |delay: f64| delay.min(turn - delay);
+            if near(copying.delay_a_rad).min(near(copying.delay_b_rad)) < TOOL_CLEARANCE_RAD {
+                return None;
+            }
+            let roots = Lobing { copying, compliance_ratio }.near_neutral(1.5, f64::from(HIGHEST) + 0.5);
+            let after = |factor: f64| factor.powf(RANKED_REVOLUTIONS).min(1e6);
+            let of_blank: f64 = waves
+                .iter()
+                .map(|(order, um)| {
+                    um * of_order(&roots, f64::from(*order)).map_or(0.0, |r| after(r.factor_per_revolution()))
+                })
+                .sum();
+            let of_feed: f64 = roots.iter().map(|root| SEED_UM * after(root.factor_per_revolution())).sum();
+            worst = worst.max(of_blank + of_feed);
+        }
+        Some(worst)
+    }
+
+    fn placed(&self, angles: Angles, compliance_ratio: f64, blank: &[f64]) -> Option<Placed> {
+        let copying = Copying::of_angles(angles.half_angle_rad, angles.tool_rad);
+        let (last_mm, first_mm) = touched_mm(blank, &copying);
+        let lowest = blank.iter().copied().fold(f64::INFINITY, f64::min);
+        let base = Setting { compliance_ratio, ..self.base.clone() };
+        Placed::new(&base, angles, first_mm + self.range.clearance_mm, last_mm.min(lowest) - self.range.allowance_mm)
+    }
+
+    /// Every cell with every feed that the machine has.
+    fn simulate(&self, cells: &[(Angles, f64)], dwells: &[f64], from: f64, to: f64) -> Result<Vec<Tried>, Failure> {
+        let range = self.range;
+        let mut runs: Vec<(Angles, f64, Setting)> = Vec::new();
+        for &(angles, k) in cells {
+            let Some(placed) = self.placed(angles, k, self.blank) else { continue };
+            let mut before = f64::INFINITY;
+            for share in FEEDS {
+                let feed = range.feed_min_mm_per_rev.powf(1.0 - share) * range.feed_max_mm_per_rev.powf(share);
+                let revolutions = (placed.travel_mm / feed).ceil().clamp(1.0, range.revolutions_max);
+                let feed = placed.travel_mm / revolutions;
+                let can = feed >= range.feed_min_mm_per_rev && feed <= range.feed_max_mm_per_rev;
+                if can && before - revolutions > 0.5 {
+                    for dwell in dwells {
+                        let setting = placed.in_revolutions(revolutions);
+                        runs.push((angles, k, Setting { spark_out_revolutions: *dwell, ..setting }));
+                    }
+                    before = revolutions;
+                }
+            }
+        }
+        let mut tried = Vec::with_capacity(runs.len());
+        for (done, some) in runs.chunks(AT_ONCE).enumerate() {
+            checkpoint(self.share.monitor)?;
+            let share = from + (to - from) * (done * AT_ONCE) as f64 / runs.len() as f64;
+            self.share
+                .report(share, Message::new("stage_search_wide").with("of", runs.len()).with("done", done * AT_ONCE));
+            let of = |(angles, k, setting): &(Angles, f64, Setting)| {
+                let found = self.run(setting, self.blank)?;
+                let of = |roundness_um| Tried {
+                    angles: *angles,
+                    compliance_ratio: *k,
+                    setting: setting.clone(),
+                    roundness_um,
+                };
+                Ok(found.map(of))
+            };
+            tried.extend(side_by_side(some, of)?.into_iter().flatten());
+        }
+        Ok(tried)
+    }
+
+    /// `None` where the ring falls through or its profile has no circles.
+    fn run(&self, setting: &Setting, blank: &[f64]) -> Result<Option<f64>, Failure> {
+        let turned = or_none(turn::<Failure>(blank, setting, &mut |_, _| checkpoint(self.share.monitor)))?;
+        let Some(turned) = turned.filter(|turned| turned.first_contact_rev.is_some()) else { return Ok(None) };
+        Ok(or_none(roundness_um(&turned.radii_mm, self.job.filter))?.map(|found| found.0))
+    }
+
+    /// How often the target is met with the angles off by up to the stated error, the blank's waves larger or smaller, and
+    /// the blank put in turned: an even sequence of trials, always the same.
+    pub(super) fn robust_share(&self, angles: Angles, setting: &Setting) -> Result<f64, Failure> {
+        let error = self.range.angle_error_deg.to_radians();
+        let mean = self.blank.iter().sum::<f64>() / self.blank.len() as f64;
+        let trials: Vec<_> = (1..=TRIALS).collect();
+        let met = side_by_side(&trials, |&i| {
+            // Additive recurrence with powers of the inverse of the root of x⁵ = x + 1: even in four dimensions.
+            let at = |power: i32| (0.5 + f64::from(i) * 0.856_674_883_854_502_9_f64.powi(power)).fract();
+            let off = Angles {
+                tool_rad: angles.tool_rad + error * (2.0 * at(1) - 1.0),
+                half_angle_rad: angles.half_angle_rad + error * (2.0 * at(2) - 1.0),
+            };
+            let by = 1.0 + WAVES_OFF * (2.0 * at(3) - 1.0);
+            let mut blank: Vec<f64> = self.blank.iter().map(|radius| mean + by * (radius - mean)).collect();
+            let n = blank.len();
+            blank.rotate_left(turned_nodes(at(4), n));
+            let Some(placed) = self.placed(off, setting.compliance_ratio, &blank) else { return Ok(false) };
+            let dwell = setting.spark_out_revolutions;
+            let off = Setting { spark_out_revolutions: dwell, ..placed.in_revolutions(setting.revolutions) };
+            Ok(self.run(&off, &blank)?.is_some_and(|um| um <= self.range.target_um))
+        })?;
+        Ok(met.iter().filter(|met| **met).count() as f64 / f64::from(TRIALS))
+    }
+}
+
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of n")]
+fn turned_nodes(share: f64, n: usize) -> usize {
+    ((share * n as f64) as usize).min(n - 1)
+}
+
+/// The best cells, none of them the neighbour of a better one.
+fn apart(cells: Vec<(f64, Angles, f64)>) -> Vec<(f64, Angles, f64)> {
+    let mut kept: Vec<(f64, Angles, f64)> = Vec::new();
+    for cell in cells {
+        let near = |other: &(f64, Angles, f64)| {
+            (other.1.tool_rad - cell.1.tool_rad).abs() < 1.1 * TOOL_STEP_DEG.to_radians()
+                && (other.1.half_angle_rad - cell.1.half_angle_rad).abs() < 1.1 * SUPPORT_STEP_DEG.to_radians()
+                && other.2.to_bits() == cell.2.to_bits()
+        };
+        if !kept.iter().any(near) {
+            kept.push(cell);
+            if kept.len() == SIMULATED {
+                break;
+            }
+        }
+    }
+    kept
+}
+
+/// What it takes, ms: two stages at most, each of some hundred runs of the revolutions that its feeds give.
+pub(super) fn work_ms(job: &Job, range: &SearchRange, step_ns: f64) -> f64 {
+    const RUNS: f64 = 2.0 * (4.0 * SIMULATED as f64 + 8.0 * 9.0 * REFINED as f64 + REFINED as f64 * TRIALS as f64);
+    let cells = (range.tool_angle_to_deg - range.tool_angle_from_deg) / TOOL_STEP_DEG
+        * (range.support_angle_to_deg - range.support_angle_from_deg)
+        / SUPPORT_STEP_DEG;
+    let ratios = if range.compliance_ratio_max.is_some() { 3.0 } else { 1.0 };
+    // Five sets of roots per cell, 30 us each.
+    2.0 * cells * ratios * 0.15 + RUNS * 1e-6 * step_ns * f64::from(nodes(job)) * 50.0_f64.min(range.revolutions_max)
+}
+
+/// Nodes of the simulations of the search.
+pub(super) fn nodes(job: &Job) -> u32 {
+    super::causes::nodes(job)
+}
