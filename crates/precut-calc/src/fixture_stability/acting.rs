@@ -8,6 +8,7 @@ use super::cutting::{Cutting, engagement_rad};
 use super::floquet::Working;
 use super::holding::{Holding, Hung, Jaw, Joint, MM_PER_S2};
 use super::input::{FeedToward, FixtureJob, Vise, ViseJoint};
+use super::slip::Grip;
 
 /// Share of the forces of all teeth that is round-off where they cancel: a sum of some thousand steps and harmonics.
 const CANCELLED: f64 = 1e-12;
@@ -18,6 +19,8 @@ pub(super) struct Case {
     pub holding: Holding,
     pub cutting: Cutting,
     pub working: Working,
+    /// How the jaws hold what pushes along them, where the job says it.
+    pub grip: Option<Grip>,
 }
 
 impl Case {
@@ -57,6 +60,7 @@ impl Case {
                 chip_exponent: job.force.chip_thickness_exponent,
                 depth_exponent: job.force.depth_exponent,
                 radial_ratio: job.force.radial_ratio,
+                axial_ratio: job.force.axial_ratio,
                 direction: match job.cut.feed_toward {
                     FeedToward::MovableJaw => 1.0,
                     FeedToward::FixedJaw => -1.0,
@@ -65,6 +69,7 @@ impl Case {
                 process_damping_n_per_mm: 0.0,
             },
             working: Working { spindle_rpm: job.spindle_rpm()?, feed_mm: job.feed_mm()?, depth_mm: job.cut.depth_mm },
+            grip: job.fixture.grip().map(Grip::new),
         };
         for effect in effects {
             case.add(effect, conditions);

@@ -2,9 +2,10 @@
 
 use crate::calculator::{Finding, Message};
 
-use super::answer::{Aside, NEAR_LIMIT, Study};
-use super::input::Spindle;
+use super::answer::{Aside, NEAR_LIMIT, Settling, Study};
+use super::input::{Friction, Spindle};
 use super::output::{ChatterKind, ClampForce, FirstLimit, FixtureOutcome, FixtureState, OpenJoint};
+use super::plausible::implausible;
 use super::simulate::Steady;
 
 /// Distance of the tooth frequency (or a harmonic) from a natural frequency that is worth a warning.
@@ -17,6 +18,8 @@ const ZEROTH_OFF: f64 = 0.05;
 const COARSEST_STEPS: f64 = 24.0;
 /// Damping ratio below which a limit hangs on its damping alone.
 const UNDAMPED: f64 = 1e-6;
+/// Share of the cutter's radius beyond which the workpiece swings further than the engagement is the same.
+const MODEL_ENDS: f64 = 0.2;
 /// A multiplier beyond 1 by no more than this is 1 to round-off: of what has no damping.
 const ROUND_OFF: f64 = 1e-9;
 
@@ -40,12 +43,18 @@ pub(super) const WARNING_CODES: &[&str] = &[
     "spindle_torque_exceeded",
     "spindle_speed_outside_table",
     "simulation_too_coarse",
+    "implausible_unit",
+    "motion_beyond_model",
+    "friction_assumed",
+    "clamp_slips",
 ];
 
 /// Codes of the explanations made here.
 pub(super) const EXPLANATION_CODES: &[&str] = &[
     "fixture_stable",
+    "fixture_settles_slowly",
     "fixture_chatters",
+    "fixture_vibrates_on",
     "fixture_chip_lost",
     "fixture_joint_opens",
     "fixture_spindle_overloaded",
@@ -60,6 +69,8 @@ pub(super) const EXPLANATION_CODES: &[&str] = &[
     "clamp_force_only_inertia",
     "clamp_force_in_chatter",
     "clamp_force_unknown",
+    "clamp_force_against_slip",
+    "clamp_force_slip_unknown",
     "opening_is_unstable",
     "opening_stays_stable",
     "amplitude_over_feed",
@@ -113,6 +124,22 @@ pub(super) fn warnings(study: &Study<'_>, outcome: &FixtureOutcome, aside: &Asid
     }
     if case.holding.clamp_force_n.is_some_and(|force| force <= 0.0) {
         found.push(Finding::new("no_clamp_force", "/fixture/clamp_force_n").measured(0.0, 0.0, "N"));
+    }
+    found.extend(implausible(study, outcome));
+    let swing_mm = 1e-3 * outcome.verdict.peak_to_peak_um;
+    let model_mm = MODEL_ENDS * study.case.cutting.radius_mm;
+    if swing_mm > model_mm {
+        found.push(Finding::new("motion_beyond_model", "/fixture").measured(swing_mm, model_mm, "mm"));
+    }
+    if job.fixture.grip().is_some_and(|grip| grip.friction == Friction::ASSUMED) {
+        let Friction { low, high, .. } = Friction::ASSUMED;
+        found.push(Finding::new("friction_assumed", "/fixture/clamp/friction").with("low", low).with("high", high));
+    }
+    if let Some(slip) = outcome.clamp.as_ref().and_then(|clamp| clamp.slip.as_ref())
+        && let (Some(false), Some(given)) = (slip.holds, case.holding.clamp_force_n)
+    {
+        let needed = slip.clamp_force_min_n;
+        found.push(Finding::new("clamp_slips", "/fixture/clamp_force_n").measured(given, needed, "N"));
     }
     found.extend(unsteady(aside.cut, "as_given"));
     // Of a cut without a clamp force both are one run.
@@ -203,25 +230,39 @@ pub(super) fn explanation(study: &Study<'_>, outcome: &FixtureOutcome, aside: &A
     let verdict = &outcome.verdict;
     let multiplier = &outcome.multiplier;
     let feed_um = 1e3 * study.case.working.feed_mm;
+    // A motion beyond the model is no fact.
+    let within = verdict.peak_to_peak_um <= 1e3 * MODEL_ENDS * study.case.cutting.radius_mm;
+    let moving =
+        |message: Message| if within { message.with("peak_to_peak_um", verdict.peak_to_peak_um) } else { message };
     let mut said = vec![match verdict.state {
-        FixtureState::Stable => Message::new("fixture_stable")
-            .with("modulus", multiplier.modulus)
-            .with("peak_to_peak_um", verdict.peak_to_peak_um),
-        FixtureState::Chatter => Message::new("fixture_chatters")
-            .with("modulus", multiplier.modulus)
-            .with("frequency_hz", multiplier.chatter_frequency_hz)
-            .with("kind", if multiplier.kind == ChatterKind::Flip { "flip" } else { "hopf" })
-            .with("peak_to_peak_um", verdict.peak_to_peak_um),
+        FixtureState::Stable => moving(Message::new("fixture_stable").with("modulus", multiplier.modulus)),
+        FixtureState::Chatter if aside.settling == Settling::VibratesOn => {
+            moving(Message::new("fixture_vibrates_on").with("modulus", multiplier.modulus))
+        }
+        FixtureState::Chatter => moving(
+            Message::new("fixture_chatters")
+                .with("modulus", multiplier.modulus)
+                .with("frequency_hz", multiplier.chatter_frequency_hz)
+                .with("kind", if multiplier.kind == ChatterKind::Flip { "flip" } else { "hopf" }),
+        ),
         FixtureState::ChipLost => Message::new("fixture_chip_lost").with("share", verdict.lost_cut_share),
-        FixtureState::JointOpen => Message::new("fixture_joint_opens")
-            .with("joint", joint_name(verdict.joint))
-            .with("time_s", verdict.first_opening_s.unwrap_or(0.0))
-            .with("share", verdict.open_share)
-            .with("peak_to_peak_um", verdict.peak_to_peak_um),
-        FixtureState::SpindleOverloaded => Message::new("fixture_spindle_overloaded")
-            .with("margin", verdict.drive_margin.unwrap_or(0.0))
-            .with("peak_to_peak_um", verdict.peak_to_peak_um),
+        FixtureState::JointOpen => moving(
+            Message::new("fixture_joint_opens")
+                .with("joint", joint_name(verdict.joint))
+                .with("time_s", verdict.first_opening_s.unwrap_or(0.0))
+                .with("share", verdict.open_share),
+        ),
+        FixtureState::SpindleOverloaded => {
+            moving(Message::new("fixture_spindle_overloaded").with("margin", verdict.drive_margin.unwrap_or(0.0)))
+        }
     }];
+    if let Some(time_s) = multiplier.settling_time_s.filter(|_| aside.settling == Settling::Slowly) {
+        said.push(
+            Message::new("fixture_settles_slowly")
+                .with("time_s", time_s)
+                .with("teeth", (time_s * outcome.engagement.tooth_frequency_hz).ceil()),
+        );
+    }
     said.push(match study.chatter_mm {
         Some(limit) => Message::new("chatter_limit_is")
             .with("depth_mm", limit)
@@ -230,13 +271,15 @@ pub(super) fn explanation(study: &Study<'_>, outcome: &FixtureOutcome, aside: &A
     });
     said.extend(of_spindle(outcome));
     if let Some(lobes) = &outcome.lobes {
-        if let Some(better) = &aside.better {
+        if let Some(better) = lobes.better_speeds.first() {
             said.push(
                 Message::new("better_speed_is")
-                    .with("spindle_speed_rpm", better.spindle_rpm)
+                    .with("spindle_speed_rpm", better.spindle_speed_rpm)
                     .with("depth_mm", better.depth_mm)
-                    .with("what", better.first.map_or("none", |(what, _)| what.name()))
-                    .with("limit_mm", better.first.map_or(better.depth_mm, |(_, depth)| depth)),
+                    .with("removal_rate_cm3_per_min", better.removal_rate_cm3_per_min)
+                    .with("clamp_force_n", better.clamp_force_n)
+                    .with("what", better.first.map_or("none", FirstLimit::name))
+                    .with("limit_mm", better.first_mm.unwrap_or(better.depth_mm)),
             );
         }
         if let Some(lowest) = &lobes.lowest {
@@ -259,10 +302,11 @@ pub(super) fn explanation(study: &Study<'_>, outcome: &FixtureOutcome, aside: &A
     }
     if let Some(clamp) = &outcome.clamp {
         said.push(of_clamp(clamp, aside));
+        said.extend(of_slip(study, clamp));
         // What chatters already does not begin to.
         said.extend(clamp.binding_joint.filter(|_| clamp.stable).map(|joint| of_opening(clamp, joint, aside)));
     }
-    if verdict.peak_to_peak_over_feed > 1.0 {
+    if within && verdict.peak_to_peak_over_feed > 1.0 {
         said.push(
             Message::new("amplitude_over_feed")
                 .with("peak_to_peak_um", verdict.peak_to_peak_um)
@@ -297,6 +341,25 @@ fn of_clamp(clamp: &ClampForce, aside: &Aside) -> Message {
         }
     }
     message
+}
+
+/// What friction has to hold along the jaws, and from which clamp force on it does.
+fn of_slip(study: &Study<'_>, clamp: &ClampForce) -> Option<Message> {
+    let along = &clamp.along;
+    let pushed =
+        |code| Message::new(code).with("across_mean_n", along.across_mean_n).with("across_peak_n", along.across_peak_n);
+    let Some(grip) = &study.case.grip else { return Some(pushed("clamp_force_slip_unknown")) };
+    let slip = clamp.slip.as_ref()?;
+    let set_n = clamp.least_n.map_or(slip.clamp_force_min_n, |opens| opens.max(slip.clamp_force_min_n));
+    Some(
+        pushed("clamp_force_against_slip")
+            .with("upward_peak_n", along.upward_peak_n)
+            .with("friction_low", grip.friction.low)
+            .with("friction", grip.friction.value)
+            .with("least_n", slip.clamp_force_min_n)
+            .with("likely_n", slip.at_likely_friction_n)
+            .with("set_n", set_n),
+    )
 }
 
 /// What becomes of the cut when the joint that gives first opens.

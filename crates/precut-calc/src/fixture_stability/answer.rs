@@ -7,41 +7,41 @@ use rayon::prelude::*;
 use crate::calculator::{Failure, Message, Monitor, checkpoint};
 
 use super::acting::Case;
+use super::clamp::clamp_force;
 use super::drive::{self, DriveDepths};
 use super::floquet::{Multiplier, Working};
 use super::holding::Closed;
-use super::input::{Analysis, FixtureJob, SimulationSettings};
+use super::input::{Analysis, FixtureJob};
 use super::lobes::{ChatterLimit, Plane, Point, Rules, boundary, by_states, critical_depth, map, point};
 use super::march::{Marched, Plan, Step};
 use super::output::{
-    AmplitudeCurve, ArcProfile, ChatterKind, ClampForce, CuttingDrive, DepthLimits, Engagement, FirstLimit,
-    FixtureOutcome, FixtureState, FixtureVerdict, FloquetMultiplier, ForcedMotion, Histories, LobeBoundary,
-    LobeDiagram, LobeMap, OpenJoint, Oscillogram, QuasiStatic, Simulated, SpeedLimit, TextbookForce, VibrationMode,
-    ZerothOrder,
+    AmplitudeCurve, ArcProfile, ChatterKind, CuttingDrive, DepthLimits, Engagement, FirstLimit, FixtureOutcome,
+    FixtureState, FixtureVerdict, FloquetMultiplier, ForcedMotion, Histories, LobeBoundary, LobeDiagram, LobeMap,
+    OpenJoint, Oscillogram, QuasiStatic, Simulated, SpeedLimit, VibrationMode, ZerothOrder,
 };
 use super::parts::plane_of;
 use super::picture::lobes_so_far;
 use super::response::{Response, response, span_mm, unbroken};
 use super::simulate::{Observed, Steady, count, observed, plan, run, scatter, small};
+use super::speeds::{ForcedLimits, better_speeds, first_of, forced_limits};
 use super::zeroth::{at_speed, depth_mm, zeroth};
 
 pub(super) const UM_PER_MM: f64 = 1e3;
 /// Sampling error of the exact forced motion, relative.
 const SAMPLING: f64 = 1e-6;
-/// Safety factors that textbooks use.
-const TEXTBOOK_FACTORS: [f64; 4] = [1.5, 2.0, 2.5, 6.0];
+/// Share of a disturbance that is left when it has settled.
+const DECAYED: f64 = 1e-3;
 /// Entries of an oscillogram at most.
 const OSCILLOGRAM: usize = 1200;
+/// How often a run that may yet come to rest is made longer, and by which factor.
+const LONGER_RUNS: u32 = 2;
+const LONGER: usize = 4;
 /// Steps of the bracketing of a limit that only simulation gives: to 1/256 of a step of the curve.
 const BRACKETING: u32 = 8;
-/// The same of one that the forced motion of a vise that is not linear gives: to a 16 000 000th of the depth.
-const HALVINGS: u32 = 24;
 /// A limit of what grows with the depth is taken up to this share of it: what is advised is within, whatever is rounded.
-const WITHIN: f64 = 0.995;
+pub(super) const WITHIN: f64 = 0.995;
 /// A depth above this share of the limit of chatter, or of the opening of a joint, is near it.
 pub(super) const NEAR_LIMIT: f64 = 0.9;
-/// Better speeds that are listed.
-const BETTER_SPEEDS: usize = 5;
 
 /// What the parts of an answer share.
 pub(super) struct Study<'a> {
@@ -57,6 +57,19 @@ pub(super) struct Study<'a> {
     pub chatter_mm: Option<f64>,
 }
 
+/// What becomes of a disturbance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Settling {
+    /// It is gone within the run.
+    AtRest,
+    /// It decays, no tooth leaves the cut, but the run ends before it is gone.
+    Slowly,
+    /// A small one decays; that of the entry does not.
+    VibratesOn,
+    /// The multiplier says that it grows.
+    Grows,
+}
+
 /// What the advice asks beside the answer.
 pub(super) struct Aside {
     /// What the cut as it was run shows, and what it does with joints that stay closed.
@@ -64,15 +77,8 @@ pub(super) struct Aside {
     pub bonded: Option<Steady>,
     /// Errors of the moduli with the joint at the movable and at the fixed jaw open.
     pub open_errors: [f64; 2],
-    pub better: Option<Better>,
-}
-
-/// A speed with a depth that was tried there.
-pub(super) struct Better {
-    pub spindle_rpm: f64,
-    pub depth_mm: f64,
-    /// What gives out first at this speed, and at which depth.
-    pub first: Option<(FirstLimit, f64)>,
+    /// What the simulation shows of a disturbance.
+    pub settling: Settling,
 }
 
 impl<'a> Study<'a> {
@@ -87,22 +93,22 @@ impl<'a> Study<'a> {
     }
 
     /// Where chatter begins at the working speed.
-    fn chatter(&self) -> ChatterLimit {
+    pub(super) fn chatter(&self) -> ChatterLimit {
         ChatterLimit { depth_mm: self.chatter_mm, examined_mm: self.examined_mm }
     }
 
-    fn stable(&self) -> bool {
+    pub(super) fn stable(&self) -> bool {
         self.point.multiplier.modulus < 1.0
     }
 
     /// Depths at which the spindle of the job gives out at a speed; none without one.
-    fn drive_depths(&self, spindle_rpm: f64) -> DriveDepths {
+    pub(super) fn drive_depths(&self, spindle_rpm: f64) -> DriveDepths {
         let working = Working { spindle_rpm, ..self.case.working };
         self.job.spindle.as_ref().map_or_else(DriveDepths::default, |of| drive::depths(&self.case, of, working))
     }
 
     /// Runs the cut in time at the working point.
-    fn simulated(&self, unilateral: bool, keep: bool) -> Result<Observed, Failure> {
+    pub(super) fn simulated(&self, unilateral: bool, keep: bool) -> Result<Observed, Failure> {
         let mut plan = plan(&self.case, &self.job.simulation, self.case.working, self.point.multiplier.modulus);
         plan.unilateral = unilateral;
         if keep {
@@ -110,12 +116,40 @@ impl<'a> Study<'a> {
             plan.keep_first = revolution.min(plan.tooth_periods / 2);
             plan.keep_last = revolution.min(plan.tooth_periods / 2);
         }
-        observed(&self.case, &plan, self.monitor)
+        let mut seen = observed(&self.case, &plan, self.monitor)?;
+        // Where small disturbances decay, a vibration that loses the cut may yet come to rest: only a longer run tells.
+        let decays = self.stable() && self.job.simulation.tooth_periods.is_none();
+        for _ in 0..LONGER_RUNS {
+            let may_rest = seen.steady == Steady::Reached && seen.run.lost_cut > 0.0;
+            if !(decays && may_rest) || scatter(&self.case, &seen.plan, &seen.run).settled {
+                break;
+            }
+            plan.tooth_periods *= LONGER;
+            plan.steady_periods *= LONGER;
+            seen = observed(&self.case, &plan, self.monitor)?;
+        }
+        Ok(seen)
+    }
+
+    /// What the cut as it was run shows of a disturbance.
+    fn settling(&self, seen: &Observed) -> Settling {
+        let scatter = scatter(&self.case, &seen.plan, &seen.run);
+        if !self.stable() {
+            Settling::Grows
+        } else if seen.steady == Steady::Diverged {
+            Settling::VibratesOn
+        } else if scatter.settled {
+            Settling::AtRest
+        } else if seen.run.lost_cut <= 0.0 && scatter.late_over_early < 1.0 {
+            Settling::Slowly
+        } else {
+            Settling::VibratesOn
+        }
     }
 
     /// What limits the depth at a speed where chatter does so.
-    fn speed_limit(&self, spindle_rpm: f64, chatter: ChatterLimit) -> Result<SpeedLimit, Failure> {
-        let [amplitude_mm, movable_opens_mm, fixed_opens_mm] =
+    pub(super) fn speed_limit(&self, spindle_rpm: f64, chatter: ChatterLimit) -> Result<SpeedLimit, Failure> {
+        let ForcedLimits { amplitude_mm, movable_opens_mm, fixed_opens_mm, slips_mm } =
             forced_limits(&self.case, spindle_rpm, chatter.depth_mm.unwrap_or(chatter.examined_mm))?;
         Ok(SpeedLimit {
             spindle_speed_rpm: spindle_rpm,
@@ -124,6 +158,7 @@ impl<'a> Study<'a> {
             amplitude_mm,
             movable_opens_mm,
             fixed_opens_mm,
+            slips_mm,
             drive_mm: self.drive_depths(spindle_rpm).least_mm(),
         })
     }
@@ -134,7 +169,7 @@ pub(super) fn forced(case: &Case, working: Working) -> Result<Response, Failure>
 }
 
 /// Whether there is a motion about which to ask: away from the working point there may be none where joints harden.
-fn has_motion(case: &Case, working: Working) -> bool {
+pub(super) fn has_motion(case: &Case, working: Working) -> bool {
     let found = || by_states!(case.holding, unbroken(&case.holding, &case.cutting, working));
     case.holding.hardening_per_mm2 <= 0.0 || found().is_some()
 }
@@ -157,45 +192,6 @@ fn examined_mm(job: &FixtureJob, case: &Case) -> f64 {
     by_zeroth.unwrap_or(10.0).max(2.0 * case.working.depth_mm).clamp(0.001, 1000.0)
 }
 
-/// Depths up to `limit_mm` at which the forced motion at a speed exceeds the feed per tooth and opens the joint at the movable
-/// and that at the fixed jaw.
-fn forced_limits(case: &Case, spindle_rpm: f64, limit_mm: f64) -> Result<[Option<f64>; 3], Failure> {
-    let force = case.holding.clamp_force_n;
-    let most = [Some(case.working.feed_mm), force, force];
-    let at = |depth_mm: f64| -> Result<[f64; 3], Failure> {
-        let working = Working { spindle_rpm, depth_mm, ..case.working };
-        if !has_motion(case, working) {
-            return Ok([f64::INFINITY; 3]);
-        }
-        match forced(case, working) {
-            Ok(of) => Ok([of.x_mm.span(), of.left_elastic_n.high, of.right_elastic_n.high]),
-            // No motion that repeats itself: it grows without end.
-            Err(Failure::OutOfModel(_) | Failure::NotConverged { .. }) => Ok([f64::INFINITY; 3]),
-            Err(why) => Err(why),
-        }
-    };
-    let mut reached = [None; 3];
-    if case.is_linear() {
-        // At 1 mm; the forced motion goes with H^(1-mu).
-        let (power, at_1_mm) = (1.0 / (1.0 - case.cutting.depth_exponent), at(1.0)?);
-        for (depth, (most, value)) in reached.iter_mut().zip(most.into_iter().zip(at_1_mm)) {
-            *depth = most.filter(|_| value > 0.0).map(|most| (most / value).powf(power)).filter(|d| *d <= limit_mm);
-        }
-        return Ok(reached);
-    }
-    let deepest = at(limit_mm)?;
-    for (which, depth) in reached.iter_mut().enumerate() {
-        let Some(most) = most[which].filter(|most| deepest[which] > *most) else { continue };
-        let (mut low, mut high) = (0.0, limit_mm);
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (low + high);
-            if at(middle)?[which] > most { high = middle } else { low = middle }
-        }
-        *depth = Some(low);
-    }
-    Ok(reached)
-}
-
 /// Computes everything that the job asks.
 pub(super) fn outcome(study: &Study<'_>) -> Result<(FixtureOutcome, Aside), Failure> {
     let Study { job, case, monitor, .. } = study;
@@ -210,7 +206,8 @@ pub(super) fn outcome(study: &Study<'_>) -> Result<(FixtureOutcome, Aside), Fail
         simulation.halved_step_change_um = Some((again.x_mm.span() - cut.run.x_mm.span()).abs() * UM_PER_MM);
     }
     checkpoint(*monitor)?;
-    let mut aside = Aside { cut: cut.steady, bonded: None, open_errors: [0.0; 2], better: None };
+    let settling = study.settling(&cut);
+    let mut aside = Aside { cut: cut.steady, bonded: None, open_errors: [0.0; 2], settling };
     let clamp = if job.asks(Analysis::ClampForce) {
         monitor.progress(0.15, Message::new("stage_clamp_force"));
         Some(clamp_force(study, &mut aside)?)
@@ -223,12 +220,12 @@ pub(super) fn outcome(study: &Study<'_>) -> Result<(FixtureOutcome, Aside), Fail
     } else {
         None
     };
-    let lobes = if job.asks(Analysis::Lobes) { Some(lobes(study, &mut aside)?) } else { None };
+    let lobes = if job.asks(Analysis::Lobes) { Some(lobes(study)?) } else { None };
     let history = keep.then(|| histories(study, &cut.run));
     let zeroth_order = zeroth_order(study);
     let drive = cutting_drive(study);
     let outcome = FixtureOutcome {
-        verdict: verdict(study, &simulation, &cut.run, drive.margin()),
+        verdict: verdict(study, &simulation, &cut.run, settling, drive.margin()),
         engagement: engagement(study),
         quasi_static: quasi_static(case),
         drive,
@@ -274,14 +271,14 @@ fn engagement(study: &Study<'_>) -> Engagement {
         feed_mm_per_tooth: working.feed_mm,
         feed_mm_per_min: table,
         tooth_frequency_hz: working.spindle_rpm * z / 60.0,
-        removal_rate_cm3_per_min: removal_rate(case, working.depth_mm),
+        removal_rate_cm3_per_min: removal_rate(case, working),
     }
 }
 
 /// Width of the strip within the cutter times depth times table feed, cm3/min.
-pub(super) fn removal_rate(case: &Case, depth_mm: f64) -> f64 {
+pub(super) fn removal_rate(case: &Case, working: Working) -> f64 {
     let width = case.cutting.radius_mm * (case.cutting.entry_rad.cos() - case.cutting.exit_rad.cos());
-    width * depth_mm * case.working.feed_mm * case.working.spindle_rpm * case.cutting.teeth as f64 / 1000.0
+    width * working.depth_mm * working.feed_mm * working.spindle_rpm * case.cutting.teeth as f64 / 1000.0
 }
 
 fn quasi_static(case: &Case) -> QuasiStatic {
@@ -363,6 +360,7 @@ fn multiplier(study: &Study<'_>) -> FloquetMultiplier {
         chatter_frequency_hz: chatter_frequency_hz(&study.case, &found),
         // A disturbance that vanishes within a tooth period decays at no finite rate: 1e-300 stands for it.
         growth_per_s: found.modulus.max(1e-300).ln() / tau,
+        settling_time_s: (found.modulus < 1.0).then(|| DECAYED.ln() / found.modulus.max(1e-300).ln() * tau),
         modulus_error: study.point.error,
     }
 }
@@ -397,14 +395,14 @@ fn forced_motion(study: &Study<'_>) -> ForcedMotion {
 }
 
 fn simulation(study: &Study<'_>, Observed { plan, run, .. }: &Observed) -> Simulated {
-    let (sample_scatter, settled) = scatter(&study.case, plan, run);
+    let scatter = scatter(&study.case, plan, run);
     Simulated {
         steps_per_tooth: small(plan.steps_per_tooth),
         tooth_periods: small(plan.tooth_periods),
         steady_tooth_periods: small(plan.steady_periods),
         diverged: run.diverged,
-        settled: settled && !run.diverged,
-        sample_scatter,
+        settled: scatter.settled && !run.diverged,
+        sample_scatter: scatter.of_feed,
         displacement_max_um: run.x_mm.high * UM_PER_MM,
         displacement_min_um: run.x_mm.low * UM_PER_MM,
         peak_to_peak_um: run.x_mm.span() * UM_PER_MM,
@@ -426,7 +424,13 @@ fn simulation(study: &Study<'_>, Observed { plan, run, .. }: &Observed) -> Simul
     }
 }
 
-fn verdict(study: &Study<'_>, simulated: &Simulated, run: &Marched, drive_margin: Option<f64>) -> FixtureVerdict {
+fn verdict(
+    study: &Study<'_>,
+    simulated: &Simulated,
+    run: &Marched,
+    settling: Settling,
+    drive_margin: Option<f64>,
+) -> FixtureVerdict {
     let case = &study.case;
     let opened = (run.first_open_left_s, run.first_open_right_s);
     let joint = match opened {
@@ -437,7 +441,7 @@ fn verdict(study: &Study<'_>, simulated: &Simulated, run: &Marched, drive_margin
     };
     let state = if joint.is_some() {
         FixtureState::JointOpen
-    } else if !study.stable() || !simulated.settled {
+    } else if matches!(settling, Settling::Grows | Settling::VibratesOn) {
         FixtureState::Chatter
     } else if drive_margin.is_some_and(|margin| margin < 1.0) {
         FixtureState::SpindleOverloaded
@@ -465,82 +469,6 @@ fn verdict(study: &Study<'_>, simulated: &Simulated, run: &Marched, drive_margin
         clamp_margin: case.holding.clamp_force_n.filter(|_| exact && asked > 0.0).map(|force| force / asked),
         drive_margin,
     }
-}
-
-/// Static force on the joints at the movable and the fixed jaw (`fixture/5.7`).
-pub(super) fn static_clamp_n(case: &Case, high_n: f64, low_n: f64) -> (f64, f64) {
-    let (left, right) = (case.holding.left.stiffness_n_per_mm, case.holding.right.stiffness_n_per_mm);
-    let (toward_movable, toward_fixed) = (case.above_round_off_n(high_n), case.above_round_off_n(-low_n));
-    if case.holding.jaw.is_some() {
-        (0.0, toward_movable)
-    } else {
-        (toward_fixed * left / (left + right), toward_movable * right / (left + right))
-    }
-}
-
-fn clamp_force(study: &Study<'_>, aside: &mut Aside) -> Result<ClampForce, Failure> {
-    let case = &study.case;
-    let stable = study.stable();
-    let Observed { run, steady, .. } = study.simulated(false, false)?;
-    aside.bonded = Some(steady);
-    let is_seen = steady == Steady::Reached;
-    let asked = if stable {
-        let forced = &study.forced;
-        Some([forced.left_n, forced.right_n, forced.left_elastic_n, forced.right_elastic_n])
-    } else {
-        // A run that shows no steady state says of no clamp force that it is enough.
-        is_seen.then_some([run.left_n, run.right_n, run.left_elastic_n, run.right_elastic_n])
-    };
-    let asked = asked.map(|ranges| ranges.map(|range| case.above_round_off_n(range.high)));
-    let least_n = asked.map(|[movable, fixed, ..]| movable.max(fixed));
-    let with_entry = |least: f64| {
-        [run.left_entry_n, run.right_entry_n].map(|n| case.above_round_off_n(n)).into_iter().fold(least, f64::max)
-    };
-    let least_with_entry_n = least_n.filter(|_| is_seen).map(with_entry);
-    let (high, low) = case.cutting.static_extremes_n(case.working.feed_mm, case.working.depth_mm);
-    let (static_movable_n, static_fixed_n) = static_clamp_n(case, high, low);
-    let static_n = static_movable_n.max(static_fixed_n);
-    let over_static = |force: Option<f64>| force.filter(|_| static_n > 0.0).map(|force| force / static_n);
-    let power = 1.0 / (1.0 - case.cutting.depth_exponent);
-    let depth_for = |(force, least): (f64, f64)| case.working.depth_mm * (force / least).powf(power);
-    let depth_for_given = case
-        .holding
-        .clamp_force_n
-        .zip(least_n.filter(|least| stable && *least > 0.0 && case.is_linear()))
-        .map(depth_for)
-        .filter(|depth| *depth <= study.chatter_mm.unwrap_or(study.examined_mm));
-    let open = |closed: Closed| point(&study.rules, &case.holding, &case.cutting, case.working, closed);
-    let movable_open = open(Closed { left: false, right: true })?;
-    let fixed_open = open(Closed { left: true, right: false })?;
-    aside.open_errors = [movable_open.error, fixed_open.error];
-    let of = |which: usize| asked.map(|asked| asked[which]);
-    Ok(ClampForce {
-        least_n,
-        least_with_entry_n,
-        binding_joint: asked
-            .filter(|[movable, fixed, ..]| movable.max(*fixed) > 0.0)
-            .map(|[movable, fixed, ..]| if movable > fixed { OpenJoint::Movable } else { OpenJoint::Fixed }),
-        movable_n: of(0),
-        fixed_n: of(1),
-        movable_elastic_n: of(2),
-        fixed_elastic_n: of(3),
-        static_movable_n,
-        static_fixed_n,
-        factor_needed: over_static(least_n),
-        factor_needed_with_entry: over_static(least_with_entry_n),
-        stable,
-        depth_for_given_force_mm: depth_for_given,
-        modulus_movable_open: movable_open.multiplier.modulus,
-        modulus_fixed_open: fixed_open.multiplier.modulus,
-        textbook: TEXTBOOK_FACTORS
-            .iter()
-            .map(|&factor| TextbookForce {
-                factor,
-                clamp_force_n: factor * static_n,
-                enough: least_n.is_some_and(|least| factor * static_n >= least),
-            })
-            .collect(),
-    })
 }
 
 /// What one depth gives with joints that stay closed.
@@ -606,11 +534,14 @@ fn limits(study: &Study<'_>) -> Result<DepthLimits, Failure> {
     let amplitude_mm = reach(&|at| at.span_mm, case.working.feed_mm)?;
     let movable_opens_mm = force.map(|force| reach(&|at| at.left_n, force)).transpose()?.flatten();
     let fixed_opens_mm = force.map(|force| reach(&|at| at.right_n, force)).transpose()?.flatten();
+    let stable_to_mm = study.chatter_mm.unwrap_or(study.examined_mm);
+    let slips_mm = forced_limits(case, case.working.spindle_rpm, stable_to_mm)?.slips_mm;
     let drive = study.drive_depths(case.working.spindle_rpm);
     let first = first_of([
         (FirstLimit::Chatter, study.chatter_mm),
         (FirstLimit::MovableOpens, movable_opens_mm),
         (FirstLimit::FixedOpens, fixed_opens_mm),
+        (FirstLimit::Slips, slips_mm),
         (FirstLimit::Amplitude, amplitude_mm),
         (FirstLimit::Power, drive.power_mm),
         (FirstLimit::Torque, drive.torque_mm),
@@ -628,11 +559,12 @@ fn limits(study: &Study<'_>) -> Result<DepthLimits, Failure> {
         amplitude_mm,
         movable_opens_mm,
         fixed_opens_mm,
+        slips_mm,
         power_mm: drive.power_mm,
         torque_mm: drive.torque_mm,
         first: first.map(|(what, _)| what),
         first_mm: first.map(|(_, depth)| depth),
-        removal_rate_cm3_per_min: first.map(|(_, depth)| removal_rate(case, depth)),
+        removal_rate_cm3_per_min: first.map(|(_, depth)| removal_rate(case, case.at_depth(depth))),
         at_speeds,
         curve: AmplitudeCurve {
             modulus: column(&|at| at.modulus),
@@ -643,12 +575,6 @@ fn limits(study: &Study<'_>) -> Result<DepthLimits, Failure> {
             depth_mm: depths,
         },
     })
-}
-
-/// What gives out first: at one depth the earlier of the list is the cause of the later.
-fn first_of(limits: [(FirstLimit, Option<f64>); 6]) -> Option<(FirstLimit, f64)> {
-    let known = limits.into_iter().filter_map(|(what, depth)| depth.map(|depth| (what, depth)));
-    known.reduce(|best, next| if next.1 < best.1 * (1.0 - 1e-6) { next } else { best })
 }
 
 /// Smallest depth at which a quantity exceeds its limit: bracketed on the curve, split at the chatter limit where the
@@ -684,7 +610,7 @@ fn first_reached(
     Ok(Some(onset.unwrap_or(high)))
 }
 
-fn lobes(study: &Study<'_>, aside: &mut Aside) -> Result<LobeDiagram, Failure> {
+fn lobes(study: &Study<'_>) -> Result<LobeDiagram, Failure> {
     let case = &study.case;
     let settings = &study.job.lobes;
     let working = case.working;
@@ -726,6 +652,7 @@ fn lobes(study: &Study<'_>, aside: &mut Aside) -> Result<LobeDiagram, Failure> {
             amplitude_mm: boundary.amplitude_mm[i],
             movable_opens_mm: boundary.movable_opens_mm[i],
             fixed_opens_mm: boundary.fixed_opens_mm[i],
+            slips_mm: boundary.slips_mm[i],
             drive_mm: study.drive_depths(spindle_speed_rpm).least_mm(),
         })
         .collect();
@@ -736,13 +663,6 @@ fn lobes(study: &Study<'_>, aside: &mut Aside) -> Result<LobeDiagram, Failure> {
         .map(|(_, limit)| whole_limit(study, limit))
         .transpose()?;
     let better_speeds = better_speeds(study, &limits, plane.most_mm)?;
-    for limit in &better_speeds {
-        checkpoint(monitor)?;
-        aside.better = tried(study, limit, plane.most_mm)?;
-        if aside.better.is_some() {
-            break;
-        }
-    }
     Ok(LobeDiagram { boundary, lowest, better_speeds, map })
 }
 
@@ -750,15 +670,14 @@ fn lobes(study: &Study<'_>, aside: &mut Aside) -> Result<LobeDiagram, Failure> {
 fn beside(study: &Study<'_>, plane: &Plane, points: &[super::lobes::BoundaryPoint]) -> Result<LobeBoundary, Failure> {
     let case = &study.case;
     let factor = case.cutting.mean_factor();
-    let one = |point: &super::lobes::BoundaryPoint| -> Result<[Option<f64>; 4], Failure> {
+    let one = |point: &super::lobes::BoundaryPoint| -> Result<(ForcedLimits, Option<f64>), Failure> {
         let kappa = at_speed(&case.holding, &case.cutting, point.spindle_rpm);
         let zeroth = kappa.map(|k| depth_mm(&case.cutting, factor, k, plane.feed_mm)).filter(|h| *h <= plane.most_mm);
         if !case.is_linear() {
-            return Ok([None, None, None, zeroth]);
+            return Ok((ForcedLimits::default(), zeroth));
         }
         let limit_mm = point.crossings_mm.first().copied().unwrap_or(point.examined_mm);
-        let [amplitude, movable, fixed] = forced_limits(case, point.spindle_rpm, limit_mm)?;
-        Ok([amplitude, movable, fixed, zeroth])
+        Ok((forced_limits(case, point.spindle_rpm, limit_mm)?, zeroth))
     };
     let mut rows = Vec::with_capacity(points.len());
     for (number, chunk) in points.chunks(32).enumerate() {
@@ -768,7 +687,7 @@ fn beside(study: &Study<'_>, plane: &Plane, points: &[super::lobes::BoundaryPoin
         let done = ((number + 1) * 32).min(points.len()) as f64 / points.len().max(1) as f64;
         study.monitor.progress(0.9 + 0.09 * done, Message::new("stage_boundary"));
     }
-    let column = |which: usize| rows.iter().map(|row| row[which]).collect::<Vec<_>>();
+    let column = |of: fn(&ForcedLimits) -> Option<f64>| rows.iter().map(|row| of(&row.0)).collect::<Vec<_>>();
     let drive: Vec<DriveDepths> = points.iter().map(|p| study.drive_depths(p.spindle_rpm)).collect();
     let shown = |depth: Option<f64>| depth.filter(|depth| *depth <= plane.most_mm);
     Ok(LobeBoundary {
@@ -776,12 +695,13 @@ fn beside(study: &Study<'_>, plane: &Plane, points: &[super::lobes::BoundaryPoin
         depth_examined_mm: points.iter().map(|p| p.examined_mm).collect(),
         chatter_mm: points.iter().map(|p| p.limit().depth_mm).collect(),
         stable_again_mm: points.iter().map(|p| p.crossings_mm.get(1).copied()).collect(),
-        amplitude_mm: column(0),
-        movable_opens_mm: column(1),
-        fixed_opens_mm: column(2),
+        amplitude_mm: column(|of| of.amplitude_mm),
+        movable_opens_mm: column(|of| of.movable_opens_mm),
+        fixed_opens_mm: column(|of| of.fixed_opens_mm),
+        slips_mm: column(|of| of.slips_mm),
         power_mm: drive.iter().map(|of| shown(of.power_mm)).collect(),
         torque_mm: drive.iter().map(|of| shown(of.torque_mm)).collect(),
-        zeroth_order_mm: column(3),
+        zeroth_order_mm: rows.iter().map(|row| row.1).collect(),
     })
 }
 
@@ -792,95 +712,6 @@ fn whole_limit(study: &Study<'_>, limit: SpeedLimit) -> Result<SpeedLimit, Failu
     }
     let chatter = ChatterLimit { depth_mm: limit.chatter_mm, examined_mm: limit.depth_examined_mm };
     study.speed_limit(limit.spindle_speed_rpm, chatter)
-}
-
-/// What one may cut at a speed: the least of its limits, and no deeper than was looked.
-fn allowed_mm(limit: &SpeedLimit) -> f64 {
-    let SpeedLimit { chatter_mm, amplitude_mm, movable_opens_mm, fixed_opens_mm, drive_mm, .. } = *limit;
-    let limits = [chatter_mm, amplitude_mm, movable_opens_mm, fixed_opens_mm, drive_mm];
-    limits.into_iter().flatten().fold(limit.depth_examined_mm, f64::min)
-}
-
-/// Peaks of what the limits allow that lie deeper than at the working speed, nearest first. `limits` were looked for up to
-/// `most_mm`.
-fn better_speeds(study: &Study<'_>, limits: &[SpeedLimit], most_mm: f64) -> Result<Vec<SpeedLimit>, Failure> {
-    let Study { case, rules, .. } = study;
-    let working = case.working.spindle_rpm;
-    // Elsewhere was looked no deeper than here.
-    let chatter = match study.chatter() {
-        known if known.depth_mm.is_some() || known.examined_mm >= most_mm => known,
-        _ => critical_depth(rules, &case.holding, &case.cutting, case.working, most_mm)?,
-    };
-    let here = allowed_mm(&study.speed_limit(working, chatter)?);
-    let depth = |i: usize| allowed_mm(&limits[i]);
-    let mut peaks = Vec::new();
-    for (i, limit) in limits.iter().enumerate() {
-        checkpoint(study.monitor)?;
-        let at = depth(i);
-        let left = i.checked_sub(1).is_none_or(|before| depth(before) < at);
-        let right = i + 1 == limits.len() || depth(i + 1) <= at;
-        if left && right && at > 1.02 * here {
-            let limit = whole_limit(study, *limit)?;
-            peaks.extend((allowed_mm(&limit) > 1.02 * here).then_some(limit));
-        }
-    }
-    peaks.sort_by(|a, b| {
-        (a.spindle_speed_rpm / working).ln().abs().total_cmp(&(b.spindle_speed_rpm / working).ln().abs())
-    });
-    peaks.truncate(BETTER_SPEEDS);
-    Ok(peaks)
-}
-
-/// What is to be said of a better speed, tried before it is said: not near chatter or an opening joint, within the other
-/// limits, as it is read. `None` where the cut then does not hold still after all (a large motion may stand beside the
-/// stable one, and the entry asks more of a joint than the steady cut).
-fn tried(study: &Study<'_>, better: &SpeedLimit, most_mm: f64) -> Result<Option<Better>, Failure> {
-    let case = &study.case;
-    // The peaks of lobes are sharp: the limits are those of the speed that is read.
-    let spindle_rpm = said(better.spindle_speed_rpm, 4, f64::round);
-    let there = Working { spindle_rpm, ..case.working };
-    let chatter = critical_depth(&study.rules, &case.holding, &case.cutting, there, most_mm)?;
-    let limit = study.speed_limit(spindle_rpm, chatter)?;
-    let short_of = [limit.chatter_mm, limit.movable_opens_mm, limit.fixed_opens_mm];
-    let depths = short_of.into_iter().flatten().map(|depth| NEAR_LIMIT * depth);
-    let within = [limit.amplitude_mm, limit.drive_mm].into_iter().flatten().map(|depth| WITHIN * depth);
-    let allowed_mm = depths.chain(within).fold(limit.depth_examined_mm, f64::min);
-    if allowed_mm <= 0.0 {
-        return Ok(None);
-    }
-    let depth_mm = said(allowed_mm, 3, f64::floor);
-    let working = Working { depth_mm, ..there };
-    if !has_motion(case, working) {
-        return Ok(None);
-    }
-    let modulus = point(&study.rules, &case.holding, &case.cutting, working, Closed::BOTH)?.multiplier.modulus;
-    if modulus >= 1.0 || forced_span_mm(case, working).map_or(true, |span_mm| span_mm > working.feed_mm) {
-        return Ok(None);
-    }
-    let SimulationSettings { regeneration, entry, .. } = study.job.simulation;
-    let settings = SimulationSettings { regeneration, entry, ..SimulationSettings::default() };
-    let plan = Plan { unilateral: case.holding.clamp_force_n.is_some(), ..plan(case, &settings, working, modulus) };
-    let run = run(case, &plan, study.monitor)?;
-    let opened = run.first_open_left_s.or(run.first_open_right_s).is_some();
-    if run.diverged || opened || run.lost_cut > 0.0 || !scatter(case, &plan, &run).1 {
-        return Ok(None);
-    }
-    let drive = study.drive_depths(spindle_rpm);
-    let first = first_of([
-        (FirstLimit::Chatter, limit.chatter_mm),
-        (FirstLimit::MovableOpens, limit.movable_opens_mm),
-        (FirstLimit::FixedOpens, limit.fixed_opens_mm),
-        (FirstLimit::Amplitude, limit.amplitude_mm),
-        (FirstLimit::Power, drive.power_mm),
-        (FirstLimit::Torque, drive.torque_mm),
-    ]);
-    Ok(Some(Better { spindle_rpm, depth_mm, first }))
-}
-
-/// A positive number with as many digits as a sentence says of it.
-fn said(value: f64, digits: i32, rounded: fn(f64) -> f64) -> f64 {
-    let scale = 10.0_f64.powf(f64::from(digits) - 1.0 - value.log10().floor());
-    rounded(value * scale) / scale
 }
 
 fn histories(study: &Study<'_>, run: &Marched) -> Histories {

@@ -5,7 +5,7 @@ use crate::effects::FixtureEffect as Effect;
 
 use super::acting::Case;
 use super::cutting::engagement_rad;
-use super::input::{FixtureJob, MAX_MAP_POINTS, Vise};
+use super::input::{FixtureJob, Friction, MAX_MAP_POINTS, Vise};
 
 /// Codes of the faults found here, and those that fields name for their range.
 pub(super) const CODES: &[&str] = &[
@@ -29,6 +29,8 @@ pub(super) const CODES: &[&str] = &[
     "effect_without_clamp_force",
     "exponent_beyond_law",
     "runout_beyond_feed",
+    "jaw_face_missing",
+    "frictions_unordered",
 ];
 
 /// S and S_z that both are given may differ by so much.
@@ -37,6 +39,7 @@ const FEEDS_AGREE: f64 = 0.01;
 impl Check for FixtureJob {
     fn check(&self, violations: &mut Violations) {
         check_cut(self, violations);
+        check_grip(self, violations);
         check_spindle(self, violations);
         check_lobes(self, violations);
         check_simulation(self, violations);
@@ -69,6 +72,22 @@ fn check_cut(job: &FixtureJob, violations: &mut Violations) {
                 .with("feed_mm_per_tooth", per_tooth)
         });
     }
+}
+
+fn check_grip(job: &FixtureJob, violations: &mut Violations) {
+    let Some(grip) = job.fixture.grip() else { return };
+    let Friction { low, value, high } = grip.friction;
+    violations.require(low <= value && value <= high, || {
+        Finding::new("frictions_unordered", "/fixture/clamp/friction")
+            .with("low", low)
+            .with("value", value)
+            .with("high", high)
+    });
+    let faced = grip.jaw_length_mm.is_some() && grip.jaw_height_mm.is_some();
+    violations.require(faced || grip.force_height_mm <= 0.0, || {
+        let missing = if grip.jaw_length_mm.is_none() { "jaw_length_mm" } else { "jaw_height_mm" };
+        Finding::new("jaw_face_missing", format!("/fixture/clamp/{missing}")).with("height", grip.force_height_mm)
+    });
 }
 
 fn check_spindle(job: &FixtureJob, violations: &mut Violations) {

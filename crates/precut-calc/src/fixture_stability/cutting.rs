@@ -25,6 +25,8 @@ pub(super) struct Cutting {
     pub depth_exponent: f64,
     /// Radial over tangential force.
     pub radial_ratio: f64,
+    /// Axial over tangential force, positive where it lifts the workpiece.
+    pub axial_ratio: f64,
     /// +1: feed toward the movable jaw, -1: toward the fixed jaw.
     pub direction: f64,
     /// How far tooth 0 stands out, mm.
@@ -74,8 +76,24 @@ impl Cutting {
     pub(super) fn shape(&self, angle_rad: f64) -> f64 {
         let (sin, cos) = angle_rad.sin_cos();
         let sin = sin.max(0.0);
-        let thickness = if self.chip_exponent > 0.0 { sin.powf(1.0 - self.chip_exponent) } else { sin };
-        thickness * (cos + self.radial_ratio * sin)
+        self.thickness(sin) * (cos + self.radial_ratio * sin)
+    }
+
+    /// The same across the feed: sin^(1-k) phi (rho cos phi - sin phi).
+    pub(super) fn across(&self, angle_rad: f64) -> f64 {
+        let (sin, cos) = angle_rad.sin_cos();
+        let sin = sin.max(0.0);
+        self.thickness(sin) * (self.radial_ratio * cos - sin)
+    }
+
+    /// sin^(1-k) phi: the share of one tooth in the tangential force.
+    pub(super) fn tangential(&self, angle_rad: f64) -> f64 {
+        self.thickness(angle_rad.sin().max(0.0))
+    }
+
+    /// sin phi to the power 1-k.
+    fn thickness(&self, sin: f64) -> f64 {
+        if self.chip_exponent > 0.0 { sin.powf(1.0 - self.chip_exponent) } else { sin }
     }
 
     /// Angle of the j-th tooth back from the one that entered last.
@@ -152,10 +170,22 @@ impl Cutting {
 
     /// Sum over the teeth in cut of their share times the power of their chip: the force over the level, without its direction.
     pub(super) fn smooth_force(&self, stretch: &Stretch, since_entry_rad: f64, phase: usize, feed_mm: f64) -> f64 {
+        self.smooth(stretch, since_entry_rad, phase, feed_mm, &|angle| self.shape(angle))
+    }
+
+    /// The same for any share of one tooth over its angle.
+    fn smooth(
+        &self,
+        stretch: &Stretch,
+        since_entry_rad: f64,
+        phase: usize,
+        feed_mm: f64,
+        shape: &dyn Fn(f64) -> f64,
+    ) -> f64 {
         (0..stretch.teeth)
             .map(|j| {
                 let chip = self.chip_mm(feed_mm, self.tooth_number(phase, j));
-                self.shape(self.angle_rad(since_entry_rad, j)) * self.chip_power(chip)
+                shape(self.angle_rad(since_entry_rad, j)) * self.chip_power(chip)
             })
             .sum()
     }
@@ -181,15 +211,12 @@ impl Cutting {
 
     /// Largest tangential force of all teeth in cut together with a smooth chip, N.
     pub(super) fn tangential_max_n(&self, feed_mm: f64, depth_mm: f64) -> f64 {
-        let (high, _) = self.extremes(|stretch, since, phase| {
-            (0..stretch.teeth)
-                .map(|j| {
-                    let chip = self.chip_mm(feed_mm, self.tooth_number(phase, j));
-                    self.chip_power(chip * self.angle_rad(since, j).sin())
-                })
-                .sum()
-        });
-        high * self.level(depth_mm)
+        self.extremes_of(feed_mm, &|angle| self.tangential(angle)).0 * self.level(depth_mm)
+    }
+
+    /// Largest and smallest sum over the teeth in cut of a share times the power of their smooth chip.
+    pub(super) fn extremes_of(&self, feed_mm: f64, shape: &dyn Fn(f64) -> f64) -> (f64, f64) {
+        self.extremes(|stretch, since, phase| self.smooth(stretch, since, phase, feed_mm, shape))
     }
 
     /// Largest and smallest value over a period of the force, one-sided limits at entries and exits included.
@@ -221,13 +248,18 @@ impl Cutting {
         (high, low)
     }
 
-    /// z/(2 pi) times the integral of the shape over the arc: the mean directional factor a0 (`fixture/5.3`).
+    /// The mean directional factor a0 (`fixture/5.3`).
     pub(super) fn mean_factor(&self) -> f64 {
+        self.mean_of(&|angle| self.shape(angle))
+    }
+
+    /// z/(2 pi) times the integral of a share of one tooth over the arc.
+    pub(super) fn mean_of(&self, shape: &dyn Fn(f64) -> f64) -> f64 {
         // Half an arc each; the substitution takes the root of sin^(1-k) at 0 and pi away: phi = end + width s^4.
         let middle = 0.5 * (self.entry_rad + self.exit_rad);
         let half = |end: f64| {
             let width = middle - end;
-            integrate(0.0, 1.0, 40, |s| self.shape(end + width * s.powi(4)) * 4.0 * s.powi(3)) * width.abs()
+            integrate(0.0, 1.0, 40, |s| shape(end + width * s.powi(4)) * 4.0 * s.powi(3)) * width.abs()
         };
         self.teeth as f64 / TAU * (half(self.entry_rad) + half(self.exit_rad))
     }

@@ -4,8 +4,8 @@ use super::answer::forced_span_mm;
 use super::forward::Measure;
 use super::predict::{PreparedFixture, PreparedRow};
 use crate::calculator::{
-    Design, Expansions, Grouping, Hypotheses, Hypothesis, Inapplicability, Inapplicable, Range, Shape, Smooth,
-    Treatment, Variable,
+    Condition, Design, Expansions, Grouping, Hypotheses, Hypothesis, Inapplicability, Inapplicable, Range, Shape,
+    Smooth, Treatment, Variable,
 };
 use crate::effects::{Cause, FIXTURE_CAUSES, Fit, FixtureEffect, Parameter};
 
@@ -231,6 +231,7 @@ pub(super) fn design(prepared: &PreparedFixture) -> Design {
             cell: numbered(&|row| [row.run as u64, depth(row), row.time_s.to_bits(), 0, 0]),
             regressors: Vec::new(),
             groupings: Vec::new(),
+            conditions: Vec::new(),
             order: None,
             fold: numbered(&|row| [row.run as u64, 0, 0, 0, 0]),
         };
@@ -243,13 +244,23 @@ pub(super) fn design(prepared: &PreparedFixture) -> Design {
         [speed, feed, clamped, at_depth(row), row.margin as u64]
     });
     let per_speed = numbered(&|row| [speed(row), 0, 0, 0, 0]);
-    let mut groupings = vec![Grouping { name: "per_speed", group: per_speed.clone() }];
+    let grouping = |name, group: Vec<usize>| Grouping { name, over: Vec::new(), group };
+    let mut groupings = vec![grouping("per_speed", per_speed.clone())];
     if !limit {
-        groupings.push(Grouping { name: "per_depth", group: numbered(&|row| [depth(row), 0, 0, 0, 0]) });
-        groupings.push(Grouping { name: "per_cell", group: cell.clone() });
+        groupings.push(grouping("per_depth", numbered(&|row| [depth(row), 0, 0, 0, 0])));
+        groupings.push(grouping("per_cell", cell.clone()));
     }
+    let ln = |name, of: &dyn Fn(&PreparedRow) -> f64| {
+        Condition::of(name, &rows.iter().map(|row| of(row).max(f64::MIN_POSITIVE).ln()).collect::<Vec<_>>())
+    };
+    let conditions = [
+        ln("speed", &|row| row.working.spindle_rpm),
+        ln("feed", &|row| row.working.feed_mm),
+        ln("depth", &|row| row.working.depth_mm).filter(|_| !limit),
+    ];
+    let conditions = conditions.into_iter().flatten().collect();
     let regressors = regressors(rows, &per_speed, &cell, limit);
-    Design { smooth: Smooth::None, cell, regressors, groupings, order: None, fold: per_speed }
+    Design { smooth: Smooth::None, cell, regressors, groupings, conditions, order: None, fold: per_speed }
 }
 
 /// Columns for the scatter without repeats: a level per speed where there are cells enough, for resonances are sharper than

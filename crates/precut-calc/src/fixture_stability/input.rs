@@ -93,6 +93,10 @@ pub struct MillingForce {
     #[serde(default = "radial_ratio")]
     #[schema(minimum = 0.0, maximum = 10.0, default = 0.6, example = 0.6, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("rho"))))]
     pub radial_ratio: f64,
+    /// Axial over tangential force; positive lifts the workpiece.
+    #[serde(default)]
+    #[schema(minimum = -10.0, maximum = 10.0, default = 0.0, example = 0.3, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("rho_a"))))]
+    pub axial_ratio: f64,
 }
 
 fn radial_ratio() -> f64 {
@@ -188,6 +192,53 @@ pub struct ViseJoint {
     pub damping_n_s_per_mm: f64,
 }
 
+/// How the jaws hold what pushes along them: across the feed and upward, where nothing but friction does.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct JawGrip {
+    /// Friction between jaw and workpiece.
+    #[serde(default)]
+    pub friction: Friction,
+    /// Height of the cutting force over the middle of the jaws; it needs the face of a jaw.
+    #[serde(default)]
+    #[schema(minimum = 0.0, maximum = 10_000.0, default = 0.0, example = 15.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("h"))))]
+    pub force_height_mm: f64,
+    /// Length of the face of a jaw that grips.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.1, maximum = 10_000.0, example = 150.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("a"))))]
+    pub jaw_length_mm: Option<f64>,
+    /// Its height.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.1, maximum = 10_000.0, example = 30.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("b"))))]
+    pub jaw_height_mm: Option<f64>,
+}
+
+/// What is known of a friction. Forces are told for all three; the one that counts is that of the lowest.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Friction {
+    /// The lowest that may be met.
+    #[schema(minimum = 0.001, maximum = 2.0, example = 0.1, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("mu_low"))))]
+    pub low: f64,
+    /// The likely one.
+    #[schema(minimum = 0.001, maximum = 2.0, example = 0.15, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("mu"))))]
+    pub value: f64,
+    /// The highest.
+    #[schema(minimum = 0.001, maximum = 2.0, example = 0.2, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("mu_high"))))]
+    pub high: f64,
+}
+
+impl Friction {
+    /// Ground steel jaws, dry: a judgement, and warned of.
+    pub(super) const ASSUMED: Self = Self { low: 0.1, value: 0.15, high: 0.2 };
+}
+
+impl Default for Friction {
+    fn default() -> Self {
+        Self::ASSUMED
+    }
+}
+
 /// The screw locks itself: both jaws are springs, preloaded when it was tightened (type 1).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
@@ -203,6 +254,9 @@ pub struct SelfLocking {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 0.0, maximum = 1e8, example = 2000.0, extensions(("x-unit" = json!("N")), ("x-symbol" = json!("F_0")), ("x-code" = json!("bad_clamp_force"))))]
     pub clamp_force_n: Option<f64>,
+    /// How the jaws hold what pushes along them; without it nothing is said about whether the workpiece slips.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub clamp: Option<JawGrip>,
 }
 
 /// A cylinder presses the movable jaw with a constant force; the jaw moves as a second mass (type 2).
@@ -227,6 +281,9 @@ pub struct ConstantForce {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 0.0, maximum = 1e8, example = 2000.0, extensions(("x-unit" = json!("N")), ("x-symbol" = json!("F_3")), ("x-code" = json!("bad_clamp_force"))))]
     pub clamp_force_n: Option<f64>,
+    /// How the jaws hold what pushes along them; without it nothing is said about whether the workpiece slips.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub clamp: Option<JawGrip>,
 }
 
 /// What the spindle can give. What is stated for all speeds and what the table says both hold: the least counts.
@@ -278,7 +335,7 @@ pub struct SpindlePoint {
 pub enum Analysis {
     /// Stable, chattering, losing the cut, or a joint open; always answered.
     Verdict,
-    /// Least clamp force without a joint opening, and the safety factor that is really needed.
+    /// Least clamp force without a joint opening and, where friction is given, without the workpiece slipping.
     ClampForce,
     /// Limiting depth over spindle speed.
     Lobes,
@@ -447,6 +504,14 @@ impl Vise {
         match self {
             Self::SelfLocking(v) => (v.workpiece_mass_kg, v.movable_joint, v.fixed_joint, v.clamp_force_n),
             Self::ConstantForce(v) => (v.workpiece_mass_kg, v.movable_joint, v.fixed_joint, v.clamp_force_n),
+        }
+    }
+
+    /// How the jaws hold what pushes along them.
+    pub(super) fn grip(&self) -> Option<&JawGrip> {
+        match self {
+            Self::SelfLocking(v) => v.clamp.as_ref(),
+            Self::ConstantForce(v) => v.clamp.as_ref(),
         }
     }
 }

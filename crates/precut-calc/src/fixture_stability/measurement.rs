@@ -98,6 +98,7 @@ fn one() -> u32 {
 
 impl MeasuredRow for FixtureMeasurement {
     const MAX_ROWS: usize = 20_000;
+    const MEASURED: &'static [&'static str] = &["peak_to_peak_um", "displacement_um", "depth_limit_mm", "regime"];
 }
 
 impl Measurement for FixtureMeasurement {

@@ -14,6 +14,7 @@ mod advice;
 mod answer;
 mod answering;
 mod check;
+mod clamp;
 mod consequence;
 mod cutting;
 mod drive;
@@ -31,24 +32,27 @@ mod next_runs;
 mod output;
 mod parts;
 mod picture;
+mod plausible;
 mod predict;
 mod response;
 mod settled;
 mod simulate;
+mod slip;
+mod speeds;
 mod zeroth;
 
 pub use forward::{FixtureAllowances, FixturePoint, FixtureRun, RegimeMargin};
 pub use input::{
-    Analysis, ConstantForce, Entry, FaceMill, FeedToward, FixtureJob, LimitSettings, LimitSpeed, LobeSettings,
-    MAX_MAP_POINTS, MillingCut, MillingForce, Regeneration, SelfLocking, SimulationSettings, Spindle, SpindlePoint,
-    Vise, ViseJoint,
+    Analysis, ConstantForce, Entry, FaceMill, FeedToward, FixtureJob, Friction, JawGrip, LimitSettings, LimitSpeed,
+    LobeSettings, MAX_MAP_POINTS, MillingCut, MillingForce, Regeneration, SelfLocking, SimulationSettings, Spindle,
+    SpindlePoint, Vise, ViseJoint,
 };
 pub use measurement::{FixtureMeasurement, ObservedRegime};
 pub use output::{
-    AmplitudeCurve, ArcProfile, ChatterKind, ClampForce, CuttingDrive, DepthLimits, Engagement, FirstLimit,
-    FixtureOutcome, FixtureState, FixtureVerdict, FloquetMultiplier, ForcedMotion, Histories, LobeBoundary,
-    LobeDiagram, LobeMap, OpenJoint, Oscillogram, QuasiStatic, Simulated, SpeedLimit, TextbookForce, VibrationMode,
-    ZerothOrder,
+    AmplitudeCurve, ArcProfile, BetterSpeed, ChatterKind, ClampForce, CuttingDrive, DepthLimits, Engagement,
+    FirstLimit, FixtureOutcome, FixtureState, FixtureVerdict, FloquetMultiplier, ForcedMotion, Histories, LobeBoundary,
+    LobeDiagram, LobeMap, OpenJoint, Oscillogram, PushedAlong, QuasiStatic, Simulated, SlipForce, SpeedLimit,
+    TextbookForce, VibrationMode, ZerothOrder,
 };
 
 pub use parts::{TimeRun, forced_motion, lobe_boundary, lobe_map, multiplier_modulus, run_in_time};
@@ -72,14 +76,13 @@ impl Calculator for FixtureStability {
     const META: Meta = Meta {
         id: "fixture-stability",
         kind: CalculatorKind::Calculator,
-        version: 7,
+        version: 8,
         title: "Fixture stability",
         question: "How deep can this face mill cut in this vise before chatter or a joint opens, and how hard must one clamp?",
         summary: "A face mill shakes the workpiece in its vise: teeth enter and leave, each cuts what earlier ones left, \
                   and the joints to the jaws can open. From cutter, cut, masses, stiffness, damping and clamp force: \
                   the forced motion, the Floquet multiplier with chatter frequency, the limiting depth and the lobe \
-                  diagram, the cut in time, the least clamp force without a joint opening and the safety factor that \
-                  is really needed.",
+                  diagram, the cut in time, the least clamp force by which no joint opens and nothing slips.",
         references: &[
             "Petrakov, Conditions of workpiece clamping in fixtures of the first and second type in face milling, NTUU KPI, 2014",
             "Insperger, Stepan, Updated semi-discretization method for periodic delay-differential equations with discrete delay, Int. J. Numer. Meth. Engng 61 (2004) 117-141",

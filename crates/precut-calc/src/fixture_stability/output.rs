@@ -248,6 +248,9 @@ pub struct FloquetMultiplier {
     /// Growth of a disturbance, negative where it decays.
     #[schema(extensions(("x-unit" = json!("1/s"))))]
     pub growth_per_s: f64,
+    /// Time in which a disturbance falls to a thousandth; null where none decays.
+    #[schema(extensions(("x-unit" = json!("s"))))]
+    pub settling_time_s: Option<f64>,
     /// Estimated error of the modulus: two orders compared, and the residual of the eigenvalue.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub modulus_error: f64,
@@ -425,7 +428,7 @@ pub struct ClampForce {
     /// On the joint at the fixed jaw.
     #[schema(extensions(("x-unit" = json!("N"))))]
     pub static_fixed_n: f64,
-    /// The safety factor that is really needed on the static force; null where the static force is 0, or what is needed is not known.
+    /// The safety factor that opening asks on the static force; null where the static force is 0, or what is needed is not known.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub factor_needed: Option<f64>,
     /// The same with the hard entry.
@@ -433,6 +436,10 @@ pub struct ClampForce {
     pub factor_needed_with_entry: Option<f64>,
     /// Whether it comes from the exact forced motion (stable) or from a simulated chatter that should not be run.
     pub stable: bool,
+    /// What pushes the workpiece along the jaws, where only friction holds it.
+    pub along: PushedAlong,
+    /// Clamp force by which friction holds that; null where the job does not say how the jaws grip, and in chatter.
+    pub slip: Option<SlipForce>,
     /// Deepest cut that the given clamp force holds, where it is reached before chatter.
     #[schema(extensions(("x-unit" = json!("mm"))))]
     pub depth_for_given_force_mm: Option<f64>,
@@ -444,6 +451,45 @@ pub struct ClampForce {
     pub modulus_fixed_open: f64,
     /// Textbook safety factors beside it.
     pub textbook: Vec<TextbookForce>,
+}
+
+/// Force of smooth chips on the workpiece along the jaws, where only friction holds it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct PushedAlong {
+    /// Across the feed, mean.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub across_mean_n: f64,
+    /// Across the feed, largest either way.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub across_peak_n: f64,
+    /// Upward, mean; 0 where the cut presses down.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub upward_mean_n: f64,
+    /// Upward, largest.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub upward_peak_n: f64,
+}
+
+/// Clamp force by which friction holds the workpiece at every instant of the forced motion.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct SlipForce {
+    /// With the lowest friction: the force to set where it is above that against opening.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub clamp_force_min_n: f64,
+    /// With the likely friction.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub at_likely_friction_n: f64,
+    /// With the highest friction.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub at_high_friction_n: f64,
+    /// Against the mean forces alone, without vibration, with the lowest friction.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub against_mean_n: f64,
+    /// Friction with which the given clamp force holds; null where none is given, or some moment leaves no normal force.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub friction_needed: Option<f64>,
+    /// Whether the given clamp force holds with the lowest friction; null where none is given.
+    pub holds: Option<bool>,
 }
 
 /// Static clamp force times a safety factor.
@@ -474,6 +520,9 @@ pub struct DepthLimits {
     /// That at the fixed jaw.
     #[schema(extensions(("x-unit" = json!("mm"))))]
     pub fixed_opens_mm: Option<f64>,
+    /// Depth at which the workpiece slips along the jaws at the given clamp force and the lowest friction; null where none of both is given, too.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub slips_mm: Option<f64>,
     /// The power of the spindle gives out.
     #[schema(extensions(("x-unit" = json!("mm"))))]
     pub power_mm: Option<f64>,
@@ -506,6 +555,8 @@ pub enum FirstLimit {
     MovableOpens,
     /// The joint at the fixed jaw opens.
     FixedOpens,
+    /// The workpiece slips along the jaws.
+    Slips,
     /// The power of the spindle gives out.
     Power,
     /// The torque of the spindle gives out.
@@ -520,6 +571,7 @@ impl FirstLimit {
             Self::Amplitude => "amplitude",
             Self::MovableOpens => "movable_opens",
             Self::FixedOpens => "fixed_opens",
+            Self::Slips => "slips",
             Self::Power => "power",
             Self::Torque => "torque",
         }
@@ -548,9 +600,34 @@ pub struct SpeedLimit {
     /// That at the fixed jaw.
     #[schema(extensions(("x-unit" = json!("mm"))))]
     pub fixed_opens_mm: Option<f64>,
+    /// Depth at which the workpiece slips along the jaws at the given clamp force and the lowest friction, without chatter; null where none of both is given, too.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub slips_mm: Option<f64>,
     /// Depth at which the power or the torque of the spindle gives out; null where nothing is said of them.
     #[schema(extensions(("x-unit" = json!("mm"))))]
     pub drive_mm: Option<f64>,
+}
+
+/// A speed at which more can be removed, with a cut that was tried there: stable, closed, within the other limits.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct BetterSpeed {
+    /// Spindle speed.
+    #[schema(extensions(("x-unit" = json!("rev/min"))))]
+    pub spindle_speed_rpm: f64,
+    /// Depth to cut: a tenth short of chatter, of an opening joint and of slip, and within the other limits.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub depth_mm: f64,
+    /// Material removal rate of that cut.
+    #[schema(extensions(("x-unit" = json!("cm3/min"))))]
+    pub removal_rate_cm3_per_min: f64,
+    /// Least clamp force of that cut: against opening and, where friction is given, against slip.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub clamp_force_n: f64,
+    /// What gives out first at this speed; null where nothing does up to the depth examined.
+    pub first: Option<FirstLimit>,
+    /// Its depth.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub first_mm: Option<f64>,
 }
 
 /// One entry per depth.
@@ -583,8 +660,8 @@ pub struct LobeDiagram {
     pub boundary: LobeBoundary,
     /// Lowest limit on it.
     pub lowest: Option<SpeedLimit>,
-    /// Speeds at which one may cut deeper than at the working speed before the first of their limits, nearest first.
-    pub better_speeds: Vec<SpeedLimit>,
+    /// Speeds at which more can be removed than at the working speed, each tried, the highest removal rate first.
+    pub better_speeds: Vec<BetterSpeed>,
     /// |multiplier| over the plane, where it was asked for.
     pub map: Option<LobeMap>,
 }
@@ -614,6 +691,9 @@ pub struct LobeBoundary {
     /// That at the fixed jaw.
     #[schema(extensions(("x-unit" = json!("mm"))))]
     pub fixed_opens_mm: Vec<Option<f64>>,
+    /// Depth at which the workpiece slips along the jaws at the given clamp force and the lowest friction, without chatter; null where none of both is given, too.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub slips_mm: Vec<Option<f64>>,
     /// Depth at which the power of the spindle gives out, up to the greatest depth.
     #[schema(extensions(("x-unit" = json!("mm"))))]
     pub power_mm: Vec<Option<f64>>,
@@ -634,6 +714,22 @@ impl LobeBoundary {
         let without = self.depth_examined_mm.iter().zip(&self.chatter_mm);
         let depths: Vec<Option<f64>> = without.map(|(depth, chatter)| chatter.is_none().then_some(*depth)).collect();
         depths.iter().flatten().any(|depth| *depth < (1.0 - SAME) * greatest).then_some(depths)
+    }
+
+    /// How deep one may cut at each speed: the least of all limits, no deeper than was looked.
+    pub(super) fn safe_mm(&self) -> Vec<f64> {
+        let limits = [
+            &self.chatter_mm,
+            &self.amplitude_mm,
+            &self.movable_opens_mm,
+            &self.fixed_opens_mm,
+            &self.power_mm,
+            &self.torque_mm,
+        ];
+        let least = |at: usize| {
+            limits.iter().filter_map(|limit| limit.get(at).copied().flatten()).fold(f64::INFINITY, f64::min)
+        };
+        self.depth_examined_mm.iter().enumerate().map(|(at, depth)| depth.min(least(at))).collect()
     }
 }
 

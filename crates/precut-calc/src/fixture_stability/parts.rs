@@ -65,6 +65,7 @@ pub fn lobe_boundary(job: &FixtureJob, monitor: &dyn Monitor) -> Result<Vec<Spee
                 amplitude_mm: None,
                 movable_opens_mm: None,
                 fixed_opens_mm: None,
+                slips_mm: None,
                 drive_mm: drive.and_then(|of| of.least_mm()),
             }
         })

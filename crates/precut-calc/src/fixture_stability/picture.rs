@@ -7,7 +7,7 @@ use super::input::FixtureJob;
 use super::lobes::Map;
 use super::output::{AmplitudeCurve, ArcProfile, FixtureOutcome, LobeBoundary, LobeDiagram, LobeMap, Oscillogram};
 
-pub(super) const FIGURE_IDS: &[&str] = &["lobes", "oscillogram", "chip", "amplitude"];
+pub(super) const FIGURE_IDS: &[&str] = &["lobes", "oscillogram", "last_revolution", "chip", "amplitude"];
 pub(super) const TABLE_IDS: &[&str] = &["boundary", "map", "amplitude", "entry", "steady", "arc"];
 
 /// Codes that the figures utter.
@@ -22,11 +22,13 @@ pub(super) const LABEL_CODES: &[&str] = &[
     "peak_to_peak",
     "clamp_force_asked",
     "multiplier_modulus",
+    "safe_area",
     "chatter_limit",
     "zeroth_order_limit",
     "amplitude_limit",
     "movable_joint_limit",
     "fixed_joint_limit",
+    "slip_limit",
     "spindle_power_limit",
     "spindle_torque_limit",
     "refined_boundary",
@@ -43,6 +45,7 @@ pub(super) const LABEL_CODES: &[&str] = &[
     "given_clamp_force",
     "fixture_lobes",
     "fixture_oscillogram",
+    "fixture_last_revolution",
     "fixture_chip",
     "fixture_amplitude",
 ];
@@ -104,7 +107,8 @@ pub(super) fn figures(job: &FixtureJob, outcome: &FixtureOutcome) -> Vec<Figure>
         figures.push(figure("lobes", "fixture_lobes", SPEED, vec![Panel { y: DEPTH, height: 1.0, items }]));
     }
     if let Some(history) = &outcome.history {
-        figures.push(oscillograms(&history.entry, &history.steady));
+        figures.push(oscillogram("oscillogram", "fixture_oscillogram", &history.entry));
+        figures.push(oscillogram("last_revolution", "fixture_last_revolution", &history.steady));
         figures.push(chip(&history.arc));
     }
     figures.extend(outcome.limits.as_ref().map(|limits| amplitude(job, outcome, &limits.curve)));
@@ -126,6 +130,13 @@ fn lobes(job: &FixtureJob, outcome: &FixtureOutcome, lobes: &LobeDiagram) -> Vec
         lobes.map.iter().map(|map| heat(&map.spindle_speed_rpm, &map.depth_mm, map.modulus.iter().copied())).collect();
     let LobeBoundary { spindle_speed_rpm: x, .. } = &lobes.boundary;
     let of = &lobes.boundary;
+    items.push(Item::Band {
+        name: "safe_area",
+        x: x.clone(),
+        lower: vec![0.0; x.len()],
+        upper: of.safe_mm(),
+        role: Role::Stable,
+    });
     items.push(line("chatter_limit", x, of.chatter_mm.clone(), Role::Limit));
     if let Some(depths) = of.examined_without_chatter_mm() {
         items.push(line("examined_up_to", x, depths, Role::Unstable));
@@ -137,6 +148,7 @@ fn lobes(job: &FixtureJob, outcome: &FixtureOutcome, lobes: &LobeDiagram) -> Vec
         ("fixed_joint_limit", &of.fixed_opens_mm, 2),
         ("spindle_power_limit", &of.power_mm, 3),
         ("spindle_torque_limit", &of.torque_mm, 4),
+        ("slip_limit", &of.slips_mm, 5),
     ] {
         if values.iter().any(Option::is_some) {
             items.push(line(name, x, values.clone(), Role::Series(series)));
@@ -156,46 +168,24 @@ fn lobes(job: &FixtureJob, outcome: &FixtureOutcome, lobes: &LobeDiagram) -> Vec
     items
 }
 
-fn oscillograms(entry: &Oscillogram, steady: &Oscillogram) -> Figure {
+/// A stretch of the cut in time, at the time at which it was: the entry and the last revolution lie too far apart for one
+/// axis.
+fn oscillogram(id: &'static str, title: &'static str, of: &Oscillogram) -> Figure {
+    let curve = |name, values: &[f64], role| line(name, &of.time_s, some(values), role);
     let panel = |y: Axis, items: Vec<Item>| Panel { y, height: 1.0, items };
-    // The entry and the last revolution lie far apart; the picture shows both behind one another, a gap between them.
-    let joined = |of: &dyn Fn(&Oscillogram) -> Vec<Option<f64>>| -> Vec<Option<f64>> {
-        let mut values = of(entry);
-        values.push(None);
-        values.extend(of(steady));
-        values
-    };
-    let start = entry.time_s.last().copied().unwrap_or(0.0);
-    let first = steady.time_s.first().copied().unwrap_or(start);
-    let gap = 0.1 * start;
-    let mut time = entry.time_s.clone();
-    time.push(start + 0.5 * gap);
-    time.extend(steady.time_s.iter().map(|t| t - first + start + gap));
-    let mut displacement =
-        vec![line("workpiece_displacement", &time, joined(&|o| some(&o.displacement_um)), Role::Plain)];
-    if entry.jaw_um.is_some() {
-        let jaw = joined(&|o| o.jaw_um.as_ref().map_or_else(Vec::new, |jaw| some(jaw)));
-        displacement.push(line("jaw_displacement", &time, jaw, Role::Series(0)));
-    }
-    figure(
-        "oscillogram",
-        "fixture_oscillogram",
-        Axis::linear("time", "s"),
-        vec![
-            panel(
-                Axis::linear("force_along_feed", "N"),
-                vec![line("cutting_force", &time, joined(&|o| some(&o.force_n)), Role::Plain)],
-            ),
-            panel(Axis::linear("displacement", "um"), displacement),
-            panel(
-                Axis::linear("clamp_force_asked", "N"),
-                vec![
-                    line("movable_joint", &time, joined(&|o| some(&o.clamp_movable_n)), Role::Series(0)),
-                    line("fixed_joint", &time, joined(&|o| some(&o.clamp_fixed_n)), Role::Series(1)),
-                ],
-            ),
-        ],
-    )
+    let mut displacement = vec![curve("workpiece_displacement", &of.displacement_um, Role::Plain)];
+    displacement.extend(of.jaw_um.as_ref().map(|jaw| curve("jaw_displacement", jaw, Role::Series(0))));
+    let force = vec![curve("cutting_force", &of.force_n, Role::Plain)];
+    let clamp = vec![
+        curve("movable_joint", &of.clamp_movable_n, Role::Series(0)),
+        curve("fixed_joint", &of.clamp_fixed_n, Role::Series(1)),
+    ];
+    let panels = vec![
+        panel(Axis::linear("force_along_feed", "N"), force),
+        panel(Axis::linear("displacement", "um"), displacement),
+        panel(Axis::linear("clamp_force_asked", "N"), clamp),
+    ];
+    figure(id, title, Axis::linear("time", "s"), panels)
 }
 
 fn amplitude(job: &FixtureJob, outcome: &FixtureOutcome, curve: &AmplitudeCurve) -> Figure {
@@ -252,6 +242,7 @@ pub(super) fn tables(outcome: &FixtureOutcome) -> Vec<Table> {
                 Column::optional("amplitude", "mm", &of.amplitude_mm),
                 Column::optional("movable_opens", "mm", &of.movable_opens_mm),
                 Column::optional("fixed_opens", "mm", &of.fixed_opens_mm),
+                Column::optional("slips", "mm", &of.slips_mm),
                 Column::optional("power", "mm", &of.power_mm),
                 Column::optional("torque", "mm", &of.torque_mm),
                 Column::optional("zeroth_order", "mm", &of.zeroth_order_mm),

@@ -70,6 +70,8 @@ pub(super) struct Moment {
     pub x_mm: f64,
     pub velocity_mm_per_s: f64,
     pub force_n: f64,
+    /// What the motion takes from the normal forces of both joints together, N.
+    pub unloading_n: f64,
 }
 
 /// The forced periodic motion.
@@ -282,7 +284,15 @@ impl<'a, const N: usize> Elements<'a, N> {
     }
 
     fn moment(&self, time_s: f64, since_entry_rad: f64, q: &[f64; N], force_n: f64) -> Moment {
-        Moment { time_s, since_entry_rad, x_mm: q[0], velocity_mm_per_s: self.system.velocity(q, 0), force_n }
+        let [left_n, right_n, ..] = demands(self.system, self.holding, q);
+        Moment {
+            time_s,
+            since_entry_rad,
+            x_mm: q[0],
+            velocity_mm_per_s: self.system.velocity(q, 0),
+            force_n,
+            unloading_n: left_n + right_n,
+        }
     }
 
     fn record(&self, start: &[f64; N]) -> Response {

@@ -88,6 +88,7 @@ fn of_run(cutting: &Cutting, working: Working, run: &Marched) -> Response {
             x_mm: step.x_mm,
             velocity_mm_per_s: step.velocity_mm_per_s,
             force_n: step.force_n,
+            unloading_n: step.left_demand_n + step.right_demand_n,
         })
         .collect();
     let period_s = tau * cutting.teeth as f64;

@@ -120,12 +120,22 @@ fn steady(case: &Case, plan: &Plan, run: &Marched) -> Steady {
     }
     let (farthest_mm, fed_mm) = (run.farthest_mm, plan.steady_periods as f64 * plan.working.feed_mm);
     // A forced motion loses no cut however large it is.
-    let thrown = farthest_mm > fed_mm && run.first_lost_s.is_some() && !scatter(case, plan, run).1;
+    let thrown = farthest_mm > fed_mm && run.first_lost_s.is_some() && !scatter(case, plan, run).settled;
     if thrown { Steady::Thrown { farthest_mm, fed_mm } } else { Steady::Reached }
 }
 
-/// Scatter of the once-per-tooth samples over the steady periods, and whether they have settled: small, or still falling fast.
-pub(super) fn scatter(case: &Case, plan: &Plan, run: &Marched) -> (f64, bool) {
+/// How the once-per-tooth samples scatter over the steady periods.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Scatter {
+    /// Over the feed per tooth.
+    pub of_feed: f64,
+    /// Scatter of the second half over that of the first.
+    pub late_over_early: f64,
+    /// Small, or still falling fast.
+    pub settled: bool,
+}
+
+pub(super) fn scatter(case: &Case, plan: &Plan, run: &Marched) -> Scatter {
     let whole = case.cutting.phases();
     let samples = &run.samples_mm[run.samples_mm.len().saturating_sub(plan.steady_periods.max(2 * whole))..];
     let feed = plan.working.feed_mm;
@@ -143,6 +153,11 @@ pub(super) fn scatter(case: &Case, plan: &Plan, run: &Marched) -> (f64, bool) {
     let half = (samples.len() / 2) / whole * whole;
     let all = of(samples);
     let (early, late) = samples.split_at(half);
-    let falling = half > 0 && of(late) < 0.7 * of(early);
-    (all, all < PERIODIC || (falling && all < 30.0 * PERIODIC))
+    let (late, early) = (of(late), of(early));
+    let falling = half > 0 && late < 0.7 * early;
+    Scatter {
+        of_feed: all,
+        late_over_early: if half > 0 && early > 0.0 { late / early } else { 1.0 },
+        settled: all < PERIODIC || (falling && all < 30.0 * PERIODIC),
+    }
 }

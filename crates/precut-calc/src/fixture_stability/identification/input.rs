@@ -181,6 +181,7 @@ fn is_false(flag: &bool) -> bool {
 
 impl MeasuredRow for AmplitudeRow {
     const MAX_ROWS: usize = MAX_ROWS;
+    const MEASURED: &'static [&'static str] = &["amplitude_um", "opened"];
 }
 
 /// Which joint opened.

@@ -271,6 +271,7 @@ impl Values {
             chip_exponent: self.force.chip_thickness_exponent,
             depth_exponent: self.force.depth_exponent,
             radial_ratio: self.force.radial_ratio,
+            axial_ratio: self.force.axial_ratio,
             direction: match job.cut.feed_toward {
                 FeedToward::MovableJaw => 1.0,
                 FeedToward::FixedJaw => -1.0,
@@ -291,6 +292,7 @@ impl Values {
                 movable_joint: joint(left),
                 fixed_joint: joint(right),
                 clamp_force_n,
+                clamp: None,
             }),
             Some(jaw) => Vise::ConstantForce(ConstantForce {
                 workpiece_mass_kg: self.mass_kg,
@@ -299,6 +301,7 @@ impl Values {
                 movable_joint: joint(left),
                 fixed_joint: joint(right),
                 clamp_force_n,
+                clamp: None,
             }),
         }
     }
