@@ -17,6 +17,7 @@ pub mod num;
 pub mod path;
 pub mod ring_roundness;
 pub mod shaft;
+pub mod turning;
 
 use calculator::Registrar;
 

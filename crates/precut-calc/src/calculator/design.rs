@@ -11,6 +11,8 @@ pub struct Design {
     pub regressors: Vec<Vec<f64>>,
     /// Ways to group rows by which an unnamed remainder may have levels of its own.
     pub groupings: Vec<Grouping>,
+    /// Conditions with which, and with pairs of which, an unnamed remainder may go smoothly.
+    pub conditions: Vec<Condition>,
     /// Position of every row in the order of testing, 0 to 1, where rows have one.
     pub order: Option<Vec<f64>>,
     /// Number of the fold of every row: what is held back together.
@@ -33,6 +35,38 @@ pub enum Smooth {
 pub struct Grouping {
     /// What the groups have in common.
     pub name: &'static str,
+    /// Names that the user gave to it; empty where `name` says all.
+    pub over: Vec<String>,
     /// Group of every row.
     pub group: Vec<usize>,
+}
+
+/// A condition of the rows that differs between them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Condition {
+    /// Which.
+    pub name: &'static str,
+    /// Where every row stands in it, 0 to 1.
+    pub place: Vec<f64>,
+    /// How many different values there are.
+    pub levels: usize,
+}
+
+impl Condition {
+    /// Values further apart than this share of their range are two.
+    const APART: f64 = 1e-6;
+
+    /// `None` where all rows have one value.
+    pub fn of(name: &'static str, values: &[f64]) -> Option<Self> {
+        let low = values.iter().copied().reduce(f64::min)?;
+        let high = values.iter().copied().reduce(f64::max)?;
+        if high - low <= 1e-9 * high.abs().max(low.abs()) {
+            return None;
+        }
+        let place: Vec<f64> = values.iter().map(|value| (value - low) / (high - low)).collect();
+        let mut sorted = place.clone();
+        sorted.sort_by(f64::total_cmp);
+        let levels = 1 + sorted.windows(2).filter(|pair| pair[1] - pair[0] > Self::APART).count();
+        Some(Self { name, place, levels })
+    }
 }

@@ -70,6 +70,12 @@ pub trait Diagnosable:
         Ok(Vec::new())
     }
 
+    /// Effects that act though nobody found them: one draw of what the job allows the model to be wrong by in the next cut,
+    /// `normal` giving standard normal numbers.
+    fn allowed(_allowances: &Self::Allowances, _normal: &mut dyn FnMut() -> f64) -> Vec<Self::Effect> {
+        Vec::new()
+    }
+
     /// How many times rows are held back, at most: for the time that it takes.
     fn folds(_rows: usize, runs: usize) -> usize {
         runs.max(1)

@@ -9,6 +9,9 @@ use utoipa::{PartialSchema, ToSchema};
 pub trait MeasuredRow: Serialize + for<'de> Deserialize<'de> + ToSchema + Clone + Send + Sync + 'static {
     /// Most rows accepted.
     const MAX_ROWS: usize;
+    /// Columns that hold what was measured, where a row may do without one or another of them; none where the measured
+    /// columns are those that every row must have.
+    const MEASURED: &'static [&'static str] = &[];
 }
 
 /// A measured table in a job: rows, or in their place `{"csv": "..."}`, or a file part of the same
@@ -64,6 +67,9 @@ impl<R: MeasuredRow> PartialSchema for Measured<R> {
             .build();
         let mut extensions = utoipa::openapi::extensions::Extensions::default();
         extensions.insert("x-table".to_owned(), true.into());
+        if !R::MEASURED.is_empty() {
+            extensions.insert("x-measured".to_owned(), R::MEASURED.into());
+        }
         RefOr::T(Schema::OneOf(
             OneOfBuilder::new()
                 .description(Some("A measured table: rows, or the same as CSV text, or a file part of this name."))

@@ -19,7 +19,7 @@ mod table;
 
 pub use conflict::{Conflict, ConstraintName, ElasticScope, Infeasible, Relaxation};
 pub use consequence::{Allowed, Consequence};
-pub use design::{Design, Grouping, Smooth};
+pub use design::{Condition, Design, Grouping, Smooth};
 pub use diagnosable::{ClassLimits, Diagnosable, LimitCurve, Measurement, NextRun, Reading};
 pub use figure::{Axis, Figure, Frame, Glyph, Item, Panel, Role, Spacing};
 pub use finding::{Finding, Message, Value, Values, Violations};
@@ -28,7 +28,7 @@ pub use hypothesis::{
     Expansions, Hypotheses, Hypothesis, Inapplicability, Inapplicable, Range, Shape, Treatment, Variable,
 };
 pub use measured::{Measured, MeasuredRow};
-pub use program::{Block, Dialect, Program};
+pub use program::{Block, Dialect, Program, ProgramEnd};
 pub use ranges::{ConditionRange, Ranges};
 pub use table::{Cells, Column, Table};
 

@@ -21,6 +21,18 @@ pub enum Dialect {
     LinuxCnc,
 }
 
+/// How a program ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ProgramEnd {
+    /// `M30`: end and rewind.
+    M30,
+    /// `M2`: end.
+    M2,
+    /// Back to the program that called this one: `M99`, at Siemens `M17`.
+    Return,
+}
+
 /// A program for a turning centre, in diameters, absolute, feed per revolution.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Program {
@@ -67,6 +79,21 @@ pub enum Block {
         /// mm/rev.
         feed_mm_per_rev: Option<f64>,
     },
-    /// Spindle off, end of program.
-    End,
+    /// Calls a tool with the offset of its number.
+    Tool {
+        /// Its number.
+        number: u32,
+    },
+    /// Coolant on or off.
+    Coolant {
+        /// Whether it flows from here on.
+        on: bool,
+    },
+    /// Spindle off, and the program waits for the operator.
+    Stop {
+        /// What he is to do.
+        reason: String,
+    },
+    /// Spindle off, end of program, as the dialect has it or as asked for.
+    End(Option<ProgramEnd>),
 }
