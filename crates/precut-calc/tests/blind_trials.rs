@@ -260,6 +260,14 @@ fn talk<M: Diagnosable>(trial: &Trial, result: &ResultOf<M>) {
         result.noise.standard_deviation,
         result.verdict.name()
     );
+    for test in result.tests.iter().filter(|test| test.rejects) {
+        println!(
+            "     {} rejects the base: {:.3} p {:.2e} Holm {:.2e}",
+            test.test, test.statistic, test.p, test.p_holm
+        );
+    }
+    let base = result.sets.iter().find(|set| set.causes.is_empty() && !set.with_remainder);
+    println!("     lack of fit of the base {:?}", base.and_then(|base| base.lack_of_fit_p));
     for hidden in &trial.truth.causes {
         let Some(named) = result.named.iter().find(|cause| cause.kind == hidden.kind) else { continue };
         let first = &named.parameters[0];

@@ -99,10 +99,19 @@ fn example_runs_and_repeats<C: Calculator>(job: &C::Input, example: &str) -> Vec
 
     let figures = C::figures(job, &first.output);
     has.extend(in_declared_order(figures.iter().map(|figure| figure.id), C::META.figures, &at));
+    let tables = C::tables(job, &first.output);
+    let mut numbers = BTreeSet::new();
+    note_numbers(&output, &mut numbers);
+    note_numbers(&filled, &mut numbers);
+    for column in tables.iter().flat_map(|table| &table.columns) {
+        if let Cells::Numbers(cells) = &column.cells {
+            numbers.extend(cells.iter().flatten().map(|&number| digits(number)));
+        }
+    }
     for figure in &figures {
         figure_is_sound(figure, &declared(codes.labels), &at);
+        figure_stands_where_its_numbers_do(figure, &numbers, &at);
     }
-    let tables = C::tables(job, &first.output);
     has.extend(in_declared_order(tables.iter().map(|table| table.id), C::META.tables, &at));
     for table in &tables {
         let lengths: BTreeSet<usize> = table
@@ -129,6 +138,56 @@ fn in_declared_order(
     let in_order: Vec<_> = declared.iter().copied().filter(|id| shown.contains(id)).collect();
     assert_eq!(shown, in_order, "{at}");
     shown
+}
+
+/// Nine digits of a number.
+fn digits(number: f64) -> String {
+    format!("{:.8e}", if number == 0.0 { 0.0 } else { number })
+}
+
+fn note_numbers(value: &Value, numbers: &mut BTreeSet<String>) {
+    match value {
+        Value::Number(number) => drop(numbers.insert(digits(number.as_f64().unwrap()))),
+        Value::Array(items) => items.iter().for_each(|item| note_numbers(item, numbers)),
+        Value::Object(fields) => fields.values().for_each(|field| note_numbers(field, numbers)),
+        _ => {}
+    }
+}
+
+/// Curves of a formula, drawn at places of their own: circles about a profile, and a fit against what was measured, which
+/// is told by its logarithm.
+const DRAWN_ANYWHERE: [&str; 9] = [
+    "least_squares_circle",
+    "minimum_zone_circles",
+    "minimum_zone_inner",
+    "inscribed_circle",
+    "circumscribed_circle",
+    "fit_perfect",
+    "fit_of_all",
+    "fit_held_out",
+    "fit_outlier_limit",
+];
+
+/// No axis without its true scale: what is drawn stands at a number of the tables, the answer or the job. A profile closes
+/// where it began.
+fn figure_stands_where_its_numbers_do(figure: &Figure, numbers: &BTreeSet<String>, at: &str) {
+    for item in figure.panels.iter().flat_map(|panel| &panel.items) {
+        let (Item::Line { name, x, .. }
+        | Item::Band { name, x, .. }
+        | Item::Points { name, x, .. }
+        | Item::Bars { name, x, .. }) = item
+        else {
+            continue;
+        };
+        let closes = |x: f64| figure.x.unit == "deg" && (x - 360.0).abs() < 1e-9;
+        let invented = x.iter().find(|&&x| !closes(x) && !numbers.contains(&digits(x)));
+        assert!(
+            invented.is_none() || DRAWN_ANYWHERE.contains(name),
+            "{at}: {} has {name} at {}, which is no number of the answer",
+            figure.id,
+            invented.unwrap()
+        );
+    }
 }
 
 fn figure_is_sound(figure: &Figure, labels: &BTreeSet<&'static str>, at: &str) {

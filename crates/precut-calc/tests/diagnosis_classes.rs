@@ -57,6 +57,7 @@ fn data(sides: Vec<f64>) -> Data {
         cell: all.clone(),
         regressors: Vec::new(),
         groupings: Vec::new(),
+        conditions: Vec::new(),
         order: None,
         fold: vec![0; count],
     };

@@ -80,6 +80,7 @@ fn data(curves: &Curves, truth: &[f64]) -> Data {
         cell: (0..count).collect(),
         regressors: Vec::new(),
         groupings: Vec::new(),
+        conditions: Vec::new(),
         order: None,
         fold: vec![0; count],
     };

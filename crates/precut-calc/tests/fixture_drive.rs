@@ -151,9 +151,10 @@ fn the_spindle_bounds_the_depth_over_the_speed() {
         let least = [there.power_depth_mm, there.torque_depth_mm].into_iter().flatten().reduce(f64::min);
         assert_eq!(limit.drive_mm, least);
     }
-    // Better speeds are those that the spindle allows, too.
+    // Better speeds are those that the spindle allows, too: what is removed there asks no more of it than it has.
     for better in &got.lobes.as_ref().unwrap().better_speeds {
-        assert!(better.drive_mm.unwrap().min(better.chatter_mm.unwrap_or(8.0)) > 1.02 * power, "{better:?}");
+        let there = outcome(&posted(&job, better.spindle_speed_rpm, better.depth_mm));
+        assert!(there.verdict.drive_margin.unwrap() >= 1.0, "{better:?}");
     }
     assert!(answer.explanation.iter().any(|said| said.code == "spindle_limits_depth"));
     assert!(answer.basis.iter().any(|of| of.equation == "fixture/5.8"));
@@ -242,16 +243,27 @@ fn an_advised_speed_keeps_its_promise() {
         let answer = solve(&job);
         let got = &answer.output;
         let diagram = got.lobes.as_ref().unwrap();
-        let here = got.limits.as_ref().unwrap().first_mm.unwrap_or(got.depth_examined_mm);
+        let here = got.engagement.removal_rate_cm3_per_min;
+        let [from, to] = [0, 1].map(|end| {
+            let speeds = &diagram.boundary.spindle_speed_rpm;
+            if end == 0 { speeds[0] } else { *speeds.last().unwrap() }
+        });
+        for pair in diagram.better_speeds.windows(2) {
+            assert!(pair[0].removal_rate_cm3_per_min >= pair[1].removal_rate_cm3_per_min);
+        }
         for better in &diagram.better_speeds {
-            let limits = [better.chatter_mm, better.amplitude_mm, better.movable_opens_mm, better.fixed_opens_mm];
-            let allowed = limits.into_iter().flatten().fold(got.depth_examined_mm, f64::min);
-            assert!(allowed > 1.01 * here, "{better:?} {here}");
-            // As posted: the limits of the speed are those that its own answer has.
-            let there = outcome(&with(&posted(&job, better.spindle_speed_rpm, 1.0), "/analyses", json!(["limits"])));
-            if let (Some(amplitude), true) = (better.amplitude_mm, job["effects"].is_null()) {
-                close(there.limits.unwrap().amplitude_mm.unwrap(), amplitude, 1e-3);
-            }
+            assert!(better.spindle_speed_rpm > from && better.spindle_speed_rpm < to, "{better:?}");
+            // As posted: the cut that is told is a good one, and removes what is told, more than here where that is allowed.
+            let there = solve(&with(
+                &posted(&job, better.spindle_speed_rpm, better.depth_mm),
+                "/analyses",
+                json!(["verdict", "clamp_force"]),
+            ));
+            assert_eq!(there.output.verdict.state, FixtureState::Stable, "{better:?}");
+            let removed = there.output.engagement.removal_rate_cm3_per_min;
+            close(removed, better.removal_rate_cm3_per_min, EXACT);
+            assert!(got.verdict.state != FixtureState::Stable || removed > here, "{better:?} {here}");
+            close(there.output.clamp.unwrap().least_n.unwrap(), better.clamp_force_n, 1e-9);
         }
         let Some(advice) = said(&answer, "better_speed_is") else { continue };
         let (speed, depth) = (number(advice, "spindle_speed_rpm"), number(advice, "depth_mm"));
@@ -290,7 +302,37 @@ fn figures_without_data_are_absent() {
         let checked = checked(job).unwrap();
         FixtureStability::figures(&checked, &outcome(job)).iter().map(|figure| figure.id).collect()
     };
-    assert_eq!(shown(&example("opening")), ["oscillogram", "chip"]);
-    assert_eq!(shown(&example("paper")), ["oscillogram", "chip", "amplitude"]);
+    assert_eq!(shown(&example("opening")), ["oscillogram", "last_revolution", "chip"]);
+    assert_eq!(shown(&example("paper")), ["oscillogram", "last_revolution", "chip", "amplitude"]);
     assert_eq!(shown(&with(&example("paper"), "/analyses", json!(["verdict"]))), [""; 0]);
+}
+
+/// The safe area ends at the lowest limit that the table has at that speed, nowhere above one, and reaches it wherever one
+/// lies below what was examined.
+#[test]
+fn the_safe_area_ends_at_the_lowest_limit_of_the_table() {
+    for name in ["lobes", "pneumatic"] {
+        let job = example(name);
+        let outcome = outcome(&job);
+        let figures = FixtureStability::figures(&checked(&job).unwrap(), &outcome);
+        let lobes = figures.iter().find(|figure| figure.id == "lobes").unwrap();
+        let mut bands = lobes.panels[0].items.iter().filter_map(|item| match item {
+            Item::Band { name: "safe_area", x, lower, upper, .. } => Some((x, lower, upper)),
+            _ => None,
+        });
+        let (x, lower, upper) = bands.next_back().unwrap();
+        assert!(lower.iter().all(|&depth| depth == 0.0));
+        let boundary = serde_json::to_value(&outcome).unwrap()["lobes"]["boundary"].take();
+        let mut reached = 0;
+        for (at, (&speed, &depth)) in x.iter().zip(upper).enumerate() {
+            assert_eq!(boundary["spindle_speed_rpm"][at], speed);
+            let names = ["chatter_mm", "amplitude_mm", "movable_opens_mm", "fixed_opens_mm", "power_mm", "torque_mm"];
+            let limits: Vec<f64> = names.iter().filter_map(|limit| boundary[limit][at].as_f64()).collect();
+            assert!(limits.iter().all(|&limit| depth <= limit), "{name} at {speed}: {depth} in {limits:?}");
+            let examined = boundary["depth_examined_mm"][at].as_f64().unwrap();
+            assert!(depth == examined || limits.contains(&depth), "{name} at {speed}: {depth} is no limit");
+            reached += usize::from(limits.contains(&depth));
+        }
+        assert!(reached > x.len() / 4, "{name}: {reached} limits");
+    }
 }

@@ -138,7 +138,7 @@ fn bad_kienzle_models_are_refused_at_their_field() {
     assert!(faults(good.clone()).is_empty());
     for (name, value, code) in [
         ("cutting_edge_angle_deg", json!(0.0), "bad_lead_angle"),
-        ("cutting_edge_angle_deg", json!(90.1), "bad_lead_angle"),
+        ("cutting_edge_angle_deg", json!(120.0), "bad_lead_angle"),
         ("nose_radius_mm", json!(-0.1), "bad_nose_radius"),
         ("specific_cutting_force_n_per_mm2", json!(0.0), "bad_kienzle"),
         ("specific_normal_force_n_per_mm2", json!(-5.0), "bad_kienzle"),

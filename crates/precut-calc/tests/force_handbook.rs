@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::float_cmp, missing_docs)]
 
 use precut_calc::calculator::{Finding, Violations};
-use precut_calc::force::{FAULT_CODES, ForceModel, PowerLaw, PowerTerm, Reached, WARNING_CODES};
+use precut_calc::force::{FAULT_CODES, ForceModel, PowerLaw, PowerTerm, Reached, ReachedCut, WARNING_CODES};
 use precut_calc::material::Certainty;
 use serde_json::{Value, json};
 
@@ -218,7 +218,7 @@ fn every_wrong_choice_has_its_code() {
         (json!({"nose_radius_mm": 0.8}), "factor_not_tabulated", "/nose_radius_mm"),
         (json!({"nose_radius_mm": -0.8}), "bad_nose_radius", "/nose_radius_mm"),
         (json!({"inclination_deg": 5.0, "tool_material": "hss"}), "factor_not_tabulated", "/inclination_deg"),
-        (json!({"cutting_edge_angle_deg": 95.0}), "bad_lead_angle", "/cutting_edge_angle_deg"),
+        (json!({"cutting_edge_angle_deg": 100.1}), "bad_lead_angle", "/cutting_edge_angle_deg"),
         (json!({"cutting_edge_angle_deg": 0.0}), "bad_lead_angle", "/cutting_edge_angle_deg"),
         (json!({"wiper_edge": true, "tool_material": "hss"}), "no_handbook_row", "/wiper_edge"),
         (
@@ -277,13 +277,17 @@ fn certainty_travels_with_the_term_and_doubt_is_said() {
     assert_eq!((nose(3.0), nose(3.5), nose(4.0)), (0, 3, 3));
 }
 
+fn cut<'a>(depth_mm: Reached<'a>, feed_mm_per_rev: Reached<'a>, speed_m_per_min: Reached<'a>) -> ReachedCut<'a> {
+    ReachedCut { depth_mm, feed_mm_per_rev, speed_m_per_min }
+}
+
 #[test]
 fn leaving_the_measured_range_is_said() {
     let at = |pointer, least, largest| Reached { pointer, least, largest };
     let inside = (at("/cut/depth_mm", 0.1, 3.0), at("/cut/feed", 0.05, 0.5), at("/cut/speed", 30.0, 300.0));
     let carbide = choice(&json!({}));
-    assert!(carbide.extrapolations(inside.0, inside.1, inside.2).is_empty());
-    let found = carbide.extrapolations(at("/d", 0.09, 3.0), at("/f", 0.04, 0.5), at("/v", 100.0, 301.0));
+    assert!(carbide.extrapolations(&cut(inside.0, inside.1, inside.2)).is_empty());
+    let found = carbide.extrapolations(&cut(at("/d", 0.09, 3.0), at("/f", 0.04, 0.5), at("/v", 100.0, 301.0)));
     let said: Vec<_> = found.iter().map(|f| (f.code, f.pointer.as_str(), f.value, f.limit, f.unit)).collect();
     let code = "extrapolated_force_model";
     assert_eq!(
@@ -295,18 +299,22 @@ fn leaving_the_measured_range_is_said() {
         ]
     );
     let hss = choice(&json!({"tool_material": "hss"}));
-    assert!(hss.extrapolations(inside.0, inside.1, at("/v", 5.0, 500.0)).is_empty());
+    assert!(hss.extrapolations(&cut(inside.0, inside.1, at("/v", 5.0, 100.0))).is_empty());
+    assert_eq!(hss.extrapolations(&cut(inside.0, inside.1, at("/v", 5.0, 100.1)))[0].limit, Some(100.0));
     let kienzle: ForceModel = serde_json::from_value(json!({
         "kind": "kienzle", "cutting_edge_angle_deg": 75.0, "nose_radius_mm": 0.4, "material": "42crmo4",
         "specific_normal_force_n_per_mm2": 900.0, "normal_exponent": 0.35,
     }))
     .unwrap();
-    assert!(kienzle.extrapolations(inside.0, at("/f", 0.1, 0.3), inside.2).is_empty());
-    assert_eq!(kienzle.extrapolations(inside.0, at("/f", 0.1, 0.4), inside.2)[0].code, "feed_exceeds_nose_radius");
+    assert!(kienzle.extrapolations(&cut(inside.0, at("/f", 0.1, 0.3), inside.2)).is_empty());
+    assert_eq!(
+        kienzle.extrapolations(&cut(inside.0, at("/f", 0.1, 0.4), inside.2))[0].code,
+        "feed_exceeds_nose_radius"
+    );
     let table: ForceModel =
         serde_json::from_value(json!({"kind": "table", "rows": [{"depth_mm": 1.0, "passive_n": 9.0}]})).unwrap();
-    assert!(table.extrapolations(at("/d", 0.01, 1.0), inside.1, inside.2).is_empty());
-    assert_eq!(table.extrapolations(at("/d", 0.01, 1.1), inside.1, inside.2)[0].limit, Some(1.0));
+    assert!(table.extrapolations(&cut(at("/d", 0.01, 1.0), inside.1, inside.2)).is_empty());
+    assert_eq!(table.extrapolations(&cut(at("/d", 0.01, 1.1), inside.1, inside.2))[0].limit, Some(1.0));
 }
 
 #[test]
@@ -318,6 +326,6 @@ fn a_range_of_ones_own_replaces_the_handbooks() {
     });
     let model: ForceModel = serde_json::from_value(job).unwrap();
     let at = |pointer, least, largest| Reached { pointer, least, largest };
-    assert!(model.extrapolations(at("/d", 0.03, 0.9), at("/f", 0.02, 0.2), at("/v", 250.0, 500.0)).is_empty());
-    assert_eq!(model.extrapolations(at("/d", 0.03, 1.9), at("/f", 0.02, 0.3), at("/v", 150.0, 500.0)).len(), 3);
+    assert!(model.extrapolations(&cut(at("/d", 0.03, 0.9), at("/f", 0.02, 0.2), at("/v", 250.0, 500.0))).is_empty());
+    assert_eq!(model.extrapolations(&cut(at("/d", 0.03, 1.9), at("/f", 0.02, 0.3), at("/v", 150.0, 500.0))).len(), 3);
 }

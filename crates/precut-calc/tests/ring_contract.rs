@@ -317,12 +317,13 @@ fn search_says_what_is_out_of_reach_and_what_would_help() {
     job["settings_search"] = json!({ "target_um": 5, "clearance_mm": 0.3, "allowance_mm": 0.5 });
     let answer = run(&job);
     let search = answer.output.settings_search.unwrap();
-    assert_eq!(json!(search.status), "odd_lobes");
     assert_eq!(search.odd_orders, [3]);
     // 50 um of 3 lobes are 100 um from peak to valley; the filter of 50 UPR takes 0.25 % of the wave.
     assert!((search.odd_lobes_um - 99.75).abs() < 0.01, "{}", search.odd_lobes_um);
-    let stage = search.second_stage.unwrap();
-    assert!(stage.before_um > 95.0 && stage.after_um < 0.1 * stage.before_um, "{stage:?}");
+    // Opposite to a support they stay; elsewhere they do not.
+    assert!(search.simulated > 0);
+    let best = search.best.unwrap();
+    assert!(best.roundness_um < 10.0, "{best:?}");
     job["ring"] = json!({ "radius_mm": 150, "ellipticity_mm": 0.1 });
     job["settings_search"] = json!({ "target_um": 0.01, "revolutions_max": 20 });
     let search = run(&job).output.settings_search.unwrap();
@@ -468,7 +469,8 @@ mod any {
             any::<bool>(),
             prop::sample::select(vec!["none", "upr_15", "upr_500"]),
             effects(),
-            0..4_u32,
+            // A search simulates dozens of settings: a few of the jobs ask for one.
+            prop_oneof![79 => 0..3_u32, 1 => Just(3_u32)],
         );
         (machine, cut, form, rest).prop_map(|((radius, beta, gap, tool, roller), (feed, turns, dwell, direction, k), (e, order, wave), (clockwise, inward, filter, effects, what))| {
             let roller = roller * radius;
@@ -627,7 +629,7 @@ fn odd_waves_are_locked_in_only_opposite_to_a_support() {
     assert!(answer.output.setting.coefficient_sum > 1.02 && ron(&answer.output).0 < 10.0);
     let causes = &answer.output.simulation.as_ref().unwrap().causes;
     assert_eq!((causes.first_bite_um, causes.odd_lobes_um), (None, None));
-    for code in ["first_bite_stays", "start_clear", "odd_waves_stay", "opposite_to_support"] {
+    for code in ["start_clear", "opposite_to_support"] {
         assert!(!said(&answer, code), "{code}");
     }
     // Begun well inside the ring it takes a large bite all the same.

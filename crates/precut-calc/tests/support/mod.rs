@@ -164,6 +164,7 @@ pub fn translate(input: &Value) -> Value {
     job.insert("cut".to_owned(), Value::Object(cut));
     job.insert("stations".to_owned(), json!({ "kind": "list", "z_mm": input["stations"] }));
     put(&mut job, "include", input.get("effects").cloned());
+    put(&mut job, "compare_one_step", Some(json!(true)));
     put(
         &mut job,
         "gravity",
@@ -201,8 +202,10 @@ pub fn translate(input: &Value) -> Value {
     Value::Object(job)
 }
 
-/// A checked and filled job.
-pub fn prepared(job: Value) -> Job {
+/// A checked and filled job. Switches that it does not say are off: what acts by default has tests of its own.
+pub fn prepared(mut job: Value) -> Job {
+    let include = job.as_object_mut().unwrap().entry("include").or_insert_with(|| json!({}));
+    include.as_object_mut().unwrap().entry("mode").or_insert(json!("as_stated"));
     let mut job: Job = serde_json::from_value(job).unwrap_or_else(|e| panic!("{e}"));
     let mut violations = Violations::default();
     job.check(&mut violations);

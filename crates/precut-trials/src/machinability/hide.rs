@@ -42,6 +42,17 @@ pub(crate) const CAUSES: &[Size] = &[
 pub(crate) const OUTSIDE: &[Size] =
     &[size("chatter_island", 1.5, false), size("drift", 1.0, true), size("threshold", 1.0, true)];
 
+/// The same where regimes are continuous and nobody wrote down their order: what goes with a condition in a way, or in a
+/// direction, that the catalogue does not hold.
+pub(crate) const OUTSIDE_CONDITIONS: &[Size] = &[
+    size("chatter_island", 1.5, false),
+    size("threshold", 1.0, true),
+    size("linear_in_time", 1.0, true),
+    size("smoother_when_worn", 4.0, false),
+    size("nose_radius_power", 2.0, true),
+    size("speed_limit", 1.5, true),
+];
+
 impl Size {
     /// Whether it can act on an output at all.
     pub(crate) fn acts_on(&self, output: &Output) -> bool {
@@ -110,6 +121,12 @@ impl Scaled {
                 let bend = 1.0 + 2.0 * self.form[0];
                 (size * (cut.when.powf(bend) - 0.5)).exp()
             }
+            // The edge, or what carries it, changes while it cuts.
+            "linear_in_time" => (size * (cut.time_min / 30.0 - 0.5)).exp(),
+            "smoother_when_worn" => (-size * cut.wear_mm).exp(),
+            "nose_radius_power" => (cut.radius_mm / 0.8).powf(size),
+            // Beyond a speed and a feed something gives way.
+            "speed_limit" if cut.speed > 80.0 && cut.feed > 0.15 => size.exp(),
             // Beyond a depth the chip breaks in another way, below it does not.
             "threshold" if cut.depth > 0.8 && cut.feed > 0.12 => size.exp(),
             _ => 1.0,

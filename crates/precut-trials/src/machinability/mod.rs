@@ -11,7 +11,7 @@ pub use ideal::is_found;
 use serde_json::{Value, json};
 
 use crate::{Class, Hidden, Later, Random, Trial, Truth};
-use hide::{CAUSES, OUTSIDE, Scaled, Size};
+use hide::{CAUSES, OUTSIDE, OUTSIDE_CONDITIONS, Scaled, Size};
 
 const SPEEDS: [f64; 5] = [20.0, 35.0, 60.0, 100.0, 160.0];
 const FEEDS: [f64; 5] = [0.06, 0.1, 0.16, 0.25, 0.4];
@@ -45,6 +45,17 @@ pub(crate) struct Cut {
     /// Place in the order of testing, 0 to 1.
     pub(crate) when: f64,
     pub(crate) radius_mm: f64,
+    /// How long the edge has cut.
+    pub(crate) time_min: f64,
+}
+
+/// How the regimes of a trial are chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Plan {
+    /// Of a few levels each, some cut several times, in a stated order.
+    Levels,
+    /// As a workshop's records have them: any values, none twice, no order; with the time and the nose radius of every cut.
+    Continuous,
 }
 
 impl Output {
@@ -57,7 +68,12 @@ impl Output {
 
 /// Draws a trial. `snr` is that of every hidden cause.
 pub fn draw(class: Class, snr: f64, seed: u64) -> Trial {
-    drawn(class, snr, seed).trial
+    drawn(Plan::Levels, class, snr, seed).trial
+}
+
+/// The same over regimes of any values, none of which is cut twice, without an order.
+pub fn draw_continuous(class: Class, snr: f64, seed: u64) -> Trial {
+    drawn(Plan::Continuous, class, snr, seed).trial
 }
 
 /// A trial and what it was made of.
@@ -78,19 +94,19 @@ impl Drawn {
     }
 }
 
-fn drawn(class: Class, snr: f64, seed: u64) -> Drawn {
+fn drawn(plan: Plan, class: Class, snr: f64, seed: u64) -> Drawn {
     let mut random = Random::new(seed);
     loop {
         // A cause that this draw cannot show is drawn again.
-        if let Some(drawn) = attempt(class, snr, &mut random) {
+        if let Some(drawn) = attempt(plan, class, snr, &mut random) {
             return drawn;
         }
     }
 }
 
-fn attempt(class: Class, snr: f64, random: &mut Random) -> Option<Drawn> {
+fn attempt(plan: Plan, class: Class, snr: f64, random: &mut Random) -> Option<Drawn> {
     let output = output(random);
-    let cuts = cuts(random);
+    let cuts = cuts(plan, random);
     let sigma = random.uniform(0.03, 0.06);
     let causes: Vec<Size> = match class {
         Class::Nothing => Vec::new(),
@@ -102,19 +118,22 @@ fn attempt(class: Class, snr: f64, random: &mut Random) -> Option<Drawn> {
             }
             vec![first, second]
         }
-        Class::Outside => vec![random.pick(OUTSIDE)],
+        Class::Outside => match plan {
+            Plan::Levels => vec![random.pick(OUTSIDE)],
+            Plan::Continuous => vec![random.pick(OUTSIDE_CONDITIONS)],
+        },
     };
     let mut hidden = Vec::new();
     for cause in causes {
         hidden.push(scaled(cause, &output, &cuts, snr * sigma, random)?);
     }
     let level = 1.0 + random.uniform_sd(LEVEL);
-    let (rows, measured) = measure(&output, &hidden, &cuts, (level, sigma), random);
+    let (rows, measured) = measure(plan, &output, &hidden, &cuts, (level, sigma), random);
     let residual = measured.iter().zip(&cuts).map(|(value, cut)| (value / output.plain(cut)).ln()).collect();
     // Another day, other regimes, the same tool.
-    let cuts_later: Vec<Cut> =
-        self::cuts(random).iter().map(|cut| Cut { radius_mm: cuts[0].radius_mm, ..*cut }).collect();
-    let (rows_later, _) = measure(&output, &hidden, &cuts_later, (level, sigma), random);
+    let same_tool = |cut: &Cut| if plan == Plan::Levels { Cut { radius_mm: cuts[0].radius_mm, ..*cut } } else { *cut };
+    let cuts_later: Vec<Cut> = self::cuts(plan, random).iter().map(same_tool).collect();
+    let (rows_later, _) = measure(plan, &output, &hidden, &cuts_later, (level, sigma), random);
     let best = cuts_later.iter().map(|cut| with(&hidden, &output, cut).ln()).collect();
     let radius_mm = cuts.first().map_or(0.8, |cut| cut.radius_mm);
     let truth = Truth { class, causes: Vec::new() };
@@ -134,6 +153,7 @@ fn attempt(class: Class, snr: f64, random: &mut Random) -> Option<Drawn> {
 
 /// Rows of these cuts, and their values; `level` is a factor on all of them.
 fn measure(
+    plan: Plan,
     output: &Output,
     hidden: &[Scaled],
     cuts: &[Cut],
@@ -149,9 +169,16 @@ fn measure(
         let noise = sigma * random.uniform(0.8, 1.2) * random.student_6();
         let value = level * with(hidden, output, &real) * noise.exp();
         let mut row = json!({
-            "test": cut.test, "speed_m_per_min": cut.speed, "feed_mm_per_rev": cut.feed, "depth_mm": cut.depth,
+            "speed_m_per_min": cut.speed, "feed_mm_per_rev": cut.feed, "depth_mm": cut.depth,
             "flank_wear_mm": cut.wear_mm, "batch": if cut.second_batch { "B" } else { "A" }
         });
+        match plan {
+            Plan::Levels => row["test"] = json!(cut.test),
+            Plan::Continuous => {
+                row["time_min"] = json!(cut.time_min);
+                row["nose_radius_mm"] = json!(cut.radius_mm);
+            }
+        }
         row[output.quantity] = json!(four_digits(value));
         (row, value)
     };
@@ -181,8 +208,35 @@ fn output(random: &mut Random) -> Output {
     }
 }
 
+fn cuts(plan: Plan, random: &mut Random) -> Vec<Cut> {
+    match plan {
+        Plan::Levels => cuts_on_levels(random),
+        Plan::Continuous => cuts_anywhere(random),
+    }
+}
+
+/// Regimes as they came up, written down to three digits.
+fn cuts_anywhere(random: &mut Random) -> Vec<Cut> {
+    let between = |[low, high]: [f64; 2], random: &mut Random| {
+        three_digits((low.ln() + (high / low).ln() * random.uniform(0.0, 1.0)).exp())
+    };
+    let tests = random.whole(50, 90);
+    let mut cut = |test: usize| Cut {
+        speed: between([20.0, 160.0], random),
+        feed: between([0.06, 0.4], random),
+        depth: between([0.3, 3.0], random),
+        wear_mm: (100.0 * random.uniform(0.02, 0.4)).round() / 100.0,
+        second_batch: random.chance(0.5),
+        test: u32::try_from(test + 1).unwrap_or(u32::MAX),
+        when: 0.0,
+        radius_mm: random.pick(&[0.4, 0.8, 1.2]),
+        time_min: (10.0 * random.uniform(1.0, 30.0)).round() / 10.0,
+    };
+    (0..tests).map(&mut cut).collect()
+}
+
 /// Regimes of a plan in random order, some of them cut twice or thrice.
-fn cuts(random: &mut Random) -> Vec<Cut> {
+fn cuts_on_levels(random: &mut Random) -> Vec<Cut> {
     let tests = random.whole(36, 60);
     let radius_mm = random.pick(&[0.4, 0.8, 1.2]);
     let mut cuts = Vec::new();
@@ -196,6 +250,7 @@ fn cuts(random: &mut Random) -> Vec<Cut> {
             test: u32::try_from(test + 1).unwrap_or(u32::MAX),
             when: test as f64 / (tests - 1) as f64,
             radius_mm,
+            time_min: 0.0,
         };
         let repeats = random.pick(&[1, 1, 2, 3]);
         cuts.extend(std::iter::repeat_n(cut, repeats));
@@ -240,7 +295,15 @@ fn scaled(cause: Size, output: &Output, cuts: &[Cut], rms: f64, random: &mut Ran
 }
 
 fn four_digits(value: f64) -> f64 {
-    let scale = 10.0_f64.powf(3.0 - value.log10().floor());
+    rounded(value, 4)
+}
+
+fn three_digits(value: f64) -> f64 {
+    rounded(value, 3)
+}
+
+fn rounded(value: f64, digits: u8) -> f64 {
+    let scale = 10.0_f64.powf(f64::from(digits) - 1.0 - value.log10().floor());
     (value * scale).round() / scale
 }
 
