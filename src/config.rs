@@ -19,6 +19,9 @@ pub const DEFAULTS: &str = include_str!("../config.default.toml");
 /// Sections of the configuration: `PRECUT_LOG_LEVEL` is `log.level`.
 const SECTIONS: [&str; 8] = ["log", "limits", "jobs", "cache", "postgres", "shutdown", "cors", "auth"];
 
+/// Settings outside of the sections.
+const OUTSIDE: [&str; 5] = ["listen", "data", "store", "role", "cpu"];
+
 /// Settings that are words even where they look like numbers: `PRECUT_DATA=2026`.
 const WORDS: [&str; 6] = ["listen", "data", "store", "role", "log.level", "log.format"];
 
@@ -52,6 +55,9 @@ pub struct Config {
     pub cors: Cors,
     /// Who may call it.
     pub auth: Auth,
+    /// Variables of the environment that look like settings and are none.
+    #[serde(skip)]
+    pub strays: Vec<String>,
 }
 
 /// What is logged, and how.
@@ -82,6 +88,8 @@ pub struct Limits {
     pub json_bytes: usize,
     /// Largest multipart job, bytes.
     pub multipart_bytes: usize,
+    /// Memory of all bodies in work together and of what is read from them, bytes.
+    pub bodies_bytes: usize,
     /// A body must have arrived within this time, s.
     pub body_timeout_s: f64,
     /// A request's header must have arrived within this time, s.
@@ -190,10 +198,54 @@ pub struct Auth {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ApiKey {
-    /// Whose it is: requests with it count together for the rate limit, jobs for the fair order.
+    /// What it is called in the log.
     pub name: String,
     /// BLAKE3 of the key, 64 hexadecimal digits.
     pub hash: String,
+    /// Whose it is: several keys may be one owner's, who has his jobs, results and models to himself, and whose requests
+    /// count together for the rate limit and his jobs for the fair order. The key's name where none is given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub owner: Option<String>,
+    /// What may be done with it.
+    #[serde(default = "Scope::usual")]
+    pub scopes: Vec<Scope>,
+}
+
+impl Default for ApiKey {
+    fn default() -> Self {
+        Self { name: String::new(), hash: String::new(), owner: None, scopes: Scope::usual() }
+    }
+}
+
+/// What may be done with a key.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Scope {
+    /// Ask: send jobs and cancel them.
+    Solve,
+    /// Read jobs, results and models of one's own.
+    Read,
+    /// Store and delete models of one's own.
+    Models,
+    /// See and cancel the jobs and read the results of all owners, and read the metrics.
+    Admin,
+}
+
+impl Scope {
+    /// What a key may that says nothing of it.
+    pub fn usual() -> Vec<Self> {
+        vec![Self::Solve, Self::Read, Self::Models]
+    }
+
+    /// As it is written.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Solve => "solve",
+            Self::Read => "read",
+            Self::Models => "models",
+            Self::Admin => "admin",
+        }
+    }
 }
 
 /// Settings given as flags; they win over all others.
@@ -263,8 +315,13 @@ impl Config {
         if let Some(file) = file {
             figment = figment.merge(Toml::file_exact(file));
         }
+        let mut strays = Vec::new();
         for variable in environment.into_iter().filter_map(Variable::new) {
-            figment = figment.merge(variable);
+            if variable.is_stray() {
+                strays.push(variable.said());
+            } else {
+                figment = figment.merge(variable);
+            }
         }
         figment = figment.merge(Serialized::defaults(flags));
         if let Some(store) = &flags.store {
@@ -276,7 +333,7 @@ impl Config {
         if let Some(format) = &flags.log_format {
             figment = figment.merge(("log.format", format));
         }
-        Self::read(figment)
+        Self::read(figment).map(|config| Self { strays, ..config })
     }
 
     /// The configuration, or everything that is wrong with it: a setting that cannot be read takes its default, so that
@@ -336,6 +393,7 @@ impl Config {
         for (name, count) in [
             ("limits.json_bytes", limits.json_bytes),
             ("limits.multipart_bytes", limits.multipart_bytes),
+            ("limits.bodies_bytes", limits.bodies_bytes),
             ("limits.connections", limits.connections),
             ("limits.concurrent_requests", limits.concurrent_requests),
             ("jobs.streams", self.jobs.streams),
@@ -373,6 +431,11 @@ impl Config {
                     "auth.keys[{index}].hash (\"{}\"): must be 64 hexadecimal digits, as `precut hash-key` prints them",
                     key.name
                 ));
+            }
+        }
+        for (index, key) in self.auth.keys.iter().enumerate() {
+            if key.owner.as_deref().unwrap_or(&key.name).is_empty() {
+                faults.push(format!("auth.keys[{index}]: needs a name or an owner"));
             }
         }
         for origin in &self.cors.origins {
@@ -431,6 +494,17 @@ impl Variable {
             key.strip_prefix(section).and_then(|rest| rest.strip_prefix('_')).map(|rest| format!("{section}.{rest}"))
         });
         Some(Self { name, key: sectioned.unwrap_or(key), value })
+    }
+
+    /// Whether it is in no section and no setting: somebody else's variable, or a slip. It stops nothing.
+    fn is_stray(&self) -> bool {
+        !self.key.contains('.') && !OUTSIDE.contains(&self.key.as_str()) && !SECTIONS.contains(&self.key.as_str())
+    }
+
+    fn said(&self) -> String {
+        let nearest = crate::registry::nearest(&self.key, OUTSIDE.into_iter());
+        let meant = nearest.map(|name| format!("; did you mean {PREFIX}{}?", name.to_uppercase())).unwrap_or_default();
+        format!("environment variable {} is no setting and is passed over{meant}", self.name)
     }
 }
 
@@ -498,8 +572,18 @@ mod tests {
     fn unknown_keys_are_refused_by_name_wherever_they_stand() {
         let error = load("[limits]\njson_byte = 1", &[], &Flags::default()).unwrap_err().to_string();
         assert!(error.contains("json_byte") && error.contains("precut.toml"), "{error}");
-        let error = load("", &[("PRECUT_LISTN", "127.0.0.1:1")], &Flags::default()).unwrap_err().to_string();
-        assert!(error.contains("listn") && error.contains("PRECUT_LISTN"), "{error}");
+        let error = load("", &[("PRECUT_LIMITS_JSON_BYTE", "1")], &Flags::default()).unwrap_err().to_string();
+        assert!(error.contains("json_byte") && error.contains("PRECUT_LIMITS_JSON_BYTE"), "{error}");
+    }
+
+    #[test]
+    fn a_stray_variable_stops_nothing_and_is_told_with_the_nearest() {
+        let strays = [("PRECUT_LISTN", "127.0.0.1:1"), ("PRECUT_URL", "http://cam"), ("PRECUT_PORT", "8080")];
+        let config = load("", &strays, &Flags::default()).unwrap();
+        assert_eq!(config.listen, Config::default().listen);
+        assert_eq!(config.strays.len(), 3);
+        assert!(config.strays[0].contains("PRECUT_LISTN") && config.strays[0].contains("PRECUT_LISTEN?"));
+        assert!(config.strays[1].contains("PRECUT_URL") && !config.strays[1].contains("did you mean"));
     }
 
     #[test]
@@ -512,7 +596,6 @@ mod tests {
             ("PRECUT_PORT_8080_TCP_ADDR", "10.0.0.7"),
         ];
         assert_eq!(load("", &others, &Flags::default()).unwrap(), Config::default());
-        assert!(load("", &[("PRECUT_PORT", "8080")], &Flags::default()).is_err(), "the setting is `listen`");
     }
 
     #[test]
@@ -540,7 +623,7 @@ mod tests {
         let mut config = Config::default();
         assert_eq!(toml::from_str::<Config>(&config.to_toml()).unwrap(), config);
         let hash = "ab".repeat(32);
-        config.auth.keys.push(ApiKey { name: "cam".to_owned(), hash: hash.clone() });
+        config.auth.keys.push(ApiKey { name: "cam".to_owned(), hash: hash.clone(), ..ApiKey::default() });
         assert!(!config.to_toml().contains(&hash));
     }
 }

@@ -14,6 +14,7 @@ mod nearest;
 mod place;
 mod result_text;
 mod schema;
+mod shape;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]
@@ -27,13 +28,14 @@ pub use entry::{Entry, Prepared, ResultNotes, Schemas, UnreadableResult};
 pub(crate) use canonical::canonical;
 pub(crate) use checker::{Faults, by_pointer, child};
 pub(crate) use entry::{Calculation, Job, ModelUse, Unprepared, second_line};
-pub(crate) use fault::intern as interned;
+pub(crate) use fault::{cut_short_at, intern as interned};
 pub(crate) use finite::non_finite_place;
 pub(crate) use nearest::nearest;
 #[cfg(test)]
 pub(crate) use place::FreeColumns;
 pub(crate) use place::{CellKind, Step, TableColumn, TablePlace};
 pub(crate) use result_text::{Unwritable, append as append_result};
+pub(crate) use shape::Shape;
 pub(crate) use way::way;
 
 use std::collections::BTreeMap;
@@ -132,6 +134,15 @@ impl Registry {
     /// The id most like `name`, if one is like it at all.
     pub fn nearest(&self, name: &str) -> Option<&'static str> {
         nearest(name, self.by_id.keys().copied())
+    }
+
+    /// What a job of `entry` may be made of; of one that is made of other calculators' jobs, whichever of them.
+    pub(crate) fn shape_of<'a>(&self, entry: &'a Entry) -> &'a Shape {
+        entry.shape(|| {
+            let mut any = Shape::default();
+            self.entries.iter().for_each(|entry| any.join(self.shape_of(entry).clone()));
+            any
+        })
     }
 
     /// Every component of every calculator by name, for the OpenAPI document. A type that occurs in a job is closed

@@ -1,5 +1,6 @@
 //! The command line: the service, and the same calculators without it.
 
+mod backup;
 mod health;
 mod job;
 mod serve;
@@ -14,7 +15,7 @@ use std::sync::Arc;
 use clap::{Args, Parser, Subcommand};
 
 use crate::config::Flags;
-use crate::engine::{Error, STUDIES, studies_of};
+use crate::engine::{Engine, Error, Isolation, STUDIES, studies_of};
 use crate::http::{Problem, auth, openapi};
 use crate::registry::{Entry, Registry, RegistryError};
 use crate::text::{self, Glossary, Language};
@@ -88,8 +89,17 @@ enum Command {
         #[arg(long)]
         job: bool,
     },
+    /// Compute one job for the service that started this
+    #[command(hide = true)]
+    Compute,
     /// Print the contract of the HTTP interface (OpenAPI 3.1)
     Openapi,
+    /// Copy the database of a data folder as it is at one moment, while a service works with it or not
+    Backup(backup::CopyArgs),
+    /// Put a copy into a data folder that has no database
+    Restore(backup::CopyArgs),
+    /// Read every byte of a copy and say whether it is in order
+    Verify(backup::VerifyArgs),
     /// Ask a running service whether it is ready; exit code 1 if not
     Health {
         /// Its address [default: PRECUT_LISTEN, or http://127.0.0.1:8080]
@@ -189,6 +199,24 @@ pub fn main(
     arguments: impl IntoIterator<Item = OsString>,
     registry: impl FnOnce() -> Result<Registry, RegistryError>,
 ) -> ExitCode {
+    // Without knowing its own file it cannot start itself again, and does without.
+    let isolation = std::env::current_exe().ok().map(|program| Isolation {
+        program,
+        arguments: vec![COMPUTE.into()],
+        environment: Vec::new(),
+    });
+    main_as(arguments, registry, isolation)
+}
+
+/// The sub-command by which the program computes one job for a service that is its parent.
+pub const COMPUTE: &str = "compute";
+
+/// The same for a program that starts itself again in another way.
+pub fn main_as(
+    arguments: impl IntoIterator<Item = OsString>,
+    registry: impl FnOnce() -> Result<Registry, RegistryError>,
+    isolation: Option<Isolation>,
+) -> ExitCode {
     let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
         Err(error) => {
@@ -198,8 +226,9 @@ pub fn main(
         }
     };
     let language = cli.lang.unwrap_or_default();
-    let outcome =
-        registry().map_err(|error| Failed::Machine(error.to_string())).and_then(|registry| run(cli, &registry));
+    let outcome = registry()
+        .map_err(|error| Failed::Machine(error.to_string()))
+        .and_then(|registry| run(cli, &registry, isolation));
     match outcome {
         Ok(()) | Err(Failed::NobodyListens) => ExitCode::SUCCESS,
         Err(Failed::Usage(message)) => {
@@ -229,11 +258,11 @@ fn exit_code(problem: &Problem) -> u8 {
     }
 }
 
-fn run(cli: Cli, registry: &Registry) -> Result<(), Failed> {
+fn run(cli: Cli, registry: &Registry, isolation: Option<Isolation>) -> Result<(), Failed> {
     let language = cli.lang.unwrap_or_default();
     match cli.command {
-        None => serve::run(&cli.serve, registry.clone()),
-        Some(Command::Serve(serve)) => serve::run(&serve, registry.clone()),
+        None => serve::run(&cli.serve, registry.clone(), isolation),
+        Some(Command::Serve(serve)) => serve::run(&serve, registry.clone(), isolation),
         Some(Command::Solve(solve)) => job::solve(&solve, registry, language),
         Some(Command::Check(job)) => job::check(&job, registry),
         Some(Command::List) => list(registry, language),
@@ -245,7 +274,12 @@ fn run(cli: Cli, registry: &Registry) -> Result<(), Failed> {
         Some(Command::Example { calculator, id, job }) => {
             job::example(&*entry(registry, &calculator)?, id.as_deref(), job)
         }
+        Some(Command::Compute) => Engine::compute_alone(registry, io::stdin(), &mut io::stdout().lock())
+            .map_err(|error| Failed::Machine(format!("a job of another process: {error}"))),
         Some(Command::Openapi) => print(openapi::json(registry).as_bytes()),
+        Some(Command::Backup(copy)) => backup::take(&copy),
+        Some(Command::Restore(copy)) => backup::put_back(&copy),
+        Some(Command::Verify(copy)) => backup::check(&copy),
         Some(Command::Health { url }) => health::ask(url),
         Some(Command::HashKey) => hash_key(),
     }

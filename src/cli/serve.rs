@@ -1,11 +1,14 @@
 //! The service as a process: settings, start, signals, end.
 
+use std::path::PathBuf;
+use std::time::Duration;
+
 use tokio::net::TcpListener;
 use tokio::sync::watch;
 
 use super::{Failed, ServeArgs, print};
-use crate::config::{Config, seconds};
-use crate::engine::{Engine, EngineSettings};
+use crate::config::{Config, Flags, seconds};
+use crate::engine::{Engine, EngineSettings, Isolation};
 use crate::http::{self, App};
 use crate::log;
 use crate::registry::Registry;
@@ -14,24 +17,31 @@ use crate::registry::Registry;
 const IO_THREADS: usize = 2;
 
 /// `precut serve`
-pub(super) fn run(arguments: &ServeArgs, registry: Registry) -> Result<(), Failed> {
+pub(super) fn run(arguments: &ServeArgs, registry: Registry, isolation: Option<Isolation>) -> Result<(), Failed> {
     let config = Config::load(arguments.config.as_deref(), &arguments.flags)
         .map_err(|error| Failed::Machine(format!("settings: {error}")))?;
     if arguments.print_config {
+        config.strays.iter().for_each(|stray| eprintln!("precut: {stray}"));
         return print(config.to_toml().as_bytes());
     }
     log::start(&config.log);
+    config.strays.iter().for_each(|stray| tracing::warn!("{stray}"));
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(IO_THREADS)
         .enable_all()
         .build()
         .map_err(|error| Failed::Machine(format!("the threads cannot be started: {error}")))?;
-    runtime.block_on(serve(&config, registry))
+    runtime.block_on(serve(&config, arguments, registry, isolation))
 }
 
-async fn serve(config: &Config, registry: Registry) -> Result<(), Failed> {
-    let engine =
-        Engine::open(registry, EngineSettings::of(config)).await.map_err(|error| Failed::Machine(error.to_string()))?;
+async fn serve(
+    config: &Config,
+    arguments: &ServeArgs,
+    registry: Registry,
+    isolation: Option<Isolation>,
+) -> Result<(), Failed> {
+    let settings = EngineSettings { isolation, ..EngineSettings::of(config) };
+    let engine = Engine::open(registry, settings).await.map_err(|error| Failed::Machine(error.to_string()))?;
     let listener = TcpListener::bind(config.listen)
         .await
         .map_err(|error| Failed::Machine(format!("cannot listen on {}: {error}", config.listen)))?;
@@ -44,21 +54,85 @@ async fn serve(config: &Config, registry: Registry) -> Result<(), Failed> {
     tracing::info!(%address, data = %config.data.display(), store = %config.store, role = ?config.role, "serving");
     let (stop, stopped) = watch::channel(false);
     tokio::spawn(watch_signals(stop));
+    tokio::spawn(watch_keys(app.clone(), arguments.config.clone(), arguments.flags.clone()));
     let left = http::serve(listener, app, stopped, seconds(config.shutdown.grace_s)).await;
     engine.close(left).await;
     tracing::info!("stopped");
     Ok(())
 }
 
-/// The address, and three things to try.
+/// How often it is looked whether the file of the settings is another one.
+const LOOK: Duration = Duration::from_secs(2);
+
+/// Takes over the keys of the settings when they change and when it is told to (SIGHUP). Whatever else is changed there
+/// waits for a restart.
+async fn watch_keys(app: App, file: Option<PathBuf>, flags: Flags) {
+    let state = || {
+        let about = file.as_ref().and_then(|file| std::fs::metadata(file).ok())?;
+        Some((about.modified().ok()?, about.len()))
+    };
+    let Some(mut told) = Hangups::new() else { return };
+    let mut before = state();
+    loop {
+        let is_told = tokio::select! {
+            () = told.next() => true,
+            () = tokio::time::sleep(LOOK) => false,
+        };
+        let now = state();
+        if !is_told && now == before {
+            continue;
+        }
+        before = now;
+        match Config::load(file.as_deref(), &flags) {
+            Ok(config) if app.replace_keys(&config.auth) => {
+                tracing::info!(keys = config.auth.keys.len(), "the keys are read again");
+            }
+            Ok(_) => tracing::error!(
+                "the settings name no key any more, which would open the service to everybody: the keys before stay in \
+                 force until a restart"
+            ),
+            Err(error) => tracing::error!(%error, "the settings cannot be read: the keys before stay in force"),
+        }
+    }
+}
+
+#[cfg(unix)]
+struct Hangups(tokio::signal::unix::Signal);
+
+#[cfg(unix)]
+impl Hangups {
+    fn new() -> Option<Self> {
+        let signal = tokio::signal::unix::signal(tokio::signal::unix::SignalKind::hangup());
+        signal.map(Self).inspect_err(|error| tracing::error!(%error, "signals cannot be watched")).ok()
+    }
+    async fn next(&mut self) {
+        self.0.recv().await;
+    }
+}
+
+#[cfg(not(unix))]
+struct Hangups;
+
+#[cfg(not(unix))]
+impl Hangups {
+    #[allow(clippy::unnecessary_wraps)]
+    fn new() -> Option<Self> {
+        Some(Self)
+    }
+    async fn next(&mut self) {
+        std::future::pending().await
+    }
+}
+
+/// The address, the workbench first, and what else to try.
 fn greet(engine: &Engine, address: std::net::SocketAddr) -> Result<(), Failed> {
     let post = engine.registry().entries().first().map_or(String::new(), |entry| {
         let id = entry.meta().id;
         format!("  precut example {id} --job | curl --json @- http://{address}/v1/{id}\n")
     });
     let greeting = format!(
-        "precut {} listens on http://{address}\n\nTry:\n  curl http://{address}/v1/calculators\n{post}  \
-         open http://{address}/docs in a browser\n\n",
+        "precut {} listens on http://{address}\n\nThe workbench, in a browser:\n  http://{address}/\n\nFor programs:\n  \
+         curl http://{address}/v1/calculators\n{post}  http://{address}/docs\n\n",
         env!("CARGO_PKG_VERSION")
     );
     match print(greeting.as_bytes()) {

@@ -6,7 +6,8 @@ use std::collections::HashSet;
 use precut_calc::calculator::Finding;
 use serde_json::{Map, Value};
 
-use super::json;
+use super::budget::Room;
+use super::{headings, json};
 use crate::registry::{CellKind, Faults, TableColumn, TablePlace, child, nearest};
 use crate::units;
 
@@ -25,24 +26,26 @@ pub(crate) struct CsvRows {
 }
 
 /// The rows of `text`; `None` after adding what is wrong with it at `pointer`.
-pub(crate) fn read(text: &str, place: &TablePlace, pointer: &str, faults: &mut Faults) -> Option<CsvRows> {
+pub(crate) fn read(
+    text: &str,
+    place: &TablePlace,
+    (pointer, room): (&str, &Room),
+    faults: &mut Faults,
+) -> Option<CsvRows> {
     let before = faults.total;
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let separator = separator(text);
-    let mut reader = csv::ReaderBuilder::new()
-        .delimiter(separator)
-        .has_headers(false)
-        .flexible(true)
-        .trim(csv::Trim::All)
-        .from_reader(text.as_bytes());
-    let mut records =
-        reader.records().filter_map(Result::ok).filter(|record| record.iter().any(|cell| !cell.is_empty()));
-    let Some(header) = records.next() else {
+    let Some(header) = Records::of(text, separator).next() else {
         faults.add(Finding::new("empty_table", pointer));
         return None;
     };
-    // One more than the most, so that the excess is seen.
-    let records: Vec<csv::StringRecord> = records.take(place.max_rows.saturating_add(1)).collect();
+    let records = || Records::of(text, separator).skip(1);
+    if records().nth(place.max_rows).is_some() {
+        // A table has far fewer rows than 2^53.
+        #[allow(clippy::cast_precision_loss)]
+        faults.add(Finding::new("too_many_rows", pointer).with("maximum", place.max_rows as f64));
+        return None;
+    }
     let lines = Lines { header: line(text, &header), decimal_comma: separator != b',', records: &records };
     let columns = columns(&header, &lines, place, pointer, faults);
     if faults.total > before {
@@ -50,15 +53,12 @@ pub(crate) fn read(text: &str, place: &TablePlace, pointer: &str, faults: &mut F
     }
     let table = Table { columns: &columns, decimal_comma: separator != b',', pointer };
     let mut read = CsvRows::default();
-    for (number, record) in records.iter().enumerate() {
-        if number == place.max_rows {
-            // A table has far fewer rows than 2^53.
-            #[allow(clippy::cast_precision_loss)]
-            faults.add(Finding::new("too_many_rows", pointer).with("maximum", place.max_rows as f64));
+    for (number, record) in records().enumerate() {
+        if !room.take(row_bytes(columns.len())) {
             return None;
         }
-        let line = line(text, record);
-        read.rows.push(table.row(number, record, line, faults));
+        let line = line(text, &record);
+        read.rows.push(table.row(number, &record, line, faults));
         read.lines.push(line);
     }
     (faults.total == before).then_some(read)
@@ -100,7 +100,38 @@ struct CsvColumn<'a> {
 struct Lines<'a> {
     header: u64,
     decimal_comma: bool,
-    records: &'a [csv::StringRecord],
+    /// The lines that have something in them, from the first after the header: read again each time, as all of them
+    /// together take many times the memory of their text.
+    records: &'a dyn Fn() -> std::iter::Skip<Records<'a>>,
+}
+
+/// The lines of a text that have something in them.
+struct Records<'a>(csv::StringRecordsIntoIter<&'a [u8]>);
+
+impl<'a> Records<'a> {
+    fn of(text: &'a str, separator: u8) -> Self {
+        let reader = csv::ReaderBuilder::new()
+            .delimiter(separator)
+            .has_headers(false)
+            .flexible(true)
+            .trim(csv::Trim::All)
+            .from_reader(text.as_bytes());
+        Self(reader.into_records())
+    }
+}
+
+impl Iterator for Records<'_> {
+    type Item = csv::StringRecord;
+    fn next(&mut self) -> Option<csv::StringRecord> {
+        self.0.by_ref().filter_map(Result::ok).find(|record| record.iter().any(|cell| !cell.is_empty()))
+    }
+}
+
+/// What a row with so many cells takes, bytes.
+const fn row_bytes(cells: usize) -> usize {
+    /// Name, value and place of a cell; a short name takes as much as the smallest piece of memory.
+    const CELL: usize = size_of::<Value>() + size_of::<String>() + 4 * size_of::<usize>();
+    size_of::<Value>() + size_of::<u64>() + cells * CELL
 }
 
 fn columns<'a>(
@@ -137,7 +168,8 @@ fn columns<'a>(
             }
             Err(BadHeader::Unknown { nearest: None }) => {
                 let allowed: Vec<String> = place.columns.iter().map(|column| column.name.clone()).collect();
-                faults.add(fault("unknown_column").with("allowed", allowed));
+                let found: Vec<String> = header.iter().take(used).map(shown).collect();
+                faults.add(fault("unknown_column").with("allowed", allowed).with("found", found));
             }
             Err(BadHeader::NoUnit { expected }) => faults.add(fault("missing_unit").with("expected", expected)),
             Err(BadHeader::WrongUnit { expected, received }) => {
@@ -149,7 +181,8 @@ fn columns<'a>(
     for field in place.columns.iter().filter(|field| field.required) {
         // A column under a name that was not understood is not missing as well.
         if names_read && !filled.contains(&field.name) {
-            faults.add(Finding::new("missing_column", pointer).with("column", field.name.clone()));
+            let found: Vec<String> = header.iter().take(used).map(shown).collect();
+            faults.add(Finding::new("missing_column", pointer).with("column", field.name.clone()).with("found", found));
         }
     }
     found
@@ -157,16 +190,14 @@ fn columns<'a>(
 
 /// A column that no field names, where the table takes such: numbers if all its cells are, else words.
 fn free_column<'a>(cell: &str, index: usize, lines: &Lines<'_>, place: &'a TablePlace) -> Option<CsvColumn<'a>> {
-    let (name, unit) = match cell.strip_suffix(']').and_then(|cell| cell.rsplit_once('[')) {
-        Some((name, unit)) => (name, units::suffix(unit.trim())),
-        None => (cell, String::new()),
-    };
+    let (name, unit) = headings::split(cell);
+    let unit = unit.map(units::suffix).unwrap_or_default();
     let name = name.trim().to_lowercase().replace(' ', "_") + &unit;
     if name.is_empty() || name.len() > LONGEST_NAME {
         return None;
     }
-    let cells = || lines.records.iter().filter_map(|record| record.get(index)).filter(|cell| !cell.is_empty());
-    let numbers = cells().all(|cell| decimal(cell, lines.decimal_comma).is_some());
+    let is_number = |cell: &str| cell.is_empty() || decimal(cell, lines.decimal_comma).is_some();
+    let numbers = (lines.records)().all(|record| record.get(index).is_none_or(is_number));
     let (within, kind) = match (&place.free.numbers, &place.free.words) {
         (Some(within), _) if numbers => (within, CellKind::Number),
         (_, Some(within)) => (within, CellKind::Word),
@@ -184,11 +215,8 @@ enum BadHeader {
 
 /// The field that a header means: `name [unit]`, `name_unit`, or the name alone where there is no unit.
 fn column<'a>(cell: &str, place: &'a TablePlace) -> Result<CsvColumn<'a>, BadHeader> {
-    let (name, bracket) = match cell.strip_suffix(']').and_then(|cell| cell.rsplit_once('[')) {
-        Some((name, unit)) => (name, Some(unit.trim())),
-        None => (cell, None),
-    };
-    let name = name.trim().to_lowercase().replace(' ', "_");
+    let (called, bracket) = headings::split(cell);
+    let name = called.trim().to_lowercase().replace(' ', "_");
     for field in &place.columns {
         let stem = field.name.strip_suffix(units::suffix(&field.unit).as_str()).unwrap_or(&field.name);
         if name == field.name || name == stem {
@@ -213,6 +241,9 @@ fn column<'a>(cell: &str, place: &'a TablePlace) -> Result<CsvColumn<'a>, BadHea
             return Ok(CsvColumn { field: Cow::Borrowed(field), unit: unit.to_owned(), within: None });
         }
     }
+    if let Some((field, unit)) = bracket.and_then(|unit| Some((headings::meant(called, unit, &place.columns)?, unit))) {
+        return Ok(CsvColumn { field: Cow::Borrowed(field), unit: unit.to_owned(), within: None });
+    }
     let names = place.columns.iter().map(|column| column.name.as_str());
     Err(BadHeader::Unknown { nearest: nearest(&name, names).map(str::to_owned) })
 }
@@ -236,7 +267,7 @@ impl Table<'_> {
             faults.add(finding.with("cells", used).with("columns", self.columns.len()));
             return Value::Null;
         }
-        let mut row = Map::new();
+        let mut row = Map::with_capacity(self.columns.len());
         for (index, column) in self.columns.iter().enumerate() {
             let cell = record.get(index).unwrap_or_default();
             let fault = |code| {
@@ -342,14 +373,14 @@ mod tests {
 
     fn rows(text: &str) -> Value {
         let mut faults = Faults::default();
-        let read = read(text, &place(), "/measurements", &mut faults);
+        let read = read(text, &place(), ("/measurements", &Room::default()), &mut faults);
         assert!(faults.listed.is_empty(), "{text}: {:?}", faults.listed);
         read.unwrap().rows.into()
     }
 
     fn codes(text: &str) -> Vec<&'static str> {
         let mut faults = Faults::default();
-        assert!(read(text, &place(), "/measurements", &mut faults).is_none(), "{text}");
+        assert!(read(text, &place(), ("/measurements", &Room::default()), &mut faults).is_none(), "{text}");
         for finding in &faults.listed {
             Texts::shared().try_finding(Language::En, "fault", finding).unwrap();
         }
@@ -412,7 +443,7 @@ mod tests {
     #[test]
     fn a_column_that_comes_twice_names_the_field() {
         let mut faults = Faults::default();
-        read("z_mm,z [m]\n1,2", &place(), "/measurements", &mut faults);
+        read("z_mm,z [m]\n1,2", &place(), ("/measurements", &Room::default()), &mut faults);
         let said = Texts::shared().try_finding(Language::En, "fault", &faults.listed[0]).unwrap();
         assert_eq!(said, "line 1: the column z [m] fills z_mm, which another column fills already");
     }
@@ -424,7 +455,7 @@ mod tests {
             crate::registry::FreeColumns { numbers: Some("further".to_owned()), words: Some("factors".to_owned()) };
         let mut faults = Faults::default();
         let text = "z_mm;deviation_um;Nose radius [mm];coolant;humidity\n1;2;0,8;on;\n3;4;1,2;7;0,5\n";
-        let read = read(text, &place, "/measurements", &mut faults).unwrap();
+        let read = read(text, &place, ("/measurements", &Room::default()), &mut faults).unwrap();
         assert!(faults.listed.is_empty(), "{:?}", faults.listed);
         assert_eq!(
             Value::Array(read.rows),
@@ -443,12 +474,12 @@ mod tests {
         let table = |count: usize| format!("z_mm,deviation_um,{}\n1,2{}\n", further(count), ",3".repeat(count));
         let most = place.columns.len() + MOST_FURTHER;
         let mut faults = Faults::default();
-        let rows = read(&table(most - 2), &place, "/measurements", &mut faults).unwrap().rows;
+        let rows = read(&table(most - 2), &place, ("/measurements", &Room::default()), &mut faults).unwrap().rows;
         assert_eq!(rows[0]["further"].as_object().map(Map::len), Some(most - 2));
         // Of a longer header nothing is read but its length.
         for further in [most - 1, 100_000] {
             let mut faults = Faults::default();
-            assert!(read(&table(further), &place, "/measurements", &mut faults).is_none());
+            assert!(read(&table(further), &place, ("/measurements", &Room::default()), &mut faults).is_none());
             let finding = &faults.listed[0];
             assert_eq!((finding.code, faults.total), ("too_many_columns", 1));
             let said = |language| Texts::shared().try_finding(language, "fault", finding).unwrap();
@@ -488,7 +519,7 @@ mod tests {
     #[test]
     fn a_bad_cell_is_named_by_line_and_column() {
         let mut faults = Faults::default();
-        read("z_mm,deviation_um\n\n1,2\n3,four\n", &place(), "/measurements", &mut faults);
+        read("z_mm,deviation_um\n\n1,2\n3,four\n", &place(), ("/measurements", &Room::default()), &mut faults);
         let finding = &faults.listed[0];
         assert_eq!(finding.pointer, "/measurements/1/deviation_um");
         assert_eq!(finding.values.get("line"), Some(&4.0.into()));
@@ -500,14 +531,14 @@ mod tests {
         #[test]
         fn no_text_makes_it_panic(text in "[a-z_ \\[\\];,\t\r\n\"0-9.eE+-]{0,200}") {
             let mut faults = Faults::default();
-            let read = read(&text, &place(), "/measurements", &mut faults);
+            let read = read(&text, &place(), ("/measurements", &Room::default()), &mut faults);
             prop_assert_eq!(read.is_none(), faults.total > 0);
         }
 
         #[test]
         fn any_bytes_after_a_good_header_give_rows_or_faults(text in "\\PC{0,200}") {
             let mut faults = Faults::default();
-            let read = read(&format!("z_mm,deviation_um\n{text}"), &place(), "", &mut faults);
+            let read = read(&format!("z_mm,deviation_um\n{text}"), &place(), ("", &Room::default()), &mut faults);
             prop_assert_eq!(read.is_none(), faults.total > 0);
         }
 

@@ -119,7 +119,7 @@ impl Error {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{code} at line {line}, column {column}")]
 pub struct SyntaxFault {
-    /// `bad_syntax`, `duplicate_key`, `trailing_bytes`, `nested_too_deeply`, `number_out_of_range`, `integer_too_large`,
+    /// `bad_syntax`, `duplicate_key`, `trailing_bytes`, `nested_too_deeply`, `number_out_of_range`, `number_too_long`, `integer_too_large`,
     /// `unexpected_end`, `empty_body`.
     pub code: &'static str,
     /// JSON Pointer to the value in which reading stopped.

@@ -10,7 +10,6 @@
 
 use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -32,7 +31,6 @@ pub(crate) struct Cores {
     job_slot_count: u32,
     slots: Arc<Semaphore>,
     slot_count: u32,
-    in_line: AtomicUsize,
     patience: Duration,
 }
 
@@ -48,8 +46,7 @@ impl Cores {
         let job_slots = Arc::new(Semaphore::new(job_slots));
         let slot_count = u32::try_from(2 * cores).unwrap_or(u32::MAX);
         let slots = Arc::new(Semaphore::new(2 * cores));
-        let in_line = AtomicUsize::new(0);
-        Ok(Self { pool, job_pool, job_slots, job_slot_count, slots, slot_count, in_line, patience })
+        Ok(Self { pool, job_pool, job_slots, job_slot_count, slots, slot_count, patience })
     }
 
     /// A slot if one is free.
@@ -61,17 +58,12 @@ impl Cores {
         }
     }
 
-    /// A slot, waiting for one in a line that is no longer than there are slots, and not for long.
+    /// A slot, waiting for one, but not for long. How many may wait is bounded by how many requests are in work.
     pub(crate) async fn slot(&self) -> Result<Slot, Error> {
-        let before = self.in_line.fetch_add(1, Ordering::Relaxed);
-        let _place = Place(&self.in_line);
         let busy = || {
             metrics::counter!("precut_busy_total").increment(1);
             Error::Busy { retry_after: RETRY_AFTER }
         };
-        if before >= self.slot_count as usize {
-            return self.slot_now()?.ok_or_else(busy);
-        }
         match tokio::time::timeout(self.patience, Arc::clone(&self.slots).acquire_owned()).await {
             Ok(Ok(permit)) => Ok(Slot(permit)),
             Ok(Err(_closed)) => Err(Error::ShuttingDown),
@@ -132,15 +124,6 @@ impl Cores {
         self.slots.close();
         self.job_slots.close();
         back
-    }
-}
-
-/// A place in the line.
-struct Place<'a>(&'a AtomicUsize);
-
-impl Drop for Place<'_> {
-    fn drop(&mut self) {
-        self.0.fetch_sub(1, Ordering::Relaxed);
     }
 }
 
@@ -262,7 +245,7 @@ pub(crate) fn guarded<T>(work: impl FnOnce() -> Result<T, Error>) -> Result<T, E
 #[allow(clippy::unwrap_used)]
 mod tests {
     use std::sync::Barrier;
-    use std::sync::atomic::AtomicBool;
+    use std::sync::atomic::{AtomicBool, Ordering};
     use std::sync::mpsc::channel;
     use std::thread::sleep;
     use std::time::Instant;

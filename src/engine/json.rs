@@ -1,39 +1,74 @@
 //! Bytes into a JSON value, more strictly than `serde_json` alone: a key twice in one object, bytes after the value,
 //! deep nesting, numbers that a double does not hold. `serde_json` would keep the last of two keys without a word.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::fmt;
 use std::ops::Range;
+use std::time::Duration;
 
-use serde::de::{DeserializeSeed, Deserializer, MapAccess, SeqAccess, Visitor};
+use serde::de::{DeserializeSeed, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde_json::map::Entry;
 use serde_json::{Map, Number, Value};
 
+use super::budget::Room;
 use super::error::{Error, SyntaxFault};
-use crate::registry::child;
+use crate::registry::{Shape, child, cut_short_at};
 
 /// Deepest nesting; below the parser's own limit of 128, so that the fault can be named with its place.
 const DEEPEST: usize = 100;
 /// Largest whole number that a double and RFC 8785 hold with all its digits: 2^53.
 const LARGEST_INTEGER: u64 = 1 << 53;
+/// Most characters of a number: the shortest decimal that tells two doubles apart has fewer than 800 digits.
+const LONGEST_NUMBER: usize = 1000;
+/// Names that no field has, of all objects of a job together: more than are ever shown, so that sorting by pointer still
+/// shows those that come first. Of further ones only the count is kept.
+const MOST_UNKNOWN: usize = 1000;
+/// So many bytes of such a name are kept.
+const LONGEST_UNKNOWN: usize = 100;
+/// What a value and a field take beside what they hold, bytes.
+const VALUE_BYTES: usize = size_of::<Value>();
+const FIELD_BYTES: usize = VALUE_BYTES + size_of::<String>() + 3 * size_of::<usize>();
+/// When a client that found no memory should come again.
+pub(crate) const RETRY_AFTER: Duration = Duration::from_secs(1);
+
+/// The value of `bytes`, whatever it is.
+pub(crate) fn parse(bytes: &[u8]) -> Result<Value, Error> {
+    parse_as(bytes, Shape::open(), &Room::default()).map(|parsed| parsed.value)
+}
+
+/// What was made of a body.
+#[derive(Debug)]
+pub(crate) struct Parsed {
+    pub(crate) value: Value,
+    /// Fields that have no name in the shape and are left out, as there are so many.
+    pub(crate) left_out: usize,
+}
 
 /// The value of `bytes`. A byte order mark is skipped. Whole numbers are integers however they are spelled (`500.0`,
 /// `5e2`), so that a count may be written like any other number.
-pub(crate) fn parse(bytes: &[u8]) -> Result<Value, Error> {
+///
+/// Of what does not fit the shape only as much is kept as shows what is wrong: of a field without a name in it the name, of a
+/// list where there may be none that it is one, of a list that is too long its most items and how many they are.
+pub(crate) fn parse_as(bytes: &[u8], shape: &Shape, room: &Room) -> Result<Parsed, Error> {
     let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
     if bytes.iter().all(u8::is_ascii_whitespace) {
         let message = "the body is empty".to_owned();
         let fault = SyntaxFault { code: "empty_body", pointer: String::new(), line: 1, column: 1, message };
         return Err(Error::Syntax(fault));
     }
+    if let Some(fault) = long_number(bytes) {
+        return Err(Error::Syntax(fault));
+    }
     let trail = Trail::default();
+    let (unknown, width) = (Cell::new(0), Cell::new(0));
     let mut deserializer = serde_json::Deserializer::from_slice(bytes);
-    let parsed = Strict { trail: &trail, depth: 0 }.deserialize(&mut deserializer);
-    match parsed {
+    let strict = Strict { trail: &trail, depth: 0, shape, room, unknown: &unknown, width: &width };
+    match strict.deserialize(&mut deserializer) {
         Ok(value) => match deserializer.end() {
-            Ok(()) => Ok(value),
+            Ok(()) => Ok(Parsed { value, left_out: unknown.get().saturating_sub(MOST_UNKNOWN) }),
             Err(error) => Err(Error::Syntax(fault(&error, Some("trailing_bytes"), String::new()))),
         },
+        Err(_) if room.is_spent() => Err(Error::Busy { retry_after: RETRY_AFTER }),
         Err(error) => {
             let pointer = trail.steps.borrow().iter().rev().fold(String::new(), |pointer, step| match step {
                 Step::Key(name) => child(&pointer, name),
@@ -42,6 +77,40 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Value, Error> {
             Err(Error::Syntax(fault(&error, trail.code.take(), pointer)))
         }
     }
+}
+
+/// The first number with more characters than any number needs: to read it takes memory by its length.
+fn long_number(bytes: &[u8]) -> Option<SyntaxFault> {
+    if bytes.len() <= LONGEST_NUMBER {
+        return None;
+    }
+    let (mut in_text, mut escaped, mut length) = (false, false, 0_usize);
+    for (index, byte) in bytes.iter().enumerate() {
+        match byte {
+            _ if escaped => escaped = false,
+            b'\\' if in_text => escaped = true,
+            b'"' => (in_text, length) = (!in_text, 0),
+            b'0'..=b'9' | b'.' | b'+' | b'-' | b'e' | b'E' if !in_text => {
+                length += 1;
+                if length > LONGEST_NUMBER {
+                    let before = &bytes[..=index - LONGEST_NUMBER];
+                    #[allow(clippy::naive_bytecount)] // once, of a refused body
+                    let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
+                    let column = before.iter().rev().take_while(|byte| **byte != b'\n').count();
+                    let message = format!("a number has more than {LONGEST_NUMBER} characters");
+                    return Some(SyntaxFault {
+                        code: "number_too_long",
+                        pointer: String::new(),
+                        line,
+                        column,
+                        message,
+                    });
+                }
+            }
+            _ => length = 0,
+        }
+    }
+    None
 }
 
 /// A finite number as JSON, whole numbers up to 2^53 as integers. Minus zero stays what it is.
@@ -127,14 +196,42 @@ impl Trail {
 struct Strict<'a> {
     trail: &'a Trail,
     depth: usize,
+    shape: &'a Shape,
+    room: &'a Room,
+    /// Fields so far that have no name in the shape.
+    unknown: &'a Cell<usize>,
+    /// Fields of the object before this one in its list: this one will have as many.
+    width: &'a Cell<usize>,
 }
 
-impl Strict<'_> {
+impl<'a> Strict<'a> {
     fn inside<E: serde::de::Error>(self) -> Result<Self, E> {
         if self.depth == DEEPEST {
             return Err(self.trail.refuse("nested_too_deeply", format_args!("nested more than {DEEPEST} deep")));
         }
         Ok(Self { depth: self.depth + 1, ..self })
+    }
+
+    fn of<'b>(self, shape: &'b Shape, width: &'b Cell<usize>) -> Strict<'b>
+    where
+        'a: 'b,
+    {
+        Strict { shape, width, ..self }
+    }
+
+    fn take<E: serde::de::Error>(self, bytes: usize) -> Result<(), E> {
+        if self.room.take(bytes) { Ok(()) } else { Err(E::custom("no memory is left for it")) }
+    }
+
+    /// Whether a field that has no name in the shape is one of those that are kept.
+    fn keeps_unknown(self) -> bool {
+        self.unknown.set(self.unknown.get() + 1);
+        self.unknown.get() <= MOST_UNKNOWN
+    }
+
+    fn failed<E>(self, step: Step, error: E) -> E {
+        self.trail.steps.borrow_mut().push(step);
+        error
     }
 
     fn integer<E: serde::de::Error>(self, size: u64, number: Number) -> Result<Value, E> {
@@ -182,42 +279,149 @@ impl<'de> Visitor<'de> for Strict<'_> {
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut access: A) -> Result<Value, A::Error> {
         let inside = self.inside()?;
-        let mut items = Vec::new();
-        loop {
-            match access.next_element_seed(inside) {
-                Ok(Some(item)) => items.push(item),
-                Ok(None) => return Ok(Value::Array(items)),
-                Err(error) => {
-                    self.trail.steps.borrow_mut().push(Step::Index(items.len()));
-                    return Err(error);
+        let width = Cell::new(0);
+        let (shape, most) = self.shape.items().unwrap_or((Shape::open(), 0));
+        let (mut items, mut count) = (Vec::new(), 0);
+        let item = inside.of(shape, &width);
+        while count < most {
+            match access.next_element_seed(item) {
+                Ok(Some(value)) => {
+                    self.take(VALUE_BYTES).map_err(|error| self.failed(Step::Index(count), error))?;
+                    items.push(value);
                 }
+                Ok(None) => return Ok(Value::Array(items)),
+                Err(error) => return Err(self.failed(Step::Index(count), error)),
+            }
+            count += 1;
+        }
+        loop {
+            match access.next_element_seed(Skipped(inside)) {
+                Ok(Some(())) => count += 1,
+                Ok(None) => break,
+                Err(error) => return Err(self.failed(Step::Index(count), error)),
             }
         }
+        if count > most && most > 0 {
+            items.push(cut_short_at(count));
+        }
+        Ok(Value::Array(items))
     }
 
     fn visit_map<A: MapAccess<'de>>(self, mut access: A) -> Result<Value, A::Error> {
         let inside = self.inside()?;
-        let mut fields = Map::new();
-        while let Some(name) = access.next_key::<String>()? {
+        let mut fields = Map::with_capacity(self.width.get());
+        let mut width = 0;
+        while let Some(name) = access.next_key_seed(Name(self.shape))? {
+            let shape = self.shape.field(&name);
+            let is_kept = shape.is_some() || self.keeps_unknown();
+            if !is_kept || (shape.is_none() && name.len() > LONGEST_UNKNOWN && fields.contains_key(&name)) {
+                access.next_value_seed(Skipped(inside)).map_err(|error| self.failed(Step::Key(name), error))?;
+                continue;
+            }
+            self.take::<A::Error>(FIELD_BYTES + name.len())?;
+            width += 1;
             match fields.entry(name) {
                 Entry::Occupied(there) => {
                     let name = there.key();
                     let error = self.trail.refuse("duplicate_key", format_args!("the key {name:?} occurs twice"));
-                    self.trail.steps.borrow_mut().push(Step::Key(name.clone()));
-                    return Err(error);
+                    return Err(self.failed(Step::Key(name.clone()), error));
                 }
-                Entry::Vacant(place) => match access.next_value_seed(inside) {
-                    Ok(value) => {
-                        place.insert(value);
+                Entry::Vacant(place) => {
+                    let value = match shape {
+                        Some(shape) => access.next_value_seed(inside.of(shape, &Cell::new(0))),
+                        None => access.next_value_seed(Skipped(inside)).map(|()| Value::Null),
+                    };
+                    match value {
+                        Ok(value) => {
+                            place.insert(value);
+                        }
+                        Err(error) => return Err(self.failed(Step::Key(place.key().clone()), error)),
                     }
-                    Err(error) => {
-                        self.trail.steps.borrow_mut().push(Step::Key(place.key().clone()));
-                        return Err(error);
-                    }
-                },
+                }
             }
         }
+        self.width.set(width);
         Ok(Value::Object(fields))
+    }
+}
+
+/// A value of which nothing is kept: nested too deeply and numbers out of range are told of it all the same.
+struct Skipped<'a>(Strict<'a>);
+
+impl<'de> DeserializeSeed<'de> for Skipped<'_> {
+    type Value = ();
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
+        deserializer.deserialize_any(self)
+    }
+}
+
+impl<'de> Visitor<'de> for Skipped<'_> {
+    type Value = ();
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a JSON value")
+    }
+    fn visit_unit<E>(self) -> Result<(), E> {
+        Ok(())
+    }
+    fn visit_bool<E>(self, _: bool) -> Result<(), E> {
+        Ok(())
+    }
+    fn visit_u64<E: serde::de::Error>(self, value: u64) -> Result<(), E> {
+        self.0.visit_u64(value).map(drop)
+    }
+    fn visit_i64<E: serde::de::Error>(self, value: i64) -> Result<(), E> {
+        self.0.visit_i64(value).map(drop)
+    }
+    fn visit_f64<E: serde::de::Error>(self, value: f64) -> Result<(), E> {
+        self.0.visit_f64(value).map(drop)
+    }
+    fn visit_str<E>(self, _: &str) -> Result<(), E> {
+        Ok(())
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut access: A) -> Result<(), A::Error> {
+        let inside = self.0.inside()?;
+        let mut count = 0;
+        loop {
+            match access.next_element_seed(Skipped(inside)) {
+                Ok(Some(())) => count += 1,
+                Ok(None) => return Ok(()),
+                Err(error) => return Err(self.0.failed(Step::Index(count), error)),
+            }
+        }
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut access: A) -> Result<(), A::Error> {
+        let inside = self.0.inside()?;
+        while access.next_key::<IgnoredAny>()?.is_some() {
+            access.next_value_seed(Skipped(inside))?;
+        }
+        Ok(())
+    }
+}
+
+/// The name of a field; one that has no place in the shape is cut to what can be shown.
+struct Name<'a>(&'a Shape);
+
+impl<'de> DeserializeSeed<'de> for Name<'_> {
+    type Value = String;
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<String, D::Error> {
+        deserializer.deserialize_str(self)
+    }
+}
+
+impl Visitor<'_> for Name<'_> {
+    type Value = String;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a name")
+    }
+    fn visit_str<E>(self, name: &str) -> Result<String, E> {
+        if name.len() <= LONGEST_UNKNOWN || self.0.field(name).is_some() {
+            return Ok(name.to_owned());
+        }
+        Ok(format!("{}…", &name[..name.floor_char_boundary(LONGEST_UNKNOWN)]))
     }
 }
 
@@ -278,6 +482,69 @@ mod tests {
         assert_eq!(refused("{\"a\": {\"b\": 1e400}}").pointer, "/a/b");
         let not_utf8 = parse(b"{\"a\": \"\xff\"}");
         assert!(matches!(not_utf8, Err(Error::Syntax(_))), "{not_utf8:?}");
+    }
+
+    #[test]
+    fn a_number_is_no_longer_than_numbers_are() {
+        let digits = |count| "1".repeat(count);
+        let fault = refused(&format!("{{\"a\":\n  0.{}}}", digits(LONGEST_NUMBER)));
+        assert_eq!((fault.code, fault.line, fault.column), ("number_too_long", 2, 3));
+        let longest = format!("[0.{}, {:?}]", digits(LONGEST_NUMBER - 2), digits(9 * LONGEST_NUMBER));
+        assert!((parse(longest.as_bytes()).unwrap()[0].as_f64().unwrap() - 1.0 / 9.0).abs() < 1e-15);
+    }
+
+    fn shape() -> Shape {
+        Shape::of(&json!({"type": "object", "additionalProperties": false, "properties": {
+            "rows": {"type": "array", "maxItems": 3, "items": {
+                "type": "object", "additionalProperties": false, "properties": {"z": {"type": "number"}},
+            }},
+            "number": {"type": "number"},
+        }}))
+    }
+
+    #[test]
+    fn of_what_does_not_fit_the_shape_only_as_much_is_kept_as_shows_it() {
+        let read = |text: &str| parse_as(text.as_bytes(), &shape(), &Room::default()).unwrap();
+        let long = "x".repeat(5000);
+        let parsed =
+            read(&format!("{{\"rows\": [{{\"z\": 1, \"y\": [[]]}}, 2, [3], 4, 5], \"number\": [1, 2], {long:?}: 1}}"));
+        let cut = format!("{}…", "x".repeat(LONGEST_UNKNOWN));
+        let kept = json!({"rows": [{"z": 1, "y": null}, 2, [], cut_short_at(5)], "number": [], cut: null});
+        assert_eq!((parsed.value, parsed.left_out), (kept, 0));
+        let names: Vec<String> = (0..MOST_UNKNOWN + 7).map(|number| format!("\"n{number}\":0")).collect();
+        let parsed = read(&format!("{{\"rows\":[{{{}}}],\"number\":1}}", names.join(",")));
+        assert_eq!((parsed.left_out, parsed.value["number"].as_u64()), (7, Some(1)));
+        assert_eq!(parsed.value["rows"][0].as_object().unwrap().len(), MOST_UNKNOWN);
+    }
+
+    #[test]
+    fn what_is_not_kept_is_held_to_depth_and_range_all_the_same() {
+        let code = |text: String| match parse_as(text.as_bytes(), &shape(), &Room::default()) {
+            Err(Error::Syntax(fault)) => Some(fault.code),
+            other => other.map(|_| None).unwrap(),
+        };
+        let nested = |depth: usize| format!("{}1{}", "[".repeat(depth), "]".repeat(depth));
+        let in_field = |name: &str, depth: usize| format!("{{\"{name}\":{}}}", nested(depth - 1));
+        assert_eq!(code(nested(DEEPEST)), None);
+        assert_eq!(code(nested(DEEPEST + 1)), Some("nested_too_deeply"));
+        for name in ["number", "unknown"] {
+            assert_eq!(code(in_field(name, DEEPEST)), None, "{name}");
+            assert_eq!(code(in_field(name, DEEPEST + 1)), Some("nested_too_deeply"), "{name}");
+            assert_eq!(code(format!("{{\"{name}\":[1e400]}}")), Some("number_out_of_range"), "{name}");
+        }
+    }
+
+    #[test]
+    fn a_body_takes_no_more_than_the_budget() {
+        let budget = crate::engine::budget::Budget::new(1 << 20);
+        let body = format!("[{}1]", "{\"a\":[1,2]},".repeat(10_000));
+        let room = Room::of(&budget);
+        let refused = parse_as(body.as_bytes(), Shape::open(), &room);
+        assert!(matches!(refused, Err(Error::Busy { .. })), "{refused:?}");
+        assert!(budget.used() <= 1 << 20);
+        drop(room);
+        assert!(parse_as(body.as_bytes(), Shape::open(), &Room::default()).is_ok());
+        assert_eq!(budget.used(), 0);
     }
 
     #[test]

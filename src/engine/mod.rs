@@ -5,12 +5,15 @@
 //! one calculation becomes a job.
 
 mod answer;
+mod asked;
+pub(crate) mod budget;
 mod compare;
 mod csv_table;
 mod envelope;
 mod error;
 mod exec;
 mod flight;
+mod headings;
 pub(crate) mod jobs;
 mod json;
 mod memory;
@@ -31,9 +34,9 @@ pub use crate::store::jobs::{JobId, JobKind, JobQuery, JobRecord, JobState, Prio
 pub use answer::{Body, CacheState, Checked, Solved, Stored, TablePart, Timings};
 pub use compare::{ModelComparison, Sides};
 pub use error::{Error, SyntaxFault};
-pub use jobs::{Answered, Ask, Feed, Job};
+pub use jobs::{Answered, Ask, Feed, Isolation, Job};
 pub use model::ModelContent;
-pub use models::{GivenModel, ModelAnswer, ModelError, ModelFile, ModelSource, NoShelf, OnShelf, StoredModel};
+pub use models::{GivenModel, ModelAnswer, ModelError, ModelFile, ModelSource, NoShelf, OnShelf, Shelf, StoredModel};
 pub use progress::Interim;
 pub use settings::EngineSettings;
 pub use study::STUDIES;
@@ -50,6 +53,8 @@ use crate::registry::{Entry, Registry};
 use crate::store::jobs::JobStore;
 use crate::store::models::ModelStore;
 use crate::store::{ResultPage, ResultQuery, ResultStore, Store};
+use asked::Asked;
+use budget::{Budget, Room};
 use exec::{Cores, Slot, guarded};
 use flight::{Boarded, Flights, Landed, Pilot};
 use jobs::Jobs;
@@ -82,6 +87,9 @@ pub(crate) struct Inner {
     /// Parameter studies: asked like a calculator, made of the registry's.
     studies: Arc<Entry>,
     summaries: Summaries,
+    /// Memory for bodies and what is made of them.
+    bodies: Budget,
+    asked: Asked,
     closed: AtomicBool,
 }
 
@@ -116,7 +124,7 @@ impl Engine {
         let jobs = Jobs::new(jobs);
         let host = Arc::new(study::InEngine::default());
         let studies = Arc::new(study::entry(&registry, settings.study_points, Arc::<study::InEngine>::clone(&host)));
-        let summaries = Summaries::default();
+        let (summaries, bodies) = (Summaries::default(), Budget::new(settings.bodies_bytes));
         let inner = Arc::new(Inner {
             registry,
             settings,
@@ -128,6 +136,8 @@ impl Engine {
             jobs,
             studies,
             summaries,
+            bodies,
+            asked: Asked::default(),
             closed,
         });
         host.move_in(&inner);
@@ -138,6 +148,11 @@ impl Engine {
     /// The calculators.
     pub fn registry(&self) -> &Registry {
         &self.inner.registry
+    }
+
+    /// Memory for bodies and what is made of them.
+    pub(crate) fn bodies(&self) -> &Budget {
+        &self.inner.bodies
     }
 
     /// Parameter studies, which are asked like a calculator.
@@ -153,7 +168,7 @@ impl Engine {
     /// The answer to a job, from the cache or computed. Dropping the future cancels the calculation unless another
     /// request waits for the same one.
     pub async fn solve(&self, calculator: &str, body: Body) -> Result<Solved, Error> {
-        match self.know(calculator, &body).await? {
+        match self.know(calculator, &body, &Shelf::default()).await? {
             Known::Kept(kept, parse) => hit(kept, parse),
             Known::New(ready, parse) => {
                 self.inner.afford(ready.prepared.cost)?;
@@ -163,7 +178,7 @@ impl Engine {
     }
 
     /// Reads a job, and what is known of it.
-    async fn know(&self, calculator: &str, body: &Body) -> Result<Known, Error> {
+    async fn know(&self, calculator: &str, body: &Body, shelf: &Shelf) -> Result<Known, Error> {
         let inner = &self.inner;
         if inner.closed.load(Ordering::Relaxed) {
             return Err(Error::ShuttingDown);
@@ -176,7 +191,7 @@ impl Engine {
         {
             return Ok(Known::Kept(kept, begun.elapsed()));
         }
-        let ready = inner.read(&entry, body.clone()).await?;
+        let ready = inner.read(&entry, body.clone(), shelf).await?;
         if ready.lasts {
             inner.memory.remember(fingerprint, ready.key);
         }
@@ -234,6 +249,20 @@ impl Engine {
         }
     }
 
+    /// Notes that an owner has asked for an answer: it is one of his from now on.
+    pub async fn note_asked(&self, key: &Key, owner: &str, cache: CacheState) -> Result<(), Error> {
+        if self.inner.asked.is_new(key, owner) || cache == CacheState::Miss {
+            self.inner.store.note_asked(*key, owner.to_owned()).await?;
+            self.inner.asked.add(key, owner);
+        }
+        Ok(())
+    }
+
+    /// Whether an owner has asked for an answer.
+    pub async fn has_asked(&self, key: &Key, owner: &str) -> Result<bool, Error> {
+        Ok(self.inner.store.has_asked(*key, owner.to_owned()).await?)
+    }
+
     /// The list of kept answers, newest first.
     pub async fn results(&self, query: ResultQuery) -> Result<ResultPage, Error> {
         Ok(self.inner.store.list(query).await?)
@@ -278,21 +307,22 @@ impl Inner {
     }
 
     /// Reads a job where that does no harm.
-    async fn read(self: &Arc<Self>, entry: &Arc<Entry>, body: Body) -> Result<Ready, Error> {
+    async fn read(self: &Arc<Self>, entry: &Arc<Entry>, body: Body, shelf: &Shelf) -> Result<Ready, Error> {
         if body.len() <= READ_AT_ONCE && !entry.is_composed() {
-            let found = self.find_model(entry, &body).await?;
-            let models = Models { registry: &self.registry, found };
+            let found = self.find_model(shelf, entry, &body).await?;
+            let models = Models { registry: &self.registry, found, room: Room::of(&self.bodies) };
             return guarded(|| read::read(entry, &body, &models));
         }
         let slot = match self.cores.slot_now()? {
             Some(slot) => slot,
             None => self.cores.slot().await?,
         };
-        let (this, entry, runtime) = (Arc::clone(self), Arc::clone(entry), Handle::current());
+        let (this, entry, shelf, runtime) = (Arc::clone(self), Arc::clone(entry), shelf.clone(), Handle::current());
         let work = move || {
             // The name of a model stands anywhere in the job. A thread of the pool may wait for the store.
-            let found = runtime.block_on(this.find_model(&entry, &body))?;
-            read::read(&entry, &body, &Models { registry: &this.registry, found })
+            let found = runtime.block_on(this.find_model(&shelf, &entry, &body))?;
+            let room = Room::of(&this.bodies);
+            read::read(&entry, &body, &Models { registry: &this.registry, found, room })
         };
         self.cores.run(slot, work).await
     }
@@ -459,7 +489,7 @@ pub fn check_with(registry: &Registry, calculator: &str, body: Body, model: &Giv
 
 /// Reads a job without a service.
 fn with_model(registry: &Registry, entry: &Arc<Entry>, body: &Body, model: &GivenModel) -> Result<read::Ready, Error> {
-    read::read_with(entry, body, &Models { registry, found: model.found() }, model.imposed())
+    read::read_with(entry, body, &Models::new(registry, model.found()), model.imposed())
 }
 
 /// The answer to a job in this thread, without cache, store or limit of cost: for the command line.

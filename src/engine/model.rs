@@ -10,6 +10,7 @@ use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
 
 use super::Quiet;
+use super::budget::Room;
 use super::read::Ready;
 use crate::registry::{Entry, ModelUse, Prepared, Registry, canonical, child, nearest, way};
 use crate::store::models::KeptModel;
@@ -157,6 +158,15 @@ pub(crate) struct Models<'a> {
     pub(crate) registry: &'a Registry,
     /// What the store knows of the name that the job asks for.
     pub(crate) found: Option<Found>,
+    /// Memory for what is made of the body.
+    pub(crate) room: Room,
+}
+
+impl<'a> Models<'a> {
+    /// Without a limit of memory.
+    pub(crate) fn new(registry: &'a Registry, found: Option<Found>) -> Self {
+        Self { registry, found, room: Room::default() }
+    }
 }
 
 /// What the store knows of a name.

@@ -8,6 +8,7 @@ use precut_calc::calculator::Finding;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
+use super::budget::Room;
 use super::compare::{self, ModelComparison};
 use super::model::{self, Found, ModelContent};
 use super::{Body, Engine, Error, Inner, Key, Stored, json as read_json};
@@ -24,6 +25,28 @@ const NEAR_NAMES: u32 = 1000;
 /// Largest content of a model, bytes. What a diagnosis gives takes some thousands, and models are kept until somebody
 /// deletes them.
 const MOST_CONTENT: usize = 256 << 10;
+
+/// An owner's part of the stored models: what stands before their names in the store. Names have no slash, so that none of
+/// one shelf is one of another.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Shelf(String);
+
+impl Shelf {
+    /// That of an owner; that of a service that knows no owners is the default.
+    pub fn of(owner: &str) -> Self {
+        Self(format!("{}/", owner.replace('%', "%25").replace('/', "%2F")))
+    }
+
+    fn full(&self, name: &str) -> String {
+        format!("{}{name}", self.0)
+    }
+
+    /// A model under the name that its owner knows.
+    fn plain(&self, kept: KeptModel) -> KeptModel {
+        let name = kept.name.strip_prefix(self.0.as_str()).map(ToOwned::to_owned);
+        KeptModel { name: name.unwrap_or(kept.name.clone()), ..kept }
+    }
+}
 
 /// A stored model.
 #[derive(Debug, Clone, PartialEq)]
@@ -137,7 +160,13 @@ impl ModelSource {
 
 impl Engine {
     /// Stores a model as the next revision of its name.
-    pub async fn put_model(&self, name: &str, source: ModelSource, only_new: bool) -> Result<ModelAnswer, ModelError> {
+    pub async fn put_model(
+        &self,
+        shelf: &Shelf,
+        name: &str,
+        source: ModelSource,
+        only_new: bool,
+    ) -> Result<ModelAnswer, ModelError> {
         let inner = &self.inner;
         if !model::is_name(name) {
             let finding = Finding::new("bad_model_name", "").with("name", name.to_owned());
@@ -165,64 +194,69 @@ impl Engine {
             return Err(ModelError::Invalid(vec![finding]));
         }
         // Revisions go on counting after a name was deleted.
-        let is_new = inner.models.model(name.to_owned(), None).await?.is_none();
+        let is_new = inner.models.model(shelf.full(name), None).await?.is_none();
         let new = NewModel {
-            name: name.to_owned(),
+            name: shelf.full(name),
             calculator: content.calculator.clone(),
             sha256: model::sha256(&text),
             content: text,
             only_new,
         };
         let kept = inner.models.put_model(new).await?.ok_or_else(|| ModelError::Exists(name.to_owned()))?;
-        Ok(ModelAnswer { model: stored(kept, content), is_new })
+        Ok(ModelAnswer { model: stored(shelf.plain(kept), content), is_new })
     }
 
     /// A model, `name` for its newest revision or `name@revision`.
-    pub async fn model(&self, asked: &str) -> Result<StoredModel, ModelError> {
+    pub async fn model(&self, shelf: &Shelf, asked: &str) -> Result<StoredModel, ModelError> {
         let inner = &self.inner;
         let found = match model::asked(asked) {
-            Some((name, revision)) => inner.models.model(name, revision).await?,
+            Some((name, revision)) => inner.models.model(shelf.full(&name), revision).await?,
             None => None,
         };
-        match found.and_then(|kept| ModelContent::read(&kept).map(|content| stored(kept, content))) {
+        match found.and_then(|kept| ModelContent::read(&kept).map(|content| stored(shelf.plain(kept), content))) {
             Some(model) => Ok(model),
-            None => Err(inner.unknown_model(asked).await?),
+            None => Err(inner.unknown_model(shelf, asked).await?),
         }
     }
 
     /// The newest revisions of up to `limit` models whose names follow `after`, by name.
-    pub async fn models(&self, after: String, limit: u32) -> Result<Vec<StoredModel>, ModelError> {
-        let kept = self.inner.models.models(after, limit).await?;
+    pub async fn models(&self, shelf: &Shelf, after: String, limit: u32) -> Result<Vec<StoredModel>, ModelError> {
+        let kept = self.inner.models.models(shelf.0.clone(), after, limit).await?;
         Ok(kept
             .into_iter()
             .filter_map(|kept| Some((ModelContent::read(&kept)?, kept)))
-            .map(|(c, k)| stored(k, c))
+            .map(|(c, k)| stored(shelf.plain(k), c))
             .collect())
     }
 
     /// Two models, each by `name` or `name@revision`, beside each other.
-    pub async fn compare_models(&self, asked: &str, with: &str) -> Result<ModelComparison, ModelError> {
-        compare::compare(&self.model(asked).await?, &self.model(with).await?)
+    pub async fn compare_models(&self, shelf: &Shelf, asked: &str, with: &str) -> Result<ModelComparison, ModelError> {
+        compare::compare(&self.model(shelf, asked).await?, &self.model(shelf, with).await?)
     }
 
     /// Deletes every revision of a model. Jobs that were accepted with it are not touched.
-    pub async fn delete_model(&self, name: &str) -> Result<(), ModelError> {
+    pub async fn delete_model(&self, shelf: &Shelf, name: &str) -> Result<(), ModelError> {
         let inner = &self.inner;
-        if model::is_name(name) && inner.models.delete_model(name.to_owned()).await? {
+        if model::is_name(name) && inner.models.delete_model(shelf.full(name)).await? {
             return Ok(());
         }
-        Err(inner.unknown_model(name).await?)
+        Err(inner.unknown_model(shelf, name).await?)
     }
 }
 
 impl Inner {
     /// What the store knows of the model that a job names; nothing where it names none.
-    pub(super) async fn find_model(&self, entry: &Arc<Entry>, body: &Body) -> Result<Option<Found>, Error> {
-        find_on(&*self.models, &self.registry, entry, body).await
+    pub(super) async fn find_model(
+        &self,
+        shelf: &Shelf,
+        entry: &Arc<Entry>,
+        body: &Body,
+    ) -> Result<Option<Found>, Error> {
+        find_on(&*self.models, shelf, &self.registry, entry, body, Room::of(&self.bodies)).await
     }
 
-    async fn unknown_model(&self, name: &str) -> Result<ModelError, Error> {
-        let names = names_on(&*self.models).await?;
+    async fn unknown_model(&self, shelf: &Shelf, name: &str) -> Result<ModelError, Error> {
+        let names = names_on(&*self.models, shelf).await?;
         let plain = name.split('@').next().unwrap_or_default();
         let nearest = nearest(plain, names.iter().map(String::as_str)).map(str::to_owned);
         Ok(ModelError::Unknown { name: name.to_owned(), nearest })
@@ -231,10 +265,12 @@ impl Inner {
 
 /// What a shelf has of the model that a job names; nothing where it names none.
 async fn find_on<S: ModelShelf + ?Sized>(
-    shelf: &S,
+    models: &S,
+    shelf: &Shelf,
     registry: &Registry,
     entry: &Entry,
     body: &Body,
+    room: Room,
 ) -> Result<Option<Found>, Error> {
     /// Looked for before anything is parsed: hardly any job has it.
     const FIELD: &[u8] = b"\"model\"";
@@ -244,17 +280,17 @@ async fn find_on<S: ModelShelf + ?Sized>(
     if entry.model_use() == ModelUse::None || !job.windows(FIELD.len()).any(|bytes| bytes == FIELD) {
         return Ok(None);
     }
-    let mut job = read_json::parse(job)?;
+    let mut job = read_json::parse_as(job, registry.shape_of(entry), &room)?.value;
     let Some(name) = model::named(registry, entry, &mut job) else { return Ok(None) };
     let Some((plain, revision)) = model::asked(&name) else { return Ok(None) };
-    Ok(Some(match shelf.model(plain, revision).await? {
-        Some(kept) => Found::Model(Box::new(kept)),
-        None => Found::Unknown(names_on(shelf).await?),
+    Ok(Some(match models.model(shelf.full(&plain), revision).await? {
+        Some(kept) => Found::Model(Box::new(shelf.plain(kept))),
+        None => Found::Unknown(names_on(models, shelf).await?),
     }))
 }
 
-async fn names_on<S: ModelShelf + ?Sized>(shelf: &S) -> Result<Vec<String>, Error> {
-    Ok(shelf.model_names(NEAR_NAMES).await?)
+async fn names_on<S: ModelShelf + ?Sized>(models: &S, shelf: &Shelf) -> Result<Vec<String>, Error> {
+    Ok(models.model_names(shelf.0.clone(), NEAR_NAMES).await?)
 }
 
 /// The stored model of a job that is solved without a service.
@@ -278,7 +314,7 @@ impl GivenModel {
     pub async fn stored(registry: &Registry, calculator: &str, body: &Body, data: &Path) -> Result<Self, NoShelf> {
         let entry = super::entry(registry, calculator)?;
         let shelf = SqliteShelf::open(data).await?;
-        let found = find_on(&shelf, registry, &entry, body).await;
+        let found = find_on(&shelf, &Shelf::default(), registry, &entry, body, Room::default()).await;
         shelf.close().await;
         Ok(Self::Stored(OnShelf(found?)))
     }

@@ -6,7 +6,9 @@ use bytes::Bytes;
 use precut_calc::calculator::{Failure, Finding};
 use serde_json::Value;
 
+use super::budget::Room;
 use super::error::Error;
+use super::json::Parsed;
 use super::model::{self, Held, Models};
 use super::{Body, Checked, TablePart, json, table};
 use crate::key::Key;
@@ -47,29 +49,34 @@ pub(crate) fn read_with(
         Body::Json(job) => (job, [].as_slice()),
         Body::Parts { job, tables } => (job, tables.as_slice()),
     };
-    let mut job = json::parse(job)?;
+    let Parsed { value: mut job, left_out } = json::parse_as(job, models.registry.shape_of(entry), &models.room)?;
     let misfit = given.and_then(|given| model::impose(models.registry, entry, &mut job, given));
     if let Some(misfit) = misfit {
         return Err(Found::of(vec![misfit]).with_rules(entry, &job));
     }
     let names_a_model = model::named(models.registry, entry, &mut job).is_some();
     let of_model = model::extend(models, entry, &mut job);
-    let ready = read_extended(entry, job, parts, of_model)?;
+    let ready = read_extended(entry, job, (parts, &models.room), left_out, of_model)?;
     Ok(Ready { lasts: !names_a_model, ..ready })
 }
 
 /// A job from a JSON value that [`json::parse`] made; a model in it is resolved.
 pub(crate) fn read_value(entry: &Arc<Entry>, job: Value, parts: &[TablePart]) -> Result<Ready, Error> {
-    read_extended(entry, job, parts, Vec::new())
+    read_extended(entry, job, (parts, &Room::default()), 0, Vec::new())
 }
 
 fn read_extended(
     entry: &Arc<Entry>,
     mut job: Value,
-    parts: &[TablePart],
+    (parts, room): (&[TablePart], &Room),
+    left_out: usize,
     of_model: Vec<Finding>,
 ) -> Result<Ready, Error> {
-    match check_schema(entry, &mut job, parts) {
+    let checked = check_schema(entry, &mut job, (parts, room));
+    if room.is_spent() {
+        return Err(Error::Busy { retry_after: json::RETRY_AFTER });
+    }
+    match checked.map_err(|found| Found { total: found.total + left_out, ..found }) {
         Ok(()) if of_model.is_empty() => prepared(entry, &job),
         Ok(()) => Err(Found::of(of_model).with_rules(entry, &job)),
         Err(found) => Err(found.and(of_model).with_rules(entry, &job)),
@@ -190,10 +197,10 @@ fn general_code(finding: &Finding) -> &str {
     }
 }
 
-fn check_schema(entry: &Entry, job: &mut Value, parts: &[TablePart]) -> Result<(), Found> {
+fn check_schema(entry: &Entry, job: &mut Value, (parts, room): (&[TablePart], &Room)) -> Result<(), Found> {
     let mut table_faults = Faults::default();
     let places = entry.tables_of(job).to_vec();
-    let tables = table::resolve(job, parts, &places, &mut table_faults);
+    let tables = table::resolve(job, (parts, room), &places, &mut table_faults);
     let mut schema_faults = Faults::default();
     // A resolved model is in order.
     let (plain, held) = model::split(entry, job);
@@ -212,7 +219,7 @@ fn check_schema(entry: &Entry, job: &mut Value, parts: &[TablePart]) -> Result<(
 
 /// What the schema alone finds wrong with a job.
 pub(crate) fn schema_faults(entry: &Entry, mut job: Value) -> Vec<Finding> {
-    check_schema(entry, &mut job, &[]).err().map(|found| found.findings).unwrap_or_default()
+    check_schema(entry, &mut job, (&[], &Room::default())).err().map(|found| found.findings).unwrap_or_default()
 }
 
 /// The faults sorted by pointer, as many as are listed.
@@ -263,7 +270,7 @@ mod tests {
     }
 
     fn read(entry: &Arc<Entry>, body: &Body) -> Result<Ready, Error> {
-        super::read(entry, body, &Models { registry: toy::shared(), found: None })
+        super::read(entry, body, &Models::new(toy::shared(), None))
     }
 
     fn body(job: &Value) -> Body {

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
+use super::Isolation;
 use crate::config::{Config, Role, milliseconds, seconds};
 use crate::store::StoreSettings;
 use crate::store::address::StoreAddress;
@@ -41,6 +42,10 @@ pub struct EngineSettings {
     pub job_slots: usize,
     /// How long finished jobs and their results are kept.
     pub job_age: Duration,
+    /// Memory of all bodies in work together and of what is read from them, bytes.
+    pub bodies_bytes: usize,
+    /// How a process is started for a job that may be deadly; without, such a job is given up by the count of its starts.
+    pub isolation: Option<Isolation>,
     /// So many points has a parameter study at most.
     pub study_points: u64,
     /// How long a job may stand in line for a core.
@@ -67,6 +72,8 @@ impl EngineSettings {
             queue_limit: 10_000,
             job_slots: Self::job_slots_of(cores),
             job_age: Duration::from_hours(30 * 24),
+            bodies_bytes: 128 << 20,
+            isolation: None,
             study_points: super::study::MOST_POINTS,
             patience: Duration::from_millis(250),
         }
@@ -92,6 +99,8 @@ impl EngineSettings {
             queue_limit: config.jobs.queue,
             job_slots: if config.jobs.slots == 0 { Self::job_slots_of(cores) } else { config.jobs.slots },
             job_age: Duration::from_secs(u64::from(config.jobs.days) * 24 * 3600),
+            bodies_bytes: config.limits.bodies_bytes,
+            isolation: None,
             study_points: config.limits.study_points,
             patience: Duration::from_millis(config.limits.queue_ms),
         }

@@ -4,6 +4,7 @@
 use precut_calc::calculator::Finding;
 use serde_json::{Map, Value, json};
 
+use super::budget::Room;
 use super::{TablePart, csv_table};
 use crate::registry::{Faults, Step, TablePlace, child, nearest};
 
@@ -22,7 +23,12 @@ pub(crate) struct Tables {
 }
 
 /// Puts rows in the place of CSV. What cannot be read becomes null.
-pub(crate) fn resolve(job: &mut Value, parts: &[TablePart], places: &[TablePlace], faults: &mut Faults) -> Tables {
+pub(crate) fn resolve(
+    job: &mut Value,
+    (parts, room): (&[TablePart], &Room),
+    places: &[TablePlace],
+    faults: &mut Faults,
+) -> Tables {
     let mut tables = Tables::default();
     for part in parts {
         if let Err(finding) = place_part(job, part, places) {
@@ -32,7 +38,7 @@ pub(crate) fn resolve(job: &mut Value, parts: &[TablePart], places: &[TablePlace
     for place in places {
         each_at(job, &place.path, String::new(), &mut |value, pointer| {
             let Some(text) = csv_text(value) else { return };
-            if let Some(read) = csv_table::read(&text, place, &pointer, faults) {
+            if let Some(read) = csv_table::read(&text, place, (&pointer, room), faults) {
                 tables.sources.push(CsvSource { pointer, lines: read.lines });
                 *value = read.rows.into();
             } else {
@@ -204,7 +210,12 @@ mod tests {
             .map(|(name, text)| TablePart { name: (*name).into(), text: text.to_string().into() })
             .collect();
         let mut faults = Faults::default();
-        resolve(&mut job, &parts, registry.entry("toy-bar").unwrap().tables_of(&Value::Null), &mut faults);
+        resolve(
+            &mut job,
+            (&parts, &Room::default()),
+            registry.entry("toy-bar").unwrap().tables_of(&Value::Null),
+            &mut faults,
+        );
         for finding in &faults.listed {
             Texts::shared().try_finding(Language::En, "fault", finding).unwrap();
         }

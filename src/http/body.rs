@@ -15,13 +15,19 @@ use http_body_util::BodyExt;
 use super::Peer;
 use super::problem::Problem;
 use crate::config::{Limits, seconds};
+use crate::engine::budget::{Budget, Held, Spent};
 use crate::engine::{Body, TablePart};
 
 /// Parts of a multipart body beside `job`; a job has fewer tables.
 const MOST_TABLES: usize = 16;
 
 /// The job in the body of a request; whether its measured tables may come as files is asked where that matters.
-pub(super) async fn job(request: Request, takes_tables: impl Fn() -> bool, limits: &Limits) -> Result<Body, Problem> {
+pub(super) async fn job(
+    request: Request,
+    takes_tables: impl Fn() -> bool,
+    limits: &Limits,
+    budget: &Budget,
+) -> Result<Body, Problem> {
     let kind = Kind::of(request.headers(), &takes_tables)?;
     let limit = match kind {
         Kind::Json => limits.json_bytes,
@@ -34,8 +40,8 @@ pub(super) async fn job(request: Request, takes_tables: impl Fn() -> bool, limit
             return Err(Problem::too_large(limit));
         }
         match kind {
-            Kind::Json => whole(request.into_body(), declared, limit).await.map(Body::Json),
-            Kind::Multipart => parts(request, limit).await,
+            Kind::Json => whole(request.into_body(), declared, limit, budget.hold()).await.map(Body::Json),
+            Kind::Multipart => parts(request, limit, budget).await,
         }
     };
     let time = seconds(limits.body_timeout_s);
@@ -84,8 +90,19 @@ fn declared_length(headers: &HeaderMap) -> Option<u64> {
     headers.get(CONTENT_LENGTH)?.to_str().ok()?.parse().ok()
 }
 
+/// Bodies up to this size are not held against the budget: as many as there may be requests take little.
+const UNCHARGED: usize = 32 << 10;
+
+/// Takes what a body that grows to `bytes` needs; `held` is what it has.
+fn charge(held: &mut Held, bytes: usize) -> Result<(), Problem> {
+    if bytes <= UNCHARGED {
+        return Ok(());
+    }
+    held.grow(bytes.saturating_sub(held.bytes())).map_err(|Spent| Problem::no_memory())
+}
+
 /// The bytes of a body. One that came in one piece is not copied.
-async fn whole(mut body: HttpBody, declared: Option<u64>, limit: usize) -> Result<Bytes, Problem> {
+async fn whole(mut body: HttpBody, declared: Option<u64>, limit: usize, mut held: Held) -> Result<Bytes, Problem> {
     let mut first = Bytes::new();
     let mut rest = BytesMut::new();
     while let Some(frame) = body.frame().await {
@@ -93,21 +110,23 @@ async fn whole(mut body: HttpBody, declared: Option<u64>, limit: usize) -> Resul
         if first.len() + rest.len() + data.len() > limit {
             return Err(Problem::too_large(limit));
         }
+        charge(&mut held, first.len() + rest.len() + data.len())?;
         if first.is_empty() && rest.is_empty() {
             first = data;
             continue;
         }
         if rest.is_empty() {
             // The limit was held against the declared length already.
-            rest.reserve(declared.and_then(|length| usize::try_from(length).ok()).unwrap_or(2 * first.len()));
+            let length = declared.and_then(|length| usize::try_from(length).ok()).unwrap_or(2 * first.len());
+            rest.reserve(length);
             rest.extend_from_slice(&std::mem::take(&mut first));
         }
         rest.extend_from_slice(&data);
     }
-    Ok(if rest.is_empty() { first } else { rest.freeze() })
+    Ok(held.with(if rest.is_empty() { first } else { rest.freeze() }))
 }
 
-async fn parts(mut request: Request, limit: usize) -> Result<Body, Problem> {
+async fn parts(mut request: Request, limit: usize, budget: &Budget) -> Result<Body, Problem> {
     DefaultBodyLimit::max(limit).apply(&mut request);
     let mut multipart =
         Multipart::from_request(request, &()).await.map_err(|error| Problem::multipart(error.body_text()))?;
@@ -117,11 +136,16 @@ async fn parts(mut request: Request, limit: usize) -> Result<Body, Problem> {
     };
     let mut job = None;
     let mut tables: Vec<TablePart> = Vec::new();
-    while let Some(field) = multipart.next_field().await.map_err(|error| fault(&error))? {
+    while let Some(mut field) = multipart.next_field().await.map_err(|error| fault(&error))? {
         let Some(name) = field.name().map(ToOwned::to_owned) else {
             return Err(Problem::multipart("a part has no name".to_owned()));
         };
-        let bytes = field.bytes().await.map_err(|error| fault(&error))?;
+        let (mut held, mut bytes) = (budget.hold(), BytesMut::new());
+        while let Some(data) = field.chunk().await.map_err(|error| fault(&error))? {
+            charge(&mut held, bytes.len() + data.len())?;
+            bytes.extend_from_slice(&data);
+        }
+        let bytes = held.with(bytes.freeze());
         if name == "job" {
             if job.replace(bytes).is_some() {
                 return Err(Problem::multipart("there are two parts `job`".to_owned()));

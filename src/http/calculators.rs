@@ -14,6 +14,7 @@ use serde_json::Value;
 use utoipa::ToSchema;
 
 use super::answer::{self, Parts, View};
+use super::auth::Caller;
 use super::jobs;
 use super::metrics::CacheCounters;
 use super::negotiate::{self, Media};
@@ -53,6 +54,7 @@ const PARAMETERS: &[&str] = &["table", "figure", "priority", "deadline_s"];
 
 /// `POST /v1/{calculator}`
 pub(super) async fn solve(app: App, room: Arc<Room>, request: Request) -> Result<Response, Problem> {
+    let caller = request.extensions().get::<Caller>().cloned().unwrap_or(Caller::Stranger);
     let mut query = Query::of(request.uri(), PARAMETERS)?;
     let priority = query.one_of("priority", Priority::ALL, Priority::word)?;
     let deadline_s = query.number("deadline_s", &(LEAST_DEADLINE_S..=MOST_DEADLINE_S))?;
@@ -69,18 +71,24 @@ pub(super) async fn solve(app: App, room: Arc<Room>, request: Request) -> Result
         deadline: deadline_s.map(Duration::from_secs_f64),
         idempotency_key: prefer::idempotency_key(headers)?,
         wait: preference.wait(),
-        ..Ask::plain(gate::owner(&app, &request))
+        shelf: caller.shelf(),
+        ..Ask::plain(gate::owner(&caller, &request))
     };
     let language = negotiate::language(headers);
     let mut condition = HeaderMap::new();
     for tag in headers.get_all(IF_NONE_MATCH) {
         condition.append(IF_NONE_MATCH, tag.clone());
     }
-    let job = body::job(request, || room.entry.takes_tables(), &app.limits).await?;
+    let job = body::job(request, || room.entry.takes_tables(), &app.limits, app.engine.bodies()).await?;
     let solved = match app.engine.submit(room.id(), job, ask).await? {
         Answered::Solved(solved) => solved,
         Answered::Job(job) => return Ok(jobs::accepted(&job, preference, language)),
     };
+    if let Some(owner) = caller.owner() {
+        // The answer is there, whether or not there is room to note whose it is.
+        let noted = app.engine.note_asked(&solved.stored.key, &owner, solved.cache).await;
+        noted.unwrap_or_else(|error| tracing::warn!(%error, "it is not noted who asked for an answer"));
+    }
     match solved.cache {
         CacheState::Hit => room.counters.hit.increment(1),
         CacheState::Miss => room.counters.miss.increment(1),

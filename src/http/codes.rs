@@ -12,6 +12,7 @@ pub const CODES: &[(&str, u16)] = &[
     ("integer_too_large", 400),
     ("nested_too_deeply", 400),
     ("number_out_of_range", 400),
+    ("number_too_long", 400),
     ("trailing_bytes", 400),
     ("unexpected_end", 400),
     // The request is at fault.
@@ -23,6 +24,7 @@ pub const CODES: &[(&str, u16)] = &[
     ("incomplete_body", 400),
     ("missing_job_part", 400),
     ("unauthorized", 401),
+    ("forbidden", 403),
     ("not_found", 404),
     ("unknown_calculator", 404),
     ("unknown_figure", 404),

@@ -6,6 +6,7 @@ use std::hash::{BuildHasher, Hash, RandomState};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+use axum::Extension;
 use axum::extract::{Path, Request, State};
 use axum::http::header::{CACHE_CONTROL, HeaderValue};
 use axum::http::{HeaderMap, HeaderName, StatusCode};
@@ -16,6 +17,7 @@ use precut_calc::calculator::Figure;
 use serde::Serialize;
 use utoipa::ToSchema;
 
+use super::auth::Caller;
 use super::jobs::{self, named};
 use super::problem::Problem;
 use super::{App, gate, negotiate, parts};
@@ -95,13 +97,14 @@ impl Drop for Place {
 /// `GET /v1/jobs/{id}/events`
 pub(super) async fn follow(
     State(app): State<App>,
+    Extension(caller): Extension<Caller>,
     Path(id): Path<String>,
     request: Request,
 ) -> Result<Response, Problem> {
-    let id = named(&id)?;
+    let id = named(&app, &caller, &id).await?.record.id;
     let seen = last_seen(request.headers());
     let language = negotiate::language(request.headers());
-    let owner = gate::owner(&app, &request);
+    let owner = gate::owner(&caller, &request);
     let place = app.streams.place(owner).ok_or_else(|| {
         Problem::new(StatusCode::TOO_MANY_REQUESTS, "too_many_streams")
             .with("limit", app.streams.most)

@@ -15,9 +15,9 @@ use axum::body::{Body, HttpBody as _};
 use axum::extract::{Request, State};
 use axum::http::header::{
     ACCEPT_ENCODING, CACHE_CONTROL, CONTENT_ENCODING, CONTENT_LANGUAGE, CONTENT_LENGTH, CONTENT_LOCATION,
-    CONTENT_SECURITY_POLICY, CONTENT_TYPE, ETAG, REFERRER_POLICY, VARY, WWW_AUTHENTICATE, X_CONTENT_TYPE_OPTIONS,
+    CONTENT_SECURITY_POLICY, CONTENT_TYPE, ETAG, HOST, REFERRER_POLICY, VARY, WWW_AUTHENTICATE, X_CONTENT_TYPE_OPTIONS,
 };
-use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, Version};
 use axum::middleware::Next;
 use axum::response::Response;
 use futures_util::FutureExt;
@@ -26,8 +26,9 @@ use tower_http::compression::CompressionLayer;
 use tower_http::compression::predicate::SizeAbove;
 use tracing::Instrument;
 
+use super::auth::Caller;
 use super::problem::Problem;
-use super::{App, CACHE_STATE, Peer, negotiate};
+use super::{App, CACHE_STATE, Peer, auth, negotiate};
 use crate::text::Language;
 
 /// Comes in and goes out with every request.
@@ -50,16 +51,22 @@ pub(super) async fn gate(State(app): State<App>, mut request: Request, next: Nex
     let allowed = allowed(&app, request.uri().path());
     let language = negotiate::language(request.headers());
     let encodings = request.headers_mut().remove(ACCEPT_ENCODING);
+    let caller = app.keys.caller(request.headers());
+    request.extensions_mut().insert(caller.clone());
     let span = tracing::info_span!(
         "request",
         id = id.to_str().unwrap_or_default(),
         method = method.as_str(),
-        path = request.uri().path()
+        path = request.uri().path(),
+        key = match &caller {
+            Caller::Holder(holder) => Some(holder.name.as_str()),
+            Caller::Anyone | Caller::Stranger => None,
+        }
     );
 
     let _in_flight = InFlight::new(&app);
     let response = async {
-        let response = match admit(&app, &request) {
+        let response = match admit(&app, &request, &caller) {
             Ok(()) => AssertUnwindSafe(next.run(request)).catch_unwind().await.unwrap_or_else(|_| {
                 // The panic hook has logged why.
                 Problem::new(StatusCode::INTERNAL_SERVER_ERROR, "internal").into_bare_response()
@@ -78,7 +85,11 @@ pub(super) async fn gate(State(app): State<App>, mut request: Request, next: Nex
 }
 
 /// Whether the request may be worked on at all.
-fn admit(app: &App, request: &Request) -> Result<(), Problem> {
+fn admit(app: &App, request: &Request, caller: &Caller) -> Result<(), Problem> {
+    let hosts = request.headers().get_all(HOST).iter().count();
+    if request.version() == Version::HTTP_11 && hosts != 1 {
+        return Err(Problem::of_status(StatusCode::BAD_REQUEST));
+    }
     if request.uri().path_and_query().is_some_and(|target| target.as_str().len() > MOST_TARGET_BYTES) {
         return Err(Problem::of_status(StatusCode::URI_TOO_LONG));
     }
@@ -89,15 +100,21 @@ fn admit(app: &App, request: &Request) -> Result<(), Problem> {
     let path = request.uri().path();
     let is_guarded = path.starts_with("/v1/") || path == "/metrics";
     if is_guarded {
-        let owner = app.keys.owner(request.headers());
         if let Some(rate) = &app.rate {
-            let client = owner.map_or_else(|| Client::of(request), Client::Key);
+            let client = match caller {
+                Caller::Holder(holder) => Client::Key(&holder.owner),
+                Caller::Anyone | Caller::Stranger => Client::of(request),
+            };
             rate.take(client, Instant::now())
                 .map_err(|wait| Problem::new(StatusCode::TOO_MANY_REQUESTS, "too_many_requests").retry_after(wait))?;
         }
-        if app.keys.required() && owner.is_none() {
+        if matches!(caller, Caller::Stranger) {
             return Err(Problem::new(StatusCode::UNAUTHORIZED, "unauthorized")
                 .header(WWW_AUTHENTICATE, HeaderValue::from_static("Bearer realm=\"precut\"")));
+        }
+        let scope = auth::needed(request.method(), path);
+        if !caller.may(scope) {
+            return Err(Problem::new(StatusCode::FORBIDDEN, "forbidden").with("scope", scope.word()));
         }
     }
     let is_probe = path.starts_with("/health/") || path == "/metrics";
@@ -132,10 +149,10 @@ impl Client<'_> {
 }
 
 /// Who asks, as a name for the fair order of jobs and the like.
-pub(super) fn owner(app: &App, request: &Request) -> String {
+pub(super) fn owner(caller: &Caller, request: &Request) -> String {
     use std::net::{Ipv4Addr, Ipv6Addr};
-    if let Some(name) = app.keys.owner(request.headers()) {
-        return format!("key:{name}");
+    if let Some(owner) = caller.owner() {
+        return owner;
     }
     match Client::of(request) {
         Client::V4(octets) => format!("ip:{}", Ipv4Addr::from(octets)),

@@ -1,5 +1,6 @@
 //! Jobs: listed, watched, cancelled, and their results.
 
+use axum::Extension;
 use axum::extract::{Path, State};
 use axum::http::header::{CACHE_CONTROL, CONTENT_LANGUAGE, CONTENT_TYPE, HeaderValue, LOCATION, RETRY_AFTER, VARY};
 use axum::http::{HeaderMap, StatusCode, Uri};
@@ -9,13 +10,14 @@ use utoipa::ToSchema;
 
 use super::App;
 use super::answer::{self, View};
+use super::auth::Caller;
 use super::document::Document;
 use super::negotiate;
 use super::parts::{JobFile, private};
 use super::prefer::{PREFERENCE_APPLIED, Preference};
 use super::problem::{Problem, ProblemDocument};
 use super::query::Query;
-use crate::engine::{CacheState, Error, Job, JobId, JobQuery, JobState, Priority, Timings};
+use crate::engine::{CacheState, Error, Job, JobQuery, JobState, Priority, Timings};
 use crate::text::{Language, Texts, told};
 
 /// Most jobs of one page.
@@ -224,7 +226,12 @@ pub(super) fn apply(response: &mut Response, preference: Preference) {
 }
 
 /// `GET /v1/jobs`
-pub(super) async fn list(State(app): State<App>, uri: Uri, headers: HeaderMap) -> Result<Response, Problem> {
+pub(super) async fn list(
+    State(app): State<App>,
+    Extension(caller): Extension<Caller>,
+    uri: Uri,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
     let mut query = Query::of(&uri, &["state", "calculator", "limit", "after"])?;
     let limit = query.number("limit", &(1..=MOST_ITEMS))?.unwrap_or(DEFAULT_ITEMS);
     let state = query.one_of("state", JobState::ALL, JobState::word)?;
@@ -235,7 +242,10 @@ pub(super) async fn list(State(app): State<App>, uri: Uri, headers: HeaderMap) -
     {
         return Err(Error::unknown(app.engine.registry(), id).into());
     }
-    let (jobs, next) = app.engine.jobs(JobQuery { state, calculator: calculator.clone(), limit, before }).await?;
+    let (jobs, next) = app
+        .engine
+        .jobs(JobQuery { state, calculator: calculator.clone(), owner: caller.shown(), limit, before })
+        .await?;
     let filter = state.map(|state| format!("&state={}", state.word())).unwrap_or_default()
         + &calculator.map(|id| format!("&calculator={id}")).unwrap_or_default();
     let language = negotiate::language(&headers);
@@ -260,28 +270,32 @@ pub(super) async fn list(State(app): State<App>, uri: Uri, headers: HeaderMap) -
     Ok(response)
 }
 
-/// The job that an address names.
-pub(super) fn named(id: &str) -> Result<JobId, Problem> {
-    id.parse().map_err(|_| Problem::missing("unknown_job", id))
+/// The job that an address names, if the caller may see it: one of another owner is as good as none.
+pub(super) async fn named(app: &App, caller: &Caller, id: &str) -> Result<Job, Problem> {
+    let absent = || Problem::missing("unknown_job", id);
+    let job = app.engine.job(id.parse().map_err(|_| absent())?).await?;
+    if caller.sees(&job.record.owner) { Ok(job) } else { Err(absent()) }
 }
 
 /// `GET /v1/jobs/{id}`
 pub(super) async fn read(
     State(app): State<App>,
+    Extension(caller): Extension<Caller>,
     Path(id): Path<String>,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let job = app.engine.job(named(&id)?).await?;
+    let job = named(&app, &caller, &id).await?;
     Ok(answered(&job, StatusCode::OK, negotiate::language(&headers)))
 }
 
 /// `GET /v1/jobs/{id}/job`
 pub(super) async fn input(
     State(app): State<App>,
+    Extension(caller): Extension<Caller>,
     Path(id): Path<String>,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let (record, input) = app.engine.job_input(named(&id)?).await?;
+    let (record, input) = app.engine.job_input(named(&app, &caller, &id).await?.record.id).await?;
     let job = serde_json::from_slice(&input).map_err(|_| Problem::internal())?;
     let document = Document::json(&JobFile { calculator: record.calculator, job }, None);
     Ok(private(document.respond(&headers)))
@@ -290,10 +304,11 @@ pub(super) async fn input(
 /// `DELETE /v1/jobs/{id}`
 pub(super) async fn cancel(
     State(app): State<App>,
+    Extension(caller): Extension<Caller>,
     Path(id): Path<String>,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let (job, before) = app.engine.cancel(named(&id)?).await?;
+    let (job, before) = app.engine.cancel(named(&app, &caller, &id).await?.record.id).await?;
     let status = if before == JobState::Running { StatusCode::ACCEPTED } else { StatusCode::OK };
     Ok(answered(&job, status, negotiate::language(&headers)))
 }
@@ -301,11 +316,12 @@ pub(super) async fn cancel(
 /// `GET /v1/jobs/{id}/result`
 pub(super) async fn result(
     State(app): State<App>,
+    Extension(caller): Extension<Caller>,
     Path(id): Path<String>,
     uri: Uri,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let stored = app.engine.job_result(named(&id)?).await?;
+    let stored = app.engine.job_result(named(&app, &caller, &id).await?.record.id).await?;
     let meta = stored.entry().meta();
     let view = View::of(&uri, &headers, meta, &answer::offered(meta))?;
     let mut response = answer::respond(stored.clone(), view, &headers).await?;

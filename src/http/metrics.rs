@@ -181,10 +181,26 @@ impl CacheCounters {
 
 /// `GET /metrics`
 pub(super) async fn get(State(app): State<App>) -> impl IntoResponse {
-    #[allow(clippy::cast_precision_loss)] // a count of requests in work
+    #[allow(clippy::cast_precision_loss)] // counts far below 2^53
     metrics::gauge!("http_requests_in_flight").set(app.in_flight.load(std::sync::atomic::Ordering::Relaxed) as f64);
+    metrics::gauge!("precut_bodies_bytes").set(app.engine.bodies().used() as f64);
+    of_the_process();
     let text = app.metrics.handle.render();
     ([(CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8"), (CACHE_CONTROL, "no-store")], text)
+}
+
+/// Memory and open files of the process, where the system tells them.
+fn of_the_process() {
+    /// Pages of memory are of this size wherever the system tells them this way.
+    const PAGE_BYTES: f64 = 4096.0;
+    let pages = std::fs::read_to_string("/proc/self/statm").ok();
+    if let Some(pages) = pages.and_then(|sizes| sizes.split(' ').nth(1)?.parse::<f64>().ok()) {
+        metrics::gauge!("process_resident_memory_bytes").set(pages * PAGE_BYTES);
+    }
+    if let Ok(open) = std::fs::read_dir("/proc/self/fd") {
+        #[allow(clippy::cast_precision_loss)] // a count of files
+        metrics::gauge!("process_open_fds").set(open.count() as f64);
+    }
 }
 
 /// The recorder of the process: the `metrics` facade knows only one.
@@ -220,7 +236,7 @@ fn recorder() -> &'static PrometheusHandle {
             metrics::Unit::Seconds,
             "Time that a calculation took on its core, by calculator."
         );
-        metrics::describe_counter!("precut_busy_total", "Jobs refused because every core computed and the line was full.");
+        metrics::describe_counter!("precut_busy_total", "Jobs refused because no core became free in time.");
         metrics::describe_counter!("precut_panics_total", "Calculations that crashed. Each is a fault of ours.");
         metrics::describe_counter!("precut_store_failures_total", "Failures of the store, by operation.");
         metrics::describe_counter!("precut_jobs_accepted_total", "Jobs put on record, by calculator.");
@@ -237,6 +253,9 @@ fn recorder() -> &'static PrometheusHandle {
         );
         metrics::describe_counter!("precut_queue_full_total", "Jobs refused because too many waited.");
         metrics::describe_counter!("precut_jobs_poisonous_total", "Jobs given up: they ended the process each time.");
+        metrics::describe_gauge!("precut_bodies_bytes", "Memory of bodies in work, of limits.bodies_bytes.");
+        metrics::describe_gauge!("process_resident_memory_bytes", "Memory of the process that is in use.");
+        metrics::describe_gauge!("process_open_fds", "Files and connections that the process has open.");
         metrics::describe_gauge!("precut_build_info", "Always 1; the version is its label.");
         metrics::gauge!("precut_build_info", "version" => env!("CARGO_PKG_VERSION")).set(1.0);
         handle

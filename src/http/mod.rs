@@ -37,7 +37,7 @@ use axum::http::{HeaderName, Uri};
 use axum::routing::{any, get, post};
 use tower_http::cors::{AllowOrigin, CorsLayer};
 
-use crate::config::{Config, Limits, Role};
+use crate::config::{self, Config, Limits, Role};
 use crate::engine::{Engine, Error};
 
 pub use answer::written;
@@ -108,6 +108,11 @@ impl App {
     pub fn stop(&self) {
         self.stopping.store(true, Ordering::Relaxed);
         self.engine.stop_jobs();
+    }
+
+    /// From now on these keys open the service, unless that would open to everybody what keys guard; whether they do.
+    pub fn replace_keys(&self, auth: &config::Auth) -> bool {
+        self.keys.replace(auth)
     }
 
     fn is_stopping(&self) -> bool {

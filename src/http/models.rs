@@ -1,5 +1,6 @@
 //! Stored models: what a diagnosis found, under a name that later jobs ask for.
 
+use axum::Extension;
 use axum::body::Body as HttpBody;
 use axum::extract::{Path, Request, State};
 use axum::http::header::{CACHE_CONTROL, CONTENT_TYPE, IF_NONE_MATCH, LOCATION};
@@ -9,11 +10,15 @@ use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
 
+use super::auth::Caller;
 use super::problem::Problem;
 use super::query::Query;
-use super::{App, body};
+use super::{App, body, jobs, results};
+use crate::config::Limits;
 use crate::engine::{Body, ModelAnswer, ModelError, ModelSource, StoredModel};
 
+/// Largest model that is read, bytes: four times what is kept of one, for who writes it with white space.
+const MOST_BYTES: usize = 1 << 20;
 /// Most models of one page.
 pub(super) const MOST_ITEMS: u32 = 500;
 /// Models of one page unless asked for more or fewer.
@@ -143,11 +148,16 @@ fn answered(status: StatusCode, value: &impl Serialize) -> Response {
 }
 
 /// `GET /v1/models`
-pub(super) async fn list(State(app): State<App>, uri: Uri) -> Result<Response, Problem> {
+pub(super) async fn list(
+    State(app): State<App>,
+    Extension(caller): Extension<Caller>,
+    uri: Uri,
+) -> Result<Response, Problem> {
     let mut query = Query::of(&uri, &["limit", "after"])?;
     let limit = query.number("limit", &(1..=MOST_ITEMS))?.unwrap_or(DEFAULT_ITEMS);
     // One more than asked for tells whether there is another page.
-    let mut models = app.engine.models(query.text("after").unwrap_or_default(), limit + 1).await?;
+    let shelf = caller.shelf();
+    let mut models = app.engine.models(&shelf, query.text("after").unwrap_or_default(), limit + 1).await?;
     let more = models.len() > limit as usize;
     models.truncate(limit as usize);
     let next = models.last().filter(|_| more).map(|last| format!("/v1/models?limit={limit}&after={}", last.name));
@@ -155,25 +165,43 @@ pub(super) async fn list(State(app): State<App>, uri: Uri) -> Result<Response, P
 }
 
 /// `GET /v1/models/{name}`
-pub(super) async fn read(State(app): State<App>, Path(name): Path<String>) -> Result<Response, Problem> {
-    Ok(answered(StatusCode::OK, &document(app.engine.model(&name).await?)))
+pub(super) async fn read(
+    State(app): State<App>,
+    Extension(caller): Extension<Caller>,
+    Path(name): Path<String>,
+) -> Result<Response, Problem> {
+    Ok(answered(StatusCode::OK, &document(app.engine.model(&caller.shelf(), &name).await?)))
 }
 
 /// `GET /v1/models/{name}/comparison`
-pub(super) async fn compare(State(app): State<App>, Path(name): Path<String>, uri: Uri) -> Result<Response, Problem> {
+pub(super) async fn compare(
+    State(app): State<App>,
+    Extension(caller): Extension<Caller>,
+    Path(name): Path<String>,
+    uri: Uri,
+) -> Result<Response, Problem> {
     let with = Query::of(&uri, &["with"])?.needed("with")?;
-    Ok(answered(StatusCode::OK, &app.engine.compare_models(&name, &with).await?))
+    Ok(answered(StatusCode::OK, &app.engine.compare_models(&caller.shelf(), &name, &with).await?))
 }
 
 /// `PUT /v1/models/{name}`
 pub(super) async fn store(
     State(app): State<App>,
+    Extension(caller): Extension<Caller>,
     Path(name): Path<String>,
     request: Request,
 ) -> Result<Response, Problem> {
     let only_new = wants_new(request.headers());
-    let Body::Json(sent) = body::job(request, || false, &app.limits).await? else { return Err(Problem::internal()) };
-    let ModelAnswer { model, is_new } = app.engine.put_model(&name, ModelSource::read(&sent)?, only_new).await?;
+    let limits = Limits { json_bytes: app.limits.json_bytes.min(MOST_BYTES), ..app.limits.clone() };
+    let sent = body::job(request, || false, &limits, app.engine.bodies()).await?;
+    let Body::Json(sent) = sent else { return Err(Problem::internal()) };
+    let source = ModelSource::read(&sent)?;
+    match &source {
+        ModelSource::Result(key) => drop(results::named(&app, &caller, &key.to_string()).await?),
+        ModelSource::Job(id) => drop(jobs::named(&app, &caller, &id.to_string()).await?),
+        ModelSource::Exported { .. } => {}
+    }
+    let ModelAnswer { model, is_new } = app.engine.put_model(&caller.shelf(), &name, source, only_new).await?;
     let location = format!("/v1/models/{}@{}", model.name, model.revision);
     let status = if is_new { StatusCode::CREATED } else { StatusCode::OK };
     let mut response = answered(status, &document(model));
@@ -188,8 +216,12 @@ fn wants_new(headers: &HeaderMap) -> bool {
 }
 
 /// `DELETE /v1/models/{name}`
-pub(super) async fn delete(State(app): State<App>, Path(name): Path<String>) -> Result<Response, Problem> {
-    app.engine.delete_model(&name).await?;
+pub(super) async fn delete(
+    State(app): State<App>,
+    Extension(caller): Extension<Caller>,
+    Path(name): Path<String>,
+) -> Result<Response, Problem> {
+    app.engine.delete_model(&caller.shelf(), &name).await?;
     let mut response = Response::new(HttpBody::empty());
     *response.status_mut() = StatusCode::NO_CONTENT;
     Ok(response)

@@ -1,22 +1,21 @@
 //! The parts of a kept result as data with words: its figures to be drawn, its tables to be shown, the job that made
 //! it to be changed and sent again. What the workbench shows comes from here.
 
-use std::str::FromStr;
-use std::sync::Arc;
-
+use axum::Extension;
 use axum::extract::{Path, State};
 use axum::http::header::CACHE_CONTROL;
-use axum::http::{HeaderMap, HeaderValue, StatusCode};
+use axum::http::{HeaderMap, HeaderValue};
 use axum::response::Response;
 use precut_calc::calculator::{Cells, Figure, Table};
 use serde::Serialize;
 use serde_json::{Value, json};
 use utoipa::ToSchema;
 
+use super::auth::Caller;
 use super::document::Document;
 use super::problem::Problem;
-use super::{App, answer, negotiate};
-use crate::engine::{Key, Stored};
+use super::{App, answer, negotiate, results};
+use crate::engine::Stored;
 use crate::text::{Language, Texts};
 
 /// The figures of an answer, as data.
@@ -76,11 +75,12 @@ pub(super) struct JobFile {
 /// `GET /v1/results/{key}/figures`
 pub(super) async fn figures(
     State(app): State<App>,
+    Extension(caller): Extension<Caller>,
     Path(name): Path<String>,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
     let language = negotiate::language(&headers);
-    let document = made(&app, &name, move |stored| {
+    let document = made((&app, &caller), &name, move |stored| {
         let items = stored.figures()?.iter().map(|figure| worded(figure, language)).collect();
         Ok(Document::json(&FigureList { items }, Some(language)))
     });
@@ -90,11 +90,12 @@ pub(super) async fn figures(
 /// `GET /v1/results/{key}/tables`
 pub(super) async fn tables(
     State(app): State<App>,
+    Extension(caller): Extension<Caller>,
     Path(name): Path<String>,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
     let language = negotiate::language(&headers);
-    let document = made(&app, &name, move |stored| {
+    let document = made((&app, &caller), &name, move |stored| {
         let items = stored.tables_in(language)?.into_iter().map(|table| shown(table, language)).collect();
         Ok(Document::json(&TableList { items }, Some(language)))
     });
@@ -104,10 +105,11 @@ pub(super) async fn tables(
 /// `GET /v1/results/{key}/job`
 pub(super) async fn job(
     State(app): State<App>,
+    Extension(caller): Extension<Caller>,
     Path(name): Path<String>,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let document = made(&app, &name, |stored| {
+    let document = made((&app, &caller), &name, |stored| {
         let job = serde_json::from_slice(&stored.input).map_err(|_| Problem::internal())?;
         Ok(Document::json(&JobFile { calculator: stored.entry().meta().id.to_owned(), job }, None))
     });
@@ -116,13 +118,11 @@ pub(super) async fn job(
 
 /// Makes a document of a kept result. Reading an answer back is work: not on the threads that move bytes.
 async fn made(
-    app: &App,
+    (app, caller): (&App, &Caller),
     name: &str,
     make: impl FnOnce(&Stored) -> Result<Document, Problem> + Send + 'static,
 ) -> Result<Document, Problem> {
-    let key = Key::from_str(name).map_err(|_| Problem::new(StatusCode::BAD_REQUEST, "bad_key"))?;
-    let absent = || Problem::new(StatusCode::NOT_FOUND, "unknown_result").with("key", name.to_owned());
-    let stored: Arc<Stored> = app.engine.result(&key).await?.ok_or_else(absent)?;
+    let stored = results::named(app, caller, name).await?;
     tokio::task::spawn_blocking(move || make(&stored)).await.map_err(|_| Problem::internal())?
 }
 

@@ -9,7 +9,7 @@ use std::time::Duration;
 use axum::http::header::RETRY_AFTER;
 use axum::http::{HeaderName, HeaderValue, StatusCode};
 use axum::response::{IntoResponse, Response};
-use precut_calc::calculator::{Failure, Finding, Infeasible, Values};
+use precut_calc::calculator::{Failure, Finding, Infeasible, Value as Datum, Values};
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -129,6 +129,11 @@ impl Problem {
         Self::new(StatusCode::PAYLOAD_TOO_LARGE, "body_too_large").with("limit_bytes", limit_bytes)
     }
 
+    /// The memory for bodies is spent.
+    pub(super) fn no_memory() -> Self {
+        Error::Busy { retry_after: Duration::from_secs(1) }.into()
+    }
+
     pub(super) fn too_slow(time: Duration) -> Self {
         Self::new(StatusCode::REQUEST_TIMEOUT, "timeout").with("limit_s", time.as_secs_f64())
     }
@@ -197,15 +202,16 @@ impl Problem {
     pub fn document(&self, language: Language, instance: Option<String>) -> ProblemDocument {
         let texts = Texts::shared();
         let inner = &*self.0;
+        let values = short_values(&inner.values);
         let errors: Vec<Notice> =
-            inner.findings.iter().map(|finding| texts.notice(language, "fault", finding)).collect();
+            inner.findings.iter().map(|finding| texts.notice(language, "fault", &short(finding))).collect();
         let (title, detail) = match (inner.by_finding, errors.first()) {
             // The class gives the title; what is wrong this time is what was found.
             (Some(class), Some(fault)) => {
-                let title = texts.word(language, "problem", &format!("{class}.title"), &inner.values);
+                let title = texts.word(language, "problem", &format!("{class}.title"), &values);
                 (title, fault.detail.clone())
             }
-            (class, _) => texts.problem(language, class.unwrap_or(inner.code), &inner.values),
+            (class, _) => texts.problem(language, class.unwrap_or(inner.code), &values),
         };
         ProblemDocument {
             kind: format!("/problems/{}", inner.code),
@@ -218,6 +224,33 @@ impl Problem {
             errors_total: inner.total,
             infeasible: inner.infeasible.clone(),
         }
+    }
+}
+
+/// Most characters of a text that came with a request and goes out with its answer.
+const LONGEST_SHOWN: usize = 300;
+
+/// The finding, with texts that are no longer than somebody reads: what is sent in megabytes does not come back.
+fn short(finding: &Finding) -> Finding {
+    Finding { pointer: short_text(&finding.pointer), values: short_values(&finding.values), ..finding.clone() }
+}
+
+fn short_values(values: &Values) -> Values {
+    values.iter().fold(Values::new(), |short, (name, value)| short.with(name, short_value(value)))
+}
+
+fn short_value(value: &Datum) -> Datum {
+    match value {
+        Datum::Text(text) if text.len() > LONGEST_SHOWN => Datum::Text(short_text(text).into()),
+        Datum::List(items) => Datum::List(items.iter().map(short_value).collect()),
+        other => other.clone(),
+    }
+}
+
+fn short_text(text: &str) -> String {
+    match text.char_indices().nth(LONGEST_SHOWN) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text.to_owned(),
     }
 }
 

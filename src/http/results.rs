@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::str::FromStr;
 use std::sync::Arc;
 
+use axum::Extension;
 use axum::extract::{Path, State};
 use axum::http::header::{CACHE_CONTROL, CONTENT_LANGUAGE, HeaderValue, VARY};
 use axum::http::{HeaderMap, StatusCode, Uri};
@@ -12,6 +13,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::answer::{self, View};
+use super::auth::Caller;
 use super::problem::Problem;
 use super::query::Query;
 use super::{App, CACHE_STATE, negotiate};
@@ -72,7 +74,12 @@ pub(super) struct ResultLinks {
 }
 
 /// `GET /v1/results`
-pub(super) async fn list(State(app): State<App>, uri: Uri, headers: HeaderMap) -> Result<Response, Problem> {
+pub(super) async fn list(
+    State(app): State<App>,
+    Extension(caller): Extension<Caller>,
+    uri: Uri,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
     let mut query = Query::of(&uri, &["calculator", "limit", "after"])?;
     let limit = query.number("limit", &(1..=MOST_ITEMS))?.unwrap_or(DEFAULT_ITEMS);
     let after = query.after::<Cursor>()?;
@@ -82,7 +89,8 @@ pub(super) async fn list(State(app): State<App>, uri: Uri, headers: HeaderMap) -
     {
         return Err(Error::unknown(app.engine.registry(), id).into());
     }
-    let page = app.engine.results(ResultQuery { calculator: calculator.clone(), limit: Some(limit), after }).await?;
+    let query = ResultQuery { calculator: calculator.clone(), owner: caller.shown(), limit: Some(limit), after };
+    let page = app.engine.results(query).await?;
     let asked: Vec<_> = page.items.iter().map(|item| (item.key, item.calculator.clone())).collect();
     let summaries = app.engine.summaries(&asked).await;
     let language = negotiate::language(&headers);
@@ -95,18 +103,29 @@ pub(super) async fn list(State(app): State<App>, uri: Uri, headers: HeaderMap) -
 /// `GET /v1/results/{key}`
 pub(super) async fn read(
     State(app): State<App>,
+    Extension(caller): Extension<Caller>,
     Path(name): Path<String>,
     uri: Uri,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let key = Key::from_str(&name).map_err(|_| Problem::new(StatusCode::BAD_REQUEST, "bad_key"))?;
-    let absent = || Problem::new(StatusCode::NOT_FOUND, "unknown_result").with("key", name.clone());
-    let stored: Arc<Stored> = app.engine.result(&key).await?.ok_or_else(absent)?;
+    let stored = named(&app, &caller, &name).await?;
     let meta = stored.entry().meta();
     let view = View::of(&uri, &headers, meta, &answer::offered(meta))?;
     let mut response = answer::respond(stored, view, &headers).await?;
     response.headers_mut().insert(CACHE_STATE, HeaderValue::from_static("hit"));
     Ok(response)
+}
+
+/// The result that an address names, if the caller has asked for it: another is as good as none.
+pub(super) async fn named(app: &App, caller: &Caller, name: &str) -> Result<Arc<Stored>, Problem> {
+    let key = Key::from_str(name).map_err(|_| Problem::new(StatusCode::BAD_REQUEST, "bad_key"))?;
+    let absent = || Problem::new(StatusCode::NOT_FOUND, "unknown_result").with("key", name.to_owned());
+    if let Some(owner) = caller.shown()
+        && !app.engine.has_asked(&key, &owner).await?
+    {
+        return Err(absent());
+    }
+    app.engine.result(&key).await?.ok_or_else(absent)
 }
 
 fn page_of(

@@ -22,6 +22,7 @@ use super::contract::{self, Contract, Make};
 use super::family;
 use super::place::{TablePlace, table_places};
 use super::schema::Components;
+use super::shape::Shape;
 use super::{RESERVED, RegistryError, Unwritable, append_result, child, non_finite_place};
 
 /// One calculator with its types closed over.
@@ -31,6 +32,8 @@ pub struct Entry {
     /// What jobs are held against, and where their tables stand: made for the first job.
     checker: OnceLock<Checker>,
     tables: OnceLock<Vec<TablePlace>>,
+    /// What a job may be made of, for who reads it.
+    shape: OnceLock<Shape>,
     /// Schemas of job and result with references followed and unions told apart: made for the first who asks.
     strict_input: OnceLock<Value>,
     strict_output: OnceLock<Value>,
@@ -152,6 +155,7 @@ impl Entry {
             contracts,
             checker: OnceLock::new(),
             tables: OnceLock::new(),
+            shape: OnceLock::new(),
             strict_input: OnceLock::new(),
             strict_output: OnceLock::new(),
             more_codes: Vec::new(),
@@ -336,6 +340,19 @@ impl Entry {
         // Who asks for the tables of a job checks it next.
         entry.checker();
         entry.tables()
+    }
+    /// What a job may be made of; `of_any` says it of the job of any calculator, where there is one inside.
+    pub(crate) fn shape(&self, of_any: impl FnOnce() -> Shape) -> &Shape {
+        self.shape.get_or_init(|| match self.members() {
+            [] => {
+                let own = Shape::of(&follows(self.input().strict()));
+                if self.composed { own.with_field("job", of_any()) } else { own }
+            }
+            members => members.iter().fold(Shape::default(), |mut all, member| {
+                all.join(Shape::of(&follows(member.entry.input().strict())));
+                all
+            }),
+        })
     }
     /// Whether a job may name a stored model.
     pub(crate) fn model_use(&self) -> ModelUse {

@@ -167,7 +167,7 @@ fn out_of_range(pointer: &str, received: &Value, limit: &Value, node: &Value) ->
 
 fn count(pointer: &str, code: &'static str, received: &Value, limit: u64, node: &Value) -> Finding {
     let size = match received {
-        Value::Array(items) => items.len(),
+        Value::Array(items) => items.last().and_then(cut_short).unwrap_or(items.len()),
         Value::Object(fields) => fields.len(),
         Value::String(text) => text.chars().count(),
         _ => 0,
@@ -175,6 +175,19 @@ fn count(pointer: &str, code: &'static str, received: &Value, limit: u64, node: 
     // Lengths are far below 2^53.
     #[allow(clippy::cast_precision_loss)]
     coded(code, pointer, node).measured(size as f64, limit as f64, "1")
+}
+
+/// Name of the one field of the object that stands in the place of all items beyond the most that a list may have.
+const CUT_SHORT: &str = "\u{0}items";
+
+/// The last item of a list that had more items than are kept.
+pub(crate) fn cut_short_at(items: usize) -> Value {
+    Value::Object(Map::from_iter([(CUT_SHORT.to_owned(), items.into())]))
+}
+
+/// How many items the list had that this one ends.
+fn cut_short(last: &Value) -> Option<usize> {
+    usize::try_from(last.get(CUT_SHORT)?.as_u64()?).ok()
 }
 
 fn numeric(mut finding: Finding, received: &Value, node: &Value) -> Finding {

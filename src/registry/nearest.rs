@@ -2,9 +2,14 @@
 
 /// Below this similarity (Jaro-Winkler, 0 to 1) a name is another one, not a slip.
 const ALIKE: f64 = 0.8;
+/// Nothing is called by a name longer than this, bytes; to compare takes time and memory by its length.
+const LONGEST: usize = 256;
 
 /// The known name most like `name`, if one is like it at all.
 pub(crate) fn nearest<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    if name.len() > LONGEST {
+        return None;
+    }
     let name = name.to_lowercase();
     known
         .map(|known| (strsim::jaro_winkler(&name, known), known))

@@ -7,7 +7,8 @@ use super::number;
 
 /// A table as CSV: UTF-8 without a byte-order mark, a comma between cells, a line feed after every
 /// line, one header line `name [unit]` (the bare name for words), decimal points. Numbers are the
-/// shortest that read back bit for bit; where there is none, the cell is empty.
+/// shortest that read back bit for bit; where there is none, the cell is empty. A word that a spreadsheet would run as
+/// a formula has an apostrophe in front, see `defused`.
 #[allow(clippy::missing_panics_doc)] // writing to memory cannot fail
 pub fn csv(table: &Table) -> String {
     let mut writer = WriterBuilder::new().terminator(Terminator::Any(b'\n')).from_writer(Vec::new());
@@ -23,8 +24,8 @@ pub fn csv(table: &Table) -> String {
 
 fn header(column: &Column) -> String {
     match column.unit {
-        "" => column.name.clone().into_owned(),
-        unit => format!("{} [{unit}]", column.name),
+        "" => defused(&column.name),
+        unit => defused(&format!("{} [{unit}]", column.name)),
     }
 }
 
@@ -38,8 +39,16 @@ fn length(column: &Column) -> usize {
 fn cell(column: &Column, row: usize) -> String {
     match &column.cells {
         Cells::Numbers(cells) => cells.get(row).copied().flatten().and_then(number::shortest).unwrap_or_default(),
-        Cells::Words(cells) => cells.get(row).map(|word| word.clone().into_owned()).unwrap_or_default(),
+        Cells::Words(cells) => cells.get(row).map(|word| defused(word)).unwrap_or_default(),
     }
+}
+
+/// A word as a cell: one that begins with `=`, `+`, `-`, `@`, a tab or a carriage return, where a spreadsheet begins a
+/// formula, gets an apostrophe in front, and so does one that begins with an apostrophe. To read it back, take one
+/// apostrophe away where there is one. Numbers are numbers: they need none.
+fn defused(word: &str) -> String {
+    const BEGINS: [char; 7] = ['=', '+', '-', '@', '\t', '\r', '\''];
+    if word.starts_with(BEGINS) { format!("'{word}") } else { word.to_owned() }
 }
 
 #[cfg(test)]
@@ -86,6 +95,20 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn no_word_begins_a_formula_and_every_word_reads_back(words in proptest::collection::vec("[=+@\t\r'\\-a|!,\"\n]{0,6}", 1..20)) {
+            let cells = words.iter().map(|word| Cow::Owned(word.clone())).collect();
+            let numbers = vec![-1.0; words.len()];
+            let table = Table { id: "t", columns: vec![Column::words("a", cells), Column::numbers("b", "1", &numbers)] };
+            let text = csv(&table);
+            let mut reader = ::csv::Reader::from_reader(text.as_bytes());
+            for (row, word) in reader.records().map(Result::unwrap).zip(&words) {
+                prop_assert!(!row[0].starts_with(['=', '+', '-', '@', '\t', '\r']), "{row:?}");
+                prop_assert_eq!(row[0].strip_prefix('\'').unwrap_or(&row[0]), word);
+                prop_assert_eq!(&row[1], "-1");
+            }
+        }
+
         #[test]
         fn every_number_reads_back(values in proptest::collection::vec(proptest::option::of(-1e300..1e300), 1..50)) {
             let table = Table { id: "t", columns: vec![Column::optional("a", "um/N", &values), Column::numbers("b", "1", &vec![1.0; values.len()])] };

@@ -11,11 +11,14 @@
 //! | diameters | always | `DIAMON` | `G7` |
 //! | path | exact enough by default | exact enough by default | `G64 P` one increment: bare `G64` may cut corners |
 //! | speed limit | system B: `G92 S`; system A: `G50 S` | `LIMS=` | `G96 D` |
-//! | end | `M30` | `M30` | `M2` |
+//! | tool | `T0303`: number and offset | `T3 D1` | `T3 M6`, `G43` for the offset |
+//! | stop | `M5`, then `M0` | `M5`, then `M0` | `M5`, then `M0` |
+//! | end, unless the job says which | `M30` | `M30` | `M2` |
+//! | end of a called program | `M99` | `M17` | `M2`: LinuxCNC returns from files by their end |
 //!
 //! In the other of Fanuc's two systems `G90`, `G92` and `G50` mean something else, so the program says which one it is for.
 
-use precut_calc::calculator::{Block, Dialect, Program};
+use precut_calc::calculator::{Block, Dialect, Program, ProgramEnd};
 
 use super::number::{at_most, decimals_of};
 
@@ -109,9 +112,21 @@ impl Writer {
                     self.line(&format!("G1{axes}{feed}"));
                 }
             }
-            Block::End => {
+            Block::Tool { number } => self.tool(number),
+            Block::Coolant { on } => self.line(if on { "M8" } else { "M9" }),
+            Block::Stop { ref reason } => {
                 self.line("M5");
-                self.line(if self.dialect == Dialect::LinuxCnc { "M2" } else { "M30" });
+                self.comment(reason);
+                self.line("M0");
+            }
+            Block::End(end) => {
+                self.line("M5");
+                self.line(match (end, self.dialect) {
+                    (None | Some(ProgramEnd::Return), Dialect::LinuxCnc) | (Some(ProgramEnd::M2), _) => "M2",
+                    (Some(ProgramEnd::Return), Dialect::Siemens) => "M17",
+                    (Some(ProgramEnd::Return), Dialect::Fanuc | Dialect::FanucA) => "M99",
+                    (None | Some(ProgramEnd::M30), _) => "M30",
+                });
             }
         }
     }
@@ -135,6 +150,17 @@ impl Writer {
                 self.line("G7");
                 let tolerance = at_most(self.increment_mm, self.decimals);
                 self.line(&format!("G64 P{tolerance}"));
+            }
+        }
+    }
+
+    fn tool(&mut self, number: u32) {
+        match self.dialect {
+            Dialect::Fanuc | Dialect::FanucA => self.line(&format!("T{number:02}{number:02}")),
+            Dialect::Siemens => self.line(&format!("T{number} D1")),
+            Dialect::LinuxCnc => {
+                self.line(&format!("T{number} M6"));
+                self.line("G43");
             }
         }
     }
@@ -268,7 +294,7 @@ mod tests {
                 cut(89.884_68, -1000.0, Some(0.5)),
                 cut(89.977_769, -2000.0, None),
                 Block::Rapid { x_diameter_mm: Some(96.0), z_mm: None },
-                Block::End,
+                Block::End(None),
             ],
         }
     }
@@ -346,6 +372,21 @@ mod tests {
     }
 
     #[test]
+    fn tool_coolant_stop_and_end_in_every_dialect() {
+        let lines = |dialect, end| {
+            let stop = Block::Stop { reason: "open the rest (at Z-200)".to_owned() };
+            let blocks = vec![Block::Tool { number: 3 }, Block::Coolant { on: true }, stop, Block::End(end)];
+            gcode(&Program { dialect, increment_mm: 0.001, blocks }, &[])
+        };
+        let fanuc = "%\nT0303\nM8\nM5\n(open the rest [at Z-200])\nM0\nM5\nM99\n%\n";
+        assert_eq!(lines(Dialect::FanucA, Some(ProgramEnd::Return)), fanuc);
+        assert_eq!(lines(Dialect::Siemens, None), "T3 D1\nM8\nM5\n; open the rest [at Z-200]\nM0\nM5\nM30\n");
+        assert!(lines(Dialect::Siemens, Some(ProgramEnd::Return)).ends_with("M5\nM17\n"));
+        assert!(lines(Dialect::LinuxCnc, None).starts_with("T3 M6\nG43\nM8\n"));
+        assert!(lines(Dialect::LinuxCnc, Some(ProgramEnd::M30)).ends_with("M5\nM30\n"));
+    }
+
+    #[test]
     fn increments_that_are_no_power_of_ten() {
         let cut = |x_diameter_mm| Block::Cut { x_diameter_mm, z_mm: 0.0, feed_mm_per_rev: None };
         let blocks = vec![cut(10.000_24), cut(10.000_25), cut(-0.000_1)];
@@ -373,7 +414,9 @@ mod tests {
         let length = -1e5..1e5;
         prop_oneof![
             Just(Block::Modes),
-            Just(Block::End),
+            Just(Block::End(None)),
+            (1..99_u32).prop_map(|number| Block::Tool { number }),
+            Just(Block::Stop { reason: "G0 X1. (open the rest)".to_owned() }),
             (0.1..1e4).prop_map(|rpm| Block::SpindleSpeed { rpm }),
             (0.1..1e4, 0.1..1e4)
                 .prop_map(|(speed_m_per_min, limit_rpm)| Block::SurfaceSpeed { speed_m_per_min, limit_rpm }),

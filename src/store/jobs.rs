@@ -161,6 +161,16 @@ words! {
     }
 }
 
+/// So many jobs of its priority that came later go before a job of that length, as a rule: the shorter goes first, and who
+/// waits for long comes up, whatever else comes.
+pub(crate) fn yields_to(estimate_ms: f64) -> i64 {
+    /// The longest give way to no more than those of an hour.
+    const LONGEST_S: f64 = 3600.0;
+    #[allow(clippy::cast_possible_truncation)] // 0 to 11
+    let doublings = (1.0 + (estimate_ms / 1e3).clamp(0.0, LONGEST_S)).log2() as i64;
+    doublings
+}
+
 /// A job to be accepted.
 #[derive(Debug, Clone)]
 pub struct NewJob {
@@ -237,6 +247,8 @@ pub struct JobRecord {
     pub deadline_ms: Option<i64>,
     /// When its result may go.
     pub expires_ms: Option<i64>,
+    /// Whose it is.
+    pub owner: String,
 }
 
 /// What came of a new job.
@@ -330,6 +342,8 @@ pub struct JobQuery {
     pub state: Option<JobState>,
     /// Only those of this calculator.
     pub calculator: Option<String>,
+    /// Only those of this owner.
+    pub owner: Option<String>,
     /// At most so many.
     pub limit: u32,
     /// Only those before this one.
@@ -409,8 +423,8 @@ pub trait JobStore: Send + Sync + 'static {
     fn job_inputs(&self, ids: Vec<JobId>, most: usize) -> BoxFuture<'_, Result<Vec<(JobId, Bytes)>, StoreError>>;
     /// How many wait and run.
     fn counts(&self) -> BoxFuture<'_, Result<JobCounts, StoreError>>;
-    /// Starts charged to the job's computation so far, if it waits.
-    fn waiting_attempts(&self, id: JobId) -> BoxFuture<'_, Result<Option<u32>, StoreError>>;
+    /// Starts charged to the job's computation so far and its calculator, if it waits.
+    fn waiting(&self, id: JobId) -> BoxFuture<'_, Result<Option<(u32, String)>, StoreError>>;
     /// Takes the job and all equal ones that wait under a lease, and charges them one start; fails them, with
     /// `problem`, if they have been charged `most` already.
     fn claim(&self, id: JobId, lease: Lease, most: u32, problem: String) -> BoxFuture<'_, Result<Claimed, StoreError>>;

@@ -1,6 +1,7 @@
 //! Kept results, and jobs with their queue. Nothing outside this module speaks SQL.
 
 pub mod address;
+pub mod backup;
 pub mod jobs;
 mod ledger;
 pub mod models;
@@ -91,6 +92,10 @@ pub trait ResultStore: Send + Sync + 'static {
     fn put(&self, result: KeptResult);
     /// The results, newest first, those just put among them.
     fn list(&self, query: ResultQuery) -> BoxFuture<'_, Result<ResultPage, StoreError>>;
+    /// Notes that an owner has asked for a result.
+    fn note_asked(&self, key: Key, owner: String) -> BoxFuture<'_, Result<(), StoreError>>;
+    /// Whether an owner has asked for a result, by a request or a job.
+    fn has_asked(&self, key: Key, owner: String) -> BoxFuture<'_, Result<bool, StoreError>>;
     /// The filled jobs of kept results, compressed, as far as they take no more than so many bytes; those that are not
     /// there are left out.
     fn inputs(&self, keys: Vec<Key>, most: usize) -> BoxFuture<'_, Result<Vec<(Key, Bytes)>, StoreError>>;
@@ -161,6 +166,8 @@ pub struct KeptResult {
 pub struct ResultQuery {
     /// Only those of this calculator.
     pub calculator: Option<String>,
+    /// Only those that this owner has asked for.
+    pub owner: Option<String>,
     /// At most so many; [`ResultQuery::LIMIT`] unless told, never above [`ResultQuery::MOST`].
     pub limit: Option<u32>,
     /// Where the page before ended.

@@ -40,10 +40,11 @@ pub struct NewModel {
 pub trait ModelShelf: Send + Sync + 'static {
     /// A revision of a model, or its newest.
     fn model(&self, name: String, revision: Option<u32>) -> BoxFuture<'_, Result<Option<KeptModel>, StoreError>>;
-    /// The newest revisions of up to `limit` models whose names follow `after`, by name.
-    fn models(&self, after: String, limit: u32) -> BoxFuture<'_, Result<Vec<KeptModel>, StoreError>>;
-    /// The names of up to `limit` models, in order.
-    fn model_names(&self, limit: u32) -> BoxFuture<'_, Result<Vec<String>, StoreError>>;
+    /// The newest revisions of up to `limit` models of a shelf whose names follow `after`, by name. A shelf is what stands
+    /// before the names, see [`crate::engine::Shelf`]; nothing behind it has a slash.
+    fn models(&self, shelf: String, after: String, limit: u32) -> BoxFuture<'_, Result<Vec<KeptModel>, StoreError>>;
+    /// The names of up to `limit` models of a shelf, in order.
+    fn model_names(&self, shelf: String, limit: u32) -> BoxFuture<'_, Result<Vec<String>, StoreError>>;
 }
 
 /// Where models are kept.

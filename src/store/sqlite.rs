@@ -156,25 +156,24 @@ impl SqliteStore {
         let limit = query.limit.unwrap_or(ResultQuery::LIMIT).clamp(1, ResultQuery::MOST);
         let after = query.after.map(|cursor| (cursor.created_ms, cursor.key.as_bytes().to_vec()));
         let (created_ms, key) = after.unwrap_or((i64::MAX, vec![0xff; 32]));
+        let index = if query.calculator.is_some() { "results_by_calculator" } else { "results_by_time" };
+        let mut statement = QueryBuilder::<Sqlite>::new(
+            "SELECT key, calculator, version, engine, bytes, created_ms FROM results INDEXED BY ",
+        );
+        statement.push(index).push(" WHERE (created_ms, key) < (").push_bind(created_ms);
+        statement.push(", ").push_bind(key).push(")");
+        if let Some(calculator) = query.calculator {
+            statement.push(" AND calculator = ").push_bind(calculator);
+        }
+        if let Some(owner) = query.owner {
+            let of = "EXISTS (SELECT 1 FROM asked WHERE asked.key = results.key AND asked.owner = ";
+            statement.push(" AND (").push(of).push_bind(owner.clone());
+            let of = ") OR EXISTS (SELECT 1 FROM precut_jobs AS job WHERE job.key = results.key AND job.owner = ";
+            statement.push(of).push_bind(owner).push("))");
+        }
         // One more than asked for tells whether there is another page.
-        let statement = match query.calculator {
-            None => sqlx::query_as(
-                "SELECT key, calculator, version, engine, bytes, created_ms FROM results INDEXED BY results_by_time
-                 WHERE (created_ms, key) < (?1, ?2) ORDER BY created_ms DESC, key DESC LIMIT ?3",
-            )
-            .bind(created_ms)
-            .bind(key)
-            .bind(limit + 1),
-            Some(calculator) => sqlx::query_as(
-                "SELECT key, calculator, version, engine, bytes, created_ms FROM results INDEXED BY results_by_calculator
-                 WHERE calculator = ?4 AND (created_ms, key) < (?1, ?2) ORDER BY created_ms DESC, key DESC LIMIT ?3",
-            )
-            .bind(created_ms)
-            .bind(key)
-            .bind(limit + 1)
-            .bind(calculator),
-        };
-        let rows: Vec<SummaryRow> = statement.fetch_all(&self.readers).await?;
+        statement.push(" ORDER BY created_ms DESC, key DESC LIMIT ").push_bind(limit + 1);
+        let rows: Vec<SummaryRow> = statement.build_query_as().fetch_all(&self.readers).await?;
         let mut items: Vec<ResultSummary> = rows.into_iter().filter_map(SummaryRow::summary).collect();
         let more = items.len() > limit as usize;
         items.truncate(limit as usize);
@@ -204,6 +203,28 @@ impl ResultStore for SqliteStore {
     }
     fn list(&self, query: ResultQuery) -> BoxFuture<'_, Result<ResultPage, StoreError>> {
         Box::pin(self.page(query))
+    }
+    fn note_asked(&self, key: Key, owner: String) -> BoxFuture<'_, Result<(), StoreError>> {
+        Box::pin(self.ledger.write(move |connection| {
+            let owner = owner.clone();
+            Box::pin(async move {
+                sqlx::query("INSERT OR IGNORE INTO asked (key, owner) VALUES (?1, ?2)")
+                    .bind(key.as_bytes().as_slice())
+                    .bind(owner)
+                    .execute(connection)
+                    .await?;
+                Ok(())
+            })
+        }))
+    }
+    fn has_asked(&self, key: Key, owner: String) -> BoxFuture<'_, Result<bool, StoreError>> {
+        Box::pin(async move {
+            let asked = sqlx::query_scalar(
+                "SELECT EXISTS (SELECT 1 FROM asked WHERE key = ?1 AND owner = ?2)
+                     OR EXISTS (SELECT 1 FROM precut_jobs WHERE key = ?1 AND owner = ?2)",
+            );
+            Ok(asked.bind(key.as_bytes().as_slice()).bind(owner).fetch_one(&self.readers).await?)
+        })
     }
     fn inputs(&self, keys: Vec<Key>, most: usize) -> BoxFuture<'_, Result<Vec<(Key, Bytes)>, StoreError>> {
         Box::pin(self.some_inputs(keys, most))
@@ -267,7 +288,7 @@ fn writing(options: &SqliteConnectOptions) -> SqliteConnectOptions {
     options.clone().page_size(PAGE).pragma("cache_size", "-8000").pragma("wal_autocheckpoint", "2000")
 }
 
-fn lock(folder: &Path) -> Result<File, OpenError> {
+pub(super) fn lock(folder: &Path) -> Result<File, OpenError> {
     let unusable = |error: std::io::Error| OpenError::Unusable { folder: folder.to_owned(), reason: error.to_string() };
     let file = File::options().create(true).truncate(false).write(true).open(folder.join(LOCK)).map_err(unusable)?;
     match file.try_lock() {

@@ -14,12 +14,12 @@ impl ModelShelf for SqliteStore {
         Box::pin(model_in(&self.readers, name, revision))
     }
 
-    fn models(&self, after: String, limit: u32) -> BoxFuture<'_, Result<Vec<KeptModel>, StoreError>> {
-        Box::pin(models_in(&self.readers, after, limit))
+    fn models(&self, shelf: String, after: String, limit: u32) -> BoxFuture<'_, Result<Vec<KeptModel>, StoreError>> {
+        Box::pin(models_in(&self.readers, shelf, after, limit))
     }
 
-    fn model_names(&self, limit: u32) -> BoxFuture<'_, Result<Vec<String>, StoreError>> {
-        Box::pin(names_in(&self.readers, limit))
+    fn model_names(&self, shelf: String, limit: u32) -> BoxFuture<'_, Result<Vec<String>, StoreError>> {
+        Box::pin(names_in(&self.readers, shelf, limit))
     }
 }
 
@@ -49,12 +49,12 @@ impl ModelShelf for SqliteShelf {
         Box::pin(model_in(&self.0, name, revision))
     }
 
-    fn models(&self, after: String, limit: u32) -> BoxFuture<'_, Result<Vec<KeptModel>, StoreError>> {
-        Box::pin(models_in(&self.0, after, limit))
+    fn models(&self, shelf: String, after: String, limit: u32) -> BoxFuture<'_, Result<Vec<KeptModel>, StoreError>> {
+        Box::pin(models_in(&self.0, shelf, after, limit))
     }
 
-    fn model_names(&self, limit: u32) -> BoxFuture<'_, Result<Vec<String>, StoreError>> {
-        Box::pin(names_in(&self.0, limit))
+    fn model_names(&self, shelf: String, limit: u32) -> BoxFuture<'_, Result<Vec<String>, StoreError>> {
+        Box::pin(names_in(&self.0, shelf, limit))
     }
 }
 
@@ -71,23 +71,29 @@ async fn model_in(pool: &SqlitePool, name: String, revision: Option<u32>) -> Res
     Ok(row.and_then(ModelRow::model))
 }
 
-async fn models_in(pool: &SqlitePool, after: String, limit: u32) -> Result<Vec<KeptModel>, StoreError> {
+async fn models_in(pool: &SqlitePool, shelf: String, after: String, limit: u32) -> Result<Vec<KeptModel>, StoreError> {
     let rows: Vec<ModelRow> = sqlx::query_as(
         "SELECT name, revision, calculator, content, sha256, created_ms FROM models AS one
          WHERE name > ?1 AND content IS NOT NULL
+           AND substr(name, 1, length(?3)) = ?3 AND instr(substr(name, length(?3) + 1), '/') = 0
            AND revision = (SELECT max(revision) FROM models WHERE name = one.name AND content IS NOT NULL)
          ORDER BY name LIMIT ?2",
     )
-    .bind(after)
+    .bind(shelf.clone() + &after)
     .bind(limit)
+    .bind(shelf)
     .fetch_all(pool)
     .await?;
     Ok(rows.into_iter().filter_map(ModelRow::model).collect())
 }
 
-async fn names_in(pool: &SqlitePool, limit: u32) -> Result<Vec<String>, StoreError> {
-    let names = sqlx::query_scalar("SELECT DISTINCT name FROM models WHERE content IS NOT NULL ORDER BY name LIMIT ?1");
-    Ok(names.bind(limit).fetch_all(pool).await?)
+async fn names_in(pool: &SqlitePool, shelf: String, limit: u32) -> Result<Vec<String>, StoreError> {
+    let names = sqlx::query_scalar(
+        "SELECT DISTINCT substr(name, length(?2) + 1) FROM models WHERE content IS NOT NULL
+           AND substr(name, 1, length(?2)) = ?2 AND instr(substr(name, length(?2) + 1), '/') = 0
+         ORDER BY 1 LIMIT ?1",
+    );
+    Ok(names.bind(limit).bind(shelf).fetch_all(pool).await?)
 }
 
 impl ModelStore for SqliteStore {

@@ -27,7 +27,8 @@ async fn store(folder: &TempDir, bytes: u64) -> SqliteStore {
 }
 
 async fn list(store: &SqliteStore, calculator: Option<&str>, limit: u32, after: Option<Cursor>) -> ResultPage {
-    let query = ResultQuery { calculator: calculator.map(str::to_owned), limit: Some(limit), after };
+    let query =
+        ResultQuery { calculator: calculator.map(str::to_owned), limit: Some(limit), after, ..ResultQuery::default() };
     store.list(query).await.unwrap()
 }
 

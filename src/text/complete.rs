@@ -63,6 +63,7 @@ const LATIN: &[&str] = &[
     "rough",
     // Symbols of formulas.
     "alpha",
+    "ap",
     "cos",
     "delta",
     "dn",
@@ -87,6 +88,7 @@ const LATIN: &[&str] = &[
     "provenance",
     "regression",
     "repeats",
+    "shear",
     "stated",
     // Values of JSON.
     "false",

@@ -17,12 +17,14 @@
 //!
 //! What a dead process left running is in line again when the next one opens the store; where several share a store,
 //! when nobody has heard of the computation for some seconds. Who runs a job and who is asked about it may be two
-//! processes: [`JobStore::tell`] brings news from one to the other, and every request reads the record. Each start is charged; at the
-//! last of [`MOST_ATTEMPTS`] a job runs alone, and one that takes the process along even then is failed as
-//! `crashed_repeatedly`. A start that a shutdown interrupts is not charged, and the last one that is allowed is not
-//! charged to a study that gets on in it (it has put a part down, which is not computed again): however often its process
-//! is killed, it is finished. A panic is no such start: it is caught, and
-//! the job fails at once, as it would panic again.
+//! processes: [`JobStore::tell`] brings news from one to the other, and every request reads the record.
+//!
+//! Each start is charged, and a charge says nothing of who ended the process. At the last of [`MOST_ATTEMPTS`] a job runs
+//! alone and in a process of its own ([`isolated`]): one that ends even that is failed as `crashed_repeatedly`, and one whose
+//! service is killed meanwhile is taken up again, however often. A start that a shutdown interrupts is not charged. A study
+//! runs in the service's own process at its last attempt, too, and that attempt is not charged while it gets on in it (it has
+//! put a part down, which is not computed again): however often its process is killed, it is finished. A panic is no such
+//! start: it is caught, and the job fails at once, as it would panic again.
 //!
 //! # What else may be a job
 //!
@@ -36,6 +38,7 @@ mod estimate;
 mod fault;
 mod feeds;
 mod help;
+mod isolated;
 mod requests;
 mod running;
 mod sweeper;
@@ -43,6 +46,7 @@ pub(crate) mod work;
 mod worker;
 
 pub use feeds::Feed;
+pub use isolated::Isolation;
 pub use requests::Answered;
 
 use std::sync::{Arc, Mutex, PoisonError};
@@ -54,7 +58,7 @@ use tokio::sync::{Notify, watch};
 use tokio::task::JoinHandle;
 
 use super::progress::Reported;
-use super::{Error, Inner, Key, Stored};
+use super::{Error, Inner, Key, Shelf, Stored};
 use crate::store::jobs::{
     Accepted, Changed, Idempotency, JobId, JobKind, JobPage, JobQuery, JobRecord, JobState, JobStore, MOST_ATTEMPTS,
     NewJob, News, Priority, Timing,
@@ -75,6 +79,8 @@ const TIMINGS: u32 = 5000;
 pub struct Ask {
     /// Whose job it is: clients take turns.
     pub owner: String,
+    /// Where the model is that the job names.
+    pub shelf: Shelf,
     /// How soon.
     pub priority: Priority,
     /// After so long it is of no use any more.
@@ -88,7 +94,14 @@ pub struct Ask {
 impl Ask {
     /// A request without wishes.
     pub fn plain(owner: impl Into<String>) -> Self {
-        Self { owner: owner.into(), priority: Priority::Normal, deadline: None, idempotency_key: None, wait: None }
+        Self {
+            owner: owner.into(),
+            shelf: Shelf::default(),
+            priority: Priority::Normal,
+            deadline: None,
+            idempotency_key: None,
+            wait: None,
+        }
     }
 }
 

@@ -23,11 +23,11 @@ impl Engine {
     pub async fn submit(&self, calculator: &str, body: Body, ask: Ask) -> Result<Answered, Error> {
         let inner = &self.inner;
         let body_hash = ask.idempotency_key.as_ref().map(|_| fingerprint(calculator, &body));
-        let (ready, parse, kept) = match self.know(calculator, &body).await? {
+        let (ready, parse, kept) = match self.know(calculator, &body, &ask.shelf).await? {
             Known::Kept(kept, parse) if body_hash.is_none() => return Ok(solved(hit(kept, parse)?)),
             // It has a record, too, by which it is known again.
             Known::Kept(kept, parse) => {
-                (Box::new(inner.read(&inner.known(calculator)?, body).await?), parse, Some(kept))
+                (Box::new(inner.read(&inner.known(calculator)?, body, &ask.shelf).await?), parse, Some(kept))
             }
             Known::New(ready, parse) => (ready, parse, None),
         };

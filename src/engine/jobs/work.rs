@@ -8,6 +8,8 @@ use futures_util::future::BoxFuture;
 use serde_json::Value;
 use tokio::sync::oneshot;
 
+use super::MOST_ATTEMPTS;
+use super::isolated::Isolated;
 use super::running::Running;
 use crate::engine::exec::{Slot, guarded};
 use crate::engine::flight::Boarded;
@@ -36,7 +38,13 @@ pub(super) fn of(engine: &Inner, claim: &Claim) -> Result<Box<dyn Work>, Error> 
             if entry.is_composed() {
                 return Ok(Box::new(Composed { entry, input: claim.input.clone() }));
             }
-            Ok(Box::new(Calculation { ready: ready(&entry, &claim.input)? }))
+            let ready = ready(&entry, &claim.input)?;
+            match &engine.settings.isolation {
+                Some(isolation) if claim.attempt >= MOST_ATTEMPTS => {
+                    Ok(Box::new(Isolated { ready, isolation: isolation.clone() }))
+                }
+                _ => Ok(Box::new(Calculation { ready })),
+            }
         }
     }
 }

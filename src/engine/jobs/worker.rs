@@ -13,8 +13,8 @@ use crate::store::jobs::{Claim, Claimed, Ending, JobId};
 /// Runs the job of a task, if it still waits. Returns when its record says how it ended, or that it waits again.
 pub(super) async fn run_task(engine: Arc<Inner>, id: JobId) {
     let jobs = &engine.jobs;
-    let charged = match stubbornly(&engine, || jobs.store.waiting_attempts(id)).await {
-        Some(Some(charged)) => charged,
+    let (charged, calculator) = match stubbornly(&engine, || jobs.store.waiting(id)).await {
+        Some(Some(waiting)) => waiting,
         // Nobody waits for it to begin; perhaps somebody has asked for help with it.
         Some(None) => return help::run(&engine, id).await,
         None => return,
@@ -22,6 +22,10 @@ pub(super) async fn run_task(engine: Arc<Inner>, id: JobId) {
     // A start that takes the process along is charged to all that ran beside it. Before a job is given up as the one
     // to blame, it is tried alone.
     let alone = charged + 1 >= MOST_ATTEMPTS;
+    // In a process of its own it may be tried as often as somebody kills this one.
+    let is_isolated =
+        engine.settings.isolation.is_some() && engine.known(&calculator).is_ok_and(|entry| !entry.is_composed());
+    let most = if is_isolated { u32::MAX } else { MOST_ATTEMPTS };
     let slot = tokio::select! {
         slot = engine.cores.job_slot(alone) => slot,
         () = jobs.stopped() => return,
@@ -30,7 +34,7 @@ pub(super) async fn run_task(engine: Arc<Inner>, id: JobId) {
     let begun = jobs.computations.begin();
     let running = Arc::clone(&begun.running);
     let poison = fault::written(&Error::CrashedRepeatedly { attempts: MOST_ATTEMPTS });
-    let claim = || jobs.store.claim(id, running.lease(), MOST_ATTEMPTS, poison.clone());
+    let claim = || jobs.store.claim(id, running.lease(), most, poison.clone());
     let claim = match stubbornly(&engine, claim).await {
         Some(Claimed::Run(claim)) => claim,
         Some(Claimed::Poisonous(failed)) => {
@@ -86,7 +90,13 @@ async fn settle(
             }
             return;
         }
-        Err(error) => (Ending::Failed(fault::written(&error)), "failed"),
+        Err(error) => {
+            if let Error::CrashedRepeatedly { attempts } = error {
+                tracing::error!(job = %claim.jobs[0], attempts, "a job ended its process, the last time one of its own");
+                metrics::counter!("precut_jobs_poisonous_total").increment(claim.jobs.len() as u64);
+            }
+            (Ending::Failed(fault::written(&error)), "failed")
+        }
     };
     metrics::counter!("precut_jobs_total", "calculator" => claim.calculator.clone(), "outcome" => label).increment(1);
     metrics::histogram!("precut_job_seconds", "calculator" => claim.calculator.clone()).record(took.as_secs_f64());

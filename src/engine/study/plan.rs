@@ -11,6 +11,7 @@ use super::input::{Spacing, StudyInput};
 use super::pick::Wanted;
 use super::result::Setting;
 use super::{check, faults};
+use crate::engine::budget::Room;
 use crate::engine::error::Error;
 use crate::engine::read::{self, Ready};
 use crate::registry::{Entry, Faults, Registry};
@@ -205,7 +206,7 @@ fn rows_for_tables(entry: &Entry, job: &mut Map<String, Value>) -> Vec<Finding> 
     let mut whole = Value::Object(std::mem::take(job));
     let mut faults = Faults::default();
     let places = entry.tables_of(&whole).to_vec();
-    crate::engine::table::resolve(&mut whole, &[], &places, &mut faults);
+    crate::engine::table::resolve(&mut whole, (&[], &Room::default()), &places, &mut faults);
     if let Value::Object(resolved) = whole {
         *job = resolved;
     }

@@ -35,9 +35,10 @@ pub(super) fn schemas() -> Vec<(String, RefOr<Schema>)> {
 }
 
 /// Problems by status: name of the response, what it means.
-const PROBLEMS: [(u16, &str, &str); 18] = [
+const PROBLEMS: [(u16, &str, &str); 19] = [
     (400, "BadRequest", "The request or the body's JSON is malformed: `errors` has line and column."),
     (401, "Unauthorized", "A key is needed, or the one sent is none."),
+    (403, "Forbidden", "The key may not do this: it lacks the scope in `detail`."),
     (404, "NotFound", "There is nothing of that name; where one is like it, `detail` says which."),
     (405, "MethodNotAllowed", "The address has other methods: see `Allow`."),
     (406, "NotAcceptable", "None of the accepted media types exists here; `detail` lists those that do."),
@@ -69,7 +70,7 @@ const PROBLEMS: [(u16, &str, &str); 18] = [
 ];
 
 /// Statuses that every guarded operation can give.
-const ANYWHERE: [u16; 6] = [401, 414, 429, 431, 500, 503];
+const ANYWHERE: [u16; 7] = [401, 403, 414, 429, 431, 500, 503];
 
 fn problem_name(status: u16) -> &'static str {
     PROBLEMS.iter().find(|(known, ..)| *known == status).map_or("Problem", |(_, name, _)| name)

@@ -36,6 +36,12 @@ impl ResultStore for PostgresStore {
     fn list(&self, query: ResultQuery) -> BoxFuture<'_, Result<ResultPage, StoreError>> {
         Box::pin(self.page(query))
     }
+    fn note_asked(&self, key: Key, owner: String) -> BoxFuture<'_, Result<(), StoreError>> {
+        Box::pin(self.note_asked_in(key, owner))
+    }
+    fn has_asked(&self, key: Key, owner: String) -> BoxFuture<'_, Result<bool, StoreError>> {
+        Box::pin(self.has_asked_in(key, owner))
+    }
     fn inputs(&self, keys: Vec<Key>, most: usize) -> BoxFuture<'_, Result<Vec<(Key, Bytes)>, StoreError>> {
         Box::pin(self.some_inputs(keys, most))
     }
@@ -99,6 +105,9 @@ impl PostgresStore {
         }
         if let Some(calculator) = query.calculator {
             statement.push(" AND calculator = ").push_bind(calculator);
+        }
+        if let Some(owner) = query.owner {
+            statement.push(" AND owner = ").push_bind(owner);
         }
         if let Some(before) = query.before {
             statement.push(" AND id < ").push_bind(before.to_string());
@@ -179,16 +188,16 @@ impl JobStore for PostgresStore {
             Ok(JobCounts { queued: u64::try_from(queued).unwrap_or(0), running: u64::try_from(running).unwrap_or(0) })
         })
     }
-    fn waiting_attempts(&self, id: JobId) -> BoxFuture<'_, Result<Option<u32>, StoreError>> {
+    fn waiting(&self, id: JobId) -> BoxFuture<'_, Result<Option<(u32, String)>, StoreError>> {
         Box::pin(async move {
-            let attempts: Option<i32> = sqlx::query_scalar(
-                "SELECT max(other.attempt) FROM precut.jobs AS one JOIN precut.jobs AS other USING (key)
-                 WHERE one.id = $1 AND one.state = 'queued' AND other.state = 'queued'",
+            let waiting: Option<(i32, String)> = sqlx::query_as(
+                "SELECT max(other.attempt), one.calculator FROM precut.jobs AS one JOIN precut.jobs AS other USING (key)
+                 WHERE one.id = $1 AND one.state = 'queued' AND other.state = 'queued' GROUP BY one.calculator",
             )
             .bind(id.to_string())
-            .fetch_one(&self.pool)
+            .fetch_optional(&self.pool)
             .await?;
-            Ok(attempts.map(count))
+            Ok(waiting.map(|(attempts, calculator)| (count(attempts), calculator)))
         })
     }
     fn claim(&self, id: JobId, lease: Lease, most: u32, problem: String) -> BoxFuture<'_, Result<Claimed, StoreError>> {

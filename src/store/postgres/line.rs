@@ -6,7 +6,7 @@ use super::lock;
 use super::queue::{self, Task, task_name};
 use super::record::{Outcome, RecordRow, column, columns, record};
 use super::results::insert;
-use crate::store::jobs::{Accepted, JobState, NewJob};
+use crate::store::jobs::{Accepted, JobState, NewJob, yields_to};
 use crate::store::sqlite_jobs::pack::Packed;
 use crate::store::sqlite_jobs::record::{parsed, rank};
 
@@ -16,8 +16,8 @@ struct Facts {
     lease: Option<String>,
     attempt: Option<i32>,
     started_ms: Option<i64>,
-    /// Last place of the owner, first place of all.
-    own: Option<i64>,
+    /// Jobs of the owner, first place of all.
+    own: i64,
     first: Option<i64>,
     queued: i64,
 }
@@ -26,8 +26,8 @@ struct Facts {
 async fn facts(connection: &mut PgConnection, job: &NewJob, queue_limit: u64) -> Outcome<Facts> {
     sqlx::query_as(
         "SELECT running.lease, running.attempt, running.started_ms,
-             (SELECT max(turn) FROM precut.jobs WHERE state = 'queued' AND owner = $2 AND priority = $3) AS own,
-             (SELECT min(turn) FROM precut.jobs WHERE state = 'queued' AND priority = $3) AS first,
+             (SELECT count(*) FROM precut.jobs WHERE state = 'queued' AND owner = $2 AND priority = $3) AS own,
+             (SELECT min(turn) FROM precut.jobs WHERE state IN ('queued', 'running') AND priority = $3) AS first,
              (SELECT count(*) FROM (SELECT FROM precut.jobs WHERE state = 'queued' LIMIT $4) AS waiting) AS queued
          FROM (VALUES (1)) AS one
          LEFT JOIN LATERAL (SELECT lease, attempt, started_ms FROM precut.jobs WHERE key = $1 AND state = 'running' LIMIT 1)
@@ -86,7 +86,7 @@ pub(super) async fn submit(
     }
     let finished = (state == JobState::Succeeded).then_some(now);
     let priority = i32::try_from(rank(job.priority)).unwrap_or(0);
-    let turn = facts.own.map_or(0, |turn| turn + 1).max(facts.first.unwrap_or(0));
+    let turn = facts.first.map_or(0, |first| first + 1) + facts.own + yields_to(job.estimate_ms);
     let id = job.id.to_string();
     let row: Option<RecordRow> = sqlx::query_as(concat!(
         "INSERT INTO precut.jobs (id, kind, calculator, version, engine, key, input, state, progress, attempt, lease,

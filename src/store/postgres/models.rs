@@ -22,28 +22,32 @@ impl ModelShelf for PostgresStore {
         })
     }
 
-    fn models(&self, after: String, limit: u32) -> BoxFuture<'_, Result<Vec<KeptModel>, StoreError>> {
+    fn models(&self, shelf: String, after: String, limit: u32) -> BoxFuture<'_, Result<Vec<KeptModel>, StoreError>> {
         Box::pin(async move {
             let rows: Vec<ModelRow> = sqlx::query_as(
                 "SELECT DISTINCT ON (name COLLATE \"C\") name, revision, calculator, content, sha256, created_ms FROM precut.models
                  WHERE name COLLATE \"C\" > $1 AND content IS NOT NULL
+                   AND left(name, length($3)) = $3 AND position('/' IN substr(name, length($3) + 1)) = 0
                  ORDER BY name COLLATE \"C\", revision DESC LIMIT $2",
             )
-            .bind(after)
+            .bind(shelf.clone() + &after)
             .bind(i64::from(limit))
+            .bind(shelf)
             .fetch_all(&self.pool)
             .await?;
             Ok(rows.into_iter().filter_map(ModelRow::model).collect())
         })
     }
 
-    fn model_names(&self, limit: u32) -> BoxFuture<'_, Result<Vec<String>, StoreError>> {
+    fn model_names(&self, shelf: String, limit: u32) -> BoxFuture<'_, Result<Vec<String>, StoreError>> {
         Box::pin(async move {
             let names = sqlx::query_scalar(
-                "SELECT DISTINCT name COLLATE \"C\" AS name FROM precut.models WHERE content IS NOT NULL
-                 ORDER BY name LIMIT $1",
+                "SELECT DISTINCT substr(name, length($2) + 1) COLLATE \"C\" AS plain FROM precut.models
+                 WHERE content IS NOT NULL
+                   AND left(name, length($2)) = $2 AND position('/' IN substr(name, length($2) + 1)) = 0
+                 ORDER BY plain LIMIT $1",
             );
-            Ok(names.bind(i64::from(limit)).fetch_all(&self.pool).await?)
+            Ok(names.bind(i64::from(limit)).bind(shelf).fetch_all(&self.pool).await?)
         })
     }
 }

@@ -11,7 +11,7 @@ use crate::store::sqlite_jobs::record::{of_rank, parsed, unreadable};
 macro_rules! columns {
     () => {
         "id, kind, calculator, key, state, stage, progress, attempt, lease, priority, problem, estimate_ms, \
-         created_ms, started_ms, finished_ms, deadline_ms, expires_ms"
+         created_ms, started_ms, finished_ms, deadline_ms, expires_ms, owner"
     };
 }
 
@@ -38,6 +38,7 @@ pub(super) struct RecordRow {
     finished_ms: Option<i64>,
     deadline_ms: Option<i64>,
     expires_ms: Option<i64>,
+    owner: String,
 }
 
 impl RecordRow {
@@ -60,6 +61,7 @@ impl RecordRow {
             finished_ms: self.finished_ms,
             deadline_ms: self.deadline_ms,
             expires_ms: self.expires_ms,
+            owner: self.owner,
         })
     }
 }

@@ -63,6 +63,12 @@ impl PostgresStore {
             statement.push(" AND (created_ms, key) < (").push_bind(after.created_ms);
             statement.push(", ").push_bind(after.key.as_bytes().to_vec()).push(")");
         }
+        if let Some(owner) = query.owner {
+            let of = "EXISTS (SELECT FROM precut.asked WHERE asked.key = results.key AND asked.owner = ";
+            statement.push(" AND (").push(of).push_bind(owner.clone());
+            let of = ") OR EXISTS (SELECT FROM precut.jobs AS job WHERE job.key = results.key AND job.owner = ";
+            statement.push(of).push_bind(owner).push("))");
+        }
         // One more than asked for tells whether there is another page.
         statement.push(" ORDER BY created_ms DESC, key DESC LIMIT ").push_bind(i64::from(limit) + 1);
         let rows: Vec<(Vec<u8>, String, i32, String, i64, i64)> =
@@ -82,6 +88,23 @@ impl PostgresStore {
         items.truncate(limit as usize);
         let next = items.last().filter(|_| more).map(|last| Cursor { created_ms: last.created_ms, key: last.key });
         Ok(ResultPage { items, next })
+    }
+
+    pub(super) async fn note_asked_in(&self, key: Key, owner: String) -> Result<(), StoreError> {
+        sqlx::query("INSERT INTO precut.asked (key, owner) VALUES ($1, $2) ON CONFLICT DO NOTHING")
+            .bind(key.as_bytes().as_slice())
+            .bind(owner)
+            .execute(&self.pool)
+            .await?;
+        Ok(())
+    }
+
+    pub(super) async fn has_asked_in(&self, key: Key, owner: String) -> Result<bool, StoreError> {
+        let asked = sqlx::query_scalar(
+            "SELECT EXISTS (SELECT FROM precut.asked WHERE key = $1 AND owner = $2)
+                 OR EXISTS (SELECT FROM precut.jobs WHERE key = $1 AND owner = $2)",
+        );
+        Ok(asked.bind(key.as_bytes().as_slice()).bind(owner).fetch_one(&self.pool).await?)
     }
 
     pub(super) async fn some_inputs(&self, keys: Vec<Key>, most: usize) -> Result<Vec<(Key, Bytes)>, StoreError> {

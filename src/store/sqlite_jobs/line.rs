@@ -4,26 +4,27 @@ use sqlx::sqlite::SqliteConnection;
 
 use super::pack::Packed;
 use super::record::{Outcome, parsed, rank, record};
-use crate::store::jobs::{Accepted, JobState};
+use crate::store::jobs::{Accepted, JobState, yields_to};
 use crate::store::{queue, row};
 
 /// The place of a new job in the order of its priority.
 ///
-/// Start-time fair queueing: a client's jobs follow one another, and a client that has none waiting begins where the
-/// line now is. So two clients take turns, however many jobs one of them has sent before the other came.
-async fn turn(connection: &mut SqliteConnection, owner: &str, priority: i64) -> Outcome<i64> {
-    let own: Option<i64> =
-        sqlx::query_scalar("SELECT max(turn) FROM precut_jobs WHERE state = 'queued' AND owner = ?1 AND priority = ?2")
+/// A client's jobs follow one another, and a client that has none waiting begins behind the first of the line. So two
+/// clients take turns, however many jobs one of them has sent before the other came. A long job lets some later ones
+/// pass, see [`yields_to`].
+async fn turn(connection: &mut SqliteConnection, owner: &str, priority: i64, estimate_ms: f64) -> Outcome<i64> {
+    let own: i64 =
+        sqlx::query_scalar("SELECT count(*) FROM precut_jobs WHERE state = 'queued' AND owner = ?1 AND priority = ?2")
             .bind(owner)
             .bind(priority)
             .fetch_one(&mut *connection)
             .await?;
     let first: Option<i64> =
-        sqlx::query_scalar("SELECT min(turn) FROM precut_jobs WHERE state = 'queued' AND priority = ?1")
+        sqlx::query_scalar("SELECT min(turn) FROM precut_jobs WHERE state IN ('queued', 'running') AND priority = ?1")
             .bind(priority)
             .fetch_one(&mut *connection)
             .await?;
-    Ok(own.map_or(0, |turn| turn + 1).max(first.unwrap_or(0)))
+    Ok(first.map_or(0, |first| first + 1) + own + yields_to(estimate_ms))
 }
 
 pub(super) async fn submit(
@@ -75,7 +76,7 @@ pub(super) async fn submit(
     }
     let finished = (state == JobState::Succeeded).then_some(now);
     let priority = rank(job.priority);
-    let turn = turn(connection, &job.owner, priority).await?;
+    let turn = turn(connection, &job.owner, priority, job.estimate_ms).await?;
     sqlx::query(
         "INSERT INTO precut_jobs (id, kind, calculator, version, key, input, state, progress, attempt, lease,
              heartbeat_ms, priority, turn, owner, idempotency, body_hash, estimate_ms, created_ms, started_ms,

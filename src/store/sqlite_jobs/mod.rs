@@ -76,6 +76,9 @@ impl SqliteStore {
         if let Some(calculator) = query.calculator {
             statement.push(" AND calculator = ").push_bind(calculator);
         }
+        if let Some(owner) = query.owner {
+            statement.push(" AND owner = ").push_bind(owner);
+        }
         if let Some(before) = query.before {
             statement.push(" AND id < ").push_bind(before.to_string());
         }
@@ -130,16 +133,13 @@ impl JobStore for SqliteStore {
     fn counts(&self) -> BoxFuture<'_, Result<JobCounts, StoreError>> {
         Box::pin(self.count_jobs())
     }
-    fn waiting_attempts(&self, id: JobId) -> BoxFuture<'_, Result<Option<u32>, StoreError>> {
+    fn waiting(&self, id: JobId) -> BoxFuture<'_, Result<Option<(u32, String)>, StoreError>> {
         Box::pin(async move {
-            let attempts = sqlx::query_scalar(
-                "SELECT max(other.attempt) FROM precut_jobs AS one JOIN precut_jobs AS other USING (key)
-                 WHERE one.id = ?1 AND one.state = 'queued' AND other.state = 'queued'",
-            )
-            .bind(id.to_string())
-            .fetch_one(&self.readers)
-            .await?;
-            Ok(attempts)
+            let waiting = sqlx::query_as(
+                "SELECT max(other.attempt), one.calculator FROM precut_jobs AS one JOIN precut_jobs AS other USING (key)
+                 WHERE one.id = ?1 AND one.state = 'queued' AND other.state = 'queued' GROUP BY one.calculator",
+            );
+            Ok(waiting.bind(id.to_string()).fetch_optional(&self.readers).await?)
         })
     }
     fn claim(&self, id: JobId, lease: Lease, most: u32, problem: String) -> BoxFuture<'_, Result<Claimed, StoreError>> {

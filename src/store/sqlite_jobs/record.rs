@@ -10,7 +10,7 @@ use crate::store::jobs::{JobId, JobKind, JobRecord, JobState, Priority};
 macro_rules! columns {
     () => {
         "id, kind, calculator, key, state, stage, progress, attempt, lease, priority, problem, estimate_ms, \
-         created_ms, started_ms, finished_ms, deadline_ms, expires_ms"
+         created_ms, started_ms, finished_ms, deadline_ms, expires_ms, owner"
     };
 }
 
@@ -35,6 +35,7 @@ pub(super) struct RecordRow {
     finished_ms: Option<i64>,
     deadline_ms: Option<i64>,
     expires_ms: Option<i64>,
+    owner: String,
 }
 
 impl RecordRow {
@@ -57,6 +58,7 @@ impl RecordRow {
             finished_ms: self.finished_ms,
             deadline_ms: self.deadline_ms,
             expires_ms: self.expires_ms,
+            owner: self.owner,
         })
     }
 }

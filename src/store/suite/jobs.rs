@@ -73,7 +73,7 @@ pub(in crate::store) async fn what_a_process_left_running_is_in_line_again_at_th
         // Twice charged, it lets the others go first.
         let expected = if attempt < 2 { [running, waiting] } else { [waiting, running] };
         assert_eq!(place.line().await, expected, "after {attempt}");
-        assert_eq!(place.store().waiting_attempts(running).await.unwrap(), Some(attempt));
+        assert_eq!(place.store().waiting(running).await.unwrap().map(|(attempts, _)| attempts), Some(attempt));
         match place.claim(running).await {
             Claimed::Run(claim) => assert_eq!(claim.attempt, attempt + 1),
             Claimed::Poisonous(jobs) => assert_eq!((jobs, attempt), (vec![running], MOST)),

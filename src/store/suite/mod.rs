@@ -104,7 +104,8 @@ pub(in crate::store) async fn list(
     limit: u32,
     after: Option<Cursor>,
 ) -> ResultPage {
-    let query = ResultQuery { calculator: calculator.map(str::to_owned), limit: Some(limit), after };
+    let query =
+        ResultQuery { calculator: calculator.map(str::to_owned), limit: Some(limit), after, ..ResultQuery::default() };
     store.list(query).await.unwrap()
 }
 

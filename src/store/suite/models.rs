@@ -22,9 +22,9 @@ pub(in crate::store) async fn revisions_rise_and_are_never_given_twice<P: Place>
     assert_eq!(put("b", false).await.unwrap().unwrap().revision, 2);
     assert_eq!(put("a", true).await.unwrap().unwrap().revision, 1);
     let names = |models: Vec<KeptModel>| models.into_iter().map(|m| (m.name, m.revision)).collect::<Vec<_>>();
-    let all = names(store.models(String::new(), 10).await.unwrap());
+    let all = names(store.models(String::new(), String::new(), 10).await.unwrap());
     assert_eq!(all, [("a".to_owned(), 1), ("b".to_owned(), 2)]);
-    assert_eq!(names(store.models("a".to_owned(), 10).await.unwrap()), [("b".to_owned(), 2)]);
+    assert_eq!(names(store.models(String::new(), "a".to_owned(), 10).await.unwrap()), [("b".to_owned(), 2)]);
     assert_eq!(store.model("b".to_owned(), Some(1)).await.unwrap().unwrap().revision, 1);
     assert!(store.delete_model("b".to_owned()).await.unwrap());
     assert!(!store.delete_model("b".to_owned()).await.unwrap());

@@ -1,0 +1,181 @@
+//! What a job may be made of at each place, read off its schema: what the reader of JSON keeps, so that a body that will
+//! be refused costs little more memory than its own bytes.
+//!
+//! A shape is wider than the schema: the variants of a union are one. What does not fit a shape breaks the schema.
+
+use std::collections::BTreeMap;
+
+use serde_json::Value;
+
+/// What may stand at a place.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Shape {
+    /// Fields by name.
+    fields: BTreeMap<String, Shape>,
+    /// Fields of any other name.
+    further: Option<Box<Shape>>,
+    /// Items of a list.
+    items: Option<Box<Shape>>,
+    /// How many items; unbounded where the schema names no most.
+    most_items: Option<usize>,
+    /// Nothing is said of what stands here.
+    open: bool,
+}
+
+/// A place of which nothing is known.
+static OPEN: Shape = Shape { fields: BTreeMap::new(), further: None, items: None, most_items: None, open: true };
+
+impl Shape {
+    /// A place of which nothing is known.
+    pub(crate) fn open() -> &'static Self {
+        &OPEN
+    }
+
+    /// What a schema in the form of [`super::schema::strict`] lets stand.
+    pub(crate) fn of(strict: &Value) -> Self {
+        let mut shape = Self::default();
+        shape.add(strict);
+        shape
+    }
+
+    /// What either lets stand.
+    pub(crate) fn join(&mut self, other: Self) {
+        for (name, field) in other.fields {
+            self.fields.entry(name).or_default().join(field);
+        }
+        join(&mut self.further, other.further);
+        match (&mut self.items, other.items) {
+            (Some(items), Some(more)) => {
+                items.join(*more);
+                self.most_items = self.most_items.zip(other.most_items).map(|(one, other)| one.max(other));
+            }
+            (items @ None, Some(more)) => (*items, self.most_items) = (Some(more), other.most_items),
+            (_, None) => {}
+        }
+        self.open |= other.open;
+    }
+
+    /// The same with another shape for one of its fields.
+    pub(crate) fn with_field(mut self, name: &str, field: Self) -> Self {
+        self.fields.insert(name.to_owned(), field);
+        self
+    }
+
+    fn add(&mut self, strict: &Value) {
+        let Some(map) = strict.as_object() else { return };
+        let part = |name: &str| map.get(name);
+        for (name, property) in part("properties").and_then(Value::as_object).into_iter().flatten() {
+            self.fields.entry(name.clone()).or_default().add_or_open(property);
+        }
+        if let Some(further) = part("additionalProperties").filter(|further| **further != Value::Bool(false)) {
+            self.further.get_or_insert_default().add_or_open(further);
+        }
+        if let Some(patterns) = part("patternProperties").and_then(Value::as_object) {
+            patterns.values().for_each(|pattern| self.further.get_or_insert_default().add_or_open(pattern));
+        }
+        let mut items: Vec<&Value> = part("items").into_iter().collect();
+        items.extend(part("prefixItems").and_then(Value::as_array).into_iter().flatten());
+        if !items.is_empty() {
+            let most = part("maxItems").and_then(Value::as_u64).and_then(|most| usize::try_from(most).ok());
+            let mut shape = Self { items: Some(Box::default()), most_items: most, ..Self::default() };
+            for item in items {
+                shape.items.get_or_insert_default().add_or_open(item);
+            }
+            self.join(shape);
+        }
+        for list in ["allOf", "anyOf", "oneOf"] {
+            for branch in part(list).and_then(Value::as_array).into_iter().flatten() {
+                self.add(branch);
+            }
+        }
+        for branch in ["then", "else"] {
+            if let Some(branch) = part(branch) {
+                self.add(branch);
+            }
+        }
+        // An object of which no field is named, and a list of which no item is, may hold anything.
+        let has = |names: &[&str]| names.iter().any(|name| part(name).is_some());
+        let may_be = |kind: &str| {
+            let is = |one: &Value| one == kind;
+            part("type").is_some_and(|kinds| is(kinds) || kinds.as_array().is_some_and(|kinds| kinds.iter().any(is)))
+        };
+        let is_any_object =
+            may_be("object") && !has(&["properties", "additionalProperties", "patternProperties", "allOf"]);
+        let is_any_list = may_be("array") && !has(&["items", "prefixItems"]);
+        self.open |= is_any_object || is_any_list;
+    }
+
+    /// What is named by nothing but its place may be anything.
+    fn add_or_open(&mut self, strict: &Value) {
+        const SAYING: [&str; 9] =
+            ["type", "properties", "items", "prefixItems", "allOf", "anyOf", "oneOf", "enum", "const"];
+        match strict.as_object() {
+            Some(map) if SAYING.iter().any(|name| map.contains_key(*name)) => self.add(strict),
+            _ => self.open = true,
+        }
+    }
+
+    /// What may stand in a field; nothing where there is none of that name.
+    pub(crate) fn field(&self, name: &str) -> Option<&Self> {
+        // Rows may come as the text of a table in their place.
+        let is_text_of_rows = || name == "csv" && self.items.is_some();
+        let further = || self.further.as_deref();
+        self.fields.get(name).or_else(further).or_else(|| (self.open || is_text_of_rows()).then(Self::open))
+    }
+
+    /// What may stand in a list, and how many; nothing where there may be no list.
+    pub(crate) fn items(&self) -> Option<(&Self, usize)> {
+        match &self.items {
+            Some(items) => Some((items, self.most_items.unwrap_or(usize::MAX))),
+            None => self.open.then(|| (Self::open(), usize::MAX)),
+        }
+    }
+}
+
+fn join(here: &mut Option<Box<Shape>>, more: Option<Box<Shape>>) {
+    match (here, more) {
+        (Some(here), Some(more)) => here.join(*more),
+        (here @ None, more) => *here = more,
+        (Some(_), None) => {}
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn lists_have_their_most_and_unions_are_one() {
+        let shape = Shape::of(&json!({
+            "type": "object",
+            "properties": {
+                "rows": {"type": "array", "maxItems": 3, "items": {"type": "object", "properties": {"a": {"type": "number"}}}},
+                "one": {"x-tag": "kind", "allOf": [
+                    {"if": {}, "then": {"properties": {"kind": {"const": "x"}, "z": {"type": "array", "items": {}}}}},
+                    {"if": {}, "then": {"properties": {"kind": {"const": "y"}, "w": {"type": "number"}}}},
+                ]},
+                "map": {"type": "object", "additionalProperties": {"type": "number"}},
+                "any": {"type": "object"},
+                "list": {"type": "array"},
+                "whatever": {"description": "of no type"},
+                "number": {"type": "number"},
+            },
+            "additionalProperties": false,
+        }));
+        let rows = shape.field("rows").unwrap();
+        assert_eq!(rows.items().unwrap().1, 3);
+        assert!(rows.items().unwrap().0.field("a").is_some() && rows.items().unwrap().0.field("b").is_none());
+        assert!(rows.field("csv").is_some() && rows.field("other").is_none());
+        let one = shape.field("one").unwrap();
+        assert!(one.field("z").is_some() && one.field("w").is_some() && one.field("v").is_none());
+        assert!(shape.field("map").unwrap().field("whatever").unwrap().items().is_none());
+        assert!(shape.field("any").unwrap().field("x").unwrap().items().is_some());
+        assert!(
+            shape.field("number").unwrap().items().is_none() && shape.field("number").unwrap().field("x").is_none()
+        );
+        assert!(shape.field("list").unwrap().items().is_some() && shape.field("whatever").unwrap().items().is_some());
+        assert!(shape.field("unknown").is_none());
+    }
+}
