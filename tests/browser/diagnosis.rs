@@ -77,7 +77,7 @@ fn a_table_with_headings_in_russian_is_matched() {
          document.querySelector('.table-input').dispatchEvent(new DragEvent('drop', {{bubbles: true, cancelable: true, dataTransfer: data}})) }})()"
     ));
     page.wait_for(".matching .primary:not(:disabled)");
-    let matched = "[...document.querySelectorAll('.matching tbody tr')].map(row => row.querySelector('select').value).filter(Boolean).join()";
+    let matched = "[...document.querySelectorAll('.matching .match tbody tr')].map(row => row.querySelector('select').value).filter(Boolean).join()";
     assert_eq!(page.evaluate(matched), "0,1,2");
     page.click(".matching .primary");
     page.until("!document.querySelector('.matching')");

@@ -14,7 +14,11 @@ fn a_locked_service_asks_for_its_key_and_says_when_it_is_wrong() {
     let _turn = TURN.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     let Some(mut page) = Page::new() else { return };
     let service = Service::start_with(|config| {
-        config.auth.keys.push(ApiKey { name: "shop".to_owned(), hash: auth::hash(KEY).to_hex().to_string() });
+        config.auth.keys.push(ApiKey {
+            name: "shop".to_owned(),
+            hash: auth::hash(KEY).to_hex().to_string(),
+            ..ApiKey::default()
+        });
     });
     page.open(&service.page("deflection-compensation"));
     page.wait_for("#api-key");

@@ -6,6 +6,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, clippy::needless_pass_by_value, missing_docs, unreachable_pub)]
 
 mod access;
+mod answers;
 mod assets;
 mod calm;
 mod chromium;

@@ -109,7 +109,7 @@ fn what_cannot_be_read_makes_the_result_an_old_one_and_is_computed_only_once_it_
     page.until(SETTLED);
     page.fill(FEED, "0,5 mm");
     page.wait_for(".stale-note");
-    assert!(page.text("#field-cut-feed_mm_per_rev-fault").contains("not a number"));
+    assert!(page.text("#field-cut-feed_mm_per_rev-fault").contains("“mm” is no unit that fits here"));
     assert!(page.text(".pane-switch .badge").starts_with('1'));
     page.evaluate("document.activeElement.blur()");
     page.click(".form-head .primary");
@@ -252,11 +252,12 @@ fn a_dropped_csv_is_matched_by_column_and_unit_and_evaluated() {
         json!(csv)
     ));
     page.wait_for(".matching");
-    // The angle goes by another name here: the user says which column it is.
+    // The angle goes by another name here: what is guessed says so, until the user says which column it is.
     let ready = "!document.querySelector('.matching .primary').disabled";
-    page.until("document.querySelector('.matching .fault')");
+    let guesses = "document.querySelectorAll('.matching .guessed').length";
+    assert_eq!(page.evaluate(guesses), 2);
     page.pick(".matching tbody tr:nth-child(1) select", "0");
-    page.until(ready);
+    page.until(&format!("{ready} && {guesses} === 1"));
     assert_eq!(page.value(".matching tbody tr:nth-child(2) td:nth-child(3) select"), "mm");
     page.click(".matching .primary");
     page.until(&format!("document.querySelector('.verdict').textContent !== {} && {SETTLED}", json!(before)));

@@ -43,7 +43,7 @@ fn a_job_is_varied_from_its_own_page_and_every_point_can_be_opened() {
     page.pick("#vary-1", "/cut/spindle_speed_rpm");
     page.fill("#vary-1-count", "4");
     page.until("document.querySelector('#study-points').textContent.startsWith('20 ')");
-    page.until("document.querySelector('.stale-note')");
+    page.until("document.querySelector('.so-far')");
     page.click("#run-study");
     page.until(&format!("{DONE} && document.querySelectorAll('.study-rows tbody tr').length === 20 && document.querySelector('.picture image')"));
     page.evaluate("document.querySelector('.plot').focus()");

@@ -2,6 +2,7 @@
 
 use serde_json::json;
 
+use crate::access::assert_accessible;
 use crate::chromium::Page;
 use crate::{SETTLED, both};
 
@@ -77,11 +78,15 @@ fn the_page_knows_the_units_of_the_service() {
     let Some((_turn, mut page, service)) = both() else { return };
     page.open(&service.page(""));
     let dimensions = page.evaluate(
-        "import(new URL('units.js', document.querySelector('script[type=module]').src)).then(it => it.DIMENSIONS)",
+        "import(new URL('units.js', document.querySelector('script[type=module]').src)).then(it => [it.DIMENSIONS, it.DIMENSIONS.map(units => units.map(([one]) => it.converted(1, one, units[0][0])))])",
     );
-    let dimensions: Vec<Vec<Vec<String>>> = serde_json::from_value(dimensions).unwrap();
+    let (dimensions, sizes): (Vec<Vec<Vec<String>>>, Vec<Vec<f64>>) = serde_json::from_value(dimensions).unwrap();
     assert!(dimensions.len() > 15);
-    for units in dimensions {
+    for (units, sizes) in dimensions.into_iter().zip(sizes) {
+        for (spellings, size) in units.iter().zip(sizes) {
+            let own = precut::units::convert(1.0, &spellings[0], &units[0][0]).unwrap();
+            assert!((size / own - 1.0).abs() < 1e-11, "{}: {size} against {own}", spellings[0]);
+        }
         let first = units[0][0].clone();
         assert_eq!(units.concat(), precut::units::alike(&first).collect::<Vec<_>>(), "{first}");
         for spellings in units {
@@ -134,5 +139,92 @@ fn columns_that_no_field_has_are_kept_where_the_rows_take_them() {
     page.until(READY);
     assert_eq!(page.text(".columns-kept"), "Kept with every row: Nose radius [mm]");
     assert_eq!(page.text(".columns-left"), "Not taken: batch");
+    page.assert_calm();
+}
+
+/// Every measured table of every page takes a file that is chosen, as on a phone, shows it with its chart, and uses it only
+/// when it is told to; meanwhile nothing on the page is an answer to it.
+#[test]
+fn a_chosen_file_is_shown_before_it_is_used() {
+    let Some((_turn, mut page, service)) = both() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("profile.txt");
+    // No heading, a decimal comma, the unit known to whoever measured.
+    let rows = (0..60).map(|row: i32| {
+        let angle = f64::from(6 * row);
+        format!("{angle};{:.6}\n", 5e-3 * (3.0 * angle.to_radians()).cos()).replace('.', ",")
+    });
+    std::fs::write(&file, rows.collect::<String>()).unwrap();
+    page.screen(360, 740, false);
+    page.open(&service.page("roundness-evaluation"));
+    page.until(SETTLED);
+    page.click_on("Inputs");
+    let limits = page.text(".door-limits");
+    assert!(
+        limits.contains("200\u{202f}000 rows") && limits.contains("8.4 MB"),
+        "said before a file is read: {limits}"
+    );
+    for times in 1..=2 {
+        // The same file again, as after a mistake.
+        page.choose_file("input[data-table=deviations]", &file);
+        page.wait_for(".matching");
+        assert!(page.text(".matching").contains("no heading"), "{times}");
+        assert_eq!(page.evaluate("document.querySelectorAll('.matching .guessed').length"), 2, "guesses are said");
+        assert_eq!(page.evaluate("document.querySelector('.matching .primary').disabled"), true, "a unit is missing");
+        assert_eq!(page.evaluate("document.querySelector('#take').disabled"), true, "a table waits");
+        page.click_on("Cancel");
+        page.until("!document.querySelector('.matching') && !document.querySelector('#take').disabled");
+    }
+    page.choose_file("input[data-table=deviations]", &file);
+    page.wait_for(".matching");
+    page.pick(".matching tbody tr:nth-child(1) td:nth-child(3) select", "deg");
+    page.pick(".matching tbody tr:nth-child(2) td:nth-child(3) select", "mm");
+    page.until(READY);
+    assert_eq!(page.text(".table-chart figcaption span"), "Radial deviation: −5 … 5 µm");
+    assert_accessible(&mut page, "a table that waits");
+    page.click(".matching .primary");
+    page.until("!document.querySelector('.matching')");
+    page.click_on("Result");
+    page.until(&format!("/circle is (9\\.|10)/.test(document.querySelector('.verdict').textContent) && {SETTLED}"));
+    page.assert_calm();
+}
+
+/// Sizes where deviations are asked for: nobody takes anything off them unasked.
+#[test]
+fn sizes_are_not_taken_for_deviations() {
+    let Some((_turn, mut page, service)) = both() else { return };
+    page.open(&service.page("roundness-evaluation"));
+    page.until(SETTLED);
+    let rows = (0..60).map(|row: i32| {
+        let angle = f64::from(6 * row);
+        format!("{angle};{:.9}\n", (32.0 + 4e-3 * (3.0 * angle.to_radians()).cos()) / 25.4)
+    });
+    drop_csv(&mut page, &format!("Angle [deg];Measured radius, inch\n{}", rows.collect::<String>()));
+    page.until("document.querySelector('.sizes-asked .fault')");
+    assert_eq!(page.evaluate(READY), false);
+    assert!(page.text(".sizes-asked").contains("look like sizes of about 32 mm"));
+    page.click_on("Take off the nominal");
+    page.until(READY);
+    page.click(".matching .primary");
+    page.until(&format!("/circle is [78][. ]/.test(document.querySelector('.verdict').textContent) && {SETTLED}"));
+    page.assert_calm();
+}
+
+/// A diagnosis without a measured column is none: one of them is asked for by name.
+#[test]
+fn what_was_measured_is_always_asked_for() {
+    let Some((_turn, mut page, service)) = both() else { return };
+    page.open(&service.page("diagnosis"));
+    page.until(SETTLED);
+    drop_csv(&mut page, "Station [mm];Inspector\n10;A\n20;B\n30;C\n");
+    page.until("document.querySelector('.matching .fault')");
+    let said = page.text(".matching");
+    assert!(said.contains("What was measured is still needed") && said.contains("Diameter deviation"), "{said}");
+    assert_eq!(page.evaluate(READY), false);
+    page.click_on("Cancel");
+    // As the shop calls it: matched by what it is, and said to be a guess.
+    drop_csv(&mut page, "Pos (mm);Measured dia, inch\n10;1.2601\n20;1.2602\n30;1.2603\n");
+    page.until(READY);
+    assert_eq!(page.evaluate("document.querySelectorAll('.matching .guessed').length"), 2);
     page.assert_calm();
 }

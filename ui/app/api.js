@@ -32,6 +32,7 @@ export class Refused extends Error {
 /** The service cannot be reached. */
 export class Unreachable extends Error {}
 
+/** @param {string} path @param {RequestInit & { headers?: Record<string, string> }} [options] */
 async function ask(path, { headers = {}, ...options } = {}) {
   const key = storedKey();
   let response;
@@ -96,7 +97,8 @@ export const jobInput = id => json(`/v1/jobs/${enc(id)}/job`);
 export const cancel = id => json(`/v1/jobs/${enc(id)}`, { method: 'DELETE' });
 export const alive = async () => { await ask('/health/live'); };
 
-/** Sends a job: `{answer}` if it is answered at once, `{job}` if it takes longer. */
+/** Sends a job: `{answer}` if it is answered at once, `{job}` if it takes longer.
+ *  @param {string} id @param {any} body @param {{ signal?: AbortSignal }} [options] */
 export async function solve(id, body, { signal } = {}) {
   const response = await ask(`/v1/${enc(id)}`, {
     method: 'POST',
@@ -146,7 +148,8 @@ export const saveModel = (name, source) => json(`/v1/models/${enc(name)}`, {
 export const dropModel = name => ask(`/v1/models/${enc(name)}`, { method: 'DELETE' });
 export const model = name => json(`/v1/models/${enc(name)}`);
 
-/** Follows a job's events until it is over; connects again where the line breaks. Returns how to stop. */
+/** Follows a job's events until it is over; connects again where the line breaks. Returns how to stop.
+ *  @param {string} id @param {Partial<Record<'onState' | 'onProgress' | 'onInterim' | 'onDone' | 'onTrouble', (what: any) => void>>} handlers */
 export function follow(id, { onState, onProgress, onInterim, onDone, onTrouble }) {
   const control = new AbortController();
   let last = '';

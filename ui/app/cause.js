@@ -37,7 +37,7 @@ function wordsOf(description, calculator) {
 }
 
 /** Whether the result is that of a diagnosis that says anything of causes. */
-export const hasCauses = (id, result) => id === 'diagnosis' && Array.isArray(result?.causes) && result.verdict !== 'refused';
+export const hasCauses = result => Array.isArray(result?.causes) && result.verdict !== 'refused';
 
 /** Whether the heaviest set is one of the catalogue, and the rows object to it. */
 const isObjected = ({ verdict, sets, unnamed_probability: unnamed }) => verdict === 'unknown' && sets[0]?.posterior > unnamed;

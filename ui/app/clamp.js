@@ -8,7 +8,7 @@ const WIDTH = 1000;
 const setForce = job => Object.values(job).map(part => part?.clamp_force_n).find(force => typeof force === 'number') ?? null;
 
 /** Whether the result says anything of the clamp force. */
-export const hasClamp = (id, result) => id === 'fixture-stability' && Boolean(result?.clamp);
+export const hasClamp = result => result?.clamp?.static_movable_n !== undefined;
 
 export function ClampBars({ result, input, schema }) {
   const { clamp } = result;

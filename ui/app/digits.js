@@ -14,7 +14,8 @@ const endOf = name => UNITS.find(unit => name.endsWith(`_${unit}`)) || '';
 const stemOf = name => { const end = endOf(name); return end ? name.slice(0, -end.length - 1) : name; };
 
 /** The name of the number beside `name` that is its uncertainty, and what it is to be multiplied by: the same name with
- *  `_error` or `_uncertainty`, in the same unit; of a mean radius in mm also that in µm. */
+ *  `_error` or `_uncertainty`, in the same unit; of a mean radius in mm also that in µm.
+ *  @returns {[string, number] | null} */
 function besides(object, name) {
   const [stem, end] = [stemOf(name), endOf(name)];
   const own = WORDS.map(word => `${stem}${word}${end && `_${end}`}`).find(other => isSpread(object[other]));

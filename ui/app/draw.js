@@ -176,7 +176,7 @@ function mapImage(item, x, y, { left, top, width, height }) {
   const image = context.createImageData(columns, rows);
   const { step, steps, isAbove } = colouring(item);
   const half = list => (list.length > 1 ? [(list[1] - list[0]) / 2, (list.at(-1) - list.at(-2)) / 2] : [0, 0]);
-  const inside = (list, value, [first, last]) => value >= list[0] - first && value <= list.at(-1) + last;
+  const inside = (list, value, ends) => value >= list[0] - ends[0] && value <= list.at(-1) + ends[1];
   const [hx, hy] = [half(item.x), half(item.y)];
   const across = Array.from({ length: columns }, (_, column) => {
     const value = x.back(left + column + 0.5);
@@ -234,7 +234,9 @@ const DENSE = 150;
 const smaller = marker => (marker === MARKERS.circle ? 'm-1.5 0a1.5 1.5 0 1 0 3 0a1.5 1.5 0 1 0-3 0' : marker.replace(/-?\d*\.?\d+/g, number => `${Number(number) * 0.5} `));
 export const markerOf = item => (item.x.length > DENSE ? smaller(role(item.role).marker) : role(item.role).marker);
 
-/** Draws the items of a panel. `plane` has `place(x, y)`, the scales, the frame, and how symbols stand. */
+/** @typedef {{ style: (item: any) => string, hidden: Set<string>, ghost?: boolean }} Look */
+/** Draws the items of a panel. `plane` has `place(x, y)`, the scales, the frame, and how symbols stand.
+ *  @param {any} panel @param {any} plane @param {Look} look */
 export function items(panel, plane, { style, hidden, ghost }) {
   const { place, x, y, frame, stance } = plane;
   const barNames = [...new Set(panel.items.filter(item => item.kind === 'bars').map(item => item.name))];

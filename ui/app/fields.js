@@ -1,13 +1,17 @@
 // Fields of a single value: label, control, unit, and the words of the service where the value is at fault.
 import { html, useState, useEffect, useRef, cell } from './lib.js';
-import { t, capital, typed, parsed, number, unitOf } from './text.js';
+import { t, capital, typed, number, unitOf } from './text.js';
+import { read } from './number.js';
 import { kindOf, labelOf, wordOf, symbolParts, range, pointer, spoken } from './schema.js';
+
+/** A unit of more letters is written smaller rather than broken. */
+const LONG_UNIT = 7;
 
 export const fieldId = path => `field${pointer(path).replace(/[^A-Za-z0-9_]/g, '-')}`;
 
 /** The fields of the form whose text is no value, by their ids: what is computed without them is not what is typed. */
 export const unread = cell(new Set());
-function mark(id, isUnread) {
+export function mark(id, isUnread) {
   if (unread.get().has(id) === isUnread) return;
   const ids = new Set(unread.get());
   if (isUnread) ids.add(id);
@@ -38,6 +42,13 @@ export const defaultText = schema => {
   return t('default_is', { value: typeof schema.default === 'number' ? number(schema.default) : schema.default === true ? t('yes') : schema.default === false ? t('no') : wordOf(schema, schema.default) });
 };
 
+/** What shows its meaning while it is pointed at, and while it is edited. */
+export const explained = (context, help) => ({
+  onMouseEnter: () => context.pointAt(help),
+  onMouseLeave: () => context.pointAt(null),
+  onFocusIn: () => { context.pointAt(null); context.focusOn(help); },
+});
+
 /** Label, control, unit, and the words of the service where the value is at fault. */
 export function Row({ name, schema, path, value, required, context, control: Control, compact }) {
   const id = fieldId(path);
@@ -49,13 +60,8 @@ export function Row({ name, schema, path, value, required, context, control: Con
   const from = typeof filled === 'number' && filled !== schema.default ? `${number(filled)} ${unitOf(schema)}: ${context.sourceAt(path)}`.replace(/ +:/, ':') : '';
   const description = spoken([schema.description, own, from].filter(Boolean).join(' '), context.names);
   const allowed = kindOf(schema) === 'number' ? rangeText(schema) : '';
-  const show = () => context.setHelp({ label, symbol: schema['x-symbol'], range: allowed, description });
-  // A code: it is worded anew in each language.
+  // Codes: they are worded anew in each language.
   const [wrong, setWrong] = useState(null);
-  useEffect(() => {
-    mark(id, wrong !== null);
-    return () => mark(id, false);
-  }, [id, wrong !== null]);
   const unit = unitOf(schema);
   const common = {
     id, schema, value, context, label,
@@ -67,11 +73,16 @@ export function Row({ name, schema, path, value, required, context, control: Con
     required,
   };
   return html`
-    <div class=${`row ${faults.length || wrong ? 'faulty' : ''} ${compact ? 'compact' : ''}`} onMouseEnter=${show} onFocusIn=${show}>
+    <div class=${`row ${faults.length || wrong ? 'faulty' : ''} ${compact ? 'compact' : ''}`} ...${explained(context, { label, symbol: schema['x-symbol'], range: allowed, description })}>
       <${Control} ...${common} label=${html`<span>${label}</span>${schema['x-symbol'] && schema['x-symbol'].toLowerCase() !== label.toLowerCase() && html`\u00a0<${Symbol} symbol=${schema['x-symbol']} />`}`} unit=${unit} plain=${label} />
       <span id=${`${id}-about`} class="hidden">${[unit && t('in_unit', { unit }), allowed, description].filter(Boolean).join('. ')}</span>
-      <${Faults} faults=${wrong ? [{ detail: t(wrong) }] : faults} id=${`${id}-fault`} names=${context.names} />
+      ${wrong ? html`<${Unread} ...${wrong} id=${`${id}-fault`} />` : html`<${Faults} faults=${faults} id=${`${id}-fault`} names=${context.names} />`}
     </div>`;
+}
+
+/** Why a text is no value; what it may mean is offered. */
+export function Unread({ fault, values, choices, choose, id }) {
+  return html`<p class="fault" id=${id}><span>${t(fault, values)}</span>${choices && html`<span class="choices">${choices.map(value => html`<button type="button" key=${value} onClick=${() => choose(value)}>${number(value, 12)}</button>`)}</span>`}</p>`;
 }
 
 export function Faults({ faults, id, names }) {
@@ -93,49 +104,67 @@ export function nudged(value, schema, direction, shift) {
   return Math.min(Math.max(next, low ?? -Infinity), high ?? Infinity);
 }
 
-export function NumberInput({ id, schema, value, filled, set, setWrong, described, invalid, label, unit, required, context }) {
+/** Why a text is no value of the field, or `{ value }`. */
+export function valueOf(text, schema, required) {
+  const found = read(text, schema['x-unit']);
+  if (found.fault) return found;
+  if (found.value === null) return required ? { fault: 'needed' } : found;
+  return schema.type === 'integer' && !Number.isInteger(found.value) ? { fault: 'not_whole' } : found;
+}
+
+/** The text of a number while it is edited, in a row of the form or a cell of a table. Until it is a value the field is
+ *  marked: nothing that is shown is an answer to it. */
+export function useNumber({ id, schema, value, required, set, onFault }) {
   const [draft, setDraft] = useState(null);
-  const [isFocused, setFocused] = useState(false);
+  const wrong = useRef(null);
+  const say = fault => {
+    wrong.current = fault;
+    mark(id, fault !== null);
+    onFault(fault);
+  };
+  const drop = () => {
+    setDraft(null);
+    if (wrong.current) say(null);
+  };
+  const put = next => { drop(); if (!Object.is(next, value)) set(next, 'typing'); };
+  useEffect(() => () => mark(id, false), [id]);
   // The value may change under a draft: by the way back, by a click in the picture.
   useEffect(() => {
-    if (draft === null || Object.is(parsed(draft) ?? undefined, value)) return;
-    setDraft(null);
-    setWrong(null);
+    if (draft === null || Object.is(valueOf(draft, schema, required).value ?? undefined, value)) return;
+    drop();
   }, [value]);
+  return {
+    draft,
+    take: text => {
+      setDraft(text);
+      const found = valueOf(text, schema, required);
+      say(found.fault ? { ...found, choose: put } : null);
+      if (!found.fault && !Object.is(found.value ?? undefined, value)) set(found.value ?? undefined, 'typing');
+    },
+    leave: () => { if (!wrong.current) setDraft(null); },
+    put,
+    key: event => {
+      if (event.key !== 'ArrowUp' && event.key !== 'ArrowDown') return;
+      event.preventDefault();
+      put(nudged(value, schema, event.key === 'ArrowUp' ? 1 : -1, event.shiftKey));
+    },
+  };
+}
+
+export function NumberInput({ id, schema, value, filled, set, setWrong, described, invalid, label, unit, required, context }) {
+  const [isFocused, setFocused] = useState(false);
+  const { draft, take, leave, put, key } = useNumber({ id, schema, value, required, set, onFault: setWrong });
   // All digits only while they may be edited.
   const shown = draft ?? (isFocused || typeof value !== 'number' ? typed(value) : typed(Number(value.toPrecision(7))));
-  const faultOf = read => {
-    if (Number.isNaN(read)) return 'not_a_number';
-    if (read === null) return required ? 'needed' : null;
-    return schema.type === 'integer' && !Number.isInteger(read) ? 'not_whole' : null;
-  };
-  const take = text => {
-    setDraft(text);
-    const read = parsed(text);
-    const fault = faultOf(read);
-    setWrong(fault);
-    if (fault === null && !Object.is(read ?? undefined, value)) set(read ?? undefined, 'typing');
-  };
-  const leave = () => {
-    setFocused(false);
-    if (draft !== null && faultOf(parsed(draft)) === null) setDraft(null);
-  };
-  const key = event => {
-    if (event.key !== 'ArrowUp' && event.key !== 'ArrowDown') return;
-    event.preventDefault();
-    setDraft(null);
-    setWrong(null);
-    set(nudged(value, schema, event.key === 'ArrowUp' ? 1 : -1, event.shiftKey), 'typing');
-  };
-  const drag = useDrag(value, schema, next => { setDraft(null); setWrong(null); set(next, 'typing'); });
+  const drag = useDrag(value, schema, put);
   const standIn = typeof filled === 'number' ? filled : schema.default;
   const placeholder = standIn === undefined || standIn === null ? '' : typed(Number(standIn.toPrecision(7)));
   return html`
     <label for=${id} class="label draggable" ...${drag}>${label}</label>
     <span class="control"><input id=${id} type="text" inputmode="decimal" autocomplete="off" spellcheck=${false} value=${shown} placeholder=${placeholder} title=${rangeText(schema)}
       disabled=${context.disabled} aria-describedby=${described} aria-invalid=${invalid ? 'true' : undefined} aria-required=${required ? 'true' : undefined}
-      onInput=${event => take(event.currentTarget.value)} onBlur=${leave} onKeyDown=${key} onFocus=${event => { const field = event.currentTarget; setFocused(true); setTimeout(() => { if (document.activeElement === field) field.select(); }, 0); }} /></span>
-    <span class="unit" aria-hidden="true">${unit}</span>`;
+      onInput=${event => take(event.currentTarget.value)} onBlur=${() => { setFocused(false); leave(); }} onKeyDown=${key} onFocus=${event => { const field = event.currentTarget; setFocused(true); setTimeout(() => { if (document.activeElement === field) field.select(); }, 0); }} /></span>
+    <span class=${`unit ${unit.length > LONG_UNIT ? 'long' : ''}`} aria-hidden="true">${unit}</span>`;
 }
 
 /** A number dragged by its label: 60 px double it. */
@@ -168,7 +197,7 @@ export function TextInput({ id, value, schema, set, described, invalid, label, r
     <label for=${id} class="label">${label}</label>
     <span class="control wide">${context.names?.has(value) && html`<span class="called">${context.names.get(value)}</span>`}<input id=${id} type="text" autocomplete="off" value=${value ?? ''} placeholder=${schema.default ?? ''} disabled=${context.disabled}
       aria-describedby=${described} aria-invalid=${invalid ? 'true' : undefined} aria-required=${required ? 'true' : undefined}
-      onChange=${event => set(event.currentTarget.value === '' && !required ? undefined : event.currentTarget.value)} /></span>`;
+      onInput=${event => set(event.currentTarget.value === '' && !required ? undefined : event.currentTarget.value, 'typing')} /></span>`;
 }
 
 /** The service's words for the values of an enumeration, where it has any. */

@@ -110,7 +110,8 @@ function zoomed(shown, about, factor, full, kind) {
 
 /** Places along an axis at which a cross may stand where nothing is drawn that has places of its own. */
 const CROSS_STEPS = 60;
-const evenly = ([low, high], isLog) => Array.from({ length: CROSS_STEPS + 1 }, (_, index) => {
+const evenly = (ends, isLog) => Array.from({ length: CROSS_STEPS + 1 }, (_, index) => {
+  const [low, high] = ends;
   const share = index / CROSS_STEPS;
   return isLog ? low * (high / low) ** share : low + (high - low) * share;
 });

@@ -1,14 +1,22 @@
 // A form from a schema. Nothing here knows a calculator.
 import { html, useState, useEffect, useMemo, unique } from './lib.js';
 import { t, number, unitOf } from './text.js';
-import { resolve, namesOf, kindOf, variants, variantOf, variantName, blank, labelOf, wordOf, spoken, pointer, at, changed } from './schema.js';
-import { fieldId, isLeaf, Symbol, Faults, Row, NumberInput, TextInput, Enum, Switch, Library, ModelChoice } from './fields.js';
+import { resolve, namesOf, kindOf, variants, variantOf, variantName, blank, kept, labelOf, wordOf, spoken, pointer, at, changed } from './schema.js';
+import { fieldId, isLeaf, mark, explained, Symbol, Faults, Row, NumberInput, TextInput, Enum, Switch, Library, ModelChoice } from './fields.js';
 import { List, MapFields } from './lists.js';
 import { TableInput } from './table-input.js';
 
 /** Everything that fields share: the root schema, errors by pointer, what changes, who shows help. */
 class Context {
-  constructor(fields) { Object.assign(this, fields); }
+  /** @param {any} fields */
+  constructor(fields) {
+    Object.assign(this, fields);
+    this.value = fields.value;
+    this.filled = fields.filled;
+    this.libraries = fields.libraries;
+    /** @type {Map<string, any[]>} */
+    this.errors = fields.errors;
+  }
   /** What the service filled in where nothing was given. */
   filledAt(path) { return this.filled ? at(this.filled, path) : undefined; }
   /** Where that comes from: the source of the material that is named beside it, or the service. */
@@ -30,7 +38,9 @@ class Context {
 
 /** The form of a job. `errors` are those of a problem document; `libraries` the choices of `x-library` fields. */
 export function Form({ calculator, schema, value, filled, onChange, errors, libraries, models, examples, disabled }) {
-  const [help, setHelp] = useState(null);
+  // What is under the hand is explained, otherwise the field that is being edited.
+  const [pointed, setPointed] = useState(null);
+  const [focused, setFocused] = useState(null);
   const root = schema;
   const byPointer = useMemo(() => {
     const map = new Map();
@@ -39,7 +49,7 @@ export function Form({ calculator, schema, value, filled, onChange, errors, libr
   }, [errors]);
   // Models extend the jobs of one calculator: of the one whose job stands in this one, if there is such.
   const owner = typeof value.calculator === 'string' ? value.calculator : calculator;
-  const context = new Context({ root, value, names: namesOf(root), filled, errors: byPointer, libraries, models: (models || []).filter(model => model.calculator === owner), setHelp, disabled, set: (path, part, how) => onChange(changed(value, path, part), how) });
+  const context = new Context({ root, value, names: namesOf(root), filled, errors: byPointer, libraries, models: (models || []).filter(model => model.calculator === owner), pointAt: setPointed, focusOn: setFocused, disabled, set: (path, part, how) => onChange(changed(value, path, part), how) });
   const whole = resolve(schema, root);
   // A family of jobs, told apart by one field.
   const family = kindOf(whole) === 'choice' ? variants(whole, root) : null;
@@ -79,7 +89,7 @@ export function Form({ calculator, schema, value, filled, onChange, errors, libr
         ${further.length > 0 && html`<h2 class="divider">${t('further_settings')}</h2>`}
         ${further.map(entry => section(entry, false))}
       </div>
-      <${Help} help=${help} />
+      <${Help} help=${pointed ?? focused} />
     </form>`;
 }
 
@@ -88,7 +98,7 @@ function Help({ help }) {
   return html`
     <div class="help" aria-hidden="true">
       ${help ? html`<p><strong>${help.label}</strong>${help.symbol && html` <${Symbol} symbol=${help.symbol} />`}${help.range && html` <span class="range">${help.range}</span>`}</p>
-        <p>${help.description}</p>` : html`<p class="quiet">${t('help_hint')}</p>`}
+        <p>${help.description}</p>` : html`<p class="quiet">${t(matchMedia('(pointer: coarse)').matches ? 'help_hint_touch' : 'help_hint')}</p>`}
     </div>`;
 }
 
@@ -215,19 +225,11 @@ function Choice({ schema, path, value, context }) {
   const id = `${fieldId(path)}-kind`;
   const pick = event => {
     const chosen = list[Number(event.currentTarget.value)];
-    const fresh = blank(chosen.schema, context.root);
-    // What both kinds have in common stays.
-    if (value && typeof value === 'object' && !Array.isArray(value) && fresh && typeof fresh === 'object') {
-      for (const name of Object.keys(fresh)) {
-        if (name !== chosen.tag && typeof value[name] === typeof fresh[name] && typeof value[name] !== 'object') fresh[name] = value[name];
-      }
-    }
-    context.set(path, fresh);
+    context.set(path, kept(value, now.schema, chosen, context.root));
   };
   const name = variant => variantName(variant, context.root) ?? t(`form_${kindOf(variant.schema)}`);
-  const show = () => context.setHelp({ label: name(now), description: now.schema.description });
   return html`
-    <div class="row" onMouseEnter=${show} onFocusIn=${show}>
+    <div class="row" ...${explained(context, { label: name(now), description: now.schema.description })}>
       <label for=${id} class="label">${t('kind')}</label>
       <span class="control wide"><select id=${id} value=${list.indexOf(now)} onChange=${pick}>
         ${list.map((variant, index) => html`<option value=${index}>${name(variant)}</option>`)}
@@ -242,14 +244,18 @@ function Choice({ schema, path, value, context }) {
 function JsonField({ name, schema, path, value, context }) {
   const [draft, setDraft] = useState(null);
   const [wrong, setWrong] = useState(false);
+  const id = fieldId(path);
+  useEffect(() => () => mark(id, false), [id]);
   const take = text => {
     setDraft(text);
-    try {
-      context.set(path, text.trim() === '' ? undefined : JSON.parse(text));
-      setWrong(false);
-    } catch { setWrong(true); }
+    let part;
+    let isWrong = false;
+    try { part = text.trim() === '' ? undefined : JSON.parse(text); } catch { isWrong = true; }
+    setWrong(isWrong);
+    mark(id, isWrong);
+    if (!isWrong) context.set(path, part, 'typing');
   };
-  return html`<textarea id=${fieldId(path)} rows="4" class="json" spellcheck=${false} aria-label=${labelOf(name, schema)} aria-invalid=${wrong ? 'true' : undefined}
+  return html`<textarea id=${id} rows="4" class="json" spellcheck=${false} aria-label=${labelOf(name, schema)} aria-invalid=${wrong ? 'true' : undefined}
     value=${draft ?? (value === undefined ? '' : JSON.stringify(value, null, 1))} onInput=${event => take(event.currentTarget.value)}></textarea>`;
 }
 
@@ -260,7 +266,7 @@ export function goTo(place) {
     const element = document.getElementById(fieldId(path.slice(0, length)));
     if (element) {
       element.scrollIntoView({ block: 'center' });
-      (element.matches('input,select,textarea,button') ? element : element.querySelector('input,select,textarea,button'))?.focus();
+      /** @type {HTMLElement | null} */ (element.matches('input,select,textarea,button') ? element : element.querySelector('input,select,textarea,button'))?.focus();
       return;
     }
   }

@@ -1,11 +1,13 @@
 // The one place from which the vendored libraries come.
-import { h, render, Component, Fragment } from './vendor/preact.module.js';
+import { h, render, Component as Base, Fragment } from './vendor/preact.module.js';
 import htm from './vendor/htm.module.js';
 
 import { useState, useEffect } from './vendor/hooks.module.js';
 
 export { useState, useEffect, useLayoutEffect, useMemo, useRef, useCallback, useReducer } from './vendor/hooks.module.js';
-export { h, render, Component, Fragment };
+/** @type {{ new (): { state: any, setState(state: any): void } }} */
+export const Component = /** @type {any} */ (Base);
+export { h, render, Fragment };
 export const html = htm.bind(h);
 
 /** Calls `task` after `wait` ms without another call. */

@@ -1,8 +1,10 @@
 // Lists and tables of a job: names to tick, lines of numbers, grids, parts, values by name.
 import { html, useState, useEffect } from './lib.js';
-import { t, capital, typed, parsed, unitOf } from './text.js';
+import { t, capital, typed, unitOf } from './text.js';
+import { read } from './number.js';
+import { pasted, rowsOf } from './paste.js';
 import { resolve, kindOf, variants, variantOf, variantName, blank, labelOf, spoken } from './schema.js';
-import { fieldId, isLeaf, nudged, rangeText, defaultText, optionText, Faults } from './fields.js';
+import { fieldId, isLeaf, mark, explained, useNumber, Unread, rangeText, defaultText, optionText, Faults } from './fields.js';
 import { Body, Field } from './form.js';
 
 /** Most columns of a list that is shown as a grid. */
@@ -14,6 +16,9 @@ const LONG_LIST = 40;
 export function List({ name, schema, path, value, context }) {
   const items = resolve(schema.items, context.root);
   const [whole, setWhole] = useState(false);
+  // Rows that come, go, or are pasted are others: no text that was being edited stays with the wrong one.
+  const [turn, setTurn] = useState(0);
+  const [refusal, setRefusal] = useState(null);
   if (kindOf(items) === 'enum') return html`<${Ticks} schema=${schema} items=${items} path=${path} value=${value} context=${context} />`;
   if (kindOf(items) === 'number') return html`<${Numbers} name=${name} schema=${schema} path=${path} value=${value} context=${context} />`;
   if (kindOf(items) === 'string') return html`<${Words} name=${name} schema=${schema} path=${path} value=${value} context=${context} />`;
@@ -21,9 +26,20 @@ export function List({ name, schema, path, value, context }) {
   const add = () => {
     // A new one like the last one: supports, segments, zones come in rows.
     const last = value.at(-1);
-    context.set(path, [...value, last === undefined || kindOf(items) === 'choice' ? blank(items, context.root) : structuredClone(last)]);
+    put([...value, last === undefined || kindOf(items) === 'choice' ? blank(items, context.root) : structuredClone(last)]);
   };
-  const remove = index => context.set(path, value.filter((_, other) => other !== index));
+  const put = rows => { setTurn(turn + 1); setRefusal(null); context.set(path, rows); };
+  const remove = index => put(value.filter((_, other) => other !== index));
+  /** Rows of a spreadsheet fill the table from the cell on into which they are pasted; all of them, or none. */
+  const paste = event => {
+    const { column, row } = event.target.dataset.column ? { column: event.target.dataset.column, row: Number(event.target.closest('[data-row]').dataset.row) } : {};
+    const cells = column && rowsOf(event.clipboardData.getData('text'));
+    if (!cells) return;
+    event.preventDefault();
+    const found = pasted(cells, { columns: plain, from: column, row, value, items, most: schema.maxItems });
+    if (found.fault) setRefusal(found);
+    else put(found.rows);
+  };
   const shown = whole ? value : value.slice(0, LONG_LIST);
   const fields = kindOf(items) === 'object' ? Object.entries(items.properties).map(([field, part]) => ({ name: field, schema: resolve(part, context.root) })) : [];
   const plain = fields.filter(field => isLeaf(field.schema));
@@ -31,15 +47,13 @@ export function List({ name, schema, path, value, context }) {
   const label = index => `${labelOf(name, schema)} ${index + 1}`;
   return html`
     ${isGrid && value.length > 0 ? html`
-      <div class="grid-scroll"><table class="grid">
+      <div class="grid-scroll"><table class="grid" onPaste=${paste}>
         <thead><tr>${plain.map(field => html`<th scope="col" title=${field.schema.description}>${labelOf(field.name, field.schema)}<span class="unit">${unitOf(field.schema)}</span></th>`)}<th><span class="hidden">${t('remove')}</span></th></tr></thead>
-        <tbody>${shown.flatMap((row, index) => [html`<tr key=${index}>
-          ${plain.map(field => html`<td><${Cell} field=${field} path=${[...path, index, field.name]} value=${row[field.name]} required=${(items.required || []).includes(field.name)} context=${context} row=${label(index)} /></td>`)}
-          <td><button type="button" class="icon" disabled=${value.length <= (schema.minItems || 0)} aria-label=${`${t('remove')}: ${label(index)}`} onClick=${() => remove(index)}>×</button></td>
-        </tr>`, html`<${RowFaults} key=${`faults ${index}`} ...${{ plain, path: [...path, index], context }} />`])}</tbody>
-      </table></div>`
+        ${shown.map((row, index) => html`<tbody key=${`${turn} ${index}`} data-row=${index}><${GridRow} ...${{ plain, items, row, context }} path=${[...path, index]} label=${label(index)} canRemove=${value.length > (schema.minItems || 0)} remove=${() => remove(index)} /></tbody>`)}
+      </table></div>
+      ${refusal && html`<p class="fault" role="alert"><span>${t(refusal.fault, refusal.values)}</span></p>`}`
     : shown.map((item, index) => html`
-      <fieldset class="item" key=${index} id=${fieldId([...path, index])}>
+      <fieldset class="item" key=${`${turn} ${index}`} id=${fieldId([...path, index])}>
         <legend><span><span class="hidden">${labelOf(name, schema)} </span>${index + 1}${kindOf(items) === 'choice' ? ` · ${variantName(variantOf(variants(items, context.root), item), context.root) ?? ''}` : ''}</span>
           <button type="button" class="icon" disabled=${value.length <= (schema.minItems || 0)} aria-label=${`${t('remove')}: ${label(index)}`} onClick=${() => remove(index)}>×</button></legend>
         <${Faults} faults=${context.errorsAt([...path, index])} id=${`${fieldId([...path, index])}-item`} names=${context.names} />
@@ -49,41 +63,40 @@ export function List({ name, schema, path, value, context }) {
     <button type="button" class="more" disabled=${full} onClick=${add}>${t('add_item')}<span class="hidden"> ${labelOf(name, schema)}</span></button>`;
 }
 
-/** What is wrong in a row of a grid: below it, as wide as the grid, so that no column moves. */
-function RowFaults({ plain, path, context }) {
+/** A row of a grid and what is wrong in it: below it, as wide as the grid, so that no column moves. */
+function GridRow({ plain, items, path, row, label, remove, canRemove, context }) {
+  const [wrong, setWrong] = useState({});
+  const note = (name, fault) => setWrong(({ [name]: before, ...others }) => (fault ? { ...others, [name]: fault } : others));
+  const refused = plain.flatMap(field => (wrong[field.name] ? [{ ...wrong[field.name], id: `${fieldId([...path, field.name])}-fault` }] : []));
+  return html`
+    <tr>
+      ${plain.map(field => html`<td key=${field.name}><${Cell} field=${field} path=${[...path, field.name]} value=${row[field.name]} required=${(items.required || []).includes(field.name)} context=${context} row=${label} onFault=${note} /></td>`)}
+      <td><button type="button" class="icon" disabled=${!canRemove} aria-label=${`${t('remove')}: ${label}`} onClick=${remove}>×</button></td>
+    </tr>
+    ${refused.length > 0 && html`<tr class="row-faults"><td colspan=${plain.length + 1}>${refused.map(fault => html`<${Unread} key=${fault.id} ...${fault} />`)}</td></tr>`}
+    <${RowFaults} plain=${plain.filter(({ name }) => !wrong[name])} ...${{ path, context }} width=${plain.length + 1} />`;
+}
+
+function RowFaults({ plain, path, context, width }) {
   const found = [...context.errorsAt(path).map(fault => ({ ...fault, id: fieldId(path) })), ...plain.flatMap(field => context.errorsAt([...path, field.name]).map(fault => ({ ...fault, id: fieldId([...path, field.name]) })))];
   if (found.length === 0) return null;
-  return html`<tr class="row-faults"><td colspan=${plain.length + 1}>${found.map(({ id, detail }, index) => html`<p class="fault" key=${index} id=${`${id}-fault`}>${capital(spoken(detail, context.names))}</p>`)}</td></tr>`;
+  return html`<tr class="row-faults"><td colspan=${width}>${found.map(({ id, detail }, index) => html`<p class="fault" key=${index} id=${`${id}-fault`}>${capital(spoken(detail, context.names))}</p>`)}</td></tr>`;
 }
 
 /** A number in a grid: its name is that of row and column. */
-function Cell({ field, path, value, required, context, row }) {
-  const [draft, setDraft] = useState(null);
+function Cell({ field, path, value, required, context, row, onFault }) {
   const faults = context.errorsAt(path);
   const label = labelOf(field.name, field.schema);
-  useEffect(() => {
-    const typed_ = draft === null ? null : parsed(draft);
-    if (draft !== null && !Number.isNaN(typed_) && !Object.is(typed_ ?? undefined, value)) setDraft(null);
-  }, [value]);
-  const read = draft === null ? value : parsed(draft);
-  const wrong = Number.isNaN(read) || (required && read === null);
-  const show = () => context.setHelp({ label, symbol: field.schema['x-symbol'], range: rangeText(field.schema), description: [field.schema.description, defaultText(field.schema)].join(' ') });
   const id = fieldId(path);
-  const take = text => {
-    setDraft(text);
-    const next = parsed(text);
-    if (!Number.isNaN(next) && !(required && next === null)) context.set(path, next === null ? undefined : next, 'typing');
-  };
-  const key = event => {
-    if (event.key !== 'ArrowUp' && event.key !== 'ArrowDown') return;
-    event.preventDefault();
-    setDraft(null);
-    context.set(path, nudged(value, field.schema, event.key === 'ArrowUp' ? 1 : -1, event.shiftKey), 'typing');
-  };
+  const [wrong, setWrong] = useState(null);
+  const { draft, take, leave, key } = useNumber({ id, schema: field.schema, value, required, set: (part, how) => context.set(path, part, how), onFault: fault => { setWrong(fault); onFault(field.name, fault); } });
+  useEffect(() => () => onFault(field.name, null), []);
+  const help = explained(context, { label, symbol: field.schema['x-symbol'], range: rangeText(field.schema), description: [field.schema.description, defaultText(field.schema)].join(' ') });
+  const isFaulty = faults.length > 0 || wrong !== null;
   return html`
-    <input id=${id} type="text" inputmode="decimal" autocomplete="off" value=${draft ?? typed(value)} aria-label=${`${row}: ${label}`} onFocus=${event => { show(); event.currentTarget.select(); }} onMouseEnter=${show}
-      title=${rangeText(field.schema)} placeholder=${field.schema.default !== undefined ? typed(field.schema.default) : ''} aria-invalid=${faults.length || wrong ? 'true' : undefined} aria-describedby=${faults.length ? `${id}-fault` : undefined}
-      onInput=${event => take(event.currentTarget.value)} onBlur=${() => { if (!wrong) setDraft(null); }} onKeyDown=${key} />`;
+    <input id=${id} type="text" inputmode="decimal" autocomplete="off" data-column=${field.name} value=${draft ?? typed(value)} aria-label=${`${row}: ${label}`} onFocus=${event => event.currentTarget.select()} ...${help}
+      title=${rangeText(field.schema)} placeholder=${field.schema.default !== undefined ? typed(field.schema.default) : ''} aria-invalid=${isFaulty ? 'true' : undefined} aria-describedby=${isFaulty ? `${id}-fault` : undefined}
+      onInput=${event => take(event.currentTarget.value)} onBlur=${leave} onKeyDown=${key} />`;
 }
 
 /** Which of several things are wanted. */
@@ -102,26 +115,42 @@ function Ticks({ schema, items, path, value, context }) {
 /** Numbers in one line. */
 function Numbers({ name, schema, path, value, context }) {
   const [draft, setDraft] = useState(null);
-  const read = (draft ?? '').split(/[;\s]+/).filter(Boolean).map(parsed);
-  const wrong = draft !== null && read.some(Number.isNaN);
+  const id = fieldId(path);
+  const unit = schema['x-unit'] ?? resolve(schema.items, context.root)['x-unit'];
+  const list = text => text.split(/[;\n\t]/.test(text) ? /[;\n\t]+/ : /\s+/).filter(part => part.trim()).map(part => read(part, unit));
+  const wrong = draft === null ? null : list(draft).find(({ fault }) => fault);
+  useEffect(() => () => mark(id, false), [id]);
   const take = text => {
     setDraft(text);
-    const next = text.split(/[;\s]+/).filter(Boolean).map(parsed);
-    if (!next.some(Number.isNaN)) context.set(path, next, 'typing');
+    const next = list(text);
+    const isRead = next.every(({ fault }) => !fault);
+    mark(id, !isRead);
+    if (isRead) context.set(path, next.map(one => one.value), 'typing');
   };
-  const id = fieldId(path);
+  // A line has no lines of its own: those of a spreadsheet become parts of the list.
+  const paste = event => {
+    const text = event.clipboardData.getData('text').trim();
+    if (!/[\n\t]/.test(text)) return;
+    event.preventDefault();
+    take(text.split(/[\n\t]+/).join('; '));
+  };
   return html`
     <div class="line"><input id=${id} type="text" aria-label=${`${labelOf(name, schema)} (${t('numbers_hint')})`} placeholder=${t('numbers_hint')} value=${draft ?? value.map(typed).join('; ')}
-      aria-invalid=${wrong ? 'true' : undefined} onInput=${event => take(event.currentTarget.value)} onBlur=${() => { if (!wrong) setDraft(null); }} />
+      aria-invalid=${wrong ? 'true' : undefined} aria-describedby=${wrong ? `${id}-fault` : undefined} onInput=${event => take(event.currentTarget.value)} onPaste=${paste} onBlur=${() => { if (!wrong) setDraft(null); }} />
     <span class="unit">${unitOf(schema['x-unit'] ? schema : schema.items)}</span></div>
-    <${Faults} faults=${wrong ? [{ detail: t('not_a_number') }] : []} id=${`${id}-fault`} />`;
+    ${wrong && html`<${Unread} ...${wrong} choices=${null} id=${`${id}-fault`} />`}`;
 }
 
 /** Names in one line. */
 function Words({ name, schema, path, value, context }) {
+  const [draft, setDraft] = useState(null);
+  const take = text => {
+    setDraft(text);
+    context.set(path, text.split(/[;,]+/).map(word => word.trim()).filter(Boolean), 'typing');
+  };
   return html`
-    <div class="line"><input id=${fieldId(path)} type="text" aria-label=${`${labelOf(name, schema)} (${t('words_hint')})`} placeholder=${t('words_hint')} value=${value.join('; ')}
-      onChange=${event => context.set(path, event.currentTarget.value.split(/[;,]+/).map(word => word.trim()).filter(Boolean))} /></div>`;
+    <div class="line"><input id=${fieldId(path)} type="text" aria-label=${`${labelOf(name, schema)} (${t('words_hint')})`} placeholder=${t('words_hint')} value=${draft ?? value.join('; ')}
+      onInput=${event => take(event.currentTarget.value)} onBlur=${() => setDraft(null)} /></div>`;
 }
 
 /** Values by names that the schema does not know. */

@@ -18,7 +18,7 @@ function complain(error) {
   if (String(error?.message ?? error).startsWith('ResizeObserver loop')) return;
   const known = error instanceof api.Refused || error instanceof api.Unreachable;
   const words = t('page_trouble') === 'page_trouble' ? 'Something in this page failed. Reload it; if it happens again, tell those who run the service:' : t('page_trouble');
-  trouble.textContent = known ? error.problem?.detail || t('offline_detail') : `${words} ${error?.message || error}`;
+  trouble.textContent = known ? (error instanceof api.Refused && error.problem?.detail) || t('offline_detail') : `${words} ${error?.message || error}`;
   trouble.hidden = false;
   setTimeout(() => { trouble.hidden = true; }, known ? 6000 : 30000);
 }
@@ -190,8 +190,10 @@ function KeyForm({ done, refused }) {
     </form>`;
 }
 
+// A file that falls beside its field must not take the place of the page.
+for (const kind of ['dragover', 'drop']) addEventListener(kind, event => { if (!event.defaultPrevented) event.preventDefault(); });
 addEventListener('keydown', event => {
-  if (event.key === 'Enter' && (event.ctrlKey || event.metaKey)) document.querySelector('.form')?.requestSubmit();
+  if (event.key === 'Enter' && (event.ctrlKey || event.metaKey)) /** @type {HTMLFormElement | null} */ (document.querySelector('.form'))?.requestSubmit();
 });
 
 const root = document.getElementById('app');

@@ -2,7 +2,7 @@
 import { html, useState, useEffect, useRef } from './lib.js';
 import { t, number, duration, moment, language } from './text.js';
 import * as api from './api.js';
-import { save } from './result.js';
+import { save } from './handover.js';
 
 const LOOK_MS = 1500;
 /** Results of one calculator not further apart than this stand in one line until asked for. */
@@ -93,7 +93,7 @@ export function Jobs({ calculators, refreshJobs }) {
             <th scope="row" role="rowheader">${!known.has(item.calculator) ? name : item.state === 'succeeded' ? html`<a href=${addressOf(item)}>${name}</a>` : isActive ? html`<a href=${`#/${item.calculator}?run=${item.id}`}>${name}</a>` : name}<${Told} item=${item} /></th>
             <td role="cell"><span class=${`state ${item.state}`}>${t(`state_${item.state}`)}</span>${item.problem ? html`<span class="quiet"> ${item.problem.detail || item.problem.title}</span>` : ''}</td>
             <td role="cell" class="progress-cell">${isActive ? html`<progress max="1" value=${item.progress} aria-label=${`${name}: ${t('progress')}`}></progress><span class="quiet">${item.stage || ''}${item.remaining_ms ? ` · ${t('time_left', { time: duration(item.remaining_ms) })}` : ''}</span>`
-              : item.started_at && item.finished_at ? html`<span class="took">${duration(new Date(item.finished_at) - new Date(item.started_at))}</span>` : ''}</td>
+              : item.started_at && item.finished_at ? html`<span class="took">${duration(Date.parse(item.finished_at) - Date.parse(item.started_at))}</span>` : ''}</td>
             <td role="cell" class="when">${moment(item.created_at)}</td>
             <td role="cell">${isActive && html`<button type="button" onClick=${() => stop(item.id)}>${t('cancel_job')}<span class="hidden"> ${name}${item.summary ? `, ${item.summary}` : ''}</span></button>`}</td></tr>`;
         })}</tbody></table></div>`}
@@ -111,7 +111,7 @@ function inBursts(items) {
   const bursts = [];
   for (const item of items) {
     const last = bursts.at(-1)?.at(-1);
-    if (last && last.calculator === item.calculator && Math.abs(new Date(last.created_at) - new Date(item.created_at)) < BURST_MS) bursts.at(-1).push(item);
+    if (last && last.calculator === item.calculator && Math.abs(Date.parse(last.created_at) - Date.parse(item.created_at)) < BURST_MS) bursts.at(-1).push(item);
     else bursts.push([item]);
   }
   return bursts;

@@ -42,9 +42,10 @@ function shiftsOf(effects) {
 }
 
 /** The point that stands there once it is moved across its direction from the origin: on the same circle less the way. */
-function beforeShift([x, y], by) {
+function beforeShift(point, by) {
+  const [x, y] = point;
   const reach = Math.hypot(x, y);
-  if (by === 0 || reach <= Math.abs(by)) return [x, y];
+  if (by === 0 || reach <= Math.abs(by)) return point;
   // A right angle at the point that is looked for: reach² = its own² + by².
   const own = Math.sqrt(reach * reach - by * by);
   const turn = Math.atan2(y, x) - Math.atan2(by, own);
@@ -99,8 +100,8 @@ function byMap(job, { result, effects }) {
 }
 
 /** What a point of a figure stands for: `{ hint, at: [x, y], jobAt(x, y) }`, or `null`. */
-export function pickOf(id, figure, schema, job, body) {
+export function pickOf(figure, schema, job, body) {
   if (!figure) return null;
-  if (id === 'ring-roundness' && figure.id === 'map') return byMap(job, body);
+  if (figure.id === 'map' && body.result.setup_map) return byMap(job, body);
   return byAxes(figure, schema, job);
 }

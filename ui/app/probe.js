@@ -7,7 +7,8 @@ const KEPT = 400;
 
 /** Follows a job as fast as the service answers; one that is passed by before its turn is never sent. `tag` names the
  *  job, `null` asks for none. `bare` answers come
- *  without their figures. Gives the last answer found: `{ tag, answer, figures }` or `{ tag, problem }`. */
+ *  without their figures. Gives the last answer found: `{ tag, answer, figures }` or `{ tag, problem }`.
+ *  @param {string} id @param {string | null} tag @param {any} job @param {{ bare?: boolean }} [options] */
 export function useProbe(id, tag, job, { bare } = {}) {
   const [found, setFound] = useState(null);
   const line = useRef(null);

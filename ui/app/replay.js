@@ -20,7 +20,7 @@ const CURVE_HEIGHT = 40;
 const told = turns => number(Math.round(turns * 100) / 100, 8);
 
 /** Whether there is a history to go through. */
-export const canReplay = (id, figure, result) => id === 'ring-roundness' && figure?.id === 'polar' && (result?.simulation?.history?.revolution?.length ?? 0) > 1;
+export const canReplay = (figure, result) => figure?.id === 'polar' && (result?.simulation?.history?.revolution?.length ?? 0) > 1;
 
 /** The job with its surfaces on the way and nothing else that takes time or room. */
 export function withFrames(job, { result }) {

@@ -1,7 +1,8 @@
 // Numbers to places on the paper, and the round numbers at which an axis is labelled.
 import { number, superscript } from './text.js';
 
-/** A scale from `[low, high]` to `[from, to]`. */
+/** A scale from `[low, high]` to `[from, to]`.
+ *  @param {string} spacing @param {number[]} domain @param {number[]} places */
 export function scale(spacing, [low, high], [from, to]) {
   const isLog = spacing === 'logarithmic';
   const bend = isLog ? Math.log10 : value => value;
@@ -46,7 +47,8 @@ export function aired(span, spacing, share = 0.06) {
   return [low, high];
 }
 
-/** Round numbers in a range, about `count` of them. */
+/** Round numbers in a range, about `count` of them.
+ *  @param {string} spacing @param {number[]} range @param {number} count */
 export function ticks(spacing, [low, high], count) {
   if (spacing === 'logarithmic') {
     const from = Math.ceil(Math.log10(low) - 1e-9);

@@ -109,6 +109,19 @@ export function blank(schema, root, depth = 0) {
   }
 }
 
+/** A value of another kind: with everything that both kinds have, also what is not required, and nothing else of the old. */
+export function kept(value, from, { schema, tag }, root) {
+  const fresh = blank(schema, root);
+  if (!value || typeof value !== 'object' || Array.isArray(value) || !fresh || typeof fresh !== 'object') return fresh;
+  for (const [name, part] of Object.entries(schema.properties || {})) {
+    if (name === tag || value[name] === undefined || !from.properties?.[name]) continue;
+    const [own, before] = [resolve(part, root), resolve(from.properties[name], root)];
+    const isAlike = kindOf(own) === kindOf(before) && own['x-unit'] === before['x-unit'] && JSON.stringify(own.properties ?? own.oneOf ?? own.items ?? null) === JSON.stringify(before.properties ?? before.oneOf ?? before.items ?? null);
+    if (isAlike && (!own.enum || own.enum.includes(value[name]))) fresh[name] = value[name];
+  }
+  return fresh;
+}
+
 /** What units add to a field's name, the longest first. */
 const SUFFIXES = [
   'n_mm_per_rad', 'rad_per_n_mm', 'n_per_mm2', 'n_per_mm', 'n_s_per_mm', 'kg_per_m3', 'um_per_m_k', 'um_per_km', 'um_per_rev', 'um_per_n', 'um_per_k', 'mm_per_tooth',
@@ -135,6 +148,7 @@ const namesBySchema = new WeakMap();
 /** What every field of a schema is called, by its name. */
 export function namesOf(schema) {
   if (namesBySchema.has(schema)) return namesBySchema.get(schema);
+  /** @type {Map<string, string> & { of?: any }} */
   const names = new Map();
   const walk = part => {
     if (!part || typeof part !== 'object') return;

@@ -1,12 +1,17 @@
 // Parameter studies: one to three fields of a calculator's job are varied, every point an answer of its own.
 import { html, useState, useEffect, useRef, useMemo } from './lib.js';
-import { t, capital, number, typed, parsed, unitSymbol, plural, language } from './text.js';
+import { t, capital, number, typed, unitSymbol, plural, language } from './text.js';
 import * as api from './api.js';
-import { jobOf, lastQuery } from './room.js';
+import { jobOf } from './address.js';
+import { lastQuery } from './desk.js';
+import { read } from './number.js';
 import { keepRun, keptRun, inputOf } from './runs.js';
 import { Progress, Trouble } from './status.js';
 import { Picture } from './figure.js';
-import { Downloads, RequestView, Warnings, Sheet, usePictureHeight, short } from './result.js';
+import { Warnings, usePictureHeight, short } from './result.js';
+import { Downloads } from './handover.js';
+import { RequestView } from './tabs.js';
+import { Sheet } from './values.js';
 import { parts, namesOf, spoken as labelled, within } from './schema.js';
 import { leavesOf, outputsOf, proposed, pointsOf } from './vary.js';
 
@@ -19,7 +24,7 @@ const OF_VARIED = new Map([['from', 'from'], ['to', 'to'], ['count', 'number_of_
 /** What the list of downloads wants to know of a calculator. */
 const DECLARED = { media_types: ['application/json', 'text/csv', 'image/svg+xml'] };
 
-const read = (query, name, otherwise) => {
+const said = (query, name, otherwise) => {
   try { return query.get(name) ? JSON.parse(query.get(name)) : otherwise; } catch { return otherwise; }
 };
 const jobPart = query => new URLSearchParams([...query].filter(([name]) => !OWN.includes(name) && name !== 'pin'));
@@ -82,9 +87,9 @@ async function givenStudy(id) {
 function Board({ description, job, stored, part, query, calculators, choose, tell: write, refreshJobs }) {
   const leaves = useMemo(() => leavesOf(description.input_schema, job), [description, job]);
   const outputs = useMemo(() => outputsOf(description.output_schema, description.study_outputs), [description]);
-  const [vary, setVary] = useState(() => stored?.vary || read(query, 'vary', null) || proposed(leaves).map(({ range }) => range));
+  const [vary, setVary] = useState(() => stored?.vary || said(query, 'vary', null) || proposed(leaves).map(({ range }) => range));
   const [combine, setCombine] = useState(() => stored?.combine || query.get('combine') || 'grid');
-  const [wished, setWished] = useState(() => stored?.outputs || read(query, 'outputs', null) || description.study_outputs);
+  const [wished, setWished] = useState(() => stored?.outputs || said(query, 'outputs', null) || description.study_outputs);
   const [answer, setAnswer] = useState(null);
   const [problem, setProblem] = useState(null);
   const [running, setRunning] = useState(null);
@@ -161,7 +166,7 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
   /** Computes the study: not before all of it can be read. */
   const compute = event => {
     event.preventDefault();
-    const first = document.querySelector('.study-form [data-unread]');
+    const first = /** @type {HTMLElement | null} */ (document.querySelector('.study-form [data-unread]'));
     if (!first) { start(); return; }
     setPane('form');
     setTimeout(() => { first.scrollIntoView({ block: 'center' }); first.focus(); }, 30);
@@ -214,6 +219,14 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
   // A kept study has no page of its job, but its points have.
   const ofPoint = answer?.answer.result.rows.find(({ status }) => status === 'succeeded')?.key;
   const page = !stored ? `#/${description.id}${part ? `?${part}` : ''}` : ofPoint && `#/${description.id}?result=${ofPoint}`;
+  const begun = useRef(JSON.stringify(body));
+  const touched = JSON.stringify(body) !== begun.current;
+  // A kept study is its own job; one that is changed, on its way, refused or not to be read has no answer to take away.
+  const isAsked = answer && (JSON.stringify(answer.asked) === JSON.stringify(body) || (stored && !touched));
+  const stale = Boolean(answer && (!isAsked || pending || running || problem));
+  const current = useRef(null);
+  current.current = stale ? null : answer?.key;
+  const owns = key => current.current === key && !document.querySelector('.study-form [data-unread]');
   const trouble = problem && html`<${Trouble} problem=${problem.errors ? { ...problem, errors: faults } : problem} names=${names} over=${Boolean(answer)} onGo=${go} />`;
   return html`
     <main class="room" data-pane=${pane} id="main" tabindex="-1">
@@ -254,7 +267,7 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
         <header class="room-head"><h1>${t('study_question')}</h1><p class="summary">${description.title}</p>${running && html`<${Progress} running=${running} stop=${() => api.cancel(running.id).catch(fail)} />`}</header>
         ${answer && trouble}
         ${!answer && !running?.interim ? html`<div class="empty">${problem ? html`<div class="no-answer">${trouble}</div>` : running ? '' : html`<p>${pending ? t('first_answer') : t('study_empty')}</p>`}</div>`
-          : html`<${Findings} ...${{ answer, interim: running?.interim, leaves, outputs, description }} stale=${Boolean(answer && JSON.stringify(answer.asked) !== JSON.stringify(body) && !stored)} />`}
+          : html`<${Findings} ...${{ answer, interim: running?.interim, leaves, outputs, description }} ...${{ stale, owns }} />`}
       </section>
     </main>`;
 }
@@ -267,22 +280,23 @@ function Varied({ index, variable, leaves, taken, faults, set, remove }) {
   useEffect(() => setDraft({}), [variable.pointer]);
   const groups = [...new Set(leaves.map(({ group }) => group))];
   const pick = place => { setDraft({}); set(proposed(leaves.filter(one => one.pointer === place))[0].range); };
+  const unit = leaf?.schema['x-unit'];
+  const listed = text => {
+    if (leaf?.kind === 'number') return text.split(/[;\n\t]/.test(text) ? /[;\n\t]+/ : /\s+/).filter(part => part.trim()).map(part => read(part, unit));
+    return text.split(/[;,\s]+/).filter(Boolean).map(word => ({ value: leaf?.kind === 'boolean' ? word === 'true' : word }));
+  };
+  const found = (name, text) => (name === 'values' ? listed(text) : [read(text, name === 'count' ? '1' : unit)].filter(({ value }) => value !== null));
+  const faultOf = (name, text) => {
+    const values = found(name, text);
+    return values.length === 0 ? { fault: 'needed' } : values.find(({ fault }) => fault) ?? null;
+  };
   const take = (name, text) => {
     setDraft({ ...draft, [name]: text });
-    if (faultOf(name, text) === null) set({ ...variable, [name]: parsed(text) });
-  };
-  const listed = text => {
-    const words = text.split(leaf?.kind === 'number' ? /[;\s]+/ : /[;,\s]+/).filter(Boolean);
-    return leaf?.kind === 'number' ? words.map(parsed) : leaf?.kind === 'boolean' ? words.map(word => word === 'true') : words;
-  };
-  const faultOf = (name, text) => {
-    const values = name === 'values' ? listed(text) : [parsed(text)].filter(value => value !== null);
-    if (values.length === 0) return 'needed';
-    return values.some(Number.isNaN) ? 'not_a_number' : null;
+    if (faultOf(name, text) === null) set({ ...variable, [name]: found(name, text)[0].value });
   };
   const takeList = text => {
     setDraft({ ...draft, values: text });
-    if (faultOf('values', text) === null) set({ pointer: variable.pointer, values: listed(text) });
+    if (faultOf('values', text) === null) set({ pointer: variable.pointer, values: listed(text).map(({ value }) => value) });
   };
   const id = name => `vary-${index}-${name}`;
   // A draft that is no value stays, and says so.
@@ -309,7 +323,7 @@ function Varied({ index, variable, leaves, taken, faults, set, remove }) {
         : html`<div class="study-range">${field('from', t('from'))}${field('to', t('to'))}${field('count', t('how_many'))}
           <label class="study-field">${t('spacing')}<select id=${id('spacing')} value=${variable.spacing || 'linear'} onChange=${event => set({ ...variable, spacing: event.currentTarget.value })}><option value="linear">${t('spacing_linear')}</option><option value="log">${t('spacing_log')}</option></select></label></div>`}
       ${leaf && html`<p class="quiet study-now">${t('value_now')} ${typeof leaf.value === 'number' ? number(leaf.value, 6) : leaf.value === undefined ? t('not_set') : String(leaf.value)} ${leaf.unit}</p>`}
-      ${unread.map(([name, fault]) => html`<p class="fault" key=${name} id=${id(`${name}-fault`)}><span>${name === 'values' ? '' : `${t(OF_VARIED.get(name))}: `}${t(fault)}</span></p>`)}
+      ${unread.map(([name, fault]) => html`<p class="fault" key=${name} id=${id(`${name}-fault`)}><span>${name === 'values' ? '' : `${t(OF_VARIED.get(name))}: `}${t(fault.fault, fault.values)}</span></p>`)}
       ${faults.map(({ detail }) => html`<p class="fault" role="alert"><span>${capital(detail)}</span></p>`)}
     </fieldset>`;
 }
@@ -322,7 +336,7 @@ function valuesOf({ from, to, count, spacing }) {
 }
 
 /** What came out: pictures, a sentence, one row per point. */
-function Findings({ answer, interim, leaves, outputs, description, stale }) {
+function Findings({ answer, interim, leaves, outputs, description, stale, owns }) {
   const calculator = description.id;
   const [chosen, setChosen] = useState(null);
   const [picked, setPicked] = useState(null);
@@ -334,12 +348,13 @@ function Findings({ answer, interim, leaves, outputs, description, stale }) {
   const pick = figure?.id === 'map' && result && result.variables.length === 2 ? (x, y) => setPicked(nearestRow(result, x, y)) : null;
   const [first, ...others] = answer?.answer.explanation || [];
   return html`
+    <p class="not-printed">${t('not_printed')}</p>
     <div class=${`result ${stale ? 'stale' : ''}`}>
       ${all.length > 1 && html`<div class="figure-choice" role="group" aria-label=${t('figures')}>${all.map(({ id, title }) => html`<button type="button" key=${id} aria-pressed=${figure.id === id} onClick=${() => setChosen(id)}>${id === 'map' ? t('study_map') : id === 'curves' ? t('study_curves') : short(title.text)}</button>`)}</div>`}
       <div class="picture-and-words">
         <div class="picture-box">
           ${figure && !isEmpty ? html`<${Picture} key=${figure.id} figure=${figure} height=${height} onPick=${pick} main />` : html`<p class="quiet">${t('no_figure')}</p>`}
-          <div class="under">${(interim || stale) && html`<p class="stale-note" role="status">${interim ? t('so_far') : t('stale_note')}</p>`}</div>
+          <div class="under">${(interim || stale) && html`<p class="so-far" role="status">${interim ? t('so_far') : t('stale_note')}</p>`}</div>
           ${pick && !isEmpty && picked === null && html`<p class="quiet hint">${t('click_for_row')}</p>`}
           ${result && picked !== null && html`<${Point} result=${result} index=${picked} calculator=${calculator} names=${namesOf(description.input_schema)} />`}
         </div>
@@ -350,9 +365,9 @@ function Findings({ answer, interim, leaves, outputs, description, stale }) {
         </div>`}
       </div>
       ${result && html`
-        <div class="bar"><span class="quiet">${plural('points', result.points)}${result.failed > 0 ? `, ${t('without_answer', { count: result.failed })}` : ''}</span><${Downloads} id="studies" description=${DECLARED} answer=${answer} figure=${figure} /></div>
+        <div class="bar"><span class="quiet">${plural('points', result.points)}${result.failed > 0 ? `, ${t('without_answer', { count: result.failed })}` : ''}</span><${Downloads} id="studies" description=${DECLARED} answer=${answer} figure=${figure} stale=${stale} owns=${owns} /></div>
         <${Rows} ...${{ result, leaves, outputs, calculator, picked }} names=${namesOf(description.input_schema)} />
-        ${answer.asked && html`<details class="tabs request"><summary>${t('tab_request')}</summary><div><${RequestView} id="studies" job=${answer.asked} answer=${answer} link=${`#/studies?study=${answer.key}`} /></div></details>`}
+        ${answer.asked && html`<details class="tabs request"><summary>${t('tab_request')}</summary><div><${RequestView} id="studies" job=${answer.asked} answer=${answer} stale=${stale} link=${`#/studies?study=${answer.key}`} /></div></details>`}
         <${Sheet} description=${description} body=${answer.answer} job=${answer.answer.input.job} />`}
     </div>`;
 }

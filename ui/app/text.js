@@ -73,13 +73,6 @@ export function number(value, digits = 6) {
 /** A number as it is typed: all its digits, nothing between them. */
 export const typed = value => (value === null || value === undefined ? '' : String(value).replace('.', decimalMark()));
 
-/** Reads what was typed, with point or comma; `null` for nothing, `NaN` for what is no number. */
-export function parsed(text) {
-  const plain = text.trim().replace(/[\s\u00a0\u202f]/g, '').replace('−', '-').replace(',', '.');
-  if (plain === '') return null;
-  return /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i.test(plain) ? Number(plain) : NaN;
-}
-
 /** A length of time in words: `3 s`, `2 min 5 s`. */
 export function duration(ms) {
   if (ms < 950) return `${number(Math.max(ms, 0), 2)} ${t('unit_ms')}`;
@@ -110,7 +103,7 @@ export function unitSymbol(unit) {
 
 // Who writes milli does not mean mega: of that no capitals are mixed up.
 const spellings = symbol => (symbol.startsWith('М') ? [symbol] : [symbol, symbol.toLowerCase()]);
-const WORDS = new Map([...Object.entries(RUSSIAN).flatMap(([word, symbol]) => spellings(symbol).map(text => [text, word])), ['град', 'deg']]);
+const WORDS = new Map([...Object.entries(RUSSIAN).flatMap(([word, symbol]) => spellings(symbol).map(text => /** @type {[string, string]} */ ([text, word]))), /** @type {[string, string]} */ (['град', 'deg'])]);
 /** A unit with the words of the contract, as far as it is written with those of print: `мкм/об` becomes `um/rev`. */
 export const unitWords = unit => unit.replace(/[а-яё]+/gi, word => WORDS.get(word) ?? WORDS.get(word.toLowerCase()) ?? word);
 

@@ -26,7 +26,7 @@ const pathsOf = job => {
 };
 
 /** Whether the figure is a curve whose point stands for a job. */
-export const canTrade = (id, figure, job) => id === 'feed-schedule' && figure?.id === 'trade_off' && pathsOf(job).length > 0;
+export const canTrade = (figure, job) => figure?.id === 'trade_off' && pathsOf(job).length > 0;
 
 /** The ends of the curve. */
 export const spanOf = figure => {

@@ -1,0 +1,56 @@
+// What an address of a calculator's page stands for, and the address of what is typed there.
+import * as api from './api.js';
+import { difference, changed, parts } from './schema.js';
+import { keptRun, inputOf } from './runs.js';
+
+/** Longer addresses name the kept result instead of the changes. */
+const LONGEST_QUERY = 1600;
+
+/** The job that an address stands for. */
+export async function jobOf(description, query, service = api) {
+  const key = query.get('result');
+  if (key) {
+    const kept = await service.jobOf(key);
+    return { job: kept.job, base: kept.job, baseName: { result: key }, key };
+  }
+  const name = query.get('example') || description.examples[0]?.id;
+  const base = description.jobs[name] ?? {};
+  let job = base;
+  for (const [place, text] of query) {
+    if (!place.startsWith('/')) continue;
+    job = changed(job, parts(place), text === '' ? undefined : JSON.parse(text));
+  }
+  if (query.get('model')) job = { ...job, model: query.get('model') };
+  return { job, base, baseName: { example: name }, key: null };
+}
+
+/** What an address stands for that names a run: the job as it was typed if it was started here, else as the service was
+ *  given it. */
+export async function openedBy(description, query, service = api) {
+  const run = query.get('run');
+  const typed = run && keptRun(run);
+  if (typed) return { ...await jobOf(description, query, service), job: typed, isOwnRun: true };
+  const given = run && await inputOf(run);
+  if (!given || given.calculator !== description.id) return jobOf(description, query, service);
+  return { job: given.job, base: given.job, baseName: { run }, key: null, isOwnRun: false };
+}
+
+/** The address of a job: its base with what differs, or its kept result where that is too long. */
+export function queryOf(state, job, key, run, pin) {
+  const query = addressOf(state, difference(state.base, job), key);
+  if (run) query.set('run', run);
+  if (pin) query.set('pin', pin);
+  return query;
+}
+
+function addressOf({ baseName }, changes, key) {
+  const kept = key ? { result: key } : {};
+  // A kept result or a run stands for its own job alone.
+  if (!baseName.example) return new URLSearchParams(changes.length > 0 ? kept : baseName);
+  const query = new URLSearchParams(baseName);
+  for (const [place, value] of changes) query.set(place, value === undefined ? '' : JSON.stringify(value));
+  return key && query.toString().length > LONGEST_QUERY ? new URLSearchParams(kept) : query;
+}
+
+/** Slashes of pointers are legible in an address. */
+export const written = query => query.toString().replace(/%2F/g, '/').replace(/%3A/g, ':');

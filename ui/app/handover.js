@@ -1,0 +1,52 @@
+// What leaves the page: files, programs, copies, paper. Nothing leaves it that is not the answer to the inputs on the screen,
+// neither when it is asked for nor when it is there.
+import { html, useState } from './lib.js';
+import { t } from './text.js';
+import * as api from './api.js';
+
+export function save(blob, name) {
+  const link = document.createElement('a');
+  link.href = URL.createObjectURL(blob);
+  link.download = name;
+  document.body.append(link);
+  link.click();
+  link.remove();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+
+/** `take(accept, ending, query)` fetches the answer in a form and saves it; `owns(key)` says whether it is still that of
+ *  the inputs on the screen. Also what went wrong. */
+export function useHandOver({ name, answer, owns }) {
+  // What went wrong with another answer is no trouble of this one.
+  const [failed, setFailed] = useState({ key: null, why: null });
+  const take = async (accept, ending, query = '') => {
+    const { key } = answer;
+    setFailed({ key, why: null });
+    if (!owns(key)) return;
+    try {
+      const blob = await api.file(key, accept, query);
+      if (owns(key)) save(blob, `${name}.${ending}`);
+      else setFailed({ key, why: t('changed_meanwhile') });
+    } catch (error) { setFailed({ key, why: error.problem?.detail || error.message }); }
+  };
+  return [take, failed.key === answer.key ? failed.why : null];
+}
+
+/** A file of an answer is told from others by the beginning of its key. */
+export const fileName = (id, answer) => `${id}-${answer.key.slice(3, 11)}`;
+
+/** Every form in which the answer can be had. */
+export function Downloads({ id, description, answer, figure, stale, owns }) {
+  const [take, trouble] = useHandOver({ name: fileName(id, answer), answer, owns });
+  const has = type => description.media_types.includes(type);
+  const button = (text, ...what) => html`<button type="button" disabled=${stale} onClick=${() => take(...what)}>${text}</button>`;
+  return html`
+    <span class="downloads" role="group" aria-label=${t('download')}><span class="quiet">${t('download')}</span>
+      ${button('JSON', 'application/json', 'json')}
+      ${has('text/csv') && button('CSV', 'text/csv', 'csv')}
+      ${has('image/svg+xml') && figure && button('SVG', 'image/svg+xml', 'svg', `?figure=${figure.id}`)}
+      ${has('text/x-gcode') && button(t('gcode'), 'text/x-gcode', 'nc')}
+      <button type="button" disabled=${stale} onClick=${() => { if (owns(answer.key)) window.print(); }}>${t('print')}</button>
+    </span>
+    ${trouble && html`<p class="fault" role="alert"><span>${trouble}</span></p>`}`;
+}

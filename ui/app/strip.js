@@ -1,0 +1,63 @@
+// The answer: what was asked, said in one sentence, with its numbers and the one thing to take away. It is always in view,
+// and says so where it is not an answer to the inputs on the screen.
+import { html, useMemo } from './lib.js';
+import { t, capital, number } from './text.js';
+import { spreadOf, withSpread } from './digits.js';
+import { flat } from './values.js';
+import { useHandOver, fileName } from './handover.js';
+
+/** Numbers beside the sentence. */
+const MOST_NUMBERS = 3;
+/** Numbers that differ by less, as a share, are one. */
+const SAME = 1e-9;
+
+/** The sentences of a text. */
+export const sentences = text => (text === '' ? [] : text.split(/(?<=[.!?]) (?=[A-ZА-ЯЁ])/));
+
+/** The numbers that the declaration names, as far as the result has them. */
+function headline(description, result) {
+  const rows = new Map(flat(description.output_schema, result, description.output_schema).map(row => [`/${row.path.join('/')}`, row]));
+  const found = description.study_outputs.map(place => rows.get(place)).filter(row => typeof row?.value === 'number');
+  // What has the same name would be told apart by nobody, and what is the same number says nothing new.
+  const isSame = (one, other) => one.label === other.label || (Math.abs(one.value - other.value) <= SAME * Math.abs(other.value) && one.unit === other.unit);
+  return found.filter((row, index) => found.findIndex(other => isSame(row, other)) === index).slice(0, MOST_NUMBERS);
+}
+
+/** A number as one reads it at a glance: with its uncertainty where that is not small, a share that is next to none or all
+ *  as such. */
+function glance({ value, schema }, spread) {
+  if (spread > LARGE_SPREAD * Math.abs(value) && spread < Math.abs(value)) return withSpread(value, spread);
+  if (schema.minimum === 0 && schema.maximum === 1) {
+    if (value > 0 && value < SURE) return `< ${number(SURE)}`;
+    if (value < 1 && value > 1 - SURE) return `> ${number(1 - SURE)}`;
+  }
+  return number(value, 3);
+}
+const LARGE_SPREAD = 0.02;
+const SURE = 1e-3;
+
+/** Why the answer is not one to the inputs on the screen. */
+const WHY = { unread: 'answer_unread', wrong: 'answer_wrong', changed: 'answer_changed', computing: 'answer_computing', cancelled: 'answer_cancelled' };
+
+export function Strip({ id, description, answer, said, standing, owns, trouble }) {
+  const { result } = answer.answer;
+  const numbers = useMemo(() => headline(description, result), [description, result]);
+  const [take, refusal] = useHandOver({ name: fileName(id, answer), answer, owns });
+  const isProgram = description.media_types.includes('text/x-gcode');
+  const hand = () => {
+    if (isProgram) take('text/x-gcode', 'nc');
+    else if (owns(answer.key)) window.print();
+  };
+  const why = WHY[standing];
+  return html`
+    <section class=${`strip ${why ? `not-theirs ${standing}` : ''}`} id="answer" aria-label=${t('answer')} tabindex="-1">
+      <p class="verdict" aria-live="polite">${capital(said ?? '')}</p>
+      <dl class="headline">${numbers.map(row => html`<div key=${row.path.join('/')} title=${row.description}><dt>${row.label}</dt><dd>${glance(row, spreadOf(result, row.path)?.spread)}${row.unit && html`<small> ${row.unit}</small>`}</dd></div>`)}</dl>
+      <div class="hand-over">
+        <button type="button" id="take" class="primary" disabled=${Boolean(why)} onClick=${hand}>${isProgram ? t('take_program') : t('take_sheet')}</button>
+        ${why && html`<p class="stale-note" role="status">${t(why)}</p>`}
+      </div>
+      ${refusal && html`<p class="fault" role="alert"><span>${refusal}</span></p>`}
+      ${trouble}
+    </section>`;
+}
