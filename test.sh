@@ -12,7 +12,7 @@ set -euo pipefail
 shopt -s inherit_errexit # a failing command inside $(...) ends the step too
 cd "$(dirname "${BASH_SOURCE[0]}")"
 
-STEPS=(format lint docs dependencies unused scripts test contract programs dockerfile attack)
+STEPS=(format lint docs dependencies unused scripts page test contract programs dockerfile attack)
 declare -A ABOUT=(
   [format]="rustfmt"
   [lint]="clippy over everything, warnings denied"
@@ -20,6 +20,7 @@ declare -A ABOUT=(
   [dependencies]="licences, sources and banned packages against deny.toml"
   [unused]="cargo-machete: dependencies that nothing uses"
   [scripts]="shellcheck"
+  [page]="the workbench without a browser: its parts, and the types of all of it"
   [test]="unit, property and HTTP tests"
   [contract]="openapi/precut.json is what the program prints"
   [programs]="programs for machines, read by LinuxCNC's own interpreter"
@@ -114,6 +115,28 @@ step_scripts() {
   find . -path ./target -prune -o -name '*.sh' -print0 | xargs -0 shellcheck .ci/run
 }
 
+step_page() {
+  local tools said
+  need node nodejs
+  node --test tests/workbench/*.test.mjs
+  need npm npm
+  tools=$(target)/tools/workbench
+  if ! cmp -s tests/workbench/package-lock.json "$tools/package-lock.json"; then
+    mkdir -p "$tools"
+    cp tests/workbench/package.json tests/workbench/package-lock.json "$tools/"
+    npm ci --prefix "$tools" --no-audit --no-fund --silent || {
+      rm -f "$tools/package-lock.json"
+      absent "typescript"
+    }
+  fi
+  # What others wrote has no types, and is not ours to mend.
+  said=$("$tools/node_modules/.bin/tsc" --project tests/workbench/tsconfig.json | grep -v '^ui/app/vendor/' | grep 'error TS' || true)
+  [ -z "$said" ] || {
+    echo "$said" >&2
+    return 1
+  }
+}
+
 postgres_installed() { [ -n "$(find /usr/lib/postgresql -path '*/bin/initdb' 2>/dev/null)" ] || command -v initdb >/dev/null; }
 
 step_test() {
@@ -178,6 +201,7 @@ step_programs() {
   precut=$(binary)
   python3 tests/tools/rs274_check.py self-test
   python3 tests/tools/rs274_check.py examples "$precut"
+  python3 tests/tools/rs274_check.py random "$precut" 20
 }
 
 step_dockerfile() {

@@ -84,7 +84,7 @@ fn the_other_codes_of_the_specification() {
         })
     };
     let kienzle = json!({
-        "kind": "kienzle", "cutting_edge_angle_deg": 91, "nose_radius_mm": -1,
+        "kind": "kienzle", "cutting_edge_angle_deg": 120, "nose_radius_mm": -1,
         "specific_cutting_force_n_per_mm2": 0, "cutting_exponent": 1.0,
         "specific_normal_force_n_per_mm2": 900, "normal_exponent": 0.3
     });
@@ -224,7 +224,7 @@ fn a_number_out_of_its_range_is_told_both_ends() {
         (("/force/passive_n", json!(-1)), "bad_constant_force", ["0", "1000000 N"]),
         (("/force/passive_n", json!(1e300)), "out_of_range", ["0", "1000000 N"]),
         (("/force/wear_factor", json!(0)), "bad_wear_factor", ["0", "10"]),
-        (of_force(kienzle("cutting_edge_angle_deg", 91.0)), "bad_lead_angle", ["0", "90"]),
+        (of_force(kienzle("cutting_edge_angle_deg", 120.0)), "bad_lead_angle", ["0", "120"]),
         (of_force(kienzle("nose_radius_mm", -1.0)), "bad_nose_radius", ["0", "50 mm"]),
         (of_force(kienzle("specific_normal_force_n_per_mm2", 0.0)), "bad_kienzle", ["0", "100000 N/mm²"]),
         (of_force(kienzle("normal_exponent", 1.0)), "bad_kienzle", ["0", "1"]),

@@ -207,7 +207,7 @@ fn gcode() -> Result<Measured, String> {
     let (x, y) = profile(10_000);
     let cuts =
         x.iter().zip(&y).map(|(x, y)| Block::Cut { x_diameter_mm: 90.0 - y, z_mm: -x, feed_mm_per_rev: Some(0.5) });
-    let blocks = std::iter::once(Block::Modes).chain(cuts).chain([Block::End]).collect();
+    let blocks = std::iter::once(Block::Modes).chain(cuts).chain([Block::End(None)]).collect();
     let program = Program { dialect: Dialect::Fanuc, increment_mm: 0.001, blocks };
     cpu_time(|| render::gcode(&program, &[]))
 }

@@ -17,6 +17,7 @@ mod dice;
 mod disk;
 mod killed;
 mod locked;
+mod memory;
 mod process;
 mod small_disk;
 mod streams;

@@ -358,8 +358,9 @@ async fn clients_take_turns() {
     let keys = ["one client's key, 0123456789", "another client's key, 98765432"];
     let server = Server::start_with(|config| {
         config.jobs.slots = 1;
-        config.auth.keys =
-            keys.map(|key| ApiKey { name: key[..3].to_owned(), hash: auth::hash(key).to_string() }).to_vec();
+        config.auth.keys = keys
+            .map(|key| ApiKey { name: key[..3].to_owned(), hash: auth::hash(key).to_string(), ..ApiKey::default() })
+            .to_vec();
     })
     .await;
     let client = |who: usize, request: RequestBuilder| request.bearer_auth(keys[who]);
@@ -377,10 +378,11 @@ async fn clients_take_turns() {
     let second = send(1, lasting(1920, 20)).await;
     drop(held);
     let mut ends = Vec::new();
-    for address in first.iter().chain([&second]) {
+    let of_all = first.iter().map(|address| (0, address)).chain([(1, &second)]);
+    for (who, address) in of_all {
         let start = Instant::now();
         ends.push(loop {
-            let job: Value = client(0, server.get(address)).send().await.unwrap().json().await.unwrap();
+            let job: Value = client(who, server.get(address)).send().await.unwrap().json().await.unwrap();
             if job["state"] == "succeeded" {
                 break job["finished_at"].as_str().unwrap().to_owned();
             }
@@ -467,4 +469,39 @@ async fn long_jobs_leave_the_short_answers_their_place() {
         let body = json!({"length_mm": length, "load_n": 1, "work_ms": 5}).to_string();
         assert_eq!(server.post(body).send().await.unwrap().status(), 200);
     }
+}
+
+#[tokio::test]
+async fn a_cancelled_or_failed_job_is_computed_when_it_is_asked_for_again_as_its_message_says() {
+    let server = Server::start().await;
+    let ask = |body: String, key: &str| {
+        let request = server.post(body).header("idempotency-key", key.to_owned());
+        request.header("prefer", "respond-async").send()
+    };
+    let held = toy::hold(1520);
+    let first = ask(slow(1520), "a").await.unwrap();
+    let address = header(&first, "location").to_owned();
+    server.client.delete(server.url(&address)).send().await.unwrap();
+    // Under its name it is the job that was cancelled, and says what to do.
+    let again = problem(ask(slow(1520), "a").await.unwrap(), 409, "job_cancelled").await;
+    assert!(again["detail"].as_str().unwrap().contains("another Idempotency-Key"), "{again:#}");
+    let next = ask(slow(1520), "b").await.unwrap();
+    assert_eq!(next.status(), 202);
+    let next = header(&next, "location").to_owned();
+    assert_ne!(next, address);
+    drop(held);
+    until(&server, &next, &["succeeded"]).await;
+    // So it is with one that failed.
+    let held = toy::hold(1521);
+    let late = server.post_to("/v1/sagging-bar?deadline_s=0.001", slow(1521)).header("idempotency-key", "c");
+    let late = late.header("prefer", "respond-async").send().await.unwrap();
+    if late.status() == 202 {
+        until(&server, header(&late, "location"), &["failed"]).await;
+    }
+    problem(ask(slow(1521), "c").await.unwrap(), 422, "deadline_exceeded").await;
+    let next = ask(slow(1521), "d").await.unwrap();
+    assert_eq!(next.status(), 202);
+    drop(held);
+    until(&server, header(&next, "location"), &["succeeded"]).await;
+    server.stop().await;
 }

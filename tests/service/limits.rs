@@ -14,8 +14,12 @@ const KEY: &str = "0123456789abcdef0123456789abcdef";
 async fn guarded() -> Server {
     Server::start_with(|config| {
         config.auth.keys = vec![
-            ApiKey { name: "mes".to_owned(), hash: auth::hash("another key, never sent").to_string() },
-            ApiKey { name: "cam".to_owned(), hash: auth::hash(KEY).to_string() },
+            ApiKey {
+                name: "mes".to_owned(),
+                hash: auth::hash("another key, never sent").to_string(),
+                ..ApiKey::default()
+            },
+            ApiKey { name: "cam".to_owned(), hash: auth::hash(KEY).to_string(), ..ApiKey::default() },
         ];
     })
     .await
@@ -160,4 +164,40 @@ async fn configured_origins_may_call_and_read_the_headers() {
         .unwrap();
     assert_eq!(preflight.status(), 200);
     assert!(header(&preflight, "access-control-allow-headers").contains("authorization"));
+}
+
+#[tokio::test]
+async fn a_burst_of_small_jobs_waits_for_its_turn() {
+    // Many times as many as there are slots; that they wait is up to `queue_ms`, not to how many wait.
+    let server = Server::start_with(|config| {
+        config.cpu = 1;
+        config.limits.queue_ms = 60_000;
+    })
+    .await;
+    let at_once = (0..40).map(|number| {
+        let job = format!("{{\"length_mm\": {}, \"load_n\": 1, \"duration_ms\": 20}}", 800 + number);
+        server.post(job).send()
+    });
+    for response in futures_util::future::join_all(at_once).await {
+        assert_eq!(response.unwrap().status(), 200);
+    }
+    server.stop().await;
+}
+
+#[tokio::test]
+async fn a_request_says_to_which_host_it_goes() {
+    let server = Server::start().await;
+    for (head, status) in [
+        ("GET /health/live HTTP/1.1\r\n\r\n", "HTTP/1.1 400 "),
+        ("GET /health/live HTTP/1.1\r\nHost: a\r\nHost: b\r\n\r\n", "HTTP/1.1 400 "),
+        ("GET /health/live HTTP/1.1\r\nHost: a\r\n\r\n", "HTTP/1.1 200 "),
+        ("GET /health/live HTTP/1.0\r\n\r\n", "HTTP/1.0 200 "),
+    ] {
+        let mut stream = TcpStream::connect(server.address).await.unwrap();
+        stream.write_all(head.as_bytes()).await.unwrap();
+        let mut said = vec![0; 13];
+        stream.read_exact(&mut said).await.unwrap();
+        assert_eq!(String::from_utf8(said).unwrap(), status, "{head}");
+    }
+    server.stop().await;
 }

@@ -14,6 +14,7 @@ mod language;
 mod limits;
 mod models;
 mod negotiation;
+mod owners;
 mod process;
 mod results;
 mod standing;

@@ -145,7 +145,14 @@ fn piped(program: &Path) -> Command {
 pub fn be_child() {
     let Ok(arguments) = std::env::var("TOY_ARGUMENTS") else { return };
     let arguments = std::iter::once("precut").chain(arguments.lines()).map(Into::into);
-    let code = precut::cli::main(arguments, || Ok(toy::registry()));
+    // What it starts for a job is this test of this binary again.
+    let again = toy_command(&[precut::cli::COMPUTE]);
+    let isolation = precut::engine::Isolation {
+        program: again.get_program().into(),
+        arguments: again.get_args().map(Into::into).collect(),
+        environment: vec![("TOY_ARGUMENTS".into(), precut::cli::COMPUTE.into())],
+    };
+    let code = precut::cli::main_as(arguments, || Ok(toy::registry()), Some(isolation));
     // `ExitCode` does not tell its number; it is 0 or not.
     std::process::exit(i32::from(code != std::process::ExitCode::SUCCESS));
 }

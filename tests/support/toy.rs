@@ -293,7 +293,7 @@ impl Calculator for Bar {
                 Block::Modes,
                 Block::Rapid { x_diameter_mm: Some(50.0), z_mm: Some(2.0) },
                 Block::Cut { x_diameter_mm: 50.0, z_mm: -input.length_mm, feed_mm_per_rev: Some(0.2) },
-                Block::End,
+                Block::End(None),
             ];
             Ok(Program { dialect: Dialect::Fanuc, increment_mm: 0.001, blocks })
         })

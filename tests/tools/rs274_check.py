@@ -3,6 +3,7 @@
 
     rs274_check.py self-test            the checker finds what is wrong with a program
     rs274_check.py examples PRECUT      every example job of the program PRECUT that has a machine program
+    rs274_check.py random PRECUT COUNT  so many random jobs: shafts of steps, seats and passes, and schedules of them
     rs274_check.py file PROGRAM PATH    one program against its path as CSV
 
 `rs274` (Debian: linuxcnc-uspace) prints the canonical motions that a program stands for, X as a radius.
@@ -12,6 +13,7 @@ import csv
 import io
 import json
 import pathlib
+import random
 import re
 import subprocess
 import sys
@@ -71,7 +73,7 @@ def check(program: str, path: list[tuple[float, float]]) -> str:
     others = {c.split("(")[0] for c in commands if re.match(r"ARC_FEED|NURBS|DWELL|START_CUTTER", c)}
     if others:
         raise Fault(f"what no path holds: {sorted(others)}")
-    compare([(x, z) for _, _, x, z in cuts], path)
+    compare(runs(motions), path)
     check_rapids(motions, max(x for x, _ in path))
     return f"{len(cuts)} cuts, feed {feeds[-1]:g} mm/rev"
 
@@ -82,12 +84,42 @@ def point(arguments: str) -> tuple[float, float]:
     return 2 * numbers[0], numbers[2]
 
 
-def compare(cuts: list[tuple[float, float]], path: list[tuple[float, float]]) -> None:
-    if len(cuts) != len(path):
-        raise Fault(f"{len(cuts)} cuts for {len(path)} points")
-    for number, (cut, wanted) in enumerate(zip(cuts, path), 1):
-        if any(abs(a - b) > TOLERANCE_MM for a, b in zip(cut, wanted)):
-            raise Fault(f"point {number}: cut to (X, Z) = {cut}, path {wanted}")
+def runs(motions: list[tuple[str, int, float, float]]) -> list[list[tuple[float, float]]]:
+    """The ends of feed moves, one list for every way between two rapid motions."""
+    found: list[list[tuple[float, float]]] = []
+    before = ""
+    for kind, _, x, z in motions:
+        if kind == "STRAIGHT_FEED":
+            if before != kind:
+                found.append([])
+            found[-1].append((x, z))
+        before = kind
+    return found
+
+
+def compare(cuts: list[list[tuple[float, float]]], path: list[tuple[float, float]]) -> None:
+    """The path is driven in its order; beside it the tool feeds to a cut and away from it, at most three moves each."""
+    def near(a: tuple[float, float], b: tuple[float, float]) -> bool:
+        return all(abs(p - q) <= TOLERANCE_MM for p, q in zip(a, b))
+
+    # Two stretches that meet share a point, which is one move.
+    path = [point for point, before in zip(path, [None, *path]) if point != before]
+    number = 0
+    for run in cuts:
+        start = next((i for i, cut in enumerate(run[:4]) if number < len(path) and near(cut, path[number])), None)
+        if start is None:
+            wanted = path[number] if number < len(path) else "no more"
+            raise Fault(f"point {number + 1}: cut to (X, Z) = {run[0]}, path {wanted}")
+        beside = 0
+        for cut in run[start:]:
+            if number < len(path) and near(cut, path[number]) and beside == 0:
+                number += 1
+            elif cut != run[start] and beside < 3:
+                beside += 1
+            else:
+                raise Fault(f"point {number + 1}: cut to (X, Z) = {cut}, path {path[number:number + 1]}")
+    if number < len(path):
+        raise Fault(f"{number} points of the path are cut, it has {len(path)}")
 
 
 def check_rapids(motions: list[tuple[str, int, float, float]], largest: float) -> None:
@@ -178,6 +210,61 @@ def examples(binary: str) -> int:
     return faults
 
 
+def random_job(seed: int) -> tuple[str, dict]:
+    """A calculator and a job for it: a shaft of steps on two centres."""
+    draw = random.Random(seed)
+    passes = draw.random() < 0.3
+    stock, segments = 60.0, []
+    for _ in range(draw.randint(1, 5)):
+        diameter = round(draw.choice([40.0, 40.02, draw.uniform(30, 55)]), 3)
+        seat = not passes and segments and draw.random() < 0.2
+        blank = stock if passes else diameter if seat else round(diameter + draw.uniform(0.5, 4), 2)
+        segments.append({"length_mm": round(draw.uniform(20, 150), draw.randint(0, 3)), "diameter_mm": diameter,
+                         "stock_diameter_mm": blank})
+    length = sum(segment["length_mm"] for segment in segments)
+    job = {
+        "shaft": {"segments": segments, "youngs_modulus_n_per_mm2": 210000},
+        "supports": [{"kind": "centre", "z_mm": 0, "compliance_um_per_n": 0.02},
+                     {"kind": "centre", "z_mm": length, "compliance_um_per_n": 0.03}],
+        "program": {"dialect": "linuxcnc", "clearance_x_mm": draw.choice([0, 1, 5]), "clearance_z_mm": draw.choice([0, 2, 5]),
+                    "zero": draw.choice(["left_face", "right_face"])},
+    }
+    direction = draw.choice(["to_headstock", "to_tailstock"])
+    if not passes and draw.random() < 0.4:
+        ends = [sum(segment["length_mm"] for segment in segments[:i]) for i in range(len(segments) + 1)]
+        zones = [{"id": f"z{i}", "z_start_mm": ends[i], "z_end_mm": ends[i + 1], "diameter_mm": segment["diameter_mm"],
+                  "depth_mm": (segment["stock_diameter_mm"] - segment["diameter_mm"]) / 2}
+                 for i, segment in enumerate(segments) if segment["stock_diameter_mm"] > segment["diameter_mm"]]
+        limits = {"feed_min_mm_per_rev": 0.05, "feed_max_mm_per_rev": 0.4, "speed_min_m_per_min": 30,
+                  "speed_max_m_per_min": 150}
+        life = {"form": "log_log", "constant": 13, "speed_exponent": -2, "feed_exponent": -0.5}
+        return "feed-schedule", {**job, "zones": zones, "limits": limits, "models": {"tool_life": life},
+                                 "objective": {"kind": "time"}, "feed_direction": direction}
+    job["force"] = {"kind": "power_law",
+                    "passive": {"coefficient": 2430, "depth_exponent": 0.9, "feed_exponent": 0.6, "speed_exponent": -0.3}}
+    job["cut"] = {"feed_mm_per_rev": 0.2, "speed_m_per_min": 120, "feed_direction": direction}
+    if passes:
+        least = min(segment["diameter_mm"] for segment in segments)
+        job["passes"] = [{"diameter_mm": round((stock + least) / 2, 2)}, {"diameter_mm": least, "compensated": True}]
+    return "deflection-compensation", job
+
+
+def randoms(binary: str, count: int) -> int:
+    """Number of faults over random jobs."""
+    faults = 0
+    for seed in range(count):
+        calculator, job = random_job(seed)
+        try:
+            solve = ("solve", "--calculator", calculator, "-", "--format")
+            path = precut(binary, *solve, "csv", "--table", "path", stdin=json.dumps(job))
+            check(precut(binary, *solve, "gcode", stdin=json.dumps(job)), read_path(path))
+        except Fault as fault:
+            faults += 1
+            print(f"FAULT {calculator} {seed}: {fault}")
+    print(f"{count - faults} of {count} random programs are good")
+    return faults
+
+
 def self_test() -> int:
     """Our own example passes; every way to spoil it is found."""
     program = (HERE / "rs274" / "example.ngc").read_text()
@@ -216,6 +303,8 @@ def main(arguments: list[str]) -> int:
             return self_test()
         case ["examples", binary]:
             return examples(binary)
+        case ["random", binary, count]:
+            return randoms(binary, int(count))
         case ["file", program, path]:
             print(check(pathlib.Path(program).read_text(), read_path(pathlib.Path(path).read_text())))
             return 0
