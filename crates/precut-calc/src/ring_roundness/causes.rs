@@ -20,6 +20,9 @@ use super::turning::{Setting, turn};
 const LEAST_NODES: u32 = 720;
 /// Revolutions of spark-out that are added where it is asked whether more of them would help.
 const MORE_SPARK_OUT: f64 = 3.0;
+/// A term whose absence takes more revolutions than so many times those of the job is left out: a tool that starts clear
+/// of the blank comes to it at its own feed.
+pub(super) const MOST_LONGER: f64 = 4.0;
 /// A blank rounder than this makes no waves, um.
 const ROUND_UM: f64 = 1e-3;
 /// |a| + |b| above 1 by less than this is the rounding of a drawing's decimals.
@@ -152,7 +155,9 @@ fn variants(job: &Job, scene: &Scene, end: &Stance, blank: &[f64]) -> Result<Vec
         let mut clear = setting.clone();
         clear.tip_start_mm = add(setting.tip_start_mm, scaled(setting.feed_direction, -back_mm));
         clear.revolutions += back_mm / setting.feed_mm_per_rev;
-        add_one(CauseKind::FirstBite, None, clear, blank.to_vec());
+        if clear.revolutions <= MOST_LONGER * setting.revolutions {
+            add_one(CauseKind::FirstBite, None, clear, blank.to_vec());
+        }
     }
     let finer = Setting {
         feed_mm_per_rev: 0.5 * setting.feed_mm_per_rev,

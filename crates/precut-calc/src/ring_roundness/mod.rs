@@ -166,8 +166,8 @@ fn work(job: &Job) -> Work {
             Method::ExactContact => runs * n * step_ns,
             Method::NearestSamples => 7.0 * n * n + 3600.0 * step_ns,
         };
-        // The causes: one run with everything, one with each term off, one of them with twice the revolutions.
-        let terms = 8.0 + job.effects.len() as f64;
+        // The causes: one run with everything, one with each term off, one of them with twice the revolutions, one with more.
+        let terms = 7.0 + causes::MOST_LONGER + job.effects.len() as f64;
         let per_turn = per_turn + terms * f64::from(causes::nodes(job)) * step_ns;
         // The history fits a circle per entry.
         work.simulation = 1e-6 * turns * per_turn + 3e-5 * n * turns.min(400.0) + 1e-3 * n;

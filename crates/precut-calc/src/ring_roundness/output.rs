@@ -227,7 +227,8 @@ pub struct CausesOutcome {
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub samples: u32,
     /// The roundness without each term that makes waves, the one that matters most first. Shares need not add up to 1:
-    /// terms act on each other.
+    /// terms act on each other. The first bite is left out where a start clear of the blank takes more than four times the
+    /// job's revolutions.
     pub switched_off: Vec<CauseOutcome>,
 }
 

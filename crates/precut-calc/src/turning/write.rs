@@ -297,8 +297,11 @@ impl Writer<'_> {
         self.push(Block::Rapid { x_diameter_mm, z_mm });
     }
 
-    /// Feeds to a place of the program, and notes what is left there.
+    /// Feeds to a place of the program, and notes what is left there; no block where the tool is there already.
     fn feed_to(&mut self, z_mm: f64, x_diameter_mm: f64) {
+        if self.last == Some((z_mm + self.setting.zero_mm, x_diameter_mm)) {
+            return;
+        }
         let feed_mm_per_rev = self.feed.take();
         self.push(Block::Cut { x_diameter_mm, z_mm, feed_mm_per_rev });
         let z = z_mm + self.setting.zero_mm;
