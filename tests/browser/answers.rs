@@ -141,7 +141,10 @@ fn no_program_is_ever_that_of_another_part() {
             if page.evaluate("Boolean(document.querySelector('.strip.wrong'))") == true {
                 // Begun anew.
                 page.evaluate("location.hash = '#/deflection-compensation?example=stepped_with_rest'");
+                page.until(SETTLED);
             }
+            // What can be computed gives its program and its sheet, whatever was typed before.
+            page.until("(take(), programs.length > 0 && papers.length > 0)");
         }
         for (kind, count) in [("programs", &mut checked.0), ("papers", &mut checked.1)] {
             let taken = page.evaluate(&format!("{kind}.splice(0)"));
@@ -164,7 +167,7 @@ fn no_program_is_ever_that_of_another_part() {
         }
     }
     eprintln!("{edits} edits: {} programs and {} sheets, each that of its screen", checked.0, checked.1);
-    assert!(checked.0 >= edits / 20 && checked.1 >= edits / 20, "{checked:?} were taken at all");
+    assert!(checked.0 > 0 && checked.1 > 0, "{checked:?} were taken at all");
     page.assert_calm();
 }
 

@@ -184,7 +184,7 @@ fn a_chosen_file_is_shown_before_it_is_used() {
     assert_accessible(&mut page, "a table that waits");
     page.click(".matching .primary");
     page.until("!document.querySelector('.matching')");
-    page.click_on("Result");
+    page.click(".pane-switch button:nth-child(2)");
     page.until(&format!("/circle is (9\\.|10)/.test(document.querySelector('.verdict').textContent) && {SETTLED}"));
     page.assert_calm();
 }
