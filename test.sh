@@ -165,24 +165,35 @@ step_test() {
 
 # All programs of tests, whatever fails, so that one look at the log shows all of it.
 run_tests() {
-  local name log calculators code=0
-  local -a others=()
+  local name code=0
+  local -a others=() beside=()
   for name in tests/*.rs tests/*/main.rs; do
     name=${name#tests/}
     name=${name%/main.rs}
-    others+=(--test "${name%.rs}")
+    name=${name%.rs}
+    [ "$name" = browser ] || others+=(--test "$name")
   done
   cargo test --workspace --locked --no-run
-  # The calculators' own tests only compute. They get what the others, which wait for processes and pages, leave of the cores.
-  log=$(mktemp)
-  nice -n 19 cargo test --workspace --locked --test calc >"$log" 2>&1 &
-  calculators=$!
+  # The calculators' own tests only compute: they get what the others leave of the cores, which wait for processes and
+  # pages. The pages wait most.
+  run_beside calc nice -n 19
+  run_beside browser
   cargo test --workspace --locked --no-fail-fast --lib --bins "${others[@]}" || code=1
-  wait "$calculators" || code=1
-  cat "$log"
-  rm -f "$log"
+  for name in "${beside[@]}"; do
+    wait "${name%% *}" || code=1
+    cat "${name#* }"
+    rm -f "${name#* }"
+  done
   cargo test --workspace --locked --no-fail-fast --doc || code=1
   return "$code"
+}
+
+run_beside() { # run_beside PROGRAM [COMMAND...]: runs a program of tests in the background, its words into a file
+  local log program=$1
+  shift
+  log=$(mktemp)
+  "$@" cargo test --workspace --locked --no-fail-fast --test "$program" >"$log" 2>&1 &
+  beside+=("$! $log")
 }
 
 step_contract() {
@@ -201,7 +212,7 @@ step_programs() {
   precut=$(binary)
   python3 tests/tools/rs274_check.py self-test
   python3 tests/tools/rs274_check.py examples "$precut"
-  python3 tests/tools/rs274_check.py random "$precut" 20
+  python3 tests/tools/rs274_check.py random "$precut" 40
 }
 
 step_dockerfile() {
