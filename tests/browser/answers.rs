@@ -143,8 +143,10 @@ fn no_program_is_ever_that_of_another_part() {
                 page.evaluate("location.hash = '#/deflection-compensation?example=stepped_with_rest'");
                 page.until(SETTLED);
             }
-            // What can be computed gives its program and its sheet, whatever was typed before.
-            page.until("(take(), programs.length > 0 && papers.length > 0)");
+            // What can be computed gives its sheet and its program, or says why there is none, whatever was typed before.
+            page.until("!document.querySelector('#take').disabled");
+            page.evaluate("take()");
+            page.until("papers.length > 0 && (programs.length > 0 || !(document.querySelector('.strip > .fault')?.textContent ?? 'meanwhile').includes('meanwhile'))");
         }
         for (kind, count) in [("programs", &mut checked.0), ("papers", &mut checked.1)] {
             let taken = page.evaluate(&format!("{kind}.splice(0)"));

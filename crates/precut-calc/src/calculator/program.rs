@@ -91,7 +91,7 @@ pub enum Block {
     },
     /// Spindle off, and the program waits for the operator.
     Stop {
-        /// What he is to do.
+        /// What the operator has to do before the program goes on.
         reason: String,
     },
     /// Spindle off, end of program, as the dialect has it or as asked for.

@@ -312,7 +312,7 @@ pub(super) struct SeenAlong {
 }
 
 impl SeenAlong {
-    /// Of the last cut.
+    /// What stands along the last cut.
     pub(super) fn of(stage: &Stage, shares: &Shares, uncertainty_um: &[f64]) -> Self {
         Self {
             dominating: dominating(stage, shares),

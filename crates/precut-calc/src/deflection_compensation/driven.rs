@@ -19,7 +19,7 @@ use super::toolpath::{Drawn, drawn};
 
 /// The paths as programmed and what they give.
 pub(super) struct Driven {
-    /// Of the last cut.
+    /// The path of the last cut.
     pub path: Path,
     /// Every pass of several, at the stations of the answer.
     pub passes: Vec<PassOutcome>,
