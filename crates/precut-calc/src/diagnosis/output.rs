@@ -26,10 +26,10 @@ pub struct DiagnosisResult<E: ToSchema, R: ToSchema> {
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub collinearity: Option<f64>,
     /// Posterior probability that nothing is wrong that these rows could show.
-    #[schema(extensions(("x-unit" = json!("1"))))]
+    #[schema(minimum = 0.0, maximum = 1.0, extensions(("x-unit" = json!("1"))))]
     pub none_probability: f64,
     /// Posterior probability that something acts that the catalogue does not hold.
-    #[schema(extensions(("x-unit" = json!("1"))))]
+    #[schema(minimum = 0.0, maximum = 1.0, extensions(("x-unit" = json!("1"))))]
     pub unnamed_probability: f64,
     /// Scatter of single rows.
     pub noise: NoiseReport,
