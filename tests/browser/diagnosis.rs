@@ -135,9 +135,7 @@ fn shares_of_what_the_rows_object_to_are_said_to_mean_little() {
     );
     let key = key.as_str().unwrap();
     page.open(&service.page(&format!("diagnosis?result={key}")));
-    page.until(&format!(
-        "document.querySelector('.verdict')?.textContent.includes('not all that acts') && {SETTLED}"
-    ));
+    page.until(&format!("document.querySelector('.verdict')?.textContent.includes('not all that acts') && {SETTLED}"));
     let found = page.text(".causes");
     assert!(found.contains("does not fit these rows: none is named"), "{found}");
     assert_eq!(page.evaluate("document.querySelectorAll('.causes tr.named').length"), 0);

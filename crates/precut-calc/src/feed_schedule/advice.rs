@@ -6,7 +6,7 @@ use crate::machinability::{Conditions, MachinabilityModel, ModelForm};
 use super::case::Case;
 use super::input::{FeedMode, Goal, Job, SpeedMode};
 use super::models::Output;
-use super::output::{ChangePlace, Looser, Outcome, Price};
+use super::output::{ChangePlace, Looser, Outcome, Price, ZoneOutcome};
 use super::plan::Method;
 use super::run::broken;
 use super::scatter;
@@ -40,6 +40,7 @@ pub(super) const WARNING_CODES: &[&str] = &[
 
 /// Codes of the explanations made here.
 pub(super) const EXPLANATION_CODES: &[&str] = &[
+    "scheduled",
     "limit_costs_most",
     "nothing_binds",
     "against_constant_feed",
@@ -314,7 +315,8 @@ fn unused(job: &Job, out: &mut Vec<Finding>) {
 
 /// What is to be said of the answer, the most important first.
 pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
-    let mut out: Vec<Message> = costliest(job, outcome).into_iter().collect();
+    let mut out = vec![scheduled(outcome)];
+    out.extend(costliest(job, outcome));
     if let Some(constant) = &outcome.comparison.constant_feed {
         out.push(
             Message::new("against_constant_feed")
@@ -379,6 +381,22 @@ pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
     }
     out.push(certified(job, outcome));
     out
+}
+
+/// What was asked for: the time, the feeds and the speeds.
+fn scheduled(outcome: &Outcome) -> Message {
+    let over = |of: fn(&ZoneOutcome) -> f64| {
+        let values = || outcome.zones.iter().map(of);
+        (values().fold(f64::INFINITY, f64::min), values().fold(0.0, f64::max))
+    };
+    let (least_feed, most_feed) = over(|zone| zone.feed_mm_per_rev);
+    let (least_speed, most_speed) = over(|zone| zone.speed_m_per_min);
+    Message::new("scheduled")
+        .with("time_min", outcome.cutting_time_min)
+        .with("least_feed_mm_per_rev", least_feed)
+        .with("most_feed_mm_per_rev", most_feed)
+        .with("least_speed_m_per_min", least_speed)
+        .with("most_speed_m_per_min", most_speed)
 }
 
 /// The limit that costs most, or that none binds.
