@@ -6,6 +6,22 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use bytes::Bytes;
 
+/// Bodies up to this size are not held against the budget: as many as there may be requests take little.
+const UNCHARGED: usize = 32 << 10;
+/// What a body and what is made of it take at once, by its size: a text in it stands there a second time, and a third where
+/// it has escapes. Charged as the body arrives: what is refused later has been taken already.
+const TIMES: usize = 3;
+
+/// What a body of so many bytes is charged.
+pub(crate) fn charge_of(bytes: usize) -> usize {
+    if bytes <= UNCHARGED { 0 } else { TIMES * bytes }
+}
+
+/// What of that is for what is made of it.
+pub(crate) fn paid_beside(bytes: usize) -> usize {
+    charge_of(bytes).saturating_sub(bytes)
+}
+
 /// What is charged is taken from the budget in pieces of at least so many bytes.
 const PIECE: usize = 64 << 10;
 
@@ -85,18 +101,23 @@ impl Drop for Held {
 #[derive(Debug, Default)]
 pub(crate) struct Room {
     held: Option<RefCell<Held>>,
+    /// What was charged with the body already.
+    paid: Cell<usize>,
     pending: Cell<usize>,
     spent: Cell<bool>,
 }
 
 impl Room {
-    pub(crate) fn of(budget: &Budget) -> Self {
-        Self { held: Some(RefCell::new(budget.hold())), ..Self::default() }
+    /// For a body that has `paid` so many bytes for it.
+    pub(crate) fn of(budget: &Budget, paid: usize) -> Self {
+        Self { held: Some(RefCell::new(budget.hold())), paid: Cell::new(paid), ..Self::default() }
     }
 
     /// Takes so many bytes; whether there were as many. Once there were not, there are none any more.
     pub(crate) fn take(&self, bytes: usize) -> bool {
-        let pending = self.pending.get() + bytes;
+        let of_paid = bytes.min(self.paid.get());
+        self.paid.set(self.paid.get() - of_paid);
+        let pending = self.pending.get() + bytes - of_paid;
         self.pending.set(pending);
         if pending >= PIECE
             && let Some(held) = &self.held
@@ -139,14 +160,23 @@ mod tests {
     }
 
     #[test]
+    fn a_large_body_pays_for_what_is_made_of_it() {
+        assert_eq!([charge_of(UNCHARGED), paid_beside(UNCHARGED)], [0, 0]);
+        assert_eq!([charge_of(1 << 20), paid_beside(1 << 20)], [3 << 20, 2 << 20]);
+    }
+
+    #[test]
     fn a_reader_takes_no_more_than_there_is() {
         let budget = Budget::new(3 * PIECE);
-        let room = Room::of(&budget);
+        let room = Room::of(&budget, 0);
         let taken = 100 * (0..PIECE).take_while(|_| room.take(100)).count();
         assert!((2 * PIECE..=4 * PIECE).contains(&taken), "{taken}");
         assert!(room.is_spent() && !room.take(0));
         drop(room);
         assert_eq!(budget.used(), 0);
+        let room = Room::of(&budget, 5 * PIECE);
+        assert!(room.take(4 * PIECE) && budget.used() == 0);
+        assert!(room.take(3 * PIECE) && budget.used() == 2 * PIECE);
         assert!(Room::default().take(usize::MAX / 2));
     }
 }

@@ -15,6 +15,8 @@ use crate::units;
 const LONGEST_NAME: usize = 64;
 /// Most columns beside those that fields name: each takes its time in every row.
 const MOST_FURTHER: usize = 64;
+/// Cells of a line that is read at all: each takes some memory of its own before anything is known of it.
+const MOST_CELLS: usize = 200_000;
 /// Longest piece of a cell that is shown.
 const SHOWN_CHARS: usize = 40;
 
@@ -35,6 +37,11 @@ pub(crate) fn read(
     let before = faults.total;
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let separator = separator(text);
+    let most = place.columns.len() + MOST_FURTHER;
+    if let Some(columns) = overlong_line(text, separator) {
+        faults.add(Finding::new("too_many_columns", pointer).with("columns", columns).with("maximum", most));
+        return None;
+    }
     let Some(header) = Records::of(text, separator).next() else {
         faults.add(Finding::new("empty_table", pointer));
         return None;
@@ -64,6 +71,12 @@ pub(crate) fn read(
     (faults.total == before).then_some(read)
 }
 
+/// How many cells the first line has that has too many to be read.
+fn overlong_line(text: &str, separator: u8) -> Option<usize> {
+    let cells = |line: &[u8]| 1 + line.iter().filter(|byte| **byte == separator).count();
+    text.as_bytes().split(|byte| *byte == b'\n').map(cells).find(|cells| *cells > MOST_CELLS)
+}
+
 /// The line on which a record stands. The reader's own position is that of the empty lines before it.
 fn line(text: &str, record: &csv::StringRecord) -> u64 {
     let Some(position) = record.position() else { return 0 };
@@ -76,16 +89,17 @@ fn line(text: &str, record: &csv::StringRecord) -> u64 {
 /// Tab, semicolon or comma: the first of them that the header has outside quotes. A header without any is a single
 /// column, which may then have decimal commas.
 fn separator(text: &str) -> u8 {
+    const ALL: [u8; 3] = [b'\t', b';', b','];
     let header = text.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();
-    let mut quoted = false;
-    let bare: Vec<char> = header
-        .chars()
-        .filter(|c| {
-            quoted ^= *c == '"';
-            !quoted
-        })
-        .collect();
-    [b'\t', b';', b','].into_iter().find(|separator| bare.contains(&char::from(*separator))).unwrap_or(b'\t')
+    // Noted as they are met: the characters of a header may take many times its bytes.
+    let (mut quoted, mut met) = (false, [false; 3]);
+    for byte in header.bytes() {
+        quoted ^= byte == b'"';
+        for (met, separator) in met.iter_mut().zip(ALL) {
+            *met |= !quoted && byte == separator;
+        }
+    }
+    ALL.into_iter().zip(met).find(|(_, met)| *met).map_or(b'\t', |(separator, _)| separator)
 }
 
 /// A column of the text: which field it fills and from which unit.
@@ -477,7 +491,7 @@ mod tests {
         let rows = read(&table(most - 2), &place, ("/measurements", &Room::default()), &mut faults).unwrap().rows;
         assert_eq!(rows[0]["further"].as_object().map(Map::len), Some(most - 2));
         // Of a longer header nothing is read but its length.
-        for further in [most - 1, 100_000] {
+        for further in [most - 1, 100_000, 1_000_000] {
             let mut faults = Faults::default();
             assert!(read(&table(further), &place, ("/measurements", &Room::default()), &mut faults).is_none());
             let finding = &faults.listed[0];

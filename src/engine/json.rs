@@ -25,8 +25,12 @@ const LONGEST_NUMBER: usize = 1000;
 const MOST_UNKNOWN: usize = 1000;
 /// So many bytes of such a name are kept.
 const LONGEST_UNKNOWN: usize = 100;
+/// So many bytes of a text are kept where there may be none: more than are ever shown.
+const LONGEST_MISFIT: usize = 1000;
 /// What a value and a field take beside what they hold, bytes.
 const VALUE_BYTES: usize = size_of::<Value>();
+/// A list that grows has room for as many items again.
+const ITEM_BYTES: usize = 2 * VALUE_BYTES;
 const FIELD_BYTES: usize = VALUE_BYTES + size_of::<String>() + 3 * size_of::<usize>();
 /// When a client that found no memory should come again.
 pub(crate) const RETRY_AFTER: Duration = Duration::from_secs(1);
@@ -270,11 +274,15 @@ impl<'de> Visitor<'de> for Strict<'_> {
     fn visit_f64<E: serde::de::Error>(self, value: f64) -> Result<Value, E> {
         number(value).ok_or_else(|| self.trail.refuse("number_out_of_range", "a number is too large"))
     }
-    fn visit_str<E>(self, value: &str) -> Result<Value, E> {
-        Ok(Value::String(value.to_owned()))
-    }
-    fn visit_string<E>(self, value: String) -> Result<Value, E> {
-        Ok(Value::String(value))
+    fn visit_str<E: serde::de::Error>(self, value: &str) -> Result<Value, E> {
+        let kept = match value {
+            long if long.len() > LONGEST_MISFIT && !self.shape.holds_text() => {
+                &long[..long.floor_char_boundary(LONGEST_MISFIT)]
+            }
+            whole => whole,
+        };
+        self.take(kept.len())?;
+        Ok(Value::String(kept.to_owned()))
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut access: A) -> Result<Value, A::Error> {
@@ -286,7 +294,7 @@ impl<'de> Visitor<'de> for Strict<'_> {
         while count < most {
             match access.next_element_seed(item) {
                 Ok(Some(value)) => {
-                    self.take(VALUE_BYTES).map_err(|error| self.failed(Step::Index(count), error))?;
+                    self.take(ITEM_BYTES).map_err(|error| self.failed(Step::Index(count), error))?;
                     items.push(value);
                 }
                 Ok(None) => return Ok(Value::Array(items)),
@@ -518,6 +526,36 @@ mod tests {
     }
 
     #[test]
+    fn of_a_text_where_there_may_be_none_the_beginning_is_kept() {
+        let shape = Shape::of(&json!({"type": "object", "properties": {
+            "number": {"type": "number"},
+            "choice": {"type": "string", "enum": ["one"]},
+            "text": {"type": "string"},
+            "either": {"oneOf": [{"type": "number"}, {"type": "string"}]},
+            "rows": {"type": "array", "maxItems": 3, "items": {"type": "object", "properties": {}}},
+        }}));
+        let long = "\u{e9}".repeat(5000);
+        for (place, kept) in [
+            (json!({"number": long}), LONGEST_MISFIT),
+            (json!({"choice": long}), LONGEST_MISFIT),
+            (json!({"rows": long}), LONGEST_MISFIT),
+            (json!({"text": long}), long.len()),
+            (json!({"either": long}), long.len()),
+            (json!({"rows": {"csv": long}}), long.len()),
+        ] {
+            let read = parse_as(place.to_string().as_bytes(), &shape, &Room::default()).unwrap().value;
+            let (name, value) = read.as_object().unwrap().iter().next().unwrap();
+            let text = value.get("csv").unwrap_or(value).as_str().unwrap();
+            assert_eq!((text.len(), long.starts_with(text)), (kept, true), "{name}");
+        }
+        // What is kept for good is charged.
+        let budget = crate::engine::budget::Budget::new(4 << 20);
+        let text = json!({"text": "x".repeat(1 << 20)}).to_string();
+        let room = Room::of(&budget, 0);
+        assert!(parse_as(text.as_bytes(), &shape, &room).is_ok() && budget.used() >= 1 << 20);
+    }
+
+    #[test]
     fn what_is_not_kept_is_held_to_depth_and_range_all_the_same() {
         let code = |text: String| match parse_as(text.as_bytes(), &shape(), &Room::default()) {
             Err(Error::Syntax(fault)) => Some(fault.code),
@@ -538,7 +576,7 @@ mod tests {
     fn a_body_takes_no_more_than_the_budget() {
         let budget = crate::engine::budget::Budget::new(1 << 20);
         let body = format!("[{}1]", "{\"a\":[1,2]},".repeat(10_000));
-        let room = Room::of(&budget);
+        let room = Room::of(&budget, 0);
         let refused = parse_as(body.as_bytes(), Shape::open(), &room);
         assert!(matches!(refused, Err(Error::Busy { .. })), "{refused:?}");
         assert!(budget.used() <= 1 << 20);

@@ -54,7 +54,7 @@ use crate::store::jobs::JobStore;
 use crate::store::models::ModelStore;
 use crate::store::{ResultPage, ResultQuery, ResultStore, Store};
 use asked::Asked;
-use budget::{Budget, Room};
+use budget::{Budget, Room, paid_beside};
 use exec::{Cores, Slot, guarded};
 use flight::{Boarded, Flights, Landed, Pilot};
 use jobs::Jobs;
@@ -306,11 +306,22 @@ impl Inner {
         self.entry(name).cloned().ok_or_else(|| Error::unknown(&self.registry, name))
     }
 
+    /// For what is made of a body, which was charged as it came.
+    fn room_for(&self, body: &Body) -> Room {
+        let paid = match body {
+            Body::Json(job) => paid_beside(job.len()),
+            Body::Parts { job, tables } => {
+                paid_beside(job.len()) + tables.iter().map(|table| paid_beside(table.text.len())).sum::<usize>()
+            }
+        };
+        Room::of(&self.bodies, paid)
+    }
+
     /// Reads a job where that does no harm.
     async fn read(self: &Arc<Self>, entry: &Arc<Entry>, body: Body, shelf: &Shelf) -> Result<Ready, Error> {
         if body.len() <= READ_AT_ONCE && !entry.is_composed() {
             let found = self.find_model(shelf, entry, &body).await?;
-            let models = Models { registry: &self.registry, found, room: Room::of(&self.bodies) };
+            let models = Models { registry: &self.registry, found, room: self.room_for(&body) };
             return guarded(|| read::read(entry, &body, &models));
         }
         let slot = match self.cores.slot_now()? {
@@ -321,7 +332,7 @@ impl Inner {
         let work = move || {
             // The name of a model stands anywhere in the job. A thread of the pool may wait for the store.
             let found = runtime.block_on(this.find_model(&shelf, &entry, &body))?;
-            let room = Room::of(&this.bodies);
+            let room = this.room_for(&body);
             read::read(&entry, &body, &Models { registry: &this.registry, found, room })
         };
         self.cores.run(slot, work).await

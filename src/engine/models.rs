@@ -252,7 +252,7 @@ impl Inner {
         entry: &Arc<Entry>,
         body: &Body,
     ) -> Result<Option<Found>, Error> {
-        find_on(&*self.models, shelf, &self.registry, entry, body, Room::of(&self.bodies)).await
+        find_on(&*self.models, shelf, &self.registry, entry, body, self.room_for(body)).await
     }
 
     async fn unknown_model(&self, shelf: &Shelf, name: &str) -> Result<ModelError, Error> {

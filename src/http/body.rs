@@ -15,7 +15,7 @@ use http_body_util::BodyExt;
 use super::Peer;
 use super::problem::Problem;
 use crate::config::{Limits, seconds};
-use crate::engine::budget::{Budget, Held, Spent};
+use crate::engine::budget::{Budget, Held, Spent, charge_of};
 use crate::engine::{Body, TablePart};
 
 /// Parts of a multipart body beside `job`; a job has fewer tables.
@@ -90,15 +90,9 @@ fn declared_length(headers: &HeaderMap) -> Option<u64> {
     headers.get(CONTENT_LENGTH)?.to_str().ok()?.parse().ok()
 }
 
-/// Bodies up to this size are not held against the budget: as many as there may be requests take little.
-const UNCHARGED: usize = 32 << 10;
-
 /// Takes what a body that grows to `bytes` needs; `held` is what it has.
 fn charge(held: &mut Held, bytes: usize) -> Result<(), Problem> {
-    if bytes <= UNCHARGED {
-        return Ok(());
-    }
-    held.grow(bytes.saturating_sub(held.bytes())).map_err(|Spent| Problem::no_memory())
+    held.grow(charge_of(bytes).saturating_sub(held.bytes())).map_err(|Spent| Problem::no_memory())
 }
 
 /// The bytes of a body. One that came in one piece is not copied.

@@ -18,12 +18,15 @@ pub(crate) struct Shape {
     items: Option<Box<Shape>>,
     /// How many items; unbounded where the schema names no most.
     most_items: Option<usize>,
+    /// A text of any words may stand here.
+    text: bool,
     /// Nothing is said of what stands here.
     open: bool,
 }
 
 /// A place of which nothing is known.
-static OPEN: Shape = Shape { fields: BTreeMap::new(), further: None, items: None, most_items: None, open: true };
+static OPEN: Shape =
+    Shape { fields: BTreeMap::new(), further: None, items: None, most_items: None, text: true, open: true };
 
 impl Shape {
     /// A place of which nothing is known.
@@ -52,6 +55,7 @@ impl Shape {
             (items @ None, Some(more)) => (*items, self.most_items) = (Some(more), other.most_items),
             (_, None) => {}
         }
+        self.text |= other.text;
         self.open |= other.open;
     }
 
@@ -101,6 +105,7 @@ impl Shape {
         };
         let is_any_object =
             may_be("object") && !has(&["properties", "additionalProperties", "patternProperties", "allOf"]);
+        self.text |= may_be("string") && !has(&["enum", "const"]);
         let is_any_list = may_be("array") && !has(&["items", "prefixItems"]);
         self.open |= is_any_object || is_any_list;
     }
@@ -121,6 +126,11 @@ impl Shape {
         let is_text_of_rows = || name == "csv" && self.items.is_some();
         let further = || self.further.as_deref();
         self.fields.get(name).or_else(further).or_else(|| (self.open || is_text_of_rows()).then(Self::open))
+    }
+
+    /// Whether a text of any length may stand here.
+    pub(crate) fn holds_text(&self) -> bool {
+        self.text || self.open
     }
 
     /// What may stand in a list, and how many; nothing where there may be no list.

@@ -52,6 +52,7 @@ fn worst() -> Vec<(&'static str, &'static str, String, f64)> {
             body("{\"measurements\":{\"csv\":\"z_mm,sag_um\\n", "1,1\\n", "1,1\"}}"),
             3.0,
         ),
+        ("nothing but separators", bar, body("{\"measurements\":{\"csv\":\"", ",", "\\n1\"}}"), 3.0),
         ("columns of a table", bar, body("{\"measurements\":{\"csv\":\"", "z_mm,", "z_mm\\n1\"}}"), 3.0),
         ("a study of a list in an unknown field", studies, body(&study("\"job\":{\"x\":["), "{},", "{}]}}"), 3.0),
         ("a study of too many rows", studies, body(&study("\"job\":{\"measurements\":["), "{},", "{}]}}"), 3.0),
@@ -123,7 +124,8 @@ async fn all_bodies_together_stay_within_their_budget() {
     }
     let took = memory(process, "VmHWM") - at_rest;
     println!("{seen:?}, {:.1} MB of {:.1} MB, {:.1} MB in all", took / MB, BUDGET / MB, (took + at_rest) / MB);
-    assert!(took + at_rest < 256.0 * 1024.0 * 1024.0);
+    // Beside the bodies stand the buffers of eighteen connections, and what the allocator has not given back.
+    assert!(took <= 1.25 * BUDGET, "{:.1} MB of {:.1} MB", took / MB, BUDGET / MB);
     // What was taken is given back: a large body is read again.
     let (name, path, body, _) = &all[1];
     assert_eq!(sent(&service.client, service.url(path), body.clone()).await.0, 422, "{name}");

@@ -8,6 +8,7 @@ mod beam_exact;
 mod beam_properties;
 mod beam_support;
 mod blind_trials;
+mod cancellation;
 mod cases;
 mod conformance;
 mod deflection_advice;

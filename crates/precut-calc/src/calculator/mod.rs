@@ -100,6 +100,32 @@ pub fn checkpoint(monitor: &dyn Monitor) -> Result<(), Failure> {
     if monitor.cancelled() { Err(Failure::Cancelled) } else { Ok(()) }
 }
 
+/// Looks at a monitor once per so much work, however the work is cut up into turns of loops.
+pub struct Pace<'a> {
+    monitor: &'a dyn Monitor,
+    since_look: usize,
+}
+
+impl<'a> Pace<'a> {
+    /// Multiplications between two looks: some milliseconds.
+    const PER_LOOK: usize = 4_000_000;
+
+    /// Nothing done yet.
+    pub fn new(monitor: &'a dyn Monitor) -> Self {
+        Self { monitor, since_look: 0 }
+    }
+
+    /// So many multiplications, about, were done or are done next: `Err(Failure::Cancelled)` once nobody waits any more.
+    pub fn work(&mut self, multiplications: usize) -> Result<(), Failure> {
+        self.since_look = self.since_look.saturating_add(multiplications);
+        if self.since_look < Self::PER_LOOK {
+            return Ok(());
+        }
+        self.since_look = 0;
+        checkpoint(self.monitor)
+    }
+}
+
 /// A calculator's name, version, examples and sources.
 #[derive(Debug, Clone, Copy)]
 pub struct Meta {

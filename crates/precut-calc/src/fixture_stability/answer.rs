@@ -84,10 +84,10 @@ pub(super) struct Aside {
 impl<'a> Study<'a> {
     pub(super) fn new(job: &'a FixtureJob, case: Case, monitor: &'a dyn Monitor) -> Result<Self, Failure> {
         let rules = Rules::new();
-        let point = point(&rules, &case.holding, &case.cutting, case.working, Closed::BOTH)?;
-        let forced = forced(&case, case.working)?;
+        let point = point(&rules, &case.holding, &case.cutting, case.working, Closed::BOTH, monitor)?;
+        let forced = forced(&case, case.working, monitor)?;
         let asked_mm = examined_mm(job, &case);
-        let limit = critical_depth(&rules, &case.holding, &case.cutting, case.working, asked_mm)?;
+        let limit = critical_depth(&rules, &case.holding, &case.cutting, case.working, asked_mm, monitor)?;
         let ChatterLimit { depth_mm: chatter_mm, examined_mm } = limit;
         Ok(Self { job, case, rules, monitor, point, forced, asked_mm, examined_mm, chatter_mm })
     }
@@ -150,7 +150,7 @@ impl<'a> Study<'a> {
     /// What limits the depth at a speed where chatter does so.
     pub(super) fn speed_limit(&self, spindle_rpm: f64, chatter: ChatterLimit) -> Result<SpeedLimit, Failure> {
         let ForcedLimits { amplitude_mm, movable_opens_mm, fixed_opens_mm, slips_mm } =
-            forced_limits(&self.case, spindle_rpm, chatter.depth_mm.unwrap_or(chatter.examined_mm))?;
+            forced_limits(&self.case, spindle_rpm, chatter.depth_mm.unwrap_or(chatter.examined_mm), self.monitor)?;
         Ok(SpeedLimit {
             spindle_speed_rpm: spindle_rpm,
             depth_examined_mm: chatter.examined_mm,
@@ -164,19 +164,19 @@ impl<'a> Study<'a> {
     }
 }
 
-pub(super) fn forced(case: &Case, working: Working) -> Result<Response, Failure> {
-    by_states!(case.holding, response(&case.holding, &case.cutting, working))
+pub(super) fn forced(case: &Case, working: Working, monitor: &dyn Monitor) -> Result<Response, Failure> {
+    by_states!(case.holding, response(&case.holding, &case.cutting, working, monitor))
 }
 
 /// Whether there is a motion about which to ask: away from the working point there may be none where joints harden.
-pub(super) fn has_motion(case: &Case, working: Working) -> bool {
-    let found = || by_states!(case.holding, unbroken(&case.holding, &case.cutting, working));
-    case.holding.hardening_per_mm2 <= 0.0 || found().is_some()
+pub(super) fn has_motion(case: &Case, working: Working, monitor: &dyn Monitor) -> Result<bool, Failure> {
+    let found = || by_states!(case.holding, unbroken(&case.holding, &case.cutting, working, monitor));
+    Ok(case.holding.hardening_per_mm2 <= 0.0 || found()?.is_some())
 }
 
 /// Peak-to-peak displacement of the forced motion, mm.
-pub(super) fn forced_span_mm(case: &Case, working: Working) -> Result<f64, Failure> {
-    by_states!(case.holding, span_mm(&case.holding, &case.cutting, working))
+pub(super) fn forced_span_mm(case: &Case, working: Working, monitor: &dyn Monitor) -> Result<f64, Failure> {
+    by_states!(case.holding, span_mm(&case.holding, &case.cutting, working, monitor))
 }
 
 /// How deep limits are looked for: as the job says, else well above the zeroth-order limit and the working depth.
@@ -485,12 +485,13 @@ struct AtDepth {
 fn at_depth(study: &Study<'_>, depth: f64) -> Result<Option<AtDepth>, Failure> {
     let case = &study.case;
     let working = case.at_depth(depth);
-    if !has_motion(case, working) {
+    if !has_motion(case, working, study.monitor)? {
         return Ok(None);
     }
-    let modulus = point(&study.rules, &case.holding, &case.cutting, working, Closed::BOTH)?.multiplier.modulus;
+    let found = point(&study.rules, &case.holding, &case.cutting, working, Closed::BOTH, study.monitor)?;
+    let modulus = found.multiplier.modulus;
     if modulus < 1.0 {
-        let forced = forced(case, working)?;
+        let forced = forced(case, working, study.monitor)?;
         return Ok(Some(AtDepth {
             modulus,
             span_mm: forced.x_mm.span(),
@@ -500,7 +501,7 @@ fn at_depth(study: &Study<'_>, depth: f64) -> Result<Option<AtDepth>, Failure> {
         }));
     }
     let plan = plan(case, &study.job.simulation, working, modulus);
-    let run = observed(case, &plan, &crate::calculator::Unwatched)?.run;
+    let run = observed(case, &plan, study.monitor)?.run;
     Ok(Some(AtDepth {
         modulus,
         span_mm: run.x_mm.span(),
@@ -535,7 +536,7 @@ fn limits(study: &Study<'_>) -> Result<DepthLimits, Failure> {
     let movable_opens_mm = force.map(|force| reach(&|at| at.left_n, force)).transpose()?.flatten();
     let fixed_opens_mm = force.map(|force| reach(&|at| at.right_n, force)).transpose()?.flatten();
     let stable_to_mm = study.chatter_mm.unwrap_or(study.examined_mm);
-    let slips_mm = forced_limits(case, case.working.spindle_rpm, stable_to_mm)?.slips_mm;
+    let slips_mm = forced_limits(case, case.working.spindle_rpm, stable_to_mm, study.monitor)?.slips_mm;
     let drive = study.drive_depths(case.working.spindle_rpm);
     let first = first_of([
         (FirstLimit::Chatter, study.chatter_mm),
@@ -550,7 +551,8 @@ fn limits(study: &Study<'_>) -> Result<DepthLimits, Failure> {
     for speed in &study.job.limits.speeds_rpm {
         checkpoint(study.monitor)?;
         let working = Working { spindle_rpm: speed.0, ..case.working };
-        let chatter = critical_depth(&study.rules, &case.holding, &case.cutting, working, study.asked_mm)?;
+        let chatter =
+            critical_depth(&study.rules, &case.holding, &case.cutting, working, study.asked_mm, study.monitor)?;
         at_speeds.push(study.speed_limit(speed.0, chatter)?);
     }
     let column = |of: &dyn Fn(&AtDepth) -> f64| found.iter().map(of).collect::<Vec<f64>>();
@@ -677,7 +679,7 @@ fn beside(study: &Study<'_>, plane: &Plane, points: &[super::lobes::BoundaryPoin
             return Ok((ForcedLimits::default(), zeroth));
         }
         let limit_mm = point.crossings_mm.first().copied().unwrap_or(point.examined_mm);
-        Ok((forced_limits(case, point.spindle_rpm, limit_mm)?, zeroth))
+        Ok((forced_limits(case, point.spindle_rpm, limit_mm, study.monitor)?, zeroth))
     };
     let mut rows = Vec::with_capacity(points.len());
     for (number, chunk) in points.chunks(32).enumerate() {

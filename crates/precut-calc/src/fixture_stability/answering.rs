@@ -10,13 +10,13 @@ use std::sync::LazyLock;
 
 use nalgebra::DMatrix;
 
-use crate::calculator::{Failure, Finding};
+use crate::calculator::{Failure, Finding, Monitor, Pace, checkpoint};
 use crate::num::dde::{Matrix, Propagator, Rule, product, times};
 use crate::num::dense::length;
 use crate::num::gmres::gmres;
 
 use super::cutting::{Cutting, Stretch};
-use super::floquet::{Working, damped, elements};
+use super::floquet::{MULTIPLICATIONS_PER_CHIP, Working, damped, elements};
 use super::holding::System;
 use super::response::{Forces, Range};
 
@@ -119,6 +119,7 @@ pub(super) struct Period<'a, const N: usize> {
     hardening_n_per_mm3: f64,
     propagators: Vec<Propagator<N, POINTS>>,
     elements: Vec<Element>,
+    monitor: &'a dyn Monitor,
     /// State at the start of a period by the state that a force leaves at its end of a start at rest.
     closing: Matrix<N>,
 }
@@ -143,6 +144,24 @@ pub(super) enum NoMotion {
     Unsettled { residual_mm: f64, steps: u32 },
 }
 
+/// Why a search for a motion ends.
+enum Stop {
+    No(NoMotion),
+    Failed(Failure),
+}
+
+impl From<NoMotion> for Stop {
+    fn from(why: NoMotion) -> Self {
+        Self::No(why)
+    }
+}
+
+impl From<Failure> for Stop {
+    fn from(failure: Failure) -> Self {
+        Self::Failed(failure)
+    }
+}
+
 /// How much a motion is worth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Effort {
@@ -159,12 +178,17 @@ pub(super) fn answering_motion<'a, const N: usize>(
     working: Working,
     hardening_n_per_mm3: f64,
     effort: Effort,
+    monitor: &'a dyn Monitor,
 ) -> Result<Result<AnsweringMotion<'a, N>, NoMotion>, Failure> {
     let products = match effort {
         Effort::Asked => ASKED_FOR,
         Effort::Looked => LOOKED_FOR,
     };
-    Ok(Period::new(system, cutting, working, hardening_n_per_mm3)?.motion(products))
+    match Period::new(system, cutting, working, hardening_n_per_mm3, monitor)?.motion(products) {
+        Ok(motion) => Ok(Ok(motion)),
+        Err(Stop::No(why)) => Ok(Err(why)),
+        Err(Stop::Failed(failure)) => Err(failure),
+    }
 }
 
 impl<'a, const N: usize> Period<'a, N> {
@@ -173,7 +197,9 @@ impl<'a, const N: usize> Period<'a, N> {
         cutting: &'a Cutting,
         working: Working,
         hardening_n_per_mm3: f64,
+        monitor: &'a dyn Monitor,
     ) -> Result<Self, Failure> {
+        let mut pace = Pace::new(monitor);
         let seconds_per_rad = cutting.tooth_period_s(working.spindle_rpm) / cutting.pitch_rad();
         let (mut propagators, mut placed): (Vec<Propagator<N, POINTS>>, Vec<Element>) = (Vec::new(), Vec::new());
         let mut known: Vec<(f64, usize)> = Vec::new();
@@ -184,6 +210,7 @@ impl<'a, const N: usize> Period<'a, N> {
             let mut from_rad = stretch.from_rad;
             let whole = elements(cutting, &stretch, seconds_per_rad, system.radius_rad_per_s).into_iter();
             for length_rad in whole.flat_map(|length| (0..parts).map(move |_| length / f64::from(parts))) {
+                pace.work(MULTIPLICATIONS_PER_CHIP * POINTS * (1 + stretch.teeth))?;
                 let same = |(length, teeth): &(f64, usize)| {
                     (length - length_rad).abs() <= 1e-12 * length_rad && *teeth == stretch.teeth
                 };
@@ -211,6 +238,7 @@ impl<'a, const N: usize> Period<'a, N> {
             hardening_n_per_mm3,
             propagators,
             elements: placed,
+            monitor,
             closing: std::array::from_fn(|i| std::array::from_fn(|j| closing[(i, j)])),
         })
     }
@@ -233,10 +261,12 @@ impl<'a, const N: usize> Period<'a, N> {
 
     /// Force of the chips at the points, N, and its slope over x(t) - x(t - tau), N/mm, into `slope_n_per_mm`; `None` where a
     /// tooth loses the cut.
-    fn force_n(&self, x_mm: &Field, load: f64, slope_n_per_mm: &mut Field) -> Option<Field> {
+    fn force_n(&self, x_mm: &Field, load: f64, slope_n_per_mm: &mut Field) -> Result<Option<Field>, Failure> {
+        let mut pace = Pace::new(self.monitor);
         let power = 1.0 - self.cutting.chip_exponent;
         let mut force_n = vec![0.0; self.points()];
         for (at, element) in self.in_order() {
+            pace.work(MULTIPLICATIONS_PER_CHIP * POINTS * (1 + element.shares.len()))?;
             let phase = at / self.points_per_pitch();
             let before = (at + self.points() - self.points_per_pitch()) % self.points();
             for i in 0..POINTS {
@@ -246,7 +276,7 @@ impl<'a, const N: usize> Period<'a, N> {
                     let fed_mm = self.cutting.chip_mm(self.working.feed_mm, self.cutting.tooth_number(phase, j));
                     let chip_mm = fed_mm - moved_mm;
                     if chip_mm <= 0.0 {
-                        return None;
+                        return Ok(None);
                     }
                     let of_tooth = shares[i] * self.cutting.chip_power(chip_mm);
                     force += of_tooth;
@@ -256,7 +286,7 @@ impl<'a, const N: usize> Period<'a, N> {
                 slope_n_per_mm[at + i] = load * self.cutting.direction * self.level * slope;
             }
         }
-        Some(force_n)
+        Ok(Some(force_n))
     }
 
     /// One sweep over the period from a state to the last: `seen` is told where every element begins, and in which state.
@@ -302,11 +332,11 @@ impl<'a, const N: usize> Period<'a, N> {
     }
 
     /// `products` that its linear equations may take.
-    fn motion(self, products: f64) -> Result<AnsweringMotion<'a, N>, NoMotion> {
+    fn motion(self, products: f64) -> Result<AnsweringMotion<'a, N>, Stop> {
         let mut left = products;
         let still = || vec![0.0; self.points()];
         let mut found = self.newton(still(), 1.0, &mut left);
-        if found.is_err() {
+        if matches!(found, Err(Stop::No(_))) {
             let raised = |step: u32| f64::from(step) / f64::from(LOADS);
             found = (2..=LOADS).fold(self.newton(still(), raised(1), &mut left), |found, step| {
                 found.and_then(|balance| self.newton(balance.answer_mm, raised(step), &mut left))
@@ -317,20 +347,21 @@ impl<'a, const N: usize> Period<'a, N> {
     }
 
     /// What holds of a motion under a share of the force; `None` where a tooth loses the cut.
-    fn balance(&self, x_mm: Field, load: f64) -> Option<Balance> {
+    fn balance(&self, x_mm: Field, load: f64) -> Result<Option<Balance>, Failure> {
+        checkpoint(self.monitor)?;
         let mut slope_n_per_mm = vec![0.0; x_mm.len()];
-        let force_n = self.force_n(&x_mm, load, &mut slope_n_per_mm)?;
+        let Some(force_n) = self.force_n(&x_mm, load, &mut slope_n_per_mm)? else { return Ok(None) };
         let acting_n: Field =
             force_n.iter().zip(&x_mm).map(|(force, x)| force - self.hardening_n_per_mm3 * x.powi(3)).collect();
         let (answer_mm, ends_mm) = self.answer(&acting_n);
         let missing_mm = answer_mm.iter().zip(&x_mm).map(|(answer, x)| answer - x).collect();
-        Some(Balance { x_mm, force_n, slope_n_per_mm, acting_n, answer_mm, ends_mm, missing_mm })
+        Ok(Some(Balance { x_mm, force_n, slope_n_per_mm, acting_n, answer_mm, ends_mm, missing_mm }))
     }
 
     /// Newton's method from x under a share of the force. Steps are halved where a tooth would lose the cut, or more be missing
     /// than before. What it takes comes off the products that are `left`.
-    fn newton(&self, from_mm: Field, load: f64, left: &mut f64) -> Result<Balance, NoMotion> {
-        let mut now = self.balance(from_mm, load).ok_or(NoMotion::CutLost)?;
+    fn newton(&self, from_mm: Field, load: f64, left: &mut f64) -> Result<Balance, Stop> {
+        let mut now = self.balance(from_mm, load)?.ok_or(NoMotion::CutLost)?;
         for steps in 1..=NEWTON_STEPS {
             let residual_mm = now.largest_mm();
             // Of numbers that are none the largest is 0, but the length is none either.
@@ -338,41 +369,42 @@ impl<'a, const N: usize> Period<'a, N> {
                 return Ok(now);
             }
             let unsettled = NoMotion::Unsettled { residual_mm, steps };
-            let step = self.step(&now, left).ok_or(unsettled)?;
+            let step = self.step(&now, left)?.ok_or(unsettled)?;
             let moved = |share: f64| {
                 let x_mm = now.x_mm.iter().zip(&step).map(|(x, step)| x + share * step).collect();
                 self.balance(x_mm, load)
             };
-            let (mut share, mut next) = (1.0, moved(1.0));
+            let (mut share, mut next) = (1.0, moved(1.0)?);
             let is_nearer = |next: &Balance| next.length_mm() < now.length_mm();
             while !next.as_ref().is_some_and(is_nearer) {
                 share *= 0.5;
                 if share < LEAST_SHARE {
-                    return Err(if next.is_none() { NoMotion::CutLost } else { unsettled });
+                    return Err(Stop::No(if next.is_none() { NoMotion::CutLost } else { unsettled }));
                 }
-                next = moved(share);
+                next = moved(share)?;
             }
             now = next.ok_or(NoMotion::CutLost)?;
         }
-        Err(NoMotion::Unsettled { residual_mm: now.largest_mm(), steps: NEWTON_STEPS })
+        Err(Stop::No(NoMotion::Unsettled { residual_mm: now.largest_mm(), steps: NEWTON_STEPS }))
     }
 
     /// (1 - G (slope (1 - S) - 3 K x^2)) step = what is missing, with S the shift by a tooth pitch; `None` where that is more than
     /// the products `left` allow.
-    fn step(&self, now: &Balance, left: &mut f64) -> Option<Field> {
+    fn step(&self, now: &Balance, left: &mut f64) -> Result<Option<Field>, Failure> {
         let (points, pitch) = (self.points(), self.points_per_pitch());
         let most = affordable(*left, points);
         let found = gmres(&now.missing_mm, LINEAR_RESIDUAL, most, |v| {
+            checkpoint(self.monitor)?;
             let force_of = |i: usize| {
                 let own = 3.0 * self.hardening_n_per_mm3 * now.x_mm[i] * now.x_mm[i] * v[i];
                 now.slope_n_per_mm[i] * (v[i] - v[(i + points - pitch) % points]) - own
             };
             let force: Field = (0..points).map(force_of).collect();
             let (by_force, _) = self.answer(&force);
-            v.iter().zip(&by_force).map(|(v, g)| v - g).collect()
-        });
+            Ok::<_, Failure>(v.iter().zip(&by_force).map(|(v, g)| v - g).collect())
+        })?;
         *left -= products(found.steps, points);
-        (found.residual <= LINEAR_RESIDUAL || most == LINEAR_STEPS).then_some(found.x)
+        Ok((found.residual <= LINEAR_RESIDUAL || most == LINEAR_STEPS).then_some(found.x))
     }
 }
 

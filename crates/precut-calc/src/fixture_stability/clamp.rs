@@ -55,7 +55,7 @@ pub(super) fn clamp_force(study: &Study<'_>, aside: &mut Aside) -> Result<ClampF
         .zip(least_n.filter(|least| stable && *least > 0.0 && case.is_linear()))
         .map(depth_for)
         .filter(|depth| *depth <= study.chatter_mm.unwrap_or(study.examined_mm));
-    let open = |closed: Closed| point(&study.rules, &case.holding, &case.cutting, case.working, closed);
+    let open = |closed: Closed| point(&study.rules, &case.holding, &case.cutting, case.working, closed, study.monitor);
     let movable_open = open(Closed { left: false, right: true })?;
     let fixed_open = open(Closed { left: true, right: false })?;
     aside.open_errors = [movable_open.error, fixed_open.error];

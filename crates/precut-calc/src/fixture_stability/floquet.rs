@@ -7,7 +7,8 @@
 
 use std::f64::consts::TAU;
 
-use crate::num::dde::{Matrix, PeriodMap, Propagator, Rule, exponential, largest};
+use crate::calculator::{Failure, Monitor, Pace, checkpoint};
+use crate::num::dde::{Matrix, PeriodMap, Propagator, Rule, exponential, largest_paced};
 
 use super::cutting::{Cutting, Stretch};
 use super::holding::System;
@@ -19,6 +20,9 @@ const LONGEST_RAD: f64 = 0.8;
 /// Ratio of neighbouring elements toward a root of sin^(1-k), and how many there are at most.
 const GRADING: f64 = 0.15;
 const GRADES: u32 = 4;
+
+/// What a chip of one tooth at one place is worth: a sine and a power.
+pub(super) const MULTIPLICATIONS_PER_CHIP: usize = 40;
 
 /// The largest multiplier.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -71,7 +75,9 @@ impl<const N: usize, const P: usize> SpeedPlan<N, P> {
         cutting: &Cutting,
         working: Working,
         stiffening: Option<Stiffening<'_>>,
-    ) -> Self {
+        monitor: &dyn Monitor,
+    ) -> Result<Self, Failure> {
+        let mut pace = Pace::new(monitor);
         let tau = cutting.tooth_period_s(working.spindle_rpm);
         let seconds_per_rad = tau / cutting.pitch_rad();
         let phases = cutting.phases();
@@ -85,6 +91,7 @@ impl<const N: usize, const P: usize> SpeedPlan<N, P> {
             }
             let mut from = stretch.from_rad;
             for length in elements(cutting, &stretch, seconds_per_rad, system.radius_rad_per_s) {
+                pace.work(MULTIPLICATIONS_PER_CHIP * phases * P * stretch.teeth)?;
                 let known = lengths
                     .iter()
                     .position(|(l, teeth)| (l - length).abs() <= 1e-12 * length && *teeth == stretch.teeth);
@@ -106,11 +113,12 @@ impl<const N: usize, const P: usize> SpeedPlan<N, P> {
                 from += length;
             }
         }
-        plan
+        Ok(plan)
     }
 
     /// The period map at the level Cp H^(1-mu); `None` when its equations are singular.
-    fn map(&self, level: f64) -> Option<PeriodMap<N, P>> {
+    fn map(&self, level: f64, monitor: &dyn Monitor) -> Result<Option<PeriodMap<N, P>>, Failure> {
+        let mut pace = Pace::new(monitor);
         let mut map = PeriodMap::new();
         for phase in 0..self.phases {
             let mut history = 0;
@@ -121,25 +129,38 @@ impl<const N: usize, const P: usize> SpeedPlan<N, P> {
                         let own = stiffening.get(phase).copied().unwrap_or([0.0; P]);
                         let present = std::array::from_fn(|i| level * slope[phase][i] + own[i]);
                         let delayed = std::array::from_fn(|i| -level * slope[phase][i]);
-                        map.element(&self.kinds[*kind], &present, &delayed, history)?;
+                        pace.work(2 * P * P * (P + N))?;
+                        if map.element(&self.kinds[*kind], &present, &delayed, history).is_none() {
+                            return Ok(None);
+                        }
                         history += 1;
                     }
                 }
             }
         }
-        Some(map)
+        Ok(Some(map))
     }
 
     /// The largest multiplier at the level, to `tolerance` in its residual.
-    pub(super) fn multiplier(&self, level: f64, tolerance: f64) -> Option<Multiplier> {
-        self.largest(level, tolerance, |_| {})
+    pub(super) fn multiplier(
+        &self,
+        level: f64,
+        tolerance: f64,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<Multiplier>, Failure> {
+        self.largest(level, tolerance, monitor, |_| {})
     }
 
     /// The same of masses that no spring ties to the ground, without their shift as one body. That shift leaves every chip
     /// as it is, so its multiplier is 1 in any cut and says nothing of this one.
-    pub(super) fn multiplier_but_of_shift(&self, level: f64, tolerance: f64) -> Option<Multiplier> {
+    pub(super) fn multiplier_but_of_shift(
+        &self,
+        level: f64,
+        tolerance: f64,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<Multiplier>, Failure> {
         // After every period everything is shifted back to x = 0: of the multipliers that one becomes 0, the others stay.
-        self.largest(level, tolerance, |vector| {
+        self.largest(level, tolerance, monitor, |vector| {
             let shift = vector[0];
             for (i, value) in vector.iter_mut().enumerate() {
                 let is_velocity = i < N && i % 2 == 1;
@@ -151,20 +172,30 @@ impl<const N: usize, const P: usize> SpeedPlan<N, P> {
     }
 
     /// The largest multiplier of the period map with something done after it.
-    fn largest(&self, level: f64, tolerance: f64, after: impl Fn(&mut [f64])) -> Option<Multiplier> {
-        let map = self.map(level)?;
-        let found = largest(map.dimension(), 8, tolerance, |vector| {
+    fn largest(
+        &self,
+        level: f64,
+        tolerance: f64,
+        monitor: &dyn Monitor,
+        after: impl Fn(&mut [f64]),
+    ) -> Result<Option<Multiplier>, Failure> {
+        checkpoint(monitor)?;
+        let Some(map) = self.map(level, monitor)? else { return Ok(None) };
+        let apply = |vector: &mut [f64]| {
             map.apply(vector);
             after(vector);
-        });
+            checkpoint(monitor)
+        };
+        let mut pace = Pace::new(monitor);
+        let found = largest_paced(map.dimension(), 8, tolerance, apply, |done| pace.work(done))?;
         let modulus = if self.phases == 1 { found.modulus() } else { found.modulus().powf(1.0 / self.phases as f64) };
-        modulus.is_finite().then_some(Multiplier {
+        Ok(modulus.is_finite().then_some(Multiplier {
             re: found.re,
             im: found.im,
             modulus,
             phases: self.phases,
             residual: found.residual,
-        })
+        }))
     }
 }
 

@@ -5,7 +5,7 @@ use super::forward::Measure;
 use super::predict::{PreparedFixture, PreparedRow};
 use crate::calculator::{
     Condition, Design, Expansions, Grouping, Hypotheses, Hypothesis, Inapplicability, Inapplicable, Range, Shape,
-    Smooth, Treatment, Variable,
+    Smooth, Treatment, Unwatched, Variable,
 };
 use crate::effects::{Cause, FIXTURE_CAUSES, Fit, FixtureEffect, Parameter};
 
@@ -136,7 +136,8 @@ impl Experiment<'_> {
     /// Hardening in the measure of the swings at which it is to be seen; in that of the catalogue where the base has none.
     fn hardening(&self, parameter: &Parameter, range: Range) -> Variable {
         let PreparedFixture { base, rows, .. } = self.prepared;
-        let swings = rows.iter().filter_map(|row| forced_span_mm(base, row.working).ok()).map(|span| 0.5 * span);
+        let swings =
+            rows.iter().filter_map(|row| forced_span_mm(base, row.working, &Unwatched).ok()).map(|span| 0.5 * span);
         let (sum, count) = swings.fold((0.0, 0.0), |(sum, count), swing| (sum + swing * swing, count + 1.0));
         let prior_sd = if sum > 0.0 { HARDENED_SHARE * count / sum } else { parameter.prior_sd };
         let treatment = Treatment::Amplitude { prior_sd: prior_sd.min(range.upper) };

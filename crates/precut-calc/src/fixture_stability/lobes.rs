@@ -79,9 +79,10 @@ pub(super) fn point(
     cutting: &Cutting,
     working: Working,
     closed: Closed,
+    monitor: &dyn Monitor,
 ) -> Result<Point, Failure> {
     let in_touch = Holding { jaw: holding.jaw.filter(|_| closed.left), ..holding.clone() };
-    by_states!(in_touch, point_of(rules, &in_touch, cutting, working, closed))
+    by_states!(in_touch, point_of(rules, &in_touch, cutting, working, closed, monitor))
 }
 
 fn point_of<const N: usize>(
@@ -90,10 +91,11 @@ fn point_of<const N: usize>(
     cutting: &Cutting,
     working: Working,
     closed: Closed,
+    monitor: &dyn Monitor,
 ) -> Result<Point, Failure> {
     let system = holding.system::<N>(closed);
-    let fine = at::<N, FINE>(&rules.fine, &system, holding, cutting, working, closed, FINE_RESIDUAL)?;
-    let check = at::<N, CHECK>(&rules.check, &system, holding, cutting, working, closed, FINE_RESIDUAL)?;
+    let fine = at::<N, FINE>(&rules.fine, &system, holding, cutting, working, (closed, FINE_RESIDUAL), monitor)?;
+    let check = at::<N, CHECK>(&rules.check, &system, holding, cutting, working, (closed, FINE_RESIDUAL), monitor)?;
     // Two more points per element gain two digits; the residual stands for a pair of close multipliers.
     let error = (fine.modulus - check.modulus).abs() + fine.residual * fine.modulus;
     Ok(Point { multiplier: fine, error })
@@ -105,19 +107,24 @@ fn at<const N: usize, const P: usize>(
     holding: &Holding,
     cutting: &Cutting,
     working: Working,
-    closed: Closed,
-    residual: f64,
+    (closed, residual): (Closed, f64),
+    monitor: &dyn Monitor,
 ) -> Result<Multiplier, Failure> {
     let hardening = holding.hardening_n_per_mm3(closed);
     let plan = if hardening > 0.0 && closed == Closed::BOTH {
-        about(rule, system, holding, cutting, working, &response::<N>(holding, cutting, working)?)
+        let forced = response::<N>(holding, cutting, working, monitor)?;
+        about(rule, system, holding, cutting, working, &forced, monitor)?
     } else {
-        SpeedPlan::new(rule, system, cutting, working, None)
+        SpeedPlan::new(rule, system, cutting, working, None, monitor)?
     };
     let level = cutting.level(working.depth_mm);
     let is_free = holding.jaw.is_some() && !closed.right;
-    let found = if is_free { plan.multiplier_but_of_shift(level, residual) } else { plan.multiplier(level, residual) };
-    found.ok_or_else(unsolved)
+    let found = if is_free {
+        plan.multiplier_but_of_shift(level, residual, monitor)
+    } else {
+        plan.multiplier(level, residual, monitor)
+    };
+    found?.ok_or_else(unsolved)
 }
 
 /// The vise stiffened by the motion about which it is asked whether a small change decays.
@@ -128,10 +135,11 @@ fn about<const N: usize, const P: usize>(
     cutting: &Cutting,
     working: Working,
     forced: &Response,
-) -> SpeedPlan<N, P> {
+    monitor: &dyn Monitor,
+) -> Result<SpeedPlan<N, P>, Failure> {
     let hardening = holding.hardening_n_per_mm3(Closed::BOTH);
     let stiffness = |t: f64| 3.0 * hardening * forced.x_at(t).powi(2);
-    SpeedPlan::new(rule, system, cutting, working, Some(&stiffness))
+    SpeedPlan::new(rule, system, cutting, working, Some(&stiffness), monitor)
 }
 
 /// Where the modulus crosses 1 over the depth, from the bottom, and how deep could be looked.
@@ -160,6 +168,7 @@ struct Column<'a, const N: usize, const P: usize> {
     /// Shared by all depths where nothing but the level depends on the depth.
     plan: Option<SpeedPlan<N, P>>,
     residual: f64,
+    monitor: &'a dyn Monitor,
 }
 
 impl<'a, const N: usize, const P: usize> Column<'a, N, P> {
@@ -170,26 +179,28 @@ impl<'a, const N: usize, const P: usize> Column<'a, N, P> {
         cutting: &'a Cutting,
         working: Working,
         residual: f64,
-    ) -> Self {
+        monitor: &'a dyn Monitor,
+    ) -> Result<Self, Failure> {
         let shared = cutting.process_damping_n_per_mm <= 0.0 && holding.hardening_per_mm2 <= 0.0;
-        let plan = shared.then(|| SpeedPlan::new(rule, system, cutting, working, None));
-        Self { rule, system, holding, cutting, working, plan, residual }
+        let plan = shared.then(|| SpeedPlan::new(rule, system, cutting, working, None, monitor)).transpose()?;
+        Ok(Self { rule, system, holding, cutting, working, plan, residual, monitor })
     }
 
     /// `None` where joints harden and no forced motion is found about which to ask.
     fn modulus(&self, depth_mm: f64) -> Result<Option<f64>, Failure> {
         let level = self.cutting.level(depth_mm);
         let found = if let Some(plan) = &self.plan {
-            plan.multiplier(level, self.residual)
+            plan.multiplier(level, self.residual, self.monitor)?
         } else {
             let working = Working { depth_mm, ..self.working };
             let plan = if self.hardens() {
-                let Some(forced) = unbroken::<N>(self.holding, self.cutting, working) else { return Ok(None) };
-                about(self.rule, self.system, self.holding, self.cutting, working, &forced)
+                let found = unbroken::<N>(self.holding, self.cutting, working, self.monitor)?;
+                let Some(forced) = found else { return Ok(None) };
+                about(self.rule, self.system, self.holding, self.cutting, working, &forced, self.monitor)?
             } else {
-                SpeedPlan::new(self.rule, self.system, self.cutting, working, None)
+                SpeedPlan::new(self.rule, self.system, self.cutting, working, None, self.monitor)?
             };
-            plan.multiplier(level, self.residual)
+            plan.multiplier(level, self.residual, self.monitor)?
         };
         Ok(Some(found.ok_or_else(unsolved)?.modulus))
     }
@@ -203,13 +214,13 @@ impl<'a, const N: usize, const P: usize> Column<'a, N, P> {
     }
 
     /// Depth up to which there is a forced motion: `most`, or less where joints harden.
-    fn reach_mm(&self, most_mm: f64) -> f64 {
-        if !self.hardens() || self.has_motion(most_mm) {
-            return most_mm;
+    fn reach_mm(&self, most_mm: f64) -> Result<f64, Failure> {
+        if !self.hardens() || self.has_motion(most_mm)? {
+            return Ok(most_mm);
         }
         let (mut low, mut high) = (0.5 * most_mm, most_mm);
         for _ in 0..DOWN {
-            if self.has_motion(low) {
+            if self.has_motion(low)? {
                 break;
             }
             (low, high) = (0.5 * low, low);
@@ -217,22 +228,23 @@ impl<'a, const N: usize, const P: usize> Column<'a, N, P> {
         self.last_motion_mm(low, high)
     }
 
-    fn has_motion(&self, depth_mm: f64) -> bool {
-        unbroken::<N>(self.holding, self.cutting, Working { depth_mm, ..self.working }).is_some()
+    fn has_motion(&self, depth_mm: f64) -> Result<bool, Failure> {
+        let working = Working { depth_mm, ..self.working };
+        Ok(unbroken::<N>(self.holding, self.cutting, working, self.monitor)?.is_some())
     }
 
     /// How far beyond a depth with a forced motion there still is one, short of a depth without.
-    fn last_motion_mm(&self, mut with_mm: f64, mut without_mm: f64) -> f64 {
+    fn last_motion_mm(&self, mut with_mm: f64, mut without_mm: f64) -> Result<f64, Failure> {
         for _ in 0..UP {
             let middle = 0.5 * (with_mm + without_mm);
-            if self.has_motion(middle) { with_mm = middle } else { without_mm = middle }
+            if self.has_motion(middle)? { with_mm = middle } else { without_mm = middle }
         }
-        with_mm
+        Ok(with_mm)
     }
 
     /// Depths at which the modulus crosses 1 up to `most`, from the bottom: a scan, then bracketing.
     fn crossings(&self, most_mm: f64, relative: f64, only_first: bool) -> Result<Crossings, Failure> {
-        let reach_mm = self.reach_mm(most_mm);
+        let reach_mm = self.reach_mm(most_mm)?;
         let mut found = Crossings { depths_mm: Vec::new(), up_to_mm: 0.0 };
         let Some(free) = self.modulus(0.0)? else { return Ok(found) };
         let mut before = (0.0, free.ln());
@@ -242,7 +254,7 @@ impl<'a, const N: usize, const P: usize> Column<'a, N, P> {
             // A motion that comes back deeper down is another one: between both nothing crosses 1.
             let is_last = modulus.is_none();
             if is_last {
-                depth = self.last_motion_mm(before.0, depth);
+                depth = self.last_motion_mm(before.0, depth)?;
                 modulus = self.modulus(depth)?;
             }
             let Some(modulus) = modulus else { break };
@@ -306,8 +318,9 @@ pub(super) fn critical_depth(
     cutting: &Cutting,
     working: Working,
     most_mm: f64,
+    monitor: &dyn Monitor,
 ) -> Result<ChatterLimit, Failure> {
-    by_states!(holding, critical_of(rules, holding, cutting, working, most_mm))
+    by_states!(holding, critical_of(rules, holding, cutting, working, most_mm, monitor))
 }
 
 fn critical_of<const N: usize>(
@@ -316,9 +329,10 @@ fn critical_of<const N: usize>(
     cutting: &Cutting,
     working: Working,
     most_mm: f64,
+    monitor: &dyn Monitor,
 ) -> Result<ChatterLimit, Failure> {
     let system = holding.system::<N>(Closed::BOTH);
-    let column = Column::new(&rules.fine, &system, holding, cutting, working, FINE_RESIDUAL);
+    let column = Column::new(&rules.fine, &system, holding, cutting, working, FINE_RESIDUAL, monitor)?;
     let Crossings { depths_mm, up_to_mm } = column.crossings(most_mm, FINE_DEPTH, true)?;
     Ok(ChatterLimit { depth_mm: depths_mm.first().copied(), examined_mm: up_to_mm })
 }
@@ -330,8 +344,9 @@ pub(super) fn moduli(
     cutting: &Cutting,
     working: Working,
     depths_mm: &[f64],
+    monitor: &dyn Monitor,
 ) -> Result<Vec<f64>, Failure> {
-    by_states!(holding, moduli_of(rules, holding, cutting, working, depths_mm))
+    by_states!(holding, moduli_of(rules, holding, cutting, working, depths_mm, monitor))
 }
 
 fn moduli_of<const N: usize>(
@@ -340,9 +355,10 @@ fn moduli_of<const N: usize>(
     cutting: &Cutting,
     working: Working,
     depths_mm: &[f64],
+    monitor: &dyn Monitor,
 ) -> Result<Vec<f64>, Failure> {
     let system = holding.system::<N>(Closed::BOTH);
-    let column = Column::new(&rules.coarse, &system, holding, cutting, working, COARSE_RESIDUAL);
+    let column = Column::new(&rules.coarse, &system, holding, cutting, working, COARSE_RESIDUAL, monitor)?;
     depths_mm.iter().map(|&depth| column.on_map(depth)).collect()
 }
 
@@ -406,7 +422,7 @@ fn boundary_of<const N: usize>(
     let system = holding.system::<N>(Closed::BOTH);
     let at = |spindle_rpm: f64| -> Result<BoundaryPoint, Failure> {
         let working = plane.working(spindle_rpm);
-        let column = Column::new(&rules.coarse, &system, holding, cutting, working, COARSE_RESIDUAL);
+        let column = Column::new(&rules.coarse, &system, holding, cutting, working, COARSE_RESIDUAL, monitor)?;
         let Crossings { depths_mm, up_to_mm } = column.crossings(plane.most_mm, COARSE_DEPTH, false)?;
         Ok(BoundaryPoint { spindle_rpm, crossings_mm: depths_mm, examined_mm: up_to_mm })
     };
@@ -505,7 +521,7 @@ fn map_of<const N: usize>(
             .par_iter()
             .map(|block| {
                 let working = plane.working(map.speeds_rpm[block.column]);
-                let column = Column::new(&rules.coarse, &system, holding, cutting, working, COARSE_RESIDUAL);
+                let column = Column::new(&rules.coarse, &system, holding, cutting, working, COARSE_RESIDUAL, monitor)?;
                 map.depths_mm[block.rows.clone()].iter().map(|&depth| column.on_map(depth)).collect()
             })
             .collect();
@@ -518,7 +534,7 @@ fn map_of<const N: usize>(
     }
     if refinement > 0 {
         let column = |spindle_rpm: f64| {
-            Column::new(&rules.coarse, &system, holding, cutting, plane.working(spindle_rpm), COARSE_RESIDUAL)
+            Column::new(&rules.coarse, &system, holding, cutting, plane.working(spindle_rpm), COARSE_RESIDUAL, monitor)
         };
         map.refined = refine(&map, refinement, &column, monitor)?;
         shown(1.0, &map);
@@ -531,7 +547,7 @@ fn map_of<const N: usize>(
 fn refine<'a, const N: usize>(
     map: &Map,
     levels: u32,
-    column: &(dyn Fn(f64) -> Column<'a, N, COARSE> + Sync),
+    column: &(dyn Fn(f64) -> Result<Column<'a, N, COARSE>, Failure> + Sync),
     monitor: &dyn Monitor,
 ) -> Result<Vec<(f64, f64)>, Failure> {
     let (columns, rows) = (map.speeds_rpm.len(), map.depths_mm.len());
@@ -584,7 +600,7 @@ fn refine<'a, const N: usize>(
             let found: Result<Vec<Vec<f64>>, Failure> = chunk
                 .par_iter()
                 .map(|(i, rows)| {
-                    let column = column(place(&map.speeds_rpm, *i));
+                    let column = column(place(&map.speeds_rpm, *i))?;
                     rows.iter().map(|&j| column.on_map(place(&map.depths_mm, j))).collect()
                 })
                 .collect();

@@ -9,7 +9,7 @@ mod linear;
 
 use std::f64::consts::PI;
 
-use crate::calculator::{Failure, Monitor, checkpoint};
+use crate::calculator::{Failure, Monitor, Pace, checkpoint};
 use crate::num::dde::{Matrix, exponential, times};
 
 use super::cutting::Cutting;
@@ -22,8 +22,10 @@ use linear::Stretch;
 const DIVERGED_MM: f64 = 10.0;
 /// Events in one step at most: a joint does not open and close oftener in a hundredth of an oscillation.
 const EVENTS_PER_STEP: u32 = 16;
-/// Steps between two looks whether anybody still waits: some milliseconds.
-const STEPS_PER_LOOK: usize = 40_000;
+/// What a step is worth without a tooth, and what a tooth adds to it, in multiplications.
+const MULTIPLICATIONS_PER_STEP: usize = 60;
+/// Steps that are gone through without a look, by all teeth together.
+const STEPS_AT_ONCE: usize = 400_000;
 
 /// How older surfaces are remembered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -319,25 +321,29 @@ pub(super) fn march<const N: usize>(
     plan: &Plan,
     monitor: &dyn Monitor,
 ) -> Result<Marched, Failure> {
-    let mut state = State::<N>::new(holding, cutting, plan);
+    let mut state = State::<N>::new(holding, cutting, plan, monitor)?;
     let mut record = Record::new(plan);
-    let mut since_look = 0;
+    let mut pace = Pace::new(monitor);
+    // As deep as the process of a tooth is, as many teeth are in cut.
+    let per_step = MULTIPLICATIONS_PER_STEP * (1 + state.grid.teeth_before);
+    let at_once = (STEPS_AT_ONCE / (1 + state.grid.teeth_before)).max(1);
     state.enter();
     for period in 0..plan.tooth_periods {
-        since_look += state.grid.steps;
-        if since_look >= STEPS_PER_LOOK {
-            since_look = 0;
-            checkpoint(monitor)?;
-        }
         state.tooth_period = period;
         record.samples_mm.push(state.q[0]);
         if state.is_plain() {
             let (leave, steps) = (state.grid.leave, state.grid.steps);
-            state.sweep(0..leave, &mut record);
-            state.sweep(leave..steps, &mut record);
+            for (from, to) in [(0, leave), (leave, steps)] {
+                for first in (from..to).step_by(at_once) {
+                    let range = first..to.min(first + at_once);
+                    pace.work(per_step * range.len())?;
+                    state.sweep(range, &mut record);
+                }
+            }
             state.enter_next();
         } else {
             for i in 0..state.grid.steps {
+                pace.work(per_step)?;
                 state.advance(i, &mut record);
             }
         }
@@ -352,7 +358,7 @@ pub(super) fn march<const N: usize>(
 }
 
 impl<'a, const N: usize> State<'a, N> {
-    fn new(holding: &'a Holding, cutting: &'a Cutting, plan: &'a Plan) -> Self {
+    fn new(holding: &'a Holding, cutting: &'a Cutting, plan: &'a Plan, monitor: &dyn Monitor) -> Result<Self, Failure> {
         let grid = Grid::of(cutting, &plan.working, plan.steps_per_tooth);
         let system = holding.system::<N>(Closed::BOTH);
         let force = holding.clamp_force_n.unwrap_or(0.0);
@@ -361,9 +367,10 @@ impl<'a, const N: usize> State<'a, N> {
             .iter()
             .flat_map(|&h| (0..4).map(move |which| (h, Closed { left: which % 2 == 1, right: which / 2 == 1 })))
             .map(|(h, closed)| {
+                checkpoint(monitor)?;
                 if !plan.unilateral && closed != Closed::BOTH {
                     // Never used: a bonded run has one system.
-                    return Flow::new(&system, [0.0; N], h);
+                    return Ok(Flow::new(&system, [0.0; N], h));
                 }
                 let of = holding.system::<N>(closed);
                 let (left, right) = (f64::from(u8::from(closed.left)), f64::from(u8::from(closed.right)));
@@ -372,12 +379,12 @@ impl<'a, const N: usize> State<'a, N> {
                 if let Some(jaw) = system.jaw {
                     constant[jaw + 1] = system.push[jaw + 1] * force * (left - 1.0);
                 }
-                Flow::new(&of, constant, h)
+                Ok(Flow::new(&of, constant, h))
             })
-            .collect();
+            .collect::<Result<_, Failure>>()?;
         let share = |cell| cutting.shape((cutting.entry_rad + grid.angle_rad(cutting, cell)).min(PI));
         let cells = (0..grid.cells).map(|cell| Cell { share: share(cell), surface: 0.0, chip: 0.0 }).collect();
-        Self {
+        Ok(Self {
             cutting,
             holding,
             plan,
@@ -397,7 +404,7 @@ impl<'a, const N: usize> State<'a, N> {
             reached: grid.cells,
             grid,
             system,
-        }
+        })
     }
 
     /// All teeth that stand in the arc at the start cut at once.

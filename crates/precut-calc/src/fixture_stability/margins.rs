@@ -27,7 +27,7 @@ const MOST_FEEDS: usize = 4;
 
 impl PreparedFixture {
     fn log_modulus(&self, case: &Case, working: Working) -> Result<f64, Failure> {
-        let found = point(&self.rules, &case.holding, &case.cutting, working, Closed::BOTH)?;
+        let found = point(&self.rules, &case.holding, &case.cutting, working, Closed::BOTH, &Unwatched)?;
         Ok(found.multiplier.modulus.max(f64::MIN_POSITIVE).ln())
     }
 
@@ -38,7 +38,9 @@ impl PreparedFixture {
         let Some(working) = rows.first().map(of) else { return Ok(1.0) };
         let Case { holding, cutting, .. } = &self.base;
         for times in LOOKED_FOR {
-            if let Some(limit) = critical_depth(&self.rules, holding, cutting, working, times * deepest)?.depth_mm {
+            let most_mm = times * deepest;
+            let found = critical_depth(&self.rules, holding, cutting, working, most_mm, &Unwatched)?;
+            if let Some(limit) = found.depth_mm {
                 let at =
                     |shift: f64| self.log_modulus(&self.base, Working { depth_mm: limit * shift.exp(), ..working });
                 return Ok(((at(STEP)? - at(-STEP)?) / (2.0 * STEP)).max(FLATTEST));
@@ -114,7 +116,7 @@ pub(super) fn or_missing<T>(found: Result<T, Failure>) -> Result<Result<T, Missi
 fn opening(case: &Case, unit: &mut Option<Response>) -> Result<Prediction, Failure> {
     let Some(force) = case.holding.clamp_force_n else { return Ok(Err(Missing::NoSolution)) };
     let asked = |forced: &Response| forced.left_elastic_n.high.max(forced.right_elastic_n.high);
-    let forced = |working| or_missing(forced(case, working));
+    let forced = |working| or_missing(forced(case, working, &Unwatched));
     let asked = if case.is_linear() {
         let unit = match unit {
             Some(unit) => unit,

@@ -168,18 +168,40 @@ impl Calculator for FixtureStability {
     }
 }
 
-/// Expected work. A multiplier costs about 1 us per point of its history and 10 us besides; a step in time 12 ns (a plain
-/// vise, linear law) to 60 ns (joints that open, a power of the chip, kept steps): the most is taken.
+/// Oscillations in a tooth period from which on one Krylov space does not suffice for a multiplier, how its time then grows with
+/// them, and how much it is at most: that of all restarts. Measured with 72 to 540 oscillations.
+const ONE_SPACE: f64 = 50.0;
+const RESTARTS_GROW: f64 = 2.8;
+const ALL_RESTARTS: f64 = 1000.0;
+/// Bytes that a multiplier holds per point of its history: the vectors of its space, and what the map is made of.
+const POINT_BYTES: f64 = 700.0;
+/// Bytes of a piece of the forced motion, of a kept step, and of a place of the arc.
+const PIECE_BYTES: f64 = 250.0;
+const STEP_BYTES: f64 = 100.0;
+const PLACE_BYTES: f64 = 24.0;
+
+/// Expected work. A multiplier costs about 1 us per point of its history and 10 us besides, a thousand times as much where the
+/// cutter turns so slowly that hundreds of oscillations go into a tooth period; a step in time 12 ns (a plain vise, linear law) to
+/// 60 ns (joints that open, a power of the chip, kept steps), the most is taken, and 25 ns for every further tooth in cut.
 fn cost(job: &FixtureJob) -> Cost {
     let Some(case) = Case::of(job) else { return Cost { ms: 1.0, bytes: 100_000, driver: "/cut" } };
     let highest = case.holding.modes().last().map_or(0.0, |mode| mode.natural_hz);
-    let history = |spindle_rpm: f64| 24.0 + 14.0 * highest * case.cutting.tooth_period_s(spindle_rpm);
+    let oscillations = |spindle_rpm: f64| highest * case.cutting.tooth_period_s(spindle_rpm);
+    let history = |spindle_rpm: f64| 24.0 + 14.0 * oscillations(spindle_rpm);
+    let restarted = |spindle_rpm: f64| (oscillations(spindle_rpm) / ONE_SPACE).powf(RESTARTS_GROW);
     let states = case.holding.states() as f64;
-    let point_ms = |n: f64| (0.008 + 0.0006 * history(n)) * (0.5 + 0.25 * states);
+    let phases = case.cutting.phases() as f64;
+    let of_phases = 0.7 + 0.3 * phases;
+    let point_ms = |n: f64| {
+        let per_point = 0.0006 * of_phases * restarted(n).clamp(1.0, ALL_RESTARTS);
+        (0.008 + per_point * history(n)) * (0.5 + 0.25 * states)
+    };
     let working = case.working.spindle_rpm;
     let steps =
         job.simulation.steps_per_tooth.map_or_else(|| simulate::steps_per_tooth(&case, working) as f64, f64::from);
-    let run_ms = steps * job.simulation.tooth_periods.map_or(400.0, f64::from) * 6e-5;
+    let teeth = case.cutting.stretches().iter().map(|stretch| stretch.teeth).max().unwrap_or(0) as f64;
+    let step_ms = 6e-5 + 2.5e-5 * (teeth - 2.0).max(0.0);
+    let run_ms = steps * job.simulation.tooth_periods.map_or(400.0, f64::from) * step_ms;
     // A better speed is tried before it is named.
     let more = [Analysis::ClampForce, Analysis::Lobes].into_iter().filter(|of| job.asks(*of)).count();
     let runs = 1.0 + f64::from(u8::from(job.simulation.verified)) * 2.0 + more as f64;
@@ -188,7 +210,14 @@ fn cost(job: &FixtureJob) -> Cost {
     if job.asks(Analysis::Limits) {
         parts.push((0.6 * f64::from(job.limits.depths) * run_ms, "/limits/depths"));
     }
-    let mut bytes = 400_000;
+    let kept = if job.asks(Analysis::History) { 2.0 * case.cutting.teeth.clamp(4, 40) as f64 } else { 0.0 };
+    let pieces = phases * (240.0 + 48.0 * oscillations(working));
+    let held = POINT_BYTES * phases.sqrt() * history(working)
+        + PIECE_BYTES * pieces
+        + steps * (STEP_BYTES * kept + PLACE_BYTES * (1.0 + teeth));
+    // Of what no number of bytes holds the most.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    let mut bytes = 400_000_u64.saturating_add(held as u64);
     if job.asks(Analysis::Lobes) {
         let from = job.lobes.from_rpm.unwrap_or(0.5 * working);
         let to = job.lobes.to_rpm.unwrap_or(2.0 * working).max(from);

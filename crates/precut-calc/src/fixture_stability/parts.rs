@@ -1,6 +1,6 @@
 //! Parts of an answer by themselves, with the code that the whole answer uses: for identification and for measuring.
 
-use crate::calculator::{Failure, Monitor};
+use crate::calculator::{Failure, Monitor, Unwatched};
 
 use super::acting::Case;
 use super::answer::forced;
@@ -35,7 +35,7 @@ pub(super) fn plane_of(job: &FixtureJob, case: &Case, examined_mm: f64) -> Plane
 /// Modulus of the largest multiplier at the working point of a checked and filled job, and its estimated error.
 pub fn multiplier_modulus(job: &FixtureJob) -> Result<(f64, f64), Failure> {
     let case = case(job)?;
-    let found = point(&Rules::new(), &case.holding, &case.cutting, case.working, Closed::BOTH)?;
+    let found = point(&Rules::new(), &case.holding, &case.cutting, case.working, Closed::BOTH, &Unwatched)?;
     Ok((found.multiplier.modulus, found.error))
 }
 
@@ -75,7 +75,7 @@ pub fn lobe_boundary(job: &FixtureJob, monitor: &dyn Monitor) -> Result<Vec<Spee
 /// Peak-to-peak displacement and least clamp force of the forced motion, um and N.
 pub fn forced_motion(job: &FixtureJob) -> Result<(f64, f64), Failure> {
     let case = case(job)?;
-    let motion = forced(&case, case.working)?;
+    let motion = forced(&case, case.working, &Unwatched)?;
     Ok((1e3 * motion.x_mm.span(), motion.left_n.high.max(motion.right_n.high).max(0.0)))
 }
 

@@ -145,7 +145,7 @@ impl PreparedFixture {
                 }
                 Measure::DepthLimit => {
                     let most = 4.0 * working.depth_mm.max(2.5);
-                    or_missing(critical_depth(&self.rules, &case.holding, &case.cutting, working, most))?
+                    or_missing(critical_depth(&self.rules, &case.holding, &case.cutting, working, most, &Unwatched))?
                         .and_then(|limit| limit.depth_mm.ok_or(Missing::NoSolution))
                 }
             };
@@ -156,7 +156,8 @@ impl PreparedFixture {
 
     /// Why a point has no amplitude, where it has none: it chatters, or there is no motion to ask about.
     fn instability(&self, case: &Case) -> Result<Option<Missing>, Failure> {
-        Ok(match or_missing(point(&self.rules, &case.holding, &case.cutting, case.working, Closed::BOTH))? {
+        let found = point(&self.rules, &case.holding, &case.cutting, case.working, Closed::BOTH, &Unwatched);
+        Ok(match or_missing(found)? {
             Ok(point) => (point.multiplier.modulus >= 1.0).then_some(Missing::Unstable),
             Err(missing) => Some(missing),
         })
@@ -174,11 +175,11 @@ impl PreparedFixture {
             return Ok(Err(missing));
         }
         if !case.is_linear() {
-            return Ok(or_missing(forced_span_mm(case, case.working))?.map(|span_mm| span_mm * UM_PER_MM));
+            return Ok(or_missing(forced_span_mm(case, case.working, &Unwatched))?.map(|span_mm| span_mm * UM_PER_MM));
         }
         let span_mm = match unit_mm {
             Some(span_mm) => *span_mm,
-            None => match or_missing(forced_span_mm(case, case.at_depth(1.0)))? {
+            None => match or_missing(forced_span_mm(case, case.at_depth(1.0), &Unwatched))? {
                 Ok(span_mm) => *unit_mm.insert(span_mm),
                 Err(missing) => return Ok(Err(missing)),
             },
@@ -201,7 +202,7 @@ impl PreparedFixture {
         let mut predicted = Vec::with_capacity(rows.len());
         if !late.is_empty() {
             // Long after the entry: the forced motion, in step with the tooth that entered at the start.
-            let forced = or_missing(forced(case, case.working))?;
+            let forced = or_missing(forced(case, case.working, &Unwatched))?;
             let at = |row: usize| forced.as_ref().map(|motion| motion.x_at(time(row)) * UM_PER_MM).map_err(|why| *why);
             predicted.extend(late.into_iter().map(|row| (row, at(row))));
         }

@@ -6,12 +6,12 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::calculator::{Failure, Finding};
+use crate::calculator::{Failure, Finding, Monitor, Pace};
 use crate::num::dde::{Matrix, Propagator, Rule, times};
 
 use super::answering::{AnsweringMotion, Effort, NoMotion, answering_motion};
 use super::cutting::{Cutting, Stretch};
-use super::floquet::{Working, damped};
+use super::floquet::{MULTIPLICATIONS_PER_CHIP, Working, damped};
 use super::holding::{Closed, Holding, System};
 use super::settled::settled;
 
@@ -133,12 +133,14 @@ struct Elements<'a, const N: usize> {
     matrices: Vec<(Matrix<N>, f64)>,
     pieces: Vec<Piece<N>>,
     seconds_per_rad: f64,
+    monitor: &'a dyn Monitor,
 }
 
 pub(super) fn response<const N: usize>(
     holding: &Holding,
     cutting: &Cutting,
     working: Working,
+    monitor: &dyn Monitor,
 ) -> Result<Response, Failure> {
     let system = holding.system::<N>(Closed::BOTH);
     let level = cutting.direction * cutting.level(working.depth_mm);
@@ -146,12 +148,12 @@ pub(super) fn response<const N: usize>(
         let chips_n = level * cutting.smooth_force(stretch, since, phase, working.feed_mm);
         Forces { chips_n, acting_n: chips_n }
     };
-    let under_smooth = || Elements::new(&system, holding, cutting, working, smooth).response();
-    let why = match answering::<N>(&system, holding, cutting, working, Effort::Asked)? {
+    let under_smooth = || Elements::new(&system, holding, cutting, working, smooth, monitor)?.response();
+    let why = match answering::<N>(&system, holding, cutting, working, Effort::Asked, monitor)? {
         Ok(motion) => {
             let response = if cutting.uneven() || holding.hardening_per_mm2 > 0.0 {
                 let forces = |stretch: &Stretch, since: f64, phase: usize| motion.forces_n(stretch, since, phase);
-                Elements::new(&system, holding, cutting, working, forces).response()?
+                Elements::new(&system, holding, cutting, working, forces, monitor)?.response()?
             } else {
                 under_smooth()?
             };
@@ -160,7 +162,7 @@ pub(super) fn response<const N: usize>(
         Err(why) => why,
     };
     if cutting.uneven()
-        && let Some(settled) = settled::<N>(holding, cutting, working)?
+        && let Some(settled) = settled::<N>(holding, cutting, working, monitor)?
     {
         return Ok(settled);
     }
@@ -174,19 +176,38 @@ pub(super) fn response<const N: usize>(
 }
 
 /// The forced motion of a cut that no tooth loses; `None` where none is found.
-pub(super) fn unbroken<const N: usize>(holding: &Holding, cutting: &Cutting, working: Working) -> Option<Response> {
+pub(super) fn unbroken<const N: usize>(
+    holding: &Holding,
+    cutting: &Cutting,
+    working: Working,
+    monitor: &dyn Monitor,
+) -> Result<Option<Response>, Failure> {
     let system = holding.system::<N>(Closed::BOTH);
-    let motion = answering::<N>(&system, holding, cutting, working, Effort::Looked).ok()?.ok()?;
+    let found = answering::<N>(&system, holding, cutting, working, Effort::Looked, monitor);
+    let Some(motion) = unless_cancelled(found)?.and_then(Result::ok) else { return Ok(None) };
     let forces = |stretch: &Stretch, since: f64, phase: usize| motion.forces_n(stretch, since, phase);
-    let response = Elements::new(&system, holding, cutting, working, forces).response().ok()?;
-    Some(Response { x_mm: motion.range_mm(), ..response })
+    let response = Elements::new(&system, holding, cutting, working, forces, monitor)?.response();
+    Ok(unless_cancelled(response)?.map(|response| Response { x_mm: motion.range_mm(), ..response }))
+}
+
+/// What is not found is none, but for want of anybody who waits for it.
+fn unless_cancelled<T>(found: Result<T, Failure>) -> Result<Option<T>, Failure> {
+    match found {
+        Err(Failure::Cancelled) => Err(Failure::Cancelled),
+        found => Ok(found.ok()),
+    }
 }
 
 /// Largest less smallest x of the forced motion, mm: that of [`response`], without its curves.
-pub(super) fn span_mm<const N: usize>(holding: &Holding, cutting: &Cutting, working: Working) -> Result<f64, Failure> {
-    match answering::<N>(&holding.system(Closed::BOTH), holding, cutting, working, Effort::Asked)? {
+pub(super) fn span_mm<const N: usize>(
+    holding: &Holding,
+    cutting: &Cutting,
+    working: Working,
+    monitor: &dyn Monitor,
+) -> Result<f64, Failure> {
+    match answering::<N>(&holding.system(Closed::BOTH), holding, cutting, working, Effort::Asked, monitor)? {
         Ok(motion) => Ok(motion.range_mm().span()),
-        Err(_) => Ok(response::<N>(holding, cutting, working)?.x_mm.span()),
+        Err(_) => Ok(response::<N>(holding, cutting, working, monitor)?.x_mm.span()),
     }
 }
 
@@ -196,8 +217,9 @@ fn answering<'a, const N: usize>(
     cutting: &'a Cutting,
     working: Working,
     effort: Effort,
+    monitor: &'a dyn Monitor,
 ) -> Result<Result<AnsweringMotion<'a, N>, NoMotion>, Failure> {
-    answering_motion(system, cutting, working, holding.hardening_n_per_mm3(Closed::BOTH), effort)
+    answering_motion(system, cutting, working, holding.hardening_n_per_mm3(Closed::BOTH), effort, monitor)
 }
 
 impl<'a, const N: usize> Elements<'a, N> {
@@ -207,7 +229,9 @@ impl<'a, const N: usize> Elements<'a, N> {
         cutting: &Cutting,
         working: Working,
         forces: impl Fn(&Stretch, f64, usize) -> Forces,
-    ) -> Self {
+        monitor: &'a dyn Monitor,
+    ) -> Result<Self, Failure> {
+        let mut pace = Pace::new(monitor);
         let rule = Rule::<POINTS>::new();
         let tau = cutting.tooth_period_s(working.spindle_rpm);
         let seconds_per_rad = tau / cutting.pitch_rad();
@@ -232,6 +256,7 @@ impl<'a, const N: usize> Elements<'a, N> {
                 let force = |since: f64| forces(stretch, since, phase);
                 let mut end = force(stretch.from_rad);
                 for i in 0..count {
+                    pace.work(MULTIPLICATIONS_PER_CHIP * (POINTS + 1) * (1 + stretch.teeth))?;
                     let from_rad = stretch.from_rad + i as f64 * length;
                     let start = end;
                     end = force(from_rad + length);
@@ -245,17 +270,17 @@ impl<'a, const N: usize> Elements<'a, N> {
                 }
             }
         }
-        Self { system, holding, propagators, matrices, pieces, seconds_per_rad }
+        Ok(Self { system, holding, propagators, matrices, pieces, seconds_per_rad, monitor })
     }
 
     /// The motion that comes back after a period.
     fn response(&self) -> Result<Response, Failure> {
-        let forced = self.sweep(&[0.0; N], 1.0);
+        let forced = self.sweep(&[0.0; N], 1.0)?;
         let mut matrix = DMatrix::<f64>::identity(N, N);
         for column in 0..N {
             let mut unit = [0.0; N];
             unit[column] = 1.0;
-            let end = self.sweep(&unit, 0.0);
+            let end = self.sweep(&unit, 0.0)?;
             for row in 0..N {
                 matrix[(row, column)] -= end[row];
             }
@@ -264,7 +289,7 @@ impl<'a, const N: usize> Elements<'a, N> {
         let solution = matrix.lu().solve(&right).filter(|s| s.iter().all(|value| value.is_finite()));
         let start = solution
             .ok_or_else(|| Failure::OutOfModel(Finding::new("undamped_resonance", "/cut/spindle_speed_rpm")))?;
-        Ok(self.record(&std::array::from_fn(|i| start[i])))
+        self.record(&std::array::from_fn(|i| start[i]))
     }
 
     /// State at the end of an element from that at its start. `driven` is 1, or 0 for what the start alone does.
@@ -279,8 +304,12 @@ impl<'a, const N: usize> Elements<'a, N> {
         end
     }
 
-    fn sweep(&self, start: &[f64; N], driven: f64) -> [f64; N] {
-        self.pieces.iter().fold(*start, |q, piece| self.step(piece, &q, driven))
+    fn sweep(&self, start: &[f64; N], driven: f64) -> Result<[f64; N], Failure> {
+        let mut pace = Pace::new(self.monitor);
+        self.pieces.iter().try_fold(*start, |q, piece| {
+            pace.work(N * (N + POINTS))?;
+            Ok(self.step(piece, &q, driven))
+        })
     }
 
     fn moment(&self, time_s: f64, since_entry_rad: f64, q: &[f64; N], force_n: f64) -> Moment {
@@ -295,13 +324,15 @@ impl<'a, const N: usize> Elements<'a, N> {
         }
     }
 
-    fn record(&self, start: &[f64; N]) -> Response {
+    fn record(&self, start: &[f64; N]) -> Result<Response, Failure> {
+        let mut pace = Pace::new(self.monitor);
         let mut moments = Vec::with_capacity(self.pieces.len() + 1);
         let (mut x, mut demand) = (Range::NONE, [Range::NONE; 4]);
         let (mut q, mut time) = (*start, 0.0);
         let mut at_exit = start[0];
         let mut before: Option<usize> = None;
         for (index, piece) in self.pieces.iter().enumerate() {
+            pace.work(100 * N)?;
             moments.push(self.moment(time, piece.from_rad, &q, piece.ends.0.chips_n));
             if before.is_some_and(|teeth| teeth > piece.stretch.teeth) {
                 at_exit = q[0];
@@ -337,7 +368,7 @@ impl<'a, const N: usize> Elements<'a, N> {
         if stretches.len() < 2 {
             at_exit = start[0];
         }
-        Response {
+        Ok(Response {
             moments,
             x_mm: x,
             left_n: demand[0],
@@ -347,7 +378,7 @@ impl<'a, const N: usize> Elements<'a, N> {
             x_at_entry_mm: start[0],
             x_at_exit_mm: at_exit,
             period_s: time,
-        }
+        })
     }
 
     /// Demands on the clamp force: left, right, and both without damping.

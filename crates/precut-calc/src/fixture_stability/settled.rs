@@ -1,6 +1,6 @@
 //! The forced motion as what a run in time comes to: of uneven teeth that lose the cut, or on joints that harden.
 
-use crate::calculator::{Failure, Unwatched};
+use crate::calculator::{Failure, Monitor};
 
 use super::cutting::Cutting;
 use super::floquet::Working;
@@ -21,6 +21,7 @@ pub(super) fn settled<const N: usize>(
     holding: &Holding,
     cutting: &Cutting,
     working: Working,
+    monitor: &dyn Monitor,
 ) -> Result<Option<Response>, Failure> {
     let highest = holding.modes().last().map_or(0.0, |mode| mode.natural_hz);
     let steps = count((80.0 * highest * cutting.tooth_period_s(working.spindle_rpm)).clamp(SETTLING_STEPS, 8000.0));
@@ -39,7 +40,7 @@ pub(super) fn settled<const N: usize>(
             keep_first: 0,
             keep_last: cutting.teeth,
         };
-        let run = march::<N>(holding, cutting, &plan, &Unwatched)?;
+        let run = march::<N>(holding, cutting, &plan, monitor)?;
         if run.diverged {
             return Ok(None);
         }

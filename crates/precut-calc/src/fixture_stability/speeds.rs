@@ -1,6 +1,6 @@
 //! What limits the depth at a speed, and speeds at which more can be removed.
 
-use crate::calculator::{Failure, checkpoint};
+use crate::calculator::{Failure, Monitor, checkpoint};
 
 use super::acting::Case;
 use super::answer::{NEAR_LIMIT, Study, WITHIN, forced, forced_span_mm, has_motion, removal_rate};
@@ -35,15 +35,20 @@ pub(super) struct ForcedLimits {
 }
 
 /// Limits up to `limit_mm`.
-pub(super) fn forced_limits(case: &Case, spindle_rpm: f64, limit_mm: f64) -> Result<ForcedLimits, Failure> {
+pub(super) fn forced_limits(
+    case: &Case,
+    spindle_rpm: f64,
+    limit_mm: f64,
+    monitor: &dyn Monitor,
+) -> Result<ForcedLimits, Failure> {
     let force = case.holding.clamp_force_n;
     let most = [Some(case.working.feed_mm), force, force, force.filter(|_| case.grip.is_some())];
     let at = |depth_mm: f64| -> Result<[f64; 4], Failure> {
         let working = Working { spindle_rpm, depth_mm, ..case.working };
-        if !has_motion(case, working) {
+        if !has_motion(case, working, monitor)? {
             return Ok([f64::INFINITY; 4]);
         }
-        match forced(case, working) {
+        match forced(case, working, monitor) {
             Ok(of) => {
                 let slips = |grip| Pushing::new(case, working, &of, grip).least_n(grip.friction.low);
                 let slips_n = case.grip.as_ref().map_or(0.0, slips);
@@ -145,7 +150,7 @@ fn removed_here(study: &Study<'_>, most_mm: f64) -> Result<f64, Failure> {
     // Elsewhere was looked no deeper than here.
     let chatter = match study.chatter() {
         known if known.depth_mm.is_some() || known.examined_mm >= most_mm => known,
-        _ => critical_depth(rules, &case.holding, &case.cutting, case.working, most_mm)?,
+        _ => critical_depth(rules, &case.holding, &case.cutting, case.working, most_mm, study.monitor)?,
     };
     let limit = study.speed_limit(case.working.spindle_rpm, chatter)?;
     let safe = removal_rate(case, Working { depth_mm: limit.safe_mm(), ..case.working });
@@ -161,21 +166,28 @@ fn tried(study: &Study<'_>, spindle_speed_rpm: f64, most_mm: f64) -> Result<Opti
     // The peaks of lobes are sharp: the limits are those of the speed that is read.
     let spindle_rpm = said(spindle_speed_rpm, 4, f64::round);
     let there = Working { spindle_rpm, ..case.working };
-    let chatter: ChatterLimit = critical_depth(&study.rules, &case.holding, &case.cutting, there, most_mm)?;
+    let chatter: ChatterLimit =
+        critical_depth(&study.rules, &case.holding, &case.cutting, there, most_mm, study.monitor)?;
     let limit = study.speed_limit(spindle_rpm, chatter)?;
     let safe_mm = limit.safe_mm();
     if safe_mm <= 0.0 {
         return Ok(None);
     }
     let working = Working { depth_mm: said(safe_mm, 3, f64::floor), ..there };
-    if !has_motion(case, working) {
+    if !has_motion(case, working, study.monitor)? {
         return Ok(None);
     }
-    let modulus = point(&study.rules, &case.holding, &case.cutting, working, Closed::BOTH)?.multiplier.modulus;
-    if modulus >= 1.0 || forced_span_mm(case, working).map_or(true, |span_mm| span_mm > working.feed_mm) {
+    let found = point(&study.rules, &case.holding, &case.cutting, working, Closed::BOTH, study.monitor)?;
+    let modulus = found.multiplier.modulus;
+    if modulus >= 1.0 {
         return Ok(None);
     }
-    let motion = forced(case, working)?;
+    match forced_span_mm(case, working, study.monitor) {
+        Ok(span_mm) if span_mm <= working.feed_mm => {}
+        Err(Failure::Cancelled) => return Err(Failure::Cancelled),
+        _ => return Ok(None),
+    }
+    let motion = forced(case, working, study.monitor)?;
     let opens_n = case.above_round_off_n(motion.left_n.high.max(motion.right_n.high));
     let slips_n = case.grip.as_ref().map(|grip| Pushing::new(case, working, &motion, grip).least_n(grip.friction.low));
     let clamp_n = slips_n.map_or(opens_n, |slips| slips.max(opens_n));

@@ -16,10 +16,18 @@ pub struct Solution {
 /// Solves A x = `right` from x = 0 until the residual is below `tolerance` of the right-hand side, or after `most` applications.
 ///
 /// The residual falls fast where A is the identity and few directions more. A zero right-hand side gives 0.
-pub fn gmres(right: &[f64], tolerance: f64, most: usize, mut apply: impl FnMut(&[f64]) -> Vec<f64>) -> Solution {
+///
+/// # Errors
+/// Those of `apply`, with which it ends.
+pub fn gmres<E>(
+    right: &[f64],
+    tolerance: f64,
+    most: usize,
+    mut apply: impl FnMut(&[f64]) -> Result<Vec<f64>, E>,
+) -> Result<Solution, E> {
     let whole = length(right);
     if whole <= 0.0 || !whole.is_finite() {
-        return Solution { x: vec![0.0; right.len()], residual: 0.0, steps: 0 };
+        return Ok(Solution { x: vec![0.0; right.len()], residual: 0.0, steps: 0 });
     }
     let mut basis = vec![scaled(right, 1.0 / whole)];
     // The Hessenberg matrix turned triangular column by column, the rotations that did it, and the right-hand side turned along.
@@ -31,7 +39,7 @@ pub fn gmres(right: &[f64], tolerance: f64, most: usize, mut apply: impl FnMut(&
         if turned[steps].abs() <= tolerance * whole {
             break;
         }
-        let mut next = apply(&basis[steps]);
+        let mut next = apply(&basis[steps])?;
         let before = length(&next);
         let mut column = Vec::with_capacity(steps + 2);
         for vector in &basis {
@@ -70,7 +78,7 @@ pub fn gmres(right: &[f64], tolerance: f64, most: usize, mut apply: impl FnMut(&
     for (vector, factor) in basis.iter().zip(&factors) {
         add_scaled(&mut x, *factor, vector);
     }
-    Solution { x, residual: turned[columns.len()].abs() / whole, steps: columns.len() }
+    Ok(Solution { x, residual: turned[columns.len()].abs() / whole, steps: columns.len() })
 }
 
 fn scaled(vector: &[f64], factor: f64) -> Vec<f64> {
@@ -79,7 +87,24 @@ fn scaled(vector: &[f64], factor: f64) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use std::convert::Infallible;
+
+    use super::{Solution, length};
+
+    fn gmres(right: &[f64], tolerance: f64, most: usize, mut apply: impl FnMut(&[f64]) -> Vec<f64>) -> Solution {
+        super::gmres(right, tolerance, most, |v| Ok::<_, Infallible>(apply(v))).unwrap_or_else(|never| match never {})
+    }
+
+    #[test]
+    fn an_error_ends_it() {
+        let mut applied = 0;
+        let apply = |v: &[f64]| {
+            applied += 1;
+            if applied < 2 { Ok(v.iter().rev().copied().collect()) } else { Err("no more") }
+        };
+        assert_eq!(super::gmres(&[1.0, 2.0, 4.0, 8.0], 1e-12, 9, apply), Err("no more"));
+        assert_eq!(applied, 2);
+    }
 
     /// The identity and a rank-2 part that is not symmetric.
     fn few_directions_more(vector: &[f64]) -> Vec<f64> {

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use rayon::prelude::*;
 
-use crate::calculator::{Failure, Finding, Message, Monitor, checkpoint};
+use crate::calculator::{Failure, Finding, Message, Monitor, Pace, checkpoint};
 use crate::num::roundness::{Grid, Section, least_squares};
 
 use super::causes::causes;
@@ -256,12 +256,14 @@ fn nearest(job: &Job, scene: &Scene, end: &Stance, share: Share<'_>) -> Result<S
     let points = sampled_blank(job, scene, n as usize)?;
     let total = scene.setting.revolutions + scene.setting.spark_out_revolutions;
     let part = share.part(0.4, 1.0);
-    let sampled = turn_sampled::<Failure>(&points, &scene.setting, &mut |revolution| {
+    let mut pace = Pace::new(share.monitor);
+    let mut after = |revolution: &Revolution| {
         checkpoint(share.monitor)?;
         let done = revolution.turned_revolutions;
         part.report(done / total, stage(done, total));
         Ok(())
-    })?;
+    };
+    let sampled = turn_sampled::<Failure>(&points, &scene.setting, &mut after, &mut |done| pace.work(done))?;
     let flip = |p: &Vec2| if scene.mirrored { [-p[0], p[1]] } else { *p };
     let surface = if sampled.torn {
         None

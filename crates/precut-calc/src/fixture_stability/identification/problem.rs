@@ -120,8 +120,8 @@ impl<'a> Problem<'a> {
 
     /// Multipliers of the rows of a group and its forced motion at 1 mm.
     fn linear(&self, cut: &Cut, group: &Group) -> Result<(Vec<f64>, Response), Failure> {
-        let moduli = moduli(&self.rules, &cut.holding, &cut.cutting, cut.working, &self.depths(group))?;
-        let forced = by_states!(cut.holding, response(&cut.holding, &cut.cutting, cut.working))?;
+        let moduli = moduli(&self.rules, &cut.holding, &cut.cutting, cut.working, &self.depths(group), self.monitor)?;
+        let forced = by_states!(cut.holding, response(&cut.holding, &cut.cutting, cut.working, self.monitor))?;
         Ok((moduli, forced))
     }
 

@@ -185,7 +185,8 @@ fn onsets(problem: &Problem<'_>, best: &Tried) -> Result<Vec<OnsetFit>, Failure>
             .ok_or_else(|| Failure::Internal("a job that the check refuses".to_owned()))?;
         let deepest = group.rows.iter().map(|&row| problem.job.measurements.rows()[row].depth_mm).fold(0.0, f64::max);
         let predicted_mm =
-            critical_depth(&problem.rules, &cut.holding, &cut.cutting, cut.working, 2.0 * deepest)?.depth_mm;
+            critical_depth(&problem.rules, &cut.holding, &cut.cutting, cut.working, 2.0 * deepest, problem.monitor)?
+                .depth_mm;
         let (stable, chatter) = onset_mm(problem, group);
         let above = stable.is_none_or(|depth| predicted_mm.is_none_or(|limit| limit >= depth));
         let below = chatter.is_none_or(|depth| predicted_mm.is_some_and(|limit| limit <= depth));

@@ -4,6 +4,8 @@
 //! nearly one modulus) it is restarted with the Ritz vectors of largest modulus (thick restart, Wu and Simon 2000; Stewart's
 //! Krylov-Schur decomposition, 2001, with any orthonormal basis of the kept invariant subspace in place of Schur vectors).
 
+use std::convert::Infallible;
+
 use nalgebra::{Complex, DMatrix, DVector};
 
 /// Largest Krylov space before a restart.
@@ -41,27 +43,46 @@ impl Eigenvalue {
 /// not suffice, it is restarted from its leading Ritz vectors, 40 times at most; the residual says how far it got. The zero
 /// map gives 0.
 pub fn largest(dimension: usize, power_steps: usize, tolerance: f64, mut apply: impl FnMut(&mut [f64])) -> Eigenvalue {
+    let apply = |vector: &mut [f64]| {
+        apply(vector);
+        Ok::<(), Infallible>(())
+    };
+    match largest_paced(dimension, power_steps, tolerance, apply, |_| Ok(())) {
+        Ok(found) => found,
+        Err(never) => match never {},
+    }
+}
+
+/// [`largest`] of a map that may fail, telling `work` how many multiplications it has done beside those of the map: it ends
+/// with the first error of either.
+pub fn largest_paced<E>(
+    dimension: usize,
+    power_steps: usize,
+    tolerance: f64,
+    mut apply: impl FnMut(&mut [f64]) -> Result<(), E>,
+    mut work: impl FnMut(usize) -> Result<(), E>,
+) -> Result<Eigenvalue, E> {
     let mut start = start_vector(dimension);
     for _ in 0..power_steps {
-        apply(&mut start);
+        apply(&mut start)?;
         if normalise(&mut start) <= 0.0 {
-            return Eigenvalue { re: 0.0, im: 0.0, residual: 0.0 };
+            return Ok(Eigenvalue { re: 0.0, im: 0.0, residual: 0.0 });
         }
     }
     let mut space = Krylov::new(&start);
-    let mut found = space.extend(tolerance, &mut apply);
+    let mut found = space.extend(tolerance, &mut apply, &mut work)?;
     for _ in 0..RESTARTS {
         if found.residual <= tolerance {
             break;
         }
         // Where the kept vectors are no longer what they were taken for, it begins again with the best of them.
-        if !space.sound || !space.restart() {
+        if !space.sound || !space.restart(&mut work)? {
             space = Krylov::new(&space.leader);
         }
-        found = space.extend(tolerance, &mut apply);
-        space.verify(&mut found, &mut apply);
+        found = space.extend(tolerance, &mut apply, &mut work)?;
+        space.verify(&mut found, &mut apply)?;
     }
-    found
+    Ok(found)
 }
 
 /// A fixed sequence between -1 and 1 (a linear congruential generator), normalised.
@@ -128,7 +149,12 @@ impl Krylov {
     }
 
     /// Adds vectors until the largest Ritz value has converged or the space is full.
-    fn extend(&mut self, tolerance: f64, apply: &mut impl FnMut(&mut [f64])) -> Eigenvalue {
+    fn extend<E>(
+        &mut self,
+        tolerance: f64,
+        apply: &mut impl FnMut(&mut [f64]) -> Result<(), E>,
+        work: &mut impl FnMut(usize) -> Result<(), E>,
+    ) -> Result<Eigenvalue, E> {
         let dimension = self.basis[0].len();
         let limit = LARGEST.min(dimension);
         let ld = self.basis.len();
@@ -137,9 +163,10 @@ impl Krylov {
             let (known, rest) = self.basis.split_at_mut(k + 1);
             let next = &mut rest[0];
             next.copy_from_slice(&known[k]);
-            apply(next);
+            apply(next)?;
             let before = dot(next, next).sqrt();
             for (i, v) in known.iter().enumerate() {
+                work(2 * dimension)?;
                 let h = dot(v, next);
                 self.projected[k * ld + i] = h;
                 subtract(next, h, v);
@@ -147,6 +174,7 @@ impl Krylov {
             // A second pass where most of the vector was taken away keeps the basis orthogonal to round-off.
             if dot(next, next).sqrt() < 0.7 * before {
                 for (i, v) in known.iter().enumerate() {
+                    work(2 * dimension)?;
                     let h = dot(v, next);
                     self.projected[k * ld + i] += h;
                     subtract(next, h, v);
@@ -163,16 +191,18 @@ impl Krylov {
             let tested =
                 if self.kept > 0 { self.size.is_multiple_of(TEST_EVERY) } else { self.size >= 5 && self.size % 2 == 1 };
             if below <= 0.0 || tested || self.size == limit {
+                // An eigenvalue problem of so many rows.
+                work(10 * self.size.pow(3))?;
                 let found = self.ritz(below);
                 let settled =
                     (found.modulus() - last.modulus()).abs() <= tolerance.sqrt().max(tolerance) * found.modulus();
                 if below <= 0.0 || (found.residual <= tolerance && settled) || self.size == limit {
-                    return found;
+                    return Ok(found);
                 }
                 last = found;
             }
         }
-        last
+        Ok(last)
     }
 
     /// The largest Ritz value and the residual of its pair over its modulus.
@@ -204,8 +234,12 @@ impl Krylov {
 
     /// Puts in place of the residual that of the vector itself, by applying the map to it. Kept Ritz vectors of a map that is
     /// far from normal are nearly dependent, and T is then not what the map does to them.
-    fn verify(&mut self, found: &mut Eigenvalue, apply: &mut impl FnMut(&mut [f64])) {
-        let Some(y) = ritz_vector(&self.square(), found.re, found.im) else { return };
+    fn verify<E>(
+        &mut self,
+        found: &mut Eigenvalue,
+        apply: &mut impl FnMut(&mut [f64]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let Some(y) = ritz_vector(&self.square(), found.re, found.im) else { return Ok(()) };
         let part = |of: fn(&Complex<f64>) -> f64| -> Vec<f64> {
             let mut sum = vec![0.0; self.basis[0].len()];
             for (vector, factor) in self.basis.iter().zip(y.iter().map(of)) {
@@ -215,8 +249,8 @@ impl Krylov {
         };
         let (re, im) = (part(|c| c.re), part(|c| c.im));
         let (mut moved_re, mut moved_im) = (re.clone(), im.clone());
-        apply(&mut moved_re);
-        apply(&mut moved_im);
+        apply(&mut moved_re)?;
+        apply(&mut moved_im)?;
         for p in 0..re.len() {
             moved_re[p] -= found.re * re[p] - found.im * im[p];
             moved_im[p] -= found.re * im[p] + found.im * re[p];
@@ -229,13 +263,14 @@ impl Krylov {
         }
         self.leader = re;
         normalise(&mut self.leader);
+        Ok(())
     }
 
     /// Keeps the Ritz vectors of largest modulus and the next vector; `false` where there is nothing to gain.
-    fn restart(&mut self) -> bool {
+    fn restart<E>(&mut self, work: &mut impl FnMut(usize) -> Result<(), E>) -> Result<bool, E> {
         let (size, ld) = (self.size, self.basis.len());
         if size + 1 > ld || size <= KEPT {
-            return false;
+            return Ok(false);
         }
         let square = self.square();
         let below = self.projected[(size - 1) * ld + size];
@@ -261,7 +296,7 @@ impl Krylov {
             }
         }
         if kept.is_empty() || kept.len() + 1 >= size {
-            return false;
+            return Ok(false);
         }
         let q = DMatrix::from_columns(&kept);
         let inside = q.transpose() * &square * &q;
@@ -269,6 +304,7 @@ impl Krylov {
         let dimension = self.basis[0].len();
         let mut row = vec![0.0; count];
         for place in 0..dimension {
+            work(size * count)?;
             row.fill(0.0);
             for (i, vector) in self.basis[..size].iter().enumerate() {
                 for (j, sum) in row.iter_mut().enumerate() {
@@ -288,7 +324,7 @@ impl Krylov {
             self.projected[j * ld + count] = below * q[(size - 1, j)];
         }
         (self.kept, self.size) = (count, count);
-        true
+        Ok(true)
     }
 }
 
@@ -562,21 +598,51 @@ mod tests {
                 }
             }
         };
+        fn sure<T>(result: Result<T, Infallible>) -> T {
+            result.unwrap_or_else(|never| match never {})
+        }
         // Neighbours 0.004 apart, coupled by as much: condition of the largest eigenvalue about the sum of 1/k!.
         let found = largest(150, 8, 1e-9, map(0.004));
         assert!(found.residual <= 1e-9 && (found.modulus() - 0.95).abs() < 1e-7, "{found:?}");
         // Coupled 25 times as strongly it has pseudo-eigenvalues all around: T alone would call them converged.
-        let mut apply = map(0.1);
+        let map = map(0.1);
+        let mut apply = |v: &mut [f64]| {
+            map(v);
+            Ok(())
+        };
         let mut space = Krylov::new(&start_vector(150));
-        let mut found = space.extend(1e-9, &mut apply);
+        let mut found = sure(space.extend(1e-9, &mut apply, &mut |_| Ok(())));
         for _ in 0..4 {
             let told = found;
-            space.verify(&mut found, &mut apply);
+            sure(space.verify(&mut found, &mut apply));
             assert!(space.sound || found.residual > told.residual, "{told:?} {found:?}");
-            if !space.restart() {
+            if !sure(space.restart(&mut |_| Ok(()))) {
                 break;
             }
-            found = space.extend(1e-9, &mut apply);
+            found = sure(space.extend(1e-9, &mut apply, &mut |_| Ok(())));
         }
+    }
+
+    #[test]
+    fn an_error_of_the_map_or_of_who_is_told_of_the_work_ends_it() {
+        let mut left = 20;
+        let apply = |_: &mut [f64]| {
+            left -= 1;
+            if left > 0 { Ok(()) } else { Err("map") }
+        };
+        assert_eq!(largest_paced(200, 8, 1e-9, apply, |_| Ok(())), Err("map"));
+        let mut done = 0;
+        let work = |more| {
+            done += more;
+            if done < 1_000_000 { Ok(()) } else { Err("work") }
+        };
+        let slow = |v: &mut [f64]| {
+            let last = v.len() - 1;
+            v.rotate_right(1);
+            v[last] *= 0.5;
+            Ok(())
+        };
+        assert_eq!(largest_paced(2000, 8, 1e-12, slow, work), Err("work"));
+        assert!(done < 1_000_000 + 300_000, "{done}");
     }
 }

@@ -29,11 +29,12 @@ pub(crate) struct Sampled {
 }
 
 /// Turns the points `points_mm` (body frame) by the paper's algorithm, one angular step per sample; `after` hears of every
-/// revolution and may end the run. Only the geometry of point supports and a tip is known to it.
+/// revolution, `work` of the multiplications on the way; both may end the run. Only the geometry of point supports and a tip is known to it.
 pub(crate) fn turn_sampled<E>(
     points_mm: &[Vec2],
     setting: &Setting,
     after: &mut dyn FnMut(&Revolution) -> Result<(), E>,
+    work: &mut dyn FnMut(usize) -> Result<(), E>,
 ) -> Result<Sampled, E> {
     let n = points_mm.len();
     let mut points = points_mm.to_vec();
@@ -51,7 +52,9 @@ pub(crate) fn turn_sampled<E>(
             // In the frame of the body: its points stay, the machine turns the other way.
             let (sin, cos) = phi.sin_cos();
             let into_body = |p: Vec2| [cos * p[0] + sin * p[1], -sin * p[0] + cos * p[1]];
+            work(2 * n)?;
             for _ in 0..MOST_ROUNDS {
+                work(4 * n)?;
                 let (a, b) = (into_body(sub(setting.support_a_mm, shift)), into_body(sub(setting.support_b_mm, shift)));
                 let (at_a, at_b) = (points[nearest(&points, a)], points[nearest(&points, b)]);
                 // The printed formula gives the increment of the shift, not its value.

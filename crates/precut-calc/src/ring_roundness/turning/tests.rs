@@ -86,7 +86,8 @@ fn nearest_samples_give_what_their_number_gives() {
                 [150.25 * t.cos(), 149.75 * t.sin()]
             })
             .collect();
-        let sampled = turn_sampled::<Stuck>(&points, &seed(112.5, feed, turns, 0.0), &mut |_| Ok(())).unwrap();
+        let sampled =
+            turn_sampled::<Stuck>(&points, &seed(112.5, feed, turns, 0.0), &mut |_| Ok(()), &mut |_| Ok(())).unwrap();
         assert!(!sampled.torn);
         let (x, y): (Vec<f64>, Vec<f64>) = sampled.points_mm.iter().map(|p| (p[0], p[1])).unzip();
         let section = crate::num::roundness::Section::from_points(&x, &y).unwrap();
@@ -96,7 +97,9 @@ fn nearest_samples_give_what_their_number_gives() {
     }
     let points: Vec<[f64; 2]> = (0..400_u32).map(|i| plane::direction(TAU * f64::from(i) / 400.0)).collect();
     let points: Vec<[f64; 2]> = points.iter().map(|p| [150.25 * p[0], 149.75 * p[1]]).collect();
-    let sampled = turn_sampled::<Stuck>(&points, &seed(112.5, 1.5 / 256.0, 256.0, 0.0), &mut |_| Ok(())).unwrap();
+    let sampled =
+        turn_sampled::<Stuck>(&points, &seed(112.5, 1.5 / 256.0, 256.0, 0.0), &mut |_| Ok(()), &mut |_| Ok(()))
+            .unwrap();
     assert!(sampled.torn);
 }
 
