@@ -105,6 +105,22 @@ proptest! {
         prop_assert!(there * there <= own[0] * own[1] * (1.0 + 1e-9) + 1e-11 * scale * scale);
     }
 
+    /// With the section of their blanks some segments change the compliance by no more than the bound says.
+    #[test]
+    fn blanks_change_no_more_than_the_bound(case in cases(true, 0)) {
+        let of = |state| built(&Case { state, ..case.clone() });
+        let finished = of(State::Finished);
+        let compliance = |beam: &Beam| beam.profile(&case.grid(), Wanted::default()).radial_mm_per_n;
+        let (share, before) = (finished.stock_changes_at_most(), compliance(&finished));
+        let rounding = 1e-11 * largest(&case.barely_held().radial_mm_per_n) + 1e-17;
+        let mixed = [Side::Left, Side::Right].map(|stock_side| State::Mixed { stock_side });
+        for state in [State::Stock, mixed[0], mixed[1]] {
+            for (after, before) in compliance(&of(state)).iter().zip(&before) {
+                prop_assert!((after - before).abs() <= share * before + rounding, "{before:e} becomes {after:e}");
+            }
+        }
+    }
+
     #[test]
     fn turned_end_for_end(case in cases(true, 2), force in 0.0..2000.0_f64) {
         let other = mirrored(&case);

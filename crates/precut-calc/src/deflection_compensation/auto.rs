@@ -9,20 +9,21 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::calculator::{Failure, Message, Monitor};
+use crate::num::beam::Wanted;
 
 use super::acting::Acting;
 use super::columns::uncertainty_um;
 use super::driven::Again;
 use super::grid::Grid;
 use super::input::{IncludeMode, Job, Section, Theory};
-use super::output::SecondOrder;
-use super::second_order::second_order;
+use super::model::wanted;
+use super::second_order::Estimates;
 use super::stage::{Stage, all_cuts};
 
 /// Share of the tolerance, or of the uncertainty, above which an effect acts.
 const SHARE: f64 = 0.1;
 /// Stations at which the effects are tried.
-const SAMPLES: usize = 33;
+pub(super) const SAMPLES: usize = 33;
 /// Tolerances to either side take half of that of size.
 const HALF: f64 = 0.5;
 
@@ -83,13 +84,18 @@ impl Switch {
         }
     }
 
-    fn size_um(self, sizes: &SecondOrder) -> Option<f64> {
-        match self {
-            Self::AxialMoment => sizes.axial_moment_um,
-            Self::Tangential => sizes.tangential_um,
-            Self::PartlyTurned => sizes.partly_turned_um,
-            Self::Shear => sizes.shear_um,
-        }
+    /// Largest change of the diameter by it, where that is more than the limit.
+    fn above_um(self, limit_um: f64, estimates: &Estimates<'_>) -> Result<Option<f64>, Failure> {
+        let size_um = match self {
+            Self::AxialMoment => estimates.axial_moment_um(),
+            Self::Tangential => estimates.tangential_um(),
+            Self::PartlyTurned if estimates.partly_turned_at_most_um().is_some_and(|most_um| most_um <= limit_um) => {
+                0.0
+            }
+            Self::PartlyTurned => estimates.partly_turned_um()?,
+            Self::Shear => estimates.shear_um()?,
+        };
+        Ok((size_um > limit_um).then_some(size_um))
     }
 
     fn turn_on(self, job: &mut Job) {
@@ -107,31 +113,52 @@ impl Switch {
 /// One effect changes the size of another, so all that are still open are tried again with those that act.
 pub(super) fn settled<'a>(job: &'a Job, monitor: &dyn Monitor) -> Result<(Cow<'a, Job>, Vec<Automatic>), Failure> {
     let acting = Acting::of(&job.effects, &job.conditions, job.cut.feed_direction);
-    let open = |job: &Job| Switch::ALL.into_iter().filter(|switch| switch.is_open(job, &acting)).collect::<Vec<_>>();
-    if job.include.mode == IncludeMode::AsStated || open(job).is_empty() {
+    if open(job, &acting).next().is_none() {
         return Ok((Cow::Borrowed(job), Vec::new()));
     }
     let grid = Grid::of(job);
     let sampled = grid.at(&grid.sample(SAMPLES));
     let (mut job, mut on) = (Cow::Borrowed(job), Vec::new());
     loop {
-        let still_open = open(&job);
         let (stage, _) = all_cuts(&job, &sampled, &acting, &mut |_, _, _| (), &Again(monitor))?;
-        let sizes = second_order(&job, &sampled, &acting, &stage)?;
-        let limit_um = limit_um(&job, &acting, &stage);
-        let matter = |switch: Switch| {
-            let change_um = switch.size_um(&sizes).filter(|size| *size > limit_um)?;
-            Some((switch, Automatic { effect: switch.name().to_owned(), change_um, limit_um }))
+        let still_open = || open(&job, &acting);
+        let of_job = wanted(&job);
+        let wanted = Wanted {
+            tangential: of_job.tangential || still_open().any(|switch| switch == Switch::Tangential),
+            couple: of_job.couple || still_open().any(|switch| switch == Switch::AxialMoment),
+            weight: of_job.weight,
         };
-        let found: Vec<(Switch, Automatic)> = still_open.into_iter().filter_map(matter).collect();
-        if found.is_empty() {
-            return Ok((job, on));
+        let estimates = Estimates::of(&job, &sampled, &acting, &stage, wanted)?;
+        let limit_um = limit_um(&job, &acting, &stage);
+        let mut found = Vec::new();
+        for switch in still_open() {
+            if let Some(change_um) = switch.above_um(limit_um, &estimates)? {
+                found.push((switch, Automatic { effect: switch.name().to_owned(), change_um, limit_um }));
+            }
         }
+        let turned_on = found.len();
         for (switch, automatic) in found {
             switch.turn_on(job.to_mut());
             on.push(automatic);
         }
+        if turned_on == 0 || open(&job, &acting).next().is_none() {
+            return Ok((job, on));
+        }
     }
+}
+
+/// The switches that a job leaves open.
+fn open(job: &Job, acting: &Acting) -> impl Iterator<Item = Switch> {
+    let is_left_to_us = job.include.mode == IncludeMode::Auto;
+    Switch::ALL.into_iter().filter(move |switch| is_left_to_us && switch.is_open(job, acting))
+}
+
+/// About how many cuts at [`SAMPLES`] stations are computed at most to see what acts: in every round all passes, and
+/// each effect that is still open.
+pub(super) fn cuts_tried(job: &Job) -> usize {
+    let acting = Acting::of(&job.effects, &job.conditions, job.cut.feed_direction);
+    let open = open(job, &acting).count();
+    (1..=open).map(|still_open| job.passes.len().max(1) + 1 + still_open).sum()
 }
 
 /// The smaller of the tolerances of form and size, um.

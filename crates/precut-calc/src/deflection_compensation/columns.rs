@@ -96,17 +96,31 @@ pub(super) fn uncertainty_um(job: &Job, acting: &Acting, stage: &Stage) -> Vec<f
     let Stage { line, radii, cut, .. } = stage;
     let relative = Relative::of(&job.uncertainty);
     let scatter = 2.0 * acting.scatter_mm * UM_PER_MM;
-    let radius_mm = cut.loads.along().enumerate().map(|(i, loads)| {
+    let mut of_stations = Vec::with_capacity(radii.target.len());
+    for (loads, run) in cut.loads.runs() {
+        let copying = &cut.planned_copying[run.clone()];
         if line.only_radial() {
             // All that scales is W P_y, with force and compliance alike.
-            line.compliance_mm_per_n(i) * loads.passive_n * relative.both
+            let per_compliance = loads.passive_n * relative.both;
+            let work = &line.work_mm_per_n[run];
+            let radius_mm = work.iter().map(|work| (work + line.carriage_mm_per_n) * per_compliance);
+            of_stations.extend(radius_mm.zip(copying).map(|(radius, copying)| diameter_um(radius, *copying)));
         } else {
-            relative.radius_mm(line, i, loads, at(&cut.z_mm, i), radii.target[i])
+            let radius_mm = run.map(|i| relative.radius_mm(line, i, loads, at(&cut.z_mm, i), radii.target[i]));
+            of_stations.extend(radius_mm.zip(copying).map(|(radius, copying)| diameter_um(radius, *copying)));
         }
-    });
-    let systematic =
-        radius_mm.zip(&cut.planned_copying).map(|(radius, copying)| 2.0 * radius * (1.0 - copying) * UM_PER_MM);
-    if scatter > 0.0 { systematic.map(|um| um.hypot(scatter)).collect() } else { systematic.map(f64::abs).collect() }
+    }
+    if scatter > 0.0 {
+        for um in &mut of_stations {
+            *um = um.hypot(scatter);
+        }
+    }
+    of_stations
+}
+
+/// Of the diameter, where the copying factor answers a change of the radius.
+fn diameter_um(radius_mm: f64, copying: f64) -> f64 {
+    (2.0 * radius_mm * (1.0 - copying) * UM_PER_MM).abs()
 }
 
 /// Relative standard uncertainties.

@@ -1,5 +1,7 @@
 //! One cut along the shaft: what the nominal path gives, what must be commanded.
 
+use std::ops::Range;
+
 use crate::calculator::{Failure, Monitor, checkpoint};
 
 use super::equilibrium::{Engagement, command_radius_mm, commanded_model_depth_mm, copying_factor};
@@ -90,21 +92,22 @@ impl NominalLoads {
 
     /// One entry for every station.
     pub(super) fn along(&self) -> impl Iterator<Item = &Loads> {
-        self.runs_with_length().flat_map(|(loads, length)| std::iter::repeat_n(loads, length))
+        self.runs().flat_map(|(loads, run)| std::iter::repeat_n(loads, run.len()))
     }
 
     /// One component at every station.
     pub(super) fn column(&self, component: impl Fn(&Loads) -> f64) -> Vec<f64> {
         let mut column = Vec::with_capacity(self.stations);
-        for (loads, length) in self.runs_with_length() {
-            column.extend(std::iter::repeat_n(component(loads), length));
+        for (loads, run) in self.runs() {
+            column.resize(run.end, component(loads));
         }
         column
     }
 
-    fn runs_with_length(&self) -> impl Iterator<Item = (&Loads, usize)> {
+    /// Stations in a row with the same loads.
+    pub(super) fn runs(&self) -> impl Iterator<Item = (&Loads, Range<usize>)> {
         let ends = self.runs.iter().skip(1).map(|run| run.first).chain([self.stations]);
-        self.runs.iter().zip(ends).map(|(run, end)| (&run.loads, end - run.first))
+        self.runs.iter().zip(ends).map(|(run, end)| (&run.loads, run.first..end))
     }
 }
 

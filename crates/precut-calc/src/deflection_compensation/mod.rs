@@ -157,7 +157,8 @@ impl Calculator for DeflectionCompensation {
         let passes = job.passes.len().max(1) as f64;
         // Measured: about 0.3 us per station and cut; each rest that opens and closes solves a contact problem anew.
         let contacts = job.supports.iter().filter(|s| !s.carries()).count() as f64;
-        let us = stations * (passes + 1.0) * (0.5 + 1.5 * contacts);
+        let tried = (auto::SAMPLES * auto::cuts_tried(job)) as f64;
+        let us = (stations * (passes + 1.0) + tried) * (0.5 + 1.5 * contacts);
         let bytes = 100_000 + station_count(job) as u64 * (400 + 80 * job.passes.len() as u64);
         let driver = match job.stations {
             Stations::PerZone { .. } => "/stations/count",

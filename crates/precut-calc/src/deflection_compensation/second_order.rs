@@ -25,42 +25,98 @@ const NOTICEABLE_SHARE: f64 = 0.1;
 /// Codes of the warnings about effects that were left out.
 pub(super) const WARNING_CODES: &[&str] = &["effect_left_out"];
 
-/// Largest change of the diameter by every effect of second order: the state under the same loads with it and without
-/// it, one-sided rests as they stand in each.
+/// Largest change of the diameter by every effect of second order.
 pub(super) fn second_order(job: &Job, grid: &Grid, acting: &Acting, stage: &Stage) -> Result<SecondOrder, Failure> {
-    let sample = Sample::of(grid, stage);
-    let variant = stage.variant(job, acting);
     let all = Wanted { tangential: true, couple: true, weight: true };
-    let state = State::of(job, acting, stage, &stage.structure, &sample, all)?;
-    let include = &job.include;
-    let with_include = |change: fn(&mut Include)| {
+    let estimates = Estimates::of(job, grid, acting, stage, all)?;
+    let (main, feed) = (job.force.has_main(), job.force.has_feed());
+    Ok(SecondOrder {
+        tangential_um: main.then(|| estimates.tangential_um()),
+        axial_moment_um: feed.then(|| estimates.axial_moment_um()),
+        weight_um: Some(estimates.with_include_um(|include| include.weight = !include.weight)),
+        partly_turned_um: Some(estimates.partly_turned_um()?),
+        shear_um: Some(estimates.shear_um()?),
+        thrust_ratio: (feed || job.tailstock_thrust_n.is_some()).then(|| thrust_ratio(job, &estimates.sample)),
+    })
+}
+
+/// Makes the estimates: the state under the same loads with an effect and without it, one-sided rests as they stand in
+/// each.
+pub(super) struct Estimates<'a> {
+    job: &'a Job,
+    acting: &'a Acting,
+    stage: &'a Stage,
+    sample: Sample,
+    /// The shaft as the stage has it.
+    state: State,
+}
+
+impl<'a> Estimates<'a> {
+    /// About a cut; `wanted` is what the effects of loads need that are asked for, beside what the job has.
+    pub(super) fn of(
+        job: &'a Job,
+        grid: &Grid,
+        acting: &'a Acting,
+        stage: &'a Stage,
+        wanted: Wanted,
+    ) -> Result<Self, Failure> {
+        let sample = Sample::of(grid, stage);
+        let state = State::of(job, acting, stage, &stage.structure, &sample, wanted)?;
+        Ok(Self { job, acting, stage, sample, state })
+    }
+
+    pub(super) fn tangential_um(&self) -> f64 {
+        self.with_include_um(|include| include.tangential = Some(!include.tangential()))
+    }
+
+    pub(super) fn axial_moment_um(&self) -> f64 {
+        self.with_include_um(|include| include.axial_moment = Some(!include.axial_moment()))
+    }
+
+    pub(super) fn partly_turned_um(&self) -> Result<f64, Failure> {
+        let section = self.stage.variant(self.job, self.acting).section;
+        let other = if section == Section::Mixed { Section::Finished } else { Section::Mixed };
+        self.with_structure_um(other, self.job.shaft.theory())
+    }
+
+    /// No less than [`Self::partly_turned_um`], without a structure: the compliance of a finished shaft shrinks at most
+    /// like the flexibility of its stiffest blank. `None` where more than the passive force acts.
+    pub(super) fn partly_turned_at_most_um(&self) -> Option<f64> {
+        let Self { job, stage, sample, state, .. } = self;
+        if !stage.line.only_radial() || job.include.weight || !self.acting.set_off.is_empty() {
+            return None;
+        }
+        let share = stage.structure.beam.stock_changes_at_most();
+        Some(sample.largest(|place| share * state.profile.radial_mm_per_n[place.k] * place.loads.passive_n))
+    }
+
+    pub(super) fn shear_um(&self) -> Result<f64, Failure> {
+        let other = match self.job.shaft.theory() {
+            Theory::EulerBernoulli => Theory::Timoshenko,
+            Theory::Timoshenko => Theory::EulerBernoulli,
+        };
+        self.with_structure_um(self.stage.variant(self.job, self.acting).section, other)
+    }
+
+    /// By another set of loads.
+    fn with_include_um(&self, change: fn(&mut Include)) -> f64 {
+        let include = &self.job.include;
         let mut other = include.clone();
         change(&mut other);
-        sample.largest(|place| state.moved_mm(place, &other) - state.moved_mm(place, include))
-    };
-    let change_by = |section: Section, theory: Theory| -> Result<f64, Failure> {
-        let mut other = variant;
+        self.sample.largest(|place| self.state.moved_mm(place, &other) - self.state.moved_mm(place, include))
+    }
+
+    /// By another structure.
+    fn with_structure_um(&self, section: Section, theory: Theory) -> Result<f64, Failure> {
+        let Self { job, acting, stage, sample, state } = self;
+        let mut other = stage.variant(job, acting);
         other.section = section;
         other.theory = theory;
         let structure = Structure::of(job, &other)?;
-        let changed = State::of(job, acting, stage, &structure, &sample, wanted(job))?;
+        let changed = State::of(job, acting, stage, &structure, sample, wanted(job))?;
+        let include = &job.include;
         Ok(sample.largest(|place| changed.moved_mm(place, include) - state.moved_mm(place, include)))
-    };
-    let other_theory = match job.shaft.theory() {
-        Theory::EulerBernoulli => Theory::Timoshenko,
-        Theory::Timoshenko => Theory::EulerBernoulli,
-    };
-    let section = variant.section;
-    let other_section = if section == Section::Mixed { Section::Finished } else { Section::Mixed };
-    let (main, feed) = (job.force.has_main(), job.force.has_feed());
-    Ok(SecondOrder {
-        tangential_um: main.then(|| with_include(|include| include.tangential = Some(!include.tangential()))),
-        axial_moment_um: feed.then(|| with_include(|include| include.axial_moment = Some(!include.axial_moment()))),
-        weight_um: Some(with_include(|include| include.weight = !include.weight)),
-        partly_turned_um: Some(change_by(other_section, job.shaft.theory())?),
-        shear_um: Some(change_by(section, other_theory)?),
-        thrust_ratio: (feed || job.tailstock_thrust_n.is_some()).then(|| thrust_ratio(job, &sample)),
-    })
+    }
 }
 
 /// A held shaft at the stations of a sample.

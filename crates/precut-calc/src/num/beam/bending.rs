@@ -20,25 +20,22 @@ pub(super) struct Bending<'a> {
 /// Moment and shear over an interval.
 #[derive(Clone, Copy)]
 struct Course {
-    moment: Form,
-    shear: Form,
+    moment: Form<3>,
+    shear: Form<2>,
 }
 
 impl Course {
     fn of(diagram: &Diagram) -> Self {
-        Self {
-            moment: Form::new(&diagram.ends).plus(Form::new(&[0.0, 4.0 * diagram.bulge, 0.0])),
-            shear: Form::new(&diagram.shear),
-        }
+        Self { moment: Form([0.0, 4.0 * diagram.bulge, 0.0]).plus(Form(diagram.ends)), shear: Form(diagram.shear) }
     }
 }
 
 impl Bending<'_> {
     /// Generalised reaction of the base to a unit force at the tool.
-    pub(super) fn reaction(&self, k: usize, generalised: usize) -> Form {
+    pub(super) fn reaction(&self, k: usize, generalised: usize) -> Form<2> {
         let interval = &self.frame.intervals[k];
         let at = |z: f64| self.frame.base.reactions(Load { z, couple: false })[generalised];
-        Form::new(&[at(interval.start), at(interval.end)])
+        Form([at(interval.start), at(interval.end)])
     }
 
     /// Generalised reactions of the base to a unit couple at the tool; the same everywhere.
@@ -47,85 +44,115 @@ impl Bending<'_> {
     }
 
     /// Displacement and rotation at the tool by a unit force there, from one side of the tool.
-    pub(super) fn by_force(&self, k: usize, side: Side) -> [Form; 2] {
+    #[inline]
+    pub(super) fn by_force(&self, k: usize, side: Side) -> (Form<6>, Form<5>) {
         let interval = &self.frame.intervals[k];
+        let overhang = |gram| {
+            let (displacement, rotation) = cantilever(gram, interval.length, interval.section(side), side);
+            (displacement.raised(), rotation.raised())
+        };
         match (interval.zone, side) {
             (Zone::Span, _) => {
-                let reaction = self.reaction(k, usize::from(side == Side::Right));
-                let functional = self.functional(k, side);
+                let end = usize::from(side == Side::Right);
+                let (reaction, (moment, shear)) = (self.reaction(k, end), self.functional(k, side));
                 let held = self.table(side).gram(node(k, side))[0];
-                let work = self.running(k, side, &functional, &functional, held).times(&reaction);
-                [work.times(&reaction), work.scaled(self.couple_reactions()[usize::from(side == Side::Right)])]
+                let (bending, shearing) = (moment.times::<2, 3>(moment), Form([shear * shear]));
+                let work: Form<5> = self.running::<3, 1, 4>(k, side, bending, shearing, held).times(reaction);
+                (work.times(reaction), work.scaled(self.couple_reactions()[end]))
             }
-            (Zone::Right, Side::Left) => cantilever(self.left.gram(k), interval.length, interval.section(side), side),
-            (Zone::Left, Side::Right) => {
-                cantilever(self.right.gram(k + 1), interval.length, interval.section(side), side)
-            }
-            (Zone::Left, Side::Left) | (Zone::Right, Side::Right) => [Form::new(&[0.0]); 2],
+            (Zone::Right, Side::Left) => overhang(self.left.gram(k)),
+            (Zone::Left, Side::Right) => overhang(self.right.gram(k + 1)),
+            (Zone::Left, Side::Left) | (Zone::Right, Side::Right) => (Form::ZERO, Form::ZERO),
         }
     }
 
     /// Displacement and rotation at the tool by a unit load of a fixed unknown (or by the weight), from one side.
-    pub(super) fn by_column(&self, k: usize, side: Side, column: usize) -> [Form; 2] {
+    pub(super) fn by_column(&self, k: usize, side: Side, column: usize) -> (Form<6>, Form<5>) {
         match (self.frame.intervals[k].zone, side) {
             (Zone::Span, _) => {
                 let end = usize::from(side == Side::Right);
                 let held = self.table(side).column(node(k, side), column)[0];
-                let course = Course::of(self.frame.diagram(k, column, side));
-                let work = self.running(k, side, &self.functional(k, side), &course, held);
-                [work.times(&self.reaction(k, end)), work.scaled(self.couple_reactions()[end])]
+                let (course, (moment, shear)) =
+                    (Course::of(self.frame.diagram(k, column, side)), self.functional(k, side));
+                let (bending, shearing) = (moment.times::<3, 4>(course.moment), course.shear.scaled(shear));
+                let work: Form<5> = self.running(k, side, bending, shearing, held);
+                (work.times(self.reaction(k, end)), work.scaled(self.couple_reactions()[end]))
             }
-            (Zone::Right, Side::Left) | (Zone::Left, Side::Right) => self.curve(k, side, column),
-            (Zone::Left, Side::Left) | (Zone::Right, Side::Right) => [Form::new(&[0.0]); 2],
+            (Zone::Right, Side::Left) | (Zone::Left, Side::Right) => {
+                let (displacement, rotation) = self.curve(k, side, column);
+                (displacement.raised().plus(self.bow(k, side, column)), rotation.raised())
+            }
+            (Zone::Left, Side::Left) | (Zone::Right, Side::Right) => (Form::ZERO, Form::ZERO),
         }
     }
 
     /// Work of two fixed diagrams on one side of the tool.
-    pub(super) fn pair(&self, k: usize, side: Side, i: usize, j: usize) -> Form {
+    pub(super) fn pair(&self, k: usize, side: Side, i: usize, j: usize) -> Form<6> {
         let course = |column| Course::of(self.frame.diagram(k, column, side));
-        self.running(k, side, &course(i), &course(j), self.table(side).pair(node(k, side), i, j))
+        let (a, b) = (course(i), course(j));
+        let (bending, shearing) = (a.moment.times::<3, 5>(b.moment), a.shear.times::<2, 3>(b.shear));
+        self.running(k, side, bending, shearing, self.table(side).pair(node(k, side), i, j))
     }
 
-    /// Displacement and rotation along the interval by a unit load of a fixed unknown, or by the weight: where one
-    /// section is in force on both sides, or one side gives all.
-    pub(super) fn curve(&self, k: usize, side: Side, column: usize) -> [Form; 2] {
+    /// Displacement and rotation along the interval by a unit load of a fixed unknown, or by the weight less its
+    /// [`Self::bow`]: where one section is in force on both sides, or one side gives all.
+    #[inline]
+    pub(super) fn curve(&self, k: usize, side: Side, column: usize) -> (Form<4>, Form<3>) {
         let (start, end) = (self.state(k, column), self.state(k + 1, column));
         let interval = &self.frame.intervals[k];
-        let section = interval.section(side);
-        let diagram = self.frame.diagram(k, column, side);
-        let bubble =
-            interval.length * section.bending_flexibility_per_n_mm2 * (diagram.ends[1] - diagram.ends[0]) / 2.0;
-        [
-            deflection([start[0], end[0]], interval.length, section, diagram),
-            Form::new(&[start[1], end[1]]).plus(Form::new(&[0.0, bubble, 0.0])),
-        ]
+        let (h, bend) = (interval.length, interval.section(side).bending_flexibility_per_n_mm2);
+        let [a, b] = self.frame.diagram(k, column, side).ends;
+        // The chord, and bending by the chord of the moments: vanishes at an end where the displacement is zero to full
+        // relative accuracy.
+        let cubic = h * h * bend / 6.0;
+        let bubble = h * bend * (b - a) / 2.0;
+        (
+            Form([0.0, cubic * (2.0 * a + b), cubic * (a + 2.0 * b), 0.0]).plus(Form([start[0], end[0]])),
+            Form([0.0, bubble, 0.0]).plus(Form([start[1], end[1]])),
+        )
+    }
+
+    /// What a distributed load adds to the deflection curve between two break points.
+    pub(super) fn bow(&self, k: usize, side: Side, column: usize) -> Form<5> {
+        let interval = &self.frame.intervals[k];
+        let (h, section, bulge) = (interval.length, interval.section(side), self.frame.diagram(k, column, side).bulge);
+        // The bulge is q h²/8: q h⁴ / 24 EJ (xi eta + xi² eta²) of bending, q h² / 2 kGA xi eta of shear.
+        let bow = bulge * h * h * section.bending_flexibility_per_n_mm2 / 3.0;
+        let shear = 4.0 * bulge * section.shear_flexibility_per_n;
+        Form([0.0, 0.0, bow, 0.0, 0.0]).plus(Form([0.0, bow + shear, 0.0]))
     }
 
     fn table(&self, side: Side) -> &Tables {
         if side == Side::Left { self.left } else { self.right }
     }
 
-    /// Diagram of a unit reaction of the near support, in the span.
-    fn functional(&self, k: usize, side: Side) -> Course {
+    /// Moment and shear by a unit reaction of the near support, in the span.
+    fn functional(&self, k: usize, side: Side) -> (Form<2>, f64) {
         let (interval, base) = (&self.frame.intervals[k], &self.frame.base);
-        let (ends, shear) = match side {
-            Side::Left => ([interval.start - base.p, interval.end - base.p], 1.0),
-            Side::Right => ([base.q - interval.start, base.q - interval.end], -1.0),
-        };
-        Course { moment: Form::new(&ends), shear: Form::new(&[shear]) }
+        match side {
+            Side::Left => (Form([interval.start - base.p, interval.end - base.p]), 1.0),
+            Side::Right => (Form([base.q - interval.start, base.q - interval.end]), -1.0),
+        }
     }
 
-    /// The work of two diagrams up to the tool: what was held before the interval, and its part.
-    fn running(&self, k: usize, side: Side, a: &Course, b: &Course, held: f64) -> Form {
+    /// The work of two diagrams up to the tool, from the products of their moments and of their shears: what was held
+    /// before the interval, and its part.
+    #[inline]
+    fn running<const M: usize, const S: usize, const R: usize>(
+        &self,
+        k: usize,
+        side: Side,
+        moments: Form<M>,
+        shears: Form<S>,
+        held: f64,
+    ) -> Form<R> {
         let interval = &self.frame.intervals[k];
         let section = interval.section(side);
-        let bend = interval.length * section.bending_flexibility_per_n_mm2;
-        let mut density = a.moment.times(&b.moment).scaled(bend);
+        let mut density = moments.scaled(interval.length * section.bending_flexibility_per_n_mm2);
         if section.shear_flexibility_per_n > 0.0 {
-            let shear = interval.length * section.shear_flexibility_per_n;
-            density = density.plus(a.shear.times(&b.shear).scaled(shear));
+            density = density.plus(shears.scaled(interval.length * section.shear_flexibility_per_n));
         }
-        density.accumulated(side).plus(Form::new(&[held]))
+        density.accumulated::<R>(side).plus(Form([held]))
     }
 
     /// Displacement and rotation at a break point by a fixed load. Inside the span only for a shaft of one section.
@@ -151,35 +178,13 @@ fn node(k: usize, side: Side) -> usize {
 
 /// Displacement and rotation of a point on an overhang by a unit force there: the compliance of the place where the
 /// interval is held, carried to the point, and the interval's own. `side`: on which side of the point it is held.
-fn cantilever(gram: [f64; 3], h: f64, section: &Section, side: Side) -> [Form; 2] {
+fn cantilever(gram: [f64; 3], h: f64, section: &Section, side: Side) -> (Form<4>, Form<3>) {
     let [vv, vt, tt] = gram;
     let (vt, sign) = if side == Side::Left { (vt, 1.0) } else { (-vt, -1.0) };
-    let along = |coefficients: &mut [f64]| {
-        if side == Side::Right {
-            coefficients.reverse();
-        }
-        Form::new(coefficients)
-    };
     let bend = section.bending_flexibility_per_n_mm2;
-    let displacement = along(&mut [vv, vv + h * (2.0 * vt + section.shear_flexibility_per_n)])
-        .plus(along(&mut [0.0, 0.0, h * h * tt]))
-        .plus(along(&mut [0.0, 0.0, 0.0, h * h * h * bend / 3.0]));
-    let rotation = along(&mut [vt, vt + h * tt]).plus(along(&mut [0.0, 0.0, h * h * bend / 2.0]));
-    [displacement, rotation.scaled(sign)]
-}
-
-/// The deflection curve between two break points: chord, bending by the chord of the moments, and by a distributed
-/// load. Of degree three, with the latter four; vanishes at an end where the displacement is zero to full relative accuracy.
-fn deflection(ends: [f64; 2], h: f64, section: &Section, diagram: &Diagram) -> Form {
-    let bend = section.bending_flexibility_per_n_mm2;
-    let [a, b] = diagram.ends;
-    let cubic = h * h * bend / 6.0;
-    let mut curve = Form::new(&ends).plus(Form::new(&[0.0, cubic * (2.0 * a + b), cubic * (a + 2.0 * b), 0.0]));
-    if diagram.bulge.abs() > 0.0 {
-        // The bulge is q h²/8: q h⁴ / 24 EJ (xi eta + xi² eta²) of bending, q h² / 2 kGA xi eta of shear.
-        let bow = diagram.bulge * h * h * bend / 3.0;
-        let shear = 4.0 * diagram.bulge * section.shear_flexibility_per_n;
-        curve = curve.plus(Form::new(&[0.0, bow + shear, 0.0])).plus(Form::new(&[0.0, 0.0, bow, 0.0, 0.0]));
-    }
-    curve
+    let displacement = Form([0.0, 0.0, 0.0, h * h * h * bend / 3.0])
+        .plus(Form([vv, vv + h * (2.0 * vt + section.shear_flexibility_per_n)]))
+        .plus(Form([0.0, 0.0, h * h * tt]));
+    let rotation = Form([0.0, 0.0, h * h * bend / 2.0]).plus(Form([vt, vt + h * tt])).scaled(sign);
+    if side == Side::Left { (displacement, rotation) } else { (displacement.mirrored(), rotation.mirrored()) }
 }

@@ -11,93 +11,84 @@ const ORDINALS: [f64; DEGREE + 1] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
 /// The highest degree that occurs: compliance less the squares of cubic influence functions.
 const DEGREE: usize = 6;
 
-/// Coefficients raised to the common degree, ready to be sampled.
-pub(super) type Raised = [f64; DEGREE + 1];
-
-/// A form of degree 0..=6.
+/// A form of degree `N - 1`, by its coefficients.
+///
+/// The degree belongs to the type: the few operations on forms are then straight lines of code.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Form {
-    coefficients: Raised,
-    degree: usize,
-}
+pub(super) struct Form<const N: usize>(pub(super) [f64; N]);
 
-impl Form {
-    /// From its coefficients; at most seven.
-    pub(super) fn new(given: &[f64]) -> Self {
-        let mut coefficients = [0.0; DEGREE + 1];
-        coefficients[..given.len()].copy_from_slice(given);
-        Self { coefficients, degree: given.len() - 1 }
+/// A form of the common degree, ready to be sampled.
+pub(super) type Raised = Form<{ DEGREE + 1 }>;
+
+impl<const N: usize> Form<N> {
+    pub(super) const ZERO: Self = Self([0.0; N]);
+
+    /// The same function, of a higher degree: times a power of `xi + eta`.
+    #[inline]
+    pub(super) fn raised<const M: usize>(self) -> Form<M> {
+        const { assert!(N <= M) };
+        let mut coefficients = [0.0; M];
+        coefficients[..N].copy_from_slice(&self.0);
+        for count in N..M {
+            for k in (0..count).rev() {
+                coefficients[k + 1] += coefficients[k];
+            }
+        }
+        Form(coefficients)
     }
 
-    /// The same function, one degree higher: times `xi + eta`.
-    fn lifted(mut self) -> Self {
-        for k in (0..=self.degree).rev() {
-            self.coefficients[k + 1] += self.coefficients[k];
-        }
-        self.degree += 1;
-        self
-    }
-
-    /// The coefficients at the common degree.
-    pub(super) fn raised(mut self) -> Raised {
-        while self.degree < DEGREE {
-            self = self.lifted();
-        }
-        self.coefficients
-    }
-
-    /// Sum of two forms of any degree.
-    pub(super) fn plus(mut self, mut other: Self) -> Self {
-        while self.degree < other.degree {
-            self = self.lifted();
-        }
-        while other.degree < self.degree {
-            other = other.lifted();
-        }
-        for (mine, theirs) in self.coefficients.iter_mut().zip(&other.coefficients) {
+    /// Sum with a form of at most this degree.
+    #[inline]
+    pub(super) fn plus<const M: usize>(mut self, other: Form<M>) -> Self {
+        for (mine, theirs) in self.0.iter_mut().zip(other.raised::<N>().0) {
             *mine += theirs;
         }
         self
     }
 
-    /// Product; the degrees must add up to at most six.
-    pub(super) fn times(&self, other: &Self) -> Self {
-        let mut coefficients = [0.0; DEGREE + 1];
-        for (i, mine) in self.coefficients[..=self.degree].iter().enumerate() {
-            for (j, theirs) in other.coefficients[..=other.degree].iter().enumerate() {
+    /// Product; the degrees add up.
+    #[inline]
+    pub(super) fn times<const M: usize, const R: usize>(self, other: Form<M>) -> Form<R> {
+        const { assert!(R + 1 == N + M) };
+        let mut coefficients = [0.0; R];
+        for (i, mine) in self.0.iter().enumerate() {
+            for (j, theirs) in other.0.iter().enumerate() {
                 coefficients[i + j] += mine * theirs;
             }
         }
-        Self { coefficients, degree: self.degree + other.degree }
+        Form(coefficients)
     }
 
     /// The integral over `xi` from the start to the place, or with `Side::Right` from the place to the end: running sums
-    /// of the coefficients in Bernstein's basis. The degree must be below six.
-    pub(super) fn accumulated(mut self, side: Side) -> Self {
-        let degree = self.degree;
-        if side == Side::Right {
-            self.coefficients[..=degree].reverse();
-        }
-        let mut coefficients = [0.0; DEGREE + 1];
+    /// of the coefficients in Bernstein's basis.
+    #[inline]
+    pub(super) fn accumulated<const R: usize>(self, side: Side) -> Form<R> {
+        const { assert!(R == N + 1 && N <= DEGREE) };
+        let place = |k: usize, count: usize| if side == Side::Left { k } else { count - 1 - k };
+        let mut coefficients = [0.0; R];
         let mut sum = 0.0;
         // Binomial coefficients of this degree and of the next one.
         let (mut own, mut next) = (1.0, 1.0);
-        let size = ORDINALS[degree + 1];
-        for k in 0..=degree {
-            sum += self.coefficients[k] / own;
+        let size = ORDINALS[N];
+        for k in 0..N {
+            sum += self.0[place(k, N)] / own;
             own *= (size - 1.0 - ORDINALS[k]) / ORDINALS[k + 1];
             next *= (size - ORDINALS[k]) / ORDINALS[k + 1];
-            coefficients[k + 1] = next * sum / size;
+            coefficients[place(k + 1, R)] = next * sum / size;
         }
-        if side == Side::Right {
-            coefficients[..=degree + 1].reverse();
-        }
-        Self { coefficients, degree: degree + 1 }
+        Form(coefficients)
+    }
+
+    /// With the ends of the interval exchanged.
+    pub(super) fn mirrored(mut self) -> Self {
+        self.0.reverse();
+        self
     }
 
     /// Multiplied by a number.
+    #[inline]
     pub(super) fn scaled(mut self, factor: f64) -> Self {
-        for coefficient in &mut self.coefficients {
+        for coefficient in &mut self.0 {
             *coefficient *= factor;
         }
         self
@@ -116,7 +107,7 @@ pub(super) struct Span {
 ///
 /// Both coordinates are formed by themselves, so that each is exactly 0 at its end.
 pub(super) fn sample(form: &Raised, span: Span, places: &[f64], into: &mut Vec<f64>) {
-    let [c0, c1, c2, c3, c4, c5, c6] = *form;
+    let Form([c0, c1, c2, c3, c4, c5, c6]) = *form;
     let Span { start, end, inverse_length } = span;
     into.extend(places.iter().map(|&place| {
         let xi = (place - start) * inverse_length;
@@ -130,7 +121,7 @@ pub(super) fn sample(form: &Raised, span: Span, places: &[f64], into: &mut Vec<f
 mod tests {
     use super::*;
 
-    fn value(form: Form, xi: f64) -> f64 {
+    fn value<const N: usize>(form: Form<N>, xi: f64) -> f64 {
         let mut out = Vec::new();
         sample(&form.raised(), Span { start: 0.0, end: 1.0, inverse_length: 1.0 }, &[xi], &mut out);
         out[0]
@@ -139,18 +130,18 @@ mod tests {
     #[test]
     fn integrals_agree_with_powers() {
         // xi³ + 2 xi² eta - eta³ over xi, by hand: 1 - 3 xi + 3 xi² ... collected in powers of xi.
-        let form = Form::new(&[-1.0, 0.0, 2.0, 1.0]);
+        let form = Form([-1.0, 0.0, 2.0, 1.0]);
         let power = |x: f64| -x + 1.5 * x * x - x.powi(3) / 3.0;
         for step in 0..=4 {
             let x = f64::from(step) / 4.0;
-            assert!((value(form.accumulated(Side::Left), x) - power(x)).abs() < 1e-15);
-            assert!((value(form.accumulated(Side::Right), x) - power(1.0) + power(x)).abs() < 1e-15);
+            assert!((value(form.accumulated::<5>(Side::Left), x) - power(x)).abs() < 1e-15);
+            assert!((value(form.accumulated::<5>(Side::Right), x) - power(1.0) + power(x)).abs() < 1e-15);
         }
     }
 
     #[test]
     fn arithmetic_agrees_with_values() {
-        let (a, b) = (Form::new(&[1.0, -2.0, 0.5]), Form::new(&[0.3, 4.0, 1.0, -2.0]));
+        let (a, b) = (Form([1.0, -2.0, 0.5]), Form([0.3, 4.0, 1.0, -2.0]));
         for step in 0..=8 {
             let xi = f64::from(step) / 8.0;
             let eta = 1.0 - xi;
@@ -158,8 +149,8 @@ mod tests {
             let vb = 0.3 * eta.powi(3) + 4.0 * xi * eta * eta + xi * xi * eta - 2.0 * xi.powi(3);
             // A dozen operations on numbers of order one.
             assert!((value(a, xi) - va).abs() < 1e-14);
-            assert!((value(a.plus(b), xi) - va - vb).abs() < 1e-14);
-            assert!((value(a.times(&b).scaled(2.0), xi) - 2.0 * va * vb).abs() < 1e-13);
+            assert!((value(b.plus(a), xi) - va - vb).abs() < 1e-14);
+            assert!((value(a.times::<4, 6>(b).scaled(2.0), xi) - 2.0 * va * vb).abs() < 1e-13);
         }
     }
 }

@@ -229,19 +229,20 @@ pub(super) struct Frame {
     pub(super) base: Base,
     /// Unit loads that stand still: what the redundants do.
     pub(super) loads: Vec<Load>,
-    /// Base reactions of each load, and last those of the weight of the section left of the tool.
+    /// Base reactions of each load, and last in a weighed frame those of the weight of the section left of the tool.
     pub(super) reactions: Vec<[f64; 2]>,
     /// By interval, then by load.
     diagrams: Vec<Diagram>,
-    /// Weight over the whole shaft of the sections that are in force left and right of the tool; by interval.
+    /// In a weighed frame, weight over the whole shaft of the sections that are in force left and right of the tool; by
+    /// interval.
     weights: [Vec<Diagram>; 2],
 }
 
 impl Frame {
-    /// Break points at the steps, the ends, and `places`, all of which lie on the shaft.
+    /// Break points at the steps, the ends, and `places`, all of which lie on the shaft; without the weight.
     pub(super) fn new(segments: &[Segment], length_mm: f64, base: Base, loads: Vec<Load>, state: State) -> Self {
         let intervals = divide(segments, length_mm, &base, &loads, state);
-        let mut reactions: Vec<_> = loads.iter().map(|load| base.reactions(*load)).collect();
+        let reactions = loads.iter().map(|load| base.reactions(*load)).collect();
         let mut diagrams = Vec::with_capacity(intervals.len() * loads.len());
         for interval in &intervals {
             for load in &loads {
@@ -250,15 +251,32 @@ impl Frame {
                 diagrams.push(Diagram { ends, bulge: 0.0, shear: [shear; 2] });
             }
         }
-        let (left, weight_reactions) = weigh(&intervals, &base, Side::Left);
-        let (right, _) = weigh(&intervals, &base, Side::Right);
-        reactions.push(weight_reactions);
-        Self { intervals, base, loads, reactions, diagrams, weights: [left, right] }
+        Self { intervals, base, loads, reactions, diagrams, weights: [Vec::new(), Vec::new()] }
+    }
+
+    /// The same with the weight: few ask for it.
+    pub(super) fn weighed(&self) -> Self {
+        let mut frame = self.clone();
+        let (left, reactions) = weigh(&self.intervals, &self.base, Side::Left);
+        let (right, _) = weigh(&self.intervals, &self.base, Side::Right);
+        frame.reactions.push(reactions);
+        frame.weights = [left, right];
+        frame
+    }
+
+    /// Whether the weight is among the diagrams.
+    pub(super) fn is_weighed(&self) -> bool {
+        self.reactions.len() > self.loads.len()
     }
 
     /// Number of fixed unit loads.
     pub(super) fn columns(&self) -> usize {
         self.loads.len()
+    }
+
+    /// Number of diagrams: the fixed unit loads, and in a weighed frame the weight.
+    pub(super) fn width(&self) -> usize {
+        self.reactions.len()
     }
 
     /// Diagram of a fixed load over an interval; the index after the last load is the weight.

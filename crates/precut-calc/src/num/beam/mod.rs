@@ -60,11 +60,8 @@ pub struct Beam {
     /// Follow rests: index of the support and offset from the tool, mm.
     follow: Vec<(usize, f64)>,
     radial: Plane,
-    tangential: Plane,
-    /// The stock's section counts everywhere.
-    stock: bool,
-    /// The section changes with the tool.
-    changing: bool,
+    /// [`State::Mixed`] only where the sections differ.
+    state: State,
     /// Where nothing but the load moves with the tool.
     steady: Option<Steady>,
 }
@@ -73,7 +70,6 @@ pub struct Beam {
 #[derive(Debug, Clone)]
 struct Steady {
     radial: Factor,
-    tangential: Factor,
     /// Radial compliance, by interval.
     compliance: Vec<Raised>,
 }
@@ -106,6 +102,11 @@ impl Beam {
         let (unknowns, mut loads) = plane::fixed_unknowns(supports, &base);
         loads.extend(probe.map(|z| frame::Load { z: z.clamp(0.0, length_mm), couple: false }));
         let frame = Frame::new(segments, length_mm, base, loads, state);
+        Ok(Self::on(frame, segments.to_vec(), supports.to_vec(), unknowns, state))
+    }
+
+    /// With the works of a frame.
+    fn on(frame: Frame, segments: Vec<Segment>, supports: Vec<Support>, unknowns: Vec<Unknown>, state: State) -> Self {
         let left = Tables::new(&frame, Side::Left);
         let right = Tables::new(&frame, Side::Right);
         let follow: Vec<(usize, f64)> = supports
@@ -116,24 +117,25 @@ impl Beam {
                 _ => None,
             })
             .collect();
-        let radial = Plane::new(Direction::Radial, supports, &unknowns, &frame, &follow);
-        let tangential = Plane::new(Direction::Tangential, supports, &unknowns, &frame, &follow);
-        let mut beam = Self {
-            segments: segments.to_vec(),
-            supports: supports.to_vec(),
-            frame,
-            left,
-            right,
-            unknowns,
-            follow,
-            radial,
-            tangential,
-            stock: state == State::Stock,
-            changing,
-            steady: None,
-        };
+        let radial = Plane::new(Direction::Radial, &supports, &unknowns, &frame, &follow);
+        let mut beam = Self { segments, supports, frame, left, right, unknowns, follow, radial, state, steady: None };
         beam.steady = beam.settle();
-        Ok(beam)
+        beam
+    }
+
+    /// The same with the weight among the loads.
+    fn weighed(&self) -> Self {
+        let Self { segments, supports, unknowns, .. } = self.clone();
+        Self::on(self.frame.weighed(), segments, supports, unknowns, self.state)
+    }
+
+    /// The section changes with the tool.
+    fn is_changing(&self) -> bool {
+        matches!(self.state, State::Mixed { .. })
+    }
+
+    fn tangential(&self) -> Plane {
+        Plane::new(Direction::Tangential, &self.supports, &self.unknowns, &self.frame, &self.follow)
     }
 
     /// Length of the shaft, mm.
@@ -141,17 +143,33 @@ impl Beam {
         self.frame.intervals.last().map_or(0.0, |interval| interval.end)
     }
 
+    /// By what share of itself the compliance of a finished shaft changes at most at any place, whichever segments have
+    /// the blank's section instead.
+    ///
+    /// The compliance is the least complementary energy: with all flexibilities scaled by a factor it lies between itself
+    /// and as many times itself, since the supports keep theirs. So the segment whose two sections differ most decides.
+    pub fn stock_changes_at_most(&self) -> f64 {
+        let ratio = |of: fn(&Section) -> f64, segment: &Segment| {
+            let (stock, finished) = (of(&segment.stock), of(&segment.finished));
+            if finished > 0.0 { (stock / finished - 1.0).abs() } else { 0.0 }
+        };
+        let bending = |segment| ratio(|section| section.bending_flexibility_per_n_mm2, segment);
+        let shear = |segment| ratio(|section| section.shear_flexibility_per_n, segment);
+        self.segments.iter().map(|segment| bending(segment).max(shear(segment))).fold(0.0, f64::max)
+    }
+
     fn settle(&self) -> Option<Steady> {
-        if !self.follow.is_empty() || (self.changing && self.frame.columns() > 0) {
+        if !self.follow.is_empty() || (self.is_changing() && self.frame.columns() > 0) {
             return None;
         }
+        let radial = self.factor(&self.radial);
+        let compliance = self.pieces(&self.radial, &radial).compliances();
+        Some(Steady { radial, compliance })
+    }
+
+    fn factor(&self, plane: &Plane) -> Factor {
         let end = self.frame.intervals.len();
-        let pair = |i: usize, j: usize| self.left.pair(end, i, j);
-        let radial = Factor::new(&self.frame, &self.radial, pair);
-        let tangential = Factor::new(&self.frame, &self.tangential, pair);
-        let pieces = self.pieces(&self.radial, &radial);
-        let compliance = (0..end).map(|k| pieces.compliance(k)).collect();
-        Some(Steady { radial, tangential, compliance })
+        Factor::new(&self.frame, plane, |i, j| self.left.pair(end, i, j))
     }
 
     fn bending(&self) -> Bending<'_> {

@@ -66,8 +66,8 @@ pub(super) struct Plane {
     pub(super) redundants: Vec<usize>,
     /// The follow rests that hold both ways.
     pub(super) bilateral_follow: Vec<usize>,
-    /// By break point: a rigid support that holds both ways stands there.
-    rigid: Vec<bool>,
+    /// Break points at which a rigid support stands that holds both ways.
+    rigid: Vec<usize>,
     /// A rigid follow rest that holds both ways stands at the tool.
     rigid_at_tool: bool,
 }
@@ -99,16 +99,13 @@ impl Plane {
         let bilateral_follow: Vec<usize> =
             (0..follow.len()).filter(|&i| direction.holds(&supports[follow[i].0])).collect();
         let follow_compliance: Vec<f64> = follow.iter().map(|&(i, _)| direction.compliance(&supports[i])).collect();
-        let mut rigid = vec![false; frame.intervals.len() + 1];
         let stiff = |compliance: f64| compliance <= 0.0;
-        for support in
-            supports.iter().filter(|support| direction.holds(support) && stiff(direction.compliance(support)))
-        {
-            if let Some(z) = support.fixed_z_mm() {
-                let node = frame.intervals.partition_point(|interval| interval.start < z);
-                rigid[node] = true;
-            }
-        }
+        let node = |z: f64| frame.intervals.partition_point(|interval| interval.start < z);
+        let rigid = supports
+            .iter()
+            .filter(|support| direction.holds(support) && stiff(direction.compliance(support)))
+            .filter_map(|support| support.fixed_z_mm().map(node))
+            .collect();
         let rigid_at_tool = bilateral_follow.iter().any(|&i| stiff(follow_compliance[i]) && follow[i].1.abs() <= 0.0);
         Self {
             base: [direction.compliance(first), second],
@@ -123,15 +120,15 @@ impl Plane {
 
     /// A rigid support that holds both ways stands at the break point.
     pub(super) fn is_rigid(&self, node: usize) -> bool {
-        self.rigid[node]
+        self.rigid.contains(&node)
     }
 
     /// The tool stands, in this interval, on a rigid support that holds both ways.
     pub(super) fn holds_tool(&self, frame: &Frame, interval: usize, place: f64) -> bool {
         let Some(found) = frame.intervals.get(interval) else { return false };
         self.rigid_at_tool
-            || (self.rigid[interval] && place <= found.start && place >= found.start)
-            || (self.rigid[interval + 1] && place <= found.end && place >= found.end)
+            || (self.is_rigid(interval) && place <= found.start && place >= found.start)
+            || (self.is_rigid(interval + 1) && place <= found.end && place >= found.end)
     }
 
     /// Share of the base's springs in the work of two loads with these reactions.
@@ -143,7 +140,7 @@ impl Plane {
 /// The structure whose section does not change with the tool: redundants eliminated once and for all.
 #[derive(Debug, Clone)]
 pub(super) struct Factor {
-    /// Rows of the fixed unknowns and last the weight; see [`Symmetric::eliminate`].
+    /// Rows of the fixed unknowns and last in a weighed frame the weight; see [`Symmetric::eliminate`].
     pub(super) matrix: Symmetric,
     /// Inverse roots of the pivots, in the order of the redundants.
     pub(super) pivots: Vec<f64>,
@@ -152,7 +149,7 @@ pub(super) struct Factor {
 impl Factor {
     /// `pair` gives bending and shear work of two diagrams.
     pub(super) fn new(frame: &Frame, plane: &Plane, pair: impl Fn(usize, usize) -> f64) -> Self {
-        let order = frame.columns() + 1;
+        let order = frame.width();
         let mut matrix = Symmetric::zeros(order);
         for i in 0..order {
             for j in i..order {

@@ -42,8 +42,11 @@ impl Beam {
     /// Stations ascending, mm, on the shaft. At a station on a rigid support that holds both ways all values
     /// are exactly 0.
     pub fn profile(&self, stations_mm: &[f64], want: Wanted) -> Profile {
+        if want.weight && !self.frame.is_weighed() {
+            return self.weighed().profile(stations_mm, want);
+        }
         match &self.steady {
-            Some(steady) if !(self.changing && want.weight) => self.steady_profile(steady, stations_mm, want),
+            Some(steady) if !(self.is_changing() && want.weight) => self.steady_profile(steady, stations_mm, want),
             _ if self.follow.is_empty() => self.turning_profile(stations_mm, want),
             _ => self.moving_profile(stations_mm, want),
         }
@@ -54,16 +57,22 @@ impl Beam {
         let intervals = self.frame.intervals.len();
         let over = |piece: &dyn Fn(usize) -> Raised| self.sample((0..intervals).map(piece), stations);
         let radial = self.pieces(&self.radial, &steady.radial);
-        let tangential = self.pieces(&self.tangential, &steady.tangential);
         let when = |wanted: bool, piece: &dyn Fn(usize) -> Raised| if wanted { over(piece) } else { Vec::new() };
-        let profile = Profile {
+        let mut profile = Profile {
             radial_mm_per_n: self.sample(steady.compliance.iter().copied(), stations),
             couple_per_n: when(want.couple, &|k| radial.coupling(k)),
-            tangential_mm_per_n: when(want.tangential, &|k| tangential.compliance(k)),
             sag_radial_mm: when(want.weight, &|k| radial.sag(k)),
-            sag_tangential_mm: when(want.weight, &|k| tangential.sag(k)),
-            contacts: None,
+            ..Profile::default()
         };
+        if want.tangential || want.weight {
+            let plane = self.tangential();
+            let factor = self.factor(&plane);
+            let tangential = self.pieces(&plane, &factor);
+            if want.tangential {
+                profile.tangential_mm_per_n = self.sample(tangential.compliances().into_iter(), stations);
+            }
+            profile.sag_tangential_mm = when(want.weight, &|k| tangential.sag(k));
+        }
         let rests = self.one_sided();
         if rests.is_empty() {
             return profile;
@@ -122,7 +131,7 @@ impl Beam {
         });
         if want.tangential || want.weight {
             let rows = Rows { couple: false, weight: want.weight };
-            Turning::new(self.bending(), &self.tangential, rows).run(stations, |works, block| {
+            Turning::new(self.bending(), &self.tangential(), rows).run(stations, |works, block| {
                 let force = works.force_row();
                 if want.tangential {
                     profile.tangential_mm_per_n.extend_from_slice(&works.work(force, force)[..block.len()]);
@@ -143,6 +152,7 @@ impl Beam {
         let rows = Rows { couple: want.couple, weight: want.weight };
         let mut works = Works::new(&self.frame, &self.left, &self.right, &self.follow, rows);
         let mut reduction = Reduction::default();
+        let tangential = self.tangential();
         for &station in stations {
             let k = works.place(station);
             let (force, couple, weight) = (works.force_row(), works.couple_row(), works.weight_row());
@@ -160,8 +170,8 @@ impl Beam {
                 reduction.note(&works, &self.radial, &rests, slot, free, want, &mut contacts);
             }
             if want.tangential || want.weight {
-                let free = f64::from(!self.tangential.holds_tool(&self.frame, k, station));
-                reduction.reduce(&works, &self.tangential);
+                let free = f64::from(!tangential.holds_tool(&self.frame, k, station));
+                reduction.reduce(&works, &tangential);
                 if want.tangential {
                     profile.tangential_mm_per_n.push(free * reduction.matrix.at(force, force));
                 }

@@ -105,7 +105,7 @@ impl Beam {
             .filter(|(i, support)| Some(*i) != left_out && support.bilateral_z_mm().is_some())
             .map(|(_, support)| *support)
             .collect();
-        let state = if self.stock { State::Stock } else { State::Finished };
+        let state = if self.state == State::Stock { State::Stock } else { State::Finished };
         let beam = Self::with_probe(&self.segments, &kept, state, Some(load_z_mm))?;
         let Some(steady) = &beam.steady else { return Ok(Vec::new()) };
         let pieces = beam.pieces(&beam.radial, &steady.radial);

@@ -15,12 +15,13 @@ use super::model::Side;
 /// one at the far end for an overhang of no length.
 #[derive(Debug, Clone)]
 pub(super) struct Tables {
+    side: Side,
     width: usize,
-    /// Work of the functionals with each other: `00`, `01`, `11`.
+    /// Work of the functionals with each other, `00`, `01`, `11`, by break point in the order of the integration.
     gram: Vec<[f64; 3]>,
-    /// Work of the functionals with each fixed diagram; by break point.
+    /// Work of the functionals with each fixed diagram; by break point likewise.
     columns: Vec<[f64; 2]>,
-    /// Work of the fixed diagrams with each other; by break point.
+    /// Work of the fixed diagrams with each other; by break point likewise.
     pairs: Vec<f64>,
 }
 
@@ -28,60 +29,54 @@ impl Tables {
     /// From the left with the sections in force left of the tool, or from the right with the others.
     pub(super) fn new(frame: &Frame, side: Side) -> Self {
         let count = frame.intervals.len();
-        let width = frame.columns() + 1;
-        let mut march =
-            March { frame, side, gram: [0.0; 3], columns: vec![[0.0; 2]; width], pairs: vec![0.0; width * width] };
-        let mut tables = Self {
-            width,
-            gram: vec![[0.0; 3]; count + 1],
-            columns: vec![[0.0; 2]; (count + 1) * width],
-            pairs: vec![0.0; (count + 1) * width * width],
+        let width = frame.width();
+        let mut march = March {
+            frame,
+            side,
+            gram: Vec::with_capacity(count + 1),
+            columns: Vec::with_capacity((count + 1) * width),
+            pairs: Vec::with_capacity((count + 1) * width * width),
         };
-        let mut inside = false;
+        march.gram.push([0.0; 3]);
+        march.columns.resize(width, [0.0; 2]);
+        march.pairs.resize(width * width, 0.0);
+        let interval = |step: usize| if side == Side::Left { step } else { count - 1 - step };
+        let in_span = |step: usize| step < count && frame.intervals[interval(step)].zone == Zone::Span;
         for step in 0..count {
-            let (k, node) = if side == Side::Left { (step, step) } else { (count - 1 - step, count - step) };
-            let zone = frame.intervals[k].zone;
-            if inside && zone != Zone::Span {
+            march.advance(interval(step));
+            if in_span(step) && !in_span(step + 1) {
                 march.leave_the_span();
             }
-            inside = zone == Zone::Span;
-            tables.store(node, &march);
-            march.advance(k);
         }
-        if inside {
-            march.leave_the_span();
-        }
-        tables.store(if side == Side::Left { count } else { 0 }, &march);
-        tables
+        let March { gram, columns, pairs, .. } = march;
+        Self { side, width, gram, columns, pairs }
     }
 
-    fn store(&mut self, node: usize, march: &March<'_>) {
-        let width = self.width;
-        self.gram[node] = march.gram;
-        self.columns[node * width..(node + 1) * width].copy_from_slice(&march.columns);
-        self.pairs[node * width * width..(node + 1) * width * width].copy_from_slice(&march.pairs);
+    /// Where the entry of a break point stands: they are in the order of the integration.
+    fn step(&self, node: usize) -> usize {
+        if self.side == Side::Left { node } else { self.gram.len() - 1 - node }
     }
 
     pub(super) fn gram(&self, node: usize) -> [f64; 3] {
-        self.gram[node]
+        self.gram[self.step(node)]
     }
 
     /// Functionals with a fixed diagram; the index after the last load is the weight.
     pub(super) fn column(&self, node: usize, column: usize) -> [f64; 2] {
-        self.columns[node * self.width + column]
+        self.columns[self.step(node) * self.width + column]
     }
 
     /// Work of two fixed diagrams; that of the weight with itself is not meant.
     pub(super) fn pair(&self, node: usize, i: usize, j: usize) -> f64 {
-        self.pairs[(node * self.width + i) * self.width + j]
+        self.pairs[(self.step(node) * self.width + i) * self.width + j]
     }
 }
 
-/// The state of the integration at a break point.
+/// The integration: the entries up to the break point that it has come to.
 struct March<'a> {
     frame: &'a Frame,
     side: Side,
-    gram: [f64; 3],
+    gram: Vec<[f64; 3]>,
     columns: Vec<[f64; 2]>,
     pairs: Vec<f64>,
 }
@@ -92,8 +87,10 @@ impl March<'_> {
     fn leave_the_span(&mut self) {
         let inverse = self.frame.base.inverse_span;
         let turn = if self.side == Side::Left { -inverse } else { inverse };
-        self.gram = [0.0, 0.0, self.gram[0] * inverse * inverse];
-        for column in &mut self.columns {
+        if let Some(gram) = self.gram.last_mut() {
+            *gram = [0.0, 0.0, gram[0] * inverse * inverse];
+        }
+        for column in self.columns.iter_mut().rev().take(self.frame.width()) {
             *column = [0.0, column[0] * turn];
         }
     }
@@ -103,48 +100,49 @@ impl March<'_> {
         let interval = &self.frame.intervals[k];
         let base = &self.frame.base;
         let work = Work::new(interval.length, interval.section(self.side));
-        let functionals = match (interval.zone, self.side) {
+        let (functionals, shift) = match (interval.zone, self.side) {
             (Zone::Span, Side::Left) => {
-                [Ordinates::linear([interval.start - base.p, interval.end - base.p], 1.0), Ordinates::default()]
+                let first = Ordinates::linear([interval.start - base.p, interval.end - base.p], 1.0);
+                ([first, Ordinates::default()], 0.0)
             }
             (Zone::Span, Side::Right) => {
-                [Ordinates::linear([base.q - interval.start, base.q - interval.end], -1.0), Ordinates::default()]
+                let first = Ordinates::linear([base.q - interval.start, base.q - interval.end], -1.0);
+                ([first, Ordinates::default()], 0.0)
             }
             (Zone::Right, Side::Left) => {
-                self.shift(interval.length);
-                [Ordinates::linear([-interval.length, 0.0], 1.0), Ordinates::linear([-1.0; 2], 0.0)]
+                let first = Ordinates::linear([-interval.length, 0.0], 1.0);
+                ([first, Ordinates::linear([-1.0; 2], 0.0)], interval.length)
             }
             (Zone::Left, Side::Right) => {
-                self.shift(-interval.length);
-                [Ordinates::linear([0.0, -interval.length], -1.0), Ordinates::linear([1.0; 2], 0.0)]
+                let first = Ordinates::linear([0.0, -interval.length], -1.0);
+                ([first, Ordinates::linear([1.0; 2], 0.0)], -interval.length)
             }
-            (Zone::Left, Side::Left) | (Zone::Right, Side::Right) => [Ordinates::default(); 2],
+            (Zone::Left, Side::Left) | (Zone::Right, Side::Right) => ([Ordinates::default(); 2], 0.0),
         };
         let [first, second] = &functionals;
-        self.gram[0] += work.of(first, first);
-        self.gram[1] += work.of(first, second);
-        self.gram[2] += work.of(second, second);
-        let width = self.columns.len();
+        // Force and couple are those at the next break point.
+        let [vv, vt, tt] = self.gram.last().copied().unwrap_or_default();
+        self.gram.push([
+            vv + shift * (2.0 * vt + shift * tt) + work.of(first, first),
+            vt + shift * tt + work.of(first, second),
+            tt + work.of(second, second),
+        ]);
+        let width = self.frame.width();
+        let (columns, pairs) = (self.columns.len(), self.pairs.len());
+        self.columns.extend_from_within(columns - width..);
+        self.pairs.extend_from_within(pairs - width * width..);
         for i in 0..width {
             let diagram = self.frame.diagram(k, i, self.side).whole();
-            self.columns[i][0] += work.of(first, &diagram);
-            self.columns[i][1] += work.of(second, &diagram);
+            let [by_first, by_second] = &mut self.columns[columns + i];
+            *by_first += shift * *by_second + work.of(first, &diagram);
+            *by_second += work.of(second, &diagram);
             for j in i..width {
                 let pair = work.of(&diagram, &self.frame.diagram(k, j, self.side).whole());
-                self.pairs[i * width + j] += pair;
+                self.pairs[pairs + i * width + j] += pair;
                 if i != j {
-                    self.pairs[j * width + i] += pair;
+                    self.pairs[pairs + j * width + i] += pair;
                 }
             }
-        }
-    }
-
-    /// Force and couple at the next break point, seen from this one.
-    fn shift(&mut self, by: f64) {
-        let [vv, vt, tt] = self.gram;
-        self.gram = [vv + by * (2.0 * vt + by * tt), vt + by * tt, tt];
-        for column in &mut self.columns {
-            column[0] += by * column[1];
         }
     }
 }

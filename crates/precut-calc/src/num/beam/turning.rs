@@ -22,8 +22,8 @@ pub(super) struct Turning<'a> {
     frame: &'a Frame,
     plane: &'a Plane,
     order: usize,
-    /// By interval, the upper triangle by rows.
-    works: Vec<Vec<Raised>>,
+    /// By interval, of each the upper triangle by rows.
+    works: Vec<Raised>,
     lanes: Vec<Lane>,
     /// Diagonal of the redundants before the elimination.
     pub(super) original: Vec<Lane>,
@@ -37,8 +37,11 @@ impl<'a> Turning<'a> {
         let order = columns + 1 + usize::from(rows.couple || rows.weight) + usize::from(rows.weight);
         let lost = if rows.weight { differences(frame) } else { Vec::new() };
         let builder = Builder { bending, plane, rows, order };
-        let works = (0..frame.intervals.len()).map(|k| builder.interval(k, &lost)).collect();
         let size = order * (order + 1) / 2;
+        let mut works = vec![Raised::ZERO; size * frame.intervals.len()];
+        for (k, forms) in works.chunks_exact_mut(size).enumerate() {
+            builder.interval(k, &lost, forms);
+        }
         Self { frame, plane, order, works, lanes: vec![[0.0; BLOCK]; size], original: vec![[0.0; BLOCK]; columns] }
     }
 
@@ -47,13 +50,14 @@ impl<'a> Turning<'a> {
         let mut rest = stations;
         let mut values = Vec::with_capacity(BLOCK);
         let last = self.frame.intervals.len() - 1;
+        let size = self.lanes.len();
         for k in 0..=last {
             let interval = &self.frame.intervals[k];
             let count = if k == last { rest.len() } else { rest.partition_point(|place| *place < interval.end) };
             let (here, behind) = rest.split_at(count);
             let span = Span { start: interval.start, end: interval.end, inverse_length: 1.0 / interval.length };
             for block in here.chunks(BLOCK) {
-                for (form, lane) in self.works[k].iter().zip(&mut self.lanes) {
+                for (form, lane) in self.works[k * size..].iter().zip(&mut self.lanes) {
                     values.clear();
                     sample(form, span, block, &mut values);
                     lane[..block.len()].copy_from_slice(&values);
@@ -133,77 +137,78 @@ struct Builder<'a> {
 
 /// The weight as one side of the tool sees it: force and couple at the tool in place of the difference on the other one.
 struct Replaced {
-    force: Form,
-    couple: Form,
+    force: Form<2>,
+    couple: Form<3>,
 }
 
 impl Builder<'_> {
-    fn interval(&self, k: usize, lost: &[[Resultant; 2]]) -> Vec<Raised> {
+    /// Adds up the works of an interval.
+    fn interval(&self, k: usize, lost: &[[Resultant; 2]], forms: &mut [Raised]) {
         let columns = self.bending.frame.columns();
-        let mut forms = vec![Form::new(&[0.0]); self.order * (self.order + 1) / 2];
         let replaced = if self.rows.weight { self.replaced(k, lost) } else { Vec::new() };
         for (end, side) in [Side::Left, Side::Right].into_iter().enumerate() {
-            let mut add = |i: usize, j: usize, form: Form| {
+            let mut add = |i: usize, j: usize, form: Raised| {
                 let entry = &mut forms[packed(self.order, i, j)];
                 *entry = entry.plus(form);
             };
-            let own = self.bending.by_force(k, side);
-            add(columns, columns, own[0]);
+            let (moved, turned) = self.bending.by_force(k, side);
+            add(columns, columns, moved.raised());
             if self.order > columns + 1 {
-                add(columns, columns + 1, own[1]);
+                add(columns, columns + 1, turned.raised());
             }
+            let weight = replaced.get(end);
             for i in 0..columns {
-                let [displacement, rotation] = self.bending.by_column(k, side, i);
-                add(i, columns, displacement);
+                let (displacement, rotation) = self.bending.by_column(k, side, i);
+                add(i, columns, displacement.raised());
                 if self.order > columns + 1 {
-                    add(i, columns + 1, rotation);
+                    add(i, columns + 1, rotation.raised());
                 }
                 for j in i..columns {
-                    add(i, j, self.bending.pair(k, side, i, j));
+                    add(i, j, self.bending.pair(k, side, i, j).raised());
                 }
-                if let Some(weight) = replaced.get(end) {
-                    let instead = displacement.times(&weight.force).plus(rotation.times(&weight.couple));
-                    add(i, columns + 2, self.bending.pair(k, side, i, columns).plus(instead));
+                if let Some(weight) = weight {
+                    add(i, columns + 2, self.bending.pair(k, side, i, columns).raised());
+                    add(i, columns + 2, displacement.times(weight.force).plus(rotation.times::<3, 7>(weight.couple)));
                 }
             }
-            if let Some(weight) = replaced.get(end) {
-                let [sag, _] = self.bending.by_column(k, side, columns);
-                let instead = own[0].times(&weight.force).plus(own[1].times(&weight.couple));
-                add(columns, columns + 2, sag.plus(instead));
+            if let Some(weight) = weight {
+                add(columns, columns + 2, self.bending.by_column(k, side, columns).0.raised());
+                add(columns, columns + 2, moved.times(weight.force).plus(turned.times::<3, 7>(weight.couple)));
             }
         }
-        self.spring(k, &mut forms, replaced.first());
-        forms.iter().map(|form| form.raised()).collect()
+        self.spring(k, forms, replaced.first());
     }
 
     /// Springs of the base and of the unknowns.
-    fn spring(&self, k: usize, forms: &mut [Form], weight: Option<&Replaced>) {
+    fn spring(&self, k: usize, forms: &mut [Raised], weight: Option<&Replaced>) {
         let frame = self.bending.frame;
         let columns = frame.columns();
+        let mut reactions: Vec<Form<3>> = Vec::with_capacity(self.order);
         for generalised in 0..2 {
-            let mut reactions: Vec<Form> =
-                frame.reactions[..columns].iter().map(|r| Form::new(&[r[generalised]])).collect();
+            reactions.clear();
+            reactions.extend(frame.reactions[..columns].iter().map(|r| Form([r[generalised]]).raised()));
             let (force, couple) =
-                (self.bending.reaction(k, generalised), Form::new(&[self.bending.couple_reactions()[generalised]]));
-            reactions.push(force);
+                (self.bending.reaction(k, generalised), Form([self.bending.couple_reactions()[generalised]]));
+            reactions.push(force.raised());
             if self.order > columns + 1 {
-                reactions.push(couple);
+                reactions.push(couple.raised());
             }
             if let Some(weight) = weight {
-                let whole = Form::new(&[frame.reactions[columns][generalised]]);
-                reactions.push(whole.plus(force.times(&weight.force)).plus(couple.times(&weight.couple)));
+                let whole: Form<3> = Form([frame.reactions[columns][generalised]]).raised();
+                let replaced = force.times::<2, 3>(weight.force).plus(couple.times::<3, 3>(weight.couple));
+                reactions.push(whole.plus(replaced));
             }
             // The work of couple or weight with themselves is never asked for.
             for i in 0..=columns {
                 for j in i..self.order {
                     let entry = &mut forms[packed(self.order, i, j)];
-                    *entry = entry.plus(reactions[i].times(&reactions[j]).scaled(self.plane.base[generalised]));
+                    *entry = entry.plus(reactions[i].times::<3, 5>(reactions[j]).scaled(self.plane.base[generalised]));
                 }
             }
         }
         for (i, compliance) in self.plane.fixed.iter().enumerate() {
             let entry = &mut forms[packed(self.order, i, i)];
-            *entry = entry.plus(Form::new(&[*compliance]));
+            *entry = entry.plus(Form([*compliance]));
         }
     }
 
@@ -212,12 +217,11 @@ impl Builder<'_> {
         let interval = &self.bending.frame.intervals[k];
         let missing = interval.section(Side::Right).weight_n_per_mm - interval.section(Side::Left).weight_n_per_mm;
         // The moment about the tool of a uniform load is convex: `q h²/2 xi eta` below its chord.
-        let below = Form::new(&[0.0, -0.5 * missing * interval.length * interval.length, 0.0]);
-        let between =
-            |pick: fn(&Resultant) -> f64, end: usize| Form::new(&[pick(&lost[k][end]), pick(&lost[k + 1][end])]);
+        let below = Form([0.0, -0.5 * missing * interval.length * interval.length, 0.0]);
+        let between = |pick: fn(&Resultant) -> f64, end: usize| Form([pick(&lost[k][end]), pick(&lost[k + 1][end])]);
         vec![
-            Replaced { force: between(|r| r.force, 1), couple: between(|r| r.moment, 1).plus(below) },
-            Replaced { force: between(|r| r.force, 0).scaled(-1.0), couple: between(|r| r.moment, 0).plus(below) },
+            Replaced { force: between(|r| r.force, 1), couple: below.plus(between(|r| r.moment, 1)) },
+            Replaced { force: between(|r| r.force, 0).scaled(-1.0), couple: below.plus(between(|r| r.moment, 0)) },
         ]
     }
 }
