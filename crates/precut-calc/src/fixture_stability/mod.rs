@@ -168,11 +168,14 @@ impl Calculator for FixtureStability {
     }
 }
 
-/// Oscillations in a tooth period from which on one Krylov space does not suffice for a multiplier, how its time then grows with
-/// them, and how much it is at most: that of all restarts. Measured with 72 to 540 oscillations.
-const ONE_SPACE: f64 = 50.0;
-const RESTARTS_GROW: f64 = 2.8;
-const ALL_RESTARTS: f64 = 1000.0;
+/// Oscillations in a tooth period from which on one Krylov space does not suffice for most multipliers, how their time then grows
+/// with them, and how much it is at most: that of all restarts. Measured with 20 to 540 oscillations.
+const ONE_SPACE: f64 = 120.0;
+const RESTARTS_GROW: f64 = 3.5;
+const ALL_RESTARTS: f64 = 300.0;
+/// Of uneven teeth: a forced motion per tooth squared and 50 points of the history of a multiplier, ms. Measured with 8 to 120
+/// teeth.
+const UNEVEN_MS: f64 = 0.4 / 50.0;
 /// Bytes that a multiplier holds per point of its history: the vectors of its space, and what the map is made of.
 const POINT_BYTES: f64 = 700.0;
 /// Bytes of a piece of the forced motion, of a kept step, and of a place of the arc.
@@ -180,7 +183,7 @@ const PIECE_BYTES: f64 = 250.0;
 const STEP_BYTES: f64 = 100.0;
 const PLACE_BYTES: f64 = 24.0;
 
-/// Expected work. A multiplier costs about 1 us per point of its history and 10 us besides, a thousand times as much where the
+/// Expected work. A multiplier costs about 1 us per point of its history and 10 us besides, some hundred times as much where the
 /// cutter turns so slowly that hundreds of oscillations go into a tooth period; a step in time 12 ns (a plain vise, linear law) to
 /// 60 ns (joints that open, a power of the chip, kept steps), the most is taken, and 25 ns for every further tooth in cut.
 fn cost(job: &FixtureJob) -> Cost {
@@ -207,6 +210,9 @@ fn cost(job: &FixtureJob) -> Cost {
     let runs = 1.0 + f64::from(u8::from(job.simulation.verified)) * 2.0 + more as f64;
     let mut parts =
         vec![(2.0 + 100.0 * point_ms(working), "/cut/spindle_speed_rpm"), (runs * run_ms, "/simulation/tooth_periods")];
+    if case.cutting.uneven() {
+        parts.push((UNEVEN_MS * phases * phases * history(working), "/cutter/teeth"));
+    }
     if job.asks(Analysis::Limits) {
         parts.push((0.6 * f64::from(job.limits.depths) * run_ms, "/limits/depths"));
     }
