@@ -586,6 +586,10 @@ mod tests {
         }
     }
 
+    fn sure<T>(result: Result<T, Infallible>) -> T {
+        result.unwrap_or_else(|never| match never {})
+    }
+
     /// A bidiagonal map is far from normal. The residual is always that of the vector, and where the eigenvalues can be told
     /// from what round-off makes of them the largest is found.
     #[test]
@@ -598,9 +602,6 @@ mod tests {
                 }
             }
         };
-        fn sure<T>(result: Result<T, Infallible>) -> T {
-            result.unwrap_or_else(|never| match never {})
-        }
         // Neighbours 0.004 apart, coupled by as much: condition of the largest eigenvalue about the sum of 1/k!.
         let found = largest(150, 8, 1e-9, map(0.004));
         assert!(found.residual <= 1e-9 && (found.modulus() - 0.95).abs() < 1e-7, "{found:?}");
