@@ -13,7 +13,7 @@ use super::{Affines, Failed, Objective, Program};
 /// # Errors
 /// Where a test of feasibility came to nothing.
 pub fn conflict(program: &Program, limits: &[usize]) -> Result<Vec<usize>, Failed> {
-    let mut search = Search { program, members: limits.to_vec(), near: None };
+    let mut search = Search { program, members: limits.to_vec(), near: Near::NotSought };
     let Verdict::Infeasible { rows, sums, .. } = search.test(limits)? else { return Ok(Vec::new()) };
     let kept = supported(limits, &rows, &sums);
     if search.test(&kept)? != Verdict::Feasible {
@@ -33,8 +33,14 @@ struct Search<'a> {
     program: &'a Program,
     /// They conflict.
     members: Vec<usize>,
-    /// The point that keeps the members' rows and comes nearest to their sums, once it was looked for.
-    near: Option<Option<Vec<f64>>>,
+    near: Near,
+}
+
+/// The point that keeps the members' rows and comes nearest to their sums.
+enum Near {
+    NotSought,
+    NotFound,
+    Found(Vec<f64>),
 }
 
 /// Most members that are left out about one point, and most variables that change for them.
@@ -70,7 +76,7 @@ impl Search<'_> {
                     let still = [&without[..k], &kept].concat();
                     let is_less = still.len() < without.len() && self.test(&still)? != Verdict::Feasible;
                     self.members = if is_less { still } else { without };
-                    self.near = None;
+                    self.near = Near::NotSought;
                 }
             }
         }
@@ -83,11 +89,11 @@ impl Search<'_> {
         if out.len() > AROUND.0 {
             return false;
         }
-        if self.near.is_none() {
+        if matches!(self.near, Near::NotSought) {
             let (rows, sums) = self.split(&self.members);
-            self.near = Some(nearest(self.program, &rows, &sums));
+            self.near = nearest(self.program, &rows, &sums).map_or(Near::NotFound, Near::Found);
         }
-        let Some(Some(near)) = &self.near else { return false };
+        let Near::Found(near) = &self.near else { return false };
         let (rows, sums) = self.split(&[&self.members[..out.start], &self.members[out.end..]].concat());
         let (gone, _) = self.split(&self.members[out]);
         let is_free = self.around(&gone, &rows);
