@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
 use crate::feed_support::{conflict, job, near, solve, solved};
-use precut_calc::calculator::{Answer, Calculator, ElasticScope, Failure, Unwatched};
+use precut_calc::calculator::{Answer, Block, Calculator, ElasticScope, Failure, Unwatched};
 use precut_calc::feed_schedule::{ChangePlace, FeedSchedule, Outcome, Price, PriceBasis};
 use serde_json::{Value, json};
 
@@ -63,6 +63,44 @@ fn three_edges_are_counted_and_two_are_found() {
     between.sort_unstable();
     assert_eq!((change.place, between), (ChangePlace::BetweenZones, ["end", "mid"]));
     near("where", change.z_mm, 750.0, 0.0, 1e-9);
+}
+
+/// With two edges for every part a batch changes nothing; of a part that an edge serves several times the last edge of the
+/// batch is paid whole, and the words and the program count it.
+#[test]
+fn a_batch_pays_and_tells_its_edges() {
+    let mut two = case("three-edges-no-stop");
+    two["limits"]["whole_edges"] = json!(true);
+    two["limits"]["batch_parts"] = json!(7);
+    let two = solved(two);
+    near("whole edges", two.objective, 34.876, 0.0, 0.001);
+    assert_eq!((two.edges.len(), two.edges_per_part), (2, Some(2.0)));
+
+    let mut given = case("three-edges-no-stop");
+    given["limits"]["whole_edges"] = json!(true);
+    let life = given["models"]["tool_life"]["constant"].as_f64().unwrap();
+    given["models"]["tool_life"]["constant"] = json!(life + 100.0_f64.ln());
+    let without_end = solved(given.clone());
+    let many = without_end.tool_changes.last().unwrap().every_parts;
+    assert!(many > 2, "{many}");
+    given["limits"]["batch_parts"] = json!(many + 1);
+    let batch = answer(given.clone());
+    let every = batch.output.tool_changes.last().unwrap().every_parts;
+    let edges = f64::from((many + 1).div_ceil(every));
+    near("edges", batch.output.edges_per_part.unwrap(), edges / f64::from(many + 1), 1e-12, 0.0);
+    assert!(batch.output.objective > without_end.objective);
+    let said = batch.explanation.iter().find(|message| message.code == "batch_edges").unwrap();
+    let said = serde_json::to_value(&said.values).unwrap();
+    assert_eq!(
+        [&said["parts"], &said["edges"], &said["every"]].map(|value| value.as_f64().unwrap()),
+        [f64::from(many + 1), edges, f64::from(every)]
+    );
+    if every > 1 {
+        let program = FeedSchedule::program(&job(given), &batch.output).unwrap().unwrap();
+        let told = format!("after every {every} parts, {edges} edges for {} parts", many + 1);
+        let is_told = |block: &Block| matches!(block, Block::Note(note) if note.contains(&told));
+        assert!(program.blocks.iter().any(is_told), "{told}");
+    }
 }
 
 #[test]

@@ -39,6 +39,7 @@ mod feed_cases;
 mod feed_claims;
 mod feed_continuous;
 mod feed_decisions;
+mod feed_depths;
 mod feed_diagnosis;
 mod feed_diagnosis_trials;
 mod feed_effects;

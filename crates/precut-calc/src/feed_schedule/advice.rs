@@ -48,6 +48,7 @@ pub(super) const EXPLANATION_CODES: &[&str] = &[
     "edge_used",
     "whole_parts",
     "edge_changes",
+    "batch_edges",
     "fewest_zones",
     "passes_found",
     "equal_deflection_clamped",
@@ -357,6 +358,7 @@ pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
         let inside = outcome.tool_changes.iter().filter(|change| change.place == ChangePlace::InsideZone).count();
         out.push(Message::new("edge_changes").with("edges", edges).with("inside", inside));
     }
+    out.extend(batch(job, outcome));
     if let Some(found) = &outcome.continuous {
         out.push(
             Message::new("fewest_zones")
@@ -397,6 +399,20 @@ fn scheduled(outcome: &Outcome) -> Message {
         .with("most_feed_mm_per_rev", most_feed)
         .with("least_speed_m_per_min", least_speed)
         .with("most_speed_m_per_min", most_speed)
+}
+
+/// What a batch takes of edges that serve one or more whole parts.
+fn batch(job: &Job, outcome: &Outcome) -> Option<Message> {
+    let parts = f64::from(job.limits.as_ref()?.batch_parts?);
+    let per_part = outcome.edges_per_part.filter(|edges| *edges <= 1.0)?;
+    let after = outcome.tool_changes.last()?;
+    let edges = (per_part * parts).round();
+    Some(
+        Message::new("batch_edges")
+            .with("parts", parts)
+            .with("edges", edges)
+            .with("every", f64::from(after.every_parts)),
+    )
 }
 
 /// The limit that costs most, or that none binds.

@@ -164,6 +164,9 @@ fn check_limits(job: &Job, limits: &Limits, violations: &mut Violations) {
     violations.require(!(limits.whole_edges && limits.whole_parts_per_edge), || {
         Finding::new("method_not_together", "/limits/whole_edges").with("other", "whole parts per edge")
     });
+    violations.require(!(limits.batch_parts.is_some() && limits.whole_parts_per_edge), || {
+        Finding::new("method_not_together", "/limits/batch_parts").with("other", "whole parts per edge")
+    });
     let share = limits.tool_usage_max.filter(|share| limits.whole_edges && *share > 1.0);
     violations.require(share.is_none(), || {
         Finding::new("usage_above_an_edge", "/limits/tool_usage_max").measured(share.unwrap_or(1.0), 1.0, "1")
@@ -196,6 +199,7 @@ fn check_needs(job: &Job, violations: &mut Violations) {
         need(limits.tool_usage_max.is_some(), Output::ToolLife, "tool_usage_max");
         need(limits.whole_parts_per_edge, Output::ToolLife, "whole_parts_per_edge");
         need(limits.whole_edges, Output::ToolLife, "whole_edges");
+        need(limits.batch_parts.is_some(), Output::ToolLife, "batch_parts");
         need(limits.tool_life_min_min.is_some(), Output::ToolLife, "tool_life_min_min");
         need(limits.deflection_spread_ratio_max.is_some(), Output::ForceY, "deflection_spread_ratio_max");
     }

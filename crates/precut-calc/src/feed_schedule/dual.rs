@@ -5,7 +5,7 @@ use crate::num::gp::Affines;
 use super::solve::Solved;
 
 /// A limit nearer than this, in logarithms, holds: within ten steps of a number that is solved anew it may begin to bind.
-const NEAR: f64 = 10.0 * super::prices::STEP;
+pub(super) const NEAR: f64 = 10.0 * super::prices::STEP;
 /// More limits than this are not examined: the work grows with the third power.
 const MOST: usize = 150;
 /// What is left of a direction that lies in the range, relative.

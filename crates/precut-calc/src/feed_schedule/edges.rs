@@ -50,6 +50,14 @@ pub(super) fn units(case: &Case) -> Vec<Vec<usize>> {
     units
 }
 
+/// Edges that one part takes of those that serve so many parts each: over a batch, the last of its edges whole.
+pub(super) fn shared(parts_per_edge: u32, batch_parts: Option<u32>) -> f64 {
+    match batch_parts {
+        Some(batch) => f64::from(batch.div_ceil(parts_per_edge)) / f64::from(batch),
+        None => 1.0 / f64::from(parts_per_edge),
+    }
+}
+
 /// The edges of a schedule.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Plan {
@@ -57,6 +65,7 @@ pub(super) struct Plan {
     count: u32,
     /// Whole parts that one edge serves.
     parts_per_edge: u32,
+    batch_parts: Option<u32>,
     pub edges: Vec<EdgeUse>,
     pub changes: Vec<ToolChange>,
 }
@@ -64,7 +73,7 @@ pub(super) struct Plan {
 impl Plan {
     /// Edges per part.
     pub(super) fn per_part(&self) -> f64 {
-        f64::from(self.count) / f64::from(self.parts_per_edge)
+        f64::from(self.count) * shared(self.parts_per_edge, self.batch_parts)
     }
 }
 
@@ -90,7 +99,9 @@ fn plan(case: &Case, zones: &[ZoneOutcome], parts: Option<u32>) -> Option<Plan> 
     let usage: Vec<f64> = zones.iter().map(|zone| zone.tool_usage).collect::<Option<_>>()?;
     let fresh_always = case.limits.tool_usage_scope == UsageScope::Surface;
     let most = capacity(case) * (1.0 + KEPT);
-    let mut filling = Filling { case, most, plan: Plan { count: 1, ..Plan::default() }, edge: EdgeUse::default() };
+    let batch_parts = case.limits.batch_parts;
+    let plan = Plan { count: 1, batch_parts, ..Plan::default() };
+    let mut filling = Filling { case, most, plan, edge: EdgeUse::default() };
     let mut last: Option<usize> = None;
     for unit in units(case) {
         let whole: f64 = unit.iter().map(|&i| usage[i]).sum();
@@ -107,8 +118,8 @@ fn plan(case: &Case, zones: &[ZoneOutcome], parts: Option<u32>) -> Option<Plan> 
     let used = edge.tool_usage;
     plan.parts_per_edge = parts.unwrap_or(1);
     if plan.count == 1 && !fresh_always && used > 0.0 && parts.is_none() {
-        // Beyond a million parts nobody counts.
-        plan.parts_per_edge = counted((most / used).floor().clamp(1.0, 1e6));
+        // Beyond a million parts nobody counts, beyond a batch there are none.
+        plan.parts_per_edge = counted((most / used).floor().clamp(1.0, batch_parts.map_or(1e6, f64::from)));
     }
     let order = order_of(case);
     if let (Some(&first), Some(&last)) = (order.first(), order.last()) {
@@ -228,7 +239,8 @@ pub(super) fn recount(case: &Case, outcome: &mut Outcome) {
 /// What every edge of an answer with whole edges may cut.
 pub(super) fn limits_of(case: &Case, outcome: &Outcome) -> EdgeLimits {
     let per_part = outcome.edges_per_part.unwrap_or(1.0);
-    let most = capacity(case) * per_part.min(1.0);
+    let after = outcome.tool_changes.iter().find(|change| change.place == ChangePlace::BetweenParts);
+    let most = capacity(case) * (1.0 / f64::from(after.map_or(1, |change| change.every_parts)));
     let zone = |id: &String| case.zones.iter().position(|zone| zone.id == *id);
     let group = |edge: &EdgeUse| (edge.zones.iter().filter_map(zone).collect(), most);
     EdgeLimits { per_part, groups: outcome.edges.iter().map(group).collect() }

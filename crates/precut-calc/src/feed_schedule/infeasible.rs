@@ -173,70 +173,14 @@ fn elastic(built: &Built, all: bool) -> (Program, Vec<Label>) {
     (program, labels)
 }
 
-/// Deletion filter over the support of the certificate of infeasibility.
+/// Names of a smallest set of limits that conflict; none where they nearly hold together.
 fn conflict(case: &Case, built: &Built) -> Result<Vec<ConstraintName>, Failure> {
-    let program = &built.program;
     let stalled = || Failure::NotConverged { what: "the test of feasibility", residual: f64::NAN, iterations: 120 };
-    let test = |members: &[usize]| -> Result<Verdict, Failure> {
-        let (rows, sums) = split(members, program.rows.len());
-        gp::feasibility(program, &rows, &sums).map_err(|_| stalled())
-    };
-    let count = program.rows.len() + program.sums.len();
-    let limits = built.rows.iter().chain(&built.sums);
-    let everything: Vec<usize> =
-        limits.enumerate().filter(|(_, label)| label.kind.is_limit()).map(|(k, _)| k).collect();
-    let Verdict::Infeasible { rows, sums, .. } = test(&everything)? else {
-        // Nearly feasible: nothing to name.
-        return Ok(Vec::new());
-    };
-    let mut members = supported(&everything, &rows, &sums, count);
-    if test(&members)? == Verdict::Feasible {
-        members = everything;
-    }
-    // Many at once first: of what is not needed most goes in few tests.
-    let mut size = (members.len() / 4).max(1);
-    loop {
-        let mut k = 0;
-        while k < members.len() {
-            let end = (k + size).min(members.len());
-            let without: Vec<usize> = [&members[..k], &members[end..]].concat();
-            match test(&without)? {
-                Verdict::Feasible => k = end,
-                Verdict::Infeasible { rows, sums, .. } => {
-                    // The new certificate may leave out others behind these as well; those before are needed.
-                    let kept = supported(&without, &rows, &sums, count);
-                    let still: Vec<usize> = without
-                        .iter()
-                        .enumerate()
-                        .filter(|(at, m)| *at < k || kept.contains(m))
-                        .map(|(_, m)| *m)
-                        .collect();
-                    let shrunk = still.len() < without.len() && matches!(test(&still)?, Verdict::Infeasible { .. });
-                    members = if shrunk { still } else { without };
-                }
-            }
-        }
-        if size == 1 {
-            break;
-        }
-        size = (size / 4).max(1);
-    }
-    let label = |k: usize| if k < program.rows.len() { &built.rows[k] } else { &built.sums[k - program.rows.len()] };
+    let labels: Vec<&Label> = built.rows.iter().chain(&built.sums).collect();
+    let limits: Vec<usize> = (0..labels.len()).filter(|&k| labels[k].kind.is_limit()).collect();
+    let mut members = gp::conflict(&built.program, &limits).map_err(|_| stalled())?;
     members.sort_unstable();
-    let mut names: Vec<ConstraintName> = members.into_iter().map(|k| label(k).name(case)).collect();
+    let mut names: Vec<ConstraintName> = members.into_iter().map(|k| labels[k].name(case)).collect();
     names.dedup();
     Ok(names)
-}
-
-fn split(members: &[usize], rows: usize) -> (Vec<usize>, Vec<usize>) {
-    let of_rows = members.iter().copied().filter(|&k| k < rows).collect();
-    let of_sums = members.iter().copied().filter(|&k| k >= rows).map(|k| k - rows).collect();
-    (of_rows, of_sums)
-}
-
-/// Members whose weight in the certificate is above rounding.
-fn supported(members: &[usize], rows: &[f64], sums: &[f64], count: usize) -> Vec<usize> {
-    let weight = |k: usize| if k < rows.len() { rows[k] } else { sums[k - rows.len()] };
-    let most = (0..count).map(weight).fold(0.0, f64::max);
-    members.iter().copied().filter(|&k| weight(k) > 1e-6 * most).collect()
 }

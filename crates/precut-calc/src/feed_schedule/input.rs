@@ -261,6 +261,10 @@ pub struct Limits {
     #[serde(default)]
     #[schema(default = false, example = true)]
     pub whole_edges: bool,
+    /// Parts of the batch: where an edge serves several, the last one of the batch is paid whole as well.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1, maximum = 1_000_000, example = 50, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("N"))))]
+    pub batch_parts: Option<u32>,
     /// Least tool life at the conditions of any zone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-6, maximum = 1e6, example = 15.0, extensions(("x-unit" = json!("min")), ("x-symbol" = json!("T_min"))))]

@@ -4,7 +4,8 @@ use crate::calculator::{Failure, Monitor};
 
 use super::case::{Case, PassSplit};
 use super::compliance::Held;
-use super::dual::Active;
+use super::dual::{Active, NEAR};
+use super::edges::capacity;
 use super::input::{Goal, Job};
 use super::output::{Looser, NextWhole, Price, PriceBasis};
 use super::program::{Kind, Label, Place, Variation};
@@ -29,6 +30,8 @@ struct Knob {
     name: (String, String),
     lower: bool,
     weight: f64,
+    /// Something else holds the row where it is: looser alone buys nothing.
+    is_held: bool,
 }
 
 /// What re-solving needs beside the schedule itself.
@@ -52,6 +55,7 @@ pub(super) fn prices(
     let multipliers = solution.row_multipliers.iter().chain(&solution.sum_multipliers);
     let labels = solved.built.rows.iter().chain(&solved.built.sums);
     let mut found: Vec<(Price, Vec<(usize, f64)>)> = Vec::new();
+    let mut held: Vec<String> = Vec::new();
     let mut places: std::collections::HashMap<String, usize> = std::collections::HashMap::new();
     for (row, (label, &multiplier)) in labels.zip(multipliers).enumerate() {
         if multiplier <= NONE && !active.holds(row) {
@@ -60,6 +64,9 @@ pub(super) fn prices(
         for knob in knobs(label, case, again.job, is_upper_spread(solved, row)) {
             // One percent of a semi-log limit is so many units of its row.
             let by = knob.weight * if label.plain { label.limit.abs() } else { 1.0 };
+            if knob.is_held {
+                held.push(knob.pointer.clone());
+            }
             let at = *places.entry(knob.pointer.clone()).or_insert_with(|| {
                 found.push((priceless(&knob, label), Vec::new()));
                 found.len() - 1
@@ -73,7 +80,7 @@ pub(super) fn prices(
     found.sort_by(|a, b| b.0.gain_percent.unwrap_or(0.0).total_cmp(&a.0.gain_percent.unwrap_or(0.0)));
     let mut tries = if active.is_known() { TRIED } else { TRIED / 4 };
     for (price, rows) in &mut found {
-        if active.settles(rows) {
+        if active.settles(rows) && !held.contains(&price.pointer) {
             continue;
         }
         price.basis = PriceBasis::OneOfSeveral;
@@ -132,7 +139,8 @@ fn is_upper_spread(solved: &Solved, row: usize) -> bool {
 fn knobs(label: &Label, case: &Case, job: &Job, upper_spread: bool) -> Vec<Knob> {
     let zone = if let Place::Zone(i) = label.place { Some(i) } else { None };
     let kind = label.kind.name().into_owned();
-    let of = |pointer: String, name: (String, String), lower| Knob { pointer, name, lower, weight: 1.0 };
+    let of =
+        |pointer: String, name: (String, String), lower| Knob { pointer, name, lower, weight: 1.0, is_held: false };
     let general = |pointer: &str| of(pointer.to_owned(), (kind.clone(), "part".to_owned()), label.lower);
     let of_zone = |field: &str| {
         zone.map(|i| {
@@ -165,8 +173,13 @@ fn knobs(label: &Label, case: &Case, job: &Job, upper_spread: bool) -> Vec<Knob>
         Kind::ToolLifeMin => vec![general("/limits/tool_life_min_min")],
         Kind::ToolUsage => vec![general("/limits/tool_usage_max")],
         Kind::WholeEdge => {
-            let given = job.limits.as_ref().is_some_and(|limits| limits.tool_usage_max.is_some());
-            if given { vec![further("/limits/tool_usage_max", "tool_usage", false)] } else { Vec::new() }
+            let given = job.limits.as_ref().and_then(|limits| limits.tool_usage_max);
+            // Beyond a whole edge there is none.
+            let knob = |most: f64| Knob {
+                is_held: most.ln() >= -NEAR,
+                ..further("/limits/tool_usage_max", "tool_usage", false)
+            };
+            given.map(knob).into_iter().collect()
         }
         Kind::TimeMax => vec![general("/limits/time_max_min")],
         Kind::Power => {
@@ -187,9 +200,15 @@ fn knobs(label: &Label, case: &Case, job: &Job, upper_spread: bool) -> Vec<Knob>
             let index = zone.map(|i| case.zones[i].index);
             let own = index.and_then(|index| job.zones[index].feed_max_mm_per_rev);
             let all = job.limits.as_ref().map_or(f64::INFINITY, |limits| limits.feed_max_mm_per_rev);
+            let of_all = general("/limits/feed_max_mm_per_rev");
+            let own = own.and_then(|own| Some(((own / all).ln(), of_zone("feed_max_mm_per_rev")?)));
             match own {
-                Some(own) if own < all => of_zone("feed_max_mm_per_rev").into_iter().collect(),
-                _ => vec![general("/limits/feed_max_mm_per_rev")],
+                // Of two alike each holds the feed without the other.
+                Some((apart, own)) if apart.abs() <= NEAR => {
+                    [own, of_all].map(|knob| Knob { is_held: true, ..knob }).into_iter().collect()
+                }
+                Some((apart, own)) if apart < 0.0 => vec![own],
+                _ => vec![of_all],
             }
         }
         Kind::SpeedMin => vec![general("/limits/speed_min_m_per_min")],
@@ -226,8 +245,8 @@ fn try_it(
     monitor: &dyn Monitor,
 ) -> Result<(), Failure> {
     let sign = if price.looser == Looser::Less { -1.0 } else { 1.0 };
-    let looser = objective(price, sign * STEP, solved, again, monitor)?;
-    let tighter = objective(price, -sign * STEP, solved, again, monitor)?;
+    let looser = objective(price, sign * STEP, case, solved, again, monitor)?;
+    let tighter = objective(price, -sign * STEP, case, solved, again, monitor)?;
     let points = matches!(case.goal, Goal::Hardening {});
     let percent = |from: f64, to: f64| {
         if points { (from - to) / (100.0 * STEP) } else { (from / to).ln() / STEP }
@@ -251,6 +270,7 @@ fn try_it(
 fn objective(
     price: &Price,
     by: f64,
+    as_it_is: &Case,
     solved: &Solved,
     again: &Again<'_>,
     monitor: &dyn Monitor,
@@ -259,8 +279,10 @@ fn objective(
     let Some(number) = number(&mut job, &price.pointer) else { return Ok(None) };
     *number *= by.exp();
     let case = Case::of(&job, again.held, again.split.as_ref())?;
-    let edges = solved.whole.as_ref().map(|(limits, _)| limits);
-    let variation = Variation { parts_per_edge: solved.parts_per_edge, edges, about: None };
+    // The edges are as they are, but for how far each may be used.
+    let further = capacity(&case) / capacity(as_it_is);
+    let edges = solved.whole.as_ref().map(|(limits, _)| limits.used_further(further));
+    let variation = Variation { parts_per_edge: solved.parts_per_edge, edges: edges.as_ref(), about: None };
     match solve_as(&case, &variation, false, monitor) {
         Ok(turned) => Ok(Some(turned.objective)),
         Err(Unsolved::Failed(Failure::Cancelled)) => Err(Failure::Cancelled),

@@ -185,6 +185,14 @@ pub(super) struct EdgeLimits {
     pub groups: Vec<(Vec<usize>, f64)>,
 }
 
+impl EdgeLimits {
+    /// The same edges with every limit times a factor.
+    pub(super) fn used_further(&self, factor: f64) -> Self {
+        let groups = self.groups.iter().map(|(zones, most)| (zones.clone(), most * factor)).collect();
+        Self { per_part: self.per_part, groups }
+    }
+}
+
 /// What the objective's terms are made of: money or minutes per minute in the cut and per edge, and fixed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Rates {

@@ -85,7 +85,8 @@ impl Made {
         let edges: Vec<f64> = stretches.iter().flat_map(|stretch| &stretch.corners).map(|corner| corner.0).collect();
         let cuts: Vec<Turned> = passes.iter().map(|pass| pass.turned).collect();
         let (mut work, blank) = Work::of(job, &said, &passes, &words, &Blank::of(job, &cuts, &edges))?;
-        let written = turning::write(&setting, &blank, &mut work, said.passed.clone(), &stretches);
+        let head = said.passed.iter().cloned().chain(after_parts(job, outcome)).collect();
+        let written = turning::write(&setting, &blank, &mut work, head, &stretches);
         let driven = turning::drive(&written, &blank, setting.zero_mm, &mut work);
         let fits = zones_fit_the_shaft(job, outcome, &cuts).is_ok();
         let proof = if fits { driven.proof(|station| work.wanted_mm(station), |_| None) } else { None };
@@ -245,6 +246,18 @@ fn stretches(
         }
     }
     all
+}
+
+/// After how many parts the edge is changed, where edges are whole and one serves several.
+fn after_parts(job: &Job, outcome: &Outcome) -> Option<String> {
+    let limits = job.limits.as_ref().filter(|limits| limits.whole_edges)?;
+    let change = outcome.tool_changes.last().filter(|change| change.every_parts > 1)?;
+    let every = change.every_parts;
+    let note = format!("one edge cuts {every} parts: index or change the insert after every {every} parts");
+    Some(match limits.batch_parts {
+        Some(batch) => format!("{note}, {} edges for {batch} parts", batch.div_ceil(every)),
+        None => note,
+    })
 }
 
 /// A part of a pass, as shares of its length, and whether it begins with a new edge.

@@ -7,7 +7,7 @@
 use crate::calculator::{Failure, Monitor};
 
 use super::case::Case;
-use super::edges::{KEPT, capacity, counted, units};
+use super::edges::{KEPT, capacity, counted, shared, units};
 use super::input::UsageScope;
 use super::models::Output;
 use super::program::{EdgeLimits, Rates, Variation};
@@ -218,18 +218,24 @@ impl Search<'_> {
         solve_as(&case, &Variation::default(), false, self.monitor).map(|solved| solved.objective)
     }
 
-    /// Several whole parts per edge: convex in their number.
+    /// Several whole parts per edge: convex in their number where every part pays its share of the edge. A batch pays the
+    /// last edge whole, which is never less.
     fn several_parts(&mut self) -> Result<(), Unsolved> {
-        let mut before = f64::INFINITY;
-        for parts in 2..=MOST_PARTS {
-            let share = 1.0 / f64::from(parts);
+        let batch_parts = self.case.limits.batch_parts;
+        let (mut parts, mut before) = (1, f64::INFINITY);
+        while let Some(more) = more_parts(parts, batch_parts) {
+            parts = more;
+            let (share, per_part) = (1.0 / f64::from(parts), shared(parts, batch_parts));
             let limits =
-                EdgeLimits { per_part: share, groups: vec![(self.zones(0, self.units.len()), self.capacity * share)] };
+                EdgeLimits { per_part, groups: vec![(self.zones(0, self.units.len()), self.capacity * share)] };
             match self.solve(limits, false) {
-                Ok(solved) if solved.objective >= before => return Ok(()),
                 Ok(solved) => {
-                    before = solved.objective;
+                    let by_share = solved.objective - self.per_edge * (per_part - share);
                     self.take(solved);
+                    if by_share >= before && self.is_worse(by_share) {
+                        return Ok(());
+                    }
+                    before = by_share;
                 }
                 Err(Unsolved::Infeasible(_)) => return Ok(()),
                 Err(failed) => return Err(failed),
@@ -327,6 +333,18 @@ impl Search<'_> {
         }
         found.map(|(j, at, _)| (j, at))
     }
+}
+
+/// The next number of parts per edge that is worth a try: of all with which a batch takes as many edges only the least.
+fn more_parts(parts: u32, batch_parts: Option<u32>) -> Option<u32> {
+    let more = match batch_parts {
+        Some(batch) => {
+            let edges = batch.div_ceil(parts);
+            batch.div_ceil(edges.checked_sub(1).filter(|fewer| *fewer > 0)?)
+        }
+        None => parts + 1,
+    };
+    (more <= MOST_PARTS).then_some(more)
 }
 
 fn least(open: &[Node]) -> Option<usize> {

@@ -224,9 +224,10 @@ impl Driver {
         self.at = (z_mm.map(|z| z + self.zero_mm).or(from.0), x_diameter_mm.or(from.1));
         let (Some(z1), Some(x1)) = self.at else { return };
         let (z0, x0) = (from.0.unwrap_or(z1), from.1.unwrap_or(x1));
-        if let Some(clearance) = clearance_mm(&self.driven.surface, [z0, z1], 0.5 * x0.min(x1)) {
-            let least = self.driven.rapid_clearance_mm.map_or(clearance, |least| least.min(clearance));
-            self.driven.rapid_clearance_mm = Some(least);
+        let least = self.driven.rapid_clearance_mm;
+        // A program of many approaches alike is not measured to the nanometre at each of them.
+        if let Some(clearance) = clearance_mm(&self.driven.surface, [z0, z1], 0.5 * x0.min(x1), least) {
+            self.driven.rapid_clearance_mm = Some(least.map_or(clearance, |least| least.min(clearance)));
         }
     }
 }
@@ -245,10 +246,13 @@ fn mean_at_least(a: f64, b: f64, least: f64) -> f64 {
 }
 
 /// Distance of a motion over a stretch from the surface, the larger of its two components, mm: none where the surface is
-/// farther than the radius of the motion; negative never, 0 at and in the work.
-fn clearance_mm(surface: &Surface, [z0, z1]: [f64; 2], radius_mm: f64) -> Option<f64> {
+/// farther than the radius of the motion, or than what was found elsewhere; negative never, 0 at and in the work.
+fn clearance_mm(surface: &Surface, [z0, z1]: [f64; 2], radius_mm: f64, elsewhere: Option<f64>) -> Option<f64> {
     let (low, high) = (z0.min(z1), z0.max(z1));
     let touches = |d: f64| surface.highest_mm(low - d, high + d) + d >= radius_mm;
+    if elsewhere.is_some_and(|least| least < radius_mm && !touches(least)) {
+        return None;
+    }
     let widest = surface.widest_mm();
     let (mut free, mut met) = (0.0, radius_mm.max(0.0));
     if surface.highest_mm(low - met, high + met) <= 0.0 {

@@ -129,6 +129,19 @@ impl Affines {
         }
         out
     }
+
+    /// Some of the forms, in the order of `rows`, over variables that are numbered anew.
+    #[must_use]
+    pub fn renumbered(&self, rows: impl Iterator<Item = usize>, place: &[usize]) -> Self {
+        let mut out = Self::new();
+        let mut entries: Vec<(usize, f64)> = Vec::with_capacity(8);
+        for row in rows {
+            entries.clear();
+            entries.extend(self.entries(row).map(|(index, coefficient)| (place[index], coefficient)));
+            out.push(&entries, self.constant[row]);
+        }
+        out
+    }
 }
 
 fn narrow(index: usize) -> u32 {

@@ -20,7 +20,7 @@ pub enum Verdict {
 }
 
 /// A common relaxation up to this counts as none.
-const TOLERANCE: f64 = 1e-7;
+pub(super) const TOLERANCE: f64 = 1e-7;
 /// Half-width of the box that keeps every variable bounded when bounds are left out, in logarithms.
 const BOX: f64 = 12.0;
 
@@ -30,7 +30,7 @@ const BOX: f64 = 12.0;
 /// # Errors
 /// [`Failed::Stalled`] where both came to nothing.
 pub fn feasibility(program: &Program, rows: &[usize], sums: &[usize]) -> Result<Verdict, Failed> {
-    let relaxed = relaxed(program, rows, sums);
+    let relaxed = relaxed(&part(program, rows, sums).0, true);
     let settings = Settings { gap: 1e-9, enough: Some(-1e-6), iterations: 120, ..Settings::default() };
     let own = Layout::new(&relaxed).ok_or(Failed::NotChained).and_then(|layout| layout.minimise(&settings));
     let solution = own.or_else(|failed| conic::minimise(&relaxed, settings.gap).map_err(|_| failed))?;
@@ -50,9 +50,7 @@ pub fn feasibility(program: &Program, rows: &[usize], sums: &[usize]) -> Result<
 
 /// A point that satisfies all limits, with as much room as they leave up to a thousandth; `None` where none was found.
 pub fn inside(program: &Program) -> Option<Vec<f64>> {
-    let rows: Vec<usize> = (0..program.rows.len()).collect();
-    let sums: Vec<usize> = (0..program.sums.len()).collect();
-    let relaxed = relaxed(program, &rows, &sums);
+    let relaxed = relaxed(program, true);
     let settings = Settings { gap: 1e-9, enough: Some(-1e-3), iterations: 200, ..Settings::default() };
     let own = Layout::new(&relaxed).ok_or(Failed::NotChained).and_then(|layout| layout.minimise(&settings));
     let solution = own.ok().or_else(|| conic::minimise(&relaxed, settings.gap).ok())?;
@@ -61,15 +59,57 @@ pub fn inside(program: &Program) -> Option<Vec<f64>> {
     (program.violation(&y) <= TOLERANCE).then_some(y)
 }
 
-fn relaxed(program: &Program, rows: &[usize], sums: &[usize]) -> Program {
+/// The point that keeps the chosen rows and comes nearest to the chosen sums; `None` where none was found, or without sums.
+pub(super) fn nearest(program: &Program, rows: &[usize], sums: &[usize]) -> Option<Vec<f64>> {
+    if sums.is_empty() {
+        return None;
+    }
+    let (part, variables) = part(program, rows, sums);
+    let settings = Settings { gap: 1e-9, iterations: 120, ..Settings::default() };
+    let solution = Layout::new(&relaxed(&part, false))?.minimise(&settings).ok()?;
+    let mut y = program.start.clone();
+    for (&variable, &value) in variables.iter().zip(&solution.y) {
+        y[variable] = value;
+    }
+    Some(y)
+}
+
+/// Some of the limits, with nothing to minimise, over the variables that these touch; and which those are.
+fn part(program: &Program, rows: &[usize], sums: &[usize]) -> (Program, Vec<usize>) {
+    let mut is_touched = vec![false; program.variables()];
+    rows.iter().flat_map(|&row| program.rows.entries(row)).for_each(|(i, _)| is_touched[i] = true);
+    for terms in sums.iter().map(|&sum| &program.sums[sum]) {
+        (0..terms.len()).flat_map(|row| terms.entries(row)).for_each(|(i, _)| is_touched[i] = true);
+    }
+    let variables: Vec<usize> = (0..program.variables()).filter(|&i| is_touched[i]).collect();
+    let mut place = vec![0; program.variables()];
+    for (at, &variable) in variables.iter().enumerate() {
+        place[variable] = at;
+    }
+    let mut nothing = Affines::new();
+    nothing.push(&[], 0.0);
+    let local = variables.iter().filter(|&&i| i < program.local).count();
+    let renumbered = |terms: &Affines| terms.renumbered(0..terms.len(), &place);
+    let part = Program {
+        local,
+        common: variables.len() - local,
+        objective: Objective::Linear(nothing),
+        rows: program.rows.renumbered(rows.iter().copied(), &place),
+        sums: sums.iter().map(|&sum| renumbered(&program.sums[sum])).collect(),
+        start: variables.iter().map(|&i| program.start[i]).collect(),
+    };
+    (part, variables)
+}
+
+/// The program with one relaxation t for all its sums, and for its rows where they give, too; t is least.
+fn relaxed(program: &Program, rows_give: bool) -> Program {
     let t = program.variables();
-    let mut all = program.rows.chosen(rows).with_entry(t, -1.0);
+    let mut all = if rows_give { program.rows.with_entry(t, -1.0) } else { program.rows.clone() };
     for (i, start) in program.start.iter().enumerate() {
         all.push(&[(i, 1.0)], -(start + BOX));
         all.push(&[(i, -1.0)], start - BOX);
     }
     all.push(&[(t, -1.0)], -0.5);
-    let sums: Vec<Affines> = sums.iter().map(|&sum| program.sums[sum].with_entry(t, -1.0)).collect();
     let mut least = Affines::new();
     least.push(&[(t, 1.0)], 0.0);
     let mut relaxed = Program {
@@ -77,7 +117,7 @@ fn relaxed(program: &Program, rows: &[usize], sums: &[usize]) -> Program {
         common: program.common + 1,
         objective: Objective::Linear(least),
         rows: all,
-        sums,
+        sums: program.sums.iter().map(|sum| sum.with_entry(t, -1.0)).collect(),
         start: program.start.clone(),
     };
     relaxed.start.push(0.0);

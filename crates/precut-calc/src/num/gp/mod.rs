@@ -8,6 +8,7 @@
 
 mod affine;
 mod border;
+mod conflict;
 pub mod conic;
 mod feasibility;
 mod interior;
@@ -15,6 +16,7 @@ mod layout;
 mod newton;
 
 pub use affine::Affines;
+pub use conflict::conflict;
 pub use feasibility::{Verdict, feasibility, inside};
 pub use interior::{Failed, Settings, minimise};
 pub use layout::Layout;
