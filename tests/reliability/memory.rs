@@ -9,6 +9,8 @@ use crate::watch::Service;
 /// Just below the largest body that is read.
 const BYTES: usize = 7_800_000;
 const MB: f64 = 1e6;
+/// What a request takes beside its body: what is refused at the first byte takes 0.5 to 0.8 MB, whatever its size.
+const BESIDE: f64 = 1.0 * MB;
 
 /// A body of about [`BYTES`]: a piece again and again between a beginning and an end.
 fn body(begin: &str, piece: &str, end: &str) -> String {
@@ -52,8 +54,8 @@ fn worst() -> Vec<(&'static str, &'static str, String, f64)> {
             body("{\"measurements\":{\"csv\":\"z_mm,sag_um\\n", "1,1\\n", "1,1\"}}"),
             3.0,
         ),
-        // Its bytes, the text without escapes, and the text that is kept: three times and what stands beside them.
-        ("nothing but separators", bar, body("{\"measurements\":{\"csv\":\"", ",", "\\n1\"}}"), 3.3),
+        // Its bytes, the text without escapes, and the text that is kept.
+        ("nothing but separators", bar, body("{\"measurements\":{\"csv\":\"", ",", "\\n1\"}}"), 3.0),
         ("columns of a table", bar, body("{\"measurements\":{\"csv\":\"", "z_mm,", "z_mm\\n1\"}}"), 3.0),
         ("a study of a list in an unknown field", studies, body(&study("\"job\":{\"x\":["), "{},", "{}]}}"), 3.0),
         ("a study of too many rows", studies, body(&study("\"job\":{\"measurements\":["), "{},", "{}]}}"), 3.0),
@@ -95,7 +97,7 @@ async fn no_body_takes_much_more_memory_than_its_bytes() {
         println!("{name}: {status}, {answer} bytes back, {:.1} MB, {:.2} of the body", took / MB, took / bytes);
         assert!((400..=499).contains(&status), "{name}: {status}");
         assert!(answer < 200_000, "{name}: an answer of {answer} bytes");
-        assert!(took <= most * bytes, "{name}: {:.2} times its size", took / bytes);
+        assert!(took <= most * bytes + BESIDE, "{name}: {:.2} times its size", took / bytes);
         service.stop();
     }
 }
