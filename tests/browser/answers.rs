@@ -139,8 +139,11 @@ fn no_program_is_ever_that_of_another_part() {
             page.evaluate("[...document.querySelectorAll('.grid input[aria-invalid=true]')].forEach(it => typeInto(it, { diameter_mm: '30', stock_diameter_mm: '55' }[it.dataset.column] ?? '150'))");
             page.until("document.querySelector('.result-pane').getAttribute('aria-busy') === 'false'");
             if page.evaluate("document.querySelector('#take').disabled") == true {
-                // Begun anew.
+                // Begun anew, from another page: what was typed may not have reached the address.
+                page.evaluate("location.hash = '#/results'");
+                page.until("!document.querySelector('#take')");
                 page.evaluate("location.hash = '#/deflection-compensation?example=stepped_with_rest'");
+                page.until(SETTLED);
             }
             // What can be computed gives its sheet and its program, or says why there is none, whatever was typed before.
             page.until("!document.querySelector('#take').disabled");
