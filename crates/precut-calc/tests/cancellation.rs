@@ -125,7 +125,7 @@ impl Schema {
             Value::Number(there) => {
                 let names = ["minimum", "exclusiveMinimum", "maximum", "exclusiveMaximum"];
                 let all = schemas.iter().flat_map(|schema| names.iter().filter_map(|name| schema[*name].as_f64()));
-                let distinct: BTreeSet<u64> = all.map(|end| end.to_bits()).collect();
+                let distinct: BTreeSet<u64> = all.map(f64::to_bits).collect();
                 for end in distinct.into_iter().map(f64::from_bits) {
                     // What may not be reached itself is come near to.
                     let inward = if end.abs() > 0.0 { end * (1.0 - 1e-6) } else { 1e-6 };
@@ -195,7 +195,7 @@ impl Looked {
         for &after in cancels {
             let (longest, all) = longest_work::<C>(&job, after);
             if std::env::var_os("PRECUT_SHOW").is_some() {
-                println!("{longest:>10.1?} {all:>10.1?} {name}");
+                eprintln!("{longest:>10.1?} {all:>10.1?} {name}");
             }
             self.longest = self.longest.max(longest);
             if longest > LONGEST {
@@ -269,7 +269,7 @@ fn a_cancelled_calculation_ends_soon_at_the_ends_of_all_ranges() {
         precut_calc::register(&mut looked);
         looked
     });
-    println!("{} jobs, {} cancelled, {:.1?} without a look at most", looked.jobs, looked.cancelled, looked.longest);
+    eprintln!("{} jobs, {} cancelled, {:.1?} without a look at most", looked.jobs, looked.cancelled, looked.longest);
     assert!(looked.cancelled > 100, "{} of {} jobs", looked.cancelled, looked.jobs);
     assert!(looked.faults.is_empty(), "{}", looked.faults.join("\n"));
 }

@@ -109,10 +109,14 @@ fn pointers() -> Array {
         .build()
 }
 
+/// Most values that are listed one by one; a range may have more.
+const MOST_VALUES: usize = 100_000;
+
 fn settings() -> Array {
     ArrayBuilder::new()
         .items(scalar())
         .min_items(Some(1))
+        .max_items(Some(MOST_VALUES))
         .description(Some("The values, in the order of the rows: numbers in the field's unit, words, or truth values."))
         .build()
 }
