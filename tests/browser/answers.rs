@@ -9,7 +9,7 @@ use crate::chromium::Page;
 use crate::{SETTLED, both};
 
 /// Edits of one walk; with `PRECUT_EDITS` as many as it says.
-const EDITS: usize = 100;
+const EDITS: usize = 200;
 
 /// Numbers without a pattern that a test could be right by.
 struct Dice(u64);
@@ -171,7 +171,7 @@ fn no_program_is_ever_that_of_another_part() {
         }
     }
     eprintln!("{edits} edits: {} programs and {} sheets, each that of its screen", checked.0, checked.1);
-    assert!(checked.0 > 0 && checked.1 > 0, "{checked:?} were taken at all");
+    assert!(checked.0 >= edits / 10 && checked.1 >= edits / 10, "{checked:?} were taken at all");
     page.assert_calm();
 }
 
