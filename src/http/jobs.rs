@@ -17,7 +17,7 @@ use super::parts::{JobFile, private};
 use super::prefer::{PREFERENCE_APPLIED, Preference};
 use super::problem::{Problem, ProblemDocument};
 use super::query::Query;
-use crate::engine::{CacheState, Error, Job, JobQuery, JobState, Priority, Timings};
+use crate::engine::{CacheState, Job, JobQuery, JobState, Priority, Timings};
 use crate::text::{Language, Texts, told};
 
 /// Most jobs of one page.
@@ -236,12 +236,7 @@ pub(super) async fn list(
     let limit = query.number("limit", &(1..=MOST_ITEMS))?.unwrap_or(DEFAULT_ITEMS);
     let state = query.one_of("state", JobState::ALL, JobState::word)?;
     let before = query.after()?;
-    let calculator = query.text("calculator");
-    if let Some(id) = &calculator
-        && app.engine.entry(id).is_none()
-    {
-        return Err(Error::unknown(app.engine.registry(), id).into());
-    }
+    let calculator = query.calculator(&app.engine)?;
     let (jobs, next) = app
         .engine
         .jobs(JobQuery { state, calculator: calculator.clone(), owner: caller.shown(), limit, before })

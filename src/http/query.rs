@@ -9,6 +9,7 @@ use axum::extract::Query as Pairs;
 use axum::http::{StatusCode, Uri};
 
 use super::problem::Problem;
+use crate::engine::{Engine, Error};
 use crate::registry::nearest;
 
 /// The parameters of a request, each once and each known to its address.
@@ -42,6 +43,15 @@ impl Query {
     /// A text.
     pub(super) fn text(&mut self, name: &str) -> Option<String> {
         self.0.remove(name)
+    }
+
+    /// The name of a calculator that there is.
+    pub(super) fn calculator(&mut self, engine: &Engine) -> Result<Option<String>, Problem> {
+        let id = self.text("calculator");
+        match &id {
+            Some(id) if engine.entry(id).is_none() => Err(Error::unknown(engine.registry(), id).into()),
+            _ => Ok(id),
+        }
     }
 
     /// A text that cannot be left out.

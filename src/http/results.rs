@@ -17,7 +17,7 @@ use super::auth::Caller;
 use super::problem::Problem;
 use super::query::Query;
 use super::{App, CACHE_STATE, negotiate};
-use crate::engine::{Error, Key, Stored, Summary};
+use crate::engine::{Key, Stored, Summary};
 use crate::store::{Cursor, ResultPage, ResultQuery, ResultSummary};
 use crate::text::{Language, told};
 
@@ -83,12 +83,7 @@ pub(super) async fn list(
     let mut query = Query::of(&uri, &["calculator", "limit", "after"])?;
     let limit = query.number("limit", &(1..=MOST_ITEMS))?.unwrap_or(DEFAULT_ITEMS);
     let after = query.after::<Cursor>()?;
-    let calculator = query.text("calculator");
-    if let Some(id) = &calculator
-        && app.engine.entry(id).is_none()
-    {
-        return Err(Error::unknown(app.engine.registry(), id).into());
-    }
+    let calculator = query.calculator(&app.engine)?;
     let query = ResultQuery { calculator: calculator.clone(), owner: caller.shown(), limit: Some(limit), after };
     let page = app.engine.results(query).await?;
     let asked: Vec<_> = page.items.iter().map(|item| (item.key, item.calculator.clone())).collect();

@@ -115,7 +115,7 @@ impl<'a> Pace<'a> {
         Self { monitor, since_look: 0 }
     }
 
-    /// So many multiplications, about, were done or are done next: `Err(Failure::Cancelled)` once nobody waits any more.
+    /// Counts work in multiplications, done or about to be done; `Err(Failure::Cancelled)` once nobody waits for the answer.
     pub fn work(&mut self, multiplications: usize) -> Result<(), Failure> {
         self.since_look = self.since_look.saturating_add(multiplications);
         if self.since_look < Self::PER_LOOK {

@@ -179,7 +179,7 @@ pub(super) fn one_more_rest(
     };
     added.fill(&grid.steps_mm);
     with_rest.supports.push(added);
-    // What acts by default may be other effects there.
+    // With the support other effects may act by default.
     let with_rest = match settled(&with_rest, monitor) {
         Ok((with_rest, _)) => with_rest,
         Err(Failure::OutOfModel(_)) => return Ok(None),
@@ -200,8 +200,7 @@ pub(super) fn one_more_rest(
     Ok(form.form_error_um.map(|form_error_um| OneMoreRest { kind, z_mm, compliance_um_per_n, form_error_um }))
 }
 
-/// What is put under the shaft where it gives way most, and where: beyond the last support it is the free end that gives
-/// way, and there belongs a tailstock.
+/// The support that is tried where the shaft gives way most, and its station: a steady rest, or a tailstock at a free end.
 fn placed(job: &Job, z_mm: f64) -> (AddedSupport, f64) {
     let carrying = || job.supports.iter().filter(|s| s.carries()).filter_map(Support::station_mm);
     let (first, last) = (carrying().fold(f64::INFINITY, f64::min), carrying().fold(f64::NEG_INFINITY, f64::max));
@@ -363,7 +362,7 @@ fn yielding(stage: &Stage, shares: &Shares) -> Message {
     if most.1 <= 0.0 {
         return Message::new("nothing_yields").with("z_mm", shares.z_mm);
     }
-    // What was not given cannot be judged.
+    // A machine without compliances in the job cannot be compared with the work.
     let machine = shares.headstock + shares.tailstock + shares.rests + shares.tool;
     if most.0 == "work_dominates" && machine <= 0.0 {
         return Message::new("machine_taken_as_rigid").with("z_mm", shares.z_mm);
