@@ -545,6 +545,22 @@ proptest::proptest! {
     }
 }
 
+/// A start clear of the blank comes to it at the job's own feed: by nanometres a revolution that is no run to try.
+#[test]
+fn a_first_bite_is_switched_off_only_where_that_ends() {
+    let tried = |feed_mm_per_rev: f64, revolutions: u32| {
+        let mut job = with("/tool/y_mm", json!(113.0));
+        job["tool"]["feed_mm_per_rev"] = json!(feed_mm_per_rev);
+        job["tool"]["revolutions"] = json!(revolutions);
+        job["samples"] = json!(720);
+        let values = serde_json::to_value(&run(&job).output).unwrap();
+        let off = values["simulation"]["causes"]["switched_off"].as_array().unwrap().clone();
+        off.iter().any(|cause| cause["cause"] == "first_bite")
+    };
+    assert!(tried(0.08, 8));
+    assert!(!tried(1e-6, 8));
+}
+
 /// Frames of a replay are the surface on the way: what their history says, and what a run that stops there leaves.
 #[test]
 fn a_replay_shows_what_the_history_says_and_what_a_shorter_run_leaves() {
