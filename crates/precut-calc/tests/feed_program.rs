@@ -3,7 +3,7 @@
 #![allow(clippy::float_cmp, reason = "diameters are cut to the very number")]
 #![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "cells of a blank are few")]
 
-use precut_calc::calculator::{Answer, Block, Calculator, Failure, Unwatched, Violations};
+use precut_calc::calculator::{Answer, Block, Calculator, Failure, Finding, Unwatched, Value as Said, Violations};
 use precut_calc::feed_schedule::{FeedSchedule, Job, Outcome};
 use serde_json::{Value, json};
 
@@ -56,6 +56,13 @@ fn refused(job: &Value) -> &'static str {
 
 fn warned(job: &Value) -> Vec<&'static str> {
     answered(job).1.warnings.iter().map(|warning| warning.code).collect()
+}
+
+fn number(finding: &Finding, name: &str) -> f64 {
+    match finding.values.get(name) {
+        Some(Said::Number(value)) => *value,
+        other => panic!("{name}: {other:?}"),
+    }
 }
 
 /// A turned blank by cells.
@@ -163,6 +170,36 @@ fn stepped_shafts_are_turned_to_their_drawing() {
         // Down to 44 or 40 beside 60 or 50, whichever way.
         assert!(warned(&job).contains(&"plunge_at_shoulder"));
     }
+}
+
+/// Edges below 90 degrees run into every step up in the direction of the feed, and into no other.
+#[test]
+fn a_square_shoulder_needs_an_edge_of_90_degrees() {
+    let steps = [(100.0, 40.0, 41.0), (150.0, 50.0, 51.0), (80.0, 44.0, 45.0), (120.0, 60.0, 60.0)];
+    let zones = json!([
+        zone("a", 0.0, 100.0, 40.0, 0.5),
+        zone("b", 100.0, 250.0, 50.0, 0.5),
+        zone("c", 250.0, 330.0, 44.0, 0.5),
+    ]);
+    let met = |direction: &str, angle_deg: f64| {
+        let mut job = job(&steps, &zones);
+        job["feed_direction"] = json!(direction);
+        job["cutting_edge_angle_deg"] = json!(angle_deg);
+        let (_, answer) = answered(&job);
+        let of_edge = answer.warnings.into_iter().filter(|warning| warning.code == "edge_meets_shoulder");
+        of_edge.map(|warning| ["z_mm", "reach_mm"].map(|name| number(&warning, name))).collect::<Vec<_>>()
+    };
+    let reach_mm = |height_mm: f64| height_mm / 75.0_f64.to_radians().tan();
+    let near = |found: Vec<[f64; 2]>, right: &[[f64; 2]]| {
+        assert_eq!(found.len(), right.len(), "{found:?}");
+        let pairs = found.iter().flatten().zip(right.iter().flatten());
+        assert!(pairs.clone().all(|(a, b)| (a - b).abs() < 1e-9), "{found:?}");
+    };
+    // A collar that no zone cuts is a shoulder, too.
+    near(met("to_tailstock", 75.0), &[[100.0, reach_mm(5.0)], [330.0, reach_mm(8.0)]]);
+    near(met("to_headstock", 75.0), &[[250.0, reach_mm(3.0)]]);
+    near(met("to_tailstock", 90.0), &[]);
+    near(met("to_headstock", 93.0), &[]);
 }
 
 #[test]

@@ -5,9 +5,10 @@ use std::f64::consts::{PI, SQRT_2};
 
 use crate::calculator::{Failure, Finding};
 use crate::num::beam::{BeamError, area_mm2};
+use crate::turning::{EDGE_MEETS_SHOULDER, Finished, edge_meets_shoulders};
 
 use super::grid::Grid;
-use super::input::{FeedDirection, Job, Segment};
+use super::input::{Job, Segment};
 use super::output::Outcome;
 use super::regime::{Speed, spindle_speed_rpm};
 use super::stage::Stage;
@@ -25,14 +26,12 @@ const BOW_DOUBLED: f64 = 1.0 / SQRT_2;
 const SHELL_SHARE: f64 = 0.1;
 /// Mean radius over wall from which on a tube is a shell.
 const THIN: f64 = 5.0;
-/// An edge at this angle stands square to the axis, degrees.
-const SQUARE_DEG: f64 = 90.0;
 /// Standard deviations on either side.
 const DEVIATIONS: f64 = 2.0;
 
 /// Codes of the warnings made here.
 pub(super) const WARNING_CODES: &[&str] =
-    &["near_critical_speed", "thin_wall", "edge_meets_shoulder", "uncertainty_exceeds_tolerance"];
+    &["near_critical_speed", "thin_wall", EDGE_MEETS_SHOULDER, "uncertainty_exceeds_tolerance"];
 
 /// First critical speed of the held shaft in bending, rev/min: masses on the flexibility of the finished shaft on its
 /// bilateral supports, largest eigenvalue by power iteration. A rest that travels or bears on one side holds nothing here.
@@ -159,31 +158,22 @@ fn thin_wall(job: &Job, index: usize, segment: &Segment, beam_mm_per_n: f64) -> 
     })
 }
 
-/// Shoulders toward which the tool feeds with an edge below 90 degrees: it leads the nose by h/tan(kappa) at the height h
-/// and cuts into the face before the nose is there.
+/// Shoulders that the edge runs into.
 fn shoulders(job: &Job, stage: &Stage) -> Vec<Finding> {
-    let Some(angle_deg) = job.force.cutting_edge_angle_deg().filter(|angle| *angle < SQUARE_DEG) else {
-        return Vec::new();
-    };
     let ends_mm = job.shaft.ends_mm();
-    let segments = &job.shaft.segments;
-    let lead = angle_deg.to_radians().tan().recip();
-    let meets = |k: usize| {
-        let (cut, ahead) = match stage.regime.direction {
-            FeedDirection::ToHeadstock => (&segments[k + 1], &segments[k]),
-            FeedDirection::ToTailstock => (&segments[k], &segments[k + 1]),
-        };
-        let turned = job.stock_profile.is_some() || cut.stock_mm() > cut.diameter_mm;
-        let height_mm = (ahead.diameter_mm - cut.diameter_mm) / 2.0;
-        (turned && height_mm > 0.0).then(|| {
-            Finding::new("edge_meets_shoulder", "/force/cutting_edge_angle_deg")
-                .measured(angle_deg, SQUARE_DEG, "deg")
-                .with("z_mm", ends_mm[k + 1])
-                .with("height_mm", height_mm)
-                .with("reach_mm", height_mm * lead)
+    let finished: Vec<Finished> = job
+        .shaft
+        .segments
+        .iter()
+        .zip(&ends_mm[1..])
+        .map(|(segment, &to_mm)| Finished {
+            to_mm,
+            diameter_mm: segment.diameter_mm,
+            is_turned: job.stock_profile.is_some() || segment.stock_mm() > segment.diameter_mm,
         })
-    };
-    (0..segments.len().saturating_sub(1)).filter_map(meets).collect()
+        .collect();
+    let angle_deg = job.force.cutting_edge_angle_deg();
+    edge_meets_shoulders(angle_deg, "/force/cutting_edge_angle_deg", stage.regime.direction, &finished)
 }
 
 /// Tolerances that two standard deviations of what is known do not fit into: of size to one side; of form by how much the

@@ -2,6 +2,7 @@
 
 use crate::calculator::{Basis, Finding, Message};
 use crate::machinability::{Conditions, MachinabilityModel, ModelForm};
+use crate::turning::EDGE_MEETS_SHOULDER;
 
 use super::case::Case;
 use super::input::{FeedMode, Goal, Job, SpeedMode};
@@ -27,6 +28,7 @@ pub(super) const WARNING_CODES: &[&str] = &[
     "compensation_needed",
     "unconfirmed_model",
     "plunge_at_shoulder",
+    EDGE_MEETS_SHOULDER,
     "pass_thicker_than_counted",
     "surface_wears_out_its_edge",
     "shares_of_edges_priced",

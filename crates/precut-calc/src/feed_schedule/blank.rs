@@ -1,6 +1,7 @@
 //! What stands of the workpiece before the program runs, and whether the zones fit it.
 
 use crate::calculator::{Failure, Finding};
+use crate::turning::Finished;
 
 use super::input::Job;
 use super::output::Outcome;
@@ -52,6 +53,21 @@ impl Blank {
             blank.change(cut.from_mm, cut.to_mm, |there| there.max(cut.diameter_mm + 2.0 * cut.depth_mm));
         }
         blank
+    }
+
+    /// The shaft after all cuts.
+    pub(super) fn finished(mut self, cuts: &[Turned]) -> Vec<Finished> {
+        for cut in cuts {
+            self.change(cut.from_mm, cut.to_mm, |there| there.min(cut.diameter_mm));
+        }
+        let is_turned = |ends: &[f64]| {
+            let over = |cut: &Turned| cut.from_mm.max(ends[0]) + LEAST_MM < cut.to_mm.min(ends[1]);
+            cuts.iter().any(over)
+        };
+        let stretches = self.edges_mm.windows(2).zip(&self.diameters_mm);
+        stretches
+            .map(|(ends, &diameter_mm)| Finished { to_mm: ends[1], diameter_mm, is_turned: is_turned(ends) })
+            .collect()
     }
 
     /// Ends and diameter of every stretch, along the shaft.

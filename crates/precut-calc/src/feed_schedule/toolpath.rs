@@ -4,9 +4,10 @@ use std::borrow::Cow;
 
 use crate::calculator::{Column, Failure, Finding, Program, Table};
 use crate::deflection_compensation::{ProgramZero, Reach, chuck_in_the_way, met};
+use crate::force::ForceModel;
 use crate::path::round_to_increment;
 use crate::shaft::{FeedDirection, Support};
-use crate::turning::{self, Limits, Proof, Setting, Speed, Stretch, Written};
+use crate::turning::{self, Limits, Proof, Setting, Speed, Stretch, Written, edge_meets_shoulders};
 
 use super::blank::{Blank, Turned, zones_fit_the_shaft};
 use super::driven::Work;
@@ -110,7 +111,20 @@ impl Made {
         found.extend(job.supports.iter().enumerate().filter_map(|(i, support)| met(&reach, i, support)));
         found.extend(thicker(job, outcome, &self.passes));
         found.extend(beyond_the_spindle(job, outcome));
+        found.extend(self.shoulders(job));
         found
+    }
+
+    /// Shoulders that the edge runs into.
+    fn shoulders(&self, job: &Job) -> Vec<Finding> {
+        let cuts: Vec<Turned> = self.passes.iter().map(|pass| pass.turned).collect();
+        let finished = Blank::of(job, &cuts, &[]).finished(&cuts);
+        let of_force = || job.force.as_ref().and_then(ForceModel::cutting_edge_angle_deg);
+        let (angle_deg, pointer) = match job.cutting_edge_angle_deg {
+            Some(angle_deg) => (Some(angle_deg), "/cutting_edge_angle_deg"),
+            None => (of_force(), "/force/cutting_edge_angle_deg"),
+        };
+        edge_meets_shoulders(angle_deg, pointer, job.feed_direction, &finished)
     }
 
     /// Places where the tool goes down beside what is as thick as the cut, once each with the smallest diameter.

@@ -5,11 +5,13 @@
 //! the last one really left. The proof of an answer is what the drive finds.
 
 mod drive;
+mod shoulder;
 mod surface;
 mod write;
 
 pub(crate) use drive::{Driven, Limits, drive};
 pub use drive::{Proof, ProofPlace};
+pub(crate) use shoulder::{EDGE_MEETS_SHOULDER, Finished, edge_meets_shoulders};
 pub(crate) use surface::{Point, Surface};
 pub(crate) use write::{Rest, Setting, Speed, Stretch, Written, write};
 
