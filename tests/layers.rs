@@ -123,3 +123,20 @@ fn every_metric_is_explained() {
         assert!(used.contains(name), "{name} is described and never counted");
     }
 }
+
+/// What the papers for maintainers call a file is one.
+#[test]
+fn the_papers_name_files_that_exist() {
+    for paper in ["ARCHITECTURE.md", "CONTRIBUTING.md"] {
+        let text = std::fs::read_to_string(root().join(paper)).unwrap();
+        let quoted = text.split('`').skip(1).step_by(2);
+        let names: Vec<&str> = quoted
+            .filter(|word| word.contains('/') && !word.starts_with("/v1") && !word.contains([' ', '*', '\n']))
+            .filter(|word| !word.contains("NAME"))
+            .collect();
+        assert!(names.len() > 8, "{paper}: {names:?}");
+        for name in names {
+            assert!(root().join(name).exists(), "{paper} names {name}");
+        }
+    }
+}
