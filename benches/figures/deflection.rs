@@ -40,8 +40,9 @@ pub(crate) fn compliance(count: u32) -> Result<Measured, String> {
     cpu_time(|| Beam::new(&segments, &supports, State::Finished).map(|beam| beam.profile(&at, none)))
 }
 
-/// The whole answer of a job: with `detail: profile` the profile, the command, the prediction, copying and form.
-pub(crate) fn answer(count: u32, detail: &str) -> Result<Measured, String> {
+/// The whole answer of a job: with `detail: profile` the profile, the command, the prediction, copying and form. By default
+/// what the job leaves open is tried, and its partly turned section acts; with `as_stated` the finished shaft bends.
+pub(crate) fn answer(count: u32, detail: &str, mode: &str) -> Result<Measured, String> {
     let segments: Vec<_> = [0, 10, 0, 5, 0]
         .into_iter()
         .map(|bore| json!({ "length_mm": 400, "diameter_mm": 40, "stock_diameter_mm": 42, "bore_diameter_mm": bore }))
@@ -61,6 +62,7 @@ pub(crate) fn answer(count: u32, detail: &str) -> Result<Measured, String> {
         "cut": { "feed_mm_per_rev": 0.2, "speed_m_per_min": 140 },
         "stations": { "kind": "per_zone", "count": count },
         "tolerance": { "form_um": 20 },
+        "include": { "mode": mode },
         "detail": detail
     }))
     .map_err(|error| error.to_string())?;

@@ -28,16 +28,23 @@ pub(crate) fn all() -> Vec<Row> {
         row("compliance profile, 200 stations", Unit::Time, us(5.0), us(1.5), || deflection::compliance(200)),
         row("compliance profile, 10,000 stations", Unit::Time, us(80.0), us(20.0), || deflection::compliance(10_000)),
         row("complete deflection answer (detail: profile), 10,000 stations", Unit::Time, us(1000.0), us(300.0), || {
-            deflection::answer(10_000, "profile")
+            deflection::answer(10_000, "profile", "auto")
         }),
         row("the same with path, comparison and advice (detail: full)", Unit::Time, None, None, || {
-            deflection::answer(10_000, "full")
+            deflection::answer(10_000, "full", "auto")
         }),
-        row("complete deflection answer (detail: profile), 201 stations", Unit::Time, None, None, || {
-            deflection::answer(201, "profile")
+        row(
+            "complete deflection answer (detail: profile), 201 stations, effects as stated",
+            Unit::Time,
+            us(20.0),
+            us(10.0),
+            || deflection::answer(201, "profile", "as_stated"),
+        ),
+        row("the same, effects tried by default, its partly turned section acting", Unit::Time, None, None, || {
+            deflection::answer(201, "profile", "auto")
         }),
-        row("the same with path, comparison and advice (detail: full), 201 stations", Unit::Time, None, None, || {
-            deflection::answer(201, "full")
+        row("and with path, comparison and advice (detail: full)", Unit::Time, None, None, || {
+            deflection::answer(201, "full", "auto")
         }),
         row("fewest-chord tool path, 10,000 stations", Unit::Time, us(10_000.0), us(3000.0), || {
             deflection::chords(10_000)

@@ -60,8 +60,15 @@ impl<'a> Estimates<'a> {
         stage: &'a Stage,
         wanted: Wanted,
     ) -> Result<Self, Failure> {
-        let sample = Sample::of(grid, stage);
-        let state = State::of(job, acting, stage, &stage.structure, &sample, wanted)?;
+        let (chosen, sample) = Sample::of(grid, stage);
+        let is_known = wanted == Wanted::default() && !stage.line.has_contacts();
+        let profile = if is_known {
+            let radial_mm_per_n = chosen.iter().map(|&i| stage.line.work_mm_per_n[i]).collect();
+            Profile { radial_mm_per_n, ..Profile::default() }
+        } else {
+            stage.structure.beam.profile(&sample.z_mm, wanted)
+        };
+        let state = State::of(job, acting, stage, &stage.structure, &sample, profile)?;
         Ok(Self { job, acting, stage, sample, state })
     }
 
@@ -113,7 +120,8 @@ impl<'a> Estimates<'a> {
         other.section = section;
         other.theory = theory;
         let structure = Structure::of(job, &other)?;
-        let changed = State::of(job, acting, stage, &structure, sample, wanted(job))?;
+        let profile = structure.beam.profile(&sample.z_mm, wanted(job));
+        let changed = State::of(job, acting, stage, &structure, sample, profile)?;
         let include = &job.include;
         Ok(sample.largest(|place| changed.moved_mm(place, include) - state.moved_mm(place, include)))
     }
@@ -138,9 +146,8 @@ impl State {
         stage: &Stage,
         structure: &Structure,
         sample: &Sample,
-        wanted: Wanted,
+        mut profile: Profile,
     ) -> Result<Self, Failure> {
-        let mut profile = structure.beam.profile(&sample.z_mm, wanted);
         let displaced = structure.displaced(job, &acting.set_off, &sample.z_mm)?.unwrap_or_default();
         if let Some(contacts) = &mut profile.contacts {
             contacts.displace(displaced.rests_mm.clone());
@@ -198,7 +205,8 @@ struct Sample {
 }
 
 impl Sample {
-    fn of(grid: &Grid, stage: &Stage) -> Self {
+    /// With the indices of its stations.
+    fn of(grid: &Grid, stage: &Stage) -> (Vec<usize>, Self) {
         let contacts = stage.line.has_contacts();
         let chosen = grid.sample(if contacts { SAMPLES_WITH_CONTACTS } else { SAMPLES });
         let mut places = Vec::new();
@@ -209,7 +217,8 @@ impl Sample {
                 places.push(Place { k, target_mm, loads: stage.line.nominal_loads(i, cut_mm) });
             }
         }
-        Self { z_mm: chosen.iter().map(|&i| grid.z_mm[i]).collect(), places }
+        let z_mm = chosen.iter().map(|&i| grid.z_mm[i]).collect();
+        (chosen, Self { z_mm, places })
     }
 
     /// Largest change of the diameter, um, of a change of the radius in mm.

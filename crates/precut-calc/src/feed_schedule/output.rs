@@ -340,7 +340,7 @@ pub struct Price {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(example = 0.893, extensions(("x-unit" = json!("percent"))))]
     pub gain_percent: Option<f64>,
-    /// What one percent tighter adds to it, where that is something else.
+    /// What one percent tighter adds to it, where that is something else. Absent with `solved_anew`: tighter leaves no schedule with as many edges.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(example = 1.2, extensions(("x-unit" = json!("percent"))))]
     pub loss_percent: Option<f64>,

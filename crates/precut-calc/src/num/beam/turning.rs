@@ -62,7 +62,7 @@ impl<'a> Turning<'a> {
                     sample(form, span, block, &mut values);
                     lane[..block.len()].copy_from_slice(&values);
                 }
-                self.eliminate();
+                self.eliminate(block.len());
                 self.hold(k, block);
                 visit(self, block);
             }
@@ -80,7 +80,8 @@ impl<'a> Turning<'a> {
         self.frame.columns()
     }
 
-    fn eliminate(&mut self) {
+    /// The first `count` stations of the block.
+    fn eliminate(&mut self, count: usize) {
         let columns = self.frame.columns();
         for (i, original) in self.original.iter_mut().enumerate().take(columns) {
             *original = self.lanes[packed(self.order, i, i)];
@@ -88,20 +89,20 @@ impl<'a> Turning<'a> {
         let mut eliminated = vec![false; self.order];
         for &e in &self.plane.redundants {
             eliminated[e] = true;
-            let pivot = self.lanes[packed(self.order, e, e)];
-            let mut inverse = [0.0; BLOCK];
-            for ((inverse, pivot), original) in inverse.iter_mut().zip(&pivot).zip(&self.original[e]) {
+            let pivot = &self.lanes[packed(self.order, e, e)][..count];
+            let mut inverse: Lane = [0.0; BLOCK];
+            for ((inverse, pivot), original) in inverse.iter_mut().zip(pivot).zip(&self.original[e]) {
                 *inverse = if *pivot > VANISHING * original { 1.0 / pivot } else { 0.0 };
             }
             for i in (0..self.order).filter(|i| !eliminated[*i]) {
                 let mut factor = self.lanes[packed(self.order, i.min(e), i.max(e))];
-                for (factor, inverse) in factor.iter_mut().zip(&inverse) {
+                for (factor, inverse) in factor[..count].iter_mut().zip(&inverse) {
                     *factor *= inverse;
                 }
                 for j in (i..self.order).filter(|j| !eliminated[*j]) {
                     let other = self.lanes[packed(self.order, j.min(e), j.max(e))];
                     let lane = &mut self.lanes[packed(self.order, i, j)];
-                    for ((work, factor), other) in lane.iter_mut().zip(&factor).zip(&other) {
+                    for ((work, factor), other) in lane[..count].iter_mut().zip(&factor).zip(&other) {
                         *work -= factor * other;
                     }
                 }
