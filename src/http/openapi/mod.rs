@@ -3,6 +3,7 @@
 mod fixed;
 mod jobs;
 mod models;
+mod named;
 mod parts;
 mod rooms;
 
@@ -11,6 +12,7 @@ use std::collections::BTreeMap;
 use serde_json::{Map, Value};
 use utoipa::openapi::path::PathsBuilder;
 use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityScheme};
+use utoipa::openapi::server::ServerBuilder;
 use utoipa::openapi::tag::TagBuilder;
 use utoipa::openapi::{ComponentsBuilder, InfoBuilder, LicenseBuilder, OpenApiBuilder};
 use utoipa::openapi::{RefOr, Schema};
@@ -91,10 +93,16 @@ pub fn document(registry: &Registry) -> Value {
                 .build(),
         )
         .tags(Some(parts::TAGS.map(|(name, text)| TagBuilder::new().name(name).description(Some(text)).build())))
+        .servers(Some([ServerBuilder::new()
+            .url("/")
+            .description(Some("The service that this document comes from."))
+            .build()]))
         .paths(paths)
         .components(Some(components.build()))
         .build();
-    stable(serde_json::to_value(&api).expect("a document has only words and numbers"))
+    let mut document = stable(serde_json::to_value(&api).expect("a document has only words and numbers"));
+    named::choices(&mut document);
+    document
 }
 
 /// Extensions (`x-...`) behind the other members and by name: `utoipa` keeps them in a hash map.

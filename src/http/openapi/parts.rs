@@ -135,6 +135,7 @@ pub(super) fn guarded(mut operation: OperationBuilder, own: &[u16]) -> Operation
 
 /// The same for operations that need no key.
 pub(super) fn open(mut operation: OperationBuilder, own: &[u16]) -> OperationBuilder {
+    operation = operation.securities(Some(Vec::new()));
     for status in own.iter().chain(&[414, 431, 500, 503]) {
         operation = operation.response(status.to_string(), Ref::from_response_name(problem_name(*status)));
     }
