@@ -120,6 +120,8 @@ pub struct Limits {
 pub struct Jobs {
     /// Jobs that run at the same time; 0 takes all cores but one.
     pub slots: usize,
+    /// What is estimated shorter, ms, has a place of its own while all others are taken; 0 for no such place.
+    pub short_ms: f64,
     /// Jobs that may wait.
     pub queue: u64,
     /// How long finished jobs and their results are kept, days.
@@ -412,6 +414,10 @@ impl Config {
             if !(ms > 0.0 && ms.is_finite()) {
                 faults.push(format!("{name} = {ms}: must be above 0"));
             }
+        }
+        let short_ms = self.jobs.short_ms;
+        if !(short_ms >= 0.0 && short_ms.is_finite()) {
+            faults.push(format!("jobs.short_ms = {short_ms}: must be 0 or more"));
         }
         if !(2..=1000).contains(&self.postgres.connections) {
             faults.push(format!("postgres.connections = {}: must be 2 to 1000", self.postgres.connections));

@@ -335,7 +335,7 @@ impl Inner {
             let room = this.room_for(&body);
             read::read(&entry, &body, &Models { registry: &this.registry, found, room })
         };
-        self.cores.run(slot, work).await
+        slot.run(work).await
     }
 
     /// What is kept under a key, in memory or in the store. A store that fails is as good as an empty one here.
@@ -376,7 +376,7 @@ impl Inner {
     /// Runs the calculation on the pool.
     fn fly(inner: &Arc<Self>, pilot: Pilot, ready: Ready, slot: Slot, queued: Instant) {
         let this = Arc::clone(inner);
-        inner.cores.spawn(move || this.run(pilot, &ready, Some(slot), queued));
+        slot.line().push(move || this.run(pilot, &ready, Some(slot), queued));
     }
 
     /// Runs the calculation, keeps its answer and tells it.

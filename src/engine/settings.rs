@@ -40,6 +40,8 @@ pub struct EngineSettings {
     pub queue_limit: u64,
     /// Jobs run at the same time behind the direct answers.
     pub job_slots: usize,
+    /// A job estimated below this has a place of its own while all others are taken; none has at 0.
+    pub short_limit: Duration,
     /// How long finished jobs and their results are kept.
     pub job_age: Duration,
     /// Memory of all bodies in work together and of what is read from them, bytes.
@@ -71,6 +73,7 @@ impl EngineSettings {
             cost_limit_bytes: 1 << 30,
             queue_limit: 10_000,
             job_slots: Self::job_slots_of(cores),
+            short_limit: Duration::from_secs(5),
             job_age: Duration::from_hours(30 * 24),
             bodies_bytes: 128 << 20,
             isolation: None,
@@ -98,6 +101,7 @@ impl EngineSettings {
             cost_limit_bytes: config.limits.job_bytes,
             queue_limit: config.jobs.queue,
             job_slots: if config.jobs.slots == 0 { Self::job_slots_of(cores) } else { config.jobs.slots },
+            short_limit: milliseconds(config.jobs.short_ms),
             job_age: Duration::from_secs(u64::from(config.jobs.days) * 24 * 3600),
             bodies_bytes: config.limits.bodies_bytes,
             isolation: None,

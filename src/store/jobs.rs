@@ -425,6 +425,8 @@ pub trait JobStore: Send + Sync + 'static {
     fn counts(&self) -> BoxFuture<'_, Result<JobCounts, StoreError>>;
     /// Starts charged to the job's computation so far and its calculator, if it waits.
     fn waiting(&self, id: JobId) -> BoxFuture<'_, Result<Option<(u32, String)>, StoreError>>;
+    /// The next job in line of at most so long, estimated, that was not charged a start yet.
+    fn next_short(&self, most_ms: f64) -> BoxFuture<'_, Result<Option<JobId>, StoreError>>;
     /// Takes the job and all equal ones that wait under a lease, and charges them one start; fails them, with
     /// `problem`, if they have been charged `most` already.
     fn claim(&self, id: JobId, lease: Lease, most: u32, problem: String) -> BoxFuture<'_, Result<Claimed, StoreError>>;

@@ -11,6 +11,7 @@
 //! 2. A task comes up in the queue; [`worker`] takes the job with all equal ones that wait under one **lease**, and
 //!    charges them a start. Every later write names the lease and finds no record once it is lost: a computation that
 //!    was given to somebody else cannot write any more.
+//!    While long jobs have taken all places, short ones have one more ([`short`]).
 //! 3. It runs on the jobs' own pool. How far it is stands in memory and is written once a second.
 //! 4. Its end, with its result, is written in one transaction for all jobs that still hold the lease. A cancel or a
 //!    deadline takes one job off the lease; when the last has gone, the computation is told to stop.
@@ -41,6 +42,7 @@ mod help;
 mod isolated;
 mod requests;
 mod running;
+mod short;
 mod sweeper;
 pub(crate) mod work;
 mod worker;
@@ -149,6 +151,8 @@ pub(crate) struct Jobs {
     feeds: Arc<Feeds>,
     computations: Arc<Computations>,
     new_deadline: Notify,
+    /// A job came into line.
+    came: Notify,
     stop: watch::Sender<bool>,
     tasks: Mutex<Vec<JoinHandle<()>>>,
 }
@@ -161,6 +165,7 @@ impl Jobs {
             feeds: Arc::default(),
             computations: Arc::default(),
             new_deadline: Notify::new(),
+            came: Notify::new(),
             stop: watch::channel(false).0,
             tasks: Mutex::default(),
         }
@@ -179,7 +184,7 @@ impl Jobs {
             let engine = weak.upgrade();
             let task: futures_util::future::BoxFuture<'static, ()> = Box::pin(async move {
                 if let Some(engine) = engine {
-                    worker::run_task(engine, id).await;
+                    worker::run_task(engine, id, None).await;
                 }
             });
             task
@@ -188,6 +193,9 @@ impl Jobs {
         if engine.settings.role.works() {
             let work = jobs.store.work(engine.cores.job_places(), run, jobs.stop.subscribe());
             tasks.push(tokio::spawn(work));
+            if !engine.settings.short_limit.is_zero() {
+                tasks.push(tokio::spawn(short::run(Arc::downgrade(engine))));
+            }
         }
         let (feeds, computations) = (Arc::clone(&jobs.feeds), Arc::clone(&jobs.computations));
         jobs.store.tell(Arc::new(move |news| match news {
@@ -213,6 +221,10 @@ impl Jobs {
         for task in tasks {
             let _ = task.await;
         }
+    }
+
+    fn is_stopped(&self) -> bool {
+        *self.stop.borrow()
     }
 
     /// Waits until [`Jobs::stop`].
@@ -260,6 +272,7 @@ impl Jobs {
                 if useful_for_ms.is_some() {
                     self.new_deadline.notify_one();
                 }
+                self.came.notify_one();
                 Ok((record, true))
             }
             Accepted::Known(record) => Ok((record, false)),

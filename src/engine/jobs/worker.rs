@@ -6,15 +6,18 @@ use std::time::{Duration, Instant};
 use precut_calc::calculator::Failure;
 
 use super::{MOST_ATTEMPTS, fault, help, work};
+use crate::engine::exec::Slot;
 use crate::engine::{Error, Inner, Stored};
 use crate::store::StoreError;
 use crate::store::jobs::{Claim, Claimed, Ending, JobId};
 
-/// Runs the job of a task, if it still waits. Returns when its record says how it ended, or that it waits again.
-pub(super) async fn run_task(engine: Arc<Inner>, id: JobId) {
+/// Runs a job, if it still waits: in a place of those for short ones, if it was given one. Returns when its record says how
+/// it ended, or that it waits again.
+pub(super) async fn run_task(engine: Arc<Inner>, id: JobId, place: Option<Slot>) {
     let jobs = &engine.jobs;
     let (charged, calculator) = match stubbornly(&engine, || jobs.store.waiting(id)).await {
         Some(Some(waiting)) => waiting,
+        Some(None) if place.is_some() => return,
         // Nobody waits for it to begin; perhaps somebody has asked for help with it.
         Some(None) => return help::run(&engine, id).await,
         None => return,
@@ -26,11 +29,13 @@ pub(super) async fn run_task(engine: Arc<Inner>, id: JobId) {
     let is_isolated =
         engine.settings.isolation.is_some() && engine.known(&calculator).is_ok_and(|entry| !entry.is_composed());
     let most = if is_isolated { u32::MAX } else { MOST_ATTEMPTS };
-    let slot = tokio::select! {
-        slot = engine.cores.job_slot(alone) => slot,
-        () = jobs.stopped() => return,
+    let slot = match place.filter(|_| !alone) {
+        Some(place) => place,
+        None => tokio::select! {
+            Ok(slot) = engine.cores.job_slot(alone) => slot,
+            () = jobs.stopped() => return,
+        },
     };
-    let Ok(slot) = slot else { return };
     let begun = jobs.computations.begin();
     let running = Arc::clone(&begun.running);
     let poison = fault::written(&Error::CrashedRepeatedly { attempts: MOST_ATTEMPTS });

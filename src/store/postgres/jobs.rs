@@ -19,6 +19,7 @@ use crate::store::jobs::{
     JobStore, Lease, Live, NewJob, RunTask, Shared, Timing,
 };
 use crate::store::sqlite_jobs::pack::{packed, packed_ending};
+use crate::store::sqlite_jobs::record::parsed;
 use crate::store::{KeptResult, ResultPage, ResultQuery, ResultStore, StoreError, Taken};
 
 /// Tasks that one call for help makes at most.
@@ -198,6 +199,19 @@ impl JobStore for PostgresStore {
             .fetch_optional(&self.pool)
             .await?;
             Ok(waiting.map(|(attempts, calculator)| (count(attempts), calculator)))
+        })
+    }
+    fn next_short(&self, most_ms: f64) -> BoxFuture<'_, Result<Option<JobId>, StoreError>> {
+        Box::pin(async move {
+            let next: Option<String> = sqlx::query_scalar(
+                "SELECT id FROM precut.jobs WHERE state = 'queued' AND estimate_ms <= $1 AND attempt = 0 AND engine = $2
+                 ORDER BY priority DESC, turn, id LIMIT 1",
+            )
+            .bind(most_ms)
+            .bind(&self.engine)
+            .fetch_optional(&self.pool)
+            .await?;
+            Ok(next.map(|id| parsed(&id)).transpose()?)
         })
     }
     fn claim(&self, id: JobId, lease: Lease, most: u32, problem: String) -> BoxFuture<'_, Result<Claimed, StoreError>> {

@@ -17,6 +17,8 @@ struct TakenRow {
     attempt: i32,
     kind: String,
     calculator: String,
+    priority: i32,
+    turn: i64,
     /// Of one of them only: they are equal.
     input: Option<Vec<u8>>,
 }
@@ -44,7 +46,7 @@ pub(super) async fn claim(
              expires_ms = CASE WHEN starts < $3 THEN NULL ELSE $5::bigint + $7 END,
              progress = 0, stage = NULL
          FROM line, charged WHERE job.id = line.id AND job.state = 'queued'
-         RETURNING job.id, job.state, job.attempt, job.kind, job.calculator,
+         RETURNING job.id, job.state, job.attempt, job.kind, job.calculator, job.priority, job.turn,
              CASE WHEN job.id = $2 THEN job.input END AS input",
     )
     .bind(key.as_bytes().as_slice())
@@ -59,7 +61,7 @@ pub(super) async fn claim(
     if taken.is_empty() {
         // The answer to a claim may be lost on its way: who asks again has it already.
         taken = sqlx::query_as(
-            "SELECT id, state, attempt, kind, calculator, CASE WHEN id = $2 THEN input END AS input
+            "SELECT id, state, attempt, kind, calculator, priority, turn, CASE WHEN id = $2 THEN input END AS input
              FROM precut.jobs WHERE lease = $1 AND state = 'running'",
         )
         .bind(lease.to_string())
@@ -73,6 +75,16 @@ pub(super) async fn claim(
     if job.state != JobState::Running.word() {
         return Ok(Claimed::Poisonous(jobs));
     }
+    // The line has come to this place, however long others run that were taken before: who comes now begins behind it.
+    // Rows that somebody else is about to write are left alone; nobody waits here.
+    sqlx::query(
+        "UPDATE precut.jobs SET turn = $1 WHERE id IN (
+             SELECT id FROM precut.jobs WHERE state = 'running' AND priority = $2 AND turn < $1 FOR UPDATE SKIP LOCKED)",
+    )
+    .bind(job.turn)
+    .bind(job.priority)
+    .execute(connection)
+    .await?;
     Ok(Claimed::Run(Claim {
         lease,
         jobs,

@@ -27,7 +27,7 @@ pub(super) use care::recover;
 use care::{expire_deadlines, forget_expired, note_timing, sweep};
 use line::submit;
 use pack::{PackedEnding, packed, packed_ending};
-use record::{Outcome, RecordRow, columns, json_list, record};
+use record::{Outcome, RecordRow, columns, json_list, parsed, record};
 use run::{beat, cancel, claim, finish, redo, requeue};
 
 impl SqliteStore {
@@ -140,6 +140,18 @@ impl JobStore for SqliteStore {
                  WHERE one.id = ?1 AND one.state = 'queued' AND other.state = 'queued' GROUP BY one.calculator",
             );
             Ok(waiting.bind(id.to_string()).fetch_optional(&self.readers).await?)
+        })
+    }
+    fn next_short(&self, most_ms: f64) -> BoxFuture<'_, Result<Option<JobId>, StoreError>> {
+        Box::pin(async move {
+            let next: Option<String> = sqlx::query_scalar(
+                "SELECT id FROM precut_jobs WHERE state = 'queued' AND estimate_ms <= ?1 AND attempt = 0
+                 ORDER BY priority DESC, turn, id LIMIT 1",
+            )
+            .bind(most_ms)
+            .fetch_optional(&self.readers)
+            .await?;
+            Ok(next.map(|id| parsed(&id)).transpose()?)
         })
     }
     fn claim(&self, id: JobId, lease: Lease, most: u32, problem: String) -> BoxFuture<'_, Result<Claimed, StoreError>> {

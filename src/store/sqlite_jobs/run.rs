@@ -15,6 +15,8 @@ struct Waiting {
     kind: String,
     calculator: String,
     input: Vec<u8>,
+    priority: i64,
+    turn: i64,
 }
 
 pub(super) async fn claim(
@@ -26,11 +28,11 @@ pub(super) async fn claim(
     now: i64,
 ) -> Outcome<Claimed> {
     let waiting: Option<Waiting> =
-        sqlx::query_as("SELECT key, kind, calculator, input FROM precut_jobs WHERE id = ?1 AND state = 'queued'")
+        sqlx::query_as("SELECT key, kind, calculator, input, priority, turn FROM precut_jobs WHERE id = ?1 AND state = 'queued'")
             .bind(id.to_string())
             .fetch_optional(&mut *connection)
             .await?;
-    let Some(Waiting { key, kind, calculator, input }) = waiting else { return Ok(Claimed::Nothing) };
+    let Some(Waiting { key, kind, calculator, input, priority, turn }) = waiting else { return Ok(Claimed::Nothing) };
     let charged: u32 = sqlx::query_scalar("SELECT max(attempt) FROM precut_jobs WHERE key = ?1 AND state = 'queued'")
         .bind(&key)
         .fetch_one(&mut *connection)
@@ -57,8 +59,14 @@ pub(super) async fn claim(
     .bind(charged + 1)
     .bind(lease.to_string())
     .bind(now)
-    .fetch_all(connection)
+    .fetch_all(&mut *connection)
     .await?;
+    // The line has come to this place, however long others run that were taken before: who comes now begins behind it.
+    sqlx::query("UPDATE precut_jobs SET turn = ?1 WHERE state = 'running' AND priority = ?2 AND turn < ?1")
+        .bind(turn)
+        .bind(priority)
+        .execute(connection)
+        .await?;
     // A damaged input is nothing that can be run: who claims it finds that out and says so on the record.
     let input = zstd::decode_all(&*input).unwrap_or_default();
     let kind = JobKind::of_word(&kind).ok_or_else(|| unreadable("kind"))?;

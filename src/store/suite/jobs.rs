@@ -195,6 +195,56 @@ pub(in crate::store) async fn the_line_is_fair_between_owners_and_keeps_prioriti
     assert!(at(third) < at(ids[2]));
 }
 
+pub(in crate::store) async fn a_long_job_lets_some_short_ones_pass_and_no_more<P: Place>() {
+    let place = P::new().await;
+    let long = |number: u32| NewJob { estimate_ms: 3_600_000.0, ..job(number) };
+    // One runs all the time. Another one waits, for the other place, and short ones of many clients keep coming.
+    let running = place.accept(long(1)).await.id;
+    place.run(running).await;
+    place.lose_task(running).await;
+    let waiting = place.accept(long(2)).await.id;
+    let mut passed = 0;
+    for number in 10..60 {
+        let owner = format!("client {number}");
+        place.accept(NewJob { owner, ..job(number) }).await;
+        let first = place.line().await[0];
+        if first == waiting {
+            break;
+        }
+        passed += 1;
+        let claim = place.run(first).await;
+        place.lose_task(first).await;
+        place.store().finish(claim.lease, Ending::Succeeded(result(number))).await.unwrap();
+    }
+    assert!((1..=12).contains(&passed), "{passed} have passed");
+    assert_eq!(place.line().await[0], waiting);
+}
+
+pub(in crate::store) async fn the_next_short_job_is_the_first_of_them_in_line<P: Place>() {
+    let place = P::new().await;
+    let lasting = |number: u32, estimate_ms: f64| NewJob { estimate_ms, ..job(number) };
+    let next = async || place.store().next_short(5000.0).await.unwrap();
+    place.accept(lasting(1, 60_000.0)).await;
+    assert_eq!(next().await, None);
+    let first = place.accept(lasting(2, 5000.0)).await.id;
+    let second = place.accept(lasting(3, 10.0)).await.id;
+    let high = place.accept(NewJob { priority: Priority::High, ..lasting(4, 100.0) }).await.id;
+    let mut taken = Vec::new();
+    while let Some(id) = next().await {
+        taken.push(id);
+        place.run(id).await;
+    }
+    // A client's jobs follow one another, the shorter before the longer where both are short enough to differ.
+    assert_eq!(taken[0], high);
+    taken.sort();
+    assert_eq!(taken, [first, second, high]);
+    // What has been charged a start waits for a place with the others.
+    place.silence().await;
+    place.store().sweep(Arc::new(Vec::new)).await.unwrap();
+    assert_eq!(place.record(second).await.state, JobState::Queued);
+    assert_eq!(next().await, None);
+}
+
 pub(in crate::store) async fn deadlines_end_what_is_late_and_nothing_else<P: Place>() {
     let place = P::new().await;
     let due = |number: u32, ms: i64| NewJob { useful_for_ms: Some(ms), ..job(number) };

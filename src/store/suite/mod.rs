@@ -123,6 +123,8 @@ macro_rules! suite {
             a_name_is_one_job_for_its_owner
             a_full_queue_takes_no_more
             the_line_is_fair_between_owners_and_keeps_priorities
+            a_long_job_lets_some_short_ones_pass_and_no_more
+            the_next_short_job_is_the_first_of_them_in_line
             deadlines_end_what_is_late_and_nothing_else
             a_lost_task_is_given_again_and_no_other
             what_a_kept_job_points_to_stays_and_what_is_expired_goes
