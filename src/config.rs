@@ -17,7 +17,7 @@ use crate::store::address::{Given, StoreAddress};
 pub const DEFAULTS: &str = include_str!("../config.default.toml");
 
 /// Sections of the configuration: `PRECUT_LOG_LEVEL` is `log.level`.
-const SECTIONS: [&str; 8] = ["log", "limits", "jobs", "cache", "postgres", "shutdown", "cors", "auth"];
+const SECTIONS: [&str; 9] = ["log", "limits", "jobs", "quota", "cache", "postgres", "shutdown", "cors", "auth"];
 
 /// Settings outside of the sections.
 const OUTSIDE: [&str; 5] = ["listen", "data", "store", "role", "cpu"];
@@ -45,6 +45,8 @@ pub struct Config {
     pub limits: Limits,
     /// What runs behind the answers.
     pub jobs: Jobs,
+    /// What one owner may take.
+    pub quota: Quota,
     /// What is kept.
     pub cache: Cache,
     /// How a PostgreSQL database is used.
@@ -128,6 +130,16 @@ pub struct Jobs {
     pub days: u32,
     /// Event streams that one client may have open.
     pub streams: usize,
+}
+
+/// What one owner of keys may take, or one address where nobody is asked for a key.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Quota {
+    /// Work within an hour, s of computation; 0 for no limit.
+    pub work_s_per_hour: f64,
+    /// Jobs and their results kept for him, bytes; 0 for no limit.
+    pub kept_bytes: u64,
 }
 
 /// What is kept.
@@ -414,6 +426,10 @@ impl Config {
             if !(ms > 0.0 && ms.is_finite()) {
                 faults.push(format!("{name} = {ms}: must be above 0"));
             }
+        }
+        let work_s = self.quota.work_s_per_hour;
+        if !(work_s >= 0.0 && work_s.is_finite()) {
+            faults.push(format!("quota.work_s_per_hour = {work_s}: must be 0 or more"));
         }
         let short_ms = self.jobs.short_ms;
         if !(short_ms >= 0.0 && short_ms.is_finite()) {

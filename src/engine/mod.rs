@@ -20,6 +20,7 @@ mod memory;
 mod model;
 mod models;
 mod progress;
+mod quota;
 mod read;
 mod settings;
 mod study;
@@ -38,6 +39,7 @@ pub use jobs::{Answered, Ask, Feed, Isolation, Job};
 pub use model::ModelContent;
 pub use models::{GivenModel, ModelAnswer, ModelError, ModelFile, ModelSource, NoShelf, OnShelf, Shelf, StoredModel};
 pub use progress::Interim;
+pub use quota::{Share, Standing};
 pub use settings::EngineSettings;
 pub use study::STUDIES;
 pub(crate) use summary::Summary;
@@ -60,6 +62,7 @@ use flight::{Boarded, Flights, Landed, Pilot};
 use jobs::Jobs;
 use memory::{Kept, Memory, fingerprint};
 use model::Models;
+use quota::Unwritten;
 use read::Ready;
 use summary::Summaries;
 
@@ -90,6 +93,7 @@ pub(crate) struct Inner {
     /// Memory for bodies and what is made of them.
     bodies: Budget,
     asked: Asked,
+    unwritten: Unwritten,
     closed: AtomicBool,
 }
 
@@ -138,6 +142,7 @@ impl Engine {
             summaries,
             bodies,
             asked: Asked::default(),
+            unwritten: Unwritten::default(),
             closed,
         });
         host.move_in(&inner);
@@ -292,6 +297,9 @@ impl Engine {
         if !inner.cores.drain(grace).await {
             inner.flights.cancel_all();
         }
+        if let Err(error) = inner.unwritten.write(&*inner.jobs.store).await {
+            tracing::warn!(%error, "the work of the last answers is not on record");
+        }
         inner.store.close().await;
     }
 }
@@ -371,6 +379,19 @@ impl Inner {
         // An estimate that is no number is not below the limit.
         let affordable = cost.ms <= limit.as_secs_f64() * 1e3 && cost.bytes <= limit_bytes;
         if affordable { Ok(()) } else { Err(Error::TooExpensive { cost, limit, limit_bytes }) }
+    }
+
+    /// Whether an owner may ask for so much work in an hour at all.
+    fn afford_at_all(&self, cost: &Cost, estimate_ms: f64) -> Result<(), Error> {
+        let (most_ms, limit_bytes) = (self.settings.quota.work_ms, self.settings.cost_limit_bytes);
+        match most_ms.filter(|most_ms| estimate_ms > *most_ms) {
+            Some(most_ms) => Err(Error::TooExpensive {
+                cost: Cost { ms: estimate_ms, ..*cost },
+                limit: Duration::from_secs_f64(most_ms / 1e3),
+                limit_bytes,
+            }),
+            None => Ok(()),
+        }
     }
 
     /// Runs the calculation on the pool.

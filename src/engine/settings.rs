@@ -7,6 +7,7 @@ use super::Isolation;
 use crate::config::{Config, Role, milliseconds, seconds};
 use crate::store::StoreSettings;
 use crate::store::address::StoreAddress;
+use crate::store::jobs::Quota;
 use crate::store::sqlite::Keep;
 
 /// How an engine works.
@@ -50,6 +51,8 @@ pub struct EngineSettings {
     pub isolation: Option<Isolation>,
     /// So many points has a parameter study at most.
     pub study_points: u64,
+    /// How much one owner may take.
+    pub quota: Quota,
     /// How long a job may stand in line for a core.
     pub patience: Duration,
 }
@@ -78,6 +81,7 @@ impl EngineSettings {
             bodies_bytes: 128 << 20,
             isolation: None,
             study_points: super::study::MOST_POINTS,
+            quota: Quota::default(),
             patience: Duration::from_millis(250),
         }
     }
@@ -106,6 +110,10 @@ impl EngineSettings {
             bodies_bytes: config.limits.bodies_bytes,
             isolation: None,
             study_points: config.limits.study_points,
+            quota: Quota {
+                kept_bytes: Some(config.quota.kept_bytes).filter(|bytes| *bytes > 0),
+                work_ms: Some(1e3 * config.quota.work_s_per_hour).filter(|ms| *ms > 0.0),
+            },
             patience: Duration::from_millis(config.limits.queue_ms),
         }
     }

@@ -21,6 +21,7 @@ mod parts;
 mod prefer;
 mod problem;
 mod query;
+mod quota;
 mod rate;
 mod results;
 mod server;
@@ -216,6 +217,8 @@ fn cors(origins: &[String]) -> Option<CorsLayer> {
         header::LOCATION,
         header::RETRY_AFTER,
         prefer::PREFERENCE_APPLIED,
+        quota::RATE_LIMIT,
+        quota::RATE_LIMIT_POLICY,
         CACHE_STATE,
         gate::REQUEST_ID,
     ];

@@ -12,6 +12,7 @@ use futures_util::future::BoxFuture;
 use tokio::sync::watch;
 use uuid::{ContextV7, Timestamp, Uuid};
 
+pub use super::quota::{Quota, Usage};
 use super::{KeptResult, StoreError};
 use crate::key::Key;
 
@@ -197,6 +198,8 @@ pub struct NewJob {
     /// For how long after it is accepted it is of use, ms. Its deadline is set where it is accepted, by the same reading
     /// of the same clock: whoever asks may have another.
     pub useful_for_ms: Option<i64>,
+    /// What its owner may take.
+    pub quota: Quota,
     /// Its result, where it is there already.
     pub result: Option<KeptResult>,
 }
@@ -265,6 +268,19 @@ pub enum Accepted {
         /// How many.
         queued: u64,
     },
+    /// Its owner takes as much as he may.
+    OverQuota(Usage),
+}
+
+/// A job that waits.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Waiting {
+    /// Starts charged to its computation so far.
+    pub charged: u32,
+    /// By which calculator.
+    pub calculator: String,
+    /// Whose it is.
+    pub owner: String,
 }
 
 /// A computation to run.
@@ -423,8 +439,8 @@ pub trait JobStore: Send + Sync + 'static {
     fn job_inputs(&self, ids: Vec<JobId>, most: usize) -> BoxFuture<'_, Result<Vec<(JobId, Bytes)>, StoreError>>;
     /// How many wait and run.
     fn counts(&self) -> BoxFuture<'_, Result<JobCounts, StoreError>>;
-    /// Starts charged to the job's computation so far and its calculator, if it waits.
-    fn waiting(&self, id: JobId) -> BoxFuture<'_, Result<Option<(u32, String)>, StoreError>>;
+    /// What is to be known of a job before it is taken, if it waits.
+    fn waiting(&self, id: JobId) -> BoxFuture<'_, Result<Option<Waiting>, StoreError>>;
     /// The next job in line of at most so long, estimated, that was not charged a start yet.
     fn next_short(&self, most_ms: f64) -> BoxFuture<'_, Result<Option<JobId>, StoreError>>;
     /// Takes the job and all equal ones that wait under a lease, and charges them one start; fails them, with
@@ -434,6 +450,12 @@ pub trait JobStore: Send + Sync + 'static {
     fn finish(&self, lease: Lease, ending: Ending) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>>;
     /// Puts a computation back in line without a charge.
     fn release(&self, lease: Lease) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>>;
+    /// What an owner takes of the service.
+    fn usage(&self, owner: String) -> BoxFuture<'_, Result<Usage, StoreError>>;
+    /// Notes the work of answers that were no jobs: whose it was, and how much, ms.
+    fn note_work(&self, work: Vec<(String, f64)>) -> BoxFuture<'_, Result<(), StoreError>>;
+    /// Fails a job that waits, with `problem`; whether it did.
+    fn refuse(&self, id: JobId, problem: String) -> BoxFuture<'_, Result<bool, StoreError>>;
     /// Ends one job without a result.
     fn cancel(&self, id: JobId) -> BoxFuture<'_, Result<Option<Cancelled>, StoreError>>;
     /// Puts a job whose result is damaged back in line.

@@ -7,6 +7,7 @@ mod ledger;
 pub mod models;
 mod postgres;
 mod queue;
+pub(crate) mod quota;
 mod row;
 pub mod sqlite;
 mod sqlite_jobs;

@@ -16,6 +16,7 @@ mod models;
 mod negotiation;
 mod owners;
 mod process;
+mod quotas;
 mod results;
 mod standing;
 mod studies;

@@ -246,9 +246,9 @@ impl Jobs {
     /// Puts a job on record; whether it is a new one.
     pub(crate) async fn accept(
         &self,
+        engine: &Inner,
         request: Request,
         ask: &Ask,
-        queue_limit: u64,
     ) -> Result<(JobRecord, bool), Error> {
         let idempotency = ask.idempotency_key.clone().map(|key| Idempotency { key, body_hash: request.body_hash });
         let useful_for_ms = ask.deadline.map(|after| i64::try_from(after.as_millis()).unwrap_or(i64::MAX));
@@ -264,9 +264,11 @@ impl Jobs {
             idempotency,
             estimate_ms: request.estimate_ms,
             useful_for_ms,
+            quota: engine.settings.quota,
             result: request.result.map(|stored| stored.kept()),
         };
-        match self.store.submit(job, queue_limit).await? {
+        let work_ms = if job.result.is_some() { 0.0 } else { job.estimate_ms };
+        match self.store.submit(job, engine.settings.queue_limit).await? {
             Accepted::New(record) => {
                 metrics::counter!("precut_jobs_accepted_total", "calculator" => request.calculator).increment(1);
                 if useful_for_ms.is_some() {
@@ -277,6 +279,10 @@ impl Jobs {
             }
             Accepted::Known(record) => Ok((record, false)),
             Accepted::OtherBody(id) => Err(Error::IdempotencyKeyReused(id)),
+            Accepted::OverQuota(usage) => {
+                let refused = engine.refused(&usage, &engine.settings.quota, work_ms);
+                Err(refused.unwrap_or_else(|| Error::internal("a job was refused for no reason".to_owned())))
+            }
             Accepted::QueueFull { queued } => {
                 metrics::counter!("precut_queue_full_total").increment(1);
                 Err(Error::QueueFull { queued, retry_after: RETRY_QUEUE })

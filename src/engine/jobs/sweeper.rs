@@ -65,6 +65,7 @@ async fn look_after(engine: Weak<Inner>) {
             () = jobs.stopped() => return,
             _ = beat.tick() => {
                 count += 1;
+                report("work", engine.unwritten.write(&*jobs.store).await);
                 if jobs.store.is_shared() || count.is_multiple_of(SWEEP) {
                     sweep(&engine).await;
                 }

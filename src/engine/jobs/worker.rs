@@ -9,13 +9,13 @@ use super::{MOST_ATTEMPTS, fault, help, work};
 use crate::engine::exec::Slot;
 use crate::engine::{Error, Inner, Stored};
 use crate::store::StoreError;
-use crate::store::jobs::{Claim, Claimed, Ending, JobId};
+use crate::store::jobs::{Claim, Claimed, Ending, JobId, Waiting};
 
 /// Runs a job, if it still waits: in a place of those for short ones, if it was given one. Returns when its record says how
 /// it ended, or that it waits again.
 pub(super) async fn run_task(engine: Arc<Inner>, id: JobId, place: Option<Slot>) {
     let jobs = &engine.jobs;
-    let (charged, calculator) = match stubbornly(&engine, || jobs.store.waiting(id)).await {
+    let Waiting { charged, calculator, owner } = match stubbornly(&engine, || jobs.store.waiting(id)).await {
         Some(Some(waiting)) => waiting,
         Some(None) if place.is_some() => return,
         // Nobody waits for it to begin; perhaps somebody has asked for help with it.
@@ -36,6 +36,15 @@ pub(super) async fn run_task(engine: Arc<Inner>, id: JobId, place: Option<Slot>)
             () = jobs.stopped() => return,
         },
     };
+    if let Err(error @ Error::KeptQuota { .. }) = engine.may_begin(&owner).await {
+        let problem = fault::written(&error);
+        if stubbornly(&engine, || jobs.store.refuse(id, problem.clone())).await == Some(true) {
+            metrics::counter!("precut_jobs_total", "calculator" => calculator, "outcome" => "refused").increment(1);
+            tracing::info!(job = %id, %error, "a job is not begun");
+            jobs.feeds.touch(&[id]);
+        }
+        return;
+    }
     let begun = jobs.computations.begin();
     let running = Arc::clone(&begun.running);
     let poison = fault::written(&Error::CrashedRepeatedly { attempts: MOST_ATTEMPTS });

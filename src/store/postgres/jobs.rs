@@ -12,11 +12,12 @@ use super::care::{note_timing, timings};
 use super::line::submit;
 use super::queue::{self, Task, Tasks};
 use super::record::{Outcome, RecordRow, columns, count, record};
-use super::run::{beat, cancel, claim, finish, redo, requeue};
+use super::run::{beat, cancel, claim, finish, redo, refuse, requeue};
+use super::usage::{note_work, usage};
 use crate::key::Key;
 use crate::store::jobs::{
     Accepted, Beat, Cancelled, Changed, Claimed, Ending, Hear, JobCounts, JobId, JobPage, JobQuery, JobRecord,
-    JobStore, Lease, Live, NewJob, RunTask, Shared, Timing,
+    JobStore, Lease, Live, NewJob, RunTask, Shared, Timing, Usage, Waiting,
 };
 use crate::store::sqlite_jobs::pack::{packed, packed_ending};
 use crate::store::sqlite_jobs::record::parsed;
@@ -189,16 +190,18 @@ impl JobStore for PostgresStore {
             Ok(JobCounts { queued: u64::try_from(queued).unwrap_or(0), running: u64::try_from(running).unwrap_or(0) })
         })
     }
-    fn waiting(&self, id: JobId) -> BoxFuture<'_, Result<Option<(u32, String)>, StoreError>> {
+    fn waiting(&self, id: JobId) -> BoxFuture<'_, Result<Option<Waiting>, StoreError>> {
         Box::pin(async move {
-            let waiting: Option<(i32, String)> = sqlx::query_as(
-                "SELECT max(other.attempt), one.calculator FROM precut.jobs AS one JOIN precut.jobs AS other USING (key)
-                 WHERE one.id = $1 AND one.state = 'queued' AND other.state = 'queued' GROUP BY one.calculator",
+            let waiting: Option<(i32, String, String)> = sqlx::query_as(
+                "SELECT max(other.attempt), one.calculator, one.owner
+                 FROM precut.jobs AS one JOIN precut.jobs AS other USING (key)
+                 WHERE one.id = $1 AND one.state = 'queued' AND other.state = 'queued'
+                 GROUP BY one.calculator, one.owner",
             )
             .bind(id.to_string())
             .fetch_optional(&self.pool)
             .await?;
-            Ok(waiting.map(|(attempts, calculator)| (count(attempts), calculator)))
+            Ok(waiting.map(|(charged, calculator, owner)| Waiting { charged: count(charged), calculator, owner }))
         })
     }
     fn next_short(&self, most_ms: f64) -> BoxFuture<'_, Result<Option<JobId>, StoreError>> {
@@ -228,6 +231,19 @@ impl JobStore for PostgresStore {
     }
     fn release(&self, lease: Lease) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>> {
         Box::pin(self.write(move |connection| Box::pin(requeue(connection, lease, false, None))))
+    }
+    fn usage(&self, owner: String) -> BoxFuture<'_, Result<Usage, StoreError>> {
+        Box::pin(async move {
+            let mut connection = self.pool.acquire().await?;
+            Ok(usage(&mut connection, &owner).await?)
+        })
+    }
+    fn note_work(&self, work: Vec<(String, f64)>) -> BoxFuture<'_, Result<(), StoreError>> {
+        Box::pin(self.write(move |connection| Box::pin(note_work(connection, work))))
+    }
+    fn refuse(&self, id: JobId, problem: String) -> BoxFuture<'_, Result<bool, StoreError>> {
+        let keep_ms = self.keep_ms;
+        Box::pin(self.write(move |connection| Box::pin(async move { refuse(connection, id, &problem, keep_ms).await })))
     }
     fn cancel(&self, id: JobId) -> BoxFuture<'_, Result<Option<Cancelled>, StoreError>> {
         let keep_ms = self.keep_ms;

@@ -17,6 +17,7 @@ mod results;
 mod run;
 mod start;
 mod studies;
+mod usage;
 #[cfg(test)]
 mod tests;
 mod writer;

@@ -5,6 +5,7 @@ mod line;
 pub(super) mod pack;
 pub(super) mod record;
 mod run;
+mod usage;
 #[cfg(test)]
 mod tests;
 
@@ -18,7 +19,7 @@ use tokio::sync::watch;
 
 use super::jobs::{
     Accepted, Beat, Cancelled, Changed, Claimed, Ending, JobCounts, JobId, JobPage, JobQuery, JobRecord, JobStore,
-    Lease, Live, NewJob, RunTask, Timing,
+    Lease, Live, NewJob, RunTask, Timing, Usage, Waiting,
 };
 use super::queue::{self, Tasks};
 use super::sqlite::SqliteStore;
@@ -28,7 +29,8 @@ use care::{expire_deadlines, forget_expired, note_timing, sweep};
 use line::submit;
 use pack::{PackedEnding, packed, packed_ending};
 use record::{Outcome, RecordRow, columns, json_list, parsed, record};
-use run::{beat, cancel, claim, finish, redo, requeue};
+use run::{beat, cancel, claim, finish, redo, refuse, requeue};
+use usage::{forget_work, note_work, usage};
 
 impl SqliteStore {
     async fn finish_job(&self, lease: Lease, ending: Ending) -> Result<Vec<JobId>, StoreError> {
@@ -133,13 +135,18 @@ impl JobStore for SqliteStore {
     fn counts(&self) -> BoxFuture<'_, Result<JobCounts, StoreError>> {
         Box::pin(self.count_jobs())
     }
-    fn waiting(&self, id: JobId) -> BoxFuture<'_, Result<Option<(u32, String)>, StoreError>> {
+    fn waiting(&self, id: JobId) -> BoxFuture<'_, Result<Option<Waiting>, StoreError>> {
         Box::pin(async move {
-            let waiting = sqlx::query_as(
-                "SELECT max(other.attempt), one.calculator FROM precut_jobs AS one JOIN precut_jobs AS other USING (key)
-                 WHERE one.id = ?1 AND one.state = 'queued' AND other.state = 'queued' GROUP BY one.calculator",
-            );
-            Ok(waiting.bind(id.to_string()).fetch_optional(&self.readers).await?)
+            let waiting: Option<(u32, String, String)> = sqlx::query_as(
+                "SELECT max(other.attempt), one.calculator, one.owner
+                 FROM precut_jobs AS one JOIN precut_jobs AS other USING (key)
+                 WHERE one.id = ?1 AND one.state = 'queued' AND other.state = 'queued'
+                 GROUP BY one.calculator, one.owner",
+            )
+            .bind(id.to_string())
+            .fetch_optional(&self.readers)
+            .await?;
+            Ok(waiting.map(|(charged, calculator, owner)| Waiting { charged, calculator, owner }))
         })
     }
     fn next_short(&self, most_ms: f64) -> BoxFuture<'_, Result<Option<JobId>, StoreError>> {
@@ -170,6 +177,25 @@ impl JobStore for SqliteStore {
                 Box::pin(async move { requeue(connection, &json_list(&[lease]), false).await })
             }),
         )
+    }
+    fn usage(&self, owner: String) -> BoxFuture<'_, Result<Usage, StoreError>> {
+        Box::pin(async move {
+            let mut reader = self.readers.acquire().await?;
+            Ok(usage(&mut reader, &owner, now_ms()).await?)
+        })
+    }
+    fn note_work(&self, work: Vec<(String, f64)>) -> BoxFuture<'_, Result<(), StoreError>> {
+        Box::pin(self.ledger.write(move |connection| {
+            let work = work.clone();
+            Box::pin(async move { note_work(connection, &work, now_ms()).await })
+        }))
+    }
+    fn refuse(&self, id: JobId, problem: String) -> BoxFuture<'_, Result<bool, StoreError>> {
+        let keep_ms = self.keep_ms;
+        Box::pin(self.ledger.write(move |connection| {
+            let problem = problem.clone();
+            Box::pin(async move { refuse(connection, id, &problem, keep_ms, now_ms()).await })
+        }))
     }
     fn cancel(&self, id: JobId) -> BoxFuture<'_, Result<Option<Cancelled>, StoreError>> {
         let keep_ms = self.keep_ms;
@@ -223,6 +249,7 @@ impl JobStore for SqliteStore {
                 let round = self.ledger.write(move |connection| {
                     Box::pin(async move {
                         queue::forget_done(connection).await?;
+                        forget_work(connection, now_ms()).await?;
                         forget_expired(connection, keep_ms, now_ms()).await
                     })
                 });

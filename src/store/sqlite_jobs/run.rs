@@ -88,7 +88,7 @@ pub(super) async fn finish(
     let ended: Vec<String> = sqlx::query_scalar(
         "UPDATE precut_jobs
          SET state = ?2, problem = ?3, progress = iif(?2 = 'succeeded', 1.0, progress), stage = NULL, lease = NULL,
-             heartbeat_ms = NULL, finished_ms = ?4, expires_ms = ?5, key = coalesce(?6, key)
+             heartbeat_ms = NULL, finished_ms = ?4, expires_ms = ?5, key = coalesce(?6, key), result_bytes = ?7
          WHERE lease = ?1 AND state = 'running' RETURNING id",
     )
     .bind(lease.to_string())
@@ -97,6 +97,7 @@ pub(super) async fn finish(
     .bind(now)
     .bind(now.saturating_add(keep_ms))
     .bind(result.map(|result| result.key.clone()))
+    .bind(result.map_or(0, row::ResultRow::bytes))
     .fetch_all(&mut *connection)
     .await?;
     if let Some(result) = result
@@ -168,6 +169,26 @@ pub(super) async fn cancel(
     Ok(Some(Cancelled { job, before, unwanted }))
 }
 
+pub(super) async fn refuse(
+    connection: &mut SqliteConnection,
+    id: JobId,
+    problem: &str,
+    keep_ms: i64,
+    now: i64,
+) -> Outcome<bool> {
+    let refused = sqlx::query(
+        "UPDATE precut_jobs SET state = 'failed', problem = ?2, finished_ms = ?3, expires_ms = ?4
+         WHERE id = ?1 AND state = 'queued'",
+    )
+    .bind(id.to_string())
+    .bind(problem)
+    .bind(now)
+    .bind(now.saturating_add(keep_ms))
+    .execute(connection)
+    .await?;
+    Ok(refused.rows_affected() > 0)
+}
+
 pub(super) async fn redo(connection: &mut SqliteConnection, id: JobId) -> Outcome<()> {
     sqlx::query("DELETE FROM results WHERE key = (SELECT key FROM precut_jobs WHERE id = ?1 AND state = 'succeeded')")
         .bind(id.to_string())
@@ -175,7 +196,7 @@ pub(super) async fn redo(connection: &mut SqliteConnection, id: JobId) -> Outcom
         .await?;
     let back: Vec<String> = sqlx::query_scalar(
         "UPDATE precut_jobs SET state = 'queued', attempt = 0, progress = 0.0, started_ms = NULL, finished_ms = NULL,
-             expires_ms = NULL, deadline_ms = NULL
+             expires_ms = NULL, deadline_ms = NULL, result_bytes = 0
          WHERE id = ?1 AND state = 'succeeded' RETURNING id",
     )
     .bind(id.to_string())

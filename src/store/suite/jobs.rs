@@ -7,7 +7,8 @@ use tokio::sync::watch;
 
 use super::{MOST, PROBLEM, Place, job, key, result};
 use crate::store::jobs::{
-    Accepted, Beat, Claimed, Ending, Idempotency, JobCounts, JobId, JobState, Lease, NewJob, Priority, RunTask, Timing,
+    Accepted, Beat, Claimed, Ending, Idempotency, JobCounts, JobId, JobState, Lease, NewJob, Priority, Quota, RunTask, Timing,
+    Usage,
 };
 use crate::store::sqlite::Keep;
 use crate::store::{KeptResult, now_ms};
@@ -73,7 +74,7 @@ pub(in crate::store) async fn what_a_process_left_running_is_in_line_again_at_th
         // Twice charged, it lets the others go first.
         let expected = if attempt < 2 { [running, waiting] } else { [waiting, running] };
         assert_eq!(place.line().await, expected, "after {attempt}");
-        assert_eq!(place.store().waiting(running).await.unwrap().map(|(attempts, _)| attempts), Some(attempt));
+        assert_eq!(place.store().waiting(running).await.unwrap().map(|waiting| waiting.charged), Some(attempt));
         match place.claim(running).await {
             Claimed::Run(claim) => assert_eq!(claim.attempt, attempt + 1),
             Claimed::Poisonous(jobs) => assert_eq!((jobs, attempt), (vec![running], MOST)),
@@ -243,6 +244,93 @@ pub(in crate::store) async fn the_next_short_job_is_the_first_of_them_in_line<P:
     place.store().sweep(Arc::new(Vec::new)).await.unwrap();
     assert_eq!(place.record(second).await.state, JobState::Queued);
     assert_eq!(next().await, None);
+}
+
+/// How an owner stands who is refused a job.
+async fn refused<P: Place>(place: &P, job: NewJob) -> Usage {
+    match place.store().submit(job, 100).await.unwrap() {
+        Accepted::OverQuota(usage) => usage,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn ms(time: Duration) -> i64 {
+    i64::try_from(time.as_millis()).unwrap()
+}
+
+pub(in crate::store) async fn an_owner_gets_so_much_work_in_an_hour<P: Place>() {
+    const MOST_MS: f64 = 100_000.0;
+    let place = P::new().await;
+    let ask = |number: u32, estimate_ms: f64| NewJob {
+        estimate_ms,
+        quota: Quota { work_ms: Some(MOST_MS), ..Quota::default() },
+        ..job(number)
+    };
+    let first = place.accept(ask(1, 60_000.0)).await.id;
+    assert_eq!(refused(&place, ask(2, 60_000.0)).await.open_ms, 60_000.0);
+    assert_eq!(place.store().job(ask(2, 1.0).id).await.unwrap(), None);
+    place.accept(NewJob { owner: "two".to_owned(), ..ask(3, 60_000.0) }).await;
+    // What is there already costs nothing, and what was not done was not used.
+    place.accept(NewJob { result: Some(result(4)), ..ask(4, 60_000.0) }).await;
+    place.store().cancel(first).await.unwrap();
+    let second = place.accept(ask(5, 60_000.0)).await.id;
+    // What is over counts by what it took.
+    let claim = place.run(second).await;
+    place.store().finish(claim.lease, Ending::Succeeded(result(5))).await.unwrap();
+    let took = place.store().usage("one".to_owned()).await.unwrap();
+    assert!(took.open_ms == 0.0 && took.work_ms() < 30_000.0, "{took:?}");
+    // So does work that was no job; and there is room when it is told that there is.
+    let work = |owner: &str, ms: f64| (owner.to_owned(), ms);
+    place.store().note_work(vec![work("one", 30_000.0), work("two", 5.0)]).await.unwrap();
+    place.store().note_work(vec![work("one", 40_000.0)]).await.unwrap();
+    let usage = refused(&place, ask(6, 60_000.0)).await;
+    assert!((70_000.0..100_000.0).contains(&usage.work_ms()), "{usage:?}");
+    let wait = usage.room_for_work(MOST_MS, 60_000.0);
+    assert!(wait > Duration::from_mins(58) && wait <= Duration::from_mins(61), "{wait:?}");
+    place.later(ms(wait) - 120_000).await;
+    refused(&place, ask(6, 60_000.0)).await;
+    place.later(120_000).await;
+    place.accept(ask(6, 60_000.0)).await;
+    place.store().forget_expired().await.unwrap();
+    assert_eq!(place.store().usage("two".to_owned()).await.unwrap().done, []);
+}
+
+pub(in crate::store) async fn what_is_kept_for_an_owner_has_a_bound<P: Place>() {
+    const MOST: u64 = 50_000;
+    let place = P::new().await;
+    let mut noise = vec![0_u8; 30_000];
+    blake3::Hasher::new().finalize_xof().fill(&mut noise);
+    let large = |number: u32| KeptResult { body: noise.clone().into(), ..result(number) };
+    let ask = |number: u32, result: Option<KeptResult>| NewJob {
+        quota: Quota { kept_bytes: Some(MOST), ..Quota::default() },
+        result,
+        ..job(number)
+    };
+    // Equal jobs share a result: it counts once.
+    for _ in 0..3 {
+        place.accept(ask(1, Some(large(1)))).await;
+    }
+    let kept = place.store().usage("one".to_owned()).await.unwrap().kept_bytes();
+    assert!((30_000..40_000).contains(&kept), "{kept}");
+    // So does the result of a job that was computed, and what is asked of one that waits.
+    let claim = place.run(place.accept(ask(2, None)).await.id).await;
+    place.store().finish(claim.lease, Ending::Succeeded(large(2))).await.unwrap();
+    let usage = refused(&place, ask(3, None)).await;
+    assert!((60_000..80_000).contains(&usage.kept_bytes()), "{usage:?}");
+    place.accept(NewJob { owner: "two".to_owned(), ..ask(3, None) }).await;
+    // There is room when it is told that there is.
+    let wait = usage.room_to_keep(MOST, Duration::from_hours(1));
+    assert!(wait > Duration::from_mins(58) && wait <= Duration::from_hours(1), "{wait:?}");
+    place.later(ms(wait) - 60_000).await;
+    refused(&place, ask(4, None)).await;
+    place.later(60_000).await;
+    let waiting = place.accept(ask(4, None)).await.id;
+    // A job that waits can be refused, once.
+    assert!(place.store().refuse(waiting, PROBLEM.to_owned()).await.unwrap());
+    let record = place.record(waiting).await;
+    assert_eq!((record.state, record.problem.as_deref(), record.attempt), (JobState::Failed, Some(PROBLEM), 0));
+    assert!(record.expires_ms > record.finished_ms);
+    assert!(!place.store().refuse(waiting, PROBLEM.to_owned()).await.unwrap());
 }
 
 pub(in crate::store) async fn deadlines_end_what_is_late_and_nothing_else<P: Place>() {
