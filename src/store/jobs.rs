@@ -281,6 +281,8 @@ pub struct Waiting {
     pub calculator: String,
     /// Whose it is.
     pub owner: String,
+    /// When it was accepted, ms UTC.
+    pub created_ms: i64,
 }
 
 /// A computation to run.
@@ -375,13 +377,17 @@ pub struct JobPage {
     pub next: Option<JobId>,
 }
 
-/// How many jobs are in which state.
+/// How the jobs and their store are.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct JobCounts {
     /// Waiting.
     pub queued: u64,
     /// Being computed.
     pub running: u64,
+    /// When the one came that has waited longest, ms UTC.
+    pub oldest_ms: Option<i64>,
+    /// What the database takes of the disk.
+    pub store_bytes: u64,
 }
 
 /// What a job took.
@@ -437,7 +443,7 @@ pub trait JobStore: Send + Sync + 'static {
     /// What jobs need to run, compressed, as far as it takes no more than so many bytes; those that have none any more
     /// are left out.
     fn job_inputs(&self, ids: Vec<JobId>, most: usize) -> BoxFuture<'_, Result<Vec<(JobId, Bytes)>, StoreError>>;
-    /// How many wait and run.
+    /// How many wait and run, since when, and how large the database is.
     fn counts(&self) -> BoxFuture<'_, Result<JobCounts, StoreError>>;
     /// What is to be known of a job before it is taken, if it waits.
     fn waiting(&self, id: JobId) -> BoxFuture<'_, Result<Option<Waiting>, StoreError>>;
@@ -452,6 +458,8 @@ pub trait JobStore: Send + Sync + 'static {
     fn release(&self, lease: Lease) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>>;
     /// What an owner takes of the service.
     fn usage(&self, owner: String) -> BoxFuture<'_, Result<Usage, StoreError>>;
+    /// What is kept of jobs and their results for each owner of keys, bytes.
+    fn kept_by_owner(&self) -> BoxFuture<'_, Result<Vec<(String, u64)>, StoreError>>;
     /// Notes the work of answers that were no jobs: whose it was, and how much, ms.
     fn note_work(&self, work: Vec<(String, f64)>) -> BoxFuture<'_, Result<(), StoreError>>;
     /// Fails a job that waits, with `problem`; whether it did.

@@ -60,6 +60,7 @@ use tokio::sync::{Notify, watch};
 use tokio::task::JoinHandle;
 
 use super::progress::Reported;
+use super::quota::label;
 use super::{Error, Inner, Key, Shelf, Stored};
 use crate::store::jobs::{
     Accepted, Changed, Idempotency, JobId, JobKind, JobPage, JobQuery, JobRecord, JobState, JobStore, MOST_ATTEMPTS,
@@ -271,6 +272,7 @@ impl Jobs {
         match self.store.submit(job, engine.settings.queue_limit).await? {
             Accepted::New(record) => {
                 metrics::counter!("precut_jobs_accepted_total", "calculator" => request.calculator).increment(1);
+                metrics::counter!("precut_owner_jobs_total", "owner" => label(&ask.owner)).increment(1);
                 if useful_for_ms.is_some() {
                     self.new_deadline.notify_one();
                 }

@@ -7,6 +7,7 @@ use precut_calc::calculator::Failure;
 
 use super::{MOST_ATTEMPTS, fault, help, work};
 use crate::engine::exec::Slot;
+use crate::engine::quota::worked;
 use crate::engine::{Error, Inner, Stored};
 use crate::store::StoreError;
 use crate::store::jobs::{Claim, Claimed, Ending, JobId, Waiting};
@@ -15,7 +16,7 @@ use crate::store::jobs::{Claim, Claimed, Ending, JobId, Waiting};
 /// it ended, or that it waits again.
 pub(super) async fn run_task(engine: Arc<Inner>, id: JobId, place: Option<Slot>) {
     let jobs = &engine.jobs;
-    let Waiting { charged, calculator, owner } = match stubbornly(&engine, || jobs.store.waiting(id)).await {
+    let Waiting { charged, calculator, owner, created_ms } = match stubbornly(&engine, || jobs.store.waiting(id)).await {
         Some(Some(waiting)) => waiting,
         Some(None) if place.is_some() => return,
         // Nobody waits for it to begin; perhaps somebody has asked for help with it.
@@ -61,6 +62,8 @@ pub(super) async fn run_task(engine: Arc<Inner>, id: JobId, place: Option<Slot>)
         Some(Claimed::Nothing) | None => return,
     };
     running.claimed();
+    let waited = Duration::from_millis(jobs.store.now_ms().saturating_sub(created_ms).max(0).unsigned_abs());
+    metrics::histogram!("precut_job_wait_seconds", "calculator" => calculator).record(waited.as_secs_f64());
     jobs.feeds.touch(&claim.jobs);
     tracing::info!(job = %id, calculator = claim.calculator, attempt = claim.attempt, "a job begins");
     let started = Instant::now();
@@ -74,6 +77,7 @@ pub(super) async fn run_task(engine: Arc<Inner>, id: JobId, place: Option<Slot>)
         }
         Err(error) => Err(error),
     };
+    worked(&owner, started.elapsed().as_secs_f64() * 1e3);
     settle(&engine, &claim, outcome, started.elapsed(), running.is_cancelled()).await;
 }
 

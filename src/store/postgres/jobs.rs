@@ -13,7 +13,7 @@ use super::line::submit;
 use super::queue::{self, Task, Tasks};
 use super::record::{Outcome, RecordRow, columns, count, record};
 use super::run::{beat, cancel, claim, finish, redo, refuse, requeue};
-use super::usage::{note_work, usage};
+use super::usage::{kept_by_owner, note_work, usage};
 use crate::key::Key;
 use crate::store::jobs::{
     Accepted, Beat, Cancelled, Changed, Claimed, Ending, Hear, JobCounts, JobId, JobPage, JobQuery, JobRecord,
@@ -181,27 +181,37 @@ impl JobStore for PostgresStore {
     }
     fn counts(&self) -> BoxFuture<'_, Result<JobCounts, StoreError>> {
         Box::pin(async {
-            let (queued, running): (i64, i64) = sqlx::query_as(
+            let (queued, running, oldest_ms, store_bytes): (i64, i64, Option<i64>, i64) = sqlx::query_as(
                 "SELECT (SELECT count(*) FROM precut.jobs WHERE state = 'queued'),
-                     (SELECT count(*) FROM precut.jobs WHERE state = 'running')",
+                     (SELECT count(*) FROM precut.jobs WHERE state = 'running'),
+                     (SELECT created_ms FROM precut.jobs WHERE state = 'queued' ORDER BY id LIMIT 1),
+                     (SELECT sum(pg_total_relation_size(oid))::bigint FROM pg_class WHERE relkind = 'r'
+                          AND relnamespace IN ('precut'::regnamespace, 'apalis'::regnamespace))",
             )
             .fetch_one(&self.pool)
             .await?;
-            Ok(JobCounts { queued: u64::try_from(queued).unwrap_or(0), running: u64::try_from(running).unwrap_or(0) })
+            let count = |number: i64| u64::try_from(number).unwrap_or(0);
+            let (queued, running, store_bytes) = (count(queued), count(running), count(store_bytes));
+            Ok(JobCounts { queued, running, oldest_ms, store_bytes })
         })
     }
     fn waiting(&self, id: JobId) -> BoxFuture<'_, Result<Option<Waiting>, StoreError>> {
         Box::pin(async move {
-            let waiting: Option<(i32, String, String)> = sqlx::query_as(
-                "SELECT max(other.attempt), one.calculator, one.owner
+            let waiting: Option<(i32, String, String, i64)> = sqlx::query_as(
+                "SELECT max(other.attempt), one.calculator, one.owner, one.created_ms
                  FROM precut.jobs AS one JOIN precut.jobs AS other USING (key)
                  WHERE one.id = $1 AND one.state = 'queued' AND other.state = 'queued'
-                 GROUP BY one.calculator, one.owner",
+                 GROUP BY one.id",
             )
             .bind(id.to_string())
             .fetch_optional(&self.pool)
             .await?;
-            Ok(waiting.map(|(charged, calculator, owner)| Waiting { charged: count(charged), calculator, owner }))
+            Ok(waiting.map(|(charged, calculator, owner, created_ms)| Waiting {
+                charged: count(charged),
+                calculator,
+                owner,
+                created_ms,
+            }))
         })
     }
     fn next_short(&self, most_ms: f64) -> BoxFuture<'_, Result<Option<JobId>, StoreError>> {
@@ -237,6 +247,9 @@ impl JobStore for PostgresStore {
             let mut connection = self.pool.acquire().await?;
             Ok(usage(&mut connection, &owner).await?)
         })
+    }
+    fn kept_by_owner(&self) -> BoxFuture<'_, Result<Vec<(String, u64)>, StoreError>> {
+        Box::pin(async move { Ok(kept_by_owner(&self.pool).await?) })
     }
     fn note_work(&self, work: Vec<(String, f64)>) -> BoxFuture<'_, Result<(), StoreError>> {
         Box::pin(self.write(move |connection| Box::pin(note_work(connection, work))))

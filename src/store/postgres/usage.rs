@@ -1,6 +1,6 @@
 //! What an owner takes of the service.
 
-use sqlx::postgres::PgConnection;
+use sqlx::postgres::{PgConnection, PgPool};
 
 use super::record::Outcome;
 use crate::store::quota::{HOUR_MS, MINUTE_MS, Usage};
@@ -46,6 +46,19 @@ pub(super) async fn usage(connection: &mut PgConnection, owner: &str) -> Outcome
     .await?;
     let kept = kept.into_iter().map(|(goes, bytes)| (goes, u64::try_from(bytes).unwrap_or(0))).collect();
     Ok(Usage { kept, open_ms, done })
+}
+
+pub(super) async fn kept_by_owner(pool: &PgPool) -> Outcome<Vec<(String, u64)>> {
+    let kept: Vec<(String, i64)> = sqlx::query_as(
+        "SELECT owner, sum(bytes)::bigint FROM (
+             SELECT owner, sum(input_bytes) + max(result_bytes) AS bytes FROM precut.jobs
+             WHERE starts_with(owner, 'key:') AND (expires_ms IS NULL OR expires_ms > precut.now_ms())
+             GROUP BY owner, key) AS results
+         GROUP BY owner",
+    )
+    .fetch_all(pool)
+    .await?;
+    Ok(kept.into_iter().map(|(owner, bytes)| (owner, u64::try_from(bytes).unwrap_or(0))).collect())
 }
 
 pub(super) async fn note_work(connection: &mut PgConnection, mut work: Vec<(String, f64)>) -> Outcome<()> {

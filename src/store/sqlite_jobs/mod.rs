@@ -30,7 +30,7 @@ use line::submit;
 use pack::{PackedEnding, packed, packed_ending};
 use record::{Outcome, RecordRow, columns, json_list, parsed, record};
 use run::{beat, cancel, claim, finish, redo, refuse, requeue};
-use usage::{forget_work, note_work, usage};
+use usage::{forget_work, kept_by_owner, note_work, usage};
 
 impl SqliteStore {
     async fn finish_job(&self, lease: Lease, ending: Ending) -> Result<Vec<JobId>, StoreError> {
@@ -95,14 +95,17 @@ impl SqliteStore {
     }
 
     async fn count_jobs(&self) -> Result<JobCounts, StoreError> {
-        let count = |state: &'static str| async move {
-            let count: i64 = sqlx::query_scalar("SELECT count(*) FROM precut_jobs WHERE state = ?1")
-                .bind(state)
-                .fetch_one(&self.readers)
-                .await?;
-            Ok::<_, StoreError>(u64::try_from(count).unwrap_or(0))
-        };
-        Ok(JobCounts { queued: count("queued").await?, running: count("running").await? })
+        let (queued, running, oldest_ms, store_bytes): (i64, i64, Option<i64>, i64) = sqlx::query_as(
+            "SELECT (SELECT count(*) FROM precut_jobs WHERE state = 'queued'),
+                 (SELECT count(*) FROM precut_jobs WHERE state = 'running'),
+                 (SELECT created_ms FROM precut_jobs WHERE state = 'queued' ORDER BY id LIMIT 1),
+                 (SELECT page_count FROM pragma_page_count) * (SELECT page_size FROM pragma_page_size)",
+        )
+        .fetch_one(&self.readers)
+        .await?;
+        let count = |number: i64| u64::try_from(number).unwrap_or(0);
+        let (queued, running, store_bytes) = (count(queued), count(running), count(store_bytes));
+        Ok(JobCounts { queued, running, oldest_ms, store_bytes })
     }
 }
 
@@ -137,16 +140,17 @@ impl JobStore for SqliteStore {
     }
     fn waiting(&self, id: JobId) -> BoxFuture<'_, Result<Option<Waiting>, StoreError>> {
         Box::pin(async move {
-            let waiting: Option<(u32, String, String)> = sqlx::query_as(
-                "SELECT max(other.attempt), one.calculator, one.owner
+            let waiting: Option<(u32, String, String, i64)> = sqlx::query_as(
+                "SELECT max(other.attempt), one.calculator, one.owner, one.created_ms
                  FROM precut_jobs AS one JOIN precut_jobs AS other USING (key)
                  WHERE one.id = ?1 AND one.state = 'queued' AND other.state = 'queued'
-                 GROUP BY one.calculator, one.owner",
+                 GROUP BY one.id",
             )
             .bind(id.to_string())
             .fetch_optional(&self.readers)
             .await?;
-            Ok(waiting.map(|(charged, calculator, owner)| Waiting { charged, calculator, owner }))
+            let told = |(charged, calculator, owner, created_ms)| Waiting { charged, calculator, owner, created_ms };
+            Ok(waiting.map(told))
         })
     }
     fn next_short(&self, most_ms: f64) -> BoxFuture<'_, Result<Option<JobId>, StoreError>> {
@@ -182,6 +186,12 @@ impl JobStore for SqliteStore {
         Box::pin(async move {
             let mut reader = self.readers.acquire().await?;
             Ok(usage(&mut reader, &owner, now_ms()).await?)
+        })
+    }
+    fn kept_by_owner(&self) -> BoxFuture<'_, Result<Vec<(String, u64)>, StoreError>> {
+        Box::pin(async move {
+            let mut reader = self.readers.acquire().await?;
+            Ok(kept_by_owner(&mut reader, now_ms()).await?)
         })
     }
     fn note_work(&self, work: Vec<(String, f64)>) -> BoxFuture<'_, Result<(), StoreError>> {

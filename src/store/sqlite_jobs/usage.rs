@@ -40,6 +40,19 @@ pub(super) async fn usage(connection: &mut SqliteConnection, owner: &str, now: i
     Ok(Usage { kept, open_ms, done })
 }
 
+pub(super) async fn kept_by_owner(connection: &mut SqliteConnection, now: i64) -> Outcome<Vec<(String, u64)>> {
+    let kept: Vec<(String, i64)> = sqlx::query_as(
+        "SELECT owner, sum(bytes) FROM (
+             SELECT owner, sum(input_bytes) + max(result_bytes) AS bytes FROM precut_jobs
+             WHERE owner > 'key:' AND owner < 'key;' AND (expires_ms IS NULL OR expires_ms > ?1) GROUP BY owner, key)
+         GROUP BY owner",
+    )
+    .bind(now)
+    .fetch_all(connection)
+    .await?;
+    Ok(kept.into_iter().map(|(owner, bytes)| (owner, u64::try_from(bytes).unwrap_or(0))).collect())
+}
+
 pub(super) async fn note_work(connection: &mut SqliteConnection, work: &[(String, f64)], now: i64) -> Outcome<()> {
     for (owner, ms) in work {
         sqlx::query(

@@ -7,7 +7,7 @@ use tokio::sync::watch;
 
 use super::{MOST, PROBLEM, Place, job, key, result};
 use crate::store::jobs::{
-    Accepted, Beat, Claimed, Ending, Idempotency, JobCounts, JobId, JobState, Lease, NewJob, Priority, Quota, RunTask, Timing,
+    Accepted, Beat, Claimed, Ending, Idempotency, JobId, JobState, Lease, NewJob, Priority, Quota, RunTask, Timing,
     Usage,
 };
 use crate::store::sqlite::Keep;
@@ -161,7 +161,8 @@ pub(in crate::store) async fn a_full_queue_takes_no_more<P: Place>() {
     }
     let refused = place.store().submit(job(3), 3).await.unwrap();
     assert_eq!(refused, Accepted::QueueFull { queued: 3 });
-    assert_eq!(place.store().counts().await.unwrap(), JobCounts { queued: 3, running: 0 });
+    let counts = place.store().counts().await.unwrap();
+    assert_eq!((counts.queued, counts.running), (3, 0));
     assert_eq!(place.line().await.len(), 3);
 }
 
@@ -244,6 +245,32 @@ pub(in crate::store) async fn the_next_short_job_is_the_first_of_them_in_line<P:
     place.store().sweep(Arc::new(Vec::new)).await.unwrap();
     assert_eq!(place.record(second).await.state, JobState::Queued);
     assert_eq!(next().await, None);
+}
+
+pub(in crate::store) async fn the_state_of_jobs_and_store_is_told_in_figures<P: Place>() {
+    let place = P::new().await;
+    let empty = place.store().counts().await.unwrap();
+    assert_eq!((empty.queued, empty.running, empty.oldest_ms), (0, 0, None));
+    assert!(empty.store_bytes > 10_000, "{empty:?}");
+    let from = |owner: &str, number: u32| NewJob { owner: owner.to_owned(), ..job(number) };
+    let first = place.accept(from("key:a", 1)).await;
+    tokio::time::sleep(Duration::from_millis(2)).await;
+    let second = place.accept(from("key:b", 2)).await;
+    place.accept(from("ip:127.0.0.1", 3)).await;
+    assert_eq!(place.store().counts().await.unwrap().oldest_ms, Some(first.created_ms));
+    let waiting = place.store().waiting(first.id).await.unwrap().unwrap();
+    assert_eq!((waiting.created_ms, waiting.owner.as_str()), (first.created_ms, "key:a"));
+    let claim = place.run(first.id).await;
+    let counts = place.store().counts().await.unwrap();
+    assert_eq!((counts.queued, counts.running, counts.oldest_ms), (2, 1, Some(second.created_ms)));
+    place.store().finish(claim.lease, Ending::Succeeded(result(1))).await.unwrap();
+    // Of owners of keys only: addresses are many.
+    let mut kept = place.store().kept_by_owner().await.unwrap();
+    kept.sort();
+    let told: Vec<&str> = kept.iter().map(|(owner, _)| owner.as_str()).collect();
+    assert_eq!(told, ["key:a", "key:b"]);
+    let alone = place.store().usage("key:a".to_owned()).await.unwrap().kept_bytes();
+    assert!(kept[0].1 == alone && kept[0].1 > kept[1].1 && kept[1].1 > 0, "{kept:?}");
 }
 
 /// How an owner stands who is refused a job.

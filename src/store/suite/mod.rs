@@ -128,6 +128,7 @@ macro_rules! suite {
             the_line_is_fair_between_owners_and_keeps_priorities
             a_long_job_lets_some_short_ones_pass_and_no_more
             the_next_short_job_is_the_first_of_them_in_line
+            the_state_of_jobs_and_store_is_told_in_figures
             an_owner_gets_so_much_work_in_an_hour
             what_is_kept_for_an_owner_has_a_bound
             deadlines_end_what_is_late_and_nothing_else
