@@ -54,7 +54,7 @@ use tokio::runtime::Handle;
 use crate::registry::{Entry, Registry};
 use crate::store::jobs::JobStore;
 use crate::store::models::ModelStore;
-use crate::store::{ResultPage, ResultQuery, ResultStore, Store};
+use crate::store::{Origin, ResultPage, ResultQuery, ResultStore, Store};
 use asked::Asked;
 use budget::{Budget, Room, paid_beside};
 use exec::{Cores, Slot, guarded};
@@ -266,6 +266,11 @@ impl Engine {
     /// Whether an owner has asked for an answer.
     pub async fn has_asked(&self, key: &Key, owner: &str) -> Result<bool, Error> {
         Ok(self.inner.store.has_asked(*key, owner.to_owned()).await?)
+    }
+
+    /// Since when an answer is kept, and who has asked for it: of all, or of one owner.
+    pub async fn origin(&self, key: &Key, owner: Option<String>) -> Result<Origin, Error> {
+        Ok(self.inner.store.origin(*key, owner).await?)
     }
 
     /// The list of kept answers, newest first.

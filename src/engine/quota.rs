@@ -38,7 +38,8 @@ pub(crate) fn label(owner: &str) -> String {
 pub(crate) fn worked(owner: &str, ms: f64) {
     // A counter counts whole numbers.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // below 2^53, and positive
-    metrics::counter!("precut_owner_work_milliseconds_total", "owner" => label(owner)).increment(ms.max(0.0).ceil() as u64);
+    metrics::counter!("precut_owner_work_milliseconds_total", "owner" => label(owner))
+        .increment(ms.max(0.0).ceil() as u64);
 }
 
 /// Work of answers that are no jobs, until it is on record.

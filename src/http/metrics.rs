@@ -31,9 +31,10 @@ const RESULT: &str = "/v1/results/{key}";
 const RESULT_FIGURES: &str = "/v1/results/{key}/figures";
 const RESULT_TABLES: &str = "/v1/results/{key}/tables";
 const RESULT_JOB: &str = "/v1/results/{key}/job";
+const RESULT_PROVENANCE: &str = "/v1/results/{key}/provenance";
 
 /// Addresses with a variable part, as they are counted.
-const PATTERNS: [(&str, &str); 16] = [
+const PATTERNS: [(&str, &str); 17] = [
     ("/v1/jobs/", JOB),
     ("/v1/jobs/", JOB_RESULT),
     ("/v1/jobs/", JOB_INPUT),
@@ -44,6 +45,7 @@ const PATTERNS: [(&str, &str); 16] = [
     ("/v1/results/", RESULT_FIGURES),
     ("/v1/results/", RESULT_TABLES),
     ("/v1/results/", RESULT_JOB),
+    ("/v1/results/", RESULT_PROVENANCE),
     ("/v1/calculators/", "/v1/calculators/{id}"),
     ("/v1/materials/", "/v1/materials/{id}"),
     ("/v1/", "/v1/{calculator}"),
@@ -159,6 +161,7 @@ fn pattern(path: &str) -> Option<&'static str> {
             Some("figures") => RESULT_FIGURES,
             Some("tables") => RESULT_TABLES,
             Some("job") => RESULT_JOB,
+            Some("provenance") => RESULT_PROVENANCE,
             _ => RESULT,
         });
     }

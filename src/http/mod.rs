@@ -20,6 +20,7 @@ mod pages;
 mod parts;
 mod prefer;
 mod problem;
+mod provenance;
 mod query;
 mod quota;
 mod rate;
@@ -169,6 +170,7 @@ fn routes(app: &App, health: Router<App>) -> Router<App> {
         .route("/v1/results/{key}/figures", get(parts::figures))
         .route("/v1/results/{key}/tables", get(parts::tables))
         .route("/v1/results/{key}/job", get(parts::job))
+        .route("/v1/results/{key}/provenance", get(provenance::read))
         .route("/v1/materials", get(materials::list))
         .route("/v1/materials/{id}", get(materials::read))
         .route("/v1/{calculator}", any(unknown_calculator));

@@ -362,6 +362,8 @@ pub struct JobQuery {
     pub calculator: Option<String>,
     /// Only those of this owner.
     pub owner: Option<String>,
+    /// Only those that come to this result.
+    pub key: Option<Key>,
     /// At most so many.
     pub limit: u32,
     /// Only those before this one.

@@ -106,7 +106,10 @@ mod tests {
         // What is still being computed counts for an hour after its end.
         assert_eq!(room(71.0), 3_600_000);
         let quota = Quota { work_ms: Some(100.0), ..Quota::default() };
-        assert_eq!((usage.beyond(&quota, 40.0), usage.beyond(&quota, 40.1)), (None, Some(Beyond::Work { most_ms: 100.0 })));
+        assert_eq!(
+            (usage.beyond(&quota, 40.0), usage.beyond(&quota, 40.1)),
+            (None, Some(Beyond::Work { most_ms: 100.0 }))
+        );
         // What costs nothing is never too much.
         let spent = Quota { work_ms: Some(1.0), ..Quota::default() };
         assert_eq!(usage.beyond(&spent, 0.0), None);

@@ -487,7 +487,10 @@ async fn a_short_job_does_not_wait_for_long_ones_and_long_ones_are_not_kept_wait
         let short = sent(&server, lasting(length, 20)).await;
         until(&server, &short, &["succeeded"]).await;
     }
-    assert_eq!((&job(&server, &first).await["state"], &job(&server, &second).await["state"]), (&json!("running"), &json!("queued")));
+    assert_eq!(
+        (&job(&server, &first).await["state"], &job(&server, &second).await["state"]),
+        (&json!("running"), &json!("queued"))
+    );
     // Only one of them at a time.
     let short_held = toy::hold(1945);
     let one = sent(&server, lasting(1945, 1)).await;

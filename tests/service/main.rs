@@ -5,6 +5,9 @@
 #[path = "../support/mod.rs"]
 mod support;
 
+#[path = "../support/isolation.rs"]
+mod isolation;
+
 mod bad_input;
 mod command_line;
 mod contract;

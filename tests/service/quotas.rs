@@ -44,7 +44,8 @@ fn estimated(length_mm: u32, seconds: u32) -> String {
 
 /// What is left of a quota, by the header of an answer, and after how many seconds there is more.
 fn left(response: &Response, quota: &str) -> (f64, Option<u64>) {
-    let told = header(response, "ratelimit").split(", ").find(|told| told.starts_with(&format!("\"{quota}\";"))).unwrap();
+    let told =
+        header(response, "ratelimit").split(", ").find(|told| told.starts_with(&format!("\"{quota}\";"))).unwrap();
     let parameter = |name: &str| told.split(';').find_map(|part| part.strip_prefix(&format!("{name}=")));
     (parameter("r").unwrap().parse().unwrap(), parameter("t").map(|seconds| seconds.parse().unwrap()))
 }
@@ -120,7 +121,8 @@ async fn what_is_kept_for_an_owner_has_a_bound() {
     .await;
     let large = |length: u32| json!({"length_mm": length, "load_n": 1, "stations": 3000}).to_string();
     let named = |key: &'static str, length: u32, name: &str| {
-        ask(&server, key, large(length)).header("idempotency-key", name.to_owned()).send()
+        let request = ask(&server, key, large(length)).header("idempotency-key", name.to_owned());
+        request.header("prefer", "wait=60").send()
     };
     let first = named(ONE, 2121, "first").await.unwrap();
     assert_eq!(first.status(), 200);

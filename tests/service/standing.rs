@@ -153,11 +153,8 @@ async fn metrics_tell_how_long_jobs_wait_how_large_the_store_is_and_who_asks_for
     let config = folder.path().join("precut.toml");
     std::fs::write(&config, format!("auth.keys = [{}]\njobs.slots = 1\n", keys.join(", "))).unwrap();
     let gate = folder.path().join("gate");
-    let settings = [
-        ("PRECUT_CONFIG", config.to_str().unwrap()),
-        (toy::HELD_MM, "2201"),
-        (toy::GATE, gate.to_str().unwrap()),
-    ];
+    let settings =
+        [("PRECUT_CONFIG", config.to_str().unwrap()), (toy::HELD_MM, "2201"), (toy::GATE, gate.to_str().unwrap())];
     let process = Process::start_with(&folder.path().join("data"), &settings);
     let client = reqwest::Client::new();
     let url = |path: &str| format!("http://{}{path}", process.address);

@@ -245,12 +245,7 @@ impl Jobs {
     }
 
     /// Puts a job on record; whether it is a new one.
-    pub(crate) async fn accept(
-        &self,
-        engine: &Inner,
-        request: Request,
-        ask: &Ask,
-    ) -> Result<(JobRecord, bool), Error> {
+    pub(crate) async fn accept(&self, engine: &Inner, request: Request, ask: &Ask) -> Result<(JobRecord, bool), Error> {
         let idempotency = ask.idempotency_key.clone().map(|key| Idempotency { key, body_hash: request.body_hash });
         let useful_for_ms = ask.deadline.map(|after| i64::try_from(after.as_millis()).unwrap_or(i64::MAX));
         let job = NewJob {

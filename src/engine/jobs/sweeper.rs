@@ -130,7 +130,9 @@ async fn tally_owners(engine: &Arc<Inner>, told: &mut HashSet<String>) {
     let gauge = |owner: &str, bytes: u64| {
         metrics::gauge!("precut_owner_kept_bytes", "owner" => label(owner)).set(bytes as f64);
     };
-    told.drain().for_each(|owner| gauge(&owner, 0));
+    for owner in told.drain() {
+        gauge(&owner, 0);
+    }
     for (owner, bytes) in kept {
         gauge(&owner, bytes);
         told.insert(owner);

@@ -16,7 +16,8 @@ use crate::store::jobs::{Claim, Claimed, Ending, JobId, Waiting};
 /// it ended, or that it waits again.
 pub(super) async fn run_task(engine: Arc<Inner>, id: JobId, place: Option<Slot>) {
     let jobs = &engine.jobs;
-    let Waiting { charged, calculator, owner, created_ms } = match stubbornly(&engine, || jobs.store.waiting(id)).await {
+    let Waiting { charged, calculator, owner, created_ms } = match stubbornly(&engine, || jobs.store.waiting(id)).await
+    {
         Some(Some(waiting)) => waiting,
         Some(None) if place.is_some() => return,
         // Nobody waits for it to begin; perhaps somebody has asked for help with it.
@@ -30,12 +31,13 @@ pub(super) async fn run_task(engine: Arc<Inner>, id: JobId, place: Option<Slot>)
     let is_isolated =
         engine.settings.isolation.is_some() && engine.known(&calculator).is_ok_and(|entry| !entry.is_composed());
     let most = if is_isolated { u32::MAX } else { MOST_ATTEMPTS };
-    let slot = match place.filter(|_| !alone) {
-        Some(place) => place,
-        None => tokio::select! {
+    let slot = if let Some(place) = place.filter(|_| !alone) {
+        place
+    } else {
+        tokio::select! {
             Ok(slot) = engine.cores.job_slot(alone) => slot,
             () = jobs.stopped() => return,
-        },
+        }
     };
     if let Err(error @ Error::KeptQuota { .. }) = engine.may_begin(&owner).await {
         let problem = fault::written(&error);

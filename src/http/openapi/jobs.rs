@@ -76,13 +76,13 @@ fn accepted() -> ResponseBuilder {
     );
     let response = parts::quotas().into_iter().fold(response, |response, (name, header)| response.header(name, header));
     response
-    .header("Location", parts::text_header("Address of the job.", &format!("/v1/jobs/{EXAMPLE}")))
-    .header("Retry-After", seconds())
-    .header("Preference-Applied", parts::text_header("Preferences that were followed.", "respond-async"))
-    .header("Content-Language", parts::text_header("Language of the sentences: `en` or `ru`.", "en"))
-    .link("job", link("read_job", "Reads the job."))
-    .link("result", link("read_job_result", "Reads its result."))
-    .link("cancel", link("cancel_job", "Cancels it."))
+        .header("Location", parts::text_header("Address of the job.", &format!("/v1/jobs/{EXAMPLE}")))
+        .header("Retry-After", seconds())
+        .header("Preference-Applied", parts::text_header("Preferences that were followed.", "respond-async"))
+        .header("Content-Language", parts::text_header("Language of the sentences: `en` or `ru`.", "en"))
+        .link("job", link("read_job", "Reads the job."))
+        .link("result", link("read_job_result", "Reads its result."))
+        .link("cancel", link("cancel_job", "Cancels it."))
 }
 
 fn link(operation: &str, text: &str) -> Link {

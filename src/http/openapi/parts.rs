@@ -96,7 +96,8 @@ pub(super) fn responses() -> Vec<(String, Response)> {
                 response = response.header("Retry-After", retry_after());
             }
             if status == 429 {
-                response = quotas().into_iter().fold(response, |response, (name, header)| response.header(name, header));
+                response =
+                    quotas().into_iter().fold(response, |response, (name, header)| response.header(name, header));
             }
             if status == 401 {
                 response =
@@ -279,11 +280,15 @@ pub(super) fn text_header(text: &str, example: &str) -> Header {
 pub(super) fn quotas() -> [(&'static str, Header); 2] {
     let policy = "Where the service sets quotas: which. `work`: seconds of computation in an hour; `kept`: bytes of jobs \
                   and results (draft-ietf-httpapi-ratelimit-headers).";
-    let limit = "Where it sets quotas: what is left (`r`), and after how many seconds some of what is taken comes back (`t`).";
+    let limit =
+        "Where it sets quotas: what is left (`r`), and after how many seconds some of what is taken comes back (`t`).";
     [
         (
             "RateLimit-Policy",
-            text_header(policy, "\"work\";q=3600;qu=\"compute-seconds\";w=3600, \"kept\";q=200000000;qu=\"kept-bytes\""),
+            text_header(
+                policy,
+                "\"work\";q=3600;qu=\"compute-seconds\";w=3600, \"kept\";q=200000000;qu=\"kept-bytes\"",
+            ),
         ),
         ("RateLimit", text_header(limit, "\"work\";r=3540;t=1260, \"kept\";r=187654321;t=86400")),
     ]

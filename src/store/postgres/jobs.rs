@@ -21,7 +21,7 @@ use crate::store::jobs::{
 };
 use crate::store::sqlite_jobs::pack::{packed, packed_ending};
 use crate::store::sqlite_jobs::record::parsed;
-use crate::store::{KeptResult, ResultPage, ResultQuery, ResultStore, StoreError, Taken};
+use crate::store::{KeptResult, Origin, ResultPage, ResultQuery, ResultStore, StoreError, Taken};
 
 /// Tasks that one call for help makes at most.
 const MOST_HELP: u32 = 256;
@@ -43,6 +43,9 @@ impl ResultStore for PostgresStore {
     }
     fn has_asked(&self, key: Key, owner: String) -> BoxFuture<'_, Result<bool, StoreError>> {
         Box::pin(self.has_asked_in(key, owner))
+    }
+    fn origin(&self, key: Key, owner: Option<String>) -> BoxFuture<'_, Result<Origin, StoreError>> {
+        Box::pin(self.origin_of(key, owner))
     }
     fn inputs(&self, keys: Vec<Key>, most: usize) -> BoxFuture<'_, Result<Vec<(Key, Bytes)>, StoreError>> {
         Box::pin(self.some_inputs(keys, most))
@@ -110,6 +113,9 @@ impl PostgresStore {
         }
         if let Some(owner) = query.owner {
             statement.push(" AND owner = ").push_bind(owner);
+        }
+        if let Some(key) = query.key {
+            statement.push(" AND key = ").push_bind(key.as_bytes().to_vec());
         }
         if let Some(before) = query.before {
             statement.push(" AND id < ").push_bind(before.to_string());

@@ -103,7 +103,7 @@ pub(super) async fn submit(
              heartbeat_ms, priority, turn, pushed, owner, idempotency, body_hash, estimate_ms, created_ms, started_ms,
              finished_ms, deadline_ms, expires_ms, input_bytes, result_bytes)
          VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14, $15, $16, $17, $18, $19, $20, $21, $22,
-             $23, $24, octet_length($7), $25)
+             $23, $24, octet_length($7::bytea), $25)
          ON CONFLICT (owner, idempotency) DO NOTHING RETURNING ",
         columns!()
     ))

@@ -17,9 +17,9 @@ mod results;
 mod run;
 mod start;
 mod studies;
-mod usage;
 #[cfg(test)]
 mod tests;
+mod usage;
 mod writer;
 
 use std::time::Duration;

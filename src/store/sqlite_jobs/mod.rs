@@ -5,9 +5,9 @@ mod line;
 pub(super) mod pack;
 pub(super) mod record;
 mod run;
-mod usage;
 #[cfg(test)]
 mod tests;
+mod usage;
 
 use std::sync::Arc;
 
@@ -80,6 +80,9 @@ impl SqliteStore {
         }
         if let Some(owner) = query.owner {
             statement.push(" AND owner = ").push_bind(owner);
+        }
+        if let Some(key) = query.key {
+            statement.push(" AND key = ").push_bind(key.as_bytes().to_vec());
         }
         if let Some(before) = query.before {
             statement.push(" AND id < ").push_bind(before.to_string());

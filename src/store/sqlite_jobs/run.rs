@@ -27,11 +27,12 @@ pub(super) async fn claim(
     keep_ms: i64,
     now: i64,
 ) -> Outcome<Claimed> {
-    let waiting: Option<Waiting> =
-        sqlx::query_as("SELECT key, kind, calculator, input, priority, turn FROM precut_jobs WHERE id = ?1 AND state = 'queued'")
-            .bind(id.to_string())
-            .fetch_optional(&mut *connection)
-            .await?;
+    let waiting: Option<Waiting> = sqlx::query_as(
+        "SELECT key, kind, calculator, input, priority, turn FROM precut_jobs WHERE id = ?1 AND state = 'queued'",
+    )
+    .bind(id.to_string())
+    .fetch_optional(&mut *connection)
+    .await?;
     let Some(Waiting { key, kind, calculator, input, priority, turn }) = waiting else { return Ok(Claimed::Nothing) };
     let charged: u32 = sqlx::query_scalar("SELECT max(attempt) FROM precut_jobs WHERE key = ?1 AND state = 'queued'")
         .bind(&key)
