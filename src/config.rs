@@ -17,7 +17,7 @@ use crate::store::address::{Given, StoreAddress};
 pub const DEFAULTS: &str = include_str!("../config.default.toml");
 
 /// Sections of the configuration: `PRECUT_LOG_LEVEL` is `log.level`.
-const SECTIONS: [&str; 8] = ["log", "limits", "jobs", "cache", "postgres", "shutdown", "cors", "auth"];
+const SECTIONS: [&str; 9] = ["log", "limits", "jobs", "quota", "cache", "postgres", "shutdown", "cors", "auth"];
 
 /// Settings outside of the sections.
 const OUTSIDE: [&str; 5] = ["listen", "data", "store", "role", "cpu"];
@@ -45,6 +45,8 @@ pub struct Config {
     pub limits: Limits,
     /// What runs behind the answers.
     pub jobs: Jobs,
+    /// What one owner may take.
+    pub quota: Quota,
     /// What is kept.
     pub cache: Cache,
     /// How a PostgreSQL database is used.
@@ -120,12 +122,24 @@ pub struct Limits {
 pub struct Jobs {
     /// Jobs that run at the same time; 0 takes all cores but one.
     pub slots: usize,
+    /// What is estimated shorter, ms, has a place of its own while all others are taken; 0 for no such place.
+    pub short_ms: f64,
     /// Jobs that may wait.
     pub queue: u64,
     /// How long finished jobs and their results are kept, days.
     pub days: u32,
     /// Event streams that one client may have open.
     pub streams: usize,
+}
+
+/// What one owner of keys may take, or one address where nobody is asked for a key.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Quota {
+    /// Work within an hour, s of computation; 0 for no limit.
+    pub work_s_per_hour: f64,
+    /// Jobs and their results kept for him, bytes; 0 for no limit.
+    pub kept_bytes: u64,
 }
 
 /// What is kept.
@@ -412,6 +426,14 @@ impl Config {
             if !(ms > 0.0 && ms.is_finite()) {
                 faults.push(format!("{name} = {ms}: must be above 0"));
             }
+        }
+        let work_s = self.quota.work_s_per_hour;
+        if !(work_s >= 0.0 && work_s.is_finite()) {
+            faults.push(format!("quota.work_s_per_hour = {work_s}: must be 0 or more"));
+        }
+        let short_ms = self.jobs.short_ms;
+        if !(short_ms >= 0.0 && short_ms.is_finite()) {
+            faults.push(format!("jobs.short_ms = {short_ms}: must be 0 or more"));
         }
         if !(2..=1000).contains(&self.postgres.connections) {
             faults.push(format!("postgres.connections = {}: must be 2 to 1000", self.postgres.connections));

@@ -54,6 +54,30 @@ pub enum Error {
         /// When to come again.
         retry_after: Duration,
     },
+    /// Its owner has spent the work of an hour.
+    #[error("estimated {estimate_s} s, {left_s} s are left of the hour's {quota_s} s")]
+    WorkQuota {
+        /// What the job is estimated at, s.
+        estimate_s: f64,
+        /// What is left, s.
+        left_s: f64,
+        /// All of it, s.
+        quota_s: f64,
+        /// When there is so much, if nothing else is asked.
+        retry_after: Duration,
+    },
+    /// As much is kept for its owner as may be.
+    #[error("{kept_bytes} bytes are kept, allowed {quota_bytes} bytes")]
+    KeptQuota {
+        /// What is kept.
+        kept_bytes: u64,
+        /// What may be.
+        quota_bytes: u64,
+        /// When there is room again, ms UTC.
+        room_ms: i64,
+        /// The same from now, for who just asks.
+        retry_after: Option<Duration>,
+    },
     /// Something else was asked under the same idempotency key.
     #[error("the idempotency key belongs to job {0}, which asked something else")]
     IdempotencyKeyReused(JobId),

@@ -2,7 +2,7 @@
 //!
 //! Direct answers have a thread per core. Jobs have a pool of their own with one thread less: whatever a long
 //! calculation does in parallel, it cannot take all threads from the short ones, which would otherwise stand behind
-//! every piece of its work.
+//! every piece of its work. Short jobs have one more thread for the time when long ones have taken all of theirs.
 //!
 //! A calculation begins where nothing else is under way. A thread that waits for pieces of its own calculation takes
 //! up whatever rayon has for it meanwhile, and returns when that is done: if it were another calculation, a short one
@@ -29,30 +29,62 @@ pub(crate) struct Cores {
     job_pool: Pool,
     job_slots: Arc<Semaphore>,
     job_slot_count: u32,
+    short_pool: Pool,
+    short_slot: Arc<Semaphore>,
     slots: Arc<Semaphore>,
     slot_count: u32,
     patience: Duration,
 }
 
-/// The right to use the pool for one job.
-pub(crate) struct Slot(#[allow(dead_code)] OwnedSemaphorePermit); // held, never looked at
+/// The right to use a pool for one calculation.
+pub(crate) struct Slot {
+    line: Arc<Line>,
+    #[allow(dead_code)] // held, never looked at
+    permit: OwnedSemaphorePermit,
+    /// Of who runs alone: short jobs keep away, too.
+    #[allow(dead_code)]
+    keeps_away: Option<OwnedSemaphorePermit>,
+}
+
+impl Slot {
+    /// Where its calculation is to stand in line.
+    pub(crate) fn line(&self) -> Arc<Line> {
+        Arc::clone(&self.line)
+    }
+
+    /// Runs `work` and waits for it.
+    pub(crate) async fn run<T: Send + 'static>(
+        self,
+        work: impl FnOnce() -> Result<T, Error> + Send + 'static,
+    ) -> Result<T, Error> {
+        let (sender, receiver) = oneshot::channel();
+        self.line().push(move || {
+            let outcome = guarded(work);
+            drop(self);
+            // Nobody listens if the client has gone.
+            let _ = sender.send(outcome);
+        });
+        receiver.await.unwrap_or(Err(Error::Crashed))
+    }
+}
 
 impl Cores {
     /// Twice as many slots as cores: while one job ends, the next is there.
     pub(crate) fn new(cores: usize, job_slots: usize, patience: Duration) -> Result<Self, rayon::ThreadPoolBuildError> {
         let (cores, job_slots) = (cores.clamp(1, 1024), job_slots.clamp(1, 1024));
         let (job_slot_count, job_pool) = (u32::try_from(job_slots).unwrap_or(1), Pool::new("job", job_slots)?);
-        let pool = Pool::new("calc", cores)?;
+        let (pool, short_pool) = (Pool::new("calc", cores)?, Pool::new("short", 1)?);
         let job_slots = Arc::new(Semaphore::new(job_slots));
         let slot_count = u32::try_from(2 * cores).unwrap_or(u32::MAX);
         let slots = Arc::new(Semaphore::new(2 * cores));
-        Ok(Self { pool, job_pool, job_slots, job_slot_count, slots, slot_count, patience })
+        let short_slot = Arc::new(Semaphore::new(1));
+        Ok(Self { pool, job_pool, job_slots, job_slot_count, short_pool, short_slot, slots, slot_count, patience })
     }
 
     /// A slot if one is free.
     pub(crate) fn slot_now(&self) -> Result<Option<Slot>, Error> {
         match Arc::clone(&self.slots).try_acquire_owned() {
-            Ok(permit) => Ok(Some(Slot(permit))),
+            Ok(permit) => Ok(Some(self.pool.slot(permit))),
             Err(TryAcquireError::NoPermits) => Ok(None),
             Err(TryAcquireError::Closed) => Err(Error::ShuttingDown),
         }
@@ -65,7 +97,7 @@ impl Cores {
             Error::Busy { retry_after: RETRY_AFTER }
         };
         match tokio::time::timeout(self.patience, Arc::clone(&self.slots).acquire_owned()).await {
-            Ok(Ok(permit)) => Ok(Slot(permit)),
+            Ok(Ok(permit)) => Ok(self.pool.slot(permit)),
             Ok(Err(_closed)) => Err(Error::ShuttingDown),
             Err(_elapsed) => Err(busy()),
         }
@@ -78,51 +110,43 @@ impl Cores {
 
     /// The right to run a job: alone, or beside others. Waits for it.
     pub(crate) async fn job_slot(&self, alone: bool) -> Result<Slot, Error> {
+        let closed = |_| Error::ShuttingDown;
         let permits = if alone { self.job_slot_count } else { 1 };
-        let permit = Arc::clone(&self.job_slots).acquire_many_owned(permits).await;
-        permit.map(Slot).map_err(|_closed| Error::ShuttingDown)
+        let permit = Arc::clone(&self.job_slots).acquire_many_owned(permits).await.map_err(closed)?;
+        let mut slot = self.job_pool.slot(permit);
+        if alone {
+            slot.keeps_away = Some(Arc::clone(&self.short_slot).acquire_owned().await.map_err(closed)?);
+        }
+        Ok(slot)
+    }
+
+    /// The right to run a short job while others have taken all places.
+    pub(crate) async fn short_job_slot(&self) -> Result<Slot, Error> {
+        let permit = Arc::clone(&self.short_slot).acquire_owned().await;
+        permit.map(|permit| self.short_pool.slot(permit)).map_err(|_closed| Error::ShuttingDown)
+    }
+
+    /// Whether a job that comes now finds a place.
+    pub(crate) fn has_job_place(&self) -> bool {
+        self.job_slots.available_permits() > 0
     }
 
     /// The right to use one more core for a job, if nobody waits for it.
     pub(crate) fn spare_job_slot(&self) -> Option<Slot> {
-        Arc::clone(&self.job_slots).try_acquire_owned().ok().map(Slot)
-    }
-
-    /// Runs `work` on the jobs' pool.
-    pub(crate) fn spawn_job(&self, work: impl FnOnce() + Send + 'static) {
-        self.job_pool.line.push(work);
-    }
-
-    /// Runs `work` on the pool.
-    pub(crate) fn spawn(&self, work: impl FnOnce() + Send + 'static) {
-        self.pool.line.push(work);
-    }
-
-    /// Runs `work` on the pool and waits for it.
-    pub(crate) async fn run<T: Send + 'static>(
-        &self,
-        slot: Slot,
-        work: impl FnOnce() -> Result<T, Error> + Send + 'static,
-    ) -> Result<T, Error> {
-        let (sender, receiver) = oneshot::channel();
-        self.pool.line.push(move || {
-            let outcome = guarded(work);
-            drop(slot);
-            // Nobody listens if the client has gone.
-            let _ = sender.send(outcome);
-        });
-        receiver.await.unwrap_or(Err(Error::Crashed))
+        Arc::clone(&self.job_slots).try_acquire_owned().ok().map(|permit| self.job_pool.slot(permit))
     }
 
     /// Gives no more slots and waits until those given are back, at most so long; whether they are.
     pub(crate) async fn drain(&self, most: Duration) -> bool {
         let all = async {
             let _jobs = self.job_slots.acquire_many(self.job_slot_count).await?;
+            let _short = self.short_slot.acquire().await?;
             self.slots.acquire_many(self.slot_count).await.map(drop)
         };
         let back = matches!(tokio::time::timeout(most, all).await, Ok(Ok(())));
         self.slots.close();
         self.job_slots.close();
+        self.short_slot.close();
         back
     }
 }
@@ -147,6 +171,10 @@ impl Pool {
             .inspect_err(|_| line.close())?;
         Ok(Self { line, _threads: threads })
     }
+
+    fn slot(&self, permit: OwnedSemaphorePermit) -> Slot {
+        Slot { line: Arc::clone(&self.line), permit, keeps_away: None }
+    }
 }
 
 impl Drop for Pool {
@@ -157,7 +185,7 @@ impl Drop for Pool {
 
 /// Calculations that nobody has begun, the oldest first.
 #[derive(Default)]
-struct Line {
+pub(crate) struct Line {
     standing: Mutex<Standing>,
     came: Condvar,
 }
@@ -171,7 +199,7 @@ struct Standing {
 }
 
 impl Line {
-    fn push(&self, work: impl FnOnce() + Send + 'static) {
+    pub(crate) fn push(&self, work: impl FnOnce() + Send + 'static) {
         let mut standing = self.lock();
         standing.work.push_back(Box::new(work));
         standing.uncalled += 1;
@@ -250,6 +278,8 @@ mod tests {
     use std::thread::sleep;
     use std::time::Instant;
 
+    use futures_util::FutureExt;
+
     use super::*;
 
     const LONG: Duration = Duration::from_secs(10);
@@ -271,13 +301,13 @@ mod tests {
         let cores = cores(2);
         let ((over, is_over), (seen, sees)) = (channel(), channel());
         let inside = Arc::clone(&cores);
-        cores.spawn_job(move || {
+        cores.job_pool.line.push(move || {
             let begun = &Barrier::new(2);
             // The other one comes while this one waits for its last piece, and goes on until this one is over.
             let other = move || seen.send(is_over.recv_timeout(LONG).is_ok()).unwrap();
             let last_piece = move || {
                 begun.wait();
-                inside.spawn_job(other);
+                inside.job_pool.line.push(other);
                 sleep(Duration::from_millis(100));
             };
             rayon::join(|| begun.wait(), last_piece);
@@ -295,7 +325,7 @@ mod tests {
             let (begin, begun) = channel();
             let (seen, sees) = channel();
             let awaited = Arc::clone(&came);
-            cores.spawn_job(move || {
+            cores.job_pool.line.push(move || {
                 let both = &Barrier::new(2);
                 let piece = || {
                     both.wait();
@@ -309,19 +339,34 @@ mod tests {
                 seen.send(rayon::join(first, piece)).unwrap();
             });
             begun.recv().unwrap();
-            cores.spawn_job(move || came.store(true, Ordering::Relaxed));
+            cores.job_pool.line.push(move || came.store(true, Ordering::Relaxed));
             assert_eq!(sees.recv().unwrap(), (true, true));
         }
+    }
+
+    #[tokio::test]
+    async fn who_runs_alone_has_no_short_job_beside_him() {
+        let cores = cores(2);
+        let short = cores.short_job_slot().await.unwrap();
+        assert!(cores.has_job_place());
+        let mut alone = Box::pin(cores.job_slot(true));
+        assert!(alone.as_mut().now_or_never().is_none());
+        drop(short);
+        let alone = alone.await.unwrap();
+        assert!(!cores.has_job_place());
+        assert!(cores.short_job_slot().now_or_never().is_none());
+        drop(alone);
+        cores.short_job_slot().await.unwrap();
     }
 
     #[test]
     fn threads_end_when_what_stands_in_line_is_done() {
         let cores = cores(1);
-        let lines = [&cores.pool.line, &cores.job_pool.line].map(Arc::downgrade);
+        let lines = [&cores.pool, &cores.job_pool, &cores.short_pool].map(|pool| &pool.line).map(Arc::downgrade);
         let (done, all) = channel();
         for index in 0..3 {
             let done = done.clone();
-            cores.spawn(move || {
+            cores.pool.line.push(move || {
                 sleep(Duration::from_millis(20));
                 done.send(index).unwrap();
             });

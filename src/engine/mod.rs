@@ -20,6 +20,7 @@ mod memory;
 mod model;
 mod models;
 mod progress;
+mod quota;
 mod read;
 mod settings;
 mod study;
@@ -38,6 +39,7 @@ pub use jobs::{Answered, Ask, Feed, Isolation, Job};
 pub use model::ModelContent;
 pub use models::{GivenModel, ModelAnswer, ModelError, ModelFile, ModelSource, NoShelf, OnShelf, Shelf, StoredModel};
 pub use progress::Interim;
+pub use quota::{Share, Standing};
 pub use settings::EngineSettings;
 pub use study::STUDIES;
 pub(crate) use summary::Summary;
@@ -52,7 +54,7 @@ use tokio::runtime::Handle;
 use crate::registry::{Entry, Registry};
 use crate::store::jobs::JobStore;
 use crate::store::models::ModelStore;
-use crate::store::{ResultPage, ResultQuery, ResultStore, Store};
+use crate::store::{Origin, ResultPage, ResultQuery, ResultStore, Store};
 use asked::Asked;
 use budget::{Budget, Room, paid_beside};
 use exec::{Cores, Slot, guarded};
@@ -60,6 +62,7 @@ use flight::{Boarded, Flights, Landed, Pilot};
 use jobs::Jobs;
 use memory::{Kept, Memory, fingerprint};
 use model::Models;
+use quota::Unwritten;
 use read::Ready;
 use summary::Summaries;
 
@@ -90,6 +93,7 @@ pub(crate) struct Inner {
     /// Memory for bodies and what is made of them.
     bodies: Budget,
     asked: Asked,
+    unwritten: Unwritten,
     closed: AtomicBool,
 }
 
@@ -138,6 +142,7 @@ impl Engine {
             summaries,
             bodies,
             asked: Asked::default(),
+            unwritten: Unwritten::default(),
             closed,
         });
         host.move_in(&inner);
@@ -263,6 +268,11 @@ impl Engine {
         Ok(self.inner.store.has_asked(*key, owner.to_owned()).await?)
     }
 
+    /// Since when an answer is kept, and who has asked for it: of all, or of one owner.
+    pub async fn origin(&self, key: &Key, owner: Option<String>) -> Result<Origin, Error> {
+        Ok(self.inner.store.origin(*key, owner).await?)
+    }
+
     /// The list of kept answers, newest first.
     pub async fn results(&self, query: ResultQuery) -> Result<ResultPage, Error> {
         Ok(self.inner.store.list(query).await?)
@@ -291,6 +301,9 @@ impl Engine {
         inner.jobs.close().await;
         if !inner.cores.drain(grace).await {
             inner.flights.cancel_all();
+        }
+        if let Err(error) = inner.unwritten.write(&*inner.jobs.store).await {
+            tracing::warn!(%error, "the work of the last answers is not on record");
         }
         inner.store.close().await;
     }
@@ -335,7 +348,7 @@ impl Inner {
             let room = this.room_for(&body);
             read::read(&entry, &body, &Models { registry: &this.registry, found, room })
         };
-        self.cores.run(slot, work).await
+        slot.run(work).await
     }
 
     /// What is kept under a key, in memory or in the store. A store that fails is as good as an empty one here.
@@ -373,10 +386,23 @@ impl Inner {
         if affordable { Ok(()) } else { Err(Error::TooExpensive { cost, limit, limit_bytes }) }
     }
 
+    /// Whether an owner may ask for so much work in an hour at all.
+    fn afford_at_all(&self, cost: &Cost, estimate_ms: f64) -> Result<(), Error> {
+        let (most_ms, limit_bytes) = (self.settings.quota.work_ms, self.settings.cost_limit_bytes);
+        match most_ms.filter(|most_ms| estimate_ms > *most_ms) {
+            Some(most_ms) => Err(Error::TooExpensive {
+                cost: Cost { ms: estimate_ms, ..*cost },
+                limit: Duration::from_secs_f64(most_ms / 1e3),
+                limit_bytes,
+            }),
+            None => Ok(()),
+        }
+    }
+
     /// Runs the calculation on the pool.
     fn fly(inner: &Arc<Self>, pilot: Pilot, ready: Ready, slot: Slot, queued: Instant) {
         let this = Arc::clone(inner);
-        inner.cores.spawn(move || this.run(pilot, &ready, Some(slot), queued));
+        slot.line().push(move || this.run(pilot, &ready, Some(slot), queued));
     }
 
     /// Runs the calculation, keeps its answer and tells it.

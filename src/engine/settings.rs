@@ -7,6 +7,7 @@ use super::Isolation;
 use crate::config::{Config, Role, milliseconds, seconds};
 use crate::store::StoreSettings;
 use crate::store::address::StoreAddress;
+use crate::store::jobs::Quota;
 use crate::store::sqlite::Keep;
 
 /// How an engine works.
@@ -40,6 +41,8 @@ pub struct EngineSettings {
     pub queue_limit: u64,
     /// Jobs run at the same time behind the direct answers.
     pub job_slots: usize,
+    /// A job estimated below this has a place of its own while all others are taken; none has at 0.
+    pub short_limit: Duration,
     /// How long finished jobs and their results are kept.
     pub job_age: Duration,
     /// Memory of all bodies in work together and of what is read from them, bytes.
@@ -48,6 +51,8 @@ pub struct EngineSettings {
     pub isolation: Option<Isolation>,
     /// So many points has a parameter study at most.
     pub study_points: u64,
+    /// How much one owner may take.
+    pub quota: Quota,
     /// How long a job may stand in line for a core.
     pub patience: Duration,
 }
@@ -71,10 +76,12 @@ impl EngineSettings {
             cost_limit_bytes: 1 << 30,
             queue_limit: 10_000,
             job_slots: Self::job_slots_of(cores),
+            short_limit: Duration::from_secs(5),
             job_age: Duration::from_hours(30 * 24),
             bodies_bytes: 128 << 20,
             isolation: None,
             study_points: super::study::MOST_POINTS,
+            quota: Quota::default(),
             patience: Duration::from_millis(250),
         }
     }
@@ -98,10 +105,15 @@ impl EngineSettings {
             cost_limit_bytes: config.limits.job_bytes,
             queue_limit: config.jobs.queue,
             job_slots: if config.jobs.slots == 0 { Self::job_slots_of(cores) } else { config.jobs.slots },
+            short_limit: milliseconds(config.jobs.short_ms),
             job_age: Duration::from_secs(u64::from(config.jobs.days) * 24 * 3600),
             bodies_bytes: config.limits.bodies_bytes,
             isolation: None,
             study_points: config.limits.study_points,
+            quota: Quota {
+                kept_bytes: Some(config.quota.kept_bytes).filter(|bytes| *bytes > 0),
+                work_ms: Some(1e3 * config.quota.work_s_per_hour).filter(|ms| *ms > 0.0),
+            },
             patience: Duration::from_millis(config.limits.queue_ms),
         }
     }

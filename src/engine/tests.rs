@@ -363,6 +363,9 @@ impl ResultStore for BrokenStore {
     fn note_asked(&self, _key: Key, _owner: String) -> BoxFuture<'_, Result<(), StoreError>> {
         Box::pin(async { Err(StoreError::Failed("broken".to_owned())) })
     }
+    fn origin(&self, _key: Key, _owner: Option<String>) -> BoxFuture<'_, Result<Origin, StoreError>> {
+        Box::pin(async { Err(StoreError::Failed("gone".to_owned())) })
+    }
     fn has_asked(&self, _key: Key, _owner: String) -> BoxFuture<'_, Result<bool, StoreError>> {
         Box::pin(async { Err(StoreError::Failed("broken".to_owned())) })
     }

@@ -7,7 +7,7 @@ use std::time::Duration;
 use axum::extract::{Path, Request, State};
 use axum::http::HeaderMap;
 use axum::http::header::{ACCEPT, IF_NONE_MATCH};
-use axum::response::Response;
+use axum::response::{IntoResponse, Response};
 use precut_calc::calculator::{CalculatorKind, Meta};
 use serde::Serialize;
 use serde_json::Value;
@@ -21,7 +21,7 @@ use super::negotiate::{self, Media};
 use super::prefer::{self, Preference};
 use super::problem::Problem;
 use super::query::Query;
-use super::{App, body, gate};
+use super::{App, body, gate, quota};
 use crate::engine::{Answered, Ask, CacheState, Error, Priority};
 use crate::registry::{Entry, Registry};
 use crate::text::{self, Glossary, Language};
@@ -53,8 +53,26 @@ pub(super) const LEAST_DEADLINE_S: f64 = 0.001;
 const PARAMETERS: &[&str] = &["table", "figure", "priority", "deadline_s"];
 
 /// `POST /v1/{calculator}`
-pub(super) async fn solve(app: App, room: Arc<Room>, request: Request) -> Result<Response, Problem> {
+pub(super) async fn solve(app: App, room: Arc<Room>, request: Request) -> Response {
     let caller = request.extensions().get::<Caller>().cloned().unwrap_or(Caller::Stranger);
+    let owner = gate::owner(&caller, &request);
+    let outcome = answered(&app, &room, request, (&caller, owner.clone())).await;
+    match app.engine.standing(&owner).await {
+        Ok(None) => outcome.into_response(),
+        Ok(Some(standing)) => quota::told(outcome, &standing),
+        Err(error) => {
+            tracing::debug!(%error, "it is not told how an owner stands with his quotas");
+            outcome.into_response()
+        }
+    }
+}
+
+async fn answered(
+    app: &App,
+    room: &Room,
+    request: Request,
+    (caller, owner): (&Caller, String),
+) -> Result<Response, Problem> {
     let mut query = Query::of(request.uri(), PARAMETERS)?;
     let priority = query.one_of("priority", Priority::ALL, Priority::word)?;
     let deadline_s = query.number("deadline_s", &(LEAST_DEADLINE_S..=MOST_DEADLINE_S))?;
@@ -62,7 +80,7 @@ pub(super) async fn solve(app: App, room: Arc<Room>, request: Request) -> Result
     let view = View::of_parts(Parts::of(&mut query), headers, room.entry.meta(), &room.offered)?;
     let mut preference = Preference::of(headers);
     // Those who wait are requests in work: they leave room for those who do not.
-    let waiting = preference.wait_s.map(|_| Waiting::new(&app));
+    let waiting = preference.wait_s.map(|_| Waiting::new(app));
     if waiting.as_ref().is_some_and(|waiting| waiting.is_too_many) {
         preference.wait_s = Some(0);
     }
@@ -72,7 +90,7 @@ pub(super) async fn solve(app: App, room: Arc<Room>, request: Request) -> Result
         idempotency_key: prefer::idempotency_key(headers)?,
         wait: preference.wait(),
         shelf: caller.shelf(),
-        ..Ask::plain(gate::owner(&caller, &request))
+        ..Ask::plain(owner)
     };
     let language = negotiate::language(headers);
     let mut condition = HeaderMap::new();

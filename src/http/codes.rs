@@ -54,8 +54,10 @@ pub const CODES: &[(&str, u16)] = &[
     ("not_converged", 422),
     ("out_of_model", 422),
     ("too_expensive", 422),
+    ("kept_quota", 429),
     ("too_many_requests", 429),
     ("too_many_streams", 429),
+    ("work_quota", 429),
     ("header_too_large", 431),
     // The service is.
     ("crashed", 500),

@@ -239,7 +239,7 @@ pub(super) async fn list(
     let calculator = query.calculator(&app.engine)?;
     let (jobs, next) = app
         .engine
-        .jobs(JobQuery { state, calculator: calculator.clone(), owner: caller.shown(), limit, before })
+        .jobs(JobQuery { state, calculator: calculator.clone(), owner: caller.shown(), key: None, limit, before })
         .await?;
     let filter = state.map(|state| format!("&state={}", state.word())).unwrap_or_default()
         + &calculator.map(|id| format!("&calculator={id}")).unwrap_or_default();

@@ -31,9 +31,10 @@ const RESULT: &str = "/v1/results/{key}";
 const RESULT_FIGURES: &str = "/v1/results/{key}/figures";
 const RESULT_TABLES: &str = "/v1/results/{key}/tables";
 const RESULT_JOB: &str = "/v1/results/{key}/job";
+const RESULT_PROVENANCE: &str = "/v1/results/{key}/provenance";
 
 /// Addresses with a variable part, as they are counted.
-const PATTERNS: [(&str, &str); 16] = [
+const PATTERNS: [(&str, &str); 17] = [
     ("/v1/jobs/", JOB),
     ("/v1/jobs/", JOB_RESULT),
     ("/v1/jobs/", JOB_INPUT),
@@ -44,6 +45,7 @@ const PATTERNS: [(&str, &str); 16] = [
     ("/v1/results/", RESULT_FIGURES),
     ("/v1/results/", RESULT_TABLES),
     ("/v1/results/", RESULT_JOB),
+    ("/v1/results/", RESULT_PROVENANCE),
     ("/v1/calculators/", "/v1/calculators/{id}"),
     ("/v1/materials/", "/v1/materials/{id}"),
     ("/v1/", "/v1/{calculator}"),
@@ -159,6 +161,7 @@ fn pattern(path: &str) -> Option<&'static str> {
             Some("figures") => RESULT_FIGURES,
             Some("tables") => RESULT_TABLES,
             Some("job") => RESULT_JOB,
+            Some("provenance") => RESULT_PROVENANCE,
             _ => RESULT,
         });
     }
@@ -207,7 +210,8 @@ fn of_the_process() {
 fn recorder() -> &'static PrometheusHandle {
     static RECORDER: OnceLock<PrometheusHandle> = OnceLock::new();
     RECORDER.get_or_init(|| {
-        let of_jobs = Matcher::Full("precut_job_seconds".to_owned());
+        // Of `precut_job_seconds` and `precut_job_wait_seconds`.
+        let of_jobs = Matcher::Prefix("precut_job_".to_owned());
         let builder = PrometheusBuilder::new()
             .set_buckets(&LATENCY_S)
             .and_then(|builder| builder.set_buckets_for_metric(of_jobs, &JOB_S))
@@ -246,6 +250,19 @@ fn recorder() -> &'static PrometheusHandle {
             metrics::Unit::Seconds,
             "Time that a job's computation took, by calculator."
         );
+        metrics::describe_histogram!(
+            "precut_job_wait_seconds",
+            metrics::Unit::Seconds,
+            "Time from when a job was accepted to its beginning, by calculator."
+        );
+        metrics::describe_gauge!("precut_job_oldest_seconds", "How long the job has waited that has waited longest.");
+        metrics::describe_gauge!("precut_store_bytes", "What the database takes of the disk.");
+        metrics::describe_counter!("precut_owner_jobs_total", "Jobs put on record, by owner of keys.");
+        metrics::describe_counter!(
+            "precut_owner_work_milliseconds_total",
+            "Work by owner of keys: what jobs took here, what direct answers were estimated at."
+        );
+        metrics::describe_gauge!("precut_owner_kept_bytes", "Jobs and their results that are kept, by owner of keys.");
         metrics::describe_gauge!("precut_jobs", "Jobs by state: queued, running.");
         metrics::describe_counter!(
             "precut_jobs_helped_total",

@@ -20,7 +20,9 @@ mod pages;
 mod parts;
 mod prefer;
 mod problem;
+mod provenance;
 mod query;
+mod quota;
 mod rate;
 mod results;
 mod server;
@@ -168,6 +170,7 @@ fn routes(app: &App, health: Router<App>) -> Router<App> {
         .route("/v1/results/{key}/figures", get(parts::figures))
         .route("/v1/results/{key}/tables", get(parts::tables))
         .route("/v1/results/{key}/job", get(parts::job))
+        .route("/v1/results/{key}/provenance", get(provenance::read))
         .route("/v1/materials", get(materials::list))
         .route("/v1/materials/{id}", get(materials::read))
         .route("/v1/{calculator}", any(unknown_calculator));
@@ -216,6 +219,8 @@ fn cors(origins: &[String]) -> Option<CorsLayer> {
         header::LOCATION,
         header::RETRY_AFTER,
         prefer::PREFERENCE_APPLIED,
+        quota::RATE_LIMIT,
+        quota::RATE_LIMIT_POLICY,
         CACHE_STATE,
         gate::REQUEST_ID,
     ];

@@ -102,8 +102,13 @@ impl Problem {
 
     /// The same with the time after which it is worth coming again.
     pub(super) fn retry_after(self, wait: Duration) -> Self {
-        let whole_s = wait.as_secs() + u64::from(wait.subsec_nanos() > 0);
-        self.with("retry_after_s", wait.as_secs_f64()).header(RETRY_AFTER, HeaderValue::from(whole_s.max(1)))
+        self.with("retry_after_s", wait.as_secs_f64()).header(RETRY_AFTER, HeaderValue::from(whole_s(wait).max(1)))
+    }
+
+    /// The same as its header says it.
+    pub(super) fn retry_after_s(&self) -> Option<u64> {
+        let (_, value) = self.0.header.as_ref().filter(|(name, _)| *name == RETRY_AFTER)?;
+        value.to_str().ok()?.parse().ok()
     }
 
     fn findings(mut self, findings: Vec<Finding>, total: usize) -> Self {
@@ -254,6 +259,11 @@ fn short_text(text: &str) -> String {
     }
 }
 
+/// A time in whole seconds, none too few.
+pub(super) fn whole_s(time: Duration) -> u64 {
+    time.as_secs() + u64::from(time.subsec_nanos() > 0)
+}
+
 impl IntoResponse for Problem {
     /// An answer without a body: `super::gate` writes the document.
     fn into_response(self) -> Response {
@@ -313,6 +323,25 @@ impl From<Error> for Problem {
                 Self::new(StatusCode::SERVICE_UNAVAILABLE, "queue_full")
                     .with("queued", queued as f64)
                     .retry_after(retry_after)
+            }
+            Error::WorkQuota { estimate_s, left_s, quota_s, retry_after } => {
+                Self::new(StatusCode::TOO_MANY_REQUESTS, "work_quota")
+                    .with("estimate_s", estimate_s)
+                    .with("left_s", left_s)
+                    .with("quota_s", quota_s)
+                    .retry_after(retry_after)
+            }
+            Error::KeptQuota { kept_bytes, quota_bytes, room_ms, retry_after } => {
+                let room_at = jiff::Timestamp::from_millisecond(room_ms).unwrap_or_default();
+                #[allow(clippy::cast_precision_loss)] // printed with three digits
+                let problem = Self::new(StatusCode::TOO_MANY_REQUESTS, "kept_quota")
+                    .with("kept_mb", kept_bytes as f64 / 1e6)
+                    .with("quota_mb", quota_bytes as f64 / 1e6)
+                    .with("room_at", format!("{room_at:.0}"));
+                match retry_after {
+                    Some(wait) => problem.retry_after(wait),
+                    None => problem,
+                }
             }
             Error::IdempotencyKeyReused(job) => {
                 Self::new(StatusCode::UNPROCESSABLE_ENTITY, "idempotency_key_reused").with("job", job.to_string())

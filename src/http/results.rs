@@ -113,14 +113,21 @@ pub(super) async fn read(
 
 /// The result that an address names, if the caller has asked for it: another is as good as none.
 pub(super) async fn named(app: &App, caller: &Caller, name: &str) -> Result<Arc<Stored>, Problem> {
+    let key = visible(app, caller, name).await?;
+    app.engine.result(&key).await?.ok_or_else(|| absent(name))
+}
+
+/// The key that an address names, if the caller has asked for its result.
+pub(super) async fn visible(app: &App, caller: &Caller, name: &str) -> Result<Key, Problem> {
     let key = Key::from_str(name).map_err(|_| Problem::new(StatusCode::BAD_REQUEST, "bad_key"))?;
-    let absent = || Problem::new(StatusCode::NOT_FOUND, "unknown_result").with("key", name.to_owned());
-    if let Some(owner) = caller.shown()
-        && !app.engine.has_asked(&key, &owner).await?
-    {
-        return Err(absent());
+    match caller.shown() {
+        Some(owner) if !app.engine.has_asked(&key, &owner).await? => Err(absent(name)),
+        _ => Ok(key),
     }
-    app.engine.result(&key).await?.ok_or_else(absent)
+}
+
+pub(super) fn absent(name: &str) -> Problem {
+    Problem::new(StatusCode::NOT_FOUND, "unknown_result").with("key", name.to_owned())
 }
 
 fn page_of(

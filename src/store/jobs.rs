@@ -12,6 +12,7 @@ use futures_util::future::BoxFuture;
 use tokio::sync::watch;
 use uuid::{ContextV7, Timestamp, Uuid};
 
+pub use super::quota::{Quota, Usage};
 use super::{KeptResult, StoreError};
 use crate::key::Key;
 
@@ -197,6 +198,8 @@ pub struct NewJob {
     /// For how long after it is accepted it is of use, ms. Its deadline is set where it is accepted, by the same reading
     /// of the same clock: whoever asks may have another.
     pub useful_for_ms: Option<i64>,
+    /// What its owner may take.
+    pub quota: Quota,
     /// Its result, where it is there already.
     pub result: Option<KeptResult>,
 }
@@ -265,6 +268,21 @@ pub enum Accepted {
         /// How many.
         queued: u64,
     },
+    /// Its owner takes as much as he may.
+    OverQuota(Usage),
+}
+
+/// A job that waits.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Waiting {
+    /// Starts charged to its computation so far.
+    pub charged: u32,
+    /// By which calculator.
+    pub calculator: String,
+    /// Whose it is.
+    pub owner: String,
+    /// When it was accepted, ms UTC.
+    pub created_ms: i64,
 }
 
 /// A computation to run.
@@ -344,6 +362,8 @@ pub struct JobQuery {
     pub calculator: Option<String>,
     /// Only those of this owner.
     pub owner: Option<String>,
+    /// Only those that come to this result.
+    pub key: Option<Key>,
     /// At most so many.
     pub limit: u32,
     /// Only those before this one.
@@ -359,13 +379,17 @@ pub struct JobPage {
     pub next: Option<JobId>,
 }
 
-/// How many jobs are in which state.
+/// How the jobs and their store are.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct JobCounts {
     /// Waiting.
     pub queued: u64,
     /// Being computed.
     pub running: u64,
+    /// When the one came that has waited longest, ms UTC.
+    pub oldest_ms: Option<i64>,
+    /// What the database takes of the disk.
+    pub store_bytes: u64,
 }
 
 /// What a job took.
@@ -421,10 +445,12 @@ pub trait JobStore: Send + Sync + 'static {
     /// What jobs need to run, compressed, as far as it takes no more than so many bytes; those that have none any more
     /// are left out.
     fn job_inputs(&self, ids: Vec<JobId>, most: usize) -> BoxFuture<'_, Result<Vec<(JobId, Bytes)>, StoreError>>;
-    /// How many wait and run.
+    /// How many wait and run, since when, and how large the database is.
     fn counts(&self) -> BoxFuture<'_, Result<JobCounts, StoreError>>;
-    /// Starts charged to the job's computation so far and its calculator, if it waits.
-    fn waiting(&self, id: JobId) -> BoxFuture<'_, Result<Option<(u32, String)>, StoreError>>;
+    /// What is to be known of a job before it is taken, if it waits.
+    fn waiting(&self, id: JobId) -> BoxFuture<'_, Result<Option<Waiting>, StoreError>>;
+    /// The next job in line of at most so long, estimated, that was not charged a start yet.
+    fn next_short(&self, most_ms: f64) -> BoxFuture<'_, Result<Option<JobId>, StoreError>>;
     /// Takes the job and all equal ones that wait under a lease, and charges them one start; fails them, with
     /// `problem`, if they have been charged `most` already.
     fn claim(&self, id: JobId, lease: Lease, most: u32, problem: String) -> BoxFuture<'_, Result<Claimed, StoreError>>;
@@ -432,6 +458,14 @@ pub trait JobStore: Send + Sync + 'static {
     fn finish(&self, lease: Lease, ending: Ending) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>>;
     /// Puts a computation back in line without a charge.
     fn release(&self, lease: Lease) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>>;
+    /// What an owner takes of the service.
+    fn usage(&self, owner: String) -> BoxFuture<'_, Result<Usage, StoreError>>;
+    /// What is kept of jobs and their results for each owner of keys, bytes.
+    fn kept_by_owner(&self) -> BoxFuture<'_, Result<Vec<(String, u64)>, StoreError>>;
+    /// Notes the work of answers that were no jobs: whose it was, and how much, ms.
+    fn note_work(&self, work: Vec<(String, f64)>) -> BoxFuture<'_, Result<(), StoreError>>;
+    /// Fails a job that waits, with `problem`; whether it did.
+    fn refuse(&self, id: JobId, problem: String) -> BoxFuture<'_, Result<bool, StoreError>>;
     /// Ends one job without a result.
     fn cancel(&self, id: JobId) -> BoxFuture<'_, Result<Option<Cancelled>, StoreError>>;
     /// Puts a job whose result is damaged back in line.

@@ -7,6 +7,7 @@ mod ledger;
 pub mod models;
 mod postgres;
 mod queue;
+pub(crate) mod quota;
 mod row;
 pub mod sqlite;
 mod sqlite_jobs;
@@ -96,6 +97,8 @@ pub trait ResultStore: Send + Sync + 'static {
     fn note_asked(&self, key: Key, owner: String) -> BoxFuture<'_, Result<(), StoreError>>;
     /// Whether an owner has asked for a result, by a request or a job.
     fn has_asked(&self, key: Key, owner: String) -> BoxFuture<'_, Result<bool, StoreError>>;
+    /// Since when a result is kept, and who has asked for it: of all, or of one owner.
+    fn origin(&self, key: Key, owner: Option<String>) -> BoxFuture<'_, Result<Origin, StoreError>>;
     /// The filled jobs of kept results, compressed, as far as they take no more than so many bytes; those that are not
     /// there are left out.
     fn inputs(&self, keys: Vec<Key>, most: usize) -> BoxFuture<'_, Result<Vec<(Key, Bytes)>, StoreError>>;
@@ -159,6 +162,20 @@ pub struct KeptResult {
     pub input: Bytes,
     /// The envelope, JSON.
     pub body: Bytes,
+}
+
+/// Where a kept result comes from, beside what it says itself.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Origin {
+    /// When it was computed, ms UTC; none where it is not kept.
+    pub created_ms: Option<i64>,
+    /// The owners who had it as a direct answer, at most [`Origin::MOST`].
+    pub asked_by: Vec<String>,
+}
+
+impl Origin {
+    /// Never more owners than so many.
+    pub const MOST: u32 = 100;
 }
 
 /// What a list of results asks for.

@@ -18,7 +18,7 @@ use super::queue::{self, Tasks};
 use super::row::ResultRow;
 use super::sqlite_jobs;
 use super::writer::{LIST_PATIENCE, Limits, Writer};
-use super::{Cursor, KeptResult, ResultPage, ResultQuery, ResultStore, ResultSummary, StoreError};
+use super::{Cursor, KeptResult, Origin, ResultPage, ResultQuery, ResultStore, ResultSummary, StoreError};
 use crate::key::Key;
 
 fn migrations() -> Migrator {
@@ -224,6 +224,24 @@ impl ResultStore for SqliteStore {
                      OR EXISTS (SELECT 1 FROM precut_jobs WHERE key = ?1 AND owner = ?2)",
             );
             Ok(asked.bind(key.as_bytes().as_slice()).bind(owner).fetch_one(&self.readers).await?)
+        })
+    }
+    fn origin(&self, key: Key, owner: Option<String>) -> BoxFuture<'_, Result<Origin, StoreError>> {
+        Box::pin(async move {
+            self.writer.flush(LIST_PATIENCE).await;
+            let created_ms = sqlx::query_scalar("SELECT created_ms FROM results WHERE key = ?1")
+                .bind(key.as_bytes().as_slice())
+                .fetch_optional(&self.readers)
+                .await?;
+            let asked_by = sqlx::query_scalar(
+                "SELECT owner FROM asked WHERE key = ?1 AND (?3 IS NULL OR owner = ?3) ORDER BY owner LIMIT ?2",
+            )
+            .bind(key.as_bytes().as_slice())
+            .bind(Origin::MOST)
+            .bind(owner)
+            .fetch_all(&self.readers)
+            .await?;
+            Ok(Origin { created_ms, asked_by })
         })
     }
     fn inputs(&self, keys: Vec<Key>, most: usize) -> BoxFuture<'_, Result<Vec<(Key, Bytes)>, StoreError>> {

@@ -87,6 +87,33 @@ async fn any_api_answers_for_any_job_and_a_cancel_reaches_its_worker() {
 }
 
 #[tokio::test]
+async fn a_short_job_has_a_place_where_long_ones_have_taken_all_others() {
+    let Some(database) = Database::start() else { return };
+    let api = Member::start(&database, "api", &[]).await;
+    let mut workers = Vec::new();
+    for _ in 0..2 {
+        workers.push(Member::start(&database, "worker", &[("PRECUT_JOBS_SLOTS", "1")]).await);
+    }
+    let mut long = Vec::new();
+    for length in [700, 701, 702] {
+        long.push(api.accepted(BAR, &json!({"length_mm": length, "load_n": 10, "duration_ms": 120_000})).await);
+    }
+    for address in &long[..2] {
+        api.job_in(address, "running").await;
+    }
+    for length in 710..714 {
+        let short = api.accepted(BAR, &json!({"length_mm": length, "load_n": 10, "duration_ms": 20})).await;
+        assert_eq!(api.job_in(&short, "succeeded").await["attempt"], 1);
+    }
+    let states = [api.job(&long[0]).await, api.job(&long[1]).await, api.job(&long[2]).await];
+    assert_eq!(states.map(|job| job["state"].clone()), [json!("running"), json!("running"), json!("queued")]);
+    for member in workers {
+        member.stop();
+    }
+    api.stop();
+}
+
+#[tokio::test]
 async fn the_database_restarts_under_load_and_nothing_is_lost() {
     let Some(mut database) = Database::start() else { return };
     let api = Member::start(&database, "api", &[]).await;

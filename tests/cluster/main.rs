@@ -12,6 +12,9 @@
 #[allow(dead_code)] // these tests start processes only
 mod support;
 
+#[path = "../support/isolation.rs"]
+mod isolation;
+
 #[path = "../reliability/dice.rs"]
 mod dice;
 
@@ -24,6 +27,7 @@ mod chaos;
 mod clocks;
 mod database;
 mod full;
+mod owners;
 mod process;
 mod start;
 mod studies;

@@ -335,7 +335,7 @@ async fn ends(server: &Server, addresses: &[String]) -> Vec<String> {
 
 #[tokio::test]
 async fn jobs_of_higher_priority_go_first() {
-    let server = Server::start_with(|config| config.jobs.slots = 1).await;
+    let server = Server::start_with(|config| (config.jobs.slots, config.jobs.short_ms) = (1, 0.0)).await;
     let held = toy::hold(1900);
     let first = sent(&server, lasting(1900, 1)).await;
     until(&server, &first, &["running"]).await;
@@ -357,7 +357,7 @@ async fn jobs_of_higher_priority_go_first() {
 async fn clients_take_turns() {
     let keys = ["one client's key, 0123456789", "another client's key, 98765432"];
     let server = Server::start_with(|config| {
-        config.jobs.slots = 1;
+        (config.jobs.slots, config.jobs.short_ms) = (1, 0.0);
         config.auth.keys = keys
             .map(|key| ApiKey { name: key[..3].to_owned(), hash: auth::hash(key).to_string(), ..ApiKey::default() })
             .to_vec();
@@ -469,6 +469,50 @@ async fn long_jobs_leave_the_short_answers_their_place() {
         let body = json!({"length_mm": length, "load_n": 1, "work_ms": 5}).to_string();
         assert_eq!(server.post(body).send().await.unwrap().status(), 200);
     }
+}
+
+/// Estimated at a minute, and done as soon as nobody holds it.
+fn estimated_long(length_mm: u32) -> String {
+    json!({"length_mm": length_mm, "load_n": 1, "work_ms": 60_000}).to_string()
+}
+
+#[tokio::test]
+async fn a_short_job_does_not_wait_for_long_ones_and_long_ones_are_not_kept_waiting_by_short_ones() {
+    let server = Server::start_with(|config| config.jobs.slots = 1).await;
+    let held = toy::hold(1930);
+    let first = sent(&server, estimated_long(1930)).await;
+    let second = sent(&server, estimated_long(1931)).await;
+    until(&server, &first, &["running"]).await;
+    for length in 1940..1945 {
+        let short = sent(&server, lasting(length, 20)).await;
+        until(&server, &short, &["succeeded"]).await;
+    }
+    assert_eq!(
+        (&job(&server, &first).await["state"], &job(&server, &second).await["state"]),
+        (&json!("running"), &json!("queued"))
+    );
+    // Only one of them at a time.
+    let short_held = toy::hold(1945);
+    let one = sent(&server, lasting(1945, 1)).await;
+    until(&server, &one, &["running"]).await;
+    let other = sent(&server, lasting(1946, 1)).await;
+    assert_eq!(job(&server, &other).await["state"], "queued");
+    drop(short_held);
+    until(&server, &other, &["succeeded"]).await;
+    // The long one that waits gets its place, although there is always a short one that waits, too.
+    drop(held);
+    let mut waiting = Vec::new();
+    for length in 1950..2050 {
+        waiting.push(sent(&server, lasting(length, 20)).await);
+        if job(&server, &second).await["state"] == "succeeded" {
+            break;
+        }
+        if waiting.len() > 3 {
+            until(&server, &waiting.remove(0), &["succeeded"]).await;
+        }
+    }
+    assert_eq!(job(&server, &second).await["state"], "succeeded");
+    server.stop().await;
 }
 
 #[tokio::test]

@@ -5,6 +5,9 @@
 #[path = "../support/mod.rs"]
 mod support;
 
+#[path = "../support/isolation.rs"]
+mod isolation;
+
 mod bad_input;
 mod command_line;
 mod contract;
@@ -16,6 +19,7 @@ mod models;
 mod negotiation;
 mod owners;
 mod process;
+mod quotas;
 mod results;
 mod standing;
 mod studies;

@@ -1,8 +1,11 @@
 //! What every answer has, and what the service says of itself.
 
+use std::time::{Duration, Instant};
+
+use precut::http::auth;
 use serde_json::Value;
 
-use crate::support::{Server, header, problem, toy};
+use crate::support::{Process, Server, header, problem, toy};
 
 #[tokio::test]
 async fn every_answer_carries_a_request_id() {
@@ -137,4 +140,59 @@ async fn every_problem_has_a_page_in_words() {
         assert!(page.text().await.unwrap().contains(code));
     }
     problem(server.get("/problems/none_such").send().await.unwrap(), 404, "unknown_problem").await;
+}
+
+/// A process of its own: figures are those of a process, and other tests move them.
+#[tokio::test]
+async fn metrics_tell_how_long_jobs_wait_how_large_the_store_is_and_who_asks_for_how_much() {
+    let folder = tempfile::tempdir().unwrap();
+    let keys = ["alpha", "beta", "watch"].map(|name| {
+        let scopes = if name == "watch" { ", scopes = [\"admin\"]" } else { "" };
+        format!("{{ name = \"{name}\", hash = \"{}\"{scopes} }}", auth::hash(name))
+    });
+    let config = folder.path().join("precut.toml");
+    std::fs::write(&config, format!("auth.keys = [{}]\njobs.slots = 1\n", keys.join(", "))).unwrap();
+    let gate = folder.path().join("gate");
+    let settings =
+        [("PRECUT_CONFIG", config.to_str().unwrap()), (toy::HELD_MM, "2201"), (toy::GATE, gate.to_str().unwrap())];
+    let process = Process::start_with(&folder.path().join("data"), &settings);
+    let client = reqwest::Client::new();
+    let url = |path: &str| format!("http://{}{path}", process.address);
+    let send = async |key: &str, length: u32| {
+        let job = serde_json::json!({"length_mm": length, "load_n": 1, "work_ms": 60_000});
+        let request = client.post(url(&format!("/v1/{}", toy::BAR))).bearer_auth(key).json(&job);
+        let response = request.header("prefer", "respond-async").send().await.unwrap();
+        assert_eq!(response.status(), 202);
+    };
+    let figure = async |name: &str| -> Option<f64> {
+        let text = client.get(url("/metrics")).bearer_auth("watch").send().await.unwrap().text().await.unwrap();
+        text.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(' ')?.parse().ok())
+    };
+    let until = async |name: &str, is_so: fn(f64) -> bool| {
+        let begun = Instant::now();
+        while !figure(name).await.is_some_and(is_so) {
+            assert!(begun.elapsed() < Duration::from_mins(1), "{name}: {:?}", figure(name).await);
+            tokio::time::sleep(Duration::from_millis(50)).await;
+        }
+    };
+    send("alpha", 2201).await;
+    send("beta", 2202).await;
+    until("precut_jobs{state=\"queued\"}", |count| count == 1.0).await;
+    until("precut_job_oldest_seconds", |seconds| seconds > 0.0).await;
+    until("precut_store_bytes", |bytes| bytes > 10_000.0).await;
+    until("precut_owner_kept_bytes{owner=\"alpha\"}", |bytes| bytes > 0.0).await;
+    std::fs::write(&gate, "").unwrap();
+    let waits = format!("precut_job_wait_seconds_count{{calculator=\"{}\"}}", toy::BAR);
+    until(&waits, |count| count == 2.0).await;
+    until("precut_job_oldest_seconds", |seconds| seconds == 0.0).await;
+    for owner in ["alpha", "beta"] {
+        assert_eq!(figure(&format!("precut_owner_jobs_total{{owner=\"{owner}\"}}")).await, Some(1.0));
+        until(&format!("precut_owner_work_milliseconds_total{{owner=\"{owner}\"}}"), |ms| ms > 0.0).await;
+    }
+    for name in ["process_resident_memory_bytes", "process_open_fds"] {
+        assert!(figure(name).await.unwrap() > 1.0, "{name}");
+    }
+    // Addresses are no labels: there may be any number of them.
+    let text = client.get(url("/metrics")).bearer_auth("watch").send().await.unwrap().text().await.unwrap();
+    assert!(!text.contains("127.0.0.1"), "{text}");
 }

@@ -21,6 +21,9 @@ pub(super) fn written(error: &Error) -> String {
         Error::DeadlineExceeded => json!({"kind": "deadline_exceeded"}),
         Error::CrashedRepeatedly { attempts } => json!({"kind": "crashed_repeatedly", "attempts": attempts}),
         Error::Crashed => json!({"kind": "crashed"}),
+        Error::KeptQuota { kept_bytes, quota_bytes, room_ms, .. } => {
+            json!({"kind": "kept_quota", "kept_bytes": kept_bytes, "quota_bytes": quota_bytes, "room_ms": room_ms})
+        }
         other => json!({"kind": "internal", "cause": other.to_string()}),
     };
     value.to_string()
@@ -69,6 +72,12 @@ fn error_of(value: &Value) -> Option<Error> {
         },
         "unknown_calculator" => Error::UnknownCalculator { name: value["name"].as_str()?.to_owned(), nearest: None },
         "deadline_exceeded" => Error::DeadlineExceeded,
+        "kept_quota" => Error::KeptQuota {
+            kept_bytes: value["kept_bytes"].as_u64()?,
+            quota_bytes: value["quota_bytes"].as_u64()?,
+            room_ms: value["room_ms"].as_i64()?,
+            retry_after: None,
+        },
         "crashed_repeatedly" => Error::CrashedRepeatedly { attempts: whole("attempts")? },
         "crashed" => Error::Crashed,
         "internal" => Error::Calculation(Failure::Internal(value["cause"].as_str()?.to_owned())),
@@ -162,6 +171,7 @@ mod tests {
             Error::DeadlineExceeded,
             Error::CrashedRepeatedly { attempts: 3 },
             Error::Crashed,
+            Error::KeptQuota { kept_bytes: 70, quota_bytes: 60, room_ms: 1_769_941_200_123, retry_after: None },
         ];
         for error in errors {
             assert_eq!(read(&written(&error)), error);

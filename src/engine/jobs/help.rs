@@ -46,7 +46,7 @@ pub(super) async fn run(engine: &Arc<Inner>, id: JobId) {
     let unwanted = Arc::new(AtomicBool::new(false));
     let (sender, mut receiver) = oneshot::channel();
     let (watch, key) = (Unwanted(Arc::clone(&unwanted)), shared.key);
-    engine.cores.spawn_job(move || {
+    slot.line().push(move || {
         let begun = Instant::now();
         let outcome = guarded(|| {
             let ready = work::ready(&entry, &shared.input)?;

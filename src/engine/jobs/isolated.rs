@@ -66,7 +66,7 @@ impl Work for Isolated {
             }
             let (sender, receiver) = oneshot::channel();
             let this = Arc::clone(&engine);
-            engine.cores.spawn_job(move || {
+            slot.line().push(move || {
                 let begun = Instant::now();
                 let given_up = || running.is_cancelled() || sender.is_closed();
                 let answer = guarded(|| answered(&ready, &isolation, &given_up));

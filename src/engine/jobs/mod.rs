@@ -11,6 +11,7 @@
 //! 2. A task comes up in the queue; [`worker`] takes the job with all equal ones that wait under one **lease**, and
 //!    charges them a start. Every later write names the lease and finds no record once it is lost: a computation that
 //!    was given to somebody else cannot write any more.
+//!    While long jobs have taken all places, short ones have one more ([`short`]).
 //! 3. It runs on the jobs' own pool. How far it is stands in memory and is written once a second.
 //! 4. Its end, with its result, is written in one transaction for all jobs that still hold the lease. A cancel or a
 //!    deadline takes one job off the lease; when the last has gone, the computation is told to stop.
@@ -41,6 +42,7 @@ mod help;
 mod isolated;
 mod requests;
 mod running;
+mod short;
 mod sweeper;
 pub(crate) mod work;
 mod worker;
@@ -58,6 +60,7 @@ use tokio::sync::{Notify, watch};
 use tokio::task::JoinHandle;
 
 use super::progress::Reported;
+use super::quota::label;
 use super::{Error, Inner, Key, Shelf, Stored};
 use crate::store::jobs::{
     Accepted, Changed, Idempotency, JobId, JobKind, JobPage, JobQuery, JobRecord, JobState, JobStore, MOST_ATTEMPTS,
@@ -149,6 +152,8 @@ pub(crate) struct Jobs {
     feeds: Arc<Feeds>,
     computations: Arc<Computations>,
     new_deadline: Notify,
+    /// A job came into line.
+    came: Notify,
     stop: watch::Sender<bool>,
     tasks: Mutex<Vec<JoinHandle<()>>>,
 }
@@ -161,6 +166,7 @@ impl Jobs {
             feeds: Arc::default(),
             computations: Arc::default(),
             new_deadline: Notify::new(),
+            came: Notify::new(),
             stop: watch::channel(false).0,
             tasks: Mutex::default(),
         }
@@ -179,7 +185,7 @@ impl Jobs {
             let engine = weak.upgrade();
             let task: futures_util::future::BoxFuture<'static, ()> = Box::pin(async move {
                 if let Some(engine) = engine {
-                    worker::run_task(engine, id).await;
+                    worker::run_task(engine, id, None).await;
                 }
             });
             task
@@ -188,6 +194,9 @@ impl Jobs {
         if engine.settings.role.works() {
             let work = jobs.store.work(engine.cores.job_places(), run, jobs.stop.subscribe());
             tasks.push(tokio::spawn(work));
+            if !engine.settings.short_limit.is_zero() {
+                tasks.push(tokio::spawn(short::run(Arc::downgrade(engine))));
+            }
         }
         let (feeds, computations) = (Arc::clone(&jobs.feeds), Arc::clone(&jobs.computations));
         jobs.store.tell(Arc::new(move |news| match news {
@@ -215,6 +224,10 @@ impl Jobs {
         }
     }
 
+    fn is_stopped(&self) -> bool {
+        *self.stop.borrow()
+    }
+
     /// Waits until [`Jobs::stop`].
     pub(crate) async fn stopped(&self) {
         // The sender lives as long as this does.
@@ -232,12 +245,7 @@ impl Jobs {
     }
 
     /// Puts a job on record; whether it is a new one.
-    pub(crate) async fn accept(
-        &self,
-        request: Request,
-        ask: &Ask,
-        queue_limit: u64,
-    ) -> Result<(JobRecord, bool), Error> {
+    pub(crate) async fn accept(&self, engine: &Inner, request: Request, ask: &Ask) -> Result<(JobRecord, bool), Error> {
         let idempotency = ask.idempotency_key.clone().map(|key| Idempotency { key, body_hash: request.body_hash });
         let useful_for_ms = ask.deadline.map(|after| i64::try_from(after.as_millis()).unwrap_or(i64::MAX));
         let job = NewJob {
@@ -252,18 +260,26 @@ impl Jobs {
             idempotency,
             estimate_ms: request.estimate_ms,
             useful_for_ms,
+            quota: engine.settings.quota,
             result: request.result.map(|stored| stored.kept()),
         };
-        match self.store.submit(job, queue_limit).await? {
+        let work_ms = if job.result.is_some() { 0.0 } else { job.estimate_ms };
+        match self.store.submit(job, engine.settings.queue_limit).await? {
             Accepted::New(record) => {
                 metrics::counter!("precut_jobs_accepted_total", "calculator" => request.calculator).increment(1);
+                metrics::counter!("precut_owner_jobs_total", "owner" => label(&ask.owner)).increment(1);
                 if useful_for_ms.is_some() {
                     self.new_deadline.notify_one();
                 }
+                self.came.notify_one();
                 Ok((record, true))
             }
             Accepted::Known(record) => Ok((record, false)),
             Accepted::OtherBody(id) => Err(Error::IdempotencyKeyReused(id)),
+            Accepted::OverQuota(usage) => {
+                let refused = engine.refused(&usage, &engine.settings.quota, work_ms);
+                Err(refused.unwrap_or_else(|| Error::internal("a job was refused for no reason".to_owned())))
+            }
             Accepted::QueueFull { queued } => {
                 metrics::counter!("precut_queue_full_total").increment(1);
                 Err(Error::QueueFull { queued, retry_after: RETRY_QUEUE })

@@ -36,8 +36,12 @@ impl Engine {
         // What was learned of a calculator holds for a study of it, too.
         let numbers_of = ready.prepared.numbers_of.as_ref().unwrap_or(meta);
         let estimate_ms = inner.jobs.estimates.corrected(numbers_of.id, numbers_of.version, ready.prepared.cost.ms);
+        if kept.is_none() {
+            inner.afford_at_all(&ready.prepared.cost, estimate_ms)?;
+        }
         let is_short = estimate_ms <= inner.settings.direct_limit.as_secs_f64() * 1e3;
         if is_short && ask.wait.is_none() && body_hash.is_none() {
+            inner.charge(&ask.owner, estimate_ms).await?;
             let answer = self.solve_directly(*ready, parse);
             let outcome = match ask.deadline {
                 None => answer.await,
@@ -60,7 +64,8 @@ impl Engine {
             result,
         };
         let was_there = request.result.is_some();
-        let (record, is_new) = inner.jobs.accept(request, &ask, inner.settings.queue_limit).await?;
+        inner.unwritten.write(&*inner.jobs.store).await?;
+        let (record, is_new) = inner.jobs.accept(inner, request, &ask).await?;
         // A short job with a name of its own is answered as others are, if it gets its turn soon.
         let short_wait = if is_short { inner.settings.direct_limit + inner.settings.patience } else { Duration::ZERO };
         let job = inner.jobs.wait(record, ask.wait.unwrap_or(short_wait)).await?;

@@ -1,11 +1,13 @@
 //! What has to be looked after from time to time: progress on record, deadlines, lost tasks, what is to be forgotten.
 
+use std::collections::HashSet;
 use std::sync::{Arc, Weak};
 use std::time::Duration;
 
 use tokio::time::Instant;
 
 use super::fault;
+use crate::engine::quota::label;
 use crate::engine::{Error, Inner};
 
 /// How often progress is written.
@@ -58,6 +60,7 @@ fn beat() -> tokio::time::Interval {
 
 async fn look_after(engine: Weak<Inner>) {
     let (mut beat, mut count, mut due) = (beat(), 0_u64, Instant::now());
+    let mut owners = HashSet::new();
     loop {
         let Some(engine) = engine.upgrade() else { return };
         let jobs = &engine.jobs;
@@ -65,11 +68,15 @@ async fn look_after(engine: Weak<Inner>) {
             () = jobs.stopped() => return,
             _ = beat.tick() => {
                 count += 1;
+                report("work", engine.unwritten.write(&*jobs.store).await);
                 if jobs.store.is_shared() || count.is_multiple_of(SWEEP) {
                     sweep(&engine).await;
                 }
                 if count.is_multiple_of(COUNT) {
                     tally(&engine).await;
+                }
+                if count % FORGET == COUNT {
+                    tally_owners(&engine, &mut owners).await;
                 }
                 if count.is_multiple_of(FORGET) {
                     report("forget", jobs.store.forget_expired().await);
@@ -103,13 +110,32 @@ async fn sweep(engine: &Arc<Inner>) {
     }
 }
 
+#[allow(clippy::cast_precision_loss)] // counts of jobs, bytes of a disk: below 2^53
 async fn tally(engine: &Arc<Inner>) {
     if let Some(counts) = report("count", engine.jobs.store.counts().await) {
-        #[allow(clippy::cast_precision_loss)] // counts of jobs
         let gauge =
             |state: &'static str, count: u64| metrics::gauge!("precut_jobs", "state" => state).set(count as f64);
         gauge("queued", counts.queued);
         gauge("running", counts.running);
+        let waited_ms = counts.oldest_ms.map_or(0, |came| engine.jobs.store.now_ms().saturating_sub(came).max(0));
+        metrics::gauge!("precut_job_oldest_seconds").set(waited_ms as f64 / 1e3);
+        metrics::gauge!("precut_store_bytes").set(counts.store_bytes as f64);
+    }
+}
+
+/// Tells what is kept for each owner of keys; of those told before nothing any more where nothing is kept.
+async fn tally_owners(engine: &Arc<Inner>, told: &mut HashSet<String>) {
+    let Some(kept) = report("count", engine.jobs.store.kept_by_owner().await) else { return };
+    #[allow(clippy::cast_precision_loss)] // bytes of a disk, below 2^53
+    let gauge = |owner: &str, bytes: u64| {
+        metrics::gauge!("precut_owner_kept_bytes", "owner" => label(owner)).set(bytes as f64);
+    };
+    for owner in told.drain() {
+        gauge(&owner, 0);
+    }
+    for (owner, bytes) in kept {
+        gauge(&owner, bytes);
+        told.insert(owner);
     }
 }
 

@@ -20,7 +20,7 @@ use crate::store::jobs::{Claim, JobKind};
 
 /// Something to run for jobs.
 pub(crate) trait Work: Send + Sync {
-    /// Runs it. `slot` is the right to the jobs' pool, to be held as long as cores are used. To be given up soon after
+    /// Runs it. `slot` is the right to a pool of jobs, to be held as long as cores are used. To be given up soon after
     /// [`Running::cancelled`]; its own progress is to be told by [`Running::follow`].
     fn run(
         self: Box<Self>,
@@ -71,12 +71,12 @@ impl Work for Composed {
     ) -> BoxFuture<'static, Result<Arc<Stored>, Error>> {
         Box::pin(async move {
             let (sender, receiver) = oneshot::channel();
-            engine.cores.spawn_job(move || {
+            slot.line().push(move || {
                 // Nobody listens if the job was given up.
                 let _ = sender.send(guarded(|| ready(&self.entry, &self.input)));
             });
             let ready = receiver.await.unwrap_or(Err(Error::Crashed))?;
-            Inner::calculate(&engine, ready, &running, Some(slot)).await
+            Inner::calculate(&engine, ready, &running, slot).await
         })
     }
 }
@@ -93,18 +93,18 @@ impl Work for Calculation {
         running: Arc<Running>,
         slot: Slot,
     ) -> BoxFuture<'static, Result<Arc<Stored>, Error>> {
-        Box::pin(async move { Inner::calculate(&engine, self.ready, &running, Some(slot)).await })
+        Box::pin(async move { Inner::calculate(&engine, self.ready, &running, slot).await })
     }
 }
 
 impl Inner {
     /// An ordinary cached calculation as a job: from the cache, from whoever computes it already, or computed on the
-    /// jobs' pool with the job's `slot`, and then kept for whoever asks next.
+    /// pool of the job's `slot`, and then kept for whoever asks next.
     pub(crate) async fn calculate(
         engine: &Arc<Self>,
         ready: Ready,
         running: &Running,
-        slot: Option<Slot>,
+        slot: Slot,
     ) -> Result<Arc<Stored>, Error> {
         let mut mine = Some((ready, slot));
         loop {
@@ -125,7 +125,7 @@ impl Inner {
                 && let Some((ready, slot)) = mine.take()
             {
                 let (this, queued) = (Arc::clone(engine), Instant::now());
-                engine.cores.spawn_job(move || this.run(pilot, &ready, slot, queued));
+                slot.line().push(move || this.run(pilot, &ready, Some(slot), queued));
             }
             let landed = tokio::select! {
                 landed = seat.landed() => landed,

@@ -6,15 +6,20 @@ use std::time::{Duration, Instant};
 use precut_calc::calculator::Failure;
 
 use super::{MOST_ATTEMPTS, fault, help, work};
+use crate::engine::exec::Slot;
+use crate::engine::quota::worked;
 use crate::engine::{Error, Inner, Stored};
 use crate::store::StoreError;
-use crate::store::jobs::{Claim, Claimed, Ending, JobId};
+use crate::store::jobs::{Claim, Claimed, Ending, JobId, Waiting};
 
-/// Runs the job of a task, if it still waits. Returns when its record says how it ended, or that it waits again.
-pub(super) async fn run_task(engine: Arc<Inner>, id: JobId) {
+/// Runs a job, if it still waits: in a place of those for short ones, if it was given one. Returns when its record says how
+/// it ended, or that it waits again.
+pub(super) async fn run_task(engine: Arc<Inner>, id: JobId, place: Option<Slot>) {
     let jobs = &engine.jobs;
-    let (charged, calculator) = match stubbornly(&engine, || jobs.store.waiting(id)).await {
+    let Waiting { charged, calculator, owner, created_ms } = match stubbornly(&engine, || jobs.store.waiting(id)).await
+    {
         Some(Some(waiting)) => waiting,
+        Some(None) if place.is_some() => return,
         // Nobody waits for it to begin; perhaps somebody has asked for help with it.
         Some(None) => return help::run(&engine, id).await,
         None => return,
@@ -26,11 +31,23 @@ pub(super) async fn run_task(engine: Arc<Inner>, id: JobId) {
     let is_isolated =
         engine.settings.isolation.is_some() && engine.known(&calculator).is_ok_and(|entry| !entry.is_composed());
     let most = if is_isolated { u32::MAX } else { MOST_ATTEMPTS };
-    let slot = tokio::select! {
-        slot = engine.cores.job_slot(alone) => slot,
-        () = jobs.stopped() => return,
+    let slot = if let Some(place) = place.filter(|_| !alone) {
+        place
+    } else {
+        tokio::select! {
+            Ok(slot) = engine.cores.job_slot(alone) => slot,
+            () = jobs.stopped() => return,
+        }
     };
-    let Ok(slot) = slot else { return };
+    if let Err(error @ Error::KeptQuota { .. }) = engine.may_begin(&owner).await {
+        let problem = fault::written(&error);
+        if stubbornly(&engine, || jobs.store.refuse(id, problem.clone())).await == Some(true) {
+            metrics::counter!("precut_jobs_total", "calculator" => calculator, "outcome" => "refused").increment(1);
+            tracing::info!(job = %id, %error, "a job is not begun");
+            jobs.feeds.touch(&[id]);
+        }
+        return;
+    }
     let begun = jobs.computations.begin();
     let running = Arc::clone(&begun.running);
     let poison = fault::written(&Error::CrashedRepeatedly { attempts: MOST_ATTEMPTS });
@@ -47,6 +64,8 @@ pub(super) async fn run_task(engine: Arc<Inner>, id: JobId) {
         Some(Claimed::Nothing) | None => return,
     };
     running.claimed();
+    let waited = Duration::from_millis(jobs.store.now_ms().saturating_sub(created_ms).max(0).unsigned_abs());
+    metrics::histogram!("precut_job_wait_seconds", "calculator" => calculator).record(waited.as_secs_f64());
     jobs.feeds.touch(&claim.jobs);
     tracing::info!(job = %id, calculator = claim.calculator, attempt = claim.attempt, "a job begins");
     let started = Instant::now();
@@ -60,6 +79,7 @@ pub(super) async fn run_task(engine: Arc<Inner>, id: JobId) {
         }
         Err(error) => Err(error),
     };
+    worked(&owner, started.elapsed().as_secs_f64() * 1e3);
     settle(&engine, &claim, outcome, started.elapsed(), running.is_cancelled()).await;
 }
 

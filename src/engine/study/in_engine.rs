@@ -57,7 +57,7 @@ impl Host for InEngine {
         for _ in 0..most {
             let Some(slot) = engine.cores.spare_job_slot() else { return };
             let (cores, work) = (Arc::clone(&engine), Arc::clone(work));
-            engine.cores.spawn_job(move || {
+            slot.line().push(move || {
                 let mut slot = Some(slot);
                 // Whoever waits for a core gets this one.
                 work(&mut || {

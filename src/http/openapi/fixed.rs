@@ -7,7 +7,7 @@ use utoipa::openapi::{Content, RefOr, Schema};
 
 use super::parts;
 use crate::http::negotiate::Media;
-use crate::http::{calculators, codes, health, materials, pages, parts as result_parts, results};
+use crate::http::{calculators, codes, health, materials, pages, parts as result_parts, provenance, results};
 use crate::registry::Registry;
 
 /// Address and operations, in the order of the document.
@@ -21,6 +21,7 @@ pub(super) fn paths(registry: &Registry) -> Vec<(&'static str, PathItem)> {
         ("/v1/results/{key}/figures", get(read_figures())),
         ("/v1/results/{key}/tables", get(read_tables())),
         ("/v1/results/{key}/job", get(read_result_job())),
+        ("/v1/results/{key}/provenance", get(read_provenance())),
         ("/v1/materials", get(list_materials())),
         ("/v1/materials/{id}", get(read_material())),
         ("/", get(landing())),
@@ -42,6 +43,7 @@ pub(super) fn schemas() -> Vec<(String, RefOr<Schema>)> {
         super::schemas_of::<result_parts::FigureList>(),
         super::schemas_of::<result_parts::TableList>(),
         super::schemas_of::<result_parts::JobFile>(),
+        super::schemas_of::<provenance::Provenance>(),
         super::schemas_of::<materials::MaterialList>(),
         super::schemas_of::<pages::Landing>(),
         super::schemas_of::<pages::ProblemPage>(),
@@ -177,6 +179,17 @@ fn read_result_job() -> OperationBuilder {
         "Which job made that answer?",
         "The job of a kept answer with every default filled in and its measured tables as rows: to be changed and sent again.",
         "JobFile",
+    )
+}
+
+fn read_provenance() -> OperationBuilder {
+    part_of_result(
+        "read_result_provenance",
+        "Where does that answer come from?",
+        "Traces an answer, as from the line `result b3:...` of a program, to the versions that made it, the model that took \
+         part, and the jobs that came to it with the owners of their keys. Jobs and owners that who asks may not see are \
+         not told.",
+        "Provenance",
     )
 }
 

@@ -69,18 +69,20 @@ pub(super) fn may_become_one(operation: OperationBuilder) -> OperationBuilder {
 }
 
 fn accepted() -> ResponseBuilder {
-    parts::success(
+    let response = parts::success(
         "It is a job now, and will be done whatever happens to this process.",
         "application/json",
         parts::json_of("Job"),
-    )
-    .header("Location", parts::text_header("Address of the job.", &format!("/v1/jobs/{EXAMPLE}")))
-    .header("Retry-After", seconds())
-    .header("Preference-Applied", parts::text_header("Preferences that were followed.", "respond-async"))
-    .header("Content-Language", parts::text_header("Language of the sentences: `en` or `ru`.", "en"))
-    .link("job", link("read_job", "Reads the job."))
-    .link("result", link("read_job_result", "Reads its result."))
-    .link("cancel", link("cancel_job", "Cancels it."))
+    );
+    let response = parts::quotas().into_iter().fold(response, |response, (name, header)| response.header(name, header));
+    response
+        .header("Location", parts::text_header("Address of the job.", &format!("/v1/jobs/{EXAMPLE}")))
+        .header("Retry-After", seconds())
+        .header("Preference-Applied", parts::text_header("Preferences that were followed.", "respond-async"))
+        .header("Content-Language", parts::text_header("Language of the sentences: `en` or `ru`.", "en"))
+        .link("job", link("read_job", "Reads the job."))
+        .link("result", link("read_job_result", "Reads its result."))
+        .link("cancel", link("cancel_job", "Cancels it."))
 }
 
 fn link(operation: &str, text: &str) -> Link {

@@ -57,7 +57,11 @@ const PROBLEMS: [(u16, &str, &str); 19] = [
         "Unprocessable",
         "The job breaks rules (every fault is in `errors`), is too expensive, or has no answer: infeasible, outside the model, not converged. Then `code` says why and `detail` what would make it possible.",
     ),
-    (429, "TooManyRequests", "The client asks more often than its rate allows, or has too many event streams open."),
+    (
+        429,
+        "TooManyRequests",
+        "The client asks more often than its rate allows, has too many event streams open, or has spent a quota: of work in an hour, of bytes kept. `detail` says what is left and when there is more.",
+    ),
     (431, "HeaderTooLarge", "The header is larger than 32 KiB."),
     (500, "InternalError", "The service's own fault; its log knows the request id."),
     (
@@ -90,6 +94,10 @@ pub(super) fn responses() -> Vec<(String, Response)> {
                 .header("Content-Language", text_header("Language of the sentences: `en` or `ru`.", "en"));
             if matches!(status, 409 | 429 | 503) {
                 response = response.header("Retry-After", retry_after());
+            }
+            if status == 429 {
+                response =
+                    quotas().into_iter().fold(response, |response, (name, header)| response.header(name, header));
             }
             if status == 401 {
                 response =
@@ -267,6 +275,24 @@ fn retry_after() -> Header {
 
 pub(super) fn text_header(text: &str, example: &str) -> Header {
     HeaderBuilder::new().schema(Some(string())).description(Some(text)).example(Some(json!(example))).build()
+}
+
+/// How an owner stands with his quotas, in the header of an answer.
+pub(super) fn quotas() -> [(&'static str, Header); 2] {
+    let policy = "Where the service sets quotas: which. `work`: seconds of computation in an hour; `kept`: bytes of jobs \
+                  and results (draft-ietf-httpapi-ratelimit-headers).";
+    let limit =
+        "Where it sets quotas: what is left (`r`), and after how many seconds some of what is taken comes back (`t`).";
+    [
+        (
+            "RateLimit-Policy",
+            text_header(
+                policy,
+                "\"work\";q=3600;qu=\"compute-seconds\";w=3600, \"kept\";q=200000000;qu=\"kept-bytes\"",
+            ),
+        ),
+        ("RateLimit", text_header(limit, "\"work\";r=3540;t=1260, \"kept\";r=187654321;t=86400")),
+    ]
 }
 
 pub(super) fn header_of(schema: Object, text: &str) -> Header {

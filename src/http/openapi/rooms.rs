@@ -146,6 +146,7 @@ fn answered(meta: &Meta, answer: &str) -> ResponseBuilder {
             "Server-Timing",
             parts::text_header("Where the time went, ms.", "parse;dur=0.041, queue;dur=0.004, run;dur=0.310"),
         );
+    response = parts::quotas().into_iter().fold(response, |response, (name, header)| response.header(name, header));
     response = response.link(
         "result",
         LinkBuilder::new()

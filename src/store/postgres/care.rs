@@ -4,6 +4,7 @@ use sqlx::postgres::{PgConnection, PgPool};
 
 use super::record::{Outcome, column, count, ids, texts};
 use super::run::{requeue, unwanted};
+use super::usage::forget_work;
 use super::{PostgresStore, lock, news, queue};
 use crate::key::Key;
 use crate::store::StoreError;
@@ -213,6 +214,7 @@ async fn forget(connection: &mut PgConnection, keep_ms: i64) -> Outcome<u64> {
     if !is_first(connection, Duty::Forget).await? {
         return Ok(0);
     }
+    forget_work(connection).await?;
     // First the input, then, much later, the record: that a job was there is known longer than what it gave.
     sqlx::query(
         "UPDATE precut.jobs SET input = '', idempotency = NULL, body_hash = NULL

@@ -12,14 +12,16 @@ use super::care::{note_timing, timings};
 use super::line::submit;
 use super::queue::{self, Task, Tasks};
 use super::record::{Outcome, RecordRow, columns, count, record};
-use super::run::{beat, cancel, claim, finish, redo, requeue};
+use super::run::{beat, cancel, claim, finish, redo, refuse, requeue};
+use super::usage::{kept_by_owner, note_work, usage};
 use crate::key::Key;
 use crate::store::jobs::{
     Accepted, Beat, Cancelled, Changed, Claimed, Ending, Hear, JobCounts, JobId, JobPage, JobQuery, JobRecord,
-    JobStore, Lease, Live, NewJob, RunTask, Shared, Timing,
+    JobStore, Lease, Live, NewJob, RunTask, Shared, Timing, Usage, Waiting,
 };
 use crate::store::sqlite_jobs::pack::{packed, packed_ending};
-use crate::store::{KeptResult, ResultPage, ResultQuery, ResultStore, StoreError, Taken};
+use crate::store::sqlite_jobs::record::parsed;
+use crate::store::{KeptResult, Origin, ResultPage, ResultQuery, ResultStore, StoreError, Taken};
 
 /// Tasks that one call for help makes at most.
 const MOST_HELP: u32 = 256;
@@ -41,6 +43,9 @@ impl ResultStore for PostgresStore {
     }
     fn has_asked(&self, key: Key, owner: String) -> BoxFuture<'_, Result<bool, StoreError>> {
         Box::pin(self.has_asked_in(key, owner))
+    }
+    fn origin(&self, key: Key, owner: Option<String>) -> BoxFuture<'_, Result<Origin, StoreError>> {
+        Box::pin(self.origin_of(key, owner))
     }
     fn inputs(&self, keys: Vec<Key>, most: usize) -> BoxFuture<'_, Result<Vec<(Key, Bytes)>, StoreError>> {
         Box::pin(self.some_inputs(keys, most))
@@ -108,6 +113,9 @@ impl PostgresStore {
         }
         if let Some(owner) = query.owner {
             statement.push(" AND owner = ").push_bind(owner);
+        }
+        if let Some(key) = query.key {
+            statement.push(" AND key = ").push_bind(key.as_bytes().to_vec());
         }
         if let Some(before) = query.before {
             statement.push(" AND id < ").push_bind(before.to_string());
@@ -179,25 +187,50 @@ impl JobStore for PostgresStore {
     }
     fn counts(&self) -> BoxFuture<'_, Result<JobCounts, StoreError>> {
         Box::pin(async {
-            let (queued, running): (i64, i64) = sqlx::query_as(
+            let (queued, running, oldest_ms, store_bytes): (i64, i64, Option<i64>, i64) = sqlx::query_as(
                 "SELECT (SELECT count(*) FROM precut.jobs WHERE state = 'queued'),
-                     (SELECT count(*) FROM precut.jobs WHERE state = 'running')",
+                     (SELECT count(*) FROM precut.jobs WHERE state = 'running'),
+                     (SELECT created_ms FROM precut.jobs WHERE state = 'queued' ORDER BY id LIMIT 1),
+                     (SELECT sum(pg_total_relation_size(oid))::bigint FROM pg_class WHERE relkind = 'r'
+                          AND relnamespace IN ('precut'::regnamespace, 'apalis'::regnamespace))",
             )
             .fetch_one(&self.pool)
             .await?;
-            Ok(JobCounts { queued: u64::try_from(queued).unwrap_or(0), running: u64::try_from(running).unwrap_or(0) })
+            let count = |number: i64| u64::try_from(number).unwrap_or(0);
+            let (queued, running, store_bytes) = (count(queued), count(running), count(store_bytes));
+            Ok(JobCounts { queued, running, oldest_ms, store_bytes })
         })
     }
-    fn waiting(&self, id: JobId) -> BoxFuture<'_, Result<Option<(u32, String)>, StoreError>> {
+    fn waiting(&self, id: JobId) -> BoxFuture<'_, Result<Option<Waiting>, StoreError>> {
         Box::pin(async move {
-            let waiting: Option<(i32, String)> = sqlx::query_as(
-                "SELECT max(other.attempt), one.calculator FROM precut.jobs AS one JOIN precut.jobs AS other USING (key)
-                 WHERE one.id = $1 AND one.state = 'queued' AND other.state = 'queued' GROUP BY one.calculator",
+            let waiting: Option<(i32, String, String, i64)> = sqlx::query_as(
+                "SELECT max(other.attempt), one.calculator, one.owner, one.created_ms
+                 FROM precut.jobs AS one JOIN precut.jobs AS other USING (key)
+                 WHERE one.id = $1 AND one.state = 'queued' AND other.state = 'queued'
+                 GROUP BY one.id",
             )
             .bind(id.to_string())
             .fetch_optional(&self.pool)
             .await?;
-            Ok(waiting.map(|(attempts, calculator)| (count(attempts), calculator)))
+            Ok(waiting.map(|(charged, calculator, owner, created_ms)| Waiting {
+                charged: count(charged),
+                calculator,
+                owner,
+                created_ms,
+            }))
+        })
+    }
+    fn next_short(&self, most_ms: f64) -> BoxFuture<'_, Result<Option<JobId>, StoreError>> {
+        Box::pin(async move {
+            let next: Option<String> = sqlx::query_scalar(
+                "SELECT id FROM precut.jobs WHERE state = 'queued' AND estimate_ms <= $1 AND attempt = 0 AND engine = $2
+                 ORDER BY priority DESC, turn, id LIMIT 1",
+            )
+            .bind(most_ms)
+            .bind(&self.engine)
+            .fetch_optional(&self.pool)
+            .await?;
+            Ok(next.map(|id| parsed(&id)).transpose()?)
         })
     }
     fn claim(&self, id: JobId, lease: Lease, most: u32, problem: String) -> BoxFuture<'_, Result<Claimed, StoreError>> {
@@ -214,6 +247,22 @@ impl JobStore for PostgresStore {
     }
     fn release(&self, lease: Lease) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>> {
         Box::pin(self.write(move |connection| Box::pin(requeue(connection, lease, false, None))))
+    }
+    fn usage(&self, owner: String) -> BoxFuture<'_, Result<Usage, StoreError>> {
+        Box::pin(async move {
+            let mut connection = self.pool.acquire().await?;
+            Ok(usage(&mut connection, &owner).await?)
+        })
+    }
+    fn kept_by_owner(&self) -> BoxFuture<'_, Result<Vec<(String, u64)>, StoreError>> {
+        Box::pin(async move { Ok(kept_by_owner(&self.pool).await?) })
+    }
+    fn note_work(&self, work: Vec<(String, f64)>) -> BoxFuture<'_, Result<(), StoreError>> {
+        Box::pin(self.write(move |connection| Box::pin(note_work(connection, work))))
+    }
+    fn refuse(&self, id: JobId, problem: String) -> BoxFuture<'_, Result<bool, StoreError>> {
+        let keep_ms = self.keep_ms;
+        Box::pin(self.write(move |connection| Box::pin(async move { refuse(connection, id, &problem, keep_ms).await })))
     }
     fn cancel(&self, id: JobId) -> BoxFuture<'_, Result<Option<Cancelled>, StoreError>> {
         let keep_ms = self.keep_ms;

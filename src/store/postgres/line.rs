@@ -6,7 +6,9 @@ use super::lock;
 use super::queue::{self, Task, task_name};
 use super::record::{Outcome, RecordRow, column, columns, record};
 use super::results::insert;
+use super::usage::{lock_owner, usage};
 use crate::store::jobs::{Accepted, JobState, NewJob, yields_to};
+use crate::store::row::ResultRow;
 use crate::store::sqlite_jobs::pack::Packed;
 use crate::store::sqlite_jobs::record::{parsed, rank};
 
@@ -68,6 +70,14 @@ pub(super) async fn submit(
     if let Some(known) = known(connection, job).await? {
         return Ok(known);
     }
+    if !job.quota.is_none() {
+        lock_owner(connection, &job.owner).await?;
+        let usage = usage(connection, &job.owner).await?;
+        let work_ms = if result.is_some() { 0.0 } else { job.estimate_ms };
+        if usage.beyond(&job.quota, work_ms).is_some() {
+            return Ok(Accepted::OverQuota(usage));
+        }
+    }
     let facts = facts(connection, job, queue_limit).await?;
     // An equal job that is being computed takes this one along.
     let (state, lease, attempt, started_ms) = match (result, facts.lease) {
@@ -91,9 +101,9 @@ pub(super) async fn submit(
     let row: Option<RecordRow> = sqlx::query_as(concat!(
         "INSERT INTO precut.jobs (id, kind, calculator, version, engine, key, input, state, progress, attempt, lease,
              heartbeat_ms, priority, turn, pushed, owner, idempotency, body_hash, estimate_ms, created_ms, started_ms,
-             finished_ms, deadline_ms, expires_ms)
+             finished_ms, deadline_ms, expires_ms, input_bytes, result_bytes)
          VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14, $15, $16, $17, $18, $19, $20, $21, $22,
-             $23, $24)
+             $23, $24, octet_length($7::bytea), $25)
          ON CONFLICT (owner, idempotency) DO NOTHING RETURNING ",
         columns!()
     ))
@@ -121,6 +131,7 @@ pub(super) async fn submit(
     .bind(finished)
     .bind(job.useful_for_ms.map(|after| now.saturating_add(after)))
     .bind(finished.map(|at| at.saturating_add(keep_ms)))
+    .bind(result.as_ref().map_or(0, ResultRow::bytes))
     .fetch_optional(&mut *connection)
     .await?;
     let Some(row) = row else {

@@ -11,7 +11,7 @@ use super::record::{Outcome, column, count};
 use super::writer::LIST_PATIENCE;
 use crate::key::Key;
 use crate::store::row::ResultRow;
-use crate::store::{Cursor, KeptResult, ResultPage, ResultQuery, ResultSummary, StoreError};
+use crate::store::{Cursor, KeptResult, Origin, ResultPage, ResultQuery, ResultSummary, StoreError};
 
 /// Rows deleted in one transaction.
 const EVICTED_AT_ONCE: i64 = 1000;
@@ -105,6 +105,23 @@ impl PostgresStore {
                  OR EXISTS (SELECT FROM precut.jobs WHERE key = $1 AND owner = $2)",
         );
         Ok(asked.bind(key.as_bytes().as_slice()).bind(owner).fetch_one(&self.pool).await?)
+    }
+
+    pub(super) async fn origin_of(&self, key: Key, owner: Option<String>) -> Result<Origin, StoreError> {
+        self.writer.flush(LIST_PATIENCE).await;
+        let created_ms = sqlx::query_scalar("SELECT created_ms FROM precut.results WHERE key = $1")
+            .bind(key.as_bytes().as_slice())
+            .fetch_optional(&self.pool)
+            .await?;
+        let asked_by = sqlx::query_scalar(
+            "SELECT owner FROM precut.asked WHERE key = $1 AND ($3::text IS NULL OR owner = $3) ORDER BY owner LIMIT $2",
+        )
+        .bind(key.as_bytes().as_slice())
+        .bind(i64::from(Origin::MOST))
+        .bind(owner)
+        .fetch_all(&self.pool)
+        .await?;
+        Ok(Origin { created_ms, asked_by })
     }
 
     pub(super) async fn some_inputs(&self, keys: Vec<Key>, most: usize) -> Result<Vec<(Key, Bytes)>, StoreError> {

@@ -6,6 +6,7 @@ use sqlx::postgres::PgConnection;
 use super::record::{Outcome, column, count, ids, record, texts};
 use super::{lock_job, lock_lease, news, queue, results};
 use crate::store::jobs::{Beat, Cancelled, Claim, Claimed, JobId, JobKind, JobState, Lease};
+use crate::store::row::ResultRow;
 use crate::store::sqlite_jobs::pack::PackedEnding;
 use crate::store::sqlite_jobs::record::{parsed, unreadable};
 
@@ -17,6 +18,8 @@ struct TakenRow {
     attempt: i32,
     kind: String,
     calculator: String,
+    priority: i32,
+    turn: i64,
     /// Of one of them only: they are equal.
     input: Option<Vec<u8>>,
 }
@@ -44,7 +47,7 @@ pub(super) async fn claim(
              expires_ms = CASE WHEN starts < $3 THEN NULL ELSE $5::bigint + $7 END,
              progress = 0, stage = NULL
          FROM line, charged WHERE job.id = line.id AND job.state = 'queued'
-         RETURNING job.id, job.state, job.attempt, job.kind, job.calculator,
+         RETURNING job.id, job.state, job.attempt, job.kind, job.calculator, job.priority, job.turn,
              CASE WHEN job.id = $2 THEN job.input END AS input",
     )
     .bind(key.as_bytes().as_slice())
@@ -59,7 +62,7 @@ pub(super) async fn claim(
     if taken.is_empty() {
         // The answer to a claim may be lost on its way: who asks again has it already.
         taken = sqlx::query_as(
-            "SELECT id, state, attempt, kind, calculator, CASE WHEN id = $2 THEN input END AS input
+            "SELECT id, state, attempt, kind, calculator, priority, turn, CASE WHEN id = $2 THEN input END AS input
              FROM precut.jobs WHERE lease = $1 AND state = 'running'",
         )
         .bind(lease.to_string())
@@ -73,6 +76,16 @@ pub(super) async fn claim(
     if job.state != JobState::Running.word() {
         return Ok(Claimed::Poisonous(jobs));
     }
+    // The line has come to this place, however long others run that were taken before: who comes now begins behind it.
+    // Rows that somebody else is about to write are left alone; nobody waits here.
+    sqlx::query(
+        "UPDATE precut.jobs SET turn = $1 WHERE id IN (
+             SELECT id FROM precut.jobs WHERE state = 'running' AND priority = $2 AND turn < $1 FOR UPDATE SKIP LOCKED)",
+    )
+    .bind(job.turn)
+    .bind(job.priority)
+    .execute(connection)
+    .await?;
     Ok(Claimed::Run(Claim {
         lease,
         jobs,
@@ -98,7 +111,8 @@ pub(super) async fn finish(
     let ended: Vec<String> = sqlx::query_scalar(
         "UPDATE precut.jobs
          SET state = $2, problem = $3, progress = CASE WHEN $2 = 'succeeded' THEN 1.0 ELSE progress END, stage = NULL,
-             lease = NULL, heartbeat_ms = NULL, finished_ms = $4, expires_ms = $4::bigint + $5, key = coalesce($6, key)
+             lease = NULL, heartbeat_ms = NULL, finished_ms = $4, expires_ms = $4::bigint + $5, key = coalesce($6, key),
+             result_bytes = $7
          WHERE lease = $1 AND state = 'running' RETURNING id",
     )
     .bind(lease.to_string())
@@ -107,6 +121,7 @@ pub(super) async fn finish(
     .bind(now)
     .bind(keep_ms)
     .bind(result.map(|result| result.key.clone()))
+    .bind(result.map_or(0, ResultRow::bytes))
     .fetch_all(&mut *connection)
     .await?;
     if let Some(result) = result
@@ -189,12 +204,31 @@ pub(super) async fn cancel(connection: &mut PgConnection, id: JobId, keep_ms: i6
     Ok(Some(Cancelled { job, before, unwanted }))
 }
 
+pub(super) async fn refuse(connection: &mut PgConnection, id: JobId, problem: &str, keep_ms: i64) -> Outcome<bool> {
+    let Some((_, now)) = lock_job(connection, &id.to_string()).await? else { return Ok(false) };
+    let refused = sqlx::query(
+        "UPDATE precut.jobs SET state = 'failed', problem = $2, finished_ms = $3, expires_ms = $3::bigint + $4
+         WHERE id = $1 AND state = 'queued'",
+    )
+    .bind(id.to_string())
+    .bind(problem)
+    .bind(now)
+    .bind(keep_ms)
+    .execute(&mut *connection)
+    .await?;
+    let is_refused = refused.rows_affected() > 0;
+    if is_refused {
+        news::tell(connection, &[id], &[]).await?;
+    }
+    Ok(is_refused)
+}
+
 pub(super) async fn redo(connection: &mut PgConnection, id: JobId) -> Outcome<()> {
     let id = id.to_string();
     let Some((key, _)) = lock_job(connection, &id).await? else { return Ok(()) };
     let back: Vec<String> = sqlx::query_scalar(
         "UPDATE precut.jobs SET state = 'queued', attempt = 0, progress = 0, started_ms = NULL, finished_ms = NULL,
-             expires_ms = NULL, deadline_ms = NULL
+             expires_ms = NULL, deadline_ms = NULL, result_bytes = 0
          WHERE id = $1 AND state = 'succeeded' RETURNING id",
     )
     .bind(&id)

@@ -163,6 +163,15 @@ impl Place for InDatabase {
         self.execute("UPDATE precut.studies SET beat_ms = beat_ms - 100000").await;
     }
 
+    async fn later(&self, ms: i64) {
+        for earlier in [
+            "UPDATE precut.jobs SET started_ms = started_ms - $1, finished_ms = finished_ms - $1, expires_ms = expires_ms - $1",
+            "UPDATE precut.work SET minute = (minute * 60000 - $1) / 60000",
+        ] {
+            sqlx::query(earlier).bind(ms).execute(&self.runtime_pool).await.unwrap();
+        }
+    }
+
     async fn damage(&self) {
         self.execute("UPDATE precut.results SET version = 4").await;
     }

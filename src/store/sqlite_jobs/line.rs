@@ -4,7 +4,9 @@ use sqlx::sqlite::SqliteConnection;
 
 use super::pack::Packed;
 use super::record::{Outcome, parsed, rank, record};
+use super::usage::usage;
 use crate::store::jobs::{Accepted, JobState, yields_to};
+use crate::store::row::ResultRow;
 use crate::store::{queue, row};
 
 /// The place of a new job in the order of its priority.
@@ -50,6 +52,13 @@ pub(super) async fn submit(
             return Ok(record(connection, id).await?.map_or(Accepted::OtherBody(id), Accepted::Known));
         }
     }
+    if !job.quota.is_none() {
+        let usage = usage(connection, &job.owner, now).await?;
+        let work_ms = if result.is_some() { 0.0 } else { job.estimate_ms };
+        if usage.beyond(&job.quota, work_ms).is_some() {
+            return Ok(Accepted::OverQuota(usage));
+        }
+    }
     // An equal job that is being computed takes this one along.
     let running: Option<(String, u32, Option<i64>)> = sqlx::query_as(
         "SELECT lease, attempt, started_ms FROM precut_jobs WHERE key = ?1 AND state = 'running' LIMIT 1",
@@ -80,8 +89,9 @@ pub(super) async fn submit(
     sqlx::query(
         "INSERT INTO precut_jobs (id, kind, calculator, version, key, input, state, progress, attempt, lease,
              heartbeat_ms, priority, turn, owner, idempotency, body_hash, estimate_ms, created_ms, started_ms,
-             finished_ms, deadline_ms, expires_ms)
-         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19, ?20, ?21, ?22)",
+             finished_ms, deadline_ms, expires_ms, input_bytes, result_bytes)
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19, ?20, ?21, ?22,
+             length(?6), ?23)",
     )
     .bind(job.id.to_string())
     .bind(job.kind.word())
@@ -105,6 +115,7 @@ pub(super) async fn submit(
     .bind(finished)
     .bind(job.useful_for_ms.map(|after| now.saturating_add(after)))
     .bind(finished.map(|at| at.saturating_add(keep_ms)))
+    .bind(result.as_ref().map_or(0, ResultRow::bytes))
     .execute(&mut *connection)
     .await?;
     if state == JobState::Queued {

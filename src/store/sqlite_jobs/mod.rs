@@ -7,6 +7,7 @@ pub(super) mod record;
 mod run;
 #[cfg(test)]
 mod tests;
+mod usage;
 
 use std::sync::Arc;
 
@@ -18,7 +19,7 @@ use tokio::sync::watch;
 
 use super::jobs::{
     Accepted, Beat, Cancelled, Changed, Claimed, Ending, JobCounts, JobId, JobPage, JobQuery, JobRecord, JobStore,
-    Lease, Live, NewJob, RunTask, Timing,
+    Lease, Live, NewJob, RunTask, Timing, Usage, Waiting,
 };
 use super::queue::{self, Tasks};
 use super::sqlite::SqliteStore;
@@ -27,8 +28,9 @@ pub(super) use care::recover;
 use care::{expire_deadlines, forget_expired, note_timing, sweep};
 use line::submit;
 use pack::{PackedEnding, packed, packed_ending};
-use record::{Outcome, RecordRow, columns, json_list, record};
-use run::{beat, cancel, claim, finish, redo, requeue};
+use record::{Outcome, RecordRow, columns, json_list, parsed, record};
+use run::{beat, cancel, claim, finish, redo, refuse, requeue};
+use usage::{forget_work, kept_by_owner, note_work, usage};
 
 impl SqliteStore {
     async fn finish_job(&self, lease: Lease, ending: Ending) -> Result<Vec<JobId>, StoreError> {
@@ -79,6 +81,9 @@ impl SqliteStore {
         if let Some(owner) = query.owner {
             statement.push(" AND owner = ").push_bind(owner);
         }
+        if let Some(key) = query.key {
+            statement.push(" AND key = ").push_bind(key.as_bytes().to_vec());
+        }
         if let Some(before) = query.before {
             statement.push(" AND id < ").push_bind(before.to_string());
         }
@@ -93,14 +98,17 @@ impl SqliteStore {
     }
 
     async fn count_jobs(&self) -> Result<JobCounts, StoreError> {
-        let count = |state: &'static str| async move {
-            let count: i64 = sqlx::query_scalar("SELECT count(*) FROM precut_jobs WHERE state = ?1")
-                .bind(state)
-                .fetch_one(&self.readers)
-                .await?;
-            Ok::<_, StoreError>(u64::try_from(count).unwrap_or(0))
-        };
-        Ok(JobCounts { queued: count("queued").await?, running: count("running").await? })
+        let (queued, running, oldest_ms, store_bytes): (i64, i64, Option<i64>, i64) = sqlx::query_as(
+            "SELECT (SELECT count(*) FROM precut_jobs WHERE state = 'queued'),
+                 (SELECT count(*) FROM precut_jobs WHERE state = 'running'),
+                 (SELECT created_ms FROM precut_jobs WHERE state = 'queued' ORDER BY id LIMIT 1),
+                 (SELECT page_count FROM pragma_page_count) * (SELECT page_size FROM pragma_page_size)",
+        )
+        .fetch_one(&self.readers)
+        .await?;
+        let count = |number: i64| u64::try_from(number).unwrap_or(0);
+        let (queued, running, store_bytes) = (count(queued), count(running), count(store_bytes));
+        Ok(JobCounts { queued, running, oldest_ms, store_bytes })
     }
 }
 
@@ -133,13 +141,31 @@ impl JobStore for SqliteStore {
     fn counts(&self) -> BoxFuture<'_, Result<JobCounts, StoreError>> {
         Box::pin(self.count_jobs())
     }
-    fn waiting(&self, id: JobId) -> BoxFuture<'_, Result<Option<(u32, String)>, StoreError>> {
+    fn waiting(&self, id: JobId) -> BoxFuture<'_, Result<Option<Waiting>, StoreError>> {
         Box::pin(async move {
-            let waiting = sqlx::query_as(
-                "SELECT max(other.attempt), one.calculator FROM precut_jobs AS one JOIN precut_jobs AS other USING (key)
-                 WHERE one.id = ?1 AND one.state = 'queued' AND other.state = 'queued' GROUP BY one.calculator",
-            );
-            Ok(waiting.bind(id.to_string()).fetch_optional(&self.readers).await?)
+            let waiting: Option<(u32, String, String, i64)> = sqlx::query_as(
+                "SELECT max(other.attempt), one.calculator, one.owner, one.created_ms
+                 FROM precut_jobs AS one JOIN precut_jobs AS other USING (key)
+                 WHERE one.id = ?1 AND one.state = 'queued' AND other.state = 'queued'
+                 GROUP BY one.id",
+            )
+            .bind(id.to_string())
+            .fetch_optional(&self.readers)
+            .await?;
+            let told = |(charged, calculator, owner, created_ms)| Waiting { charged, calculator, owner, created_ms };
+            Ok(waiting.map(told))
+        })
+    }
+    fn next_short(&self, most_ms: f64) -> BoxFuture<'_, Result<Option<JobId>, StoreError>> {
+        Box::pin(async move {
+            let next: Option<String> = sqlx::query_scalar(
+                "SELECT id FROM precut_jobs WHERE state = 'queued' AND estimate_ms <= ?1 AND attempt = 0
+                 ORDER BY priority DESC, turn, id LIMIT 1",
+            )
+            .bind(most_ms)
+            .fetch_optional(&self.readers)
+            .await?;
+            Ok(next.map(|id| parsed(&id)).transpose()?)
         })
     }
     fn claim(&self, id: JobId, lease: Lease, most: u32, problem: String) -> BoxFuture<'_, Result<Claimed, StoreError>> {
@@ -158,6 +184,31 @@ impl JobStore for SqliteStore {
                 Box::pin(async move { requeue(connection, &json_list(&[lease]), false).await })
             }),
         )
+    }
+    fn usage(&self, owner: String) -> BoxFuture<'_, Result<Usage, StoreError>> {
+        Box::pin(async move {
+            let mut reader = self.readers.acquire().await?;
+            Ok(usage(&mut reader, &owner, now_ms()).await?)
+        })
+    }
+    fn kept_by_owner(&self) -> BoxFuture<'_, Result<Vec<(String, u64)>, StoreError>> {
+        Box::pin(async move {
+            let mut reader = self.readers.acquire().await?;
+            Ok(kept_by_owner(&mut reader, now_ms()).await?)
+        })
+    }
+    fn note_work(&self, work: Vec<(String, f64)>) -> BoxFuture<'_, Result<(), StoreError>> {
+        Box::pin(self.ledger.write(move |connection| {
+            let work = work.clone();
+            Box::pin(async move { note_work(connection, &work, now_ms()).await })
+        }))
+    }
+    fn refuse(&self, id: JobId, problem: String) -> BoxFuture<'_, Result<bool, StoreError>> {
+        let keep_ms = self.keep_ms;
+        Box::pin(self.ledger.write(move |connection| {
+            let problem = problem.clone();
+            Box::pin(async move { refuse(connection, id, &problem, keep_ms, now_ms()).await })
+        }))
     }
     fn cancel(&self, id: JobId) -> BoxFuture<'_, Result<Option<Cancelled>, StoreError>> {
         let keep_ms = self.keep_ms;
@@ -211,6 +262,7 @@ impl JobStore for SqliteStore {
                 let round = self.ledger.write(move |connection| {
                     Box::pin(async move {
                         queue::forget_done(connection).await?;
+                        forget_work(connection, now_ms()).await?;
                         forget_expired(connection, keep_ms, now_ms()).await
                     })
                 });

@@ -15,6 +15,8 @@ struct Waiting {
     kind: String,
     calculator: String,
     input: Vec<u8>,
+    priority: i64,
+    turn: i64,
 }
 
 pub(super) async fn claim(
@@ -25,12 +27,13 @@ pub(super) async fn claim(
     keep_ms: i64,
     now: i64,
 ) -> Outcome<Claimed> {
-    let waiting: Option<Waiting> =
-        sqlx::query_as("SELECT key, kind, calculator, input FROM precut_jobs WHERE id = ?1 AND state = 'queued'")
-            .bind(id.to_string())
-            .fetch_optional(&mut *connection)
-            .await?;
-    let Some(Waiting { key, kind, calculator, input }) = waiting else { return Ok(Claimed::Nothing) };
+    let waiting: Option<Waiting> = sqlx::query_as(
+        "SELECT key, kind, calculator, input, priority, turn FROM precut_jobs WHERE id = ?1 AND state = 'queued'",
+    )
+    .bind(id.to_string())
+    .fetch_optional(&mut *connection)
+    .await?;
+    let Some(Waiting { key, kind, calculator, input, priority, turn }) = waiting else { return Ok(Claimed::Nothing) };
     let charged: u32 = sqlx::query_scalar("SELECT max(attempt) FROM precut_jobs WHERE key = ?1 AND state = 'queued'")
         .bind(&key)
         .fetch_one(&mut *connection)
@@ -57,8 +60,14 @@ pub(super) async fn claim(
     .bind(charged + 1)
     .bind(lease.to_string())
     .bind(now)
-    .fetch_all(connection)
+    .fetch_all(&mut *connection)
     .await?;
+    // The line has come to this place, however long others run that were taken before: who comes now begins behind it.
+    sqlx::query("UPDATE precut_jobs SET turn = ?1 WHERE state = 'running' AND priority = ?2 AND turn < ?1")
+        .bind(turn)
+        .bind(priority)
+        .execute(connection)
+        .await?;
     // A damaged input is nothing that can be run: who claims it finds that out and says so on the record.
     let input = zstd::decode_all(&*input).unwrap_or_default();
     let kind = JobKind::of_word(&kind).ok_or_else(|| unreadable("kind"))?;
@@ -80,7 +89,7 @@ pub(super) async fn finish(
     let ended: Vec<String> = sqlx::query_scalar(
         "UPDATE precut_jobs
          SET state = ?2, problem = ?3, progress = iif(?2 = 'succeeded', 1.0, progress), stage = NULL, lease = NULL,
-             heartbeat_ms = NULL, finished_ms = ?4, expires_ms = ?5, key = coalesce(?6, key)
+             heartbeat_ms = NULL, finished_ms = ?4, expires_ms = ?5, key = coalesce(?6, key), result_bytes = ?7
          WHERE lease = ?1 AND state = 'running' RETURNING id",
     )
     .bind(lease.to_string())
@@ -89,6 +98,7 @@ pub(super) async fn finish(
     .bind(now)
     .bind(now.saturating_add(keep_ms))
     .bind(result.map(|result| result.key.clone()))
+    .bind(result.map_or(0, row::ResultRow::bytes))
     .fetch_all(&mut *connection)
     .await?;
     if let Some(result) = result
@@ -160,6 +170,26 @@ pub(super) async fn cancel(
     Ok(Some(Cancelled { job, before, unwanted }))
 }
 
+pub(super) async fn refuse(
+    connection: &mut SqliteConnection,
+    id: JobId,
+    problem: &str,
+    keep_ms: i64,
+    now: i64,
+) -> Outcome<bool> {
+    let refused = sqlx::query(
+        "UPDATE precut_jobs SET state = 'failed', problem = ?2, finished_ms = ?3, expires_ms = ?4
+         WHERE id = ?1 AND state = 'queued'",
+    )
+    .bind(id.to_string())
+    .bind(problem)
+    .bind(now)
+    .bind(now.saturating_add(keep_ms))
+    .execute(connection)
+    .await?;
+    Ok(refused.rows_affected() > 0)
+}
+
 pub(super) async fn redo(connection: &mut SqliteConnection, id: JobId) -> Outcome<()> {
     sqlx::query("DELETE FROM results WHERE key = (SELECT key FROM precut_jobs WHERE id = ?1 AND state = 'succeeded')")
         .bind(id.to_string())
@@ -167,7 +197,7 @@ pub(super) async fn redo(connection: &mut SqliteConnection, id: JobId) -> Outcom
         .await?;
     let back: Vec<String> = sqlx::query_scalar(
         "UPDATE precut_jobs SET state = 'queued', attempt = 0, progress = 0.0, started_ms = NULL, finished_ms = NULL,
-             expires_ms = NULL, deadline_ms = NULL
+             expires_ms = NULL, deadline_ms = NULL, result_bytes = 0
          WHERE id = ?1 AND state = 'succeeded' RETURNING id",
     )
     .bind(id.to_string())

@@ -7,7 +7,8 @@ use tokio::sync::watch;
 
 use super::{MOST, PROBLEM, Place, job, key, result};
 use crate::store::jobs::{
-    Accepted, Beat, Claimed, Ending, Idempotency, JobCounts, JobId, JobState, Lease, NewJob, Priority, RunTask, Timing,
+    Accepted, Beat, Claimed, Ending, Idempotency, JobId, JobState, Lease, NewJob, Priority, Quota, RunTask, Timing,
+    Usage,
 };
 use crate::store::sqlite::Keep;
 use crate::store::{KeptResult, now_ms};
@@ -73,7 +74,7 @@ pub(in crate::store) async fn what_a_process_left_running_is_in_line_again_at_th
         // Twice charged, it lets the others go first.
         let expected = if attempt < 2 { [running, waiting] } else { [waiting, running] };
         assert_eq!(place.line().await, expected, "after {attempt}");
-        assert_eq!(place.store().waiting(running).await.unwrap().map(|(attempts, _)| attempts), Some(attempt));
+        assert_eq!(place.store().waiting(running).await.unwrap().map(|waiting| waiting.charged), Some(attempt));
         match place.claim(running).await {
             Claimed::Run(claim) => assert_eq!(claim.attempt, attempt + 1),
             Claimed::Poisonous(jobs) => assert_eq!((jobs, attempt), (vec![running], MOST)),
@@ -160,7 +161,8 @@ pub(in crate::store) async fn a_full_queue_takes_no_more<P: Place>() {
     }
     let refused = place.store().submit(job(3), 3).await.unwrap();
     assert_eq!(refused, Accepted::QueueFull { queued: 3 });
-    assert_eq!(place.store().counts().await.unwrap(), JobCounts { queued: 3, running: 0 });
+    let counts = place.store().counts().await.unwrap();
+    assert_eq!((counts.queued, counts.running), (3, 0));
     assert_eq!(place.line().await.len(), 3);
 }
 
@@ -193,6 +195,169 @@ pub(in crate::store) async fn the_line_is_fair_between_owners_and_keeps_prioriti
     let line = place.line().await;
     let at = |id: JobId| line.iter().position(|other| *other == id).unwrap();
     assert!(at(third) < at(ids[2]));
+}
+
+pub(in crate::store) async fn a_long_job_lets_some_short_ones_pass_and_no_more<P: Place>() {
+    let place = P::new().await;
+    let long = |number: u32| NewJob { estimate_ms: 3_600_000.0, ..job(number) };
+    // One runs all the time. Another one waits, for the other place, and short ones of many clients keep coming.
+    let running = place.accept(long(1)).await.id;
+    place.run(running).await;
+    place.lose_task(running).await;
+    let waiting = place.accept(long(2)).await.id;
+    let mut passed = 0;
+    for number in 10..60 {
+        let owner = format!("client {number}");
+        place.accept(NewJob { owner, ..job(number) }).await;
+        let first = place.line().await[0];
+        if first == waiting {
+            break;
+        }
+        passed += 1;
+        let claim = place.run(first).await;
+        place.lose_task(first).await;
+        place.store().finish(claim.lease, Ending::Succeeded(result(number))).await.unwrap();
+    }
+    assert!((1..=12).contains(&passed), "{passed} have passed");
+    assert_eq!(place.line().await[0], waiting);
+}
+
+pub(in crate::store) async fn the_next_short_job_is_the_first_of_them_in_line<P: Place>() {
+    let place = P::new().await;
+    let lasting = |number: u32, estimate_ms: f64| NewJob { estimate_ms, ..job(number) };
+    let next = async || place.store().next_short(5000.0).await.unwrap();
+    place.accept(lasting(1, 60_000.0)).await;
+    assert_eq!(next().await, None);
+    let first = place.accept(lasting(2, 5000.0)).await.id;
+    let second = place.accept(lasting(3, 10.0)).await.id;
+    let high = place.accept(NewJob { priority: Priority::High, ..lasting(4, 100.0) }).await.id;
+    let mut taken = Vec::new();
+    while let Some(id) = next().await {
+        taken.push(id);
+        place.run(id).await;
+    }
+    // A client's jobs follow one another, the shorter before the longer where both are short enough to differ.
+    assert_eq!(taken[0], high);
+    taken.sort();
+    assert_eq!(taken, [first, second, high]);
+    // What has been charged a start waits for a place with the others.
+    place.silence().await;
+    place.store().sweep(Arc::new(Vec::new)).await.unwrap();
+    assert_eq!(place.record(second).await.state, JobState::Queued);
+    assert_eq!(next().await, None);
+}
+
+pub(in crate::store) async fn the_state_of_jobs_and_store_is_told_in_figures<P: Place>() {
+    let place = P::new().await;
+    let empty = place.store().counts().await.unwrap();
+    assert_eq!((empty.queued, empty.running, empty.oldest_ms), (0, 0, None));
+    assert!(empty.store_bytes > 10_000, "{empty:?}");
+    let from = |owner: &str, number: u32| NewJob { owner: owner.to_owned(), ..job(number) };
+    let first = place.accept(from("key:a", 1)).await;
+    tokio::time::sleep(Duration::from_millis(2)).await;
+    let second = place.accept(from("key:b", 2)).await;
+    place.accept(from("ip:127.0.0.1", 3)).await;
+    assert_eq!(place.store().counts().await.unwrap().oldest_ms, Some(first.created_ms));
+    let waiting = place.store().waiting(first.id).await.unwrap().unwrap();
+    assert_eq!((waiting.created_ms, waiting.owner.as_str()), (first.created_ms, "key:a"));
+    let claim = place.run(first.id).await;
+    let counts = place.store().counts().await.unwrap();
+    assert_eq!((counts.queued, counts.running, counts.oldest_ms), (2, 1, Some(second.created_ms)));
+    place.store().finish(claim.lease, Ending::Succeeded(result(1))).await.unwrap();
+    // Of owners of keys only: addresses are many.
+    let mut kept = place.store().kept_by_owner().await.unwrap();
+    kept.sort();
+    let told: Vec<&str> = kept.iter().map(|(owner, _)| owner.as_str()).collect();
+    assert_eq!(told, ["key:a", "key:b"]);
+    let alone = place.store().usage("key:a".to_owned()).await.unwrap().kept_bytes();
+    assert!(kept[0].1 == alone && kept[0].1 > kept[1].1 && kept[1].1 > 0, "{kept:?}");
+}
+
+/// How an owner stands who is refused a job.
+async fn refused<P: Place>(place: &P, job: NewJob) -> Usage {
+    match place.store().submit(job, 100).await.unwrap() {
+        Accepted::OverQuota(usage) => usage,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn ms(time: Duration) -> i64 {
+    i64::try_from(time.as_millis()).unwrap()
+}
+
+pub(in crate::store) async fn an_owner_gets_so_much_work_in_an_hour<P: Place>() {
+    const MOST_MS: f64 = 100_000.0;
+    let place = P::new().await;
+    let ask = |number: u32, estimate_ms: f64| NewJob {
+        estimate_ms,
+        quota: Quota { work_ms: Some(MOST_MS), ..Quota::default() },
+        ..job(number)
+    };
+    let first = place.accept(ask(1, 60_000.0)).await.id;
+    assert!((refused(&place, ask(2, 60_000.0)).await.open_ms - 60_000.0).abs() < 1e-9);
+    assert_eq!(place.store().job(ask(2, 1.0).id).await.unwrap(), None);
+    place.accept(NewJob { owner: "two".to_owned(), ..ask(3, 60_000.0) }).await;
+    // What is there already costs nothing, and what was not done was not used.
+    place.accept(NewJob { result: Some(result(4)), ..ask(4, 60_000.0) }).await;
+    place.store().cancel(first).await.unwrap();
+    let second = place.accept(ask(5, 60_000.0)).await.id;
+    // What is over counts by what it took.
+    let claim = place.run(second).await;
+    place.store().finish(claim.lease, Ending::Succeeded(result(5))).await.unwrap();
+    let took = place.store().usage("one".to_owned()).await.unwrap();
+    assert!(took.open_ms == 0.0 && took.work_ms() < 30_000.0, "{took:?}");
+    // So does work that was no job; and there is room when it is told that there is.
+    let work = |owner: &str, ms: f64| (owner.to_owned(), ms);
+    place.store().note_work(vec![work("one", 30_000.0), work("two", 5.0)]).await.unwrap();
+    place.store().note_work(vec![work("one", 40_000.0)]).await.unwrap();
+    let usage = refused(&place, ask(6, 60_000.0)).await;
+    assert!((70_000.0..100_000.0).contains(&usage.work_ms()), "{usage:?}");
+    let wait = usage.room_for_work(MOST_MS, 60_000.0);
+    assert!(wait > Duration::from_mins(58) && wait <= Duration::from_mins(61), "{wait:?}");
+    place.later(ms(wait) - 120_000).await;
+    refused(&place, ask(6, 60_000.0)).await;
+    place.later(120_000).await;
+    place.accept(ask(6, 60_000.0)).await;
+    place.store().forget_expired().await.unwrap();
+    assert_eq!(place.store().usage("two".to_owned()).await.unwrap().done, []);
+}
+
+pub(in crate::store) async fn what_is_kept_for_an_owner_has_a_bound<P: Place>() {
+    const MOST: u64 = 50_000;
+    let place = P::new().await;
+    let mut noise = vec![0_u8; 30_000];
+    blake3::Hasher::new().finalize_xof().fill(&mut noise);
+    let large = |number: u32| KeptResult { body: noise.clone().into(), ..result(number) };
+    let ask = |number: u32, result: Option<KeptResult>| NewJob {
+        quota: Quota { kept_bytes: Some(MOST), ..Quota::default() },
+        result,
+        ..job(number)
+    };
+    // Equal jobs share a result: it counts once.
+    for _ in 0..3 {
+        place.accept(ask(1, Some(large(1)))).await;
+    }
+    let kept = place.store().usage("one".to_owned()).await.unwrap().kept_bytes();
+    assert!((30_000..40_000).contains(&kept), "{kept}");
+    // So does the result of a job that was computed, and what is asked of one that waits.
+    let claim = place.run(place.accept(ask(2, None)).await.id).await;
+    place.store().finish(claim.lease, Ending::Succeeded(large(2))).await.unwrap();
+    let usage = refused(&place, ask(3, None)).await;
+    assert!((60_000..80_000).contains(&usage.kept_bytes()), "{usage:?}");
+    place.accept(NewJob { owner: "two".to_owned(), ..ask(3, None) }).await;
+    // There is room when it is told that there is.
+    let wait = usage.room_to_keep(MOST, Duration::from_hours(1));
+    assert!(wait > Duration::from_mins(58) && wait <= Duration::from_hours(1), "{wait:?}");
+    place.later(ms(wait) - 60_000).await;
+    refused(&place, ask(4, None)).await;
+    place.later(60_000).await;
+    let waiting = place.accept(ask(4, None)).await.id;
+    // A job that waits can be refused, once.
+    assert!(place.store().refuse(waiting, PROBLEM.to_owned()).await.unwrap());
+    let record = place.record(waiting).await;
+    assert_eq!((record.state, record.problem.as_deref(), record.attempt), (JobState::Failed, Some(PROBLEM), 0));
+    assert!(record.expires_ms > record.finished_ms);
+    assert!(!place.store().refuse(waiting, PROBLEM.to_owned()).await.unwrap());
 }
 
 pub(in crate::store) async fn deadlines_end_what_is_late_and_nothing_else<P: Place>() {

@@ -8,7 +8,7 @@ pub(in crate::store) mod results;
 use std::time::Duration;
 
 use crate::key::Key;
-use crate::store::jobs::{Accepted, Claim, Claimed, JobId, JobKind, JobRecord, Lease, NewJob, Priority};
+use crate::store::jobs::{Accepted, Claim, Claimed, JobId, JobKind, JobRecord, Lease, NewJob, Priority, Quota};
 use crate::store::sqlite::Keep;
 use crate::store::{Cursor, KeptResult, ResultPage, ResultQuery, Store};
 
@@ -28,6 +28,8 @@ pub(in crate::store) trait Place: Sized {
     async fn lose_task(&self, id: JobId);
     /// From now on nobody has heard of any computation for long.
     async fn silence(&self);
+    /// Everything that is on record happened so much earlier, ms.
+    async fn later(&self, ms: i64);
     /// Changes the rows of kept results.
     async fn damage(&self);
 
@@ -83,6 +85,7 @@ pub(in crate::store) fn job(number: u32) -> NewJob {
         idempotency: None,
         estimate_ms: 10.0,
         useful_for_ms: None,
+        quota: Quota::default(),
         result: None,
     }
 }
@@ -123,6 +126,11 @@ macro_rules! suite {
             a_name_is_one_job_for_its_owner
             a_full_queue_takes_no_more
             the_line_is_fair_between_owners_and_keeps_priorities
+            a_long_job_lets_some_short_ones_pass_and_no_more
+            the_next_short_job_is_the_first_of_them_in_line
+            the_state_of_jobs_and_store_is_told_in_figures
+            an_owner_gets_so_much_work_in_an_hour
+            what_is_kept_for_an_owner_has_a_bound
             deadlines_end_what_is_late_and_nothing_else
             a_lost_task_is_given_again_and_no_other
             what_a_kept_job_points_to_stays_and_what_is_expired_goes
