@@ -27,3 +27,4 @@ mod full;
 mod process;
 mod start;
 mod studies;
+mod tls;
