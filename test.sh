@@ -12,7 +12,7 @@ set -euo pipefail
 shopt -s inherit_errexit # a failing command inside $(...) ends the step too
 cd "$(dirname "${BASH_SOURCE[0]}")"
 
-STEPS=(format lint docs dependencies unused scripts page test contract programs dockerfile attack)
+STEPS=(format lint docs dependencies unused scripts page test contract programs dockerfile packaging attack)
 declare -A ABOUT=(
   [format]="rustfmt"
   [lint]="clippy over everything, warnings denied"
@@ -25,6 +25,7 @@ declare -A ABOUT=(
   [contract]="openapi/precut.json is what the program prints"
   [programs]="programs for machines, read by LinuxCNC's own interpreter"
   [dockerfile]="hadolint over the Dockerfile; compose.yaml is YAML"
+  [packaging]="the Debian package goes in, over itself and out; systemd's unit; Kubernetes' manifests and their settings"
   [attack]="schemathesis against the running service, all checks"
 )
 MACHETE=0.9.2
@@ -112,7 +113,7 @@ step_unused() {
 
 step_scripts() {
   need shellcheck shellcheck
-  find . -path ./target -prune -o -name '*.sh' -print0 | xargs -0 shellcheck .ci/run
+  find . -path ./target -prune -o -name '*.sh' -print0 | xargs -0 shellcheck .ci/run packaging/debian/*
 }
 
 step_page() {
@@ -221,6 +222,58 @@ step_dockerfile() {
   "$tools/hadolint" docker/Dockerfile
   "$tools/python" -c 'import sys, yaml; services = yaml.safe_load(sys.stdin)["services"]; services["precut"]; services["worker"]' \
     <docker/compose.yaml
+}
+
+step_packaging() {
+  local tools precut folder package file said
+  tools=$(python_tools)
+  precut=$(binary)
+  folder=$(mktemp -d)
+  # shellcheck disable=SC2064 # the folder as it is now
+  trap "rm -rf '$folder'" EXIT
+
+  for file in packaging/kubernetes/*.yaml; do
+    "$tools/kubernetes-validate" --strict --quiet "$file"
+    "$tools/python" -c '
+import sys, yaml
+for part in yaml.safe_load_all(sys.stdin):
+    print(part.get("data", {}).get("precut.toml", "") if part["kind"] == "ConfigMap" else "")
+' <"$file" >"$folder/settings.toml"
+    grep --quiet admin_listen "$folder/settings.toml"
+    "$precut" --config "$folder/settings.toml" --print-config >/dev/null
+  done
+
+  need dpkg-deb dpkg
+  need readelf binutils
+  package=$(packaging/deb.sh "$precut" "$folder" -Znone 2>/dev/null)
+  mkdir -p "$folder"/root/var/lib/dpkg/{info,updates,triggers}
+  touch "$folder"/root/var/lib/dpkg/{status,available}
+  # Into a folder of its own; its scripts run outside of it, where they see that they have nothing to start.
+  in_folder() {
+    dpkg --root="$folder/root" --force-script-chrootless --force-not-root --force-depends "$@" </dev/null >"$folder/log" 2>&1 ||
+      { cat "$folder/log" >&2 && return 1; }
+  }
+  in_folder --install "$package"
+  "$folder/root/usr/bin/precut" --config "$folder/root/etc/precut/precut.toml" --print-config >/dev/null
+  echo "# mine" >>"$folder/root/etc/precut/precut.toml"
+  in_folder --install "$package"
+  grep --quiet "# mine" "$folder/root/etc/precut/precut.toml"
+
+  need systemd-analyze systemd
+  sed "s|^ExecStart=precut|ExecStart=$folder/root/usr/bin/precut|" packaging/precut.service >"$folder/precut.service"
+  # A name that it does not know is only said, and passed over.
+  said=$(systemd-analyze verify "$folder/precut.service" 2>&1 | grep precut.service || true)
+  [ -z "$said" ] || {
+    echo "$said" >&2
+    return 1
+  }
+  # Of 100: what it may do beyond what it needs.
+  systemd-analyze security --offline=true --threshold=20 "$folder/precut.service" >/dev/null
+
+  in_folder --remove precut
+  [ ! -e "$folder/root/usr/bin/precut" ]
+  in_folder --purge precut
+  [ ! -e "$folder/root/etc/precut" ]
 }
 
 step_attack() {

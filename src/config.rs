@@ -20,10 +20,10 @@ pub const DEFAULTS: &str = include_str!("../config.default.toml");
 const SECTIONS: [&str; 9] = ["log", "limits", "jobs", "quota", "cache", "postgres", "shutdown", "cors", "auth"];
 
 /// Settings outside of the sections.
-const OUTSIDE: [&str; 5] = ["listen", "data", "store", "role", "cpu"];
+const OUTSIDE: [&str; 6] = ["listen", "admin_listen", "data", "store", "role", "cpu"];
 
 /// Settings that are words even where they look like numbers: `PRECUT_DATA=2026`.
-const WORDS: [&str; 6] = ["listen", "data", "store", "role", "log.level", "log.format"];
+const WORDS: [&str; 7] = ["listen", "admin_listen", "data", "store", "role", "log.level", "log.format"];
 
 /// What the service runs with. Unknown keys are refused wherever they come from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -31,6 +31,9 @@ const WORDS: [&str; 6] = ["listen", "data", "store", "role", "log.level", "log.f
 pub struct Config {
     /// Address and port to listen on.
     pub listen: SocketAddr,
+    /// Address and port of their own for health and metrics; `None`: only with everything else.
+    #[serde(with = "address_or_nothing")]
+    pub admin_listen: Option<SocketAddr>,
     /// Folder of the database.
     pub data: PathBuf,
     /// Where results, jobs and the queue are kept.
@@ -98,6 +101,8 @@ pub struct Limits {
     pub header_timeout_s: f64,
     /// Connections open at the same time.
     pub connections: usize,
+    /// Connections that one client may have open.
+    pub connections_per_client: usize,
     /// Requests in work at the same time.
     pub concurrent_requests: usize,
     /// Requests per second and client in the long run; 0 for no limit.
@@ -387,7 +392,7 @@ impl Config {
 
     /// Whether only this machine can reach the service.
     pub fn is_loopback(&self) -> bool {
-        self.listen.ip().is_loopback()
+        [Some(self.listen), self.admin_listen].into_iter().flatten().all(|address| address.ip().is_loopback())
     }
 
     /// Settings that make no sense.
@@ -409,6 +414,7 @@ impl Config {
             ("limits.multipart_bytes", limits.multipart_bytes),
             ("limits.bodies_bytes", limits.bodies_bytes),
             ("limits.connections", limits.connections),
+            ("limits.connections_per_client", limits.connections_per_client),
             ("limits.concurrent_requests", limits.concurrent_requests),
             ("jobs.streams", self.jobs.streams),
         ] {
@@ -475,6 +481,24 @@ impl Config {
 impl Default for Config {
     fn default() -> Self {
         toml::from_str(DEFAULTS).expect("a test reads the defaults")
+    }
+}
+
+/// An address, or an empty text for none: TOML has no other word for nothing.
+mod address_or_nothing {
+    use std::net::SocketAddr;
+
+    use serde::de::Error;
+    use serde::{Deserialize, Deserializer, Serializer};
+
+    #[allow(clippy::ref_option)] // serde gives a reference to the field
+    pub(super) fn serialize<S: Serializer>(address: &Option<SocketAddr>, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(&address.map(|address| address.to_string()).unwrap_or_default())
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<SocketAddr>, D::Error> {
+        let text = String::deserialize(deserializer)?;
+        if text.is_empty() { Ok(None) } else { text.parse().map(Some).map_err(D::Error::custom) }
     }
 }
 
@@ -606,6 +630,19 @@ mod tests {
         assert_eq!(config.strays.len(), 3);
         assert!(config.strays[0].contains("PRECUT_LISTN") && config.strays[0].contains("PRECUT_LISTEN?"));
         assert!(config.strays[1].contains("PRECUT_URL") && !config.strays[1].contains("did you mean"));
+    }
+
+    #[test]
+    fn an_address_of_its_own_for_health_and_metrics_is_none_unless_it_is_given() {
+        assert_eq!(Config::default().admin_listen, None);
+        let config = load("", &[("PRECUT_ADMIN_LISTEN", "127.0.0.1:9090")], &Flags::default()).unwrap();
+        assert_eq!(config.admin_listen, Some("127.0.0.1:9090".parse().unwrap()));
+        assert_eq!(toml::from_str::<Config>(&config.to_toml()).unwrap(), config);
+        assert!(config.is_loopback());
+        let config = load("admin_listen = \"0.0.0.0:9090\"", &[], &Flags::default()).unwrap();
+        assert!(!config.is_loopback(), "others reach the metrics, too");
+        let error = load("admin_listen = \"here\"", &[], &Flags::default()).unwrap_err().to_string();
+        assert!(error.contains("admin_listen"), "{error}");
     }
 
     #[test]

@@ -26,9 +26,10 @@ pub(super) fn ask(url: Option<String>) -> Result<(), Failed> {
     }
 }
 
-/// Where a service with this environment listens, as seen from this machine.
+/// Where a service with this environment answers for its health, as seen from this machine.
 fn own_url() -> String {
-    let listen = std::env::var("PRECUT_LISTEN").ok().and_then(|text| text.parse::<SocketAddr>().ok());
+    let given = |name| std::env::var(name).ok().and_then(|text| text.parse::<SocketAddr>().ok());
+    let listen = given("PRECUT_ADMIN_LISTEN").or_else(|| given("PRECUT_LISTEN"));
     let mut listen = listen.unwrap_or(SocketAddr::from((Ipv4Addr::LOCALHOST, 8080)));
     match listen.ip() {
         IpAddr::V4(ip) if ip.is_unspecified() => listen.set_ip(Ipv4Addr::LOCALHOST.into()),

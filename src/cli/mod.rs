@@ -102,7 +102,7 @@ enum Command {
     Verify(backup::VerifyArgs),
     /// Ask a running service whether it is ready; exit code 1 if not
     Health {
-        /// Its address [default: PRECUT_LISTEN, or http://127.0.0.1:8080]
+        /// Its address [default: PRECUT_ADMIN_LISTEN, PRECUT_LISTEN, or http://127.0.0.1:8080]
         #[arg(long, value_name = "URL")]
         url: Option<String>,
     },

@@ -1,5 +1,6 @@
 //! The service as a process: settings, start, signals, end.
 
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -42,23 +43,33 @@ async fn serve(
 ) -> Result<(), Failed> {
     let settings = EngineSettings { isolation, ..EngineSettings::of(config) };
     let engine = Engine::open(registry, settings).await.map_err(|error| Failed::Machine(error.to_string()))?;
-    let listener = TcpListener::bind(config.listen)
-        .await
-        .map_err(|error| Failed::Machine(format!("cannot listen on {}: {error}", config.listen)))?;
-    let address = listener.local_addr().unwrap_or(config.listen);
+    let (listener, address) = listen(config.listen).await?;
+    let admin = match config.admin_listen {
+        Some(address) => Some(listen(address).await?),
+        None => None,
+    };
     if !config.is_loopback() && config.auth.keys.is_empty() {
         tracing::warn!(%address, "reachable from other machines without keys: see auth.keys");
     }
     let app = App::new(engine.clone(), config);
-    greet(&engine, address)?;
+    let (admin, admin_address) = admin.unzip();
+    greet(&engine, address, admin_address)?;
     tracing::info!(%address, data = %config.data.display(), store = %config.store, role = ?config.role, "serving");
     let (stop, stopped) = watch::channel(false);
     tokio::spawn(watch_signals(stop));
     tokio::spawn(watch_keys(app.clone(), arguments.config.clone(), arguments.flags.clone()));
-    let left = http::serve(listener, app, stopped, seconds(config.shutdown.grace_s)).await;
+    let left = http::serve(listener, admin, app, stopped, seconds(config.shutdown.grace_s)).await;
     engine.close(left).await;
     tracing::info!("stopped");
     Ok(())
+}
+
+async fn listen(address: SocketAddr) -> Result<(TcpListener, SocketAddr), Failed> {
+    let listener = TcpListener::bind(address)
+        .await
+        .map_err(|error| Failed::Machine(format!("cannot listen on {address}: {error}")))?;
+    let address = listener.local_addr().unwrap_or(address);
+    Ok((listener, address))
 }
 
 /// How often it is looked whether the file of the settings is another one.
@@ -125,14 +136,15 @@ impl Hangups {
 }
 
 /// The address, the workbench first, and what else to try.
-fn greet(engine: &Engine, address: std::net::SocketAddr) -> Result<(), Failed> {
+fn greet(engine: &Engine, address: SocketAddr, admin: Option<SocketAddr>) -> Result<(), Failed> {
     let post = engine.registry().entries().first().map_or(String::new(), |entry| {
         let id = entry.meta().id;
         format!("  precut example {id} --job | curl --json @- http://{address}/v1/{id}\n")
     });
+    let admin = admin.map_or(String::new(), |admin| format!("Health and metrics:\n  http://{admin}/health/ready\n\n"));
     let greeting = format!(
         "precut {} listens on http://{address}\n\nThe workbench, in a browser:\n  http://{address}/\n\nFor programs:\n  \
-         curl http://{address}/v1/calculators\n{post}  http://{address}/docs\n\n",
+         curl http://{address}/v1/calculators\n{post}  http://{address}/docs\n\n{admin}",
         env!("CARGO_PKG_VERSION")
     );
     match print(greeting.as_bytes()) {

@@ -5,7 +5,6 @@
 //! from the cache is not much more work than that.
 
 use std::convert::Infallible;
-use std::hash::{Hash, Hasher};
 use std::net::IpAddr;
 use std::panic::AssertUnwindSafe;
 use std::sync::atomic::Ordering;
@@ -128,7 +127,8 @@ fn admit(app: &App, request: &Request, caller: &Caller) -> Result<(), Problem> {
 }
 
 /// Who asks, where no key says so. A whole IPv6 network counts as one: it belongs to one customer.
-enum Client<'a> {
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) enum Client<'a> {
     Key(&'a str),
     V4([u8; 4]),
     V6Network([u8; 8]),
@@ -137,13 +137,17 @@ enum Client<'a> {
 
 impl Client<'_> {
     fn of(request: &Request) -> Self {
-        match request.extensions().get::<Peer>().map(|peer| peer.ip.to_canonical()) {
-            Some(IpAddr::V4(ip)) => Self::V4(ip.octets()),
-            Some(IpAddr::V6(ip)) => {
+        request.extensions().get::<Peer>().map_or(Self::Unknown, |peer| Self::at(peer.ip))
+    }
+
+    /// Whoever has this address.
+    pub(super) fn at(ip: IpAddr) -> Self {
+        match ip.to_canonical() {
+            IpAddr::V4(ip) => Self::V4(ip.octets()),
+            IpAddr::V6(ip) => {
                 let [a, b, c, d, e, f, g, h, ..] = ip.octets();
                 Self::V6Network([a, b, c, d, e, f, g, h])
             }
-            None => Self::Unknown,
         }
     }
 }
@@ -162,18 +166,6 @@ pub(super) fn owner(caller: &Caller, request: &Request) -> String {
             format!("ip:{}/64", Ipv6Addr::from(octets))
         }
         Client::Key(_) | Client::Unknown => "unknown".to_owned(),
-    }
-}
-
-impl Hash for Client<'_> {
-    fn hash<H: Hasher>(&self, state: &mut H) {
-        std::mem::discriminant(self).hash(state);
-        match self {
-            Self::Key(name) => name.hash(state),
-            Self::V4(octets) => octets.hash(state),
-            Self::V6Network(octets) => octets.hash(state),
-            Self::Unknown => {}
-        }
     }
 }
 

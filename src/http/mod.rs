@@ -131,13 +131,24 @@ struct Peer {
 
 /// Every route behind the gate.
 pub fn router(app: &App) -> Router {
-    let health = Router::new()
+    // Who only runs jobs is asked how it is, and nothing else.
+    if app.role == Role::Worker { admin_router(app) } else { gated(app, routes(app, health())) }
+}
+
+/// Health and metrics alone, behind the same gate.
+fn admin_router(app: &App) -> Router {
+    gated(app, health())
+}
+
+fn health() -> Router<App> {
+    Router::new()
         .route("/health/live", get(health::live))
         .route("/health/ready", get(health::ready))
-        .route("/metrics", get(metrics::get));
-    // Who only runs jobs is asked how it is, and nothing else.
-    let router = if app.role == Role::Worker { health } else { routes(app, health) };
-    let router = router
+        .route("/metrics", get(metrics::get))
+}
+
+fn gated(app: &App, routes: Router<App>) -> Router {
+    let router = routes
         .fallback(not_found)
         .layer(axum::middleware::from_fn_with_state(app.clone(), gate::gate))
         .with_state(app.clone());

@@ -1,10 +1,11 @@
 //! Connections: accepted, bounded, and closed in good order.
 
+use std::collections::HashMap;
 use std::convert::Infallible;
 use std::future::poll_fn;
-use std::net::SocketAddr;
-use std::sync::Arc;
+use std::net::{IpAddr, SocketAddr};
 use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use axum::Router;
@@ -15,9 +16,10 @@ use hyper::server::conn::http1;
 use hyper::service::service_fn;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::{Semaphore, mpsc, watch};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc, watch};
 use tower::Service;
 
+use super::gate::Client;
 use super::in_place::in_place;
 use super::{App, Peer, body};
 use crate::config::seconds;
@@ -29,16 +31,26 @@ const LINGER_PAUSE: Duration = Duration::from_secs(2);
 const ACCEPT_PAUSE: Duration = Duration::from_millis(50);
 /// How often samples of latency are folded.
 const UPKEEP: Duration = Duration::from_secs(5);
+/// Connections at the address for health and metrics, and how many of them one client may have.
+const ADMIN_CONNECTIONS: usize = 64;
+const ADMIN_CONNECTIONS_PER_CLIENT: usize = 32;
 
 /// Serves until `stop` says so, then lets requests in work finish for `grace`; what is left of it. Until they have,
-/// newcomers are answered, too: that the service is shutting down.
-pub async fn serve(listener: TcpListener, app: App, mut stop: watch::Receiver<bool>, grace: Duration) -> Duration {
+/// newcomers are answered, too: that the service is shutting down. `admin` answers for health and metrics all the time.
+pub async fn serve(
+    listener: TcpListener,
+    admin: Option<TcpListener>,
+    app: App,
+    mut stop: watch::Receiver<bool>,
+    grace: Duration,
+) -> Duration {
     let router = super::router(&app);
-    let places = Arc::new(Semaphore::new(app.limits.connections));
+    let places = Places::new(app.limits.connections, app.limits.connections_per_client);
     let header_timeout = seconds(app.limits.header_timeout_s);
     // Closed when the last connection has dropped its end.
     let (open, mut all_closed) = mpsc::channel::<Infallible>(1);
     let upkeep = tokio::spawn(upkeep(app.clone()));
+    let admin = admin.map(|listener| tokio::spawn(serve_admin(listener, app.clone())));
     loop {
         let accepted = tokio::select! {
             biased;
@@ -77,16 +89,87 @@ pub async fn serve(listener: TcpListener, app: App, mut stop: watch::Receiver<bo
         }
     }
     upkeep.abort();
+    if let Some(admin) = admin {
+        admin.abort();
+    }
     end.saturating_duration_since(Instant::now())
 }
 
-async fn accept(
-    listener: &TcpListener,
-    places: &Arc<Semaphore>,
-) -> Option<(TcpStream, SocketAddr, tokio::sync::OwnedSemaphorePermit)> {
-    let place = places.clone().acquire_owned().await.ok()?;
+/// Answers for health and metrics, one request a connection: nobody keeps one for later.
+async fn serve_admin(listener: TcpListener, app: App) {
+    let router = super::admin_router(&app);
+    let places = Places::new(ADMIN_CONNECTIONS, ADMIN_CONNECTIONS_PER_CLIENT);
+    let header_timeout = seconds(app.limits.header_timeout_s);
+    loop {
+        let Some((stream, peer, place)) = accept(&listener, &places).await else { continue };
+        let router = router.clone();
+        tokio::spawn(async move {
+            connection(stream, peer, router, header_timeout, None).await;
+            drop(place);
+        });
+    }
+}
+
+/// Places for connections: so many for all, and of them so many for one client that others find one.
+#[derive(Clone)]
+struct Places {
+    free: Arc<Semaphore>,
+    of_one: usize,
+    taken: Arc<Mutex<HashMap<Client<'static>, Taken>>>,
+}
+
+/// What one client has.
+#[derive(Default)]
+struct Taken {
+    places: usize,
+    /// Whether it is in the log that it wanted more.
+    told: bool,
+}
+
+/// The place of one connection, free again when it is dropped.
+struct Place {
+    places: Places,
+    client: Client<'static>,
+    _permit: OwnedSemaphorePermit,
+}
+
+impl Places {
+    fn new(all: usize, of_one: usize) -> Self {
+        Self { free: Arc::new(Semaphore::new(all)), of_one, taken: Arc::default() }
+    }
+
+    /// `None` where the client has all that one may have.
+    fn take(&self, permit: OwnedSemaphorePermit, ip: IpAddr) -> Option<Place> {
+        let client = Client::at(ip);
+        let mut taken = self.taken.lock().unwrap_or_else(PoisonError::into_inner);
+        let its = taken.entry(client).or_default();
+        if its.places < self.of_one {
+            its.places += 1;
+            return Some(Place { places: self.clone(), client, _permit: permit });
+        }
+        if !std::mem::replace(&mut its.told, true) {
+            tracing::warn!(%ip, connections = its.places, "a client opens too many connections; further ones are closed");
+        }
+        None
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        let mut taken = self.places.taken.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(its) = taken.get_mut(&self.client) {
+            its.places -= 1;
+            if its.places == 0 {
+                taken.remove(&self.client);
+            }
+        }
+    }
+}
+
+async fn accept(listener: &TcpListener, places: &Places) -> Option<(TcpStream, SocketAddr, Place)> {
+    let permit = places.free.clone().acquire_owned().await.ok()?;
     match listener.accept().await {
-        Ok((stream, peer)) => Some((stream, peer, place)),
+        Ok((stream, peer)) => places.take(permit, peer.ip()).map(|place| (stream, peer, place)),
         Err(error) => {
             // Connections that are gone again are nothing; running out of descriptors passes.
             tracing::warn!(%error, "a connection could not be accepted");

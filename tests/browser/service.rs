@@ -38,7 +38,7 @@ impl Service {
                 let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
                 tell.send(listener.local_addr().unwrap()).unwrap();
                 let app = App::new(engine.clone(), &config);
-                let left = http::serve(listener, app, stopped, Duration::from_millis(200)).await;
+                let left = http::serve(listener, None, app, stopped, Duration::from_millis(200)).await;
                 engine.close(left).await;
             });
         });

@@ -31,3 +31,4 @@ mod owners;
 mod process;
 mod start;
 mod studies;
+mod tls;

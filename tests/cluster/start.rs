@@ -7,7 +7,7 @@ use crate::database::{Database, Member, until};
 use crate::support::toy_command;
 
 /// What a start that does not come about says, on both of its outputs.
-fn refused(store: &str, settings: &[(&str, &str)], arguments: &[&str]) -> (Option<i32>, String) {
+pub(crate) fn refused(store: &str, settings: &[(&str, &str)], arguments: &[&str]) -> (Option<i32>, String) {
     let data = tempfile::tempdir().unwrap();
     let mut all = vec!["serve", "--listen", "127.0.0.1:0", "--data", data.path().to_str().unwrap()];
     all.extend_from_slice(arguments);

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use precut::config::ApiKey;
 use precut::http::auth;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
-use tokio::net::TcpStream;
+use tokio::net::{TcpSocket, TcpStream};
 
 use crate::support::{Server, header, problem, toy};
 
@@ -131,6 +131,84 @@ async fn connections_beyond_the_limit_wait_for_their_turn() {
     drop(first);
     let count = tokio::time::timeout(Duration::from_mins(1), second.read(&mut answer)).await.unwrap().unwrap();
     assert!(answer[..count].starts_with(b"HTTP/1.1 200 "));
+}
+
+#[tokio::test]
+async fn one_client_cannot_take_all_connections() {
+    let server = Server::start_with(|config| {
+        config.limits.connections = 4;
+        config.limits.connections_per_client = 2;
+    })
+    .await;
+    let from = async |ip: [u8; 4]| {
+        let socket = TcpSocket::new_v4().unwrap();
+        socket.bind((ip, 0).into()).unwrap();
+        socket.connect(server.address).await.unwrap()
+    };
+    let is_answered = async |stream: &mut TcpStream| {
+        let mut answer = [0; 13];
+        // One that is closed may be so before, while or after it is written.
+        let _ = stream.write_all(b"GET /health/live HTTP/1.1\r\nHost: x\r\n\r\n").await;
+        let read = tokio::time::timeout(Duration::from_mins(1), stream.read_exact(&mut answer)).await;
+        read.expect("an answer, or its end").is_ok() && answer.starts_with(b"HTTP/1.1 200 ")
+    };
+    let greedy = [127, 0, 0, 2];
+    let mut held = [from(greedy).await, from(greedy).await];
+    for stream in &mut held {
+        assert!(is_answered(stream).await);
+    }
+    assert!(!is_answered(&mut from(greedy).await).await, "two are as many as one client may have");
+    assert!(is_answered(&mut from([127, 0, 0, 3]).await).await, "others find a place");
+    let [first, _second] = held;
+    drop(first);
+    let begun = Instant::now();
+    while !is_answered(&mut from(greedy).await).await {
+        assert!(begun.elapsed() < Duration::from_mins(1), "the place is free again");
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+}
+
+#[tokio::test]
+async fn health_and_metrics_answer_at_their_own_address_when_all_connections_are_taken() {
+    let server = Server::start_with(|config| {
+        config.limits.connections = 3;
+        config.admin_listen = Some(([127, 0, 0, 1], 0).into());
+    })
+    .await;
+    let admin = server.admin.unwrap();
+    let mut idle = Vec::new();
+    for _ in 0..3 {
+        idle.push(TcpStream::connect(server.address).await.unwrap());
+    }
+    let at_the_other = server.get("/health/ready").timeout(Duration::from_millis(300)).send().await;
+    assert!(at_the_other.unwrap_err().is_timeout(), "there is no place");
+    let ask = |path: &str| server.client.get(format!("http://{admin}{path}")).send();
+    // More often than there are places: none is kept.
+    for _ in 0..100 {
+        assert_eq!(ask("/health/ready").await.unwrap().status(), 200);
+    }
+    assert_eq!(ask("/health/live").await.unwrap().status(), 200);
+    assert!(ask("/metrics").await.unwrap().text().await.unwrap().contains("http_requests_in_flight"));
+    for path in ["/", "/v1/calculators", "/openapi.json"] {
+        problem(ask(path).await.unwrap(), 404, "not_found").await;
+    }
+    drop(idle);
+    server.stop().await;
+}
+
+#[tokio::test]
+async fn metrics_at_their_own_address_need_the_same_key() {
+    let server = Server::start_with(|config| {
+        config.admin_listen = Some(([127, 0, 0, 1], 0).into());
+        config.auth.keys =
+            vec![ApiKey { name: "cam".to_owned(), hash: auth::hash(KEY).to_string(), ..ApiKey::default() }];
+    })
+    .await;
+    let at = |path: &str| format!("http://{}{path}", server.admin.unwrap());
+    problem(server.client.get(at("/metrics")).send().await.unwrap(), 401, "unauthorized").await;
+    let known = server.client.get(at("/metrics")).header("authorization", format!("Bearer {KEY}"));
+    problem(known.send().await.unwrap(), 403, "forbidden").await;
+    assert_eq!(server.client.get(at("/health/ready")).send().await.unwrap().status(), 200);
 }
 
 #[tokio::test]

@@ -21,6 +21,8 @@ use tokio::task::JoinHandle;
 /// A running service with the toy calculator and a database of its own.
 pub struct Server {
     pub address: SocketAddr,
+    /// Where it answers for health and metrics alone, if it was set.
+    pub admin: Option<SocketAddr>,
     pub client: Client,
     stop: watch::Sender<bool>,
     task: JoinHandle<()>,
@@ -48,14 +50,20 @@ impl Server {
         let engine = Engine::open(registry, settings).await.expect("an empty folder");
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
         let address = listener.local_addr().expect("it is bound");
+        let admin = match config.admin_listen {
+            Some(address) => Some(TcpListener::bind(address).await.expect("a free port")),
+            None => None,
+        };
+        let admin_address = admin.as_ref().map(|admin| admin.local_addr().expect("it is bound"));
         let app = App::new(engine.clone(), &config);
         let (stop, stopped) = watch::channel(false);
         let task = tokio::spawn(async move {
-            let left = http::serve(listener, app, stopped, Duration::from_mins(1)).await;
+            let left = http::serve(listener, admin, app, stopped, Duration::from_mins(1)).await;
             engine.close(left).await;
         });
         Self {
             address,
+            admin: admin_address,
             client: Client::builder().no_gzip().no_brotli().build().expect("a plain client"),
             stop,
             task,

@@ -19,6 +19,7 @@ mod start;
 mod studies;
 #[cfg(test)]
 mod tests;
+mod tls;
 mod usage;
 mod writer;
 

@@ -10,7 +10,7 @@ use sqlx::migrate::{MigrateError, Migrator};
 use sqlx::postgres::{PgConnectOptions, PgPool, PgPoolOptions};
 use tokio::time::Instant;
 
-use super::{Use, queue};
+use super::{Use, queue, tls};
 use crate::store::OpenError;
 use crate::store::address::Secret;
 
@@ -41,8 +41,8 @@ pub(super) fn refused(error: &sqlx::Error) -> OpenError {
 fn reason(error: &sqlx::Error) -> String {
     let code = error.as_database_error().and_then(DatabaseError::code).map(Cow::into_owned);
     match (error, code.as_deref()) {
-        (_, Some("28P01" | "28000")) => "it does not accept the user name or the password (user and password stand in \
-                                         the address, or in PGUSER and PGPASSWORD)"
+        (_, Some("28P01")) => "it does not accept the user name or the password (user and password stand in the \
+                               address, or in PGUSER and PGPASSWORD)"
             .to_owned(),
         (_, Some("3D000")) => "it has no database of that name; make one with `createdb`".to_owned(),
         (_, Some("42501")) => format!(
@@ -62,11 +62,6 @@ fn reason(error: &sqlx::Error) -> String {
         (sqlx::Error::Configuration(_), _) => "the address is not understood; it reads \
                                                postgres://user:password@host:5432/database"
             .to_owned(),
-        (sqlx::Error::Tls(_), _) => {
-            "it insists on TLS, which this program does not speak to a database; use a private \
-                                     network or a tunnel"
-                .to_owned()
-        }
         (sqlx::Error::Io(error), _) => format!("it does not answer ({error})"),
         (sqlx::Error::PoolTimedOut, _) => "it does not answer".to_owned(),
         (other, _) => other.to_string(),
@@ -76,7 +71,8 @@ fn reason(error: &sqlx::Error) -> String {
 /// Whether waiting may help: nobody listens there yet, or it is just starting or stopping.
 fn may_pass(error: &sqlx::Error) -> bool {
     match error {
-        sqlx::Error::Io(_) | sqlx::Error::PoolTimedOut => true,
+        sqlx::Error::Io(error) => !tls::is_refusal(error),
+        sqlx::Error::PoolTimedOut => true,
         other => other
             .as_database_error()
             .and_then(DatabaseError::code)
@@ -86,8 +82,8 @@ fn may_pass(error: &sqlx::Error) -> bool {
 
 /// A pool of connections to a database whose tables are up to date.
 pub(super) async fn connected(address: &Secret, usage: &Use) -> Result<PgPool, OpenError> {
-    let options =
-        PgConnectOptions::from_str(address.reveal()).map_err(|error| refused(&error))?.application_name("precut");
+    let options = PgConnectOptions::from_str(address.reveal()).map_err(|error| refused(&error))?;
+    let options = tls::checked(options, address.reveal()).map_err(OpenError::Database)?.application_name("precut");
     // A connection of its own: to bring tables up to date may take longer than anything later.
     let first = patiently(&options, usage.patience.start).await?;
     let prepared = prepare(&first).await;
@@ -120,6 +116,11 @@ pub(super) async fn connected(address: &Secret, usage: &Use) -> Result<PgPool, O
         .map_err(|error| refused(&error))
 }
 
+/// Why it lets nobody in.
+fn closed(error: &sqlx::Error, options: &PgConnectOptions) -> OpenError {
+    OpenError::Database(tls::reason(error, options).unwrap_or_else(|| reason(error)))
+}
+
 /// A connection, also to a database that is not up yet.
 async fn patiently(options: &PgConnectOptions, most: Duration) -> Result<PgPool, OpenError> {
     let begun = Instant::now();
@@ -135,7 +136,7 @@ async fn patiently(options: &PgConnectOptions, most: Duration) -> Result<PgPool,
                     told = true;
                 }
             }
-            Err(error) => return Err(refused(&error)),
+            Err(error) => return Err(closed(&error, options)),
         }
         tokio::time::sleep(PAUSE).await;
     }
