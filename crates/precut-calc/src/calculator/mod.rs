@@ -21,7 +21,7 @@ pub use conflict::{Conflict, ConstraintName, ElasticScope, Infeasible, Relaxatio
 pub use consequence::{Allowed, Consequence};
 pub use design::{Condition, Design, Grouping, Smooth};
 pub use diagnosable::{ClassLimits, Diagnosable, LimitCurve, Measurement, NextRun, Reading};
-pub use figure::{Axis, Figure, Frame, Glyph, Item, Panel, Role, Spacing};
+pub use figure::{Along, Axis, Figure, Frame, Glyph, Handle, Item, Move, Panel, Role, Spacing};
 pub use finding::{Finding, Message, Value, Values, Violations};
 pub use forward::{Column as JacobianColumn, ForwardModel, Missing, Prediction, PrepareError, Quantity, Rows};
 pub use hypothesis::{
