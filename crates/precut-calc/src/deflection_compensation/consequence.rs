@@ -6,9 +6,8 @@ use crate::calculator::{Allowed, Calculator, Consequence, Failure, ForwardModel,
 use crate::effects::DeflectionEffect;
 
 use super::DeflectionCompensation;
-use super::auto;
 use super::forward::{CommandedPoint, DeflectionPoint, DeflectionRun};
-use super::input::{Detail, Include, IncludeMode, Job};
+use super::input::{Detail, IncludeMode, Job};
 
 /// Places along every diameter at which the turned shaft is looked at, beside the corners of the path: a half-wave between
 /// them is missed by less than 0.03 % of its height, (pi/128)^2/2.
@@ -26,8 +25,7 @@ pub(super) fn consequences(
     acting: &[Vec<DeflectionEffect>],
 ) -> Result<Vec<Consequence>, Failure> {
     let conditions = runs.first().cloned().unwrap_or_default();
-    let Some(mut believing) = as_driven(job, &conditions, believed)? else { return Ok(Vec::new()) };
-    let Some(path) = path(&believing)? else { return Ok(Vec::new()) };
+    let Some(path) = compensated(job, &conditions, believed)? else { return Ok(Vec::new()) };
     let points = looked_at(&path).into_iter().map(|z_mm| (0, DeflectionPoint { z_mm })).collect();
     let run = DeflectionRun {
         tool_path_at_start_m: conditions.tool_path_at_start_m,
@@ -36,8 +34,7 @@ pub(super) fn consequences(
         ..DeflectionRun::default()
     };
     let rows = Rows { runs: vec![run], points };
-    believing.effects.clone_from(&job.effects);
-    let Ok(prepared) = DeflectionCompensation::prepare(&believing, &rows, "diameter_deviation_um", &Unwatched) else {
+    let Ok(prepared) = DeflectionCompensation::prepare(job, &rows, "diameter_deviation_um", &Unwatched) else {
         return Ok(Vec::new());
     };
     let turned: Vec<Option<(f64, f64)>> = acting
@@ -62,28 +59,21 @@ pub(super) fn consequences(
     ])
 }
 
-/// The job as the calculator takes it with these effects beside its own: one cut from the stock, and what acts by default
-/// switched on. `None` where it is out of the model.
-fn as_driven(job: &Job, conditions: &DeflectionRun, believed: &[DeflectionEffect]) -> Result<Option<Job>, Failure> {
+/// The corners of the path driven with these effects beside the job's own; `None` where it is not complete.
+fn compensated(
+    job: &Job,
+    conditions: &DeflectionRun,
+    believed: &[DeflectionEffect],
+) -> Result<Option<Vec<CommandedPoint>>, Failure> {
     let mut job = job.clone();
     job.passes.clear();
     job.detail = Detail::Full;
+    // The path of the model that predicts: it takes the switches as they stand.
+    job.include.mode = IncludeMode::AsStated;
     job.effects.extend_from_slice(believed);
     job.conditions.tool_path_at_start_m = job.conditions.tool_path_at_start_m.or(conditions.tool_path_at_start_m);
     job.conditions.warm_time_at_start_min = job.conditions.warm_time_at_start_min.or(conditions.warm_time_at_start_min);
-    match auto::settled(&job, &Unwatched) {
-        Ok((settled, _)) => Ok(Some(Job {
-            include: Include { mode: IncludeMode::AsStated, ..settled.include.clone() },
-            ..settled.into_owned()
-        })),
-        Err(Failure::OutOfModel(_)) => Ok(None),
-        Err(failure) => Err(failure),
-    }
-}
-
-/// The corners of the path that is driven; `None` where it is not complete.
-fn path(job: &Job) -> Result<Option<Vec<CommandedPoint>>, Failure> {
-    let path = match DeflectionCompensation::run(job, &Unwatched) {
+    let path = match DeflectionCompensation::run(&job, &Unwatched) {
         Ok(answer) => answer.output.path,
         Err(Failure::OutOfModel(_)) => return Ok(None),
         Err(failure) => return Err(failure),
