@@ -39,7 +39,7 @@ pub(crate) fn step(rollers: bool) -> Result<Measured, String> {
     let prepared =
         RingRoundness::prepare(&job, &rows, "radius_mm", &Unwatched).map_err(|_| "not prepared".to_owned())?;
     let steps = 7200.0 * job.tool.revolutions;
-    Ok(per(cpu_time(|| RingRoundness::predict(&prepared, &[]))?, steps))
+    Ok(per(cpu_time(|| RingRoundness::predict(&prepared, &[], &Unwatched))?, steps))
 }
 
 /// The whole answer to the paper's run of 256 revolutions: two runs, history, circles, spectrum.

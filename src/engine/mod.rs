@@ -48,6 +48,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+pub(crate) use precut_calc::calculator::Quiet;
 use precut_calc::calculator::{Cost, Failure, Message, Monitor};
 use tokio::runtime::Handle;
 
@@ -499,16 +500,6 @@ fn compute(ready: &Ready, monitor: &dyn Monitor) -> Result<Stored, Error> {
         Err(Failure::Cancelled) => Err(Error::Cancelled),
         Err(failure) => Err(Error::Calculation(failure)),
     }
-}
-
-/// What a part of a calculation sees of the monitor: it may be cancelled, its progress is nobody's business.
-pub(crate) struct Quiet<'m>(pub(crate) &'m dyn Monitor);
-
-impl Monitor for Quiet<'_> {
-    fn cancelled(&self) -> bool {
-        self.0.cancelled()
-    }
-    fn progress(&self, _fraction: f64, _stage: Message) {}
 }
 
 /// Everything but the calculation, without an engine.

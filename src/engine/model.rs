@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use std::fmt::Write as _;
 
 use precut_calc::calculator::{Failure, Finding, Message, Monitor, Violations};
+use precut_calc::diagnosis::{JointUncertainty, ParameterMove};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
@@ -19,6 +20,8 @@ use crate::text::significant;
 /// The field of a job that names a model.
 const MODEL: &str = "model";
 const EFFECTS: &str = "effects";
+/// The field of a diagnosis, and of what a model says of its origin, that tells how unsure effects are.
+pub(super) const UNCERTAINTY: &str = "effects_uncertainty";
 /// The field that holds the base job of a diagnosis or a study.
 const JOB: &str = "job";
 /// The field by which a diagnosis or a study names the calculator of its base job.
@@ -55,6 +58,17 @@ impl ModelContent {
     }
     pub(crate) fn read(kept: &KeptModel) -> Option<Self> {
         serde_json::from_str(&kept.content).ok()
+    }
+
+    /// How unsure its effects are, by its diagnosis. What says so of no number of theirs says nothing.
+    fn unsure(&self) -> Vec<JointUncertainty> {
+        let stated = self.provenance.get(UNCERTAINTY).cloned().unwrap_or_default();
+        let stated: Vec<JointUncertainty> = serde_json::from_value(stated).unwrap_or_default();
+        let is_there = |own: &ParameterMove| {
+            let effect = (own.effect as usize).checked_sub(1).and_then(|index| self.effects.get(index));
+            effect.and_then(|effect| effect.get(&own.parameter)).is_some_and(Value::is_number)
+        };
+        stated.into_iter().filter(|entry| entry.moves.iter().all(is_there)).collect()
     }
 }
 
@@ -218,25 +232,46 @@ pub(crate) fn extend(models: &Models<'_>, entry: &Entry, job: &mut Value) -> Vec
         sha256: kept.sha256.clone(),
         effects: content.effects.len(),
     };
-    let faults = join(job, &places, content.effects);
-    if faults.is_empty()
-        && let Some(fields) = within(job, &places.model)
-    {
-        fields.insert(MODEL.to_owned(), json!(held));
+    let unsure = content.unsure();
+    match join(job, &places, content.effects) {
+        Ok(before) => {
+            if let Some(fields) = within(job, &places.model) {
+                fields.insert(MODEL.to_owned(), json!(held));
+                // Only a diagnosis, whose base job is inside it, asks how unsure effects are.
+                if places.effects.len() > places.model.len() {
+                    tell(fields, unsure, before);
+                }
+            }
+            Vec::new()
+        }
+        Err(faults) => faults,
     }
-    faults
 }
 
 fn kind(effect: &Value) -> Option<&str> {
     effect.get("kind")?.as_str()
 }
 
-/// Appends the model's effects. One that the job has already is a fault.
-fn join(job: &mut Value, places: &Places, effects: Vec<Value>) -> Vec<Finding> {
+/// Appends how unsure the effects of the model are, which stand behind so many others.
+fn tell(diagnosis: &mut Map<String, Value>, unsure: Vec<JointUncertainty>, before: usize) {
+    let behind = |own: ParameterMove| ParameterMove {
+        effect: own.effect.saturating_add(u32::try_from(before).unwrap_or(u32::MAX)),
+        ..own
+    };
+    let moved =
+        unsure.into_iter().map(|entry| json!({ "moves": entry.moves.into_iter().map(behind).collect::<Vec<_>>() }));
+    // What is no list is the schema's to refuse.
+    if let Value::Array(stated) = diagnosis.entry(UNCERTAINTY).or_insert_with(|| json!([])) {
+        stated.extend(moved);
+    }
+}
+
+/// Appends the model's effects, and tells behind how many. One that the job has already is a fault.
+fn join(job: &mut Value, places: &Places, effects: Vec<Value>) -> Result<usize, Vec<Finding>> {
     let at = pointer(&places.effects, EFFECTS);
     // What is no object or no list is the schema's to refuse.
-    let Some(fields) = within(job, &places.effects) else { return Vec::new() };
-    let Value::Array(own) = fields.entry(EFFECTS).or_insert_with(|| json!([])) else { return Vec::new() };
+    let Some(fields) = within(job, &places.effects) else { return Ok(0) };
+    let Value::Array(own) = fields.entry(EFFECTS).or_insert_with(|| json!([])) else { return Ok(0) };
     let mut violations = Violations::default();
     for (index, one) in own.iter().enumerate() {
         let both = kind(one).filter(|own| effects.iter().any(|effect| kind(effect) == Some(own)));
@@ -245,10 +280,12 @@ fn join(job: &mut Value, places: &Places, effects: Vec<Value>) -> Vec<Finding> {
         }
     }
     let violations = violations.into_vec();
-    if violations.is_empty() {
-        own.extend(effects);
+    if !violations.is_empty() {
+        return Err(violations);
     }
-    violations
+    let before = own.len();
+    own.extend(effects);
+    Ok(before)
 }
 
 /// Whether a way through a job leads to the model that it names, or into it.

@@ -5,12 +5,13 @@ use std::str::FromStr;
 use std::sync::Arc;
 
 use precut_calc::calculator::Finding;
+use precut_calc::diagnosis::{JointUncertainty, ParameterMove};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::budget::Room;
 use super::compare::{self, ModelComparison};
-use super::model::{self, Found, ModelContent};
+use super::model::{self, Found, ModelContent, UNCERTAINTY};
 use super::{Body, Engine, Error, Inner, Key, Stored, json as read_json};
 use crate::registry::{Entry, Faults, ModelUse, Registry, canonical, nearest};
 use crate::store::OpenError;
@@ -428,6 +429,17 @@ fn stored(kept: KeptModel, content: ModelContent) -> StoredModel {
     StoredModel { name: kept.name, revision: kept.revision, sha256: kept.sha256, created_ms: kept.created_ms, content }
 }
 
+/// How unsure effects are that stand elsewhere in another list, or are left out of it.
+fn renumbered(unsure: &Value, place: impl Fn(usize) -> Option<usize>) -> Vec<JointUncertainty> {
+    let unsure: Vec<JointUncertainty> = serde_json::from_value(unsure.clone()).unwrap_or_default();
+    let moved = |own: ParameterMove| {
+        let effect = place((own.effect as usize).checked_sub(1)?)?;
+        Some(ParameterMove { effect: u32::try_from(effect + 1).ok()?, ..own })
+    };
+    let entries = unsure.into_iter().map(|entry| entry.moves.into_iter().filter_map(moved).collect::<Vec<_>>());
+    entries.filter(|moves| !moves.is_empty()).map(|moves| JointUncertainty { moves }).collect()
+}
+
 /// The model that a diagnosis found, with where it comes from.
 fn content_of(stored: &Stored, pointer: &str) -> Result<ModelContent, ModelError> {
     if stored.entry().meta().id != DIAGNOSIS {
@@ -443,10 +455,15 @@ fn content_of(stored: &Stored, pointer: &str) -> Result<ModelContent, ModelError
         let finding = Finding::new("diagnosis_without_causes", pointer).with("verdict", verdict);
         return Err(ModelError::Invalid(vec![finding]));
     }
-    // What an earlier model added to the base job belongs to the extended one.
+    // What an earlier model added to the base job belongs to the extended one, as far as it has not changed.
     let of_job = input["job"]["effects"].as_array().map_or(&[][..], Vec::as_slice);
     let inherited = input["model"]["effects"].as_u64().and_then(|count| usize::try_from(count).ok()).unwrap_or(0);
-    let effects = of_job[of_job.len().saturating_sub(inherited)..].iter().cloned().chain(named).collect();
+    let stays = |own: &Value| named.iter().all(|found| compare::identity(found) != compare::identity(own));
+    let kept: Vec<usize> =
+        (of_job.len().saturating_sub(inherited)..of_job.len()).filter(|&index| stays(&of_job[index])).collect();
+    let unsure = renumbered(&input[UNCERTAINTY], |effect| kept.iter().position(|&index| index == effect));
+    let unsure_now = renumbered(&result[UNCERTAINTY], |effect| Some(kept.len() + effect));
+    let effects = kept.iter().map(|&index| of_job[index].clone()).chain(named).collect();
     let base = canonical(&input["job"]).map_err(|error| Error::internal(format!("a kept diagnosis: {error}")))?;
     Ok(ModelContent {
         calculator: input["calculator"].as_str().unwrap_or_default().to_owned(),
@@ -460,6 +477,7 @@ fn content_of(stored: &Stored, pointer: &str) -> Result<ModelContent, ModelError
             "base_job_b3": blake3::hash(&base).to_hex().as_str(),
             "extends": input.get("model").cloned().unwrap_or(Value::Null),
             "causes": result["named"],
+            "effects_uncertainty": [unsure, unsure_now].concat(),
             "gain": result["gain"],
         }),
     })

@@ -162,3 +162,62 @@ async fn a_model_has_each_effect_once() {
     let waves = json!({ "calculator": "ring-roundness", "effects": [wave(3), wave(5)], "provenance": null });
     assert_eq!(put(&server, "waves", &waves).await, 201);
 }
+
+/// A stored model does not blind: what of it changed is named, with what it was, and takes its place in the next revision.
+#[tokio::test]
+async fn what_a_stored_model_holds_is_found_changed_and_replaced() {
+    let server = server().await;
+    let unsure = |effect: u32, parameter: &str, by: f64| json!({ "moves": [{ "effect": effect, "parameter": parameter, "by": by }] });
+    let mut model = lathe(0.002, 0.001, 0.003);
+    model["effects"].as_array_mut().unwrap().insert(0, json!({ "kind": "size_offset", "offset_um": 0.02 }));
+    model["provenance"]["effects_uncertainty"] = json!([
+        unsure(1, "offset_um", 0.03),
+        unsure(2, "delta_um_per_n", 0.0005),
+        // What is of no number of the model says nothing.
+        unsure(2, "kind", 1.0),
+        unsure(3, "delta_um_per_n", 1.0),
+    ]);
+    assert_eq!(put(&server, "lathe", &model).await, 201);
+
+    let example =
+        include_str!("../../crates/precut-calc/src/deflection_compensation/examples/diagnosis_headstock.json");
+    let mut job: Value = serde_json::from_str(example).unwrap();
+    job["options"] = json!({ "held_out": false });
+    job["model"] = json!("lathe");
+    // Stated beside the model: its effects come behind.
+    job["job"]["effects"] = json!([{ "kind": "guideway_bow", "bow_um": 0.01 }]);
+    job["effects_uncertainty"] = json!([unsure(1, "bow_um", 0.05)]);
+    let answer = diagnosed(&server, &job).await;
+    assert_eq!(
+        answer["input"]["effects_uncertainty"],
+        json!([unsure(1, "bow_um", 0.05), unsure(2, "offset_um", 0.03), unsure(3, "delta_um_per_n", 0.0005)])
+    );
+    let result = &answer["result"];
+    assert_eq!((&result["verdict"], &result["named"][0]["kind"]), (&json!("named"), &json!("headstock_compliance")));
+    let found = &result["named"][0]["parameters"][0];
+    assert_eq!(found["was"], 0.002);
+    assert!(found["value"].as_f64().unwrap() > 0.01, "{found}");
+    let said =
+        answer["explanation"].as_array().unwrap().iter().find(|said| said["code"] == "diagnosis_changed").unwrap();
+    assert_eq!((&said["values"]["from"], &said["values"]["to"]), (&found["was"], &found["value"]));
+
+    let from = json!({ "from_result": answer["key"] });
+    assert_eq!(put(&server, "lathe", &from).await, 200);
+    let stored = got(&server, "/v1/models/lathe").await;
+    let kinds: Vec<&str> =
+        stored["effects"].as_array().unwrap().iter().map(|effect| effect["kind"].as_str().unwrap()).collect();
+    assert_eq!(kinds, ["size_offset", "headstock_compliance"]);
+    assert_eq!(stored["effects"][1]["delta_um_per_n"], found["value"]);
+    let kept = stored["provenance"]["effects_uncertainty"].as_array().unwrap();
+    assert_eq!(kept[0], unsure(1, "offset_um", 0.03));
+    assert_eq!((kept.len(), &kept[1]["moves"][0]["effect"]), (2, &json!(2)));
+
+    // Under it the same rows hold nothing new.
+    let again = diagnosed(&server, &job).await;
+    assert_eq!(again["result"]["verdict"], "adequate", "{}", again["result"]["named"]);
+}
+
+async fn diagnosed(server: &Server, job: &Value) -> Value {
+    let request = server.post_to("/v1/diagnosis", job.to_string()).header("prefer", "wait=60");
+    request.send().await.unwrap().json().await.unwrap()
+}

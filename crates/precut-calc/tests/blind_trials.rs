@@ -23,9 +23,9 @@ use std::path::Path;
 
 use precut_calc::calculator::{Calculator, Check, Diagnosable, Measurement, Unwatched, Violations};
 use precut_calc::diagnosis::{
-    Diagnosis, JobOf, NamedCause, ResultOf, SetReport, residuals_with, separation_from, separations_of,
+    Diagnosis, JobOf, NamedCause, ResultOf, SetReport, VerdictClass, residuals_with, separation_from, separations_of,
 };
-use precut_trials::score::{HeldOut, Said, Score};
+use precut_trials::score::{HeldOut, Said, Score, Share};
 use precut_trials::{Class, Hidden, Trial};
 use serde_json::{Value, json};
 
@@ -190,6 +190,89 @@ pub(crate) fn without_the_cause<M: Diagnosable>(trials: Trials) -> Mutated {
         keep(trials.name, &text);
     }
     mutated
+}
+
+/// What comes of measuring again after a model was stored.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Stored {
+    /// Draws whose cause was named, and so could be stored; the others are not tried.
+    pub(crate) stored: u64,
+    /// Of these, how many are quiet over rows that were measured later under other conditions, nothing having changed.
+    pub(crate) quiet: Share,
+    /// How many name the cause that was stored where it has grown since.
+    pub(crate) named: Share,
+    /// Of those, how often the interval holds what acts now.
+    pub(crate) covered: Share,
+    /// How many name something else.
+    pub(crate) wrong: u64,
+}
+
+/// One cause of this strength is found and stored, with what the rows leave open of it; then the same machine is measured
+/// again, and once more as if the stored effect had been a share of what acts now.
+pub(crate) fn after_a_model_was_stored<M: Diagnosable>(trials: Trials, share: f64) -> Stored {
+    let (seed, count) = (number("PRECUT_TRIAL_SEED", trials.seed), number("PRECUT_TRIALS", trials.count));
+    let (mut stored, mut text) = (Stored::default(), String::new());
+    let diagnosed = |request: &Value| {
+        Diagnosis::<M>::run(&job::<M>(request, json!({ "held_out": false })), &Unwatched).unwrap().output
+    };
+    for k in 0..count {
+        let mut trial = (trials.draw)(trials.class, trials.snr, seed_of(seed, k));
+        let first = diagnosed(&trial.request);
+        let hidden: Vec<String> = trial.truth.causes.iter().map(|hidden| hidden.kind.to_owned()).collect();
+        if first.verdict != VerdictClass::Named || kinds(&first.named) != hidden || first.effects.is_empty() {
+            continue;
+        }
+        // A job that holds it must state what it depends on; the rows have their own.
+        let needed = match hidden[0].as_str() {
+            "wear_multiplicative" | "wear_force_additive" => Some(("flank_wear_mm", json!(0.0))),
+            "batch_shift" => Some(("batch", json!("A"))),
+            _ => None,
+        };
+        if let Some((condition, value)) = needed {
+            trial.request["job"]["conditions"][condition] = value.clone();
+            if let Some(later) = &mut trial.later {
+                later.request["job"]["conditions"][condition] = value;
+            }
+        }
+        stored.stored += 1;
+        let unsure = serde_json::to_value(&first.effects_uncertainty).unwrap();
+        let mut said = Vec::new();
+        if let Some(later) = &trial.later {
+            let again = diagnosed(&with_effects(&later.request, &first.effects, &unsure));
+            stored.quiet.add(again.verdict == VerdictClass::Adequate);
+            said.push(format!("later {} {}", again.verdict.name(), kinds(&again.named).join(" + ")));
+        }
+        let mut before = serde_json::to_value(&first.effects).unwrap();
+        let field = first.effects_uncertainty[0].moves.iter().map(|own| own.parameter.as_str());
+        let field = field.filter(|field| *field != "phase_rad").next().unwrap();
+        let absent = if field == "factor" { 1.0 } else { 0.0 };
+        let now = before[0][field].as_f64().unwrap();
+        before[0][field] = json!(absent + share * (now - absent));
+        let changed = diagnosed(&with_effects(&trial.request, &before, &unsure));
+        let is_right = changed.verdict == VerdictClass::Named && kinds(&changed.named) == hidden;
+        stored.named.add(is_right);
+        if is_right {
+            covered(&trial, &changed.named).into_iter().for_each(|held| stored.covered.add(held));
+            assert!(changed.named[0].parameters[0].was.is_some(), "{:?}", changed.named);
+        } else if changed.verdict == VerdictClass::Named {
+            stored.wrong += 1;
+        }
+        said.push(format!("grown {} {}", changed.verdict.name(), kinds(&changed.named).join(" + ")));
+        writeln!(text, "{:<28}{}", hidden[0], said.join("; ")).unwrap();
+    }
+    println!("{}: after a model was stored, {count} draws from seed {seed}\n{text}{stored:?}", M::META.id);
+    if (seed, count) == (trials.seed, trials.count) {
+        keep(trials.name, &text);
+    }
+    stored
+}
+
+/// A request whose base holds these effects.
+fn with_effects(request: &Value, effects: &impl serde::Serialize, unsure: &Value) -> Value {
+    let mut request = request.clone();
+    request["job"]["effects"] = serde_json::to_value(effects).unwrap();
+    request["effects_uncertainty"] = unsure.clone();
+    request
 }
 
 /// The kinds of the catalogue without one.

@@ -9,7 +9,12 @@ use std::sync::Mutex;
 use std::time::Duration;
 
 use cpu_time::ThreadTime;
-use precut_calc::calculator::{Calculator, Check, Message, Monitor, Registrar, Violations};
+use precut_calc::calculator::{Calculator, Check, Diagnosable, Message, Monitor, Registrar, Violations};
+use precut_calc::deflection_compensation::DeflectionCompensation;
+use precut_calc::diagnosis::Diagnosis;
+use precut_calc::feed_schedule::FeedSchedule;
+use precut_calc::fixture_stability::FixtureStability;
+use precut_calc::ring_roundness::RingRoundness;
 use serde_json::{Value, json};
 use utoipa::{PartialSchema, ToSchema};
 
@@ -258,6 +263,64 @@ fn dear(calculator: &str) -> Vec<Value> {
         "feed-schedule" => vec![json!({"method": {"kind": "continuous", "grid_points": 1000, "segments_max": 100}})],
         _ => Vec::new(),
     }
+}
+
+/// When diagnoses are cancelled: while the base is prepared, while signatures are computed, in the search or the folds.
+const WITHIN: [Duration; 3] = [Duration::from_millis(1), Duration::from_millis(300), Duration::from_millis(1500)];
+/// Longest work of a diagnosis between two looks.
+const LONGEST_OF_DIAGNOSIS: Duration = Duration::from_millis(100);
+
+/// The first diagnosis of a calculator with a base that is dear to predict, and with all that was measured so many times over,
+/// each time as runs of their own and a little different.
+fn diagnosis<M: Diagnosable>(base: &Value, times: usize) -> Value {
+    let mut value: Value = serde_json::from_str(M::DIAGNOSES[0].job).unwrap();
+    merge(&mut value["job"], base);
+    let quantity = value["quantity"].as_str().unwrap().to_owned();
+    let runs = value["runs"].as_array().cloned().unwrap_or_default();
+    let rows = value["measurements"].as_array().cloned().unwrap();
+    let apart = if rows[0].get("run").is_some() { runs.len() } else { 0 };
+    let mut measured = Vec::with_capacity(times * rows.len());
+    for k in 0..times {
+        for (index, row) in rows.iter().enumerate() {
+            let mut row = row.clone();
+            if apart > 0 {
+                row["run"] = json!(row["run"].as_u64().unwrap() as usize + k * apart);
+            }
+            let by = 1.0 + 1e-3 * ((k * 7 + index * 13) % 11) as f64;
+            row[&quantity] = json!(row[&quantity].as_f64().unwrap() * by);
+            measured.push(row);
+        }
+    }
+    value["measurements"] = json!(measured);
+    value["runs"] = json!(vec![runs; if apart > 0 { times } else { 1 }].concat());
+    value
+}
+
+#[test]
+fn a_cancelled_diagnosis_ends_soon_wherever_it_is() {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let looked = pool.install(|| {
+        let mut looked = Looked::default();
+        let vise = [
+            json!({"cutter": {"teeth": 200}, "cut": {"spindle_speed_rpm": 20}}),
+            json!({"effects": [{"kind": "contact_hardening", "cubic_per_mm2": 1000.0}]}),
+        ];
+        for base in &vise {
+            let job = diagnosis::<FixtureStability>(base, 1);
+            looked.at::<Diagnosis<FixtureStability>>(&job, &base.to_string(), &WITHIN);
+        }
+        let ring = json!({"tool": {"revolutions": 2000}});
+        let job = diagnosis::<RingRoundness>(&ring, 1);
+        looked.at::<Diagnosis<RingRoundness>>(&job, &ring.to_string(), &WITHIN);
+        let shafts = diagnosis::<DeflectionCompensation>(&json!({}), 20);
+        looked.at::<Diagnosis<DeflectionCompensation>>(&shafts, "20 times", &WITHIN);
+        let cuts = diagnosis::<FeedSchedule>(&json!({}), 40);
+        looked.at::<Diagnosis<FeedSchedule>>(&cuts, "40 times", &WITHIN);
+        looked
+    });
+    eprintln!("{} cancelled, {:.1?} without a look at most", looked.cancelled, looked.longest);
+    assert_eq!(looked.cancelled, 5);
+    assert!(looked.longest < LONGEST_OF_DIAGNOSIS && looked.faults.is_empty(), "{}", looked.faults.join("\n"));
 }
 
 #[test]

@@ -107,7 +107,7 @@ fn predict(job: &Job, runs: &[Run], effects: &[DeflectionEffect]) -> Vec<Predict
         (0..runs.len()).flat_map(|k| stations().into_iter().map(move |z_mm| (k, DeflectionPoint { z_mm }))).collect();
     let rows = Rows { runs: runs.iter().map(as_run).collect(), points };
     let prepared = DeflectionCompensation::prepare(job, &rows, "diameter_deviation_um", &Unwatched).unwrap();
-    DeflectionCompensation::predict(&prepared, effects).unwrap()
+    DeflectionCompensation::predict(&prepared, effects, &Unwatched).unwrap()
 }
 
 /// The effect as parameter and as part of the base job, in both feed directions, against the equation.
@@ -359,7 +359,7 @@ fn a_run_cut_along_a_corrected_path_is_measured_against_the_drawing() {
     let points = stations().into_iter().map(|z_mm| (0, DeflectionPoint { z_mm })).collect();
     let rows = Rows { runs: vec![run], points };
     let prepared = DeflectionCompensation::prepare(&job, &rows, "diameter_deviation_um", &Unwatched).unwrap();
-    let found = DeflectionCompensation::predict(&prepared, &[]).unwrap();
+    let found = DeflectionCompensation::predict(&prepared, &[], &Unwatched).unwrap();
     for (z, value) in stations().into_iter().zip(found) {
         // t = t_c and deviation 2 (y + e) - 2 (t_c - a): the same cut with 0.05 mm more depth.
         let deeper = Run { depth: RUN.depth + 0.05, ..RUN };

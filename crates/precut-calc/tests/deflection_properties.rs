@@ -109,7 +109,7 @@ fn predicted(job: &Job, z: &[f64], commands: &[f64]) -> Vec<f64> {
     let points = z.iter().map(|&z_mm| (0, DeflectionPoint { z_mm })).collect();
     let rows = Rows { runs: vec![run], points };
     let prepared = DeflectionCompensation::prepare(job, &rows, "diameter_deviation_um", &Unwatched).unwrap();
-    DeflectionCompensation::predict(&prepared, &[]).unwrap().into_iter().map(Result::unwrap).collect()
+    DeflectionCompensation::predict(&prepared, &[], &Unwatched).unwrap().into_iter().map(Result::unwrap).collect()
 }
 
 fn commands(outcome: &Outcome) -> Option<Vec<f64>> {

@@ -70,7 +70,7 @@ fn cut_with(job: &Value, z: &[f64], commands: &[Option<f64>]) -> Vec<f64> {
     let rows = Rows { runs: vec![run], points };
     let model =
         DeflectionCompensation::prepare(&prepared(job.clone()), &rows, "diameter_deviation_um", &Unwatched).unwrap();
-    DeflectionCompensation::predict(&model, &[]).unwrap().into_iter().map(Result::unwrap).collect()
+    DeflectionCompensation::predict(&model, &[], &Unwatched).unwrap().into_iter().map(Result::unwrap).collect()
 }
 
 /// The uncertainty that the answer gives is the root of the squares of what 10 % of force and 10 % of compliance do.

@@ -25,7 +25,7 @@ impl Shifted {
         let treatment = Treatment::Amplitude { prior_sd: PRIOR_SD };
         let variable = Variable { name: "shift", unit: "1", treatment, range };
         let (cause, label) = (&DEFLECTION_CAUSES[0], String::new());
-        let hypothesis = Hypothesis { cause, label, variables: vec![variable], prior_weight: 1.0 };
+        let hypothesis = Hypothesis { cause, label, variables: vec![variable], prior_weight: 1.0, held: None };
         Self { hypotheses: vec![hypothesis], base, level }
     }
 }
@@ -209,7 +209,7 @@ fn classes_of_one_side_are_weighed_without_running_away() {
 fn the_deviance_is_judged_by_draws_of_the_base() {
     for (shift, low, high) in [(0.0, 0.05, 1.0), (0.1, 0.0, 0.001)] {
         let (base, sides) = scan(80, shift);
-        let tests = weighed(&Shifted::new(base, WIDE, 0.005), &data(sides), adequacy);
+        let tests = weighed(&Shifted::new(base, WIDE, 0.005), &data(sides), |of| adequacy(of, &Unwatched).unwrap());
         assert_eq!(tests.len(), 1);
         assert!((low..=high).contains(&tests[0].p), "{shift}: {:?}", tests[0]);
     }

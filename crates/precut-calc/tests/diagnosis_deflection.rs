@@ -7,8 +7,8 @@ use precut_calc::deflection_compensation::{
     DeflectionAllowances, DeflectionCompensation, DeflectionPoint, DeflectionRun, Job,
 };
 use precut_calc::diagnosis::{
-    Bound, CONFOUNDED_BELOW, Data, DiagnosisOptions, Effort, Foundation, Layout, Signature, Subject, Verdict, Weighing,
-    adequacy, gain, remainder_shape, separations, suspected_factor,
+    Bound, CONFOUNDED_BELOW, Data, DiagnosisOptions, Effort, Foundation, Known, Layout, Signature, Subject, Verdict,
+    Weighing, adequacy, gain, remainder_shape, separations, suspected_factor,
 };
 use serde_json::{Value, json};
 
@@ -39,7 +39,7 @@ fn job(sketch: &Value) -> Job {
     }))
 }
 
-fn bound(sketch: &Value) -> (Bound<DeflectionCompensation>, Data) {
+fn bound(sketch: &Value) -> (Bound<'static, DeflectionCompensation>, Data) {
     let base = &sketch["job"];
     let mut number = std::collections::BTreeMap::new();
     let runs: Vec<DeflectionRun> = sketch["runs"]
@@ -90,13 +90,13 @@ fn bound(sketch: &Value) -> (Bound<DeflectionCompensation>, Data) {
     };
     let value = rows.iter().map(|row| row["diameter_deviation_um"].as_f64().unwrap()).collect();
     (
-        Bound::new(prepared, allowances, quantity, &DiagnosisOptions::default()),
+        Bound::new(prepared, Known::default(), allowances, quantity, &DiagnosisOptions::default(), &Unwatched).unwrap(),
         Data { value, uncertainty: None, sides: None, layout },
     )
 }
 
 struct Case {
-    subject: Bound<DeflectionCompensation>,
+    subject: Bound<'static, DeflectionCompensation>,
     data: Data,
 }
 
@@ -108,7 +108,7 @@ impl Case {
 
     fn weighed<T>(&self, look: impl FnOnce(&Foundation<'_>, &Weighing<'_>) -> T) -> T {
         let foundation = Foundation::of(&self.subject, &self.data, &Unwatched).unwrap();
-        let keep = foundation.keep(&foundation.outliers());
+        let keep = foundation.keep(&foundation.outliers(&Unwatched).unwrap());
         let weighing = Weighing::of(&foundation, keep, Effort::full(3), &Unwatched).unwrap();
         look(&foundation, &weighing)
     }
@@ -138,7 +138,7 @@ fn nothing_is_found_where_nothing_is_hidden() {
         assert_eq!(weighing.verdict, Verdict::Adequate);
         assert!(weighing.none > 0.5, "{}", weighing.none);
         // Two of a hundred such tests would say otherwise at this level.
-        for test in adequacy(weighing) {
+        for test in adequacy(weighing, &Unwatched).unwrap() {
             assert!(test.p_holm > 0.01, "{test:?}");
         }
     });
@@ -157,7 +157,7 @@ fn single_causes_are_named_with_their_size() {
             let (found, sd) = (set.settings[0].values[0], set.standard_deviations[0][0]);
             // Three standard deviations hold 99.7 % of the truths.
             assert!((found - truth).abs() < 3.0 * sd, "{cause}: {found} +- {sd}, truth {truth}");
-            assert!(adequacy(weighing).iter().any(|test| test.p_holm < 0.01));
+            assert!(adequacy(weighing, &Unwatched).unwrap().iter().any(|test| test.p_holm < 0.01));
         });
     }
 }
@@ -236,7 +236,7 @@ fn a_spike_is_set_aside_and_the_verdict_stays() {
     let spike = case.data.value.len() / 2;
     case.data.value[spike] += 40.0;
     let foundation = Foundation::of(&case.subject, &case.data, &Unwatched).unwrap();
-    assert_eq!(foundation.outliers().rows, [spike]);
+    assert_eq!(foundation.outliers(&Unwatched).unwrap().rows, [spike]);
     case.weighed(|_, weighing| assert_eq!(case.named(&weighing.verdict), ["headstock_compliance"]));
 }
 

@@ -28,7 +28,7 @@ impl Curves {
         let variable = Variable { name: "size", unit: "1", treatment, range };
         let cause = &DEFLECTION_CAUSES[0];
         let hypothesis =
-            Hypothesis { cause, label: String::new(), variables: vec![variable; sizes], prior_weight: 1.0 };
+            Hypothesis { cause, label: String::new(), variables: vec![variable; sizes], prior_weight: 1.0, held: None };
         let x = (0..40).map(|i| f64::from(i) / 39.0).collect();
         Self { hypotheses: vec![hypothesis], x, shape, together: None }
     }

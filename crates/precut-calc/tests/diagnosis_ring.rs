@@ -129,7 +129,7 @@ fn the_example_names_its_cause_and_predicts_what_was_held_back() {
 #[test]
 fn every_cause_is_a_hypothesis_or_says_why_not() {
     let rigid = prepared(&job(&short()), vec![RingRun::default()], "radial_deviation_um");
-    let found = RingRoundness::hypotheses(&rigid);
+    let found = RingRoundness::hypotheses(&rigid, &[], &Unwatched).unwrap();
     assert_eq!(found.inapplicable, []);
     for cause in RING_CAUSES {
         assert!(found.applicable.iter().any(|h| h.cause.kind == cause.kind), "{}", cause.kind);
@@ -161,14 +161,34 @@ fn every_cause_is_a_hypothesis_or_says_why_not() {
         { "kind": "initial_harmonic", "order": 3, "amplitude_mm": 0.01, "phase_rad": 0.0 },
         { "kind": "work_slip", "slip_deg_per_rev": 0.1 }
     ]);
-    let found = RingRoundness::hypotheses(&prepared(&job(&held), vec![RingRun::default()], "radial_deviation_um"));
+    let found = RingRoundness::hypotheses(
+        &prepared(&job(&held), vec![RingRun::default()], "radial_deviation_um"),
+        &[],
+        &Unwatched,
+    )
+    .unwrap();
     let why = |kind: &str| found.inapplicable.iter().find(|h| h.cause.kind == kind).map(|h| h.reason);
     assert_eq!(why("spark_out_missing"), Some(Inapplicability::NothingToActOn));
     assert_eq!(why("tool_push_off"), Some(Inapplicability::NothingToActOn));
-    assert_eq!(why("work_slip"), Some(Inapplicability::InJob));
-    let orders: Vec<&str> =
-        found.applicable.iter().filter(|h| h.cause.kind == "initial_harmonic").map(|h| h.label.as_str()).collect();
-    assert_eq!(orders, ["order 2", "order 4", "order 5", "order 6"]);
+    // Of kinds that may recur what acts already is there beside the others.
+    let harmonic = |order: u32| RingEffect::InitialHarmonic { order, amplitude_mm: 0.01, phase_rad: 0.0 };
+    let chatter = RingEffect::ChatterHarmonic { amplitude_mm: 0.001, waves_per_revolution: 23 };
+    let prepared = prepared(&job(&held), vec![RingRun::default()], "radial_deviation_um");
+    let acting = [harmonic(3), harmonic(7), chatter];
+    let with = RingRoundness::hypotheses(&prepared, &acting, &Unwatched).unwrap();
+    let orders = |kind: &str| -> Vec<String> {
+        with.applicable.iter().filter(|h| h.cause.kind == kind).map(|h| h.label.clone()).collect()
+    };
+    assert_eq!(orders("initial_harmonic"), ["order 2", "order 3", "order 4", "order 5", "order 6", "order 7"]);
+    assert_eq!(orders("chatter_harmonic"), ["order 23", ""]);
+    // Each is what one of them is about, and no other.
+    for effect in acting {
+        let about = with.applicable.iter().filter_map(|h| Some((h, RingRoundness::values(&prepared, h, &effect)?)));
+        let about: Vec<_> = about.collect();
+        assert_eq!(about.len(), 1, "{effect:?}");
+        let again = RingRoundness::effects(&prepared, about[0].0, &about[0].1).unwrap();
+        assert_eq!(again, [effect]);
+    }
     // Of a stated roller the ratio is known: about 60 mm over 12 mm, less what is cut off.
     let runout = found.applicable.iter().find(|h| h.cause.kind == "roller_runout").unwrap();
     let Treatment::Shape { grid, .. } = &runout.variables[2].treatment else { panic!("{runout:?}") };
@@ -200,11 +220,11 @@ fn a_run_is_a_ring_with_its_own_settings() {
     other["tool"]["spark_out_revolutions"] = json!(2.5);
     other["tool"]["feed_mm_per_rev"] = json!(0.03);
     let effects = [RingEffect::ToolPushOff { push_off_ratio: 0.2 }];
-    let together = RingRoundness::predict(&both, &effects).unwrap();
+    let together = RingRoundness::predict(&both, &effects, &Unwatched).unwrap();
     let mut apart = Vec::new();
     for alone in [short(), other] {
         let ring = prepared(&job(&alone), vec![RingRun::default()], "radial_deviation_um");
-        apart.extend(RingRoundness::predict(&ring, &effects).unwrap());
+        apart.extend(RingRoundness::predict(&ring, &effects, &Unwatched).unwrap());
     }
     assert_eq!(together, apart);
     let wrong = RingRun { tool_y_mm: Some(-80.0), ..RingRun::default() };
@@ -231,7 +251,7 @@ fn next_rings_can_be_turned() {
         let Ok(ring) = RingRoundness::prepare(&job, &rows, "radial_deviation_um", &Unwatched) else {
             panic!("{} is refused", run.changes)
         };
-        let predicted = RingRoundness::predict(&ring, &[]).unwrap();
+        let predicted = RingRoundness::predict(&ring, &[], &Unwatched).unwrap();
         assert!(predicted.iter().all(Result::is_ok), "{}", run.changes);
     }
 }
@@ -241,7 +261,7 @@ fn next_rings_can_be_turned() {
 fn size_and_eccentricity_of_measured_radii_are_no_finding() {
     let base = job(&short());
     let ring = prepared(&base, vec![RingRun::default()], "radius_mm");
-    let radii = RingRoundness::predict(&ring, &[]).unwrap();
+    let radii = RingRoundness::predict(&ring, &[], &Unwatched).unwrap();
     let mut state = 7_u64;
     let rows: Vec<Value> = (0_u32..72)
         .zip(radii)

@@ -46,6 +46,18 @@ fn what_the_catalogue_lacks_is_unknown() {
     assert!(score.unknown.reaches(0.93), "{}", score.unknown);
 }
 
+/// A stored model is quiet where nothing changed, and does not blind where something did: its own causes are named as changed.
+#[test]
+fn a_stored_model_does_not_blind() {
+    let stored = blind_trials::after_a_model_was_stored::<DeflectionCompensation>(
+        trials("deflection-stored", Class::One, 7.5, 6, 40),
+        0.6,
+    );
+    assert!(stored.stored >= 20, "{stored:?}");
+    assert!(stored.quiet.reaches(0.97) && stored.named.reaches(0.9) && stored.covered.reaches(0.92), "{stored:?}");
+    assert_eq!(stored.wrong, 0, "{stored:?}");
+}
+
 /// Without the entry of the hidden cause hardly anything else is named, but what these rows cannot tell from it.
 #[test]
 fn what_is_taken_out_of_the_catalogue_is_not_forced_on_another() {

@@ -62,7 +62,7 @@ fn measured_on(
     let points = at.iter().map(|(run, _, z)| (*run, DeflectionPoint { z_mm: *z })).collect();
     let rows = Rows { runs, points };
     let prepared = DeflectionCompensation::prepare(&base, &rows, "diameter_deviation_um", &Unwatched).unwrap();
-    let predicted = DeflectionCompensation::predict(&prepared, &[]).unwrap();
+    let predicted = DeflectionCompensation::predict(&prepared, &[], &Unwatched).unwrap();
     let mut random = Pcg64::seed_from_u64(seed);
     // The sum of twelve uniform numbers: normal to 4 standard deviations.
     let mut normal = || (0..12).map(|_| random.random_range(0.0..1.0)).sum::<f64>() - 6.0;
@@ -84,7 +84,7 @@ fn a_path_that_leaves_out_an_error_of_the_machine_leaves_it_on_the_shaft() {
     let job = job::<DeflectionCompensation>(value);
     let runs: Vec<DeflectionRun> = serde_json::from_value(headstock()["runs"].clone()).unwrap();
     let judged = |believed: &[DeflectionEffect], acting: DeflectionEffect| {
-        let of = DeflectionCompensation::consequences(&job, "", &runs, believed, &[vec![acting]]).unwrap();
+        let of = DeflectionCompensation::consequences(&job, "", &runs, believed, &[vec![acting]], &Unwatched).unwrap();
         (of[0].values[0].unwrap(), of[1].values[0].unwrap())
     };
     let taper = DeflectionEffect::TailstockOffset { offset_um: 10.0 };
@@ -107,7 +107,7 @@ fn a_depth_chosen_for_too_soft_a_material_chatters_by_the_ratio_of_the_forces() 
     let value: Value = serde_json::from_str(FixtureStability::DIAGNOSES[0].job).unwrap();
     let job = job::<FixtureStability>(value["job"].clone());
     let acting = vec![vec![FixtureEffect::ForceCoefficient { factor: 1.25 }], Vec::new()];
-    let judged = FixtureStability::consequences(&job, "peak_to_peak_um", &[], &[], &acting).unwrap();
+    let judged = FixtureStability::consequences(&job, "peak_to_peak_um", &[], &[], &acting, &Unwatched).unwrap();
     // The limit is where Cp H^(1-mu) reaches a value, and this job has mu = 0; found to 1e-4 of the depth.
     let margin = |k: usize| judged[0].values[k].unwrap();
     assert!((margin(0) + 20.0).abs() < 0.03, "{}", margin(0));
@@ -128,7 +128,8 @@ fn a_schedule_made_with_too_smooth_a_model_oversteps_its_roughness_by_the_shift(
     let shift = MachinabilityEffect::LevelShift { delta_ln: 0.2, output: Some("roughness".to_owned()) };
     let used = |believed: &[MachinabilityEffect]| {
         let acting = [vec![shift.clone()]];
-        FeedSchedule::consequences(&job, "roughness_um", &[], believed, &acting).unwrap()[0].values[0].unwrap()
+        FeedSchedule::consequences(&job, "roughness_um", &[], believed, &acting, &Unwatched).unwrap()[0].values[0]
+            .unwrap()
     };
     // The programme is solved to 1e-8 of its objective; a limit that binds holds to some 1e-6.
     assert!((used(&[]) - 0.2_f64.exp()).abs() < 1e-4, "{}", used(&[]));
@@ -158,8 +159,9 @@ fn what_comes_of_zones_and_passes_that_were_found_is_told_as_of_given_ones() {
     let shift = MachinabilityEffect::LevelShift { delta_ln: 0.2, output: Some("roughness".to_owned()) };
     for value in [found, passes] {
         let job = job::<FeedSchedule>(value);
-        let told =
-            FeedSchedule::consequences(&job, "roughness_um", &[], &[], &[vec![shift.clone()]]).unwrap()[0].values[0];
+        let told = FeedSchedule::consequences(&job, "roughness_um", &[], &[], &[vec![shift.clone()]], &Unwatched)
+            .unwrap()[0]
+            .values[0];
         // The programme is solved to 1e-8 of its objective; a limit that binds holds to some 1e-6.
         assert!((told.unwrap() - 0.2_f64.exp()).abs() < 1e-4, "{told:?}");
     }

@@ -32,7 +32,7 @@ fn predicted(job: Value, quantity: &str) -> f64 {
         serde_json::from_value(json!({ "speed_m_per_min": 35.0, "feed_mm_per_rev": 0.1, "depth_mm": 1.5 })).unwrap();
     let rows = Rows { runs: vec![MachinabilityRun::default()], points: vec![(0, point)] };
     let prepared = FeedSchedule::prepare(&job, &rows, quantity, &Unwatched).unwrap();
-    FeedSchedule::predict(&prepared, &[]).unwrap()[0].unwrap()
+    FeedSchedule::predict(&prepared, &[], &Unwatched).unwrap()[0].unwrap()
 }
 
 /// Every effect of the catalogue as its own formula, written out once more.
@@ -308,7 +308,7 @@ fn scatter(name: &str, effects: &[MachinabilityEffect]) -> f64 {
         .collect();
     let rows_of = Rows { runs: vec![MachinabilityRun::default()], points };
     let prepared = FeedSchedule::prepare(&job, &rows_of, quantity, &Unwatched).unwrap();
-    let predicted = FeedSchedule::predict(&prepared, effects).unwrap();
+    let predicted = FeedSchedule::predict(&prepared, effects, &Unwatched).unwrap();
     let residuals: Vec<f64> =
         rows.iter().zip(predicted).map(|(row, p)| (number(&row["value"]) / p.unwrap()).ln()).collect();
     let n = residuals.len() as f64;

@@ -34,7 +34,7 @@ fn margins(job: &FixtureJob, speed: f64, depths: &[f64], margin: RegimeMargin, e
     let points = depths.iter().map(|&h| (0, FixturePoint { depth_mm: Some(h), margin, ..FixturePoint::default() }));
     let rows = Rows { runs: vec![run], points: points.collect() };
     let Ok(prepared) = FixtureStability::prepare(job, &rows, "regime", &Unwatched) else { panic!("not prepared") };
-    FixtureStability::predict(&prepared, effects).unwrap().into_iter().map(Result::unwrap).collect()
+    FixtureStability::predict(&prepared, effects, &Unwatched).unwrap().into_iter().map(Result::unwrap).collect()
 }
 
 fn limit(job: &FixtureJob, speed: f64) -> f64 {
@@ -42,7 +42,7 @@ fn limit(job: &FixtureJob, speed: f64) -> f64 {
     let rows =
         Rows { runs: vec![run], points: vec![(0, FixturePoint { depth_mm: Some(10.0), ..FixturePoint::default() })] };
     let Ok(prepared) = FixtureStability::prepare(job, &rows, "depth_limit_mm", &Unwatched) else { panic!() };
-    FixtureStability::predict(&prepared, &[]).unwrap()[0].unwrap()
+    FixtureStability::predict(&prepared, &[], &Unwatched).unwrap()[0].unwrap()
 }
 
 fn speeds() -> Vec<f64> {

@@ -110,7 +110,7 @@ fn level_of(request: &Value, hidden: f64) -> f64 {
     };
     let prepared = prepared(&job(), &rows, "peak_to_peak_um");
     let at_truth = [FixtureEffect::Stiffness { factor: hidden }];
-    let predicted = values(&FixtureStability::predict(&prepared, &at_truth).unwrap());
+    let predicted = values(&FixtureStability::predict(&prepared, &at_truth, &Unwatched).unwrap());
     let measured =
         request["measurements"].as_array().unwrap().iter().map(|row| row["peak_to_peak_um"].as_f64().unwrap());
     measured.zip(&predicted).map(|(m, p)| (m / p).ln()).sum::<f64>() / predicted.len() as f64
@@ -166,8 +166,8 @@ fn the_hidden_cause_of_the_open_case_is_told() {
 fn every_cause_is_a_hypothesis_or_says_why_not() {
     let rows = grid(&[300.0, 640.0], &[1.0, 2.0]);
     let prepared = prepared(&job(), &rows, "peak_to_peak_um");
-    let base = values(&FixtureStability::predict(&prepared, &[]).unwrap());
-    let found = FixtureStability::hypotheses(&prepared);
+    let base = values(&FixtureStability::predict(&prepared, &[], &Unwatched).unwrap());
+    let found = FixtureStability::hypotheses(&prepared, &[], &Unwatched).unwrap();
     let why = |kind: &str| found.inapplicable.iter().find(|h| h.cause.kind == kind).map(|h| h.reason);
     assert_eq!(why("jaw_mass"), Some(Inapplicability::NothingToActOn));
     assert_eq!(why("preload_loss"), Some(Inapplicability::NothingToActOn));
@@ -183,8 +183,8 @@ fn every_cause_is_a_hypothesis_or_says_why_not() {
         };
         let effects = |share: f64| FixtureStability::effects(&prepared, hypothesis, &at(share)).unwrap();
         // Of no size it is absent, of some it acts.
-        let absent = values(&FixtureStability::predict(&prepared, &effects(0.0)).unwrap());
-        let acts = values(&FixtureStability::predict(&prepared, &effects(0.3)).unwrap());
+        let absent = values(&FixtureStability::predict(&prepared, &effects(0.0), &Unwatched).unwrap());
+        let acts = values(&FixtureStability::predict(&prepared, &effects(0.3), &Unwatched).unwrap());
         let kind = hypothesis.cause.kind;
         assert!(absent.iter().zip(&base).all(|(a, b)| (a / b - 1.0).abs() < 1e-9), "{kind}");
         assert!(acts.iter().zip(&base).any(|(a, b)| (a / b - 1.0).abs() > 1e-6), "{kind}");
@@ -194,8 +194,12 @@ fn every_cause_is_a_hypothesis_or_says_why_not() {
     let depth = found.applicable.iter().find(|h| h.cause.kind == "depth_exponent").unwrap();
     assert!(depth.variables[0].range.lower.abs() < f64::EPSILON);
 
-    let one_depth =
-        FixtureStability::hypotheses(&self::prepared(&job(), &grid(&[300.0, 640.0], &[1.0]), "peak_to_peak_um"));
+    let one_depth = FixtureStability::hypotheses(
+        &self::prepared(&job(), &grid(&[300.0, 640.0], &[1.0]), "peak_to_peak_um"),
+        &[],
+        &Unwatched,
+    )
+    .unwrap();
     let why = |kind: &str| one_depth.inapplicable.iter().find(|h| h.cause.kind == kind).map(|h| h.reason);
     assert_eq!(why("depth_exponent"), Some(Inapplicability::ConditionConstant("depth_mm")));
 }
@@ -207,8 +211,8 @@ fn coarse_predictions_are_the_predictions_of_stable_points() {
     for effect in [FixtureEffect::Mass { factor: 1.2 }, FixtureEffect::ToothRunout { runout_mm: 0.01 }] {
         let effects = [effect];
         assert_eq!(
-            FixtureStability::predict(&prepared, &effects).unwrap(),
-            FixtureStability::predict_coarsely(&prepared, &effects).unwrap()
+            FixtureStability::predict(&prepared, &effects, &Unwatched).unwrap(),
+            FixtureStability::predict_coarsely(&prepared, &effects, &Unwatched).unwrap()
         );
     }
 }
@@ -235,14 +239,14 @@ fn repeats_share_a_cell_and_a_speed_its_fold() {
 fn allowances_are_in_the_unit_of_the_statistics() {
     let rows = grid(&[300.0, 640.0], &[1.0, 2.0]);
     let amplitudes = prepared(&job(), &rows, "peak_to_peak_um");
-    let columns = FixtureStability::nuisances(&amplitudes, &FixtureAllowances::default()).unwrap();
+    let columns = FixtureStability::nuisances(&amplitudes, &[], &FixtureAllowances::default(), &Unwatched).unwrap();
     assert_eq!(columns, [vec![0.005; 4]]);
     let times = |run: usize| {
         (1..=20).map(move |i| (run, FixturePoint { time_s: Some(1e-3 * f64::from(i)), ..FixturePoint::default() }))
     };
     let histories = Rows { runs: rows.runs, points: times(0).chain(times(1)).collect() };
     let prepared = prepared(&job(), &histories, "displacement_um");
-    let columns = FixtureStability::nuisances(&prepared, &FixtureAllowances::default()).unwrap();
+    let columns = FixtureStability::nuisances(&prepared, &[], &FixtureAllowances::default(), &Unwatched).unwrap();
     assert_eq!(columns.len(), 3);
     // One zero of time for each history.
     assert!(columns[1][20..].iter().chain(&columns[2][..20]).all(|value| *value == 0.0));
@@ -252,7 +256,7 @@ fn allowances_are_in_the_unit_of_the_statistics() {
         let points =
             histories.points.iter().map(|(run, p)| (*run, FixturePoint { time_s: p.time_s.map(|t| t + by), ..*p }));
         let rows = Rows { runs: histories.runs.clone(), points: points.collect() };
-        values(&FixtureStability::predict(&self::prepared(&job(), &rows, "displacement_um"), &[]).unwrap())
+        values(&FixtureStability::predict(&self::prepared(&job(), &rows, "displacement_um"), &[], &Unwatched).unwrap())
     };
     let (before, after) = (later(-2.5e-5), later(2.5e-5));
     let most = columns[1].iter().fold(0.0_f64, |most, v| most.max(v.abs()));
@@ -276,7 +280,8 @@ fn a_softer_vise_shows_in_a_history() {
     });
     let rows = Rows { runs: grid(&speeds, &[]).runs, points: points.collect() };
     let truth = [FixtureEffect::Damping { factor: 0.6 }];
-    let clean = values(&FixtureStability::predict(&prepared(&job(), &rows, "displacement_um"), &truth).unwrap());
+    let clean =
+        values(&FixtureStability::predict(&prepared(&job(), &rows, "displacement_um"), &truth, &Unwatched).unwrap());
     let mut state = 3;
     let measurements: Vec<Value> = rows
         .points
@@ -303,7 +308,8 @@ fn less_damping_shows_in_depth_limits() {
     let speeds = [300.0, 360.0, 430.0, 520.0, 640.0, 700.0];
     let rows = grid(&speeds, &[3.0]);
     let truth = [FixtureEffect::Damping { factor: 0.7 }];
-    let clean = values(&FixtureStability::predict(&prepared(&job(), &rows, "depth_limit_mm"), &truth).unwrap());
+    let clean =
+        values(&FixtureStability::predict(&prepared(&job(), &rows, "depth_limit_mm"), &truth, &Unwatched).unwrap());
     let mut state = 5;
     let mut measurements = Vec::new();
     for repeat in 1..=3 {
@@ -333,7 +339,7 @@ fn next_runs_can_be_cut() {
     for run in next {
         let points = run.points.into_iter().map(|point| (0, point)).collect();
         let rows = Rows { runs: vec![run.run], points };
-        let predicted = FixtureStability::predict(&prepared(&job, &rows, "peak_to_peak_um"), &[]).unwrap();
+        let predicted = FixtureStability::predict(&prepared(&job, &rows, "peak_to_peak_um"), &[], &Unwatched).unwrap();
         assert!(predicted.iter().all(Result::is_ok), "{}", run.changes);
     }
 }

@@ -286,7 +286,7 @@ fn the_forward_model_is_the_calculator() {
     let rows = rows(&[318.31, 400.0], &[1.0, 3.0, 8.0]);
     let prepared = FixtureStability::prepare(&job, &rows, "peak_to_peak_um", &Unwatched).unwrap();
     let effect = FixtureEffect::Stiffness { factor: 0.9 };
-    let predicted = FixtureStability::predict(&prepared, std::slice::from_ref(&effect)).unwrap();
+    let predicted = FixtureStability::predict(&prepared, std::slice::from_ref(&effect), &Unwatched).unwrap();
     for ((run, point), prediction) in rows.points.iter().zip(&predicted) {
         let mut job = reference_job(1);
         job["cut"]["spindle_speed_rpm"] = json!(rows.runs[*run].spindle_speed_rpm);
@@ -300,14 +300,15 @@ fn the_forward_model_is_the_calculator() {
         }
     }
     assert!(predicted[2].is_err() && predicted[1].is_ok());
-    let column = FixtureStability::nuisances(&prepared, &FixtureAllowances::default()).unwrap().remove(0);
+    let column =
+        FixtureStability::nuisances(&prepared, &[], &FixtureAllowances::default(), &Unwatched).unwrap().remove(0);
     // Statistics work on the logarithm of an amplitude: a level moves it by the same everywhere.
     assert!(column.iter().all(|moved| (moved - 0.005).abs() < 1e-12));
     let limits = FixtureStability::prepare(&job, &rows, "depth_limit_mm", &Unwatched).unwrap();
-    let limit = FixtureStability::predict(&limits, &[]).unwrap()[0].unwrap();
+    let limit = FixtureStability::predict(&limits, &[], &Unwatched).unwrap()[0].unwrap();
     assert!((limit / 4.099_269_45 - 1.0).abs() < 1e-6, "{limit}");
     let margins = FixtureStability::prepare(&job, &rows, "regime", &Unwatched).unwrap();
-    let margin = FixtureStability::predict(&margins, &[]).unwrap();
+    let margin = FixtureStability::predict(&margins, &[], &Unwatched).unwrap();
     assert!(margin[1].unwrap() > 0.0 && margin[2].unwrap() < 0.0, "{margin:?}");
     let unknown = FixtureStability::prepare(&job, &rows, "amplitude", &Unwatched);
     assert!(unknown.is_err());
@@ -322,7 +323,7 @@ fn a_displacement_is_that_of_the_run_in_time() {
     };
     let predict = |time_s: f64| {
         let prepared = FixtureStability::prepare(&job, &at(time_s), "displacement_um", &Unwatched).unwrap();
-        FixtureStability::predict(&prepared, &[]).unwrap()[0].unwrap()
+        FixtureStability::predict(&prepared, &[], &Unwatched).unwrap()[0].unwrap()
     };
     assert!(predict(0.0).abs() < 1e-9);
     // Late in the run and long after it: the same periodic motion, a whole number of tooth periods apart.
@@ -371,7 +372,7 @@ fn the_synthetic_example_hides_a_softer_joint() {
     };
     let prepared = FixtureStability::prepare(&job, &rows, "peak_to_peak_um", &Unwatched).unwrap();
     let scatter = |effects: &[FixtureEffect]| {
-        let predicted = FixtureStability::predict(&prepared, effects).unwrap();
+        let predicted = FixtureStability::predict(&prepared, effects, &Unwatched).unwrap();
         let square: f64 = predicted
             .iter()
             .zip(measured)

@@ -26,6 +26,7 @@ mod diagnosis_answers;
 mod diagnosis_claims;
 mod diagnosis_classes;
 mod diagnosis_deflection;
+mod diagnosis_known;
 mod diagnosis_profiles;
 mod diagnosis_refusals;
 mod diagnosis_ring;

@@ -52,7 +52,7 @@ fn the_true_cause_explains_the_trace_of_another_model() {
     let (rows, values) = rows(&case["measurements"]);
     let prepared = RingRoundness::prepare(&job, &rows, "radial_deviation_um", &Unwatched).unwrap();
     let left = |effects: &[RingEffect]| {
-        let predicted = RingRoundness::predict(&prepared, effects).unwrap();
+        let predicted = RingRoundness::predict(&prepared, effects, &Unwatched).unwrap();
         rms(values.iter().zip(&predicted).map(|(y, p)| y - p.unwrap()))
     };
     let truth: Vec<RingEffect> = case["answer"]["effects"]
@@ -80,7 +80,7 @@ fn nuisances_and_jacobian_are_derivatives() {
     let points = (0..36).map(|i| (0, RingPoint { angle_deg: 10.0 * f64::from(i) })).collect();
     let rows = Rows { runs: vec![RingRun::default()], points };
     let prepared = RingRoundness::prepare(&job, &rows, "radial_deviation_um", &Unwatched).unwrap();
-    let columns = RingRoundness::nuisances(&prepared, &RingAllowances::default()).unwrap();
+    let columns = RingRoundness::nuisances(&prepared, &[], &RingAllowances::default(), &Unwatched).unwrap();
     assert_eq!(columns.len(), 5);
     assert!(columns.iter().all(|column| column.len() == 36 && column.iter().all(|v| v.is_finite())));
     // A wave of the blank where nothing has been cut yet comes through as it is: derivative cos(3θ) per mm, in um.
@@ -152,7 +152,7 @@ fn wear_makes_the_ring_larger() {
     };
     let prepared = RingRoundness::prepare(&job, &rows, "radius_mm", &Unwatched).unwrap();
     let mean = |effects: &[RingEffect]| {
-        RingRoundness::predict(&prepared, effects).unwrap().iter().map(|p| p.unwrap()).sum::<f64>() / 360.0
+        RingRoundness::predict(&prepared, effects, &Unwatched).unwrap().iter().map(|p| p.unwrap()).sum::<f64>() / 360.0
     };
     let (base, worn) = (mean(&[]), mean(&[RingEffect::SupportWear { recession_um_per_rev: 1.0 }]));
     // A recedes 96 um along the line to the tip by the end, the ring being cut all round: half of it on the radius, at

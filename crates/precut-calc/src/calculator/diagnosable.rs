@@ -1,11 +1,11 @@
 //! What turns a forward model into one that can be diagnosed.
 
-use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::{
     Calculator, Consequence, Design, Example, Expansions, Failure, ForwardModel, Hypotheses, Hypothesis, MeasuredRow,
-    Prediction, Ranges, Rows,
+    Monitor, Prediction, Ranges, Rows, Treatment, Variable,
 };
 
 /// A calculator whose model can be compared with measurements, cause by cause.
@@ -15,7 +15,7 @@ pub trait Diagnosable:
         Job = <Self as Calculator>::Input,
         Run: Default + PartialEq + std::fmt::Debug + 'static,
         Allowances: PartialEq + std::fmt::Debug + 'static,
-        Effect: Serialize + DeserializeOwned + ToSchema + PartialEq + std::fmt::Debug + 'static,
+        Effect: ToSchema + PartialEq + std::fmt::Debug + 'static,
     >
 {
     /// A measured row: its place, its run, and the value under the name of its quantity.
@@ -29,11 +29,20 @@ pub trait Diagnosable:
     const DIAGNOSES: &'static [Example];
 
     /// The causes that these rows can speak about, in the coordinates in which they are fitted, with bounds
-    /// and references as the job has them.
-    fn hypotheses(prepared: &Self::Prepared) -> Hypotheses;
+    /// and references as the job has them. `held` acts already: of kinds that may recur each of these is there, too.
+    fn hypotheses(
+        prepared: &Self::Prepared,
+        held: &[Self::Effect],
+        monitor: &dyn Monitor,
+    ) -> Result<Hypotheses, Failure>;
 
     /// The effects that a hypothesis stands for at these values of its variables; `None` outside their ranges.
     fn effects(prepared: &Self::Prepared, hypothesis: &Hypothesis, values: &[f64]) -> Option<Vec<Self::Effect>>;
+
+    /// The values of a hypothesis' variables at which it is this effect; `None` where it is about another.
+    fn values(_prepared: &Self::Prepared, hypothesis: &Hypothesis, effect: &Self::Effect) -> Option<Vec<f64>> {
+        values_by_name(hypothesis, effect)
+    }
 
     /// How the rows hang together.
     fn design(prepared: &Self::Prepared) -> Design;
@@ -45,7 +54,11 @@ pub trait Diagnosable:
     }
 
     /// Of a quantity that is a class: where the rows stand and where the limit runs with these effects.
-    fn class_limits(_prepared: &Self::Prepared, _effects: &[Self::Effect]) -> Result<Option<ClassLimits>, Failure> {
+    fn class_limits(
+        _prepared: &Self::Prepared,
+        _effects: &[Self::Effect],
+        _monitor: &dyn Monitor,
+    ) -> Result<Option<ClassLimits>, Failure> {
         Ok(None)
     }
 
@@ -66,6 +79,7 @@ pub trait Diagnosable:
         _runs: &[Self::Run],
         _believed: &[Self::Effect],
         _acting: &[Vec<Self::Effect>],
+        _monitor: &dyn Monitor,
     ) -> Result<Vec<Consequence>, Failure> {
         Ok(Vec::new())
     }
@@ -88,8 +102,12 @@ pub trait Diagnosable:
 
     /// The prediction as divided differences need it: where a prediction is dear, with coarser numerics, whose own error
     /// cancels in a difference.
-    fn predict_coarsely(prepared: &Self::Prepared, effects: &[Self::Effect]) -> Result<Vec<Prediction>, Failure> {
-        Self::predict(prepared, effects)
+    fn predict_coarsely(
+        prepared: &Self::Prepared,
+        effects: &[Self::Effect],
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Prediction>, Failure> {
+        Self::predict(prepared, effects, monitor)
     }
 
     /// Expected time of one prediction of one run, ms: a diagnosis makes some hundreds. 0 where it is next to nothing
@@ -97,6 +115,24 @@ pub trait Diagnosable:
     fn predict_ms(_job: &Self::Job) -> f64 {
         0.0
     }
+}
+
+/// Values of variables that are fields of the effect. Of hypotheses that differ by a label what is stated is what they
+/// are about.
+pub(crate) fn values_by_name(hypothesis: &Hypothesis, effect: &impl Serialize) -> Option<Vec<f64>> {
+    let fields = serde_json::to_value(effect).ok()?;
+    if fields.get("kind")?.as_str()? != hypothesis.cause.kind {
+        return None;
+    }
+    let field = |variable: &Variable| {
+        let value = fields.get(variable.name)?.as_f64()?;
+        let is_another = match variable.treatment {
+            Treatment::Stated { value: of } => !hypothesis.label.is_empty() && (value - of).abs() > 1e-9 * of.abs(),
+            _ => false,
+        };
+        (!is_another).then_some(value)
+    };
+    hypothesis.variables.iter().map(field).collect()
 }
 
 /// A run that could be measured next.

@@ -1,6 +1,6 @@
 //! What a diagnosis needs of a calculator: the model as a function of its effects.
 
-use super::{Cost, Failure, Finding, Monitor};
+use super::{Cost, Failure, Finding, Monitor, Unwatched};
 use crate::effects::{Cause, Parameter};
 use serde::{Serialize, de::DeserializeOwned};
 use utoipa::ToSchema;
@@ -15,7 +15,7 @@ pub trait ForwardModel {
     /// Where on the part (or when) a value was measured.
     type Point: DeserializeOwned + Serialize + ToSchema + Clone + Send + Sync;
     /// The named effects that the model takes.
-    type Effect: Clone + Send + Sync;
+    type Effect: Serialize + DeserializeOwned + Clone + Send + Sync;
     /// How wrong the base may be without that being a finding: standard deviations.
     type Allowances: DeserializeOwned + Serialize + ToSchema + Default + Clone + Send + Sync;
     /// What no effect's parameter changes.
@@ -39,6 +39,12 @@ pub trait ForwardModel {
         Vec::new()
     }
 
+    /// The effects that a job holds.
+    fn own_effects(job: &Self::Job) -> &[Self::Effect];
+
+    /// A job without them.
+    fn without_effects(job: &Self::Job) -> Self::Job;
+
     /// Everything that no effect parameter changes, once per diagnosis. Faults of the rows are all given at once.
     fn prepare(
         job: &Self::Job,
@@ -47,8 +53,13 @@ pub trait ForwardModel {
         monitor: &dyn Monitor,
     ) -> Result<Self::Prepared, PrepareError>;
 
-    /// One value per row, in the row's unit and order. Deterministic, callable from any thread.
-    fn predict(prepared: &Self::Prepared, effects: &[Self::Effect]) -> Result<Vec<Prediction>, Failure>;
+    /// One value per row, in the row's unit and order, with these effects beside those of the job. Deterministic, callable
+    /// from any thread.
+    fn predict(
+        prepared: &Self::Prepared,
+        effects: &[Self::Effect],
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Prediction>, Failure>;
 
     /// The effect of a cause with its parameters set to `values`, in the order of [`Cause::parameters`].
     fn effect(cause: &Cause, values: &[f64]) -> Option<Self::Effect>;
@@ -62,8 +73,13 @@ pub trait ForwardModel {
         divided_differences::<Self>(prepared, effects, of)
     }
 
-    /// d predict / d allowance: how the prediction moves when the base is wrong by one standard deviation.
-    fn nuisances(prepared: &Self::Prepared, allowances: &Self::Allowances) -> Result<Vec<Column>, Failure>;
+    /// d predict / d allowance: how the prediction with these effects moves when it is wrong by one standard deviation.
+    fn nuisances(
+        prepared: &Self::Prepared,
+        effects: &[Self::Effect],
+        allowances: &Self::Allowances,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Column>, Failure>;
 
     /// Cost of one `predict`.
     fn predict_cost(prepared: &Self::Prepared) -> Cost;
@@ -127,7 +143,7 @@ pub(crate) fn divided_differences<M: ForwardModel + ?Sized>(
     let predict = |values: &[(&'static Cause, Vec<f64>)]| -> Result<Vec<Prediction>, Failure> {
         let built: Option<Vec<M::Effect>> = values.iter().map(|(cause, v)| M::effect(cause, v)).collect();
         let built = built.ok_or_else(|| Failure::Internal("an effect that the model does not know".to_owned()))?;
-        M::predict(prepared, &built)
+        M::predict(prepared, &built, &Unwatched)
     };
     of.iter()
         .map(|&(effect, parameter)| {

@@ -31,7 +31,7 @@ pub enum Inapplicability {
     ConditionAtTwoLevels(&'static str),
     /// The job has nothing that it could act on (no steady rest, no tailstock).
     NothingToActOn,
-    /// The job holds it already.
+    /// The job holds it already, and nothing of it can change.
     InJob,
     /// The user asked for other causes.
     NotAskedFor,
@@ -50,9 +50,54 @@ pub struct Hypothesis {
     pub variables: Vec<Variable>,
     /// Prior weight relative to the other causes.
     pub prior_weight: f64,
+    /// The effect of the base that it is a change of; none where the base has no such effect.
+    pub held: Option<Held>,
+}
+
+/// An effect that the base holds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Held {
+    /// Which of the effects of the base.
+    pub effect: usize,
+    /// Values of the hypothesis' variables at which it is that effect.
+    pub values: Vec<f64>,
 }
 
 impl Hypothesis {
+    /// The same as a change of an effect that the base holds: its sizes count from there, its shapes stay as they are. Of an
+    /// effect without a size its shapes change. `None` where nothing of it can.
+    pub fn change_of(mut self, held: Held) -> Option<Self> {
+        let has_sizes = self.has_amplitude();
+        for (variable, &from) in self.variables.iter_mut().zip(&held.values) {
+            let prior_sd = match &variable.treatment {
+                Treatment::Amplitude { prior_sd } => Some(*prior_sd),
+                Treatment::Shape { prior: Some(prior), .. } if !has_sizes => {
+                    Some(if prior.logarithmic { prior.sd * from.abs() } else { prior.sd })
+                }
+                _ => None,
+            };
+            let Range { lower, upper } = variable.range;
+            match prior_sd {
+                Some(prior_sd) => {
+                    variable.treatment = Treatment::Amplitude { prior_sd };
+                    // No change is always within.
+                    variable.range = Range { lower: (lower - from).min(0.0), upper: (upper - from).max(0.0) };
+                }
+                None => variable.treatment = Treatment::Stated { value: from },
+            }
+        }
+        self.held = Some(held);
+        self.has_amplitude().then_some(self)
+    }
+
+    /// Where the sizes of a variable count from: 0, or what the base holds.
+    pub fn counted_from(&self, variable: usize) -> f64 {
+        match (&self.held, &self.variables[variable].treatment) {
+            (Some(held), Treatment::Amplitude { .. }) => held.values[variable],
+            _ => 0.0,
+        }
+    }
+
     /// Whether it has a size of its own, rather than being there or not.
     pub fn has_amplitude(&self) -> bool {
         self.amplitudes().next().is_some()

@@ -20,12 +20,13 @@ mod table;
 pub use conflict::{Conflict, ConstraintName, ElasticScope, Infeasible, Relaxation};
 pub use consequence::{Allowed, Consequence};
 pub use design::{Condition, Design, Grouping, Smooth};
+pub(crate) use diagnosable::values_by_name;
 pub use diagnosable::{ClassLimits, Diagnosable, LimitCurve, Measurement, NextRun, Reading};
 pub use figure::{Axis, Figure, Frame, Glyph, Item, Panel, Role, Spacing};
 pub use finding::{Finding, Message, Value, Values, Violations};
 pub use forward::{Column as JacobianColumn, ForwardModel, Missing, Prediction, PrepareError, Quantity, Rows};
 pub use hypothesis::{
-    Expansions, Hypotheses, Hypothesis, Inapplicability, Inapplicable, Range, Shape, Treatment, Variable,
+    Expansions, Held, Hypotheses, Hypothesis, Inapplicability, Inapplicable, Range, Shape, Treatment, Variable,
 };
 pub use measured::{Measured, MeasuredRow};
 pub use program::{Block, Dialect, Program, ProgramEnd};
@@ -91,6 +92,16 @@ pub struct Unwatched;
 impl Monitor for Unwatched {
     fn cancelled(&self) -> bool {
         false
+    }
+    fn progress(&self, _fraction: f64, _stage: Message) {}
+}
+
+/// A monitor that hears of no progress: for a calculation inside another one.
+pub struct Quiet<'m>(pub &'m dyn Monitor);
+
+impl Monitor for Quiet<'_> {
+    fn cancelled(&self) -> bool {
+        self.0.cancelled()
     }
     fn progress(&self, _fraction: f64, _stage: Message) {}
 }

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::calculator::{Allowed, Calculator, Consequence, Failure, ForwardModel, Rows, Unwatched};
+use crate::calculator::{Allowed, Calculator, Consequence, Failure, ForwardModel, Monitor, Quiet, Rows};
 use crate::effects::DeflectionEffect;
 
 use super::DeflectionCompensation;
@@ -23,9 +23,10 @@ pub(super) fn consequences(
     runs: &[DeflectionRun],
     believed: &[DeflectionEffect],
     acting: &[Vec<DeflectionEffect>],
+    monitor: &dyn Monitor,
 ) -> Result<Vec<Consequence>, Failure> {
     let conditions = runs.first().cloned().unwrap_or_default();
-    let Some(path) = compensated(job, &conditions, believed)? else { return Ok(Vec::new()) };
+    let Some(path) = compensated(job, &conditions, believed, monitor)? else { return Ok(Vec::new()) };
     let points = looked_at(&path).into_iter().map(|z_mm| (0, DeflectionPoint { z_mm })).collect();
     let run = DeflectionRun {
         tool_path_at_start_m: conditions.tool_path_at_start_m,
@@ -34,13 +35,13 @@ pub(super) fn consequences(
         ..DeflectionRun::default()
     };
     let rows = Rows { runs: vec![run], points };
-    let Ok(prepared) = DeflectionCompensation::prepare(job, &rows, "diameter_deviation_um", &Unwatched) else {
+    let Ok(prepared) = DeflectionCompensation::prepare(job, &rows, "diameter_deviation_um", monitor) else {
         return Ok(Vec::new());
     };
     let turned: Vec<Option<(f64, f64)>> = acting
         .par_iter()
         .map(|effects| {
-            let deviations = DeflectionCompensation::predict(&prepared, effects)?;
+            let deviations = DeflectionCompensation::predict(&prepared, effects, monitor)?;
             let deviations: Option<Vec<f64>> = deviations.into_iter().map(Result::ok).collect();
             Ok(deviations.and_then(|d| d.into_iter().map(|d| (d, d)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))))
         })
@@ -64,6 +65,7 @@ fn compensated(
     job: &Job,
     conditions: &DeflectionRun,
     believed: &[DeflectionEffect],
+    monitor: &dyn Monitor,
 ) -> Result<Option<Vec<CommandedPoint>>, Failure> {
     let mut job = job.clone();
     job.passes.clear();
@@ -73,7 +75,7 @@ fn compensated(
     job.effects.extend_from_slice(believed);
     job.conditions.tool_path_at_start_m = job.conditions.tool_path_at_start_m.or(conditions.tool_path_at_start_m);
     job.conditions.warm_time_at_start_min = job.conditions.warm_time_at_start_min.or(conditions.warm_time_at_start_min);
-    let path = match DeflectionCompensation::run(&job, &Unwatched) {
+    let path = match DeflectionCompensation::run(&job, &Quiet(monitor)) {
         Ok(answer) => answer.output.path,
         Err(Failure::OutOfModel(_)) => return Ok(None),
         Err(failure) => return Err(failure),

@@ -6,6 +6,7 @@ use utoipa::ToSchema;
 use crate::calculator::{
     Consequence, Cost, Design, Diagnosable, Example, Failure, Finding, ForwardModel, Hypotheses, Hypothesis,
     JacobianColumn, Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows, checkpoint,
+    values_by_name,
 };
 use crate::effects::{Cause, DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect};
 use crate::num::beam::Profile;
@@ -222,6 +223,14 @@ impl ForwardModel for DeflectionCompensation {
         faults
     }
 
+    fn own_effects(job: &Job) -> &[DeflectionEffect] {
+        &job.effects
+    }
+
+    fn without_effects(job: &Job) -> Job {
+        Job { effects: Vec::new(), ..job.clone() }
+    }
+
     fn prepare(
         job: &Job,
         rows: &Rows<DeflectionRun, DeflectionPoint>,
@@ -254,8 +263,12 @@ impl ForwardModel for DeflectionCompensation {
         })
     }
 
-    fn predict(prepared: &PreparedDeflection, effects: &[DeflectionEffect]) -> Result<Vec<Prediction>, Failure> {
-        predict(&prepared.runs, prepared.rows, prepared.measure, effects)
+    fn predict(
+        prepared: &PreparedDeflection,
+        effects: &[DeflectionEffect],
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Prediction>, Failure> {
+        predict(&prepared.runs, prepared.rows, prepared.measure, effects, monitor)
     }
 
     fn effect(cause: &Cause, values: &[f64]) -> Option<DeflectionEffect> {
@@ -264,11 +277,14 @@ impl ForwardModel for DeflectionCompensation {
 
     fn nuisances(
         prepared: &PreparedDeflection,
+        effects: &[DeflectionEffect],
         allowances: &DeflectionAllowances,
+        monitor: &dyn Monitor,
     ) -> Result<Vec<JacobianColumn>, Failure> {
-        let by_force = prepared.slope(|delta| DeflectionEffect::ForceLevel { delta })?;
-        let by_bending = prepared.slope(|delta| DeflectionEffect::BendingScale { delta })?;
-        let along = prepared.slope_along()?;
+        let about = About { prepared, effects, monitor };
+        let by_force = about.slope(|delta| DeflectionEffect::ForceLevel { delta })?;
+        let by_bending = about.slope(|delta| DeflectionEffect::BendingScale { delta })?;
+        let along = about.slope_along()?;
         let scaled = |column: &[f64], by: f64| -> Vec<f64> { column.iter().map(|x| x * by).collect() };
         let mut columns = Vec::new();
         for run in &prepared.runs {
@@ -286,7 +302,7 @@ impl ForwardModel for DeflectionCompensation {
         }
         columns.push(scaled(&by_force, allowances.force_level_rel));
         columns.push(scaled(&by_bending, allowances.bending_rel));
-        columns.extend(prepared.neglected_shear()?);
+        columns.extend(about.neglected_shear()?);
         Ok(columns)
     }
 
@@ -323,8 +339,12 @@ impl Diagnosable for DeflectionCompensation {
         ]
     }
 
-    fn hypotheses(prepared: &PreparedDeflection) -> Hypotheses {
-        Experiment { job: &prepared.job, runs: &prepared.conditions_of_runs }.hypotheses()
+    fn hypotheses(
+        prepared: &PreparedDeflection,
+        _held: &[DeflectionEffect],
+        _monitor: &dyn Monitor,
+    ) -> Result<Hypotheses, Failure> {
+        Ok(Experiment { job: &prepared.job, runs: &prepared.conditions_of_runs }.hypotheses())
     }
 
     fn effects(
@@ -342,6 +362,16 @@ impl Diagnosable for DeflectionCompensation {
         Some(vec![effect])
     }
 
+    fn values(prepared: &PreparedDeflection, hypothesis: &Hypothesis, effect: &DeflectionEffect) -> Option<Vec<f64>> {
+        match effect {
+            DeflectionEffect::ChuckRotationalStiffness { ktheta_n_mm_per_rad: k } => {
+                let is_it = hypothesis.cause.kind == effect.kind();
+                is_it.then(|| vec![k / (k + chuck_scale_n_mm_per_rad(&prepared.job))])
+            }
+            _ => values_by_name(hypothesis, effect),
+        }
+    }
+
     fn design(prepared: &PreparedDeflection) -> Design {
         design(&prepared.job, &prepared.places)
     }
@@ -352,8 +382,9 @@ impl Diagnosable for DeflectionCompensation {
         runs: &[DeflectionRun],
         believed: &[DeflectionEffect],
         acting: &[Vec<DeflectionEffect>],
+        monitor: &dyn Monitor,
     ) -> Result<Vec<Consequence>, Failure> {
-        consequences(job, runs, believed, acting)
+        consequences(job, runs, believed, acting, monitor)
     }
 
     fn next_runs(
@@ -519,9 +550,11 @@ fn predict(
     rows: usize,
     measure: Measure,
     effects: &[DeflectionEffect],
+    monitor: &dyn Monitor,
 ) -> Result<Vec<Prediction>, Failure> {
     let mut out = vec![Err(Missing::NoSolution); rows];
     for run in runs {
+        checkpoint(monitor)?;
         run.predict(effects, measure, &mut out)?;
     }
     Ok(out)
@@ -540,31 +573,45 @@ fn prepared_runs(job: &Job, runs: &[DeflectionRun], places: &[(usize, f64)]) -> 
     Ok(prepared)
 }
 
-impl PreparedDeflection {
+/// The prediction with effects, and what changes it a little.
+struct About<'a> {
+    prepared: &'a PreparedDeflection,
+    effects: &'a [DeflectionEffect],
+    monitor: &'a dyn Monitor,
+}
+
+impl About<'_> {
+    fn predicted(&self, runs: &[PreparedRun], effects: &[DeflectionEffect]) -> Result<Vec<Prediction>, Failure> {
+        predict(runs, self.prepared.rows, self.prepared.measure, effects, self.monitor)
+    }
+
     /// What a base that bends without shear leaves out: known, so it is allowed for rather than found.
     /// `None` where the base has it.
     fn neglected_shear(&self) -> Result<Option<JacobianColumn>, Failure> {
-        if self.job.shaft.theory() == Theory::Timoshenko {
+        let PreparedDeflection { job, runs, conditions_of_runs, places, .. } = self.prepared;
+        if job.shaft.theory() == Theory::Timoshenko {
             return Ok(None);
         }
-        let mut with_shear = self.job.clone();
+        let mut with_shear = job.clone();
         with_shear.shaft.theory = Some(Theory::Timoshenko);
-        let runs = prepared_runs(&with_shear, &self.conditions_of_runs, &self.places)?;
-        let without = DeflectionCompensation::predict(self, &[])?;
-        Ok(Some(difference(&without, &predict(&runs, self.rows, self.measure, &[])?, 1.0)))
+        let with = prepared_runs(&with_shear, conditions_of_runs, places)?;
+        let without = self.predicted(runs, self.effects)?;
+        Ok(Some(difference(&without, &self.predicted(&with, self.effects)?, 1.0)))
     }
 
     /// Central difference of the prediction by a relative effect about 0, one entry per row.
     fn slope(&self, effect: impl Fn(f64) -> DeflectionEffect) -> Result<Vec<f64>, Failure> {
-        let at = |delta: f64| DeflectionCompensation::predict(self, &[effect(delta)]);
+        let at = |delta: f64| {
+            self.predicted(&self.prepared.runs, &[self.effects, std::slice::from_ref(&effect(delta))].concat())
+        };
         Ok(difference(&at(-RELATIVE_STEP)?, &at(RELATIVE_STEP)?, 2.0 * RELATIVE_STEP))
     }
 
     /// Central difference of the prediction along the shaft.
     fn slope_along(&self) -> Result<Vec<f64>, Failure> {
         let at = |dz_mm: f64| -> Result<Vec<Prediction>, Failure> {
-            let runs = self.runs.iter().map(|run| run.shifted(dz_mm)).collect::<Result<Vec<_>, _>>()?;
-            predict(&runs, self.rows, self.measure, &[])
+            let runs = self.prepared.runs.iter().map(|run| run.shifted(dz_mm)).collect::<Result<Vec<_>, _>>()?;
+            self.predicted(&runs, self.effects)
         };
         Ok(difference(&at(-GAUGE_STEP_MM)?, &at(GAUGE_STEP_MM)?, 2.0 * GAUGE_STEP_MM))
     }

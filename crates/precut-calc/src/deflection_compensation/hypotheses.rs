@@ -33,9 +33,6 @@ impl Experiment<'_> {
         if !cause.moves_mean {
             return Some(Inapplicability::ScatterOnly);
         }
-        if self.job.effects.iter().any(|effect| effect.kind() == cause.kind) {
-            return Some(Inapplicability::InJob);
-        }
         if let Some(absent) = cause.conditions.iter().find(|field| !self.is_given(field)) {
             return Some(Inapplicability::ConditionAbsent(absent));
         }
@@ -104,7 +101,13 @@ impl Experiment<'_> {
     }
 
     fn hypotheses_of(&self, cause: &'static Cause) -> Vec<Hypothesis> {
-        let of = |label: String, variables: Vec<Variable>| Hypothesis { cause, label, variables, prior_weight: 1.0 };
+        let of = |label: String, variables: Vec<Variable>| Hypothesis {
+            cause,
+            label,
+            variables,
+            prior_weight: 1.0,
+            held: None,
+        };
         match cause.kind {
             "steady_rest_offset" => {
                 let stations = self.job.supports.iter().filter_map(|support| match support {

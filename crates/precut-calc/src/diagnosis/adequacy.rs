@@ -10,7 +10,7 @@ use super::link;
 use super::noise::pure_error;
 use super::sparse::Sparse;
 use super::weigh::Weighing;
-use crate::calculator::Smooth;
+use crate::calculator::{Failure, Monitor, Smooth, checkpoint};
 
 /// A test with its statistic and p-value.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,9 +73,9 @@ impl TestKind {
 }
 
 /// All tests that these rows allow.
-pub fn adequacy(weighing: &Weighing<'_>) -> Vec<Test> {
+pub fn adequacy(weighing: &Weighing<'_>, monitor: &dyn Monitor) -> Result<Vec<Test>, Failure> {
     if let Some(sides) = &weighing.foundation.data.sides {
-        return deviance(weighing, sides).into_iter().collect();
+        return Ok(deviance(weighing, sides, monitor)?.into_iter().collect());
     }
     let mut tests: Vec<Test> =
         [lack_of_fit(weighing), smooth_directions(weighing), ljung_box(weighing), runs(weighing), held_out(weighing)]
@@ -83,7 +83,7 @@ pub fn adequacy(weighing: &Weighing<'_>) -> Vec<Test> {
             .flatten()
             .collect();
     holm(&mut tests);
-    tests
+    Ok(tests)
 }
 
 /// Holm's step-down correction: p_(i) times the number of tests not yet rejected, never falling.
@@ -107,7 +107,7 @@ const DRAWS: usize = 2000;
 
 /// D = -2 sum of ln F(s m/sigma) of the base's margins. Its distribution is no chi-squared one for single classes, so it is
 /// drawn: allowances from their prior, classes from the margins under them.
-fn deviance(weighing: &Weighing<'_>, sides: &[f64]) -> Option<Test> {
+fn deviance(weighing: &Weighing<'_>, sides: &[f64], monitor: &dyn Monitor) -> Result<Option<Test>, Failure> {
     let foundation = weighing.foundation;
     let rows: Vec<usize> = (0..weighing.keep.len()).filter(|&row| weighing.keep[row]).collect();
     let of = |side: f64, row: usize| -2.0 * link::log_probability(side * foundation.base[row] / weighing.scatter(row));
@@ -117,6 +117,7 @@ fn deviance(weighing: &Weighing<'_>, sides: &[f64]) -> Option<Test> {
     let mut larger = 0.0;
     let nuisances: Vec<Vec<f64>> = foundation.nuisances.iter().map(Sparse::dense).collect();
     for _ in 0..DRAWS {
+        checkpoint(monitor)?;
         let sizes: Vec<f64> =
             nuisances.iter().map(|_| normal.inverse_cdf(random.random::<f64>().clamp(1e-12, 1.0 - 1e-12))).collect();
         let drawn: f64 = rows
@@ -130,7 +131,7 @@ fn deviance(weighing: &Weighing<'_>, sides: &[f64]) -> Option<Test> {
         larger += f64::from(u8::from(drawn >= found));
     }
     // Counted with the rows themselves, so that it is never 0.
-    test(TestKind::Deviance, found, (rows.len() as f64, None), (larger + 1.0) / (DRAWS as f64 + 1.0))
+    Ok(test(TestKind::Deviance, found, (rows.len() as f64, None), (larger + 1.0) / (DRAWS as f64 + 1.0)))
 }
 
 /// F = [SS_lof/c] / [SS_pe/(n - c)], c distinct conditions; the base has no fitted parameter. Of rows

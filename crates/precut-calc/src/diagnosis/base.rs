@@ -5,10 +5,11 @@ use std::sync::OnceLock;
 use rayon::prelude::*;
 
 use super::input::{DiagnosisOptions, PriorWeight};
+use super::known::Known;
 use super::subject::{Setting, Subject};
 use crate::calculator::{
-    Diagnosable, Expansions, Failure, Hypotheses, Hypothesis, Inapplicability, Inapplicable, JacobianColumn, Missing,
-    Prediction, Treatment, Variable,
+    Diagnosable, Expansions, Failure, Held, Hypotheses, Hypothesis, Inapplicability, Inapplicable, JacobianColumn,
+    Missing, Monitor, Prediction, Treatment, Variable,
 };
 
 /// From this time of one prediction on, ms, divided differences are one-sided and fewer sets are refined.
@@ -22,22 +23,31 @@ const DEAR_MS: f64 = 5.0;
 const STEP: f64 = 1e-3;
 
 /// A forward model with its rows and allowances.
-pub struct Bound<M: Diagnosable> {
+pub struct Bound<'a, M: Diagnosable> {
     prepared: M::Prepared,
+    known: Known<M::Effect>,
     allowances: M::Allowances,
     hypotheses: Hypotheses,
     logarithmic: bool,
     dear: bool,
     /// The base with the numerics of divided differences.
     coarse_base: OnceLock<Vec<Prediction>>,
+    monitor: &'a dyn Monitor,
 }
 
-impl<M: Diagnosable> Bound<M> {
-    /// `quantity` decides whether residuals are taken of the value or of its logarithm.
-    /// `options` leave out kinds of causes that are not asked for, and weigh those that are.
-    pub fn new(prepared: M::Prepared, allowances: M::Allowances, quantity: &str, options: &DiagnosisOptions) -> Self {
+impl<'a, M: Diagnosable> Bound<'a, M> {
+    /// `prepared` is of a job without effects; those of `known` act beside it. `quantity` decides whether residuals are taken
+    /// of the value or of its logarithm. `options` leave out kinds of causes that are not asked for, and weigh those that are.
+    pub fn new(
+        prepared: M::Prepared,
+        known: Known<M::Effect>,
+        allowances: M::Allowances,
+        quantity: &str,
+        options: &DiagnosisOptions,
+        monitor: &'a dyn Monitor,
+    ) -> Result<Self, Failure> {
         let logarithmic = M::QUANTITIES.iter().any(|known| known.name == quantity && known.logarithmic);
-        let mut hypotheses = M::hypotheses(&prepared);
+        let mut hypotheses = about_known::<M>(&prepared, &known.effects, monitor)?;
         if let Some(asked_for) = &options.causes {
             let (kept, left): (Vec<Hypothesis>, Vec<Hypothesis>) =
                 hypotheses.applicable.into_iter().partition(|h| asked_for.iter().any(|kind| kind == h.cause.kind));
@@ -47,7 +57,8 @@ impl<M: Diagnosable> Bound<M> {
         }
         weigh(&mut hypotheses.applicable, &options.prior_weights);
         let dear = M::predict_cost(&prepared).ms > DEAR_MS;
-        Self { prepared, allowances, hypotheses, logarithmic, dear, coarse_base: OnceLock::new() }
+        let coarse_base = OnceLock::new();
+        Ok(Self { prepared, known, allowances, hypotheses, logarithmic, dear, coarse_base, monitor })
     }
 
     /// The forward model's own view of the rows.
@@ -65,25 +76,53 @@ impl<M: Diagnosable> Bound<M> {
         &self.hypotheses
     }
 
-    /// The effects that settings stand for.
+    /// The effects that settings stand for: what joins the base, and what stands in place of an effect of the base.
     pub(super) fn effects_of(&self, settings: &[Setting]) -> Result<Vec<M::Effect>, Failure> {
         let mut effects = Vec::with_capacity(settings.len());
         for setting in settings {
-            let hypothesis = &self.hypotheses.applicable[setting.hypothesis];
-            effects.extend(M::effects(&self.prepared, hypothesis, &setting.values).ok_or_else(|| {
-                Failure::Internal(format!("{} takes no {:?}", hypothesis.cause.kind, setting.values))
-            })?);
+            effects.extend(self.effects_at(setting)?);
         }
         Ok(effects)
     }
 
-    /// The base with these effects, in the unit in which residuals are taken.
+    fn effects_at(&self, setting: &Setting) -> Result<Vec<M::Effect>, Failure> {
+        let hypothesis = &self.hypotheses.applicable[setting.hypothesis];
+        let values: Vec<f64> =
+            setting.values.iter().enumerate().map(|(k, value)| value + hypothesis.counted_from(k)).collect();
+        M::effects(&self.prepared, hypothesis, &values)
+            .ok_or_else(|| Failure::Internal(format!("{} takes no {values:?}", hypothesis.cause.kind)))
+    }
+
+    /// All that acts with these settings: the effects of the base, as far as they have not changed, and what they stand for.
+    pub(super) fn acting(&self, settings: &[Setting]) -> Result<Vec<M::Effect>, Failure> {
+        let changed = |effect: usize| {
+            let is_of = |setting: &&Setting| {
+                self.hypotheses.applicable[setting.hypothesis].held.as_ref().is_some_and(|held| held.effect == effect)
+            };
+            settings.iter().any(|setting| is_of(&setting))
+        };
+        let own = self.known.effects.iter().enumerate();
+        let mut acting: Vec<M::Effect> =
+            own.filter(|(index, _)| !changed(*index)).map(|(_, effect)| effect.clone()).collect();
+        acting.extend(self.effects_of(settings)?);
+        Ok(acting)
+    }
+
+    /// The base with these effects beside its own, in the unit in which residuals are taken.
     pub(super) fn with_effects(&self, effects: &[M::Effect]) -> Result<Vec<Prediction>, Failure> {
-        Ok(self.in_unit(M::predict(&self.prepared, effects)?))
+        self.predicted(&[&self.known.effects, effects].concat())
+    }
+
+    fn predicted(&self, acting: &[M::Effect]) -> Result<Vec<Prediction>, Failure> {
+        Ok(self.in_unit(M::predict(&self.prepared, acting, self.monitor)?))
+    }
+
+    fn predicted_coarsely(&self, acting: &[M::Effect]) -> Result<Vec<Prediction>, Failure> {
+        Ok(self.in_unit(M::predict_coarsely(&self.prepared, acting, self.monitor)?))
     }
 
     fn coarsely(&self, settings: &[Setting]) -> Result<Vec<Prediction>, Failure> {
-        Ok(self.in_unit(M::predict_coarsely(&self.prepared, &self.effects_of(settings)?)?))
+        self.predicted_coarsely(&self.acting(settings)?)
     }
 
     /// Residuals are taken of the logarithm where the quantity is logarithmic.
@@ -153,6 +192,31 @@ impl<M: Diagnosable> Bound<M> {
     }
 }
 
+/// The causes that rows can speak about; those that the base has already as changes of what it has.
+fn about_known<M: Diagnosable>(
+    prepared: &M::Prepared,
+    known: &[M::Effect],
+    monitor: &dyn Monitor,
+) -> Result<Hypotheses, Failure> {
+    let Hypotheses { applicable, mut inapplicable } = M::hypotheses(prepared, known, monitor)?;
+    let mut sorted = Vec::with_capacity(applicable.len());
+    for hypothesis in applicable {
+        let held = known
+            .iter()
+            .enumerate()
+            .find_map(|(effect, own)| Some(Held { effect, values: M::values(prepared, &hypothesis, own)? }));
+        let cause = hypothesis.cause;
+        match held {
+            None => sorted.push(hypothesis),
+            Some(held) => match hypothesis.change_of(held) {
+                Some(change) => sorted.push(change),
+                None => inapplicable.push(Inapplicable { cause, reason: Inapplicability::InJob }),
+            },
+        }
+    }
+    Ok(Hypotheses { applicable: sorted, inapplicable })
+}
+
 /// Prior weights as stated, together as many as there are hypotheses: a set of causes stays as likely as before.
 fn weigh(hypotheses: &mut [Hypothesis], stated: &[PriorWeight]) {
     let weight = |kind: &str| stated.iter().find(|of| of.kind == kind).map_or(1.0, |of| of.weight);
@@ -172,7 +236,7 @@ fn width(variable: &Variable, value: f64) -> f64 {
     }
 }
 
-impl<M: Diagnosable> Subject for Bound<M>
+impl<M: Diagnosable> Subject for Bound<'_, M>
 where
     M::Allowances: Sync,
 {
@@ -181,15 +245,25 @@ where
     }
 
     fn predict(&self, settings: &[Setting]) -> Result<Vec<Prediction>, Failure> {
-        self.with_effects(&self.effects_of(settings)?)
+        self.predicted(&self.acting(settings)?)
     }
 
     fn predict_coarsely(&self, settings: &[Setting]) -> Result<Vec<Prediction>, Failure> {
         self.centre(settings)
     }
 
+    /// Of a change: as far from what the base holds as else from nothing.
     fn expansions(&self, hypothesis: usize) -> Expansions {
-        M::expansions(&self.prepared, &self.hypotheses.applicable[hypothesis])
+        let hypothesis = &self.hypotheses.applicable[hypothesis];
+        let mut expansions = M::expansions(&self.prepared, hypothesis);
+        if hypothesis.held.is_some() {
+            let within = |place: &Vec<f64>| {
+                let sizes = hypothesis.amplitudes().map(|(variable, _)| hypothesis.variables[variable].range);
+                sizes.zip(place).all(|(range, size)| (range.lower..=range.upper).contains(size))
+            };
+            expansions.places.retain(within);
+        }
+        expansions
     }
 
     fn jacobian(&self, settings: &[Setting], of: &[(usize, usize)]) -> Result<Vec<JacobianColumn>, Failure> {
@@ -197,7 +271,11 @@ where
         of.par_iter().map(|&place| self.slope(settings, place, middle.as_deref())).collect()
     }
 
+    /// What the job allows, and what is not known of the effects of the base.
     fn nuisances(&self) -> Result<Vec<JacobianColumn>, Failure> {
-        M::nuisances(&self.prepared, &self.allowances)
+        let Self { prepared, known, allowances, monitor, .. } = self;
+        let mut columns = M::nuisances(prepared, &known.effects, allowances, *monitor)?;
+        columns.extend(known.columns(|acting| self.predicted_coarsely(acting))?);
+        Ok(columns)
     }
 }

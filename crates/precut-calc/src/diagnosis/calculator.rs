@@ -7,6 +7,7 @@ use super::base::Bound;
 use super::copies::{copies, digits_written};
 use super::data::{Data, Layout};
 use super::input::{DiagnosisJob, MAX_RUNS};
+use super::known::{Known, has_parameter};
 use super::output::DiagnosisResult;
 use super::{picture, report, said};
 use crate::calculator::{
@@ -40,7 +41,7 @@ impl<M: Diagnosable> Calculator for Diagnosis<M> {
     const META: Meta = Meta {
         id: "diagnosis",
         kind: CalculatorKind::Calculator,
-        version: 10,
+        version: 11,
         title: "Diagnosis",
         question: "What does the simulation get wrong, why, and what is gained by mending it?",
         summary: "Measurements of what was really cut against a calculator's job: whether anything is wrong beyond \
@@ -103,11 +104,17 @@ fn statistics(rows: usize, runs: usize, weighings: usize) -> (f64, u64) {
     (ms, 1_000_000 + 5000 * n + 30 * n * r + 300 * r * r)
 }
 
+/// The base of a diagnosis: a job without effects, and those that it had.
+pub(super) fn base_of<M: Diagnosable>(job: &JobOf<M>) -> (M::Job, Known<M::Effect>) {
+    let known = Known { effects: M::own_effects(&job.job).to_vec(), unsure: job.effects_uncertainty.clone() };
+    (M::without_effects(&job.job), known)
+}
+
 /// Hands the base model, bound to its rows, and what was measured there to who needs them.
 pub(super) fn with_measured<M: Diagnosable, T>(
     job: &JobOf<M>,
     monitor: &dyn Monitor,
-    then: impl FnOnce(&Measured<M::Run, M::Point>, &Bound<M>, &Data) -> Result<T, Failure>,
+    then: impl FnOnce(&Measured<M::Run, M::Point>, &Bound<'_, M>, &Data) -> Result<T, Failure>,
 ) -> Result<T, Failure> {
     let rows = job.measurements.rows();
     let of_row = |row: usize| {
@@ -115,7 +122,8 @@ pub(super) fn with_measured<M: Diagnosable, T>(
         readings.into_iter().map(move |reading| (row, reading))
     };
     let all: Vec<(usize, Reading<M::Point>)> = (0..rows.len()).flat_map(of_row).collect();
-    let (mut measured, mut prepared, mut data) = laid_out::<M>(job, &all, monitor)?;
+    let (base, known) = base_of::<M>(job);
+    let (mut measured, mut prepared, mut data) = laid_out::<M>(job, &base, &all, monitor)?;
     let runs = &measured.places.runs;
     let raw: Vec<f64> = all.iter().map(|(_, reading)| reading.value).collect();
     let relative = |(digit, value): (f64, &f64)| if is_logarithmic::<M>(job) { digit / value.abs() } else { digit };
@@ -126,10 +134,11 @@ pub(super) fn with_measured<M: Diagnosable, T>(
             .filter(|index| copies.binary_search(index).is_err())
             .map(|index| all[index].clone())
             .collect();
-        (measured, prepared, data) = laid_out::<M>(job, &once, monitor)?;
+        (measured, prepared, data) = laid_out::<M>(job, &base, &once, monitor)?;
         measured.copies = copies.into_iter().map(|index| all[index].0).collect();
     }
-    let bound = Bound::<M>::new(prepared, job.allowances.clone(), &job.quantity, &job.options);
+    let allowances = job.allowances.clone();
+    let bound = Bound::<M>::new(prepared, known, allowances, &job.quantity, &job.options, monitor)?;
     then(&measured, &bound, &data)
 }
 
@@ -137,6 +146,7 @@ pub(super) fn with_measured<M: Diagnosable, T>(
 #[allow(clippy::type_complexity, reason = "three parts that are made together")]
 fn laid_out<M: Diagnosable>(
     job: &JobOf<M>,
+    base: &M::Job,
     readings: &[(usize, Reading<M::Point>)],
     monitor: &dyn Monitor,
 ) -> Result<(Measured<M::Run, M::Point>, M::Prepared, Data), Failure> {
@@ -146,7 +156,7 @@ fn laid_out<M: Diagnosable>(
     let run_of = |row: usize| rows[row].run() as usize - 1;
     let points = readings.iter().map(|(row, reading)| (run_of(*row), reading.point.clone())).collect();
     let places: Rows<M::Run, M::Point> = Rows { runs, points };
-    let prepared = M::prepare(&job.job, &places, &job.quantity, monitor).map_err(|error| unprepared(error, &used))?;
+    let prepared = M::prepare(base, &places, &job.quantity, monitor).map_err(|error| unprepared(error, &used))?;
     let design = M::design(&prepared);
     let raw: Vec<f64> = readings.iter().map(|(_, reading)| reading.value).collect();
     let data = match M::spreads(&prepared, &job.allowances) {
@@ -179,6 +189,7 @@ pub(super) const FAULT_CODES: &[&str] = &[
     "unknown_quantity",
     "unknown_cause",
     "unknown_condition",
+    "unknown_parameter",
     "range_reversed",
     "duplicate_items",
 ];
@@ -270,6 +281,7 @@ where
             violations.add(finding.under("/job"));
         }
         check_rows(self, violations);
+        check_uncertainty(self, violations);
         check_places(self, violations);
     }
 }
@@ -335,6 +347,28 @@ where
                 .measured(range.to, range.from, "1")
                 .with("name", range.condition.clone())
         });
+    }
+}
+
+/// What is unsure must be there.
+fn check_uncertainty<J, R, W, A>(job: &DiagnosisJob<J, R, W, A>, violations: &mut Violations)
+where
+    J: utoipa::ToSchema,
+    R: utoipa::ToSchema,
+    W: MeasuredRow + Measurement<Model: ForwardModel<Job = J, Run = R>>,
+    A: utoipa::ToSchema,
+{
+    let effects = W::Model::own_effects(&job.job);
+    for (index, entry) in job.effects_uncertainty.iter().enumerate() {
+        for (number, unsure) in entry.moves.iter().enumerate() {
+            let effect = (unsure.effect as usize).checked_sub(1).and_then(|index| effects.get(index));
+            violations.require(effect.is_some_and(|effect| has_parameter(effect, &unsure.parameter)), || {
+                Finding::new("unknown_parameter", format!("/effects_uncertainty/{index}/moves/{number}"))
+                    .with("effect", f64::from(unsure.effect))
+                    .with("parameter", unsure.parameter.clone())
+                    .with("count", effects.len())
+            });
+        }
     }
 }
 

@@ -10,8 +10,9 @@ use super::base::Bound;
 use super::calculator::Measured;
 use super::gain::Gain;
 use super::link;
+use super::subject::Setting;
 use super::weigh::Weighing;
-use crate::calculator::{Diagnosable, Failure, Finding, LimitCurve, Prediction};
+use crate::calculator::{Diagnosable, Failure, Finding, LimitCurve, Monitor, Prediction};
 
 /// Probability of a class below which a set does not explain it.
 const AGAINST: f64 = 1e-3;
@@ -80,19 +81,20 @@ pub struct ClassHeldOut {
 
 /// Nothing where the rows are values.
 pub(super) fn report<M: Diagnosable>(
-    bound: &Bound<M>,
+    bound: &Bound<'_, M>,
     weighing: &Weighing<'_>,
     measured: &Measured<M::Run, M::Point>,
     extended: Option<&[Prediction]>,
-    effects: &[M::Effect],
+    settings: &[Setting],
     gain: Option<&Gain>,
-    seed: u64,
+    (seed, monitor): (u64, &dyn Monitor),
 ) -> Result<Option<ClassReport>, Failure> {
     let foundation = weighing.foundation;
     let Some(sides) = &foundation.data.sides else { return Ok(None) };
-    let Some(places) = M::class_limits(bound.prepared(), &[])? else { return Ok(None) };
+    let limits_with = |settings: &[Setting]| M::class_limits(bound.prepared(), &bound.acting(settings)?, monitor);
+    let Some(places) = limits_with(&[])? else { return Ok(None) };
     let limits_extended = match extended {
-        Some(_) => M::class_limits(bound.prepared(), effects)?.map_or_else(Vec::new, |limits| limits.curves),
+        Some(_) => limits_with(settings)?.map_or_else(Vec::new, |limits| limits.curves),
         None => Vec::new(),
     };
     let count = sides.len();

@@ -6,7 +6,7 @@ use rand_pcg::Pcg64;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::base::Bound;
-use super::calculator::JobOf;
+use super::calculator::{JobOf, base_of};
 use super::output::{DecisionReport, DownstreamReport};
 use super::refine::Fit;
 use super::subject::{Setting, Subject};
@@ -26,7 +26,7 @@ const NEARLY_NORMAL: f64 = 60.0;
 pub(super) fn downstream<M: Diagnosable>(
     job: &JobOf<M>,
     runs: &[M::Run],
-    bound: &Bound<M>,
+    bound: &Bound<'_, M>,
     weighing: &Weighing<'_>,
     leading: Option<&SetWeight>,
     monitor: &dyn Monitor,
@@ -38,15 +38,19 @@ pub(super) fn downstream<M: Diagnosable>(
     let Some(draws) = draws(bound, set, fit, weighing.noise.dof, &mut random) else {
         return Ok(Vec::new());
     };
-    let mut acting = draws.iter().map(|settings| bound.effects_of(settings)).collect::<Result<Vec<_>, _>>()?;
+    let mut acting = draws.iter().map(|settings| bound.acting(settings)).collect::<Result<Vec<_>, _>>()?;
     for effects in &mut acting {
         effects.extend(M::allowed(&job.allowances, &mut || random.next()));
     }
-    let decided = |believed: &[M::Effect]| {
+    let (base_job, _) = base_of::<M>(job);
+    let decided = |believed: &[Setting]| -> Result<Vec<Consequence>, Failure> {
+        let believed = bound.acting(believed)?;
+        let decided = M::consequences(&base_job, &job.quantity, runs, &believed, &acting, monitor)?;
+        // What was cancelled has no consequences, either.
         checkpoint(monitor)?;
-        M::consequences(&job.job, &job.quantity, runs, believed, &acting)
+        Ok(decided)
     };
-    let (base, extended) = (decided(&[])?, decided(&bound.effects_of(&set.settings)?)?);
+    let (base, extended) = (decided(&[])?, decided(&set.settings)?);
     let both = base.iter().filter_map(|of_base| {
         let of_extended = extended.iter().find(|other| other.name == of_base.name)?;
         Some(DownstreamReport {

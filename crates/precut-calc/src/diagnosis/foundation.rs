@@ -46,12 +46,12 @@ impl<'a> Foundation<'a> {
     }
 
     /// Rows that stand alone.
-    pub fn outliers(&self) -> Outliers {
+    pub fn outliers(&self, monitor: &dyn Monitor) -> Result<Outliers, Failure> {
         if self.data.sides.is_some() {
             // A class stands on one of two sides: none stands alone.
-            return Outliers::default();
+            return Ok(Outliers::default());
         }
-        outliers(self.data, &self.residual)
+        outliers(self.data, &self.residual, monitor)
     }
 
     /// Rows that the base predicts and that are not set aside.

@@ -5,6 +5,7 @@ use utoipa::openapi::RefOr;
 use utoipa::openapi::schema::{ObjectBuilder, Schema, SchemaType, Type};
 use utoipa::{PartialSchema, ToSchema};
 
+use super::known::JointUncertainty;
 use super::weigh::LEVEL;
 use crate::calculator::{ConditionRange, ForwardModel, Measured, MeasuredRow, Measurement};
 
@@ -22,9 +23,13 @@ pub struct DiagnosisJob<J: ToSchema, R: ToSchema, W: MeasuredRow + Measurement, 
     /// Whose job this is.
     #[schema(example = "deflection-compensation")]
     pub calculator: String,
-    /// The base model: a complete job of that calculator. The diagnosis adds to the effects that it holds.
+    /// The base model: a complete job of that calculator. The diagnosis adds to the effects that it holds, or finds them changed.
     #[schema(inline)]
     pub job: J,
+    /// What is not known of the effects that the base job holds; a stored model brings its own. What lies within is no finding.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schema(max_items = 256)]
+    pub effects_uncertainty: Vec<JointUncertainty>,
     /// Conditions of the runs that were measured; what a run leaves out is as in the job.
     #[serde(default = "Vec::new", skip_serializing_if = "Vec::is_empty")]
     #[schema(inline, max_items = 500)]

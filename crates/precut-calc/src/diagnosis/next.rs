@@ -1,7 +1,7 @@
 //! The next measurement worth making (`diagnosis/3.6`).
 
 use super::base::Bound;
-use super::calculator::JobOf;
+use super::calculator::{JobOf, base_of};
 use super::data::{Data, Layout};
 use super::identify::Signature;
 use super::input::DiagnosisOptions;
@@ -58,9 +58,10 @@ pub(super) fn next_measurement<M: Diagnosable>(
     let mut candidates = Vec::new();
     for candidate in M::next_runs(&job.job, rows, Ranges(&job.options.ranges)) {
         checkpoint(monitor)?;
-        let Some(separation_then) = separation_with::<M>(job, rows, &candidate, weighing, leader, rival)? else {
-            continue;
-        };
+        let then = separation_with::<M>(job, rows, &candidate, weighing, [Some(leader), rival], monitor)?;
+        // What was cancelled is no run beyond the model.
+        checkpoint(monitor)?;
+        let Some(separation_then) = then else { continue };
         let gained = separation_then * separation_then - separation_now * separation_now;
         candidates.push((candidate.changes, candidate.run.clone(), separation_then));
         if best.as_ref().is_none_or(|best| separation_then > best.separation_then) {
@@ -114,17 +115,16 @@ fn separation_with<M: Diagnosable>(
     rows: &Rows<M::Run, M::Point>,
     candidate: &NextRun<M::Run, M::Point>,
     weighing: &Weighing<'_>,
-    leader: &SetWeight,
-    rival: Option<&SetWeight>,
+    sets: [Option<&SetWeight>; 2],
+    monitor: &dyn Monitor,
 ) -> Result<Option<f64>, Failure> {
     let mut all = rows.clone();
     let run = all.runs.len();
     all.runs.push(candidate.run.clone());
     all.points.extend(candidate.points.iter().map(|point| (run, point.clone())));
     // A candidate beyond what the model covers is no candidate.
-    let Ok(prepared) = M::prepare(&job.job, &all, &job.quantity, &crate::calculator::Unwatched) else {
-        return Ok(None);
-    };
+    let (base, known) = base_of::<M>(job);
+    let Ok(prepared) = M::prepare(&base, &all, &job.quantity, monitor) else { return Ok(None) };
     let old = weighing.foundation.data;
     let first = old.value.len();
     let layout = Layout {
@@ -140,7 +140,7 @@ fn separation_with<M: Diagnosable>(
     let data = Data { value: vec![0.0; all.points.len()], uncertainty: None, sides: None, layout };
     // Every cause: the sets are found in it by kind.
     let every = DiagnosisOptions::default();
-    let bound = Bound::<M>::new(prepared, job.allowances.clone(), &job.quantity, &every);
+    let bound = Bound::<M>::new(prepared, known, job.allowances.clone(), &job.quantity, &every, monitor)?;
     let translated = |set: &SetWeight| -> Option<Vec<Setting>> {
         set.settings
             .iter()
@@ -151,7 +151,7 @@ fn separation_with<M: Diagnosable>(
             })
             .collect()
     };
-    let (Some(of_leader), Some(of_rival)) = (translated(leader), rival.map_or(Some(Vec::new()), translated)) else {
+    let [Some(of_leader), Some(of_rival)] = sets.map(|set| set.map_or(Some(Vec::new()), translated)) else {
         return Ok(None);
     };
     let mut keep = weighing.keep.clone();

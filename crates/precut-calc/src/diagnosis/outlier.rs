@@ -3,7 +3,7 @@
 use super::basis::{dot, orthonormal, smooth_columns};
 use super::data::Data;
 use super::noise::smooth_order;
-use crate::calculator::Smooth;
+use crate::calculator::{Failure, Monitor, Smooth, checkpoint};
 
 /// Scaled deleted residual beyond which a row is looked at, in robust standard deviations.
 const SUSPECT: f64 = 4.5;
@@ -47,7 +47,7 @@ impl Outliers {
 ///
 /// The deletion is essential: in a fit that contains it, a spike of 20 sigma drags its neighbours beyond
 /// 3 sigma with it and would pass for structure.
-pub(super) fn outliers(data: &Data, residual: &[f64]) -> Outliers {
+pub(super) fn outliers(data: &Data, residual: &[f64], monitor: &dyn Monitor) -> Result<Outliers, Failure> {
     let ordered = data.layout.design.smooth != Smooth::None;
     let mut traces: Vec<Fit> = if ordered {
         data.layout
@@ -65,6 +65,7 @@ pub(super) fn outliers(data: &Data, residual: &[f64]) -> Outliers {
     let mut flagged = Vec::new();
     let most = (residual.len() / ONE_IN).max(1);
     let spread = loop {
+        checkpoint(monitor)?;
         let spread = robust_sd(traces.iter().flat_map(Fit::open_residuals));
         if spread <= 0.0 {
             break spread;
@@ -97,13 +98,13 @@ pub(super) fn outliers(data: &Data, residual: &[f64]) -> Outliers {
         fit.structure.fill(false);
         if flagged.len() > most {
             let heavy_tails = ordered.then(|| heavy_tails(&traces, residual.len()));
-            return Outliers { rows: flagged, too_many: true, heavy_tails, far_rows: Vec::new() };
+            return Ok(Outliers { rows: flagged, too_many: true, heavy_tails, far_rows: Vec::new() });
         }
     };
     let far = traces.iter().filter(|_| ordered).flat_map(|fit| fit.far_structure(SUSPECT * spread));
     let mut far_rows: Vec<usize> = far.collect();
     far_rows.sort_unstable();
-    Outliers { rows: flagged, too_many: false, heavy_tails: None, far_rows }
+    Ok(Outliers { rows: flagged, too_many: false, heavy_tails: None, far_rows })
 }
 
 /// A far row and a neighbour as far away, if the rows beside both are at peace without them and every sweep that passed the

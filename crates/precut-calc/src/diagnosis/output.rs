@@ -6,6 +6,7 @@ use utoipa::openapi::Object;
 use utoipa::openapi::schema::{ObjectBuilder, SchemaType, Type};
 
 use super::classes::ClassReport;
+use super::known::JointUncertainty;
 
 /// What the measurements say about the base model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -51,9 +52,11 @@ pub struct DiagnosisResult<E: ToSchema, R: ToSchema> {
     pub profiles: Vec<ProfileReport>,
     /// Shape of what the catalogue does not explain.
     pub remainder: Option<RemainderReport>,
-    /// The effects that extend the base model; empty where none is named.
+    /// The effects that extend the base model, those that the base held otherwise in their place; empty where none is named.
     #[schema(inline)]
     pub effects: Vec<E>,
+    /// What the rows leave open of `effects`.
+    pub effects_uncertainty: Vec<JointUncertainty>,
     /// Error on data held back, base against extended; of classes see `classes`.
     pub gain: Option<GainReport>,
     /// Where the quantity is a class: what each model says of every row, and where the limits run.
@@ -123,6 +126,9 @@ pub struct ParameterReport {
     /// Value, in the unit that `unit` names.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub value: f64,
+    /// Value in the base, where the base holds the effect already; the cause is that it changed.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub was: Option<f64>,
     /// Posterior standard deviation; absent for what is stated.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub standard_deviation: Option<f64>,

@@ -9,6 +9,7 @@ use super::downstream::downstream;
 use super::foundation::Foundation;
 use super::gain::{Gain, gain};
 use super::identify::twins;
+use super::known::left_open;
 use super::next::{NextMeasurement, next_measurement};
 use super::noise::{NoiseSource, between_sweeps};
 use super::output::{
@@ -36,14 +37,14 @@ pub(super) const STAGE_CODES: &[&str] =
 pub(super) fn answer<M: Diagnosable>(
     job: &JobOf<M>,
     measured: &Measured<M::Run, M::Point>,
-    bound: &Bound<M>,
+    bound: &Bound<'_, M>,
     data: &Data,
     monitor: &dyn Monitor,
 ) -> Result<Answer<ResultOf<M>>, Failure> {
     let Measured { places, used, copies, .. } = measured;
     stage(monitor, 0.05, "diagnosis_stage_signatures");
     let mut foundation = Foundation::of(bound, data, monitor)?;
-    let found = foundation.outliers();
+    let found = foundation.outliers(monitor)?;
     if job.options.leave_outliers_out {
         foundation.heavy_tails.clone_from(&found.heavy_tails);
     }
@@ -86,7 +87,11 @@ pub(super) fn answer<M: Diagnosable>(
     let mut warnings = warnings(&job.options, &weighing, &found, (used, copies), refusal.is_none(), gain.is_some());
     let (signatures, separations) = view.signatures()?;
     let with = extended.prediction.as_deref();
-    let classes = classes::report(bound, &weighing, measured, with, &effects, gain.as_ref(), seed)?;
+    let classes = classes::report(bound, &weighing, measured, with, settings, gain.as_ref(), (seed, monitor))?;
+    let effects_uncertainty = match leading {
+        Some(set) => left_open(&weighing, set, |settings| bound.effects_of(settings))?,
+        None => Vec::new(),
+    };
     // Of classes a root mean square means nothing.
     let gain = gain.filter(|_| classes.is_none());
     let output = DiagnosisResult {
@@ -114,6 +119,7 @@ pub(super) fn answer<M: Diagnosable>(
             .flatten()
             .map(|shape| remainder_report(shape, used)),
         effects,
+        effects_uncertainty,
         gain: gain.as_ref().map(gain_report),
         classes,
         downstream,
@@ -268,7 +274,7 @@ fn gain_report(gain: &Gain) -> GainReport {
     }
 }
 
-fn not_applicable<M: Diagnosable>(bound: &Bound<M>, weighing: &Weighing<'_>) -> Vec<NotApplicable> {
+fn not_applicable<M: Diagnosable>(bound: &Bound<'_, M>, weighing: &Weighing<'_>) -> Vec<NotApplicable> {
     let report = |kind: &str, reason: &str, condition: Option<&str>| NotApplicable {
         kind: kind.to_owned(),
         reason: reason.to_owned(),

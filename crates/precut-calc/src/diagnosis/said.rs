@@ -58,6 +58,7 @@ pub(super) const EXPLANATION_CODES: &[&str] = &[
     "diagnosis_next",
     "diagnosis_negligible",
     "diagnosis_several_values",
+    "diagnosis_changed",
     "diagnosis_downstream",
 ];
 
@@ -249,6 +250,7 @@ pub(super) fn explanation<E: utoipa::ToSchema, R: utoipa::ToSchema>(
     if !negligible.is_empty() {
         said.push(Message::new("diagnosis_negligible").with("causes", negligible));
     }
+    said.extend(output.named.iter().flat_map(changed));
     said.extend(output.named.iter().filter_map(several_values));
     // A run that parts nothing is not worth a sentence.
     if let Some(next) = output.next_measurement.as_ref().filter(|next| next.rows_needed.is_some()) {
@@ -294,6 +296,24 @@ pub(super) fn explanation<E: utoipa::ToSchema, R: utoipa::ToSchema>(
             .with("high", downstream.extended.interval_95[1])
     }));
     said
+}
+
+/// From what to what an effect of the base changed.
+fn changed(cause: &NamedCause) -> impl Iterator<Item = Message> {
+    cause.parameters.iter().filter_map(|parameter| {
+        let [low, high] = parameter.interval_95?;
+        Some(
+            Message::new("diagnosis_changed")
+                .with("cause", cause.kind.clone())
+                .with("label", cause.label.clone())
+                .with("parameter", parameter.name.clone())
+                .with("unit", parameter.unit.clone())
+                .with("from", parameter.was?)
+                .with("to", parameter.value)
+                .with("low", low)
+                .with("high", high),
+        )
+    })
 }
 
 /// Where the rows fit another value of a cause nearly as well.

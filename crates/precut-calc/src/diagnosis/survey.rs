@@ -340,7 +340,7 @@ mod tests {
                 variable("ratio", Treatment::Shape { grid: ratios, prior }, 0.5, 50.0),
             ];
             let cause = &RING_CAUSES[0];
-            let hypotheses = vec![Hypothesis { cause, label: String::new(), variables, prior_weight: 1.0 }];
+            let hypotheses = vec![Hypothesis { cause, label: String::new(), variables, prior_weight: 1.0, held: None }];
             Self { hypotheses, turns_per_size, parts }
         }
 

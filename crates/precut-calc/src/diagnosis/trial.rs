@@ -54,15 +54,17 @@ pub fn separation_from<M: Diagnosable>(job: &JobOf<M>, change: &[f64], named: &[
 }
 
 /// The hypothesis of a named cause with its values.
-fn setting_of<M: Diagnosable>(bound: &Bound<M>, cause: &NamedCause) -> Result<Setting, Failure> {
+fn setting_of<M: Diagnosable>(bound: &Bound<'_, M>, cause: &NamedCause) -> Result<Setting, Failure> {
     let is_of = |hypothesis: &Hypothesis| hypothesis.cause.kind == cause.kind && hypothesis.label == cause.label;
     let hypothesis = bound.hypotheses().iter().position(is_of);
     let hypothesis = hypothesis.ok_or_else(|| Failure::Internal(format!("no hypothesis {}", cause.kind)))?;
-    Ok(Setting { hypothesis, values: cause.parameters.iter().map(|parameter| parameter.value).collect() })
+    let counted_from = |variable: usize| bound.hypotheses()[hypothesis].counted_from(variable);
+    let values = cause.parameters.iter().enumerate().map(|(k, parameter)| parameter.value - counted_from(k));
+    Ok(Setting { hypothesis, values: values.collect() })
 }
 
 /// Which variables of settings are fitted: sizes, and shapes that have a prior.
-fn fitted<M: Diagnosable>(bound: &Bound<M>, settings: &[Setting]) -> Vec<(usize, usize)> {
+fn fitted<M: Diagnosable>(bound: &Bound<'_, M>, settings: &[Setting]) -> Vec<(usize, usize)> {
     let of_setting = |(member, setting): (usize, &Setting)| {
         let hypothesis = &bound.hypotheses()[setting.hypothesis];
         let sizes = hypothesis.amplitudes().map(|(variable, _)| variable);
@@ -75,7 +77,7 @@ fn fitted<M: Diagnosable>(bound: &Bound<M>, settings: &[Setting]) -> Vec<(usize,
 /// Scatter, allowances and signatures of a job's rows, without a search.
 fn with_base_weighed<M: Diagnosable, T>(
     job: &JobOf<M>,
-    then: impl FnOnce(&Bound<M>, &Weighing<'_>) -> Result<T, Failure>,
+    then: impl FnOnce(&Bound<'_, M>, &Weighing<'_>) -> Result<T, Failure>,
 ) -> Result<T, Failure> {
     with_measured::<M, _>(job, &Unwatched, |_, bound, data| {
         let foundation = Foundation::of(bound, data, &Unwatched)?;

@@ -208,26 +208,30 @@ impl<'a> View<'a> {
         } else {
             profile.map_or(Known::Quadratic, Known::Profile)
         };
+        let from = self.hypotheses[setting.hypothesis].counted_from(index);
         let interval = |share: f64| {
-            fitted.then(|| match &known {
+            let counted = fitted.then(|| match &known {
                 Known::Peaks(_, peaks) => {
                     mixture_interval(peaks, share, dof).map(|edge| edge.clamp(range.lower, range.upper))
                 }
                 Known::Profile(profile) => profile.interval(quantile(share, dof)),
                 Known::Quadratic => quadratic(share),
-            })
+            });
+            counted.map(|ends| ends.map(|end| end + from))
         };
+        let is_change = self.hypotheses[setting.hypothesis].held.is_some();
         let span = range.upper - range.lower;
         ParameterReport {
             name: variable.name.to_owned(),
             unit: variable.unit.to_owned(),
-            value,
+            value: value + from,
+            was: (is_change && fitted).then_some(from),
             standard_deviation: fitted.then_some(sd),
             interval_50: interval(0.50),
             interval_90: interval(0.90),
             interval_95: interval(0.95),
             interval_from: fitted.then(|| known.name().to_owned()),
-            other_values: others.iter().map(|other| other.value).collect(),
+            other_values: others.iter().map(|other| other.value + from).collect(),
             at_limit: fitted && (value - range.lower < 1e-9 * span || range.upper - value < 1e-9 * span),
         }
     }
@@ -246,6 +250,7 @@ impl<'a> View<'a> {
             let hypothesis = &self.hypotheses[profile.hypothesis];
             let variable = &hypothesis.variables[profile.variable];
             let member = set.settings.iter().position(|setting| setting.hypothesis == profile.hypothesis)?;
+            let from = hypothesis.counted_from(profile.variable);
             let (fit, sd) =
                 (set.settings[member].values[profile.variable], set.standard_deviations[member][profile.variable]);
             Some(ProfileReport {
@@ -253,7 +258,7 @@ impl<'a> View<'a> {
                 label: hypothesis.label.clone(),
                 parameter: variable.name.to_owned(),
                 unit: variable.unit.to_owned(),
-                value: profile.value.clone(),
+                value: profile.value.iter().map(|value| value + from).collect(),
                 deviations: profile.value.iter().map(|value| (value - fit) / sd).collect(),
                 rise: profile.rise.clone(),
                 rise_at_95: reach * reach,

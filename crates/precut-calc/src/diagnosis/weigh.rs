@@ -15,7 +15,7 @@ use super::refine::{Fit, Refinement};
 use super::search::Linear;
 use super::subject::Setting;
 use super::whiten::{White, Whitener};
-use crate::calculator::{Failure, Hypothesis, Monitor, Smooth, Treatment};
+use crate::calculator::{Failure, Hypothesis, Monitor, Smooth};
 
 /// Singles with which pairs are made, and pairs with which triples are, where a part of the rows is held back or every
 /// prediction is a simulation; of the whole all singles and more pairs are.
@@ -268,7 +268,7 @@ impl<'a> Weighing<'a> {
             verdict: Verdict::Adequate,
         };
         if data.sides.is_none() || !effort.in_fold {
-            weighing.tests = adequacy(&weighing);
+            weighing.tests = adequacy(&weighing, monitor)?;
         }
         weighing.verdict = weighing.judged(effort.level);
         Ok(weighing)
@@ -499,12 +499,12 @@ fn about_leader(
 /// of one cause the first counts.
 fn at_limit(fit: &Fit, hypotheses: &[Hypothesis]) -> bool {
     fit.settings.iter().any(|setting| {
-        let variables = &hypotheses[setting.hypothesis].variables;
-        let first =
-            variables.iter().zip(&setting.values).find(|(v, _)| matches!(v.treatment, Treatment::Amplitude { .. }));
-        first.is_some_and(|(variable, value)| {
-            let near = |bound: f64| (value - bound).abs() < 1e-9 * (variable.range.upper - variable.range.lower);
-            (near(variable.range.lower) && variable.range.lower < 0.0) || near(variable.range.upper)
+        let hypothesis = &hypotheses[setting.hypothesis];
+        hypothesis.amplitudes().next().is_some_and(|(index, _)| {
+            let (range, value) = (hypothesis.variables[index].range, setting.values[index]);
+            let near = |bound: f64| (value - bound).abs() < 1e-9 * (range.upper - range.lower);
+            let is_absent = range.lower + hypothesis.counted_from(index) >= 0.0;
+            (near(range.lower) && !is_absent) || near(range.upper)
         })
     })
 }

@@ -12,6 +12,7 @@ mod ring;
 pub use deflection::{CAUSES as DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect};
 pub use fixture::{CAUSES as FIXTURE_CAUSES, FixtureConditions, FixtureEffect};
 pub use machinability::{CAUSES as MACHINABILITY_CAUSES, FactorLevel, MachinabilityConditions, MachinabilityEffect};
+pub(crate) use ring::whole;
 pub use ring::{CAUSES as RING_CAUSES, RingConditions, RingEffect};
 
 /// An entry of the catalogue.

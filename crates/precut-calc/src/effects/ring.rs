@@ -148,7 +148,7 @@ impl RingEffect {
 }
 
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the range of an order")]
-fn whole(order: f64) -> u32 {
+pub(crate) fn whole(order: f64) -> u32 {
     order.round().clamp(1.0, 1000.0) as u32
 }
 

@@ -1,6 +1,6 @@
 //! What comes of a schedule that was made with a model, where other effects act (`diagnosis/3.9`).
 
-use crate::calculator::{Allowed, Calculator, Consequence, Failure, ForwardModel, Rows, Unwatched};
+use crate::calculator::{Allowed, Calculator, Consequence, Failure, ForwardModel, Monitor, Quiet, Rows};
 use crate::effects::MachinabilityEffect;
 
 use super::FeedSchedule;
@@ -15,15 +15,16 @@ pub(super) fn consequences(
     runs: &[MachinabilityRun],
     believed: &[MachinabilityEffect],
     acting: &[Vec<MachinabilityEffect>],
+    monitor: &dyn Monitor,
 ) -> Result<Vec<Consequence>, Failure> {
     if !job.zones.iter().any(|zone| limit_of(job, zone, quantity).is_some()) {
         return Ok(Vec::new());
     }
     let mut scheduled = job.clone();
     scheduled.effects.extend_from_slice(believed);
-    let zones = match FeedSchedule::run(&scheduled, &Unwatched) {
+    let zones = match FeedSchedule::run(&scheduled, &Quiet(monitor)) {
         Ok(answer) => answer.output.zones,
-        Err(Failure::Internal(what)) => return Err(Failure::Internal(what)),
+        Err(failure @ (Failure::Internal(_) | Failure::Cancelled)) => return Err(failure),
         // A model that no schedule satisfies decides nothing.
         Err(_) => return Ok(Vec::new()),
     };
@@ -41,7 +42,7 @@ pub(super) fn consequences(
         ..runs.first().cloned().unwrap_or_default()
     };
     let rows = Rows { runs: vec![conditions], points: zones.iter().map(|zone| (0, place(zone))).collect() };
-    let Ok(prepared) = FeedSchedule::prepare(job, &rows, quantity, &Unwatched) else { return Ok(Vec::new()) };
+    let Ok(prepared) = FeedSchedule::prepare(job, &rows, quantity, monitor) else { return Ok(Vec::new()) };
     let limits: Vec<Option<Limit>> = zones
         .iter()
         .map(|cut| {
@@ -52,7 +53,7 @@ pub(super) fn consequences(
     let values = acting
         .iter()
         .map(|effects| {
-            let predicted = FeedSchedule::predict(&prepared, effects)?;
+            let predicted = FeedSchedule::predict(&prepared, effects, monitor)?;
             let shares = predicted.iter().zip(&limits).filter_map(|(value, limit)| Some((value, (*limit)?)));
             let shares: Option<Vec<f64>> = shares.map(|(value, limit)| Some(limit.share(value.ok()?))).collect();
             Ok(shares.and_then(|shares| shares.into_iter().reduce(f64::max)))

@@ -6,6 +6,7 @@ use utoipa::ToSchema;
 use crate::calculator::{
     Consequence, Cost, Design, Diagnosable, Example, Expansions, Failure, Finding, ForwardModel, Hypotheses,
     Hypothesis, JacobianColumn, Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows,
+    checkpoint,
 };
 use crate::effects::{
     Cause, FactorLevel, MACHINABILITY_CAUSES, MachinabilityConditions, MachinabilityEffect as Effect,
@@ -76,7 +77,7 @@ pub struct PreparedMachinability {
     pub(super) model: MachinabilityModel,
     /// The output's name in `models`.
     pub(super) output: String,
-    /// Effects of the job on this output.
+    /// Effects of the job, on any output.
     pub(super) own: Vec<Effect>,
     pub(super) reference: Reference,
     pub(super) rows: Vec<Row>,
@@ -122,6 +123,14 @@ impl ForwardModel for FeedSchedule {
     const CONDITIONS: &'static [&'static str] =
         &["speed_m_per_min", "feed_mm_per_rev", "depth_mm", "time_min", "flank_wear_mm"];
 
+    fn own_effects(job: &Job) -> &[Effect] {
+        &job.effects
+    }
+
+    fn without_effects(job: &Job) -> Job {
+        Job { effects: Vec::new(), ..job.clone() }
+    }
+
     fn prepare(
         job: &Job,
         rows: &Rows<MachinabilityRun, MachinabilityPoint>,
@@ -159,9 +168,8 @@ impl ForwardModel for FeedSchedule {
         if !faults.is_empty() {
             return Err(PrepareError::Invalid(faults));
         }
-        let own = job.effects.iter().filter(|effect| effect.output().is_none_or(|output| output == name)).cloned();
         Ok(PreparedMachinability {
-            own: own.collect(),
+            own: job.effects.clone(),
             reference: reference(job, &cuts),
             named: levels::named(&job.conditions, &cuts, name),
             rows: cuts,
@@ -170,7 +178,12 @@ impl ForwardModel for FeedSchedule {
         })
     }
 
-    fn predict(prepared: &PreparedMachinability, effects: &[Effect]) -> Result<Vec<Prediction>, Failure> {
+    fn predict(
+        prepared: &PreparedMachinability,
+        effects: &[Effect],
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Prediction>, Failure> {
+        checkpoint(monitor)?;
         Ok(prepared.rows.iter().map(|row| prepared.value(row, effects)).collect())
     }
 
@@ -180,7 +193,9 @@ impl ForwardModel for FeedSchedule {
 
     fn nuisances(
         prepared: &PreparedMachinability,
+        _effects: &[Effect],
         allowances: &MachinabilityAllowances,
+        _monitor: &dyn Monitor,
     ) -> Result<Vec<JacobianColumn>, Failure> {
         // Residuals are taken of logarithms: a share of the level is the same on every row.
         Ok(vec![vec![allowances.level_rel; prepared.rows.len()]])
@@ -209,12 +224,20 @@ impl Diagnosable for FeedSchedule {
         vec![Effect::LevelShift { delta_ln: allowances.level_rel * normal(), output: None }]
     }
 
-    fn hypotheses(prepared: &PreparedMachinability) -> Hypotheses {
-        prepared.hypotheses()
+    fn hypotheses(
+        prepared: &PreparedMachinability,
+        _held: &[Effect],
+        _monitor: &dyn Monitor,
+    ) -> Result<Hypotheses, Failure> {
+        Ok(prepared.hypotheses())
     }
 
     fn effects(prepared: &PreparedMachinability, hypothesis: &Hypothesis, values: &[f64]) -> Option<Vec<Effect>> {
         prepared.effects_of(hypothesis, values)
+    }
+
+    fn values(prepared: &PreparedMachinability, hypothesis: &Hypothesis, effect: &Effect) -> Option<Vec<f64>> {
+        prepared.values_of(hypothesis, effect)
     }
 
     fn design(prepared: &PreparedMachinability) -> Design {
@@ -237,8 +260,9 @@ impl Diagnosable for FeedSchedule {
         runs: &[MachinabilityRun],
         believed: &[Effect],
         acting: &[Vec<Effect>],
+        monitor: &dyn Monitor,
     ) -> Result<Vec<Consequence>, Failure> {
-        consequences(job, quantity, runs, believed, acting)
+        consequences(job, quantity, runs, believed, acting, monitor)
     }
 
     fn folds(rows: usize, _runs: usize) -> usize {
@@ -263,7 +287,8 @@ impl PreparedMachinability {
     }
 
     fn value(&self, row: &Row, effects: &[Effect]) -> Prediction {
-        let all = || self.own.iter().chain(effects);
+        let on_this = |effect: &&Effect| effect.output().is_none_or(|output| output == self.output);
+        let all = || self.own.iter().chain(effects).filter(on_this);
         // Feed marks are those of the row's own insert.
         let marks = row.nose_radius_mm.and_then(|radius| {
             all().find_map(|effect| match effect {

@@ -2,12 +2,13 @@
 
 use crate::calculator::{
     Expansions, Hypotheses, Hypothesis, Inapplicability, Inapplicable, Range, Shape, Treatment, Variable,
+    values_by_name,
 };
 use crate::effects::{Cause, Fit, MACHINABILITY_CAUSES, MachinabilityEffect as Effect, Parameter};
 use crate::machinability::ModelForm;
 
 use super::forward::{PreparedMachinability, Row};
-use super::levels::{batches, factors};
+use super::levels::{NamedLevel, batches, factors};
 
 /// Prior standard deviation of a force that does not vanish with the chip, share of the force at the reference.
 const EDGE_FORCE_SHARE: f64 = 0.1;
@@ -33,7 +34,6 @@ impl PreparedMachinability {
     }
 
     fn inapplicability(&self, cause: &'static Cause) -> Option<Inapplicability> {
-        let held = || self.own.iter().any(|effect| effect.kind() == cause.kind);
         let acts = match cause.kind {
             "nose_radius_floor" => self.output == "roughness",
             "edge_force_offset" | "wear_force_additive" => self.is_force(),
@@ -48,7 +48,6 @@ impl PreparedMachinability {
             "batch_shift" => named(batches(&self.rows).len(), "batch"),
             "factor_shift" => self.factors(1),
             "factor_interaction" => self.factors(2),
-            _ if held() => Some(Inapplicability::InJob),
             "speed_exponent" | "built_up_edge" => self.varies("speed_m_per_min", 2),
             "feed_exponent" => self.varies("feed_mm_per_rev", 2),
             "depth_exponent" => self.varies("depth_mm", 2),
@@ -100,11 +99,11 @@ impl PreparedMachinability {
             label,
             variables: cause.parameters.iter().map(|parameter| self.variable(parameter)).collect(),
             prior_weight,
+            held: None,
         };
         if matches!(cause.kind, "batch_shift" | "factor_shift" | "factor_interaction") {
             let levels = self.named.iter().filter(|level| level.effect.kind() == cause.kind);
-            let open = levels.filter(|level| !self.own.iter().any(|own| is_of(own, &level.effect)));
-            return open.map(|level| of(level.label.clone(), level.weight)).collect();
+            return levels.map(|level| of(level.label.clone(), level.weight)).collect();
         }
         vec![of(String::new(), 1.0)]
     }
@@ -146,11 +145,26 @@ impl PreparedMachinability {
         stated.unwrap_or(1.0)
     }
 
+    fn level_of(&self, hypothesis: &Hypothesis) -> Option<&NamedLevel> {
+        let is_it =
+            |level: &&NamedLevel| level.effect.kind() == hypothesis.cause.kind && level.label == hypothesis.label;
+        self.named.iter().find(is_it)
+    }
+
+    /// The values of a hypothesis' variables at which it is this effect.
+    pub(super) fn values_of(&self, hypothesis: &Hypothesis, effect: &Effect) -> Option<Vec<f64>> {
+        if effect.output().is_some_and(|output| output != self.output) {
+            return None;
+        }
+        match self.level_of(hypothesis) {
+            Some(level) => level.shift_in(effect).map(|by| vec![by]),
+            None => values_by_name(hypothesis, effect),
+        }
+    }
+
     /// The effects that a hypothesis stands for at these values of its variables.
     pub(super) fn effects_of(&self, hypothesis: &Hypothesis, values: &[f64]) -> Option<Vec<Effect>> {
-        let kind = hypothesis.cause.kind;
-        let level = self.named.iter().find(|level| level.effect.kind() == kind && level.label == hypothesis.label);
-        let mut effect = match (level, values) {
+        let mut effect = match (self.level_of(hypothesis), values) {
             (Some(level), &[by]) => level.shifted(by),
             _ => Effect::from_parameters(hypothesis.cause, values)?,
         };
@@ -165,21 +179,6 @@ fn named(levels: usize, field: &'static str) -> Option<Inapplicability> {
         0 => Some(Inapplicability::ConditionAbsent(field)),
         1 => Some(Inapplicability::ConditionConstant(field)),
         _ => None,
-    }
-}
-
-/// Whether two effects act on the same level.
-fn is_of(own: &Effect, other: &Effect) -> bool {
-    match (own, other) {
-        (Effect::BatchShift { batch: a, .. }, Effect::BatchShift { batch: b, .. }) => a == b,
-        (Effect::FactorShift { factor: f, level: l, .. }, Effect::FactorShift { factor: g, level: m, .. }) => {
-            (f, l) == (g, m)
-        }
-        (
-            Effect::FactorInteraction { factor_1: f, level_1: l, factor_2: p, level_2: q, .. },
-            Effect::FactorInteraction { factor_1: g, level_1: m, factor_2: r, level_2: s, .. },
-        ) => (f, l, p, q) == (g, m, r, s) || (f, l, p, q) == (r, s, g, m),
-        _ => false,
     }
 }
 

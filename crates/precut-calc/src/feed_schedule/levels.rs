@@ -30,6 +30,24 @@ impl NamedLevel {
         }
         effect
     }
+
+    /// What an effect adds to this level; `None` where it acts on another.
+    pub(super) fn shift_in(&self, effect: &Effect) -> Option<f64> {
+        match (effect, &self.effect) {
+            (Effect::BatchShift { batch: a, delta_ln, .. }, Effect::BatchShift { batch: b, .. }) => {
+                (a == b).then_some(*delta_ln)
+            }
+            (
+                Effect::FactorShift { factor: f, level: l, delta_ln, .. },
+                Effect::FactorShift { factor: g, level: m, .. },
+            ) => ((f, l) == (g, m)).then_some(*delta_ln),
+            (
+                Effect::FactorInteraction { factor_1: f, level_1: l, factor_2: p, level_2: q, delta_ln, .. },
+                Effect::FactorInteraction { factor_1: g, level_1: m, factor_2: r, level_2: s, .. },
+            ) => ((f, l, p, q) == (g, m, r, s) || (f, l, p, q) == (r, s, g, m)).then_some(*delta_ln),
+            _ => None,
+        }
+    }
 }
 
 /// Batches of the rows; none where a row does not state its own.

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::calculator::{Allowed, Consequence, Failure, ForwardModel, Rows, Unwatched};
+use crate::calculator::{Allowed, Consequence, Failure, ForwardModel, Monitor, Rows};
 use crate::effects::FixtureEffect;
 
 use super::FixtureStability;
@@ -16,15 +16,16 @@ pub(super) fn consequences(
     runs: &[FixtureRun],
     believed: &[FixtureEffect],
     acting: &[Vec<FixtureEffect>],
+    monitor: &dyn Monitor,
 ) -> Result<Vec<Consequence>, Failure> {
     let conditions = runs.first().cloned().unwrap_or_default();
     let run = FixtureRun { time_since_clamping_min: conditions.time_since_clamping_min, ..FixtureRun::default() };
     let rows = Rows { runs: vec![run], points: vec![(0, FixturePoint::default())] };
-    let Ok(prepared) = FixtureStability::prepare(job, &rows, "depth_limit_mm", &Unwatched) else {
+    let Ok(prepared) = FixtureStability::prepare(job, &rows, "depth_limit_mm", monitor) else {
         return Ok(Vec::new());
     };
     let limit_mm = |effects: &[FixtureEffect]| -> Result<Option<f64>, Failure> {
-        let limits = FixtureStability::predict(&prepared, effects)?;
+        let limits = FixtureStability::predict(&prepared, effects, monitor)?;
         Ok(limits.into_iter().next().and_then(Result::ok).filter(|depth| *depth > 0.0))
     };
     let Some(chosen_mm) = limit_mm(believed)? else { return Ok(Vec::new()) };

@@ -14,7 +14,7 @@ use super::FixtureStability;
 use super::acting::Case;
 use super::consequence::consequences;
 use super::floquet::Working;
-use super::hypotheses::{Experiment, design, effects, expansions};
+use super::hypotheses::{Experiment, design, effects, expansions, values};
 use super::input::FixtureJob;
 use super::lobes::Rules;
 use super::measurement::FixtureMeasurement;
@@ -148,6 +148,14 @@ impl ForwardModel for FixtureStability {
     const QUANTITIES: &'static [Quantity] = QUANTITIES;
     const CONDITIONS: &'static [&'static str] = &["spindle_speed_rpm", "feed_mm_per_tooth", "depth_mm"];
 
+    fn own_effects(job: &FixtureJob) -> &[FixtureEffect] {
+        &job.effects
+    }
+
+    fn without_effects(job: &FixtureJob) -> FixtureJob {
+        FixtureJob { effects: Vec::new(), ..job.clone() }
+    }
+
     fn prepare(
         job: &FixtureJob,
         rows: &Rows<FixtureRun, FixturePoint>,
@@ -193,26 +201,35 @@ impl ForwardModel for FixtureStability {
         if !faults.is_empty() {
             return Err(PrepareError::Invalid(faults));
         }
-        PreparedFixture::new(job.clone(), base, prepared, measure, Rules::new()).map_err(PrepareError::Failed)
+        PreparedFixture::new(job.clone(), base, prepared, measure, Rules::new(), monitor).map_err(PrepareError::Failed)
     }
 
-    fn predict(prepared: &PreparedFixture, effects: &[FixtureEffect]) -> Result<Vec<Prediction>, Failure> {
-        prepared.predicted(effects, Ask::default())
+    fn predict(
+        prepared: &PreparedFixture,
+        effects: &[FixtureEffect],
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Prediction>, Failure> {
+        prepared.predicted(effects, Ask::new(monitor))
     }
 
     fn effect(cause: &Cause, values: &[f64]) -> Option<FixtureEffect> {
         FixtureEffect::from_parameters(cause, values)
     }
 
-    fn nuisances(prepared: &PreparedFixture, allowances: &FixtureAllowances) -> Result<Vec<JacobianColumn>, Failure> {
+    fn nuisances(
+        prepared: &PreparedFixture,
+        effects: &[FixtureEffect],
+        allowances: &FixtureAllowances,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<JacobianColumn>, Failure> {
         let level = allowances.amplitude_level_rel;
         match prepared.measure {
             // A level moves every logarithm alike.
             Measure::PeakToPeak | Measure::DepthLimit | Measure::Regime => Ok(vec![vec![level; prepared.rows.len()]]),
             Measure::Displacement => {
-                let base = prepared.predicted(&[], Ask::default())?;
+                let base = prepared.predicted(effects, Ask::new(monitor))?;
                 let mut columns = vec![base.iter().map(|value| value.map_or(0.0, |value| level * value)).collect()];
-                columns.extend(prepared.late_by_ms(allowances.time_zero_ms)?);
+                columns.extend(prepared.late_by_ms(allowances.time_zero_ms, effects, monitor)?);
                 Ok(columns)
             }
         }
@@ -239,12 +256,20 @@ impl Diagnosable for FixtureStability {
         },
     ];
 
-    fn hypotheses(prepared: &PreparedFixture) -> Hypotheses {
-        Experiment { prepared }.hypotheses()
+    fn hypotheses(
+        prepared: &PreparedFixture,
+        _held: &[FixtureEffect],
+        monitor: &dyn Monitor,
+    ) -> Result<Hypotheses, Failure> {
+        Experiment { prepared, monitor }.hypotheses()
     }
 
     fn effects(_prepared: &PreparedFixture, hypothesis: &Hypothesis, values: &[f64]) -> Option<Vec<FixtureEffect>> {
         effects(hypothesis, values)
+    }
+
+    fn values(_prepared: &PreparedFixture, hypothesis: &Hypothesis, effect: &FixtureEffect) -> Option<Vec<f64>> {
+        values(hypothesis, effect)
     }
 
     fn design(prepared: &PreparedFixture) -> Design {
@@ -259,8 +284,12 @@ impl Diagnosable for FixtureStability {
         (prepared.measure == Measure::Regime).then(|| prepared.rows.iter().map(of).collect())
     }
 
-    fn class_limits(prepared: &PreparedFixture, effects: &[FixtureEffect]) -> Result<Option<ClassLimits>, Failure> {
-        if prepared.measure == Measure::Regime { prepared.class_limits(effects).map(Some) } else { Ok(None) }
+    fn class_limits(
+        prepared: &PreparedFixture,
+        effects: &[FixtureEffect],
+        monitor: &dyn Monitor,
+    ) -> Result<Option<ClassLimits>, Failure> {
+        if prepared.measure == Measure::Regime { prepared.class_limits(effects, monitor).map(Some) } else { Ok(None) }
     }
 
     fn next_runs(
@@ -277,17 +306,22 @@ impl Diagnosable for FixtureStability {
         runs: &[FixtureRun],
         believed: &[FixtureEffect],
         acting: &[Vec<FixtureEffect>],
+        monitor: &dyn Monitor,
     ) -> Result<Vec<Consequence>, Failure> {
-        consequences(job, runs, believed, acting)
+        consequences(job, runs, believed, acting, monitor)
     }
 
     fn expansions(_prepared: &PreparedFixture, hypothesis: &Hypothesis) -> Expansions {
         expansions(hypothesis)
     }
 
-    fn predict_coarsely(prepared: &PreparedFixture, effects: &[FixtureEffect]) -> Result<Vec<Prediction>, Failure> {
+    fn predict_coarsely(
+        prepared: &PreparedFixture,
+        effects: &[FixtureEffect],
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Prediction>, Failure> {
         // Whether a point is stable is asked of the prediction itself, not of every step beside it.
-        prepared.predicted(effects, Ask { whether_stable: false, ..Ask::default() })
+        prepared.predicted(effects, Ask { whether_stable: false, ..Ask::new(monitor) })
     }
 
     fn predict_ms(_job: &FixtureJob) -> f64 {

@@ -2,10 +2,11 @@
 
 use super::answer::forced_span_mm;
 use super::forward::Measure;
+use super::margins::or_missing;
 use super::predict::{PreparedFixture, PreparedRow};
 use crate::calculator::{
-    Condition, Design, Expansions, Grouping, Hypotheses, Hypothesis, Inapplicability, Inapplicable, Range, Shape,
-    Smooth, Treatment, Unwatched, Variable,
+    Condition, Design, Expansions, Failure, Grouping, Hypotheses, Hypothesis, Inapplicability, Inapplicable, Monitor,
+    Range, Shape, Smooth, Treatment, Variable, values_by_name,
 };
 use crate::effects::{Cause, FIXTURE_CAUSES, Fit, FixtureEffect, Parameter};
 
@@ -44,26 +45,24 @@ const HUNG_DAMPING: Shape = Shape { mean: -3.506_557_897_319_982, sd: 0.4, logar
 /// What decides which causes rows can speak about.
 pub(super) struct Experiment<'a> {
     pub(super) prepared: &'a PreparedFixture,
+    pub(super) monitor: &'a dyn Monitor,
 }
 
 impl Experiment<'_> {
     /// The catalogue, sorted by whether these rows can speak about a cause.
-    pub(super) fn hypotheses(&self) -> Hypotheses {
+    pub(super) fn hypotheses(&self) -> Result<Hypotheses, Failure> {
         let mut sorted = Hypotheses::default();
         for cause in FIXTURE_CAUSES {
             match self.inapplicability(cause) {
                 Some(reason) => sorted.inapplicable.push(Inapplicable { cause, reason }),
-                None => sorted.applicable.push(self.hypothesis(cause)),
+                None => sorted.applicable.push(self.hypothesis(cause)?),
             }
         }
-        sorted
+        Ok(sorted)
     }
 
     fn inapplicability(&self, cause: &'static Cause) -> Option<Inapplicability> {
-        let PreparedFixture { job, base, rows, measure, .. } = self.prepared;
-        if job.effects.iter().any(|effect| effect.kind() == cause.kind) {
-            return Some(Inapplicability::InJob);
-        }
+        let PreparedFixture { base, rows, measure, .. } = self.prepared;
         let nothing = |acts: bool| (!acts).then_some(Inapplicability::NothingToActOn);
         match cause.kind {
             // At one depth it is a force level.
@@ -86,12 +85,13 @@ impl Experiment<'_> {
         }
     }
 
-    fn hypothesis(&self, cause: &'static Cause) -> Hypothesis {
-        let variables = cause.parameters.iter().map(|p| self.variable(cause, p)).collect();
-        Hypothesis { cause, label: String::new(), variables, prior_weight: 1.0 }
+    fn hypothesis(&self, cause: &'static Cause) -> Result<Hypothesis, Failure> {
+        let variables: Result<_, Failure> = cause.parameters.iter().map(|p| self.variable(cause, p)).collect();
+        let variables = variables?;
+        Ok(Hypothesis { cause, label: String::new(), variables, prior_weight: 1.0, held: None })
     }
 
-    fn variable(&self, cause: &Cause, parameter: &Parameter) -> Variable {
+    fn variable(&self, cause: &Cause, parameter: &Parameter) -> Result<Variable, Failure> {
         let cutting = &self.prepared.base.cutting;
         let (mut lower, mut upper) = (parameter.lower, parameter.upper);
         match cause.kind {
@@ -111,7 +111,7 @@ impl Experiment<'_> {
             _ => {}
         }
         match cause.kind {
-            "second_mode" => return self.hung(parameter, Range { lower, upper }),
+            "second_mode" => return Ok(self.hung(parameter, Range { lower, upper })),
             "contact_hardening" => return self.hardening(parameter, Range { lower, upper }),
             _ => {}
         }
@@ -121,27 +121,31 @@ impl Experiment<'_> {
             Fit::Fixed { default } => Treatment::Stated { value: default },
             Fit::OfJob => Treatment::Stated { value: 0.0 },
         };
-        match parameter.fit {
+        Ok(match parameter.fit {
             // Its logarithm is 0 where it is absent, and a factor of 2 as far as one of 1/2.
             Fit::Factor => {
                 let range = Range { lower: lower.ln(), upper: upper.ln() };
                 Variable { name: "ln_factor", unit: "1", treatment, range }
             }
             _ => Variable { name: parameter.name, unit: parameter.unit, treatment, range: Range { lower, upper } },
-        }
+        })
     }
 }
 
 impl Experiment<'_> {
     /// Hardening in the measure of the swings at which it is to be seen; in that of the catalogue where the base has none.
-    fn hardening(&self, parameter: &Parameter, range: Range) -> Variable {
+    fn hardening(&self, parameter: &Parameter, range: Range) -> Result<Variable, Failure> {
         let PreparedFixture { base, rows, .. } = self.prepared;
-        let swings =
-            rows.iter().filter_map(|row| forced_span_mm(base, row.working, &Unwatched).ok()).map(|span| 0.5 * span);
-        let (sum, count) = swings.fold((0.0, 0.0), |(sum, count), swing| (sum + swing * swing, count + 1.0));
+        let (mut sum, mut count) = (0.0, 0.0);
+        for row in rows {
+            if let Ok(span_mm) = or_missing(forced_span_mm(base, row.working, self.monitor))? {
+                sum += (0.5 * span_mm) * (0.5 * span_mm);
+                count += 1.0;
+            }
+        }
         let prior_sd = if sum > 0.0 { HARDENED_SHARE * count / sum } else { parameter.prior_sd };
         let treatment = Treatment::Amplitude { prior_sd: prior_sd.min(range.upper) };
-        Variable { name: parameter.name, unit: parameter.unit, treatment, range }
+        Ok(Variable { name: parameter.name, unit: parameter.unit, treatment, range })
     }
 
     /// What swings on the workpiece, in the measures of workpiece and vise: beside a resonance it shows only near its own
@@ -186,6 +190,18 @@ pub(super) fn effects(hypothesis: &Hypothesis, values: &[f64]) -> Option<Vec<Fix
         _ => FixtureEffect::from_parameters(cause, values)?,
     };
     Some(vec![effect])
+}
+
+/// The values of a hypothesis' variables at which it is this effect.
+pub(super) fn values(hypothesis: &Hypothesis, effect: &FixtureEffect) -> Option<Vec<f64>> {
+    match *effect {
+        FixtureEffect::Stiffness { factor }
+        | FixtureEffect::Damping { factor }
+        | FixtureEffect::Mass { factor }
+        | FixtureEffect::ForceCoefficient { factor }
+        | FixtureEffect::JawMass { factor } => (hypothesis.cause.kind == effect.kind()).then(|| vec![factor.ln()]),
+        _ => values_by_name(hypothesis, effect),
+    }
 }
 
 /// Sizes about which a hypothesis is linearised beside 0: the amplitude of a cutter grows with a tooth that stands out to

@@ -1,6 +1,6 @@
 //! How a cut goes, as margins that are positive where it stays quiet and closed (`fixture/7.1`, `fixture/7.2`).
 
-use crate::calculator::{ClassLimits, Failure, LimitCurve, Missing, Prediction, Unwatched};
+use crate::calculator::{ClassLimits, Failure, LimitCurve, Missing, Monitor, Prediction};
 use crate::effects::FixtureEffect;
 
 use super::acting::Case;
@@ -26,23 +26,24 @@ const SPEEDS: usize = 40;
 const MOST_FEEDS: usize = 4;
 
 impl PreparedFixture {
-    fn log_modulus(&self, case: &Case, working: Working) -> Result<f64, Failure> {
-        let found = point(&self.rules, &case.holding, &case.cutting, working, Closed::BOTH, &Unwatched)?;
+    fn log_modulus(&self, case: &Case, working: Working, monitor: &dyn Monitor) -> Result<f64, Failure> {
+        let found = point(&self.rules, &case.holding, &case.cutting, working, Closed::BOTH, monitor)?;
         Ok(found.multiplier.modulus.max(f64::MIN_POSITIVE).ln())
     }
 
     /// g = d ln|mu|/d ln H of the base where chatter begins at the speed and feed of these rows; 1 where it never does.
-    pub(super) fn steepness_of(&self, rows: &[usize]) -> Result<f64, Failure> {
+    pub(super) fn steepness_of(&self, rows: &[usize], monitor: &dyn Monitor) -> Result<f64, Failure> {
         let of = |row: &usize| self.rows[*row].working;
         let deepest = rows.iter().map(|row| of(row).depth_mm).fold(f64::MIN_POSITIVE, f64::max);
         let Some(working) = rows.first().map(of) else { return Ok(1.0) };
         let Case { holding, cutting, .. } = &self.base;
         for times in LOOKED_FOR {
             let most_mm = times * deepest;
-            let found = critical_depth(&self.rules, holding, cutting, working, most_mm, &Unwatched)?;
+            let found = critical_depth(&self.rules, holding, cutting, working, most_mm, monitor)?;
             if let Some(limit) = found.depth_mm {
-                let at =
-                    |shift: f64| self.log_modulus(&self.base, Working { depth_mm: limit * shift.exp(), ..working });
+                let at = |shift: f64| {
+                    self.log_modulus(&self.base, Working { depth_mm: limit * shift.exp(), ..working }, monitor)
+                };
                 return Ok(((at(STEP)? - at(-STEP)?) / (2.0 * STEP)).max(FLATTEST));
             }
         }
@@ -56,14 +57,16 @@ impl PreparedFixture {
         rows: &[usize],
         steepness: f64,
         unit: &mut Option<Response>,
+        monitor: &dyn Monitor,
     ) -> Result<Vec<(usize, Prediction)>, Failure> {
         let asks = |margin: RegimeMargin| rows.iter().any(|&row| self.rows[row].margin == margin);
         let chatter = if asks(RegimeMargin::Chatter) {
-            or_missing(self.log_modulus(case, case.working))?.map(|ln| -ln / steepness)
+            or_missing(self.log_modulus(case, case.working, monitor))?.map(|ln| -ln / steepness)
         } else {
             Err(Missing::NoSolution)
         };
-        let opening = if asks(RegimeMargin::Opening) { opening(case, unit)? } else { Err(Missing::NoSolution) };
+        let opening =
+            if asks(RegimeMargin::Opening) { opening(case, unit, monitor)? } else { Err(Missing::NoSolution) };
         let of = |row: usize| match self.rows[row].margin {
             RegimeMargin::Chatter => chatter,
             RegimeMargin::Opening => opening,
@@ -72,7 +75,11 @@ impl PreparedFixture {
     }
 
     /// Where the rows stand, and the depth at which chatter begins with these effects, of every feed.
-    pub(super) fn class_limits(&self, effects: &[FixtureEffect]) -> Result<ClassLimits, Failure> {
+    pub(super) fn class_limits(
+        &self,
+        effects: &[FixtureEffect],
+        monitor: &dyn Monitor,
+    ) -> Result<ClassLimits, Failure> {
         let speeds: Vec<f64> = self.rows.iter().map(|row| row.working.spindle_rpm).collect();
         let depths: Vec<f64> = self.rows.iter().map(|row| row.working.depth_mm).collect();
         let mut feeds: Vec<f64> = self.rows.iter().map(|row| row.working.feed_mm).collect();
@@ -89,7 +96,7 @@ impl PreparedFixture {
         // Where joints harden there may be no forced motion at some depth of some speed, and no limit to draw.
         let curve = |feed_mm: f64| -> Result<Option<LimitCurve>, Failure> {
             let plane = Plane { from_rpm, to_rpm, speeds: SPEEDS, most_mm, depths: 2, feed_mm };
-            let found = boundary(&self.rules, &case.holding, &case.cutting, &plane, &Unwatched, &mut |_, _| {});
+            let found = boundary(&self.rules, &case.holding, &case.cutting, &plane, monitor, &mut |_, _| {});
             Ok(or_missing(found)?.ok().map(|found| LimitCurve {
                 feed_mm_per_tooth: feed_mm,
                 spindle_speed_rpm: found.iter().map(|point| point.spindle_rpm).collect(),
@@ -113,10 +120,10 @@ pub(super) fn or_missing<T>(found: Result<T, Failure>) -> Result<Result<T, Missi
 
 /// ln of the clamp force over what the forced motion in closed joints asks for. `unit` is the motion at 1 mm of depth, where
 /// it goes with H^(1-mu).
-fn opening(case: &Case, unit: &mut Option<Response>) -> Result<Prediction, Failure> {
+fn opening(case: &Case, unit: &mut Option<Response>, monitor: &dyn Monitor) -> Result<Prediction, Failure> {
     let Some(force) = case.holding.clamp_force_n else { return Ok(Err(Missing::NoSolution)) };
     let asked = |forced: &Response| forced.left_elastic_n.high.max(forced.right_elastic_n.high);
-    let forced = |working| or_missing(forced(case, working, &Unwatched));
+    let forced = |working| or_missing(forced(case, working, monitor));
     let asked = if case.is_linear() {
         let unit = match unit {
             Some(unit) => unit,

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use crate::calculator::{Failure, JacobianColumn, Missing, Prediction, Unwatched};
+use crate::calculator::{Failure, JacobianColumn, Missing, Monitor, Prediction};
 use crate::effects::{FixtureConditions, FixtureEffect};
 
 use super::acting::Case;
@@ -65,17 +65,18 @@ impl PreparedRow {
 }
 
 /// How rows are predicted.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Ask {
+#[derive(Clone, Copy)]
+pub(super) struct Ask<'a> {
     /// Whether a chattering point is to be found out.
     pub whether_stable: bool,
     /// How much later every row of a history is read, s.
     pub later_s: f64,
+    pub monitor: &'a dyn Monitor,
 }
 
-impl Default for Ask {
-    fn default() -> Self {
-        Self { whether_stable: true, later_s: 0.0 }
+impl<'a> Ask<'a> {
+    pub(super) fn new(monitor: &'a dyn Monitor) -> Self {
+        Self { whether_stable: true, later_s: 0.0, monitor }
     }
 }
 
@@ -86,6 +87,7 @@ impl PreparedFixture {
         rows: Vec<PreparedRow>,
         measure: Measure,
         rules: Rules,
+        monitor: &dyn Monitor,
     ) -> Result<Self, Failure> {
         let mut groups: BTreeMap<_, Vec<usize>> = BTreeMap::new();
         for (index, row) in rows.iter().enumerate() {
@@ -95,14 +97,14 @@ impl PreparedFixture {
         let mut prepared = Self { job, base, rows, measure, rules, groups, steepness: Vec::new() };
         if measure == Measure::Regime {
             let each: Result<Vec<f64>, Failure> =
-                prepared.groups.par_iter().map(|rows| prepared.steepness_of(rows)).collect();
+                prepared.groups.par_iter().map(|rows| prepared.steepness_of(rows, monitor)).collect();
             prepared.steepness = each?;
         }
         Ok(prepared)
     }
 
     /// One value per row.
-    pub(super) fn predicted(&self, effects: &[FixtureEffect], ask: Ask) -> Result<Vec<Prediction>, Failure> {
+    pub(super) fn predicted(&self, effects: &[FixtureEffect], ask: Ask<'_>) -> Result<Vec<Prediction>, Failure> {
         let mut all = self.job.effects.clone();
         all.extend_from_slice(effects);
         let of_groups: Vec<Vec<(usize, Prediction)>> =
@@ -114,7 +116,12 @@ impl PreparedFixture {
         Ok(predicted)
     }
 
-    fn group(&self, group: usize, effects: &[FixtureEffect], ask: Ask) -> Result<Vec<(usize, Prediction)>, Failure> {
+    fn group(
+        &self,
+        group: usize,
+        effects: &[FixtureEffect],
+        ask: Ask<'_>,
+    ) -> Result<Vec<(usize, Prediction)>, Failure> {
         let rows = &self.groups[group];
         let first = &self.rows[rows[0]];
         let conditions = FixtureConditions { time_since_clamping_min: first.time_since_clamping_min };
@@ -136,7 +143,7 @@ impl PreparedFixture {
                 continue;
             }
             if self.measure == Measure::Regime {
-                predicted.extend(self.margins(&case, &rows, self.steepness[group], &mut unit)?);
+                predicted.extend(self.margins(&case, &rows, self.steepness[group], &mut unit, ask.monitor)?);
                 continue;
             }
             let prediction = match self.measure {
@@ -145,7 +152,7 @@ impl PreparedFixture {
                 }
                 Measure::DepthLimit => {
                     let most = 4.0 * working.depth_mm.max(2.5);
-                    or_missing(critical_depth(&self.rules, &case.holding, &case.cutting, working, most, &Unwatched))?
+                    or_missing(critical_depth(&self.rules, &case.holding, &case.cutting, working, most, ask.monitor))?
                         .and_then(|limit| limit.depth_mm.ok_or(Missing::NoSolution))
                 }
             };
@@ -155,8 +162,8 @@ impl PreparedFixture {
     }
 
     /// Why a point has no amplitude, where it has none: it chatters, or there is no motion to ask about.
-    fn instability(&self, case: &Case) -> Result<Option<Missing>, Failure> {
-        let found = point(&self.rules, &case.holding, &case.cutting, case.working, Closed::BOTH, &Unwatched);
+    fn instability(&self, case: &Case, monitor: &dyn Monitor) -> Result<Option<Missing>, Failure> {
+        let found = point(&self.rules, &case.holding, &case.cutting, case.working, Closed::BOTH, monitor);
         Ok(match or_missing(found)? {
             Ok(point) => (point.multiplier.modulus >= 1.0).then_some(Missing::Unstable),
             Err(missing) => Some(missing),
@@ -165,21 +172,22 @@ impl PreparedFixture {
 
     /// The exact forced motion; a chattering point has no amplitude that a small change moves a little. `unit_mm` is
     /// the amplitude at 1 mm of depth, where the motion goes with H^(1-mu).
-    fn peak_to_peak(&self, case: &Case, unit_mm: &mut Option<f64>, ask: Ask) -> Result<Prediction, Failure> {
+    fn peak_to_peak(&self, case: &Case, unit_mm: &mut Option<f64>, ask: Ask<'_>) -> Result<Prediction, Failure> {
         if case.working.depth_mm <= 0.0 {
             return Ok(Err(Missing::NoCut));
         }
         if ask.whether_stable
-            && let Some(missing) = self.instability(case)?
+            && let Some(missing) = self.instability(case, ask.monitor)?
         {
             return Ok(Err(missing));
         }
         if !case.is_linear() {
-            return Ok(or_missing(forced_span_mm(case, case.working, &Unwatched))?.map(|span_mm| span_mm * UM_PER_MM));
+            let span_mm = or_missing(forced_span_mm(case, case.working, ask.monitor))?;
+            return Ok(span_mm.map(|span_mm| span_mm * UM_PER_MM));
         }
         let span_mm = match unit_mm {
             Some(span_mm) => *span_mm,
-            None => match or_missing(forced_span_mm(case, case.at_depth(1.0), &Unwatched))? {
+            None => match or_missing(forced_span_mm(case, case.at_depth(1.0), ask.monitor))? {
                 Ok(span_mm) => *unit_mm.insert(span_mm),
                 Err(missing) => return Ok(Err(missing)),
             },
@@ -188,9 +196,9 @@ impl PreparedFixture {
     }
 
     /// x at the times of these rows after the entry: one cut in time, as long as the last row within it asks.
-    fn history(&self, case: &Case, rows: &[usize], ask: Ask) -> Result<Vec<(usize, Prediction)>, Failure> {
+    fn history(&self, case: &Case, rows: &[usize], ask: Ask<'_>) -> Result<Vec<(usize, Prediction)>, Failure> {
         if ask.whether_stable
-            && let Some(missing) = self.instability(case)?
+            && let Some(missing) = self.instability(case, ask.monitor)?
         {
             return Ok(rows.iter().map(|&row| (row, Err(missing))).collect());
         }
@@ -202,7 +210,7 @@ impl PreparedFixture {
         let mut predicted = Vec::with_capacity(rows.len());
         if !late.is_empty() {
             // Long after the entry: the forced motion, in step with the tooth that entered at the start.
-            let forced = or_missing(forced(case, case.working, &Unwatched))?;
+            let forced = or_missing(forced(case, case.working, ask.monitor))?;
             let at = |row: usize| forced.as_ref().map(|motion| motion.x_at(time(row)) * UM_PER_MM).map_err(|why| *why);
             predicted.extend(late.into_iter().map(|row| (row, at(row))));
         }
@@ -211,7 +219,7 @@ impl PreparedFixture {
         plan.steady_periods = 1;
         plan.keep_first = wanted;
         plan.unilateral = case.holding.clamp_force_n.is_some();
-        let steps = simulate(case, &plan, &Unwatched)?.first;
+        let steps = simulate(case, &plan, ask.monitor)?.first;
         predicted.extend(early.into_iter().map(|row| {
             let after = steps.partition_point(|step| step.time_s <= time(row)).clamp(1, steps.len().max(2) - 1);
             let value = match (steps.get(after - 1), steps.get(after)) {
@@ -227,8 +235,13 @@ impl PreparedFixture {
     }
 
     /// What a late zero of time does to the history of each run.
-    pub(super) fn late_by_ms(&self, late_ms: f64) -> Result<Vec<JacobianColumn>, Failure> {
-        let at = |later_s: f64| self.predicted(&[], Ask { later_s, ..Ask::default() });
+    pub(super) fn late_by_ms(
+        &self,
+        late_ms: f64,
+        effects: &[FixtureEffect],
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<JacobianColumn>, Failure> {
+        let at = |later_s: f64| self.predicted(effects, Ask { later_s, ..Ask::new(monitor) });
         let (before, after) = (at(-TIME_STEP_S)?, at(TIME_STEP_S)?);
         let slopes: Vec<f64> = before
             .iter()

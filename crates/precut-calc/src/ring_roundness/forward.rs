@@ -14,7 +14,7 @@ use crate::calculator::{
 use crate::effects::{Cause, RING_CAUSES, RingEffect};
 
 use super::RingRoundness;
-use super::hypotheses::{design, effects, expansions, hypotheses};
+use super::hypotheses::{design, effects, expansions, hypotheses, values};
 use super::input::{Job, Method};
 use super::measurement::RingMeasurement;
 use super::next_runs::next_runs;
@@ -158,6 +158,14 @@ impl ForwardModel for RingRoundness {
     const QUANTITIES: &'static [Quantity] = QUANTITIES;
     const CONDITIONS: &'static [&'static str] = &["spark_out_revolutions"];
 
+    fn own_effects(job: &Job) -> &[RingEffect] {
+        &job.effects
+    }
+
+    fn without_effects(job: &Job) -> Job {
+        Job { effects: Vec::new(), ..job.clone() }
+    }
+
     fn prepare(
         job: &Job,
         rows: &Rows<RingRun, RingPoint>,
@@ -199,15 +207,24 @@ impl ForwardModel for RingRoundness {
         }
     }
 
-    fn predict(prepared: &PreparedRing, effects: &[RingEffect]) -> Result<Vec<Prediction>, Failure> {
-        Ok(prepared.predicted(effects, NODES))
+    fn predict(
+        prepared: &PreparedRing,
+        effects: &[RingEffect],
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Prediction>, Failure> {
+        prepared.predicted(effects, NODES, monitor)
     }
 
     fn effect(cause: &Cause, values: &[f64]) -> Option<RingEffect> {
         RingEffect::from_parameters(cause, values)
     }
 
-    fn nuisances(prepared: &PreparedRing, allowances: &RingAllowances) -> Result<Vec<JacobianColumn>, Failure> {
+    fn nuisances(
+        prepared: &PreparedRing,
+        effects: &[RingEffect],
+        allowances: &RingAllowances,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<JacobianColumn>, Failure> {
         let (size_um, centre_um) = match prepared.measure {
             Measure::Deviation => (allowances.centring_um, allowances.centring_um),
             Measure::Radius => (allowances.size_um, allowances.eccentricity_um),
@@ -218,10 +235,13 @@ impl ForwardModel for RingRoundness {
         let mut columns = Vec::new();
         for ring in &prepared.rings {
             let base = |n: usize| {
-                prepared.profile(ring, &[], n).map_err(|Unlocated| Failure::NotConverged {
-                    what: "location of the ring on its supports",
-                    residual: 0.0,
-                    iterations: 0,
+                prepared.profile(ring, effects, n, monitor).map_err(|why| match why {
+                    Unpredicted::Unlocated => Failure::NotConverged {
+                        what: "location of the ring on its supports",
+                        residual: 0.0,
+                        iterations: 0,
+                    },
+                    Unpredicted::Cancelled => Failure::Cancelled,
                 })
             };
             let (once, twice) = rayon::join(|| base(NODES), || base(2 * NODES));
@@ -261,12 +281,16 @@ impl Diagnosable for RingRoundness {
         job: include_str!("examples/diagnosis_roller.json"),
     }];
 
-    fn hypotheses(prepared: &PreparedRing) -> Hypotheses {
-        hypotheses(&prepared.rings.iter().map(|ring| &ring.job).collect::<Vec<_>>())
+    fn hypotheses(prepared: &PreparedRing, held: &[RingEffect], _monitor: &dyn Monitor) -> Result<Hypotheses, Failure> {
+        Ok(hypotheses(&prepared.jobs(), held))
     }
 
     fn effects(prepared: &PreparedRing, hypothesis: &Hypothesis, values: &[f64]) -> Option<Vec<RingEffect>> {
-        effects(hypothesis, values, &prepared.rings.iter().map(|ring| &ring.job).collect::<Vec<_>>())
+        effects(hypothesis, values, &prepared.jobs())
+    }
+
+    fn values(prepared: &PreparedRing, hypothesis: &Hypothesis, effect: &RingEffect) -> Option<Vec<f64>> {
+        values(hypothesis, effect, &prepared.jobs())
     }
 
     fn design(prepared: &PreparedRing) -> Design {
@@ -281,8 +305,12 @@ impl Diagnosable for RingRoundness {
         expansions(hypothesis)
     }
 
-    fn predict_coarsely(prepared: &PreparedRing, effects: &[RingEffect]) -> Result<Vec<Prediction>, Failure> {
-        Ok(prepared.predicted(effects, COARSE_NODES))
+    fn predict_coarsely(
+        prepared: &PreparedRing,
+        effects: &[RingEffect],
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Prediction>, Failure> {
+        prepared.predicted(effects, COARSE_NODES, monitor)
     }
 
     fn predict_ms(job: &Job) -> f64 {
@@ -308,37 +336,63 @@ fn faults_of_ring(k: usize, job: &Job) -> Vec<Finding> {
     faults
 }
 
-/// The ring cannot be located on its supports.
-struct Unlocated;
+/// Why a ring has no profile.
+enum Unpredicted {
+    /// It cannot be located on its supports.
+    Unlocated,
+    /// Nobody waits for it any more.
+    Cancelled,
+}
 
-impl From<Stuck> for Unlocated {
+impl From<Stuck> for Unpredicted {
     fn from(_: Stuck) -> Self {
-        Self
+        Self::Unlocated
     }
 }
 
 impl PreparedRing {
-    fn predicted(&self, effects: &[RingEffect], nodes: usize) -> Vec<Prediction> {
-        let profiles: Vec<_> = self.rings.par_iter().map(|ring| self.profile(ring, effects, nodes)).collect();
+    fn jobs(&self) -> Vec<&Job> {
+        self.rings.iter().map(|ring| &ring.job).collect()
+    }
+
+    fn predicted(
+        &self,
+        effects: &[RingEffect],
+        nodes: usize,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Prediction>, Failure> {
+        let profiles: Vec<_> = self.rings.par_iter().map(|ring| self.profile(ring, effects, nodes, monitor)).collect();
         let mut predicted = vec![Err(Missing::NoSolution); self.places.len()];
         for (ring, profile) in self.rings.iter().zip(&profiles) {
             // None where an effect is so large that the ring cannot rest on its supports.
-            let Ok(profile) = profile else { continue };
+            let profile = match profile {
+                Ok(profile) => profile,
+                Err(Unpredicted::Unlocated) => continue,
+                Err(Unpredicted::Cancelled) => return Err(Failure::Cancelled),
+            };
             for &row in &ring.rows {
                 predicted[row] = Ok(read(profile, self.places[row].1));
             }
         }
-        predicted
+        Ok(predicted)
     }
 
     /// The measured quantity at uniform body angles: the least-squares circle removed to first order (mean and first
     /// wave), or the radius.
-    fn profile(&self, ring: &TurnedRing, effects: &[RingEffect], n: usize) -> Result<Vec<f64>, Unlocated> {
+    fn profile(
+        &self,
+        ring: &TurnedRing,
+        effects: &[RingEffect],
+        n: usize,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<f64>, Unpredicted> {
         let mut all = ring.job.effects.clone();
         all.extend_from_slice(effects);
         let scene = Scene::of(&ring.job, &all);
-        let blank = scene.blank_mm(&ring.job, n).map_err(|_| Unlocated)?;
-        let turned = turn::<Unlocated>(&blank, &scene.setting, &mut |_, _| Ok(()))?;
+        let blank = scene.blank_mm(&ring.job, n).map_err(|_| Unpredicted::Unlocated)?;
+        let turned = turn::<Unpredicted>(&blank, &scene.setting, &mut |_, _| {
+            if monitor.cancelled() { Err(Unpredicted::Cancelled) } else { Ok(()) }
+        })?;
         let radii = scene.unmirrored(turned.radii_mm);
         Ok(match self.measure {
             Measure::Radius => radii,

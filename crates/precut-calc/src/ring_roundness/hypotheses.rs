@@ -6,9 +6,9 @@ use super::input::Job;
 use super::scene::Scene;
 use crate::calculator::{
     Design, Expansions, Hypotheses, Hypothesis, Inapplicability, Inapplicable, Range, Shape, Smooth, Treatment,
-    Variable,
+    Variable, values_by_name,
 };
-use crate::effects::{Cause, Fit, Parameter, RING_CAUSES, RingEffect};
+use crate::effects::{Cause, Fit, Parameter, RING_CAUSES, RingEffect, whole};
 
 /// Blocks of a trace that are held back by turns, deg: longer than what a remainder is correlated over.
 const BLOCK_DEG: f64 = 30.0;
@@ -37,26 +37,18 @@ const WAVES_TRIED: usize = 8;
 /// The catalogue, sorted by whether traces of these rings can speak about a cause.
 ///
 /// A wave with a phase is two sizes, A cos ph and A sin ph: the model is linear in both, and no phase is tried first.
-pub(super) fn hypotheses(rings: &[&Job]) -> Hypotheses {
+pub(super) fn hypotheses(rings: &[&Job], held: &[RingEffect]) -> Hypotheses {
     let mut sorted = Hypotheses::default();
     for cause in RING_CAUSES {
         match inapplicability(cause, rings) {
             Some(reason) => sorted.inapplicable.push(Inapplicable { cause, reason }),
-            None => sorted.applicable.extend(hypotheses_of(cause, rings)),
+            None => sorted.applicable.extend(hypotheses_of(cause, rings, held)),
         }
     }
     sorted
 }
 
-fn held<'a>(rings: &'a [&Job], kind: &'a str) -> impl Iterator<Item = &'a RingEffect> {
-    rings.iter().take(1).flat_map(|job| &job.effects).filter(move |effect| effect.kind() == kind)
-}
-
 fn inapplicability(cause: &'static Cause, rings: &[&Job]) -> Option<Inapplicability> {
-    let recurs = matches!(cause.kind, "initial_harmonic" | "chatter_harmonic");
-    if !recurs && held(rings, cause.kind).next().is_some() {
-        return Some(Inapplicability::InJob);
-    }
     match cause.kind {
         "spark_out_missing" if rings.iter().all(|job| job.tool.spark_out_revolutions <= 0.0) => {
             Some(Inapplicability::NothingToActOn)
@@ -69,20 +61,22 @@ fn inapplicability(cause: &'static Cause, rings: &[&Job]) -> Option<Inapplicabil
     }
 }
 
-fn hypotheses_of(cause: &'static Cause, rings: &[&Job]) -> Vec<Hypothesis> {
+fn hypotheses_of(cause: &'static Cause, rings: &[&Job], held: &[RingEffect]) -> Vec<Hypothesis> {
+    let known: Vec<f64> =
+        held.iter().filter(|effect| effect.kind() == cause.kind).filter_map(RingEffect::recurs_by).collect();
     let of = |label: String, variables: Vec<Variable>, prior_weight: f64| Hypothesis {
         cause,
         label,
         variables,
         prior_weight,
+        held: None,
     };
     match cause.kind {
         "initial_harmonic" => {
-            let known: Vec<f64> = held(rings, cause.kind).filter_map(RingEffect::recurs_by).collect();
-            let all = grid_of(cause, "order");
-            let orders = all.iter().filter(|order| !known.contains(order));
+            let grid = grid_of(cause, "order");
+            let orders = grid.iter().chain(known.iter().filter(|order| !grid.contains(order)));
             // Several waves are one cause: they share its weight.
-            let share = 1.0 / all.len() as f64;
+            let share = 1.0 / grid.len() as f64;
             let stated = |order: f64| Treatment::Stated { value: order };
             orders
                 .map(|&order| {
@@ -98,14 +92,14 @@ fn hypotheses_of(cause: &'static Cause, rings: &[&Job]) -> Vec<Hypothesis> {
             vec![of(String::new(), variables, 1.0)]
         }
         "chatter_harmonic" => {
-            let known: Vec<f64> = held(rings, cause.kind).filter_map(RingEffect::recurs_by).collect();
             let waves = grid_of(cause, "waves_per_revolution").iter().copied().filter(|m| !known.contains(m)).collect();
             let size = parameter(cause, "amplitude_mm");
-            let variables = vec![
-                variable(size, Treatment::Amplitude { prior_sd: size.prior_sd }),
-                variable(parameter(cause, "waves_per_revolution"), Treatment::Shape { grid: waves, prior: None }),
-            ];
-            vec![of(String::new(), variables, 1.0)]
+            let wave = |label, waves: Treatment| {
+                let size = variable(size, Treatment::Amplitude { prior_sd: size.prior_sd });
+                of(label, vec![size, variable(parameter(cause, "waves_per_revolution"), waves)], 1.0)
+            };
+            let of_known = known.iter().map(|&m| wave(format!("order {m}"), Treatment::Stated { value: m }));
+            of_known.chain([wave(String::new(), Treatment::Shape { grid: waves, prior: None })]).collect()
         }
         _ => {
             let treated = |p: &Parameter| match p.fit {
@@ -206,13 +200,38 @@ pub(super) fn effects(hypothesis: &Hypothesis, values: &[f64], rings: &[&Job]) -
             RingEffect::from_parameters(cause, &[cos.hypot(sin), sin.atan2(cos), order])?
         }
         ("roller_runout", &[cos, sin, ratio]) => {
-            let turned = rings.first().map_or(0.0, |job| TAU * (job.tool.revolutions + job.tool.spark_out_revolutions));
-            let phase = (sin.atan2(cos) - ratio * turned).rem_euclid(TAU);
+            let phase = (sin.atan2(cos) - ratio * turned_rad(rings)).rem_euclid(TAU);
             RingEffect::from_parameters(cause, &[cos.hypot(sin), phase, ratio])?
         }
         _ => RingEffect::from_parameters(cause, values)?,
     };
     Some(vec![effect])
+}
+
+/// All that the first ring turns.
+fn turned_rad(rings: &[&Job]) -> f64 {
+    rings.first().map_or(0.0, |job| TAU * (job.tool.revolutions + job.tool.spark_out_revolutions))
+}
+
+/// The values of a hypothesis' variables at which it is this effect.
+pub(super) fn values(hypothesis: &Hypothesis, effect: &RingEffect, rings: &[&Job]) -> Option<Vec<f64>> {
+    let stated = hypothesis.variables.last().map(|variable| &variable.treatment);
+    let quadratures = |amplitude: f64, phase: f64, wave: f64| {
+        let (sin, cos) = phase.sin_cos();
+        vec![amplitude * cos, amplitude * sin, wave]
+    };
+    match *effect {
+        RingEffect::InitialHarmonic { order, amplitude_mm, phase_rad } => {
+            let is_of = hypothesis.cause.kind == effect.kind()
+                && matches!(stated, Some(Treatment::Stated { value }) if whole(*value) == order);
+            is_of.then(|| quadratures(amplitude_mm, phase_rad, f64::from(order)))
+        }
+        RingEffect::RollerRunout { amplitude_mm, ratio, phase_rad } => (hypothesis.cause.kind == effect.kind())
+            .then(|| quadratures(amplitude_mm, phase_rad + ratio * turned_rad(rings), ratio)),
+        // One that is looked for on a grid is another one.
+        RingEffect::ChatterHarmonic { .. } if !matches!(stated, Some(Treatment::Stated { .. })) => None,
+        _ => values_by_name(hypothesis, effect),
+    }
 }
 
 /// Rows round the ring; equal angles of one ring are repeats; blocks of 30 degrees are held back by turns, in every trace

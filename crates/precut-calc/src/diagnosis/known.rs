@@ -1,0 +1,159 @@
+//! Effects that the base holds already: what is known of them, and how unsurely.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Cholesky, DMatrix};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use serde_json::Value;
+use utoipa::ToSchema;
+
+use super::subject::Setting;
+use super::weigh::{SetWeight, Weighing};
+use crate::calculator::{Failure, Prediction};
+
+/// The field that is the same a turn further.
+const PHASE: &str = "phase_rad";
+/// Share of a standard deviation by which parameters are moved for a divided difference.
+const STEP: f64 = 0.01;
+
+/// Parameters of effects that are unsure together: where the first is off by `by`, so is each of the others. One entry is
+/// independent of the next.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct JointUncertainty {
+    /// How far each parameter moves, at one standard deviation.
+    #[schema(min_items = 1, max_items = 64)]
+    pub moves: Vec<ParameterMove>,
+}
+
+/// How far a parameter moves.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ParameterMove {
+    /// Number of the effect in its list, from 1.
+    #[schema(minimum = 1, maximum = 1000, example = 1, extensions(("x-symbol" = json!("i")), ("x-unit" = json!("1"))))]
+    pub effect: u32,
+    /// Field of the effect.
+    #[schema(max_length = 64, example = "delta_um_per_n")]
+    pub parameter: String,
+    /// By how much, in the unit of the field.
+    #[schema(minimum = -1e15, maximum = 1e15, example = 0.001, extensions(("x-symbol" = json!("u")), ("x-unit" = json!("1"))))]
+    pub by: f64,
+}
+
+/// The effects of a base, and what is not known of them.
+#[derive(Debug, Clone)]
+pub struct Known<E> {
+    /// What acts in the base.
+    pub effects: Vec<E>,
+    /// How unsure that is.
+    pub unsure: Vec<JointUncertainty>,
+}
+
+impl<E> Default for Known<E> {
+    fn default() -> Self {
+        Self { effects: Vec::new(), unsure: Vec::new() }
+    }
+}
+
+impl<E: Serialize + DeserializeOwned> Known<E> {
+    /// The effects, off by so many standard deviations of one entry.
+    fn off_by(&self, entry: &JointUncertainty, deviations: f64) -> Result<Vec<E>, Failure> {
+        let unmoved = |error: serde_json::Error| Failure::Internal(format!("an effect that is moved: {error}"));
+        let mut fields: Vec<Value> =
+            self.effects.iter().map(serde_json::to_value).collect::<Result<_, _>>().map_err(unmoved)?;
+        for ParameterMove { effect, parameter, by } in &entry.moves {
+            if let Some(field) = fields.get_mut(*effect as usize - 1).and_then(|fields| fields.get_mut(parameter)) {
+                *field = Value::from(field.as_f64().unwrap_or(0.0) + deviations * by);
+            }
+        }
+        fields.into_iter().map(serde_json::from_value).collect::<Result<_, _>>().map_err(unmoved)
+    }
+
+    /// What one standard deviation of every entry does to what is predicted with the effects.
+    pub(super) fn columns(
+        &self,
+        predict: impl Fn(&[E]) -> Result<Vec<Prediction>, Failure>,
+    ) -> Result<Vec<Vec<f64>>, Failure> {
+        let column = |entry: &JointUncertainty| {
+            let (below, above) = (predict(&self.off_by(entry, -STEP)?)?, predict(&self.off_by(entry, STEP)?)?);
+            let slope = |pair: (&Prediction, &Prediction)| match pair {
+                (Ok(below), Ok(above)) => (above - below) / (2.0 * STEP),
+                _ => 0.0,
+            };
+            Ok(below.iter().zip(&above).map(slope).collect())
+        };
+        self.unsure.iter().map(column).collect()
+    }
+}
+
+/// Whether an effect has a number of that name.
+pub(super) fn has_parameter(effect: &impl Serialize, parameter: &str) -> bool {
+    serde_json::to_value(effect).is_ok_and(|fields| fields.get(parameter).is_some_and(Value::is_f64))
+}
+
+/// What a fit leaves open of the effects that it stands for, in their own parameters.
+pub(super) fn left_open<E: Serialize>(
+    weighing: &Weighing<'_>,
+    set: &SetWeight,
+    effects_of: impl Fn(&[Setting]) -> Result<Vec<E>, Failure>,
+) -> Result<Vec<JointUncertainty>, Failure> {
+    let deviations = &set.standard_deviations;
+    let free: Vec<(usize, usize)> = (0..set.settings.len())
+        .flat_map(|member| (0..deviations[member].len()).map(move |variable| (member, variable)))
+        .filter(|&(member, variable)| deviations[member][variable] > 0.0)
+        .collect();
+    let numbers = |deviations: f64, direction: &[f64]| {
+        let mut settings = set.settings.clone();
+        for (&(member, variable), by) in free.iter().zip(direction) {
+            settings[member].values[variable] += deviations * by;
+        }
+        effects_of(&settings).map(|effects| effects.iter().map(fields).collect::<Vec<_>>())
+    };
+    let mut open = Vec::new();
+    for direction in directions(weighing, set, &free).column_iter() {
+        let direction: Vec<f64> = direction.iter().copied().collect();
+        let (below, above) = (numbers(-STEP, &direction)?, numbers(STEP, &direction)?);
+        let mut moves = Vec::new();
+        for (index, (below, above)) in below.iter().zip(&above).enumerate() {
+            for ((parameter, low), (_, high)) in below.iter().zip(above) {
+                let turns = if parameter == PHASE { ((high - low) / TAU).round() } else { 0.0 };
+                let by = (high - low - TAU * turns) / (2.0 * STEP);
+                if by.abs() > 0.0 {
+                    let effect = u32::try_from(index + 1).unwrap_or(u32::MAX);
+                    moves.push(ParameterMove { effect, parameter: parameter.clone(), by });
+                }
+            }
+        }
+        if !moves.is_empty() {
+            open.push(JointUncertainty { moves });
+        }
+    }
+    Ok(open)
+}
+
+/// Numbers of an effect by the names of their fields.
+fn fields(effect: &impl Serialize) -> Vec<(String, f64)> {
+    let fields = serde_json::to_value(effect).unwrap_or_default();
+    let numbers = fields.as_object().into_iter().flatten().filter(|(_, value)| value.is_f64());
+    numbers.filter_map(|(name, value)| Some((name.clone(), value.as_f64()?))).collect()
+}
+
+/// Independent directions of one standard deviation each, as columns over the free values. What a grid of shapes widens is
+/// wider here, too.
+fn directions(weighing: &Weighing<'_>, set: &SetWeight, free: &[(usize, usize)]) -> DMatrix<f64> {
+    let deviation = |k: usize| set.standard_deviations[free[k].0][free[k].1];
+    let fit = weighing.fit(&set.members);
+    let place = |k: usize| fit.and_then(|fit| fit.free.iter().position(|of| *of == free[k]));
+    let correlation = |i: usize, j: usize| match (fit, place(i), place(j)) {
+        _ if i == j => 1.0,
+        (Some(fit), Some(a), Some(b)) => {
+            let c = &fit.covariance;
+            c[(a, b)] / (c[(a, a)] * c[(b, b)]).sqrt()
+        }
+        _ => 0.0,
+    };
+    let covariance = DMatrix::from_fn(free.len(), free.len(), |i, j| correlation(i, j) * deviation(i) * deviation(j));
+    let alone = || DMatrix::from_fn(free.len(), free.len(), |i, j| if i == j { deviation(i) } else { 0.0 });
+    Cholesky::new(covariance).map_or_else(alone, Cholesky::unpack)
+}
