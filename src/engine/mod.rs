@@ -49,7 +49,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 pub(crate) use precut_calc::calculator::Quiet;
-use precut_calc::calculator::{Cost, Failure, Message, Monitor};
+use precut_calc::calculator::{Cost, Failure, Monitor};
 use tokio::runtime::Handle;
 
 use crate::registry::{Entry, Registry};

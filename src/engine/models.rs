@@ -461,8 +461,8 @@ fn content_of(stored: &Stored, pointer: &str) -> Result<ModelContent, ModelError
     let stays = |own: &Value| named.iter().all(|found| compare::identity(found) != compare::identity(own));
     let kept: Vec<usize> =
         (of_job.len().saturating_sub(inherited)..of_job.len()).filter(|&index| stays(&of_job[index])).collect();
-    let unsure = renumbered(&input[UNCERTAINTY], |effect| kept.iter().position(|&index| index == effect));
-    let unsure_now = renumbered(&result[UNCERTAINTY], |effect| Some(kept.len() + effect));
+    let mut unsure = renumbered(&input[UNCERTAINTY], |effect| kept.iter().position(|&index| index == effect));
+    unsure.extend(renumbered(&result[UNCERTAINTY], |effect| Some(kept.len() + effect)));
     let effects = kept.iter().map(|&index| of_job[index].clone()).chain(named).collect();
     let base = canonical(&input["job"]).map_err(|error| Error::internal(format!("a kept diagnosis: {error}")))?;
     Ok(ModelContent {
@@ -477,7 +477,7 @@ fn content_of(stored: &Stored, pointer: &str) -> Result<ModelContent, ModelError
             "base_job_b3": blake3::hash(&base).to_hex().as_str(),
             "extends": input.get("model").cloned().unwrap_or(Value::Null),
             "causes": result["named"],
-            "effects_uncertainty": [unsure, unsure_now].concat(),
+            UNCERTAINTY: unsure,
             "gain": result["gain"],
         }),
     })

@@ -226,6 +226,8 @@ pub(crate) fn after_a_model_was_stored<M: Diagnosable>(trials: Trials, share: f6
         let needed = match hidden[0].as_str() {
             "wear_multiplicative" | "wear_force_additive" => Some(("flank_wear_mm", json!(0.0))),
             "batch_shift" => Some(("batch", json!("A"))),
+            "tool_wear" => Some(("tool_path_at_start_m", json!(0.0))),
+            "thermal_growth" => Some(("warm_time_at_start_min", json!(0.0))),
             _ => None,
         };
         if let Some((condition, value)) = needed {

@@ -7,7 +7,9 @@ use precut_calc::calculator::{Answer, Calculator, Check, Diagnosable, Unwatched,
 use precut_calc::deflection_compensation::DeflectionCompensation;
 use precut_calc::diagnosis::{Diagnosis, ResultOf, VerdictClass, best_evidence};
 use precut_calc::feed_schedule::FeedSchedule;
-use precut_trials::{Class, Random, deflection, machinability};
+use precut_calc::fixture_stability::FixtureStability;
+use precut_calc::ring_roundness::RingRoundness;
+use precut_trials::{Class, Random, deflection, fixture, machinability, ring};
 use serde_json::{Value, json};
 
 use crate::blind_trials::{self, Draw, seed_of};
@@ -240,6 +242,16 @@ fn the_search_over_cuts_loses_no_set() {
 #[test]
 fn the_search_over_shafts_loses_no_set() {
     search_keeps_what_is_there::<DeflectionCompensation>(deflection::draw, 78, draws(10));
+}
+
+#[test]
+fn the_search_over_rings_loses_no_set() {
+    search_keeps_what_is_there::<RingRoundness>(ring::draw, 79, draws(2));
+}
+
+#[test]
+fn the_search_over_vises_loses_no_set() {
+    search_keeps_what_is_there::<FixtureStability>(fixture::draw, 80, draws(4));
 }
 
 /// What is promised of a compensated shaft is what the path leaves that the calculator puts out.
