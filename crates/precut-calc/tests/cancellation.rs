@@ -309,7 +309,7 @@ fn a_cancelled_diagnosis_ends_soon_wherever_it_is() {
             let job = diagnosis::<FixtureStability>(base, 1);
             looked.at::<Diagnosis<FixtureStability>>(&job, &base.to_string(), &WITHIN);
         }
-        let ring = json!({"tool": {"revolutions": 2000}});
+        let ring = json!({"tool": {"spark_out_revolutions": 1000}});
         let job = diagnosis::<RingRoundness>(&ring, 1);
         looked.at::<Diagnosis<RingRoundness>>(&job, &ring.to_string(), &WITHIN);
         let shafts = diagnosis::<DeflectionCompensation>(&json!({}), 20);

@@ -246,7 +246,7 @@ fn the_search_over_shafts_loses_no_set() {
 
 #[test]
 fn the_search_over_rings_loses_no_set() {
-    search_keeps_what_is_there::<RingRoundness>(ring::draw, 79, draws(2));
+    search_keeps_what_is_there::<RingRoundness>(ring::draw, 79, draws(1));
 }
 
 #[test]

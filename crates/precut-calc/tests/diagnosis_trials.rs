@@ -51,10 +51,11 @@ fn what_the_catalogue_lacks_is_unknown() {
 fn a_stored_model_does_not_blind() {
     let stored = blind_trials::after_a_model_was_stored::<DeflectionCompensation>(
         trials("deflection-stored", Class::One, 7.5, 6, 40),
-        0.6,
+        0.25,
     );
     assert!(stored.stored >= 20, "{stored:?}");
-    assert!(stored.quiet.reaches(0.97) && stored.named.reaches(0.9) && stored.covered.reaches(0.92), "{stored:?}");
+    // What a set-up hides twice, when it was stored and now, takes a larger change.
+    assert!(stored.quiet.reaches(0.97) && stored.named.reaches(0.85) && stored.covered.reaches(0.92), "{stored:?}");
     assert_eq!(stored.wrong, 0, "{stored:?}");
 }
 

@@ -63,7 +63,8 @@ impl<E: Serialize + DeserializeOwned> Known<E> {
         let mut fields: Vec<Value> =
             self.effects.iter().map(serde_json::to_value).collect::<Result<_, _>>().map_err(unmoved)?;
         for ParameterMove { effect, parameter, by } in &entry.moves {
-            if let Some(field) = fields.get_mut(*effect as usize - 1).and_then(|fields| fields.get_mut(parameter)) {
+            let own = (*effect as usize).checked_sub(1).and_then(|index| fields.get_mut(index));
+            if let Some(field) = own.and_then(|fields| fields.get_mut(parameter)) {
                 *field = Value::from(field.as_f64().unwrap_or(0.0) + deviations * by);
             }
         }
