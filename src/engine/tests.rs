@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use futures_util::future::BoxFuture;
-use precut_calc::calculator::{Example, Failure, Finding, Unwatched};
+use precut_calc::calculator::{Example, Failure, Finding, Message, Unwatched};
 use rayon::prelude::*;
 use serde_json::{Value, json};
 use tempfile::TempDir;
