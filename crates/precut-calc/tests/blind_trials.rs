@@ -196,7 +196,7 @@ pub(crate) fn without_the_cause<M: Diagnosable>(trials: Trials) -> Mutated {
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Stored {
     /// Draws whose cause was named, and so could be stored; the others are not tried.
-    pub(crate) stored: u64,
+    pub(crate) tried: u64,
     /// Of these, how many are quiet over rows that were measured later under other conditions, nothing having changed.
     pub(crate) quiet: Share,
     /// How many name the cause that was stored where it has grown since.
@@ -236,7 +236,7 @@ pub(crate) fn after_a_model_was_stored<M: Diagnosable>(trials: Trials, share: f6
                 later.request["job"]["conditions"][condition] = value;
             }
         }
-        stored.stored += 1;
+        stored.tried += 1;
         let unsure = serde_json::to_value(&first.effects_uncertainty).unwrap();
         let mut said = Vec::new();
         if let Some(later) = &trial.later {
@@ -245,8 +245,8 @@ pub(crate) fn after_a_model_was_stored<M: Diagnosable>(trials: Trials, share: f6
             said.push(format!("later {} {}", again.verdict.name(), kinds(&again.named).join(" + ")));
         }
         let mut before = serde_json::to_value(&first.effects).unwrap();
-        let field = first.effects_uncertainty[0].moves.iter().map(|own| own.parameter.as_str());
-        let field = field.filter(|field| *field != "phase_rad").next().unwrap();
+        let mut field = first.effects_uncertainty[0].moves.iter().map(|own| own.parameter.as_str());
+        let field = field.find(|field| *field != "phase_rad").unwrap();
         let absent = if field == "factor" { 1.0 } else { 0.0 };
         let now = before[0][field].as_f64().unwrap();
         before[0][field] = json!(absent + share * (now - absent));
@@ -254,7 +254,9 @@ pub(crate) fn after_a_model_was_stored<M: Diagnosable>(trials: Trials, share: f6
         let is_right = changed.verdict == VerdictClass::Named && kinds(&changed.named) == hidden;
         stored.named.add(is_right);
         if is_right {
-            covered(&trial, &changed.named).into_iter().for_each(|held| stored.covered.add(held));
+            for held in covered(&trial, &changed.named) {
+                stored.covered.add(held);
+            }
             assert!(changed.named[0].parameters[0].was.is_some(), "{:?}", changed.named);
         } else if changed.verdict == VerdictClass::Named {
             stored.wrong += 1;

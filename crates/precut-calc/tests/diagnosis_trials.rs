@@ -53,7 +53,7 @@ fn a_stored_model_does_not_blind() {
         trials("deflection-stored", Class::One, 7.5, 6, 40),
         0.25,
     );
-    assert!(stored.stored >= 20, "{stored:?}");
+    assert!(stored.tried >= 20, "{stored:?}");
     // What a set-up hides twice, when it was stored and now, takes a larger change.
     assert!(stored.quiet.reaches(0.97) && stored.named.reaches(0.85) && stored.covered.reaches(0.92), "{stored:?}");
     assert_eq!(stored.wrong, 0, "{stored:?}");
