@@ -11,6 +11,7 @@ mod blind_trials;
 mod cancellation;
 mod cases;
 mod conformance;
+mod cylinder_fits;
 mod deflection_advice;
 mod deflection_clocks;
 mod deflection_defaults;

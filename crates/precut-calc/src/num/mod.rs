@@ -1,6 +1,7 @@
 //! Numerics with no machining words in them.
 
 pub mod beam;
+pub mod cylinder;
 pub mod dde;
 pub mod dense;
 pub mod evolve;
