@@ -110,19 +110,26 @@ fn units(job: &Job, outcome: &Outcome, table: &'static str) -> Vec<Finding> {
                 .with("looks_like", looks_like),
         );
     }
-    let radius_mm = outcome.measured.least_squares.radius_mm;
-    if let Some(nominal_mm) = job.nominal_radius_mm.filter(|nominal| (radius_mm / nominal - 1.0).abs() > UNLIKE) {
-        let ratio = radius_mm / nominal_mm;
-        let known =
-            [(2.0, "diameters"), (0.5, "nominal_diameter"), (25.4, "nominal_in_inch"), (1.0 / 25.4, "radii_in_inch")];
-        let looks_like = known.iter().find(|(factor, _)| (ratio / factor - 1.0).abs() < SAME_RATIO);
-        let finding = Finding::new("radius_unlike_nominal", format!("/{table}")).measured(radius_mm, nominal_mm, "mm");
-        found.push(match looks_like {
-            Some((_, words)) => finding.with("looks_like", *words),
-            None => finding,
-        });
-    }
+    found.extend(unlike_nominal(job.nominal_radius_mm, outcome.measured.least_squares.radius_mm, table));
     found
+}
+
+/// A radius that is not the nominal one.
+pub(in crate::ring_roundness) fn unlike_nominal(
+    nominal_mm: Option<f64>,
+    radius_mm: f64,
+    table: &'static str,
+) -> Option<Finding> {
+    let nominal_mm = nominal_mm.filter(|nominal| (radius_mm / nominal - 1.0).abs() > UNLIKE)?;
+    let ratio = radius_mm / nominal_mm;
+    let known =
+        [(2.0, "diameters"), (0.5, "nominal_diameter"), (25.4, "nominal_in_inch"), (1.0 / 25.4, "radii_in_inch")];
+    let looks_like = known.iter().find(|(factor, _)| (ratio / factor - 1.0).abs() < SAME_RATIO);
+    let finding = Finding::new("radius_unlike_nominal", format!("/{table}")).measured(radius_mm, nominal_mm, "mm");
+    Some(match looks_like {
+        Some((_, words)) => finding.with("looks_like", *words),
+        None => finding,
+    })
 }
 
 /// One reading far from its neighbours: dirt, a scratch, a jump of the probe.
@@ -171,7 +178,7 @@ fn tolerance(job: &Job, outcome: &Outcome) -> Option<Result<Message, Finding>> {
 }
 
 /// What is known to be unknown of the roundness asked for: between the points, of the spline, of the round-off.
-fn error_um(job: &Job, outcome: &Outcome) -> f64 {
+pub(in crate::ring_roundness) fn error_um(job: &Job, outcome: &Outcome) -> f64 {
     let sampling_um = sampling_um(job, outcome);
     // A peak and a valley, each with the error of the spline.
     let spline_um = if job.filter == (RoundnessFilter::None {}) || !outcome.data.filter_applied {

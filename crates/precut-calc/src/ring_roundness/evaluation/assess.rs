@@ -27,7 +27,7 @@ const LEAST_FOR_HALF: usize = 6;
 pub(super) const FAILURE_CODES: &[&str] = &["not_star_shaped", "points_without_circle"];
 
 /// Everything of a checked and filled job.
-pub(super) fn outcome(job: &Job, monitor: &dyn Monitor) -> Result<Outcome, Failure> {
+pub(in crate::ring_roundness) fn outcome(job: &Job, monitor: &dyn Monitor) -> Result<Outcome, Failure> {
     checkpoint(monitor)?;
     monitor.progress(0.0, Message::new("stage_circles"));
     let readings = Readings::of(job).map_err(|error| failure(error, None))?;

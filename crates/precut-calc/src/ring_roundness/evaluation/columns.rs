@@ -1,6 +1,6 @@
 //! What the columns of an instrument's file hold: by their names, else by their values.
 
-use super::header::{ANGLE, DEG_PER_RAD, DEVIATION, DIAMETER, INDEX, RADIUS, is_named, unit_of};
+use super::header::{ANGLE, DEG_PER_RAD, DEVIATION, DIAMETER, HEIGHT, INDEX, RADIUS, is_named, unit_of};
 use super::instrument::{Block, Column, Format, Unknown};
 
 /// The names of a block's columns: the nearest line above with as many cells, none of them a number.
@@ -63,6 +63,8 @@ pub(super) fn roles(
             Column::X(length(name, 1.0))
         } else if matches!(name.split([' ', '[', '(', '_']).next(), Some("y")) {
             Column::Y(length(name, 1.0))
+        } else if is_named(name, HEIGHT) {
+            Column::Z(length(name, 1.0))
         } else if is_named(name, DEVIATION) {
             Column::Deviation(1e3 * length(name, 1e-3))
         } else if is_named(name, INDEX) {
@@ -140,10 +142,13 @@ fn by_values(block: &Block, common: Option<f64>, nominal_mm: Option<f64>) -> Opt
             } else if is_circle(&a, &b) {
                 let mm = common.unwrap_or(1.0);
                 roles.extend([Column::X(mm), Column::Y(mm)]);
+                if rest > 2 {
+                    roles.push(Column::Z(mm));
+                }
             } else {
                 return None;
             }
-            roles.extend(vec![Column::Other; rest - 2]);
+            roles.extend(vec![Column::Other; width - roles.len()]);
         }
     }
     Some(roles)

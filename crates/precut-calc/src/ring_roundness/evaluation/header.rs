@@ -25,6 +25,8 @@ pub(super) const ANGLE: &[&str] = &[
 ];
 pub(super) const RADIUS: &[&str] =
     &["radius", "rad.", "радиус", "rayon", "raggio", "radio", "半径", "promień", "poloměr"];
+pub(super) const HEIGHT: &[&str] =
+    &["z", "height", "höhe", "hoehe", "высота", "hauteur", "altezza", "altura", "高度", "wysokość", "výška"];
 pub(super) const DIAMETER: &[&str] =
     &["diameter", "durchmesser", "диаметр", "diamètre", "diametro", "diámetro", "直径", "ø"];
 pub(super) const DEVIATION: &[&str] = &[
@@ -182,6 +184,19 @@ pub(super) fn stated_radius_mm(heading: &[String]) -> Option<f64> {
         };
         (nominal.iter().any(|word| line.contains(word)) && value > 0.0).then_some(value * share * mm.unwrap_or(1.0))
     })
+}
+
+/// The height that a line states after one of the words for it.
+pub(super) fn stated_height_mm(line: &str) -> Option<f64> {
+    let at = HEIGHT.iter().find_map(|word| {
+        let edge = |c: Option<char>| c.is_none_or(|c| !c.is_alphabetic());
+        line.match_indices(word)
+            .find(|(at, _)| edge(line[..*at].chars().next_back()) && edge(line[at + word.len()..].chars().next()))
+            .map(|(at, _)| at)
+    })?;
+    let after = &line[at..];
+    let (value, mm) = stated(&after.replace(['=', ':'], " "))?;
+    Some(value * mm.unwrap_or(1.0))
 }
 
 pub(super) fn magnification(line: &str) -> Option<f64> {

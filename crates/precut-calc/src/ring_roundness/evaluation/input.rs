@@ -101,6 +101,8 @@ pub enum FileColumn {
     XMm,
     /// Coordinate square to it in mm.
     YMm,
+    /// Height along the axis in mm: rows at different heights are different sections.
+    ZMm,
     /// Something else.
     Ignored,
 }
@@ -228,7 +230,7 @@ pub enum ReferenceCircle {
 
 impl ReferenceCircle {
     /// Its name in the contract.
-    pub(super) const fn name(self) -> &'static str {
+    pub(in crate::ring_roundness) const fn name(self) -> &'static str {
         match self {
             Self::LeastSquares => "least_squares",
             Self::MinimumZone => "minimum_zone",

@@ -2,12 +2,12 @@
 //! several sections, angle or none. What was taken for what is told; what cannot be told is asked.
 
 use super::columns::{found, names, roles};
-use super::header::{CLOCKWISE, COUNTER, has_word, magnification, stated_radius_mm};
+use super::header::{CLOCKWISE, COUNTER, has_word, magnification, stated_height_mm, stated_radius_mm};
 use super::output::RepairKind;
 
 /// What a column holds, and how many mm, um or degrees its unit is.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Column {
+pub(in crate::ring_roundness) enum Column {
     /// Degrees per unit.
     Angle(f64),
     /// mm per unit of a distance from the axis.
@@ -17,12 +17,22 @@ pub(super) enum Column {
     /// mm per unit.
     X(f64),
     Y(f64),
+    /// mm per unit of the height along the axis.
+    Z(f64),
     Other,
 }
 
 /// A section of the file.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Rows {
+pub(in crate::ring_roundness) struct FileSection {
+    pub(in crate::ring_roundness) rows: Rows,
+    /// Height of each row, mm; none where the file does not tell.
+    pub(in crate::ring_roundness) heights_mm: Vec<f64>,
+}
+
+/// Rows of a section.
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::ring_roundness) enum Rows {
     /// Angles (degrees) and radii (mm).
     Radii(Vec<(f64, f64)>),
     /// Angles (degrees) and deviations (um).
@@ -32,21 +42,21 @@ pub(super) enum Rows {
 }
 
 /// What was done to the text, and to how much of it.
-pub(super) type Done = (RepairKind, usize);
+pub(in crate::ring_roundness) type Done = (RepairKind, usize);
 
 /// A file that was understood.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Understood {
-    /// One entry per section, in the order of the file.
-    pub(super) sections: Vec<Rows>,
-    pub(super) done: Vec<Done>,
+pub(in crate::ring_roundness) struct Understood {
+    /// One entry per section, in the order of the file; rows of one block at several heights are several sections.
+    pub(in crate::ring_roundness) sections: Vec<FileSection>,
+    pub(in crate::ring_roundness) done: Vec<Done>,
     /// Nominal radius that the header states, mm.
-    pub(super) nominal_mm: Option<f64>,
+    pub(in crate::ring_roundness) nominal_mm: Option<f64>,
 }
 
 /// Why a file was not understood.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Unknown {
+pub(in crate::ring_roundness) enum Unknown {
     /// No rows of numbers.
     NoNumbers,
     /// The columns as found: name, or `?`, with the range of the values.
@@ -55,9 +65,15 @@ pub(super) enum Unknown {
 
 /// Fewest rows of a section.
 const FEWEST_ROWS: usize = 3;
+/// Heights that are nearer than this to their neighbours belong to one section, mm.
+pub(in crate::ring_roundness) const SECTION_GAP_MM: f64 = 0.2;
 
 /// Reads a file. `columns` overrides what the header says; `nominal_mm` tells deviations from radii where nothing else does.
-pub(super) fn read(text: &str, columns: &[Column], nominal_mm: Option<f64>) -> Result<Understood, Unknown> {
+pub(in crate::ring_roundness) fn read(
+    text: &str,
+    columns: &[Column],
+    nominal_mm: Option<f64>,
+) -> Result<Understood, Unknown> {
     let mut done: Vec<Done> = Vec::new();
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let lines: Vec<&str> = text.lines().map(str::trim).collect();
@@ -98,17 +114,19 @@ pub(super) fn read(text: &str, columns: &[Column], nominal_mm: Option<f64>) -> R
         if further > 0 && sections.is_empty() {
             done.push((RepairKind::ColumnsLeftOut, further));
         }
-        let rows = section(block, &roles, clockwise, magnification)
+        let read = section(block, &roles, clockwise, magnification)
             .ok_or_else(|| found(block, &names(&lines, block, format)))?;
-        if sections.is_empty() && !roles.iter().any(|role| matches!(role, Column::Angle(_) | Column::X(_))) {
+        let stated = block_height_mm(&lines, block, format);
+        let has_angles = roles.iter().any(|role| matches!(role, Column::Angle(_) | Column::X(_)));
+        if sections.is_empty() && !has_angles {
             done.push((RepairKind::AnglesSpreadEvenly, block.rows.len()));
         }
-        sections.push(rows);
+        sections.extend(at_heights(read, stated, (!has_angles).then_some(if clockwise { -360.0 } else { 360.0 })));
     }
-    if clockwise && !matches!(sections[0], Rows::Points(_)) {
+    if clockwise && !matches!(sections[0].rows, Rows::Points(_)) {
         done.push((RepairKind::TurnedRound, 1));
     }
-    if magnification.is_some_and(|by| by > 1.0) && matches!(sections[0], Rows::Deviations(_)) {
+    if magnification.is_some_and(|by| by > 1.0) && matches!(sections[0].rows, Rows::Deviations(_)) {
         done.push((RepairKind::MagnificationTakenOut, 1));
     }
     Ok(Understood { sections, done, nominal_mm: stated_mm })
@@ -223,13 +241,79 @@ fn blocks(lines: &[&str], format: Format) -> Vec<Block> {
     blocks
 }
 
-fn section(block: &Block, roles: &[Column], clockwise: bool, magnification: Option<f64>) -> Option<Rows> {
+/// The height that the lines before a block state: "Section 2, Z = 12.5 mm".
+fn block_height_mm(lines: &[&str], block: &Block, format: Format) -> Option<f64> {
+    let above = lines[..block.from].iter().rev();
+    above.take_while(|line| format.row(line).is_none()).find_map(|line| stated_height_mm(&line.to_lowercase()))
+}
+
+/// Rows of several heights as several sections, from the lowest; those of one height as they are. `turn_deg` is what rows
+/// without angles are spread over.
+fn at_heights(read: FileSection, stated_mm: Option<f64>, turn_deg: Option<f64>) -> Vec<FileSection> {
+    if read.heights_mm.is_empty() {
+        let heights_mm = stated_mm.map_or_else(Vec::new, |height| vec![height; read.rows.len()]);
+        return vec![FileSection { heights_mm, ..read }];
+    }
+    let groups = groups(&read.heights_mm, SECTION_GAP_MM);
+    // Scattered heights are not sections.
+    if groups.len() < 2 || groups.iter().any(|group| group.len() < FEWEST_ROWS) {
+        return vec![read];
+    }
+    let part = |group: &Vec<usize>| FileSection {
+        rows: read.rows.part(group, turn_deg),
+        heights_mm: group.iter().map(|&row| read.heights_mm[row]).collect(),
+    };
+    groups.iter().map(part).collect()
+}
+
+/// Which values lie together: sorted, every gap wider than `gap` begins a new group; each group in the order it came.
+pub(in crate::ring_roundness) fn groups(values: &[f64], gap: f64) -> Vec<Vec<usize>> {
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
+    let mut groups: Vec<Vec<usize>> = Vec::new();
+    let mut last = f64::NEG_INFINITY;
+    for at in order {
+        match groups.last_mut().filter(|_| values[at] - last <= gap) {
+            Some(group) => group.push(at),
+            None => groups.push(vec![at]),
+        }
+        last = values[at];
+    }
+    groups.iter_mut().for_each(|group| group.sort_unstable());
+    groups
+}
+
+impl Rows {
+    pub(in crate::ring_roundness) fn len(&self) -> usize {
+        match self {
+            Self::Radii(rows) | Self::Deviations(rows) | Self::Points(rows) => rows.len(),
+        }
+    }
+
+    /// Some of the rows; those without angles spread over a turn anew.
+    fn part(&self, of: &[usize], turn_deg: Option<f64>) -> Self {
+        let angle = |at: usize, given| turn_deg.map_or(given, |turn| turn * at as f64 / of.len() as f64);
+        let row = |rows: &[(f64, f64)], at: usize, row: usize| (angle(at, rows[row].0), rows[row].1);
+        let part = |rows: &[(f64, f64)]| of.iter().enumerate().map(|(at, &from)| row(rows, at, from)).collect();
+        match self {
+            Self::Radii(rows) => Self::Radii(part(rows)),
+            Self::Deviations(rows) => Self::Deviations(part(rows)),
+            Self::Points(rows) => Self::Points(part(rows)),
+        }
+    }
+}
+
+fn section(block: &Block, roles: &[Column], clockwise: bool, magnification: Option<f64>) -> Option<FileSection> {
     let at = |fits: fn(&Column) -> bool| roles.iter().position(fits);
     let pairs =
         |i: usize, p: f64, j: usize, q: f64| block.rows.iter().map(|row| (p * row[i], q * row[j])).collect::<Vec<_>>();
+    let heights_mm = match at(|c| matches!(c, Column::Z(_))).map(|i| (i, roles[i])) {
+        Some((i, Column::Z(mm))) => block.rows.iter().map(|row| mm * row[i]).collect(),
+        _ => Vec::new(),
+    };
     if let (Some(i), Some(j)) = (at(|c| matches!(c, Column::X(_))), at(|c| matches!(c, Column::Y(_)))) {
         let (Column::X(p), Column::Y(q)) = (roles[i], roles[j]) else { return None };
-        return Some(Rows::Points(pairs(i, p, j, q)));
+        return Some(FileSection { rows: Rows::Points(pairs(i, p, j, q)), heights_mm });
     }
     let value = at(|c| matches!(c, Column::Radius(_) | Column::Deviation(_)))?;
     let n = block.rows.len() as f64;
@@ -239,9 +323,10 @@ fn section(block: &Block, roles: &[Column], clockwise: bool, magnification: Opti
         _ => (0..block.rows.len()).map(|i| sense * 360.0 * i as f64 / n).collect(),
     };
     let with = |by: f64| angles.iter().zip(&block.rows).map(|(angle, row)| (*angle, by * row[value])).collect();
-    match roles[value] {
-        Column::Radius(mm) => Some(Rows::Radii(with(mm))),
-        Column::Deviation(um) => Some(Rows::Deviations(with(um / magnification.unwrap_or(1.0)))),
-        _ => None,
-    }
+    let rows = match roles[value] {
+        Column::Radius(mm) => Rows::Radii(with(mm)),
+        Column::Deviation(um) => Rows::Deviations(with(um / magnification.unwrap_or(1.0))),
+        _ => return None,
+    };
+    Some(FileSection { rows, heights_mm })
 }

@@ -4,16 +4,16 @@
 //! [`crate::num::roundness`] (circles with proofs, spline, filter, spectrum) -> `assess` -> `output`; `advice` says
 //! what dominates and what looks wrong, `picture` draws.
 
-mod advice;
-mod assess;
+pub(super) mod advice;
+pub(super) mod assess;
 mod check;
 mod columns;
 mod header;
 mod input;
-mod instrument;
+pub(super) mod instrument;
 mod output;
 mod picture;
-mod readings;
+pub(super) mod readings;
 
 pub use input::{
     FileColumn, InstrumentFile, Job, MAX_POINTS, ReferenceCircle, RoundnessDeviationRow, RoundnessFilter,
@@ -39,7 +39,7 @@ impl Calculator for RoundnessEvaluation {
     const META: Meta = Meta {
         id: "roundness-evaluation",
         kind: CalculatorKind::Evaluation,
-        version: 2,
+        version: 3,
         title: "Roundness evaluation",
         question: "How round is this measured section, about which circle, and what form has the error?",
         summary: "From measured radii, deviations or points of a round section: the least-squares, minimum-zone, \

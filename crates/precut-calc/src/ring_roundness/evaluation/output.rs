@@ -73,7 +73,7 @@ pub struct RoundnessRepair {
 }
 
 impl RoundnessRepair {
-    pub(super) fn new(kind: RepairKind, count: usize, change_um: f64) -> Self {
+    pub(in crate::ring_roundness) fn new(kind: RepairKind, count: usize, change_um: f64) -> Self {
         Self { kind, count, change_um }
     }
 }
@@ -110,7 +110,7 @@ pub enum RepairKind {
 
 impl RepairKind {
     /// Its name, as in the contract.
-    pub(super) const fn name(self) -> &'static str {
+    pub(in crate::ring_roundness) const fn name(self) -> &'static str {
         match self {
             Self::ClosingRowLeftOut => "closing_row_left_out",
             Self::TurnsLaidOnEachOther => "turns_laid_on_each_other",

@@ -50,9 +50,7 @@ impl Table {
 pub(super) fn count(job: &Job) -> usize {
     let radii = job.radii.as_ref().map_or(0, |table| table.rows().len());
     let deviations = job.deviations.as_ref().map_or(0, |table| table.rows().len());
-    let in_file = file_rows(job).map_or(0, |rows| match rows {
-        Rows::Radii(rows) | Rows::Deviations(rows) | Rows::Points(rows) => rows.len(),
-    });
+    let in_file = file_rows(job).map_or(0, |rows| rows.len());
     radii + deviations + job.points.as_ref().map_or(0, |table| table.rows().len()) + in_file
 }
 
@@ -60,23 +58,28 @@ pub(super) fn count(job: &Job) -> usize {
 const SAME_PLACE: f64 = 1e-6;
 
 /// The points in counter-clockwise order, their least-squares circle, and where they stood.
-pub(super) struct Readings {
-    pub(super) section: Section,
+pub(in crate::ring_roundness) struct Readings {
+    pub(in crate::ring_roundness) section: Section,
     pub(super) circle: LeastSquares,
     /// Row of the job's table for each point.
-    pub(super) rows: Vec<usize>,
+    pub(in crate::ring_roundness) rows: Vec<usize>,
     /// Direction of each point from the least-squares centre, degrees, 0 to 360.
     pub(super) angles_deg: Vec<f64>,
     /// Widest angle between neighbours, degrees, and the point after it.
     pub(super) largest_gap: (f64, usize),
     /// What was put right in reading.
-    pub(super) repairs: Vec<RoundnessRepair>,
+    pub(in crate::ring_roundness) repairs: Vec<RoundnessRepair>,
 }
 
 /// The file of a job as it is understood.
 pub(super) fn file(job: &Job) -> Option<Result<Understood, Unknown>> {
-    const DEG_PER_RAD: f64 = 180.0 / std::f64::consts::PI;
     let file = job.file.as_ref()?;
+    Some(instrument::read(&file.text, &columns(&file.columns), job.nominal_radius_mm))
+}
+
+/// Columns as a job names them.
+pub(in crate::ring_roundness) fn columns(named: &[FileColumn]) -> Vec<Column> {
+    const DEG_PER_RAD: f64 = 180.0 / std::f64::consts::PI;
     let column = |column: &FileColumn| match column {
         FileColumn::AngleDeg => Column::Angle(1.0),
         FileColumn::AngleRad => Column::Angle(DEG_PER_RAD),
@@ -86,16 +89,16 @@ pub(super) fn file(job: &Job) -> Option<Result<Understood, Unknown>> {
         FileColumn::DeviationMm => Column::Deviation(UM_PER_MM),
         FileColumn::XMm => Column::X(1.0),
         FileColumn::YMm => Column::Y(1.0),
+        FileColumn::ZMm => Column::Z(1.0),
         FileColumn::Ignored => Column::Other,
     };
-    let columns: Vec<Column> = file.columns.iter().map(column).collect();
-    Some(instrument::read(&file.text, &columns, job.nominal_radius_mm))
+    named.iter().map(column).collect()
 }
 
 /// The section of the file that is asked for.
 fn file_rows(job: &Job) -> Option<Rows> {
     let section = (job.file.as_ref()?.section as usize).checked_sub(1)?;
-    file(job)?.ok()?.sections.into_iter().nth(section)
+    file(job)?.ok()?.sections.into_iter().nth(section).map(|section| section.rows)
 }
 
 /// Whether the readings are deviations.
@@ -118,7 +121,7 @@ struct Reading {
 
 impl Readings {
     /// Of a job with one table; a deviation without nominal radius counts from 0.
-    pub(super) fn of(job: &Job) -> Result<Self, RoundnessError> {
+    pub(in crate::ring_roundness) fn of(job: &Job) -> Result<Self, RoundnessError> {
         let mut repairs = Vec::new();
         if let Some(Ok(read)) = file(job) {
             repairs.extend(read.done.into_iter().map(|(kind, count)| RoundnessRepair::new(kind, count, 0.0)));
