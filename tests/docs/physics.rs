@@ -22,7 +22,8 @@ const CATALOGUES: [(&[Cause], &str); 4] = [
 ];
 
 /// Groups of equations.
-const GROUPS: [&str; 7] = ["deflection/", "diagnosis/", "feed/", "fit/", "fixture/", "ring/", "roundness/"];
+const GROUPS: [&str; 9] =
+    ["clamping/", "cylindricity/", "deflection/", "diagnosis/", "feed/", "fit/", "fixture/", "ring/", "roundness/"];
 
 /// Equations that have a heading: its first word.
 fn documented() -> BTreeSet<String> {

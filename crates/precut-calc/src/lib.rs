@@ -27,6 +27,7 @@ pub fn register(registrar: &mut impl Registrar) {
     registrar.diagnosable::<deflection_compensation::DeflectionCompensation>();
     registrar.diagnosable::<ring_roundness::RingRoundness>();
     registrar.calculator::<ring_roundness::evaluation::RoundnessEvaluation>();
+    registrar.calculator::<ring_roundness::cylindricity::CylindricityEvaluation>();
     registrar.diagnosable::<feed_schedule::FeedSchedule>();
     registrar.calculator::<feed_schedule::fit::MachinabilityFit>();
     registrar.diagnosable::<fixture_stability::FixtureStability>();

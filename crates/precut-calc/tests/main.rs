@@ -12,6 +12,7 @@ mod cancellation;
 mod cases;
 mod conformance;
 mod cylinder_fits;
+mod cylindricity_evaluation;
 mod deflection_advice;
 mod deflection_clocks;
 mod deflection_defaults;

@@ -11,6 +11,7 @@
 mod advice;
 mod causes;
 mod check;
+pub mod cylindricity;
 pub mod evaluation;
 mod forward;
 mod hypotheses;
