@@ -15,6 +15,7 @@ pub mod machinability;
 pub mod material;
 pub mod num;
 pub mod path;
+pub mod ring_clamping;
 pub mod ring_roundness;
 pub mod shaft;
 pub mod turning;
@@ -28,6 +29,7 @@ pub fn register(registrar: &mut impl Registrar) {
     registrar.diagnosable::<ring_roundness::RingRoundness>();
     registrar.calculator::<ring_roundness::evaluation::RoundnessEvaluation>();
     registrar.calculator::<ring_roundness::cylindricity::CylindricityEvaluation>();
+    registrar.calculator::<ring_clamping::RingClamping>();
     registrar.diagnosable::<feed_schedule::FeedSchedule>();
     registrar.calculator::<feed_schedule::fit::MachinabilityFit>();
     registrar.diagnosable::<fixture_stability::FixtureStability>();

@@ -76,6 +76,7 @@ mod machinability_real;
 mod material_library;
 mod path_chords;
 mod ring_cases;
+mod ring_clamping;
 mod ring_contract;
 mod ring_effects;
 mod ring_reference;
