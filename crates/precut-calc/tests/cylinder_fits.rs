@@ -131,7 +131,7 @@ fn no_search_finds_a_cylinder_that_the_proof_excludes() {
                 for _ in 0..24 {
                     let to = at.map(|end| end + size * random.random_range(-1.0..1.0_f64));
                     let there = value_mm(kind, &moved(to), &points);
-                    if there < best {
+                    if there < best && to.iter().all(|end| end.abs() <= within) {
                         (best, at, gained) = (there, to, true);
                     }
                 }

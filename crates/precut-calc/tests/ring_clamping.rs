@@ -118,8 +118,11 @@ fn the_largest_moment_is_that_under_a_load() {
 
 #[test]
 fn jaws_all_round_press_evenly_and_from_inside_the_other_way() {
-    let even = solve(&jaws(4.0, 3, &json!({ "contact_angle_deg": 120.0 }))).output;
+    let mut all_round = jaws(4.0, 3, &json!({ "contact_angle_deg": 120.0 }));
+    all_round["roundness_tolerance_um"] = json!(1.0);
+    let even = solve(&all_round).output;
     assert!(even.roundness_um < 1e-6, "{}", even.roundness_um);
+    assert_eq!(even.limits.unwrap().force_per_jaw_max_n, None);
     let outside = solve(&jaws(4.0, 3, &json!({}))).output;
     let inside = solve(&jaws(4.0, 3, &json!({ "grip": "inside" }))).output;
     assert!((outside.roundness_um / inside.roundness_um - 1.0).abs() < 1e-9);
@@ -170,7 +173,28 @@ fn what_is_advised_is_done_and_comes() {
         let there = solve(&job).output.roundness_um;
         assert!((there - other.roundness_um).abs() <= 1e-9 * there, "{other:?}: {there}");
     }
-    assert!(codes(&first).contains(&"other_jaws"));
+}
+
+/// Where the jaws given cannot hold the cut and keep the tolerance, those that are named can: at the force that must be.
+#[test]
+fn the_jaws_that_are_named_do_what_the_given_ones_cannot() {
+    let mut job = jaws(10.0, 3, &json!({ "contact_angle_deg": 20.0, "force_per_jaw_n": 2000.0 }));
+    job["roundness_tolerance_um"] = json!(10.0);
+    job["cutting"] = json!({ "tangential_force_n": 250, "cutting_diameter_mm": 130 });
+    let first = solve(&job);
+    let finding = first.warnings.iter().find(|finding| finding.code == "no_force_fits").unwrap();
+    let number = |name: &str| match finding.values.get(name) {
+        Some(precut_calc::calculator::Value::Number(number)) => *number,
+        other => panic!("{name}: {other:?}"),
+    };
+    let (count, angle) = (number("jaws"), number("contact_angle_deg"));
+    job["holding"] =
+        json!({ "kind": "jaws", "jaws": count as u32, "force_per_jaw_n": 1.0, "contact_angle_deg": angle });
+    let least = solve(&job).output.limits.unwrap().force_per_jaw_min_n.unwrap();
+    job["holding"]["force_per_jaw_n"] = json!(1.0001 * least);
+    let second = solve(&job);
+    assert!(second.warnings.is_empty(), "{:?}", codes(&second));
+    assert!(!codes(&second).contains(&"other_jaws"));
 }
 
 /// Jaws one by one are jaws: any contacts are sums of waves, and must balance.

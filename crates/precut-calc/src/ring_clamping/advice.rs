@@ -42,7 +42,13 @@ pub(super) fn warnings(job: &Job, outcome: &Outcome) -> Vec<Finding> {
         if let (Some(most), Some(least)) = (limits.force_per_jaw_max_n, limits.force_per_jaw_min_n)
             && least > most
         {
-            found.push(Finding::new("no_force_fits", "/holding").measured(least, most, "N"));
+            let finding = Finding::new("no_force_fits", "/holding").measured(least, most, "N");
+            found.push(match best_other(job, outcome) {
+                Some(other) => {
+                    finding.with("jaws", f64::from(other.jaws)).with("contact_angle_deg", other.contact_angle_deg)
+                }
+                None => finding,
+            });
         }
     }
     let ring = job.ring();
@@ -61,7 +67,7 @@ pub(super) fn warnings(job: &Job, outcome: &Outcome) -> Vec<Finding> {
     found
 }
 
-pub(super) fn explanation(outcome: &Outcome) -> Vec<Message> {
+pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
     let mut said = Vec::new();
     let lobes = &outcome.lobes;
     let largest = (0..lobes.order.len()).max_by(|&a, &b| lobes.amplitude_um[a].total_cmp(&lobes.amplitude_um[b]));
@@ -85,7 +91,8 @@ pub(super) fn explanation(outcome: &Outcome) -> Vec<Message> {
         said.extend(limits.force_per_jaw_max_n.map(|n| Message::new("force_may_be").with("force_n", n)));
         said.extend(limits.force_per_jaw_min_n.map(|n| Message::new("force_must_be").with("force_n", n)));
     }
-    said.extend(best_other(outcome).map(|other| {
+    let other = best_other(job, outcome).filter(|_| !is_enough(job, outcome));
+    said.extend(other.map(|other| {
         Message::new("other_jaws")
             .with("jaws", f64::from(other.jaws))
             .with("contact_angle_deg", other.contact_angle_deg)
@@ -95,9 +102,24 @@ pub(super) fn explanation(outcome: &Outcome) -> Vec<Message> {
     said
 }
 
-/// The fewest jaws that leave much less, of these the best.
-fn best_other(outcome: &Outcome) -> Option<&OtherJaws> {
-    let better = || outcome.alternatives.iter().filter(|other| other.roundness_um < BETTER * outcome.roundness_um);
+/// The fewest other jaws that do what is asked, of these the best: hold the cut and keep the tolerance, else keep the
+/// tolerance, else leave much less.
+fn best_other<'o>(job: &Job, outcome: &'o Outcome) -> Option<&'o OtherJaws> {
+    let Holding::Jaws { jaws, .. } = &job.holding else { return None };
+    let needed_n = outcome.limits.and_then(|limits| limits.force_per_jaw_min_n).map(|each| each * f64::from(*jaws));
+    let is_better = |other: &&OtherJaws| match (needed_n, job.roundness_tolerance_um) {
+        (Some(sum_n), Some(_)) => other.force_per_jaw_max_n.is_none_or(|most| most * f64::from(other.jaws) >= sum_n),
+        (None, Some(tolerance_um)) => other.roundness_um <= tolerance_um,
+        (_, None) => other.roundness_um < BETTER * outcome.roundness_um,
+    };
+    let better = || outcome.alternatives.iter().filter(is_better);
     let fewest = better().map(|other| other.jaws).min()?;
     better().filter(|other| other.jaws == fewest).min_by(|a, b| a.roundness_um.total_cmp(&b.roundness_um))
+}
+
+/// Whether the jaws as they are do all that is asked.
+fn is_enough(job: &Job, outcome: &Outcome) -> bool {
+    let window = outcome.limits.map(|limits| (limits.force_per_jaw_min_n, limits.force_per_jaw_max_n));
+    let fits = !matches!(window, Some((Some(least), Some(most))) if least > most);
+    fits && job.roundness_tolerance_um.is_some_and(|tolerance| outcome.roundness_um <= tolerance)
 }

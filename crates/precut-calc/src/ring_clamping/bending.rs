@@ -61,7 +61,7 @@ impl Ring {
     pub(super) fn waves(&self, presses: &[Press]) -> Vec<Wave> {
         let (stretch, shear) = (self.stretch(), self.shear());
         let unit = self.radius_mm.powi(3) / (PI * self.modulus_n_per_mm2 * self.inertia_mm4());
-        self.load(presses, |k| {
+        Self::load(presses, |k| {
             let kk = k * k;
             unit * (1.0 - stretch + kk * shear) / ((kk - 1.0) * (kk - 1.0))
         })
@@ -69,7 +69,7 @@ impl Ring {
 
     /// Bending moment along the ring, N mm.
     pub(super) fn moment_n_mm(&self, presses: &[Press]) -> Vec<f64> {
-        profile(&self.load(presses, |k| self.radius_mm / PI / (k * k - 1.0)))
+        profile(&Self::load(presses, |k| self.radius_mm / PI / (k * k - 1.0)))
     }
 
     /// Largest bending stress, N/mm².
@@ -79,7 +79,7 @@ impl Ring {
     }
 
     /// The waves of the load from the second order on, each times its factor.
-    fn load(&self, presses: &[Press], factor: impl Fn(f64) -> f64) -> Vec<Wave> {
+    fn load(presses: &[Press], factor: impl Fn(f64) -> f64) -> Vec<Wave> {
         (2..=HIGHEST)
             .filter_map(|order| {
                 let k = order as f64;

@@ -36,6 +36,9 @@ const LOBES: usize = 12;
 /// Waves below this share of the largest are left out.
 const SMALLEST: f64 = 1e-6;
 
+/// Roundness that is rounding.
+const NO_LOBES_UM: f64 = 1e-6;
+
 /// The calculator.
 #[derive(Debug, Clone, Copy)]
 pub struct RingClamping;
@@ -105,7 +108,7 @@ impl Calculator for RingClamping {
     fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
         let output = outcome(job, monitor)?;
         let warnings = advice::warnings(job, &output);
-        let explanation = advice::explanation(&output);
+        let explanation = advice::explanation(job, &output);
         monitor.progress(1.0, Message::new("stage_done"));
         Ok(Answer { output, warnings, explanation, basis: BASIS.to_vec() })
     }
@@ -240,9 +243,10 @@ fn roundness_um(ring: &Ring, released_mm: &[f64]) -> Result<f64, Failure> {
     Ok(UM_PER_MM * found.least_squares.span.width_mm())
 }
 
-/// The force at which the roundness is the tolerance: both grow alike.
+/// The force at which the roundness is the tolerance: both grow alike. `None` where jaws all round leave no lobes.
 fn allowed_n(job: &Job, force_n: f64, roundness_um: f64) -> Option<f64> {
-    job.roundness_tolerance_um.map(|tolerance_um| force_n * tolerance_um / roundness_um)
+    let tolerance_um = job.roundness_tolerance_um?;
+    (roundness_um > NO_LOBES_UM).then(|| force_n * tolerance_um / roundness_um)
 }
 
 /// The force per jaw that the cut asks for: friction at the jaws' diameter against torque and feed force.

@@ -57,7 +57,7 @@ pub struct ReleasedProfile {
 /// How hard jaws may and must press.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct GripLimits {
-    /// Force per jaw at which the roundness is the tolerance; absent without a tolerance.
+    /// Force per jaw at which the roundness is the tolerance; absent without a tolerance or without lobes.
     #[schema(extensions(("x-unit" = json!("N"))))]
     pub force_per_jaw_max_n: Option<f64>,
     /// Force per jaw that the cut asks for; absent without one.
@@ -80,7 +80,7 @@ pub struct OtherJaws {
     /// `RONt` of the ring let go.
     #[schema(extensions(("x-unit" = json!("um"))))]
     pub roundness_um: f64,
-    /// Force per jaw at which the roundness is the tolerance; absent without a tolerance.
+    /// Force per jaw at which the roundness is the tolerance; absent without a tolerance or without lobes.
     #[schema(extensions(("x-unit" = json!("N"))))]
     pub force_per_jaw_max_n: Option<f64>,
 }

@@ -63,7 +63,9 @@ pub(super) fn seen(axis: Axis, points: &[Point]) -> (Axis, Vec<Local>, f64) {
     let heights = seen.iter().map(|local| local.height_mm);
     let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), z| (l.min(z), h.max(z)));
     let middle_mm = 0.5 * (low + high);
-    seen.iter_mut().for_each(|local| local.height_mm -= middle_mm);
+    for local in &mut seen {
+        local.height_mm -= middle_mm;
+    }
     (Axis { origin_mm: axis.place_mm([0.0; 2], middle_mm), ..axis }, seen, 0.5 * (high - low))
 }
 

@@ -66,6 +66,7 @@ pub(super) fn line(places: &[(f64, f64)]) -> Line {
 /// The second-degree part of the radii: how much larger the radius is in the middle than at the ends, and the polynomial
 /// in the share of half the length that has no straight part by least squares.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(clippy::struct_field_names, reason = "units stand in the name")]
 pub(super) struct Barrel {
     /// Radius in the middle less that at the ends, mm.
     pub(super) rise_mm: f64,
@@ -106,11 +107,15 @@ pub(super) fn without(forms: &[Form], part: PartKind) -> Option<Vec<Form>> {
         PartKind::Roundness => left.iter_mut().flat_map(|f| &mut f.samples).for_each(|sample| sample.off_mm = 0.0),
         PartKind::Taper => {
             let radii = line(&forms.iter().map(|f| (f.height_mm, f.radius_mm)).collect::<Vec<_>>());
-            left.iter_mut().for_each(|f| f.radius_mm -= radii.slope * (f.height_mm - radii.middle_mm));
+            for form in &mut left {
+                form.radius_mm -= radii.slope * (form.height_mm - radii.middle_mm);
+            }
         }
         PartKind::Barrel => {
             let barrel = barrel(forms)?;
-            left.iter_mut().for_each(|f| f.radius_mm -= barrel.at(f.height_mm));
+            for form in &mut left {
+                form.radius_mm -= barrel.at(form.height_mm);
+            }
         }
         PartKind::Bend => {
             if forms.len() < 3 {
@@ -118,7 +123,9 @@ pub(super) fn without(forms: &[Form], part: PartKind) -> Option<Vec<Form>> {
             }
             for k in [0, 1] {
                 let centres = line(&forms.iter().map(|f| (f.height_mm, f.centre_mm[k])).collect::<Vec<_>>());
-                left.iter_mut().for_each(|f| f.centre_mm[k] = centres.at(f.height_mm));
+                for form in &mut left {
+                    form.centre_mm[k] = centres.at(form.height_mm);
+                }
             }
         }
     }

@@ -279,7 +279,9 @@ pub(in crate::ring_roundness) fn groups(values: &[f64], gap: f64) -> Vec<Vec<usi
         }
         last = values[at];
     }
-    groups.iter_mut().for_each(|group| group.sort_unstable());
+    for group in &mut groups {
+        group.sort_unstable();
+    }
     groups
 }
 
