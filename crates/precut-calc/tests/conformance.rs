@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
 use precut_calc::calculator::{
-    Calculator, Cells, Check, Failure, Figure, ForwardModel, Frame, Item, Message, Monitor, Registrar, Unwatched,
-    Violations,
+    Along, Calculator, Cells, Check, Failure, Figure, ForwardModel, Frame, Handle, Item, Message, Monitor, Move,
+    Registrar, Unwatched, Violations,
 };
 use serde_json::Value;
 
@@ -111,6 +111,11 @@ fn example_runs_and_repeats<C: Calculator>(job: &C::Input, example: &str) -> Vec
     for figure in &figures {
         figure_is_sound(figure, &declared(codes.labels), &at);
         figure_stands_where_its_numbers_do(figure, &numbers, &at);
+        for item in figure.panels.iter().flat_map(|panel| &panel.items) {
+            if let Item::Handle(handle) = item {
+                handle_moves_the_job::<C>(handle, &filled, &at);
+            }
+        }
     }
     has.extend(in_declared_order(tables.iter().map(|table| table.id), C::META.tables, &at));
     for table in &tables {
@@ -190,6 +195,41 @@ fn figure_stands_where_its_numbers_do(figure: &Figure, numbers: &BTreeSet<String
     }
 }
 
+/// Wherever a handle goes within its reach, the job that follows it is one that may be asked, and the handle is then there.
+fn handle_moves_the_job<C: Calculator>(handle: &Handle, filled: &Value, at: &str) {
+    let place = |handle: &Handle| if handle.along == Along::X { handle.x } else { handle.y };
+    let (from, [least, most]) = (place(handle), handle.reach);
+    assert!(least <= from && from <= most && !handle.moves.is_empty(), "{at}: {} stands beside its reach", handle.name);
+    for to in [least, 0.5 * (least + from), 0.5 * (from + most), most] {
+        let mut job = filled.clone();
+        for Move { pointer, per_unit } in &handle.moves {
+            let number = job.pointer_mut(pointer).unwrap_or_else(|| panic!("{at}: {pointer} is not in the job"));
+            *number = (number.as_f64().unwrap() + per_unit * (to - from)).into();
+        }
+        let mut job: C::Input = serde_json::from_value(job).unwrap();
+        let mut violations = Violations::default();
+        job.check(&mut violations);
+        let faults = violations.into_vec();
+        // Two supports at one place are told apart by nobody.
+        let others: Vec<_> = faults.iter().filter(|fault| fault.code != "duplicate_support").collect();
+        assert!(others.is_empty(), "{at}: {} at {to}: {others:?}", handle.name);
+        if !faults.is_empty() {
+            continue;
+        }
+        C::fill(&mut job);
+        let Ok(answer) = C::run(&job, &Unwatched) else { continue };
+        let is_it = |other: &&Handle| other.name == handle.name && other.moves == handle.moves;
+        let figures = C::figures(&job, &answer.output);
+        let moved = figures
+            .iter()
+            .flat_map(|figure| &figure.panels)
+            .flat_map(|panel| &panel.items)
+            .find_map(|item| if let Item::Handle(other) = item { Some(other).filter(is_it) } else { None });
+        let there = moved.map_or(f64::NAN, place);
+        assert!((there - to).abs() <= 1e-6 * most.abs(), "{at}: {} went to {to} and is at {there}", handle.name);
+    }
+}
+
 fn figure_is_sound(figure: &Figure, labels: &BTreeSet<&'static str>, at: &str) {
     let known = |code: &str| assert!(labels.contains(code), "{at}: undeclared label {code}");
     known(figure.title.code);
@@ -232,6 +272,7 @@ fn figure_is_sound(figure: &Figure, labels: &BTreeSet<&'static str>, at: &str) {
                     assert!(ribbons, "{at}: ribbons stand in a panel of their own");
                 }
                 Item::Glyph { x, y, .. } => assert!(x.is_finite() && y.is_finite(), "{at}"),
+                Item::Handle(handle) => known(handle.name),
             }
         }
     }

@@ -42,6 +42,8 @@ pub(super) fn items(
             | Item::Outline { name, .. } => *name,
             Item::HeatMap { value, .. } => value.label,
             Item::Glyph { glyph, .. } => glyph::label(*glyph),
+            // Nobody takes hold of paper.
+            Item::Handle(_) => continue,
         };
         put!(page, "<g><title>{}</title>", Escaped(&(wording.label)(code)));
         // Between a curve and the colours under it.
@@ -78,6 +80,7 @@ pub(super) fn items(
                     put!(page, "</g>");
                 }
             }
+            Item::Handle(_) => {}
         }
         put!(page, "</g>");
     }

@@ -70,6 +70,12 @@ pub trait Diagnosable:
         ranges: Ranges<'_>,
     ) -> Vec<NextRun<Self::Run, Self::Point>>;
 
+    /// Where a row of a next run would be measured, by the fields of a row; nothing where its run says it all, or where
+    /// another point is of the same row.
+    fn place(_point: &Self::Point) -> Vec<(&'static str, Option<f64>)> {
+        Vec::new()
+    }
+
     /// What comes of the decision that the job's user makes with the effects `believed` (the path that is compensated, the
     /// schedule, the depth), where each of `acting` is what really acts; both stand beside the job's own effects. What
     /// the job leaves to its runs is as in the first. Empty where the job decides nothing.

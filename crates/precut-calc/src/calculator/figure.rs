@@ -174,6 +174,46 @@ pub enum Item {
         /// Where its tip is.
         y: f64,
     },
+    /// A place that can be taken hold of where the picture is a live one; a printed picture does not have it.
+    Handle(Handle),
+}
+
+/// A place of a picture that numbers of the job follow when it is moved along one axis.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Handle {
+    /// Code of what it is called.
+    pub name: &'static str,
+    /// Where it is.
+    pub x: f64,
+    /// Where it is.
+    pub y: f64,
+    /// The axis along which it goes.
+    pub along: Along,
+    /// How far it goes: its least and its largest place on that axis.
+    pub reach: [f64; 2],
+    /// Places at which it stops when it comes near them.
+    pub stops: Vec<f64>,
+    /// The numbers that follow it.
+    pub moves: Vec<Move>,
+}
+
+/// An axis of a panel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Along {
+    /// The abscissa.
+    X,
+    /// The ordinate.
+    Y,
+}
+
+/// A number of the job that follows a handle.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Move {
+    /// Its place in the job.
+    pub pointer: String,
+    /// By how much it changes when the handle goes on by one.
+    pub per_unit: f64,
 }
 
 /// What a thing in a picture stands for; the renderer chooses colour and stroke, never colour alone.

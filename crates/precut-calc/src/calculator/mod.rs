@@ -22,7 +22,7 @@ pub use consequence::{Allowed, Consequence};
 pub use design::{Condition, Design, Grouping, Smooth};
 pub(crate) use diagnosable::values_by_name;
 pub use diagnosable::{ClassLimits, Diagnosable, LimitCurve, Measurement, NextRun, Reading};
-pub use figure::{Axis, Figure, Frame, Glyph, Item, Panel, Role, Spacing};
+pub use figure::{Along, Axis, Figure, Frame, Glyph, Handle, Item, Move, Panel, Role, Spacing};
 pub use finding::{Finding, Message, Value, Values, Violations};
 pub use forward::{Column as JacobianColumn, ForwardModel, Missing, Prediction, PrepareError, Quantity, Rows};
 pub use hypothesis::{

@@ -59,6 +59,7 @@ pub(super) const EXPLANATION_CODES: &[&str] = &[
     "weight_dominates",
     "couple_dominates",
     "offset_dominates",
+    "compensation_holds",
     "nominal_path_leaves",
     "compensated_path_leaves",
     "path_has_gaps",
@@ -71,6 +72,9 @@ pub(super) const EXPLANATION_CODES: &[&str] = &[
     "machine_taken_as_rigid",
     "effect_acts_by_default",
 ];
+
+/// Standard deviations on either side that hold 95 % of a normal scatter.
+const TWO_SIDED_95: f64 = 1.96;
 
 /// Codes of the warnings made here.
 pub(super) const WARNING_CODES: &[&str] = &[
@@ -215,7 +219,11 @@ fn placed(job: &Job, z_mm: f64) -> (AddedSupport, f64) {
 
 /// The answer in words, most important first; `dominating` says what dominates.
 pub(super) fn explanation(job: &Job, outcome: &Outcome, seen_along: &SeenAlong) -> Vec<Message> {
-    let mut said = vec![nominal_path(&outcome.before), seen_along.dominating.clone()];
+    let (nominal, dominating) = (nominal_path(&outcome.before), seen_along.dominating.clone());
+    let mut said = match decision(job, outcome, seen_along.uncertainty_um) {
+        Some(decision) => vec![decision, dominating, nominal],
+        None => vec![nominal, dominating],
+    };
     if let Some(path) = &outcome.path {
         said.push(match (outcome.form_error_after_um, outcome.largest_error_after_um) {
             (Some(form), Some(largest)) => Message::new("compensated_path_leaves")
@@ -243,6 +251,27 @@ pub(super) fn explanation(job: &Job, outcome: &Outcome, seen_along: &SeenAlong) 
     }
     said.extend(outcome.included_automatically.iter().map(|automatic| automatic.said(job)));
     said
+}
+
+/// Whether the shaft that is cut along the compensated path keeps the tolerance of its size, as surely as that is known;
+/// `None` where there is no path or no tolerance.
+fn decision(job: &Job, outcome: &Outcome, uncertainty_um: f64) -> Option<Message> {
+    let allowed_um = job.tolerance.diameter_um? / 2.0;
+    let (before, after) = (outcome.form_error_um?, outcome.form_error_after_um?);
+    let largest = outcome.largest_error_after_um?.abs();
+    let unsure_um = TWO_SIDED_95 * uncertainty_um;
+    let holds = if largest > allowed_um {
+        "no"
+    } else if largest + unsure_um > allowed_um {
+        "unsure"
+    } else {
+        "yes"
+    };
+    let message = Message::new("compensation_holds")
+        .with("before_um", before)
+        .with("after_um", seen(after, outcome))
+        .with("largest_um", seen(largest, outcome));
+    Some(message.with("unsure_um", unsure_um).with("allowed_um", allowed_um).with("holds", holds))
 }
 
 /// How much of a deviation of the blank is left: after all passes, where there are several.

@@ -387,6 +387,10 @@ impl Diagnosable for DeflectionCompensation {
         consequences(job, runs, believed, acting, monitor)
     }
 
+    fn place(point: &DeflectionPoint) -> Vec<(&'static str, Option<f64>)> {
+        vec![("z_mm", Some(point.z_mm))]
+    }
+
     fn next_runs(
         job: &Job,
         rows: &Rows<DeflectionRun, DeflectionPoint>,

@@ -102,22 +102,22 @@ impl Calculator for DeflectionCompensation {
         examples: &[
             Example {
                 id: "paper",
-                title: "Steel shaft 90 x 2000 between centres: the source paper's own",
+                title: "A shaft of 90 x 2000 mm that comes out 0.1 mm thick in the middle",
                 job: include_str!("examples/paper.json"),
             },
             Example {
                 id: "stepped_with_rest",
-                title: "Stepped shaft with a one-sided steady rest, all force components, LinuxCNC program",
+                title: "A stepped shaft in a steady rest: 77 µm too thick, and 2 µm along the compensated path",
                 job: include_str!("examples/stepped_with_rest.json"),
             },
             Example {
                 id: "chuck_and_tailstock",
-                title: "Hollow shaft in a chuck with tailstock, Kienzle force model, tool wear and a soft tailstock",
+                title: "A hollow shaft in a chuck: a worn tool and a soft tailstock make it 33 µm too thick",
                 job: include_str!("examples/chuck_and_tailstock.json"),
             },
             Example {
                 id: "two_passes",
-                title: "Roughing and finishing a crooked blank: what is copied",
+                title: "A crooked blank: how much of it is left after roughing and finishing",
                 job: include_str!("examples/two_passes.json"),
             },
         ],
@@ -319,5 +319,5 @@ const CODES: Codes = Codes {
     warnings: &[advice::WARNING_CODES, soundness::WARNING_CODES, second_order::WARNING_CODES, force::WARNING_CODES],
     explanations: &[advice::EXPLANATION_CODES],
     stages: &[&["stage_pass", "stage_advice", "stage_done"]],
-    labels: &[picture::LABEL_CODES],
+    labels: &[picture::LABEL_CODES, crate::shaft::handles::LABEL_CODES],
 };

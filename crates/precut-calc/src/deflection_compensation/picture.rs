@@ -1,11 +1,12 @@
 //! Figures and tables of an answer.
 
-use crate::calculator::{Axis, Column, Figure, Frame, Glyph, Item, Message, Panel, Role, Table};
+use crate::calculator::{Along, Axis, Column, Figure, Frame, Glyph, Item, Message, Panel, Role, Table};
 
 use super::columns::offsets_um;
 use super::input::{Job, Support};
 use super::output::{OneStep, Outcome, PathZone, StationColumns};
 use crate::shaft::elastic::ends;
+use crate::shaft::handles::handles;
 
 const Z: Axis = Axis::linear("station", "mm");
 
@@ -122,6 +123,9 @@ fn outline(job: &Job, outcome: &Outcome, height: f64) -> Panel {
         });
     }
     items.push(Item::Glyph { glyph: Glyph::Tool, x: tool_z, y: -radius_at(tool_z) });
+    // Passes have diameters of their own, which those of the drawing cannot leave behind.
+    let is_free = |item: &Item| job.passes.is_empty() || !matches!(item, Item::Handle(of) if of.along == Along::Y);
+    items.extend(handles(&job.shaft, &job.supports).into_iter().filter(is_free));
     Panel { y: Axis::linear("radius", "mm"), height, items }
 }
 

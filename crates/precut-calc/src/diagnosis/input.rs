@@ -38,7 +38,7 @@ pub struct DiagnosisJob<J: ToSchema, R: ToSchema, W: MeasuredRow + Measurement, 
     #[schema(schema_with = quantity::<W>)]
     pub quantity: String,
     /// The measured rows.
-    #[schema(schema_with = Measured::<W>::schema)]
+    #[schema(schema_with = measurements::<W>)]
     pub measurements: Measured<W>,
     /// How wrong the base may be without that being a finding.
     #[serde(default)]
@@ -58,6 +58,17 @@ fn quantity<W: Measurement>() -> RefOr<Schema> {
         .examples(known.clone().take(1))
         .enum_values(Some(known))
         .into()
+}
+
+/// Rows that name their run; a column that they do not have may be a condition of it.
+fn measurements<W: MeasuredRow>() -> RefOr<Schema> {
+    let mut schema = Measured::<W>::schema();
+    if let RefOr::T(Schema::OneOf(forms)) = &mut schema {
+        let extensions = forms.extensions.get_or_insert_default();
+        extensions.insert("x-runs".to_owned(), "runs".into());
+        extensions.insert("x-run-number".to_owned(), "run".into());
+    }
+    schema
 }
 
 /// What is looked for, and how far.

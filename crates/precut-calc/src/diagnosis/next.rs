@@ -1,5 +1,7 @@
 //! The next measurement worth making (`diagnosis/3.6`).
 
+use std::collections::BTreeMap;
+
 use super::base::Bound;
 use super::calculator::{JobOf, base_of};
 use super::data::{Data, Layout};
@@ -23,6 +25,8 @@ pub struct NextMeasurement<R> {
     pub run: R,
     /// Rows that it would bring.
     pub rows: usize,
+    /// Where they would be measured: columns by the fields of a row.
+    pub places: BTreeMap<String, Vec<Option<f64>>>,
     /// Separation of the leader from its strongest rival with the rows there are, sigmas.
     pub separation_now: f64,
     /// The same with this run measured too.
@@ -68,6 +72,7 @@ pub(super) fn next_measurement<M: Diagnosable>(
             best = Some(NextMeasurement {
                 changes: candidate.changes,
                 rows: candidate.points.len(),
+                places: columns::<M>(&candidate.points),
                 run: candidate.run,
                 separation_now,
                 separation_then,
@@ -80,6 +85,19 @@ pub(super) fn next_measurement<M: Diagnosable>(
         }
     }
     Ok(best.map(|best| NextMeasurement { candidates, ..best }))
+}
+
+/// Places as columns: the numbers of each by the names of their fields.
+fn columns<M: Diagnosable>(points: &[M::Point]) -> BTreeMap<String, Vec<Option<f64>>> {
+    let places: Vec<_> = points.iter().map(M::place).filter(|place| !place.is_empty()).collect();
+    let mut columns: BTreeMap<String, Vec<Option<f64>>> = BTreeMap::new();
+    for (row, place) in places.iter().enumerate() {
+        for &(field, value) in place {
+            columns.entry(field.to_owned()).or_insert_with(|| vec![None; places.len()])[row] = value;
+        }
+    }
+    columns.retain(|_, values| values.iter().any(Option::is_some));
+    columns
 }
 
 /// To be expected from what a run adds to the separation; no larger than a number can say.

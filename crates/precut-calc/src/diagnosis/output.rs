@@ -1,5 +1,7 @@
 //! The answer of a diagnosis.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 use utoipa::openapi::Object;
@@ -493,6 +495,10 @@ pub struct NextReport<R: ToSchema> {
     /// Rows that it would bring.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub rows: u32,
+    /// Where they would be measured: columns by the fields of a measured row, one entry per row.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[schema(extensions(("x-unit" = json!("as the field's name says"))))]
+    pub places: BTreeMap<String, Vec<Option<f64>>>,
     /// Kinds of the leading set.
     pub leader: Vec<String>,
     /// Kinds of its strongest rival; none for the base.

@@ -290,6 +290,7 @@ impl<'a> View<'a> {
             changes: next.changes.to_owned(),
             run: next.run,
             rows: count(next.rows),
+            places: next.places,
             leader: kinds(&next.leader),
             rival: kinds(&next.rival),
             separation_now_sigmas: next.separation_now,

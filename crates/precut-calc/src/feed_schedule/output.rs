@@ -338,7 +338,10 @@ pub struct Price {
     pub looser: Looser,
     /// What one percent looser takes off the objective, in percent of it; with the objective `hardening` in percentage points. Absent for whole numbers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(example = 0.893, extensions(("x-unit" = json!("percent"))))]
+    #[schema(example = 0.893, extensions(
+        ("x-unit" = json!("percent")),
+        ("x-knobs" = json!({ "pointer": "pointer", "looser": "looser", "gain": "gain_percent", "of": "/objective" }))
+    ))]
     pub gain_percent: Option<f64>,
     /// What one percent tighter adds to it, where that is something else. Absent with `solved_anew`: tighter leaves no schedule with as many edges.
     #[serde(default, skip_serializing_if = "Option::is_none")]

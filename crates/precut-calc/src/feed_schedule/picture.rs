@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use crate::calculator::{Axis, Column, Figure, Frame, Glyph, Item, Message, Panel, Role, Table};
 use crate::shaft::Support;
+use crate::shaft::handles::of_supports;
 
 use super::input::Job;
 use super::output::{Outcome, ZoneOutcome};
@@ -150,6 +151,8 @@ fn outline(job: &Job, outcome: &Outcome, height: f64) -> Panel {
             items.push(Item::Glyph { glyph, x: z, y: if on_surface { radius_at(z) } else { 0.0 } });
         }
     }
+    // Its zones have diameters of their own: of the shaft nothing can be pulled alone.
+    items.extend(job.shaft.iter().flat_map(|shaft| of_supports(shaft, &job.supports)));
     Panel { y: Axis::linear("radius", "mm"), height, items }
 }
 

@@ -292,6 +292,14 @@ impl Diagnosable for FixtureStability {
         if prepared.measure == Measure::Regime { prepared.class_limits(effects, monitor).map(Some) } else { Ok(None) }
     }
 
+    fn place(point: &FixturePoint) -> Vec<(&'static str, Option<f64>)> {
+        // A class is one row, whichever margins it speaks about; the first is always that of chatter.
+        if point.margin == RegimeMargin::Opening {
+            return Vec::new();
+        }
+        vec![("repeat", point.repeat.map(f64::from)), ("depth_mm", point.depth_mm), ("time_s", point.time_s)]
+    }
+
     fn next_runs(
         job: &FixtureJob,
         rows: &Rows<FixtureRun, FixturePoint>,

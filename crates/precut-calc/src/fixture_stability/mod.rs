@@ -91,22 +91,22 @@ impl Calculator for FixtureStability {
         examples: &[
             Example {
                 id: "paper",
-                title: "Screw vise, eight teeth, 3 mm deep: the source paper's own cut",
+                title: "Eight teeth, 3 mm deep, in a screw vise: it shakes by 15 µm and holds",
                 job: include_str!("examples/paper.json"),
             },
             Example {
                 id: "lobes",
-                title: "Lobe diagram with map of a stiff part at high speed, full slot, two teeth",
+                title: "A fast full slot: at which speeds and depths it stays quiet, and the best of them",
                 job: include_str!("examples/lobes.json"),
             },
             Example {
                 id: "pneumatic",
-                title: "Pneumatic vise: least clamp force and limits of the depth",
+                title: "How little a pneumatic vise may press, and how deep one may cut in it",
                 job: include_str!("examples/pneumatic.json"),
             },
             Example {
                 id: "opening",
-                title: "Clamped too loosely: a stable cut opens a joint and starts to chatter",
+                title: "A vise set too loosely: a stable cut opens a joint and begins to chatter",
                 job: include_str!("examples/opening.json"),
             },
         ],
@@ -120,10 +120,10 @@ impl Calculator for FixtureStability {
             Hallmark::Of("/fixture/clamp_force_n"),
         ],
         study_outputs: &[
-            "/multiplier/modulus",
             "/chatter_depth_mm",
             "/verdict/peak_to_peak_um",
             "/forced/clamp_fixed_n",
+            "/multiplier/modulus",
         ],
         codes: CODES,
         figures: picture::FIGURE_IDS,

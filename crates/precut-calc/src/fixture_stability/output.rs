@@ -612,7 +612,18 @@ pub struct SpeedLimit {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct BetterSpeed {
     /// Spindle speed.
-    #[schema(extensions(("x-unit" = json!("rev/min"))))]
+    #[schema(extensions(
+        ("x-unit" = json!("rev/min")),
+        ("x-choices" = json!({
+            "sets": {
+                "/cut/spindle_speed_rpm": "spindle_speed_rpm",
+                "/cut/depth_mm": "depth_mm",
+                "/cut/feed_mm_per_tooth": "/engagement/feed_mm_per_tooth",
+            },
+            "clears": ["/cut/speed_m_per_min", "/cut/feed_mm_per_min"],
+            "against": { "removal_rate_cm3_per_min": "/engagement/removal_rate_cm3_per_min" },
+        }))
+    ))]
     pub spindle_speed_rpm: f64,
     /// Depth to cut: a tenth short of chatter, of an opening joint and of slip, and within the other limits.
     #[schema(extensions(("x-unit" = json!("mm"))))]

@@ -32,6 +32,7 @@ pub(super) const LABEL_CODES: &[&str] = &[
     "spindle_power_limit",
     "spindle_torque_limit",
     "refined_boundary",
+    "better_speeds",
     "working_point",
     "working_depth",
     "workpiece_displacement",
@@ -163,6 +164,11 @@ fn lobes(job: &FixtureJob, outcome: &FixtureOutcome, lobes: &LobeDiagram) -> Vec
             y: refined_depth_mm.clone(),
             role: Role::Unstable,
         });
+    }
+    if !lobes.better_speeds.is_empty() {
+        let better = lobes.better_speeds.iter().map(|better| (better.spindle_speed_rpm, better.depth_mm));
+        let (x, y) = better.unzip();
+        items.push(Item::Points { name: "better_speeds", x, y, role: Role::After });
     }
     items.push(working);
     items

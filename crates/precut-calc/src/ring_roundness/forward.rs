@@ -297,6 +297,10 @@ impl Diagnosable for RingRoundness {
         design(&prepared.places)
     }
 
+    fn place(point: &RingPoint) -> Vec<(&'static str, Option<f64>)> {
+        vec![("angle_deg", Some(point.angle_deg))]
+    }
+
     fn next_runs(job: &Job, rows: &Rows<RingRun, RingPoint>, ranges: Ranges<'_>) -> Vec<NextRun<RingRun, RingPoint>> {
         next_runs(job, rows, ranges)
     }

@@ -84,27 +84,27 @@ impl Calculator for RingRoundness {
         examples: &[
             Example {
                 id: "paper",
-                title: "Ellipse 300 mm, 256 revolutions: the source paper's run as printed, located exactly",
+                title: "A ring of 300 mm that comes out 0.25 mm out of round",
                 job: include_str!("examples/paper.json"),
             },
             Example {
                 id: "clear_start",
-                title: "The same feed, the tool starting clear of the largest diameter, with the linear theory",
+                title: "The same ring, the tool starting clear of it: round to 3 µm",
                 job: include_str!("examples/clear_start.json"),
             },
             Example {
                 id: "paper_algorithm",
-                title: "The source paper's own algorithm, whose answer depends on the number of samples",
+                title: "An algorithm whose roundness depends on the number of samples",
                 job: include_str!("examples/paper_algorithm.json"),
             },
             Example {
                 id: "rollers",
-                title: "Measured blank on rollers, compliant tool, forces, one roller running out",
+                title: "A measured blank on rollers, one of which runs out: round to 10 µm",
                 job: include_str!("examples/rollers.json"),
             },
             Example {
                 id: "set_up",
-                title: "Which angles, which feed: set-up map and settings search",
+                title: "Which angles and which feed make a ring round: a map to choose from",
                 job: include_str!("examples/set_up.json"),
             },
         ],

@@ -86,7 +86,7 @@ fn shows(item: &Item) -> bool {
         Item::Band { x, .. } | Item::Points { x, .. } | Item::Ribbon { x, .. } | Item::Outline { x, .. } => {
             !x.is_empty()
         }
-        Item::Glyph { .. } => false,
+        Item::Glyph { .. } | Item::Handle(_) => false,
     }
 }
 

@@ -2,6 +2,7 @@
 
 pub(crate) mod check;
 pub(crate) mod elastic;
+pub(crate) mod handles;
 mod input;
 pub(crate) mod places;
 

@@ -67,12 +67,12 @@ impl Calculator for FixtureIdentification {
         examples: &[
             Example {
                 id: "paper_screw_vise",
-                title: "The source paper's table of a screw vise, predicted row by row with a set that was identified from it",
+                title: "A screw vise known from its table: every row predicted",
                 job: include_str!("examples/paper_screw_vise.json"),
             },
             Example {
                 id: "paper_pneumatic_vise",
-                title: "The source paper's table of a pneumatic vise, predicted row by row with the same set",
+                title: "A pneumatic vise, predicted with what the screw vise taught",
                 job: include_str!("examples/paper_pneumatic_vise.json"),
             },
             Example {
