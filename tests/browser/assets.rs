@@ -29,7 +29,8 @@ async fn the_page_is_small_and_kept_by_its_version() {
     assert!(files.len() > 12, "{files:?}");
     let version = files[0].split('/').nth(2).unwrap();
     let texts = ["en", "ru"].map(|tag| format!("/ui/{version}/text/{tag}.json"));
-    for file in files.iter().copied().chain(texts.iter().map(String::as_str)) {
+    let pictures = format!("/ui/{version}/outcomes.json");
+    for file in files.iter().copied().chain(texts.iter().map(String::as_str)).chain([pictures.as_str()]) {
         let answer = get(service.url(file)).send().await.unwrap();
         assert_eq!(answer.status(), 200, "{file}");
         assert_eq!(answer.headers()["cache-control"], "public, max-age=31536000, immutable", "{file}");

@@ -14,6 +14,7 @@ mod diagnosis;
 mod instruments;
 mod jobs;
 mod keys;
+mod offers;
 mod rooms;
 mod screenshots;
 mod service;

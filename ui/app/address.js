@@ -1,7 +1,25 @@
 // What an address of a calculator's page stands for, and the address of what is typed there.
 import * as api from './api.js';
+import { t } from './text.js';
 import { difference, changed, parts } from './schema.js';
 import { keptRun, inputOf } from './runs.js';
+
+/** A link that stands for nothing here; the message is for whoever opened it. */
+export class BrokenLink extends Error {}
+
+/** A value of an address. */
+function valueOf(place, text) {
+  try { return text === '' ? undefined : JSON.parse(text); } catch { throw new BrokenLink(t('link_value', { place, text })); }
+}
+
+/** What a key of a link is kept under; said in the user's words where nothing is. */
+async function keptBy(key, service) {
+  try {
+    return await service.jobOf(key);
+  } catch (error) {
+    throw error instanceof api.Refused && [400, 404, 410, 422].includes(error.status) ? new BrokenLink(t('link_result')) : error;
+  }
+}
 
 /** Longer addresses name the kept result instead of the changes. */
 const LONGEST_QUERY = 1600;
@@ -10,15 +28,17 @@ const LONGEST_QUERY = 1600;
 export async function jobOf(description, query, service = api) {
   const key = query.get('result');
   if (key) {
-    const kept = await service.jobOf(key);
+    const kept = await keptBy(key, service);
+    if (kept.calculator !== undefined && kept.calculator !== description.id) throw new BrokenLink(t('link_other'));
     return { job: kept.job, base: kept.job, baseName: { result: key }, key };
   }
   const name = query.get('example') || description.examples[0]?.id;
+  if (name && !description.jobs[name]) throw new BrokenLink(t('link_example', { name }));
   const base = description.jobs[name] ?? {};
   let job = base;
   for (const [place, text] of query) {
     if (!place.startsWith('/')) continue;
-    job = changed(job, parts(place), text === '' ? undefined : JSON.parse(text));
+    job = changed(job, parts(place), valueOf(place, text));
   }
   if (query.get('model')) job = { ...job, model: query.get('model') };
   return { job, base, baseName: { example: name }, key: null };
@@ -31,7 +51,12 @@ export async function openedBy(description, query, service = api) {
   const typed = run && keptRun(run);
   if (typed) return { ...await jobOf(description, query, service), job: typed, isOwnRun: true };
   const given = run && await inputOf(run);
-  if (!given || given.calculator !== description.id) return jobOf(description, query, service);
+  if (run && (!given || given.calculator !== description.id)) {
+    // A job that was not begun from an example is known by its run alone.
+    if (!query.has('example') && !query.has('result')) throw new BrokenLink(t('link_run'));
+    return jobOf(description, query, service);
+  }
+  if (!given) return jobOf(description, query, service);
   return { job: given.job, base: given.job, baseName: { run }, key: null, isOwnRun: false };
 }
 

@@ -4,6 +4,7 @@ import { html, useMemo } from './lib.js';
 import { t, capital, number, unitSymbol, unitOf } from './text.js';
 import { humanised, labelOf, resolve, variants, within } from './schema.js';
 import { withSpread } from './digits.js';
+import { SheetButtons } from './inspection.js';
 
 const WIDTH = 1000;
 /** So many causes are drawn. */
@@ -69,18 +70,8 @@ export function sizesOf(parameters, properties, unit) {
   }).map(size => (size.isFine && size.unit === 'mm' ? { ...size, value: UM_PER_MM * size.value, spread: UM_PER_MM * size.spread, unit: 'um', shown: undefined } : size));
 }
 
-const said = ({ name, value, spread, unit, shown, atLimit }) => `${name} ${[spread ? withSpread(value, spread) : number(value, 4), shown ?? unitSymbol(unit)].filter(Boolean).join(' ')}${atLimit ? ` (${t('at_limit')})` : ''}`;
-
-/** A condition of a run as it is told; what the user named keeps its letters. */
-function conditionOf(name, value, field) {
-  const label = field ? labelOf(name, field) : humanised(name);
-  if (Array.isArray(value)) return value.map(one => (one.factor ? `${one.factor} ${one.level}` : String(one))).join(', ');
-  const text = typeof value === 'number' ? number(value, 4) : typeof value === 'boolean' ? t(value ? 'yes' : 'no') : field?.enum ? labelled(field, value) : String(value);
-  return [label, text, unitOf(field)].filter(Boolean).join(' ');
-}
-
-export function Causes({ result, description, calculator, unit }) {
-  const { kinds, conditions } = useMemo(() => wordsOf(description, calculator), [description, calculator]);
+/** How the causes of a diagnosis are called. */
+function namer(kinds) {
   // Which of several of its kind: an order, a place, or a name that the user gave.
   const whichOf = (kind, label) => {
     const [, order] = /^order ([\d.]+)$/.exec(label) || [];
@@ -90,7 +81,54 @@ export function Causes({ result, description, calculator, unit }) {
   };
   // As inside a sentence.
   const spoken = kind => kinds.get(kind)?.text ?? labelled(null, kind);
-  const nameOf = (kind, label) => `${capital(spoken(kind))}${label ? ` (${whichOf(kind, label)})` : ''}`;
+  return { spoken, nameOf: (kind, label) => `${capital(spoken(kind))}${label ? ` (${whichOf(kind, label)})` : ''}` };
+}
+
+/** The set of causes that an answer names: it and nothing beside it. */
+const exactSet = ({ verdict, sets, named }) => (verdict === 'named' ? sets.find(({ causes, with_remainder: rest }) => !rest && causes.length === named.length && causes.every(one => named.some(other => isSame(one, other)))) : undefined);
+
+/** An error as it is told; `unit` is empty where the quantity is judged by its logarithm: its errors are shares then. */
+const errorOf = (error, unit) => (unit === '' ? number(100 * error, 3) : number(error, 3));
+
+/** The numbers of a diagnosis that matter at a glance: what is named, or may act, with its probability, how large it is, and
+ *  what it gains on data that was held back. None where nothing is said of causes. */
+export function causesHeadline(result, description, calculator, unit) {
+  if (!Array.isArray(result?.causes)) return null;
+  if (!hasCauses(result)) return [];
+  const { kinds } = wordsOf(description, calculator);
+  const { nameOf } = namer(kinds);
+  const setName = causes => (causes.length > 0 ? causes.map(({ kind, label }) => nameOf(kind, label)).join(' + ') : t('cause_none'));
+  const { gain } = result;
+  const gained = gain ? [{ label: t('held_back'), text: `${errorOf(gain.rmse_base, unit)} → ${errorOf(gain.rmse_extended, unit)}`, unit: unit === '' ? '%' : unit }] : [];
+  const share = (label, probability) => ({ label, text: percent(probability) });
+  if (result.verdict === 'named') {
+    const [first] = result.named;
+    const [size] = sizesOf(first.parameters, kinds.get(first.kind)?.properties, unit);
+    const likely = exactSet(result)?.posterior ?? Math.min(...result.causes.filter(cause => result.named.some(one => isSame(one, cause))).map(cause => cause.probability));
+    return [share(setName(result.named), likely), ...gained, ...(size ? [{ label: size.name, text: sizeText(size), unit: size.shown ?? unitSymbol(size.unit) }] : [])];
+  }
+  if (result.verdict === 'adequate') return [share(t('cause_none'), result.none_probability), share(t('cause_unknown'), result.unnamed_probability), ...gained];
+  if (result.verdict === 'confounded') return [...result.likely_sets.slice(0, 2).map(({ causes, posterior }) => share(setName(causes), posterior)), ...gained];
+  return [...(isObjected(result) ? [] : [share(t('cause_unknown'), result.unnamed_probability)]), share(t('cause_none'), result.none_probability), ...gained];
+}
+
+const sizeText = ({ value, spread }) => (spread ? withSpread(value, spread) : number(value, 4));
+const said = size => `${size.name} ${[sizeText(size), size.shown ?? unitSymbol(size.unit)].filter(Boolean).join(' ')}${size.atLimit ? ` (${t('at_limit')})` : ''}`;
+
+/** A condition of a run as it is told; what the user named keeps its letters. */
+function conditionOf(name, value, field) {
+  const label = field ? labelOf(name, field) : humanised(name);
+  if (Array.isArray(value)) return value.map(one => (one.factor ? `${one.factor} ${one.level}` : String(one))).join(', ');
+  const text = typeof value === 'number' ? number(value, 4) : typeof value === 'boolean' ? t(value ? 'yes' : 'no') : field?.enum ? labelled(field, value) : String(value);
+  return [label, text, unitOf(field)].filter(Boolean).join(' ');
+}
+
+/** Whether a next measurement is advised: of what the list does not hold none can be told apart. */
+export const advisesNext = result => Boolean(result?.next_measurement) && (result.verdict !== 'unknown' || result.named.length > 0);
+
+export function Causes({ result, description, calculator, unit, sheet, answer, name, owns, stale }) {
+  const { kinds, conditions } = useMemo(() => wordsOf(description, calculator), [description, calculator]);
+  const { spoken, nameOf } = useMemo(() => namer(kinds), [kinds]);
   const times = (kind, list) => { const count = list.filter(other => other === kind).length; return count > 1 ? `${count} × ${spoken(kind)}` : spoken(kind); };
   const set = list => (list.length > 0 ? [...new Set(list)].map(kind => times(kind, list)).join(' + ') : t('the_base'));
   const isUnknown = result.verdict === 'unknown';
@@ -105,7 +143,7 @@ export function Causes({ result, description, calculator, unit }) {
   const nearest = isUnknown ? others.map(bar => ({ ...bar, length: bar.share, share: null })) : [];
   const like = named.filter(bar => bar.like?.length > 0);
   const { gain, next_measurement: next } = result;
-  const exact = result.verdict === 'named' && result.sets.find(({ causes, with_remainder: rest }) => !rest && causes.length === named.length && causes.every(one => result.named.some(other => isSame(one, other))));
+  const exact = exactSet(result);
   return html`
     <section class="picture causes" aria-label=${t('causes_found')}>
       <h2>${t('causes_found')}</h2>
@@ -117,9 +155,10 @@ export function Causes({ result, description, calculator, unit }) {
       ${result.named.length > 0 && html`<ul class="sizes">${result.named.map(({ kind, label, parameters }) => html`<li key=${kind + label}><strong>${nameOf(kind, label)}</strong>${sizesOf(parameters, kinds.get(kind)?.properties, unit).map(size => ` · ${said(size)}`)}</li>`)}</ul>`}
       ${like.map(({ key, name, like: twins }) => html`<p key=${key} class="quiet">${t('looks_like', { cause: name, others: twins.map(spoken).join(', ') })}</p>`)}
       ${gain && html`<${Gain} ...${{ gain, unit, isNamed: named.length > 0 }} />`}
-      ${next && (!isUnknown || named.length > 0) && html`<h3>${t('next_measurement')}</h3>
+      ${advisesNext(result) && html`<h3>${t('next_measurement')}</h3>
         <p class="run">${Object.entries(next.run).filter(([, value]) => value !== null && !(Array.isArray(value) && value.length === 0)).map(([name, value]) => html`<span key=${name} class=${name === next.changes ? 'changed' : ''}>${conditionOf(name, value, conditions.get(name))}</span>`)}</p>
-        <p class="quiet">${t('next_separates', { leader: set(next.leader), rival: set(next.rival), now: number(next.separation_now_sigmas, 2), then: number(next.separation_then_sigmas, 2) })}</p>`}
+        <p class="quiet">${t('next_separates', { leader: set(next.leader), rival: set(next.rival), now: number(next.separation_now_sigmas, 2), then: number(next.separation_then_sigmas, 2) })}</p>
+        ${sheet && html`<${SheetButtons} ...${{ sheet, answer, name, owns, stale }} title=${description.title} />`}`}
     </section>`;
 }
 
@@ -135,8 +174,7 @@ function Bar({ name, share, length = share ?? 1, isNamed = false, isAnswer = fal
 // No finite data make anything certain.
 const percent = share => (share > 0.999 ? `> ${number(99.9)} %` : share > 0 && share < 0.001 ? `< ${number(0.1)} %` : `${number(100 * share, share > 0.99 ? 3 : 2)} %`);
 
-/** The error on held-back data before and after, against what scatter and allowances leave to any model. `unit` is empty
- *  where the quantity is judged by its logarithm: its errors are shares then. */
+/** The error on held-back data before and after, against what scatter and allowances leave to any model. */
 function Gain({ gain, unit, isNamed }) {
   const isWorse = gain.rmse_extended >= gain.rmse_base;
   const rows = [
@@ -145,7 +183,7 @@ function Gain({ gain, unit, isNamed }) {
     ...(typeof gain.noise_ceiling === 'number' ? [['clamp-statics', t('error_noise'), gain.noise_ceiling]] : []),
   ];
   const most = Math.max(...rows.map(row => row[2]));
-  const told = error => (unit === '' ? `${number(100 * error, 3)} %` : `${number(error, 3)} ${unit ?? ''}`);
+  const told = error => `${errorOf(error, unit)} ${unit === '' ? '%' : unit ?? ''}`;
   return html`
     <h3>${t('held_back')}</h3>
     <table><tbody>${rows.map(([look, name, error]) => html`<tr key=${look}><th scope="row">${name}</th>

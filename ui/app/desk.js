@@ -4,7 +4,7 @@ import * as api from './api.js';
 import { t, language } from './text.js';
 import { cell, debounced } from './lib.js';
 import { keepRun } from './runs.js';
-import { openedBy, queryOf, written } from './address.js';
+import { BrokenLink, openedBy, queryOf, written } from './address.js';
 
 /** An answer slower than this, ms, is asked for and not followed live. */
 const LIVE_LIMIT_MS = 1500;
@@ -339,7 +339,7 @@ export class Desk {
     try {
       const { key, isOwnRun, ...next } = await openedBy(this.state.description, query, this.service);
       if (isLate()) return;
-      this.set({ ...next, problem: null });
+      this.set({ ...next, problem: null, missing: null });
       const pin = query.get('pin');
       if (pin && this.state.pinned?.key !== pin) this.pinOf(pin).then(pinned => this.set({ pinned }), () => {});
       const runId = query.get('run');
@@ -365,7 +365,7 @@ export class Desk {
         this.ownQuery = null;
         this.open(query);
       });
-      if (!this.waits.open && (error instanceof api.Refused || error instanceof SyntaxError)) this.set({ missing: error });
+      if (!this.waits.open && (error instanceof api.Refused || error instanceof BrokenLink)) this.set({ missing: error });
       else if (!api.isBusy(error)) this.fail(error);
     }
   }

@@ -42,7 +42,7 @@ export function styles(figure) {
   const counts = {};
   const known = new Map();
   for (const panel of figure.panels) {
-    for (const item of panel.items.filter(({ name }) => name)) {
+    for (const item of panel.items.filter(({ name, kind }) => name && kind !== 'handle')) {
       const base = role(item.role).name;
       const key = `${base} ${item.name}`;
       if (known.has(key)) continue;

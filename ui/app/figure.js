@@ -6,6 +6,7 @@ import { scale, extent, aired, ticks, labels, valueAt, cellAt } from './scale.js
 import { items, styles, weaves, hasRibbons, stretchAt, barStep } from './draw.js';
 import { axisName, readDigits, abscissae, ordinates, Head, describe } from './panel.js';
 import { Polar } from './polar.js';
+import { Handles } from './handles.js';
 
 const LEAST_PANEL = 78;
 const LEAST_RIBBON = 44;
@@ -117,8 +118,9 @@ const evenly = (ends, isLog) => Array.from({ length: CROSS_STEPS + 1 }, (_, inde
 });
 
 /** The picture. `onPick(x, y)` where a click in it, or Enter at the cross, means something; `handle` is a point that
- *  can be dragged: `{ x, y, onMove(x, y), onDrop(x, y) }`, without `y` along the first curve. */
-export function Picture({ figure, pinned, height: screenHeight = 460, onPick, handle, main }) {
+ *  can be dragged: `{ x, y, onMove(x, y), onDrop(x, y) }`, without `y` along the first curve; `onHold(handle)` where handles
+ *  of the figure can be pulled, giving `{ move(place), drop() }`. */
+export function Picture({ figure, pinned, height: screenHeight = 460, onPick, handle, onHold, main }) {
   const [ref, screenWidth] = useWidth();
   const isPrinting = usePrinting();
   const [paper, setPaper] = useState(LEAST_PAPER);
@@ -212,7 +214,7 @@ export function Picture({ figure, pinned, height: screenHeight = 460, onPick, ha
       <div ref=${ref} class="plot" tabindex="0" role="application" aria-label=${`${figure.title.text}. ${t('picture_keys')}${onPick ? ` ${t('pick_keys')}` : ''}`} onKeyDown=${key}>
         ${width > 0 && (isPolar
           ? html`<${Polar} ...${common} least=${least} setAt=${setAt} />`
-          : html`<${Stacked} ...${common} ...${{ full, setAt, setOver, setView, drag, setDrag, onPick, handle }} />`)}
+          : html`<${Stacked} ...${common} ...${{ full, setAt, setOver, setView, drag, setDrag, onPick, handle, onHold }} />`)}
       </div>
       <p class="hidden" role="status">${spoken}</p>
       ${tabled && html`<${Numbers} figure=${figure} samples=${samples} />`}
@@ -256,18 +258,20 @@ function Numbers({ figure, samples }) {
 }
 
 /** Panels under each other over one abscissa. */
-function Stacked({ figure, pinned, width, isPrinting, style, hidden, toggle, at, setAt, over, setOver, full, shown, view, setView, height, drag, setDrag, onPick, handle }) {
+function Stacked({ figure, pinned, width, isPrinting, style, hidden, toggle, at, setAt, over, setOver, full, shown, view, setView, height, drag, setDrag, onPick, handle, onHold }) {
   const shares = figure.panels.reduce((sum, panel) => sum + panel.height, 0) || 1;
   const ghosts = figure.panels.map((panel, index) => pinned?.panels[index] || null);
   const visible = figure.panels.map(panel => ({ ...panel, items: panel.items.filter(item => !item.name || !hidden.has(item.name)) }));
   const isMany = visible.length >= MANY_PANELS;
   const least = isPrinting ? { panel: LEAST_ON_PAPER, ofMany: LEAST_ON_PAPER, ribbon: LEAST_RIBBON } : isLowScreen() ? LOW : { panel: LEAST_PANEL, ofMany: LEAST_OF_MANY, ribbon: LEAST_RIBBON };
+  // While a handle is pulled the axes stay as they are.
+  const frozen = useRef(null);
   const panels = visible.map((panel, index) => {
     const isRibbon = hasRibbons(panel);
     const tall = Math.max(isRibbon ? least.ribbon : isMany ? least.ofMany : least.panel, Math.round((height * panel.height) / shares));
     const span = extent([...ordinates(panel, view), ...(ghosts[index] ? ordinates(ghosts[index], view) : [])], panel.y.scale);
     const isMap = panel.items.some(item => item.kind === 'heat_map');
-    const domain = isMap ? span : aired(span, panel.y.scale);
+    const domain = frozen.current?.index === index ? frozen.current.domain : isMap ? span : aired(span, panel.y.scale);
     const places = isRibbon ? [] : ticks(panel.y.scale, domain, Math.max(tall < 36 ? 2 : 3, Math.round(tall / 42)));
     return { panel, ghost: ghosts[index], tall, domain, places, ...labels(panel.y.scale, places), span: span ? span[1] - span[0] : 0 };
   });
@@ -276,7 +280,7 @@ function Stacked({ figure, pinned, width, isPrinting, style, hidden, toggle, at,
   const glyphs = figure.panels.flatMap(panel => panel.items.filter(item => item.kind === 'glyph'));
   const atEnds = glyphs.some(({ glyph }) => END_GLYPHS.includes(glyph));
   const edge = atEnds && !view ? Math.min(GLYPH_ROOM, (right - left) / 8) : 0;
-  const x = scale(figure.x.scale, shown, [left + edge, right - edge]);
+  const x = scale(figure.x.scale, frozen.current?.shown ?? shown, [left + edge, right - edge]);
   const xPlaces = ticks(figure.x.scale, shown, Math.max(2, Math.round((right - left) / 90)));
   const xLabels = labels(figure.x.scale, xPlaces);
 
@@ -367,7 +371,7 @@ function Stacked({ figure, pinned, width, isPrinting, style, hidden, toggle, at,
         const svgHeight = 6 + tall + (last ? AXIS_ROOM : 8);
         return html`
           <${Head} key=${`head-${index}`} ...${{ panel: figure.panels[index], ghost, style, hidden, toggle, at, over, factor, span }} />
-          <svg key=${`panel-${index}`} data-panel=${index} class="chart" width=${width} height=${svgHeight} viewBox=${`0 0 ${width} ${svgHeight}`} role="img" aria-label=${describe(panel, figure)}>
+          <div key=${`panel-${index}`} class="panel"><svg data-panel=${index} class="chart" width=${width} height=${svgHeight} viewBox=${`0 0 ${width} ${svgHeight}`} role="img" aria-label=${describe(panel, figure)}>
             <defs><clipPath id=${clip}><rect x=${left} y="6" width=${Math.max(1, right - left)} height=${tall} /></clipPath>${hasRibbons(panel) && weaves(`${clip}-weave`)}</defs>
             <g class="grid">${places.map(place => html`<path d=${`M${left} ${y(place).toFixed(1)}H${right}`} />`)}${xPlaces.map(place => html`<path d=${`M${x(place).toFixed(1)} 6V${6 + tall}`} />`)}</g>
             ${places.length > 0 && domain[0] < 0 && domain[1] > 0 && panel.y.scale === 'linear' && html`<path class="zero" d=${`M${left} ${y(0).toFixed(1)}H${right}`} />`}
@@ -388,7 +392,12 @@ function Stacked({ figure, pinned, width, isPrinting, style, hidden, toggle, at,
                 const h = v === null || v === undefined ? NaN : y(v);
                 return h >= 5 && h <= 7 + tall ? html`<circle class=${`dot ${style(item)}`} cx=${cursor} cy=${h} r="3.4" />` : null;
               })}`}
-          </svg>`;
+          </svg>
+          ${onHold && !isPrinting && html`<${Handles} ...${{ panel, axis: figure.x, x, y, frame }} hold=${item => {
+            const { move: pull, drop } = onHold(item);
+            frozen.current = { index, domain, shown };
+            return { move: pull, drop: () => { frozen.current = null; drop(); } };
+          }} />`}</div>`;
       })}
     </div>`;
 }

@@ -1,7 +1,8 @@
 // A form from a schema. Nothing here knows a calculator.
 import { html, useState, useEffect, useMemo, unique } from './lib.js';
 import { t, number, unitOf } from './text.js';
-import { resolve, namesOf, kindOf, variants, variantOf, variantName, blank, kept, labelOf, wordOf, spoken, pointer, at, changed } from './schema.js';
+import { resolve, namesOf, kindOf, variants, variantOf, memberOf, variantName, blank, kept, labelOf, wordOf, spoken, pointer, at, changed } from './schema.js';
+import { runsOf } from './table-file.js';
 import { fieldId, isLeaf, mark, explained, Symbol, Faults, Row, NumberInput, TextInput, Enum, Switch, Library, ModelChoice } from './fields.js';
 import { List, MapFields } from './lists.js';
 import { TableInput } from './table-input.js';
@@ -157,6 +158,12 @@ function summary(schema, value, root) {
   return words.join(' · ');
 }
 
+/** Of a table whose rows name their run: the runs beside it. */
+function runsBeside(schema, path, { root, value }) {
+  if (!schema['x-runs'] || path.length !== 1) return undefined;
+  return { ...runsOf(memberOf(root, value), schema, root), value: value[schema['x-runs']] };
+}
+
 /** The inside of a part, whatever it is. */
 export function Body({ name, schema, path, value, context }) {
   switch (kindOf(schema)) {
@@ -164,9 +171,13 @@ export function Body({ name, schema, path, value, context }) {
     case 'choice': return html`<${Choice} schema=${schema} path=${path} value=${value} context=${context} />`;
     case 'array': return html`<${List} name=${name} schema=${schema} path=${path} value=${value || []} context=${context} />`;
     case 'map': return html`<${MapFields} name=${name} schema=${schema} path=${path} value=${value || {}} context=${context} />`;
-    case 'table': return html`<${TableInput} name=${name} schema=${schema} root=${context.root} value=${value} names=${context.names}
+    case 'table': return html`<${TableInput} name=${name} schema=${schema} root=${context.root} value=${value} names=${context.names} runs=${runsBeside(schema, path, context)}
       faults=${context.errorsAt(path)} below=${[...context.errors].filter(([place]) => place.startsWith(`${pointer(path)}/`)).flatMap(([, faults]) => faults)}
-      onChange=${part => context.set(path, part)} />`;
+      onChange=${(part, runs) => {
+        const beside = path.slice(0, -1);
+        const whole = changed(at(context.value, beside), [name], part);
+        context.set(beside, runs ? changed(whole, [schema['x-runs']], runs) : whole);
+      }} />`;
     default: return html`<${JsonField} name=${name} schema=${schema} path=${path} value=${value} context=${context} />`;
   }
 }

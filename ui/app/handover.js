@@ -1,6 +1,6 @@
 // What leaves the page: files, programs, copies, paper. Nothing leaves it that is not the answer to the inputs on the screen,
 // neither when it is asked for nor when it is there.
-import { html, useState } from './lib.js';
+import { html, render, useState } from './lib.js';
 import { t } from './text.js';
 import * as api from './api.js';
 
@@ -30,6 +30,25 @@ export function useHandOver({ name, answer, owns }) {
     } catch (error) { setFailed({ key, why: error.problem?.detail || error.message }); }
   };
   return [take, failed.key === answer.key ? failed.why : null];
+}
+
+/** Saves a text that was made of the answer with this key. */
+export const saveText = (text, type, name, owns, key) => { if (owns(key)) save(new Blob([text], { type }), name); };
+
+/** Puts a page of its own on paper, made of the answer with this key. */
+export function printAlone(page, owns, key) {
+  if (!owns(key)) return;
+  const paper = document.createElement('div');
+  paper.className = 'paper';
+  document.body.append(paper);
+  render(page, paper);
+  document.body.classList.add('paper-only');
+  addEventListener('afterprint', () => {
+    document.body.classList.remove('paper-only');
+    render(null, paper);
+    paper.remove();
+  }, { once: true });
+  if (owns(key)) window.print();
 }
 
 /** A file of an answer is told from others by the beginning of its key. */

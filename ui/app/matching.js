@@ -13,7 +13,7 @@ const SHOWN = 4;
 const CHART = { width: 360, height: 96, left: 6, right: 6, top: 6, bottom: 6 };
 
 /** Columns and units of a file, to be confirmed. */
-export function Matching({ id, draft, setDraft, columns, measured, most, others, accept, cancel, label }) {
+export function Matching({ id, draft, filled, setDraft, columns, measured, most, others, conditions, rows, isMore, accept, cancel, label }) {
   const { file, matches } = draft;
   const set = (column, match) => setDraft({ ...draft, matches: { ...matches, [column]: match } });
   const isNeeded = ({ name, required }) => required || measured.includes(name);
@@ -27,8 +27,9 @@ export function Matching({ id, draft, setDraft, columns, measured, most, others,
   const labelled = names => columns.filter(({ name }) => names.includes(name)).map(({ name, schema }) => labelOf(name, schema)).join(', ');
   // Numbers that look like sizes where deviations are asked for: which they are is said by whoever knows.
   const asked = columns.filter(({ name }) => matches[name]?.size !== undefined && matches[name].less === null);
-  const isLong = file.rows.length > most;
-  const isReady = missing.length === 0 && unitless.length === 0 && asked.length === 0 && !isUnmeasured && !isLong && Object.values(matches).some(Boolean);
+  const isLong = filled.rows.length + (isMore ? rows : 0) > most;
+  const empty = file.rows.length - filled.rows.length;
+  const isReady = missing.length === 0 && unitless.length === 0 && asked.length === 0 && !isUnmeasured && !isLong && filled.rows.length > 0 && Object.values(matches).some(Boolean);
   const unitFault = ({ name, schema }) => (matches[name].said === null ? t('unit_missing', { name: labelOf(name, schema) }) : t('unit_unknown', { name: labelOf(name, schema), unit: matches[name].said }));
   const titleOf = ({ title, index }) => title || t('column_number', { number: index + 1 });
   const titles = list => list.map(titleOf).join('; ');
@@ -70,9 +71,12 @@ export function Matching({ id, draft, setDraft, columns, measured, most, others,
       ${unitless.length > 0 && html`<p class="fault" role="alert">${unitless.map(column => html`<span key=${column.name}>${unitFault(column)}</span>`)}</p>`}
       ${columns.filter(({ name }) => matches[name]?.size !== undefined).map(column => html`<${Sizes} key=${column.name} column=${column} match=${matches[column.name]} set=${match => set(column.name, match)} />`)}
       ${others.kept.length > 0 && html`<p class="columns-kept">${t('columns_kept', { names: titles(others.kept) })}</p>`}
+      ${conditions.length > 0 && html`<p class="columns-runs">${t('columns_runs', { names: conditions.map(({ name, schema }) => labelOf(name, schema)).join('; ') })}</p>`}
+      ${empty > 0 && html`<p class=${filled.rows.length === 0 ? 'fault' : 'quiet'} role="status"><span>${t('rows_empty', { count: number(empty) })}</span></p>`}
       ${others.left.length > 0 && html`<p class="columns-left">${t('columns_left', { names: titles(others.left) })}</p>`}
-      <${Chart} ...${{ file, columns, matches, measured }} />
-      <div class="actions"><button type="button" class="primary" disabled=${!isReady} onClick=${accept}>${t('use_table')}<span class="hidden">: ${label}</span></button>
+      <${Chart} ...${{ file: filled, columns, matches, measured }} />
+      <div class="actions">${isMore && html`<button type="button" class="primary" disabled=${!isReady} onClick=${() => accept(true)}>${t('add_rows', { count: number(rows) })}<span class="hidden">: ${label}</span></button>`}
+        <button type="button" class=${isMore ? '' : 'primary'} disabled=${!isReady} onClick=${() => accept(false)}>${isMore ? t('use_table_alone') : t('use_table')}<span class="hidden">: ${label}</span></button>
         <button type="button" onClick=${cancel}>${t('cancel')}</button></div>
     </div>`;
 }

@@ -3,17 +3,25 @@ import { html, useState, useEffect, useRef } from './lib.js';
 import { t, number, duration, moment, language } from './text.js';
 import * as api from './api.js';
 import { save } from './handover.js';
+import { useOutcomes, Outcome } from './outcomes.js';
 
 const LOOK_MS = 1500;
 /** Results of one calculator not further apart than this stand in one line until asked for. */
 const BURST_MS = 600000;
 
 export function Home({ calculators }) {
+  const outcomes = useOutcomes();
   const group = kind => calculators.filter(item => item.kind === kind);
-  const list = items => html`<ul class="questions">${items.map(({ id, question, title, summary, examples }) => html`
-    <li key=${id}><a href=${`#/${id}`}><span class="question">${question}</span><span class="room-title">${title}</span></a>
-      <p>${summary}</p>
-      <p class="examples">${examples.map(example => html`<a key=${example.id} href=${`#/${id}?example=${example.id}`}>${example.title}</a>`)}</p></li>`)}</ul>`;
+  const link = (id, { id: name, title }, picture) => html`<a key=${name} href=${`#/${id}?example=${name}`}>${picture}<span>${title}</span></a>`;
+  const card = ({ id, question, title, summary, examples }) => {
+    const shown = outcomes[id];
+    const first = examples.find(({ id: name }) => name === shown?.example) ?? examples[0];
+    return html`
+    <li key=${id}><a href=${`#/${id}`} title=${summary}><span class="question">${question}</span><span class="room-title">${title}</span></a>
+      <p class="outcome">${link(id, first, html`<span class="outcome-picture">${shown && html`<${Outcome} figure=${shown.figure} />`}</span>`)}</p>
+      <p class="examples">${examples.filter(example => example !== first).map(example => link(id, example))}</p></li>`;
+  };
+  const list = items => html`<ul class="questions">${items.map(card)}</ul>`;
   return html`
     <main class="plain home" id="main" tabindex="-1"><h1>${t('slogan')}</h1>
       ${list(group('calculator'))}

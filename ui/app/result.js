@@ -1,5 +1,5 @@
 // What a run gave: the answer, the picture, the words, and everything else behind tabs.
-import { html, useState, useEffect, useLayoutEffect, usePrinting } from './lib.js';
+import { html, useState, useEffect, useLayoutEffect, useMemo, usePrinting } from './lib.js';
 import { t, capital, unitSymbol } from './text.js';
 import * as api from './api.js';
 import { Picture, differenceOf, isLowScreen } from './figure.js';
@@ -7,8 +7,11 @@ import { namesOf, spoken } from './schema.js';
 import { canReplay, Replay } from './replay.js';
 import { canTrade, spanOf, TradeOff } from './tradeoff.js';
 import { hasClamp, ClampBars } from './clamp.js';
-import { hasCauses, Causes } from './cause.js';
-import { Downloads } from './handover.js';
+import { hasCauses, advisesNext, causesHeadline, Causes } from './cause.js';
+import { hasOffers, Offers } from './offers.js';
+import { sheetOf, takeSheet } from './inspection.js';
+import { movedJob } from './handles.js';
+import { Downloads, fileName } from './handover.js';
 import { Strip, sentences } from './strip.js';
 import { Tabs } from './tabs.js';
 import { Sheet } from './values.js';
@@ -60,7 +63,7 @@ export function usePictureHeight(panels) {
   return Math.round(Math.max(240, Math.min(size[1] - around - 34 * panels, 900)));
 }
 
-const drawn = figure => figure.panels.flatMap(panel => panel.items).filter(({ kind, x }) => kind !== 'glyph' && x.length > 0);
+const drawn = figure => figure.panels.flatMap(panel => panel.items).filter(({ kind, x }) => kind !== 'glyph' && kind !== 'handle' && x.length > 0);
 /** Pictures of what the job did not ask for are empty: they are not offered. */
 const shownOf = figures => { const some = figures.filter(figure => drawn(figure).length > 0); return some.length > 0 ? some : figures.slice(0, 1); };
 /** The unit of what a diagnosis judges, empty for logarithms. */
@@ -84,9 +87,6 @@ export function Result({ id, desk, description, answer, problem, trouble, runnin
   const figures = shownOf(answer?.figures || []);
   const figure = interim || figures.find(({ id: name }) => name === chosen) || figures.find(isTelling) || figures[0];
   const height = usePictureHeight(figure?.panels.length || 1);
-  if (!answer && !interim) {
-    return html`<div class="empty">${running ? '' : problem ? html`<div class="no-answer">${trouble}<p>${problem.code === 'cancelled' ? t('cancelled_waits') : t('picture_waits')}</p></div>` : html`<p class="late">${t('first_answer')}</p>`}</div>`;
-  }
   const twin = pinned && !interim && pinned.key !== answer?.key ? pinned.figures.find(({ id: name }) => name === figure?.id) : null;
   const subtracted = twin && difference ? differenceOf(figure, twin) : null;
   const body = answer?.answer;
@@ -98,12 +98,30 @@ export function Result({ id, desk, description, answer, problem, trouble, runnin
   const held = (ends, value) => Math.min(Math.max(value, ends[0]), ends[1]);
   const handle = trades ? { x: factor, onMove: x => setFactor(Number(held(spanOf(figure), x).toPrecision(4))), onDrop: () => {} }
     : picks?.at ? { x: (grabbed || picks.at)[0], y: (grabbed || picks.at)[1], onMove: (x, y) => setGrabbed([x, y]), onDrop: (x, y) => { setGrabbed(null); pick(x, y); } } : null;
+  // Numbers of the job follow a handle from where they are when it is taken.
+  const hold = taken => {
+    const { job } = desk.state;
+    return {
+      move: to => desk.change(movedJob(job, body.input, taken, to - taken[taken.along]), 'typing'),
+      drop: () => { if (desk.state.waiting) desk.ask(desk.state.job, 'run'); },
+    };
+  };
+  const unit = residualUnit(figures);
+  const numbers = useMemo(() => body && causesHeadline(body.result, description, body.input.calculator, unit), [body, description, unit]);
+  const sheet = useMemo(() => (body && advisesNext(body.result) ? sheetOf(description, body, answer.job) : null), [answer, description]);
+  // What a diagnosis is made for: the model that it found, or else the measurement that would find one.
+  const isFound = models && body?.result.verdict === 'named';
+  const act = isFound ? { text: t('take_model'), act: () => { const field = document.getElementById('model-name'); field?.scrollIntoView({ block: 'center' }); field?.focus(); } }
+    : sheet ? { text: t('take_sheet_next'), act: () => takeSheet(sheet, fileName(id, answer), owns, answer.key) } : null;
+  if (!answer && !interim) {
+    return html`<div class="empty">${running ? '' : problem ? html`<div class="no-answer">${trouble}<p>${problem.code === 'cancelled' ? t('cancelled_waits') : t('picture_waits')}</p></div>` : html`<p class="late">${t('first_answer')}</p>`}</div>`;
+  }
   const [first, ...more] = body?.explanation.filter(({ code }) => !(hasCauses(body.result) && SHOWN_BY_CAUSES.includes(code))) || [];
   // The answer is its first sentence; what else was said with it stands among the words.
   const [said, ...rest] = sentences(first?.text ?? '');
   const others = [...(rest.length > 0 ? [{ code: first.code, text: rest.join(' ') }] : []), ...more];
   return html`
-    ${body && html`<${Strip} ...${{ id, description, answer, said, standing, owns, trouble }} />`}
+    ${body && html`<${Strip} ...${{ id, description, answer, said, limits: numbers ? undefined : sentences(more[0]?.text ?? '')[0], numbers, main: act, standing, owns, trouble }} />`}
     <p class="not-printed">${t('not_printed')}</p>
     <div class=${`result ${stale ? 'stale' : ''}`}>
       ${figures.length > MOST_BUTTONS && !interim && html`<${FigurePick} ...${{ figures, figure, choose: setChosen }} />`}
@@ -113,7 +131,7 @@ export function Result({ id, desk, description, answer, problem, trouble, runnin
         </div>`}
       <div class="picture-and-words">
         <div class="picture-box">
-          ${figure ? html`<${Picture} key=${figure.id} figure=${subtracted && subtracted.panels.length ? subtracted : (replays && earlier) || figure} pinned=${subtracted ? null : twin} height=${trades ? Math.min(height, TRADE_HEIGHT) : height} main onPick=${picks ? pick : null} handle=${handle} />`
+          ${figure ? html`<${Picture} key=${figure.id} figure=${subtracted && subtracted.panels.length ? subtracted : (replays && earlier) || figure} pinned=${subtracted ? null : twin} height=${trades ? Math.min(height, TRADE_HEIGHT) : height} main onPick=${picks ? pick : null} handle=${handle} onHold=${isOwn && !earlier ? hold : null} />`
             : html`<p class="quiet">${t('no_figure')}</p>`}
           ${twin && html`<p class="pin-legend">${subtracted ? t('pinned_less') : t('pinned_shadow')}</p>`}
           <div class="under">${interim && html`<p class="so-far" role="status">${t('so_far')}</p>`}</div>
@@ -124,8 +142,9 @@ export function Result({ id, desk, description, answer, problem, trouble, runnin
         ${body && html`
         <div class="words">
           <${Warnings} key=${answer.key} list=${body.warnings} names=${namesOf(description.input_schema)} />
+          ${hasOffers(description, body.result) && html`<${Offers} ...${{ description, answer, isCurrent: !stale }} apply=${next => { if (owns(answer.key)) onApply(next); }} />`}
           ${hasClamp(body.result) && html`<${ClampBars} result=${body.result} input=${body.input} schema=${description.output_schema} />`}
-          ${hasCauses(body.result) && html`<${Causes} result=${body.result} description=${description} calculator=${body.input.calculator} unit=${residualUnit(figures)} />`}
+          ${hasCauses(body.result) && html`<${Causes} result=${body.result} description=${description} calculator=${body.input.calculator} unit=${unit} ...${{ sheet, answer, owns, stale }} name=${fileName(id, answer)} />`}
           ${others.length > 0 && html`<ul class="explanation">${others.map(({ code, text }, index) => html`<li key=${code + index}>${capital(text)}</li>`)}</ul>`}
         </div>`}
       </div>

@@ -8,7 +8,7 @@ import { namesOf } from './schema.js';
 import { pickOf } from './pick.js';
 import { Progress, Trouble } from './status.js';
 import { Desk } from './desk.js';
-import { queryOf, written } from './address.js';
+import { BrokenLink, queryOf, written } from './address.js';
 
 /** After the form is in sight. */
 const soon = task => setTimeout(task, 30);
@@ -38,7 +38,9 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
   const [pane, setPane] = useState('picture');
   const { description, missing, libraries, job, baseName, answer, problem, running, pending, waiting, pinned } = state;
   if (missing) {
-    return html`<main class="plain" id="main" tabindex="-1"><h1>${missing.problem?.title || t('trouble_title')}</h1><p>${capital(missing.problem?.detail || missing.message)}</p>
+    const isBroken = missing instanceof BrokenLink;
+    return html`<main class="plain" id="main" tabindex="-1"><h1>${isBroken ? t('broken_link') : missing.problem?.title || t('trouble_title')}</h1><p role="alert">${capital(missing.problem?.detail || missing.message)}</p>
+      ${isBroken && description?.examples.length > 0 && html`<ul class="plain-list">${description.examples.map(({ id: name, title }) => html`<li key=${name}><a href=${`#/${id}?example=${name}`}>${title}</a></li>`)}</ul>`}
       <p><a href=${`#/${id}`} onClick=${() => setTimeout(() => location.reload(), 0)}>${t('start_over')}</a></p></main>`;
   }
   if (!description || !job) return html`<main class="plain quiet-start" id="main" tabindex="-1"><p>${t('loading')}</p></main>`;

@@ -83,6 +83,12 @@ export function variantOf(list, value) {
   return list.find(({ schema }) => schema.type === type || (type === 'number' && schema.type === 'integer')) || list[0];
 }
 
+/** The schema of a value whose root may be one of a family. */
+export function memberOf(root, value) {
+  const whole = resolve(root, root);
+  return kindOf(whole) === 'choice' ? variantOf(variants(whole, root), value).schema : whole;
+}
+
 /** A value to begin with: what must be there, from the schema's examples. */
 export function blank(schema, root, depth = 0) {
   const whole = resolve(schema, root);
@@ -221,6 +227,39 @@ export const wordOf = (schema, word) => capital(schema?.['x-labels']?.[word] || 
 /** What a variant of a choice is called: by the label of its tag. */
 export function variantName({ schema, tag, value }, root) {
   return tag ? wordOf(resolve(schema.properties[tag], root), value) : null;
+}
+
+/** The field at a path of a value: its schema, and what it is called, with the name of the item of a list that it stands in;
+ *  `null` where there is none.
+ *  @param {any} root @param {any} value @param {(string | number)[]} path */
+export function fieldAt(root, value, path) {
+  let schema = resolve(root, root);
+  let inner = value;
+  let item = '';
+  for (const part of path) {
+    const list = Array.isArray(inner);
+    const shape = schema.oneOf || schema.anyOf ? variantOf(variants(schema, root), inner)?.schema : schema;
+    const next = list ? shape?.items : shape?.properties?.[part];
+    if (!next) return null;
+    inner = inner?.[part];
+    if (list) item = inner?.id ?? inner?.name ?? String(Number(part) + 1);
+    schema = resolve(next, root);
+  }
+  const label = labelOf(String(path.at(-1)), schema);
+  return { schema, label: item ? `${item}: ${within(label)}` : label };
+}
+
+/** The lists of a result of whose items a field carries an extension, each with what that says: `{ said, items, schema,
+ *  label }`. */
+export function listsWith(word, root, value, schema = root, name = '') {
+  const whole = resolve(schema, root);
+  if (Array.isArray(value)) {
+    const item = whole.items && resolve(whole.items, root);
+    const said = Object.values(item?.properties || {}).map(part => resolve(part, root)[word]).find(Boolean);
+    return said ? [{ said, items: value, schema: item, label: labelOf(name, whole) }] : [];
+  }
+  if (!value || typeof value !== 'object' || !whole.properties) return [];
+  return Object.entries(value).flatMap(([part, inner]) => (whole.properties[part] ? listsWith(word, root, inner, whole.properties[part], part) : []));
 }
 
 /** A symbol as print writes it: `D_0` as its parts. */

@@ -14,13 +14,17 @@ const SAME = 1e-9;
 /** The sentences of a text. */
 export const sentences = text => (text === '' ? [] : text.split(/(?<=[.!?]) (?=[A-ZА-ЯЁ])/));
 
+/** A number of the strip: what it is called, how it is written, its unit, what it means, and a second one beside it.
+ *  @typedef {{ label: string, text: string, unit?: string, title?: string }} Headline */
+
 /** The numbers that the declaration names, as far as the result has them. */
-function headline(description, result) {
+function declared(description, result) {
   const rows = new Map(flat(description.output_schema, result, description.output_schema).map(row => [`/${row.path.join('/')}`, row]));
   const found = description.study_outputs.map(place => rows.get(place)).filter(row => typeof row?.value === 'number');
   // What has the same name would be told apart by nobody, and what is the same number says nothing new.
   const isSame = (one, other) => one.label === other.label || (Math.abs(one.value - other.value) <= SAME * Math.abs(other.value) && one.unit === other.unit);
-  return found.filter((row, index) => found.findIndex(other => isSame(row, other)) === index).slice(0, MOST_NUMBERS);
+  const told = found.filter((row, index) => found.findIndex(other => isSame(row, other)) === index).slice(0, MOST_NUMBERS);
+  return told.map(row => ({ label: row.label, text: glance(row, spreadOf(result, row.path)?.spread), unit: row.unit, title: row.description }));
 }
 
 /** A number as one reads it at a glance: with its uncertainty where that is not small, a share that is next to none or all
@@ -36,25 +40,34 @@ function glance({ value, schema }, spread) {
 const LARGE_SPREAD = 0.02;
 const SURE = 1e-3;
 
+/** A sentence as short as it can be: what stands before its colon. */
+const LONG = 90;
+const brief = text => (text.length > LONG ? text.split(/: | \(/)[0].replace(/[.,;]$/, '') : text);
+
 /** Why the answer is not one to the inputs on the screen. */
 const WHY = { unread: 'answer_unread', wrong: 'answer_wrong', changed: 'answer_changed', computing: 'answer_computing', cancelled: 'answer_cancelled' };
 
-export function Strip({ id, description, answer, said, standing, owns, trouble }) {
+/** The answer to the question: its sentence, what limits it, its numbers, and the one thing to take away: `main`, `{ text,
+ *  act() }`; without it the program, or the sheet to print.
+ *  @param {{ id: string, description: any, answer: any, said: string, limits?: string, numbers?: Headline[] | null, main?: any, standing: string, owns: any, trouble: any }} props */
+export function Strip({ id, description, answer, said, limits, numbers, main, standing, owns, trouble }) {
   const { result } = answer.answer;
-  const numbers = useMemo(() => headline(description, result), [description, result]);
+  const told = useMemo(() => numbers ?? declared(description, result), [description, result, numbers]);
   const [take, refusal] = useHandOver({ name: fileName(id, answer), answer, owns });
   const isProgram = description.media_types.includes('text/x-gcode');
   const hand = () => {
-    if (isProgram) take('text/x-gcode', 'nc');
+    if (main) main.act();
+    else if (isProgram) take('text/x-gcode', 'nc');
     else if (owns(answer.key)) window.print();
   };
   const why = WHY[standing];
   return html`
     <section class=${`strip ${why ? `not-theirs ${standing}` : ''}`} id="answer" aria-label=${t('answer')} tabindex="-1">
-      <p class="verdict" aria-live="polite">${capital(said ?? '')}</p>
-      <dl class="headline">${numbers.map(row => html`<div key=${row.path.join('/')} title=${row.description}><dt>${row.label}</dt><dd>${glance(row, spreadOf(result, row.path)?.spread)}${row.unit && html`<small> ${row.unit}</small>`}</dd></div>`)}</dl>
+      <div class="told-first"><p class="verdict" aria-live="polite">${capital(said ?? '')}</p>
+        ${limits && html`<p class="limits">${capital(brief(limits))}</p>`}</div>
+      <dl class="headline">${told.map(row => html`<div key=${row.label} title=${row.title}><dt>${row.label}</dt><dd>${row.text}${row.unit && html`<small> ${row.unit}</small>`}</dd></div>`)}</dl>
       <div class="hand-over">
-        <button type="button" id="take" class="primary" disabled=${Boolean(why)} onClick=${hand}>${isProgram ? t('take_program') : t('take_sheet')}</button>
+        <button type="button" id="take" class="primary" disabled=${Boolean(why)} onClick=${hand}>${main ? main.text : isProgram ? t('take_program') : t('take_sheet')}</button>
         ${why && html`<p class="stale-note" role="status">${t(why)}</p>`}
       </div>
       ${refusal && html`<p class="fault" role="alert"><span>${refusal}</span></p>`}

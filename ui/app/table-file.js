@@ -83,6 +83,15 @@ export function rowFields(schema, root) {
 /** Most rows that the table may have. */
 export const mostRows = (schema, root) => resolve((schema.oneOf || schema.anyOf).find(form => resolve(form, root).type === 'array'), root).maxItems ?? Infinity;
 
+/** Of a table whose rows name their run: the list of the job that has the runs, the field of a row with the number of its run,
+ *  counted from 1, and the fields of a run that a column can fill. */
+export function runsOf(member, table, root) {
+  const list = table['x-runs'];
+  const items = resolve(resolve(member.properties[list], root).items, root);
+  const fields = Object.entries(items.properties || {}).map(([name, part]) => ({ name, schema: resolve(part, root) }));
+  return { list, number: table['x-run-number'], fields: new Map(wanted(fields).map(({ name, schema }) => [name, schema])) };
+}
+
 /** The columns that the table may have. */
 export const wanted = fields => fields.filter(({ schema }) => ['number', 'integer', 'string', 'boolean'].includes(schema.type));
 
@@ -221,6 +230,90 @@ export function matched(file, columns, matches, kept) {
   const places = [...used.map(({ name }) => matches[name]), ...kept.map(({ index }) => ({ index }))];
   const header = [...used.map(title), ...kept.map(other => other.title)];
   return `${[line(header, SEPARATORS), ...file.rows.map(row => line(places.map(place => cellOf(row, place)), [file.separator]))].join('\n')}\n`;
+}
+
+/** Columns of a file that are no field of a row, but a condition of its run: `[{ name, schema, index, unit }]`. */
+export function conditionsIn(file, matches, runs) {
+  const taken = new Set(Object.values(matches).filter(Boolean).map(({ index }) => index));
+  return [...runs.fields].flatMap(([name, schema]) => {
+    const index = file.header.findIndex((title, at) => !taken.has(at) && title !== '' && isNamed({ name, schema }, title));
+    const { unit } = index < 0 ? { unit: null } : unitRead(file.header[index], schema);
+    return index < 0 || (hasUnit(schema) && unit === null) ? [] : [{ name, schema, index, unit }];
+  });
+}
+
+/** What a cell says in the words of the contract: a number in the field's own unit, a truth value, a word. */
+function valueOf(text, separator, { schema, unit }) {
+  if (text === undefined || text === '') return undefined;
+  if (schema.type === 'boolean') return /^(true|1|yes|да)$/i.test(text);
+  if (schema.type !== 'number' && schema.type !== 'integer') return text;
+  const number = cellNumber(text, separator);
+  if (number === null || Number.isNaN(number)) return undefined;
+  return hasUnit(schema) ? Number(converted(number, unit, schema['x-unit']).toPrecision(12)) : number;
+}
+
+/** The conditions of every run that a file names, by the number of the run. */
+export function conditionsOf(file, matches, runs, conditions) {
+  const own = matches[runs.number];
+  const found = new Map();
+  for (const row of file.rows) {
+    const number = own ? cellNumber(row[own.index], file.separator) || 1 : 1;
+    const before = found.get(number) ?? {};
+    const said = Object.fromEntries(conditions.map(one => [one.name, valueOf(row[one.index], file.separator, one)]).filter(([, value]) => value !== undefined));
+    found.set(number, { ...said, ...before });
+  }
+  return found;
+}
+
+/** The runs of a job with those that a file brings; what the list is too short for was as the job says. */
+export function runsWith(before, found) {
+  const runs = [...(before ?? [])];
+  for (const [number, conditions] of found) {
+    if (!Number.isInteger(number) || number < 1 || number > MOST_RUNS) continue;
+    while (runs.length < number) runs.push({});
+    runs[number - 1] = { ...runs[number - 1], ...conditions };
+  }
+  return runs;
+}
+const MOST_RUNS = 10_000;
+
+/** The file without the rows in which nothing was measured: a sheet need not be filled to its end. */
+export function measuredOnly(file, matches, measured) {
+  const places = measured.filter(name => matches[name]).map(name => matches[name].index);
+  const rows = places.length === 0 ? file.rows : file.rows.filter(row => places.some(index => (row[index] ?? '') !== ''));
+  return rows.length === file.rows.length ? file : { ...file, rows };
+}
+
+/** A table as names of fields and cells in their own units; columns that no field has keep their names. */
+function plain(value, columns, free) {
+  if (Array.isArray(value)) {
+    // Levels of factors are columns of their own, as they come from a file.
+    const rows = value.map(row => Object.fromEntries(Object.entries(row).flatMap(([name, cell]) => (Array.isArray(cell) ? cell.map(one => [one.factor ?? one.name, one.level ?? one.value]) : cell === null ? [] : [[name, cell]]))));
+    const header = [...new Set(rows.flatMap(row => Object.keys(row)))];
+    return { header, rows: rows.map(row => header.map(name => (row[name] === undefined ? '' : String(row[name])))) };
+  }
+  const { file } = readFile(value.csv);
+  const matches = guess(columns, file.header);
+  const used = columns.filter(({ name }) => matches[name]);
+  const { kept } = othersOf(file, columns, matches, free);
+  const cellOf = (row, column) => { const own = valueOf(row[matches[column.name].index], file.separator, { schema: column.schema, unit: matches[column.name].unit }); return own === undefined ? '' : String(own); };
+  return { header: [...used.map(({ name }) => name), ...kept.map(({ title }) => title)], rows: file.rows.map(row => [...used.map(column => cellOf(row, column)), ...kept.map(({ index }) => row[index] ?? '')]) };
+}
+
+/** Two tables under each other, as CSV. */
+export function joined(before, after, columns, free) {
+  const [one, other] = [plain(before, columns, free), plain(after, columns, free)];
+  const header = [...new Set([...one.header, ...other.header])];
+  const lines = [one, other].flatMap(({ header: own, rows }) => rows.map(row => header.map(name => row[own.indexOf(name)] ?? '')));
+  return `${[header, ...lines].map(line => line.map(cell => quote(cell, SEPARATORS)).join('\t')).join('\n')}\n`;
+}
+
+/** The largest number of a run that a table or the list of runs has. */
+export function lastRun(value, columns, free, runs, list) {
+  if (!value) return list?.length ?? 0;
+  const { header, rows } = plain(value, columns, free);
+  const at = header.indexOf(runs.number);
+  return Math.max(list?.length ?? 0, 1, ...rows.map(row => (at < 0 ? 1 : Number(row[at]) || 1)));
 }
 
 /** The columns of a kept CSV, by their labels. */

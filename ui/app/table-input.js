@@ -5,12 +5,16 @@ import { html, useState, useEffect, useRef, useMemo, unique } from './lib.js';
 import { t, plural, number, unitOf, language } from './text.js';
 import { kindOf, labelOf, wordOf, spoken } from './schema.js';
 import { mark } from './fields.js';
-import { MOST_BYTES, decoded, readFile, rowFields, mostRows, wanted, freeOf, guess, othersOf, matched, headings, sizeAbout } from './table-file.js';
+import {
+  MOST_BYTES, decoded, readFile, rowFields, mostRows, wanted, freeOf, guess, othersOf, matched, headings, sizeAbout, cellNumber, conditionsIn, conditionsOf, runsWith, measuredOnly, joined, lastRun,
+} from './table-file.js';
 import { Matching } from './matching.js';
 
 const MEGA = 1_000_000;
 
-export function TableInput({ name, schema, root, value, onChange, faults, below, names }) {
+/** `runs` says of which list of the job the rows name an item, with that list as it is: `{ list, number, fields, value }`;
+ *  `onChange(table, runs)` gets both. */
+export function TableInput({ name, schema, root, value, runs, onChange, faults, below, names }) {
   const [draft, setDraft] = useState(null);
   const [over, setOver] = useState(false);
   const [pasting, setPasting] = useState(false);
@@ -53,17 +57,29 @@ export function TableInput({ name, schema, root, value, onChange, faults, below,
     if (event.dataTransfer.files.length > 0) take(event.dataTransfer.files);
     else if (text) open(text, t('pasted'));
   };
-  const others = draft && othersOf(draft.file, columns, draft.matches, freeOf(fields));
-  const accept = () => { onChange({ csv: matched(draft.file, columns, draft.matches, others.kept) }); show(null); };
+  const free = useMemo(() => freeOf(fields), [fields]);
+  const conditions = draft && runs ? conditionsIn(draft.file, draft.matches, runs) : [];
+  const others = draft && othersOf(draft.file, columns, { ...draft.matches, ...Object.fromEntries(conditions.map(one => [`/${one.name}`, one])) }, free);
+  const filled = draft && measuredOnly(draft.file, draft.matches, measured);
+  /** Uses the table in place of the one there is, or below it. */
+  const accept = isMore => {
+    const table = { csv: matched(filled, columns, draft.matches, others.kept) };
+    const next = runs && (conditions.length > 0 || isMore) ? runsWith(isMore ? runs.value : [], conditionsOf(filled, draft.matches, runs, conditions)) : undefined;
+    onChange(isMore ? { csv: joined(value, table, columns, free) } : table, next);
+    show(null);
+  };
   const rows = Array.isArray(value) ? value.length : value?.csv ? value.csv.trim().split('\n').length - 1 : 0;
   const list = [...(faults || []), ...(below || [])];
   const needed = columns.filter(({ required, name: one }) => required || measured.includes(one));
+  // Rows of runs that are not there yet go below those that are.
+  const ownRun = runs && draft?.matches[runs.number];
+  const isMore = Boolean(ownRun && rows > 0) && filled.rows.every(row => cellNumber(row[ownRun.index], draft.file.separator) > lastRun(value, columns, free, runs, runs.value));
   return html`
     <div class=${`table-input ${over ? 'over' : ''}`} onDragOver=${event => { event.preventDefault(); setOver(true); }} onDragLeave=${() => setOver(false)} onDrop=${drop}>
       ${list.length > 0 && html`<p class="fault" id=${`${id}-fault`}>${list.slice(0, 6).map(fault => html`<span>${spoken(fault.detail, names)}</span>`)}
         ${list.length > 6 && html`<span>${t('and_more', { count: list.length - 6 })}</span>`}</p>`}
       ${trouble && html`<p class="fault" role="alert"><span>${trouble}</span></p>`}
-      ${draft ? html`<${Matching} ...${{ id: waiting, draft, columns, measured, most, others, accept, label }} setDraft=${show} cancel=${() => show(null)} />` : html`
+      ${draft ? html`<${Matching} ...${{ id: waiting, draft, filled, columns, measured, most, others, conditions, rows, isMore, accept, label }} setDraft=${show} cancel=${() => show(null)} />` : html`
         ${rows > 0
           ? html`<p class="table-state"><strong>${plural('rows', rows)}</strong>${value.csv && html` <span class="quiet">${headings(value.csv, columns)}</span>`}</p>
             ${Array.isArray(value) && html`<${Preview} rows=${value} columns=${columns} label=${label} />`}`

@@ -1,0 +1,112 @@
+// Places of a picture that can be taken hold of, with the mouse, a finger or the keys: numbers of the job follow. Which places
+// these are, along which axis they go and what follows them, the figure says.
+import { html, useRef } from './lib.js';
+import { t, capital, number, unitSymbol } from './text.js';
+import { at, changed, parts } from './schema.js';
+
+/** A handle this near to one of its stops is there, px. */
+const STOP_PX = 7;
+const FAR = 10;
+/** Digits that a number which follows a handle keeps. */
+const DIGITS = 10;
+
+/** The largest round number that is no more than so many units are to a pixel. */
+export const stepOf = perPixel => 10 ** Math.floor(Math.log10(perPixel) + 1e-9);
+
+/** Where a handle is that is pulled to a place: on a round number or at one of its stops, within its reach. */
+export function settled(handle, place, step, near = 0) {
+  const [least, most] = handle.reach;
+  const stop = handle.stops.reduce((best, one) => (Math.abs(one - place) <= Math.abs((best ?? Infinity) - place) ? one : best), null);
+  const to = stop !== null && Math.abs(stop - place) <= near ? stop : Number((Math.round(place / step) * step).toPrecision(DIGITS));
+  return Math.min(Math.max(to, least), most);
+}
+
+/** The job with the numbers that follow a handle, once it is so far from where it was; `filled` has those that the job leaves
+ *  to the service. */
+export const movedJob = (job, filled, handle, by) => handle.moves.reduce((whole, { pointer, per_unit: perUnit }) => {
+  const path = parts(pointer);
+  const before = at(job, path) ?? at(filled, path);
+  return typeof before === 'number' ? changed(whole, path, Number((before + perUnit * by).toPrecision(DIGITS))) : whole;
+}, job);
+
+const placeOf = handle => handle[handle.along];
+
+/** A handle stands within its panel. */
+const INSIDE_PX = 9;
+const withinFrame = (v, { top, height }) => Math.min(Math.max(v, top + INSIDE_PX), top + height - INSIDE_PX);
+
+/** Handles nearer to each other than this, px, are too near for a finger: what comes later in the figure stays. */
+const APART_PX = 25;
+
+/** Those of a panel that have room; the others come when the picture is larger, or a part of it. */
+export function roomy(handles, x, y, frame) {
+  const kept = [];
+  for (const one of handles.toReversed()) {
+    const [h, v] = [x(one.handle.x), withinFrame(y(one.handle.y), frame)];
+    if (kept.every(other => Math.hypot(other.h - h, other.v - v) >= APART_PX)) kept.push({ ...one, h, v });
+  }
+  return kept.reverse();
+}
+
+/** The handles of a panel. `x` and `y` are its scales; `hold(handle)` begins, and gives `move(place)` and `drop()`. */
+export function Handles({ panel, axis, x, y, hold, frame }) {
+  // What is being pulled stays, wherever it comes.
+  const pulled = useRef(null);
+  const all = panel.items.map((handle, index) => ({ handle, index })).filter(({ handle }) => handle.kind === 'handle');
+  const shown = pulled.current ? all.filter(({ index }) => pulled.current.includes(index)) : roomy(all, x, y, frame);
+  const take = handle => {
+    pulled.current = shown.map(({ index }) => index);
+    const { move, drop } = hold(handle);
+    return { move, drop: () => { pulled.current = null; drop(); } };
+  };
+  return html`
+    <div class="handles">${shown.map(({ handle, index }) => html`<${Grip} key=${index} ...${{ handle, x, y, frame }} hold=${take} axis=${handle.along === 'x' ? axis : panel.y} />`)}</div>`;
+}
+
+function Grip({ handle, x, y, axis, hold, frame }) {
+  // Pulled: the scale and the place of then, as both change with the picture that follows.
+  const pulled = useRef(null);
+  const own = handle.along === 'x' ? x : y;
+  const [left, top] = [x(handle.x), withinFrame(y(handle.y), frame)];
+  if (!(left >= frame.left - 1 && left <= frame.left + frame.width + 1)) return null;
+  const pixel = event => (handle.along === 'x' ? event.clientX : event.clientY);
+  const perPixel = Math.abs(own.back(1) - own.back(0));
+  const step = stepOf(perPixel);
+  const down = event => {
+    if (event.button !== 0) return;
+    event.stopPropagation();
+    event.preventDefault();
+    event.currentTarget.focus();
+    event.currentTarget.setPointerCapture(event.pointerId);
+    pulled.current = { ...hold(handle), from: pixel(event), scale: own, step, handle };
+  };
+  const move = event => {
+    event.stopPropagation();
+    const held = pulled.current;
+    if (!held) return;
+    const begun = held.scale(placeOf(held.handle));
+    const to = settled(held.handle, held.scale.back(begun + pixel(event) - held.from), held.step, STOP_PX * Math.abs(held.scale.back(1) - held.scale.back(0)));
+    held.move(to);
+  };
+  const up = event => {
+    event.stopPropagation();
+    pulled.current?.drop();
+    pulled.current = null;
+  };
+  const key = event => {
+    const way = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 }[event.key];
+    const to = event.key === 'Home' ? handle.reach[0] : event.key === 'End' ? handle.reach[1] : way ? placeOf(handle) + way * step * (event.shiftKey ? FAR : 1) : null;
+    if (to === null || event.ctrlKey || event.metaKey || event.altKey) return;
+    event.preventDefault();
+    event.stopPropagation();
+    const { move: go, drop } = hold(handle);
+    go(settled(handle, to, step));
+    drop();
+  };
+  const said = `${number(placeOf(handle), 6)} ${unitSymbol(axis.unit)}`;
+  // The name stands within the picture.
+  const side = left > frame.left + 0.7 * frame.width ? 'late' : left < frame.left + 0.2 * frame.width ? 'early' : '';
+  return html`<span class=${`grip ${handle.along} ${side}`} role="slider" tabindex="0" style=${{ left: `${left}px`, top: `${top}px` }} data-name=${handle.name} aria-label=${`${capital(handle.text)}. ${t('grip_keys')}`}
+    aria-orientation=${handle.along === 'x' ? 'horizontal' : 'vertical'} aria-valuenow=${placeOf(handle)} aria-valuemin=${handle.reach[0]} aria-valuemax=${handle.reach[1]} aria-valuetext=${said}
+    onPointerDown=${down} onPointerMove=${move} onPointerUp=${up} onPointerCancel=${up} onKeyDown=${key} onDblClick=${event => event.stopPropagation()}><b aria-hidden="true">${capital(handle.text)} ${said}</b></span>`;
+}
