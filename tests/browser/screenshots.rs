@@ -8,7 +8,8 @@ use crate::chromium::Page;
 use crate::{SETTLED, both};
 
 /// Name, place, width, height, whether dark.
-const SHOTS: [(&str, &str, u32, u32, bool); 20] = [
+const SHOTS: [(&str, &str, u32, u32, bool); 21] = [
+    ("start", "", 1440, 900, false),
     ("deflection", "deflection-compensation", 1440, 900, false),
     ("deflection-ru", "deflection-compensation?example=stepped_with_rest", 1440, 900, false),
     ("lobes", "fixture-stability?example=lobes", 1440, 900, true),
@@ -56,6 +57,7 @@ fn the_documentation_shows_the_workbench_as_it_is() {
         match place {
             "models" | "results" => page.wait_for(".list tbody tr"),
             "studies" => page.wait_for("#run-study"),
+            "" => page.wait_for(".outcome-picture svg path"),
             _ => page.until(SETTLED),
         }
         stage(&mut page, name);
