@@ -71,7 +71,6 @@ impl Calculator for CylindricityEvaluation {
         hallmarks: &[
             Hallmark::Of("/nominal_radius_mm"),
             Hallmark::Count("/points"),
-            Hallmark::Count("/radii"),
             Hallmark::Count("/deviations"),
             Hallmark::Of("/cylindricity_tolerance_um"),
             Hallmark::Of("/filter/cutoff_upr"),
