@@ -70,7 +70,7 @@ fn the_start_page_shows_outcomes() {
     let count = page.evaluate("document.querySelectorAll('.questions li').length");
     assert_eq!(page.evaluate("document.querySelectorAll('.outcome-picture svg').length"), count);
     // Every picture shows something, and its example is told beside it and opens.
-    assert_eq!(page.evaluate("[...document.querySelectorAll('.outcome-picture svg')].every(it => [...it.querySelectorAll('path')].some(path => path.getAttribute('d').length > 40))"), true);
+    assert_eq!(page.evaluate("[...document.querySelectorAll('.outcome-picture svg')].every(it => [...it.querySelectorAll('path')].some(path => path.getAttribute('d').split(/[ML]/).length > 5))"), true);
     assert_eq!(page.evaluate("[...document.querySelectorAll('.outcome a, .examples a')].some(it => it.textContent.includes('source paper'))"), false);
     // Nothing was computed for it.
     assert_eq!(
