@@ -314,3 +314,33 @@ fn links_that_lead_to_nothing_are_answered_in_the_users_words() {
     }
     page.assert_calm();
 }
+
+#[test]
+fn a_part_that_is_kept_as_ones_own_is_where_another_calculator_begins() {
+    let Some((_turn, mut page, service)) = both() else { return };
+    page.open(&service.page("deflection-compensation"));
+    page.until(SETTLED);
+    page.fill("#field-shaft-youngs_modulus_n_per_mm2", "123000");
+    page.until(&format!("{SETTLED} && {CURRENT}"));
+    page.click("[data-own='shaft Shaft'] [data-act=keep]");
+    page.wait_for("[data-own='shaft Shaft'] [data-act=forget]");
+    // Every calculator that asks for a shaft begins with it, and says so.
+    page.open(&service.page("feed-schedule"));
+    page.until(SETTLED);
+    assert_eq!(page.value("#field-shaft-youngs_modulus_n_per_mm2"), "123000");
+    assert!(page.text(".own-note").contains("shaft"));
+    page.until("location.hash.includes('/shaft')");
+    assert_fits(&mut page, "own parts");
+    // The example is a click away, and what is one's own another.
+    page.click(".own-note a");
+    page.until(&format!("!document.querySelector('.own-note') && {SETTLED}"));
+    let example = page.value("#field-shaft-youngs_modulus_n_per_mm2");
+    assert_ne!(example, "123000");
+    page.click("[data-own='shaft Shaft'] [data-act=use]");
+    page.until("document.querySelector('#field-shaft-youngs_modulus_n_per_mm2').value === '123000'");
+    page.click("[data-own='shaft Shaft'] [data-act=forget]");
+    page.open(&service.page("feed-schedule"));
+    page.until(SETTLED);
+    assert_eq!(page.value("#field-shaft-youngs_modulus_n_per_mm2"), example);
+    page.assert_calm();
+}

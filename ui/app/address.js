@@ -3,6 +3,7 @@ import * as api from './api.js';
 import { t } from './text.js';
 import { difference, changed, parts } from './schema.js';
 import { keptRun, inputOf } from './runs.js';
+import { withOwn } from './mine.js';
 
 /** A link that stands for nothing here; the message is for whoever opened it. */
 export class BrokenLink extends Error {}
@@ -30,7 +31,8 @@ export async function jobOf(description, query, service = api) {
   if (key) {
     const kept = await keptBy(key, service);
     if (kept.calculator !== undefined && kept.calculator !== description.id) throw new BrokenLink(t('link_other'));
-    return { job: kept.job, base: kept.job, baseName: { result: key }, key };
+    const model = query.get('model');
+    return { job: model ? { ...kept.job, model } : kept.job, base: kept.job, baseName: { result: key }, own: [], key: model ? null : key };
   }
   const name = query.get('example') || description.examples[0]?.id;
   if (name && !description.jobs[name]) throw new BrokenLink(t('link_example', { name }));
@@ -40,12 +42,15 @@ export async function jobOf(description, query, service = api) {
     if (!place.startsWith('/')) continue;
     job = changed(job, parts(place), valueOf(place, text));
   }
-  if (query.get('model')) job = { ...job, model: query.get('model') };
-  return { job, base, baseName: { example: name }, key: null };
+  // Whoever asks for no job in particular begins with what is his own.
+  const begun = query.has('example') || job !== base ? { job, own: [] } : withOwn(description.input_schema, job);
+  if (query.get('model')) begun.job = { ...begun.job, model: query.get('model') };
+  return { ...begun, base, baseName: { example: name }, key: null };
 }
 
 /** What an address stands for that names a run: the job as it was typed if it was started here, else as the service was
- *  given it. */
+ *  given it.
+ *  @returns {Promise<any>} */
 export async function openedBy(description, query, service = api) {
   const run = query.get('run');
   const typed = run && keptRun(run);
@@ -57,7 +62,7 @@ export async function openedBy(description, query, service = api) {
     return jobOf(description, query, service);
   }
   if (!given) return jobOf(description, query, service);
-  return { job: given.job, base: given.job, baseName: { run }, key: null, isOwnRun: false };
+  return { job: given.job, base: given.job, baseName: { run }, own: [], key: null, isOwnRun: false };
 }
 
 /** The address of a job: its base with what differs, or its kept result where that is too long. */

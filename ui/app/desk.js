@@ -5,6 +5,7 @@ import { t, language } from './text.js';
 import { cell, debounced } from './lib.js';
 import { keepRun } from './runs.js';
 import { BrokenLink, openedBy, queryOf, written } from './address.js';
+import { noteLast } from './mine.js';
 
 /** An answer slower than this, ms, is asked for and not followed live. */
 const LIVE_LIMIT_MS = 1500;
@@ -29,9 +30,6 @@ export function standingOf({ job, answer, problem, pending, running, waiting }, 
 /** Why a job has no result. */
 const endOf = record => record.problem || { title: t(`state_${record.state}`), code: record.state };
 
-/** The last state of each calculator's page, by its id: what a study of it begins with. */
-export const lastQuery = new Map();
-
 const realClock = { now: () => performance.now(), pause: ms => new Promise(resolve => setTimeout(resolve, ms)) };
 
 /**
@@ -43,6 +41,7 @@ const realClock = { now: () => performance.now(), pause: ms => new Promise(resol
  * @property {any} base
  * @property {{ example?: string, result?: string, run?: string }} baseName
  * @property {any} job
+ * @property {string[]} own parts of the user's own that the job began with
  * @property {null | { key: string, job: any, answer: any, figures: any[], language: string }} answer
  * @property {any} problem the document of a refusal
  * @property {any} running the record of a job that is followed
@@ -61,7 +60,7 @@ export class Desk {
     this.service = service;
     this.clock = clock;
     /** @type {DeskState} */
-    this.state = { description: null, missing: null, libraries: {}, base: null, baseName: {}, job: null, answer: null, problem: null, running: null, pending: false, waiting: false, pinned: null };
+    this.state = { description: null, missing: null, libraries: {}, base: null, baseName: {}, job: null, own: [], answer: null, problem: null, running: null, pending: false, waiting: false, pinned: null };
     /** @type {Set<(state: DeskState) => void>} */
     this.watchers = new Set();
     this.isClosed = false;
@@ -107,7 +106,7 @@ export class Desk {
   tell(job, key, run, how) {
     if (how === 'replace' && this.isUnwritten) return;
     const next = written(queryOf(this.state, job, key, run, this.state.pinned?.key));
-    lastQuery.set(this.id, next);
+    noteLast(this.id, next);
     if (next === this.ownQuery) return;
     this.ownQuery = next;
     this.turn.open += 1;

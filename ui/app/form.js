@@ -6,6 +6,7 @@ import { runsOf } from './table-file.js';
 import { fieldId, isLeaf, mark, explained, Symbol, Faults, Row, NumberInput, TextInput, Enum, Switch, Library, ModelChoice } from './fields.js';
 import { List, MapFields } from './lists.js';
 import { TableInput } from './table-input.js';
+import { forget, isSame, keep, ownName, useKept } from './mine.js';
 
 /** Everything that fields share: the root schema, errors by pointer, what changes, who shows help. */
 class Context {
@@ -56,7 +57,7 @@ export function Form({ calculator, schema, value, filled, onChange, errors, libr
   const family = kindOf(whole) === 'choice' ? variants(whole, root) : null;
   const member = family && variantOf(family, value);
   const top = member ? member.schema : whole;
-  const all = Object.entries(top.properties || {}).map(([name, part]) => ({ name, schema: resolve(part, root) })).filter(entry => kindOf(entry.schema) !== 'constant');
+  const all = Object.entries(top.properties || {}).map(([name, part]) => ({ name, schema: resolve(part, root), own: ownName(name, part, root) })).filter(entry => kindOf(entry.schema) !== 'constant');
   const required = new Set(top.required || []);
   const isSection = ({ schema: part }) => ['object', 'choice', 'array', 'table', 'map', 'json'].includes(kindOf(part));
   const sections = all.filter(isSection);
@@ -70,8 +71,8 @@ export function Form({ calculator, schema, value, filled, onChange, errors, libr
   asked.sort((a, b) => Number(Boolean(b.schema['x-table'] && required.has(b.name))) - Number(Boolean(a.schema['x-table'] && required.has(a.name))));
   const usual = sections.filter(entry => !asked.includes(entry) && entry.schema['x-table']);
   const further = sections.filter(entry => !asked.includes(entry) && !usual.includes(entry));
-  const section = ({ name, schema: part }, open) => html`
-    <${Section} key=${name} name=${name} schema=${part} path=${[name]} value=${value[name]} open=${open} required=${required.has(name)} context=${context} />`;
+  const section = ({ name, schema: part, own }, open) => html`
+    <${Section} key=${name} name=${name} own=${own} schema=${part} path=${[name]} value=${value[name]} open=${open} required=${required.has(name)} context=${context} />`;
   return html`
     <form class="form" onSubmit=${event => { event.preventDefault(); onChange(value, 'run'); }} novalidate aria-label=${t('inputs')}>
       <div class="sections">
@@ -123,7 +124,7 @@ function Fold({ title, note, summary, open: initially, errors, action, children,
 }
 
 /** A top-level part of the job. */
-function Section({ name, schema, path, value, open, required, context }) {
+function Section({ name, own, schema, path, value, open, required, context }) {
   const label = labelOf(name, schema);
   const isThere = value !== undefined && value !== null;
   const add = () => context.set(path, schema.default && Object.keys(schema.default).length ? schema.default : blank({ ...schema, optional: false }, context.root));
@@ -131,13 +132,28 @@ function Section({ name, schema, path, value, open, required, context }) {
   const remove = !required && isThere && kind !== 'table' && html`
     <button type="button" class="quiet-button" onClick=${() => context.set(path, undefined)} title=${t('use_default')}>${t('reset')}<span class="hidden"> ${label}</span></button>`;
   const direct = context.errorsAt(path);
+  const keeping = own && html`<${Keeping} own=${own} label=${label} value=${value} isThere=${isThere && context.errorsBelow(path) === 0} use=${part => context.set(path, part)} />`;
   return html`
-    <${Fold} title=${label} open=${open} errors=${context.errorsBelow(path)} summary=${summary(schema, value, context.root)} action=${remove} description=${schema.description}>
+    <${Fold} title=${label} open=${open} errors=${context.errorsBelow(path)} summary=${summary(schema, value, context.root)} action=${[keeping, remove]} description=${schema.description}>
       <${Faults} faults=${kind === 'table' ? [] : direct} id=${fieldId(path)} names=${context.names} />
       ${isThere || required || kind === 'table' || (kind === 'object' && !schema.optional) || kind === 'array' || kind === 'map'
         ? html`<${Body} name=${name} schema=${schema} path=${path} value=${value} context=${context} />`
         : html`<p class="absent"><span>${spoken(schema.description, context.names)}</span><button type="button" onClick=${add}>${t('add')}<span class="hidden"> ${label}</span></button></p>`}
     <//>`;
+}
+
+/** A part that the user calls his own: kept for every calculator, taken from there, let go. */
+function Keeping({ own, label, value, isThere, use }) {
+  const mine = useKept(own);
+  const isMine = mine !== undefined && isSame(mine, value);
+  const button = (act, when, then) => when && html`
+    <button type="button" class="quiet-button" data-act=${act} onClick=${then} title=${t(`own_${act}_why`)}>${t(`own_${act}`)}<span class="hidden"> ${label}</span></button>`;
+  return html`
+    <span data-own=${own}>
+      ${button('forget', isMine, () => forget(own))}
+      ${button('use', mine !== undefined && !isMine, () => use(mine))}
+      ${button('keep', isThere && !isMine, () => keep(own, value))}
+    </span>`;
 }
 
 /** What a folded part holds, in a few words. */

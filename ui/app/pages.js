@@ -3,6 +3,8 @@ import { html, useState, useEffect, useRef } from './lib.js';
 import { t, number, duration, moment, language } from './text.js';
 import * as api from './api.js';
 import { save } from './handover.js';
+import { written } from './address.js';
+import { lastJob } from './mine.js';
 import { useOutcomes, Outcome } from './outcomes.js';
 
 const LOOK_MS = 1500;
@@ -173,7 +175,7 @@ export function Models({ calculators, models, refreshModels }) {
         ${models.length === 0 ? html`<p class="empty-list">${t('no_models')}</p>` : html`<div class="grid-scroll" tabindex="0" role="region" aria-label=${t('models')}><table class="list" role="table">
           <thead role="rowgroup"><tr role="row"><th scope="col" role="columnheader">${t('name')}</th><th scope="col" role="columnheader">${t('calculator')}</th><th scope="col" role="columnheader" class="number">${t('revision')}</th><th scope="col" role="columnheader">${t('created')}</th><th scope="col" role="columnheader"><span class="hidden">${t('actions')}</span></th></tr></thead>
           <tbody role="rowgroup">${models.map(({ name, calculator, revision, created_at: created }) => html`<tr role="row" key=${name}><th scope="row" role="rowheader">${name}</th><td role="cell">${titleOf(calculators, calculator)}</td><td role="cell" class="number">${revision}</td><td role="cell" class="when">${created ? moment(created) : ''}</td>
-            <td role="cell" class="actions"><a class="button" href=${`#/${calculator}?model=${name}`}>${t('use_model')}<span class="hidden"> ${name}</span></a>
+            <td role="cell" class="actions"><a class="button" href=${`#/${calculator}?${written(new URLSearchParams([...lastJob(calculator), ['model', name]]))}`}>${t('use_model')}<span class="hidden"> ${name}</span></a>
               <button type="button" onClick=${() => fetchDocument(name)}>JSON<span class="hidden"> ${name}</span></button>
               <button type="button" class=${asked === name ? 'sure' : ''} onBlur=${() => setAsked(null)} onKeyDown=${event => { if (event.key === 'Escape') setAsked(null); }} onClick=${() => (asked === name ? drop(name) : setAsked(name))}>${asked === name ? t('delete_sure') : t('delete')}<span class="hidden"> ${name}</span></button></td></tr>`)}</tbody></table></div>`}
         <p><label class="button">${t('import_model')} <input type="file" class="hidden" accept=".json,application/json" onChange=${take} /></label></p>`}

@@ -4,7 +4,7 @@ import { t, capital, language } from './text.js';
 import { Form, goTo } from './form.js';
 import { unread } from './fields.js';
 import { Result } from './result.js';
-import { namesOf } from './schema.js';
+import { labelOf, memberOf, namesOf, resolve } from './schema.js';
 import { pickOf } from './pick.js';
 import { Progress, Trouble } from './status.js';
 import { Desk } from './desk.js';
@@ -36,7 +36,7 @@ function useDesk({ id, query, replace, push, refreshJobs }) {
 export function Room({ id, query, replace, push, models, refreshJobs }) {
   const [desk, state, unreadable] = useDesk({ id, query, replace, push, refreshJobs });
   const [pane, setPane] = useState('picture');
-  const { description, missing, libraries, job, baseName, answer, problem, running, pending, waiting, pinned } = state;
+  const { description, missing, libraries, job, own, baseName, answer, problem, running, pending, waiting, pinned } = state;
   if (missing) {
     const isBroken = missing instanceof BrokenLink;
     return html`<main class="plain" id="main" tabindex="-1"><h1>${isBroken ? t('broken_link') : missing.problem?.title || t('trouble_title')}</h1><p role="alert">${capital(missing.problem?.detail || missing.message)}</p>
@@ -79,6 +79,7 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
           </select>
           <button type="button" class=${`primary ${waiting ? 'calling' : ''}`} onClick=${() => compute('picture')} title="Ctrl+Enter">${waiting ? t('run_changed') : t('run')}</button>
         </div>
+        ${own.length > 0 && html`<p class="own-note" role="status">${t('own_used', { parts: own.map(name => labelOf(name, resolve(memberOf(description.input_schema, job).properties[name], description.input_schema)).toLowerCase()).join(', ') })} <a href=${`#/${id}?example=${baseName.example}`}>${t('own_example')}</a></p>`}
         <${Form} key=${`${id} ${baseName.example ?? 'kept'}`} schema=${description.input_schema} value=${job} filled=${answer?.answer.input} onChange=${(next, how) => (how === 'run' ? compute(pane) : desk.change(next, how))} errors=${problem?.errors} examples=${description.jobs} libraries=${libraries} calculator=${id} models=${models} />
       </section>
       <section class="result-pane" aria-label=${t('result')} aria-busy=${pending || running ? 'true' : 'false'}>

@@ -3,7 +3,7 @@ import { html, useState, useEffect, useRef, useMemo } from './lib.js';
 import { t, capital, number, typed, unitSymbol, plural, language } from './text.js';
 import * as api from './api.js';
 import { jobOf } from './address.js';
-import { lastQuery } from './desk.js';
+import { lastJob } from './mine.js';
 import { read } from './number.js';
 import { keepRun, keptRun, inputOf } from './runs.js';
 import { Progress, Trouble } from './status.js';
@@ -72,7 +72,7 @@ export function Study({ calculators, query, push, replace, refreshJobs }) {
     return () => { gone = true; stopWaiting?.(); };
   }, [asked, spoken, asking]);
   const tell = next => { own.current = next; replace(next); };
-  const choose = id => push(`calculator=${id}${lastQuery.get(id) ? `&${written(jobPart(new URLSearchParams(lastQuery.get(id))))}` : ''}`);
+  const choose = id => push(written(new URLSearchParams([['calculator', id], ...lastJob(id)])));
   if (missing) return html`<main class="plain" id="main" tabindex="-1"><h1>${missing.problem?.title || t('trouble_title')}</h1><p>${capital(missing.problem?.detail || missing.message)}</p><p><a href="#/studies" onClick=${() => setMissing(null)}>${t('start_over')}</a></p></main>`;
   if (!opened) return html`<main class="plain quiet-start" id="main" tabindex="-1"><p>${t('loading')}</p></main>`;
   return html`<${Board} key=${opened.serial} ...${{ ...opened, calculators, choose, tell, refreshJobs }} />`;
