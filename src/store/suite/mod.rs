@@ -87,6 +87,8 @@ pub(in crate::store) fn job(number: u32) -> NewJob {
         useful_for_ms: None,
         quota: Quota::default(),
         result: None,
+        callback: None,
+        traceparent: None,
     }
 }
 
@@ -140,6 +142,7 @@ macro_rules! suite {
         }
         suite! { $place, models:
             revisions_rise_and_are_never_given_twice
+            models_count_for_who_stores_them_until_they_are_deleted
         }
         suite! { $place, results:
             what_is_put_is_got_after_the_store_was_closed
