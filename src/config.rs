@@ -793,7 +793,9 @@ mod tests {
         assert_eq!(host("mes.plant.example:443").as_deref(), Some("mes.plant.example Some(443)"));
         assert_eq!(host("0x7f.1:80").as_deref(), Some("127.0.0.1 Some(80)"));
         assert_eq!(host("[::1]:8000").as_deref(), Some("[::1] Some(8000)"));
-        for bad in ["", "https://mes.plant.example", "mes/path", "user@mes", "mes:", "mes:x", "*", "a b", "mes?x", "mes#x"] {
+        for bad in
+            ["", "https://mes.plant.example", "mes/path", "user@mes", "mes:", "mes:x", "*", "a b", "mes?x", "mes#x"]
+        {
             assert_eq!(host(bad), None, "{bad}");
         }
     }
@@ -804,13 +806,17 @@ mod tests {
                     owners = [{ owner = \"cam\", secret_file = \"\" }]\n\
                     [traces]\nendpoint = \"collector:4318\"\nshare = 2.0";
         let error = load(file, &[], &Flags::default()).unwrap_err().to_string();
-        for name in ["hosts", "secret_file", "owners", "timeout_s", "pauses_s"].map(|name| format!("callbacks.{name}")) {
+        for name in ["hosts", "secret_file", "owners", "timeout_s", "pauses_s"].map(|name| format!("callbacks.{name}"))
+        {
             assert!(error.contains(&name), "{name} missing in: {error}");
         }
         assert!(error.contains("traces.endpoint") && error.contains("traces.share"), "{error}");
         let environment = [("PRECUT_CALLBACKS_HOSTS", "[\"mes:80\"]"), ("PRECUT_CALLBACKS_SECRET_FILE", "12")];
         let config = load("", &environment, &Flags::default()).unwrap();
-        assert_eq!((config.callbacks.hosts, config.callbacks.secret_file), (vec!["mes:80".to_owned()], "12".to_owned()));
+        assert_eq!(
+            (config.callbacks.hosts, config.callbacks.secret_file),
+            (vec!["mes:80".to_owned()], "12".to_owned())
+        );
     }
 
     #[test]

@@ -31,7 +31,8 @@ pub(super) fn run(arguments: &ServeArgs, registry: Registry, isolation: Option<I
         .enable_all()
         .build()
         .map_err(|error| Failed::Machine(format!("the threads cannot be started: {error}")))?;
-    let export = Export::start(&config.traces, runtime.handle()).map_err(|error| Failed::Machine(format!("settings: {error}")))?;
+    let export = Export::start(&config.traces, runtime.handle())
+        .map_err(|error| Failed::Machine(format!("settings: {error}")))?;
     log::start(&config.log, export.as_ref());
     config.strays.iter().for_each(|stray| tracing::warn!("{stray}"));
     let outcome = runtime.block_on(serve(&config, arguments, registry, isolation));

@@ -111,11 +111,12 @@ impl ModelStore for SqliteStore {
                 .write(move |connection| {
                     let name = name.clone();
                     Box::pin(async move {
-                        let done =
-                            sqlx::query("UPDATE models SET content = NULL, bytes = 0 WHERE name = ?1 AND content IS NOT NULL")
-                                .bind(name)
-                                .execute(connection)
-                                .await?;
+                        let done = sqlx::query(
+                            "UPDATE models SET content = NULL, bytes = 0 WHERE name = ?1 AND content IS NOT NULL",
+                        )
+                        .bind(name)
+                        .execute(connection)
+                        .await?;
                         Ok(done.rows_affected() > 0)
                     })
                 })

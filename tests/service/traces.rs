@@ -63,7 +63,10 @@ async fn a_job_is_one_trace_from_its_request_to_its_callback() {
     assert!(about.contains("service.name") && about.contains("precut") && about.contains("service.version"), "{about}");
     let spans = spans(&batches);
     let of = |trace: &str| -> Vec<&Value> { spans.iter().filter(|span| span["traceId"] == trace).collect() };
-    let named = |name: &str| of(trace).into_iter().find(|span| span["name"] == name).unwrap();
+    let named = |name: &str| {
+        let found = of(trace).into_iter().find(|span| span["name"] == name);
+        found.unwrap_or_else(|| panic!("no span {name} in {spans:#?}"))
+    };
     let (request, job, callback) = (named("request"), named("job"), named("callback"));
     assert_eq!(request["parentSpanId"], parent);
     assert_eq!(job["parentSpanId"], request["spanId"]);

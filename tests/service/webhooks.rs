@@ -115,7 +115,11 @@ async fn jobs_that_fail_or_are_cancelled_are_told_too() {
     drop(held);
     let told = |path: &str| calls.iter().find(|call| call.path == path).unwrap().json();
     let failed = told("/failed");
-    assert_eq!((failed["type"].as_str(), failed["data"]["problem"].is_string()), (Some("job.failed"), true), "{failed}");
+    assert_eq!(
+        (failed["type"].as_str(), failed["data"]["problem"].is_string()),
+        (Some("job.failed"), true),
+        "{failed}"
+    );
     assert_eq!(told("/cancelled")["type"], "job.cancelled");
     assert_eq!(told("/late")["data"]["problem"], "deadline_exceeded");
     server.stop().await;
@@ -185,9 +189,17 @@ async fn what_nobody_takes_is_given_up_for_all_to_see() {
     };
     let (broken, gone) = (send("/broken", 2241).await, send("/gone", 2242).await);
     let given_up = callback_in(&server, &broken, "given_up").await;
-    assert_eq!((&given_up["attempts"], &given_up["fault"]), (&json!(4), &json!("http_500")), "three pauses, four tries");
+    assert_eq!(
+        (&given_up["attempts"], &given_up["fault"]),
+        (&json!(4), &json!("http_500")),
+        "three pauses, four tries"
+    );
     let given_up = callback_in(&server, &gone, "given_up").await;
-    assert_eq!((&given_up["attempts"], &given_up["fault"]), (&json!(1), &json!("http_410")), "it says not to come again");
+    assert_eq!(
+        (&given_up["attempts"], &given_up["fault"]),
+        (&json!(1), &json!("http_410")),
+        "it says not to come again"
+    );
     let metrics = server.get("/metrics").send().await.unwrap().text().await.unwrap();
     let given_up = metrics.lines().find(|line| line.starts_with("precut_callbacks_total{outcome=\"given_up\"}"));
     // Other tests of this program count beside this one.

@@ -19,14 +19,14 @@ use crate::trace::{self, Traceparent};
 /// it ended, or that it waits again.
 pub(super) async fn run_task(engine: Arc<Inner>, id: JobId, place: Option<Slot>) {
     let jobs = &engine.jobs;
-    let Waiting { charged, calculator, owner, created_ms, traceparent } = match stubbornly(&engine, || jobs.store.waiting(id)).await
-    {
-        Some(Some(waiting)) => waiting,
-        Some(None) if place.is_some() => return,
-        // Nobody waits for it to begin; perhaps somebody has asked for help with it.
-        Some(None) => return help::run(&engine, id).await,
-        None => return,
-    };
+    let Waiting { charged, calculator, owner, created_ms, traceparent } =
+        match stubbornly(&engine, || jobs.store.waiting(id)).await {
+            Some(Some(waiting)) => waiting,
+            Some(None) if place.is_some() => return,
+            // Nobody waits for it to begin; perhaps somebody has asked for help with it.
+            Some(None) => return help::run(&engine, id).await,
+            None => return,
+        };
     // A start that takes the process along is charged to all that ran beside it. Before a job is given up as the one
     // to blame, it is tried alone.
     let alone = charged + 1 >= MOST_ATTEMPTS;

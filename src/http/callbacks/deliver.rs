@@ -13,7 +13,7 @@ use url::Url;
 use super::Callbacks;
 use super::event::JobEvent;
 use super::sign::signatures;
-use crate::engine::{DueCallback, Engine, TakeUp, Tried};
+use crate::engine::{DueCallback, Engine, Error, Job, TakeUp, Tried};
 use crate::http::App;
 use crate::http::gate::TRACEPARENT;
 use crate::outward::{Fault, Outward};
@@ -92,15 +92,21 @@ async fn due(engine: &Engine, callbacks: &Callbacks, free: usize, busy: &HashMap
 /// Tries once, and puts down what came of it; the host that was called.
 async fn tell(app: App, outward: Outward, due: DueCallback) -> String {
     let host = due.host.clone();
+    let job = app.engine.job(due.job).await;
+    let given: Option<Traceparent> = job.as_ref().ok().and_then(|job| job.record.traceparent.as_deref()?.parse().ok());
     let span = tracing::info_span!(
         "callback",
         job = %due.job,
         host = due.host,
         attempt = due.attempt,
-        trace = tracing::field::Empty
+        trace = given.map(|given| tracing::field::display(given.trace()))
     );
+    if let Some(given) = given {
+        trace::follow(&span, given);
+    }
+    let place = trace::place_of(&span, given);
     let told = async {
-        let outcome = tried(&app, &outward, &due).await;
+        let outcome = tried(&app, &outward, (&due, job), place).await;
         let (tried, label) = match outcome {
             Ok(()) => (Tried::Delivered, "delivered"),
             Err(fault) => what_now(&app.callbacks.pauses, due.attempt, fault),
@@ -136,14 +142,19 @@ fn what_now(pauses: &[Duration], attempt: u32, fault: String) -> (Tried, &'stati
 }
 
 /// One try; why it came to nothing, as a code.
-async fn tried(app: &App, outward: &Outward, due: &DueCallback) -> Result<(), String> {
+async fn tried(
+    app: &App,
+    outward: &Outward,
+    (due, job): (&DueCallback, Result<Job, Error>),
+    place: Option<Traceparent>,
+) -> Result<(), String> {
     let internal = || "internal".to_owned();
     let url: Url = due.url.parse().map_err(|_| internal())?;
     // The settings may have changed since it was asked for.
     if !app.callbacks.may_be_called(&url) {
         return Err("host_not_allowed".to_owned());
     }
-    let job = app.engine.job(due.job).await.map_err(|error| {
+    let job = job.map_err(|error| {
         tracing::warn!(%error, "the job cannot be read");
         internal()
     })?;
@@ -154,18 +165,12 @@ async fn tried(app: &App, outward: &Outward, due: &DueCallback) -> Result<(), St
     let event = JobEvent::of(&job).ok_or_else(internal)?;
     let body = Bytes::from(serde_json::to_vec(&event).map_err(|_| internal())?);
     let (id, now_s) = (due.job.to_string(), jiff::Timestamp::now().as_second());
-    let span = tracing::Span::current();
-    let given: Option<Traceparent> = job.record.traceparent.as_deref().and_then(|text| text.parse().ok());
-    if let Some(given) = given {
-        span.record("trace", tracing::field::display(given.trace()));
-        trace::follow(&span, given);
-    }
     let mut headers = HeaderMap::new();
     let texts = [
         (SIGNATURE, Some(signatures(&secrets, &id, now_s, &body))),
         (ID, Some(id)),
         (TIMESTAMP, Some(now_s.to_string())),
-        (TRACEPARENT, trace::place_of(&span, given).map(|place| place.to_string())),
+        (TRACEPARENT, place.map(|place| place.to_string())),
     ];
     for (name, text) in texts {
         if let Some(text) = text {

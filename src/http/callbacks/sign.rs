@@ -67,7 +67,9 @@ fn secrets(text: &str) -> Result<Vec<Secret>, &'static str> {
     let secret = |line: &&str| {
         let bytes = line.strip_prefix(PREFIX).and_then(|rest| STANDARD.decode(rest).ok());
         let bytes = bytes.filter(|bytes| BYTES.contains(&bytes.len()));
-        bytes.map(Secret).ok_or("a secret is whsec_ and 24 to 64 bytes in base64, such as `openssl rand -base64 32` prints")
+        bytes
+            .map(Secret)
+            .ok_or("a secret is whsec_ and 24 to 64 bytes in base64, such as `openssl rand -base64 32` prints")
     };
     lines.iter().map(secret).collect()
 }

@@ -188,16 +188,17 @@ impl JobStore for PostgresStore {
     }
     fn counts(&self) -> BoxFuture<'_, Result<JobCounts, StoreError>> {
         Box::pin(async {
-            let (queued, running, callbacks, oldest_ms, store_bytes): (i64, i64, i64, Option<i64>, i64) = sqlx::query_as(
-                "SELECT (SELECT count(*) FROM precut.jobs WHERE state = 'queued'),
+            let (queued, running, callbacks, oldest_ms, store_bytes): (i64, i64, i64, Option<i64>, i64) =
+                sqlx::query_as(
+                    "SELECT (SELECT count(*) FROM precut.jobs WHERE state = 'queued'),
                      (SELECT count(*) FROM precut.jobs WHERE state = 'running'),
                      (SELECT count(*) FROM precut.callbacks WHERE state = 'pending'),
                      (SELECT created_ms FROM precut.jobs WHERE state = 'queued' ORDER BY id LIMIT 1),
                      (SELECT sum(pg_total_relation_size(oid))::bigint FROM pg_class WHERE relkind = 'r'
                           AND relnamespace IN ('precut'::regnamespace, 'apalis'::regnamespace))",
-            )
-            .fetch_one(&self.pool)
-            .await?;
+                )
+                .fetch_one(&self.pool)
+                .await?;
             let count = |number: i64| u64::try_from(number).unwrap_or(0);
             let (queued, running, store_bytes) = (count(queued), count(running), count(store_bytes));
             Ok(JobCounts { queued, running, callbacks: count(callbacks), oldest_ms, store_bytes })

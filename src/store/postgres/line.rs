@@ -2,11 +2,11 @@
 
 use sqlx::postgres::PgConnection;
 
-use super::{callbacks, lock};
 use super::queue::{self, Task, task_name};
 use super::record::{Outcome, RecordRow, column, columns, record};
 use super::results::insert;
 use super::usage::{lock_owner, usage};
+use super::{callbacks, lock};
 use crate::store::jobs::{Accepted, JobState, NewJob, yields_to};
 use crate::store::row::ResultRow;
 use crate::store::sqlite_jobs::pack::Packed;

@@ -61,10 +61,12 @@ impl ModelStore for PostgresStore {
 
     fn delete_model(&self, name: String) -> BoxFuture<'_, Result<bool, StoreError>> {
         Box::pin(async move {
-            let done = sqlx::query("UPDATE precut.models SET content = NULL, bytes = 0 WHERE name = $1 AND content IS NOT NULL")
-                .bind(name)
-                .execute(&self.pool)
-                .await?;
+            let done = sqlx::query(
+                "UPDATE precut.models SET content = NULL, bytes = 0 WHERE name = $1 AND content IS NOT NULL",
+            )
+            .bind(name)
+            .execute(&self.pool)
+            .await?;
             Ok(done.rows_affected() > 0)
         })
     }

@@ -43,7 +43,9 @@ pub(super) async fn take_up(connection: &mut SqliteConnection, wanted: &TakeUp, 
     .bind(wanted.most)
     .fetch_all(connection)
     .await?;
-    let due = |(job, url, host, attempt): (String, _, _, _)| Ok(DueCallback { job: parsed(&job)?, url, host, lease, attempt });
+    let due = |(job, url, host, attempt): (String, _, _, _)| {
+        Ok(DueCallback { job: parsed(&job)?, url, host, lease, attempt })
+    };
     taken.into_iter().map(due).collect()
 }
 

@@ -45,8 +45,7 @@ pub(in crate::store) async fn revisions_rise_and_are_never_given_twice<P: Place>
     assert_eq!(store.model("b".to_owned(), Some(2)).await.unwrap(), None);
     // However many come at once, each has a number of its own.
     let many = (0..10).map(|_| put("c", false));
-    let mut numbers: Vec<u32> =
-        futures_util::future::join_all(many).await.into_iter().map(Option::unwrap).collect();
+    let mut numbers: Vec<u32> = futures_util::future::join_all(many).await.into_iter().map(Option::unwrap).collect();
     numbers.sort_unstable();
     assert!(numbers.into_iter().eq(1..=10));
 }
