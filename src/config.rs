@@ -577,7 +577,7 @@ pub(crate) fn allowed_host(text: &str) -> Option<(String, Option<u16>)> {
     let is_bare = url.path().is_empty() && url.query().is_none() && url.fragment().is_none();
     let is_nobodys = url.username().is_empty() && url.password().is_none();
     let port = url.port();
-    if !is_bare || !is_nobodys || text.contains('@') || text.ends_with(':') {
+    if !is_bare || !is_nobodys || text.contains(['@', '*']) || text.ends_with(':') {
         return None;
     }
     // A host of a scheme that the web knows is brought into its one form: lower case, Punycode, numbers as addresses.

