@@ -21,6 +21,9 @@ mod dice;
 #[path = "../reliability/small_disk.rs"]
 mod small_disk;
 
+#[path = "../support/certificates.rs"]
+mod certificates;
+
 #[path = "../support/receiver.rs"]
 #[allow(dead_code)] // not all of it is used here
 mod receiver;

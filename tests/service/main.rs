@@ -8,6 +8,9 @@ mod support;
 #[path = "../support/isolation.rs"]
 mod isolation;
 
+#[path = "../support/certificates.rs"]
+mod certificates;
+
 #[path = "../support/receiver.rs"]
 mod receiver;
 

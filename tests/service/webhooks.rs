@@ -8,9 +8,10 @@ use precut::http::auth;
 use serde_json::{Value, json};
 use tempfile::NamedTempFile;
 
+use crate::certificates::{certificate, signed};
 use crate::jobs::lasting;
 use crate::receiver::{Receiver, SECRET, secret_file};
-use crate::support::{Server, header, problem, toy};
+use crate::support::{Process, Server, header, problem, toy};
 
 const OTHER_SECRET: &str = "whsec_AAECAwQFBgcICQoLDA0ODxAREhMUFRYXGBkaGxwdHh8=";
 
@@ -388,4 +389,78 @@ async fn a_place_in_a_trace_is_kept_with_the_job_and_passed_on() {
     }
     assert!(receiver.after(4).await[1..].iter().all(|call| call.header("traceparent").is_empty()));
     server.stop().await;
+}
+
+/// What a receiver with a certificate for `localhost` needs.
+fn tls(folder: &std::path::Path) -> std::sync::Arc<rustls::ServerConfig> {
+    use rustls::pki_types::pem::PemObject;
+    use rustls::pki_types::{CertificateDer, PrivateKeyDer};
+    let certificate = CertificateDer::from_pem_file(folder.join("server.pem")).unwrap();
+    let key = PrivateKeyDer::from_pem_file(folder.join("server.key")).unwrap();
+    let provider = std::sync::Arc::new(rustls::crypto::ring::default_provider());
+    let config = rustls::ServerConfig::builder_with_provider(provider).with_safe_default_protocol_versions().unwrap();
+    std::sync::Arc::new(config.with_no_client_auth().with_single_cert(vec![certificate], key).unwrap())
+}
+
+#[cfg(unix)]
+#[tokio::test]
+async fn over_tls_only_who_is_who_he_says_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    if certificate(folder.path(), "plant", &["-subj", "/CN=plant"]).is_none() {
+        return;
+    }
+    signed(folder.path(), "server", &["-subj", "/CN=mes", "-addext", "subjectAltName=DNS:localhost"]).unwrap();
+    let (receiver, secret) = (Receiver::secured(tls(folder.path())), secret_file(SECRET));
+    let port = receiver.address.port();
+    let (hosts, authority) = (format!("[\"localhost:{port}\", \"127.0.0.1:{port}\"]"), folder.path().join("plant.pem"));
+    let settings = [
+        ("PRECUT_CALLBACKS_HOSTS", hosts.as_str()),
+        ("PRECUT_CALLBACKS_PRIVATE", "true"),
+        ("PRECUT_CALLBACKS_SECRET_FILE", secret.path().to_str().unwrap()),
+        ("PRECUT_CALLBACKS_PAUSES_S", "[]"),
+    ];
+    let told = async |process: &Process, host: &str, length: u32| -> Value {
+        let client = reqwest::Client::new();
+        let at = |path: &str| format!("http://{}{path}", process.address);
+        let path = told_to(&format!("https://{host}:{port}/"));
+        let request = client.post(at(&path)).header("content-type", "application/json").body(lasting(length, 1));
+        let sent = request.header("prefer", "respond-async").send().await.unwrap();
+        let address = header(&sent, "location").to_owned();
+        loop {
+            let mut job: Value = client.get(at(&address)).send().await.unwrap().json().await.unwrap();
+            if matches!(job["callback"]["state"].as_str(), Some("delivered" | "given_up")) {
+                return job["callback"].take();
+            }
+            tokio::time::sleep(Duration::from_millis(5)).await;
+        }
+    };
+    let trusting = [&settings[..], &[("SSL_CERT_FILE", authority.to_str().unwrap())]].concat();
+    let process = Process::start_with(&folder.path().join("trusting"), &trusting);
+    assert_eq!(told(&process, "localhost", 2341).await["state"], "delivered");
+    let other_host = told(&process, "127.0.0.1", 2342).await;
+    assert_eq!((&other_host["state"], &other_host["fault"]), (&json!("given_up"), &json!("no_tls")));
+    drop(process);
+    // The authorities of the system do not know this one.
+    let process = Process::start_with(&folder.path().join("other"), &settings);
+    assert_eq!(told(&process, "localhost", 2343).await["fault"], "no_tls");
+    let calls = receiver.calls();
+    assert_eq!(calls.len(), 1);
+    assert!(calls[0].is_signed_with(SECRET));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_service_that_cannot_sign_does_not_start() {
+    let folder = tempfile::tempdir().unwrap();
+    let secret = secret_file("whsec_short");
+    for (file, words) in [("/nowhere/secret", "/nowhere/secret"), (secret.path().to_str().unwrap(), "base64")] {
+        let data = folder.path().to_str().unwrap();
+        let output = crate::support::toy_command(&["serve", "--listen", "127.0.0.1:0", "--data", data])
+            .envs([("PRECUT_CALLBACKS_HOSTS", "[\"mes\"]"), ("PRECUT_CALLBACKS_SECRET_FILE", file)])
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.code() == Some(1) && said.contains(words), "{said}");
+        assert!(!said.contains("whsec_short"), "{said}");
+    }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 use std::io::{BufRead, BufReader, Read, Write};
-use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::net::{SocketAddr, TcpListener};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -65,26 +65,30 @@ impl Receiver {
 
     /// One that says something, or nothing and keeps the connection.
     pub fn saying(answers: impl FnMut(&Call) -> Option<String> + Send + 'static) -> Self {
-        Self::on(TcpListener::bind("127.0.0.1:0").unwrap(), answers)
+        Self::listening(answers, None)
     }
 
-    /// The same at a place that was taken before.
-    pub fn on(listener: TcpListener, answers: impl FnMut(&Call) -> Option<String> + Send + 'static) -> Self {
+    /// One that takes everything, over TLS.
+    #[allow(dead_code)] // not every program of tests has one
+    pub fn secured(tls: Arc<rustls::ServerConfig>) -> Self {
+        Self::listening(|_| Some("HTTP/1.1 204 x\r\n\r\n".to_owned()), Some(tls))
+    }
+
+    fn listening(
+        answers: impl FnMut(&Call) -> Option<String> + Send + 'static,
+        tls: Option<Arc<rustls::ServerConfig>>,
+    ) -> Self {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = listener.local_addr().unwrap();
         let calls = Arc::new(Mutex::new(Vec::new()));
         let (kept, answers): (_, Arc<Mutex<Answers>>) = (Arc::clone(&calls), Arc::new(Mutex::new(Box::new(answers))));
         std::thread::spawn(move || {
             for stream in listener.incoming().map_while(Result::ok) {
                 let (kept, answers) = (Arc::clone(&kept), Arc::clone(&answers));
-                std::thread::spawn(move || {
-                    let mut held = stream;
-                    let Some(call) = read(&mut held) else { return };
-                    let said = (answers.lock().unwrap())(&call);
-                    kept.lock().unwrap().push(call);
-                    match said {
-                        Some(said) => drop(held.write_all(said.as_bytes())),
-                        None => std::thread::sleep(PATIENCE),
-                    }
+                let tls = tls.clone().map(|tls| rustls::ServerConnection::new(tls).unwrap());
+                std::thread::spawn(move || match tls {
+                    Some(tls) => answer(rustls::StreamOwned::new(tls, stream), &kept, &answers),
+                    None => answer(stream, &kept, &answers),
                 });
             }
         });
@@ -118,8 +122,18 @@ impl Receiver {
     }
 }
 
-fn read(stream: &mut TcpStream) -> Option<Call> {
-    let mut reader = BufReader::new(stream.try_clone().ok()?);
+fn answer(mut stream: impl Read + Write, kept: &Mutex<Vec<Call>>, answers: &Mutex<Answers>) {
+    let Some(call) = read(&mut stream) else { return };
+    let said = (answers.lock().unwrap())(&call);
+    kept.lock().unwrap().push(call);
+    match said {
+        Some(said) => drop(stream.write_all(said.as_bytes())),
+        None => std::thread::sleep(PATIENCE),
+    }
+}
+
+fn read(stream: &mut impl Read) -> Option<Call> {
+    let mut reader = BufReader::new(stream);
     let mut line = String::new();
     reader.read_line(&mut line).ok()?;
     let path = line.split(' ').nth(1)?.to_owned();

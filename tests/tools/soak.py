@@ -59,10 +59,11 @@ class Service:
     def connection(self) -> http.client.HTTPConnection:
         return http.client.HTTPConnection("127.0.0.1", self.port, timeout=120)
 
-    def memory_mb(self) -> float:
-        status = pathlib.Path(f"/proc/{self.process.pid}/status").read_text()
-        line = next(line for line in status.splitlines() if line.startswith("VmRSS"))
-        return int(line.split()[1]) * 1024 / 1e6
+    def memory_mb(self) -> tuple[float, float]:
+        """What is resident, and how much of it is the process's own: the rest is pages of the program's file."""
+        lines = pathlib.Path(f"/proc/{self.process.pid}/status").read_text().splitlines()
+        sizes = {line.split(":")[0]: line.split()[1] for line in lines if line.endswith("kB")}
+        return tuple(int(sizes[name]) * 1024 / 1e6 for name in ("VmRSS", "RssAnon"))
 
     def files(self) -> int:
         return len(os.listdir(f"/proc/{self.process.pid}/fd"))
@@ -223,20 +224,22 @@ def main() -> int:
         if service.process.poll() is not None:
             raise SystemExit(f"the service ended with {service.process.returncode}")
         minutes = (time.monotonic() - begun) / 60
-        memory, files = service.memory_mb(), service.files()
+        (memory, own), files = service.memory_mb(), service.files()
         answers = sum(load.answers.values())
-        print(f"{minutes:7.1f} min {memory:8.2f} MB {files:4d} files {answers:8d} answers"
+        print(f"{minutes:7.1f} min {memory:8.2f} MB ({own:7.2f} its own) {files:4d} files {answers:8d} answers"
               f" {answers / minutes / 60:5.1f}/s {service.cpu_s() / minutes / 0.6:5.1f} % CPU", flush=True)
         if minutes >= given.warm_up:
-            seen.append((minutes / 60, memory))
+            seen.append((minutes / 60, memory, own))
             files_then = files if files_then is None else files_then
     load.stop = True
     for thread in threads:
         thread.join(60)
-    middle = sum(memory for _, memory in seen) / len(seen)
-    drift = 100 * slope(seen) / middle
-    print(f"drift after {given.warm_up:g} min: {drift:+.2f} % an hour, {2 * drift:+.2f} % in two hours, of {middle:.1f} MB"
-          f" (lowest {min(memory for _, memory in seen):.1f}, highest {max(memory for _, memory in seen):.1f})")
+    for name, column in (("resident memory", 1), ("its own part of it", 2)):
+        sizes = [point[column] for point in seen]
+        middle = sum(sizes) / len(sizes)
+        drift = 100 * slope([(point[0], point[column]) for point in seen]) / middle
+        print(f"{name} after {given.warm_up:g} min: {drift:+.2f} % an hour, {2 * drift:+.2f} % in two hours,"
+              f" of {middle:.1f} MB (lowest {min(sizes):.1f}, highest {max(sizes):.1f})")
     told = ", ".join(f"{status}: {count}" for status, count in sorted(load.answers.items()))
     print(f"{sum(load.answers.values())} answers ({told}), {len(load.broken)} requests without one")
     files = service.files()

@@ -55,7 +55,7 @@ impl Secrets {
 
 fn read(file: &Path, text: std::io::Result<String>) -> Result<Vec<Secret>, String> {
     let fault = |what: &str| format!("the secret of callbacks in {}: {what}", file.display());
-    secrets(&text.map_err(|error| fault(&error.to_string()))?).map_err(|what| fault(what))
+    secrets(&text.map_err(|error| fault(&error.to_string()))?).map_err(fault)
 }
 
 /// What a file of secrets says. A fault names no part of it.

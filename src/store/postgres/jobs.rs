@@ -292,7 +292,15 @@ impl JobStore for PostgresStore {
         Box::pin(self.sweep_jobs(live))
     }
     fn take_up_callbacks(&self, wanted: TakeUp) -> BoxFuture<'_, Result<Vec<DueCallback>, StoreError>> {
-        Box::pin(self.write(move |connection| Box::pin(callbacks::take_up(connection, wanted))))
+        Box::pin(async move {
+            let due =
+                "SELECT EXISTS (SELECT FROM precut.callbacks WHERE state = 'pending' AND next_ms <= precut.now_ms())";
+            // Hardly ever is there one: that is no reason to write.
+            if !sqlx::query_scalar::<_, bool>(due).fetch_one(&self.pool).await? {
+                return Ok(Vec::new());
+            }
+            self.write(move |connection| Box::pin(callbacks::take_up(connection, wanted))).await
+        })
     }
     fn settle_callback(&self, due: DueCallback, tried: Tried) -> BoxFuture<'_, Result<bool, StoreError>> {
         Box::pin(self.write(move |connection| Box::pin(callbacks::settle(connection, due, tried))))
