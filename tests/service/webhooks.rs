@@ -19,7 +19,7 @@ const OTHER_SECRET: &str = "whsec_AAECAwQFBgcICQoLDA0ODxAREhMUFRYXGBkaGxwdHh8=";
 fn calling(config: &mut Config, receiver: &Receiver, secret: &NamedTempFile) {
     config.callbacks.hosts = vec![receiver.host()];
     config.callbacks.private = true;
-    config.callbacks.secret_file = secret.path().to_str().unwrap().to_owned();
+    secret.path().to_str().unwrap().clone_into(&mut config.callbacks.secret_file);
     config.callbacks.pauses_s = vec![0.01, 0.02, 0.03];
 }
 
@@ -29,12 +29,8 @@ async fn server(receiver: &Receiver, secret: &NamedTempFile) -> Server {
 
 /// Where the toy takes a job that is told to an address.
 fn told_to(url: &str) -> String {
-    let url: String = form(url);
+    let url: String = url::form_urlencoded::byte_serialize(url.as_bytes()).collect();
     format!("/v1/{}?callback={url}", toy::BAR)
-}
-
-fn form(text: &str) -> String {
-    text.bytes().map(|byte| format!("%{byte:02X}")).collect()
 }
 
 async fn job(server: &Server, address: &str) -> Value {
@@ -289,7 +285,7 @@ async fn nobody_is_called_whom_the_settings_do_not_name() {
     .await;
     let url = format!("http://localhost:{}/", receiver.address.port());
     let sent = server.post_to(&told_to(&url), lasting(2261, 1)).header("prefer", "respond-async").send().await.unwrap();
-    let given_up = callback_in(&server, &header(&sent, "location").to_owned(), "given_up").await;
+    let given_up = callback_in(&server, header(&sent, "location"), "given_up").await;
     assert_eq!(given_up["fault"], "private_address");
     server.stop().await;
     assert!(receiver.calls().is_empty());
