@@ -17,13 +17,24 @@ use crate::store::address::{Given, StoreAddress};
 pub const DEFAULTS: &str = include_str!("../config.default.toml");
 
 /// Sections of the configuration: `PRECUT_LOG_LEVEL` is `log.level`.
-const SECTIONS: [&str; 9] = ["log", "limits", "jobs", "quota", "cache", "postgres", "shutdown", "cors", "auth"];
+const SECTIONS: [&str; 11] =
+    ["log", "limits", "jobs", "quota", "callbacks", "traces", "cache", "postgres", "shutdown", "cors", "auth"];
 
 /// Settings outside of the sections.
 const OUTSIDE: [&str; 6] = ["listen", "admin_listen", "data", "store", "role", "cpu"];
 
 /// Settings that are words even where they look like numbers: `PRECUT_DATA=2026`.
-const WORDS: [&str; 7] = ["listen", "admin_listen", "data", "store", "role", "log.level", "log.format"];
+const WORDS: [&str; 9] = [
+    "listen",
+    "admin_listen",
+    "data",
+    "store",
+    "role",
+    "log.level",
+    "log.format",
+    "callbacks.secret_file",
+    "traces.endpoint",
+];
 
 /// What the service runs with. Unknown keys are refused wherever they come from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -50,6 +61,10 @@ pub struct Config {
     pub jobs: Jobs,
     /// What one owner may take.
     pub quota: Quota,
+    /// Who may be told that a job is over.
+    pub callbacks: Callbacks,
+    /// Where spans go.
+    pub traces: Traces,
     /// What is kept.
     pub cache: Cache,
     /// How a PostgreSQL database is used.
@@ -143,8 +158,46 @@ pub struct Jobs {
 pub struct Quota {
     /// Work within an hour, s of computation; 0 for no limit.
     pub work_s_per_hour: f64,
-    /// Jobs and their results kept for him, bytes; 0 for no limit.
+    /// Jobs, their results and models kept for him, bytes; 0 for no limit.
     pub kept_bytes: u64,
+}
+
+/// Who may be told that a job is over.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Callbacks {
+    /// Hosts that may be called, each with its port where that is not its scheme's; none: nobody is told.
+    pub hosts: Vec<String>,
+    /// Whether they may have addresses of private networks and of this machine.
+    pub private: bool,
+    /// File with the secret that signs, one or two lines.
+    pub secret_file: String,
+    /// The same of owners who have secrets of their own.
+    pub owners: Vec<OwnerSecret>,
+    /// How long one try may take, s.
+    pub timeout_s: f64,
+    /// Pauses between tries, s.
+    pub pauses_s: Vec<f64>,
+}
+
+/// Where the secret of an owner of keys is.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OwnerSecret {
+    /// Whose it is.
+    pub owner: String,
+    /// File with it, one or two lines.
+    pub secret_file: String,
+}
+
+/// Where spans go.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Traces {
+    /// Where batches of spans are posted (OTLP over HTTP); empty: nowhere.
+    pub endpoint: String,
+    /// Share of the traces that begin here which is exported, 0 to 1.
+    pub share: f64,
 }
 
 /// What is kept.
@@ -437,6 +490,7 @@ impl Config {
         if !(work_s >= 0.0 && work_s.is_finite()) {
             faults.push(format!("quota.work_s_per_hour = {work_s}: must be 0 or more"));
         }
+        self.faults_outward(&mut faults);
         let short_ms = self.jobs.short_ms;
         if !(short_ms >= 0.0 && short_ms.is_finite()) {
             faults.push(format!("jobs.short_ms = {short_ms}: must be 0 or more"));
@@ -476,6 +530,60 @@ impl Config {
         }
         faults
     }
+}
+
+impl Config {
+    /// Of where the service sends something by itself.
+    fn faults_outward(&self, faults: &mut Vec<String>) {
+        let Callbacks { hosts, secret_file, owners, timeout_s, pauses_s, .. } = &self.callbacks;
+        for host in hosts {
+            if allowed_host(host).is_none() {
+                faults.push(format!(
+                    "callbacks.hosts: \"{host}\" is no host such as mes.plant.example or mes.plant.example:8443"
+                ));
+            }
+        }
+        if !hosts.is_empty() && secret_file.is_empty() {
+            faults.push("callbacks.secret_file: has to be given with callbacks.hosts".to_owned());
+        }
+        for OwnerSecret { owner, secret_file } in owners {
+            if owner.is_empty() || secret_file.is_empty() {
+                faults.push("callbacks.owners: each needs an owner and a secret_file".to_owned());
+            }
+        }
+        if !(0.1..=60.0).contains(timeout_s) {
+            faults.push(format!("callbacks.timeout_s = {timeout_s}: must be 0.1 to 60 s"));
+        }
+        if pauses_s.len() > 30 || !pauses_s.iter().all(|pause| (0.0..=604_800.0).contains(pause)) {
+            faults.push("callbacks.pauses_s: must be at most 30 pauses of 0 to 604800 s".to_owned());
+        }
+        let Traces { endpoint, share } = &self.traces;
+        let is_http = |url: url::Url| matches!(url.scheme(), "http" | "https") && url.has_host();
+        if !endpoint.is_empty() && !endpoint.parse().is_ok_and(is_http) {
+            faults.push(format!(
+                "traces.endpoint = \"{endpoint}\": must be an address such as http://127.0.0.1:4318/v1/traces"
+            ));
+        }
+        if !(0.0..=1.0).contains(share) {
+            faults.push(format!("traces.share = {share}: must be 0 to 1"));
+        }
+    }
+}
+
+/// A host that may be called, with its port where one is given: as they stand in an address that was read.
+pub(crate) fn allowed_host(text: &str) -> Option<(String, Option<u16>)> {
+    // The default port of its scheme would not be told from none; no scheme has port 0.
+    let url: url::Url = format!("precut://{text}").parse().ok()?;
+    let is_bare = url.path().is_empty() && url.query().is_none() && url.fragment().is_none();
+    let is_nobodys = url.username().is_empty() && url.password().is_none();
+    let port = url.port();
+    if !is_bare || !is_nobodys || text.contains(['@', '*']) || text.ends_with(':') {
+        return None;
+    }
+    // A host of a scheme that the web knows is brought into its one form: lower case, Punycode, numbers as addresses.
+    let host: url::Url = format!("http://{}", url.host_str()?).parse().ok()?;
+    let host = host.host_str()?;
+    Some((host.strip_suffix('.').unwrap_or(host).to_owned(), port))
 }
 
 impl Default for Config {
@@ -675,6 +783,40 @@ mod tests {
             assert!(error.contains(name), "{name} missing in: {error}");
         }
         assert_eq!(error.lines().count(), 5, "{error}");
+    }
+
+    #[test]
+    fn a_host_that_may_be_called_is_brought_into_its_one_form() {
+        let host = |text| allowed_host(text).map(|(host, port)| format!("{host} {port:?}"));
+        assert_eq!(host("MES.Plant.example").as_deref(), Some("mes.plant.example None"));
+        assert_eq!(host("mes.plant.example.:8443").as_deref(), Some("mes.plant.example Some(8443)"));
+        assert_eq!(host("mes.plant.example:443").as_deref(), Some("mes.plant.example Some(443)"));
+        assert_eq!(host("0x7f.1:80").as_deref(), Some("127.0.0.1 Some(80)"));
+        assert_eq!(host("[::1]:8000").as_deref(), Some("[::1] Some(8000)"));
+        for bad in
+            ["", "https://mes.plant.example", "mes/path", "user@mes", "mes:", "mes:x", "*", "a b", "mes?x", "mes#x"]
+        {
+            assert_eq!(host(bad), None, "{bad}");
+        }
+    }
+
+    #[test]
+    fn settings_of_what_is_sent_outward_are_looked_at() {
+        let file = "[callbacks]\nhosts = [\"https://mes\"]\ntimeout_s = 0.0\npauses_s = [-1.0]\n\
+                    owners = [{ owner = \"cam\", secret_file = \"\" }]\n\
+                    [traces]\nendpoint = \"collector:4318\"\nshare = 2.0";
+        let error = load(file, &[], &Flags::default()).unwrap_err().to_string();
+        for name in ["hosts", "secret_file", "owners", "timeout_s", "pauses_s"].map(|name| format!("callbacks.{name}"))
+        {
+            assert!(error.contains(&name), "{name} missing in: {error}");
+        }
+        assert!(error.contains("traces.endpoint") && error.contains("traces.share"), "{error}");
+        let environment = [("PRECUT_CALLBACKS_HOSTS", "[\"mes:80\"]"), ("PRECUT_CALLBACKS_SECRET_FILE", "12")];
+        let config = load("", &environment, &Flags::default()).unwrap();
+        assert_eq!(
+            (config.callbacks.hosts, config.callbacks.secret_file),
+            (vec!["mes:80".to_owned()], "12".to_owned())
+        );
     }
 
     #[test]

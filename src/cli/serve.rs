@@ -13,6 +13,7 @@ use crate::engine::{Engine, EngineSettings, Isolation};
 use crate::http::{self, App};
 use crate::log;
 use crate::registry::Registry;
+use crate::trace::Export;
 
 /// Threads that move bytes; all physics is on the engine's own.
 const IO_THREADS: usize = 2;
@@ -25,14 +26,20 @@ pub(super) fn run(arguments: &ServeArgs, registry: Registry, isolation: Option<I
         config.strays.iter().for_each(|stray| eprintln!("precut: {stray}"));
         return print(config.to_toml().as_bytes());
     }
-    log::start(&config.log);
-    config.strays.iter().for_each(|stray| tracing::warn!("{stray}"));
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(IO_THREADS)
         .enable_all()
         .build()
         .map_err(|error| Failed::Machine(format!("the threads cannot be started: {error}")))?;
-    runtime.block_on(serve(&config, arguments, registry, isolation))
+    let export = Export::start(&config.traces, runtime.handle())
+        .map_err(|error| Failed::Machine(format!("settings: {error}")))?;
+    log::start(&config.log, export.as_ref());
+    config.strays.iter().for_each(|stray| tracing::warn!("{stray}"));
+    let outcome = runtime.block_on(serve(&config, arguments, registry, isolation));
+    if let Some(export) = export {
+        export.end();
+    }
+    outcome
 }
 
 async fn serve(
@@ -41,6 +48,7 @@ async fn serve(
     registry: Registry,
     isolation: Option<Isolation>,
 ) -> Result<(), Failed> {
+    http::callbacks::are_ready(&config.callbacks).map_err(|error| Failed::Machine(format!("settings: {error}")))?;
     let settings = EngineSettings { isolation, ..EngineSettings::of(config) };
     let engine = Engine::open(registry, settings).await.map_err(|error| Failed::Machine(error.to_string()))?;
     let (listener, address) = listen(config.listen).await?;

@@ -64,6 +64,11 @@ impl Memory {
 
 /// Hash of a body as it came, for one calculator: equal bytes mean an equal job.
 pub(crate) fn fingerprint(calculator: &str, body: &Body) -> [u8; 32] {
+    fingerprint_with(calculator, body, None)
+}
+
+/// The same of a request that says who is told of its end.
+pub(crate) fn fingerprint_with(calculator: &str, body: &Body, told: Option<&str>) -> [u8; 32] {
     let mut hasher = blake3::Hasher::new();
     let mut part = |bytes: &[u8]| {
         hasher.update(&(bytes.len() as u64).to_le_bytes()).update(bytes);
@@ -78,6 +83,9 @@ pub(crate) fn fingerprint(calculator: &str, body: &Body) -> [u8; 32] {
                 part(&table.text);
             }
         }
+    }
+    if let Some(told) = told {
+        part(told.as_bytes());
     }
     *hasher.finalize().as_bytes()
 }

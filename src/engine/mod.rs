@@ -31,6 +31,7 @@ mod tests;
 
 pub use crate::key::{BadKey, ENGINE_VERSION, Key};
 pub use crate::store::OpenError;
+pub use crate::store::callbacks::{Callback, CallbackState, DueCallback, NewCallback, TakeUp, Tried};
 pub use crate::store::jobs::{JobId, JobKind, JobQuery, JobRecord, JobState, Priority};
 pub use answer::{Body, CacheState, Checked, Solved, Stored, TablePart, Timings};
 pub use compare::{ModelComparison, Sides};

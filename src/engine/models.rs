@@ -16,7 +16,7 @@ use super::{Body, Engine, Error, Inner, Key, Stored, json as read_json};
 use crate::registry::{Entry, Faults, ModelUse, Registry, canonical, nearest};
 use crate::store::OpenError;
 use crate::store::jobs::JobId;
-use crate::store::models::{KeptModel, ModelShelf, NewModel};
+use crate::store::models::{KeptModel, ModelShelf, NewModel, PutModel};
 use crate::store::sqlite_models::SqliteShelf;
 
 /// The calculator whose results can become models.
@@ -160,13 +160,13 @@ impl ModelSource {
 }
 
 impl Engine {
-    /// Stores a model as the next revision of its name.
+    /// Stores a model as the next revision of its name, for an owner.
     pub async fn put_model(
         &self,
         shelf: &Shelf,
         name: &str,
         source: ModelSource,
-        only_new: bool,
+        (only_new, owner): (bool, String),
     ) -> Result<ModelAnswer, ModelError> {
         let inner = &self.inner;
         if !model::is_name(name) {
@@ -202,8 +202,15 @@ impl Engine {
             sha256: model::sha256(&text),
             content: text,
             only_new,
+            owner,
+            quota: inner.settings.quota,
         };
-        let kept = inner.models.put_model(new).await?.ok_or_else(|| ModelError::Exists(name.to_owned()))?;
+        let bytes = new.content.len() as u64;
+        let kept = match inner.models.put_model(new).await? {
+            PutModel::Kept(kept) => kept,
+            PutModel::Taken => return Err(ModelError::Exists(name.to_owned())),
+            PutModel::OverQuota(usage) => return Err(inner.no_room(&usage, bytes).into()),
+        };
         Ok(ModelAnswer { model: stored(shelf.plain(kept), content), is_new })
     }
 

@@ -120,17 +120,27 @@ impl Inner {
                 quota_s: most_ms / 1e3,
                 retry_after: usage.room_for_work(most_ms, work_ms),
             },
-            Beyond::Kept { most_bytes } => {
-                let wait = usage.room_to_keep(most_bytes, self.settings.job_age);
-                let wait_ms = i64::try_from(wait.as_millis()).unwrap_or(i64::MAX);
-                Error::KeptQuota {
-                    kept_bytes: usage.kept_bytes(),
-                    quota_bytes: most_bytes,
-                    room_ms: self.jobs.store.now_ms().saturating_add(wait_ms),
-                    retry_after: Some(wait),
-                }
-            }
+            Beyond::Kept { most_bytes } => self.full(usage, most_bytes, most_bytes),
         })
+    }
+
+    /// Why a model of so many bytes is not kept for its owner.
+    pub(super) fn no_room(&self, usage: &Usage, bytes: u64) -> Error {
+        let most_bytes = self.settings.quota.kept_bytes.unwrap_or(u64::MAX);
+        // There is room for it once no more than the rest is kept.
+        self.full(usage, most_bytes, most_bytes.saturating_sub(bytes).saturating_add(1))
+    }
+
+    /// There is room again once less than so much is kept.
+    fn full(&self, usage: &Usage, quota_bytes: u64, below_bytes: u64) -> Error {
+        let wait = usage.room_to_keep(below_bytes, self.settings.job_age);
+        let wait_ms = i64::try_from(wait.as_millis()).unwrap_or(i64::MAX);
+        Error::KeptQuota {
+            kept_bytes: usage.kept_bytes(),
+            quota_bytes,
+            room_ms: self.jobs.store.now_ms().saturating_add(wait_ms),
+            retry_after: Some(wait),
+        }
     }
 }
 

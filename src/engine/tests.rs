@@ -545,7 +545,10 @@ async fn a_large_body_that_names_a_model_is_read_when_there_is_a_core() {
     let settings = EngineSettings { cores: 1, patience, ..EngineSettings::in_folder(folder.path()) };
     let engine = Engine::open(Registry::standard().unwrap(), settings).await.unwrap();
     let content = ModelContent { calculator: SHAFT.to_owned(), effects: vec![soft_headstock()], provenance: json!({}) };
-    engine.put_model(&Shelf::default(), "lathe", ModelSource::Exported { content, sha256: None }, true).await.unwrap();
+    engine
+        .put_model(&Shelf::default(), "lathe", ModelSource::Exported { content, sha256: None }, (true, String::new()))
+        .await
+        .unwrap();
     let padded = |text: String| Body::Json((text + &" ".repeat(READ_AT_ONCE)).into());
     let job = |name: &str| shaft(|job| job["model"] = name.into()).to_string();
     let solved = engine.solve(SHAFT, padded(job("lathe"))).await.unwrap();

@@ -25,6 +25,7 @@ use super::{App, body, gate, quota};
 use crate::engine::{Answered, Ask, CacheState, Error, Priority};
 use crate::registry::{Entry, Registry};
 use crate::text::{self, Glossary, Language};
+use crate::trace::Traceparent;
 
 /// A calculator with what its route needs on every request.
 pub(super) struct Room {
@@ -50,7 +51,7 @@ pub(super) const MOST_DEADLINE_S: f64 = 31_536_000.0;
 pub(super) const LEAST_DEADLINE_S: f64 = 0.001;
 
 /// Of a request for an answer: which part of it, and how it is to be computed.
-const PARAMETERS: &[&str] = &["table", "figure", "priority", "deadline_s"];
+const PARAMETERS: &[&str] = &["table", "figure", "priority", "deadline_s", "callback"];
 
 /// `POST /v1/{calculator}`
 pub(super) async fn solve(app: App, room: Arc<Room>, request: Request) -> Response {
@@ -76,6 +77,8 @@ async fn answered(
     let mut query = Query::of(request.uri(), PARAMETERS)?;
     let priority = query.one_of("priority", Priority::ALL, Priority::word)?;
     let deadline_s = query.number("deadline_s", &(LEAST_DEADLINE_S..=MOST_DEADLINE_S))?;
+    let callback = query.text("callback").map(|url| app.callbacks.checked(url)).transpose()?;
+    let traceparent = request.extensions().get::<Traceparent>().map(ToString::to_string);
     let headers = request.headers();
     let view = View::of_parts(Parts::of(&mut query), headers, room.entry.meta(), &room.offered)?;
     let mut preference = Preference::of(headers);
@@ -90,6 +93,8 @@ async fn answered(
         idempotency_key: prefer::idempotency_key(headers)?,
         wait: preference.wait(),
         shelf: caller.shelf(),
+        callback,
+        traceparent,
         ..Ask::plain(owner)
     };
     let language = negotiate::language(headers);

@@ -16,6 +16,7 @@ pub const CODES: &[(&str, u16)] = &[
     ("trailing_bytes", 400),
     ("unexpected_end", 400),
     // The request is at fault.
+    ("bad_callback", 400),
     ("bad_idempotency_key", 400),
     ("bad_key", 400),
     ("bad_multipart", 400),

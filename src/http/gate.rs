@@ -29,9 +29,13 @@ use super::auth::Caller;
 use super::problem::Problem;
 use super::{App, CACHE_STATE, Peer, auth, negotiate};
 use crate::text::Language;
+use crate::trace::{self, Traceparent};
 
 /// Comes in and goes out with every request.
 pub(super) const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
+
+/// Where a request belongs in a trace (W3C Trace Context).
+pub(super) const TRACEPARENT: HeaderName = HeaderName::from_static("traceparent");
 
 /// Longest target of a request, bytes.
 const MOST_TARGET_BYTES: usize = 8 * 1024;
@@ -60,8 +64,17 @@ pub(super) async fn gate(State(app): State<App>, mut request: Request, next: Nex
         key = match &caller {
             Caller::Holder(holder) => Some(holder.name.as_str()),
             Caller::Anyone | Caller::Stranger => None,
-        }
+        },
+        trace = tracing::field::Empty
     );
+    let given = traceparent(request.headers());
+    if let Some(given) = given {
+        trace::follow(&span, given);
+    }
+    if let Some(place) = trace::place_of(&span, given) {
+        span.record("trace", tracing::field::display(place.trace()));
+        request.extensions_mut().insert(place);
+    }
 
     let _in_flight = InFlight::new(&app);
     let response = async {
@@ -183,6 +196,13 @@ impl Drop for InFlight<'_> {
     fn drop(&mut self) {
         self.0.in_flight.fetch_sub(1, Ordering::Relaxed);
     }
+}
+
+/// The client's place in a trace; one that is none counts as not given (W3C Trace Context, section 3.3).
+fn traceparent(headers: &HeaderMap) -> Option<Traceparent> {
+    let mut given = headers.get_all(TRACEPARENT).iter();
+    let only = given.next().filter(|_| given.next().is_none());
+    only?.to_str().ok()?.parse().ok()
 }
 
 /// The client's id if it is a decent one, a new one otherwise.

@@ -11,6 +11,7 @@ use utoipa::ToSchema;
 use super::App;
 use super::answer::{self, View};
 use super::auth::Caller;
+use super::callbacks::{self, CallbackDocument};
 use super::document::Document;
 use super::negotiate;
 use super::parts::{JobFile, private};
@@ -79,6 +80,11 @@ pub(super) struct JobDocument {
     links: JobLinks,
     /// Why it failed.
     problem: Option<ProblemDocument>,
+    /// Who is told when it is over, as `callback` asked for it; null where nobody is.
+    callback: Option<CallbackDocument>,
+    /// Where it belongs in a trace (W3C Trace Context), if the request that made it did.
+    #[schema(example = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01")]
+    traceparent: Option<String>,
 }
 
 /// How far a job is.
@@ -189,6 +195,8 @@ pub(super) fn document(job: &Job, language: Language) -> JobDocument {
             cancel: format!("/v1/jobs/{id}"),
         },
         problem: job.problem.clone().map(|problem| Problem::from(problem).document(language, None)),
+        callback: record.callback.as_ref().map(|callback| callbacks::document(callback, time)),
+        traceparent: record.traceparent.clone(),
     }
 }
 

@@ -262,12 +262,17 @@ fn recorder() -> &'static PrometheusHandle {
             "precut_owner_work_milliseconds_total",
             "Work by owner of keys: what jobs took here, what direct answers were estimated at."
         );
-        metrics::describe_gauge!("precut_owner_kept_bytes", "Jobs and their results that are kept, by owner of keys.");
+        metrics::describe_gauge!("precut_owner_kept_bytes", "Jobs, their results and models that are kept, by owner of keys.");
         metrics::describe_gauge!("precut_jobs", "Jobs by state: queued, running.");
         metrics::describe_counter!(
             "precut_jobs_helped_total",
             "Times that this process computed parts of a job that another one runs."
         );
+        metrics::describe_counter!(
+            "precut_callbacks_total",
+            "Tries to tell somebody that a job is over, by outcome: delivered, failed, given_up."
+        );
+        metrics::describe_gauge!("precut_callbacks_pending", "Callbacks that are to be delivered.");
         metrics::describe_counter!("precut_queue_full_total", "Jobs refused because too many waited.");
         metrics::describe_counter!("precut_jobs_poisonous_total", "Jobs given up: they ended the process each time.");
         metrics::describe_gauge!("precut_bodies_bytes", "Memory of bodies in work, of limits.bodies_bytes.");

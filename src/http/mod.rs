@@ -4,6 +4,7 @@ mod answer;
 pub mod auth;
 mod body;
 mod calculators;
+pub mod callbacks;
 mod codes;
 mod document;
 mod events;
@@ -63,6 +64,7 @@ pub struct Shared {
     limits: Limits,
     origins: Vec<String>,
     keys: auth::Keys,
+    callbacks: callbacks::Callbacks,
     rate: Option<rate::RateLimiter>,
     metrics: metrics::Metrics,
     rooms: Vec<Arc<calculators::Room>>,
@@ -93,6 +95,7 @@ impl App {
             limits: config.limits.clone(),
             origins: config.cors.origins.clone(),
             keys: auth::Keys::new(&config.auth),
+            callbacks: callbacks::Callbacks::new(&config.callbacks),
             rate: rate::RateLimiter::new(config.limits.requests_per_s, config.limits.burst),
             metrics,
             rooms: rooms.into_iter().map(Arc::new).collect(),
@@ -223,6 +226,7 @@ fn cors(origins: &[String]) -> Option<CorsLayer> {
         prefer::IDEMPOTENCY_KEY,
         prefer::PREFER,
         gate::REQUEST_ID,
+        gate::TRACEPARENT,
     ];
     let exposed = [
         header::CONTENT_LOCATION,

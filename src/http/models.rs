@@ -13,7 +13,7 @@ use utoipa::ToSchema;
 use super::auth::Caller;
 use super::problem::Problem;
 use super::query::Query;
-use super::{App, body, jobs, results};
+use super::{App, body, gate, jobs, results};
 use crate::config::Limits;
 use crate::engine::{Body, ModelAnswer, ModelError, ModelSource, StoredModel};
 
@@ -192,6 +192,7 @@ pub(super) async fn store(
     request: Request,
 ) -> Result<Response, Problem> {
     let only_new = wants_new(request.headers());
+    let owner = gate::owner(&caller, &request);
     let limits = Limits { json_bytes: app.limits.json_bytes.min(MOST_BYTES), ..app.limits.clone() };
     let sent = body::job(request, || false, &limits, app.engine.bodies()).await?;
     let Body::Json(sent) = sent else { return Err(Problem::internal()) };
@@ -201,7 +202,7 @@ pub(super) async fn store(
         ModelSource::Job(id) => drop(jobs::named(&app, &caller, &id.to_string()).await?),
         ModelSource::Exported { .. } => {}
     }
-    let ModelAnswer { model, is_new } = app.engine.put_model(&caller.shelf(), &name, source, only_new).await?;
+    let ModelAnswer { model, is_new } = app.engine.put_model(&caller.shelf(), &name, source, (only_new, owner)).await?;
     let location = format!("/v1/models/{}@{}", model.name, model.revision);
     let status = if is_new { StatusCode::CREATED } else { StatusCode::OK };
     let mut response = answered(status, &document(model));

@@ -21,7 +21,7 @@ use tower::Service;
 
 use super::gate::Client;
 use super::in_place::in_place;
-use super::{App, Peer, body};
+use super::{App, Peer, body, callbacks};
 use crate::config::seconds;
 
 /// How long a refused client may go on sending before its connection is cut, and how long it may pause meanwhile.
@@ -50,6 +50,7 @@ pub async fn serve(
     // Closed when the last connection has dropped its end.
     let (open, mut all_closed) = mpsc::channel::<Infallible>(1);
     let upkeep = tokio::spawn(upkeep(app.clone()));
+    let telling = tokio::spawn(callbacks::deliver(app.clone(), stop.clone()));
     let admin = admin.map(|listener| tokio::spawn(serve_admin(listener, app.clone())));
     loop {
         let accepted = tokio::select! {
@@ -89,6 +90,8 @@ pub async fn serve(
         }
     }
     upkeep.abort();
+    // It ends by itself, soon after it was told to stop.
+    let _ = telling.await;
     if let Some(admin) = admin {
         admin.abort();
     }

@@ -12,6 +12,7 @@ use futures_util::future::BoxFuture;
 use tokio::sync::watch;
 use uuid::{ContextV7, Timestamp, Uuid};
 
+pub use super::callbacks::{Callback, CallbackState, DueCallback, NewCallback, TakeUp, Tried};
 pub use super::quota::{Quota, Usage};
 use super::{KeptResult, StoreError};
 use crate::key::Key;
@@ -202,6 +203,10 @@ pub struct NewJob {
     pub quota: Quota,
     /// Its result, where it is there already.
     pub result: Option<KeptResult>,
+    /// Who is told when it is over.
+    pub callback: Option<NewCallback>,
+    /// Where the request belongs in a trace (W3C Trace Context).
+    pub traceparent: Option<String>,
 }
 
 /// A client's own name for a request, with the hash of what it asked.
@@ -252,6 +257,10 @@ pub struct JobRecord {
     pub expires_ms: Option<i64>,
     /// Whose it is.
     pub owner: String,
+    /// Where the request belongs in a trace.
+    pub traceparent: Option<String>,
+    /// Who is told when it is over.
+    pub callback: Option<Callback>,
 }
 
 /// What came of a new job.
@@ -283,6 +292,8 @@ pub struct Waiting {
     pub owner: String,
     /// When it was accepted, ms UTC.
     pub created_ms: i64,
+    /// Where the request belongs in a trace.
+    pub traceparent: Option<String>,
 }
 
 /// A computation to run.
@@ -386,6 +397,8 @@ pub struct JobCounts {
     pub queued: u64,
     /// Being computed.
     pub running: u64,
+    /// Callbacks that are to be delivered.
+    pub callbacks: u64,
     /// When the one came that has waited longest, ms UTC.
     pub oldest_ms: Option<i64>,
     /// What the database takes of the disk.
@@ -477,6 +490,10 @@ pub trait JobStore: Send + Sync + 'static {
     /// Puts back in line what nobody runs (`live` tells the computations of this process, those about to be claimed
     /// among them), and in the queue what waits and is not there.
     fn sweep(&self, live: Live) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>>;
+    /// Takes up callbacks that are due.
+    fn take_up_callbacks(&self, wanted: TakeUp) -> BoxFuture<'_, Result<Vec<DueCallback>, StoreError>>;
+    /// Writes what came of a try; whether it was still who tried that holds it.
+    fn settle_callback(&self, due: DueCallback, tried: Tried) -> BoxFuture<'_, Result<bool, StoreError>>;
     /// Forgets jobs whose time is over.
     fn forget_expired(&self) -> BoxFuture<'_, Result<u64, StoreError>>;
     /// Notes what a job took.

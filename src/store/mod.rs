@@ -2,6 +2,7 @@
 
 pub mod address;
 pub mod backup;
+pub mod callbacks;
 pub mod jobs;
 mod ledger;
 pub mod models;

@@ -3,6 +3,7 @@
 use futures_util::future::BoxFuture;
 
 use super::StoreError;
+use super::quota::{Quota, Usage};
 
 /// A model as it is kept.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -22,7 +23,7 @@ pub struct KeptModel {
 }
 
 /// A model to be kept.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct NewModel {
     /// Its name.
     pub name: String,
@@ -34,6 +35,21 @@ pub struct NewModel {
     pub sha256: String,
     /// Only if nothing has the name.
     pub only_new: bool,
+    /// Who stores it: for him it counts.
+    pub owner: String,
+    /// What he may take.
+    pub quota: Quota,
+}
+
+/// What came of a model that was to be kept.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PutModel {
+    /// It is kept.
+    Kept(KeptModel),
+    /// Its name is taken, and only a new one was wanted.
+    Taken,
+    /// For its owner so much is kept that there is no room for it.
+    OverQuota(Usage),
 }
 
 /// Where models are found.
@@ -49,9 +65,8 @@ pub trait ModelShelf: Send + Sync + 'static {
 
 /// Where models are kept.
 pub trait ModelStore: ModelShelf {
-    /// Keeps a model as the next revision of its name, on the disk on return; `None` where the name is taken and only a
-    /// new one was wanted.
-    fn put_model(&self, model: NewModel) -> BoxFuture<'_, Result<Option<KeptModel>, StoreError>>;
+    /// Keeps a model as the next revision of its name, on the disk on return.
+    fn put_model(&self, model: NewModel) -> BoxFuture<'_, Result<PutModel, StoreError>>;
     /// Deletes every revision of a model; whether there was one.
     fn delete_model(&self, name: String) -> BoxFuture<'_, Result<bool, StoreError>>;
 }
@@ -68,6 +83,10 @@ pub(super) struct ModelRow {
 }
 
 impl ModelRow {
+    /// What came of it: a row, where one was written.
+    pub(super) fn put(row: Option<Self>) -> PutModel {
+        row.and_then(Self::model).map_or(PutModel::Taken, PutModel::Kept)
+    }
     pub(super) fn model(self) -> Option<KeptModel> {
         Some(KeptModel {
             name: self.name,

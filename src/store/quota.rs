@@ -26,8 +26,8 @@ impl Quota {
 /// What one owner takes of the service.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Usage {
-    /// What is kept of jobs and their results, bytes, with the time from now after which it goes, ms; none for jobs that
-    /// are not over.
+    /// What is kept of jobs, their results and models, bytes, with the time from now after which it goes, ms; none for
+    /// jobs that are not over, and for models.
     pub kept: Vec<(Option<i64>, u64)>,
     /// Estimated work of jobs that are not over, ms.
     pub open_ms: f64,
@@ -52,6 +52,11 @@ impl Usage {
         let is_too_much = |most: &f64| work_ms > 0.0 && self.work_ms() + work_ms > *most;
         let kept = quota.kept_bytes.filter(is_full).map(|most_bytes| Beyond::Kept { most_bytes });
         kept.or_else(|| quota.work_ms.filter(is_too_much).map(|most_ms| Beyond::Work { most_ms }))
+    }
+
+    /// Whether so many bytes more are within a quota.
+    pub(crate) fn has_room(&self, quota: &Quota, bytes: u64) -> bool {
+        quota.kept_bytes.is_none_or(|most| self.kept_bytes().saturating_add(bytes) <= most)
     }
 
     /// When there is room for so much work, if nothing else is asked: what counts at the end counts for an hour after it.
@@ -122,7 +127,11 @@ mod tests {
         let day = Duration::from_hours(24);
         let room = |most| usage.room_to_keep(most, day).as_millis();
         assert_eq!([room(46), room(45), room(36), room(35), room(6), room(5)], [0, 1000, 1000, 3000, 3000, 86_400_000]);
-        let beyond = |most| usage.beyond(&Quota { kept_bytes: Some(most), ..Quota::default() }, 1.0);
+        let kept = |most| Quota { kept_bytes: Some(most), ..Quota::default() };
+        let beyond = |most| usage.beyond(&kept(most), 1.0);
+        // How large a model is is known before it is kept.
+        assert_eq!((usage.has_room(&kept(50), 5), usage.has_room(&kept(49), 5)), (true, false));
+        assert!(usage.has_room(&Quota::default(), u64::MAX));
         assert_eq!((beyond(46), beyond(45)), (None, Some(Beyond::Kept { most_bytes: 45 })));
     }
 }

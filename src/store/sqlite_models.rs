@@ -3,10 +3,11 @@
 use std::path::Path;
 
 use futures_util::future::BoxFuture;
-use sqlx::sqlite::{SqliteConnectOptions, SqlitePool, SqlitePoolOptions};
+use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection, SqlitePool, SqlitePoolOptions};
 
-use super::models::{KeptModel, ModelRow, ModelShelf, ModelStore, NewModel, column};
+use super::models::{KeptModel, ModelRow, ModelShelf, ModelStore, NewModel, PutModel, column};
 use super::sqlite::{BUSY_TIMEOUT, DATABASE, SqliteStore};
+use super::sqlite_jobs::usage::usage;
 use super::{OpenError, StoreError, now_ms};
 
 impl ModelShelf for SqliteStore {
@@ -97,33 +98,11 @@ async fn names_in(pool: &SqlitePool, shelf: String, limit: u32) -> Result<Vec<St
 }
 
 impl ModelStore for SqliteStore {
-    fn put_model(&self, model: NewModel) -> BoxFuture<'_, Result<Option<KeptModel>, StoreError>> {
-        Box::pin(async move {
-            let created_ms = now_ms();
-            let row: Option<ModelRow> = self
-                .ledger
-                .write(move |connection| {
-                    let model = model.clone();
-                    Box::pin(async move {
-                        sqlx::query_as(
-                            "INSERT INTO models (name, revision, calculator, content, sha256, created_ms)
-                             SELECT ?1, 1 + coalesce(max(revision), 0), ?2, ?3, ?4, ?5 FROM models WHERE name = ?1
-                             HAVING NOT ?6 OR count(content) = 0
-                             RETURNING name, revision, calculator, content, sha256, created_ms",
-                        )
-                        .bind(model.name)
-                        .bind(model.calculator)
-                        .bind(model.content)
-                        .bind(model.sha256)
-                        .bind(created_ms)
-                        .bind(model.only_new)
-                        .fetch_optional(connection)
-                        .await
-                    })
-                })
-                .await?;
-            Ok(row.and_then(ModelRow::model))
-        })
+    fn put_model(&self, model: NewModel) -> BoxFuture<'_, Result<PutModel, StoreError>> {
+        Box::pin(self.ledger.write(move |connection| {
+            let model = model.clone();
+            Box::pin(async move { put(connection, &model, now_ms()).await })
+        }))
     }
 
     fn delete_model(&self, name: String) -> BoxFuture<'_, Result<bool, StoreError>> {
@@ -132,15 +111,41 @@ impl ModelStore for SqliteStore {
                 .write(move |connection| {
                     let name = name.clone();
                     Box::pin(async move {
-                        let done =
-                            sqlx::query("UPDATE models SET content = NULL WHERE name = ?1 AND content IS NOT NULL")
-                                .bind(name)
-                                .execute(connection)
-                                .await?;
+                        let done = sqlx::query(
+                            "UPDATE models SET content = NULL, bytes = 0 WHERE name = ?1 AND content IS NOT NULL",
+                        )
+                        .bind(name)
+                        .execute(connection)
+                        .await?;
                         Ok(done.rows_affected() > 0)
                     })
                 })
                 .await
         })
     }
+}
+
+async fn put(connection: &mut SqliteConnection, model: &NewModel, now: i64) -> Result<PutModel, sqlx::Error> {
+    if model.quota.kept_bytes.is_some() {
+        let usage = usage(connection, &model.owner, now).await?;
+        if !usage.has_room(&model.quota, model.content.len() as u64) {
+            return Ok(PutModel::OverQuota(usage));
+        }
+    }
+    let row = sqlx::query_as(
+        "INSERT INTO models (name, revision, calculator, content, sha256, created_ms, owner, bytes)
+         SELECT ?1, 1 + coalesce(max(revision), 0), ?2, ?3, ?4, ?5, ?7, octet_length(?3) FROM models WHERE name = ?1
+         HAVING NOT ?6 OR count(content) = 0
+         RETURNING name, revision, calculator, content, sha256, created_ms",
+    )
+    .bind(&model.name)
+    .bind(&model.calculator)
+    .bind(&model.content)
+    .bind(&model.sha256)
+    .bind(now)
+    .bind(model.only_new)
+    .bind(&model.owner)
+    .fetch_optional(connection)
+    .await?;
+    Ok(ModelRow::put(row))
 }

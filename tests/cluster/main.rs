@@ -21,6 +21,13 @@ mod dice;
 #[path = "../reliability/small_disk.rs"]
 mod small_disk;
 
+#[path = "../support/certificates.rs"]
+mod certificates;
+
+#[path = "../support/receiver.rs"]
+#[allow(dead_code)] // not all of it is used here
+mod receiver;
+
 mod across;
 mod backup;
 mod chaos;
@@ -32,3 +39,4 @@ mod process;
 mod start;
 mod studies;
 mod tls;
+mod webhooks;

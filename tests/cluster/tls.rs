@@ -1,35 +1,11 @@
 //! TLS to the database: an authority of the test's own, a server with its certificate, and who refuses whom.
 
-use std::path::Path;
-use std::process::{Command, Stdio};
-
 use serde_json::json;
 
+use crate::certificates::{certificate, signed};
 use crate::database::{Database, Member};
 use crate::start::refused;
 use crate::support::toy;
-
-/// A key with its certificate; `None`, with a word, where nobody can make one.
-fn certificate(folder: &Path, name: &str, arguments: &[&str]) -> Option<()> {
-    let mut command = Command::new("openssl");
-    command.args(["req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-days", "2"]);
-    command.args(["-keyout", &format!("{name}.key"), "-out", &format!("{name}.pem")]).args(arguments);
-    match command.current_dir(folder).stdin(Stdio::null()).output() {
-        Ok(output) => assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr)),
-        Err(error) => {
-            assert!(std::env::var("CI").as_deref() != Ok("true"), "openssl: {error}");
-            println!("NOT TESTED: openssl: {error}");
-            return None;
-        }
-    }
-    Some(())
-}
-
-/// What the authority has signed.
-fn signed(folder: &Path, name: &str, arguments: &[&str]) -> Option<()> {
-    let by = ["-CA", "plant.pem", "-CAkey", "plant.key", "-addext", "basicConstraints=critical,CA:FALSE"];
-    certificate(folder, name, &[&by, arguments].concat())
-}
 
 #[tokio::test]
 async fn the_way_to_the_database_is_encrypted_and_who_is_there_is_checked_as_asked() {

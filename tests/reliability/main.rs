@@ -11,6 +11,10 @@
 #[allow(dead_code)] // these tests start processes only
 mod support;
 
+#[path = "../support/receiver.rs"]
+#[allow(dead_code)] // not all of it is used here
+mod receiver;
+
 mod clients;
 mod damage;
 mod dice;
@@ -22,3 +26,4 @@ mod process;
 mod small_disk;
 mod streams;
 mod watch;
+mod webhooks;

@@ -8,6 +8,12 @@ mod support;
 #[path = "../support/isolation.rs"]
 mod isolation;
 
+#[path = "../support/certificates.rs"]
+mod certificates;
+
+#[path = "../support/receiver.rs"]
+mod receiver;
+
 mod bad_input;
 mod command_line;
 mod contract;
@@ -23,3 +29,5 @@ mod quotas;
 mod results;
 mod standing;
 mod studies;
+mod traces;
+mod webhooks;

@@ -203,3 +203,49 @@ async fn without_quotas_nothing_is_said_of_them() {
     let answer = server.post(lasting(2131, 1)).send().await.unwrap();
     assert_eq!((header(&answer, "ratelimit"), header(&answer, "ratelimit-policy")), ("", ""));
 }
+
+#[tokio::test]
+async fn stored_models_count_for_what_is_kept() {
+    let server = Server::start_of(Registry::standard().unwrap(), |config| {
+        with_keys(config);
+        config.quota.kept_bytes = 1000;
+    })
+    .await;
+    let model = json!({
+        "calculator": "deflection-compensation",
+        "effects": [{"kind": "headstock_compliance", "delta_um_per_n": 0.022}],
+        "provenance": {"note": "x".repeat(300)},
+    });
+    let put = |key: &'static str, name: &str| {
+        let request = server.client.put(server.url(&format!("/v1/models/{name}"))).bearer_auth(key);
+        request.header("content-type", "application/json").body(model.to_string()).send()
+    };
+    assert_eq!(put(ONE, "winter").await.unwrap().status(), 201);
+    assert_eq!(put(ONE, "winter").await.unwrap().status(), 200, "a second revision fits");
+    let refused = put(ONE, "summer").await.unwrap();
+    let wait_s: u64 = header(&refused, "retry-after").parse().unwrap();
+    assert!(wait_s >= 29 * 86_400, "nothing goes by itself: {wait_s} s");
+    let refused = problem(refused, 429, "kept_quota").await;
+    assert!(refused["detail"].as_str().unwrap().contains("models"), "{refused:#}");
+    // What is left is told with answers, and another owner has his own.
+    let short = json!({
+        "shaft": {"segments": [{"length_mm": 500, "diameter_mm": 60, "stock_diameter_mm": 62}], "material": "steel_45"},
+        "supports": [{"kind": "centre", "z_mm": 0}, {"kind": "centre", "z_mm": 500}],
+        "force": {"kind": "constant", "passive_n": 200},
+        "cut": {"feed_mm_per_rev": 0.3, "spindle_speed_rpm": 500},
+    });
+    let ask = async |key: &str| {
+        let request = server.post_to("/v1/deflection-compensation", short.to_string()).bearer_auth(key);
+        request.send().await.unwrap()
+    };
+    let left_of_one = left(&ask(ONE).await, "kept").0;
+    assert!((1.0..450.0).contains(&left_of_one), "{left_of_one}");
+    assert_eq!(left(&ask(OTHER).await, "kept").0, 1000.0);
+    assert_eq!(put(OTHER, "summer").await.unwrap().status(), 201);
+    // Whoever deletes one has room again.
+    let delete = server.client.delete(server.url("/v1/models/winter")).bearer_auth(ONE);
+    assert_eq!(delete.send().await.unwrap().status(), 204);
+    assert_eq!(left(&ask(ONE).await, "kept").0, 1000.0);
+    assert_eq!(put(ONE, "summer").await.unwrap().status(), 201);
+    server.stop().await;
+}

@@ -64,7 +64,7 @@ use super::quota::label;
 use super::{Error, Inner, Key, Shelf, Stored};
 use crate::store::jobs::{
     Accepted, Changed, Idempotency, JobId, JobKind, JobPage, JobQuery, JobRecord, JobState, JobStore, MOST_ATTEMPTS,
-    NewJob, News, Priority, Timing,
+    NewCallback, NewJob, News, Priority, Timing,
 };
 use estimate::Estimates;
 use feeds::Feeds;
@@ -92,6 +92,10 @@ pub struct Ask {
     pub idempotency_key: Option<String>,
     /// Wait at most so long for the result of a job; `None`: as the service thinks best.
     pub wait: Option<Duration>,
+    /// Who is told when it is over.
+    pub callback: Option<NewCallback>,
+    /// Where the request belongs in a trace.
+    pub traceparent: Option<String>,
 }
 
 impl Ask {
@@ -104,6 +108,8 @@ impl Ask {
             deadline: None,
             idempotency_key: None,
             wait: None,
+            callback: None,
+            traceparent: None,
         }
     }
 }
@@ -154,6 +160,8 @@ pub(crate) struct Jobs {
     new_deadline: Notify,
     /// A job came into line.
     came: Notify,
+    /// A job ended here: somebody may have to be told.
+    ended: Notify,
     stop: watch::Sender<bool>,
     tasks: Mutex<Vec<JoinHandle<()>>>,
 }
@@ -167,6 +175,7 @@ impl Jobs {
             computations: Arc::default(),
             new_deadline: Notify::new(),
             came: Notify::new(),
+            ended: Notify::new(),
             stop: watch::channel(false).0,
             tasks: Mutex::default(),
         }
@@ -262,6 +271,8 @@ impl Jobs {
             useful_for_ms,
             quota: engine.settings.quota,
             result: request.result.map(|stored| stored.kept()),
+            callback: ask.callback.clone(),
+            traceparent: ask.traceparent.clone(),
         };
         let work_ms = if job.result.is_some() { 0.0 } else { job.estimate_ms };
         match self.store.submit(job, engine.settings.queue_limit).await? {
@@ -272,6 +283,9 @@ impl Jobs {
                     self.new_deadline.notify_one();
                 }
                 self.came.notify_one();
+                if record.state.is_final() {
+                    self.ended.notify_one();
+                }
                 Ok((record, true))
             }
             Accepted::Known(record) => Ok((record, false)),
@@ -307,6 +321,7 @@ impl Jobs {
         }
         if !cancelled.before.is_final() {
             self.feeds.touch(&[id]);
+            self.ended.notify_one();
         }
         Ok((self.now(cancelled.job), cancelled.before))
     }

@@ -4,9 +4,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::{Ask, Feed, Job, Request};
-use crate::engine::memory::{Kept, fingerprint};
+use crate::engine::memory::{Kept, fingerprint_with};
 use crate::engine::{Body, CacheState, Engine, Error, Known, Solved, Stored, Timings, hit};
-use crate::store::jobs::{JobId, JobKind, JobQuery, JobRecord, JobState};
+use crate::store::jobs::{DueCallback, JobId, JobKind, JobQuery, JobRecord, JobState, TakeUp, Tried};
 
 /// What came of a request.
 #[derive(Debug, Clone)]
@@ -22,9 +22,13 @@ impl Engine {
     /// will be done, and wherever it has to be done whatever happens.
     pub async fn submit(&self, calculator: &str, body: Body, ask: Ask) -> Result<Answered, Error> {
         let inner = &self.inner;
-        let body_hash = ask.idempotency_key.as_ref().map(|_| fingerprint(calculator, &body));
+        // Who is told belongs to what was asked.
+        let told = ask.callback.as_ref().map(|callback| callback.url.as_str());
+        let body_hash = ask.idempotency_key.as_ref().map(|_| fingerprint_with(calculator, &body, told));
+        // Such a request has a record, whatever is known of its answer: what was promised outlives the process.
+        let is_on_record = body_hash.is_some() || told.is_some();
         let (ready, parse, kept) = match self.know(calculator, &body, &ask.shelf).await? {
-            Known::Kept(kept, parse) if body_hash.is_none() => return Ok(solved(hit(kept, parse)?)),
+            Known::Kept(kept, parse) if !is_on_record => return Ok(solved(hit(kept, parse)?)),
             // It has a record, too, by which it is known again.
             Known::Kept(kept, parse) => {
                 (Box::new(inner.read(&inner.known(calculator)?, body, &ask.shelf).await?), parse, Some(kept))
@@ -40,7 +44,7 @@ impl Engine {
             inner.afford_at_all(&ready.prepared.cost, estimate_ms)?;
         }
         let is_short = estimate_ms <= inner.settings.direct_limit.as_secs_f64() * 1e3;
-        if is_short && ask.wait.is_none() && body_hash.is_none() {
+        if is_short && ask.wait.is_none() && !is_on_record {
             inner.charge(&ask.owner, estimate_ms).await?;
             let answer = self.solve_directly(*ready, parse);
             let outcome = match ask.deadline {
@@ -138,6 +142,25 @@ impl Engine {
                 Err(Error::JobNotFinished { state: JobState::Queued, retry_after: job.retry_after() })
             }
         }
+    }
+
+    /// Waits until a job has ended here, at most so long: then somebody may have to be told.
+    pub(crate) async fn ended(&self, most: Duration) {
+        let _ = tokio::time::timeout(most, self.inner.jobs.ended.notified()).await;
+    }
+
+    /// Takes up callbacks that are due.
+    pub(crate) async fn take_up_callbacks(&self, wanted: TakeUp) -> Result<Vec<DueCallback>, Error> {
+        Ok(self.inner.jobs.store.take_up_callbacks(wanted).await?)
+    }
+
+    /// Writes what came of a try of a callback.
+    pub(crate) async fn settle_callback(&self, due: DueCallback, tried: Tried) -> Result<(), Error> {
+        let job = due.job;
+        if self.inner.jobs.store.settle_callback(due, tried).await? {
+            self.inner.jobs.feeds.touch(&[job]);
+        }
+        Ok(())
     }
 
     /// From now on no job is taken up, and those that run go back in line; the rest goes on.

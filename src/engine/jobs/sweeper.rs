@@ -117,6 +117,7 @@ async fn tally(engine: &Arc<Inner>) {
             |state: &'static str, count: u64| metrics::gauge!("precut_jobs", "state" => state).set(count as f64);
         gauge("queued", counts.queued);
         gauge("running", counts.running);
+        metrics::gauge!("precut_callbacks_pending").set(counts.callbacks as f64);
         let waited_ms = counts.oldest_ms.map_or(0, |came| engine.jobs.store.now_ms().saturating_sub(came).max(0));
         metrics::gauge!("precut_job_oldest_seconds").set(waited_ms as f64 / 1e3);
         metrics::gauge!("precut_store_bytes").set(counts.store_bytes as f64);

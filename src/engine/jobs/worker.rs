@@ -4,26 +4,29 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use precut_calc::calculator::Failure;
+use tracing::Instrument;
 
+use super::running::Running;
 use super::{MOST_ATTEMPTS, fault, help, work};
 use crate::engine::exec::Slot;
 use crate::engine::quota::worked;
 use crate::engine::{Error, Inner, Stored};
 use crate::store::StoreError;
 use crate::store::jobs::{Claim, Claimed, Ending, JobId, Waiting};
+use crate::trace::{self, Traceparent};
 
 /// Runs a job, if it still waits: in a place of those for short ones, if it was given one. Returns when its record says how
 /// it ended, or that it waits again.
 pub(super) async fn run_task(engine: Arc<Inner>, id: JobId, place: Option<Slot>) {
     let jobs = &engine.jobs;
-    let Waiting { charged, calculator, owner, created_ms } = match stubbornly(&engine, || jobs.store.waiting(id)).await
-    {
-        Some(Some(waiting)) => waiting,
-        Some(None) if place.is_some() => return,
-        // Nobody waits for it to begin; perhaps somebody has asked for help with it.
-        Some(None) => return help::run(&engine, id).await,
-        None => return,
-    };
+    let Waiting { charged, calculator, owner, created_ms, traceparent } =
+        match stubbornly(&engine, || jobs.store.waiting(id)).await {
+            Some(Some(waiting)) => waiting,
+            Some(None) if place.is_some() => return,
+            // Nobody waits for it to begin; perhaps somebody has asked for help with it.
+            Some(None) => return help::run(&engine, id).await,
+            None => return,
+        };
     // A start that takes the process along is charged to all that ran beside it. Before a job is given up as the one
     // to blame, it is tried alone.
     let alone = charged + 1 >= MOST_ATTEMPTS;
@@ -67,11 +70,22 @@ pub(super) async fn run_task(engine: Arc<Inner>, id: JobId, place: Option<Slot>)
     let waited = Duration::from_millis(jobs.store.now_ms().saturating_sub(created_ms).max(0).unsigned_abs());
     metrics::histogram!("precut_job_wait_seconds", "calculator" => calculator).record(waited.as_secs_f64());
     jobs.feeds.touch(&claim.jobs);
-    tracing::info!(job = %id, calculator = claim.calculator, attempt = claim.attempt, "a job begins");
+    let span = tracing::info_span!("job", id = %id, calculator = claim.calculator, trace = tracing::field::Empty);
+    if let Some(traceparent) = traceparent.and_then(|text| text.parse::<Traceparent>().ok()) {
+        span.record("trace", tracing::field::display(traceparent.trace()));
+        trace::follow(&span, traceparent);
+    }
+    run_claimed(&engine, &claim, (&running, slot, &owner)).instrument(span).await;
+}
+
+/// Runs what was claimed in its place, for its owner.
+async fn run_claimed(engine: &Arc<Inner>, claim: &Claim, (running, slot, owner): (&Arc<Running>, Slot, &str)) {
+    let jobs = &engine.jobs;
+    tracing::info!(job = %claim.jobs[0], calculator = claim.calculator, attempt = claim.attempt, "a job begins");
     let started = Instant::now();
-    let outcome = match work::of(&engine, &claim) {
+    let outcome = match work::of(engine, claim) {
         Ok(work) => {
-            let working = work.run(Arc::clone(&engine), Arc::clone(&running), slot);
+            let working = work.run(Arc::clone(engine), Arc::clone(running), slot);
             tokio::select! {
                 outcome = working => outcome,
                 () = jobs.stopped() => Err(Error::ShuttingDown),
@@ -79,8 +93,8 @@ pub(super) async fn run_task(engine: Arc<Inner>, id: JobId, place: Option<Slot>)
         }
         Err(error) => Err(error),
     };
-    worked(&owner, started.elapsed().as_secs_f64() * 1e3);
-    settle(&engine, &claim, outcome, started.elapsed(), running.is_cancelled()).await;
+    worked(owner, started.elapsed().as_secs_f64() * 1e3);
+    settle(engine, claim, outcome, started.elapsed(), running.is_cancelled()).await;
 }
 
 /// Writes how a computation ended.
@@ -123,6 +137,7 @@ async fn settle(
     if let Some(ended) = stubbornly(engine, || jobs.store.finish(claim.lease, ending.clone())).await {
         tracing::info!(job = %claim.jobs[0], ms, outcome = label, "a job ends");
         jobs.feeds.touch(&ended);
+        jobs.ended.notify_one();
     }
 }
 

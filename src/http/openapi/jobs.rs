@@ -4,14 +4,15 @@ use serde_json::json;
 use utoipa::openapi::header::{Header, HeaderBuilder};
 use utoipa::openapi::link::{Link, LinkBuilder};
 use utoipa::openapi::path::{HttpMethod, OperationBuilder, Parameter, ParameterIn, PathItem};
+use utoipa::openapi::request_body::RequestBodyBuilder;
 use utoipa::openapi::response::ResponseBuilder;
 use utoipa::openapi::schema::{ObjectBuilder, SchemaType, Type};
-use utoipa::openapi::{Content, Object, RefOr, Schema};
+use utoipa::openapi::{Content, Object, RefOr, Required, Schema};
 
 use super::parts;
 use crate::http::calculators::{LEAST_DEADLINE_S, MOST_DEADLINE_S};
 use crate::http::negotiate::Media;
-use crate::http::{events, jobs};
+use crate::http::{callbacks, events, jobs};
 use crate::registry::Registry;
 use crate::store::jobs::{JobState, Priority};
 
@@ -34,7 +35,12 @@ pub(super) fn paths(registry: &Registry) -> Vec<(&'static str, PathItem)> {
 
 /// Schemas of what they answer.
 pub(super) fn schemas() -> Vec<(String, RefOr<Schema>)> {
-    [super::schemas_of::<jobs::JobList>(), super::schemas_of::<events::JobProgress>()].concat()
+    [
+        super::schemas_of::<jobs::JobList>(),
+        super::schemas_of::<events::JobProgress>(),
+        super::schemas_of::<callbacks::JobEvent>(),
+    ]
+    .concat()
 }
 
 /// Adds to a calculator's operation that it may become a job.
@@ -49,6 +55,7 @@ pub(super) fn may_become_one(operation: OperationBuilder) -> OperationBuilder {
         .minimum(Some(LEAST_DEADLINE_S))
         .maximum(Some(MOST_DEADLINE_S))
         .build();
+    let url = ObjectBuilder::new().schema_type(SchemaType::new(Type::String)).max_length(Some(2048)).build();
     let key = ObjectBuilder::new().schema_type(SchemaType::new(Type::String)).pattern(Some("^[!-~]{1,255}$")).build();
     operation
         .parameter(header(
@@ -65,7 +72,46 @@ pub(super) fn may_become_one(operation: OperationBuilder) -> OperationBuilder {
         ))
         .parameter(query("priority", "Which jobs go first, should this become one.", priority))
         .parameter(query("deadline_s", "After so many seconds the answer is of no use any more.", deadline))
+        .parameter(query(
+            "callback",
+            "Address that is told when this is over: a signed `JobEvent` is posted to it (Standard Webhooks), again and \
+             again until it is taken. Such a request is always a job. Hosts have to be allowed (`callbacks.hosts`).",
+            url,
+        ))
+        .parameter(header(
+            "traceparent",
+            "Where the request belongs in a trace (W3C Trace Context): passed on to the job and to its callback.",
+            parts::string(),
+        ))
         .response("202", accepted())
+}
+
+/// What the service posts to whoever is told that a job is over.
+pub(super) fn webhook() -> PathItem {
+    let header = |name, text: &str| parts::parameter(name, ParameterIn::Header, text, parts::string()).build();
+    let body = RequestBodyBuilder::new()
+        .description(Some("The job that is over. The same at every try."))
+        .required(Some(Required::True))
+        .content("application/json", parts::json_of("JobEvent"));
+    let answer = |text: &str| ResponseBuilder::new().description(text);
+    let operation = operation(
+        "job_is_over",
+        "Is that job over?",
+        "Posted to the address that came with a job as `callback`, signed as Standard Webhooks has it. It is delivered at \
+         least once; `webhook-id` is the same each time. No redirect is followed, and no body of an answer is read.",
+    )
+    .parameter(header("webhook-id", "Id of the job: the same at every try."))
+    .parameter(header("webhook-timestamp", "When this try was made, seconds since 1970 UTC."))
+    .parameter(header(
+        "webhook-signature",
+        "`v1,` and the base64 of HMAC-SHA256 over `id.timestamp.body`; two, with a space between, while a secret is replaced.",
+    ))
+    .parameter(header("traceparent", "Where the call belongs in a trace, if the job does."))
+    .request_body(Some(body.build()))
+    .response("2XX", answer("It is taken."))
+    .response("410", answer("Nobody is there any more: it is given up at once."))
+    .response("default", answer("It is tried again, after longer and longer pauses."));
+    PathItem::new(HttpMethod::Post, operation)
 }
 
 fn accepted() -> ResponseBuilder {

@@ -33,7 +33,7 @@ a safe query.
 
 **Long calculations** become jobs (`202` and `Location`): to be asked for, followed as events, cancelled. An accepted \
 job is done whatever happens to the process. `Prefer: respond-async` makes a job of anything, `Prefer: wait=N` waits for \
-one, `Idempotency-Key` makes sending it twice harmless.
+one, `Idempotency-Key` makes sending it twice harmless, `?callback=` has its end told to an address (webhooks).
 
 **Forms**: `Accept` chooses among JSON, CSV (`?table=`), SVG (`?figure=`) and, where a path is the answer, G-code. \
 `Accept-Language` chooses the language of sentences; names and codes are never translated.
@@ -98,6 +98,7 @@ pub fn document(registry: &Registry) -> Value {
             .description(Some("The service that this document comes from."))
             .build()]))
         .paths(paths)
+        .webhooks(Some(PathsBuilder::new().path("job_is_over", jobs::webhook())))
         .components(Some(components.build()))
         .build();
     let mut document = stable(serde_json::to_value(&api).expect("a document has only words and numbers"));

@@ -8,6 +8,7 @@ use tokio::sync::watch;
 use uuid::Uuid;
 
 use super::PostgresStore;
+use super::callbacks;
 use super::care::{note_timing, timings};
 use super::line::submit;
 use super::queue::{self, Task, Tasks};
@@ -16,8 +17,8 @@ use super::run::{beat, cancel, claim, finish, redo, refuse, requeue};
 use super::usage::{kept_by_owner, note_work, usage};
 use crate::key::Key;
 use crate::store::jobs::{
-    Accepted, Beat, Cancelled, Changed, Claimed, Ending, Hear, JobCounts, JobId, JobPage, JobQuery, JobRecord,
-    JobStore, Lease, Live, NewJob, RunTask, Shared, Timing, Usage, Waiting,
+    Accepted, Beat, Cancelled, Changed, Claimed, DueCallback, Ending, Hear, JobCounts, JobId, JobPage, JobQuery,
+    JobRecord, JobStore, Lease, Live, NewJob, RunTask, Shared, TakeUp, Timing, Tried, Usage, Waiting,
 };
 use crate::store::sqlite_jobs::pack::{packed, packed_ending};
 use crate::store::sqlite_jobs::record::parsed;
@@ -187,24 +188,26 @@ impl JobStore for PostgresStore {
     }
     fn counts(&self) -> BoxFuture<'_, Result<JobCounts, StoreError>> {
         Box::pin(async {
-            let (queued, running, oldest_ms, store_bytes): (i64, i64, Option<i64>, i64) = sqlx::query_as(
-                "SELECT (SELECT count(*) FROM precut.jobs WHERE state = 'queued'),
+            let (queued, running, callbacks, oldest_ms, store_bytes): (i64, i64, i64, Option<i64>, i64) =
+                sqlx::query_as(
+                    "SELECT (SELECT count(*) FROM precut.jobs WHERE state = 'queued'),
                      (SELECT count(*) FROM precut.jobs WHERE state = 'running'),
+                     (SELECT count(*) FROM precut.callbacks WHERE state = 'pending'),
                      (SELECT created_ms FROM precut.jobs WHERE state = 'queued' ORDER BY id LIMIT 1),
                      (SELECT sum(pg_total_relation_size(oid))::bigint FROM pg_class WHERE relkind = 'r'
                           AND relnamespace IN ('precut'::regnamespace, 'apalis'::regnamespace))",
-            )
-            .fetch_one(&self.pool)
-            .await?;
+                )
+                .fetch_one(&self.pool)
+                .await?;
             let count = |number: i64| u64::try_from(number).unwrap_or(0);
             let (queued, running, store_bytes) = (count(queued), count(running), count(store_bytes));
-            Ok(JobCounts { queued, running, oldest_ms, store_bytes })
+            Ok(JobCounts { queued, running, callbacks: count(callbacks), oldest_ms, store_bytes })
         })
     }
     fn waiting(&self, id: JobId) -> BoxFuture<'_, Result<Option<Waiting>, StoreError>> {
         Box::pin(async move {
-            let waiting: Option<(i32, String, String, i64)> = sqlx::query_as(
-                "SELECT max(other.attempt), one.calculator, one.owner, one.created_ms
+            let waiting: Option<(i32, String, String, i64, Option<String>)> = sqlx::query_as(
+                "SELECT max(other.attempt), one.calculator, one.owner, one.created_ms, one.traceparent
                  FROM precut.jobs AS one JOIN precut.jobs AS other USING (key)
                  WHERE one.id = $1 AND one.state = 'queued' AND other.state = 'queued'
                  GROUP BY one.id",
@@ -212,11 +215,12 @@ impl JobStore for PostgresStore {
             .bind(id.to_string())
             .fetch_optional(&self.pool)
             .await?;
-            Ok(waiting.map(|(charged, calculator, owner, created_ms)| Waiting {
+            Ok(waiting.map(|(charged, calculator, owner, created_ms, traceparent)| Waiting {
                 charged: count(charged),
                 calculator,
                 owner,
                 created_ms,
+                traceparent,
             }))
         })
     }
@@ -286,6 +290,20 @@ impl JobStore for PostgresStore {
     }
     fn sweep(&self, live: Live) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>> {
         Box::pin(self.sweep_jobs(live))
+    }
+    fn take_up_callbacks(&self, wanted: TakeUp) -> BoxFuture<'_, Result<Vec<DueCallback>, StoreError>> {
+        Box::pin(async move {
+            let due =
+                "SELECT EXISTS (SELECT FROM precut.callbacks WHERE state = 'pending' AND next_ms <= precut.now_ms())";
+            // Hardly ever is there one: that is no reason to write.
+            if !sqlx::query_scalar::<_, bool>(due).fetch_one(&self.pool).await? {
+                return Ok(Vec::new());
+            }
+            self.write(move |connection| Box::pin(callbacks::take_up(connection, wanted))).await
+        })
+    }
+    fn settle_callback(&self, due: DueCallback, tried: Tried) -> BoxFuture<'_, Result<bool, StoreError>> {
+        Box::pin(self.write(move |connection| Box::pin(callbacks::settle(connection, due, tried))))
     }
     fn forget_expired(&self) -> BoxFuture<'_, Result<u64, StoreError>> {
         Box::pin(self.forget())

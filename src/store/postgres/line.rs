@@ -2,11 +2,11 @@
 
 use sqlx::postgres::PgConnection;
 
-use super::lock;
 use super::queue::{self, Task, task_name};
 use super::record::{Outcome, RecordRow, column, columns, record};
 use super::results::insert;
 use super::usage::{lock_owner, usage};
+use super::{callbacks, lock};
 use crate::store::jobs::{Accepted, JobState, NewJob, yields_to};
 use crate::store::row::ResultRow;
 use crate::store::sqlite_jobs::pack::Packed;
@@ -101,9 +101,9 @@ pub(super) async fn submit(
     let row: Option<RecordRow> = sqlx::query_as(concat!(
         "INSERT INTO precut.jobs (id, kind, calculator, version, engine, key, input, state, progress, attempt, lease,
              heartbeat_ms, priority, turn, pushed, owner, idempotency, body_hash, estimate_ms, created_ms, started_ms,
-             finished_ms, deadline_ms, expires_ms, input_bytes, result_bytes)
+             finished_ms, deadline_ms, expires_ms, input_bytes, result_bytes, traceparent)
          VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14, $15, $16, $17, $18, $19, $20, $21, $22,
-             $23, $24, octet_length($7::bytea), $25)
+             $23, $24, octet_length($7::bytea), $25, $26)
          ON CONFLICT (owner, idempotency) DO NOTHING RETURNING ",
         columns!()
     ))
@@ -132,6 +132,7 @@ pub(super) async fn submit(
     .bind(job.useful_for_ms.map(|after| now.saturating_add(after)))
     .bind(finished.map(|at| at.saturating_add(keep_ms)))
     .bind(result.as_ref().map_or(0, ResultRow::bytes))
+    .bind(&job.traceparent)
     .fetch_optional(&mut *connection)
     .await?;
     let Some(row) = row else {
@@ -142,5 +143,8 @@ pub(super) async fn submit(
         let task = Task { job: &id, name: task_name(&id, 1), priority, turn: Some(turn) };
         queue::add(connection, engine, &[task]).await?;
     }
-    Ok(Accepted::New(row.record()?))
+    let Some(callback) = &job.callback else { return Ok(Accepted::New(row.record()?)) };
+    callbacks::note(connection, job.id, callback, finished).await?;
+    let written = record(connection, job.id).await?.ok_or(sqlx::Error::RowNotFound)?;
+    Ok(Accepted::New(written))
 }

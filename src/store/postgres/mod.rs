@@ -5,6 +5,7 @@
 //! of the processes need not agree. What a process does is told to the others by notifications ([`news`]); one that is
 //! lost costs at most a second, as everything is looked at again.
 
+mod callbacks;
 mod care;
 mod clock;
 mod jobs;

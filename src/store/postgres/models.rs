@@ -1,10 +1,12 @@
 //! Stored models in PostgreSQL.
 
 use futures_util::future::BoxFuture;
+use sqlx::postgres::PgConnection;
 
 use super::PostgresStore;
+use super::usage::{lock_owner, usage};
 use crate::store::StoreError;
-use crate::store::models::{KeptModel, ModelRow, ModelShelf, ModelStore, NewModel, column};
+use crate::store::models::{KeptModel, ModelRow, ModelShelf, ModelStore, NewModel, PutModel, column};
 
 impl ModelShelf for PostgresStore {
     fn model(&self, name: String, revision: Option<u32>) -> BoxFuture<'_, Result<Option<KeptModel>, StoreError>> {
@@ -53,44 +55,50 @@ impl ModelShelf for PostgresStore {
 }
 
 impl ModelStore for PostgresStore {
-    fn put_model(&self, model: NewModel) -> BoxFuture<'_, Result<Option<KeptModel>, StoreError>> {
-        Box::pin(async move {
-            let row: Option<ModelRow> = self
-                .write(|connection| {
-                    Box::pin(async move {
-                        // One after the other, so that no two take the same number.
-                        sqlx::query("SELECT pg_advisory_xact_lock(hashtextextended('precut.models ' || $1, 0))")
-                            .bind(model.name.clone())
-                            .execute(&mut *connection)
-                            .await?;
-                        sqlx::query_as(
-                            "INSERT INTO precut.models (name, revision, calculator, content, sha256, created_ms)
-                             SELECT $1, 1 + coalesce(max(revision), 0), $2, $3, $4, precut.now_ms()
-                             FROM precut.models WHERE name = $1
-                             HAVING NOT $5 OR count(content) = 0
-                             RETURNING name, revision, calculator, content, sha256, created_ms",
-                        )
-                        .bind(model.name)
-                        .bind(model.calculator)
-                        .bind(model.content)
-                        .bind(model.sha256)
-                        .bind(model.only_new)
-                        .fetch_optional(connection)
-                        .await
-                    })
-                })
-                .await?;
-            Ok(row.and_then(ModelRow::model))
-        })
+    fn put_model(&self, model: NewModel) -> BoxFuture<'_, Result<PutModel, StoreError>> {
+        Box::pin(self.write(|connection| Box::pin(put(connection, model))))
     }
 
     fn delete_model(&self, name: String) -> BoxFuture<'_, Result<bool, StoreError>> {
         Box::pin(async move {
-            let done = sqlx::query("UPDATE precut.models SET content = NULL WHERE name = $1 AND content IS NOT NULL")
-                .bind(name)
-                .execute(&self.pool)
-                .await?;
+            let done = sqlx::query(
+                "UPDATE precut.models SET content = NULL, bytes = 0 WHERE name = $1 AND content IS NOT NULL",
+            )
+            .bind(name)
+            .execute(&self.pool)
+            .await?;
             Ok(done.rows_affected() > 0)
         })
     }
+}
+
+async fn put(connection: &mut PgConnection, model: NewModel) -> Result<PutModel, sqlx::Error> {
+    // One after the other, so that no two take the same number.
+    sqlx::query("SELECT pg_advisory_xact_lock(hashtextextended('precut.models ' || $1, 0))")
+        .bind(&model.name)
+        .execute(&mut *connection)
+        .await?;
+    if model.quota.kept_bytes.is_some() {
+        lock_owner(connection, &model.owner).await?;
+        let usage = usage(connection, &model.owner).await?;
+        if !usage.has_room(&model.quota, model.content.len() as u64) {
+            return Ok(PutModel::OverQuota(usage));
+        }
+    }
+    let row = sqlx::query_as(
+        "INSERT INTO precut.models (name, revision, calculator, content, sha256, created_ms, owner, bytes)
+         SELECT $1, 1 + coalesce(max(revision), 0), $2, $3, $4, precut.now_ms(), $6, octet_length($3)
+         FROM precut.models WHERE name = $1
+         HAVING NOT $5 OR count(content) = 0
+         RETURNING name, revision, calculator, content, sha256, created_ms",
+    )
+    .bind(model.name)
+    .bind(model.calculator)
+    .bind(model.content)
+    .bind(model.sha256)
+    .bind(model.only_new)
+    .bind(model.owner)
+    .fetch_optional(connection)
+    .await?;
+    Ok(ModelRow::put(row))
 }

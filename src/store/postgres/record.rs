@@ -4,6 +4,7 @@ use sqlx::FromRow;
 use sqlx::postgres::PgConnection;
 
 use crate::key::Key;
+use crate::store::callbacks::Callback;
 use crate::store::jobs::{JobId, JobKind, JobRecord, JobState};
 use crate::store::sqlite_jobs::record::{of_rank, parsed, unreadable};
 
@@ -11,7 +12,9 @@ use crate::store::sqlite_jobs::record::{of_rank, parsed, unreadable};
 macro_rules! columns {
     () => {
         "id, kind, calculator, key, state, stage, progress, attempt, lease, priority, problem, estimate_ms, \
-         created_ms, started_ms, finished_ms, deadline_ms, expires_ms, owner"
+         created_ms, started_ms, finished_ms, deadline_ms, expires_ms, owner, traceparent, \
+         (SELECT json_build_object('url', url, 'state', callbacks.state, 'attempts', attempts, 'next_ms', next_ms, 'fault', fault, \
+             'settled_ms', settled_ms)::text FROM precut.callbacks WHERE job = jobs.id) AS callback"
     };
 }
 
@@ -39,6 +42,8 @@ pub(super) struct RecordRow {
     deadline_ms: Option<i64>,
     expires_ms: Option<i64>,
     owner: String,
+    traceparent: Option<String>,
+    callback: Option<String>,
 }
 
 impl RecordRow {
@@ -62,6 +67,8 @@ impl RecordRow {
             deadline_ms: self.deadline_ms,
             expires_ms: self.expires_ms,
             owner: self.owner,
+            traceparent: self.traceparent,
+            callback: self.callback.as_deref().map(Callback::read).transpose()?,
         })
     }
 }

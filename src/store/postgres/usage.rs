@@ -18,7 +18,9 @@ pub(super) async fn usage(connection: &mut PgConnection, owner: &str) -> Outcome
         "SELECT max(until) - $2, sum(bytes)::bigint FROM (
              SELECT max(expires_ms) AS until, sum(input_bytes) + max(result_bytes) AS bytes FROM precut.jobs
              WHERE owner = $1 AND (expires_ms IS NULL OR expires_ms > $2) GROUP BY key) AS results
-         GROUP BY until / $3",
+         GROUP BY until / $3
+         UNION ALL
+         SELECT NULL, sum(bytes)::bigint FROM precut.models WHERE owner = $1 AND content IS NOT NULL HAVING count(*) > 0",
     )
     .bind(owner)
     .bind(now)
@@ -53,7 +55,9 @@ pub(super) async fn kept_by_owner(pool: &PgPool) -> Outcome<Vec<(String, u64)>> 
         "SELECT owner, sum(bytes)::bigint FROM (
              SELECT owner, sum(input_bytes) + max(result_bytes) AS bytes FROM precut.jobs
              WHERE starts_with(owner, 'key:') AND (expires_ms IS NULL OR expires_ms > precut.now_ms())
-             GROUP BY owner, key) AS results
+             GROUP BY owner, key
+             UNION ALL
+             SELECT owner, bytes FROM precut.models WHERE starts_with(owner, 'key:') AND content IS NOT NULL) AS results
          GROUP BY owner",
     )
     .fetch_all(pool)

@@ -2,10 +2,11 @@
 
 use sqlx::sqlite::{SqliteConnection, SqlitePool};
 
+use super::callbacks;
 use super::record::{Outcome, ids, json_list, parsed};
 use super::run::{requeue, unwanted};
 use crate::store::jobs::{Changed, JobId, Lease, Timing};
-use crate::store::queue;
+use crate::store::{now_ms, queue};
 
 /// Timings kept of each calculator.
 const TIMINGS: i64 = 1000;
@@ -147,6 +148,7 @@ pub(in crate::store) async fn recover(pool: &SqlitePool) -> Outcome<u64> {
         count = requeue(&mut transaction, &json_list(&orphans), true).await?.len();
     }
     queue::push_lost(&mut transaction).await?;
+    callbacks::recover(&mut transaction, now_ms()).await?;
     transaction.commit().await?;
     Ok(count as u64)
 }

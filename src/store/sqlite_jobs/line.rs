@@ -2,6 +2,7 @@
 
 use sqlx::sqlite::SqliteConnection;
 
+use super::callbacks;
 use super::pack::Packed;
 use super::record::{Outcome, parsed, rank, record};
 use super::usage::usage;
@@ -89,9 +90,9 @@ pub(super) async fn submit(
     sqlx::query(
         "INSERT INTO precut_jobs (id, kind, calculator, version, key, input, state, progress, attempt, lease,
              heartbeat_ms, priority, turn, owner, idempotency, body_hash, estimate_ms, created_ms, started_ms,
-             finished_ms, deadline_ms, expires_ms, input_bytes, result_bytes)
+             finished_ms, deadline_ms, expires_ms, input_bytes, result_bytes, traceparent)
          VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19, ?20, ?21, ?22,
-             length(?6), ?23)",
+             length(?6), ?23, ?24)",
     )
     .bind(job.id.to_string())
     .bind(job.kind.word())
@@ -116,10 +117,14 @@ pub(super) async fn submit(
     .bind(job.useful_for_ms.map(|after| now.saturating_add(after)))
     .bind(finished.map(|at| at.saturating_add(keep_ms)))
     .bind(result.as_ref().map_or(0, ResultRow::bytes))
+    .bind(&job.traceparent)
     .execute(&mut *connection)
     .await?;
     if state == JobState::Queued {
         queue::push(connection, &[job.id.to_string()]).await?;
+    }
+    if let Some(callback) = &job.callback {
+        callbacks::note(connection, job.id, callback, finished).await?;
     }
     let written = record(connection, job.id).await?.ok_or(sqlx::Error::RowNotFound)?;
     Ok(Accepted::New(written))

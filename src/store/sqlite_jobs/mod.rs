@@ -1,5 +1,6 @@
 //! Jobs in the SQLite file. The functions below work inside a transaction of the ledger.
 
+mod callbacks;
 mod care;
 mod line;
 pub(super) mod pack;
@@ -7,7 +8,7 @@ pub(super) mod record;
 mod run;
 #[cfg(test)]
 mod tests;
-mod usage;
+pub(super) mod usage;
 
 use std::sync::Arc;
 
@@ -18,8 +19,8 @@ use sqlx::sqlite::Sqlite;
 use tokio::sync::watch;
 
 use super::jobs::{
-    Accepted, Beat, Cancelled, Changed, Claimed, Ending, JobCounts, JobId, JobPage, JobQuery, JobRecord, JobStore,
-    Lease, Live, NewJob, RunTask, Timing, Usage, Waiting,
+    Accepted, Beat, Cancelled, Changed, Claimed, DueCallback, Ending, JobCounts, JobId, JobPage, JobQuery, JobRecord,
+    JobStore, Lease, Live, NewJob, RunTask, TakeUp, Timing, Tried, Usage, Waiting,
 };
 use super::queue::{self, Tasks};
 use super::sqlite::SqliteStore;
@@ -98,9 +99,10 @@ impl SqliteStore {
     }
 
     async fn count_jobs(&self) -> Result<JobCounts, StoreError> {
-        let (queued, running, oldest_ms, store_bytes): (i64, i64, Option<i64>, i64) = sqlx::query_as(
+        let (queued, running, callbacks, oldest_ms, store_bytes): (i64, i64, i64, Option<i64>, i64) = sqlx::query_as(
             "SELECT (SELECT count(*) FROM precut_jobs WHERE state = 'queued'),
                  (SELECT count(*) FROM precut_jobs WHERE state = 'running'),
+                 (SELECT count(*) FROM callbacks INDEXED BY callbacks_due WHERE state = 'pending'),
                  (SELECT created_ms FROM precut_jobs WHERE state = 'queued' ORDER BY id LIMIT 1),
                  (SELECT page_count FROM pragma_page_count) * (SELECT page_size FROM pragma_page_size)",
         )
@@ -108,7 +110,7 @@ impl SqliteStore {
         .await?;
         let count = |number: i64| u64::try_from(number).unwrap_or(0);
         let (queued, running, store_bytes) = (count(queued), count(running), count(store_bytes));
-        Ok(JobCounts { queued, running, oldest_ms, store_bytes })
+        Ok(JobCounts { queued, running, callbacks: count(callbacks), oldest_ms, store_bytes })
     }
 }
 
@@ -143,8 +145,8 @@ impl JobStore for SqliteStore {
     }
     fn waiting(&self, id: JobId) -> BoxFuture<'_, Result<Option<Waiting>, StoreError>> {
         Box::pin(async move {
-            let waiting: Option<(u32, String, String, i64)> = sqlx::query_as(
-                "SELECT max(other.attempt), one.calculator, one.owner, one.created_ms
+            let waiting: Option<(u32, String, String, i64, Option<String>)> = sqlx::query_as(
+                "SELECT max(other.attempt), one.calculator, one.owner, one.created_ms, one.traceparent
                  FROM precut_jobs AS one JOIN precut_jobs AS other USING (key)
                  WHERE one.id = ?1 AND one.state = 'queued' AND other.state = 'queued'
                  GROUP BY one.id",
@@ -152,7 +154,13 @@ impl JobStore for SqliteStore {
             .bind(id.to_string())
             .fetch_optional(&self.readers)
             .await?;
-            let told = |(charged, calculator, owner, created_ms)| Waiting { charged, calculator, owner, created_ms };
+            let told = |(charged, calculator, owner, created_ms, traceparent)| Waiting {
+                charged,
+                calculator,
+                owner,
+                created_ms,
+                traceparent,
+            };
             Ok(waiting.map(told))
         })
     }
@@ -252,6 +260,27 @@ impl JobStore for SqliteStore {
             }
             Ok(back)
         })
+    }
+    fn take_up_callbacks(&self, wanted: TakeUp) -> BoxFuture<'_, Result<Vec<DueCallback>, StoreError>> {
+        Box::pin(async move {
+            let due = "SELECT EXISTS (SELECT 1 FROM callbacks INDEXED BY callbacks_due
+                                      WHERE state = 'pending' AND next_ms <= ?1)";
+            // Hardly ever is there one: that is no reason to write.
+            if !sqlx::query_scalar::<_, bool>(due).bind(now_ms()).fetch_one(&self.readers).await? {
+                return Ok(Vec::new());
+            }
+            let take_up = self.ledger.write(move |connection| {
+                let wanted = wanted.clone();
+                Box::pin(async move { callbacks::take_up(connection, &wanted, now_ms()).await })
+            });
+            take_up.await
+        })
+    }
+    fn settle_callback(&self, due: DueCallback, tried: Tried) -> BoxFuture<'_, Result<bool, StoreError>> {
+        Box::pin(self.ledger.write(move |connection| {
+            let (due, tried) = (due.clone(), tried.clone());
+            Box::pin(async move { callbacks::settle(connection, &due, &tried, now_ms()).await })
+        }))
     }
     fn forget_expired(&self) -> BoxFuture<'_, Result<u64, StoreError>> {
         let keep_ms = self.keep_ms;

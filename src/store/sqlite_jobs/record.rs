@@ -4,13 +4,16 @@ use sqlx::FromRow;
 use sqlx::sqlite::SqliteConnection;
 
 use crate::key::Key;
+use crate::store::callbacks::Callback;
 use crate::store::jobs::{JobId, JobKind, JobRecord, JobState, Priority};
 
 /// The columns of a [`JobRecord`].
 macro_rules! columns {
     () => {
         "id, kind, calculator, key, state, stage, progress, attempt, lease, priority, problem, estimate_ms, \
-         created_ms, started_ms, finished_ms, deadline_ms, expires_ms, owner"
+         created_ms, started_ms, finished_ms, deadline_ms, expires_ms, owner, traceparent, \
+         (SELECT json_object('url', url, 'state', callbacks.state, 'attempts', attempts, 'next_ms', next_ms, 'fault', fault, \
+             'settled_ms', settled_ms) FROM callbacks WHERE job = precut_jobs.id) AS callback"
     };
 }
 
@@ -36,6 +39,8 @@ pub(super) struct RecordRow {
     deadline_ms: Option<i64>,
     expires_ms: Option<i64>,
     owner: String,
+    traceparent: Option<String>,
+    callback: Option<String>,
 }
 
 impl RecordRow {
@@ -59,6 +64,8 @@ impl RecordRow {
             deadline_ms: self.deadline_ms,
             expires_ms: self.expires_ms,
             owner: self.owner,
+            traceparent: self.traceparent,
+            callback: self.callback.as_deref().map(Callback::read).transpose()?,
         })
     }
 }

@@ -5,13 +5,15 @@ use sqlx::sqlite::SqliteConnection;
 use super::record::Outcome;
 use crate::store::quota::{HOUR_MS, MINUTE_MS, Usage};
 
-pub(super) async fn usage(connection: &mut SqliteConnection, owner: &str, now: i64) -> Outcome<Usage> {
-    // Equal jobs share a result. By the hour, so that it is told in few numbers.
+pub(in crate::store) async fn usage(connection: &mut SqliteConnection, owner: &str, now: i64) -> Outcome<Usage> {
+    // Equal jobs share a result. By the hour, so that it is told in few numbers. Models go when they are deleted.
     let kept: Vec<(Option<i64>, i64)> = sqlx::query_as(
         "SELECT max(until) - ?2, sum(bytes) FROM (
              SELECT max(expires_ms) AS until, sum(input_bytes) + max(result_bytes) AS bytes FROM precut_jobs
              WHERE owner = ?1 AND (expires_ms IS NULL OR expires_ms > ?2) GROUP BY key)
-         GROUP BY until / ?3",
+         GROUP BY until / ?3
+         UNION ALL
+         SELECT NULL, sum(bytes) FROM models WHERE owner = ?1 AND content IS NOT NULL HAVING count(*) > 0",
     )
     .bind(owner)
     .bind(now)
@@ -44,7 +46,9 @@ pub(super) async fn kept_by_owner(connection: &mut SqliteConnection, now: i64) -
     let kept: Vec<(String, i64)> = sqlx::query_as(
         "SELECT owner, sum(bytes) FROM (
              SELECT owner, sum(input_bytes) + max(result_bytes) AS bytes FROM precut_jobs
-             WHERE owner > 'key:' AND owner < 'key;' AND (expires_ms IS NULL OR expires_ms > ?1) GROUP BY owner, key)
+             WHERE owner > 'key:' AND owner < 'key;' AND (expires_ms IS NULL OR expires_ms > ?1) GROUP BY owner, key
+             UNION ALL
+             SELECT owner, bytes FROM models WHERE owner > 'key:' AND owner < 'key;' AND content IS NOT NULL)
          GROUP BY owner",
     )
     .bind(now)

@@ -1,6 +1,7 @@
 //! The tests that every store has to pass, unchanged. A store comes with a [`Place`] and the line `suite!(Place);`.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+pub(in crate::store) mod callbacks;
 pub(in crate::store) mod jobs;
 pub(in crate::store) mod models;
 pub(in crate::store) mod results;
@@ -87,6 +88,8 @@ pub(in crate::store) fn job(number: u32) -> NewJob {
         useful_for_ms: None,
         quota: Quota::default(),
         result: None,
+        callback: None,
+        traceparent: None,
     }
 }
 
@@ -138,8 +141,14 @@ macro_rules! suite {
             timings_are_kept_newest_first
             the_queue_hands_out_each_task_once_and_no_more_than_there_are_places
         }
+        suite! { $place, callbacks:
+            a_callback_is_due_when_its_job_is_over_however_it_ends
+            a_callback_is_one_process_at_a_time_and_over_once_it_is_settled
+            who_has_died_loses_a_callback_and_nobody_takes_all_places
+        }
         suite! { $place, models:
             revisions_rise_and_are_never_given_twice
+            models_count_for_who_stores_them_until_they_are_deleted
         }
         suite! { $place, results:
             what_is_put_is_got_after_the_store_was_closed

@@ -1,0 +1,203 @@
+//! Callbacks on their way: taken up when they are due, tried, and tried again.
+
+use std::collections::HashMap;
+use std::time::Duration;
+
+use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode};
+use bytes::Bytes;
+use tokio::sync::watch;
+use tokio::task::JoinSet;
+use tracing::Instrument;
+use url::Url;
+
+use super::Callbacks;
+use super::event::JobEvent;
+use super::sign::signatures;
+use crate::engine::{DueCallback, Engine, Error, Job, TakeUp, Tried};
+use crate::http::App;
+use crate::http::gate::TRACEPARENT;
+use crate::outward::{Fault, Outward};
+use crate::trace::{self, Traceparent};
+
+/// Tries at the same time.
+const MOST: usize = 16;
+/// After so many of one host no more of it are taken up.
+const MOST_OF_ONE: u32 = 4;
+/// How often it is looked for what is due.
+const LOOK: Duration = Duration::from_secs(1);
+/// Who has taken a callback up is taken for dead so long after he should have been done.
+const SPARE: Duration = Duration::from_secs(15);
+/// How long tries may take to end when the service does.
+const LAST: Duration = Duration::from_secs(5);
+
+const ID: HeaderName = HeaderName::from_static("webhook-id");
+const TIMESTAMP: HeaderName = HeaderName::from_static("webhook-timestamp");
+const SIGNATURE: HeaderName = HeaderName::from_static("webhook-signature");
+
+/// Delivers what is due until `stop` says so. Who may call nobody leaves it to those that may.
+pub(in crate::http) async fn deliver(app: App, mut stop: watch::Receiver<bool>) {
+    let callbacks = &app.callbacks;
+    if callbacks.are_off() {
+        return;
+    }
+    let outward = match Outward::new(callbacks.reach, callbacks.timeout) {
+        Ok(outward) => outward,
+        Err(error) => return tracing::error!(%error, "nobody can be told that a job is over"),
+    };
+    let (mut tries, mut busy) = (JoinSet::new(), HashMap::<String, u32>::new());
+    loop {
+        for due in due(&app.engine, callbacks, MOST - tries.len(), &busy).await {
+            *busy.entry(due.host.clone()).or_default() += 1;
+            tries.spawn(tell(app.clone(), outward.clone(), due));
+        }
+        tokio::select! {
+            Some(host) = tries.join_next() => ended(&mut busy, host.ok()),
+            () = app.engine.ended(LOOK) => {}
+            _ = stop.wait_for(|stop| *stop) => break,
+        }
+    }
+    // What is cut off is tried again by whoever comes next.
+    let _ = tokio::time::timeout(LAST, async { while tries.join_next().await.is_some() {} }).await;
+}
+
+/// A try of a host has ended; without its name it panicked, and nobody knows whose it was.
+fn ended(busy: &mut HashMap<String, u32>, host: Option<String>) {
+    let Some(host) = host else { return busy.clear() };
+    if let Some(tries) = busy.get_mut(&host) {
+        *tries -= 1;
+        if *tries == 0 {
+            busy.remove(&host);
+        }
+    }
+}
+
+async fn due(engine: &Engine, callbacks: &Callbacks, free: usize, busy: &HashMap<String, u32>) -> Vec<DueCallback> {
+    if free == 0 {
+        return Vec::new();
+    }
+    let hold = callbacks.timeout + SPARE;
+    let wanted = TakeUp {
+        most: u32::try_from(free).unwrap_or(0),
+        most_of_one: MOST_OF_ONE,
+        not_of: busy.iter().filter(|(_, tries)| **tries >= MOST_OF_ONE).map(|(host, _)| host.clone()).collect(),
+        hold_ms: i64::try_from(hold.as_millis()).unwrap_or(i64::MAX),
+    };
+    engine.take_up_callbacks(wanted).await.unwrap_or_else(|error| {
+        metrics::counter!("precut_store_failures_total", "operation" => "callbacks").increment(1);
+        tracing::warn!(%error, "it is not known who is to be told that a job is over");
+        Vec::new()
+    })
+}
+
+/// Tries once, and puts down what came of it; the host that was called.
+async fn tell(app: App, outward: Outward, due: DueCallback) -> String {
+    let host = due.host.clone();
+    let job = app.engine.job(due.job).await;
+    let given: Option<Traceparent> = job.as_ref().ok().and_then(|job| job.record.traceparent.as_deref()?.parse().ok());
+    let span = tracing::info_span!(
+        "callback",
+        job = %due.job,
+        host = due.host,
+        attempt = due.attempt,
+        trace = given.map(|given| tracing::field::display(given.trace()))
+    );
+    if let Some(given) = given {
+        trace::follow(&span, given);
+    }
+    let place = trace::place_of(&span, given);
+    let told = async {
+        let outcome = tried(&app, &outward, (&due, job), place).await;
+        let (tried, label) = match outcome {
+            Ok(()) => (Tried::Delivered, "delivered"),
+            Err(fault) => what_now(&app.callbacks.pauses, due.attempt, fault),
+        };
+        metrics::counter!("precut_callbacks_total", "outcome" => label).increment(1);
+        match &tried {
+            Tried::Delivered => tracing::info!("told that the job is over"),
+            Tried::Again { fault, .. } => tracing::info!(fault, "not told; it is tried again"),
+            Tried::GivenUp { fault } => tracing::warn!(fault, "not told; it is given up"),
+        }
+        if let Err(error) = app.engine.settle_callback(due, tried).await {
+            // It is held for a while, and then tried again.
+            metrics::counter!("precut_store_failures_total", "operation" => "callbacks").increment(1);
+            tracing::warn!(%error, "what came of telling is not on record");
+        }
+    };
+    told.instrument(span).await;
+    host
+}
+
+/// What is done after a try that came to nothing, and what it is called in the metrics.
+fn what_now(pauses: &[Duration], attempt: u32, fault: String) -> (Tried, &'static str) {
+    // The receiver says that it is gone for good.
+    let is_gone = fault == Fault::Status(StatusCode::GONE).code();
+    let pause = pauses.get(attempt.saturating_sub(1) as usize).filter(|_| !is_gone);
+    match pause {
+        Some(pause) => {
+            let after_ms = i64::try_from(pause.as_millis()).unwrap_or(i64::MAX);
+            (Tried::Again { after_ms, fault }, "failed")
+        }
+        None => (Tried::GivenUp { fault }, "given_up"),
+    }
+}
+
+/// One try; why it came to nothing, as a code.
+async fn tried(
+    app: &App,
+    outward: &Outward,
+    (due, job): (&DueCallback, Result<Job, Error>),
+    place: Option<Traceparent>,
+) -> Result<(), String> {
+    let internal = || "internal".to_owned();
+    let url: Url = due.url.parse().map_err(|_| internal())?;
+    // The settings may have changed since it was asked for.
+    if !app.callbacks.may_be_called(&url) {
+        return Err("host_not_allowed".to_owned());
+    }
+    let job = job.map_err(|error| {
+        tracing::warn!(%error, "the job cannot be read");
+        internal()
+    })?;
+    let secrets = app.callbacks.secrets.of(&job.record.owner).await.map_err(|error| {
+        tracing::error!("{error}");
+        "no_secret".to_owned()
+    })?;
+    let event = JobEvent::of(&job).ok_or_else(internal)?;
+    let body = Bytes::from(serde_json::to_vec(&event).map_err(|_| internal())?);
+    let (id, now_s) = (due.job.to_string(), jiff::Timestamp::now().as_second());
+    let mut headers = HeaderMap::new();
+    let texts = [
+        (SIGNATURE, Some(signatures(&secrets, &id, now_s, &body))),
+        (ID, Some(id)),
+        (TIMESTAMP, Some(now_s.to_string())),
+        (TRACEPARENT, place.map(|place| place.to_string())),
+    ];
+    for (name, text) in texts {
+        if let Some(text) = text {
+            headers.insert(name, HeaderValue::try_from(text).map_err(|_| internal())?);
+        }
+    }
+    outward.post(&url, headers, body).await.map_err(Fault::code)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::Config;
+
+    #[test]
+    fn pauses_grow_until_it_is_given_up_after_seven_hours() {
+        let pauses = Callbacks::new(&Config::default().callbacks).pauses;
+        let mut waited = Duration::ZERO;
+        let mut attempt = 1;
+        while let (Tried::Again { after_ms, .. }, _) = what_now(&pauses, attempt, "http_503".to_owned()) {
+            let pause = Duration::from_millis(after_ms.unsigned_abs());
+            assert!(attempt == 1 || pause > pauses[attempt as usize - 2], "they grow");
+            (waited, attempt) = (waited + pause, attempt + 1);
+        }
+        assert_eq!(attempt, 8);
+        assert!((Duration::from_hours(7)..Duration::from_hours(8)).contains(&waited), "{waited:?}");
+        let gone = what_now(&pauses, 1, "http_410".to_owned());
+        assert_eq!(gone, (Tried::GivenUp { fault: "http_410".to_owned() }, "given_up"));
+    }
+}

@@ -1,0 +1,114 @@
+//! Who is told that a job is over, and what came of it.
+//!
+//! A callback is a row beside its job. The end of the job, however it comes about, makes it due in the same transaction.
+//! Who tries it holds it for a time, as a computation is held under a lease: who dies meanwhile loses it, and it is tried
+//! again. So it is delivered at least once.
+
+use serde::Deserialize;
+
+use super::jobs::{JobId, Lease};
+
+/// Whom to tell.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NewCallback {
+    /// Where.
+    pub url: String,
+    /// Host and port of it.
+    pub host: String,
+}
+
+/// What has become of a callback.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+pub struct Callback {
+    /// Where.
+    pub url: String,
+    /// How far it is.
+    pub state: CallbackState,
+    /// Tries begun.
+    pub attempts: u32,
+    /// When it is tried next, ms UTC.
+    pub next_ms: Option<i64>,
+    /// Why the last try came to nothing: a code.
+    pub fault: Option<String>,
+    /// When it was delivered or given up, ms UTC.
+    pub settled_ms: Option<i64>,
+}
+
+impl Callback {
+    /// As a store tells it.
+    pub(super) fn read(text: &str) -> Result<Self, sqlx::Error> {
+        serde_json::from_str(text).map_err(|error| sqlx::Error::Decode(error.into()))
+    }
+}
+
+/// How far a callback is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CallbackState {
+    /// Its job is not over.
+    Waiting,
+    /// It is to be told.
+    Pending,
+    /// Somebody has taken it.
+    Delivered,
+    /// Nobody has, however often it was tried.
+    GivenUp,
+}
+
+/// How callbacks are taken up.
+#[derive(Debug, Clone)]
+pub struct TakeUp {
+    /// At most so many.
+    pub most: u32,
+    /// At most so many of one host.
+    pub most_of_one: u32,
+    /// None of these hosts.
+    pub not_of: Vec<String>,
+    /// Who takes them up is taken for dead after so long, ms.
+    pub hold_ms: i64,
+}
+
+/// A callback that is to be tried now.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DueCallback {
+    /// Of which job.
+    pub job: JobId,
+    /// Where.
+    pub url: String,
+    /// Host and port of it.
+    pub host: String,
+    /// The right to try it.
+    pub lease: Lease,
+    /// Which try this is, from 1.
+    pub attempt: u32,
+}
+
+/// What came of a try.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Tried {
+    /// It was taken.
+    Delivered,
+    /// It is to be tried again.
+    Again {
+        /// After so long, ms.
+        after_ms: i64,
+        /// Why it came to nothing: a code.
+        fault: String,
+    },
+    /// It was the last try.
+    GivenUp {
+        /// Why it came to nothing: a code.
+        fault: String,
+    },
+}
+
+impl Tried {
+    /// State, time until the next try and fault, as they are written.
+    pub(super) fn written(&self) -> (&'static str, Option<i64>, Option<&str>) {
+        match self {
+            Self::Delivered => ("delivered", None, None),
+            Self::Again { after_ms, fault } => ("pending", Some(*after_ms), Some(fault)),
+            Self::GivenUp { fault } => ("given_up", None, Some(fault)),
+        }
+    }
+}
