@@ -76,7 +76,8 @@ pub(crate) fn score<M: Diagnosable>(trials: Trials) -> Score {
 
 /// Compares with the score that is kept under a name, or keeps this one.
 fn keep(name: &str, text: &str) {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/trials").join(name).with_extension("txt");
+    let path =
+        Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("tests/trials").join(name).with_extension("txt");
     if std::env::var_os("PRECUT_WRITE_TRIALS").is_some() {
         std::fs::write(&path, text).unwrap();
     }

@@ -13,7 +13,8 @@ use precut_calc::diagnosis::{
 use serde_json::{Value, json};
 
 fn example(name: &str) -> Value {
-    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference/diagnosis").join(name);
+    let path =
+        std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("tests/reference/diagnosis").join(name);
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 

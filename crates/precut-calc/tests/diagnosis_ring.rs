@@ -54,7 +54,7 @@ fn prepared(job: &Job, runs: Vec<RingRun>, quantity: &str) -> <RingRoundness as 
 
 /// The short job of the reference in the terms of the contract.
 fn reference() -> (Value, Value) {
-    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+    let path = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
         .join("tests/reference/diagnosis/example-roundness-roller_runout.json");
     let case: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
     let short = &case["job"];

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 /// The page has this line.
 fn documented(line: &str) {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/physics/feed-schedule.md");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/..", "/../../docs/physics/feed-schedule.md");
     let page = std::fs::read_to_string(path).unwrap();
     assert!(page.lines().any(|known| known == line), "docs/physics/feed-schedule.md lacks the line\n{line}");
 }

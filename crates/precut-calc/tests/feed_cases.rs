@@ -7,7 +7,7 @@ use precut_calc::feed_schedule::{ChangePlace, FeedSchedule, Outcome, Price, Pric
 use serde_json::{Value, json};
 
 fn case(name: &str) -> Value {
-    let path = format!("{}/tests/cases/feed-schedule/{name}.json", env!("CARGO_MANIFEST_DIR"));
+    let path = format!("{}/tests/cases/feed-schedule/{name}.json", concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
     serde_json::from_str(&std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{path}: {e}"))).unwrap()
 }
 

@@ -44,7 +44,7 @@ fn talk(name: &str, result: &Found) {
 
 /// A short job of the reference in the terms of the contract.
 fn open_case(name: &str) -> (Value, Value) {
-    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+    let path = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
         .join(format!("tests/reference/diagnosis/example-machinability-{name}.json"));
     let case: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
     let short = &case["job"]["model"];
@@ -196,7 +196,9 @@ fn the_extended_model_is_what_a_job_takes() {
 
 /// A measured table by the names in its header; `None` where the reference is not there, which CI does not accept.
 fn measured(name: &str) -> Option<Vec<std::collections::BTreeMap<String, String>>> {
-    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/reference/diagnosis").join(name);
+    let path = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
+        .join("../../../shared/reference/diagnosis")
+        .join(name);
     let Ok(text) = std::fs::read_to_string(&path) else {
         assert!(std::env::var("CI").is_err(), "{name} must be there");
         println!("{name} is absent: nothing tried");

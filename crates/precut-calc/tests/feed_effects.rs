@@ -272,7 +272,8 @@ fn an_effect_may_make_it_impossible() {
 }
 
 fn example(name: &str) -> Value {
-    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference/diagnosis").join(name);
+    let path =
+        std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("tests/reference/diagnosis").join(name);
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 

@@ -25,7 +25,7 @@ fn answered(request: &Value) -> DiagnosisResult<FixtureEffect, FixtureRun> {
 
 /// The short job of the reference in the terms of the contract: only the sum of the joints matters to it.
 fn reference() -> (Value, Value) {
-    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+    let path = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
         .join("tests/reference/diagnosis/example-fixture-stiffness.json");
     let case: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
     let short = &case["job"];

@@ -335,8 +335,8 @@ fn a_displacement_is_that_of_the_run_in_time() {
 /// The published synthetic example: its hidden effect, a stiffness of 0.9575, fits better than none, to its own scatter.
 #[test]
 fn the_synthetic_example_hides_a_softer_joint() {
-    let path =
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference/fixture-stability/example-fixture-stiffness.json");
+    let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
+        .join("tests/reference/fixture-stability/example-fixture-stiffness.json");
     let example: Value = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
     let of = |name: &str| example["job"][name].as_f64().unwrap();
     // The short job states the sums; the amplitude of a screw vise depends on nothing else.

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use crate::support::prepared;
 
 fn reference() -> Value {
-    let path = format!("{}/tests/reference/library/kienzle-beyond-90.json", env!("CARGO_MANIFEST_DIR"));
+    let path = format!("{}/tests/reference/library/kienzle-beyond-90.json", concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 

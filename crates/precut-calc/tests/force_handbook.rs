@@ -7,7 +7,10 @@ use precut_calc::material::Certainty;
 use serde_json::{Value, json};
 
 fn coefficients() -> Value {
-    let path = format!("{}/tests/reference/deflection-compensation/coefficients.json", env!("CARGO_MANIFEST_DIR"));
+    let path = format!(
+        "{}/tests/reference/deflection-compensation/coefficients.json",
+        concat!(env!("CARGO_MANIFEST_DIR"), "/..")
+    );
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 

@@ -6,7 +6,7 @@ use precut_calc::force::{ForceModel, Forces};
 use serde_json::{Value, json};
 
 fn read(name: &str) -> Value {
-    let path = format!("{}/tests/reference/deflection-compensation/{name}", env!("CARGO_MANIFEST_DIR"));
+    let path = format!("{}/tests/reference/deflection-compensation/{name}", concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 

@@ -5,7 +5,7 @@ use precut_calc::machinability::{Conditions, LibraryModel, find_set, sets};
 use serde_json::Value;
 
 fn table() -> Value {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/reference/feed-scheduling/seed-tables.json");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/..", "/tests/reference/feed-scheduling/seed-tables.json");
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 

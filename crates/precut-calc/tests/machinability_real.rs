@@ -10,7 +10,8 @@ use serde_json::{Map, Value, json};
 /// Rows of a table with its columns renamed; `None`, after saying so, where it is absent and may be. A new name that
 /// begins with `further.` or `factors.` goes there.
 fn rows(file: &str, names: &[(&str, &str)], keep: impl Fn(&dyn Fn(&str) -> String) -> bool) -> Option<Vec<Value>> {
-    let path = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/reference/diagnosis")).join(file);
+    let path =
+        PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/..", "/../../../shared/reference/diagnosis")).join(file);
     let Ok(text) = std::fs::read_to_string(&path) else {
         assert!(std::env::var_os("CI").is_none(), "{} is absent", path.display());
         println!("skipped: {} is absent", path.display());

@@ -9,7 +9,10 @@ use utoipa::openapi::{RefOr, Schema};
 use utoipa::{PartialSchema, ToSchema};
 
 fn coefficients() -> Value {
-    let path = format!("{}/tests/reference/deflection-compensation/coefficients.json", env!("CARGO_MANIFEST_DIR"));
+    let path = format!(
+        "{}/tests/reference/deflection-compensation/coefficients.json",
+        concat!(env!("CARGO_MANIFEST_DIR"), "/..")
+    );
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 

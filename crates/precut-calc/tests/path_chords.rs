@@ -9,7 +9,8 @@ use proptest::prelude::*;
 use serde_json::Value;
 
 fn reference() -> Value {
-    let path = format!("{}/tests/reference/deflection-compensation/path.json", env!("CARGO_MANIFEST_DIR"));
+    let path =
+        format!("{}/tests/reference/deflection-compensation/path.json", concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 

@@ -8,7 +8,8 @@ use precut_calc::ring_roundness::{CauseKind, Outcome, SearchSetting, SearchStatu
 use serde_json::{Value, json};
 
 fn case(name: &str) -> Value {
-    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases/ring-roundness").join(name);
+    let path =
+        std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("tests/cases/ring-roundness").join(name);
     serde_json::from_str(&std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))).unwrap()
 }
 

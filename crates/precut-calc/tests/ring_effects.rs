@@ -7,7 +7,7 @@ use precut_calc::ring_roundness::{Job, RingAllowances, RingPoint, RingRoundness,
 use serde_json::{Value, json};
 
 fn trace() -> Value {
-    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+    let path = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
         .join("tests/reference/diagnosis/example-roundness-roller_runout.json");
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }

@@ -127,8 +127,8 @@ fn the_form_of_the_input_does_not_matter() {
 /// A case of the reference files through the whole calculator: a profile without eccentricity, and its filter.
 #[test]
 fn a_reference_case_as_a_job() {
-    let path =
-        std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference/ring-roundness/ron_07_spiral_step.json");
+    let path = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
+        .join("tests/reference/ring-roundness/ron_07_spiral_step.json");
     let case: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
     let rows: Vec<Value> = (0..1000)
         .map(|i| 0.36 * f64::from(i))

@@ -27,7 +27,9 @@ fn told(answer: &Answer<Outcome>) -> Vec<&'static str> {
 }
 
 fn case(name: &str) -> Value {
-    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases/roundness-evaluation").join(name);
+    let path = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
+        .join("tests/cases/roundness-evaluation")
+        .join(name);
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
@@ -165,7 +167,8 @@ fn rows_in_any_order_and_of_any_turns_give_the_same_answer() {
 /// The reference circles of the metrology institute, all of them, where they lie beside the project.
 #[test]
 fn the_reference_circles_are_all_asked() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/reference/nist/circle2d_reference_pairs.json");
+    let path =
+        concat!(env!("CARGO_MANIFEST_DIR"), "/..", "/../../../shared/reference/nist/circle2d_reference_pairs.json");
     let Ok(text) = std::fs::read_to_string(path) else { return };
     let file: Value = serde_json::from_str(&text).unwrap();
     let sets = file["sets"].as_array().unwrap();

@@ -10,7 +10,8 @@ use precut_calc::fixture_stability::{FixtureJob, FixtureOutcome, FixtureStabilit
 use serde_json::{Value, json};
 
 pub fn reference(file: &str) -> Value {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference/fixture-stability").join(file);
+    let path =
+        Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("tests/reference/fixture-stability").join(file);
     serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
 }
 

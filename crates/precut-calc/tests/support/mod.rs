@@ -14,10 +14,9 @@ use serde_json::{Map, Value, json};
 /// A reference file of the deflection calculator.
 pub fn reference(name: &str) -> Value {
     // Used by the tests of the whole workspace, too, which are compiled one folder up.
-    let here = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
-    let up = here.join("crates/precut-calc");
-    let path =
-        if up.is_dir() { up } else { here.to_owned() }.join("tests/reference/deflection-compensation").join(name);
+    let package = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let root = package.ancestors().find(|folder| folder.join("Cargo.lock").is_file()).unwrap_or(package);
+    let path = root.join("crates/precut-calc").join("tests/reference/deflection-compensation").join(name);
     let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     serde_json::from_str(&text).unwrap()
 }
