@@ -343,7 +343,7 @@ pub struct Price {
         ("x-knobs" = json!({ "pointer": "pointer", "looser": "looser", "gain": "gain_percent", "of": "/objective" }))
     ))]
     pub gain_percent: Option<f64>,
-    /// What one percent tighter adds to it, where that is something else. Absent with `solved_anew`: tighter leaves no schedule with as many edges.
+    /// What one percent tighter adds to it, where that is something else. Absent with `solved_anew`: tighter leaves no schedule with as many edges, one part per edge more or less.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(example = 1.2, extensions(("x-unit" = json!("percent"))))]
     pub loss_percent: Option<f64>,
