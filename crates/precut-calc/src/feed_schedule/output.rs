@@ -371,7 +371,7 @@ pub enum Looser {
 pub enum PriceBasis {
     /// The multipliers of the optimum, which settle it: the same both ways.
     Multipliers,
-    /// A schedule solved anew with the number changed by a hundredth of a percent either way: looser and tighter differ.
+    /// A schedule solved anew with the number changed by a thousandth of a percent either way, or a hundredth where that is not solved closely enough: looser and tighter differ.
     SolvedAnew,
     /// The multipliers of the optimum, which are one of several sets: not solved anew.
     OneOfSeveral,
