@@ -21,7 +21,7 @@ CREATE INDEX callbacks_due ON callbacks (next_ms) WHERE state = 'pending';
 -- A job ends in many ways, and each of them has to be told.
 CREATE TRIGGER callbacks_of_what_is_over AFTER UPDATE OF state ON precut_jobs
 WHEN NEW.state IN ('succeeded', 'failed', 'cancelled') BEGIN
-    UPDATE callbacks SET state = 'pending', next_ms = NEW.finished_ms WHERE job = NEW.id AND state = 'waiting';
+    UPDATE callbacks SET state = 'pending', next_ms = coalesce(NEW.finished_ms, 0) WHERE job = NEW.id AND state = 'waiting';
 END;
 
 -- Where the request belongs in a trace (W3C Trace Context).

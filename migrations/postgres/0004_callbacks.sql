@@ -15,7 +15,7 @@ CREATE INDEX callbacks_due ON precut.callbacks (next_ms) WHERE state = 'pending'
 -- With the rights of the owner: what ends jobs may be a program that was granted nothing here yet.
 CREATE FUNCTION precut.call_back() RETURNS trigger LANGUAGE plpgsql SECURITY DEFINER SET search_path = precut, pg_temp AS $$
 BEGIN
-    UPDATE precut.callbacks SET state = 'pending', next_ms = NEW.finished_ms WHERE job = NEW.id AND state = 'waiting';
+    UPDATE precut.callbacks SET state = 'pending', next_ms = coalesce(NEW.finished_ms, 0) WHERE job = NEW.id AND state = 'waiting';
     RETURN NULL;
 END $$;
 CREATE TRIGGER callbacks_of_what_is_over AFTER UPDATE OF state ON precut.jobs FOR EACH ROW

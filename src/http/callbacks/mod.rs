@@ -117,7 +117,7 @@ pub(super) struct CallbackDocument {
     #[schema(format = DateTime)]
     next_at: Option<String>,
     /// Why the last try came to nothing: `http_` with the status of the answer, `no_address`, `private_address`,
-    /// `no_connection`, `no_tls`, `no_answer`, `no_secret`, `host_not_allowed`; null where none did, or it was taken.
+    /// `no_connection`, `no_tls`, `no_answer`, `no_secret`, `host_not_allowed`, `internal`; null where none did, or it was taken.
     #[schema(example = "http_503")]
     fault: Option<String>,
     /// When it was delivered or given up.

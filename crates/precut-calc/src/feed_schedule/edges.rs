@@ -58,6 +58,30 @@ pub(super) fn shared(parts_per_edge: u32, batch_parts: Option<u32>) -> f64 {
     }
 }
 
+/// Most whole parts per edge tried.
+pub(super) const MOST_PARTS: u32 = 10_000;
+
+/// The next number of parts per edge that is worth a try: of all with which a batch takes as many edges only the least.
+pub(super) fn more_parts(parts: u32, batch_parts: Option<u32>) -> Option<u32> {
+    let more = match batch_parts {
+        Some(batch) => {
+            let edges = batch.div_ceil(parts);
+            batch.div_ceil(edges.checked_sub(1).filter(|fewer| *fewer > 0)?)
+        }
+        None => parts + 1,
+    };
+    (more <= MOST_PARTS).then_some(more)
+}
+
+/// The number of parts per edge before.
+pub(super) fn fewer_parts(parts: u32, batch_parts: Option<u32>) -> Option<u32> {
+    let fewer = match batch_parts {
+        Some(batch) => batch.div_ceil(batch.div_ceil(parts) + 1),
+        None => parts.checked_sub(1)?,
+    };
+    (1..parts).contains(&fewer).then_some(fewer)
+}
+
 /// The edges of a schedule.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Plan {
@@ -243,5 +267,5 @@ pub(super) fn limits_of(case: &Case, outcome: &Outcome) -> EdgeLimits {
     let most = capacity(case) * (1.0 / f64::from(after.map_or(1, |change| change.every_parts)));
     let zone = |id: &String| case.zones.iter().position(|zone| zone.id == *id);
     let group = |edge: &EdgeUse| (edge.zones.iter().filter_map(zone).collect(), most);
-    EdgeLimits { per_part, groups: outcome.edges.iter().map(group).collect() }
+    EdgeLimits::new(per_part, outcome.edges.iter().map(group).collect())
 }

@@ -343,7 +343,7 @@ pub struct Price {
         ("x-knobs" = json!({ "pointer": "pointer", "looser": "looser", "gain": "gain_percent", "of": "/objective" }))
     ))]
     pub gain_percent: Option<f64>,
-    /// What one percent tighter adds to it, where that is something else. Absent with `solved_anew`: tighter leaves no schedule with as many edges.
+    /// What one percent tighter adds to it, where that is something else. Absent with `solved_anew`: tighter leaves no schedule with as many edges, one part per edge more or less.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(example = 1.2, extensions(("x-unit" = json!("percent"))))]
     pub loss_percent: Option<f64>,
@@ -371,7 +371,7 @@ pub enum Looser {
 pub enum PriceBasis {
     /// The multipliers of the optimum, which settle it: the same both ways.
     Multipliers,
-    /// A schedule solved anew with the number changed by a hundredth of a percent either way: looser and tighter differ.
+    /// A schedule solved anew with the number changed by a thousandth of a percent either way, or a hundredth where that is not solved closely enough: looser and tighter differ.
     SolvedAnew,
     /// The multipliers of the optimum, which are one of several sets: not solved anew.
     OneOfSeveral,

@@ -8,7 +8,7 @@ use super::dual::{Active, NEAR};
 use super::edges::capacity;
 use super::input::{Goal, Job};
 use super::output::{Looser, NextWhole, Price, PriceBasis};
-use super::program::{Kind, Label, Place, Variation};
+use super::program::{EdgeLimits, Kind, Label, Place, Variation};
 use super::solve::{Solved, Unsolved, solve_as};
 
 /// A multiplier up to this is none.
@@ -236,7 +236,7 @@ fn knobs(label: &Label, case: &Case, job: &Job, upper_spread: bool) -> Vec<Knob>
     }
 }
 
-/// Turns the number both ways and solves anew, edges and parts per edge as they are.
+/// Turns the number both ways and solves anew, edges as they are.
 fn try_it(
     price: &mut Price,
     case: &Case,
@@ -245,15 +245,13 @@ fn try_it(
     monitor: &dyn Monitor,
 ) -> Result<(), Failure> {
     let sign = if price.looser == Looser::Less { -1.0 } else { 1.0 };
-    let looser = objective(price, sign * STEP, case, solved, again, monitor)?;
-    let tighter = objective(price, -sign * STEP, case, solved, again, monitor)?;
-    let points = matches!(case.goal, Goal::Hardening {});
-    let percent = |from: f64, to: f64| {
-        if points { (from - to) / (100.0 * STEP) } else { (from / to).ln() / STEP }
+    let Slope::Of(gain) = slope(price, sign, case, solved, again, monitor)? else { return Ok(()) };
+    let loss = match slope(price, -sign, case, solved, again, monitor)? {
+        Slope::Of(loss) => Some(loss),
+        Slope::Impossible => None,
+        Slope::Unknown => return Ok(()),
     };
-    let Some(looser) = looser else { return Ok(()) };
-    let gain = percent(solved.objective, looser).max(0.0);
-    let loss = tighter.map(|tighter| percent(tighter, solved.objective));
+    let gain = gain.max(0.0);
     let agrees = |a: f64, b: f64| (a - b).abs() <= AGREES.0 * a.abs().max(b.abs()) + AGREES.1;
     let multiplier = price.gain_percent.unwrap_or(gain);
     if agrees(gain, multiplier) && loss.is_some_and(|loss| agrees(loss, multiplier)) {
@@ -266,28 +264,74 @@ fn try_it(
     Ok(())
 }
 
-/// The objective with the number changed by so much in its logarithm; `None` where there is no schedule.
-fn objective(
+/// What turning a number does to the objective, percent per percent.
+enum Slope {
+    Of(f64),
+    /// No schedule is left.
+    Impossible,
+    /// The schedule is not solved closely enough to tell.
+    Unknown,
+}
+
+/// Turns the number up or down. In thin room a schedule is solved less closely, and a longer step tells what a short one
+/// does not.
+fn slope(
+    price: &Price,
+    sign: f64,
+    case: &Case,
+    solved: &Solved,
+    again: &Again<'_>,
+    monitor: &dyn Monitor,
+) -> Result<Slope, Failure> {
+    let points = matches!(case.goal, Goal::Hardening {});
+    let is_looser = (sign < 0.0) == (price.looser == Looser::Less);
+    for step in [STEP, 10.0 * STEP] {
+        let Some((objective, gap)) = turned(price, sign * step, case, solved, again, monitor)? else {
+            // Where a shorter step left a schedule, room ends between them.
+            return Ok(if step > STEP { Slope::Unknown } else { Slope::Impossible });
+        };
+        let (from, to) = if is_looser { (solved.objective, objective) } else { (objective, solved.objective) };
+        let slope = if points { (from - to) / (100.0 * step) } else { (from / to).ln() / step };
+        let error = (gap + solved.certificate.gap) * solved.gain / step;
+        if error <= LEAST.max(AGREES.0 * slope.abs()) {
+            return Ok(Slope::Of(slope));
+        }
+    }
+    Ok(Slope::Unknown)
+}
+
+/// The objective, and the gap of its program, with the number changed by so much in its logarithm; `None` where there is
+/// no schedule. Edges are as they are, but an edge may cut one part more or less.
+fn turned(
     price: &Price,
     by: f64,
     as_it_is: &Case,
     solved: &Solved,
     again: &Again<'_>,
     monitor: &dyn Monitor,
-) -> Result<Option<f64>, Failure> {
+) -> Result<Option<(f64, f64)>, Failure> {
     let mut job = again.job.clone();
     let Some(number) = number(&mut job, &price.pointer) else { return Ok(None) };
     *number *= by.exp();
     let case = Case::of(&job, again.held, again.split.as_ref())?;
     // The edges are as they are, but for how far each may be used.
     let further = capacity(&case) / capacity(as_it_is);
-    let edges = solved.whole.as_ref().map(|(limits, _)| limits.used_further(further));
-    let variation = Variation { parts_per_edge: solved.parts_per_edge, edges: edges.as_ref(), about: None };
-    match solve_as(&case, &variation, false, monitor) {
-        Ok(turned) => Ok(Some(turned.objective)),
-        Err(Unsolved::Failed(Failure::Cancelled)) => Err(Failure::Cancelled),
-        Err(_) => Ok(None),
+    let plans: Vec<Option<EdgeLimits>> = match &solved.whole {
+        Some((limits, _)) => limits.with_neighbours().iter().map(|limits| Some(limits.used_further(further))).collect(),
+        None => vec![None],
+    };
+    let mut best: Option<(f64, f64)> = None;
+    for edges in &plans {
+        let variation = Variation { parts_per_edge: solved.parts_per_edge, edges: edges.as_ref(), about: None };
+        match solve_as(&case, &variation, false, monitor) {
+            Ok(turned) if best.is_none_or(|(least, _)| turned.objective < least) => {
+                best = Some((turned.objective, turned.certificate.gap));
+            }
+            Err(Unsolved::Failed(Failure::Cancelled)) => return Err(Failure::Cancelled),
+            _ => {}
+        }
     }
+    Ok(best)
 }
 
 /// The number of a job at a place.

@@ -8,6 +8,7 @@ use crate::num::gp::{Affines, Objective, Program};
 
 use super::acting::Form;
 use super::case::{Case, ZoneCase};
+use super::edges::{fewer_parts, more_parts, shared};
 use super::input::{FeedMode, Goal, SpeedMode};
 use super::models::Output;
 
@@ -183,13 +184,48 @@ pub(super) struct EdgeLimits {
     pub per_part: f64,
     /// Zones, and the share of edges that they may use together.
     pub groups: Vec<(Vec<usize>, f64)>,
+    /// Where one edge serves whole parts: how many.
+    parts: Option<Parts>,
+}
+
+/// Whole parts that one edge serves.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Parts {
+    per_edge: u32,
+    batch: Option<u32>,
 }
 
 impl EdgeLimits {
+    /// Edges of which each may be used for so much of these zones.
+    pub(super) fn new(per_part: f64, groups: Vec<(Vec<usize>, f64)>) -> Self {
+        Self { per_part, groups, parts: None }
+    }
+
+    /// One edge for so many whole parts.
+    pub(super) fn several_parts(parts: u32, batch: Option<u32>, zones: Vec<usize>, capacity: f64) -> Self {
+        Self {
+            per_part: shared(parts, batch),
+            groups: vec![(zones, capacity * (1.0 / f64::from(parts)))],
+            parts: Some(Parts { per_edge: parts, batch }),
+        }
+    }
+
     /// The same edges with every limit times a factor.
     pub(super) fn used_further(&self, factor: f64) -> Self {
         let groups = self.groups.iter().map(|(zones, most)| (zones.clone(), most * factor)).collect();
-        Self { per_part: self.per_part, groups }
+        Self { groups, ..self.clone() }
+    }
+
+    /// The same edges, and where one serves whole parts, those that serve the next fewer and more.
+    pub(super) fn with_neighbours(&self) -> Vec<Self> {
+        let mut all = vec![self.clone()];
+        if let (Some(Parts { per_edge, batch }), [(zones, most)]) = (self.parts, self.groups.as_slice()) {
+            let capacity = most * f64::from(per_edge);
+            let neighbours = [fewer_parts(per_edge, batch), more_parts(per_edge, batch)];
+            let of = |parts| Self::several_parts(parts, batch, zones.clone(), capacity);
+            all.extend(neighbours.into_iter().flatten().map(of));
+        }
+        all
     }
 }
 

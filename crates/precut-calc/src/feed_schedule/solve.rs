@@ -5,6 +5,7 @@ use crate::num::gp::{self, Failed, Layout, Objective, Program, Settings, Solutio
 
 use super::acting::Bend;
 use super::case::Case;
+use super::edges::MOST_PARTS;
 use super::infeasible::{self, Infeasibility};
 use super::input::Goal;
 use super::models::Output;
@@ -61,8 +62,6 @@ const HELD: f64 = 2e-8;
 const LINEARISATIONS: u32 = 60;
 /// Steps of ln V, ln S below this end the linearisations.
 const SETTLED: f64 = 1e-9;
-/// Most parts per edge tried.
-const MOST_PARTS: u32 = 10_000;
 
 /// Solves a case; `why` decides whether an infeasible one is analysed.
 pub(super) fn solve(case: &Case, why: bool, monitor: &dyn Monitor) -> Result<Solved, Unsolved> {

@@ -7,7 +7,7 @@
 use crate::calculator::{Failure, Monitor};
 
 use super::case::Case;
-use super::edges::{KEPT, capacity, counted, shared, units};
+use super::edges::{KEPT, capacity, counted, more_parts, units};
 use super::input::UsageScope;
 use super::models::Output;
 use super::program::{EdgeLimits, Rates, Variation};
@@ -18,8 +18,6 @@ const EFFORT: usize = 20_000;
 const PROGRAMS: (usize, usize) = (40, 2000);
 /// Bounds nearer than this, relative, are equal.
 const SAME: f64 = 1e-9;
-/// Most whole parts per edge tried.
-const MOST_PARTS: u32 = 10_000;
 
 /// Ranges of the borders between edges: border j stands before a unit in its range.
 struct Node {
@@ -58,9 +56,8 @@ pub(super) fn edges(case: &Case, why: bool, monitor: &dyn Monitor) -> Result<Sol
     };
     // Every unit on an edge of its own: nothing is looser, and with a fresh edge for every surface nothing else is meant.
     let each: Vec<usize> = (0..=search.units.len()).collect();
-    let fresh_always = case.limits.tool_usage_scope == UsageScope::Surface;
     let solved = search.at_borders(&each, why)?;
-    if fresh_always || search.per_edge <= 0.0 {
+    if search.is_fresh_always() || search.per_edge <= 0.0 {
         let bound = solved.objective;
         return Ok(with_bound(solved, bound));
     }
@@ -91,7 +88,20 @@ impl Search<'_> {
     /// One edge between each border and the next; the first border is 0, the last the number of units.
     fn at_borders(&mut self, borders: &[usize], why: bool) -> Result<Solved, Unsolved> {
         let groups = borders.windows(2).map(|pair| (self.zones(pair[0], pair[1]), self.capacity)).collect();
-        self.solve(EdgeLimits { per_part: (borders.len() - 1) as f64, groups }, why)
+        let edges = borders.len() - 1;
+        let limits =
+            if edges == 1 && !self.is_fresh_always() { self.parts(1) } else { EdgeLimits::new(edges as f64, groups) };
+        self.solve(limits, why)
+    }
+
+    /// One edge for so many whole parts.
+    fn parts(&self, parts: u32) -> EdgeLimits {
+        EdgeLimits::several_parts(parts, self.case.limits.batch_parts, self.zones(0, self.units.len()), self.capacity)
+    }
+
+    /// Whether every surface takes a fresh edge, whatever is left of the last.
+    fn is_fresh_always(&self) -> bool {
+        self.case.limits.tool_usage_scope == UsageScope::Surface
     }
 
     /// The zones of some units.
@@ -225,9 +235,8 @@ impl Search<'_> {
         let (mut parts, mut before) = (1, f64::INFINITY);
         while let Some(more) = more_parts(parts, batch_parts) {
             parts = more;
-            let (share, per_part) = (1.0 / f64::from(parts), shared(parts, batch_parts));
-            let limits =
-                EdgeLimits { per_part, groups: vec![(self.zones(0, self.units.len()), self.capacity * share)] };
+            let limits = self.parts(parts);
+            let (share, per_part) = (1.0 / f64::from(parts), limits.per_part);
             match self.solve(limits, false) {
                 Ok(solved) => {
                     let by_share = solved.objective - self.per_edge * (per_part - share);
@@ -272,7 +281,7 @@ impl Search<'_> {
             .copied()
             .collect();
         let groups = kept.into_iter().map(|(from, to, most)| (self.zones(from, to), most)).collect();
-        match self.solve(EdgeLimits { per_part: edges as f64, groups }, false) {
+        match self.solve(EdgeLimits::new(edges as f64, groups), false) {
             Ok(solved) => Ok(Some(Node { ranges, solved })),
             Err(Unsolved::Infeasible(_)) => Ok(None),
             Err(failed) => Err(failed),
@@ -333,18 +342,6 @@ impl Search<'_> {
         }
         found.map(|(j, at, _)| (j, at))
     }
-}
-
-/// The next number of parts per edge that is worth a try: of all with which a batch takes as many edges only the least.
-fn more_parts(parts: u32, batch_parts: Option<u32>) -> Option<u32> {
-    let more = match batch_parts {
-        Some(batch) => {
-            let edges = batch.div_ceil(parts);
-            batch.div_ceil(edges.checked_sub(1).filter(|fewer| *fewer > 0)?)
-        }
-        None => parts + 1,
-    };
-    (more <= MOST_PARTS).then_some(more)
 }
 
 fn least(open: &[Node]) -> Option<usize> {
