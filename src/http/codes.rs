@@ -16,7 +16,6 @@ pub const CODES: &[(&str, u16)] = &[
     ("trailing_bytes", 400),
     ("unexpected_end", 400),
     // The request is at fault.
-    ("bad_callback", 400),
     ("bad_idempotency_key", 400),
     ("bad_key", 400),
     ("bad_multipart", 400),
@@ -47,6 +46,7 @@ pub const CODES: &[(&str, u16)] = &[
     ("uri_too_long", 414),
     ("unsupported_media_type", 415),
     // The job is at fault, or has no answer.
+    ("bad_callback", 422),
     ("deadline_exceeded", 422),
     ("idempotency_key_reused", 422),
     ("infeasible", 422),

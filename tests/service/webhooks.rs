@@ -253,13 +253,13 @@ async fn nobody_is_called_whom_the_settings_do_not_name() {
     let (receiver, secret) = (Receiver::start(), secret_file(SECRET));
     let refused = async |server: &Server, url: &str, words: &str| {
         let sent = server.post_to(&told_to(url), toy::JOB).send().await.unwrap();
-        let refused = problem(sent, 400, "bad_callback").await;
+        let refused = problem(sent, 422, "bad_callback").await;
         assert!(refused["detail"].as_str().unwrap().contains(words), "{refused:#}");
     };
     let off = Server::start().await;
     refused(&off, &receiver.url("/"), "callbacks.hosts").await;
     let russian = off.post_to(&told_to("https://mes/"), toy::JOB).header("accept-language", "ru").send().await.unwrap();
-    assert!(problem(russian, 400, "bad_callback").await["detail"].as_str().unwrap().contains("настройке"));
+    assert!(problem(russian, 422, "bad_callback").await["detail"].as_str().unwrap().contains("настройке"));
     off.stop().await;
     let server = server(&receiver, &secret).await;
     for (url, words) in [

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Keeps a service of its own under mixed load and watches its memory.
 
-    tests/tools/soak.py PRECUT [--minutes 120] [--warm-up 20] [--per-s 14] [--every 30] [--seed 1] [--nice 10]
+    tests/tools/soak.py PRECUT [--minutes 120] [--warm-up 30] [--per-s 14] [--every 30] [--seed 1] [--nice 10]
 
 Direct answers that are new and that are known, in every form, faults, jobs that are watched to their end, studies,
 lists and figures, by a few connections at a steady rate. Prints a line of resident memory, open files and answers each
@@ -204,7 +204,7 @@ def main() -> int:
     about = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     about.add_argument("precut")
     about.add_argument("--minutes", type=float, default=120)
-    about.add_argument("--warm-up", type=float, default=20)
+    about.add_argument("--warm-up", type=float, default=30)
     about.add_argument("--per-s", type=float, default=14)
     about.add_argument("--every", type=float, default=30)
     about.add_argument("--seed", type=int, default=1)

@@ -57,7 +57,7 @@ impl Callbacks {
     /// The address that a client gave, if it may be called.
     pub(super) fn checked(&self, text: String) -> Result<NewCallback, Problem> {
         let refused = |fault: &'static str| {
-            Problem::new(StatusCode::BAD_REQUEST, "bad_callback").with("fault", fault).with("name", "callback")
+            Problem::new(StatusCode::UNPROCESSABLE_ENTITY, "bad_callback").with("fault", fault).with("name", "callback")
         };
         if self.are_off() {
             return Err(refused("off").with("setting", SETTING));

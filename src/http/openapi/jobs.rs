@@ -7,7 +7,7 @@ use utoipa::openapi::path::{HttpMethod, OperationBuilder, Parameter, ParameterIn
 use utoipa::openapi::request_body::RequestBodyBuilder;
 use utoipa::openapi::response::ResponseBuilder;
 use utoipa::openapi::schema::{ObjectBuilder, SchemaType, Type};
-use utoipa::openapi::{Content, Object, RefOr, Required, Schema};
+use utoipa::openapi::{Content, Object, RefOr, Required, Schema, SchemaFormat};
 
 use super::parts;
 use crate::http::calculators::{LEAST_DEADLINE_S, MOST_DEADLINE_S};
@@ -55,7 +55,11 @@ pub(super) fn may_become_one(operation: OperationBuilder) -> OperationBuilder {
         .minimum(Some(LEAST_DEADLINE_S))
         .maximum(Some(MOST_DEADLINE_S))
         .build();
-    let url = ObjectBuilder::new().schema_type(SchemaType::new(Type::String)).max_length(Some(2048)).build();
+    let url = ObjectBuilder::new()
+        .schema_type(SchemaType::new(Type::String))
+        .format(Some(SchemaFormat::Custom("uri".to_owned())))
+        .max_length(Some(2048))
+        .build();
     let key = ObjectBuilder::new().schema_type(SchemaType::new(Type::String)).pattern(Some("^[!-~]{1,255}$")).build();
     operation
         .parameter(header(
