@@ -30,7 +30,7 @@ OF_LIST = ["description", "minItems", "maxItems"]
 SCALARS = ["number", "integer", "string"]
 HEADER = "# Made from the contract by generate.py: not to be edited.\n# ruff: noqa\n"
 OPTIONS = """
---preset standard-py310-20261027 --input-file-type openapi --disable-timestamp --base-class precut._base.Model
+--preset standard-py310-20261027 --input-file-type openapi --disable-timestamp --base-class precut._base.Base
 --naming-strategy full-path --enum-field-as-literal all --use-one-literal-as-default --collapse-root-models
 --use-schema-description --use-field-description --use-inline-field-description --use-attribute-docstrings
 --no-allow-population-by-field-name
@@ -136,13 +136,14 @@ def models(document: dict[str, Any]) -> str:
 def asks(text: str, asked: list[Question]) -> str:
     """Says of every job which calculator it is for and what its result is."""
     for _, job, result in asked:
-        head = f"class {job}(Model):\n"
-        if head not in text or f"class {result}(Model):\n" not in text:
+        head = f"class {job}(Base):\n"
+        if head not in text or f"class {result}(Base):\n" not in text:
             sys.exit(f"{job} or {result} is not among the models")
-        text = text.replace(head, f'class {job}(Model, Asks["{result}"]):\n')
-    text = text.replace("from precut._base import Model\n", "from precut._base import Asks, Model\n")
+        text = text.replace(head, f'class {job}(Base, Asks["{result}"]):\n')
+    text = text.replace("from precut._base import Base\n", "from precut._base import Asks, Base\n")
     rows = "".join(f"    {job}: ({json.dumps(calculator)}, {result}),\n" for calculator, job, result in asked)
-    return f'{text}\n\nJOBS: dict[type[Any], tuple[str, type[Any]]] = {{\n{rows}}}\n"""Of a job its calculator and its result."""\n'
+    text += f"\n\nJOBS: dict[type[Any], tuple[str, type[Any]]] = {{\n{rows}}}\n"
+    return text + '"""Of a job its calculator and its result."""\n'
 
 
 def generate(output: Path = OWN) -> None:

@@ -2,10 +2,11 @@
 
 import io
 
-import precut
 import pydantic
 import pytest
-from precut import models
+
+import precut
+from precut import Answer, models
 from precut._events import Reader
 from precut._progress import Bar
 
@@ -52,3 +53,11 @@ def test_the_bar_is_one_line():
     first, second = out.getvalue().split("\r")[1:]
     assert first.startswith("ring-roundness [########......") and " 25%, map, 2 s left" in first
     assert len(second) == len(first) and "100%" in second
+
+
+def test_what_a_newer_service_adds_is_kept():
+    zone = {"name": "whole", "value": 1.0, "unit": "mm", "news": 7}
+    with pytest.raises(pydantic.ValidationError):
+        models.NamedValue(**zone)
+    raw = {"calculator": "x", "key": "b3:0", "input": {}, "result": zone}
+    assert Answer(raw, precut.Client(), models.NamedValue).result.model_extra == {"news": 7}

@@ -10,13 +10,14 @@ from pathlib import Path
 from typing import Any
 
 from . import Answer, Client, PrecutError
-from ._wire import URL
 
 
 def parser() -> argparse.ArgumentParser:
     whole = argparse.ArgumentParser(prog="python -m precut", description="Asks a running precut service.")
-    whole.add_argument("--url", default=os.environ.get("PRECUT_URL", URL), help="address of the service (or PRECUT_URL)")
-    whole.add_argument("--key", default=os.environ.get("PRECUT_KEY"), help="key, where the service asks for one (or PRECUT_KEY)")
+    whole.add_argument("--url", help="address of the service (or PRECUT_URL)")
+    whole.add_argument(
+        "--key", default=os.environ.get("PRECUT_KEY"), help="key, where the service asks for one (or PRECUT_KEY)"
+    )
     whole.add_argument("--lang", default="en", choices=["en", "ru"], help="language of sentences")
     commands = whole.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
@@ -31,7 +32,9 @@ def parser() -> argparse.ArgumentParser:
     solve.add_argument("job", help="file with the job as JSON; - for standard input")
     form = solve.add_mutually_exclusive_group()
     form.add_argument("--table", nargs="?", const="", metavar="NAME", help="a table as CSV instead; the first if not named")
-    form.add_argument("--figure", nargs="?", const="", metavar="NAME", help="a figure as SVG instead; the first if not named")
+    form.add_argument(
+        "--figure", nargs="?", const="", metavar="NAME", help="a figure as SVG instead; the first if not named"
+    )
     form.add_argument("--program", action="store_true", help="the program for the machine instead")
     form.add_argument("--json", action="store_true", help="the whole answer instead of its main sentences")
     solve.add_argument("--output", type=Path, help="file for what would be printed")

@@ -63,22 +63,22 @@ class Envelope(Generic[R]):
     def result(self) -> R:
         """The calculator's own result as a model."""
         of_result = self._result or result_of(self.calculator, self.input)
-        return TypeAdapter(of_result).validate_python(self.raw["result"])
+        return TypeAdapter(of_result).validate_python(self.raw["result"], extra="allow")
 
     @cached_property
     def explanation(self) -> list[models.Remark]:
         """What dominates and what would help, the most important first."""
-        return TypeAdapter(list[models.Remark]).validate_python(self.raw["explanation"])
+        return TypeAdapter(list[models.Remark]).validate_python(self.raw["explanation"], extra="allow")
 
     @cached_property
     def warnings(self) -> list[models.Notice]:
         """Where an input leaves the range of a formula, and the like."""
-        return TypeAdapter(list[models.Notice]).validate_python(self.raw["warnings"])
+        return TypeAdapter(list[models.Notice]).validate_python(self.raw["warnings"], extra="allow")
 
     @cached_property
     def basis(self) -> list[models.Basis]:
         """The equations that acted, with their sources."""
-        return TypeAdapter(list[models.Basis]).validate_python(self.raw["basis"])
+        return TypeAdapter(list[models.Basis]).validate_python(self.raw["basis"], extra="allow")
 
     def __repr__(self) -> str:
         said = "".join(f"\n  {remark.text}" for remark in self.explanation)
@@ -170,7 +170,9 @@ def frames(found: list[models.ResultTable]) -> dict[str, pandas.DataFrame]:
         raise ImportError("tables are DataFrames of pandas: pip install 'precut[tables]'") from fault
     made = {}
     for table in found:
-        columns = {f"{column.name} [{column.unit}]" if column.unit else column.name: column.cells for column in table.columns}
+        columns = {
+            f"{column.name} [{column.unit}]" if column.unit else column.name: column.cells for column in table.columns
+        }
         made[table.id] = pandas.DataFrame(columns)
     return made
 

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict
 R = TypeVar("R")
 
 
-class Model(BaseModel):
+class Base(BaseModel):
     """An object of the contract. Fields carry their units in their names; what a newer service adds is kept."""
 
     # Schemas are built when a class is first used: there are hundreds, and a program needs a few.

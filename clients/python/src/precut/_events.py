@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from . import models
+
+Kind = Literal["state", "progress", "interim", "done"]
 
 
 @dataclass(frozen=True)
 class Event:
     """What happened to a job."""
 
-    kind: Literal["state", "progress", "interim", "done"]
+    kind: Kind
     id: str
     data: Any
-    """A `models.Job` with `state` and `done`, `models.JobProgress` with `progress`, a figure as a dictionary with `interim`."""
+    """`models.Job` with `state` and `done`, `models.JobProgress` with `progress`, a dictionary with `interim`."""
 
 
 class Reader:
@@ -31,8 +33,9 @@ class Reader:
             self._fields.setdefault(name, []).append(value.removeprefix(" "))
             return None
         fields, self._fields = self._fields, {}
-        kind = "".join(fields.get("event", []))
-        if kind not in ("state", "progress", "interim", "done"):
+        said = "".join(fields.get("event", []))
+        kind = next((kind for kind in get_args(Kind) if kind == said), None)
+        if kind is None:
             return None  # a sign of life, or something newer than this package
         data = json.loads("\n".join(fields.get("data", [])))
         if kind in ("state", "done"):

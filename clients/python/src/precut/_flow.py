@@ -12,11 +12,11 @@ import time
 import uuid
 from collections.abc import Generator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, TypeVar, Union
+from typing import Any, TypeVar
 from urllib.parse import quote
 
 from . import models
-from ._base import Model
+from ._base import Base
 from ._errors import StillRunning, Unreachable, problem
 from ._events import Event, Reader
 
@@ -76,7 +76,7 @@ class Reply:
         return json.loads(self.body)
 
 
-Step = Union[Send, Open, Line, Pause, Tell]
+Step = Send | Open | Line | Pause | Tell
 Flow = Generator[Step, Any, T]
 
 
@@ -164,11 +164,14 @@ def question(calculator: str | Any, job: Any) -> tuple[str, Any, Any]:
     if job is None:
         calculator, job = None, calculator
     of_class, result = models.JOBS.get(type(job), (None, None))
-    if calculator is None and of_class is None:
-        raise TypeError(f"a {type(job).__name__} does not say which calculator it is for: solve('deflection-compensation', job)")
-    if calculator is not None and of_class is not None and calculator != of_class:
-        raise TypeError(f"a {type(job).__name__} is a job of {of_class}, not of {calculator}")
-    return calculator or of_class, job, result
+    asked = calculator or of_class
+    if asked is None:
+        raise TypeError(
+            f"a {type(job).__name__} does not say which calculator it is for: solve('deflection-compensation', job)"
+        )
+    if of_class not in (None, asked):
+        raise TypeError(f"a {type(job).__name__} is a job of {of_class}, not of {asked}")
+    return asked, job, result
 
 
 def body(job: Any) -> bytes:
@@ -177,7 +180,7 @@ def body(job: Any) -> bytes:
 
 def sendable(part: Any) -> Any:
     """Models, also inside dictionaries and lists, as what is sent."""
-    if isinstance(part, Model):
+    if isinstance(part, Base):
         return part.sent()
     if isinstance(part, Mapping):
         return {key: sendable(value) for key, value in part.items()}
@@ -186,7 +189,9 @@ def sendable(part: Any) -> Any:
     return part
 
 
-def post(calculator: str, job: Any, key: str | None, priority: str | None, prefer: str | None, patience: Patience) -> Flow[Reply]:
+def post(
+    calculator: str, job: Any, key: str | None, priority: str | None, prefer: str | None, patience: Patience
+) -> Flow[Reply]:
     # With a name of its own the request can be sent again without being done again.
     headers = {"content-type": "application/json", "idempotency-key": key or str(uuid.uuid4())}
     if prefer is not None:
@@ -219,7 +224,9 @@ def result(id: str, job: Any, patience: Patience) -> Flow[dict[str, Any]]:
     return reply.json()
 
 
-def submit(calculator: str, job: Any, key: str | None, priority: str | None, patience: Patience) -> Flow[models.Job | dict[str, Any]]:
+def submit(
+    calculator: str, job: Any, key: str | None, priority: str | None, patience: Patience
+) -> Flow[models.Job | dict[str, Any]]:
     """A job, or the answer where it is there already."""
     reply = yield from post(calculator, job, key, priority, "respond-async", patience)
     return models.Job.model_validate_json(reply.body) if reply.status == 202 else reply.json()

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from typing import TextIO, Union
+from typing import TextIO
 
 from . import models
 from ._events import Event
 
 # True shows it, False does not, None shows it where somebody may look; a function is called with every event.
-Progress = Union[bool, None, Callable[[Event], None]]
+Progress = bool | None | Callable[[Event], None]
 WIDTH = 30
 
 

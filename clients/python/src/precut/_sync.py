@@ -15,13 +15,13 @@ from ._answer import Answer
 from ._base import Asks, R
 from ._events import Event
 from ._progress import Progress, ignore, watcher
-from ._wire import RETRIES, TIMEOUT_S, URL, headers, reply, request, stream, unreachable
+from ._wire import RETRIES, TIMEOUT_S, address, headers, reply, request, stream, unreachable
 
 T = TypeVar("T")
 
 
 class Client:
-    """A client of the service at `url`.
+    """A client of the service at `url`, else at `PRECUT_URL` of the environment, else on this machine.
 
     `key` is needed where the service asks for keys; `language` is that of sentences, `en` or `ru`. A request that meets
     a busy or restarting service is tried again up to `retries` times. `timeout_s` is for one exchange, not for a job.
@@ -29,7 +29,7 @@ class Client:
 
     def __init__(
         self,
-        url: str = URL,
+        url: str | None = None,
         *,
         key: str | None = None,
         language: str = "en",
@@ -37,7 +37,9 @@ class Client:
         timeout_s: float = TIMEOUT_S,
         transport: httpx.BaseTransport | None = None,
     ) -> None:
-        self._http = httpx.Client(base_url=url, headers=headers(key, language), timeout=timeout_s, transport=transport)
+        self._http = httpx.Client(
+            base_url=address(url), headers=headers(key, language), timeout=timeout_s, transport=transport
+        )
         self._retries = retries
 
     def __enter__(self) -> Client:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import platform
 from importlib.metadata import version
 
@@ -13,6 +14,10 @@ from ._errors import Unreachable
 URL = "http://127.0.0.1:8080"
 RETRIES = 5
 TIMEOUT_S = 60.0
+
+
+def address(url: str | None) -> str:
+    return url or os.environ.get("PRECUT_URL") or URL
 
 
 def headers(key: str | None, language: str) -> dict[str, str]:
