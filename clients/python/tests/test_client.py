@@ -106,6 +106,20 @@ def test_a_missing_object_points_at_what_should_hold_it(client):
     assert fault.holder is job and fault.value is None and "cut" in fault.detail
 
 
+def test_a_fault_names_the_field_of_a_model_as_python_does(client):
+    study = models.StudyJob(
+        calculator="ring-clamping",
+        job=client.example("ring-clamping"),
+        vary=[{"pointer": "/width_mm", "from": 30, "to": 20, "count": 2}],
+    )
+    assert client.solve(study).result.model_fields_set
+    study.vary[0].from_ = "x"
+    with pytest.raises(precut.InvalidJob) as refused:
+        client.solve(study)
+    (fault,) = refused.value.faults
+    assert fault.holder is study.vary[0] and (fault.path, fault.value) == ("vary[0].from_", "x")
+
+
 def test_other_refusals_keep_their_code(client):
     with pytest.raises(precut.Problem) as refused:
         client.solve("no-such-thing", {})

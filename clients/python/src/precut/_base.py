@@ -13,7 +13,10 @@ class Base(BaseModel):
     """An object of the contract. Fields carry their units in their names; what a newer service adds is kept."""
 
     # Schemas are built when a class is first used: there are hundreds, and a program needs a few.
-    model_config = ConfigDict(extra="allow", defer_build=True, use_attribute_docstrings=True)
+    # `from`, which Python keeps for itself, is `from_`.
+    model_config = ConfigDict(
+        extra="allow", defer_build=True, use_attribute_docstrings=True, validate_by_name=True, validate_by_alias=True
+    )
 
     def model_post_init(self, context: Any, /) -> None:
         # A job is sent without what was left to its default. The word that tells choices apart has to go with it.
@@ -23,7 +26,7 @@ class Base(BaseModel):
 
     def sent(self) -> dict[str, Any]:
         """As it is sent: what was said, not what was left to its default."""
-        return self.model_dump(mode="json", exclude_unset=True, exclude_none=True)
+        return self.model_dump(mode="json", by_alias=True, warnings=False, exclude_unset=True, exclude_none=True)
 
 
 class Asks(Generic[R]):

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from . import models
+from ._base import Base
 
 
 class PrecutError(Exception):
@@ -86,9 +87,8 @@ def located(notice: models.Notice, job: Any) -> Fault:
         token = token.replace("~1", "/").replace("~0", "~")
         if name is not None and (inner := step(holder, name)) is not None:
             holder = inner
-        is_index = token.isdigit() and not isinstance(holder, Mapping)
-        name = int(token) if is_index else token
-        path += f"[{token}]" if is_index else f".{token}" if path else token
+        name = spelled(holder, token)
+        path += f"[{name}]" if isinstance(name, int) else f".{name}" if path else name
     return Fault(
         code=notice.code,
         detail=notice.detail,
@@ -100,6 +100,13 @@ def located(notice: models.Notice, job: Any) -> Fault:
         unit=notice.unit,
         values=notice.values or {},
     )
+
+
+def spelled(holder: Any, token: str) -> str | int:
+    """What the caller calls the field, key or index."""
+    if isinstance(holder, Base):
+        return next((name for name, field in type(holder).model_fields.items() if field.alias == token), token)
+    return int(token) if token.isdigit() and not isinstance(holder, Mapping) else token
 
 
 def step(holder: Any, name: str | int) -> Any:
