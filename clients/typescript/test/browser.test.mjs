@@ -50,23 +50,24 @@ test("it works in a page from elsewhere", { skip: missing }, async () => {
   });
   await new Promise((listens) => pages.listen(0, "127.0.0.1", listens));
   const origin = `http://127.0.0.1:${pages.address().port}`;
-  service = await Service.start({ PRECUT_CORS_ORIGINS: origin });
   const profile = await mkdtemp(join(tmpdir(), "precut-chromium-"));
   const options = ["--headless=new", "--no-sandbox", "--disable-gpu", `--user-data-dir=${profile}`, "--no-first-run"];
-  const browser = spawn(CHROMIUM ?? "chromium", [...options, origin], { stdio: "ignore" });
-  browser.on("error", reject);
   const late = setTimeout(() => reject(new Error("the page says nothing")), LONGEST_MS);
+  let browser;
   try {
+    service = await Service.start({ PRECUT_CORS_ORIGINS: JSON.stringify([origin]) });
+    browser = spawn(CHROMIUM ?? "chromium", [...options, origin], { stdio: "ignore" });
+    browser.on("error", reject);
     const { kinds, ...rest } = await told;
     assert.deepEqual(rest, { calculator: "ring-clamping", figure: "<svg", refused: "InvalidJob" });
     assert(kinds.includes("state") && kinds.includes("done"));
   } finally {
     clearTimeout(late);
-    const ended = new Promise((done) => browser.on("exit", done));
-    if (browser.exitCode === null && browser.kill()) await ended;
+    const ended = new Promise((done) => browser?.on("exit", done));
+    if (browser?.exitCode === null && browser.kill()) await ended;
     pages.closeAllConnections();
     pages.close();
-    await service.stop();
+    await service?.stop();
     await rm(profile, { recursive: true, force: true, maxRetries: 5 });
   }
 });
