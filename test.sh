@@ -125,7 +125,7 @@ step_unused() {
 
 step_scripts() {
   need shellcheck shellcheck
-  find . -path ./target -prune -o -name '*.sh' -print0 | xargs -0 shellcheck .ci/run packaging/debian/*
+  find . \( -path ./target -o -name node_modules \) -prune -o -name '*.sh' -print0 | xargs -0 shellcheck .ci/run packaging/debian/*
 }
 
 step_page() {

@@ -138,13 +138,13 @@ def test_a_long_job_is_followed_to_its_end(client):
     events = []
     answer = client.solve(*slow(client), progress=events.append)
     assert events[-1].kind == "done" and events[-1].data.state == "succeeded"
-    assert any(event.kind == "progress" for event in events)
+    assert events[0].kind == "state" and events[0].data.calculator == "ring-roundness"
     assert isinstance(answer.result, models.RingRoundnessResult)
 
 
 def test_a_wait_ends_in_time_and_the_job_goes_on(client):
     with pytest.raises(precut.StillRunning) as late:
-        client.solve(*slow(client), timeout_s=0.3)
+        client.solve(*slow(client), timeout_s=0.0)
     running = client.job(late.value.job.id)
     assert running.look().state in ("queued", "running", "succeeded")
     assert running.wait().key == late.value.job.key

@@ -67,12 +67,13 @@ test("a long job is followed to its end", async () => {
   const answer = await precut.solve("ring-roundness", await slow(), { onEvent: (event) => seen.push(event) });
   assert.equal(seen.at(-1).kind, "done");
   assert.equal(seen.at(-1).data.state, "succeeded");
-  assert(seen.some(({ kind }) => kind === "progress"));
+  assert.equal(seen[0].kind, "state");
+  assert.equal(seen[0].data.calculator, "ring-roundness");
   assert.notEqual(answer.result.setup_map, null);
 });
 
 test("a wait ends in time and the job goes on", async () => {
-  const late = await precut.solve("ring-roundness", await slow(), { timeoutS: 0.3 }).catch((fault) => fault);
+  const late = await precut.solve("ring-roundness", await slow(), { timeoutS: 0 }).catch((fault) => fault);
   assert(late instanceof StillRunning, String(late));
   assert.equal((await precut.job(late.job.id).wait()).key, late.job.key);
 });

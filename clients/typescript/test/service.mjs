@@ -27,7 +27,8 @@ export class Service {
     if (program === undefined) throw new Error("PRECUT must name the program of the service");
     const { promise, resolve, reject } = withResolvers();
     this.#process = spawn(program, ["serve", "--listen", this.#listen, "--data", join(this.#folder, "data")], {
-      env: { ...process.env, ...this.#settings },
+      // What takes a tenth of a second is a job, also on a fast machine.
+      env: { ...process.env, PRECUT_LIMITS_DIRECT_MS: "100", ...this.#settings },
     });
     let log = "";
     const read = (text) => {

@@ -244,24 +244,26 @@ def cancel(id: str, patience: Patience) -> Flow[models.Job]:
 def wait(id: str, patience: Patience) -> Flow[None]:
     """Follows the events of a job to its end; a stream that breaks is taken up where it broke."""
     last, broken = "", 0
-    while True:
+    while not patience.is_over():
         headers = {"accept": "text/event-stream"} | ({"last-event-id": last} if last else {})
-        reply = yield from exchange(Open(f"/v1/jobs/{id}/events", headers, patience.within(LONGEST_SILENCE_S)), patience)
+        try:
+            reply = yield from exchange(Open(f"/v1/jobs/{id}/events", headers, patience.within(LONGEST_SILENCE_S)), patience)
+        except Unreachable:
+            if patience.is_over():
+                break
+            raise
         if reply.status == 204:
             return
         reader = Reader()
-        while (line := (yield from next_line())) is not None:
-            if patience.is_over():
-                raise StillRunning((yield from look(id, Patience(patience.retries))))
+        while not patience.is_over() and (line := (yield from next_line())) is not None:
             if (event := reader.line(line)) is not None:
                 last, broken = event.id, 0
                 yield Tell(event)
                 if event.kind == "done":
                     return
-        if patience.is_over():
-            raise StillRunning((yield from look(id, Patience(patience.retries))))
         yield from pause(broken, None, patience)
         broken += 1
+    raise StillRunning((yield from look(id, Patience(patience.retries))))
 
 
 def next_line() -> Flow[str | None]:
