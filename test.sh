@@ -250,7 +250,7 @@ python_client() { # python_client SOURCES TOOLS PRECUT
   "$2/python" -m build --no-isolation
   "$2/pip" install --quiet --disable-pip-version-check --no-deps --force-reinstall dist/*.whl
   # The wheel without what it is built from is what is tested.
-  "$2/mypy" src/precut
+  "$2/mypy" src/precut tests/typed.py
   PRECUT=$3 "$2/python" -m pytest --quiet
 }
 
