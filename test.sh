@@ -12,7 +12,7 @@ set -euo pipefail
 shopt -s inherit_errexit # a failing command inside $(...) ends the step too
 cd "$(dirname "${BASH_SOURCE[0]}")"
 
-STEPS=(format lint docs dependencies unused scripts page test contract programs dockerfile packaging attack)
+STEPS=(format lint docs dependencies unused scripts page test contract clients programs dockerfile packaging attack)
 declare -A ABOUT=(
   [format]="rustfmt"
   [lint]="clippy over everything, warnings denied"
@@ -22,7 +22,8 @@ declare -A ABOUT=(
   [scripts]="shellcheck"
   [page]="the workbench without a browser: its parts, and the types of all of it"
   [test]="unit, property and HTTP tests"
-  [contract]="openapi/precut.json is what the program prints"
+  [contract]="openapi/precut.json is what the program prints, and nothing that Redocly, Spectral or a validator calls an error"
+  [clients]="the clients in Python and TypeScript: built, their tests, documentation and notebooks against the service"
   [programs]="programs for machines, read by LinuxCNC's own interpreter"
   [dockerfile]="hadolint over the Dockerfile; compose.yaml is YAML"
   [packaging]="the Debian package goes in, over itself and out; systemd's unit; Kubernetes' manifests and their settings"
@@ -65,21 +66,32 @@ need() { # need COMMAND PACKAGE...: installs the packages unless the command is 
   command -v "$command" >/dev/null || packages "$@"
 }
 
-python_tools() { # prints the folder of the Python tools, made from requirements.txt once
-  local venv stamp
-  venv=$(target)/tools/python
+python_tools() { # python_tools [REQUIREMENTS NAME]: prints the folder of Python tools, made from their list once
+  local requirements=${1:-tests/tools/requirements.txt} venv stamp
+  venv=$(target)/tools/${2:-python}
   stamp=$venv/requirements.txt
-  if ! cmp -s tests/tools/requirements.txt "$stamp"; then
+  if ! cmp -s "$requirements" "$stamp"; then
     need python3 python3 >&2
     # Debian splits what a virtual environment needs from python3 itself.
     python3 -c "import ensurepip, venv" 2>/dev/null || packages python3-venv >&2
     rm -rf "$venv"
     python3 -m venv "$venv" >&2
-    "$venv/bin/pip" install --quiet --disable-pip-version-check --requirement tests/tools/requirements.txt >&2 ||
-      absent "a package of tests/tools/requirements.txt"
-    cp tests/tools/requirements.txt "$stamp"
+    "$venv/bin/pip" install --quiet --disable-pip-version-check --requirement "$requirements" >&2 ||
+      absent "a package of $requirements"
+    cp "$requirements" "$stamp"
   fi
   echo "$venv/bin"
+}
+
+node_tools() { # node_tools FROM FOLDER: installs into the folder what FROM/package-lock.json lists, once
+  need node nodejs
+  need npm npm
+  if ! cmp -s "$1/package-lock.json" "$2/.installed"; then
+    mkdir -p "$2"
+    cp "$1/package.json" "$1/package-lock.json" "$2/"
+    npm ci --prefix "$2" --no-audit --no-fund --silent || absent "a package of $1/package-lock.json"
+    cp "$1/package-lock.json" "$2/.installed"
+  fi
 }
 
 binary() { # prints the path of the debug build, made now
@@ -113,23 +125,15 @@ step_unused() {
 
 step_scripts() {
   need shellcheck shellcheck
-  find . -path ./target -prune -o -name '*.sh' -print0 | xargs -0 shellcheck .ci/run packaging/debian/*
+  find . \( -path ./target -o -name node_modules \) -prune -o -name '*.sh' -print0 | xargs -0 shellcheck .ci/run packaging/debian/*
 }
 
 step_page() {
   local tools said
   need node nodejs
   node --test tests/workbench/*.test.mjs
-  need npm npm
   tools=$(target)/tools/workbench
-  if ! cmp -s tests/workbench/package-lock.json "$tools/package-lock.json"; then
-    mkdir -p "$tools"
-    cp tests/workbench/package.json tests/workbench/package-lock.json "$tools/"
-    npm ci --prefix "$tools" --no-audit --no-fund --silent || {
-      rm -f "$tools/package-lock.json"
-      absent "typescript"
-    }
-  fi
+  node_tools tests/workbench "$tools"
   # What others wrote has no types, and is not ours to mend.
   said=$("$tools/node_modules/.bin/tsc" --project tests/workbench/tsconfig.json | grep -v '^ui/app/vendor/' | grep 'error TS' || true)
   [ -z "$said" ] || {
@@ -198,12 +202,60 @@ run_beside() { # run_beside PROGRAM [COMMAND...]: runs a program of tests in the
 }
 
 step_contract() {
-  local precut
+  local precut tools linters
   precut=$(binary)
   "$precut" openapi | diff --unified openapi/precut.json - | head -n 60 || {
     echo "openapi/precut.json is stale: precut openapi > openapi/precut.json" >&2
     return 1
   }
+  tools=$(python_tools)
+  "$tools/openapi-spec-validator" openapi/precut.json
+  linters=$(target)/tools/contract
+  node_tools tests/tools/contract "$linters"
+  # They ask for newer versions of themselves, and tell who uses them; not here.
+  REDOCLY_TELEMETRY=off REDOCLY_SUPPRESS_UPDATE_NOTICE=true "$linters/node_modules/.bin/redocly" lint openapi/precut.json \
+    --extends recommended --format summary
+  "$linters/node_modules/.bin/spectral" lint openapi/precut.json --ruleset tests/tools/contract/spectral.json \
+    --fail-severity error --quiet
+}
+
+step_clients() {
+  local precut stage python log beside code=0
+  precut=$(realpath "$(binary)")
+  python=$(realpath "$(python_tools clients/python/requirements.txt python-client)")
+  # They are built in a copy: what is made from the contract stays out of the sources.
+  stage=$(target)/clients
+  rm -rf "$stage"/clients/{python,typescript}/{src,dist,tests,test,notebooks}
+  mkdir -p "$stage"
+  tar --create --exclude={node_modules,dist,build,models.py,contract.ts} clients docs/api.md openapi README.md LICENSE |
+    tar --extract --directory "$stage"
+  node_tools clients/typescript "$stage/clients/typescript"
+  # The page of the test in a browser; without one it says so, in CI it fails.
+  (need chromium chromium) || true
+  log=$(mktemp)
+  python_client "$stage/clients/python" "$python" "$precut" >"$log" 2>&1 &
+  beside=$!
+  typescript_client "$stage/clients/typescript" "$precut" || code=1
+  wait "$beside" || code=1
+  cat "$log"
+  rm -f "$log"
+  return "$code"
+}
+
+python_client() { # python_client SOURCES TOOLS PRECUT
+  set -e
+  cd "$1"
+  "$2/ruff" format --check .
+  "$2/ruff" check .
+  "$2/python" -m build --no-isolation
+  "$2/pip" install --quiet --disable-pip-version-check --no-deps --force-reinstall dist/*.whl
+  # The wheel without what it is built from is what is tested.
+  "$2/mypy" src/precut tests/typed.py
+  PRECUT=$3 "$2/python" -m pytest --quiet
+}
+
+typescript_client() { # typescript_client SOURCES PRECUT
+  (cd "$1" && PRECUT=$2 npm test --silent && npm pack --silent)
 }
 
 step_programs() {

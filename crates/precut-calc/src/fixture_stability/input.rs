@@ -1,7 +1,7 @@
 //! The job: a cutter, a cut, a workpiece in a vise, and what is asked.
 
 use serde::{Deserialize, Serialize};
-use utoipa::openapi::schema::{Discriminator, OneOfBuilder};
+use utoipa::openapi::schema::OneOfBuilder;
 use utoipa::openapi::{RefOr, Schema};
 use utoipa::{PartialSchema, ToSchema};
 
@@ -167,7 +167,6 @@ impl PartialSchema for Vise {
                 .description(Some("How the workpiece is clamped."))
                 .item(choice("self_locking", SelfLocking::schema()))
                 .item(choice("constant_force", ConstantForce::schema()))
-                .discriminator(Some(Discriminator::new("kind")))
                 .build(),
         ))
     }
