@@ -42,6 +42,7 @@ pub use progress::Interim;
 pub use quota::{Share, Standing};
 pub use settings::EngineSettings;
 pub use study::STUDIES;
+pub(crate) use json::top_level_field;
 pub(crate) use summary::Summary;
 
 use std::sync::Arc;

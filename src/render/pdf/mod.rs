@@ -1,0 +1,184 @@
+//! An answer as a report on paper: PDF 1.7 that may be archived (PDF/A-2a) and heard (tagged).
+//!
+//! Pages are laid out first and painted then, so that each knows how many there are. Texts are data all the way: nothing
+//! in them is read as markup. The same report gives the same bytes. Its length is bounded: of long tables and long lists
+//! some rows are shown, and how many there are is said; all of them are in the workbook and in CSV.
+
+mod face;
+mod fields;
+mod figures;
+mod layout;
+mod paint;
+mod style;
+mod table;
+
+use usvg::{Options, Tree};
+
+use self::face::{FAMILY, database, printable};
+use self::layout::{Element, Kind, LEFT, Layout, Mark, WIDTH};
+use self::style::{
+    ALARM, ALARM_TINT, BODY, FORMULA, KICKER, NOTE, SUBJECT, Style, TINT, TITLE, VALUE, VERDICT, ACCENT, Line,
+};
+use super::report::{Counts, Equation, Report};
+
+/// Why there is no report.
+#[derive(Debug, thiserror::Error)]
+pub enum PdfError {
+    /// A picture that is no SVG.
+    #[error("a picture cannot be read: {0}")]
+    Picture(#[from] usvg::Error),
+    /// The document breaks a rule of its standard.
+    #[error("the document cannot be written: {0}")]
+    Document(String),
+}
+
+/// The report as a PDF.
+pub fn pdf(report: &Report, counts: Counts<'_>) -> Result<Vec<u8>, PdfError> {
+    let mut layout = Layout::new();
+    let mut parts = head(&mut layout, report);
+    parts.extend(warnings(&mut layout, report));
+    for picture in &report.pictures {
+        layout.skip(10.0);
+        let tree = Tree::from_str(&printable(&picture.svg), &options(report.language))?;
+        parts.push(layout.picture(tree, &picture.description));
+    }
+    for (heading, own) in [(&report.headings.results, &report.results), (&report.headings.inputs, &report.inputs)] {
+        if !own.is_empty() {
+            parts.push(layout.section(heading));
+            parts.extend(fields::all(&mut layout, own, report.decimal, counts));
+        }
+    }
+    parts.extend(tables(&mut layout, report, counts));
+    parts.extend(equations(&mut layout, report));
+    parts.extend(origin(&mut layout, report));
+    paint::painted(&layout, &parts, report, counts)
+}
+
+fn options(language: &str) -> Options<'static> {
+    Options {
+        font_family: FAMILY.to_owned(),
+        fontdb: database(),
+        languages: vec![language.to_owned()],
+        ..Options::default()
+    }
+}
+
+/// What was asked, and the answer.
+fn head(layout: &mut Layout, report: &Report) -> Vec<Element> {
+    let whole = (LEFT, WIDTH);
+    let mut parts = vec![layout.paragraph(&report.title, KICKER, whole)];
+    layout.y += 1.0;
+    parts.push(layout.heading(&report.question, TITLE, 1, 40.0));
+    layout.y += 2.0;
+    parts.push(layout.paragraph(&report.subject, SUBJECT, whole));
+    layout.y += 8.0;
+    let mut remarks = report.remarks.iter();
+    if let Some(verdict) = remarks.next() {
+        parts.push(boxed(layout, verdict, VERDICT, (ACCENT, TINT)));
+        layout.y += 4.0;
+    }
+    let items: Vec<Element> = remarks.map(|remark| item(layout, remark)).collect();
+    if !items.is_empty() {
+        parts.push(Element::new(Kind::List, items));
+    }
+    parts
+}
+
+/// What is to be seen at once: on a ground of its own.
+fn boxed(layout: &mut Layout, text: &str, style: Style, (edge, ground): ((u8, u8, u8), (u8, u8, u8))) -> Element {
+    const PAD: f32 = 7.0;
+    let lines: Vec<Line> = style.lines(text, WIDTH - 2.0 * PAD - 3.0);
+    let height = style.leading() * lines.len() as f32 + 2.0 * PAD;
+    // What is longer than a page has no ground.
+    if height <= Layout::page_room() {
+        layout.need(height);
+        let y = layout.y;
+        layout.decorate(vec![
+            Mark::Area { x: LEFT, y, width: WIDTH, height, color: ground },
+            Mark::Area { x: LEFT, y, width: 3.0, height, color: edge },
+        ]);
+    }
+    layout.y += PAD;
+    let leaves = layout.lines(lines, LEFT + 3.0 + PAD);
+    layout.y += PAD;
+    Element::of_leaves(Kind::Paragraph, leaves)
+}
+
+/// An item of a list.
+fn item(layout: &mut Layout, text: &str) -> Element {
+    const INDENT: f32 = 10.0;
+    layout.y += 2.0;
+    layout.need(BODY.leading());
+    let bullet = Mark::Text { x: LEFT, y: layout.y, line: BODY.line("•") };
+    layout.decorate(vec![bullet]);
+    let lines = BODY.lines(text, WIDTH - INDENT);
+    let leaves = layout.lines(lines, LEFT + INDENT);
+    Element::new(Kind::Item, vec![Element::of_leaves(Kind::ItemText, leaves)])
+}
+
+fn warnings(layout: &mut Layout, report: &Report) -> Vec<Element> {
+    if report.warnings.is_empty() {
+        return Vec::new();
+    }
+    let mut parts = vec![layout.section(&report.headings.warnings)];
+    for warning in &report.warnings {
+        parts.push(boxed(layout, warning, BODY, (ALARM, ALARM_TINT)));
+        layout.y += 3.0;
+    }
+    parts
+}
+
+fn tables(layout: &mut Layout, report: &Report, counts: Counts<'_>) -> Vec<Element> {
+    report.tables.iter().flat_map(|sheet| table::sheet(layout, sheet, report.decimal, counts)).collect()
+}
+
+fn equations(layout: &mut Layout, report: &Report) -> Vec<Element> {
+    let mut parts = Vec::new();
+    if !report.equations.is_empty() {
+        parts.push(layout.section(&report.headings.equations));
+        for equation in &report.equations {
+            parts.extend(self::equation(layout, equation));
+        }
+    }
+    if !report.references.is_empty() {
+        parts.push(layout.section(&report.headings.references));
+        let items: Vec<Element> = report.references.iter().map(|reference| item(layout, reference)).collect();
+        parts.push(Element::new(Kind::List, items));
+    }
+    parts
+}
+
+/// Number and source of an equation, and what it says.
+fn equation(layout: &mut Layout, equation: &Equation) -> Vec<Element> {
+    const INDENT: f32 = 12.0;
+    layout.skip(4.0);
+    let said = format!("{}  {}", equation.number, equation.source);
+    let height = FORMULA.leading() * equation.formula.len() as f32;
+    layout.need((VALUE.leading() * 2.0 + height).min(Layout::page_room() / 2.0));
+    let mut parts = vec![layout.paragraph(&said, VALUE, (LEFT, WIDTH))];
+    if !equation.formula.is_empty() {
+        layout.y += 1.0;
+        let lines: Vec<Line> = equation.formula.iter().map(|line| fitting(line, WIDTH - INDENT)).collect();
+        let leaves = layout.lines(lines, LEFT + INDENT);
+        parts.push(Element::of_leaves(Kind::Formula(printable(&equation.formula.join(" "))), leaves));
+    }
+    parts
+}
+
+/// A line of a formula, in smaller letters where it is long: broken it would be another formula.
+fn fitting(text: &str, room: f32) -> Line {
+    let line = FORMULA.line(text);
+    if line.width <= room {
+        return line;
+    }
+    Style { size: FORMULA.size * room / line.width, ..FORMULA }.line(text)
+}
+
+/// What made the answer, so that it can be asked again.
+fn origin(layout: &mut Layout, report: &Report) -> Vec<Element> {
+    let mut parts = vec![layout.section(&report.headings.origin)];
+    for (name, value) in &report.origin {
+        parts.push(layout.paragraph(&format!("{name}: {value}"), NOTE, (LEFT, WIDTH)));
+    }
+    parts
+}
