@@ -51,6 +51,8 @@ pub struct Headings {
     pub results: String,
     /// The job.
     pub inputs: String,
+    /// Tables.
+    pub tables: String,
     /// Equations and their sources.
     pub equations: String,
     /// Literature.
@@ -88,6 +90,8 @@ pub struct Field {
     pub label: String,
     /// What it is.
     pub value: Datum,
+    /// With how many digits it is read.
+    pub digits: usize,
     /// Printed unit; empty for words and bare numbers.
     pub unit: String,
 }

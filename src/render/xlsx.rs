@@ -21,7 +21,7 @@ const MEASURED_LINES: usize = 200;
 /// Letters of the narrowest and the widest column.
 const WIDTHS: (usize, usize) = (8, 60);
 /// Letters on a line of a sheet of words.
-const PAGE_LETTERS: f64 = 110.0;
+const PAGE_LETTERS: f64 = 130.0;
 
 /// Why there is no workbook.
 #[derive(Debug, thiserror::Error)]

@@ -4,6 +4,7 @@ use serde_json::Value;
 
 use super::own;
 use super::tree::Tree;
+use super::vocabulary::Vocabulary;
 use crate::registry::forms;
 use crate::render::{Datum, Field};
 use crate::text::{Glossary, Language, capitalised, spoken_number};
@@ -12,6 +13,10 @@ use crate::text::{Glossary, Language, capitalised, spoken_number};
 const JOINT: &str = " · ";
 /// Values of a list that stand in one field.
 const MOST_VALUES: usize = 40;
+
+/// Digits with which a number is read, and an error of one.
+const DIGITS: usize = 5;
+const ERROR_DIGITS: usize = 2;
 
 /// What becomes of lists, and of what only experts ask for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,6 +33,7 @@ pub(super) struct Fields<'d> {
     root: &'d str,
     language: Language,
     glossary: &'static Glossary,
+    vocabulary: &'d Vocabulary,
     lists: Lists,
 }
 
@@ -44,8 +50,13 @@ struct Place<'t> {
 }
 
 impl<'d> Fields<'d> {
-    pub(super) fn of(document: &'d Value, root: &'d str, language: Language, lists: Lists) -> Self {
-        Self { document, root, language, glossary: Glossary::of(language), lists }
+    pub(super) fn of(
+        document: &'d Value,
+        root: &'d str,
+        (language, vocabulary): (Language, &'d Vocabulary),
+        lists: Lists,
+    ) -> Self {
+        Self { document, root, language, glossary: Glossary::of(language), vocabulary, lists }
     }
 
     /// Every value of the tree.
@@ -75,7 +86,7 @@ impl<'d> Fields<'d> {
                 found.push(self.field(forms, Datum::Word(word), place));
             }
             Tree::Number(number) => found.push(self.field(forms, Datum::Number(*number), place)),
-            Tree::Word(word) => found.push(self.field(forms, Datum::Word(self.word(forms, word)), place)),
+            Tree::Word(word) => found.push(self.field(forms, Datum::Word(self.word(forms, word, place)), place)),
         }
     }
 
@@ -109,7 +120,7 @@ impl<'d> Fields<'d> {
             return;
         }
         if items.iter().all(|item| !matches!(item, Tree::Object(_) | Tree::List(..))) {
-            let mut said: Vec<String> = items.iter().take(MOST_VALUES).map(|item| self.single(&inner, item)).collect();
+            let mut said: Vec<String> = items.iter().take(MOST_VALUES).map(|item| self.single(&inner, item, place)).collect();
             if count > said.len() {
                 said.push(format!("… ({count})"));
             }
@@ -143,6 +154,7 @@ impl<'d> Fields<'d> {
             group: around.join(JOINT),
             label,
             value,
+            digits: place.way.last().map_or(DIGITS, |name| if is_error(name) { ERROR_DIGITS } else { DIGITS }),
             unit: if unit.is_empty() { String::new() } else { self.glossary.unit(unit) },
         }
     }
@@ -152,22 +164,27 @@ impl<'d> Fields<'d> {
     }
 
     /// A word of a choice in the reader's language; a name that the user gave stays as it is.
-    fn word(&self, forms: &Forms<'d>, word: &str) -> String {
+    fn word(&self, forms: &Forms<'d>, word: &str, place: &Place<'_>) -> String {
         if forms.iter().any(|(form, _)| allows(form, word) == Some(true)) {
             return self.glossary.word(word);
         }
-        let said = if self.lists == Lists::LeftOut { worded(word, self.language) } else { None };
-        said.unwrap_or_else(|| word.to_owned())
+        // In a job, words of no choice are the user's.
+        let name = place.way.last().filter(|_| self.lists == Lists::LeftOut);
+        name.and_then(|name| self.vocabulary.under(name, word)).unwrap_or_else(|| word.to_owned())
     }
 
-    fn single(&self, forms: &Forms<'d>, item: &Tree) -> String {
+    fn single(&self, forms: &Forms<'d>, item: &Tree, place: &Place<'_>) -> String {
         match item {
             Tree::Number(number) => spoken_number(*number, self.language),
-            Tree::Word(word) => self.word(forms, word),
+            Tree::Word(word) => self.word(forms, word, place),
             Tree::Truth(truth) => own(self.language, if *truth { "yes" } else { "no" }),
             Tree::Nothing | Tree::List(..) | Tree::Object(_) => "–".to_owned(),
         }
     }
+}
+
+fn is_error(name: &str) -> bool {
+    ["numerical_error", "uncertainty"].iter().any(|word| name.contains(word))
 }
 
 /// Whether a choice has this word; `None` where the schema lists none.
@@ -187,24 +204,4 @@ fn fitting<'d>(forms: &Forms<'d>, fields: &[(String, Tree)]) -> Forms<'d> {
     };
     let fitting: Forms<'d> = forms.iter().filter(|(form, _)| fits(form)).copied().collect();
     if fitting.is_empty() { forms.iter().filter(|(form, _)| form["properties"].is_object()).copied().collect() } else { fitting }
-}
-
-/// What a code that stands alone is called, or several of them; nothing for what is none.
-pub(super) fn worded(text: &str, language: Language) -> Option<String> {
-    const JOINTS: [&str; 3] = [" + ", ", ", "|"];
-    match text {
-        "true" | "yes" => return Some(own(language, "yes")),
-        "false" | "no" => return Some(own(language, "no")),
-        _ => {}
-    }
-    let glossary = Glossary::of(language);
-    if let Some(said) = glossary.known(text) {
-        return Some(said.to_owned());
-    }
-    JOINTS.iter().find_map(|joint| {
-        let parts: Vec<&str> = text.split(joint).collect();
-        let said: Option<Vec<&str>> = parts.iter().map(|part| glossary.known(part)).collect();
-        (parts.len() > 1).then_some(())?;
-        Some(said?.join(joint))
-    })
 }

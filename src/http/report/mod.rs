@@ -3,6 +3,7 @@
 mod equations;
 mod fields;
 mod tree;
+mod vocabulary;
 
 use precut_calc::calculator::{Cells, Figure, Table, Values};
 use serde::Deserialize;
@@ -10,14 +11,12 @@ use serde::de::DeserializeOwned;
 
 use self::fields::{Fields, Lists};
 use self::tree::Tree;
+use self::vocabulary::Vocabulary;
 use super::answer;
 use super::problem::Problem;
 use crate::engine::Stored;
 use crate::render::{self, Counted, Equation, Headings, Picture, Report, Sheet};
 use crate::text::{Glossary, Language, Texts, capitalised, told};
-
-/// Columns of tables in which names stand that the user gave: they are nobody's words.
-const OWN_NAMES: [&str; 6] = ["zone", "id", "label", "batch", "level", "of_level"];
 
 /// The answer as pages.
 pub(super) fn pdf(stored: &Stored, language: Language) -> Result<Vec<u8>, Problem> {
@@ -74,7 +73,9 @@ fn report(stored: &Stored, language: Language) -> Result<Report, Problem> {
     let warnings: Vec<Warning> = part(&body, "warnings")?;
     let basis: Vec<Basis> = part(&body, "basis")?;
     let (input, result): (Tree, Tree) = (part(&body, "input")?, part(&body, "result")?);
-    let fields = |document, tree, lists| Fields::of(document, meta.id, language, lists).all(tree);
+    let (of_job, of_result) = (entry.input_document(), entry.output_document());
+    let words = Vocabulary::of([&of_result, &of_job], meta.id, language);
+    let fields = |document, tree, lists| Fields::of(document, meta.id, (language, &words), lists).all(tree);
     let engine = stored.said("engine").unwrap_or_default();
     let version = stored.said("version").unwrap_or_default();
     Ok(Report {
@@ -85,10 +86,10 @@ fn report(stored: &Stored, language: Language) -> Result<Report, Problem> {
         subject: told(language, &stored.marks()),
         remarks: remarks.into_iter().map(|remark| capitalised(&remark.text)).collect(),
         warnings: warnings.into_iter().map(|warning| capitalised(&warning.detail)).collect(),
-        results: fields(&entry.output_document(), &result, Lists::LeftOut),
-        inputs: fields(&entry.input_document(), &input, Lists::Told),
+        results: fields(&of_result, &result, Lists::LeftOut),
+        inputs: fields(&of_job, &input, Lists::Told),
         pictures: Vec::new(),
-        tables: stored.tables_in(language)?.into_iter().map(|table| sheet(table, language)).collect(),
+        tables: stored.tables_in(language)?.into_iter().map(|table| sheet(table, &words, language)).collect(),
         equations: basis.into_iter().map(equation).collect(),
         references: meta.references.iter().map(|reference| (*reference).to_owned()).collect(),
         origin: origin(stored, part(&body, "model")?, language),
@@ -118,6 +119,7 @@ fn headings(language: Language) -> Headings {
         warnings: own("warnings"),
         results: own("results"),
         inputs: own("inputs"),
+        tables: own("tables"),
         equations: own("equations"),
         references: own("references"),
         origin: own("origin"),
@@ -159,7 +161,7 @@ fn picture(figure: &Figure, language: Language) -> Picture {
 }
 
 /// A table with the words of its head, and words in place of codes.
-fn sheet(mut table: Table, language: Language) -> Sheet {
+fn sheet(mut table: Table, words: &Vocabulary, language: Language) -> Sheet {
     let glossary = Glossary::of(language);
     let heads = table.columns.iter().map(|column| {
         let name = Texts::shared().column(language, &column.name, column.unit);
@@ -167,14 +169,10 @@ fn sheet(mut table: Table, language: Language) -> Sheet {
     });
     let heads = heads.collect();
     for column in &mut table.columns {
-        let is_own = OWN_NAMES.contains(&column.name.as_ref());
-        if let Cells::Words(cells) = &mut column.cells
-            && !is_own
-        {
-            for cell in cells {
-                if let Some(said) = fields::worded(cell, language) {
-                    *cell = said.into();
-                }
+        let Cells::Words(cells) = &mut column.cells else { continue };
+        for cell in cells {
+            if let Some(said) = words.under(&column.name, cell) {
+                *cell = said.into();
             }
         }
     }

@@ -75,12 +75,16 @@ impl Run {
     }
 }
 
+/// A space at which no line ends.
+pub(super) const GLUE: char = '\u{a0}';
+
 /// Text as it can be set: white space is a space, what cannot be seen is left out, and what no face has is written by
 /// its number.
 pub(super) fn printable(text: &str) -> String {
     let mut printable = String::with_capacity(text.len());
     for character in text.chars() {
         match character {
+            GLUE => printable.push(GLUE),
             c if c.is_whitespace() => printable.push(' '),
             '\u{ad}' | '\u{200b}'..='\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}' => {}
             // Of private use: without a meaning to whom it was not told.

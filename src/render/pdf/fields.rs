@@ -1,5 +1,6 @@
 //! Single values of a job or a result: by groups, in two columns; lists of alike things as tables.
 
+use super::face::GLUE;
 use super::figures;
 use super::layout::{Element, Kind, LEFT, Layout, Mark, WIDTH};
 use super::style::{GROUP, LABEL, Line, NOTE, VALUE};
@@ -86,8 +87,13 @@ struct Entry {
 
 impl Entry {
     fn of(field: &Field, decimal: char) -> Self {
-        let value = table::shortened(&figures::datum(&field.value, decimal));
-        let value = if field.unit.is_empty() { value } else { format!("{value} {}", field.unit) };
+        let value = table::shortened(&figures::datum(field, decimal));
+        // An angle's sign stands at its number.
+        let value = match field.unit.as_str() {
+            "" => value,
+            "°" => format!("{value}°"),
+            unit => format!("{value}{GLUE}{unit}"),
+        };
         Self { name: LABEL.lines(&field.label, NAME), value: VALUE.lines(&value, COLUMN - NAME - GAP) }
     }
 

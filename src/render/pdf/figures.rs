@@ -1,28 +1,30 @@
 //! Numbers as they are printed.
 
 use crate::render::number;
-use crate::render::report::Datum;
+use crate::render::report::{Datum, Field};
 use crate::text::significant;
 
-/// Digits of a number that stands alone.
-const DIGITS: usize = 6;
 /// Digits of the largest number of a column.
 const COLUMN_DIGITS: i32 = 5;
+/// Digits of each where they are of many magnitudes.
+const DIGITS: usize = 5;
+/// A number that is written with so many characters stands as it is.
+const SHORT: usize = 8;
 /// Whole numbers below it are printed with all of their digits.
 const WHOLE_BELOW: f64 = 1e12;
 
 /// A value of a job or a result.
-pub(super) fn datum(value: &Datum, decimal: char) -> String {
-    match value {
+pub(super) fn datum(field: &Field, decimal: char) -> String {
+    match &field.value {
         Datum::Word(word) => word.clone(),
-        Datum::Number(number) => alone(*number, decimal),
+        Datum::Number(number) => alone(*number, field.digits, decimal),
     }
 }
 
 /// As it came where it is short, else with some digits.
-pub(super) fn alone(value: f64, decimal: char) -> String {
+fn alone(value: f64, digits: usize, decimal: char) -> String {
     let Some(shortest) = number::shortest(value) else { return String::new() };
-    let text = if shortest.len() <= DIGITS + 3 { shortest } else { significant(value, DIGITS) };
+    let text = if shortest.len() <= SHORT { shortest } else { significant(value, digits) };
     with_decimal(text, decimal)
 }
 
@@ -43,7 +45,7 @@ pub(super) fn column_texts(cells: &[Option<f64>], decimal: char) -> Vec<String> 
     let is_even = magnitude(largest) < 9 && (least.is_infinite() || magnitude(least) >= 1 - decimals);
     let text = |value: f64| match usize::try_from(decimals) {
         Ok(decimals) if is_even => number::at_most(value, decimals),
-        _ => significant(value, DIGITS - 1),
+        _ => significant(value, DIGITS),
     };
     let texts: Vec<String> = cells.iter().map(|cell| cell.filter(|value| value.is_finite()).map(text).unwrap_or_default()).collect();
     if !is_even {
@@ -88,9 +90,10 @@ mod tests {
     }
 
     #[test]
-    fn a_number_alone_is_as_it_came_or_has_six_digits() {
-        for (value, text) in [(210_000.0, "210000"), (0.1 + 0.2, "0,3"), (-104.364_912, "-104,365"), (1e-9, "1e-9")] {
-            assert_eq!(alone(value, ','), text);
+    fn a_number_alone_is_as_it_came_or_has_its_digits() {
+        for (value, text) in [(210_000.0, "210000"), (0.1 + 0.2, "0,3"), (-104.364_912, "-104,36"), (1e-9, "1e-9")] {
+            assert_eq!(alone(value, 5, ','), text);
         }
+        assert_eq!(alone(1.153_187_2e-7, 2, '.'), "1.2e-7");
     }
 }

@@ -191,11 +191,16 @@ impl Layout {
         heading
     }
 
+    /// How high a picture is.
+    pub(super) fn picture_height(tree: &Tree) -> f32 {
+        Self::page_room().min(WIDTH * tree.size().height() / tree.size().width())
+    }
+
     /// A picture as wide as the text, or as high as a page.
     pub(super) fn picture(&mut self, tree: Tree, description: &str) -> Element {
         let size = tree.size();
-        let width = WIDTH.min(Self::page_room() * size.width() / size.height());
-        let height = width * size.height() / size.width();
+        let height = Self::picture_height(&tree);
+        let width = height * size.width() / size.height();
         self.need(height);
         let leaf = self.put(vec![Mark::Picture { x: LEFT, y: self.y, width, tree: Box::new(tree) }]);
         self.y += height;

@@ -19,7 +19,7 @@ use self::layout::{Element, Kind, LEFT, Layout, Mark, WIDTH};
 use self::style::{
     ALARM, ALARM_TINT, BODY, FORMULA, KICKER, NOTE, SUBJECT, Style, TINT, TITLE, VALUE, VERDICT, ACCENT, Line,
 };
-use super::report::{Counts, Equation, Report};
+use super::report::{Counts, Equation, Field, Report};
 
 /// Why there is no report.
 #[derive(Debug, thiserror::Error)]
@@ -37,17 +37,25 @@ pub fn pdf(report: &Report, counts: Counts<'_>) -> Result<Vec<u8>, PdfError> {
     let mut layout = Layout::new();
     let mut parts = head(&mut layout, report);
     parts.extend(warnings(&mut layout, report));
+    let mut pictures = Vec::with_capacity(report.pictures.len());
     for picture in &report.pictures {
+        pictures.push((Tree::from_str(&printable(&picture.svg), &options(report.language))?, &picture.description));
+    }
+    let headings = &report.headings;
+    let numbers = |layout: &mut Layout| values(layout, (&headings.results, &report.results), report.decimal, counts);
+    // Numbers fill the page on which the main picture has no room.
+    let is_full = pictures.first().is_some_and(|(tree, _)| Layout::picture_height(tree) + 10.0 > layout.room());
+    if is_full {
+        parts.extend(numbers(&mut layout));
+    }
+    for (tree, description) in pictures {
         layout.skip(10.0);
-        let tree = Tree::from_str(&printable(&picture.svg), &options(report.language))?;
-        parts.push(layout.picture(tree, &picture.description));
+        parts.push(layout.picture(tree, description));
     }
-    for (heading, own) in [(&report.headings.results, &report.results), (&report.headings.inputs, &report.inputs)] {
-        if !own.is_empty() {
-            parts.push(layout.section(heading));
-            parts.extend(fields::all(&mut layout, own, report.decimal, counts));
-        }
+    if !is_full {
+        parts.extend(numbers(&mut layout));
     }
+    parts.extend(values(&mut layout, (&headings.inputs, &report.inputs), report.decimal, counts));
     parts.extend(tables(&mut layout, report, counts));
     parts.extend(equations(&mut layout, report));
     parts.extend(origin(&mut layout, report));
@@ -70,7 +78,7 @@ fn head(layout: &mut Layout, report: &Report) -> Vec<Element> {
     layout.y += 1.0;
     parts.push(layout.heading(&report.question, TITLE, 1, 40.0));
     layout.y += 2.0;
-    parts.push(layout.paragraph(&report.subject, SUBJECT, whole));
+    parts.push(layout.paragraph(&marks_together(&report.subject), SUBJECT, whole));
     layout.y += 8.0;
     let mut remarks = report.remarks.iter();
     if let Some(verdict) = remarks.next() {
@@ -82,6 +90,14 @@ fn head(layout: &mut Layout, report: &Report) -> Vec<Element> {
         parts.push(Element::new(Kind::List, items));
     }
     parts
+}
+
+/// The marks of a job, each on one line unless it is long.
+fn marks_together(subject: &str) -> String {
+    const BETWEEN: &str = " · ";
+    const MOST_LETTERS: usize = 60;
+    let glued = |mark: &str| if mark.chars().count() > MOST_LETTERS { mark.to_owned() } else { mark.replace(' ', "\u{a0}") };
+    subject.split(BETWEEN).map(glued).collect::<Vec<_>>().join("\u{a0}· ")
 }
 
 /// What is to be seen at once: on a ground of its own.
@@ -128,8 +144,29 @@ fn warnings(layout: &mut Layout, report: &Report) -> Vec<Element> {
     parts
 }
 
+/// A section of single values.
+fn values(
+    layout: &mut Layout,
+    (heading, own): (&str, &[Field]),
+    decimal: char,
+    counts: Counts<'_>,
+) -> Vec<Element> {
+    if own.is_empty() {
+        return Vec::new();
+    }
+    let mut parts = vec![layout.section(heading)];
+    parts.extend(fields::all(layout, own, decimal, counts));
+    parts
+}
+
 fn tables(layout: &mut Layout, report: &Report, counts: Counts<'_>) -> Vec<Element> {
-    report.tables.iter().flat_map(|sheet| table::sheet(layout, sheet, report.decimal, counts)).collect()
+    let filled: Vec<_> = report.tables.iter().filter(|sheet| table::rows(sheet) > 0).collect();
+    if filled.is_empty() {
+        return Vec::new();
+    }
+    let mut parts = vec![layout.section(&report.headings.tables)];
+    parts.extend(filled.into_iter().flat_map(|sheet| table::sheet(layout, sheet, report.decimal, counts)));
+    parts
 }
 
 fn equations(layout: &mut Layout, report: &Report) -> Vec<Element> {
@@ -158,20 +195,25 @@ fn equation(layout: &mut Layout, equation: &Equation) -> Vec<Element> {
     let mut parts = vec![layout.paragraph(&said, VALUE, (LEFT, WIDTH))];
     if !equation.formula.is_empty() {
         layout.y += 1.0;
-        let lines: Vec<Line> = equation.formula.iter().map(|line| fitting(line, WIDTH - INDENT)).collect();
+        let lines: Vec<Line> = equation.formula.iter().flat_map(|line| fitting(line, WIDTH - INDENT)).collect();
         let leaves = layout.lines(lines, LEFT + INDENT);
         parts.push(Element::of_leaves(Kind::Formula(printable(&equation.formula.join(" "))), leaves));
     }
     parts
 }
 
-/// A line of a formula, in smaller letters where it is long: broken it would be another formula.
-fn fitting(text: &str, room: f32) -> Line {
+/// A line of a formula; a long one in somewhat smaller letters, a very long one broken between its terms.
+fn fitting(text: &str, room: f32) -> Vec<Line> {
+    const SMALLEST: f32 = 0.85;
     let line = FORMULA.line(text);
-    if line.width <= room {
-        return line;
+    let share = room / line.width.max(1.0);
+    if share >= 1.0 {
+        vec![line]
+    } else if share >= SMALLEST {
+        vec![Style { size: FORMULA.size * share, ..FORMULA }.line(text)]
+    } else {
+        FORMULA.lines(text, room)
     }
-    Style { size: FORMULA.size * room / line.width, ..FORMULA }.line(text)
 }
 
 /// What made the answer, so that it can be asked again.

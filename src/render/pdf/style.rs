@@ -4,7 +4,7 @@ use krilla::color::rgb::Color;
 use textwrap::core::Fragment;
 use textwrap::wrap_algorithms::{Penalties, wrap_first_fit, wrap_optimal_fit};
 
-use super::face::{self, Run, Weight};
+use super::face::{self, GLUE, Run, Weight};
 
 /// Face, size in points, colour.
 #[derive(Debug, Clone, Copy)]
@@ -69,7 +69,7 @@ impl Style {
 
     /// The text on one line, however long.
     pub(super) fn line(self, text: &str) -> Line {
-        let runs = face::shaped(&face::printable(text), self.weight);
+        let runs = face::shaped(&face::printable(text).replace(GLUE, " "), self.weight);
         let width = runs.iter().map(|run| run.width).sum::<f32>() * self.size;
         Line { runs, style: self, width }
     }

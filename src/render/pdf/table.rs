@@ -8,7 +8,7 @@ use super::style::{CELL, FAINT, GROUP, HEAD, Line, NOTE, RULE};
 use crate::render::report::{Counted, Counts, Datum, Field, Sheet};
 
 /// Rows of a longer table that are shown.
-pub(super) const MOST_ROWS: usize = 40;
+pub(super) const MOST_ROWS: usize = 30;
 /// Letters of a cell that are shown.
 const MOST_LETTERS: usize = 240;
 /// Between columns, points.
@@ -16,7 +16,7 @@ const GAP: f32 = 9.0;
 /// A column of words is no wider unless there is room, points.
 const WORDS_WIDE: f32 = 170.0;
 /// Above and below the lines of a row, points.
-const PAD: f32 = 1.6;
+const PAD: f32 = 1.2;
 
 /// A column as it is printed.
 #[derive(Debug, Clone)]
@@ -28,10 +28,7 @@ pub(super) struct Printed {
 
 /// A table of the answer: all rows, or some of a long one with the count said.
 pub(super) fn sheet(layout: &mut Layout, sheet: &Sheet, decimal: char, counts: Counts<'_>) -> Vec<Element> {
-    let rows = sheet.table.columns.iter().map(length).max().unwrap_or(0);
-    if rows == 0 {
-        return Vec::new();
-    }
+    let rows = rows(sheet);
     let (chosen, note) = chosen(&sheet.table.columns, rows, counts);
     let columns: Vec<Printed> = sheet
         .table
@@ -53,13 +50,18 @@ pub(super) fn sheet(layout: &mut Layout, sheet: &Sheet, decimal: char, counts: C
             Printed { head, is_number, cells }
         })
         .collect();
-    layout.skip(10.0);
+    layout.skip(6.0);
     let mut elements = vec![layout.heading(&sheet.title, GROUP, 3, 50.0)];
     if let Some(note) = note {
         elements.push(layout.paragraph(&note, NOTE, (LEFT, WIDTH)));
     }
     elements.extend(grid(layout, columns));
     elements
+}
+
+/// How many rows a table has: what the job did not ask for has none.
+pub(super) fn rows(sheet: &Sheet) -> usize {
+    sheet.table.columns.iter().map(length).max().unwrap_or(0)
 }
 
 fn length(column: &Column) -> usize {
@@ -223,11 +225,7 @@ fn rule(layout: &mut Layout, height: f32, end: f32) {
 }
 
 /// A list of alike things: what each has, in columns.
-pub(super) fn of_items(
-    layout: &mut Layout,
-    items: &[(String, Vec<&Field>)],
-    decimal: char,
-) -> Vec<Element> {
+pub(super) fn of_items<'f>(layout: &mut Layout, items: &[(String, Vec<&'f Field>)], decimal: char) -> Vec<Element> {
     let mut names: Vec<(&str, &str, &str)> = Vec::new();
     for field in items.iter().flat_map(|(_, fields)| fields) {
         let name = field.way.last().map_or("", String::as_str);
@@ -238,12 +236,12 @@ pub(super) fn of_items(
     let mut columns =
         vec![Printed { head: String::new(), is_number: false, cells: items.iter().map(|(title, _)| title.clone()).collect() }];
     for (name, label, unit) in names {
-        let own = |fields: &[&Field]| {
-            fields.iter().find(|field| field.way.last().is_some_and(|last| last == name)).map(|field| field.value.clone())
+        let own = |fields: &[&'f Field]| {
+            fields.iter().find(|field| field.way.last().is_some_and(|last| last == name)).copied()
         };
         let values: Vec<_> = items.iter().map(|(_, fields)| own(fields)).collect();
-        let is_number = values.iter().flatten().all(|value| matches!(value, Datum::Number(_)));
-        let cells = values.iter().map(|value| value.as_ref().map(|value| figures::datum(value, decimal)).unwrap_or_default());
+        let is_number = values.iter().flatten().all(|value| matches!(value.value, Datum::Number(_)));
+        let cells = values.iter().map(|value| value.map(|value| figures::datum(value, decimal)).unwrap_or_default());
         let head = if unit.is_empty() { label.to_owned() } else { format!("{label}, {unit}") };
         columns.push(Printed { head, is_number, cells: cells.map(|cell| shortened(&cell)).collect() });
     }
