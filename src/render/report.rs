@@ -99,9 +99,9 @@ pub struct Field {
 impl Field {
     /// Its place as a JSON Pointer.
     pub fn pointer(&self) -> String {
-        self.way.iter().fold(String::new(), |pointer, step| {
-            format!("{pointer}/{}", step.replace('~', "~0").replace('/', "~1"))
-        })
+        self.way
+            .iter()
+            .fold(String::new(), |pointer, step| format!("{pointer}/{}", step.replace('~', "~0").replace('/', "~1")))
     }
 }
 
@@ -143,4 +143,60 @@ pub struct Equation {
     pub formula: Vec<String>,
     /// Where it comes from.
     pub source: String,
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use precut_calc::calculator::Column;
+
+    pub(in crate::render) fn sheet(columns: Vec<Column>) -> Sheet {
+        let heads = columns.iter().map(|column| (column.name.to_string(), column.unit.to_owned())).collect();
+        Sheet { title: "Table".to_owned(), heads, table: Table { id: "table", columns } }
+    }
+
+    pub(in crate::render) fn field(way: &[&str], group: &str, value: Datum) -> Field {
+        Field {
+            way: way.iter().map(|step| (*step).to_owned()).collect(),
+            group: group.to_owned(),
+            label: way.last().map_or(String::new(), |step| (*step).to_owned()),
+            value,
+            digits: 5,
+            unit: "mm".to_owned(),
+        }
+    }
+
+    pub(in crate::render) fn report(tables: Vec<Sheet>) -> Report {
+        let words = |text: &str| text.to_owned();
+        Report {
+            language: "en",
+            decimal: '.',
+            title: words("Toy"),
+            question: words("How far does it bend?"),
+            subject: words("length 3 mm"),
+            remarks: vec![words("It bends."), words("It does so everywhere.")],
+            warnings: vec![words("it is a toy")],
+            results: vec![field(&["sag_mm"], "", Datum::Number(0.25))],
+            inputs: vec![field(&["bar", "length_mm"], "Bar", Datum::Number(3.0))],
+            pictures: Vec::new(),
+            tables,
+            equations: vec![Equation {
+                number: words("toy/1"), formula: vec![words("y = x²")], source: words("none")
+            }],
+            references: vec![words("A book")],
+            origin: vec![(words("key"), words("b3:00"))],
+            signature: words("precut 0 toy 1 b3:00"),
+            headings: Headings {
+                answer: words("Answer"),
+                warnings: words("Warnings"),
+                results: words("Results"),
+                inputs: words("Inputs"),
+                tables: words("Tables"),
+                equations: words("Equations"),
+                references: words("Literature"),
+                origin: words("Origin"),
+                columns: ["group", "field", "value", "unit", "place"].map(words),
+            },
+        }
+    }
 }

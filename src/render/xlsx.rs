@@ -4,7 +4,9 @@
 //! whatever they begin with. The same answer gives the same bytes.
 
 use precut_calc::calculator::Cells;
-use rust_xlsxwriter::{DocProperties, ExcelDateTime, Format, FormatAlign, FormatBorder, Workbook, Worksheet, XlsxError};
+use rust_xlsxwriter::{
+    DocProperties, ExcelDateTime, Format, FormatAlign, FormatBorder, Workbook, Worksheet, XlsxError,
+};
 
 use super::report::{Datum, Field, Report, Sheet};
 
@@ -297,8 +299,50 @@ fn sheet_name(wanted: &str, taken: &[String]) -> String {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
+    use crate::render::report::tests::{report, sheet};
+    use calamine::{Data, Reader, Xlsx};
+    use precut_calc::calculator::Column;
+    use std::borrow::Cow;
+    use std::io::Cursor;
+
+    #[test]
+    fn what_is_too_large_is_refused_before_it_is_made() {
+        let numbers = vec![1.0; MOST_CELLS / 4 + 1];
+        let columns = ["a", "b", "c", "d"].map(|name| Column::numbers(name, "mm", &numbers));
+        let fault = xlsx(&report(vec![sheet(columns.into())])).unwrap_err();
+        assert!(matches!(fault, XlsxFault::TooLarge(2_000_004)), "{fault}");
+        let long = Column::numbers("a", "mm", &vec![1.0; MOST_LINES]);
+        assert!(matches!(xlsx(&report(vec![sheet(vec![long])])), Err(XlsxFault::TooLarge(_))));
+    }
+
+    #[test]
+    fn numbers_read_back_bit_for_bit_and_words_as_they_are() {
+        let numbers = [0.1 + 0.2, -1e-300, 1.797e308, 5e-324, 1e15 + 0.3, -0.0, f64::NAN];
+        let words = ["=1+1", "'x", "", "a\u{1}b\n\tc", "_x0041_", "1e5"];
+        let mut words: Vec<Cow<'static, str>> = words.map(Cow::from).into();
+        words.push("y".repeat(40_000).into());
+        let columns = vec![Column::numbers("a", "mm", &numbers), Column::words("b", words.clone())];
+        let bytes = xlsx(&report(vec![sheet(columns)])).unwrap();
+        let mut book: Xlsx<_> = Xlsx::new(Cursor::new(bytes)).unwrap();
+        let range = book.worksheet_range_at(2).unwrap().unwrap();
+        for (row, (number, word)) in numbers.iter().zip(&words).enumerate() {
+            let cell = range.get((row + 1, 0)).cloned().unwrap_or_default();
+            if number.is_finite() {
+                assert_eq!(cell, Data::Float(*number));
+            } else {
+                assert_eq!(cell, Data::Empty);
+            }
+            let cell = range.get((row + 1, 1)).cloned().unwrap_or_default();
+            match word.as_ref() {
+                "" => assert_eq!(cell, Data::Empty),
+                word if word.len() > MOST_LETTERS => assert!(cell.to_string().ends_with('…')),
+                word => assert_eq!(cell, Data::String(word.to_owned())),
+            }
+        }
+    }
 
     #[test]
     fn names_of_sheets_are_allowed_and_differ() {

@@ -164,7 +164,8 @@ fn answered(meta: &Meta, answer: &str) -> ResponseBuilder {
             Media::Xlsx => "A workbook: the answer in words, its inputs, and every table on a sheet of its own.",
             Media::Pdf => "A report: verdict, warnings, pictures, numbers, inputs, tables, equations (PDF/A-2a).",
         };
-        let content = if matches!(media, Media::Xlsx | Media::Pdf) { parts::file_of(text) } else { parts::text_of(text) };
+        let content =
+            if matches!(media, Media::Xlsx | Media::Pdf) { parts::file_of(text) } else { parts::text_of(text) };
         response = response.content(media.essence(), content);
     }
     response

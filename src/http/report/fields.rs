@@ -100,7 +100,8 @@ impl<'d> Fields<'d> {
     ) {
         let shapes = fitting(forms, fields);
         for (name, value) in fields {
-            let own: Vec<_> = shapes.iter().filter_map(|(form, of)| Some((form["properties"].get(name)?, *of))).collect();
+            let own: Vec<_> =
+                shapes.iter().filter_map(|(form, of)| Some((form["properties"].get(name)?, *of))).collect();
             let component = own.first().map_or("", |(_, component)| component);
             let forms = self.forms(own);
             let unit = forms.iter().find_map(|(form, _)| form["x-unit"].as_str().or(form["items"]["x-unit"].as_str()));
@@ -120,7 +121,8 @@ impl<'d> Fields<'d> {
             return;
         }
         if items.iter().all(|item| !matches!(item, Tree::Object(_) | Tree::List(..))) {
-            let mut said: Vec<String> = items.iter().take(MOST_VALUES).map(|item| self.single(&inner, item, place)).collect();
+            let mut said: Vec<String> =
+                items.iter().take(MOST_VALUES).map(|item| self.single(&inner, item, place)).collect();
             if count > said.len() {
                 said.push(format!("… ({count})"));
             }
@@ -144,7 +146,8 @@ impl<'d> Fields<'d> {
     }
 
     fn field(&self, forms: &Forms<'d>, value: Datum, place: &Place<'_>) -> Field {
-        let (label, around) = place.names.split_last().map_or((String::new(), &[][..]), |(last, rest)| (last.clone(), rest));
+        let (label, around) =
+            place.names.split_last().map_or((String::new(), &[][..]), |(last, rest)| (last.clone(), rest));
         let unit = forms.iter().find_map(|(form, _)| form["x-unit"].as_str()).unwrap_or_default();
         // `as objective_unit says`: the field of that name that stands nearest.
         let said = unit.strip_prefix("as ").and_then(|rest| rest.strip_suffix(" says"));
@@ -203,5 +206,9 @@ fn fitting<'d>(forms: &Forms<'d>, fields: &[(String, Tree)]) -> Forms<'d> {
         })
     };
     let fitting: Forms<'d> = forms.iter().filter(|(form, _)| fits(form)).copied().collect();
-    if fitting.is_empty() { forms.iter().filter(|(form, _)| form["properties"].is_object()).copied().collect() } else { fitting }
+    if fitting.is_empty() {
+        forms.iter().filter(|(form, _)| form["properties"].is_object()).copied().collect()
+    } else {
+        fitting
+    }
 }

@@ -93,7 +93,8 @@ impl Vocabulary {
             let parts: Vec<&str> = text.split(joint).collect();
             // Between the words of a sentence there are spaces, too.
             let is_list = parts.len() > 1 && (*joint != " " || parts.iter().any(|part| part.contains('_')));
-            let parts: Option<Vec<&str>> = is_list.then(|| parts.iter().map(|part| self.code(part)).collect()).flatten();
+            let parts: Option<Vec<&str>> =
+                is_list.then(|| parts.iter().map(|part| self.code(part)).collect()).flatten();
             parts.map(|parts| capitalised(&parts.join(said)))
         })
     }

@@ -15,7 +15,7 @@ const NAME: f32 = COLUMN * 0.56;
 /// Between a name and its value.
 const GAP: f32 = 6.0;
 /// Values that are shown.
-const MOST_FIELDS: usize = 400;
+const MOST_FIELDS: usize = 300;
 
 /// Everything of these.
 pub(super) fn all(layout: &mut Layout, all: &[Field], decimal: char, counts: Counts<'_>) -> Vec<Element> {
@@ -133,10 +133,7 @@ fn group(layout: &mut Layout, title: &str, fields: &[&Field], decimal: char) -> 
 }
 
 fn marks(lines: &[Line], x: f32, y: f32) -> Vec<Mark> {
-    let place = |(index, line): (usize, &Line)| Mark::Text {
-        x,
-        y: y + index as f32 * VALUE.leading(),
-        line: line.clone(),
-    };
+    let place =
+        |(index, line): (usize, &Line)| Mark::Text { x, y: y + index as f32 * VALUE.leading(), line: line.clone() };
     lines.iter().enumerate().map(place).collect()
 }

@@ -47,7 +47,8 @@ pub(super) fn column_texts(cells: &[Option<f64>], decimal: char) -> Vec<String> 
         Ok(decimals) if is_even => number::at_most(value, decimals),
         _ => significant(value, DIGITS),
     };
-    let texts: Vec<String> = cells.iter().map(|cell| cell.filter(|value| value.is_finite()).map(text).unwrap_or_default()).collect();
+    let texts: Vec<String> =
+        cells.iter().map(|cell| cell.filter(|value| value.is_finite()).map(text).unwrap_or_default()).collect();
     if !is_even {
         return texts.into_iter().map(|text| with_decimal(text, decimal)).collect();
     }

@@ -17,7 +17,7 @@ use usvg::{Options, Tree};
 use self::face::{FAMILY, database, printable};
 use self::layout::{Element, Kind, LEFT, Layout, Mark, WIDTH};
 use self::style::{
-    ALARM, ALARM_TINT, BODY, FORMULA, KICKER, NOTE, SUBJECT, Style, TINT, TITLE, VALUE, VERDICT, ACCENT, Line,
+    ACCENT, ALARM, ALARM_TINT, BODY, FORMULA, KICKER, Line, NOTE, SUBJECT, Style, TINT, TITLE, VALUE, VERDICT,
 };
 use super::report::{Counts, Equation, Field, Report};
 
@@ -96,7 +96,8 @@ fn head(layout: &mut Layout, report: &Report) -> Vec<Element> {
 fn marks_together(subject: &str) -> String {
     const BETWEEN: &str = " · ";
     const MOST_LETTERS: usize = 60;
-    let glued = |mark: &str| if mark.chars().count() > MOST_LETTERS { mark.to_owned() } else { mark.replace(' ', "\u{a0}") };
+    let glued =
+        |mark: &str| if mark.chars().count() > MOST_LETTERS { mark.to_owned() } else { mark.replace(' ', "\u{a0}") };
     subject.split(BETWEEN).map(glued).collect::<Vec<_>>().join("\u{a0}· ")
 }
 
@@ -145,12 +146,7 @@ fn warnings(layout: &mut Layout, report: &Report) -> Vec<Element> {
 }
 
 /// A section of single values.
-fn values(
-    layout: &mut Layout,
-    (heading, own): (&str, &[Field]),
-    decimal: char,
-    counts: Counts<'_>,
-) -> Vec<Element> {
+fn values(layout: &mut Layout, (heading, own): (&str, &[Field]), decimal: char, counts: Counts<'_>) -> Vec<Element> {
     if own.is_empty() {
         return Vec::new();
     }
@@ -223,4 +219,101 @@ fn origin(layout: &mut Layout, report: &Report) -> Vec<Element> {
         parts.push(layout.paragraph(&format!("{name}: {value}"), NOTE, (LEFT, WIDTH)));
     }
     parts
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::render::report::tests::{field, report, sheet};
+    use crate::render::report::{Counted, Datum, Picture};
+    use precut_calc::calculator::Column;
+    use proptest::prelude::*;
+    use std::borrow::Cow;
+
+    fn counts(count: Counted) -> String {
+        format!("{count:?}")
+    }
+
+    fn pages(pdf: &[u8]) -> usize {
+        lopdf::Document::load_mem(pdf).unwrap().get_pages().len()
+    }
+
+    fn words(pdf: &[u8]) -> String {
+        let document = lopdf::Document::load_mem(pdf).unwrap();
+        let pages: Vec<u32> = document.get_pages().into_keys().collect();
+        document.extract_text(&pages).unwrap().split_whitespace().collect::<Vec<_>>().join(" ")
+    }
+
+    #[test]
+    fn equal_reports_give_equal_bytes() {
+        let one = pdf(&report(Vec::new()), &counts).unwrap();
+        assert_eq!(one, pdf(&report(Vec::new()), &counts).unwrap());
+        let text = words(&one);
+        for said in
+            ["How far does it bend?", "It bends.", "it is a toy", "0.25 mm", "toy/1 none", "y = x²", "Page(1, 1)"]
+        {
+            assert!(text.contains(said), "{said} in {text}");
+        }
+    }
+
+    #[test]
+    fn whatever_comes_in_masses_takes_few_pages() {
+        let numbers: Vec<f64> = (0..200_000).map(f64::from).collect();
+        let columns = (0..12).map(|_| Column::numbers("a", "mm", &numbers)).collect();
+        let names = vec![Cow::from("x".repeat(100_000)); 500];
+        let many = |group: &str| {
+            let name = |index: usize| format!("{group}{index}");
+            (0..5000)
+                .map(|index| field(&[&name(index)], &name(index / 7), Datum::Word("w ".repeat(index % 40))))
+                .collect()
+        };
+        let whole = Report {
+            inputs: many("i"),
+            results: many("r"),
+            ..report(vec![sheet(columns), sheet(vec![Column::words("names", names)])])
+        };
+        let made = pdf(&whole, &counts).unwrap();
+        assert!(pages(&made) < 40, "{}", pages(&made));
+        let text = words(&made);
+        for said in ["EvenRows(30, 200000)", "FirstRows(30, 500)", "Fields(300, 5000)", "199999"] {
+            assert!(text.contains(said), "{said}");
+        }
+    }
+
+    #[test]
+    fn pictures_are_text_and_lines_and_may_hold_any_letters() {
+        let svg = "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"960\" height=\"3000\"><style>text{font-family:\
+                   system-ui,sans-serif}</style><text x=\"9\" y=\"30\">零 Вал µ ≤ &lt;b&gt;</text></svg>";
+        let picture = Picture { svg: svg.to_owned(), description: "零".to_owned() };
+        let whole = Report { pictures: vec![picture], ..report(Vec::new()) };
+        let text = words(&pdf(&whole, &counts).unwrap());
+        // Its letters are placed one by one.
+        assert!(text.replace(' ', "").contains("U+96F6Валµ≤<b>"), "{text}");
+        let broken = Picture { svg: "no picture".to_owned(), description: String::new() };
+        assert!(matches!(
+            pdf(&Report { pictures: vec![broken], ..report(Vec::new()) }, &counts),
+            Err(PdfError::Picture(_))
+        ));
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(16))]
+        /// Nothing that anyone may name a thing breaks the document or the rules of its standard.
+        #[test]
+        fn any_text_can_be_set(text in "\\PC{0,60}", other in any::<String>()) {
+            let columns = vec![Column::words("b", vec![text.clone().into(), other.clone().into()])];
+            let whole = Report {
+                title: other.clone(),
+                subject: text.clone(),
+                remarks: vec![text.clone(), other.clone()],
+                warnings: vec![other.clone()],
+                inputs: vec![field(&[&text], &other, Datum::Word(text.clone()))],
+                equations: vec![Equation { number: text.clone(), formula: vec![other.clone()], source: text.clone() }],
+                ..report(vec![sheet(columns)])
+            };
+            let made = pdf(&whole, &counts).map_err(|error| TestCaseError::fail(error.to_string()))?;
+            prop_assert!(made.starts_with(b"%PDF-1.7"));
+        }
+    }
 }

@@ -66,7 +66,9 @@ pub(super) fn painted(
 /// The rules of the standard that are broken, not the fonts that they are broken with.
 fn told(error: &KrillaError) -> String {
     let mut told = match error {
-        KrillaError::Validation(errors) => format!("{:?}", errors.iter().map(|(error, _)| error).take(3).collect::<Vec<_>>()),
+        KrillaError::Validation(errors) => {
+            format!("{:?}", errors.iter().map(|(error, _)| error).take(3).collect::<Vec<_>>())
+        }
         other => other.to_string(),
     };
     told.truncate(told.char_indices().nth(400).map_or(told.len(), |(end, _)| end));
@@ -84,7 +86,9 @@ fn metadata(report: &Report) -> Metadata {
         .language(report.language.to_owned())
         .creator("precut".to_owned())
         .producer("precut".to_owned())
-        .creation_date(DateTime::new(NO_DATE).month(1).day(1).hour(0).minute(0).second(0).utc_offset_hour(0).utc_offset_minute(0))
+        .creation_date(
+            DateTime::new(NO_DATE).month(1).day(1).hour(0).minute(0).second(0).utc_offset_hour(0).utc_offset_minute(0),
+        )
         .document_id(report.signature.clone())
 }
 
@@ -168,7 +172,7 @@ fn group(element: &Element, places: &[Option<Identifier>]) -> Node {
 fn tag(kind: &Kind) -> TagKind {
     match kind {
         Kind::Heading(level, text) => {
-            Tag::Hn(NonZeroU16::new(*level).unwrap_or(NonZeroU16::MIN), Some(text.clone())).into()
+            Tag::Hn(NonZeroU16::new(*level).unwrap_or(NonZeroU16::MIN), Some(spoken(text))).into()
         }
         Kind::Paragraph => Tag::P.into(),
         Kind::List => Tag::L(ListNumbering::Disc).into(),
@@ -178,7 +182,12 @@ fn tag(kind: &Kind) -> TagKind {
         Kind::Row => Tag::TR.into(),
         Kind::Head => Tag::TH(TableHeaderScope::Both).into(),
         Kind::Cell => Tag::TD.into(),
-        Kind::Figure(seen) => Tag::Figure(Some(seen.clone())).into(),
-        Kind::Formula(text) => Tag::Formula(Some(text.clone())).into(),
+        Kind::Figure(seen) => Tag::Figure(Some(spoken(seen))).into(),
+        Kind::Formula(text) => Tag::Formula(Some(spoken(text))).into(),
     }
+}
+
+/// What is said in place of something: the standard asks that it be something.
+fn spoken(text: &str) -> String {
+    if text.trim().is_empty() { "–".to_owned() } else { text.to_owned() }
 }

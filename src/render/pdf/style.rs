@@ -82,10 +82,15 @@ impl Style {
             .split(' ')
             .filter(|word| !word.is_empty())
             .flat_map(|word| self.broken(word, room))
-            .map(|(text, is_end)| Word { width: self.width(&text).into(), space: if is_end { space } else { 0.0 }, text })
+            .map(|(text, is_end)| Word {
+                width: self.width(&text).into(),
+                space: if is_end { space } else { 0.0 },
+                text,
+            })
             .collect();
         let room = [f64::from(room)];
-        let lines = wrap_optimal_fit(&words, &room, &Penalties::new()).unwrap_or_else(|_| wrap_first_fit(&words, &room));
+        let lines =
+            wrap_optimal_fit(&words, &room, &Penalties::new()).unwrap_or_else(|_| wrap_first_fit(&words, &room));
         lines.into_iter().map(|line| self.line(&joined(line))).collect()
     }
 

@@ -43,7 +43,8 @@ pub(super) fn sheet(layout: &mut Layout, sheet: &Sheet, decimal: char, counts: C
                     (true, column_texts(&picked, decimal))
                 }
                 Cells::Words(cells) => {
-                    let picked = chosen.iter().map(|row| cells.get(*row).map(|word| shortened(word)).unwrap_or_default());
+                    let picked =
+                        chosen.iter().map(|row| cells.get(*row).map(|word| shortened(word)).unwrap_or_default());
                     (false, picked.collect())
                 }
             };
@@ -148,10 +149,8 @@ fn drawn(layout: &mut Layout, mut block: Vec<(Printed, f32)>) -> Element {
     let rows = block.iter().map(|(column, _)| column.cells.len()).max().unwrap_or(0);
     layout.y += 3.0;
     layout.need(head_height + 3.0 * CELL.leading());
-    let leaves: Vec<usize> = head_marks(layout.y, &heads, &block, &places)
-        .into_iter()
-        .map(|marks| layout.put(marks))
-        .collect();
+    let leaves: Vec<usize> =
+        head_marks(layout.y, &heads, &block, &places).into_iter().map(|marks| layout.put(marks)).collect();
     let cells = leaves.into_iter().map(|leaf| Element::of_leaves(Kind::Head, vec![leaf])).collect();
     let mut lines = vec![Element::new(Kind::Row, cells)];
     rule(layout, head_height, end);
@@ -233,8 +232,11 @@ pub(super) fn of_items<'f>(layout: &mut Layout, items: &[(String, Vec<&'f Field>
             names.push((name, &field.label, &field.unit));
         }
     }
-    let mut columns =
-        vec![Printed { head: String::new(), is_number: false, cells: items.iter().map(|(title, _)| title.clone()).collect() }];
+    let mut columns = vec![Printed {
+        head: String::new(),
+        is_number: false,
+        cells: items.iter().map(|(title, _)| title.clone()).collect(),
+    }];
     for (name, label, unit) in names {
         let own = |fields: &[&'f Field]| {
             fields.iter().find(|field| field.way.last().is_some_and(|last| last == name)).copied()
