@@ -87,6 +87,10 @@ pub(super) fn printable(text: &str) -> String {
             GLUE => printable.push(GLUE),
             c if c.is_whitespace() => printable.push(' '),
             '\u{ad}' | '\u{200b}'..='\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}' => {}
+            // From right to left: lines here go the other way.
+            '\u{590}'..='\u{8ff}' | '\u{fb1d}'..='\u{fdff}' | '\u{fe70}'..='\u{fefc}' => {
+                printable.push_str(&numbered(character));
+            }
             // Of private use: without a meaning to whom it was not told.
             '\u{e000}'..='\u{f8ff}' | '\u{f0000}'.. => printable.push_str(&numbered(character)),
             c if c.is_ascii_graphic() || FACES[0].has(c) || FACES[2].has(c) => printable.push(c),
