@@ -27,7 +27,9 @@ impl Vocabulary {
     pub(super) fn of(documents: [&Value; 2], root: &str, language: Language) -> Self {
         let glossary = Glossary::of(language);
         let mut own = Self { language, glossary, names: HashMap::new(), stems: HashMap::new() };
-        documents.into_iter().for_each(|document| own.walk(document, root));
+        for document in documents {
+            own.walk(document, root);
+        }
         own
     }
 
