@@ -36,7 +36,7 @@ pub(crate) use place::FreeColumns;
 pub(crate) use place::{CellKind, Step, TableColumn, TablePlace};
 pub(crate) use result_text::{Unwritable, append as append_result};
 pub(crate) use shape::Shape;
-pub(crate) use way::way;
+pub(crate) use way::{forms, way};
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

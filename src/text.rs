@@ -18,12 +18,12 @@ mod number;
 mod template;
 
 pub(crate) use described::described;
-pub(crate) use glossary::Glossary;
+pub(crate) use glossary::{Glossary, capitalised};
 pub(crate) use kept::{datum, reworded, reworded_rows};
 pub use language::Language;
 pub(crate) use mark::{Mark, Said, told};
 pub use notice::{Notice, Remark};
-pub(crate) use number::significant;
+pub(crate) use number::{significant, spoken_number};
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, LazyLock, OnceLock};

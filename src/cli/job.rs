@@ -29,6 +29,10 @@ pub(super) enum Form {
     Svg,
     /// Its program for the machine
     Gcode,
+    /// Its inputs and all of its tables as a workbook
+    Xlsx,
+    /// All of it as a report on paper
+    Pdf,
 }
 
 impl From<Form> for Media {
@@ -38,6 +42,8 @@ impl From<Form> for Media {
             Form::Csv => Self::Csv,
             Form::Svg => Self::Svg,
             Form::Gcode => Self::Gcode,
+            Form::Xlsx => Self::Xlsx,
+            Form::Pdf => Self::Pdf,
         }
     }
 }
@@ -48,13 +54,14 @@ pub(super) fn solve(arguments: &SolveArgs, registry: &Registry, language: Langua
     let part = match arguments.format {
         Form::Csv => arguments.table.as_deref(),
         Form::Svg => arguments.figure.as_deref(),
-        Form::Json | Form::Gcode => None,
+        Form::Json | Form::Gcode | Form::Xlsx | Form::Pdf => None,
     };
     let stored = solve_with(registry, &calculator, body, &model, &Unwatched)?;
     let bytes = written(&stored, arguments.format.into(), part, language)?;
     match &arguments.output {
         Some(path) => std::fs::write(path, &bytes).map_err(|error| Failed::Machine(named(path, &error))),
-        None if bytes.ends_with(b"\n") => print(&bytes),
+        // A byte more would be a fault of the file.
+        None if bytes.ends_with(b"\n") || matches!(arguments.format, Form::Xlsx | Form::Pdf) => print(&bytes),
         None => print(&bytes).and_then(|()| print(b"\n")),
     }
 }

@@ -28,6 +28,7 @@ Examples:
   precut example deflection-compensation          a complete job file, ready to run
   precut example deflection-compensation | precut solve -
   precut solve job.json --format gcode -o shaft.nc
+  precut solve job.json --format pdf -o report.pdf
   precut solve diag.json --measured shaft.csv     what was measured, from a file beside the job
   precut solve job.json --model lathe-7.json      with the causes that a diagnosis found
   precut solve job.json --data ./data             the same by the name in the job, from the service's database

@@ -12,7 +12,7 @@ use super::model;
 use crate::key::{ENGINE_VERSION, Key};
 use crate::registry::{Entry, UnreadableResult};
 use crate::store::{KeptResult, StoreError};
-use crate::text::Language;
+use crate::text::{Language, Mark};
 
 /// A job as it came.
 #[derive(Debug, Clone)]
@@ -121,6 +121,13 @@ impl Stored {
             Value::String(word) => Some(word),
             other => Some(other.to_string()),
         }
+    }
+    /// What tells its job from others of the same calculator; nothing of a very large job.
+    pub(crate) fn marks(&self) -> Vec<Mark> {
+        /// Jobs with more have measured tables, and reading one as a tree takes many times its size.
+        const MOST_BYTES: usize = 1 << 20;
+        let job = (self.input.len() <= MOST_BYTES).then(|| serde_json::from_slice(&self.input).ok()).flatten();
+        job.map(|job| super::summary::hallmarks(&self.entry, &job)).unwrap_or_default()
     }
     /// Which calculator made it.
     pub fn entry(&self) -> &Arc<Entry> {

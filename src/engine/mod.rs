@@ -37,6 +37,7 @@ pub use answer::{Body, CacheState, Checked, Solved, Stored, TablePart, Timings};
 pub use compare::{ModelComparison, Sides};
 pub use error::{Error, SyntaxFault};
 pub use jobs::{Answered, Ask, Feed, Isolation, Job};
+pub(crate) use json::top_level_field;
 pub use model::ModelContent;
 pub use models::{GivenModel, ModelAnswer, ModelError, ModelFile, ModelSource, NoShelf, OnShelf, Shelf, StoredModel};
 pub use progress::Interim;

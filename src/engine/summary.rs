@@ -124,7 +124,8 @@ fn marks(registry: &Registry, entry: &Arc<Entry>, job: &Value) -> Vec<Mark> {
     told
 }
 
-fn hallmarks(entry: &Entry, job: &Value) -> Vec<Mark> {
+/// What a calculator declares that its jobs are known by.
+pub(super) fn hallmarks(entry: &Entry, job: &Value) -> Vec<Mark> {
     let declared = entry.meta().hallmarks;
     if declared.is_empty() {
         return Vec::new();

@@ -12,16 +12,21 @@ use axum::response::Response;
 use bytes::Bytes;
 use precut_calc::calculator::{Figure, Meta, Value, Values};
 use serde::Deserialize;
+use tokio::sync::Semaphore;
 
 use super::negotiate::{self, Media};
 use super::problem::Problem;
 use super::query::Query;
-use super::{CACHE_STATE, codes};
+use super::{CACHE_STATE, codes, report};
 use crate::engine::{CacheState, ENGINE_VERSION, Stored, Timings};
 use crate::render;
 use crate::text::{Glossary, Language, Texts, fingerprint};
 
 const SERVER_TIMING: HeaderName = HeaderName::from_static("server-timing");
+
+/// So many workbooks and reports are made at once: each takes some ten megabytes while it is made. Who gave up waiting
+/// holds the place until the one that was begun is done.
+static PLACES: Semaphore = Semaphore::const_new(2);
 
 /// Which form of an answer is asked for.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,6 +59,7 @@ pub(super) fn offered(meta: &Meta) -> Vec<Media> {
     offered.extend((!meta.tables.is_empty()).then_some(Media::Csv));
     offered.extend((!meta.figures.is_empty()).then_some(Media::Svg));
     offered.extend(meta.has_program.then_some(Media::Gcode));
+    offered.extend([Media::Xlsx, Media::Pdf]);
     offered
 }
 
@@ -77,7 +83,7 @@ impl View {
         let part = match media {
             Media::Csv => parts.table,
             Media::Svg => parts.figure,
-            Media::Json | Media::Gcode => None,
+            Media::Json | Media::Gcode | Media::Xlsx | Media::Pdf => None,
         };
         Ok(Self { media, part, language: negotiate::language(headers) })
     }
@@ -94,7 +100,7 @@ impl View {
             let _ = write!(tag, "-{ENGINE_VERSION}");
         }
         // and what is put into words then, with the words.
-        if self.media == Media::Svg || self.language != Language::default() {
+        if self.media == Media::Svg || self.media.is_heavy() || self.language != Language::default() {
             let _ = write!(tag, "-{}", fingerprint(self.language));
         }
         tag.push('"');
@@ -115,8 +121,13 @@ pub(super) async fn respond(stored: Arc<Stored>, view: View, condition: &HeaderM
             stored.body.clone()
         } else {
             let stored = stored.clone();
+            let place = if media.is_heavy() { PLACES.acquire().await.ok() } else { None };
             // Reading an answer back, wording and drawing it is work: not on the threads that move bytes.
-            tokio::task::spawn_blocking(move || rendered(&stored, &view)).await.map_err(|_| Problem::internal())??
+            let made = tokio::task::spawn_blocking(move || {
+                let _place = place;
+                rendered(&stored, &view)
+            });
+            made.await.map_err(|_| Problem::internal())??
         };
         let mut response = Response::new(Body::from(body));
         let headers = response.headers_mut();
@@ -192,6 +203,8 @@ fn rendered(stored: &Stored, view: &View) -> Result<Bytes, Problem> {
             let program = stored.program()?.ok_or_else(Problem::internal)?;
             render::gcode(&program, &program_header(stored))
         }
+        Media::Xlsx => return Ok(report::xlsx(stored, view.language)?.into()),
+        Media::Pdf => return Ok(report::pdf(stored, view.language)?.into()),
     };
     Ok(Bytes::from(text))
 }
@@ -204,19 +217,21 @@ fn absent<'a>(code: &'static str, view: &View, ids: impl Iterator<Item = &'a str
 }
 
 fn drawn(figure: &Figure, language: Language) -> String {
+    with_words(figure, language, |wording| render::svg(figure, wording))
+}
+
+/// Makes something of a figure with its words in that language.
+pub(super) fn with_words<T>(figure: &Figure, language: Language, make: impl FnOnce(&render::Wording<'_>) -> T) -> T {
     let texts = Texts::shared();
-    render::svg(
-        figure,
-        &render::Wording {
-            message: &|message| texts.message(language, "figure", message),
-            label: &|code| label(figure, code, language),
-            unit: &|unit| match language {
-                Language::En => render::unit_symbol(unit),
-                Language::Ru => Glossary::of(language).unit(unit),
-            },
-            decimal: language.decimal(),
+    make(&render::Wording {
+        message: &|message| texts.message(language, "figure", message),
+        label: &|code| label(figure, code, language),
+        unit: &|unit| match language {
+            Language::En => render::unit_symbol(unit),
+            Language::Ru => Glossary::of(language).unit(unit),
         },
-    )
+        decimal: language.decimal(),
+    })
 }
 
 /// What a figure calls an axis or a curve. Names that no table of texts has stand in the title's values: as text, or, of

@@ -55,6 +55,7 @@ pub const CODES: &[(&str, u16)] = &[
     ("not_converged", 422),
     ("out_of_model", 422),
     ("too_expensive", 422),
+    ("workbook_too_large", 422),
     ("kept_quota", 429),
     ("too_many_requests", 429),
     ("too_many_streams", 429),

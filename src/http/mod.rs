@@ -25,6 +25,7 @@ mod provenance;
 mod query;
 mod quota;
 mod rate;
+mod report;
 mod results;
 mod server;
 mod workbench;

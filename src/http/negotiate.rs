@@ -18,6 +18,10 @@ pub enum Media {
     Svg,
     /// Its program for the machine.
     Gcode,
+    /// Its inputs and all of its tables as a workbook.
+    Xlsx,
+    /// All of it as a report on paper.
+    Pdf,
 }
 
 impl Media {
@@ -28,17 +32,23 @@ impl Media {
             Self::Csv => "text/csv",
             Self::Svg => "image/svg+xml",
             Self::Gcode => "text/x-gcode",
+            Self::Xlsx => "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet",
+            Self::Pdf => "application/pdf",
         }
     }
 
     /// As in `Content-Type`.
     pub const fn content_type(self) -> &'static str {
         match self {
-            Self::Json => "application/json",
             Self::Csv => "text/csv; charset=utf-8; header=present",
-            Self::Svg => "image/svg+xml",
             Self::Gcode => "text/x-gcode; charset=utf-8",
+            Self::Json | Self::Svg | Self::Xlsx | Self::Pdf => self.essence(),
         }
+    }
+
+    /// Whether making it takes so much that only some are made at a time.
+    pub(super) const fn is_heavy(self) -> bool {
+        matches!(self, Self::Xlsx | Self::Pdf)
     }
 
     /// In entity tags and on the command line.
@@ -48,6 +58,8 @@ impl Media {
             Self::Csv => "csv",
             Self::Svg => "svg",
             Self::Gcode => "gcode",
+            Self::Xlsx => "xlsx",
+            Self::Pdf => "pdf",
         }
     }
 }

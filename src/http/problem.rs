@@ -178,6 +178,12 @@ impl Problem {
         Self::new(StatusCode::NOT_FOUND, code).with("name", name.to_owned())
     }
 
+    /// An answer with more numbers than a workbook is made of.
+    pub(super) fn too_large_for_a_workbook(cells: usize, most: usize) -> Self {
+        let problem = Self::new(StatusCode::UNPROCESSABLE_ENTITY, "workbook_too_large");
+        problem.with("cells", cells as f64).with("most", most as f64)
+    }
+
     /// A model that breaks rules.
     pub(super) fn invalid_model(findings: Vec<Finding>) -> Self {
         let total = findings.len();

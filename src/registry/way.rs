@@ -50,7 +50,12 @@ pub(crate) fn way(document: &Value, root: &str, tokens: &[String]) -> Way {
 const DEEPEST: usize = 16;
 
 /// What a node may be, each with its type's name: references followed, variants beside each other.
-fn forms<'d>(document: &'d Value, node: &'d Value, component: &'d str, depth: usize) -> Vec<(&'d Value, &'d str)> {
+pub(crate) fn forms<'d>(
+    document: &'d Value,
+    node: &'d Value,
+    component: &'d str,
+    depth: usize,
+) -> Vec<(&'d Value, &'d str)> {
     if depth > DEEPEST {
         return Vec::new();
     }

@@ -47,8 +47,12 @@ fn cell(column: &Column, row: usize) -> String {
 /// formula, gets an apostrophe in front, and so does one that begins with an apostrophe. To read it back, take one
 /// apostrophe away where there is one. Numbers are numbers: they need none.
 fn defused(word: &str) -> String {
-    const BEGINS: [char; 7] = ['=', '+', '-', '@', '\t', '\r', '\''];
-    if word.starts_with(BEGINS) { format!("'{word}") } else { word.to_owned() }
+    if begins_a_formula(word) || word.starts_with('\'') { format!("'{word}") } else { word.to_owned() }
+}
+
+/// Whether a spreadsheet would take a word that is typed in for a formula.
+pub(super) fn begins_a_formula(word: &str) -> bool {
+    word.starts_with(['=', '+', '-', '@', '\t', '\r'])
 }
 
 #[cfg(test)]

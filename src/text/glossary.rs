@@ -106,6 +106,11 @@ impl Glossary {
         self.get("word", word).or_else(|| self.get("said", word)).map_or_else(|| word.replace('_', " "), str::to_owned)
     }
 
+    /// The same, if there is a word for it.
+    pub(crate) fn known(&self, word: &str) -> Option<&str> {
+        self.get("word", word).or_else(|| self.get("said", word))
+    }
+
     /// What a value of a choice or a field is called where it stands alone: its word, else the field's label.
     pub(crate) fn name(&self, code: &str) -> String {
         let own = self.get("word", code).or_else(|| self.get("said", code)).map(capitalised);
@@ -198,7 +203,7 @@ fn derived(field: &str, unit: Option<&str>) -> String {
     capitalised(&bare.unwrap_or(field).replace('_', " "))
 }
 
-pub(super) fn capitalised(text: &str) -> String {
+pub(crate) fn capitalised(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }

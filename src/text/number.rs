@@ -43,6 +43,11 @@ fn trimmed(number: &str) -> &str {
     if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { number }
 }
 
+/// A number as it stands where nothing says how it is read.
+pub(crate) fn spoken_number(x: f64, language: Language) -> String {
+    spoken(&read(x), language)
+}
+
 /// A number as it stands in a sentence of that language.
 pub(super) fn spoken(number: &str, language: Language) -> String {
     match language.decimal() {

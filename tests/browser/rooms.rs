@@ -282,9 +282,14 @@ fn results_are_downloaded_in_every_form() {
     let Some((_turn, mut page, service)) = both() else { return };
     page.open(&service.page("deflection-compensation"));
     page.until(SETTLED);
-    for (button, ending, begins) in
-        [("JSON", "json", "{\"calculator\""), ("CSV", "csv", "z"), ("SVG", "svg", "<svg"), ("G-code", "nc", "")]
-    {
+    for (button, ending, begins) in [
+        ("JSON", "json", "{\"calculator\""),
+        ("CSV", "csv", "z"),
+        ("XLSX", "xlsx", "PK"),
+        ("PDF", "pdf", "%PDF-1.7"),
+        ("SVG", "svg", "<svg"),
+        ("G-code", "nc", ""),
+    ] {
         page.click_on(button);
         let start = Instant::now();
         let text = loop {
@@ -292,14 +297,15 @@ fn results_are_downloaded_in_every_form() {
                 std::fs::read_dir(page.downloads.path()).unwrap().map(|file| file.unwrap().path()).collect();
             let found = files.iter().find(|file| file.extension().is_some_and(|own| own == ending));
             // It is there before it is complete.
-            let text = found.map(|file| std::fs::read_to_string(file).unwrap()).unwrap_or_default();
+            let text = found.map(|file| std::fs::read(file).unwrap()).unwrap_or_default();
+            let text = String::from_utf8_lossy(&text).into_owned();
             if text.len() > 200 {
                 break text;
             }
             assert!(start.elapsed() < Duration::from_secs(20), "no .{ending} in {files:?}");
             std::thread::sleep(Duration::from_millis(50));
         };
-        assert!(text.starts_with(begins), "{button}: {}", &text[..text.len().min(100)]);
+        assert!(text.starts_with(begins), "{button}: {}", text.chars().take(100).collect::<String>());
     }
     // The other forms in the page itself.
     page.click("#tab-tables");

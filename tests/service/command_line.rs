@@ -357,3 +357,21 @@ async fn a_job_names_a_model_of_a_data_folder_whoever_serves_from_it() {
     assert!(String::from_utf8_lossy(&refused.stderr).contains(place), "{refused:?}");
     assert_eq!(std::fs::read_dir(place).unwrap().count(), 0);
 }
+
+/// A byte more, as a line feed at the end, would be a fault of such a file.
+#[test]
+fn reports_and_workbooks_are_written_as_they_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("ring.json");
+    std::fs::write(&file, precut(&["example", "ring-clamping"]).stdout).unwrap();
+    let file = file.to_str().unwrap();
+    for (format, begins) in [("pdf", &b"%PDF-1.7"[..]), ("xlsx", b"PK")] {
+        let path = folder.path().join(format);
+        let written = precut(&["solve", file, "--format", format, "--lang", "ru", "--output", path.to_str().unwrap()]);
+        assert!(written.status.success(), "{}", String::from_utf8_lossy(&written.stderr));
+        let printed = precut(&["solve", file, "--format", format, "--lang", "ru"]).stdout;
+        assert!(printed.starts_with(begins), "{format}");
+        assert_eq!(std::fs::read(&path).unwrap(), printed, "{format}");
+        assert_ne!(precut(&["solve", file, "--format", format]).stdout, printed, "{format} in English");
+    }
+}

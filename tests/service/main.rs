@@ -24,6 +24,7 @@ mod limits;
 mod models;
 mod negotiation;
 mod owners;
+mod paper;
 mod process;
 mod quotas;
 mod results;

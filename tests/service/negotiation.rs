@@ -61,7 +61,9 @@ async fn what_does_not_exist_is_not_acceptable_and_the_problem_lists_what_does()
         let response = server.post(toy::JOB).header("accept", accept).send().await.unwrap();
         let document = problem(response, 406, "not_acceptable").await;
         let detail = document["detail"].as_str().unwrap();
-        for kind in ["application/json", "text/csv", "image/svg+xml", "text/x-gcode"] {
+        for kind in
+            ["application/json", "text/csv", "image/svg+xml", "text/x-gcode", "spreadsheetml.sheet", "application/pdf"]
+        {
             assert!(detail.contains(kind), "{kind} in {detail}");
         }
     }

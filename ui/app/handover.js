@@ -54,6 +54,9 @@ export function printAlone(page, owns, key) {
 /** A file of an answer is told from others by the beginning of its key. */
 export const fileName = (id, answer) => `${id}-${answer.key.slice(3, 11)}`;
 
+/** The media type of a workbook. */
+export const WORKBOOK = 'application/vnd.openxmlformats-officedocument.spreadsheetml.sheet';
+
 /** Every form in which the answer can be had. */
 export function Downloads({ id, description, answer, figure, stale, owns }) {
   const [take, trouble] = useHandOver({ name: fileName(id, answer), answer, owns });
@@ -63,6 +66,8 @@ export function Downloads({ id, description, answer, figure, stale, owns }) {
     <span class="downloads" role="group" aria-label=${t('download')}><span class="quiet">${t('download')}</span>
       ${button('JSON', 'application/json', 'json')}
       ${has('text/csv') && button('CSV', 'text/csv', 'csv')}
+      ${has(WORKBOOK) && button('XLSX', WORKBOOK, 'xlsx')}
+      ${has('application/pdf') && button('PDF', 'application/pdf', 'pdf')}
       ${has('image/svg+xml') && figure && button('SVG', 'image/svg+xml', 'svg', `?figure=${figure.id}`)}
       ${has('text/x-gcode') && button(t('gcode'), 'text/x-gcode', 'nc')}
       <button type="button" disabled=${stale} onClick=${() => { if (owns(answer.key)) window.print(); }}>${t('print')}</button>

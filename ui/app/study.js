@@ -9,7 +9,7 @@ import { keepRun, keptRun, inputOf } from './runs.js';
 import { Progress, Trouble } from './status.js';
 import { Picture } from './figure.js';
 import { Warnings, usePictureHeight, short } from './result.js';
-import { Downloads } from './handover.js';
+import { Downloads, WORKBOOK } from './handover.js';
 import { RequestView } from './tabs.js';
 import { Sheet } from './values.js';
 import { parts, namesOf, spoken as labelled, within } from './schema.js';
@@ -22,7 +22,7 @@ const OWN = ['calculator', 'vary', 'combine', 'outputs', 'study', 'run'];
 /** What the words of a varied field are called on this page. */
 const OF_VARIED = new Map([['from', 'from'], ['to', 'to'], ['count', 'number_of_values'], ['values', 'value'], ['spacing', 'spacing']]);
 /** What the list of downloads wants to know of a calculator. */
-const DECLARED = { media_types: ['application/json', 'text/csv', 'image/svg+xml'] };
+const DECLARED = { media_types: ['application/json', 'text/csv', 'image/svg+xml', WORKBOOK, 'application/pdf'] };
 
 const said = (query, name, otherwise) => {
   try { return query.get(name) ? JSON.parse(query.get(name)) : otherwise; } catch { return otherwise; }

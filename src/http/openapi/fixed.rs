@@ -127,11 +127,7 @@ fn read_result() -> OperationBuilder {
     ))
     .header("Content-Language", parts::text_header("Language of the sentences: `en` or `ru`.", "en"))
     .header("Precut-Cache", parts::text_header("Always `hit`: nothing is computed.", "hit"));
-    for (media, text) in
-        [(Media::Csv, "One of its tables."), (Media::Svg, "One of its figures."), (Media::Gcode, "Its program.")]
-    {
-        response = response.content(media.essence(), parts::text_of(text));
-    }
+    response = parts::other_forms(response);
     let key = json!("b3:0000000000000000000000000000000000000000000000000000000000000000");
     let operation = operation(
         "results",

@@ -238,11 +238,7 @@ fn result() -> OperationBuilder {
         .header("Content-Language", parts::text_header("Language of the sentences: `en` or `ru`.", "en"))
         .header("Precut-Cache", parts::text_header("Always `hit`: nothing is computed.", "hit"))
         .header("Server-Timing", parts::text_header("Where the time went, ms.", "parse;dur=0.000"));
-    for (media, text) in
-        [(Media::Csv, "One of its tables."), (Media::Svg, "One of its figures."), (Media::Gcode, "Its program.")]
-    {
-        response = response.content(media.essence(), parts::text_of(text));
-    }
+    response = parts::other_forms(response);
     let operation = operation(
         "read_job_result",
         "What did that job come to?",

@@ -10,6 +10,7 @@ use utoipa::openapi::schema::{KnownFormat, ObjectBuilder, SchemaFormat, SchemaTy
 use utoipa::openapi::security::SecurityRequirement;
 use utoipa::openapi::{Content, Object, Ref, RefOr, Required, Schema};
 
+use crate::http::negotiate::Media;
 use crate::http::problem::ProblemDocument;
 use crate::text::Remark;
 
@@ -246,6 +247,26 @@ pub(super) fn json_of(schema: &str) -> Content {
 pub(super) fn text_of(text: &str) -> Content {
     let schema = ObjectBuilder::new().schema_type(SchemaType::new(Type::String)).description(Some(text)).build();
     Content::new(Some(schema))
+}
+
+/// Bytes that are no text.
+pub(super) fn file_of(text: &str) -> Content {
+    let binary = SchemaFormat::KnownFormat(KnownFormat::Binary);
+    let schema = ObjectBuilder::new().schema_type(SchemaType::new(Type::String)).format(Some(binary));
+    Content::new(Some(schema.description(Some(text)).build()))
+}
+
+/// The forms of an answer beside JSON, whichever calculator made it.
+pub(super) fn other_forms(mut response: ResponseBuilder) -> ResponseBuilder {
+    for (media, text) in
+        [(Media::Csv, "One of its tables."), (Media::Svg, "One of its figures."), (Media::Gcode, "Its program.")]
+    {
+        response = response.content(media.essence(), text_of(text));
+    }
+    for (media, text) in [(Media::Xlsx, "All of its tables as a workbook."), (Media::Pdf, "All of it as a report.")] {
+        response = response.content(media.essence(), file_of(text));
+    }
+    response
 }
 
 /// Headers of what can be asked for again.

@@ -161,8 +161,12 @@ fn answered(meta: &Meta, answer: &str) -> ResponseBuilder {
             Media::Csv => "One table; header `name [unit]`, decimal points, UTF-8.",
             Media::Svg => "One figure, worth printing.",
             Media::Gcode => "The program for the machine; `422` while a station has no command.",
+            Media::Xlsx => "A workbook: the answer in words, its inputs, and every table on a sheet of its own.",
+            Media::Pdf => "A report: verdict, warnings, pictures, numbers, inputs, tables, equations (PDF/A-2a).",
         };
-        response = response.content(media.essence(), parts::text_of(text));
+        let content =
+            if matches!(media, Media::Xlsx | Media::Pdf) { parts::file_of(text) } else { parts::text_of(text) };
+        response = response.content(media.essence(), content);
     }
     response
 }

@@ -115,7 +115,7 @@ fn open(
          viewBox=\"0 0 960 {height}\" role=\"img\">\n"
     );
     put!(page, "<title>{}</title>\n", Escaped(&(wording.message)(&figure.title)));
-    put!(page, "<desc>{}</desc>\n", Escaped(&description(figure, wording)));
+    put!(page, "<desc>{}</desc>\n", Escaped(&described(figure, wording)));
     let has_ribbons = ribbon::any(&figure.panels);
     put!(page, "<style>{}{}", style::CSS, if has_ribbons { style::RIBBONS } else { "" });
     for diverging in [false, true] {
@@ -137,8 +137,8 @@ fn open(
     }
 }
 
-/// Each axis with its curves and what they span.
-fn description(figure: &Figure, wording: &Wording<'_>) -> String {
+/// A figure in words, for those who cannot see it: each axis with its curves and what they span.
+pub fn described(figure: &Figure, wording: &Wording<'_>) -> String {
     let named = |axis: Axis| match (wording.unit)(axis.unit) {
         unit if unit.is_empty() => (wording.label)(axis.label),
         unit => format!("{}, {unit}", (wording.label)(axis.label)),
