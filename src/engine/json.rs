@@ -318,6 +318,7 @@ impl<'de> Visitor<'de> for Strict<'_> {
     fn visit_map<A: MapAccess<'de>>(self, mut access: A) -> Result<Value, A::Error> {
         let inside = self.inside()?;
         let mut fields = Map::with_capacity(self.width.get());
+        let mut left_out = Vec::new();
         let mut width = 0;
         while let Some(name) = access.next_key_seed(Name(self.shape))? {
             let shape = self.shape.field(&name);
@@ -341,6 +342,9 @@ impl<'de> Visitor<'de> for Strict<'_> {
                     };
                     match value {
                         Ok(value) => {
+                            if value.is_null() && shape.is_some_and(Shape::is_left_out_by_null) {
+                                left_out.push(place.key().clone());
+                            }
                             place.insert(value);
                         }
                         Err(error) => return Err(self.failed(Step::Key(place.key().clone()), error)),
@@ -349,6 +353,10 @@ impl<'de> Visitor<'de> for Strict<'_> {
             }
         }
         self.width.set(width);
+        // Until here, so that a key twice is seen.
+        for name in left_out {
+            fields.remove(&name);
+        }
         Ok(Value::Object(fields))
     }
 }

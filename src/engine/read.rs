@@ -315,6 +315,11 @@ mod tests {
             "youngs_modulus_n_per_mm2": 210_000.0, "measurements": [], "steady": null,
         });
         assert_eq!(key(&plain()), key(&same));
+        let left_out = json!({
+            "length_mm": 500, "segments": [{"diameter_mm": 20}], "youngs_modulus_n_per_mm2": null, "support": null,
+            "stations": null, "measurements": null, "effects": null,
+        });
+        assert_eq!(key(&plain()), key(&left_out));
         assert_ne!(key(&plain()), key(&with("length_mm", json!(501))));
     }
 
@@ -339,12 +344,13 @@ mod tests {
             "support": {"kind": "elastic", "compliance_um_per_n": 99, "stiffness": 3},
             "steady": {"kind": "elastik"},
             "stations": "many",
+            "length_mm": null,
             "mode": "plane",
             "effects": [{"kind": "bar"}, {"diameter_mm": 3}],
         });
         let expected = [
             ("unknown_field", "/lenght_mm"),
-            ("missing_field", "/length_mm"),
+            ("wrong_type", "/length_mm"),
             ("wrong_type", "/youngs_modulus_n_per_mm2"),
             ("unknown_field", "/segments/1/colour"),
             ("out_of_range", "/segments/1/diameter_mm"),

@@ -4,6 +4,7 @@
 //! A shape is wider than the schema: the variants of a union are one. What does not fit a shape breaks the schema.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 use serde_json::Value;
 
@@ -22,11 +23,20 @@ pub(crate) struct Shape {
     text: bool,
     /// Nothing is said of what stands here.
     open: bool,
+    /// A field that need not be there, and whose value is never null: null says that it is not there.
+    optional: bool,
 }
 
 /// A place of which nothing is known.
-static OPEN: Shape =
-    Shape { fields: BTreeMap::new(), further: None, items: None, most_items: None, text: true, open: true };
+static OPEN: Shape = Shape {
+    fields: BTreeMap::new(),
+    further: None,
+    items: None,
+    most_items: None,
+    text: true,
+    open: true,
+    optional: false,
+};
 
 impl Shape {
     /// A place of which nothing is known.
@@ -44,7 +54,16 @@ impl Shape {
     /// What either lets stand.
     pub(crate) fn join(&mut self, other: Self) {
         for (name, field) in other.fields {
-            self.fields.entry(name).or_default().join(field);
+            match self.fields.entry(name) {
+                Entry::Occupied(mut own) => {
+                    let optional = own.get().optional && field.optional;
+                    own.get_mut().join(field);
+                    own.get_mut().optional = optional;
+                }
+                Entry::Vacant(place) => {
+                    place.insert(field);
+                }
+            }
         }
         join(&mut self.further, other.further);
         match (&mut self.items, other.items) {
@@ -68,8 +87,15 @@ impl Shape {
     fn add(&mut self, strict: &Value) {
         let Some(map) = strict.as_object() else { return };
         let part = |name: &str| map.get(name);
+        let required = |name: &str| {
+            part("required").and_then(Value::as_array).is_some_and(|all| all.iter().any(|one| one == name))
+        };
         for (name, property) in part("properties").and_then(Value::as_object).into_iter().flatten() {
-            self.fields.entry(name.clone()).or_default().add_or_open(property);
+            // A field of several variants is left out of none that needs it.
+            let elsewhere = self.fields.get(name).is_none_or(|field| field.optional);
+            let field = self.fields.entry(name.clone()).or_default();
+            field.add_or_open(property);
+            field.optional = elsewhere && !required(name) && says_no_null(property);
         }
         if let Some(further) = part("additionalProperties").filter(|further| **further != Value::Bool(false)) {
             self.further.get_or_insert_default().add_or_open(further);
@@ -133,12 +159,26 @@ impl Shape {
         self.text || self.open
     }
 
+    /// Whether null in this field says that it is not there.
+    pub(crate) fn is_left_out_by_null(&self) -> bool {
+        self.optional
+    }
+
     /// What may stand in a list, and how many; nothing where there may be no list.
     pub(crate) fn items(&self) -> Option<(&Self, usize)> {
         match &self.items {
             Some(items) => Some((items, self.most_items.unwrap_or(usize::MAX))),
             None => self.open.then(|| (Self::open(), usize::MAX)),
         }
+    }
+}
+
+/// Whether a schema names types, and null is none of them.
+fn says_no_null(strict: &Value) -> bool {
+    match strict.get("type") {
+        Some(Value::String(kind)) => kind != "null",
+        Some(Value::Array(kinds)) => kinds.iter().all(|kind| kind != "null"),
+        _ => false,
     }
 }
 
@@ -187,5 +227,27 @@ mod tests {
         );
         assert!(shape.field("list").unwrap().items().is_some() && shape.field("whatever").unwrap().items().is_some());
         assert!(shape.field("unknown").is_none());
+    }
+
+    #[test]
+    fn null_leaves_out_what_no_variant_needs_and_none_takes() {
+        let variant = |required: &[&str]| {
+            json!({"type": "object", "required": required, "properties": {
+                "a": {"type": "number"}, "b": {"type": ["number", "null"]}, "c": {}, "d": {"type": "object"},
+            }})
+        };
+        let left_out =
+            |shape: &Shape| ["a", "b", "c", "d"].map(|name| shape.field(name).unwrap().is_left_out_by_null());
+        let free = Shape::of(&variant(&[]));
+        assert_eq!(left_out(&free), [true, false, false, true]);
+        assert_eq!(
+            left_out(&Shape::of(&json!({"allOf": [variant(&["a"]), variant(&[])]}))),
+            [false, false, false, true]
+        );
+        let mut joined = Shape::default();
+        joined.join(free);
+        assert_eq!(left_out(&joined), [true, false, false, true]);
+        joined.join(Shape::of(&variant(&["d"])));
+        assert_eq!(left_out(&joined), [true, false, false, false]);
     }
 }
