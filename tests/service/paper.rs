@@ -178,11 +178,11 @@ async fn a_workbook_of_every_first_example_holds_the_numbers_of_the_json() {
                         let cell = sheet.get((row + 1, place)).unwrap_or(&Data::Empty);
                         match own {
                             Value::Number(own) => {
-                                assert_eq!(cell, &Data::Float(own.as_f64().unwrap()), "{name} {place} {row}")
+                                assert_eq!(cell, &Data::Float(own.as_f64().unwrap()), "{name} {place} {row}");
                             }
                             Value::Null => assert_eq!(cell, &Data::Empty),
                             Value::String(own) => {
-                                assert_eq!(own.is_empty(), *cell == Data::Empty, "{name}: {own} {cell}")
+                                assert_eq!(own.is_empty(), *cell == Data::Empty, "{name}: {own} {cell}");
                             }
                             other => panic!("{other}"),
                         }
