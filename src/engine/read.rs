@@ -320,6 +320,8 @@ mod tests {
             "stations": null, "measurements": null, "effects": null,
         });
         assert_eq!(key(&plain()), key(&left_out));
+        let needed = with("segments", json!([{"diameter_mm": null}]));
+        assert_eq!(faults(&needed), [("wrong_type", "/segments/0/diameter_mm".to_owned())]);
         assert_ne!(key(&plain()), key(&with("length_mm", json!(501))));
     }
 
@@ -344,13 +346,12 @@ mod tests {
             "support": {"kind": "elastic", "compliance_um_per_n": 99, "stiffness": 3},
             "steady": {"kind": "elastik"},
             "stations": "many",
-            "length_mm": null,
             "mode": "plane",
             "effects": [{"kind": "bar"}, {"diameter_mm": 3}],
         });
         let expected = [
             ("unknown_field", "/lenght_mm"),
-            ("wrong_type", "/length_mm"),
+            ("missing_field", "/length_mm"),
             ("wrong_type", "/youngs_modulus_n_per_mm2"),
             ("unknown_field", "/segments/1/colour"),
             ("out_of_range", "/segments/1/diameter_mm"),
