@@ -78,8 +78,8 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
             ${description.examples.map(({ id: name, title: text }) => html`<option value=${name}>${text}</option>`)}
           </select>
           <button type="button" class=${`primary ${waiting ? 'calling' : ''}`} onClick=${() => compute('picture')} title="Ctrl+Enter">${waiting ? t('run_changed') : t('run')}</button>
+          ${own.length > 0 && html`<p class="own-note" role="status">${t('own_used', { parts: own.map(name => labelOf(name, resolve(memberOf(description.input_schema, job).properties[name], description.input_schema)).toLowerCase()).join(', ') })} <a href=${`#/${id}?example=${baseName.example}`}>${t('own_example')}</a></p>`}
         </div>
-        ${own.length > 0 && html`<p class="own-note" role="status">${t('own_used', { parts: own.map(name => labelOf(name, resolve(memberOf(description.input_schema, job).properties[name], description.input_schema)).toLowerCase()).join(', ') })} <a href=${`#/${id}?example=${baseName.example}`}>${t('own_example')}</a></p>`}
         <${Form} key=${`${id} ${baseName.example ?? 'kept'}`} schema=${description.input_schema} value=${job} filled=${answer?.answer.input} onChange=${(next, how) => (how === 'run' ? compute(pane) : desk.change(next, how))} errors=${problem?.errors} examples=${description.jobs} libraries=${libraries} calculator=${id} models=${models} />
       </section>
       <section class="result-pane" aria-label=${t('result')} aria-busy=${pending || running ? 'true' : 'false'}>
