@@ -112,6 +112,8 @@ pub(super) fn webhook() -> PathItem {
     ))
     .parameter(header("traceparent", "Where the call belongs in a trace, if the job does."))
     .request_body(Some(body.build()))
+    // Its signature says who it is from.
+    .securities(Some(Vec::new()))
     .response("2XX", answer("It is taken."))
     .response("410", answer("Nobody is there any more: it is given up at once."))
     .response("default", answer("It is tried again, after longer and longer pauses."));
