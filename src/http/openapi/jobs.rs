@@ -18,6 +18,8 @@ use crate::store::jobs::{JobState, Priority};
 
 const ID: &str = "^[0-9a-f]{8}-[0-9a-f]{4}-7[0-9a-f]{3}-[0-9a-f]{4}-[0-9a-f]{12}$";
 const EXAMPLE: &str = "0198c5f1-8a3e-7c40-b0a1-5e2d9f4c6b7a";
+/// What an address is told that came with a job.
+pub(super) const OVER: &str = "job_is_over";
 
 /// Address and operations.
 pub(super) fn paths(registry: &Registry) -> Vec<(&'static str, PathItem)> {
@@ -91,7 +93,7 @@ pub(super) fn may_become_one(operation: OperationBuilder) -> OperationBuilder {
 }
 
 /// What the service posts to whoever is told that a job is over.
-pub(super) fn webhook() -> PathItem {
+pub(super) fn callback() -> PathItem {
     let header = |name, text: &str| parts::parameter(name, ParameterIn::Header, text, parts::string()).build();
     let body = RequestBodyBuilder::new()
         .description(Some("The job that is over. The same at every try."))
@@ -99,7 +101,7 @@ pub(super) fn webhook() -> PathItem {
         .content("application/json", parts::json_of("JobEvent"));
     let answer = |text: &str| ResponseBuilder::new().description(text);
     let operation = operation(
-        "job_is_over",
+        OVER,
         "Is that job over?",
         "Posted to the address that came with a job as `callback`, signed as Standard Webhooks has it. It is delivered at \
          least once; `webhook-id` is the same each time. No redirect is followed, and no body of an answer is read.",

@@ -9,7 +9,7 @@ mod rooms;
 
 use std::collections::BTreeMap;
 
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 use utoipa::openapi::path::PathsBuilder;
 use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityScheme};
 use utoipa::openapi::server::ServerBuilder;
@@ -98,12 +98,30 @@ pub fn document(registry: &Registry) -> Value {
             .description(Some("The service that this document comes from."))
             .build()]))
         .paths(paths)
-        .webhooks(Some(PathsBuilder::new().path("job_is_over", jobs::webhook())))
+        .webhooks(Some(PathsBuilder::new().path(jobs::OVER, jobs::callback())))
         .components(Some(components.build()))
         .build();
     let mut document = stable(serde_json::to_value(&api).expect("a document has only words and numbers"));
+    called_back(&mut document);
     named::choices(&mut document);
     document
+}
+
+/// `utoipa` has no callbacks. What it holds as a webhook belongs to the operations that take an address for it; generators
+/// of clients stumble over webhooks, too.
+fn called_back(document: &mut Value) {
+    let Some(mut calls) = document.as_object_mut().and_then(|parts| parts.shift_remove("webhooks")) else { return };
+    document["components"]["callbacks"] =
+        json!({ jobs::OVER: { "{$request.query.callback}": calls[jobs::OVER].take() } });
+    let reference = json!({ jobs::OVER: { "$ref": format!("#/components/callbacks/{}", jobs::OVER) } });
+    let paths = document["paths"].as_object_mut().into_iter().flat_map(|paths| paths.values_mut());
+    for operation in paths.filter_map(Value::as_object_mut).flat_map(|path| path.values_mut()) {
+        let takes_address =
+            |parameters: &Vec<Value>| parameters.iter().any(|parameter| parameter["name"] == "callback");
+        if operation["parameters"].as_array().is_some_and(takes_address) {
+            operation["callbacks"] = reference.clone();
+        }
+    }
 }
 
 /// Extensions (`x-...`) behind the other members and by name: `utoipa` keeps them in a hash map.
