@@ -107,19 +107,19 @@ pub fn document(registry: &Registry) -> Value {
     document
 }
 
-/// `utoipa` has no callbacks. What it holds as a webhook belongs to the operations that take an address for it; generators
-/// of clients stumble over webhooks, too.
+/// `utoipa` has no callbacks. What it holds as a webhook belongs to the operations that take an address for it, in each
+/// written out: one generator of clients stumbles over webhooks, another over references to callbacks.
 fn called_back(document: &mut Value) {
-    let Some(mut calls) = document.as_object_mut().and_then(|parts| parts.shift_remove("webhooks")) else { return };
-    document["components"]["callbacks"] =
-        json!({ jobs::OVER: { "{$request.query.callback}": calls[jobs::OVER].take() } });
-    let reference = json!({ jobs::OVER: { "$ref": format!("#/components/callbacks/{}", jobs::OVER) } });
+    let Some(calls) = document.as_object_mut().and_then(|parts| parts.shift_remove("webhooks")) else { return };
     let paths = document["paths"].as_object_mut().into_iter().flat_map(|paths| paths.values_mut());
     for operation in paths.filter_map(Value::as_object_mut).flat_map(|path| path.values_mut()) {
         let takes_address =
             |parameters: &Vec<Value>| parameters.iter().any(|parameter| parameter["name"] == "callback");
+        let Some(id) = operation["operationId"].as_str() else { continue };
         if operation["parameters"].as_array().is_some_and(takes_address) {
-            operation["callbacks"] = reference.clone();
+            let mut call = calls[jobs::OVER].clone();
+            call["post"]["operationId"] = format!("{id}_is_over").into();
+            operation["callbacks"] = json!({ jobs::OVER: { "{$request.query.callback}": call } });
         }
     }
 }
