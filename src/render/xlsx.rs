@@ -120,7 +120,7 @@ impl Book {
         let sheet = self.sheet(&headings.answer, &report.signature)?;
         let mut page = Page { sheet, line: 0 };
         page.words(&report.title, &looks.title)?;
-        page.words(&report.question, &looks.words)?;
+        page.wrapped(&report.question, &looks.words)?;
         page.words(&report.subject, &looks.quiet)?;
         page.line += 1;
         for (index, remark) in report.remarks.iter().enumerate() {
