@@ -14,7 +14,7 @@
 //! The draws that stand in the tests are kept with their confusion matrices in `tests/trials`: a change that moves an answer is
 //! seen there. `PRECUT_WRITE_TRIALS=1` writes them anew.
 //!
-//! `PRECUT_TRIALS=300 PRECUT_TRIAL_SEED=12345 cargo test --release -p precut-calc diagnosis_trials -- --nocapture`
+//! `PRECUT_TRIALS=300 PRECUT_TRIAL_SEED=12345 cargo test --release -p precut-calc-tests diagnosis_trials -- --nocapture`
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 

@@ -1,6 +1,6 @@
 //! All tests of the crate in one program: what they use of the crate is compiled and linked once, not by every file.
 //!
-//! `cargo test -p precut-calc beam_exact::` runs those of one file.
+//! `cargo test -p precut-calc-tests beam_exact::` runs those of one file.
 #![allow(clippy::needless_pass_by_value, clippy::cast_possible_truncation, clippy::cast_sign_loss)] // tests write jobs
 
 mod beam_closed_forms;
