@@ -26,7 +26,7 @@ class Service:
         binary = os.environ.get("PRECUT") or sys.exit("PRECUT must name the program of the service")
         command = [binary, "serve", "--listen", self._listen, "--data", str(self._folder / "data")]
         with self._log.open("wb") as log:
-            # What takes a tenth of a second is a job, also on a fast machine.
+            # Tests of jobs need one: whatever is expected to take longer than this becomes a job.
             settings = os.environ | {"PRECUT_LIMITS_DIRECT_MS": "100"}
             self._process = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT, env=settings)
         until = time.monotonic() + START_S

@@ -27,7 +27,7 @@ export class Service {
     if (program === undefined) throw new Error("PRECUT must name the program of the service");
     const { promise, resolve, reject } = withResolvers();
     this.#process = spawn(program, ["serve", "--listen", this.#listen, "--data", join(this.#folder, "data")], {
-      // What takes a tenth of a second is a job, also on a fast machine.
+      // Tests of jobs need one: whatever is expected to take longer than this becomes a job.
       env: { ...process.env, PRECUT_LIMITS_DIRECT_MS: "100", ...this.#settings },
     });
     let log = "";

@@ -1,4 +1,4 @@
-// What the compiler finds: checked only, never run.
+// The compiler checks this file; nothing runs it.
 
 import { Precut, type Calculator, type JobEvent } from "precut";
 

@@ -252,7 +252,7 @@ where
         self.centre(settings)
     }
 
-    /// Of a change: as far from what the base holds as else from nothing.
+    /// Sizes that the model is linearised about. Those of a change of a held effect are counted from what the base holds.
     fn expansions(&self, hypothesis: usize) -> Expansions {
         let hypothesis = &self.hypotheses.applicable[hypothesis];
         let mut expansions = M::expansions(&self.prepared, hypothesis);
@@ -271,7 +271,7 @@ where
         of.par_iter().map(|&place| self.slope(settings, place, middle.as_deref())).collect()
     }
 
-    /// What the job allows, and what is not known of the effects of the base.
+    /// Allowances of the job, and the uncertainty of the effects that the base holds.
     fn nuisances(&self) -> Result<Vec<JacobianColumn>, Failure> {
         let Self { prepared, known, allowances, monitor, .. } = self;
         let mut columns = M::nuisances(prepared, &known.effects, allowances, *monitor)?;

@@ -350,7 +350,7 @@ where
     }
 }
 
-/// What is unsure must be there.
+/// Refuses an uncertainty of an effect, or of a parameter, that the base does not have.
 fn check_uncertainty<J, R, W, A>(job: &DiagnosisJob<J, R, W, A>, violations: &mut Violations)
 where
     J: utoipa::ToSchema,

@@ -236,7 +236,7 @@ fn knobs(label: &Label, case: &Case, job: &Job, upper_spread: bool) -> Vec<Knob>
     }
 }
 
-/// Turns the number both ways and solves anew, edges as they are.
+/// Turns the number both ways and solves anew.
 fn try_it(
     price: &mut Price,
     case: &Case,
@@ -314,7 +314,7 @@ fn turned(
     let Some(number) = number(&mut job, &price.pointer) else { return Ok(None) };
     *number *= by.exp();
     let case = Case::of(&job, again.held, again.split.as_ref())?;
-    // The edges are as they are, but for how far each may be used.
+    // How far an edge may be used is one of the numbers.
     let further = capacity(&case) / capacity(as_it_is);
     let plans: Vec<Option<EdgeLimits>> = match &solved.whole {
         Some((limits, _)) => limits.with_neighbours().iter().map(|limits| Some(limits.used_further(further))).collect(),
