@@ -1,5 +1,6 @@
 //! What turns a forward model into one that can be diagnosed.
 
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -76,6 +77,11 @@ pub trait Diagnosable:
         Vec::new()
     }
 
+    /// The same place where it was counted from the other end of the part; `None` where a place has no other end.
+    fn from_other_end(_job: &Self::Job, _point: &Self::Point) -> Option<Self::Point> {
+        None
+    }
+
     /// What comes of the decision that the job's user makes with the effects `believed` (the path that is compensated, the
     /// schedule, the depth), where each of `acting` is what really acts; both stand beside the job's own effects. What
     /// the job leaves to its runs is as in the first. Empty where the job decides nothing.
@@ -121,6 +127,14 @@ pub trait Diagnosable:
     fn predict_ms(_job: &Self::Job) -> f64 {
         0.0
     }
+}
+
+/// What was written down with one of its numbers divided; `None` where it has no such number.
+pub(crate) fn divided<T: Serialize + DeserializeOwned>(own: &T, field: &str, factor: f64) -> Option<T> {
+    let mut fields = serde_json::to_value(own).ok()?;
+    let number = fields.get_mut(field)?;
+    *number = (number.as_f64()? / factor).into();
+    serde_json::from_value(fields).ok()
 }
 
 /// Values of variables that are fields of the effect. Of hypotheses that differ by a label what is stated is what they

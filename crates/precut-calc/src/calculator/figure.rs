@@ -176,6 +176,8 @@ pub enum Item {
     },
     /// A place that can be taken hold of where the picture is a live one; a printed picture does not have it.
     Handle(Handle),
+    /// The place that the setting of the job has in the picture; a printed picture does not have it.
+    Setting(Setting),
 }
 
 /// A place of a picture that numbers of the job follow when it is moved along one axis.
@@ -195,6 +197,44 @@ pub struct Handle {
     pub stops: Vec<f64>,
     /// The numbers that follow it.
     pub moves: Vec<Move>,
+}
+
+/// Where the job stands in a picture. Every other place is another job: [`Calculator::at_place`] says which.
+///
+/// [`Calculator::at_place`]: super::Calculator::at_place
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Setting {
+    /// Code of what it is called.
+    pub name: &'static str,
+    /// Where it is.
+    pub x: f64,
+    /// Where it is. Along a curve, and round a polar picture, the abscissa alone counts.
+    pub y: f64,
+    /// The figure of the other job that shows what a place would give before it is taken; `None` where it is taken at
+    /// once.
+    pub tried_in: Option<&'static str>,
+    /// What stays as it is, and what goes along, when it is put elsewhere.
+    pub about: Option<Said>,
+}
+
+/// Something that is said beside a picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Said {
+    /// Code of the sentence.
+    pub label: &'static str,
+}
+
+/// A place in a picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place<'a> {
+    /// `id` of the figure.
+    pub figure: &'a str,
+    /// Code of the setting that is put there.
+    pub setting: &'a str,
+    /// Abscissa.
+    pub x: f64,
+    /// Ordinate.
+    pub y: f64,
 }
 
 /// An axis of a panel.

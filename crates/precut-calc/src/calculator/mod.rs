@@ -20,9 +20,9 @@ mod table;
 pub use conflict::{Conflict, ConstraintName, ElasticScope, Infeasible, Relaxation};
 pub use consequence::{Allowed, Consequence};
 pub use design::{Condition, Design, Grouping, Smooth};
-pub(crate) use diagnosable::values_by_name;
 pub use diagnosable::{ClassLimits, Diagnosable, LimitCurve, Measurement, NextRun, Reading};
-pub use figure::{Along, Axis, Figure, Frame, Glyph, Handle, Item, Move, Panel, Role, Spacing};
+pub(crate) use diagnosable::{divided, values_by_name};
+pub use figure::{Along, Axis, Figure, Frame, Glyph, Handle, Item, Move, Panel, Place, Role, Said, Setting, Spacing};
 pub use finding::{Finding, Message, Value, Values, Violations};
 pub use forward::{Column as JacobianColumn, ForwardModel, Missing, Prediction, PrepareError, Quantity, Rows};
 pub use hypothesis::{
@@ -65,6 +65,11 @@ pub trait Calculator: Send + Sync + 'static {
     /// The program for the machine, where the answer is one: `None` if this calculator has none,
     /// `Err` if this answer has none (a station without a command).
     fn program(_input: &Self::Input, _output: &Self::Output) -> Option<Result<Program, Failure>> {
+        None
+    }
+
+    /// The job for which another place of a [`Setting`] in a figure stands; `None` where there is none.
+    fn at_place(_input: &Self::Input, _output: &Self::Output, _place: &Place<'_>) -> Option<Self::Input> {
         None
     }
 }

@@ -387,6 +387,11 @@ impl Diagnosable for DeflectionCompensation {
         consequences(job, runs, believed, acting, monitor)
     }
 
+    fn from_other_end(job: &Job, point: &DeflectionPoint) -> Option<DeflectionPoint> {
+        let length = job.shaft.length_mm();
+        Some(DeflectionPoint { z_mm: (length - point.z_mm).clamp(0.0, length) })
+    }
+
     fn place(point: &DeflectionPoint) -> Vec<(&'static str, Option<f64>)> {
         vec![("z_mm", Some(point.z_mm))]
     }

@@ -165,6 +165,12 @@ impl ForwardModel for FeedSchedule {
             }
             cuts.extend(cut.ok());
         }
+        // What is measured is no condition of itself.
+        if quantity == "flank_wear_mm" {
+            for cut in &mut cuts {
+                cut.conditions.flank_wear_mm = None;
+            }
+        }
         if !faults.is_empty() {
             return Err(PrepareError::Invalid(faults));
         }

@@ -126,7 +126,7 @@ pub struct Zone {
     #[schema(minimum = 0.0, maximum = 1e6, example = 0.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("z_1")), ("x-code" = json!("bad_zone"))))]
     pub z_start_mm: f64,
     /// Where it ends.
-    #[schema(minimum = 0.0, maximum = 1e6, example = 150.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("z_2")), ("x-code" = json!("bad_zone"))))]
+    #[schema(minimum = 0.0, maximum = 1e6, example = 150.0, extensions(("x-unit" = json!("mm")), ("x-ends-with" = json!("/shaft/segments/*/length_mm")), ("x-symbol" = json!("z_2")), ("x-code" = json!("bad_zone"))))]
     pub z_end_mm: f64,
     /// Diameter that it is turned to; speed, time and torque are counted at it.
     #[schema(minimum = 0.01, maximum = 10_000.0, example = 80.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("D")), ("x-code" = json!("bad_diameter"))))]

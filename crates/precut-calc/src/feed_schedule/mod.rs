@@ -69,7 +69,8 @@ pub use output::{
 pub use plan::{Compensation, EqualTarget, Method, PassPlan, TradeOff, TradedLimit};
 
 use crate::calculator::{
-    Answer, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Hallmark, Meta, Monitor, Program, Table,
+    Answer, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Hallmark, Meta, Monitor, Place, Program,
+    Table,
 };
 use crate::shaft::places;
 use crate::{force, shaft};
@@ -226,6 +227,10 @@ impl Calculator for FeedSchedule {
 
     fn program(job: &Job, outcome: &Outcome) -> Option<Result<Program, Failure>> {
         Some(toolpath::program(job, outcome))
+    }
+
+    fn at_place(job: &Job, _outcome: &Outcome, place: &Place<'_>) -> Option<Job> {
+        picture::at_place(job, place)
     }
 }
 

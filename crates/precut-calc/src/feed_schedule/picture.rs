@@ -3,15 +3,20 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use crate::calculator::{Axis, Column, Figure, Frame, Glyph, Item, Message, Panel, Role, Table};
-use crate::shaft::Support;
+use crate::calculator::{
+    Along, Axis, Column, Figure, Frame, Glyph, Handle, Item, Message, Move, Panel, Place, Role, Setting, Table,
+};
 use crate::shaft::handles::of_supports;
+use crate::shaft::{Shaft, Support, places};
 
-use super::input::Job;
+use super::input::{Job, Zone};
 use super::output::{Outcome, ZoneOutcome};
+use super::plan::TradedLimit;
 use super::toolpath::path_table;
 
 const Z: Axis = Axis::linear("station", "mm");
+/// A zone whose end is pulled keeps at least this share of its length.
+const LEAST_OF_ZONE: f64 = 0.1;
 
 pub(super) const FIGURE_IDS: &[&str] = &["schedule", "trade_off", "zones_found"];
 pub(super) const TABLE_IDS: &[&str] = &["zones", "binding", "path", "segments", "trade_off", "passes"];
@@ -40,7 +45,9 @@ pub(super) const LABEL_CODES: &[&str] = &[
     "zones_found_figure",
     "limit_factor",
     "objective_value",
+    "handle_zone",
     "objective_over_limit",
+    "limits_as_they_are",
     "zone_count",
     "binds_deflection",
     "binds_spread",
@@ -153,7 +160,32 @@ fn outline(job: &Job, outcome: &Outcome, height: f64) -> Panel {
     }
     // Its zones have diameters of their own: of the shaft nothing can be pulled alone.
     items.extend(job.shaft.iter().flat_map(|shaft| of_supports(shaft, &job.supports)));
+    items.extend(job.zones.windows(2).enumerate().filter_map(|(i, pair)| meeting(job, i, &pair[0], &pair[1])));
     Panel { y: Axis::linear("radius", "mm"), height, items }
+}
+
+/// Where two zones meet within a segment: what one gains the other loses, and neither leaves its segment.
+fn meeting(job: &Job, i: usize, before: &Zone, after: &Zone) -> Option<Item> {
+    let z = before.z_end_mm;
+    let ends_mm = job.shaft.as_ref().map_or_else(|| vec![before.z_start_mm, after.z_end_mm], Shaft::ends_mm);
+    let left = ends_mm.iter().copied().rfind(|end| *end <= z)?;
+    let right = ends_mm.iter().copied().find(|end| *end > z)?;
+    let is_within = places::same(z, after.z_start_mm) && !places::same(z, left) && !places::same(z, right);
+    let keeps = |zone: &Zone| LEAST_OF_ZONE * (zone.z_end_mm - zone.z_start_mm);
+    let least = (before.z_start_mm + keeps(before)).max(left + keeps(before));
+    let most = (after.z_end_mm - keeps(after)).min(right - keeps(after));
+    let follows = |k: usize, field: &str| Move { pointer: format!("/zones/{k}/{field}"), per_unit: 1.0 };
+    (is_within && least <= z && z <= most).then(|| {
+        Item::Handle(Handle {
+            name: "handle_zone",
+            x: z,
+            y: -before.diameter_mm.max(after.diameter_mm) / 2.0,
+            along: Along::X,
+            reach: [least, most],
+            stops: Vec::new(),
+            moves: vec![follows(i, "z_end_mm"), follows(i + 1, "z_start_mm")],
+        })
+    })
 }
 
 fn feeds(outcome: &Outcome, height: f64) -> Panel {
@@ -265,8 +297,36 @@ fn trade_off(outcome: &Outcome) -> Panel {
         "percent" => "percent",
         _ => "1",
     };
-    let items = vec![Item::Line { name: "objective_over_limit", x, y, role: Role::Command }];
+    let here =
+        Setting { name: "limits_as_they_are", x: 1.0, y: outcome.objective, tried_in: Some("schedule"), about: None };
+    let line = Item::Line { name: "objective_over_limit", x, y, role: Role::Command };
+    let items = vec![line, Item::Setting(here)];
     Panel { y: Axis::linear("objective_value", unit), height: 1.0, items }
+}
+
+/// The job of a place on the trade-off curve: all limits of its kind so many times what they are, to four digits.
+pub(super) fn at_place(job: &Job, place: &Place<'_>) -> Option<Job> {
+    let traded = job.trade_off.as_ref().filter(|_| place.figure == "trade_off" && place.x > 0.0)?.limit;
+    let mut next = job.clone();
+    let limits: Vec<&mut Option<f64>> = match traded {
+        TradedLimit::Deflection => next.zones.iter_mut().map(|zone| &mut zone.deflection_max_um).collect(),
+        TradedLimit::Roughness => next.zones.iter_mut().map(|zone| &mut zone.roughness_max_um).collect(),
+        TradedLimit::ToolUsage => next.limits.iter_mut().map(|limits| &mut limits.tool_usage_max).collect(),
+        TradedLimit::Time => next.limits.iter_mut().map(|limits| &mut limits.time_max_min).collect(),
+    };
+    for limit in limits.into_iter().flatten() {
+        *limit = four_digits(*limit * place.x);
+    }
+    Some(next)
+}
+
+fn four_digits(value: f64) -> f64 {
+    if value > 0.0 {
+        let scale = 10_f64.powf(3.0 - value.log10().floor());
+        (value * scale).round() / scale
+    } else {
+        value
+    }
 }
 
 fn found(outcome: &Outcome) -> Panel {

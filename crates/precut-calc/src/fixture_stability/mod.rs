@@ -59,7 +59,7 @@ pub use parts::{TimeRun, forced_motion, lobe_boundary, lobe_map, multiplier_modu
 
 use crate::calculator::{
     Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Hallmark, Message, Meta, Monitor,
-    Table, checkpoint,
+    Place, Table, checkpoint,
 };
 
 use acting::Case;
@@ -165,6 +165,10 @@ impl Calculator for FixtureStability {
 
     fn tables(_job: &FixtureJob, outcome: &FixtureOutcome) -> Vec<Table> {
         picture::tables(outcome)
+    }
+
+    fn at_place(job: &FixtureJob, _outcome: &FixtureOutcome, place: &Place<'_>) -> Option<FixtureJob> {
+        picture::at_place(job, place)
     }
 }
 

@@ -403,7 +403,14 @@ pub struct Simulated {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct ClampForce {
     /// Clamp force below which a joint opens in the steady state; null where the cut chatters and its simulation shows no steady state.
-    #[schema(extensions(("x-unit" = json!("N"))))]
+    #[schema(extensions(
+        ("x-unit" = json!("N")),
+        ("x-bars" = json!({
+            "asks": [["static_movable_n", "static_fixed_n"], ["least_n"], ["least_with_entry_n"]],
+            "needs": ["least_n", "least_with_entry_n"],
+            "set": "/fixture/clamp_force_n",
+        }))
+    ))]
     pub least_n: Option<f64>,
     /// The same with the hard entry.
     #[schema(extensions(("x-unit" = json!("N"))))]

@@ -1,6 +1,6 @@
 //! Figures and tables of an answer.
 
-use crate::calculator::{Axis, Column, Figure, Frame, Item, Message, Panel, Role, Table};
+use crate::calculator::{Axis, Column, Figure, Frame, Item, Message, Panel, Place, Role, Said, Setting, Table};
 
 use super::floquet::Working;
 use super::input::FixtureJob;
@@ -34,6 +34,7 @@ pub(super) const LABEL_CODES: &[&str] = &[
     "refined_boundary",
     "better_speeds",
     "working_point",
+    "feed_per_tooth_stays",
     "working_depth",
     "workpiece_displacement",
     "jaw_displacement",
@@ -171,7 +172,31 @@ fn lobes(job: &FixtureJob, outcome: &FixtureOutcome, lobes: &LobeDiagram) -> Vec
         items.push(Item::Points { name: "better_speeds", x, y, role: Role::After });
     }
     items.push(working);
+    let (x, y) = (outcome.engagement.spindle_speed_rpm, job.cut.depth_mm);
+    items.push(Item::Setting(Setting {
+        name: "working_point",
+        x,
+        y,
+        tried_in: None,
+        about: Some(Said { label: "feed_per_tooth_stays" }),
+    }));
     items
+}
+
+/// The job of a place in the lobe diagram: speed and depth to three digits, the feed per tooth as it is.
+pub(super) fn at_place(job: &FixtureJob, place: &Place<'_>) -> Option<FixtureJob> {
+    let is_lobes = place.figure == "lobes" && place.setting == "working_point" && place.x > 0.0 && place.y > 0.0;
+    is_lobes.then(|| {
+        let mut next = job.clone();
+        (next.cut.spindle_speed_rpm, next.cut.speed_m_per_min) = (Some(three_digits(place.x)), None);
+        next.cut.depth_mm = three_digits(place.y);
+        next
+    })
+}
+
+fn three_digits(value: f64) -> f64 {
+    let scale = 10_f64.powf(2.0 - value.log10().floor());
+    (value * scale).round() / scale
 }
 
 /// A stretch of the cut in time, at the time at which it was: the entry and the last revolution lie too far apart for one

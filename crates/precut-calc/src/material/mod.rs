@@ -15,29 +15,41 @@ use utoipa::ToSchema;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Certainty {
+    /// Measured, with its uncertainty.
+    Measured,
     /// Two independent sources agree, or it is so by definition.
     Confirmed,
+    /// Read in a table that a maker or a handbook published.
+    PublishedTable,
     /// One source, from knowledge of it; agrees with what surrounds it.
     Likely,
+    /// Said by the user.
+    User,
     /// To be checked against its source before it is relied on.
     ToBeChecked,
     /// A typical value of textbooks, not verified against one.
     TextbookUnverified,
+    /// Judged by whoever wrote the record, without a source.
+    Judgement,
 }
 
 impl Certainty {
     /// Whether an answer that rests on such a number has to say so.
     pub fn needs_check(self) -> bool {
-        matches!(self, Self::ToBeChecked | Self::TextbookUnverified)
+        matches!(self, Self::ToBeChecked | Self::TextbookUnverified | Self::Judgement)
     }
 
     /// Its name in the contract.
     pub fn name(self) -> &'static str {
         match self {
+            Self::Measured => "measured",
             Self::Confirmed => "confirmed",
+            Self::PublishedTable => "published_table",
             Self::Likely => "likely",
+            Self::User => "user",
             Self::ToBeChecked => "to_be_checked",
             Self::TextbookUnverified => "textbook_unverified",
+            Self::Judgement => "judgement",
         }
     }
 }

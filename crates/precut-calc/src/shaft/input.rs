@@ -187,7 +187,7 @@ pub enum Support {
     /// A centre: holds against displacement.
     Centre {
         /// Station along the shaft from the headstock end.
-        #[schema(minimum = -100_000.0, maximum = 100_000.0, example = 0.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("z"))))]
+        #[schema(minimum = -100_000.0, maximum = 100_000.0, example = 0.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("z")), ("x-ends-with" = json!("/shaft/segments/*/length_mm"))))]
         z_mm: f64,
         /// Radial compliance.
         #[serde(default)]
@@ -201,7 +201,7 @@ pub enum Support {
     /// A chuck: holds against displacement and rotation; the shaft may go on to both sides.
     Chuck {
         /// Station along the shaft from the headstock end.
-        #[schema(minimum = -100_000.0, maximum = 100_000.0, example = 0.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("z"))))]
+        #[schema(minimum = -100_000.0, maximum = 100_000.0, example = 0.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("z")), ("x-ends-with" = json!("/shaft/segments/*/length_mm"))))]
         z_mm: f64,
         /// Radial compliance.
         #[serde(default)]
@@ -219,7 +219,7 @@ pub enum Support {
     /// A steady rest: stands on the bed.
     SteadyRest {
         /// Station along the shaft from the headstock end.
-        #[schema(minimum = -100_000.0, maximum = 100_000.0, example = 600.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("z"))))]
+        #[schema(minimum = -100_000.0, maximum = 100_000.0, example = 600.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("z")), ("x-ends-with" = json!("/shaft/segments/*/length_mm"))))]
         z_mm: f64,
         /// Radial compliance.
         #[serde(default)]
