@@ -303,7 +303,8 @@ fn suspicions_are_said() {
     let answer = solve(json!({ "radii": rows, "filter": low }));
     assert_eq!(warned(&answer), ["spike_suspected"]);
     let said = serde_json::to_value(&answer.warnings[0].values).unwrap();
-    close(said["angle_deg"].as_f64().unwrap(), 100.0, 1e-9);
+    // Seen from the least-squares centre, which the spike moves by 0.06 um.
+    close(said["angle_deg"].as_f64().unwrap(), 100.0, 2e-4);
     let found = plain(json!({})).output.roundness_um;
     assert_eq!(warned(&plain(json!({ "tolerance_um": found * 1.2 }))), Vec::<&str>::new());
     assert_eq!(warned(&plain(json!({ "tolerance_um": found * 0.8 }))), ["tolerance_exceeded"]);

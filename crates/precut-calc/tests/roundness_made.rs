@@ -164,29 +164,6 @@ fn rows_in_any_order_and_of_any_turns_give_the_same_answer() {
     }
 }
 
-/// The reference circles of the metrology institute, all of them, where they lie beside the project.
-#[test]
-fn the_reference_circles_are_all_asked() {
-    let path =
-        concat!(env!("CARGO_MANIFEST_DIR"), "/..", "/../../../shared/reference/nist/circle2d_reference_pairs.json");
-    let Ok(text) = std::fs::read_to_string(path) else { return };
-    let file: Value = serde_json::from_str(&text).unwrap();
-    let sets = file["sets"].as_array().unwrap();
-    assert_eq!(sets.len(), 30);
-    for set in sets {
-        let rows: Vec<Value> =
-            set["points"].as_array().unwrap().iter().map(|p| json!({ "x_mm": p[0], "y_mm": p[1] })).collect();
-        let found = solve(json!({ "points": rows, "filter": { "kind": "none" } })).output;
-        let number = |value: &Value| value.as_str().unwrap().parse::<f64>().unwrap();
-        let nist = &set["nist_least_squares"];
-        let circle = &found.measured.least_squares;
-        let off =
-            (circle.centre_x_mm - number(&nist["center"][0])).hypot(circle.centre_y_mm - number(&nist["center"][1]));
-        assert!(off < 1e-11, "{}: {off:e}", set["id"]);
-        assert!((2.0 * circle.radius_mm - number(&nist["diameter"])).abs() < 1e-11, "{}", set["id"]);
-    }
-}
-
 /// A section of 25 mm with three and five lobes, as files have it.
 fn radius_mm(deg: f64) -> f64 {
     let angle = deg.to_radians();

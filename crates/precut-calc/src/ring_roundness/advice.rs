@@ -3,7 +3,9 @@
 use crate::calculator::{Finding, Message};
 
 use super::input::{Job, LongWave, Method};
-use super::output::{CauseKind, Fate, Outcome, SearchOutcome, SearchStatus, SimulationOutcome};
+use super::input_ranges::SearchRange;
+use super::output::{CauseKind, Outcome, SimulationOutcome};
+use super::output_settings::{Fate, SearchOutcome, SearchSetting, SearchStatus, SpeedCell};
 use super::scene::Scene;
 use super::stance::{LOOSE_RAD, Stance, through_tip};
 use super::surface::UM_PER_MM;
@@ -39,6 +41,7 @@ pub(super) const WARNING_CODES: &[&str] = &[
     "nearest_samples_no_geometry",
     "points_flew_apart",
     "roots_incomplete",
+    "machine_chatters",
 ];
 
 /// Codes of the explanations made here.
@@ -59,9 +62,14 @@ pub(super) const EXPLANATION_CODES: &[&str] = &[
     "map_empty",
     "search_robust",
     "search_fragile",
+    "search_two_stages",
     "search_beyond",
     "search_odd",
+    "first_stage",
     "second_stage",
+    "map_roundest",
+    "mildest_speed",
+    "worst_at_this_speed",
     "setting_only",
     "ring_not_modelled",
 ];
@@ -71,8 +79,7 @@ pub(super) fn warnings(job: &Job, scene: &Scene, end: &Stance, outcome: &Outcome
     let mut found = Vec::new();
     let setting = &outcome.setting;
     if setting.coefficient_sum > GAIN {
-        let lobing = super::linear::lobing(scene, end);
-        let roots = lobing.near_neutral(1.5, f64::from(job.highest_order) + 0.45);
+        let roots = scene.lobing(end.copying()).near_neutral(1.5, f64::from(job.highest_order) + 0.45);
         let worst = super::linear::worst_of(&roots);
         let mut finding =
             Finding::new("setting_not_diametral_lobes_grow", "/tool").measured(setting.coefficient_sum, GAIN, "1");
@@ -112,6 +119,15 @@ pub(super) fn warnings(job: &Job, scene: &Scene, end: &Stance, outcome: &Outcome
     }
     if let Some(simulation) = &outcome.simulation {
         of_simulation(job, end, simulation, outcome, &mut found);
+    }
+    if let Some(worst) = super::speeds::here(job, scene, end).filter(|worst| worst.is_chatter) {
+        found.push(
+            Finding::new("machine_chatters", "/dynamics")
+                .measured(worst.factor_per_revolution, 1.0, "1")
+                .with("lobes", worst.lobes)
+                .with("frequency_hz", worst.frequency_hz)
+                .with("speed_rpm", worst.work_speed_rpm),
+        );
     }
     if outcome.linear_theory.as_ref().is_some_and(|linear| !linear.complete) {
         found.push(Finding::new("roots_incomplete", "/analyses"));
@@ -177,7 +193,7 @@ pub(super) fn explanation(job: &Job, scene: &Scene, end: &Stance, outcome: &Outc
     let diametral = end.copying().is_diametral();
     let k = setting.compliance_ratio;
     let highest = f64::from(job.highest_order);
-    let growing = super::linear::lobing(scene, end).near_neutral(1.5, highest + 0.45).iter().any(super::linear::grows);
+    let growing = scene.lobing(end.copying()).near_neutral(1.5, highest + 0.45).iter().any(super::linear::grows);
     let code = match (diametral, growing) {
         (true, _) => "opposite_to_support",
         (false, true) => "off_the_diameter",
@@ -216,6 +232,26 @@ pub(super) fn explanation(job: &Job, scene: &Scene, end: &Stance, outcome: &Outc
             ),
             None => said.push(Message::new("map_empty")),
         }
+        if let Some(roundest) = &map.roundest {
+            said.push(
+                Message::new("map_roundest")
+                    .with("tool_angle_deg", roundest.tool_angle_deg)
+                    .with("support_half_angle_deg", roundest.support_half_angle_deg)
+                    .with("roundness_um", roundest.roundness_um),
+            );
+        }
+    }
+    if let Some(speeds) = &outcome.speed_map {
+        let told = |code, cell: &SpeedCell| {
+            Message::new(code)
+                .with("speed_rpm", cell.work_speed_rpm)
+                .with("lobes", cell.lobes)
+                .with("frequency_hz", cell.frequency_hz)
+                .with("factor", cell.factor_per_revolution)
+                .with("made_by", if cell.is_chatter { "machine" } else { "geometry" })
+        };
+        said.extend(speeds.here.iter().map(|cell| told("worst_at_this_speed", cell)));
+        said.extend(speeds.best.iter().map(|cell| told("mildest_speed", cell)));
     }
     if let Some(search) = &outcome.settings_search {
         of_search(job, search, &mut said);
@@ -314,11 +350,36 @@ pub(super) fn back_off_mm(setting: &Setting, radii: &[f64]) -> Option<f64> {
     Some(high)
 }
 
+/// A setting of the search in words.
+fn placed(message: Message, job: &Job, setting: &SearchSetting) -> Message {
+    let off = |of: fn(&SearchRange) -> f64| job.settings_search.as_ref().map_or(0.0, of);
+    let rolls = job.supports.roller_radius_mm > 0.0;
+    message
+        .with("revolutions", setting.revolutions)
+        .with("spark_out_revolutions", setting.spark_out_revolutions)
+        .with("feed_mm_per_rev", setting.feed_mm_per_rev)
+        .with("x_mm", setting.tool_x_mm)
+        .with("y_mm", setting.tool_y_mm)
+        .with("tool_angle_deg", setting.tool_angle_deg)
+        .with("support_half_angle_deg", setting.support_half_angle_deg)
+        .with("support_distance_mm", setting.support_distance_mm)
+        .with("support_depth_mm", setting.support_depth_mm)
+        .with("feed_direction_deg", setting.feed_direction_deg)
+        .with("compliance_ratio", setting.compliance_ratio)
+        .with("robust_share", setting.robust_share)
+        .with("angle_error_deg", off(|range| range.angle_error_deg))
+        .with("waves_error", off(|range| 0.01 * range.blank_waves_error_percent))
+        .with("runout_um", if rolls { off(|range| range.roller_runout_um) } else { 0.0 })
+        .with("roundness_um", setting.roundness_um)
+        .with("margin_um", setting.margin_um)
+}
+
 fn of_search(job: &Job, search: &SearchOutcome, said: &mut Vec<Message>) {
     let target = job.settings_search.map_or(0.0, |range| range.target_um);
     let code = match search.status {
         SearchStatus::Robust => "search_robust",
         SearchStatus::Fragile => "search_fragile",
+        SearchStatus::TwoStages => "search_two_stages",
         SearchStatus::BeyondLimits => "search_beyond",
         SearchStatus::OddLobes => "search_odd",
     };
@@ -329,36 +390,13 @@ fn of_search(job: &Job, search: &SearchOutcome, said: &mut Vec<Message>) {
         .with("odd_lobes_um", search.odd_lobes_um)
         .with("odd_orders", search.odd_orders.iter().map(|order| f64::from(*order)).collect::<Vec<_>>());
     if let Some(best) = &search.best {
-        message = message
-            .with("revolutions", best.revolutions)
-            .with("feed_mm_per_rev", best.feed_mm_per_rev)
-            .with("x_mm", best.tool_x_mm)
-            .with("y_mm", best.tool_y_mm)
-            .with("tool_angle_deg", best.tool_angle_deg)
-            .with("support_half_angle_deg", best.support_half_angle_deg)
-            .with("support_distance_mm", best.support_distance_mm)
-            .with("support_depth_mm", best.support_depth_mm)
-            .with("feed_direction_deg", best.feed_direction_deg)
-            .with("compliance_ratio", best.compliance_ratio)
-            .with("robust_share", best.robust_share)
-            .with("angle_error_deg", job.settings_search.map_or(0.0, |range| range.angle_error_deg))
-            .with("roundness_um", best.roundness_um)
-            .with("margin_um", best.margin_um);
+        message = placed(message, job, best);
     }
     said.push(message);
-    if let Some(stage) = &search.second_stage {
-        said.push(
-            Message::new("second_stage")
-                .with("support_distance_mm", stage.support_distance_mm)
-                .with("revolutions", stage.revolutions)
-                .with("feed_mm_per_rev", stage.feed_mm_per_rev)
-                .with("before_um", stage.before_um)
-                .with("after_um", stage.after_um)
-                .with("tool_angle_deg", stage.tool_angle_deg)
-                .with("x_mm", stage.tool_x_mm)
-                .with("y_mm", stage.tool_y_mm)
-                .with("feed_direction_deg", stage.feed_direction_deg)
-                .with("robust_share", stage.robust_share),
-        );
+    if let Some(stages) = &search.second_stage {
+        for (code, stage) in [("first_stage", &stages.first), ("second_stage", &stages.second)] {
+            let error_um = stage.roundness_error_um;
+            said.push(placed(Message::new(code), job, stage).with("target_um", target).with("error_um", error_um));
+        }
     }
 }

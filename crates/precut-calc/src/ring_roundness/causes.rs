@@ -6,7 +6,7 @@ use crate::calculator::{Failure, checkpoint};
 use super::advice::back_off_mm;
 use super::input::{DEFAULT_SAMPLES, Job};
 use super::linear::grows;
-use super::lobing::{Lobing, of_order};
+use super::lobing::of_order;
 use super::output::{CauseKind, CauseOutcome, CausesOutcome};
 use super::sampling::samples_of;
 use super::scene::Scene;
@@ -38,8 +38,7 @@ pub(super) fn causes(
 ) -> Result<CausesOutcome, Failure> {
     let setting = &scene.setting;
     let teeth_mm = end.radius_per_feed(setting.feed_direction) * setting.feed_mm_per_rev;
-    let lobing = Lobing { copying: end.copying(), compliance_ratio: setting.compliance_ratio };
-    let (roots, _) = lobing.roots(1.5, f64::from(job.highest_order) + 0.45);
+    let (roots, _) = scene.lobing(end.copying()).roots(1.5, f64::from(job.highest_order) + 0.45);
     let growing_lobes_um = (2..=job.highest_order)
         .filter(|order| of_order(&roots, f64::from(*order)).is_some_and(|root| grows(&root)))
         .filter_map(|order| run.surface.harmonic(order))

@@ -39,6 +39,8 @@ pub(super) const CODES: &[&str] = &[
     "wheel_with_compliance",
     "not_with_nearest_samples",
     "search_range_missing",
+    "dynamics_missing",
+    "mode_beyond_orders",
     "range_empty",
     "duplicate_analysis",
     "duplicate_effect",
@@ -198,6 +200,23 @@ fn check_analyses(job: &Job, violations: &mut Violations) {
         let at = "/settings_search/support_angle_to_deg";
         ascends(at, search.support_angle_from_deg, search.support_angle_to_deg, "deg");
     }
+    if let Some(dynamics) = &job.dynamics {
+        let (from, to) = super::speeds::speeds_rpm(job, dynamics);
+        ascends("/speed_map/to_rpm", from, to, "rev/min");
+        let most = f64::from(super::speeds::MOST_ORDER);
+        for (i, mode) in dynamics.modes.iter().enumerate() {
+            let lobes = mode.frequency_hz * 60.0 / dynamics.work_speed_rpm;
+            violations.require(lobes <= most, || {
+                Finding::new("mode_beyond_orders", format!("/dynamics/modes/{i}/frequency_hz"))
+                    .measured(lobes, most, "1")
+                    .with("frequency_hz", mode.frequency_hz)
+                    .with("speed_rpm", dynamics.work_speed_rpm)
+            });
+        }
+    }
+    violations.require(!job.asks(Analysis::SpeedMap) || job.dynamics.is_some(), || {
+        Finding::new("dynamics_missing", "/dynamics")
+    });
     violations.require(!job.asks(Analysis::SettingsSearch) || job.settings_search.is_some(), || {
         Finding::new("search_range_missing", "/settings_search")
     });
@@ -309,7 +328,9 @@ fn impossible(job: &Job, radius_mm: f64) -> Vec<Impossible> {
     let clear = start.tool_clearance_rad();
     // A not-a-number is a fault, too.
     if clear.is_nan() || clear < TOOL_CLEARANCE_RAD {
+        // Where the tip is taken off the support, the ring ends elsewhere, too.
         add("tool_at_support", "/tool", Some((deg(clear), deg(TOOL_CLEARANCE_RAD), "deg")));
+        return found;
     }
     let approach = dot(start.to_tip, setting.feed_direction);
     if approach.is_nan() || approach >= 0.0 {

@@ -6,6 +6,8 @@ use utoipa::{PartialSchema, ToSchema};
 use crate::calculator::{Measured, MeasuredRow};
 use crate::effects::{RingConditions, RingEffect};
 
+use super::input_ranges::{MapRange, SearchRange, SpeedRange};
+
 /// Most steps of a run, revolutions times samples.
 pub(super) const MAX_STEPS: f64 = 2e9;
 /// Nodes of a job that states none.
@@ -43,6 +45,11 @@ pub struct Job {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(extensions(("x-group" = json!("machine")), ("x-advanced" = json!(true))))]
     pub stiffness: Option<Stiffness>,
+    /// Modes of machine and tool with the work speed: chatter that feeds itself. What they give at rest is added to the
+    /// compliance ratio.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(extensions(("x-group" = json!("machine")), ("x-advanced" = json!(true))))]
+    pub dynamics: Option<Dynamics>,
     /// Forces on the ring, to learn whether it stays on its supports.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(extensions(("x-group" = json!("cut"))))]
@@ -78,8 +85,12 @@ pub struct Job {
     pub highest_order: u32,
     /// What is to be found out.
     #[serde(default = "analyses")]
-    #[schema(min_items = 1, max_items = 4, default = json!(["simulation"]), example = json!(["simulation", "linear_theory"]), extensions(("x-group" = json!("evaluation"))))]
+    #[schema(min_items = 1, max_items = 5, default = json!(["simulation"]), example = json!(["simulation", "linear_theory"]), extensions(("x-group" = json!("evaluation"))))]
     pub analyses: Vec<Analysis>,
+    /// Work speeds of the map; acts with the analysis `speed_map`.
+    #[serde(default)]
+    #[schema(extensions(("x-group" = json!("map")), ("x-advanced" = json!(true))))]
+    pub speed_map: SpeedRange,
     /// Tool angles and support angles of the map; acts with the analysis `setup_map`.
     #[serde(default)]
     #[schema(extensions(("x-group" = json!("map")), ("x-advanced" = json!(true))))]
@@ -248,6 +259,56 @@ pub struct Stiffness {
     pub support_b_n_per_mm: f64,
 }
 
+/// Modes of machine and tool in the thrust direction, and how fast the ring turns.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+#[schema(as = RingDynamics)]
+pub struct Dynamics {
+    /// Thrust force per mm of depth, specific force times width.
+    #[schema(minimum = 0.0, maximum = 1e9, example = 20_000.0, extensions(("x-unit" = json!("N/mm")), ("x-symbol" = json!("k_c w"))))]
+    pub cut_n_per_mm: f64,
+    /// Revolutions of the ring per minute.
+    #[schema(minimum = 0.01, maximum = 100_000.0, example = 60.0, extensions(("x-unit" = json!("rev/min")), ("x-symbol" = json!("n_w"))))]
+    pub work_speed_rpm: f64,
+    /// The modes, beside what `compliance_ratio` or `stiffness` state.
+    #[schema(min_items = 1, max_items = 8)]
+    pub modes: Vec<Mode>,
+}
+
+/// A mode, as a hammer test beside the cut finds it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+#[schema(as = RingMode)]
+pub struct Mode {
+    /// What swings.
+    #[serde(default)]
+    #[schema(default = "tool", example = "tool")]
+    pub at: ModePlace,
+    /// Natural frequency.
+    #[schema(minimum = 1.0, maximum = 20_000.0, example = 180.0, extensions(("x-unit" = json!("Hz")), ("x-symbol" = json!("f_n"))))]
+    pub frequency_hz: f64,
+    /// Stiffness of the mode: of the tool in the thrust direction, of a support along its contact normal.
+    #[schema(minimum = 1.0, maximum = 1e15, example = 80_000.0, extensions(("x-unit" = json!("N/mm")), ("x-symbol" = json!("k"))))]
+    pub stiffness_n_per_mm: f64,
+    /// Share of the critical damping.
+    #[schema(minimum = 1e-4, maximum = 0.99, example = 0.04, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("zeta"))))]
+    pub damping_ratio: f64,
+}
+
+/// What swings.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+#[schema(as = RingModePlace)]
+pub enum ModePlace {
+    /// Tool or wheel with its post.
+    #[default]
+    Tool,
+    /// Left support.
+    SupportA,
+    /// Right support.
+    SupportB,
+}
+
 /// Forces on the ring.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
@@ -340,7 +401,7 @@ pub enum Method {
 #[serde(rename_all = "snake_case")]
 #[schema(as = RingErrorEstimate)]
 pub enum ErrorEstimate {
-    /// Half and a third as many: the error is twice the larger difference.
+    /// Half and a third as many: the error is twice the larger difference, and at least four times that of the surfaces.
     #[default]
     HalfSamples,
     /// Twice and half as many: costs two and a half times as much again; more to be trusted.
@@ -356,153 +417,12 @@ pub enum Analysis {
     Simulation,
     /// Which waves grow, stay or decay.
     LinearTheory,
-    /// The same over tool angle and support angle.
+    /// Which waves grow over the work speed, with a machine that swings.
+    SpeedMap,
+    /// Which waves grow, stay or decay over tool angle and support angle.
     SetupMap,
     /// Fewest revolutions to a target roundness within machine limits.
     SettingsSearch,
-}
-
-/// Tool angles and support angles of the map.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields, default)]
-#[schema(as = RingMapRange)]
-pub struct MapRange {
-    /// First tool angle, counter-clockwise from the right, seen from the ring's centre.
-    #[schema(minimum = -60.0, maximum = 240.0, default = 0.0, example = 0.0, extensions(("x-unit" = json!("deg")), ("x-symbol" = json!("alpha_T"))))]
-    pub tool_angle_from_deg: f64,
-    /// Last tool angle.
-    #[schema(minimum = -60.0, maximum = 240.0, default = 180.0, example = 180.0, extensions(("x-unit" = json!("deg")), ("x-symbol" = json!("alpha_T"))))]
-    pub tool_angle_to_deg: f64,
-    /// Tool angles.
-    #[schema(minimum = 2, maximum = 721, default = 91, example = 91, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("n_T"))))]
-    pub tool_angles: u32,
-    /// First support half angle, from the downward vertical.
-    #[schema(minimum = 15.0, maximum = 75.0, default = 15.0, example = 15.0, extensions(("x-unit" = json!("deg")), ("x-symbol" = json!("beta"))))]
-    pub support_angle_from_deg: f64,
-    /// Last support half angle.
-    #[schema(minimum = 15.0, maximum = 75.0, default = 75.0, example = 75.0, extensions(("x-unit" = json!("deg")), ("x-symbol" = json!("beta"))))]
-    pub support_angle_to_deg: f64,
-    /// Support half angles.
-    #[schema(minimum = 2, maximum = 361, default = 61, example = 61, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("n_beta"))))]
-    pub support_angles: u32,
-    /// Highest order looked at.
-    #[schema(minimum = 3, maximum = 60, default = 20, example = 20, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("k_max"))))]
-    pub highest_order: u32,
-    /// How many cells are simulated, those that the theory says need the fewest revolutions: only they can have a number
-    /// of revolutions to the target.
-    #[schema(minimum = 0, maximum = 10_000, default = 200, example = 200, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("n_c")), ("x-advanced" = json!(true))))]
-    pub simulated_cells: u32,
-    /// Roundness to which the ring is to come; by the theory every wave of the start profile.
-    #[schema(minimum = 0.001, maximum = 10_000.0, default = 5.0, example = 5.0, extensions(("x-unit" = json!("um")), ("x-symbol" = json!("RONt"))))]
-    pub target_um: f64,
-}
-
-impl Default for MapRange {
-    fn default() -> Self {
-        Self {
-            tool_angle_from_deg: 0.0,
-            tool_angle_to_deg: 180.0,
-            tool_angles: 91,
-            support_angle_from_deg: 15.0,
-            support_angle_to_deg: 75.0,
-            support_angles: 61,
-            highest_order: 20,
-            simulated_cells: 200,
-            target_um: 5.0,
-        }
-    }
-}
-
-/// Target and machine limits of the search.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-#[schema(as = RingSearchRange)]
-pub struct SearchRange {
-    /// Roundness deviation to reach: RONt about the least-squares circle, after the job's filter.
-    #[schema(minimum = 0.01, maximum = 10_000.0, example = 5.0, extensions(("x-unit" = json!("um")), ("x-symbol" = json!("RONt"))))]
-    pub target_um: f64,
-    /// Smallest feed of the machine.
-    #[serde(default = "least_feed")]
-    #[schema(minimum = 1e-6, maximum = 10.0, default = 0.001, example = 0.001, extensions(("x-unit" = json!("mm/rev")), ("x-symbol" = json!("S_min"))))]
-    pub feed_min_mm_per_rev: f64,
-    /// Largest feed of the machine.
-    #[serde(default = "largest_feed")]
-    #[schema(minimum = 1e-6, maximum = 10.0, default = 0.5, example = 0.5, extensions(("x-unit" = json!("mm/rev")), ("x-symbol" = json!("S_max"))))]
-    pub feed_max_mm_per_rev: f64,
-    /// Most revolutions with feed.
-    #[serde(default = "most_revolutions")]
-    #[schema(minimum = 1.0, maximum = 100_000.0, default = 1000.0, example = 1000.0, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("n_max"))))]
-    pub revolutions_max: f64,
-    /// Distance of the tip from the largest diameter at the start, so that the first bite is small.
-    #[serde(default = "clearance")]
-    #[schema(minimum = 0.0, maximum = 10.0, default = 0.05, example = 0.05, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("c"))))]
-    pub clearance_mm: f64,
-    /// How far below the smallest radius the finished one shall lie at least.
-    #[serde(default = "allowance")]
-    #[schema(minimum = 0.0, maximum = 100.0, default = 0.05, example = 0.05, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("z"))))]
-    pub allowance_mm: f64,
-    /// How far off the angles of tool and supports may be: over this the robustness of a setting is told.
-    #[serde(default = "half")]
-    #[schema(minimum = 0.0, maximum = 10.0, default = 0.5, example = 0.5, extensions(("x-unit" = json!("deg")), ("x-symbol" = json!("u_alpha"))))]
-    pub angle_error_deg: f64,
-    /// First tool angle that the machine allows, counter-clockwise from the right, seen from the ring's centre.
-    #[serde(default = "low_tool")]
-    #[schema(minimum = -60.0, maximum = 240.0, default = 20.0, example = 20.0, extensions(("x-unit" = json!("deg")), ("x-symbol" = json!("alpha_T")), ("x-advanced" = json!(true))))]
-    pub tool_angle_from_deg: f64,
-    /// Last tool angle that the machine allows.
-    #[serde(default = "high_tool")]
-    #[schema(minimum = -60.0, maximum = 240.0, default = 160.0, example = 160.0, extensions(("x-unit" = json!("deg")), ("x-symbol" = json!("alpha_T")), ("x-advanced" = json!(true))))]
-    pub tool_angle_to_deg: f64,
-    /// Smallest support half angle that the machine allows, from the downward vertical.
-    #[serde(default = "low_support")]
-    #[schema(minimum = 15.0, maximum = 75.0, default = 17.0, example = 17.0, extensions(("x-unit" = json!("deg")), ("x-symbol" = json!("beta")), ("x-advanced" = json!(true))))]
-    pub support_angle_from_deg: f64,
-    /// Largest support half angle that the machine allows.
-    #[serde(default = "high_support")]
-    #[schema(minimum = 15.0, maximum = 75.0, default = 60.0, example = 60.0, extensions(("x-unit" = json!("deg")), ("x-symbol" = json!("beta")), ("x-advanced" = json!(true))))]
-    pub support_angle_to_deg: f64,
-    /// Up to which compliance ratio the machine can be made softer; left out, it stays as it is.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 0.0, maximum = 1000.0, example = 2.0, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("K")), ("x-advanced" = json!(true))))]
-    pub compliance_ratio_max: Option<f64>,
-    /// Revolutions without feed at the end.
-    #[serde(default = "one")]
-    #[schema(minimum = 0.0, maximum = 100.0, default = 1.0, example = 1.0, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("n_s"))))]
-    pub spark_out_revolutions: f64,
-}
-
-fn least_feed() -> f64 {
-    0.001
-}
-fn largest_feed() -> f64 {
-    0.5
-}
-fn most_revolutions() -> f64 {
-    1000.0
-}
-fn clearance() -> f64 {
-    0.05
-}
-fn allowance() -> f64 {
-    0.05
-}
-fn half() -> f64 {
-    0.5
-}
-fn low_tool() -> f64 {
-    20.0
-}
-fn high_tool() -> f64 {
-    160.0
-}
-fn low_support() -> f64 {
-    17.0
-}
-fn high_support() -> f64 {
-    60.0
-}
-fn one() -> f64 {
-    1.0
 }
 
 impl Job {

@@ -7,7 +7,11 @@
 //! ```
 //!
 //! so ρ ~ exp(λt) with λ = σ + iω needs 1 + K - a exp(-λτ_A) - b exp(-λτ_B) - K exp(-2πλ) = 0: ω lobes per revolution,
-//! factor exp(2πσ) per revolution.
+//! factor exp(2πσ) per revolution. A machine that swings gives by the frequency of the force (`ring/5.6`):
+//!
+//! ```text
+//! K(λ) = K_0 + Σ K_i / P_i(λ),   P_i = 1 + 2 ζ_i λ/ν_i + (λ/ν_i)²            (ring/5.6)
+//! ```
 
 use std::f64::consts::TAU;
 
@@ -31,37 +35,84 @@ impl Root {
     }
 }
 
-/// The characteristic equation of a setting.
+/// A mode of machine or tool at a work speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Resonance {
+    /// Thrust stiffness of the cut over the stiffness of the mode as the tool sees it, K_i.
+    pub ratio: f64,
+    /// Natural frequency over the work speed, ν_i.
+    pub lobes: f64,
+    /// Damping ratio ζ_i.
+    pub damping_ratio: f64,
+}
+
+/// The characteristic equation of a setting.
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Lobing {
     pub copying: Copying,
-    /// Compliance ratio K.
+    /// Compliance ratio K at rest, that of the modes included.
     pub compliance_ratio: f64,
+    pub resonances: Vec<Resonance>,
+}
+
+/// The characteristic function f at a place, with what Newton's method and the argument principle need. f has poles at the
+/// natural frequencies of the modes; f·Π P_i has none.
+struct Value {
+    /// f.
+    f: Complex<f64>,
+    /// df/dλ.
+    slope: Complex<f64>,
+    /// Π P_i.
+    poles: Complex<f64>,
+    /// d ln Π P_i / dλ.
+    poles_slope: Complex<f64>,
 }
 
 /// Slowest decay that is still looked for, 1/rad: below it a lobe is gone within one revolution (factor 0.0066).
 pub(crate) const FASTEST_DECAY_PER_RAD: f64 = -0.8;
 /// Newton's method has arrived.
 const ARRIVED: f64 = 1e-13;
+/// A root that grows no faster than the worst one found by more than this is not looked for, 1/rad.
+const MISSED_PER_RAD: f64 = 1e-3;
+/// Roots found last among which one that is found again is looked for.
+const KNOWN_NEAR: usize = 60;
 /// Roots nearer than this are one.
 const SAME: f64 = 1e-7;
 
 impl Lobing {
-    fn value(&self, lambda: Complex<f64>) -> (Complex<f64>, Complex<f64>) {
+    /// Compliance ratio of what does not swing, K_0.
+    fn still_ratio(&self) -> f64 {
+        self.compliance_ratio - self.resonances.iter().map(|mode| mode.ratio).sum::<f64>()
+    }
+
+    fn value(&self, lambda: Complex<f64>) -> Value {
         let Copying { a, b, delay_a_rad, delay_b_rad } = self.copying;
-        let k = self.compliance_ratio;
-        let part = |size: f64, delay: f64| {
+        let delayed = |size: f64, delay: f64| {
             if size.abs() < 1e-300 { Complex::new(0.0, 0.0) } else { (-lambda * delay).exp() * size }
         };
-        let (at_a, at_b, at_tool) = (part(a, delay_a_rad), part(b, delay_b_rad), part(k, TAU));
-        let value = Complex::new(1.0 + k, 0.0) - at_a - at_b - at_tool;
-        (value, at_a * delay_a_rad + at_b * delay_b_rad + at_tool * TAU)
+        let one = Complex::new(1.0, 0.0);
+        let (mut k, mut k_slope) = (Complex::new(self.still_ratio(), 0.0), Complex::new(0.0, 0.0));
+        let (mut poles, mut poles_slope) = (one, k_slope);
+        for mode in &self.resonances {
+            let at = lambda / mode.lobes;
+            let p = one + at * (2.0 * mode.damping_ratio) + at * at;
+            let p_slope = (at * 2.0 + 2.0 * mode.damping_ratio) / mode.lobes;
+            k += one / p * mode.ratio;
+            k_slope -= p_slope / (p * p) * mode.ratio;
+            poles *= p;
+            poles_slope += p_slope / p;
+        }
+        let (at_a, at_b) = (delayed(a, delay_a_rad), delayed(b, delay_b_rad));
+        let at_tool = if self.compliance_ratio > 0.0 { (-lambda * TAU).exp() } else { Complex::new(0.0, 0.0) };
+        let value = one - at_a - at_b + k * (one - at_tool);
+        let slope = at_a * delay_a_rad + at_b * delay_b_rad + k * at_tool * TAU + k_slope * (one - at_tool);
+        Value { f: value, slope, poles, poles_slope }
     }
 
     fn newton(&self, mut lambda: Complex<f64>) -> Option<Complex<f64>> {
         for _ in 0..40 {
-            let (value, slope) = self.value(lambda);
-            let step = value / slope;
+            let at = self.value(lambda);
+            let step = at.f / (at.slope + at.f * at.poles_slope);
             if !step.is_finite() {
                 return None;
             }
@@ -75,12 +126,23 @@ impl Lobing {
         None
     }
 
-    /// Largest σ that any root can have: (1+K) = |a| e^{-στ_A} + |b| e^{-στ_B} + K e^{-2πσ}.
+    /// Largest σ that any root can have: 1 + K_0 = |a| e^{-στ_A} + |b| e^{-στ_B} + K_0 e^{-2πσ} + Σ |K_i/P_i| (1 + e^{-2πσ}),
+    /// where with the poles at -ζν ± iν√(1-ζ²) and ω ≥ 0 |P_i| ≥ (σ+ζν) √((σ+ζν)² + ν²(1-ζ²))/ν².
     fn largest_growth(&self) -> f64 {
         let Copying { a, b, delay_a_rad, delay_b_rad } = self.copying;
-        let k = self.compliance_ratio;
+        let k = self.still_ratio();
+        let swinging = |s: f64| -> f64 {
+            let most = |mode: &Resonance| {
+                let from_pole = s + mode.damping_ratio * mode.lobes;
+                let damped2 = mode.lobes.powi(2) * (1.0 - mode.damping_ratio.powi(2)).max(0.0);
+                mode.ratio * mode.lobes.powi(2) / (from_pole * (from_pole.powi(2) + damped2).sqrt())
+            };
+            self.resonances.iter().map(most).sum()
+        };
         let excess = |s: f64| {
-            a.abs() * (-s * delay_a_rad).exp() + b.abs() * (-s * delay_b_rad).exp() + k * (-s * TAU).exp() - 1.0 - k
+            let turn = (-s * TAU).exp();
+            a.abs() * (-s * delay_a_rad).exp() + b.abs() * (-s * delay_b_rad).exp() + k * turn - 1.0 - k
+                + swinging(s) * (1.0 + turn)
         };
         let (mut low, mut high) = (0.0, 1.0);
         while excess(high) > 0.0 && high < 1e3 {
@@ -154,10 +216,14 @@ impl Lobing {
         const PIECES: u32 = 4;
         let way = end - start;
         let (mut at, mut step, mut turned) = (0.0, 1.0 / (f64::from(PIECES) * way.norm().max(1.0)), 0.0);
-        let mut value = self.value(start).0;
+        let whole = |lambda| {
+            let at = self.value(lambda);
+            at.f * at.poles
+        };
+        let mut value = whole(start);
         while at < 1.0 {
             let next = (at + step).min(1.0);
-            let there = self.value(start + way * next).0;
+            let there = whole(start + way * next);
             let turn = (there / value).arg();
             if !turn.is_finite() || step < 1e-9 {
                 return None;
@@ -178,16 +244,37 @@ impl Lobing {
     /// The roots near neutral growth with ω in `from..to`, for maps, where the certificate of [`Self::roots`] would cost too
     /// much: Newton's method from three starts per lobe. The worst root is among them (tests compare).
     pub(crate) fn near_neutral(&self, from: f64, to: f64) -> Vec<Root> {
+        self.roots_from(from, to, 3.0, &[0.0])
+    }
+
+    /// The same for a machine that swings, where more starts are needed near its natural frequencies: the argument principle
+    /// says whether a root that grows faster than all that were found is missing.
+    pub(crate) fn near_neutral_confirmed(&self, from: f64, to: f64) -> Vec<Root> {
+        let found = self.near_neutral(from, to);
+        let most = found.iter().map(|root| root.growth_per_rad).fold(FASTEST_DECAY_PER_RAD, f64::max);
+        let top = self.largest_growth() + 0.02;
+        if most + MISSED_PER_RAD >= top || self.winding(from, to, most + MISSED_PER_RAD, top) == Some(0) {
+            return found;
+        }
+        self.roots_from(from, to, 9.0, &[0.0, 0.1, 0.25, 0.5, -0.1])
+    }
+
+    fn roots_from(&self, from: f64, to: f64, per_lobe: f64, growths: &[f64]) -> Vec<Root> {
         let mut found: Vec<Root> = Vec::new();
-        let rows = whole((to - from) * 3.0);
-        for row in 0..=rows {
+        let rows = whole((to - from) * per_lobe);
+        let starts = (0..=rows).flat_map(|row| growths.iter().map(move |growth| (row, *growth)));
+        for (row, growth) in starts {
             let lobes = from + (to - from) * f64::from(row) / f64::from(rows);
-            let Some(root) = self.newton(Complex::new(0.0, lobes)) else { continue };
+            let Some(root) = self.newton(Complex::new(growth, lobes)) else { continue };
             let known = |other: &Root| (other.lobes - root.im).hypot(other.growth_per_rad - root.re) < SAME;
-            if root.im > from && root.im < to && root.re > FASTEST_DECAY_PER_RAD && !found.iter().any(known) {
+            // Newton's method ends near where it started: what is known stands near the end.
+            let near = found.iter().rev().take(KNOWN_NEAR).any(known);
+            if root.im > from && root.im < to && root.re > FASTEST_DECAY_PER_RAD && !near {
                 found.push(Root { lobes: root.im, growth_per_rad: root.re });
             }
         }
+        found.sort_by(|p, q| p.lobes.total_cmp(&q.lobes).then(q.growth_per_rad.total_cmp(&p.growth_per_rad)));
+        found.dedup_by(|p, q| (p.lobes - q.lobes).hypot(p.growth_per_rad - q.growth_per_rad) < SAME);
         found
     }
 }
@@ -227,7 +314,7 @@ mod tests {
         let angles = (0..5).flat_map(|i| (0..6).map(move |j| (17.0 + 13.3 * f64::from(i), 3.0 + 34.7 * f64::from(j))));
         for ((beta, tool), k) in angles.zip([0.0, 0.1, 0.5, 1.0, 3.0].into_iter().cycle()) {
             let copying = Copying::of_angles(f64::to_radians(beta), f64::to_radians(tool));
-            let lobing = Lobing { copying, compliance_ratio: k };
+            let lobing = Lobing { copying, compliance_ratio: k, resonances: Vec::new() };
             let (all, complete) = lobing.roots(1.5, 20.5);
             assert!(complete, "{beta} {tool} {k}");
             let worst = all.iter().map(|root| root.growth_per_rad).fold(f64::NEG_INFINITY, f64::max);

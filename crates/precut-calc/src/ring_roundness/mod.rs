@@ -12,15 +12,19 @@ mod advice;
 mod causes;
 mod check;
 pub mod cylindricity;
+mod elsewhere;
 pub mod evaluation;
 mod forward;
 mod hypotheses;
 mod input;
+mod input_ranges;
 mod linear;
 mod lobing;
+mod map;
 mod measurement;
 mod next_runs;
 mod output;
+mod output_settings;
 mod picture;
 mod place;
 mod replay;
@@ -29,26 +33,33 @@ mod scene;
 mod search;
 mod search_wide;
 mod simulate;
+mod softness;
+mod speeds;
 mod stance;
 mod surface;
+mod tables;
 mod turning;
 
 pub use forward::{RingAllowances, RingPoint, RingRun};
 pub use input::{
-    Analysis, Drive, ErrorEstimate, Forces, Job, LongWave, MapRange, Method, ProfileRow, Ring, Rotation, SearchRange,
-    Stiffness, Supports, Tool, Wave,
+    Analysis, Drive, Dynamics, ErrorEstimate, Forces, Job, LongWave, Method, Mode, ModePlace, ProfileRow, Ring,
+    Rotation, Stiffness, Supports, Tool, Wave,
 };
+pub use input_ranges::{MapRange, SearchRange, SpeedRange};
 pub use measurement::RingMeasurement;
 pub use output::{
-    CauseKind, CauseOutcome, CausesOutcome, CircleValues, Evaluated, Fate, HistoryColumns, LinearOutcome, MapCell,
-    MapOutcome, OrderOutcome, Outcome, PathColumns, ProfileColumns, ReactionsOutcome, ReplayFrame, ReplayOutcome,
-    RootOutcome, SearchOutcome, SearchSetting, SearchStatus, SecondStage, SettingOutcome, SimulationOutcome,
-    SpectrumColumns, TriedColumns, WaveColumn,
+    CauseKind, CauseOutcome, CausesOutcome, CircleValues, Evaluated, HistoryColumns, Outcome, PathColumns,
+    ProfileColumns, ReactionsOutcome, ReplayFrame, ReplayOutcome, SettingOutcome, SimulationOutcome, SpectrumColumns,
+    WaveColumn,
+};
+pub use output_settings::{
+    CutCell, Fate, LinearOutcome, MapCell, MapOutcome, OrderOutcome, RootOutcome, SearchOutcome, SearchSetting,
+    SearchStatus, SecondStage, SpeedCell, SpeedMapOutcome, TriedColumns,
 };
 
 use crate::calculator::{
     Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Finding, Hallmark, Message, Meta,
-    Monitor, Table, checkpoint,
+    Monitor, Place, Table, checkpoint,
 };
 
 use scene::Scene;
@@ -67,7 +78,7 @@ impl Calculator for RingRoundness {
     const META: Meta = Meta {
         id: "ring-roundness",
         kind: CalculatorKind::Calculator,
-        version: 3,
+        version: 4,
         title: "Ring roundness",
         question: "How round will a ring get that is turned while it rests on the surface being turned?",
         summary: "A ring or a journal rests with the surface being turned on two supports while a wide-edge tool is fed \
@@ -107,6 +118,16 @@ impl Calculator for RingRoundness {
                 title: "Which angles and which feed make a ring round: a map to choose from",
                 job: include_str!("examples/set_up.json"),
             },
+            Example {
+                id: "cut_map",
+                title: "How round the same cut would come out at other angles of tool and supports",
+                job: include_str!("examples/cut_map.json"),
+            },
+            Example {
+                id: "speeds",
+                title: "A tool post that swings: which work speed does not chatter",
+                job: include_str!("examples/speeds.json"),
+            },
         ],
         hallmarks: &[
             Hallmark::Of("/ring/radius_mm"),
@@ -118,7 +139,7 @@ impl Calculator for RingRoundness {
         study_outputs: &["/roundness_um", "/roundness_unfiltered_um", "/mean_radius_mm", "/setting/coefficient_sum"],
         codes: CODES,
         figures: picture::FIGURE_IDS,
-        tables: picture::TABLE_IDS,
+        tables: tables::TABLE_IDS,
         has_program: false,
     };
 
@@ -139,7 +160,11 @@ impl Calculator for RingRoundness {
     }
 
     fn tables(_job: &Job, outcome: &Outcome) -> Vec<Table> {
-        picture::tables(outcome)
+        tables::tables(outcome)
+    }
+
+    fn at_place(job: &Job, outcome: &Outcome, place: &Place<'_>) -> Option<Job> {
+        elsewhere::at_place(job, outcome, place)
     }
 }
 
@@ -147,6 +172,7 @@ impl Calculator for RingRoundness {
 struct Work {
     simulation: f64,
     theory: f64,
+    speeds: f64,
     map: f64,
     search: f64,
 }
@@ -157,7 +183,7 @@ fn work(job: &Job) -> Work {
     let n = f64::from(sampling::samples_of(job));
     let turns = job.tool.revolutions + job.tool.spark_out_revolutions;
     let step_ns = if job.supports.roller_radius_mm > 0.0 { 400.0 } else { 90.0 };
-    let mut work = Work { simulation: 0.0, theory: 0.0, map: 0.0, search: 0.0 };
+    let mut work = Work { simulation: 0.0, theory: 0.0, speeds: 0.0, map: 0.0, search: 0.0 };
     if job.asks(Analysis::Simulation) {
         let runs = match job.error_estimate {
             ErrorEstimate::HalfSamples => 1.84,
@@ -176,18 +202,26 @@ fn work(job: &Job) -> Work {
     if job.asks(Analysis::LinearTheory) {
         work.theory = 5.0;
     }
+    if job.asks(Analysis::SpeedMap) {
+        work.speeds = speeds::work_ms(job);
+    }
     if job.asks(Analysis::SetupMap) {
         let cells = f64::from(job.setup_map.tool_angles) * f64::from(job.setup_map.support_angles);
         // A simulated cell takes its revolutions twice at most, some hundred.
         let simulated = cells.min(f64::from(job.setup_map.simulated_cells));
         let nodes = job.filter.cutoff_upr().map_or(n, |cutoff| f64::from(8 * cutoff).max(720.0));
-        work.map = 2e-3 * cells * f64::from(job.setup_map.highest_order) + simulated * 150.0 * nodes * 1e-6 * step_ns;
+        let everywhere = if job.setup_map.cut_everywhere { cells * turns } else { 0.0 };
+        work.map = 2e-3 * cells * f64::from(job.setup_map.highest_order)
+            + (simulated * 150.0 + everywhere) * nodes * 1e-6 * step_ns;
     }
     if let (true, Some(range)) = (job.asks(Analysis::SettingsSearch), &job.settings_search) {
         let nodes = if job.filter == LongWave::None { n } else { n.min(1800.0) };
+        let expected = search::expected(job, range);
         // A scan in steps of 5 % sums to 21 times its largest run.
-        work.search = 1e-6 * step_ns * (21.0 * nodes + 6.0 * n) * range.revolutions_max.min(2000.0)
-            + search_wide::work_ms(job, range, step_ns);
+        work.search = 1e-6 * step_ns * (21.0 * nodes + 6.0 * n) * expected.revolutions;
+        if expected.is_wide {
+            work.search += search_wide::work_ms(job, range, step_ns);
+        }
     }
     work
 }
@@ -197,7 +231,11 @@ fn cost(job: &Job) -> Cost {
     let samples = sampling::samples_of(job);
     let mut ms = 1.0 + work.simulation + work.theory;
     let mut driver = if samples > 7200 { "/samples" } else { "/tool/revolutions" };
-    for (part, field) in [(work.map, "/setup_map/tool_angles"), (work.search, "/settings_search/revolutions_max")] {
+    for (part, field) in [
+        (work.speeds, "/speed_map/speeds"),
+        (work.map, "/setup_map/tool_angles"),
+        (work.search, "/settings_search/revolutions_max"),
+    ] {
         if part > ms {
             driver = field;
         }
@@ -223,15 +261,17 @@ fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
         setting: setting(job, &scene, &end)?,
         simulation: None,
         linear_theory: None,
+        speed_map: None,
         setup_map: None,
         settings_search: None,
     };
     let whole = Share { monitor, from: 0.0, to: 1.0 };
     // Each part has the share of the progress that it is expected to take of the time.
     let work = work(job);
-    let total = work.simulation + work.theory + work.map + work.search;
+    let total = work.simulation + work.theory + work.speeds + work.map + work.search;
     let after = |done: f64| if total > 0.0 { done / total } else { 0.0 };
-    let [simulated, mapped] = [work.simulation, work.simulation + work.theory + work.map].map(after);
+    let sped = work.simulation + work.theory + work.speeds;
+    let [simulated, sped, mapped] = [work.simulation, sped, sped + work.map].map(after);
     if job.asks(Analysis::Simulation) {
         let simulated = simulate::simulate(job, &scene, &end, whole.part(0.0, simulated))?;
         if let (Some(end), Some(error)) = (&simulated.end, &simulated.end_error) {
@@ -247,8 +287,11 @@ fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
     if job.asks(Analysis::LinearTheory) {
         outcome.linear_theory = Some(linear::theory(job, &scene, &end));
     }
+    if job.asks(Analysis::SpeedMap) {
+        outcome.speed_map = Some(speeds::map(job, &scene, &end, whole.part(simulated, sped))?);
+    }
     if job.asks(Analysis::SetupMap) {
-        outcome.setup_map = Some(linear::map(job, &scene, &end, whole.part(simulated, mapped))?);
+        outcome.setup_map = Some(map::map(job, &scene, &end, whole.part(sped, mapped))?);
     }
     if let (true, Some(range)) = (job.asks(Analysis::SettingsSearch), &job.settings_search) {
         outcome.settings_search = Some(search::search(job, range, &scene, whole.part(mapped, 1.0))?);
@@ -338,6 +381,8 @@ fn basis(job: &Job) -> Vec<Basis> {
         job.asks(Analysis::LinearTheory) || job.asks(Analysis::SetupMap),
         &[("ring/5.2", COPYING), ("ring/5.3", COPYING)],
     );
+    add(job.dynamics.is_some(), &[("ring/5.6", "regenerative chatter: Tobias, Fishwick 1958; Tlusty, Polacek 1963")]);
+    add(job.asks(Analysis::SetupMap) && job.setup_map.cut_everywhere, &[("ring/7.3", "simulation of every cell")]);
     add(job.asks(Analysis::SettingsSearch), &[("ring/5.4", COPYING), ("ring/7.1", "scan by simulation")]);
     used.extend(
         job.effects.iter().map(|effect| Basis { equation: effect.cause().equation, source: "catalogue of effects" }),
@@ -351,6 +396,13 @@ const CODES: Codes = Codes {
     failures: &[simulate::FAILURE_CODES, &["no_end_position"]],
     warnings: &[advice::WARNING_CODES],
     explanations: &[advice::EXPLANATION_CODES],
-    stages: &[&["stage_revolution", "stage_setup_map", "stage_search", "stage_search_wide", "stage_done"]],
+    stages: &[&[
+        "stage_revolution",
+        "stage_speed_map",
+        "stage_setup_map",
+        "stage_search",
+        "stage_search_wide",
+        "stage_done",
+    ]],
     labels: &[picture::LABEL_CODES],
 };

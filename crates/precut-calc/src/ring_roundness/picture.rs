@@ -1,16 +1,15 @@
-//! Figures and tables of an answer. What the job does not ask for has no figure.
+//! Figures of an answer. What the job does not ask for has no figure.
 
-use crate::calculator::{Axis, Column, Figure, Frame, Glyph, Item, Message, Panel, Role, Table};
+use crate::calculator::{Axis, Figure, Frame, Glyph, Item, Message, Panel, Role, Said, Setting};
 
+use super::elsewhere::{CONTACT_SUPPORT, CONTACT_TOOL, THIS_SETTING};
 use super::input::Job;
-use super::output::{
-    HistoryColumns, MapOutcome, Outcome, ProfileColumns, SettingOutcome, SimulationOutcome, SpectrumColumns,
-};
+use super::output::{HistoryColumns, Outcome, ProfileColumns, SettingOutcome, SimulationOutcome, SpectrumColumns};
+use super::output_settings::{MapOutcome, SpeedMapOutcome};
 use super::scene::Scene;
 
-pub(super) const FIGURE_IDS: &[&str] = &["polar", "profile", "history", "spectrum", "map", "search"];
-pub(super) const TABLE_IDS: &[&str] =
-    &["profile", "history", "waves", "spectrum", "lobing", "roots", "map", "search", "centre_path"];
+pub(super) const FIGURE_IDS: &[&str] =
+    &["polar", "profile", "history", "spectrum", "speeds", "map", "cut_map", "search"];
 
 /// Codes that the figures utter.
 pub(super) const LABEL_CODES: &[&str] = &[
@@ -23,6 +22,10 @@ pub(super) const LABEL_CODES: &[&str] = &[
     "deepest_cut",
     "waves_per_revolution",
     "factor_per_revolution",
+    "work_speed",
+    "lobes_per_revolution",
+    "worst_wave_of_all",
+    "worst_wave_at_rest",
     "tool_angle",
     "support_half_angle",
     "growth_per_revolution",
@@ -41,12 +44,17 @@ pub(super) const LABEL_CODES: &[&str] = &[
     "target",
     "tried_settings",
     "best_setting",
-    "this_setting",
+    THIS_SETTING,
+    "set_up_stays",
+    CONTACT_TOOL,
+    CONTACT_SUPPORT,
     "ring_polar",
     "ring_profile",
     "ring_history",
     "ring_spectrum",
+    "ring_speeds",
     "ring_map",
+    "ring_cut_map",
     "ring_search",
 ];
 
@@ -86,7 +94,7 @@ fn shows(item: &Item) -> bool {
         Item::Band { x, .. } | Item::Points { x, .. } | Item::Ribbon { x, .. } | Item::Outline { x, .. } => {
             !x.is_empty()
         }
-        Item::Glyph { .. } | Item::Handle(_) => false,
+        Item::Glyph { .. } | Item::Handle(_) | Item::Setting(_) => false,
     }
 }
 
@@ -100,9 +108,12 @@ pub(super) fn figures(job: &Job, outcome: &Outcome) -> Vec<Figure> {
     figures
 }
 
+fn figure(id: &'static str, title: &'static str, frame: Frame, x: Axis, panels: Vec<Panel>) -> Figure {
+    Figure { id, title: Message::new(title), frame, x, panels }
+}
+
 fn drawn(job: &Job, outcome: &Outcome) -> Vec<Figure> {
     let simulation = outcome.simulation.as_ref();
-    let figure = |id, title, frame, x, panels| Figure { id, title: Message::new(title), frame, x, panels };
     vec![
         Figure {
             // Their symbol is that of a steady rest; here they are what the job calls them.
@@ -136,7 +147,15 @@ fn drawn(job: &Job, outcome: &Outcome) -> Vec<Figure> {
             Axis::linear("waves_per_revolution", "1"),
             spectrum(simulation.map(|s| &s.spectrum), outcome),
         ),
+        figure(
+            "speeds",
+            "ring_speeds",
+            Frame::Stacked,
+            Axis::linear("work_speed", "rev/min"),
+            speeds(outcome.speed_map.as_ref()),
+        ),
         figure("map", "ring_map", Frame::Stacked, Axis::linear("tool_angle", "deg"), map(outcome.setup_map.as_ref())),
+        cut_map(outcome.setup_map.as_ref()),
         figure("search", "ring_search", Frame::Stacked, Axis::linear("feed_revolutions", "1"), search(job, outcome)),
     ]
 }
@@ -153,7 +172,7 @@ fn polar(job: &Job, simulation: Option<&SimulationOutcome>, setting: &SettingOut
         }
         items.push(closed("ring_after", &profile.angle_deg, &profile.end_deviation_um, Role::After));
         items.push(closed("ring_after_filtered", &profile.angle_deg, &profile.end_filtered_um, Role::Plain));
-        items.extend(contacts(job, profile, setting));
+        items.extend(drawn_contacts(job, profile, setting));
     } else if let Some(simulation) = simulation {
         let profile = &simulation.profile;
         items.push(closed("ring_before", &profile.angle_deg, &profile.start_deviation_um, Role::Before));
@@ -161,20 +180,47 @@ fn polar(job: &Job, simulation: Option<&SimulationOutcome>, setting: &SettingOut
     Panel { y: Axis::linear("deviation", "um"), height: 1.0, items }
 }
 
-/// Tool and supports where they touch the ring as it stops, in the frame of the body.
-fn contacts(job: &Job, profile: &ProfileColumns, setting: &SettingOutcome) -> Vec<Item> {
+/// Where tool or support touches the ring as it stops.
+pub(super) struct Contact {
+    glyph: Glyph,
+    /// In the frame of the body.
+    pub(super) body_angle_deg: f64,
+    /// What it is called where it can be pulled; the left support follows the right one.
+    pub(super) handle: Option<&'static str>,
+}
+
+/// Tool and supports where they touch the ring as it stops.
+pub(super) fn contacts(job: &Job, setting: &SettingOutcome) -> [Contact; 3] {
     let scene = Scene::of(job, &job.effects);
     let turns = (scene.setting.revolutions + scene.setting.spark_out_revolutions) * (1.0 - scene.setting.motion.slip);
     let sense = if scene.mirrored { -1.0 } else { 1.0 };
     let half = setting.support_half_angle_deg;
-    [(Glyph::SteadyRest, 270.0 - half), (Glyph::SteadyRest, 270.0 + half), (Glyph::Tool, setting.tool_angle_deg)]
-        .into_iter()
-        .filter_map(|(glyph, in_space)| {
-            let x = (in_space - sense * 360.0 * turns.fract()).rem_euclid(360.0);
-            let nearest = profile.angle_deg.iter().rposition(|angle| *angle <= x)?;
-            Some(Item::Glyph { glyph, x, y: *profile.end_deviation_um.get(nearest)? })
-        })
-        .collect()
+    let of = |glyph, in_space: f64, handle| Contact {
+        glyph,
+        body_angle_deg: (in_space - sense * 360.0 * turns.fract()).rem_euclid(360.0),
+        handle,
+    };
+    [
+        of(Glyph::SteadyRest, 270.0 - half, None),
+        of(Glyph::SteadyRest, 270.0 + half, Some(CONTACT_SUPPORT)),
+        of(Glyph::Tool, setting.tool_angle_deg, Some(CONTACT_TOOL)),
+    ]
+}
+
+fn pulled(name: &'static str, x: f64, y: f64) -> Setting {
+    Setting { name, x, y, tried_in: None, about: Some(Said { label: "set_up_stays" }) }
+}
+
+fn drawn_contacts(job: &Job, profile: &ProfileColumns, setting: &SettingOutcome) -> Vec<Item> {
+    let drawn = |contact: &Contact| {
+        let x = contact.body_angle_deg;
+        let nearest = profile.angle_deg.iter().rposition(|angle| *angle <= x)?;
+        let y = *profile.end_deviation_um.get(nearest)?;
+        let symbol = Item::Glyph { glyph: contact.glyph, x, y };
+        let grip = contact.handle.map(|name| Item::Setting(pulled(name, x, y)));
+        Some([Some(symbol), grip])
+    };
+    contacts(job, setting).iter().filter_map(drawn).flatten().flatten().collect()
 }
 
 fn unrolled(profile: Option<&ProfileColumns>) -> Vec<Panel> {
@@ -192,7 +238,7 @@ fn unrolled(profile: Option<&ProfileColumns>) -> Vec<Panel> {
     ]
 }
 
-const WAVE_NAMES: [&str; 6] = ["waves_2", "waves_3", "waves_4", "waves_5", "waves_6", "waves_7"];
+pub(super) const WAVE_NAMES: [&str; 6] = ["waves_2", "waves_3", "waves_4", "waves_5", "waves_6", "waves_7"];
 
 fn history(history: Option<&HistoryColumns>) -> Vec<Panel> {
     let (mut roundness, mut waves, mut bites) = (Vec::new(), Vec::new(), Vec::new());
@@ -248,24 +294,91 @@ fn map(map: Option<&MapOutcome>) -> Vec<Panel> {
         let positive = |values: &[Option<f64>]| values.iter().map(|value| value.filter(|v| *v > 0.0)).collect();
         let factors = positive(&map.worst_factor_per_revolution);
         growth.push(heat(Axis::logarithmic("growth_per_revolution", "1"), factors, true));
+        let (x, y) = (map.here.tool_angle_deg, map.here.support_half_angle_deg);
         let here = |items: &mut Vec<Item>| {
-            items.push(Item::Points {
-                name: "this_setting",
-                x: vec![map.here.tool_angle_deg],
-                y: vec![map.here.support_half_angle_deg],
-                role: Role::Nominal,
-            });
+            items.push(Item::Points { name: THIS_SETTING, x: vec![x], y: vec![y], role: Role::Nominal });
+            items.push(Item::Setting(pulled(THIS_SETTING, x, y)));
         };
         here(&mut growth);
         // Near the edge of decay the revolutions go to infinity: their logarithm shows the rest, too.
-        let values = positive(&map.revolutions_to_target);
-        revolutions.push(heat(Axis::logarithmic("revolutions_to_target", "1"), values, false));
-        here(&mut revolutions);
+        let values: Vec<Option<f64>> = positive(&map.revolutions_to_target);
+        // Without a wave that decays everywhere to the target the panel would be empty.
+        if values.iter().any(Option::is_some) {
+            revolutions.push(heat(Axis::logarithmic("revolutions_to_target", "1"), values, false));
+            here(&mut revolutions);
+        }
     }
     vec![
         Panel { y: Axis::linear("support_half_angle", "deg"), height: 1.0, items: growth },
         Panel { y: Axis::linear("support_half_angle", "deg"), height: 1.0, items: revolutions },
     ]
+}
+
+/// Growth over work speed and orders; below it the worst wave of all.
+fn speeds(map: Option<&SpeedMapOutcome>) -> Vec<Panel> {
+    let (mut growth, mut worst) = (Vec::new(), Vec::new());
+    if let Some(map) = map {
+        let speeds = &map.work_speed_rpm;
+        let rows = map.lobes_from.iter().zip(&map.lobes_to);
+        growth.push(Item::HeatMap {
+            value: Axis::logarithmic("growth_per_revolution", "1"),
+            x: speeds.clone(),
+            y: rows.map(|(from, to)| 0.5 * f64::from(from + to)).collect(),
+            values: map.factor_per_revolution.clone(),
+            diverging: true,
+        });
+        let cells = &map.worst;
+        let y = cells.iter().map(|cell| cell.map(|cell| cell.factor_per_revolution)).collect();
+        worst.push(Item::Line { name: "worst_wave_of_all", x: speeds.clone(), y, role: Role::After });
+        let at_rest = map.at_rest_factor_per_revolution.iter().copied().flatten().reduce(f64::max);
+        let ends = [speeds.first().copied(), speeds.last().copied()].map(|speed| speed.unwrap_or(0.0));
+        if let Some(at_rest) = at_rest {
+            worst.push(line("worst_wave_at_rest", &ends, &[at_rest; 2], Role::Plain));
+        }
+        worst.push(line("neutral", &ends, &[1.0; 2], Role::Limit));
+        if let Some(here) = &map.here {
+            let point = |y| Item::Points { name: "this_setting", x: vec![here.work_speed_rpm], y, role: Role::Nominal };
+            growth.push(point(vec![here.lobes]));
+            worst.push(point(vec![here.factor_per_revolution]));
+        }
+    }
+    vec![
+        Panel { y: Axis::linear("lobes_per_revolution", "1"), height: 1.0, items: growth },
+        Panel { y: Axis::logarithmic("factor_per_revolution", "1"), height: 0.5, items: worst },
+    ]
+}
+
+fn cut_map(map: Option<&MapOutcome>) -> Figure {
+    let Some(map) = map.filter(|map| !map.cut_roundness_um.is_empty()) else { return cut_map_of(Vec::new()) };
+    let mut items = vec![cut_cells((&map.tool_angle_deg, &map.support_half_angle_deg), &map.cut_roundness_um)];
+    let mut mark = |name, x, y, role| items.push(Item::Points { name, x: vec![x], y: vec![y], role });
+    let (x, y) = (map.here.tool_angle_deg, map.here.support_half_angle_deg);
+    mark(THIS_SETTING, x, y, Role::Nominal);
+    if let Some(roundest) = &map.roundest {
+        mark("best_setting", roundest.tool_angle_deg, roundest.support_half_angle_deg, Role::After);
+    }
+    items.push(Item::Setting(pulled(THIS_SETTING, x, y)));
+    cut_map_of(items)
+}
+
+/// The simulated map while it is computed: tool angles, support half angles, and the cells cut so far.
+pub(super) fn cut_map_so_far(angles_deg: (&[f64], &[f64]), roundness_um: &[Option<f64>]) -> Figure {
+    cut_map_of(vec![cut_cells(angles_deg, roundness_um)])
+}
+
+fn cut_map_of(items: Vec<Item>) -> Figure {
+    let panel = Panel { y: Axis::linear("support_half_angle", "deg"), height: 1.0, items };
+    figure("cut_map", "ring_cut_map", Frame::Stacked, Axis::linear("tool_angle", "deg"), vec![panel])
+}
+
+fn cut_cells((x, y): (&[f64], &[f64]), roundness_um: &[Option<f64>]) -> Item {
+    Item::HeatMap {
+        value: Axis::logarithmic("roundness_deviation", "um"),
+        x: x.to_vec(),
+        y: y.to_vec(),
+        values: roundness_um.to_vec(),
+        diverging: false,
+    }
 }
 
 fn search(job: &Job, outcome: &Outcome) -> Vec<Panel> {
@@ -286,157 +399,4 @@ fn search(job: &Job, outcome: &Outcome) -> Vec<Panel> {
         }
     }
     vec![Panel { y: Axis::logarithmic("roundness_deviation", "um"), height: 1.0, items }]
-}
-
-pub(super) fn tables(outcome: &Outcome) -> Vec<Table> {
-    let simulation = outcome.simulation.as_ref();
-    vec![
-        profile_table(&simulation.map(|s| s.profile.clone()).unwrap_or_default()),
-        history_table(&simulation.map(|s| s.history.clone()).unwrap_or_default()),
-        waves_table(&simulation.map(|s| s.history.clone()).unwrap_or_default()),
-        spectrum_table(&simulation.map(|s| s.spectrum.clone()).unwrap_or_default()),
-        lobing_table(outcome),
-        roots_table(outcome),
-        map_table(outcome.setup_map.as_ref()),
-        search_table(outcome),
-        path_table(outcome),
-    ]
-}
-
-fn profile_table(profile: &ProfileColumns) -> Table {
-    let padded = |values: &[f64]| -> Vec<Option<f64>> {
-        if values.is_empty() { vec![None; profile.angle_deg.len()] } else { some(values) }
-    };
-    Table {
-        id: "profile",
-        columns: vec![
-            Column::numbers("angle", "deg", &profile.angle_deg),
-            Column::numbers("start_radius", "mm", &profile.start_radius_mm),
-            Column::optional("end_radius", "mm", &padded(&profile.end_radius_mm)),
-            Column::numbers("start_deviation", "um", &profile.start_deviation_um),
-            Column::optional("end_deviation", "um", &padded(&profile.end_deviation_um)),
-            Column::optional("end_filtered", "um", &padded(&profile.end_filtered_um)),
-        ],
-    }
-}
-
-fn history_table(history: &HistoryColumns) -> Table {
-    Table {
-        id: "history",
-        columns: vec![
-            Column::numbers("revolution", "1", &history.revolution),
-            Column::numbers("roundness", "um", &history.roundness_um),
-            Column::numbers("mean_radius", "mm", &history.mean_radius_mm),
-            Column::numbers("deepest_cut", "um", &history.deepest_cut_um),
-            Column::numbers("cutting_share", "1", &history.cutting_share),
-        ],
-    }
-}
-
-fn waves_table(history: &HistoryColumns) -> Table {
-    let mut columns = vec![Column::numbers("revolution", "1", &history.revolution)];
-    columns.extend(
-        history.waves.iter().zip(WAVE_NAMES).map(|(wave, name)| Column::numbers(name, "um", &wave.amplitude_um)),
-    );
-    Table { id: "waves", columns }
-}
-
-fn spectrum_table(spectrum: &SpectrumColumns) -> Table {
-    let order: Vec<f64> = spectrum.order.iter().copied().map(f64::from).collect();
-    Table {
-        id: "spectrum",
-        columns: vec![
-            Column::numbers("order", "1", &order),
-            Column::numbers("start", "um", &spectrum.start_um),
-            Column::numbers("end", "um", &spectrum.end_um),
-            Column::numbers("end_error", "um", &spectrum.end_error_um),
-            Column::numbers("end_angle_of_max", "deg", &spectrum.end_angle_of_max_deg),
-            Column::optional("ratio", "1", &spectrum.ratio),
-        ],
-    }
-}
-
-fn lobing_table(outcome: &Outcome) -> Table {
-    let orders = outcome.linear_theory.as_ref().map_or(&[][..], |linear| &linear.orders);
-    let column = |of: &dyn Fn(&super::output::OrderOutcome) -> f64| orders.iter().map(of).collect::<Vec<f64>>();
-    Table {
-        id: "lobing",
-        columns: vec![
-            Column::numbers("order", "1", &column(&|o| f64::from(o.order))),
-            Column::numbers("visibility_real", "1", &column(&|o| o.visibility_real)),
-            Column::numbers("visibility_imaginary", "1", &column(&|o| o.visibility_imaginary)),
-            Column::optional(
-                "factor_per_revolution",
-                "1",
-                &orders.iter().map(|o| o.factor_per_revolution).collect::<Vec<_>>(),
-            ),
-            Column::words("fate", orders.iter().map(|o| o.fate.name().into()).collect()),
-        ],
-    }
-}
-
-fn roots_table(outcome: &Outcome) -> Table {
-    let roots = outcome.linear_theory.as_ref().map_or(&[][..], |linear| &linear.roots);
-    Table {
-        id: "roots",
-        columns: vec![
-            Column::numbers("lobes", "1", &roots.iter().map(|r| r.lobes).collect::<Vec<_>>()),
-            Column::numbers(
-                "factor_per_revolution",
-                "1",
-                &roots.iter().map(|r| r.factor_per_revolution).collect::<Vec<_>>(),
-            ),
-        ],
-    }
-}
-
-fn map_table(map: Option<&MapOutcome>) -> Table {
-    let (mut tool, mut support) = (Vec::new(), Vec::new());
-    let nothing: &[Option<f64>] = &[];
-    if let Some(map) = map {
-        for beta in &map.support_half_angle_deg {
-            for alpha in &map.tool_angle_deg {
-                tool.push(*alpha);
-                support.push(*beta);
-            }
-        }
-    }
-    Table {
-        id: "map",
-        columns: vec![
-            Column::numbers("tool_angle", "deg", &tool),
-            Column::numbers("support_half_angle", "deg", &support),
-            Column::optional(
-                "worst_factor_per_revolution",
-                "1",
-                map.map_or(nothing, |m| &m.worst_factor_per_revolution),
-            ),
-            Column::optional("worst_lobes", "1", map.map_or(nothing, |m| &m.worst_lobes)),
-            Column::optional("revolutions_to_target", "1", map.map_or(nothing, |m| &m.revolutions_to_target)),
-        ],
-    }
-}
-
-fn search_table(outcome: &Outcome) -> Table {
-    let tried = outcome.settings_search.as_ref().map(|s| s.tried.clone()).unwrap_or_default();
-    Table {
-        id: "search",
-        columns: vec![
-            Column::numbers("revolutions", "1", &tried.revolutions),
-            Column::numbers("feed", "mm/rev", &tried.feed_mm_per_rev),
-            Column::numbers("roundness", "um", &tried.roundness_um),
-        ],
-    }
-}
-
-fn path_table(outcome: &Outcome) -> Table {
-    let path = outcome.simulation.as_ref().map(|s| s.centre_path.clone()).unwrap_or_default();
-    Table {
-        id: "centre_path",
-        columns: vec![
-            Column::numbers("revolution", "1", &path.revolution),
-            Column::numbers("x", "um", &path.x_um),
-            Column::numbers("y", "um", &path.y_um),
-        ],
-    }
 }

@@ -12,6 +12,12 @@ pub(super) struct Angles {
     pub tool_rad: f64,
 }
 
+impl Angles {
+    pub(super) fn copying(&self) -> Copying {
+        Copying::of_angles(self.half_angle_rad, self.tool_rad)
+    }
+}
+
 /// A setting at given angles, without its feed.
 #[derive(Debug, Clone)]
 pub(super) struct Placed {

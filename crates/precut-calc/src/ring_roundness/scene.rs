@@ -6,7 +6,9 @@ use crate::effects::RingEffect as Effect;
 use crate::num::roundness::{PeriodicSpline, RoundnessError};
 
 use super::input::{Job, Ring, Rotation};
-use super::stance::{Stance, through_tip};
+use super::lobing::Lobing;
+use super::softness::Softness;
+use super::stance::{Copying, Stance, through_tip};
 use super::turning::plane::{Vec2, direction};
 use super::turning::{Motion, Oscillation, Setting, moved_across};
 
@@ -18,6 +20,7 @@ pub(crate) struct Scene {
     /// The machine; mirrored where the ring turns clockwise.
     pub setting: Setting,
     pub mirrored: bool,
+    pub softness: Softness,
     /// Waves that effects add to the blank: order, amplitude (mm), phase.
     waves: Vec<(f64, f64, f64)>,
 }
@@ -34,7 +37,7 @@ impl Scene {
             feed_mm_per_rev: job.tool.feed_mm_per_rev,
             revolutions: job.tool.revolutions,
             spark_out_revolutions: job.tool.spark_out_revolutions,
-            compliance_ratio: job.compliance_ratio,
+            compliance_ratio: 0.0,
             wheel_radius_mm: job.tool.wheel_radius_mm,
             motion: Motion::default(),
         };
@@ -53,7 +56,7 @@ impl Scene {
                     setting.motion.wear_mm_per_rev += recession_um_per_rev * MM_PER_UM;
                 }
                 Effect::RollerRunout { amplitude_mm, ratio, phase_rad } => {
-                    setting.motion.runout.push(Oscillation { amplitude_mm, ratio, phase_rad });
+                    setting.motion.runout_a.push(Oscillation { amplitude_mm, ratio, phase_rad });
                 }
                 Effect::ToolPushOff { push_off_ratio } => push_off += push_off_ratio,
                 Effect::SparkOutMissing { spark_out_revolutions } => {
@@ -66,16 +69,19 @@ impl Scene {
                 Effect::WorkSlip { slip_deg_per_rev } => setting.motion.slip += slip_deg_per_rev / 360.0,
             }
         }
-        if let (Some(stiffness), Some(stance)) = (&job.stiffness, through_tip(&setting, setting.tip_end_mm())) {
-            let copying = stance.copying();
-            setting.compliance_ratio = stiffness.cut_n_per_mm
-                * (1.0 / stiffness.tool_n_per_mm
-                    + copying.a.powi(2) / stiffness.support_a_n_per_mm
-                    + copying.b.powi(2) / stiffness.support_b_n_per_mm);
-        }
-        setting.compliance_ratio += push_off;
+        let softness = Softness::of(job, push_off);
         let mirrored = job.rotation == Rotation::Clockwise;
-        Self { setting: if mirrored { mirror(&setting) } else { setting }, mirrored, waves }
+        let (mut setting, softness) =
+            if mirrored { (mirror(&setting), softness.mirrored()) } else { (setting, softness) };
+        // Where the ring cannot rest there is nothing to cut.
+        setting.compliance_ratio = through_tip(&setting, setting.tip_end_mm())
+            .map_or(job.compliance_ratio + push_off, |stance| softness.ratio(&stance.copying()));
+        Self { setting, mirrored, softness, waves }
+    }
+
+    /// The characteristic equation of the waves at a place of tool and supports.
+    pub(crate) fn lobing(&self, copying: Copying) -> Lobing {
+        self.softness.lobing(copying)
     }
 
     /// Radii of the blank at `n` uniform body angles, mm; in the mirror where the setting is.
@@ -154,7 +160,7 @@ fn mirror(setting: &Setting) -> Setting {
     let flip = |p: Vec2| [-p[0], p[1]];
     let (a, b) = (flip(setting.support_b_mm), flip(setting.support_a_mm));
     let mut motion = setting.motion.clone();
-    motion.runout_at_b = true;
+    std::mem::swap(&mut motion.runout_a, &mut motion.runout_b);
     Setting {
         support_a_mm: a,
         support_b_mm: b,

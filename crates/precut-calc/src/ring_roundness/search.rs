@@ -9,20 +9,23 @@ use std::f64::consts::TAU;
 
 use crate::calculator::{Failure, Finding, Message, checkpoint};
 
-use super::input::{Job, LongWave, SearchRange};
-use super::output::{SearchOutcome, SearchSetting, SearchStatus, SecondStage, TriedColumns};
+use super::input::{Job, LongWave};
+use super::input_ranges::SearchRange;
+use super::output_settings::{SearchOutcome, SearchSetting, SearchStatus, SecondStage, TriedColumns};
 use super::place::Angles;
 use super::sampling::samples_of;
 use super::scene::{Scene, mirrored_rad};
-use super::search_wide::{self, Tried, Wide};
-use super::simulate::Share;
+use super::search_wide::{self, Wide};
+use super::simulate::{SAFETY, Share, or_none, stated_errors};
 use super::stance::{Stance, at_radius, through_tip};
-use super::surface::{UM_PER_MM, odd_waves_mm, roundness_um, unevaluable};
+use super::surface::{UM_PER_MM, odd_waves_mm, of_radii, roundness_um, unevaluable};
 use super::turning::plane::{Vec2, add, angle, norm, scaled, sub, unit};
 use super::turning::{Setting, turn};
 
 /// Nodes of the scan where a filter hides the teeth: good to some nm.
 const SCAN_SAMPLES: u32 = 1800;
+/// Nodes of the blank that the work is estimated from.
+const COARSE_SAMPLES: usize = 360;
 /// Step of the scan.
 const STEP: f64 = 1.05;
 /// The scan begins at this share of the revolutions at which D' is the target, and ends at this multiple.
@@ -33,19 +36,12 @@ const ORDERS: usize = 5;
 /// Share of the error that a second stage must leave at most to be worth its name.
 const WORTH: f64 = 0.8;
 
-/// The setting of the search apart from its feed.
+/// The setting opposite to a support apart from its feed.
 struct Plan {
     setting: Setting,
     travel_mm: f64,
     /// Revolutions at which the teeth are as high as the target.
     natural: f64,
-}
-
-/// Result of one run.
-struct Cut {
-    roundness_um: f64,
-    mean_radius_mm: f64,
-    radii_mm: Vec<f64>,
 }
 
 pub(super) fn search(
@@ -68,35 +64,80 @@ pub(super) fn search(
         tried: TriedColumns::default(),
         second_stage: None,
     };
-    let Some(plan) = plan(range, scene, &blank) else { return Ok(outcome) };
-    let finder = Finder { job, range, scene, plan, blank, share };
-    let mut first = None;
-    if odd_lobes_um > range.target_um {
-        outcome.status = SearchStatus::OddLobes;
-        if let Some(revolutions) = finder.nearest_allowed(finder.plan.natural) {
-            let cut = finder.cut(&finder.setting(revolutions), &finder.blank)?;
-            outcome.note(revolutions, &finder, cut.roundness_um);
-            outcome.best = Some(finder.verified(&finder.setting(revolutions))?);
-            first = Some(cut);
+    let plan = plan(range, scene, &blank);
+    let finder = Finder { job, range, scene, blank, share };
+    // What a second stage may begin with.
+    let mut firsts = Vec::new();
+    if let Some(plan) = plan {
+        if odd_lobes_um > range.target_um {
+            outcome.status = SearchStatus::OddLobes;
+            if let Some(revolutions) = finder.nearest_allowed(&plan, plan.natural) {
+                let setting = plan.at(revolutions);
+                if let Some(found_um) = finder.cut_um(&setting)? {
+                    outcome.note(revolutions, &plan, found_um);
+                }
+                outcome.best = finder.verified(&setting)?;
+            }
+        } else {
+            finder.scan(&plan, &mut outcome)?;
         }
-    } else {
-        finder.scan(&mut outcome)?;
+        firsts.extend(outcome.best.map(|best| plan.at(best.revolutions)));
     }
-    if matches!(outcome.status, SearchStatus::Robust | SearchStatus::Fragile) {
+    if outcome.is_reached() {
         return Ok(outcome);
     }
-    finder.everywhere(&mut outcome)?;
-    if let (SearchStatus::BeyondLimits | SearchStatus::OddLobes, Some(first)) = (outcome.status, first) {
-        outcome.second_stage = finder.second_stage(&first, &mut outcome.simulated)?;
+    firsts.extend(finder.everywhere(&mut outcome)?);
+    if !outcome.is_reached() {
+        for first in firsts {
+            outcome.second_stage = finder.second_stage(&first, &mut outcome.simulated)?;
+            if outcome.second_stage.is_some_and(|stages| stages.second.margin_um >= 0.0) {
+                outcome.status = SearchStatus::TwoStages;
+                break;
+            }
+        }
     }
     Ok(outcome)
 }
 
+/// What a search is expected to do, before it does.
+pub(super) struct Expected {
+    /// Largest number of revolutions of the scan.
+    pub revolutions: f64,
+    /// Whether the search over all angles is needed: opposite to a support no feed helps.
+    pub is_wide: bool,
+}
+
+/// Of a coarse blank: the scan ends at about twice the revolutions at which the teeth are as high as the target.
+pub(super) fn expected(job: &Job, range: &SearchRange) -> Expected {
+    let scene = Scene::of(job, &job.effects);
+    let everything = Expected { revolutions: 0.0, is_wide: true };
+    let Ok(blank) = scene.blank_mm(job, COARSE_SAMPLES) else { return everything };
+    let odd = roundness_um(&odd_waves_mm(&blank), job.filter).map_or(f64::MAX, |(odd_um, _)| odd_um);
+    match plan(range, &scene, &blank) {
+        Some(plan) if odd <= range.target_um => {
+            let most = (plan.travel_mm / range.feed_min_mm_per_rev).min(range.revolutions_max);
+            Expected { revolutions: (2.0 * plan.natural).min(most), is_wide: plan.natural > most }
+        }
+        _ => everything,
+    }
+}
+
+impl Plan {
+    fn at(&self, revolutions: f64) -> Setting {
+        Setting { revolutions, feed_mm_per_rev: self.travel_mm / revolutions, ..self.setting.clone() }
+    }
+}
+
 impl SearchOutcome {
-    fn note(&mut self, revolutions: f64, finder: &Finder<'_>, roundness_um: f64) {
+    fn note(&mut self, revolutions: f64, plan: &Plan, roundness_um: f64) {
         self.tried.revolutions.push(revolutions);
-        self.tried.feed_mm_per_rev.push(finder.plan.travel_mm / revolutions);
+        self.tried.feed_mm_per_rev.push(plan.travel_mm / revolutions);
         self.tried.roundness_um.push(roundness_um);
+    }
+
+    /// Whether one stage reaches the target.
+    fn is_reached(&self) -> bool {
+        matches!(self.status, SearchStatus::Robust | SearchStatus::Fragile)
     }
 }
 
@@ -161,50 +202,52 @@ struct Finder<'a> {
     job: &'a Job,
     range: &'a SearchRange,
     scene: &'a Scene,
-    plan: Plan,
     blank: Vec<f64>,
     share: Share<'a>,
 }
 
 impl Finder<'_> {
-    fn setting(&self, revolutions: f64) -> Setting {
-        let mut setting = self.plan.setting.clone();
-        setting.revolutions = revolutions;
-        setting.feed_mm_per_rev = self.plan.travel_mm / revolutions;
-        setting
-    }
-
     /// Fewest and most revolutions that the machine allows.
-    fn limits(&self) -> (f64, f64) {
-        let fewest = (self.plan.travel_mm / self.range.feed_max_mm_per_rev).ceil().max(1.0);
-        let most = (self.plan.travel_mm / self.range.feed_min_mm_per_rev).floor().min(self.range.revolutions_max);
+    fn limits(&self, plan: &Plan) -> (f64, f64) {
+        let fewest = (plan.travel_mm / self.range.feed_max_mm_per_rev).ceil().max(1.0);
+        let most = (plan.travel_mm / self.range.feed_min_mm_per_rev).floor().min(self.range.revolutions_max);
         (fewest, most)
     }
 
-    fn nearest_allowed(&self, revolutions: f64) -> Option<f64> {
-        let (fewest, most) = self.limits();
+    fn nearest_allowed(&self, plan: &Plan, revolutions: f64) -> Option<f64> {
+        let (fewest, most) = self.limits(plan);
         (fewest <= most).then(|| revolutions.round().clamp(fewest, most))
     }
 
-    fn cut(&self, setting: &Setting, blank: &[f64]) -> Result<Cut, Failure> {
-        let turned = turn::<Failure>(blank, setting, &mut |_, _| checkpoint(self.share.monitor))?;
-        let (roundness_um, mean_radius_mm) = roundness_um(&turned.radii_mm, self.job.filter)?;
-        Ok(Cut { roundness_um, mean_radius_mm, radii_mm: turned.radii_mm })
+    /// The radii after stages one after the other; `None` where the ring falls through.
+    fn after(&self, stages: &[&Setting], mut radii_mm: Vec<f64>) -> Result<Option<Vec<f64>>, Failure> {
+        for stage in stages {
+            let watch = &mut |_: &_, _: &[f64]| checkpoint(self.share.monitor);
+            let Some(turned) = or_none(turn::<Failure>(&radii_mm, stage, watch))? else { return Ok(None) };
+            radii_mm = turned.radii_mm;
+        }
+        Ok(Some(radii_mm))
+    }
+
+    /// Roundness with the nodes of the scan, um.
+    fn cut_um(&self, setting: &Setting) -> Result<Option<f64>, Failure> {
+        let Some(radii) = self.after(&[setting], self.blank.clone())? else { return Ok(None) };
+        Ok(or_none(roundness_um(&radii, self.job.filter))?.map(|(roundness_um, _)| roundness_um))
     }
 
     /// Scans the revolutions upward until three in a row pass and the middle one holds with the job's own nodes.
-    fn scan(&self, outcome: &mut SearchOutcome) -> Result<(), Failure> {
-        let (fewest, most) = self.limits();
-        let from = (FROM * self.plan.natural).round().max(fewest);
-        let to = (TO * self.plan.natural).round().max(from).min(most);
+    fn scan(&self, plan: &Plan, outcome: &mut SearchOutcome) -> Result<(), Failure> {
+        let (fewest, most) = self.limits(plan);
+        let from = (FROM * plan.natural).round().max(fewest);
+        let to = (TO * plan.natural).round().max(from).min(most);
         let (mut n, mut row) = (from, 0);
         let mut nearest: Option<(f64, f64)> = None;
         let mut single: Option<f64> = None;
         while n <= to {
             let share = ((n / from).ln() / (to / from).ln().max(1e-9)).clamp(0.0, 1.0);
             self.share.report(share, Message::new("stage_search").with("revolutions", n));
-            let found = self.cut(&self.setting(n), &self.blank)?.roundness_um;
-            outcome.note(n, self, found);
+            let found = self.cut_um(&plan.at(n))?.unwrap_or(f64::MAX);
+            outcome.note(n, plan, found);
             if nearest.is_none_or(|(_, best)| found < best) {
                 nearest = Some((n, found));
             }
@@ -214,8 +257,7 @@ impl Finder<'_> {
             }
             if row >= 3 {
                 let middle = outcome.tried.revolutions[outcome.tried.revolutions.len() - 2];
-                let setting = self.verified(&self.setting(middle))?;
-                if setting.margin_um >= 0.0 {
+                if let Some(setting) = self.verified(&plan.at(middle))?.filter(|setting| setting.margin_um >= 0.0) {
                     outcome.status = SearchStatus::Robust;
                     outcome.best = Some(setting);
                     break;
@@ -224,125 +266,109 @@ impl Finder<'_> {
             n = (n * STEP).round().max(n + 1.0);
         }
         if let Some(fewest) = single {
-            let setting = self.verified(&self.setting(fewest))?;
-            outcome.fewest = (setting.margin_um >= 0.0).then_some(setting);
+            outcome.fewest = self.verified(&plan.at(fewest))?.filter(|setting| setting.margin_um >= 0.0);
         }
-        if outcome.best.is_none()
-            && let Some((n, _)) = nearest
-        {
-            let setting = self.verified(&self.setting(n))?;
-            outcome.status = if setting.margin_um >= 0.0 { SearchStatus::Fragile } else { SearchStatus::BeyondLimits };
-            outcome.best = Some(setting);
+        if let (None, Some((n, _))) = (&outcome.best, nearest) {
+            outcome.best = self.verified(&plan.at(n))?;
+            if outcome.best.is_some_and(|best| best.margin_um >= 0.0) {
+                outcome.status = SearchStatus::Fragile;
+            }
         }
         Ok(())
     }
 
-    /// The setting with the job's own nodes, and with half of them for the error.
-    fn verified(&self, setting: &Setting) -> Result<SearchSetting, Failure> {
+    /// A setting with the job's own nodes, and with half and a third of them for the error.
+    fn verified(&self, setting: &Setting) -> Result<Option<SearchSetting>, Failure> {
+        let coarse = self.coarse_mm()?;
+        self.verified_after(&[], setting, &coarse)
+    }
+
+    fn coarse_mm(&self) -> Result<Vec<f64>, Failure> {
+        self.scene.blank_mm(self.job, search_wide::nodes(self.job) as usize).map_err(unevaluable)
+    }
+
+    /// The same of a setting that begins with what others leave; `start_mm` is that, with the nodes of the wide search.
+    fn verified_after(
+        &self,
+        before: &[&Setting],
+        setting: &Setting,
+        start_mm: &[f64],
+    ) -> Result<Option<SearchSetting>, Failure> {
         let n = samples_of(self.job).max(super::input::DEFAULT_SAMPLES);
-        let blank = |n: u32| self.scene.blank_mm(self.job, n as usize).map_err(unevaluable);
-        let full = self.cut(setting, &blank(n)?)?;
-        let half = self.cut(setting, &blank(n / 2)?)?;
-        let error = (full.roundness_um - half.roundness_um).abs();
-        let coarse = blank(search_wide::nodes(self.job))?;
+        let stages: Vec<&Setting> = before.iter().copied().chain([setting]).collect();
+        let mut surfaces = Vec::with_capacity(3);
+        for nodes in [n, n / 2, (n / 3).next_multiple_of(4)] {
+            let blank = self.scene.blank_mm(self.job, nodes as usize).map_err(unevaluable)?;
+            let Some(radii) = self.after(&stages, blank)? else { return Ok(None) };
+            let Some(surface) = or_none(of_radii(&radii, self.job.filter, 2))? else { return Ok(None) };
+            surfaces.push(surface);
+        }
+        let [full, half, third] = &surfaces[..] else { return Ok(None) };
+        let error = stated_errors(full, &[(half, SAFETY), (third, SAFETY)]);
+        let (roundness_um, error_um) = (full.evaluated.filtered.least_squares_um, error.filtered.least_squares_um);
         let end = through_tip(setting, setting.tip_end_mm())
             .ok_or_else(|| Failure::OutOfModel(Finding::new("no_end_position", "/tool")))?;
         let angles = Angles { half_angle_rad: end.half_angle_rad, tool_rad: end.tool_rad() };
-        let placed = self.as_placed(setting);
-        Ok(SearchSetting {
-            tool_x_mm: placed.x_mm,
-            tool_y_mm: placed.y_mm,
-            feed_direction_deg: placed.feed_direction_deg,
-            support_distance_mm: placed.distance_mm,
-            support_depth_mm: placed.depth_mm,
+        let mirrored = self.scene.mirrored;
+        let [x, y] = setting.tip_start_mm;
+        Ok(Some(SearchSetting {
+            tool_x_mm: if mirrored { -x } else { x },
+            tool_y_mm: y,
+            feed_direction_deg: mirrored_rad(angle(setting.feed_direction), mirrored).rem_euclid(TAU).to_degrees(),
+            support_distance_mm: norm(sub(setting.support_b_mm, setting.support_a_mm)),
+            support_depth_mm: -setting.support_a_mm[1],
             support_half_angle_deg: end.half_angle_rad.to_degrees(),
-            tool_angle_deg: mirrored_rad(end.tool_rad(), self.scene.mirrored).to_degrees(),
+            tool_angle_deg: mirrored_rad(end.tool_rad(), mirrored).to_degrees(),
             compliance_ratio: setting.compliance_ratio,
-            robust_share: self.wide(&coarse).robust_share(angles, setting)?,
+            robust_share: self.wide(start_mm).robust_share(angles, setting)?,
             feed_mm_per_rev: setting.feed_mm_per_rev,
             revolutions: setting.revolutions,
             spark_out_revolutions: setting.spark_out_revolutions,
-            roundness_um: full.roundness_um,
-            roundness_error_um: error,
-            margin_um: self.range.target_um - full.roundness_um - error,
-            mean_radius_mm: full.mean_radius_mm,
-        })
+            roundness_um,
+            roundness_error_um: error_um,
+            margin_um: self.range.target_um - roundness_um - error_um,
+            mean_radius_mm: full.evaluated.mean_radius_mm,
+        }))
     }
 
     fn wide<'b>(&'b self, blank: &'b [f64]) -> Wide<'b> {
         Wide {
             job: self.job,
             range: self.range,
-            base: &self.plan.setting,
+            base: &self.scene.setting,
+            softness: &self.scene.softness,
             mirrored: self.scene.mirrored,
             blank,
             share: self.share,
         }
     }
 
-    /// The search over all angles; what it finds is taken where it is better.
-    fn everywhere(&self, outcome: &mut SearchOutcome) -> Result<(), Failure> {
-        let nodes = search_wide::nodes(self.job) as usize;
-        let blank = self.scene.blank_mm(self.job, nodes).map_err(unevaluable)?;
-        let Some(found) = self.wide(&blank).search()? else { return Ok(()) };
+    /// The search over all angles; what it finds is taken where it is better. The setting that it found.
+    fn everywhere(&self, outcome: &mut SearchOutcome) -> Result<Option<Setting>, Failure> {
+        let blank = self.coarse_mm()?;
+        let Some(found) = self.wide(&blank).search()? else { return Ok(None) };
         outcome.simulated += found.simulated;
-        let setting = self.verified(&found.best.setting)?;
+        let Some(setting) = self.verified_after(&[], &found.best.setting, &blank)? else { return Ok(None) };
         if setting.margin_um >= 0.0 {
             let robust = setting.robust_share >= search_wide::ROBUST;
             outcome.status = if robust { SearchStatus::Robust } else { SearchStatus::Fragile };
         }
-        if outcome.best.is_none_or(|best| setting.roundness_um < best.roundness_um) {
+        if outcome.is_reached() || outcome.best.is_none_or(|best| setting.roundness_um < best.roundness_um) {
             outcome.best = Some(setting);
         }
-        Ok(())
-    }
-
-    /// Where tool and supports stand, as the job has it.
-    fn as_placed(&self, setting: &Setting) -> Placing {
-        let [x, y] = setting.tip_start_mm;
-        let direction_rad = angle(setting.feed_direction);
-        let mirrored = self.scene.mirrored;
-        Placing {
-            x_mm: if mirrored { -x } else { x },
-            y_mm: y,
-            feed_direction_deg: mirrored_rad(direction_rad, mirrored).rem_euclid(TAU).to_degrees(),
-            distance_mm: norm(sub(setting.support_b_mm, setting.support_a_mm)),
-            depth_mm: -setting.support_a_mm[1],
-        }
+        Ok(Some(found.best.setting))
     }
 
     /// A second stage that begins with what the first leaves: the waves that the first does not see decay at other angles
     /// (`ring/5.5`). Given only where the simulation of both shows a gain.
-    fn second_stage(&self, first: &Cut, simulated: &mut usize) -> Result<Option<SecondStage>, Failure> {
-        let wide = self.wide(&first.radii_mm);
-        let Some(found) = wide.search()? else { return Ok(None) };
+    fn second_stage(&self, first: &Setting, simulated: &mut usize) -> Result<Option<SecondStage>, Failure> {
+        let blank = self.coarse_mm()?;
+        let Some(left_mm) = self.after(&[first], blank.clone())? else { return Ok(None) };
+        let Some(found) = self.wide(&left_mm).search()? else { return Ok(None) };
         *simulated += found.simulated;
-        let Tried { setting, angles, roundness_um, .. } = found.best;
-        let placed = self.as_placed(&setting);
-        let stage = SecondStage {
-            tool_x_mm: placed.x_mm,
-            tool_y_mm: placed.y_mm,
-            feed_direction_deg: placed.feed_direction_deg,
-            support_depth_mm: placed.depth_mm,
-            support_half_angle_deg: angles.half_angle_rad.to_degrees(),
-            tool_angle_deg: mirrored_rad(angles.tool_rad, self.scene.mirrored).to_degrees(),
-            support_distance_mm: placed.distance_mm,
-            feed_mm_per_rev: setting.feed_mm_per_rev,
-            revolutions: setting.revolutions,
-            before_um: first.roundness_um,
-            after_um: roundness_um,
-            robust_share: found.robust_share,
-        };
-        let alone = self.range.target_um.max(WORTH * first.roundness_um);
-        Ok(Some(stage).filter(|stage| stage.after_um < alone))
+        let second = self.verified_after(&[first], &found.best.setting, &left_mm)?;
+        let Some((first, second)) = self.verified_after(&[], first, &blank)?.zip(second) else { return Ok(None) };
+        let worth = self.range.target_um.max(WORTH * first.roundness_um);
+        Ok(Some(SecondStage { first, second }).filter(|stages| stages.second.roundness_um < worth))
     }
-}
-
-/// Where tool and supports stand, in the machine of the job.
-struct Placing {
-    x_mm: f64,
-    y_mm: f64,
-    feed_direction_deg: f64,
-    distance_mm: f64,
-    depth_mm: f64,
 }

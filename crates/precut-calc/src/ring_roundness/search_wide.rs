@@ -9,13 +9,15 @@ use rayon::prelude::*;
 use crate::calculator::{Failure, Message, checkpoint};
 use crate::num::roundness::Grid;
 
-use super::input::{Job, SearchRange};
-use super::lobing::{Lobing, of_order};
+use super::input::Job;
+use super::input_ranges::SearchRange;
+use super::lobing::of_order;
 use super::place::{Angles, Placed, touched_mm};
 use super::simulate::{Share, or_none, side_by_side};
-use super::stance::{Copying, TOOL_CLEARANCE_RAD};
+use super::softness::Softness;
+use super::stance::TOOL_CLEARANCE_RAD;
 use super::surface::{UM_PER_MM, roundness_um, unevaluable};
-use super::turning::{Setting, turn};
+use super::turning::{Oscillation, Setting, turn};
 
 /// Step of the grid of angles, deg.
 const TOOL_STEP_DEG: f64 = 2.0;
@@ -39,8 +41,6 @@ const AT_ONCE: usize = 16;
 const MORE_SPARK_OUT: f64 = 3.0;
 /// Trials of the robustness.
 const TRIALS: u32 = 24;
-/// By how much the waves of the blank are larger or smaller in them.
-const WAVES_OFF: f64 = 0.2;
 /// Share of trials from which on a setting counts as robust.
 pub(super) const ROBUST: f64 = 0.9;
 
@@ -50,6 +50,7 @@ pub(super) struct Wide<'a> {
     pub range: &'a SearchRange,
     /// The job's setting in the kernel's frame; its angles and feed are replaced.
     pub base: &'a Setting,
+    pub softness: &'a Softness,
     pub mirrored: bool,
     pub blank: &'a [f64],
     pub share: Share<'a>,
@@ -67,8 +68,6 @@ pub(super) struct Tried {
 /// What came of it.
 pub(super) struct Found {
     pub best: Tried,
-    /// Share of the trials with angles, waves and phase off in which the target is met.
-    pub robust_share: f64,
     /// Settings simulated.
     pub simulated: usize,
 }
@@ -97,8 +96,11 @@ impl Wide<'_> {
                         tool_rad: best.angles.tool_rad + tool.to_radians(),
                         half_angle_rad: best.angles.half_angle_rad + support.to_radians(),
                     };
-                    if !beside.contains(&(angles, best.compliance_ratio)) {
-                        beside.push((angles, best.compliance_ratio));
+                    // As much softer than by itself as the best cell is.
+                    let by_itself = |angles: Angles| self.softness.ratio(&angles.copying());
+                    let k = best.compliance_ratio - by_itself(best.angles) + by_itself(angles);
+                    if !beside.contains(&(angles, k)) {
+                        beside.push((angles, k));
                     }
                 }
             }
@@ -122,7 +124,7 @@ impl Wide<'_> {
                 best = Some((robust, candidate));
             }
         }
-        Ok(best.map(|(robust_share, best)| Found { best, robust_share, simulated }))
+        Ok(best.map(|(_, best)| Found { best, simulated }))
     }
 
     /// Peak to valley of the blank's waves by order, from 2.
@@ -146,17 +148,17 @@ impl Wide<'_> {
                 (here <= to + 1e-9).then_some(here)
             })
         };
-        let given = self.base.compliance_ratio;
-        let mut ratios = vec![given];
-        if let Some(most) = range.compliance_ratio_max.filter(|most| *most > given) {
-            ratios.extend([f64::midpoint(given, most), most]);
-        }
+        let ratios = |angles: Angles| {
+            let given = self.softness.ratio(&angles.copying());
+            let most = range.compliance_ratio_max.filter(|most| *most > given);
+            [Some(given), most.map(|most| f64::midpoint(given, most)), most].into_iter().flatten()
+        };
         let mut cells = Vec::new();
         for support in steps(range.support_angle_from_deg, range.support_angle_to_deg, SUPPORT_STEP_DEG) {
             for tool in steps(range.tool_angle_from_deg, range.tool_angle_to_deg, TOOL_STEP_DEG) {
                 let tool_rad = super::scene::mirrored_rad(tool.to_radians(), self.mirrored);
                 let angles = Angles { half_angle_rad: support.to_radians(), tool_rad };
-                cells.extend(ratios.iter().map(|k| (angles, *k)));
+                cells.extend(ratios(angles).map(|k| (angles, k)));
             }
         }
         cells
@@ -169,13 +171,16 @@ impl Wide<'_> {
         let corners = if error > 0.0 { &corners[..] } else { &corners[..1] };
         let mut worst = 0.0_f64;
         for (tool, support) in corners {
-            let copying = Copying::of_angles(angles.half_angle_rad + support, angles.tool_rad + tool);
+            let off = Angles { half_angle_rad: angles.half_angle_rad + support, tool_rad: angles.tool_rad + tool };
+            let copying = off.copying();
             let turn = std::f64::consts::TAU;
             let near = |delay: f64| delay.min(turn - delay);
             if near(copying.delay_a_rad).min(near(copying.delay_b_rad)) < TOOL_CLEARANCE_RAD {
                 return None;
             }
-            let roots = Lobing { copying, compliance_ratio }.near_neutral(1.5, f64::from(HIGHEST) + 0.5);
+            let mut lobing = self.softness.lobing(copying);
+            lobing.compliance_ratio = compliance_ratio.max(lobing.compliance_ratio);
+            let roots = lobing.near_neutral(1.5, f64::from(HIGHEST) + 0.5);
             let after = |factor: f64| factor.powf(RANKED_REVOLUTIONS).min(1e6);
             let of_blank: f64 = waves
                 .iter()
@@ -189,12 +194,15 @@ impl Wide<'_> {
         Some(worst)
     }
 
-    fn placed(&self, angles: Angles, compliance_ratio: f64, blank: &[f64]) -> Option<Placed> {
-        let copying = Copying::of_angles(angles.half_angle_rad, angles.tool_rad);
-        let (last_mm, first_mm) = touched_mm(blank, &copying);
-        let lowest = blank.iter().copied().fold(f64::INFINITY, f64::min);
-        let base = Setting { compliance_ratio, ..self.base.clone() };
-        Placed::new(&base, angles, first_mm + self.range.clearance_mm, last_mm.min(lowest) - self.range.allowance_mm)
+    /// Radii at which the tool starts and ends, mm.
+    fn ends_mm(&self, angles: Angles) -> (f64, f64) {
+        let (last_mm, first_mm) = touched_mm(self.blank, &angles.copying());
+        let lowest = self.blank.iter().copied().fold(f64::INFINITY, f64::min);
+        (first_mm + self.range.clearance_mm, last_mm.min(lowest) - self.range.allowance_mm)
+    }
+
+    fn placed(&self, angles: Angles, compliance_ratio: f64, (from_mm, to_mm): (f64, f64)) -> Option<Placed> {
+        Placed::new(&Setting { compliance_ratio, ..self.base.clone() }, angles, from_mm, to_mm)
     }
 
     /// Every cell with every feed that the machine has.
@@ -202,7 +210,7 @@ impl Wide<'_> {
         let range = self.range;
         let mut runs: Vec<(Angles, f64, Setting)> = Vec::new();
         for &(angles, k) in cells {
-            let Some(placed) = self.placed(angles, k, self.blank) else { continue };
+            let Some(placed) = self.placed(angles, k, self.ends_mm(angles)) else { continue };
             let mut before = f64::INFINITY;
             for share in FEEDS {
                 let feed = range.feed_min_mm_per_rev.powf(1.0 - share) * range.feed_max_mm_per_rev.powf(share);
@@ -246,29 +254,49 @@ impl Wide<'_> {
         Ok(or_none(roundness_um(&turned.radii_mm, self.job.filter))?.map(|found| found.0))
     }
 
-    /// How often the target is met with the angles off by up to the stated error, the blank's waves larger or smaller, and
-    /// the blank put in turned: an even sequence of trials, always the same.
+    /// How often the target is met with the angles off by up to the stated error, the rollers running out, the blank's
+    /// waves larger or smaller, and the blank put in turned: an even sequence of trials, always the same.
     pub(super) fn robust_share(&self, angles: Angles, setting: &Setting) -> Result<f64, Failure> {
         let error = self.range.angle_error_deg.to_radians();
         let mean = self.blank.iter().sum::<f64>() / self.blank.len() as f64;
+        // Set up for the blank as it is stated.
+        let ends_mm = self.ends_mm(angles);
         let trials: Vec<_> = (1..=TRIALS).collect();
         let met = side_by_side(&trials, |&i| {
-            // Additive recurrence with powers of the inverse of the root of x⁵ = x + 1: even in four dimensions.
-            let at = |power: i32| (0.5 + f64::from(i) * 0.856_674_883_854_502_9_f64.powi(power)).fract();
+            // Additive recurrence with powers of the inverse of the root of x⁷ = x + 1: even in six dimensions.
+            let at = |power: i32| (0.5 + f64::from(i) * 0.898_653_712_628_699_3_f64.powi(power)).fract();
             let off = Angles {
                 tool_rad: angles.tool_rad + error * (2.0 * at(1) - 1.0),
                 half_angle_rad: angles.half_angle_rad + error * (2.0 * at(2) - 1.0),
             };
-            let by = 1.0 + WAVES_OFF * (2.0 * at(3) - 1.0);
+            let by = 1.0 + 0.01 * self.range.blank_waves_error_percent * (2.0 * at(3) - 1.0);
             let mut blank: Vec<f64> = self.blank.iter().map(|radius| mean + by * (radius - mean)).collect();
             let n = blank.len();
             blank.rotate_left(turned_nodes(at(4), n));
-            let Some(placed) = self.placed(off, setting.compliance_ratio, &blank) else { return Ok(false) };
+            let Some(placed) = self.placed(off, setting.compliance_ratio, ends_mm) else { return Ok(false) };
             let dwell = setting.spark_out_revolutions;
-            let off = Setting { spark_out_revolutions: dwell, ..placed.in_revolutions(setting.revolutions) };
+            let mut off = Setting { spark_out_revolutions: dwell, ..placed.in_revolutions(setting.revolutions) };
+            self.run_out(&mut off, mean, [at(5), at(6)]);
             Ok(self.run(&off, &blank)?.is_some_and(|um| um <= self.range.target_um))
         })?;
         Ok(met.iter().filter(|met| **met).count() as f64 / f64::from(TRIALS))
+    }
+}
+
+impl Wide<'_> {
+    /// Both rollers off their axes by half of the stated run-out, at phases that are shares of a turn.
+    fn run_out(&self, setting: &mut Setting, ring_mm: f64, phases: [f64; 2]) {
+        let amplitude_mm = 0.5 * self.range.roller_runout_um / UM_PER_MM;
+        if setting.roller_radius_mm <= 0.0 || amplitude_mm <= 0.0 {
+            return;
+        }
+        let [a, b] = phases.map(|share| Oscillation {
+            amplitude_mm,
+            ratio: ring_mm / setting.roller_radius_mm,
+            phase_rad: std::f64::consts::TAU * share,
+        });
+        setting.motion.runout_a.push(a);
+        setting.motion.runout_b.push(b);
     }
 }
 
@@ -296,15 +324,15 @@ fn apart(cells: Vec<(f64, Angles, f64)>) -> Vec<(f64, Angles, f64)> {
     kept
 }
 
-/// What it takes, ms: two stages at most, each of some hundred runs of the revolutions that its feeds give.
+/// What it takes, ms: two stages as often as one, each of some hundred runs of the revolutions that its feeds give.
 pub(super) fn work_ms(job: &Job, range: &SearchRange, step_ns: f64) -> f64 {
-    const RUNS: f64 = 2.0 * (4.0 * SIMULATED as f64 + 8.0 * 9.0 * REFINED as f64 + REFINED as f64 * TRIALS as f64);
+    const RUNS: f64 = 1.5 * (4.0 * SIMULATED as f64 + 8.0 * 9.0 * REFINED as f64 + REFINED as f64 * TRIALS as f64);
     let cells = (range.tool_angle_to_deg - range.tool_angle_from_deg) / TOOL_STEP_DEG
         * (range.support_angle_to_deg - range.support_angle_from_deg)
         / SUPPORT_STEP_DEG;
     let ratios = if range.compliance_ratio_max.is_some() { 3.0 } else { 1.0 };
     // Five sets of roots per cell, 30 us each.
-    2.0 * cells * ratios * 0.15 + RUNS * 1e-6 * step_ns * f64::from(nodes(job)) * 50.0_f64.min(range.revolutions_max)
+    1.5 * cells * ratios * 0.15 + RUNS * 1e-6 * step_ns * f64::from(nodes(job)) * 50.0_f64.min(range.revolutions_max)
 }
 
 /// Nodes of the simulations of the search.

@@ -8,7 +8,7 @@
 )]
 
 use precut_calc::calculator::{Answer, Calculator, Check, Failure, Finding, Unwatched, Violations};
-use precut_calc::ring_roundness::{Job, Outcome, RingRoundness};
+use precut_calc::ring_roundness::{Job, Outcome, RingRoundness, SearchSetting};
 use serde_json::{Value, json};
 
 /// A reference file.
@@ -56,6 +56,11 @@ pub fn translate(input: &Value) -> Value {
     })
 }
 
+/// How many random set-ups a property is tried on: `PRECUT_RING_TRIALS`, or so many.
+pub fn trials(in_the_suite: u64) -> u64 {
+    std::env::var("PRECUT_RING_TRIALS").ok().and_then(|text| text.parse().ok()).unwrap_or(in_the_suite)
+}
+
 /// Faults of a job.
 pub fn faults(job: &Value) -> Vec<Finding> {
     let job: Job = serde_json::from_value(job.clone()).unwrap();
@@ -81,4 +86,40 @@ pub fn try_run(job: &Value) -> Result<Answer<Outcome>, Failure> {
 /// The same where it must succeed.
 pub fn run(job: &Value) -> Answer<Outcome> {
     try_run(job).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Tip at the start and at the end of the feed, and half the distance of the supports: a round ring of the radius `first`
+/// rests on them, and the tip stands at the angle `tool` on it; so it does after `travel`, when the supports stand at the half
+/// angle `beta` below its centre.
+pub fn ends_of_the_feed(first: f64, travel: f64, beta: f64, tool: f64, depth: f64) -> ([f64; 2], [f64; 2], f64) {
+    let tip = |radius: f64, half: f64| {
+        let centre = (radius * radius - half * half).sqrt() - depth;
+        [radius * tool.cos(), centre + radius * tool.sin()]
+    };
+    let ends = |last: f64| {
+        let half = last * beta.sin();
+        (tip(first, half), tip(last, half), half)
+    };
+    let (mut low, mut high) = (1.0, first);
+    for _ in 0..80 {
+        let middle = 0.5 * (low + high);
+        let (start, end, _) = ends(middle);
+        if f64::hypot(end[0] - start[0], end[1] - start[1]) > travel { low = middle } else { high = middle }
+    }
+    ends(low)
+}
+
+/// The setting advised as a job.
+pub fn as_job(job: &Value, best: &SearchSetting) -> Value {
+    let mut advised = job.clone();
+    advised["analyses"] = json!(["simulation"]);
+    advised["supports"]["distance_mm"] = json!(best.support_distance_mm);
+    advised["supports"]["depth_mm"] = json!(best.support_depth_mm);
+    advised["compliance_ratio"] = json!(best.compliance_ratio);
+    advised["tool"] = json!({
+        "x_mm": best.tool_x_mm, "y_mm": best.tool_y_mm, "feed_direction_deg": best.feed_direction_deg,
+        "feed_mm_per_rev": best.feed_mm_per_rev, "revolutions": best.revolutions,
+        "spark_out_revolutions": best.spark_out_revolutions
+    });
+    advised
 }

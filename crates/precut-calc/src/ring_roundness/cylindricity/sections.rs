@@ -9,7 +9,7 @@ use crate::ring_roundness::evaluation::instrument::{
 use crate::ring_roundness::evaluation::readings::{Readings, columns};
 use crate::ring_roundness::evaluation::{
     Job as SectionJob, ReferenceCircle, RoundnessDeviationRow, RoundnessFilter, RoundnessPointRow, RoundnessRadiusRow,
-    RoundnessRepair,
+    RoundnessRepair, SpikeTreatment,
 };
 
 use super::input::Job;
@@ -138,6 +138,7 @@ pub(super) fn section_job(job: &Job, nominal_radius_mm: Option<f64>) -> SectionJ
         file: None,
         nominal_radius_mm,
         filter: job.filter,
+        spikes: SpikeTreatment::Keep,
         reference: job.reference,
         profile_points: None,
         highest_harmonic: 50,

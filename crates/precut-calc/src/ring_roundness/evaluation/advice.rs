@@ -4,7 +4,7 @@ use crate::calculator::{Finding, Message};
 
 use super::assess::{judged, of_reference};
 use super::check::filter_points;
-use super::input::{Job, RoundnessFilter};
+use super::input::{Job, RoundnessFilter, SpikeTreatment};
 use super::output::Outcome;
 use super::readings::Table;
 
@@ -42,11 +42,6 @@ const POINTS_PER_WAVE: f64 = 7.0;
 const FINEST_UM: f64 = 0.02;
 /// A mean radius farther from the nominal one than this is of another quantity or unit.
 const UNLIKE: f64 = 0.02;
-/// A reading this many standard deviations (estimated from the median, which a spike does not move) off the filtered
-/// profile is no roughness.
-const SPIKE: f64 = 8.0;
-/// Median of the absolute value of a normal deviate, in standard deviations.
-const MEDIAN_OF_NORMAL: f64 = 0.674_49;
 /// Widest spread of the ratio that a mistaken unit makes.
 const SAME_RATIO: f64 = 0.01;
 
@@ -132,29 +127,21 @@ pub(in crate::ring_roundness) fn unlike_nominal(
     })
 }
 
-/// One reading far from its neighbours: dirt, a scratch, a jump of the probe.
+/// Readings that count although they stand off all around them.
 fn spike(job: &Job, outcome: &Outcome, table: &'static str) -> Option<Finding> {
-    if !matches!(job.filter, RoundnessFilter::LowPass { .. }) || !outcome.data.filter_applied {
-        return None;
-    }
-    let profile = &outcome.profile;
-    let left: Vec<f64> = profile
-        .radial_deviation_um
-        .iter()
-        .zip(&profile.filtered_deviation_um)
-        .map(|(all, kept)| (all - kept).abs())
-        .collect();
-    let at = (0..left.len()).max_by(|&a, &b| left[a].total_cmp(&left[b]))?;
-    let mut sorted = left.clone();
-    sorted.sort_by(f64::total_cmp);
-    let deviation_um = sorted[sorted.len() / 2] / MEDIAN_OF_NORMAL;
-    let limit_um = SPIKE * deviation_um;
-    // Below what instruments resolve a ratio says nothing.
-    (left[at] > limit_um && left[at] > FINEST_UM).then(|| {
-        Finding::new("spike_suspected", format!("/{table}"))
-            .measured(left[at], limit_um, "um")
-            .with("angle_deg", profile.angle_deg[at])
-            .with("roughness_um", deviation_um)
+    let spikes = &outcome.data.spikes;
+    let highest = spikes.iter().max_by(|p, q| p.height_um.abs().total_cmp(&q.height_um.abs()))?;
+    let finding = Finding::new("spike_suspected", format!("/{table}"))
+        .value(highest.height_um, "um")
+        .with("angle_deg", highest.angle_deg)
+        .with("width_deg", highest.width_deg)
+        .with("row", highest.row)
+        .with("count", spikes.len())
+        .with("roundness_um", outcome.roundness_um);
+    let without = outcome.data.roundness_without_spikes_um;
+    (job.spikes == SpikeTreatment::Keep).then(|| match without {
+        Some(without_um) => finding.with("without_um", without_um),
+        None => finding,
     })
 }
 

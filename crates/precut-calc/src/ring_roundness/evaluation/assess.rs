@@ -1,11 +1,11 @@
 //! From the points to the answer.
 
-use crate::calculator::{Failure, Finding, Message, Monitor, checkpoint};
+use crate::calculator::{Failure, Finding, Message, Monitor, Quiet, checkpoint};
 use crate::num::roundness::{
     Circles, Evaluation, Filter, Grid, PeriodicSpline, RoundnessError, circles, evaluate, refer,
 };
 
-use super::input::{Job, ReferenceCircle, RoundnessFilter};
+use super::input::{Job, ReferenceCircle, RoundnessFilter, SpikeTreatment};
 use super::output::{
     ContactKind, OtherCircle, Outcome, RoundnessCircle, RoundnessCircles, RoundnessContact, RoundnessData,
     RoundnessProfile, RoundnessProof, RoundnessSpectrum,
@@ -31,9 +31,21 @@ pub(in crate::ring_roundness) fn outcome(job: &Job, monitor: &dyn Monitor) -> Re
     checkpoint(monitor)?;
     monitor.progress(0.0, Message::new("stage_circles"));
     let readings = Readings::of(job).map_err(|error| failure(error, None))?;
-    let outcome = if readings.is_closed() { curve(job, &readings, monitor)? } else { scattered(job, &readings)? };
+    let mut outcome = of_readings(job, &readings, monitor)?;
+    if job.spikes == SpikeTreatment::Keep && !readings.spikes.is_empty() {
+        // What would come without them is tried, not guessed.
+        let without = Job { spikes: SpikeTreatment::Remove, ..job.clone() };
+        let readings = Readings::of(&without).map_err(|error| failure(error, None))?;
+        outcome.data.roundness_without_spikes_um =
+            of_readings(&without, &readings, &Quiet(monitor)).ok().map(|without| without.roundness_um);
+        checkpoint(monitor)?;
+    }
     monitor.progress(1.0, Message::new("stage_done"));
     Ok(outcome)
+}
+
+fn of_readings(job: &Job, readings: &Readings, monitor: &dyn Monitor) -> Result<Outcome, Failure> {
+    if readings.is_closed() { curve(job, readings, monitor) } else { scattered(job, readings) }
 }
 
 /// Points through which a curve can be laid: everything.
@@ -100,6 +112,8 @@ fn scattered(job: &Job, readings: &Readings) -> Result<Outcome, Failure> {
             eccentricity_angle_deg: y.atan2(x).to_degrees().rem_euclid(360.0),
             filter_applied: job.filter == (RoundnessFilter::None {}),
             repairs: readings.repairs.clone(),
+            spikes: readings.spikes.clone(),
+            roundness_without_spikes_um: None,
             interpolation_error_um: 0.0,
             aliasing_um: 0.0,
         },
@@ -186,6 +200,8 @@ fn data(job: &Job, readings: &Readings, found: &Evaluation) -> Result<RoundnessD
         uniform,
         filter_applied: true,
         repairs: readings.repairs.clone(),
+        spikes: readings.spikes.clone(),
+        roundness_without_spikes_um: None,
         eccentricity_mm: x.hypot(y),
         eccentricity_angle_deg: y.atan2(x).to_degrees().rem_euclid(360.0),
         interpolation_error_um: if uniform && is_at_grid(job, readings) {

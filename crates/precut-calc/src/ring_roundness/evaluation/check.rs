@@ -114,7 +114,10 @@ fn check_form(job: &Job, at: &str, violations: &mut Violations) {
     let radius_mm = readings.circle.circle.radius_mm;
     let deviation = 0.5 * readings.circle.span.width_mm() / radius_mm;
     violations.require(deviation <= LARGEST_DEVIATION, || {
-        Finding::new("not_round", at).measured(deviation, LARGEST_DEVIATION, "1").with("radius_mm", radius_mm)
+        Finding::new("not_round", at)
+            .measured(deviation, LARGEST_DEVIATION, "1")
+            .with("radius_mm", radius_mm)
+            .with("spikes", readings.spikes.len())
     });
 }
 

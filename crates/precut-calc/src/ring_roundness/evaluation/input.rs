@@ -37,6 +37,10 @@ pub struct Job {
     #[serde(default)]
     #[schema(extensions(("x-group" = json!("evaluation"))))]
     pub filter: RoundnessFilter,
+    /// What is done with spikes: readings that stand off all around them. They are listed in `data.spikes` in any case.
+    #[serde(default)]
+    #[schema(default = "keep", example = "keep", extensions(("x-group" = json!("evaluation"))))]
+    pub spikes: SpikeTreatment,
     /// The reference circle that `roundness_um` is about. All four are always given.
     #[serde(default)]
     #[schema(default = "least_squares", example = "minimum_zone")]
@@ -54,6 +58,18 @@ pub struct Job {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 0.001, maximum = 100_000.0, example = 10.0, extensions(("x-unit" = json!("um")), ("x-symbol" = json!("t")), ("x-group" = json!("workpiece"))))]
     pub tolerance_um: Option<f64>,
+}
+
+/// What is done with spikes.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+#[schema(as = RoundnessSpikeTreatment)]
+pub enum SpikeTreatment {
+    /// They count as any reading.
+    #[default]
+    Keep,
+    /// They are left out, and that is told.
+    Remove,
 }
 
 /// The text of a file as a roundness tester or a coordinate machine wrote it: header text and comments in any language,

@@ -14,14 +14,15 @@ pub(super) mod instrument;
 mod output;
 mod picture;
 pub(super) mod readings;
+mod spikes;
 
 pub use input::{
     FileColumn, InstrumentFile, Job, MAX_POINTS, ReferenceCircle, RoundnessDeviationRow, RoundnessFilter,
-    RoundnessPointRow, RoundnessRadiusRow,
+    RoundnessPointRow, RoundnessRadiusRow, SpikeTreatment,
 };
 pub use output::{
     ContactKind, OtherCircle, Outcome, RepairKind, RoundnessCircle, RoundnessCircles, RoundnessContact, RoundnessData,
-    RoundnessProfile, RoundnessProof, RoundnessRepair, RoundnessSpectrum,
+    RoundnessProfile, RoundnessProof, RoundnessRepair, RoundnessSpectrum, RoundnessSpike,
 };
 
 use crate::calculator::{
@@ -39,7 +40,7 @@ impl Calculator for RoundnessEvaluation {
     const META: Meta = Meta {
         id: "roundness-evaluation",
         kind: CalculatorKind::Evaluation,
-        version: 3,
+        version: 4,
         title: "Roundness evaluation",
         question: "How round is this measured section, about which circle, and what form has the error?",
         summary: "From measured radii, deviations or points of a round section: the least-squares, minimum-zone, \

@@ -49,6 +49,12 @@ pub struct RoundnessData {
     pub filter_applied: bool,
     /// What was put right in reading.
     pub repairs: Vec<RoundnessRepair>,
+    /// Readings that stand off all around them by more than eight standard deviations of those: dirt, a scratch, a jump of
+    /// the probe, a keyway. Whether they count is a matter of the job's `spikes`.
+    pub spikes: Vec<RoundnessSpike>,
+    /// `roundness_um` of the same job with its spikes left out; null where there are none, or they are left out.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub roundness_without_spikes_um: Option<f64>,
     /// Estimated error of the spline between the points (root mean square): a spline through every second point misses
     /// the others by sixteen times as much, if the form is smooth. Exact points have none.
     #[schema(extensions(("x-unit" = json!("um"))))]
@@ -57,6 +63,26 @@ pub struct RoundnessData {
     /// quarter of all harmonics.
     #[schema(extensions(("x-unit" = json!("um"))))]
     pub aliasing_um: f64,
+}
+
+/// Readings side by side that stand off all around them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct RoundnessSpike {
+    /// Row of the job's table that stands off most, from 0.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub row: usize,
+    /// Direction of it from the least-squares centre of the points.
+    #[schema(extensions(("x-unit" = json!("deg"))))]
+    pub angle_deg: f64,
+    /// Angle between the readings beside the spike.
+    #[schema(extensions(("x-unit" = json!("deg"))))]
+    pub width_deg: f64,
+    /// How many readings it has.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub points: usize,
+    /// How far it stands off, outward positive.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub height_um: f64,
 }
 
 /// What was put right in reading the table, and what it changes.
@@ -106,6 +132,8 @@ pub enum RepairKind {
     MagnificationTakenOut,
     /// The file states no unit of its deviations: they were taken for micrometres.
     TakenAsUm,
+    /// Readings of spikes were left out, as the job asks; `change_um` is the height of the highest.
+    SpikesLeftOut,
 }
 
 impl RepairKind {
@@ -124,6 +152,7 @@ impl RepairKind {
             Self::TurnedRound => "turned_round",
             Self::MagnificationTakenOut => "magnification_taken_out",
             Self::TakenAsUm => "taken_as_um",
+            Self::SpikesLeftOut => "spikes_left_out",
         }
     }
 }

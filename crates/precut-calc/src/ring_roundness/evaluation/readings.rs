@@ -4,9 +4,10 @@ use std::collections::HashSet;
 
 use crate::num::roundness::{LeastSquares, RoundnessError, Section, least_squares};
 
-use super::input::{FileColumn, Job};
+use super::input::{FileColumn, Job, SpikeTreatment};
 use super::instrument::{self, Column, Rows, Understood, Unknown};
-use super::output::{RepairKind, RoundnessRepair};
+use super::output::{RepairKind, RoundnessRepair, RoundnessSpike};
+use super::spikes;
 
 const UM_PER_MM: f64 = 1e3;
 /// Widest gap between neighbouring points through which a curve is laid: half a wave of six lobes. Of few points, so many
@@ -69,6 +70,8 @@ pub(in crate::ring_roundness) struct Readings {
     pub(super) largest_gap: (f64, usize),
     /// What was put right in reading.
     pub(in crate::ring_roundness) repairs: Vec<RoundnessRepair>,
+    /// Readings that stand off all around them; left out of the points where the job asks for that.
+    pub(super) spikes: Vec<RoundnessSpike>,
 }
 
 /// The file of a job as it is understood.
@@ -150,7 +153,35 @@ impl Readings {
             angles_deg = order.iter().map(|&index| angles_deg[index]).collect();
         }
         let largest_gap = largest_gap(&angles_deg);
-        Ok(Self { section, circle, rows, angles_deg, largest_gap, repairs })
+        let read = Self { section, circle, rows, angles_deg, largest_gap, repairs, spikes: Vec::new() };
+        read.with_spikes(job.spikes)
+    }
+
+    /// Finds spikes, and leaves them out where that is asked for.
+    fn with_spikes(mut self, treatment: SpikeTreatment) -> Result<Self, RoundnessError> {
+        let distances_mm = self.section.distances_mm(self.circle.circle.centre_mm);
+        let found = spikes::spikes(&distances_mm);
+        self.spikes = found.iter().map(|run| spikes::told(run, &self.angles_deg, &distances_mm, &self.rows)).collect();
+        if treatment == SpikeTreatment::Keep || found.is_empty() {
+            return Ok(self);
+        }
+        let left_out: HashSet<usize> = found.into_iter().flatten().collect();
+        let kept: Vec<usize> = (0..self.rows.len()).filter(|at| !left_out.contains(at)).collect();
+        let (x, y): (Vec<f64>, Vec<f64>) = kept.iter().map(|&at| self.section.point_mm(at).into()).unzip();
+        let section = Section::from_points(&x, &y)?;
+        let circle = least_squares(&section)?;
+        let angles_deg: Vec<f64> =
+            (0..section.len()).map(|index| direction_deg(&section, circle.circle.centre_mm, index)).collect();
+        let highest_um = self.spikes.iter().map(|spike| spike.height_um.abs()).fold(0.0, f64::max);
+        self.repairs.push(RoundnessRepair::new(RepairKind::SpikesLeftOut, left_out.len(), highest_um));
+        Ok(Self {
+            rows: kept.iter().map(|&at| self.rows[at]).collect(),
+            largest_gap: largest_gap(&angles_deg),
+            section,
+            circle,
+            angles_deg,
+            ..self
+        })
     }
 
     /// Whether no gap is so wide that a curve through the points would be invention: none much wider than even points

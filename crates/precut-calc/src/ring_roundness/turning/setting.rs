@@ -61,10 +61,10 @@ impl Oscillation {
 /// What moves beside the feed (effects), as functions of the rotation of the machine.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Motion {
-    /// A support, towards the origin of the machine frame.
-    pub runout: Vec<Oscillation>,
-    /// That support is B, as in the mirror.
-    pub runout_at_b: bool,
+    /// Support A, towards the origin of the machine frame.
+    pub runout_a: Vec<Oscillation>,
+    /// Support B, likewise.
+    pub runout_b: Vec<Oscillation>,
     /// Tip, towards the origin of the machine frame.
     pub chatter: Vec<Oscillation>,
     /// Both supports recede from the origin, mm per revolution.
@@ -75,7 +75,8 @@ pub(crate) struct Motion {
 
 impl Motion {
     fn is_still(&self) -> bool {
-        self.runout.is_empty() && self.chatter.is_empty() && self.wear_mm_per_rev.abs() < f64::MIN_POSITIVE
+        [&self.runout_a, &self.runout_b, &self.chatter].into_iter().all(Vec::is_empty)
+            && self.wear_mm_per_rev.abs() < f64::MIN_POSITIVE
     }
 }
 
@@ -163,14 +164,17 @@ impl Moving {
 impl Machine for Moving {
     fn supports(&self, turned_rad: f64) -> (Vec2, Vec2) {
         let wear = self.motion.wear_mm_per_rev * turned_rad / TAU;
-        let inward = self.motion.runout.iter().map(|o| o.at(turned_rad)).fold(0.0, |sum, x| sum + x);
-        let (a, b) = if self.motion.runout_at_b { (wear, wear - inward) } else { (wear - inward, wear) };
+        let outward = |runout| wear - sum_at(runout, turned_rad);
+        let (a, b) = (outward(&self.motion.runout_a), outward(&self.motion.runout_b));
         (add(self.still.a, scaled(self.a, a)), add(self.still.b, scaled(self.b, b)))
     }
     fn tip(&self, turned_rad: f64) -> Vec2 {
-        let inward = self.motion.chatter.iter().map(|o| o.at(turned_rad)).fold(0.0, |sum, x| sum + x);
-        add(self.still.tip(turned_rad), scaled(self.tip, -inward))
+        add(self.still.tip(turned_rad), scaled(self.tip, -sum_at(&self.motion.chatter, turned_rad)))
     }
+}
+
+fn sum_at(oscillations: &[Oscillation], turned_rad: f64) -> f64 {
+    oscillations.iter().map(|oscillation| oscillation.at(turned_rad)).fold(0.0, |sum, x| sum + x)
 }
 
 /// A point moved across its direction from the origin, positive counter-clockwise.

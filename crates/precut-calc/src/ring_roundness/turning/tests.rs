@@ -39,7 +39,7 @@ fn steps_side_by_side_find_what_single_steps_find() {
     // has none. The error of the location is 1e-9 mm in both.
     let tip = run(&ellipse(1440), &seed(113.5, 0.08, 30.5, 0.75));
     let mut setting = seed(113.5, 0.08, 30.5, 0.75);
-    setting.motion.runout.push(Oscillation { amplitude_mm: 0.0, ratio: 3.0, phase_rad: 0.1 });
+    setting.motion.runout_a.push(Oscillation { amplitude_mm: 0.0, ratio: 3.0, phase_rad: 0.1 });
     let moving = run(&ellipse(1440), &setting);
     assert_eq!(tip.steps, moving.steps);
     for (p, q) in tip.radii_mm.iter().zip(&moving.radii_mm) {
