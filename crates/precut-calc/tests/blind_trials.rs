@@ -9,7 +9,8 @@
 //! - `PRECUT_TRIAL_SNR`: at which ratio of signal to noise;
 //! - `PRECUT_TRIAL_APART=1`: how far hidden causes stand from the others also where that takes as long as a diagnosis, and
 //!   whether an observer finds them who knows what every cause would look like;
-//! - `PRECUT_TRIAL_TALK=1`: what every answer says.
+//! - `PRECUT_TRIAL_TALK=1`: what every answer says;
+//! - `PRECUT_TRIAL_SCATTER=normal`, `rounded` or `correlated`: how single rows of shafts and cuts scatter.
 //!
 //! The draws that stand in the tests are kept with their confusion matrices in `tests/trials`: a change that moves an answer is
 //! seen there. `PRECUT_WRITE_TRIALS=1` writes them anew.
@@ -26,7 +27,7 @@ use precut_calc::diagnosis::{
     Diagnosis, JobOf, NamedCause, ResultOf, SetReport, VerdictClass, residuals_with, separation_from, separations_of,
 };
 use precut_trials::score::{HeldOut, Said, Score, Share};
-use precut_trials::{Class, Hidden, Trial};
+use precut_trials::{Class, Hidden, Scatter, Trial, deflection, machinability};
 use serde_json::{Value, json};
 
 /// Draws trial number `seed` of a class at a ratio of signal to noise.
@@ -68,6 +69,7 @@ pub(crate) fn score<M: Diagnosable>(trials: Trials) -> Score {
     if (seed, count) == (trials.seed, trials.count)
         && !asked_for("PRECUT_TRIAL_GAIN")
         && !asked_for("PRECUT_TRIAL_APART")
+        && scatter() == Scatter::Student
     {
         keep(name, &text);
     }
@@ -90,11 +92,36 @@ pub(crate) fn seed_of(series: u64, k: u64) -> u64 {
     series.wrapping_mul(1_000_003).wrapping_add(k)
 }
 
+/// How single rows scatter.
+fn scatter() -> Scatter {
+    match std::env::var("PRECUT_TRIAL_SCATTER").as_deref() {
+        Ok("normal") => Scatter::Normal,
+        Ok("rounded") => Scatter::Rounded,
+        Ok("correlated") => Scatter::Correlated,
+        _ => Scatter::Student,
+    }
+}
+
+/// A shaft, whose rows scatter as asked for.
+pub(crate) fn shaft(class: Class, snr: f64, seed: u64) -> Trial {
+    deflection::draw_scattered(scatter(), class, snr, seed)
+}
+
+/// Cuts on levels.
+pub(crate) fn cuts(class: Class, snr: f64, seed: u64) -> Trial {
+    machinability::draw_scattered(scatter(), class, snr, seed)
+}
+
+/// Cuts as a workshop's records have them.
+pub(crate) fn records(class: Class, snr: f64, seed: u64) -> Trial {
+    machinability::draw_continuous_scattered(scatter(), class, snr, seed)
+}
+
 fn asked_for(name: &str) -> bool {
     std::env::var_os(name).is_some()
 }
 
-fn number<T: std::str::FromStr>(name: &str, default: T) -> T {
+pub(crate) fn number<T: std::str::FromStr>(name: &str, default: T) -> T {
     std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
 }
 
@@ -309,7 +336,7 @@ fn separations<M: Diagnosable>(trial: &Trial, job: &JobOf<M>) -> Vec<f64> {
 }
 
 /// Whether the 95 % interval of the first parameter of a named cause holds what was hidden, for every cause named right.
-fn covered(trial: &Trial, named: &[NamedCause]) -> Vec<bool> {
+pub(crate) fn covered(trial: &Trial, named: &[NamedCause]) -> Vec<bool> {
     let of = |hidden: &Hidden| {
         let named = named.iter().find(|cause| cause.kind == hidden.kind)?;
         let [low, high] = named.parameters[0].interval_95?;

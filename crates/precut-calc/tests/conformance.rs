@@ -273,6 +273,7 @@ fn figure_is_sound(figure: &Figure, labels: &BTreeSet<&'static str>, at: &str) {
                 }
                 Item::Glyph { x, y, .. } => assert!(x.is_finite() && y.is_finite(), "{at}"),
                 Item::Handle(handle) => known(handle.name),
+                Item::Setting(setting) => known(setting.name),
             }
         }
     }

@@ -16,7 +16,7 @@ use crate::blind_trials::{self, Draw, seed_of};
 
 /// How many draws: a tenth of what is asked for, all of it where `PRECUT_CLAIMS` says how many.
 fn draws(in_the_suite: u64) -> u64 {
-    std::env::var("PRECUT_CLAIMS").ok().and_then(|text| text.parse().ok()).unwrap_or(in_the_suite)
+    blind_trials::number("PRECUT_CLAIMS", in_the_suite)
 }
 
 fn case(name: &str) -> Value {
@@ -221,18 +221,25 @@ fn a_hint_names_no_cause_that_is_less_likely_than_what_has_no_name() {
 
 /// No set of causes has more evidence alone than the best of the full search.
 fn search_keeps_what_is_there<M: Diagnosable>(draw: Draw, series: u64, count: u64) {
+    let mut lost = Vec::new();
     for k in 0..count {
         let class = if k % 2 == 0 { Class::One } else { Class::Two };
         let trial = draw(class, 3.0, seed_of(series, k));
-        let best = best_evidence::<M>(&blind_trials::job::<M>(&trial.request, json!({}))).unwrap();
+        let whole = blind_trials::job::<M>(&trial.request, json!({}));
+        let best = best_evidence::<M>(&whole).unwrap();
         let hidden: Vec<&str> = trial.truth.causes.iter().map(|cause| cause.kind).collect();
-        let others = (0..2).map(|shift| vec![M::CAUSES[(k as usize + 7 * shift) % M::CAUSES.len()].kind]);
+        // Where every prediction is a simulation, what is hidden is looked for alone, and no other cause.
+        let other_causes = if M::predict_ms(&whole.job) > 0.0 { 0 } else { 2 };
+        let others = (0..other_causes).map(|shift| vec![M::CAUSES[(k as usize + 7 * shift) % M::CAUSES.len()].kind]);
         for causes in others.chain([hidden]) {
             let job = blind_trials::job::<M>(&trial.request, json!({ "causes": causes }));
             let alone = best_evidence::<M>(&job).unwrap();
-            assert!(alone <= best + 1e-6 * best.abs().max(1.0), "{class:?} {k}: {causes:?} {alone}, all {best}");
+            if alone > best + 1e-6 * best.abs().max(1.0) {
+                lost.push(format!("{class:?} {k}: {causes:?} {alone}, all {best}"));
+            }
         }
     }
+    assert!(lost.is_empty(), "{} of {count} draws: {lost:#?}", lost.len());
 }
 
 #[test]

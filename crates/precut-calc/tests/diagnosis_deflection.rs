@@ -188,14 +188,14 @@ fn what_the_catalogue_does_not_hold_is_not_named() {
 fn the_gain_on_held_back_runs_is_what_the_fit_promises() {
     for name in [HEADSTOCK, WEAR, TWO] {
         Case::of(name).weighed(|foundation, weighing| {
-            let nested = gain(foundation, weighing, Effort::full(3), true, 1, &Unwatched).unwrap().unwrap();
+            let nested = gain(foundation, weighing, Effort::full(3), true, &Unwatched).unwrap().unwrap();
             assert!(nested.rmse_extended < nested.rmse_base);
             assert!(nested.interval.0 <= nested.gain && nested.gain <= nested.interval.1);
             assert!(nested.explained_share.unwrap() > 0.8, "{:?}", nested.explained_share);
         });
     }
     Case::of(ADEQUATE).weighed(|foundation, weighing| {
-        let nested = gain(foundation, weighing, Effort::full(3), true, 1, &Unwatched).unwrap().unwrap();
+        let nested = gain(foundation, weighing, Effort::full(3), true, &Unwatched).unwrap().unwrap();
         assert!(nested.gain.abs() < 0.05, "{}", nested.gain);
     });
 }

@@ -8,7 +8,7 @@ use precut_trials::{Class, deflection};
 use crate::blind_trials::{self, Trials};
 
 fn trials(name: &'static str, class: Class, snr: f64, seed: u64, count: u64) -> Trials {
-    Trials { name, draw: deflection::draw, ideal: Some(deflection::is_found), class, snr, seed, count }
+    Trials { name, draw: blind_trials::shaft, ideal: Some(deflection::is_found), class, snr, seed, count }
 }
 
 fn score(name: &'static str, class: Class, snr: f64, seed: u64, count: u64) -> Score {

@@ -11,7 +11,7 @@ use serde_json::json;
 use crate::blind_trials::{self, Trials};
 
 fn trials(name: &'static str, class: Class, snr: f64, seed: u64, count: u64) -> Trials {
-    Trials { name, draw: machinability::draw, ideal: Some(machinability::is_found), class, snr, seed, count }
+    Trials { name, draw: blind_trials::cuts, ideal: Some(machinability::is_found), class, snr, seed, count }
 }
 
 fn score(name: &'static str, class: Class, snr: f64, seed: u64, count: u64) -> Score {
@@ -52,7 +52,7 @@ fn what_the_catalogue_lacks_is_unknown() {
 
 fn over_any_values(name: &'static str, class: Class, snr: f64, seed: u64, count: u64) -> Score {
     let trials = trials(name, class, snr, seed, count);
-    blind_trials::score::<FeedSchedule>(Trials { draw: machinability::draw_continuous, ideal: None, ..trials })
+    blind_trials::score::<FeedSchedule>(Trials { draw: blind_trials::records, ideal: None, ..trials })
 }
 
 /// Records of a workshop: no condition twice, no order.

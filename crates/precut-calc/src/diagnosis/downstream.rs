@@ -1,12 +1,13 @@
 //! What comes of deciding with the extended model instead of the base (`diagnosis/3.9`).
 
-use nalgebra::{Cholesky, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::base::Bound;
 use super::calculator::{JobOf, base_of};
+use super::extension::Extension;
 use super::output::{DecisionReport, DownstreamReport};
 use super::refine::Fit;
 use super::subject::{Setting, Subject};
@@ -20,24 +21,29 @@ const LEAST: usize = DRAWS / 2;
 /// Degrees of freedom from which on Student's t is a normal distribution to 2 % of its 95 % interval.
 const NEARLY_NORMAL: f64 = 60.0;
 
-/// Decisions with the base and with the extended model, each judged where the extended model acts with what the rows leave
-/// open of its sizes and with what the job allows besides. Empty where the leading set was not refined, or where the job
-/// decides nothing.
+/// Decisions with the base and with the extended model, each judged where one of the sets behind the extended model acts, as
+/// often as its share, with what the rows leave open of its sizes and with what the job allows besides. Empty where a set was
+/// not refined, or where the job decides nothing.
 pub(super) fn downstream<M: Diagnosable>(
     job: &JobOf<M>,
     runs: &[M::Run],
     bound: &Bound<'_, M>,
     weighing: &Weighing<'_>,
-    leading: Option<&SetWeight>,
+    extension: &Extension<'_>,
     monitor: &dyn Monitor,
 ) -> Result<Vec<DownstreamReport>, Failure> {
-    let Some((set, fit)) = leading.and_then(|set| Some((set, weighing.fit(&set.members)?))) else {
-        return Ok(Vec::new());
-    };
     let mut random = Gaussian { random: Pcg64::seed_from_u64(u64::from(job.options.seed)), normal: Normal::standard() };
-    let Some(draws) = draws(bound, set, fit, weighing.noise.dof, &mut random) else {
+    let mut parts = Vec::with_capacity(extension.parts.len());
+    for &(share, set) in &extension.parts {
+        let open = weighing.fit(&set.members).and_then(|fit| Open::of(bound, set, fit));
+        let Some(open) = open else { return Ok(Vec::new()) };
+        parts.push((share, open));
+    }
+    if parts.is_empty() {
         return Ok(Vec::new());
-    };
+    }
+    let draws: Vec<Vec<Setting>> =
+        (0..DRAWS).map(|_| random.one_of(&parts).draw(weighing.noise.dof, &mut random)).collect();
     let mut acting = draws.iter().map(|settings| bound.acting(settings)).collect::<Result<Vec<_>, _>>()?;
     for effects in &mut acting {
         effects.extend(M::allowed(&job.allowances, &mut || random.next()));
@@ -50,7 +56,7 @@ pub(super) fn downstream<M: Diagnosable>(
         checkpoint(monitor)?;
         Ok(decided)
     };
-    let (base, extended) = (decided(&[])?, decided(&set.settings)?);
+    let (base, extended) = (decided(&[])?, decided(&extension.settings)?);
     let both = base.iter().filter_map(|of_base| {
         let of_extended = extended.iter().find(|other| other.name == of_base.name)?;
         Some(DownstreamReport {
@@ -64,34 +70,38 @@ pub(super) fn downstream<M: Diagnosable>(
     Ok(both.collect())
 }
 
-/// Settings drawn from the posterior of a fit: Student's t about the optimum, cut at the bounds. What a grid of shapes
-/// widens is widened here, too.
-fn draws(
-    subject: &dyn Subject,
-    set: &SetWeight,
-    fit: &Fit,
-    dof: f64,
-    random: &mut Gaussian,
-) -> Option<Vec<Vec<Setting>>> {
-    let lower = Cholesky::new(fit.covariance.clone())?.unpack();
-    let widened: Vec<f64> = fit
-        .free
-        .iter()
-        .enumerate()
-        .map(|(k, &(member, variable))| set.standard_deviations[member][variable] / fit.covariance[(k, k)].sqrt())
-        .collect();
-    let draw = |_| {
+/// What the rows leave open of a set: Student's t about its optimum, cut at the bounds. What a grid of shapes widens is
+/// widened here, too.
+struct Open<'a> {
+    subject: &'a dyn Subject,
+    set: &'a SetWeight,
+    fit: &'a Fit,
+    /// Triangular factor of the covariance.
+    lower: DMatrix<f64>,
+    widened: Vec<f64>,
+}
+
+impl<'a> Open<'a> {
+    fn of(subject: &'a dyn Subject, set: &'a SetWeight, fit: &'a Fit) -> Option<Self> {
+        let lower = Cholesky::new(fit.covariance.clone())?.unpack();
+        let free = fit.free.iter().enumerate();
+        let widened = free
+            .map(|(k, &(member, variable))| set.standard_deviations[member][variable] / fit.covariance[(k, k)].sqrt());
+        Some(Self { subject, set, fit, lower, widened: widened.collect() })
+    }
+
+    fn draw(&self, dof: f64, random: &mut Gaussian) -> Vec<Setting> {
+        let free = &self.fit.free;
         let scale = random.student_scale(dof);
-        let step = &lower * DVector::from_fn(fit.free.len(), |_, _| scale * random.next());
-        let mut settings = set.settings.clone();
-        for (k, &(member, variable)) in fit.free.iter().enumerate() {
-            let range = subject.hypotheses()[settings[member].hypothesis].variables[variable].range;
+        let step = &self.lower * DVector::from_fn(free.len(), |_, _| scale * random.next());
+        let mut settings = self.set.settings.clone();
+        for (k, &(member, variable)) in free.iter().enumerate() {
+            let range = self.subject.hypotheses()[settings[member].hypothesis].variables[variable].range;
             let value = &mut settings[member].values[variable];
-            *value = (*value + step[k] * widened[k]).clamp(range.lower, range.upper);
+            *value = (*value + step[k] * self.widened[k]).clamp(range.lower, range.upper);
         }
         settings
-    };
-    Some((0..DRAWS).map(draw).collect())
+    }
 }
 
 struct Gaussian {
@@ -104,6 +114,16 @@ impl Gaussian {
         // In the open interval: both ends are infinite.
         let share = self.random.random_range(f64::EPSILON..1.0);
         self.normal.inverse_cdf(share)
+    }
+
+    /// One of these as often as its share; the only one without a draw.
+    fn one_of<'b, T>(&mut self, parts: &'b [(f64, T)]) -> &'b T {
+        let mut left = if parts.len() > 1 { self.random.random_range(0.0..1.0) } else { 0.0 };
+        let chosen = parts.iter().position(|(share, _)| {
+            left -= share;
+            left < 0.0
+        });
+        &parts[chosen.unwrap_or(parts.len() - 1)].1
     }
 
     /// sqrt(nu/chi^2), chi^2 a sum of nu squares.

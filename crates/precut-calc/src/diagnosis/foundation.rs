@@ -45,6 +45,12 @@ impl<'a> Foundation<'a> {
         Ok(Self { subject, data, base, predicted, residual, heavy_tails: None, signatures, nuisances, allowed })
     }
 
+    /// One more allowance.
+    pub(super) fn allow(&mut self, column: Sparse) {
+        column.entries().for_each(|(row, value)| self.allowed[row] += value * value);
+        self.nuisances.push(column);
+    }
+
     /// Rows that stand alone.
     pub fn outliers(&self, monitor: &dyn Monitor) -> Result<Outliers, Failure> {
         if self.data.sides.is_some() {

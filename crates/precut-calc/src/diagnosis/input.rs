@@ -104,10 +104,10 @@ pub struct DiagnosisOptions {
     /// Whether the gain is measured on data held back, with causes chosen anew in every fold.
     #[schema(default = true, example = true)]
     pub held_out: bool,
-    /// Go on although the data look like a wrong unit or sign.
+    /// Go on although the data look like a wrong unit, a wrong sign or another blunder.
     #[schema(default = false, example = false)]
     pub accept_suspected_unit: bool,
-    /// Seed of the resamples behind the interval of the gain.
+    /// Seed of the draws behind the intervals of decisions, and of the gain of classes.
     #[schema(minimum = 0, maximum = 4_294_967_295_u32, default = 1, example = 1, extensions(("x-symbol" = json!("s_0")), ("x-unit" = json!("1"))))]
     pub seed: u32,
 }

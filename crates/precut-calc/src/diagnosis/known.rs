@@ -93,33 +93,36 @@ pub(super) fn has_parameter(effect: &impl Serialize, parameter: &str) -> bool {
     serde_json::to_value(effect).is_ok_and(|fields| fields.get(parameter).is_some_and(Value::is_f64))
 }
 
-/// What a fit leaves open of the effects that it stands for, in their own parameters.
+/// One standard deviation of something that is open: how far it moves values of settings, each by its setting and its
+/// variable.
+pub(super) type Direction = Vec<((usize, usize), f64)>;
+
+/// What independent directions leave open of the effects that settings stand for, in their own parameters. Where an effect
+/// ends at a bound it is looked at from one side.
 pub(super) fn left_open<E: Serialize>(
-    weighing: &Weighing<'_>,
-    set: &SetWeight,
+    settings: &[Setting],
+    directions: &[Direction],
     effects_of: impl Fn(&[Setting]) -> Result<Vec<E>, Failure>,
 ) -> Result<Vec<JointUncertainty>, Failure> {
-    let deviations = &set.standard_deviations;
-    let free: Vec<(usize, usize)> = (0..set.settings.len())
-        .flat_map(|member| (0..deviations[member].len()).map(move |variable| (member, variable)))
-        .filter(|&(member, variable)| deviations[member][variable] > 0.0)
-        .collect();
-    let numbers = |deviations: f64, direction: &[f64]| {
-        let mut settings = set.settings.clone();
-        for (&(member, variable), by) in free.iter().zip(direction) {
-            settings[member].values[variable] += deviations * by;
+    let numbers = |deviations: f64, direction: &Direction| {
+        let mut moved = settings.to_vec();
+        for ((member, variable), by) in direction {
+            moved[*member].values[*variable] += deviations * by;
         }
-        effects_of(&settings).map(|effects| effects.iter().map(fields).collect::<Vec<_>>())
+        effects_of(&moved).map(|effects| effects.iter().map(fields).collect::<Vec<_>>())
     };
     let mut open = Vec::new();
-    for direction in directions(weighing, set, &free).column_iter() {
-        let direction: Vec<f64> = direction.iter().copied().collect();
-        let (below, above) = (numbers(-STEP, &direction)?, numbers(STEP, &direction)?);
+    for direction in directions {
+        let (below, above, between) = match (numbers(-STEP, direction), numbers(STEP, direction)) {
+            (Ok(below), Ok(above)) => (below, above, 2.0 * STEP),
+            (Ok(below), Err(_)) => (below, numbers(0.0, direction)?, STEP),
+            (Err(_), above) => (numbers(0.0, direction)?, above?, STEP),
+        };
         let mut moves = Vec::new();
         for (index, (below, above)) in below.iter().zip(&above).enumerate() {
             for ((parameter, low), (_, high)) in below.iter().zip(above) {
                 let turns = if parameter == PHASE { ((high - low) / TAU).round() } else { 0.0 };
-                let by = (high - low - TAU * turns) / (2.0 * STEP);
+                let by = (high - low - TAU * turns) / between;
                 if by.abs() > 0.0 {
                     let effect = u32::try_from(index + 1).unwrap_or(u32::MAX);
                     moves.push(ParameterMove { effect, parameter: parameter.clone(), by });
@@ -140,10 +143,15 @@ fn fields(effect: &impl Serialize) -> Vec<(String, f64)> {
     numbers.filter_map(|(name, value)| Some((name.clone(), value.as_f64()?))).collect()
 }
 
-/// Independent directions of one standard deviation each, as columns over the free values. What a grid of shapes widens is
+/// Independent directions of one standard deviation each of what the rows leave open of a set. What a grid of shapes widens is
 /// wider here, too.
-fn directions(weighing: &Weighing<'_>, set: &SetWeight, free: &[(usize, usize)]) -> DMatrix<f64> {
-    let deviation = |k: usize| set.standard_deviations[free[k].0][free[k].1];
+pub(super) fn directions(weighing: &Weighing<'_>, set: &SetWeight) -> Vec<Direction> {
+    let deviations = &set.standard_deviations;
+    let free: Vec<(usize, usize)> = (0..set.settings.len())
+        .flat_map(|member| (0..deviations[member].len()).map(move |variable| (member, variable)))
+        .filter(|&(member, variable)| deviations[member][variable] > 0.0)
+        .collect();
+    let deviation = |k: usize| deviations[free[k].0][free[k].1];
     let fit = weighing.fit(&set.members);
     let place = |k: usize| fit.and_then(|fit| fit.free.iter().position(|of| *of == free[k]));
     let correlation = |i: usize, j: usize| match (fit, place(i), place(j)) {
@@ -156,5 +164,6 @@ fn directions(weighing: &Weighing<'_>, set: &SetWeight, free: &[(usize, usize)])
     };
     let covariance = DMatrix::from_fn(free.len(), free.len(), |i, j| correlation(i, j) * deviation(i) * deviation(j));
     let alone = || DMatrix::from_fn(free.len(), free.len(), |i, j| if i == j { deviation(i) } else { 0.0 });
-    Cholesky::new(covariance).map_or_else(alone, Cholesky::unpack)
+    let columns = Cholesky::new(covariance).map_or_else(alone, Cholesky::unpack);
+    columns.column_iter().map(|column| free.iter().copied().zip(column.iter().copied()).collect()).collect()
 }

@@ -13,6 +13,8 @@
 //! - `optima`: other values that the rows fit nearly as well (`diagnosis/3.4`);
 //! - `weigh`: posterior weights and the verdict (`diagnosis/3.5`, `diagnosis/3.7`);
 //! - `profile`: intervals where a likelihood is not quadratic (`diagnosis/3.6`);
+//! - `blunder`: rows that were written down wrongly, weighed against physics (`diagnosis/8`);
+//! - `extension`: the model that is left behind, an average where no set is settled (`diagnosis/3.8`);
 //! - `gain`, `downstream`: what the extended model is worth, on data held back and in what is decided with it
 //!   (`diagnosis/3.8`, `diagnosis/3.9`);
 //! - `trial`: what is asked where the truth is known.
@@ -21,6 +23,7 @@ mod adequacy;
 mod base;
 mod basis;
 mod blocks;
+mod blunder;
 mod calculator;
 mod class_likelihood;
 mod classes;
@@ -29,6 +32,7 @@ mod data;
 mod discrepancy;
 mod downstream;
 mod evidence;
+mod extension;
 mod fairness;
 mod foundation;
 mod gain;
@@ -64,9 +68,11 @@ mod whiten;
 
 pub use adequacy::{Test, TestKind, adequacy};
 pub use base::Bound;
+pub use blunder::BlunderReport;
 pub use calculator::{Diagnosis, JobOf, ResultOf};
 pub use classes::{ClassHeldOut, ClassReport};
 pub use data::{Data, Layout};
+pub use extension::ExtensionKind;
 pub use foundation::Foundation;
 pub use gain::{Gain, gain};
 pub use identify::{COLLINEAR_ABOVE, CONFOUNDED_BELOW, Separation, Signature, separations, twins};

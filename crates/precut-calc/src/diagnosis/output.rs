@@ -7,7 +7,9 @@ use utoipa::ToSchema;
 use utoipa::openapi::Object;
 use utoipa::openapi::schema::{ObjectBuilder, SchemaType, Type};
 
+use super::blunder::BlunderReport;
 use super::classes::ClassReport;
+use super::extension::ExtensionKind;
 use super::known::JointUncertainty;
 
 /// What the measurements say about the base model.
@@ -22,6 +24,8 @@ pub struct DiagnosisResult<E: ToSchema, R: ToSchema> {
     pub likely_sets: Vec<LikelySet>,
     /// Why nothing is said about physics, for `refused`.
     pub refusal: Option<Refusal>,
+    /// Blunders in the data that the rows look like, likeliest first.
+    pub blunders: Vec<BlunderReport>,
     /// What each of the causes named changes in the prediction.
     pub contributions: Vec<ContributionReport>,
     /// Collinearity index of the causes named (Brun and Reichert): above 20 they cannot be fitted together; absent for one
@@ -54,7 +58,11 @@ pub struct DiagnosisResult<E: ToSchema, R: ToSchema> {
     pub profiles: Vec<ProfileReport>,
     /// Shape of what the catalogue does not explain.
     pub remainder: Option<RemainderReport>,
-    /// The effects that extend the base model, those that the base held otherwise in their place; empty where none is named.
+    /// What the extended model is. Where no cause is named there is one only if it predicted rows that were held back better
+    /// than the base, beyond chance.
+    pub extension: ExtensionKind,
+    /// The effects that extend the base model, those that the base held otherwise in their place; empty where it is not
+    /// extended.
     #[schema(inline)]
     pub effects: Vec<E>,
     /// What the rows leave open of `effects`.
@@ -63,8 +71,8 @@ pub struct DiagnosisResult<E: ToSchema, R: ToSchema> {
     pub gain: Option<GainReport>,
     /// Where the quantity is a class: what each model says of every row, and where the limits run.
     pub classes: Option<ClassReport>,
-    /// What comes of deciding with either model, where the extended one is right; empty where none is named, or where the
-    /// job decides nothing.
+    /// What comes of deciding with either model, where the extended one is right; empty where the base is not extended, or
+    /// where the job decides nothing.
     pub downstream: Vec<DownstreamReport>,
     /// The run that would best part the leading set from its strongest rival.
     #[schema(inline)]
@@ -197,7 +205,7 @@ pub struct LikelySet {
 /// Why the data cannot be judged.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Refusal {
-    /// Code of the reason: `unit_suspected`, `absolute_values`, `constant_values`, `too_few_rows`, `base_fails`.
+    /// Code of the reason: `unit_suspected`, `blunder_suspected`, `absolute_values`, `constant_values`, `too_few_rows`, `base_fails`.
     pub reason: String,
     /// For a suspected unit: the factor that it would leave.
     #[schema(extensions(("x-unit" = json!("1"))))]
@@ -299,7 +307,7 @@ pub struct CauseReport {
     /// Which of several effects of one kind; empty where there is one.
     pub label: String,
     /// Posterior probability that it takes part.
-    #[schema(extensions(("x-unit" = json!("1"))))]
+    #[schema(extensions(("x-unit" = json!("1")), ("x-causes" = json!({ "errors_as_in": "residuals" }))))]
     pub probability: f64,
     /// Kinds that some experiments cannot tell from it.
     pub confounded_with: Vec<String>,
@@ -441,7 +449,7 @@ pub struct GainReport {
     /// 1 - extended/base.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub gain: f64,
-    /// 95 % interval of the gain.
+    /// 95 % interval of the gain on as many parts that are measured anew.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub gain_interval_95: [f64; 2],
     /// What scatter and allowances leave to any model.
@@ -555,10 +563,11 @@ pub struct RowColumns {
     /// Prediction of the base.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub base: Vec<Option<f64>>,
-    /// Prediction of the extended model: the leading set.
+    /// Prediction of the extended model; the base where there is none.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub extended: Vec<Option<f64>>,
-    /// Standard deviation of a row about the extended prediction: scatter, allowances, fit; absent where nothing is named.
+    /// Standard deviation of a row about the extended prediction: scatter, allowances, fit; absent where the base is
+    /// not extended.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub extended_deviation: Vec<Option<f64>>,
     /// Whether the row counted.

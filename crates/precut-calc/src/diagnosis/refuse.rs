@@ -1,5 +1,6 @@
 //! Why data are not judged, or not as far as was asked (`diagnosis/8`).
 
+use super::blunder::{BlunderReport, SUSPECTED};
 use super::calculator::JobOf;
 use super::foundation::Foundation;
 use super::output::Refusal;
@@ -55,6 +56,17 @@ pub(super) fn refusal<M: Diagnosable>(
         }
     }
     too_few(values.len())
+}
+
+/// Where the rows look like blunders rather than like anything that acts.
+pub(super) fn of_blunders(blunders: &[BlunderReport]) -> Option<Refusal> {
+    let together: f64 = blunders.iter().map(|blunder| blunder.probability).sum();
+    (together >= SUSPECTED).then(|| Refusal {
+        reason: "blunder_suspected".to_owned(),
+        factor: None,
+        fitted_factor: None,
+        rows_needed: None,
+    })
 }
 
 fn too_few(rows: usize) -> Option<Refusal> {

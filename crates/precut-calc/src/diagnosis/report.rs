@@ -2,21 +2,23 @@
 
 use super::adequacy::Test;
 use super::base::Bound;
+use super::blunder::blunders;
 use super::calculator::{JobOf, Measured, ResultOf, stage};
 use super::classes;
 use super::data::Data;
 use super::downstream::downstream;
+use super::extension::{Extension, ExtensionKind};
 use super::foundation::Foundation;
 use super::gain::{Gain, gain};
 use super::identify::twins;
-use super::known::left_open;
+use super::input::DiagnosisOptions;
 use super::next::{NextMeasurement, next_measurement};
 use super::noise::{NoiseSource, between_sweeps};
 use super::output::{
     CausePair, DiagnosisResult, GainReport, NamedCause, NoiseReport, NotApplicable, RemainderReport, RowColumns,
     StepReport, TestReport, VerdictClass,
 };
-use super::refuse::{most_causes, refusal};
+use super::refuse::{most_causes, of_blunders, refusal};
 use super::remainder::{RemainderShape, remainder_shape};
 use super::said::{basis, doubts, explanation, hinted, nearest, warnings};
 use super::subject::{Setting, Subject};
@@ -27,6 +29,8 @@ use crate::calculator::{
     Smooth, Value,
 };
 
+/// Probability of nothing from which on an adequate base leaves no reason to look for blunders.
+const QUIET: f64 = 0.5;
 /// Sets that are listed.
 const LISTED_SETS: usize = 20;
 
@@ -50,19 +54,26 @@ pub(super) fn answer<M: Diagnosable>(
     }
     let keep = if job.options.leave_outliers_out { foundation.keep(&found) } else { foundation.predicted.clone() };
     stage(monitor, 0.2, "diagnosis_stage_search");
-    let most_causes = most_causes(usize::from(job.options.most_causes), used.len());
-    let (effort, fold_effort) = if bound.is_dear() {
-        (Effort::dear(most_causes), Effort::dear_fold(most_causes))
+    let [effort, fold_effort] = efforts(&job.options, used.len(), bound.is_dear());
+    let mut weighing = Weighing::of(&foundation, keep, effort, monitor)?;
+    let quantity = M::QUANTITIES.iter().find(|known| known.name == job.quantity);
+    let quantity = quantity.ok_or_else(|| Failure::Internal(format!("{} is no quantity", job.quantity)))?;
+    let mut refusal = refusal::<M>(job, &foundation, &weighing);
+    let is_quiet = weighing.none >= QUIET && matches!(weighing.verdict, Verdict::Adequate);
+    let blunders = if refusal.is_some() || is_quiet || bound.is_dear() {
+        Vec::new()
     } else {
-        (Effort::full(most_causes), Effort::fold(most_causes))
+        blunders::<M>(job, measured, &weighing, quantity, fold_effort, monitor)?
     };
-    let [effort, fold_effort] = [effort, fold_effort].map(|effort| Effort { level: job.options.level, ..effort });
-    let weighing = Weighing::of(&foundation, keep, effort, monitor)?;
-    let refusal = refusal::<M>(job, &foundation, &weighing);
+    if !job.options.accept_suspected_unit {
+        refusal = refusal.or_else(|| of_blunders(&blunders));
+        weighing.doubt(blunders.iter().map(|blunder| blunder.probability).sum());
+    }
+    let weighing = weighing;
     let seed = u64::from(job.options.seed);
     let gain = if job.options.held_out && refusal.is_none() {
         stage(monitor, 0.5, "diagnosis_stage_gain");
-        gain(&foundation, &weighing, fold_effort, true, seed, monitor)?
+        gain(&foundation, &weighing, fold_effort, true, monitor)?
     } else {
         None
     };
@@ -71,14 +82,18 @@ pub(super) fn answer<M: Diagnosable>(
     let view = View::of(bound.hypotheses(), &weighing, refusal.is_none(), bound.is_dear(), monitor)?;
     let named = if refusal.is_some() { Vec::new() } else { view.named() };
     let leading = view.leading().filter(|_| !named.is_empty());
-    let settings: &[Setting] = leading.map_or(&[], |set| &set.settings);
+    // Of classes the error on what was held back is no square.
+    let tried = gain.as_ref().filter(|_| data.sides.is_none());
+    let extension = if refusal.is_none() { Extension::of(&weighing, leading, tried)? } else { Extension::none() };
+    let settings: &[Setting] = &extension.settings;
     let effects = bound.effects_of(settings)?;
+    let is_extended = extension.kind != ExtensionKind::None;
     let extended = Extended {
-        prediction: leading.map(|_| bound.predict(settings)).transpose()?,
-        deviation: leading.and_then(|set| weighing.deviation(set)),
+        prediction: is_extended.then(|| bound.predict(settings)).transpose()?,
+        deviation: if is_extended { extension.deviation(&weighing)? } else { None },
     };
-    let downstream = if matches!(view.class(), VerdictClass::Named) && refusal.is_none() {
-        downstream(job, &places.runs, bound, &weighing, leading, monitor)?
+    let downstream = if matches!(view.class(), VerdictClass::Named | VerdictClass::Confounded) {
+        downstream(job, &places.runs, bound, &weighing, &extension, monitor)?
     } else {
         Vec::new()
     };
@@ -88,10 +103,7 @@ pub(super) fn answer<M: Diagnosable>(
     let (signatures, separations) = view.signatures()?;
     let with = extended.prediction.as_deref();
     let classes = classes::report(bound, &weighing, measured, with, settings, gain.as_ref(), (seed, monitor))?;
-    let effects_uncertainty = match leading {
-        Some(set) => left_open(&weighing, set, |settings| bound.effects_of(settings))?,
-        None => Vec::new(),
-    };
+    let effects_uncertainty = extension.open(&weighing, |settings| bound.effects_of(settings))?;
     // Of classes a root mean square means nothing.
     let gain = gain.filter(|_| classes.is_none());
     let output = DiagnosisResult {
@@ -100,6 +112,7 @@ pub(super) fn answer<M: Diagnosable>(
         likely_sets: if refusal.is_some() { Vec::new() } else { view.likely_sets() },
         none_probability: weighing.none,
         unnamed_probability: weighing.unnamed,
+        blunders,
         contributions,
         collinearity,
         noise: noise_report(&weighing),
@@ -107,17 +120,12 @@ pub(super) fn answer<M: Diagnosable>(
         sets: weighing.sets.iter().take(LISTED_SETS).map(|set| view.set_report(set, gain.as_ref())).collect(),
         causes: view.causes(),
         not_applicable: not_applicable(bound, &weighing),
-        twins: twins(&weighing)
-            .into_iter()
-            .map(|(a, b)| CausePair { a: view.kind(a).to_owned(), b: view.kind(b).to_owned() })
-            .collect(),
+        twins: pairs(twins(&weighing), &view),
         separations,
         signatures,
         profiles: view.profiles(),
-        remainder: matches!(weighing.verdict, Verdict::Unknown(_))
-            .then(|| remainder_shape(&weighing))
-            .flatten()
-            .map(|shape| remainder_report(shape, used)),
+        remainder: unnamed_remainder(&weighing, used),
+        extension: extension.kind,
         effects,
         effects_uncertainty,
         gain: gain.as_ref().map(gain_report),
@@ -129,16 +137,25 @@ pub(super) fn answer<M: Diagnosable>(
         outliers: found.rows.iter().map(|&row| row_number(used[row])).collect(),
         refusal,
     };
-    let quantity = M::QUANTITIES.iter().find(|known| known.name == job.quantity);
-    let quantity = quantity.ok_or_else(|| Failure::Internal(format!("{} is no quantity", job.quantity)))?;
     if output.refusal.is_none() {
-        warnings.extend(doubts(&output));
+        warnings.extend(doubts(&output, quantity));
     }
     let explanation = explanation(&output, quantity);
     let explanation =
         explanation.into_iter().map(|message| in_particular(message, &output, &contenders, quantity)).collect();
     stage(monitor, 1.0, "stage_done");
     Ok(Answer { output, warnings, explanation, basis: basis() })
+}
+
+/// How far is searched over all rows, and in every fold.
+fn efforts(options: &DiagnosisOptions, rows: usize, is_dear: bool) -> [Effort; 2] {
+    let most_causes = most_causes(usize::from(options.most_causes), rows);
+    let efforts = if is_dear {
+        [Effort::dear(most_causes), Effort::dear_fold(most_causes)]
+    } else {
+        [Effort::full(most_causes), Effort::fold(most_causes)]
+    };
+    efforts.map(|effort| Effort { level: options.level, ..effort })
 }
 
 /// Labels of the causes that a next measurement parts.
@@ -196,11 +213,22 @@ fn in_particular<E: utoipa::ToSchema, R: utoipa::ToSchema>(
     }
 }
 
-/// The extended model on the rows, where causes are named.
+/// The extended model on the rows, where there is one.
 struct Extended {
     prediction: Option<Vec<Prediction>>,
     /// Standard deviation of a row about it.
     deviation: Option<Vec<f64>>,
+}
+
+/// What is left without a name, where the verdict is that something is.
+fn unnamed_remainder(weighing: &Weighing<'_>, used: &[usize]) -> Option<RemainderReport> {
+    let shape = matches!(weighing.verdict, Verdict::Unknown(_)).then(|| remainder_shape(weighing)).flatten()?;
+    Some(remainder_report(shape, used))
+}
+
+/// Pairs of causes by their kinds.
+fn pairs(pairs: Vec<(usize, usize)>, view: &View<'_>) -> Vec<CausePair> {
+    pairs.into_iter().map(|(a, b)| CausePair { a: view.kind(a).to_owned(), b: view.kind(b).to_owned() }).collect()
 }
 
 fn remainder_report(shape: RemainderShape, used: &[usize]) -> RemainderReport {

@@ -3,7 +3,9 @@
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::adequacy::TestKind;
+use super::blunder::BlunderReport;
 use super::classes;
+use super::extension::ExtensionKind;
 use super::identify::{COLLINEAR_ABOVE, CONFOUNDED_BELOW};
 use super::input::DiagnosisOptions;
 use super::noise::NoiseSource;
@@ -12,7 +14,7 @@ use super::output::{CauseReport, DiagnosisResult, NamedCause, Refusal, SetReport
 use super::refuse::{most_causes, rows_for};
 use super::suspect::swapped_columns;
 use super::weigh::{ALARM, UNNAMED, UNNAMED_MATTERS, Weighing};
-use crate::calculator::{Basis, Finding, Message, Quantity, Smooth};
+use crate::calculator::{Basis, Finding, Message, Quantity, Smooth, Value};
 
 /// Probability of a scatter so much larger than between sweeps by chance, below which rows have structure that sweeps share.
 const FINER: f64 = 0.01;
@@ -40,6 +42,7 @@ pub(super) const WARNING_CODES: &[&str] = &[
     "collinear_causes",
     "outlying_run",
     "rankings_disagree",
+    "blunder_possible",
 ];
 pub(super) const EXPLANATION_CODES: &[&str] = &[
     "diagnosis_adequate",
@@ -49,10 +52,12 @@ pub(super) const EXPLANATION_CODES: &[&str] = &[
     "diagnosis_unknown",
     "diagnosis_objected",
     "diagnosis_unit_suspected",
+    "diagnosis_blunder",
     "diagnosis_absolute_values",
     "diagnosis_constant_values",
     "diagnosis_too_few_rows",
     "diagnosis_base_fails",
+    "diagnosis_extended",
     "diagnosis_gain",
     "diagnosis_class_gain",
     "diagnosis_next",
@@ -146,8 +151,15 @@ fn odd_rows(leave_out: bool, weighing: &Weighing<'_>, found: &Outliers, used: &[
 }
 
 /// What speaks against taking the verdict as it stands.
-pub(super) fn doubts<E: utoipa::ToSchema, R: utoipa::ToSchema>(output: &DiagnosisResult<E, R>) -> Vec<Finding> {
-    let mut doubts = Vec::new();
+pub(super) fn doubts<E: utoipa::ToSchema, R: utoipa::ToSchema>(
+    output: &DiagnosisResult<E, R>,
+    quantity: &Quantity,
+) -> Vec<Finding> {
+    let told = |blunder: &BlunderReport| {
+        let said = of_blunder(blunder, quantity).into_iter();
+        said.fold(Finding::new("blunder_possible", "/measurements"), |said, (name, value)| said.with(name, value))
+    };
+    let mut doubts: Vec<Finding> = output.blunders.iter().map(told).collect();
     let noise = &output.noise;
     if let (Some(between), Some(dof), Some(of_rows)) =
         (noise.between_sweeps, noise.between_sweeps_degrees_of_freedom, noise.degrees_of_freedom)
@@ -239,7 +251,14 @@ pub(super) fn explanation<E: utoipa::ToSchema, R: utoipa::ToSchema>(
             .with("kind", output.remainder.as_ref().map_or_else(String::new, |remainder| remainder.kind.clone()))
             .with("over", output.remainder.as_ref().map_or_else(Vec::new, |remainder| remainder.over.clone()))
             .with("named", kinds(&output.named)),
-        VerdictClass::Refused => refused(output.refusal.as_ref(), output.rows.row.len()),
+        VerdictClass::Refused => match output.blunders.first() {
+            Some(blunder) => of_blunder(blunder, quantity)
+                .into_iter()
+                .fold(Message::new("diagnosis_blunder"), |said, (name, value)| said.with(name, value))
+                .with("verdict", blunder.verdict_if_corrected.name())
+                .with("sets", blunder.causes_if_corrected.clone()),
+            None => refused(output.refusal.as_ref(), output.rows.row.len()),
+        },
     }];
     let negligible: Vec<String> = output
         .contributions
@@ -263,6 +282,10 @@ pub(super) fn explanation<E: utoipa::ToSchema, R: utoipa::ToSchema>(
                 .with("then", next.separation_then_sigmas),
         );
     }
+    if matches!(output.extension, ExtensionKind::Average | ExtensionKind::Likeliest) {
+        let is_average = f64::from(u8::from(output.extension == ExtensionKind::Average));
+        said.push(Message::new("diagnosis_extended").with("average", is_average).with("effects", output.effects.len()));
+    }
     if let Some(gain) = &output.gain {
         said.push(
             Message::new("diagnosis_gain")
@@ -277,15 +300,7 @@ pub(super) fn explanation<E: utoipa::ToSchema, R: utoipa::ToSchema>(
                 .with("unit", if quantity.logarithmic { "" } else { quantity.unit }),
         );
     }
-    if let Some(held_out) = output.classes.as_ref().and_then(|classes| classes.held_out.as_ref()) {
-        said.push(
-            Message::new("diagnosis_class_gain")
-                .with("base", held_out.share_right_base)
-                .with("extended", held_out.share_right_extended)
-                .with("base_score", held_out.log_score_base)
-                .with("extended_score", held_out.log_score_extended),
-        );
-    }
+    said.extend(class_gain(output));
     said.extend(output.downstream.iter().map(|downstream| {
         Message::new("diagnosis_downstream")
             .with("outcome", downstream.outcome.clone())
@@ -296,6 +311,18 @@ pub(super) fn explanation<E: utoipa::ToSchema, R: utoipa::ToSchema>(
             .with("high", downstream.extended.interval_95[1])
     }));
     said
+}
+
+/// What the extension gains where classes were measured.
+fn class_gain<E: utoipa::ToSchema, R: utoipa::ToSchema>(output: &DiagnosisResult<E, R>) -> Option<Message> {
+    let held_out = output.classes.as_ref()?.held_out.as_ref()?;
+    Some(
+        Message::new("diagnosis_class_gain")
+            .with("base", held_out.share_right_base)
+            .with("extended", held_out.share_right_extended)
+            .with("base_score", held_out.log_score_base)
+            .with("extended_score", held_out.log_score_extended),
+    )
 }
 
 /// From what to what an effect of the base changed.
@@ -370,6 +397,21 @@ fn objected<E: utoipa::ToSchema, R: utoipa::ToSchema>(output: &DiagnosisResult<E
         Some(p) => said.with("of_base", 0.0).with("probability", p),
         None => said.with("of_base", 1.0).with("probability", against_base),
     }
+}
+
+/// What a sentence about a blunder says: runs by their numbers, 0 for none.
+fn of_blunder(blunder: &BlunderReport, quantity: &Quantity) -> Vec<(&'static str, Value)> {
+    let run = |index: usize| Value::from(blunder.runs.get(index).map_or(0.0, |run| f64::from(*run)));
+    vec![
+        ("kind", Value::from(blunder.kind.clone())),
+        ("first", run(0)),
+        ("second", run(1)),
+        ("condition", Value::from(blunder.condition.clone().unwrap_or_default())),
+        ("factor", Value::from(blunder.factor.unwrap_or(1.0))),
+        ("shift", Value::from(blunder.shift.unwrap_or(0.0))),
+        ("unit_of_shift", Value::from(quantity.unit)),
+        ("probability", Value::from(blunder.probability)),
+    ]
 }
 
 fn refused(refusal: Option<&Refusal>, rows: usize) -> Message {

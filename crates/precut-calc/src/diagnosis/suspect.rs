@@ -61,11 +61,25 @@ const FORCE_UNITS: [f64; 6] = [9.80665, 1.0 / 9.80665, 1000.0, 0.001, 4.44822, 1
 /// The same in amplitudes, where half of the peak-to-peak is given for the whole.
 const AMPLITUDES: [f64; 8] = [2.0, 0.5, 1000.0, 0.001, 25.4, 1.0 / 25.4, 39.37, 1.0 / 39.37];
 
+/// Factors that a wrong unit leaves in the values of a quantity.
+pub(super) fn factors_of(quantity: &Quantity) -> &'static [f64] {
+    match quantity {
+        Quantity { logarithmic: false, .. } => &FACTORS,
+        Quantity { unit: "N", .. } => &FORCE_UNITS,
+        Quantity { name, .. } if name.contains("peak_to_peak") => &AMPLITUDES,
+        Quantity { unit: "um" | "mm", .. } => &UNITS,
+        _ => &[],
+    }
+}
+
 /// The same of what is compared by its logarithm: a wrong unit shifts all rows by ln q, and leaves exponents alone.
 ///
 /// The shift is looked for where it explains four fifths of the mean square of the residuals. Twice or half is a blunder of
 /// amplitudes only: a surface twice as rough as expected is no wrong unit.
 pub fn suspected_offset(quantity: &Quantity, measured: &[f64], base: &[f64], keep: &[bool]) -> Option<SuspectedFactor> {
+    if !quantity.logarithmic {
+        return None;
+    }
     let rows = measured.iter().zip(base).zip(keep).filter(|(_, keep)| **keep);
     let gaps: Vec<f64> = rows.map(|((y, f), _)| y - f).collect();
     let count = gaps.len() as f64;
@@ -74,12 +88,6 @@ pub fn suspected_offset(quantity: &Quantity, measured: &[f64], base: &[f64], kee
     if gaps.len() < 3 || square <= 0.0 || count * mean * mean <= EXPLAINED * square {
         return None;
     }
-    let factors = match quantity {
-        Quantity { unit: "N", .. } => FORCE_UNITS.as_slice(),
-        Quantity { name, .. } if name.contains("peak_to_peak") => AMPLITUDES.as_slice(),
-        Quantity { unit: "um" | "mm", .. } => UNITS.as_slice(),
-        _ => &[],
-    };
     // As a share of the variance about the mean of the rows, which is what causes are held against.
     let centre = measured.iter().zip(keep).filter(|(_, keep)| **keep).map(|(y, _)| y).sum::<f64>() / count;
     let spread: f64 =
@@ -87,7 +95,7 @@ pub fn suspected_offset(quantity: &Quantity, measured: &[f64], base: &[f64], kee
     let left: f64 = gaps.iter().map(|gap| (gap - mean) * (gap - mean)).sum();
     let explained = if spread > 0.0 { 1.0 - left / spread } else { 0.0 };
     let near = |factor: &&f64| (mean.exp() / **factor - 1.0).abs() < NEAR;
-    factors.iter().find(near).map(|&factor| SuspectedFactor { factor, fitted: mean.exp(), explained })
+    factors_of(quantity).iter().find(near).map(|&factor| SuspectedFactor { factor, fitted: mean.exp(), explained })
 }
 
 /// Whether every sweep has values that go one way from row to row, and places that do not.

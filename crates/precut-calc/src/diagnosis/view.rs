@@ -12,7 +12,7 @@ use super::output::{
     ParameterReport, ProfileReport, SeparationReport, SetReport, SignatureReport, VerdictClass,
 };
 use super::profile::Profile;
-use super::subject::Setting;
+use super::subject::{Setting, Subject};
 use super::weigh::{SetWeight, Verdict, Weighing};
 use crate::calculator::{Failure, Hypothesis, Monitor, Treatment};
 
@@ -126,16 +126,11 @@ impl<'a> View<'a> {
 
     /// Runs that the others do not lead one to expect.
     pub(super) fn outlying(&self, gain: Option<&Gain>) -> Vec<OutlyingRunReport> {
-        let kinds = |members: &Vec<usize>| members.iter().map(|&h| self.kind(h).to_owned()).collect::<Vec<_>>();
         let report = |odd: &OutlyingRun| OutlyingRunReport {
             run: u32::try_from(odd.run + 1).unwrap_or(u32::MAX),
             misfit_per_row: odd.misfit_per_row,
             verdict_without: class_of(&odd.without),
-            sets_without: match &odd.without {
-                Verdict::Adequate => Vec::new(),
-                Verdict::Named(members) | Verdict::Unknown(members) => vec![kinds(members)],
-                Verdict::Confounded(sets) => sets.iter().map(kinds).collect(),
-            },
+            sets_without: kinds_of(self.hypotheses, &odd.without),
         };
         gain.map_or_else(Vec::new, |gain| gain.outlying.iter().map(report).collect())
     }
@@ -333,6 +328,20 @@ impl<'a> View<'a> {
             .map(|signature| SignatureReport { causes: kinds(&signature.members), change: signature.change })
             .collect();
         Ok((changes, apart))
+    }
+}
+
+/// A verdict with its sets, by their kinds.
+pub(super) fn class_and_kinds(subject: &dyn Subject, verdict: &Verdict) -> (VerdictClass, Vec<Vec<String>>) {
+    (class_of(verdict), kinds_of(subject.hypotheses(), verdict))
+}
+
+fn kinds_of(hypotheses: &[Hypothesis], verdict: &Verdict) -> Vec<Vec<String>> {
+    let kinds = |members: &Vec<usize>| members.iter().map(|&h| hypotheses[h].cause.kind.to_owned()).collect::<Vec<_>>();
+    match verdict {
+        Verdict::Adequate => Vec::new(),
+        Verdict::Named(members) | Verdict::Unknown(members) => vec![kinds(members)],
+        Verdict::Confounded(sets) => sets.iter().map(kinds).collect(),
     }
 }
 

@@ -1,6 +1,7 @@
 //! From rows to posterior weights and a verdict (`diagnosis/3.5`, `diagnosis/3.7`).
 
 use super::adequacy::{Test, adequacy};
+use super::blunder::POSSIBLE;
 use super::discrepancy::{self, Kind, Remainder};
 use super::evidence::{Normal, log_sum_exp};
 use super::fairness::Left;
@@ -111,7 +112,7 @@ impl Effort {
             most_causes,
             leading: [LEADING_SINGLES, LEADING_PAIRS],
             leaders: 1,
-            of_each_size: [0, 4, 2, 1],
+            of_each_size: [0, 4, 3, 1],
             rounds: 3,
             late_leaders: 2,
             nonlinear: true,
@@ -190,6 +191,8 @@ pub struct Weighing<'a> {
     pub none: f64,
     /// Posterior of all sets with an unnamed remainder.
     pub unnamed: f64,
+    /// Logarithm of the evidence of all sets together, each by its prior: comparable between tables of as many rows.
+    pub(super) log_evidence: f64,
     /// Posterior that a hypothesis takes part, for every hypothesis.
     pub inclusion: Vec<f64>,
     /// Tests of the base.
@@ -250,6 +253,7 @@ impl<'a> Weighing<'a> {
             Likelihood::Gaussian { whitener, .. } => whitener.clone(),
             Likelihood::Classes(_) => about_leader(foundation, &sets, &noise, &keep)?,
         };
+        let log_evidence = total - 0.5 * whitener.log_det();
         let low_order: Vec<White> = data.layout.design.regressors.iter().map(|column| whitener.white(column)).collect();
         let mut weighing = Self {
             foundation,
@@ -263,6 +267,7 @@ impl<'a> Weighing<'a> {
             sets,
             none,
             unnamed,
+            log_evidence,
             inclusion,
             tests: Vec::new(),
             verdict: Verdict::Adequate,
@@ -331,6 +336,13 @@ impl<'a> Weighing<'a> {
             return Verdict::Unknown(Vec::new());
         }
         Verdict::Confounded(likely.iter().map(|set| set.members.clone()).collect())
+    }
+
+    /// Beside rows that may have been written down wrongly no set is named, however much it explains.
+    pub(super) fn doubt(&mut self, of_blunders: f64) {
+        if let (true, Verdict::Named(members)) = (of_blunders >= POSSIBLE, &self.verdict) {
+            self.verdict = Verdict::Confounded(vec![members.clone()]);
+        }
     }
 
     /// What every value of every member of a set whose shapes stay on their grid may be, point by point of the grid; `None` of

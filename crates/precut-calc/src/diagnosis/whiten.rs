@@ -103,6 +103,14 @@ impl Whitener {
         if self.nuisances.is_empty() { Some(0.0) } else { self.factor.as_ref().map(log_det) }
     }
 
+    /// ln |C| over the rows that count.
+    pub(super) fn log_det(&self) -> f64 {
+        let of_scatter: f64 = self.traces.iter().flatten().map(|&row| 2.0 * self.sigma[row].ln()).sum();
+        // Of a sweep of n rows |R| = (1 - rho^2)^(n - 1).
+        let pairs: usize = self.traces.iter().map(|rows| rows.len().saturating_sub(1)).sum();
+        of_scatter + pairs as f64 * (1.0 - self.rho * self.rho).ln() + self.log_det_allowances().unwrap_or(0.0)
+    }
+
     /// Number of rows that count.
     pub(super) fn rows(&self) -> f64 {
         self.rows as f64

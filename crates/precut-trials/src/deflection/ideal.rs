@@ -5,11 +5,11 @@ use super::{
     BENDING_ALLOWANCE, Drawn, FORCE_LEVEL_ALLOWANCE, FORCE_PER_RUN_ALLOWANCE, SETUP_ALLOWANCE_UM, drawn, scaled,
 };
 use crate::observer::{Covariance, Expected, NEIGHBOURS};
-use crate::{Class, Random};
+use crate::{Class, Random, Scatter};
 
 /// Whether that observer finds the one cause that [`super::draw`] hides under this seed.
 pub fn is_found(snr: f64, seed: u64) -> bool {
-    let drawn = drawn(Class::One, snr, seed);
+    let drawn = drawn(Scatter::Student, Class::One, snr, seed);
     let Some(truth) = drawn.trial.truth.causes.first() else { return false };
     // Numbers of its own: what the draw takes is not changed by who looks on.
     let mut random = Random::new(seed ^ 0x5eed);

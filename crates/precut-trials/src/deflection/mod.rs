@@ -8,7 +8,7 @@ pub use ideal::is_found;
 
 use serde_json::{Value, json};
 
-use crate::{Class, Hidden, Later, Random, Trial, Truth};
+use crate::{Class, Hidden, Later, Random, Scatter, Trial, Truth};
 use hide::{CAUSES, OUTSIDE, Size};
 
 /// Depth, feed and speed at which the force is stated.
@@ -59,7 +59,12 @@ pub(crate) struct Acting {
 
 /// Draws a trial. `snr` is that of every hidden cause.
 pub fn draw(class: Class, snr: f64, seed: u64) -> Trial {
-    drawn(class, snr, seed).trial
+    draw_scattered(Scatter::Student, class, snr, seed)
+}
+
+/// The same with rows that scatter otherwise.
+pub fn draw_scattered(scatter: Scatter, class: Class, snr: f64, seed: u64) -> Trial {
+    drawn(scatter, class, snr, seed).trial
 }
 
 /// A trial and what it was made of.
@@ -94,17 +99,17 @@ impl Drawn {
     }
 }
 
-fn drawn(class: Class, snr: f64, seed: u64) -> Drawn {
+fn drawn(scatter: Scatter, class: Class, snr: f64, seed: u64) -> Drawn {
     let mut random = Random::new(seed);
     loop {
         // A cause that needs what this draw does not have (both directions, two depths) is drawn again.
-        if let Some(drawn) = attempt(class, snr, &mut random) {
+        if let Some(drawn) = attempt(scatter, class, snr, &mut random) {
             return drawn;
         }
     }
 }
 
-fn attempt(class: Class, snr: f64, random: &mut Random) -> Option<Drawn> {
+fn attempt(scatter: Scatter, class: Class, snr: f64, random: &mut Random) -> Option<Drawn> {
     let lathe = lathe(random);
     let runs = runs(&lathe, random);
     let sigma = random.uniform(0.8, 1.8);
@@ -128,7 +133,7 @@ fn attempt(class: Class, snr: f64, random: &mut Random) -> Option<Drawn> {
     }
     let level = 1.0 + random.uniform_sd(FORCE_LEVEL_ALLOWANCE);
     let bending = 1.0 + random.uniform_sd(BENDING_ALLOWANCE);
-    let machine = Machine { lathe: &lathe, hidden: &hidden, level, bending, sigma };
+    let machine = Machine { lathe: &lathe, hidden: &hidden, level, bending, sigma, scatter };
     let (rows, measured) = machine.measure(&runs, &places, traces, random);
     // Another shift on the same machine.
     let runs_later = self::runs(&lathe, random);
@@ -160,32 +165,38 @@ struct Machine<'a> {
     level: f64,
     bending: f64,
     sigma: f64,
+    scatter: Scatter,
 }
 
 impl Machine<'_> {
     /// Rows of runs that are measured so many times, and their values.
     fn measure(&self, runs: &[Run], places: &[f64], traces: usize, random: &mut Random) -> (Vec<Value>, Vec<f64>) {
-        let Self { lathe, hidden, level, bending, sigma } = *self;
+        let Self { lathe, hidden, level, bending, sigma, scatter } = *self;
+        let digits = if scatter == Scatter::Rounded { 0 } else { 2 };
         let (mut rows, mut measured) = (Vec::new(), Vec::new());
         for (index, run) in runs.iter().enumerate() {
             let force = level * (1.0 + random.uniform_sd(FORCE_PER_RUN_ALLOWANCE));
             let setup_um = random.uniform_sd(SETUP_ALLOWANCE_UM);
             for trace in 1..=traces {
-                let mut before = random.student_6();
+                let mut before = scatter.next(random);
                 for &place in places {
                     let z = (place + random.uniform(-GAUGE_POSITION_MM, GAUGE_POSITION_MM)).clamp(0.0, lathe.length_mm);
                     let elastic = elastic_um_per_n(lathe, z, hidden, bending);
                     let clean = deviation_um(lathe, run, index, (z, elastic), hidden, force);
-                    let fresh = random.student_6();
-                    // A moving average with coefficient 0.2: correlated by 0.19 with its neighbour.
-                    let noise = (fresh + 0.2 * before) / 1.04_f64.sqrt();
-                    before = fresh;
+                    let fresh = scatter.next(random);
+                    let noise = if scatter == Scatter::Correlated {
+                        before = 0.4 * before + 0.84_f64.sqrt() * fresh;
+                        before
+                    } else {
+                        // A moving average with coefficient 0.2: correlated by 0.19 with its neighbour.
+                        (fresh + 0.2 * std::mem::replace(&mut before, fresh)) / 1.04_f64.sqrt()
+                    };
                     let uneven = random.uniform(0.8, 1.2);
                     let value = clean + setup_um + sigma * uneven * noise;
                     measured.push(value);
                     rows.push(json!({
                         "run": index + 1, "trace": trace, "z_mm": round(place, 3),
-                        "diameter_deviation_um": round(value, 2)
+                        "diameter_deviation_um": round(value, digits)
                     }));
                 }
             }

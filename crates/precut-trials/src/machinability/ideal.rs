@@ -3,11 +3,11 @@
 use super::hide::CAUSES;
 use super::{LEVEL, Plan, drawn, scaled};
 use crate::observer::{Covariance, Expected};
-use crate::{Class, Random};
+use crate::{Class, Random, Scatter};
 
 /// Whether that observer finds the one cause that [`super::draw`] hides under this seed.
 pub fn is_found(snr: f64, seed: u64) -> bool {
-    let drawn = drawn(Plan::Levels, Class::One, snr, seed);
+    let drawn = drawn((Plan::Levels, Scatter::Student), Class::One, snr, seed);
     let (Some(truth), Some(hidden)) = (drawn.trial.truth.causes.first(), drawn.hidden.first()) else { return false };
     // Numbers of its own: what the draw takes is not changed by who looks on.
     let mut random = Random::new(seed ^ 0x5eed);

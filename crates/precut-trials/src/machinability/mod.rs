@@ -10,7 +10,7 @@ pub use ideal::is_found;
 
 use serde_json::{Value, json};
 
-use crate::{Class, Hidden, Later, Random, Trial, Truth};
+use crate::{Class, Hidden, Later, Random, Scatter, Trial, Truth};
 use hide::{CAUSES, OUTSIDE, OUTSIDE_CONDITIONS, Scaled, Size};
 
 const SPEEDS: [f64; 5] = [20.0, 35.0, 60.0, 100.0, 160.0];
@@ -68,12 +68,22 @@ impl Output {
 
 /// Draws a trial. `snr` is that of every hidden cause.
 pub fn draw(class: Class, snr: f64, seed: u64) -> Trial {
-    drawn(Plan::Levels, class, snr, seed).trial
+    draw_scattered(Scatter::Student, class, snr, seed)
+}
+
+/// The same with rows that scatter otherwise.
+pub fn draw_scattered(scatter: Scatter, class: Class, snr: f64, seed: u64) -> Trial {
+    drawn((Plan::Levels, scatter), class, snr, seed).trial
 }
 
 /// The same over regimes of any values, none of which is cut twice, without an order.
 pub fn draw_continuous(class: Class, snr: f64, seed: u64) -> Trial {
-    drawn(Plan::Continuous, class, snr, seed).trial
+    draw_continuous_scattered(Scatter::Student, class, snr, seed)
+}
+
+/// Regimes of any values, and rows that scatter otherwise.
+pub fn draw_continuous_scattered(scatter: Scatter, class: Class, snr: f64, seed: u64) -> Trial {
+    drawn((Plan::Continuous, scatter), class, snr, seed).trial
 }
 
 /// A trial and what it was made of.
@@ -94,7 +104,7 @@ impl Drawn {
     }
 }
 
-fn drawn(plan: Plan, class: Class, snr: f64, seed: u64) -> Drawn {
+fn drawn(plan: (Plan, Scatter), class: Class, snr: f64, seed: u64) -> Drawn {
     let mut random = Random::new(seed);
     loop {
         // A cause that this draw cannot show is drawn again.
@@ -104,7 +114,7 @@ fn drawn(plan: Plan, class: Class, snr: f64, seed: u64) -> Drawn {
     }
 }
 
-fn attempt(plan: Plan, class: Class, snr: f64, random: &mut Random) -> Option<Drawn> {
+fn attempt((plan, scatter): (Plan, Scatter), class: Class, snr: f64, random: &mut Random) -> Option<Drawn> {
     let output = output(random);
     let cuts = cuts(plan, random);
     let sigma = random.uniform(0.03, 0.06);
@@ -128,12 +138,12 @@ fn attempt(plan: Plan, class: Class, snr: f64, random: &mut Random) -> Option<Dr
         hidden.push(scaled(cause, &output, &cuts, snr * sigma, random)?);
     }
     let level = 1.0 + random.uniform_sd(LEVEL);
-    let (rows, measured) = measure(plan, &output, &hidden, &cuts, (level, sigma), random);
+    let (rows, measured) = measure((plan, scatter), &output, &hidden, &cuts, (level, sigma), random);
     let residual = measured.iter().zip(&cuts).map(|(value, cut)| (value / output.plain(cut)).ln()).collect();
     // Another day, other regimes, the same tool.
     let same_tool = |cut: &Cut| if plan == Plan::Levels { Cut { radius_mm: cuts[0].radius_mm, ..*cut } } else { *cut };
     let cuts_later: Vec<Cut> = self::cuts(plan, random).iter().map(same_tool).collect();
-    let (rows_later, _) = measure(plan, &output, &hidden, &cuts_later, (level, sigma), random);
+    let (rows_later, _) = measure((plan, scatter), &output, &hidden, &cuts_later, (level, sigma), random);
     let best = cuts_later.iter().map(|cut| with(&hidden, &output, cut).ln()).collect();
     let radius_mm = cuts.first().map_or(0.8, |cut| cut.radius_mm);
     let truth = Truth { class, causes: Vec::new() };
@@ -153,7 +163,7 @@ fn attempt(plan: Plan, class: Class, snr: f64, random: &mut Random) -> Option<Dr
 
 /// Rows of these cuts, and their values; `level` is a factor on all of them.
 fn measure(
-    plan: Plan,
+    (plan, scatter): (Plan, Scatter),
     output: &Output,
     hidden: &[Scaled],
     cuts: &[Cut],
@@ -166,7 +176,7 @@ fn measure(
             depth: cut.depth * (1.0 + random.uniform(-DEPTH_ERROR, DEPTH_ERROR)),
             ..*cut
         };
-        let noise = sigma * random.uniform(0.8, 1.2) * random.student_6();
+        let noise = sigma * random.uniform(0.8, 1.2) * scatter.next(random);
         let value = level * with(hidden, output, &real) * noise.exp();
         let mut row = json!({
             "speed_m_per_min": cut.speed, "feed_mm_per_rev": cut.feed, "depth_mm": cut.depth,
@@ -179,7 +189,7 @@ fn measure(
                 row["nose_radius_mm"] = json!(cut.radius_mm);
             }
         }
-        row[output.quantity] = json!(four_digits(value));
+        row[output.quantity] = json!(rounded(value, if scatter == Scatter::Rounded { 2 } else { 4 }));
         (row, value)
     };
     cuts.iter().map(&mut measured).unzip()
@@ -292,10 +302,6 @@ fn scaled(cause: Size, output: &Output, cuts: &[Cut], rms: f64, random: &mut Ran
         if reached(middle) < rms { low = middle } else { high = middle }
     }
     Some(at(0.5 * (low + high)))
-}
-
-fn four_digits(value: f64) -> f64 {
-    rounded(value, 4)
 }
 
 fn three_digits(value: f64) -> f64 {
