@@ -41,8 +41,8 @@ pub struct Contents {
     pub jobs: u64,
     /// Kept results, each with the checksum that it was written with.
     pub results: u64,
-    /// Revisions of stored models.
-    pub models: u64,
+    /// Revisions of stored models, machines, tools and materials.
+    pub documents: u64,
     /// Size of the file, bytes.
     pub bytes: u64,
 }
@@ -111,10 +111,14 @@ pub async fn verify(copy: &Path) -> Result<Contents, BackupError> {
         return Err(damaged(format!("{bad} of {results} results are damaged")));
     }
     let jobs = count(&mut database, "SELECT count(*) FROM precut_jobs").await.map_err(failed)?;
-    let models = count(&mut database, "SELECT count(*) FROM models").await.map_err(failed)?;
+    // A copy may be older than the table of all documents.
+    let old =
+        count(&mut database, "SELECT count(*) FROM sqlite_master WHERE name = 'models'").await.map_err(failed)? > 0;
+    let count_documents = if old { "SELECT count(*) FROM models" } else { "SELECT count(*) FROM documents" };
+    let documents = count(&mut database, count_documents).await.map_err(failed)?;
     database.close().await.map_err(failed)?;
     let bytes = fs::metadata(copy).map_err(|error| BackupError::File(copy.to_owned(), error))?.len();
-    Ok(Contents { jobs, results, models, bytes })
+    Ok(Contents { jobs, results, documents, bytes })
 }
 
 /// Puts a copy that is in order into a folder that has no database and that nobody uses.

@@ -207,6 +207,8 @@ pub struct NewJob {
     pub callback: Option<NewCallback>,
     /// Where the request belongs in a trace (W3C Trace Context).
     pub traceparent: Option<String>,
+    /// What the systems on the trace's way say of it.
+    pub tracestate: Option<String>,
 }
 
 /// A client's own name for a request, with the hash of what it asked.
@@ -259,6 +261,8 @@ pub struct JobRecord {
     pub owner: String,
     /// Where the request belongs in a trace.
     pub traceparent: Option<String>,
+    /// What the systems on the trace's way say of it.
+    pub tracestate: Option<String>,
     /// Who is told when it is over.
     pub callback: Option<Callback>,
 }
@@ -294,6 +298,8 @@ pub struct Waiting {
     pub created_ms: i64,
     /// Where the request belongs in a trace.
     pub traceparent: Option<String>,
+    /// What the systems on the trace's way say of it.
+    pub tracestate: Option<String>,
 }
 
 /// A computation to run.
@@ -429,6 +435,8 @@ pub type Live = Arc<dyn Fn() -> Vec<Lease> + Send + Sync>;
 pub enum News {
     /// These jobs changed, and nobody wants these computations any more.
     Changed(Changed),
+    /// Documents changed.
+    Library,
     /// Something was said that could not be heard: anything may have changed.
     Missed,
 }

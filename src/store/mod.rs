@@ -3,16 +3,16 @@
 pub mod address;
 pub mod backup;
 pub mod callbacks;
+pub mod documents;
 pub mod jobs;
 mod ledger;
-pub mod models;
 mod postgres;
 mod queue;
 pub(crate) mod quota;
 mod row;
 pub mod sqlite;
+pub(crate) mod sqlite_documents;
 mod sqlite_jobs;
-pub(crate) mod sqlite_models;
 mod sqlite_studies;
 #[cfg(test)]
 mod suite;
@@ -54,8 +54,8 @@ pub enum OpenError {
 }
 
 /// Everything that outlasts a process.
-pub trait Store: ResultStore + jobs::JobStore + models::ModelStore {}
-impl<S: ResultStore + jobs::JobStore + models::ModelStore> Store for S {}
+pub trait Store: ResultStore + jobs::JobStore + documents::DocumentStore {}
+impl<S: ResultStore + jobs::JobStore + documents::DocumentStore> Store for S {}
 
 /// Which store, and how it is used.
 #[derive(Debug, Clone)]

@@ -26,8 +26,8 @@ impl Quota {
 /// What one owner takes of the service.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Usage {
-    /// What is kept of jobs, their results and models, bytes, with the time from now after which it goes, ms; none for
-    /// jobs that are not over, and for models.
+    /// What is kept of jobs, their results and documents, bytes, with the time from now after which it goes, ms; none for
+    /// jobs that are not over, and for documents.
     pub kept: Vec<(Option<i64>, u64)>,
     /// Estimated work of jobs that are not over, ms.
     pub open_ms: f64,

@@ -160,6 +160,9 @@ async fn call(connection: &mut PgConnection, key: Key, most: u32, engine: String
     queue::add(connection, &engine, &tasks).await
 }
 
+/// A job that waits: tries, calculator, owner, when it came, and its place in a trace.
+type WaitingRow = (i32, String, String, i64, Option<String>, Option<String>);
+
 impl JobStore for PostgresStore {
     fn submit(&self, job: NewJob, queue_limit: u64) -> BoxFuture<'_, Result<Accepted, StoreError>> {
         Box::pin(self.submit_job(job, queue_limit))
@@ -206,8 +209,8 @@ impl JobStore for PostgresStore {
     }
     fn waiting(&self, id: JobId) -> BoxFuture<'_, Result<Option<Waiting>, StoreError>> {
         Box::pin(async move {
-            let waiting: Option<(i32, String, String, i64, Option<String>)> = sqlx::query_as(
-                "SELECT max(other.attempt), one.calculator, one.owner, one.created_ms, one.traceparent
+            let waiting: Option<WaitingRow> = sqlx::query_as(
+                "SELECT max(other.attempt), one.calculator, one.owner, one.created_ms, one.traceparent, one.tracestate
                  FROM precut.jobs AS one JOIN precut.jobs AS other USING (key)
                  WHERE one.id = $1 AND one.state = 'queued' AND other.state = 'queued'
                  GROUP BY one.id",
@@ -215,12 +218,13 @@ impl JobStore for PostgresStore {
             .bind(id.to_string())
             .fetch_optional(&self.pool)
             .await?;
-            Ok(waiting.map(|(charged, calculator, owner, created_ms, traceparent)| Waiting {
+            Ok(waiting.map(|(charged, calculator, owner, created_ms, traceparent, tracestate)| Waiting {
                 charged: count(charged),
                 calculator,
                 owner,
                 created_ms,
                 traceparent,
+                tracestate,
             }))
         })
     }

@@ -101,9 +101,9 @@ pub(super) async fn submit(
     let row: Option<RecordRow> = sqlx::query_as(concat!(
         "INSERT INTO precut.jobs (id, kind, calculator, version, engine, key, input, state, progress, attempt, lease,
              heartbeat_ms, priority, turn, pushed, owner, idempotency, body_hash, estimate_ms, created_ms, started_ms,
-             finished_ms, deadline_ms, expires_ms, input_bytes, result_bytes, traceparent)
+             finished_ms, deadline_ms, expires_ms, input_bytes, result_bytes, traceparent, tracestate)
          VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14, $15, $16, $17, $18, $19, $20, $21, $22,
-             $23, $24, octet_length($7::bytea), $25, $26)
+             $23, $24, octet_length($7::bytea), $25, $26, $27)
          ON CONFLICT (owner, idempotency) DO NOTHING RETURNING ",
         columns!()
     ))
@@ -133,6 +133,7 @@ pub(super) async fn submit(
     .bind(finished.map(|at| at.saturating_add(keep_ms)))
     .bind(result.as_ref().map_or(0, ResultRow::bytes))
     .bind(&job.traceparent)
+    .bind(&job.tracestate)
     .fetch_optional(&mut *connection)
     .await?;
     let Some(row) = row else {

@@ -8,9 +8,9 @@
 mod callbacks;
 mod care;
 mod clock;
+mod documents;
 mod jobs;
 mod line;
-mod models;
 mod news;
 mod queue;
 mod record;

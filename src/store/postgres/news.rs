@@ -23,20 +23,23 @@ const PAUSE: Duration = Duration::from_millis(250);
 /// The bell is rung so often even where nothing is heard.
 const RING: Duration = Duration::from_secs(1);
 
-#[derive(Serialize, Deserialize)]
+#[derive(Default, Serialize, Deserialize)]
 struct Notice {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     jobs: Vec<String>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     unwanted: Vec<String>,
+    /// Documents changed: what the trigger of their table says.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    library: bool,
 }
 
 /// Tells all processes, once the transaction is committed.
 pub(super) async fn tell(connection: &mut PgConnection, jobs: &[JobId], unwanted: &[Lease]) -> Outcome<()> {
     let (jobs, unwanted) = (super::record::texts(jobs), super::record::texts(unwanted));
-    let of_jobs = jobs.chunks(TOLD_AT_ONCE).map(|jobs| Notice { jobs: jobs.to_vec(), unwanted: Vec::new() });
+    let of_jobs = jobs.chunks(TOLD_AT_ONCE).map(|jobs| Notice { jobs: jobs.to_vec(), ..Notice::default() });
     let of_leases =
-        unwanted.chunks(TOLD_AT_ONCE).map(|unwanted| Notice { jobs: Vec::new(), unwanted: unwanted.to_vec() });
+        unwanted.chunks(TOLD_AT_ONCE).map(|unwanted| Notice { unwanted: unwanted.to_vec(), ..Notice::default() });
     for notice in of_jobs.chain(of_leases) {
         let text = serde_json::to_string(&notice).map_err(|error| sqlx::Error::Encode(error.into()))?;
         sqlx::query("SELECT pg_notify($1, $2)").bind(CHANNEL).bind(text).execute(&mut *connection).await?;
@@ -113,6 +116,10 @@ async fn listen_once(pool: &PgPool, bell: &AtomicWaker, hear: &Mutex<Option<Hear
                 Some(notification) if notification.channel() == TASKS => bell.wake(),
                 Some(notification) => {
                     if let Ok(notice) = serde_json::from_str::<Notice>(notification.payload()) {
+                        if notice.library {
+                            pass_on(hear, News::Library);
+                            continue;
+                        }
                         let jobs = notice.jobs.iter().filter_map(|id| id.parse().ok()).collect();
                         let unwanted = notice.unwanted.iter().filter_map(|lease| lease.parse().ok()).collect();
                         pass_on(hear, News::Changed(Changed { jobs, unwanted }));

@@ -12,7 +12,7 @@ use crate::store::sqlite_jobs::record::{of_rank, parsed, unreadable};
 macro_rules! columns {
     () => {
         "id, kind, calculator, key, state, stage, progress, attempt, lease, priority, problem, estimate_ms, \
-         created_ms, started_ms, finished_ms, deadline_ms, expires_ms, owner, traceparent, \
+         created_ms, started_ms, finished_ms, deadline_ms, expires_ms, owner, traceparent, tracestate, \
          (SELECT json_build_object('url', url, 'state', callbacks.state, 'attempts', attempts, 'next_ms', next_ms, 'fault', fault, \
              'settled_ms', settled_ms)::text FROM precut.callbacks WHERE job = jobs.id) AS callback"
     };
@@ -43,6 +43,7 @@ pub(super) struct RecordRow {
     expires_ms: Option<i64>,
     owner: String,
     traceparent: Option<String>,
+    tracestate: Option<String>,
     callback: Option<String>,
 }
 
@@ -68,6 +69,7 @@ impl RecordRow {
             expires_ms: self.expires_ms,
             owner: self.owner,
             traceparent: self.traceparent,
+            tracestate: self.tracestate,
             callback: self.callback.as_deref().map(Callback::read).transpose()?,
         })
     }

@@ -15,7 +15,7 @@ use crate::store::OpenError;
 use crate::store::address::Secret;
 
 /// What this program knows of the tables: the number of its last migration.
-pub(super) const SCHEMA: i32 = 5;
+pub(super) const SCHEMA: i32 = 7;
 /// How long a request waits for a connection before it is told that the store does not serve.
 const ACQUIRE: Duration = Duration::from_secs(2);
 /// A connection that was idle for longer is asked whether it still is one.

@@ -90,9 +90,9 @@ pub(super) async fn submit(
     sqlx::query(
         "INSERT INTO precut_jobs (id, kind, calculator, version, key, input, state, progress, attempt, lease,
              heartbeat_ms, priority, turn, owner, idempotency, body_hash, estimate_ms, created_ms, started_ms,
-             finished_ms, deadline_ms, expires_ms, input_bytes, result_bytes, traceparent)
+             finished_ms, deadline_ms, expires_ms, input_bytes, result_bytes, traceparent, tracestate)
          VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19, ?20, ?21, ?22,
-             length(?6), ?23, ?24)",
+             length(?6), ?23, ?24, ?25)",
     )
     .bind(job.id.to_string())
     .bind(job.kind.word())
@@ -118,6 +118,7 @@ pub(super) async fn submit(
     .bind(finished.map(|at| at.saturating_add(keep_ms)))
     .bind(result.as_ref().map_or(0, ResultRow::bytes))
     .bind(&job.traceparent)
+    .bind(&job.tracestate)
     .execute(&mut *connection)
     .await?;
     if state == JobState::Queued {

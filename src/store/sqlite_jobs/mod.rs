@@ -114,6 +114,9 @@ impl SqliteStore {
     }
 }
 
+/// A job that waits: tries, calculator, owner, when it came, and its place in a trace.
+type WaitingRow = (u32, String, String, i64, Option<String>, Option<String>);
+
 impl JobStore for SqliteStore {
     fn submit(&self, job: NewJob, queue_limit: u64) -> BoxFuture<'_, Result<Accepted, StoreError>> {
         Box::pin(self.submit_job(job, queue_limit))
@@ -145,8 +148,8 @@ impl JobStore for SqliteStore {
     }
     fn waiting(&self, id: JobId) -> BoxFuture<'_, Result<Option<Waiting>, StoreError>> {
         Box::pin(async move {
-            let waiting: Option<(u32, String, String, i64, Option<String>)> = sqlx::query_as(
-                "SELECT max(other.attempt), one.calculator, one.owner, one.created_ms, one.traceparent
+            let waiting: Option<WaitingRow> = sqlx::query_as(
+                "SELECT max(other.attempt), one.calculator, one.owner, one.created_ms, one.traceparent, one.tracestate
                  FROM precut_jobs AS one JOIN precut_jobs AS other USING (key)
                  WHERE one.id = ?1 AND one.state = 'queued' AND other.state = 'queued'
                  GROUP BY one.id",
@@ -154,12 +157,13 @@ impl JobStore for SqliteStore {
             .bind(id.to_string())
             .fetch_optional(&self.readers)
             .await?;
-            let told = |(charged, calculator, owner, created_ms, traceparent)| Waiting {
+            let told = |(charged, calculator, owner, created_ms, traceparent, tracestate)| Waiting {
                 charged,
                 calculator,
                 owner,
                 created_ms,
                 traceparent,
+                tracestate,
             };
             Ok(waiting.map(told))
         })

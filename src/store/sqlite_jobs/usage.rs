@@ -6,14 +6,14 @@ use super::record::Outcome;
 use crate::store::quota::{HOUR_MS, MINUTE_MS, Usage};
 
 pub(in crate::store) async fn usage(connection: &mut SqliteConnection, owner: &str, now: i64) -> Outcome<Usage> {
-    // Equal jobs share a result. By the hour, so that it is told in few numbers. Models go when they are deleted.
+    // Equal jobs share a result. By the hour, so that it is told in few numbers. Models and the like go when they are deleted.
     let kept: Vec<(Option<i64>, i64)> = sqlx::query_as(
         "SELECT max(until) - ?2, sum(bytes) FROM (
              SELECT max(expires_ms) AS until, sum(input_bytes) + max(result_bytes) AS bytes FROM precut_jobs
              WHERE owner = ?1 AND (expires_ms IS NULL OR expires_ms > ?2) GROUP BY key)
          GROUP BY until / ?3
          UNION ALL
-         SELECT NULL, sum(bytes) FROM models WHERE owner = ?1 AND content IS NOT NULL HAVING count(*) > 0",
+         SELECT NULL, sum(bytes) FROM documents WHERE owner = ?1 AND content IS NOT NULL HAVING count(*) > 0",
     )
     .bind(owner)
     .bind(now)
@@ -48,7 +48,7 @@ pub(super) async fn kept_by_owner(connection: &mut SqliteConnection, now: i64) -
              SELECT owner, sum(input_bytes) + max(result_bytes) AS bytes FROM precut_jobs
              WHERE owner > 'key:' AND owner < 'key;' AND (expires_ms IS NULL OR expires_ms > ?1) GROUP BY owner, key
              UNION ALL
-             SELECT owner, bytes FROM models WHERE owner > 'key:' AND owner < 'key;' AND content IS NOT NULL)
+             SELECT owner, bytes FROM documents WHERE owner > 'key:' AND owner < 'key;' AND content IS NOT NULL)
          GROUP BY owner",
     )
     .bind(now)

@@ -7,7 +7,8 @@ use crate::store::jobs::{Ending, JobId, NewJob};
 
 fn told(number: u32, host: &str) -> NewJob {
     let callback = NewCallback { url: format!("https://{host}/{number}"), host: host.to_owned() };
-    NewJob { callback: Some(callback), traceparent: Some(format!("place {number}")), ..job(number) }
+    let (parent, state) = (format!("place {number}"), format!("state {number}"));
+    NewJob { callback: Some(callback), traceparent: Some(parent), tracestate: Some(state), ..job(number) }
 }
 
 fn all() -> TakeUp {
@@ -32,14 +33,15 @@ pub(in crate::store) async fn a_callback_is_due_when_its_job_is_over_however_it_
         let record = place.accept(told(number, "mes:443")).await;
         let callback = record.callback.unwrap();
         assert_eq!((callback.state, callback.attempts, callback.next_ms), (CallbackState::Waiting, 0, None));
-        assert_eq!(record.traceparent, Some(format!("place {number}")));
+        let (parent, state) = (record.traceparent.unwrap(), record.tracestate.unwrap());
+        assert_eq!((parent, state), (format!("place {number}"), format!("state {number}")));
         ids.push(record.id);
     }
     let waiting = store.waiting(ids[0]).await.unwrap().unwrap();
-    assert_eq!(waiting.traceparent.as_deref(), Some("place 0"));
+    assert_eq!((waiting.traceparent.as_deref(), waiting.tracestate.as_deref()), (Some("place 0"), Some("state 0")));
     // Nobody asked for it.
     let silent = place.accept(job(6)).await;
-    assert_eq!((silent.callback, silent.traceparent), (None, None));
+    assert_eq!((silent.callback, silent.traceparent, silent.tracestate), (None, None, None));
     assert_eq!(due(store, all()).await, []);
     let claim = place.run(ids[0]).await;
     assert_eq!(due(store, all()).await, [], "it has only begun");

@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 pub(in crate::store) mod callbacks;
+pub(in crate::store) mod documents;
 pub(in crate::store) mod jobs;
-pub(in crate::store) mod models;
 pub(in crate::store) mod results;
 
 use std::time::Duration;
@@ -90,6 +90,7 @@ pub(in crate::store) fn job(number: u32) -> NewJob {
         result: None,
         callback: None,
         traceparent: None,
+        tracestate: None,
     }
 }
 
@@ -146,9 +147,11 @@ macro_rules! suite {
             a_callback_is_one_process_at_a_time_and_over_once_it_is_settled
             who_has_died_loses_a_callback_and_nobody_takes_all_places
         }
-        suite! { $place, models:
+        suite! { $place, documents:
             revisions_rise_and_are_never_given_twice
-            models_count_for_who_stores_them_until_they_are_deleted
+            kinds_and_shelves_are_apart
+            several_are_kept_together_or_none_of_them
+            documents_count_for_who_stores_them_until_they_are_deleted
         }
         suite! { $place, results:
             what_is_put_is_got_after_the_store_was_closed

@@ -1,0 +1,67 @@
+//! Which calculators take names, and of what kind of machine and tool.
+
+use precut_calc::calculator::Finding;
+
+use super::view::Views;
+use super::writer::Writer;
+use crate::record::Kind;
+
+/// Calculators that take the same fields.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Room {
+    /// A shaft, how it is held, one cut.
+    Deflection,
+    /// A shaft in zones.
+    Schedule,
+    /// A cutter and a spindle.
+    Milling,
+}
+
+impl Room {
+    /// The room of a calculator; `None` where it takes no names.
+    pub(super) fn of(calculator: &str) -> Option<Self> {
+        match calculator {
+            "deflection-compensation" => Some(Self::Deflection),
+            "feed-schedule" => Some(Self::Schedule),
+            "fixture-stability" | "milling-stability" => Some(Self::Milling),
+            _ => None,
+        }
+    }
+
+    fn kinds(self, kind: Kind) -> &'static [&'static str] {
+        match (self, kind) {
+            (Self::Milling, Kind::Machine) => &["mill"],
+            (_, Kind::Machine) => &["lathe"],
+            (Self::Milling, Kind::Tool) => &["milling_indexable", "milling_solid"],
+            (_, Kind::Tool) => &["turning_external", "boring_bar"],
+            (_, Kind::Material) => &[],
+        }
+    }
+}
+
+/// Machine and tool must be of a kind that the calculator knows, and a holder one that turns along the shaft.
+pub(super) fn check(room: Room, views: &Views<'_>, writer: &mut Writer<'_>) {
+    for (view, code) in [(&views.machine, "wrong_kind_of_machine"), (&views.tool, "wrong_kind_of_tool")] {
+        let Some(view) = view else { continue };
+        let Some(kind) = view.text("kind") else { continue };
+        let allowed = room.kinds(view.kind);
+        if !allowed.contains(&kind) {
+            writer.fault(
+                Finding::new(code, view.pointer.clone())
+                    .with("received", kind.to_owned())
+                    .with("allowed", allowed.to_vec()),
+            );
+        }
+    }
+    if room == Room::Milling {
+        return;
+    }
+    let Some(tool) = &views.tool else { return };
+    if let Some(holder) = tool.codes.holder.as_ref().filter(|holder| holder.is_for_facing()) {
+        writer.fault(
+            Finding::new("holder_for_facing", tool.pointer.clone())
+                .with("holder", holder.to_string())
+                .with("style", holder.style.to_string()),
+        );
+    }
+}
