@@ -132,6 +132,8 @@ pub struct Limits {
     pub job_bytes: u64,
     /// Most points of a parameter study.
     pub study_points: u64,
+    /// Most revisions of machines, tools and materials that are kept, of all owners together.
+    pub library_records: u64,
     /// How long a job may wait for a core, ms.
     pub queue_ms: u64,
 }
@@ -295,10 +297,12 @@ impl Default for ApiKey {
 pub enum Scope {
     /// Ask: send jobs and cancel them.
     Solve,
-    /// Read jobs, results and models of one's own.
+    /// Read jobs, results, models and records of one's own.
     Read,
     /// Store and delete models of one's own.
     Models,
+    /// Store and delete machines, tools and materials of one's own.
+    Library,
     /// See and cancel the jobs and read the results of all owners, and read the metrics.
     Admin,
 }
@@ -306,7 +310,7 @@ pub enum Scope {
 impl Scope {
     /// What a key may that says nothing of it.
     pub fn usual() -> Vec<Self> {
-        vec![Self::Solve, Self::Read, Self::Models]
+        vec![Self::Solve, Self::Read, Self::Models, Self::Library]
     }
 
     /// As it is written.
@@ -315,6 +319,7 @@ impl Scope {
             Self::Solve => "solve",
             Self::Read => "read",
             Self::Models => "models",
+            Self::Library => "library",
             Self::Admin => "admin",
         }
     }

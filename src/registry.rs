@@ -10,6 +10,7 @@ mod entry;
 mod family;
 mod fault;
 mod finite;
+mod names;
 mod nearest;
 mod place;
 mod result_text;
@@ -26,10 +27,11 @@ use entry::Member;
 pub use entry::{Entry, Prepared, ResultNotes, Schemas, UnreadableResult};
 
 pub(crate) use canonical::canonical;
-pub(crate) use checker::{Faults, by_pointer, child};
+pub(crate) use checker::{Checker, Faults, by_pointer, child};
 pub(crate) use entry::{Calculation, Job, ModelUse, Unprepared, second_line};
 pub(crate) use fault::{cut_short_at, intern as interned};
 pub(crate) use finite::non_finite_place;
+pub(crate) use names::takes as takes_names;
 pub(crate) use nearest::nearest;
 #[cfg(test)]
 pub(crate) use place::FreeColumns;
@@ -45,7 +47,8 @@ use precut_calc::calculator::{Calculator, Diagnosable, ForwardModel, Registrar};
 use utoipa::openapi::{RefOr, Schema};
 
 /// Names under `/v1/` that the service itself uses: no calculator may have one of them.
-pub const RESERVED: [&str; 6] = ["jobs", "results", "studies", "models", "materials", "calculators"];
+pub const RESERVED: [&str; 9] =
+    ["jobs", "results", "studies", "models", "machines", "tools", "materials", "library", "calculators"];
 
 /// Every calculator, in the order in which they are offered. Cheap to clone.
 #[derive(Clone)]
@@ -113,12 +116,14 @@ impl Registry {
                 return Err(RegistryError::Twice(id));
             }
         }
-        if cfg!(debug_assertions) {
-            // Contracts are the same in every build of the same types: those that are tested are in order.
-            let mut components = BTreeMap::new();
-            entries.iter().try_for_each(|entry| entry.verify(&mut components))?;
-        }
         Ok(Self { entries: Arc::new(entries.into_iter().map(Arc::new).collect()), by_id: Arc::new(by_id) })
+    }
+
+    /// Makes everything that is made on demand of the contracts, and says whether it fits together. A test does this: contracts
+    /// follow from types alone, and it takes most of a second in a debug build.
+    pub fn verify(&self) -> Result<(), RegistryError> {
+        let mut components = schema::Components::new();
+        self.entries.iter().try_for_each(|entry| entry.verify(&mut components))
     }
 
     /// All of them.

@@ -1,11 +1,10 @@
 //! Where a request belongs in a trace (W3C Trace Context), and the export of what is done for it (OpenTelemetry).
 //!
-//! A client's `traceparent` goes with the job into the store and from there to whoever computes it and to whoever is told of
-//! its end. Where spans are exported, each of these is a span of its own and the next one's parent; where they are not,
-//! the client's own is passed on as it came.
+//! A client's `traceparent` and `tracestate` go with the job into the store and from there to whoever computes it and to
+//! whoever is told of its end. Where spans are exported, each of these is a span of its own and the next one's parent; where
+//! they are not, the client's own is passed on as it came.
 
 use std::fmt;
-use std::str::FromStr;
 use std::time::Duration;
 
 use futures_util::future::BoxFuture;
@@ -31,76 +30,77 @@ use crate::outward::{Fault, Outward, Reach};
 /// A batch of spans has to be taken within this time.
 const TIMEOUT: Duration = Duration::from_secs(10);
 
-/// This is no `traceparent`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("a traceparent is 00-<32 hexadecimal digits>-<16 hexadecimal digits>-<2 hexadecimal digits>")]
-pub(crate) struct BadTraceparent;
+/// Most that is kept of a `tracestate`, bytes: so much has to be passed on (W3C Trace Context, section 3.3.1.5).
+const MOST_STATE: usize = 512;
+/// Where it has more, entries longer than this go first.
+const LONG_ENTRY: usize = 128;
 
-/// A place in a trace.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Traceparent {
-    trace: u128,
-    parent: u64,
-    flags: u8,
-}
+/// Where something belongs in a trace, and what the systems on the trace's way say of it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct TraceContext(SpanContext);
 
-impl Traceparent {
-    /// The trace that it belongs to.
-    pub(crate) fn trace(self) -> impl fmt::Display {
-        TraceId::from(self.trace)
-    }
-
-    fn of_context(context: &SpanContext) -> Option<Self> {
-        context.is_valid().then(|| Self {
-            trace: u128::from_be_bytes(context.trace_id().to_bytes()),
-            parent: u64::from_be_bytes(context.span_id().to_bytes()),
-            flags: context.trace_flags().to_u8(),
-        })
-    }
-
-    fn context(self) -> SpanContext {
-        let (trace, parent) = (TraceId::from(self.trace), SpanId::from(self.parent));
-        SpanContext::new(trace, parent, TraceFlags::new(self.flags), true, TraceState::NONE)
-    }
-}
-
-impl FromStr for Traceparent {
-    type Err = BadTraceparent;
-    fn from_str(text: &str) -> Result<Self, BadTraceparent> {
-        let parts: Vec<&str> = text.splitn(5, '-').collect();
-        let [version, trace, parent, flags, ref more @ ..] = parts[..] else { return Err(BadTraceparent) };
+impl TraceContext {
+    /// What two headers say. Without a `traceparent` that is one there is nothing; a `tracestate` that is none counts as
+    /// not given, and so does an empty one.
+    pub(crate) fn read(traceparent: &str, tracestate: &str) -> Option<Self> {
+        let parts: Vec<&str> = traceparent.splitn(5, '-').collect();
+        let [version, trace, parent, flags, ref more @ ..] = parts[..] else { return None };
         let is_hex = |part: &str, digits| {
             part.len() == digits && part.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'))
         };
         let is_whole = is_hex(version, 2) && is_hex(trace, 32) && is_hex(parent, 16) && is_hex(flags, 2);
         // Later versions may have more behind it.
         if !is_whole || version == "ff" || (version == "00" && !more.is_empty()) {
-            return Err(BadTraceparent);
+            return None;
         }
-        let read = Self {
-            trace: u128::from_str_radix(trace, 16).map_err(|_| BadTraceparent)?,
-            parent: u64::from_str_radix(parent, 16).map_err(|_| BadTraceparent)?,
-            flags: u8::from_str_radix(flags, 16).map_err(|_| BadTraceparent)?,
-        };
-        if read.trace == 0 || read.parent == 0 { Err(BadTraceparent) } else { Ok(read) }
+        let (trace, parent) = (TraceId::from_hex(trace).ok()?, SpanId::from_hex(parent).ok()?);
+        let flags = TraceFlags::new(u8::from_str_radix(flags, 16).ok()?);
+        let context = SpanContext::new(trace, parent, flags, true, state(tracestate));
+        context.is_valid().then_some(Self(context))
+    }
+
+    /// What is on record of a job.
+    pub(crate) fn of_record(traceparent: Option<&str>, tracestate: Option<&str>) -> Option<Self> {
+        Self::read(traceparent?, tracestate.unwrap_or_default())
+    }
+
+    /// The trace that it belongs to.
+    pub(crate) fn trace(&self) -> TraceId {
+        self.0.trace_id()
+    }
+
+    /// As a header.
+    pub(crate) fn traceparent(&self) -> String {
+        format!("00-{}-{}-{:02x}", self.0.trace_id(), self.0.span_id(), self.0.trace_flags())
+    }
+
+    /// As a header, if there is anything to say.
+    pub(crate) fn tracestate(&self) -> Option<String> {
+        Some(self.0.trace_state().header()).filter(|text| !text.is_empty())
     }
 }
 
-impl fmt::Display for Traceparent {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "00-{:032x}-{:016x}-{:02x}", self.trace, self.parent, self.flags)
+/// A `tracestate` of 32 entries and [`MOST_STATE`] bytes at most.
+fn state(text: &str) -> TraceState {
+    let text = text.parse().map(|state: TraceState| state.header()).unwrap_or_default();
+    let mut entries: Vec<&str> = text.split(',').collect();
+    while entries.iter().map(|entry| entry.len() + 1).sum::<usize>() > MOST_STATE + 1 {
+        let last_long = entries.iter().rposition(|entry| entry.len() > LONG_ENTRY);
+        entries.remove(last_long.unwrap_or(entries.len() - 1));
     }
+    entries.join(",").parse().unwrap_or_default()
 }
 
 /// From now on a span belongs there.
-pub(crate) fn follow(span: &Span, parent: Traceparent) {
+pub(crate) fn follow(span: &Span, parent: &TraceContext) {
     // Fails only where spans are not exported.
-    let _ = span.set_parent(Context::new().with_remote_span_context(parent.context()));
+    let _ = span.set_parent(Context::new().with_remote_span_context(parent.0.clone()));
 }
 
 /// The place of a span whose parent was given: its own where spans are exported, else the parent's.
-pub(crate) fn place_of(span: &Span, given: Option<Traceparent>) -> Option<Traceparent> {
-    Traceparent::of_context(span.context().span().span_context()).or(given)
+pub(crate) fn place_of(span: &Span, given: Option<TraceContext>) -> Option<TraceContext> {
+    let own = span.context().span().span_context().clone();
+    if own.is_valid() { Some(TraceContext(own)) } else { given }
 }
 
 /// Exports spans; what is left is sent when it is ended.
@@ -187,15 +187,16 @@ impl HttpClient for Client {
 mod tests {
     use super::*;
 
+    const PARENT: &str = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01";
+
     #[test]
     fn a_traceparent_is_read_as_the_standard_has_it() {
-        let text = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01";
-        let read: Traceparent = text.parse().unwrap();
-        assert_eq!(read.to_string(), text);
+        let read = TraceContext::read(PARENT, "").unwrap();
+        assert_eq!((read.traceparent().as_str(), read.tracestate()), (PARENT, None));
         assert_eq!(read.trace().to_string(), "4bf92f3577b34da6a3ce929d0e0e4736");
         // A later version may say more; what is known of it is taken.
-        let later: Traceparent = "cc-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01-what".parse().unwrap();
-        assert_eq!(later, read);
+        let later = "cc-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01-what";
+        assert_eq!(TraceContext::read(later, ""), Some(read));
         for bad in [
             "",
             "00",
@@ -208,7 +209,31 @@ mod tests {
             "ff-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01",
             "00-+bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01",
         ] {
-            assert_eq!(bad.parse::<Traceparent>(), Err(BadTraceparent), "{bad}");
+            assert_eq!(TraceContext::read(bad, "a=1"), None, "{bad}");
         }
+    }
+
+    #[test]
+    fn a_tracestate_is_kept_within_its_bounds() {
+        let kept = |text: &str| TraceContext::read(PARENT, text).unwrap().tracestate();
+        assert_eq!(
+            kept(" rojo=00f067aa0ba902b7,\tcongo@x=t61 ,,").as_deref(),
+            Some("rojo=00f067aa0ba902b7,congo@x=t61")
+        );
+        for none in ["", ",", "nothing", "A=1", "a=b=c", "a=1,b"] {
+            assert_eq!(kept(none), None, "{none}");
+        }
+        // Of more than 32 entries the first are kept: those who say something last stand first.
+        let entries: Vec<String> = (0..40).map(|number| format!("k{number}={number}")).collect();
+        assert_eq!(kept(&entries.join(",")), Some(entries[..32].join(",")));
+        // Of too many bytes the long entries go first, the last of them before the others; then the last of all.
+        let entry = |name: &str, bytes: usize| format!("{name}={}", "x".repeat(bytes - name.len() - 1));
+        let (long, short) = (|name| entry(name, 200), |name| entry(name, 100));
+        let all = [long("a"), short("b"), long("c"), short("d"), long("e")];
+        assert_eq!(kept(&all.join(",")), Some([long("a"), short("b"), short("d")].join(",")));
+        let all: Vec<String> = ["a", "b", "c", "d", "e", "f"].map(short).to_vec();
+        assert_eq!(kept(&all.join(",")), Some(all[..5].join(",")));
+        let full = [entry("a", 100), entry("b", 100), entry("c", 100), entry("d", 100), entry("e", 108)].join(",");
+        assert_eq!((full.len(), kept(&full)), (MOST_STATE, Some(full.clone())));
     }
 }

@@ -46,6 +46,6 @@ fn run(work: impl Future<Output = Result<Contents, BackupError>>) -> Result<Cont
 }
 
 fn told(what: &str, contents: Contents) -> Result<(), Failed> {
-    let Contents { jobs, results, models, bytes } = contents;
-    print(format!("{what}: {jobs} jobs, {results} results, {models} revisions of models, {bytes} bytes\n").as_bytes())
+    let Contents { jobs, results, documents, bytes } = contents;
+    print(format!("{what}: {jobs} jobs, {results} results, {documents} revisions of models and library records, {bytes} bytes\n").as_bytes())
 }

@@ -12,7 +12,8 @@ use serde_json::value::RawValue;
 
 use super::{Failed, JobArgs, SolveArgs, entry, print, print_json};
 use crate::engine::{
-    Body, Error, GivenModel, ModelFile, NoShelf, STUDIES, SyntaxFault, TablePart, check_with, solve_with,
+    Body, Error, Form as FileForm, Given, Library, ModelFile, NotGiven, STUDIES, SyntaxFault, TablePart, check_with,
+    solve_with,
 };
 use crate::http::{Media, Problem, written};
 use crate::registry::{Entry, Registry};
@@ -50,13 +51,13 @@ impl From<Form> for Media {
 
 /// `precut solve`
 pub(super) fn solve(arguments: &SolveArgs, registry: &Registry, language: Language) -> Result<(), Failed> {
-    let (calculator, body, model) = read(&arguments.job, registry)?;
+    let (calculator, body, given) = read(&arguments.job, registry)?;
     let part = match arguments.format {
         Form::Csv => arguments.table.as_deref(),
         Form::Svg => arguments.figure.as_deref(),
         Form::Json | Form::Gcode | Form::Xlsx | Form::Pdf => None,
     };
-    let stored = solve_with(registry, &calculator, body, &model, &Unwatched)?;
+    let stored = solve_with(registry, &calculator, body, &given, &Unwatched)?;
     let bytes = written(&stored, arguments.format.into(), part, language)?;
     match &arguments.output {
         Some(path) => std::fs::write(path, &bytes).map_err(|error| Failed::Machine(named(path, &error))),
@@ -68,8 +69,8 @@ pub(super) fn solve(arguments: &SolveArgs, registry: &Registry, language: Langua
 
 /// `precut check`
 pub(super) fn check(arguments: &JobArgs, registry: &Registry) -> Result<(), Failed> {
-    let (calculator, body, model) = read(arguments, registry)?;
-    let checked = check_with(registry, &calculator, body, &model)?;
+    let (calculator, body, given) = read(arguments, registry)?;
+    let checked = check_with(registry, &calculator, body, &given)?;
     print_json(&json!({
         "calculator": calculator,
         "key": checked.key.to_string(),
@@ -98,8 +99,8 @@ pub(super) fn example(entry: &Entry, id: Option<&str>, bare: bool) -> Result<(),
     }
 }
 
-/// The calculator's name, the job with its tables, and the model that it takes.
-fn read(arguments: &JobArgs, registry: &Registry) -> Result<(String, Body, GivenModel), Failed> {
+/// The calculator's name, the job with its tables, and what its names mean.
+fn read(arguments: &JobArgs, registry: &Registry) -> Result<(String, Body, Given), Failed> {
     let bytes = if arguments.file.as_os_str() == "-" {
         if io::stdin().is_terminal() {
             eprintln!("reading the job from standard input; end it with Ctrl-D");
@@ -121,22 +122,30 @@ fn read(arguments: &JobArgs, registry: &Registry) -> Result<(String, Body, Given
         let tables = arguments.measured.iter().map(|given| table(given, &calculator, &names));
         Body::Parts { job, tables: tables.collect::<Result<_, _>>()? }
     };
-    let model = match (&arguments.model, &arguments.data) {
-        (Some(file), _) => GivenModel::File(model_file(file, registry)?),
-        (None, Some(folder)) => stored_model(registry, &calculator, &body, folder)?,
-        (None, None) => GivenModel::None,
-    };
-    Ok((calculator, body, model))
+    let model = arguments.model.as_ref().map(|file| model_file(file, registry)).transpose()?;
+    let library = arguments.library.as_ref().map(|file| library_file(file)).transpose()?;
+    let mut given = Given { model, library, ..Given::default() };
+    if let Some(folder) = &arguments.data {
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+        let runtime = runtime.map_err(|error| Failed::Machine(format!("the threads cannot be started: {error}")))?;
+        let looked = runtime.block_on(given.look_up(registry, (&calculator, &body), folder));
+        looked.map_err(|error| match error {
+            NotGiven::Folder(error) => Failed::Machine(error.to_string()),
+            NotGiven::Asked(error) => error.into(),
+        })?;
+    }
+    Ok((calculator, body, given))
 }
 
-/// The model that the job names, from the database of a data folder.
-fn stored_model(registry: &Registry, calculator: &str, body: &Body, folder: &Path) -> Result<GivenModel, Failed> {
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
-    let runtime = runtime.map_err(|error| Failed::Machine(format!("the threads cannot be started: {error}")))?;
-    runtime.block_on(GivenModel::stored(registry, calculator, body, folder)).map_err(|error| match error {
-        NoShelf::Folder(error) => Failed::Machine(error.to_string()),
-        NoShelf::Asked(error) => error.into(),
-    })
+/// Own records of a file, by how its name ends.
+pub(super) fn library_file(path: &Path) -> Result<Library, Failed> {
+    let bytes = std::fs::read(path).map_err(|error| Failed::Machine(named(path, &error)))?;
+    let form = match path.extension().and_then(|end| end.to_str()) {
+        Some("toml") => FileForm::Toml,
+        Some("csv") => FileForm::Csv,
+        _ => FileForm::Json,
+    };
+    Ok(Library::read(form, &bytes).map_err(Problem::from)?)
 }
 
 /// A model as `GET /v1/models/{name}` gave it.

@@ -3,6 +3,7 @@
 mod backup;
 mod health;
 mod job;
+mod library;
 mod serve;
 
 use std::ffi::OsString;
@@ -13,6 +14,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::{Args, Parser, Subcommand};
+use precut_library::Kind;
 
 use crate::config::Flags;
 use crate::engine::{Engine, Error, Isolation, STUDIES, studies_of};
@@ -32,6 +34,9 @@ Examples:
   precut solve diag.json --measured shaft.csv     what was measured, from a file beside the job
   precut solve job.json --model lathe-7.json      with the causes that a diagnosis found
   precut solve job.json --data ./data             the same by the name in the job, from the service's database
+  precut materials 4140                           what a material brings along, by any of its names
+  precut tools --search DNMG                      which tools are known
+  precut solve job.json --library ours.toml       with machines and tools of one's own
   precut check job.json                           every fault of a job at once
   precut solve job.json --lang ru                 the same in Russian
   precut example studies | precut solve - --format csv
@@ -72,6 +77,12 @@ enum Command {
     Check(JobArgs),
     /// List the calculators with their questions
     List,
+    /// List the machines that a job may name, or show one
+    Machines(library::RecordArgs),
+    /// List the tools that a job may name, or show one; a designation shows what it says
+    Tools(library::RecordArgs),
+    /// List the materials that a job may name, or show one
+    Materials(library::RecordArgs),
     /// Print the JSON Schema of a calculator's job
     Schema {
         /// Name of the calculator, or `studies`
@@ -141,7 +152,10 @@ struct JobArgs {
     /// Stored model that extends the job, as `GET /v1/models/NAME` exported it; the job may name it
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// Data folder that has the stored model which the job names; a service may be using it
+    /// File with machines, tools and materials of your own (JSON, TOML or CSV), which the job may name
+    #[arg(long, value_name = "FILE", conflicts_with = "data")]
+    library: Option<PathBuf>,
+    /// Data folder that has the stored model, machine, tool and material which the job names; a service may be using it
     #[arg(long, value_name = "DIR", conflicts_with = "model")]
     data: Option<PathBuf>,
 }
@@ -252,7 +266,7 @@ pub fn main_as(
 /// As the help says.
 fn exit_code(problem: &Problem) -> u8 {
     match (problem.status().as_u16(), problem.code()) {
-        (422, "invalid_job" | "invalid_model" | "too_expensive") => 2,
+        (422, "invalid_job" | "invalid_model" | "invalid_record" | "too_expensive") => 2,
         (422, _) => 3,
         (400..=499, _) => 2,
         _ => 1,
@@ -267,6 +281,9 @@ fn run(cli: Cli, registry: &Registry, isolation: Option<Isolation>) -> Result<()
         Some(Command::Solve(solve)) => job::solve(&solve, registry, language),
         Some(Command::Check(job)) => job::check(&job, registry),
         Some(Command::List) => list(registry, language),
+        Some(Command::Machines(records)) => library::show(Kind::Machine, &records, language),
+        Some(Command::Tools(records)) => library::show(Kind::Tool, &records, language),
+        Some(Command::Materials(records)) => library::show(Kind::Material, &records, language),
         Some(Command::Schema { calculator, result }) => {
             let entry = entry(registry, &calculator)?;
             let document = if result { entry.output_document() } else { entry.input_document() };

@@ -1,14 +1,15 @@
 //! A job on its way in, an answer on its way out.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 use std::time::Duration;
 
 use bytes::Bytes;
-use precut_calc::calculator::{Cost, Figure, Program, Table};
+use precut_calc::calculator::{Cost, Figure, Place, Program, Table};
 use serde_json::Value;
 
 use super::error::Error;
-use super::model;
+use super::{model, names};
 use crate::key::{ENGINE_VERSION, Key};
 use crate::registry::{Entry, UnreadableResult};
 use crate::store::{KeptResult, StoreError};
@@ -145,26 +146,65 @@ impl Stored {
             body: self.body.clone(),
         }
     }
+    /// The filled job as its calculator has it.
+    fn own_input(&self) -> Vec<u8> {
+        let input = names::without_drawn(&self.input);
+        model::without_model(&self.entry, &input).into_owned()
+    }
+    /// The filled job as it may be sent again: without what it got from records beside its numbers.
+    pub fn job(&self) -> Cow<'_, [u8]> {
+        names::without_drawn(&self.input)
+    }
     /// Its pictures; the first is the main one.
     pub fn figures(&self) -> Result<Vec<Figure>, Error> {
-        self.entry.figures(&model::without_model(&self.entry, &self.input), &self.body).map_err(outdated)
+        self.entry.figures(&self.own_input(), &self.body).map_err(outdated)
     }
     /// Its tables; the first is the main one.
     pub fn tables(&self) -> Result<Vec<Table>, Error> {
-        self.entry.result_tables(&model::without_model(&self.entry, &self.input), &self.body).map_err(outdated)
+        self.entry.result_tables(&self.own_input(), &self.body).map_err(outdated)
     }
     /// The same with what stands in them as sentences in that language.
     pub fn tables_in(&self, language: Language) -> Result<Vec<Table>, Error> {
         let body = self.body_in(language);
-        self.entry.result_tables(&model::without_model(&self.entry, &self.input), &body).map_err(outdated)
+        self.entry.result_tables(&self.own_input(), &body).map_err(outdated)
+    }
+    /// Its job with what changes where a setting of a picture is put at another place; as it is where no job stands there.
+    pub fn job_at(&self, place: &Place<'_>) -> Result<Value, Error> {
+        let unreadable = |error: serde_json::Error| outdated(UnreadableResult(error.to_string()));
+        let mut job: Value = serde_json::from_slice(&self.job()).map_err(unreadable)?;
+        let moved = self.entry.at_place(&self.own_input(), &self.body, place);
+        if let Some(moved) = moved.map_err(outdated)? {
+            change(&mut job, &moved.before, &moved.after);
+        }
+        Ok(job)
     }
     /// Its program for the machine: `None` if the calculator has none, `Err` if this answer has none.
     pub fn program(&self) -> Result<Option<Program>, Error> {
-        self.entry
-            .program(&model::without_model(&self.entry, &self.input), &self.body)
-            .map_err(outdated)?
-            .transpose()
-            .map_err(Error::Calculation)
+        self.entry.program(&self.own_input(), &self.body).map_err(outdated)?.transpose().map_err(Error::Calculation)
+    }
+}
+
+/// Changes in a value what differs between two others of its shape.
+fn change(value: &mut Value, before: &Value, after: &Value) {
+    match (value, before, after) {
+        (_, before, after) if before == after => {}
+        (Value::Object(fields), Value::Object(before), Value::Object(after)) => {
+            fields.retain(|name, _| after.contains_key(name) || !before.contains_key(name));
+            for (name, after) in after {
+                match (fields.get_mut(name), before.get(name)) {
+                    (Some(field), Some(before)) => change(field, before, after),
+                    _ => drop(fields.insert(name.clone(), after.clone())),
+                }
+            }
+        }
+        (Value::Array(items), Value::Array(before), Value::Array(after))
+            if items.len() == after.len() && before.len() == after.len() =>
+        {
+            for ((item, before), after) in items.iter_mut().zip(before).zip(after) {
+                change(item, before, after);
+            }
+        }
+        (value, _, after) => *value = after.clone(),
     }
 }
 

@@ -23,6 +23,10 @@ pub(crate) fn write(ready: &Ready, monitor: &dyn Monitor) -> Result<Vec<u8>, Fai
     ready.write_echo(&mut body)?;
     let effects = json::top_level_field(&body[begin..], "effects").map(|place| begin + place.start..begin + place.end);
     field(&mut body, "model", &ready.model)?;
+    if let Some(drawn) = &ready.drawn {
+        field(&mut body, "resources", &drawn.resources)?;
+        field(&mut body, "origins", &drawn.origins)?;
+    }
     name(&mut body, "effects");
     match effects {
         Some(effects) => body.extend_from_within(effects),
@@ -30,8 +34,12 @@ pub(crate) fn write(ready: &Ready, monitor: &dyn Monitor) -> Result<Vec<u8>, Fai
     }
     name(&mut body, "result");
     let begin = body.len();
-    let ResultNotes { warnings, mut explanation, basis } = ready.prepared.run(monitor, &mut body)?;
+    let ResultNotes { mut warnings, mut explanation, basis } = ready.prepared.run(monitor, &mut body)?;
     explanation.extend(model::changes(ready, &body[begin..], monitor)?);
+    if let Some(drawn) = &ready.drawn {
+        explanation.extend(drawn.explanation.iter().cloned());
+        warnings.extend(drawn.warnings.iter().cloned());
+    }
     let texts = Texts::shared();
     let explanation: Vec<Remark> = explanation.iter().map(|message| texts.remark(Language::En, message)).collect();
     let warnings: Vec<Notice> = warnings.iter().map(|finding| texts.notice(Language::En, "warning", finding)).collect();

@@ -6,7 +6,7 @@ use precut_calc::calculator::Failure;
 use quick_cache::Weighter;
 use quick_cache::sync::Cache;
 
-use super::{Body, Stored};
+use super::{Body, Shelf, Stored};
 use crate::key::Key;
 
 /// What a job of some key comes to: always the same.
@@ -30,13 +30,21 @@ impl Weighter<Key, Kept> for Bytes {
     }
 }
 
-/// So many bodies are recognised without being read; 64 bytes each.
+/// What a body meant.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Known {
+    pub(crate) key: Key,
+    /// Where it names what may be revised: since which change that was so.
+    pub(crate) generation: Option<u64>,
+}
+
+/// So many bodies are recognised without being read; 80 bytes each.
 const RECOGNISED: usize = 16_384;
 
 /// The memory tier.
 pub(crate) struct Memory {
     kept: Cache<Key, Kept, Bytes>,
-    recognised: Cache<[u8; 32], Key>,
+    recognised: Cache<[u8; 32], Known>,
 }
 
 impl Memory {
@@ -53,21 +61,22 @@ impl Memory {
     pub(crate) fn keep(&self, key: Key, kept: Kept) {
         self.kept.insert(key, kept);
     }
-    /// The key of a body that was read before, by its fingerprint.
-    pub(crate) fn recognise(&self, fingerprint: &[u8; 32]) -> Option<Key> {
+    /// What a body that was read before meant, by its fingerprint.
+    pub(crate) fn recognise(&self, fingerprint: &[u8; 32]) -> Option<Known> {
         self.recognised.get(fingerprint)
     }
-    pub(crate) fn remember(&self, fingerprint: [u8; 32], key: Key) {
-        self.recognised.insert(fingerprint, key);
+    pub(crate) fn remember(&self, fingerprint: [u8; 32], known: Known) {
+        self.recognised.insert(fingerprint, known);
     }
 }
 
-/// Hash of a body as it came, for one calculator: equal bytes mean an equal job.
-pub(crate) fn fingerprint(calculator: &str, body: &Body) -> [u8; 32] {
-    fingerprint_with(calculator, body, None)
+/// Hash of a body as it came, for one calculator, from whoever has these names: equal bytes mean an equal job, as long as no
+/// name comes to mean something else.
+pub(crate) fn fingerprint_on(calculator: &str, body: &Body, shelf: &Shelf) -> [u8; 32] {
+    fingerprint_with(calculator, body, Some(&shelf.prefix()))
 }
 
-/// The same of a request that says who is told of its end.
+/// The same of a request that says something beside its body: who is told of its end.
 pub(crate) fn fingerprint_with(calculator: &str, body: &Body, told: Option<&str>) -> [u8; 32] {
     let mut hasher = blake3::Hasher::new();
     let mut part = |bytes: &[u8]| {

@@ -13,12 +13,15 @@ mod envelope;
 mod error;
 mod exec;
 mod flight;
+mod generation;
 mod headings;
 pub(crate) mod jobs;
 mod json;
+pub(crate) mod library;
 mod memory;
 mod model;
 mod models;
+mod names;
 mod progress;
 mod quota;
 mod read;
@@ -38,8 +41,13 @@ pub use compare::{ModelComparison, Sides};
 pub use error::{Error, SyntaxFault};
 pub use jobs::{Answered, Ask, Feed, Isolation, Job};
 pub(crate) use json::top_level_field;
+pub use library::{
+    FieldComparison, Form, ImportReport, Imported, RecordAnswer, RecordComparison, RecordError, RecordHead, RecordPage,
+    RecordQuery, StoredRecord,
+};
 pub use model::ModelContent;
-pub use models::{GivenModel, ModelAnswer, ModelError, ModelFile, ModelSource, NoShelf, OnShelf, Shelf, StoredModel};
+pub use models::{ModelAnswer, ModelError, ModelFile, ModelSource, Shelf, StoredModel};
+pub use names::{Given, Library, NotGiven};
 pub use progress::Interim;
 pub use quota::{Share, Standing};
 pub use settings::EngineSettings;
@@ -55,18 +63,19 @@ use precut_calc::calculator::{Cost, Failure, Monitor};
 use tokio::runtime::Handle;
 
 use crate::registry::{Entry, Registry};
+use crate::store::documents::DocumentStore;
 use crate::store::jobs::JobStore;
-use crate::store::models::ModelStore;
 use crate::store::{Origin, ResultPage, ResultQuery, ResultStore, Store};
 use asked::Asked;
 use budget::{Budget, Room, paid_beside};
 use exec::{Cores, Slot, guarded};
 use flight::{Boarded, Flights, Landed, Pilot};
+use generation::Generation;
 use jobs::Jobs;
-use memory::{Kept, Memory, fingerprint};
-use model::Models;
+use memory::{Kept, Known as Recognised, Memory, fingerprint_on};
+use names::{Asks, Names, Remembered};
 use quota::Unwritten;
-use read::Ready;
+use read::{Draft, Ready};
 use summary::Summaries;
 
 /// Bodies up to this size are read where they arrive, larger ones on the pool: about 1 ms of reading.
@@ -88,7 +97,11 @@ pub(crate) struct Inner {
     flights: Arc<Flights>,
     cores: Cores,
     store: Arc<dyn ResultStore>,
-    models: Arc<dyn ModelStore>,
+    documents: Arc<dyn DocumentStore>,
+    /// Counts changes of documents.
+    generation: Arc<Generation>,
+    /// Records and indices that were looked up lately.
+    remembered: Remembered,
     jobs: Jobs,
     /// Parameter studies: asked like a calculator, made of the registry's.
     studies: Arc<Entry>,
@@ -112,15 +125,15 @@ impl Engine {
     /// Opens the store in the settings' folder and starts the threads.
     pub async fn open(registry: Registry, settings: EngineSettings) -> Result<Self, OpenError> {
         let store = crate::store::open(&settings.store_settings()).await?;
-        let (results, models) = (Arc::<dyn Store>::clone(&store), Arc::<dyn Store>::clone(&store));
-        Self::with_stores(registry, settings, results, models, store).await
+        let (results, documents) = (Arc::<dyn Store>::clone(&store), Arc::<dyn Store>::clone(&store));
+        Self::with_stores(registry, settings, results, documents, store).await
     }
 
     async fn with_stores(
         registry: Registry,
         settings: EngineSettings,
         store: Arc<dyn ResultStore>,
-        models: Arc<dyn ModelStore>,
+        documents: Arc<dyn DocumentStore>,
         jobs: Arc<dyn JobStore>,
     ) -> Result<Self, OpenError> {
         let cores = Cores::new(settings.cores, settings.job_slots, settings.patience)
@@ -139,7 +152,9 @@ impl Engine {
             flights,
             cores,
             store,
-            models,
+            documents,
+            generation: Arc::default(),
+            remembered: Remembered::default(),
             jobs,
             studies,
             summaries,
@@ -193,16 +208,17 @@ impl Engine {
         }
         let entry = inner.known(calculator)?;
         let begun = Instant::now();
-        let fingerprint = fingerprint(entry.meta().id, body);
-        if let Some(key) = inner.memory.recognise(&fingerprint)
-            && let Some(kept) = inner.look_up(&key).await
+        let fingerprint = fingerprint_on(entry.meta().id, body, shelf);
+        if let Some(known) = inner.memory.recognise(&fingerprint)
+            && inner.still_means(known.generation).await
+            && let Some(kept) = inner.look_up(&known.key).await
         {
             return Ok(Known::Kept(kept, begun.elapsed()));
         }
+        let generation = inner.generation.number();
         let ready = inner.read(&entry, body.clone(), shelf).await?;
-        if ready.lasts {
-            inner.memory.remember(fingerprint, ready.key);
-        }
+        let generation = ready.names_any.then_some(generation);
+        inner.memory.remember(fingerprint, Recognised { key: ready.key, generation });
         let parse = begun.elapsed();
         Ok(match inner.look_up(&ready.key).await {
             Some(kept) => Known::Kept(kept, parse),
@@ -335,10 +351,11 @@ impl Inner {
 
     /// Reads a job where that does no harm.
     async fn read(self: &Arc<Self>, entry: &Arc<Entry>, body: Body, shelf: &Shelf) -> Result<Ready, Error> {
+        let room = self.room_for(&body);
         if body.len() <= READ_AT_ONCE && !entry.is_composed() {
-            let found = self.find_model(shelf, entry, &body).await?;
-            let models = Models { registry: &self.registry, found, room: self.room_for(&body) };
-            return guarded(|| read::read(entry, &body, &models));
+            let mut draft = guarded(|| Draft::of(entry, &body, (&self.registry, &room)))?;
+            let found = self.find(shelf, &draft.asks(&self.registry, entry)).await?;
+            return guarded(|| draft.read(entry, &body, &Names { registry: &self.registry, found, room }));
         }
         let slot = match self.cores.slot_now()? {
             Some(slot) => slot,
@@ -346,12 +363,17 @@ impl Inner {
         };
         let (this, entry, shelf, runtime) = (Arc::clone(self), Arc::clone(entry), shelf.clone(), Handle::current());
         let work = move || {
-            // The name of a model stands anywhere in the job. A thread of the pool may wait for the store.
-            let found = runtime.block_on(this.find_model(&shelf, &entry, &body))?;
-            let room = this.room_for(&body);
-            read::read(&entry, &body, &Models { registry: &this.registry, found, room })
+            let mut draft = Draft::of(&entry, &body, (&this.registry, &room))?;
+            // Names stand anywhere in the job. A thread of the pool may wait for the store.
+            let found = runtime.block_on(this.find(&shelf, &draft.asks(&this.registry, &entry)))?;
+            draft.read(&entry, &body, &Names { registry: &this.registry, found, room })
         };
         slot.run(work).await
+    }
+
+    /// What is known of the names of a job.
+    async fn find(&self, shelf: &Shelf, asks: &Asks) -> Result<names::Found, Error> {
+        if asks.is_empty() { Ok(names::Found::default()) } else { self.finder(shelf).await?.all(asks).await }
     }
 
     /// What is kept under a key, in memory or in the store. A store that fails is as good as an empty one here.
@@ -474,6 +496,11 @@ fn hit(kept: Kept, parse: Duration) -> Result<Solved, Error> {
     Ok(Solved { stored: outcome(kept)?, cache: CacheState::Hit, timings })
 }
 
+/// A body as JSON, whatever it is.
+pub(crate) fn parsed(body: &[u8]) -> Result<serde_json::Value, Error> {
+    json::parse(body)
+}
+
 /// What is asked under a name, without an engine.
 fn entry(registry: &Registry, calculator: &str) -> Result<Arc<Entry>, Error> {
     if calculator == STUDIES {
@@ -507,36 +534,31 @@ fn compute(ready: &Ready, monitor: &dyn Monitor) -> Result<Stored, Error> {
 /// Everything but the calculation, without an engine.
 #[allow(clippy::needless_pass_by_value)] // a body is handed over, here as to an engine
 pub fn check_now(registry: &Registry, calculator: &str, body: Body) -> Result<Checked, Error> {
-    check_with(registry, calculator, body, &GivenModel::None)
+    check_with(registry, calculator, body, &Given::default())
 }
 
-/// The same with a stored model.
+/// The same with what its names mean.
 #[allow(clippy::needless_pass_by_value)]
-pub fn check_with(registry: &Registry, calculator: &str, body: Body, model: &GivenModel) -> Result<Checked, Error> {
+pub fn check_with(registry: &Registry, calculator: &str, body: Body, given: &Given) -> Result<Checked, Error> {
     let entry = entry(registry, calculator)?;
-    guarded(|| with_model(registry, &entry, &body, model)?.into_checked())
-}
-
-/// Reads a job without a service.
-fn with_model(registry: &Registry, entry: &Arc<Entry>, body: &Body, model: &GivenModel) -> Result<read::Ready, Error> {
-    read::read_with(entry, body, &Models::new(registry, model.found()), model.imposed())
+    guarded(|| given.read(registry, &entry, &body)?.into_checked())
 }
 
 /// The answer to a job in this thread, without cache, store or limit of cost: for the command line.
 #[allow(clippy::needless_pass_by_value)]
 pub fn solve_now(registry: &Registry, calculator: &str, body: Body, monitor: &dyn Monitor) -> Result<Stored, Error> {
-    solve_with(registry, calculator, body, &GivenModel::None, monitor)
+    solve_with(registry, calculator, body, &Given::default(), monitor)
 }
 
-/// The same with a stored model.
+/// The same with what its names mean.
 #[allow(clippy::needless_pass_by_value)]
 pub fn solve_with(
     registry: &Registry,
     calculator: &str,
     body: Body,
-    model: &GivenModel,
+    given: &Given,
     monitor: &dyn Monitor,
 ) -> Result<Stored, Error> {
     let entry = entry(registry, calculator)?;
-    guarded(|| compute(&with_model(registry, &entry, &body, model)?, monitor))
+    guarded(|| compute(&given.read(registry, &entry, &body)?, monitor))
 }

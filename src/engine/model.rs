@@ -11,10 +11,10 @@ use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
 
 use super::Quiet;
-use super::budget::Room;
+use super::names::Found;
 use super::read::Ready;
 use crate::registry::{Entry, ModelUse, Prepared, Registry, canonical, child, nearest, way};
-use crate::store::models::KeptModel;
+use crate::store::documents::KeptDocument;
 use crate::text::significant;
 
 /// The field of a job that names a model.
@@ -56,7 +56,7 @@ impl ModelContent {
         let bytes = canonical(self).expect("effects and provenance came as JSON");
         String::from_utf8(bytes).expect("JSON is UTF-8")
     }
-    pub(crate) fn read(kept: &KeptModel) -> Option<Self> {
+    pub(crate) fn read(kept: &KeptDocument) -> Option<Self> {
         serde_json::from_str(&kept.content).ok()
     }
 
@@ -111,19 +111,27 @@ struct Places {
 
 /// `None` where this job cannot name one.
 fn places(registry: &Registry, entry: &Entry, job: &Value) -> Option<Places> {
-    let of_base = || job.get(CALCULATOR)?.as_str().map(str::to_owned);
-    match entry.model_use() {
-        ModelUse::None => None,
-        ModelUse::OfJob => Some(Places { model: vec![], effects: vec![], calculator: entry.meta().id.to_owned() }),
-        ModelUse::OfBase => Some(Places { model: vec![], effects: vec![JOB], calculator: of_base()? }),
-        ModelUse::Within => {
-            let inner = registry.entry(&of_base()?)?;
-            let mut places = places(registry, inner, job.get(JOB)?)?;
-            places.model.insert(0, JOB);
-            places.effects.insert(0, JOB);
-            Some(places)
-        }
+    if entry.model_use() != ModelUse::Within {
+        return places_in(entry, job);
     }
+    let inner = registry.entry(of_base(job)?)?;
+    let mut places = places(registry, inner, job.get(JOB)?)?;
+    places.model.insert(0, JOB);
+    places.effects.insert(0, JOB);
+    Some(places)
+}
+
+/// The same of a job that is no study.
+fn places_in(entry: &Entry, job: &Value) -> Option<Places> {
+    match entry.model_use() {
+        ModelUse::None | ModelUse::Within => None,
+        ModelUse::OfJob => Some(Places { model: vec![], effects: vec![], calculator: entry.meta().id.to_owned() }),
+        ModelUse::OfBase => Some(Places { model: vec![], effects: vec![JOB], calculator: of_base(job)?.to_owned() }),
+    }
+}
+
+fn of_base(job: &Value) -> Option<&str> {
+    job.get(CALCULATOR)?.as_str()
 }
 
 fn within<'a>(job: &'a mut Value, path: &[&str]) -> Option<&'a mut Map<String, Value>> {
@@ -141,7 +149,7 @@ pub(crate) fn named(registry: &Registry, entry: &Entry, job: &mut Value) -> Opti
 }
 
 /// Puts the name of a model into a job that names none. A fault where the job names another, or cannot name one.
-pub(crate) fn impose(registry: &Registry, entry: &Entry, job: &mut Value, given: &KeptModel) -> Option<Finding> {
+pub(crate) fn impose(registry: &Registry, entry: &Entry, job: &mut Value, given: &KeptDocument) -> Option<Finding> {
     let Some(places) = places(registry, entry, job) else {
         let finding = Finding::new("job_without_model", "").with("name", given.name.clone());
         return Some(finding.with("calculator", entry.meta().id));
@@ -167,34 +175,22 @@ pub(crate) fn impose(registry: &Registry, entry: &Entry, job: &mut Value, given:
     }
 }
 
-/// What may be asked about models while a job is read.
-pub(crate) struct Models<'a> {
-    pub(crate) registry: &'a Registry,
-    /// What the store knows of the name that the job asks for.
-    pub(crate) found: Option<Found>,
-    /// Memory for what is made of the body.
-    pub(crate) room: Room,
-}
-
-impl<'a> Models<'a> {
-    /// Without a limit of memory.
-    pub(crate) fn new(registry: &'a Registry, found: Option<Found>) -> Self {
-        Self { registry, found, room: Room::default() }
-    }
-}
-
 /// What the store knows of a name.
-#[derive(Debug, Clone)]
-pub(crate) enum Found {
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum FoundModel {
     /// This one.
-    Model(Box<KeptModel>),
+    Model(Box<KeptDocument>),
     /// None of that name; these are there.
     Unknown(Vec<String>),
 }
 
 /// Puts the effects of the model that a job names to the job's own. Faults where that cannot be.
-pub(crate) fn extend(models: &Models<'_>, entry: &Entry, job: &mut Value) -> Vec<Finding> {
-    let Some(places) = places(models.registry, entry, job) else { return Vec::new() };
+pub(crate) fn extend(registry: &Registry, found: &Found, entry: &Entry, job: &mut Value) -> Vec<Finding> {
+    extend_with(found, places(registry, entry, job), job)
+}
+
+fn extend_with(found: &Found, places: Option<Places>, job: &mut Value) -> Vec<Finding> {
+    let Some(places) = places else { return Vec::new() };
     let at = pointer(&places.model, MODEL);
     let Some(asked) = within(job, &places.model).and_then(|fields| fields.get(MODEL)).cloned() else {
         return Vec::new();
@@ -206,20 +202,20 @@ pub(crate) fn extend(models: &Models<'_>, entry: &Entry, job: &mut Value) -> Vec
     if self::asked(&name).is_none() {
         return vec![Finding::new("bad_model_name", at).with("name", name)];
     }
-    let kept = match &models.found {
-        Some(Found::Model(kept)) => kept,
-        Some(Found::Unknown(known)) => {
+    let kept = match found.model(&name) {
+        Some(FoundModel::Model(kept)) => kept,
+        Some(FoundModel::Unknown(known)) => {
             let finding = Finding::new("unknown_model", at).with("name", name.clone());
             let near = nearest(&name, known.iter().map(String::as_str)).map(str::to_owned);
             return vec![near.into_iter().fold(finding, |finding, near| finding.with("nearest", near))];
         }
         None => return vec![Finding::new("no_models_here", at).with("name", name)],
     };
-    if kept.calculator != places.calculator {
+    if kept.class != places.calculator {
         return vec![
             Finding::new("model_of_another_calculator", at)
                 .with("name", name)
-                .with("of", kept.calculator.clone())
+                .with("of", kept.class.clone())
                 .with("calculator", places.calculator),
         ];
     }
@@ -245,6 +241,16 @@ pub(crate) fn extend(models: &Models<'_>, entry: &Entry, job: &mut Value) -> Vec
             Vec::new()
         }
         Err(faults) => faults,
+    }
+}
+
+/// The same for a point of a study, whose model may be resolved already; its calculator takes the models of its own jobs, or of
+/// its base.
+pub(crate) fn extend_point(found: &Found, entry: &Entry, job: &mut Value) -> Vec<Finding> {
+    if job.get(MODEL).is_some_and(Value::is_string) {
+        extend_with(found, places_in(entry, job), job)
+    } else {
+        Vec::new()
     }
 }
 

@@ -1,33 +1,26 @@
 //! Stored models: made of what a diagnosis found, listed, read, deleted, and found for the jobs that name them.
 
-use std::path::Path;
 use std::str::FromStr;
-use std::sync::Arc;
 
 use precut_calc::calculator::Finding;
 use precut_calc::diagnosis::{JointUncertainty, ParameterMove};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::budget::Room;
 use super::compare::{self, ModelComparison};
-use super::model::{self, Found, ModelContent, UNCERTAINTY};
-use super::{Body, Engine, Error, Inner, Key, Stored, json as read_json};
-use crate::registry::{Entry, Faults, ModelUse, Registry, canonical, nearest};
-use crate::store::OpenError;
+use super::model::{self, ModelContent, UNCERTAINTY};
+use super::{Engine, Error, Inner, Key, Stored, json as read_json};
+use crate::registry::{Faults, ModelUse, Registry, canonical, nearest};
+use crate::store::documents::{Before, KeptDocument, Kind, NewDocument, NewDocuments, Placed, PutDocuments};
 use crate::store::jobs::JobId;
-use crate::store::models::{KeptModel, ModelShelf, NewModel, PutModel};
-use crate::store::sqlite_models::SqliteShelf;
 
 /// The calculator whose results can become models.
 const DIAGNOSIS: &str = "diagnosis";
-/// Names that are looked through for one like an unknown name.
-const NEAR_NAMES: u32 = 1000;
 /// Largest content of a model, bytes. What a diagnosis gives takes some thousands, and models are kept until somebody
 /// deletes them.
 const MOST_CONTENT: usize = 256 << 10;
 
-/// An owner's part of the stored models: what stands before their names in the store. Names have no slash, so that none of
+/// An owner's part of the stored models, machines, tools and materials: what stands before their names in the store. Names have no slash, so that none of
 /// one shelf is one of another.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Shelf(String);
@@ -38,14 +31,19 @@ impl Shelf {
         Self(format!("{}/", owner.replace('%', "%25").replace('/', "%2F")))
     }
 
-    fn full(&self, name: &str) -> String {
+    pub(super) fn full(&self, name: &str) -> String {
         format!("{}{name}", self.0)
     }
 
-    /// A model under the name that its owner knows.
-    fn plain(&self, kept: KeptModel) -> KeptModel {
+    /// A document under the name that its owner knows.
+    pub(super) fn plain(&self, kept: KeptDocument) -> KeptDocument {
         let name = kept.name.strip_prefix(self.0.as_str()).map(ToOwned::to_owned);
-        KeptModel { name: name.unwrap_or(kept.name.clone()), ..kept }
+        KeptDocument { name: name.unwrap_or(kept.name.clone()), ..kept }
+    }
+
+    /// What stands before the names.
+    pub(super) fn prefix(&self) -> String {
+        self.0.clone()
     }
 }
 
@@ -194,31 +192,35 @@ impl Engine {
             let finding = Finding::new("model_too_large", "").with("bytes", text.len()).with("most", MOST_CONTENT);
             return Err(ModelError::Invalid(vec![finding]));
         }
-        // Revisions go on counting after a name was deleted.
-        let is_new = inner.models.model(shelf.full(name), None).await?.is_none();
-        let new = NewModel {
+        let (bytes, sha256) = (text.len() as u64, model::sha256(&text));
+        let new = NewDocument {
+            kind: Kind::Model,
             name: shelf.full(name),
-            calculator: content.calculator.clone(),
-            sha256: model::sha256(&text),
+            class: content.calculator.clone(),
+            words: String::new(),
+            sha256: sha256.clone(),
             content: text,
-            only_new,
-            owner,
-            quota: inner.settings.quota,
         };
-        let bytes = new.content.len() as u64;
-        let kept = match inner.models.put_model(new).await? {
-            PutModel::Kept(kept) => kept,
-            PutModel::Taken => return Err(ModelError::Exists(name.to_owned())),
-            PutModel::OverQuota(usage) => return Err(inner.no_room(&usage, bytes).into()),
+        let (quota, most) = (inner.settings.quota, u64::MAX);
+        let new = NewDocuments { documents: vec![new], only_new, unless_equal: false, owner, quota, most };
+        let placed = match inner.put_documents(new).await? {
+            PutDocuments::Kept(placed) => placed,
+            PutDocuments::Taken => return Err(ModelError::Exists(name.to_owned())),
+            PutDocuments::OverQuota(usage) => return Err(inner.no_room(&usage, bytes).into()),
+            PutDocuments::Full => Vec::new(),
         };
-        Ok(ModelAnswer { model: stored(shelf.plain(kept), content), is_new })
+        let [Placed { revision, created_ms, before }] = placed[..] else {
+            return Err(Error::internal(format!("model {name} is not kept")).into());
+        };
+        let model = StoredModel { name: name.to_owned(), revision, sha256, created_ms, content };
+        Ok(ModelAnswer { model, is_new: before == Before::Nothing })
     }
 
     /// A model, `name` for its newest revision or `name@revision`.
     pub async fn model(&self, shelf: &Shelf, asked: &str) -> Result<StoredModel, ModelError> {
         let inner = &self.inner;
         let found = match model::asked(asked) {
-            Some((name, revision)) => inner.models.model(shelf.full(&name), revision).await?,
+            Some((name, revision)) => inner.documents.document(Kind::Model, shelf.full(&name), revision).await?,
             None => None,
         };
         match found.and_then(|kept| ModelContent::read(&kept).map(|content| stored(shelf.plain(kept), content))) {
@@ -229,7 +231,7 @@ impl Engine {
 
     /// The newest revisions of up to `limit` models whose names follow `after`, by name.
     pub async fn models(&self, shelf: &Shelf, after: String, limit: u32) -> Result<Vec<StoredModel>, ModelError> {
-        let kept = self.inner.models.models(shelf.0.clone(), after, limit).await?;
+        let kept = self.inner.documents.documents(Kind::Model, shelf.prefix(), after, limit).await?;
         Ok(kept
             .into_iter()
             .filter_map(|kept| Some((ModelContent::read(&kept)?, kept)))
@@ -245,7 +247,7 @@ impl Engine {
     /// Deletes every revision of a model. Jobs that were accepted with it are not touched.
     pub async fn delete_model(&self, shelf: &Shelf, name: &str) -> Result<(), ModelError> {
         let inner = &self.inner;
-        if model::is_name(name) && inner.models.delete_model(shelf.full(name)).await? {
+        if model::is_name(name) && inner.delete_document(Kind::Model, shelf.full(name)).await? {
             return Ok(());
         }
         Err(inner.unknown_model(shelf, name).await?)
@@ -253,107 +255,12 @@ impl Engine {
 }
 
 impl Inner {
-    /// What the store knows of the model that a job names; nothing where it names none.
-    pub(super) async fn find_model(
-        &self,
-        shelf: &Shelf,
-        entry: &Arc<Entry>,
-        body: &Body,
-    ) -> Result<Option<Found>, Error> {
-        find_on(&*self.models, shelf, &self.registry, entry, body, self.room_for(body)).await
-    }
-
     async fn unknown_model(&self, shelf: &Shelf, name: &str) -> Result<ModelError, Error> {
-        let names = names_on(&*self.models, shelf).await?;
+        let names = self.finder(shelf).await?.names(Kind::Model).await?;
         let plain = name.split('@').next().unwrap_or_default();
         let nearest = nearest(plain, names.iter().map(String::as_str)).map(str::to_owned);
         Ok(ModelError::Unknown { name: name.to_owned(), nearest })
     }
-}
-
-/// What a shelf has of the model that a job names; nothing where it names none.
-async fn find_on<S: ModelShelf + ?Sized>(
-    models: &S,
-    shelf: &Shelf,
-    registry: &Registry,
-    entry: &Entry,
-    body: &Body,
-    room: Room,
-) -> Result<Option<Found>, Error> {
-    /// Looked for before anything is parsed: hardly any job has it.
-    const FIELD: &[u8] = b"\"model\"";
-    let job = match body {
-        Body::Json(job) | Body::Parts { job, .. } => job,
-    };
-    if entry.model_use() == ModelUse::None || !job.windows(FIELD.len()).any(|bytes| bytes == FIELD) {
-        return Ok(None);
-    }
-    let mut job = read_json::parse_as(job, registry.shape_of(entry), &room)?.value;
-    let Some(name) = model::named(registry, entry, &mut job) else { return Ok(None) };
-    let Some((plain, revision)) = model::asked(&name) else { return Ok(None) };
-    Ok(Some(match models.model(shelf.full(&plain), revision).await? {
-        Some(kept) => Found::Model(Box::new(shelf.plain(kept))),
-        None => Found::Unknown(names_on(models, shelf).await?),
-    }))
-}
-
-async fn names_on<S: ModelShelf + ?Sized>(models: &S, shelf: &Shelf) -> Result<Vec<String>, Error> {
-    Ok(models.model_names(shelf.0.clone(), NEAR_NAMES).await?)
-}
-
-/// The stored model of a job that is solved without a service.
-#[derive(Debug, Default)]
-pub enum GivenModel {
-    /// It has none.
-    #[default]
-    None,
-    /// That of a file, which the job takes whether it names it or not.
-    File(ModelFile),
-    /// What a data folder has of the name in the job.
-    Stored(OnShelf),
-}
-
-/// What a data folder has of a name.
-#[derive(Debug)]
-pub struct OnShelf(Option<Found>);
-
-impl GivenModel {
-    /// Looks for the model that a job names in a data folder, from which a service may be serving meanwhile.
-    pub async fn stored(registry: &Registry, calculator: &str, body: &Body, data: &Path) -> Result<Self, NoShelf> {
-        let entry = super::entry(registry, calculator)?;
-        let shelf = SqliteShelf::open(data).await?;
-        let found = find_on(&shelf, &Shelf::default(), registry, &entry, body, Room::default()).await;
-        shelf.close().await;
-        Ok(Self::Stored(OnShelf(found?)))
-    }
-
-    /// What is known of the name in the job.
-    pub(super) fn found(&self) -> Option<Found> {
-        match self {
-            Self::None => None,
-            Self::File(file) => Some(Found::Model(Box::new(file.kept().clone()))),
-            Self::Stored(OnShelf(found)) => found.clone(),
-        }
-    }
-
-    /// The model that the job takes whatever it names.
-    pub(super) fn imposed(&self) -> Option<&KeptModel> {
-        match self {
-            Self::File(file) => Some(file.kept()),
-            Self::None | Self::Stored(_) => None,
-        }
-    }
-}
-
-/// Why no model was looked for.
-#[derive(Debug, thiserror::Error)]
-pub enum NoShelf {
-    /// The data folder.
-    #[error(transparent)]
-    Folder(#[from] OpenError),
-    /// The job, or the database in the folder.
-    #[error("{0:?}")]
-    Asked(#[from] Error),
 }
 
 /// What is wrong with a model: its calculator, or effects that the calculator does not know.
@@ -394,7 +301,7 @@ fn is_whole(content: &ModelContent, sha256: Option<&str>) -> bool {
 
 /// A model that was exported, for jobs that are solved without a store.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ModelFile(KeptModel);
+pub struct ModelFile(KeptDocument);
 
 impl ModelFile {
     /// What `GET /v1/models/{name}` gave.
@@ -417,22 +324,22 @@ impl ModelFile {
         }
         let revision = fields["revision"].as_u64().and_then(|revision| u32::try_from(revision).ok()).unwrap_or(1);
         let text = content.canonical();
-        Ok(Self(KeptModel {
+        Ok(Self(KeptDocument {
             name,
             revision,
-            calculator: content.calculator,
+            class: content.calculator,
             sha256: model::sha256(&text),
             content: text,
             created_ms: 0,
         }))
     }
 
-    pub(super) fn kept(&self) -> &KeptModel {
+    pub(super) fn kept(&self) -> &KeptDocument {
         &self.0
     }
 }
 
-fn stored(kept: KeptModel, content: ModelContent) -> StoredModel {
+fn stored(kept: KeptDocument, content: ModelContent) -> StoredModel {
     StoredModel { name: kept.name, revision: kept.revision, sha256: kept.sha256, created_ms: kept.created_ms, content }
 }
 
@@ -484,6 +391,7 @@ fn content_of(stored: &Stored, pointer: &str) -> Result<ModelContent, ModelError
             "base_job_b3": blake3::hash(&base).to_hex().as_str(),
             "extends": input.get("model").cloned().unwrap_or(Value::Null),
             "causes": result["named"],
+            "extension": result["extension"],
             UNCERTAINTY: unsure,
             "gain": result["gain"],
         }),

@@ -9,11 +9,12 @@ use serde_json::Value;
 use super::budget::Room;
 use super::error::Error;
 use super::json::Parsed;
-use super::model::{self, Held, Models};
+use super::model::{self, Held};
+use super::names::{self, Asks, Drawn, Names};
 use super::{Body, Checked, TablePart, json, table};
 use crate::key::Key;
-use crate::registry::{Entry, Faults, Prepared, Unprepared, by_pointer};
-use crate::store::models::KeptModel;
+use crate::registry::{Entry, Faults, Prepared, Registry, Unprepared, by_pointer};
+use crate::store::documents::KeptDocument;
 
 /// A job that can run, with the address of its answer.
 pub(crate) struct Ready {
@@ -26,66 +27,133 @@ pub(crate) struct Ready {
     pub(crate) model: Option<Held>,
     /// The job without what the model adds.
     pub(crate) base: Option<Prepared>,
-    /// Whether the same bytes will always mean the same job: not where they name a model, which may be revised.
-    pub(crate) lasts: bool,
+    /// What it got from machines, tools and materials that it names.
+    pub(crate) drawn: Option<Drawn>,
+    /// Whether the same bytes may come to mean another job: where they name what may be revised.
+    pub(crate) names_any: bool,
     /// Whether there are measured tables in it.
     has_rows: bool,
 }
 
-/// Reads a job. What the schema refuses is listed together with what the rules between fields refuse, as far as the
-/// job can be read in spite of its faults.
-pub(crate) fn read(entry: &Arc<Entry>, body: &Body, models: &Models<'_>) -> Result<Ready, Error> {
-    read_with(entry, body, models, None)
+/// A body whose syntax is in order: what it names can be told.
+pub(crate) struct Draft {
+    job: Value,
+    left_out: usize,
 }
 
-/// The same with a model that the job takes although it may not name it.
-pub(crate) fn read_with(
-    entry: &Arc<Entry>,
-    body: &Body,
-    models: &Models<'_>,
-    given: Option<&KeptModel>,
-) -> Result<Ready, Error> {
-    let (job, parts) = match body {
-        Body::Json(job) => (job, [].as_slice()),
-        Body::Parts { job, tables } => (job, tables.as_slice()),
-    };
-    let Parsed { value: mut job, left_out } = json::parse_as(job, models.registry.shape_of(entry), &models.room)?;
-    let misfit = given.and_then(|given| model::impose(models.registry, entry, &mut job, given));
-    if let Some(misfit) = misfit {
-        return Err(Found::of(vec![misfit]).with_rules(entry, &job));
+impl Draft {
+    /// Of a body.
+    pub(crate) fn of(entry: &Entry, body: &Body, (registry, room): (&Registry, &Room)) -> Result<Self, Error> {
+        let (Body::Json(job) | Body::Parts { job, .. }) = body;
+        let Parsed { value: job, left_out } = json::parse_as(job, registry.shape_of(entry), room)?;
+        Ok(Self { job, left_out })
     }
-    let names_a_model = model::named(models.registry, entry, &mut job).is_some();
-    let of_model = model::extend(models, entry, &mut job);
-    let ready = read_extended(entry, job, (parts, &models.room), left_out, of_model)?;
-    Ok(Ready { lasts: !names_a_model, ..ready })
+
+    /// The same with a model that the job takes although it may not name it.
+    pub(crate) fn with_model(
+        mut self,
+        registry: &Registry,
+        entry: &Entry,
+        given: &KeptDocument,
+    ) -> Result<Self, Error> {
+        match model::impose(registry, entry, &mut self.job, given) {
+            None => Ok(self),
+            Some(misfit) => Err(Found::of(vec![misfit]).with_rules(entry, &self.job)),
+        }
+    }
+
+    /// What it names.
+    pub(crate) fn asks(&mut self, registry: &Registry, entry: &Entry) -> Asks {
+        Asks::of(registry, entry, &mut self.job)
+    }
+
+    /// Reads the job of a body. What the schema refuses is listed together with what the rules between fields refuse, as far as
+    /// the job can be read in spite of its faults.
+    pub(crate) fn read(self, entry: &Arc<Entry>, body: &Body, names: &Names<'_>) -> Result<Ready, Error> {
+        let parts = match body {
+            Body::Json(_) => [].as_slice(),
+            Body::Parts { tables, .. } => tables.as_slice(),
+        };
+        read_named(entry, self.job, (parts, self.left_out), names)
+    }
 }
 
-/// A job from a JSON value that [`json::parse`] made; a model in it is resolved.
-pub(crate) fn read_value(entry: &Arc<Entry>, job: Value, parts: &[TablePart]) -> Result<Ready, Error> {
-    read_extended(entry, job, (parts, &Room::default()), 0, Vec::new())
+/// Reads the job of a body.
+#[cfg(test)]
+pub(crate) fn read(entry: &Arc<Entry>, body: &Body, names: &Names<'_>) -> Result<Ready, Error> {
+    Draft::of(entry, body, (names.registry, &names.room))?.read(entry, body, names)
 }
 
-fn read_extended(
+/// The job of a point of a study. Its model may be resolved already.
+pub(crate) fn read_point(entry: &Arc<Entry>, mut job: Value, found: &names::Found) -> Result<Ready, Error> {
+    let (drawn, of_names) = names::fill(entry, &mut job, found);
+    names::turn_model_off(entry, &mut job);
+    let of_model = model::extend_point(found, entry, &mut job);
+    let resolved = Resolved { job, drawn, of_names, of_model, enclosed: None };
+    read_resolved(entry, resolved, (&[], &Room::default()), 0)
+}
+
+/// A job whose names are given their meaning.
+pub(crate) fn read_named(
     entry: &Arc<Entry>,
     mut job: Value,
+    (parts, left_out): (&[TablePart], usize),
+    names: &Names<'_>,
+) -> Result<Ready, Error> {
+    let names_any = names::names_any(names.registry, entry, &mut job);
+    let (drawn, of_names) = names::fill(entry, &mut job, &names.found);
+    names::turn_model_off(entry, &mut job);
+    let of_model = model::extend(names.registry, &names.found, entry, &mut job);
+    let resolved = Resolved { job, drawn, enclosed: Some(&names.found), of_names, of_model };
+    let ready = read_resolved(entry, resolved, (parts, &names.room), left_out)?;
+    Ok(Ready { names_any, ..ready })
+}
+
+/// A job without names, and what came of them.
+#[derive(Default)]
+struct Resolved<'a> {
+    job: Value,
+    drawn: Option<Drawn>,
+    /// What the points of a study may name.
+    enclosed: Option<&'a names::Found>,
+    of_names: Vec<Finding>,
+    of_model: Vec<Finding>,
+}
+
+fn read_resolved(
+    entry: &Arc<Entry>,
+    resolved: Resolved<'_>,
     (parts, room): (&[TablePart], &Room),
     left_out: usize,
-    of_model: Vec<Finding>,
 ) -> Result<Ready, Error> {
+    let Resolved { mut job, drawn, enclosed, of_names, of_model } = resolved;
     let checked = check_schema(entry, &mut job, (parts, room));
     if room.is_spent() {
         return Err(Error::Busy { retry_after: json::RETRY_AFTER });
     }
-    match checked.map_err(|found| Found { total: found.total + left_out, ..found }) {
-        Ok(()) if of_model.is_empty() => prepared(entry, &job),
-        Ok(()) => Err(Found::of(of_model).with_rules(entry, &job)),
-        Err(found) => Err(found.and(of_model).with_rules(entry, &job)),
+    let checked = checked.map_err(|found| Found { total: found.total + left_out, ..found });
+    match checked {
+        Ok(()) if of_names.is_empty() && of_model.is_empty() => {
+            if let Some(drawn) = &drawn {
+                names::with_drawn(&mut job, drawn);
+            }
+            if let Some(found) = enclosed {
+                names::enclose(entry, &mut job, found);
+            }
+            prepared(entry, &job)
+        }
+        Ok(()) if of_names.is_empty() => Err(Found::of(of_model).with_rules(entry, &job)),
+        Ok(()) => Err(Found::of(of_names).and(of_model).told()),
+        Err(found) if of_names.is_empty() => Err(found.and(of_model).with_rules(entry, &job)),
+        // What a name that means nothing would have filled in is missing for that alone.
+        Err(found) => Err(found.without_missing().and(of_names).and(of_model).told()),
     }
 }
 
 /// A job whose syntax, tables and schema are in order, or were when it was accepted.
 pub(crate) fn prepared(entry: &Arc<Entry>, job: &Value) -> Result<Ready, Error> {
-    let (job, model) = model::split(entry, job);
+    let (job, drawn) = names::split(job);
+    let (job, model) = model::split(entry, &job);
     let has_rows = table::has_rows(&job, entry.tables_of(&job));
     let mut prepared = entry.prepare(&job).map_err(|unprepared| match unprepared {
         Unprepared::Invalid(findings) => {
@@ -97,16 +165,24 @@ pub(crate) fn prepared(entry: &Arc<Entry>, job: &Value) -> Result<Ready, Error> 
         Unprepared::Failed(failure) => Error::Calculation(failure),
     })?;
     let canonical = std::mem::take(&mut prepared.canonical);
-    let canonical = Bytes::from(match &model {
+    let canonical = match &model {
         None => canonical,
         Some(held) => model::canonical_with(&canonical, held).map_err(Error::internal)?,
-    });
+    };
+    let (canonical, hashed) = match &drawn {
+        None => (Bytes::from(canonical), None),
+        Some(drawn) => {
+            let (kept, hashed) = names::canonical_with(&canonical, drawn).map_err(Error::internal)?;
+            (Bytes::from(kept), Some(hashed))
+        }
+    };
     let base = model.as_ref().and_then(|held| model::base(entry, &job, held));
     if let Some(base) = &base {
         prepared.cost.ms += base.cost.ms;
     }
-    let key = Key::of(entry.meta(), prepared.numbers_of.as_ref(), &canonical);
-    Ok(Ready { entry: Arc::clone(entry), prepared, key, canonical, model, base, lasts: true, has_rows })
+    let key = Key::of(entry.meta(), prepared.numbers_of.as_ref(), hashed.as_deref().unwrap_or(&canonical));
+    let names_any = model.is_some() || drawn.is_some();
+    Ok(Ready { entry: Arc::clone(entry), prepared, key, canonical, model, base, drawn, names_any, has_rows })
 }
 
 /// What the schema and the tables found.
@@ -120,6 +196,19 @@ struct Found {
 impl Found {
     fn of(findings: Vec<Finding>) -> Self {
         Self { total: findings.len(), findings, unread: Vec::new() }
+    }
+
+    /// Without fields that are missing.
+    fn without_missing(mut self) -> Self {
+        let before = self.findings.len();
+        self.findings.retain(|finding| general_code(finding) != "missing_field");
+        self.total -= before - self.findings.len();
+        self
+    }
+
+    /// As an error.
+    fn told(self) -> Error {
+        invalid(self.findings, self.total)
     }
 
     /// With more; the first fault at a place is enough.
@@ -270,7 +359,7 @@ mod tests {
     }
 
     fn read(entry: &Arc<Entry>, body: &Body) -> Result<Ready, Error> {
-        super::read(entry, body, &Models::new(toy::shared(), None))
+        super::read(entry, body, &Names::new(toy::shared(), names::Found::default()))
     }
 
     fn body(job: &Value) -> Body {

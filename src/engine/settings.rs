@@ -51,6 +51,8 @@ pub struct EngineSettings {
     pub isolation: Option<Isolation>,
     /// So many points has a parameter study at most.
     pub study_points: u64,
+    /// So many revisions of machines, tools and materials are kept at most, of everybody together.
+    pub most_records: u64,
     /// How much one owner may take.
     pub quota: Quota,
     /// How long a job may stand in line for a core.
@@ -81,6 +83,7 @@ impl EngineSettings {
             bodies_bytes: 128 << 20,
             isolation: None,
             study_points: super::study::MOST_POINTS,
+            most_records: 100_000,
             quota: Quota::default(),
             patience: Duration::from_millis(250),
         }
@@ -110,6 +113,7 @@ impl EngineSettings {
             bodies_bytes: config.limits.bodies_bytes,
             isolation: None,
             study_points: config.limits.study_points,
+            most_records: config.limits.library_records,
             quota: Quota {
                 kept_bytes: Some(config.quota.kept_bytes).filter(|bytes| *bytes > 0),
                 work_ms: Some(1e3 * config.quota.work_s_per_hour).filter(|ms| *ms > 0.0),

@@ -439,8 +439,9 @@ fn conforms(registry: &Registry, entry: &Entry) {
 fn example_conforms(registry: &Registry, entry: &Entry, example: &Example) -> Vec<&'static str> {
     let (texts, meta) = (Texts::shared(), entry.meta());
     let body = || Body::Json(example.job.into());
-    let ready = read::read(&registry.entry(meta.id).unwrap().clone(), &body(), &Models::new(registry, None))
-        .unwrap_or_else(|error| panic!("{} of {}: {error:?}", example.id, meta.id));
+    let ready =
+        read::read(&registry.entry(meta.id).unwrap().clone(), &body(), &Names::new(registry, names::Found::default()))
+            .unwrap_or_else(|error| panic!("{} of {}: {error:?}", example.id, meta.id));
     let mut result = Vec::new();
     let computed = ready.prepared.run(&Unwatched, &mut result).unwrap();
     let input = ready.prepared.input().unwrap();
@@ -481,7 +482,7 @@ fn example_conforms(registry: &Registry, entry: &Entry, example: &Example) -> Ve
     let again = read::read(
         &registry.entry(meta.id).unwrap().clone(),
         &Body::Json(ready.canonical.clone()),
-        &Models::new(registry, None),
+        &Names::new(registry, names::Found::default()),
     )
     .unwrap();
     assert_eq!(again.key, ready.key, "the filled job of {} has another key", meta.id);
@@ -522,14 +523,15 @@ impl Monitor for Impatient {
 fn a_cancel_is_heard_while_a_job_is_computed_without_its_model() {
     let registry = Registry::standard().unwrap();
     let model = json!({"name": "lathe", "calculator": SHAFT, "effects": [soft_headstock()]});
-    let model = GivenModel::File(ModelFile::read(&registry, model.to_string().as_bytes()).unwrap());
-    let solve = |job: &Value, model: &GivenModel, most: usize| {
+    let model =
+        Given { model: Some(ModelFile::read(&registry, model.to_string().as_bytes()).unwrap()), ..Given::default() };
+    let solve = |job: &Value, model: &Given, most: usize| {
         let monitor = Impatient { looks: 0.into(), most, told: 0.into() };
         let outcome = solve_with(&registry, SHAFT, Body::Json(job.to_string().into()), model, &monitor);
         (outcome, monitor.looks.into_inner(), monitor.told.into_inner())
     };
     let own = shaft(|job| job["effects"] = json!([soft_headstock()]));
-    let (outcome, looks, told) = solve(&own, &GivenModel::None, usize::MAX);
+    let (outcome, looks, told) = solve(&own, &Given::default(), usize::MAX);
     outcome.unwrap();
     let extended = shaft(|job| job["effects"] = json!([]));
     let (outcome, more_looks, as_told) = solve(&extended, &model, usize::MAX);

@@ -17,7 +17,7 @@ use tokio::sync::Semaphore;
 use super::negotiate::{self, Media};
 use super::problem::Problem;
 use super::query::Query;
-use super::{CACHE_STATE, codes, report};
+use super::{CACHE_STATE, codes, parts, report};
 use crate::engine::{CacheState, ENGINE_VERSION, Stored, Timings};
 use crate::render;
 use crate::text::{Glossary, Language, Texts, fingerprint};
@@ -34,7 +34,26 @@ pub(super) struct View {
     media: Media,
     /// Of the table or figure; the first if `None`.
     part: Option<String>,
+    /// What stands in the document besides.
+    include: Option<Include>,
     language: Language,
+}
+
+/// What an answer as JSON may bring along.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Include {
+    /// Its figures as data, as under `/v1/results/{key}/figures`.
+    Figures,
+}
+
+impl Include {
+    pub(super) const ALL: &[Self] = &[Self::Figures];
+
+    pub(super) fn word(self) -> &'static str {
+        match self {
+            Self::Figures => "figures",
+        }
+    }
 }
 
 /// Which table and figure of an answer are asked for, whichever of them its form then needs.
@@ -42,14 +61,16 @@ pub(super) struct View {
 pub(super) struct Parts {
     table: Option<String>,
     figure: Option<String>,
+    include: Option<Include>,
 }
 
 impl Parts {
     /// Its parameters.
-    pub(super) const KNOWN: &[&str] = &["table", "figure"];
+    pub(super) const KNOWN: &[&str] = &["table", "figure", "include"];
 
-    pub(super) fn of(query: &mut Query) -> Self {
-        Self { table: query.text("table"), figure: query.text("figure") }
+    pub(super) fn of(query: &mut Query) -> Result<Self, Problem> {
+        let include = query.one_of("include", Include::ALL, Include::word)?;
+        Ok(Self { table: query.text("table"), figure: query.text("figure"), include })
     }
 }
 
@@ -66,7 +87,7 @@ pub(super) fn offered(meta: &Meta) -> Vec<Media> {
 impl View {
     /// What a request asks for; refused if there is no such thing.
     pub(super) fn of(uri: &Uri, headers: &HeaderMap, meta: &Meta, offered: &[Media]) -> Result<Self, Problem> {
-        Self::of_parts(Parts::of(&mut Query::of(uri, Parts::KNOWN)?), headers, meta, offered)
+        Self::of_parts(Parts::of(&mut Query::of(uri, Parts::KNOWN)?)?, headers, meta, offered)
     }
 
     /// The same of a query that was read already.
@@ -85,7 +106,8 @@ impl View {
             Media::Svg => parts.figure,
             Media::Json | Media::Gcode | Media::Xlsx | Media::Pdf => None,
         };
-        Ok(Self { media, part, language: negotiate::language(headers) })
+        let include = parts.include.filter(|_| media == Media::Json);
+        Ok(Self { media, part, include, language: negotiate::language(headers) })
     }
 
     /// The strong entity tag: everything that the bytes depend on.
@@ -95,12 +117,16 @@ impl View {
         tag.push_str(stored.key.to_string().trim_start_matches("b3:"));
         let part = self.part.as_deref().unwrap_or_default();
         let _ = write!(tag, "-{}-{part}-{}", self.media.short(), self.language.tag());
+        if let Some(include) = self.include {
+            let _ = write!(tag, "-{}", include.word());
+        }
         // What is made when it is asked for changes with what makes it,
-        if self.media != Media::Json {
+        if self.media != Media::Json || self.include.is_some() {
             let _ = write!(tag, "-{ENGINE_VERSION}");
         }
         // and what is put into words then, with the words.
-        if self.media == Media::Svg || self.media.is_heavy() || self.language != Language::default() {
+        let is_worded = self.media == Media::Svg || self.media.is_heavy() || self.include.is_some();
+        if is_worded || self.language != Language::default() {
             let _ = write!(tag, "-{}", fingerprint(self.language));
         }
         tag.push('"');
@@ -117,7 +143,7 @@ pub(super) async fn respond(stored: Arc<Stored>, view: View, condition: &HeaderM
         response
     } else {
         let (media, language) = (view.media, view.language);
-        let body = if media == Media::Json && language == Language::default() {
+        let body = if media == Media::Json && view.include.is_none() && language == Language::default() {
             stored.body.clone()
         } else {
             let stored = stored.clone();
@@ -175,7 +201,7 @@ pub fn written(stored: &Stored, media: Media, part: Option<&str>, language: Lang
     if !offered.contains(&media) {
         return Err(not_acceptable(&offered));
     }
-    rendered(stored, &View { media, part: part.map(ToOwned::to_owned), language })
+    rendered(stored, &View { media, part: part.map(ToOwned::to_owned), include: None, language })
 }
 
 fn not_acceptable(offered: &[Media]) -> Problem {
@@ -186,6 +212,7 @@ fn not_acceptable(offered: &[Media]) -> Problem {
 fn rendered(stored: &Stored, view: &View) -> Result<Bytes, Problem> {
     let wanted = |id: &str| view.part.as_deref().is_none_or(|part| part == id);
     let text = match view.media {
+        Media::Json if view.include == Some(Include::Figures) => return with_figures(stored, view.language),
         Media::Json => return Ok(stored.body_in(view.language)),
         Media::Csv => {
             let tables = stored.tables_in(view.language)?;
@@ -207,6 +234,19 @@ fn rendered(stored: &Stored, view: &View) -> Result<Bytes, Problem> {
         Media::Pdf => return Ok(report::pdf(stored, view.language)?.into()),
     };
     Ok(Bytes::from(text))
+}
+
+/// The answer with its figures as its last field.
+fn with_figures(stored: &Stored, language: Language) -> Result<Bytes, Problem> {
+    let figures: Vec<_> = stored.figures()?.iter().map(|figure| parts::worded(figure, language)).collect();
+    let mut body = Vec::from(stored.body_in(language));
+    if body.pop() != Some(b'}') {
+        return Err(Problem::internal());
+    }
+    body.extend_from_slice(b",\"figures\":");
+    serde_json::to_writer(&mut body, &figures).map_err(|_| Problem::internal())?;
+    body.push(b'}');
+    Ok(body.into())
 }
 
 /// A declared table or figure that this answer does not have.

@@ -117,6 +117,9 @@ impl Caller {
     }
 }
 
+/// Addresses of machines, tools and materials.
+const RECORDS: [&str; 4] = ["/v1/machines", "/v1/tools", "/v1/materials", "/v1/library"];
+
 /// What must be allowed for a request under `/v1/` or for the metrics.
 pub(super) fn needed(method: &Method, path: &str) -> Scope {
     let is_reading = matches!(*method, Method::GET | Method::HEAD | Method::OPTIONS);
@@ -124,6 +127,9 @@ pub(super) fn needed(method: &Method, path: &str) -> Scope {
         "/metrics" => Scope::Admin,
         _ if is_reading => Scope::Read,
         _ if path.starts_with("/v1/models") => Scope::Models,
+        // Nothing is stored.
+        "/v1/tools/parse" => Scope::Solve,
+        _ if RECORDS.iter().any(|folder| path.starts_with(folder)) => Scope::Library,
         _ => Scope::Solve,
     }
 }

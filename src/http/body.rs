@@ -52,6 +52,36 @@ pub(super) async fn job(
     Ok(body)
 }
 
+/// The bytes of a body that is one of these types, and which.
+pub(super) async fn plain(
+    request: Request,
+    types: &[&'static str],
+    limits: &Limits,
+    budget: &Budget,
+) -> Result<(&'static str, Bytes), Problem> {
+    let headers = request.headers();
+    let sent = headers.get(CONTENT_TYPE).and_then(|kind| kind.to_str().ok()).unwrap_or_default().to_owned();
+    let essence = sent.split(';').next().unwrap_or_default().trim();
+    let Some(kind) = types.iter().find(|kind| kind.eq_ignore_ascii_case(essence)) else {
+        return Err(Problem::other_type(&sent, types));
+    };
+    if headers.get(CONTENT_ENCODING).is_some_and(|encoding| !encoding.as_bytes().eq_ignore_ascii_case(b"identity")) {
+        return Err(Problem::other_type(&sent, types));
+    }
+    let (limit, declared) = (limits.json_bytes, declared_length(headers));
+    if declared.is_some_and(|length| length > limit as u64) {
+        return Err(Problem::too_large(limit));
+    }
+    let unread = request.extensions().get::<Peer>().map(|peer| peer.unread.clone());
+    let time = seconds(limits.body_timeout_s);
+    let read = whole(request.into_body(), declared, limit, budget.hold());
+    let bytes = tokio::time::timeout(time, read).await.unwrap_or_else(|_| Err(Problem::too_slow(time)))?;
+    if let Some(unread) = unread {
+        unread.store(false, Ordering::Relaxed);
+    }
+    Ok((kind, bytes))
+}
+
 #[derive(Clone, Copy)]
 enum Kind {
     Json,

@@ -23,9 +23,9 @@ use super::problem::Problem;
 use super::query::Query;
 use super::{App, body, gate, quota};
 use crate::engine::{Answered, Ask, CacheState, Error, Priority};
-use crate::registry::{Entry, Registry};
+use crate::registry::{Entry, Registry, takes_names};
 use crate::text::{self, Glossary, Language};
-use crate::trace::Traceparent;
+use crate::trace::TraceContext;
 
 /// A calculator with what its route needs on every request.
 pub(super) struct Room {
@@ -51,7 +51,7 @@ pub(super) const MOST_DEADLINE_S: f64 = 31_536_000.0;
 pub(super) const LEAST_DEADLINE_S: f64 = 0.001;
 
 /// Of a request for an answer: which part of it, and how it is to be computed.
-const PARAMETERS: &[&str] = &["table", "figure", "priority", "deadline_s", "callback"];
+const PARAMETERS: &[&str] = &["table", "figure", "include", "priority", "deadline_s", "callback"];
 
 /// `POST /v1/{calculator}`
 pub(super) async fn solve(app: App, room: Arc<Room>, request: Request) -> Response {
@@ -78,9 +78,10 @@ async fn answered(
     let priority = query.one_of("priority", Priority::ALL, Priority::word)?;
     let deadline_s = query.number("deadline_s", &(LEAST_DEADLINE_S..=MOST_DEADLINE_S))?;
     let callback = query.text("callback").map(|url| app.callbacks.checked(url)).transpose()?;
-    let traceparent = request.extensions().get::<Traceparent>().map(ToString::to_string);
+    let trace = request.extensions().get::<TraceContext>();
+    let (traceparent, tracestate) = (trace.map(TraceContext::traceparent), trace.and_then(TraceContext::tracestate));
     let headers = request.headers();
-    let view = View::of_parts(Parts::of(&mut query), headers, room.entry.meta(), &room.offered)?;
+    let view = View::of_parts(Parts::of(&mut query)?, headers, room.entry.meta(), &room.offered)?;
     let mut preference = Preference::of(headers);
     // Those who wait are requests in work: they leave room for those who do not.
     let waiting = preference.wait_s.map(|_| Waiting::new(app));
@@ -95,6 +96,7 @@ async fn answered(
         shelf: caller.shelf(),
         callback,
         traceparent,
+        tracestate,
         ..Ask::plain(owner)
     };
     let language = negotiate::language(headers);
@@ -160,6 +162,12 @@ pub(super) async fn describe(
     }
 }
 
+/// What jobs of a calculator may name.
+fn record_kinds(calculator: &str) -> Vec<&'static str> {
+    use precut_library::Kind;
+    Kind::ALL.into_iter().filter(|kind| takes_names(calculator, *kind)).map(Kind::name).collect()
+}
+
 /// Every calculator of the service.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct CalculatorList {
@@ -167,6 +175,9 @@ pub(super) struct CalculatorList {
     items: Vec<CalculatorSummary>,
     /// Address of the next page; always null: the list is complete.
     next: Option<String>,
+    /// Version of the engine's own records of machines, tools and materials; grows with every changed number.
+    #[schema(minimum = 1, example = 1)]
+    data_version: u32,
 }
 
 /// A calculator in a list.
@@ -240,6 +251,8 @@ pub(super) struct CalculatorDescription {
     figures: &'static [&'static str],
     /// Whether measured tables may come as files in `multipart/form-data`.
     takes_tables: bool,
+    /// What its jobs may name: `machine`, `tool`, `material`; `GET /v1/machines` and the like list them.
+    records: Vec<&'static str>,
     /// Pointers into the result that a parameter study shows unless asked for others.
     study_outputs: &'static [&'static str],
     /// Codes of its messages, warnings and faults.
@@ -265,6 +278,7 @@ pub(super) fn listed(registry: &Registry, language: Language) -> CalculatorList 
     CalculatorList {
         items: registry.entries().iter().map(|entry| summary(entry.meta(), language)).collect(),
         next: None,
+        data_version: precut_library::built_in::DATA_VERSION,
     }
 }
 
@@ -282,6 +296,7 @@ pub(super) fn described(entry: &Entry, language: Language) -> CalculatorDescript
         tables: meta.tables,
         figures: meta.figures,
         takes_tables: entry.takes_tables(),
+        records: record_kinds(meta.id),
         study_outputs: meta.study_outputs,
         codes: meta.codes.all().collect(),
         labels: labels(meta, language),

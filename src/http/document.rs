@@ -10,10 +10,8 @@ use axum::http::{HeaderMap, HeaderValue, StatusCode};
 use axum::response::Response;
 use bytes::Bytes;
 
-use precut_calc::material;
-
 use super::problem::Problem;
-use super::{App, calculators, materials, negotiate, openapi};
+use super::{App, calculators, negotiate, openapi};
 use crate::registry::Registry;
 use crate::text::Language;
 
@@ -70,8 +68,6 @@ pub(super) struct Documents {
     calculators: InLanguages,
     calculator: BTreeMap<&'static str, InLanguages>,
     registry: Registry,
-    materials: InLanguages,
-    material: BTreeMap<&'static str, InLanguages>,
 }
 
 impl Documents {
@@ -81,8 +77,6 @@ impl Documents {
             calculators: InLanguages::default(),
             calculator: registry.entries().iter().map(|entry| (entry.meta().id, InLanguages::default())).collect(),
             registry: registry.clone(),
-            materials: InLanguages::default(),
-            material: material::library().iter().map(|material| (material.id, InLanguages::default())).collect(),
         }
     }
 
@@ -100,17 +94,6 @@ impl Documents {
         let (entry, made) = (self.registry.entry(id)?, self.calculator.get(id)?);
         let make = || Document::json(&calculators::described(entry, language), Some(language));
         Some(made[language.index()].get_or_init(make))
-    }
-
-    pub(super) fn materials(&self, language: Language) -> &Document {
-        let make = || Document::json(&materials::listed(language), Some(language));
-        self.materials[language.index()].get_or_init(make)
-    }
-
-    pub(super) fn material(&self, id: &str, language: Language) -> Option<&Document> {
-        let material = material::library().iter().find(|material| material.id == id)?;
-        let make = || Document::json(&materials::said(material, language), Some(language));
-        Some(self.material.get(id)?[language.index()].get_or_init(make))
     }
 }
 

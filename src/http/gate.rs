@@ -29,13 +29,15 @@ use super::auth::Caller;
 use super::problem::Problem;
 use super::{App, CACHE_STATE, Peer, auth, negotiate};
 use crate::text::Language;
-use crate::trace::{self, Traceparent};
+use crate::trace::{self, TraceContext};
 
 /// Comes in and goes out with every request.
 pub(super) const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 
 /// Where a request belongs in a trace (W3C Trace Context).
 pub(super) const TRACEPARENT: HeaderName = HeaderName::from_static("traceparent");
+/// What the systems on the trace's way say of it.
+pub(super) const TRACESTATE: HeaderName = HeaderName::from_static("tracestate");
 
 /// Longest target of a request, bytes.
 const MOST_TARGET_BYTES: usize = 8 * 1024;
@@ -67,8 +69,8 @@ pub(super) async fn gate(State(app): State<App>, mut request: Request, next: Nex
         },
         trace = tracing::field::Empty
     );
-    let given = traceparent(request.headers());
-    if let Some(given) = given {
+    let given = trace_context(request.headers());
+    if let Some(given) = &given {
         trace::follow(&span, given);
     }
     if let Some(place) = trace::place_of(&span, given) {
@@ -199,10 +201,12 @@ impl Drop for InFlight<'_> {
 }
 
 /// The client's place in a trace; one that is none counts as not given (W3C Trace Context, section 3.3).
-fn traceparent(headers: &HeaderMap) -> Option<Traceparent> {
+fn trace_context(headers: &HeaderMap) -> Option<TraceContext> {
     let mut given = headers.get_all(TRACEPARENT).iter();
     let only = given.next().filter(|_| given.next().is_none());
-    only?.to_str().ok()?.parse().ok()
+    // Of these several are one list.
+    let state: Result<Vec<&str>, _> = headers.get_all(TRACESTATE).iter().map(HeaderValue::to_str).collect();
+    TraceContext::read(only?.to_str().ok()?, &state.unwrap_or_default().join(","))
 }
 
 /// The client's id if it is a decent one, a new one otherwise.
@@ -227,7 +231,9 @@ fn allowed(app: &App, path: &str) -> &'static str {
     match folder {
         "" if app.rooms.iter().any(|room| room.id() == name) => "POST",
         "jobs" if !name.contains('/') => "GET, HEAD, DELETE",
-        "models" if !name.contains('/') => "GET, HEAD, PUT, DELETE",
+        "library" if name == "import" => "POST",
+        "tools" if name == "parse" => "POST",
+        "models" | "machines" | "tools" | "materials" if !name.contains('/') => "GET, HEAD, PUT, DELETE",
         _ => "GET, HEAD",
     }
 }

@@ -27,14 +27,17 @@ const JOB_INPUT: &str = "/v1/jobs/{id}/job";
 const JOB_EVENTS: &str = "/v1/jobs/{id}/events";
 const MODEL: &str = "/v1/models/{name}";
 const MODEL_COMPARISON: &str = "/v1/models/{name}/comparison";
+const RECORD: &str = "/v1/{kind}/{name}";
+const RECORD_COMPARISON: &str = "/v1/{kind}/{name}/comparison";
 const RESULT: &str = "/v1/results/{key}";
 const RESULT_FIGURES: &str = "/v1/results/{key}/figures";
 const RESULT_TABLES: &str = "/v1/results/{key}/tables";
 const RESULT_JOB: &str = "/v1/results/{key}/job";
+const RESULT_JOB_AT: &str = "/v1/results/{key}/job_at";
 const RESULT_PROVENANCE: &str = "/v1/results/{key}/provenance";
 
 /// Addresses with a variable part, as they are counted.
-const PATTERNS: [(&str, &str); 17] = [
+const PATTERNS: [(&str, &str); 23] = [
     ("/v1/jobs/", JOB),
     ("/v1/jobs/", JOB_RESULT),
     ("/v1/jobs/", JOB_INPUT),
@@ -45,9 +48,15 @@ const PATTERNS: [(&str, &str); 17] = [
     ("/v1/results/", RESULT_FIGURES),
     ("/v1/results/", RESULT_TABLES),
     ("/v1/results/", RESULT_JOB),
+    ("/v1/results/", RESULT_JOB_AT),
     ("/v1/results/", RESULT_PROVENANCE),
     ("/v1/calculators/", "/v1/calculators/{id}"),
-    ("/v1/materials/", "/v1/materials/{id}"),
+    ("/v1/machines/", RECORD),
+    ("/v1/machines/", RECORD_COMPARISON),
+    ("/v1/tools/", RECORD),
+    ("/v1/tools/", RECORD_COMPARISON),
+    ("/v1/materials/", RECORD),
+    ("/v1/materials/", RECORD_COMPARISON),
     ("/v1/", "/v1/{calculator}"),
     ("/problems/", "/problems/{code}"),
     ("/docs/", "/docs/{file}"),
@@ -55,7 +64,7 @@ const PATTERNS: [(&str, &str); 17] = [
 ];
 
 /// Addresses without one, besides the calculators'.
-const PLAIN: [&str; 13] = [
+const PLAIN: [&str; 18] = [
     "/",
     "/docs",
     "/openapi.json",
@@ -66,7 +75,12 @@ const PLAIN: [&str; 13] = [
     "/v1/jobs",
     "/v1/models",
     "/v1/results",
+    "/v1/machines",
+    "/v1/tools",
     "/v1/materials",
+    "/v1/tools/parse",
+    "/v1/library/import",
+    "/v1/library/export",
     "/v1/studies",
     "other",
 ];
@@ -155,12 +169,17 @@ fn pattern(path: &str) -> Option<&'static str> {
     if path.starts_with("/v1/models/") {
         return Some(if path.ends_with("/comparison") { MODEL_COMPARISON } else { MODEL });
     }
+    let is_record = ["/v1/machines/", "/v1/tools/", "/v1/materials/"].iter().any(|folder| path.starts_with(folder));
+    if is_record && path != "/v1/tools/parse" {
+        return Some(if path.ends_with("/comparison") { RECORD_COMPARISON } else { RECORD });
+    }
     if path.starts_with("/v1/results/") {
         let part = path.rsplit('/').next();
         return Some(match part {
             Some("figures") => RESULT_FIGURES,
             Some("tables") => RESULT_TABLES,
             Some("job") => RESULT_JOB,
+            Some("job_at") => RESULT_JOB_AT,
             Some("provenance") => RESULT_PROVENANCE,
             _ => RESULT,
         });

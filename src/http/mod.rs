@@ -12,7 +12,7 @@ mod gate;
 mod health;
 mod in_place;
 mod jobs;
-mod materials;
+mod library;
 mod metrics;
 mod models;
 mod negotiate;
@@ -25,6 +25,7 @@ mod provenance;
 mod query;
 mod quota;
 mod rate;
+mod records;
 mod report;
 mod results;
 mod server;
@@ -41,11 +42,14 @@ use axum::http::{HeaderName, Uri};
 use axum::routing::{any, get, post};
 use tower_http::cors::{AllowOrigin, CorsLayer};
 
+use precut_library::Kind;
+
 use crate::config::{self, Config, Limits, Role};
 use crate::engine::{Engine, Error};
 
 pub use answer::written;
 pub use codes::CODES;
+pub use library::{codes_said, record_said};
 pub use negotiate::Media;
 #[cfg(test)]
 pub(crate) use pages::DESCRIPTION;
@@ -185,10 +189,15 @@ fn routes(app: &App, health: Router<App>) -> Router<App> {
         .route("/v1/results/{key}/figures", get(parts::figures))
         .route("/v1/results/{key}/tables", get(parts::tables))
         .route("/v1/results/{key}/job", get(parts::job))
+        .route("/v1/results/{key}/job_at", get(parts::job_at))
         .route("/v1/results/{key}/provenance", get(provenance::read))
-        .route("/v1/materials", get(materials::list))
-        .route("/v1/materials/{id}", get(materials::read))
+        .route("/v1/library/export", get(library::export))
+        .route("/v1/library/import", post(library::import))
+        .route("/v1/tools/parse", post(library::parse))
         .route("/v1/{calculator}", any(unknown_calculator));
+    for kind in Kind::ALL {
+        router = router.merge(records::routes(kind));
+    }
     for room in &app.rooms {
         let handler = {
             let (app, room) = (app.clone(), room.clone());

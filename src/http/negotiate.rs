@@ -71,10 +71,18 @@ pub(super) fn media(headers: &HeaderMap, offered: &[Media]) -> Option<Media> {
     if matches!(accept.as_ref(), "" | "*/*" | "application/json") {
         return offered.first().copied();
     }
+    let liked = liked(headers, offered.iter().map(|media| media.essence()))?;
+    offered.iter().copied().find(|media| media.essence() == liked)
+}
+
+/// The same for types that are no form of an answer.
+pub(super) fn liked(headers: &HeaderMap, offered: impl Iterator<Item = &'static str>) -> Option<&'static str> {
+    let accept = joined(headers, ACCEPT);
+    let accept = if accept.is_empty() { "*/*".into() } else { accept };
     let ranges: Vec<Range<'_>> = accept.split(',').filter_map(Range::parse).collect();
-    let mut best: Option<(Media, u16)> = None;
-    for &candidate in offered {
-        let (kind, subtype) = candidate.essence().split_once('/').unwrap_or_default();
+    let mut best: Option<(&'static str, u16)> = None;
+    for candidate in offered {
+        let (kind, subtype) = candidate.split_once('/').unwrap_or_default();
         let quality = ranges
             .iter()
             .filter_map(|range| range.specificity(kind, subtype).map(|specificity| (specificity, range.quality)))

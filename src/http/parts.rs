@@ -4,9 +4,9 @@
 use axum::Extension;
 use axum::extract::{Path, State};
 use axum::http::header::CACHE_CONTROL;
-use axum::http::{HeaderMap, HeaderValue};
+use axum::http::{HeaderMap, HeaderValue, Uri};
 use axum::response::Response;
-use precut_calc::calculator::{Cells, Figure, Table};
+use precut_calc::calculator::{Cells, Figure, Place, Table};
 use serde::Serialize;
 use serde_json::{Value, json};
 use utoipa::ToSchema;
@@ -14,6 +14,7 @@ use utoipa::ToSchema;
 use super::auth::Caller;
 use super::document::Document;
 use super::problem::Problem;
+use super::query::Query;
 use super::{App, answer, negotiate, results};
 use crate::engine::Stored;
 use crate::text::{Language, Texts};
@@ -102,6 +103,33 @@ pub(super) async fn tables(
     Ok(private(document.await?.respond(&headers)))
 }
 
+/// Another place of a picture, of whose job is asked.
+struct Elsewhere {
+    figure: String,
+    setting: String,
+    x: f64,
+    y: f64,
+}
+
+impl Elsewhere {
+    const KNOWN: &[&str] = &["figure", "setting", "x", "y"];
+    const ANY: std::ops::RangeInclusive<f64> = f64::MIN..=f64::MAX;
+
+    fn of(uri: &Uri) -> Result<Self, Problem> {
+        let mut query = Query::of(uri, Self::KNOWN)?;
+        Ok(Self {
+            figure: query.needed("figure")?,
+            setting: query.needed("setting")?,
+            x: query.needed_number("x", &Self::ANY)?,
+            y: query.needed_number("y", &Self::ANY)?,
+        })
+    }
+
+    fn place(&self) -> Place<'_> {
+        Place { figure: &self.figure, setting: &self.setting, x: self.x, y: self.y }
+    }
+}
+
 /// `GET /v1/results/{key}/job`
 pub(super) async fn job(
     State(app): State<App>,
@@ -110,10 +138,27 @@ pub(super) async fn job(
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
     let document = made((&app, &caller), &name, |stored| {
-        let job = serde_json::from_slice(&stored.input).map_err(|_| Problem::internal())?;
-        Ok(Document::json(&JobFile { calculator: stored.entry().meta().id.to_owned(), job }, None))
+        let job = serde_json::from_slice(&stored.job()).map_err(|_| Problem::internal())?;
+        Ok(job_file(stored, job))
     });
     Ok(private(document.await?.respond(&headers)))
+}
+
+/// `GET /v1/results/{key}/job_at`
+pub(super) async fn job_at(
+    State(app): State<App>,
+    Extension(caller): Extension<Caller>,
+    Path(name): Path<String>,
+    uri: Uri,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    let elsewhere = Elsewhere::of(&uri)?;
+    let document = made((&app, &caller), &name, move |stored| Ok(job_file(stored, stored.job_at(&elsewhere.place())?)));
+    Ok(private(document.await?.respond(&headers)))
+}
+
+fn job_file(stored: &Stored, job: Value) -> Document {
+    Document::json(&JobFile { calculator: stored.entry().meta().id.to_owned(), job }, None)
 }
 
 /// Makes a document of a kept result. Reading an answer back is work: not on the threads that move bytes.
@@ -150,7 +195,7 @@ fn name_parts(value: &mut Value, word: &dyn Fn(&str) -> String) {
                     map.insert("text".to_owned(), text.into());
                 }
             }
-            for part in ["x", "y", "value", "panels", "items"] {
+            for part in ["x", "y", "value", "panels", "items", "about"] {
                 if let Some(part) = map.get_mut(part) {
                     name_parts(part, word);
                 }

@@ -155,6 +155,13 @@ impl Problem {
             .with("expected", expected)
     }
 
+    /// A body that is none of these types.
+    pub(super) fn other_type(received: &str, types: &[&str]) -> Self {
+        Self::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, "unsupported_media_type")
+            .with("received", received.to_owned())
+            .with("expected", types.join(", "))
+    }
+
     /// A body that is compressed.
     pub(super) fn encoded(encoding: &str, takes_tables: bool) -> Self {
         Self::media_type("", takes_tables).with("encoding", encoding.to_owned())
@@ -188,6 +195,20 @@ impl Problem {
     pub(super) fn invalid_model(findings: Vec<Finding>) -> Self {
         let total = findings.len();
         Self::new(StatusCode::UNPROCESSABLE_ENTITY, "invalid_model").findings(findings, total)
+    }
+
+    /// A machine, tool or material that is not there.
+    pub fn unknown_record(kind: precut_library::Kind, name: &str, nearest: Vec<String>) -> Self {
+        let problem = Self::missing(kind.unknown(), name);
+        if nearest.is_empty() { problem } else { problem.with("nearest", nearest) }
+    }
+
+    /// A record, or several, that break rules.
+    pub(super) fn invalid_record(findings: Vec<Finding>, total: usize) -> Self {
+        Self::new(StatusCode::UNPROCESSABLE_ENTITY, "invalid_record")
+            .with("errors_total", total)
+            .with("listed", findings.len())
+            .findings(findings, total)
     }
 
     /// Status of the answer.

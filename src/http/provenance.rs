@@ -1,6 +1,8 @@
 //! Where an answer comes from: which versions made it, of which model, for which jobs of whom. A line of a program
 //! (`result b3:...`) is traced back with it.
 
+use std::collections::BTreeMap;
+
 use axum::Extension;
 use axum::extract::{Path, State};
 use axum::http::HeaderMap;
@@ -40,6 +42,8 @@ pub(super) struct Provenance {
     computed_at: Option<String>,
     /// The stored model that took part; null where none did.
     model: Option<ModelOrigin>,
+    /// The machine, tool and material that took part, by what they are; none where none was named.
+    resources: BTreeMap<String, RecordOrigin>,
     /// The jobs that came to it and may be seen by who asks, newest first, at most 100.
     #[schema(max_items = 100)]
     jobs: Vec<JobOrigin>,
@@ -61,6 +65,31 @@ pub(super) struct ModelOrigin {
     revision: u32,
     /// Hash of its content.
     sha256: String,
+}
+
+/// A machine, tool or material that took part in an answer.
+#[derive(Debug, Serialize, Deserialize, ToSchema)]
+pub(super) struct RecordOrigin {
+    /// Its name; of an own one, on the shelf of who asked first.
+    #[schema(example = "lathe-3")]
+    name: String,
+    /// Its revision, which never changes; absent of the engine's own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1)]
+    revision: Option<u32>,
+    /// True of the engine's own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    built_in: Option<bool>,
+    /// Version of the engine's data; absent of an own one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1)]
+    data_version: Option<u32>,
+    /// Hash of what it says.
+    sha256: String,
+    /// What the job called it, where that is another of its names.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(example = "4140")]
+    asked_as: Option<String>,
 }
 
 /// A job that came to an answer.
@@ -127,6 +156,7 @@ fn told(key: Key, calculator: String, stored: Option<&Stored>, origin: &Origin, 
     let time = |ms: i64| format!("{:.3}", jiff::Timestamp::from_millisecond(ms).unwrap_or_default());
     let said = |name| stored.and_then(|stored| stored.said(name));
     let model: Option<ModelOrigin> = said("model").and_then(|model| serde_json::from_str(&model).ok());
+    let resources = said("resources").and_then(|resources| serde_json::from_str(&resources).ok()).unwrap_or_default();
     let job = |Job { record, .. }: &Job| JobOrigin {
         id: record.id.to_string(),
         owner: holder(&record.owner),
@@ -149,6 +179,7 @@ fn told(key: Key, calculator: String, stored: Option<&Stored>, origin: &Origin, 
             calculator: format!("/v1/calculators/{calculator}"),
         },
         model,
+        resources,
         calculator,
     }
 }

@@ -59,6 +59,14 @@ impl Query {
         self.text(name).ok_or_else(|| fault("missing", name))
     }
 
+    /// A number within a range that cannot be left out.
+    pub(super) fn needed_number<T>(&mut self, name: &'static str, range: &RangeInclusive<T>) -> Result<T, Problem>
+    where
+        T: FromStr + PartialOrd + Display,
+    {
+        self.number(name, range)?.ok_or_else(|| fault("missing", name))
+    }
+
     /// A number within a range.
     pub(super) fn number<T>(&mut self, name: &'static str, range: &RangeInclusive<T>) -> Result<Option<T>, Problem>
     where

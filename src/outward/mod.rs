@@ -1,6 +1,6 @@
 //! Requests that the service makes itself: a small body posted to an address, and the status that comes back.
 //!
-//! Nothing is followed that an answer says: no redirect is taken, no proxy asked, no body read. Where the address was given
+//! Nothing is followed that an answer says but how long to stay away: no redirect is taken, no proxy asked, no body read. Where the address was given
 //! by a client, it goes to an address that was looked at ([`Reach`]), so that nobody sends the service where he cannot go
 //! himself.
 
@@ -12,9 +12,11 @@ use std::time::Duration;
 use bytes::Bytes;
 use http_body_util::Full;
 use hyper::client::conn::http1;
-use hyper::header::{CONTENT_TYPE, HOST, HeaderMap, HeaderValue, USER_AGENT};
+use hyper::header::{CONTENT_TYPE, HOST, HeaderMap, HeaderValue, RETRY_AFTER, USER_AGENT};
+use hyper::http::response::Parts;
 use hyper::{Method, Request, StatusCode};
 use hyper_util::rt::TokioIo;
+use jiff::Timestamp;
 use rustls::pki_types::ServerName;
 use rustls::{ClientConfig, RootCertStore};
 use tokio::io::{AsyncRead, AsyncWrite};
@@ -41,7 +43,12 @@ pub(crate) enum Fault {
     /// No answer came in time, or none that is HTTP.
     NoAnswer,
     /// The answer has another status than 2xx.
-    Status(StatusCode),
+    Status {
+        /// That.
+        status: StatusCode,
+        /// For how long the other end asks to be left alone.
+        retry_after: Option<Duration>,
+    },
 }
 
 impl Fault {
@@ -53,7 +60,7 @@ impl Fault {
             Self::NoConnection => "no_connection".to_owned(),
             Self::NoTls => "no_tls".to_owned(),
             Self::NoAnswer => "no_answer".to_owned(),
-            Self::Status(status) => format!("http_{}", status.as_u16()),
+            Self::Status { status, .. } => format!("http_{}", status.as_u16()),
         }
     }
 }
@@ -86,11 +93,16 @@ impl Outward {
     /// Posts a body; that the answer has a status of 2xx.
     pub(crate) async fn post(&self, url: &Url, headers: HeaderMap, body: Bytes) -> Result<(), Fault> {
         let answered = tokio::time::timeout(self.timeout, self.answered(url, headers, body));
-        let status = answered.await.unwrap_or(Err(Fault::NoAnswer))?;
-        if status.is_success() { Ok(()) } else { Err(Fault::Status(status)) }
+        let answer = answered.await.unwrap_or(Err(Fault::NoAnswer))?;
+        let status = answer.status;
+        if status.is_success() {
+            Ok(())
+        } else {
+            Err(Fault::Status { status, retry_after: retry_after(&answer.headers) })
+        }
     }
 
-    async fn answered(&self, url: &Url, headers: HeaderMap, body: Bytes) -> Result<StatusCode, Fault> {
+    async fn answered(&self, url: &Url, headers: HeaderMap, body: Bytes) -> Result<Parts, Fault> {
         let stream = self.connected(url).await?;
         let request = request(url, headers, body).ok_or(Fault::NoAnswer)?;
         if url.scheme() == "http" {
@@ -132,7 +144,7 @@ fn request(url: &Url, headers: HeaderMap, body: Bytes) -> Option<Request<Full<By
 }
 
 /// Sends a request over a connection of its own, which ends with the header of the answer.
-async fn exchanged<S>(stream: S, request: Request<Full<Bytes>>) -> Result<StatusCode, Fault>
+async fn exchanged<S>(stream: S, request: Request<Full<Bytes>>) -> Result<Parts, Fault>
 where
     S: AsyncRead + AsyncWrite + Unpin,
 {
@@ -146,5 +158,35 @@ where
         // It ends with the answer where the other end closes at once.
         _ = &mut connection => answer.await,
     };
-    answered.map(|answer| answer.status()).map_err(|_| Fault::NoAnswer)
+    answered.map(|answer| answer.into_parts().0).map_err(|_| Fault::NoAnswer)
+}
+
+/// What `Retry-After` says: seconds, or a date (RFC 9110, section 10.2.3). A date that has passed says nothing.
+fn retry_after(headers: &HeaderMap) -> Option<Duration> {
+    let text = headers.get(RETRY_AFTER)?.to_str().ok()?;
+    if let Ok(seconds) = text.parse() {
+        return Some(Duration::from_secs(seconds));
+    }
+    let date = jiff::fmt::rfc2822::parse(text).ok()?;
+    date.timestamp().duration_since(Timestamp::now()).try_into().ok()
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn how_long_to_stay_away_is_said_in_seconds_or_by_a_date() {
+        let said =
+            |text: &str| retry_after(&HeaderMap::from_iter([(RETRY_AFTER, HeaderValue::try_from(text).unwrap())]));
+        assert_eq!(said("120"), Some(Duration::from_mins(2)));
+        assert_eq!(said("18446744073709551615"), Some(Duration::from_secs(u64::MAX)));
+        let later = said("Tue, 31 Dec 2199 23:59:59 GMT").unwrap();
+        assert!(later > Duration::from_hours(24), "{later:?}");
+        for nothing in ["", "soon", "-1", "1.5", "18446744073709551616", "Wed, 21 Oct 2015 07:28:00 GMT"] {
+            assert_eq!(said(nothing), None, "{nothing}");
+        }
+        assert_eq!(retry_after(&HeaderMap::new()), None);
+    }
 }

@@ -11,7 +11,7 @@ use utoipa::ToSchema;
 use utoipa::openapi::{RefOr, Schema};
 
 use super::schema::{self, Components};
-use super::{RegistryError, family};
+use super::{RegistryError, family, names};
 
 /// Makes the contract of a type.
 pub(super) type Make = Box<dyn Fn() -> Result<Contract, RegistryError> + Send + Sync>;
@@ -22,6 +22,8 @@ pub(super) struct Contract {
     components: Components,
     /// Before objects were closed: what makes two types of one name the same type.
     open: Components,
+    /// Jobs that may name records, by the calculator whose they are: the root, or the components of that name.
+    named: Vec<(Option<String>, &'static str)>,
 }
 
 /// Makes the contract of `T`, a job or a result of that calculator. `adapt` may change its root before objects are
@@ -62,7 +64,8 @@ impl Contract {
             schema::close(&mut root);
             components.values_mut().for_each(schema::close);
         }
-        Ok(Self { root, components, open })
+        let named = closed.then_some((None, calculator)).into_iter().collect();
+        Ok(Self { root, components, open, named })
     }
 
     /// One of several contracts, by what stands in the field `calculator` of a job.
@@ -71,26 +74,44 @@ impl Contract {
         told_apart: bool,
     ) -> Result<Self, RegistryError> {
         let (mut components, mut open) = (Components::new(), Components::new());
-        let mut names = Vec::new();
+        let (mut names, mut named) = (Vec::new(), Vec::new());
         for part in parts {
             let (name, part) = part?;
+            named.extend(part.named.into_iter().map(|(_, calculator)| (Some(name.clone()), calculator)));
             components.extend(part.components);
             open.extend(part.open);
             components.insert(name.clone(), part.root);
             names.push(name);
         }
         let root = family::one_of(&names, &components, told_apart);
-        Ok(Self { root, components, open })
+        Ok(Self { root, components, open, named })
     }
 
     /// The schema for the OpenAPI document.
     pub(super) fn schema(&self) -> Result<RefOr<Schema>, RegistryError> {
-        typed(&self.root)
+        let mut root = self.root.clone();
+        for (_, calculator) in self.named.iter().filter(|(component, _)| component.is_none()) {
+            names::offer(calculator, &mut root);
+        }
+        typed(&root)
     }
 
     /// The components for the OpenAPI document.
     pub(super) fn components(&self) -> Result<BTreeMap<String, RefOr<Schema>>, RegistryError> {
-        self.components.iter().map(|(name, part)| Ok((name.clone(), typed(part)?))).collect()
+        let mut components = self.components.clone();
+        for (name, part) in &mut components {
+            names::add_beside(name, part);
+            names::relax(name, part);
+        }
+        for (component, calculator) in &self.named {
+            if let Some(job) = component.as_ref().and_then(|name| components.get_mut(name)) {
+                names::offer(calculator, job);
+            }
+        }
+        if self.named.iter().any(|(_, calculator)| names::takes_any(calculator)) {
+            components.extend(names::components());
+        }
+        components.into_iter().map(|(name, part)| Ok((name, typed(&part)?))).collect()
     }
 
     /// The components before their objects were closed.
@@ -98,9 +119,18 @@ impl Contract {
         self.open
     }
 
-    /// The schema with its components inside it.
+    /// The schema with its components inside it. What stands beside names is in it; names are not, which forms ask for in a
+    /// way of their own.
     pub(super) fn document(&self) -> Value {
-        schema::standing_alone(&self.root, &self.components)
+        let mut components = self.components.clone();
+        for (name, part) in &mut components {
+            names::add_beside(name, part);
+        }
+        let mut root = self.root.clone();
+        if let Some((_, calculator)) = self.named.iter().find(|(component, _)| component.is_none()) {
+            names::add_to_job(calculator, &mut root);
+        }
+        schema::standing_alone(&root, &components)
     }
 
     /// The schema with references followed and unions told apart.

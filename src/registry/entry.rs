@@ -6,8 +6,8 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use precut_calc::calculator::{
-    Answer, Basis, Calculator, Check, Cost, Diagnosable, Failure, Figure, Finding, Message, Meta, Monitor, Program,
-    Table, Violations,
+    Answer, Basis, Calculator, Check, Cost, Diagnosable, Failure, Figure, Finding, Message, Meta, Monitor, Place,
+    Program, Table, Violations,
 };
 use precut_calc::diagnosis::{Diagnosis, JobOf, ResultOf};
 use serde::Deserialize;
@@ -19,11 +19,11 @@ use utoipa::openapi::{RefOr, Schema};
 use super::canonical::canonical;
 use super::checker::{Checker, Faults};
 use super::contract::{self, Contract, Make};
-use super::family;
 use super::place::{TablePlace, table_places};
 use super::schema::Components;
 use super::shape::Shape;
 use super::{RESERVED, RegistryError, Unwritable, append_result, child, non_finite_place};
+use super::{family, names};
 
 /// One calculator with its types closed over.
 pub struct Entry {
@@ -85,10 +85,10 @@ pub(super) struct Member {
     pub(super) entry: Entry,
 }
 
-/// What is made of a contract. Contracts follow from types alone, and [`Entry::verify`] makes all that is made of them in
-/// every build that tests.
+/// Takes what is made of a contract. It cannot fail: contracts follow from types alone, and a test makes everything that is made
+/// of them.
 fn follows<T>(made: Result<T, RegistryError>) -> T {
-    made.expect("the contract of a type is made by every test")
+    made.expect("the contract of a type is made by a test")
 }
 
 impl Entry {
@@ -345,14 +345,27 @@ impl Entry {
     pub(crate) fn shape(&self, of_any: impl FnOnce() -> Shape) -> &Shape {
         self.shape.get_or_init(|| match self.members() {
             [] => {
-                let own = Shape::of(&follows(self.input().strict()));
+                let mut own = Shape::of(&follows(self.input().strict()));
+                names::let_in(&mut own, self.meta.id);
                 if self.composed { own.with_field("job", of_any()) } else { own }
             }
             members => members.iter().fold(Shape::default(), |mut all, member| {
-                all.join(Shape::of(&follows(member.entry.input().strict())));
+                let mut own = Shape::of(&follows(member.entry.input().strict()));
+                if let Some(mut job) = own.field("job").cloned() {
+                    names::let_in(&mut job, member.calculator);
+                    own = own.with_field("job", job);
+                }
+                all.join(own);
                 all
             }),
         })
+    }
+    /// The fields of the job that may name records: of the job itself, or of the base job of a diagnosis of that calculator.
+    pub(crate) fn job_fields(&self, calculator: &str) -> &Value {
+        match self.member(calculator) {
+            Some(member) => &member.strict_input()["properties"]["job"]["properties"],
+            None => &self.strict_input()["properties"],
+        }
     }
     /// Whether a job may name a stored model.
     pub(crate) fn model_use(&self) -> ModelUse {
@@ -401,6 +414,15 @@ impl Entry {
     /// The tables of a result.
     pub(crate) fn result_tables(&self, input: &[u8], envelope: &[u8]) -> Result<Vec<Table>, UnreadableResult> {
         self.of_kept_job(input)?.calculation.tables(input, envelope)
+    }
+    /// The job for which another place in a picture of a result stands; `None` where there is none.
+    pub(crate) fn at_place(
+        &self,
+        input: &[u8],
+        envelope: &[u8],
+        place: &Place<'_>,
+    ) -> Result<Option<Moved>, UnreadableResult> {
+        self.of_kept_job(input)?.calculation.at_place(input, envelope, place)
     }
     /// The program of a result, where there is one.
     pub(crate) fn program(&self, input: &[u8], envelope: &[u8]) -> Result<MaybeProgram, UnreadableResult> {
@@ -497,6 +519,12 @@ pub struct UnreadableResult(pub String);
 
 type MaybeProgram = Option<Result<Program, Failure>>;
 
+/// A job, and what becomes of it at another place of a picture.
+pub(crate) struct Moved {
+    pub(crate) before: Value,
+    pub(crate) after: Value,
+}
+
 /// What an entry does, whatever its types are.
 pub(crate) trait Calculation: Send + Sync {
     fn prepare(&self, job: &Value) -> Result<Prepared, Unprepared>;
@@ -504,6 +532,10 @@ pub(crate) trait Calculation: Send + Sync {
     fn figures(&self, input: &[u8], envelope: &[u8]) -> Result<Vec<Figure>, UnreadableResult>;
     fn tables(&self, input: &[u8], envelope: &[u8]) -> Result<Vec<Table>, UnreadableResult>;
     fn program(&self, input: &[u8], envelope: &[u8]) -> Result<MaybeProgram, UnreadableResult>;
+    /// What has no places of its own stands where it is.
+    fn at_place(&self, _input: &[u8], _envelope: &[u8], _place: &Place<'_>) -> Result<Option<Moved>, UnreadableResult> {
+        Ok(None)
+    }
 }
 
 /// A filled job.
@@ -605,6 +637,12 @@ impl<C: Calculator> Calculation for Typed<C> {
     fn program(&self, input: &[u8], envelope: &[u8]) -> Result<MaybeProgram, UnreadableResult> {
         let (input, output) = read::<C>(input, envelope)?;
         Ok(C::program(&input, &output))
+    }
+    fn at_place(&self, input: &[u8], envelope: &[u8], place: &Place<'_>) -> Result<Option<Moved>, UnreadableResult> {
+        let (input, output) = read::<C>(input, envelope)?;
+        let Some(after) = C::at_place(&input, &output, place) else { return Ok(None) };
+        let written = |job: &C::Input| serde_json::to_value(job).map_err(|error| UnreadableResult(error.to_string()));
+        Ok(Some(Moved { before: written(&input)?, after: written(&after)? }))
     }
 }
 

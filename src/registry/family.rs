@@ -23,9 +23,9 @@ pub(super) fn name_calculator(job: &mut Value, calculator: &str) {
 /// Lets a job name a stored model.
 pub(super) fn offer_model(job: &mut Value) {
     job["properties"]["model"] = json!({
-        "type": "string",
+        "type": ["string", "null"],
         "pattern": "^[a-z0-9][a-z0-9_-]{0,63}(@[1-9][0-9]{0,8})?$",
-        "description": "A stored model of this calculator, `name` or `name@revision`: its effects act beside those of the job.",
+        "description": "A stored model of this calculator, `name` or `name@revision`: its effects act beside those of the job. Null turns off that of the machine.",
         "examples": ["lathe-7-winter"],
         "x-group": "effects",
     });

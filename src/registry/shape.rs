@@ -78,6 +78,20 @@ impl Shape {
         self.open |= other.open;
     }
 
+    /// A list of so many at most.
+    pub(crate) fn list_of(item: Self, most: usize) -> Self {
+        Self { items: Some(Box::new(item)), most_items: Some(most), ..Self::default() }
+    }
+
+    /// Lets more stand where a way leads; `*` are the items of a list.
+    pub(crate) fn let_in(&mut self, way: &[&str], more: Self) {
+        match way.split_first() {
+            None => self.join(more),
+            Some((&"*", rest)) => self.items.get_or_insert_default().let_in(rest, more),
+            Some((name, rest)) => self.fields.entry((*name).to_owned()).or_default().let_in(rest, more),
+        }
+    }
+
     /// The same with another shape for one of its fields.
     pub(crate) fn with_field(mut self, name: &str, field: Self) -> Self {
         self.fields.insert(name.to_owned(), field);

@@ -12,8 +12,7 @@ use crate::text::{Language, Texts};
 /// The toy under another name.
 struct Renamed<const NAME: usize>;
 
-const NAMES: [&str; 9] =
-    ["jobs", "results", "studies", "models", "materials", "calculators", "other-toy", "Toy", "toy bar"];
+const NAMES: [&str; 9] = ["jobs", "results", "studies", "models", "machines", "tools", "other-toy", "Toy", "toy bar"];
 
 impl<const NAME: usize> Calculator for Renamed<NAME> {
     type Input = ToyInput;
@@ -47,6 +46,13 @@ fn one_line_makes_a_calculator_known() {
     assert_eq!(ids, ["toy-bar", "other-toy"]);
     assert_eq!(registry.nearest("other_toy"), Some("other-toy"));
     assert_eq!(registry.entry("other-toy").unwrap().table_names(), ["measurements"]);
+}
+
+#[test]
+fn everything_can_be_made_of_the_contracts_and_they_fit_together() {
+    for registry in [Registry::standard().unwrap(), toy::registry()] {
+        registry.verify().unwrap();
+    }
 }
 
 #[test]

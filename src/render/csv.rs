@@ -46,7 +46,7 @@ fn cell(column: &Column, row: usize) -> String {
 /// A word as a cell: one that begins with `=`, `+`, `-`, `@`, a tab or a carriage return, where a spreadsheet begins a
 /// formula, gets an apostrophe in front, and so does one that begins with an apostrophe. To read it back, take one
 /// apostrophe away where there is one. Numbers are numbers: they need none.
-fn defused(word: &str) -> String {
+pub(crate) fn defused(word: &str) -> String {
     if begins_a_formula(word) || word.starts_with('\'') { format!("'{word}") } else { word.to_owned() }
 }
 

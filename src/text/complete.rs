@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::sync::LazyLock;
 
-use precut_calc::material;
+use precut_library::{Kind, built_in};
 use serde_json::Value;
 
 use super::{Glossary, Language, Texts};
@@ -40,6 +40,7 @@ const LATIN: &[&str] = &[
     "RONq",
     "Retry",
     "Siemens",
+    "1.2738",
     "1.4301",
     "after",
     "angle",
@@ -84,7 +85,12 @@ const LATIN: &[&str] = &[
     "around",
     "common",
     "quadratic",
+    "from",
+    "holder",
     "If-None-Match",
+    "insert",
+    "normal_force",
+    "set",
     "lathe-7",
     "provenance",
     "regression",
@@ -240,8 +246,8 @@ impl Asked {
                 asked.walk(&document, meta.id, meta.id);
             }
         }
-        for material in material::library() {
-            asked.help.insert(material.title.to_owned(), "materials".to_owned());
+        for record in Kind::ALL.into_iter().flat_map(built_in::records) {
+            asked.help.insert(record.text("title").unwrap_or_default().to_owned(), record.kind.plural().to_owned());
         }
         asked.help.insert(crate::http::DESCRIPTION.to_owned(), "GET /".to_owned());
         asked
@@ -284,7 +290,9 @@ impl Asked {
 
     /// Names of fields and values of choices, which stay as they are in every language.
     fn names(&self) -> BTreeSet<String> {
-        self.label.keys().map(|(_, field)| field.clone()).chain(self.word.keys().cloned()).collect()
+        let of_records = Kind::ALL.into_iter().flat_map(|kind| kind.fields().iter().map(|field| field.name.to_owned()));
+        let of_jobs = self.label.keys().map(|(_, field)| field.clone()).chain(self.word.keys().cloned());
+        of_jobs.chain(of_records).chain(Kind::ALL.map(|kind| kind.plural().to_owned())).collect()
     }
 }
 

@@ -87,23 +87,34 @@ fn error_of(value: &Value) -> Option<Error> {
 
 /// What a job is doing, as it is kept.
 pub(super) fn written_stage(stage: &Message) -> String {
-    json!({"code": stage.code, "values": stage.values}).to_string()
+    message(stage).to_string()
 }
 
 /// What a job was doing, read back.
 pub(super) fn read_stage(text: &str) -> Option<Message> {
-    let value: Value = serde_json::from_str(text).ok()?;
+    message_of(&serde_json::from_str(text).ok()?)
+}
+
+/// A message as it is kept.
+pub(crate) fn message(message: &Message) -> Value {
+    json!({"code": message.code, "values": message.values})
+}
+
+/// A message, read back.
+pub(crate) fn message_of(value: &Value) -> Option<Message> {
     Some(Message { code: interned(value["code"].as_str()?), values: values_of(value["values"].as_object()?)? })
 }
 
-fn note(finding: &Finding) -> Value {
+/// A finding as it is kept.
+pub(crate) fn note(finding: &Finding) -> Value {
     json!({
         "code": finding.code, "pointer": finding.pointer, "value": finding.value, "limit": finding.limit,
         "unit": finding.unit, "values": finding.values,
     })
 }
 
-fn finding_of(value: &Value) -> Option<Finding> {
+/// A finding, read back.
+pub(crate) fn finding_of(value: &Value) -> Option<Finding> {
     let mut finding = Finding::new(interned(value["code"].as_str()?), value["pointer"].as_str()?);
     finding.value = value["value"].as_f64();
     finding.limit = value["limit"].as_f64();

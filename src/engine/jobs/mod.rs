@@ -47,6 +47,7 @@ mod sweeper;
 pub(crate) mod work;
 mod worker;
 
+pub(crate) use fault::{finding_of, message, message_of, note};
 pub use feeds::Feed;
 pub use isolated::Isolation;
 pub use requests::Answered;
@@ -96,6 +97,8 @@ pub struct Ask {
     pub callback: Option<NewCallback>,
     /// Where the request belongs in a trace.
     pub traceparent: Option<String>,
+    /// What the systems on the trace's way say of it.
+    pub tracestate: Option<String>,
 }
 
 impl Ask {
@@ -110,6 +113,7 @@ impl Ask {
             wait: None,
             callback: None,
             traceparent: None,
+            tracestate: None,
         }
     }
 }
@@ -208,13 +212,18 @@ impl Jobs {
             }
         }
         let (feeds, computations) = (Arc::clone(&jobs.feeds), Arc::clone(&jobs.computations));
+        let generation = Arc::clone(&engine.generation);
         jobs.store.tell(Arc::new(move |news| match news {
             News::Changed(Changed { jobs, unwanted }) => {
                 computations.cancel(&unwanted);
                 feeds.touch(&jobs);
             }
+            News::Library => generation.changed(),
             // Computations that are not wanted any more are told so by the next word of their progress.
-            News::Missed => feeds.touch_all(),
+            News::Missed => {
+                generation.changed();
+                feeds.touch_all();
+            }
         }));
         jobs.tasks.lock().unwrap_or_else(PoisonError::into_inner).extend(tasks);
     }
@@ -273,6 +282,7 @@ impl Jobs {
             result: request.result.map(|stored| stored.kept()),
             callback: ask.callback.clone(),
             traceparent: ask.traceparent.clone(),
+            tracestate: ask.tracestate.clone(),
         };
         let work_ms = if job.result.is_some() { 0.0 } else { job.estimate_ms };
         match self.store.submit(job, engine.settings.queue_limit).await? {

@@ -13,13 +13,13 @@ use crate::engine::quota::worked;
 use crate::engine::{Error, Inner, Stored};
 use crate::store::StoreError;
 use crate::store::jobs::{Claim, Claimed, Ending, JobId, Waiting};
-use crate::trace::{self, Traceparent};
+use crate::trace::{self, TraceContext};
 
 /// Runs a job, if it still waits: in a place of those for short ones, if it was given one. Returns when its record says how
 /// it ended, or that it waits again.
 pub(super) async fn run_task(engine: Arc<Inner>, id: JobId, place: Option<Slot>) {
     let jobs = &engine.jobs;
-    let Waiting { charged, calculator, owner, created_ms, traceparent } =
+    let Waiting { charged, calculator, owner, created_ms, traceparent, tracestate } =
         match stubbornly(&engine, || jobs.store.waiting(id)).await {
             Some(Some(waiting)) => waiting,
             Some(None) if place.is_some() => return,
@@ -71,9 +71,9 @@ pub(super) async fn run_task(engine: Arc<Inner>, id: JobId, place: Option<Slot>)
     metrics::histogram!("precut_job_wait_seconds", "calculator" => calculator).record(waited.as_secs_f64());
     jobs.feeds.touch(&claim.jobs);
     let span = tracing::info_span!("job", id = %id, calculator = claim.calculator, trace = tracing::field::Empty);
-    if let Some(traceparent) = traceparent.and_then(|text| text.parse::<Traceparent>().ok()) {
-        span.record("trace", tracing::field::display(traceparent.trace()));
-        trace::follow(&span, traceparent);
+    if let Some(place) = TraceContext::of_record(traceparent.as_deref(), tracestate.as_deref()) {
+        span.record("trace", tracing::field::display(place.trace()));
+        trace::follow(&span, &place);
     }
     run_claimed(&engine, &claim, (&running, slot, &owner)).instrument(span).await;
 }

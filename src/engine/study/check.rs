@@ -10,7 +10,7 @@ use super::faults;
 use super::input::{Combine, Spacing, StudyInput, Variable};
 use super::place;
 use super::plan::{Found, Output, Planned};
-use crate::engine::{model, read};
+use crate::engine::{model, names, read};
 use crate::registry::Entry;
 
 /// What can be told without the calculator: how many values each variable has, and what is wrong with that.
@@ -99,8 +99,11 @@ fn variable(entry: &Entry, job: &Value, index: usize, variable: &Variable, found
         found.push(Finding::new("model_not_variable", at));
         return None;
     }
+    let is_a_name = names::is_a_name(entry, job, &tokens);
     let field = match place::field(entry.strict_input(), Some(job), &tokens) {
         Ok(field) if field.is_scalar() => field,
+        // What a name may be, or what is said over its record: the points show whether it fits.
+        Ok(_) | Err(_) if is_a_name => place::Field::any(),
         Ok(_) => {
             found.push(Finding::new("not_variable", at).with("received", variable.pointer.clone()));
             return None;
@@ -209,7 +212,7 @@ pub(super) fn values(input: &StudyInput, fields: Vec<Option<Found>>, found: &mut
 
 /// What the schema finds wrong with the job where no variable is concerned. Rules between fields may be broken by the
 /// variables' values alone, and say nothing yet.
-pub(super) fn job(entry: &Entry, input: &StudyInput, fields: &[Option<Found>]) -> Vec<Finding> {
+pub(super) fn job(entry: &Entry, input: &StudyInput, fields: &[Option<Found>], names: &names::Found) -> Vec<Finding> {
     let mut job = input.job.clone();
     for (variable, found) in input.vary.iter().zip(fields) {
         if let Some(found) = found
@@ -218,7 +221,9 @@ pub(super) fn job(entry: &Entry, input: &StudyInput, fields: &[Option<Found>]) -
             set(&mut job, &found.tokens, first);
         }
     }
-    let findings = read::schema_faults(entry, Value::Object(job));
+    let mut job = Value::Object(job);
+    names::fill(entry, &mut job, names);
+    let findings = read::schema_faults(entry, job);
     let concerns = |finding: &Finding| input.vary.iter().any(|variable| variable.pointer == finding.pointer);
     findings.into_iter().filter(|finding| !concerns(finding)).map(faults::in_job).collect()
 }

@@ -30,6 +30,10 @@ pub(crate) struct StudyInput {
     #[serde(default)]
     #[schema(schema_with = pointers)]
     pub(crate) outputs: Vec<String>,
+    /// The records that its points name, as they were when it was accepted. Nobody may send it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(ignore)]
+    pub(crate) records: Option<Value>,
 }
 
 /// A field of the job and the values that it takes: `values`, or `from`, `to` and `count`.

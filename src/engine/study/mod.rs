@@ -160,6 +160,7 @@ impl Job for Study {
         if let Value::Object(job) = job {
             input.job = job;
         }
+        input.records = None;
         serde_json::to_value(&input).map_err(|error| Failure::Internal(format!("the filled study: {error}")))
     }
 

@@ -31,6 +31,11 @@ pub(crate) enum Numbers {
 }
 
 impl Field {
+    /// One that may be anything.
+    pub(crate) fn any() -> Self {
+        Self { numbers: Some(Numbers::Any), truth: true, word: true, ..Self::default() }
+    }
+
     /// Whether it may be a number.
     pub(crate) fn is_number(&self) -> bool {
         self.numbers.is_some()

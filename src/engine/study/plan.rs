@@ -13,6 +13,7 @@ use super::result::Setting;
 use super::{check, faults};
 use crate::engine::budget::Room;
 use crate::engine::error::Error;
+use crate::engine::names;
 use crate::engine::read::{self, Ready};
 use crate::registry::{Entry, Faults, Registry};
 
@@ -43,6 +44,8 @@ pub(crate) struct Plan {
     pub(crate) shard_points: usize,
     pub(crate) cost: Cost,
     pub(crate) wanted: Wanted,
+    /// What names in its points mean.
+    names: names::Found,
 }
 
 /// A variable with its values.
@@ -72,13 +75,16 @@ impl Plan {
         let mut found = rows_for_tables(entry, &mut input.job);
         let (lengths, structure) = check::structure(&input, most_points);
         found.extend(structure);
+        let names = names::enclosed(input.records.as_ref());
         let fields = check::variables(entry, &input, &mut found);
         let outputs = check::outputs(entry, &mut input, &mut found);
         if !found.is_empty() {
             // What is wrong with the job itself is said along with it, as far as it can be told.
             // A table that could not be read is no fault of its own once more.
             let said: BTreeSet<String> = found.iter().map(|finding| finding.pointer.clone()).collect();
-            found.extend(check::job(entry, &input, &fields).into_iter().filter(|one| !said.contains(&one.pointer)));
+            found.extend(
+                check::job(entry, &input, &fields, &names).into_iter().filter(|one| !said.contains(&one.pointer)),
+            );
             return Err(found);
         }
         let shape = Shape::new(lengths, input.combine);
@@ -99,6 +105,7 @@ impl Plan {
             shard_points: 1,
             cost: Cost { ms: 0.0, bytes: 0, driver: "/vary" },
             wanted,
+            names,
         };
         plan.look()?;
         Ok(plan)
@@ -171,7 +178,7 @@ impl Plan {
 
     /// The job of a point, ready to run.
     pub(crate) fn ready(&self, point: usize) -> Result<Ready, Error> {
-        read::read_value(&self.entry, Value::Object(self.job(point)), &[])
+        read::read_point(&self.entry, Value::Object(self.job(point)), &self.names)
     }
 
     /// What the variables are at a point.

@@ -554,7 +554,7 @@ fn the_cost_is_that_of_its_points() {
 fn a_composed_entry_is_never_run_where_it_arrives() {
     let entry = studies_of(&toy::registry());
     assert!(entry.is_composed());
-    let models = crate::engine::model::Models::new(toy::shared(), None);
+    let models = crate::engine::names::Names::new(toy::shared(), crate::engine::names::Found::default());
     let study = study(json!([{"pointer": "/length_mm", "values": [100]}]));
     let ready = read::read(&entry, &body(&study), &models).unwrap();
     assert!(ready.prepared.cost.ms < 0.5, "although it is short");

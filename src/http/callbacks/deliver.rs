@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::time::Duration;
 
-use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode};
+use axum::http::{HeaderMap, HeaderName, HeaderValue};
 use bytes::Bytes;
 use tokio::sync::watch;
 use tokio::task::JoinSet;
@@ -15,9 +15,9 @@ use super::event::JobEvent;
 use super::sign::signatures;
 use crate::engine::{DueCallback, Engine, Error, Job, TakeUp, Tried};
 use crate::http::App;
-use crate::http::gate::TRACEPARENT;
+use crate::http::gate::{TRACEPARENT, TRACESTATE};
 use crate::outward::{Fault, Outward};
-use crate::trace::{self, Traceparent};
+use crate::trace::{self, TraceContext};
 
 /// Tries at the same time.
 const MOST: usize = 16;
@@ -27,6 +27,12 @@ const MOST_OF_ONE: u32 = 4;
 const LOOK: Duration = Duration::from_secs(1);
 /// Who has taken a callback up is taken for dead so long after he should have been done.
 const SPARE: Duration = Duration::from_secs(15);
+/// For so long at most a receiver is left alone because it asks for that (`Retry-After`).
+const MOST_LEAVE: Duration = Duration::from_hours(24);
+/// Fault of a receiver that is gone for good.
+const GONE: &str = "http_410";
+/// A fault of the service's own.
+const INTERNAL: &str = "internal";
 /// How long tries may take to end when the service does.
 const LAST: Duration = Duration::from_secs(5);
 
@@ -93,15 +99,16 @@ async fn due(engine: &Engine, callbacks: &Callbacks, free: usize, busy: &HashMap
 async fn tell(app: App, outward: Outward, due: DueCallback) -> String {
     let host = due.host.clone();
     let job = app.engine.job(due.job).await;
-    let given: Option<Traceparent> = job.as_ref().ok().and_then(|job| job.record.traceparent.as_deref()?.parse().ok());
+    let record = job.as_ref().ok().map(|job| &job.record);
+    let given = record.and_then(|job| TraceContext::of_record(job.traceparent.as_deref(), job.tracestate.as_deref()));
     let span = tracing::info_span!(
         "callback",
         job = %due.job,
         host = due.host,
         attempt = due.attempt,
-        trace = given.map(|given| tracing::field::display(given.trace()))
+        trace = given.as_ref().map(|given| tracing::field::display(given.trace()))
     );
-    if let Some(given) = given {
+    if let Some(given) = &given {
         trace::follow(&span, given);
     }
     let place = trace::place_of(&span, given);
@@ -109,7 +116,7 @@ async fn tell(app: App, outward: Outward, due: DueCallback) -> String {
         let outcome = tried(&app, &outward, (&due, job), place).await;
         let (tried, label) = match outcome {
             Ok(()) => (Tried::Delivered, "delivered"),
-            Err(fault) => what_now(&app.callbacks.pauses, due.attempt, fault),
+            Err(miss) => what_now(&app.callbacks.pauses, due.attempt, miss),
         };
         metrics::counter!("precut_callbacks_total", "outcome" => label).increment(1);
         match &tried {
@@ -127,61 +134,88 @@ async fn tell(app: App, outward: Outward, due: DueCallback) -> String {
     host
 }
 
+/// Why a try came to nothing.
+#[derive(Debug, PartialEq, Eq)]
+struct Miss {
+    /// As a code.
+    fault: String,
+    /// For how long the receiver asks to be left alone.
+    leave: Option<Duration>,
+}
+
+impl From<Fault> for Miss {
+    fn from(fault: Fault) -> Self {
+        let leave = if let Fault::Status { retry_after, .. } = fault { retry_after } else { None };
+        Self { fault: fault.code(), leave }
+    }
+}
+
+impl From<&str> for Miss {
+    fn from(fault: &str) -> Self {
+        Self { fault: fault.to_owned(), leave: None }
+    }
+}
+
 /// What is done after a try that came to nothing, and what it is called in the metrics.
-fn what_now(pauses: &[Duration], attempt: u32, fault: String) -> (Tried, &'static str) {
+fn what_now(pauses: &[Duration], attempt: u32, miss: Miss) -> (Tried, &'static str) {
+    let Miss { fault, leave } = miss;
     // The receiver says that it is gone for good.
-    let is_gone = fault == Fault::Status(StatusCode::GONE).code();
+    let is_gone = fault == GONE;
     let pause = pauses.get(attempt.saturating_sub(1) as usize).filter(|_| !is_gone);
     match pause {
         Some(pause) => {
-            let after_ms = i64::try_from(pause.as_millis()).unwrap_or(i64::MAX);
+            // A shorter one would use the tries up.
+            let after = leave.map_or(*pause, |leave| leave.min(MOST_LEAVE).max(*pause));
+            let after_ms = i64::try_from(after.as_millis()).unwrap_or(i64::MAX);
             (Tried::Again { after_ms, fault }, "failed")
         }
         None => (Tried::GivenUp { fault }, "given_up"),
     }
 }
 
-/// One try; why it came to nothing, as a code.
+/// One try; why it came to nothing.
 async fn tried(
     app: &App,
     outward: &Outward,
     (due, job): (&DueCallback, Result<Job, Error>),
-    place: Option<Traceparent>,
-) -> Result<(), String> {
-    let internal = || "internal".to_owned();
-    let url: Url = due.url.parse().map_err(|_| internal())?;
+    place: Option<TraceContext>,
+) -> Result<(), Miss> {
+    let url: Url = due.url.parse().map_err(|_| INTERNAL)?;
     // The settings may have changed since it was asked for.
     if !app.callbacks.may_be_called(&url) {
-        return Err("host_not_allowed".to_owned());
+        return Err("host_not_allowed".into());
     }
     let job = job.map_err(|error| {
         tracing::warn!(%error, "the job cannot be read");
-        internal()
+        INTERNAL
     })?;
     let secrets = app.callbacks.secrets.of(&job.record.owner).await.map_err(|error| {
         tracing::error!("{error}");
-        "no_secret".to_owned()
+        "no_secret"
     })?;
-    let event = JobEvent::of(&job).ok_or_else(internal)?;
-    let body = Bytes::from(serde_json::to_vec(&event).map_err(|_| internal())?);
+    let event = JobEvent::of(&job).ok_or(INTERNAL)?;
+    let body = Bytes::from(serde_json::to_vec(&event).map_err(|_| INTERNAL)?);
     let (id, now_s) = (due.job.to_string(), jiff::Timestamp::now().as_second());
     let mut headers = HeaderMap::new();
     let texts = [
         (SIGNATURE, Some(signatures(&secrets, &id, now_s, &body))),
         (ID, Some(id)),
         (TIMESTAMP, Some(now_s.to_string())),
-        (TRACEPARENT, place.map(|place| place.to_string())),
+        (TRACEPARENT, place.as_ref().map(TraceContext::traceparent)),
+        (TRACESTATE, place.as_ref().and_then(TraceContext::tracestate)),
     ];
     for (name, text) in texts {
         if let Some(text) = text {
-            headers.insert(name, HeaderValue::try_from(text).map_err(|_| internal())?);
+            headers.insert(name, HeaderValue::try_from(text).map_err(|_| INTERNAL)?);
         }
     }
-    outward.post(&url, headers, body).await.map_err(Fault::code)
+    Ok(outward.post(&url, headers, body).await?)
 }
 
 #[cfg(test)]
 mod tests {
+    use axum::http::StatusCode;
+
     use super::*;
     use crate::config::Config;
 
@@ -190,14 +224,27 @@ mod tests {
         let pauses = Callbacks::new(&Config::default().callbacks).pauses;
         let mut waited = Duration::ZERO;
         let mut attempt = 1;
-        while let (Tried::Again { after_ms, .. }, _) = what_now(&pauses, attempt, "http_503".to_owned()) {
+        while let (Tried::Again { after_ms, .. }, _) = what_now(&pauses, attempt, "http_503".into()) {
             let pause = Duration::from_millis(after_ms.unsigned_abs());
             assert!(attempt == 1 || pause > pauses[attempt as usize - 2], "they grow");
             (waited, attempt) = (waited + pause, attempt + 1);
         }
         assert_eq!(attempt, 8);
         assert!((Duration::from_hours(7)..Duration::from_hours(8)).contains(&waited), "{waited:?}");
-        let gone = what_now(&pauses, 1, "http_410".to_owned());
+        let gone = what_now(&pauses, 1, "http_410".into());
         assert_eq!(gone, (Tried::GivenUp { fault: "http_410".to_owned() }, "given_up"));
+    }
+
+    #[test]
+    fn a_receiver_is_left_alone_for_as_long_as_it_asks_within_a_day() {
+        let pauses = [Duration::from_secs(30)];
+        for (asked_s, left_s) in [(None, 30), (Some(1), 30), (Some(600), 600), (Some(u64::MAX), 86_400)] {
+            let retry_after = asked_s.map(Duration::from_secs);
+            let miss = || Miss::from(Fault::Status { status: StatusCode::SERVICE_UNAVAILABLE, retry_after });
+            let again = Tried::Again { after_ms: left_s * 1000, fault: "http_503".to_owned() };
+            assert_eq!(what_now(&pauses, 1, miss()), (again, "failed"));
+            // It does not get a try more for that.
+            assert_eq!(what_now(&pauses, 2, miss()).1, "given_up");
+        }
     }
 }

@@ -1,13 +1,13 @@
 //! The operations that do not depend on which calculators there are.
 
-use precut_calc::material;
 use serde_json::json;
-use utoipa::openapi::path::{HttpMethod, OperationBuilder, ParameterIn, PathItem};
-use utoipa::openapi::{Content, RefOr, Schema};
+use utoipa::openapi::path::{HttpMethod, OperationBuilder, Parameter, ParameterIn, PathItem};
+use utoipa::openapi::schema::{ObjectBuilder, SchemaType, Type};
+use utoipa::openapi::{Content, Object, RefOr, Required, Schema};
 
 use super::parts;
 use crate::http::negotiate::Media;
-use crate::http::{calculators, codes, health, materials, pages, parts as result_parts, provenance, results};
+use crate::http::{calculators, codes, health, pages, parts as result_parts, provenance, results};
 use crate::registry::Registry;
 
 /// Address and operations, in the order of the document.
@@ -21,9 +21,8 @@ pub(super) fn paths(registry: &Registry) -> Vec<(&'static str, PathItem)> {
         ("/v1/results/{key}/figures", get(read_figures())),
         ("/v1/results/{key}/tables", get(read_tables())),
         ("/v1/results/{key}/job", get(read_result_job())),
+        ("/v1/results/{key}/job_at", get(read_result_job_at())),
         ("/v1/results/{key}/provenance", get(read_provenance())),
-        ("/v1/materials", get(list_materials())),
-        ("/v1/materials/{id}", get(read_material())),
         ("/", get(landing())),
         ("/docs", get(docs())),
         ("/openapi.json", get(openapi())),
@@ -44,7 +43,6 @@ pub(super) fn schemas() -> Vec<(String, RefOr<Schema>)> {
         super::schemas_of::<result_parts::TableList>(),
         super::schemas_of::<result_parts::JobFile>(),
         super::schemas_of::<provenance::Provenance>(),
-        super::schemas_of::<materials::MaterialList>(),
         super::schemas_of::<pages::Landing>(),
         super::schemas_of::<pages::ProblemPage>(),
         super::schemas_of::<health::Health>(),
@@ -138,6 +136,7 @@ fn read_result() -> OperationBuilder {
     .parameter(parts::path_parameter("key", "Address of the answer.", parts::key(), key))
     .parameter(query("table", "Which table, with `Accept: text/csv`; the first if absent."))
     .parameter(query("figure", "Which figure, with `Accept: image/svg+xml`; the first if absent."))
+    .parameter(parts::include())
     .response("200", response);
     parts::guarded(parts::conditional(operation), &[400, 404, 406, 410, 422])
 }
@@ -178,6 +177,28 @@ fn read_result_job() -> OperationBuilder {
     )
 }
 
+fn read_result_job_at() -> OperationBuilder {
+    part_of_result(
+        "read_result_job_at",
+        "Which job stands at another place of a picture?",
+        "The job for which another place of a setting in a picture of a kept answer stands; where none stands there, the job as \
+         it is.",
+        "JobFile",
+    )
+    .parameter(query("figure", "Figure in which a setting is put elsewhere.", parts::string()))
+    .parameter(query("setting", "Name of the item of kind `setting` that is put elsewhere.", parts::string()))
+    .parameter(query("x", "Its abscissa there, in the unit of the axis.", number()))
+    .parameter(query("y", "Its ordinate there, in the unit of the axis.", number()))
+}
+
+fn query(name: &str, text: &str, schema: Object) -> Parameter {
+    parts::parameter(name, ParameterIn::Query, text, schema).required(Required::True).build()
+}
+
+fn number() -> Object {
+    ObjectBuilder::new().schema_type(SchemaType::new(Type::Number)).build()
+}
+
 fn read_provenance() -> OperationBuilder {
     part_of_result(
         "read_result_provenance",
@@ -187,31 +208,6 @@ fn read_provenance() -> OperationBuilder {
          not told.",
         "Provenance",
     )
-}
-
-fn list_materials() -> OperationBuilder {
-    let operation = operation(
-        "library",
-        "list_materials",
-        "Which materials are known?",
-        "Elastic constants, strength and force laws of work materials; every number with its source and how certain it is.",
-    )
-    .response("200", parts::tagged(json_of("MaterialList", "The materials.")));
-    parts::guarded(parts::conditional(operation), &[])
-}
-
-fn read_material() -> OperationBuilder {
-    let ids = material::library().iter().map(|material| material.id.to_owned());
-    let first = material::library().first().map_or("", |material| material.id);
-    let operation = operation(
-        "library",
-        "read_material",
-        "What is known of a material?",
-        "The numbers that a job gets when it names the material.",
-    )
-    .parameter(parts::path_parameter("id", "Name of the material.", parts::one_of(ids), json!(first)))
-    .response("200", parts::tagged(json_of("Material", "The material.")));
-    parts::guarded(parts::conditional(operation), &[404])
 }
 
 fn landing() -> OperationBuilder {

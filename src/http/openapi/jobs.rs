@@ -89,6 +89,11 @@ pub(super) fn may_become_one(operation: OperationBuilder) -> OperationBuilder {
             "Where the request belongs in a trace (W3C Trace Context): passed on to the job and to its callback.",
             parts::string(),
         ))
+        .parameter(header(
+            "tracestate",
+            "What the systems on the trace's way say of it: passed on with `traceparent`, 32 entries and 512 characters of it.",
+            parts::string(),
+        ))
         .response("202", accepted())
 }
 
@@ -113,12 +118,13 @@ pub(super) fn callback() -> PathItem {
         "`v1,` and the base64 of HMAC-SHA256 over `id.timestamp.body`; two, with a space between, while a secret is replaced.",
     ))
     .parameter(header("traceparent", "Where the call belongs in a trace, if the job does."))
+    .parameter(header("tracestate", "What came with the job beside its `traceparent`."))
     .request_body(Some(body.build()))
     // Its signature says who it is from.
     .securities(Some(Vec::new()))
     .response("2XX", answer("It is taken."))
     .response("410", answer("Nobody is there any more: it is given up at once."))
-    .response("default", answer("It is tried again, after longer and longer pauses."));
+    .response("default", answer("It is tried again, after longer and longer pauses, or that of `Retry-After` if it is longer, up to a day."));
     PathItem::new(HttpMethod::Post, operation)
 }
 

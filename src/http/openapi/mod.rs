@@ -2,6 +2,7 @@
 
 mod fixed;
 mod jobs;
+mod library;
 mod models;
 mod named;
 mod parts;
@@ -65,10 +66,18 @@ pub fn document(registry: &Registry) -> Value {
     for (address, path) in jobs::paths(registry).into_iter().chain(models::paths()).chain(fixed::paths(registry)) {
         paths = paths.path(address, path);
     }
-    for (name, schema) in
-        parts::schemas().into_iter().chain(fixed::schemas()).chain(jobs::schemas()).chain(models::schemas())
+    for (address, path) in library::paths() {
+        paths = paths.path(address, path);
+    }
+    for (name, schema) in parts::schemas()
+        .into_iter()
+        .chain(fixed::schemas())
+        .chain(jobs::schemas())
+        .chain(models::schemas())
+        .chain(library::schemas())
     {
-        schemas.insert(name, schema);
+        let before = schemas.insert(name.clone(), schema.clone());
+        debug_assert!(before.is_none_or(|before| before == schema), "two schemas are called {name}");
     }
     let components = schemas
         .into_iter()

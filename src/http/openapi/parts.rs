@@ -10,6 +10,7 @@ use utoipa::openapi::schema::{KnownFormat, ObjectBuilder, SchemaFormat, SchemaTy
 use utoipa::openapi::security::SecurityRequirement;
 use utoipa::openapi::{Content, Object, Ref, RefOr, Required, Schema};
 
+use crate::http::answer::Include;
 use crate::http::negotiate::Media;
 use crate::http::problem::ProblemDocument;
 use crate::text::Remark;
@@ -194,6 +195,13 @@ pub(super) fn parameter(name: &str, place: ParameterIn, text: &str, schema: Obje
         .required(Required::False)
         .description(Some(text))
         .schema(Some(schema))
+}
+
+/// What an answer as JSON may bring along.
+pub(super) fn include() -> Parameter {
+    let words = one_of(Include::ALL.iter().map(|include| include.word().to_owned()));
+    let text = "`figures`: what there is to draw, as the last field of an answer as JSON: one request in place of two.";
+    parameter("include", ParameterIn::Query, text, words).build()
 }
 
 /// A part of the address.

@@ -96,6 +96,7 @@ fn parameters(mut operation: OperationBuilder, meta: &Meta) -> OperationBuilder 
         let text = "Which figure, with `Accept: image/svg+xml`; the first if absent.";
         operation =
             operation.parameter(parts::parameter("figure", ParameterIn::Query, text, ids(meta.figures)).build());
+        operation = operation.parameter(parts::include());
     }
     operation
 }
@@ -196,11 +197,25 @@ fn envelope(meta: &Meta, result: &str) -> Object {
             anything("The job with every default filled in; measured tables in it as their row count and hash."),
         )
         .property("model", model())
+        .property("resources", resources())
+        .property(
+            "origins",
+            list(
+                "NumberOrigin",
+                "Where each number comes from that a record had a say in; absent where the job named none.",
+            ),
+        )
         .property("effects", effects)
         .property("result", Ref::from_schema_name(result))
         .property("explanation", list("Remark", "What dominates, what binds, what would help: most important first."))
         .property("warnings", list("Notice", "Where an input leaves a formula's range of validity, and the like."))
         .property("basis", list("Basis", "The equations that acted, with their sources."))
+        .property(
+            "figures",
+            ArrayBuilder::new()
+                .items(anything("A figure: frame, axes and panels with their items, each with its `text`."))
+                .description(Some("What there is to draw, with `include=figures`; absent otherwise.")),
+        )
         .required("calculator")
         .required("version")
         .required("engine")
@@ -213,6 +228,16 @@ fn envelope(meta: &Meta, result: &str) -> Object {
         .required("warnings")
         .required("basis")
         .description(Some(format!("An answer of {}.", meta.id)))
+        .build()
+}
+
+/// The records that a job named.
+fn resources() -> Object {
+    ObjectBuilder::new()
+        .additional_properties(Some(Ref::from_schema_name("RecordOrigin")))
+        .description(Some(
+            "The machine, tool and material that the job named, each as it was when the job was accepted; absent where it named none.",
+        ))
         .build()
 }
 

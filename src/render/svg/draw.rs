@@ -43,7 +43,7 @@ pub(super) fn items(
             Item::HeatMap { value, .. } => value.label,
             Item::Glyph { glyph, .. } => glyph::label(*glyph),
             // Nobody takes hold of paper.
-            Item::Handle(_) => continue,
+            Item::Handle(_) | Item::Setting(_) => continue,
         };
         put!(page, "<g><title>{}</title>", Escaped(&(wording.label)(code)));
         // Between a curve and the colours under it.
@@ -80,7 +80,7 @@ pub(super) fn items(
                     put!(page, "</g>");
                 }
             }
-            Item::Handle(_) => {}
+            Item::Handle(_) | Item::Setting(_) => {}
         }
         put!(page, "</g>");
     }

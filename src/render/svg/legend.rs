@@ -125,7 +125,7 @@ fn sample(page: &mut Page, sample: &Sample<'_>, x: f64, y: f64, styles: &Styles)
             ribbon::sample(page, (x, y - 6.0), (SAMPLE, 12.0), &class(name, *role), *role);
         }
         // The map has an entry of its own; a handle has none.
-        Sample::Item(Item::HeatMap { .. } | Item::Handle(_)) => {}
+        Sample::Item(Item::HeatMap { .. } | Item::Handle(_) | Item::Setting(_)) => {}
         Sample::Map(key) => key.sample(page, (x, y - 5.0), (SAMPLE, 10.0)),
         Sample::Item(Item::Bars { name, role, .. }) => {
             let class = class(name, *role);

@@ -87,7 +87,7 @@ fn ordinates(item: &Item) -> Box<dyn Iterator<Item = f64> + '_> {
         Item::Points { y, .. } | Item::Outline { y, .. } => Box::new(y.iter().copied()),
         Item::HeatMap { values, .. } => Box::new(values.iter().copied().flatten()),
         // What it weighs is no place on the ordinate; a handle is not drawn.
-        Item::Ribbon { .. } | Item::Handle(_) => Box::new(std::iter::empty()),
+        Item::Ribbon { .. } | Item::Handle(_) | Item::Setting(_) => Box::new(std::iter::empty()),
         Item::Glyph { y, .. } => Box::new(std::iter::once(*y)),
     }
 }

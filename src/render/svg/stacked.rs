@@ -244,7 +244,7 @@ fn across(panel: &Panel, spacing: Spacing) -> Vec<f64> {
             }
             Item::HeatMap { x, .. } => taken.extend(ends(spacing, x)),
             Item::Glyph { x, .. } => taken.extend(coordinate(spacing, *x)),
-            Item::Handle(_) => {}
+            Item::Handle(_) | Item::Setting(_) => {}
         }
     }
     taken

@@ -175,7 +175,7 @@ pub(super) fn identity(item: &Item) -> Option<(&'static str, Role)> {
         | Item::Bars { name, role, .. }
         | Item::Ribbon { name, role, .. }
         | Item::Outline { name, role, .. } => Some((name, role)),
-        Item::HeatMap { .. } | Item::Glyph { .. } | Item::Handle(_) => None,
+        Item::HeatMap { .. } | Item::Glyph { .. } | Item::Handle(_) | Item::Setting(_) => None,
     }
 }
 
