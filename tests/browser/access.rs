@@ -63,9 +63,15 @@ fn axe_finds_no_violation_on_any_page() {
     page.open(&service.page("feed-schedule"));
     page.until(SETTLED);
     page.click_on("Objective over");
+    // The picture of another place comes once one is tried.
+    page.wait_for("#trial");
+    page.evaluate("document.querySelector('#trial').focus()");
+    for _ in 0..10 {
+        page.press("ArrowRight");
+    }
     page.wait_for(".preview .picture");
     assert_accessible(&mut page, "trade-off");
-    for place in ["jobs", "results", "models", "nothing-like-it"] {
+    for place in ["jobs", "results", "models", "library", "nothing-like-it"] {
         page.open(&service.page(place));
         page.wait_for("main h1");
         assert_accessible(&mut page, place);
@@ -77,11 +83,11 @@ fn axe_finds_no_violation_on_any_page() {
 fn no_page_is_wider_than_its_window() {
     let Some((_turn, mut page, service)) = both() else { return };
     let mut places = rooms(&mut page, &service);
-    places.extend(["", "jobs", "results", "models", "studies"].map(str::to_owned));
+    places.extend(["", "jobs", "results", "models", "library", "studies"].map(str::to_owned));
     for place in &places {
         page.screen(360, 740, false);
         page.open(&service.page(place));
-        if ["", "jobs", "results", "models", "studies"].contains(&place.as_str()) {
+        if ["", "jobs", "results", "models", "library", "studies"].contains(&place.as_str()) {
             page.wait_for("main h1");
         } else {
             page.until(SETTLED);
@@ -181,7 +187,7 @@ fn the_keyboard_alone_is_enough() {
     page.until("document.activeElement.classList.contains('skip')");
     // Through the shell into the form, in the order in which it is read.
     let mut seen = Vec::new();
-    for _ in 0..16 {
+    for _ in 0..20 {
         page.press("Tab");
         let name = page.evaluate(
             "(() => { const it = document.activeElement; return (it.id || it.textContent).trim().slice(0, 40) })()",

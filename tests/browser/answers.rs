@@ -38,7 +38,7 @@ fn typed(dice: &mut Dice, mm: f64) -> (String, Option<f64>) {
 
 /// What stands in the form, by the ids of its fields.
 const WATCH: &str = "(() => { \
-    window.onScreen = () => [...document.querySelectorAll('.form input[inputmode=decimal]')].filter(it => it.id.startsWith('field-shaft-segments-') || it.id === 'field-cut-feed_mm_per_rev').map(it => [it.id, it.value]); \
+    window.onScreen = () => [...document.querySelectorAll('.form input[inputmode=decimal]')].filter(it => it.id.startsWith('field-shaft-segments-') || /^field-supports-[0-9]+-z_mm$/.test(it.id) || it.id === 'field-cut-feed_mm_per_rev').map(it => [it.id, it.value]); \
     window.typeInto = (it, text) => { it.focus(); Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, 'value').set.call(it, text); it.dispatchEvent(new InputEvent('input', { bubbles: true })); }; \
     window.programs = []; window.papers = []; \
     const make = URL.createObjectURL; \
@@ -57,6 +57,12 @@ fn copied(base: &Value, screen: &Value, known: &HashMap<String, f64>) -> Option<
             "" => None,
             text => Some(known.get(text).copied().or_else(|| text.parse().ok())?),
         };
+        // A support at the end of the shaft goes with it.
+        if let Some(place) = id.strip_prefix("field-supports-") {
+            let support: usize = place.split('-').next().unwrap().parse().unwrap();
+            job["supports"][support]["z_mm"] = number?.into();
+            continue;
+        }
         match id.strip_prefix("field-shaft-segments-") {
             Some(place) => {
                 let (row, name) = place.split_once('-').unwrap();

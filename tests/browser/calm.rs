@@ -157,6 +157,12 @@ fn a_default_says_where_it_comes_from_and_many_pictures_are_a_list() {
     // The material is named, its numbers are grey; the line below says which material, and whose number it is.
     page.evaluate("document.querySelector('#field-shaft-youngs_modulus_n_per_mm2').focus()");
     page.until("/from the material .*\\(.+\\)/.test(document.querySelector('.help').textContent)");
+    // Another material is another source, told while the field is still the one being edited.
+    page.evaluate(
+        "{ const list = document.querySelector('#field-shaft-material'); list.value = 'c60'; \
+         list.dispatchEvent(new Event('change', { bubbles: true })); }",
+    );
+    page.until("/from the material .*C60.*\\(.+\\)/.test(document.querySelector('.help').textContent)");
     page.open(&service.page("diagnosis"));
     page.until(SETTLED);
     let first = page.text(".picture h2");

@@ -15,6 +15,7 @@ mod instruments;
 mod jobs;
 mod keys;
 mod offers;
+mod records;
 mod rooms;
 mod screenshots;
 mod service;

@@ -98,7 +98,7 @@ fn stage(page: &mut Page, name: &str) {
         }
         "trade-off" => {
             page.click_on("Objective over");
-            page.evaluate("document.querySelector('#trade-off').focus()");
+            page.evaluate("document.querySelector('#trial').focus()");
             for _ in 0..14 {
                 page.press("ArrowRight");
             }

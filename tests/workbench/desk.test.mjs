@@ -20,15 +20,14 @@ function service({ followed = {} } = {}) {
       signal.addEventListener('abort', () => { over(); reject(new DOMException('', 'AbortError')); });
       own.asked.push({
         job, signal,
-        answer: () => { over(); resolve({ answer: { key: `b3:${JSON.stringify(job)}`, result: job } }); },
+        answer: () => { over(); resolve({ answer: { key: `b3:${JSON.stringify(job)}`, result: job }, figures: [] }); },
         accept: run => { over(); resolve({ job: { id: run, state: 'queued' } }); },
         refuse: () => { over(); reject(new Refused(422, { title: 'no', status: 422 })); },
         lose: () => { over(); reject(new Unreachable('away')); },
       });
     }),
     patient: question => question(),
-    result: async key => ({ key, result: JSON.parse(key.slice(3)) }),
-    figures: async () => [],
+    shown: async key => ({ answer: { key, result: JSON.parse(key.slice(3)) }, figures: [] }),
     calculator: async () => ({ id: 'toy', examples: [{ id: 'first' }], jobs: { first: { d: 1 } }, input_schema: {} }),
     jobOf: async key => ({ job: JSON.parse(key.slice(3)) }),
     cancel: async run => { own.cancelled.push(run); },

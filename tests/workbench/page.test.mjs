@@ -12,13 +12,24 @@ test('nothing in the page names a calculator', () => {
 });
 
 test('nothing leaves the page past the rule', () => {
-  // What saves, copies or prints stands in one file, or asks it; lists and models are no answers.
+  // What saves, copies or prints stands in one file, or asks it; lists, models and records are no answers.
   for (const [name, text] of files) {
-    if (!['handover.js', 'pages.js'].includes(name)) assert.ok(!/createObjectURL|api\.file\(|[^a-z]save\(/.test(text), `${name} saves by itself`);
+    if (!['handover.js', 'pages.js', 'library.js'].includes(name)) assert.ok(!/createObjectURL|api\.file\(|[^a-z]save\(/.test(text), `${name} saves by itself`);
     for (const found of text.matchAll(/window\.print\(\)/g)) assert.match(text.slice(Math.max(0, found.index - 60), found.index), /owns\(/, `${name} prints unasked`);
   }
 });
 
 test('no file is long', () => {
   for (const [name, text] of files) assert.ok(text.split('\n').length <= 420, `${name} has ${text.split('\n').length} lines`);
+});
+
+test('maps have the colours of the service\'s own drawings', () => {
+  const service = readFileSync(new URL('../../src/render/svg/colour.rs', import.meta.url), 'utf8');
+  const page = files.find(([name]) => name === 'palette.js')[1];
+  for (const name of ['SEQUENTIAL', 'DIVERGING', 'DIVERGING_DARK']) {
+    const own = page.match(new RegExp(`const ${name} = split\\('([^']*)'\\)`))[1].split(' ');
+    const list = service.match(new RegExp(`const ${name}: [^=]*= \\[([^\\]]*)\\]`))[1];
+    assert.ok(own.length > 1, name);
+    assert.deepEqual(own, [...list.matchAll(/"([0-9a-f]{6})"/g)].map(([, colour]) => colour), name);
+  }
 });

@@ -9,7 +9,7 @@ import { withOwn } from './mine.js';
 export class BrokenLink extends Error {}
 
 /** A value of an address. */
-function valueOf(place, text) {
+function readValue(place, text) {
   try { return text === '' ? undefined : JSON.parse(text); } catch { throw new BrokenLink(t('link_value', { place, text })); }
 }
 
@@ -40,7 +40,7 @@ export async function jobOf(description, query, service = api) {
   let job = base;
   for (const [place, text] of query) {
     if (!place.startsWith('/')) continue;
-    job = changed(job, parts(place), valueOf(place, text));
+    job = changed(job, parts(place), readValue(place, text));
   }
   // Whoever asks for no job in particular begins with what is his own.
   const begun = query.has('example') || job !== base ? { job, own: [] } : withOwn(description.input_schema, job);

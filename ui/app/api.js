@@ -84,37 +84,49 @@ const enc = encodeURIComponent;
 
 export const calculators = () => json('/v1/calculators');
 export const calculator = id => json(`/v1/calculators/${enc(id)}`);
-export const materials = () => json('/v1/materials');
+/** All machines, tools or materials: own ones, then the service's. */
+export async function records(list) {
+  const items = [];
+  for (let next = `/v1/${list}`; next;) {
+    const part = await json(next);
+    items.push(...part.items);
+    next = part.next;
+  }
+  return items;
+}
 export const results = query => json(`/v1/results?${new URLSearchParams(query)}`);
 export const page = path => json(path);
 export const result = (key, signal) => json(`/v1/results/${key}`, { signal });
-export const figures = async (key, signal) => (await json(`/v1/results/${key}/figures`, { signal })).items;
+/** An answer with its figures: `{ answer, figures }`, in one request. */
+export const shown = async (key, signal) => withFigures(await json(`/v1/results/${key}?include=figures`, { signal }));
+const withFigures = ({ figures, ...answer }) => ({ answer, figures: figures ?? [] });
 export const tables = async (key, signal) => (await json(`/v1/results/${key}/tables`, { signal })).items;
 export const jobOf = key => json(`/v1/results/${key}/job`);
+/** The job for which another place of a picture stands: `{ figure, setting, x, y }`. */
+export const jobAt = (key, place, signal) => json(`/v1/results/${key}/job_at?${new URLSearchParams(place)}`, { signal });
 export const jobs = query => json(`/v1/jobs?${new URLSearchParams(query)}`);
 export const job = id => json(`/v1/jobs/${enc(id)}`);
 export const jobInput = id => json(`/v1/jobs/${enc(id)}/job`);
 export const cancel = id => json(`/v1/jobs/${enc(id)}`, { method: 'DELETE' });
 export const alive = async () => { await ask('/health/live'); };
 
-/** Sends a job: `{answer}` if it is answered at once, `{job}` if it takes longer.
+/** Sends a job: `{answer, figures}` if it is answered at once, `{job}` if it takes longer.
  *  @param {string} id @param {any} body @param {{ signal?: AbortSignal }} [options] */
 export async function solve(id, body, { signal } = {}) {
-  const response = await ask(`/v1/${enc(id)}`, {
+  const response = await ask(`/v1/${enc(id)}?include=figures`, {
     method: 'POST',
     signal,
     headers: { 'Content-Type': 'application/json' },
     body: JSON.stringify(body),
   });
   const document = await response.json();
-  if (response.status === 202) return { job: document };
-  return { answer: document, cache: response.headers.get('Precut-Cache'), timing: response.headers.get('Server-Timing') };
+  return response.status === 202 ? { job: document } : withFigures(document);
 }
 
-/** An answer, however long it takes; given up, its job is cancelled. */
+/** An answer with its figures, however long it takes; given up, its job is cancelled. */
 export async function answered(id, body, signal) {
-  const { answer, job: record } = await solve(id, body, { signal });
-  if (answer) return answer;
+  const { job: record, ...found } = await solve(id, body, { signal });
+  if (!record) return found;
   const done = await new Promise((resolve, reject) => {
     const stop = follow(record.id, { onDone: resolve, onTrouble: reject });
     signal?.addEventListener('abort', () => {
@@ -124,7 +136,7 @@ export async function answered(id, body, signal) {
     });
   });
   if (done.state !== 'succeeded') throw new Refused(done.problem?.status || 409, done.problem || { title: done.state });
-  return result(done.key, signal);
+  return shown(done.key, signal);
 }
 
 /** A result in another form, as a file. */
@@ -134,6 +146,17 @@ export async function file(key, accept, query = '') {
 export async function program(key, signal) {
   return (await ask(`/v1/results/${key}`, { signal, headers: { Accept: 'text/x-gcode' } })).text();
 }
+
+const recordAt = (list, name) => `/v1/${list}/${enc(name)}`;
+/** Stores a machine, a tool or a material; only under a name that nothing has, if it has to be new. */
+export const saveRecord = (list, name, source, isNew) => json(recordAt(list, name), {
+  method: 'PUT',
+  headers: { 'Content-Type': 'application/json', ...(isNew && { 'If-None-Match': '*' }) },
+  body: JSON.stringify(source),
+});
+export const dropRecord = (list, name) => ask(recordAt(list, name), { method: 'DELETE' });
+export const importLibrary = (text, type) => json('/v1/library/import', { method: 'POST', headers: { 'Content-Type': type }, body: text });
+export const exportLibrary = async form => (await ask(`/v1/library/export?format=${form}`)).blob();
 
 /** Stored models: `null` where the service keeps none. */
 export async function models() {

@@ -1,8 +1,9 @@
-// What a diagnosis found, at a glance: how likely each cause is, its size, what the data cannot tell apart, what is
-// gained on data that was held back, and the measurement worth making next.
+// Causes that were weighed, at a glance: how likely each is, its size, what the data cannot tell apart, what is gained on data
+// that was held back, and the measurement worth making next. A result has them where its schema says so (`x-causes` at a field
+// of an item of their list).
 import { html, useMemo } from './lib.js';
 import { t, capital, number, unitSymbol, unitOf } from './text.js';
-import { humanised, labelOf, resolve, variants, within } from './schema.js';
+import { humanised, labelOf, listsWith, resolve, variants, within } from './schema.js';
 import { withSpread } from './digits.js';
 import { SheetButtons } from './inspection.js';
 
@@ -37,8 +38,18 @@ function wordsOf(description, calculator) {
   };
 }
 
-/** Whether the result is that of a diagnosis that says anything of causes. */
-export const hasCauses = result => Array.isArray(result?.causes) && result.verdict !== 'refused';
+/** The causes of an answer with the words for them; `null` for an answer without. `unit` is that of the errors, empty for
+ *  logarithms; `isSilent` says that it was refused to say anything of them. */
+export function causesOf(description, { result, input: { calculator } }, figures) {
+  const root = description.output_schema;
+  const [list] = listsWith('x-causes', root, result, answerSchema(description, calculator));
+  if (!list) return null;
+  const unit = figures.find(({ id }) => id === list.said.errors_as_in)?.panels[0]?.y.unit;
+  return { result, ...wordsOf(description, calculator), unit: unit === undefined ? undefined : unitSymbol(unit), named: result.named ?? [], isNamed: result.verdict === 'named', isSilent: result.verdict === 'refused' };
+}
+
+/** What the picture of the causes tells already. */
+export const saidOfCauses = code => ['diagnosis_next', 'diagnosis_gain'].includes(code);
 
 /** Whether the heaviest set is one of the catalogue, and the rows object to it. */
 const isObjected = ({ verdict, sets, unnamed_probability: unnamed }) => verdict === 'unknown' && sets[0]?.posterior > unnamed;
@@ -92,10 +103,10 @@ const errorOf = (error, unit) => (unit === '' ? number(100 * error, 3) : number(
 
 /** The numbers of a diagnosis that matter at a glance: what is named, or may act, with its probability, how large it is, and
  *  what it gains on data that was held back. None where nothing is said of causes. */
-export function causesHeadline(result, description, calculator, unit) {
-  if (!Array.isArray(result?.causes)) return null;
-  if (!hasCauses(result)) return [];
-  const { kinds } = wordsOf(description, calculator);
+export function causesHeadline(causes) {
+  if (!causes) return null;
+  if (causes.isSilent) return [];
+  const { result, kinds, unit } = causes;
   const { nameOf } = namer(kinds);
   const setName = causes => (causes.length > 0 ? causes.map(({ kind, label }) => nameOf(kind, label)).join(' + ') : t('cause_none'));
   const { gain } = result;
@@ -124,16 +135,16 @@ function conditionOf(name, value, field) {
 }
 
 /** Whether a next measurement is advised: of what the list does not hold none can be told apart. */
-export const advisesNext = result => Boolean(result?.next_measurement) && (result.verdict !== 'unknown' || result.named.length > 0);
+const advisesNext = result => Boolean(result.next_measurement) && (result.verdict !== 'unknown' || result.named.length > 0);
+export const nextAdvised = causes => Boolean(causes && !causes.isSilent && advisesNext(causes.result));
 
-export function Causes({ result, description, calculator, unit, sheet, answer, name, owns, stale }) {
-  const { kinds, conditions } = useMemo(() => wordsOf(description, calculator), [description, calculator]);
+export function Causes({ causes: { result, kinds, conditions, unit, isSilent }, sheet, answer, title, name, owns, stale }) {
   const { spoken, nameOf } = useMemo(() => namer(kinds), [kinds]);
   const times = (kind, list) => { const count = list.filter(other => other === kind).length; return count > 1 ? `${count} × ${spoken(kind)}` : spoken(kind); };
   const set = list => (list.length > 0 ? [...new Set(list)].map(kind => times(kind, list)).join(' + ') : t('the_base'));
   const isUnknown = result.verdict === 'unknown';
   const isDenied = isObjected(result);
-  const likely = result.causes.slice().sort((a, b) => b.probability - a.probability)
+  const likely = (result.causes ?? []).slice().sort((a, b) => b.probability - a.probability)
     .map(cause => ({ ...cause, key: cause.kind + cause.label, name: nameOf(cause.kind, cause.label), share: cause.probability, like: cause.confounded_with, isNamed: result.named.some(one => isSame(one, cause)) }));
   const named = likely.filter(({ isNamed }) => isNamed);
   const others = likely.filter(({ isNamed, share }) => !isNamed && share >= LEAST_SHARE).slice(0, Math.max(0, MOST_BARS - named.length));
@@ -144,6 +155,7 @@ export function Causes({ result, description, calculator, unit, sheet, answer, n
   const like = named.filter(bar => bar.like?.length > 0);
   const { gain, next_measurement: next } = result;
   const exact = exactSet(result);
+  if (isSilent) return null;
   return html`
     <section class="picture causes" aria-label=${t('causes_found')}>
       <h2>${t('causes_found')}</h2>
@@ -157,8 +169,8 @@ export function Causes({ result, description, calculator, unit, sheet, answer, n
       ${gain && html`<${Gain} ...${{ gain, unit, isNamed: named.length > 0 }} />`}
       ${advisesNext(result) && html`<h3>${t('next_measurement')}</h3>
         <p class="run">${Object.entries(next.run).filter(([, value]) => value !== null && !(Array.isArray(value) && value.length === 0)).map(([name, value]) => html`<span key=${name} class=${name === next.changes ? 'changed' : ''}>${conditionOf(name, value, conditions.get(name))}</span>`)}</p>
-        <p class="quiet">${t('next_separates', { leader: set(next.leader), rival: set(next.rival), now: number(next.separation_now_sigmas, 2), then: number(next.separation_then_sigmas, 2) })}</p>
-        ${sheet && html`<${SheetButtons} ...${{ sheet, answer, name, owns, stale }} title=${description.title} />`}`}
+        <p class="quiet">${t('next_separates', { leader: set(next.leader), rival: set(next.rival), now: number(next.separation_now_sigmas, 2), after: number(next.separation_then_sigmas, 2) })}</p>
+        ${sheet && html`<${SheetButtons} ...${{ sheet, answer, name, owns, stale, title }} />`}`}
     </section>`;
 }
 
@@ -167,7 +179,7 @@ function Bar({ name, share, length = share ?? 1, isNamed = false, isAnswer = fal
   const isSolid = isNamed || isAnswer;
   return html`
     <tr class=${isNamed ? 'named' : isAnswer ? 'answer' : ''}><th scope="row">${name}</th>
-      <td class="clamp-bar"><svg viewBox=${`0 0 ${WIDTH} 14`} preserveAspectRatio="none" aria-hidden="true"><rect class=${isNamed ? 'clamp-given' : isAnswer ? 'share-answer' : 'share-hollow'} x="0" y="1" width=${Math.max(WIDTH * length, isSolid ? 2 : 6)} height="12" vector-effect="non-scaling-stroke" /></svg></td>
+      <td class="clamp-bar"><svg viewBox=${`0 0 ${WIDTH} 14`} preserveAspectRatio="none" aria-hidden="true"><rect class=${isNamed ? 'bar-given' : isAnswer ? 'share-answer' : 'share-hollow'} x="0" y="1" width=${Math.max(WIDTH * length, isSolid ? 2 : 6)} height="12" vector-effect="non-scaling-stroke" /></svg></td>
       <td class="number">${share === null ? '' : percent(share)}</td></tr>`;
 }
 
@@ -178,9 +190,9 @@ const percent = share => (share > 0.999 ? `> ${number(99.9)} %` : share > 0 && s
 function Gain({ gain, unit, isNamed }) {
   const isWorse = gain.rmse_extended >= gain.rmse_base;
   const rows = [
-    ['clamp-entry', t('error_base'), gain.rmse_base],
-    [isWorse ? 'gain-none' : isNamed ? 'clamp-given' : 'clamp-dynamics', t(isNamed ? 'error_extended' : 'error_chosen'), gain.rmse_extended],
-    ...(typeof gain.noise_ceiling === 'number' ? [['clamp-statics', t('error_noise'), gain.noise_ceiling]] : []),
+    ['bar-third', t('error_base'), gain.rmse_base],
+    [isWorse ? 'gain-none' : isNamed ? 'bar-given' : 'bar-second', t(isNamed ? 'error_extended' : 'error_chosen'), gain.rmse_extended],
+    ...(typeof gain.noise_ceiling === 'number' ? [['bar-first', t('error_noise'), gain.noise_ceiling]] : []),
   ];
   const most = Math.max(...rows.map(row => row[2]));
   const told = error => `${errorOf(error, unit)} ${unit === '' ? '%' : unit ?? ''}`;

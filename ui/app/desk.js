@@ -6,6 +6,8 @@ import { cell, debounced } from './lib.js';
 import { keepRun } from './runs.js';
 import { BrokenLink, openedBy, queryOf, written } from './address.js';
 import { noteLast } from './mine.js';
+import { FOLDER } from './records.js';
+import { Places } from './elsewhere.js';
 
 /** An answer slower than this, ms, is asked for and not followed live. */
 const LIVE_LIMIT_MS = 1500;
@@ -37,7 +39,7 @@ const realClock = { now: () => performance.now(), pause: ms => new Promise(resol
  * @typedef {object} DeskState
  * @property {any} description the calculator's declaration in the language of now
  * @property {any} missing why there is no such page
- * @property {{ materials?: any[] }} libraries
+ * @property {{ machines?: any[], tools?: any[], materials?: any[] }} libraries records that jobs may name
  * @property {any} base
  * @property {{ example?: string, result?: string, run?: string }} baseName
  * @property {any} job
@@ -72,6 +74,7 @@ export class Desk {
     this.isFlying = false;
     this.wanted = null;
     this.stopFollowing = null;
+    this.places = new Places(this);
     /** @type {Record<string, (() => void) | null>} */
     this.waits = {};
     this.turn = { describe: 0, open: 0 };
@@ -148,15 +151,16 @@ export class Desk {
     const said = language();
     try {
       let start;
-      const { answer: body, job: record } = await this.service.patient(() => {
+      const { job: record, ...found } = await this.service.patient(() => {
         start = this.clock.now();
         return this.service.solve(this.id, job, { signal });
       }, signal);
       if (signal.aborted) return;
       if (record) { this.begun(record, job); return; }
       this.isLive = this.clock.now() - start < LIVE_LIMIT_MS;
-      await this.show(body.key, body, job, signal, said);
-      if (!signal.aborted && this.state.job === job) this.tell(job, body.key, null, 'replace');
+      const { key } = found.answer;
+      await this.show(key, { ...found, language: said }, job, signal);
+      if (!signal.aborted && this.state.job === job) this.tell(job, key, null, 'replace');
     } catch (error) {
       if (error instanceof api.Unreachable) {
         // Asked again ever more rarely: what was typed is computed when the service is back.
@@ -218,16 +222,19 @@ export class Desk {
 
   // Answers
 
-  /** A kept answer with its figures, in the language of now; `said` is the one in which a body was asked for. */
-  async worded(key, body, signal, said = language()) {
-    const asked = language();
-    const { patient } = this.service;
-    const [whole, figures] = await Promise.all([said === asked && body ? body : patient(() => this.service.result(key, signal), signal), patient(() => this.service.figures(key, signal), signal)]);
-    if (signal?.aborted || this.isClosed) return undefined;
-    return asked === language() ? { answer: whole, figures, language: asked } : this.worded(key, null, signal);
+  /** A kept answer with its figures in the language of now; `got` is one that came in some language. */
+  async worded(key, got, signal) {
+    const { patient, shown } = this.service;
+    let found = got;
+    while (found?.language !== language()) {
+      const asked = language();
+      found = { ...await patient(() => shown(key, signal), signal), language: asked };
+      if (signal?.aborted || this.isClosed) return undefined;
+    }
+    return found;
   }
-  async show(key, body, job, signal, said) {
-    const found = await this.worded(key, body, signal, said);
+  async show(key, got, job, signal) {
+    const found = await this.worded(key, got, signal);
     if (!found) return;
     // What was changed while this was computed is asked for next, or, where that takes long, waits to be asked for.
     const isNext = this.wanted !== null;
@@ -238,10 +245,7 @@ export class Desk {
     const found = await this.worded(key);
     if (found && this.state.answer?.key === key) this.set({ answer: { ...this.state.answer, ...found } });
   }
-  async pinOf(key) {
-    const [answer, figures] = await Promise.all([this.service.result(key), this.service.figures(key)]);
-    return { key, answer, figures };
-  }
+  async pinOf(key) { return { key, ...await this.service.shown(key) }; }
   pin() {
     const { pinned, answer, job, running } = this.state;
     this.set({ pinned: pinned ? null : { key: answer.key, figures: answer.figures, answer: answer.answer } });
@@ -308,7 +312,9 @@ export class Desk {
       const found = await this.service.calculator(this.id);
       if (isLate()) return;
       this.set({ description: found });
-      if (JSON.stringify(found.input_schema).includes('"x-library"')) this.service.materials().then(({ items }) => !isLate() && this.set({ libraries: { materials: items } })).catch(() => {});
+      const lists = new Set((found.records || []).map(kind => FOLDER[kind]));
+      if (JSON.stringify(found.input_schema).includes('"x-library"')) lists.add('materials');
+      for (const list of lists) this.service.records(list).then(items => !isLate() && this.set({ libraries: { ...this.state.libraries, [list]: items } })).catch(() => {});
       const { problem, job, running, answer, pinned } = this.state;
       // What was refused is refused again, in the other language.
       if (this.spoken !== spoken && problem?.status === 422 && this.isLive && job) this.ask(job, 'run');

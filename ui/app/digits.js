@@ -1,11 +1,11 @@
 // How many digits a number has: as many as its own uncertainty leaves it, where the answer carries one.
 import { number, decimalMark } from './text.js';
+import { converted } from './units.js';
 
 /** Names under which the uncertainty of `value` stands beside it. */
 const OF_VALUE = ['standard_error', 'standard_deviation', 'uncertainty', 'error'];
 /** What stands behind the stem of a number that is the uncertainty of the one without it. */
 const WORDS = ['_uncertainty', '_error'];
-const MM_PER_UM = 1e-3;
 /** Endings whose numbers are told in a finer unit than what they belong to. */
 const UNITS = ['um', 'mm', 'n', 'deg', 'rpm', 'hz', 'percent', 'kw', 'min', 's'];
 
@@ -14,13 +14,15 @@ const endOf = name => UNITS.find(unit => name.endsWith(`_${unit}`)) || '';
 const stemOf = name => { const end = endOf(name); return end ? name.slice(0, -end.length - 1) : name; };
 
 /** The name of the number beside `name` that is its uncertainty, and what it is to be multiplied by: the same name with
- *  `_error` or `_uncertainty`, in the same unit; of a mean radius in mm also that in µm.
+ *  `_error` or `_uncertainty`, in its unit or a finer one of the same dimension.
  *  @returns {[string, number] | null} */
 function besides(object, name) {
   const [stem, end] = [stemOf(name), endOf(name)];
-  const own = WORDS.map(word => `${stem}${word}${end && `_${end}`}`).find(other => isSpread(object[other]));
-  if (own) return [own, 1];
-  if (name === 'mean_radius_mm' && isSpread(object.mean_radius_error_um)) return ['mean_radius_error_um', MM_PER_UM];
+  const units = end === 'mm' ? ['mm', 'um'] : [end];
+  for (const unit of units) {
+    const own = WORDS.map(word => `${stem}${word}${unit && `_${unit}`}`).find(other => isSpread(object[other]));
+    if (own) return [own, unit === end ? 1 : converted(1, unit, end)];
+  }
   const ofValue = name === 'value' && OF_VALUE.find(word => isSpread(object[word]));
   return ofValue ? [ofValue, 1] : null;
 }

@@ -14,6 +14,9 @@ const BY_ROLE = {
 const SERIES = ['circle', 'square', 'triangle', 'diamond', 'cross', 'plus', 'bar', 'down'];
 const VARIANTS = 6;
 
+/** Whether an item is a drawn one of the picture's curves, areas and points; symbols, and what can be taken hold of, are not. */
+export const isDrawn = ({ kind }) => !['glyph', 'handle', 'setting'].includes(kind);
+
 /** The class of a role and its marker. */
 export function role(of) {
   if (of && typeof of === 'object') {
@@ -42,7 +45,7 @@ export function styles(figure) {
   const counts = {};
   const known = new Map();
   for (const panel of figure.panels) {
-    for (const item of panel.items.filter(({ name, kind }) => name && kind !== 'handle')) {
+    for (const item of panel.items.filter(item => item.name && isDrawn(item))) {
       const base = role(item.role).name;
       const key = `${base} ${item.name}`;
       if (known.has(key)) continue;

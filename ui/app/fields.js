@@ -2,6 +2,7 @@
 import { html, useState, useEffect, useRef, cell } from './lib.js';
 import { t, capital, typed, number, unitOf } from './text.js';
 import { read } from './number.js';
+import { Origin } from './records.js';
 import { kindOf, labelOf, wordOf, symbolParts, range, pointer, spoken } from './schema.js';
 
 /** A unit of more letters is written smaller rather than broken. */
@@ -22,7 +23,7 @@ export function mark(id, isUnread) {
 /** Whether one control is enough for it. */
 export const isLeaf = schema => ['number', 'string', 'boolean', 'enum'].includes(kindOf(schema));
 
-export function Symbol({ symbol }) {
+export function FieldSymbol({ symbol }) {
   const { base, sub } = symbolParts(symbol);
   return html`<i class="symbol">${base}${sub && html`<sub>${sub}</sub>`}</i>`;
 }
@@ -43,11 +44,14 @@ export const defaultText = schema => {
 };
 
 /** What shows its meaning while it is pointed at, and while it is edited. */
-export const explained = (context, help) => ({
-  onMouseEnter: () => context.pointAt(help),
-  onMouseLeave: () => context.pointAt(null),
-  onFocusIn: () => { context.pointAt(null); context.focusOn(help); },
-});
+export function explained(context, id, help) {
+  context.helps.set(id, help);
+  return {
+    onMouseEnter: () => context.pointAt(id),
+    onMouseLeave: () => context.pointAt(null),
+    onFocusIn: () => { context.pointAt(null); context.focusOn(id); },
+  };
+}
 
 /** Label, control, unit, and the words of the service where the value is at fault. */
 export function Row({ name, schema, path, value, required, context, control: Control, compact }) {
@@ -60,6 +64,8 @@ export function Row({ name, schema, path, value, required, context, control: Con
   const from = typeof filled === 'number' && filled !== schema.default ? `${number(filled)} ${unitOf(schema)}: ${context.sourceAt(path)}`.replace(/ +:/, ':') : '';
   const description = spoken([schema.description, own, from].filter(Boolean).join(' '), context.names);
   const allowed = kindOf(schema) === 'number' ? rangeText(schema) : '';
+  const origin = value === undefined ? context.originAt(path) : undefined;
+  const [isAsked, setAsked] = useState(false);
   // Codes: they are worded anew in each language.
   const [wrong, setWrong] = useState(null);
   const unit = unitOf(schema);
@@ -73,9 +79,11 @@ export function Row({ name, schema, path, value, required, context, control: Con
     required,
   };
   return html`
-    <div class=${`row ${faults.length || wrong ? 'faulty' : ''} ${compact ? 'compact' : ''}`} ...${explained(context, { label, symbol: schema['x-symbol'], range: allowed, description })}>
-      <${Control} ...${common} label=${html`<span>${label}</span>${schema['x-symbol'] && schema['x-symbol'].toLowerCase() !== label.toLowerCase() && html`\u00a0<${Symbol} symbol=${schema['x-symbol']} />`}`} unit=${unit} plain=${label} />
+    <div class=${`row ${faults.length || wrong ? 'faulty' : ''} ${compact ? 'compact' : ''}`} ...${explained(context, id, { label, symbol: schema['x-symbol'], range: allowed, description })}>
+      ${origin && html`<button type="button" class="origin-mark" aria-expanded=${isAsked ? 'true' : 'false'} title=${t('where_from')} aria-label=${`${t('where_from')} ${label}`} onClick=${() => setAsked(!isAsked)}>◦</button>`}
+      <${Control} ...${common} label=${html`<span>${label}</span>${schema['x-symbol'] && schema['x-symbol'].toLowerCase() !== label.toLowerCase() && html`\u00a0<${FieldSymbol} symbol=${schema['x-symbol']} />`}`} unit=${unit} plain=${label} />
       <span id=${`${id}-about`} class="hidden">${[unit && t('in_unit', { unit }), allowed, description].filter(Boolean).join('. ')}</span>
+      ${origin && isAsked && html`<${Origin} origin=${origin} resources=${context.resources} unit=${unit} />`}
       ${wrong ? html`<${Unread} ...${wrong} id=${`${id}-fault`} />` : html`<${Faults} faults=${faults} id=${`${id}-fault`} names=${context.names} />`}
     </div>`;
 }
@@ -105,7 +113,7 @@ export function nudged(value, schema, direction, shift) {
 }
 
 /** Why a text is no value of the field, or `{ value }`. */
-export function valueOf(text, schema, required) {
+export function readField(text, schema, required) {
   const found = read(text, schema['x-unit']);
   if (found.fault) return found;
   if (found.value === null) return required ? { fault: 'needed' } : found;
@@ -130,14 +138,14 @@ export function useNumber({ id, schema, value, required, set, onFault }) {
   useEffect(() => () => mark(id, false), [id]);
   // The value may change under a draft: by the way back, by a click in the picture.
   useEffect(() => {
-    if (draft === null || Object.is(valueOf(draft, schema, required).value ?? undefined, value)) return;
+    if (draft === null || Object.is(readField(draft, schema, required).value ?? undefined, value)) return;
     drop();
   }, [value]);
   return {
     draft,
     take: text => {
       setDraft(text);
-      const found = valueOf(text, schema, required);
+      const found = readField(text, schema, required);
       say(found.fault ? { ...found, choose: put } : null);
       if (!found.fault && !Object.is(found.value ?? undefined, value)) set(found.value ?? undefined, 'typing');
     },

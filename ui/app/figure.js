@@ -6,7 +6,7 @@ import { scale, extent, aired, ticks, labels, valueAt, cellAt } from './scale.js
 import { items, styles, weaves, hasRibbons, stretchAt, barStep } from './draw.js';
 import { axisName, readDigits, abscissae, ordinates, Head, describe } from './panel.js';
 import { Polar } from './polar.js';
-import { Handles } from './handles.js';
+import { Handles, usePlane } from './handles.js';
 
 const LEAST_PANEL = 78;
 const LEAST_RIBBON = 44;
@@ -117,10 +117,13 @@ const evenly = (ends, isLog) => Array.from({ length: CROSS_STEPS + 1 }, (_, inde
   return isLog ? low * (high / low) ** share : low + (high - low) * share;
 });
 
-/** The picture. `onPick(x, y)` where a click in it, or Enter at the cross, means something; `handle` is a point that
- *  can be dragged: `{ x, y, onMove(x, y), onDrop(x, y) }`, without `y` along the first curve; `onHold(handle)` where handles
- *  of the figure can be pulled, giving `{ move(place), drop() }`. */
-export function Picture({ figure, pinned, height: screenHeight = 460, onPick, handle, onHold, main }) {
+/** The picture. `onPut(setting, x, y, how)` puts a setting of it elsewhere, `trial` is where one is tried along a curve,
+ *  `{ x, move(x) }`; `onHold(handle)` where its handles can be pulled, giving `{ move(place), drop() }`; `effect` says what
+ *  that did, `{ name, texts }`; `onPick(x, y)` reads a place. */
+export function Picture({ figure, pinned, height: screenHeight = 460, onPut, trial, onHold, effect, onPick: onRead, main }) {
+  const plane = usePlane(figure, onPut, trial);
+  const onPick = plane.onPick ?? onRead;
+  const { handle } = plane;
   const [ref, screenWidth] = useWidth();
   const isPrinting = usePrinting();
   const [paper, setPaper] = useState(LEAST_PAPER);
@@ -200,7 +203,7 @@ export function Picture({ figure, pinned, height: screenHeight = 460, onPick, ha
     act();
   };
   const least = isLowScreen() || isPrinting ? LOW.polar : LEAST_POLAR;
-  const common = { figure, pinned, width, style, hidden, toggle, at, over: isPlane ? over : null, shown, view, height, isPrinting };
+  const common = { figure, pinned, width, style, hidden, toggle, at, over: isPlane ? over : null, shown, view, height, isPrinting, effect };
   const tools = html`
     <div class="tools" role="group" aria-label=${t('picture_tools')}>
       ${!isPolar && html`<button type="button" class="icon" aria-label=${t('zoom_in')} title=${t('zoom_in')} onClick=${() => zoom(0.5)}>+</button>
@@ -213,7 +216,7 @@ export function Picture({ figure, pinned, height: screenHeight = 460, onPick, ha
       <figcaption><h2 id=${`${id}-title`}>${figure.title.text}</h2>${tools}</figcaption>
       <div ref=${ref} class="plot" tabindex="0" role="application" aria-label=${`${figure.title.text}. ${t('picture_keys')}${onPick ? ` ${t('pick_keys')}` : ''}`} onKeyDown=${key}>
         ${width > 0 && (isPolar
-          ? html`<${Polar} ...${common} least=${least} setAt=${setAt} />`
+          ? html`<${Polar} ...${common} ...${{ least, setAt, onPut }} />`
           : html`<${Stacked} ...${common} ...${{ full, setAt, setOver, setView, drag, setDrag, onPick, handle, onHold }} />`)}
       </div>
       <p class="hidden" role="status">${spoken}</p>
@@ -258,9 +261,9 @@ function Numbers({ figure, samples }) {
 }
 
 /** Panels under each other over one abscissa. */
-function Stacked({ figure, pinned, width, isPrinting, style, hidden, toggle, at, setAt, over, setOver, full, shown, view, setView, height, drag, setDrag, onPick, handle, onHold }) {
+function Stacked({ figure, pinned, width, isPrinting, style, hidden, toggle, at, setAt, over, setOver, full, shown, view, setView, height, drag, setDrag, onPick, handle, onHold, effect }) {
   const shares = figure.panels.reduce((sum, panel) => sum + panel.height, 0) || 1;
-  const ghosts = figure.panels.map((panel, index) => pinned?.panels[index] || null);
+  const ghosts = figure.panels.map((_, index) => pinned?.panels[index] || null);
   const visible = figure.panels.map(panel => ({ ...panel, items: panel.items.filter(item => !item.name || !hidden.has(item.name)) }));
   const isMany = visible.length >= MANY_PANELS;
   const least = isPrinting ? { panel: LEAST_ON_PAPER, ofMany: LEAST_ON_PAPER, ribbon: LEAST_RIBBON } : isLowScreen() ? LOW : { panel: LEAST_PANEL, ofMany: LEAST_OF_MANY, ribbon: LEAST_RIBBON };
@@ -393,7 +396,7 @@ function Stacked({ figure, pinned, width, isPrinting, style, hidden, toggle, at,
                 return h >= 5 && h <= 7 + tall ? html`<circle class=${`dot ${style(item)}`} cx=${cursor} cy=${h} r="3.4" />` : null;
               })}`}
           </svg>
-          ${onHold && !isPrinting && html`<${Handles} ...${{ panel, axis: figure.x, x, y, frame }} hold=${item => {
+          ${onHold && !isPrinting && html`<${Handles} ...${{ panel, axis: figure.x, x, y, frame, effect }} hold=${item => {
             const { move: pull, drop } = onHold(item);
             frozen.current = { index, domain, shown };
             return { move: pull, drop: () => { frozen.current = null; drop(); } };

@@ -3,10 +3,12 @@ import { html, useState, useEffect, useMemo, unique } from './lib.js';
 import { t, number, unitOf } from './text.js';
 import { resolve, namesOf, kindOf, variants, variantOf, memberOf, variantName, blank, kept, labelOf, wordOf, spoken, pointer, at, changed } from './schema.js';
 import { runsOf } from './table-file.js';
-import { fieldId, isLeaf, mark, explained, Symbol, Faults, Row, NumberInput, TextInput, Enum, Switch, Library, ModelChoice } from './fields.js';
+import { fieldId, isLeaf, mark, explained, FieldSymbol, Faults, Row, NumberInput, TextInput, Enum, Switch, Library, ModelChoice } from './fields.js';
 import { List, MapFields } from './lists.js';
 import { TableInput } from './table-input.js';
 import { forget, isSame, keep, ownName, useKept } from './mine.js';
+import { Records } from './records.js';
+import { withFollowers } from './follow.js';
 
 /** Everything that fields share: the root schema, errors by pointer, what changes, who shows help. */
 class Context {
@@ -15,12 +17,19 @@ class Context {
     Object.assign(this, fields);
     this.value = fields.value;
     this.filled = fields.filled;
+    this.resources = fields.resources;
+    /** @type {Map<string, any> | undefined} */
+    this.origins = fields.origins;
     this.libraries = fields.libraries;
     /** @type {Map<string, any[]>} */
     this.errors = fields.errors;
+    /** @type {Map<string, any>} What each field of this form means now, by its id. */
+    this.helps = new Map();
   }
   /** What the service filled in where nothing was given. */
   filledAt(path) { return this.filled ? at(this.filled, path) : undefined; }
+  /** Where it comes from, if a machine, a tool or a material fills it in. */
+  originAt(path) { return this.origins?.get(pointer(path)); }
   /** Where that comes from: the source of the material that is named beside it, or the service. */
   sourceAt(path) {
     const beside = at(this.value, path.slice(0, -1)) || {};
@@ -38,8 +47,9 @@ class Context {
   }
 }
 
-/** The form of a job. `errors` are those of a problem document; `libraries` the choices of `x-library` fields. */
-export function Form({ calculator, schema, value, filled, onChange, errors, libraries, models, examples, disabled }) {
+/** The form of a job. `errors` are those of a problem document; `libraries` the records that it may name, by what they are:
+ *  `records`, and the choices of `x-library` fields; `said` is the answer to it. */
+export function Form({ calculator, schema, value, said, onChange, errors, libraries, records = [], models, examples, disabled }) {
   // What is under the hand is explained, otherwise the field that is being edited.
   const [pointed, setPointed] = useState(null);
   const [focused, setFocused] = useState(null);
@@ -51,16 +61,19 @@ export function Form({ calculator, schema, value, filled, onChange, errors, libr
   }, [errors]);
   // Models extend the jobs of one calculator: of the one whose job stands in this one, if there is such.
   const owner = typeof value.calculator === 'string' ? value.calculator : calculator;
-  const context = new Context({ root, value, names: namesOf(root), filled, errors: byPointer, libraries, models: (models || []).filter(model => model.calculator === owner), pointAt: setPointed, focusOn: setFocused, disabled, set: (path, part, how) => onChange(changed(value, path, part), how) });
+  const origins = useMemo(() => new Map((said?.origins || []).map(origin => [origin.pointer, origin])), [said]);
+  const context = new Context({ root, value, names: namesOf(root), filled: said?.input, origins, resources: said?.resources, errors: byPointer, libraries, models: (models || []).filter(model => model.calculator === owner), pointAt: setPointed, focusOn: setFocused, disabled, set: (path, part, how) => onChange(withFollowers(root, value, changed(value, path, part)), how) });
   const whole = resolve(schema, root);
   // A family of jobs, told apart by one field.
   const family = kindOf(whole) === 'choice' ? variants(whole, root) : null;
   const member = family && variantOf(family, value);
   const top = member ? member.schema : whole;
   const all = Object.entries(top.properties || {}).map(([name, part]) => ({ name, schema: resolve(part, root), own: ownName(name, part, root) })).filter(entry => kindOf(entry.schema) !== 'constant');
+  // Where a name stands in place of an object of the calculator's own, the picker shows it.
+  const isNamed = ({ name }) => records.includes(name) && typeof value[name] === 'string';
   const required = new Set(top.required || []);
   const isSection = ({ schema: part }) => ['object', 'choice', 'array', 'table', 'map', 'json'].includes(kindOf(part));
-  const sections = all.filter(isSection);
+  const sections = all.filter(entry => isSection(entry) && !isNamed(entry));
   const loose = new Map();
   for (const entry of all.filter(entry => !isSection(entry))) {
     const group = entry.schema['x-group'] || 'settings';
@@ -76,6 +89,7 @@ export function Form({ calculator, schema, value, filled, onChange, errors, libr
   return html`
     <form class="form" onSubmit=${event => { event.preventDefault(); onChange(value, 'run'); }} novalidate aria-label=${t('inputs')}>
       <div class="sections">
+        ${records.length > 0 && html`<${Records} kinds=${records} declared=${all.map(({ name }) => name)} value=${value} onChange=${onChange} libraries=${libraries} said=${said} context=${context} />`}
         ${member && html`<div class="family"><div class="row"><label class="label" for="family">${labelOf(member.tag, resolve(top.properties[member.tag], root))}</label>
           <span class="control wide"><select id="family" value=${family.indexOf(member)} onChange=${event => {
             const chosen = family[Number(event.currentTarget.value)];
@@ -91,15 +105,16 @@ export function Form({ calculator, schema, value, filled, onChange, errors, libr
         ${further.length > 0 && html`<h2 class="divider">${t('further_settings')}</h2>`}
         ${further.map(entry => section(entry, false))}
       </div>
-      <${Help} help=${pointed ?? focused} />
+      <${Help} of=${pointed ?? focused} helps=${context.helps} />
     </form>`;
 }
 
 /** The line that says what the field under the cursor means. It keeps its height: nothing jumps. */
-function Help({ help }) {
+function Help({ of, helps }) {
+  const help = helps.get(of);
   return html`
     <div class="help" aria-hidden="true">
-      ${help ? html`<p><strong>${help.label}</strong>${help.symbol && html` <${Symbol} symbol=${help.symbol} />`}${help.range && html` <span class="range">${help.range}</span>`}</p>
+      ${help ? html`<p><strong>${help.label}</strong>${help.symbol && html` <${FieldSymbol} symbol=${help.symbol} />`}${help.range && html` <span class="range">${help.range}</span>`}</p>
         <p>${help.description}</p>` : html`<p class="quiet">${t(matchMedia('(pointer: coarse)').matches ? 'help_hint_touch' : 'help_hint')}</p>`}
     </div>`;
 }
@@ -256,7 +271,7 @@ function Choice({ schema, path, value, context }) {
   };
   const name = variant => variantName(variant, context.root) ?? t(`form_${kindOf(variant.schema)}`);
   return html`
-    <div class="row" ...${explained(context, { label: name(now), description: now.schema.description })}>
+    <div class="row" ...${explained(context, id, { label: name(now), description: now.schema.description })}>
       <label for=${id} class="label">${t('kind')}</label>
       <span class="control wide"><select id=${id} value=${list.indexOf(now)} onChange=${pick}>
         ${list.map((variant, index) => html`<option value=${index}>${name(variant)}</option>`)}

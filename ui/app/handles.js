@@ -1,8 +1,10 @@
 // Places of a picture that can be taken hold of, with the mouse, a finger or the keys: numbers of the job follow. Which places
-// these are, along which axis they go and what follows them, the figure says.
-import { html, useRef } from './lib.js';
+// these are, along which axis they go and what follows them, the figure says; what it does to the answer stands above the
+// hand.
+import { html, useRef, useState, useEffect } from './lib.js';
 import { t, capital, number, unitSymbol } from './text.js';
 import { at, changed, parts } from './schema.js';
+import { settingsOf } from './elsewhere.js';
 
 /** A handle this near to one of its stops is there, px. */
 const STOP_PX = 7;
@@ -48,8 +50,9 @@ export function roomy(handles, x, y, frame) {
   return kept.reverse();
 }
 
-/** The handles of a panel. `x` and `y` are its scales; `hold(handle)` begins, and gives `move(place)` and `drop()`. */
-export function Handles({ panel, axis, x, y, hold, frame }) {
+/** The handles of a panel. `x` and `y` are its scales; `hold(handle)` begins, and gives `move(place)` and `drop()`; `effect`
+ *  says what that did to the answer. */
+export function Handles({ panel, axis, x, y, hold, frame, effect }) {
   // What is being pulled stays, wherever it comes.
   const pulled = useRef(null);
   const all = panel.items.map((handle, index) => ({ handle, index })).filter(({ handle }) => handle.kind === 'handle');
@@ -60,10 +63,10 @@ export function Handles({ panel, axis, x, y, hold, frame }) {
     return { move, drop: () => { pulled.current = null; drop(); } };
   };
   return html`
-    <div class="handles">${shown.map(({ handle, index }) => html`<${Grip} key=${index} ...${{ handle, x, y, frame }} hold=${take} axis=${handle.along === 'x' ? axis : panel.y} />`)}</div>`;
+    <div class="handles">${shown.map(({ handle, index }) => html`<${Grip} key=${index} ...${{ handle, x, y, frame, effect }} hold=${take} axis=${handle.along === 'x' ? axis : panel.y} />`)}</div>`;
 }
 
-function Grip({ handle, x, y, axis, hold, frame }) {
+function Grip({ handle, x, y, axis, hold, frame, effect }) {
   // Pulled: the scale and the place of then, as both change with the picture that follows.
   const pulled = useRef(null);
   const own = handle.along === 'x' ? x : y;
@@ -107,6 +110,74 @@ function Grip({ handle, x, y, axis, hold, frame }) {
   // The name stands within the picture.
   const side = left > frame.left + 0.7 * frame.width ? 'late' : left < frame.left + 0.2 * frame.width ? 'early' : '';
   return html`<span class=${`grip ${handle.along} ${side}`} role="slider" tabindex="0" style=${{ left: `${left}px`, top: `${top}px` }} data-name=${handle.name} aria-label=${`${capital(handle.text)}. ${t('grip_keys')}`}
-    aria-orientation=${handle.along === 'x' ? 'horizontal' : 'vertical'} aria-valuenow=${placeOf(handle)} aria-valuemin=${handle.reach[0]} aria-valuemax=${handle.reach[1]} aria-valuetext=${said}
-    onPointerDown=${down} onPointerMove=${move} onPointerUp=${up} onPointerCancel=${up} onKeyDown=${key} onDblClick=${event => event.stopPropagation()}><b aria-hidden="true">${capital(handle.text)} ${said}</b></span>`;
+    aria-orientation=${handle.along === 'x' ? 'horizontal' : 'vertical'} aria-valuenow=${placeOf(handle)} aria-valuemin=${handle.reach[0]} aria-valuemax=${handle.reach[1]} aria-valuetext=${effectOf(effect, handle) ? `${said}; ${effectOf(effect, handle)}` : said}
+    onPointerDown=${down} onPointerMove=${move} onPointerUp=${up} onPointerCancel=${up} onKeyDown=${key} onDblClick=${event => event.stopPropagation()}><${Name} ...${{ handle, said, effect }} /></span>`;
+}
+
+/** What pulling this handle did to the answer. */
+const effectOf = (effect, handle) => (effect?.name === handle.name && effect.texts.length > 0 ? effect.texts.join('; ') : '');
+
+/** What stands above a handle: its name, its place, what it does. */
+const Name = ({ handle, said, effect }) => html`<b aria-hidden="true">${capital(handle.text)} ${said}${effectOf(effect, handle) && html`<small>${effectOf(effect, handle)}</small>`}</b>`;
+
+/** What of a picture in the plane can be put elsewhere: `onPick(x, y)` of a click or of Enter at the cross, and the point that
+ *  can be dragged, `{ x, y, onMove(x, y), onDrop(x, y) }`, without `y` along the first curve. */
+export function usePlane(figure, onPut, trial) {
+  // Where the point is while it is dragged.
+  const [grabbed, setGrabbed] = useState(null);
+  useEffect(() => { setGrabbed(null); }, [figure]);
+  const settings = onPut && figure.frame !== 'polar' ? settingsOf(figure) : [];
+  if (trial) return { onPick: null, handle: { x: trial.x, onMove: trial.move, onDrop: () => {} } };
+  const point = settings.find(setting => !setting.tried_in);
+  if (!point) return { onPick: null, handle: null };
+  const put = (x, y, how) => onPut(point, x, y, how);
+  return {
+    onPick: (x, y) => put(x, y, 'run'),
+    handle: {
+      x: grabbed ? grabbed[0] : point.x, y: grabbed ? grabbed[1] : point.y,
+      onMove: (x, y) => { setGrabbed([x, y]); put(x, y, 'typing'); },
+      onDrop: (x, y) => { setGrabbed(null); put(x, y, 'run'); },
+    },
+  };
+}
+
+/** Degrees by which the keys turn a place round a polar picture. */
+const TURN = 1;
+
+/** Settings of a polar picture: places round it. `place(angle, value)` is that of the picture, `put(setting, angle, how)` goes
+ *  there. */
+export function RoundHandles({ settings, centre, place, put, effect }) {
+  const pulled = useRef(null);
+  return html`
+    <div class="handles">${settings.map(setting => {
+      const [left, top] = place(setting.x, setting.y);
+      const angleOf = event => {
+        const box = event.currentTarget.closest('.handles').getBoundingClientRect();
+        return ((Math.atan2(centre[1] - (event.clientY - box.top), event.clientX - box.left - centre[0]) * 180) / Math.PI + 360) % 360;
+      };
+      const down = event => {
+        if (event.button !== 0) return;
+        event.preventDefault();
+        event.currentTarget.focus();
+        event.currentTarget.setPointerCapture(event.pointerId);
+        pulled.current = setting.name;
+      };
+      const move = event => { if (pulled.current === setting.name) put(setting, angleOf(event), 'typing'); };
+      const up = event => {
+        if (pulled.current !== setting.name) return;
+        pulled.current = null;
+        put(setting, angleOf(event), 'run');
+      };
+      const key = event => {
+        const way = { ArrowRight: -1, ArrowDown: -1, ArrowLeft: 1, ArrowUp: 1 }[event.key];
+        if (!way || event.ctrlKey || event.metaKey || event.altKey) return;
+        event.preventDefault();
+        event.stopPropagation();
+        put(setting, (setting.x + way * TURN * (event.shiftKey ? FAR : 1) + 360) % 360, 'run');
+      };
+      const said = `${number(setting.x, 4)}°`;
+      return html`<span key=${setting.name} class="grip round" role="slider" tabindex="0" style=${{ left: `${left}px`, top: `${top}px` }} data-name=${setting.name} aria-label=${`${capital(setting.text)}. ${t('grip_keys')}`}
+        aria-valuenow=${Math.round(10 * setting.x) / 10} aria-valuemin="0" aria-valuemax="360" aria-valuetext=${effectOf(effect, setting) ? `${said}; ${effectOf(effect, setting)}` : said}
+        onPointerDown=${down} onPointerMove=${move} onPointerUp=${up} onPointerCancel=${up} onKeyDown=${key}><${Name} handle=${setting} said=${said} effect=${effect} /></span>`;
+    })}</div>`;
 }

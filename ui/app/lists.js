@@ -91,7 +91,7 @@ function Cell({ field, path, value, required, context, row, onFault }) {
   const [wrong, setWrong] = useState(null);
   const { draft, take, leave, key } = useNumber({ id, schema: field.schema, value, required, set: (part, how) => context.set(path, part, how), onFault: fault => { setWrong(fault); onFault(field.name, fault); } });
   useEffect(() => () => onFault(field.name, null), []);
-  const help = explained(context, { label, symbol: field.schema['x-symbol'], range: rangeText(field.schema), description: [field.schema.description, defaultText(field.schema)].join(' ') });
+  const help = explained(context, id, { label, symbol: field.schema['x-symbol'], range: rangeText(field.schema), description: [field.schema.description, defaultText(field.schema)].join(' ') });
   const isFaulty = faults.length > 0 || wrong !== null;
   return html`
     <input id=${id} type="text" inputmode="decimal" autocomplete="off" data-column=${field.name} value=${draft ?? typed(value)} aria-label=${`${row}: ${label}`} onFocus=${event => event.currentTarget.select()} ...${help}

@@ -5,6 +5,7 @@ import * as api from './api.js';
 import { Room } from './room.js';
 import { Study } from './study.js';
 import { Home, Jobs, Results, Models } from './pages.js';
+import { Library } from './library.js';
 
 const JOBS_LOOK_MS = 4000;
 /** So many jobs of a state are counted. */
@@ -107,7 +108,7 @@ function App() {
 
   const known = calculators?.find(({ id }) => id === page);
   useEffect(() => {
-    const names = { studies: t('studies'), jobs: t('jobs'), results: t('results'), models: t('models') };
+    const names = { studies: t('studies'), jobs: t('jobs'), results: t('results'), models: t('models'), library: t('records') };
     document.title = known ? `${known.title} – precut` : names[page] ? `${names[page]} – precut` : 'precut';
   }, [page, known, spoken]);
   const first = useRef(true);
@@ -138,6 +139,7 @@ function App() {
         : page === 'results' ? html`<${Results} calculators=${calculators} query=${query} replace=${replace} />`
         : page === 'studies' ? html`<${Study} key=${attempt} ...${{ calculators, query, push, replace, refreshJobs }} />`
         : page === 'models' ? html`<${Models} calculators=${calculators} models=${models} refreshModels=${refreshModels} />`
+        : page === 'library' ? html`<${Library} key=${spoken} />`
         : known ? html`<${Room} key=${`${page} ${attempt}`} id=${page} ...${{ query, push, replace, models, refreshJobs }} />`
         : html`<main class="plain" id="main" tabindex="-1"><h1>${t('no_page')}</h1><p><a href="#/">${t('to_start')}</a></p></main>`}
     <//>`;

@@ -74,7 +74,7 @@ function Knobs({ description, answer, isCurrent, apply }) {
       <h2>${t('knobs_title', { name: within(goal.label) })}</h2>
       <ul>${shown.map(knob => html`<li key=${knob.pointer}><button type="button" data-pointer=${knob.pointer} onClick=${() => press(knob)}>
         <span class="knob-name">${knob.label} <small>${number(knob.before, DIGITS)} → ${number(knob.after, DIGITS)} ${unitOf(knob.field)}</small></span>
-        <svg viewBox=${`0 0 ${WIDTH} 14`} preserveAspectRatio="none" aria-hidden="true"><rect class="clamp-given" x="0" y="1" width=${Math.max((WIDTH * knob.gain) / most, 4)} height="12" /></svg>
+        <svg viewBox=${`0 0 ${WIDTH} 14`} preserveAspectRatio="none" aria-hidden="true"><rect class="bar-given" x="0" y="1" width=${Math.max((WIDTH * knob.gain) / most, 4)} height="12" /></svg>
         <span class="number">${signed(-knob.gain)}</span></button></li>`)}</ul>
       ${knobs.length > shown.length && html`<button type="button" class="more" onClick=${() => setAll(true)}>${t('and_more', { count: knobs.length - shown.length })}</button>`}
       <p class="quiet hint knob-came" role="status">${came === null ? t('knobs_hint') : t('knob_came', { name: pressed.label, goal: within(goal.label), before: number(pressed.goal, 5), after: number(goal.value, 5), unit: goal.unit, came: signed(came), told: signed(-pressed.gain) })}</p>

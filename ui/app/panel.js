@@ -3,7 +3,7 @@
 import { html } from './lib.js';
 import { capital, t, number, unitSymbol } from './text.js';
 import { extent, valueAt, cellAt } from './scale.js';
-import { markerOf, stretchAt, ribbonSample, weaves } from './draw.js';
+import { isDrawn, markerOf, stretchAt, ribbonSample, weaves } from './draw.js';
 import { colouring } from './palette.js';
 
 export const axisName = (axis, factor) => {
@@ -29,7 +29,7 @@ const edges = (x, isLog) => {
 
 export function abscissae(figure) {
   const isLog = figure.x.scale === 'logarithmic';
-  return figure.panels.flatMap(panel => panel.items.flatMap(item => (item.kind === 'glyph' || item.kind === 'handle' ? [] : item.kind === 'ribbon' ? [...item.x, ...item.x_end] : item.kind === 'heat_map' ? edges(item.x, isLog) : item.x)));
+  return figure.panels.flatMap(panel => panel.items.flatMap(item => (!isDrawn(item) ? [] : item.kind === 'ribbon' ? [...item.x, ...item.x_end] : item.kind === 'heat_map' ? edges(item.x, isLog) : item.x)));
 }
 
 export function ordinates(panel, view) {
@@ -68,7 +68,7 @@ const READ = ['line', 'bars', 'points', 'band', 'ribbon'];
 /** Name of the axis and of each curve, with its value at the cursor. */
 export function Head({ panel, ghost, style, hidden, toggle, at, over = null, factor, span, polar }) {
   const seen = new Set();
-  const named = panel.items.filter(item => item.name && item.kind !== 'handle' && !seen.has(item.name) && seen.add(item.name));
+  const named = panel.items.filter(item => item.name && isDrawn(item) && !seen.has(item.name) && seen.add(item.name));
   const value = (source, item) => {
     if (at === null) return null;
     const twin = source.items.find(other => other.name === item.name && other.kind === item.kind);
@@ -125,7 +125,7 @@ function Key({ item, now }) {
 
 /** A panel in words, for those who cannot see it. */
 export function describe(panel, figure) {
-  const spans = panel.items.filter(item => item.name && item.kind !== 'handle' && (item.y || item.lower || item.places)).map(item => {
+  const spans = panel.items.filter(item => item.name && isDrawn(item) && (item.y || item.lower || item.places)).map(item => {
     if (item.places) return `${item.text} ${item.places.join(' ')}`;
     const span = extent(item.y || [...item.lower, ...item.upper], 'linear');
     return span ? `${item.text} ${number(span[0], 3)} … ${number(span[1], 3)}` : item.text;

@@ -1,6 +1,6 @@
 // Rows of a spreadsheet, pasted into a table of the form: all of them are taken, or none and it is said why.
 import { labelOf } from './schema.js';
-import { valueOf } from './fields.js';
+import { readField } from './fields.js';
 
 /** The cells of what was copied, by rows; `null` where it is a single one, which is pasted as any text. */
 export function rowsOf(text) {
@@ -18,7 +18,7 @@ export function pasted(cells, { columns, from, row, value, items, most }) {
   if (first + width > columns.length) return { fault: 'paste_wide', values: { width, room: columns.length - first } };
   const required = new Set(items.required || []);
   const given = columns.slice(first, first + width);
-  const readCells = line => given.map((column, at) => ({ column, text: line[at] ?? '', ...valueOf(line[at] ?? '', column.schema, required.has(column.name)) }));
+  const readCells = line => given.map((column, at) => ({ column, text: line[at] ?? '', ...readField(line[at] ?? '', column.schema, required.has(column.name)) }));
   const isHeading = cells.length > 1 && cells[0].every(cell => !/^[+\-−]?[.,]?\d/.test(cell));
   const lines = (isHeading ? cells.slice(1) : cells).map(readCells);
   const wrong = lines.flatMap((line, at) => line.map(cell => ({ ...cell, at }))).find(cell => cell.fault);

@@ -4,9 +4,11 @@ import { number } from './text.js';
 import { scale, extent, aired, ticks, labels, valueAt } from './scale.js';
 import { items } from './draw.js';
 import { ordinates, Head, describe } from './panel.js';
+import { RoundHandles } from './handles.js';
+import { settingsOf } from './elsewhere.js';
 
 /** A roundness chart: deviations magnified outward from a base circle. */
-export function Polar({ figure, pinned, width, height, least, style, hidden, toggle, at, setAt }) {
+export function Polar({ figure, pinned, width, height, least, style, hidden, toggle, at, setAt, onPut, effect, isPrinting }) {
   const panel = { ...figure.panels[0], items: figure.panels[0].items.filter(item => !item.name || !hidden.has(item.name)) };
   const ghost = pinned?.panels[0];
   const size = Math.max(240, Math.min(width, Math.max(height, least)));
@@ -50,7 +52,7 @@ export function Polar({ figure, pinned, width, height, least, style, hidden, tog
   const lines = round(panel).items.filter(item => item.kind === 'line');
   return html`
     <${Head} ...${{ panel: round(figure.panels[0]), ghost: ghost && round(ghost), style, hidden, toggle, at, factor, span: span ? span[1] - span[0] : 0, polar: true }} />
-    <svg class="chart polar" width=${width} height=${size} viewBox=${`0 0 ${width} ${size}`} role="img" aria-label=${describe(panel, figure)} onPointerMove=${move} onPointerLeave=${() => setAt(null)}>
+    <div class="panel"><svg class="chart polar" width=${width} height=${size} viewBox=${`0 0 ${width} ${size}`} role="img" aria-label=${describe(panel, figure)} onPointerMove=${move} onPointerLeave=${() => setAt(null)}>
       <g class="grid">${places.map(value => html`<circle cx=${centre[0]} cy=${centre[1]} r=${r(value)} class=${value === 0 ? 'zero' : ''} />`)}
         ${Array.from({ length: 12 }, (_, index) => html`<path d=${spoke(30 * index, radius * 0.4, radius)} />`)}</g>
       <circle class="frame" cx=${centre[0]} cy=${centre[1]} r=${radius} />
@@ -72,5 +74,6 @@ export function Polar({ figure, pinned, width, height, least, style, hidden, tog
           const [h, v] = place(turned, value);
           return html`<circle class=${`dot ${style(item)}`} cx=${h} cy=${v} r="3.4" />`;
         })}`}
-    </svg>`;
+    </svg>
+    ${onPut && !isPrinting && html`<${RoundHandles} settings=${settingsOf(figure)} ...${{ centre, place, effect }} put=${(setting, angle, how) => onPut(setting, angle, 0, how)} />`}</div>`;
 }

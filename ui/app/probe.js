@@ -5,11 +5,11 @@ import * as api from './api.js';
 /** Answers kept while the page is open. */
 const KEPT = 400;
 
-/** Follows a job as fast as the service answers; one that is passed by before its turn is never sent. `tag` names the
- *  job, `null` asks for none. `bare` answers come
- *  without their figures. Gives the last answer found: `{ tag, answer, figures }` or `{ tag, problem }`.
- *  @param {string} id @param {string | null} tag @param {any} job @param {{ bare?: boolean }} [options] */
-export function useProbe(id, tag, job, { bare } = {}) {
+/** Follows a job as fast as the service answers; one that is passed by before its turn is never sent. `tag` names the job,
+ *  `null` asks for none; `job(signal)` gives it. Gives the last answer found: `{ tag, job, answer, figures }` or
+ *  `{ tag, problem }`.
+ *  @param {string} id @param {string | null} tag @param {(signal: AbortSignal) => any} job */
+export function useProbe(id, tag, job) {
   const [found, setFound] = useState(null);
   const line = useRef(null);
   if (!line.current) line.current = { wanted: null, busy: false, gone: false, kept: new Map(), control: new AbortController() };
@@ -28,7 +28,7 @@ export function useProbe(id, tag, job, { bare } = {}) {
       own.wanted = null;
       let answer = own.kept.get(asked.tag);
       if (!answer) {
-        answer = await fetched(id, asked, own.control.signal, bare);
+        answer = await fetched(id, asked, own.control.signal);
         if (!answer) break;
         if (own.kept.size >= KEPT) own.kept.delete(own.kept.keys().next().value);
         if (!answer.problem) own.kept.set(asked.tag, answer);
@@ -40,13 +40,14 @@ export function useProbe(id, tag, job, { bare } = {}) {
   return found;
 }
 
-async function fetched(id, { tag, job }, signal, bare) {
+async function fetched(id, { tag, job: made }, signal) {
+  let job;
   try {
     // Too many at once: asked again when the service says.
-    const answer = await api.patient(() => api.answered(id, job, signal), signal);
-    return { tag, answer, figures: bare ? [] : await api.patient(() => api.figures(answer.key, signal), signal) };
+    job = await api.patient(() => made(signal), signal);
+    return { tag, job, ...await api.patient(() => api.answered(id, job, signal), signal) };
   } catch (error) {
     if (error.name === 'AbortError') return null;
-    return { tag, problem: error.problem || { title: error.message } };
+    return { tag, job, problem: error.problem || { title: error.message } };
   }
 }

@@ -1,16 +1,15 @@
-// The ring revolution by revolution: all surfaces on the way come with one answer, that of the same job asked for them.
+// A run state by state: all states on the way come with one answer, that of the same job asked for them. Which figure shows
+// them, what to ask for and where it then stands, the schema of the result says (`x-replay` at a field of the history).
 import { html, useState, useEffect, useMemo } from './lib.js';
-import { t, number } from './text.js';
+import { t, number, unitOf } from './text.js';
+import { at, changed, labelOf, parts, resolve } from './schema.js';
 import { below } from './scale.js';
 import { useProbe } from './probe.js';
 
 /** Between two frames of a replay, ms. */
 const FRAME_MS = 160;
-/** Surfaces that are asked for at most; a replay shows half of them. */
-const FRAMES = 120;
+/** A replay shows so many of the states. */
 const PLAYED = 60;
-/** Points of profiles that the answer needs beside them: the fewest there are. */
-const LEAST_PROFILE = 36;
 /** A blank larger than so many times the surface would hide it. */
 const SHOWN_TOGETHER = 4;
 const CURVE_WIDTH = 1000;
@@ -19,67 +18,84 @@ const CURVE_HEIGHT = 40;
 /** Revolutions as they are told: what is counted in nodes ends a little before the whole one. */
 const told = turns => number(Math.round(turns * 100) / 100, 8);
 
-/** Whether there is a history to go through. */
-export const canReplay = (figure, result) => figure?.id === 'polar' && (result?.simulation?.history?.revolution?.length ?? 0) > 1;
-
-/** The job with its surfaces on the way and nothing else that takes time or room. */
-export function withFrames(job, { result }) {
-  const { settings_search: search, setup_map: map, ...rest } = job;
-  return { ...rest, samples: result.simulation.samples, analyses: ['simulation'], profile_points: LEAST_PROFILE, replay_frames: FRAMES };
+/** The object of a result of whose fields one carries `x-replay`: `{ said, history, schema }`. */
+function historyIn(root, schema, value) {
+  const whole = resolve(schema, root);
+  if (!value || typeof value !== 'object' || Array.isArray(value) || !whole.properties) return null;
+  const fields = Object.entries(whole.properties).map(([name, part]) => [name, resolve(part, root)]);
+  // What a list carries, the schema has at its items.
+  const said = fields.map(([, part]) => part['x-replay'] ?? part.items?.['x-replay']).find(Boolean);
+  if (said) return { said, history: value, schema: whole };
+  return fields.map(([name, part]) => historyIn(root, part, value[name])).find(Boolean) ?? null;
 }
 
-/** The revolutions at which there is a surface: of the blank, of one in so many, of the end. */
-function stepsOf({ revolution }) {
+/** The history that a figure can be taken through, `null` where there is none. */
+export function replayOf({ output_schema: root }, figure, result) {
+  const found = historyIn(root, root, result);
+  if (!found || found.said.figure !== figure.id || !(found.history[found.said.at]?.length > 1)) return null;
+  const field = name => resolve(found.schema.properties[name], root);
+  const named = name => ({ name, label: labelOf(name, field(name)), unit: unitOf(field(name)) });
+  return { ...found, value: named(found.said.value), beside: named(found.said.beside) };
+}
+
+/** The job with its states on the way and nothing else that takes time or room. */
+export function withFrames(job, result, { asks, keeps, drops }) {
+  const bare = drops.reduce((whole, place) => (at(whole, parts(place)) === undefined ? whole : changed(whole, parts(place), undefined)), job);
+  const kept = Object.entries(keeps).reduce((whole, [place, from]) => changed(whole, parts(place), at(result, parts(from))), bare);
+  return Object.entries(asks).reduce((whole, [place, value]) => changed(whole, parts(place), value), kept);
+}
+
+/** The revolutions at which there is a state: of the start, of one in so many, of the end. */
+function stepsOf(revolution, most) {
   const total = revolution.at(-1);
-  const every = Math.max(1, Math.ceil(total / FRAMES - 1e-3));
+  const every = Math.max(1, Math.ceil(total / most - 1e-3));
   const steps = [0];
   for (let turns = every; turns < total - 0.01; turns += every) steps.push(turns);
   return [...steps, total];
 }
 
 /** The first state: the blank, which the answer holds already. */
-const blankOf = figures => figures.find(({ id }) => id === 'profile')?.panels[0]?.items[0];
+const blankOf = (figures, { blank }) => figures.find(({ id }) => id === blank)?.panels[0]?.items[0];
 const spanOf = values => Math.max(...values) - Math.min(...values);
 
-/** The chart of one surface: the curves of the end with its own, tool and supports where they stood. */
-function chartOf(polar, blank, replay, frame) {
-  const end = replay.frames.at(-1);
-  const turned = frame.tool_angle_deg - end.tool_angle_deg;
-  const after = polar.panels[0].items.find(({ name }) => name === 'ring_after');
-  const items = polar.panels[0].items.flatMap(item => {
+/** The chart of one state: the curves of the end with its own, symbols where they stood. */
+function chartOf(shown, blank, replay, frame, said) {
+  const [angles, values] = [replay[said.angles], frame[said.values]];
+  const turned = frame[said.turned] - replay.frames.at(-1)[said.turned];
+  const after = shown.panels[0].items.find(({ name }) => name === said.curve);
+  const items = shown.panels[0].items.flatMap(item => {
     if (item.kind !== 'glyph') return [];
     const x = (item.x + turned + 720) % 360;
-    return [{ ...item, x, y: frame.deviation_um[Math.max(0, below(replay.angle_deg, x))] }];
+    return [{ ...item, x, y: values[Math.max(0, below(angles, x))] }];
   });
-  const isShown = blank && spanOf(blank.y.filter(value => value !== null)) < SHOWN_TOGETHER * spanOf(frame.deviation_um);
-  const curve = { ...after, x: [...replay.angle_deg, replay.angle_deg[0] + 360], y: [...frame.deviation_um, frame.deviation_um[0]] };
-  return { ...polar, panels: [{ ...polar.panels[0], items: [...(isShown ? [blank] : []), curve, ...items] }] };
+  const isShown = blank && spanOf(blank.y.filter(value => value !== null)) < SHOWN_TOGETHER * spanOf(values);
+  const closed = { ...after, x: [...angles, angles[0] + 360], y: [...values, values[0]] };
+  return { ...shown, panels: [{ ...shown.panels[0], items: [...(isShown ? [blank] : []), closed, ...items] }] };
 }
 
 const titled = (figure, turns, of) => figure && { ...figure, title: { ...figure.title, text: t('ring_at', { revolution: told(turns), of: told(of) }) } };
 
 /** A scrubber over the history; `onShow(figure)` with the state that is to be seen, `null` for the end. */
-export function Replay({ id, answer, job, figures, onShow }) {
-  const { history, start } = answer.result.simulation;
-  const steps = useMemo(() => stepsOf(history), [history]);
+export function Replay({ id, said: { said, history, value, beside }, answer, job, figure, figures, onShow }) {
+  const turns = history[said.at];
+  const steps = useMemo(() => stepsOf(turns, said.most), [history]);
   const last = steps.length - 1;
   const [step, setStep] = useState(last);
   const [isPlaying, setPlaying] = useState(false);
   // Asked for at the first move, then there for all of them.
   const [isWanted, setWanted] = useState(false);
-  const polar = figures.find(figure => figure.id === 'polar');
-  const found = useProbe(id, isWanted ? answer.key : null, isWanted ? withFrames(job, answer) : null, { bare: true });
-  const replay = found?.answer?.result.simulation.replay;
+  const found = useProbe(id, isWanted ? answer.key : null, () => withFrames(job, answer.result, said));
+  const replay = found?.answer && at(found.answer.result, parts(said.frames));
   useEffect(() => {
     if (step === last) { onShow(null); return; }
     setWanted(true);
-    const blank = blankOf(figures);
-    if (step === 0) onShow(blank && titled({ ...polar, panels: [{ ...polar.panels[0], items: [blank] }] }, 0, steps[last]));
+    const blank = blankOf(figures, said);
+    if (step === 0) onShow(blank && titled({ ...figure, panels: [{ ...figure.panels[0], items: [blank] }] }, 0, steps[last]));
     else if (replay) {
       const frame = replay.frames[Math.min(step - 1, replay.frames.length - 1)];
-      onShow(titled(chartOf(polar, blank, replay, frame), frame.revolution, steps[last]));
+      onShow(titled(chartOf(figure, blank, replay, frame, said), frame[said.at], steps[last]));
     }
-  }, [step, replay, polar]);
+  }, [step, replay, figure]);
   useEffect(() => {
     if (!isPlaying) return undefined;
     const stride = Math.max(1, Math.ceil(last / PLAYED));
@@ -88,11 +104,10 @@ export function Replay({ id, answer, job, figures, onShow }) {
   }, [isPlaying]);
   useEffect(() => { if (step === last) setPlaying(false); }, [step]);
 
-  const at = step === 0 ? -1 : Math.max(0, below(history.revolution, steps[step] + 0.01));
-  const roundness = at >= 0 ? history.roundness_um[at] : start.unfiltered.least_squares_um;
-  const radius = at >= 0 ? history.mean_radius_mm[at] : start.mean_radius_mm;
-  const curve = useMemo(() => curveOf(history, steps[last], start.unfiltered.least_squares_um), [answer.key]);
-  const says = t('revolution_is', { revolution: told(steps[step]), of: told(steps[last]), roundness: number(roundness, 4) });
+  const here = step === 0 ? -1 : Math.max(0, below(turns, steps[step] + 0.01));
+  const [now, other] = [value, beside].map(({ name }, index) => (here >= 0 ? history[name][here] : at(answer.result, parts([said.from.value, said.from.beside][index]))));
+  const curve = useMemo(() => curveOf(turns, history[value.name], steps[last], at(answer.result, parts(said.from.value))), [answer.key]);
+  const says = t('revolution_is', { revolution: told(steps[step]), of: told(steps[last]), name: value.label, value: `${number(now, 4)} ${value.unit}` });
   const isLate = step > 0 && step < last && !replay && !found?.problem;
   return html`
     <div class="scrubber" role="group" aria-label=${t('replay')}>
@@ -102,14 +117,14 @@ export function Replay({ id, answer, job, figures, onShow }) {
         <svg viewBox=${`0 0 ${CURVE_WIDTH} ${CURVE_HEIGHT}`} preserveAspectRatio="none" aria-hidden="true"><path class="after" d=${curve} vector-effect="non-scaling-stroke" /><path class="cursor" d=${`M${(CURVE_WIDTH * step) / last} 0V${CURVE_HEIGHT}`} vector-effect="non-scaling-stroke" /></svg>
         <input type="range" id="replay" min="0" max=${last} step="1" value=${step} aria-label=${t('replay')} aria-valuetext=${says} onInput=${event => { setPlaying(false); setStep(Number(event.currentTarget.value)); }} />
       </div>
-      <p class="scrub-text">${says}<span class="quiet"> · ${t('mean_radius')} ${number(radius, 7)} ${t('unit_mm')}</span>${isLate && html`<span class="late"> · ${t('loading')}</span>`}</p>
+      <p class="scrub-text">${says}<span class="quiet"> · ${beside.label} ${number(other, 7)} ${beside.unit}</span>${isLate && html`<span class="late"> · ${t('loading')}</span>`}</p>
       ${found?.problem && html`<p class="fault"><span>${found.problem.detail || found.problem.title}</span></p>`}
     </div>`;
 }
 
-/** The roundness over the revolutions, by its logarithm. */
-function curveOf({ revolution, roundness_um: roundness }, total, start) {
-  const points = [[0, start], ...revolution.map((turns, index) => [turns, roundness[index]])].map(([turns, value]) => [turns, Math.log10(Math.max(value, 1e-6))]);
+/** What is followed over the revolutions, by its logarithm. */
+function curveOf(revolution, values, total, start) {
+  const points = [[0, start], ...revolution.map((turns, index) => [turns, values[index]])].map(([turns, value]) => [turns, Math.log10(Math.max(value, 1e-6))]);
   const [low, high] = [Math.min(...points.map(point => point[1])), Math.max(...points.map(point => point[1]))];
   return points.map(([turns, value], index) => `${index ? 'L' : 'M'}${((CURVE_WIDTH * turns) / total).toFixed(1)} ${(3 + (CURVE_HEIGHT - 6) * (1 - (value - low) / (high - low || 1))).toFixed(1)}`).join('');
 }

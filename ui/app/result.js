@@ -1,29 +1,29 @@
 // What a run gave: the answer, the picture, the words, and everything else behind tabs.
 import { html, useState, useEffect, useLayoutEffect, useMemo, usePrinting } from './lib.js';
-import { t, capital, unitSymbol } from './text.js';
+import { t, capital } from './text.js';
 import * as api from './api.js';
 import { Picture, differenceOf, isLowScreen } from './figure.js';
 import { namesOf, spoken } from './schema.js';
-import { canReplay, Replay } from './replay.js';
-import { canTrade, spanOf, TradeOff } from './tradeoff.js';
-import { hasClamp, ClampBars } from './clamp.js';
-import { hasCauses, advisesNext, causesHeadline, Causes } from './cause.js';
+import { replayOf, Replay } from './replay.js';
+import { triedIn, held, Trial } from './trial.js';
+import { placeOf, settingsOf } from './elsewhere.js';
+import { Bars } from './bars.js';
+import { causesOf, causesHeadline, saidOfCauses, nextAdvised, Causes } from './cause.js';
 import { hasOffers, Offers } from './offers.js';
 import { sheetOf, takeSheet } from './inspection.js';
 import { movedJob } from './handles.js';
+import { isDrawn } from './draw.js';
 import { Downloads, fileName } from './handover.js';
-import { Strip, sentences } from './strip.js';
+import { Strip, sentences, declared } from './strip.js';
 import { Tabs } from './tabs.js';
 import { Sheet } from './values.js';
 
-/** The curve above a schedule leaves room for it. */
-const TRADE_HEIGHT = 260;
+/** The curve above what is tried leaves room for it. */
+const TRIAL_HEIGHT = 260;
 /** More warnings than these are folded. */
 const FEW_WARNINGS = 3;
 /** More pictures than these are chosen from a list. */
 const MOST_BUTTONS = 6;
-/** What the picture of the causes tells already. */
-const SHOWN_BY_CAUSES = ['diagnosis_next', 'diagnosis_gain'];
 /** On a low screen: what the panels have before it is measured, and at least; what a chart needs around its panel, the last
  *  one for the axis, and what is left free below. */
 const LOW_ROOM = 260;
@@ -63,15 +63,16 @@ export function usePictureHeight(panels) {
   return Math.round(Math.max(240, Math.min(size[1] - around - 34 * panels, 900)));
 }
 
-const drawn = figure => figure.panels.flatMap(panel => panel.items).filter(({ kind, x }) => kind !== 'glyph' && kind !== 'handle' && x.length > 0);
+const drawn = figure => figure.panels.flatMap(panel => panel.items).filter(item => isDrawn(item) && item.x.length > 0);
 /** Pictures of what the job did not ask for are empty: they are not offered. */
 const shownOf = figures => { const some = figures.filter(figure => drawn(figure).length > 0); return some.length > 0 ? some : figures.slice(0, 1); };
-/** The unit of what a diagnosis judges, empty for logarithms. */
-const residualUnit = figures => { const unit = figures.find(({ id }) => id === 'residuals')?.panels[0]?.y.unit; return unit === undefined ? undefined : unitSymbol(unit); };
 /** Whether a picture shows more than a single point. */
 const isTelling = figure => drawn(figure).some(({ kind, x }) => kind !== 'points' || x.length > 1);
 
-export function Result({ id, desk, description, answer, problem, trouble, running, pinned, models, pickOf, study, standing }) {
+/** What changed in the numbers of the strip since they were `before`. */
+const effectOn = (before, now) => now.flatMap((row, index) => (before[index]?.label === row.label && before[index].text !== row.text ? [`${row.label} ${before[index].text} → ${row.text} ${row.unit ?? ''}`.trim()] : []));
+
+export function Result({ id, desk, description, answer, problem, trouble, running, pinned, models, study, standing }) {
   const stale = !['none', 'current'].includes(standing);
   const owns = key => desk.owns(key);
   const onApply = job => desk.change(job, 'run');
@@ -79,10 +80,11 @@ export function Result({ id, desk, description, answer, problem, trouble, runnin
   const [difference, setDifference] = useState(false);
   // An earlier state of the same run, in place of its end.
   const [earlier, setEarlier] = useState(null);
-  const [factor, setFactor] = useState(1);
-  // A point that is being dragged.
-  const [grabbed, setGrabbed] = useState(null);
-  useEffect(() => { setEarlier(null); setFactor(1); setGrabbed(null); }, [answer?.key]);
+  // Where along a curve another setting is tried.
+  const [tried, setTried] = useState(null);
+  // What was pulled last, and what the strip said before.
+  const [pulled, setPulled] = useState(null);
+  useEffect(() => { setEarlier(null); setTried(null); }, [answer?.key]);
   const interim = running?.interim;
   const figures = shownOf(answer?.figures || []);
   const figure = interim || figures.find(({ id: name }) => name === chosen) || figures.find(isTelling) || figures[0];
@@ -90,38 +92,44 @@ export function Result({ id, desk, description, answer, problem, trouble, runnin
   const twin = pinned && !interim && pinned.key !== answer?.key ? pinned.figures.find(({ id: name }) => name === figure?.id) : null;
   const subtracted = twin && difference ? differenceOf(figure, twin) : null;
   const body = answer?.answer;
-  const isOwn = figure && body && !interim && !subtracted;
-  const picks = isOwn ? pickOf(figure, body) : null;
-  const replays = isOwn && canReplay(figure, body.result);
-  const trades = isOwn && canTrade(figure, answer.job);
-  const pick = (x, y) => { const next = picks.jobAt(x, y); if (next) onApply(next); };
-  const held = (ends, value) => Math.min(Math.max(value, ends[0]), ends[1]);
-  const handle = trades ? { x: factor, onMove: x => setFactor(Number(held(spanOf(figure), x).toPrecision(4))), onDrop: () => {} }
-    : picks?.at ? { x: (grabbed || picks.at)[0], y: (grabbed || picks.at)[1], onMove: (x, y) => setGrabbed([x, y]), onDrop: (x, y) => { setGrabbed(null); pick(x, y); } } : null;
+  const isOwn = Boolean(figure && body && !interim && !subtracted);
+  const replay = isOwn ? replayOf(description, figure, body.result) : null;
+  const trial = isOwn ? triedIn(figure) : undefined;
+  const told = useMemo(() => (body ? declared(description, body.result) : []), [body, description]);
+  const effect = pulled && { name: pulled.name, texts: effectOn(pulled.told, told) };
+  const take = name => setPulled(before => (before?.name === name && before.isHeld ? before : { name, told, isHeld: true }));
+  const letGo = () => setPulled(before => before && { ...before, isHeld: false });
+  // What takes long is computed when it is let go.
+  const put = (setting, x, y, how) => {
+    take(setting.name);
+    if (how === 'run') letGo();
+    desk.places.put(placeOf(figure, setting, x, y), how);
+  };
   // Numbers of the job follow a handle from where they are when it is taken.
   const hold = taken => {
     const { job } = desk.state;
+    take(taken.name);
     return {
       move: to => desk.change(movedJob(job, body.input, taken, to - taken[taken.along]), 'typing'),
-      drop: () => { if (desk.state.waiting) desk.ask(desk.state.job, 'run'); },
+      drop: () => { letGo(); if (desk.state.waiting) desk.ask(desk.state.job, 'run'); },
     };
   };
-  const unit = residualUnit(figures);
-  const numbers = useMemo(() => body && causesHeadline(body.result, description, body.input.calculator, unit), [body, description, unit]);
-  const sheet = useMemo(() => (body && advisesNext(body.result) ? sheetOf(description, body, answer.job) : null), [answer, description]);
+  const causes = useMemo(() => (body ? causesOf(description, body, answer.figures) : null), [answer, description]);
+  const numbers = useMemo(() => causesHeadline(causes), [causes]);
+  const sheet = useMemo(() => (nextAdvised(causes) ? sheetOf(description, body, answer.job) : null), [answer, causes]);
   // What a diagnosis is made for: the model that it found, or else the measurement that would find one.
-  const isFound = models && body?.result.verdict === 'named';
-  const act = isFound ? { text: t('take_model'), act: () => { const field = document.getElementById('model-name'); field?.scrollIntoView({ block: 'center' }); field?.focus(); } }
+  const model = models && causes?.named.length > 0;
+  const act = model && causes.isNamed ? { text: t('take_model'), act: () => { const field = document.getElementById('model-name'); field?.scrollIntoView({ block: 'center' }); field?.focus(); } }
     : sheet ? { text: t('take_sheet_next'), act: () => takeSheet(sheet, fileName(id, answer), owns, answer.key) } : null;
   if (!answer && !interim) {
     return html`<div class="empty">${running ? '' : problem ? html`<div class="no-answer">${trouble}<p>${problem.code === 'cancelled' ? t('cancelled_waits') : t('picture_waits')}</p></div>` : html`<p class="late">${t('first_answer')}</p>`}</div>`;
   }
-  const [first, ...more] = body?.explanation.filter(({ code }) => !(hasCauses(body.result) && SHOWN_BY_CAUSES.includes(code))) || [];
+  const [first, ...more] = body?.explanation.filter(({ code }) => !(causes && !causes.isSilent && saidOfCauses(code))) || [];
   // The answer is its first sentence; what else was said with it stands among the words.
   const [said, ...rest] = sentences(first?.text ?? '');
   const others = [...(rest.length > 0 ? [{ code: first.code, text: rest.join(' ') }] : []), ...more];
   return html`
-    ${body && html`<${Strip} ...${{ id, description, answer, said, limits: numbers ? undefined : sentences(more[0]?.text ?? '')[0], numbers, main: act, standing, owns, trouble }} />`}
+    ${body && html`<${Strip} ...${{ id, description, answer, said, limits: numbers ? undefined : sentences(more[0]?.text ?? '')[0], numbers: numbers ?? told, main: act, standing, owns, trouble }} />`}
     <p class="not-printed">${t('not_printed')}</p>
     <div class=${`result ${stale ? 'stale' : ''}`}>
       ${figures.length > MOST_BUTTONS && !interim && html`<${FigurePick} ...${{ figures, figure, choose: setChosen }} />`}
@@ -131,20 +139,21 @@ export function Result({ id, desk, description, answer, problem, trouble, runnin
         </div>`}
       <div class="picture-and-words">
         <div class="picture-box">
-          ${figure ? html`<${Picture} key=${figure.id} figure=${subtracted && subtracted.panels.length ? subtracted : (replays && earlier) || figure} pinned=${subtracted ? null : twin} height=${trades ? Math.min(height, TRADE_HEIGHT) : height} main onPick=${picks ? pick : null} handle=${handle} onHold=${isOwn && !earlier ? hold : null} />`
+          ${figure ? html`<${Picture} key=${figure.id} figure=${subtracted?.panels.length ? subtracted : (replay && earlier) || figure} pinned=${subtracted ? null : twin} height=${trial ? Math.min(height, TRIAL_HEIGHT) : height} main
+            onPut=${isOwn && !earlier ? put : null} trial=${trial && { x: tried ?? trial.x, move: x => setTried(held(figure, x)) }} onHold=${isOwn && !earlier ? hold : null} effect=${effect} />`
             : html`<p class="quiet">${t('no_figure')}</p>`}
           ${twin && html`<p class="pin-legend">${subtracted ? t('pinned_less') : t('pinned_shadow')}</p>`}
           <div class="under">${interim && html`<p class="so-far" role="status">${t('so_far')}</p>`}</div>
-          ${replays && html`<${Replay} key=${answer.key} id=${id} answer=${body} job=${answer.job} figures=${figures} onShow=${setEarlier} />`}
-          ${trades && html`<${TradeOff} key=${answer.key} ...${{ id, figure, factor, setFactor, figures }} answer=${body} job=${answer.job} schema=${description.input_schema} apply=${next => { if (owns(answer.key)) onApply(next); }} />`}
-          ${picks && html`<p class="quiet hint">${picks.hint}</p>`}
+          ${replay && html`<${Replay} key=${answer.key} id=${id} said=${replay} answer=${body} job=${answer.job} figure=${figure} figures=${figures} onShow=${setEarlier} />`}
+          ${trial && html`<${Trial} key=${answer.key} ...${{ id, desk, figure, setting: trial, figures }} x=${tried ?? trial.x} setX=${setTried} answer=${answer} apply=${next => { if (owns(answer.key)) onApply(next); }} />`}
+          ${isOwn && !trial && html`<${PlaneHint} figure=${figure} />`}
         </div>
         ${body && html`
         <div class="words">
           <${Warnings} key=${answer.key} list=${body.warnings} names=${namesOf(description.input_schema)} />
           ${hasOffers(description, body.result) && html`<${Offers} ...${{ description, answer, isCurrent: !stale }} apply=${next => { if (owns(answer.key)) onApply(next); }} />`}
-          ${hasClamp(body.result) && html`<${ClampBars} result=${body.result} input=${body.input} schema=${description.output_schema} />`}
-          ${hasCauses(body.result) && html`<${Causes} result=${body.result} description=${description} calculator=${body.input.calculator} unit=${unit} ...${{ sheet, answer, owns, stale }} name=${fileName(id, answer)} />`}
+          <${Bars} result=${body.result} input=${body.input} description=${description} />
+          ${causes && html`<${Causes} ...${{ causes, sheet, answer, owns, stale }} title=${description.title} name=${fileName(id, answer)} />`}
           ${others.length > 0 && html`<ul class="explanation">${others.map(({ code, text }, index) => html`<li key=${code + index}>${capital(text)}</li>`)}</ul>`}
         </div>`}
       </div>
@@ -157,10 +166,17 @@ export function Result({ id, desk, description, answer, problem, trouble, runnin
           ${study && html`<a class="button" id="vary" href=${study}>${t('vary_fields')}</a>`}
           <${Downloads} ...${{ id, description, answer, figure, stale, owns }} />
         </div>
-        ${models && body.result.named?.length > 0 && html`<${SaveModel} resultKey=${answer.key} stale=${stale} owns=${owns} />`}
+        ${model && html`<${SaveModel} resultKey=${answer.key} stale=${stale} owns=${owns} />`}
         <${Tabs} ...${{ id, description, answer, pinned, stale, owns }} />
         <${Sheet} ...${{ description, body, job: answer.job }} />`}
     </div>`;
+}
+
+/** How another place of the picture is tried, and what goes along. */
+function PlaneHint({ figure }) {
+  const [setting] = settingsOf(figure);
+  if (!setting) return null;
+  return html`<p class="quiet hint">${t(figure.frame === 'polar' ? 'pull_to_try' : 'click_to_try')}${setting.about && ` ${setting.about.text}`}</p>`;
 }
 
 /** Many pictures: a list, and the way to the next and the one before. */

@@ -5,7 +5,6 @@ import { Form, goTo } from './form.js';
 import { unread } from './fields.js';
 import { Result } from './result.js';
 import { labelOf, memberOf, namesOf, resolve } from './schema.js';
-import { pickOf } from './pick.js';
 import { Progress, Trouble } from './status.js';
 import { Desk } from './desk.js';
 import { BrokenLink, queryOf, written } from './address.js';
@@ -80,12 +79,12 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
           <button type="button" class=${`primary ${waiting ? 'calling' : ''}`} onClick=${() => compute('picture')} title="Ctrl+Enter">${waiting ? t('run_changed') : t('run')}</button>
           ${own.length > 0 && html`<p class="own-note" role="status">${t('own_used', { parts: own.map(name => labelOf(name, resolve(memberOf(description.input_schema, job).properties[name], description.input_schema)).toLowerCase()).join(', ') })} <a href=${`#/${id}?example=${baseName.example}`}>${t('own_example')}</a></p>`}
         </div>
-        <${Form} key=${`${id} ${baseName.example ?? 'kept'}`} schema=${description.input_schema} value=${job} filled=${answer?.answer.input} onChange=${(next, how) => (how === 'run' ? compute(pane) : desk.change(next, how))} errors=${problem?.errors} examples=${description.jobs} libraries=${libraries} calculator=${id} models=${models} />
+        <${Form} key=${`${id} ${baseName.example ?? 'kept'}`} schema=${description.input_schema} value=${job} said=${answer?.answer} records=${description.records} onChange=${(next, how) => (how === 'run' ? compute(pane) : desk.change(next, how))} errors=${problem?.errors} examples=${description.jobs} libraries=${libraries} calculator=${id} models=${models} />
       </section>
       <section class="result-pane" aria-label=${t('result')} aria-busy=${pending || running ? 'true' : 'false'}>
         <div class=${`work-line ${pending && !running ? 'on' : ''}`} aria-hidden="true"></div>
         <header class="room-head"><h1>${description.question}</h1><p class="summary">${description.title}</p>${running && html`<${Progress} running=${running} stop=${() => desk.stop()} />`}</header>
-        <${Result} ...${{ id, desk, description, answer, problem, trouble, running, pinned, models, study, standing: desk.standing(), pickOf: (figure, body) => pickOf(figure, description.input_schema, job, body) }} />
+        <${Result} ...${{ id, desk, description, answer, problem, trouble, running, pinned, models, study, standing: desk.standing() }} />
       </section>
     </main>`;
 }

@@ -26,7 +26,7 @@ export function resolve(schema, root) {
       continue;
     }
     const choices = whole.oneOf || whole.anyOf;
-    if (choices && choices.some(choice => choice.type === 'null')) {
+    if (choices?.some(choice => choice.type === 'null')) {
       optional = true;
       const rest = choices.filter(choice => choice.type !== 'null');
       const { oneOf, anyOf, ...own } = whole;

@@ -1,6 +1,6 @@
 // The answer: what was asked, said in one sentence, with its numbers and the one thing to take away. It is always in view,
 // and says so where it is not an answer to the inputs on the screen.
-import { html, useMemo } from './lib.js';
+import { html } from './lib.js';
 import { t, capital, number } from './text.js';
 import { spreadOf, withSpread } from './digits.js';
 import { flat } from './values.js';
@@ -17,8 +17,9 @@ export const sentences = text => (text === '' ? [] : text.split(/(?<=[.!?]) (?=[
 /** A number of the strip: what it is called, how it is written, its unit, what it means, and a second one beside it.
  *  @typedef {{ label: string, text: string, unit?: string, title?: string }} Headline */
 
-/** The numbers that the declaration names, as far as the result has them. */
-function declared(description, result) {
+/** The numbers that the declaration names, as far as the result has them.
+ *  @returns {Headline[]} */
+export function declared(description, result) {
   const rows = new Map(flat(description.output_schema, result, description.output_schema).map(row => [`/${row.path.join('/')}`, row]));
   const found = description.study_outputs.map(place => rows.get(place)).filter(row => typeof row?.value === 'number');
   // What has the same name would be told apart by nobody, and what is the same number says nothing new.
@@ -49,10 +50,8 @@ const WHY = { unread: 'answer_unread', wrong: 'answer_wrong', changed: 'answer_c
 
 /** The answer to the question: its sentence, what limits it, its numbers, and the one thing to take away: `main`, `{ text,
  *  act() }`; without it the program, or the sheet to print.
- *  @param {{ id: string, description: any, answer: any, said: string, limits?: string, numbers?: Headline[] | null, main?: any, standing: string, owns: any, trouble: any }} props */
+ *  @param {{ id: string, description: any, answer: any, said: string, limits?: string, numbers: Headline[], main?: any, standing: string, owns: any, trouble: any }} props */
 export function Strip({ id, description, answer, said, limits, numbers, main, standing, owns, trouble }) {
-  const { result } = answer.answer;
-  const told = useMemo(() => numbers ?? declared(description, result), [description, result, numbers]);
   const [take, refusal] = useHandOver({ name: fileName(id, answer), answer, owns });
   const isProgram = description.media_types.includes('text/x-gcode');
   const hand = () => {
@@ -65,7 +64,7 @@ export function Strip({ id, description, answer, said, limits, numbers, main, st
     <section class=${`strip ${why ? `not-theirs ${standing}` : ''}`} id="answer" aria-label=${t('answer')} tabindex="-1">
       <div class="told-first"><p class="verdict" aria-live="polite">${capital(said ?? '')}</p>
         ${limits && html`<p class="limits">${capital(brief(limits))}</p>`}</div>
-      <dl class="headline">${told.map(row => html`<div key=${row.label} title=${row.title}><dt>${row.label}</dt><dd>${row.text}${row.unit && html`<small> ${row.unit}</small>`}</dd></div>`)}</dl>
+      <dl class="headline">${numbers.map(row => html`<div key=${row.label} title=${row.title}><dt>${row.label}</dt><dd>${row.text}${row.unit && html`<small> ${row.unit}</small>`}</dd></div>`)}</dl>
       <div class="hand-over">
         <button type="button" id="take" class="primary" disabled=${Boolean(why)} onClick=${hand}>${main ? main.text : isProgram ? t('take_program') : t('take_sheet')}</button>
         ${why && html`<p class="stale-note" role="status">${t(why)}</p>`}

@@ -5,6 +5,7 @@ import * as api from './api.js';
 import { jobOf } from './address.js';
 import { lastJob } from './mine.js';
 import { read } from './number.js';
+import { mark, unread as unreadFields } from './fields.js';
 import { keepRun, keptRun, inputOf } from './runs.js';
 import { Progress, Trouble } from './status.js';
 import { Picture } from './figure.js';
@@ -98,6 +99,9 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
   const control = useRef(null);
   const stop = useRef(null);
   const latest = useRef(null);
+  // Fields whose text is no value: nothing that is shown is an answer to it.
+  const [unreadable, setUnreadable] = useState(unreadFields.get());
+  useEffect(() => unreadFields.watch(setUnreadable), []);
   useEffect(() => () => { control.current?.abort(); stop.current?.(); }, []);
   const body = { calculator: description.id, job, vary, ...(vary.length > 1 && { combine }), outputs: wished };
   const tell = extra => write(written(new URLSearchParams([['calculator', description.id], ...new URLSearchParams(part), ['vary', JSON.stringify(vary)], ...(vary.length > 1 ? [['combine', combine]] : []), ...(wished.join() === description.study_outputs.join() ? [] : [['outputs', JSON.stringify(wished)]]), ...extra])));
@@ -113,9 +117,9 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
   const show = async (key, whole, asked, said = language()) => {
     const now = language();
     const signal = control.current?.signal;
-    const [result, figures] = await Promise.all([said === now && whole ? whole : api.patient(() => api.result(key, signal), signal), api.patient(() => api.figures(key, signal), signal)]);
+    const found = said === now && whole ? whole : await api.patient(() => api.shown(key, signal), signal);
     if (now !== language()) { await show(key, null, asked); return; }
-    setAnswer({ key, answer: result, figures, asked });
+    setAnswer({ key, ...found, asked });
     setPending(false);
     setProblem(null);
   };
@@ -150,13 +154,13 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
     setPane('picture');
     const said = language();
     try {
-      const { answer: whole, job: record } = await api.patient(() => api.solve('studies', body, { signal }), signal);
+      const { job: record, ...found } = await api.patient(() => api.solve('studies', body, { signal }), signal);
       if (signal.aborted) return;
       if (record) {
         keepRun(record.id, body);
         tell([['run', record.id]]);
         watch(record, body, true);
-      } else { await show(whole.key, whole, body, said); tell([['study', whole.key]]); }
+      } else { await show(found.answer.key, found, body, said); tell([['study', found.answer.key]]); }
     } catch (error) {
       fail(error);
       if (error instanceof api.Unreachable) api.whenBack(error, () => { if (!signal.aborted) latest.current(); });
@@ -166,7 +170,7 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
   /** Computes the study: not before all of it can be read. */
   const compute = event => {
     event.preventDefault();
-    const first = /** @type {HTMLElement | null} */ (document.querySelector('.study-form [data-unread]'));
+    const first = /** @type {HTMLElement | undefined} */ ([...document.querySelectorAll('.study-form input')].find(field => unreadFields.get().has(field.id)));
     if (!first) { start(); return; }
     setPane('form');
     setTimeout(() => { first.scrollIntoView({ block: 'center' }); first.focus(); }, 30);
@@ -223,10 +227,10 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
   const touched = JSON.stringify(body) !== begun.current;
   // A kept study is its own job; one that is changed, on its way, refused or not to be read has no answer to take away.
   const isAsked = answer && (JSON.stringify(answer.asked) === JSON.stringify(body) || (stored && !touched));
-  const stale = Boolean(answer && (!isAsked || pending || running || problem));
+  const stale = Boolean(answer && (!isAsked || pending || running || problem || unreadable.size > 0));
   const current = useRef(null);
   current.current = stale ? null : answer?.key;
-  const owns = key => current.current === key && !document.querySelector('.study-form [data-unread]');
+  const owns = key => current.current === key && unreadFields.get().size === 0;
   const trouble = problem && html`<${Trouble} problem=${problem.errors ? { ...problem, errors: faults } : problem} names=${names} over=${Boolean(answer)} onGo=${go} />`;
   return html`
     <main class="room" data-pane=${pane} id="main" tabindex="-1">
@@ -301,11 +305,16 @@ function Varied({ index, variable, leaves, taken, faults, set, remove }) {
   const id = name => `vary-${index}-${name}`;
   // A draft that is no value stays, and says so.
   const unread = Object.keys(draft).map(name => [name, faultOf(name, draft[name])]).filter(([, fault]) => fault !== null);
+  useEffect(() => {
+    const ids = unread.map(([name]) => id(name));
+    ids.forEach(one => mark(one, true));
+    return () => ids.forEach(one => mark(one, false));
+  }, [unread.map(([name]) => name).join()]);
   const leave = name => { if (!unread.some(([other]) => other === name)) setDraft(({ [name]: done, ...others }) => others); };
   const about = name => {
     const isUnread = unread.some(([other]) => other === name);
     const isRefused = faults.some(({ pointer: place }) => place.split('/')[3] === name);
-    return { 'aria-invalid': isUnread || isRefused ? 'true' : undefined, 'aria-describedby': isUnread ? id(`${name}-fault`) : undefined, 'data-unread': isUnread ? '' : undefined, onBlur: () => leave(name) };
+    return { 'aria-invalid': isUnread || isRefused ? 'true' : undefined, 'aria-describedby': isUnread ? id(`${name}-fault`) : undefined, onBlur: () => leave(name) };
   };
   const field = (name, label) => html`<label class="study-field">${label}<input id=${id(name)} type="text" inputmode="decimal" autocomplete="off" value=${draft[name] ?? typed(variable[name])} ...${about(name)} onInput=${event => take(name, event.currentTarget.value)} /></label>`;
   const range = { pointer: variable.pointer, from: leaf?.range?.from ?? 0, to: leaf?.range?.to ?? 1, count: 5 };

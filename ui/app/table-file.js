@@ -243,7 +243,7 @@ export function conditionsIn(file, matches, runs) {
 }
 
 /** What a cell says in the words of the contract: a number in the field's own unit, a truth value, a word. */
-function valueOf(text, separator, { schema, unit }) {
+function cellValue(text, separator, { schema, unit }) {
   if (text === undefined || text === '') return undefined;
   if (schema.type === 'boolean') return /^(true|1|yes|да)$/i.test(text);
   if (schema.type !== 'number' && schema.type !== 'integer') return text;
@@ -259,7 +259,7 @@ export function conditionsOf(file, matches, runs, conditions) {
   for (const row of file.rows) {
     const number = own ? cellNumber(row[own.index], file.separator) || 1 : 1;
     const before = found.get(number) ?? {};
-    const said = Object.fromEntries(conditions.map(one => [one.name, valueOf(row[one.index], file.separator, one)]).filter(([, value]) => value !== undefined));
+    const said = Object.fromEntries(conditions.map(one => [one.name, cellValue(row[one.index], file.separator, one)]).filter(([, value]) => value !== undefined));
     found.set(number, { ...said, ...before });
   }
   return found;
@@ -296,7 +296,7 @@ function plain(value, columns, free) {
   const matches = guess(columns, file.header);
   const used = columns.filter(({ name }) => matches[name]);
   const { kept } = othersOf(file, columns, matches, free);
-  const cellOf = (row, column) => { const own = valueOf(row[matches[column.name].index], file.separator, { schema: column.schema, unit: matches[column.name].unit }); return own === undefined ? '' : String(own); };
+  const cellOf = (row, column) => { const own = cellValue(row[matches[column.name].index], file.separator, { schema: column.schema, unit: matches[column.name].unit }); return own === undefined ? '' : String(own); };
   return { header: [...used.map(({ name }) => name), ...kept.map(({ title }) => title)], rows: file.rows.map(row => [...used.map(column => cellOf(row, column)), ...kept.map(({ index }) => row[index] ?? '')]) };
 }
 

@@ -6,7 +6,7 @@ const MOST_DEPTH = 8;
 /** Values that a field is varied over unless another number is asked for. */
 const COUNT = 9;
 /** What a user most often asks about. */
-const FIRST = /(feed_mm_|speed_|depth_mm$)/;
+const FIRST = /(feed|speed|depth)_m/;
 
 /** Every single number, word and truth value of a job, those that it leaves to their defaults too. */
 export function leavesOf(schema, job) {
