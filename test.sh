@@ -25,7 +25,7 @@ declare -A ABOUT=(
   [contract]="openapi/precut.json is what the program prints, and nothing that Redocly, Spectral or a validator calls an error"
   [clients]="the clients in Python and TypeScript: built, their tests, documentation and notebooks against the service"
   [programs]="programs for machines, read by LinuxCNC's own interpreter"
-  [dockerfile]="hadolint over the Dockerfile; compose.yaml is YAML"
+  [dockerfile]="hadolint over the Dockerfile; compose.yaml against the Compose specification"
   [packaging]="the Debian package goes in, over itself and out; systemd's unit; Kubernetes' manifests and their settings"
   [attack]="schemathesis against the running service, all checks"
 )
@@ -272,8 +272,7 @@ step_dockerfile() {
   local tools
   tools=$(python_tools)
   "$tools/hadolint" docker/Dockerfile
-  "$tools/python" -c 'import sys, yaml; services = yaml.safe_load(sys.stdin)["services"]; services["precut"]; services["worker"]' \
-    <docker/compose.yaml
+  "$tools/check-jsonschema" --quiet --builtin-schema vendor.compose-spec docker/compose.yaml
 }
 
 step_packaging() {

@@ -122,7 +122,7 @@ fn the_other_codes_of_the_specification() {
             "/effects/1/kind",
         ),
         ("/stations", json!({ "kind": "per_zone", "count": 300_000 }), "too_many_stations", "/stations/count"),
-        ("/material", json!("steel"), "unknown_field", "/material"),
+        ("/material", json!("steel"), "unknown_material", "/material"),
         ("/shaft/material", json!("unobtainium"), "unknown_material", "/shaft/material"),
     ];
     for (place, value, code, at) in changes {

@@ -99,9 +99,11 @@ def questions(document: dict[str, Any]) -> list[Question]:
         answer = operations.get("post", {}).get("responses", {}).get("200")
         if answer is None or not path.startswith("/v1/"):
             continue
+        envelope = schemas[reference(answer["content"]["application/json"]["schema"])]
+        if "result" not in envelope["properties"]:
+            continue  # Records of machines, tools and materials are no question.
         job = reference(operations["post"]["requestBody"]["content"]["application/json"]["schema"])
         choices = [reference(choice) for choice in schemas[job].get("oneOf", [])]
-        envelope = schemas[reference(answer["content"]["application/json"]["schema"])]
         result = reference(envelope["properties"]["result"])
         results = [reference(choice) for choice in schemas[result].get("anyOf", [])]
         for one in choices or [job]:

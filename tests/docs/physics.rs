@@ -22,8 +22,18 @@ const CATALOGUES: [(&[Cause], &str); 4] = [
 ];
 
 /// Groups of equations.
-const GROUPS: [&str; 9] =
-    ["clamping/", "cylindricity/", "deflection/", "diagnosis/", "feed/", "fit/", "fixture/", "ring/", "roundness/"];
+const GROUPS: [&str; 10] = [
+    "clamping/",
+    "cylindricity/",
+    "deflection/",
+    "diagnosis/",
+    "feed/",
+    "fit/",
+    "fixture/",
+    "library/",
+    "ring/",
+    "roundness/",
+];
 
 /// Equations that have a heading: its first word.
 fn documented() -> BTreeSet<String> {

@@ -172,7 +172,7 @@ fn limited(folder: &Path) -> Command {
     let inner = crate::support::toy_command(&["serve", "--listen", "127.0.0.1:0", "--data", folder.to_str().unwrap()]);
     let mut command = Command::new("sh");
     // Blocks of 512 bytes where POSIX rules, of 1024 in bash.
-    command.args(["-c", "trap '' XFSZ; ulimit -f 3000; exec \"$0\" \"$@\""]).arg(inner.get_program());
+    command.args(["-c", "trap '' XFSZ; ulimit -f 5000; exec \"$0\" \"$@\""]).arg(inner.get_program());
     command.args(inner.get_args());
     for (name, value) in inner.get_envs() {
         match value {

@@ -375,3 +375,45 @@ fn reports_and_workbooks_are_written_as_they_are() {
         assert_ne!(precut(&["solve", file, "--format", format]).stdout, printed, "{format} in English");
     }
 }
+
+#[test]
+fn names_are_looked_up_in_files_and_data_folders() {
+    let job = r#"{"calculator": "deflection-compensation", "job": {"machine": "lathe-3", "material": "4140",
+        "shaft": {"segments": [{"length_mm": 300, "diameter_mm": 30, "stock_diameter_mm": 32}]},
+        "supports": [{"kind": "chuck", "z_mm": 0}, {"kind": "centre", "z_mm": 300}],
+        "force": {"kind": "constant", "passive_n": 200}, "cut": {"feed_mm_per_rev": 0.2, "spindle_speed_rpm": 500}}}"#;
+    let refused = feed_precut(&["solve", "-"], job);
+    assert_eq!(refused.status.code(), Some(2));
+    assert_eq!(complaint(&refused)["errors"][0]["code"], "unknown_machine");
+    let folder = tempfile::tempdir().unwrap();
+    let library = folder.path().join("ours.json");
+    let machine = r#"{"schema_version": 1, "machines": [{"id": "lathe-3", "kind": "lathe",
+        "compliance": {"carriage_um_per_n": 0.02, "headstock_chuck_um_per_n": 0.01, "tailstock_centre_um_per_n": 0.03}}]}"#;
+    std::fs::write(&library, machine).unwrap();
+    let library = library.to_str().unwrap();
+    let carriage = |output: &Output| -> Value {
+        let answer: Value = serde_json::from_slice(&output.stdout).unwrap_or_else(|_| panic!("{output:?}"));
+        answer["input"]["carriage"]["compliance_um_per_n"].clone()
+    };
+    assert_eq!(carriage(&feed_precut(&["solve", "-", "--library", library], job)), 0.02);
+    // In the data folder of a service, while it runs.
+    let service = Process::start();
+    let put = std::process::Command::new("curl")
+        .args(["--silent", "--fail", "--request", "PUT", "--json"])
+        .arg(r#"{"kind": "lathe", "compliance": {"carriage_um_per_n": 0.05}}"#)
+        .arg(format!("http://{}/v1/machines/lathe-3", service.address))
+        .output();
+    if put.is_ok_and(|put| put.status.success()) {
+        let folder = service.folder.to_str().unwrap();
+        assert_eq!(carriage(&feed_precut(&["solve", "-", "--data", folder], job)), 0.05);
+    }
+    let shown = precut(&["materials", "4140"]);
+    let shown: Value = serde_json::from_slice(&shown.stdout).unwrap();
+    assert_eq!((&shown["name"], &shown["built_in"]), (&"42crmo4".into(), &true.into()));
+    let own = precut(&["machines", "--library", library, "--search", "lathe-3"]);
+    assert!(String::from_utf8_lossy(&own.stdout).starts_with("lathe-3"));
+    let codes = precut(&["tools", "CNMG120408 PCLNR2525M12"]);
+    let codes: Value = serde_json::from_slice(&codes.stdout).unwrap();
+    assert_eq!(codes["geometry"]["cutting_edge_angle_deg"], 95.0);
+    assert_eq!(precut(&["tools", "no such tool"]).status.code(), Some(2));
+}

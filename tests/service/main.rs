@@ -14,12 +14,15 @@ mod certificates;
 #[path = "../support/receiver.rs"]
 mod receiver;
 
+mod attack;
 mod bad_input;
+mod cases;
 mod command_line;
 mod contract;
 mod events;
 mod jobs;
 mod language;
+mod library;
 mod limits;
 mod models;
 mod negotiation;
@@ -28,6 +31,7 @@ mod paper;
 mod process;
 mod quotas;
 mod results;
+mod roundness;
 mod standing;
 mod studies;
 mod traces;

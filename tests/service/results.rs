@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use precut::registry::Registry;
 use serde_json::Value;
 
 use crate::support::{Server, header, problem, toy};
@@ -223,5 +224,32 @@ async fn a_result_is_read_in_parts_with_words() {
         let absent = server.get(&format!("/v1/results/b3:{zeros}/{part}")).send().await.unwrap();
         problem(absent, 404, "unknown_result").await;
         problem(server.get(&format!("/v1/results/none/{part}")).send().await.unwrap(), 400, "bad_key").await;
+    }
+}
+
+/// What a click in a picture stands for is a job that may be sent, and it is the one of that place.
+#[tokio::test]
+async fn another_place_of_a_picture_is_a_job() {
+    let server = Server::start_of(Registry::standard().unwrap(), |_| {}).await;
+    let about: Value = server.get("/v1/calculators/fixture-stability").send().await.unwrap().json().await.unwrap();
+    let solve =
+        |job: &Value| server.post_to("/v1/fixture-stability", job.to_string()).header("prefer", "wait=60").send();
+    let answer: Value = solve(&about["jobs"]["lobes"]).await.unwrap().json().await.unwrap();
+    let path = format!("/v1/results/{}", answer["key"].as_str().unwrap());
+    let own: Value = server.get(&format!("{path}/job")).send().await.unwrap().json().await.unwrap();
+    let place = "figure=lobes&setting=working_point&x=1500&y=1.25";
+    let moved: Value = server.get(&format!("{path}/job_at?{place}")).send().await.unwrap().json().await.unwrap();
+    let mut expected = own.clone();
+    expected["job"]["cut"]["spindle_speed_rpm"] = 1500.0.into();
+    expected["job"]["cut"]["depth_mm"] = 1.25.into();
+    assert_eq!(moved, expected);
+    assert_eq!(solve(&moved["job"]).await.unwrap().status(), 200);
+    // A place is all four, and what is missing is named.
+    for missing in ["figure", "setting", "x", "y"] {
+        let rest: Vec<&str> = place.split('&').filter(|part| !part.starts_with(&format!("{missing}="))).collect();
+        let response = server.get(&format!("{path}/job_at?{}", rest.join("&"))).send().await.unwrap();
+        assert_eq!(response.status(), 400);
+        let problem: Value = response.json().await.unwrap();
+        assert_eq!(problem["detail"], format!("the parameter {missing} is missing"));
     }
 }

@@ -39,7 +39,7 @@ async fn a_job_is_one_trace_from_its_request_to_its_callback() {
         let mut request = client.post(url).body(job);
         request = request.header("content-type", "application/json").header("prefer", "respond-async");
         if let Some(place) = place {
-            request = request.header("traceparent", place);
+            request = request.header("traceparent", place).header("tracestate", "plant=mes");
         }
         let accepted = request.send().await.unwrap();
         assert_eq!((accepted.status().as_u16(), header(&accepted, "retry-after")), (202, "1"));
@@ -74,6 +74,8 @@ async fn a_job_is_one_trace_from_its_request_to_its_callback() {
     let place = |span: &Value| format!("00-{trace}-{}-01", span["spanId"].as_str().unwrap());
     assert_eq!(accepted["traceparent"], place(request));
     assert_eq!(told.header("traceparent"), place(callback), "who is told can go on with it");
+    assert_eq!(told.header("tracestate"), "plant=mes");
+    assert_eq!((&job["traceState"], &callback["traceState"]), (&json!("plant=mes"), &json!("plant=mes")));
     assert!(of(&"a".repeat(32)).is_empty());
     assert_eq!(of(own.split('-').nth(1).unwrap()).len(), 3);
 }

@@ -10,7 +10,7 @@ use tempfile::NamedTempFile;
 
 use crate::certificates::{certificate, signed};
 use crate::jobs::lasting;
-use crate::receiver::{Receiver, SECRET, secret_file};
+use crate::receiver::{Call, Receiver, SECRET, secret_file};
 use crate::support::{Process, Server, header, problem, toy};
 
 const OTHER_SECRET: &str = "whsec_AAECAwQFBgcICQoLDA0ODxAREhMUFRYXGBkaGxwdHh8=";
@@ -207,6 +207,43 @@ async fn what_nobody_takes_is_given_up_for_all_to_see() {
 }
 
 #[tokio::test]
+async fn a_receiver_that_asks_for_time_gets_it_within_a_day() {
+    let receiver = Receiver::saying(|call| {
+        let asked = match call.path.as_str() {
+            "/hour" => "3600",
+            "/century" => "Tue, 31 Dec 2199 23:59:59 GMT",
+            _ => "0",
+        };
+        Some(format!("HTTP/1.1 429 x\r\nRetry-After: {asked}\r\nContent-Length: 0\r\n\r\n"))
+    });
+    let secret = secret_file(SECRET);
+    let server = server(&receiver, &secret).await;
+    let minute = 60;
+    for (length, path, wait_s) in [(2245, "/hour", 3600), (2246, "/century", 86_400)] {
+        let request = server.post_to(&told_to(&receiver.url(path)), lasting(length, 1));
+        let sent = request.header("prefer", "respond-async").send().await.unwrap();
+        let address = header(&sent, "location").to_owned();
+        let told = loop {
+            let job = job(&server, &address).await;
+            if job["callback"]["fault"] == "http_429" {
+                break job;
+            }
+            tokio::time::sleep(Duration::from_millis(5)).await;
+        };
+        let at = |text: &Value| -> jiff::Timestamp { text.as_str().unwrap().parse().unwrap() };
+        let waits = at(&told["callback"]["next_at"]).duration_since(at(&told["finished_at"])).as_secs();
+        assert!((wait_s - 1..wait_s + minute).contains(&waits), "{path}: {waits} s");
+        assert_eq!(told["callback"]["attempts"], 1);
+    }
+    // One that asks to be called at once is given the pauses all the same, and no more tries.
+    let request = server.post_to(&told_to(&receiver.url("/now")), lasting(2247, 1));
+    let sent = request.header("prefer", "respond-async").send().await.unwrap();
+    let given_up = callback_in(&server, header(&sent, "location"), "given_up").await;
+    assert_eq!((&given_up["attempts"], &given_up["fault"]), (&json!(4), &json!("http_429")));
+    server.stop().await;
+}
+
+#[tokio::test]
 async fn an_answer_cannot_lead_it_elsewhere_or_hold_it_up() {
     let elsewhere = Receiver::start();
     let (to, secret) = (elsewhere.url("/stolen"), secret_file(SECRET));
@@ -369,21 +406,27 @@ async fn a_place_in_a_trace_is_kept_with_the_job_and_passed_on() {
     let (receiver, secret) = (Receiver::start(), secret_file(SECRET));
     let server = server(&receiver, &secret).await;
     let place = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01";
+    let states = ["rojo=00f067aa0ba902b7", "congo=t61rcWkgMzE"];
     let send = async |given: &[&str], length: u32| -> Value {
         let mut request = server.post_to(&told_to(&receiver.url("/")), lasting(length, 600));
         for one in given {
             request = request.header("traceparent", *one);
         }
+        for one in states {
+            request = request.header("tracestate", one);
+        }
         request.send().await.unwrap().json().await.unwrap()
     };
     // Nothing is exported here: it goes on as it came.
     assert_eq!(send(&[place], 2331).await["traceparent"], place);
-    assert_eq!(receiver.after(1).await[0].header("traceparent"), place);
+    let told = receiver.after(1).await.remove(0);
+    assert_eq!((told.header("traceparent"), told.header("tracestate")), (place, states.join(",").as_str()));
     // What is none counts as not given.
     for (number, given) in (2332..).zip([&[][..], &["00-nonsense"], &[place, place]]) {
         assert_eq!(send(given, number).await["traceparent"], json!(null), "{given:?}");
     }
-    assert!(receiver.after(4).await[1..].iter().all(|call| call.header("traceparent").is_empty()));
+    let has_none = |call: &Call| call.header("traceparent").is_empty() && call.header("tracestate").is_empty();
+    assert!(receiver.after(4).await[1..].iter().all(has_none));
     server.stop().await;
 }
 

@@ -10,9 +10,9 @@ use crate::support::{Server, header, problem, toy};
 
 /// Keys by name, owner and scopes.
 const KEYS: [(&str, &str, &[Scope]); 5] = [
-    ("a-one", "alpha", &[Scope::Solve, Scope::Read, Scope::Models]),
-    ("a-two", "alpha", &[Scope::Solve, Scope::Read, Scope::Models]),
-    ("b", "beta", &[Scope::Solve, Scope::Read, Scope::Models]),
+    ("a-one", "alpha", &[Scope::Solve, Scope::Read, Scope::Models, Scope::Library]),
+    ("a-two", "alpha", &[Scope::Solve, Scope::Read, Scope::Models, Scope::Library]),
+    ("b", "beta", &[Scope::Solve, Scope::Read, Scope::Models, Scope::Library]),
     ("reader", "alpha", &[Scope::Read]),
     ("root", "root", &[Scope::Admin]),
 ];
@@ -154,6 +154,48 @@ pub async fn models_are_their_owners_alone(server: &Server) {
     }
     assert_eq!(other.request(Method::DELETE, "/v1/models/lathe").send().await.unwrap().status(), 204);
     assert_eq!(mine.json("/v1/models/lathe").await["revision"], 2);
+}
+
+pub async fn records_are_their_owners_alone(server: &Server) {
+    let (mine, same, other) = (As(server, "a-one"), As(server, "a-two"), As(server, "b"));
+    let put = async |caller: &As<'_>, carriage: f64| {
+        let set = serde_json::json!({ "/compliance/carriage_um_per_n": carriage });
+        let record = serde_json::json!({ "from": "lathe_engine_medium", "set": set });
+        let response = caller.request(Method::PUT, "/v1/machines/lathe-3").json(&record).send().await.unwrap();
+        (response.status().as_u16(), response.json::<Value>().await.unwrap())
+    };
+    assert_eq!(put(&mine, 0.02).await.0, 201);
+    assert_eq!(same.json("/v1/machines/lathe-3").await["revision"], 1);
+    // To another it is not there, in no list and in no job; the engine's own are there for all.
+    problem(other.get("/v1/machines/lathe-3").await, 404, "unknown_machine").await;
+    assert_eq!(other.names("/v1/machines?own=true", "name").await, Vec::<String>::new());
+    assert_eq!(other.json("/v1/machines/lathe_engine_medium").await["built_in"], true);
+    problem(other.request(Method::DELETE, "/v1/machines/lathe-3").send().await.unwrap(), 404, "unknown_machine").await;
+    let job = serde_json::json!({
+        "machine": "lathe-3",
+        "shaft": {"segments": [{"length_mm": 500, "diameter_mm": 60, "stock_diameter_mm": 62}], "material": "steel_45"},
+        "supports": [{"kind": "chuck", "z_mm": 0}, {"kind": "centre", "z_mm": 500}],
+        "force": {"kind": "constant", "passive_n": 200},
+        "cut": {"feed_mm_per_rev": 0.3, "spindle_speed_rpm": 500},
+    });
+    let solve = async |caller: &As<'_>| {
+        caller.request(Method::POST, "/v1/deflection-compensation").json(&job).send().await.unwrap()
+    };
+    let refused = problem(solve(&other).await, 422, "invalid_job").await;
+    assert_eq!(refused["errors"][0]["code"], "unknown_machine", "{refused:#}");
+    assert!(!refused.to_string().contains("lathe-3\"]"), "it does not tell what another has");
+    // The same name of two owners means two things.
+    assert_eq!(put(&other, 0.07).await.1["revision"], 1);
+    let carriage = async |caller: &As<'_>| -> Value {
+        let answer: Value = solve(caller).await.json().await.unwrap();
+        answer["input"]["carriage"]["compliance_um_per_n"].clone()
+    };
+    assert_eq!((carriage(&mine).await, carriage(&other).await), (0.02.into(), 0.07.into()));
+    assert!(
+        !mine.request(Method::GET, "/v1/library/export").send().await.unwrap().text().await.unwrap().contains("0.07")
+    );
+    assert_eq!(other.request(Method::DELETE, "/v1/machines/lathe-3").send().await.unwrap().status(), 204);
+    assert_eq!(mine.json("/v1/machines/lathe-3").await["revision"], 1);
 }
 
 pub async fn an_answer_is_traced_to_what_made_it(server: &Server) {

@@ -8,7 +8,8 @@ export type Schemas = components["schemas"];
 type Post<P extends keyof paths> = paths[P] extends { post: infer O } ? O : never;
 type Solves<O> = O extends {
   requestBody: { content: { "application/json": infer J } };
-  responses: { 200: { content: { "application/json": infer A } } };
+  // What answers no question, as the codes of a tool, has no result.
+  responses: { 200: { content: { "application/json": infer A extends { result: unknown } } } };
 }
   ? { job: J; answer: A; query: QueryOf<O> }
   : never;

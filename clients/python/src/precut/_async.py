@@ -125,9 +125,9 @@ class AsyncClient:
         """An example job, the first if none is named."""
         return await self._run(lambda patience: flow.example(calculator, name, patience))
 
-    async def materials(self) -> list[models.MaterialItem]:
+    async def materials(self) -> list[models.MaterialRecord]:
         """Work materials with the sources of their numbers."""
-        return models.MaterialList.model_validate(await self.get("/v1/materials")).items
+        return models.MaterialRecordList.model_validate(await self.get("/v1/materials")).items
 
     async def jobs(self, *, most: int | None = 50, **query: str) -> list[models.ListedJob]:
         """The newest jobs; `state=` and `calculator=` choose."""

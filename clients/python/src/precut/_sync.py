@@ -123,9 +123,9 @@ class Client:
         """An example job, the first if none is named."""
         return self._run(lambda patience: flow.example(calculator, name, patience))
 
-    def materials(self) -> list[models.MaterialItem]:
+    def materials(self) -> list[models.MaterialRecord]:
         """Work materials with the sources of their numbers."""
-        return models.MaterialList.model_validate(self.get("/v1/materials")).items
+        return models.MaterialRecordList.model_validate(self.get("/v1/materials")).items
 
     def jobs(self, *, most: int | None = 50, **query: str) -> list[models.ListedJob]:
         """The newest jobs; `state=` and `calculator=` choose."""
