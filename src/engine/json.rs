@@ -12,7 +12,7 @@ use serde_json::{Map, Number, Value};
 
 use super::budget::Room;
 use super::error::{Error, SyntaxFault};
-use crate::registry::{Shape, child, cut_short_at};
+use crate::registry::{Faults, Shape, child, cut_short_at};
 
 /// Deepest nesting; below the parser's own limit of 128, so that the fault can be named with its place.
 const DEEPEST: usize = 100;
@@ -27,6 +27,8 @@ const MOST_UNKNOWN: usize = 1000;
 const LONGEST_UNKNOWN: usize = 100;
 /// So many bytes of a text are kept where there may be none: more than are ever shown.
 const LONGEST_MISFIT: usize = 1000;
+/// So many items of a long list are kept of a body that is read for its faults.
+pub(crate) const HEAD_ITEMS: usize = 256;
 /// What a value and a field take beside what they hold, bytes.
 const VALUE_BYTES: usize = size_of::<Value>();
 /// A list that grows has room for as many items again.
@@ -38,6 +40,24 @@ pub(crate) const RETRY_AFTER: Duration = Duration::from_secs(1);
 /// The value of `bytes`, whatever it is.
 pub(crate) fn parse(bytes: &[u8]) -> Result<Value, Error> {
     parse_as(bytes, Shape::open(), &Room::default()).map(|parsed| parsed.value)
+}
+
+/// What was made of a large body to see what is wrong with it.
+#[derive(Debug)]
+pub(crate) struct ParsedHead {
+    pub(crate) parsed: Parsed,
+    /// Where a long list was not kept whole, the faults of its further items.
+    pub(crate) beyond: Option<Faults>,
+}
+
+/// The value of `bytes` with the first items of long lists only. Each further one is held to what the items of its list
+/// have to be, and forgotten: as values they take many times the memory of their text, which a body that is refused
+/// anyway shall not.
+pub(crate) fn parse_head(bytes: &[u8], shape: &Shape, room: &Room) -> Result<ParsedHead, Error> {
+    let beyond = Beyond::default();
+    let parsed = parse_with(bytes, shape, room, Some(&beyond))?;
+    let Beyond { faults, is_any, .. } = beyond;
+    Ok(ParsedHead { parsed, beyond: is_any.get().then(|| faults.into_inner()) })
 }
 
 /// What was made of a body.
@@ -54,6 +74,10 @@ pub(crate) struct Parsed {
 /// Of what does not fit the shape only as much is kept as shows what is wrong: of a field without a name in it the name, of a
 /// list where there may be none that it is one, of a list that is too long its most items and how many they are.
 pub(crate) fn parse_as(bytes: &[u8], shape: &Shape, room: &Room) -> Result<Parsed, Error> {
+    parse_with(bytes, shape, room, None)
+}
+
+fn parse_with(bytes: &[u8], shape: &Shape, room: &Room, beyond: Option<&Beyond>) -> Result<Parsed, Error> {
     let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
     if bytes.iter().all(u8::is_ascii_whitespace) {
         let message = "the body is empty".to_owned();
@@ -66,7 +90,7 @@ pub(crate) fn parse_as(bytes: &[u8], shape: &Shape, room: &Room) -> Result<Parse
     let trail = Trail::default();
     let (unknown, width) = (Cell::new(0), Cell::new(0));
     let mut deserializer = serde_json::Deserializer::from_slice(bytes);
-    let strict = Strict { trail: &trail, depth: 0, shape, room, unknown: &unknown, width: &width };
+    let strict = Strict { trail: &trail, depth: 0, shape, room, unknown: &unknown, width: &width, beyond };
     match strict.deserialize(&mut deserializer) {
         Ok(value) => match deserializer.end() {
             Ok(()) => Ok(Parsed { value, left_out: unknown.get().saturating_sub(MOST_UNKNOWN) }),
@@ -196,6 +220,30 @@ impl Trail {
     }
 }
 
+/// Items of long lists that are not kept.
+#[derive(Default)]
+struct Beyond {
+    /// Theirs, with pointers from the value that is being read.
+    faults: RefCell<Faults>,
+    is_any: Cell<bool>,
+    /// They are there one at a time.
+    room: Room,
+}
+
+impl Beyond {
+    /// How many faults are listed.
+    fn listed(&self) -> usize {
+        self.faults.borrow().listed.len()
+    }
+
+    /// The faults from `first` on were found in what stands at `step` of the value that is being read.
+    fn place(&self, first: usize, step: &str) {
+        for fault in &mut self.faults.borrow_mut().listed[first..] {
+            fault.pointer.insert_str(0, step);
+        }
+    }
+}
+
 #[derive(Clone, Copy)]
 struct Strict<'a> {
     trail: &'a Trail,
@@ -206,6 +254,8 @@ struct Strict<'a> {
     unknown: &'a Cell<usize>,
     /// Fields of the object before this one in its list: this one will have as many.
     width: &'a Cell<usize>,
+    /// Where long lists are not kept whole.
+    beyond: Option<&'a Beyond>,
 }
 
 impl<'a> Strict<'a> {
@@ -233,9 +283,30 @@ impl<'a> Strict<'a> {
         self.unknown.get() <= MOST_UNKNOWN
     }
 
+    /// Reads what stands at `step` and says of the faults beyond the heads of its lists where they are.
+    fn at<T, E>(self, step: impl FnOnce() -> String, read: impl FnOnce() -> Result<T, E>) -> Result<T, E> {
+        let first = self.beyond.map(Beyond::listed);
+        let value = read()?;
+        if let Some((beyond, first)) = self.beyond.zip(first)
+            && beyond.listed() > first
+        {
+            beyond.place(first, &step());
+        }
+        Ok(value)
+    }
+
     fn failed<E>(self, step: Step, error: E) -> E {
         self.trail.steps.borrow_mut().push(step);
         error
+    }
+
+    /// Holds an item that is not kept to what the items of its list have to be. Where the list may be one of several the
+    /// whole is read before anything is said of it.
+    fn check_beyond(self, beyond: &Beyond, item: &Value, index: usize) {
+        beyond.is_any.set(true);
+        if let [rules] = self.shape.item_rules() {
+            rules.check(item, || format!("/{index}"), &mut beyond.faults.borrow_mut());
+        }
     }
 
     fn integer<E: serde::de::Error>(self, size: u64, number: Number) -> Result<Value, E> {
@@ -291,8 +362,12 @@ impl<'de> Visitor<'de> for Strict<'_> {
         let (shape, most) = self.shape.items().unwrap_or((Shape::open(), 0));
         let (mut items, mut count) = (Vec::new(), 0);
         let item = inside.of(shape, &width);
-        while count < most {
-            match access.next_element_seed(item) {
+        let head = match self.beyond {
+            Some(_) if !self.shape.item_rules().is_empty() => HEAD_ITEMS.min(most),
+            _ => most,
+        };
+        while count < head {
+            match self.at(|| format!("/{count}"), || access.next_element_seed(item)) {
                 Ok(Some(value)) => {
                     self.take(ITEM_BYTES).map_err(|error| self.failed(Step::Index(count), error))?;
                     items.push(value);
@@ -302,6 +377,17 @@ impl<'de> Visitor<'de> for Strict<'_> {
             }
             count += 1;
         }
+        if let Some(beyond) = self.beyond {
+            let item = Strict { room: &beyond.room, ..item };
+            while count < most {
+                match self.at(|| format!("/{count}"), || access.next_element_seed(item)) {
+                    Ok(Some(value)) => self.check_beyond(beyond, &value, count),
+                    Ok(None) => return Ok(Value::Array(items)),
+                    Err(error) => return Err(self.failed(Step::Index(count), error)),
+                }
+                count += 1;
+            }
+        }
         loop {
             match access.next_element_seed(Skipped(inside)) {
                 Ok(Some(())) => count += 1,
@@ -310,7 +396,10 @@ impl<'de> Visitor<'de> for Strict<'_> {
             }
         }
         if count > most && most > 0 {
-            items.push(cut_short_at(count));
+            match (self.beyond, self.shape.item_rules()) {
+                (Some(beyond), [rules]) if head < most => beyond.faults.borrow_mut().add(rules.too_many(count)),
+                _ => items.push(cut_short_at(count)),
+            }
         }
         Ok(Value::Array(items))
     }
@@ -337,7 +426,8 @@ impl<'de> Visitor<'de> for Strict<'_> {
                 }
                 Entry::Vacant(place) => {
                     let value = match shape {
-                        Some(shape) => access.next_value_seed(inside.of(shape, &Cell::new(0))),
+                        Some(shape) => self
+                            .at(|| child("", place.key()), || access.next_value_seed(inside.of(shape, &Cell::new(0)))),
                         None => access.next_value_seed(Skipped(inside)).map(|()| Value::Null),
                     };
                     match value {

@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use super::budget::Room;
 use super::error::Error;
-use super::json::Parsed;
+use super::json::{Parsed, ParsedHead};
 use super::model::{self, Held};
 use super::names::{self, Asks, Drawn, Names};
 use super::{Body, Checked, TablePart, json, table};
@@ -35,18 +35,37 @@ pub(crate) struct Ready {
     has_rows: bool,
 }
 
+/// Bodies up to this size, bytes, are kept whole while they are read: the values of their rows take little more than a
+/// request takes anyway.
+const KEPT_WHOLE: usize = 64 << 10;
+
 /// A body whose syntax is in order: what it names can be told.
 pub(crate) struct Draft {
     job: Value,
     left_out: usize,
+    /// Where only the heads of long lists were kept, the faults of what follows them.
+    beyond: Option<Faults>,
+    /// The model that was put into the job.
+    imposed: Option<KeptDocument>,
 }
 
 impl Draft {
     /// Of a body.
     pub(crate) fn of(entry: &Entry, body: &Body, (registry, room): (&Registry, &Room)) -> Result<Self, Error> {
         let (Body::Json(job) | Body::Parts { job, .. }) = body;
+        if job.len() <= KEPT_WHOLE {
+            return Self::whole(entry, body, (registry, room));
+        }
+        let shape = entry.shape_of_named(job).unwrap_or_else(|| registry.shape_of(entry));
+        let ParsedHead { parsed, beyond } = json::parse_head(job, shape, room)?;
+        Ok(Self { job: parsed.value, left_out: parsed.left_out, beyond, imposed: None })
+    }
+
+    /// The same with all that is in the body.
+    fn whole(entry: &Entry, body: &Body, (registry, room): (&Registry, &Room)) -> Result<Self, Error> {
+        let (Body::Json(job) | Body::Parts { job, .. }) = body;
         let Parsed { value: job, left_out } = json::parse_as(job, registry.shape_of(entry), room)?;
-        Ok(Self { job, left_out })
+        Ok(Self { job, left_out, beyond: None, imposed: None })
     }
 
     /// The same with a model that the job takes although it may not name it.
@@ -57,7 +76,7 @@ impl Draft {
         given: &KeptDocument,
     ) -> Result<Self, Error> {
         match model::impose(registry, entry, &mut self.job, given) {
-            None => Ok(self),
+            None => Ok(Self { imposed: Some(given.clone()), ..self }),
             Some(misfit) => Err(Found::of(vec![misfit]).with_rules(entry, &self.job)),
         }
     }
@@ -74,7 +93,13 @@ impl Draft {
             Body::Json(_) => [].as_slice(),
             Body::Parts { tables, .. } => tables.as_slice(),
         };
-        read_named(entry, self.job, (parts, self.left_out), names)
+        let Some(beyond) = self.beyond else { return read_named(entry, self.job, (parts, self.left_out), names) };
+        held_to_schema(entry, self.job, (parts, self.left_out, beyond), names)?;
+        let mut whole = Self::whole(entry, body, (names.registry, &names.room))?;
+        if let Some(imposed) = &self.imposed {
+            whole = whole.with_model(names.registry, entry, imposed)?;
+        }
+        read_named(entry, whole.job, (parts, whole.left_out), names)
     }
 }
 
@@ -101,12 +126,24 @@ pub(crate) fn read_named(
     names: &Names<'_>,
 ) -> Result<Ready, Error> {
     let names_any = names::names_any(names.registry, entry, &mut job);
-    let (drawn, of_names) = names::fill(entry, &mut job, &names.found);
-    names::turn_model_off(entry, &mut job);
-    let of_model = model::extend(names.registry, &names.found, entry, &mut job);
-    let resolved = Resolved { job, drawn, enclosed: Some(&names.found), of_names, of_model };
-    let ready = read_resolved(entry, resolved, (parts, &names.room), left_out)?;
+    let ready = read_resolved(entry, Resolved::of(entry, job, names), (parts, &names.room), left_out)?;
     Ok(Ready { names_any, ..ready })
+}
+
+/// What the schema refuses in a job of which the heads of long lists are there, and the faults beyond them. The rules between
+/// fields, which need all of the job, are asked when these are mended.
+fn held_to_schema(
+    entry: &Arc<Entry>,
+    job: Value,
+    (parts, left_out, beyond): (&[TablePart], usize, Faults),
+    names: &Names<'_>,
+) -> Result<(), Error> {
+    let Resolved { mut job, of_names, of_model, .. } = Resolved::of(entry, job, names);
+    let found = check_schema(entry, &mut job, (parts, &names.room)).err().unwrap_or_else(|| Found::of(Vec::new()));
+    let found = Found { total: found.total + left_out + beyond.total, ..found }.listing(beyond.listed);
+    let found = if of_names.is_empty() { found } else { found.without_missing() };
+    let found = found.and(of_names).and(of_model);
+    if found.total == 0 { Ok(()) } else { Err(found.told()) }
 }
 
 /// A job without names, and what came of them.
@@ -118,6 +155,16 @@ struct Resolved<'a> {
     enclosed: Option<&'a names::Found>,
     of_names: Vec<Finding>,
     of_model: Vec<Finding>,
+}
+
+impl<'a> Resolved<'a> {
+    /// The job whose names are given their meaning.
+    fn of(entry: &Entry, mut job: Value, names: &'a Names<'_>) -> Self {
+        let (drawn, of_names) = names::fill(entry, &mut job, &names.found);
+        names::turn_model_off(entry, &mut job);
+        let of_model = model::extend(names.registry, &names.found, entry, &mut job);
+        Self { job, drawn, enclosed: Some(&names.found), of_names, of_model }
+    }
 }
 
 fn read_resolved(
@@ -203,6 +250,12 @@ impl Found {
         let before = self.findings.len();
         self.findings.retain(|finding| general_code(finding) != "missing_field");
         self.total -= before - self.findings.len();
+        self
+    }
+
+    /// With more of its faults.
+    fn listing(mut self, more: Vec<Finding>) -> Self {
+        self.findings.extend(more);
         self
     }
 
@@ -498,6 +551,51 @@ mod tests {
         assert_eq!(finding.values.get("nearest"), Some(&"elastic".into()));
         let finding = only(&with("mode", json!("plane")));
         assert!(finding.values.get("allowed").is_some());
+    }
+
+    /// The same job as a body that is kept whole while it is read, and as one of which the heads of lists are kept.
+    fn small_and_large(job: &Value) -> [Body; 2] {
+        let text = job.to_string();
+        assert!(text.len() <= KEPT_WHOLE, "{}", text.len());
+        [Body::Json(text.clone().into()), Body::Json((text + &" ".repeat(KEPT_WHOLE)).into())]
+    }
+
+    #[test]
+    fn a_large_body_has_the_faults_that_it_has_when_it_is_kept_whole() {
+        let rows = |count: usize, bad: &[(usize, Value)]| {
+            let mut rows = vec![json!({"z_mm": 1, "deviation_um": 2}); count];
+            bad.iter().for_each(|(index, row)| rows[*index] = row.clone());
+            with("measurements", rows.into())
+        };
+        let bad = [
+            (3, json!({"z_mm": -1, "deviation_um": "x"})),
+            (300, json!({"z_mm": 1, "deviation_um": 2, "colour": [1, 2]})),
+            (1999, json!({"z_mm": null, "deviation_um": 2})),
+        ];
+        let mut with_more = rows(2000, &bad[1..]);
+        with_more["lenght_mm"] = json!(3);
+        with_more.as_object_mut().unwrap().remove("segments");
+        for job in [rows(2000, &bad[..1]), rows(2000, &bad[1..]), rows(2002, &bad), with_more] {
+            let [small, large] = small_and_large(&job).map(|body| match read(&toy(), &body) {
+                Err(Error::Invalid { findings, total }) => (findings, total),
+                _ => panic!("accepted"),
+            });
+            assert!(small.1 > 0);
+            assert_eq!(small, large);
+        }
+        let [small, large] = small_and_large(&rows(2000, &[])).map(|body| read(&toy(), &body).unwrap().key);
+        assert_eq!(small, large);
+        let swapped = rows(2000, &[(1999, json!({"deviation_um": 2, "z_mm": 7}))]);
+        let [small, large] = small_and_large(&swapped).map(|body| read(&toy(), &body).unwrap().key);
+        assert!(small == large && small != key(&rows(2000, &[])));
+    }
+
+    #[test]
+    fn a_row_beyond_the_head_of_a_text_says_its_line() {
+        let lines: String = (0..400).map(|line| if line == 350 { "-3,4\n" } else { "1,2\n" }).collect();
+        let finding = only(&with("measurements", json!({"csv": format!("z_mm,deviation_um\n{lines}")})));
+        assert_eq!((finding.code, finding.pointer.as_str()), ("out_of_range", "/measurements/350/z_mm"));
+        assert_eq!(finding.values.get("line"), Some(&352.0.into()));
     }
 
     #[test]

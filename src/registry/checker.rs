@@ -1,15 +1,18 @@
 //! A compiled schema that names every fault of a value.
 
+use std::sync::OnceLock;
+
 use jsonschema::Validator;
 use precut_calc::calculator::Finding;
 use serde_json::{Map, Value};
 
 use super::RegistryError;
-use super::fault::report;
+use super::fault::{report, too_many_items};
 
 /// A compiled schema. The items of its arrays are checked one by one, each against a checker of their own and none
 /// beyond the most that the array may hold, so that a hostile body of a million bad cells costs no more memory than
 /// the faults that are kept.
+#[derive(Debug)]
 pub(crate) struct Checker {
     validator: Validator,
     schema: Value,
@@ -17,6 +20,7 @@ pub(crate) struct Checker {
 }
 
 /// The items of an array inside a value.
+#[derive(Debug)]
 struct ArrayItems {
     /// Names of the fields that lead to the array.
     path: Vec<String>,
@@ -28,11 +32,44 @@ struct ArrayItems {
 }
 
 /// The variant `word` of the union at `path`, told by its field `tag`.
-#[derive(Clone)]
+#[derive(Debug, Clone)]
 struct Variant {
     path: Vec<String>,
     tag: String,
     word: Value,
+}
+
+/// What the items of a list have to be, each on its own: for lists that are too long to be kept before they are known to be
+/// in order.
+#[derive(Debug)]
+pub(crate) struct ItemRules {
+    /// The schema of the list.
+    list: Value,
+    items: OnceLock<Option<Checker>>,
+}
+
+impl ItemRules {
+    /// Of a list's schema in the form of [`super::schema::strict`].
+    pub(super) fn of(list: &Value) -> Self {
+        Self { list: list.clone(), items: OnceLock::new() }
+    }
+
+    /// Adds every fault of one item, which stands at `pointer`.
+    pub(crate) fn check(&self, item: &Value, pointer: impl FnOnce() -> String, faults: &mut Faults) {
+        let items = self.items.get_or_init(|| {
+            Checker::new(self.list["items"].clone())
+                .inspect_err(|error| tracing::error!(%error, "the schema of a list's items does not stand alone"))
+                .ok()
+        });
+        if let Some(items) = items.as_ref().filter(|items| !items.accepts(item)) {
+            items.check(item, &pointer(), faults);
+        }
+    }
+
+    /// The fault of a list at the place itself that has so many items, more than it may have.
+    pub(crate) fn too_many(&self, items: usize) -> Finding {
+        too_many_items("", items, &self.list)
+    }
 }
 
 /// Faults found, the first of them kept.
@@ -48,6 +85,12 @@ impl Faults {
 
     pub(crate) fn add(&mut self, finding: Finding) {
         self.add_with(|| finding);
+    }
+    /// Adds what others found.
+    pub(crate) fn extend(&mut self, found: Self) {
+        self.total += found.total;
+        let room = Self::KEPT.saturating_sub(self.listed.len());
+        self.listed.extend(found.listed.into_iter().take(room));
     }
     /// Adds a fault that is only made if it is kept.
     pub(crate) fn add_with(&mut self, finding: impl FnOnce() -> Finding) {

@@ -85,6 +85,20 @@ pub(super) struct Member {
     pub(super) entry: Entry,
 }
 
+impl Member {
+    /// What a job of it may be made of.
+    fn shape(&self) -> &Shape {
+        self.entry.shape.get_or_init(|| {
+            let mut own = Shape::of(&follows(self.entry.input().strict()));
+            if let Some(mut job) = own.field("job").cloned() {
+                names::let_in(&mut job, self.calculator);
+                own = own.with_field("job", job);
+            }
+            own
+        })
+    }
+}
+
 /// Takes what is made of a contract. It cannot fail: contracts follow from types alone, and a test makes everything that is made
 /// of them.
 fn follows<T>(made: Result<T, RegistryError>) -> T {
@@ -350,15 +364,15 @@ impl Entry {
                 if self.composed { own.with_field("job", of_any()) } else { own }
             }
             members => members.iter().fold(Shape::default(), |mut all, member| {
-                let mut own = Shape::of(&follows(member.entry.input().strict()));
-                if let Some(mut job) = own.field("job").cloned() {
-                    names::let_in(&mut job, member.calculator);
-                    own = own.with_field("job", job);
-                }
-                all.join(own);
+                all.join(member.shape().clone());
                 all
             }),
         })
+    }
+    /// What the job in a body may be made of, where it names one of several calculators.
+    pub(crate) fn shape_of_named(&self, body: &[u8]) -> Option<&Shape> {
+        let named: family::Named = serde_json::from_slice(body).ok().filter(|_| !self.members().is_empty())?;
+        self.members().iter().find(|of| of.calculator == named.calculator).map(Member::shape)
     }
     /// The fields of the job that may name records: of the job itself, or of the base job of a diagnosis of that calculator.
     pub(crate) fn job_fields(&self, calculator: &str) -> &Value {

@@ -172,9 +172,18 @@ fn count(pointer: &str, code: &'static str, received: &Value, limit: u64, node: 
         Value::String(text) => text.chars().count(),
         _ => 0,
     };
+    beyond(coded(code, pointer, node), size, limit)
+}
+
+/// The fault of a list at `pointer`, whose schema is `node`, that has so many items.
+pub(super) fn too_many_items(pointer: &str, items: usize, node: &Value) -> Finding {
+    beyond(coded("too_many_items", pointer, node), items, node["maxItems"].as_u64().unwrap_or_default())
+}
+
+fn beyond(finding: Finding, size: usize, limit: u64) -> Finding {
     // Lengths are far below 2^53.
     #[allow(clippy::cast_precision_loss)]
-    coded(code, pointer, node).measured(size as f64, limit as f64, "1")
+    finding.measured(size as f64, limit as f64, "1")
 }
 
 /// Name of the one field of the object that stands in the place of all items beyond the most that a list may have.

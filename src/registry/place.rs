@@ -1,9 +1,13 @@
 //! Where in a job measured tables stand, and what their columns are.
 
+use std::sync::Arc;
+
 use serde_json::Value;
 
+use super::checker::ItemRules;
+
 /// A field of a job that holds a measured table.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub(crate) struct TablePlace {
     /// Way from the root of the job.
     pub(crate) path: Vec<Step>,
@@ -13,6 +17,8 @@ pub(crate) struct TablePlace {
     pub(crate) max_rows: usize,
     /// Fields of a row that take the columns which no field names: one for numbers, one for words.
     pub(crate) free: FreeColumns,
+    /// What a row has to be.
+    pub(crate) rules: Arc<ItemRules>,
 }
 
 /// Where columns go that no field names; without a place they are faults.
@@ -130,7 +136,7 @@ fn place(schema: &Value, path: &[Step]) -> TablePlace {
         .collect();
     let max_rows = schema["maxItems"].as_u64().and_then(|most| usize::try_from(most).ok()).unwrap_or(usize::MAX);
     let free = FreeColumns { numbers: free("numbers"), words: free("words") };
-    TablePlace { path: path.to_vec(), columns, max_rows, free }
+    TablePlace { path: path.to_vec(), columns, max_rows, free, rules: Arc::new(ItemRules::of(schema)) }
 }
 
 fn kind(declared: &Value) -> CellKind {

@@ -5,11 +5,17 @@
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
+use std::sync::Arc;
 
 use serde_json::Value;
 
+use super::checker::ItemRules;
+
+/// A list that may have more items is too long to be kept whole before it is known to be in order.
+const LONG_LIST: usize = 1000;
+
 /// What may stand at a place.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Shape {
     /// Fields by name.
     fields: BTreeMap<String, Shape>,
@@ -19,6 +25,8 @@ pub(crate) struct Shape {
     items: Option<Box<Shape>>,
     /// How many items; unbounded where the schema names no most.
     most_items: Option<usize>,
+    /// What the items of a long list have to be, by the variants of the place.
+    rules: Vec<Arc<ItemRules>>,
     /// A text of any words may stand here.
     text: bool,
     /// Nothing is said of what stands here.
@@ -33,6 +41,7 @@ static OPEN: Shape = Shape {
     further: None,
     items: None,
     most_items: None,
+    rules: Vec::new(),
     text: true,
     open: true,
     optional: false,
@@ -74,6 +83,7 @@ impl Shape {
             (items @ None, Some(more)) => (*items, self.most_items) = (Some(more), other.most_items),
             (_, None) => {}
         }
+        self.rules.extend(other.rules);
         self.text |= other.text;
         self.open |= other.open;
     }
@@ -121,7 +131,9 @@ impl Shape {
         items.extend(part("prefixItems").and_then(Value::as_array).into_iter().flatten());
         if !items.is_empty() {
             let most = part("maxItems").and_then(Value::as_u64).and_then(|most| usize::try_from(most).ok());
-            let mut shape = Self { items: Some(Box::default()), most_items: most, ..Self::default() };
+            let is_long = most.is_some_and(|most| most > LONG_LIST) && part("prefixItems").is_none();
+            let rules = is_long.then(|| Arc::new(ItemRules::of(strict))).into_iter().collect();
+            let mut shape = Self { items: Some(Box::default()), most_items: most, rules, ..Self::default() };
             for item in items {
                 shape.items.get_or_insert_default().add_or_open(item);
             }
@@ -166,6 +178,11 @@ impl Shape {
         let is_text_of_rows = || name == "csv" && self.items.is_some();
         let further = || self.further.as_deref();
         self.fields.get(name).or_else(further).or_else(|| (self.open || is_text_of_rows()).then(Self::open))
+    }
+
+    /// What the items of a long list have to be, by the variants of the place; nothing where no list is long.
+    pub(crate) fn item_rules(&self) -> &[Arc<ItemRules>] {
+        &self.rules
     }
 
     /// Whether a text of any length may stand here.
