@@ -5,6 +5,7 @@
 //! inside; micrometres and degrees only at the border, where every field's name carries its unit.
 
 pub mod calculator;
+pub mod compliance_fit;
 pub mod deflection_compensation;
 pub mod diagnosis;
 pub mod effects;
@@ -34,4 +35,5 @@ pub fn register(registrar: &mut impl Registrar) {
     registrar.calculator::<feed_schedule::fit::MachinabilityFit>();
     registrar.diagnosable::<fixture_stability::FixtureStability>();
     registrar.calculator::<fixture_stability::identification::FixtureIdentification>();
+    registrar.calculator::<compliance_fit::ComplianceFit>();
 }
