@@ -12,7 +12,7 @@ const settle = async () => { for (let turn = 0; turn < 20; turn += 1) await null
 function service({ followed = {} } = {}) {
   const own = {
     asked: [], most: 0, inFlight: 0, cancelled: [],
-    solve: (id, job, { signal }) => new Promise((resolve, reject) => {
+    solve: (_id, job, { signal }) => new Promise((resolve, reject) => {
       own.inFlight += 1;
       own.most = Math.max(own.most, own.inFlight);
       let isOver = false;
@@ -30,7 +30,7 @@ function service({ followed = {} } = {}) {
     shown: async key => ({ answer: { key, result: JSON.parse(key.slice(3)) }, figures: [] }),
     calculator: async () => ({ id: 'toy', examples: [{ id: 'first' }], jobs: { first: { d: 1 } }, input_schema: {} }),
     jobOf: async key => ({ job: JSON.parse(key.slice(3)) }),
-    cancel: async run => { own.cancelled.push(run); },
+    cancel: run => { own.cancelled.push(run); return Promise.resolve(); },
     follow: (run, handlers) => { followed[run] = handlers; return () => { delete followed[run]; }; },
     whenBack: () => null,
   };

@@ -45,7 +45,7 @@ test('of places that are passed by quickly the last one counts, and what is type
   const asked = [];
   const desk = {
     isClosed: false, state: { job: { d: 1 }, answer: { key: 'b3:1', job: { d: 1 } }, waiting: false },
-    service: { jobOf: async () => ({ job: { d: 1 } }), jobAt: (key, { x }) => new Promise(go => asked.push(() => go({ job: { d: x } }))) },
+    service: { jobOf: async () => ({ job: { d: 1 } }), jobAt: (_key, { x }) => new Promise(go => asked.push(() => go({ job: { d: x } }))) },
     change: next => { desk.state = { ...desk.state, job: next }; },
     ask: () => {},
   };

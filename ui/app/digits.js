@@ -30,7 +30,8 @@ function besides(object, name) {
 /** The uncertainty of the number at a path of a result, `{ spread, path }` with the place where it stands itself: beside
  *  the number, or at the same place of `..._error`. */
 export function spreadOf(result, path) {
-  const way = path.slice(0, -1).reduce((list, name) => [...list, list.at(-1)?.[name]], [result]);
+  const way = [result];
+  for (const name of path.slice(0, -1)) way.push(way.at(-1)?.[name]);
   const beside = way.at(-1) && besides(way.at(-1), path.at(-1));
   if (beside) return { spread: way.at(-1)[beside[0]] * beside[1], path: [...path.slice(0, -1), beside[0]] };
   for (let depth = path.length - 2; depth >= 0; depth -= 1) {

@@ -35,6 +35,8 @@ const TABLE_ROWS = 120;
 
 /** A shop tablet, a small window: every line of its height counts. */
 export const isLowScreen = () => innerWidth > 860 && innerHeight < 700;
+/** A phone: the form and the picture are two panes. */
+const isNarrow = () => innerWidth <= 860;
 
 function paperHeight({ frame, panels }) {
   const letters = selector => document.querySelector(selector)?.textContent.length || 0;
@@ -202,7 +204,7 @@ export function Picture({ figure, pinned, height: screenHeight = 460, onPut, tri
     event.preventDefault();
     act();
   };
-  const least = isLowScreen() || isPrinting ? LOW.polar : LEAST_POLAR;
+  const least = isLowScreen() || isNarrow() || isPrinting ? LOW.polar : LEAST_POLAR;
   const common = { figure, pinned, width, style, hidden, toggle, at, over: isPlane ? over : null, shown, view, height, isPrinting, effect };
   const tools = html`
     <div class="tools" role="group" aria-label=${t('picture_tools')}>

@@ -22,8 +22,9 @@ export function debounced(task, wait) {
 }
 
 /** A store that components may watch. */
-export function cell(value) {
+export function cell(first) {
   const watchers = new Set();
+  let value = first;
   return {
     get: () => value,
     set: next => {

@@ -132,17 +132,26 @@ function App() {
     ${!isOnline && html`<p class="banner away" role="status">${t('offline_title')}. ${t('offline_detail')}</p>`}
     ${needsKey && html`<${KeyForm} key=${attempt} refused=${needsKey === 'refused'} done=${() => setAttempt(attempt + 1)} />`}
     <${Guard} key=${page}>
-      ${!calculators && needsKey ? html`<main class="plain" id="main" tabindex="-1"><h1>${t('slogan')}</h1><p>${t('key_why')}</p></main>`
-        : !calculators ? html`<main class="plain" id="main" tabindex="-1"><p class="late">${t('loading')}</p></main>`
-        : page === '' ? html`<${Home} calculators=${calculators} />`
-        : page === 'jobs' ? html`<${Jobs} calculators=${calculators} refreshJobs=${refreshJobs} />`
-        : page === 'results' ? html`<${Results} calculators=${calculators} query=${query} replace=${replace} />`
-        : page === 'studies' ? html`<${Study} key=${attempt} ...${{ calculators, query, push, replace, refreshJobs }} />`
-        : page === 'models' ? html`<${Models} calculators=${calculators} models=${models} refreshModels=${refreshModels} />`
-        : page === 'library' ? html`<${Library} key=${spoken} />`
-        : known ? html`<${Room} key=${`${page} ${attempt}`} id=${page} ...${{ query, push, replace, models, refreshJobs }} />`
-        : html`<main class="plain" id="main" tabindex="-1"><h1>${t('no_page')}</h1><p><a href="#/">${t('to_start')}</a></p></main>`}
+      <${Page} ...${{ page, query, calculators, known, needsKey, models, refreshModels, refreshJobs, push, replace, attempt, spoken }} />
     <//>`;
+}
+
+/** A page without a picture: a heading, and what is said. */
+const plain = (heading, said) => html`<main class="plain" id="main" tabindex="-1">${heading && html`<h1>${heading}</h1>`}${said}</main>`;
+
+/** What the address names. */
+function Page({ page, query, calculators, known, needsKey, models, refreshModels, refreshJobs, push, replace, attempt, spoken }) {
+  if (!calculators) return needsKey ? plain(t('slogan'), html`<p>${t('key_why')}</p>`) : plain(null, html`<p class="late">${t('loading')}</p>`);
+  if (known) return html`<${Room} key=${`${page} ${attempt}`} id=${page} ...${{ query, push, replace, models, refreshJobs }} />`;
+  switch (page) {
+    case '': return html`<${Home} calculators=${calculators} />`;
+    case 'jobs': return html`<${Jobs} calculators=${calculators} refreshJobs=${refreshJobs} />`;
+    case 'results': return html`<${Results} calculators=${calculators} query=${query} replace=${replace} />`;
+    case 'studies': return html`<${Study} key=${attempt} ...${{ calculators, query, push, replace, refreshJobs }} />`;
+    case 'models': return html`<${Models} calculators=${calculators} models=${models} refreshModels=${refreshModels} />`;
+    case 'library': return html`<${Library} key=${spoken} />`;
+    default: return plain(t('no_page'), html`<p><a href="#/">${t('to_start')}</a></p>`);
+  }
 }
 
 function Header({ page, calculators, running, models, known }) {

@@ -32,34 +32,30 @@ export function abscissae(figure) {
   return figure.panels.flatMap(panel => panel.items.flatMap(item => (!isDrawn(item) ? [] : item.kind === 'ribbon' ? [...item.x, ...item.x_end] : item.kind === 'heat_map' ? edges(item.x, isLog) : item.x)));
 }
 
-export function ordinates(panel, view) {
-  const inside = view ? x => x >= view[0] && x <= view[1] : () => true;
+/** Of one side of an item what is seen of it in a view. */
+function seenOf({ kind, x }, side, view) {
+  if (!view) return side;
+  const inside = at => x[at] >= view[0] && x[at] <= view[1];
   const found = [];
-  for (const item of panel.items) {
-    const sides = { line: [item.y], bars: [item.y], points: [item.y], outline: [item.y], band: [item.lower, item.upper], heat_map: [] }[item.kind] || [];
-    for (const side of sides) {
-      let before = null;
-      for (let index = 0; index < side.length; index += 1) {
-        const within = inside(item.x[index]);
-        if (within) {
-          if (before !== null) { found.push(before); before = null; }
-          found.push(side[index]);
-        } else if (view && item.kind !== 'points') {
-          // The point next to the view on either side: the curve enters from there.
-          if (index > 0 && inside(item.x[index - 1])) found.push(side[index]);
-          // Of a view between two points the curve is all that there is.
-          else if (index > 0 && item.x[index - 1] < view[0] && item.x[index] > view[1]) found.push(side[index - 1], side[index]);
-          before = side[index];
-        }
-      }
-    }
-    if (item.kind === 'heat_map') {
-      const half = item.y.length > 1 ? (item.y[1] - item.y[0]) / 2 : 0;
-      found.push(Math.max(item.y[0] - half, item.y[0] > 0 ? item.y[0] / 10 : -Infinity), item.y.at(-1) + half);
-    }
-    if (item.kind === 'bars') found.push(0);
-  }
+  side.forEach((value, at) => {
+    if (inside(at)) found.push(value);
+    // The points next to the view on either side: the curve enters from there.
+    else if (kind !== 'points' && (inside(at - 1) || inside(at + 1))) found.push(value);
+    // Of a view between two points the curve is all that there is.
+    else if (kind !== 'points' && x[at - 1] < view[0] && x[at] > view[1]) found.push(side[at - 1], value);
+  });
   return found;
+}
+
+export function ordinates(panel, view) {
+  return panel.items.flatMap(item => {
+    const sides = { line: [item.y], bars: [item.y], points: [item.y], outline: [item.y], band: [item.lower, item.upper] }[item.kind] ?? [];
+    const found = sides.flatMap(side => seenOf(item, side, view));
+    if (item.kind === 'bars') return [...found, 0];
+    if (item.kind !== 'heat_map') return found;
+    const half = item.y.length > 1 ? (item.y[1] - item.y[0]) / 2 : 0;
+    return [Math.max(item.y[0] - half, item.y[0] > 0 ? item.y[0] / 10 : -Infinity), item.y.at(-1) + half];
+  });
 }
 
 /** What has a value at the cursor: its room is there before the value, so that nothing moves. */

@@ -17,8 +17,14 @@ export function Progress({ running, stop }) {
 }
 
 /** The names of the fields on the way to a place of the job, items counted from 1. */
-const wayOf = (place, names) => parts(place).map(part => (/^\d+$/.test(part) ? String(Number(part) + 1) : names?.get(part) ?? humanised(part)))
-  .reduce((way, part) => (/^\d+$/.test(part) && way.length > 0 ? [...way.slice(0, -1), `${way.at(-1)} ${part}`] : [...way, part]), []).join(' · ');
+function wayOf(place, names) {
+  const way = [];
+  for (const part of parts(place)) {
+    if (!/^\d+$/.test(part)) way.push(names?.get(part) ?? humanised(part));
+    else way.push([way.pop(), Number(part) + 1].filter(Boolean).join(' '));
+  }
+  return way.join(' · ');
+}
 
 /** What is wrong: the service's words, and the way to each field. `over` what is there already, so that nothing moves. */
 export function Trouble({ problem, onGo, names, over }) {

@@ -353,7 +353,7 @@ function Findings({ answer, interim, leaves, outputs, description, stale, owns }
   const all = interim ? [interim] : answer?.figures || [];
   const figure = all.find(({ id }) => id === chosen) || all[0];
   const isEmpty = figure && !figure.panels.some(panel => panel.items.some(item => (item.values || item.y).some(value => value !== null)));
-  const height = usePictureHeight(figure?.panels.length || 1);
+  const height = usePictureHeight();
   const pick = figure?.id === 'map' && result && result.variables.length === 2 ? (x, y) => setPicked(nearestRow(result, x, y)) : null;
   const [first, ...others] = answer?.answer.explanation || [];
   return html`
