@@ -57,10 +57,11 @@ const isObjected = ({ verdict, sets, unnamed_probability: unnamed }) => verdict 
 const isSame = (one, other) => one.kind === other.kind && one.label === other.label;
 
 /** Two parts of one wave, `..._cos_...` and `..._sin_...`, as its amplitude. */
-function amplitudeOf(cos, sin, field) {
+function amplitudeOf(cos, sin, properties) {
+  const name = `${cos.name.split('_cos_')[0]}_${cos.unit}`;
   const value = Math.hypot(cos.value, sin.value);
   const spread = Math.hypot(cos.value * (cos.standard_deviation || 0), sin.value * (sin.standard_deviation || 0)) / (value || 1);
-  return { name: field ? labelOf('amplitude_mm', field) : humanised('amplitude'), value, spread, unit: cos.unit, isFine: true, atLimit: cos.at_limit || sin.at_limit };
+  return { name: properties?.[name] ? labelOf(name, properties[name]) : humanised(name, cos.unit), value, spread, unit: cos.unit, isFine: true, atLimit: cos.at_limit || sin.at_limit };
 }
 
 /** The sizes of a cause as they are told: a logarithm as the factor that it is, the two parts of a wave as one amplitude,
@@ -69,7 +70,7 @@ export function sizesOf(parameters, properties, unit) {
   const twins = new Map(parameters.filter(({ name }) => name.includes('_cos_')).map(cos => [cos, parameters.find(({ name }) => name === cos.name.replace('_cos_', '_sin_'))]).filter(([, sin]) => sin));
   const parts = [...twins.values()];
   return parameters.filter(one => !parts.includes(one)).map(one => {
-    if (twins.has(one)) return amplitudeOf(one, twins.get(one), properties?.amplitude_mm);
+    if (twins.has(one)) return amplitudeOf(one, twins.get(one), properties);
     const field = properties?.[one.name];
     const told = { name: field ? labelOf(one.name, field) : one.name === 'kappa' ? t('size_share') : humanised(one.name, one.unit), value: one.value, spread: one.standard_deviation, unit: one.unit, shown: field && unitOf(field), isFine: /^(amplitude|runout)_/.test(one.name), atLimit: one.at_limit };
     const isLog = one.name.startsWith('ln_') || one.name.endsWith('_ln');

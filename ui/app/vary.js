@@ -57,7 +57,7 @@ function around(value, schema) {
 
 /** A field with values to begin with: one of the cut first. */
 export function proposed(leaves, taken = []) {
-  const rank = ({ kind, isGiven, pointer: place }) => (kind === 'number' ? 0 : 8) + (isGiven ? 0 : 4) + (place.startsWith('/cut/') || place.startsWith('/tool/') ? 0 : 1) + (FIRST.test(place) ? 0 : 2);
+  const rank = ({ kind, isGiven, schema, pointer: place }) => (kind === 'number' ? 0 : 8) + (isGiven ? 0 : 4) + (schema['x-group'] === 'cut' ? 0 : 1) + (FIRST.test(place) ? 0 : 2);
   const free = leaves.filter(one => !taken.includes(one.pointer)).sort((a, b) => rank(a) - rank(b));
   return free.slice(0, 1).map(leaf => ({ leaf, range: valuesOf(leaf) }));
 }
