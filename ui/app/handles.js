@@ -37,15 +37,16 @@ const placeOf = handle => handle[handle.along];
 const INSIDE_PX = 9;
 const withinFrame = (v, { top, height }) => Math.min(Math.max(v, top + INSIDE_PX), top + height - INSIDE_PX);
 
-/** Handles nearer to each other than this, px, are too near for a finger: what comes later in the figure stays. */
-const APART_PX = 25;
+/** Handles nearer to each other than this, px, both across and up, cover too much of each other to be hit: what comes later in
+ *  the figure stays. */
+const APART_PX = 26;
 
 /** Those of a panel that have room; the others come when the picture is larger, or a part of it. */
 export function roomy(handles, x, y, frame) {
   const kept = [];
   for (const one of handles.toReversed()) {
     const [h, v] = [x(one.handle.x), withinFrame(y(one.handle.y), frame)];
-    if (kept.every(other => Math.hypot(other.h - h, other.v - v) >= APART_PX)) kept.push({ ...one, h, v });
+    if (kept.every(other => Math.max(Math.abs(other.h - h), Math.abs(other.v - v)) >= APART_PX)) kept.push({ ...one, h, v });
   }
   return kept.reverse();
 }
