@@ -1,10 +1,19 @@
 // Colours of maps, from `palette.css`: evenly spaced in lightness, told apart by colour-blind eyes.
-const listed = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim().split(' ').map(hex => [0, 2, 4].map(at => parseInt(hex.slice(at, at + 2), 16)));
+const listed = name =>
+  getComputedStyle(document.documentElement)
+    .getPropertyValue(name)
+    .trim()
+    .split(' ')
+    .map(hex => [0, 2, 4].map(at => parseInt(hex.slice(at, at + 2), 16)));
 
 /** Paper is white whatever the screen is. */
 let isPrinting = false;
-addEventListener('beforeprint', () => { isPrinting = true; });
-addEventListener('afterprint', () => { isPrinting = false; });
+addEventListener('beforeprint', () => {
+  isPrinting = true;
+});
+addEventListener('afterprint', () => {
+  isPrinting = false;
+});
 const isDark = () => !isPrinting && matchMedia('(prefers-color-scheme: dark)').matches;
 
 /** The colours of a map from low to high. */

@@ -29,7 +29,11 @@ const edges = (x, isLog) => {
 
 export function abscissae(figure) {
   const isLog = figure.x.scale === 'logarithmic';
-  return figure.panels.flatMap(panel => panel.items.flatMap(item => (!isDrawn(item) ? [] : item.kind === 'ribbon' ? [...item.x, ...item.x_end] : item.kind === 'heat_map' ? edges(item.x, isLog) : item.x)));
+  return figure.panels.flatMap(panel =>
+    panel.items.flatMap(item =>
+      !isDrawn(item) ? [] : item.kind === 'ribbon' ? [...item.x, ...item.x_end] : item.kind === 'heat_map' ? edges(item.x, isLog) : item.x,
+    ),
+  );
 }
 
 /** Of one side of an item what is seen of it in a view. */
@@ -82,7 +86,13 @@ export function Head({ panel, ghost, style, hidden, toggle, at, over = null, fac
     return read === null || read === undefined ? null : readDigits(read, span);
   };
   const map = panel.items.find(item => item.kind === 'heat_map');
-  const stretch = at === null ? null : panel.items.filter(({ kind }) => kind === 'ribbon').map(item => stretchAt(item, at)).find(Boolean);
+  const stretch =
+    at === null
+      ? null
+      : panel.items
+          .filter(({ kind }) => kind === 'ribbon')
+          .map(item => stretchAt(item, at))
+          .find(Boolean);
   return html`
     <div class="panel-head">
       <span class="axis-name">${polar ? t('magnified', { name: axisName(panel.y, factor) }) : axisName(panel.y, factor)}${panel.items.some(({ kind }) => kind === 'ribbon') && html` <output class="stretch">${stretch?.place}</output>`}</span>
@@ -99,7 +109,8 @@ export function Head({ panel, ghost, style, hidden, toggle, at, over = null, fac
 }
 
 function Swatch({ item, look }) {
-  if (item.kind === 'ribbon') return html`<svg class="swatch" width="28" height="14" viewBox="0 0 28 14" aria-hidden="true"><defs>${weaves(`legend-${item.name}`)}</defs>${ribbonSample(item, look, `legend-${item.name}`)}</svg>`;
+  if (item.kind === 'ribbon')
+    return html`<svg class="swatch" width="28" height="14" viewBox="0 0 28 14" aria-hidden="true"><defs>${weaves(`legend-${item.name}`)}</defs>${ribbonSample(item, look, `legend-${item.name}`)}</svg>`;
   const shape = {
     line: html`<path class=${`line ${look}`} d="M1 7H27" />`,
     band: html`<rect class=${`band ${look}`} x="1" y="2" width="26" height="10" />`,
@@ -121,10 +132,12 @@ function Key({ item, now }) {
 
 /** A panel in words, for those who cannot see it. */
 export function describe(panel, figure) {
-  const spans = panel.items.filter(item => item.name && isDrawn(item) && (item.y || item.lower || item.places)).map(item => {
-    if (item.places) return `${item.text} ${item.places.join(' ')}`;
-    const span = extent(item.y || [...item.lower, ...item.upper], 'linear');
-    return span ? `${item.text} ${number(span[0], 3)} … ${number(span[1], 3)}` : item.text;
-  });
+  const spans = panel.items
+    .filter(item => item.name && isDrawn(item) && (item.y || item.lower || item.places))
+    .map(item => {
+      if (item.places) return `${item.text} ${item.places.join(' ')}`;
+      const span = extent(item.y || [...item.lower, ...item.upper], 'linear');
+      return span ? `${item.text} ${number(span[0], 3)} … ${number(span[1], 3)}` : item.text;
+    });
   return `${axisName(panel.y)} (${axisName(figure.x)}): ${spans.join('; ')}`;
 }

@@ -55,19 +55,30 @@ export function usePictureHeight() {
     const observer = new ResizeObserver(measure);
     observer.observe(plot);
     addEventListener('resize', measure);
-    return () => { observer.disconnect(); removeEventListener('resize', measure); };
+    return () => {
+      observer.disconnect();
+      removeEventListener('resize', measure);
+    };
   });
   return Math.min(MOST_ROOM, Math.max(isLowScreen() ? LEAST_LOW_ROOM : LEAST_ROOM, room));
 }
 
 const drawn = figure => figure.panels.flatMap(panel => panel.items).filter(item => isDrawn(item) && item.x.length > 0);
 /** Pictures of what the job did not ask for are empty: they are not offered. */
-const shownOf = figures => { const some = figures.filter(figure => drawn(figure).length > 0); return some.length > 0 ? some : figures.slice(0, 1); };
+const shownOf = figures => {
+  const some = figures.filter(figure => drawn(figure).length > 0);
+  return some.length > 0 ? some : figures.slice(0, 1);
+};
 /** Whether a picture shows more than a single point. */
 const isTelling = figure => drawn(figure).some(({ kind, x }) => kind !== 'points' || x.length > 1);
 
 /** What changed in the numbers of the strip since they were `before`. */
-const effectOn = (before, now) => now.flatMap((row, index) => (before[index]?.label === row.label && before[index].text !== row.text ? [`${row.label} ${before[index].text} → ${row.text} ${row.unit ?? ''}`.trim()] : []));
+const effectOn = (before, now) =>
+  now.flatMap((row, index) =>
+    before[index]?.label === row.label && before[index].text !== row.text
+      ? [`${row.label} ${before[index].text} → ${row.text} ${row.unit ?? ''}`.trim()]
+      : [],
+  );
 
 /** What a hand does in a picture: `put` a setting of it elsewhere, `hold` one of its handles; and the `effect` of what was
  *  pulled last on the numbers of the strip. */
@@ -89,7 +100,10 @@ function useHands({ desk, figure, body, told }) {
       take(taken.name);
       return {
         move: to => desk.change(movedJob(job, body.input, taken, to - taken[taken.along]), 'typing'),
-        drop: () => { letGo(); if (desk.state.waiting) desk.ask(desk.state.job, 'run'); },
+        drop: () => {
+          letGo();
+          if (desk.state.waiting) desk.ask(desk.state.job, 'run');
+        },
       };
     },
   };
@@ -97,13 +111,23 @@ function useHands({ desk, figure, body, told }) {
 
 /** What a diagnosis is made for: the model that it found, or else the measurement that would find one. */
 function actOf({ id, model, causes, sheet, answer, owns }) {
-  if (model && causes.isNamed) return { text: t('take_model'), act: () => { const field = document.getElementById('model-name'); field?.scrollIntoView({ block: 'center' }); field?.focus(); } };
+  if (model && causes.isNamed)
+    return {
+      text: t('take_model'),
+      act: () => {
+        const field = document.getElementById('model-name');
+        field?.scrollIntoView({ block: 'center' });
+        field?.focus();
+      },
+    };
   return sheet ? { text: t('take_sheet_next'), act: () => takeSheet(sheet, fileName(id, answer), owns, answer.key) } : null;
 }
 
 /** Where there is no answer yet. */
 function NoAnswer({ running, problem, trouble }) {
-  const said = problem ? html`<div class="no-answer">${trouble}<p>${problem.code === 'cancelled' ? t('cancelled_waits') : t('picture_waits')}</p></div>` : html`<p class="late">${t('first_answer')}</p>`;
+  const said = problem
+    ? html`<div class="no-answer">${trouble}<p>${problem.code === 'cancelled' ? t('cancelled_waits') : t('picture_waits')}</p></div>`
+    : html`<p class="late">${t('first_answer')}</p>`;
   return html`<div class="empty">${running ? '' : said}</div>`;
 }
 
@@ -113,7 +137,10 @@ function MainPicture({ id, desk, description, answer, pinned, interim, figure, f
   const [earlier, setEarlier] = useState(null);
   // Where along a curve another setting is tried.
   const [tried, setTried] = useState(null);
-  useEffect(() => { setEarlier(null); setTried(null); }, [answer?.key]);
+  useEffect(() => {
+    setEarlier(null);
+    setTried(null);
+  }, [answer?.key]);
   const body = answer?.answer;
   const height = usePictureHeight();
   const { effect, put, hold } = useHands({ desk, figure, body, told });
@@ -134,7 +161,8 @@ function MainPicture({ id, desk, description, answer, pinned, interim, figure, f
 }
 
 /** The same picture of the pinned run, where it is another run. */
-const twinOf = ({ pinned, interim, answer, figure }) => (pinned && !interim && pinned.key !== answer?.key ? pinned.figures.find(({ id: name }) => name === figure?.id) : null);
+const twinOf = ({ pinned, interim, answer, figure }) =>
+  pinned && !interim && pinned.key !== answer?.key ? pinned.figures.find(({ id: name }) => name === figure?.id) : null;
 
 /** The pictures of an answer by their names. */
 function FigureChoice({ figures, figure, choose }) {
@@ -152,9 +180,14 @@ function Bar({ id, desk, description, answer, pinned, study, figure, difference,
   return html`
     <div class="bar">
       <button type="button" aria-pressed=${Boolean(pinned)} onClick=${() => desk.pin()}>${pinned ? t('unpin') : t('pin')}</button>
-      ${pinned && (pinned.key === answer.key ? html`<span class="quiet">${t('pinned_same')}</span>` : html`
+      ${
+        pinned &&
+        (pinned.key === answer.key
+          ? html`<span class="quiet">${t('pinned_same')}</span>`
+          : html`
         <label><input type="checkbox" checked=${difference} onChange=${event => setDifference(event.currentTarget.checked)} /> ${t('draw_difference')}</label>
-        <a href=${`#/${id}?result=${pinned.key}`}>${t('open_pinned')}</a>`)}
+        <a href=${`#/${id}?result=${pinned.key}`}>${t('open_pinned')}</a>`)
+      }
       ${study && html`<a class="button" id="vary" href=${study}>${t('vary_fields')}</a>`}
       <${Downloads} ...${{ id, description, answer, figure, stale, owns }} />
     </div>`;
@@ -163,7 +196,9 @@ function Bar({ id, desk, description, answer, pinned, study, figure, difference,
 export function Result({ id, desk, description, answer, problem, trouble, running, pinned, models, study, standing }) {
   const stale = !['none', 'current'].includes(standing);
   const owns = key => desk.owns(key);
-  const apply = job => { if (owns(answer.key)) desk.change(job, 'run'); };
+  const apply = job => {
+    if (owns(answer.key)) desk.change(job, 'run');
+  };
   const [chosen, setChosen] = useState(null);
   const [difference, setDifference] = useState(false);
   const interim = running?.interim;
@@ -189,20 +224,26 @@ export function Result({ id, desk, description, answer, problem, trouble, runnin
         <div class="picture-box">
           ${figure ? html`<${MainPicture} ...${{ id, desk, description, answer, pinned, interim, figure, figures, difference, told, apply }} />` : html`<p class="quiet">${t('no_figure')}</p>`}
         </div>
-        ${body && html`
+        ${
+          body &&
+          html`
         <div class="words">
           <${Warnings} key=${answer.key} list=${body.warnings} names=${namesOf(description.input_schema)} />
           ${hasOffers(description, body.result) && html`<${Offers} ...${{ description, answer, isCurrent: !stale, apply }} />`}
           <${Bars} result=${body.result} input=${body.input} description=${description} />
           ${causes && html`<${Causes} ...${{ causes, sheet, answer, owns, stale }} title=${description.title} name=${fileName(id, answer)} />`}
           ${others.length > 0 && html`<ul class="explanation">${others.map(({ code, text }, index) => html`<li key=${code + index}>${capital(text)}</li>`)}</ul>`}
-        </div>`}
+        </div>`
+        }
       </div>
-      ${body && html`
+      ${
+        body &&
+        html`
         <${Bar} ...${{ id, desk, description, answer, pinned, study, figure, difference, setDifference, stale, owns }} />
         ${model && html`<${SaveModel} resultKey=${answer.key} stale=${stale} owns=${owns} />`}
         <${Tabs} ...${{ id, description, answer, pinned, stale, owns }} />
-        <${Sheet} ...${{ description, body, job: answer.job }} />`}
+        <${Sheet} ...${{ description, body, job: answer.job }} />`
+      }
     </div>`;
 }
 
@@ -248,7 +289,11 @@ function SaveModel({ resultKey, stale, owns }) {
     event.preventDefault();
     setTrouble(null);
     if (!owns(resultKey)) return;
-    try { setDone(await api.saveModel(name, { from_result: resultKey })); } catch (error) { setTrouble(error.problem?.errors?.[0]?.detail || error.problem?.detail || error.message); }
+    try {
+      setDone(await api.saveModel(name, { from_result: resultKey }));
+    } catch (error) {
+      setTrouble(error.problem?.errors?.[0]?.detail || error.problem?.detail || error.message);
+    }
   };
   return html`
     <form class="bar save-model" onSubmit=${keep}>
@@ -259,4 +304,3 @@ function SaveModel({ resultKey, stale, owns }) {
       ${trouble && html`<p class="fault" role="alert"><span>${trouble}</span></p>`}
     </form>`;
 }
-
