@@ -49,7 +49,10 @@ export function usePictureHeight() {
       if (charts.length === 0 || box.height === 0) return;
       const charted = charts.reduce((sum, chart) => sum + chart.getBoundingClientRect().height, 0);
       const axes = charts[0].classList.contains('polar') ? 0 : CHART_ROOM * charts.length + AXIS_ROOM;
-      lately = Math.round(innerHeight - (box.top + scrollY) - (box.height - charted) - axes - END_ROOM);
+      // What goes through a run stands below its picture, in sight with it where there is room.
+      const scrubber = isLowScreen() ? null : plot.closest('.picture-box')?.querySelector('.scrubber');
+      const below = scrubber ? scrubber.getBoundingClientRect().height + END_ROOM : 0;
+      lately = Math.round(innerHeight - (box.top + scrollY) - (box.height - charted) - axes - below - END_ROOM);
       setRoom(lately);
     };
     const observer = new ResizeObserver(measure);
