@@ -20,7 +20,8 @@ pub fn assert_accessible(page: &mut Page, place: &str) {
     assert_eq!(found, json!([]), "{place}: {found:#}");
 }
 
-fn rooms(page: &mut Page, service: &Service) -> Vec<String> {
+/// The addresses of all calculators.
+pub fn rooms(page: &mut Page, service: &Service) -> Vec<String> {
     page.open(&service.page(""));
     page.wait_for(".questions li");
     let rooms = page.evaluate(

@@ -2,6 +2,7 @@
 
 use serde_json::json;
 
+use crate::access::rooms;
 use crate::chromium::Page;
 use crate::sizes::{assert_fits, at_sizes, fits};
 use crate::{SETTLED, both};
@@ -160,6 +161,33 @@ fn a_file_is_shown_before_it_is_used_at_every_size() {
     page.assert_calm();
 }
 
+/// 2: a file can be chosen for every measured table that a calculator asks for, on a phone.
+#[test]
+fn every_measured_table_takes_a_chosen_file() {
+    let Some((_turn, mut page, service)) = both() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("no_heading.csv");
+    std::fs::write(&file, "0;1,5\n6;2\n12;2,5\n").unwrap();
+    page.screen(390, 844, false);
+    let mut tables = 0;
+    for room in rooms(&mut page, &service) {
+        page.open(&service.page(&room));
+        page.until(SETTLED);
+        pane(&mut page, "form");
+        let found =
+            page.evaluate("[...document.querySelectorAll('input[type=file][data-table]')].map(it => it.dataset.table)");
+        for table in found.as_array().unwrap().iter().filter_map(serde_json::Value::as_str) {
+            page.choose_file(&format!("input[data-table={table}]"), &file);
+            page.until("document.querySelectorAll('.matching .match tbody tr').length > 0 && document.querySelector('#take').disabled");
+            page.click_on("Cancel");
+            page.until("!document.querySelector('.matching') && !document.querySelector('#take').disabled");
+            tables += 1;
+        }
+    }
+    assert!(tables >= 4, "{tables} tables");
+    page.assert_calm();
+}
+
 /// After `gated()` what is asked waits until `go()`.
 const GATE: &str = "(() => { const own = window.fetch; let open = null; let gate = null; \
     window.gated = () => { gate = new Promise(go => { open = go }) }; window.go = () => { open?.(); gate = null }; \
@@ -195,6 +223,25 @@ fn handles_stand_on_the_axis_and_follow_the_hand() {
             "document.activeElement.matches('{shoulder}') && document.querySelector('{shoulder} b').checkVisibility()"
         ));
     });
+    page.assert_calm();
+}
+
+/// 5: so do the ends of a schedule's zones, and the supports and the tool of a ring round its picture.
+#[test]
+fn zones_and_the_supports_of_a_ring_follow_the_hand() {
+    let Some((_turn, mut page, service)) = both() else { return };
+    for (room, grip) in
+        [("feed-schedule", ".grip[data-name=handle_zone]"), ("ring-roundness?example=clear_start", ".grip.round")]
+    {
+        page.open(&service.page(room));
+        page.until(SETTLED);
+        page.wait_for(grip);
+        let place = format!("Number(document.querySelector('{grip}').getAttribute('aria-valuenow'))");
+        let (before, job) = (page.evaluate(&place), page.evaluate("location.hash"));
+        page.evaluate(&format!("document.querySelector('{grip}').focus()"));
+        page.press("ArrowRight");
+        page.until(&format!("{place} !== {before} && location.hash !== {job} && {CURRENT} && {SETTLED}"));
+    }
     page.assert_calm();
 }
 
