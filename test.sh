@@ -20,7 +20,7 @@ declare -A ABOUT=(
   [dependencies]="licences, sources and banned packages against deny.toml"
   [unused]="cargo-machete: dependencies that nothing uses"
   [scripts]="shellcheck"
-  [page]="the workbench without a browser: its parts, and the types of all of it"
+  [page]="the workbench without a browser: its parts, their form and rules (biome.jsonc), and the types of all of it"
   [test]="unit, property and HTTP tests"
   [contract]="openapi/precut.json is what the program prints, and nothing that Redocly, Spectral or a validator calls an error"
   [clients]="the clients in Python and TypeScript: built, their tests, documentation and notebooks against the service"
@@ -134,6 +134,7 @@ step_page() {
   node --test tests/workbench/*.test.mjs
   tools=$(target)/tools/workbench
   node_tools tests/workbench "$tools"
+  "$tools/node_modules/.bin/biome" ci --error-on-warnings
   # What others wrote has no types, and is not ours to mend.
   said=$("$tools/node_modules/.bin/tsc" --project tests/workbench/tsconfig.json | grep -v '^ui/app/vendor/' | grep 'error TS' || true)
   [ -z "$said" ] || {

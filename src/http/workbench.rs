@@ -10,6 +10,7 @@ use axum::response::Response;
 
 use super::document::Document;
 use super::problem::Problem;
+use crate::render::palette;
 
 #[derive(rust_embed::RustEmbed)]
 #[folder = "ui/app"]
@@ -17,6 +18,8 @@ struct Files;
 
 const HTML: &str = "text/html; charset=utf-8";
 const INDEX: &str = "index.html";
+/// The colours of pictures, which are those of the service's own.
+const PALETTE: &str = "palette.css";
 
 /// Scripts and styles of the service alone, no inline ones; it talks to nobody else.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; \
@@ -41,8 +44,11 @@ pub(super) fn index(headers: &HeaderMap) -> Result<Response, Problem> {
 pub(super) async fn file(Path((asked, name)): Path<(String, String)>, headers: HeaderMap) -> Result<Response, Problem> {
     let absent = || Problem::not_found(&format!("/ui/{asked}/{name}"));
     let kind = content_type(&name).ok_or_else(absent)?;
-    let file = Files::get(&name).ok_or_else(absent)?;
-    let mut response = Document::new(file.data.into_owned(), kind, None).respond(&headers);
+    let content = match name.as_str() {
+        PALETTE => palette().into_bytes(),
+        name => Files::get(name).ok_or_else(absent)?.data.into_owned(),
+    };
+    let mut response = Document::new(content, kind, None).respond(&headers);
     // A page of an older version gets what there is now, and asks again the next time.
     if asked == version() {
         let for_ever = HeaderValue::from_static("public, max-age=31536000, immutable");
@@ -65,26 +71,37 @@ fn content_type(name: &str) -> Option<&'static str> {
 /// Changes with any of the files.
 #[cfg(not(debug_assertions))]
 fn version() -> String {
-    static VERSION: std::sync::LazyLock<String> = std::sync::LazyLock::new(computed_version);
+    static VERSION: std::sync::LazyLock<String> = std::sync::LazyLock::new(|| {
+        hashed(|name, hasher| {
+            if let Some(file) = Files::get(name) {
+                hasher.update(&file.metadata.sha256_hash());
+            }
+        })
+    });
     VERSION.clone()
 }
 
-/// Changes with any of the files, also while the service runs.
+/// Changes with any of the files, also while the service runs: with the time at which one was written, as reading all of
+/// them for every request takes longer than all else.
 #[cfg(debug_assertions)]
 fn version() -> String {
-    computed_version()
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("ui/app");
+    hashed(|name, hasher| {
+        let written = std::fs::metadata(folder.join(name)).and_then(|file| file.modified());
+        hasher.update(format!("{written:?}").as_bytes());
+    })
 }
 
-fn computed_version() -> String {
+/// The hash of all names, each with what `add` adds of its file.
+fn hashed(add: impl Fn(&str, &mut blake3::Hasher)) -> String {
     let mut names: Vec<_> = Files::iter().collect();
     names.sort_unstable();
     let mut hasher = blake3::Hasher::new();
+    hasher.update(palette().as_bytes());
     for name in names {
         hasher.update(name.as_bytes());
         hasher.update(&[0]);
-        if let Some(file) = Files::get(&name) {
-            hasher.update(&file.metadata.sha256_hash());
-        }
+        add(&name, &mut hasher);
     }
     hasher.finalize().to_hex()[..12].to_owned()
 }

@@ -16,5 +16,5 @@ pub(crate) use self::csv::defused;
 pub use self::gcode::gcode;
 pub use self::pdf::{PdfError, pdf};
 pub use self::report::{Counted, Counts, Datum, Equation, Field, Headings, Picture, Report, Sheet};
-pub use self::svg::{Wording, described, svg, unit_symbol};
+pub use self::svg::{Wording, described, palette, svg, unit_symbol};
 pub use self::xlsx::{MOST_CELLS, XlsxFault, xlsx};

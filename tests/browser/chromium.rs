@@ -4,6 +4,7 @@ use std::io::{BufRead, BufReader};
 use std::net::TcpStream;
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
+use std::sync::LazyLock;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -16,16 +17,25 @@ const NAMES: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
 /// Longest wait for something on the page. The machine may be busy.
 const PATIENCE: Duration = Duration::from_mins(3);
 /// Between two looks.
-const LOOK: Duration = Duration::from_millis(40);
+const LOOK: Duration = Duration::from_millis(15);
 
-/// A browser with one page. It ends with the test.
+/// Starts the program that it is given, and ends it, with what it left behind, when whoever started this is gone.
+const KEEPER: &str = r#""$@" & read -r _; kill $!; wait; rm -rf "$TMPDIR""#;
+
+/// The browser of all tests: starting one takes longer than most of them.
+struct Browser {
+    address: String,
+    /// Its open end is what keeps the browser.
+    _keeper: Child,
+}
+
+/// A page in a context of its own: nothing of another test is in it. It ends with the test.
 pub struct Page {
-    process: Child,
     socket: WebSocket<TcpStream>,
     session: String,
+    context: String,
     last: u64,
     complaints: Vec<String>,
-    _profile: TempDir,
     /// Where downloads land.
     pub downloads: TempDir,
 }
@@ -42,51 +52,58 @@ pub fn found() -> Option<PathBuf> {
     found
 }
 
-impl Page {
-    /// A fresh browser.
-    pub fn new() -> Option<Self> {
+impl Browser {
+    fn start() -> Option<Self> {
         let program = found()?;
-        let profile = tempfile::tempdir().unwrap();
-        let downloads = tempfile::tempdir().unwrap();
-        let mut process = Command::new(program)
+        let profile = tempfile::tempdir().unwrap().keep();
+        let mut keeper = Command::new("sh")
+            .args(["-c", KEEPER, "sh"])
+            .arg(program)
             .args(["--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--hide-scrollbars"])
             .args(["--force-color-profile=srgb", "--lang=en", "--remote-debugging-port=0", "--no-first-run"])
-            .arg(format!("--user-data-dir={}", profile.path().display()))
+            .args(["--disable-renderer-backgrounding", "--disable-backgrounding-occluded-windows"])
+            .arg(format!("--user-data-dir={}", profile.display()))
             .arg("about:blank")
-            // It leaves what it keeps there behind when it is killed.
-            .env("TMPDIR", profile.path())
-            .stdin(Stdio::null())
+            .env("TMPDIR", profile)
+            .stdin(Stdio::piped())
             .stdout(Stdio::null())
             .stderr(Stdio::piped())
             .spawn()
             .unwrap();
-        let mut lines = BufReader::new(process.stderr.take().unwrap()).lines();
+        let mut lines = BufReader::new(keeper.stderr.take().unwrap()).lines();
         let address =
             lines.by_ref().map_while(Result::ok).find_map(|line| Some(line.split_once("listening on ")?.1.to_owned()));
         let address = address.expect("chromium says where it listens");
         // Whatever else it says must not fill the pipe.
         thread::spawn(move || lines.for_each(drop));
+        Some(Self { address, _keeper: keeper })
+    }
+}
+
+impl Page {
+    /// A fresh page; `None` where there is no browser.
+    pub fn new() -> Option<Self> {
+        static BROWSER: LazyLock<Option<Browser>> = LazyLock::new(Browser::start);
+        let address = BROWSER.as_ref()?.address.as_str();
+        let downloads = tempfile::tempdir().unwrap();
         let host = address.trim_start_matches("ws://").split('/').next().unwrap();
         let stream = TcpStream::connect(host).unwrap();
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
-        let (socket, _) = tungstenite::client(address.as_str(), stream).unwrap();
-        let mut page = Self {
-            process,
-            socket,
-            session: String::new(),
-            last: 0,
-            complaints: Vec::new(),
-            _profile: profile,
-            downloads,
-        };
-        let target = page.call("Target.createTarget", json!({"url": "about:blank"}));
+        let (socket, _) = tungstenite::client(address, stream).unwrap();
+        let (session, context) = (String::new(), String::new());
+        let mut page = Self { socket, session, context, last: 0, complaints: Vec::new(), downloads };
+        let context = page.call("Target.createBrowserContext", json!({}))["browserContextId"].take();
+        context.as_str().unwrap().clone_into(&mut page.context);
+        let target = page.call("Target.createTarget", json!({"url": "about:blank", "browserContextId": context}));
         let attached = page.call("Target.attachToTarget", json!({"targetId": target["targetId"], "flatten": true}));
         let folder = page.downloads.path().to_str().unwrap().to_owned();
-        page.call("Browser.setDownloadBehavior", json!({"behavior": "allow", "downloadPath": folder}));
+        let to = json!({"behavior": "allow", "downloadPath": folder, "browserContextId": context});
+        page.call("Browser.setDownloadBehavior", to);
         attached["sessionId"].as_str().unwrap().clone_into(&mut page.session);
         for domain in ["Page", "Runtime", "Log"] {
             page.call(&format!("{domain}.enable"), json!({}));
         }
+        page.call("Emulation.setFocusEmulationEnabled", json!({"enabled": true}));
         // A page computes while one types only where answers come at once; here they always do, by its clock.
         page.call("Page.addScriptToEvaluateOnNewDocument", json!({"source": "performance.now = () => 0;"}));
         page.screen(1440, 900, false);
@@ -330,8 +347,9 @@ impl Page {
 
 impl Drop for Page {
     fn drop(&mut self) {
-        let _ = self.process.kill();
-        let _ = self.process.wait();
+        let end =
+            json!({"id": 0, "method": "Target.disposeBrowserContext", "params": {"browserContextId": self.context}});
+        let _ = self.socket.send(Message::text(end.to_string()));
     }
 }
 

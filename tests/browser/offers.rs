@@ -5,30 +5,12 @@ use serde_json::{Value, json};
 
 use crate::access::assert_accessible;
 use crate::chromium::Page;
+use crate::sizes::assert_fits;
 use crate::{SETTLED, both};
 
 const CURRENT: &str = "!document.querySelector('.not-theirs')";
 /// The strip's numbers, by their names.
 const HEADLINE: &str = "Object.fromEntries([...document.querySelectorAll('.headline > div')].map(it => [it.querySelector('dt').textContent, it.querySelector('dd').textContent]))";
-/// At a phone, a shop tablet and a desk; light and dark.
-const SIZES: [(u32, u32, bool); 4] = [(360, 740, true), (1024, 600, false), (1440, 900, true), (2560, 1300, false)];
-
-/// Without a violation and no wider than the window, at every size and in both languages; back to English on a desk.
-fn assert_fits(page: &mut Page, place: &str) {
-    for (width, height, dark) in SIZES {
-        page.screen(width, height, dark);
-        page.until(&format!("innerWidth === {width}"));
-        let tag = if dark { "RU" } else { "EN" };
-        page.click_on(tag);
-        page.until(&format!("document.documentElement.lang === '{}'", tag.to_lowercase()));
-        page.until("document.documentElement.scrollWidth <= innerWidth");
-        assert_accessible(page, &format!("{place} at {width}"));
-    }
-    page.click_on("EN");
-    page.screen(1440, 900, false);
-    page.until("innerWidth === 1440 && document.documentElement.lang === 'en'");
-}
-
 #[test]
 fn the_strip_of_a_diagnosis_says_what_is_named_how_surely_and_what_it_gains() {
     let Some((_turn, mut page, service)) = both() else { return };
@@ -50,7 +32,6 @@ fn the_strip_of_a_diagnosis_says_what_is_named_how_surely_and_what_it_gains() {
     assert_eq!(page.text("#take"), "Keep the model");
     page.click("#take");
     page.until("document.activeElement.id === 'model-name'");
-    assert_fits(&mut page, "diagnosis");
     // Where nothing of the list is named, that is what the numbers say.
     page.open(&service.page("diagnosis?example=guideway"));
     page.until(&format!(
@@ -79,7 +60,6 @@ fn the_start_page_shows_outcomes() {
         ),
         false
     );
-    assert_fits(&mut page, "start");
     assert!(page.text(".outcome").contains("0.1 mm thick in the middle"));
     page.click(".outcome a");
     page.until(&format!("location.hash.includes('example=paper') && {SETTLED}"));
@@ -120,7 +100,7 @@ fn a_bar_turns_its_number_by_one_percent_and_buys_what_it_says() {
     // A price is a slope: over one percent it bends a little.
     assert!(numbers.len() == 2 && (numbers[0] / numbers[1] - 1.0).abs() < 0.1, "{said}");
     page.until("location.hash.includes('=')");
-    assert_fits(&mut page, "knobs");
+    assert_fits(&mut page, 0, "knobs");
     page.assert_calm();
 }
 
@@ -130,7 +110,7 @@ fn a_better_speed_is_used_and_keeps_what_it_promises() {
     page.open(&service.page("fixture-stability?example=lobes"));
     page.until(SETTLED);
     page.wait_for(".offers li button");
-    assert_fits(&mut page, "better speeds");
+    assert_fits(&mut page, 1, "better speeds");
     let promised = "[...document.querySelectorAll('.offers li:first-child dd')].map(it => parseFloat(it.textContent.replace(/\\s/g, '')))";
     let best = page.evaluate(promised);
     // Speed, depth, removal rate, clamp force; the best first, each more than now.
@@ -204,7 +184,6 @@ fn shoulders_diameters_and_supports_follow_the_hand() {
     assert!(!page.text(".verdict").is_empty() && page.evaluate("document.querySelector('.problem')") == Value::Null);
     // It can be undone step by step.
     page.until("location.hash.includes('/shaft/segments/')");
-    assert_fits(&mut page, "handles");
     page.assert_calm();
 }
 
@@ -330,7 +309,7 @@ fn a_part_that_is_kept_as_ones_own_is_where_another_calculator_begins() {
     assert_eq!(page.value("#field-shaft-youngs_modulus_n_per_mm2"), "123000");
     assert!(page.text(".own-note").contains("shaft"));
     page.until("location.hash.includes('/shaft')");
-    assert_fits(&mut page, "own parts");
+    assert_fits(&mut page, 2, "own parts");
     // The example is a click away, and what is one's own another.
     page.click(".own-note a");
     page.until(&format!("!document.querySelector('.own-note') && {SETTLED}"));

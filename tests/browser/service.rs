@@ -1,6 +1,7 @@
 //! The whole service with its own calculators, on a free port of this machine, while a test lives.
 
 use std::net::SocketAddr;
+use std::sync::LazyLock;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -10,6 +11,9 @@ use precut::http::{self, App};
 use precut::registry::Registry;
 use tokio::net::TcpListener;
 use tokio::sync::watch;
+
+/// Contracts are made on demand, which takes most of a second here: once for all tests.
+static REGISTRY: LazyLock<Registry> = LazyLock::new(|| Registry::standard().unwrap());
 
 /// A running service.
 pub struct Service {
@@ -34,7 +38,7 @@ impl Service {
             let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
             runtime.block_on(async move {
                 let settings = EngineSettings::of(&config);
-                let engine = Engine::open(Registry::standard().unwrap(), settings).await.unwrap();
+                let engine = Engine::open(REGISTRY.clone(), settings).await.unwrap();
                 let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
                 tell.send(listener.local_addr().unwrap()).unwrap();
                 let app = App::new(engine.clone(), &config);

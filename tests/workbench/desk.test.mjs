@@ -6,32 +6,65 @@ import { Desk } from '../../ui/app/desk.js';
 import { Refused, Unreachable } from '../../ui/app/api.js';
 import { cell } from '../../ui/app/lib.js';
 
-const settle = async () => { for (let turn = 0; turn < 20; turn += 1) await null; };
+const settle = async () => {
+  for (let turn = 0; turn < 20; turn += 1) await null;
+};
 
 /** A service that answers when it is told to. */
 function service({ followed = {} } = {}) {
   const own = {
-    asked: [], most: 0, inFlight: 0, cancelled: [],
-    solve: (id, job, { signal }) => new Promise((resolve, reject) => {
-      own.inFlight += 1;
-      own.most = Math.max(own.most, own.inFlight);
-      let isOver = false;
-      const over = () => { own.inFlight -= isOver ? 0 : 1; isOver = true; };
-      signal.addEventListener('abort', () => { over(); reject(new DOMException('', 'AbortError')); });
-      own.asked.push({
-        job, signal,
-        answer: () => { over(); resolve({ answer: { key: `b3:${JSON.stringify(job)}`, result: job }, figures: [] }); },
-        accept: run => { over(); resolve({ job: { id: run, state: 'queued' } }); },
-        refuse: () => { over(); reject(new Refused(422, { title: 'no', status: 422 })); },
-        lose: () => { over(); reject(new Unreachable('away')); },
-      });
-    }),
+    asked: [],
+    most: 0,
+    inFlight: 0,
+    cancelled: [],
+    solve: (_id, job, { signal }) =>
+      new Promise((resolve, reject) => {
+        own.inFlight += 1;
+        own.most = Math.max(own.most, own.inFlight);
+        let isOver = false;
+        const over = () => {
+          own.inFlight -= isOver ? 0 : 1;
+          isOver = true;
+        };
+        signal.addEventListener('abort', () => {
+          over();
+          reject(new DOMException('', 'AbortError'));
+        });
+        own.asked.push({
+          job,
+          signal,
+          answer: () => {
+            over();
+            resolve({ answer: { key: `b3:${JSON.stringify(job)}`, result: job }, figures: [] });
+          },
+          accept: run => {
+            over();
+            resolve({ job: { id: run, state: 'queued' } });
+          },
+          refuse: () => {
+            over();
+            reject(new Refused(422, { title: 'no', status: 422 }));
+          },
+          lose: () => {
+            over();
+            reject(new Unreachable('away'));
+          },
+        });
+      }),
     patient: question => question(),
     shown: async key => ({ answer: { key, result: JSON.parse(key.slice(3)) }, figures: [] }),
     calculator: async () => ({ id: 'toy', examples: [{ id: 'first' }], jobs: { first: { d: 1 } }, input_schema: {} }),
     jobOf: async key => ({ job: JSON.parse(key.slice(3)) }),
-    cancel: async run => { own.cancelled.push(run); },
-    follow: (run, handlers) => { followed[run] = handlers; return () => { delete followed[run]; }; },
+    cancel: run => {
+      own.cancelled.push(run);
+      return Promise.resolve();
+    },
+    follow: (run, handlers) => {
+      followed[run] = handlers;
+      return () => {
+        delete followed[run];
+      };
+    },
     whenBack: () => null,
   };
   return own;
@@ -175,7 +208,10 @@ test('a lost service is asked again, for the last thing typed', async () => {
 test('whatever happens in whatever order, only the answer to what is typed may be taken away', async () => {
   // A walk over all that can happen, from many starts; what is typed is known beside the desk.
   let seed = 1;
-  const random = below => { seed = (seed * 1103515245 + 12345) % 2147483648; return Math.floor((seed / 2147483648) * below); };
+  const random = below => {
+    seed = (seed * 1103515245 + 12345) % 2147483648;
+    return Math.floor((seed / 2147483648) * below);
+  };
   let taken = 0;
   for (let walk = 0; walk < 200; walk += 1) {
     const followed = {};
@@ -184,17 +220,54 @@ test('whatever happens in whatever order, only the answer to what is typed may b
     let isRead = true;
     for (let step = 0; step < 40; step += 1) {
       const open = far.asked.filter(one => !one.isOver && !one.signal.aborted);
-      const end = how => { const one = open[random(open.length)]; if (one) { one.isOver = true; one[how](`run-${walk}-${step}`); } };
+      const end = how => {
+        const one = open[random(open.length)];
+        if (one) {
+          one.isOver = true;
+          one[how](`run-${walk}-${step}`);
+        }
+      };
       [
-        () => { typed = job(step + 2); desk.change(typed, 'typing'); },
-        () => { typed = job(step + 2); desk.change(typed, 'run'); },
-        () => { isRead = false; unread.set(new Set(['field-d'])); },
-        () => { isRead = true; unread.set(new Set()); },
-        () => end('answer'), () => end('answer'), () => end('answer'), () => end('refuse'), () => end('accept'), () => end('lose'),
-        () => { const [run, handlers] = Object.entries(followed)[0] ?? []; if (run) { delete followed[run]; handlers.onDone({ id: run, state: 'succeeded', key: `b3:${JSON.stringify(desk.state.running.asked)}` }); } },
-        () => { const [run, handlers] = Object.entries(followed)[0] ?? []; if (run) { delete followed[run]; handlers.onDone({ id: run, state: 'failed', problem: { title: 'no' } }); } },
+        () => {
+          typed = job(step + 2);
+          desk.change(typed, 'typing');
+        },
+        () => {
+          typed = job(step + 2);
+          desk.change(typed, 'run');
+        },
+        () => {
+          isRead = false;
+          unread.set(new Set(['field-d']));
+        },
+        () => {
+          isRead = true;
+          unread.set(new Set());
+        },
+        () => end('answer'),
+        () => end('answer'),
+        () => end('answer'),
+        () => end('refuse'),
+        () => end('accept'),
+        () => end('lose'),
+        () => {
+          const [run, handlers] = Object.entries(followed)[0] ?? [];
+          if (run) {
+            delete followed[run];
+            handlers.onDone({ id: run, state: 'succeeded', key: `b3:${JSON.stringify(desk.state.running.asked)}` });
+          }
+        },
+        () => {
+          const [run, handlers] = Object.entries(followed)[0] ?? [];
+          if (run) {
+            delete followed[run];
+            handlers.onDone({ id: run, state: 'failed', problem: { title: 'no' } });
+          }
+        },
         () => pauses.splice(0).forEach(go => go()),
-        () => { clock.time += 800; },
+        () => {
+          clock.time += 800;
+        },
         () => desk.ask(desk.state.job, 'run'),
       ][random(15)]();
       if (random(3) > 0) await settle();

@@ -11,10 +11,21 @@ const schema = {
   type: 'object',
   properties: {
     part: { type: 'object', properties: { pieces: { type: 'array', items: { type: 'object', properties: { length: number } } } } },
-    holders: { type: 'array', items: { oneOf: [{ type: 'object', properties: { kind: { const: 'rest' }, z: place } }, { type: 'object', properties: { kind: { const: 'follows' }, offset: number } }] } },
+    holders: {
+      type: 'array',
+      items: {
+        oneOf: [
+          { type: 'object', properties: { kind: { const: 'rest' }, z: place } },
+          { type: 'object', properties: { kind: { const: 'follows' }, offset: number } },
+        ],
+      },
+    },
   },
 };
-const job = (lengths, ...places) => ({ part: { pieces: lengths.map(length => ({ length })) }, holders: [...places.map(z => ({ kind: 'rest', z })), { kind: 'follows', offset: 7 }] });
+const job = (lengths, ...places) => ({
+  part: { pieces: lengths.map(length => ({ length })) },
+  holders: [...places.map(z => ({ kind: 'rest', z })), { kind: 'follows', offset: 7 }],
+});
 
 test('what stands at the end of a part stays there when the part gets shorter or longer', () => {
   assert.deepEqual(withFollowers(schema, job([39.2, 292.9], 0, 332.1), job([39.2, 200], 0, 332.1)), job([39.2, 200], 0, 239.2));
@@ -44,12 +55,17 @@ test('another place of a picture changes what the service says, in the words in 
 test('of places that are passed by quickly the last one counts, and what is typed meanwhile is not undone', async () => {
   const asked = [];
   const desk = {
-    isClosed: false, state: { job: { d: 1 }, answer: { key: 'b3:1', job: { d: 1 } }, waiting: false },
-    service: { jobOf: async () => ({ job: { d: 1 } }), jobAt: (key, { x }) => new Promise(go => asked.push(() => go({ job: { d: x } }))) },
-    change: next => { desk.state = { ...desk.state, job: next }; },
+    isClosed: false,
+    state: { job: { d: 1 }, answer: { key: 'b3:1', job: { d: 1 } }, waiting: false },
+    service: { jobOf: async () => ({ job: { d: 1 } }), jobAt: (_key, { x }) => new Promise(go => asked.push(() => go({ job: { d: x } }))) },
+    change: next => {
+      desk.state = { ...desk.state, job: next };
+    },
     ask: () => {},
   };
-  const settle = async () => { for (let turn = 0; turn < 20; turn += 1) await null; };
+  const settle = async () => {
+    for (let turn = 0; turn < 20; turn += 1) await null;
+  };
   const places = new Places(desk);
   places.put({ x: 2 }, 'typing');
   places.put({ x: 3 }, 'typing');

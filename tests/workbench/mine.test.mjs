@@ -13,8 +13,17 @@ const { jobOf } = await import('../../ui/app/address.js');
 const shaft = { type: 'object', properties: { length_mm: { type: 'number' } } };
 const root = {
   type: 'object',
-  properties: { shaft: { $ref: '#/$defs/Shaft' }, carriage: { anyOf: [{ type: 'null' }, { $ref: '#/$defs/Carriage' }] }, rows: { $ref: '#/$defs/Rows' }, note: { type: 'string' } },
-  $defs: { Shaft: shaft, Carriage: { type: 'object', properties: { compliance: { type: 'number' } } }, Rows: { type: 'array', 'x-table': {} } },
+  properties: {
+    shaft: { $ref: '#/$defs/Shaft' },
+    carriage: { anyOf: [{ type: 'null' }, { $ref: '#/$defs/Carriage' }] },
+    rows: { $ref: '#/$defs/Rows' },
+    note: { type: 'string' },
+  },
+  $defs: {
+    Shaft: shaft,
+    Carriage: { type: 'object', properties: { compliance: { type: 'number' } } },
+    Rows: { type: 'array', 'x-table': {} },
+  },
 };
 const example = { shaft: { length_mm: 100 }, carriage: { compliance: 1 }, note: 'an example' };
 const description = { id: 'one', input_schema: root, examples: [{ id: 'first' }], jobs: { first: example } };

@@ -5,13 +5,37 @@ import assert from 'node:assert/strict';
 import { settled, movedJob, stepOf, roomy } from '../../ui/app/handles.js';
 import { knobsOf, chosenJob } from '../../ui/app/offers.js';
 import { sheetOf, csvOf } from '../../ui/app/inspection.js';
-import { readFile, rowFields, runsOf, wanted, freeOf, guess, conditionsIn, conditionsOf, runsWith, measuredOnly, othersOf, matched, joined, lastRun } from '../../ui/app/table-file.js';
+import {
+  readFile,
+  rowFields,
+  runsOf,
+  wanted,
+  freeOf,
+  guess,
+  conditionsIn,
+  conditionsOf,
+  runsWith,
+  measuredOnly,
+  othersOf,
+  matched,
+  joined,
+  lastRun,
+} from '../../ui/app/table-file.js';
 import { resolve } from '../../ui/app/schema.js';
 
 const number = (unit, title) => ({ type: 'number', 'x-unit': unit, title });
 
 test('a handle goes by round numbers, stops where it shall, and stays within its reach', () => {
-  const handle = { x: 400, along: 'x', reach: [10, 990], stops: [0, 500, 1000], moves: [{ pointer: '/parts/0/length_mm', per_unit: 1 }, { pointer: '/parts/1/length_mm', per_unit: -1 }] };
+  const handle = {
+    x: 400,
+    along: 'x',
+    reach: [10, 990],
+    stops: [0, 500, 1000],
+    moves: [
+      { pointer: '/parts/0/length_mm', per_unit: 1 },
+      { pointer: '/parts/1/length_mm', per_unit: -1 },
+    ],
+  };
   assert.equal(stepOf(2.4), 1);
   assert.equal(settled(handle, 433.7, 1), 434);
   assert.equal(settled(handle, 494.2, 1, 7), 500);
@@ -27,35 +51,102 @@ test('a handle goes by round numbers, stops where it shall, and stays within its
 test('handles too near for a finger give way to those that come later', () => {
   const at = (x, y) => ({ handle: { x, y } });
   const same = value => value;
-  assert.deepEqual(roomy([at(0, 0), at(10, 0), at(60, 0)], same, same, { top: -100, height: 200 }).map(({ handle }) => handle.x), [10, 60]);
+  assert.deepEqual(
+    roomy([at(0, 0), at(10, 0), at(60, 0)], same, same, { top: -100, height: 200 }).map(({ handle }) => handle.x),
+    [10, 60],
+  );
 });
 
 test('a knob gives way by one percent to the side on which it is looser', () => {
-  const inputs = { type: 'object', properties: { zones: { type: 'array', items: { type: 'object', properties: { id: { type: 'string' }, most_um: number('um', 'deflection limit') } } }, least: number('1', 'least feed') } };
-  const item = { type: 'object', properties: { pointer: { type: 'string' }, gain: { type: ['number', 'null'], 'x-knobs': { pointer: 'pointer', looser: 'looser', gain: 'gain', of: '/objective' } } } };
+  const inputs = {
+    type: 'object',
+    properties: {
+      zones: {
+        type: 'array',
+        items: { type: 'object', properties: { id: { type: 'string' }, most_um: number('um', 'deflection limit') } },
+      },
+      least: number('1', 'least feed'),
+    },
+  };
+  const item = {
+    type: 'object',
+    properties: {
+      pointer: { type: 'string' },
+      gain: { type: ['number', 'null'], 'x-knobs': { pointer: 'pointer', looser: 'looser', gain: 'gain', of: '/objective' } },
+    },
+  };
   const outputs = { type: 'object', properties: { objective: number('min', 'objective'), prices: { type: 'array', items: item } } };
-  const prices = [{ pointer: '/zones/1/most_um', looser: 'more', gain: 0.4 }, { pointer: '/least', looser: 'less', gain: 0.1 }, { pointer: '/whole', looser: 'more' }, { pointer: '/not/there', looser: 'more', gain: 1 }];
-  const found = knobsOf({ input_schema: inputs, output_schema: outputs }, { input: { zones: [{ id: 'z1', most_um: 5 }, { id: 'z2', most_um: 10 }], least: 0.1, whole: 3 }, result: { objective: 40, prices } });
-  assert.deepEqual(found.map(({ label, before, after, gain }) => [label, before, after, gain]), [['z2: deflection limit', 10, 10.1, 0.4], ['Least feed', 0.1, 0.099, 0.1]]);
+  const prices = [
+    { pointer: '/zones/1/most_um', looser: 'more', gain: 0.4 },
+    { pointer: '/least', looser: 'less', gain: 0.1 },
+    { pointer: '/whole', looser: 'more' },
+    { pointer: '/not/there', looser: 'more', gain: 1 },
+  ];
+  const found = knobsOf(
+    { input_schema: inputs, output_schema: outputs },
+    {
+      input: {
+        zones: [
+          { id: 'z1', most_um: 5 },
+          { id: 'z2', most_um: 10 },
+        ],
+        least: 0.1,
+        whole: 3,
+      },
+      result: { objective: 40, prices },
+    },
+  );
+  assert.deepEqual(
+    found.map(({ label, before, after, gain }) => [label, before, after, gain]),
+    [
+      ['z2: deflection limit', 10, 10.1, 0.4],
+      ['Least feed', 0.1, 0.099, 0.1],
+    ],
+  );
 });
 
 test('a choice sets its fields and clears what would contradict them', () => {
-  const said = { sets: { '/cut/speed_rpm': 'speed_rpm', '/cut/feed_mm': '/engagement/feed_mm' }, clears: ['/cut/speed_m_per_min', '/cut/absent'] };
+  const said = {
+    sets: { '/cut/speed_rpm': 'speed_rpm', '/cut/feed_mm': '/engagement/feed_mm' },
+    clears: ['/cut/speed_m_per_min', '/cut/absent'],
+  };
   const job = { cut: { speed_m_per_min: 100, depth_mm: 1 } };
-  assert.deepEqual(chosenJob(job, { engagement: { feed_mm: 0.1 } }, { speed_rpm: 900 }, said), { cut: { depth_mm: 1, speed_rpm: 900, feed_mm: 0.1 } });
+  assert.deepEqual(chosenJob(job, { engagement: { feed_mm: 0.1 } }, { speed_rpm: 900 }, said), {
+    cut: { depth_mm: 1, speed_rpm: 900, feed_mm: 0.1 },
+  });
   assert.deepEqual(job.cut, { speed_m_per_min: 100, depth_mm: 1 });
 });
 
-const rows = { type: 'array', maxItems: 100, items: { type: 'object', required: ['z_mm'], properties: { run: { type: 'integer', title: 'run' }, z_mm: number('mm', 'station'), deviation_um: number('um', 'deviation') } } };
+const rows = {
+  type: 'array',
+  maxItems: 100,
+  items: {
+    type: 'object',
+    required: ['z_mm'],
+    properties: { run: { type: 'integer', title: 'run' }, z_mm: number('mm', 'station'), deviation_um: number('um', 'deviation') },
+  },
+};
 const root = {
   type: 'object',
   properties: {
     quantity: { type: 'string' },
-    runs: { type: 'array', items: { type: 'object', properties: { depth_mm: number('mm', 'depth'), way: { type: 'string', enum: ['to', 'fro'] } } } },
-    measurements: { oneOf: [rows, { type: 'object', properties: { csv: { type: 'string' } } }], 'x-table': true, 'x-measured': ['deviation_um'], 'x-runs': 'runs', 'x-run-number': 'run' },
+    runs: {
+      type: 'array',
+      items: { type: 'object', properties: { depth_mm: number('mm', 'depth'), way: { type: 'string', enum: ['to', 'fro'] } } },
+    },
+    measurements: {
+      oneOf: [rows, { type: 'object', properties: { csv: { type: 'string' } } }],
+      'x-table': true,
+      'x-measured': ['deviation_um'],
+      'x-runs': 'runs',
+      'x-run-number': 'run',
+    },
   },
 };
-const answer = { input: { quantity: 'deviation_um', runs: [{ depth_mm: 1 }], measurements: [{ run: 1, z_mm: 5, deviation_um: 2 }] }, result: { next_measurement: { changes: 'depth_mm', run: { depth_mm: 1.8, way: 'fro' }, rows: 3, places: { z_mm: [10, 20.5, 30] } } } };
+const answer = {
+  input: { quantity: 'deviation_um', runs: [{ depth_mm: 1 }], measurements: [{ run: 1, z_mm: 5, deviation_um: 2 }] },
+  result: { next_measurement: { changes: 'depth_mm', run: { depth_mm: 1.8, way: 'fro' }, rows: 3, places: { z_mm: [10, 20.5, 30] } } },
+};
 
 test('the sheet of the next measurement comes back as rows of a run that was not there', () => {
   const sheet = sheetOf({ input_schema: root }, answer, answer.input);
@@ -71,9 +162,15 @@ test('the sheet of the next measurement comes back as rows of a run that was not
   const file = measuredOnly(whole, matches, ['deviation_um']);
   assert.equal(file.rows.length, 2);
   const conditions = conditionsIn(file, matches, runs);
-  assert.deepEqual(conditions.map(({ name }) => name), ['depth_mm', 'way']);
+  assert.deepEqual(
+    conditions.map(({ name }) => name),
+    ['depth_mm', 'way'],
+  );
   assert.equal(lastRun(answer.input.measurements, columns, free, runs, answer.input.runs), 1);
-  assert.deepEqual(runsWith(answer.input.runs, conditionsOf(file, matches, runs, conditions)), [{ depth_mm: 1 }, { depth_mm: 1.8, way: 'fro' }]);
+  assert.deepEqual(runsWith(answer.input.runs, conditionsOf(file, matches, runs, conditions)), [
+    { depth_mm: 1 },
+    { depth_mm: 1.8, way: 'fro' },
+  ]);
   const { kept } = othersOf(file, columns, { ...matches, ...Object.fromEntries(conditions.map(one => [`/${one.name}`, one])) }, free);
   const both = joined(answer.input.measurements, { csv: matched(file, columns, matches, kept) }, columns, free);
   assert.equal(both, 'run\tz_mm\tdeviation_um\n1\t5\t2\n2\t10\t4.5\n2\t20.5\t5\n');

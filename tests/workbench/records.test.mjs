@@ -5,7 +5,15 @@ import { numbersOf } from '../../ui/app/library.js';
 import { codesOf, find, fold, indexOf, named, nameOf, overruled } from '../../ui/app/records.js';
 
 test('names are folded as the service folds them', () => {
-  for (const [one, other] of [['1.7225', '17225'], ['40Х', '40Kh'], ['40Х', '40X'], ['ШХ15', 'ShKh15'], ['38ХМ', '38khm'], ['42 CrMo 4', '42crmo4'], ['Größe', 'grosse']]) {
+  for (const [one, other] of [
+    ['1.7225', '17225'],
+    ['40Х', '40Kh'],
+    ['40Х', '40X'],
+    ['ШХ15', 'ShKh15'],
+    ['38ХМ', '38khm'],
+    ['42 CrMo 4', '42crmo4'],
+    ['Größe', 'grosse'],
+  ]) {
     assert.equal(fold(one), fold(other), `${one} and ${other}`);
   }
 });
@@ -40,12 +48,22 @@ test('a name stands alone or beside what is said over its record', () => {
   assert.deepEqual(named({ name: 'lathe-3', power_kw: 5 }, null, true), { power_kw: 5 });
   assert.equal(named({ name: 'lathe-3' }, null, true), undefined);
   assert.equal(nameOf({ insert: 'CNMG120408', holder: 'PCLNR2525M12' }), 'CNMG120408 PCLNR2525M12');
-  const origins = [{ pointer: '/a', parts: [{ from: 'job' }] }, { pointer: '/b', parts: [{ from: 'machine' }, { from: 'tool' }] }];
+  const origins = [
+    { pointer: '/a', parts: [{ from: 'job' }] },
+    { pointer: '/b', parts: [{ from: 'machine' }, { from: 'tool' }] },
+  ];
   assert.deepEqual(overruled({ origins, resources: { material: {}, shaft_material: {} } }), ['/shaft/material', '/a']);
   assert.deepEqual(overruled(undefined), []);
 });
 
 test('the numbers of a record are found with their places', () => {
-  const record = { name: 'lathe-3', compliance: { carriage_um_per_n: { value: 0.018, certainty: 'user', source: 'user' } }, control: { dialect: { value: 'fanuc' } }, spindle: { characteristic: [{ power_kw: 5 }] } };
-  assert.deepEqual(numbersOf(record), [{ place: '/compliance/carriage_um_per_n', label: 'compliance · carriage_um_per_n', value: 0.018, certainty: 'user', source: 'user' }]);
+  const record = {
+    name: 'lathe-3',
+    compliance: { carriage_um_per_n: { value: 0.018, certainty: 'user', source: 'user' } },
+    control: { dialect: { value: 'fanuc' } },
+    spindle: { characteristic: [{ power_kw: 5 }] },
+  };
+  assert.deepEqual(numbersOf(record), [
+    { place: '/compliance/carriage_um_per_n', label: 'compliance · carriage_um_per_n', value: 0.018, certainty: 'user', source: 'user' },
+  ]);
 });

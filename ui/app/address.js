@@ -10,7 +10,11 @@ export class BrokenLink extends Error {}
 
 /** A value of an address. */
 function readValue(place, text) {
-  try { return text === '' ? undefined : JSON.parse(text); } catch { throw new BrokenLink(t('link_value', { place, text })); }
+  try {
+    return text === '' ? undefined : JSON.parse(text);
+  } catch {
+    throw new BrokenLink(t('link_value', { place, text }));
+  }
 }
 
 /** What a key of a link is kept under; said in the user's words where nothing is. */
@@ -54,8 +58,8 @@ export async function jobOf(description, query, service = api) {
 export async function openedBy(description, query, service = api) {
   const run = query.get('run');
   const typed = run && keptRun(run);
-  if (typed) return { ...await jobOf(description, query, service), job: typed, isOwnRun: true };
-  const given = run && await inputOf(run);
+  if (typed) return { ...(await jobOf(description, query, service)), job: typed, isOwnRun: true };
+  const given = run && (await inputOf(run));
   if (run && (!given || given.calculator !== description.id)) {
     // A job that was not begun from an example is known by its run alone.
     if (!query.has('example') && !query.has('result')) throw new BrokenLink(t('link_run'));

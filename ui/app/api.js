@@ -12,10 +12,18 @@ const MOST_TRIES = 6;
 
 const KEY = 'precut-key';
 const storedKey = () => {
-  try { return sessionStorage.getItem(KEY); } catch { return null; }
+  try {
+    return sessionStorage.getItem(KEY);
+  } catch {
+    return null;
+  }
 };
 export function useKey(key) {
-  try { sessionStorage.setItem(KEY, key.trim()); } catch { /* it is asked for again after a reload */ }
+  try {
+    sessionStorage.setItem(KEY, key.trim());
+  } catch {
+    /* it is asked for again after a reload */
+  }
   keyAsked.set(null);
 }
 
@@ -75,7 +83,12 @@ export function whenBack(error, task) {
     return () => clearTimeout(timer);
   }
   if (!(error instanceof Unreachable)) return null;
-  const stop = online.watch(isUp => { if (isUp) { stop(); task(); } });
+  const stop = online.watch(isUp => {
+    if (isUp) {
+      stop();
+      task();
+    }
+  });
   return stop;
 }
 
@@ -87,7 +100,7 @@ export const calculator = id => json(`/v1/calculators/${enc(id)}`);
 /** All machines, tools or materials: own ones, then the service's. */
 export async function records(list) {
   const items = [];
-  for (let next = `/v1/${list}`; next;) {
+  for (let next = `/v1/${list}`; next; ) {
     const part = await json(next);
     items.push(...part.items);
     next = part.next;
@@ -108,7 +121,9 @@ export const jobs = query => json(`/v1/jobs?${new URLSearchParams(query)}`);
 export const job = id => json(`/v1/jobs/${enc(id)}`);
 export const jobInput = id => json(`/v1/jobs/${enc(id)}/job`);
 export const cancel = id => json(`/v1/jobs/${enc(id)}`, { method: 'DELETE' });
-export const alive = async () => { await ask('/health/live'); };
+export const alive = async () => {
+  await ask('/health/live');
+};
 
 /** Sends a job: `{answer, figures}` if it is answered at once, `{job}` if it takes longer.
  *  @param {string} id @param {any} body @param {{ signal?: AbortSignal }} [options] */
@@ -149,11 +164,12 @@ export async function program(key, signal) {
 
 const recordAt = (list, name) => `/v1/${list}/${enc(name)}`;
 /** Stores a machine, a tool or a material; only under a name that nothing has, if it has to be new. */
-export const saveRecord = (list, name, source, isNew) => json(recordAt(list, name), {
-  method: 'PUT',
-  headers: { 'Content-Type': 'application/json', ...(isNew && { 'If-None-Match': '*' }) },
-  body: JSON.stringify(source),
-});
+export const saveRecord = (list, name, source, isNew) =>
+  json(recordAt(list, name), {
+    method: 'PUT',
+    headers: { 'Content-Type': 'application/json', ...(isNew && { 'If-None-Match': '*' }) },
+    body: JSON.stringify(source),
+  });
 export const dropRecord = (list, name) => ask(recordAt(list, name), { method: 'DELETE' });
 export const importLibrary = (text, type) => json('/v1/library/import', { method: 'POST', headers: { 'Content-Type': type }, body: text });
 export const exportLibrary = async form => (await ask(`/v1/library/export?format=${form}`)).blob();
@@ -163,11 +179,12 @@ export async function models() {
   const { links } = await json('/', { headers: { Accept: 'application/json' } });
   return links.models ? (await json(`${links.models}?limit=500`)).items : null;
 }
-export const saveModel = (name, source) => json(`/v1/models/${enc(name)}`, {
-  method: 'PUT',
-  headers: { 'Content-Type': 'application/json' },
-  body: JSON.stringify(source),
-});
+export const saveModel = (name, source) =>
+  json(`/v1/models/${enc(name)}`, {
+    method: 'PUT',
+    headers: { 'Content-Type': 'application/json' },
+    body: JSON.stringify(source),
+  });
 export const dropModel = name => ask(`/v1/models/${enc(name)}`, { method: 'DELETE' });
 export const model = name => json(`/v1/models/${enc(name)}`);
 

@@ -14,7 +14,9 @@ function findings(root, result) {
   return Object.entries(result ?? {}).flatMap(([name, value]) => {
     if (!value || typeof value !== 'object' || Array.isArray(value) || !whole.properties?.[name]) return [];
     const schema = resolve(whole.properties[name], root);
-    const said = Object.values(schema.properties ?? {}).map(part => resolve(part, root)['x-bars']).find(Boolean);
+    const said = Object.values(schema.properties ?? {})
+      .map(part => resolve(part, root)['x-bars'])
+      .find(Boolean);
     return said ? [{ said, value, schema, label: labelOf(name, schema) }] : [];
   });
 }
@@ -29,9 +31,16 @@ function Group({ said, value, schema, label, input, inputs, root }) {
   const given = at(input, place);
   const asks = said.asks.map((names, index) => {
     const known = names.map(name => value[name]).filter(one => typeof one === 'number');
-    return { look: LOOKS[index % LOOKS.length], name: labelOf(names[0], field(names[0])), force: known.length > 0 ? Math.max(...known) : null };
+    return {
+      look: LOOKS[index % LOOKS.length],
+      name: labelOf(names[0], field(names[0])),
+      force: known.length > 0 ? Math.max(...known) : null,
+    };
   });
-  const set = typeof given === 'number' ? [{ look: 'bar-given', name: fieldAt(inputs, input, place)?.label ?? t('bar_set'), force: given, isSet: true }] : [];
+  const set =
+    typeof given === 'number'
+      ? [{ look: 'bar-given', name: fieldAt(inputs, input, place)?.label ?? t('bar_set'), force: given, isSet: true }]
+      : [];
   const rows = [...asks, ...set];
   // What has no number has no bar.
   const most = Math.max(...rows.map(({ force }) => force ?? 0), 1e-9);
@@ -42,9 +51,11 @@ function Group({ said, value, schema, label, input, inputs, root }) {
   return html`
     <figure class="picture clamp" aria-label=${label}>
       <figcaption><h2>${label}</h2></figcaption>
-      <table><tbody>${rows.map(({ look, name, force, isSet }) => html`<tr key=${look}><th scope="row">${name}</th>
+      <table><tbody>${rows.map(
+        ({ look, name, force, isSet }) => html`<tr key=${look}><th scope="row">${name}</th>
         <td class="clamp-bar"><svg viewBox=${`0 0 ${WIDTH} 14`} preserveAspectRatio="none" aria-hidden="true"><rect class=${`${look} ${isSet && isShort ? 'short' : ''}`} x="0" y="1" width=${force === null ? 0 : Math.max((WIDTH * force) / most, 2)} height="12" />${isSet && needed !== null ? html`<path class="cursor" d=${`M${(WIDTH * needed) / most} 0V14`} vector-effect="non-scaling-stroke" />` : ''}</svg></td>
-        <td class="number">${force === null ? '–' : `${number(force, 4)} ${unit}`}</td></tr>`)}</tbody></table>
+        <td class="number">${force === null ? '–' : `${number(force, 4)} ${unit}`}</td></tr>`,
+      )}</tbody></table>
       ${typeof given === 'number' && needed !== null && html`<p class="quiet hint">${isShort ? t('bars_short') : t('bars_hold')}</p>`}
     </figure>`;
 }

@@ -62,7 +62,21 @@ export class Desk {
     this.service = service;
     this.clock = clock;
     /** @type {DeskState} */
-    this.state = { description: null, missing: null, libraries: {}, base: null, baseName: {}, job: null, own: [], answer: null, problem: null, running: null, pending: false, waiting: false, pinned: null };
+    this.state = {
+      description: null,
+      missing: null,
+      libraries: {},
+      base: null,
+      baseName: {},
+      job: null,
+      own: [],
+      answer: null,
+      problem: null,
+      running: null,
+      pending: false,
+      waiting: false,
+      pinned: null,
+    };
     /** @type {Set<(state: DeskState) => void>} */
     this.watchers = new Set();
     this.isClosed = false;
@@ -93,9 +107,13 @@ export class Desk {
     this.state = { ...this.state, ...patch };
     if (!this.isClosed) this.watchers.forEach(watcher => watcher(this.state));
   }
-  standing() { return standingOf(this.state, this.unread.get().size); }
+  standing() {
+    return standingOf(this.state, this.unread.get().size);
+  }
   /** Whether this answer may be taken away: it is shown, and it is that of the inputs on the screen. */
-  owns(key) { return this.standing() === 'current' && this.state.answer.key === key; }
+  owns(key) {
+    return this.standing() === 'current' && this.state.answer.key === key;
+  }
 
   close() {
     this.isClosed = true;
@@ -128,14 +146,20 @@ export class Desk {
     this.set({ job });
     this.isUnwritten = true;
     this.pushLater();
-    if (how !== 'run' && !this.isLive) { this.set({ waiting: true }); return; }
+    if (how !== 'run' && !this.isLive) {
+      this.set({ waiting: true });
+      return;
+    }
     this.ask(job, how);
   }
 
   /** Asks at once, or after the request in flight; never two at a time. */
   ask(job, how) {
     this.set({ pending: true, waiting: false });
-    if (how === 'typing' && this.isFlying) { this.wanted = job; return undefined; }
+    if (how === 'typing' && this.isFlying) {
+      this.wanted = job;
+      return undefined;
+    }
     this.wanted = null;
     return this.run(job, how);
   }
@@ -156,7 +180,10 @@ export class Desk {
         return this.service.solve(this.id, job, { signal });
       }, signal);
       if (signal.aborted) return;
-      if (record) { this.begun(record, job); return; }
+      if (record) {
+        this.begun(record, job);
+        return;
+      }
       this.isLive = this.clock.now() - start < LIVE_LIMIT_MS;
       const { key } = found.answer;
       await this.show(key, { ...found, language: said }, job, signal);
@@ -195,7 +222,10 @@ export class Desk {
       // What was typed after it is asked for in its place.
       const next = this.wanted;
       this.wanted = null;
-      this.service.cancel(record.id).catch(() => {}).then(() => this.refreshJobs?.());
+      this.service
+        .cancel(record.id)
+        .catch(() => {})
+        .then(() => this.refreshJobs?.());
       this.run(next, 'run');
       return;
     }
@@ -208,16 +238,25 @@ export class Desk {
   }
 
   refused(error, job, how, signal) {
-    if (how !== 'typing') { this.fail(error); return; }
+    if (how !== 'typing') {
+      this.fail(error);
+      return;
+    }
     if (this.wanted) return;
-    this.clock.pause(TYPING_PAUSE_MS).then(() => { if (!signal.aborted && this.state.job === job) this.fail(error); });
+    this.clock.pause(TYPING_PAUSE_MS).then(() => {
+      if (!signal.aborted && this.state.job === job) this.fail(error);
+    });
   }
 
   fail(error) {
     if (error.name === 'AbortError' || this.isClosed) return;
     if (error instanceof api.Refused) this.set({ pending: false, problem: error.problem });
-    else if (error instanceof api.Unreachable) this.set({ pending: false, problem: { title: t('offline_title'), detail: t('offline_detail'), code: 'offline' } });
-    else { this.set({ pending: false }); throw error; }
+    else if (error instanceof api.Unreachable)
+      this.set({ pending: false, problem: { title: t('offline_title'), detail: t('offline_detail'), code: 'offline' } });
+    else {
+      this.set({ pending: false });
+      throw error;
+    }
   }
 
   // Answers
@@ -228,7 +267,7 @@ export class Desk {
     let found = got;
     while (found?.language !== language()) {
       const asked = language();
-      found = { ...await patient(() => shown(key, signal), signal), language: asked };
+      found = { ...(await patient(() => shown(key, signal), signal)), language: asked };
       if (signal?.aborted || this.isClosed) return undefined;
     }
     return found;
@@ -238,14 +277,21 @@ export class Desk {
     if (!found) return;
     // What was changed while this was computed is asked for next, or, where that takes long, waits to be asked for.
     const isNext = this.wanted !== null;
-    this.set({ answer: { key, job, ...found }, problem: null, pending: isNext, waiting: !isNext && !this.isLive && this.state.job !== job });
+    this.set({
+      answer: { key, job, ...found },
+      problem: null,
+      pending: isNext,
+      waiting: !isNext && !this.isLive && this.state.job !== job,
+    });
   }
   /** Says the answer that is shown in another language. What was asked or refused meanwhile stays as it is. */
   async reword(key) {
     const found = await this.worded(key);
     if (found && this.state.answer?.key === key) this.set({ answer: { ...this.state.answer, ...found } });
   }
-  async pinOf(key) { return { key, ...await this.service.shown(key) }; }
+  async pinOf(key) {
+    return { key, ...(await this.service.shown(key)) };
+  }
   pin() {
     const { pinned, answer, job, running } = this.state;
     this.set({ pinned: pinned ? null : { key: answer.key, figures: answer.figures, answer: answer.answer } });
@@ -261,7 +307,11 @@ export class Desk {
     if (!before) return;
     this.stopFollowing?.();
     this.set({ running: null });
-    if (before.isOwn) this.service.cancel(before.id).catch(() => {}).then(() => this.refreshJobs?.());
+    if (before.isOwn)
+      this.service
+        .cancel(before.id)
+        .catch(() => {})
+        .then(() => this.refreshJobs?.());
   }
   /** The answer of a run has an address of its own, also where the job was known by its run alone. */
   settle(run, key, job) {
@@ -276,12 +326,19 @@ export class Desk {
     this.isLive = false;
     this.set({ running: { ...record, asked: job, isOwn, interim: null, language: language() } });
     this.refreshJobs?.();
-    const more = patch => { if (this.state.running) this.set({ running: { ...this.state.running, ...patch } }); };
+    const more = patch => {
+      if (this.state.running) this.set({ running: { ...this.state.running, ...patch } });
+    };
     this.stopFollowing = this.service.follow(record.id, {
-      onState: next => { if (this.state.running?.id === next.id) more(next); },
+      onState: next => {
+        if (this.state.running?.id === next.id) more(next);
+      },
       onProgress: more,
       onInterim: interim => more({ interim }),
-      onTrouble: error => { this.refreshJobs?.(); this.set({ running: null, pending: false, problem: error.problem }); },
+      onTrouble: error => {
+        this.refreshJobs?.();
+        this.set({ running: null, pending: false, problem: error.problem });
+      },
       onDone: done => this.ended(done, job),
     });
   }
@@ -293,10 +350,18 @@ export class Desk {
         await this.show(done.key, null, job, this.control?.signal);
         this.settle(done.id, done.key, job);
       } else this.set({ problem: endOf(done) });
-    } catch (error) { this.fail(error); } finally { this.set({ running: null, pending: false }); }
+    } catch (error) {
+      this.fail(error);
+    } finally {
+      this.set({ running: null, pending: false });
+    }
   }
   async stop() {
-    try { await this.service.cancel(this.state.running.id); } catch (error) { this.fail(error); }
+    try {
+      await this.service.cancel(this.state.running.id);
+    } catch (error) {
+      this.fail(error);
+    }
   }
 
   // What the page begins with
@@ -314,7 +379,11 @@ export class Desk {
       this.set({ description: found });
       const lists = new Set((found.records || []).map(kind => FOLDER[kind]));
       if (JSON.stringify(found.input_schema).includes('"x-library"')) lists.add('materials');
-      for (const list of lists) this.service.records(list).then(items => !isLate() && this.set({ libraries: { ...this.state.libraries, [list]: items } })).catch(() => {});
+      for (const list of lists)
+        this.service
+          .records(list)
+          .then(items => !isLate() && this.set({ libraries: { ...this.state.libraries, [list]: items } }))
+          .catch(() => {});
       const { problem, job, running, answer, pinned } = this.state;
       // What was refused is refused again, in the other language.
       if (this.spoken !== spoken && problem?.status === 422 && this.isLive && job) this.ask(job, 'run');
@@ -346,17 +415,31 @@ export class Desk {
       if (isLate()) return;
       this.set({ ...next, problem: null, missing: null });
       const pin = query.get('pin');
-      if (pin && this.state.pinned?.key !== pin) this.pinOf(pin).then(pinned => this.set({ pinned }), () => {});
+      if (pin && this.state.pinned?.key !== pin)
+        this.pinOf(pin).then(
+          pinned => this.set({ pinned }),
+          () => {},
+        );
       const runId = query.get('run');
       if (runId) {
         this.renew();
         try {
           const record = await this.service.job(runId);
           if (isLate()) return;
-          if (['queued', 'running', 'succeeded'].includes(record.state)) { this.set({ pending: true }); this.follow(record, next.job, isOwnRun); return; }
+          if (['queued', 'running', 'succeeded'].includes(record.state)) {
+            this.set({ pending: true });
+            this.follow(record, next.job, isOwnRun);
+            return;
+          }
           // What became of somebody else's job is said; it is not begun anew.
-          if (next.baseName.run) { this.leaveRun(); this.set({ pending: false, problem: endOf(record) }); return; }
-        } catch (error) { if (!(error instanceof api.Refused)) throw error; }
+          if (next.baseName.run) {
+            this.leaveRun();
+            this.set({ pending: false, problem: endOf(record) });
+            return;
+          }
+        } catch (error) {
+          if (!(error instanceof api.Refused)) throw error;
+        }
       }
       if (key) {
         this.leaveRun();

@@ -11,7 +11,10 @@ const UNITS = ['um', 'mm', 'n', 'deg', 'rpm', 'hz', 'percent', 'kw', 'min', 's']
 
 const isSpread = value => typeof value === 'number' && Number.isFinite(value) && value > 0;
 const endOf = name => UNITS.find(unit => name.endsWith(`_${unit}`)) || '';
-const stemOf = name => { const end = endOf(name); return end ? name.slice(0, -end.length - 1) : name; };
+const stemOf = name => {
+  const end = endOf(name);
+  return end ? name.slice(0, -end.length - 1) : name;
+};
 
 /** The name of the number beside `name` that is its uncertainty, and what it is to be multiplied by: the same name with
  *  `_error` or `_uncertainty`, in its unit or a finer one of the same dimension.
@@ -30,7 +33,8 @@ function besides(object, name) {
 /** The uncertainty of the number at a path of a result, `{ spread, path }` with the place where it stands itself: beside
  *  the number, or at the same place of `..._error`. */
 export function spreadOf(result, path) {
-  const way = path.slice(0, -1).reduce((list, name) => [...list, list.at(-1)?.[name]], [result]);
+  const way = [result];
+  for (const name of path.slice(0, -1)) way.push(way.at(-1)?.[name]);
   const beside = way.at(-1) && besides(way.at(-1), path.at(-1));
   if (beside) return { spread: way.at(-1)[beside[0]] * beside[1], path: [...path.slice(0, -1), beside[0]] };
   for (let depth = path.length - 2; depth >= 0; depth -= 1) {
@@ -47,7 +51,11 @@ export function spreadColumns(columns) {
   const find = (name, unit) => columns.find(other => other.name === name && other.unit === unit)?.cells;
   return columns.map(({ name, unit }) => {
     const own = WORDS.map(word => find(`${name}${word}`, unit)).find(Boolean);
-    const found = own || (['value', 'estimate', 'coefficient'].includes(name) ? OF_VALUE.map(word => columns.find(other => other.name === word)?.cells).find(Boolean) : undefined);
+    const found =
+      own ||
+      (['value', 'estimate', 'coefficient'].includes(name)
+        ? OF_VALUE.map(word => columns.find(other => other.name === word)?.cells).find(Boolean)
+        : undefined);
     return found?.map(cell => (isSpread(cell) ? cell : undefined));
   });
 }

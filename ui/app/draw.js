@@ -4,12 +4,29 @@ import { ascends, below } from './scale.js';
 import { colouring } from './palette.js';
 
 const MARKERS = {
-  circle: 'm-3 0a3 3 0 1 0 6 0a3 3 0 1 0-6 0', square: 'm-3-3h6v6h-6z', diamond: 'm0-4l4 4l-4 4l-4-4z', triangle: 'm0-4l3.8 6.5h-7.6z',
-  down: 'm0 4l3.8-6.5h-7.6z', plus: 'm-4 0h8m-4-4v8', cross: 'm-3-3l6 6m0-6l-6 6', bar: 'm0-4v8',
+  circle: 'm-3 0a3 3 0 1 0 6 0a3 3 0 1 0-6 0',
+  square: 'm-3-3h6v6h-6z',
+  diamond: 'm0-4l4 4l-4 4l-4-4z',
+  triangle: 'm0-4l3.8 6.5h-7.6z',
+  down: 'm0 4l3.8-6.5h-7.6z',
+  plus: 'm-4 0h8m-4-4v8',
+  cross: 'm-3-3l6 6m0-6l-6 6',
+  bar: 'm0-4v8',
 };
 const BY_ROLE = {
-  nominal: 'plus', before: 'cross', after: 'square', command: 'diamond', comparison: 'triangle', part: 'circle', stock: 'circle', tolerance: 'bar',
-  uncertainty: 'bar', limit: 'bar', stable: 'circle', unstable: 'cross', plain: 'circle',
+  nominal: 'plus',
+  before: 'cross',
+  after: 'square',
+  command: 'diamond',
+  comparison: 'triangle',
+  part: 'circle',
+  stock: 'circle',
+  tolerance: 'bar',
+  uncertainty: 'bar',
+  limit: 'bar',
+  stable: 'circle',
+  unstable: 'cross',
+  plain: 'circle',
 };
 const SERIES = ['circle', 'square', 'triangle', 'diamond', 'cross', 'plus', 'bar', 'down'];
 const VARIANTS = 6;
@@ -80,7 +97,10 @@ const widthOf = text => [...text].reduce((sum, letter) => sum + (/[а-яёА-Я�
 function sharesOf(panel, item) {
   const ribbons = panel.items.filter(({ kind }) => kind === 'ribbon');
   return item.x.map(from => {
-    const here = ribbons.map(one => ({ name: one.name, weight: one.weight[one.x.indexOf(from)] })).filter(({ weight }) => weight > 0).sort((a, b) => b.weight - a.weight);
+    const here = ribbons
+      .map(one => ({ name: one.name, weight: one.weight[one.x.indexOf(from)] }))
+      .filter(({ weight }) => weight > 0)
+      .sort((a, b) => b.weight - a.weight);
     const sum = here.reduce((total, { weight }) => total + weight, 0);
     const raised = here.map(({ weight }) => Math.max(weight / sum, LEAST_SHARE));
     const whole = raised.reduce((total, share) => total + share, 0);
@@ -98,7 +118,9 @@ export function stretchAt(item, x) {
 
 function ribbon(panel, item, { x, frame, id }, look, ghost) {
   // A run that is compared lies as a strip below the present one.
-  const [top, height] = ghost ? [frame.top + frame.height * 0.74, frame.height * 0.26] : [frame.top, frame.height * (frame.hasGhost ? 0.7 : 1)];
+  const [top, height] = ghost
+    ? [frame.top + frame.height * 0.74, frame.height * 0.26]
+    : [frame.top, frame.height * (frame.hasGhost ? 0.7 : 1)];
   const shares = sharesOf(panel, item);
   return item.x.map((from, index) => {
     const [left, right] = [x(from), x(item.x_end[index])];
@@ -114,7 +136,8 @@ function ribbon(panel, item, { x, frame, id }, look, ghost) {
 }
 
 /** A piece of a ribbon with its letter, for a legend. */
-export const ribbonSample = (item, look, id) => html`<rect class=${`ribbon ${look}`} x="1" y="1" width="26" height="12" />${weaveOf(item.role) > 0 && html`<rect class="weave" fill=${`url(#${id}-${weaveOf(item.role)})`} x="1" y="1" width="26" height="12" />`}<text class="said" x="14" y="11" text-anchor="middle">${letterOf(item.role)}</text>`;
+export const ribbonSample = (item, look, id) =>
+  html`<rect class=${`ribbon ${look}`} x="1" y="1" width="26" height="12" />${weaveOf(item.role) > 0 && html`<rect class="weave" fill=${`url(#${id}-${weaveOf(item.role)})`} x="1" y="1" width="26" height="12" />`}<text class="said" x="14" y="11" text-anchor="middle">${letterOf(item.role)}</text>`;
 
 const px = value => Math.round(value * 10) / 10;
 
@@ -124,7 +147,10 @@ export function linePath(xs, ys, place, width) {
   let pen = false;
   const put = (x, y) => {
     const [h, v] = place(x, y);
-    if (!Number.isFinite(h) || !Number.isFinite(v)) { pen = false; return; }
+    if (!Number.isFinite(h) || !Number.isFinite(v)) {
+      pen = false;
+      return;
+    }
     path += `${pen ? 'L' : 'M'}${px(h)} ${px(v)}`;
     pen = true;
   };
@@ -152,13 +178,18 @@ export function linePath(xs, ys, place, width) {
       index += 1;
     }
     if (gap) pen = false;
-    if (low !== null) for (const at of [...new Set([first, low, high, index - 1])].sort((a, b) => a - b)) if (ys[at] !== null) put(xs[at], ys[at]);
+    if (low !== null)
+      for (const at of [...new Set([first, low, high, index - 1])].sort((a, b) => a - b)) if (ys[at] !== null) put(xs[at], ys[at]);
   }
   return path;
 }
 
 function ring(xs, ys, place) {
-  return xs.map((x, index) => place(x, ys[index])).filter(point => point.every(Number.isFinite)).map(([h, v], index) => `${index ? 'L' : 'M'}${px(h)} ${px(v)}`).join('');
+  return xs
+    .map((x, index) => place(x, ys[index]))
+    .filter(point => point.every(Number.isFinite))
+    .map(([h, v], index) => `${index ? 'L' : 'M'}${px(h)} ${px(v)}`)
+    .join('');
 }
 
 /** Where the middles of neighbouring columns meet. */
@@ -223,18 +254,28 @@ function glyph(item, place, { mirrored, turn = 0, reach = 12 }) {
   return html`<g class="glyph" transform=${`translate(${px(h)} ${px(v)}) rotate(${turn}) scale(${across} ${up})`}>${shape}</g>`;
 }
 
-const has = (item, x) => { const at = below(item.x, x); return item.x[at] === x && item.y[at] !== null; };
+const has = (item, x) => {
+  const at = below(item.x, x);
+  return item.x[at] === x && item.y[at] !== null;
+};
 
 /** The least distance of neighbouring bars of a panel, all names together, by `place`; 0 where there is one abscissa. */
 export function barStep(panel, place = x => x) {
-  const places = [...new Set(panel.items.filter(({ kind }) => kind === 'bars').flatMap(item => item.x.filter((_, at) => item.y[at] !== null)))].map(place).sort((a, b) => a - b);
+  const places = [
+    ...new Set(panel.items.filter(({ kind }) => kind === 'bars').flatMap(item => item.x.filter((_, at) => item.y[at] !== null))),
+  ]
+    .map(place)
+    .sort((a, b) => a - b);
   const steps = places.slice(1).map((one, at) => one - places[at]);
   return steps.length > 0 ? Math.min(...steps) : 0;
 }
 
 /** More points than these are drawn small: they stand for a curve. */
 const DENSE = 150;
-const smaller = marker => (marker === MARKERS.circle ? 'm-1.5 0a1.5 1.5 0 1 0 3 0a1.5 1.5 0 1 0-3 0' : marker.replace(/-?\d*\.?\d+/g, number => `${Number(number) * 0.5} `));
+const smaller = marker =>
+  marker === MARKERS.circle
+    ? 'm-1.5 0a1.5 1.5 0 1 0 3 0a1.5 1.5 0 1 0-3 0'
+    : marker.replace(/-?\d*\.?\d+/g, number => `${Number(number) * 0.5} `);
 export const markerOf = item => (item.x.length > DENSE ? smaller(role(item.role).marker) : role(item.role).marker);
 
 /** @typedef {{ style: (item: any) => string, hidden: Set<string>, ghost?: boolean }} Look */
@@ -247,37 +288,53 @@ export function items(panel, plane, { style, hidden, ghost }) {
     if (item.name && hidden.has(item.name)) return null;
     const look = `${style(item)}${ghost ? ' ghost' : ''}`;
     switch (item.kind) {
-      case 'line': return html`<path key=${index} class=${`line ${look}`} d=${linePath(item.x, item.y, place, frame.width)} />`;
+      case 'line':
+        return html`<path key=${index} class=${`line ${look}`} d=${linePath(item.x, item.y, place, frame.width)} />`;
       case 'band': {
         const edge = ring([...item.x, ...[...item.x].reverse()], [...item.upper, ...[...item.lower].reverse()], place);
-        const lines = [item.upper, item.lower].map(side => html`<path class=${`edge ${look}`} d=${linePath(item.x, side, place, frame.width)} />`);
+        const lines = [item.upper, item.lower].map(
+          side => html`<path class=${`edge ${look}`} d=${linePath(item.x, side, place, frame.width)} />`,
+        );
         return html`<g key=${index}><path class=${`band ${look}`} d=${`${edge}z`} />${lines}</g>`;
       }
       case 'points': {
         const marker = markerOf(item);
-        const d = item.x.map((value, at) => place(value, item.y[at])).filter(point => point.every(Number.isFinite)).map(([h, v]) => `M${px(h)} ${px(v)}${marker}`).join('');
+        const d = item.x
+          .map((value, at) => place(value, item.y[at]))
+          .filter(point => point.every(Number.isFinite))
+          .map(([h, v]) => `M${px(h)} ${px(v)}${marker}`)
+          .join('');
         return html`<path key=${index} class=${`points ${look}`} d=${d} />`;
       }
       case 'bars': {
         if (ghost && !x) return null;
         const whole = Math.min(barStep(panel, x) * 0.8 || frame.width / 4, 60);
         const zero = y.spacing === 'logarithmic' ? frame.top + frame.height : Math.min(Math.max(y(0), frame.top), frame.top + frame.height);
-        const d = item.x.map((value, place_) => {
-          if (item.y[place_] === null || !Number.isFinite(y(item.y[place_]))) return '';
-          // Those of several names over one abscissa stand side by side.
-          const here = barNames.filter(name => panel.items.some(other => other.kind === 'bars' && other.name === name && has(other, value)));
-          const width = Math.max(whole / here.length, 1);
-          const left = x(value) - whole / 2 + here.indexOf(item.name) * width;
-          const tip = y(item.y[place_]);
-          return `M${px(left)} ${px(zero)}V${px(tip)}h${px(width * 0.94)}V${px(zero)}z`;
-        }).join('');
+        const d = item.x
+          .map((value, place_) => {
+            if (item.y[place_] === null || !Number.isFinite(y(item.y[place_]))) return '';
+            // Those of several names over one abscissa stand side by side.
+            const here = barNames.filter(name =>
+              panel.items.some(other => other.kind === 'bars' && other.name === name && has(other, value)),
+            );
+            const width = Math.max(whole / here.length, 1);
+            const left = x(value) - whole / 2 + here.indexOf(item.name) * width;
+            const tip = y(item.y[place_]);
+            return `M${px(left)} ${px(zero)}V${px(tip)}h${px(width * 0.94)}V${px(zero)}z`;
+          })
+          .join('');
         return html`<path key=${index} class=${`bars ${look}`} d=${d} />`;
       }
-      case 'heat_map': return ghost || !x ? null : html`<g key=${index}>${mapImage(item, x, y, frame)}</g>`;
-      case 'ribbon': return x ? html`<g key=${index}>${ribbon(panel, item, plane, look, ghost)}</g>` : null;
-      case 'outline': return html`<path key=${index} class=${`outline ${look}`} d=${`${ring(item.x, item.y, place)}z`} />`;
-      case 'glyph': return ghost ? null : html`<g key=${index}>${glyph(item, place, stance(item))}</g>`;
-      default: return null;
+      case 'heat_map':
+        return ghost || !x ? null : html`<g key=${index}>${mapImage(item, x, y, frame)}</g>`;
+      case 'ribbon':
+        return x ? html`<g key=${index}>${ribbon(panel, item, plane, look, ghost)}</g>` : null;
+      case 'outline':
+        return html`<path key=${index} class=${`outline ${look}`} d=${`${ring(item.x, item.y, place)}z`} />`;
+      case 'glyph':
+        return ghost ? null : html`<g key=${index}>${glyph(item, place, stance(item))}</g>`;
+      default:
+        return null;
     }
   });
 }

@@ -15,7 +15,8 @@ export function followed(job, filled, moved) {
 }
 
 /** The settings of a figure, each with the index of its panel. */
-export const settingsOf = figure => figure.panels.flatMap(({ items }, panel) => items.filter(({ kind }) => kind === 'setting').map(setting => ({ ...setting, panel })));
+export const settingsOf = figure =>
+  figure.panels.flatMap(({ items }, panel) => items.filter(({ kind }) => kind === 'setting').map(setting => ({ ...setting, panel })));
 
 /** What a place is in a request. */
 export const placeOf = (figure, setting, x, y = 0) => ({ figure: figure.id, setting: setting.name, x, y });
@@ -33,7 +34,12 @@ export class Places {
 
   /** The job that stands there, made of what was asked with the answer shown. */
   async jobAt(place, signal) {
-    const { service, state: { answer: { key, job } } } = this.desk;
+    const {
+      service,
+      state: {
+        answer: { key, job },
+      },
+    } = this.desk;
     if (this.filled?.key !== key) this.filled = { key, job: service.jobOf(key) };
     const [filled, moved] = await Promise.all([this.filled.job, service.jobAt(key, place, signal)]);
     return followed(job, filled.job, moved.job);
@@ -54,6 +60,8 @@ export class Places {
         if (difference(job, moved).length > 0) this.desk.change(moved, then);
         else if (then === 'run' && this.desk.state.waiting) this.desk.ask(job, 'run');
       }
-    } finally { this.isBusy = false; }
+    } finally {
+      this.isBusy = false;
+    }
   }
 }

@@ -40,7 +40,16 @@ export function rangeText(schema) {
 
 export const defaultText = schema => {
   if (schema.default === undefined || schema.default === null || typeof schema.default === 'object') return '';
-  return t('default_is', { value: typeof schema.default === 'number' ? number(schema.default) : schema.default === true ? t('yes') : schema.default === false ? t('no') : wordOf(schema, schema.default) });
+  return t('default_is', {
+    value:
+      typeof schema.default === 'number'
+        ? number(schema.default)
+        : schema.default === true
+          ? t('yes')
+          : schema.default === false
+            ? t('no')
+            : wordOf(schema, schema.default),
+  });
 };
 
 /** What shows its meaning while it is pointed at, and while it is edited. */
@@ -49,7 +58,10 @@ export function explained(context, id, help) {
   return {
     onMouseEnter: () => context.pointAt(id),
     onMouseLeave: () => context.pointAt(null),
-    onFocusIn: () => { context.pointAt(null); context.focusOn(id); },
+    onFocusIn: () => {
+      context.pointAt(null);
+      context.focusOn(id);
+    },
   };
 }
 
@@ -61,7 +73,10 @@ export function Row({ name, schema, path, value, required, context, control: Con
   const filled = value === undefined ? context.filledAt(path) : undefined;
   const own = defaultText(schema);
   // A number that the service takes from elsewhere says from where.
-  const from = typeof filled === 'number' && filled !== schema.default ? `${number(filled)} ${unitOf(schema)}: ${context.sourceAt(path)}`.replace(/ +:/, ':') : '';
+  const from =
+    typeof filled === 'number' && filled !== schema.default
+      ? `${number(filled)} ${unitOf(schema)}: ${context.sourceAt(path)}`.replace(/ +:/, ':')
+      : '';
   const description = spoken([schema.description, own, from].filter(Boolean).join(' '), context.names);
   const allowed = kindOf(schema) === 'number' ? rangeText(schema) : '';
   const origin = value === undefined ? context.originAt(path) : undefined;
@@ -70,7 +85,11 @@ export function Row({ name, schema, path, value, required, context, control: Con
   const [wrong, setWrong] = useState(null);
   const unit = unitOf(schema);
   const common = {
-    id, schema, value, context, label,
+    id,
+    schema,
+    value,
+    context,
+    label,
     set: (part, how) => context.set(path, part, how),
     setWrong,
     filled: context.filledAt(path),
@@ -134,7 +153,10 @@ export function useNumber({ id, schema, value, required, set, onFault }) {
     setDraft(null);
     if (wrong.current) say(null);
   };
-  const put = next => { drop(); if (!Object.is(next, value)) set(next, 'typing'); };
+  const put = next => {
+    drop();
+    if (!Object.is(next, value)) set(next, 'typing');
+  };
   useEffect(() => () => mark(id, false), [id]);
   // The value may change under a draft: by the way back, by a click in the picture.
   useEffect(() => {
@@ -149,7 +171,9 @@ export function useNumber({ id, schema, value, required, set, onFault }) {
       say(found.fault ? { ...found, choose: put } : null);
       if (!found.fault && !Object.is(found.value ?? undefined, value)) set(found.value ?? undefined, 'typing');
     },
-    leave: () => { if (!wrong.current) setDraft(null); },
+    leave: () => {
+      if (!wrong.current) setDraft(null);
+    },
     put,
     key: event => {
       if (event.key !== 'ArrowUp' && event.key !== 'ArrowDown') return;
@@ -171,7 +195,16 @@ export function NumberInput({ id, schema, value, filled, set, setWrong, describe
     <label for=${id} class="label draggable" ...${drag}>${label}</label>
     <span class="control"><input id=${id} type="text" inputmode="decimal" autocomplete="off" spellcheck=${false} value=${shown} placeholder=${placeholder} title=${rangeText(schema)}
       disabled=${context.disabled} aria-describedby=${described} aria-invalid=${invalid ? 'true' : undefined} aria-required=${required ? 'true' : undefined}
-      onInput=${event => take(event.currentTarget.value)} onBlur=${() => { setFocused(false); leave(); }} onKeyDown=${key} onFocus=${event => { const field = event.currentTarget; setFocused(true); setTimeout(() => { if (document.activeElement === field) field.select(); }, 0); }} /></span>
+      onInput=${event => take(event.currentTarget.value)} onBlur=${() => {
+        setFocused(false);
+        leave();
+      }} onKeyDown=${key} onFocus=${event => {
+        const field = event.currentTarget;
+        setFocused(true);
+        setTimeout(() => {
+          if (document.activeElement === field) field.select();
+        }, 0);
+      }} /></span>
     <span class=${`unit ${unit.length > LONG_UNIT ? 'long' : ''}`} aria-hidden="true">${unit}</span>`;
 }
 
@@ -195,8 +228,16 @@ function useDrag(value, schema, set) {
       const limited = Math.min(Math.max(raw, low ?? -Infinity), high ?? Infinity);
       set(schema.type === 'integer' ? Math.round(limited) : Number(limited.toPrecision(3)));
     },
-    onPointerUp: () => { start.current = start.current?.moved ? { done: true } : null; if (start.current) setTimeout(() => { start.current = null; }, 0); },
-    onClick: event => { if (start.current?.done) event.preventDefault(); },
+    onPointerUp: () => {
+      start.current = start.current?.moved ? { done: true } : null;
+      if (start.current)
+        setTimeout(() => {
+          start.current = null;
+        }, 0);
+    },
+    onClick: event => {
+      if (start.current?.done) event.preventDefault();
+    },
   };
 }
 

@@ -35,6 +35,8 @@ const TABLE_ROWS = 120;
 
 /** A shop tablet, a small window: every line of its height counts. */
 export const isLowScreen = () => innerWidth > 860 && innerHeight < 700;
+/** A phone: the form and the picture are two panes. */
+const isNarrow = () => innerWidth <= 860;
 
 function paperHeight({ frame, panels }) {
   const letters = selector => document.querySelector(selector)?.textContent.length || 0;
@@ -73,15 +75,17 @@ function useScheme() {
 export function differenceOf(figure, other) {
   const panels = figure.panels.map((panel, index) => {
     const twins = other.panels[index]?.items || [];
-    const lines = panel.items.filter(item => item.kind === 'line' || item.kind === 'bars').flatMap(item => {
-      const twin = twins.find(candidate => candidate.kind === item.kind && candidate.name === item.name);
-      if (!twin) return [];
-      const y = item.x.map((x, at) => {
-        const before = valueAt(twin.x, twin.y, x, item.kind === 'line');
-        return item.y[at] === null || before === null || before === undefined ? null : item.y[at] - before;
+    const lines = panel.items
+      .filter(item => item.kind === 'line' || item.kind === 'bars')
+      .flatMap(item => {
+        const twin = twins.find(candidate => candidate.kind === item.kind && candidate.name === item.name);
+        if (!twin) return [];
+        const y = item.x.map((x, at) => {
+          const before = valueAt(twin.x, twin.y, x, item.kind === 'line');
+          return item.y[at] === null || before === null || before === undefined ? null : item.y[at] - before;
+        });
+        return [{ ...item, y }];
       });
-      return [{ ...item, y }];
-    });
     return { ...panel, y: { ...panel.y, scale: 'linear', text: `Δ ${panel.y.text}` }, items: lines };
   });
   return { ...figure, panels: panels.filter(panel => panel.items.length > 0) };
@@ -89,7 +93,8 @@ export function differenceOf(figure, other) {
 
 /** The smallest part of an axis that is shown, a share of the whole: its numbers can still be told apart. */
 const LEAST_PART = 1e-4;
-const bent = kind => (kind === 'logarithmic' ? { bend: Math.log10, straight: value => 10 ** value } : { bend: value => value, straight: value => value });
+const bent = kind =>
+  kind === 'logarithmic' ? { bend: Math.log10, straight: value => 10 ** value } : { bend: value => value, straight: value => value };
 
 /** A part of an axis as it can be shown: with its ends inside the whole, and not too small; `null` for the whole. */
 function partOf(ends, full, kind) {
@@ -106,16 +111,21 @@ function partOf(ends, full, kind) {
 function zoomed(shown, about, factor, full, kind) {
   const { bend, straight } = bent(kind);
   const middle = bend(about);
-  return partOf(shown.map(end => straight(middle + (bend(end) - middle) * factor)), full, kind);
+  return partOf(
+    shown.map(end => straight(middle + (bend(end) - middle) * factor)),
+    full,
+    kind,
+  );
 }
 
 /** Places along an axis at which a cross may stand where nothing is drawn that has places of its own. */
 const CROSS_STEPS = 60;
-const evenly = (ends, isLog) => Array.from({ length: CROSS_STEPS + 1 }, (_, index) => {
-  const [low, high] = ends;
-  const share = index / CROSS_STEPS;
-  return isLog ? low * (high / low) ** share : low + (high - low) * share;
-});
+const evenly = (ends, isLog) =>
+  Array.from({ length: CROSS_STEPS + 1 }, (_, index) => {
+    const [low, high] = ends;
+    const share = index / CROSS_STEPS;
+    return isLog ? low * (high / low) ** share : low + (high - low) * share;
+  });
 
 /** The picture. `onPut(setting, x, y, how)` puts a setting of it elsewhere, `trial` is where one is tried along a curve,
  *  `{ x, move(x) }`; `onHold(handle)` where its handles can be pulled, giving `{ move(place), drop() }`; `effect` says what
@@ -128,7 +138,9 @@ export function Picture({ figure, pinned, height: screenHeight = 460, onPut, tri
   const isPrinting = usePrinting();
   const [paper, setPaper] = useState(LEAST_PAPER);
   // After what else changes on paper: all warnings are there then.
-  useLayoutEffect(() => { if (isPrinting) queueMicrotask(() => setPaper(paperHeight(figure))); }, [isPrinting]);
+  useLayoutEffect(() => {
+    if (isPrinting) queueMicrotask(() => setPaper(paperHeight(figure)));
+  }, [isPrinting]);
   const [width, height] = isPrinting ? [PAPER_WIDTH, paper] : [screenWidth, screenHeight];
   const [view, setView] = useState(null);
   const [at, setAt] = useState(null);
@@ -140,13 +152,18 @@ export function Picture({ figure, pinned, height: screenHeight = 460, onPut, tri
   const [tabled, setTabled] = useState(false);
   useScheme();
   const id = useMemo(() => unique('picture'), []);
-  useEffect(() => { setView(null); setAt(null); setOver(null); }, [figure.id]);
+  useEffect(() => {
+    setView(null);
+    setAt(null);
+    setOver(null);
+  }, [figure.id]);
   const style = useMemo(() => styles(figure), [figure]);
-  const toggle = name => setHidden(old => {
-    const next = new Set(old);
-    if (!next.delete(name)) next.add(name);
-    return next;
-  });
+  const toggle = name =>
+    setHidden(old => {
+      const next = new Set(old);
+      if (!next.delete(name)) next.add(name);
+      return next;
+    });
   const isPolar = figure.frame === 'polar';
   const full = useMemo(() => {
     const span = extent([...abscissae(figure), ...(pinned ? abscissae(pinned) : [])], figure.x.scale);
@@ -162,7 +179,10 @@ export function Picture({ figure, pinned, height: screenHeight = 460, onPut, tri
   const map = isPolar ? null : figure.panels.flatMap(panel => panel.items).find(item => item.kind === 'heat_map');
   const samples = useMemo(() => {
     if (map || onPick) return map ? map.x : evenly(full, figure.x.scale === 'logarithmic');
-    const longest = figure.panels.flatMap(panel => panel.items).filter(item => ['line', 'bars', 'points'].includes(item.kind)).sort((a, b) => b.x.length - a.x.length)[0];
+    const longest = figure.panels
+      .flatMap(panel => panel.items)
+      .filter(item => ['line', 'bars', 'points'].includes(item.kind))
+      .sort((a, b) => b.x.length - a.x.length)[0];
     return longest ? [...new Set(longest.x)].sort((a, b) => a - b) : [];
   }, [figure]);
 
@@ -176,11 +196,20 @@ export function Picture({ figure, pinned, height: screenHeight = 460, onPut, tri
     if (samples.length === 0) return;
     const inside = samples.filter(x => x >= shown[0] && x <= shown[1]);
     if (inside.length === 0) return;
-    const now = at === null ? (handle && isPlane ? inside.findIndex(x => x >= handle.x) : Math.floor(inside.length / 2)) : inside.findIndex(x => x >= at - 1e-12 * Math.abs(at));
+    const now =
+      at === null
+        ? handle && isPlane
+          ? inside.findIndex(x => x >= handle.x)
+          : Math.floor(inside.length / 2)
+        : inside.findIndex(x => x >= at - 1e-12 * Math.abs(at));
     const stride = far ? Math.max(1, Math.round(inside.length / 10)) : Math.max(1, Math.round(inside.length / 200));
     const next = inside[Math.min(Math.max((now < 0 ? inside.length - 1 : now) + count * stride, 0), inside.length - 1)];
     setAt(next);
-    setSpoken(readings(figure, next, over).map(({ text, value, unit }) => `${text} ${number(value, 4)} ${unit}`).join('; '));
+    setSpoken(
+      readings(figure, next, over)
+        .map(({ text, value, unit }) => `${text} ${number(value, 4)} ${unit}`)
+        .join('; '),
+    );
   };
   // Up and down: the cross of a map, or of a picture in which a point can be tried.
   const rise = (count, far) => {
@@ -192,32 +221,69 @@ export function Picture({ figure, pinned, height: screenHeight = 460, onPut, tri
     const next = rows[Math.min(Math.max(now + count * (far ? 5 : 1), 0), rows.length - 1)];
     if (at === null) setAt(handle?.x ?? samples[Math.floor(samples.length / 2)]);
     setOver(next);
-    setSpoken(readings(figure, at, next).map(({ text, value, unit }) => `${text} ${number(value, 4)} ${unit}`).join('; '));
+    setSpoken(
+      readings(figure, at, next)
+        .map(({ text, value, unit }) => `${text} ${number(value, 4)} ${unit}`)
+        .join('; '),
+    );
   };
   const isPlane = Boolean(map || (onPick && !isPolar));
   const key = event => {
-    const plane = isPlane ? { ArrowUp: () => rise(1, event.shiftKey), ArrowDown: () => rise(-1, event.shiftKey), Enter: () => { if (onPick && at !== null && over !== null) onPick(at, over); } } : {};
-    const act = { ...plane, ArrowLeft: () => step(-1, event.shiftKey), ArrowRight: () => step(1, event.shiftKey), Home: () => { setAt(shown[0]); }, End: () => { setAt(shown[1]); }, '+': () => zoom(0.5), '=': () => zoom(0.5), '-': () => zoom(2), 0: () => setView(null), Escape: () => { setAt(null); setOver(null); setView(null); } }[event.key];
+    const plane = isPlane
+      ? {
+          ArrowUp: () => rise(1, event.shiftKey),
+          ArrowDown: () => rise(-1, event.shiftKey),
+          Enter: () => {
+            if (onPick && at !== null && over !== null) onPick(at, over);
+          },
+        }
+      : {};
+    const act = {
+      ...plane,
+      ArrowLeft: () => step(-1, event.shiftKey),
+      ArrowRight: () => step(1, event.shiftKey),
+      Home: () => {
+        setAt(shown[0]);
+      },
+      End: () => {
+        setAt(shown[1]);
+      },
+      '+': () => zoom(0.5),
+      '=': () => zoom(0.5),
+      '-': () => zoom(2),
+      0: () => setView(null),
+      Escape: () => {
+        setAt(null);
+        setOver(null);
+        setView(null);
+      },
+    }[event.key];
     if (!act || event.ctrlKey || event.metaKey || event.altKey || event.target !== event.currentTarget) return;
     event.preventDefault();
     act();
   };
-  const least = isLowScreen() || isPrinting ? LOW.polar : LEAST_POLAR;
+  const least = isLowScreen() || isNarrow() || isPrinting ? LOW.polar : LEAST_POLAR;
   const common = { figure, pinned, width, style, hidden, toggle, at, over: isPlane ? over : null, shown, view, height, isPrinting, effect };
   const tools = html`
     <div class="tools" role="group" aria-label=${t('picture_tools')}>
-      ${!isPolar && html`<button type="button" class="icon" aria-label=${t('zoom_in')} title=${t('zoom_in')} onClick=${() => zoom(0.5)}>+</button>
+      ${
+        !isPolar &&
+        html`<button type="button" class="icon" aria-label=${t('zoom_in')} title=${t('zoom_in')} onClick=${() => zoom(0.5)}>+</button>
       <button type="button" class="icon" aria-label=${t('zoom_out')} title=${t('zoom_out')} disabled=${!view} onClick=${() => zoom(2)}>−</button>
-      <button type="button" class="icon" aria-label=${t('zoom_reset')} title=${t('zoom_reset')} disabled=${!view} onClick=${() => setView(null)}>⤢</button>`}
+      <button type="button" class="icon" aria-label=${t('zoom_reset')} title=${t('zoom_reset')} disabled=${!view} onClick=${() => setView(null)}>⤢</button>`
+      }
       <button type="button" class="icon" aria-label=${t('as_table')} title=${t('as_table')} aria-pressed=${tabled} onClick=${() => setTabled(!tabled)}>▤</button>
     </div>`;
   return html`
     <figure class=${`picture ${main ? 'main' : ''}`} aria-labelledby=${`${id}-title`}>
       <figcaption><h2 id=${`${id}-title`}>${figure.title.text}</h2>${tools}</figcaption>
       <div ref=${ref} class="plot" tabindex="0" role="application" aria-label=${`${figure.title.text}. ${t('picture_keys')}${onPick ? ` ${t('pick_keys')}` : ''}`} onKeyDown=${key}>
-        ${width > 0 && (isPolar
-          ? html`<${Polar} ...${common} ...${{ least, setAt, onPut }} />`
-          : html`<${Stacked} ...${common} ...${{ full, setAt, setOver, setView, drag, setDrag, onPick, handle, onHold }} />`)}
+        ${
+          width > 0 &&
+          (isPolar
+            ? html`<${Polar} ...${common} ...${{ least, setAt, onPut }} />`
+            : html`<${Stacked} ...${common} ...${{ full, setAt, setOver, setView, drag, setDrag, onPick, handle, onHold }} />`)
+        }
       </div>
       <p class="hidden" role="status">${spoken}</p>
       ${tabled && html`<${Numbers} figure=${figure} samples=${samples} />`}
@@ -248,25 +314,57 @@ function readings(figure, x, y = null) {
 function Numbers({ figure, samples }) {
   const stride = Math.max(1, Math.ceil(samples.length / TABLE_ROWS));
   const xs = samples.filter((_, index) => index % stride === 0);
-  const columns = figure.panels.flatMap(panel => panel.items.filter(item => ['line', 'bars', 'points', 'ribbon'].includes(item.kind)).map(item => ({ item, unit: panel.y.unit })));
+  const columns = figure.panels.flatMap(panel =>
+    panel.items.filter(item => ['line', 'bars', 'points', 'ribbon'].includes(item.kind)).map(item => ({ item, unit: panel.y.unit })),
+  );
   if (columns.length === 0) return html`<p class="quiet">${t('see_tables')}</p>`;
   return html`
     <div class="grid-scroll numbers" tabindex="0" role="region" aria-label=${figure.title.text}><table class="grid still">
       <thead><tr><th scope="col">${figure.x.text} <span class="unit">${unitSymbol(figure.x.unit)}</span></th>${columns.map(({ item, unit }) => html`<th scope="col">${item.text} <span class="unit">${unitSymbol(unit)}</span></th>`)}</tr></thead>
-      <tbody>${xs.map(x => html`<tr key=${x}><th scope="row">${number(x, 6)}</th>${columns.map(({ item }) => {
-        const value = item.kind === 'ribbon' ? stretchAt(item, x)?.weight : valueAt(item.x, item.y, x, item.kind === 'line');
-        return html`<td>${value === null || value === undefined ? '' : number(value, 5)}</td>`;
-      })}</tr>`)}</tbody>
+      <tbody>${xs.map(
+        x =>
+          html`<tr key=${x}><th scope="row">${number(x, 6)}</th>${columns.map(({ item }) => {
+            const value = item.kind === 'ribbon' ? stretchAt(item, x)?.weight : valueAt(item.x, item.y, x, item.kind === 'line');
+            return html`<td>${value === null || value === undefined ? '' : number(value, 5)}</td>`;
+          })}</tr>`,
+      )}</tbody>
     </table></div>`;
 }
 
 /** Panels under each other over one abscissa. */
-function Stacked({ figure, pinned, width, isPrinting, style, hidden, toggle, at, setAt, over, setOver, full, shown, view, setView, height, drag, setDrag, onPick, handle, onHold, effect }) {
+function Stacked({
+  figure,
+  pinned,
+  width,
+  isPrinting,
+  style,
+  hidden,
+  toggle,
+  at,
+  setAt,
+  over,
+  setOver,
+  full,
+  shown,
+  view,
+  setView,
+  height,
+  drag,
+  setDrag,
+  onPick,
+  handle,
+  onHold,
+  effect,
+}) {
   const shares = figure.panels.reduce((sum, panel) => sum + panel.height, 0) || 1;
   const ghosts = figure.panels.map((_, index) => pinned?.panels[index] || null);
   const visible = figure.panels.map(panel => ({ ...panel, items: panel.items.filter(item => !item.name || !hidden.has(item.name)) }));
   const isMany = visible.length >= MANY_PANELS;
-  const least = isPrinting ? { panel: LEAST_ON_PAPER, ofMany: LEAST_ON_PAPER, ribbon: LEAST_RIBBON } : isLowScreen() ? LOW : { panel: LEAST_PANEL, ofMany: LEAST_OF_MANY, ribbon: LEAST_RIBBON };
+  const least = isPrinting
+    ? { panel: LEAST_ON_PAPER, ofMany: LEAST_ON_PAPER, ribbon: LEAST_RIBBON }
+    : isLowScreen()
+      ? LOW
+      : { panel: LEAST_PANEL, ofMany: LEAST_OF_MANY, ribbon: LEAST_RIBBON };
   // While a handle is pulled the axes stay as they are.
   const frozen = useRef(null);
   const panels = visible.map((panel, index) => {
@@ -301,14 +399,16 @@ function Stacked({ figure, pinned, width, isPrinting, style, hidden, toggle, at,
     return scale(panel.y.scale, domain, [6 + tall, 6]).back(v);
   };
   /** The point that can be dragged: its place in the first panel. */
-  const grip = handle && (() => {
-    const { panel, domain, tall } = panels[0];
-    const line = panel.items.find(item => item.kind === 'line');
-    const value = handle.y ?? (line ? valueAt(line.x, line.y, handle.x) : null);
-    const v = value === null || value === undefined ? NaN : scale(panel.y.scale, domain, [6 + tall, 6])(value);
-    const h = x(handle.x);
-    return h >= left && h <= right && v >= 0 && v <= 12 + tall ? [h, v] : null;
-  })();
+  const grip =
+    handle &&
+    (() => {
+      const { panel, domain, tall } = panels[0];
+      const line = panel.items.find(item => item.kind === 'line');
+      const value = handle.y ?? (line ? valueAt(line.x, line.y, handle.x) : null);
+      const v = value === null || value === undefined ? NaN : scale(panel.y.scale, domain, [6 + tall, 6])(value);
+      const h = x(handle.x);
+      return h >= left && h <= right && v >= 0 && v <= 12 + tall ? [h, v] : null;
+    })();
   const nearGrip = event => {
     if (!grip) return false;
     const svg = event.currentTarget.querySelector('svg[data-panel="0"]').getBoundingClientRect();
@@ -316,7 +416,10 @@ function Stacked({ figure, pinned, width, isPrinting, style, hidden, toggle, at,
   };
   // Held beside the state: a press and its release may come faster than a drawing.
   const held = useRef(null);
-  const hold = next => { held.current = next; setDrag(next); };
+  const hold = next => {
+    held.current = next;
+    setDrag(next);
+  };
   const move = event => {
     const { place, value } = where(event);
     setAt(value);
@@ -332,7 +435,10 @@ function Stacked({ figure, pinned, width, isPrinting, style, hidden, toggle, at,
     if (event.button !== 0 || event.target.closest('button')) return;
     const { place } = where(event);
     event.currentTarget.setPointerCapture(event.pointerId);
-    if (nearGrip(event)) { held.current = { grip: true, moved: false }; return; }
+    if (nearGrip(event)) {
+      held.current = { grip: true, moved: false };
+      return;
+    }
     hold({ from: place, to: place });
   };
   const up = event => {
@@ -345,7 +451,10 @@ function Stacked({ figure, pinned, width, isPrinting, style, hidden, toggle, at,
     }
     const ends = [held.current.from, held.current.to].sort((a, b) => a - b);
     hold(null);
-    if (ends[1] - ends[0] > 8) { setView(partOf(ends.map(x.back), full, figure.x.scale)); return; }
+    if (ends[1] - ends[0] > 8) {
+      setView(partOf(ends.map(x.back), full, figure.x.scale));
+      return;
+    }
     if (!onPick) return;
     onPick(where(event).value, spot(event));
   };
@@ -355,7 +464,12 @@ function Stacked({ figure, pinned, width, isPrinting, style, hidden, toggle, at,
     if (event.deltaY !== 0) setView(zoomed(shown, where(event).value, event.deltaY > 0 ? 1.25 : 0.8, full, figure.x.scale));
   };
   return html`
-    <div class=${`stack ${onPick ? 'pickable' : ''}`} onPointerMove=${move} onPointerDown=${down} onPointerUp=${up} onPointerCancel=${() => hold(null)} onPointerLeave=${() => { if (!held.current) { setAt(null); setOver(null); } }} onDblClick=${() => setView(null)} onWheel=${wheel}>
+    <div class=${`stack ${onPick ? 'pickable' : ''}`} onPointerMove=${move} onPointerDown=${down} onPointerUp=${up} onPointerCancel=${() => hold(null)} onPointerLeave=${() => {
+      if (!held.current) {
+        setAt(null);
+        setOver(null);
+      }
+    }} onDblClick=${() => setView(null)} onWheel=${wheel}>
       ${panels.map(({ panel, ghost, tall, domain, places, texts, factor, span }, index) => {
         const last = index === panels.length - 1;
         const own = panel.items.filter(item => item.kind === 'glyph');
@@ -366,8 +480,13 @@ function Stacked({ figure, pinned, width, isPrinting, style, hidden, toggle, at,
         const clip = `clip-${figure.id}-${index}`;
         const stance = item => {
           const outline = panel.items.find(other => other.kind === 'outline' && other.role === 'part');
-          const radius = outline ? Math.max(...outline.y.filter((_, place) => Math.abs(outline.x[place] - item.x) <= (shown[1] - shown[0]) / 50 + 1e-9), 0) : 0;
-          return { mirrored: item.glyph === 'chuck' ? item.x > (shown[0] + shown[1]) / 2 : item.y < 0, reach: Math.abs(y(0) - y(radius || domain[1] * 0.5)) };
+          const radius = outline
+            ? Math.max(...outline.y.filter((_, place) => Math.abs(outline.x[place] - item.x) <= (shown[1] - shown[0]) / 50 + 1e-9), 0)
+            : 0;
+          return {
+            mirrored: item.glyph === 'chuck' ? item.x > (shown[0] + shown[1]) / 2 : item.y < 0,
+            reach: Math.abs(y(0) - y(radius || domain[1] * 0.5)),
+          };
         };
         const plane = { x, y, frame, stance, id: `${clip}-weave`, place: (h, v) => [x(h), y(v)] };
         const cursor = at !== null && at >= shown[0] && at <= shown[1] ? x(at) : null;
@@ -384,23 +503,41 @@ function Stacked({ figure, pinned, width, isPrinting, style, hidden, toggle, at,
             </g>
             <rect class="frame" x=${left} y="6" width=${Math.max(1, right - left)} height=${tall} />
             <g class="tick-labels" text-anchor="end">${places.map((place, tick) => html`<text x=${left - 6} y=${y(place) + 4}>${texts[tick]}</text>`)}</g>
-            ${last && html`<g class="tick-labels" text-anchor="middle">${xPlaces.map((place, tick) => html`<text x=${Math.min(Math.max(x(place), 12), width - 3 - 3.4 * xLabels.texts[tick].length)} y=${tall + 22}>${xLabels.texts[tick]}</text>`)}</g>
-              <text class="x-name" x=${(left + right) / 2} y=${tall + 39} text-anchor="middle">${axisName(figure.x, xLabels.factor)}${at !== null ? ` = ${readDigits(at, shown[1] - shown[0])}` : ''}</text>`}
+            ${
+              last &&
+              html`<g class="tick-labels" text-anchor="middle">${xPlaces.map((place, tick) => html`<text x=${Math.min(Math.max(x(place), 12), width - 3 - 3.4 * xLabels.texts[tick].length)} y=${tall + 22}>${xLabels.texts[tick]}</text>`)}</g>
+              <text class="x-name" x=${(left + right) / 2} y=${tall + 39} text-anchor="middle">${axisName(figure.x, xLabels.factor)}${at !== null ? ` = ${readDigits(at, shown[1] - shown[0])}` : ''}</text>`
+            }
             ${drag && Math.abs(drag.to - drag.from) > 4 && html`<rect class="selection" x=${Math.min(drag.from, drag.to)} y="6" width=${Math.abs(drag.to - drag.from)} height=${tall} />`}
             ${over !== null && over >= domain[0] && over <= domain[1] && html`<path class="cursor" d=${`M${left} ${y(over).toFixed(1)}H${right}`} />`}
             ${index === 0 && grip && html`<circle class="reach" cx=${grip[0]} cy=${grip[1]} r="22" /><circle class="handle" cx=${grip[0]} cy=${grip[1]} r="7.5" />`}
-            ${cursor !== null && html`<path class="cursor" d=${`M${cursor.toFixed(1)} 6V${6 + tall}`} />
-              ${panel.items.filter(item => item.kind === 'line' && !hidden.has(item.name)).map(item => {
-                const v = valueAt(item.x, item.y, at);
-                const h = v === null || v === undefined ? NaN : y(v);
-                return h >= 5 && h <= 7 + tall ? html`<circle class=${`dot ${style(item)}`} cx=${cursor} cy=${h} r="3.4" />` : null;
-              })}`}
+            ${
+              cursor !== null &&
+              html`<path class="cursor" d=${`M${cursor.toFixed(1)} 6V${6 + tall}`} />
+              ${panel.items
+                .filter(item => item.kind === 'line' && !hidden.has(item.name))
+                .map(item => {
+                  const v = valueAt(item.x, item.y, at);
+                  const h = v === null || v === undefined ? NaN : y(v);
+                  return h >= 5 && h <= 7 + tall ? html`<circle class=${`dot ${style(item)}`} cx=${cursor} cy=${h} r="3.4" />` : null;
+                })}`
+            }
           </svg>
-          ${onHold && !isPrinting && html`<${Handles} ...${{ panel, axis: figure.x, x, y, frame, effect }} hold=${item => {
-            const { move: pull, drop } = onHold(item);
-            frozen.current = { index, domain, shown };
-            return { move: pull, drop: () => { frozen.current = null; drop(); } };
-          }} />`}</div>`;
+          ${
+            onHold &&
+            !isPrinting &&
+            html`<${Handles} ...${{ panel, axis: figure.x, x, y, frame, effect }} hold=${item => {
+              const { move: pull, drop } = onHold(item);
+              frozen.current = { index, domain, shown };
+              return {
+                move: pull,
+                drop: () => {
+                  frozen.current = null;
+                  drop();
+                },
+              };
+            }} />`
+          }</div>`;
       })}
     </div>`;
 }

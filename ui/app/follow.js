@@ -26,7 +26,9 @@ function followers(schema, value, root, path = []) {
   if (value === null || typeof value !== 'object' || kindOf(whole) === 'table') return [];
   if (Array.isArray(value)) return whole.items ? value.flatMap((item, index) => followers(whole.items, item, root, [...path, index])) : [];
   const shape = kindOf(whole) === 'choice' ? variantOf(variants(whole, root), value)?.schema : whole;
-  return Object.entries(value).flatMap(([name, part]) => (shape?.properties?.[name] ? followers(shape.properties[name], part, root, [...path, name]) : []));
+  return Object.entries(value).flatMap(([name, part]) =>
+    shape?.properties?.[name] ? followers(shape.properties[name], part, root, [...path, name]) : [],
+  );
 }
 
 /** The changed job with what stood at an end that moved still standing there. */

@@ -1,9 +1,39 @@
 // A form from a schema. Nothing here knows a calculator.
 import { html, useState, useEffect, useMemo, unique } from './lib.js';
 import { t, number, unitOf } from './text.js';
-import { resolve, namesOf, kindOf, variants, variantOf, memberOf, variantName, blank, kept, labelOf, wordOf, spoken, pointer, at, changed } from './schema.js';
+import {
+  resolve,
+  namesOf,
+  kindOf,
+  variants,
+  variantOf,
+  memberOf,
+  variantName,
+  blank,
+  kept,
+  labelOf,
+  wordOf,
+  spoken,
+  pointer,
+  at,
+  changed,
+} from './schema.js';
 import { runsOf } from './table-file.js';
-import { fieldId, isLeaf, mark, explained, FieldSymbol, Faults, Row, NumberInput, TextInput, Enum, Switch, Library, ModelChoice } from './fields.js';
+import {
+  fieldId,
+  isLeaf,
+  mark,
+  explained,
+  FieldSymbol,
+  Faults,
+  Row,
+  NumberInput,
+  TextInput,
+  Enum,
+  Switch,
+  Library,
+  ModelChoice,
+} from './fields.js';
 import { List, MapFields } from './lists.js';
 import { TableInput } from './table-input.js';
 import { forget, isSame, keep, ownName, useKept } from './mine.js';
@@ -27,9 +57,13 @@ class Context {
     this.helps = new Map();
   }
   /** What the service filled in where nothing was given. */
-  filledAt(path) { return this.filled ? at(this.filled, path) : undefined; }
+  filledAt(path) {
+    return this.filled ? at(this.filled, path) : undefined;
+  }
   /** Where it comes from, if a machine, a tool or a material fills it in. */
-  originAt(path) { return this.origins?.get(pointer(path)); }
+  originAt(path) {
+    return this.origins?.get(pointer(path));
+  }
   /** Where that comes from: the source of the material that is named beside it, or the service. */
   sourceAt(path) {
     const beside = at(this.value, path.slice(0, -1)) || {};
@@ -37,7 +71,9 @@ class Context {
     const entry = material?.[path.at(-1)];
     return entry?.source ? t('from_material', { name: material.title, source: entry.source }) : t('filled_in');
   }
-  errorsAt(path) { return this.errors.get(pointer(path)) || []; }
+  errorsAt(path) {
+    return this.errors.get(pointer(path)) || [];
+  }
   /** Faults of everything below a path, and of the path itself. */
   errorsBelow(path) {
     const start = pointer(path);
@@ -62,13 +98,29 @@ export function Form({ calculator, schema, value, said, onChange, errors, librar
   // Models extend the jobs of one calculator: of the one whose job stands in this one, if there is such.
   const owner = typeof value.calculator === 'string' ? value.calculator : calculator;
   const origins = useMemo(() => new Map((said?.origins || []).map(origin => [origin.pointer, origin])), [said]);
-  const context = new Context({ root, value, names: namesOf(root), filled: said?.input, origins, resources: said?.resources, errors: byPointer, libraries, models: (models || []).filter(model => model.calculator === owner), pointAt: setPointed, focusOn: setFocused, disabled, set: (path, part, how) => onChange(withFollowers(root, value, changed(value, path, part)), how) });
+  const context = new Context({
+    root,
+    value,
+    names: namesOf(root),
+    filled: said?.input,
+    origins,
+    resources: said?.resources,
+    errors: byPointer,
+    libraries,
+    models: (models || []).filter(model => model.calculator === owner),
+    pointAt: setPointed,
+    focusOn: setFocused,
+    disabled,
+    set: (path, part, how) => onChange(withFollowers(root, value, changed(value, path, part)), how),
+  });
   const whole = resolve(schema, root);
   // A family of jobs, told apart by one field.
   const family = kindOf(whole) === 'choice' ? variants(whole, root) : null;
   const member = family && variantOf(family, value);
   const top = member ? member.schema : whole;
-  const all = Object.entries(top.properties || {}).map(([name, part]) => ({ name, schema: resolve(part, root), own: ownName(name, part, root) })).filter(entry => kindOf(entry.schema) !== 'constant');
+  const all = Object.entries(top.properties || {})
+    .map(([name, part]) => ({ name, schema: resolve(part, root), own: ownName(name, part, root) }))
+    .filter(entry => kindOf(entry.schema) !== 'constant');
   // Where a name stands in place of an object of the calculator's own, the picker shows it.
   const isNamed = ({ name }) => records.includes(name) && typeof value[name] === 'string';
   const required = new Set(top.required || []);
@@ -79,29 +131,39 @@ export function Form({ calculator, schema, value, said, onChange, errors, librar
     const group = entry.schema['x-group'] || 'settings';
     loose.set(group, [...(loose.get(group) || []), entry]);
   }
-  const asked = sections.filter(({ name, schema: part }) => required.has(name) || value[name] !== undefined && !part['x-advanced']);
+  const asked = sections.filter(({ name, schema: part }) => required.has(name) || (value[name] !== undefined && !part['x-advanced']));
   // What was measured comes first where nothing can be said without it.
-  asked.sort((a, b) => Number(Boolean(b.schema['x-table'] && required.has(b.name))) - Number(Boolean(a.schema['x-table'] && required.has(a.name))));
+  asked.sort(
+    (a, b) => Number(Boolean(b.schema['x-table'] && required.has(b.name))) - Number(Boolean(a.schema['x-table'] && required.has(a.name))),
+  );
   const usual = sections.filter(entry => !asked.includes(entry) && entry.schema['x-table']);
   const further = sections.filter(entry => !asked.includes(entry) && !usual.includes(entry));
   const section = ({ name, schema: part, own }, open) => html`
     <${Section} key=${name} name=${name} own=${own} schema=${part} path=${[name]} value=${value[name]} open=${open} required=${required.has(name)} context=${context} />`;
   return html`
-    <form class="form" onSubmit=${event => { event.preventDefault(); onChange(value, 'run'); }} novalidate aria-label=${t('inputs')}>
+    <form class="form" onSubmit=${event => {
+      event.preventDefault();
+      onChange(value, 'run');
+    }} novalidate aria-label=${t('inputs')}>
       <div class="sections">
         ${records.length > 0 && html`<${Records} kinds=${records} declared=${all.map(({ name }) => name)} value=${value} onChange=${onChange} libraries=${libraries} said=${said} context=${context} />`}
-        ${member && html`<div class="family"><div class="row"><label class="label" for="family">${labelOf(member.tag, resolve(top.properties[member.tag], root))}</label>
+        ${
+          member &&
+          html`<div class="family"><div class="row"><label class="label" for="family">${labelOf(member.tag, resolve(top.properties[member.tag], root))}</label>
           <span class="control wide"><select id="family" value=${family.indexOf(member)} onChange=${event => {
             const chosen = family[Number(event.currentTarget.value)];
             const example = Object.values(examples || {}).find(job => job[chosen.tag] === chosen.value);
             onChange(example || blank(chosen.schema, root));
-          }}>${family.map((variant, index) => html`<option value=${index}>${variantName(variant, root)}</option>`)}</select></span></div></div>`}
+          }}>${family.map((variant, index) => html`<option value=${index}>${variantName(variant, root)}</option>`)}</select></span></div></div>`
+        }
         ${asked.map(entry => section(entry, true))}
         ${usual.map(entry => section(entry, false))}
-        ${[...loose].map(([group, entries]) => html`
+        ${[...loose].map(
+          ([group, entries]) => html`
           <${Fold} key=${`group-${group}`} title=${entries[0].schema['x-group-label'] || t(`group_${group}`)} open=${true} errors=${entries.reduce((sum, { name }) => sum + context.errorsBelow([name]), 0)}>
             <${Fields} entries=${entries} path=${[]} value=${value} required=${required} context=${context} />
-          <//>`)}
+          <//>`,
+        )}
         ${further.length > 0 && html`<h2 class="divider">${t('further_settings')}</h2>`}
         ${further.map(entry => section(entry, false))}
       </div>
@@ -114,8 +176,12 @@ function Help({ of, helps }) {
   const help = helps.get(of);
   return html`
     <div class="help" aria-hidden="true">
-      ${help ? html`<p><strong>${help.label}</strong>${help.symbol && html` <${FieldSymbol} symbol=${help.symbol} />`}${help.range && html` <span class="range">${help.range}</span>`}</p>
-        <p>${help.description}</p>` : html`<p class="quiet">${t(matchMedia('(pointer: coarse)').matches ? 'help_hint_touch' : 'help_hint')}</p>`}
+      ${
+        help
+          ? html`<p><strong>${help.label}</strong>${help.symbol && html` <${FieldSymbol} symbol=${help.symbol} />`}${help.range && html` <span class="range">${help.range}</span>`}</p>
+        <p>${help.description}</p>`
+          : html`<p class="quiet">${t(matchMedia('(pointer: coarse)').matches ? 'help_hint_touch' : 'help_hint')}</p>`
+      }
     </div>`;
 }
 
@@ -123,7 +189,9 @@ function Help({ of, helps }) {
 function Fold({ title, note, summary, open: initially, errors, action, children, description }) {
   const [open, setOpen] = useState(initially);
   const id = useMemo(() => unique('fold'), []);
-  useEffect(() => { if (errors > 0) setOpen(true); }, [errors]);
+  useEffect(() => {
+    if (errors > 0) setOpen(true);
+  }, [errors]);
   return html`
     <section class=${`fold ${open ? 'open' : ''} ${errors > 0 ? 'faulty' : ''}`}>
       <div class="fold-head">
@@ -142,18 +210,30 @@ function Fold({ title, note, summary, open: initially, errors, action, children,
 function Section({ name, own, schema, path, value, open, required, context }) {
   const label = labelOf(name, schema);
   const isThere = value !== undefined && value !== null;
-  const add = () => context.set(path, schema.default && Object.keys(schema.default).length ? schema.default : blank({ ...schema, optional: false }, context.root));
+  const add = () =>
+    context.set(
+      path,
+      schema.default && Object.keys(schema.default).length ? schema.default : blank({ ...schema, optional: false }, context.root),
+    );
   const kind = kindOf(schema);
-  const remove = !required && isThere && kind !== 'table' && html`
+  const remove =
+    !required &&
+    isThere &&
+    kind !== 'table' &&
+    html`
     <button type="button" class="quiet-button" onClick=${() => context.set(path, undefined)} title=${t('use_default')}>${t('reset')}<span class="hidden"> ${label}</span></button>`;
   const direct = context.errorsAt(path);
-  const keeping = own && html`<${Keeping} own=${own} label=${label} value=${value} isThere=${isThere && context.errorsBelow(path) === 0} use=${part => context.set(path, part)} />`;
+  const keeping =
+    own &&
+    html`<${Keeping} own=${own} label=${label} value=${value} isThere=${isThere && context.errorsBelow(path) === 0} use=${part => context.set(path, part)} />`;
   return html`
     <${Fold} title=${label} open=${open} errors=${context.errorsBelow(path)} summary=${summary(schema, value, context.root)} action=${[keeping, remove]} description=${schema.description}>
       <${Faults} faults=${kind === 'table' ? [] : direct} id=${fieldId(path)} names=${context.names} />
-      ${isThere || required || kind === 'table' || (kind === 'object' && !schema.optional) || kind === 'array' || kind === 'map'
-        ? html`<${Body} name=${name} schema=${schema} path=${path} value=${value} context=${context} />`
-        : html`<p class="absent"><span>${spoken(schema.description, context.names)}</span><button type="button" onClick=${add}>${t('add')}<span class="hidden"> ${label}</span></button></p>`}
+      ${
+        isThere || required || kind === 'table' || (kind === 'object' && !schema.optional) || kind === 'array' || kind === 'map'
+          ? html`<${Body} name=${name} schema=${schema} path=${path} value=${value} context=${context} />`
+          : html`<p class="absent"><span>${spoken(schema.description, context.names)}</span><button type="button" onClick=${add}>${t('add')}<span class="hidden"> ${label}</span></button></p>`
+      }
     <//>`;
 }
 
@@ -161,7 +241,9 @@ function Section({ name, own, schema, path, value, open, required, context }) {
 function Keeping({ own, label, value, isThere, use }) {
   const mine = useKept(own);
   const isMine = mine !== undefined && isSame(mine, value);
-  const button = (act, when, then) => when && html`
+  const button = (act, when, then) =>
+    when &&
+    html`
     <button type="button" class="quiet-button" data-act=${act} onClick=${then} title=${t(`own_${act}_why`)}>${t(`own_${act}`)}<span class="hidden"> ${label}</span></button>`;
   return html`
     <span data-own=${own}>
@@ -174,7 +256,10 @@ function Keeping({ own, label, value, isThere, use }) {
 /** What a folded part holds, in a few words. */
 function summary(schema, value, root) {
   if (value === undefined || value === null) return t('not_set');
-  if (Array.isArray(value)) return value.every(part => typeof part === 'string') ? value.map(word => wordOf(schema.items && resolve(schema.items, root), word)).join(', ') : `${value.length}`;
+  if (Array.isArray(value))
+    return value.every(part => typeof part === 'string')
+      ? value.map(word => wordOf(schema.items && resolve(schema.items, root), word)).join(', ')
+      : `${value.length}`;
   if (typeof value !== 'object') return String(value);
   if (value.csv) return 'CSV';
   const words = [];
@@ -198,18 +283,24 @@ function runsBeside(schema, path, { root, value }) {
 /** The inside of a part, whatever it is. */
 export function Body({ name, schema, path, value, context }) {
   switch (kindOf(schema)) {
-    case 'object': return html`<${ObjectFields} schema=${schema} path=${path} value=${value || {}} context=${context} />`;
-    case 'choice': return html`<${Choice} schema=${schema} path=${path} value=${value} context=${context} />`;
-    case 'array': return html`<${List} name=${name} schema=${schema} path=${path} value=${value || []} context=${context} />`;
-    case 'map': return html`<${MapFields} name=${name} schema=${schema} path=${path} value=${value || {}} context=${context} />`;
-    case 'table': return html`<${TableInput} name=${name} schema=${schema} root=${context.root} value=${value} names=${context.names} runs=${runsBeside(schema, path, context)}
+    case 'object':
+      return html`<${ObjectFields} schema=${schema} path=${path} value=${value || {}} context=${context} />`;
+    case 'choice':
+      return html`<${Choice} schema=${schema} path=${path} value=${value} context=${context} />`;
+    case 'array':
+      return html`<${List} name=${name} schema=${schema} path=${path} value=${value || []} context=${context} />`;
+    case 'map':
+      return html`<${MapFields} name=${name} schema=${schema} path=${path} value=${value || {}} context=${context} />`;
+    case 'table':
+      return html`<${TableInput} name=${name} schema=${schema} root=${context.root} value=${value} names=${context.names} runs=${runsBeside(schema, path, context)}
       faults=${context.errorsAt(path)} below=${[...context.errors].filter(([place]) => place.startsWith(`${pointer(path)}/`)).flatMap(([, faults]) => faults)}
       onChange=${(part, runs) => {
         const beside = path.slice(0, -1);
         const whole = changed(at(context.value, beside), [name], part);
         context.set(beside, runs ? changed(whole, [schema['x-runs']], runs) : whole);
       }} />`;
-    default: return html`<${JsonField} name=${name} schema=${schema} path=${path} value=${value} context=${context} />`;
+    default:
+      return html`<${JsonField} name=${name} schema=${schema} path=${path} value=${value} context=${context} />`;
   }
 }
 
@@ -224,14 +315,17 @@ function ObjectFields({ schema, path, value, context, without }) {
 
 function Fields({ entries, path, value, required, context }) {
   const [all, setAll] = useState(false);
-  const isRare = ({ name, schema }) =>
-    !required.has(name) && value[name] === undefined && (schema['x-advanced'] || !isLeaf(schema));
+  const isRare = ({ name, schema }) => !required.has(name) && value[name] === undefined && (schema['x-advanced'] || !isLeaf(schema));
   const rare = entries.filter(isRare);
   // One rare field is no reason to hide it.
   const hidden = rare.length > 1 && !all && !rare.some(({ name }) => context.errorsBelow([...path, name]) > 0) ? rare : [];
   return html`
-    ${entries.filter(entry => !hidden.includes(entry) && kindOf(entry.schema) !== 'constant').map(({ name, schema }) => html`
-      <${Field} key=${name} name=${name} schema=${schema} path=${[...path, name]} value=${value[name]} required=${required.has(name)} context=${context} />`)}
+    ${entries
+      .filter(entry => !hidden.includes(entry) && kindOf(entry.schema) !== 'constant')
+      .map(
+        ({ name, schema }) => html`
+      <${Field} key=${name} name=${name} schema=${schema} path=${[...path, name]} value=${value[name]} required=${required.has(name)} context=${context} />`,
+      )}
     ${hidden.length > 0 && html`<button type="button" class="more" onClick=${() => setAll(true)}>${t('more_fields', { count: hidden.length })}</button>`}`;
 }
 
@@ -240,7 +334,8 @@ export function Field(props) {
   const { name, schema, path, value, required, context } = props;
   const kind = kindOf(schema);
   if (schema['x-library'] === 'materials' && context.libraries?.materials) return html`<${Row} ...${props} control=${Library} />`;
-  if (name === 'model' && kind === 'string' && context.models.length + (value ? 1 : 0) > 0) return html`<${Row} ...${props} control=${ModelChoice} />`;
+  if (name === 'model' && kind === 'string' && context.models.length + (value ? 1 : 0) > 0)
+    return html`<${Row} ...${props} control=${ModelChoice} />`;
   if (kind === 'number') return html`<${Row} ...${props} control=${NumberInput} />`;
   if (kind === 'string') return html`<${Row} ...${props} control=${TextInput} />`;
   if (kind === 'enum') return html`<${Row} ...${props} control=${Enum} />`;
@@ -254,9 +349,11 @@ export function Field(props) {
         ${isThere && !required && html`<button type="button" class="quiet-button" onClick=${() => set(undefined)}>${t('remove')}<span class="hidden"> ${label}</span></button>`}
       </legend>
       <${Faults} faults=${context.errorsAt(path)} id=${`${fieldId(path)}-part`} names=${context.names} />
-      ${isThere || required || kind === 'array'
-        ? html`<${Body} name=${name} schema=${schema} path=${path} value=${value} context=${context} />`
-        : html`<p class="absent"><span>${spoken(schema.description, context.names)}</span><button type="button" onClick=${() => set(blank({ ...schema, optional: false }, context.root))}>${t('add')}<span class="hidden"> ${label}</span></button></p>`}
+      ${
+        isThere || required || kind === 'array'
+          ? html`<${Body} name=${name} schema=${schema} path=${path} value=${value} context=${context} />`
+          : html`<p class="absent"><span>${spoken(schema.description, context.names)}</span><button type="button" onClick=${() => set(blank({ ...schema, optional: false }, context.root))}>${t('add')}<span class="hidden"> ${label}</span></button></p>`
+      }
     </fieldset>`;
 }
 
@@ -277,9 +374,11 @@ function Choice({ schema, path, value, context }) {
         ${list.map((variant, index) => html`<option value=${index}>${name(variant)}</option>`)}
       </select></span>
     </div>
-    ${kindOf(now.schema) === 'object'
-      ? html`<${ObjectFields} schema=${now.schema} path=${path} value=${value || {}} context=${context} without=${now.tag} />`
-      : html`<${Field} name=${path.at(-1)} schema=${now.schema} path=${path} value=${value} required=${true} context=${context} />`}`;
+    ${
+      kindOf(now.schema) === 'object'
+        ? html`<${ObjectFields} schema=${now.schema} path=${path} value=${value || {}} context=${context} without=${now.tag} />`
+        : html`<${Field} name=${path.at(-1)} schema=${now.schema} path=${path} value=${value} required=${true} context=${context} />`
+    }`;
 }
 
 /** What no other field can show. */
@@ -292,7 +391,11 @@ function JsonField({ name, schema, path, value, context }) {
     setDraft(text);
     let part;
     let isWrong = false;
-    try { part = text.trim() === '' ? undefined : JSON.parse(text); } catch { isWrong = true; }
+    try {
+      part = text.trim() === '' ? undefined : JSON.parse(text);
+    } catch {
+      isWrong = true;
+    }
     setWrong(isWrong);
     mark(id, isWrong);
     if (!isWrong) context.set(path, part, 'typing');
@@ -308,7 +411,9 @@ export function goTo(place) {
     const element = document.getElementById(fieldId(path.slice(0, length)));
     if (element) {
       element.scrollIntoView({ block: 'center' });
-      /** @type {HTMLElement | null} */ (element.matches('input,select,textarea,button') ? element : element.querySelector('input,select,textarea,button'))?.focus();
+      /** @type {HTMLElement | null} */ (
+        element.matches('input,select,textarea,button') ? element : element.querySelector('input,select,textarea,button')
+      )?.focus();
       return;
     }
   }

@@ -25,11 +25,12 @@ export function settled(handle, place, step, near = 0) {
 
 /** The job with the numbers that follow a handle, once it is so far from where it was; `filled` has those that the job leaves
  *  to the service. */
-export const movedJob = (job, filled, handle, by) => handle.moves.reduce((whole, { pointer, per_unit: perUnit }) => {
-  const path = parts(pointer);
-  const before = at(job, path) ?? at(filled, path);
-  return typeof before === 'number' ? changed(whole, path, Number((before + perUnit * by).toPrecision(DIGITS))) : whole;
-}, job);
+export const movedJob = (job, filled, handle, by) =>
+  handle.moves.reduce((whole, { pointer, per_unit: perUnit }) => {
+    const path = parts(pointer);
+    const before = at(job, path) ?? at(filled, path);
+    return typeof before === 'number' ? changed(whole, path, Number((before + perUnit * by).toPrecision(DIGITS))) : whole;
+  }, job);
 
 const placeOf = handle => handle[handle.along];
 
@@ -37,15 +38,16 @@ const placeOf = handle => handle[handle.along];
 const INSIDE_PX = 9;
 const withinFrame = (v, { top, height }) => Math.min(Math.max(v, top + INSIDE_PX), top + height - INSIDE_PX);
 
-/** Handles nearer to each other than this, px, are too near for a finger: what comes later in the figure stays. */
-const APART_PX = 25;
+/** Handles nearer to each other than this, px, both across and up, cover too much of each other to be hit: what comes later in
+ *  the figure stays. */
+const APART_PX = 26;
 
 /** Those of a panel that have room; the others come when the picture is larger, or a part of it. */
 export function roomy(handles, x, y, frame) {
   const kept = [];
   for (const one of handles.toReversed()) {
     const [h, v] = [x(one.handle.x), withinFrame(y(one.handle.y), frame)];
-    if (kept.every(other => Math.hypot(other.h - h, other.v - v) >= APART_PX)) kept.push({ ...one, h, v });
+    if (kept.every(other => Math.max(Math.abs(other.h - h), Math.abs(other.v - v)) >= APART_PX)) kept.push({ ...one, h, v });
   }
   return kept.reverse();
 }
@@ -60,7 +62,13 @@ export function Handles({ panel, axis, x, y, hold, frame, effect }) {
   const take = handle => {
     pulled.current = shown.map(({ index }) => index);
     const { move, drop } = hold(handle);
-    return { move, drop: () => { pulled.current = null; drop(); } };
+    return {
+      move,
+      drop: () => {
+        pulled.current = null;
+        drop();
+      },
+    };
   };
   return html`
     <div class="handles">${shown.map(({ handle, index }) => html`<${Grip} key=${index} ...${{ handle, x, y, frame, effect }} hold=${take} axis=${handle.along === 'x' ? axis : panel.y} />`)}</div>`;
@@ -88,7 +96,12 @@ function Grip({ handle, x, y, axis, hold, frame, effect }) {
     const held = pulled.current;
     if (!held) return;
     const begun = held.scale(placeOf(held.handle));
-    const to = settled(held.handle, held.scale.back(begun + pixel(event) - held.from), held.step, STOP_PX * Math.abs(held.scale.back(1) - held.scale.back(0)));
+    const to = settled(
+      held.handle,
+      held.scale.back(begun + pixel(event) - held.from),
+      held.step,
+      STOP_PX * Math.abs(held.scale.back(1) - held.scale.back(0)),
+    );
     held.move(to);
   };
   const up = event => {
@@ -98,7 +111,14 @@ function Grip({ handle, x, y, axis, hold, frame, effect }) {
   };
   const key = event => {
     const way = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 }[event.key];
-    const to = event.key === 'Home' ? handle.reach[0] : event.key === 'End' ? handle.reach[1] : way ? placeOf(handle) + way * step * (event.shiftKey ? FAR : 1) : null;
+    const to =
+      event.key === 'Home'
+        ? handle.reach[0]
+        : event.key === 'End'
+          ? handle.reach[1]
+          : way
+            ? placeOf(handle) + way * step * (event.shiftKey ? FAR : 1)
+            : null;
     if (to === null || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();
     event.stopPropagation();
@@ -118,14 +138,17 @@ function Grip({ handle, x, y, axis, hold, frame, effect }) {
 const effectOf = (effect, handle) => (effect?.name === handle.name && effect.texts.length > 0 ? effect.texts.join('; ') : '');
 
 /** What stands above a handle: its name, its place, what it does. */
-const Name = ({ handle, said, effect }) => html`<b aria-hidden="true">${capital(handle.text)} ${said}${effectOf(effect, handle) && html`<small>${effectOf(effect, handle)}</small>`}</b>`;
+const Name = ({ handle, said, effect }) =>
+  html`<b aria-hidden="true">${capital(handle.text)} ${said}${effectOf(effect, handle) && html`<small>${effectOf(effect, handle)}</small>`}</b>`;
 
 /** What of a picture in the plane can be put elsewhere: `onPick(x, y)` of a click or of Enter at the cross, and the point that
  *  can be dragged, `{ x, y, onMove(x, y), onDrop(x, y) }`, without `y` along the first curve. */
 export function usePlane(figure, onPut, trial) {
   // Where the point is while it is dragged.
   const [grabbed, setGrabbed] = useState(null);
-  useEffect(() => { setGrabbed(null); }, [figure]);
+  useEffect(() => {
+    setGrabbed(null);
+  }, [figure]);
   const settings = onPut && figure.frame !== 'polar' ? settingsOf(figure) : [];
   if (trial) return { onPick: null, handle: { x: trial.x, onMove: trial.move, onDrop: () => {} } };
   const point = settings.find(setting => !setting.tried_in);
@@ -134,9 +157,16 @@ export function usePlane(figure, onPut, trial) {
   return {
     onPick: (x, y) => put(x, y, 'run'),
     handle: {
-      x: grabbed ? grabbed[0] : point.x, y: grabbed ? grabbed[1] : point.y,
-      onMove: (x, y) => { setGrabbed([x, y]); put(x, y, 'typing'); },
-      onDrop: (x, y) => { setGrabbed(null); put(x, y, 'run'); },
+      x: grabbed ? grabbed[0] : point.x,
+      y: grabbed ? grabbed[1] : point.y,
+      onMove: (x, y) => {
+        setGrabbed([x, y]);
+        put(x, y, 'typing');
+      },
+      onDrop: (x, y) => {
+        setGrabbed(null);
+        put(x, y, 'run');
+      },
     },
   };
 }
@@ -162,7 +192,9 @@ export function RoundHandles({ settings, centre, place, put, effect }) {
         event.currentTarget.setPointerCapture(event.pointerId);
         pulled.current = setting.name;
       };
-      const move = event => { if (pulled.current === setting.name) put(setting, angleOf(event), 'typing'); };
+      const move = event => {
+        if (pulled.current === setting.name) put(setting, angleOf(event), 'typing');
+      };
       const up = event => {
         if (pulled.current !== setting.name) return;
         pulled.current = null;

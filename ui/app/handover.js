@@ -27,13 +27,17 @@ export function useHandOver({ name, answer, owns }) {
       const blob = await api.file(key, accept, query);
       if (owns(key)) save(blob, `${name}.${ending}`);
       else setFailed({ key, why: t('changed_meanwhile') });
-    } catch (error) { setFailed({ key, why: error.problem?.detail || error.message }); }
+    } catch (error) {
+      setFailed({ key, why: error.problem?.detail || error.message });
+    }
   };
   return [take, failed.key === answer.key ? failed.why : null];
 }
 
 /** Saves a text that was made of the answer with this key. */
-export const saveText = (text, type, name, owns, key) => { if (owns(key)) save(new Blob([text], { type }), name); };
+export const saveText = (text, type, name, owns, key) => {
+  if (owns(key)) save(new Blob([text], { type }), name);
+};
 
 /** Puts a page of its own on paper, made of the answer with this key. */
 export function printAlone(page, owns, key) {
@@ -43,11 +47,15 @@ export function printAlone(page, owns, key) {
   document.body.append(paper);
   render(page, paper);
   document.body.classList.add('paper-only');
-  addEventListener('afterprint', () => {
-    document.body.classList.remove('paper-only');
-    render(null, paper);
-    paper.remove();
-  }, { once: true });
+  addEventListener(
+    'afterprint',
+    () => {
+      document.body.classList.remove('paper-only');
+      render(null, paper);
+      paper.remove();
+    },
+    { once: true },
+  );
   if (owns(key)) window.print();
 }
 
@@ -70,7 +78,9 @@ export function Downloads({ id, description, answer, figure, stale, owns }) {
       ${has('application/pdf') && button('PDF', 'application/pdf', 'pdf')}
       ${has('image/svg+xml') && figure && button('SVG', 'image/svg+xml', 'svg', `?figure=${figure.id}`)}
       ${has('text/x-gcode') && button(t('gcode'), 'text/x-gcode', 'nc')}
-      <button type="button" disabled=${stale} onClick=${() => { if (owns(answer.key)) window.print(); }}>${t('print')}</button>
+      <button type="button" disabled=${stale} onClick=${() => {
+        if (owns(answer.key)) window.print();
+      }}>${t('print')}</button>
     </span>
     ${trouble && html`<p class="fault" role="alert"><span>${trouble}</span></p>`}`;
 }

@@ -15,22 +15,35 @@ export function sheetOf({ input_schema: root }, { input, result }, job) {
   const next = result.next_measurement;
   if (!next) return null;
   const member = memberOf(root, input);
-  const [place, table] = Object.entries(member.properties || {}).map(([name, part]) => [name, resolve(part, root)]).find(([, part]) => part['x-runs']) ?? [];
+  const [place, table] =
+    Object.entries(member.properties || {})
+      .map(([name, part]) => [name, resolve(part, root)])
+      .find(([, part]) => part['x-runs']) ?? [];
   if (!table) return null;
   const all = rowFields(table, root);
   const fields = new Map(all.map(field => [field.name, field.schema]));
   const runs = runsOf(member, table, root);
-  const told = (name, schema, cells) => ({ name, label: schema ? labelOf(name, schema) : name, unit: unitSymbol(schema?.['x-unit']), schema, cells });
+  const told = (name, schema, cells) => ({
+    name,
+    label: schema ? labelOf(name, schema) : name,
+    unit: unitSymbol(schema?.['x-unit']),
+    schema,
+    cells,
+  });
   // Several points may be of one row.
   const [first] = Object.values(next.places || {});
   const count = first?.length ?? next.rows;
   const same = value => Array.from({ length: count }, () => value);
   const taken = lastRun(job[place], wanted(all), freeOf(all), runs, job[runs.list]);
-  const where = Object.entries(next.places || {}).filter(([name]) => fields.has(name)).map(([name, cells]) => told(name, fields.get(name), cells));
-  const under = Object.entries(next.run).filter(([name, value]) => value !== null && value !== undefined && !(name in (next.places || {}))).flatMap(([name, value]) => {
-    if (isLevels(value)) return value.map(({ factor, level }) => told(factor, null, same(level)));
-    return Array.isArray(value) ? [] : [told(name, fields.get(name) ?? runs.fields.get(name) ?? { title: humanised(name) }, same(value))];
-  });
+  const where = Object.entries(next.places || {})
+    .filter(([name]) => fields.has(name))
+    .map(([name, cells]) => told(name, fields.get(name), cells));
+  const under = Object.entries(next.run)
+    .filter(([name, value]) => value !== null && value !== undefined && !(name in (next.places || {})))
+    .flatMap(([name, value]) => {
+      if (isLevels(value)) return value.map(({ factor, level }) => told(factor, null, same(level)));
+      return Array.isArray(value) ? [] : [told(name, fields.get(name) ?? runs.fields.get(name) ?? { title: humanised(name) }, same(value))];
+    });
   return {
     changes: next.changes.split(', '),
     columns: [told(runs.number, fields.get(runs.number), same(taken + 1)), ...where, ...under],
@@ -48,15 +61,30 @@ const quoted = text => (/[;,"\n]/.test(text) ? `"${text.replaceAll('"', '""')}"`
 /** The sheet as spreadsheets of this language read it: names that the door knows, nothing in the measured column. */
 export function csvOf(sheet) {
   const separator = decimalMark() === ',' ? ';' : ',';
-  const cell = value => quoted(value === null || value === undefined ? '' : typeof value === 'number' ? typed(Number(value.toPrecision(DIGITS))) : String(value));
+  const cell = value =>
+    quoted(
+      value === null || value === undefined ? '' : typeof value === 'number' ? typed(Number(value.toPrecision(DIGITS))) : String(value),
+    );
   const columns = columnsOf(sheet);
-  const lines = [columns.map(({ name }) => quoted(name)), ...Array.from({ length: sheet.count }, (_, row) => columns.map(({ cells }) => cell(cells[row])))];
+  const lines = [
+    columns.map(({ name }) => quoted(name)),
+    ...Array.from({ length: sheet.count }, (_, row) => columns.map(({ cells }) => cell(cells[row]))),
+  ];
   return `\ufeff${lines.map(line => line.join(separator)).join('\r\n')}\r\n`;
 }
 
 export const takeSheet = (sheet, name, owns, key) => saveText(csvOf(sheet), 'text/csv;charset=utf-8', `${name}-next.csv`, owns, key);
 
-const written = ({ schema }, value) => (value === null || value === undefined ? '' : typeof value === 'number' ? number(value, 7) : typeof value === 'boolean' ? t(value ? 'yes' : 'no') : schema?.enum ? wordOf(schema, value) : String(value));
+const written = ({ schema }, value) =>
+  value === null || value === undefined
+    ? ''
+    : typeof value === 'number'
+      ? number(value, 7)
+      : typeof value === 'boolean'
+        ? t(value ? 'yes' : 'no')
+        : schema?.enum
+          ? wordOf(schema, value)
+          : String(value);
 
 /** The sheet on paper, alone on its page. */
 function Paper({ sheet, title, of }) {

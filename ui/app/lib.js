@@ -22,8 +22,9 @@ export function debounced(task, wait) {
 }
 
 /** A store that components may watch. */
-export function cell(value) {
+export function cell(first) {
   const watchers = new Set();
+  let value = first;
   return {
     get: () => value,
     set: next => {
@@ -45,7 +46,10 @@ export function usePrinting() {
     const after = () => setPrinting(false);
     addEventListener('beforeprint', before);
     addEventListener('afterprint', after);
-    return () => { removeEventListener('beforeprint', before); removeEventListener('afterprint', after); };
+    return () => {
+      removeEventListener('beforeprint', before);
+      removeEventListener('afterprint', after);
+    };
   }, []);
   return isPrinting;
 }

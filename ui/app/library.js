@@ -22,7 +22,10 @@ export function numbersOf(record, path = []) {
 }
 
 /** What a service says that refuses a record: every fault with its place. */
-const said = error => (error.problem?.errors?.length ? error.problem.errors.map(({ pointer: place, detail }) => `${place}: ${detail}`).join('; ') : error.problem?.detail || error.message);
+const said = error =>
+  error.problem?.errors?.length
+    ? error.problem.errors.map(({ pointer: place, detail }) => `${place}: ${detail}`).join('; ')
+    : error.problem?.detail || error.message;
 
 /** The numbers of one record; what is changed becomes its next revision. */
 function Numbers({ kind, record, done, fail }) {
@@ -33,15 +36,22 @@ function Numbers({ kind, record, done, fail }) {
   const store = async event => {
     event.preventDefault();
     const set = Object.fromEntries(found.map(row => [row.place, row.read.value]));
-    try { await api.saveRecord(FOLDER[kind], record.name, { from: record.name, set }); await done(); } catch (error) { fail(said(error)); }
+    try {
+      await api.saveRecord(FOLDER[kind], record.name, { from: record.name, set });
+      await done();
+    } catch (error) {
+      fail(said(error));
+    }
   };
   return html`
     <form class="record-numbers" aria-label=${record.name} onSubmit=${store}>
       <table class="list"><thead><tr><th scope="col">${t('name')}</th><th scope="col" class="number">${t('value')}</th><th scope="col">${t('certainty')}</th></tr></thead>
-        <tbody>${rows.map(({ place, label, value, certainty, source }) => html`<tr key=${place}><th scope="row"><code>${label}</code></th>
+        <tbody>${rows.map(
+          ({ place, label, value, certainty, source }) => html`<tr key=${place}><th scope="row"><code>${label}</code></th>
           <td class="number"><input type="text" inputmode="decimal" autocomplete="off" aria-label=${label} value=${typedIn[place] ?? typed(value)} aria-invalid=${typedIn[place] !== undefined && read(typedIn[place]).fault ? 'true' : undefined}
             onInput=${event => setTyped({ ...typedIn, [place]: event.currentTarget.value })} /></td>
-          <td title=${source}>${t(`certainty_${certainty}`)}</td></tr>`)}</tbody></table>
+          <td title=${source}>${t(`certainty_${certainty}`)}</td></tr>`,
+        )}</tbody></table>
       <p><button type="submit" class="primary" disabled=${found.length === 0 || isWrong}>${t('record_store')}</button></p>
     </form>`;
 }
@@ -54,11 +64,20 @@ function Copy({ lists, done, fail }) {
   const records = lists[FOLDER[kind]];
   const store = async event => {
     event.preventDefault();
-    try { await api.saveRecord(FOLDER[kind], name.trim(), { from: from || records[0]?.name }, true); setName(''); await done(kind, name.trim()); } catch (error) { fail(said(error)); }
+    try {
+      await api.saveRecord(FOLDER[kind], name.trim(), { from: from || records[0]?.name }, true);
+      setName('');
+      await done(kind, name.trim());
+    } catch (error) {
+      fail(said(error));
+    }
   };
   return html`
     <form class="record-copy" aria-label=${t('record_copy')} onSubmit=${store}>
-      <label>${t('kind')} <select value=${kind} onChange=${event => { setKind(event.currentTarget.value); setFrom(''); }}>${KINDS.map(word => html`<option value=${word}>${t(`record_${word}`)}</option>`)}</select></label>
+      <label>${t('kind')} <select value=${kind} onChange=${event => {
+        setKind(event.currentTarget.value);
+        setFrom('');
+      }}>${KINDS.map(word => html`<option value=${word}>${t(`record_${word}`)}</option>`)}</select></label>
       <label>${t('record_from')} <select id="record-from" value=${from || records[0]?.name} onChange=${event => setFrom(event.currentTarget.value)}>${records.map(record => html`<option value=${record.name}>${record.title || record.name}</option>`)}</select></label>
       <label>${t('name')} <input id="record-name" type="text" autocomplete="off" required pattern="[a-z0-9][a-z0-9_\\-]{0,63}" placeholder="lathe-3" value=${name} onInput=${event => setName(event.currentTarget.value)} /></label>
       <button type="submit" class="primary">${t('record_copy')}</button>
@@ -72,11 +91,30 @@ export function Library() {
   const [opened, setOpened] = useState('');
   const [asked, setAsked] = useState('');
   const load = async () => {
-    try { setLists(Object.fromEntries(await Promise.all(Object.values(FOLDER).map(async list => [list, await api.records(list)])))); } catch (error) { setTrouble(said(error)); }
+    try {
+      setLists(Object.fromEntries(await Promise.all(Object.values(FOLDER).map(async list => [list, await api.records(list)]))));
+    } catch (error) {
+      setTrouble(said(error));
+    }
   };
-  useEffect(() => { load(); }, []);
-  const done = async (kind, name) => { setTrouble(null); await load(); if (name) setOpened(`${kind} ${name}`); };
-  const act = async task => { setTrouble(null); setTold(null); try { await task(); await load(); } catch (error) { setTrouble(said(error)); } };
+  useEffect(() => {
+    load();
+  }, []);
+  const done = async (kind, name) => {
+    setTrouble(null);
+    await load();
+    if (name) setOpened(`${kind} ${name}`);
+  };
+  const act = async task => {
+    setTrouble(null);
+    setTold(null);
+    try {
+      await task();
+      await load();
+    } catch (error) {
+      setTrouble(said(error));
+    }
+  };
   const take = event => {
     const field = event.currentTarget;
     const [file] = field.files;
@@ -88,17 +126,32 @@ export function Library() {
       setTold(t('record_imported', { fresh: report.new.length, changed: report.changed.length, equal: report.equal.length }));
     });
   };
-  const own = lists && KINDS.flatMap(kind => lists[FOLDER[kind]].filter(record => record.built_in === false).map(record => ({ kind, record, id: `${kind} ${record.name}` })));
+  const own =
+    lists &&
+    KINDS.flatMap(kind =>
+      lists[FOLDER[kind]].filter(record => record.built_in === false).map(record => ({ kind, record, id: `${kind} ${record.name}` })),
+    );
   return html`
     <main class="plain" id="main" tabindex="-1"><h1>${t('records')}</h1><p class="quiet">${t('records_about')}</p>
       ${trouble && html`<p class="problem" role="alert">${trouble}</p>`}
       ${told && html`<p role="status">${told}</p>`}
       ${lists && html`<${Copy} lists=${lists} done=${done} fail=${setTrouble} />`}
-      ${own && (own.length === 0 ? html`<p class="empty-list">${t('records_none')}</p>` : html`<div class="grid-scroll" tabindex="0" role="region" aria-label=${t('records')}><table class="list" role="table">
+      ${
+        own &&
+        (own.length === 0
+          ? html`<p class="empty-list">${t('records_none')}</p>`
+          : html`<div class="grid-scroll" tabindex="0" role="region" aria-label=${t('records')}><table class="list" role="table">
         <thead role="rowgroup"><tr role="row"><th scope="col" role="columnheader">${t('name')}</th><th scope="col" role="columnheader">${t('kind')}</th><th scope="col" role="columnheader" class="number">${t('revision')}</th><th scope="col" role="columnheader"><span class="hidden">${t('actions')}</span></th></tr></thead>
-        <tbody role="rowgroup">${own.map(({ kind, record, id }) => html`<tr role="row" key=${id}><th scope="row" role="rowheader">${record.name}<p class="quiet">${record.title}</p></th><td role="cell">${t(`record_${kind}`)}</td><td role="cell" class="number">${record.revision}</td>
+        <tbody role="rowgroup">${own.map(
+          ({
+            kind,
+            record,
+            id,
+          }) => html`<tr role="row" key=${id}><th scope="row" role="rowheader">${record.name}<p class="quiet">${record.title}</p></th><td role="cell">${t(`record_${kind}`)}</td><td role="cell" class="number">${record.revision}</td>
           <td role="cell" class="actions"><button type="button" aria-expanded=${opened === id ? 'true' : 'false'} onClick=${() => setOpened(opened === id ? '' : id)}>${t('record_numbers')}<span class="hidden"> ${record.name}</span></button>
-            <button type="button" class=${asked === id ? 'sure' : ''} onBlur=${() => setAsked('')} onClick=${() => (asked === id ? act(() => api.dropRecord(FOLDER[kind], record.name)) : setAsked(id))}>${asked === id ? t('delete_sure') : t('delete')}<span class="hidden"> ${record.name}</span></button></td></tr>`)}</tbody></table></div>`)}
+            <button type="button" class=${asked === id ? 'sure' : ''} onBlur=${() => setAsked('')} onClick=${() => (asked === id ? act(() => api.dropRecord(FOLDER[kind], record.name)) : setAsked(id))}>${asked === id ? t('delete_sure') : t('delete')}<span class="hidden"> ${record.name}</span></button></td></tr>`,
+        )}</tbody></table></div>`)
+      }
       ${own?.filter(({ id }) => id === opened).map(({ kind, record, id }) => html`<section key=${`${id} ${record.revision}`}><h2>${record.name}</h2><${Numbers} kind=${kind} record=${record} done=${done} fail=${setTrouble} /></section>`)}
       <p><label class="button">${t('record_import')} <input type="file" class="hidden" accept=".json,.toml,.csv" onChange=${take} /></label>
         ${Object.keys(TYPES).map(form => html` <button type="button" key=${form} onClick=${() => act(async () => save(await api.exportLibrary(form), `library.${form}`))}>${form.toUpperCase()}<span class="hidden">: ${t('record_export')}</span></button>`)}</p>

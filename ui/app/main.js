@@ -18,17 +18,31 @@ function complain(error) {
   // A notice of the browser that a size settles one frame later.
   if (String(error?.message ?? error).startsWith('ResizeObserver loop')) return;
   const known = error instanceof api.Refused || error instanceof api.Unreachable;
-  const words = t('page_trouble') === 'page_trouble' ? 'Something in this page failed. Reload it; if it happens again, tell those who run the service:' : t('page_trouble');
-  trouble.textContent = known ? (error instanceof api.Refused && error.problem?.detail) || t('offline_detail') : `${words} ${error?.message || error}`;
+  const words =
+    t('page_trouble') === 'page_trouble'
+      ? 'Something in this page failed. Reload it; if it happens again, tell those who run the service:'
+      : t('page_trouble');
+  trouble.textContent = known
+    ? (error instanceof api.Refused && error.problem?.detail) || t('offline_detail')
+    : `${words} ${error?.message || error}`;
   trouble.hidden = false;
-  setTimeout(() => { trouble.hidden = true; }, known ? 6000 : 30000);
+  setTimeout(
+    () => {
+      trouble.hidden = true;
+    },
+    known ? 6000 : 30000,
+  );
 }
 addEventListener('error', event => complain(event.error || event.message));
 addEventListener('unhandledrejection', event => complain(event.reason));
 
 /** A name of the address in plain letters. One that is no encoding of any stays as it is, and is the name of no page. */
 function decoded(name) {
-  try { return decodeURIComponent(name); } catch { return name; }
+  try {
+    return decodeURIComponent(name);
+  } catch {
+    return name;
+  }
 }
 
 /** The page and the state in the address: `#/page?query`. */
@@ -38,10 +52,18 @@ function place() {
 }
 
 class Guard extends Component {
-  constructor() { super(); this.state = { error: null }; }
-  componentDidCatch(error) { this.setState({ error }); complain(error); }
+  constructor() {
+    super();
+    this.state = { error: null };
+  }
+  componentDidCatch(error) {
+    this.setState({ error });
+    complain(error);
+  }
   render({ children }, { error }) {
-    return error ? html`<main class="plain" id="main"><h1>${t('trouble_title')}</h1><p>${t('page_trouble')} ${error.message}</p><p><a href="#/" onClick=${() => this.setState({ error: null })}>${t('start_over')}</a></p></main>` : children;
+    return error
+      ? html`<main class="plain" id="main"><h1>${t('trouble_title')}</h1><p>${t('page_trouble')} ${error.message}</p><p><a href="#/" onClick=${() => this.setState({ error: null })}>${t('start_over')}</a></p></main>`
+      : children;
   }
 }
 
@@ -75,13 +97,23 @@ function App() {
     const move = () => setPlace(place());
     addEventListener('hashchange', move);
     addEventListener('popstate', move);
-    return () => { removeEventListener('hashchange', move); removeEventListener('popstate', move); };
+    return () => {
+      removeEventListener('hashchange', move);
+      removeEventListener('popstate', move);
+    };
   }, []);
   useEffect(() => {
-    api.patient(api.calculators).then(({ items }) => setCalculators(items), error => { if (!(error instanceof api.Unreachable) && error.status !== 401) complain(error); });
+    api.patient(api.calculators).then(
+      ({ items }) => setCalculators(items),
+      error => {
+        if (!(error instanceof api.Unreachable) && error.status !== 401) complain(error);
+      },
+    );
   }, [spoken, attempt, isOnline]);
   const refreshModels = useCallback(() => api.models().then(setModels, () => {}), []);
-  useEffect(() => { refreshModels(); }, [page, attempt, isOnline]);
+  useEffect(() => {
+    refreshModels();
+  }, [page, attempt, isOnline]);
   const refreshJobs = useCallback(async () => {
     looks.current += 1;
     const look = looks.current;
@@ -89,15 +121,22 @@ function App() {
       const found = await openJobs();
       // What was asked before something else is not newer because it took longer.
       if (look === looks.current) setRunning(found);
-    } catch { /* the count is of no use then, and the next look tells */ }
+    } catch {
+      /* the count is of no use then, and the next look tells */
+    }
   }, []);
   useEffect(() => {
-    const look = () => { if (!document.hidden) refreshJobs(); };
+    const look = () => {
+      if (!document.hidden) refreshJobs();
+    };
     refreshJobs();
     const timer = setInterval(look, JOBS_LOOK_MS);
     // What was not looked at while the page was hidden is long past.
     document.addEventListener('visibilitychange', look);
-    return () => { clearInterval(timer); document.removeEventListener('visibilitychange', look); };
+    return () => {
+      clearInterval(timer);
+      document.removeEventListener('visibilitychange', look);
+    };
   }, [attempt, isOnline]);
   // While the service is away, it is asked now and then whether it is back.
   useEffect(() => {
@@ -114,7 +153,10 @@ function App() {
   const first = useRef(true);
   useEffect(() => {
     // A new page begins at its beginning, also for those who hear it.
-    if (first.current) { first.current = false; return; }
+    if (first.current) {
+      first.current = false;
+      return;
+    }
     scrollTo(0, 0);
     document.getElementById('main')?.focus({ preventScroll: true });
   }, [page]);
@@ -127,35 +169,67 @@ function App() {
   const replace = useCallback(to('replaceState', page), [page]);
 
   return html`
-    <a class="skip" href="#main" onClick=${event => { event.preventDefault(); document.getElementById('main')?.focus(); }}>${t('skip')}</a>
+    <a class="skip" href="#main" onClick=${event => {
+      event.preventDefault();
+      document.getElementById('main')?.focus();
+    }}>${t('skip')}</a>
     <${Header} ...${{ page, calculators, running, models, known }} />
     ${!isOnline && html`<p class="banner away" role="status">${t('offline_title')}. ${t('offline_detail')}</p>`}
     ${needsKey && html`<${KeyForm} key=${attempt} refused=${needsKey === 'refused'} done=${() => setAttempt(attempt + 1)} />`}
     <${Guard} key=${page}>
-      ${!calculators && needsKey ? html`<main class="plain" id="main" tabindex="-1"><h1>${t('slogan')}</h1><p>${t('key_why')}</p></main>`
-        : !calculators ? html`<main class="plain" id="main" tabindex="-1"><p class="late">${t('loading')}</p></main>`
-        : page === '' ? html`<${Home} calculators=${calculators} />`
-        : page === 'jobs' ? html`<${Jobs} calculators=${calculators} refreshJobs=${refreshJobs} />`
-        : page === 'results' ? html`<${Results} calculators=${calculators} query=${query} replace=${replace} />`
-        : page === 'studies' ? html`<${Study} key=${attempt} ...${{ calculators, query, push, replace, refreshJobs }} />`
-        : page === 'models' ? html`<${Models} calculators=${calculators} models=${models} refreshModels=${refreshModels} />`
-        : page === 'library' ? html`<${Library} key=${spoken} />`
-        : known ? html`<${Room} key=${`${page} ${attempt}`} id=${page} ...${{ query, push, replace, models, refreshJobs }} />`
-        : html`<main class="plain" id="main" tabindex="-1"><h1>${t('no_page')}</h1><p><a href="#/">${t('to_start')}</a></p></main>`}
+      <${Page} ...${{ page, query, calculators, known, needsKey, models, refreshModels, refreshJobs, push, replace, attempt, spoken }} />
     <//>`;
+}
+
+/** A page without a picture: a heading, and what is said. */
+const plain = (heading, said) => html`<main class="plain" id="main" tabindex="-1">${heading && html`<h1>${heading}</h1>`}${said}</main>`;
+
+/** What the address names. */
+function Page({ page, query, calculators, known, needsKey, models, refreshModels, refreshJobs, push, replace, attempt, spoken }) {
+  if (!calculators)
+    return needsKey ? plain(t('slogan'), html`<p>${t('key_why')}</p>`) : plain(null, html`<p class="late">${t('loading')}</p>`);
+  if (known) return html`<${Room} key=${`${page} ${attempt}`} id=${page} ...${{ query, push, replace, models, refreshJobs }} />`;
+  switch (page) {
+    case '':
+      return html`<${Home} calculators=${calculators} />`;
+    case 'jobs':
+      return html`<${Jobs} calculators=${calculators} refreshJobs=${refreshJobs} />`;
+    case 'results':
+      return html`<${Results} calculators=${calculators} query=${query} replace=${replace} />`;
+    case 'studies':
+      return html`<${Study} key=${attempt} ...${{ calculators, query, push, replace, refreshJobs }} />`;
+    case 'models':
+      return html`<${Models} calculators=${calculators} models=${models} refreshModels=${refreshModels} />`;
+    case 'library':
+      return html`<${Library} key=${spoken} />`;
+    default:
+      return plain(t('no_page'), html`<p><a href="#/">${t('to_start')}</a></p>`);
+  }
 }
 
 function Header({ page, calculators, running, models, known }) {
   const [open, setOpen] = useState(false);
   const menu = useRef(null);
-  useEffect(() => { setOpen(false); }, [page]);
+  useEffect(() => {
+    setOpen(false);
+  }, [page]);
   useLayoutEffect(() => {
     if (!open) return undefined;
-    const leave = event => { if (!menu.current?.contains(event.target)) setOpen(false); };
-    const key = event => { if (event.key === 'Escape') { setOpen(false); menu.current?.querySelector('button')?.focus(); } };
+    const leave = event => {
+      if (!menu.current?.contains(event.target)) setOpen(false);
+    };
+    const key = event => {
+      if (event.key === 'Escape') {
+        setOpen(false);
+        menu.current?.querySelector('button')?.focus();
+      }
+    };
     addEventListener('pointerdown', leave);
     addEventListener('keydown', key);
-    return () => { removeEventListener('pointerdown', leave); removeEventListener('keydown', key); };
+    return () => {
+      removeEventListener('pointerdown', leave);
+      removeEventListener('keydown', key);
+    };
   }, [open]);
   const link = (name, text, extra) => html`<a href=${`#/${name}`} aria-current=${page === name ? 'page' : undefined}>${text}${extra}</a>`;
   return html`
@@ -175,7 +249,16 @@ function Header({ page, calculators, running, models, known }) {
         <a href="/docs" class="docs-link">${t('docs')}</a>
       </nav>
       <div class="languages" role="group" aria-label=${t('language')}>
-        ${languages.map(tag => html`<button type="button" key=${tag} lang=${tag} aria-pressed=${language() === tag} onClick=${() => speak(tag).catch(() => api.alive().then(() => location.reload(), () => {}))}>${tag.toUpperCase()}</button>`)}
+        ${languages.map(
+          tag =>
+            html`<button type="button" key=${tag} lang=${tag} aria-pressed=${language() === tag} onClick=${() =>
+              speak(tag).catch(() =>
+                api.alive().then(
+                  () => location.reload(),
+                  () => {},
+                ),
+              )}>${tag.toUpperCase()}</button>`,
+        )}
       </div>
     </header>`;
 }
@@ -183,9 +266,15 @@ function Header({ page, calculators, running, models, known }) {
 /** The service is locked: it wants a key. */
 function KeyForm({ done, refused }) {
   const [key, setKey] = useState('');
-  useEffect(() => { document.getElementById('api-key')?.focus(); }, []);
+  useEffect(() => {
+    document.getElementById('api-key')?.focus();
+  }, []);
   return html`
-    <form class="banner key-form" aria-label=${t('key_wanted')} onSubmit=${event => { event.preventDefault(); api.useKey(key); done(); }}>
+    <form class="banner key-form" aria-label=${t('key_wanted')} onSubmit=${event => {
+      event.preventDefault();
+      api.useKey(key);
+      done();
+    }}>
       <label for="api-key">${t('key_wanted')}</label><input id="api-key" type="password" autocomplete="off" value=${key} aria-describedby="api-key-hint" aria-invalid=${refused ? 'true' : undefined} onInput=${event => setKey(event.currentTarget.value)} required /><button type="submit" class="primary">${t('use_key')}</button>
       ${refused && html`<span class="refused" role="alert">${t('key_refused')}</span>`}
       <span id="api-key-hint">${t('key_hint')}</span>
@@ -193,13 +282,19 @@ function KeyForm({ done, refused }) {
 }
 
 // A file that falls beside its field must not take the place of the page.
-for (const kind of ['dragover', 'drop']) addEventListener(kind, event => { if (!event.defaultPrevented) event.preventDefault(); });
+for (const kind of ['dragover', 'drop'])
+  addEventListener(kind, event => {
+    if (!event.defaultPrevented) event.preventDefault();
+  });
 addEventListener('keydown', event => {
-  if (event.key === 'Enter' && (event.ctrlKey || event.metaKey)) /** @type {HTMLFormElement | null} */ (document.querySelector('.form'))?.requestSubmit();
+  if (event.key === 'Enter' && (event.ctrlKey || event.metaKey))
+    /** @type {HTMLFormElement | null} */ (document.querySelector('.form'))?.requestSubmit();
 });
 
 const root = document.getElementById('app');
-speak().then(() => {
-  root.textContent = '';
-  render(html`<${App} />`, root);
-}).catch(complain);
+speak()
+  .then(() => {
+    root.textContent = '';
+    render(html`<${App} />`, root);
+  })
+  .catch(complain);

@@ -13,7 +13,22 @@ const SHOWN = 4;
 const CHART = { width: 360, height: 96, left: 6, right: 6, top: 6, bottom: 6 };
 
 /** Columns and units of a file, to be confirmed. */
-export function Matching({ id, draft, filled, setDraft, columns, measured, most, others, conditions, rows, isMore, accept, cancel, label }) {
+export function Matching({
+  id,
+  draft,
+  filled,
+  setDraft,
+  columns,
+  measured,
+  most,
+  others,
+  conditions,
+  rows,
+  isMore,
+  accept,
+  cancel,
+  label,
+}) {
   const { file, matches } = draft;
   const set = (column, match) => setDraft({ ...draft, matches: { ...matches, [column]: match } });
   const isNeeded = ({ name, required }) => required || measured.includes(name);
@@ -24,17 +39,34 @@ export function Matching({ id, draft, filled, setDraft, columns, measured, most,
   const unitless = columns.filter(isUnitless);
   const missing = columns.filter(({ name, required }) => required && !matches[name]);
   const isUnmeasured = measured.length > 0 && !measured.some(name => matches[name]);
-  const labelled = names => columns.filter(({ name }) => names.includes(name)).map(({ name, schema }) => labelOf(name, schema)).join(', ');
+  const labelled = names =>
+    columns
+      .filter(({ name }) => names.includes(name))
+      .map(({ name, schema }) => labelOf(name, schema))
+      .join(', ');
   // Numbers that look like sizes where deviations are asked for: which they are is said by whoever knows.
   const asked = columns.filter(({ name }) => matches[name]?.size !== undefined && matches[name].less === null);
   const isLong = filled.rows.length + (isMore ? rows : 0) > most;
   const empty = file.rows.length - filled.rows.length;
-  const isReady = missing.length === 0 && unitless.length === 0 && asked.length === 0 && !isUnmeasured && !isLong && filled.rows.length > 0 && Object.values(matches).some(Boolean);
-  const unitFault = ({ name, schema }) => (matches[name].said === null ? t('unit_missing', { name: labelOf(name, schema) }) : t('unit_unknown', { name: labelOf(name, schema), unit: matches[name].said }));
+  const isReady =
+    missing.length === 0 &&
+    unitless.length === 0 &&
+    asked.length === 0 &&
+    !isUnmeasured &&
+    !isLong &&
+    filled.rows.length > 0 &&
+    Object.values(matches).some(Boolean);
+  const unitFault = ({ name, schema }) =>
+    matches[name].said === null
+      ? t('unit_missing', { name: labelOf(name, schema) })
+      : t('unit_unknown', { name: labelOf(name, schema), unit: matches[name].said });
   const titleOf = ({ title, index }) => title || t('column_number', { number: index + 1 });
   const titles = list => list.map(titleOf).join('; ');
   const pick = ({ name, schema }, text) => {
-    if (text === '') { set(name, undefined); return; }
+    if (text === '') {
+      set(name, undefined);
+      return;
+    }
     const index = Number(text);
     settle({ name, schema }, { index, isGuess: false, ...unitRead(file.header[index], schema) });
   };
@@ -60,9 +92,14 @@ export function Matching({ id, draft, filled, setDraft, columns, measured, most,
               <option value="">${t('no_column')}</option>
               ${file.header.map((title, index) => html`<option value=${index}>${titleOf({ title, index })}${file.rows[0]?.[index] ? ` (${file.rows[0][index]} …)` : ''}</option>`)}
             </select>${match?.isGuess && html`<span class="guessed">${t('guessed')}</span>`}</td>
-            <td class="unit-cell">${match && (units.length > 1 ? html`<select aria-label=${`${labelOf(name, schema)}: ${t('unit')}`} aria-invalid=${isOpen ? 'true' : undefined} value=${match.unit ?? ''} onChange=${event => settle(column, { ...match, unit: event.currentTarget.value })}>
+            <td class="unit-cell">${
+              match &&
+              (units.length > 1
+                ? html`<select aria-label=${`${labelOf(name, schema)}: ${t('unit')}`} aria-invalid=${isOpen ? 'true' : undefined} value=${match.unit ?? ''} onChange=${event => settle(column, { ...match, unit: event.currentTarget.value })}>
               ${match.unit === null && html`<option value="" disabled>${t('choose_unit')}</option>`}
-              ${units.map(unit => html`<option value=${unit}>${unitSymbol(unit) || '1'}</option>`)}</select>` : unitOf(schema))}</td>
+              ${units.map(unit => html`<option value=${unit}>${unitSymbol(unit) || '1'}</option>`)}</select>`
+                : unitOf(schema))
+            }</td>
           </tr>`;
         })}</tbody></table>
       ${!all && columns.length > shown.length && html`<button type="button" class="more" onClick=${() => setAll(true)}>${t('more_fields', { count: columns.length - shown.length })}</button>`}
@@ -90,31 +127,44 @@ function Sizes({ column, match, set }) {
     <div class="sizes-asked" role="group" aria-label=${t('sizes_or_deviations')}>
       <p class=${match.less === null ? 'fault' : ''}><span>${t('looks_like_sizes', { name: labelOf(column.name, column.schema), size: number(match.size) })}</span></p>
       <div class="line"><button type="button" aria-pressed=${match.less > 0} disabled=${!isRead} onClick=${() => set({ ...match, less: nominal.value })}>${t('take_off')}</button>
-        <input type="text" inputmode="decimal" aria-label=${t('nominal_size')} aria-invalid=${isRead ? undefined : 'true'} value=${text} onInput=${event => { setText(event.currentTarget.value); if (match.less) set({ ...match, less: null }); }} /><span class="unit">${unitSymbol('mm')}</span></div>
+        <input type="text" inputmode="decimal" aria-label=${t('nominal_size')} aria-invalid=${isRead ? undefined : 'true'} value=${text} onInput=${event => {
+          setText(event.currentTarget.value);
+          if (match.less) set({ ...match, less: null });
+        }} /><span class="unit">${unitSymbol('mm')}</span></div>
       <button type="button" aria-pressed=${match.less === 0} onClick=${() => set({ ...match, less: 0 })}>${t('are_deviations')}</button>
     </div>`;
 }
 
 /** What the table will be: its first rows, and the measured numbers over their places. */
 function Chart({ file, columns, matches, measured }) {
-  const used = columns.filter(({ name, schema }) => matches[name] && schema.type === 'number' && !(hasUnit(schema) && matches[name].unit === null));
+  const used = columns.filter(
+    ({ name, schema }) => matches[name] && schema.type === 'number' && !(hasUnit(schema) && matches[name].unit === null),
+  );
   const y = used.find(({ name }) => measured.includes(name)) ?? used.filter(({ required }) => required).at(-1);
   const x = used.find(column => column !== y && column.required) ?? used.find(column => column !== y);
-  const columnOf = column => numbersOf(file, matches[column.name]).map(value => {
-    if (value === null || Number.isNaN(value)) return null;
-    const { unit, less } = matches[column.name];
-    const own = column.schema['x-unit'];
-    const shown = hasUnit(column.schema) ? converted(value, unit, own) : value;
-    return less ? shown - converted(less, 'mm', own) : shown;
-  });
-  const drawn = useMemo(() => (y ? { xs: x ? columnOf(x) : file.rows.map((_, index) => index + 1), ys: columnOf(y) } : null), [file, matches]);
+  const columnOf = column =>
+    numbersOf(file, matches[column.name]).map(value => {
+      if (value === null || Number.isNaN(value)) return null;
+      const { unit, less } = matches[column.name];
+      const own = column.schema['x-unit'];
+      const shown = hasUnit(column.schema) ? converted(value, unit, own) : value;
+      return less ? shown - converted(less, 'mm', own) : shown;
+    });
+  const drawn = useMemo(
+    () => (y ? { xs: x ? columnOf(x) : file.rows.map((_, index) => index + 1), ys: columnOf(y) } : null),
+    [file, matches],
+  );
   if (!drawn) return html`<p class="quiet">${t('chart_waits')}</p>`;
   const [xSpan, ySpan] = [extent(drawn.xs, 'linear'), extent(drawn.ys, 'linear')];
   const unread = drawn.ys.filter(value => value === null).length;
   if (!xSpan || !ySpan) return html`<p class="fault"><span>${t('no_numbers', { name: labelOf(y.name, y.schema) })}</span></p>`;
   const { width, height, left, right, top, bottom } = CHART;
-  const place = (h, v) => [left + ((h - xSpan[0]) / (xSpan[1] - xSpan[0] || 1)) * (width - left - right), height - bottom - ((v - ySpan[0]) / (ySpan[1] - ySpan[0] || 1)) * (height - top - bottom)];
-  const named = (column, span) => `${labelOf(column.name, column.schema)}: ${number(span[0], 4)} … ${number(span[1], 4)} ${unitOf(column.schema)}`.trim();
+  const place = (h, v) => [
+    left + ((h - xSpan[0]) / (xSpan[1] - xSpan[0] || 1)) * (width - left - right),
+    height - bottom - ((v - ySpan[0]) / (ySpan[1] - ySpan[0] || 1)) * (height - top - bottom),
+  ];
+  const named = (column, span) =>
+    `${labelOf(column.name, column.schema)}: ${number(span[0], 4)} … ${number(span[1], 4)} ${unitOf(column.schema)}`.trim();
   const told = [named(y, ySpan), x ? named(x, xSpan) : t('rows_in_order')];
   // A table whose rows do not go on in one direction is one of points.
   const isLine = drawn.xs.every((value, index) => index === 0 || value >= drawn.xs[index - 1]);
@@ -124,5 +174,11 @@ function Chart({ file, columns, matches, measured }) {
       ${isLine && points.length > 1 ? html`<path class="line command" d=${linePath(drawn.xs, drawn.ys, place, width)} />` : html`<path class="points command" d=${points.map(([h, v]) => `M${h.toFixed(1)} ${v.toFixed(1)}m-2 0h4m-2-2v4`).join('')} />`}</svg>
       <figcaption>${told.map(text => html`<span key=${text}>${text}</span>`)}${unread > 0 && html`<span class="fault">${t('cells_unread', { count: unread })}</span>`}</figcaption></figure>
     <div class="grid-scroll" tabindex="0" role="region" aria-label=${t('first_rows')}><table class="grid still"><thead><tr>${used.map(({ name, schema }) => html`<th scope="col">${labelOf(name, schema)} <span class="unit">${unitOf(schema)}</span></th>`)}</tr></thead>
-      <tbody>${file.rows.slice(0, SHOWN).map((_, row) => html`<tr key=${row}>${used.map(column => { const value = columnOf(column)[row]; return html`<td>${value === null ? '' : number(value, 6)}</td>`; })}</tr>`)}</tbody></table></div>`;
+      <tbody>${file.rows.slice(0, SHOWN).map(
+        (_, row) =>
+          html`<tr key=${row}>${used.map(column => {
+            const value = columnOf(column)[row];
+            return html`<td>${value === null ? '' : number(value, 6)}</td>`;
+          })}</tr>`,
+      )}</tbody></table></div>`;
 }

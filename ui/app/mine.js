@@ -7,10 +7,18 @@ const PARTS = 'precut-own-parts';
 const LAST = 'precut-last';
 
 function read(store, name) {
-  try { return JSON.parse(store().getItem(name)) ?? {}; } catch { return {}; }
+  try {
+    return JSON.parse(store().getItem(name)) ?? {};
+  } catch {
+    return {};
+  }
 }
 function write(store, name, value) {
-  try { store().setItem(name, JSON.stringify(value)); } catch { /* private browsing: known until the page is left */ }
+  try {
+    store().setItem(name, JSON.stringify(value));
+  } catch {
+    /* private browsing: known until the page is left */
+  }
 }
 const lasting = () => localStorage;
 const ofTab = () => sessionStorage;
@@ -18,7 +26,9 @@ const ofTab = () => sessionStorage;
 /** The kept parts by what they are kept under. */
 const parts = cell(read(lasting, PARTS));
 // Another tab keeps its parts, too.
-globalThis.addEventListener?.('storage', event => { if (event.key === PARTS) parts.set(read(lasting, PARTS)); });
+globalThis.addEventListener?.('storage', event => {
+  if (event.key === PARTS) parts.set(read(lasting, PARTS));
+});
 
 function put(next) {
   parts.set(next);
@@ -40,7 +50,7 @@ export function useKept(own) {
 /** What a part is kept under: its name with its type in the contract, so that it fits wherever it is put; `null` for a part
  *  of no type of its own, and for measured tables. */
 export function ownName(name, schema, root) {
-  const meant = [schema, ...schema.oneOf ?? [], ...schema.anyOf ?? [], ...schema.allOf ?? []];
+  const meant = [schema, ...(schema.oneOf ?? []), ...(schema.anyOf ?? []), ...(schema.allOf ?? [])];
   const reference = meant.find(part => part.$ref) ?? (schema.items?.$ref && schema.items);
   return reference && !resolve(schema, root)['x-table'] ? `${name} ${reference.$ref.split('/').at(-1)}` : null;
 }

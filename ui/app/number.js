@@ -6,7 +6,10 @@ import { unitIn, choicesOf, converted } from './units.js';
 /** `{ value }` (`null` for nothing), or `{ fault, values, choices }`: a code of the page's words, what stands in them, and
  *  the numbers between which to choose. `unit` is that of the field; the value comes in it. */
 export function read(text, unit) {
-  const plain = text.replace(/[\u00a0\u202f\u2009]/g, ' ').replace(/[−–]/g, '-').trim();
+  const plain = text
+    .replace(/[\u00a0\u202f\u2009]/g, ' ')
+    .replace(/[−–]/g, '-')
+    .trim();
   if (plain === '') return { value: null };
   const [, figures, tail] = /^([+-]?[\d.,' ]*\d[.,]?(?:\s*e[+-]?\d+)?)\s*(.*)$/i.exec(plain) ?? [];
   if (figures === undefined || /^[^a-zа-яµμ°%"″”]/i.test(tail)) return { fault: 'not_a_number' };
@@ -33,7 +36,10 @@ function readings(figures) {
   const [, sign, body, power = ''] = /^([+-]?)([\d.,' ]+)(e[+-]?\d+)?$/i.exec(figures) ?? [];
   // A group of thousands that lost its number begins with zeros.
   if (body === undefined || /^0\d/.test(body)) return [];
-  const made = text => { const value = Number(`${sign}${text}${power}`); return Number.isFinite(value) ? [value] : []; };
+  const made = text => {
+    const value = Number(`${sign}${text}${power}`);
+    return Number.isFinite(value) ? [value] : [];
+  };
   const marks = [...body.replace(/[\d]/g, '')];
   const kinds = [...new Set(marks)];
   if (marks.length === 0) return made(body);
@@ -44,7 +50,9 @@ function readings(figures) {
   if (kinds.length === 2) {
     // The last one parts the decimals, the other one the thousands.
     const isDecimal = last === '.' || last === ',';
-    return isDecimal && marks.filter(mark => mark === last).length === 1 && isGrouped(whole.split(kinds[0])) && digits.test(part) ? made(`${whole.split(kinds[0]).join('')}.${part}`) : [];
+    return isDecimal && marks.filter(mark => mark === last).length === 1 && isGrouped(whole.split(kinds[0])) && digits.test(part)
+      ? made(`${whole.split(kinds[0]).join('')}.${part}`)
+      : [];
   }
   if (kinds.length > 2) return [];
   if (last === ' ' || last === "'") return isGrouped([whole, part]) ? made(whole + part) : [];

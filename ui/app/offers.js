@@ -18,20 +18,23 @@ const numberAt = ({ output_schema: root }, result, path) => flat(root, result, r
 const signed = percent => `${percent < 0 ? '−' : '+'}${number(Math.abs(percent), 3)} %`;
 
 /** Whether it says what its numbers buy, or has better settings. */
-export const hasOffers = ({ output_schema: root }, result) => ['x-knobs', 'x-choices'].some(word => listsWith(word, root, result).some(({ items }) => items.length > 0));
+export const hasOffers = ({ output_schema: root }, result) =>
+  ['x-knobs', 'x-choices'].some(word => listsWith(word, root, result).some(({ items }) => items.length > 0));
 
 /** The numbers of a job that buy something, each one percent to the side on which it is looser. */
 export function knobsOf({ output_schema: root, input_schema: inputs }, { result, input }) {
-  return listsWith('x-knobs', root, result).flatMap(({ said, items }) => items.flatMap(item => {
-    const path = parts(item[said.pointer]);
-    const before = at(input, path);
-    const field = fieldAt(inputs, input, path);
-    const gain = item[said.gain];
-    if (typeof before !== 'number' || typeof gain !== 'number' || !field) return [];
-    const side = item[said.looser] === 'less' ? -1 : 1;
-    const after = Number((before * (1 + (side * STEP_PERCENT) / 100)).toPrecision(DIGITS));
-    return [{ pointer: item[said.pointer], path, label: field.label, field: field.schema, before, after, gain, of: parts(said.of) }];
-  }));
+  return listsWith('x-knobs', root, result).flatMap(({ said, items }) =>
+    items.flatMap(item => {
+      const path = parts(item[said.pointer]);
+      const before = at(input, path);
+      const field = fieldAt(inputs, input, path);
+      const gain = item[said.gain];
+      if (typeof before !== 'number' || typeof gain !== 'number' || !field) return [];
+      const side = item[said.looser] === 'less' ? -1 : 1;
+      const after = Number((before * (1 + (side * STEP_PERCENT) / 100)).toPrecision(DIGITS));
+      return [{ pointer: item[said.pointer], path, label: field.label, field: field.schema, before, after, gain, of: parts(said.of) }];
+    }),
+  );
 }
 
 /** The job with a choice in place of its setting: what it sets, without what would contradict it. */
@@ -47,7 +50,12 @@ export function Offers({ description, answer, isCurrent, apply }) {
   const root = description.output_schema;
   return html`
     <${Knobs} ...${{ description, answer, isCurrent, apply }} />
-    ${listsWith('x-choices', root, result).filter(({ items }) => items.length > 0).map(list => html`<${Choices} key=${list.label} ...${{ list, root, result }} apply=${item => apply(chosenJob(answer.job, result, item, list.said))} />`)}`;
+    ${listsWith('x-choices', root, result)
+      .filter(({ items }) => items.length > 0)
+      .map(
+        list =>
+          html`<${Choices} key=${list.label} ...${{ list, root, result }} apply=${item => apply(chosenJob(answer.job, result, item, list.said))} />`,
+      )}`;
 }
 
 function Knobs({ description, answer, isCurrent, apply }) {
@@ -72,10 +80,12 @@ function Knobs({ description, answer, isCurrent, apply }) {
   return html`
     <section class="picture knobs" aria-label=${t('knobs_title', { name: within(goal.label) })}>
       <h2>${t('knobs_title', { name: within(goal.label) })}</h2>
-      <ul>${shown.map(knob => html`<li key=${knob.pointer}><button type="button" data-pointer=${knob.pointer} onClick=${() => press(knob)}>
+      <ul>${shown.map(
+        knob => html`<li key=${knob.pointer}><button type="button" data-pointer=${knob.pointer} onClick=${() => press(knob)}>
         <span class="knob-name">${knob.label} <small>${number(knob.before, DIGITS)} → ${number(knob.after, DIGITS)} ${unitOf(knob.field)}</small></span>
         <svg viewBox=${`0 0 ${WIDTH} 14`} preserveAspectRatio="none" aria-hidden="true"><rect class="bar-given" x="0" y="1" width=${Math.max((WIDTH * knob.gain) / most, 4)} height="12" /></svg>
-        <span class="number">${signed(-knob.gain)}</span></button></li>`)}</ul>
+        <span class="number">${signed(-knob.gain)}</span></button></li>`,
+      )}</ul>
       ${knobs.length > shown.length && html`<button type="button" class="more" onClick=${() => setAll(true)}>${t('and_more', { count: knobs.length - shown.length })}</button>`}
       <p class="quiet hint knob-came" role="status">${came === null ? t('knobs_hint') : t('knob_came', { name: pressed.label, goal: within(goal.label), before: number(pressed.goal, 5), after: number(goal.value, 5), unit: goal.unit, came: signed(came), told: signed(-pressed.gain) })}</p>
     </section>`;
@@ -91,8 +101,10 @@ function Choices({ list, root, result, apply }) {
   return html`
     <section class="picture offers" aria-label=${label}>
       <h2>${label}</h2>
-      <ol>${items.map((item, index) => html`<li key=${index}>
+      <ol>${items.map(
+        (item, index) => html`<li key=${index}>
         <dl>${flat(schema, item, root).map(row => html`<div key=${row.path.join('/')} title=${row.description}><dt>${row.label}</dt><dd>${shownValue(row.value, row.schema, null, 4)}${row.unit && html`<small> ${row.unit}</small>`}${gainOf(row) && html` <small class="gain">${gainOf(row)}</small>`}</dd></div>`)}</dl>
-        <button type="button" onClick=${() => apply(item)}>${t('use_this')}<span class="hidden">: ${label} ${index + 1}</span></button></li>`)}</ol>
+        <button type="button" onClick=${() => apply(item)}>${t('use_this')}<span class="hidden">: ${label} ${index + 1}</span></button></li>`,
+      )}</ol>
     </section>`;
 }

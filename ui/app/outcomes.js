@@ -17,7 +17,15 @@ export function useOutcomes() {
   const [outcomes, setOutcomes] = useState(kept ?? {});
   useEffect(() => {
     if (kept) return;
-    fetch(new URL('./outcomes.json', import.meta.url)).then(answer => (answer.ok ? answer.json() : {})).then(found => { kept = found; setOutcomes(found); }, () => {});
+    fetch(new URL('./outcomes.json', import.meta.url))
+      .then(answer => (answer.ok ? answer.json() : {}))
+      .then(
+        found => {
+          kept = found;
+          setOutcomes(found);
+        },
+        () => {},
+      );
   }, []);
   return outcomes;
 }

@@ -29,37 +29,37 @@ const edges = (x, isLog) => {
 
 export function abscissae(figure) {
   const isLog = figure.x.scale === 'logarithmic';
-  return figure.panels.flatMap(panel => panel.items.flatMap(item => (!isDrawn(item) ? [] : item.kind === 'ribbon' ? [...item.x, ...item.x_end] : item.kind === 'heat_map' ? edges(item.x, isLog) : item.x)));
+  return figure.panels.flatMap(panel =>
+    panel.items.flatMap(item =>
+      !isDrawn(item) ? [] : item.kind === 'ribbon' ? [...item.x, ...item.x_end] : item.kind === 'heat_map' ? edges(item.x, isLog) : item.x,
+    ),
+  );
+}
+
+/** Of one side of an item what is seen of it in a view. */
+function seenOf({ kind, x }, side, view) {
+  if (!view) return side;
+  const inside = at => x[at] >= view[0] && x[at] <= view[1];
+  const found = [];
+  side.forEach((value, at) => {
+    if (inside(at)) found.push(value);
+    // The points next to the view on either side: the curve enters from there.
+    else if (kind !== 'points' && (inside(at - 1) || inside(at + 1))) found.push(value);
+    // Of a view between two points the curve is all that there is.
+    else if (kind !== 'points' && x[at - 1] < view[0] && x[at] > view[1]) found.push(side[at - 1], value);
+  });
+  return found;
 }
 
 export function ordinates(panel, view) {
-  const inside = view ? x => x >= view[0] && x <= view[1] : () => true;
-  const found = [];
-  for (const item of panel.items) {
-    const sides = { line: [item.y], bars: [item.y], points: [item.y], outline: [item.y], band: [item.lower, item.upper], heat_map: [] }[item.kind] || [];
-    for (const side of sides) {
-      let before = null;
-      for (let index = 0; index < side.length; index += 1) {
-        const within = inside(item.x[index]);
-        if (within) {
-          if (before !== null) { found.push(before); before = null; }
-          found.push(side[index]);
-        } else if (view && item.kind !== 'points') {
-          // The point next to the view on either side: the curve enters from there.
-          if (index > 0 && inside(item.x[index - 1])) found.push(side[index]);
-          // Of a view between two points the curve is all that there is.
-          else if (index > 0 && item.x[index - 1] < view[0] && item.x[index] > view[1]) found.push(side[index - 1], side[index]);
-          before = side[index];
-        }
-      }
-    }
-    if (item.kind === 'heat_map') {
-      const half = item.y.length > 1 ? (item.y[1] - item.y[0]) / 2 : 0;
-      found.push(Math.max(item.y[0] - half, item.y[0] > 0 ? item.y[0] / 10 : -Infinity), item.y.at(-1) + half);
-    }
-    if (item.kind === 'bars') found.push(0);
-  }
-  return found;
+  return panel.items.flatMap(item => {
+    const sides = { line: [item.y], bars: [item.y], points: [item.y], outline: [item.y], band: [item.lower, item.upper] }[item.kind] ?? [];
+    const found = sides.flatMap(side => seenOf(item, side, view));
+    if (item.kind === 'bars') return [...found, 0];
+    if (item.kind !== 'heat_map') return found;
+    const half = item.y.length > 1 ? (item.y[1] - item.y[0]) / 2 : 0;
+    return [Math.max(item.y[0] - half, item.y[0] > 0 ? item.y[0] / 10 : -Infinity), item.y.at(-1) + half];
+  });
 }
 
 /** What has a value at the cursor: its room is there before the value, so that nothing moves. */
@@ -86,7 +86,13 @@ export function Head({ panel, ghost, style, hidden, toggle, at, over = null, fac
     return read === null || read === undefined ? null : readDigits(read, span);
   };
   const map = panel.items.find(item => item.kind === 'heat_map');
-  const stretch = at === null ? null : panel.items.filter(({ kind }) => kind === 'ribbon').map(item => stretchAt(item, at)).find(Boolean);
+  const stretch =
+    at === null
+      ? null
+      : panel.items
+          .filter(({ kind }) => kind === 'ribbon')
+          .map(item => stretchAt(item, at))
+          .find(Boolean);
   return html`
     <div class="panel-head">
       <span class="axis-name">${polar ? t('magnified', { name: axisName(panel.y, factor) }) : axisName(panel.y, factor)}${panel.items.some(({ kind }) => kind === 'ribbon') && html` <output class="stretch">${stretch?.place}</output>`}</span>
@@ -103,7 +109,8 @@ export function Head({ panel, ghost, style, hidden, toggle, at, over = null, fac
 }
 
 function Swatch({ item, look }) {
-  if (item.kind === 'ribbon') return html`<svg class="swatch" width="28" height="14" viewBox="0 0 28 14" aria-hidden="true"><defs>${weaves(`legend-${item.name}`)}</defs>${ribbonSample(item, look, `legend-${item.name}`)}</svg>`;
+  if (item.kind === 'ribbon')
+    return html`<svg class="swatch" width="28" height="14" viewBox="0 0 28 14" aria-hidden="true"><defs>${weaves(`legend-${item.name}`)}</defs>${ribbonSample(item, look, `legend-${item.name}`)}</svg>`;
   const shape = {
     line: html`<path class=${`line ${look}`} d="M1 7H27" />`,
     band: html`<rect class=${`band ${look}`} x="1" y="2" width="26" height="10" />`,
@@ -125,10 +132,12 @@ function Key({ item, now }) {
 
 /** A panel in words, for those who cannot see it. */
 export function describe(panel, figure) {
-  const spans = panel.items.filter(item => item.name && isDrawn(item) && (item.y || item.lower || item.places)).map(item => {
-    if (item.places) return `${item.text} ${item.places.join(' ')}`;
-    const span = extent(item.y || [...item.lower, ...item.upper], 'linear');
-    return span ? `${item.text} ${number(span[0], 3)} … ${number(span[1], 3)}` : item.text;
-  });
+  const spans = panel.items
+    .filter(item => item.name && isDrawn(item) && (item.y || item.lower || item.places))
+    .map(item => {
+      if (item.places) return `${item.text} ${item.places.join(' ')}`;
+      const span = extent(item.y || [...item.lower, ...item.upper], 'linear');
+      return span ? `${item.text} ${number(span[0], 3)} … ${number(span[1], 3)}` : item.text;
+    });
   return `${axisName(panel.y)} (${axisName(figure.x)}): ${spans.join('; ')}`;
 }

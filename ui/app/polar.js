@@ -66,14 +66,17 @@ export function Polar({ figure, pinned, width, height, least, style, hidden, tog
         const [c, s] = [Math.cos((angle * Math.PI) / 180), Math.sin((angle * Math.PI) / 180)];
         return html`<text x=${centre[0] + (radius + (hasGlyphs ? 38 : 15)) * c} y=${centre[1] - (radius + (hasGlyphs ? 36 : 13)) * s + 4}>${angle}°</text>`;
       })}</g>
-      ${turned !== null && html`<path class="cursor" d=${spoke(turned, radius * 0.1, radius)} />
+      ${
+        turned !== null &&
+        html`<path class="cursor" d=${spoke(turned, radius * 0.1, radius)} />
         <text class="x-name" x=${centre[0]} y=${centre[1] + 5} text-anchor="middle">${number(turned, 4)}°</text>
         ${lines.map(item => {
           const value = valueAt(item.x, item.y, turned);
           if (value === null || value === undefined) return null;
           const [h, v] = place(turned, value);
           return html`<circle class=${`dot ${style(item)}`} cx=${h} cy=${v} r="3.4" />`;
-        })}`}
+        })}`
+      }
     </svg>
     ${onPut && !isPrinting && html`<${RoundHandles} settings=${settingsOf(figure)} ...${{ centre, place, effect }} put=${(setting, angle, how) => onPut(setting, angle, 0, how)} />`}</div>`;
 }

@@ -14,10 +14,19 @@ export function useProbe(id, tag, job) {
   const line = useRef(null);
   if (!line.current) line.current = { wanted: null, busy: false, gone: false, kept: new Map(), control: new AbortController() };
   const own = line.current;
-  useEffect(() => () => { own.gone = true; own.control.abort(); }, []);
+  useEffect(
+    () => () => {
+      own.gone = true;
+      own.control.abort();
+    },
+    [],
+  );
   useEffect(() => {
     own.wanted = tag === null ? null : { tag, job };
-    if (tag === null) { setFound(null); return; }
+    if (tag === null) {
+      setFound(null);
+      return;
+    }
     if (!own.busy) next();
   }, [tag]);
 
@@ -45,7 +54,7 @@ async function fetched(id, { tag, job: made }, signal) {
   try {
     // Too many at once: asked again when the service says.
     job = await api.patient(() => made(signal), signal);
-    return { tag, job, ...await api.patient(() => api.answered(id, job, signal), signal) };
+    return { tag, job, ...(await api.patient(() => api.answered(id, job, signal), signal)) };
   } catch (error) {
     if (error.name === 'AbortError') return null;
     return { tag, job, problem: error.problem || { title: error.message } };

@@ -9,7 +9,40 @@ const MOST_HITS = 12;
 /** Where the records of a kind are listed. */
 export const FOLDER = { machine: 'machines', tool: 'tools', material: 'materials' };
 
-const CYRILLIC = ['a', 'b', 'v', 'g', 'd', 'e', 'zh', 'z', 'i', 'y', 'k', 'l', 'm', 'n', 'o', 'p', 'r', 's', 't', 'u', 'f', 'x', 'ts', 'ch', 'sh', 'shch', '', 'y', '', 'e', 'yu', 'ya'];
+const CYRILLIC = [
+  'a',
+  'b',
+  'v',
+  'g',
+  'd',
+  'e',
+  'zh',
+  'z',
+  'i',
+  'y',
+  'k',
+  'l',
+  'm',
+  'n',
+  'o',
+  'p',
+  'r',
+  's',
+  't',
+  'u',
+  'f',
+  'x',
+  'ts',
+  'ch',
+  'sh',
+  'shch',
+  '',
+  'y',
+  '',
+  'e',
+  'yu',
+  'ya',
+];
 const LATIN = { ё: 'e', ä: 'a', á: 'a', à: 'a', ö: 'o', ó: 'o', ü: 'u', ú: 'u', ß: 'ss' };
 /** A name as the service compares it: small letters and digits alone, Cyrillic letters of GOST in Latin ones, `kh` as `x`. */
 export function fold(text) {
@@ -24,7 +57,10 @@ export function fold(text) {
 }
 
 /** Everything that a record is called. */
-const namesOf = record => [record.name, ...Object.values(record.names || {}).flat(), record.insert, record.holder, record.title].filter(name => typeof name === 'string');
+const namesOf = record =>
+  [record.name, ...Object.values(record.names || {}).flat(), record.insert, record.holder, record.title].filter(
+    name => typeof name === 'string',
+  );
 
 /** The records as they are searched. */
 export const indexOf = records => (records || []).map(record => ({ record, folded: namesOf(record).map(fold) }));
@@ -40,26 +76,37 @@ export function find(index, text) {
     if (places.length > 0) return 2;
     return words.length > 1 && words.every(word => folded.some(name => name.includes(word))) ? 3 : null;
   };
-  return index.map((entry, place) => ({ ...entry, rank: rank(entry), place })).filter(entry => entry.rank !== null)
-    .sort((one, other) => one.rank - other.rank || one.place - other.place).map(entry => entry.record);
+  return index
+    .map((entry, place) => ({ ...entry, rank: rank(entry), place }))
+    .filter(entry => entry.rank !== null)
+    .sort((one, other) => one.rank - other.rank || one.place - other.place)
+    .map(entry => entry.record);
 }
 
 /** What a text says of a tool in ISO codes, `CNMG120408 PCLNR2525M12`; `null` where it says nothing. */
 export function codesOf(text) {
-  const words = text.trim().toUpperCase().split(/[\s,;]+/).filter(Boolean);
+  const words = text
+    .trim()
+    .toUpperCase()
+    .split(/[\s,;]+/)
+    .filter(Boolean);
   const insert = words.find(word => /^[A-Z]{4}\d\d[0-9T]\d/.test(word));
   const holder = words.find(word => word !== insert && /^([A-Z]\d{2}[A-Z]-)?[A-Z]{5}\d/.test(word));
-  if (!insert && !holder || words.length !== [insert, holder].filter(Boolean).length) return null;
+  if ((!insert && !holder) || words.length !== [insert, holder].filter(Boolean).length) return null;
   return { ...(insert && { insert }), ...(holder && { holder }) };
 }
 
 /** The name or the codes that stand in a job. */
-export const nameOf = value => (typeof value === 'string' ? value : value?.name ?? ([value?.insert, value?.holder].filter(Boolean).join(' ') || ''));
+export const nameOf = value =>
+  typeof value === 'string' ? value : (value?.name ?? ([value?.insert, value?.holder].filter(Boolean).join(' ') || ''));
 
 /** A job's value with another name in it. What stands beside the name stays, and so do the fields that a calculator has
  *  there itself. */
 export function named(value, name, isDeclared) {
-  const beside = value && typeof value === 'object' ? Object.fromEntries(Object.entries(value).filter(([field]) => !['name', 'insert', 'holder'].includes(field))) : {};
+  const beside =
+    value && typeof value === 'object'
+      ? Object.fromEntries(Object.entries(value).filter(([field]) => !['name', 'insert', 'holder'].includes(field)))
+      : {};
   const isAlone = Object.keys(beside).length === 0 && !isDeclared;
   const codes = name && typeof name === 'object';
   if (!name) return isDeclared && Object.keys(beside).length > 0 ? beside : undefined;
@@ -70,7 +117,11 @@ export function named(value, name, isDeclared) {
 export function overruled(said) {
   const { origins, resources } = said || {};
   const numbers = (origins || []).filter(({ parts: of }) => of.every(({ from }) => from === 'job')).map(origin => origin.pointer);
-  const ofParts = resources?.material ? Object.keys(resources).filter(place => !FOLDER[place]).map(place => `/${place.replace('_', '/')}`) : [];
+  const ofParts = resources?.material
+    ? Object.keys(resources)
+        .filter(place => !FOLDER[place])
+        .map(place => `/${place.replace('_', '/')}`)
+    : [];
   return [...ofParts, ...numbers];
 }
 
@@ -100,21 +151,39 @@ function Picker({ kind, records, value, isDeclared, set, faults, context }) {
   const name = nameOf(value);
   const groups = kind === 'material' ? ['P', 'M', 'K', 'N', 'S', 'H'] : [];
   const inGroup = record => !group || record.iso513_group === group;
-  const all = draft === null ? [] : (draft.trim() === '' || draft === name ? index.map(({ record }) => record) : find(index, draft)).filter(inGroup);
+  const all =
+    draft === null ? [] : (draft.trim() === '' || draft === name ? index.map(({ record }) => record) : find(index, draft)).filter(inGroup);
   const hits = group || draft?.trim() ? all.slice(0, group ? all.length : MOST_HITS) : all;
   const codes = kind === 'tool' && draft ? codesOf(draft) : null;
   const isOpen = draft !== null && (hits.length > 0 || codes);
-  const close = () => { setDraft(null); setChosen(0); setGroup(''); };
-  const put = next => { set(named(value, next, isDeclared)); close(); };
+  const close = () => {
+    setDraft(null);
+    setChosen(0);
+    setGroup('');
+  };
+  const put = next => {
+    set(named(value, next, isDeclared));
+    close();
+  };
   const take = () => {
-    if (draft === null || draft === name) { close(); return; }
+    if (draft === null || draft === name) {
+      close();
+      return;
+    }
     if (draft.trim() === '') put(null);
     else if (hits[chosen] && (!codes || fold(draft) === fold(hits[chosen].name))) put(hits[chosen].name);
     else put(codes || draft.trim());
   };
   const onKeyDown = event => {
-    if (event.key === 'Escape') { close(); return; }
-    if (event.key === 'Enter') { event.preventDefault(); take(); return; }
+    if (event.key === 'Escape') {
+      close();
+      return;
+    }
+    if (event.key === 'Enter') {
+      event.preventDefault();
+      take();
+      return;
+    }
     const step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
     if (!step) return;
     event.preventDefault();
@@ -127,16 +196,48 @@ function Picker({ kind, records, value, isDeclared, set, faults, context }) {
       <label class="label" for=${id}>${t(`record_${kind}`)}</label>
       <span class="control wide"><input id=${id} type="text" role="combobox" autocomplete="off" spellcheck=${false} aria-expanded=${isOpen ? 'true' : 'false'} aria-controls=${`${id}-hits`} aria-autocomplete="list"
         aria-activedescendant=${isOpen && hits[chosen] ? `${id}-${chosen}` : undefined} aria-invalid=${faults.length > 0 ? 'true' : undefined} disabled=${context.disabled}
-        value=${draft ?? name} placeholder=${t(`record_${kind}_hint`)} onFocus=${event => { setDraft(name); event.currentTarget.select(); }} onBlur=${take}
-        onInput=${event => { setDraft(event.currentTarget.value); setChosen(0); }} onKeyDown=${onKeyDown} />
+        value=${draft ?? name} placeholder=${t(`record_${kind}_hint`)} onFocus=${event => {
+          setDraft(name);
+          event.currentTarget.select();
+        }} onBlur=${take}
+        onInput=${event => {
+          setDraft(event.currentTarget.value);
+          setChosen(0);
+        }} onKeyDown=${onKeyDown} />
         ${name && draft === null && html`<button type="button" class="icon" data-act="clear" title=${t('remove')} aria-label=${`${t('remove')}: ${t(`record_${kind}`)}`} onClick=${() => put(null)}>×</button>`}</span>
       ${record?.title && draft === null && html`<p class="record-title">${record.title}</p>`}
-      ${draft !== null && groups.length > 0 && html`<div class="chips" role="group" aria-label=${t('record_group')}>${groups.map(word => html`
-        <button type="button" key=${word} aria-pressed=${group === word} onMouseDown=${event => event.preventDefault()} onClick=${() => { setGroup(group === word ? '' : word); setChosen(0); }}>${word}</button>`)}</div>`}
-      ${isOpen && html`<ul class="hits" role="listbox" id=${`${id}-hits`} aria-label=${t(`record_${kind}`)}>
-        ${codes && html`<li role="option" aria-selected="false" onMouseDown=${event => { event.preventDefault(); put(codes); }}><strong>${[codes.insert, codes.holder].filter(Boolean).join(' ')}</strong> <span>${t('record_by_codes')}</span></li>`}
-        ${hits.map((hit, place) => html`<li key=${hit.name} id=${`${id}-${place}`} role="option" aria-selected=${place === chosen ? 'true' : 'false'} onMouseDown=${event => { event.preventDefault(); put(hit.name); }}>
-          <strong>${hit.name}</strong> <span>${hit.title}${hit.built_in === false ? ` · ${t('record_own')}` : ''}</span></li>`)}</ul>`}
+      ${
+        draft !== null &&
+        groups.length > 0 &&
+        html`<div class="chips" role="group" aria-label=${t('record_group')}>${groups.map(
+          word => html`
+        <button type="button" key=${word} aria-pressed=${group === word} onMouseDown=${event => event.preventDefault()} onClick=${() => {
+          setGroup(group === word ? '' : word);
+          setChosen(0);
+        }}>${word}</button>`,
+        )}</div>`
+      }
+      ${
+        isOpen &&
+        html`<ul class="hits" role="listbox" id=${`${id}-hits`} aria-label=${t(`record_${kind}`)}>
+        ${
+          codes &&
+          html`<li role="option" aria-selected="false" onMouseDown=${event => {
+            event.preventDefault();
+            put(codes);
+          }}><strong>${[codes.insert, codes.holder].filter(Boolean).join(' ')}</strong> <span>${t('record_by_codes')}</span></li>`
+        }
+        ${hits.map(
+          (
+            hit,
+            place,
+          ) => html`<li key=${hit.name} id=${`${id}-${place}`} role="option" aria-selected=${place === chosen ? 'true' : 'false'} onMouseDown=${event => {
+            event.preventDefault();
+            put(hit.name);
+          }}>
+          <strong>${hit.name}</strong> <span>${hit.title}${hit.built_in === false ? ` · ${t('record_own')}` : ''}</span></li>`,
+        )}</ul>`
+      }
       ${faults.length > 0 && html`<p class="fault">${faults.map(fault => html`<span>${fault.detail}</span>`)}</p>`}
     </div>`;
 }
@@ -150,10 +251,16 @@ export function Records({ kinds, declared, value, onChange, libraries, said, con
   const useRecords = () => onChange(ofJob.reduce((job, place) => changed(job, parts(place), undefined), value));
   return html`
     <section class="records" aria-label=${t('records')}>
-      ${kinds.map(kind => html`<${Picker} key=${kind} kind=${kind} records=${libraries?.[FOLDER[kind]]} value=${value[kind]} isDeclared=${declared.includes(kind)} faults=${below(pointer([kind]))} context=${context}
-        set=${part => onChange(changed(value, [kind], part))} />`)}
+      ${kinds.map(
+        kind => html`<${Picker} key=${kind} kind=${kind} records=${libraries?.[FOLDER[kind]]} value=${value[kind]} isDeclared=${declared.includes(kind)} faults=${below(pointer([kind]))} context=${context}
+        set=${part => onChange(changed(value, [kind], part))} />`,
+      )}
       <p class="quiet"><a href="#/library">${t('records_mine')}</a></p>
-      ${kinds.some(kind => nameOf(value[kind])) && there.length > 0 && html`<p class="quiet" role="status">${plural('record_fills', filled)}
-        ${ofJob.length > 0 && html` <span>${plural('record_overruled', ofJob.length)}</span> <button type="button" class="quiet-button" data-act="use-records" onClick=${useRecords}>${t('record_use')}</button>`}</p>`}
+      ${
+        kinds.some(kind => nameOf(value[kind])) &&
+        there.length > 0 &&
+        html`<p class="quiet" role="status">${plural('record_fills', filled)}
+        ${ofJob.length > 0 && html` <span>${plural('record_overruled', ofJob.length)}</span> <button type="button" class="quiet-button" data-act="use-records" onClick=${useRecords}>${t('record_use')}</button>`}</p>`
+      }
     </section>`;
 }

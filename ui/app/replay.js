@@ -40,7 +40,10 @@ export function replayOf({ output_schema: root }, figure, result) {
 
 /** The job with its states on the way and nothing else that takes time or room. */
 export function withFrames(job, result, { asks, keeps, drops }) {
-  const bare = drops.reduce((whole, place) => (at(whole, parts(place)) === undefined ? whole : changed(whole, parts(place), undefined)), job);
+  const bare = drops.reduce(
+    (whole, place) => (at(whole, parts(place)) === undefined ? whole : changed(whole, parts(place), undefined)),
+    job,
+  );
   const kept = Object.entries(keeps).reduce((whole, [place, from]) => changed(whole, parts(place), at(result, parts(from))), bare);
   return Object.entries(asks).reduce((whole, [place, value]) => changed(whole, parts(place), value), kept);
 }
@@ -73,7 +76,8 @@ function chartOf(shown, blank, replay, frame, said) {
   return { ...shown, panels: [{ ...shown.panels[0], items: [...(isShown ? [blank] : []), closed, ...items] }] };
 }
 
-const titled = (figure, turns, of) => figure && { ...figure, title: { ...figure.title, text: t('ring_at', { revolution: told(turns), of: told(of) }) } };
+const titled = (figure, turns, of) =>
+  figure && { ...figure, title: { ...figure.title, text: t('ring_at', { revolution: told(turns), of: told(of) }) } };
 
 /** A scrubber over the history; `onShow(figure)` with the state that is to be seen, `null` for the end. */
 export function Replay({ id, said: { said, history, value, beside }, answer, job, figure, figures, onShow }) {
@@ -87,7 +91,10 @@ export function Replay({ id, said: { said, history, value, beside }, answer, job
   const found = useProbe(id, isWanted ? answer.key : null, () => withFrames(job, answer.result, said));
   const replay = found?.answer && at(found.answer.result, parts(said.frames));
   useEffect(() => {
-    if (step === last) { onShow(null); return; }
+    if (step === last) {
+      onShow(null);
+      return;
+    }
     setWanted(true);
     const blank = blankOf(figures, said);
     if (step === 0) onShow(blank && titled({ ...figure, panels: [{ ...figure.panels[0], items: [blank] }] }, 0, steps[last]));
@@ -102,20 +109,35 @@ export function Replay({ id, said: { said, history, value, beside }, answer, job
     const timer = setInterval(() => setStep(now => Math.min(now + stride, last)), FRAME_MS);
     return () => clearInterval(timer);
   }, [isPlaying]);
-  useEffect(() => { if (step === last) setPlaying(false); }, [step]);
+  useEffect(() => {
+    if (step === last) setPlaying(false);
+  }, [step]);
 
   const here = step === 0 ? -1 : Math.max(0, below(turns, steps[step] + 0.01));
-  const [now, other] = [value, beside].map(({ name }, index) => (here >= 0 ? history[name][here] : at(answer.result, parts([said.from.value, said.from.beside][index]))));
+  const [now, other] = [value, beside].map(({ name }, index) =>
+    here >= 0 ? history[name][here] : at(answer.result, parts([said.from.value, said.from.beside][index])),
+  );
   const curve = useMemo(() => curveOf(turns, history[value.name], steps[last], at(answer.result, parts(said.from.value))), [answer.key]);
-  const says = t('revolution_is', { revolution: told(steps[step]), of: told(steps[last]), name: value.label, value: `${number(now, 4)} ${value.unit}` });
+  const says = t('revolution_is', {
+    revolution: told(steps[step]),
+    of: told(steps[last]),
+    name: value.label,
+    value: `${number(now, 4)} ${value.unit}`,
+  });
   const isLate = step > 0 && step < last && !replay && !found?.problem;
   return html`
     <div class="scrubber" role="group" aria-label=${t('replay')}>
       <button type="button" class="icon" aria-label=${isPlaying ? t('replay_stop') : t('replay_play')} title=${isPlaying ? t('replay_stop') : t('replay_play')} aria-pressed=${isPlaying}
-        onClick=${() => { if (!isPlaying && step === last) setStep(0); setPlaying(!isPlaying); }}>${isPlaying ? '❚❚' : '▶'}</button>
+        onClick=${() => {
+          if (!isPlaying && step === last) setStep(0);
+          setPlaying(!isPlaying);
+        }}>${isPlaying ? '❚❚' : '▶'}</button>
       <div class="track">
         <svg viewBox=${`0 0 ${CURVE_WIDTH} ${CURVE_HEIGHT}`} preserveAspectRatio="none" aria-hidden="true"><path class="after" d=${curve} vector-effect="non-scaling-stroke" /><path class="cursor" d=${`M${(CURVE_WIDTH * step) / last} 0V${CURVE_HEIGHT}`} vector-effect="non-scaling-stroke" /></svg>
-        <input type="range" id="replay" min="0" max=${last} step="1" value=${step} aria-label=${t('replay')} aria-valuetext=${says} onInput=${event => { setPlaying(false); setStep(Number(event.currentTarget.value)); }} />
+        <input type="range" id="replay" min="0" max=${last} step="1" value=${step} aria-label=${t('replay')} aria-valuetext=${says} onInput=${event => {
+          setPlaying(false);
+          setStep(Number(event.currentTarget.value));
+        }} />
       </div>
       <p class="scrub-text">${says}<span class="quiet"> · ${beside.label} ${number(other, 7)} ${beside.unit}</span>${isLate && html`<span class="late"> · ${t('loading')}</span>`}</p>
       ${found?.problem && html`<p class="fault"><span>${found.problem.detail || found.problem.title}</span></p>`}
@@ -124,7 +146,15 @@ export function Replay({ id, said: { said, history, value, beside }, answer, job
 
 /** What is followed over the revolutions, by its logarithm. */
 function curveOf(revolution, values, total, start) {
-  const points = [[0, start], ...revolution.map((turns, index) => [turns, values[index]])].map(([turns, value]) => [turns, Math.log10(Math.max(value, 1e-6))]);
+  const points = [[0, start], ...revolution.map((turns, index) => [turns, values[index]])].map(([turns, value]) => [
+    turns,
+    Math.log10(Math.max(value, 1e-6)),
+  ]);
   const [low, high] = [Math.min(...points.map(point => point[1])), Math.max(...points.map(point => point[1]))];
-  return points.map(([turns, value], index) => `${index ? 'L' : 'M'}${((CURVE_WIDTH * turns) / total).toFixed(1)} ${(3 + (CURVE_HEIGHT - 6) * (1 - (value - low) / (high - low || 1))).toFixed(1)}`).join('');
+  return points
+    .map(
+      ([turns, value], index) =>
+        `${index ? 'L' : 'M'}${((CURVE_WIDTH * turns) / total).toFixed(1)} ${(3 + (CURVE_HEIGHT - 6) * (1 - (value - low) / (high - low || 1))).toFixed(1)}`,
+    )
+    .join('');
 }

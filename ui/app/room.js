@@ -21,11 +21,18 @@ function useDesk({ id, query, replace, push, refreshJobs }) {
   useEffect(() => {
     setState(desk.state);
     const stop = desk.watch(setState);
-    return () => { stop(); desk.close(); };
+    return () => {
+      stop();
+      desk.close();
+    };
   }, []);
   const spoken = language();
-  useEffect(() => { desk.describe(); }, [spoken]);
-  useEffect(() => { desk.open(query); }, [Boolean(state.description), query.toString()]);
+  useEffect(() => {
+    desk.describe();
+  }, [spoken]);
+  useEffect(() => {
+    desk.open(query);
+  }, [Boolean(state.description), query.toString()]);
   // Fields whose text is no value: the answer shown is not one to what is typed.
   const [unreadable, setUnreadable] = useState(unread.get());
   useEffect(() => unread.watch(setUnreadable), []);
@@ -46,24 +53,46 @@ export function Room({ id, query, replace, push, models, refreshJobs }) {
 
   /** Computes what is typed: not before all of it can be read. */
   const compute = next => {
-    const first = /** @type {HTMLElement[]} */ ([...document.querySelectorAll('.form input, .form textarea, .form .matching')]).find(field => unread.get().has(field.id));
-    if (!first) { setPane(next); desk.ask(desk.state.job, 'run'); return; }
+    const first = /** @type {HTMLElement[]} */ ([...document.querySelectorAll('.form input, .form textarea, .form .matching')]).find(
+      field => unread.get().has(field.id),
+    );
+    if (!first) {
+      setPane(next);
+      desk.ask(desk.state.job, 'run');
+      return;
+    }
     setPane('form');
-    soon(() => { first.scrollIntoView({ block: 'center' }); first.focus(); });
+    soon(() => {
+      first.scrollIntoView({ block: 'center' });
+      first.focus();
+    });
   };
   const pickExample = name => {
     desk.isLive = true;
     push(written(new URLSearchParams({ example: name })));
   };
-  const go = place => { setPane('form'); soon(() => goTo(place)); };
+  const go = place => {
+    setPane('form');
+    soon(() => goTo(place));
+  };
   // A run of this calculator is none of a study.
   const ofStudy = baseName.run ? new URLSearchParams({ result: answer?.key }) : queryOf(state, job, answer?.key);
   const study = answer && `#/studies?calculator=${id}&${written(ofStudy)}`;
   const faultCount = (problem?.errors || []).length + unreadable.size;
-  const trouble = problem && !(['offline', 'cancelled'].includes(problem.code) && answer) && html`<${Trouble} problem=${problem} names=${namesOf(description.input_schema)} over=${Boolean(answer)} onGo=${go} />`;
+  const trouble =
+    problem &&
+    !(['offline', 'cancelled'].includes(problem.code) && answer) &&
+    html`<${Trouble} problem=${problem} names=${namesOf(description.input_schema)} over=${Boolean(answer)} onGo=${go} />`;
   return html`
     <main class="room" data-pane=${pane} id="main" tabindex="-1">
-      ${answer && html`<a class="skip" href="#answer" onClick=${event => { event.preventDefault(); setPane('picture'); soon(() => document.getElementById('answer')?.focus()); }}>${t('skip_to_answer')}</a>`}
+      ${
+        answer &&
+        html`<a class="skip" href="#answer" onClick=${event => {
+          event.preventDefault();
+          setPane('picture');
+          soon(() => document.getElementById('answer')?.focus());
+        }}>${t('skip_to_answer')}</a>`
+      }
       <div class="pane-switch" role="group" aria-label=${t('panes')}>
         <button type="button" aria-pressed=${pane === 'form'} onClick=${() => setPane('form')}>${t('inputs')}${faultCount > 0 && html` <span class="badge">${faultCount}<span class="hidden"> ${t('faults_here')}</span></span>`}</button>
         <button type="button" aria-pressed=${pane === 'picture'} onClick=${() => setPane('picture')}>${t('result')}</button>

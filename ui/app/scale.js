@@ -67,14 +67,16 @@ export function ticks(spacing, [low, high], count) {
   const size = 10 ** Math.floor(Math.log10(raw));
   const step = [1, 2, 2.5, 5, 10].map(factor => factor * size).find(value => value >= raw * 0.999) || size * 10;
   const all = [];
-  for (let index = Math.ceil(low / step - 1e-9); index <= Math.floor(high / step + 1e-9); index += 1) all.push(Number((index * step).toPrecision(12)));
+  for (let index = Math.ceil(low / step - 1e-9); index <= Math.floor(high / step + 1e-9); index += 1)
+    all.push(Number((index * step).toPrecision(12)));
   return all;
 }
 
 /** The labels of ticks, all with the same number of decimals; a power of ten common to all stands apart. */
 export function labels(spacing, places) {
   const largest = Math.max(...places.map(Math.abs), 0);
-  if (spacing === 'logarithmic') return { texts: places.map(value => (value >= 1e5 || value < 1e-3 ? power(value) : number(value))), factor: '' };
+  if (spacing === 'logarithmic')
+    return { texts: places.map(value => (value >= 1e5 || value < 1e-3 ? power(value) : number(value))), factor: '' };
   const exponent = largest >= 1e6 || (largest > 0 && largest < 1e-3) ? 3 * Math.floor(Math.log10(largest) / 3) : 0;
   const texts = places.map(value => number(Number((value / 10 ** exponent).toPrecision(10)), 10));
   return { texts, factor: exponent ? `10${superscript(exponent)}` : '' };
@@ -101,7 +103,11 @@ export function below(list, value) {
 const ascending = new WeakMap();
 /** Whether a list ascends. */
 export function ascends(list) {
-  if (!ascending.has(list)) ascending.set(list, list.every((value, index) => index === 0 || value >= list[index - 1]));
+  if (!ascending.has(list))
+    ascending.set(
+      list,
+      list.every((value, index) => index === 0 || value >= list[index - 1]),
+    );
   return ascending.get(list);
 }
 

@@ -94,24 +94,33 @@ export function blank(schema, root, depth = 0) {
   const whole = resolve(schema, root);
   if (depth > 12) return null;
   switch (kindOf(whole)) {
-    case 'constant': return whole.const ?? whole.enum[0];
-    case 'enum': return whole.default ?? whole.enum[0];
-    case 'choice': return blank(variants(whole, root)[0].schema, root, depth + 1);
+    case 'constant':
+      return whole.const ?? whole.enum[0];
+    case 'enum':
+      return whole.default ?? whole.enum[0];
+    case 'choice':
+      return blank(variants(whole, root)[0].schema, root, depth + 1);
     case 'object': {
       const value = {};
       for (const name of whole.required || []) value[name] = blank(whole.properties[name], root, depth + 1);
       return value;
     }
-    case 'table': return [];
-    case 'map': return {};
+    case 'table':
+      return [];
+    case 'map':
+      return {};
     case 'array': {
       if (Array.isArray(whole.example)) return whole.example;
       return Array.from({ length: whole.minItems || 0 }, () => blank(whole.items, root, depth + 1));
     }
-    case 'boolean': return whole.example ?? whole.default ?? false;
-    case 'number': return whole.example ?? whole.default ?? whole.minimum ?? 0;
-    case 'string': return whole.example ?? whole.default ?? '';
-    default: return whole.example ?? null;
+    case 'boolean':
+      return whole.example ?? whole.default ?? false;
+    case 'number':
+      return whole.example ?? whole.default ?? whole.minimum ?? 0;
+    case 'string':
+      return whole.example ?? whole.default ?? '';
+    default:
+      return whole.example ?? null;
   }
 }
 
@@ -122,7 +131,11 @@ export function kept(value, from, { schema, tag }, root) {
   for (const [name, part] of Object.entries(schema.properties || {})) {
     if (name === tag || value[name] === undefined || !from.properties?.[name]) continue;
     const [own, before] = [resolve(part, root), resolve(from.properties[name], root)];
-    const isAlike = kindOf(own) === kindOf(before) && own['x-unit'] === before['x-unit'] && JSON.stringify(own.properties ?? own.oneOf ?? own.items ?? null) === JSON.stringify(before.properties ?? before.oneOf ?? before.items ?? null);
+    const isAlike =
+      kindOf(own) === kindOf(before) &&
+      own['x-unit'] === before['x-unit'] &&
+      JSON.stringify(own.properties ?? own.oneOf ?? own.items ?? null) ===
+        JSON.stringify(before.properties ?? before.oneOf ?? before.items ?? null);
     if (isAlike && (!own.enum || own.enum.includes(value[name]))) fresh[name] = value[name];
   }
   return fresh;
@@ -130,8 +143,41 @@ export function kept(value, from, { schema, tag }, root) {
 
 /** What units add to a field's name, the longest first. */
 const SUFFIXES = [
-  'n_mm_per_rad', 'rad_per_n_mm', 'n_per_mm2', 'n_per_mm', 'n_s_per_mm', 'kg_per_m3', 'um_per_m_k', 'um_per_km', 'um_per_rev', 'um_per_n', 'um_per_k', 'mm_per_tooth',
-  'mm_per_rev', 'mm_per_min', 'm_per_min', 'm_per_s2', 'deg_per_rev', 'n_m', 'percent', 'rpm', 'deg', 'rad', 'min', 'hz', 'kw', 'kg', 'km', 'mm', 'um', 'ms', 'n', 'm', 's', 'k', 'h',
+  'n_mm_per_rad',
+  'rad_per_n_mm',
+  'n_per_mm2',
+  'n_per_mm',
+  'n_s_per_mm',
+  'kg_per_m3',
+  'um_per_m_k',
+  'um_per_km',
+  'um_per_rev',
+  'um_per_n',
+  'um_per_k',
+  'mm_per_tooth',
+  'mm_per_rev',
+  'mm_per_min',
+  'm_per_min',
+  'm_per_s2',
+  'deg_per_rev',
+  'n_m',
+  'percent',
+  'rpm',
+  'deg',
+  'rad',
+  'min',
+  'hz',
+  'kw',
+  'kg',
+  'km',
+  'mm',
+  'um',
+  'ms',
+  'n',
+  'm',
+  's',
+  'k',
+  'h',
 ];
 const written = unit => unit.toLowerCase().replace(/[()]/g, '').replace(/\//g, '_per_').replace(/[ *]+/g, '_');
 
@@ -158,7 +204,8 @@ export function namesOf(schema) {
   const names = new Map();
   const walk = part => {
     if (!part || typeof part !== 'object') return;
-    for (const [name, field] of Object.entries(part.properties || {})) if (field?.title && !names.has(name)) names.set(name, labelOf(name, field));
+    for (const [name, field] of Object.entries(part.properties || {}))
+      if (field?.title && !names.has(name)) names.set(name, labelOf(name, field));
     Object.values(part).forEach(walk);
   };
   walk(schema);
@@ -186,7 +233,8 @@ export function vocabularyOf(...schemas) {
 }
 
 /** As inside a sentence: abbreviations and single letters keep their capitals. */
-export const within = label => (/^.[^A-ZА-ЯЁ\s]/.test(label) && !/^\w+'s /.test(label) ? label.charAt(0).toLowerCase() + label.slice(1) : label);
+export const within = label =>
+  /^.[^A-ZА-ЯЁ\s]/.test(label) && !/^\w+'s /.test(label) ? label.charAt(0).toLowerCase() + label.slice(1) : label;
 
 const wordsBySchema = new WeakMap();
 /** What the words of every choice of a schema are called, as inside a sentence. */
@@ -208,7 +256,10 @@ function wordsIn(schema) {
  *  them. `names` are those of `namesOf`. */
 export function spoken(text, names) {
   const words = names?.of && wordsIn(names.of);
-  const field = name => { const label = names?.get(name); return label && within(label); };
+  const field = name => {
+    const label = names?.get(name);
+    return label && within(label);
+  };
   const name = code => field(code) ?? words?.get(code);
   // Where nouns are declined a label stands as a quotation.
   const quoted = label => (/[а-яё]/i.test(label) ? `«${label}»` : label);
@@ -218,7 +269,9 @@ export function spoken(text, names) {
     const way = code.split('.');
     return name(code) ? quoted(name(code)) : way.length > 1 && way.every(field) ? quoted(way.map(field).join(' · ')) : code;
   };
-  return (text || '').replace(/`([^`]+)`/g, (_, code) => said(code)).replace(/\b[a-z][a-z0-9]*(?:_[a-z0-9]+)+\b/g, word => field(word) ?? word);
+  return (text || '')
+    .replace(/`([^`]+)`/g, (_, code) => said(code))
+    .replace(/\b[a-z][a-z0-9]*(?:_[a-z0-9]+)+\b/g, word => field(word) ?? word);
 }
 
 /** What a word of an enumeration is called. */
@@ -255,17 +308,43 @@ export function listsWith(word, root, value, schema = root, name = '') {
   const whole = resolve(schema, root);
   if (Array.isArray(value)) {
     const item = whole.items && resolve(whole.items, root);
-    const said = Object.values(item?.properties || {}).map(part => resolve(part, root)[word]).find(Boolean);
+    const said = Object.values(item?.properties || {})
+      .map(part => resolve(part, root)[word])
+      .find(Boolean);
     return said ? [{ said, items: value, schema: item, label: labelOf(name, whole) }] : [];
   }
   if (!value || typeof value !== 'object' || !whole.properties) return [];
-  return Object.entries(value).flatMap(([part, inner]) => (whole.properties[part] ? listsWith(word, root, inner, whole.properties[part], part) : []));
+  return Object.entries(value).flatMap(([part, inner]) =>
+    whole.properties[part] ? listsWith(word, root, inner, whole.properties[part], part) : [],
+  );
 }
 
 /** A symbol as print writes it: `D_0` as its parts. */
 const GREEK = {
-  alpha: 'α', beta: 'β', gamma: 'γ', delta: 'δ', epsilon: 'ε', zeta: 'ζ', eta: 'η', theta: 'θ', kappa: 'κ', lambda: 'λ', mu: 'μ', nu: 'ν',
-  xi: 'ξ', rho: 'ρ', sigma: 'σ', tau: 'τ', phi: 'φ', chi: 'χ', psi: 'ψ', omega: 'ω', Delta: 'Δ', Omega: 'Ω', Sigma: 'Σ', Phi: 'Φ',
+  alpha: 'α',
+  beta: 'β',
+  gamma: 'γ',
+  delta: 'δ',
+  epsilon: 'ε',
+  zeta: 'ζ',
+  eta: 'η',
+  theta: 'θ',
+  kappa: 'κ',
+  lambda: 'λ',
+  mu: 'μ',
+  nu: 'ν',
+  xi: 'ξ',
+  rho: 'ρ',
+  sigma: 'σ',
+  tau: 'τ',
+  phi: 'φ',
+  chi: 'χ',
+  psi: 'ψ',
+  omega: 'ω',
+  Delta: 'Δ',
+  Omega: 'Ω',
+  Sigma: 'Σ',
+  Phi: 'Φ',
 };
 export function symbolParts(symbol) {
   const greek = text => GREEK[text] || text;
@@ -286,7 +365,11 @@ export function range(schema) {
 // Pointers (RFC 6901) and values by them.
 
 export const pointer = path => path.map(part => `/${String(part).replace(/~/g, '~0').replace(/\//g, '~1')}`).join('');
-export const parts = text => text.split('/').slice(1).map(part => part.replace(/~1/g, '/').replace(/~0/g, '~'));
+export const parts = text =>
+  text
+    .split('/')
+    .slice(1)
+    .map(part => part.replace(/~1/g, '/').replace(/~0/g, '~'));
 
 export function at(value, path) {
   return path.reduce((inner, part) => (inner === null || inner === undefined ? undefined : inner[part]), value);

@@ -11,14 +11,23 @@ export function Progress({ running, stop }) {
     <div class="progress-box" role="group" aria-label=${t('job_progress')}>
       <p class="progress-text"><span class="doing"><strong>${t(`state_${running.state}`)}</strong>${running.stage ? ` – ${running.stage}` : ''}</span>
         <span class="left">${share} %${running.remaining_ms ? ` · ${t('time_left', { time: duration(running.remaining_ms) })}` : ''}</span></p>
-      <button type="button" id="cancel-job" disabled=${isStopping} onClick=${() => { setStopping(true); stop(); }}>${t('cancel_job')}</button><a href="#/jobs">${t('all_jobs')}</a>
+      <button type="button" id="cancel-job" disabled=${isStopping} onClick=${() => {
+        setStopping(true);
+        stop();
+      }}>${t('cancel_job')}</button><a href="#/jobs">${t('all_jobs')}</a>
       <progress max="100" value=${share} aria-label=${t('job_progress')}></progress>
     </div>`;
 }
 
 /** The names of the fields on the way to a place of the job, items counted from 1. */
-const wayOf = (place, names) => parts(place).map(part => (/^\d+$/.test(part) ? String(Number(part) + 1) : names?.get(part) ?? humanised(part)))
-  .reduce((way, part) => (/^\d+$/.test(part) && way.length > 0 ? [...way.slice(0, -1), `${way.at(-1)} ${part}`] : [...way, part]), []).join(' · ');
+function wayOf(place, names) {
+  const way = [];
+  for (const part of parts(place)) {
+    if (!/^\d+$/.test(part)) way.push(names?.get(part) ?? humanised(part));
+    else way.push([way.pop(), Number(part) + 1].filter(Boolean).join(' '));
+  }
+  return way.join(' · ');
+}
 
 /** What is wrong: the service's words, and the way to each field. `over` what is there already, so that nothing moves. */
 export function Trouble({ problem, onGo, names, over }) {
@@ -27,8 +36,13 @@ export function Trouble({ problem, onGo, names, over }) {
     <div class=${over ? 'over-slot' : ''}><div class=${`problem ${over ? 'over' : ''} ${problem.code === 'cancelled' ? 'calm' : ''}`} role="alert">
       <p><strong>${problem.title}</strong></p>
       ${problem.detail && errors.length === 0 && html`<p>${capital(spoken(problem.detail, names))}</p>`}
-      ${errors.length > 0 && html`<ul>${errors.map(({ pointer: place, detail }) => html`<li key=${place + detail}>
-        ${place ? html`<button type="button" class="link" title=${place} onClick=${() => onGo(place)}>${wayOf(place, names)}</button>: ` : ''}${place ? spoken(detail, names) : capital(spoken(detail, names))}</li>`)}</ul>`}
+      ${
+        errors.length > 0 &&
+        html`<ul>${errors.map(
+          ({ pointer: place, detail }) => html`<li key=${place + detail}>
+        ${place ? html`<button type="button" class="link" title=${place} onClick=${() => onGo(place)}>${wayOf(place, names)}</button>: ` : ''}${place ? spoken(detail, names) : capital(spoken(detail, names))}</li>`,
+        )}</ul>`
+      }
       ${problem.code && problem.type && html`<p class="quiet"><a href=${problem.type} target="_blank" rel="noopener">${t('what_it_means')}</a></p>`}
     </div></div>`;
 }

@@ -23,9 +23,15 @@ export function declared(description, result) {
   const rows = new Map(flat(description.output_schema, result, description.output_schema).map(row => [`/${row.path.join('/')}`, row]));
   const found = description.study_outputs.map(place => rows.get(place)).filter(row => typeof row?.value === 'number');
   // What has the same name would be told apart by nobody, and what is the same number says nothing new.
-  const isSame = (one, other) => one.label === other.label || (Math.abs(one.value - other.value) <= SAME * Math.abs(other.value) && one.unit === other.unit);
+  const isSame = (one, other) =>
+    one.label === other.label || (Math.abs(one.value - other.value) <= SAME * Math.abs(other.value) && one.unit === other.unit);
   const told = found.filter((row, index) => found.findIndex(other => isSame(row, other)) === index).slice(0, MOST_NUMBERS);
-  return told.map(row => ({ label: row.label, text: glance(row, spreadOf(result, row.path)?.spread), unit: row.unit, title: row.description }));
+  return told.map(row => ({
+    label: row.label,
+    text: glance(row, spreadOf(result, row.path)?.spread),
+    unit: row.unit,
+    title: row.description,
+  }));
 }
 
 /** A number as one reads it at a glance: with its uncertainty where that is not small, a share that is next to none or all
@@ -46,7 +52,13 @@ const LONG = 90;
 const brief = text => (text.length > LONG ? text.split(/: | \(/)[0].replace(/[.,;]$/, '') : text);
 
 /** Why the answer is not one to the inputs on the screen. */
-const WHY = { unread: 'answer_unread', wrong: 'answer_wrong', changed: 'answer_changed', computing: 'answer_computing', cancelled: 'answer_cancelled' };
+const WHY = {
+  unread: 'answer_unread',
+  wrong: 'answer_wrong',
+  changed: 'answer_changed',
+  computing: 'answer_computing',
+  cancelled: 'answer_cancelled',
+};
 
 /** The answer to the question: its sentence, what limits it, its numbers, and the one thing to take away: `main`, `{ text,
  *  act() }`; without it the program, or the sheet to print.

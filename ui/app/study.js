@@ -21,12 +21,22 @@ const ROWS_SHOWN = 100;
 /** Words of the address that belong to the study, not to the job. */
 const OWN = ['calculator', 'vary', 'combine', 'outputs', 'study', 'run'];
 /** What the words of a varied field are called on this page. */
-const OF_VARIED = new Map([['from', 'from'], ['to', 'to'], ['count', 'number_of_values'], ['values', 'value'], ['spacing', 'spacing']]);
+const OF_VARIED = new Map([
+  ['from', 'from'],
+  ['to', 'to'],
+  ['count', 'number_of_values'],
+  ['values', 'value'],
+  ['spacing', 'spacing'],
+]);
 /** What the list of downloads wants to know of a calculator. */
 const DECLARED = { media_types: ['application/json', 'text/csv', 'image/svg+xml', WORKBOOK, 'application/pdf'] };
 
 const said = (query, name, otherwise) => {
-  try { return query.get(name) ? JSON.parse(query.get(name)) : otherwise; } catch { return otherwise; }
+  try {
+    return query.get(name) ? JSON.parse(query.get(name)) : otherwise;
+  } catch {
+    return otherwise;
+  }
 };
 const jobPart = query => new URLSearchParams([...query].filter(([name]) => !OWN.includes(name) && name !== 'pin'));
 const written = query => query.toString().replace(/%2F/g, '/').replace(/%3A/g, ':').replace(/%2C/g, ',');
@@ -57,7 +67,7 @@ export function Study({ calculators, query, push, replace, refreshJobs }) {
           return;
         }
         // A kept study brings its job with it; a running one was put down by the page that started it, or the service has it.
-        const stored = kept ? (await api.jobOf(kept)).job : run ? keptRun(run) ?? await givenStudy(run) : null;
+        const stored = kept ? (await api.jobOf(kept)).job : run ? (keptRun(run) ?? (await givenStudy(run))) : null;
         const description = await api.calculator(stored?.calculator || query.get('calculator') || calculators[0].id);
         const job = stored ? stored.job : (await jobOf(description, new URLSearchParams(part))).job;
         if (gone) return;
@@ -70,11 +80,18 @@ export function Study({ calculators, query, push, replace, refreshJobs }) {
         if (!stopWaiting) setMissing(error);
       }
     })();
-    return () => { gone = true; stopWaiting?.(); };
+    return () => {
+      gone = true;
+      stopWaiting?.();
+    };
   }, [asked, spoken, asking]);
-  const tell = next => { own.current = next; replace(next); };
+  const tell = next => {
+    own.current = next;
+    replace(next);
+  };
   const choose = id => push(written(new URLSearchParams([['calculator', id], ...lastJob(id)])));
-  if (missing) return html`<main class="plain" id="main" tabindex="-1"><h1>${missing.problem?.title || t('trouble_title')}</h1><p>${capital(missing.problem?.detail || missing.message)}</p><p><a href="#/studies" onClick=${() => setMissing(null)}>${t('start_over')}</a></p></main>`;
+  if (missing)
+    return html`<main class="plain" id="main" tabindex="-1"><h1>${missing.problem?.title || t('trouble_title')}</h1><p>${capital(missing.problem?.detail || missing.message)}</p><p><a href="#/studies" onClick=${() => setMissing(null)}>${t('start_over')}</a></p></main>`;
   if (!opened) return html`<main class="plain quiet-start" id="main" tabindex="-1"><p>${t('loading')}</p></main>`;
   return html`<${Board} key=${opened.serial} ...${{ ...opened, calculators, choose, tell, refreshJobs }} />`;
 }
@@ -102,9 +119,27 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
   // Fields whose text is no value: nothing that is shown is an answer to it.
   const [unreadable, setUnreadable] = useState(unreadFields.get());
   useEffect(() => unreadFields.watch(setUnreadable), []);
-  useEffect(() => () => { control.current?.abort(); stop.current?.(); }, []);
+  useEffect(
+    () => () => {
+      control.current?.abort();
+      stop.current?.();
+    },
+    [],
+  );
   const body = { calculator: description.id, job, vary, ...(vary.length > 1 && { combine }), outputs: wished };
-  const tell = extra => write(written(new URLSearchParams([['calculator', description.id], ...new URLSearchParams(part), ['vary', JSON.stringify(vary)], ...(vary.length > 1 ? [['combine', combine]] : []), ...(wished.join() === description.study_outputs.join() ? [] : [['outputs', JSON.stringify(wished)]]), ...extra])));
+  const tell = extra =>
+    write(
+      written(
+        new URLSearchParams([
+          ['calculator', description.id],
+          ...new URLSearchParams(part),
+          ['vary', JSON.stringify(vary)],
+          ...(vary.length > 1 ? [['combine', combine]] : []),
+          ...(wished.join() === description.study_outputs.join() ? [] : [['outputs', JSON.stringify(wished)]]),
+          ...extra,
+        ]),
+      ),
+    );
 
   const fail = error => {
     if (error.name === 'AbortError') return;
@@ -118,7 +153,10 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
     const now = language();
     const signal = control.current?.signal;
     const found = said === now && whole ? whole : await api.patient(() => api.shown(key, signal), signal);
-    if (now !== language()) { await show(key, null, asked); return; }
+    if (now !== language()) {
+      await show(key, null, asked);
+      return;
+    }
     setAnswer({ key, ...found, asked });
     setPending(false);
     setProblem(null);
@@ -136,8 +174,16 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
         setRunning(null);
         try {
           if (done.state === 'succeeded' && !asked) location.hash = `#/studies?study=${done.key}`;
-          else if (done.state === 'succeeded') { await show(done.key, null, asked); tell([['study', done.key]]); } else { setPending(false); setProblem(done.problem || { title: t(`state_${done.state}`), code: done.state }); }
-        } catch (error) { fail(error); }
+          else if (done.state === 'succeeded') {
+            await show(done.key, null, asked);
+            tell([['study', done.key]]);
+          } else {
+            setPending(false);
+            setProblem(done.problem || { title: t(`state_${done.state}`), code: done.state });
+          }
+        } catch (error) {
+          fail(error);
+        }
       },
     });
   };
@@ -145,7 +191,11 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
     control.current?.abort();
     stop.current?.();
     // What somebody else started goes on.
-    if (running?.isOwn) api.cancel(running.id).catch(() => {}).then(refreshJobs);
+    if (running?.isOwn)
+      api
+        .cancel(running.id)
+        .catch(() => {})
+        .then(refreshJobs);
     control.current = new AbortController();
     const { signal } = control.current;
     setPending(true);
@@ -160,20 +210,34 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
         keepRun(record.id, body);
         tell([['run', record.id]]);
         watch(record, body, true);
-      } else { await show(found.answer.key, found, body, said); tell([['study', found.answer.key]]); }
+      } else {
+        await show(found.answer.key, found, body, said);
+        tell([['study', found.answer.key]]);
+      }
     } catch (error) {
       fail(error);
-      if (error instanceof api.Unreachable) api.whenBack(error, () => { if (!signal.aborted) latest.current(); });
+      if (error instanceof api.Unreachable)
+        api.whenBack(error, () => {
+          if (!signal.aborted) latest.current();
+        });
     }
   };
   latest.current = start;
   /** Computes the study: not before all of it can be read. */
   const compute = event => {
     event.preventDefault();
-    const first = /** @type {HTMLElement | undefined} */ ([...document.querySelectorAll('.study-form input')].find(field => unreadFields.get().has(field.id)));
-    if (!first) { start(); return; }
+    const first = /** @type {HTMLElement | undefined} */ (
+      [...document.querySelectorAll('.study-form input')].find(field => unreadFields.get().has(field.id))
+    );
+    if (!first) {
+      start();
+      return;
+    }
     setPane('form');
-    setTimeout(() => { first.scrollIntoView({ block: 'center' }); first.focus(); }, 30);
+    setTimeout(() => {
+      first.scrollIntoView({ block: 'center' });
+      first.focus();
+    }, 30);
   };
   // A study of the address: kept, or on its way.
   useEffect(() => {
@@ -181,16 +245,24 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
     const { signal } = control.current;
     const [kept, run] = [query.get('study'), query.get('run')];
     const again = error => {
-      const waits = api.whenBack(error, () => { if (!signal.aborted) open(); });
+      const waits = api.whenBack(error, () => {
+        if (!signal.aborted) open();
+      });
       if (!waits || !api.isBusy(error)) fail(error);
     };
     const open = () => {
       if (!kept && !run) return;
       setPending(true);
-      if (kept) { show(kept, null, stored).catch(again); return; }
+      if (kept) {
+        show(kept, null, stored).catch(again);
+        return;
+      }
       api.job(run).then(record => {
         if (['queued', 'running', 'succeeded'].includes(record.state)) watch(record, stored, keptRun(run) !== null);
-        else { setPending(false); setProblem(record.problem || { title: t(`state_${record.state}`), code: record.state }); }
+        else {
+          setPending(false);
+          setProblem(record.problem || { title: t(`state_${record.state}`), code: record.state });
+        }
       }, again);
     };
     open();
@@ -204,12 +276,21 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
     else if (answer) show(answer.key, null, answer.asked).catch(fail);
   }, [language()]);
 
-  const names = useMemo(() => new Map([...namesOf(description.input_schema), ...[['job', 'inputs'], ['vary', 'field'], ['outputs', 'read_off'], ...OF_VARIED].map(([name, code]) => [name, t(code)])]), [description, language()]);
+  const names = useMemo(
+    () =>
+      new Map([
+        ...namesOf(description.input_schema),
+        ...[['job', 'inputs'], ['vary', 'field'], ['outputs', 'read_off'], ...OF_VARIED].map(([name, code]) => [name, t(code)]),
+      ]),
+    [description, language()],
+  );
   // The service names what is varied by the names of the contract.
   const named = fault => {
     const index = /^\/vary\/(\d+)/.exec(fault.pointer)?.[1];
     const leaf = index !== undefined && leaves.find(one => one.pointer === vary[index]?.pointer);
-    const detail = fault.detail.replace(/^(\w+)(?:\.\d+)?(?= (?:=|is) )/, (word, name) => (name === 'vary' && leaf ? within(leaf.label.split(' · ').at(-1)) : OF_VARIED.has(name) ? within(t(OF_VARIED.get(name))) : word));
+    const detail = fault.detail.replace(/^(\w+)(?:\.\d+)?(?= (?:=|is) )/, (word, name) =>
+      name === 'vary' && leaf ? within(leaf.label.split(' · ').at(-1)) : OF_VARIED.has(name) ? within(t(OF_VARIED.get(name))) : word,
+    );
     return { ...fault, detail: labelled(detail, names) };
   };
   const faults = (problem?.errors || []).map(named);
@@ -231,7 +312,9 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
   const current = useRef(null);
   current.current = stale ? null : answer?.key;
   const owns = key => current.current === key && unreadFields.get().size === 0;
-  const trouble = problem && html`<${Trouble} problem=${problem.errors ? { ...problem, errors: faults } : problem} names=${names} over=${Boolean(answer)} onGo=${go} />`;
+  const trouble =
+    problem &&
+    html`<${Trouble} problem=${problem.errors ? { ...problem, errors: faults } : problem} names=${names} over=${Boolean(answer)} onGo=${go} />`;
   return html`
     <main class="room" data-pane=${pane} id="main" tabindex="-1">
       <div class="pane-switch" role="group" aria-label=${t('panes')}>
@@ -251,9 +334,24 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
               <p>${stored ? t('job_of_study') : t('job_of_page')} ${page && html`<a href=${page}>${t('change_job')}</a>`}</p>
             </div></section>
             <section class="fold open"><div class="fold-head"><h2 class="study-head">${t('varied')}</h2></div><div class="fold-body study-part">
-              ${vary.map((variable, index) => html`<${Varied} key=${index} ...${{ index, variable, leaves, taken: vary.map(one => one.pointer), faults: below(`/vary/${index}`) }}
-                set=${next => setVary(vary.map((one, other) => (other === index ? next : one)))} remove=${vary.length > 1 ? () => setVary(vary.filter((_, other) => other !== index)) : null} />`)}
-              ${vary.length < Math.min(MOST_VARIED, leaves.length) && html`<button type="button" class="more" id="add-varied" onClick=${() => setVary([...vary, proposed(leaves, vary.map(one => one.pointer))[0].range])}>${t('vary_another')}</button>`}
+              ${vary.map(
+                (
+                  variable,
+                  index,
+                ) => html`<${Varied} key=${index} ...${{ index, variable, leaves, taken: vary.map(one => one.pointer), faults: below(`/vary/${index}`) }}
+                set=${next => setVary(vary.map((one, other) => (other === index ? next : one)))} remove=${vary.length > 1 ? () => setVary(vary.filter((_, other) => other !== index)) : null} />`,
+              )}
+              ${
+                vary.length < Math.min(MOST_VARIED, leaves.length) &&
+                html`<button type="button" class="more" id="add-varied" onClick=${() =>
+                  setVary([
+                    ...vary,
+                    proposed(
+                      leaves,
+                      vary.map(one => one.pointer),
+                    )[0].range,
+                  ])}>${t('vary_another')}</button>`
+              }
               ${vary.length > 1 && html`<div class="study-field"><label for="combine">${t('combine')}</label><select id="combine" value=${combine} onChange=${event => setCombine(event.currentTarget.value)}><option value="grid">${t('combine_grid')}</option><option value="zip">${t('combine_zip')}</option></select></div>`}
               <p class="quiet" id="study-points">${plural('points', points)}</p>
               ${faults.filter(({ pointer: place }) => place === '/vary').map(({ detail }) => html`<p class="fault"><span>${capital(detail)}</span></p>`)}
@@ -270,8 +368,11 @@ function Board({ description, job, stored, part, query, calculators, choose, tel
         <div class=${`work-line ${pending && !running ? 'on' : ''}`} aria-hidden="true"></div>
         <header class="room-head"><h1>${t('study_question')}</h1><p class="summary">${description.title}</p>${running && html`<${Progress} running=${running} stop=${() => api.cancel(running.id).catch(fail)} />`}</header>
         ${answer && trouble}
-        ${!answer && !running?.interim ? html`<div class="empty">${problem ? html`<div class="no-answer">${trouble}</div>` : running ? '' : html`<p>${pending ? t('first_answer') : t('study_empty')}</p>`}</div>`
-          : html`<${Findings} ...${{ answer, interim: running?.interim, leaves, outputs, description }} ...${{ stale, owns }} />`}
+        ${
+          !answer && !running?.interim
+            ? html`<div class="empty">${problem ? html`<div class="no-answer">${trouble}</div>` : running ? '' : html`<p>${pending ? t('first_answer') : t('study_empty')}</p>`}</div>`
+            : html`<${Findings} ...${{ answer, interim: running?.interim, leaves, outputs, description }} ...${{ stale, owns }} />`
+        }
       </section>
     </main>`;
 }
@@ -283,16 +384,27 @@ function Varied({ index, variable, leaves, taken, faults, set, remove }) {
   const [draft, setDraft] = useState({});
   useEffect(() => setDraft({}), [variable.pointer]);
   const groups = [...new Set(leaves.map(({ group }) => group))];
-  const pick = place => { setDraft({}); set(proposed(leaves.filter(one => one.pointer === place))[0].range); };
+  const pick = place => {
+    setDraft({});
+    set(proposed(leaves.filter(one => one.pointer === place))[0].range);
+  };
   const unit = leaf?.schema['x-unit'];
   const listed = text => {
-    if (leaf?.kind === 'number') return text.split(/[;\n\t]/.test(text) ? /[;\n\t]+/ : /\s+/).filter(part => part.trim()).map(part => read(part, unit));
-    return text.split(/[;,\s]+/).filter(Boolean).map(word => ({ value: leaf?.kind === 'boolean' ? word === 'true' : word }));
+    if (leaf?.kind === 'number')
+      return text
+        .split(/[;\n\t]/.test(text) ? /[;\n\t]+/ : /\s+/)
+        .filter(part => part.trim())
+        .map(part => read(part, unit));
+    return text
+      .split(/[;,\s]+/)
+      .filter(Boolean)
+      .map(word => ({ value: leaf?.kind === 'boolean' ? word === 'true' : word }));
   };
-  const found = (name, text) => (name === 'values' ? listed(text) : [read(text, name === 'count' ? '1' : unit)].filter(({ value }) => value !== null));
+  const found = (name, text) =>
+    name === 'values' ? listed(text) : [read(text, name === 'count' ? '1' : unit)].filter(({ value }) => value !== null);
   const faultOf = (name, text) => {
     const values = found(name, text);
-    return values.length === 0 ? { fault: 'needed' } : values.find(({ fault }) => fault) ?? null;
+    return values.length === 0 ? { fault: 'needed' } : (values.find(({ fault }) => fault) ?? null);
   };
   const take = (name, text) => {
     setDraft({ ...draft, [name]: text });
@@ -304,19 +416,28 @@ function Varied({ index, variable, leaves, taken, faults, set, remove }) {
   };
   const id = name => `vary-${index}-${name}`;
   // A draft that is no value stays, and says so.
-  const unread = Object.keys(draft).map(name => [name, faultOf(name, draft[name])]).filter(([, fault]) => fault !== null);
+  const unread = Object.keys(draft)
+    .map(name => [name, faultOf(name, draft[name])])
+    .filter(([, fault]) => fault !== null);
   useEffect(() => {
     const ids = unread.map(([name]) => id(name));
     ids.forEach(one => mark(one, true));
     return () => ids.forEach(one => mark(one, false));
   }, [unread.map(([name]) => name).join()]);
-  const leave = name => { if (!unread.some(([other]) => other === name)) setDraft(({ [name]: done, ...others }) => others); };
+  const leave = name => {
+    if (!unread.some(([other]) => other === name)) setDraft(({ [name]: done, ...others }) => others);
+  };
   const about = name => {
     const isUnread = unread.some(([other]) => other === name);
     const isRefused = faults.some(({ pointer: place }) => place.split('/')[3] === name);
-    return { 'aria-invalid': isUnread || isRefused ? 'true' : undefined, 'aria-describedby': isUnread ? id(`${name}-fault`) : undefined, onBlur: () => leave(name) };
+    return {
+      'aria-invalid': isUnread || isRefused ? 'true' : undefined,
+      'aria-describedby': isUnread ? id(`${name}-fault`) : undefined,
+      onBlur: () => leave(name),
+    };
   };
-  const field = (name, label) => html`<label class="study-field">${label}<input id=${id(name)} type="text" inputmode="decimal" autocomplete="off" value=${draft[name] ?? typed(variable[name])} ...${about(name)} onInput=${event => take(name, event.currentTarget.value)} /></label>`;
+  const field = (name, label) =>
+    html`<label class="study-field">${label}<input id=${id(name)} type="text" inputmode="decimal" autocomplete="off" value=${draft[name] ?? typed(variable[name])} ...${about(name)} onInput=${event => take(name, event.currentTarget.value)} /></label>`;
   const range = { pointer: variable.pointer, from: leaf?.range?.from ?? 0, to: leaf?.range?.to ?? 1, count: 5 };
   return html`
     <fieldset class="item varied">
@@ -325,12 +446,24 @@ function Varied({ index, variable, leaves, taken, faults, set, remove }) {
         ${!leaf && html`<option value=${variable.pointer}>${variable.pointer}</option>`}
         ${groups.map(group => html`<optgroup label=${group || t('inputs')}>${leaves.filter(one => one.group === group).map(one => html`<option value=${one.pointer} disabled=${one.pointer !== variable.pointer && taken.includes(one.pointer)}>${one.label}${one.unit ? `, ${one.unit}` : ''}</option>`)}</optgroup>`)}
       </select>
-      ${leaf?.kind === 'number' && html`<div class="study-way" role="group" aria-label=${t('values_of', { name: leaf.label })}>
-        <label><input type="radio" name=${id('way')} checked=${!isList} onChange=${() => { setDraft({}); set(range); }} /> ${t('a_range')}</label>
-        <label><input type="radio" name=${id('way')} checked=${isList} onChange=${() => { setDraft({}); set({ pointer: variable.pointer, values: valuesOf(variable) }); }} /> ${t('a_list')}</label></div>`}
-      ${isList ? html`<input id=${id('values')} type="text" aria-label=${t('values_of', { name: leaf?.label || variable.pointer })} placeholder=${t('numbers_hint')} value=${draft.values ?? variable.values.map(value => (typeof value === 'number' ? typed(value) : String(value))).join('; ')} ...${about('values')} onInput=${event => takeList(event.currentTarget.value)} />`
-        : html`<div class="study-range">${field('from', t('from'))}${field('to', t('to'))}${field('count', t('how_many'))}
-          <label class="study-field">${t('spacing')}<select id=${id('spacing')} value=${variable.spacing || 'linear'} onChange=${event => set({ ...variable, spacing: event.currentTarget.value })}><option value="linear">${t('spacing_linear')}</option><option value="log">${t('spacing_log')}</option></select></label></div>`}
+      ${
+        leaf?.kind === 'number' &&
+        html`<div class="study-way" role="group" aria-label=${t('values_of', { name: leaf.label })}>
+        <label><input type="radio" name=${id('way')} checked=${!isList} onChange=${() => {
+          setDraft({});
+          set(range);
+        }} /> ${t('a_range')}</label>
+        <label><input type="radio" name=${id('way')} checked=${isList} onChange=${() => {
+          setDraft({});
+          set({ pointer: variable.pointer, values: valuesOf(variable) });
+        }} /> ${t('a_list')}</label></div>`
+      }
+      ${
+        isList
+          ? html`<input id=${id('values')} type="text" aria-label=${t('values_of', { name: leaf?.label || variable.pointer })} placeholder=${t('numbers_hint')} value=${draft.values ?? variable.values.map(value => (typeof value === 'number' ? typed(value) : String(value))).join('; ')} ...${about('values')} onInput=${event => takeList(event.currentTarget.value)} />`
+          : html`<div class="study-range">${field('from', t('from'))}${field('to', t('to'))}${field('count', t('how_many'))}
+          <label class="study-field">${t('spacing')}<select id=${id('spacing')} value=${variable.spacing || 'linear'} onChange=${event => set({ ...variable, spacing: event.currentTarget.value })}><option value="linear">${t('spacing_linear')}</option><option value="log">${t('spacing_log')}</option></select></label></div>`
+      }
       ${leaf && html`<p class="quiet study-now">${t('value_now')} ${typeof leaf.value === 'number' ? number(leaf.value, 6) : leaf.value === undefined ? t('not_set') : String(leaf.value)} ${leaf.unit}</p>`}
       ${unread.map(([name, fault]) => html`<p class="fault" key=${name} id=${id(`${name}-fault`)}><span>${name === 'values' ? '' : `${t(OF_VARIED.get(name))}: `}${t(fault.fault, fault.values)}</span></p>`)}
       ${faults.map(({ detail }) => html`<p class="fault" role="alert"><span>${capital(detail)}</span></p>`)}
@@ -341,7 +474,9 @@ function Varied({ index, variable, leaves, taken, faults, set, remove }) {
 function valuesOf({ from, to, count, spacing }) {
   const number_ = Math.min(Math.max(count || 2, 2), 50);
   const share = index => index / (number_ - 1);
-  return Array.from({ length: number_ }, (_, index) => Number((spacing === 'log' ? from * (to / from) ** share(index) : from + (to - from) * share(index)).toPrecision(6)));
+  return Array.from({ length: number_ }, (_, index) =>
+    Number((spacing === 'log' ? from * (to / from) ** share(index) : from + (to - from) * share(index)).toPrecision(6)),
+  );
 }
 
 /** What came out: pictures, a sentence, one row per point. */
@@ -353,7 +488,7 @@ function Findings({ answer, interim, leaves, outputs, description, stale, owns }
   const all = interim ? [interim] : answer?.figures || [];
   const figure = all.find(({ id }) => id === chosen) || all[0];
   const isEmpty = figure && !figure.panels.some(panel => panel.items.some(item => (item.values || item.y).some(value => value !== null)));
-  const height = usePictureHeight(figure?.panels.length || 1);
+  const height = usePictureHeight();
   const pick = figure?.id === 'map' && result && result.variables.length === 2 ? (x, y) => setPicked(nearestRow(result, x, y)) : null;
   const [first, ...others] = answer?.answer.explanation || [];
   return html`
@@ -367,23 +502,36 @@ function Findings({ answer, interim, leaves, outputs, description, stale, owns }
           ${pick && !isEmpty && picked === null && html`<p class="quiet hint">${t('click_for_row')}</p>`}
           ${result && picked !== null && html`<${Point} result=${result} index=${picked} calculator=${calculator} names=${namesOf(description.input_schema)} />`}
         </div>
-        ${result && html`<div class="words">
+        ${
+          result &&
+          html`<div class="words">
           ${first && html`<p class="verdict" aria-live="polite">${capital(first.text)}</p>`}
           <${Warnings} key=${answer.key} list=${answer.answer.warnings} names=${namesOf(description.input_schema)} />
           <ul class="explanation">${others.map(({ code, text }, index) => html`<li key=${code + index}>${capital(text)}</li>`)}</ul>
-        </div>`}
+        </div>`
+        }
       </div>
-      ${result && html`
+      ${
+        result &&
+        html`
         <div class="bar"><span class="quiet">${plural('points', result.points)}${result.failed > 0 ? `, ${t('without_answer', { count: result.failed })}` : ''}</span><${Downloads} id="studies" description=${DECLARED} answer=${answer} figure=${figure} stale=${stale} owns=${owns} /></div>
         <${Rows} ...${{ result, leaves, outputs, calculator, picked }} names=${namesOf(description.input_schema)} />
         ${answer.asked && html`<details class="tabs request"><summary>${t('tab_request')}</summary><div><${RequestView} id="studies" job=${answer.asked} answer=${answer} stale=${stale} link=${`#/studies?study=${answer.key}`} /></div></details>`}
-        <${Sheet} description=${description} body=${answer.answer} job=${answer.answer.input.job} />`}
+        <${Sheet} description=${description} body=${answer.answer} job=${answer.answer.input.job} />`
+      }
     </div>`;
 }
 
 /** Why a point has no answer. */
-const WHY = { invalid: 'why_invalid', infeasible: 'why_infeasible', out_of_model: 'why_out_of_model', not_converged: 'why_not_converged', failed: 'why_failed' };
-const shownSetting = value => (typeof value === 'number' ? number(value, 6) : value === true ? t('yes') : value === false ? t('no') : String(value));
+const WHY = {
+  invalid: 'why_invalid',
+  infeasible: 'why_infeasible',
+  out_of_model: 'why_out_of_model',
+  not_converged: 'why_not_converged',
+  failed: 'why_failed',
+};
+const shownSetting = value =>
+  typeof value === 'number' ? number(value, 6) : value === true ? t('yes') : value === false ? t('no') : String(value);
 const nearestRow = ({ variables, rows }, x, y) => {
   const near = (list, value) => list.reduce((best, one) => (Math.abs(one - value) < Math.abs(best - value) ? one : best));
   const [a, b] = [near(variables[0].values, x), near(variables[1].values, y)];
@@ -404,9 +552,14 @@ function Rows({ result, leaves, outputs, calculator, picked, names }) {
   return html`
     <div class="grid-scroll tall tabs" tabindex="0" role="region" aria-label=${t('table')}><table class="grid still study-rows">
       <thead><tr>${variables.map(({ pointer: place, unit }) => html`<th scope="col">${named(leaves, place)} <span class="unit">${unitSymbol(unit)}</span></th>`)}${read_.map(({ pointer: place, unit }) => html`<th scope="col">${named(outputs, place)} <span class="unit">${unitSymbol(unit)}</span></th>`)}<th><span class="hidden">${t('actions')}</span></th></tr></thead>
-      <tbody>${rows.slice(0, shown).map((row, index) => html`<tr key=${index} class=${index === picked ? 'picked' : ''}>${row.values.map(value => html`<td>${shownSetting(value)}</td>`)}
+      <tbody>${rows.slice(0, shown).map(
+        (
+          row,
+          index,
+        ) => html`<tr key=${index} class=${index === picked ? 'picked' : ''}>${row.values.map(value => html`<td>${shownSetting(value)}</td>`)}
         ${row.status === 'succeeded' ? row.outputs.map(value => html`<td>${value === null ? '' : number(value, 5)}</td>`) : html`<td class="word reason" colspan=${read_.length}><span class="state failed">${t(WHY[row.status])}</span> ${capital(labelled(row.detail, names))}</td>`}
-        <td>${row.key && row.status === 'succeeded' ? html`<a href=${`#/${calculator}?result=${row.key}`}>${t('open_point')}<span class="hidden"> ${index + 1}</span></a>` : ''}</td></tr>`)}</tbody>
+        <td>${row.key && row.status === 'succeeded' ? html`<a href=${`#/${calculator}?result=${row.key}`}>${t('open_point')}<span class="hidden"> ${index + 1}</span></a>` : ''}</td></tr>`,
+      )}</tbody>
     </table></div>
     ${rows.length > shown && html`<button type="button" class="more" onClick=${() => setShown(shown + 1000)}>${t('more_rows', { count: rows.length - shown })}</button>`}`;
 }

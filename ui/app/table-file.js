@@ -6,7 +6,16 @@ import { named, choicesOf, unitIn, stemOf, endsOf, converted } from './units.js'
 /** Longest name of a column that no field has, as the service takes it. */
 const LONGEST_NAME = 64;
 
-const norm = text => (text ?? '').toLowerCase().replace(/µ|μ/g, 'u').replace(/мкм/g, 'um').replace(/мм/g, 'mm').replace(/град|°/g, 'deg').replace(/ё/g, 'е').replace(/[^a-z0-9а-я]+/g, '_').replace(/^_|_$/g, '');
+const norm = text =>
+  (text ?? '')
+    .toLowerCase()
+    .replace(/µ|μ/g, 'u')
+    .replace(/мкм/g, 'um')
+    .replace(/мм/g, 'mm')
+    .replace(/град|°/g, 'deg')
+    .replace(/ё/g, 'е')
+    .replace(/[^a-z0-9а-я]+/g, '_')
+    .replace(/^_|_$/g, '');
 
 /** The cells of one line; quotes protect separators. */
 function cells(line, separator) {
@@ -15,8 +24,14 @@ function cells(line, separator) {
   let quoted = false;
   for (let at = 0; at < line.length; at += 1) {
     const c = line[at];
-    if (c === '"' && quoted && line[at + 1] === '"') { text += '"'; at += 1; } else if (c === '"') quoted = !quoted;
-    else if (c === separator && !quoted) { found.push(text.trim()); text = ''; } else text += c;
+    if (c === '"' && quoted && line[at + 1] === '"') {
+      text += '"';
+      at += 1;
+    } else if (c === '"') quoted = !quoted;
+    else if (c === separator && !quoted) {
+      found.push(text.trim());
+      text = '';
+    } else text += c;
   }
   found.push(text.trim());
   return found;
@@ -33,38 +48,94 @@ export function decoded(bytes, tag = 'en') {
   const [a, b] = bytes;
   if (a === 0xff && b === 0xfe) return new TextDecoder('utf-16le').decode(bytes);
   if (a === 0xfe && b === 0xff) return new TextDecoder('utf-16be').decode(bytes);
-  try { return new TextDecoder('utf-8', { fatal: true }).decode(bytes); } catch { return new TextDecoder(tag === 'ru' ? 'windows-1251' : 'windows-1252').decode(bytes); }
+  try {
+    return new TextDecoder('utf-8', { fatal: true }).decode(bytes);
+  } catch {
+    return new TextDecoder(tag === 'ru' ? 'windows-1251' : 'windows-1252').decode(bytes);
+  }
 }
 
 const isFigure = text => /^[+\-−]?(\d+[.,]?\d*|[.,]\d+)(e[+-]?\d+)?$/i.test(text);
 const split = (line, separator) => (separator === ' ' ? line.trim().split(SPACES) : cells(line, separator));
 
 /** Lines of a file that are to be read. */
-const linesOf = text => text.replace(/^\ufeff/, '').split(/\r\n|\n|\r/).filter(line => line.trim() !== '' && !line.startsWith('#'));
+const linesOf = text =>
+  text
+    .replace(/^\ufeff/, '')
+    .split(/\r\n|\n|\r/)
+    .filter(line => line.trim() !== '' && !line.startsWith('#'));
 
 /** What separates the cells of a file without a heading: what leaves nothing but numbers. */
-const headless = line => ['\t', ';', ' ', ','].find(separator => { const parts = split(line, separator); return parts.length > 1 && parts.every(isFigure); });
+const headless = line =>
+  ['\t', ';', ' ', ','].find(separator => {
+    const parts = split(line, separator);
+    return parts.length > 1 && parts.every(isFigure);
+  });
 
 /** A file as its heading and rows, `{ file }`; or `{ fault }`. Without a heading its columns have none. */
 export function readFile(text) {
-  if (/^PK\u0003|\u0000/.test(text.slice(0, 2000))) return { fault: 'file_no_text' };
+  if (text.startsWith('PK\u0003') || text.slice(0, 2000).includes('\0')) return { fault: 'file_no_text' };
   const lines = linesOf(text);
   if (lines.length === 0) return { fault: 'csv_empty' };
   const without = headless(lines[0]);
   const separator = without ?? SEPARATORS.find(c => cells(lines[0], c).length > 1) ?? '\t';
   const all = lines.map(line => split(line, separator));
-  if (without) return { file: { separator: separator === ' ' ? '\t' : separator, header: all[0].map(() => ''), rows: all, isHeadless: true } };
+  if (without)
+    return { file: { separator: separator === ' ' ? '\t' : separator, header: all[0].map(() => ''), rows: all, isHeadless: true } };
   if (lines.length < 2) return { fault: 'csv_empty' };
   return { file: { separator, header: all[0], rows: all.slice(1), isHeadless: false } };
 }
 
 /** What people call a column, and what fields call it. */
-const SYNONYMS = new Map(Object.entries({
-  dia: 'diameter', diam: 'diameter', 'диам': 'diameter', 'диаметр': 'diameter', 'ø': 'diameter', dev: 'deviation', err: 'deviation', error: 'deviation', delta: 'deviation', 'откл': 'deviation', 'отклонение': 'deviation',
-  pos: 'z', position: 'z', station: 'z', place: 'z', distance: 'z', 'координата': 'z', 'положение': 'z', ang: 'angle', theta: 'angle', phi: 'angle', 'угол': 'angle', rad: 'radius', 'радиус': 'radius', radial: 'radius',
-  ra: 'roughness', rz: 'roughness', 'шероховатость': 'roughness', vc: 'speed', 'скорость': 'speed', 'подача': 'feed', ap: 'depth', 'глубина': 'depth', ampl: 'amplitude', 'амплитуда': 'amplitude', 'сила': 'force', rpm: 'spindle', n: 'spindle',
-}));
-const wordsOf = text => new Set(norm(text).split('_').filter(Boolean).map(word => SYNONYMS.get(word) ?? word));
+const SYNONYMS = new Map(
+  Object.entries({
+    dia: 'diameter',
+    diam: 'diameter',
+    диам: 'diameter',
+    диаметр: 'diameter',
+    ø: 'diameter',
+    dev: 'deviation',
+    err: 'deviation',
+    error: 'deviation',
+    delta: 'deviation',
+    откл: 'deviation',
+    отклонение: 'deviation',
+    pos: 'z',
+    position: 'z',
+    station: 'z',
+    place: 'z',
+    distance: 'z',
+    координата: 'z',
+    положение: 'z',
+    ang: 'angle',
+    theta: 'angle',
+    phi: 'angle',
+    угол: 'angle',
+    rad: 'radius',
+    радиус: 'radius',
+    radial: 'radius',
+    ra: 'roughness',
+    rz: 'roughness',
+    шероховатость: 'roughness',
+    vc: 'speed',
+    скорость: 'speed',
+    подача: 'feed',
+    ap: 'depth',
+    глубина: 'depth',
+    ampl: 'amplitude',
+    амплитуда: 'amplitude',
+    сила: 'force',
+    rpm: 'spindle',
+    n: 'spindle',
+  }),
+);
+const wordsOf = text =>
+  new Set(
+    norm(text)
+      .split('_')
+      .filter(Boolean)
+      .map(word => SYNONYMS.get(word) ?? word),
+  );
 
 /** Name and unit in a header: `diameter [um]`, `diameter (um)`, `diameter, um`. */
 export function headed(title) {
@@ -74,14 +145,24 @@ export function headed(title) {
 
 /** What a row of the table may hold. */
 export function rowFields(schema, root) {
-  const rows = resolve((schema.oneOf || schema.anyOf).find(form => resolve(form, root).type === 'array'), root);
+  const rows = resolve(
+    (schema.oneOf || schema.anyOf).find(form => resolve(form, root).type === 'array'),
+    root,
+  );
   const item = resolve(rows.items, root);
-  return Object.entries(item.properties || {})
-    .map(([name, part]) => ({ name, schema: resolve(part, root), required: (item.required || []).includes(name) }));
+  return Object.entries(item.properties || {}).map(([name, part]) => ({
+    name,
+    schema: resolve(part, root),
+    required: (item.required || []).includes(name),
+  }));
 }
 
 /** Most rows that the table may have. */
-export const mostRows = (schema, root) => resolve((schema.oneOf || schema.anyOf).find(form => resolve(form, root).type === 'array'), root).maxItems ?? Infinity;
+export const mostRows = (schema, root) =>
+  resolve(
+    (schema.oneOf || schema.anyOf).find(form => resolve(form, root).type === 'array'),
+    root,
+  ).maxItems ?? Infinity;
 
 /** Of a table whose rows name their run: the list of the job that has the runs, the field of a row with the number of its run,
  *  counted from 1, and the fields of a run that a column can fill. */
@@ -117,8 +198,11 @@ export function unitRead(title, schema) {
 function isNamed(column, title) {
   const bare = norm(stemOf(column.name, column.schema['x-unit']));
   const heading = norm(headed(title).name);
-  return norm(title) === norm(column.name) || [bare, norm(column.name)].includes(heading)
-    || endsOf(column.schema['x-unit'] ?? '').some(({ end }) => heading === `${bare}_${end}`);
+  return (
+    norm(title) === norm(column.name) ||
+    [bare, norm(column.name)].includes(heading) ||
+    endsOf(column.schema['x-unit'] ?? '').some(({ end }) => heading === `${bare}_${end}`)
+  );
 }
 
 /** Which column of the file goes where, as far as names and units tell. */
@@ -139,15 +223,27 @@ export function guess(columns, header, measured = [], rows = []) {
   }
   for (const column of columns) {
     const symbol = norm(column.schema['x-symbol'] || '');
-    const words = norm(column.name).split('_').filter(word => word.length > 3);
+    const words = norm(column.name)
+      .split('_')
+      .filter(word => word.length > 3);
     if (symbol) take(column, ({ name }) => norm(name) === symbol);
-    take(column, ({ name }) => words.length > 0 && words.every(word => norm(name).includes(word) || word === norm(column.schema['x-unit'] || '')));
+    take(
+      column,
+      ({ name }) => words.length > 0 && words.every(word => norm(name).includes(word) || word === norm(column.schema['x-unit'] || '')),
+    );
     // Endings differ: the beginnings of the label's words are enough.
-    const said = norm(labelOf(column.name, column.schema)).split('_').filter(word => word.length > 3).map(word => word.slice(0, -2));
+    const said = norm(labelOf(column.name, column.schema))
+      .split('_')
+      .filter(word => word.length > 3)
+      .map(word => word.slice(0, -2));
     take(column, ({ name }) => said.length > 0 && said.every(word => norm(name).includes(word)));
   }
   // What remains is guessed, and said to be: by what people call such things, then by what is the only one left.
-  const fits = (column, { title, unit }) => unit === null || !hasUnit(column.schema) || unitIn(unit, column.schema['x-unit']) !== null || unitRead(title, column.schema).unit !== null;
+  const fits = (column, { title, unit }) =>
+    unit === null ||
+    !hasUnit(column.schema) ||
+    unitIn(unit, column.schema['x-unit']) !== null ||
+    unitRead(title, column.schema).unit !== null;
   const needed = columns.filter(({ required, name }) => required || measured.includes(name));
   const closeness = (column, heading) => {
     const [own, said] = [wordsOf(stemOf(column.name, column.schema['x-unit'])), wordsOf(heading.name)];
@@ -155,17 +251,26 @@ export function guess(columns, header, measured = [], rows = []) {
     return common / (own.size + said.size - common || 1);
   };
   // The closest pair first: a diameter is a diameter before it is the deviation of one.
-  const pairs = needed.flatMap(column => left.map(heading => ({ column, heading, close: closeness(column, heading) }))).filter(({ close }) => close > 0).sort((one, other) => other.close - one.close);
+  const pairs = needed
+    .flatMap(column => left.map(heading => ({ column, heading, close: closeness(column, heading) })))
+    .filter(({ close }) => close > 0)
+    .sort((one, other) => other.close - one.close);
   for (const { column, heading } of pairs.filter(pair => fits(pair.column, pair.heading))) take(column, other => other === heading, true);
   // A unit that does not fit is said, where nothing else does.
   for (const { column, heading } of pairs.filter(pair => pair.column.required)) take(column, other => other === heading, true);
   const isNumeric = index => rows.length > 0 && rows.slice(0, 20).every(row => !row[index] || isFigure(row[index]));
-  for (const column of columns.filter(({ required, schema }) => required && schema.type === 'number')) take(column, heading => fits(column, heading) && isNumeric(heading.index), true);
+  for (const column of columns.filter(({ required, schema }) => required && schema.type === 'number'))
+    take(column, heading => fits(column, heading) && isNumeric(heading.index), true);
   if (measured.length > 0 && !measured.some(name => matches[name])) {
     const rest = left.filter(heading => heading.unit !== null && isNumeric(heading.index));
     for (const heading of rest) {
-      const column = columns.find(({ name, schema }) => measured.includes(name) && hasUnit(schema) && unitIn(heading.unit, schema['x-unit']) !== null);
-      if (column) { take(column, other => other === heading, true); break; }
+      const column = columns.find(
+        ({ name, schema }) => measured.includes(name) && hasUnit(schema) && unitIn(heading.unit, schema['x-unit']) !== null,
+      );
+      if (column) {
+        take(column, other => other === heading, true);
+        break;
+      }
     }
   }
   return matches;
@@ -174,7 +279,9 @@ export function guess(columns, header, measured = [], rows = []) {
 /** The number of a cell, as the service reads it; `null` for an empty one, `NaN` for words. */
 export function cellNumber(text, separator) {
   if ((text ?? '') === '') return null;
-  return isNumber(text, separator) ? Number((separator !== ',' && text.includes(',') ? text.replaceAll('.', ' ').replaceAll(',', '.') : text).replaceAll('−', '-')) : NaN;
+  return isNumber(text, separator)
+    ? Number((separator !== ',' && text.includes(',') ? text.replaceAll('.', ' ').replaceAll(',', '.') : text).replaceAll('−', '-'))
+    : NaN;
 }
 
 /** The numbers of the column that a field takes, in the unit in which they are read; without what is taken off them. */
@@ -184,7 +291,10 @@ export const numbersOf = (file, match) => file.rows.map(row => cellNumber(row[ma
  *  Deviations of a size are small beside it and lie on both sides of nothing. */
 export function sizeAbout(file, column, match) {
   if (!/deviation/.test(column.name) || !match?.unit || !['mm', 'um'].includes(column.schema['x-unit'])) return null;
-  const sorted = numbersOf(file, match).filter(Number.isFinite).map(value => converted(value, match.unit, 'mm')).sort((a, b) => a - b);
+  const sorted = numbersOf(file, match)
+    .filter(Number.isFinite)
+    .map(value => converted(value, match.unit, 'mm'))
+    .sort((a, b) => a - b);
   const middle = sorted[Math.floor(sorted.length / 2)];
   return sorted.length > 0 && middle > LEAST_SIZE_MM && sorted.at(-1) - sorted[0] < SIZE_SPREAD * middle ? Number(middle.toFixed(1)) : null;
 }
@@ -200,11 +310,19 @@ function isNumber(cell, separator) {
 
 /** The columns that no field takes: those that the rows keep beside their fields, and those that are left. */
 export function othersOf(file, columns, matches, free) {
-  const taken = new Set(Object.values(matches).filter(Boolean).map(({ index }) => index));
-  const others = file.header.map((title, index) => ({ title, index, texts: file.rows.map(row => row[index] ?? '').filter(Boolean) }))
+  const taken = new Set(
+    Object.values(matches)
+      .filter(Boolean)
+      .map(({ index }) => index),
+  );
+  const others = file.header
+    .map((title, index) => ({ title, index, texts: file.rows.map(row => row[index] ?? '').filter(Boolean) }))
     .filter(({ title, index, texts }) => !taken.has(index) && (title !== '' || texts.length > 0));
-  const isKept = ({ title, texts }) => title !== '' && title.length <= LONGEST_NAME && !columns.some(column => isNamed(column, title))
-    && (free.has('words') || (free.has('numbers') && texts.every(text => isNumber(text, file.separator))));
+  const isKept = ({ title, texts }) =>
+    title !== '' &&
+    title.length <= LONGEST_NAME &&
+    !columns.some(column => isNamed(column, title)) &&
+    (free.has('words') || (free.has('numbers') && texts.every(text => isNumber(text, file.separator))));
   return { kept: others.filter(isKept), left: others.filter(other => !isKept(other)) };
 }
 
@@ -229,12 +347,24 @@ export function matched(file, columns, matches, kept) {
   const line = (parts, separators) => parts.map(part => quote(part, separators)).join(file.separator);
   const places = [...used.map(({ name }) => matches[name]), ...kept.map(({ index }) => ({ index }))];
   const header = [...used.map(title), ...kept.map(other => other.title)];
-  return `${[line(header, SEPARATORS), ...file.rows.map(row => line(places.map(place => cellOf(row, place)), [file.separator]))].join('\n')}\n`;
+  return `${[
+    line(header, SEPARATORS),
+    ...file.rows.map(row =>
+      line(
+        places.map(place => cellOf(row, place)),
+        [file.separator],
+      ),
+    ),
+  ].join('\n')}\n`;
 }
 
 /** Columns of a file that are no field of a row, but a condition of its run: `[{ name, schema, index, unit }]`. */
 export function conditionsIn(file, matches, runs) {
-  const taken = new Set(Object.values(matches).filter(Boolean).map(({ index }) => index));
+  const taken = new Set(
+    Object.values(matches)
+      .filter(Boolean)
+      .map(({ index }) => index),
+  );
   return [...runs.fields].flatMap(([name, schema]) => {
     const index = file.header.findIndex((title, at) => !taken.has(at) && title !== '' && isNamed({ name, schema }, title));
     const { unit } = index < 0 ? { unit: null } : unitRead(file.header[index], schema);
@@ -259,7 +389,9 @@ export function conditionsOf(file, matches, runs, conditions) {
   for (const row of file.rows) {
     const number = own ? cellNumber(row[own.index], file.separator) || 1 : 1;
     const before = found.get(number) ?? {};
-    const said = Object.fromEntries(conditions.map(one => [one.name, cellValue(row[one.index], file.separator, one)]).filter(([, value]) => value !== undefined));
+    const said = Object.fromEntries(
+      conditions.map(one => [one.name, cellValue(row[one.index], file.separator, one)]).filter(([, value]) => value !== undefined),
+    );
     found.set(number, { ...said, ...before });
   }
   return found;
@@ -288,7 +420,13 @@ export function measuredOnly(file, matches, measured) {
 function plain(value, columns, free) {
   if (Array.isArray(value)) {
     // Levels of factors are columns of their own, as they come from a file.
-    const rows = value.map(row => Object.fromEntries(Object.entries(row).flatMap(([name, cell]) => (Array.isArray(cell) ? cell.map(one => [one.factor ?? one.name, one.level ?? one.value]) : cell === null ? [] : [[name, cell]]))));
+    const rows = value.map(row =>
+      Object.fromEntries(
+        Object.entries(row).flatMap(([name, cell]) =>
+          Array.isArray(cell) ? cell.map(one => [one.factor ?? one.name, one.level ?? one.value]) : cell === null ? [] : [[name, cell]],
+        ),
+      ),
+    );
     const header = [...new Set(rows.flatMap(row => Object.keys(row)))];
     return { header, rows: rows.map(row => header.map(name => (row[name] === undefined ? '' : String(row[name])))) };
   }
@@ -296,8 +434,14 @@ function plain(value, columns, free) {
   const matches = guess(columns, file.header);
   const used = columns.filter(({ name }) => matches[name]);
   const { kept } = othersOf(file, columns, matches, free);
-  const cellOf = (row, column) => { const own = cellValue(row[matches[column.name].index], file.separator, { schema: column.schema, unit: matches[column.name].unit }); return own === undefined ? '' : String(own); };
-  return { header: [...used.map(({ name }) => name), ...kept.map(({ title }) => title)], rows: file.rows.map(row => [...used.map(column => cellOf(row, column)), ...kept.map(({ index }) => row[index] ?? '')]) };
+  const cellOf = (row, column) => {
+    const own = cellValue(row[matches[column.name].index], file.separator, { schema: column.schema, unit: matches[column.name].unit });
+    return own === undefined ? '' : String(own);
+  };
+  return {
+    header: [...used.map(({ name }) => name), ...kept.map(({ title }) => title)],
+    rows: file.rows.map(row => [...used.map(column => cellOf(row, column)), ...kept.map(({ index }) => row[index] ?? '')]),
+  };
 }
 
 /** Two tables under each other, as CSV. */
@@ -318,9 +462,10 @@ export function lastRun(value, columns, free, runs, list) {
 
 /** The columns of a kept CSV, by their labels. */
 export function headings(csv, columns) {
-  return readFile(csv).file?.header.map(title => {
-    const column = columns.find(one => isNamed(one, title));
-    return column ? labelOf(column.name, column.schema) : title;
-  }).join(', ');
+  return readFile(csv)
+    .file?.header.map(title => {
+      const column = columns.find(one => isNamed(one, title));
+      return column ? labelOf(column.name, column.schema) : title;
+    })
+    .join(', ');
 }
-

@@ -12,7 +12,13 @@ import { useHandOver } from './handover.js';
 const TABLE_ROWS = 200;
 
 export function Tabs({ id, description, answer, pinned, stale, owns }) {
-  const names = ['values', ...(description.tables.length ? ['tables'] : []), ...(description.media_types.includes('text/x-gcode') ? ['program'] : []), 'basis', 'request'];
+  const names = [
+    'values',
+    ...(description.tables.length ? ['tables'] : []),
+    ...(description.media_types.includes('text/x-gcode') ? ['program'] : []),
+    'basis',
+    'request',
+  ];
   const [open, setOpen] = useState('values');
   const current = names.includes(open) ? open : names[0];
   const key = event => {
@@ -44,16 +50,23 @@ function useFetched(fetched, key, said) {
   const [found, setFound] = useState(null);
   useEffect(() => {
     const control = new AbortController();
-    const tell = what => { if (!control.signal.aborted) setFound({ key, ...what }); };
-    api.patient(() => fetched(key, control.signal), control.signal)
-      .then(value => tell({ value }), error => tell({ trouble: error.problem?.detail || error.message }));
+    const tell = what => {
+      if (!control.signal.aborted) setFound({ key, ...what });
+    };
+    api
+      .patient(() => fetched(key, control.signal), control.signal)
+      .then(
+        value => tell({ value }),
+        error => tell({ trouble: error.problem?.detail || error.message }),
+      );
     return () => control.abort();
   }, [key, said]);
   return found && { ...found, isOld: found.key !== key };
 }
 
 /** The tables of an answer; what the job did not ask for has one without rows. */
-const filledTables = async (key, signal) => (await api.tables(key, signal)).filter(({ columns }) => columns.some(({ cells }) => cells.length > 0));
+const filledTables = async (key, signal) =>
+  (await api.tables(key, signal)).filter(({ columns }) => columns.some(({ cells }) => cells.length > 0));
 
 function Tables({ answer, id, description, stale, owns }) {
   const { labels } = description;
@@ -77,7 +90,13 @@ function Tables({ answer, id, description, stale, owns }) {
     return value === '' && name === 'causes' ? capital(t('the_base')) : wordUnder(name, String(value), names);
   };
   return html`
-    <div class="bar">${tables.length > 1 && html`<label>${t('table')} <select value=${chosen} onChange=${event => { setChosen(Number(event.currentTarget.value)); setRows(TABLE_ROWS); }}>${tables.map(({ id: name }, index) => html`<option value=${index}>${titled(name)}</option>`)}</select></label>`}
+    <div class="bar">${
+      tables.length > 1 &&
+      html`<label>${t('table')} <select value=${chosen} onChange=${event => {
+        setChosen(Number(event.currentTarget.value));
+        setRows(TABLE_ROWS);
+      }}>${tables.map(({ id: name }, index) => html`<option value=${index}>${titled(name)}</option>`)}</select></label>`
+    }
       <span class="quiet">${plural('rows', count)}</span>
       <button type="button" disabled=${isOld || stale} onClick=${() => take('text/csv', `${table.id}.csv`, `?table=${table.id}`)}>CSV</button></div>
     ${trouble && html`<p class="fault" role="alert"><span>${trouble}</span></p>`}
@@ -122,7 +141,9 @@ function Copy({ text, disabled }) {
   const [done, setDone] = useState(false);
   const area = useRef(null);
   const copy = async () => {
-    try { await navigator.clipboard.writeText(text); } catch {
+    try {
+      await navigator.clipboard.writeText(text);
+    } catch {
       // Without a secure origin there is no clipboard: the old way.
       area.current.hidden = false;
       area.current.value = text;
@@ -135,4 +156,3 @@ function Copy({ text, disabled }) {
   };
   return html`<button type="button" class="copy" disabled=${disabled} onClick=${copy}>${done ? t('copied') : t('copy')}</button><textarea ref=${area} hidden aria-hidden="true" tabindex="-1"></textarea>`;
 }
-

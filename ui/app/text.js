@@ -31,7 +31,11 @@ export function plural(code, count, values = {}) {
 
 const wished = () => {
   let kept = null;
-  try { kept = localStorage.getItem(STORE); } catch { /* private browsing */ }
+  try {
+    kept = localStorage.getItem(STORE);
+  } catch {
+    /* private browsing */
+  }
   if (LANGUAGES.includes(kept)) return kept;
   const own = (navigator.languages || [navigator.language]).map(tag => tag.slice(0, 2));
   return own.find(tag => LANGUAGES.includes(tag)) || 'en';
@@ -43,7 +47,11 @@ export async function speak(tag = wished()) {
   words = await response.json();
   current = tag;
   document.documentElement.lang = tag;
-  try { localStorage.setItem(STORE, tag); } catch { /* asked for again next time */ }
+  try {
+    localStorage.setItem(STORE, tag);
+  } catch {
+    /* asked for again next time */
+  }
   languageChanged.set(languageChanged.get() + 1);
 }
 
@@ -79,15 +87,45 @@ export function duration(ms) {
   const s = Math.round(ms / 1000);
   if (s < 60) return `${s} ${t('unit_s')}`;
   const min = Math.floor(s / 60);
-  return min < 60 ? `${min} ${t('unit_min')} ${s % 60} ${t('unit_s')}` : `${Math.floor(min / 60)} ${t('unit_h')} ${min % 60} ${t('unit_min')}`;
+  return min < 60
+    ? `${min} ${t('unit_min')} ${s % 60} ${t('unit_s')}`
+    : `${Math.floor(min / 60)} ${t('unit_h')} ${min % 60} ${t('unit_min')}`;
 }
 
 export const moment = text => new Date(text).toLocaleString(current, { dateStyle: 'short', timeStyle: 'medium' });
 
 const SYMBOLS = { um: 'µm', us: 'µs', urad: 'µrad', deg: '°' };
 const RUSSIAN = {
-  mm: 'мм', um: 'мкм', m: 'м', N: 'Н', kN: 'кН', W: 'Вт', kW: 'кВт', s: 'с', ms: 'мс', us: 'мкс', min: 'мин', h: 'ч', rpm: 'об/мин',
-  rev: 'об', tooth: 'зуб', kg: 'кг', Hz: 'Гц', rad: 'рад', urad: 'мкрад', K: 'К', mK: 'мК', km: 'км', MPa: 'МПа', GPa: 'ГПа', g: 'г', J: 'Дж', nm: 'нм', cm: 'см', inch: 'дюйм', money: 'ден.\u00a0ед.',
+  mm: 'мм',
+  um: 'мкм',
+  m: 'м',
+  N: 'Н',
+  kN: 'кН',
+  W: 'Вт',
+  kW: 'кВт',
+  s: 'с',
+  ms: 'мс',
+  us: 'мкс',
+  min: 'мин',
+  h: 'ч',
+  rpm: 'об/мин',
+  rev: 'об',
+  tooth: 'зуб',
+  kg: 'кг',
+  Hz: 'Гц',
+  rad: 'рад',
+  urad: 'мкрад',
+  K: 'К',
+  mK: 'мК',
+  km: 'км',
+  MPa: 'МПа',
+  GPa: 'ГПа',
+  g: 'г',
+  J: 'Дж',
+  nm: 'нм',
+  cm: 'см',
+  inch: 'дюйм',
+  money: 'ден.\u00a0ед.',
 };
 
 /** The symbol of a unit of the contract: `um/N` becomes `µm/N` or `мкм/Н`, `N/mm2` becomes `N/mm²`. */
@@ -96,14 +134,15 @@ export function unitSymbol(unit) {
   if (!unit || unit === '1' || unit.startsWith('as ')) return '';
   if (unit === 'percent') return '%';
   const spell = word => (current === 'ru' && RUSSIAN[word]) || SYMBOLS[word] || word;
-  return unit
-    .replace(/([A-Za-zµ]+)(-?\d*)/g, (_, word, power) => spell(word) + superscript(power))
-    .replace(/[* ]/g, '·');
+  return unit.replace(/([A-Za-zµ]+)(-?\d*)/g, (_, word, power) => spell(word) + superscript(power)).replace(/[* ]/g, '·');
 }
 
 // Who writes milli does not mean mega: of that no capitals are mixed up.
 const spellings = symbol => (symbol.startsWith('М') ? [symbol] : [symbol, symbol.toLowerCase()]);
-const WORDS = new Map([...Object.entries(RUSSIAN).flatMap(([word, symbol]) => spellings(symbol).map(text => /** @type {[string, string]} */ ([text, word]))), /** @type {[string, string]} */ (['град', 'deg'])]);
+const WORDS = new Map([
+  ...Object.entries(RUSSIAN).flatMap(([word, symbol]) => spellings(symbol).map(text => /** @type {[string, string]} */ ([text, word]))),
+  /** @type {[string, string]} */ (['град', 'deg']),
+]);
 /** A unit with the words of the contract, as far as it is written with those of print: `мкм/об` becomes `um/rev`. */
 export const unitWords = unit => unit.replace(/[а-яё]+/gi, word => WORDS.get(word) ?? WORDS.get(word.toLowerCase()) ?? word);
 

@@ -45,18 +45,24 @@ function changesOf(schema, before, after) {
 
 function told({ label, unit, values }) {
   const all = [...new Set(values)];
-  const text = all.length > MOST_TOLD ? `${number(Math.min(...all), 4)} … ${number(Math.max(...all), 4)}` : all.map(value => number(value, 4)).join('; ');
+  const text =
+    all.length > MOST_TOLD
+      ? `${number(Math.min(...all), 4)} … ${number(Math.max(...all), 4)}`
+      : all.map(value => number(value, 4)).join('; ');
   return `${label} ${text} ${unit}`.trim();
 }
 
 /** Of a figure the panels in which another one of the same job differs. */
-const differing = (figure, other) => [...figure.panels.keys()].filter(index => JSON.stringify(figure.panels[index].items) !== JSON.stringify(other.panels[index]?.items));
+const differing = (figure, other) =>
+  [...figure.panels.keys()].filter(index => JSON.stringify(figure.panels[index].items) !== JSON.stringify(other.panels[index]?.items));
 const partOf = (figure, panels) => ({ ...figure, panels: panels.map(index => figure.panels[index]).filter(Boolean) });
 
 export function Trial({ id, desk, figure, setting, answer, figures, x, setX, apply }) {
   const [low, high] = spanOf(figure);
   const isHere = Math.abs(Math.log(x / setting.x)) < 1e-6;
-  const found = useProbe(id, isHere ? null : `${answer.key} ${x}`, signal => desk.places.jobAt(placeOf(figure, setting, x, setting.y), signal));
+  const found = useProbe(id, isHere ? null : `${answer.key} ${x}`, signal =>
+    desk.places.jobAt(placeOf(figure, setting, x, setting.y), signal),
+  );
   const isThere = !isHere && found?.tag === `${answer.key} ${x}`;
   const own = figures.find(({ id: name }) => name === setting.tried_in);
   const there = found?.figures?.find(({ id: name }) => name === setting.tried_in);

@@ -30,12 +30,21 @@ export function leavesOf(schema, job) {
         walk(inner, value?.[name], [...path, name], [...names, labelOf(name, field)]);
       }
     } else if (kind === 'array') {
-      (value || []).forEach((item, index) => walk(whole.items, item, [...path, index], [...names.slice(0, -1), `${names.at(-1)} ${index + 1}`]));
+      (value || []).forEach((item, index) =>
+        walk(whole.items, item, [...path, index], [...names.slice(0, -1), `${names.at(-1)} ${index + 1}`]),
+      );
     } else if (kind === 'number' || kind === 'boolean' || (kind === 'enum' && value !== undefined)) {
       const now = value ?? whole.default;
       leaves.push({
-        pointer: pointer(path), kind, value: now, schema: whole, unit: unitOf(whole), isGiven: value !== undefined,
-        label: names.slice(-2).join(' · '), group: names[0] ?? '', range: kind === 'number' ? around(now, whole) : null,
+        pointer: pointer(path),
+        kind,
+        value: now,
+        schema: whole,
+        unit: unitOf(whole),
+        isGiven: value !== undefined,
+        label: names.slice(-2).join(' · '),
+        group: names[0] ?? '',
+        range: kind === 'number' ? around(now, whole) : null,
       });
     }
   };
@@ -57,7 +66,8 @@ function around(value, schema) {
 
 /** A field with values to begin with: one of the cut first. */
 export function proposed(leaves, taken = []) {
-  const rank = ({ kind, isGiven, pointer: place }) => (kind === 'number' ? 0 : 8) + (isGiven ? 0 : 4) + (place.startsWith('/cut/') || place.startsWith('/tool/') ? 0 : 1) + (FIRST.test(place) ? 0 : 2);
+  const rank = ({ kind, isGiven, schema, pointer: place }) =>
+    (kind === 'number' ? 0 : 8) + (isGiven ? 0 : 4) + (schema['x-group'] === 'cut' ? 0 : 1) + (FIRST.test(place) ? 0 : 2);
   const free = leaves.filter(one => !taken.includes(one.pointer)).sort((a, b) => rank(a) - rank(b));
   return free.slice(0, 1).map(leaf => ({ leaf, range: valuesOf(leaf) }));
 }
@@ -84,7 +94,8 @@ export function outputsOf(schema, first) {
     const whole = resolve(part, schema);
     const kind = kindOf(whole);
     if (kind === 'object') {
-      for (const [name, inner] of Object.entries(whole.properties)) walk(inner, [...path, name], [...names, labelOf(name, resolve(inner, schema))]);
+      for (const [name, inner] of Object.entries(whole.properties))
+        walk(inner, [...path, name], [...names, labelOf(name, resolve(inner, schema))]);
     } else if (kind === 'number') {
       found.push({ pointer: pointer(path), label: names.slice(-3).join(' · '), unit: unitOf(whole), description: whole.description });
     }

@@ -1,7 +1,35 @@
-//! Colours of maps: evenly spaced in lightness (OKLab), told apart by colour-blind eyes. Low is next to the paper,
-//! on white paper and on a dark screen alike.
+//! Colours that colour-blind eyes tell apart: of roles (after Okabe and Ito), and of maps, evenly spaced in lightness
+//! (OKLab), whose low end is next to the paper, on white paper and on a dark screen alike. The workbench draws with the
+//! same ones: they are served to it.
+
+use std::fmt::Write as _;
 
 use super::page::{Page, put};
+
+/// A colour by its name in the workbench, what has it in a picture and as what, on paper and on a dark screen.
+type Colour = (&'static str, &'static [&'static str], &'static str, &'static str, &'static str);
+const COLOURS: [Colour; 20] = [
+    ("r-nominal", &["nominal", "n6"], "color", "5c6470", "aab2bd"),
+    ("r-before", &["before", "plain.v2"], "color", "d55e00", "ff8f45"),
+    ("r-after", &["after", "n2", "plain.v3"], "color", "007a59", "2fc79a"),
+    ("r-command", &["command", "n0", "plain.v1"], "color", "0072b2", "62bdf5"),
+    ("r-comparison", &["comparison", "n3", "plain.v4"], "color", "a8487f", "e59ac4"),
+    ("r-part", &["part"], "color", "6b7480", "98a1ad"),
+    ("r-part-fill", &["part.outline"], "fill", "dde1e6", "343a43"),
+    ("r-stock", &["stock", "plain.v5"], "color", "a06a00", "dba63a"),
+    ("r-tolerance", &["tolerance"], "color", "2a8fd0", "62bdf5"),
+    ("r-uncertainty", &["uncertainty"], "color", "c98500", "f0b93a"),
+    ("r-limit", &["limit"], "color", "b00020", "ff6b78"),
+    ("r-stable", &["stable"], "color", "1f6fb4", "62bdf5"),
+    ("r-unstable", &["unstable", "n1"], "color", "c24a00", "ff8f45"),
+    ("r-plain", &["plain"], "color", "1a1d21", "e8eaed"),
+    ("r-4", &["n4"], "color", "8a5c00", "dba63a"),
+    ("r-5", &["n5"], "color", "1a7f9c", "6fd3ec"),
+    ("r-7", &["n7"], "color", "5b4bb0", "ab9ff2"),
+    ("plot-grid", &["grid"], "stroke", "e4e7eb", "2a2f36"),
+    ("plot-frame", &["zero", "frame"], "stroke", "9aa2ad", "69727e"),
+    ("plot-ink", &["number"], "fill", "4d5561", "aab2bd"),
+];
 
 /// Steps of a scale.
 pub(super) const STEPS: u8 = 20;
@@ -30,14 +58,58 @@ pub(super) fn class(diverging: bool, step: u8) -> String {
     format!("{}{step}", if diverging { 'd' } else { 'm' })
 }
 
+/// Dark rules are for screens only: paper stays white.
+const DARK: &str = "@media screen and (prefers-color-scheme:dark)";
+
+/// A map's colours from low to high, on paper and on a dark screen.
+fn map(diverging: bool) -> [Vec<&'static str>; 2] {
+    let sequential = || SEQUENTIAL.iter().copied();
+    if diverging {
+        [DIVERGING.to_vec(), DIVERGING_DARK.to_vec()]
+    } else {
+        [sequential().collect(), sequential().rev().collect()]
+    }
+}
+
+/// The rules of the roles.
+pub(super) fn roles(page: &mut Page) {
+    let rules = |page: &mut Page, is_dark: bool| {
+        for (_, classes, property, light, dark) in COLOURS {
+            let of: Vec<String> = classes.iter().map(|class| format!(".precut-figure .{class}")).collect();
+            put!(page, "{}{{{property}:#{}}}", of.join(","), if is_dark { dark } else { light });
+        }
+    };
+    rules(page, false);
+    put!(page, "{DARK}{{");
+    rules(page, true);
+    put!(page, "}}");
+}
+
 /// The rules of all steps of one scale.
 pub(super) fn css(page: &mut Page, diverging: bool) {
-    let dark: Vec<&str> = if diverging { DIVERGING_DARK.to_vec() } else { SEQUENTIAL.iter().rev().copied().collect() };
-    let light = if diverging { DIVERGING } else { SEQUENTIAL };
+    let [light, dark] = map(diverging);
     rules(page, diverging, &light);
-    put!(page, "@media screen and (prefers-color-scheme:dark){{");
+    put!(page, "{DARK}{{");
     rules(page, diverging, &dark);
     put!(page, "}}");
+}
+
+/// All colours as variables of a style sheet: roles by screen, the colours of maps of either screen as lists.
+pub fn palette() -> String {
+    let mut css = String::from(":root{");
+    for (name, _, _, light, _) in COLOURS {
+        let _ = write!(css, "--{name}:#{light};");
+    }
+    for (name, diverging) in [("map", false), ("map-diverging", true)] {
+        let [light, dark] = map(diverging);
+        let _ = write!(css, "--{name}:{};--{name}-dark:{};", light.join(" "), dark.join(" "));
+    }
+    let _ = write!(css, "}}{DARK}{{:root{{");
+    for (name, _, _, _, dark) in COLOURS {
+        let _ = write!(css, "--{name}:#{dark};");
+    }
+    css.push_str("}}");
+    css
 }
 
 fn rules(page: &mut Page, diverging: bool, colours: &[&str]) {

@@ -23,6 +23,7 @@ mod unit;
 
 use precut_calc::calculator::{Axis, Figure, Frame, Item, Message, Panel};
 
+pub use self::colour::palette;
 use self::map::Key;
 use self::page::{Escaped, Page, Px, lines, put};
 use self::scale::{Ticks, rough};
@@ -118,6 +119,7 @@ fn open(
     put!(page, "<desc>{}</desc>\n", Escaped(&described(figure, wording)));
     let has_ribbons = ribbon::any(&figure.panels);
     put!(page, "<style>{}{}", style::CSS, if has_ribbons { style::RIBBONS } else { "" });
+    colour::roles(page);
     for diverging in [false, true] {
         if keys.iter().flatten().any(|key| key.diverging == diverging) {
             colour::css(page, diverging);

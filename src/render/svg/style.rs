@@ -1,5 +1,5 @@
-//! How things look: colours that colour-blind eyes tell apart (Okabe and Ito), and a dash pattern or a
-//! marker of its own for each, so that nothing is said by colour alone.
+//! How things look: a dash pattern or a marker of its own for everything that has a colour, so that nothing is said by
+//! colour alone.
 
 use std::collections::BTreeMap;
 
@@ -15,10 +15,9 @@ pub(super) const CSS: &str = "\
 .precut-figure text{fill:#1a1d21}\
 .precut-figure .title{font-size:17px;font-weight:600}\
 .precut-figure .name{font-weight:600}\
-.precut-figure .number{fill:#4d5561}\
-.precut-figure .grid{stroke:#e4e7eb;fill:none}\
+.precut-figure .grid{fill:none}\
 .precut-figure .fine{stroke-opacity:.55}\
-.precut-figure .zero,.precut-figure .frame{stroke:#9aa2ad;fill:none}\
+.precut-figure .zero,.precut-figure .frame{fill:none}\
 .precut-figure .line{fill:none;stroke:currentColor;stroke-width:1.9;stroke-linejoin:round}\
 .precut-figure .dot{fill:currentColor;stroke:none}\
 .precut-figure .band{fill:currentColor;fill-opacity:.2;stroke:none}\
@@ -27,42 +26,29 @@ pub(super) const CSS: &str = "\
 .precut-figure .outline{fill:currentColor;fill-opacity:.25;stroke:currentColor;stroke-width:1.2;stroke-linejoin:round}\
 .precut-figure .glyph{fill:#fff;stroke:#1a1d21;stroke-width:1.2;stroke-linejoin:round}\
 .precut-figure .solid{fill:#1a1d21}\
-.precut-figure .nominal{color:#5c6470;stroke-width:1.3;stroke-dasharray:12 3 2 3}\
-.precut-figure .before{color:#d55e00;stroke-dasharray:8 4}\
-.precut-figure .after{color:#007a59}\
-.precut-figure .command{color:#0072b2;stroke-dasharray:16 4}\
-.precut-figure .comparison{color:#a8487f;stroke-dasharray:2.5 3}\
-.precut-figure .part{color:#6b7480}\
-.precut-figure .part.outline{fill:#dde1e6;fill-opacity:1}\
-.precut-figure .stock{color:#a06a00;stroke-dasharray:4 3;fill-opacity:.1}\
-.precut-figure .tolerance{color:#2a8fd0}\
+.precut-figure .nominal{stroke-width:1.3;stroke-dasharray:12 3 2 3}\
+.precut-figure .before{stroke-dasharray:8 4}\
+.precut-figure .command{stroke-dasharray:16 4}\
+.precut-figure .comparison{stroke-dasharray:2.5 3}\
+.precut-figure .part.outline{fill-opacity:1}\
+.precut-figure .stock{stroke-dasharray:4 3;fill-opacity:.1}\
 .precut-figure .tolerance.edge{stroke-dasharray:5 3}\
 .precut-figure .tolerance.line{stroke-dasharray:10 3 2 3 2 3}\
-.precut-figure .uncertainty{color:#e69f00}\
 .precut-figure .uncertainty.line{stroke-dasharray:4 2 1 2}\
-.precut-figure .limit{color:#b00020}\
 .precut-figure .limit.line{stroke-width:2.8}\
-.precut-figure .stable{color:#1f6fb4}\
-.precut-figure .unstable{color:#c24a00;stroke-dasharray:4 3}\
-.precut-figure .plain{color:#1a1d21}\
-.precut-figure .n0{color:#0072b2}\
-.precut-figure .n1{color:#c24a00;stroke-dasharray:8 4}\
-.precut-figure .n2{color:#007a59;stroke-dasharray:2.5 3}\
-.precut-figure .n3{color:#a8487f;stroke-dasharray:12 3 2 3}\
-.precut-figure .n4{color:#8a5c00;stroke-dasharray:16 4}\
-.precut-figure .n5{color:#1a7f9c;stroke-dasharray:5 2 1 2 1 2}\
-.precut-figure .n6{color:#5c6470;stroke-dasharray:5 2}\
-.precut-figure .n7{color:#5b4bb0;stroke-dasharray:10 3 2 3 2 3}\
+.precut-figure .unstable{stroke-dasharray:4 3}\
+.precut-figure .n1{stroke-dasharray:8 4}\
+.precut-figure .n2{stroke-dasharray:2.5 3}\
+.precut-figure .n3{stroke-dasharray:12 3 2 3}\
+.precut-figure .n4{stroke-dasharray:16 4}\
+.precut-figure .n5{stroke-dasharray:5 2 1 2 1 2}\
+.precut-figure .n6{stroke-dasharray:5 2}\
+.precut-figure .n7{stroke-dasharray:10 3 2 3 2 3}\
 .precut-figure .v1{stroke-dasharray:5 2}\
 .precut-figure .v2{stroke-dasharray:2 2}\
 .precut-figure .v3{stroke-dasharray:10 3 2 3}\
 .precut-figure .v4{stroke-dasharray:14 3 5 3}\
 .precut-figure .v5{stroke-dasharray:5 2 1 2 1 2}\
-.precut-figure .plain.v1{color:#0072b2}\
-.precut-figure .plain.v2{color:#d55e00}\
-.precut-figure .plain.v3{color:#007a59}\
-.precut-figure .plain.v4{color:#a8487f}\
-.precut-figure .plain.v5{color:#a06a00}\
 .precut-figure .points,.precut-figure .dot,.precut-figure .bars{stroke-dasharray:none}\
 .precut-figure .bars{fill:currentColor;fill-opacity:.85;stroke:currentColor;stroke-width:.8}\
 .precut-figure .bars.nominal,.precut-figure .bars.before,.precut-figure .bars.comparison,.precut-figure .bars.n1,\
@@ -75,41 +61,11 @@ pub(super) const CSS: &str = "\
 @media screen and (prefers-color-scheme:dark){\
 .precut-figure .paper{fill:#15181c}\
 .precut-figure text{fill:#e8eaed}\
-.precut-figure .number{fill:#aab2bd}\
-.precut-figure .grid{stroke:#2a2f36}\
-.precut-figure .zero,.precut-figure .frame{stroke:#69727e}\
 .precut-figure .glyph{fill:#15181c;stroke:#e8eaed}\
 .precut-figure .solid{fill:#e8eaed}\
-.precut-figure .nominal{color:#aab2bd}\
-.precut-figure .before{color:#ff8f45}\
-.precut-figure .after{color:#2fc79a}\
-.precut-figure .command{color:#62bdf5}\
-.precut-figure .comparison{color:#e59ac4}\
-.precut-figure .part{color:#98a1ad}\
-.precut-figure .part.outline{fill:#343a43}\
-.precut-figure .stock{color:#dba63a}\
-.precut-figure .tolerance{color:#62bdf5}\
-.precut-figure .uncertainty{color:#f0b93a}\
-.precut-figure .limit{color:#ff6b78}\
-.precut-figure .stable{color:#62bdf5}\
-.precut-figure .unstable{color:#ff8f45}\
-.precut-figure .plain{color:#e8eaed}\
-.precut-figure .n0{color:#62bdf5}\
-.precut-figure .n1{color:#ff8f45}\
-.precut-figure .n2{color:#2fc79a}\
-.precut-figure .n3{color:#e59ac4}\
-.precut-figure .n4{color:#dba63a}\
-.precut-figure .n5{color:#6fd3ec}\
-.precut-figure .n6{color:#aab2bd}\
-.precut-figure .n7{color:#ab9ff2}\
 .precut-figure .over{stroke:#e8eaed}\
 .precut-figure .halo,.precut-figure .casing{stroke:#15181c}\
 #precut-hatch path{stroke:#fff}\
-.precut-figure .plain.v1{color:#62bdf5}\
-.precut-figure .plain.v2{color:#ff8f45}\
-.precut-figure .plain.v3{color:#2fc79a}\
-.precut-figure .plain.v4{color:#e59ac4}\
-.precut-figure .plain.v5{color:#dba63a}\
 }";
 
 /// Where there are ribbons.
