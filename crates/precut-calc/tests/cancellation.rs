@@ -270,9 +270,11 @@ fn dear(calculator: &str) -> Vec<Value> {
         "ring-roundness" => vec![
             json!({"samples": 200_000, "tool": {"revolutions": 1000}}),
             json!({"analyses": ["setup_map"], "setup_map": {"tool_angles": 100, "support_angles": 100}}),
+            json!({"samples": 200_000, "supports": {"roller_radius_mm": 20, "distance_mm": 225, "depth_mm": 126}}),
             json!({"analyses": ["settings_search"], "settings_search": {"target_um": 0.01, "compliance_ratio_max": 3}}),
         ],
         "roundness-evaluation" => vec![
+            json!({"deviations": readings(200_000), "profile_points": 200_000}),
             // A symmetric section: many circles to tell apart.
             json!({"deviations": readings(720), "profile_points": 200_000}),
         ],

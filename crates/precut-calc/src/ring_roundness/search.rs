@@ -222,7 +222,7 @@ impl Finder<'_> {
     /// The radii after stages one after the other; `None` where the ring falls through.
     fn after(&self, stages: &[&Setting], mut radii_mm: Vec<f64>) -> Result<Option<Vec<f64>>, Failure> {
         for stage in stages {
-            let watch = &mut |_: &_, _: &[f64]| checkpoint(self.share.monitor);
+            let watch = &mut |_: Option<&_>, _: &[f64]| checkpoint(self.share.monitor);
             let Some(turned) = or_none(turn::<Failure>(&radii_mm, stage, watch))? else { return Ok(None) };
             radii_mm = turned.radii_mm;
         }

@@ -118,6 +118,7 @@ pub(super) fn run_exact(
     follower.recorder = Recorder::new(scene, frames, total);
     let turned = turn::<Failure>(&blank, &scene.setting, &mut |revolution, radii| {
         checkpoint(share.monitor)?;
+        let Some(revolution) = revolution else { return Ok(()) };
         let done = revolution.turned_revolutions;
         share.report(done / total, stage(done, total));
         if with_history { follower.follow(revolution, radii, &grid, share.monitor) } else { Ok(()) }

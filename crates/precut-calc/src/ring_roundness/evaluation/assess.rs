@@ -30,12 +30,13 @@ pub(super) const FAILURE_CODES: &[&str] = &["not_star_shaped", "points_without_c
 pub(in crate::ring_roundness) fn outcome(job: &Job, monitor: &dyn Monitor) -> Result<Outcome, Failure> {
     checkpoint(monitor)?;
     monitor.progress(0.0, Message::new("stage_circles"));
-    let readings = Readings::of(job).map_err(|error| failure(error, None))?;
+    let goes_on = || !monitor.cancelled();
+    let readings = Readings::of(job, &goes_on).map_err(|error| failure(error, None))?;
     let mut outcome = of_readings(job, &readings, monitor)?;
     if job.spikes == SpikeTreatment::Keep && !readings.spikes.is_empty() {
         // What would come without them is tried, not guessed.
         let without = Job { spikes: SpikeTreatment::Remove, ..job.clone() };
-        let readings = Readings::of(&without).map_err(|error| failure(error, None))?;
+        let readings = Readings::of(&without, &goes_on).map_err(|error| failure(error, None))?;
         outcome.data.roundness_without_spikes_um =
             of_readings(&without, &readings, &Quiet(monitor)).ok().map(|without| without.roundness_um);
         checkpoint(monitor)?;
