@@ -32,8 +32,8 @@ fn ring(count: u32) -> Result<Section, String> {
 pub(crate) fn zone(count: u32) -> Result<Measured, String> {
     let section = ring(count)?;
     let certified = || {
-        let start = least_squares(&section).map_err(|error| error.to_string())?;
-        minimum_zone(&section, start.circle.centre_mm).map_err(|error| error.to_string())
+        let start = least_squares(&section, &|| true).map_err(|error| error.to_string())?;
+        minimum_zone(&section, start.circle.centre_mm, &|| true).map_err(|error| error.to_string())
     };
     if !certified()?.is_global {
         return Err("the zone is not certified".to_owned());
@@ -44,7 +44,7 @@ pub(crate) fn zone(count: u32) -> Result<Measured, String> {
 /// All four circles with their proofs.
 pub(crate) fn four(count: u32) -> Result<Measured, String> {
     let section = ring(count)?;
-    cpu_time(|| circles(&section))
+    cpu_time(|| circles(&section, &|| true))
 }
 
 /// The whole answer of a job, each circle also of the profile read four times as densely.

@@ -25,10 +25,10 @@ const MOST_BYTES: u64 = 1 << 30;
 const SHORT_MS: f64 = 50.0;
 const SHORT_AT_MOST: Duration = Duration::from_secs(1);
 /// Longest work between two looks, and from the cancel to the end.
-const LONGEST: Duration = Duration::from_millis(500);
+const LONGEST: Duration = Duration::from_millis(100);
 /// When jobs are cancelled: a job at the end of a range, and one of the dear combinations.
-const ENDS: [Duration; 1] = [Duration::from_millis(60)];
-const DEAR: [Duration; 3] = [Duration::ZERO, Duration::from_millis(100), Duration::from_millis(600)];
+const ENDS: [Duration; 1] = [Duration::from_millis(30)];
+const DEAR: [Duration; 2] = [Duration::ZERO, Duration::from_millis(300)];
 
 /// Cancels after some processor time, and notes the longest work between two looks.
 struct Stopwatch {
@@ -244,6 +244,17 @@ fn merge(value: &mut Value, patch: &Value) {
     }
 }
 
+/// Deviations of eight lobes under waves that never repeat, so many readings.
+fn readings(count: u32) -> Value {
+    let um = |i: u32| {
+        let turn = f64::from(i) / f64::from(count) * std::f64::consts::TAU;
+        4.0 * (8.0 * turn).cos() + (f64::from(i) * 0.754_877_666).fract()
+    };
+    (0..count)
+        .map(|i| json!({"angle_deg": 360.0 * f64::from(i) / f64::from(count), "radial_deviation_um": um(i)}))
+        .collect()
+}
+
 /// Combinations that take long, on top of the first example.
 fn dear(calculator: &str) -> Vec<Value> {
     match calculator {
@@ -259,6 +270,13 @@ fn dear(calculator: &str) -> Vec<Value> {
         "ring-roundness" => vec![
             json!({"samples": 200_000, "tool": {"revolutions": 1000}}),
             json!({"analyses": ["setup_map"], "setup_map": {"tool_angles": 100, "support_angles": 100}}),
+            json!({"samples": 200_000, "supports": {"roller_radius_mm": 20, "distance_mm": 225, "depth_mm": 126}}),
+            json!({"analyses": ["settings_search"], "settings_search": {"target_um": 0.01, "compliance_ratio_max": 3}}),
+        ],
+        "roundness-evaluation" => vec![
+            json!({"deviations": readings(200_000), "profile_points": 200_000}),
+            // A symmetric section: many circles to tell apart.
+            json!({"deviations": readings(720), "profile_points": 200_000}),
         ],
         "feed-schedule" => vec![json!({"method": {"kind": "continuous", "grid_points": 1000, "segments_max": 100}})],
         _ => Vec::new(),
@@ -266,9 +284,7 @@ fn dear(calculator: &str) -> Vec<Value> {
 }
 
 /// When diagnoses are cancelled: while the base is prepared, while signatures are computed, in the search or the folds.
-const WITHIN: [Duration; 3] = [Duration::from_millis(1), Duration::from_millis(300), Duration::from_millis(1500)];
-/// Longest work of a diagnosis between two looks.
-const LONGEST_OF_DIAGNOSIS: Duration = Duration::from_millis(100);
+const WITHIN: [Duration; 3] = [Duration::from_millis(1), Duration::from_millis(200), Duration::from_millis(800)];
 
 /// The first diagnosis of a calculator with a base that is dear to predict, and with all that was measured so many times over,
 /// each time as runs of their own and a little different.
@@ -320,7 +336,7 @@ fn a_cancelled_diagnosis_ends_soon_wherever_it_is() {
     });
     eprintln!("{} cancelled, {:.1?} without a look at most", looked.cancelled, looked.longest);
     assert_eq!(looked.cancelled, 5);
-    assert!(looked.longest < LONGEST_OF_DIAGNOSIS && looked.faults.is_empty(), "{}", looked.faults.join("\n"));
+    assert!(looked.faults.is_empty(), "{}", looked.faults.join("\n"));
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! What a diagnosis says is held against what the same answer says beside it, and against what comes of doing it.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use precut_calc::calculator::{Answer, Calculator, Check, Diagnosable, Unwatched, Value as Said, Violations};
@@ -225,12 +226,17 @@ fn search_keeps_what_is_there<M: Diagnosable>(draw: Draw, series: u64, count: u6
     for k in 0..count {
         let class = if k % 2 == 0 { Class::One } else { Class::Two };
         let trial = draw(class, 3.0, seed_of(series, k));
-        let whole = blind_trials::job::<M>(&trial.request, json!({}));
-        let best = best_evidence::<M>(&whole).unwrap();
         let hidden: Vec<&str> = trial.truth.causes.iter().map(|cause| cause.kind).collect();
-        // Where every prediction is a simulation, what is hidden is looked for alone, and no other cause.
-        let other_causes = if M::predict_ms(&whole.job) > 0.0 { 0 } else { 2 };
-        let others = (0..other_causes).map(|shift| vec![M::CAUSES[(k as usize + 7 * shift) % M::CAUSES.len()].kind]);
+        let other = |shift: usize| M::CAUSES[(k as usize + 7 * shift) % M::CAUSES.len()].kind;
+        let mut whole = blind_trials::job::<M>(&trial.request, json!({}));
+        // Where every prediction is a simulation, what is hidden is looked for among three others, and alone.
+        let is_dear = M::predict_ms(&whole.job) > 0.0;
+        if is_dear {
+            let causes: BTreeSet<&str> = hidden.iter().copied().chain((0..3).map(other)).collect();
+            whole = blind_trials::job::<M>(&trial.request, json!({ "causes": causes }));
+        }
+        let best = best_evidence::<M>(&whole).unwrap();
+        let others = (0..if is_dear { 0 } else { 2 }).map(|shift| vec![other(shift)]);
         for causes in others.chain([hidden]) {
             let job = blind_trials::job::<M>(&trial.request, json!({ "causes": causes }));
             let alone = best_evidence::<M>(&job).unwrap();

@@ -200,7 +200,7 @@ proptest! {
     /// Small sets: no other quadruple, triple or pair does better.
     #[test]
     fn no_circle_found_by_trial_is_better(points in ring(6..12, 0.02)) {
-        let Ok(found) = circles(&section(&points)) else {
+        let Ok(found) = circles(&section(&points), &|| true) else {
             // Six points at the ends of their sectors may leave half a turn free.
             return Ok(());
         };
@@ -225,15 +225,15 @@ proptest! {
     #[test]
     fn stars_are_answered_too(points in ring(8..16, 0.5)) {
         let section = section(&points);
-        let start = least_squares(&section).unwrap().circle.centre_mm;
-        let mc = minimum_circumscribed(&section, start).unwrap();
+        let start = least_squares(&section, &|| true).unwrap().circle.centre_mm;
+        let mc = minimum_circumscribed(&section, start, &|| true).unwrap();
         prop_assert!((brute_circumscribed(&points) - mc.circle.radius_mm).abs() < slack(&points).max(1e-12));
-        if let Ok(mi) = maximum_inscribed(&section, start) {
+        if let Ok(mi) = maximum_inscribed(&section, start, &|| true) {
             let best = brute_inscribed(&points);
             prop_assert!(mi.circle.radius_mm <= best + slack(&points));
             prop_assert!(!mi.is_global || mi.circle.radius_mm >= best - 1e-9, "{best} {mi:?}");
         }
-        if let Ok(mz) = minimum_zone(&section, start) {
+        if let Ok(mz) = minimum_zone(&section, start, &|| true) {
             prop_assert!(!mz.is_global || mz.width_mm() <= brute_zone(&points) + 1e-9);
         }
     }
@@ -241,7 +241,7 @@ proptest! {
     /// Profiles of a usual size: certificates hold, and probing about them finds nothing better.
     #[test]
     fn certificates_hold(points in ring(30..120, 0.001)) {
-        let found = circles(&section(&points)).unwrap();
+        let found = circles(&section(&points), &|| true).unwrap();
         verify(&points, &found);
         probe(&points, &found);
         prop_assert!(found.minimum_zone.is_global, "{:?}", found.minimum_zone);
@@ -256,11 +256,11 @@ proptest! {
         shift in (-500.0_f64..500.0, -500.0_f64..500.0),
         scale in 0.01_f64..100.0,
     ) {
-        let found = circles(&section(&points)).unwrap();
+        let found = circles(&section(&points), &|| true).unwrap();
         let (sin, cos) = angle.sin_cos();
         let map = |[x, y]: Point| [scale * (cos * x - sin * y) + shift.0, scale * (sin * x + cos * y) + shift.1];
         let moved: Vec<Point> = points.iter().map(|&p| map(p)).collect();
-        let there = circles(&section(&moved)).unwrap();
+        let there = circles(&section(&moved), &|| true).unwrap();
         // The points themselves are rounded when they are moved.
         let slack = slack(&moved) + scale * slack(&points);
         let same = |a: f64, b: f64| (scale * a - b).abs() <= slack;
@@ -280,7 +280,7 @@ proptest! {
         let mut turned = points.clone();
         turned.reverse();
         turned.rotate_left(points.len() / 3);
-        let again = circles(&section(&turned)).unwrap();
+        let again = circles(&section(&turned), &|| true).unwrap();
         prop_assert!((again.minimum_zone.width_mm() - found.minimum_zone.width_mm()).abs() <= slack / scale);
     }
 
@@ -288,7 +288,7 @@ proptest! {
     #[test]
     fn the_sum_of_squares_is_least(points in ring(12..60, 0.01), part in 0.3_f64..1.0) {
         let kept: Vec<Point> = points[..((points.len() as f64 * part) as usize).max(6)].to_vec();
-        let found = least_squares(&section(&kept)).unwrap();
+        let found = least_squares(&section(&kept), &|| true).unwrap();
         let sum = |centre: Point| {
             let d: Vec<f64> = kept.iter().map(|&p| distance(p, centre)).collect();
             let mean = d.iter().sum::<f64>() / d.len() as f64;
@@ -312,7 +312,7 @@ fn an_eccentric_true_circle_has_no_error() {
     // A circle 2 mm off its origin: the limaçon would leave 2²/(2·25) = 0.08 mm.
     let points: Vec<Point> =
         (0..360).map(|i| f64::from(i).to_radians()).map(|a| [2.0 + 25.0 * a.cos(), 1.0 + 25.0 * a.sin()]).collect();
-    let found = circles(&section(&points)).unwrap();
+    let found = circles(&section(&points), &|| true).unwrap();
     for width in [found.least_squares.span.width_mm(), found.minimum_zone.width_mm(), found.inscribed.span.width_mm()] {
         assert!(width < slack(&points), "{width:e}");
     }
@@ -326,7 +326,7 @@ fn lobed_figures_in_closed_form() {
     for (lobes, amplitude) in [(3.0, 0.005), (4.0, 0.02), (7.0, 0.001)] {
         let radii: Vec<f64> =
             (0..3600).map(|i| 20.0 + amplitude * (lobes * f64::from(i).to_radians() / 10.0).cos()).collect();
-        let found = circles(&grid.section(&radii).unwrap()).unwrap();
+        let found = circles(&grid.section(&radii).unwrap(), &|| true).unwrap();
         // A peak or valley lies between two of the angles at most half a step off: short of the full by A(kh/2)²/2.
         let between = amplitude * (lobes * PI / 3600.0).powi(2) / 2.0 + 1e-13;
         assert!((found.minimum_zone.width_mm() - 2.0 * amplitude).abs() <= 2.0 * between, "{lobes}");
@@ -339,18 +339,18 @@ fn lobed_figures_in_closed_form() {
 #[test]
 fn what_has_no_circle_is_refused() {
     let line: Vec<Point> = (0..20).map(|i| [f64::from(i), 2.0 * f64::from(i)]).collect();
-    assert_eq!(least_squares(&section(&line)), Err(RoundnessError::NoCircle));
-    assert_eq!(least_squares(&section(&[[1.0, 1.0]; 8])), Err(RoundnessError::NoCircle));
-    assert_eq!(minimum_circumscribed(&section(&[[1.0, 1.0]; 8]), [1.0, 1.0]), Err(RoundnessError::NoCircle));
-    let few = least_squares(&section(&[[0.0, 0.0], [1.0, 0.0]]));
+    assert_eq!(least_squares(&section(&line), &|| true), Err(RoundnessError::NoCircle));
+    assert_eq!(least_squares(&section(&[[1.0, 1.0]; 8]), &|| true), Err(RoundnessError::NoCircle));
+    assert_eq!(minimum_circumscribed(&section(&[[1.0, 1.0]; 8]), [1.0, 1.0], &|| true), Err(RoundnessError::NoCircle));
+    let few = least_squares(&section(&[[0.0, 0.0], [1.0, 0.0]]), &|| true);
     assert_eq!(few, Err(RoundnessError::TooFewPoints { count: 2, needed: 3 }));
     let arc: Vec<Point> =
         (0..30).map(|i| f64::from(i).to_radians() * 3.0).map(|a| [9.0 * a.cos(), 9.0 * a.sin()]).collect();
-    assert_eq!(maximum_inscribed(&section(&arc), [0.0, 0.0]), Err(RoundnessError::NotSurrounding));
+    assert_eq!(maximum_inscribed(&section(&arc), [0.0, 0.0], &|| true), Err(RoundnessError::NotSurrounding));
     // A quarter still has its least-squares circle and its zone.
-    let ls = least_squares(&section(&arc)).unwrap();
+    let ls = least_squares(&section(&arc), &|| true).unwrap();
     assert!(distance(ls.circle.centre_mm, [0.0, 0.0]) < 1e-12);
-    assert!(minimum_zone(&section(&arc), ls.circle.centre_mm).unwrap().width_mm() < 1e-13);
+    assert!(minimum_zone(&section(&arc), ls.circle.centre_mm, &|| true).unwrap().width_mm() < 1e-13);
     assert_eq!(Section::from_points(&[0.0, f64::NAN], &[0.0, 1.0]), Err(RoundnessError::NotFinite { index: 1 }));
     assert_eq!(Section::from_points(&[0.0, 1.0], &[0.0]), Err(RoundnessError::LengthsDiffer { first: 2, second: 1 }));
     assert_eq!(Section::from_points(&[], &[]), Err(RoundnessError::TooFewPoints { count: 0, needed: 1 }));

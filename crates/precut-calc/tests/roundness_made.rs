@@ -73,7 +73,8 @@ fn pure_lobes_of_any_order_are_evaluated() {
                     })
                     .unzip();
                 let section = Section::from_points(&x, &y).unwrap();
-                let found = circles(&section).unwrap_or_else(|error| panic!("{order} {count} {radius}: {error}"));
+                let found =
+                    circles(&section, &|| true).unwrap_or_else(|error| panic!("{order} {count} {radius}: {error}"));
                 let zone = found.minimum_zone.width_mm();
                 let others = [found.least_squares.span, found.inscribed.span, found.circumscribed.span]
                     .map(|span| span.width_mm());

@@ -158,7 +158,7 @@ proptest! {
             .unzip();
         let section = Section::from_points(&x, &y).unwrap();
         let grid = Grid::new(n).unwrap();
-        let found = evaluate(&section, &grid, Filter::LowPass { cutoff_upr: 50.0 }, 50).unwrap();
+        let found = evaluate(&section, &grid, Filter::LowPass { cutoff_upr: 50.0 }, 50, &|| true).unwrap();
         // Spline error of harmonic 12 at the widest spacing (1.8 of the mean), and the centre that uneven points put
         // off the middle of the form: its share of the amplitudes over the radius, doubled once in the second order.
         let spline = 5.0 / 384.0 * (12.0 * 1.8 * TAU / n as f64).powi(4) * 0.001;

@@ -138,7 +138,7 @@ fn all_reference_cases() {
         cases += 1;
         let case: Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
         let section = section(&case["input"]);
-        let found = circles(&section).unwrap();
+        let found = circles(&section, &|| true).unwrap();
         let (tolerance, flat) = (&case["tolerance_abs"], &case["tolerance_abs_MICI_MCCI"]);
         let comparison = |kind| Comparison {
             name: format!("{name} {kind}"),
@@ -152,7 +152,7 @@ fn all_reference_cases() {
         assert!(unfiltered.compared >= 14, "{name}: {} numbers compared", unfiltered.compared);
         let Some(cutoff_upr) = case["input"]["filter_cutoff_upr"].as_f64() else { continue };
         let grid = Grid::new(section.len()).unwrap();
-        let evaluation = evaluate(&section, &grid, Filter::LowPass { cutoff_upr }, 50).unwrap();
+        let evaluation = evaluate(&section, &grid, Filter::LowPass { cutoff_upr }, 50, &|| true).unwrap();
         let mut filtered = comparison("filtered");
         filtered.all(&evaluation.filtered);
         assert!(filtered.compared >= 14, "{name}: {} numbers compared", filtered.compared);
@@ -173,7 +173,7 @@ fn the_inscribed_circle_of_an_ellipse_is_not_unique() {
     let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
         .join("tests/reference/ring-roundness/ron_02_ellipse.json");
     let case: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
-    let found = circles(&section(&case["input"])).unwrap();
+    let found = circles(&section(&case["input"]), &|| true).unwrap();
     let mi = &found.inscribed;
     assert!(mi.is_global);
     assert_eq!(mi.others.len(), 1, "{mi:?}");
@@ -206,7 +206,7 @@ fn least_squares_circles_meet_the_nist_pairs() {
         sets += 1;
         let (x, y) = pairs(&set["points"]);
         let section = Section::from_points(&x, &y).unwrap();
-        let found = least_squares(&section).unwrap();
+        let found = least_squares(&section, &|| true).unwrap();
         let text = |value: &Value| value.as_str().unwrap().parse::<f64>().unwrap();
         let wanted = &set["nist_least_squares"];
         let centre = [text(&wanted["center"][0]), text(&wanted["center"][1])];
@@ -229,13 +229,13 @@ fn minimum_zones_of_the_nist_sets_are_not_wider_than_those_found_before() {
     for set in file["sets"].as_array().unwrap() {
         let (x, y) = pairs(&set["points"]);
         let section = Section::from_points(&x, &y).unwrap();
-        let start = least_squares(&section).unwrap().circle.centre_mm;
+        let start = least_squares(&section, &|| true).unwrap().circle.centre_mm;
         if section.len() < 4 {
-            let width = minimum_zone(&section, start).unwrap().width_mm();
+            let width = minimum_zone(&section, start, &|| true).unwrap().width_mm();
             assert!(width < 1e-12, "three points lie on a circle: {width}");
             continue;
         }
-        let found = minimum_zone(&section, start).unwrap_or_else(|e| panic!("{}: {e}", set["id"]));
+        let found = minimum_zone(&section, start, &|| true).unwrap_or_else(|e| panic!("{}: {e}", set["id"]));
         let before = &set["computed"]["minimum_zone"];
         let (width, known) = (found.width_mm(), number(&before["width"]));
         // The zones in the file were found by linear programming in double precision; one is 3e-11 mm too wide.

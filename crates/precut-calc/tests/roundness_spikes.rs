@@ -96,6 +96,30 @@ fn spikes_are_listed_with_place_and_height_and_left_out_where_asked() {
     }
 }
 
+/// A scratch anywhere beside a keyway, of few readings: each by itself. One that touches the keyway is part of it.
+#[test]
+fn a_scratch_in_the_shadow_of_a_keyway_is_told_apart() {
+    let (mut apart, mut named) = (0, 0);
+    for seed in 0..72 {
+        let mut draw = Draw::new(5000 + seed);
+        let mut section = section(seed, 120);
+        let start = draw.between(0.0, 120.0) as usize;
+        (start..start + 6).for_each(|at| section[at % 120] -= 0.8);
+        // From one side of the keyway round to the other.
+        let after = usize::try_from(seed).unwrap() * 113 / 71;
+        let at = (start + 6 + after) % 120;
+        section[at] -= draw.between(0.02, 0.06);
+        let spikes = solve(&json!({ "radii": radii(&section) })).output.data.spikes;
+        let keyways = spikes.iter().filter(|spike| spike.points >= 6 && spike.height_um < -700.0).count();
+        assert!(keyways == 1 && spikes.len() <= 2, "{seed}: {spikes:?}");
+        if (1..113).contains(&after) {
+            apart += 1;
+            named += usize::from(spikes.iter().any(|spike| spike.row == at && spike.points == 1));
+        }
+    }
+    assert!(apart >= 68 && named + 2 >= apart, "{named} of {apart}");
+}
+
 /// A keyway into which the probe dips: refused as no round section, with the remedy, which works.
 #[test]
 fn a_keyway_is_left_out_where_asked() {

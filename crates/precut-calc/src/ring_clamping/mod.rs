@@ -239,7 +239,7 @@ fn roundness_um(ring: &Ring, released_mm: &[f64]) -> Result<f64, Failure> {
         return Err(beyond());
     }
     let section = Section::from_polar(&angles, &radii).map_err(|_| beyond())?;
-    let found = circles(&section).map_err(|_| beyond())?;
+    let found = circles(&section, &|| true).map_err(|_| beyond())?;
     Ok(UM_PER_MM * found.least_squares.span.width_mm())
 }
 

@@ -1,7 +1,7 @@
 //! Where the error at the end comes from: first order (`ring/6.1`), and by switching every term of the job that makes
 //! waves off in turn (`ring/6.2`).
 
-use crate::calculator::{Failure, checkpoint};
+use crate::calculator::{Failure, Monitor, checkpoint};
 
 use super::advice::back_off_mm;
 use super::input::{DEFAULT_SAMPLES, Job};
@@ -51,7 +51,7 @@ pub(super) fn causes(
         (false, true) => 0.0,
         (false, false) => 1.0,
     };
-    let odd = if end.copying().is_diametral() { Some(odd_causes(job, run, teeth_mm, k)?) } else { None };
+    let odd = if end.copying().is_diametral() { Some(odd_causes(job, run, teeth_mm, k, share.monitor)?) } else { None };
     let nodes = nodes(job);
     Ok(CausesOutcome {
         feed_step_um: step_left * teeth_mm * UM_PER_MM,
@@ -73,11 +73,17 @@ struct OddCauses {
     blank_um: f64,
 }
 
-fn odd_causes(job: &Job, run: &Run, teeth_mm: f64, compliance_ratio: f64) -> Result<OddCauses, Failure> {
+fn odd_causes(
+    job: &Job,
+    run: &Run,
+    teeth_mm: f64,
+    compliance_ratio: f64,
+    monitor: &dyn Monitor,
+) -> Result<OddCauses, Failure> {
     let excess_mm = (run.turned.largest_bite_mm - teeth_mm).max(0.0);
     Ok(OddCauses {
         first_bite_um: one_sided_mm(excess_mm, compliance_ratio) * UM_PER_MM,
-        blank_um: roundness_um(&odd_waves_mm(&run.blank_mm), job.filter)?.0,
+        blank_um: roundness_um(&odd_waves_mm(&run.blank_mm), job.filter, monitor)?.0,
     })
 }
 
@@ -116,10 +122,10 @@ fn switched_off(
     let blank = scene.blank_mm(job, nodes as usize).map_err(unevaluable)?;
     let run = |setting: &Setting, blank: &[f64]| {
         let turned = turn::<Failure>(blank, setting, &mut |_, _| checkpoint(share.monitor))?;
-        Ok::<f64, Failure>(roundness_um(&turned.radii_mm, job.filter)?.0)
+        Ok::<f64, Failure>(roundness_um(&turned.radii_mm, job.filter, share.monitor)?.0)
     };
     let with_all = run(&scene.setting, &blank)?;
-    let variants = variants(job, scene, end, &blank)?;
+    let variants = variants(job, scene, end, &blank, share.monitor)?;
     // A setting that cannot be is no alternative.
     let without = side_by_side(&variants, |variant| or_none(run(&variant.setting, &variant.blank)))?;
     let mut told: Vec<CauseOutcome> = variants
@@ -135,7 +141,13 @@ fn switched_off(
     Ok(told)
 }
 
-fn variants(job: &Job, scene: &Scene, end: &Stance, blank: &[f64]) -> Result<Vec<Variant>, Failure> {
+fn variants(
+    job: &Job,
+    scene: &Scene,
+    end: &Stance,
+    blank: &[f64],
+    monitor: &dyn Monitor,
+) -> Result<Vec<Variant>, Failure> {
     let setting = &scene.setting;
     let mut found = Vec::new();
     let mut add_one = |cause, effect, setting: Setting, blank: Vec<f64>| {
@@ -144,10 +156,10 @@ fn variants(job: &Job, scene: &Scene, end: &Stance, blank: &[f64]) -> Result<Vec
     let odd = odd_waves_mm(blank);
     let mean = blank.iter().sum::<f64>() / blank.len() as f64;
     let even: Vec<f64> = blank.iter().zip(&odd).map(|(radius, odd)| radius - (odd - mean)).collect();
-    if roundness_um(&odd, job.filter)?.0 > ROUND_UM {
+    if roundness_um(&odd, job.filter, monitor)?.0 > ROUND_UM {
         add_one(CauseKind::BlankOddWaves, None, setting.clone(), even.clone());
     }
-    if roundness_um(&even, job.filter)?.0 > ROUND_UM {
+    if roundness_um(&even, job.filter, monitor)?.0 > ROUND_UM {
         add_one(CauseKind::BlankEvenWaves, None, setting.clone(), odd);
     }
     if let Some(back_mm) = back_off_mm(setting, blank) {

@@ -70,8 +70,10 @@ struct Value {
 
 /// Slowest decay that is still looked for, 1/rad: below it a lobe is gone within one revolution (factor 0.0066).
 pub(crate) const FASTEST_DECAY_PER_RAD: f64 = -0.8;
-/// Newton's method has arrived.
-const ARRIVED: f64 = 1e-13;
+/// A step of Newton's method below this is the last: what it leaves is some times its square.
+const ARRIVED: f64 = 1e-8;
+/// Longest step.
+const LONGEST_STEP: f64 = 0.5;
 /// A root that grows no faster than the worst one found by more than this is not looked for, 1/rad.
 const MISSED_PER_RAD: f64 = 1e-3;
 /// Roots found last among which one that is found again is looked for.
@@ -116,10 +118,14 @@ impl Lobing {
             if !step.is_finite() {
                 return None;
             }
-            // Far from a root the exponentials send the step anywhere.
-            let size = step.norm();
-            lambda -= if size > 0.5 { step * (0.5 / size) } else { step };
-            if size < ARRIVED {
+            let size2 = step.norm_sqr();
+            if size2 > LONGEST_STEP * LONGEST_STEP {
+                // Far from a root the exponentials send the step anywhere.
+                lambda -= step * (LONGEST_STEP / size2.sqrt());
+                continue;
+            }
+            lambda -= step;
+            if size2 < ARRIVED * ARRIVED {
                 return Some(lambda);
             }
         }
@@ -184,7 +190,7 @@ impl Lobing {
                         from + (to - from) * f64::from(row) / f64::from(rows),
                     );
                     let Some(root) = self.newton(start) else { continue };
-                    if inside(&root) && found.iter().all(|other| (other - root).norm() > SAME) {
+                    if inside(&root) && found.iter().all(|other| (other - root).norm_sqr() > SAME * SAME) {
                         found.push(root);
                     }
                 }
@@ -266,7 +272,8 @@ impl Lobing {
         for (row, growth) in starts {
             let lobes = from + (to - from) * f64::from(row) / f64::from(rows);
             let Some(root) = self.newton(Complex::new(growth, lobes)) else { continue };
-            let known = |other: &Root| (other.lobes - root.im).hypot(other.growth_per_rad - root.re) < SAME;
+            let known =
+                |other: &Root| (other.lobes - root.im).powi(2) + (other.growth_per_rad - root.re).powi(2) < SAME * SAME;
             // Newton's method ends near where it started: what is known stands near the end.
             let near = found.iter().rev().take(KNOWN_NEAR).any(known);
             if root.im > from && root.im < to && root.re > FASTEST_DECAY_PER_RAD && !near {

@@ -134,9 +134,10 @@ impl Mapper<'_> {
 
     /// Roundness after a cut, um; `None` where the ring falls through or its profile has no circles.
     fn cut_um(&self, setting: &Setting) -> Result<Option<f64>, Failure> {
-        let watch = &mut |_: &_, _: &[f64]| checkpoint(self.share.monitor);
+        let watch = &mut |_: Option<&_>, _: &[f64]| checkpoint(self.share.monitor);
         let Some(turned) = or_none(turn::<Failure>(&self.blank, setting, watch))? else { return Ok(None) };
-        Ok(or_none(roundness_um(&turned.radii_mm, self.job.filter))?.map(|(roundness_um, _)| roundness_um))
+        Ok(or_none(roundness_um(&turned.radii_mm, self.job.filter, self.share.monitor))?
+            .map(|(roundness_um, _)| roundness_um))
     }
 
     /// Simulates a cell with the revolutions of the theory after the last touch of the blank, and with twice as many: how

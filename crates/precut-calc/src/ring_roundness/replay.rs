@@ -54,7 +54,7 @@ impl<'s> Recorder<'s> {
         }
         let radii_mm = self.scene.unmirrored(radii_mm.to_vec());
         let section = grid.section(&radii_mm).map_err(unevaluable)?;
-        let circle = least_squares(&section).map_err(unevaluable)?.circle;
+        let circle = least_squares(&section, &|| true).map_err(unevaluable)?.circle;
         let sense = if self.scene.mirrored { -1.0 } else { 1.0 };
         let turns = turned * (1.0 - self.scene.setting.motion.slip);
         self.frames.push(ReplayFrame {

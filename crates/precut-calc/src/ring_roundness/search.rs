@@ -7,7 +7,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::calculator::{Failure, Finding, Message, checkpoint};
+use crate::calculator::{Failure, Finding, Message, Unwatched, checkpoint};
 
 use super::input::{Job, LongWave};
 use super::input_ranges::SearchRange;
@@ -15,7 +15,7 @@ use super::output_settings::{SearchOutcome, SearchSetting, SearchStatus, SecondS
 use super::place::Angles;
 use super::sampling::samples_of;
 use super::scene::{Scene, mirrored_rad};
-use super::search_wide::{self, Wide};
+use super::search_wide::{self, Tried, Wide};
 use super::simulate::{SAFETY, Share, or_none, stated_errors};
 use super::stance::{Stance, at_radius, through_tip};
 use super::surface::{UM_PER_MM, odd_waves_mm, of_radii, roundness_um, unevaluable};
@@ -53,7 +53,7 @@ pub(super) fn search(
     let n = if job.filter == LongWave::None { samples_of(job) } else { samples_of(job).min(SCAN_SAMPLES) };
     let blank = scene.blank_mm(job, n as usize).map_err(unevaluable)?;
     let odd = odd_waves_mm(&blank);
-    let odd_lobes_um = roundness_um(&odd, job.filter)?.0;
+    let odd_lobes_um = roundness_um(&odd, job.filter, share.monitor)?.0;
     let mut outcome = SearchOutcome {
         status: SearchStatus::BeyondLimits,
         best: None,
@@ -112,7 +112,7 @@ pub(super) fn expected(job: &Job, range: &SearchRange) -> Expected {
     let scene = Scene::of(job, &job.effects);
     let everything = Expected { revolutions: 0.0, is_wide: true };
     let Ok(blank) = scene.blank_mm(job, COARSE_SAMPLES) else { return everything };
-    let odd = roundness_um(&odd_waves_mm(&blank), job.filter).map_or(f64::MAX, |(odd_um, _)| odd_um);
+    let odd = roundness_um(&odd_waves_mm(&blank), job.filter, &Unwatched).map_or(f64::MAX, |(odd_um, _)| odd_um);
     match plan(range, &scene, &blank) {
         Some(plan) if odd <= range.target_um => {
             let most = (plan.travel_mm / range.feed_min_mm_per_rev).min(range.revolutions_max);
@@ -222,7 +222,7 @@ impl Finder<'_> {
     /// The radii after stages one after the other; `None` where the ring falls through.
     fn after(&self, stages: &[&Setting], mut radii_mm: Vec<f64>) -> Result<Option<Vec<f64>>, Failure> {
         for stage in stages {
-            let watch = &mut |_: &_, _: &[f64]| checkpoint(self.share.monitor);
+            let watch = &mut |_: Option<&_>, _: &[f64]| checkpoint(self.share.monitor);
             let Some(turned) = or_none(turn::<Failure>(&radii_mm, stage, watch))? else { return Ok(None) };
             radii_mm = turned.radii_mm;
         }
@@ -232,7 +232,7 @@ impl Finder<'_> {
     /// Roundness with the nodes of the scan, um.
     fn cut_um(&self, setting: &Setting) -> Result<Option<f64>, Failure> {
         let Some(radii) = self.after(&[setting], self.blank.clone())? else { return Ok(None) };
-        Ok(or_none(roundness_um(&radii, self.job.filter))?.map(|(roundness_um, _)| roundness_um))
+        Ok(or_none(roundness_um(&radii, self.job.filter, self.share.monitor))?.map(|(roundness_um, _)| roundness_um))
     }
 
     /// Scans the revolutions upward until three in a row pass and the middle one holds with the job's own nodes.
@@ -300,7 +300,9 @@ impl Finder<'_> {
         for nodes in [n, n / 2, (n / 3).next_multiple_of(4)] {
             let blank = self.scene.blank_mm(self.job, nodes as usize).map_err(unevaluable)?;
             let Some(radii) = self.after(&stages, blank)? else { return Ok(None) };
-            let Some(surface) = or_none(of_radii(&radii, self.job.filter, 2))? else { return Ok(None) };
+            let Some(surface) = or_none(of_radii(&radii, self.job.filter, 2, self.share.monitor))? else {
+                return Ok(None);
+            };
             surfaces.push(surface);
         }
         let [full, half, third] = &surfaces[..] else { return Ok(None) };
@@ -348,7 +350,7 @@ impl Finder<'_> {
         let blank = self.coarse_mm()?;
         let Some(found) = self.wide(&blank).search()? else { return Ok(None) };
         outcome.simulated += found.simulated;
-        let Some(setting) = self.verified_after(&[], &found.best.setting, &blank)? else { return Ok(None) };
+        let Some((found, setting)) = self.first_that_holds(&[], found.best, &blank)? else { return Ok(None) };
         if setting.margin_um >= 0.0 {
             let robust = setting.robust_share >= search_wide::ROBUST;
             outcome.status = if robust { SearchStatus::Robust } else { SearchStatus::Fragile };
@@ -356,7 +358,28 @@ impl Finder<'_> {
         if outcome.is_reached() || outcome.best.is_none_or(|best| setting.roundness_um < best.roundness_um) {
             outcome.best = Some(setting);
         }
-        Ok(Some(found.best.setting))
+        Ok(Some(found))
+    }
+
+    /// The first of the settings found that meets the target with the job's own nodes and their error, else the first.
+    fn first_that_holds(
+        &self,
+        before: &[&Setting],
+        found: Vec<Tried>,
+        start_mm: &[f64],
+    ) -> Result<Option<(Setting, SearchSetting)>, Failure> {
+        let mut first = None;
+        for tried in found {
+            if first.is_some() && tried.roundness_um > self.range.target_um {
+                continue;
+            }
+            let Some(verified) = self.verified_after(before, &tried.setting, start_mm)? else { continue };
+            if verified.margin_um >= 0.0 {
+                return Ok(Some((tried.setting, verified)));
+            }
+            first.get_or_insert((tried.setting, verified));
+        }
+        Ok(first)
     }
 
     /// A second stage that begins with what the first leaves: the waves that the first does not see decay at other angles
@@ -366,7 +389,7 @@ impl Finder<'_> {
         let Some(left_mm) = self.after(&[first], blank.clone())? else { return Ok(None) };
         let Some(found) = self.wide(&left_mm).search()? else { return Ok(None) };
         *simulated += found.simulated;
-        let second = self.verified_after(&[first], &found.best.setting, &left_mm)?;
+        let second = self.first_that_holds(&[first], found.best, &left_mm)?.map(|(_, second)| second);
         let Some((first, second)) = self.verified_after(&[], first, &blank)?.zip(second) else { return Ok(None) };
         let worth = self.range.target_um.max(WORTH * first.roundness_um);
         Ok(Some(SecondStage { first, second }).filter(|stages| stages.second.roundness_um < worth))

@@ -37,6 +37,10 @@ const REFINED: usize = 4;
 const BESIDE_DEG: [f64; 3] = [-0.5, 0.0, 0.5];
 /// Runs between two looks at the monitor.
 const AT_ONCE: usize = 16;
+/// Cells ranked in full between two looks.
+const RANKED_AT_ONCE: usize = 256;
+/// A setting of few revolutions is worth a trial where it leaves less than this share of the target.
+const SURELY: f64 = 0.95;
 /// Revolutions of spark-out that are tried beside those stated, in the second look.
 const MORE_SPARK_OUT: f64 = 3.0;
 /// Trials of the robustness.
@@ -67,7 +71,8 @@ pub(super) struct Tried {
 
 /// What came of it.
 pub(super) struct Found {
-    pub best: Tried,
+    /// The best first: those that meet the target most often when everything is a little off.
+    pub best: Vec<Tried>,
     /// Settings simulated.
     pub simulated: usize,
 }
@@ -75,15 +80,7 @@ pub(super) struct Found {
 impl Wide<'_> {
     /// The best setting; `None` where no cell holds the ring.
     pub(super) fn search(&self) -> Result<Option<Found>, Failure> {
-        let waves = self.waves_um()?;
-        let mut cells: Vec<(f64, Angles, f64)> = self
-            .cells()
-            .into_par_iter()
-            .filter_map(|(angles, k)| Some((self.left_um(angles, k, &waves)?, angles, k)))
-            .collect();
-        cells.sort_by(|p, q| p.0.total_cmp(&q.0));
-        let cells = apart(cells);
-        let cells: Vec<(Angles, f64)> = cells.iter().map(|&(_, angles, k)| (angles, k)).collect();
+        let cells = self.ranked()?;
         let dwell = self.range.spark_out_revolutions;
         let mut tried = self.simulate(&cells, &[dwell], 0.0, 0.6)?;
         let mut simulated = tried.len();
@@ -114,17 +111,58 @@ impl Wide<'_> {
                 |tried: &Tried| [tried.setting.revolutions, tried.setting.spark_out_revolutions].map(f64::to_bits);
             p.angles == q.angles && runs(p) == runs(q)
         });
-        // Of those that meet the target, the one that meets it most often when everything is a little off.
-        let mut best: Option<(f64, Tried)> = None;
-        for candidate in tried.into_iter().take(REFINED) {
+        // The roundest, and those that meet the target in the fewest revolutions, which a larger range of feeds must not hide.
+        let mut quick = tried.split_off(REFINED.min(tried.len()));
+        quick.retain(|tried| tried.roundness_um <= SURELY * self.range.target_um);
+        quick.sort_by(|p, q| p.setting.revolutions.total_cmp(&q.setting.revolutions));
+        quick.truncate(REFINED);
+        tried.extend(quick);
+        let mut best = Vec::with_capacity(tried.len());
+        for candidate in tried {
             checkpoint(self.share.monitor)?;
             let robust = self.robust_share(candidate.angles, &candidate.setting)?;
             simulated += TRIALS as usize;
-            if best.as_ref().is_none_or(|(share, _)| robust > *share) {
-                best = Some((robust, candidate));
+            best.push((robust, candidate));
+        }
+        best.sort_by(|p, q| q.0.total_cmp(&p.0));
+        let best: Vec<Tried> = best.into_iter().map(|(_, best)| best).collect();
+        Ok((!best.is_empty()).then_some(Found { best, simulated }))
+    }
+
+    /// The cells of which the theory leaves least, none beside a better one. An error of the angles only makes it worse, so
+    /// what is left without one says which cells need no closer look.
+    fn ranked(&self) -> Result<Vec<(Angles, f64)>, Failure> {
+        let waves = self.waves_um()?;
+        let mut cells = Vec::new();
+        for some in self.cells().chunks(RANKED_AT_ONCE) {
+            cells.extend(self.left_of(some, &waves, 0.0)?);
+        }
+        cells.sort_by(|p, q| p.0.total_cmp(&q.0));
+        let error = self.range.angle_error_deg.to_radians();
+        let mut ranked = Vec::new();
+        for (done, some) in cells.chunks(RANKED_AT_ONCE).enumerate() {
+            let some: Vec<(Angles, f64)> = some.iter().map(|&(_, angles, k)| (angles, k)).collect();
+            ranked.extend(self.left_of(&some, &waves, error)?);
+            ranked.sort_by(|p, q| p.0.total_cmp(&q.0));
+            let kept = apart(&ranked);
+            let others = cells.get((done + 1) * RANKED_AT_ONCE).map_or(f64::INFINITY, |(at_least, ..)| *at_least);
+            if kept.len() == SIMULATED && kept.last().is_some_and(|(left, ..)| *left <= others) {
+                break;
             }
         }
-        Ok(best.map(|(_, best)| Found { best, simulated }))
+        Ok(apart(&ranked).into_iter().map(|(_, angles, k)| (angles, k)).collect())
+    }
+
+    /// What the theory leaves of some cells, um, with the angles off by up to `error`, rad; those where the tool has room.
+    fn left_of(
+        &self,
+        cells: &[(Angles, f64)],
+        waves: &[(u32, f64)],
+        error: f64,
+    ) -> Result<Vec<(f64, Angles, f64)>, Failure> {
+        checkpoint(self.share.monitor)?;
+        let left = |&(angles, k): &(Angles, f64)| Some((self.left_um(angles, k, waves, error)?, angles, k));
+        Ok(cells.par_iter().filter_map(left).collect())
     }
 
     /// Peak to valley of the blank's waves by order, from 2.
@@ -165,8 +203,7 @@ impl Wide<'_> {
     }
 
     /// What the theory leaves, um: the worst that an error of the angles makes of it. `None` where the tool has no room.
-    fn left_um(&self, angles: Angles, compliance_ratio: f64, waves: &[(u32, f64)]) -> Option<f64> {
-        let error = self.range.angle_error_deg.to_radians();
+    fn left_um(&self, angles: Angles, compliance_ratio: f64, waves: &[(u32, f64)], error: f64) -> Option<f64> {
         let corners = [(0.0, 0.0), (error, error), (-error, error), (error, -error), (-error, -error)];
         let corners = if error > 0.0 { &corners[..] } else { &corners[..1] };
         let mut worst = 0.0_f64;
@@ -251,7 +288,7 @@ impl Wide<'_> {
     fn run(&self, setting: &Setting, blank: &[f64]) -> Result<Option<f64>, Failure> {
         let turned = or_none(turn::<Failure>(blank, setting, &mut |_, _| checkpoint(self.share.monitor)))?;
         let Some(turned) = turned.filter(|turned| turned.first_contact_rev.is_some()) else { return Ok(None) };
-        Ok(or_none(roundness_um(&turned.radii_mm, self.job.filter))?.map(|found| found.0))
+        Ok(or_none(roundness_um(&turned.radii_mm, self.job.filter, self.share.monitor))?.map(|found| found.0))
     }
 
     /// How often the target is met with the angles off by up to the stated error, the rollers running out, the blank's
@@ -306,9 +343,9 @@ fn turned_nodes(share: f64, n: usize) -> usize {
 }
 
 /// The best cells, none of them the neighbour of a better one.
-fn apart(cells: Vec<(f64, Angles, f64)>) -> Vec<(f64, Angles, f64)> {
+fn apart(cells: &[(f64, Angles, f64)]) -> Vec<(f64, Angles, f64)> {
     let mut kept: Vec<(f64, Angles, f64)> = Vec::new();
-    for cell in cells {
+    for &cell in cells {
         let near = |other: &(f64, Angles, f64)| {
             (other.1.tool_rad - cell.1.tool_rad).abs() < 1.1 * TOOL_STEP_DEG.to_radians()
                 && (other.1.half_angle_rad - cell.1.half_angle_rad).abs() < 1.1 * SUPPORT_STEP_DEG.to_radians()

@@ -118,9 +118,10 @@ pub(super) fn run_exact(
     follower.recorder = Recorder::new(scene, frames, total);
     let turned = turn::<Failure>(&blank, &scene.setting, &mut |revolution, radii| {
         checkpoint(share.monitor)?;
+        let Some(revolution) = revolution else { return Ok(()) };
         let done = revolution.turned_revolutions;
         share.report(done / total, stage(done, total));
-        if with_history { follower.follow(revolution, radii, &grid) } else { Ok(()) }
+        if with_history { follower.follow(revolution, radii, &grid, share.monitor) } else { Ok(()) }
     })?;
     if turned.first_contact_rev.is_none() {
         return Err(Failure::Infeasible(
@@ -131,8 +132,8 @@ pub(super) fn run_exact(
     let radii = scene.unmirrored(turned.radii_mm.clone());
     let blank_mm = scene.unmirrored(blank);
     Ok(Run {
-        surface: of_radii(&radii, job.filter, job.highest_order)?,
-        start: of_radii(&blank_mm, job.filter, job.highest_order)?,
+        surface: of_radii(&radii, job.filter, job.highest_order, share.monitor)?,
+        start: of_radii(&blank_mm, job.filter, job.highest_order, share.monitor)?,
         uncut_share: never as f64 / f64::from(n),
         turned: Turned { radii_mm: radii, ..turned },
         blank_mm,
@@ -205,7 +206,13 @@ impl Follower<'_> {
         }
     }
 
-    fn follow(&mut self, revolution: &Revolution, radii: &[f64], grid: &Grid) -> Result<(), Failure> {
+    fn follow(
+        &mut self,
+        revolution: &Revolution,
+        radii: &[f64],
+        grid: &Grid,
+        monitor: &dyn Monitor,
+    ) -> Result<(), Failure> {
         self.seen += 1;
         self.deepest_mm = self.deepest_mm.max(revolution.deepest_cut_mm);
         self.cutting += revolution.cutting_share;
@@ -218,7 +225,7 @@ impl Follower<'_> {
             return Ok(());
         }
         let section = grid.section(radii).map_err(unevaluable)?;
-        let circle = least_squares(&section).map_err(unevaluable)?;
+        let circle = least_squares(&section, &|| !monitor.cancelled()).map_err(unevaluable)?;
         let columns = &mut self.columns;
         columns.revolution.push(revolution.turned_revolutions);
         columns.roundness_um.push(circle.span.width_mm() * UM_PER_MM);
@@ -307,16 +314,17 @@ fn nearest(job: &Job, scene: &Scene, end: &Stance, share: Share<'_>) -> Result<S
     } else {
         let mut points: Vec<Vec2> = sampled.points_mm.iter().map(flip).collect();
         let section = section_of(&points)?;
-        let centre = least_squares(&section).map_err(unevaluable)?.circle.centre_mm;
+        let centre = least_squares(&section, &|| !share.monitor.cancelled()).map_err(unevaluable)?.circle.centre_mm;
         points.sort_by(|p, q| angle(sub(*p, centre)).total_cmp(&angle(sub(*q, centre))));
         points.dedup_by(|p, q| angle(sub(*p, centre)) <= angle(sub(*q, centre)));
         let grid = Grid::new(n as usize).map_err(unevaluable)?;
-        of_section(&section_of(&points)?, &grid, job.filter, job.highest_order.min(n / 2)).ok()
+        or_none(of_section(&section_of(&points)?, &grid, job.filter, job.highest_order.min(n / 2), share.monitor))?
     };
     let start = of_radii(
         &scene.unmirrored(scene.blank_mm(job, n as usize).map_err(unevaluable)?),
         job.filter,
         job.highest_order.min(n / 2),
+        share.monitor,
     )?;
     let blank_mm = scene.unmirrored(scene.blank_mm(job, n as usize).map_err(unevaluable)?);
     let radii_mm: Option<Vec<f64>> = surface.as_ref().map(|surface| surface.evaluation.referred_mm.clone());

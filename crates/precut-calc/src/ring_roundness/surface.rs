@@ -1,6 +1,6 @@
 //! A profile as a roundness tester sees it.
 
-use crate::calculator::{Failure, Finding};
+use crate::calculator::{Failure, Finding, Monitor, checkpoint};
 use crate::num::roundness::{
     Circles, Evaluation, Filter, Grid, Harmonic, RoundnessError, Section, evaluate, least_squares,
 };
@@ -26,15 +26,27 @@ pub(super) struct Surface {
 }
 
 /// Of radii at uniform angles.
-pub(super) fn of_radii(radii_mm: &[f64], filter: LongWave, highest: u32) -> Result<Surface, Failure> {
+pub(super) fn of_radii(
+    radii_mm: &[f64],
+    filter: LongWave,
+    highest: u32,
+    monitor: &dyn Monitor,
+) -> Result<Surface, Failure> {
     let grid = Grid::new(radii_mm.len()).map_err(unevaluable)?;
     let section = grid.section(radii_mm).map_err(unevaluable)?;
-    of_section(&section, &grid, filter, highest)
+    of_section(&section, &grid, filter, highest, monitor)
 }
 
 /// Of points that follow each other counter-clockwise.
-pub(super) fn of_section(section: &Section, grid: &Grid, filter: LongWave, highest: u32) -> Result<Surface, Failure> {
-    let evaluation = evaluate(section, grid, filter_of(filter), highest as usize).map_err(unevaluable)?;
+pub(super) fn of_section(
+    section: &Section,
+    grid: &Grid,
+    filter: LongWave,
+    highest: u32,
+    monitor: &dyn Monitor,
+) -> Result<Surface, Failure> {
+    let goes_on = || !monitor.cancelled();
+    let evaluation = evaluate(section, grid, filter_of(filter), highest as usize, &goes_on).map_err(unevaluable)?;
     let evaluated = Evaluated {
         mean_radius_mm: evaluation.unfiltered.least_squares.circle.radius_mm,
         unfiltered: values(&evaluation.unfiltered),
@@ -99,17 +111,19 @@ pub(super) fn difference(p: &Evaluated, others: &[(&Evaluated, f64)]) -> Evaluat
 }
 
 /// Peak to valley about the least-squares circle after the filter, um, of radii at uniform angles: what the search asks.
-pub(super) fn roundness_um(radii_mm: &[f64], filter: LongWave) -> Result<(f64, f64), Failure> {
+pub(super) fn roundness_um(radii_mm: &[f64], filter: LongWave, monitor: &dyn Monitor) -> Result<(f64, f64), Failure> {
+    let goes_on = || !monitor.cancelled();
     let grid = Grid::new(radii_mm.len()).map_err(unevaluable)?;
     let section = grid.section(radii_mm).map_err(unevaluable)?;
-    let circle = least_squares(&section).map_err(unevaluable)?;
+    let circle = least_squares(&section, &goes_on).map_err(unevaluable)?;
     let Filter::LowPass { .. } = filter_of(filter) else {
         return Ok((circle.span.width_mm() * UM_PER_MM, circle.circle.radius_mm));
     };
     let referred =
         crate::num::roundness::refer(&section, circle.circle.centre_mm, radii_mm.len()).map_err(unevaluable)?;
+    checkpoint(monitor)?;
     let filtered = grid.filtered(&referred, filter_of(filter)).map_err(unevaluable)?;
-    let found = least_squares(&grid.section(&filtered).map_err(unevaluable)?).map_err(unevaluable)?;
+    let found = least_squares(&grid.section(&filtered).map_err(unevaluable)?, &goes_on).map_err(unevaluable)?;
     Ok((found.span.width_mm() * UM_PER_MM, circle.circle.radius_mm))
 }
 
@@ -135,5 +149,8 @@ pub(super) fn odd_waves_mm(radii_mm: &[f64]) -> Vec<f64> {
 
 /// A profile that has no reference circles: torn, or the origin is not inside.
 pub(super) fn unevaluable(error: RoundnessError) -> Failure {
+    if error == RoundnessError::Stopped {
+        return Failure::Cancelled;
+    }
     Failure::OutOfModel(Finding::new("profile_not_evaluable", "").with("reason", error.to_string()))
 }

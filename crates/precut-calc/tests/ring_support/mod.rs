@@ -61,6 +61,11 @@ pub fn trials(in_the_suite: u64) -> u64 {
     std::env::var("PRECUT_RING_TRIALS").ok().and_then(|text| text.parse().ok()).unwrap_or(in_the_suite)
 }
 
+/// The same of properties that are tried on many.
+pub fn cases(in_the_suite: u32) -> u32 {
+    u32::try_from(trials(u64::from(in_the_suite))).unwrap_or(u32::MAX)
+}
+
 /// Faults of a job.
 pub fn faults(job: &Value) -> Vec<Finding> {
     let job: Job = serde_json::from_value(job.clone()).unwrap();

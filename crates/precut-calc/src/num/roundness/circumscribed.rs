@@ -3,7 +3,7 @@
 use super::contact::{hold_of_ties, resolution_mm};
 use super::section::square;
 use super::triangle::Held;
-use super::{Circle, RoundnessError, Section, Span};
+use super::{Circle, RoundnessError, Section, Span, look};
 
 /// The smallest circle that holds all points: always one and only one.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,7 +34,11 @@ const MOST_EXCHANGES: u32 = 1000;
 ///
 /// Exchange: the smallest circle of two or three contacts; the farthest point of all joins them, and the smallest
 /// circle of these decides who stays; the radius grows with every exchange. A convex problem: the circle is unique.
-pub fn minimum_circumscribed(section: &Section, start_mm: [f64; 2]) -> Result<MinimumCircumscribed, RoundnessError> {
+pub fn minimum_circumscribed(
+    section: &Section,
+    start_mm: [f64; 2],
+    goes_on: &dyn Fn() -> bool,
+) -> Result<MinimumCircumscribed, RoundnessError> {
     if section.len() < 2 {
         return Err(RoundnessError::TooFewPoints { count: section.len(), needed: 2 });
     }
@@ -43,6 +47,7 @@ pub fn minimum_circumscribed(section: &Section, start_mm: [f64; 2]) -> Result<Mi
     let second = section.span_inside(section.at(first)).farthest;
     let mut ball = Ball::of_two(section, first, second);
     for scans in 3..MOST_EXCHANGES {
+        look(goes_on)?;
         let span = section.span_inside(ball.centre);
         let resolution = resolution_mm(span.farthest_mm);
         if span.farthest_mm <= ball.radius_mm + resolution {

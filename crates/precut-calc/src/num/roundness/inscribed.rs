@@ -3,7 +3,7 @@
 use super::contact::{FLAT, half_gap_cosine, hold_of_ties, reach_mm, resolution_mm};
 use super::section::square;
 use super::triangle::{Held, first_triple};
-use super::{Circle, RoundnessError, Section, Span};
+use super::{Circle, RoundnessError, Section, Span, look};
 
 /// The largest circle with no point inside it, with its proof.
 #[derive(Debug, Clone, PartialEq)]
@@ -65,19 +65,25 @@ const MOST_TRIALS: u32 = 2000;
 /// that matter are tried, which finds the largest circle of all and its equals.
 ///
 /// [`RoundnessError::NotSurrounding`] where the points lie on an arc that holds no centre.
-pub fn maximum_inscribed(section: &Section, start_mm: [f64; 2]) -> Result<MaximumInscribed, RoundnessError> {
+pub fn maximum_inscribed(
+    section: &Section,
+    start_mm: [f64; 2],
+    goes_on: &dyn Fn() -> bool,
+) -> Result<MaximumInscribed, RoundnessError> {
     if section.len() < 3 {
         return Err(RoundnessError::TooFewPoints { count: section.len(), needed: 3 });
     }
     let start = section.inside(start_mm);
     let span = section.span_inside(start);
-    let exchanged =
-        first_triple(section, start, span.nearest, |a, b| a < b).and_then(|triple| exchange(section, start, triple));
+    let exchanged = match first_triple(section, start, span.nearest, |a, b| a < b) {
+        Some(triple) => exchange(section, start, triple, goes_on)?,
+        None => None,
+    };
     let found = match exchanged {
         Some(found) => found,
         None if half_gap_cosine(section, start).is_none() => return Err(RoundnessError::NotSurrounding),
         // The centre can be anywhere inside.
-        None => match try_all(section, start, span.farthest_mm, None) {
+        None => match try_all(section, start, span.farthest_mm, None, goes_on)? {
             Some(tried) => tried.best,
             None => return Ok(about(section, start, span)),
         },
@@ -85,7 +91,7 @@ pub fn maximum_inscribed(section: &Section, start_mm: [f64; 2]) -> Result<Maximu
     let Some(unproven) = Unproven::of(section, &found) else {
         return Ok(answer(section, &found, &[], None));
     };
-    Ok(match try_all(section, found.held.centre, unproven.within_mm, Some(&found)) {
+    Ok(match try_all(section, found.held.centre, unproven.within_mm, Some(&found), goes_on)? {
         Some(tried) => tried.answer(section),
         None => answer(section, &found, &[], Some(unproven)),
     })
@@ -144,13 +150,19 @@ fn larger_within_mm(farthest_mm: f64, radius_mm: f64, cosine: f64) -> Option<f64
     (half_chord > 0.0 && farthest_mm <= 2.0 * radius_mm * cosine).then(|| farthest_mm * cosine - half_chord.sqrt())
 }
 
-fn exchange(section: &Section, start: [f64; 2], triple: [usize; 3]) -> Option<Empty> {
-    let mut held = Held::through(section, start, triple)?;
+fn exchange(
+    section: &Section,
+    start: [f64; 2],
+    triple: [usize; 3],
+    goes_on: &dyn Fn() -> bool,
+) -> Result<Option<Empty>, RoundnessError> {
+    let Some(mut held) = Held::through(section, start, triple) else { return Ok(None) };
     for scans in 1..=MOST_EXCHANGES {
+        look(goes_on)?;
         let span = section.span_inside(held.centre);
         let resolution = resolution_mm(span.farthest_mm);
         if span.nearest_mm >= held.radius_mm - resolution {
-            return Empty::new(section, held, span, scans + 2);
+            return Ok(Empty::new(section, held, span, scans + 2));
         }
         let entering = span.nearest;
         let mut best: Option<Held> = None;
@@ -163,9 +175,10 @@ fn exchange(section: &Section, start: [f64; 2], triple: [usize; 3]) -> Option<Em
                 best = Some(next);
             }
         }
-        held = best?;
+        let Some(best) = best else { break };
+        held = best;
     }
-    None
+    Ok(None)
 }
 
 /// All circles through three points of a growing few that hold their centre and none of the few inside, not smaller than
@@ -223,7 +236,13 @@ impl Tried {
 ///
 /// The circles of a few points are at least as large as those of all, so the largest of the few that holds none of all
 /// inside is the largest of all.
-fn try_all(section: &Section, middle: [f64; 2], within_mm: f64, known: Option<&Empty>) -> Option<Tried> {
+fn try_all(
+    section: &Section,
+    middle: [f64; 2],
+    within_mm: f64,
+    known: Option<&Empty>,
+    goes_on: &dyn Fn() -> bool,
+) -> Result<Option<Tried>, RoundnessError> {
     let farthest_mm = section.span_inside(middle).farthest_mm;
     let resolution_mm = resolution_mm(farthest_mm);
     let floor_mm = known.map_or(0.0, |known| known.held.radius_mm);
@@ -247,10 +266,11 @@ fn try_all(section: &Section, middle: [f64; 2], within_mm: f64, known: Option<&E
         if held.radius_mm < trial.floor_mm - resolution_mm || found.iter().any(|known| same(&known.held, &held)) {
             continue;
         }
+        look(goes_on)?;
         let span = section.span_inside(held.centre);
         scans += 1;
         if scans > MOST_TRIALS {
-            return None;
+            return Ok(None);
         }
         if span.nearest_mm >= held.radius_mm - resolution_mm {
             let Some(empty) = Empty::new(section, held, span, scans) else { continue };
@@ -264,8 +284,11 @@ fn try_all(section: &Section, middle: [f64; 2], within_mm: f64, known: Option<&E
     let most = found.iter().map(|empty| empty.held.radius_mm).fold(f64::NEG_INFINITY, f64::max);
     found.retain(|empty| empty.held.radius_mm >= most - resolution_mm);
     let mut found = found.into_iter();
-    let best = found.next()?;
-    Some(Tried { best: Empty { scans, ..best }, others: found.collect(), is_global: bound.is_some() })
+    Ok(found.next().map(|best| Tried {
+        best: Empty { scans, ..best },
+        others: found.collect(),
+        is_global: bound.is_some(),
+    }))
 }
 
 /// The circle about a centre that only the trial of all triangles could have bettered, which took too long: told as

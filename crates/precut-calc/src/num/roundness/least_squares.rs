@@ -1,7 +1,7 @@
 //! The least-squares reference circle, LSCI.
 
 use super::section::{count, mean, square};
-use super::{Circle, RoundnessError, Section, Span};
+use super::{Circle, RoundnessError, Section, Span, look};
 
 /// Least-squares circle and the parameters that are defined about it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,13 +38,14 @@ const DISTANCE_ULPS: f64 = 4.0;
 /// Gauss-Newton from the algebraic circle, Newton where it is slow (large residuals on short arcs), each step halved
 /// until the sum falls; no linearisation in the eccentricity (limaçon) is left in the result. On the NIST reference
 /// circles the centre is right to 2e-13 mm.
-pub fn least_squares(section: &Section) -> Result<LeastSquares, RoundnessError> {
+pub fn least_squares(section: &Section, goes_on: &dyn Fn() -> bool) -> Result<LeastSquares, RoundnessError> {
     if section.len() < 3 {
         return Err(RoundnessError::TooFewPoints { count: section.len(), needed: 3 });
     }
     let (mut centre, radius) = algebraic(section)?;
     let mut here = Referred::of(section, centre, radius);
     for iteration in 1..=MOST_ITERATIONS {
+        look(goes_on)?;
         let normal = here.sums.normal();
         let smallest = normal.smaller_eigenvalue();
         // Also refuses what is no number.

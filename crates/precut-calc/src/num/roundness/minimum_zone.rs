@@ -5,7 +5,7 @@ use super::contact::{
     unit,
 };
 use super::section::{Span, square};
-use super::{RoundnessError, Section};
+use super::{RoundnessError, Section, look};
 
 /// Two concentric circles, nearest to each other, that hold all points between them, with their proof.
 ///
@@ -65,7 +65,11 @@ const FIRST_CORE: usize = 8;
 /// perpendicular bisectors; the farthest and the nearest point of all replace the contact of their own kind between the
 /// same neighbours, until no point is outside the zone of the four. Where that does not end (deviations of the
 /// order of the radius), the best quadruple of the points met, with further points until no point is outside.
-pub fn minimum_zone(section: &Section, start_mm: [f64; 2]) -> Result<MinimumZone, RoundnessError> {
+pub fn minimum_zone(
+    section: &Section,
+    start_mm: [f64; 2],
+    goes_on: &dyn Fn() -> bool,
+) -> Result<MinimumZone, RoundnessError> {
     if section.len() < 3 {
         return Err(RoundnessError::TooFewPoints { count: section.len(), needed: 3 });
     }
@@ -73,11 +77,18 @@ pub fn minimum_zone(section: &Section, start_mm: [f64; 2]) -> Result<MinimumZone
     if section.len() == 3 {
         return through_three(section, start);
     }
-    let found = opposite_extremes(section, start)
-        .or_else(|| spread_reference(section, start))
-        .and_then(|reference| exchange(section, start, reference))
-        .or_else(|| cut_planes(section, start));
-    Ok(found.map_or_else(|| about(section, start), |holding| proven(section, holding)))
+    let exchanged = match opposite_extremes(section, start).or_else(|| spread_reference(section, start)) {
+        Some(reference) => exchange(section, start, reference, goes_on)?,
+        None => None,
+    };
+    let found = match exchanged {
+        Some(holding) => Some(holding),
+        None => cut_planes(section, start, goes_on)?,
+    };
+    match found {
+        Some(holding) => proven(section, holding, goes_on),
+        None => Ok(about(section, start)),
+    }
 }
 
 /// Three points lie on a circle.
@@ -204,15 +215,22 @@ fn replace(section: &Section, centre: [f64; 2], own: &mut [usize; 2], others: [u
     own[leaving] = entering;
 }
 
-fn exchange(section: &Section, start: [f64; 2], reference: Reference) -> Option<Holding> {
-    let mut zone = Zone::through(section, start, reference)?;
+fn exchange(
+    section: &Section,
+    start: [f64; 2],
+    reference: Reference,
+    goes_on: &dyn Fn() -> bool,
+) -> Result<Option<Holding>, RoundnessError> {
+    let mut through = Zone::through(section, start, reference);
     for exchanges in 1..=MOST_EXCHANGES {
+        let Some(zone) = through else { break };
+        look(goes_on)?;
         let span = section.span_inside(zone.centre);
         let resolution = resolution_mm(span.farthest_mm);
         let (outside, inside) = (span.farthest_mm - zone.outer_mm, zone.inner_mm - span.nearest_mm);
         if outside + inside <= resolution {
             let alternates = zone.hold(section) > -f64::EPSILON.sqrt();
-            return alternates.then_some(Holding { zone, span, scans: exchanges + 1 });
+            return Ok(alternates.then_some(Holding { zone, span, scans: exchanges + 1 }));
         }
         let Reference { mut outer, mut inner } = zone.reference;
         if outside > 0.0 {
@@ -221,37 +239,48 @@ fn exchange(section: &Section, start: [f64; 2], reference: Reference) -> Option<
         if inside > 0.0 {
             replace(section, zone.centre, &mut inner, outer, span.nearest);
         }
-        zone = Zone::through(section, zone.centre, Reference { outer, inner })?;
+        through = Zone::through(section, zone.centre, Reference { outer, inner });
     }
-    None
+    Ok(None)
 }
 
 /// The best quadruple of a few points; the farthest and the nearest point of all join them until none is outside.
-fn cut_planes(section: &Section, start: [f64; 2]) -> Option<Holding> {
+fn cut_planes(
+    section: &Section,
+    start: [f64; 2],
+    goes_on: &dyn Fn() -> bool,
+) -> Result<Option<Holding>, RoundnessError> {
     let order = order_from_gap(section, start);
     let span = section.span_inside(start);
     let first = FIRST_CORE.min(order.len());
     let mut core: Vec<usize> = (0..first).map(|i| order[(order.len() - 1) * i / (first - 1)]).collect();
     core.extend([span.nearest, span.farthest]);
-    narrowest(section, start, core, 0.5 * span.farthest_mm)
+    narrowest(section, start, core, 0.5 * span.farthest_mm, goes_on)
 }
 
 /// The narrowest zone about a centre within `within_mm` of `start`: the best of a few points, which is at most as wide as
 /// that of all, until it holds all. `None` where that takes too long.
-fn narrowest(section: &Section, start: [f64; 2], mut core: Vec<usize>, within_mm: f64) -> Option<Holding> {
+fn narrowest(
+    section: &Section,
+    start: [f64; 2],
+    mut core: Vec<usize>,
+    within_mm: f64,
+    goes_on: &dyn Fn() -> bool,
+) -> Result<Option<Holding>, RoundnessError> {
     let mut scans = 1;
     loop {
         core.sort_unstable();
         core.dedup();
         if core.len() > LARGEST_CORE {
-            return None;
+            return Ok(None);
         }
-        let zone = best_of(section, start, &core, within_mm)?;
+        look(goes_on)?;
+        let Some(zone) = best_of(section, start, &core, within_mm) else { return Ok(None) };
         let reached = section.span_inside(zone.centre);
         scans += 1;
         let missing = (reached.farthest_mm - zone.outer_mm) + (zone.inner_mm - reached.nearest_mm);
         if missing <= resolution_mm(reached.farthest_mm) {
-            return Some(Holding { zone, span: reached, scans });
+            return Ok(Some(Holding { zone, span: reached, scans }));
         }
         core.extend([reached.nearest, reached.farthest]);
     }
@@ -289,29 +318,32 @@ fn best_of(section: &Section, start: [f64; 2], core: &[usize], within_mm: f64) -
 }
 
 /// A zone with its proof; where that of first order does not reach far enough, with that of trial.
-fn proven(section: &Section, holding: Holding) -> MinimumZone {
+fn proven(section: &Section, holding: Holding, goes_on: &dyn Fn() -> bool) -> Result<MinimumZone, RoundnessError> {
     let could_be_better_mm = half_gap_cosine(section, holding.zone.centre)
         .and_then(|cosine| narrower_within_mm(holding.span.width_mm(), cosine))
         // Beyond half the radius nothing was proven; the bound does not go there.
         .filter(|&mm| mm <= 0.5 * holding.span.nearest_mm);
     let reached = reach_mm(holding.zone.hold(section), holding.zone.inner_mm);
     if could_be_better_mm.is_some_and(|mm| mm <= reached) {
-        return holding.answer(section, true, true);
+        return Ok(holding.answer(section, true, true));
     }
-    let tried = could_be_better_mm.and_then(|_| {
+    let trial = could_be_better_mm.and_then(|_| {
         let mut core = extremes_of_octants(section, holding.zone.centre);
         core.extend(holding.zone.reference.outer.iter().chain(&holding.zone.reference.inner));
         let cosine = half_gap_cosine(&section.part(&core), holding.zone.centre)?;
         // The few alone must keep narrower zones within a disc, else their narrowest need not be among the quadruples.
         let within_mm = narrower_within_mm(holding.span.width_mm(), cosine)?;
-        let found = narrowest(section, holding.zone.centre, core, within_mm)?;
-        (within_mm <= 0.5 * holding.span.nearest_mm).then_some(found)
+        (within_mm <= 0.5 * holding.span.nearest_mm).then_some((core, within_mm))
     });
-    match tried {
+    let tried = match trial {
+        Some((core, within_mm)) => narrowest(section, holding.zone.centre, core, within_mm, goes_on)?,
+        None => None,
+    };
+    Ok(match tried {
         Some(found) if found.span.width_mm() < holding.span.width_mm() => found.answer(section, true, false),
         Some(_) => holding.answer(section, true, false),
         None => holding.answer(section, false, false),
-    }
+    })
 }
 
 /// The nearest and the farthest point of each eighth of a turn.

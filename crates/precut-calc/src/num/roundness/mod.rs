@@ -9,6 +9,7 @@
 //! ```
 //! [`circles`] does the four circles at once; [`evaluate`] does all of it in the order of the standard
 //! (ISO 12181-2): refer to the least-squares centre, filter, fit the circles to the filtered profile.
+//! What passes over the points again and again asks `goes_on` before each pass, and ends where that says no.
 //! Lengths are mm, angles rad, harmonics are counted in undulations per revolution (UPR).
 //!
 //! Equation numbers are those of `docs/physics/roundness-evaluation.md`.
@@ -70,6 +71,9 @@ pub enum RoundnessError {
         /// Which point, from 0.
         index: usize,
     },
+    /// Nobody waits for the answer any more.
+    #[error("stopped")]
+    Stopped,
     /// The iteration ended without reaching its tolerance.
     #[error("no convergence after {iterations} iterations, {left_mm:e} mm left")]
     NotConverged {
@@ -78,4 +82,9 @@ pub enum RoundnessError {
         /// Last step or gap, mm.
         left_mm: f64,
     },
+}
+
+/// `Err` once nobody waits for the answer any more.
+fn look(goes_on: &dyn Fn() -> bool) -> Result<(), RoundnessError> {
+    if goes_on() { Ok(()) } else { Err(RoundnessError::Stopped) }
 }

@@ -175,7 +175,7 @@ pub(super) fn as_job(job: &Job, section: &FileSection) -> SectionJob {
 
 /// Points of a section in space, in order round it, and what was put right in reading them.
 pub(super) fn points(job: &Job, section: &FileSection) -> Result<(Vec<Point>, Vec<RoundnessRepair>), RoundnessError> {
-    let readings = Readings::of(&as_job(job, section))?;
+    let readings = Readings::of(&as_job(job, section), &|| true)?;
     let point = |(index, &row): (usize, &usize)| {
         let [x, y] = readings.section.point_mm(index);
         [x, y, section.heights_mm[row]]

@@ -30,12 +30,13 @@ pub(super) const FAILURE_CODES: &[&str] = &["not_star_shaped", "points_without_c
 pub(in crate::ring_roundness) fn outcome(job: &Job, monitor: &dyn Monitor) -> Result<Outcome, Failure> {
     checkpoint(monitor)?;
     monitor.progress(0.0, Message::new("stage_circles"));
-    let readings = Readings::of(job).map_err(|error| failure(error, None))?;
+    let goes_on = || !monitor.cancelled();
+    let readings = Readings::of(job, &goes_on).map_err(|error| failure(error, None))?;
     let mut outcome = of_readings(job, &readings, monitor)?;
     if job.spikes == SpikeTreatment::Keep && !readings.spikes.is_empty() {
         // What would come without them is tried, not guessed.
         let without = Job { spikes: SpikeTreatment::Remove, ..job.clone() };
-        let readings = Readings::of(&without).map_err(|error| failure(error, None))?;
+        let readings = Readings::of(&without, &goes_on).map_err(|error| failure(error, None))?;
         outcome.data.roundness_without_spikes_um =
             of_readings(&without, &readings, &Quiet(monitor)).ok().map(|without| without.roundness_um);
         checkpoint(monitor)?;
@@ -45,7 +46,7 @@ pub(in crate::ring_roundness) fn outcome(job: &Job, monitor: &dyn Monitor) -> Re
 }
 
 fn of_readings(job: &Job, readings: &Readings, monitor: &dyn Monitor) -> Result<Outcome, Failure> {
-    if readings.is_closed() { curve(job, readings, monitor) } else { scattered(job, readings) }
+    if readings.is_closed() { curve(job, readings, monitor) } else { scattered(job, readings, monitor) }
 }
 
 /// Points through which a curve can be laid: everything.
@@ -58,14 +59,17 @@ fn curve(job: &Job, readings: &Readings, monitor: &dyn Monitor) -> Result<Outcom
     let told = number(readings.section.len().min(n)) / 2.0;
     let applies = job.filter.highest_cutoff().is_none_or(|(cutoff, _)| cutoff <= told);
     let filter = if applies { job.filter.filter() } else { Filter::None };
-    let found = evaluate(&readings.section, &grid, filter, n / 2).map_err(fail)?;
+    let goes_on = || !monitor.cancelled();
+    let found = evaluate(&readings.section, &grid, filter, n / 2, &goes_on).map_err(fail)?;
     checkpoint(monitor)?;
     monitor.progress(0.5, Message::new("stage_denser"));
     let centre = found.unfiltered.least_squares.circle.centre_mm;
     let denser = refer(&readings.section, centre, DENSER * n).map_err(fail)?;
-    let measured_denser = circles(&fine.section(&denser).map_err(fail)?).map_err(fail)?;
+    checkpoint(monitor)?;
+    let measured_denser = circles(&fine.section(&denser).map_err(fail)?, &goes_on).map_err(fail)?;
     let filtered = grid.resampled(&found.referred_mm, filter, &fine).map_err(fail)?;
-    let filtered_denser = circles(&fine.section(&filtered).map_err(fail)?).map_err(fail)?;
+    checkpoint(monitor)?;
+    let filtered_denser = circles(&fine.section(&filtered).map_err(fail)?, &goes_on).map_err(fail)?;
     checkpoint(monitor)?;
     let rows = |index: usize| row_contact(readings, index);
     let step_deg = 360.0 / number(n);
@@ -86,8 +90,8 @@ fn curve(job: &Job, readings: &Readings, monitor: &dyn Monitor) -> Result<Outcom
 }
 
 /// Points with a gap that a curve would have to invent: an arc, a keyway, a few touches. Circles of the points alone.
-fn scattered(job: &Job, readings: &Readings) -> Result<Outcome, Failure> {
-    let found = circles(&readings.section).map_err(|error| failure(error, Some(readings)))?;
+fn scattered(job: &Job, readings: &Readings, monitor: &dyn Monitor) -> Result<Outcome, Failure> {
+    let found = circles(&readings.section, &|| !monitor.cancelled()).map_err(|error| failure(error, Some(readings)))?;
     let measured = circles_out(&found, None, &|index| row_contact(readings, index));
     let mut filtered = measured.clone();
     let [x, y] = found.least_squares.circle.centre_mm;
@@ -168,6 +172,7 @@ fn failure(error: RoundnessError, readings: Option<&Readings>) -> Failure {
         RoundnessError::NoCircle | RoundnessError::NotSurrounding => {
             Failure::OutOfModel(Finding::new("points_without_circle", ""))
         }
+        RoundnessError::Stopped => Failure::Cancelled,
         other => Failure::Internal(other.to_string()),
     }
 }

@@ -107,7 +107,7 @@ fn check_nominal(job: &Job, violations: &mut Violations) -> bool {
 
 /// What only the circle through the points shows: points on a line, a form that is not round.
 fn check_form(job: &Job, at: &str, violations: &mut Violations) {
-    let Ok(readings) = Readings::of(job) else {
+    let Ok(readings) = Readings::of(job, &|| true) else {
         violations.add(Finding::new("points_on_a_line", at));
         return;
     };

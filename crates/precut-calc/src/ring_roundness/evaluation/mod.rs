@@ -40,7 +40,7 @@ impl Calculator for RoundnessEvaluation {
     const META: Meta = Meta {
         id: "roundness-evaluation",
         kind: CalculatorKind::Evaluation,
-        version: 4,
+        version: 5,
         title: "Roundness evaluation",
         question: "How round is this measured section, about which circle, and what form has the error?",
         summary: "From measured radii, deviations or points of a round section: the least-squares, minimum-zone, \

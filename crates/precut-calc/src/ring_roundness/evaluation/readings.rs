@@ -124,7 +124,7 @@ struct Reading {
 
 impl Readings {
     /// Of a job with one table; a deviation without nominal radius counts from 0.
-    pub(in crate::ring_roundness) fn of(job: &Job) -> Result<Self, RoundnessError> {
+    pub(in crate::ring_roundness) fn of(job: &Job, goes_on: &dyn Fn() -> bool) -> Result<Self, RoundnessError> {
         let mut repairs = Vec::new();
         if let Some(Ok(read)) = file(job) {
             repairs.extend(read.done.into_iter().map(|(kind, count)| RoundnessRepair::new(kind, count, 0.0)));
@@ -140,7 +140,7 @@ impl Readings {
             }
             None => points(job, &mut repairs)?,
         };
-        let circle = least_squares(&section)?;
+        let circle = least_squares(&section, goes_on)?;
         let mut angles_deg: Vec<f64> =
             (0..section.len()).map(|index| direction_deg(&section, circle.circle.centre_mm, index)).collect();
         let mut section = section;
@@ -154,26 +154,32 @@ impl Readings {
         }
         let largest_gap = largest_gap(&angles_deg);
         let read = Self { section, circle, rows, angles_deg, largest_gap, repairs, spikes: Vec::new() };
-        read.with_spikes(job.spikes)
+        read.with_spikes(job.spikes, goes_on)
     }
 
     /// Finds spikes, and leaves them out where that is asked for.
-    fn with_spikes(mut self, treatment: SpikeTreatment) -> Result<Self, RoundnessError> {
-        let distances_mm = self.section.distances_mm(self.circle.circle.centre_mm);
-        let found = spikes::spikes(&distances_mm);
-        self.spikes = found.iter().map(|run| spikes::told(run, &self.angles_deg, &distances_mm, &self.rows)).collect();
-        if treatment == SpikeTreatment::Keep || found.is_empty() {
+    fn with_spikes(mut self, treatment: SpikeTreatment, goes_on: &dyn Fn() -> bool) -> Result<Self, RoundnessError> {
+        let mut distances_mm = self.section.distances_mm(self.circle.circle.centre_mm);
+        let mut found = spikes::spikes(&distances_mm, goes_on)?;
+        if found.is_empty() {
             return Ok(self);
         }
-        let left_out: HashSet<usize> = found.into_iter().flatten().collect();
-        let kept: Vec<usize> = (0..self.rows.len()).filter(|at| !left_out.contains(at)).collect();
-        let (x, y): (Vec<f64>, Vec<f64>) = kept.iter().map(|&at| self.section.point_mm(at).into()).unzip();
-        let section = Section::from_points(&x, &y)?;
-        let circle = least_squares(&section)?;
+        // A keyway draws the circle aside: about that of the rest smaller ones show, too.
+        let centre_mm = self.without(&found, goes_on)?.2.circle.centre_mm;
+        let distances_about_rest_mm = self.section.distances_mm(centre_mm);
+        let found_about_rest = spikes::spikes(&distances_about_rest_mm, goes_on)?;
+        if !found_about_rest.is_empty() {
+            (distances_mm, found) = (distances_about_rest_mm, found_about_rest);
+        }
+        self.spikes = found.iter().map(|run| spikes::told(run, &self.angles_deg, &distances_mm, &self.rows)).collect();
+        if treatment == SpikeTreatment::Keep {
+            return Ok(self);
+        }
+        let (kept, section, circle) = self.without(&found, goes_on)?;
         let angles_deg: Vec<f64> =
             (0..section.len()).map(|index| direction_deg(&section, circle.circle.centre_mm, index)).collect();
         let highest_um = self.spikes.iter().map(|spike| spike.height_um.abs()).fold(0.0, f64::max);
-        self.repairs.push(RoundnessRepair::new(RepairKind::SpikesLeftOut, left_out.len(), highest_um));
+        self.repairs.push(RoundnessRepair::new(RepairKind::SpikesLeftOut, self.rows.len() - kept.len(), highest_um));
         Ok(Self {
             rows: kept.iter().map(|&at| self.rows[at]).collect(),
             largest_gap: largest_gap(&angles_deg),
@@ -182,6 +188,20 @@ impl Readings {
             angles_deg,
             ..self
         })
+    }
+
+    /// The points without those of some runs, and their circle.
+    fn without(
+        &self,
+        runs: &[Vec<usize>],
+        goes_on: &dyn Fn() -> bool,
+    ) -> Result<(Vec<usize>, Section, LeastSquares), RoundnessError> {
+        let left_out: HashSet<usize> = runs.iter().flatten().copied().collect();
+        let kept: Vec<usize> = (0..self.rows.len()).filter(|at| !left_out.contains(at)).collect();
+        let (x, y): (Vec<f64>, Vec<f64>) = kept.iter().map(|&at| self.section.point_mm(at).into()).unzip();
+        let section = Section::from_points(&x, &y)?;
+        let circle = least_squares(&section, goes_on)?;
+        Ok((kept, section, circle))
     }
 
     /// Whether no gap is so wide that a curve through the points would be invention: none much wider than even points

@@ -5,6 +5,7 @@
 //! looked for in three widths (`roundness/2.2`).
 
 use super::output::RoundnessSpike;
+use crate::num::roundness::RoundnessError;
 
 const UM_PER_MM: f64 = 1e3;
 /// Widths of the spikes that are looked for: readings at least, and shares of all readings.
@@ -22,33 +23,66 @@ const QUANTILES: [(f64, f64); 2] = [(0.5, 0.674_49), (0.9, 1.644_85)];
 const STEPS: f64 = 4.0;
 /// What instruments resolve, mm.
 const FINEST_MM: f64 = 2e-5;
+/// Times that spikes are looked for beside those known.
+const ROUNDS: usize = 4;
 /// Largest share of the readings that can be spikes.
 const MOST: f64 = 0.1;
 
 /// Spikes among readings in order round the section: which readings make each.
-pub(super) fn spikes(distances_mm: &[f64]) -> Vec<Vec<usize>> {
+///
+/// A large one shadows those beside it. Once it is found a line takes its place, and what comes out then is found, too.
+pub(super) fn spikes(distances_mm: &[f64], goes_on: &dyn Fn() -> bool) -> Result<Vec<Vec<usize>>, RoundnessError> {
     let n = distances_mm.len();
     if n < FEWEST {
-        return Vec::new();
+        return Ok(Vec::new());
     }
+    let mut off = vec![false; n];
+    let mut bridged = distances_mm.to_vec();
+    for _ in 0..ROUNDS {
+        let found = of_round(&bridged, goes_on)?;
+        if found.iter().flatten().all(|at| off[*at]) {
+            break;
+        }
+        found.into_iter().flatten().for_each(|at| off[at] = true);
+        // So many are no exception but the surface.
+        if off.iter().filter(|off| **off).count() as f64 > MOST * n as f64 {
+            return Ok(Vec::new());
+        }
+        bridged.copy_from_slice(distances_mm);
+        runs(&off).iter().for_each(|run| bridge(run, &mut bridged));
+    }
+    Ok(runs(&off))
+}
+
+/// What stands off in readings in which the spikes known are bridged.
+fn of_round(distances_mm: &[f64], goes_on: &dyn Fn() -> bool) -> Result<Vec<Vec<usize>>, RoundnessError> {
+    let n = distances_mm.len();
     let mut off = vec![false; n];
     let mut widths: Vec<usize> = WIDTHS.iter().map(|share| at_share(*share, n).max(LEAST_WIDTH)).collect();
     widths.dedup();
     let step_mm = usual_step_mm(distances_mm);
     for width in widths {
+        if !goes_on() {
+            return Err(RoundnessError::Stopped);
+        }
         let residuals = residuals_mm(distances_mm, width);
         let limit_mm = (LIMIT * deviation_mm(&residuals)).max(STEPS * step_mm).max(FINEST_MM);
         residuals.iter().zip(&mut off).filter(|(r, _)| r.abs() > limit_mm).for_each(|(_, off)| *off = true);
     }
-    let count = off.iter().filter(|off| **off).count();
-    // So many are no exception but the surface.
-    if count as f64 > MOST * n as f64 {
-        return Vec::new();
-    }
     // Beside a large spike what a side leads to is off, too: what does not stand over its own neighbours is none.
     let least_mm = LIMIT * roughness_mm(distances_mm);
     let stands_out = |run: &Vec<usize>| peak(run, distances_mm).1.abs() > least_mm;
-    runs(&off).into_iter().filter(stands_out).collect()
+    Ok(runs(&off).into_iter().filter(stands_out).collect())
+}
+
+/// A straight line between the readings beside a run.
+fn bridge(run: &[usize], distances_mm: &mut [f64]) {
+    let n = distances_mm.len();
+    let (before, after) = (distances_mm[(run[0] + n - 1) % n], distances_mm[(run[run.len() - 1] + 1) % n]);
+    for (k, &at) in run.iter().enumerate() {
+        let share = (k + 1) as f64 / (run.len() + 1) as f64;
+        distances_mm[at] = before + share * (after - before);
+    }
 }
 
 /// Standard deviation of the roughness from reading to reading, mm: by the median of second differences, which spikes do not
@@ -178,6 +212,8 @@ pub(super) fn told(run: &[usize], angles_deg: &[f64], distances_mm: &[f64], rows
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
+
     use super::*;
     use std::f64::consts::TAU;
 
@@ -191,21 +227,20 @@ mod tests {
     #[test]
     fn form_noise_and_a_step_are_no_spikes() {
         for n in [36, 120, 720, 3600] {
-            assert!(spikes(&readings(n)).is_empty(), "{n}");
+            assert!(spikes(&readings(n), &|| true).unwrap().is_empty(), "{n}");
             // Wider than any spike on both sides: a closed record that steps up steps down again.
             let half = n as usize / 2;
             let stepped: Vec<f64> =
                 readings(n).iter().enumerate().map(|(i, r)| if i > half { r + 0.002 } else { *r }).collect();
-            assert!(spikes(&stepped).is_empty(), "{n} {:?}", spikes(&stepped));
+            assert!(spikes(&stepped, &|| true).unwrap().is_empty(), "{n}");
             let rounded: Vec<f64> = readings(n).iter().map(|r| (r * 1e4).round() / 1e4).collect();
-            assert!(spikes(&rounded).is_empty(), "{n} {:?}", spikes(&rounded));
+            assert!(spikes(&rounded, &|| true).unwrap().is_empty(), "{n}");
         }
     }
 
     #[test]
     fn grains_scratches_and_a_keyway_are_found_where_they_are() {
-        // Of few readings a keyway shadows too many for a scratch to be seen beside it.
-        for n in [720_usize, 3600] {
+        for n in [120_usize, 720, 3600] {
             let mut readings = readings(u32::try_from(n).unwrap_or(0));
             readings[0] += 0.012;
             readings[n / 3] -= 0.01;
@@ -214,7 +249,7 @@ mod tests {
             for at in &keyway {
                 readings[*at] -= 2.0;
             }
-            let found = spikes(&readings);
+            let found = spikes(&readings, &|| true).unwrap();
             assert_eq!(found, [vec![n / 3, n / 3 + 1], keyway, vec![0]], "{n}");
         }
     }

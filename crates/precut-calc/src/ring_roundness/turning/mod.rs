@@ -56,8 +56,8 @@ pub(crate) struct Revolution {
     pub cutting_share: f64,
 }
 
-/// Hears of every revolution with the profile so far; an error ends the run.
-pub(crate) type After<'a, E> = dyn FnMut(&Revolution, &[f64]) -> Result<(), E> + 'a;
+/// Hears of every revolution with the profile so far, and now and then between two of them; an error ends the run.
+pub(crate) type After<'a, E> = dyn FnMut(Option<&Revolution>, &[f64]) -> Result<(), E> + 'a;
 
 /// The ring falls between its supports: there is no place where both touch it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -70,8 +70,8 @@ pub(crate) struct Stuck {
     pub reach_mm: f64,
 }
 
-/// Turns a ring whose radii at uniform body angles are `profile_mm`; `after` hears of every revolution with the profile
-/// so far and may end the run.
+/// Turns a ring whose radii at uniform body angles are `profile_mm`; `after` hears of every revolution and now and then
+/// in between, with the profile so far, and may end the run.
 ///
 /// Interpolation between nodes is cubic; the location leaves less than 1e-9 mm. What the number of nodes does to a
 /// result is to be asked with half of them.

@@ -30,6 +30,8 @@ const LAST_STEP_MM: f64 = 2e-5;
 pub(super) const MOST_ITERATIONS: u32 = 60;
 /// Tangent of the angle from the fixed directions beyond which they are fixed anew; the series is then exact to 1e-13.
 const FAR: f64 = 0.05;
+/// Steps between two looks, a tenth of a microsecond each on points and some on rollers.
+const STEPS_PER_LOOK: usize = 4096;
 /// A rolling contact computed so many steps ago still holds.
 const FRESH_STEPS: u64 = 16;
 
@@ -219,7 +221,7 @@ impl<'a, M: Machine> Stepper<'a, M> {
         };
     }
 
-    /// Runs to the end; `after` hears of every revolution and may end the run.
+    /// Runs to the end; `after` may end the run before.
     pub(super) fn run<E: From<Stuck>>(mut self, after: &mut After<'_, E>) -> Result<Turned, E> {
         let n = self.nodes.len();
         let mut log = Log::new(self.setting, n);
@@ -229,10 +231,14 @@ impl<'a, M: Machine> Stepper<'a, M> {
                 envelope.fit(&self.nodes);
             }
             self.highest_mm = self.nodes.range().1;
-            let mut left = n;
+            let (mut left, mut next_look) = (n, n.saturating_sub(STEPS_PER_LOOK));
             while left > 0 && !self.ended {
                 if self.stale {
                     self.refresh();
+                }
+                if left < next_look {
+                    next_look = next_look.saturating_sub(STEPS_PER_LOOK);
+                    after(None, self.nodes.values())?;
                 }
                 left -= if left >= LANES && self.frame.wide {
                     self.block::<LANES>(&mut log)?
@@ -241,7 +247,7 @@ impl<'a, M: Machine> Stepper<'a, M> {
                 };
             }
             if let Some(revolution) = log.revolution() {
-                after(&revolution, self.nodes.values())?;
+                after(Some(&revolution), self.nodes.values())?;
             }
         }
         Ok(log.turned(self.nodes.values().to_vec(), self.unmet_mm))

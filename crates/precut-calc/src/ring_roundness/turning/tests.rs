@@ -91,7 +91,7 @@ fn nearest_samples_give_what_their_number_gives() {
         assert!(!sampled.torn);
         let (x, y): (Vec<f64>, Vec<f64>) = sampled.points_mm.iter().map(|p| (p[0], p[1])).unzip();
         let section = crate::num::roundness::Section::from_points(&x, &y).unwrap();
-        let found = crate::num::roundness::least_squares(&section).unwrap().span.width_mm() * 1e3;
+        let found = crate::num::roundness::least_squares(&section, &|| true).unwrap().span.width_mm() * 1e3;
         // Printed to two digits.
         assert!((found - expected_um).abs() < 0.02 * expected_um, "{n}: {found} {expected_um}");
     }
