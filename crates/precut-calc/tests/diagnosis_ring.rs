@@ -83,7 +83,6 @@ fn reference() -> (Value, Value) {
 }
 
 #[test]
-#[ignore = "98 revolutions in each of its predictions: `-- --ignored the_hidden_cause_of_the_open_case`"]
 fn the_hidden_cause_of_the_open_case_is_named() {
     let (request, truth) = reference();
     let result = answered(&request).unwrap().output;
