@@ -66,7 +66,7 @@ impl ModelContent {
         let stated: Vec<JointUncertainty> = serde_json::from_value(stated).unwrap_or_default();
         let is_there = |own: &ParameterMove| {
             let effect = (own.effect as usize).checked_sub(1).and_then(|index| self.effects.get(index));
-            effect.and_then(|effect| effect.get(&own.parameter)).is_some_and(Value::is_number)
+            effect.and_then(|effect| effect.pointer(&format!("/{}", own.parameter))).is_some_and(Value::is_number)
         };
         stated.into_iter().filter(|entry| entry.moves.iter().all(is_there)).collect()
     }

@@ -297,7 +297,8 @@ fn a_displaced_rest_bends_the_shaft() {
 
 #[test]
 fn the_catalogue_and_the_effect_objects_agree() {
-    for (i, cause) in DEFLECTION_CAUSES.iter().enumerate() {
+    // The shape of a remainder is no number.
+    for (i, cause) in DEFLECTION_CAUSES.iter().enumerate().filter(|(_, cause)| cause.kind != "remainder") {
         let values: Vec<f64> = cause
             .parameters
             .iter()

@@ -216,7 +216,8 @@ fn a_hint_names_no_cause_that_is_less_likely_than_what_has_no_name() {
         assert_eq!(hint.values.get("cause"), Some(&Said::from(String::new())));
         assert_eq!(hint.values.get("probability"), Some(&Said::from(result.unnamed_probability)));
     } else {
-        assert_ne!(result.verdict, VerdictClass::Adequate);
+        // Or nothing is likely enough to need no hint.
+        assert!(result.verdict != VerdictClass::Adequate || result.none_probability >= 0.5);
     }
 }
 

@@ -227,8 +227,8 @@ fn the_order_of_the_rows_changes_nothing() {
     };
     let (one, other) = (of(&sketch), of(&shuffled));
     assert_eq!(one.0, other.0);
-    // Sums over other orders round differently: log evidences of some hundred differ by round-off only.
-    assert!((one.1 - other.1).abs() < 1e-8 && (one.2 - other.2).abs() < 1e-12 * one.2);
+    // Sums over other orders round differently: log evidences of some hundred, and the correlation, differ by round-off only.
+    assert!((one.1 - other.1).abs() < 1e-6 && (one.2 - other.2).abs() < 1e-9 * one.2, "{one:?} {other:?}");
 }
 
 #[test]

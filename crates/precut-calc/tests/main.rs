@@ -34,6 +34,7 @@ mod diagnosis_deflection;
 mod diagnosis_known;
 mod diagnosis_profiles;
 mod diagnosis_refusals;
+mod diagnosis_remainder;
 mod diagnosis_ring;
 mod diagnosis_ring_trials;
 mod diagnosis_trials;

@@ -45,6 +45,12 @@ pub trait Diagnosable:
         values_by_name(hypothesis, effect)
     }
 
+    /// What no cause explains as an effect of the model, of the same size in all runs; what `held` has of it already is part of
+    /// it. `None` where the model has no such effect.
+    fn remainder(_prepared: &Self::Prepared, _held: &[Self::Effect], _found: &Unnamed<'_>) -> Option<Self::Effect> {
+        None
+    }
+
     /// How the rows hang together.
     fn design(prepared: &Self::Prepared) -> Design;
 
@@ -127,6 +133,16 @@ pub trait Diagnosable:
     fn predict_ms(_job: &Self::Job) -> f64 {
         0.0
     }
+}
+
+/// Something without a name that goes smoothly along a part.
+pub struct Unnamed<'a> {
+    /// Between which places it is known, as shares of the length of the part.
+    pub ends: [f64; 2],
+    /// Its size there, in the unit of the effect.
+    pub size: &'a dyn Fn(f64) -> f64,
+    /// At so many places, evenly, straight between them, it is given well enough.
+    pub places: usize,
 }
 
 /// What was written down with one of its numbers divided; `None` where it has no such number.

@@ -1,6 +1,6 @@
 //! Named effects, digested into what they change: the structure, the force, the radial error.
 
-use crate::effects::{DeflectionConditions, DeflectionEffect as Effect};
+use crate::effects::{DeflectionConditions, DeflectionEffect as Effect, ErrorPoint};
 
 use super::input::FeedDirection;
 
@@ -101,18 +101,21 @@ pub(super) enum SetOff {
 }
 
 /// A term of the extra radial error e that depends on nothing but where and when the tool passes.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 enum ErrorTerm {
     Constant { error_mm: f64 },
     Bow { at_middle_mm: f64 },
     Wear { rate_mm_per_m: f64, wear_in_mm: f64, wear_in_path_m: f64, path_at_start_m: f64 },
     Growth { growth_mm: f64, time_constant_min: f64, warm_at_start_min: f64 },
     Heating { strain: f64, time_constant_min: f64 },
+    Profile { scale: f64, profile: Vec<ErrorPoint> },
 }
 
 /// Where and when the tool passes a station.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Passage {
+    /// Station from the headstock end, mm.
+    pub z_mm: f64,
     /// z/L.
     pub u: f64,
     /// Diameter produced, mm.
@@ -202,6 +205,9 @@ impl Acting {
             Effect::SteadyRestOffset { station_mm, offset_um } => {
                 self.set_off.push(SetOff::SteadyRest { station_mm, offset_mm: offset_um * MM_PER_UM });
             }
+            Effect::Remainder { scale, ref profile, .. } => {
+                self.errors.push(ErrorTerm::Profile { scale: scale * MM_PER_UM, profile: profile.clone() });
+            }
         }
     }
 
@@ -224,8 +230,8 @@ impl Acting {
 }
 
 impl ErrorTerm {
-    fn error_mm(self, at: Passage) -> f64 {
-        match self {
+    fn error_mm(&self, at: Passage) -> f64 {
+        match *self {
             Self::Constant { error_mm } => error_mm,
             Self::Bow { at_middle_mm } => 4.0 * at_middle_mm * at.u * (1.0 - at.u),
             Self::Wear { rate_mm_per_m, wear_in_mm, wear_in_path_m, path_at_start_m } => {
@@ -238,6 +244,20 @@ impl ErrorTerm {
             Self::Heating { strain, time_constant_min } => {
                 0.5 * at.diameter_mm * strain * (-at.time_min / time_constant_min).exp_m1()
             }
+            Self::Profile { scale, ref profile } => scale * error_um(profile, at.z_mm),
         }
+    }
+}
+
+/// The error of a remainder at a place: straight between the places it is given at, beyond them as at the ends.
+pub(super) fn error_um(profile: &[ErrorPoint], z_mm: f64) -> f64 {
+    let next = profile.partition_point(|point| point.z_mm <= z_mm);
+    match (next.checked_sub(1).map(|last| profile[last]), profile.get(next)) {
+        (Some(before), Some(after)) => {
+            let share = (z_mm - before.z_mm) / (after.z_mm - before.z_mm);
+            before.error_um + share * (after.error_um - before.error_um)
+        }
+        (Some(last), None) => last.error_um,
+        (None, first) => first.map_or(0.0, |first| first.error_um),
     }
 }

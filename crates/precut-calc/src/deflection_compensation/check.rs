@@ -260,6 +260,16 @@ fn check_effect_on_structure(job: &Job, effect: &Effect, at: &dyn Fn(&str) -> St
         },
         Effect::UncutSideStiffness {} => violations
             .require(job.passes.is_empty(), || Finding::new("effect_not_with_passes", at("")).with("kind", kind)),
+        Effect::Remainder { ref profile, .. } => {
+            for (k, pair) in profile.windows(2).enumerate().filter(|(_, pair)| pair[1].z_mm <= pair[0].z_mm) {
+                let place = at(&format!("/profile/{}/z_mm", k + 1));
+                violations.add(Finding::new("stations_not_ascending", place).measured(
+                    pair[1].z_mm,
+                    pair[0].z_mm,
+                    "mm",
+                ));
+            }
+        }
         _ => {}
     }
 }

@@ -5,20 +5,20 @@ use utoipa::ToSchema;
 
 use crate::calculator::{
     Consequence, Cost, Design, Diagnosable, Example, Failure, Finding, ForwardModel, Hypotheses, Hypothesis,
-    JacobianColumn, Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows, checkpoint,
+    JacobianColumn, Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows, Unnamed, checkpoint,
     values_by_name,
 };
-use crate::effects::{Cause, DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect};
+use crate::effects::{Cause, DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect, ErrorPoint};
 use crate::num::beam::Profile;
 use crate::shaft::places;
 
 use super::DeflectionCompensation;
-use super::acting::{Acting, StructureChange};
+use super::acting::{Acting, StructureChange, error_um};
 use super::check::outside_shaft;
 use super::consequence::consequences;
 use super::equilibrium::Engagement;
 use super::grid::{Grid, interpolate};
-use super::hypotheses::{Experiment, chuck_scale_n_mm_per_rad, design};
+use super::hypotheses::{Experiment, chuck_scale_n_mm_per_rad, design, remainder_name};
 use super::input::{FeedDirection, Job, Stations, Theory};
 use super::measurement::DeflectionMeasurement;
 use super::model::{Ingredients, Line, Radii, wanted};
@@ -341,10 +341,34 @@ impl Diagnosable for DeflectionCompensation {
 
     fn hypotheses(
         prepared: &PreparedDeflection,
-        _held: &[DeflectionEffect],
+        held: &[DeflectionEffect],
         _monitor: &dyn Monitor,
     ) -> Result<Hypotheses, Failure> {
-        Ok(Experiment { job: &prepared.job, runs: &prepared.conditions_of_runs }.hypotheses())
+        Ok(Experiment { job: &prepared.job, runs: &prepared.conditions_of_runs, held }.hypotheses())
+    }
+
+    fn remainder(
+        prepared: &PreparedDeflection,
+        held: &[DeflectionEffect],
+        found: &Unnamed<'_>,
+    ) -> Option<DeflectionEffect> {
+        let length_mm = prepared.job.shaft.length_mm();
+        let before = held.iter().find_map(|effect| match effect {
+            DeflectionEffect::Remainder { scale, profile, .. } => Some((*scale, profile.as_slice())),
+            _ => None,
+        });
+        let name = held.iter().map(remainder_name).collect();
+        // The one that was known before is part of it, over all places of either.
+        let ends_before = before.and_then(|(_, known)| Some([known.first()?.z_mm, known.last()?.z_mm]));
+        let [from, to] = found.ends.map(|end| end * length_mm);
+        let [first, last] = ends_before.map_or([from, to], |[first, last]| [first.min(from), last.max(to)]);
+        let count = before.map_or(found.places, |(_, known)| found.places.max(known.len())).max(2);
+        let point = |index: usize| {
+            let z_mm = first + (last - first) * index as f64 / (count - 1) as f64;
+            let known = before.map_or(0.0, |(scale, known)| scale * error_um(known, z_mm));
+            ErrorPoint { z_mm, error_um: known + (found.size)((z_mm / length_mm).clamp(found.ends[0], found.ends[1])) }
+        };
+        Some(DeflectionEffect::Remainder { name, scale: 1.0, profile: (0..count).map(point).collect() })
     }
 
     fn effects(

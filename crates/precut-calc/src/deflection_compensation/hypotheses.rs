@@ -7,7 +7,7 @@ use super::regime::Regime;
 use crate::calculator::{
     Design, Hypotheses, Hypothesis, Inapplicability, Inapplicable, Range, Shape, Smooth, Treatment, Variable,
 };
-use crate::effects::{Cause, DEFLECTION_CAUSES, Fit, Parameter};
+use crate::effects::{Cause, DEFLECTION_CAUSES, DeflectionEffect, Fit, Parameter};
 use crate::num::beam::second_moment_mm4;
 use crate::shaft::elastic::{clamping, ends};
 
@@ -15,6 +15,8 @@ use crate::shaft::elastic::{clamping, ends};
 pub(super) struct Experiment<'a> {
     pub(super) job: &'a Job,
     pub(super) runs: &'a [DeflectionRun],
+    /// Effects that act already.
+    pub(super) held: &'a [DeflectionEffect],
 }
 
 impl Experiment<'_> {
@@ -47,6 +49,10 @@ impl Experiment<'_> {
             ),
             "reversal_backlash" => constant("feed_direction", self.both_directions()),
             "steady_rest_offset" if !supports.iter().any(|s| matches!(s, Support::SteadyRest { .. })) => {
+                Some(Inapplicability::NothingToActOn)
+            }
+            // What was never found has no shape by which it could be known again.
+            "remainder" if !self.held.iter().any(|effect| effect.kind() == cause.kind) => {
                 Some(Inapplicability::NothingToActOn)
             }
             "chuck_rotational_stiffness" if !self.headstock_is_centre() => Some(Inapplicability::NothingToActOn),
@@ -121,6 +127,11 @@ impl Experiment<'_> {
                     })
                     .collect()
             }
+            // Known by the name that the user gave to it.
+            "remainder" => {
+                let name = self.held.iter().map(remainder_name).collect();
+                vec![of(name, cause.parameters.iter().map(|p| self.variable(cause, p, None)).collect())]
+            }
             // C is almost linear in kappa = k/(k + 3 E I/L).
             "chuck_rotational_stiffness" => vec![of(
                 String::new(),
@@ -172,6 +183,14 @@ impl Experiment<'_> {
             }
             _ => None,
         }
+    }
+}
+
+/// What a remainder is called; nothing of other effects.
+pub(super) fn remainder_name(effect: &DeflectionEffect) -> &str {
+    match effect {
+        DeflectionEffect::Remainder { name, .. } => name,
+        _ => "",
     }
 }
 

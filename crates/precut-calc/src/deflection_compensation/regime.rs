@@ -164,6 +164,7 @@ pub(super) fn passages(job: &Job, grid: &Grid, regime: &Regime, step: &Step) -> 
                 FeedDirection::ToTailstock => z - grid.steps_mm[i],
             };
             Passage {
+                z_mm: z,
                 u: z / grid.length_mm,
                 diameter_mm: pass_diameter_mm(&segments[i], step.pass_mm),
                 time_min: step.time_before_min + before[i].0 + pace[i].0 * into,

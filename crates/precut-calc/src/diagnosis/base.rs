@@ -3,13 +3,14 @@
 use std::sync::OnceLock;
 
 use rayon::prelude::*;
+use serde::{Serialize, de::DeserializeOwned};
 
 use super::input::{DiagnosisOptions, PriorWeight};
 use super::known::Known;
-use super::subject::{Setting, Subject};
+use super::subject::{Belief, Setting, Subject, Waves};
 use crate::calculator::{
     Diagnosable, Expansions, Failure, Held, Hypotheses, Hypothesis, Inapplicability, Inapplicable, JacobianColumn,
-    Missing, Monitor, Prediction, Treatment, Variable,
+    Missing, Monitor, Prediction, Treatment, Unnamed, Variable,
 };
 
 /// From this time of one prediction on, ms, divided differences are one-sided and fewer sets are refined.
@@ -21,6 +22,8 @@ const DEAR_MS: f64 = 5.0;
 /// round-off about 1e-13 of the value divided by 1e-3. One-sided where a prediction is dear: then the truncation is of
 /// order 1e-3 of the curvature.
 const STEP: f64 = 1e-3;
+/// The same of something without a name, in the unit of its effect: what it opens or closes of a gap.
+const UNIT_STEP: f64 = 0.01;
 
 /// A forward model with its rows and allowances.
 pub struct Bound<'a, M: Diagnosable> {
@@ -76,8 +79,16 @@ impl<'a, M: Diagnosable> Bound<'a, M> {
         &self.hypotheses
     }
 
-    /// The effects that settings stand for: what joins the base, and what stands in place of an effect of the base.
-    pub(super) fn effects_of(&self, settings: &[Setting]) -> Result<Vec<M::Effect>, Failure> {
+    /// The effects that are believed: what joins the base, and what stands in place of an effect of the base.
+    pub(super) fn effects_of(&self, believed: &Belief) -> Result<Vec<M::Effect>, Failure> {
+        let mut effects = self.effects_of_settings(&believed.settings)?;
+        if let Some(waves) = &believed.waves {
+            put(&mut effects, self.remainder(&self.with_settings(&believed.settings)?, waves)?);
+        }
+        Ok(effects)
+    }
+
+    fn effects_of_settings(&self, settings: &[Setting]) -> Result<Vec<M::Effect>, Failure> {
         let mut effects = Vec::with_capacity(settings.len());
         for setting in settings {
             effects.extend(self.effects_at(setting)?);
@@ -85,16 +96,44 @@ impl<'a, M: Diagnosable> Bound<'a, M> {
         Ok(effects)
     }
 
+    /// What has no name as an effect beside those that act.
+    fn remainder(&self, acting: &[M::Effect], waves: &Waves) -> Result<M::Effect, Failure> {
+        let found = Unnamed { ends: waves.ends, size: &|place| waves.at(place), places: waves.places };
+        M::remainder(&self.prepared, acting, &found)
+            .ok_or_else(|| Failure::Internal("a remainder that the model has no effect for".to_owned()))
+    }
+
     fn effects_at(&self, setting: &Setting) -> Result<Vec<M::Effect>, Failure> {
         let hypothesis = &self.hypotheses.applicable[setting.hypothesis];
         let values: Vec<f64> =
             setting.values.iter().enumerate().map(|(k, value)| value + hypothesis.counted_from(k)).collect();
+        // A remainder is what it was found as: only its size is a number.
+        let of_held = || {
+            let held = hypothesis.held.as_ref()?;
+            let named = hypothesis.variables.iter().map(|variable| variable.name).zip(values.iter().copied());
+            Some(vec![with_numbers(&self.known.effects[held.effect], named)?])
+        };
         M::effects(&self.prepared, hypothesis, &values)
+            .or_else(of_held)
             .ok_or_else(|| Failure::Internal(format!("{} takes no {values:?}", hypothesis.cause.kind)))
     }
 
-    /// All that acts with these settings: the effects of the base, as far as they have not changed, and what they stand for.
-    pub(super) fn acting(&self, settings: &[Setting]) -> Result<Vec<M::Effect>, Failure> {
+    /// All that acts where this is believed: the effects of the base, as far as they have not changed, and what it stands for.
+    pub(super) fn acting(&self, believed: &Belief) -> Result<Vec<M::Effect>, Failure> {
+        let mut acting = self.with_settings(&believed.settings)?;
+        if let Some(waves) = &believed.waves {
+            let remainder = self.remainder(&acting, waves)?;
+            put(&mut acting, remainder);
+        }
+        Ok(acting)
+    }
+
+    /// What is predicted where this is believed.
+    pub(super) fn believing(&self, believed: &Belief) -> Result<Vec<Prediction>, Failure> {
+        self.predicted(&self.acting(believed)?)
+    }
+
+    fn with_settings(&self, settings: &[Setting]) -> Result<Vec<M::Effect>, Failure> {
         let changed = |effect: usize| {
             let is_of = |setting: &&Setting| {
                 self.hypotheses.applicable[setting.hypothesis].held.as_ref().is_some_and(|held| held.effect == effect)
@@ -104,7 +143,7 @@ impl<'a, M: Diagnosable> Bound<'a, M> {
         let own = self.known.effects.iter().enumerate();
         let mut acting: Vec<M::Effect> =
             own.filter(|(index, _)| !changed(*index)).map(|(_, effect)| effect.clone()).collect();
-        acting.extend(self.effects_of(settings)?);
+        acting.extend(self.effects_of_settings(settings)?);
         Ok(acting)
     }
 
@@ -122,7 +161,7 @@ impl<'a, M: Diagnosable> Bound<'a, M> {
     }
 
     fn coarsely(&self, settings: &[Setting]) -> Result<Vec<Prediction>, Failure> {
-        self.predicted_coarsely(&self.acting(settings)?)
+        self.predicted_coarsely(&self.with_settings(settings)?)
     }
 
     /// Residuals are taken of the logarithm where the quantity is logarithmic.
@@ -192,6 +231,24 @@ impl<'a, M: Diagnosable> Bound<'a, M> {
     }
 }
 
+/// In place of an effect of the same kind, or beside the others.
+fn put<E>(effects: &mut Vec<E>, effect: E) {
+    effects.retain(|own| std::mem::discriminant(own) != std::mem::discriminant(&effect));
+    effects.push(effect);
+}
+
+/// An effect with other numbers in some of its fields.
+fn with_numbers<E: Serialize + DeserializeOwned>(
+    effect: &E,
+    numbers: impl Iterator<Item = (&'static str, f64)>,
+) -> Option<E> {
+    let mut fields = serde_json::to_value(effect).ok()?;
+    for (name, number) in numbers {
+        *fields.get_mut(name)? = number.into();
+    }
+    serde_json::from_value(fields).ok()
+}
+
 /// The causes that rows can speak about; those that the base has already as changes of what it has.
 fn about_known<M: Diagnosable>(
     prepared: &M::Prepared,
@@ -245,7 +302,7 @@ where
     }
 
     fn predict(&self, settings: &[Setting]) -> Result<Vec<Prediction>, Failure> {
-        self.predicted(&self.acting(settings)?)
+        self.predicted(&self.with_settings(settings)?)
     }
 
     fn predict_coarsely(&self, settings: &[Setting]) -> Result<Vec<Prediction>, Failure> {
@@ -277,5 +334,21 @@ where
         let mut columns = M::nuisances(prepared, &known.effects, allowances, *monitor)?;
         columns.extend(known.columns(|acting| self.predicted_coarsely(acting))?);
         Ok(columns)
+    }
+
+    fn unnamed(&self) -> Result<Option<JacobianColumn>, Failure> {
+        let acting = &self.known.effects;
+        let with = |size: f64| {
+            let found = Unnamed { ends: [0.0, 1.0], size: &|_| size, places: 2 };
+            let mut effects = acting.clone();
+            put(&mut effects, M::remainder(&self.prepared, acting, &found)?);
+            Some(self.predicted_coarsely(&effects))
+        };
+        let Some((below, above)) = with(-UNIT_STEP).zip(with(UNIT_STEP)) else { return Ok(None) };
+        let slope = |(below, above): (&Prediction, &Prediction)| match (below, above) {
+            (Ok(below), Ok(above)) => (above - below) / (2.0 * UNIT_STEP),
+            _ => 0.0,
+        };
+        Ok(Some(below?.iter().zip(&above?).map(slope).collect()))
     }
 }

@@ -10,7 +10,7 @@ use super::base::Bound;
 use super::calculator::Measured;
 use super::gain::Gain;
 use super::link;
-use super::subject::Setting;
+use super::subject::{Belief, Setting};
 use super::weigh::Weighing;
 use crate::calculator::{Diagnosable, Failure, Finding, LimitCurve, Monitor, Prediction};
 
@@ -91,7 +91,8 @@ pub(super) fn report<M: Diagnosable>(
 ) -> Result<Option<ClassReport>, Failure> {
     let foundation = weighing.foundation;
     let Some(sides) = &foundation.data.sides else { return Ok(None) };
-    let limits_with = |settings: &[Setting]| M::class_limits(bound.prepared(), &bound.acting(settings)?, monitor);
+    let limits_with =
+        |settings: &[Setting]| M::class_limits(bound.prepared(), &bound.acting(&Belief::of(settings))?, monitor);
     let Some(places) = limits_with(&[])? else { return Ok(None) };
     let limits_extended = match extended {
         Some(_) => limits_with(settings)?.map_or_else(Vec::new, |limits| limits.curves),

@@ -28,6 +28,8 @@ const PAIR_ORDERS: usize = 3;
 const LENGTHS: [f64; 3] = [0.0, 0.08, 0.2];
 /// Pointwise root mean square, in standard deviations of the scatter.
 const SIZES: [f64; 4] = [1.0, 3.0, 10.0, 30.0];
+/// A direction of which rows know less than this share of what its prior says is left out of what they leave open.
+const SEEN: f64 = 0.05;
 
 /// A kind of remainder.
 pub(super) struct Kind {
@@ -40,6 +42,8 @@ pub(super) struct Kind {
     pub(super) columns: Vec<Sparse>,
     /// Order of every column, where the columns are waves: along a part half waves, round it whole ones.
     pub(super) orders: Option<Vec<f64>>,
+    /// Where the model has an effect for it: what one unit of the effect does to the rows, root mean square.
+    pub(super) per_unit: Option<f64>,
     form: Form,
     /// Prior standard deviations of the amplitudes for every correlation length, at a size of one.
     spreads: Vec<Vec<f64>>,
@@ -67,6 +71,9 @@ pub(super) struct Remainder {
     pub(super) of_causes: Vec<f64>,
     /// Standard deviations of their priors at the best length and size.
     pub(super) prior_sd: Vec<f64>,
+    /// Where the model has an effect for it: independent directions of one standard deviation each of what the rows leave open
+    /// of both, causes first.
+    pub(super) directions: Vec<Vec<f64>>,
 }
 
 /// A wave: its order, and which share of its squared amplitude is its pointwise variance.
@@ -88,11 +95,13 @@ impl Wave {
     }
 }
 
-/// The kinds of remainder that these rows can show.
+/// The kinds of remainder that these rows can show. `unnamed`: what one unit of the effect does to the rows that the model
+/// has for what acts alike in all runs.
 pub(super) fn kinds(
     data: &Data,
     likelihood: &Likelihood,
     sigma: f64,
+    unnamed: Option<&[f64]>,
     monitor: &dyn Monitor,
 ) -> Result<Vec<Kind>, Failure> {
     let rows = data.value.len();
@@ -102,9 +111,12 @@ pub(super) fn kinds(
     checkpoint(monitor)?;
     match &data.layout.design.smooth {
         Smooth::Along(u) => {
-            let common = (0..COMMON_ORDERS).map(|k| on_all(&|row| cosine(k, u[row]))).collect();
+            let per_unit = unnamed.map(|column| (column.iter().map(|c| c * c).sum::<f64>() / rows as f64).sqrt());
+            let per_unit = per_unit.filter(|per_unit| *per_unit > 0.0);
+            let share = |row: usize| unnamed.zip(per_unit).map_or(1.0, |(column, whole)| column[row] / whole);
+            let common = (0..COMMON_ORDERS).map(|k| on_all(&|row| share(row) * cosine(k, u[row]))).collect();
             let waves: Vec<Wave> = (0..COMMON_ORDERS).map(Wave::of).collect();
-            kinds.push(smooth("common", common, &waves));
+            kinds.push(Kind { per_unit, ..smooth("common", common, &waves) });
             let runs: Vec<Vec<usize>> = runs(data);
             if runs.len() > 1 {
                 checkpoint(monitor)?;
@@ -213,7 +225,7 @@ impl Kind {
                 None => Form::whole(white()),
             },
         };
-        Self { name, over: Vec::new(), columns, orders: None, form, spreads }
+        Self { name, over: Vec::new(), columns, orders: None, per_unit: None, form, spreads }
     }
 }
 
@@ -257,7 +269,8 @@ pub(super) fn beside(
                     let (of_causes, of_kind) = t.split_at(columns.len());
                     let amplitudes = of_kind.iter().zip(&prior_sd).map(|(t, s)| t * s).collect();
                     let of_causes = of_causes.to_vec();
-                    best = Some((log_z, Remainder { log_z, kind: index, amplitudes, of_causes, prior_sd }));
+                    let directions = Vec::new();
+                    best = Some((log_z, Remainder { log_z, kind: index, amplitudes, of_causes, prior_sd, directions }));
                 }
                 all.push(log_z);
             }
@@ -269,7 +282,12 @@ pub(super) fn beside(
         }
     }
     let log_z = log_mean_exp(&named.iter().map(|(_, of_name)| log_mean_exp(of_name)).collect::<Vec<_>>());
-    Ok(best.map(|(_, remainder)| Remainder { log_z, ..remainder }))
+    Ok(best.map(|(_, remainder)| {
+        let kind = &kinds[remainder.kind];
+        let is_term = kind.per_unit.is_some();
+        let directions = if is_term { kind.directions(&remainder, columns, &own) } else { Vec::new() };
+        Remainder { log_z, directions, ..remainder }
+    }))
 }
 
 /// Evidence with the columns of a kind scaled by what is given, and the sizes of causes and columns.
@@ -305,6 +323,22 @@ impl Kind {
             // Blocks are made of values only.
             (Form::Blocks(_), Likelihood::Classes(_)) => Box::new(|_| None),
         }
+    }
+
+    /// Independent directions of one standard deviation each of what the rows leave open of causes and remainder: with
+    /// A = S G S + I, S the prior standard deviations and G the inner products, those of the eigenvectors of S G S. What rows
+    /// do not see is left out: there the prior alone speaks.
+    fn directions(&self, remainder: &Remainder, columns: &[&White], own: &Normal) -> Vec<Vec<f64>> {
+        let Form::Whole { white, gram } = &self.form else { return Vec::new() };
+        let all = joined_gram(white, gram, own, columns);
+        let scale: Vec<f64> =
+            std::iter::repeat_n(1.0, columns.len()).chain(remainder.prior_sd.iter().copied()).collect();
+        let count = scale.len();
+        let eigen = DMatrix::from_fn(count, count, |i, j| all[(i, j)] * scale[i] * scale[j]).symmetric_eigen();
+        let seen = eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter());
+        seen.filter(|(seen, _)| **seen > SEEN)
+            .map(|(seen, vector)| vector.iter().zip(&scale).map(|(v, scale)| v * scale / (1.0 + seen).sqrt()).collect())
+            .collect()
     }
 
     /// Posterior standard deviation of a remainder at every row, beside causes with these columns.
@@ -349,6 +383,16 @@ impl Kind {
 /// Inner products of causes and of the columns of a remainder together.
 fn joined(white: &[White], gram: &DMatrix<f64>, own: &Normal, columns: &[&White], residual: &White) -> Normal {
     let (causes, free) = (columns.len(), white.len());
+    let mut right = DVector::zeros(causes + free);
+    right.rows_mut(0, causes).copy_from(&own.right);
+    for (j, white) in white.iter().enumerate() {
+        right[causes + j] = white.inner(residual);
+    }
+    Normal { gram: joined_gram(white, gram, own, columns), right, square: own.square }
+}
+
+fn joined_gram(white: &[White], gram: &DMatrix<f64>, own: &Normal, columns: &[&White]) -> DMatrix<f64> {
+    let (causes, free) = (columns.len(), white.len());
     let mut all = DMatrix::zeros(causes + free, causes + free);
     all.view_mut((0, 0), (causes, causes)).copy_from(&own.gram);
     all.view_mut((causes, causes), (free, free)).copy_from(gram);
@@ -359,12 +403,7 @@ fn joined(white: &[White], gram: &DMatrix<f64>, own: &Normal, columns: &[&White]
             all[(causes + j, i)] = product;
         }
     }
-    let mut right = DVector::zeros(causes + free);
-    right.rows_mut(0, causes).copy_from(&own.right);
-    for (j, white) in white.iter().enumerate() {
-        right[causes + j] = white.inner(residual);
-    }
-    Normal { gram: all, right, square: own.square }
+    all
 }
 
 /// [`Normal::evidence`] with every column scaled, and without the inverse of what nobody asks for.
@@ -471,7 +510,7 @@ mod tests {
     fn every_size_is_preceded_by_a_look() {
         let data = data();
         let likelihood = likelihood(&data, 0.3, &[true; ROWS]);
-        let kinds = kinds(&data, &likelihood, 0.3, &Unwatched).unwrap();
+        let kinds = kinds(&data, &likelihood, 0.3, None, &Unwatched).unwrap();
         let sizes: usize = kinds.iter().map(|kind| kind.spreads.len() * SIZES.len()).sum();
         let residual = likelihood.white(&data.value);
         for at in [0, sizes - 1, sizes] {
@@ -495,7 +534,7 @@ mod tests {
             let (causes, residual) = ([white(0.05), white(0.4)], likelihood.white(&data.value));
             let (causes, sides) = (causes.iter().collect::<Vec<_>>(), [Side::Positive, Side::Both]);
             let own = Normal::of(&causes, &residual);
-            let kinds = kinds(&data, &likelihood, 0.3, &Unwatched).unwrap();
+            let kinds = kinds(&data, &likelihood, 0.3, None, &Unwatched).unwrap();
             let apart: Vec<&Kind> = kinds.iter().filter(|kind| matches!(kind.form, Form::Blocks(_))).collect();
             // Levels of rows that a correlation ties together are one block.
             assert_eq!(apart.len(), if rho > 0.0 { 1 } else { 2 });
@@ -503,7 +542,15 @@ mod tests {
                 let columns = || kind.columns.clone();
                 let form = Form::whole(columns().iter().map(|column| likelihood.white(&column.dense())).collect());
                 let spreads = kind.spreads.clone();
-                let whole = Kind { name: kind.name, over: Vec::new(), columns: columns(), orders: None, form, spreads };
+                let whole = Kind {
+                    name: kind.name,
+                    over: Vec::new(),
+                    columns: columns(),
+                    orders: None,
+                    per_unit: None,
+                    form,
+                    spreads,
+                };
                 let prior_sd: Vec<f64> = (0..kind.columns.len()).map(|k| 0.5 + 0.4 * wave(k, 1.0)).collect();
                 let of = |kind: &Kind| {
                     let (log_z, t) = kind.explained(&own, &causes, &residual, &sides, &likelihood)(&prior_sd).unwrap();
@@ -513,6 +560,7 @@ mod tests {
                         amplitudes: Vec::new(),
                         of_causes: Vec::new(),
                         prior_sd: prior_sd.clone(),
+                        directions: Vec::new(),
                     };
                     let deviation = kind.deviation(&remainder, &causes, &residual, &likelihood).unwrap();
                     [vec![log_z], t, deviation].concat()

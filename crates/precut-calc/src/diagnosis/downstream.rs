@@ -8,9 +8,10 @@ use statrs::distribution::{ContinuousCDF, Normal};
 use super::base::Bound;
 use super::calculator::{JobOf, base_of};
 use super::extension::Extension;
+use super::known::Direction;
 use super::output::{DecisionReport, DownstreamReport};
 use super::refine::Fit;
-use super::subject::{Setting, Subject};
+use super::subject::{Belief, Setting, Subject};
 use super::weigh::{SetWeight, Weighing};
 use crate::calculator::{Consequence, Diagnosable, Failure, Monitor, checkpoint};
 
@@ -33,30 +34,35 @@ pub(super) fn downstream<M: Diagnosable>(
     monitor: &dyn Monitor,
 ) -> Result<Vec<DownstreamReport>, Failure> {
     let mut random = Gaussian { random: Pcg64::seed_from_u64(u64::from(job.options.seed)), normal: Normal::standard() };
-    let mut parts = Vec::with_capacity(extension.parts.len());
-    for &(share, set) in &extension.parts {
-        let open = weighing.fit(&set.members).and_then(|fit| Open::of(bound, set, fit));
-        let Some(open) = open else { return Ok(Vec::new()) };
-        parts.push((share, open));
-    }
-    if parts.is_empty() {
-        return Ok(Vec::new());
-    }
-    let draws: Vec<Vec<Setting>> =
-        (0..DRAWS).map(|_| random.one_of(&parts).draw(weighing.noise.dof, &mut random)).collect();
-    let mut acting = draws.iter().map(|settings| bound.acting(settings)).collect::<Result<Vec<_>, _>>()?;
+    let dof = weighing.noise.dof;
+    let draws: Vec<Belief> = if let Some(term) = &extension.term {
+        let directions = term.directions();
+        (0..DRAWS).map(|_| random.beside(bound, &extension.believed, &directions, dof)).collect()
+    } else {
+        let mut parts = Vec::with_capacity(extension.parts.len());
+        for &(share, set) in &extension.parts {
+            let open = weighing.fit(&set.members).and_then(|fit| Open::of(bound, set, fit));
+            let Some(open) = open else { return Ok(Vec::new()) };
+            parts.push((share, open));
+        }
+        if parts.is_empty() {
+            return Ok(Vec::new());
+        }
+        (0..DRAWS).map(|_| Belief::of(&random.one_of(&parts).draw(dof, &mut random))).collect()
+    };
+    let mut acting = draws.iter().map(|believed| bound.acting(believed)).collect::<Result<Vec<_>, _>>()?;
     for effects in &mut acting {
         effects.extend(M::allowed(&job.allowances, &mut || random.next()));
     }
     let (base_job, _) = base_of::<M>(job);
-    let decided = |believed: &[Setting]| -> Result<Vec<Consequence>, Failure> {
+    let decided = |believed: &Belief| -> Result<Vec<Consequence>, Failure> {
         let believed = bound.acting(believed)?;
         let decided = M::consequences(&base_job, &job.quantity, runs, &believed, &acting, monitor)?;
         // What was cancelled has no consequences, either.
         checkpoint(monitor)?;
         Ok(decided)
     };
-    let (base, extended) = (decided(&[])?, decided(&extension.settings)?);
+    let (base, extended) = (decided(&Belief::default())?, decided(&extension.believed)?);
     let both = base.iter().filter_map(|of_base| {
         let of_extended = extended.iter().find(|other| other.name == of_base.name)?;
         Some(DownstreamReport {
@@ -114,6 +120,20 @@ impl Gaussian {
         // In the open interval: both ends are infinite.
         let share = self.random.random_range(f64::EPSILON..1.0);
         self.normal.inverse_cdf(share)
+    }
+
+    /// What is believed, off in all directions at once; causes kept within their bounds.
+    fn beside(&mut self, subject: &dyn Subject, believed: &Belief, directions: &[Direction], dof: f64) -> Belief {
+        let scale = self.student_scale(dof);
+        let mut drawn = believed.clone();
+        for direction in directions {
+            drawn = direction.moved(&drawn, scale * self.next());
+        }
+        for setting in &mut drawn.settings {
+            let variables = &subject.hypotheses()[setting.hypothesis].variables;
+            setting.values.iter_mut().zip(variables).for_each(|(value, own)| *value = own.range.clamp(*value));
+        }
+        drawn
     }
 
     /// One of these as often as its share; the only one without a draw.

@@ -1,5 +1,5 @@
 //! The model that a diagnosis leaves behind: the base extended by the causes named, or, where the rows do not settle which of
-//! several sets acts, by their average (`diagnosis/3.8`).
+//! several sets acts, by their average, or by what has no name as a term of its own (`diagnosis/3.8`).
 
 use std::collections::BTreeSet;
 
@@ -8,7 +8,8 @@ use utoipa::ToSchema;
 
 use super::gain::{Gain, predicting};
 use super::known::{Direction, JointUncertainty, directions, left_open};
-use super::subject::Setting;
+use super::subject::{Belief, Setting};
+use super::term::Term;
 use super::weigh::{SetWeight, Verdict, Weighing};
 use crate::calculator::{Failure, Hypothesis, Treatment};
 
@@ -29,34 +30,48 @@ pub enum ExtensionKind {
     Average,
     /// The likeliest set of causes, where an average of several does not predict as they do; no cause is named by it.
     Likeliest,
+    /// What no cause explains is a term of its own over the places measured, beside the causes that act at least.
+    Remainder,
 }
 
 /// The base extended.
 pub(super) struct Extension<'a> {
     pub(super) kind: ExtensionKind,
     /// What joins the base; of an average the causes of all sets, each size times the share of the sets that hold it.
-    pub(super) settings: Vec<Setting>,
+    pub(super) believed: Belief,
     /// The sets behind it, with their shares.
     pub(super) parts: Vec<(f64, &'a SetWeight)>,
+    /// What has no name, where that is a term.
+    pub(super) term: Option<Term<'a>>,
 }
 
 impl<'a> Extension<'a> {
     /// The base as it was.
     pub(super) fn none() -> Self {
-        Self { kind: ExtensionKind::None, settings: Vec::new(), parts: Vec::new() }
+        Self { kind: ExtensionKind::None, believed: Belief::default(), parts: Vec::new(), term: None }
     }
 
-    /// By the set whose causes are named; else by what predicted the rows that were held back better than the base,
-    /// beyond chance.
+    /// With what has no name as a term, where that predicted the rows that were held back better than the base, beyond chance;
+    /// else by the set whose causes are named; else by the sets that predicted them so.
     pub(super) fn of(
-        weighing: &'a Weighing<'_>,
+        weighing: &'a Weighing<'a>,
         named: Option<&'a SetWeight>,
         gain: Option<&Gain>,
     ) -> Result<Self, Failure> {
+        let gain = gain.filter(|gain| gain.interval.0 > 0.0);
+        let term = gain.and_then(|_| Term::of(weighing)).and_then(|term| Some((term.belief()?, term)));
+        if let Some((believed, term)) = term {
+            return Ok(Self {
+                kind: ExtensionKind::Remainder,
+                believed,
+                parts: vec![(1.0, term.set)],
+                term: Some(term),
+            });
+        }
         if let Some(set) = named {
             return Ok(Self::one(ExtensionKind::Named, set));
         }
-        let Some(gain) = gain.filter(|gain| gain.interval.0 > 0.0) else { return Ok(Self::none()) };
+        let Some(gain) = gain else { return Ok(Self::none()) };
         if matches!(weighing.verdict, Verdict::Adequate) {
             return Ok(Self::none());
         }
@@ -64,7 +79,8 @@ impl<'a> Extension<'a> {
         let Some(&(_, likeliest)) = parts.first() else { return Ok(Self::none()) };
         if parts.len() > 1 {
             let hypotheses = weighing.foundation.subject.hypotheses();
-            let average = Self { kind: ExtensionKind::Average, settings: average(hypotheses, &parts), parts };
+            let believed = Belief { settings: average(hypotheses, &parts), waves: None };
+            let average = Self { kind: ExtensionKind::Average, believed, parts, term: None };
             if average.predicts_as_its_parts(weighing)? {
                 return Ok(average);
             }
@@ -75,13 +91,13 @@ impl<'a> Extension<'a> {
     }
 
     fn one(kind: ExtensionKind, set: &'a SetWeight) -> Self {
-        Self { kind, settings: set.settings.clone(), parts: vec![(1.0, set)] }
+        Self { kind, believed: Belief::of(&set.settings), parts: vec![(1.0, set)], term: None }
     }
 
     /// Predictions of the parts, and of all together.
     fn predicts_as_its_parts(&self, weighing: &Weighing<'_>) -> Result<bool, Failure> {
         let subject = weighing.foundation.subject;
-        let with = subject.predict(&self.settings)?;
+        let with = subject.predict(&self.believed.settings)?;
         let mut gap: Vec<f64> = with.iter().map(|value| value.unwrap_or(0.0)).collect();
         for (share, set) in &self.parts {
             let of_set = subject.predict(&set.settings)?;
@@ -101,34 +117,37 @@ impl<'a> Extension<'a> {
     pub(super) fn open<E: Serialize>(
         &self,
         weighing: &Weighing<'_>,
-        effects_of: impl Fn(&[Setting]) -> Result<Vec<E>, Failure>,
+        effects_of: impl Fn(&Belief) -> Result<Vec<E>, Failure>,
     ) -> Result<Vec<JointUncertainty>, Failure> {
-        let place = |hypothesis: usize| self.settings.iter().position(|own| own.hypothesis == hypothesis);
+        if let Some(term) = &self.term {
+            return left_open(&self.believed, &term.directions(), effects_of);
+        }
+        let place = |hypothesis: usize| self.believed.settings.iter().position(|own| own.hypothesis == hypothesis);
         let hypotheses = weighing.foundation.subject.hypotheses();
         let mut all: Vec<Direction> = Vec::new();
         for (share, set) in &self.parts {
             let root = share.sqrt();
             for direction in directions(weighing, set) {
-                let moved = direction.into_iter().filter_map(|((member, variable), by)| {
+                let moved = direction.of_settings.into_iter().filter_map(|((member, variable), by)| {
                     Some(((place(set.settings[member].hypothesis)?, variable), root * by))
                 });
-                all.push(moved.collect());
+                all.push(Direction { of_settings: moved.collect(), of_waves: Vec::new() });
             }
             if self.parts.len() > 1 {
                 all.push(self.off_average(hypotheses, set, root));
             }
         }
-        left_open(&self.settings, &all, effects_of)
+        left_open(&self.believed, &all, effects_of)
     }
 
     /// How far the sizes of a set lie from the average, times a factor.
     fn off_average(&self, hypotheses: &[Hypothesis], set: &SetWeight, factor: f64) -> Direction {
-        let mut direction = Direction::new();
-        for (member, own) in self.settings.iter().enumerate() {
+        let mut direction = Direction::default();
+        for (member, own) in self.believed.settings.iter().enumerate() {
             let of_set = set.settings.iter().find(|other| other.hypothesis == own.hypothesis);
             for (variable, _) in hypotheses[own.hypothesis].amplitudes() {
                 let there = of_set.map_or(0.0, |other| other.values[variable]);
-                direction.push(((member, variable), factor * (there - own.values[variable])));
+                direction.of_settings.push(((member, variable), factor * (there - own.values[variable])));
             }
         }
         direction
@@ -137,11 +156,14 @@ impl<'a> Extension<'a> {
     /// Standard deviation of a measured row about the prediction: scatter, allowances, what the fits leave open, and how far
     /// the sets lie apart. `None` where a set was not refined.
     pub(super) fn deviation(&self, weighing: &Weighing<'_>) -> Result<Option<Vec<f64>>, Failure> {
+        if let Some(term) = &self.term {
+            return Ok(Some(term.deviation()));
+        }
         if let [(_, set)] = self.parts.as_slice() {
             return Ok(weighing.deviation(set));
         }
         let subject = weighing.foundation.subject;
-        let with = subject.predict(&self.settings)?;
+        let with = subject.predict(&self.believed.settings)?;
         let mut variance = vec![0.0; with.len()];
         for (share, set) in &self.parts {
             let Some(own) = weighing.deviation(set) else { return Ok(None) };

@@ -26,6 +26,8 @@ pub struct Foundation<'a> {
     pub(super) nuisances: Vec<Sparse>,
     /// Variance of every row by all allowances.
     pub(super) allowed: Vec<f64>,
+    /// What one unit of something without a name does to the rows, where the model has an effect for that.
+    pub(super) unnamed: Option<Vec<f64>>,
 }
 
 impl<'a> Foundation<'a> {
@@ -42,7 +44,19 @@ impl<'a> Foundation<'a> {
         for column in &nuisances {
             column.entries().for_each(|(row, value)| allowed[row] += value * value);
         }
-        Ok(Self { subject, data, base, predicted, residual, heavy_tails: None, signatures, nuisances, allowed })
+        let unnamed = subject.unnamed()?;
+        Ok(Self {
+            subject,
+            data,
+            base,
+            predicted,
+            residual,
+            heavy_tails: None,
+            signatures,
+            nuisances,
+            allowed,
+            unnamed,
+        })
     }
 
     /// One more allowance.

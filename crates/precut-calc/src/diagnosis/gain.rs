@@ -3,6 +3,7 @@
 use super::foundation::Foundation;
 use super::noise::between_sweeps;
 use super::outlying::{HeldRun, OutlyingRun, outlying};
+use super::term::Term;
 use super::view::quantile;
 use super::weigh::{Effort, SetWeight, Verdict, Weighing};
 use crate::calculator::{Failure, Monitor, checkpoint};
@@ -132,13 +133,16 @@ impl Score {
     }
 }
 
-/// Prediction of the sets that lead without the fold: the base where nothing is wrong, the leader where it
-/// holds enough, else the mean over the leading sets.
+/// Prediction of what leads without the fold: the base where nothing is wrong, with what has no name where that is a term, the
+/// leader where it holds enough, else the mean over the leading sets.
 fn prediction(
     foundation: &Foundation<'_>,
     without: &Weighing<'_>,
     chosen: Option<&Weighing<'_>>,
 ) -> Result<Vec<f64>, Failure> {
+    if let (None, Some(term)) = (chosen, Term::of(without)) {
+        return term.prediction();
+    }
     let leading: Vec<&SetWeight> = match chosen.map(|whole| &whole.verdict) {
         Some(Verdict::Named(members) | Verdict::Unknown(members)) => {
             without.sets.iter().filter(|set| set.remainder.is_none() && set.members == *members).collect()

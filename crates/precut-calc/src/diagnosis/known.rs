@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::Value;
 use utoipa::ToSchema;
 
-use super::subject::Setting;
+use super::subject::Belief;
 use super::weigh::{SetWeight, Weighing};
 use crate::calculator::{Failure, Prediction};
 
@@ -22,7 +22,7 @@ const STEP: f64 = 0.01;
 #[serde(deny_unknown_fields)]
 pub struct JointUncertainty {
     /// How far each parameter moves, at one standard deviation.
-    #[schema(min_items = 1, max_items = 64)]
+    #[schema(min_items = 1, max_items = 128)]
     pub moves: Vec<ParameterMove>,
 }
 
@@ -33,7 +33,7 @@ pub struct ParameterMove {
     /// Number of the effect in its list, from 1.
     #[schema(minimum = 1, maximum = 1000, example = 1, extensions(("x-symbol" = json!("i")), ("x-unit" = json!("1"))))]
     pub effect: u32,
-    /// Field of the effect.
+    /// Field of the effect; of a list the place in it from 0 and the field there: `profile/2/error_um`.
     #[schema(max_length = 64, example = "delta_um_per_n")]
     pub parameter: String,
     /// By how much, in the unit of the field.
@@ -64,7 +64,7 @@ impl<E: Serialize + DeserializeOwned> Known<E> {
             self.effects.iter().map(serde_json::to_value).collect::<Result<_, _>>().map_err(unmoved)?;
         for ParameterMove { effect, parameter, by } in &entry.moves {
             let own = (*effect as usize).checked_sub(1).and_then(|index| fields.get_mut(index));
-            if let Some(field) = own.and_then(|fields| fields.get_mut(parameter)) {
+            if let Some(field) = own.and_then(|fields| fields.pointer_mut(&format!("/{parameter}"))) {
                 *field = Value::from(field.as_f64().unwrap_or(0.0) + deviations * by);
             }
         }
@@ -90,26 +90,41 @@ impl<E: Serialize + DeserializeOwned> Known<E> {
 
 /// Whether an effect has a number of that name.
 pub(super) fn has_parameter(effect: &impl Serialize, parameter: &str) -> bool {
-    serde_json::to_value(effect).is_ok_and(|fields| fields.get(parameter).is_some_and(Value::is_f64))
+    serde_json::to_value(effect).is_ok_and(|fields| fields.pointer(&format!("/{parameter}")).is_some_and(Value::is_f64))
 }
 
-/// One standard deviation of something that is open: how far it moves values of settings, each by its setting and its
-/// variable.
-pub(super) type Direction = Vec<((usize, usize), f64)>;
+/// One standard deviation of something that is open.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Direction {
+    /// How far it moves values of settings, each by its setting and its variable.
+    pub(super) of_settings: Vec<((usize, usize), f64)>,
+    /// How far it moves the sizes of waves; empty where it moves none.
+    pub(super) of_waves: Vec<f64>,
+}
 
-/// What independent directions leave open of the effects that settings stand for, in their own parameters. Where an effect
+impl Direction {
+    /// What is believed, so many standard deviations along it.
+    pub(super) fn moved(&self, believed: &Belief, deviations: f64) -> Belief {
+        let mut moved = believed.clone();
+        for ((member, variable), by) in &self.of_settings {
+            moved.settings[*member].values[*variable] += deviations * by;
+        }
+        if let Some(waves) = &mut moved.waves {
+            waves.sizes.iter_mut().zip(&self.of_waves).for_each(|(size, by)| *size += deviations * by);
+        }
+        moved
+    }
+}
+
+/// What independent directions leave open of the effects that are believed, in their own parameters. Where an effect
 /// ends at a bound it is looked at from one side.
 pub(super) fn left_open<E: Serialize>(
-    settings: &[Setting],
+    believed: &Belief,
     directions: &[Direction],
-    effects_of: impl Fn(&[Setting]) -> Result<Vec<E>, Failure>,
+    effects_of: impl Fn(&Belief) -> Result<Vec<E>, Failure>,
 ) -> Result<Vec<JointUncertainty>, Failure> {
     let numbers = |deviations: f64, direction: &Direction| {
-        let mut moved = settings.to_vec();
-        for ((member, variable), by) in direction {
-            moved[*member].values[*variable] += deviations * by;
-        }
-        effects_of(&moved).map(|effects| effects.iter().map(fields).collect::<Vec<_>>())
+        effects_of(&direction.moved(believed, deviations)).map(|effects| effects.iter().map(fields).collect::<Vec<_>>())
     };
     let mut open = Vec::new();
     for direction in directions {
@@ -136,11 +151,21 @@ pub(super) fn left_open<E: Serialize>(
     Ok(open)
 }
 
-/// Numbers of an effect by the names of their fields.
+/// Numbers of an effect by where they stand in it.
 fn fields(effect: &impl Serialize) -> Vec<(String, f64)> {
-    let fields = serde_json::to_value(effect).unwrap_or_default();
-    let numbers = fields.as_object().into_iter().flatten().filter(|(_, value)| value.is_f64());
-    numbers.filter_map(|(name, value)| Some((name.clone(), value.as_f64()?))).collect()
+    fn collect(value: &Value, name: &str, found: &mut Vec<(String, f64)>) {
+        let inner = |own: &str| if name.is_empty() { own.to_owned() } else { format!("{name}/{own}") };
+        match value {
+            Value::Object(fields) => fields.iter().for_each(|(own, value)| collect(value, &inner(own), found)),
+            Value::Array(list) => {
+                list.iter().enumerate().for_each(|(index, value)| collect(value, &inner(&index.to_string()), found));
+            }
+            _ => found.extend(value.as_f64().filter(|_| value.is_f64()).map(|number| (name.to_owned(), number))),
+        }
+    }
+    let mut found = Vec::new();
+    collect(&serde_json::to_value(effect).unwrap_or_default(), "", &mut found);
+    found
 }
 
 /// Independent directions of one standard deviation each of what the rows leave open of a set. What a grid of shapes widens is
@@ -165,5 +190,6 @@ pub(super) fn directions(weighing: &Weighing<'_>, set: &SetWeight) -> Vec<Direct
     let covariance = DMatrix::from_fn(free.len(), free.len(), |i, j| correlation(i, j) * deviation(i) * deviation(j));
     let alone = || DMatrix::from_fn(free.len(), free.len(), |i, j| if i == j { deviation(i) } else { 0.0 });
     let columns = Cholesky::new(covariance).map_or_else(alone, Cholesky::unpack);
-    columns.column_iter().map(|column| free.iter().copied().zip(column.iter().copied()).collect()).collect()
+    let direction = |of_settings| Direction { of_settings, of_waves: Vec::new() };
+    columns.column_iter().map(|column| direction(free.iter().copied().zip(column.iter().copied()).collect())).collect()
 }

@@ -14,7 +14,8 @@
 //! - `weigh`: posterior weights and the verdict (`diagnosis/3.5`, `diagnosis/3.7`);
 //! - `profile`: intervals where a likelihood is not quadratic (`diagnosis/3.6`);
 //! - `blunder`: rows that were written down wrongly, weighed against physics (`diagnosis/8`);
-//! - `extension`: the model that is left behind, an average where no set is settled (`diagnosis/3.8`);
+//! - `extension`, `term`: the model that is left behind, an average where no set is settled, with a term of its own where
+//!   something has no name (`diagnosis/3.8`);
 //! - `gain`, `downstream`: what the extended model is worth, on data held back and in what is decided with it
 //!   (`diagnosis/3.8`, `diagnosis/3.9`);
 //! - `trial`: what is asked where the truth is known.
@@ -61,6 +62,7 @@ mod sparse;
 mod subject;
 mod survey;
 mod suspect;
+mod term;
 mod trial;
 mod view;
 mod weigh;

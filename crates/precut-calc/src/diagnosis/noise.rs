@@ -9,10 +9,12 @@ use super::data::Data;
 use super::link::information;
 use crate::calculator::Smooth;
 
-/// Correlations from row to row that are tried.
-const CORRELATIONS: [f64; 5] = [0.0, 0.1, 0.2, 0.3, 0.45];
+/// Correlations from row to row that are weighed.
+const CORRELATIONS: [f64; 8] = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7];
 /// Cosines that are projected out of a trace along a part.
 const COSINES: usize = 8;
+/// Cosines, or Fourier orders, that are projected out of the difference of two sweeps: how the gauge stood, and how it drifted.
+const OF_DIFFERENCE: [usize; 2] = [2, 1];
 /// Fourier orders that are projected out of a trace round a part.
 const FOURIER_ORDERS: usize = 12;
 /// Pure-error degrees of freedom that suffice on their own.
@@ -218,46 +220,89 @@ pub(super) fn between_sweeps(data: &Data, residual: &[f64], keep: &[bool]) -> Op
     (dof > 0.0).then(|| ((sum / dof).sqrt(), dof))
 }
 
-/// Restricted maximum likelihood over sigma and rho after taking smooth columns out of every trace.
+/// Restricted likelihood of sigma and rho after taking smooth columns out of every trace.
 ///
 /// The likelihood of Q'r with Q spanning the complement of Z is that of the generalised least-squares
 /// residual: log|Q'RQ| = log|R| + log|Z'R^-1 Z| - log|Z'Z|. With the stationary AR(1) correlation R,
 /// whitening is a difference of neighbours and log|R| = (n-1) log(1 - rho^2).
+///
+/// Rho is found no better than its likelihood tells, and what it decides is how far long waves scatter: their variance is
+/// (1 + rho)/(1 - rho) times that of rows that know nothing of each other. The mean of that ratio over the likelihood, with a
+/// prior of 2 (1 - rho), is taken, not its value at the likeliest rho: a rho that is too small by chance makes chance look like
+/// a cause.
 fn profile(data: &Data, residual: &[f64], keep: &[bool]) -> Noise {
-    let traces: Vec<(Vec<f64>, Vec<Vec<f64>>)> = data
-        .layout
-        .kept_traces(keep)
-        .into_iter()
-        .map(|(_, rows)| {
-            let columns =
-                smooth_columns(&data.layout.design.smooth, &rows, smooth_order(&data.layout.design.smooth, rows.len()));
-            (rows.iter().map(|&row| residual[row]).collect(), orthonormal(columns))
-        })
-        .collect();
-    let mut best: Option<(f64, Noise)> = None;
-    for rho in CORRELATIONS {
-        let (mut log_det, mut quadratic, mut dof) = (0.0, 0.0, 0.0);
-        for (values, columns) in &traces {
-            let white: Vec<Vec<f64>> = columns.iter().map(|column| decorrelated(column, rho)).collect();
-            let mut left = decorrelated(values, rho);
-            log_det += (values.len() as f64 - 1.0) * (1.0 - rho * rho).ln() + log_gram(&white);
-            let basis = orthonormal(white);
-            for column in &basis {
-                let along = dot(column, &left);
-                left.iter_mut().zip(column).for_each(|(r, c)| *r -= along * c);
-            }
-            quadratic += dot(&left, &left);
-            dof += values.len() as f64 - columns.len() as f64;
-        }
-        let dof = dof.max(1.0);
-        let variance = (quadratic / dof).max(f64::MIN_POSITIVE);
-        let log_l = -0.5 * log_det - 0.5 * dof * variance.ln();
-        if best.as_ref().is_none_or(|(most, _)| log_l > *most) {
-            let source = NoiseSource::Profile;
-            best = Some((log_l, Noise { sigma: variance.sqrt(), per_row: None, rho, dof, source }));
-        }
+    let traces = told_of_scatter(data, residual, keep);
+    if traces.is_empty() {
+        return unordered(data, residual, keep);
     }
-    best.map_or_else(|| unordered(data, residual, keep), |(_, noise)| noise)
+    let tried = CORRELATIONS.map(|rho| (restricted(&traces, rho).0 + (1.0 - rho).ln(), (1.0 + rho) / (1.0 - rho)));
+    let most = tried.iter().map(|(log_l, _)| *log_l).fold(f64::NEG_INFINITY, f64::max);
+    let weighed = tried.iter().map(|(log_l, ratio)| ((log_l - most).exp(), ratio));
+    let (sum, weight) = weighed.fold((0.0, 0.0), |(sum, all), (weight, ratio)| (sum + weight * ratio, all + weight));
+    let ratio = sum / weight;
+    restricted(&traces, (ratio - 1.0) / (ratio + 1.0)).1
+}
+
+/// A trace that scatters as its rows do, and the orthonormal smooth columns that say nothing of that.
+type Told = (Vec<f64>, Vec<Vec<f64>>);
+
+/// What the rows tell of their scatter: each sweep beside its smooth part. Sweeps of one run over the same places share what is
+/// smooth: of T of them their sum over sqrt(T) has a smooth part, and T - 1 differences, orthonormal (Helmert), have none
+/// but for the gauge. Only those show how far long waves scatter.
+fn told_of_scatter(data: &Data, residual: &[f64], keep: &[bool]) -> Vec<Told> {
+    let (smooth, cell) = (&data.layout.design.smooth, &data.layout.design.cell);
+    let columns = |rows: &[usize], count: usize| orthonormal(smooth_columns(smooth, rows, count));
+    let whole = |rows: &[usize]| columns(rows, smooth_order(smooth, rows.len()));
+    let of_difference = OF_DIFFERENCE[usize::from(matches!(smooth, Smooth::Around(_)))];
+    let sweeps = data.layout.kept_traces(keep);
+    let mut told = Vec::with_capacity(sweeps.len());
+    let mut rest = sweeps.as_slice();
+    while let Some((run, first)) = rest.first() {
+        let (own, others) = rest.split_at(rest.iter().take_while(|(of, _)| of == run).count());
+        rest = others;
+        let values = |rows: &[usize]| -> Vec<f64> { rows.iter().map(|&row| residual[row]).collect() };
+        let is_like_first = |rows: &[usize]| {
+            rows.len() == first.len() && rows.iter().zip(first).all(|(&row, &other)| cell[row] == cell[other])
+        };
+        // Of a short sweep a difference would keep no row.
+        if first.len() <= 4 * of_difference || !own.iter().all(|(_, rows)| is_like_first(rows)) {
+            told.extend(own.iter().map(|(_, rows)| (values(rows), whole(rows))));
+            continue;
+        }
+        let mut sum = values(first);
+        for (count, (_, rows)) in own.iter().enumerate().skip(1) {
+            let (before, next) = (count as f64, values(rows));
+            let norm = (before * (before + 1.0)).sqrt();
+            let difference = sum.iter().zip(&next).map(|(sum, next)| (sum - before * next) / norm).collect();
+            told.push((difference, columns(rows, of_difference)));
+            sum.iter_mut().zip(&next).for_each(|(sum, next)| *sum += next);
+        }
+        let norm = (own.len() as f64).sqrt();
+        told.push((sum.into_iter().map(|sum| sum / norm).collect(), whole(first)));
+    }
+    told
+}
+
+/// Restricted log-likelihood at a correlation, sigma at its best, and the scatter there; of rows of traces, each with the
+/// orthonormal columns that are taken out of it.
+fn restricted(traces: &[Told], rho: f64) -> (f64, Noise) {
+    let (mut log_det, mut quadratic, mut dof) = (0.0, 0.0, 0.0);
+    for (values, columns) in traces {
+        let white: Vec<Vec<f64>> = columns.iter().map(|column| decorrelated(column, rho)).collect();
+        let mut left = decorrelated(values, rho);
+        log_det += (values.len() as f64 - 1.0) * (1.0 - rho * rho).ln() + log_gram(&white);
+        let basis = orthonormal(white);
+        for column in &basis {
+            let along = dot(column, &left);
+            left.iter_mut().zip(column).for_each(|(r, c)| *r -= along * c);
+        }
+        quadratic += dot(&left, &left);
+        dof += values.len() as f64 - columns.len() as f64;
+    }
+    let dof = dof.max(1.0);
+    let variance = (quadratic / dof).max(f64::MIN_POSITIVE);
+    let log_l = -0.5 * log_det - 0.5 * dof * variance.ln();
+    (log_l, Noise { sigma: variance.sqrt(), per_row: None, rho, dof, source: NoiseSource::Profile })
 }
 
 /// AR(1) whitening of a trace in measuring order.

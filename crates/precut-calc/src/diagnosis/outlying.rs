@@ -4,6 +4,7 @@ use nalgebra::{Cholesky, DMatrix};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::sparse::Sparse;
+use super::term::Term;
 use super::weigh::{Verdict, Weighing};
 use super::whiten::Whitener;
 
@@ -52,11 +53,20 @@ impl HeldRun {
         }
         // What the fit without the run leaves open widens the prediction like an allowance.
         let mut allowed = foundation.nuisances.clone();
+        let term = Term::of(without);
         let fit = match without.verdict {
             Verdict::Adequate => None,
             _ => without.named_sets().next().and_then(|set| without.fit(&set.members)),
         };
-        if let Some(fit) = fit {
+        if let Some(term) = term {
+            let kept = |column: Vec<f64>| {
+                Sparse::new(
+                    predicted.len(),
+                    (0..predicted.len()).filter(|&row| keep[row]).map(|row| (row, column[row])),
+                )
+            };
+            allowed.extend(term.on_rows().into_iter().map(kept));
+        } else if let Some(fit) = fit {
             // Of values at their bounds the covariance may be singular: then each is taken by itself.
             let alone = || DMatrix::from_diagonal(&fit.covariance.diagonal().map(|v| v.max(0.0).sqrt()));
             let lower = Cholesky::new(fit.covariance.clone()).map_or_else(alone, Cholesky::unpack);

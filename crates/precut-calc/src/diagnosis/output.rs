@@ -58,6 +58,8 @@ pub struct DiagnosisResult<E: ToSchema, R: ToSchema> {
     pub profiles: Vec<ProfileReport>,
     /// Shape of what the catalogue does not explain.
     pub remainder: Option<RemainderReport>,
+    /// Where the base holds a remainder of an earlier diagnosis that these rows show again; absent otherwise.
+    pub recognised: Option<RecognisedReport>,
     /// What the extended model is. Where no cause is named there is one only if it predicted rows that were held back better
     /// than the base, beyond chance.
     pub extension: ExtensionKind,
@@ -406,6 +408,8 @@ pub struct RemainderReport {
     /// Amplitude of every order, in the unit of the quantity; of several runs the root mean square.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub amplitudes: Vec<f64>,
+    /// Between which places it was measured, where rows have one place each: beyond them it is not known.
+    pub known_between: Option<PlaceRange>,
     /// Share of the mean square left by the named part that it explains.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub explained_share: f64,
@@ -418,6 +422,35 @@ pub struct RemainderReport {
     /// Standard deviation of that.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub proportional_to_base_deviation: Option<f64>,
+}
+
+/// From where to where something is known.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct PlaceRange {
+    /// Field of a row that says where.
+    pub field: String,
+    /// Least place, in the unit of the field.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub from: f64,
+    /// Largest place.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub to: f64,
+}
+
+/// A remainder that the base holds, and that the rows show again.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct RecognisedReport {
+    /// What the user calls it; empty where it has no name.
+    pub label: String,
+    /// Root mean square of what rows would lie from the base without it, in the unit of the quantity.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub error_without: f64,
+    /// The same of the base as it stands.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub error_with: f64,
+    /// How surely the rows tell one from the other, sigmas.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub sigmas: f64,
 }
 
 /// A step along a part.

@@ -189,7 +189,7 @@ impl Ranking {
 
     fn set(&self, linear: &Linear<'_>, candidate: &Candidate, remainder: Option<Remainder>) -> SetWeight {
         let fit = self.fit(&candidate.members);
-        let settings = fit.map_or_else(|| linear.settings(candidate), |fit| fit.settings.clone());
+        let mut settings = fit.map_or_else(|| linear.settings(candidate), |fit| fit.settings.clone());
         let nothing = || settings.iter().map(|s| vec![0.0; s.values.len()]).collect();
         let mut standard_deviations: Vec<Vec<f64>> = fit.map_or_else(nothing, Fit::standard_deviations);
         // A shape that stays on its grid is uncertain, too, and widens the sizes.
@@ -197,6 +197,9 @@ impl Ranking {
             for (own, spread) in standard_deviations.iter_mut().zip(&candidate.spread) {
                 own.iter_mut().zip(spread).for_each(|(own, spread)| *own = own.max(*spread));
             }
+        }
+        if let (Some(fit), Some(remainder)) = (fit, &remainder) {
+            fit.move_beside(remainder, linear.hypotheses, &mut settings, &mut standard_deviations);
         }
         let others = match (fit, &self.others) {
             (Some(fit), (of, others)) if *of == candidate.members && remainder.is_none() => {

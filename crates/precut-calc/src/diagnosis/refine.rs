@@ -2,6 +2,7 @@
 
 use nalgebra::{Cholesky, DMatrix};
 
+use super::discrepancy::Remainder;
 use super::evidence::{Normal, Side};
 use super::likelihood::Likelihood;
 use super::subject::{Setting, Subject};
@@ -59,6 +60,24 @@ impl Fit {
             deviations[member][variable] = self.covariance[(k, k)].sqrt();
         }
         deviations
+    }
+
+    /// Values as they are beside a remainder that takes its share of the rows, with what that leaves open of them.
+    pub(super) fn move_beside(
+        &self,
+        remainder: &Remainder,
+        hypotheses: &[Hypothesis],
+        settings: &mut [Setting],
+        standard_deviations: &mut [Vec<f64>],
+    ) {
+        for (k, (&(member, variable), coordinate)) in self.free.iter().zip(&self.coordinates).enumerate() {
+            let range = hypotheses[settings[member].hypothesis].variables[variable].range;
+            let value = &mut settings[member].values[variable];
+            *value = coordinate.moved(remainder.of_causes[k], range);
+            let open: f64 = remainder.directions.iter().map(|direction| direction[k] * direction[k]).sum();
+            let own = &mut standard_deviations[member][variable];
+            *own = own.max(open.sqrt() * coordinate.slope(*value));
+        }
     }
 
     /// The free values at other settings, in units of their priors.

@@ -10,13 +10,13 @@ use super::downstream::downstream;
 use super::extension::{Extension, ExtensionKind};
 use super::foundation::Foundation;
 use super::gain::{Gain, gain};
-use super::identify::twins;
+use super::identify::{CONFOUNDED_BELOW, twins};
 use super::input::DiagnosisOptions;
 use super::next::{NextMeasurement, next_measurement};
 use super::noise::{NoiseSource, between_sweeps};
 use super::output::{
-    CausePair, DiagnosisResult, GainReport, NamedCause, NoiseReport, NotApplicable, RemainderReport, RowColumns,
-    StepReport, TestReport, VerdictClass,
+    CausePair, DiagnosisResult, GainReport, NamedCause, NoiseReport, NotApplicable, PlaceRange, RecognisedReport,
+    RemainderReport, RowColumns, StepReport, TestReport, VerdictClass,
 };
 use super::refuse::{most_causes, of_blunders, refusal};
 use super::remainder::{RemainderShape, remainder_shape};
@@ -26,11 +26,13 @@ use super::view::View;
 use super::weigh::{Effort, Verdict, Weighing};
 use crate::calculator::{
     Answer, Diagnosable, Failure, Hypothesis, Inapplicability, Measurement, Message, Monitor, Prediction, Quantity,
-    Smooth, Value,
+    Rows, Smooth, Value,
 };
 
 /// Probability of nothing from which on an adequate base leaves no reason to look for blunders.
 const QUIET: f64 = 0.5;
+/// The kind of what was found without a name, and stored.
+const REMAINDER: &str = "remainder";
 /// Sets that are listed.
 const LISTED_SETS: usize = 20;
 
@@ -85,14 +87,15 @@ pub(super) fn answer<M: Diagnosable>(
     // Of classes the error on what was held back is no square.
     let tried = gain.as_ref().filter(|_| data.sides.is_none());
     let extension = if refusal.is_none() { Extension::of(&weighing, leading, tried)? } else { Extension::none() };
-    let settings: &[Setting] = &extension.settings;
-    let effects = bound.effects_of(settings)?;
+    let believed = &extension.believed;
+    let effects = bound.effects_of(believed)?;
     let is_extended = extension.kind != ExtensionKind::None;
     let extended = Extended {
-        prediction: is_extended.then(|| bound.predict(settings)).transpose()?,
+        prediction: is_extended.then(|| bound.believing(believed)).transpose()?,
         deviation: if is_extended { extension.deviation(&weighing)? } else { None },
     };
-    let downstream = if matches!(view.class(), VerdictClass::Named | VerdictClass::Confounded) {
+    let is_decided = matches!(view.class(), VerdictClass::Named | VerdictClass::Confounded);
+    let downstream = if is_decided || extension.kind == ExtensionKind::Remainder {
         downstream(job, &places.runs, bound, &weighing, &extension, monitor)?
     } else {
         Vec::new()
@@ -102,8 +105,9 @@ pub(super) fn answer<M: Diagnosable>(
     let mut warnings = warnings(&job.options, &weighing, &found, (used, copies), refusal.is_none(), gain.is_some());
     let (signatures, separations) = view.signatures()?;
     let with = extended.prediction.as_deref();
-    let classes = classes::report(bound, &weighing, measured, with, settings, gain.as_ref(), (seed, monitor))?;
-    let effects_uncertainty = extension.open(&weighing, |settings| bound.effects_of(settings))?;
+    let classes =
+        classes::report(bound, &weighing, measured, with, &believed.settings, gain.as_ref(), (seed, monitor))?;
+    let effects_uncertainty = extension.open(&weighing, |believed| bound.effects_of(believed))?;
     // Of classes a root mean square means nothing.
     let gain = gain.filter(|_| classes.is_none());
     let output = DiagnosisResult {
@@ -124,7 +128,8 @@ pub(super) fn answer<M: Diagnosable>(
         separations,
         signatures,
         profiles: view.profiles(),
-        remainder: unnamed_remainder(&weighing, used),
+        remainder: unnamed_remainder::<M>(&weighing, (places, used)),
+        recognised: if refusal.is_none() { recognised(&weighing)? } else { None },
         extension: extension.kind,
         effects,
         effects_uncertainty,
@@ -221,9 +226,58 @@ struct Extended {
 }
 
 /// What is left without a name, where the verdict is that something is.
-fn unnamed_remainder(weighing: &Weighing<'_>, used: &[usize]) -> Option<RemainderReport> {
+fn unnamed_remainder<M: Diagnosable>(
+    weighing: &Weighing<'_>,
+    (places, used): (&Rows<M::Run, M::Point>, &[usize]),
+) -> Option<RemainderReport> {
     let shape = matches!(weighing.verdict, Verdict::Unknown(_)).then(|| remainder_shape(weighing)).flatten()?;
-    Some(remainder_report(shape, used))
+    let kept = places.points.iter().zip(&weighing.keep).filter(|(_, keep)| **keep);
+    let at: Vec<(&'static str, f64)> = kept
+        .filter_map(|((_, point), _)| M::place(point).first().and_then(|(field, z)| Some((*field, (*z)?))))
+        .collect();
+    let known_between = at.first().map(|(field, first)| PlaceRange {
+        field: (*field).to_owned(),
+        from: at.iter().fold(*first, |least, (_, z)| least.min(*z)),
+        to: at.iter().fold(*first, |most, (_, z)| most.max(*z)),
+    });
+    Some(RemainderReport { known_between, ..remainder_report(shape, used) })
+}
+
+/// Whether rows show a remainder that the base holds: without it they would lie farther from the base than scatter and
+/// allowances explain.
+fn recognised(weighing: &Weighing<'_>) -> Result<Option<RecognisedReport>, Failure> {
+    let foundation = weighing.foundation;
+    let subject = foundation.subject;
+    let held = subject.hypotheses().iter().enumerate().find_map(|(hypothesis, own)| {
+        let held = own.held.as_ref().filter(|_| own.cause.kind == REMAINDER)?;
+        let gone = Setting { hypothesis, values: held.values.iter().map(|value| -value).collect() };
+        Some((own.label.clone(), gone))
+    });
+    let Some((label, gone)) = held else { return Ok(None) };
+    let without = subject.predict(&[gone])?;
+    let left: Vec<f64> = without
+        .iter()
+        .zip(&foundation.data.value)
+        .zip(&foundation.residual)
+        .map(|((without, value), residual)| without.map_or(*residual, |without| value - without))
+        .collect();
+    let misfit = |left: &[f64]| {
+        let white = weighing.whitener.white(left);
+        white.inner(&white)
+    };
+    let rms = |left: &[f64]| {
+        let (sum, count) = (0..left.len())
+            .filter(|&row| weighing.keep[row])
+            .fold((0.0, 0.0), |(sum, count), row| (sum + left[row] * left[row], count + 1.0));
+        f64::sqrt(sum / f64::max(count, 1.0))
+    };
+    let sigmas = (misfit(&left) - misfit(&foundation.residual)).max(0.0).sqrt();
+    Ok((sigmas > CONFOUNDED_BELOW).then(|| RecognisedReport {
+        label,
+        error_without: rms(&left),
+        error_with: rms(&foundation.residual),
+        sigmas,
+    }))
 }
 
 /// Pairs of causes by their kinds.
@@ -237,6 +291,7 @@ fn remainder_report(shape: RemainderShape, used: &[usize]) -> RemainderReport {
         kind: shape.kind.to_owned(),
         over: shape.over,
         rms: shape.rms,
+        known_between: None,
         largest_at_row: row_number(used[shape.extreme_row]),
         value: shape.value,
         standard_deviation: shape.deviation,

@@ -57,6 +57,7 @@ pub(super) const EXPLANATION_CODES: &[&str] = &[
     "diagnosis_constant_values",
     "diagnosis_too_few_rows",
     "diagnosis_base_fails",
+    "diagnosis_recognised",
     "diagnosis_extended",
     "diagnosis_gain",
     "diagnosis_class_gain",
@@ -260,6 +261,15 @@ pub(super) fn explanation<E: utoipa::ToSchema, R: utoipa::ToSchema>(
             None => refused(output.refusal.as_ref(), output.rows.row.len()),
         },
     }];
+    if let Some(recognised) = &output.recognised {
+        said.push(
+            Message::new("diagnosis_recognised")
+                .with("label", recognised.label.clone())
+                .with("without", recognised.error_without)
+                .with("now", recognised.error_with)
+                .with("unit", if quantity.logarithmic { "" } else { quantity.unit }),
+        );
+    }
     let negligible: Vec<String> = output
         .contributions
         .iter()
@@ -282,10 +292,7 @@ pub(super) fn explanation<E: utoipa::ToSchema, R: utoipa::ToSchema>(
                 .with("then", next.separation_then_sigmas),
         );
     }
-    if matches!(output.extension, ExtensionKind::Average | ExtensionKind::Likeliest) {
-        let is_average = f64::from(u8::from(output.extension == ExtensionKind::Average));
-        said.push(Message::new("diagnosis_extended").with("average", is_average).with("effects", output.effects.len()));
-    }
+    said.extend(extended(output, quantity));
     if let Some(gain) = &output.gain {
         said.push(
             Message::new("diagnosis_gain")
@@ -311,6 +318,35 @@ pub(super) fn explanation<E: utoipa::ToSchema, R: utoipa::ToSchema>(
             .with("high", downstream.extended.interval_95[1])
     }));
     said
+}
+
+/// What the extended model is, where no cause is named by it.
+fn extended<E: utoipa::ToSchema, R: utoipa::ToSchema>(
+    output: &DiagnosisResult<E, R>,
+    quantity: &Quantity,
+) -> Option<Message> {
+    let kind = match output.extension {
+        ExtensionKind::None | ExtensionKind::Named => return None,
+        ExtensionKind::Average => "average",
+        ExtensionKind::Likeliest => "likeliest",
+        ExtensionKind::Remainder => "remainder",
+    };
+    let said = Message::new("diagnosis_extended").with("kind", kind).with("effects", output.effects.len());
+    let known = output.remainder.as_ref().filter(|_| output.extension == ExtensionKind::Remainder);
+    let deviations = known.map_or(&[][..], |remainder| remainder.standard_deviation.as_slice());
+    let square = deviations.iter().map(|deviation| deviation * deviation).sum::<f64>();
+    let between = known.and_then(|remainder| remainder.known_between.as_ref());
+    Some(
+        said.with("band", (square / deviations.len().max(1) as f64).sqrt())
+            .with("unit", if quantity.logarithmic { "" } else { quantity.unit })
+            .with("place", between.map_or_else(String::new, |between| between.field.clone()))
+            .with(
+                "unit_of_place",
+                between.map_or("", |between| between.field.rsplit('_').next().unwrap_or("")).to_owned(),
+            )
+            .with("from", between.map_or(0.0, |between| between.from))
+            .with("to", between.map_or(0.0, |between| between.to)),
+    )
 }
 
 /// What the extension gains where classes were measured.

@@ -26,6 +26,12 @@ pub trait Subject: Sync {
 
     /// What one standard deviation of every allowance does to the prediction.
     fn nuisances(&self) -> Result<Vec<JacobianColumn>, Failure>;
+
+    /// What one unit of something without a name, of the same size everywhere, does to the prediction; `None` where the model
+    /// has no effect for that.
+    fn unnamed(&self) -> Result<Option<JacobianColumn>, Failure> {
+        Ok(None)
+    }
 }
 
 /// A hypothesis with a value for each of its variables.
@@ -35,4 +41,31 @@ pub struct Setting {
     pub hypothesis: usize,
     /// In the order of [`Hypothesis::variables`].
     pub values: Vec<f64>,
+}
+
+/// What is believed to act beside the base.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Belief {
+    /// Causes with their values.
+    pub(super) settings: Vec<Setting>,
+    /// What has no name.
+    pub(super) waves: Option<Waves>,
+}
+
+/// Half waves over the length of a part, by ascending order from 0.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Waves {
+    /// Between which places they are known, shares of the length.
+    pub(super) ends: [f64; 2],
+    /// Their sizes, in the unit of the effect that stands for them.
+    pub(super) sizes: Vec<f64>,
+    /// At so many places they are given well enough.
+    pub(super) places: usize,
+}
+
+impl Belief {
+    /// Causes alone.
+    pub(super) fn of(settings: &[Setting]) -> Self {
+        Self { settings: settings.to_vec(), waves: None }
+    }
 }

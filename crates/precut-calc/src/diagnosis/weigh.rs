@@ -234,7 +234,7 @@ impl<'a> Weighing<'a> {
         if effort.other_optima {
             ranking.look_elsewhere(&linear, &refinement)?;
         }
-        let kinds = discrepancy::kinds(data, &linear.likelihood, noise.sigma, monitor)?;
+        let kinds = discrepancy::kinds(data, &linear.likelihood, noise.sigma, foundation.unnamed.as_deref(), monitor)?;
         let mut weighed = ranking.weigh(&linear, &kinds, monitor)?;
         let total = log_sum_exp(&weighed.iter().map(|set| set.0).collect::<Vec<_>>());
         weighed.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.1.members.cmp(&b.1.members)));

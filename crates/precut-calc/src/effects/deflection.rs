@@ -178,6 +178,37 @@ pub enum DeflectionEffect {
         #[schema(minimum = 0.0, maximum = 1000.0, example = 0.8, extensions(("x-unit" = json!("um")), ("x-symbol" = json!("sigma_s"))))]
         sd_um: f64,
     },
+    /// What no cause explains, as a diagnosis found it along the shaft or as it was measured: e += s r(z), straight between the
+    /// places, beyond them as at the ends.
+    Remainder {
+        /// What the user calls it.
+        #[serde(default, skip_serializing_if = "String::is_empty")]
+        #[schema(max_length = 64, example = "guideway of lathe 7")]
+        name: String,
+        /// How much of it acts: 1 as it was found.
+        #[serde(default = "as_found")]
+        #[schema(minimum = -10.0, maximum = 10.0, default = 1.0, example = 1.0, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("s"))))]
+        scale: f64,
+        /// Radial error along the shaft, by ascending places.
+        #[schema(min_items = 2, max_items = 65)]
+        profile: Vec<ErrorPoint>,
+    },
+}
+
+/// A radial error at a place.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ErrorPoint {
+    /// Station from the headstock end.
+    #[schema(minimum = -100_000.0, maximum = 100_000.0, example = 120.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("z"))))]
+    pub z_mm: f64,
+    /// Radial error there, positive = oversize.
+    #[schema(minimum = -1000.0, maximum = 1000.0, example = 3.5, extensions(("x-unit" = json!("um")), ("x-symbol" = json!("r"))))]
+    pub error_um: f64,
+}
+
+fn as_found() -> f64 {
+    1.0
 }
 
 fn wear_in_path_m() -> f64 {
@@ -224,10 +255,12 @@ impl DeflectionEffect {
             Self::SteadyRestOffset { .. } => 19,
             Self::UncutSideStiffness {} => 20,
             Self::SpindleScatter { .. } => 21,
+            Self::Remainder { .. } => 22,
         }
     }
 
-    /// The effect of a cause with the values of its parameters, in the order of the catalogue.
+    /// The effect of a cause with the values of its parameters, in the order of the catalogue. A remainder has none: its shape is
+    /// no number.
     pub fn from_parameters(cause: &Cause, values: &[f64]) -> Option<Self> {
         Some(match (cause.kind, values) {
             ("headstock_compliance", &[delta_um_per_n]) => Self::HeadstockCompliance { delta_um_per_n },
@@ -449,4 +482,5 @@ pub const CAUSES: &[Cause] = &[
         moves_mean: false,
         ..cause("spindle_scatter", "diagnosis/4.22", &[amplitude("sd_um", "um", 2.0, 0.0, 1000.0)], &[])
     },
+    cause("remainder", "diagnosis/4.23", &[amplitude("scale", "1", 1.0, -3.0, 3.0)], &[]),
 ];

@@ -9,7 +9,7 @@ mod fixture;
 mod machinability;
 mod ring;
 
-pub use deflection::{CAUSES as DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect};
+pub use deflection::{CAUSES as DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect, ErrorPoint};
 pub use fixture::{CAUSES as FIXTURE_CAUSES, FixtureConditions, FixtureEffect};
 pub use machinability::{CAUSES as MACHINABILITY_CAUSES, FactorLevel, MachinabilityConditions, MachinabilityEffect};
 pub(crate) use ring::whole;

@@ -67,6 +67,29 @@ pub fn draw_scattered(scatter: Scatter, class: Class, snr: f64, seed: u64) -> Tr
     drawn(scatter, class, snr, seed).trial
 }
 
+/// Diameter deviations of a shaft that the machine of a trial turns along a commanded path, in the regime of the job and without
+/// scatter: at each of these places, of a stated commanded diameter, um.
+pub fn turned_um(class: Class, snr: f64, seed: u64, path: &[(f64, f64)]) -> Vec<f64> {
+    let drawn = drawn(Scatter::Student, class, snr, seed);
+    let lathe = &drawn.lathe;
+    let (depth_mm, feed_mm_per_rev, speed_m_per_min) = REFERENCE;
+    let stock_mm = lathe.diameter_mm + 2.0 * depth_mm;
+    let at = |&(z, commanded_mm): &(f64, f64)| {
+        let run = Run {
+            depth_mm: 0.5 * (stock_mm - commanded_mm),
+            feed_mm_per_rev,
+            speed_m_per_min,
+            to_headstock: true,
+            path_at_start_m: 0.0,
+            warm_at_start_min: 0.0,
+        };
+        let elastic = elastic_um_per_n(lathe, z, &drawn.hidden, 1.0);
+        let opened_um = deviation_um(lathe, &run, 0, (z, elastic), &drawn.hidden, 1.0);
+        1e3 * (commanded_mm - lathe.diameter_mm) + opened_um
+    };
+    path.iter().map(at).collect()
+}
+
 /// A trial and what it was made of.
 struct Drawn {
     trial: Trial,
