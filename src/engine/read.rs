@@ -564,7 +564,9 @@ mod tests {
     fn a_large_body_has_the_faults_that_it_has_when_it_is_kept_whole() {
         let rows = |count: usize, bad: &[(usize, Value)]| {
             let mut rows = vec![json!({"z_mm": 1, "deviation_um": 2}); count];
-            bad.iter().for_each(|(index, row)| rows[*index] = row.clone());
+            for (index, row) in bad {
+                rows[*index] = row.clone();
+            }
             with("measurements", rows.into())
         };
         let bad = [

@@ -191,7 +191,6 @@ fn intervals_hold_the_truth_as_often_as_they_say() {
     }
     // 2000 draws at 95 %: a standard error of 0.5 %; intervals that are widened for readings that do not fit hold a little more.
     let share = f64::from(inside) / f64::from(of);
-    println!("{inside} of {of} intervals hold the truth");
     assert!((0.93..=0.97).contains(&share), "{share}");
 }
 

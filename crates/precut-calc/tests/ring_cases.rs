@@ -198,7 +198,7 @@ fn a_larger_range_of_revolutions_loses_no_setting() {
         json!({
             "ring": { "radius_mm": 150, "harmonics": [{ "order": 3, "amplitude_um": 50 }] },
             "supports": { "distance_mm": 200, "depth_mm": 111 },
-            "tool": { "x_mm": 100, "y_mm": 112.5, "feed_mm_per_rev": 0.005859375, "revolutions": 256 },
+            "tool": { "x_mm": 100, "y_mm": 112.5, "feed_mm_per_rev": 0.005_859_375, "revolutions": 256 },
             "analyses": ["settings_search"],
             "settings_search": {
                 "target_um": 5, "clearance_mm": 0.3, "allowance_mm": 0.5, "revolutions_max": revolutions_max

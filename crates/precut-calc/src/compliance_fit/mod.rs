@@ -73,7 +73,7 @@ impl Calculator for ComplianceFit {
         hallmarks: &[
             Hallmark::Count("/measurements"),
             Hallmark::Count("/supports"),
-            Hallmark::Of("/bar/segments/0/diameter_mm"),
+            Hallmark::Of("/bar/segments/*/diameter_mm"),
             Hallmark::Of("/gauge_error_um"),
         ],
         study_outputs: &["/fit/rms_um", "/fit/widened"],

@@ -10,7 +10,7 @@ pub(super) const TABLE_IDS: &[&str] = &["compliances", "rows"];
 
 /// Codes of titles, axes and legends.
 pub(super) const LABEL_CODES: &[&str] = &[
-    "row",
+    "gauge_row",
     "gauge_reading",
     "reading_measured",
     "reading_predicted",
@@ -48,7 +48,7 @@ pub(super) fn figures(job: &Job, outcome: &Outcome) -> Vec<Figure> {
         id: "readings",
         title: Message::new("gauge_readings"),
         frame: Frame::Stacked,
-        x: Axis::linear("row", "1"),
+        x: Axis::linear("gauge_row", "1"),
         panels: vec![panel(2.0, readings), panel(1.0, left)],
     }]
 }

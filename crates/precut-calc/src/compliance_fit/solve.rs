@@ -82,7 +82,9 @@ pub(super) fn told_apart(slopes: &Columns) -> Result<(), Vec<usize>> {
         if size == 0.0 {
             return Err(vec![j]);
         }
-        column.iter_mut().for_each(|entry| *entry /= size);
+        for entry in column {
+            *entry /= size;
+        }
     }
     let factors = Qr::pivoted(unit);
     let rank = factors.rank(SAME);

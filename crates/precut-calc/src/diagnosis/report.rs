@@ -58,8 +58,7 @@ pub(super) fn answer<M: Diagnosable>(
     stage(monitor, 0.2, "diagnosis_stage_search");
     let [effort, fold_effort] = efforts(&job.options, used.len(), bound.is_dear());
     let mut weighing = Weighing::of(&foundation, keep, effort, monitor)?;
-    let quantity = M::QUANTITIES.iter().find(|known| known.name == job.quantity);
-    let quantity = quantity.ok_or_else(|| Failure::Internal(format!("{} is no quantity", job.quantity)))?;
+    let quantity = quantity::<M>(job)?;
     let mut refusal = refusal::<M>(job, &foundation, &weighing);
     let is_quiet = weighing.none >= QUIET && matches!(weighing.verdict, Verdict::Adequate);
     let blunders = if refusal.is_some() || is_quiet || bound.is_dear() {
@@ -150,6 +149,12 @@ pub(super) fn answer<M: Diagnosable>(
         explanation.into_iter().map(|message| in_particular(message, &output, &contenders, quantity)).collect();
     stage(monitor, 1.0, "stage_done");
     Ok(Answer { output, warnings, explanation, basis: basis() })
+}
+
+/// The quantity that a checked job names.
+fn quantity<M: Diagnosable>(job: &JobOf<M>) -> Result<&'static Quantity, Failure> {
+    let named = M::QUANTITIES.iter().find(|known| known.name == job.quantity);
+    named.ok_or_else(|| Failure::Internal(format!("{} is no quantity", job.quantity)))
 }
 
 /// How far is searched over all rows, and in every fold.

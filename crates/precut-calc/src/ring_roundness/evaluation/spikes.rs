@@ -49,7 +49,9 @@ pub(super) fn spikes(distances_mm: &[f64], goes_on: &dyn Fn() -> bool) -> Result
             return Ok(Vec::new());
         }
         bridged.copy_from_slice(distances_mm);
-        runs(&off).iter().for_each(|run| bridge(run, &mut bridged));
+        for run in &runs(&off) {
+            bridge(run, &mut bridged);
+        }
     }
     Ok(runs(&off))
 }
