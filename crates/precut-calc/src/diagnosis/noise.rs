@@ -193,6 +193,7 @@ pub(super) fn between_sweeps(data: &Data, residual: &[f64], keep: &[bool]) -> Op
     }
     let sweeps = data.layout.kept_traces(keep);
     let mut runs: Vec<usize> = sweeps.iter().map(|(run, _)| *run).collect();
+    runs.sort_unstable();
     runs.dedup();
     let (mut sum, mut dof) = (0.0, 0.0);
     for run in runs {
@@ -274,7 +275,8 @@ fn told_of_scatter(data: &Data, residual: &[f64], keep: &[bool], by_differences:
     let columns = |rows: &[usize], count: usize| orthonormal(smooth_columns(smooth, rows, count));
     let whole = |rows: &[usize]| columns(rows, smooth_order(smooth, rows.len()));
     let of_difference = OF_DIFFERENCE[usize::from(matches!(smooth, Smooth::Around(_)))];
-    let sweeps = data.layout.kept_traces(keep);
+    let mut sweeps = data.layout.kept_traces(keep);
+    sweeps.sort_by_key(|(run, _)| *run);
     let mut told = Vec::with_capacity(sweeps.len());
     let mut rest = sweeps.as_slice();
     while let Some((run, first)) = rest.first() {
