@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 use super::basis::{dot, orthonormal, smooth_columns};
 use super::data::Data;
@@ -20,7 +20,7 @@ const FOURIER_ORDERS: usize = 12;
 /// Pure-error degrees of freedom that suffice on their own.
 const ENOUGH_REPEATS: f64 = 10.0;
 
-/// Probability of so much scatter below which rows contradict what was stated.
+/// Probability of so much scatter below which rows contradict what was stated, or what sweeps differ by.
 const BY_CHANCE: f64 = 0.01;
 
 /// Scatter of single rows.
@@ -231,17 +231,37 @@ pub(super) fn between_sweeps(data: &Data, residual: &[f64], keep: &[bool]) -> Op
 /// (1 + rho)/(1 - rho) times that of rows that know nothing of each other. The mean of that ratio over the likelihood, with a
 /// prior of 2 (1 - rho), is taken, not its value at the likeliest rho: a rho that is too small by chance makes chance look like
 /// a cause.
+///
+/// Sweeps that share structure finer than the columns taken out (see [`is_finer_structure`]) are looked at one by one: their
+/// differences would tell of a scatter that is none of the rows'.
 fn profile(data: &Data, residual: &[f64], keep: &[bool]) -> Noise {
-    let traces = told_of_scatter(data, residual, keep);
-    if traces.is_empty() {
+    let Some(alone) = weighed(&told_of_scatter(data, residual, keep, false)) else {
         return unordered(data, residual, keep);
+    };
+    let between = between_sweeps(data, residual, keep);
+    match between.filter(|between| !is_finer_structure((alone.sigma, alone.dof), *between)) {
+        Some(_) => weighed(&told_of_scatter(data, residual, keep, true)).unwrap_or(alone),
+        None => alone,
     }
-    let tried = CORRELATIONS.map(|rho| (restricted(&traces, rho).0 + (1.0 - rho).ln(), (1.0 + rho) / (1.0 - rho)));
+}
+
+/// Whether rows scatter beyond what sweeps differ by, each with its degrees of freedom, more than chance lets them.
+pub(super) fn is_finer_structure((sigma, dof): (f64, f64), (between, dof_between): (f64, f64)) -> bool {
+    between > 0.0
+        && FisherSnedecor::new(dof, dof_between).is_ok_and(|law| law.sf((sigma / between).powi(2)) < BY_CHANCE)
+}
+
+/// Scatter at the correlation that its likelihood tells; `None` without traces.
+fn weighed(traces: &[Told]) -> Option<Noise> {
+    if traces.is_empty() {
+        return None;
+    }
+    let tried = CORRELATIONS.map(|rho| (restricted(traces, rho).0 + (1.0 - rho).ln(), (1.0 + rho) / (1.0 - rho)));
     let most = tried.iter().map(|(log_l, _)| *log_l).fold(f64::NEG_INFINITY, f64::max);
-    let weighed = tried.iter().map(|(log_l, ratio)| ((log_l - most).exp(), ratio));
-    let (sum, weight) = weighed.fold((0.0, 0.0), |(sum, all), (weight, ratio)| (sum + weight * ratio, all + weight));
+    let shares = tried.iter().map(|(log_l, ratio)| ((log_l - most).exp(), ratio));
+    let (sum, weight) = shares.fold((0.0, 0.0), |(sum, all), (share, ratio)| (sum + share * ratio, all + share));
     let ratio = sum / weight;
-    restricted(&traces, (ratio - 1.0) / (ratio + 1.0)).1
+    Some(restricted(traces, (ratio - 1.0) / (ratio + 1.0)).1)
 }
 
 /// A trace that scatters as its rows do, and the orthonormal smooth columns that say nothing of that.
@@ -250,12 +270,11 @@ type Told = (Vec<f64>, Vec<Vec<f64>>);
 /// What the rows tell of their scatter: each sweep beside its smooth part. Sweeps of one run over the same places share what is
 /// smooth: of T of them their sum over sqrt(T) has a smooth part, and T - 1 differences, orthonormal (Helmert), have none
 /// but for the gauge. Only those show how far long waves scatter.
-fn told_of_scatter(data: &Data, residual: &[f64], keep: &[bool]) -> Vec<Told> {
+fn told_of_scatter(data: &Data, residual: &[f64], keep: &[bool], by_differences: bool) -> Vec<Told> {
     let (smooth, cell) = (&data.layout.design.smooth, &data.layout.design.cell);
     let columns = |rows: &[usize], count: usize| orthonormal(smooth_columns(smooth, rows, count));
     let whole = |rows: &[usize]| columns(rows, smooth_order(smooth, rows.len()));
     let of_difference = OF_DIFFERENCE[usize::from(matches!(smooth, Smooth::Around(_)))];
-    // Those of a run together, in whatever order they came.
     let mut sweeps = data.layout.kept_traces(keep);
     sweeps.sort_by_key(|(run, _)| *run);
     let mut told = Vec::with_capacity(sweeps.len());
@@ -268,7 +287,8 @@ fn told_of_scatter(data: &Data, residual: &[f64], keep: &[bool]) -> Vec<Told> {
             rows.len() == first.len() && rows.iter().zip(first).all(|(&row, &other)| cell[row] == cell[other])
         };
         // Of a short sweep a difference would keep no row.
-        if first.len() <= 4 * of_difference || !own.iter().all(|(_, rows)| is_like_first(rows)) {
+        let is_long = first.len() > 4 * of_difference;
+        if !by_differences || !is_long || !own.iter().all(|(_, rows)| is_like_first(rows)) {
             told.extend(own.iter().map(|(_, rows)| (values(rows), whole(rows))));
             continue;
         }

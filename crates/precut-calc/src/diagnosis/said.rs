@@ -1,14 +1,12 @@
 //! What is said about an answer: warnings, and the verdict in a sentence.
 
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
-
 use super::adequacy::TestKind;
 use super::blunder::BlunderReport;
 use super::classes;
 use super::extension::ExtensionKind;
 use super::identify::{COLLINEAR_ABOVE, CONFOUNDED_BELOW};
 use super::input::DiagnosisOptions;
-use super::noise::NoiseSource;
+use super::noise::{NoiseSource, is_finer_structure};
 use super::outlier::Outliers;
 use super::output::{CauseReport, DiagnosisResult, NamedCause, Refusal, SetReport, VerdictClass};
 use super::refuse::{most_causes, rows_for};
@@ -16,8 +14,6 @@ use super::suspect::swapped_columns;
 use super::weigh::{ALARM, UNNAMED, UNNAMED_MATTERS, Weighing};
 use crate::calculator::{Basis, Finding, Message, Quantity, Smooth, Value};
 
-/// Probability of a scatter so much larger than between sweeps by chance, below which rows have structure that sweeps share.
-const FINER: f64 = 0.01;
 /// Difference of the information criterion that is more than a bare mention (Raftery).
 const BIC_MATTERS: f64 = 2.0;
 /// Copied rows that are named by their numbers.
@@ -164,9 +160,7 @@ pub(super) fn doubts<E: utoipa::ToSchema, R: utoipa::ToSchema>(
     let noise = &output.noise;
     if let (Some(between), Some(dof), Some(of_rows)) =
         (noise.between_sweeps, noise.between_sweeps_degrees_of_freedom, noise.degrees_of_freedom)
-        && between > 0.0
-        && FisherSnedecor::new(of_rows, dof)
-            .is_ok_and(|law| law.sf((noise.standard_deviation / between).powi(2)) < FINER)
+        && is_finer_structure((noise.standard_deviation, of_rows), (between, dof))
     {
         doubts.push(
             Finding::new("finer_structure", "/measurements")
