@@ -3,10 +3,9 @@
 use std::sync::OnceLock;
 
 use rayon::prelude::*;
-use serde::{Serialize, de::DeserializeOwned};
 
 use super::input::{DiagnosisOptions, PriorWeight};
-use super::known::Known;
+use super::known::{Known, with_numbers};
 use super::subject::{Belief, Setting, Subject, Waves};
 use crate::calculator::{
     Diagnosable, Expansions, Failure, Held, Hypotheses, Hypothesis, Inapplicability, Inapplicable, JacobianColumn,
@@ -235,18 +234,6 @@ impl<'a, M: Diagnosable> Bound<'a, M> {
 fn put<E>(effects: &mut Vec<E>, effect: E) {
     effects.retain(|own| std::mem::discriminant(own) != std::mem::discriminant(&effect));
     effects.push(effect);
-}
-
-/// An effect with other numbers in some of its fields.
-fn with_numbers<E: Serialize + DeserializeOwned>(
-    effect: &E,
-    numbers: impl Iterator<Item = (&'static str, f64)>,
-) -> Option<E> {
-    let mut fields = serde_json::to_value(effect).ok()?;
-    for (name, number) in numbers {
-        *fields.get_mut(name)? = number.into();
-    }
-    serde_json::from_value(fields).ok()
 }
 
 /// The causes that rows can speak about; those that the base has already as changes of what it has.

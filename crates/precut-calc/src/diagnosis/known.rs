@@ -116,6 +116,18 @@ impl Direction {
     }
 }
 
+/// An effect with other numbers in some of its fields.
+pub(super) fn with_numbers<E: Serialize + DeserializeOwned>(
+    effect: &E,
+    numbers: impl Iterator<Item = (&'static str, f64)>,
+) -> Option<E> {
+    let mut fields = serde_json::to_value(effect).ok()?;
+    for (name, number) in numbers {
+        *fields.get_mut(name)? = number.into();
+    }
+    serde_json::from_value(fields).ok()
+}
+
 /// What independent directions leave open of the effects that are believed, in their own parameters. Where an effect
 /// ends at a bound it is looked at from one side.
 pub(super) fn left_open<E: Serialize>(
