@@ -53,7 +53,8 @@ impl Draft {
     /// Of a body.
     pub(crate) fn of(entry: &Entry, body: &Body, (registry, room): (&Registry, &Room)) -> Result<Self, Error> {
         let (Body::Json(job) | Body::Parts { job, .. }) = body;
-        if job.len() <= KEPT_WHOLE {
+        // What a study asks of a row is asked at its points, which may fill in what its base leaves out.
+        if job.len() <= KEPT_WHOLE || entry.is_composed() {
             return Self::whole(entry, body, (registry, room));
         }
         let shape = entry.shape_of_named(job).unwrap_or_else(|| registry.shape_of(entry));
