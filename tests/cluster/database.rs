@@ -152,12 +152,20 @@ impl Member {
         self.post_to(&format!("/v1/{}", toy::BAR), job)
     }
 
-    /// Sends something that shall be done behind; its address.
+    /// Sends something that shall be done behind, and again while the answer is that the database was too busy for it, as
+    /// 503 asks of a client; its address.
     pub async fn accepted(&self, path: &str, job: &Value) -> String {
-        let response = self.post_to(path, job).header("prefer", "respond-async").send().await.unwrap();
-        let address = header(&response, "location").to_owned();
-        assert_eq!(response.status(), StatusCode::ACCEPTED, "{}", response.text().await.unwrap());
-        address
+        until("acceptance", async || {
+            let response = self.post_to(path, job).header("prefer", "respond-async").send().await.unwrap();
+            if response.status() == StatusCode::SERVICE_UNAVAILABLE {
+                tokio::time::sleep(Duration::from_secs(header(&response, "retry-after").parse().unwrap())).await;
+                return None;
+            }
+            let address = header(&response, "location").to_owned();
+            assert_eq!(response.status(), StatusCode::ACCEPTED, "{}", response.text().await.unwrap());
+            Some(address)
+        })
+        .await
     }
 
     pub async fn job(&self, address: &str) -> Value {
