@@ -304,7 +304,9 @@ impl<'a> Strict<'a> {
     /// whole is read before anything is said of it.
     fn check_beyond(self, beyond: &Beyond, item: &Value, index: usize) {
         beyond.is_any.set(true);
-        if let [rules] = self.shape.item_rules() {
+        if let [rules] = self.shape.item_rules()
+            && self.shape.holds_item(index)
+        {
             rules.check(item, || format!("/{index}"), &mut beyond.faults.borrow_mut());
         }
     }

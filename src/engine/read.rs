@@ -11,9 +11,9 @@ use super::error::Error;
 use super::json::{Parsed, ParsedHead};
 use super::model::{self, Held};
 use super::names::{self, Asks, Drawn, Names};
-use super::{Body, Checked, TablePart, json, table};
+use super::{Body, Checked, TablePart, json, study, table};
 use crate::key::Key;
-use crate::registry::{Entry, Faults, Prepared, Registry, Unprepared, by_pointer};
+use crate::registry::{Entry, Faults, Prepared, Registry, Shape, Unprepared, by_pointer};
 use crate::store::documents::KeptDocument;
 
 /// A job that can run, with the address of its answer.
@@ -53,12 +53,26 @@ impl Draft {
     /// Of a body.
     pub(crate) fn of(entry: &Entry, body: &Body, (registry, room): (&Registry, &Room)) -> Result<Self, Error> {
         let (Body::Json(job) | Body::Parts { job, .. }) = body;
-        // What a study asks of a row is asked at its points, which may fill in what its base leaves out.
-        if job.len() <= KEPT_WHOLE || entry.is_composed() {
+        if job.len() <= KEPT_WHOLE {
             return Self::whole(entry, body, (registry, room));
+        }
+        if entry.is_composed() {
+            return Self::of_study(entry, job, (registry, room));
         }
         let shape = entry.shape_of_named(job).unwrap_or_else(|| registry.shape_of(entry));
         let ParsedHead { parsed, beyond } = json::parse_head(job, shape, room)?;
+        Ok(Self { job: parsed.value, left_out: parsed.left_out, beyond, imposed: None })
+    }
+
+    /// Of a large study. Where it cannot be told whose job it varies, nothing of the job is kept: the study is refused, whatever
+    /// it is.
+    fn of_study(entry: &Entry, body: &[u8], (registry, room): (&Registry, &Room)) -> Result<Self, Error> {
+        let (shape, is_whole) = match study::shape(registry, entry, body) {
+            Some(shape) => (shape, true),
+            None => (registry.shape_of(entry).clone().with_field("job", Shape::default()), false),
+        };
+        let ParsedHead { parsed, beyond } = json::parse_head(body, &shape, room)?;
+        let beyond = if is_whole { beyond } else { Some(beyond.unwrap_or_default()) };
         Ok(Self { job: parsed.value, left_out: parsed.left_out, beyond, imposed: None })
     }
 
@@ -142,6 +156,8 @@ fn held_to_schema(
     let Resolved { mut job, of_names, of_model, .. } = Resolved::of(entry, job, names);
     let found = check_schema(entry, &mut job, (parts, &names.room)).err().unwrap_or_else(|| Found::of(Vec::new()));
     let found = Found { total: found.total + left_out + beyond.total, ..found }.listing(beyond.listed);
+    names::enclose(entry, &mut job, &names.found);
+    let found = found.and(entry.faults_of_head(&job));
     let found = if of_names.is_empty() { found } else { found.without_missing() };
     let found = found.and(of_names).and(of_model);
     if found.total == 0 { Ok(()) } else { Err(found.told()) }

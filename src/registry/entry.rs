@@ -372,7 +372,11 @@ impl Entry {
     /// What the job in a body may be made of, where it names one of several calculators.
     pub(crate) fn shape_of_named(&self, body: &[u8]) -> Option<&Shape> {
         let named: family::Named = serde_json::from_slice(body).ok().filter(|_| !self.members().is_empty())?;
-        self.members().iter().find(|of| of.calculator == named.calculator).map(Member::shape)
+        self.shape_of_member(&named.calculator)
+    }
+    /// What the job of one of several calculators may be made of.
+    pub(crate) fn shape_of_member(&self, calculator: &str) -> Option<&Shape> {
+        self.members().iter().find(|of| of.calculator == calculator).map(Member::shape)
     }
     /// The fields of the job that may name records: of the job itself, or of the base job of a diagnosis of that calculator.
     pub(crate) fn job_fields(&self, calculator: &str) -> &Value {
@@ -420,6 +424,10 @@ impl Entry {
     /// The rules between fields that a job breaks which the schema refuses; none where it cannot be read at all.
     pub(crate) fn broken_rules(&self, job: &Value) -> Vec<Finding> {
         self.of_job(job).map(|entry| entry.calculation.broken_rules(job)).unwrap_or_default()
+    }
+    /// What is wrong with a job that stands inside, of which the heads of long lists are there.
+    pub(crate) fn faults_of_head(&self, job: &Value) -> Vec<Finding> {
+        self.calculation.faults_of_head(job)
     }
     /// The pictures of a result, from its job and its envelope as JSON.
     pub(crate) fn figures(&self, input: &[u8], envelope: &[u8]) -> Result<Vec<Figure>, UnreadableResult> {
@@ -543,6 +551,10 @@ pub(crate) struct Moved {
 pub(crate) trait Calculation: Send + Sync {
     fn prepare(&self, job: &Value) -> Result<Prepared, Unprepared>;
     fn broken_rules(&self, job: &Value) -> Vec<Finding>;
+    /// What is wrong with a job that stands inside, of which the heads of long lists are there.
+    fn faults_of_head(&self, _job: &Value) -> Vec<Finding> {
+        Vec::new()
+    }
     fn figures(&self, input: &[u8], envelope: &[u8]) -> Result<Vec<Figure>, UnreadableResult>;
     fn tables(&self, input: &[u8], envelope: &[u8]) -> Result<Vec<Table>, UnreadableResult>;
     fn program(&self, input: &[u8], envelope: &[u8]) -> Result<MaybeProgram, UnreadableResult>;

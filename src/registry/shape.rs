@@ -3,8 +3,8 @@
 //!
 //! A shape is wider than the schema: the variants of a union are one. What does not fit a shape breaks the schema.
 
-use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use serde_json::Value;
@@ -27,6 +27,8 @@ pub(crate) struct Shape {
     most_items: Option<usize>,
     /// What the items of a long list have to be, by the variants of the place.
     rules: Vec<Arc<ItemRules>>,
+    /// Items that are not held to them.
+    spared: BTreeSet<usize>,
     /// A text of any words may stand here.
     text: bool,
     /// Nothing is said of what stands here.
@@ -42,6 +44,7 @@ static OPEN: Shape = Shape {
     items: None,
     most_items: None,
     rules: Vec::new(),
+    spared: BTreeSet::new(),
     text: true,
     open: true,
     optional: false,
@@ -106,6 +109,17 @@ impl Shape {
     pub(crate) fn with_field(mut self, name: &str, field: Self) -> Self {
         self.fields.insert(name.to_owned(), field);
         self
+    }
+
+    /// Holds no item to anything that a way leads into.
+    pub(crate) fn spare(&mut self, way: &[String]) {
+        let Some((step, rest)) = way.split_first() else { return };
+        if let Some(field) = self.fields.get_mut(step) {
+            field.spare(rest);
+        } else if let (Some(items), Ok(index)) = (&mut self.items, step.parse()) {
+            self.spared.insert(index);
+            items.spare(rest);
+        }
     }
 
     fn add(&mut self, strict: &Value) {
@@ -183,6 +197,11 @@ impl Shape {
     /// What the items of a long list have to be, by the variants of the place; nothing where no list is long.
     pub(crate) fn item_rules(&self) -> &[Arc<ItemRules>] {
         &self.rules
+    }
+
+    /// Whether the item at `index` is held to them.
+    pub(crate) fn holds_item(&self, index: usize) -> bool {
+        !self.spared.contains(&index)
     }
 
     /// Whether a text of any length may stand here.

@@ -39,6 +39,12 @@ fn rows(rows: usize) -> String {
     format!("{{\"measurements\":[{}{{}}]}}", "{\"z_mm\":1,\"sag_um\":1},".repeat(rows))
 }
 
+/// A study of a job.
+fn study_of(job: &str) -> String {
+    let vary = "[{\"pointer\":\"/length_mm\",\"values\":[100,200]}]";
+    format!("{{\"calculator\":\"sagging-bar\",\"job\":{job},\"vary\":{vary}}}")
+}
+
 /// The worst bodies that are known, by name, with what each may take beside what the process takes at rest, by its size.
 fn worst() -> Vec<(&'static str, &'static str, String, f64)> {
     let bar = "/v1/sagging-bar";
@@ -71,6 +77,12 @@ fn worst() -> Vec<(&'static str, &'static str, String, f64)> {
         ("a study of too many rows", studies, body(&study("\"job\":{\"measurements\":["), "{},", "{}]}}"), 3.0),
         ("a study of too many values", studies, body(&study("\"vary\":[{\"values\":["), "[],", "[]]}]}"), 3.0),
         ("rows without a field", bar, body("{\"measurements\":[", "{\"z_mm\":0},", "{}]}"), 3.0),
+        (
+            "a study of rows without a field",
+            studies,
+            study_of(&format!("{{\"measurements\":[{}{{}}]}}", "{\"z_mm\":0},".repeat(99_000))),
+            3.0,
+        ),
     ]
 }
 
@@ -80,6 +92,13 @@ fn nearly_right() -> Vec<(&'static str, &'static str, String, f64)> {
     vec![
         ("a table with a bad cell at its end", bar, table(99_000, "1,1\\n", "1,x\"}}"), 3.0),
         ("rows with a bad one at their end", bar, rows(99_000), 3.0),
+        ("a study of rows with a bad one at their end", "/v1/studies", study_of(&rows(99_000)), 3.0),
+        (
+            "a study of a table with a bad cell at its end",
+            "/v1/studies",
+            study_of(&table(99_000, "1,1\\n", "1,x\"}}")),
+            3.0,
+        ),
     ]
 }
 
@@ -106,8 +125,8 @@ async fn no_body_takes_much_more_memory_than_its_bytes() {
         let service = Service::start(folder.path(), &[("PRECUT_CPU", "2")]).await;
         let process = service.process.child.id();
         // What is made for the first job of each kind is no matter of its body.
-        for small in ["{}", "{\"measurements\":{\"csv\":\"z_mm,sag_um\\n1,x\"}}"] {
-            assert_eq!(sent(&service.client, service.url(path), small.to_owned()).await.0, 422);
+        for small in [table(1, "", "1,x\"}}"), study_of(&table(1, "", "1,x\"}}")), "{}".to_owned()] {
+            assert_eq!(sent(&service.client, service.url(path), small).await.0, 422);
         }
         std::fs::write(format!("/proc/{process}/clear_refs"), "5").unwrap();
         let at_rest = memory(process, "VmRSS");

@@ -6,6 +6,8 @@ use utoipa::ToSchema;
 use utoipa::openapi::schema::{ArrayBuilder, ObjectBuilder, SchemaType, Type};
 use utoipa::openapi::{Array, Object};
 
+/// Most variables of a study, as its schema has them.
+pub(crate) const MOST_VARIABLES: usize = 3;
 /// Most outputs of a study.
 pub(crate) const MOST_OUTPUTS: usize = 16;
 

@@ -8,6 +8,7 @@ mod check;
 mod expand;
 mod faults;
 mod figure;
+mod head;
 mod host;
 mod in_engine;
 mod input;
@@ -23,6 +24,7 @@ mod table;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use head::shape;
 pub(crate) use host::{Alone, Host};
 pub(crate) use in_engine::InEngine;
 
@@ -38,6 +40,7 @@ use input::StudyInput;
 use plan::Plan;
 use result::StudyResult;
 
+use crate::engine::names;
 use crate::key::Key;
 use crate::registry::{
     Calculation, Entry, Job, Prepared, Registry, ResultNotes, Unprepared, UnreadableResult, canonical, second_line,
@@ -119,6 +122,13 @@ impl Calculation for Studies {
     fn broken_rules(&self, job: &Value) -> Vec<Finding> {
         let Ok(input) = StudyInput::deserialize(job) else { return Vec::new() };
         Plan::new(&self.registry, self.most_points, input).err().unwrap_or_default()
+    }
+
+    fn faults_of_head(&self, job: &Value) -> Vec<Finding> {
+        let Ok(input) = StudyInput::deserialize(job) else { return Vec::new() };
+        let Some(entry) = self.registry.entry(&input.calculator) else { return Vec::new() };
+        let fields = check::variables(entry, &input, &mut Vec::new());
+        check::job(entry, &input, &fields, &names::enclosed(input.records.as_ref()))
     }
 
     fn figures(&self, _input: &[u8], envelope: &[u8]) -> Result<Vec<Figure>, UnreadableResult> {

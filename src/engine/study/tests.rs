@@ -189,6 +189,43 @@ fn a_study_of_a_billion_points_is_refused_with_limit_and_count() {
 }
 
 #[test]
+fn a_large_study_has_the_faults_of_its_rows_and_spares_those_that_a_variable_leads_into() {
+    // Blanks make it large: of its lists the heads are kept at first.
+    let large = |study: &Value| Body::Json((study.to_string() + &" ".repeat(100_000)).into());
+    let read = |study: &Value| match check_now(&toy::registry(), STUDIES, large(study)) {
+        Ok(checked) => Ok(checked.key),
+        Err(Error::Invalid { findings, total }) => {
+            assert_eq!(total, findings.len());
+            Err(findings.into_iter().map(|finding| (finding.code, finding.pointer)).collect::<Vec<_>>())
+        }
+        other => panic!("{other:?}"),
+    };
+    let with_rows = |bad: &[usize], pointer: &str| {
+        let rows: Vec<Value> = (0..600)
+            .map(|row| if bad.contains(&row) { json!({"z_mm": 1}) } else { json!({"z_mm": 1, "deviation_um": 2}) })
+            .collect();
+        let mut study = study(json!([{"pointer": pointer, "values": [500, 501]}]));
+        study["job"]["measurements"] = rows.into();
+        study
+    };
+    let good = with_rows(&[], "/length_mm");
+    assert_eq!(read(&good), Ok(check_now(&toy::registry(), STUDIES, body(&good)).unwrap().key));
+    for bad in [&[3][..], &[300], &[3, 300, 599]] {
+        let study = with_rows(bad, "/length_mm");
+        let places: Vec<_> =
+            bad.iter().map(|row| ("missing_field", format!("/job/measurements/{row}/deviation_um"))).collect();
+        assert_eq!((faults(&study), read(&study)), (places.clone(), Err(places)));
+    }
+    for row in [3, 300] {
+        let filled_in = with_rows(&[row], &format!("/measurements/{row}/deviation_um"));
+        assert_eq!(read(&filled_in), Ok(check_now(&toy::registry(), STUDIES, body(&filled_in)).unwrap().key));
+    }
+    let mut nobodys = with_rows(&[3], "/length_mm");
+    nobodys["calculator"] = json!("nobodys");
+    assert_eq!(read(&nobodys), Err(faults(&nobodys)));
+}
+
+#[test]
 fn a_variable_without_values_hides_no_other_that_has_too_many() {
     let vast = json!({"pointer": "/work_ms", "from": 1, "to": 2, "count": 1_u64 << 53});
     for (empty, fault) in [
