@@ -5,6 +5,7 @@
 //! inside; micrometres and degrees only at the border, where every field's name carries its unit.
 
 pub mod calculator;
+pub mod certainty;
 pub mod compliance_fit;
 pub mod deflection_compensation;
 pub mod diagnosis;

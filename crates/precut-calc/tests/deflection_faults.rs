@@ -5,7 +5,7 @@ use precut_calc::calculator::{Check, Finding, Value as Said, Violations};
 use precut_calc::deflection_compensation::Job;
 use serde_json::{Value, json};
 
-fn faults(job: Value) -> Vec<Finding> {
+pub(crate) fn faults(job: Value) -> Vec<Finding> {
     let job: Job = serde_json::from_value(job).unwrap();
     let mut violations = Violations::default();
     job.check(&mut violations);

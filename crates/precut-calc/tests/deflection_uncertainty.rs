@@ -34,17 +34,18 @@ fn job(length_mm: f64, diameter_mm: f64, more: &Value) -> Value {
 }
 
 /// The job with all forces multiplied.
-fn with_force(job: &Value, factor: f64) -> Value {
+pub(crate) fn with_force(job: &Value, factor: f64) -> Value {
     let mut job = job.clone();
     for component in ["passive", "main", "feed"] {
-        let coefficient = &mut job["force"][component]["coefficient"];
-        *coefficient = json!(coefficient.as_f64().unwrap() * factor);
+        if let Some(coefficient) = job.pointer_mut(&format!("/force/{component}/coefficient")) {
+            *coefficient = json!(coefficient.as_f64().unwrap() * factor);
+        }
     }
     job
 }
 
 /// The job with all compliances multiplied: of the shaft, of what holds it and of the carriage.
-fn with_compliance(job: &Value, factor: f64) -> Value {
+pub(crate) fn with_compliance(job: &Value, factor: f64) -> Value {
     let mut job = job.clone();
     let modulus = &mut job["shaft"]["youngs_modulus_n_per_mm2"];
     *modulus = json!(modulus.as_f64().unwrap() / factor);
@@ -62,7 +63,7 @@ fn with_compliance(job: &Value, factor: f64) -> Value {
 }
 
 /// Diameter deviations, um, with given commands.
-fn cut_with(job: &Value, z: &[f64], commands: &[Option<f64>]) -> Vec<f64> {
+pub(crate) fn cut_with(job: &Value, z: &[f64], commands: &[Option<f64>]) -> Vec<f64> {
     let row = |(z, d): (&f64, &Option<f64>)| json!({ "z_mm": z, "diameter_mm": d.unwrap() });
     let path: Vec<Value> = z.iter().zip(commands).map(row).collect();
     let run: DeflectionRun = serde_json::from_value(json!({ "commanded_path": path })).unwrap();

@@ -15,6 +15,7 @@ mod conformance;
 mod cylinder_fits;
 mod cylindricity_evaluation;
 mod deflection_advice;
+mod deflection_certainty;
 mod deflection_clocks;
 mod deflection_defaults;
 mod deflection_effects;

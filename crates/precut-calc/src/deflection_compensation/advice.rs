@@ -5,10 +5,12 @@ use crate::force::{Reached, ReachedCut};
 
 use super::acting::Acting;
 use super::auto::settled;
+use super::conformance;
 use super::driven::Again;
 use super::encounters::{Reach, body, met};
 use super::extremes::Extremes;
-use super::form::Form;
+
+use super::form::{Deviation, Form};
 use super::grid::Grid;
 use super::input::{Job, Segment, Support, Theory};
 use super::model::{OpeningParts, at};
@@ -224,6 +226,10 @@ pub(super) fn explanation(job: &Job, outcome: &Outcome, seen_along: &SeenAlong) 
         Some(decision) => vec![decision, dominating, nominal],
         None => vec![nominal, dominating],
     };
+    if let Some(conformance) = &outcome.conformance {
+        let place = usize::from(said.len() > 2);
+        said.splice(place..place, conformance::said(conformance));
+    }
     if let Some(path) = &outcome.path {
         said.push(match (outcome.form_error_after_um, outcome.largest_error_after_um) {
             (Some(form), Some(largest)) => Message::new("compensated_path_leaves")
@@ -448,6 +454,7 @@ pub(super) fn warnings(
     }
     found.extend(missed_tolerances(job, outcome));
     found.extend(soundness::warnings(job, grid, stage, outcome, uncertainty_um));
+    found.extend(outcome.conformance.iter().flat_map(conformance::warnings));
     found
 }
 
@@ -458,15 +465,23 @@ fn missed_tolerances(job: &Job, outcome: &Outcome) -> Vec<Finding> {
         (value > limit).then(|| Finding::new(code, pointer).measured(value, limit, "um"))
     };
     let tolerance = &job.tolerance;
-    let (form, size) = (outcome.form_error_after_um, outcome.largest_error_after_um.map(f64::abs));
-    let half = tolerance.diameter_um.map(|whole| whole / 2.0);
-    [
-        missed("form_tolerance_missed", "/tolerance/form_um", form, tolerance.form_um),
-        missed("size_tolerance_missed", "/tolerance/diameter_um", size, half),
-    ]
-    .into_iter()
-    .flatten()
-    .collect()
+    let limits = tolerance.size();
+    let after = outcome.after.as_ref();
+    let of = |deviation: Option<Deviation>| deviation.map(|deviation| deviation.diameter_error_um);
+    let (largest, smallest) = (of(after.and_then(|form| form.largest)), of(after.and_then(|form| form.smallest)));
+    let beyond = |sign: f64, value: Option<f64>, limit: Option<f64>| {
+        let (value, limit) = (value?, limit?);
+        (sign * (value - limit) > 0.0).then_some((value, limit))
+    };
+    let size =
+        beyond(1.0, largest, limits.upper_um).or(beyond(-1.0, smallest, limits.lower_um)).map(|(value, limit)| {
+            let pointer = tolerance.size_pointer().unwrap_or("/tolerance");
+            Finding::new("size_tolerance_missed", pointer).measured(value.abs(), limit.abs(), "um")
+        });
+    [missed("form_tolerance_missed", "/tolerance/form_um", outcome.form_error_after_um, tolerance.form_um), size]
+        .into_iter()
+        .flatten()
+        .collect()
 }
 
 /// A stretch that should be turned and that the path does not reach.

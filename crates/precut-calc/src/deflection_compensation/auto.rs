@@ -24,8 +24,6 @@ use super::stage::{Stage, all_cuts};
 const SHARE: f64 = 0.1;
 /// Stations at which the effects are tried.
 pub(super) const SAMPLES: usize = 33;
-/// Tolerances to either side take half of that of size.
-const HALF: f64 = 0.5;
 
 /// An effect that acts although the job does not say so.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -163,7 +161,7 @@ pub(super) fn cuts_tried(job: &Job) -> usize {
 
 /// The smaller of the tolerances of form and size, um.
 fn tolerance_um(job: &Job) -> Option<f64> {
-    let size = job.tolerance.diameter_um.map(|whole| HALF * whole);
+    let size = job.tolerance.size().half_width_um();
     [job.tolerance.form_um, size].into_iter().flatten().reduce(f64::min)
 }
 

@@ -4,7 +4,8 @@ use crate::calculator::{Check, Finding, Violations};
 use crate::effects::DeflectionEffect as Effect;
 
 use super::grid::{interpolate, station_count};
-use super::input::{Job, MAX_STATIONS, Segment, Stations, StockRow, Support};
+use super::input::{Aim, Job, MAX_STATIONS, Segment, Stations, StockRow, Support};
+use super::uncertain;
 use crate::force::ForceModel;
 use crate::shaft::{self, DIAMETER_MM, elastic::clamping, elastic::ends, places};
 
@@ -36,6 +37,7 @@ pub(super) const CODES: &[&str] = &[
     "effect_without_rest",
     "effect_of_carrying_rest",
     "effect_not_with_passes",
+    "aim_without_size_limits",
 ];
 
 impl Check for Job {
@@ -48,6 +50,11 @@ impl Check for Job {
         check_stock_profile(self, violations);
         self.force.check("/force", violations);
         check_effects(self, violations);
+        uncertain::check(self, violations);
+        let aims = !matches!(self.aim, Aim::Nominal {});
+        violations.require(!aims || self.tolerance.size().middle_um().is_some(), || {
+            Finding::new("aim_without_size_limits", "/aim")
+        });
     }
 }
 

@@ -281,6 +281,11 @@ impl CutLine {
         }
     }
 
+    /// Commands a radius that is larger by so much, mm.
+    pub(super) fn aim(&mut self, by_mm: f64) {
+        self.command_mm.iter_mut().flatten().for_each(|command| *command += by_mm);
+    }
+
     /// Keeps the largest residual.
     #[inline]
     pub(super) fn note(&mut self, residual_mm: f64) {

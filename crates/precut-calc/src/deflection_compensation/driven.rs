@@ -14,11 +14,14 @@ use super::grid::{Grid, Refined};
 use super::input::Job;
 use super::model::Radii;
 use super::output::{PassOutcome, Path};
+use super::rehearsal::Rehearsal;
 use super::stage::{Along, Cuts, Stage, in_reach};
 use super::toolpath::{Drawn, drawn};
 
+const UM_PER_MM: f64 = 1e3;
+
 /// The paths as programmed and what they give.
-pub(super) struct Driven {
+pub(super) struct Driven<'a> {
     /// The path of the last cut.
     pub path: Path,
     /// Every pass of several, at the stations of the answer.
@@ -33,6 +36,8 @@ pub(super) struct Driven {
     pub drawn: Option<Drawn>,
     /// What the program was seen to do.
     pub proof: Option<Proof>,
+    /// The same cuts again with what is uncertain; where the job sets limits, and every path is whole.
+    pub rehearsal: Option<Rehearsal<'a>>,
 }
 
 /// A monitor of a part that is computed once more: it may be cancelled, its stages have been told already.
@@ -46,15 +51,20 @@ impl Monitor for Again<'_> {
 }
 
 /// Cuts the commands into straight moves, predicts what they give, and drives the program of them over the blank.
-pub(super) fn drive(
-    job: &Job,
+///
+/// The last cut's commanded diameter is larger than the exact one by `aim_um`.
+pub(super) fn drive<'a>(
+    job: &'a Job,
     grid: &Grid,
-    acting: &Acting,
+    acting: &'a Acting,
+    aim_um: f64,
     look: &mut dyn FnMut(&Grid, &Stage, usize),
     monitor: &dyn Monitor,
-) -> Result<Driven, Failure> {
+) -> Result<Driven<'a>, Failure> {
     let Refined { grid: fine, own } = grid.refined(job);
-    let Cuts { stages, passes, paths, produced_mm } = Cuts::of(job, &fine, acting, Along::Moves, look, monitor)?;
+    let aim_mm = 0.5 * aim_um / UM_PER_MM;
+    let Cuts { stages, passes, paths, commands, produced_mm } =
+        Cuts::of(job, &fine, acting, Along::Moves { aim_mm }, look, monitor)?;
     let (Some(last), Some(path)) = (stages.last(), paths.last()) else {
         return Err(Failure::Internal("no cut was computed".to_owned()));
     };
@@ -68,6 +78,7 @@ pub(super) fn drive(
     };
     let mut stage = Stage::of(job, grid, acting, last.regime, last.step, radii, monitor)?;
     stage.cut.note(last.cut.residual_mm);
+    stage.cut.aim(aim_mm);
     let after = Form::of(&fine.z_mm, &errors_um(&produced_mm, &last.radii));
     let complete = paths.iter().all(|path| path.complete);
     let (drawn, proof) = if complete {
@@ -77,6 +88,7 @@ pub(super) fn drive(
     } else {
         (None, None)
     };
+    let rehearsal = if job.tolerance.is_none() { None } else { Rehearsal::of(job, acting, &fine, &stages, &commands)? };
     Ok(Driven {
         path: path.clone(),
         passes: passes.into_iter().map(|pass| at_stations(pass, &own)).collect(),
@@ -85,6 +97,7 @@ pub(super) fn drive(
         after,
         drawn,
         proof,
+        rehearsal,
     })
 }
 

@@ -19,6 +19,7 @@ pub(super) struct Loads {
 }
 
 /// Force laws at the stations, effects in them: one for every speed and hardness that differ.
+#[derive(Clone)]
 pub(super) struct StationLaws {
     laws: Vec<DepthLaw>,
     /// Empty where there is one law for all.
@@ -26,6 +27,7 @@ pub(super) struct StationLaws {
 }
 
 /// Laws that are powers of the depth, all of one exponent.
+#[derive(Clone)]
 pub(super) struct PowerLine {
     /// Passive force at 1 mm of every law, N.
     pub factors_n: Vec<f64>,
@@ -57,6 +59,13 @@ impl StationLaws {
             laws.of_station.push(u32::try_from(laws.laws.len() - 1).unwrap_or(u32::MAX));
         }
         laws
+    }
+
+    /// Multiplies all forces.
+    pub(super) fn scale(&mut self, factor: f64) {
+        for law in &mut self.laws {
+            *law = law.clone().scaled(factor);
+        }
     }
 
     /// Whether no law has a constant part: every force vanishes with the depth.

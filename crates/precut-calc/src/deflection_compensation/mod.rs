@@ -17,6 +17,7 @@ mod advice;
 mod auto;
 mod check;
 mod columns;
+mod conformance;
 mod consequence;
 mod cut;
 mod driven;
@@ -36,11 +37,13 @@ mod output;
 mod picture;
 mod power_cut;
 mod regime;
+mod rehearsal;
 mod second_order;
 mod soundness;
 mod stage;
 mod structure;
 mod toolpath;
+mod uncertain;
 
 pub use auto::Automatic;
 pub(crate) use encounters::{Reach, chuck_in_the_way, met};
@@ -48,20 +51,22 @@ pub(crate) use equilibrium::{Opening, engage};
 pub use form::{Deviation, Extremum, ExtremumKind, Form, FormClass};
 pub use forward::{DeflectionAllowances, DeflectionPoint, DeflectionRun};
 pub use input::{
-    Carriage, Cut, Detail, FeedDirection, Gravity, Include, IncludeMode, Job, Limits, MAX_STATIONS, Pass, PathSettings,
-    ProgramSettings, ProgramZero, SafePosition, Section, Segment, Shaft, SpeedDiameter, Stations, StockRow, Support,
-    Theory, Tolerance, Uncertainty,
+    Aim, Carriage, Cut, Detail, FeedDirection, Gravity, Include, IncludeMode, Job, Limits, MAX_STATIONS, Pass,
+    PathSettings, ProgramSettings, ProgramZero, SafePosition, Section, Segment, Shaft, SpeedDiameter, Stations,
+    StockRow, Support, Theory, Tolerance, Uncertainty,
 };
 pub use measurement::DeflectionMeasurement;
 pub use output::{
-    AddedSupport, OneMoreRest, OneStep, Outcome, PassOutcome, Path, PathZone, SecondOrder, Shares, StationColumns,
-    StatusCompensated, StatusUncompensated,
+    AddedSupport, ErrorFan, OneMoreRest, OneStep, Outcome, PassOutcome, Path, PathZone, SecondOrder, Shares,
+    StationColumns, StatusCompensated, StatusUncompensated,
 };
+pub use uncertain::{DeflectionCorrelation, DeflectionQuantity, DeflectionUncertainQuantity};
 
 use crate::calculator::{
     Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Hallmark, Message, Meta, Monitor,
     Program, Table,
 };
+use crate::certainty::{self, Conformance};
 use crate::force;
 use crate::shaft::places;
 use crate::turning::Proof;
@@ -69,6 +74,7 @@ use crate::turning::Proof;
 use acting::Acting;
 use advice::SeenAlong;
 use columns::{Errors, columns, uncertainty_um};
+use conformance::Judged;
 use cut::one_step;
 use driven::{Driven, drive};
 use grid::{Grid, path_station_count, station_count};
@@ -87,7 +93,7 @@ impl Calculator for DeflectionCompensation {
     const META: Meta = Meta {
         id: "deflection-compensation",
         kind: CalculatorKind::Calculator,
-        version: 7,
+        version: 8,
         title: "Deflection compensation",
         question: "Where must the tool go so that the slender shaft comes out straight?",
         summary: "A slender shaft bends away from the tool, so less is cut than commanded. From shaft, supports, \
@@ -158,7 +164,9 @@ impl Calculator for DeflectionCompensation {
         // Measured: about 0.3 us per station and cut; each rest that opens and closes solves a contact problem anew.
         let contacts = job.supports.iter().filter(|s| !s.carries()).count() as f64;
         let tried = (auto::SAMPLES * auto::cuts_tried(job)) as f64;
-        let us = (stations * (passes + 1.0) + tried) * (0.5 + 1.5 * contacts);
+        // Parts are cut again: some 10,000 of them, measured.
+        let sure = if full && !job.tolerance.is_none() { 40_000.0 * passes * (1.0 + contacts) } else { 0.0 };
+        let us = (stations * (passes + 1.0) + tried) * (0.5 + 1.5 * contacts) + sure;
         let bytes = 100_000 + station_count(job) as u64 * (400 + 80 * job.passes.len() as u64);
         let driver = match job.stations {
             Stations::PerZone { .. } => "/stations/count",
@@ -199,22 +207,33 @@ fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
         |grid: &Grid, stage: &Stage, number: usize| of_passes.extend(advice::of_pass(job, grid, stage, number));
     let (stage, passes, driven) = match job.detail {
         Detail::Profile => {
-            let (stage, passes) = all_cuts(job, &grid, &acting, &mut look, monitor)?;
+            let (mut stage, passes) = all_cuts(job, &grid, &acting, &mut look, monitor)?;
+            // What needs probabilities is left for the full answer.
+            let middle_um = job.tolerance.size().middle_um().filter(|_| job.aim == (Aim::Middle {}));
+            let aim_um = middle_um.unwrap_or(0.0);
+            stage.cut.aim(0.5 * aim_um / UM_PER_MM);
             (stage, passes, None)
         }
         Detail::Full => {
-            let Driven { stage, passes, path, produced_mm, after, drawn, proof } =
-                drive(job, &grid, &acting, &mut look, monitor)?;
-            (stage, passes, Some(Along { path, produced_mm, after, drawn, proof }))
+            let (aimed, sure) = aimed(job, &grid, &acting, &mut look, monitor)?;
+            let Driven { stage, passes, path, produced_mm, after, drawn, proof, .. } = aimed;
+            (stage, passes, Some(Along { path, produced_mm, after, drawn, proof, sure }))
         }
     };
     in_reach(&stage)?;
     monitor.progress(0.8, Message::new("stage_advice"));
     let errors = Errors::of(&stage, driven.as_ref().map(|driven| driven.produced_mm.as_slice()));
-    let (drawn, driven) = driven.map(|along| (along.drawn, (along.path, along.after, along.proof))).unzip();
+    let mut sure = Sure::default();
+    let (drawn, driven) = driven
+        .map(|along| {
+            sure = along.sure;
+            (along.drawn, (along.path, along.after, along.proof))
+        })
+        .unzip();
     let mut outcome = Assembly { asked, job, grid: &grid, acting: &acting, stage: &stage }
         .outcome(driven, passes, &errors, monitor)?;
     outcome.included_automatically = included_automatically;
+    (outcome.aim_shift_um, outcome.conformance, outcome.error_fan) = (sure.aim_um, sure.conformance, sure.fan);
     let uncertainty_um = uncertainty_um(job, &acting, &stage);
     let drawn = drawn.flatten();
     let warnings = advice::warnings(job, &grid, &acting, &stage, &outcome, drawn.as_ref(), &uncertainty_um);
@@ -233,6 +252,46 @@ struct Along {
     after: Form,
     drawn: Option<toolpath::Drawn>,
     proof: Option<Proof>,
+    sure: Sure,
+}
+
+/// Where the last cut is aimed at, and how sure it is to come out well.
+#[derive(Default)]
+struct Sure {
+    aim_um: f64,
+    conformance: Option<Conformance>,
+    fan: Option<ErrorFan>,
+}
+
+/// The cuts of a job, the last one aimed as the job says, and how sure they are to come out well.
+fn aimed<'a>(
+    job: &'a Job,
+    grid: &Grid,
+    acting: &'a Acting,
+    look: &mut dyn FnMut(&Grid, &Stage, usize),
+    monitor: &dyn Monitor,
+) -> Result<(Driven<'a>, Sure), Failure> {
+    let mut driven = drive(job, grid, acting, 0.0, look, monitor)?;
+    let mut sure = Sure::default();
+    if job.aim != (Aim::Nominal {}) {
+        let judged = match &driven.rehearsal {
+            Some(rehearsal) => Judged::of(job, rehearsal, 0.0, monitor)?,
+            None => None,
+        };
+        sure.aim_um = match judged {
+            Some(judged) => judged.aim_um(&job.aim)?,
+            None => job.tolerance.size().middle_um().unwrap_or(0.0),
+        };
+        driven = drive(job, grid, acting, sure.aim_um, &mut |_, _, _| (), monitor)?;
+    }
+    if let Some(rehearsal) = &driven.rehearsal {
+        // The path of the rehearsal is aimed already.
+        if let Some(judged) = Judged::of(job, rehearsal, 0.0, monitor)? {
+            sure.conformance = Some(judged.conformance(0.0)?);
+            sure.fan = Some(judged.fan(0.0)?);
+        }
+    }
+    Ok((driven, sure))
 }
 
 /// What an outcome is put together from.
@@ -277,6 +336,9 @@ impl Assembly<'_> {
             second_order: if full { Some(second_order::second_order(job, grid, acting, stage)?) } else { None },
             one_more_rest: if full { advice::one_more_rest(asked, grid, acting, stage, monitor)? } else { None },
             included_automatically: Vec::new(),
+            aim_shift_um: 0.0,
+            conformance: None,
+            error_fan: None,
             critical_speed_rpm: if full { soundness::critical_speed_rpm(job, stage)? } else { None },
             one_step: (full && job.compare_one_step && !stage.line.has_contacts())
                 .then(|| one_step(&stage.line, &stage.radii, &stage.cut, job.force.depth_exponent())),
@@ -310,14 +372,26 @@ fn basis(job: &Job) -> Vec<Basis> {
 
 /// Everything that this calculator may utter, from where it is said.
 const CODES: Codes = Codes {
-    faults: &[check::CODES, crate::shaft::check::CODES, force::FAULT_CODES],
+    faults: &[
+        check::CODES,
+        uncertain::CODES,
+        certainty::DISTRIBUTION_CODES,
+        crate::shaft::check::CODES,
+        force::FAULT_CODES,
+    ],
     failures: &[
         &["path_incomplete", "path_not_computed", "pass_without_command", "numbers_out_of_reach", "tool_hits_chuck"],
         Proof::CODES,
         force::FAILURE_CODES,
     ],
-    warnings: &[advice::WARNING_CODES, soundness::WARNING_CODES, second_order::WARNING_CODES, force::WARNING_CODES],
-    explanations: &[advice::EXPLANATION_CODES],
+    warnings: &[
+        advice::WARNING_CODES,
+        conformance::WARNING_CODES,
+        soundness::WARNING_CODES,
+        second_order::WARNING_CODES,
+        force::WARNING_CODES,
+    ],
+    explanations: &[advice::EXPLANATION_CODES, conformance::EXPLANATION_CODES],
     stages: &[&["stage_pass", "stage_advice", "stage_done"]],
     labels: &[picture::LABEL_CODES, crate::shaft::handles::LABEL_CODES],
 };

@@ -14,6 +14,7 @@ use super::structure::Structure;
 /// What every depth has in common along the shaft: compliances, sag, stated errors, force laws.
 ///
 /// A column that is 0 all along is left empty, see [`at`].
+#[derive(Clone)]
 pub(super) struct Line {
     pub work_mm_per_n: Vec<f64>,
     pub carriage_mm_per_n: f64,
@@ -158,6 +159,23 @@ impl Line {
             with_feed: include.axial_moment(),
             closed_at_zero,
             power,
+        }
+    }
+
+    /// The same under cutting forces multiplied by `load`, of a shaft that sags `weight` times as far.
+    pub(super) fn under(&self, load: f64, weight: f64) -> Self {
+        let mut line = self.clone();
+        line.laws.scale(load);
+        line.power = self.power.as_ref().and_then(|_| line.laws.power());
+        line.sag_mm.iter_mut().chain(&mut line.tangential_offset_mm).for_each(|sag| *sag *= weight);
+        line.gravity_radial *= weight;
+        line
+    }
+
+    /// Puts one-sided rests farther away from the shaft.
+    pub(super) fn widen_gaps(&mut self, by_mm: f64) {
+        if let Some(contacts) = &mut self.contacts {
+            contacts.widen_gaps(by_mm);
         }
     }
 

@@ -5,6 +5,7 @@ use utoipa::ToSchema;
 
 use super::auto::Automatic;
 use super::form::Form;
+use crate::certainty::Conformance;
 use crate::turning::Proof;
 
 /// What will come out of the cut, and where the tool must go.
@@ -38,6 +39,15 @@ pub struct Outcome {
     /// program.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub proof: Option<Proof>,
+    /// Shift of the commanded diameter that `aim` makes.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub aim_shift_um: f64,
+    /// How probable it is that the shaft is good; only with `detail: full`, a tolerance and a whole path.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub conformance: Option<Conformance>,
+    /// How the diameters of single parts scatter along the shaft; likewise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error_fan: Option<ErrorFan>,
     /// What yields, at the station that deflects most.
     pub shares: Shares,
     /// Effects of second order on the diameter, whether switched on or not; only with `detail: full`.
@@ -57,6 +67,29 @@ pub struct Outcome {
     /// Bound of the numerical error of every diameter: solver residual, and round-off of the compliance.
     #[schema(extensions(("x-unit" = json!("um"))))]
     pub numerical_error_um: f64,
+}
+
+/// Diameter errors that so many percent of the parts stay below, along the shaft.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ErrorFan {
+    /// Station from the headstock end.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub z_mm: Vec<f64>,
+    /// One of twenty.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub below_5_percent_um: Vec<f64>,
+    /// One of four.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub below_25_percent_um: Vec<f64>,
+    /// One of two.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub below_50_percent_um: Vec<f64>,
+    /// Three of four.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub below_75_percent_um: Vec<f64>,
+    /// Nineteen of twenty.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub below_95_percent_um: Vec<f64>,
 }
 
 /// One entry per station, in the order of z. With `detail: profile` what the shaft does and where the tool must go.

@@ -27,6 +27,8 @@ pub(super) const LABEL_CODES: &[&str] = &[
     "without_compensation",
     "with_compensation",
     "uncertainty_band",
+    "nine_of_ten_parts",
+    "half_of_the_parts",
     "tolerance_band",
     "nominal_line",
     "commanded_path",
@@ -141,19 +143,29 @@ fn errors(job: &Job, outcome: &Outcome, height: f64) -> Panel {
     let stations = &outcome.stations;
     let mut items = Vec::new();
     let ends = [stations.z_mm.first(), stations.z_mm.last()];
-    if let (Some(width), [Some(&from), Some(&to)]) = (job.tolerance.diameter_um, ends) {
-        let half = width / 2.0;
+    let limits = job.tolerance.size();
+    if let (Some(lower), Some(upper), [Some(&from), Some(&to)]) = (limits.lower_um, limits.upper_um, ends) {
         items.push(Item::Band {
             name: "tolerance_band",
             x: vec![from, to],
-            lower: vec![-half; 2],
-            upper: vec![half; 2],
+            lower: vec![lower; 2],
+            upper: vec![upper; 2],
             role: Role::Tolerance,
         });
     }
     let after = stations.diameter_error_compensated_um.as_ref();
     let whole = after.and_then(|after| after.iter().copied().collect::<Option<Vec<f64>>>());
-    if let (Some(after), Some(unsure)) = (whole, &stations.diameter_uncertainty_um) {
+    if let Some(fan) = &outcome.error_fan {
+        let band = |name, lower: &[f64], upper: &[f64]| Item::Band {
+            name,
+            x: fan.z_mm.clone(),
+            lower: lower.to_vec(),
+            upper: upper.to_vec(),
+            role: Role::Uncertainty,
+        };
+        items.push(band("nine_of_ten_parts", &fan.below_5_percent_um, &fan.below_95_percent_um));
+        items.push(band("half_of_the_parts", &fan.below_25_percent_um, &fan.below_75_percent_um));
+    } else if let (Some(after), Some(unsure)) = (whole, &stations.diameter_uncertainty_um) {
         let shifted = |sign: f64| -> Vec<f64> { after.iter().zip(unsure).map(|(e, u)| e + sign * 2.0 * u).collect() };
         items.push(Item::Band {
             name: "uncertainty_band",

@@ -188,7 +188,7 @@ fn wide(job: &Job, uncertainty_um: &[f64]) -> Vec<Finding> {
     };
     [
         judged("/tolerance/form_um", most - least, job.tolerance.form_um),
-        judged("/tolerance/diameter_um", most, job.tolerance.diameter_um.map(|whole| whole / 2.0)),
+        judged(job.tolerance.size_pointer().unwrap_or("/tolerance"), most, job.tolerance.size().half_width_um()),
     ]
     .into_iter()
     .flatten()

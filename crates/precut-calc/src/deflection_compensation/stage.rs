@@ -38,20 +38,7 @@ impl Stage {
         radii: Radii,
         monitor: &dyn Monitor,
     ) -> Result<Self, Failure> {
-        let structure = Structure::of(job, &variant(job, acting, &regime, step.pass_mm))?;
-        let passages = if acting.has_errors() { passages(job, grid, &regime, &step) } else { Vec::new() };
-        let displaced = structure.displaced(job, &acting.set_off, &grid.z_mm)?;
-        let ingredients = Ingredients {
-            job,
-            grid,
-            acting,
-            structure: &structure,
-            regime: &regime,
-            radii: &radii,
-            passages: &passages,
-            displaced: displaced.as_ref(),
-        };
-        let line = Line::of(&ingredients, structure.beam.profile(&grid.z_mm, wanted(job)));
+        let (structure, line) = line_of(job, grid, acting, &regime, &step, &radii)?;
         let cut = CutLine::of(&line, &radii, monitor)?;
         let stage = Self { regime, structure, radii, line, cut, step };
         within_reach_of_law(job, &stage)?;
@@ -72,6 +59,32 @@ impl Stage {
     fn commands(&self, compensated: bool) -> Vec<Option<f64>> {
         if compensated { self.cut.command_mm.clone() } else { self.radii.target.iter().copied().map(Some).collect() }
     }
+}
+
+/// The held shaft of a cut and everything along it that no depth changes.
+pub(super) fn line_of(
+    job: &Job,
+    grid: &Grid,
+    acting: &Acting,
+    regime: &Regime,
+    step: &Step,
+    radii: &Radii,
+) -> Result<(Structure, Line), Failure> {
+    let structure = Structure::of(job, &variant(job, acting, regime, step.pass_mm))?;
+    let passages = if acting.has_errors() { passages(job, grid, regime, step) } else { Vec::new() };
+    let displaced = structure.displaced(job, &acting.set_off, &grid.z_mm)?;
+    let ingredients = Ingredients {
+        job,
+        grid,
+        acting,
+        structure: &structure,
+        regime,
+        radii,
+        passages: &passages,
+        displaced: displaced.as_ref(),
+    };
+    let line = Line::of(&ingredients, structure.beam.profile(&grid.z_mm, wanted(job)));
+    Ok((structure, line))
 }
 
 fn variant<'a>(job: &Job, acting: &'a Acting, regime: &Regime, pass_mm: Option<f64>) -> Variant<'a> {
@@ -133,12 +146,12 @@ pub(super) fn all_cuts(
 }
 
 /// What the tool follows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Along {
     /// The exact command of every station.
     Exact,
-    /// The moves of the program.
-    Moves,
+    /// The moves of the program, in the last cut with a commanded radius that is larger by so much, mm.
+    Moves { aim_mm: f64 },
 }
 
 /// The cuts of a job, each on what the one before it has left.
@@ -148,6 +161,8 @@ pub(super) struct Cuts {
     pub passes: Vec<PassOutcome>,
     /// One for every cut along moves.
     pub paths: Vec<Path>,
+    /// Commanded radius at every station, mm; likewise.
+    pub commands: Vec<Vec<Option<f64>>>,
     /// Radius that the last cut leaves, mm.
     pub produced_mm: Vec<Option<f64>>,
 }
@@ -163,14 +178,20 @@ impl Cuts {
     ) -> Result<Self, Failure> {
         let base = Regime::of(&job.cut);
         let mut stock = stock_radii_mm(job, grid);
-        let mut cuts = Self { stages: Vec::new(), passes: Vec::new(), paths: Vec::new(), produced_mm: Vec::new() };
+        let mut cuts = Self {
+            stages: Vec::new(),
+            passes: Vec::new(),
+            paths: Vec::new(),
+            commands: Vec::new(),
+            produced_mm: Vec::new(),
+        };
         if job.passes.is_empty() {
             // The stock of a single cut is known: depth and speed follow it.
             let target = target_radii_mm(job, grid, None);
             let idle = idle(job, grid, &stock, &target);
             let radii = Radii { target, stock, planned: None, idle };
             let mut stage = Stage::of(job, grid, acting, base, Step::default(), radii, monitor)?;
-            if along == Along::Moves {
+            if along != Along::Exact {
                 let commands = cuts.commands(job, grid, &stage, true, along, monitor)?;
                 cuts.produced_mm = stage.left_by(&commands, monitor)?;
             }
@@ -192,9 +213,13 @@ impl Cuts {
             let idle = idle(job, grid, &planned, &target);
             let radii = Radii { target: target.clone(), stock, planned: Some(planned), idle };
             let mut stage = Stage::of(job, grid, acting, regime, step, radii, monitor)?;
+            let is_last = k + 1 == job.passes.len();
+            let along = match along {
+                Along::Moves { .. } if !is_last => Along::Moves { aim_mm: 0.0 },
+                _ => along,
+            };
             let commands = cuts.commands(job, grid, &stage, pass.compensated, along, monitor)?;
             cuts.produced_mm = stage.left_by(&commands, monitor)?;
-            let is_last = k + 1 == job.passes.len();
             let produced = known(&cuts.produced_mm, &stage)?;
             let mut outcome = pass_outcome(&stage, pass.compensated, &produced, &commands, cuts.passes.last());
             outcome.path = cuts.paths.last().cloned();
@@ -223,11 +248,11 @@ impl Cuts {
         monitor: &dyn Monitor,
     ) -> Result<Vec<Option<f64>>, Failure> {
         let exact = stage.commands(compensated);
-        if along == Along::Exact {
-            return Ok(exact);
-        }
-        let Programmed { path, command_mm } = programmed(job, grid, stage, compensated, &exact, monitor)?;
+        let Along::Moves { aim_mm } = along else { return Ok(exact) };
+        let aimed: Vec<_> = exact.iter().map(|command| command.map(|command| command + aim_mm)).collect();
+        let Programmed { path, command_mm } = programmed(job, grid, stage, compensated, &aimed, monitor)?;
         self.paths.push(path);
+        self.commands.push(command_mm.clone());
         Ok(command_mm)
     }
 }

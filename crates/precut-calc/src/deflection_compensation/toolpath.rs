@@ -116,7 +116,7 @@ pub(super) fn program(job: &Job, outcome: &Outcome) -> Result<Program, Failure> 
     let (job, _) = auto::settled(job, &Unwatched)?;
     let job = &*job;
     let acting = Acting::of(&job.effects, &job.conditions, job.cut.feed_direction);
-    let driven = drive(job, &Grid::of(job), &acting, &mut |_, _, _| (), &Unwatched)?;
+    let driven = drive(job, &Grid::of(job), &acting, outcome.aim_shift_um, &mut |_, _, _| (), &Unwatched)?;
     let (Some(drawn), Some(proof)) = (driven.drawn, driven.proof) else {
         return Err(Failure::Internal("a complete path has no program".to_owned()));
     };

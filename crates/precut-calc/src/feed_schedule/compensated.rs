@@ -103,6 +103,7 @@ fn deflection_job(job: &Job, zone: &ZoneCase, u: f64, x: f64, wanted: &Compensat
         passes: Vec::new(),
         detail: Detail::Full,
         tolerance: Tolerance::default(),
+        aim: deflection::Aim::default(),
         uncertainty: Uncertainty::default(),
         path: PathSettings { chord_tolerance_um: Some(wanted.chord_tolerance_um), increment_um: wanted.increment_um },
         program: job.program.clone(),

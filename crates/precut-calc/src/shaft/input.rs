@@ -296,6 +296,19 @@ impl Support {
         }
     }
 
+    /// Multiplies its compliances.
+    pub(crate) fn yield_times(&mut self, factor: f64) {
+        match self {
+            Self::Centre { compliance_um_per_n: c, tangential_compliance_um_per_n: across, .. }
+            | Self::Chuck { compliance_um_per_n: c, tangential_compliance_um_per_n: across, .. }
+            | Self::SteadyRest { compliance_um_per_n: c, tangential_compliance_um_per_n: across, .. }
+            | Self::FollowRest { compliance_um_per_n: c, tangential_compliance_um_per_n: across, .. } => {
+                *c *= factor;
+                *across = across.map(|across| across * factor);
+            }
+        }
+    }
+
     /// Radial compliance.
     pub fn compliance_um_per_n(&self) -> f64 {
         match *self {

@@ -78,6 +78,11 @@ impl Contacts {
         self.displaced = rests_mm;
     }
 
+    /// Puts all rests farther away by so much; nearer, they may touch without a load.
+    pub fn widen_gaps(&mut self, by_mm: f64) {
+        self.gaps_mm.iter_mut().for_each(|gap| *gap += by_mm);
+    }
+
     /// Whether supports are set off, so that rests may touch without a load.
     pub fn are_displaced(&self) -> bool {
         !self.displaced.is_empty()

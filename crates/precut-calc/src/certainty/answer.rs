@@ -1,0 +1,163 @@
+//! The block `conformance` of an answer (`certainty/2`).
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::{Level, Source};
+
+/// How probable it is that a part is good, what makes that uncertain and what would help.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Conformance {
+    /// Every limit alone.
+    pub limits: Vec<LimitKept>,
+    /// All limits together.
+    pub joint: JointlyKept,
+    /// What that means for several parts of one set-up.
+    pub setup: SeveralParts,
+    /// What the doubt is made of, the largest share first.
+    pub contributions: Vec<Contribution>,
+    /// What would raise the probability, the largest gain first; each was computed. Nothing is listed that gains less than
+    /// its error.
+    pub advice: Vec<Improvement>,
+    /// How the numbers were found.
+    pub method: ConformanceMethod,
+}
+
+/// The probability that a limit is kept.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct LimitKept {
+    /// Which: `size` or `form`.
+    #[schema(example = "size")]
+    pub limit: String,
+    /// The field of the job that sets it.
+    #[schema(example = "/tolerance/diameter_um")]
+    pub pointer: String,
+    /// Probability that it is kept, between 1e-6 and 1 - 1e-6.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub probability: f64,
+    /// Twice the standard error of the probability.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub numerical_error: f64,
+    /// Probability that it is passed upward; null where there is no upper limit.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub probability_above: Option<f64>,
+    /// Probability that it is passed downward; null where there is no lower limit.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub probability_below: Option<f64>,
+}
+
+/// The probability that all limits are kept.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct JointlyKept {
+    /// Probability that a part is good, between 1e-6 and 1 - 1e-6.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub probability: f64,
+    /// Twice the standard error of the probability.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub numerical_error: f64,
+    /// The probability that the job wants.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub wanted: f64,
+    /// Whether it is reached.
+    pub met: bool,
+}
+
+/// Several parts of one set-up.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct SeveralParts {
+    /// How many.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub count: u32,
+    /// Probability that all of them are good.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub probability_all_good: f64,
+    /// How many are good on average.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub expected_good: f64,
+    /// Share of the doubt that is the same for all of them, to first order: measuring the first part tells of it.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub share_common_to_all: f64,
+}
+
+/// What a quantity adds to the doubt.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Contribution {
+    /// Its name.
+    #[schema(example = "force")]
+    pub quantity: String,
+    /// Where its distribution is from.
+    pub source: Source,
+    /// Among what it varies.
+    pub level: Level,
+    /// Share of the variance of what decides, to first order; null where quantities are correlated.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub share_of_variance: Option<f64>,
+    /// Probability that a part is good with half of its width, all else equal.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub joint_probability_if_halved: f64,
+}
+
+/// Something to do.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Improvement {
+    /// Command all diameters larger by so much: `aim` does it.
+    ShiftAim {
+        /// By how much.
+        #[schema(extensions(("x-unit" = json!("um"))))]
+        shift_um: f64,
+        /// Probability that a part is good then.
+        #[schema(extensions(("x-unit" = json!("1"))))]
+        joint_probability: f64,
+        /// By how much that is more.
+        #[schema(extensions(("x-unit" = json!("1"))))]
+        gain: f64,
+    },
+    /// Measure the diameter of the first part at one place, and shift the command by what the model makes of it.
+    MeasureFirstPart {
+        /// Where.
+        #[schema(extensions(("x-unit" = json!("mm"))))]
+        z_mm: f64,
+        /// Standard uncertainty of the gauge that is reckoned with.
+        #[schema(extensions(("x-unit" = json!("um"))))]
+        gauge_um: f64,
+        /// The diameter error that is expected; without any other no shift is needed.
+        #[schema(extensions(("x-unit" = json!("um"))))]
+        expected_um: f64,
+        /// Shift of the commanded diameter when the reading is as expected.
+        #[schema(extensions(("x-unit" = json!("um"))))]
+        shift_as_expected_um: f64,
+        /// Further shift for every micrometre that the reading is larger.
+        #[schema(extensions(("x-unit" = json!("1"))))]
+        shift_um_per_um: f64,
+        /// Probability that a later part is good then, on average over the readings.
+        #[schema(extensions(("x-unit" = json!("1"))))]
+        joint_probability: f64,
+        /// By how much that is more.
+        #[schema(extensions(("x-unit" = json!("1"))))]
+        gain: f64,
+    },
+}
+
+impl Improvement {
+    /// By how much it raises the probability.
+    pub fn gain(&self) -> f64 {
+        match *self {
+            Self::ShiftAim { gain, .. } | Self::MeasureFirstPart { gain, .. } => gain,
+        }
+    }
+}
+
+/// How probabilities were found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ConformanceMethod {
+    /// Lines through the scores that were integrated over the real model.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub lines: u32,
+    /// Joint probability of the model that is linear about the stated values.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub linear_probability: f64,
+    /// Seed of the points.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub seed: u32,
+}

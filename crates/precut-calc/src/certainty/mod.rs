@@ -1,0 +1,25 @@
+//! How sure: from what is uncertain in a job to the probability that every limit is kept (`certainty/1` to `certainty/3`).
+//!
+//! A quantity is a factor on what the job states, or an addition to it, drawn from a [`Distribution`] by its standard normal
+//! score. Scores are correlated as the job says ([`Scores`]). The probability is integrated over the real model, exactly
+//! along one line through the scores and by scrambled Sobol points over the others ([`lines`]).
+
+mod answer;
+mod distribution;
+pub(crate) mod lines;
+mod scores;
+
+pub use answer::{Conformance, ConformanceMethod, Contribution, Improvement, JointlyKept, LimitKept, SeveralParts};
+pub(crate) use distribution::{CODES as DISTRIBUTION_CODES, WidthUnit};
+pub use distribution::{Distribution, Level, Source};
+pub(crate) use scores::{Contradiction, Scores};
+
+/// Probability that a standard normal number is below `x`.
+pub(crate) fn normal_below(x: f64) -> f64 {
+    0.5 * statrs::function::erf::erfc(-x * std::f64::consts::FRAC_1_SQRT_2)
+}
+
+/// The number that a standard normal one is below with probability `p`.
+pub(crate) fn normal_quantile(p: f64) -> f64 {
+    -std::f64::consts::SQRT_2 * statrs::function::erf::erfc_inv(2.0 * p)
+}

@@ -1,0 +1,297 @@
+//! What is uncertain in a job of a shaft: its quantities, and what a draw of them changes (`certainty/1.4`).
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::calculator::{Finding, Violations};
+use crate::certainty::{Contradiction, Distribution, Level, Scores, Source, WidthUnit};
+use crate::effects::DeflectionEffect;
+
+use super::input::{Job, Uncertainty};
+use super::rehearsal::Draw;
+
+const UM_PER_MM: f64 = 1e3;
+/// Standard uncertainty of the diameter that a tool is set to, where nobody states it, um.
+const TOOL_SETTING_UM: f64 = 2.0;
+/// A relative uncertainty above this share is one of the logarithm.
+const LARGEST_NORMAL_PERCENT: f64 = 25.0;
+
+/// Codes of the faults found here.
+pub(super) const CODES: &[&str] =
+    &["duplicate_quantity", "bad_correlation", "correlations_contradict", "tolerance_given_twice", "limits_crossed"];
+
+/// A quantity that is not known exactly.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum DeflectionQuantity {
+    /// Factor on all cutting forces.
+    Force,
+    /// All compliances are divided by this factor.
+    Stiffness,
+    /// Factor on Young's modulus.
+    YoungsModulus,
+    /// Factor on the compliance of the leftmost carrying support.
+    HeadstockCompliance,
+    /// Factor on the compliance of the rightmost carrying support.
+    TailstockCompliance,
+    /// Factor on the compliance of all rests.
+    RestCompliance,
+    /// Factor on the compliance of the carriage.
+    CarriageCompliance,
+    /// Added to the gaps of one-sided rests.
+    RestGap,
+    /// Added to the diameter that the tool is set to.
+    ToolSetting,
+    /// Added to the diameter of the blank.
+    StockDiameter,
+    /// Added to the diameter that is left.
+    SpindleScatter,
+}
+
+impl DeflectionQuantity {
+    /// Its name, as in the contract.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Force => "force",
+            Self::Stiffness => "stiffness",
+            Self::YoungsModulus => "youngs_modulus",
+            Self::HeadstockCompliance => "headstock_compliance",
+            Self::TailstockCompliance => "tailstock_compliance",
+            Self::RestCompliance => "rest_compliance",
+            Self::CarriageCompliance => "carriage_compliance",
+            Self::RestGap => "rest_gap",
+            Self::ToolSetting => "tool_setting",
+            Self::StockDiameter => "stock_diameter",
+            Self::SpindleScatter => "spindle_scatter",
+        }
+    }
+
+    fn unit(self) -> WidthUnit {
+        match self {
+            Self::RestGap | Self::ToolSetting | Self::StockDiameter | Self::SpindleScatter => WidthUnit::Um,
+            _ => WidthUnit::Percent,
+        }
+    }
+
+    fn usual_level(self) -> Level {
+        match self {
+            Self::StockDiameter | Self::SpindleScatter => Level::Part,
+            _ => Level::Setup,
+        }
+    }
+
+    /// Whether it is a part of what `stiffness` stands for.
+    fn is_of_stiffness(self) -> bool {
+        matches!(
+            self,
+            Self::YoungsModulus
+                | Self::HeadstockCompliance
+                | Self::TailstockCompliance
+                | Self::RestCompliance
+                | Self::CarriageCompliance
+        )
+    }
+
+    /// Puts its value, a factor or an addition in um, into a draw.
+    fn put(self, value: f64, draw: &mut Draw) {
+        match self {
+            Self::Force => draw.force *= value,
+            Self::Stiffness => draw.stiffness *= value,
+            Self::YoungsModulus => draw.youngs_modulus *= value,
+            Self::HeadstockCompliance => draw.headstock *= value,
+            Self::TailstockCompliance => draw.tailstock *= value,
+            Self::RestCompliance => draw.rests *= value,
+            Self::CarriageCompliance => draw.carriage *= value,
+            Self::RestGap => draw.rest_gap_mm += value / UM_PER_MM,
+            Self::ToolSetting => draw.tool_setting_mm += 0.5 * value / UM_PER_MM,
+            Self::StockDiameter => draw.stock_mm += 0.5 * value / UM_PER_MM,
+            Self::SpindleScatter => draw.scatter_mm += 0.5 * value / UM_PER_MM,
+        }
+    }
+}
+
+/// How a quantity is distributed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DeflectionUncertainQuantity {
+    /// Which.
+    #[schema(example = "tool_setting")]
+    pub quantity: DeflectionQuantity,
+    /// How it is distributed about what the job states.
+    pub distribution: Distribution,
+    /// Among what it varies; not said: blank and spindle from part to part, all others from set-up to set-up.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = "setup")]
+    pub level: Option<Level>,
+}
+
+/// How two quantities go together.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DeflectionCorrelation {
+    /// Which two.
+    #[schema(min_items = 2, max_items = 2, example = json!(["force", "stiffness"]))]
+    pub between: Vec<DeflectionQuantity>,
+    /// Correlation of their standard normal scores.
+    #[schema(exclusive_minimum = -1.0, exclusive_maximum = 1.0, example = -0.3, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("rho"))))]
+    pub coefficient: f64,
+}
+
+/// A quantity with all that is known of it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Uncertain {
+    pub quantity: DeflectionQuantity,
+    pub distribution: Distribution,
+    pub level: Level,
+    pub source: Source,
+}
+
+/// All quantities of a job that are uncertain, and how they go together.
+#[derive(Debug, Clone)]
+pub(super) struct Uncertainties {
+    pub of: Vec<Uncertain>,
+    pub scores: Scores,
+}
+
+impl Uncertainties {
+    /// Of a checked job.
+    pub(super) fn of(job: &Job) -> Result<Self, Contradiction> {
+        let stated = &job.uncertainty;
+        let mut of: Vec<Uncertain> = stated
+            .quantities
+            .iter()
+            .map(|one| Uncertain {
+                quantity: one.quantity,
+                distribution: one.distribution.clone(),
+                level: one.level.unwrap_or(one.quantity.usual_level()),
+                source: Source::Stated,
+            })
+            .collect();
+        for usual in usual(job) {
+            let is_stated = of.iter().any(|one| {
+                one.quantity == usual.quantity
+                    || usual.quantity == DeflectionQuantity::Stiffness && one.quantity.is_of_stiffness()
+            });
+            if !is_stated && (stated.defaults || usual.source == Source::Stated) {
+                of.push(usual);
+            }
+        }
+        let place = |quantity| of.iter().position(|one: &Uncertain| one.quantity == quantity);
+        let pairs: Vec<(usize, usize, f64)> = stated
+            .correlations
+            .iter()
+            .filter_map(|pair| match pair.between[..] {
+                [one, other] => Some((place(one)?, place(other)?, pair.coefficient)),
+                _ => None,
+            })
+            .collect();
+        let scores = Scores::new(of.len(), &pairs)?;
+        Ok(Self { of, scores })
+    }
+
+    /// What independent scores come to.
+    pub(super) fn draw(&self, independent: &[f64]) -> Draw {
+        let mut draw = Draw::STATED;
+        for (one, score) in self.of.iter().zip(self.scores.of(independent)) {
+            one.quantity.put(one.distribution.at(score), &mut draw);
+        }
+        draw
+    }
+
+    /// The same with half of the width of one of them.
+    pub(super) fn halved(&self, index: usize) -> Self {
+        let mut halved = self.clone();
+        halved.of[index].distribution = halved.of[index].distribution.halved();
+        halved
+    }
+}
+
+/// What is uncertain in every job, as far as it is not stated otherwise.
+fn usual(job: &Job) -> Vec<Uncertain> {
+    let Uncertainty { force_percent, stiffness_percent, .. } = job.uncertainty;
+    let usual = Uncertainty::default();
+    let source = |percent: f64, usual: f64| {
+        if percent.to_bits() == usual.to_bits() { Source::Default } else { Source::Stated }
+    };
+    let mut all = vec![
+        Uncertain {
+            quantity: DeflectionQuantity::Force,
+            distribution: Distribution::Lognormal { log_standard_deviation: force_percent / 100.0 },
+            level: Level::Setup,
+            source: source(force_percent, usual.force_percent),
+        },
+        Uncertain {
+            quantity: DeflectionQuantity::Stiffness,
+            distribution: if stiffness_percent > LARGEST_NORMAL_PERCENT {
+                Distribution::Lognormal { log_standard_deviation: stiffness_percent / 100.0 }
+            } else {
+                Distribution::normal_percent(stiffness_percent)
+            },
+            level: Level::Setup,
+            source: source(stiffness_percent, usual.stiffness_percent),
+        },
+        Uncertain {
+            quantity: DeflectionQuantity::ToolSetting,
+            distribution: Distribution::normal_um(TOOL_SETTING_UM),
+            level: Level::Setup,
+            source: Source::Default,
+        },
+    ];
+    all.extend(job.effects.iter().filter_map(|effect| match *effect {
+        DeflectionEffect::SpindleScatter { sd_um } => Some(Uncertain {
+            quantity: DeflectionQuantity::SpindleScatter,
+            // Of the radius.
+            distribution: Distribution::normal_um(2.0 * sd_um),
+            level: Level::Part,
+            source: Source::Stated,
+        }),
+        _ => None,
+    }));
+    all
+}
+
+/// Finds what cannot be in the uncertainty and in the limits of size.
+pub(super) fn check(job: &Job, violations: &mut Violations) {
+    check_limits(job, violations);
+    let stated = &job.uncertainty;
+    for (i, one) in stated.quantities.iter().enumerate() {
+        let at = |field: &str| format!("/uncertainty/quantities/{i}{field}");
+        one.distribution.check(one.quantity.unit(), &at("/distribution"), violations);
+        violations.require(stated.quantities[..i].iter().all(|before| before.quantity != one.quantity), || {
+            Finding::new("duplicate_quantity", at("/quantity")).with("quantity", one.quantity.name())
+        });
+    }
+    let mut are_pairs = true;
+    for (i, pair) in stated.correlations.iter().enumerate() {
+        let [one, other] = pair.between[..] else { continue };
+        let same =
+            |before: &DeflectionCorrelation| before.between[..] == [one, other] || before.between[..] == [other, one];
+        let is_pair = one != other && !stated.correlations[..i].iter().any(same);
+        are_pairs &= is_pair;
+        violations.require(is_pair, || {
+            Finding::new("bad_correlation", format!("/uncertainty/correlations/{i}/between"))
+                .with("one", one.name())
+                .with("other", other.name())
+        });
+    }
+    if are_pairs && let Err(Contradiction { largest_factor }) = Uncertainties::of(job) {
+        violations.add(
+            Finding::new("correlations_contradict", "/uncertainty/correlations").with("largest_factor", largest_factor),
+        );
+    }
+}
+
+fn check_limits(job: &Job, violations: &mut Violations) {
+    let tolerance = &job.tolerance;
+    let limits = [tolerance.diameter_upper_um, tolerance.diameter_lower_um];
+    violations.require(tolerance.diameter_um.is_none() || limits.iter().all(Option::is_none), || {
+        Finding::new("tolerance_given_twice", "/tolerance/diameter_um")
+    });
+    if let [Some(upper), Some(lower)] = limits {
+        violations.require(lower < upper, || {
+            Finding::new("limits_crossed", "/tolerance/diameter_lower_um")
+                .measured(lower, upper, "um")
+                .with("below", upper)
+        });
+    }
+}
