@@ -35,7 +35,9 @@ pub(super) fn said(stored: &StoredRecord, revisions: &[u32], language: Language)
         said.insert("id".to_owned(), record.name.clone().into());
     }
     let mut fields = record.value.clone();
-    in_words(&mut fields);
+    if record.kind.has_sources() {
+        in_words(&mut fields);
+    }
     if let Some(title) = record.text("title") {
         let title = Glossary::of(language).help(title);
         fields["title"] = title.into();
