@@ -24,6 +24,7 @@ const SAID_BESIDE: &[&str] = &[
     "links",
     "uses",
     "conflict",
+    "force_sources",
     "power_laws",
 ];
 
