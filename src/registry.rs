@@ -47,8 +47,8 @@ use precut_calc::calculator::{Calculator, Diagnosable, ForwardModel, Registrar};
 use utoipa::openapi::{RefOr, Schema};
 
 /// Names under `/v1/` that the service itself uses: no calculator may have one of them.
-pub const RESERVED: [&str; 9] =
-    ["jobs", "results", "studies", "models", "machines", "tools", "materials", "library", "calculators"];
+pub const RESERVED: [&str; 10] =
+    ["jobs", "results", "studies", "models", "machines", "tools", "materials", "parts", "library", "calculators"];
 
 /// Every calculator, in the order in which they are offered. Cheap to clone.
 #[derive(Clone)]
@@ -134,6 +134,12 @@ impl Registry {
     /// The one of that id.
     pub fn entry(&self, id: &str) -> Option<&Arc<Entry>> {
         self.by_id.get(id).map(|&index| &self.entries[index])
+    }
+
+    /// What a field of a job has to be whose type, or that of its items, has that name in the contract; of the first calculator
+    /// that has such a field.
+    pub(crate) fn part(&self, field: &str, type_name: &str) -> Option<Checker> {
+        self.entries.iter().find_map(|entry| entry.part(field, type_name))
     }
 
     /// The id most like `name`, if one is like it at all.

@@ -117,8 +117,8 @@ impl Caller {
     }
 }
 
-/// Addresses of machines, tools and materials.
-const RECORDS: [&str; 4] = ["/v1/machines", "/v1/tools", "/v1/materials", "/v1/library"];
+/// Addresses of records.
+const RECORDS: [&str; 5] = ["/v1/machines", "/v1/tools", "/v1/materials", "/v1/parts", "/v1/library"];
 
 /// What must be allowed for a request under `/v1/` or for the metrics.
 pub(super) fn needed(method: &Method, path: &str) -> Scope {

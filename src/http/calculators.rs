@@ -165,7 +165,7 @@ pub(super) async fn describe(
 /// What jobs of a calculator may name.
 fn record_kinds(calculator: &str) -> Vec<&'static str> {
     use precut_library::Kind;
-    Kind::ALL.into_iter().filter(|kind| takes_names(calculator, *kind)).map(Kind::name).collect()
+    Kind::NAMED.into_iter().filter(|kind| takes_names(calculator, *kind)).map(Kind::name).collect()
 }
 
 /// Every calculator of the service.

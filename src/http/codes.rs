@@ -32,6 +32,7 @@ pub const CODES: &[(&str, u16)] = &[
     ("unknown_machine", 404),
     ("unknown_material", 404),
     ("unknown_model", 404),
+    ("unknown_part", 404),
     ("unknown_problem", 404),
     ("unknown_result", 404),
     ("unknown_table", 404),

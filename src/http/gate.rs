@@ -233,7 +233,7 @@ fn allowed(app: &App, path: &str) -> &'static str {
         "jobs" if !name.contains('/') => "GET, HEAD, DELETE",
         "library" if name == "import" => "POST",
         "tools" if name == "parse" => "POST",
-        "models" | "machines" | "tools" | "materials" if !name.contains('/') => "GET, HEAD, PUT, DELETE",
+        "models" | "machines" | "tools" | "materials" | "parts" if !name.contains('/') => "GET, HEAD, PUT, DELETE",
         _ => "GET, HEAD",
     }
 }

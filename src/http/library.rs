@@ -35,7 +35,9 @@ pub(super) fn said(stored: &StoredRecord, revisions: &[u32], language: Language)
         said.insert("id".to_owned(), record.name.clone().into());
     }
     let mut fields = record.value.clone();
-    in_words(&mut fields);
+    if record.kind.has_sources() {
+        in_words(&mut fields);
+    }
     if let Some(title) = record.text("title") {
         let title = Glossary::of(language).help(title);
         fields["title"] = title.into();
@@ -124,6 +126,7 @@ fn material_fields(stored: &StoredRecord, fields: &mut Value) {
         })
     });
     fields.insert("conflict".to_owned(), conflict.unwrap_or_default());
+    fields.insert("force_sources".to_owned(), force_sources(&rows));
     let engine = matches!(stored.revision, Revision::BuiltIn(_)).then(|| material::find(&record.name)).flatten();
     if let Some(Ok(Value::Object(before))) = engine.map(serde_json::to_value) {
         for (name, value) in before {
@@ -132,6 +135,19 @@ fn material_fields(stored: &StoredRecord, fields: &mut Value) {
             }
         }
     }
+}
+
+/// What each source says the specific force is at one chip thickness, where they can be compared.
+fn force_sources(rows: &[kienzle::Row<'_>]) -> Value {
+    let said = |row: &kienzle::Row<'_>| {
+        json!({
+            "row": row.index, "value_n_per_mm2": row.at_reference(), "at_chip_thickness_mm": kienzle::REFERENCE_CHIP_THICKNESS_MM,
+            "source": row.source, "certainty": row.certainty, "preferred": row.is_preferred, "superseded": row.is_superseded,
+        })
+    };
+    let mut said: Value = rows.iter().map(said).collect();
+    in_words(&mut said);
+    said
 }
 
 fn form_of(kind: &str) -> Option<Form> {

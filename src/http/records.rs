@@ -1,4 +1,4 @@
-//! Machines, tools and materials: listed, read, stored, compared, deleted.
+//! Machines, tools, materials and parts: listed, read, stored, compared, deleted.
 
 use axum::body::Body as HttpBody;
 use axum::extract::{Path, Request, State};
@@ -36,6 +36,15 @@ pub(super) fn routes(kind: Kind) -> Router<App> {
         .layer(Extension(kind))
 }
 
+/// The parameter that filters a list.
+pub(super) const fn class_parameter(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Machine | Kind::Tool => "kind",
+        Kind::Material => "group",
+        Kind::Part => "field",
+    }
+}
+
 /// `GET /v1/machines` and the like.
 async fn list(
     State(app): State<App>,
@@ -44,10 +53,10 @@ async fn list(
     uri: Uri,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let mut query = Query::of(&uri, &["q", "group", "kind", "own", "limit", "after"])?;
+    let mut query = Query::of(&uri, &["q", "group", "kind", "field", "own", "limit", "after"])?;
     let limit = query.number("limit", &(1..=MOST_ITEMS))?.unwrap_or(MOST_ITEMS);
     let own = query.one_of("own", &[true, false], |own| if own { "true" } else { "false" })?.unwrap_or(false);
-    let class = if kind == Kind::Material { "group" } else { "kind" };
+    let class = class_parameter(kind);
     let text = query.text("q").filter(|text| !text.trim().is_empty());
     let asked = RecordQuery { text, class: query.text(class), own, after: query.text("after"), limit: limit as usize };
     let (asked_text, asked_class) = (asked.text.clone(), asked.class.clone());

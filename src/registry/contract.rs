@@ -98,6 +98,11 @@ impl Contract {
 
     /// The components for the OpenAPI document.
     pub(super) fn components(&self) -> Result<BTreeMap<String, RefOr<Schema>>, RegistryError> {
+        self.offered().into_iter().map(|(name, part)| Ok((name, typed(&part)?))).collect()
+    }
+
+    /// The components with names, and what stands beside them.
+    fn offered(&self) -> Components {
         let mut components = self.components.clone();
         for (name, part) in &mut components {
             names::add_beside(name, part);
@@ -111,7 +116,16 @@ impl Contract {
         if self.named.iter().any(|(_, calculator)| names::takes_any(calculator)) {
             components.extend(names::components());
         }
-        components.into_iter().map(|(name, part)| Ok((name, typed(&part)?))).collect()
+        components
+    }
+
+    /// The schema of a field of the job, with references followed, where the field or its items are of the type of that name.
+    pub(super) fn part(&self, field: &str, type_name: &str) -> Option<Result<Value, RegistryError>> {
+        let schema = self.root["properties"].get(field)?;
+        let is_of_type = |part: &Value| part["$ref"].as_str().and_then(|way| way.rsplit('/').next()) == Some(type_name);
+        let forms = ["oneOf", "anyOf", "allOf"].into_iter().filter_map(|word| schema[word].as_array()).flatten();
+        let mut meant = forms.chain([schema, &schema["items"]]);
+        meant.any(is_of_type).then(|| schema::strict(schema, &self.offered()))
     }
 
     /// The components before their objects were closed.

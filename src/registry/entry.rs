@@ -406,6 +406,13 @@ impl Entry {
     pub(crate) fn validate(&self, job: &Value, faults: &mut Faults) {
         self.of_job(job).unwrap_or(self).checker().check(job, "", faults);
     }
+    /// What a field of the job has to be, where it is of the type of that name.
+    pub(super) fn part(&self, field: &str, type_name: &str) -> Option<Checker> {
+        match self.members() {
+            [] => self.input().part(field, type_name).map(|schema| follows(schema.and_then(Checker::new))),
+            members => members.iter().find_map(|member| member.entry.part(field, type_name)),
+        }
+    }
     /// Adds what is wrong with effects that are to act in jobs of this calculator.
     pub(crate) fn validate_effects(&self, effects: &Value, faults: &mut Faults) {
         let schema = self.strict_input()["properties"]["effects"].clone();

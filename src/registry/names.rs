@@ -26,7 +26,7 @@ const BESIDE: [&[&str]; 7] = [
 
 /// Lets a job name records.
 pub(super) fn let_in(shape: &mut Shape, calculator: &str) {
-    let taken = Kind::ALL.into_iter().filter(|kind| takes(calculator, *kind));
+    let taken = Kind::NAMED.into_iter().filter(|kind| takes(calculator, *kind));
     let mut any = false;
     for kind in taken {
         any = true;
@@ -37,27 +37,39 @@ pub(super) fn let_in(shape: &mut Shape, calculator: &str) {
     }
 }
 
-/// Names of the components that say what stands beside a name.
-fn component(kind: Kind) -> &'static str {
-    match kind {
-        Kind::Machine => "NamedMachine",
-        Kind::Tool => "NamedTool",
-        Kind::Material => "NamedMaterial",
-    }
+/// What the contract says of a name.
+struct Named {
+    kind: Kind,
+    /// The component that says what stands beside it.
+    component: &'static str,
+    example: &'static str,
+    about: &'static str,
 }
 
-/// An example of a name.
-fn example(kind: Kind) -> &'static str {
-    match kind {
-        Kind::Machine => "lathe_engine_medium",
-        Kind::Tool => "cnmg120408_pclnr2525m12",
-        Kind::Material => "42crmo4",
-    }
-}
+const NAMED: [Named; Kind::NAMED.len()] = [
+    Named {
+        kind: Kind::Machine,
+        component: "NamedMachine",
+        example: "lathe_engine_medium",
+        about: "A machine by name: its compliances, limits and prices fill in what the job leaves open.",
+    },
+    Named {
+        kind: Kind::Tool,
+        component: "NamedTool",
+        example: "cnmg120408_pclnr2525m12",
+        about: "A tool by name or by its ISO codes: its geometry and prices fill in what the job leaves open.",
+    },
+    Named {
+        kind: Kind::Material,
+        component: "NamedMaterial",
+        example: "42crmo4",
+        about: "A material by any of its names: its constants and force law fill in what the job leaves open.",
+    },
+];
 
 /// Whether jobs of a calculator may name any.
 pub(super) fn takes_any(calculator: &str) -> bool {
-    Kind::ALL.into_iter().any(|kind| takes(calculator, kind))
+    Kind::NAMED.into_iter().any(|kind| takes(calculator, kind))
 }
 
 /// Fields that stand beside names, by the component that has them.
@@ -156,57 +168,51 @@ pub(super) fn offer(calculator: &str, root: &mut Value) {
 
 /// The fields that a job of a calculator has for names, with what it declares there itself.
 fn offered(calculator: &str, declared: &Value) -> Map<String, Value> {
-    let taken = Kind::ALL.into_iter().filter(|kind| takes(calculator, *kind));
+    let taken = NAMED.iter().filter(|named| takes(calculator, named.kind));
     taken
-        .map(|kind| {
-            let name = kind.name();
+        .map(|named| {
+            let name = named.kind.name();
             let word = json!({
-                "type": "string", "maxLength": 100, "description": "`name`, or `name@revision`.", "examples": [example(kind)],
+                "type": "string", "maxLength": 100, "description": "`name`, or `name@revision`.", "examples": [named.example],
             });
-            let object = json!({ "$ref": format!("#/components/schemas/{}", component(kind)) });
+            let object = json!({ "$ref": format!("#/components/schemas/{}", named.component) });
             let own = declared["properties"].get(name).cloned();
-            let about = match kind {
-                Kind::Machine => "A machine by name: its compliances, limits and prices fill in what the job leaves open.",
-                Kind::Tool => "A tool by name or by its ISO codes: its geometry and prices fill in what the job leaves open.",
-                Kind::Material => {
-                    "A material by any of its names: its constants and force law fill in what the job leaves open."
-                }
-            };
             let forms: Vec<Value> = [Some(word), own, Some(object)].into_iter().flatten().collect();
-            (name.to_owned(), json!({ "oneOf": forms, "description": about }))
+            (name.to_owned(), json!({ "oneOf": forms, "description": named.about }))
         })
         .collect()
 }
 
 /// What [`offered`] refers to.
 pub(super) fn components() -> Components {
-    let name = |kind: Kind| json!({ "type": "string", "maxLength": 100, "examples": [example(kind)], "description": "`name`, or `name@revision`." });
-    let object = |kind: Kind, about: &str| {
+    let [machine, tool, material] = &NAMED;
+    let name = |named: &Named| json!({ "type": "string", "maxLength": 100, "examples": [named.example], "description": "`name`, or `name@revision`." });
+    let object = |named: &Named, about: &str| {
         json!({
             "type": "object", "description": about, "required": ["name"],
-            "properties": { "name": name(kind) }, "additionalProperties": true,
+            "properties": { "name": name(named) }, "additionalProperties": true,
         })
     };
     let code = |about: &str, example: &str| json!({ "type": "string", "maxLength": 64, "description": about, "examples": [example] });
-    let mut tool =
-        object(Kind::Tool, "A tool by name or by its codes, with fields of its record that the job overrules.");
-    tool["required"] = json!([]);
-    tool["properties"]["insert"] = code("Designation of the insert, ISO 1832.", "DNMG150608");
-    tool["properties"]["holder"] =
+    let mut tool_object =
+        object(tool, "A tool by name or by its codes, with fields of its record that the job overrules.");
+    tool_object["required"] = json!([]);
+    tool_object["properties"]["insert"] = code("Designation of the insert, ISO 1832.", "DNMG150608");
+    tool_object["properties"]["holder"] =
         code("Designation of the holder, ISO 5608, or of the bar, ISO 6261.", "PDJNL2525M15");
-    tool["properties"]["overhang_mm"] = json!({
+    tool_object["properties"]["overhang_mm"] = json!({
         "type": "number", "minimum": 0.01, "maximum": 10_000.0, "example": 100.0, "x-unit": "mm", "x-symbol": "L",
         "description": "Overhang of a boring bar.",
     });
     Components::from([
         (
-            component(Kind::Machine).to_owned(),
-            object(Kind::Machine, "A machine by name, with fields of its record that the job overrules."),
+            machine.component.to_owned(),
+            object(machine, "A machine by name, with fields of its record that the job overrules."),
         ),
-        (component(Kind::Tool).to_owned(), tool),
+        (tool.component.to_owned(), tool_object),
         (
-            component(Kind::Material).to_owned(),
-            object(Kind::Material, "A material by name, with fields of its record that the job overrules."),
+            material.component.to_owned(),
+            object(material, "A material by name, with fields of its record that the job overrules."),
         ),
     ])
 }

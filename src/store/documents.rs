@@ -1,5 +1,5 @@
-//! Documents under names: stored models, and the machines, tools and materials that jobs name. Each belongs to somebody and
-//! has revisions that never change.
+//! Documents under names: stored models, the machines, tools and materials that jobs name, and parts of jobs. Each belongs to
+//! somebody and has revisions that never change.
 
 use futures_util::future::BoxFuture;
 
@@ -17,6 +17,8 @@ pub enum Kind {
     Tool,
     /// A work material.
     Material,
+    /// A part of a job.
+    Part,
 }
 
 impl Kind {
@@ -27,6 +29,7 @@ impl Kind {
             Self::Machine => "machine",
             Self::Tool => "tool",
             Self::Material => "material",
+            Self::Part => "part",
         }
     }
 }
@@ -39,7 +42,8 @@ pub struct KeptDocument {
     /// From 1; a revision never changes.
     #[sqlx(try_from = "i32")]
     pub revision: u32,
-    /// What lists are filtered by: the calculator of a model, the kind of a machine or a tool, the group of a material.
+    /// What lists are filtered by: the calculator of a model, the kind of a machine or a tool, the group of a material, the
+    /// field of a part.
     pub class: String,
     /// Canonical JSON.
     pub content: String,

@@ -242,12 +242,27 @@ impl Page {
     /// Presses and moves and lets go.
     pub fn drag(&mut self, from: (f64, f64), to: (f64, f64)) {
         self.point(from);
-        self.mouse("mousePressed", from, 1);
+        self.press_at(from);
         for step in 1..=8 {
             let share = f64::from(step) / 8.0;
-            self.mouse("mouseMoved", (from.0 + share * (to.0 - from.0), from.1 + share * (to.1 - from.1)), 1);
+            self.pull((from.0 + share * (to.0 - from.0), from.1 + share * (to.1 - from.1)));
         }
-        self.mouse("mouseReleased", to, 0);
+        self.let_go(to);
+    }
+
+    /// Presses the button of the mouse.
+    pub fn press_at(&mut self, place: (f64, f64)) {
+        self.mouse("mousePressed", place, 1);
+    }
+
+    /// Moves the mouse with its button pressed.
+    pub fn pull(&mut self, place: (f64, f64)) {
+        self.mouse("mouseMoved", place, 1);
+    }
+
+    /// Lets the button of the mouse go.
+    pub fn let_go(&mut self, place: (f64, f64)) {
+        self.mouse("mouseReleased", place, 0);
     }
 
     /// A real click in the middle of an element, once it holds still: what has just come may still push it aside.

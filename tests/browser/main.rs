@@ -11,6 +11,7 @@ mod assets;
 mod calm;
 mod chromium;
 mod diagnosis;
+mod drag;
 mod instruments;
 mod jobs;
 mod keys;

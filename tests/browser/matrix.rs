@@ -213,6 +213,11 @@ fn handles_stand_on_the_axis_and_follow_the_hand() {
         page.until(&format!("{CURRENT} && {SETTLED} && document.querySelector('{shoulder}')"));
         // In steps of the axis, of which a label and a handle know their middles to half a pixel.
         assert!(page.evaluate(&off).as_f64().unwrap().abs() < 0.03, "{size}: {}", page.evaluate(&off));
+        // None is so near to another that it would be hidden.
+        for name in ["handle_end", "handle_centre", "handle_shoulder", "handle_diameter"] {
+            let there = format!("document.querySelector('.grip[data-name={name}]') !== null");
+            assert_eq!(page.evaluate(&there), true, "{name} at {size}");
+        }
         let before = page.evaluate(&place);
         page.evaluate(&format!("(gated(), document.querySelector('{shoulder}').focus())"));
         page.press("ArrowLeft");

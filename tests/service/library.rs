@@ -552,6 +552,76 @@ async fn no_record_however_broken_is_a_fault_of_the_service() {
 }
 
 #[tokio::test]
+async fn a_part_of_a_job_is_kept_as_the_job_has_it_and_only_where_a_job_takes_it() {
+    let server = server().await;
+    let stock = json!({ "segments": [{ "length_mm": 400, "diameter_mm": 60, "stock_diameter_mm": 63 }] });
+    let shaft = |value: &Value| json!({ "field": "shaft", "type": "Shaft", "value": value });
+    let (status, kept) = put(&server, "/v1/parts/my-shaft", &shaft(&stock)).await;
+    assert_eq!((status, &kept["value"], &kept["revision"]), (201, &stock, &json!(1)), "{kept:#}");
+    // A list of items, and what names a record, with words that are keys of the data.
+    let supports = json!([{ "kind": "chuck", "z_mm": 0 }, { "kind": "steady_rest", "rest": "front", "z_mm": 200 }]);
+    let listed = json!({ "field": "supports", "type": "Support", "value": supports });
+    assert_eq!(put(&server, "/v1/parts/my-supports", &listed).await.0, 201);
+    let force = json!({ "kind": "kienzle", "normal_force": "judged", "source": "iscar_2017" });
+    let (status, kept) =
+        put(&server, "/v1/parts/my-force", &json!({ "field": "force", "type": "ForceModel", "value": force })).await;
+    assert_eq!((status, &kept["value"]), (201, &force), "{kept:#}");
+    // What is kept is what a job takes.
+    let mut job = shaft_by_names();
+    for (field, name) in [("shaft", "my-shaft"), ("force", "my-force")] {
+        job[field] = got(&server, &format!("/v1/parts/{name}")).await["value"].clone();
+    }
+    answer(&server, DEFLECTION, &job).await;
+    let names = |list: &Value| -> Vec<String> {
+        list["items"].as_array().unwrap().iter().map(|item| item["name"].as_str().unwrap().to_owned()).collect()
+    };
+    assert_eq!(names(&got(&server, "/v1/parts").await), ["my-force", "my-shaft", "my-supports"]);
+    assert_eq!(names(&got(&server, "/v1/parts?field=shaft").await), ["my-shaft"]);
+
+    let refused = async |record: Value| {
+        let (status, said) = put(&server, "/v1/parts/wrong", &record).await;
+        assert_eq!(status, 422, "{said:#}");
+        let of =
+            |error: &Value| (error["pointer"].as_str().unwrap().to_owned(), error["code"].as_str().unwrap().to_owned());
+        said["errors"].as_array().unwrap().iter().map(of).collect::<Vec<_>>()
+    };
+    let pair = |pointer: &str, code: &str| (pointer.to_owned(), code.to_owned());
+    for (field, kind) in [("shaft", "Spindle"), ("spindle", "Shaft"), ("name", "string")] {
+        let strange = json!({ "field": field, "type": kind, "value": {} });
+        assert_eq!(refused(strange).await, [pair("/type", "unknown_part_type")]);
+    }
+    assert_eq!(
+        refused(json!({ "field": "shaft" })).await,
+        [pair("/type", "missing_field"), pair("/value", "missing_field")]
+    );
+    let thin = json!({ "segments": [{ "length_mm": 400, "diameter_mm": -1 }], "colour": "red" });
+    let found = refused(shaft(&thin)).await;
+    assert_eq!(found.len(), 2, "{found:?}");
+    assert!(found.iter().any(|(pointer, _)| pointer == "/value/segments/0/diameter_mm"), "{found:?}");
+    let unknown = server.get("/v1/parts/nothing").send().await.unwrap();
+    problem(unknown, 404, "unknown_part").await;
+
+    // They travel as records do; TOML has no null.
+    let null = json!({ "segments": [{ "length_mm": 400, "diameter_mm": 60 }], "material": null });
+    assert_eq!(put(&server, "/v1/parts/my-null", &shaft(&null)).await.0, 201);
+    assert_eq!(server.get("/v1/library/export?format=toml").send().await.unwrap().status(), 200);
+    server.client.delete(server.url("/v1/parts/my-null")).send().await.unwrap();
+    let other = self::server().await;
+    for (form, kind) in [("json", "application/json"), ("toml", "application/toml"), ("csv", "text/csv")] {
+        let file = server.get(&format!("/v1/library/export?format={form}")).send().await.unwrap().text().await.unwrap();
+        let import = other.client.post(other.url("/v1/library/import")).header("content-type", kind).body(file);
+        let report: Value = import.send().await.unwrap().json().await.unwrap();
+        let (new, equal) = if form == "json" { (3, 0) } else { (0, 3) };
+        let count = |list: &str| report[list].as_array().map(Vec::len);
+        assert_eq!((count("new"), count("equal")), (Some(new), Some(equal)), "{form}: {report:#}");
+    }
+    let gone = server.client.delete(server.url("/v1/parts/my-shaft")).send().await.unwrap();
+    assert_eq!(gone.status(), 204);
+    server.stop().await;
+    other.stop().await;
+}
+
+#[tokio::test]
 async fn the_history_of_a_machine_only_grows() {
     let server = server().await;
     let entry = |model: &str| json!({ "calculator": "deflection-compensation", "model": model, "revision": 1, "from_date": "2026-02-03" });

@@ -7,6 +7,7 @@ for (const name of ['localStorage', 'sessionStorage']) {
   stores[name] = new Map();
   globalThis[name] = { getItem: key => stores[name].get(key) ?? null, setItem: (key, value) => stores[name].set(key, value) };
 }
+const { useKey } = await import('../../ui/app/api.js');
 const { keep, forget, ownName, withOwn, noteLast, lastJob } = await import('../../ui/app/mine.js');
 const { jobOf } = await import('../../ui/app/address.js');
 
@@ -55,15 +56,15 @@ test('an address that says what it is about gets that', async () => {
   }
 });
 
-test('a part of another type of the same name is left alone', () => {
+test('a part of another type of the same name is left alone', async () => {
   keep('shaft Shaft', { length_mm: 700 });
   const other = { ...root, properties: { shaft: { $ref: '#/$defs/Spindle' } }, $defs: { Spindle: shaft } };
-  assert.deepEqual(withOwn(other, { shaft: { length_mm: 1 } }), { job: { shaft: { length_mm: 1 } }, own: [] });
+  assert.deepEqual(await withOwn(other, { shaft: { length_mm: 1 } }), { job: { shaft: { length_mm: 1 } }, own: [] });
 });
 
-test('what is kept and the same is no change', () => {
+test('what is kept and the same is no change', async () => {
   keep('shaft Shaft', { length_mm: 100 });
-  assert.deepEqual(withOwn(root, example), { job: example, own: [] });
+  assert.deepEqual(await withOwn(root, example), { job: example, own: [] });
 });
 
 test('a model goes onto the last job, not onto what was on its way or beside it', () => {
@@ -77,4 +78,37 @@ test('a kept result with a model is another job', async () => {
   const service = { jobOf: async () => ({ calculator: 'one', job: example }) };
   const { job, key } = await jobOf(description, query('result=b3:1&model=headstock'), service);
   assert.deepEqual([job.model, key], ['headstock', null]);
+});
+
+test('with a key parts are kept in the service, and none of the browser are used', async () => {
+  keep('shaft Shaft', { length_mm: 700 });
+  const kept = new Map([['old-carriage', { name: 'old-carriage', field: 'carriage', type: 'Carriage', value: { compliance: 5 } }]]);
+  const asked = [];
+  globalThis.fetch = (path, { method = 'GET', body, headers }) => {
+    asked.push(`${method} ${path} ${headers.Authorization}`);
+    const name = path.split('/')[3];
+    if (method === 'PUT') kept.set(name, { name, ...JSON.parse(body) });
+    if (method === 'DELETE') kept.delete(name);
+    return Promise.resolve(new Response(JSON.stringify(method === 'GET' ? { items: [...kept.values()], next: null } : {})));
+  };
+  useKey('secret');
+  const begun = await withOwn(root, example);
+  assert.deepEqual([begun.own, begun.job.carriage], [['carriage'], { compliance: 5 }]);
+  await keep('shaft Shaft', { length_mm: 300 });
+  assert.deepEqual(kept.get('shaft-shaft'), { name: 'shaft-shaft', field: 'shaft', type: 'Shaft', value: { length_mm: 300 } });
+  assert.deepEqual((await withOwn(root, example)).own, ['shaft', 'carriage']);
+  assert.equal(stores.localStorage.get('precut-own-parts'), '{"shaft Shaft":{"length_mm":700}}', 'the browser keeps nothing of it');
+  await forget('carriage Carriage');
+  assert.deepEqual([...kept.keys()], ['shaft-shaft']);
+  assert.deepEqual(
+    asked,
+    ['GET /v1/parts', 'PUT /v1/parts/shaft-shaft', 'DELETE /v1/parts/old-carriage'].map(line => `${line} Bearer secret`),
+  );
+  // What the service refuses is not kept, and whoever gives another key has other parts.
+  globalThis.fetch = async () => new Response('{"title": "no"}', { status: 403 });
+  await assert.rejects(keep('shaft Shaft', { length_mm: 1 }));
+  assert.deepEqual((await withOwn(root, example)).job.shaft, { length_mm: 300 });
+  globalThis.fetch = async () => new Response('{"items": [], "next": null}');
+  useKey('another');
+  assert.deepEqual((await withOwn(root, example)).own, []);
 });

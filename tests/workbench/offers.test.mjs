@@ -57,6 +57,20 @@ test('handles too near for a finger give way to those that come later', () => {
   );
 });
 
+test('a handle that goes along the axis makes way upwards or downwards while there is room', () => {
+  const at = (x, along) => ({ handle: { x, y: 0, along } });
+  const same = value => value;
+  const places = (top, ...handles) => roomy(handles, same, same, { top, height: -2 * top }).map(({ h, v }) => [h, v]);
+  assert.deepEqual(places(-100, at(0, 'x'), at(10, 'x')), [
+    [0, -26],
+    [10, 0],
+  ]);
+  // One that goes up and down stays where it says how far; in a low panel there is no way.
+  assert.deepEqual(places(-100, at(0, 'y'), at(10, 'x')), [[10, 0]]);
+  assert.deepEqual(places(-20, at(0, 'x'), at(10, 'x'))[0], [0, -26]);
+  assert.deepEqual(places(-19, at(0, 'x'), at(10, 'x')), [[10, 0]]);
+});
+
 test('a knob gives way by one percent to the side on which it is looser', () => {
   const inputs = {
     type: 'object',

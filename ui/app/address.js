@@ -47,7 +47,7 @@ export async function jobOf(description, query, service = api) {
     job = changed(job, parts(place), readValue(place, text));
   }
   // Whoever asks for no job in particular begins with what is his own.
-  const begun = query.has('example') || job !== base ? { job, own: [] } : withOwn(description.input_schema, job);
+  const begun = query.has('example') || job !== base ? { job, own: [] } : await withOwn(description.input_schema, job);
   if (query.get('model')) begun.job = { ...begun.job, model: query.get('model') };
   return { ...begun, base, baseName: { example: name }, key: null };
 }

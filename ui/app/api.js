@@ -18,6 +18,8 @@ const storedKey = () => {
     return null;
   }
 };
+/** Whether the service is asked with a key, and so knows whose things are whose. */
+export const hasKey = () => Boolean(storedKey());
 export function useKey(key) {
   try {
     sessionStorage.setItem(KEY, key.trim());
@@ -57,7 +59,8 @@ async function ask(path, { headers = {}, ...options } = {}) {
   }
   if (!online.get()) online.set(true);
   if (response.ok) return response;
-  if (response.status === 401 && !keyAsked.get()) keyAsked.set(key ? 'refused' : 'wanted');
+  // What was asked before a key was given says nothing of it.
+  if (response.status === 401 && key === storedKey() && !keyAsked.get()) keyAsked.set(key ? 'refused' : 'wanted');
   const problem = await response.json().catch(() => ({ title: response.statusText }));
   throw new Refused(response.status, problem, Number(response.headers.get('Retry-After')) || null);
 }
@@ -97,7 +100,7 @@ const enc = encodeURIComponent;
 
 export const calculators = () => json('/v1/calculators');
 export const calculator = id => json(`/v1/calculators/${enc(id)}`);
-/** All machines, tools or materials: own ones, then the service's. */
+/** All machines, tools, materials or parts: own ones, then the service's. */
 export async function records(list) {
   const items = [];
   for (let next = `/v1/${list}`; next; ) {
@@ -163,7 +166,7 @@ export async function program(key, signal) {
 }
 
 const recordAt = (list, name) => `/v1/${list}/${enc(name)}`;
-/** Stores a machine, a tool or a material; only under a name that nothing has, if it has to be new. */
+/** Stores a machine, a tool, a material or a part; only under a name that nothing has, if it has to be new. */
 export const saveRecord = (list, name, source, isNew) =>
   json(recordAt(list, name), {
     method: 'PUT',

@@ -1,7 +1,7 @@
 // The items of a figure as SVG elements.
 import { html } from './lib.js';
 import { ascends, below } from './scale.js';
-import { colouring } from './palette.js';
+import { colouring, colours } from './palette.js';
 
 const MARKERS = {
   circle: 'm-3 0a3 3 0 1 0 6 0a3 3 0 1 0-6 0',
@@ -200,8 +200,20 @@ const nearest = (list, value) => {
   return value - list[at] < list[at + 1] - value ? at : at + 1;
 };
 
-/** A map as a picture of its pixels; what is above the parting of colours is hatched, too. */
-function mapImage(item, x, y, { left, top, width, height }) {
+/** The picture of a map that was drawn last, by the map, and how it was drawn: it costs more than the rest of its panel. */
+const drawnMaps = new WeakMap();
+
+/** A map as a picture of its pixels. */
+function mapImage(item, x, y, frame) {
+  const { left, top, width, height } = frame;
+  const ends = [x.back(left), x.back(left + width), y.back(top), y.back(top + height)];
+  const how = [left, top, width, height, ...ends, ...colours(item.diverging)].join();
+  if (drawnMaps.get(item)?.how !== how) drawnMaps.set(item, { how, href: mapPixels(item, x, y, frame) });
+  return html`<image x=${left} y=${top} width=${width} height=${height} href=${drawnMaps.get(item).href} preserveAspectRatio="none" />`;
+}
+
+/** The address of that picture; what is above the parting of colours is hatched, too. */
+function mapPixels(item, x, y, { left, top, width, height }) {
   const canvas = document.createElement('canvas');
   const [columns, rows] = [Math.max(1, Math.round(width)), Math.max(1, Math.round(height))];
   canvas.width = columns;
@@ -209,6 +221,10 @@ function mapImage(item, x, y, { left, top, width, height }) {
   const context = canvas.getContext('2d');
   const image = context.createImageData(columns, rows);
   const { step, steps, isAbove } = colouring(item);
+  // A cell has many pixels.
+  const cells = item.values.map(value =>
+    value === null ? null : { colour: steps[step(value)], isHatched: item.diverging && isAbove(value) },
+  );
   const half = list => (list.length > 1 ? [(list[1] - list[0]) / 2, (list.at(-1) - list.at(-2)) / 2] : [0, 0]);
   const inside = (list, value, ends) => value >= list[0] - ends[0] && value <= list.at(-1) + ends[1];
   const [hx, hy] = [half(item.x), half(item.y)];
@@ -222,17 +238,17 @@ function mapImage(item, x, y, { left, top, width, height }) {
     const base = nearest(item.y, value) * item.x.length;
     for (let column = 0; column < columns; column += 1) {
       if (across[column] < 0) continue;
-      const number = item.values[base + across[column]];
-      if (number === null) continue;
-      const colour = steps[step(number)];
+      const cell = cells[base + across[column]];
+      if (cell === null) continue;
+      const { colour, isHatched } = cell;
       const at = 4 * (row * columns + column);
-      const dim = item.diverging && isAbove(number) && (row + column) % 9 === 0 ? 0.78 : 1;
+      const dim = isHatched && (row + column) % 9 === 0 ? 0.78 : 1;
       for (let part = 0; part < 3; part += 1) image.data[at + part] = colour[part] * dim;
       image.data[at + 3] = 255;
     }
   }
   context.putImageData(image, 0, 0);
-  return html`<image x=${left} y=${top} width=${width} height=${height} href=${canvas.toDataURL()} preserveAspectRatio="none" />`;
+  return canvas.toDataURL();
 }
 
 /** A symbol, its tip at the place. */

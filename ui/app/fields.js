@@ -102,7 +102,7 @@ export function Row({ name, schema, path, value, required, context, control: Con
       ${origin && html`<button type="button" class="origin-mark" aria-expanded=${isAsked ? 'true' : 'false'} title=${t('where_from')} aria-label=${`${t('where_from')} ${label}`} onClick=${() => setAsked(!isAsked)}>◦</button>`}
       <${Control} ...${common} label=${html`<span>${label}</span>${schema['x-symbol'] && schema['x-symbol'].toLowerCase() !== label.toLowerCase() && html`\u00a0<${FieldSymbol} symbol=${schema['x-symbol']} />`}`} unit=${unit} plain=${label} />
       <span id=${`${id}-about`} class="hidden">${[unit && t('in_unit', { unit }), allowed, description].filter(Boolean).join('. ')}</span>
-      ${origin && isAsked && html`<${Origin} origin=${origin} resources=${context.resources} unit=${unit} />`}
+      ${origin && isAsked && html`<${Origin} origin=${origin} resources=${context.resources} libraries=${context.libraries} unit=${unit} />`}
       ${wrong ? html`<${Unread} ...${wrong} id=${`${id}-fault`} />` : html`<${Faults} faults=${faults} id=${`${id}-fault`} names=${context.names} />`}
     </div>`;
 }

@@ -34,20 +34,29 @@ export const movedJob = (job, filled, handle, by) =>
 
 const placeOf = handle => handle[handle.along];
 
-/** A handle stands within its panel. */
+/** A handle stands within its panel; one that makes way reaches out of it so far at most. */
 const INSIDE_PX = 9;
+const OUTSIDE_PX = 6;
 const withinFrame = (v, { top, height }) => Math.min(Math.max(v, top + INSIDE_PX), top + height - INSIDE_PX);
 
 /** Handles nearer to each other than this, px, both across and up, cover too much of each other to be hit: what comes later in
  *  the figure stays. */
 const APART_PX = 26;
 
-/** Those of a panel that have room; the others come when the picture is larger, or a part of it. */
+/** Those of a panel that have room, each at its place `h`, `v`; the others come when the picture is larger, or a part of it. How
+ *  high one stands that goes along x says nothing: it makes way upwards or downwards. */
 export function roomy(handles, x, y, frame) {
   const kept = [];
   for (const one of handles.toReversed()) {
-    const [h, v] = [x(one.handle.x), withinFrame(y(one.handle.y), frame)];
-    if (kept.every(other => Math.max(Math.abs(other.h - h), Math.abs(other.v - v)) >= APART_PX)) kept.push({ ...one, h, v });
+    const h = x(one.handle.x);
+    const own = withinFrame(y(one.handle.y), frame);
+    const near = kept.filter(other => Math.abs(other.h - h) < APART_PX);
+    const beside = one.handle.along === 'x' ? near.flatMap(other => [other.v - APART_PX, other.v + APART_PX]) : [];
+    const [least, most] = [frame.top - OUTSIDE_PX, frame.top + frame.height + OUTSIDE_PX];
+    const v = [own, ...beside.sort((a, b) => Math.abs(a - own) - Math.abs(b - own))].find(
+      place => least <= place && place <= most && near.every(other => Math.abs(other.v - place) >= APART_PX),
+    );
+    if (v !== undefined) kept.push({ ...one, h, v });
   }
   return kept.reverse();
 }
@@ -58,9 +67,12 @@ export function Handles({ panel, axis, x, y, hold, frame, effect }) {
   // What is being pulled stays, wherever it comes.
   const pulled = useRef(null);
   const all = panel.items.map((handle, index) => ({ handle, index })).filter(({ handle }) => handle.kind === 'handle');
-  const shown = pulled.current ? all.filter(({ index }) => pulled.current.includes(index)) : roomy(all, x, y, frame);
+  const shown = pulled.current
+    ? all.flatMap(one => (pulled.current.has(one.index) ? [{ ...one, v: pulled.current.get(one.index) }] : []))
+    : roomy(all, x, y, frame);
   const take = handle => {
-    pulled.current = shown.map(({ index }) => index);
+    // Up and down with the picture, but for what made way.
+    pulled.current = new Map(shown.map(one => [one.index, one.handle.along === 'x' ? one.v : undefined]));
     const { move, drop } = hold(handle);
     return {
       move,
@@ -71,14 +83,14 @@ export function Handles({ panel, axis, x, y, hold, frame, effect }) {
     };
   };
   return html`
-    <div class="handles">${shown.map(({ handle, index }) => html`<${Grip} key=${index} ...${{ handle, x, y, frame, effect }} hold=${take} axis=${handle.along === 'x' ? axis : panel.y} />`)}</div>`;
+    <div class="handles">${shown.map(({ handle, index, v }) => html`<${Grip} key=${index} ...${{ handle, x, y, v, frame, effect }} hold=${take} axis=${handle.along === 'x' ? axis : panel.y} />`)}</div>`;
 }
 
-function Grip({ handle, x, y, axis, hold, frame, effect }) {
+function Grip({ handle, x, y, v, axis, hold, frame, effect }) {
   // Pulled: the scale and the place of then, as both change with the picture that follows.
   const pulled = useRef(null);
   const own = handle.along === 'x' ? x : y;
-  const [left, top] = [x(handle.x), withinFrame(y(handle.y), frame)];
+  const [left, top] = [x(handle.x), v ?? withinFrame(y(handle.y), frame)];
   if (!(left >= frame.left - 1 && left <= frame.left + frame.width + 1)) return null;
   const pixel = event => (handle.along === 'x' ? event.clientX : event.clientY);
   const perPixel = Math.abs(own.back(1) - own.back(0));

@@ -56,6 +56,52 @@ function Numbers({ kind, record, done, fail }) {
     </form>`;
 }
 
+/** A day as records have it. */
+const dayOf = date => date.toISOString().slice(0, 10);
+const titleOf = (calculators, id) => calculators.find(calculator => calculator.id === id)?.title ?? id;
+
+/** What a machine has learnt: the model in force for each calculator, those before it, and the next one. */
+function Learnt({ record, calculators, models, done, fail }) {
+  const [chosen, setChosen] = useState('');
+  const history = record.history ?? [];
+  const inForce = record.models ?? {};
+  const fitting = (models ?? []).filter(({ name, calculator, revision }) => inForce[calculator] !== `${name}@${revision}`);
+  const next = fitting.find(({ name }) => name === chosen) ?? fitting[0];
+  const today = dayOf(new Date());
+  /** Another model, or none, is in force for the jobs of a calculator from now on. */
+  const put = async (calculator, model) => {
+    const ended = history.map(entry => (entry.calculator === calculator && !entry.to_date ? { ...entry, to_date: today } : entry));
+    const begun = model ? [{ calculator, model: model.name, revision: model.revision, from_date: today }] : [];
+    const named = model ? `${model.name}@${model.revision}` : null;
+    const set = { [pointer(['models', calculator])]: named, [pointer(['history'])]: [...ended, ...begun] };
+    try {
+      await api.saveRecord(FOLDER.machine, record.name, { from: record.name, set });
+      await done();
+    } catch (error) {
+      fail(said(error));
+    }
+  };
+  return html`
+    <section class="learnt" aria-label=${`${record.name}: ${t('learnt')}`}><h3>${t('learnt')}</h3>
+      ${
+        history.length === 0
+          ? html`<p class="quiet">${t('learnt_none')}</p>`
+          : html`<table class="list"><thead><tr><th scope="col">${t('calculator')}</th><th scope="col">${t('model')}</th><th scope="col">${t('from_day')}</th><th scope="col">${t('to_day')}</th></tr></thead>
+        <tbody>${history.toReversed().map((entry, index) => {
+          const { calculator, model, revision, note } = entry;
+          const isInForce = inForce[calculator] === `${model}@${revision}` && !entry.to_date;
+          return html`<tr key=${index} data-in-force=${isInForce ? '' : undefined}><th scope="row">${titleOf(calculators, calculator)}</th><td>${model}@${revision}${note && html`<p class="quiet">${note}</p>`}</td><td data-of=${t('from_day')}>${entry.from_date}</td>
+          <td data-of=${isInForce ? undefined : t('to_day')}>${isInForce ? html`${t('in_force')} <button type="button" class="quiet-button" onClick=${() => put(calculator, null)}>${t('learnt_end')}<span class="hidden"> ${model}</span></button>` : entry.to_date}</td></tr>`;
+        })}</tbody></table>`
+      }
+      ${
+        next &&
+        html`<p class="learnt-next"><label>${t('model')} <select value=${next.name} onChange=${event => setChosen(event.currentTarget.value)}>${fitting.map(({ name, revision, calculator }) => html`<option value=${name}>${name}@${revision}: ${titleOf(calculators, calculator)}</option>`)}</select></label>
+        <button type="button" onClick=${() => put(next.calculator, next)}>${t('learnt_put')}</button></p>`
+      }
+    </section>`;
+}
+
 /** A copy of a record under a name of one's own. */
 function Copy({ lists, done, fail }) {
   const [kind, setKind] = useState('machine');
@@ -84,7 +130,7 @@ function Copy({ lists, done, fail }) {
     </form>`;
 }
 
-export function Library() {
+export function Library({ calculators, models }) {
   const [lists, setLists] = useState(null);
   const [trouble, setTrouble] = useState(null);
   const [told, setTold] = useState(null);
@@ -147,12 +193,12 @@ export function Library() {
             kind,
             record,
             id,
-          }) => html`<tr role="row" key=${id}><th scope="row" role="rowheader">${record.name}<p class="quiet">${record.title}</p></th><td role="cell">${t(`record_${kind}`)}</td><td role="cell" class="number">${record.revision}</td>
+          }) => html`<tr role="row" key=${id}><th scope="row" role="rowheader">${record.name}<p class="quiet">${record.title}</p></th><td role="cell">${t(`record_${kind}`)}</td><td role="cell" class="number" data-of=${t('revision')}>${record.revision}</td>
           <td role="cell" class="actions"><button type="button" aria-expanded=${opened === id ? 'true' : 'false'} onClick=${() => setOpened(opened === id ? '' : id)}>${t('record_numbers')}<span class="hidden"> ${record.name}</span></button>
             <button type="button" class=${asked === id ? 'sure' : ''} onBlur=${() => setAsked('')} onClick=${() => (asked === id ? act(() => api.dropRecord(FOLDER[kind], record.name)) : setAsked(id))}>${asked === id ? t('delete_sure') : t('delete')}<span class="hidden"> ${record.name}</span></button></td></tr>`,
         )}</tbody></table></div>`)
       }
-      ${own?.filter(({ id }) => id === opened).map(({ kind, record, id }) => html`<section key=${`${id} ${record.revision}`}><h2>${record.name}</h2><${Numbers} kind=${kind} record=${record} done=${done} fail=${setTrouble} /></section>`)}
+      ${own?.filter(({ id }) => id === opened).map(({ kind, record, id }) => html`<section key=${`${id} ${record.revision}`}><h2>${record.name}</h2>${kind === 'machine' && html`<${Learnt} ...${{ record, calculators, models, done }} fail=${setTrouble} />`}<${Numbers} kind=${kind} record=${record} done=${done} fail=${setTrouble} /></section>`)}
       <p><label class="button">${t('record_import')} <input type="file" class="hidden" accept=".json,.toml,.csv" onChange=${take} /></label>
         ${Object.keys(TYPES).map(form => html` <button type="button" key=${form} onClick=${() => act(async () => save(await api.exportLibrary(form), `library.${form}`))}>${form.toUpperCase()}<span class="hidden">: ${t('record_export')}</span></button>`)}</p>
     </main>`;

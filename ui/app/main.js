@@ -201,7 +201,7 @@ function Page({ page, query, calculators, known, needsKey, models, refreshModels
     case 'models':
       return html`<${Models} calculators=${calculators} models=${models} refreshModels=${refreshModels} />`;
     case 'library':
-      return html`<${Library} key=${spoken} />`;
+      return html`<${Library} key=${spoken} calculators=${calculators} models=${models} />`;
     default:
       return plain(t('no_page'), html`<p><a href="#/">${t('to_start')}</a></p>`);
   }

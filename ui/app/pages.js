@@ -246,7 +246,7 @@ export function Models({ calculators, models, refreshModels }) {
               calculator,
               revision,
               created_at: created,
-            }) => html`<tr role="row" key=${name}><th scope="row" role="rowheader">${name}</th><td role="cell">${titleOf(calculators, calculator)}</td><td role="cell" class="number">${revision}</td><td role="cell" class="when">${created ? moment(created) : ''}</td>
+            }) => html`<tr role="row" key=${name}><th scope="row" role="rowheader">${name}</th><td role="cell">${titleOf(calculators, calculator)}</td><td role="cell" class="number" data-of=${t('revision')}>${revision}</td><td role="cell" class="when">${created ? moment(created) : ''}</td>
             <td role="cell" class="actions"><a class="button" href=${`#/${calculator}?${written(new URLSearchParams([...lastJob(calculator), ['model', name]]))}`}>${t('use_model')}<span class="hidden"> ${name}</span></a>
               <button type="button" onClick=${() => fetchDocument(name)}>JSON<span class="hidden"> ${name}</span></button>
               <button type="button" class=${asked === name ? 'sure' : ''} onBlur=${() => setAsked(null)} onKeyDown=${event => {

@@ -1,10 +1,16 @@
 // Colours of maps, from `palette.css`: evenly spaced in lightness, told apart by colour-blind eyes.
-const listed = name =>
+const read = name =>
   getComputedStyle(document.documentElement)
     .getPropertyValue(name)
     .trim()
     .split(' ')
     .map(hex => [0, 2, 4].map(at => parseInt(hex.slice(at, at + 2), 16)));
+/** Lists of colours by their names: to read one makes the browser settle all styles. */
+const lists = new Map();
+function listed(name) {
+  if (!lists.has(name)) lists.set(name, read(name));
+  return lists.get(name);
+}
 
 /** Paper is white whatever the screen is. */
 let isPrinting = false;

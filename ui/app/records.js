@@ -128,16 +128,39 @@ export function overruled(said) {
 /** The record that a part of a number is from: the material of a part of the job before that of all of it. */
 const recordOf = (resources, from, place) => resources?.[`${place.split('/')[1]}_${from}`] ?? resources?.[from];
 
-/** Where a number comes from, in a few lines. */
-export function Origin({ origin, resources, unit }) {
+/** What the sources of a material say of its force, side by side on one scale: they are compared at one thickness of the chip,
+ *  as their constants trade with their exponents. `used` is the row that the number is from. */
+function Sources({ rows, used }) {
+  const most = Math.max(...rows.map(row => row.value_n_per_mm2));
+  const words = row =>
+    [t(`certainty_${row.certainty}`), row.row === used && t('source_used'), row.superseded && t('source_superseded')]
+      .filter(Boolean)
+      .join(' · ');
+  return html`
+    <table class="sources"><caption>${t('sources_say', { thickness: number(rows[0].at_chip_thickness_mm) })}</caption><tbody>${rows.map(
+      row => html`<tr key=${row.row} data-used=${row.row === used ? '' : undefined}><td class="number">${number(row.value_n_per_mm2, 4)}</td>
+      <td><span class="share" style=${{ width: `${(100 * row.value_n_per_mm2) / most}%` }} aria-hidden="true"></span>
+        ${row.address ? html`<a href=${row.address} rel="noreferrer">${row.source}</a>` : row.source} <span class="quiet">${words(row)}</span></td></tr>`,
+    )}</tbody></table>`;
+}
+
+/** Which row of a material's sources a number is from; `undefined` where it is from none. */
+const rowOf = ({ from, path }) => (from === 'material' ? /^\/kienzle\/(\d+)/.exec(path ?? '')?.[1] : undefined);
+
+/** Where a number comes from, in a few lines, and what other sources say of it. */
+export function Origin({ origin, resources, libraries, unit }) {
   return html`<ul class="origin">${origin.parts.map(part => {
+    const row = rowOf(part);
+    const rows =
+      row && libraries?.materials?.find(({ name }) => name === recordOf(resources, part.from, origin.pointer)?.name)?.force_sources;
     const record = recordOf(resources, part.from, origin.pointer);
     const name = record ? `${record.name}${record.revision ? `@${record.revision}` : ''}` : '';
     const size = typeof part.value === 'number' ? `${number(part.value)} ${unit || ''}`.trim() : '';
     const unsure = part.relative_standard_uncertainty_percent ? `±${number(part.relative_standard_uncertainty_percent, 2)} %` : '';
     const certainty = part.certainty ? t(`certainty_${part.certainty}`) : '';
     return html`<li><span>${[[t(`record_${part.from}`), name].filter(Boolean).join(' '), [size, unsure].filter(Boolean).join(' '), certainty].filter(Boolean).join(' · ')}</span>
-      ${part.source && html`<span class="quiet">${part.address ? html`<a href=${part.address} rel="noreferrer">${part.source}</a>` : part.source}</span>`}</li>`;
+      ${part.source && html`<span class="quiet">${part.address ? html`<a href=${part.address} rel="noreferrer">${part.source}</a>` : part.source}</span>`}
+      ${rows?.length > 1 && html`<${Sources} rows=${rows} used=${Number(row)} />`}</li>`;
   })}</ul>`;
 }
 

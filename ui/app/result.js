@@ -212,6 +212,8 @@ export function Result({ id, desk, description, answer, problem, trouble, runnin
   const causes = useMemo(() => (body ? causesOf(description, body, answer.figures) : null), [answer, description]);
   const numbers = useMemo(() => causesHeadline(causes), [causes]);
   const sheet = useMemo(() => (nextAdvised(causes) ? sheetOf(description, body, answer.job) : null), [answer, causes]);
+  // The sheet for print is of the answer alone: it is not made anew with every letter.
+  const paper = useMemo(() => body && html`<${Sheet} description=${description} body=${body} job=${answer.job} />`, [answer, description]);
   const model = models && causes?.named.length > 0;
   if (!answer && !interim) return html`<${NoAnswer} ...${{ running, problem, trouble }} />`;
   const [first, ...more] = body?.explanation.filter(({ code }) => !(causes && !causes.isSilent && saidOfCauses(code))) || [];
@@ -245,7 +247,7 @@ export function Result({ id, desk, description, answer, problem, trouble, runnin
         <${Bar} ...${{ id, desk, description, answer, pinned, study, figure, difference, setDifference, stale, owns }} />
         ${model && html`<${SaveModel} resultKey=${answer.key} stale=${stale} owns=${owns} />`}
         <${Tabs} ...${{ id, description, answer, pinned, stale, owns }} />
-        <${Sheet} ...${{ description, body, job: answer.job }} />`
+        ${paper}`
       }
     </div>`;
 }

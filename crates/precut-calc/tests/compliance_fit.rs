@@ -284,6 +284,8 @@ fn what_cannot_be_a_test_is_refused() {
     assert_eq!(changed("/supports/1/z_mm", json!(700)), ["support_outside_shaft"]);
     assert_eq!(changed("/measurements/0/z_load_mm", json!(700)), ["place_outside_bar"]);
     assert_eq!(changed("/measurements/0/z_load_mm", json!(null)), ["load_without_place"]);
+    let at_tool = json!({"at": "tool", "z_reading_mm": 60, "force_n": 800, "reading_um": 9});
+    assert_eq!(changed("/measurements/0", at_tool), ["gauge_at_tool", "too_few_readings"]);
     assert_eq!(changed("/measurements/0/force_n", json!(0)), ["load_of_nothing"]);
     assert_eq!(changed("/measurements", json!([row(800.0, 60.0, 60.0, 9.0)])), ["too_few_readings"]);
     assert_eq!(changed("/bar/youngs_modulus_n_per_mm2", json!(null)), ["elastic_constants_missing"]);

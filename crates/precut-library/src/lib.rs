@@ -1,6 +1,6 @@
 //! Machines, tools and materials by name.
 //!
-//! Pure: no I/O, no clock, no HTTP, no sentence. A record is JSON of one of three kinds, declared field by field in
+//! Pure: no I/O, no clock, no HTTP, no sentence. A record is JSON of one of four kinds, declared field by field in
 //! [`record`]; the built-in ones are in [`built_in`]. [`asked()`] says which names a job uses, [`resolve()`] writes what
 //! their records say into it, with the origin of every number. What ISO codes say is [`iso`], how a name is found
 //! [`search`].

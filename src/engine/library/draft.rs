@@ -24,16 +24,17 @@ const SAID_BESIDE: &[&str] = &[
     "links",
     "uses",
     "conflict",
+    "force_sources",
     "power_laws",
 ];
 
-static CHECKERS: LazyLock<[Checker; 3]> = LazyLock::new(|| {
+static CHECKERS: LazyLock<[Checker; Kind::ALL.len()]> = LazyLock::new(|| {
     Kind::ALL.map(|kind| Checker::new(schema(kind)).expect("the schema of records is made by every test"))
 });
 
 /// What a record may be made of, with what may stand beside it.
 pub(super) fn shape(kind: Kind) -> &'static Shape {
-    static SHAPES: LazyLock<[Shape; 3]> = LazyLock::new(|| {
+    static SHAPES: LazyLock<[Shape; Kind::ALL.len()]> = LazyLock::new(|| {
         Kind::ALL.map(|kind| {
             let mut shape = Shape::of(&schema(kind));
             let word = json!({ "type": "string" });
@@ -56,15 +57,7 @@ pub(super) fn shape(kind: Kind) -> &'static Shape {
             shape.with_field("from", Shape::of(&word)).with_field("set", Shape::of(&json!({ "type": "object" })))
         })
     });
-    &SHAPES[place(kind)]
-}
-
-fn place(kind: Kind) -> usize {
-    match kind {
-        Kind::Machine => 0,
-        Kind::Tool => 1,
-        Kind::Material => 2,
-    }
+    &SHAPES[kind.place()]
 }
 
 /// A record that may be kept under a name.
@@ -84,7 +77,7 @@ impl Draft {
         if !is_name(name) {
             found.add(Finding::new("bad_record_name", "").with("name", name.to_owned()));
         }
-        CHECKERS[place(kind)].check(&value, "", &mut found);
+        CHECKERS[kind.place()].check(&value, "", &mut found);
         if found.total == 0 {
             for fault in faults(kind, &value).into_iter().chain(models(&value)) {
                 found.add(fault);
@@ -106,7 +99,7 @@ impl Draft {
     /// As the store takes it, under the name that stands on a shelf.
     pub(super) fn document(&self, name: String) -> NewDocument {
         let record = &self.record;
-        let class = record.text(if record.kind == Kind::Material { "iso513_group" } else { "kind" });
+        let class = record.text(record.kind.class());
         let title = record.text("title").unwrap_or_default().replace('\n', " ");
         let words = std::iter::once(title.as_str()).chain(record.names().skip(1));
         NewDocument {
@@ -138,7 +131,9 @@ fn plain(kind: Kind, value: &mut Value) {
             _ => {}
         }
     }
-    without_addresses(value);
+    if kind.has_sources() {
+        without_addresses(value);
+    }
 }
 
 /// Answers say the address of a source behind it; a record has the source alone.

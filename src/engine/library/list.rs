@@ -13,7 +13,7 @@ use crate::engine::{Engine, Shelf};
 pub struct RecordQuery {
     /// Only those that this text fits, best first.
     pub text: Option<String>,
-    /// Only machines or tools of this kind, or materials of this group.
+    /// Only machines or tools of this kind, materials of this group, or parts for this field.
     pub class: Option<String>,
     /// Only own ones.
     pub own: bool,
@@ -47,17 +47,13 @@ impl Place<'_> {
     }
 }
 
-fn class_of(record: &Record) -> Option<&str> {
-    record.text(if record.kind == Kind::Material { "iso513_group" } else { "kind" })
-}
-
 fn fits(wanted: Option<&str>, class: Option<&str>) -> bool {
     wanted.is_none_or(|wanted| class == Some(wanted))
 }
 
 /// The engine's own records of a kind as they are searched.
 fn built_in_index(kind: Kind) -> &'static search::Index {
-    static INDICES: LazyLock<[search::Index; 3]> = LazyLock::new(|| {
+    static INDICES: LazyLock<[search::Index; Kind::ALL.len()]> = LazyLock::new(|| {
         Kind::ALL.map(|kind| {
             let mut index = search::Index::default();
             for record in built_in::records(kind) {
@@ -66,11 +62,7 @@ fn built_in_index(kind: Kind) -> &'static search::Index {
             index
         })
     });
-    match kind {
-        Kind::Machine => &INDICES[0],
-        Kind::Tool => &INDICES[1],
-        Kind::Material => &INDICES[2],
-    }
+    &INDICES[kind.place()]
 }
 
 /// Every record that the query lets through, in the order of the list.
@@ -81,7 +73,8 @@ fn places<'a>(kind: Kind, own: &'a Index, query: &RecordQuery) -> Vec<Place<'a>>
         let found = titles.binary_search_by(|title| title.name.as_str().cmp(name)).ok();
         found.filter(|&index| fits(class, Some(&titles[index].class))).map(|_| Place::Own(name))
     };
-    let of_built_in = |record: &'static Arc<Record>| fits(class, class_of(record)).then_some(Place::BuiltIn(record));
+    let of_built_in =
+        |record: &'static Arc<Record>| fits(class, record.text(kind.class())).then_some(Place::BuiltIn(record));
     if let Some(text) = &query.text {
         let own = own.find(text).into_iter().filter_map(of_own);
         let all = built_in::records(kind);

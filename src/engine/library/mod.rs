@@ -125,6 +125,7 @@ pub(crate) fn kind_of(kind: Kind) -> documents::Kind {
         Kind::Machine => documents::Kind::Machine,
         Kind::Tool => documents::Kind::Tool,
         Kind::Material => documents::Kind::Material,
+        Kind::Part => documents::Kind::Part,
     }
 }
 
@@ -266,6 +267,7 @@ impl Engine {
         let inner = &self.inner;
         self.refuse_taken(shelf, drafts).await?;
         self.refuse_shorter_histories(shelf, drafts).await?;
+        self.refuse_strange_parts(drafts)?;
         let documents: Vec<_> = drafts.iter().map(|draft| draft.document(shelf.full(&draft.record.name))).collect();
         let bytes = documents.iter().map(|document| document.content.len() as u64).sum();
         let (quota, most) = (inner.settings.quota, inner.settings.most_records);
@@ -322,6 +324,24 @@ impl Engine {
                 found.add(
                     Finding::new("history_only_grows", "/history").with("name", name.clone()).with("rows", old.len()),
                 );
+            }
+        }
+        if found.total > 0 { Err(RecordError::invalid(found)) } else { Ok(()) }
+    }
+
+    /// A part is one of a job of some calculator.
+    fn refuse_strange_parts(&self, drafts: &[Draft]) -> Result<(), RecordError> {
+        let mut found = Faults::default();
+        for record in drafts.iter().map(|draft| &draft.record).filter(|record| record.kind == Kind::Part) {
+            let said = |name: &str| record.text(name).unwrap_or_default();
+            let (field, type_name) = (said("field"), said("type"));
+            match self.registry().part(field, type_name) {
+                Some(checker) => checker.check(&record.value["value"], "/value", &mut found),
+                None => found.add(
+                    Finding::new("unknown_part_type", "/type")
+                        .with("field", field.to_owned())
+                        .with("type", type_name.to_owned()),
+                ),
             }
         }
         if found.total > 0 { Err(RecordError::invalid(found)) } else { Ok(()) }

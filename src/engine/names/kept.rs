@@ -94,7 +94,7 @@ fn texts(value: &Value) -> Vec<String> {
 }
 
 fn read_looked(value: &Value) -> Option<Looked> {
-    let kind = Kind::ALL.into_iter().find(|kind| value.get("kind").is_some_and(|word| word == kind.name()))?;
+    let kind = Kind::NAMED.into_iter().find(|kind| value.get("kind").is_some_and(|word| word == kind.name()))?;
     let found = value.get("found");
     let lookup = if let Some(found) = found {
         let revision = match (whole(found, "revision"), whole(found, "data_version")) {

@@ -113,7 +113,7 @@ fn asked_by_points(registry: &Registry, study: &Value) -> Vec<Asked> {
     for variable in variables.into_iter().flatten() {
         let Some(pointer) = variable.get("pointer").and_then(Value::as_str) else { continue };
         let last = pointer.rsplit('/').find(|token| *token != "name");
-        let Some(kind) = Kind::ALL.into_iter().find(|kind| last == Some(kind.name())) else { continue };
+        let Some(kind) = Kind::NAMED.into_iter().find(|kind| last == Some(kind.name())) else { continue };
         let values = variable.get("values").and_then(Value::as_array).into_iter().flatten();
         for name in values.filter_map(Value::as_str) {
             let Some((_, of)) = place(entry, job) else { continue };
@@ -136,7 +136,7 @@ fn model_of_machine<'a>(calculator: &str, found: &'a Looked) -> Option<&'a str> 
 fn malformed(calculator: &str, declared: &Value, job: &mut Value) -> Vec<Finding> {
     let Some(fields) = job.as_object_mut() else { return Vec::new() };
     let mut faults = Vec::new();
-    for kind in Kind::ALL {
+    for kind in Kind::NAMED {
         let name = kind.name();
         let is_declared = declared.get(name).is_some();
         let is_name = match fields.get(name) {
@@ -298,7 +298,7 @@ pub(crate) fn is_a_name(entry: &Entry, job: &Value, tokens: &[String]) -> bool {
     let Some((path, calculator)) = place(entry, job) else { return false };
     let rest = if path.is_empty() { Some(tokens) } else { tokens.strip_prefix(&[JOB.to_owned()]) };
     let first = rest.and_then(<[String]>::first);
-    Kind::ALL.into_iter().any(|kind| first.is_some_and(|first| first == kind.name()) && takes(&calculator, kind))
+    Kind::NAMED.into_iter().any(|kind| first.is_some_and(|first| first == kind.name()) && takes(&calculator, kind))
 }
 
 /// What may be asked about names while a job is read.

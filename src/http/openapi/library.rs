@@ -1,4 +1,4 @@
-//! The operations of machines, tools and materials.
+//! The operations of machines, tools, materials and parts.
 
 use precut_library::Kind;
 use precut_library::resolve::Origin;
@@ -41,6 +41,7 @@ fn component(kind: Kind) -> &'static str {
         Kind::Machine => "MachineRecord",
         Kind::Tool => "ToolRecord",
         Kind::Material => "MaterialRecord",
+        Kind::Part => "PartRecord",
     }
 }
 
@@ -49,6 +50,7 @@ fn example(kind: Kind) -> &'static str {
         Kind::Machine => "lathe-3",
         Kind::Tool => "bar-25",
         Kind::Material => "42crmo4-own",
+        Kind::Part => "shaft-shaft",
     }
 }
 
@@ -125,7 +127,7 @@ pub(super) fn schemas() -> Vec<(String, RefOr<Schema>)> {
     all.push((
         "LibraryFile".to_owned(),
         typed(json!({
-            "type": "object", "additionalProperties": { "$ref": RECORD_VALUE }, "description": "Lists of records: `machines`, `tools`, `materials`.",
+            "type": "object", "additionalProperties": { "$ref": RECORD_VALUE }, "description": "Lists of records: `machines`, `tools`, `materials`, `parts`.",
             "properties": { "schema_version": { "type": ["integer", "null"], "minimum": 1, "maximum": 1, "examples": [1], "x-unit": "1",
                 "x-symbol": "v", "description": "Version of the form." } },
         })),
@@ -157,7 +159,10 @@ pub(super) fn schemas() -> Vec<(String, RefOr<Schema>)> {
 fn record(kind: Kind) -> Value {
     json!({
         "type": "object", "additionalProperties": true, "required": ["name", "built_in", "sha256", "links"],
-        "description": format!("A {}: beside these its own fields, as docs/library.md lists them, each number with its source and how certain it is.", kind.name()),
+        "description": match kind {
+            Kind::Part => "A part of a job: beside these `field`, `type` and `value`, as docs/library.md says.".to_owned(),
+            _ => format!("A {}: beside these its own fields, as docs/library.md lists them, each number with its source and how certain it is.", kind.name()),
+        },
         "properties": {
             "name": { "type": "string", "pattern": NAME, "description": "Its name.", "examples": [example(kind)] },
             "title": { "type": "string", "description": "A few words for a list.", "examples": ["Lathe 3"] },
@@ -186,13 +191,24 @@ fn document(kind: Kind, text: &str) -> ResponseBuilder {
 
 fn list(kind: Kind) -> OperationBuilder {
     let query = |name, text: &str, schema| parts::parameter(name, ParameterIn::Query, text, schema).build();
-    let class = if kind == Kind::Material { "group" } else { "kind" };
-    let about = if kind == Kind::Material { "Only of this group of ISO 513, as `P`." } else { "Only of this kind." };
+    let (class, about) = (
+        records::class_parameter(kind),
+        match kind {
+            Kind::Machine | Kind::Tool => "Only of this kind.",
+            Kind::Material => "Only of this group of ISO 513, as `P`.",
+            Kind::Part => "Only for this field of a job, as `shaft`.",
+        },
+    );
     let operation = operation(
         format!("list_{}", kind.plural()),
         &format!("Which {} are known?", kind.plural()),
-        "Own ones and the engine's, each number with its source and how certain it is. `q` finds them by any of their names, \
-         however it is spelled, best first.",
+        match kind {
+            Kind::Part => "Own ones; the engine has none. `q` finds them by name and title, however it is spelled, best first.",
+            _ => {
+                "Own ones and the engine's, each number with its source and how certain it is. `q` finds them by any of their \
+                 names, however it is spelled, best first."
+            }
+        },
     )
     .parameter(query("q", "What somebody types: name, title, any other name.", parts::string()))
     .parameter(query(class, about, parts::string()))
@@ -243,8 +259,17 @@ fn store(kind: Kind) -> OperationBuilder {
     let location = || parts::text_header("Address of the revision.", "/v1/machines/lathe-3@1");
     let operation = operation(
         format!("store_{}", kind.name()),
-        &format!("May jobs name my own {}?", kind.name()),
-        "Stores it under a name that jobs give. Each `PUT` makes a new revision; revisions never change.",
+        &match kind {
+            Kind::Part => "May I keep a part of a job?".to_owned(),
+            _ => format!("May jobs name my own {}?", kind.name()),
+        },
+        match kind {
+            Kind::Part => {
+                "Stores what stands in a field of a job, such as a shaft, for jobs that are written later. It must be what the \
+                 field takes. Each `PUT` makes a new revision; revisions never change."
+            }
+            _ => "Stores it under a name that jobs give. Each `PUT` makes a new revision; revisions never change.",
+        },
     )
     .parameter(name(kind, NAME, "Its name: lower-case letters, digits, `-` and `_`."))
     .parameter(only_new.build())
@@ -261,6 +286,9 @@ fn source_example(kind: Kind) -> Value {
         }
         Kind::Tool => json!({ "kind": "turning_external", "insert": "DNMG150608", "holder": "PDJNL2525M15" }),
         Kind::Material => json!({ "from": "42crmo4", "set": { "/title": "42CrMo4 of our forge" } }),
+        Kind::Part => {
+            json!({ "field": "shaft", "type": "Shaft", "value": { "segments": [{ "length_mm": 400, "diameter_mm": 60 }] } })
+        }
     }
 }
 

@@ -18,6 +18,7 @@ pub(super) const CODES: &[&str] = &[
     "several_chucks",
     "load_without_place",
     "place_outside_bar",
+    "gauge_at_tool",
     "load_of_nothing",
     "nothing_to_find",
     "too_few_readings",
@@ -93,6 +94,10 @@ impl Job {
             let at = |field: &str| format!("/measurements/{i}/{field}");
             violations.require(row.force_n != 0.0, || Finding::new("load_of_nothing", at("force_n")).with("row", i));
             if row.gauged_at() == GaugedAt::Tool {
+                // It reads between tool post and bed: a station would be taken for one at the bar.
+                violations.require(row.z_reading_mm.is_none(), || {
+                    Finding::new("gauge_at_tool", at("z_reading_mm")).with("row", i)
+                });
                 continue;
             }
             violations.require(row.z_load_mm.is_some(), || {

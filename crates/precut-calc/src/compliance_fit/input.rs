@@ -151,7 +151,7 @@ pub struct GaugeRow {
     /// Radial load; negative the other way.
     #[schema(minimum = -1_000_000.0, maximum = 1_000_000.0, example = 500.0, extensions(("x-unit" = json!("N")), ("x-symbol" = json!("F"))))]
     pub force_n: f64,
-    /// Station of the gauge; that of the load where left out.
+    /// Station of a gauge at the bar; that of the load where left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 0.0, maximum = 100_000.0, example = 250.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("z_r"))))]
     pub z_reading_mm: Option<f64>,

@@ -40,6 +40,8 @@ pub enum Form {
     NamedTexts,
     /// A model of the tool life in the form of a feed schedule's `models/tool_life`.
     Model,
+    /// What stands in a field of a job.
+    OfJob,
 }
 
 /// A physical quantity: unit, symbol and the range that makes sense.

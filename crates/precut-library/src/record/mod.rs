@@ -6,6 +6,7 @@
 mod field;
 mod machine;
 mod material;
+mod part;
 mod rules;
 mod schema;
 mod settle;
@@ -36,18 +37,28 @@ pub enum Kind {
     Tool,
     /// A work material.
     Material,
+    /// A part of a job, such as a shaft. No job names it: whoever writes a job begins with it.
+    Part,
 }
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::Machine, Self::Tool, Self::Material];
+    pub const ALL: [Self; 4] = [Self::Machine, Self::Tool, Self::Material, Self::Part];
+    /// Those that jobs name.
+    pub const NAMED: [Self; 3] = [Self::Machine, Self::Tool, Self::Material];
 
-    /// The field of a job that names one.
+    /// Its place in [`Self::ALL`].
+    pub const fn place(self) -> usize {
+        self as usize
+    }
+
+    /// Its word; the field of a job that names one.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Machine => "machine",
             Self::Tool => "tool",
             Self::Material => "material",
+            Self::Part => "part",
         }
     }
 
@@ -57,6 +68,7 @@ impl Kind {
             Self::Machine => "machines",
             Self::Tool => "tools",
             Self::Material => "materials",
+            Self::Part => "parts",
         }
     }
 
@@ -66,6 +78,7 @@ impl Kind {
             Self::Machine => "unknown_machine",
             Self::Tool => "unknown_tool",
             Self::Material => "unknown_material",
+            Self::Part => "unknown_part",
         }
     }
 
@@ -75,7 +88,22 @@ impl Kind {
             Self::Machine => machine::FIELDS,
             Self::Tool => tool::FIELDS,
             Self::Material => material::FIELDS,
+            Self::Part => part::FIELDS,
         }
+    }
+
+    /// The field that lists are filtered by.
+    pub const fn class(self) -> &'static str {
+        match self {
+            Self::Machine | Self::Tool => "kind",
+            Self::Material => "iso513_group",
+            Self::Part => "field",
+        }
+    }
+
+    /// Whether its numbers say where they are from. Those of a part stand as a job has them.
+    pub const fn has_sources(self) -> bool {
+        !matches!(self, Self::Part)
     }
 }
 

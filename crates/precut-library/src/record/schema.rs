@@ -51,6 +51,7 @@ fn form(form: &Form) -> Value {
         Form::Named(quantity) => named(&sourced(&plain(quantity), Some(quantity))),
         Form::NamedTexts => named(&json!({"type": "string", "maxLength": 80})),
         Form::Model => json!({"type": "object"}),
+        Form::OfJob => json!({"type": ["object", "array"]}),
     }
 }
 

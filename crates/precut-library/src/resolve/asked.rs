@@ -24,7 +24,7 @@ pub struct Asked {
 pub fn asked(calculator: &str, job: &Value) -> Vec<Asked> {
     let Some(_) = Room::of(calculator) else { return Vec::new() };
     let mut found = Vec::new();
-    for kind in Kind::ALL {
+    for kind in Kind::NAMED {
         let Some(value) = job.get(kind.name()) else { continue };
         match value {
             Value::String(name) => push(kind, format!("/{}", kind.name()), name, &mut found),

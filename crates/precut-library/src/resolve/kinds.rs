@@ -34,7 +34,7 @@ impl Room {
             (_, Kind::Machine) => &["lathe"],
             (Self::Milling, Kind::Tool) => &["milling_indexable", "milling_solid"],
             (_, Kind::Tool) => &["turning_external", "boring_bar"],
-            (_, Kind::Material) => &[],
+            (_, Kind::Material | Kind::Part) => &[],
         }
     }
 }

@@ -32,7 +32,7 @@ impl<'a> View<'a> {
 
     fn from(&self, is_over: bool) -> From {
         match (is_over, self.kind) {
-            (true, _) => From::Job,
+            (true, _) | (_, Kind::Part) => From::Job,
             (_, Kind::Machine) => From::Machine,
             (_, Kind::Tool) => From::Tool,
             (_, Kind::Material) => From::Material,
@@ -124,7 +124,9 @@ impl<'a> Views<'a> {
                     let over = taken(room, asked.kind, writer);
                     let pointer = format!("/{}", asked.kind.name());
                     let view = record.map(|record| View::new(asked.kind, pointer, Some(record), over));
-                    *views.slot(asked.kind) = view;
+                    if let Some(slot) = views.slot(asked.kind) {
+                        *slot = view;
+                    }
                 }
             }
         }
@@ -143,11 +145,13 @@ impl<'a> Views<'a> {
         Some(views)
     }
 
-    fn slot(&mut self, kind: Kind) -> &mut Option<View<'a>> {
+    /// Where a record that a job names has its place.
+    fn slot(&mut self, kind: Kind) -> Option<&mut Option<View<'a>>> {
         match kind {
-            Kind::Machine => &mut self.machine,
-            Kind::Tool => &mut self.tool,
-            Kind::Material => &mut self.material,
+            Kind::Machine => Some(&mut self.machine),
+            Kind::Tool => Some(&mut self.tool),
+            Kind::Material => Some(&mut self.material),
+            Kind::Part => None,
         }
     }
 

@@ -51,6 +51,12 @@ struct Rows<'a> {
 impl Rows<'_> {
     fn add(&mut self, value: &Value, pointer: &str) {
         match value {
+            // What stands in a job is one cell.
+            Value::Object(_) | Value::Array(_)
+                if !pointer.is_empty() && place(self.schema, pointer).is_some_and(|place| place["type"].is_array()) =>
+            {
+                self.row(pointer, value, Default::default());
+            }
             Value::Object(fields) if fields.get("value").is_some_and(is_scalar) => {
                 let part = |name: &str| match fields.get(name) {
                     Some(Value::String(word)) => defused(word),

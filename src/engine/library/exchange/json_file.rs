@@ -78,7 +78,9 @@ pub(super) fn records(tree: Value) -> Result<Vec<Raw>, RecordError> {
                 found.add(Finding::new("missing_field", format!("{place}/id")));
                 continue;
             };
-            cite(&mut value, &sources);
+            if kind.has_sources() {
+                cite(&mut value, &sources);
+            }
             raws.push(Raw { kind, name, value, place });
         }
     }

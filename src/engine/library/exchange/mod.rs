@@ -57,7 +57,7 @@ pub struct ImportReport {
 /// A record of an import.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Imported {
-    /// `machine`, `tool` or `material`.
+    /// `machine`, `tool`, `material` or `part`.
     #[schema(example = "tool")]
     pub kind: String,
     /// Its name.
@@ -129,6 +129,7 @@ impl Engine {
         let placed = if dry_run {
             self.refuse_taken(shelf, &drafts).await?;
             self.refuse_shorter_histories(shelf, &drafts).await?;
+            self.refuse_strange_parts(&drafts)?;
             Vec::new()
         } else {
             self.keep(shelf, &drafts, (false, true), owner).await?
@@ -198,7 +199,7 @@ impl Engine {
                     tree[kind.plural()] = items.into_iter().map(with_id).collect();
                 }
                 let written = match form {
-                    Form::Toml => toml_file::written(&tree),
+                    Form::Toml => toml_file::written(tree),
                     _ => serde_json::to_vec(&tree).map_err(|error| error.to_string()),
                 };
                 written.map_err(Error::internal)?

@@ -21,8 +21,21 @@ pub(super) fn read(bytes: &[u8], room: &Room) -> Result<Vec<Raw>, RecordError> {
     json_file::records(plain(tree))
 }
 
-pub(super) fn written(tree: &Value) -> Result<Vec<u8>, String> {
-    toml::to_string(tree).map(String::into_bytes).map_err(|error| error.to_string())
+pub(super) fn written(tree: Value) -> Result<Vec<u8>, String> {
+    toml::to_string(&without_nulls(tree)).map(String::into_bytes).map_err(|error| error.to_string())
+}
+
+/// TOML has no null: what a part of a job says so is left out.
+fn without_nulls(value: Value) -> Value {
+    match value {
+        Value::Array(items) => items.into_iter().filter(|item| !item.is_null()).map(without_nulls).collect(),
+        Value::Object(fields) => fields
+            .into_iter()
+            .filter(|(_, value)| !value.is_null())
+            .map(|(name, value)| (name, without_nulls(value)))
+            .collect(),
+        other => other,
+    }
 }
 
 /// Whole numbers as integers however they are spelled, as JSON is read; a date is its text.
