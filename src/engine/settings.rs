@@ -130,6 +130,7 @@ impl EngineSettings {
             keep: Keep { bytes: self.store_bytes, age: self.store_age, jobs: self.job_age },
             connections: self.store_connections,
             wait: self.store_wait,
+            works: self.role.works(),
         }
     }
 

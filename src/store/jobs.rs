@@ -1,15 +1,14 @@
-//! Jobs as they are kept: what was asked, how far it is, how it ended; and the queue that says which runs next.
+//! Jobs as they are kept: what was asked, how far it is, how it ended.
 //!
-//! The truth about a job is its record. The queue only says who runs which job and when again, so that it may lose or
-//! repeat a task without harm: a task for a job that does not wait is nothing.
+//! The records are the queue: those that wait, in the order of priority and turn. Who takes one holds it under a lease.
 
 use std::fmt;
 use std::str::FromStr;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
 use bytes::Bytes;
 use futures_util::future::BoxFuture;
-use tokio::sync::watch;
 use uuid::{ContextV7, Timestamp, Uuid};
 
 pub use super::callbacks::{Callback, CallbackState, DueCallback, NewCallback, TakeUp, Tried};
@@ -19,6 +18,8 @@ use crate::key::Key;
 
 /// Starts after which a job that takes its process along is given up.
 pub(crate) const MOST_ATTEMPTS: u32 = 3;
+/// A computation that says nothing for so long has lost its lease, and so has who waits to run a job alone.
+pub(crate) const SILENCE: Duration = Duration::from_secs(4);
 
 /// This is not the name of a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -285,23 +286,6 @@ pub enum Accepted {
     OverQuota(Usage),
 }
 
-/// A job that waits.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Waiting {
-    /// Starts charged to its computation so far.
-    pub charged: u32,
-    /// By which calculator.
-    pub calculator: String,
-    /// Whose it is.
-    pub owner: String,
-    /// When it was accepted, ms UTC.
-    pub created_ms: i64,
-    /// Where the request belongs in a trace.
-    pub traceparent: Option<String>,
-    /// What the systems on the trace's way say of it.
-    pub tracestate: Option<String>,
-}
-
 /// A computation to run.
 #[derive(Debug, Clone)]
 pub struct Claim {
@@ -317,9 +301,47 @@ pub struct Claim {
     pub input: Bytes,
     /// Starts charged, this one among them.
     pub attempt: u32,
+    /// Whose the job is that was next in line.
+    pub owner: String,
+    /// When that was accepted, ms UTC.
+    pub created_ms: i64,
+    /// Where its request belongs in a trace.
+    pub traceparent: Option<String>,
+    /// What the systems on the trace's way say of it.
+    pub tracestate: Option<String>,
 }
 
-/// What came of a task.
+/// Who asks for the next job.
+#[derive(Debug, Clone, Copy)]
+pub struct Wanted {
+    /// Under which lease it is to run.
+    pub lease: Lease,
+    /// Only one that was not charged a start yet, of at most so long, estimated.
+    pub short_ms: Option<f64>,
+    /// The same was asked before, and the answer did not arrive.
+    pub again: bool,
+}
+
+/// What is to be done next.
+#[derive(Debug, Clone)]
+pub enum Next {
+    /// Run this.
+    Run(Claim),
+    /// This is to be claimed as the only one that runs: it may be to blame for the end of its processes. Nobody else is
+    /// told of it while it is held.
+    Suspect {
+        /// The job.
+        id: JobId,
+        /// By which calculator.
+        calculator: String,
+    },
+    /// Compute parts of this.
+    Help(Shared),
+    /// Nothing.
+    Nothing,
+}
+
+/// What came of a claim.
 #[derive(Debug, Clone)]
 pub enum Claimed {
     /// Run this.
@@ -424,15 +446,14 @@ pub struct Timing {
     pub actual_ms: f64,
 }
 
-/// What runs a task. It never fails: whatever comes of a job stands on its record.
-pub type RunTask = Arc<dyn Fn(JobId) -> BoxFuture<'static, ()> + Send + Sync>;
-
 /// Tells which computations this process runs, at the moment of asking.
 pub type Live = Arc<dyn Fn() -> Vec<Lease> + Send + Sync>;
 
 /// What happened in another process.
 #[derive(Debug, Clone, PartialEq)]
 pub enum News {
+    /// There is something to do.
+    Waiting,
     /// These jobs changed, and nobody wants these computations any more.
     Changed(Changed),
     /// Documents changed.
@@ -447,6 +468,8 @@ pub type Hear = Arc<dyn Fn(News) + Send + Sync>;
 /// A job that is being computed and made of parts that others may compute, too.
 #[derive(Debug, Clone)]
 pub struct Shared {
+    /// Its name.
+    pub id: JobId,
     /// Address of its result.
     pub key: Key,
     /// By which calculator.
@@ -468,11 +491,13 @@ pub trait JobStore: Send + Sync + 'static {
     fn job_inputs(&self, ids: Vec<JobId>, most: usize) -> BoxFuture<'_, Result<Vec<(JobId, Bytes)>, StoreError>>;
     /// How many wait and run, since when, and how large the database is.
     fn counts(&self) -> BoxFuture<'_, Result<JobCounts, StoreError>>;
-    /// What is to be known of a job before it is taken, if it waits.
-    fn waiting(&self, id: JobId) -> BoxFuture<'_, Result<Option<Waiting>, StoreError>>;
-    /// The next job in line of at most so long, estimated, that was not charged a start yet.
-    fn next_short(&self, most_ms: f64) -> BoxFuture<'_, Result<Option<JobId>, StoreError>>;
-    /// Takes the job and all equal ones that wait under a lease, and charges them one start; fails them, with
+    /// Whether there is something to do, for [`Wanted::short_ms`].
+    fn waits(&self, short_ms: Option<f64>) -> BoxFuture<'_, Result<bool, StoreError>>;
+    /// Takes the next job in line and all equal ones that wait under a lease, and charges them one start.
+    fn take(&self, wanted: Wanted) -> BoxFuture<'_, Result<Next, StoreError>>;
+    /// Keeps a suspect from others for [`SILENCE`].
+    fn hold(&self, id: JobId) -> BoxFuture<'_, Result<(), StoreError>>;
+    /// Takes this job and all equal ones that wait under a lease, and charges them one start; fails them, with
     /// `problem`, if they have been charged `most` already.
     fn claim(&self, id: JobId, lease: Lease, most: u32, problem: String) -> BoxFuture<'_, Result<Claimed, StoreError>>;
     /// Ends a computation and all jobs that still want it; which these are.
@@ -485,8 +510,9 @@ pub trait JobStore: Send + Sync + 'static {
     fn kept_by_owner(&self) -> BoxFuture<'_, Result<Vec<(String, u64)>, StoreError>>;
     /// Notes the work of answers that were no jobs: whose it was, and how much, ms.
     fn note_work(&self, work: Vec<(String, f64)>) -> BoxFuture<'_, Result<(), StoreError>>;
-    /// Fails a job that waits, with `problem`; whether it did.
-    fn refuse(&self, id: JobId, problem: String) -> BoxFuture<'_, Result<bool, StoreError>>;
+    /// Fails an owner's jobs of a computation that has not begun, with `problem`, and puts the others back in line, without
+    /// a charge; which have failed.
+    fn refuse(&self, lease: Lease, owner: String, problem: String) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>>;
     /// Ends one job without a result.
     fn cancel(&self, id: JobId) -> BoxFuture<'_, Result<Option<Cancelled>, StoreError>>;
     /// Puts a job whose result is damaged back in line.
@@ -496,7 +522,7 @@ pub trait JobStore: Send + Sync + 'static {
     /// Fails, with `problem`, what is past its deadline; and when the next deadline is, ms UTC.
     fn expire_deadlines(&self, problem: String) -> BoxFuture<'_, Result<(Changed, Option<i64>), StoreError>>;
     /// Puts back in line what nobody runs (`live` tells the computations of this process, those about to be claimed
-    /// among them), and in the queue what waits and is not there.
+    /// among them).
     fn sweep(&self, live: Live) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>>;
     /// Takes up callbacks that are due.
     fn take_up_callbacks(&self, wanted: TakeUp) -> BoxFuture<'_, Result<Vec<DueCallback>, StoreError>>;
@@ -508,8 +534,6 @@ pub trait JobStore: Send + Sync + 'static {
     fn note_timing(&self, timing: Timing) -> BoxFuture<'_, Result<(), StoreError>>;
     /// The latest timings, newest first, at most `limit`.
     fn timings(&self, limit: u32) -> BoxFuture<'_, Result<Vec<Timing>, StoreError>>;
-    /// Takes tasks out of the queue, at most `places` at a time, until `stop` says so; returns when the last has ended.
-    fn work(&self, places: usize, run: RunTask, stop: watch::Receiver<bool>) -> BoxFuture<'static, ()>;
 
     /// Whether other processes work with the same jobs.
     fn is_shared(&self) -> bool {
@@ -521,12 +545,8 @@ pub trait JobStore: Send + Sync + 'static {
     }
     /// From now on tells what happens in other processes.
     fn tell(&self, _hear: Hear) {}
-    /// Asks other processes to compute parts of the job that is computed under this key, by at most so many tasks.
+    /// Asks so many others at most to compute parts of the job that is computed under this key.
     fn call_for_help(&self, _key: Key, _most: u32) -> BoxFuture<'_, Result<(), StoreError>> {
         Box::pin(async { Ok(()) })
-    }
-    /// The job of a task that waits for nobody, if its parts are shared out.
-    fn shared(&self, _id: JobId) -> BoxFuture<'_, Result<Option<Shared>, StoreError>> {
-        Box::pin(async { Ok(None) })
     }
 }

@@ -1,4 +1,4 @@
-//! Kept results, and jobs with their queue. Nothing outside this module speaks SQL.
+//! Kept results, and jobs. Nothing outside this module speaks SQL.
 
 pub mod address;
 pub mod backup;
@@ -7,7 +7,6 @@ pub mod documents;
 pub mod jobs;
 mod ledger;
 mod postgres;
-mod queue;
 pub(crate) mod quota;
 mod row;
 pub mod sqlite;
@@ -68,6 +67,8 @@ pub(crate) struct StoreSettings {
     pub(crate) connections: u32,
     /// How long to wait at the start for a PostgreSQL that does not answer.
     pub(crate) wait: Duration,
+    /// Whether this process runs jobs.
+    pub(crate) works: bool,
 }
 
 /// Opens the store.
@@ -80,6 +81,7 @@ pub(crate) async fn open(settings: &StoreSettings) -> Result<Arc<dyn Store>, Ope
                 connections: settings.connections,
                 patience: postgres::Patience { start: settings.wait, ..postgres::Patience::default() },
                 engine: crate::key::ENGINE_VERSION.to_owned(),
+                works: settings.works,
             };
             Ok(Arc::new(postgres::PostgresStore::open(address, usage).await?))
         }

@@ -14,7 +14,6 @@ use sqlx::{Connection, QueryBuilder, Sqlite};
 
 use super::OpenError;
 use super::ledger::Ledger;
-use super::queue::{self, Tasks};
 use super::row::ResultRow;
 use super::sqlite_jobs;
 use super::writer::{LIST_PATIENCE, Limits, Writer};
@@ -46,7 +45,8 @@ pub struct SqliteStore {
     pub(super) readers: SqlitePool,
     pub(super) writer: Writer,
     pub(super) ledger: Ledger,
-    pub(super) tasks: Tasks,
+    #[cfg(test)]
+    pub(super) writing: SqlitePool,
     pub(super) keys: Keys,
     pub(super) keep_ms: i64,
     _lock: File,
@@ -116,10 +116,19 @@ impl SqliteStore {
             keys.add(key);
         }
         let limits = Limits { bytes: i64::try_from(keep.bytes).unwrap_or(i64::MAX), age: keep.age };
-        let (ledger, tasks) = (Ledger::start(writing.clone()), Tasks::new(writing.clone()));
-        let writer = Writer::start(writing, keys.clone(), limits).await.map_err(failed)?;
+        let ledger = Ledger::start(writing.clone());
+        let writer = Writer::start(writing.clone(), keys.clone(), limits).await.map_err(failed)?;
         let keep_ms = i64::try_from(keep.jobs.as_millis()).unwrap_or(i64::MAX);
-        Ok(Self { readers, writer, ledger, tasks, keys, keep_ms, _lock: lock })
+        Ok(Self {
+            readers,
+            writer,
+            ledger,
+            #[cfg(test)]
+            writing,
+            keys,
+            keep_ms,
+            _lock: lock,
+        })
     }
 
     async fn read(&self, key: Key) -> Result<Option<KeptResult>, StoreError> {
@@ -316,11 +325,10 @@ pub(super) fn lock(folder: &Path) -> Result<File, OpenError> {
     }
 }
 
-/// Brings the tables up to date: ours and the queue's, which number their migrations by time in the same list.
+/// Brings the tables up to date.
 async fn migrate(pool: &SqlitePool) -> Result<(), String> {
-    /// Ours are 1, 2, 3 ..., theirs years.
+    /// Ours are 1, 2, 3 ...; those of the queue that earlier programs had beside it stand in the same list, by time.
     const OURS_BELOW: i64 = 1_000_000;
-    let fault = |error: MigrateError| migration_fault(&error);
     let is_new: bool =
         sqlx::query_scalar("SELECT NOT EXISTS (SELECT 1 FROM sqlite_master WHERE name = '_sqlx_migrations')")
             .fetch_one(pool)
@@ -340,12 +348,9 @@ async fn migrate(pool: &SqlitePool) -> Result<(), String> {
             ));
         }
     }
-    // Neither may stumble over the other's.
-    let (mut ours, mut theirs) = (migrations(), queue::migrations());
+    let mut ours = migrations();
     ours.set_ignore_missing(true);
-    theirs.set_ignore_missing(true);
-    ours.run(pool).await.map_err(fault)?;
-    theirs.run(pool).await.map_err(fault)
+    ours.run(pool).await.map_err(|error| migration_fault(&error))
 }
 
 fn migration_fault(error: &MigrateError) -> String {

@@ -1,8 +1,8 @@
 //! Parts of a job that another process runs.
 //!
-//! A job that is made of parts is run by one process, which puts them together, and asks for help by further tasks for
-//! it ([`JobStore::call_for_help`](crate::store::jobs::JobStore::call_for_help)). Whoever gets such a task computes parts until none is left or
-//! nobody wants the job any more, but not for long: other jobs may wait for the place.
+//! A job that is made of parts is run by one process, which puts them together, and asks for help
+//! ([`JobStore::call_for_help`](crate::store::jobs::JobStore::call_for_help)). Whoever has a place and no job for it
+//! computes parts until none is left or nobody wants the job any more, but not for long: other jobs may wait for the place.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -12,31 +12,17 @@ use precut_calc::calculator::{Message, Monitor};
 use tokio::sync::oneshot;
 
 use super::work;
-use crate::engine::exec::guarded;
+use crate::engine::exec::{Slot, guarded};
 use crate::engine::{Error, Inner};
-use crate::store::jobs::JobId;
+use crate::store::jobs::Shared;
 
 /// After so long a helper lets others go first; if parts are left, another one comes.
 const SHIFT: Duration = Duration::from_secs(5);
 /// How often a helper looks whether the job is still wanted, if nobody tells him.
 const LOOK: Duration = Duration::from_secs(1);
 
-pub(super) async fn run(engine: &Arc<Inner>, id: JobId) {
-    let jobs = &engine.jobs;
-    if !jobs.store.is_shared() {
-        return;
-    }
-    let slot = tokio::select! {
-        slot = engine.cores.job_slot(false) => slot,
-        () = jobs.stopped() => return,
-    };
-    let Ok(slot) = slot else { return };
-    let shared = match jobs.store.shared(id).await {
-        Ok(Some(shared)) => shared,
-        Ok(None) => return,
-        // Help that does not come costs time and nothing else.
-        Err(error) => return tracing::debug!(job = %id, %error, "a job is not helped with"),
-    };
+pub(super) async fn run(engine: Arc<Inner>, shared: Shared, slot: Slot) {
+    let (jobs, id) = (&engine.jobs, shared.id);
     let Ok(entry) = engine.known(&shared.calculator) else { return };
     if !entry.is_composed() {
         return;

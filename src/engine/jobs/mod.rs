@@ -1,16 +1,16 @@
 //! Jobs: calculations that outlive their request and their process.
 //!
-//! A job is a record in the [`JobStore`] (who asked what, how far it is, how it ended) and a place in its queue. The
-//! record is the truth; what is in memory here (progress between two writes, who waits for news, which computations
+//! A job is a record in the [`JobStore`]: who asked what, how far it is, how it ended. The records that wait are the queue.
+//! They are the truth; what is in memory here (progress between two writes, who waits for news, which computations
 //! this process runs) may be lost at any moment without harm.
 //!
 //! # Life of a job
 //!
-//! 1. [`Engine::submit`](crate::engine::Engine::submit) writes record and task in one transaction: after it has
-//!    answered, the job survives whatever happens. A job equal to one that is being computed joins it at once.
-//! 2. A task comes up in the queue; [`worker`] takes the job with all equal ones that wait under one **lease**, and
-//!    charges them a start. Every later write names the lease and finds no record once it is lost: a computation that
-//!    was given to somebody else cannot write any more.
+//! 1. [`Engine::submit`](crate::engine::Engine::submit) writes the record: after it has answered, the job survives whatever
+//!    happens. A job equal to one that is being computed joins it at once.
+//! 2. Where a place is free, [`worker`] takes the first in line with all equal ones that wait under one **lease**, and
+//!    charges them a start, in one transaction. Every later write names the lease and finds no record once it is lost: a
+//!    computation that was given to somebody else cannot write any more.
 //!    While long jobs have taken all places, short ones have one more ([`short`]).
 //! 3. It runs on the jobs' own pool. How far it is stands in memory and is written once a second.
 //! 4. Its end, with its result, is written in one transaction for all jobs that still hold the lease. A cancel or a
@@ -162,8 +162,8 @@ pub(crate) struct Jobs {
     feeds: Arc<Feeds>,
     computations: Arc<Computations>,
     new_deadline: Notify,
-    /// A job came into line.
-    came: Notify,
+    /// There is something to do.
+    came: watch::Sender<()>,
     /// A job ended here: somebody may have to be told.
     ended: Notify,
     stop: watch::Sender<bool>,
@@ -178,7 +178,7 @@ impl Jobs {
             feeds: Arc::default(),
             computations: Arc::default(),
             new_deadline: Notify::new(),
-            came: Notify::new(),
+            came: watch::channel(()).0,
             ended: Notify::new(),
             stop: watch::channel(false).0,
             tasks: Mutex::default(),
@@ -192,28 +192,17 @@ impl Jobs {
             Ok(timings) => timings.iter().rev().for_each(|timing| jobs.estimates.learn(timing)),
             Err(error) => tracing::warn!(%error, "earlier timings cannot be read"),
         }
-        // Weak: who works for an engine does not keep it alive.
-        let weak = Arc::downgrade(engine);
-        let run = Arc::new(move |id| {
-            let engine = weak.upgrade();
-            let task: futures_util::future::BoxFuture<'static, ()> = Box::pin(async move {
-                if let Some(engine) = engine {
-                    worker::run_task(engine, id, None).await;
-                }
-            });
-            task
-        });
         let mut tasks = vec![tokio::spawn(sweeper::run(Arc::downgrade(engine)))];
         if engine.settings.role.works() {
-            let work = jobs.store.work(engine.cores.job_places(), run, jobs.stop.subscribe());
-            tasks.push(tokio::spawn(work));
+            tasks.push(tokio::spawn(worker::run(Arc::downgrade(engine))));
             if !engine.settings.short_limit.is_zero() {
                 tasks.push(tokio::spawn(short::run(Arc::downgrade(engine))));
             }
         }
         let (feeds, computations) = (Arc::clone(&jobs.feeds), Arc::clone(&jobs.computations));
-        let generation = Arc::clone(&engine.generation);
+        let (generation, came) = (Arc::clone(&engine.generation), jobs.came.clone());
         jobs.store.tell(Arc::new(move |news| match news {
+            News::Waiting => came.send_replace(()),
             News::Changed(Changed { jobs, unwanted }) => {
                 computations.cancel(&unwanted);
                 feeds.touch(&jobs);
@@ -223,6 +212,7 @@ impl Jobs {
             News::Missed => {
                 generation.changed();
                 feeds.touch_all();
+                came.send_replace(());
             }
         }));
         jobs.tasks.lock().unwrap_or_else(PoisonError::into_inner).extend(tasks);
@@ -240,6 +230,16 @@ impl Jobs {
         for task in tasks {
             let _ = task.await;
         }
+    }
+
+    /// Tells whoever has a place that there is something to do.
+    fn call(&self) {
+        self.came.send_replace(());
+    }
+
+    /// Told from now on that there is something to do.
+    fn came(&self) -> watch::Receiver<()> {
+        self.came.subscribe()
     }
 
     fn is_stopped(&self) -> bool {
@@ -292,7 +292,7 @@ impl Jobs {
                 if useful_for_ms.is_some() {
                     self.new_deadline.notify_one();
                 }
-                self.came.notify_one();
+                self.call();
                 if record.state.is_final() {
                     self.ended.notify_one();
                 }

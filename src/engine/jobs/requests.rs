@@ -139,6 +139,7 @@ impl Engine {
                 // The row was damaged. The job is known: it is computed again.
                 tracing::warn!(job = %job.record.id, "the result of a job is gone; it is computed again");
                 self.inner.jobs.store.redo(job.record.id).await?;
+                self.inner.jobs.call();
                 Err(Error::JobNotFinished { state: JobState::Queued, retry_after: job.retry_after() })
             }
         }

@@ -109,7 +109,7 @@ impl Running {
     }
 }
 
-/// A computation while it is alive.
+/// A computation while it is alive, from before it is claimed.
 pub(super) struct Begun {
     computations: Arc<Computations>,
     pub(super) running: Arc<Running>,

@@ -1,4 +1,4 @@
-//! What has to be looked after from time to time: progress on record, deadlines, lost tasks, what is to be forgotten.
+//! What has to be looked after from time to time: progress on record, deadlines, what nobody runs, what is to be forgotten.
 
 use std::collections::HashSet;
 use std::sync::{Arc, Weak};
@@ -14,7 +14,7 @@ use crate::engine::{Error, Inner};
 const BEAT: Duration = Duration::from_secs(1);
 /// At the end, how often there is a look whether anything is still computed.
 const LOOK: Duration = Duration::from_millis(20);
-/// Beats between two looks for lost jobs. Where processes share a store every beat: one of them may have died.
+/// Beats between two looks for jobs that nobody runs. Where processes share a store every beat: one of them may have died.
 const SWEEP: u64 = 5;
 /// Beats between two counts.
 const COUNT: u64 = 5;
@@ -107,6 +107,7 @@ async fn sweep(engine: &Arc<Inner>) {
     {
         tracing::warn!(jobs = back.len(), "jobs that nobody ran are in line again");
         jobs.feeds.touch(&back);
+        jobs.call();
     }
 }
 

@@ -1,85 +1,171 @@
-//! From a task of the queue to a finished job.
+//! From the line of jobs to a finished one.
 
-use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Weak};
 use std::time::{Duration, Instant};
 
+use futures_util::future::BoxFuture;
 use precut_calc::calculator::Failure;
+use tokio::sync::watch;
+use tokio::task::JoinSet;
 use tracing::Instrument;
 
-use super::running::Running;
-use super::{MOST_ATTEMPTS, fault, help, work};
+use super::running::{Begun, Running};
+use super::{Jobs, MOST_ATTEMPTS, fault, help, work};
 use crate::engine::exec::Slot;
 use crate::engine::quota::worked;
 use crate::engine::{Error, Inner, Stored};
 use crate::store::StoreError;
-use crate::store::jobs::{Claim, Claimed, Ending, JobId, Waiting};
+use crate::store::jobs::{Claim, Claimed, Ending, JobId, Next, Wanted};
 use crate::trace::{self, TraceContext};
 
-/// Runs a job, if it still waits: in a place of those for short ones, if it was given one. Returns when its record says how
-/// it ended, or that it waits again.
-pub(super) async fn run_task(engine: Arc<Inner>, id: JobId, place: Option<Slot>) {
-    let jobs = &engine.jobs;
-    let Waiting { charged, calculator, owner, created_ms, traceparent, tracestate } =
-        match stubbornly(&engine, || jobs.store.waiting(id)).await {
-            Some(Some(waiting)) => waiting,
-            Some(None) if place.is_some() => return,
-            // Nobody waits for it to begin; perhaps somebody has asked for help with it.
-            Some(None) => return help::run(&engine, id).await,
-            None => return,
+/// How often there is a look at the line, and a word of what is held, where nobody tells of anything.
+const LOOK: Duration = Duration::from_secs(1);
+/// Pause where something waits that others are about to take.
+const PAUSE: Duration = Duration::from_millis(10);
+
+/// Takes jobs for all places until the service stops; returns when the last of them has ended.
+pub(super) async fn run(engine: Weak<Inner>) {
+    let mut running = JoinSet::new();
+    // After one job there may be another: that is found out by taking it.
+    let mut may_wait = false;
+    // Weak: who works for an engine does not keep it alive.
+    while let Some(engine) = engine.upgrade().filter(|engine| !engine.jobs.is_stopped()) {
+        while running.try_join_next().is_some() {}
+        if running.len() >= engine.cores.job_places() {
+            running.join_next().await;
+            continue;
+        }
+        let mut came = engine.jobs.came();
+        if !may_wait && !waits(&engine, None).await {
+            idle(&engine.jobs, &mut came).await;
+            continue;
+        }
+        // Only with something to do: a study that uses cores to spare gives one back to who waits for it.
+        let slot = tokio::select! {
+            Ok(slot) = engine.cores.job_slot(false) => slot,
+            () = engine.jobs.stopped() => break,
         };
-    // A start that takes the process along is charged to all that ran beside it. Before a job is given up as the one
-    // to blame, it is tried alone.
-    let alone = charged + 1 >= MOST_ATTEMPTS;
+        let next = next(&engine, slot, None).await;
+        may_wait = next.is_some();
+        match next {
+            Some(work) => drop(running.spawn(work)),
+            None => tokio::time::sleep(PAUSE).await,
+        }
+    }
+    while running.join_next().await.is_some() {}
+}
+
+/// Waits until somebody tells of something to do, but not for long.
+pub(super) async fn idle(jobs: &Jobs, came: &mut watch::Receiver<()>) {
+    tokio::select! {
+        // The sender lives as long as the jobs do.
+        _ = came.changed() => {}
+        () = tokio::time::sleep(LOOK) => {}
+        () = jobs.stopped() => {}
+    }
+}
+
+/// Whether there is something to do, as far as that can be said.
+pub(super) async fn waits(engine: &Inner, short_ms: Option<f64>) -> bool {
+    engine.jobs.store.waits(short_ms).await.unwrap_or_else(|error| {
+        metrics::counter!("precut_store_failures_total", "operation" => "queue").increment(1);
+        tracing::warn!(%error, "no job can be taken at the moment");
+        false
+    })
+}
+
+/// Takes what is to be done next; what does it, in that place.
+pub(super) async fn next(engine: &Arc<Inner>, slot: Slot, short_ms: Option<f64>) -> Option<BoxFuture<'static, ()>> {
+    let begun = engine.jobs.computations.begin();
+    let asked = AtomicBool::new(false);
+    let take = || {
+        let again = asked.swap(true, Ordering::Relaxed);
+        engine.jobs.store.take(Wanted { lease: begun.running.lease(), short_ms, again })
+    };
+    let next = stubbornly(engine, take).await?;
+    let engine = Arc::clone(engine);
+    match next {
+        Next::Run(claim) => Some(Box::pin(begin(engine, begun, claim, slot))),
+        Next::Suspect { id, calculator } => Some(Box::pin(run_alone(engine, id, calculator))),
+        Next::Help(shared) => Some(Box::pin(help::run(engine, shared, slot))),
+        Next::Nothing => None,
+    }
+}
+
+/// Runs a job with nothing beside it: a start that takes the process along is charged to all that run, and before a job is
+/// given up as the one to blame, it is tried alone.
+async fn run_alone(engine: Arc<Inner>, id: JobId, calculator: String) {
+    let jobs = &engine.jobs;
+    let waiting = engine.cores.job_slot(true);
+    tokio::pin!(waiting);
+    let slot = loop {
+        tokio::select! {
+            Ok(slot) = &mut waiting => break slot,
+            () = tokio::time::sleep(LOOK) => {
+                if let Err(error) = jobs.store.hold(id).await {
+                    tracing::debug!(job = %id, %error, "a job is not kept from others");
+                }
+            }
+            () = jobs.stopped() => return,
+        }
+    };
     // In a process of its own it may be tried as often as somebody kills this one.
     let is_isolated =
         engine.settings.isolation.is_some() && engine.known(&calculator).is_ok_and(|entry| !entry.is_composed());
     let most = if is_isolated { u32::MAX } else { MOST_ATTEMPTS };
-    let slot = if let Some(place) = place.filter(|_| !alone) {
-        place
-    } else {
-        tokio::select! {
-            Ok(slot) = engine.cores.job_slot(alone) => slot,
-            () = jobs.stopped() => return,
-        }
-    };
-    if let Err(error @ Error::KeptQuota { .. }) = engine.may_begin(&owner).await {
-        let problem = fault::written(&error);
-        if stubbornly(&engine, || jobs.store.refuse(id, problem.clone())).await == Some(true) {
-            metrics::counter!("precut_jobs_total", "calculator" => calculator, "outcome" => "refused").increment(1);
-            tracing::info!(job = %id, %error, "a job is not begun");
-            jobs.feeds.touch(&[id]);
-        }
-        return;
-    }
     let begun = jobs.computations.begin();
-    let running = Arc::clone(&begun.running);
     let poison = fault::written(&Error::CrashedRepeatedly { attempts: MOST_ATTEMPTS });
-    let claim = || jobs.store.claim(id, running.lease(), most, poison.clone());
-    let claim = match stubbornly(&engine, claim).await {
-        Some(Claimed::Run(claim)) => claim,
+    let claim = || jobs.store.claim(id, begun.running.lease(), most, poison.clone());
+    match stubbornly(&engine, claim).await {
+        Some(Claimed::Run(claim)) => begin(Arc::clone(&engine), begun, claim, slot).await,
         Some(Claimed::Poisonous(failed)) => {
             for id in &failed {
                 tracing::error!(job = %id, attempts = MOST_ATTEMPTS, "a job ended its process at every attempt");
             }
             metrics::counter!("precut_jobs_poisonous_total").increment(failed.len() as u64);
-            return jobs.feeds.touch(&failed);
+            jobs.feeds.touch(&failed);
         }
-        Some(Claimed::Nothing) | None => return,
-    };
-    running.claimed();
-    let waited = Duration::from_millis(jobs.store.now_ms().saturating_sub(created_ms).max(0).unsigned_abs());
-    metrics::histogram!("precut_job_wait_seconds", "calculator" => calculator).record(waited.as_secs_f64());
+        Some(Claimed::Nothing) | None => {}
+    }
+}
+
+/// Runs what was claimed, if its owner may have it. Returns when its record says how it ended, or that it waits again.
+async fn begin(engine: Arc<Inner>, begun: Begun, claim: Claim, slot: Slot) {
+    let jobs = &engine.jobs;
+    begun.running.claimed();
+    if let Err(error @ Error::KeptQuota { .. }) = engine.may_begin(&claim.owner).await {
+        return refuse(&engine, &claim, &error).await;
+    }
+    let waited = Duration::from_millis(jobs.store.now_ms().saturating_sub(claim.created_ms).max(0).unsigned_abs());
+    metrics::histogram!("precut_job_wait_seconds", "calculator" => claim.calculator.clone())
+        .record(waited.as_secs_f64());
     jobs.feeds.touch(&claim.jobs);
-    let span = tracing::info_span!("job", id = %id, calculator = claim.calculator, trace = tracing::field::Empty);
-    if let Some(place) = TraceContext::of_record(traceparent.as_deref(), tracestate.as_deref()) {
+    let span =
+        tracing::info_span!("job", id = %claim.jobs[0], calculator = claim.calculator, trace = tracing::field::Empty);
+    if let Some(place) = TraceContext::of_record(claim.traceparent.as_deref(), claim.tracestate.as_deref()) {
         span.record("trace", tracing::field::display(place.trace()));
         trace::follow(&span, &place);
     }
-    run_claimed(&engine, &claim, (&running, slot, &owner)).instrument(span).await;
+    run_claimed(&engine, &claim, &begun.running, slot).instrument(span).await;
 }
 
-/// Runs what was claimed in its place, for its owner.
-async fn run_claimed(engine: &Arc<Inner>, claim: &Claim, (running, slot, owner): (&Arc<Running>, Slot, &str)) {
+/// Does not begin an owner's jobs; equal ones of others wait again.
+async fn refuse(engine: &Arc<Inner>, claim: &Claim, error: &Error) {
+    let jobs = &engine.jobs;
+    let problem = fault::written(error);
+    let refuse = || jobs.store.refuse(claim.lease, claim.owner.clone(), problem.clone());
+    let Some(refused) = stubbornly(engine, refuse).await else { return };
+    metrics::counter!("precut_jobs_total", "calculator" => claim.calculator.clone(), "outcome" => "refused")
+        .increment(refused.len() as u64);
+    tracing::info!(job = %claim.jobs[0], %error, "a job is not begun");
+    jobs.feeds.touch(&claim.jobs);
+    jobs.ended.notify_one();
+    jobs.call();
+}
+
+/// Runs what was claimed in its place.
+async fn run_claimed(engine: &Arc<Inner>, claim: &Claim, running: &Arc<Running>, slot: Slot) {
     let jobs = &engine.jobs;
     tracing::info!(job = %claim.jobs[0], calculator = claim.calculator, attempt = claim.attempt, "a job begins");
     let started = Instant::now();
@@ -93,7 +179,7 @@ async fn run_claimed(engine: &Arc<Inner>, claim: &Claim, (running, slot, owner):
         }
         Err(error) => Err(error),
     };
-    worked(owner, started.elapsed().as_secs_f64() * 1e3);
+    worked(&claim.owner, started.elapsed().as_secs_f64() * 1e3);
     settle(engine, claim, outcome, started.elapsed(), running.is_cancelled()).await;
 }
 
@@ -119,7 +205,10 @@ async fn settle(
         // The service stops: the job waits for the next one, and this start does not count.
         Err(Error::Cancelled | Error::ShuttingDown | Error::Calculation(Failure::Cancelled)) => {
             match jobs.store.release(claim.lease).await {
-                Ok(back) => jobs.feeds.touch(&back),
+                Ok(back) => {
+                    jobs.feeds.touch(&back);
+                    jobs.call();
+                }
                 Err(error) => tracing::warn!(%error, "a job could not be put back; it is taken up at the next start"),
             }
             return;
@@ -141,7 +230,7 @@ async fn settle(
     }
 }
 
-/// Tries until the store answers or the service stops: a task must not end while its job is open.
+/// Tries until the store answers or the service stops: a place must not be left while its job is open.
 async fn stubbornly<T, F>(engine: &Arc<Inner>, attempt: impl Fn() -> F) -> Option<T>
 where
     F: Future<Output = Result<T, StoreError>>,

@@ -5,7 +5,7 @@ use sqlx::postgres::{PgConnection, PgPool};
 use super::record::{Outcome, column, count, ids, texts};
 use super::run::{requeue, unwanted};
 use super::usage::forget_work;
-use super::{PostgresStore, lock, news, queue};
+use super::{PostgresStore, lock, news};
 use crate::key::Key;
 use crate::store::StoreError;
 use crate::store::jobs::{Changed, JobId, Lease, Live, Timing};
@@ -15,12 +15,12 @@ use crate::store::sqlite_jobs::record::parsed;
 const TIMINGS: i64 = 20_000;
 /// Jobs forgotten in one transaction; a minute's worth at a million a day is 700.
 const FORGOTTEN_AT_ONCE: i64 = 5_000;
-/// Leases and lost tasks looked after in one round.
+/// Leases looked after in one round.
 const AT_ONCE: i64 = 500;
-/// How long a task that is done is kept, and a worker that is gone.
-const DONE_FOR_S: f64 = 60.0;
-/// A queue whose workers have all been silent for so long has none.
-const DESERTED_S: f64 = 30.0;
+/// How long a worker that is gone is known.
+const GONE_FOR_MS: i64 = 600_000;
+/// A version whose workers have all been silent for so long has none.
+const DESERTED_MS: i64 = 30_000;
 /// Locks of which one process at a time has each.
 const CARE: i32 = 0x7072_6563;
 
@@ -76,21 +76,32 @@ impl PostgresStore {
             let again = self.write(|connection| Box::pin(requeue(connection, lease, true, Some(silent_ms)))).await?;
             back.extend(again);
         }
-        if self.is_time_to_look_for_lost() {
-            let mine = self.engine.clone();
-            let lost = self.write(|connection| Box::pin(push_lost(connection, mine))).await?;
-            back.extend(lost);
-        }
-        if !back.is_empty() {
-            self.tasks.wake();
+        if self.is_time_to_adopt() {
+            if self.works {
+                self.say_alive().await?;
+            }
+            back.extend(adopt(&self.pool, &self.engine).await?);
         }
         Ok(back)
     }
 
-    fn is_time_to_look_for_lost(&self) -> bool {
+    /// Says that this process runs jobs of its version.
+    async fn say_alive(&self) -> Result<(), StoreError> {
+        sqlx::query(
+            "INSERT INTO precut.workers (id, engine, seen_ms) VALUES ($1, $2, precut.now_ms())
+             ON CONFLICT (id) DO UPDATE SET seen_ms = excluded.seen_ms",
+        )
+        .bind(self.held.name())
+        .bind(&self.engine)
+        .execute(&self.pool)
+        .await?;
+        Ok(())
+    }
+
+    fn is_time_to_adopt(&self) -> bool {
         let now = tokio::time::Instant::now();
-        let mut last = self.lost.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        let is_time = last.is_none_or(|last| now.duration_since(last) >= self.patience.lost);
+        let mut last = self.looked.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let is_time = last.is_none_or(|last| now.duration_since(last) >= self.patience.adoption);
         if is_time {
             *last = Some(now);
         }
@@ -150,57 +161,40 @@ async fn stale(
     stale.iter().map(|lease| parsed(lease)).collect::<Outcome<_>>().map(Some)
 }
 
-/// Gives a task to every job that waits and has none; which these are.
-async fn push_lost(connection: &mut PgConnection, mine: String) -> Outcome<Vec<JobId>> {
-    adopt(connection, &mine).await?;
-    let lost: Vec<String> = sqlx::query_scalar(
-        "SELECT id FROM precut.jobs AS job WHERE state = 'queued' AND NOT EXISTS (
-             SELECT FROM apalis.jobs AS task
-             WHERE task.job_type = $1 || job.engine AND task.idempotency_key = job.id || ':' || job.pushed
-                 AND task.status IN ('Pending', 'Queued', 'Running'))
-         ORDER BY priority DESC, turn, id LIMIT $2 FOR UPDATE SKIP LOCKED",
-    )
-    .bind(queue::QUEUES)
-    .bind(AT_ONCE)
-    .fetch_all(&mut *connection)
-    .await?;
-    queue::push(connection, &lost).await?;
-    ids(&lost)
-}
-
-/// Takes over jobs of earlier versions that have no workers any more, where ours has. A later version's jobs wait for
-/// its workers: there may be something in them that this one cannot read.
-async fn adopt(connection: &mut PgConnection, mine: &str) -> Outcome<()> {
+/// Takes over jobs of earlier versions that have no workers any more, where ours has; which these are. A later version's
+/// jobs wait for its workers: there may be something in them that this one cannot read.
+async fn adopt(pool: &PgPool, mine: &str) -> Outcome<Vec<JobId>> {
     let engines: Vec<String> =
         sqlx::query_scalar("SELECT DISTINCT engine FROM precut.jobs WHERE state = 'queued' AND engine <> $1")
             .bind(mine)
-            .fetch_all(&mut *connection)
+            .fetch_all(pool)
             .await?;
     let older: Vec<String> = engines.into_iter().filter(|engine| is_older(engine, mine)).collect();
     if older.is_empty() {
-        return Ok(());
+        return Ok(Vec::new());
     }
-    let served: Vec<String> = sqlx::query_scalar(
-        "SELECT DISTINCT substr(worker_type, length($1) + 1) FROM apalis.workers
-         WHERE starts_with(worker_type, $1) AND last_seen > now() - make_interval(secs => $2)",
-    )
-    .bind(queue::QUEUES)
-    .bind(DESERTED_S)
-    .fetch_all(&mut *connection)
-    .await?;
+    let served: Vec<String> =
+        sqlx::query_scalar("SELECT DISTINCT engine FROM precut.workers WHERE seen_ms > precut.now_ms() - $1")
+            .bind(DESERTED_MS)
+            .fetch_all(pool)
+            .await?;
     if !served.iter().any(|engine| engine == mine) {
-        return Ok(());
+        return Ok(Vec::new());
     }
     let deserted: Vec<String> = older.into_iter().filter(|engine| !served.contains(engine)).collect();
-    let taken_over = sqlx::query("UPDATE precut.jobs SET engine = $1 WHERE state = 'queued' AND engine = ANY($2)")
-        .bind(mine)
-        .bind(&deserted)
-        .execute(connection)
-        .await?;
-    if taken_over.rows_affected() > 0 {
-        tracing::info!(jobs = taken_over.rows_affected(), of = ?deserted, "jobs of earlier versions are taken over");
+    let taken_over: Vec<String> = sqlx::query_scalar(
+        "UPDATE precut.jobs SET engine = $1 WHERE id IN (
+             SELECT id FROM precut.jobs WHERE state = 'queued' AND engine = ANY($2) FOR UPDATE SKIP LOCKED)
+         RETURNING id",
+    )
+    .bind(mine)
+    .bind(&deserted)
+    .fetch_all(pool)
+    .await?;
+    if !taken_over.is_empty() {
+        tracing::info!(jobs = taken_over.len(), of = ?deserted, "jobs of earlier versions are taken over");
     }
-    Ok(())
+    ids(&taken_over)
 }
 
 /// Whether a version comes before another, number by number.
@@ -231,23 +225,10 @@ async fn forget(connection: &mut PgConnection, keep_ms: i64) -> Outcome<u64> {
     .bind(FORGOTTEN_AT_ONCE)
     .execute(&mut *connection)
     .await?;
-    sqlx::query(
-        "DELETE FROM apalis.jobs WHERE starts_with(job_type, $1) AND status IN ('Done', 'Killed', 'Failed')
-             AND done_at < now() - make_interval(secs => $2)",
-    )
-    .bind(queue::QUEUES)
-    .bind(DONE_FOR_S)
-    .execute(&mut *connection)
-    .await?;
-    sqlx::query(
-        "DELETE FROM apalis.workers AS worker WHERE starts_with(worker_type, $1)
-             AND last_seen < now() - make_interval(secs => 10 * $2)
-             AND NOT EXISTS (SELECT FROM apalis.jobs WHERE jobs.lock_by = worker.id)",
-    )
-    .bind(queue::QUEUES)
-    .bind(DONE_FOR_S)
-    .execute(&mut *connection)
-    .await?;
+    sqlx::query("DELETE FROM precut.workers WHERE seen_ms < precut.now_ms() - $1")
+        .bind(GONE_FOR_MS)
+        .execute(&mut *connection)
+        .await?;
     sqlx::query(
         "DELETE FROM precut.timings WHERE at_ms < (SELECT at_ms FROM precut.timings ORDER BY at_ms DESC LIMIT 1 OFFSET $1)",
     )

@@ -4,30 +4,28 @@ use bytes::Bytes;
 use futures_util::future::BoxFuture;
 use sqlx::QueryBuilder;
 use sqlx::postgres::{PgConnection, Postgres};
-use tokio::sync::watch;
-use uuid::Uuid;
 
 use super::PostgresStore;
-use super::callbacks;
 use super::care::{note_timing, timings};
 use super::line::submit;
-use super::queue::{self, Task, Tasks};
-use super::record::{Outcome, RecordRow, columns, count, record};
-use super::run::{beat, cancel, claim, finish, redo, refuse, requeue};
+use super::record::{Outcome, RecordRow, column, columns, record};
+use super::run::{beat, cancel, claim, finish, hold, redo, refuse, requeue, take, waits};
 use super::usage::{kept_by_owner, note_work, usage};
+use super::{callbacks, news};
 use crate::key::Key;
 use crate::store::jobs::{
     Accepted, Beat, Cancelled, Changed, Claimed, DueCallback, Ending, Hear, JobCounts, JobId, JobPage, JobQuery,
-    JobRecord, JobStore, Lease, Live, NewJob, RunTask, Shared, TakeUp, Timing, Tried, Usage, Waiting,
+    JobRecord, JobStore, Lease, Live, NewJob, Next, TakeUp, Timing, Tried, Usage, Wanted,
 };
 use crate::store::sqlite_jobs::pack::{packed, packed_ending};
-use crate::store::sqlite_jobs::record::parsed;
 use crate::store::{KeptResult, Origin, ResultPage, ResultQuery, ResultStore, StoreError, Taken};
 
-/// Tasks that one call for help makes at most.
-const MOST_HELP: u32 = 256;
-/// Tasks for each worker that is there.
-const HELP_PER_WORKER: u32 = 4;
+/// So many are asked for help at most.
+const MOST_HELP: i32 = 256;
+/// The same for each worker that is there.
+const HELP_PER_WORKER: i32 = 4;
+/// A worker that was heard of within this time is there.
+const HERE_MS: i64 = 15_000;
 
 impl ResultStore for PostgresStore {
     fn get(&self, key: Key) -> BoxFuture<'_, Result<Option<KeptResult>, StoreError>> {
@@ -93,14 +91,19 @@ impl PostgresStore {
                 Box::pin(async move { submit(connection, &packed, (queue_limit, keep_ms, &engine)).await })
             })
             .await?;
-        self.tasks.wake();
         Ok(accepted)
     }
 
     async fn finish_job(&self, lease: Lease, ending: Ending) -> Result<Vec<JobId>, StoreError> {
         let ending = packed_ending(ending).await?;
-        let keep_ms = self.keep_ms;
-        self.write(move |connection| Box::pin(async move { finish(connection, lease, &ending, keep_ms).await })).await
+        let (keep_ms, key) = (self.keep_ms, ending.key());
+        let ended = self
+            .write(move |connection| Box::pin(async move { finish(connection, lease, &ending, keep_ms).await }))
+            .await?;
+        if let Some(key) = key.filter(|_| !ended.is_empty()) {
+            self.writer.written(&key);
+        }
+        Ok(ended)
     }
 
     async fn list_jobs(&self, query: JobQuery) -> Result<JobPage, StoreError> {
@@ -133,35 +136,27 @@ impl PostgresStore {
 
     async fn help(&self, key: Key, most: u32) -> Result<(), StoreError> {
         let engine = self.engine.clone();
-        self.write(|connection| Box::pin(call(connection, key, most, engine))).await?;
-        self.tasks.wake();
-        Ok(())
+        self.write(|connection| Box::pin(call(connection, key, most, engine))).await
     }
 }
 
-/// Pushes further tasks for the job that is computed under a key.
+/// Asks for help with the job that is computed under a key.
 async fn call(connection: &mut PgConnection, key: Key, most: u32, engine: String) -> Outcome<()> {
-    let job: Option<(String, i32)> =
-        sqlx::query_as("SELECT id, priority FROM precut.jobs WHERE key = $1 AND state = 'running' ORDER BY id LIMIT 1")
-            .bind(key.as_bytes().as_slice())
-            .fetch_optional(&mut *connection)
-            .await?;
-    let Some((job, priority)) = job else { return Ok(()) };
-    let workers: i64 = sqlx::query_scalar(
-        "SELECT count(*) FROM apalis.workers WHERE worker_type = $1 AND last_seen > now() - interval '10 seconds'",
+    sqlx::query(
+        "UPDATE precut.jobs SET help = least(help + $2, $3, $4 * (
+             SELECT count(*) FROM precut.workers WHERE engine = $5 AND seen_ms > precut.now_ms() - $6))
+         WHERE id = (SELECT id FROM precut.jobs WHERE key = $1 AND state = 'running' ORDER BY id LIMIT 1)",
     )
-    .bind(queue::name(&engine))
-    .fetch_one(&mut *connection)
+    .bind(key.as_bytes().as_slice())
+    .bind(column(most))
+    .bind(MOST_HELP)
+    .bind(HELP_PER_WORKER)
+    .bind(engine)
+    .bind(HERE_MS)
+    .execute(&mut *connection)
     .await?;
-    let tasks = most.min(MOST_HELP).min(u32::try_from(workers).unwrap_or(0).saturating_mul(HELP_PER_WORKER));
-    let tasks: Vec<Task<'_>> = (0..tasks)
-        .map(|_| Task { job: &job, name: format!("{job}:help:{}", Uuid::now_v7().simple()), priority, turn: None })
-        .collect();
-    queue::add(connection, &engine, &tasks).await
+    news::call(connection).await
 }
-
-/// A job that waits: tries, calculator, owner, when it came, and its place in a trace.
-type WaitingRow = (i32, String, String, i64, Option<String>, Option<String>);
 
 impl JobStore for PostgresStore {
     fn submit(&self, job: NewJob, queue_limit: u64) -> BoxFuture<'_, Result<Accepted, StoreError>> {
@@ -198,7 +193,7 @@ impl JobStore for PostgresStore {
                      (SELECT count(*) FROM precut.callbacks WHERE state = 'pending'),
                      (SELECT created_ms FROM precut.jobs WHERE state = 'queued' ORDER BY id LIMIT 1),
                      (SELECT sum(pg_total_relation_size(oid))::bigint FROM pg_class WHERE relkind = 'r'
-                          AND relnamespace IN ('precut'::regnamespace, 'apalis'::regnamespace))",
+                          AND relnamespace = 'precut'::regnamespace)",
                 )
                 .fetch_one(&self.pool)
                 .await?;
@@ -207,39 +202,15 @@ impl JobStore for PostgresStore {
             Ok(JobCounts { queued, running, callbacks: count(callbacks), oldest_ms, store_bytes })
         })
     }
-    fn waiting(&self, id: JobId) -> BoxFuture<'_, Result<Option<Waiting>, StoreError>> {
-        Box::pin(async move {
-            let waiting: Option<WaitingRow> = sqlx::query_as(
-                "SELECT max(other.attempt), one.calculator, one.owner, one.created_ms, one.traceparent, one.tracestate
-                 FROM precut.jobs AS one JOIN precut.jobs AS other USING (key)
-                 WHERE one.id = $1 AND one.state = 'queued' AND other.state = 'queued'
-                 GROUP BY one.id",
-            )
-            .bind(id.to_string())
-            .fetch_optional(&self.pool)
-            .await?;
-            Ok(waiting.map(|(charged, calculator, owner, created_ms, traceparent, tracestate)| Waiting {
-                charged: count(charged),
-                calculator,
-                owner,
-                created_ms,
-                traceparent,
-                tracestate,
-            }))
-        })
+    fn waits(&self, short_ms: Option<f64>) -> BoxFuture<'_, Result<bool, StoreError>> {
+        Box::pin(async move { Ok(waits(&self.pool, &self.taker(), short_ms).await?) })
     }
-    fn next_short(&self, most_ms: f64) -> BoxFuture<'_, Result<Option<JobId>, StoreError>> {
-        Box::pin(async move {
-            let next: Option<String> = sqlx::query_scalar(
-                "SELECT id FROM precut.jobs WHERE state = 'queued' AND estimate_ms <= $1 AND attempt = 0 AND engine = $2
-                 ORDER BY priority DESC, turn, id LIMIT 1",
-            )
-            .bind(most_ms)
-            .bind(&self.engine)
-            .fetch_optional(&self.pool)
-            .await?;
-            Ok(next.map(|id| parsed(&id)).transpose()?)
-        })
+    fn take(&self, wanted: Wanted) -> BoxFuture<'_, Result<Next, StoreError>> {
+        let (taker, keep_ms) = (self.taker(), self.keep_ms);
+        Box::pin(self.write(move |connection| Box::pin(take(connection, taker, wanted, keep_ms))))
+    }
+    fn hold(&self, id: JobId) -> BoxFuture<'_, Result<(), StoreError>> {
+        Box::pin(async move { Ok(hold(&self.pool, id).await?) })
     }
     fn claim(&self, id: JobId, lease: Lease, most: u32, problem: String) -> BoxFuture<'_, Result<Claimed, StoreError>> {
         Box::pin(async move {
@@ -268,20 +239,18 @@ impl JobStore for PostgresStore {
     fn note_work(&self, work: Vec<(String, f64)>) -> BoxFuture<'_, Result<(), StoreError>> {
         Box::pin(self.write(move |connection| Box::pin(note_work(connection, work))))
     }
-    fn refuse(&self, id: JobId, problem: String) -> BoxFuture<'_, Result<bool, StoreError>> {
+    fn refuse(&self, lease: Lease, owner: String, problem: String) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>> {
         let keep_ms = self.keep_ms;
-        Box::pin(self.write(move |connection| Box::pin(async move { refuse(connection, id, &problem, keep_ms).await })))
+        Box::pin(self.write(move |connection| {
+            Box::pin(async move { refuse(connection, lease, (&owner, &problem), keep_ms).await })
+        }))
     }
     fn cancel(&self, id: JobId) -> BoxFuture<'_, Result<Option<Cancelled>, StoreError>> {
         let keep_ms = self.keep_ms;
         Box::pin(self.write(move |connection| Box::pin(cancel(connection, id, keep_ms))))
     }
     fn redo(&self, id: JobId) -> BoxFuture<'_, Result<(), StoreError>> {
-        Box::pin(async move {
-            self.write(|connection| Box::pin(redo(connection, id))).await?;
-            self.tasks.wake();
-            Ok(())
-        })
+        Box::pin(self.write(move |connection| Box::pin(redo(connection, id))))
     }
     fn beat(&self, beats: Vec<Beat>) -> BoxFuture<'_, Result<Vec<Lease>, StoreError>> {
         Box::pin(async move {
@@ -318,9 +287,6 @@ impl JobStore for PostgresStore {
     fn timings(&self, limit: u32) -> BoxFuture<'_, Result<Vec<Timing>, StoreError>> {
         Box::pin(async move { Ok(timings(&self.pool, limit).await?) })
     }
-    fn work(&self, places: usize, run: RunTask, stop: watch::Receiver<bool>) -> BoxFuture<'static, ()> {
-        Box::pin(Tasks::work(self.tasks.clone(), places, run, stop))
-    }
     fn is_shared(&self) -> bool {
         true
     }
@@ -332,20 +298,5 @@ impl JobStore for PostgresStore {
     }
     fn call_for_help(&self, key: Key, most: u32) -> BoxFuture<'_, Result<(), StoreError>> {
         Box::pin(self.help(key, most))
-    }
-    fn shared(&self, id: JobId) -> BoxFuture<'_, Result<Option<Shared>, StoreError>> {
-        Box::pin(async move {
-            let row: Option<(Vec<u8>, String, Vec<u8>)> = sqlx::query_as(
-                "SELECT key, calculator, input FROM precut.jobs WHERE id = $1 AND state = 'running'
-                     AND EXISTS (SELECT FROM precut.shared_studies WHERE study = key)",
-            )
-            .bind(id.to_string())
-            .fetch_optional(&self.pool)
-            .await?;
-            let Some((key, calculator, input)) = row else { return Ok(None) };
-            let Some(key) = Key::from_bytes(&key) else { return Ok(None) };
-            let input = zstd::decode_all(input.as_slice()).map_err(|error| StoreError::Failed(error.to_string()))?;
-            Ok(Some(Shared { key, calculator, input: input.into() }))
-        })
     }
 }

@@ -2,7 +2,6 @@
 
 use sqlx::postgres::PgConnection;
 
-use super::queue::{self, Task, task_name};
 use super::record::{Outcome, RecordRow, column, columns, record};
 use super::results::insert;
 use super::usage::{lock_owner, usage};
@@ -29,7 +28,8 @@ async fn facts(connection: &mut PgConnection, job: &NewJob, queue_limit: u64) ->
     sqlx::query_as(
         "SELECT running.lease, running.attempt, running.started_ms,
              (SELECT count(*) FROM precut.jobs WHERE state = 'queued' AND owner = $2 AND priority = $3) AS own,
-             (SELECT min(turn) FROM precut.jobs WHERE state IN ('queued', 'running') AND priority = $3) AS first,
+             (SELECT min(turn) FROM (SELECT min(turn) AS turn FROM precut.jobs WHERE state = 'queued' AND priority = $3
+                 UNION ALL SELECT min(turn) FROM precut.jobs WHERE state = 'running' AND priority = $3) AS turns) AS first,
              (SELECT count(*) FROM (SELECT FROM precut.jobs WHERE state = 'queued' LIMIT $4) AS waiting) AS queued
          FROM (VALUES (1)) AS one
          LEFT JOIN LATERAL (SELECT lease, attempt, started_ms FROM precut.jobs WHERE key = $1 AND state = 'running' LIMIT 1)
@@ -97,17 +97,16 @@ pub(super) async fn submit(
     let finished = (state == JobState::Succeeded).then_some(now);
     let priority = i32::try_from(rank(job.priority)).unwrap_or(0);
     let turn = facts.first.map_or(0, |first| first + 1) + facts.own + yields_to(job.estimate_ms);
-    let id = job.id.to_string();
     let row: Option<RecordRow> = sqlx::query_as(concat!(
         "INSERT INTO precut.jobs (id, kind, calculator, version, engine, key, input, state, progress, attempt, lease,
-             heartbeat_ms, priority, turn, pushed, owner, idempotency, body_hash, estimate_ms, created_ms, started_ms,
+             heartbeat_ms, priority, turn, owner, idempotency, body_hash, estimate_ms, created_ms, started_ms,
              finished_ms, deadline_ms, expires_ms, input_bytes, result_bytes, traceparent, tracestate)
          VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14, $15, $16, $17, $18, $19, $20, $21, $22,
-             $23, $24, octet_length($7::bytea), $25, $26, $27)
+             $23, octet_length($7::bytea), $24, $25, $26)
          ON CONFLICT (owner, idempotency) DO NOTHING RETURNING ",
         columns!()
     ))
-    .bind(&id)
+    .bind(job.id.to_string())
     .bind(job.kind.word())
     .bind(&job.calculator)
     .bind(column(job.version))
@@ -121,7 +120,6 @@ pub(super) async fn submit(
     .bind(lease.as_ref().map(|_| now))
     .bind(priority)
     .bind(turn)
-    .bind(i32::from(state == JobState::Queued))
     .bind(&job.owner)
     .bind(job.idempotency.as_ref().map(|idempotency| &idempotency.key))
     .bind(job.idempotency.as_ref().map(|idempotency| idempotency.body_hash.to_vec()))
@@ -140,10 +138,6 @@ pub(super) async fn submit(
         // Somebody else was faster: his is the job.
         return known(connection, job).await?.ok_or(sqlx::Error::RowNotFound);
     };
-    if state == JobState::Queued {
-        let task = Task { job: &id, name: task_name(&id, 1), priority, turn: Some(turn) };
-        queue::add(connection, engine, &[task]).await?;
-    }
     let Some(callback) = &job.callback else { return Ok(Accepted::New(row.record()?)) };
     callbacks::note(connection, job.id, callback, finished).await?;
     let written = record(connection, job.id).await?.ok_or(sqlx::Error::RowNotFound)?;

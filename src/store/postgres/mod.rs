@@ -1,4 +1,4 @@
-//! Results, jobs and the queue in a PostgreSQL database that any number of processes share.
+//! Results and jobs in a PostgreSQL database that any number of processes share.
 //!
 //! What one connection that writes does for the SQLite file, locks do here: whoever changes who computes a key holds the
 //! lock of that key ([`lock`]) until the transaction ends. All times are the database's ([`clock::Clock`]), so that the clocks
@@ -12,7 +12,6 @@ mod documents;
 mod jobs;
 mod line;
 mod news;
-mod queue;
 mod record;
 mod results;
 mod run;
@@ -30,13 +29,13 @@ use futures_util::future::BoxFuture;
 use sqlx::postgres::{PgConnection, PgPool};
 
 use super::address::Secret;
-use super::jobs::Lease;
+use super::jobs::{Lease, SILENCE};
 use super::sqlite::Keep;
 use super::{OpenError, StoreError};
 use crate::key::Key;
 use clock::Clock;
 use news::Newsroom;
-use queue::Tasks;
+use run::Taker;
 use studies::Held;
 use writer::Writer;
 
@@ -49,8 +48,8 @@ pub(crate) struct Patience {
     pub(crate) lease: Duration,
     /// So long after a start of the database nobody is taken for dead: nobody could say that he lives before.
     pub(crate) grace: Duration,
-    /// Between two looks for jobs without a task.
-    pub(crate) lost: Duration,
+    /// Between two looks for jobs of versions that nobody runs any more; so often a worker says that it lives.
+    pub(crate) adoption: Duration,
     /// A part of a study waits so long for the results of its points to be written.
     pub(crate) points: Duration,
 }
@@ -59,9 +58,9 @@ impl Default for Patience {
     fn default() -> Self {
         Self {
             start: Duration::from_secs(10),
-            lease: Duration::from_secs(4),
+            lease: SILENCE,
             grace: Duration::from_secs(8),
-            lost: Duration::from_secs(5),
+            adoption: Duration::from_secs(5),
             points: Duration::from_secs(5),
         }
     }
@@ -78,20 +77,22 @@ pub(crate) struct Use {
     pub(crate) patience: Patience,
     /// Version of the program: whose jobs it runs.
     pub(crate) engine: String,
+    /// Whether it runs any.
+    pub(crate) works: bool,
 }
 
-/// Results, jobs and the queue in a PostgreSQL database.
+/// Results and jobs in a PostgreSQL database.
 pub(crate) struct PostgresStore {
     pool: PgPool,
     writer: Writer,
-    tasks: Tasks,
     newsroom: Newsroom,
     clock: Clock,
     held: Held,
     keep_ms: i64,
     engine: String,
+    works: bool,
     patience: Patience,
-    lost: std::sync::Mutex<Option<tokio::time::Instant>>,
+    looked: std::sync::Mutex<Option<tokio::time::Instant>>,
 }
 
 impl PostgresStore {
@@ -101,19 +102,23 @@ impl PostgresStore {
         let clock = Clock::new();
         clock.read(&pool).await.map_err(|error| start::refused(&error))?;
         let keep_ms = i64::try_from(usage.keep.jobs.as_millis()).unwrap_or(i64::MAX / 4);
-        let tasks = Tasks::new(pool.clone(), &usage.engine);
         Ok(Self {
             writer: Writer::start(pool.clone(), usage.keep),
-            newsroom: Newsroom::open(pool.clone(), tasks.bell()),
+            newsroom: Newsroom::open(pool.clone()),
             held: Held::start(pool.clone()),
-            tasks,
             clock,
             keep_ms,
             engine: usage.engine,
             patience: usage.patience,
-            lost: std::sync::Mutex::default(),
+            works: usage.works,
+            looked: std::sync::Mutex::default(),
             pool,
         })
+    }
+
+    fn taker(&self) -> Taker {
+        let silence_ms = i64::try_from(self.patience.lease.as_millis()).unwrap_or(i64::MAX);
+        Taker { engine: self.engine.clone(), silence_ms }
     }
 
     /// Does `work` in a transaction.
@@ -144,24 +149,24 @@ async fn lock(connection: &mut PgConnection, key: &Key) -> Result<i64, sqlx::Err
 
 /// The same for the key of a job; `None` where there is no such job.
 async fn lock_job(connection: &mut PgConnection, job: &str) -> Result<Option<(Key, i64)>, sqlx::Error> {
-    let key: Option<Vec<u8>> = sqlx::query_scalar("SELECT key FROM precut.jobs WHERE id = $1")
-        .bind(job)
-        .fetch_optional(&mut *connection)
-        .await?;
-    locked(connection, key).await
+    let locked: Option<(Vec<u8>, i64)> = sqlx::query_as(
+        "SELECT key, precut.now_ms() FROM (SELECT key FROM precut.jobs WHERE id = $1) AS job,
+             LATERAL pg_advisory_xact_lock(precut.lock_of(key))",
+    )
+    .bind(job)
+    .fetch_optional(connection)
+    .await?;
+    Ok(locked.and_then(|(key, now)| Some((Key::from_bytes(&key)?, now))))
 }
 
 /// The same for the key that is computed under a lease; `None` where nothing is.
 async fn lock_lease(connection: &mut PgConnection, lease: Lease) -> Result<Option<(Key, i64)>, sqlx::Error> {
-    let key: Option<Vec<u8>> = sqlx::query_scalar("SELECT key FROM precut.jobs WHERE lease = $1 LIMIT 1")
-        .bind(lease.to_string())
-        .fetch_optional(&mut *connection)
-        .await?;
-    locked(connection, key).await
-}
-
-async fn locked(connection: &mut PgConnection, key: Option<Vec<u8>>) -> Result<Option<(Key, i64)>, sqlx::Error> {
-    let Some(key) = key.as_deref().and_then(Key::from_bytes) else { return Ok(None) };
-    let now = lock(connection, &key).await?;
-    Ok(Some((key, now)))
+    let locked: Option<(Vec<u8>, i64)> = sqlx::query_as(
+        "SELECT key, precut.now_ms() FROM (SELECT key FROM precut.jobs WHERE lease = $1 LIMIT 1) AS job,
+             LATERAL pg_advisory_xact_lock(precut.lock_of(key))",
+    )
+    .bind(lease.to_string())
+    .fetch_optional(connection)
+    .await?;
+    Ok(locked.and_then(|(key, now)| Some((Key::from_bytes(&key)?, now))))
 }

@@ -1,10 +1,9 @@
-//! What happens in one process and concerns others: jobs that changed, computations that nobody wants any more, tasks
-//! that were pushed. Told by notifications of the database, which leave with the transaction that they speak of.
+//! What happens in one process and concerns others: jobs that changed, computations that nobody wants any more, work that
+//! waits. Told by notifications of the database, which leave with the transaction that they speak of.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use futures_util::task::AtomicWaker;
 use serde::{Deserialize, Serialize};
 use sqlx::postgres::{PgConnection, PgListener, PgPool};
 use tokio::task::JoinHandle;
@@ -14,14 +13,10 @@ use crate::store::jobs::{Changed, Hear, JobId, Lease, News};
 
 /// Our notifications.
 const CHANNEL: &str = "precut_news";
-/// The queue's own, at every task that is pushed.
-const TASKS: &str = "apalis::job::insert";
 /// Jobs and leases in one notification, which has room for 8000 bytes.
 const TOLD_AT_ONCE: usize = 100;
 /// Between two attempts to listen.
 const PAUSE: Duration = Duration::from_millis(250);
-/// The bell is rung so often even where nothing is heard.
-const RING: Duration = Duration::from_secs(1);
 
 #[derive(Default, Serialize, Deserialize)]
 struct Notice {
@@ -32,6 +27,9 @@ struct Notice {
     /// Documents changed: what the trigger of their table says.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     library: bool,
+    /// There is something to do: what the trigger of jobs says that come into line.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    waiting: bool,
 }
 
 /// Tells all processes, once the transaction is committed.
@@ -41,10 +39,19 @@ pub(super) async fn tell(connection: &mut PgConnection, jobs: &[JobId], unwanted
     let of_leases =
         unwanted.chunks(TOLD_AT_ONCE).map(|unwanted| Notice { unwanted: unwanted.to_vec(), ..Notice::default() });
     for notice in of_jobs.chain(of_leases) {
-        let text = serde_json::to_string(&notice).map_err(|error| sqlx::Error::Encode(error.into()))?;
-        sqlx::query("SELECT pg_notify($1, $2)").bind(CHANNEL).bind(text).execute(&mut *connection).await?;
+        say(connection, &notice).await?;
     }
     Ok(())
+}
+
+/// Tells all processes that there is something to do.
+pub(super) async fn call(connection: &mut PgConnection) -> Outcome<()> {
+    say(connection, &Notice { waiting: true, ..Notice::default() }).await
+}
+
+async fn say(connection: &mut PgConnection, notice: &Notice) -> Outcome<()> {
+    let text = serde_json::to_string(notice).map_err(|error| sqlx::Error::Encode(error.into()))?;
+    sqlx::query("SELECT pg_notify($1, $2)").bind(CHANNEL).bind(text).execute(connection).await.map(drop)
 }
 
 /// Listens, over a connection of its own.
@@ -54,9 +61,9 @@ pub(super) struct Newsroom {
 }
 
 impl Newsroom {
-    pub(super) fn open(pool: PgPool, bell: Arc<AtomicWaker>) -> Self {
+    pub(super) fn open(pool: PgPool) -> Self {
         let hear: Arc<Mutex<Option<Hear>>> = Arc::default();
-        let task = tokio::spawn(listen(pool, bell, Arc::clone(&hear)));
+        let task = tokio::spawn(listen(pool, Arc::clone(&hear)));
         Self { hear, task }
     }
 
@@ -83,9 +90,9 @@ fn pass_on(hear: &Mutex<Option<Hear>>, news: News) {
     }
 }
 
-async fn listen(pool: PgPool, bell: Arc<AtomicWaker>, hear: Arc<Mutex<Option<Hear>>>) {
+async fn listen(pool: PgPool, hear: Arc<Mutex<Option<Hear>>>) {
     loop {
-        if let Err(error) = listen_once(&pool, &bell, &hear).await {
+        if let Err(error) = listen_once(&pool, &hear).await {
             tracing::warn!(%error, "the database's notifications are not heard; listening again");
             metrics::counter!("precut_store_failures_total", "operation" => "listen").increment(1);
         }
@@ -96,41 +103,25 @@ async fn listen(pool: PgPool, bell: Arc<AtomicWaker>, hear: Arc<Mutex<Option<Hea
     }
 }
 
-async fn listen_once(pool: &PgPool, bell: &AtomicWaker, hear: &Mutex<Option<Hear>>) -> Outcome<()> {
+async fn listen_once(pool: &PgPool, hear: &Mutex<Option<Hear>>) -> Outcome<()> {
     let mut listener = PgListener::connect_with(pool).await?;
-    listener.listen_all([CHANNEL, TASKS]).await?;
+    listener.listen(CHANNEL).await?;
     // What was said before is unknown.
     pass_on(hear, News::Missed);
-    let ringing = async {
-        let mut ring = tokio::time::interval(RING);
-        loop {
-            ring.tick().await;
-            bell.wake();
+    // Where nothing comes the connection was lost, and with it what was said meanwhile.
+    while let Some(notification) = listener.try_recv().await? {
+        let Ok(notice) = serde_json::from_str::<Notice>(notification.payload()) else { continue };
+        let jobs: Vec<JobId> = notice.jobs.iter().filter_map(|id| id.parse().ok()).collect();
+        let unwanted: Vec<Lease> = notice.unwanted.iter().filter_map(|lease| lease.parse().ok()).collect();
+        if notice.library {
+            pass_on(hear, News::Library);
         }
-    };
-    let listening = async {
-        loop {
-            match listener.try_recv().await? {
-                // The connection was lost, and with it what was said meanwhile.
-                None => return Ok(()),
-                Some(notification) if notification.channel() == TASKS => bell.wake(),
-                Some(notification) => {
-                    if let Ok(notice) = serde_json::from_str::<Notice>(notification.payload()) {
-                        if notice.library {
-                            pass_on(hear, News::Library);
-                            continue;
-                        }
-                        let jobs = notice.jobs.iter().filter_map(|id| id.parse().ok()).collect();
-                        let unwanted = notice.unwanted.iter().filter_map(|lease| lease.parse().ok()).collect();
-                        pass_on(hear, News::Changed(Changed { jobs, unwanted }));
-                    }
-                }
-            }
+        if notice.waiting {
+            pass_on(hear, News::Waiting);
         }
-    };
-    // Neither is begun anew: what a connection has half received would be lost.
-    tokio::select! {
-        () = ringing => Ok(()),
-        heard = listening => heard,
+        if !jobs.is_empty() || !unwanted.is_empty() {
+            pass_on(hear, News::Changed(Changed { jobs, unwanted }));
+        }
     }
+    Ok(())
 }

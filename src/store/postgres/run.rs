@@ -1,14 +1,20 @@
 //! How a job is taken, ended and put back. Whoever does it holds the lock of the job's key.
 
 use sqlx::FromRow;
-use sqlx::postgres::PgConnection;
+use sqlx::postgres::{PgConnection, PgPool};
 
 use super::record::{Outcome, column, count, ids, record, texts};
-use super::{lock_job, lock_lease, news, queue, results};
-use crate::store::jobs::{Beat, Cancelled, Claim, Claimed, JobId, JobKind, JobState, Lease};
+use super::{lock_job, lock_lease, news, results};
+use crate::key::Key;
+use crate::store::jobs::{
+    Beat, Cancelled, Claim, Claimed, JobId, JobKind, JobState, Lease, MOST_ATTEMPTS, Next, Shared, Wanted,
+};
 use crate::store::row::ResultRow;
 use crate::store::sqlite_jobs::pack::PackedEnding;
 use crate::store::sqlite_jobs::record::{parsed, unreadable};
+
+/// Of what waits so many are looked at for one that nobody else is about to take.
+const LOOKED_AT: i64 = 64;
 
 /// A job that was taken, or given up.
 #[derive(FromRow)]
@@ -20,8 +26,179 @@ struct TakenRow {
     calculator: String,
     priority: i32,
     turn: i64,
+    owner: String,
+    created_ms: i64,
+    traceparent: Option<String>,
+    tracestate: Option<String>,
     /// Of one of them only: they are equal.
     input: Option<Vec<u8>>,
+}
+
+/// The columns of a [`TakenRow`]; `$1` is the job whose input is wanted.
+macro_rules! taken {
+    () => {
+        "id, state, attempt, kind, calculator, priority, turn, owner, created_ms, traceparent, tracestate, \
+         CASE WHEN id = $1 THEN input END AS input"
+    };
+}
+
+/// What waits and may be taken: `$1` is the version, `$2` how long others keep away from what is held, `$3` the longest job.
+macro_rules! in_line {
+    () => {
+        "state = 'queued' AND engine = $1 AND (heartbeat_ms IS NULL OR heartbeat_ms <= precut.now_ms() - $2) \
+         AND ($3::float8 IS NULL OR (estimate_ms <= $3 AND attempt = 0))"
+    };
+}
+
+/// What is computed and wants help.
+macro_rules! wants_help {
+    () => {
+        "state = 'running' AND help > 0 AND engine = $1"
+    };
+}
+
+/// Who asks for the next job: of which version, and how long others keep away from what somebody holds.
+#[derive(Clone)]
+pub(super) struct Taker {
+    pub(super) engine: String,
+    pub(super) silence_ms: i64,
+}
+
+pub(super) async fn waits(pool: &PgPool, taker: &Taker, short_ms: Option<f64>) -> Outcome<bool> {
+    sqlx::query_scalar(concat!(
+        "SELECT EXISTS (SELECT FROM precut.jobs WHERE ",
+        in_line!(),
+        ") OR ($3 IS NULL AND EXISTS (SELECT FROM precut.jobs WHERE ",
+        wants_help!(),
+        "))"
+    ))
+    .bind(&taker.engine)
+    .bind(taker.silence_ms)
+    .bind(short_ms)
+    .fetch_one(pool)
+    .await
+}
+
+pub(super) async fn take(connection: &mut PgConnection, taker: Taker, wanted: Wanted, keep_ms: i64) -> Outcome<Next> {
+    if wanted.again {
+        let id: Option<String> =
+            sqlx::query_scalar("SELECT id FROM precut.jobs WHERE lease = $1 AND state = 'running' ORDER BY id LIMIT 1")
+                .bind(wanted.lease.to_string())
+                .fetch_optional(&mut *connection)
+                .await?;
+        if let Some(id) = id
+            && let Claimed::Run(claim) = held(connection, &id, wanted.lease).await?
+        {
+            return Ok(Next::Run(claim));
+        }
+    }
+    let Some((id, key, now)) = first(connection, &taker, wanted.short_ms).await? else {
+        return if wanted.short_ms.is_some() { Ok(Next::Nothing) } else { help(connection, &taker).await };
+    };
+    let start = Start { lease: wanted.lease, most: MOST_ATTEMPTS - 1, problem: None };
+    let taken = start.taken(connection, (&id, &key, now), keep_ms).await?;
+    if let Claimed::Run(claim) = claimed(connection, &id, wanted.lease, taken).await? {
+        return Ok(Next::Run(claim));
+    }
+    // It waits no more, or it has been charged too often to run beside others.
+    let suspects: Vec<Option<String>> = sqlx::query_scalar(
+        "UPDATE precut.jobs SET heartbeat_ms = $3 WHERE key = $2 AND state = 'queued'
+         RETURNING CASE WHEN id = $1 THEN calculator END",
+    )
+    .bind(&id)
+    .bind(&key)
+    .bind(now)
+    .fetch_all(connection)
+    .await?;
+    Ok(match suspects.into_iter().flatten().next() {
+        Some(calculator) => Next::Suspect { id: parsed(&id)?, calculator },
+        None => Next::Nothing,
+    })
+}
+
+/// The first in line whose key nobody else has, with the lock of its key and the time. Who is about to take another is
+/// passed over, not waited for. Lower priorities let those pass who want help.
+async fn first(
+    connection: &mut PgConnection,
+    taker: &Taker,
+    short_ms: Option<f64>,
+) -> Outcome<Option<(String, Vec<u8>, i64)>> {
+    // The rows are materialised in order, and looked at one after the other until a lock is there: no other is taken.
+    sqlx::query_as(concat!(
+        "WITH line AS MATERIALIZED (SELECT id, key FROM precut.jobs WHERE ",
+        in_line!(),
+        " AND ($3 IS NOT NULL OR priority >= coalesce((SELECT max(priority) FROM precut.jobs WHERE ",
+        wants_help!(),
+        "), 0)) ORDER BY priority DESC, turn, id LIMIT $4)
+         SELECT id, key, precut.now_ms() FROM line WHERE pg_try_advisory_xact_lock(precut.lock_of(key)) LIMIT 1"
+    ))
+    .bind(&taker.engine)
+    .bind(taker.silence_ms)
+    .bind(short_ms)
+    .bind(LOOKED_AT)
+    .fetch_optional(connection)
+    .await
+}
+
+/// A job that wants help, which is then wanted of one less.
+async fn help(connection: &mut PgConnection, taker: &Taker) -> Outcome<Next> {
+    let helped: Option<(String, Vec<u8>, String, Vec<u8>)> = sqlx::query_as(concat!(
+        "UPDATE precut.jobs SET help = help - 1 WHERE id = (SELECT id FROM precut.jobs WHERE ",
+        wants_help!(),
+        " ORDER BY priority DESC, turn, id LIMIT 1 FOR UPDATE SKIP LOCKED) RETURNING id, key, calculator, input"
+    ))
+    .bind(&taker.engine)
+    .fetch_optional(connection)
+    .await?;
+    let Some((id, key, calculator, input)) = helped else { return Ok(Next::Nothing) };
+    let key = Key::from_bytes(&key).ok_or_else(|| unreadable("key"))?;
+    // What is damaged is found out and told by who runs it.
+    let input = zstd::decode_all(input.as_slice()).unwrap_or_default().into();
+    Ok(Next::Help(Shared { id: parsed(&id)?, key, calculator, input }))
+}
+
+/// Under which lease jobs are taken. What was charged `most` starts already is failed with `problem`; without one it is
+/// left where it is.
+struct Start<'p> {
+    lease: Lease,
+    most: u32,
+    problem: Option<&'p str>,
+}
+
+impl Start<'_> {
+    /// Takes a job whose key is locked, and all equal ones.
+    async fn taken(
+        &self,
+        connection: &mut PgConnection,
+        (id, key, now): (&str, &[u8], i64),
+        keep_ms: i64,
+    ) -> Outcome<Vec<TakenRow>> {
+        sqlx::query_as(concat!(
+            "UPDATE precut.jobs
+             SET state = CASE WHEN starts < $3 THEN 'running' ELSE 'failed' END,
+                 attempt = CASE WHEN starts < $3 THEN starts + 1 ELSE attempt END,
+                 lease = CASE WHEN starts < $3 THEN $4 END,
+                 heartbeat_ms = CASE WHEN starts < $3 THEN $5::bigint END,
+                 started_ms = CASE WHEN starts < $3 THEN $5::bigint ELSE started_ms END,
+                 problem = CASE WHEN starts < $3 THEN NULL ELSE $6 END,
+                 finished_ms = CASE WHEN starts < $3 THEN NULL ELSE $5::bigint END,
+                 expires_ms = CASE WHEN starts < $3 THEN NULL ELSE $5::bigint + $7 END,
+                 progress = 0, stage = NULL, help = 0
+             FROM (SELECT max(attempt) AS starts FROM precut.jobs WHERE key = $2 AND state = 'queued'
+                   HAVING bool_or(id = $1) AND ($6::text IS NOT NULL OR max(attempt) < $3)) AS charged
+             WHERE key = $2 AND state = 'queued' RETURNING ",
+            taken!()
+        ))
+        .bind(id)
+        .bind(key)
+        .bind(column(self.most))
+        .bind(self.lease.to_string())
+        .bind(now)
+        .bind(self.problem)
+        .bind(keep_ms)
+        .fetch_all(connection)
+        .await
+    }
 }
 
 pub(super) async fn claim(
@@ -33,43 +210,27 @@ pub(super) async fn claim(
 ) -> Outcome<Claimed> {
     let id = id.to_string();
     let Some((key, now)) = lock_job(connection, &id).await? else { return Ok(Claimed::Nothing) };
-    let mut taken: Vec<TakenRow> = sqlx::query_as(
-        "WITH line AS (SELECT id, attempt FROM precut.jobs WHERE key = $1 AND state = 'queued'),
-              charged AS (SELECT max(attempt) AS starts FROM line HAVING bool_or(id = $2))
-         UPDATE precut.jobs AS job
-         SET state = CASE WHEN starts < $3 THEN 'running' ELSE 'failed' END,
-             attempt = CASE WHEN starts < $3 THEN starts + 1 ELSE job.attempt END,
-             lease = CASE WHEN starts < $3 THEN $4 END,
-             heartbeat_ms = CASE WHEN starts < $3 THEN $5::bigint END,
-             started_ms = CASE WHEN starts < $3 THEN $5::bigint ELSE started_ms END,
-             problem = CASE WHEN starts < $3 THEN NULL ELSE $6 END,
-             finished_ms = CASE WHEN starts < $3 THEN NULL ELSE $5::bigint END,
-             expires_ms = CASE WHEN starts < $3 THEN NULL ELSE $5::bigint + $7 END,
-             progress = 0, stage = NULL
-         FROM line, charged WHERE job.id = line.id AND job.state = 'queued'
-         RETURNING job.id, job.state, job.attempt, job.kind, job.calculator, job.priority, job.turn,
-             CASE WHEN job.id = $2 THEN job.input END AS input",
-    )
-    .bind(key.as_bytes().as_slice())
-    .bind(&id)
-    .bind(column(most))
-    .bind(lease.to_string())
-    .bind(now)
-    .bind(problem)
-    .bind(keep_ms)
-    .fetch_all(&mut *connection)
-    .await?;
+    let start = Start { lease, most, problem: Some(problem) };
+    let taken = start.taken(connection, (&id, key.as_bytes(), now), keep_ms).await?;
     if taken.is_empty() {
         // The answer to a claim may be lost on its way: who asks again has it already.
-        taken = sqlx::query_as(
-            "SELECT id, state, attempt, kind, calculator, priority, turn, CASE WHEN id = $2 THEN input END AS input
-             FROM precut.jobs WHERE lease = $1 AND state = 'running'",
-        )
-        .bind(lease.to_string())
-        .bind(&id)
-        .fetch_all(&mut *connection)
-        .await?;
+        return held(connection, &id, lease).await;
     }
+    claimed(connection, &id, lease, taken).await
+}
+
+/// What is computed under a lease.
+async fn held(connection: &mut PgConnection, id: &str, lease: Lease) -> Outcome<Claimed> {
+    let taken: Vec<TakenRow> =
+        sqlx::query_as(concat!("SELECT ", taken!(), " FROM precut.jobs WHERE lease = $2 AND state = 'running'"))
+            .bind(id)
+            .bind(lease.to_string())
+            .fetch_all(&mut *connection)
+            .await?;
+    claimed(connection, id, lease, taken).await
+}
+
+async fn claimed(connection: &mut PgConnection, id: &str, lease: Lease, taken: Vec<TakenRow>) -> Outcome<Claimed> {
     let jobs = taken.iter().map(|job| parsed(&job.id)).collect::<Outcome<Vec<JobId>>>()?;
     news::tell(connection, &jobs, &[]).await?;
     let Some(job) = taken.into_iter().find(|job| job.id == id) else { return Ok(Claimed::Nothing) };
@@ -94,7 +255,24 @@ pub(super) async fn claim(
         // A damaged input is nothing that can be run: who claims it finds that out and says so on the record.
         input: zstd::decode_all(job.input.unwrap_or_default().as_slice()).unwrap_or_default().into(),
         attempt: count(job.attempt),
+        owner: job.owner,
+        created_ms: job.created_ms,
+        traceparent: job.traceparent,
+        tracestate: job.tracestate,
     }))
+}
+
+pub(super) async fn hold(pool: &PgPool, id: JobId) -> Outcome<()> {
+    sqlx::query(
+        "UPDATE precut.jobs SET heartbeat_ms = precut.now_ms()
+         WHERE id IN (SELECT other.id FROM precut.jobs AS one JOIN precut.jobs AS other USING (key)
+                      WHERE one.id = $1 AND other.state = 'queued' FOR UPDATE OF other SKIP LOCKED)
+             AND state = 'queued'",
+    )
+    .bind(id.to_string())
+    .execute(pool)
+    .await
+    .map(drop)
 }
 
 pub(super) async fn finish(
@@ -158,7 +336,6 @@ pub(super) async fn requeue(
     .bind(silent_for_ms.map_or(i64::MAX, |ms| now.saturating_sub(ms)))
     .fetch_all(&mut *connection)
     .await?;
-    queue::push(connection, &back).await?;
     let back = ids(&back)?;
     news::tell(connection, &back, &[]).await?;
     Ok(back)
@@ -204,23 +381,30 @@ pub(super) async fn cancel(connection: &mut PgConnection, id: JobId, keep_ms: i6
     Ok(Some(Cancelled { job, before, unwanted }))
 }
 
-pub(super) async fn refuse(connection: &mut PgConnection, id: JobId, problem: &str, keep_ms: i64) -> Outcome<bool> {
-    let Some((_, now)) = lock_job(connection, &id.to_string()).await? else { return Ok(false) };
-    let refused = sqlx::query(
-        "UPDATE precut.jobs SET state = 'failed', problem = $2, finished_ms = $3, expires_ms = $3::bigint + $4
-         WHERE id = $1 AND state = 'queued'",
+pub(super) async fn refuse(
+    connection: &mut PgConnection,
+    lease: Lease,
+    (owner, problem): (&str, &str),
+    keep_ms: i64,
+) -> Outcome<Vec<JobId>> {
+    let Some((_, now)) = lock_lease(connection, lease).await? else { return Ok(Vec::new()) };
+    let refused: Vec<String> = sqlx::query_scalar(
+        "UPDATE precut.jobs
+         SET state = 'failed', problem = $3, lease = NULL, heartbeat_ms = NULL, started_ms = NULL,
+             attempt = greatest(0, attempt - 1), finished_ms = $4, expires_ms = $4::bigint + $5
+         WHERE lease = $1 AND owner = $2 AND state = 'running' RETURNING id",
     )
-    .bind(id.to_string())
+    .bind(lease.to_string())
+    .bind(owner)
     .bind(problem)
     .bind(now)
     .bind(keep_ms)
-    .execute(&mut *connection)
+    .fetch_all(&mut *connection)
     .await?;
-    let is_refused = refused.rows_affected() > 0;
-    if is_refused {
-        news::tell(connection, &[id], &[]).await?;
-    }
-    Ok(is_refused)
+    let refused = ids(&refused)?;
+    news::tell(connection, &refused, &[]).await?;
+    requeue(connection, lease, false, None).await?;
+    Ok(refused)
 }
 
 pub(super) async fn redo(connection: &mut PgConnection, id: JobId) -> Outcome<()> {
@@ -241,7 +425,6 @@ pub(super) async fn redo(connection: &mut PgConnection, id: JobId) -> Outcome<()
         .bind(key.as_bytes().as_slice())
         .execute(&mut *connection)
         .await?;
-    queue::push(connection, &back).await?;
     news::tell(connection, &ids(&back)?, &[]).await
 }
 

@@ -10,12 +10,12 @@ use sqlx::migrate::{MigrateError, Migrator};
 use sqlx::postgres::{PgConnectOptions, PgPool, PgPoolOptions};
 use tokio::time::Instant;
 
-use super::{Use, queue, tls};
+use super::{Use, tls};
 use crate::store::OpenError;
 use crate::store::address::Secret;
 
 /// What this program knows of the tables: the number of its last migration.
-pub(super) const SCHEMA: i32 = 7;
+pub(super) const SCHEMA: i32 = 8;
 /// How long a request waits for a connection before it is told that the store does not serve; in tests, which share their
 /// cores with many others, as long as that never says anything of them.
 const ACQUIRE: Duration = Duration::from_secs(if cfg!(test) { 60 } else { 2 });
@@ -24,7 +24,7 @@ const TRUSTED_IDLE: Duration = Duration::from_secs(1);
 /// Between two attempts to reach a database at the start.
 const PAUSE: Duration = Duration::from_millis(250);
 
-fn migrations() -> Migrator {
+pub(super) fn migrations() -> Migrator {
     let mut migrations = sqlx::migrate!("./migrations/postgres");
     migrations.dangerous_set_table_name("precut._sqlx_migrations");
     migrations.create_schema("precut");
@@ -47,8 +47,8 @@ fn reason(error: &sqlx::Error) -> String {
             .to_owned(),
         (_, Some("3D000")) => "it has no database of that name; make one with `createdb`".to_owned(),
         (_, Some("42501")) => format!(
-            "the user may not do what is needed ({}); he must own the database, or an administrator makes the schemas \
-             `precut` and `apalis` and the extensions `hstore` and `pgcrypto` once",
+            "the user may not do what is needed ({}); he must own the database, or an administrator starts the program \
+             once as its owner and grants him the schema `precut`",
             error.as_database_error().map_or("", |error| error.message())
         ),
         (_, Some("25006")) => "it is read-only: a standby, or set so".to_owned(),
@@ -143,7 +143,7 @@ async fn patiently(options: &PgConnectOptions, most: Duration) -> Result<PgPool,
     }
 }
 
-/// Brings the tables up to date, the queue's and ours, one process at a time. Where there is nothing to be done it needs
+/// Brings the tables up to date, one process at a time. Where there is nothing to be done it needs
 /// no right to make anything.
 async fn prepare(pool: &PgPool) -> Result<(), OpenError> {
     let failed = |error: sqlx::Error| refused(&error);
@@ -162,10 +162,7 @@ async fn prepare(pool: &PgPool) -> Result<(), OpenError> {
     if is_up_to_date(pool).await? {
         return Ok(());
     }
-    for migrations in [queue::migrations(), migrations()] {
-        migrations.run(pool).await.map_err(|error| migration_fault(&error))?;
-    }
-    Ok(())
+    migrations().run(pool).await.map_err(|error| migration_fault(&error))
 }
 
 /// Whether the tables are as this program knows them, or those of a newer one that serves it. Those of a newer one that
@@ -213,11 +210,9 @@ fn migration_fault(error: &MigrateError) -> OpenError {
 mod tests {
     use super::*;
 
-    /// The queue's tables are looked at only where ours are not up to date: a newer queue needs a migration of ours.
     #[test]
-    fn the_queue_has_the_tables_that_this_schema_counts_on() {
-        let latest = |migrations: Migrator| migrations.iter().map(|migration| migration.version).max();
-        assert_eq!(latest(migrations()), Some(i64::from(SCHEMA)));
-        assert_eq!(latest(queue::migrations()), Some(20_260_902_075_949));
+    fn the_last_migration_is_the_schema_that_this_program_knows() {
+        let latest = migrations().iter().map(|migration| migration.version).max();
+        assert_eq!(latest, Some(i64::from(SCHEMA)));
     }
 }

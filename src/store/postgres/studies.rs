@@ -33,6 +33,11 @@ impl Held {
         Self { holder, parts, task }
     }
 
+    /// What this process is called.
+    pub(super) fn name(&self) -> String {
+        self.holder.to_string()
+    }
+
     fn parts(&self) -> MutexGuard<'_, HashSet<(Key, u32)>> {
         locked(&self.parts)
     }

@@ -11,7 +11,9 @@ use tokio::sync::{OnceCell, mpsc};
 
 use super::*;
 use crate::store::address::StoreAddress;
-use crate::store::jobs::{Accepted, Beat, Changed, Claimed, Ending, JobId, JobState, JobStore, Lease, NewJob, News};
+use crate::store::jobs::{
+    Accepted, Beat, Changed, Claimed, Ending, JobId, JobState, JobStore, Lease, NewJob, News, Next, Priority, Wanted,
+};
 use crate::store::suite::{MOST, PROBLEM, Place, job, keep, key, result, suite};
 use crate::store::{ResultStore, Store, Taken};
 
@@ -21,7 +23,7 @@ const AT_ONCE: Patience = Patience {
     start: Duration::from_secs(5),
     lease: Duration::from_mins(1),
     grace: Duration::ZERO,
-    lost: Duration::ZERO,
+    adoption: Duration::ZERO,
     points: Duration::from_secs(5),
 };
 
@@ -79,7 +81,7 @@ async fn create(name: &str, template: &str) {
 }
 
 fn usage(keep: Keep) -> Use {
-    Use { keep, connections: 4, patience: AT_ONCE, engine: "0.1.0".to_owned() }
+    Use { keep, connections: 4, patience: AT_ONCE, engine: "0.1.0".to_owned(), works: false }
 }
 
 impl InDatabase {
@@ -108,6 +110,74 @@ impl InDatabase {
     }
 }
 
+/// A database as the programs left it that had a queue beside the jobs, with three of them: one waits, the task of another was
+/// lost, the third is run by somebody who has been silent for long. The queue may be shared with a program of others.
+async fn before_one_queue(jobs: &[NewJob; 3], is_shared: bool) -> String {
+    let name = format!("precut_test_{}", uuid::Uuid::now_v7().simple());
+    create(&name, "template0").await;
+    let pool = pool(&name).await;
+    let mut before = start::migrations();
+    before.migrations = before.migrations.iter().filter(|migration| migration.version <= 7).cloned().collect();
+    before.run(&pool).await.unwrap();
+    sqlx::raw_sql(
+        "CREATE SCHEMA apalis;
+         CREATE TABLE apalis._sqlx_migrations (version bigint PRIMARY KEY);
+         CREATE TABLE apalis.workers (id text PRIMARY KEY, worker_type text NOT NULL);
+         CREATE TABLE apalis.jobs (job bytea NOT NULL, id text PRIMARY KEY, job_type text NOT NULL, status text NOT NULL,
+             lock_by text REFERENCES apalis.workers (id), idempotency_key text);
+         CREATE FUNCTION apalis.get_jobs(worker text) RETURNS SETOF apalis.jobs LANGUAGE sql AS $$ SELECT * FROM apalis.jobs $$;
+         INSERT INTO apalis.workers VALUES ('precut-1', 'precut/0.1.0')",
+    )
+    .execute(&pool)
+    .await
+    .unwrap();
+    for (turn, (job, (task, lease))) in
+        jobs.iter().zip([(Some("Pending"), None), (None, None), (Some("Queued"), Some(Lease::new()))]).enumerate()
+    {
+        let lease = lease.map(|lease| lease.to_string());
+        sqlx::query(
+            "INSERT INTO precut.jobs (id, kind, calculator, version, engine, key, input, state, attempt, lease, heartbeat_ms,
+                 priority, turn, pushed, owner, estimate_ms, created_ms)
+             VALUES ($1, 'calculation', 'a', 1, '0.1.0', $2, $3, CASE WHEN $4 IS NULL THEN 'queued' ELSE 'running' END,
+                 CASE WHEN $4 IS NULL THEN 0 ELSE 1 END, $4, CASE WHEN $4 IS NOT NULL THEN 1 END, 1, $5, 1, 'one', 10, 1)",
+        )
+        .bind(job.id.to_string())
+        .bind(job.key.as_bytes().as_slice())
+        .bind(zstd::encode_all(&*job.input, 1).unwrap())
+        .bind(lease)
+        .bind(i64::try_from(turn).unwrap())
+        .execute(&pool)
+        .await
+        .unwrap();
+        if let Some(status) = task {
+            sqlx::query(
+                "INSERT INTO apalis.jobs VALUES ('', $1, 'precut/0.1.0', $2, CASE WHEN $2 = 'Queued' THEN 'precut-1' END, $1 || ':1')",
+            )
+            .bind(job.id.to_string())
+            .bind(status)
+            .execute(&pool)
+            .await
+            .unwrap();
+        }
+    }
+    if is_shared {
+        sqlx::raw_sql(
+            "INSERT INTO apalis.workers VALUES ('other', 'mail');
+             INSERT INTO apalis.jobs VALUES ('', 'other', 'mail', 'Queued', 'other', NULL)",
+        )
+        .execute(&pool)
+        .await
+        .unwrap();
+    }
+    pool.close().await;
+    name
+}
+
+/// The next job for one of its processes.
+async fn take(store: &PostgresStore) -> Next {
+    JobStore::take(store, Wanted { lease: Lease::new(), short_ms: None, again: false }).await.unwrap()
+}
+
 impl Place for InDatabase {
     async fn with(keep: Keep) -> Self {
         let name = format!("precut_test_{}", uuid::Uuid::now_v7().simple());
@@ -132,30 +202,12 @@ impl Place for InDatabase {
     }
 
     async fn line(&self) -> Vec<JobId> {
-        let messages: Vec<Vec<u8>> = sqlx::query_scalar(
-            "SELECT job FROM apalis.jobs WHERE status = 'Pending' ORDER BY priority DESC, run_at ASC, id ASC",
-        )
-        .fetch_all(&self.runtime_pool)
-        .await
-        .unwrap();
-        let mut line: Vec<JobId> = messages
-            .iter()
-            .map(|message| serde_json::from_slice::<String>(message).unwrap().parse().unwrap())
-            .collect();
-        // A job that was taken without its task, as tests do, has an old task and a new one.
-        let mut seen = std::collections::HashSet::new();
-        line.reverse();
-        line.retain(|id| seen.insert(*id));
-        line.reverse();
-        line
-    }
-
-    async fn lose_task(&self, id: JobId) {
-        sqlx::query("DELETE FROM apalis.jobs WHERE idempotency_key LIKE $1")
-            .bind(format!("{id}:%"))
-            .execute(&self.runtime_pool)
-            .await
-            .unwrap();
+        let line: Vec<String> =
+            sqlx::query_scalar("SELECT id FROM precut.jobs WHERE state = 'queued' ORDER BY priority DESC, turn, id")
+                .fetch_all(&self.runtime_pool)
+                .await
+                .unwrap();
+        line.iter().map(|id| id.parse().unwrap()).collect()
     }
 
     async fn silence(&self) {
@@ -290,14 +342,13 @@ shared! {
             let due = NewJob { useful_for_ms: Some(60_000), ..job(1) };
             let accepted = place.accept(due).await;
             assert!((accepted.created_ms - before).abs() < 60_000);
-            assert_eq!(place.line().await.len(), 1, "a task is not held back by the clock of whoever pushes it");
+            assert!(place.store.waits(None).await.unwrap(), "nobody's clock holds a job back");
             let (changed, next) = place.store.expire_deadlines(PROBLEM.to_owned()).await.unwrap();
             assert_eq!(changed, Changed::default());
             assert!(next.is_some_and(|next| (next - before - 60_000).abs() < 60_000));
             let claim = place.run(accepted.id).await;
             assert_eq!(place.store.sweep(Arc::new(Vec::new)).await.unwrap(), [], "nor is a lease shorter for it");
             place.store.finish(claim.lease, Ending::Failed("{}".to_owned())).await.unwrap();
-            place.lose_task(accepted.id).await;
         }
     }
 
@@ -365,34 +416,107 @@ shared! {
         let newer = PostgresStore::open(&secret(&place.name), newer).await.unwrap();
         let old = place.accept(job(1)).await.id;
         let Accepted::New(new) = newer.submit(job(2), 100).await.unwrap() else { panic!("accepted") };
-        let queue_of = async |id: JobId| -> Vec<String> {
-            sqlx::query_scalar("SELECT job_type FROM apalis.jobs WHERE idempotency_key LIKE $1 ORDER BY job_type")
-                .bind(format!("{id}:%"))
-                .fetch_all(&place.runtime_pool)
-                .await
-                .unwrap()
+        let next = async |store: &PostgresStore| match take(store).await {
+            Next::Run(claim) => {
+                store.release(claim.lease).await.unwrap();
+                Some(claim.jobs[0])
+            }
+            Next::Nothing => None,
+            other => panic!("{other:?}"),
         };
-        assert_eq!((queue_of(old).await, queue_of(new.id).await), (vec!["precut/0.1.0".into()], vec!["precut/0.2.0".into()]));
+        let both = (next(&place.store).await, next(&newer).await);
+        assert_eq!(both, (Some(old), Some(new.id)), "each has a line of its own");
         // Nobody works yet: everything stays where it is, whoever looks.
         newer.sweep(Arc::new(Vec::new)).await.unwrap();
         place.store.sweep(Arc::new(Vec::new)).await.unwrap();
-        assert_eq!(queue_of(old).await, ["precut/0.1.0"]);
-        let worker = async |engine: &str| {
-            sqlx::query("INSERT INTO apalis.workers (id, worker_type, storage_name) VALUES ($1, $1, 'test')")
-                .bind(queue::name(engine))
-                .execute(&place.runtime_pool)
+        assert_eq!(next(&place.store).await, Some(old));
+        let working = async |engine: &str| {
+            let usage = Use { engine: engine.to_owned(), works: true, ..usage(place.keep) };
+            PostgresStore::open(&secret(&place.name), usage).await.unwrap()
+        };
+        let old_worker = working("0.1.0").await;
+        old_worker.sweep(Arc::new(Vec::new)).await.unwrap();
+        assert_eq!(next(&newer).await, Some(new.id), "an old version takes no job of a new one");
+        let new_worker = working("0.2.0").await;
+        new_worker.sweep(Arc::new(Vec::new)).await.unwrap();
+        assert_eq!(next(&place.store).await, Some(old), "its own workers are there");
+        place.execute("UPDATE precut.workers SET seen_ms = seen_ms - 60000 WHERE engine = '0.1.0'").await;
+        assert_eq!(newer.sweep(Arc::new(Vec::new)).await.unwrap(), [old]);
+        assert_eq!(next(&place.store).await, None);
+        let Next::Run(claim) = take(&new_worker).await else { panic!("both wait") };
+        assert!([old, new.id].contains(&claim.jobs[0]));
+    }
+
+    async fn help_is_asked_of_so_many_and_given_where_no_job_of_its_priority_waits() {
+        let place = InDatabase::new().await;
+        let usage = Use { works: true, ..usage(place.keep) };
+        let other = PostgresStore::open(&secret(&place.name), usage).await.unwrap();
+        other.sweep(Arc::new(Vec::new)).await.unwrap();
+        let study = place.accept(job(1)).await;
+        let claim = place.run(study.id).await;
+        assert!(!other.waits(None).await.unwrap());
+        place.store.call_for_help(key(1), 2).await.unwrap();
+        place.accept(NewJob { priority: Priority::Low, ..job(2) }).await;
+        let high = place.accept(NewJob { priority: Priority::High, ..job(3) }).await.id;
+        let Next::Run(first) = take(&other).await else { panic!("it goes first") };
+        assert_eq!(first.jobs, [high]);
+        for _ in 0..2 {
+            let Next::Help(shared) = take(&other).await else { panic!("help is wanted") };
+            assert_eq!((shared.id, shared.key, &shared.input[..]), (study.id, key(1), &b"{\"number\":1}"[..]));
+        }
+        assert!(matches!(take(&other).await, Next::Run(_)), "the low one");
+        // Nobody helps with what is over, nor with what begins anew before it asks again.
+        place.store.call_for_help(key(1), 100).await.unwrap();
+        let wanted = sqlx::query_scalar("SELECT help FROM precut.jobs WHERE id = $1").bind(study.id.to_string());
+        let wanted: i32 = wanted.fetch_one(&place.runtime_pool).await.unwrap();
+        assert_eq!(wanted, 4, "of one worker");
+        place.store.release(claim.lease).await.unwrap();
+        place.run(study.id).await;
+        assert!(!other.waits(None).await.unwrap());
+        assert!(matches!(take(&other).await, Next::Nothing));
+    }
+
+    async fn nobody_waits_for_who_is_about_to_take_another_job() {
+        let place = InDatabase::new().await;
+        let (first, second) = (place.accept(job(1)).await.id, place.accept(job(2)).await.id);
+        let mut hold = place.runtime_pool.begin().await.unwrap();
+        lock(&mut hold, &key(1)).await.unwrap();
+        let Next::Run(claim) = take(&place.store).await else { panic!("the other waits") };
+        assert_eq!(claim.jobs, [second]);
+        assert!(matches!(take(&place.store).await, Next::Nothing));
+        hold.rollback().await.unwrap();
+        let Next::Run(claim) = take(&place.store).await else { panic!("it waits") };
+        assert_eq!(claim.jobs, [first]);
+    }
+
+    async fn jobs_that_waited_in_the_queue_of_earlier_programs_are_lost_nowhere() {
+        for is_shared in [false, true] {
+            let jobs = [job(1), job(2), job(3)];
+            let name = before_one_queue(&jobs, is_shared).await;
+            let keep = keep(Duration::from_hours(1));
+            let place = InDatabase::open(name, keep, usage(keep)).await;
+            assert_eq!(place.line().await, [jobs[0].id, jobs[1].id]);
+            // Who ran the third is silent.
+            assert_eq!(place.store.sweep(Arc::new(Vec::new)).await.unwrap(), [jobs[2].id]);
+            for job in &jobs {
+                let Next::Run(claim) = take(&place.store).await else { panic!("it waits") };
+                assert_eq!((claim.jobs.as_slice(), &claim.input), (&[job.id][..], &job.input));
+            }
+            // What others have in the schema of that queue is left to them.
+            let schema: bool = sqlx::query_scalar("SELECT to_regnamespace('apalis') IS NOT NULL")
+                .fetch_one(&place.runtime_pool)
                 .await
                 .unwrap();
-        };
-        worker("0.1.0").await;
-        place.store.sweep(Arc::new(Vec::new)).await.unwrap();
-        assert_eq!(queue_of(new.id).await, ["precut/0.2.0"], "an old version takes no job of a new one");
-        worker("0.2.0").await;
-        newer.sweep(Arc::new(Vec::new)).await.unwrap();
-        assert_eq!(queue_of(old).await, ["precut/0.1.0"], "its own workers are there");
-        place.execute("DELETE FROM apalis.workers WHERE worker_type = 'precut/0.1.0'").await;
-        assert_eq!(newer.sweep(Arc::new(Vec::new)).await.unwrap(), [old]);
-        assert_eq!(queue_of(old).await, ["precut/0.1.0", "precut/0.2.0"]);
+            assert_eq!(schema, is_shared);
+            if is_shared {
+                let left: Vec<String> =
+                    sqlx::query_scalar("SELECT job_type FROM apalis.jobs UNION ALL SELECT worker_type FROM apalis.workers")
+                        .fetch_all(&place.runtime_pool)
+                        .await
+                        .unwrap();
+                assert_eq!(left, ["mail", "mail"]);
+            }
+        }
     }
 
     async fn a_newer_schema_is_refused_unless_it_says_that_it_serves_this_program() {

@@ -2,7 +2,7 @@
 //! not answer, it waits for it, as far as there is room.
 
 use std::collections::{HashMap, HashSet};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex as StdMutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -45,26 +45,30 @@ pub(super) struct Writer {
 /// What those who order and the one who carries out have in common.
 #[derive(Default)]
 struct Desk {
-    waiting: StdMutex<HashMap<Key, Arc<KeptResult>>>,
-    waiting_bytes: AtomicUsize,
+    waiting: StdMutex<Waiting>,
     /// Whether results were turned away since the last group was written.
     full: AtomicBool,
     closing: AtomicBool,
 }
 
 impl Desk {
-    fn waiting(&self) -> MutexGuard<'_, HashMap<Key, Arc<KeptResult>>> {
+    fn waiting(&self) -> MutexGuard<'_, Waiting> {
         self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
 
-    fn done(&self, results: &[Arc<KeptResult>]) {
-        let mut waiting = self.waiting();
-        for result in results {
-            waiting.remove(&result.key);
+/// Results that are not written yet, and their size.
+#[derive(Default)]
+struct Waiting {
+    results: HashMap<Key, Arc<KeptResult>>,
+    bytes: usize,
+}
+
+impl Waiting {
+    fn remove(&mut self, key: &Key) {
+        if let Some(gone) = self.results.remove(key) {
+            self.bytes -= size(&gone);
         }
-        drop(waiting);
-        self.waiting_bytes.fetch_sub(results.iter().map(|result| size(result)).sum(), Ordering::Relaxed);
-        self.full.store(false, Ordering::Relaxed);
     }
 }
 
@@ -91,25 +95,32 @@ impl Writer {
     pub(super) fn put(&self, result: KeptResult) {
         let desk = &self.desk;
         let (key, size, result) = (result.key, size(&result), Arc::new(result));
-        // In this order: once it is ordered it may be written, and then it waits no more.
-        if desk.waiting().insert(key, Arc::clone(&result)).is_some() {
+        let mut waiting = desk.waiting();
+        if waiting.results.contains_key(&key) {
             return;
         }
-        let waiting = desk.waiting_bytes.fetch_add(size, Ordering::Relaxed);
-        if waiting + size > WAITING_BYTES || self.orders.try_send(Order::Put(result)).is_err() {
-            desk.waiting().remove(&key);
-            desk.waiting_bytes.fetch_sub(size, Ordering::Relaxed);
-            metrics::counter!("precut_store_failures_total", "operation" => "queue").increment(1);
-            // Once for a crowd: under overload there are thousands of them.
-            if !desk.full.swap(true, Ordering::Relaxed) {
-                tracing::warn!("results are not kept: too many wait to be written");
-            }
+        let has_room = waiting.bytes + size <= WAITING_BYTES;
+        if has_room && self.orders.try_send(Order::Put(Arc::clone(&result))).is_ok() {
+            waiting.bytes += size;
+            waiting.results.insert(key, result);
+            return;
         }
+        drop(waiting);
+        metrics::counter!("precut_store_failures_total", "operation" => "queue").increment(1);
+        // Once for a crowd: under overload there are thousands of them.
+        if !desk.full.swap(true, Ordering::Relaxed) {
+            tracing::warn!("results are not kept: too many wait to be written");
+        }
+    }
+
+    /// A result was written with the end of its job: it waits no more.
+    pub(super) fn written(&self, key: &Key) {
+        self.desk.waiting().remove(key);
     }
 
     /// A result that is not written yet.
     pub(super) fn waiting(&self, key: &Key) -> Option<Arc<KeptResult>> {
-        self.desk.waiting().get(key).cloned()
+        self.desk.waiting().results.get(key).cloned()
     }
 
     /// Notes a use. One that is lost does no harm.
@@ -180,7 +191,10 @@ impl Clerk {
         }
     }
 
-    async fn carry_out(&mut self, group: Group) {
+    async fn carry_out(&mut self, mut group: Group) {
+        // What was written meanwhile waits no more.
+        let waiting = |result: &Arc<KeptResult>| self.desk.waiting().results.contains_key(&result.key);
+        group.put.retain(waiting);
         let orders = group.put.len() + group.touched.len() + group.forgotten.len();
         let mut written = orders == 0;
         if !written {
@@ -189,7 +203,10 @@ impl Clerk {
                 Err(reason) => tracing::warn!(reason, "results are not kept"),
             }
         }
-        self.desk.done(&group.put);
+        for result in &group.put {
+            self.desk.waiting().remove(&result.key);
+        }
+        self.desk.full.store(false, Ordering::Relaxed);
         if self.unlooked_bytes > self.keep.bytes / 16 {
             self.evict().await;
         }

@@ -3,10 +3,10 @@
 use sqlx::sqlite::{SqliteConnection, SqlitePool};
 
 use super::callbacks;
-use super::record::{Outcome, ids, json_list, parsed};
+use super::record::{Outcome, json_list, parsed};
 use super::run::{requeue, unwanted};
 use crate::store::jobs::{Changed, JobId, Lease, Timing};
-use crate::store::{now_ms, queue};
+use crate::store::now_ms;
 
 /// Timings kept of each calculator.
 const TIMINGS: i64 = 1000;
@@ -60,9 +60,7 @@ pub(super) async fn sweep(connection: &mut SqliteConnection, live: &[Lease]) -> 
     .bind(json_list(live))
     .fetch_all(&mut *connection)
     .await?;
-    let mut back = if stale.is_empty() { Vec::new() } else { requeue(connection, &json_list(&stale), true).await? };
-    back.extend(ids(&queue::push_lost(connection).await?)?);
-    Ok(back)
+    if stale.is_empty() { Ok(Vec::new()) } else { requeue(connection, &json_list(&stale), true).await }
 }
 
 /// What one round of forgetting did.
@@ -136,18 +134,19 @@ pub(super) async fn note_timing(connection: &mut SqliteConnection, timing: &Timi
     Ok(())
 }
 
-/// What the process before left behind: its running jobs go back in line, and the queue is made anew from the records.
+/// What the process before left behind: its running jobs go back in line, and what it held is free.
 pub(in crate::store) async fn recover(pool: &SqlitePool) -> Outcome<u64> {
     let mut transaction = pool.begin_with("BEGIN IMMEDIATE").await?;
     let orphans: Vec<String> = sqlx::query_scalar("SELECT DISTINCT lease FROM precut_jobs WHERE state = 'running'")
         .fetch_all(&mut *transaction)
         .await?;
-    queue::empty(&mut transaction).await?;
     let mut count = 0;
     if !orphans.is_empty() {
         count = requeue(&mut transaction, &json_list(&orphans), true).await?.len();
     }
-    queue::push_lost(&mut transaction).await?;
+    sqlx::query("UPDATE precut_jobs SET heartbeat_ms = NULL WHERE state = 'queued' AND heartbeat_ms IS NOT NULL")
+        .execute(&mut *transaction)
+        .await?;
     callbacks::recover(&mut transaction, now_ms()).await?;
     transaction.commit().await?;
     Ok(count as u64)

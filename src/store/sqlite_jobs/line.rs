@@ -7,8 +7,7 @@ use super::pack::Packed;
 use super::record::{Outcome, parsed, rank, record};
 use super::usage::usage;
 use crate::store::jobs::{Accepted, JobState, yields_to};
-use crate::store::row::ResultRow;
-use crate::store::{queue, row};
+use crate::store::row::{self, ResultRow};
 
 /// The place of a new job in the order of its priority.
 ///
@@ -121,9 +120,6 @@ pub(super) async fn submit(
     .bind(&job.tracestate)
     .execute(&mut *connection)
     .await?;
-    if state == JobState::Queued {
-        queue::push(connection, &[job.id.to_string()]).await?;
-    }
     if let Some(callback) = &job.callback {
         callbacks::note(connection, job.id, callback, finished).await?;
     }

@@ -16,21 +16,19 @@ use bytes::Bytes;
 use futures_util::future::BoxFuture;
 use sqlx::QueryBuilder;
 use sqlx::sqlite::Sqlite;
-use tokio::sync::watch;
 
 use super::jobs::{
     Accepted, Beat, Cancelled, Changed, Claimed, DueCallback, Ending, JobCounts, JobId, JobPage, JobQuery, JobRecord,
-    JobStore, Lease, Live, NewJob, RunTask, TakeUp, Timing, Tried, Usage, Waiting,
+    JobStore, Lease, Live, NewJob, Next, TakeUp, Timing, Tried, Usage, Wanted,
 };
-use super::queue::{self, Tasks};
 use super::sqlite::SqliteStore;
 use super::{StoreError, now_ms};
 pub(super) use care::recover;
 use care::{expire_deadlines, forget_expired, note_timing, sweep};
 use line::submit;
 use pack::{PackedEnding, packed, packed_ending};
-use record::{Outcome, RecordRow, columns, json_list, parsed, record};
-use run::{beat, cancel, claim, finish, redo, refuse, requeue};
+use record::{Outcome, RecordRow, columns, json_list, record};
+use run::{beat, cancel, claim, finish, hold, redo, refuse, requeue, take, waits};
 use usage::{forget_work, kept_by_owner, note_work, usage};
 
 impl SqliteStore {
@@ -67,7 +65,6 @@ impl SqliteStore {
         if let (Accepted::New(_), Some(row)) = (&accepted, &written.result) {
             self.kept(&row.key, row.bytes());
         }
-        self.tasks.wake();
         Ok(accepted)
     }
 
@@ -114,9 +111,6 @@ impl SqliteStore {
     }
 }
 
-/// A job that waits: tries, calculator, owner, when it came, and its place in a trace.
-type WaitingRow = (u32, String, String, i64, Option<String>, Option<String>);
-
 impl JobStore for SqliteStore {
     fn submit(&self, job: NewJob, queue_limit: u64) -> BoxFuture<'_, Result<Accepted, StoreError>> {
         Box::pin(self.submit_job(job, queue_limit))
@@ -146,39 +140,17 @@ impl JobStore for SqliteStore {
     fn counts(&self) -> BoxFuture<'_, Result<JobCounts, StoreError>> {
         Box::pin(self.count_jobs())
     }
-    fn waiting(&self, id: JobId) -> BoxFuture<'_, Result<Option<Waiting>, StoreError>> {
+    fn waits(&self, short_ms: Option<f64>) -> BoxFuture<'_, Result<bool, StoreError>> {
         Box::pin(async move {
-            let waiting: Option<WaitingRow> = sqlx::query_as(
-                "SELECT max(other.attempt), one.calculator, one.owner, one.created_ms, one.traceparent, one.tracestate
-                 FROM precut_jobs AS one JOIN precut_jobs AS other USING (key)
-                 WHERE one.id = ?1 AND one.state = 'queued' AND other.state = 'queued'
-                 GROUP BY one.id",
-            )
-            .bind(id.to_string())
-            .fetch_optional(&self.readers)
-            .await?;
-            let told = |(charged, calculator, owner, created_ms, traceparent, tracestate)| Waiting {
-                charged,
-                calculator,
-                owner,
-                created_ms,
-                traceparent,
-                tracestate,
-            };
-            Ok(waiting.map(told))
+            let mut reader = self.readers.acquire().await?;
+            Ok(waits(&mut reader, short_ms, now_ms()).await?)
         })
     }
-    fn next_short(&self, most_ms: f64) -> BoxFuture<'_, Result<Option<JobId>, StoreError>> {
-        Box::pin(async move {
-            let next: Option<String> = sqlx::query_scalar(
-                "SELECT id FROM precut_jobs WHERE state = 'queued' AND estimate_ms <= ?1 AND attempt = 0
-                 ORDER BY priority DESC, turn, id LIMIT 1",
-            )
-            .bind(most_ms)
-            .fetch_optional(&self.readers)
-            .await?;
-            Ok(next.map(|id| parsed(&id)).transpose()?)
-        })
+    fn take(&self, wanted: Wanted) -> BoxFuture<'_, Result<Next, StoreError>> {
+        Box::pin(self.ledger.write(move |connection| Box::pin(async move { take(connection, wanted, now_ms()).await })))
+    }
+    fn hold(&self, id: JobId) -> BoxFuture<'_, Result<(), StoreError>> {
+        Box::pin(self.ledger.write(move |connection| Box::pin(async move { hold(connection, id, now_ms()).await })))
     }
     fn claim(&self, id: JobId, lease: Lease, most: u32, problem: String) -> BoxFuture<'_, Result<Claimed, StoreError>> {
         let keep_ms = self.keep_ms;
@@ -215,11 +187,11 @@ impl JobStore for SqliteStore {
             Box::pin(async move { note_work(connection, &work, now_ms()).await })
         }))
     }
-    fn refuse(&self, id: JobId, problem: String) -> BoxFuture<'_, Result<bool, StoreError>> {
+    fn refuse(&self, lease: Lease, owner: String, problem: String) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>> {
         let keep_ms = self.keep_ms;
         Box::pin(self.ledger.write(move |connection| {
-            let problem = problem.clone();
-            Box::pin(async move { refuse(connection, id, &problem, keep_ms, now_ms()).await })
+            let (owner, problem) = (owner.clone(), problem.clone());
+            Box::pin(async move { refuse(connection, lease, (&owner, &problem), keep_ms, now_ms()).await })
         }))
     }
     fn cancel(&self, id: JobId) -> BoxFuture<'_, Result<Option<Cancelled>, StoreError>> {
@@ -230,11 +202,7 @@ impl JobStore for SqliteStore {
         )
     }
     fn redo(&self, id: JobId) -> BoxFuture<'_, Result<(), StoreError>> {
-        Box::pin(async move {
-            self.ledger.write(move |connection| Box::pin(redo(connection, id))).await?;
-            self.tasks.wake();
-            Ok(())
-        })
+        Box::pin(self.ledger.write(move |connection| Box::pin(redo(connection, id))))
     }
     fn beat(&self, beats: Vec<Beat>) -> BoxFuture<'_, Result<Vec<Lease>, StoreError>> {
         Box::pin(self.ledger.write(move |connection| {
@@ -250,20 +218,11 @@ impl JobStore for SqliteStore {
         }))
     }
     fn sweep(&self, live: Live) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>> {
-        Box::pin(async move {
-            let back = self
-                .ledger
-                .write(move |connection| {
-                    let live = Arc::clone(&live);
-                    // Asked here, where no claim can come between asking and looking.
-                    Box::pin(async move { sweep(connection, &live()).await })
-                })
-                .await?;
-            if !back.is_empty() {
-                self.tasks.wake();
-            }
-            Ok(back)
-        })
+        Box::pin(self.ledger.write(move |connection| {
+            let live = Arc::clone(&live);
+            // Asked here, where no claim can come between asking and looking.
+            Box::pin(async move { sweep(connection, &live()).await })
+        }))
     }
     fn take_up_callbacks(&self, wanted: TakeUp) -> BoxFuture<'_, Result<Vec<DueCallback>, StoreError>> {
         Box::pin(async move {
@@ -294,7 +253,6 @@ impl JobStore for SqliteStore {
                 // One transaction after the other, so that jobs get in between.
                 let round = self.ledger.write(move |connection| {
                     Box::pin(async move {
-                        queue::forget_done(connection).await?;
                         forget_work(connection, now_ms()).await?;
                         forget_expired(connection, keep_ms, now_ms()).await
                     })
@@ -329,9 +287,6 @@ impl JobStore for SqliteStore {
             };
             Ok(rows.into_iter().map(timing).collect())
         })
-    }
-    fn work(&self, places: usize, run: RunTask, stop: watch::Receiver<bool>) -> BoxFuture<'static, ()> {
-        Box::pin(Tasks::work(self.tasks.clone(), places, run, stop))
     }
 }
 

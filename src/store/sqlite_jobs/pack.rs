@@ -2,6 +2,7 @@
 
 use std::io;
 
+use crate::key::Key;
 use crate::store::StoreError;
 use crate::store::jobs::{Ending, NewJob};
 use crate::store::row::{Packer, ResultRow};
@@ -41,6 +42,16 @@ pub(in crate::store) async fn packed_ending(ending: Ending) -> Result<PackedEndi
 pub(in crate::store) enum PackedEnding {
     Succeeded(ResultRow),
     Failed(String),
+}
+
+impl PackedEnding {
+    /// Address of its result.
+    pub(in crate::store) fn key(&self) -> Option<Key> {
+        match self {
+            Self::Succeeded(result) => Key::from_bytes(&result.key),
+            Self::Failed(_) => None,
+        }
+    }
 }
 
 async fn blocking<T: Send + 'static>(

@@ -46,21 +46,12 @@ impl Place for InFile {
     }
 
     async fn line(&self) -> Vec<JobId> {
-        let messages: Vec<Vec<u8>> = sqlx::query_scalar(
-            "SELECT job FROM Jobs WHERE status = 'Pending' ORDER BY priority DESC, run_at ASC, id ASC",
-        )
-        .fetch_all(&self.store.readers)
-        .await
-        .unwrap();
-        messages.iter().map(|message| serde_json::from_slice::<String>(message).unwrap().parse().unwrap()).collect()
-    }
-
-    async fn lose_task(&self, id: JobId) {
-        sqlx::query("DELETE FROM Jobs WHERE idempotency_key LIKE ?1")
-            .bind(format!("{id}:%"))
-            .execute(&self.pool().await)
-            .await
-            .unwrap();
+        let line: Vec<String> =
+            sqlx::query_scalar("SELECT id FROM precut_jobs WHERE state = 'queued' ORDER BY priority DESC, turn, id")
+                .fetch_all(&self.store.readers)
+                .await
+                .unwrap();
+        line.iter().map(|id| id.parse().unwrap()).collect()
     }
 
     /// One process: it knows what it runs.
@@ -88,9 +79,9 @@ async fn a_full_disk_refuses_a_job_as_a_whole_and_later_takes_it() {
     let place = InFile::new().await;
     let before = place.accept(job(1)).await.id;
     // The database may not grow: what SQLite says then is what it says when the disk is full.
-    let pages: i64 = sqlx::query_scalar("PRAGMA page_count").fetch_one(&place.store.tasks.pool()).await.unwrap();
+    let pages: i64 = sqlx::query_scalar("PRAGMA page_count").fetch_one(&place.store.writing).await.unwrap();
     let bound = format!("PRAGMA max_page_count = {pages}");
-    sqlx::query(sqlx::AssertSqlSafe(bound)).execute(&place.store.tasks.pool()).await.unwrap();
+    sqlx::query(sqlx::AssertSqlSafe(bound)).execute(&place.store.writing).await.unwrap();
     let mut noise = vec![0_u8; 1 << 20];
     blake3::Hasher::new().finalize_xof().fill(&mut noise);
     let large = NewJob { input: noise.into(), ..job(2) };
@@ -108,7 +99,7 @@ async fn a_full_disk_refuses_a_job_as_a_whole_and_later_takes_it() {
 async fn a_locked_database_refuses_a_job_and_later_takes_it() {
     let place = InFile::new().await;
     // Not the five seconds of service: the test waits for it.
-    sqlx::query("PRAGMA busy_timeout = 50").execute(&place.store.tasks.pool()).await.unwrap();
+    sqlx::query("PRAGMA busy_timeout = 50").execute(&place.store.writing).await.unwrap();
     let other = place.pool().await;
     let locked = other.begin_with("BEGIN EXCLUSIVE").await.unwrap();
     let refused = futures_util::future::join_all((0..5).map(|number| place.store.submit(job(number), 100))).await;
@@ -139,4 +130,77 @@ async fn the_database_of_the_version_before_is_taken_over_with_its_results() {
     };
     assert_eq!(place.store.get(key(1)).await.unwrap(), Some(result(1)));
     place.accept(job(2)).await;
+}
+
+#[tokio::test]
+async fn jobs_that_waited_in_the_queue_of_earlier_programs_are_lost_nowhere() {
+    let folder = tempfile::tempdir().unwrap();
+    let options = SqliteConnectOptions::new().filename(folder.path().join("precut.db")).create_if_missing(true);
+    let pool = SqlitePool::connect_with(options).await.unwrap();
+    let mut before = sqlx::migrate!("./migrations");
+    before.migrations = before.migrations.iter().filter(|migration| migration.version <= 12).cloned().collect();
+    before.run(&pool).await.unwrap();
+    // As that queue made them, and its list of migrations in ours.
+    sqlx::raw_sql(
+        "CREATE TABLE Workers (id TEXT NOT NULL UNIQUE, worker_type TEXT NOT NULL);
+         CREATE TABLE Jobs (job BLOB NOT NULL, id TEXT NOT NULL UNIQUE, job_type TEXT NOT NULL, status TEXT NOT NULL,
+             lock_by TEXT, idempotency_key TEXT, PRIMARY KEY (id), FOREIGN KEY (lock_by) REFERENCES Workers (id));
+         CREATE UNIQUE INDEX idx_jobs_idempotency_key ON Jobs (job_type, idempotency_key);
+         INSERT INTO _sqlx_migrations (version, description, success, checksum, execution_time)
+             VALUES (20220530084123, 'jobs workers', 1, x'00', 0), (20260804103122, 'drop', 1, x'00', 0);
+         INSERT INTO Workers VALUES ('precut-1', 'precut')",
+    )
+    .execute(&pool)
+    .await
+    .unwrap();
+    // One waits, the task of another was lost, a third was running when the process ended.
+    let jobs = [job(1), job(2), job(3)];
+    for (turn, (job, (task, lease))) in
+        jobs.iter().zip([(Some("Pending"), None), (None, None), (Some("Running"), Some(Lease::new()))]).enumerate()
+    {
+        let lease = lease.map(|lease| lease.to_string());
+        sqlx::query(
+            "INSERT INTO precut_jobs (id, kind, calculator, version, key, input, state, attempt, lease, priority, turn, pushed,
+                 owner, estimate_ms, created_ms)
+             VALUES (?1, 'calculation', 'a', 1, ?2, ?3, iif(?4 IS NULL, 'queued', 'running'), ?4 IS NOT NULL, ?4, 1, ?5, 1,
+                 'one', 10.0, 1)",
+        )
+        .bind(job.id.to_string())
+        .bind(job.key.as_bytes().as_slice())
+        .bind(zstd::encode_all(&*job.input, 1).unwrap())
+        .bind(lease)
+        .bind(i64::try_from(turn).unwrap())
+        .execute(&pool)
+        .await
+        .unwrap();
+        if let Some(status) = task {
+            sqlx::query(
+                "INSERT INTO Jobs VALUES (?1, ?1, 'precut', ?2, iif(?2 = 'Running', 'precut-1', NULL), ?1 || ':1')",
+            )
+            .bind(job.id.to_string())
+            .bind(status)
+            .execute(&pool)
+            .await
+            .unwrap();
+        }
+    }
+    pool.close().await;
+    let place =
+        InFile { store: SqliteStore::open(folder.path(), keep(Duration::from_hours(1))).await.unwrap(), folder };
+    assert_eq!(place.line().await, jobs.each_ref().map(|job| job.id));
+    let left: Vec<String> = sqlx::query_scalar(
+        "SELECT name FROM sqlite_master WHERE tbl_name IN ('Jobs', 'Workers')
+         UNION ALL SELECT CAST(version AS TEXT) FROM _sqlx_migrations WHERE version > 1000000",
+    )
+    .fetch_all(&place.store.readers)
+    .await
+    .unwrap();
+    assert_eq!(left, [""; 0]);
+    for job in &jobs {
+        let Next::Run(claim) = place.next(None).await else { panic!("it waits") };
+        assert_eq!((claim.jobs.as_slice(), &claim.input), (&[job.id][..], &job.input));
+    }
+    // And at every start from now on.
+    let place = place.again().await;
+    assert_eq!(place.line().await.len(), 3);
 }

@@ -37,19 +37,19 @@ pub(in crate::store) async fn a_callback_is_due_when_its_job_is_over_however_it_
         assert_eq!((parent, state), (format!("place {number}"), format!("state {number}")));
         ids.push(record.id);
     }
-    let waiting = store.waiting(ids[0]).await.unwrap().unwrap();
-    assert_eq!((waiting.traceparent.as_deref(), waiting.tracestate.as_deref()), (Some("place 0"), Some("state 0")));
     // Nobody asked for it.
     let silent = place.accept(job(6)).await;
     assert_eq!((silent.callback, silent.traceparent, silent.tracestate), (None, None, None));
     assert_eq!(due(store, all()).await, []);
     let claim = place.run(ids[0]).await;
+    assert_eq!((claim.traceparent.as_deref(), claim.tracestate.as_deref()), (Some("place 0"), Some("state 0")));
     assert_eq!(due(store, all()).await, [], "it has only begun");
     store.finish(claim.lease, Ending::Succeeded(result(0))).await.unwrap();
     let claim = place.run(ids[1]).await;
     store.finish(claim.lease, Ending::Failed(PROBLEM.to_owned())).await.unwrap();
     store.cancel(ids[2]).await.unwrap();
-    store.refuse(ids[3], PROBLEM.to_owned()).await.unwrap();
+    let claim = place.run(ids[3]).await;
+    store.refuse(claim.lease, claim.owner, PROBLEM.to_owned()).await.unwrap();
     store.cancel(silent.id).await.unwrap();
     // One whose result is there is over where it begins.
     let there = place.accept(NewJob { result: Some(result(0)), ..told(0, "mes:443") }).await;

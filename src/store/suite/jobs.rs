@@ -3,12 +3,10 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use tokio::sync::watch;
-
 use super::{MOST, PROBLEM, Place, job, key, result};
 use crate::store::jobs::{
-    Accepted, Beat, Claimed, Ending, Idempotency, JobId, JobState, Lease, NewJob, Priority, Quota, RunTask, Timing,
-    Usage,
+    Accepted, Beat, Claimed, Ending, Idempotency, JobId, JobState, Lease, NewJob, Next, Priority, Quota, Timing, Usage,
+    Wanted,
 };
 use crate::store::sqlite::Keep;
 use crate::store::{KeptResult, now_ms};
@@ -74,7 +72,6 @@ pub(in crate::store) async fn what_a_process_left_running_is_in_line_again_at_th
         // Twice charged, it lets the others go first.
         let expected = if attempt < 2 { [running, waiting] } else { [waiting, running] };
         assert_eq!(place.line().await, expected, "after {attempt}");
-        assert_eq!(place.store().waiting(running).await.unwrap().map(|waiting| waiting.charged), Some(attempt));
         match place.claim(running).await {
             Claimed::Run(claim) => assert_eq!(claim.attempt, attempt + 1),
             Claimed::Poisonous(jobs) => assert_eq!((jobs, attempt), (vec![running], MOST)),
@@ -179,8 +176,7 @@ pub(in crate::store) async fn the_line_is_fair_between_owners_and_keeps_prioriti
         place.accept(from("two", 21, Priority::Normal)).await.id,
     ];
     let high = place.accept(from("three", 30, Priority::High)).await.id;
-    // Each owner's first job stands beside the others' first, and so on; within a turn, who came first. Two tasks of
-    // the same millisecond may stand either way round, as the queue names them at random.
+    // Each owner's first job stands beside the others' first, and so on; within a turn, who came first.
     let line = place.line().await;
     assert_eq!(line[0], high);
     assert_eq!(*line.last().unwrap(), low);
@@ -189,7 +185,6 @@ pub(in crate::store) async fn the_line_is_fair_between_owners_and_keeps_prioriti
     assert!(at(other[0]) < at(ids[1]) && at(other[1]) < at(ids[2]) && at(other[0]) < at(other[1]), "{line:?}");
     // A newcomer begins where the line is now, not before it.
     place.run(ids[0]).await;
-    place.lose_task(ids[0]).await;
     place.run(other[0]).await;
     let third = place.accept(from("four", 40, Priority::Normal)).await.id;
     let line = place.line().await;
@@ -203,7 +198,6 @@ pub(in crate::store) async fn a_long_job_lets_some_short_ones_pass_and_no_more<P
     // One runs all the time. Another one waits, for the other place, and short ones of many clients keep coming.
     let running = place.accept(long(1)).await.id;
     place.run(running).await;
-    place.lose_task(running).await;
     let waiting = place.accept(long(2)).await.id;
     let mut passed = 0;
     for number in 10..60 {
@@ -215,7 +209,6 @@ pub(in crate::store) async fn a_long_job_lets_some_short_ones_pass_and_no_more<P
         }
         passed += 1;
         let claim = place.run(first).await;
-        place.lose_task(first).await;
         place.store().finish(claim.lease, Ending::Succeeded(result(number))).await.unwrap();
     }
     assert!((1..=12).contains(&passed), "{passed} have passed");
@@ -225,16 +218,20 @@ pub(in crate::store) async fn a_long_job_lets_some_short_ones_pass_and_no_more<P
 pub(in crate::store) async fn the_next_short_job_is_the_first_of_them_in_line<P: Place>() {
     let place = P::new().await;
     let lasting = |number: u32, estimate_ms: f64| NewJob { estimate_ms, ..job(number) };
-    let next = async || place.store().next_short(5000.0).await.unwrap();
+    let next = async || match place.next(Some(5000.0)).await {
+        Next::Run(claim) => Some(claim.jobs[0]),
+        Next::Nothing => None,
+        other => panic!("{other:?}"),
+    };
+    let waits = async || place.store().waits(Some(5000.0)).await.unwrap();
     place.accept(lasting(1, 60_000.0)).await;
-    assert_eq!(next().await, None);
+    assert_eq!((waits().await, next().await), (false, None));
     let first = place.accept(lasting(2, 5000.0)).await.id;
     let second = place.accept(lasting(3, 10.0)).await.id;
     let high = place.accept(NewJob { priority: Priority::High, ..lasting(4, 100.0) }).await.id;
     let mut taken = Vec::new();
-    while let Some(id) = next().await {
-        taken.push(id);
-        place.run(id).await;
+    while waits().await {
+        taken.extend(next().await);
     }
     // A client's jobs follow one another, the shorter before the longer where both are short enough to differ.
     assert_eq!(taken[0], high);
@@ -244,7 +241,7 @@ pub(in crate::store) async fn the_next_short_job_is_the_first_of_them_in_line<P:
     place.silence().await;
     place.store().sweep(Arc::new(Vec::new)).await.unwrap();
     assert_eq!(place.record(second).await.state, JobState::Queued);
-    assert_eq!(next().await, None);
+    assert_eq!((waits().await, next().await), (false, None));
 }
 
 pub(in crate::store) async fn the_state_of_jobs_and_store_is_told_in_figures<P: Place>() {
@@ -258,9 +255,8 @@ pub(in crate::store) async fn the_state_of_jobs_and_store_is_told_in_figures<P: 
     let second = place.accept(from("key:b", 2)).await;
     place.accept(from("ip:127.0.0.1", 3)).await;
     assert_eq!(place.store().counts().await.unwrap().oldest_ms, Some(first.created_ms));
-    let waiting = place.store().waiting(first.id).await.unwrap().unwrap();
-    assert_eq!((waiting.created_ms, waiting.owner.as_str()), (first.created_ms, "key:a"));
     let claim = place.run(first.id).await;
+    assert_eq!((claim.created_ms, claim.owner.as_str()), (first.created_ms, "key:a"));
     let counts = place.store().counts().await.unwrap();
     assert_eq!((counts.queued, counts.running, counts.oldest_ms), (2, 1, Some(second.created_ms)));
     place.store().finish(claim.lease, Ending::Succeeded(result(1))).await.unwrap();
@@ -351,13 +347,25 @@ pub(in crate::store) async fn what_is_kept_for_an_owner_has_a_bound<P: Place>() 
     place.later(ms(wait) - 60_000).await;
     refused(&place, ask(4, None)).await;
     place.later(60_000).await;
-    let waiting = place.accept(ask(4, None)).await.id;
-    // A job that waits can be refused, once.
-    assert!(place.store().refuse(waiting, PROBLEM.to_owned()).await.unwrap());
-    let record = place.record(waiting).await;
+    place.accept(ask(4, None)).await;
+}
+
+pub(in crate::store) async fn a_job_that_may_not_begin_fails_and_its_equals_wait_again<P: Place>() {
+    let place = P::new().await;
+    let of = |owner: &str| NewJob { owner: owner.to_owned(), ..job(1) };
+    let [one, again, two] =
+        [place.accept(of("one")).await.id, place.accept(of("one")).await.id, place.accept(of("two")).await.id];
+    let claim = place.run(one).await;
+    let refuse = async || place.store().refuse(claim.lease, "one".to_owned(), PROBLEM.to_owned()).await.unwrap();
+    let mut refused = refuse().await;
+    refused.sort();
+    assert_eq!(refused, [one, again]);
+    let record = place.record(one).await;
     assert_eq!((record.state, record.problem.as_deref(), record.attempt), (JobState::Failed, Some(PROBLEM), 0));
-    assert!(record.expires_ms > record.finished_ms);
-    assert!(!place.store().refuse(waiting, PROBLEM.to_owned()).await.unwrap());
+    assert!(record.expires_ms > record.finished_ms && record.started_ms.is_none());
+    assert_eq!((place.line().await, place.record(two).await.attempt), (vec![two], 0));
+    assert_eq!(refuse().await, [], "once");
+    assert_eq!(place.line().await, [two]);
 }
 
 pub(in crate::store) async fn deadlines_end_what_is_late_and_nothing_else<P: Place>() {
@@ -379,17 +387,6 @@ pub(in crate::store) async fn deadlines_end_what_is_late_and_nothing_else<P: Pla
     }
     assert_eq!(place.record(later).await.state, JobState::Queued);
     assert_eq!(place.store().finish(claim.lease, Ending::Succeeded(result(2))).await.unwrap(), []);
-}
-
-pub(in crate::store) async fn a_lost_task_is_given_again_and_no_other<P: Place>() {
-    let place = P::new().await;
-    let (lost, kept) = (place.accept(job(1)).await.id, place.accept(job(2)).await.id);
-    assert_eq!(place.store().sweep(Arc::new(Vec::new)).await.unwrap(), []);
-    place.lose_task(lost).await;
-    assert_eq!(place.store().sweep(Arc::new(Vec::new)).await.unwrap(), [lost]);
-    let mut line = place.line().await;
-    line.sort();
-    assert_eq!(line, [lost, kept]);
 }
 
 /// How long a job's result lives in the next test: long beside what the test does meanwhile.
@@ -440,43 +437,101 @@ pub(in crate::store) async fn timings_are_kept_newest_first<P: Place>() {
     );
 }
 
-pub(in crate::store) async fn the_queue_hands_out_each_task_once_and_no_more_than_there_are_places<P: Place>() {
-    use std::sync::Mutex;
-    use std::sync::atomic::{AtomicUsize, Ordering};
+pub(in crate::store) async fn the_line_is_handed_out_in_order_and_each_job_once<P: Place>() {
     let place = P::new().await;
-    let (seen, now, most) =
-        (Arc::new(Mutex::new(Vec::new())), Arc::new(AtomicUsize::new(0)), Arc::new(AtomicUsize::new(0)));
-    // Each task ends together with another one only: with one place, none would end.
-    let pair = Arc::new(tokio::sync::Barrier::new(2));
-    let run: RunTask = {
-        let (seen, now, most) = (Arc::clone(&seen), Arc::clone(&now), Arc::clone(&most));
-        Arc::new(move |id| {
-            let (seen, now, most, pair) = (Arc::clone(&seen), Arc::clone(&now), Arc::clone(&most), Arc::clone(&pair));
-            Box::pin(async move {
-                most.fetch_max(now.fetch_add(1, Ordering::SeqCst) + 1, Ordering::SeqCst);
-                pair.wait().await;
-                now.fetch_sub(1, Ordering::SeqCst);
-                seen.lock().unwrap().push(id);
-            })
-        })
-    };
-    let (stop, stopped) = watch::channel(false);
-    let working = tokio::spawn(place.store().work(2, run, stopped));
-    let mut expected = Vec::new();
-    for number in 0..20 {
-        expected.push(place.accept(job(number)).await.id);
+    assert!(!place.store().waits(None).await.unwrap());
+    for number in 0..40 {
+        let priority = if number % 4 == 0 { Priority::High } else { Priority::Normal };
+        place.accept(NewJob { priority, owner: format!("client {}", number % 3), ..job(number) }).await;
     }
-    tokio::time::timeout(Duration::from_mins(1), async {
-        while seen.lock().unwrap().len() < expected.len() {
-            tokio::time::sleep(Duration::from_millis(10)).await;
+    let line = place.line().await;
+    for id in &line[..3] {
+        assert!(place.store().waits(None).await.unwrap());
+        match place.next(None).await {
+            Next::Run(claim) => assert_eq!((claim.jobs.as_slice(), claim.attempt), (&[*id][..], 1)),
+            other => panic!("{other:?}"),
         }
-    })
-    .await
-    .expect("all tasks end");
-    stop.send_replace(true);
-    working.await.unwrap();
-    let mut seen = seen.lock().unwrap().clone();
-    seen.sort();
-    assert_eq!(seen, expected);
-    assert_eq!(most.load(Ordering::SeqCst), 2);
+    }
+    // However many ask at once. Who finds nothing while others are about to take it asks again.
+    let place = &place;
+    let takers = (0..8).map(|_| async move {
+        let mut taken = Vec::new();
+        while place.store().waits(None).await.unwrap() {
+            match place.next(None).await {
+                Next::Run(claim) => taken.extend(claim.jobs),
+                Next::Nothing => {}
+                other => panic!("{other:?}"),
+            }
+        }
+        taken
+    });
+    let mut taken = futures_util::future::join_all(takers).await.concat();
+    taken.extend_from_slice(&line[..3]);
+    taken.sort();
+    let mut all = line;
+    all.sort();
+    assert_eq!(taken, all);
+    assert!(matches!(place.next(None).await, Next::Nothing));
+    // The answer may be lost on its way: who asks again has it already, and nothing else.
+    let id = place.accept(job(50)).await.id;
+    place.accept(job(51)).await;
+    let lease = Lease::new();
+    for again in [false, true, true] {
+        match place.store().take(Wanted { lease, short_ms: None, again }).await.unwrap() {
+            Next::Run(claim) => {
+                assert_eq!((claim.jobs.as_slice(), claim.attempt, claim.lease), (&[id][..], 1, lease));
+                assert_eq!(claim.input, "{\"number\":50}");
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+pub(in crate::store) async fn equal_jobs_are_handed_out_together<P: Place>() {
+    let place = P::new().await;
+    let mut ids = Vec::new();
+    for owner in ["one", "two", "three"] {
+        ids.push(place.accept(NewJob { owner: owner.to_owned(), ..job(1) }).await.id);
+    }
+    let Next::Run(claim) = place.next(None).await else { panic!("they wait") };
+    let mut taken = claim.jobs;
+    taken.sort();
+    assert_eq!(taken, ids);
+    assert!(matches!(place.next(None).await, Next::Nothing));
+}
+
+pub(in crate::store) async fn what_was_charged_too_often_is_kept_for_who_runs_it_alone<P: Place>() {
+    let place = P::new().await;
+    let id = place.accept(job(1)).await.id;
+    for attempt in 1..MOST {
+        let Next::Run(claim) = place.next(None).await else { panic!("it waits") };
+        assert_eq!(claim.attempt, attempt);
+        place.silence().await;
+        assert_eq!(place.store().sweep(Arc::new(Vec::new)).await.unwrap(), [id]);
+    }
+    // An equal job that comes anew does not make it a harmless one, and nobody else is told of them while they are held.
+    let equal = place.accept(NewJob { owner: "two".to_owned(), ..job(1) }).await.id;
+    match place.next(None).await {
+        Next::Suspect { id: suspect, calculator } => {
+            assert!([id, equal].contains(&suspect));
+            assert_eq!(calculator, "a");
+        }
+        other => panic!("{other:?}"),
+    }
+    assert!(!place.store().waits(None).await.unwrap());
+    assert!(matches!(place.next(None).await, Next::Nothing));
+    place.store().hold(id).await.unwrap();
+    let other = place.accept(job(2)).await.id;
+    let Next::Run(beside) = place.next(None).await else { panic!("others go on") };
+    assert_eq!(beside.jobs, [other]);
+    for waiting in [id, equal] {
+        assert_eq!(place.record(waiting).await.state, JobState::Queued);
+    }
+    place.store().finish(beside.lease, Ending::Succeeded(result(2))).await.unwrap();
+    // Who held it is gone: it is there for others.
+    let place = place.again().await;
+    assert!(place.store().waits(None).await.unwrap());
+    let Next::Suspect { id: suspect, .. } = place.next(None).await else { panic!("it waits") };
+    let claim = place.run(suspect).await;
+    assert_eq!((claim.jobs.len(), claim.attempt), (2, MOST));
 }

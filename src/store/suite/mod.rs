@@ -9,7 +9,9 @@ pub(in crate::store) mod results;
 use std::time::Duration;
 
 use crate::key::Key;
-use crate::store::jobs::{Accepted, Claim, Claimed, JobId, JobKind, JobRecord, Lease, NewJob, Priority, Quota};
+use crate::store::jobs::{
+    Accepted, Claim, Claimed, JobId, JobKind, JobRecord, Lease, NewJob, Next, Priority, Quota, Wanted,
+};
 use crate::store::sqlite::Keep;
 use crate::store::{Cursor, KeptResult, ResultPage, ResultQuery, Store};
 
@@ -23,10 +25,8 @@ pub(in crate::store) trait Place: Sized {
     fn store(&self) -> &dyn Store;
     /// As after the end of the process.
     async fn again_with(self, keep: Keep) -> Self;
-    /// The jobs that the queue would hand out, in its order.
+    /// The jobs that wait, in their order.
     async fn line(&self) -> Vec<JobId>;
-    /// Takes the tasks of a job out of the queue.
-    async fn lose_task(&self, id: JobId);
     /// From now on nobody has heard of any computation for long.
     async fn silence(&self);
     /// Everything that is on record happened so much earlier, ms.
@@ -55,6 +55,11 @@ pub(in crate::store) trait Place: Sized {
 
     async fn claim(&self, id: JobId) -> Claimed {
         self.store().claim(id, Lease::new(), MOST, PROBLEM.to_owned()).await.unwrap()
+    }
+
+    /// Takes the next job in line, or the next short one.
+    async fn next(&self, short_ms: Option<f64>) -> Next {
+        self.store().take(Wanted { lease: Lease::new(), short_ms, again: false }).await.unwrap()
     }
 
     async fn run(&self, id: JobId) -> Claim {
@@ -136,11 +141,13 @@ macro_rules! suite {
             an_owner_gets_so_much_work_in_an_hour
             what_is_kept_for_an_owner_has_a_bound
             deadlines_end_what_is_late_and_nothing_else
-            a_lost_task_is_given_again_and_no_other
             what_a_kept_job_points_to_stays_and_what_is_expired_goes
             what_some_jobs_need_is_read_at_once
             timings_are_kept_newest_first
-            the_queue_hands_out_each_task_once_and_no_more_than_there_are_places
+            the_line_is_handed_out_in_order_and_each_job_once
+            equal_jobs_are_handed_out_together
+            what_was_charged_too_often_is_kept_for_who_runs_it_alone
+            a_job_that_may_not_begin_fails_and_its_equals_wait_again
         }
         suite! { $place, callbacks:
             a_callback_is_due_when_its_job_is_over_however_it_ends
