@@ -126,12 +126,17 @@ fn head(model: &StoredModel) -> ModelHead {
     }
 }
 
-/// What tells an effect from others: its kind and other words, and which wave it is.
+/// What tells an effect from others: its kind and other words, which wave it is, and over what a profile goes.
 pub(super) fn identity(effect: &Value) -> Map<String, Value> {
     const WAVES: [&str; 3] = ["order", "ratio", "waves_per_revolution"];
     let fields = effect.as_object().into_iter().flatten();
     let apart = fields.filter(|(name, value)| value.is_string() || WAVES.contains(&name.as_str()));
-    apart.map(|(name, value)| (name.clone(), value.clone())).collect()
+    let mut apart: Map<String, Value> = apart.map(|(name, value)| (name.clone(), value.clone())).collect();
+    if let Some(point) = effect.pointer("/profile/0").and_then(Value::as_object) {
+        let over: Vec<&str> = point.keys().map(String::as_str).collect();
+        apart.insert("profile".to_owned(), over.join(", ").into());
+    }
+    apart
 }
 
 type Side<'a> = Option<(&'a StoredModel, &'a Value)>;

@@ -221,3 +221,64 @@ async fn diagnosed(server: &Server, job: &Value) -> Value {
     let request = server.post_to("/v1/diagnosis", job.to_string()).header("prefer", "wait=60");
     request.send().await.unwrap().json().await.unwrap()
 }
+
+/// What has no name in cuts is a term of the model that a diagnosis leaves: a schedule is made with it, and the same rows show it again.
+#[tokio::test]
+async fn what_has_no_name_is_stored_and_used() {
+    let server = server().await;
+    let mut rows = Vec::new();
+    for i in 0..12_u32 {
+        let speed = 20.0 * 8.0_f64.powf(f64::from(i) / 11.0);
+        for (k, depth) in [0.3_f64, 0.6, 1.2].into_iter().enumerate() {
+            for (n, feed) in [0.1_f64, 0.2].into_iter().enumerate() {
+                // As if at random, about a wave over the speed.
+                let scatter = 0.03 * ((17 * i as usize + 29 * k + 41 * n) as f64 * 2.399).sin();
+                let wave = 0.2 * (5.0 * (speed / 20.0).ln()).sin() + scatter;
+                let ln = 1.1 - 0.2 * speed.ln() + 0.8 * feed.ln() + 0.1 * depth.ln() + wave;
+                let cut = json!({ "speed_m_per_min": speed, "feed_mm_per_rev": feed, "depth_mm": depth, "roughness_um": ln.exp() });
+                rows.push(cut);
+            }
+        }
+    }
+    let roughness = json!({
+        "form": "log_log", "constant": 1.1, "speed_exponent": -0.2, "feed_exponent": 0.8, "depth_exponent": 0.1
+    });
+    let example = Registry::standard().unwrap().entry("feed-schedule").unwrap().meta().examples[0].job;
+    let mut job: Value = serde_json::from_str(example).unwrap();
+    job["models"]["roughness"] = roughness;
+    let base = json!({ "models": { "roughness": job["models"]["roughness"] } });
+    let measured =
+        json!({ "calculator": "feed-schedule", "job": base, "quantity": "roughness_um", "measurements": rows });
+    let found = diagnosed(&server, &measured).await;
+    let result = &found["result"];
+    assert_eq!(
+        (&result["verdict"], &result["extension"]),
+        (&json!("unknown"), &json!("remainder")),
+        "{}",
+        result["remainder"]["kind"]
+    );
+    assert_eq!(result["remainder"]["known_between"][0]["field"], "speed_m_per_min");
+    let said =
+        found["explanation"].as_array().unwrap().iter().find(|said| said["code"] == "diagnosis_extended").unwrap();
+    let said = said["text"].as_str().unwrap();
+    assert!(said.contains("20 to 160 m/min"), "{said}");
+
+    assert_eq!(put(&server, "lathe", &json!({ "from_result": found["key"] })).await, 201);
+    let stored = got(&server, "/v1/models/lathe").await;
+    assert_eq!(stored["effects"].as_array().unwrap().last().unwrap()["kind"], "remainder");
+    let solve = async |job: &Value| -> Value {
+        let request = server.post_to("/v1/feed-schedule", job.to_string()).header("prefer", "wait=60");
+        request.send().await.unwrap().json().await.unwrap()
+    };
+    let plain = solve(&job).await;
+    job["model"] = json!("lathe");
+    let with = solve(&job).await;
+    assert_eq!(with["input"]["model"]["name"], "lathe", "{with}");
+    assert_ne!(plain["result"]["zones"][0]["roughness_um"], with["result"]["zones"][0]["roughness_um"]);
+
+    let mut again = measured;
+    again["model"] = json!("lathe");
+    let again = diagnosed(&server, &again).await;
+    assert_eq!(again["result"]["verdict"], "adequate", "{again}");
+    assert!(again["result"]["recognised"]["sigmas"].as_f64().unwrap() > 5.0);
+}

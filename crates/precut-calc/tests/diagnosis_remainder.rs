@@ -133,9 +133,9 @@ fn a_term_says_where_it_is_known_and_how_surely() {
     let found = diagnosed(&guideway(), json!({}));
     assert_eq!((found.verdict, found.extension), (VerdictClass::Unknown, ExtensionKind::Remainder));
     let remainder = found.remainder.as_ref().unwrap();
-    let between = remainder.known_between.as_ref().unwrap();
+    let [between] = &remainder.known_between[..] else { panic!("{:?}", remainder.known_between) };
     let Some(DeflectionEffect::Remainder { profile, .. }) = found.effects.last() else { panic!("{:?}", found.effects) };
-    assert_eq!(between.field, "z_mm");
+    assert_eq!((between.field.as_str(), between.unit.as_str()), ("z_mm", "mm"));
     assert!((profile[0].z_mm - between.from).abs() < 1e-9 && (profile.last().unwrap().z_mm - between.to).abs() < 1e-9);
     // What is open of a place of the profile is what is open of the rows there, on the radius.
     let place = profile.len() / 2;

@@ -88,6 +88,26 @@ fn every_effect_is_its_formula() {
     let wear = json!([{ "kind": "wear_in", "wear_in_mm": 0.07, "time_constant_min": 4.0, "rate_mm_per_min": 0.01 }]);
     let expected = 0.07 * (1.0 - (-5.0_f64 / 4.0).exp()) + 0.01 * 5.0;
     near("wear in", predicted(base(wear), "flank_wear"), expected, 1e-10, 0.0);
+    // Straight in the logarithms, as an exponent is; twice the half; of two conditions as their interaction is.
+    let speeds = [20.0_f64, 35.0, 60.0].map(|at| json!({ "speed_m_per_min": at, "delta_ln": 0.05 * (at / 60.0).ln() }));
+    ln(json!({ "kind": "remainder", "scale": 2.0, "profile": speeds }), 0.1 * v);
+    let pairs = [0.05_f64, 0.3].map(|feed| {
+        [0.5_f64, 2.0].map(|depth| {
+            let added = 0.1 * (feed / 0.2).ln() * (depth / 0.5).ln();
+            json!({ "feed_mm_per_rev": feed, "depth_mm": depth, "delta_ln": added })
+        })
+    });
+    ln(json!({ "kind": "remainder", "profile": pairs.concat() }), 0.1 * s * t);
+    // A formula is its arithmetic, in whatever units.
+    let formula = |expression: &str| json!({ "kind": "formula", "expression": expression, "k1": 0.1, "k2": -2.0 });
+    ln(formula("k1*ln(speed_m_per_min/60[m/min])*ln(feed_mm_per_rev/200[um])"), 0.1 * v * s);
+    ln(formula("k1*(depth_mm/1[mm])^k2 + flank_wear_mm/time_min*1[min/mm]"), 0.1 * 1.5_f64.powi(-2) + 0.3 / 5.0);
+    ln(formula("k1*cos(cutting_edge_angle_deg)"), 0.1 * 75.0_f64.to_radians().cos());
+    // Beyond its places as at the ends; between places of what is no regime straight in it.
+    let shallow = [0.2, 0.5].map(|depth| json!({ "depth_mm": depth, "delta_ln": depth }));
+    ln(json!({ "kind": "remainder", "profile": shallow }), 0.5);
+    let worn = [0.0, 0.4].map(|wear| json!({ "flank_wear_mm": wear, "delta_ln": 0.2 - wear }));
+    ln(json!({ "kind": "remainder", "profile": worn }), -0.1);
     // A semi-log output takes the same terms in its own unit.
     let plain = json!([{ "kind": "speed_exponent", "delta": 0.1, "output": "hardening" }]);
     near("semi-log", predicted(base(plain), "hardening_percent") - hardening, 0.1 * v, 1e-9, 0.0);
@@ -98,7 +118,7 @@ fn every_effect_is_its_formula() {
 fn every_cause_has_an_effect() {
     for cause in MACHINABILITY_CAUSES {
         let values: Vec<f64> = cause.parameters.iter().map(|p| 0.5 * (p.lower + p.upper)).collect();
-        let named = ["batch_shift", "factor_shift", "factor_interaction"].contains(&cause.kind);
+        let named = ["batch_shift", "factor_shift", "factor_interaction", "remainder", "formula"].contains(&cause.kind);
         match MachinabilityEffect::from_parameters(cause, &values) {
             Some(effect) => assert_eq!(effect.kind(), cause.kind),
             None => assert!(named, "{}", cause.kind),
@@ -155,6 +175,34 @@ fn what_an_effect_lacks_is_a_fault() {
     ] {
         assert_eq!(without(field, effect.clone()), expected, "{effect}");
         assert_eq!(faults(base(json!([effect]))), vec![]);
+    }
+    let remainder = |points: Value| of(json!({ "kind": "remainder", "profile": points }));
+    let timely = remainder(json!([{ "time_min": 1.0, "delta_ln": 0.1 }, { "time_min": 9.0, "delta_ln": 0.0 }]));
+    assert_eq!(without("conditions", timely.clone()), fault("effect_condition_missing", "/conditions/time_min"));
+    assert_eq!(faults(base(json!([timely]))), vec![]);
+    let at = |speed: f64, depth: f64| json!({ "speed_m_per_min": speed, "depth_mm": depth, "delta_ln": 0.1 });
+    for (points, out) in [
+        (json!([at(20.0, 0.5), at(20.0, 1.0), at(40.0, 0.5), at(40.0, 1.0)]), None),
+        (json!([at(20.0, 0.5), at(20.0, 1.0), at(40.0, 0.5)]), Some(2)),
+        (json!([at(20.0, 0.5), at(20.0, 1.0), at(40.0, 0.5), at(40.0, 2.0)]), Some(3)),
+        (json!([at(20.0, 0.5), at(20.0, 1.0), at(10.0, 0.5), at(10.0, 1.0)]), Some(2)),
+        (json!([at(20.0, 1.0), at(20.0, 0.5)]), Some(1)),
+        (json!([{ "speed_m_per_min": 20.0, "delta_ln": 0.1 }, at(40.0, 1.0)]), Some(1)),
+        (json!([{ "delta_ln": 0.1 }, { "delta_ln": 0.2 }]), Some(0)),
+    ] {
+        let expected = out.map(|index| ("remainder_not_a_table".to_owned(), format!("/effects/0/profile/{index}")));
+        assert_eq!(faults(base(json!([remainder(points.clone())]))), Vec::from_iter(expected), "{points}");
+    }
+    let formula = |expression: &str| of(json!({ "kind": "formula", "expression": expression, "k1": 0.1 }));
+    let timely = formula("k1*time_min/1[min]");
+    assert_eq!(without("conditions", timely.clone()), fault("effect_condition_missing", "/conditions/time_min"));
+    assert_eq!(faults(base(json!([timely]))), vec![]);
+    for wrong in ["k1*time_min", "k1*ln(depth_mm)", "k1*", "k4", "k1*1[inch]", "k1*force_y"] {
+        assert_eq!(
+            faults(base(json!([formula(wrong)]))),
+            fault("formula_unreadable", "/effects/0/expression"),
+            "{wrong}"
+        );
     }
     // On which output: said where more than one may be meant.
     assert_eq!(
@@ -247,6 +295,31 @@ fn schedules_with_effects_are_the_best_of_a_grid() {
             1,
             true,
         ),
+        // A ridge with an edge, over speed alone.
+        (
+            effect(
+                "remainder",
+                json!({ "output": "roughness", "profile": [
+                    { "speed_m_per_min": 20.0, "delta_ln": 0.0 }, { "speed_m_per_min": 40.0, "delta_ln": 0.3 },
+                    { "speed_m_per_min": 80.0, "delta_ln": 0.0 }] }),
+            ),
+            Box::new(move |v, s| own(v, s) * (0.3 * (1.0 - (v / 40.0).ln().abs() / 2.0_f64.ln()).max(0.0)).exp()),
+            Box::new(pull),
+            1,
+            true,
+        ),
+        // The hump above as its user would write it.
+        (
+            effect(
+                "formula",
+                json!({ "output": "roughness", "k1": 0.5,
+                        "expression": "k1*exp(-((speed_m_per_min - 35[m/min])/18[m/min])^2)" }),
+            ),
+            Box::new(move |v, s| own(v, s) * (0.5 * (-((v - 35.0) / 18.0).powi(2)).exp()).exp()),
+            Box::new(pull),
+            1,
+            true,
+        ),
     ];
     for (effect, roughness, force, linearisations, local) in cases {
         let outcome = solved(zone(json!([effect])));
@@ -260,6 +333,13 @@ fn schedules_with_effects_are_the_best_of_a_grid() {
         assert!(outcome.certificate.linearisations >= linearisations, "{effect}: {:?}", outcome.certificate);
         assert_eq!(outcome.certificate.local, local, "{effect}");
     }
+}
+
+/// Where a formula has no value there is no schedule, and none is told.
+#[test]
+fn a_formula_without_a_value_is_no_schedule() {
+    let nowhere = json!([{ "kind": "formula", "output": "roughness", "expression": "ln(-feed_mm_per_rev/1[mm])" }]);
+    assert!(solve(zone(nowhere)).is_err());
 }
 
 /// A hump that leaves no feasible speed is a conflict, not a best effort.

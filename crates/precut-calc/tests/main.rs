@@ -36,6 +36,7 @@ mod diagnosis_known;
 mod diagnosis_profiles;
 mod diagnosis_refusals;
 mod diagnosis_remainder;
+mod diagnosis_remainder_cuts;
 mod diagnosis_ring;
 mod diagnosis_ring_trials;
 mod diagnosis_trials;

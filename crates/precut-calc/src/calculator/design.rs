@@ -37,6 +37,8 @@ pub struct Grouping {
     pub name: &'static str,
     /// Names that the user gave to it; empty where `name` says all.
     pub over: Vec<String>,
+    /// The conditions whose values decide the group; empty where others do, too.
+    pub conditions: Vec<&'static str>,
     /// Group of every row.
     pub group: Vec<usize>,
 }
@@ -64,9 +66,23 @@ impl Condition {
             return None;
         }
         let place: Vec<f64> = values.iter().map(|value| (value - low) / (high - low)).collect();
-        let mut sorted = place.clone();
-        sorted.sort_by(f64::total_cmp);
-        let levels = 1 + sorted.windows(2).filter(|pair| pair[1] - pair[0] > Self::APART).count();
-        Some(Self { name, place, levels })
+        let mut condition = Self { name, place, levels: 0 };
+        condition.levels = condition.values(|_| true).len();
+        Some(condition)
+    }
+
+    /// Where rows stand in it, each place once, ascending.
+    pub fn values(&self, counts: impl Fn(usize) -> bool) -> Vec<f64> {
+        let rows = (0..self.place.len()).filter(|&row| counts(row));
+        let mut values: Vec<f64> = rows.map(|row| self.place[row]).collect();
+        values.sort_by(f64::total_cmp);
+        let all = std::mem::take(&mut values);
+        for (k, value) in all.iter().enumerate() {
+            // A place apart from the one before it.
+            if k == 0 || value - all[k - 1] > Self::APART {
+                values.push(*value);
+            }
+        }
+        values
     }
 }

@@ -51,6 +51,16 @@ pub trait Diagnosable:
         None
     }
 
+    /// From where to where a remainder is known; empty of other effects.
+    fn known_over(_remainder: &Self::Effect) -> Vec<KnownOver> {
+        Vec::new()
+    }
+
+    /// Whether of two effects one stands in place of the other, as two remainders over the same do.
+    fn is_same(one: &Self::Effect, other: &Self::Effect) -> bool {
+        std::mem::discriminant(one) == std::mem::discriminant(other)
+    }
+
     /// How the rows hang together.
     fn design(prepared: &Self::Prepared) -> Design;
 
@@ -135,14 +145,40 @@ pub trait Diagnosable:
     }
 }
 
-/// Something without a name that goes smoothly along a part.
+/// Something without a name that goes with a place along a part, or with one or two conditions.
 pub struct Unnamed<'a> {
-    /// Between which places it is known, as shares of the length of the part.
-    pub ends: [f64; 2],
-    /// Its size there, in the unit of the effect.
-    pub size: &'a dyn Fn(f64) -> f64,
-    /// At so many places, evenly, straight between them, it is given well enough.
-    pub places: usize,
+    /// What it goes with.
+    pub over: &'a [Over],
+    /// Its size in the unit of the effect, where it stands at these places of each.
+    pub size: &'a dyn Fn(&[f64]) -> f64,
+}
+
+/// From where to where something is known.
+#[derive(Debug, Clone, PartialEq)]
+pub struct KnownOver {
+    /// A place or a condition, by its field.
+    pub field: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+    /// Least value.
+    pub from: f64,
+    /// Largest value.
+    pub to: f64,
+}
+
+/// What something without a name goes with.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Over {
+    /// The condition, as the design calls it; [`Over::ALONG`] along a part.
+    pub name: &'static str,
+    /// Places, ascending shares of its range or of the length of the part, between which it is known: straight between them it
+    /// is given well enough.
+    pub at: Vec<f64>,
+}
+
+impl Over {
+    /// The name of the place along a part.
+    pub const ALONG: &'static str = "along";
 }
 
 /// What was written down with one of its numbers divided; `None` where it has no such number.

@@ -5,8 +5,8 @@ use utoipa::ToSchema;
 
 use crate::calculator::{
     Consequence, Cost, Design, Diagnosable, Example, Failure, Finding, ForwardModel, Hypotheses, Hypothesis,
-    JacobianColumn, Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows, Unnamed, checkpoint,
-    values_by_name,
+    JacobianColumn, KnownOver, Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows, Unnamed,
+    checkpoint, values_by_name,
 };
 use crate::effects::{Cause, DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect, ErrorPoint};
 use crate::num::beam::Profile;
@@ -352,6 +352,8 @@ impl Diagnosable for DeflectionCompensation {
         held: &[DeflectionEffect],
         found: &Unnamed<'_>,
     ) -> Option<DeflectionEffect> {
+        let [along] = found.over else { return None };
+        let [from_end, to_end] = [along.at.first().copied()?, along.at.last().copied()?];
         let length_mm = prepared.job.shaft.length_mm();
         let before = held.iter().find_map(|effect| match effect {
             DeflectionEffect::Remainder { scale, profile, .. } => Some((*scale, profile.as_slice())),
@@ -360,15 +362,27 @@ impl Diagnosable for DeflectionCompensation {
         let name = held.iter().map(remainder_name).collect();
         // The one that was known before is part of it, over all places of either.
         let ends_before = before.and_then(|(_, known)| Some([known.first()?.z_mm, known.last()?.z_mm]));
-        let [from, to] = found.ends.map(|end| end * length_mm);
+        let [from, to] = [from_end, to_end].map(|end| end * length_mm);
         let [first, last] = ends_before.map_or([from, to], |[first, last]| [first.min(from), last.max(to)]);
-        let count = before.map_or(found.places, |(_, known)| found.places.max(known.len())).max(2);
+        let count = before.map_or(along.at.len(), |(_, known)| along.at.len().max(known.len())).max(2);
         let point = |index: usize| {
             let z_mm = first + (last - first) * index as f64 / (count - 1) as f64;
             let known = before.map_or(0.0, |(scale, known)| scale * error_um(known, z_mm));
-            ErrorPoint { z_mm, error_um: known + (found.size)((z_mm / length_mm).clamp(found.ends[0], found.ends[1])) }
+            ErrorPoint { z_mm, error_um: known + (found.size)(&[(z_mm / length_mm).clamp(from_end, to_end)]) }
         };
         Some(DeflectionEffect::Remainder { name, scale: 1.0, profile: (0..count).map(point).collect() })
+    }
+
+    fn known_over(remainder: &DeflectionEffect) -> Vec<KnownOver> {
+        let DeflectionEffect::Remainder { profile, .. } = remainder else { return Vec::new() };
+        let ends = profile.first().zip(profile.last());
+        let range = |(first, last): (&ErrorPoint, &ErrorPoint)| KnownOver {
+            field: "z_mm",
+            unit: "mm",
+            from: first.z_mm,
+            to: last.z_mm,
+        };
+        ends.map(range).into_iter().collect()
     }
 
     fn effects(

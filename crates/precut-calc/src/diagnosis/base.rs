@@ -6,10 +6,10 @@ use rayon::prelude::*;
 
 use super::input::{DiagnosisOptions, PriorWeight};
 use super::known::{Known, with_numbers};
-use super::subject::{Belief, Setting, Subject, Waves};
+use super::subject::{Belief, Form, Setting, Subject};
 use crate::calculator::{
-    Diagnosable, Expansions, Failure, Held, Hypotheses, Hypothesis, Inapplicability, Inapplicable, JacobianColumn,
-    Missing, Monitor, Prediction, Treatment, Unnamed, Variable,
+    Design, Diagnosable, Expansions, Failure, Held, Hypotheses, Hypothesis, Inapplicability, Inapplicable,
+    JacobianColumn, Missing, Monitor, Over, Prediction, Smooth, Treatment, Unnamed, Variable,
 };
 
 /// From this time of one prediction on, ms, divided differences are one-sided and fewer sets are refined.
@@ -81,8 +81,8 @@ impl<'a, M: Diagnosable> Bound<'a, M> {
     /// The effects that are believed: what joins the base, and what stands in place of an effect of the base.
     pub(super) fn effects_of(&self, believed: &Belief) -> Result<Vec<M::Effect>, Failure> {
         let mut effects = self.effects_of_settings(&believed.settings)?;
-        if let Some(waves) = &believed.waves {
-            put(&mut effects, self.remainder(&self.with_settings(&believed.settings)?, waves)?);
+        if let Some(form) = &believed.form {
+            put::<M>(&mut effects, self.remainder(&self.with_settings(&believed.settings)?, form)?);
         }
         Ok(effects)
     }
@@ -96,8 +96,8 @@ impl<'a, M: Diagnosable> Bound<'a, M> {
     }
 
     /// What has no name as an effect beside those that act.
-    fn remainder(&self, acting: &[M::Effect], waves: &Waves) -> Result<M::Effect, Failure> {
-        let found = Unnamed { ends: waves.ends, size: &|place| waves.at(place), places: waves.places };
+    fn remainder(&self, acting: &[M::Effect], form: &Form) -> Result<M::Effect, Failure> {
+        let found = Unnamed { over: &form.over, size: &|place| form.at(place) };
         M::remainder(&self.prepared, acting, &found)
             .ok_or_else(|| Failure::Internal("a remainder that the model has no effect for".to_owned()))
     }
@@ -120,9 +120,9 @@ impl<'a, M: Diagnosable> Bound<'a, M> {
     /// All that acts where this is believed: the effects of the base, as far as they have not changed, and what it stands for.
     pub(super) fn acting(&self, believed: &Belief) -> Result<Vec<M::Effect>, Failure> {
         let mut acting = self.with_settings(&believed.settings)?;
-        if let Some(waves) = &believed.waves {
-            let remainder = self.remainder(&acting, waves)?;
-            put(&mut acting, remainder);
+        if let Some(form) = &believed.form {
+            let remainder = self.remainder(&acting, form)?;
+            put::<M>(&mut acting, remainder);
         }
         Ok(acting)
     }
@@ -230,10 +230,20 @@ impl<'a, M: Diagnosable> Bound<'a, M> {
     }
 }
 
-/// In place of an effect of the same kind, or beside the others.
-fn put<E>(effects: &mut Vec<E>, effect: E) {
-    effects.retain(|own| std::mem::discriminant(own) != std::mem::discriminant(&effect));
+/// In place of an effect that is the same but for its numbers, or beside the others.
+fn put<M: Diagnosable>(effects: &mut Vec<M::Effect>, effect: M::Effect) {
+    effects.retain(|own| !M::is_same(own, &effect));
     effects.push(effect);
+}
+
+/// The whole of what something without a name goes with first: along a part, or the first condition that differs.
+fn first_axis(design: &Design) -> Option<Over> {
+    let name = match &design.smooth {
+        Smooth::Along(_) => Over::ALONG,
+        Smooth::Around(_) => return None,
+        Smooth::None => design.conditions.first()?.name,
+    };
+    Some(Over { name, at: vec![0.0, 1.0] })
 }
 
 /// The causes that rows can speak about; those that the base has already as changes of what it has.
@@ -325,10 +335,11 @@ where
 
     fn unnamed(&self) -> Result<Option<JacobianColumn>, Failure> {
         let acting = &self.known.effects;
+        let Some(axis) = first_axis(&M::design(&self.prepared)) else { return Ok(None) };
         let with = |size: f64| {
-            let found = Unnamed { ends: [0.0, 1.0], size: &|_| size, places: 2 };
+            let found = Unnamed { over: std::slice::from_ref(&axis), size: &|_| size };
             let mut effects = acting.clone();
-            put(&mut effects, M::remainder(&self.prepared, acting, &found)?);
+            put::<M>(&mut effects, M::remainder(&self.prepared, acting, &found)?);
             Some(self.predicted_coarsely(&effects))
         };
         let Some((below, above)) = with(-UNIT_STEP).zip(with(UNIT_STEP)) else { return Ok(None) };

@@ -11,7 +11,7 @@ use super::evidence::{Normal, Scale, Side, log_det, log_mean_exp};
 use super::likelihood::Likelihood;
 use super::sparse::Sparse;
 use super::whiten::White;
-use crate::calculator::{Condition, Failure, Monitor, Smooth, checkpoint};
+use crate::calculator::{Condition, Failure, Grouping, Monitor, Over, Smooth, checkpoint};
 
 /// Cosines common to all runs.
 const COMMON_ORDERS: usize = 25;
@@ -28,6 +28,10 @@ const PAIR_ORDERS: usize = 3;
 const LENGTHS: [f64; 3] = [0.0, 0.08, 0.2];
 /// Pointwise root mean square, in standard deviations of the scatter.
 const SIZES: [f64; 4] = [1.0, 3.0, 10.0, 30.0];
+/// Places of an effect over conditions, at most: as many as may be unsure together.
+const MOST_PLACES: usize = 128;
+/// Levels that are told by their independent directions, at most: each tells of each, and a stored model has its size.
+const MOST_LEVELS: usize = 40;
 /// A direction of which rows know less than this share of what its prior says is left out of what they leave open.
 const SEEN: f64 = 0.05;
 
@@ -42,11 +46,28 @@ pub(super) struct Kind {
     pub(super) columns: Vec<Sparse>,
     /// Order of every column, where the columns are waves: along a part half waves, round it whole ones.
     pub(super) orders: Option<Vec<f64>>,
-    /// Where the model has an effect for it: what one unit of the effect does to the rows, root mean square.
-    pub(super) per_unit: Option<f64>,
+    /// Where the model has an effect for it.
+    pub(super) effect: Option<OfEffect>,
     form: Form,
     /// Prior standard deviations of the amplitudes for every correlation length, at a size of one.
     spreads: Vec<Vec<f64>>,
+}
+
+/// How a remainder stands in an effect of the model.
+pub(super) struct OfEffect {
+    /// What one unit of the effect does to the rows, root mean square.
+    pub(super) per_unit: f64,
+    /// What it goes with, by the names of the design.
+    pub(super) over: Vec<&'static str>,
+    pub(super) basis: OfBasis,
+}
+
+/// What the columns are of.
+pub(super) enum OfBasis {
+    /// Products of so many half waves over each axis, the last first.
+    Waves(Vec<usize>),
+    /// Of each group of rows one, by the group of every row.
+    Levels(Vec<usize>),
 }
 
 /// What evidence is made of.
@@ -107,16 +128,19 @@ pub(super) fn kinds(
     let rows = data.value.len();
     let on_all = |values: &dyn Fn(usize) -> f64| Sparse::new(rows, (0..rows).map(|row| (row, values(row))));
     let smooth = |name, columns, waves: &[Wave]| Kind::smooth(name, columns, waves, likelihood, sigma);
+    let per_unit = unnamed.map(|column| (column.iter().map(|c| c * c).sum::<f64>() / rows as f64).sqrt());
+    let per_unit = per_unit.filter(|per_unit| *per_unit > 0.0);
+    // What one size of the effect does to a row, relative to all rows.
+    let share = |row: usize| unnamed.zip(per_unit).map_or(1.0, |(column, whole)| column[row] / whole);
+    let effect = |over, basis| per_unit.map(|per_unit| OfEffect { per_unit, over, basis });
     let mut kinds = Vec::new();
     checkpoint(monitor)?;
     match &data.layout.design.smooth {
         Smooth::Along(u) => {
-            let per_unit = unnamed.map(|column| (column.iter().map(|c| c * c).sum::<f64>() / rows as f64).sqrt());
-            let per_unit = per_unit.filter(|per_unit| *per_unit > 0.0);
-            let share = |row: usize| unnamed.zip(per_unit).map_or(1.0, |(column, whole)| column[row] / whole);
             let common = (0..COMMON_ORDERS).map(|k| on_all(&|row| share(row) * cosine(k, u[row]))).collect();
             let waves: Vec<Wave> = (0..COMMON_ORDERS).map(Wave::of).collect();
-            kinds.push(Kind { per_unit, ..smooth("common", common, &waves) });
+            let effect = effect(vec![Over::ALONG], OfBasis::Waves(vec![COMMON_ORDERS]));
+            kinds.push(Kind { effect, ..smooth("common", common, &waves) });
             let runs: Vec<Vec<usize>> = runs(data);
             if runs.len() > 1 {
                 checkpoint(monitor)?;
@@ -149,9 +173,12 @@ pub(super) fn kinds(
             groups.resize(groups.len().max(group + 1), Vec::new());
             groups[group].push(row);
         }
-        let levels = groups.iter().map(|group| Sparse::new(rows, group.iter().map(|&row| (row, 1.0)))).collect();
+        let over = varying(grouping, &data.layout.design.conditions, groups.len());
+        let of_effect = over.and_then(|over| effect(over, OfBasis::Levels(grouping.group.clone())));
+        let size = |row: usize| if of_effect.is_some() { share(row) } else { 1.0 };
+        let levels = groups.iter().map(|group| Sparse::new(rows, group.iter().map(|&row| (row, size(row))))).collect();
         let kind = Kind::levels(grouping.name, levels, likelihood, sigma);
-        kinds.push(Kind { over: grouping.over.clone(), ..kind });
+        kinds.push(Kind { over: grouping.over.clone(), effect: of_effect, ..kind });
     }
     if let Some(order) = &data.layout.design.order {
         let columns = TEST_ORDERS.map(|k| on_all(&|row| cosine(k, order[row]))).collect();
@@ -163,19 +190,25 @@ pub(super) fn kinds(
         checkpoint(monitor)?;
         // So many values allow no more waves.
         let orders = 0..=CONDITION_ORDERS.min(first.levels - 1);
-        let columns = orders.clone().map(|k| on_all(&|row| cosine(k, first.place[row]))).collect();
-        let kind = smooth("conditions", columns, &orders.map(Wave::of).collect::<Vec<_>>());
-        kinds.push(Kind { over: vec![first.name.to_owned()], ..kind });
+        let columns = orders.clone().map(|k| on_all(&|row| share(row) * cosine(k, first.place[row]))).collect();
+        let waves: Vec<Wave> = orders.map(Wave::of).collect();
+        let of_effect = effect(vec![first.name], OfBasis::Waves(vec![waves.len()]));
+        let kind = smooth("conditions", columns, &waves);
+        kinds.push(Kind { over: vec![first.name.to_owned()], effect: of_effect, ..kind });
         for second in &conditions[index + 1..] {
             checkpoint(monitor)?;
             let of_each = |condition: &Condition| 0..=PAIR_ORDERS.min(condition.levels - 1);
             let both: Vec<(usize, usize)> = of_each(first).flat_map(|j| of_each(second).map(move |k| (j, k))).collect();
-            let product =
-                |&(j, k): &(usize, usize)| on_all(&|row| cosine(j, first.place[row]) * cosine(k, second.place[row]));
+            let product = |&(j, k): &(usize, usize)| {
+                on_all(&|row| share(row) * cosine(j, first.place[row]) * cosine(k, second.place[row]))
+            };
             let waves: Vec<Wave> = both.iter().map(|&(j, k)| Wave::of(j).times(Wave::of(k))).collect();
+            let counts = [first, second].map(|condition| of_each(condition).count());
+            let of_effect = effect(vec![first.name, second.name], OfBasis::Waves(counts.to_vec()));
             let kind = smooth("pair_of_conditions", both.iter().map(product).collect(), &waves);
+            let over = vec![first.name.to_owned(), second.name.to_owned()];
             // Its waves run in two directions: there is no order by which they could be drawn.
-            kinds.push(Kind { over: vec![first.name.to_owned(), second.name.to_owned()], orders: None, ..kind });
+            kinds.push(Kind { over, orders: None, effect: of_effect, ..kind });
         }
     }
     Ok(kinds)
@@ -225,23 +258,37 @@ impl Kind {
                 None => Form::whole(white()),
             },
         };
-        Self { name, over: Vec::new(), columns, orders: None, per_unit: None, form, spreads }
+        Self { name, over: Vec::new(), columns, orders: None, effect: None, form, spreads }
     }
 }
 
 impl Form {
     fn whole(white: Vec<White>) -> Self {
-        let count = white.len();
-        let mut gram = DMatrix::zeros(count, count);
-        for i in 0..count {
-            for j in 0..=i {
-                let product = white[i].inner(&white[j]);
-                gram[(i, j)] = product;
-                gram[(j, i)] = product;
-            }
-        }
+        let (white, gram) = inner_products(white);
         Self::Whole { white, gram }
     }
+}
+
+fn inner_products(white: Vec<White>) -> (Vec<White>, DMatrix<f64>) {
+    let count = white.len();
+    let mut gram = DMatrix::zeros(count, count);
+    for i in 0..count {
+        for j in 0..=i {
+            let product = white[i].inner(&white[j]);
+            gram[(i, j)] = product;
+            gram[(j, i)] = product;
+        }
+    }
+    (white, gram)
+}
+
+/// The conditions that groups are pairs of values of, those that differ, where an effect can hold all pairs.
+fn varying(grouping: &Grouping, conditions: &[Condition], groups: usize) -> Option<Vec<&'static str>> {
+    let of = |name: &&str| conditions.iter().find(|condition| condition.name == *name);
+    let known: Vec<&Condition> = grouping.conditions.iter().filter_map(of).collect();
+    let places: usize = known.iter().map(|condition| condition.levels).product();
+    let fits = !known.is_empty() && places <= MOST_PLACES && groups <= MOST_LEVELS;
+    fits.then(|| known.iter().map(|condition| condition.name).collect())
 }
 
 /// A set of causes with a remainder of any kind beside it.
@@ -284,8 +331,8 @@ pub(super) fn beside(
     let log_z = log_mean_exp(&named.iter().map(|(_, of_name)| log_mean_exp(of_name)).collect::<Vec<_>>());
     Ok(best.map(|(_, remainder)| {
         let kind = &kinds[remainder.kind];
-        let is_term = kind.per_unit.is_some();
-        let directions = if is_term { kind.directions(&remainder, columns, &own) } else { Vec::new() };
+        let is_term = kind.effect.is_some();
+        let directions = if is_term { kind.directions(&remainder, columns, (&own, likelihood)) } else { Vec::new() };
         Remainder { log_z, directions, ..remainder }
     }))
 }
@@ -328,8 +375,22 @@ impl Kind {
     /// Independent directions of one standard deviation each of what the rows leave open of causes and remainder: with
     /// A = S G S + I, S the prior standard deviations and G the inner products, those of the eigenvectors of S G S. What rows
     /// do not see is left out: there the prior alone speaks.
-    fn directions(&self, remainder: &Remainder, columns: &[&White], own: &Normal) -> Vec<Vec<f64>> {
-        let Form::Whole { white, gram } = &self.form else { return Vec::new() };
+    fn directions(
+        &self,
+        remainder: &Remainder,
+        columns: &[&White],
+        (own, likelihood): (&Normal, &Likelihood),
+    ) -> Vec<Vec<f64>> {
+        let of_levels;
+        let (white, gram) = match &self.form {
+            Form::Whole { white, gram } => (white, gram),
+            Form::Blocks(_) => {
+                of_levels = inner_products(self.columns.iter().map(|c| likelihood.white(&c.dense())).collect());
+                (&of_levels.0, &of_levels.1)
+            }
+            // The extended model of classes holds no remainder.
+            Form::Classes(_) => return Vec::new(),
+        };
         let all = joined_gram(white, gram, own, columns);
         let scale: Vec<f64> =
             std::iter::repeat_n(1.0, columns.len()).chain(remainder.prior_sd.iter().copied()).collect();
@@ -443,7 +504,7 @@ mod tests {
     use super::super::noise::{Noise, NoiseSource};
     use super::super::whiten::Whitener;
     use super::*;
-    use crate::calculator::{Design, Grouping, Message, Unwatched};
+    use crate::calculator::{Design, Message, Unwatched};
 
     const RUNS: usize = 4;
     const ROWS: usize = 13 * RUNS;
@@ -466,6 +527,7 @@ mod tests {
             groupings: vec![Grouping {
                 name: "third",
                 over: Vec::new(),
+                conditions: Vec::new(),
                 group: (0..ROWS).map(|row| row % 3).collect(),
             }],
             conditions: Vec::new(),
@@ -547,7 +609,7 @@ mod tests {
                     over: Vec::new(),
                     columns: columns(),
                     orders: None,
-                    per_unit: None,
+                    effect: None,
                     form,
                     spreads,
                 };

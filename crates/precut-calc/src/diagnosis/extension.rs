@@ -79,7 +79,7 @@ impl<'a> Extension<'a> {
         let Some(&(_, likeliest)) = parts.first() else { return Ok(Self::none()) };
         if parts.len() > 1 {
             let hypotheses = weighing.foundation.subject.hypotheses();
-            let believed = Belief { settings: average(hypotheses, &parts), waves: None };
+            let believed = Belief { settings: average(hypotheses, &parts), form: None };
             let average = Self { kind: ExtensionKind::Average, believed, parts, term: None };
             if average.predicts_as_its_parts(weighing)? {
                 return Ok(average);
@@ -131,7 +131,7 @@ impl<'a> Extension<'a> {
                 let moved = direction.of_settings.into_iter().filter_map(|((member, variable), by)| {
                     Some(((place(set.settings[member].hypothesis)?, variable), root * by))
                 });
-                all.push(Direction { of_settings: moved.collect(), of_waves: Vec::new() });
+                all.push(Direction { of_settings: moved.collect(), of_form: Vec::new() });
             }
             if self.parts.len() > 1 {
                 all.push(self.off_average(hypotheses, set, root));

@@ -98,8 +98,8 @@ pub(super) fn has_parameter(effect: &impl Serialize, parameter: &str) -> bool {
 pub(super) struct Direction {
     /// How far it moves values of settings, each by its setting and its variable.
     pub(super) of_settings: Vec<((usize, usize), f64)>,
-    /// How far it moves the sizes of waves; empty where it moves none.
-    pub(super) of_waves: Vec<f64>,
+    /// How far it moves the sizes of what has no name; empty where it moves none.
+    pub(super) of_form: Vec<f64>,
 }
 
 impl Direction {
@@ -109,8 +109,8 @@ impl Direction {
         for ((member, variable), by) in &self.of_settings {
             moved.settings[*member].values[*variable] += deviations * by;
         }
-        if let Some(waves) = &mut moved.waves {
-            waves.sizes.iter_mut().zip(&self.of_waves).for_each(|(size, by)| *size += deviations * by);
+        if let Some(form) = &mut moved.form {
+            form.sizes.iter_mut().zip(&self.of_form).for_each(|(size, by)| *size += deviations * by);
         }
         moved
     }
@@ -202,6 +202,6 @@ pub(super) fn directions(weighing: &Weighing<'_>, set: &SetWeight) -> Vec<Direct
     let covariance = DMatrix::from_fn(free.len(), free.len(), |i, j| correlation(i, j) * deviation(i) * deviation(j));
     let alone = || DMatrix::from_fn(free.len(), free.len(), |i, j| if i == j { deviation(i) } else { 0.0 });
     let columns = Cholesky::new(covariance).map_or_else(alone, Cholesky::unpack);
-    let direction = |of_settings| Direction { of_settings, of_waves: Vec::new() };
+    let direction = |of_settings| Direction { of_settings, of_form: Vec::new() };
     columns.column_iter().map(|column| direction(free.iter().copied().zip(column.iter().copied()).collect())).collect()
 }

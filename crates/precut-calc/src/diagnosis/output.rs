@@ -408,8 +408,9 @@ pub struct RemainderReport {
     /// Amplitude of every order, in the unit of the quantity; of several runs the root mean square.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub amplitudes: Vec<f64>,
-    /// Between which places it was measured, where rows have one place each: beyond them it is not known.
-    pub known_between: Option<PlaceRange>,
+    /// Where the extended model holds it as a term: from where to where it is known, over what it goes with; beyond, the model
+    /// takes it as at the ends.
+    pub known_between: Vec<PlaceRange>,
     /// Share of the mean square left by the named part that it explains.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub explained_share: f64,
@@ -427,12 +428,14 @@ pub struct RemainderReport {
 /// From where to where something is known.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct PlaceRange {
-    /// Field of a row that says where.
+    /// Field of a row that says where: a place, or a condition.
     pub field: String,
-    /// Least place, in the unit of the field.
+    /// Unit of the field.
+    pub unit: String,
+    /// Least value, in that unit.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub from: f64,
-    /// Largest place.
+    /// Largest value.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub to: f64,
 }

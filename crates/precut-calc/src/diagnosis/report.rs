@@ -25,8 +25,8 @@ use super::subject::{Setting, Subject};
 use super::view::View;
 use super::weigh::{Effort, Verdict, Weighing};
 use crate::calculator::{
-    Answer, Diagnosable, Failure, Hypothesis, Inapplicability, Measurement, Message, Monitor, Prediction, Quantity,
-    Rows, Smooth, Value,
+    Answer, Diagnosable, Failure, Hypothesis, Inapplicability, KnownOver, Measurement, Message, Monitor, Prediction,
+    Quantity, Smooth, Value,
 };
 
 /// Probability of nothing from which on an adequate base leaves no reason to look for blunders.
@@ -88,6 +88,7 @@ pub(super) fn answer<M: Diagnosable>(
     let extension = if refusal.is_none() { Extension::of(&weighing, leading, tried)? } else { Extension::none() };
     let believed = &extension.believed;
     let effects = bound.effects_of(believed)?;
+    let term = effects.last().filter(|_| extension.kind == ExtensionKind::Remainder);
     let is_extended = extension.kind != ExtensionKind::None;
     let extended = Extended {
         prediction: is_extended.then(|| bound.believing(believed)).transpose()?,
@@ -127,7 +128,7 @@ pub(super) fn answer<M: Diagnosable>(
         separations,
         signatures,
         profiles: view.profiles(),
-        remainder: unnamed_remainder::<M>(&weighing, (places, used)),
+        remainder: unnamed_remainder::<M>(&weighing, term, used),
         recognised: if refusal.is_none() { recognised(&weighing)? } else { None },
         extension: extension.kind,
         effects,
@@ -233,33 +234,38 @@ struct Extended {
 /// What is left without a name, where the verdict is that something is.
 fn unnamed_remainder<M: Diagnosable>(
     weighing: &Weighing<'_>,
-    (places, used): (&Rows<M::Run, M::Point>, &[usize]),
+    term: Option<&M::Effect>,
+    used: &[usize],
 ) -> Option<RemainderReport> {
     let shape = matches!(weighing.verdict, Verdict::Unknown(_)).then(|| remainder_shape(weighing)).flatten()?;
-    let kept = places.points.iter().zip(&weighing.keep).filter(|(_, keep)| **keep);
-    let at: Vec<(&'static str, f64)> = kept
-        .filter_map(|((_, point), _)| M::place(point).first().and_then(|(field, z)| Some((*field, (*z)?))))
-        .collect();
-    let known_between = at.first().map(|(field, first)| PlaceRange {
-        field: (*field).to_owned(),
-        from: at.iter().fold(*first, |least, (_, z)| least.min(*z)),
-        to: at.iter().fold(*first, |most, (_, z)| most.max(*z)),
-    });
+    let range = |known: KnownOver| PlaceRange {
+        field: known.field.to_owned(),
+        unit: known.unit.to_owned(),
+        from: known.from,
+        to: known.to,
+    };
+    let known_between = term.map_or_else(Vec::new, M::known_over).into_iter().map(range).collect();
     Some(RemainderReport { known_between, ..remainder_report(shape, used) })
 }
 
 /// Whether rows show a remainder that the base holds: without it they would lie farther from the base than scatter and
 /// allowances explain.
 fn recognised(weighing: &Weighing<'_>) -> Result<Option<RecognisedReport>, Failure> {
-    let foundation = weighing.foundation;
-    let subject = foundation.subject;
-    let held = subject.hypotheses().iter().enumerate().find_map(|(hypothesis, own)| {
+    let subject = weighing.foundation.subject;
+    let held = subject.hypotheses().iter().enumerate().filter_map(|(hypothesis, own)| {
         let held = own.held.as_ref().filter(|_| own.cause.kind == REMAINDER)?;
         let gone = Setting { hypothesis, values: held.values.iter().map(|value| -value).collect() };
-        Some((own.label.clone(), gone))
+        Some((own.label.as_str(), gone))
     });
-    let Some((label, gone)) = held else { return Ok(None) };
-    let without = subject.predict(&[gone])?;
+    let each = held.map(|(label, gone)| shown_again(weighing, label, gone)).collect::<Result<Vec<_>, Failure>>()?;
+    // Of several the one that shows most.
+    Ok(each.into_iter().flatten().max_by(|a, b| a.sigmas.total_cmp(&b.sigmas)))
+}
+
+/// The same of one of them, `gone` being what takes it away.
+fn shown_again(weighing: &Weighing<'_>, label: &str, gone: Setting) -> Result<Option<RecognisedReport>, Failure> {
+    let foundation = weighing.foundation;
+    let without = foundation.subject.predict(&[gone])?;
     let left: Vec<f64> = without
         .iter()
         .zip(&foundation.data.value)
@@ -278,7 +284,7 @@ fn recognised(weighing: &Weighing<'_>) -> Result<Option<RecognisedReport>, Failu
     };
     let sigmas = (misfit(&left) - misfit(&foundation.residual)).max(0.0).sqrt();
     Ok((sigmas > CONFOUNDED_BELOW).then(|| RecognisedReport {
-        label,
+        label: label.to_owned(),
         error_without: rms(&left),
         error_with: rms(&foundation.residual),
         sigmas,
@@ -296,7 +302,7 @@ fn remainder_report(shape: RemainderShape, used: &[usize]) -> RemainderReport {
         kind: shape.kind.to_owned(),
         over: shape.over,
         rms: shape.rms,
-        known_between: None,
+        known_between: Vec::new(),
         largest_at_row: row_number(used[shape.extreme_row]),
         value: shape.value,
         standard_deviation: shape.deviation,

@@ -8,7 +8,7 @@ use super::identify::{COLLINEAR_ABOVE, CONFOUNDED_BELOW};
 use super::input::DiagnosisOptions;
 use super::noise::{NoiseSource, is_finer_structure};
 use super::outlier::Outliers;
-use super::output::{CauseReport, DiagnosisResult, NamedCause, Refusal, SetReport, VerdictClass};
+use super::output::{CauseReport, DiagnosisResult, NamedCause, PlaceRange, Refusal, SetReport, VerdictClass};
 use super::refuse::{most_causes, rows_for};
 use super::suspect::swapped_columns;
 use super::weigh::{ALARM, UNNAMED, UNNAMED_MATTERS, Weighing};
@@ -329,17 +329,15 @@ fn extended<E: utoipa::ToSchema, R: utoipa::ToSchema>(
     let known = output.remainder.as_ref().filter(|_| output.extension == ExtensionKind::Remainder);
     let deviations = known.map_or(&[][..], |remainder| remainder.standard_deviation.as_slice());
     let square = deviations.iter().map(|deviation| deviation * deviation).sum::<f64>();
-    let between = known.and_then(|remainder| remainder.known_between.as_ref());
+    let between = known.map_or(&[][..], |remainder| remainder.known_between.as_slice());
+    let numbers = |of: fn(&PlaceRange) -> f64| between.iter().map(of).collect::<Vec<_>>();
     Some(
         said.with("band", (square / deviations.len().max(1) as f64).sqrt())
             .with("unit", if quantity.logarithmic { "" } else { quantity.unit })
-            .with("place", between.map_or_else(String::new, |between| between.field.clone()))
-            .with(
-                "unit_of_place",
-                between.map_or("", |between| between.field.rsplit('_').next().unwrap_or("")).to_owned(),
-            )
-            .with("from", between.map_or(0.0, |between| between.from))
-            .with("to", between.map_or(0.0, |between| between.to)),
+            .with("places", between.iter().map(|range| range.field.clone()).collect::<Vec<_>>())
+            .with("units", between.iter().map(|range| range.unit.clone()).collect::<Vec<_>>())
+            .with("from", numbers(|range| range.from))
+            .with("to", numbers(|range| range.to)),
     )
 }
 

@@ -1,6 +1,7 @@
 //! What a diagnosis sees of a base model: hypotheses that can be switched on, and predictions with them.
 
-use crate::calculator::{Expansions, Failure, Hypothesis, JacobianColumn, Prediction};
+use super::basis::cosine;
+use crate::calculator::{Expansions, Failure, Hypothesis, JacobianColumn, Over, Prediction};
 
 /// A base model under measured rows.
 pub trait Subject: Sync {
@@ -49,23 +50,57 @@ pub(super) struct Belief {
     /// Causes with their values.
     pub(super) settings: Vec<Setting>,
     /// What has no name.
-    pub(super) waves: Option<Waves>,
+    pub(super) form: Option<Form>,
 }
 
-/// Half waves over the length of a part, by ascending order from 0.
+/// Something without a name over what it goes with.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Waves {
-    /// Between which places they are known, shares of the length.
-    pub(super) ends: [f64; 2],
-    /// Their sizes, in the unit of the effect that stands for them.
+pub(super) struct Form {
+    /// What it goes with, and where it is given.
+    pub(super) over: Vec<Over>,
+    /// What its sizes are of.
+    pub(super) basis: Basis,
+    /// In the unit of the effect that stands for it.
     pub(super) sizes: Vec<f64>,
-    /// At so many places they are given well enough.
-    pub(super) places: usize,
+}
+
+/// What sizes are of.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Basis {
+    /// Products of half waves over the range of each axis: so many orders of each from 0, those of the last first.
+    Waves(Vec<usize>),
+    /// Levels: which of the sizes at which place, those of the last axis first; none where nothing was measured.
+    Levels(Vec<Option<usize>>),
+}
+
+impl Form {
+    /// The size at a place of every axis; of levels at the nearest one.
+    pub(super) fn at(&self, place: &[f64]) -> f64 {
+        match &self.basis {
+            Basis::Waves(orders) => {
+                let wave = |index: usize| (0..orders.len()).map(move |k| cosine(digit(index, orders, k), place[k]));
+                self.sizes.iter().enumerate().map(|(index, size)| size * wave(index).product::<f64>()).sum()
+            }
+            Basis::Levels(sizes) => {
+                let index = self.over.iter().zip(place).fold(0, |index, (axis, place)| {
+                    let near = |k: &usize| (axis.at[*k] - place).abs();
+                    let own = (0..axis.at.len()).min_by(|a, b| near(a).total_cmp(&near(b)));
+                    index * axis.at.len() + own.unwrap_or(0)
+                });
+                sizes[index].map_or(0.0, |size| self.sizes[size])
+            }
+        }
+    }
+}
+
+/// The digit of an axis in a number that counts through all axes, the last one first.
+pub(super) fn digit(index: usize, counts: &[usize], axis: usize) -> usize {
+    index / counts[axis + 1..].iter().product::<usize>() % counts[axis]
 }
 
 impl Belief {
     /// Causes alone.
     pub(super) fn of(settings: &[Setting]) -> Self {
-        Self { settings: settings.to_vec(), waves: None }
+        Self { settings: settings.to_vec(), form: None }
     }
 }

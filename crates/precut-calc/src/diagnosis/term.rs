@@ -1,18 +1,21 @@
 //! What no cause explains as a term of the extended model, where the model has an effect for it (`diagnosis/3.8`).
 
-use super::basis::cosine;
-use super::discrepancy::{Kind, Remainder};
+use super::discrepancy::{Kind, OfBasis, OfEffect, Remainder};
 use super::known::Direction;
-use super::subject::{Belief, Waves};
+use super::subject::{Basis, Belief, Form, digit};
 use super::weigh::{SetWeight, UNNAMED, Verdict, Weighing};
-use crate::calculator::{Failure, Smooth};
+use crate::calculator::{Design, Failure, Over, Smooth};
+use crate::num::table::straight;
 
-/// Places between which the term is straight: the fewest of these ...
+/// Places between which the term is straight, along a part or over a condition: the fewest of these ...
 const PLACES: [usize; 4] = [9, 17, 33, 65];
+/// ... and over each of two conditions ...
+const PLACES_OF_EACH: [usize; 4] = [5, 7, 9, 11];
 /// ... that miss it by less than this share of the scatter, root mean square.
 const MISSED: f64 = 0.05;
-/// Places at which that is looked at, evenly.
+/// Places at which that is looked at, evenly; of each of two conditions.
 const LOOKED_AT: usize = 260;
+const LOOKED_AT_OF_EACH: usize = 40;
 
 /// A set of causes with a remainder that the model has an effect for, beside what `kind` makes of the rows.
 pub(super) struct Term<'a> {
@@ -20,8 +23,7 @@ pub(super) struct Term<'a> {
     pub(super) set: &'a SetWeight,
     remainder: &'a Remainder,
     kind: &'a Kind,
-    /// What one unit of the effect does to the rows.
-    per_unit: f64,
+    effect: &'a OfEffect,
 }
 
 impl<'a> Term<'a> {
@@ -35,8 +37,8 @@ impl<'a> Term<'a> {
         let kind = &weighing.kinds[remainder.kind];
         // What a set leaves open beside it is known of its fit.
         let is_fitted = set.members.is_empty() || weighing.fit(&set.members).is_some();
-        let per_unit = kind.per_unit.filter(|_| is_fitted)?;
-        Some(Self { weighing, set, remainder, kind, per_unit })
+        let effect = kind.effect.as_ref().filter(|_| is_fitted)?;
+        Some(Self { weighing, set, remainder, kind, effect })
     }
 
     /// What is predicted of every row, linear in the remainder.
@@ -53,30 +55,70 @@ impl<'a> Term<'a> {
 
     /// The causes beside it, and the remainder over the places that were measured.
     pub(super) fn belief(&self) -> Option<Belief> {
-        let Smooth::Along(place) = &self.weighing.foundation.data.layout.design.smooth else { return None };
-        let kept = || place.iter().zip(&self.weighing.keep).filter(|(_, keep)| **keep).map(|(u, _)| *u);
-        let ends = [kept().fold(1.0, f64::min), kept().fold(0.0, f64::max)];
-        let sizes = self.remainder.amplitudes.iter().map(|amplitude| amplitude / self.per_unit).collect();
-        let mut waves = Waves { ends, sizes, places: 2 };
-        if ends[1] <= ends[0] {
-            return None;
+        let sizes = self.remainder.amplitudes.iter().map(|amplitude| amplitude / self.effect.per_unit).collect();
+        let form = match &self.effect.basis {
+            OfBasis::Waves(orders) => self.of_waves(orders, sizes)?,
+            OfBasis::Levels(group) => self.of_levels(group, sizes)?,
+        };
+        Some(Belief { settings: self.set.settings.clone(), form: Some(form) })
+    }
+
+    fn of_waves(&self, orders: &[usize], sizes: Vec<f64>) -> Option<Form> {
+        let design = &self.weighing.foundation.data.layout.design;
+        let mut ends = Vec::with_capacity(orders.len());
+        for &name in &self.effect.over {
+            let place = places(design, name)?;
+            let kept = || place.iter().zip(&self.weighing.keep).filter(|(_, keep)| **keep).map(|(u, _)| *u);
+            let (from, to) = (kept().fold(1.0, f64::min), kept().fold(0.0, f64::max));
+            ends.push((name, from, to));
+            if to <= from {
+                return None;
+            }
         }
-        let least = MISSED * self.weighing.noise.sigma / self.per_unit.abs();
-        waves.places = PLACES.into_iter().find(|&places| missed(&waves, places) < least).unwrap_or(PLACES[3]);
-        Some(Belief { settings: self.set.settings.clone(), waves: Some(waves) })
+        let over = |places: usize| -> Vec<Over> {
+            let at = |from: f64, to: f64| even(places).map(|share| from + (to - from) * share).collect();
+            ends.iter().map(|&(name, from, to)| Over { name, at: at(from, to) }).collect()
+        };
+        let tried = if ends.len() == 1 { PLACES } else { PLACES_OF_EACH };
+        let mut form = Form { over: over(tried[3]), basis: Basis::Waves(orders.to_vec()), sizes };
+        let least = MISSED * self.weighing.noise.sigma / self.effect.per_unit.abs();
+        for places in tried {
+            form.over = over(places);
+            if missed(&form) < least {
+                break;
+            }
+        }
+        Some(form)
+    }
+
+    fn of_levels(&self, group: &[usize], sizes: Vec<f64>) -> Option<Form> {
+        let (design, keep) = (&self.weighing.foundation.data.layout.design, &self.weighing.keep);
+        let conditions = self.effect.over.iter().map(|name| design.conditions.iter().find(|own| own.name == *name));
+        let conditions = conditions.collect::<Option<Vec<_>>>()?;
+        let over = conditions.iter().map(|own| Over { name: own.name, at: own.values(|row| keep[row]) });
+        let over: Vec<Over> = over.collect();
+        let mut levels = vec![None; over.iter().map(|axis| axis.at.len()).product()];
+        for row in (0..keep.len()).filter(|&row| keep[row]) {
+            let index = over.iter().zip(&conditions).fold(0, |index, (axis, own)| {
+                // The place of a value is the last that is not above it.
+                index * axis.at.len() + axis.at.partition_point(|at| *at <= own.place[row]).saturating_sub(1)
+            });
+            levels[index] = Some(group[row]);
+        }
+        Some(Form { over, basis: Basis::Levels(levels), sizes })
     }
 
     /// Independent directions of one standard deviation each of what the rows leave open of [`Self::belief`].
     pub(super) fn directions(&self) -> Vec<Direction> {
         let fit = self.weighing.fit(&self.set.members);
         let of = |direction: &Vec<f64>| {
-            let (of_causes, of_waves) = direction.split_at(self.remainder.of_causes.len());
+            let (of_causes, of_form) = direction.split_at(self.remainder.of_causes.len());
             let of_settings = fit.map_or_else(Vec::new, |fit| {
                 let value = |(member, variable): (usize, usize)| self.set.settings[member].values[variable];
                 let free = fit.free.iter().zip(&fit.coordinates).zip(of_causes);
                 free.map(|((place, coordinate), t)| (*place, t * coordinate.slope(value(*place)))).collect()
             });
-            Direction { of_settings, of_waves: of_waves.iter().map(|size| size / self.per_unit).collect() }
+            Direction { of_settings, of_form: of_form.iter().map(|size| size / self.effect.per_unit).collect() }
         };
         self.remainder.directions.iter().map(of).collect()
     }
@@ -107,24 +149,37 @@ impl<'a> Term<'a> {
     }
 }
 
-/// By how much the waves are missed by straight lines between so many places, root mean square.
-fn missed(waves: &Waves, places: usize) -> f64 {
-    let [from, to] = waves.ends;
-    let place = |share: f64| from + (to - from) * share;
-    let at: Vec<f64> = (0..places).map(|k| waves.at(place(k as f64 / (places - 1) as f64))).collect();
-    let squares = (0..=LOOKED_AT).map(|k| {
-        let share = k as f64 / LOOKED_AT as f64;
-        let along = share * (places - 1) as f64;
-        let before = (0..places - 1).rev().find(|&k| k as f64 <= along).unwrap_or(0);
-        let straight = at[before] + (along - before as f64) * (at[before + 1] - at[before]);
-        (waves.at(place(share)) - straight).powi(2)
-    });
-    (squares.sum::<f64>() / (LOOKED_AT + 1) as f64).sqrt()
+/// Where every row stands in what something goes with.
+fn places<'a>(design: &'a Design, name: &str) -> Option<&'a [f64]> {
+    match &design.smooth {
+        Smooth::Along(place) if name == Over::ALONG => Some(place),
+        _ => design.conditions.iter().find(|own| own.name == name).map(|own| own.place.as_slice()),
+    }
 }
 
-impl Waves {
-    /// The size at a place, a share of the length.
-    pub(super) fn at(&self, place: f64) -> f64 {
-        self.sizes.iter().enumerate().map(|(order, size)| size * cosine(order, place)).sum()
-    }
+/// So many shares from 0 to 1.
+fn even(count: usize) -> impl Iterator<Item = f64> {
+    (0..count).map(move |k| k as f64 / (count - 1) as f64)
+}
+
+/// By how much straight lines between the places of its axes miss it, root mean square.
+fn missed(form: &Form) -> f64 {
+    let axes = &form.over;
+    let counts: Vec<usize> = axes.iter().map(|axis| axis.at.len()).collect();
+    let at_places = (0..counts.iter().product()).map(|index| {
+        let place: Vec<f64> = axes.iter().enumerate().map(|(k, axis)| axis.at[digit(index, &counts, k)]).collect();
+        form.at(&place)
+    });
+    let values: Vec<f64> = at_places.collect();
+    let looked_at = vec![1 + if axes.len() == 1 { LOOKED_AT } else { LOOKED_AT_OF_EACH }; axes.len()];
+    let count: usize = looked_at.iter().product();
+    let squares = (0..count).map(|index| {
+        let share = |k: usize| digit(index, &looked_at, k) as f64 / (looked_at[k] - 1) as f64;
+        let at = |k: usize, axis: &Over| axis.at[0] + (axis.at[axis.at.len() - 1] - axis.at[0]) * share(k);
+        let place: Vec<f64> = axes.iter().enumerate().map(|(k, axis)| at(k, axis)).collect();
+        let asked = |k: usize| axes.get(k).map(|axis| (axis.at.as_slice(), place[k]));
+        let between = asked(0).map_or(0.0, |first| straight(first, asked(1), &values).value);
+        (form.at(&place) - between).powi(2)
+    });
+    (squares.sum::<f64>() / count as f64).sqrt()
 }

@@ -186,7 +186,7 @@ pub enum DeflectionEffect {
         #[schema(max_length = 64, example = "guideway of lathe 7")]
         name: String,
         /// How much of it acts: 1 as it was found.
-        #[serde(default = "as_found")]
+        #[serde(default = "super::as_found")]
         #[schema(minimum = -10.0, maximum = 10.0, default = 1.0, example = 1.0, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("s"))))]
         scale: f64,
         /// Radial error along the shaft, by ascending places.
@@ -205,10 +205,6 @@ pub struct ErrorPoint {
     /// Radial error there, positive = oversize.
     #[schema(minimum = -1000.0, maximum = 1000.0, example = 3.5, extensions(("x-unit" = json!("um")), ("x-symbol" = json!("r"))))]
     pub error_um: f64,
-}
-
-fn as_found() -> f64 {
-    1.0
 }
 
 fn wear_in_path_m() -> f64 {

@@ -6,6 +6,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::expression::Expression;
 use super::{Cause, Fit, Parameter};
 
 /// A named physical effect on an output of the cut.
@@ -308,6 +309,102 @@ pub enum MachinabilityEffect {
         #[schema(max_length = 64, example = "roughness")]
         output: Option<String>,
     },
+    /// What no cause explains, as a diagnosis found it over one or two conditions of the cut: L += s r, straight between the
+    /// places (of speed, feed and depth in their logarithms), beyond them as at the ends.
+    Remainder {
+        /// What the user calls it.
+        #[serde(default, skip_serializing_if = "String::is_empty")]
+        #[schema(max_length = 64, example = "island of lathe 7")]
+        name: String,
+        /// How much of it acts: 1 as it was found.
+        #[serde(default = "super::as_found")]
+        #[schema(minimum = -10.0, maximum = 10.0, default = 1.0, example = 1.0, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("s"))))]
+        scale: f64,
+        /// Its places: each states the same one or two conditions; ascending by the first of them, then by the second, each value
+        /// of one with each of the other.
+        #[schema(min_items = 2, max_items = 128)]
+        profile: Vec<RemainderPoint>,
+        /// Output of `models` that it acts on; may be left out where only one can be meant.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schema(max_length = 64, example = "roughness")]
+        output: Option<String>,
+    },
+    /// A formula of the user over the conditions of the cut: L += its value.
+    Formula {
+        /// What the user calls it.
+        #[serde(default, skip_serializing_if = "String::is_empty")]
+        #[schema(max_length = 64, example = "island of lathe 7")]
+        name: String,
+        /// Numbers, conditions of the cut by their fields, `k1`, `k2`, `k3`; + - * / ^ ( ), exp, ln, sqrt, abs, sin, cos, tanh, min, max. A
+        /// unit stands in square brackets behind its number; the value has none.
+        #[schema(value_type = String, min_length = 1, max_length = 256, example = "k1*ln(speed_m_per_min/60[m/min])^2")]
+        expression: Expression,
+        /// Its number `k1`.
+        #[serde(default)]
+        #[schema(minimum = -1e6, maximum = 1e6, default = 0.0, example = 0.1, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("k1"))))]
+        k1: f64,
+        /// How far it may lie from that before anything is measured, one standard deviation: a diagnosis fits it. 0: it is as stated.
+        #[serde(default)]
+        #[schema(minimum = 0.0, maximum = 1e6, default = 0.0, example = 0.2, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("s_k1"))))]
+        k1_deviation: f64,
+        /// Its number `k2`.
+        #[serde(default)]
+        #[schema(minimum = -1e6, maximum = 1e6, default = 0.0, example = 0.1, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("k2"))))]
+        k2: f64,
+        /// How far it may lie from that before anything is measured, one standard deviation: a diagnosis fits it. 0: it is as stated.
+        #[serde(default)]
+        #[schema(minimum = 0.0, maximum = 1e6, default = 0.0, example = 0.2, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("s_k2"))))]
+        k2_deviation: f64,
+        /// Its number `k3`.
+        #[serde(default)]
+        #[schema(minimum = -1e6, maximum = 1e6, default = 0.0, example = 0.1, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("k3"))))]
+        k3: f64,
+        /// How far it may lie from that before anything is measured, one standard deviation: a diagnosis fits it. 0: it is as stated.
+        #[serde(default)]
+        #[schema(minimum = 0.0, maximum = 1e6, default = 0.0, example = 0.2, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("s_k3"))))]
+        k3_deviation: f64,
+        /// Output of `models` that it acts on; may be left out where only one can be meant.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schema(max_length = 64, example = "roughness")]
+        output: Option<String>,
+    },
+}
+
+/// What is added where a cut has these conditions.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RemainderPoint {
+    /// Cutting speed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-2, maximum = 20_000.0, example = 60.0, extensions(("x-unit" = json!("m/min")), ("x-symbol" = json!("V"))))]
+    pub speed_m_per_min: Option<f64>,
+    /// Feed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-4, maximum = 20.0, example = 0.2, extensions(("x-unit" = json!("mm/rev")), ("x-symbol" = json!("S"))))]
+    pub feed_mm_per_rev: Option<f64>,
+    /// Depth of cut.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-4, maximum = 1000.0, example = 0.5, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("t"))))]
+    pub depth_mm: Option<f64>,
+    /// Major cutting edge angle.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1.0, maximum = 179.0, example = 75.0, extensions(("x-unit" = json!("deg")), ("x-symbol" = json!("phi"))))]
+    pub cutting_edge_angle_deg: Option<f64>,
+    /// Nose radius of the insert.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.01, maximum = 100.0, example = 0.8, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("r"))))]
+    pub nose_radius_mm: Option<f64>,
+    /// Flank wear of the edge.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.0, maximum = 10.0, example = 0.2, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("VB"))))]
+    pub flank_wear_mm: Option<f64>,
+    /// Time that the edge had been in the cut.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.0, maximum = 1e6, example = 5.0, extensions(("x-unit" = json!("min")), ("x-symbol" = json!("T"))))]
+    pub time_min: Option<f64>,
+    /// What is added: to the logarithm of the output, or to the output itself where its model is `semi_log`.
+    #[schema(minimum = -1000.0, maximum = 1000.0, example = 0.1, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("b"))))]
+    pub delta_ln: f64,
 }
 
 impl MachinabilityEffect {
@@ -343,7 +440,9 @@ impl MachinabilityEffect {
             | Self::EdgeForceOffset { output, .. }
             | Self::WearMultiplicative { output, .. }
             | Self::WearForceAdditive { output, .. }
-            | Self::WearIn { output, .. } => output.as_deref(),
+            | Self::WearIn { output, .. }
+            | Self::Remainder { output, .. }
+            | Self::Formula { output, .. } => output.as_deref(),
         }
     }
 
@@ -369,7 +468,9 @@ impl MachinabilityEffect {
             | Self::EdgeForceOffset { output, .. }
             | Self::WearMultiplicative { output, .. }
             | Self::WearForceAdditive { output, .. }
-            | Self::WearIn { output, .. } => *output = name,
+            | Self::WearIn { output, .. }
+            | Self::Remainder { output, .. }
+            | Self::Formula { output, .. } => *output = name,
         }
     }
 
@@ -396,11 +497,14 @@ impl MachinabilityEffect {
             Self::WearMultiplicative { .. } => 17,
             Self::WearForceAdditive { .. } => 18,
             Self::WearIn { .. } => 19,
+            Self::Remainder { .. } => 20,
+            Self::Formula { .. } => 21,
         }
     }
 
     /// The effect of a cause with the values of its parameters, in the order of the catalogue, on whatever output is
-    /// asked for. Effects on named levels have none: batch, factor and level are no numbers.
+    /// asked for. Effects on named levels have none, nor have a remainder and a formula: batch, factor, level, shape and
+    /// text are no numbers.
     pub fn from_parameters(cause: &Cause, values: &[f64]) -> Option<Self> {
         let output = None;
         Some(match (cause.kind, values) {
@@ -483,6 +587,10 @@ pub struct MachinabilityConditions {
     #[serde(default)]
     #[schema(max_items = 20)]
     pub factors: Vec<FactorLevel>,
+    /// Nose radius of the insert; needed by a `remainder` over it.
+    #[serde(default)]
+    #[schema(minimum = 0.01, maximum = 100.0, example = 0.8, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("r")), ("x-group" = json!("effects"))))]
+    pub nose_radius_mm: Option<f64>,
     /// Time that the edge has been in the cut; needed by `wear_in`.
     #[serde(default)]
     #[schema(minimum = 0.0, maximum = 1e6, example = 5.0, extensions(("x-unit" = json!("min")), ("x-symbol" = json!("T")), ("x-group" = json!("effects"))))]
@@ -525,6 +633,11 @@ const fn shape(
 
 const fn of_job(name: &'static str, unit: &'static str, lower: f64, upper: f64) -> Parameter {
     Parameter { name, unit, fit: Fit::OfJob, prior_sd: 0.0, lower, upper }
+}
+
+/// A number of a formula; the effect itself says how far it may lie from what is stated.
+const fn of_formula(name: &'static str) -> Parameter {
+    amplitude(name, "1", 1.0, -1e6, 1e6)
 }
 
 const REFERENCE_SPEED: Parameter = of_job("reference_speed_m_per_min", "m/min", 0.01, 20_000.0);
@@ -682,4 +795,6 @@ pub const CAUSES: &[Cause] = &[
         &["time_min"],
         &[],
     ),
+    cause("remainder", "diagnosis/5.21", &[amplitude("scale", "1", 1.0, -3.0, 3.0)], &[], &[]),
+    cause("formula", "diagnosis/5.22", &[of_formula("k1"), of_formula("k2"), of_formula("k3")], &[], &[]),
 ];

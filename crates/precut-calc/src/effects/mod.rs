@@ -5,15 +5,24 @@
 //! worded outside, under `cause.{kind}`.
 
 mod deflection;
+mod expression;
 mod fixture;
 mod machinability;
 mod ring;
 
 pub use deflection::{CAUSES as DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect, ErrorPoint};
+pub use expression::Expression;
 pub use fixture::{CAUSES as FIXTURE_CAUSES, FixtureConditions, FixtureEffect};
-pub use machinability::{CAUSES as MACHINABILITY_CAUSES, FactorLevel, MachinabilityConditions, MachinabilityEffect};
+pub use machinability::{
+    CAUSES as MACHINABILITY_CAUSES, FactorLevel, MachinabilityConditions, MachinabilityEffect, RemainderPoint,
+};
 pub(crate) use ring::whole;
 pub use ring::{CAUSES as RING_CAUSES, RingConditions, RingEffect};
+
+/// How much of a remainder acts as it was found.
+fn as_found() -> f64 {
+    1.0
+}
 
 /// An entry of the catalogue.
 #[derive(Debug, Clone, Copy, PartialEq)]

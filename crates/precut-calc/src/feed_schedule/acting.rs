@@ -3,7 +3,9 @@
 use crate::effects::{MachinabilityConditions, MachinabilityEffect as Effect};
 use crate::machinability::{MachinabilityModel, ModelForm};
 
+use super::formula::Written;
 use super::input::Reference;
+use super::remainder::{Stated, Table};
 
 /// Exponent with which the feed marks and the rest of the roughness are joined (`diagnosis/5.16`).
 const FLOOR_POWER: f64 = 8.0;
@@ -49,6 +51,10 @@ pub(super) struct ActingModel {
     offset: f64,
     /// Feed marks: ln of R at 1 mm/rev, acting with the square of the feed.
     floor: Option<f64>,
+    /// What no cause explains, where it goes with speed or feed.
+    tables: Vec<Table>,
+    /// What formulas of the user add, where they go with speed or feed.
+    formulas: Vec<Written>,
 }
 
 /// What an effect may turn about, with the job's reference behind it.
@@ -77,6 +83,8 @@ impl ActingModel {
             hump: None,
             offset: 0.0,
             floor: None,
+            tables: Vec::new(),
+            formulas: Vec::new(),
         };
         // A wear-in stands in place of the model: whatever else acts, acts on it.
         let (instead, beside): (Vec<&Effect>, Vec<&Effect>) =
@@ -106,6 +114,7 @@ impl ActingModel {
 
     fn add(&mut self, effect: &Effect, at: &MachinabilityConditions, r: &Reference, ln_t: f64, ln_phi: Option<f64>) {
         let wear = at.flank_wear_mm.unwrap_or(0.0);
+        let cut = Stated { depth_mm: ln_t.exp(), angle_deg: ln_phi.map(f64::exp), conditions: at };
         match effect {
             Effect::LevelShift { delta_ln, .. } => self.base.constant += delta_ln,
             Effect::BatchShift { batch, delta_ln, .. } => {
@@ -172,6 +181,22 @@ impl ActingModel {
                 let d = ln_t - about(*reference_depth_mm, r.depth_mm);
                 self.offset += n_per_mm * wear * (depth_power * d).exp();
             }
+            Effect::Remainder { scale, profile, .. } => {
+                if let Some(table) = Table::of(*scale, profile, &cut) {
+                    match table.constant() {
+                        Some(constant) => self.base.constant += constant,
+                        None => self.tables.push(table),
+                    }
+                }
+            }
+            Effect::Formula { expression, k1, k2, k3, .. } => {
+                if let Some(written) = Written::of(expression, [*k1, *k2, *k3], &cut) {
+                    match written.constant() {
+                        Some(constant) => self.base.constant += constant,
+                        None => self.formulas.push(written),
+                    }
+                }
+            }
             Effect::WearIn { wear_in_mm, time_constant_min, rate_mm_per_min, .. } => {
                 let time = at.time_min.unwrap_or(0.0);
                 let worn = wear_in_mm * (1.0 - (-time / time_constant_min).exp()) + rate_mm_per_min * time;
@@ -193,6 +218,12 @@ impl ActingModel {
             let hump = height * (-off * off).exp();
             value += hump;
             by_u -= hump * 2.0 * off * speed / width;
+        }
+        let added = self.tables.iter().map(|table| table.at(u, x));
+        for (added, slope_u, slope_x) in added.chain(self.formulas.iter().map(|written| written.at(u, x))) {
+            value += added;
+            by_u += slope_u;
+            by_x += slope_x;
         }
         if let Some(ln_marks) = self.floor {
             let marks = ln_marks + 2.0 * x;
@@ -231,7 +262,7 @@ impl ActingModel {
     pub(super) fn bends(&self) -> Bend {
         let [q_uu, q_xx, q_ux] = self.quadratic;
         let determinant = 4.0 * q_uu * q_xx - q_ux * q_ux;
-        let inner = if self.hump.is_some() {
+        let inner = if self.hump.is_some() || !self.tables.is_empty() || !self.formulas.is_empty() {
             Bend::Mixed
         } else if self.quadratic.iter().all(|q| q.abs() <= 0.0) {
             Bend::Straight

@@ -22,6 +22,12 @@ pub(super) fn consequences(
     }
     let mut scheduled = job.clone();
     scheduled.effects.extend_from_slice(believed);
+    if let Some(first) = runs.first() {
+        let of_job = &mut scheduled.conditions;
+        of_job.flank_wear_mm = of_job.flank_wear_mm.or(first.flank_wear_mm);
+        of_job.nose_radius_mm = of_job.nose_radius_mm.or(first.nose_radius_mm);
+        of_job.time_min = of_job.time_min.or(first.time_min);
+    }
     let zones = match FeedSchedule::run(&scheduled, &Quiet(monitor)) {
         Ok(answer) => answer.output.zones,
         Err(failure @ (Failure::Internal(_) | Failure::Cancelled)) => return Err(failure),

@@ -5,6 +5,7 @@ use crate::calculator::{Condition, Design, Grouping, Smooth};
 use super::forward::{PreparedMachinability, Row};
 use super::hypotheses::same;
 use super::levels::{batches, factors};
+use super::remainder::KNOWN;
 
 /// Most folds: more conditions share them by turns, each condition whole.
 pub(super) const MOST_FOLDS: usize = 24;
@@ -17,11 +18,17 @@ pub(super) fn design(prepared: &PreparedMachinability) -> Design {
     let rows = &prepared.rows;
     let cell = cells(rows);
     let count = cell.iter().copied().max().map_or(0, |most| most + 1);
-    let pairs: [(&'static str, Of, Of); 3] =
-        [("speed_and_feed", speed, feed), ("speed_and_depth", speed, depth), ("feed_and_depth", feed, depth)];
+    let pairs: [(&'static str, [&'static str; 2], Of, Of); 3] = [
+        ("speed_and_feed", ["speed", "feed"], speed, feed),
+        ("speed_and_depth", ["speed", "depth"], speed, depth),
+        ("feed_and_depth", ["feed", "depth"], feed, depth),
+    ];
     let mut groupings: Vec<Grouping> = pairs
         .into_iter()
-        .map(|(name, first, second)| Grouping { name, over: Vec::new(), group: groups(rows, first, second) })
+        .map(|(name, pair, first, second)| {
+            let group = groups(rows, first, second);
+            Grouping { name, over: Vec::new(), conditions: pair.to_vec(), group }
+        })
         // A level for every condition, or for none, would be scatter or a shift.
         .filter(|grouping| {
             let groups = grouping.group.iter().copied().max().map_or(0, |most| most + 1);
@@ -54,24 +61,16 @@ fn levels(rows: &[Row]) -> Vec<Grouping> {
     };
     let all = std::iter::once(of_batch).chain(factors(rows).into_iter().map(of_factor));
     let many = all.filter(|(_, levels, _): &(String, Vec<String>, Vec<usize>)| levels.len() > 2);
-    many.map(|(name, _, group)| Grouping { name: "factor", over: vec![name], group }).collect()
+    many.map(|(name, _, group)| Grouping { name: "factor", over: vec![name], conditions: Vec::new(), group }).collect()
 }
 
 /// What every row states as a number and what differs between them.
 fn conditions(rows: &[Row]) -> Vec<Condition> {
-    type Stated = fn(&Row) -> Option<f64>;
-    let known: [(&'static str, Stated); 7] = [
-        ("speed", |row| Some(row.u)),
-        ("feed", |row| Some(row.x)),
-        ("depth", |row| Some(row.depth_mm.ln())),
-        ("edge_angle", |row| row.angle_deg),
-        ("nose_radius", |row| row.nose_radius_mm),
-        ("flank_wear", |row| row.conditions.flank_wear_mm),
-        ("time", |row| row.conditions.time_min),
-    ];
-    let stated =
-        known.into_iter().filter_map(|(name, of)| Some((name, rows.iter().map(of).collect::<Option<Vec<_>>>()?)));
-    stated.filter_map(|(name, values)| Condition::of(name, &values)).collect()
+    let stated = KNOWN.iter().filter_map(|known| {
+        let values = rows.iter().map(known.of_row).collect::<Option<Vec<f64>>>()?;
+        Condition::of(known.name, &values)
+    });
+    stated.collect()
 }
 
 type Of = fn(&Row) -> f64;

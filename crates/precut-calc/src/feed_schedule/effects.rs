@@ -5,10 +5,18 @@ use crate::effects::MachinabilityEffect as Effect;
 
 use super::input::Job;
 use super::models::Output;
+use super::{formula, remainder};
 
 /// Codes of the faults found here.
-pub(super) const CODES: &[&str] =
-    &["duplicate_effect", "condition_missing", "effect_output_missing", "effect_reference_missing"];
+pub(super) const CODES: &[&str] = &[
+    "duplicate_effect",
+    "condition_missing",
+    "effect_output_missing",
+    "effect_reference_missing",
+    "effect_condition_missing",
+    "formula_unreadable",
+    "remainder_not_a_table",
+];
 
 /// The name of a further output that wear effects are about.
 const FLANK_WEAR: &str = "flank_wear";
@@ -59,12 +67,21 @@ pub(super) fn check(job: &Job, violations: &mut Violations) {
             let known = eligible(job, effect);
             Finding::new("effect_output_missing", format!("{at}/output")).with("kind", kind).with("known", known)
         });
-        // Shifts may recur with another batch, level or pair of levels.
+        // Shifts may recur with another batch, level or pair of levels, remainders over other conditions, formulas by
+        // other names.
         let identity = match effect {
             Effect::BatchShift { batch, .. } => format!("{kind} {batch}"),
             Effect::FactorShift { factor, level, .. } => format!("{kind} {factor}={level}"),
             Effect::FactorInteraction { factor_1, level_1, factor_2, level_2, .. } => {
                 format!("{kind} {factor_1}={level_1} {factor_2}={level_2}")
+            }
+            Effect::Remainder { profile, .. } => {
+                remainder::check(job, profile, &at, violations);
+                format!("{kind} {}", remainder::label("", profile))
+            }
+            Effect::Formula { name, expression, .. } => {
+                formula::check(job, expression, &at, violations);
+                format!("{kind} {}", formula::label(name, expression))
             }
             _ => kind.to_owned(),
         };

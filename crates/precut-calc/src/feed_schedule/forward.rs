@@ -5,8 +5,8 @@ use utoipa::ToSchema;
 
 use crate::calculator::{
     Consequence, Cost, Design, Diagnosable, Example, Expansions, Failure, Finding, ForwardModel, Hypotheses,
-    Hypothesis, JacobianColumn, Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows,
-    checkpoint,
+    Hypothesis, JacobianColumn, KnownOver, Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows,
+    Unnamed, checkpoint,
 };
 use crate::effects::{
     Cause, FactorLevel, MACHINABILITY_CAUSES, MachinabilityConditions, MachinabilityEffect as Effect,
@@ -24,6 +24,7 @@ use super::levels::{self, NamedLevel};
 use super::measurement::MachinabilityMeasurement;
 use super::models::Output;
 use super::next_runs::next_runs;
+use super::remainder;
 
 with_conditions! {
     /// Conditions that all measurements of a run share.
@@ -232,10 +233,34 @@ impl Diagnosable for FeedSchedule {
 
     fn hypotheses(
         prepared: &PreparedMachinability,
-        _held: &[Effect],
+        held: &[Effect],
         _monitor: &dyn Monitor,
     ) -> Result<Hypotheses, Failure> {
-        Ok(prepared.hypotheses())
+        Ok(prepared.hypotheses(held))
+    }
+
+    fn remainder(prepared: &PreparedMachinability, held: &[Effect], found: &Unnamed<'_>) -> Option<Effect> {
+        prepared.remainder(held, found)
+    }
+
+    fn known_over(remainder: &Effect) -> Vec<KnownOver> {
+        match remainder {
+            Effect::Remainder { profile, .. } => remainder::known_over(profile),
+            _ => Vec::new(),
+        }
+    }
+
+    fn is_same(one: &Effect, other: &Effect) -> bool {
+        match (one, other) {
+            (
+                Effect::Remainder { profile: one, output: of_one, .. },
+                Effect::Remainder { profile: other, output: of_other, .. },
+            ) => {
+                let is_on_same = of_one.is_none() || of_other.is_none() || of_one == of_other;
+                is_on_same && remainder::is_over_same(one, other)
+            }
+            _ => std::mem::discriminant(one) == std::mem::discriminant(other),
+        }
     }
 
     fn effects(prepared: &PreparedMachinability, hypothesis: &Hypothesis, values: &[f64]) -> Option<Vec<Effect>> {
@@ -340,6 +365,7 @@ fn row(job: &Job, run: &MachinabilityRun, point: &MachinabilityPoint) -> Result<
             flank_wear_mm: point.flank_wear_mm.or(run.flank_wear_mm).or(own.flank_wear_mm),
             batch: point.batch.clone().or_else(|| run.batch.clone()).or_else(|| own.batch.clone()),
             factors,
+            nose_radius_mm: point.nose_radius_mm.or(run.nose_radius_mm).or(own.nose_radius_mm),
             time_min: point.time_min.or(run.time_min).or(own.time_min),
         },
         test: point.test.or(run.test),

@@ -9,17 +9,19 @@ use crate::machinability::ModelForm;
 
 use super::forward::{PreparedMachinability, Row};
 use super::levels::{NamedLevel, batches, factors};
+use super::{formula, remainder};
 
 /// Prior standard deviation of a force that does not vanish with the chip, share of the force at the reference.
 const EDGE_FORCE_SHARE: f64 = 0.1;
 
 impl PreparedMachinability {
-    pub(super) fn hypotheses(&self) -> Hypotheses {
+    /// `held` acts already.
+    pub(super) fn hypotheses(&self, held: &[Effect]) -> Hypotheses {
         let mut sorted = Hypotheses::default();
         for cause in MACHINABILITY_CAUSES {
-            match self.inapplicability(cause) {
+            match self.inapplicability(cause, held) {
                 Some(reason) => sorted.inapplicable.push(Inapplicable { cause, reason }),
-                None => sorted.applicable.extend(self.hypotheses_of(cause)),
+                None => sorted.applicable.extend(self.hypotheses_of(cause, held)),
             }
         }
         sorted
@@ -33,12 +35,15 @@ impl PreparedMachinability {
         self.output.starts_with("flank_wear")
     }
 
-    fn inapplicability(&self, cause: &'static Cause) -> Option<Inapplicability> {
+    fn inapplicability(&self, cause: &'static Cause, held: &[Effect]) -> Option<Inapplicability> {
         let acts = match cause.kind {
             "nose_radius_floor" => self.output == "roughness",
             "edge_force_offset" | "wear_force_additive" => self.is_force(),
             "wear_multiplicative" => !self.is_wear(),
             "wear_in" => self.is_wear(),
+            // What was never found has no shape by which it could be known again.
+            "remainder" => self.remainders(held).next().is_some(),
+            "formula" => self.formulas(held).next().is_some(),
             _ => true,
         };
         if !acts {
@@ -68,6 +73,15 @@ impl PreparedMachinability {
         }
     }
 
+    /// Formulas that act on this output and have numbers to be fitted: their names, and how far each number may be off.
+    fn formulas<'a>(&'a self, held: &'a [Effect]) -> impl Iterator<Item = (&'a str, [f64; 3])> {
+        held.iter().filter(|effect| effect.output().is_none_or(|output| output == self.output)).filter_map(|effect| {
+            let Effect::Formula { name, expression, .. } = effect else { return None };
+            let deviations = formula::deviations(effect).filter(|own| own.iter().any(|deviation| *deviation > 0.0))?;
+            Some((formula::label(name, expression), deviations))
+        })
+    }
+
     /// Why nothing can be said that needs so many factors with levels that differ.
     fn factors(&self, needed: usize) -> Option<Inapplicability> {
         let known = factors(&self.rows);
@@ -93,7 +107,7 @@ impl PreparedMachinability {
         }
     }
 
-    fn hypotheses_of(&self, cause: &'static Cause) -> Vec<Hypothesis> {
+    fn hypotheses_of(&self, cause: &'static Cause, held: &[Effect]) -> Vec<Hypothesis> {
         let of = |label: String, prior_weight: f64| Hypothesis {
             cause,
             label,
@@ -105,6 +119,12 @@ impl PreparedMachinability {
             let levels = self.named.iter().filter(|level| level.effect.kind() == cause.kind);
             return levels.map(|level| of(level.label.clone(), level.weight)).collect();
         }
+        if cause.kind == "formula" {
+            return self.formulas(held).map(|(label, deviations)| of_formula(cause, label, deviations)).collect();
+        }
+        if cause.kind == "remainder" {
+            return self.remainders(held).map(|(name, _, profile)| of(remainder::label(name, profile), 1.0)).collect();
+        }
         vec![of(String::new(), 1.0)]
     }
 
@@ -113,6 +133,7 @@ impl PreparedMachinability {
         // Of a model that is no power law what is added is added to the output itself.
         let unit_of_l = if self.model.form == ModelForm::SemiLog { at_reference } else { 1.0 };
         let size = match parameter.name {
+            "scale" => parameter.prior_sd,
             "offset_n" => EDGE_FORCE_SHARE * at_reference,
             "n_per_mm" | "wear_in_mm" | "rate_mm_per_min" => parameter.prior_sd,
             _ => parameter.prior_sd * unit_of_l,
@@ -156,6 +177,17 @@ impl PreparedMachinability {
         if effect.output().is_some_and(|output| output != self.output) {
             return None;
         }
+        let is_another = match effect {
+            Effect::Remainder { name, profile, .. } => hypothesis.label != remainder::label(name, profile),
+            Effect::Formula { name, expression, .. } => hypothesis.label != formula::label(name, expression),
+            _ => false,
+        };
+        if is_another {
+            return None;
+        }
+        if let Effect::Formula { k1, k2, k3, .. } = effect {
+            return (hypothesis.cause.kind == effect.kind()).then(|| vec![*k1, *k2, *k3]);
+        }
         match self.level_of(hypothesis) {
             Some(level) => level.shift_in(effect).map(|by| vec![by]),
             None => values_by_name(hypothesis, effect),
@@ -171,6 +203,18 @@ impl PreparedMachinability {
         effect.set_output(Some(self.output.clone()));
         Some(vec![effect])
     }
+}
+
+/// A formula of the user, each number as far from what is stated as the effect says.
+fn of_formula(cause: &'static Cause, label: &str, deviations: [f64; 3]) -> Hypothesis {
+    let variable = |(parameter, prior_sd): (&Parameter, f64)| Variable {
+        name: parameter.name,
+        unit: parameter.unit,
+        treatment: if prior_sd > 0.0 { Treatment::Amplitude { prior_sd } } else { Treatment::Stated { value: 0.0 } },
+        range: Range { lower: parameter.lower, upper: parameter.upper },
+    };
+    let variables = cause.parameters.iter().zip(deviations).map(variable).collect();
+    Hypothesis { cause, label: label.to_owned(), variables, prior_weight: 1.0, held: None }
 }
 
 /// Whether a set of named levels varies.

@@ -261,11 +261,16 @@ pub(super) fn design(prepared: &PreparedFixture) -> Design {
         [speed, feed, clamped, at_depth(row), row.margin as u64]
     });
     let per_speed = numbered(&|row| [speed(row), 0, 0, 0, 0]);
-    let grouping = |name, group: Vec<usize>| Grouping { name, over: Vec::new(), group };
-    let mut groupings = vec![grouping("per_speed", per_speed.clone())];
+    let grouping =
+        |name, conditions: Vec<&'static str>, group: Vec<usize>| Grouping { name, over: Vec::new(), conditions, group };
+    let mut groupings = vec![grouping("per_speed", vec!["speed"], per_speed.clone())];
     if !limit {
-        groupings.push(grouping("per_depth", numbered(&|row| [depth(row), 0, 0, 0, 0])));
-        groupings.push(grouping("per_cell", cell.clone()));
+        let per_depth = numbered(&|row| [depth(row), 0, 0, 0, 0]);
+        let per_point = numbered(&|row| [speed(row), depth(row), 0, 0, 0]);
+        // Where feeds or times since clamping differ, too, a cell is no place of speed and depth.
+        let of_cell = if per_point == cell { vec!["speed", "depth"] } else { Vec::new() };
+        groupings.push(grouping("per_depth", vec!["depth"], per_depth));
+        groupings.push(grouping("per_cell", of_cell, cell.clone()));
     }
     let ln = |name, of: &dyn Fn(&PreparedRow) -> f64| {
         Condition::of(name, &rows.iter().map(|row| of(row).max(f64::MIN_POSITIVE).ln()).collect::<Vec<_>>())
