@@ -464,6 +464,7 @@ impl Inner {
                     Failure::Infeasible(_)
                     | Failure::Conflicting(_)
                     | Failure::OutOfModel(_)
+                    | Failure::NotRead { .. }
                     | Failure::NotConverged { .. } => {
                         self.memory.keep(ready.key, Kept::Failure(failure.clone()));
                     }

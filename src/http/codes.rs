@@ -61,6 +61,7 @@ pub const CODES: &[(&str, u16)] = &[
     ("invalid_record", 422),
     ("not_converged", 422),
     ("out_of_model", 422),
+    ("program_not_read", 422),
     ("too_expensive", 422),
     ("workbook_too_large", 422),
     ("kept_quota", 429),

@@ -415,6 +415,10 @@ impl From<Failure> for Problem {
                 problem
             }
             Failure::OutOfModel(finding) => Self::without_answer("out_of_model", finding),
+            Failure::NotRead { findings, total } => Self::new(StatusCode::UNPROCESSABLE_ENTITY, "program_not_read")
+                .with("errors_total", total)
+                .with("listed", findings.len())
+                .findings(findings, total),
             Failure::NotConverged { what, residual, iterations } => {
                 let problem = Self::new(StatusCode::UNPROCESSABLE_ENTITY, "not_converged")
                     .with("what", what)

@@ -6,17 +6,17 @@
 //! |---|---|---|---|
 //! | frame | `%` at both ends, as the controls read in; no `O`: the number is chosen at the machine | none | none |
 //! | comment | `(...)` | `; ...` | `(...)` |
-//! | millimetres | `G21` | `G710`, `G21` is unknown there | `G21` |
-//! | absolute, per revolution | system B: `G90 G95`; system A: by the letters X and Z, `G99` | `G90 G95` | `G90 G95` |
+//! | millimetres | `G21`; system C: `G71` | `G710`, `G21` is unknown there | `G21` |
+//! | absolute, per revolution | systems B, C: `G90 G95`; system A: by the letters X and Z, `G99` | `G90 G95` | `G90 G95` |
 //! | diameters | always | `DIAMON` | `G7` |
 //! | path | exact enough by default | exact enough by default | `G64 P` one increment: bare `G64` may cut corners |
-//! | speed limit | system B: `G92 S`; system A: `G50 S` | `LIMS=` | `G96 D` |
+//! | speed limit | systems B, C: `G92 S`; system A: `G50 S` | `LIMS=` | `G96 D` |
 //! | tool | `T0303`: number and offset | `T3 D1` | `T3 M6`, `G43` for the offset |
 //! | stop | `M5`, then `M0` | `M5`, then `M0` | `M5`, then `M0` |
 //! | end, unless the job says which | `M30` | `M30` | `M2` |
 //! | end of a called program | `M99` | `M17` | `M2`: LinuxCNC returns from files by their end |
 //!
-//! In the other of Fanuc's two systems `G90`, `G92` and `G50` mean something else, so the program says which one it is for.
+//! In the others of Fanuc's systems `G90`, `G92`, `G50` and `G71` mean something else, so the program says which one it is for.
 
 use precut_calc::calculator::{Block, Dialect, Program, ProgramEnd};
 
@@ -76,7 +76,7 @@ impl Writer {
     }
 
     fn is_fanuc(&self) -> bool {
-        matches!(self.dialect, Dialect::Fanuc | Dialect::FanucA)
+        matches!(self.dialect, Dialect::Fanuc | Dialect::FanucA | Dialect::FanucC)
     }
 
     /// A comment, on as many lines as it takes.
@@ -85,7 +85,9 @@ impl Writer {
             let text = inactive(text, self.dialect);
             match self.dialect {
                 Dialect::Siemens => self.line(&format!("; {text}")),
-                Dialect::Fanuc | Dialect::FanucA | Dialect::LinuxCnc => self.line(&format!("({text})")),
+                Dialect::Fanuc | Dialect::FanucA | Dialect::FanucC | Dialect::LinuxCnc => {
+                    self.line(&format!("({text})"));
+                }
             }
         }
     }
@@ -124,7 +126,7 @@ impl Writer {
                 self.line(match (end, self.dialect) {
                     (None | Some(ProgramEnd::Return), Dialect::LinuxCnc) | (Some(ProgramEnd::M2), _) => "M2",
                     (Some(ProgramEnd::Return), Dialect::Siemens) => "M17",
-                    (Some(ProgramEnd::Return), Dialect::Fanuc | Dialect::FanucA) => "M99",
+                    (Some(ProgramEnd::Return), Dialect::Fanuc | Dialect::FanucA | Dialect::FanucC) => "M99",
                     (None | Some(ProgramEnd::M30), _) => "M30",
                 });
             }
@@ -141,6 +143,10 @@ impl Writer {
                 self.comment("for G-code system A: X Z absolute, G99 feed per revolution, G50 S speed limit");
                 self.line("G21 G18 G40 G99");
             }
+            Dialect::FanucC => {
+                self.comment("for G-code system C: G71 millimetres, G95 feed per revolution, G92 S speed limit");
+                self.line("G71 G18 G40 G90 G95");
+            }
             Dialect::Siemens => {
                 self.line("G710 G18 G40 G90 G95");
                 self.line("DIAMON");
@@ -156,7 +162,7 @@ impl Writer {
 
     fn tool(&mut self, number: u32) {
         match self.dialect {
-            Dialect::Fanuc | Dialect::FanucA => self.line(&format!("T{number:02}{number:02}")),
+            Dialect::Fanuc | Dialect::FanucA | Dialect::FanucC => self.line(&format!("T{number:02}{number:02}")),
             Dialect::Siemens => self.line(&format!("T{number} D1")),
             Dialect::LinuxCnc => {
                 self.line(&format!("T{number} M6"));
@@ -170,7 +176,7 @@ impl Writer {
         let limit = at_most(limit_rpm.floor().max(1.0), 0);
         let speed = self.speed(speed_m_per_min);
         match self.dialect {
-            Dialect::Fanuc => {
+            Dialect::Fanuc | Dialect::FanucC => {
                 self.line(&format!("G92 S{limit}"));
                 self.line(&format!("G96 S{speed} M3"));
             }
@@ -186,7 +192,7 @@ impl Writer {
     /// Of the spindle, rev/min or m/min. Many Fanuc controls know whole ones only.
     fn speed(&self, value: f64) -> String {
         match self.dialect {
-            Dialect::Fanuc | Dialect::FanucA => at_most(value.max(1.0), 0),
+            Dialect::Fanuc | Dialect::FanucA | Dialect::FanucC => at_most(value.max(1.0), 0),
             Dialect::Siemens | Dialect::LinuxCnc => at_most(value, 3),
         }
     }

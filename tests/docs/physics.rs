@@ -22,7 +22,7 @@ const CATALOGUES: [(&[Cause], &str); 4] = [
 ];
 
 /// Groups of equations.
-const GROUPS: [&str; 10] = [
+const GROUPS: [&str; 11] = [
     "clamping/",
     "cylindricity/",
     "deflection/",
@@ -31,6 +31,7 @@ const GROUPS: [&str; 10] = [
     "fit/",
     "fixture/",
     "library/",
+    "program/",
     "ring/",
     "roundness/",
 ];

@@ -1,5 +1,5 @@
 //! Programs, loaded into a machine of our own: read as text, driven over a blank that yields, and held against what the
-//! answer says. 100 random jobs of each calculator; `PRECUT_PROGRAMS=1000 cargo test -p precut --test programs` drives more.
+//! answer says, and read back by the product. 100 random jobs of each calculator; `PRECUT_PROGRAMS=1000 cargo test -p precut --test programs` drives more.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::cast_possible_truncation, clippy::cast_sign_loss, missing_docs)]
 
 mod machine;
@@ -7,9 +7,10 @@ mod shop;
 
 use machine::{Done, number};
 use precut::render::gcode;
-use precut_calc::calculator::{Calculator, Check, Failure, Unwatched, Violations};
+use precut_calc::calculator::{Block, Calculator, Check, Failure, Finding, Program, Unwatched, Violations};
 use precut_calc::deflection_compensation::DeflectionCompensation;
 use precut_calc::feed_schedule::FeedSchedule;
+use precut_calc::program_compensation::{Kind, ProgramCompensation};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
@@ -36,8 +37,39 @@ where
     assert!(faults.is_empty(), "{faults:?}: {job}");
     C::fill(&mut parsed);
     let answer = C::run(&parsed, &Unwatched).unwrap_or_else(|e| panic!("{e:?}: {job}"));
-    let program = C::program(&parsed, &answer.output).unwrap().map(|program| gcode(&program, &[]));
+    let program = C::program(&parsed, &answer.output).unwrap().map(|program| {
+        let text = gcode(&program, &[]);
+        is_read_as_written(&program, &text);
+        text
+    });
     (serde_json::to_value(&answer.output).unwrap(), program)
+}
+
+/// The product's own reader reads every move that is written, and wonders at nothing but a tool that nobody names.
+fn is_read_as_written(program: &Program, text: &str) {
+    let job = json!({ "nc_program": text, "dialect": program.dialect, "mode": { "kind": "read" } });
+    let job = serde_json::from_value(job).unwrap();
+    let answer = ProgramCompensation::run(&job, &Unwatched).unwrap_or_else(|e| panic!("{e:?}\n{text}"));
+    let is_tool = |warning: &Finding| warning.values.get("what") == Some(&"tool".into());
+    assert!(answer.warnings.iter().all(is_tool), "{:?}\n{text}", answer.warnings);
+    let steps = |value: f64| (value / program.increment_mm).round();
+    let mut at = [None; 2];
+    let mut written = Vec::new();
+    for block in &program.blocks {
+        let (kind, x, z) = match *block {
+            Block::Rapid { x_diameter_mm, z_mm } => (Kind::Rapid, x_diameter_mm, z_mm),
+            Block::Cut { x_diameter_mm, z_mm, .. } => (Kind::Line, Some(x_diameter_mm), Some(z_mm)),
+            _ => continue,
+        };
+        let to = [x.map(steps).or(at[0]), z.map(steps).or(at[1])];
+        if std::mem::replace(&mut at, to) != to {
+            written.push((kind, to));
+        }
+    }
+    let moves = answer.output.moves;
+    let places = moves.x_diameter_mm.iter().zip(&moves.z_mm).map(|(x, z)| [x.map(steps), z.map(steps)]);
+    let read: Vec<(Kind, [Option<f64>; 2])> = moves.kind.iter().copied().zip(places).collect();
+    assert_eq!(read, written, "{text}");
 }
 
 /// Largest and smallest diameter error of a lathe's columns, um.

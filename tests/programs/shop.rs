@@ -52,7 +52,7 @@ pub(crate) struct Shop {
 }
 
 const FORCE: Force = Force { c: 2430.0, x: 0.9, y: 0.6, n: -0.3 };
-const DIALECTS: [&str; 4] = ["fanuc", "fanuc_a", "siemens", "linuxcnc"];
+const DIALECTS: [&str; 5] = ["fanuc", "fanuc_a", "fanuc_c", "siemens", "linuxcnc"];
 /// On the diameter, and along the shaft.
 const CLEARANCES: [(f64, f64); 5] = [(5.0, 2.0), (5.0, 2.0), (2.0, 5.0), (0.0, 0.0), (1.0, 0.5)];
 

@@ -77,7 +77,7 @@ async fn pictures_are_labelled_in_the_language_and_tables_are_the_same_in_all() 
 #[tokio::test]
 async fn a_program_says_what_the_answer_warns_of() {
     let server = standard().await;
-    for dialect in ["fanuc", "fanuc_a", "siemens", "linuxcnc"] {
+    for dialect in ["fanuc", "fanuc_a", "fanuc_c", "siemens", "linuxcnc"] {
         let mut stepped: Value = serde_json::from_str(job()).unwrap();
         stepped["shaft"]["segments"] = serde_json::json!([
             { "length_mm": 900, "diameter_mm": 90, "stock_diameter_mm": 91 },

@@ -35,4 +35,5 @@ mod roundness;
 mod standing;
 mod studies;
 mod traces;
+mod turning_programs;
 mod webhooks;

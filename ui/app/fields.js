@@ -242,11 +242,16 @@ function useDrag(value, schema, set) {
 }
 
 export function TextInput({ id, value, schema, set, described, invalid, label, required, context }) {
+  const take = event => set(event.currentTarget.value === '' && !required ? undefined : event.currentTarget.value, 'typing');
+  if (schema['x-lines'])
+    return html`
+    <label for=${id} class="label">${label}</label>
+    <textarea id=${id} rows="12" class="json" wrap="off" spellcheck=${false} autocomplete="off" value=${value ?? ''} disabled=${context.disabled}
+      aria-describedby=${described} aria-invalid=${invalid ? 'true' : undefined} aria-required=${required ? 'true' : undefined} onInput=${take}></textarea>`;
   return html`
     <label for=${id} class="label">${label}</label>
     <span class="control wide">${context.names?.has(value) && html`<span class="called">${context.names.get(value)}</span>`}<input id=${id} type="text" autocomplete="off" value=${value ?? ''} placeholder=${schema.default ?? ''} disabled=${context.disabled}
-      aria-describedby=${described} aria-invalid=${invalid ? 'true' : undefined} aria-required=${required ? 'true' : undefined}
-      onInput=${event => set(event.currentTarget.value === '' && !required ? undefined : event.currentTarget.value, 'typing')} /></span>`;
+      aria-describedby=${described} aria-invalid=${invalid ? 'true' : undefined} aria-required=${required ? 'true' : undefined} onInput=${take} /></span>`;
 }
 
 /** The service's words for the values of an enumeration, where it has any. */

@@ -17,6 +17,7 @@ pub mod machinability;
 pub mod material;
 pub mod num;
 pub mod path;
+pub mod program_compensation;
 pub mod ring_clamping;
 pub mod ring_roundness;
 pub mod shaft;
@@ -37,4 +38,5 @@ pub fn register(registrar: &mut impl Registrar) {
     registrar.diagnosable::<fixture_stability::FixtureStability>();
     registrar.calculator::<fixture_stability::identification::FixtureIdentification>();
     registrar.calculator::<compliance_fit::ComplianceFit>();
+    registrar.calculator::<program_compensation::ProgramCompensation>();
 }

@@ -160,9 +160,9 @@ fn note_numbers(value: &Value, numbers: &mut BTreeSet<String>) {
     }
 }
 
-/// Curves of a formula, drawn at places of their own: circles about a profile, and a fit against what was measured, which
-/// is told by its logarithm.
-const DRAWN_ANYWHERE: [&str; 9] = [
+/// Curves of a formula, drawn at places of their own: circles about a profile, a fit against what was measured, which is
+/// told by its logarithm; arcs of a program.
+const DRAWN_ANYWHERE: [&str; 11] = [
     "least_squares_circle",
     "minimum_zone_circles",
     "minimum_zone_inner",
@@ -172,6 +172,8 @@ const DRAWN_ANYWHERE: [&str; 9] = [
     "fit_of_all",
     "fit_held_out",
     "fit_outlier_limit",
+    "moves_arc",
+    "surface_of_program",
 ];
 
 /// No axis without its true scale: what is drawn stands at a number of the tables, the answer or the job. A profile closes

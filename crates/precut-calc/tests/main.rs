@@ -82,6 +82,8 @@ mod machinability_library;
 mod machinability_real;
 mod material_library;
 mod path_chords;
+mod program_reading;
+mod program_stock;
 mod ring_cases;
 mod ring_clamping;
 mod ring_contract;

@@ -40,6 +40,10 @@ fn failed(failure: &Failure) -> Value {
         Failure::NotConverged { what, residual, iterations } => {
             json!({"kind": "not_converged", "what": what, "residual": residual, "iterations": iterations})
         }
+        Failure::NotRead { findings, total } => {
+            let findings: Vec<Value> = findings.iter().map(note).collect();
+            json!({"kind": "not_read", "findings": findings, "total": total})
+        }
         Failure::Internal(cause) => json!({"kind": "internal", "cause": cause}),
         // A cancelled job did not fail.
         Failure::Cancelled => json!({"kind": "internal", "cause": failure.to_string()}),
@@ -70,6 +74,10 @@ fn error_of(value: &Value) -> Option<Error> {
             findings: value["findings"].as_array()?.iter().map(finding_of).collect::<Option<_>>()?,
             total: whole("total")? as usize,
         },
+        "not_read" => Error::Calculation(Failure::NotRead {
+            findings: value["findings"].as_array()?.iter().map(finding_of).collect::<Option<_>>()?,
+            total: whole("total")? as usize,
+        }),
         "unknown_calculator" => Error::UnknownCalculator { name: value["name"].as_str()?.to_owned(), nearest: None },
         "deadline_exceeded" => Error::DeadlineExceeded,
         "kept_quota" => Error::KeptQuota {
@@ -176,6 +184,7 @@ mod tests {
             Error::Calculation(Failure::Conflicting(Box::new(Conflict { finding: finding.clone(), infeasible }))),
             Error::Calculation(Failure::OutOfModel(Finding::new("outside", ""))),
             Error::Calculation(Failure::NotConverged { what: "chip", residual: 1e-3, iterations: 40 }),
+            Error::Calculation(Failure::NotRead { findings: vec![finding.clone()], total: 3 }),
             Error::Calculation(Failure::Internal("a cause".to_owned())),
             Error::Invalid { findings: vec![finding], total: 7 },
             Error::UnknownCalculator { name: "gone".to_owned(), nearest: None },

@@ -138,6 +138,9 @@ fn reason(error: &Error) -> (Status, Finding) {
         Error::Calculation(Failure::Infeasible(finding)) => (Status::Infeasible, finding.clone()),
         Error::Calculation(Failure::Conflicting(conflict)) => (Status::Infeasible, conflict.finding.clone()),
         Error::Calculation(Failure::OutOfModel(finding)) => (Status::OutOfModel, finding.clone()),
+        Error::Calculation(Failure::NotRead { findings, .. }) => {
+            (Status::Invalid, findings.first().cloned().unwrap_or_else(|| whole("program_not_read")))
+        }
         Error::Calculation(Failure::NotConverged { what, residual, iterations }) => {
             let finding = whole("not_converged").with("what", *what).with("iterations", f64::from(*iterations));
             (Status::NotConverged, if residual.is_finite() { finding.with("residual", *residual) } else { finding })

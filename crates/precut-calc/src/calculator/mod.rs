@@ -306,6 +306,14 @@ pub enum Failure {
     /// The physics of the model does not cover the job.
     #[error("outside the model: {}", .0.code)]
     OutOfModel(Finding),
+    /// A program that the job brings along is not read.
+    #[error("the program is not read: {total} faults")]
+    NotRead {
+        /// The first of its faults, in the order of the program.
+        findings: Vec<Finding>,
+        /// How many there are.
+        total: usize,
+    },
     /// Our own fault.
     #[error("internal: {0}")]
     Internal(String),

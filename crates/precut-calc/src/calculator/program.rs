@@ -14,11 +14,26 @@ pub enum Dialect {
     /// The same with G-code system A, where `G90` is a cycle: X and Z are absolute by their letters, `G99` per
     /// revolution, `G50 S` limits the spindle.
     FanucA,
+    /// The same with G-code system C, as B but that `G71` is millimetres and roughing is `G73`.
+    FanucC,
     /// Siemens: `DIAMON` switches X to diameters.
     Siemens,
     /// LinuxCNC: `G7` switches X to diameters.
     #[serde(rename = "linuxcnc")]
     LinuxCnc,
+}
+
+impl Dialect {
+    /// Its name, as in the contract.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Fanuc => "fanuc",
+            Self::FanucA => "fanuc_a",
+            Self::FanucC => "fanuc_c",
+            Self::Siemens => "siemens",
+            Self::LinuxCnc => "linuxcnc",
+        }
+    }
 }
 
 /// How a program ends.

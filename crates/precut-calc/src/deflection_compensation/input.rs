@@ -504,7 +504,7 @@ impl Default for PathSettings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ProgramSettings {
-    /// The control: `fanuc` is a lathe with G-code system B, `fanuc_a` one with system A.
+    /// The control: `fanuc` is a lathe with G-code system B, `fanuc_a` one with system A, `fanuc_c` one with system C.
     #[serde(default)]
     #[schema(default = "fanuc", example = "linuxcnc")]
     pub dialect: Dialect,

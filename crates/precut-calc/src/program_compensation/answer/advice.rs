@@ -1,0 +1,61 @@
+//! What is said of a program.
+
+use crate::calculator::{Finding, Message};
+
+use super::super::job::ProgramStock;
+use super::super::model::stock::{Doubt, Turned, implausible_mm};
+use super::output::Outcome;
+
+/// Rapid moves that are told.
+const MOST_RAPIDS: usize = 100;
+
+/// What may be wrong with a program on its blank.
+pub(crate) const WARNING_CODES: &[&str] = &["rapid_in_stock", "nothing_cut", "cut_implausible"];
+
+/// What an answer may explain.
+pub(crate) const EXPLANATION_CODES: &[&str] = &["program_read", "cycles_expanded", "stretches_passed", "surface_left"];
+
+pub(crate) fn explanation(outcome: &Outcome) -> Vec<Message> {
+    let mut said = vec![
+        Message::new("program_read")
+            .with("lines", outcome.lines)
+            .with("feed_moves", outcome.feed_moves)
+            .with("rapid_moves", outcome.rapid_moves)
+            .with("feed_length_mm", outcome.feed_length_mm)
+            .with("tools", outcome.tools.len()),
+    ];
+    if !outcome.cycles.is_empty() {
+        said.push(Message::new("cycles_expanded").with("cycles", outcome.cycles.len()));
+    }
+    if outcome.passed_moves > 0 {
+        said.push(Message::new("stretches_passed").with("moves", outcome.passed_moves));
+    }
+    if let Some(surface) = &outcome.surface {
+        said.push(Message::new("surface_left").with("lines", surface.finishing_lines.len()));
+    }
+    said
+}
+
+/// Rapid moves through stock, and a blank that does not go with the program; `fits` is a program zero that would.
+pub(crate) fn warnings(
+    turned: &Turned,
+    doubt: Option<Doubt>,
+    (stock, zero, fits): (&ProgramStock, f64, Option<f64>),
+) -> Vec<Finding> {
+    let rapid = turned.in_stock.iter().take(MOST_RAPIDS).map(|one| {
+        Finding::new("rapid_in_stock", "/nc_program").measured(one.depth_mm, 0.0, "mm").with("line", one.line)
+    });
+    let and_fits = |finding: Finding| match fits {
+        Some(fits) => finding.with("fits_z_mm", fits),
+        None => finding,
+    };
+    let doubt = doubt.map(|doubt| match doubt {
+        Doubt::NothingCut => and_fits(Finding::new("nothing_cut", "/program_zero_z_mm").value(zero, "mm")),
+        Doubt::TooDeep(cut) => and_fits(
+            Finding::new("cut_implausible", "/program_zero_z_mm")
+                .measured(cut.depth_mm, implausible_mm(stock), "mm")
+                .with("line", cut.line),
+        ),
+    });
+    doubt.into_iter().chain(rapid).collect()
+}

@@ -1,0 +1,237 @@
+//! Numbers of the answer.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::super::model::reader::{ContourCycle, Feed, Kind, Nose, Program, ProgramMove, Speed};
+use super::super::model::stock::{Curve, Turned, lines_that_finish};
+
+/// What a program makes the machine do.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(title = "ProgramCompensation")]
+pub struct Outcome {
+    /// Lines of the program.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub lines: usize,
+    /// Moves that cut along a known path.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub feed_moves: usize,
+    /// Rapid moves.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub rapid_moves: usize,
+    /// Threads, grooves and drilling that are passed.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub passed_moves: usize,
+    /// Length of the path at the feed.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub feed_length_mm: f64,
+    /// The tools, as the program calls them, in the order in which it does.
+    pub tools: Vec<String>,
+    /// The cycles over a contour that were expanded into moves.
+    pub cycles: Vec<ContourCycle>,
+    /// The moves in the order of execution, by columns.
+    pub moves: ReadMoves,
+    /// What the program leaves of the blank on work and machine that do not yield; null without a blank.
+    pub surface: Option<LeftSurface>,
+}
+
+/// The outline that a program leaves, part by part from the headstock end, by columns. A part is straight, or an arc about a
+/// centre.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct LeftSurface {
+    /// Lines of the program that make at least 0.3 mm of it.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub finishing_lines: Vec<usize>,
+    /// Where a part begins, from the headstock end.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub z_start_mm: Vec<f64>,
+    /// Where it ends.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub z_end_mm: Vec<f64>,
+    /// Its diameter where it begins.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub diameter_start_mm: Vec<f64>,
+    /// Its diameter where it ends.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub diameter_end_mm: Vec<f64>,
+    /// Centre of an arc, from the headstock end.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub centre_z_mm: Vec<Option<f64>>,
+    /// Diameter of the centre of an arc.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub centre_diameter_mm: Vec<Option<f64>>,
+    /// Radius of an arc: above 0 the work is convex there, below 0 hollow.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub arc_radius_mm: Vec<Option<f64>>,
+    /// Line that makes the part, from 1; null where the blank stands.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub line: Vec<Option<usize>>,
+}
+
+impl LeftSurface {
+    fn of(turned: &Turned) -> Self {
+        let mut surface = Self { finishing_lines: lines_that_finish(turned), ..Self::default() };
+        for (piece, owner) in &turned.parts {
+            let arc = match piece.curve {
+                Curve::Line { .. } => None,
+                Curve::Arc { x, r, radius, is_upper } => Some((x, 2.0 * r, if is_upper { radius } else { -radius })),
+            };
+            surface.z_start_mm.push(piece.x0);
+            surface.z_end_mm.push(piece.x1);
+            surface.diameter_start_mm.push(2.0 * piece.curve.at(piece.x0));
+            surface.diameter_end_mm.push(2.0 * piece.curve.at(piece.x1));
+            surface.centre_z_mm.push(arc.map(|(z, ..)| z));
+            surface.centre_diameter_mm.push(arc.map(|(_, diameter, _)| diameter));
+            surface.arc_radius_mm.push(arc.map(|(.., radius)| radius));
+            surface.line.push(*owner);
+        }
+        surface
+    }
+}
+
+/// Moves by columns, all of one length. Places are those of the programmed point from program zero, as the moves end; null
+/// where the control alone knows it.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ReadMoves {
+    /// Line that asks for the move, from 1; of a cycle the line of its call.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub line: Vec<usize>,
+    /// What the move is.
+    pub kind: Vec<Kind>,
+    /// Diameter at the end.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub x_diameter_mm: Vec<Option<f64>>,
+    /// Place along the axis at the end.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub z_mm: Vec<Option<f64>>,
+    /// Diameter of the centre of an arc.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub centre_x_diameter_mm: Vec<Option<f64>>,
+    /// Place of the centre of an arc along the axis.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub centre_z_mm: Vec<Option<f64>>,
+    /// Feed per revolution.
+    #[schema(extensions(("x-unit" = json!("mm/rev"))))]
+    pub feed_mm_per_rev: Vec<Option<f64>>,
+    /// Feed per minute, where the program has it so.
+    #[schema(extensions(("x-unit" = json!("mm/min"))))]
+    pub feed_mm_per_min: Vec<Option<f64>>,
+    /// Speed of the spindle, where it is constant.
+    #[schema(extensions(("x-unit" = json!("rev/min"))))]
+    pub spindle_speed_rpm: Vec<Option<f64>>,
+    /// Cutting speed, where it is constant.
+    #[schema(extensions(("x-unit" = json!("m/min"))))]
+    pub speed_m_per_min: Vec<Option<f64>>,
+    /// Limit of the spindle with a constant cutting speed.
+    #[schema(extensions(("x-unit" = json!("rev/min"))))]
+    pub spindle_limit_rpm: Vec<Option<f64>>,
+    /// Place of the tool in `tools`, from 0.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub tool: Vec<Option<u32>>,
+    /// Where the nose runs.
+    pub nose_compensation: Vec<Nose>,
+}
+
+impl ReadMoves {
+    /// Adds a move. Feed and speed stand with moves that cut.
+    fn push(&mut self, one: &ProgramMove) {
+        let cuts = one.kind.is_feed();
+        let (per_rev, per_min) = match one.feed {
+            Some(Feed::PerRev(feed)) => (Some(feed), None),
+            Some(Feed::PerMinute(feed)) => (None, Some(feed)),
+            None => (None, None),
+        };
+        let (spindle, surface, limit) = match one.speed.filter(|_| cuts) {
+            Some(Speed::Spindle(rpm)) => (Some(rpm), None, None),
+            Some(Speed::Surface(speed, limit)) => (None, Some(speed), limit),
+            None => (None, None, None),
+        };
+        self.line.push(one.line);
+        self.kind.push(one.kind);
+        self.x_diameter_mm.push(one.end.x);
+        self.z_mm.push(one.end.z);
+        self.centre_x_diameter_mm.push(one.centre.map(|[x, _]| x));
+        self.centre_z_mm.push(one.centre.map(|[_, z]| z));
+        self.feed_mm_per_rev.push(per_rev);
+        self.feed_mm_per_min.push(per_min);
+        self.spindle_speed_rpm.push(spindle);
+        self.speed_m_per_min.push(surface);
+        self.spindle_limit_rpm.push(limit);
+        self.tool.push(one.tool);
+        self.nose_compensation.push(one.nose);
+    }
+
+    /// The moves with the place where each begins: diameter and z.
+    pub(super) fn paths(&self, start: Option<[f64; 2]>) -> impl Iterator<Item = Path> {
+        let ends = self.x_diameter_mm.iter().zip(&self.z_mm).map(|(x, z)| (*x).zip(*z).map(|(x, z)| [x, z]));
+        let centres =
+            self.centre_x_diameter_mm.iter().zip(&self.centre_z_mm).map(|(x, z)| (*x).zip(*z).map(|(x, z)| [x, z]));
+        let mut from = start;
+        self.kind.iter().zip(ends).zip(centres).filter_map(move |((&kind, end), centre)| {
+            let begin = std::mem::replace(&mut from, end);
+            Some(Path { kind, start: begin?, end: end?, centre })
+        })
+    }
+}
+
+/// A move between two known places: diameters and z, mm.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Path {
+    pub(super) kind: Kind,
+    pub(super) start: [f64; 2],
+    pub(super) end: [f64; 2],
+    pub(super) centre: Option<[f64; 2]>,
+}
+
+impl Path {
+    /// Angle about the centre at which an arc begins, and by which it turns, rad; counter-clockwise above 0.
+    pub(super) fn turn(&self, centre: [f64; 2]) -> (f64, f64) {
+        let angle = |point: [f64; 2]| (0.5 * (point[0] - centre[0])).atan2(point[1] - centre[1]);
+        let full = std::f64::consts::TAU;
+        let (from, to) = (angle(self.start), angle(self.end));
+        let turn = if self.kind == Kind::ArcCcw { (to - from).rem_euclid(full) } else { -(from - to).rem_euclid(full) };
+        // From a place to itself an arc goes all the way round.
+        let is_round = turn.abs() < 1e-12;
+        (
+            from,
+            if is_round && self.kind == Kind::ArcCcw {
+                full
+            } else if is_round {
+                -full
+            } else {
+                turn
+            },
+        )
+    }
+
+    /// Radius of an arc about its centre, mm.
+    pub(super) fn radius(&self, centre: [f64; 2]) -> f64 {
+        (0.5 * (self.start[0] - centre[0])).hypot(self.start[1] - centre[1])
+    }
+
+    /// Length, mm.
+    fn length(&self) -> f64 {
+        match self.centre {
+            Some(centre) => self.radius(centre) * self.turn(centre).1.abs(),
+            None => (0.5 * (self.end[0] - self.start[0])).hypot(self.end[1] - self.start[1]),
+        }
+    }
+}
+
+/// The numbers of a program that is read.
+pub(crate) fn outcome(program: &Program, turned: Option<&Turned>) -> Outcome {
+    let mut moves = ReadMoves::default();
+    program.moves.iter().for_each(|one| moves.push(one));
+    let count = |is: fn(Kind) -> bool| moves.kind.iter().filter(|&&kind| is(kind)).count();
+    Outcome {
+        lines: program.lines,
+        feed_moves: count(Kind::is_feed),
+        rapid_moves: count(|kind| kind == Kind::Rapid),
+        passed_moves: count(|kind| matches!(kind, Kind::Thread | Kind::Opaque)),
+        feed_length_mm: moves.paths(None).filter(|path| path.kind.is_feed()).map(|path| path.length()).sum(),
+        tools: program.tools.clone(),
+        cycles: program.cycles.clone(),
+        moves,
+        surface: turned.map(LeftSurface::of),
+    }
+}

@@ -1,0 +1,208 @@
+//! Pictures and tables of the answer.
+
+use std::borrow::Cow;
+
+use crate::calculator::{Axis, Column, Figure, Frame, Item, Message, Panel, Role, Table};
+
+use super::super::job::{Job, ProgramStock};
+use super::super::model::reader::{CycleKind, Kind};
+use super::output::{LeftSurface, Outcome, Path};
+
+pub(crate) const FIGURE_IDS: &[&str] = &["surface", "program"];
+pub(crate) const TABLE_IDS: &[&str] = &["moves", "cycles", "surface"];
+
+/// Codes of titles, axes and legends.
+pub(crate) const LABEL_CODES: &[&str] = &[
+    "program_moves",
+    "program_z",
+    "program_diameter",
+    "moves_rapid",
+    "moves_feed",
+    "moves_arc",
+    "surface_z",
+    "surface_diameter",
+    "surface_of_blank",
+    "surface_of_program",
+    "surface_left",
+];
+
+/// Chords of a quarter in the picture.
+const CHORDS_OF_QUARTER: f64 = 12.0;
+
+pub(crate) fn figures(job: &Job, outcome: &Outcome) -> Vec<Figure> {
+    let start = job.reading.start.map(|start| [start.x_diameter_mm, start.z_mm]);
+    let mut lines = [Curve::new("moves_rapid"), Curve::new("moves_feed"), Curve::new("moves_arc")];
+    for path in outcome.moves.paths(start) {
+        match (path.kind, path.centre) {
+            (Kind::Rapid, _) => lines[0].add(&[path.start, path.end]),
+            (Kind::Line, _) => lines[1].add(&[path.start, path.end]),
+            (Kind::ArcCw | Kind::ArcCcw, Some(centre)) => lines[2].add(&chords(&path, centre)),
+            _ => {}
+        }
+    }
+    let roles = [Role::Comparison, Role::Command, Role::Command];
+    let drawn = lines.into_iter().zip(roles).filter(|(curve, _)| !curve.x.is_empty());
+    let items: Vec<Item> =
+        drawn.map(|(curve, role)| Item::Line { name: curve.name, x: curve.x, y: curve.y, role }).collect();
+    let one = |id, title, x, y, items| Figure {
+        id,
+        title: Message::new(title),
+        frame: Frame::Stacked,
+        x: Axis::linear(x, "mm"),
+        panels: vec![Panel { y: Axis::linear(y, "mm"), height: 1.0, items }],
+    };
+    let mut figures = Vec::new();
+    if let Some((stock, surface)) = job.stock.as_ref().zip(outcome.surface.as_ref()) {
+        let items = outlines(stock, surface);
+        figures.push(one("surface", "surface_left", "surface_z", "surface_diameter", items));
+    }
+    if !items.is_empty() {
+        figures.push(one("program", "program_moves", "program_z", "program_diameter", items));
+    }
+    figures
+}
+
+/// The blank and what is left of it.
+fn outlines(stock: &ProgramStock, surface: &LeftSurface) -> Vec<Item> {
+    let mut left = Curve::new("surface_of_program");
+    for i in 0..surface.z_start_mm.len() {
+        let ends =
+            [[surface.diameter_start_mm[i], surface.z_start_mm[i]], [surface.diameter_end_mm[i], surface.z_end_mm[i]]];
+        let arc = surface.centre_diameter_mm[i].zip(surface.centre_z_mm[i]).zip(surface.arc_radius_mm[i]);
+        // Steps are drawn as they stand.
+        if left.x.is_empty() {
+            left.push(ends[0]);
+        }
+        match arc {
+            None => ends.iter().for_each(|&end| left.push(end)),
+            Some(((x, z), radius)) => {
+                // Over the work a convex arc runs clockwise from left to right.
+                let kind = if radius > 0.0 { Kind::ArcCw } else { Kind::ArcCcw };
+                let path = Path { kind, start: ends[0], end: ends[1], centre: Some([x, z]) };
+                for point in chords(&path, [x, z]) {
+                    left.push(point);
+                }
+            }
+        }
+    }
+    let blank = Item::Line {
+        name: "surface_of_blank",
+        x: stock.profile.iter().map(|row| row.z_mm).collect(),
+        y: stock.profile.iter().map(|row| Some(row.diameter_mm)).collect(),
+        role: Role::Stock,
+    };
+    vec![blank, Item::Line { name: left.name, x: left.x, y: left.y, role: Role::Part }]
+}
+
+/// Pieces of one kind with gaps between them.
+struct Curve {
+    name: &'static str,
+    x: Vec<f64>,
+    y: Vec<Option<f64>>,
+}
+
+impl Curve {
+    fn new(name: &'static str) -> Self {
+        Self { name, x: Vec::new(), y: Vec::new() }
+    }
+
+    /// A piece through points (diameter and z), which goes on where the last one ended.
+    fn add(&mut self, points: &[[f64; 2]]) {
+        let [first, ..] = points else { return };
+        let ended = self.x.last().copied().zip(self.y.last().copied().flatten());
+        let goes_on = ended.is_some_and(|(z, x)| [x, z].map(f64::to_bits) == first.map(f64::to_bits));
+        if !goes_on {
+            if let Some(&z) = self.x.last() {
+                self.x.push(z);
+                self.y.push(None);
+            }
+            self.push(*first);
+        }
+        points[1..].iter().for_each(|&point| self.push(point));
+    }
+
+    fn push(&mut self, [x, z]: [f64; 2]) {
+        self.x.push(z);
+        self.y.push(Some(x));
+    }
+}
+
+/// An arc as chords.
+fn chords(path: &Path, centre: [f64; 2]) -> Vec<[f64; 2]> {
+    let ((from, turn), radius) = (path.turn(centre), path.radius(centre));
+    let count = (turn.abs() / std::f64::consts::FRAC_PI_2 * CHORDS_OF_QUARTER).ceil().max(1.0);
+    // A full turn has 48.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    let count = count as usize;
+    let between = (1..count).map(|i| {
+        let angle = from + turn * i as f64 / count as f64;
+        [centre[0] + 2.0 * radius * angle.sin(), centre[1] + radius * angle.cos()]
+    });
+    std::iter::once(path.start).chain(between).chain(std::iter::once(path.end)).collect()
+}
+
+pub(crate) fn tables(outcome: &Outcome) -> Vec<Table> {
+    let moves = &outcome.moves;
+    let lines: Vec<f64> = moves.line.iter().map(|&line| line as f64).collect();
+    let tools = moves.tool.iter().map(|tool| {
+        let named = tool.and_then(|tool| outcome.tools.get(tool as usize));
+        Cow::Owned(named.cloned().unwrap_or_default())
+    });
+    let optional = |name, unit, cells: &[Option<f64>]| Column::optional(name, unit, cells);
+    let mut found = vec![Table {
+        id: "moves",
+        columns: vec![
+            Column::numbers("line", "1", &lines),
+            Column::words("kind", moves.kind.iter().map(|kind| kind.name().into()).collect()),
+            optional("x_diameter", "mm", &moves.x_diameter_mm),
+            optional("z", "mm", &moves.z_mm),
+            optional("centre_x_diameter", "mm", &moves.centre_x_diameter_mm),
+            optional("centre_z", "mm", &moves.centre_z_mm),
+            optional("feed", "mm/rev", &moves.feed_mm_per_rev),
+            optional("feed_rate", "mm/min", &moves.feed_mm_per_min),
+            optional("spindle_speed", "rev/min", &moves.spindle_speed_rpm),
+            optional("speed", "m/min", &moves.speed_m_per_min),
+            optional("spindle_limit", "rev/min", &moves.spindle_limit_rpm),
+            Column::words("tool", tools.collect()),
+            Column::words("nose_compensation", moves.nose_compensation.iter().map(|nose| nose.name().into()).collect()),
+        ],
+    }];
+    if !outcome.cycles.is_empty() {
+        let of = |number: fn(&super::super::model::reader::ContourCycle) -> f64| -> Vec<f64> {
+            outcome.cycles.iter().map(number).collect()
+        };
+        let kinds = outcome.cycles.iter().map(|cycle| match cycle.kind {
+            CycleKind::RoughZ => "rough_z".into(),
+            CycleKind::Pattern => "pattern".into(),
+            CycleKind::Finishing => "finishing".into(),
+        });
+        found.push(Table {
+            id: "cycles",
+            columns: vec![
+                Column::numbers("line", "1", &of(|cycle| cycle.line as f64)),
+                Column::words("kind", kinds.collect()),
+                Column::numbers("from_line", "1", &of(|cycle| cycle.from_line as f64)),
+                Column::numbers("to_line", "1", &of(|cycle| cycle.to_line as f64)),
+                Column::numbers("allowance_x_diameter", "mm", &of(|cycle| cycle.allowance_x_diameter_mm)),
+                Column::numbers("allowance_z", "mm", &of(|cycle| cycle.allowance_z_mm)),
+            ],
+        });
+    }
+    if let Some(surface) = &outcome.surface {
+        let lines: Vec<Option<f64>> = surface.line.iter().map(|line| line.map(|line| line as f64)).collect();
+        found.push(Table {
+            id: "surface",
+            columns: vec![
+                Column::numbers("z_start", "mm", &surface.z_start_mm),
+                Column::numbers("z_end", "mm", &surface.z_end_mm),
+                Column::numbers("diameter_start", "mm", &surface.diameter_start_mm),
+                Column::numbers("diameter_end", "mm", &surface.diameter_end_mm),
+                optional("centre_z", "mm", &surface.centre_z_mm),
+                optional("centre_diameter", "mm", &surface.centre_diameter_mm),
+                optional("arc_radius", "mm", &surface.arc_radius_mm),
+                optional("line", "1", &lines),
+            ],
+        });
+    }
+    found
+}

@@ -1,0 +1,11 @@
+//! The job: a program with how its control reads it.
+
+mod check;
+mod input;
+
+pub use crate::calculator::Dialect;
+pub(super) use check::CODES;
+pub use input::{
+    DecimalPoint, Job, Mode, ModeKind, ProgramFeed, ProgramStart, ProgramStock, ProgramTool, ProgramUnits, Reading,
+    StockRow, WordsOfX,
+};

@@ -1,0 +1,131 @@
+//! The program that a shop has already (`program`): read as its control reads it.
+//!
+//! The way of a job: `job` -> `model` (the reader: bytes, words, blocks, moves) -> `answer` (moves, pictures, what is said).
+
+mod answer;
+mod job;
+mod model;
+
+pub use answer::output::{LeftSurface, Outcome, ReadMoves};
+pub use job::{
+    DecimalPoint, Dialect, Job, Mode, ModeKind, ProgramFeed, ProgramStart, ProgramStock, ProgramTool, ProgramUnits,
+    Reading, StockRow, WordsOfX,
+};
+pub use model::reader::{ContourCycle, CycleKind, Kind, MAX_LINES, MAX_MOVES, Nose};
+
+use crate::calculator::{
+    Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Hallmark, Message, Meta, Monitor,
+    Table,
+};
+
+use answer::{advice, output, picture};
+use model::{reader, stock};
+
+/// Reads programs for lathes.
+#[derive(Debug, Clone, Copy)]
+pub struct ProgramCompensation;
+
+impl Calculator for ProgramCompensation {
+    type Input = Job;
+    type Output = Outcome;
+
+    const META: Meta = Meta {
+        id: "program-compensation",
+        kind: CalculatorKind::Calculator,
+        version: 1,
+        title: "The program that is there",
+        question: "What does this turning program make the machine do, word by word, and what in it is not understood?",
+        summary: "A turning program as it is, for Fanuc (G-code systems A, B and C), Siemens or LinuxCNC, is read as its \
+                  control reads it: every move with its line, end, arc centre, feed, speed, tool and nose compensation; \
+                  single cycles, roughing and finishing along a contour are expanded into their moves. What is not \
+                  understood is refused with its line, column and word and with what to do, all of it at once; threads and \
+                  grooves are passed with a warning. Nothing is guessed. With a blank: the surface that the program leaves on \
+                  work and machine that do not yield, which line makes which part of it, and rapid moves through stock.",
+        references: &[
+            "Fanuc, Operator's manual for lathe systems, G-code systems A, B and C",
+            "Siemens, SINUMERIK 840D sl Programming manual, Fundamentals",
+            "LinuxCNC, G-code reference",
+        ],
+        examples: &[Example {
+            id: "two_diameters",
+            title: "Shaft of two diameters from a bar, roughed and finished, as a Fanuc of system A reads it",
+            job: include_str!("examples/two_diameters.json"),
+        }],
+        hallmarks: &[Hallmark::Of("/dialect"), Hallmark::Of("/mode/kind")],
+        study_outputs: &["/feed_moves", "/feed_length_mm"],
+        codes: CODES,
+        figures: picture::FIGURE_IDS,
+        tables: picture::TABLE_IDS,
+        has_program: false,
+    };
+
+    fn fill(_job: &mut Job) {}
+
+    fn cost(job: &Job) -> Cost {
+        let (bytes, lines) = (job.nc_program.len(), lines_of(&job.nc_program));
+        let read_ms = 1.0 + 2e-3 * lines as f64 + 2e-4 * bytes as f64;
+        // Over a blank every move is held against the outline, which grows with the moves before it.
+        let turned_ms = if job.stock.is_some() { 1e-2 * lines as f64 + 5e-4 * (lines as f64).powi(2) } else { 0.0 };
+        Cost {
+            ms: read_ms + turned_ms,
+            // A line makes four moves at most; cycles over a contour make some more.
+            bytes: 10_000_000 + 1500 * lines as u64 + 2 * bytes as u64,
+            driver: "/nc_program",
+        }
+    }
+
+    fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
+        let ModeKind::Read = job.mode.kind;
+        monitor.progress(0.0, Message::new("stage_reading"));
+        let program = reader::read(&job.nc_program, job.dialect, &job.reading, monitor)?;
+        let mut warnings = program.warnings.clone();
+        let turned = match job.stock.as_ref().zip(job.program_zero_z_mm) {
+            Some((stock, zero)) => {
+                monitor.progress(0.3, Message::new("stage_turning"));
+                let turned = stock::turned(&program, job, (stock, zero), monitor)?;
+                let doubt = stock::doubt(&turned, stock);
+                let fits = match doubt {
+                    Some(_) => stock::zero_that_fits(&program, job, stock, monitor)?,
+                    None => None,
+                };
+                warnings.extend(advice::warnings(&turned, doubt, (stock, zero, fits)));
+                Some(turned)
+            }
+            None => None,
+        };
+        let output = output::outcome(&program, turned.as_ref());
+        let explanation = advice::explanation(&output);
+        monitor.progress(1.0, Message::new("stage_done"));
+        let acting = if turned.is_some() { BASIS } else { &BASIS[..1] };
+        Ok(Answer { output, warnings, explanation, basis: acting.to_vec() })
+    }
+
+    fn figures(job: &Job, outcome: &Outcome) -> Vec<Figure> {
+        picture::figures(job, outcome)
+    }
+
+    fn tables(_job: &Job, outcome: &Outcome) -> Vec<Table> {
+        picture::tables(outcome)
+    }
+}
+
+/// The equations that act.
+const BASIS: &[Basis] = &[
+    Basis { equation: "program/2", source: "manuals of the controls" },
+    Basis { equation: "program/3", source: "envelope of segments and arcs" },
+];
+
+/// Everything that this calculator may utter.
+const CODES: Codes = Codes {
+    faults: &[job::CODES],
+    failures: &[reader::FAULT_CODES, stock::FAILURE_CODES],
+    warnings: &[reader::WARNING_CODES, advice::WARNING_CODES],
+    explanations: &[advice::EXPLANATION_CODES],
+    stages: &[&["stage_reading", "stage_turning", "stage_done"]],
+    labels: &[picture::LABEL_CODES],
+};
+
+/// How many lines a text has at most.
+fn lines_of(text: &str) -> usize {
+    text.bytes().filter(|byte| matches!(byte, b'\n' | b'\r')).count() + 1
+}

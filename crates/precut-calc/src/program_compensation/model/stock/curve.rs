@@ -1,0 +1,93 @@
+//! Radii over the axis: straight lines and parts of circles.
+
+/// Lengths that are no different, mm.
+pub(super) const SAME_MM: f64 = 1e-9;
+
+/// A radius over x, mm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Curve {
+    /// Through a point with a slope.
+    Line { x: f64, r: f64, slope: f64 },
+    /// The upper or the lower half of a circle.
+    Arc { x: f64, r: f64, radius: f64, is_upper: bool },
+}
+
+impl Curve {
+    /// The line through two points, of which the second lies to the right.
+    pub(crate) fn through([x, r]: [f64; 2], [x1, r1]: [f64; 2]) -> Self {
+        Self::Line { x, r, slope: if x1 > x { (r1 - r) / (x1 - x) } else { 0.0 } }
+    }
+
+    /// Radius at a place; beside a circle that of its end.
+    pub(crate) fn at(self, at: f64) -> f64 {
+        match self {
+            Self::Line { x, r, slope } => r + slope * (at - x),
+            Self::Arc { x, r, radius, is_upper } => {
+                let half = (radius * radius - (at - x).powi(2)).max(0.0).sqrt();
+                if is_upper { r + half } else { r - half }
+            }
+        }
+    }
+
+    fn raised(self, by: f64) -> Self {
+        match self {
+            Self::Line { x, r, slope } => Self::Line { x, r: r + by, slope },
+            Self::Arc { x, r, radius, is_upper } => Self::Arc { x, r: r + by, radius, is_upper },
+        }
+    }
+
+    /// Places between two others at which it crosses another one raised by so much.
+    pub(super) fn crossings(self, other: Self, raised: f64, within: [f64; 2], into: &mut Vec<f64>) {
+        let other = other.raised(raised);
+        let candidates = match (self, other) {
+            (Self::Line { x, r, slope }, Self::Line { x: x1, r: r1, slope: s1 }) => {
+                let turn = slope - s1;
+                [if turn.abs() > 0.0 { (r1 - s1 * x1 - r + slope * x) / turn } else { f64::NAN }, f64::NAN]
+            }
+            (Self::Line { x, r, slope }, Self::Arc { x: cx, r: cr, radius, .. })
+            | (Self::Arc { x: cx, r: cr, radius, .. }, Self::Line { x, r, slope }) => {
+                // From the foot of the perpendicular of the centre half a chord either way.
+                let length = (1.0 + slope * slope).sqrt();
+                let (tx, tr) = (1.0 / length, slope / length);
+                let along = (cx - x) * tx + (cr - r) * tr;
+                let beside = (cr - r) * tx - (cx - x) * tr;
+                let half = (radius * radius - beside * beside).max(0.0).sqrt();
+                [x + (along - half) * tx, x + (along + half) * tx]
+            }
+            (Self::Arc { x: xa, r: ra, radius: a, .. }, Self::Arc { x: xb, r: rb, radius: b, .. }) => {
+                let (dx, dr) = (xb - xa, rb - ra);
+                let distance = dx.hypot(dr);
+                if distance <= 0.0 {
+                    return;
+                }
+                let along = 0.5 * (distance + (a * a - b * b) / distance);
+                let half = (a * a - along * along).max(0.0).sqrt();
+                let (tx, tr) = (dx / distance, dr / distance);
+                [xa + along * tx - half * tr, xa + along * tx + half * tr]
+            }
+        };
+        let inside = |at: &f64| *at > within[0] + SAME_MM && *at < within[1] - SAME_MM;
+        into.extend(candidates.into_iter().filter(inside));
+    }
+}
+
+/// A curve between two places.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Piece {
+    pub(crate) x0: f64,
+    pub(crate) x1: f64,
+    pub(crate) curve: Curve,
+}
+
+impl Piece {
+    /// Length of its path, mm.
+    pub(crate) fn length(&self) -> f64 {
+        match self.curve {
+            Curve::Line { slope, .. } => (self.x1 - self.x0) * (1.0 + slope * slope).sqrt(),
+            Curve::Arc { x, radius, .. } => {
+                let angle = |at: f64| ((at - x) / radius).clamp(-1.0, 1.0).asin();
+                radius * (angle(self.x1) - angle(self.x0))
+            }
+        }
+    }
+}

@@ -1,0 +1,14 @@
+//! The work while it is turned, on work and machine that do not yield (`program/3`).
+//!
+//! `curve` (radii over the axis) -> `chain` (the outline, and who made which part) <- `sweep` (what a tool covers on its way);
+//! `rigid` drives a program over a blank.
+
+mod chain;
+mod curve;
+mod rigid;
+mod sweep;
+
+pub(crate) use curve::Curve;
+pub(crate) use rigid::{
+    Doubt, FAILURE_CODES, Turned, doubt, implausible_mm, lines_that_finish, turned, zero_that_fits,
+};

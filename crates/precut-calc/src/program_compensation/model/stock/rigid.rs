@@ -1,0 +1,255 @@
+//! A program driven over a blank that does not yield.
+
+use std::collections::BTreeMap;
+
+use crate::calculator::{Failure, Finding, Monitor, Pace};
+
+use super::super::super::job::{Job, ProgramStock, ProgramTool};
+use super::super::reader::{Kind, Nose, Program, ProgramMove};
+use super::chain::{CONTACT_MM, Chain};
+use super::curve::{Curve, Piece};
+use super::sweep::{Shape, Way};
+
+/// Why a program is not driven over its blank.
+pub(crate) const FAILURE_CODES: &[&str] = &["tool_missing", "nose_compensation_not_driven"];
+
+/// A line that owns so much of the surface finishes, mm.
+const FINISHES_MM: f64 = 0.3;
+/// An edge this steep is a wall.
+const WALL_DEG: f64 = 90.0;
+/// Multiplications of a move against a part of the outline, about.
+const WORK_OF_PART: usize = 200;
+
+/// What a program leaves.
+#[derive(Debug, Clone)]
+pub(crate) struct Turned {
+    /// The parts of the outline: ends along the part, radius over the part, and the line that made it.
+    pub(crate) parts: Vec<(Piece, Option<usize>)>,
+    /// Length of the surface by the line that made it, mm.
+    pub(crate) owned: BTreeMap<usize, f64>,
+    /// The first rapid move through stock of each line.
+    pub(crate) in_stock: Vec<InStock>,
+    /// Whether anything is cut.
+    pub(crate) cuts: bool,
+    /// The first cut along the axis: across it a cut may well be as deep as the work is thick.
+    pub(crate) first_cut: Option<Cut>,
+}
+
+/// A rapid move through stock.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct InStock {
+    pub(crate) line: usize,
+    pub(crate) depth_mm: f64,
+}
+
+/// A cut: its line and its depth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Cut {
+    pub(crate) line: usize,
+    pub(crate) depth_mm: f64,
+}
+
+/// What speaks against a program and a blank that belong together.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Doubt {
+    /// No move at the feed cuts.
+    NothingCut,
+    /// The first cut goes deeper than half the radius.
+    TooDeep(Cut),
+}
+
+/// Whether a program and its blank belong together.
+pub(crate) fn doubt(turned: &Turned, stock: &ProgramStock) -> Option<Doubt> {
+    match turned.first_cut {
+        _ if !turned.cuts => Some(Doubt::NothingCut),
+        Some(cut) if cut.depth_mm > implausible_mm(stock) => Some(Doubt::TooDeep(cut)),
+        _ => None,
+    }
+}
+
+/// Half the radius of the blank: no first cut is deeper.
+pub(crate) fn implausible_mm(stock: &ProgramStock) -> f64 {
+    0.25 * stock.profile.iter().map(|row| row.diameter_mm).fold(0.0, f64::max)
+}
+
+/// A place of program zero, at either end of the blank, with which the program cuts as programs do.
+pub(crate) fn zero_that_fits(
+    program: &Program,
+    job: &Job,
+    stock: &ProgramStock,
+    monitor: &dyn Monitor,
+) -> Result<Option<f64>, Failure> {
+    for end in [stock.profile.last(), stock.profile.first()].into_iter().flatten() {
+        let tried = turned(program, job, (stock, end.z_mm), monitor)?;
+        if tried.in_stock.is_empty() && doubt(&tried, stock).is_none() {
+            return Ok(Some(end.z_mm));
+        }
+    }
+    Ok(None)
+}
+
+/// Lines that own enough of the surface to be said to finish it.
+pub(crate) fn lines_that_finish(turned: &Turned) -> Vec<usize> {
+    turned.owned.iter().filter(|(_, length)| **length >= FINISHES_MM).map(|(&line, _)| line).collect()
+}
+
+/// The tools that cut and are not described: name and first line.
+fn missing_tools(program: &Program, tools: &[ProgramTool]) -> Vec<(String, usize)> {
+    let mut missing: Vec<(String, usize)> = Vec::new();
+    for one in program.moves.iter().filter(|one| one.kind.is_feed()) {
+        let name = name_of(program, one).unwrap_or("none");
+        let is_there = tools.iter().any(|tool| tool.number == name) || missing.iter().any(|(known, _)| known == name);
+        if !is_there {
+            missing.push((name.to_owned(), one.line));
+        }
+    }
+    missing
+}
+
+fn name_of<'p>(program: &'p Program, one: &ProgramMove) -> Option<&'p str> {
+    one.tool.and_then(|tool| program.tools.get(tool as usize)).map(String::as_str)
+}
+
+/// The region of a tool about its programmed point.
+fn shape(tool: &ProgramTool) -> Shape {
+    let slope = |degrees: f64| (degrees < WALL_DEG).then(|| degrees.to_radians().tan());
+    let (leading, trailing) = (slope(tool.cutting_edge_angle_deg), slope(tool.minor_edge_angle_deg));
+    let nose = tool.nose_radius_mm;
+    // A left-hand tool leads toward the tailstock.
+    let is_left_hand = tool.tip_direction == 4;
+    let (left, right) = if is_left_hand { (trailing, leading) } else { (leading, trailing) };
+    let centre = match tool.tip_direction {
+        3 => [nose, nose],
+        4 => [-nose, nose],
+        8 => [0.0, nose],
+        _ => [0.0, 0.0],
+    };
+    Shape { nose, left, right, centre }
+}
+
+/// The way of a move that begins at a place (diameter and z), from the headstock end.
+fn way(one: &ProgramMove, [x0, z0]: [f64; 2], [x1, z1]: [f64; 2], zero: f64) -> Way {
+    let (a, b) = ([z0 + zero, 0.5 * x0], [z1 + zero, 0.5 * x1]);
+    let Some([cx, cz]) = one.centre else {
+        return Way::Line(a, b);
+    };
+    let centre = [cz + zero, 0.5 * cx];
+    let angle = |point: [f64; 2]| (point[1] - centre[1]).atan2(point[0] - centre[0]);
+    let full = std::f64::consts::TAU;
+    let turn = match one.kind {
+        Kind::ArcCcw => (angle(b) - angle(a)).rem_euclid(full),
+        _ => -(angle(a) - angle(b)).rem_euclid(full),
+    };
+    // From a place to itself it goes all the way round.
+    let turn = if turn.abs() > 1e-9 { turn } else { full };
+    Way::Arc { centre, radius: (a[0] - centre[0]).hypot(a[1] - centre[1]), from: angle(a), turn }
+}
+
+/// Drives a program over its blank.
+pub(crate) fn turned(
+    program: &Program,
+    job: &Job,
+    (stock, zero): (&ProgramStock, f64),
+    monitor: &dyn Monitor,
+) -> Result<Turned, Failure> {
+    let missing = missing_tools(program, &job.tools);
+    if !missing.is_empty() {
+        let (names, lines): (Vec<String>, Vec<usize>) = missing.into_iter().unzip();
+        return Err(Failure::OutOfModel(
+            Finding::new("tool_missing", "/tools").with("names", names).with("lines", lines),
+        ));
+    }
+    if let Some(one) = program.moves.iter().find(|one| one.kind.is_feed() && one.nose != Nose::Off) {
+        let finding = Finding::new("nose_compensation_not_driven", "/nc_program").with("line", one.line);
+        return Err(Failure::OutOfModel(finding));
+    }
+    let shapes: Vec<Option<Shape>> =
+        program.tools.iter().map(|name| job.tools.iter().find(|tool| tool.number == *name).map(shape)).collect();
+    let rows: Vec<[f64; 2]> = stock.profile.iter().map(|row| [row.z_mm, 0.5 * row.diameter_mm]).collect();
+    let mut chain = Chain::of(&rows);
+    let mut turned =
+        Turned { parts: Vec::new(), owned: BTreeMap::new(), in_stock: Vec::new(), cuts: false, first_cut: None };
+    let mut from = job.reading.start.map(|start| [start.x_diameter_mm, start.z_mm]);
+    let mut pace = Pace::new(monitor);
+    for one in &program.moves {
+        let begin = std::mem::replace(&mut from, one.end.known());
+        let shape = one.tool.and_then(|tool| shapes.get(tool as usize).copied().flatten());
+        let (Some(begin), Some(end), Some(shape)) = (begin, one.end.known(), shape) else {
+            continue;
+        };
+        pace.work(chain.parts().len() * WORK_OF_PART)?;
+        if one.kind == Kind::Rapid {
+            let depth_mm = chain.depth_of(&shape, &way(one, begin, end, zero));
+            let is_told = turned.in_stock.last().is_some_and(|last| last.line == one.line);
+            if depth_mm > CONTACT_MM && !is_told {
+                turned.in_stock.push(InStock { line: one.line, depth_mm });
+            }
+        } else if one.kind.is_feed() {
+            let depth_mm = chain.turn(&shape, &way(one, begin, end, zero), one.line);
+            let is_along = (end[1] - begin[1]).abs() >= 0.5 * (end[0] - begin[0]).abs();
+            if depth_mm > CONTACT_MM {
+                turned.cuts = true;
+                if is_along {
+                    turned.first_cut.get_or_insert(Cut { line: one.line, depth_mm });
+                }
+            }
+        }
+    }
+    own(&chain, &mut turned);
+    Ok(turned)
+}
+
+/// Who owns how much; what is turned away wholly is no surface.
+fn own(chain: &Chain, turned: &mut Turned) {
+    let parts = chain.parts();
+    let axis = Curve::Line { x: 0.0, r: 0.0, slope: 0.0 };
+    for (i, part) in parts.iter().enumerate() {
+        if let Some(owner) = part.owner.filter(|_| part.piece.curve != axis) {
+            *turned.owned.entry(owner).or_default() += part.piece.length();
+        }
+        if let Some(before) = i.checked_sub(1).and_then(|i| parts.get(i)) {
+            let at = part.piece.x0;
+            let height = (before.piece.curve.at(at) - part.piece.curve.at(at)).abs();
+            if let Some(owner) = chain.step_owner(i).filter(|_| height > CONTACT_MM) {
+                *turned.owned.entry(owner).or_default() += height;
+            }
+        }
+        turned.parts.push((part.piece, part.owner));
+    }
+}
+
+impl Chain {
+    /// How deep a way lies in the work, mm; below 0 it stays clear.
+    fn depth_of(&self, shape: &Shape, way: &Way) -> f64 {
+        shape.sweep(way).pieces.iter().map(|piece| self.depth(piece)).fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// Cuts along a way; how deep the tool went.
+    fn turn(&mut self, shape: &Shape, way: &Way, owner: usize) -> f64 {
+        let swept = shape.sweep(way);
+        // All of it in the work as it is before.
+        let deepest = swept.pieces.iter().map(|piece| self.depth(piece)).fold(f64::NEG_INFINITY, f64::max);
+        for piece in &swept.pieces {
+            for above in above_axis(piece) {
+                self.cut(&above, owner);
+            }
+        }
+        for &[x, from] in &swept.walls {
+            self.touch_wall(x, from, owner);
+        }
+        deepest
+    }
+}
+
+/// A piece where it is above the axis, and the axis where it is below.
+fn above_axis(piece: &Piece) -> Vec<Piece> {
+    let axis = Curve::Line { x: 0.0, r: 0.0, slope: 0.0 };
+    let mut at = vec![piece.x0, piece.x1];
+    piece.curve.crossings(axis, 0.0, [piece.x0, piece.x1], &mut at);
+    at.sort_by(f64::total_cmp);
+    let part = |ends: &[f64]| {
+        let is_above = piece.curve.at(0.5 * (ends[0] + ends[1])) >= 0.0;
+        Piece { x0: ends[0], x1: ends[1], curve: if is_above { piece.curve } else { axis } }
+    };
+    at.windows(2).map(part).collect()
+}
