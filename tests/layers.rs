@@ -84,6 +84,7 @@ fn the_compute_crate_depends_on_nothing_of_the_service() {
         "rustfft",
         "serde",
         "serde_json",
+        "sobol_burley",
         "statrs",
         "thiserror",
         "utoipa",

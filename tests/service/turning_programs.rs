@@ -15,7 +15,8 @@ fn job(program: &str) -> String {
 async fn a_program_is_refused_with_every_word_that_is_not_understood() {
     let server = Server::start_of(Registry::standard().unwrap(), |_| {}).await;
     let program = job("G21 G18 G99\nG0 X40. Z2.\n#1=2.\nG1 Z-5. F0.2 ,R2.\nM30\n");
-    for (language, said) in [("en", "line 3, column 1: #1=2. is a variable"), ("ru", "строка 3, столбец 1: #1=2.")] {
+    for (language, said) in [("en", "line 3, column 1: #1=2. is a variable"), ("ru", "строка 3, столбец 1: #1=2.")]
+    {
         // From the second on the refusal is kept.
         let response = server.post_to(ROOM, program.clone()).header("accept-language", language).send().await.unwrap();
         let document = problem(response, 422, "program_not_read").await;

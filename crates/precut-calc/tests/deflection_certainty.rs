@@ -46,7 +46,7 @@ fn references_are_met() {
         let within = number(&case, "/tolerance/default/absolute");
         let answer = solved(&meant(&case, "nominal"));
         let joint = &answer["conformance"]["joint"];
-        println!("{name}: {joint} {} {}", answer["conformance"]["limits"], answer["conformance"]["method"]);
+        eprintln!("{name}: {joint} {} {}", answer["conformance"]["limits"], answer["conformance"]["method"]);
         // Both have errors: that of the draws stands in the tolerance, ours beside it.
         let near = |what: &str, value: f64, of: &str| {
             let slack = within + number(joint, "/numerical_error");
@@ -73,7 +73,7 @@ fn the_best_aim_is_that_of_the_reference() {
     let case = reference("d2-one-sided-most-probable");
     let answer = solved(&meant(&case, "most_probable"));
     let (shift, joint) = (number(&answer, "/aim_shift_um"), number(&answer, "/conformance/joint/probability"));
-    println!("{shift} um, {joint}");
+    eprintln!("{shift} um, {joint}");
     let expected = &case["expected"];
     assert!((joint - number(expected, "/best_probability_joint")).abs() <= 0.003, "{joint}");
     assert!((shift - number(expected, "/best_shift_um")).abs() <= 1.0, "{shift}");
@@ -216,7 +216,7 @@ fn shafts_are_good_as_often_as_said() {
         let good = (0..count).filter(|_| is_good(&cut(&job, &z, &commands, truth(&mut draw)), lower, upper)).count();
         let share = good as f64 / count as f64;
         let deviation = (told * (1.0 - told) / count as f64).sqrt();
-        println!("{lower} to {upper}: told {told:.4}, {good} of {count} good, {share:.4}");
+        eprintln!("{lower} to {upper}: told {told:.4}, {good} of {count} good, {share:.4}");
         assert!((share - told).abs() < 3.0 * deviation + 0.005, "{lower} to {upper}: told {told}, {share} of {count}");
     }
 }
@@ -271,7 +271,7 @@ fn a_first_part_that_is_measured_as_advised_helps_as_told() {
         })
         .count() as f64;
     let (share, told) = (good / count as f64, of("joint_probability"));
-    println!("measured: told {told}, {share} of {count}; before {}", answer["conformance"]["joint"]);
+    eprintln!("measured: told {told}, {share} of {count}; before {}", answer["conformance"]["joint"]);
     assert!((share - told).abs() < 3.0 * (told * (1.0 - told) / count as f64).sqrt() + 0.015, "{share} {told}");
 }
 

@@ -34,13 +34,15 @@ fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt()
 }
 
+/// Draws a trial of a class at a signal to noise, of a seed.
+type Drawn = fn(Class, f64, u64) -> Trial;
+
 /// What no catalogue holds is hidden in cuts on levels and in cuts of any values. Where the answer leaves a term for it, the term
 /// is tried on cuts of another day, which know it again under the stored model.
 #[test]
 fn a_remainder_of_cuts_is_stored_and_known_again() {
     let (seed, count) = (number("PRECUT_TRIAL_SEED", 40), number("PRECUT_TRIALS", 8));
-    let plans: [(&str, fn(Class, f64, u64) -> Trial); 2] =
-        [("levels", machinability::draw), ("any values", machinability::draw_continuous)];
+    let plans: [(&str, Drawn); 2] = [("levels", machinability::draw), ("any values", machinability::draw_continuous)];
     let [mut predicts, mut recognised, mut quiet] = [Share::default(); 3];
     let (mut unknown, mut of_error) = (0, Vec::new());
     for (plan, draw) in plans {

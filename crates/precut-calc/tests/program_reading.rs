@@ -429,6 +429,64 @@ fn what_says_nothing_changes_nothing() {
     }
 }
 
+/// What is put into programs.
+const PIECES: &[&str] = &[
+    "G71",
+    "G70",
+    "P1",
+    "Q2",
+    "N1",
+    "N2",
+    "G90",
+    "G92",
+    "X",
+    "Z-5.",
+    "U",
+    "W",
+    "#",
+    "[",
+    "(",
+    ")",
+    "\"",
+    "=",
+    "IC(",
+    "CR=",
+    "CYCLE97(",
+    "G2",
+    "G3",
+    "R-5.",
+    "I",
+    "K",
+    "\n",
+    "\r",
+    "\r\n",
+    " ",
+    "\t",
+    "%",
+    "/",
+    ",",
+    "-",
+    ".",
+    "99999999999",
+    "M99",
+    "O1",
+    "T0101",
+    "G50",
+    "S",
+    "F0.1",
+    "G28",
+    "ü",
+    "\u{feff}",
+    "\0",
+    "G73",
+    "D0.001",
+    "é=",
+    "LIMS=",
+    ":",
+    "<",
+    ">",
+];
+
 /// Bytes of any kind, and programs with some of their bytes changed: an answer or a refusal, never a panic, and every fault has
 /// its place. `PRECUT_READINGS=1000000` goes on for long.
 #[test]
@@ -438,68 +496,12 @@ fn any_text_is_read_or_refused() {
         .flat_map(|name| cases(name))
         .map(|case| (case["program"].as_str().unwrap().to_owned(), case["dialect"].as_str().unwrap().to_owned()))
         .collect();
-    let pieces = [
-        "G71",
-        "G70",
-        "P1",
-        "Q2",
-        "N1",
-        "N2",
-        "G90",
-        "G92",
-        "X",
-        "Z-5.",
-        "U",
-        "W",
-        "#",
-        "[",
-        "(",
-        ")",
-        "\"",
-        "=",
-        "IC(",
-        "CR=",
-        "CYCLE97(",
-        "G2",
-        "G3",
-        "R-5.",
-        "I",
-        "K",
-        "\n",
-        "\r",
-        "\r\n",
-        " ",
-        "\t",
-        "%",
-        "/",
-        ",",
-        "-",
-        ".",
-        "99999999999",
-        "M99",
-        "O1",
-        "T0101",
-        "G50",
-        "S",
-        "F0.1",
-        "G28",
-        "ü",
-        "\u{feff}",
-        "\0",
-        "G73",
-        "D0.001",
-        "é=",
-        "LIMS=",
-        ":",
-        "<",
-        ">",
-    ];
     for seed in 0..draws(1500) {
         let mut draw = Draw::new(77 + seed);
         let mut pick = |count: usize| ((draw.share() * count as f64) as usize).min(count - 1);
         let (text, own) = &texts[pick(texts.len())];
         let mut text = if pick(4) == 0 { String::new() } else { text.clone() };
-        for _ in 0..1 + pick(12) {
+        for _ in 0..=pick(12) {
             let mut at = pick(text.len() + 1);
             while !text.is_char_boundary(at) {
                 at -= 1;
@@ -507,7 +509,7 @@ fn any_text_is_read_or_refused() {
             if pick(3) == 0 && at < text.len() {
                 text.remove(at);
             } else {
-                text.insert_str(at, pieces[pick(pieces.len())]);
+                text.insert_str(at, PIECES[pick(PIECES.len())]);
             }
         }
         let dialect = if pick(3) == 0 { DIALECTS[pick(5)] } else { own };

@@ -41,14 +41,12 @@ fn surface(answer: &Answer<Outcome>) -> &LeftSurface {
 /// Diameter at a station, and the line that made it.
 fn at(surface: &LeftSurface, z: f64) -> (f64, Option<usize>) {
     let i = (0..surface.z_start_mm.len()).find(|&i| surface.z_start_mm[i] <= z && z <= surface.z_end_mm[i]).unwrap();
-    let diameter = match (surface.centre_diameter_mm[i], surface.centre_z_mm[i], surface.arc_radius_mm[i]) {
-        (Some(x), Some(centre), Some(radius)) => {
-            x + 2.0 * radius.signum() * (radius * radius - (z - centre).powi(2)).max(0.0).sqrt()
-        }
-        _ => {
-            let share = (z - surface.z_start_mm[i]) / (surface.z_end_mm[i] - surface.z_start_mm[i]);
-            surface.diameter_start_mm[i] + share * (surface.diameter_end_mm[i] - surface.diameter_start_mm[i])
-        }
+    let circle = (surface.centre_diameter_mm[i], surface.centre_z_mm[i], surface.arc_radius_mm[i]);
+    let diameter = if let (Some(x), Some(centre), Some(radius)) = circle {
+        x + 2.0 * radius.signum() * (radius * radius - (z - centre).powi(2)).max(0.0).sqrt()
+    } else {
+        let share = (z - surface.z_start_mm[i]) / (surface.z_end_mm[i] - surface.z_start_mm[i]);
+        surface.diameter_start_mm[i] + share * (surface.diameter_end_mm[i] - surface.diameter_start_mm[i])
     };
     (diameter, surface.line[i])
 }

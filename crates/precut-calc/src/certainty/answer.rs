@@ -153,7 +153,7 @@ impl Improvement {
 pub struct ConformanceMethod {
     /// Lines through the scores that were integrated over the real model.
     #[schema(extensions(("x-unit" = json!("1"))))]
-    pub lines: u32,
+    pub integrated_lines: u32,
     /// Joint probability of the model that is linear about the stated values.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub linear_probability: f64,

@@ -26,6 +26,9 @@ const MOST_STEPS: usize = 24;
 /// By how much limits are kept, negative where one is not; infinite where there is none.
 pub(crate) type Margins<const K: usize> = [f64; K];
 
+/// Numbers of independent standard normal scores.
+pub(crate) type Values<'a, const N: usize> = dyn FnMut(&[f64]) -> Result<[f64; N], Failure> + 'a;
+
 /// A probability and twice its standard error over the scramblings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Estimate {
@@ -69,7 +72,7 @@ impl<const N: usize> Sketch<N> {
         axis: &[f64],
         effort: Effort,
         monitor: &dyn Monitor,
-        values: &mut dyn FnMut(&[f64]) -> Result<[f64; N], Failure>,
+        values: &mut Values<'_, N>,
     ) -> Result<Self, Failure> {
         let frame = Frame::along(axis);
         let mut lines = Vec::new();
@@ -120,7 +123,7 @@ pub(crate) fn integrate<const K: usize>(
     axis: &[f64],
     effort: Effort,
     monitor: &dyn Monitor,
-    margins: &mut dyn FnMut(&[f64]) -> Result<Margins<K>, Failure>,
+    margins: &mut Values<'_, K>,
 ) -> Result<Found<K>, Failure> {
     let frame = Frame::along(axis);
     let most_lines = if frame.is_a_line() { 1 } else { effort.most_lines };

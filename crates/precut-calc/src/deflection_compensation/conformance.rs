@@ -226,7 +226,9 @@ impl<'a> Judged<'a> {
                 Err(failure) => return Err(failure),
             }
         }
-        by_station.iter_mut().for_each(|errors| errors.sort_by(f64::total_cmp));
+        for errors in &mut by_station {
+            errors.sort_by(f64::total_cmp);
+        }
         let below = |percent: f64| by_station.iter().map(|errors| quantile(errors, percent / 100.0)).collect();
         Ok(ErrorFan {
             z_mm: self.rehearsal.z_mm().to_vec(),
@@ -288,7 +290,7 @@ impl<'a> Judged<'a> {
             contributions,
             advice,
             method: ConformanceMethod {
-                lines: found.lines,
+                integrated_lines: found.lines,
                 linear_probability: bounded(self.linear_probability()?),
                 seed: uncertainty.seed,
             },

@@ -70,7 +70,6 @@ pub(super) fn answer<M: Diagnosable>(
         refusal = refusal.or_else(|| of_blunders(&blunders));
         weighing.doubt(blunders.iter().map(|blunder| blunder.probability).sum());
     }
-    let weighing = weighing;
     let seed = u64::from(job.options.seed);
     let gain = if job.options.held_out && refusal.is_none() {
         stage(monitor, 0.5, "diagnosis_stage_gain");

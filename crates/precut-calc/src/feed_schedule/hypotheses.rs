@@ -133,9 +133,8 @@ impl PreparedMachinability {
         // Of a model that is no power law what is added is added to the output itself.
         let unit_of_l = if self.model.form == ModelForm::SemiLog { at_reference } else { 1.0 };
         let size = match parameter.name {
-            "scale" => parameter.prior_sd,
             "offset_n" => EDGE_FORCE_SHARE * at_reference,
-            "n_per_mm" | "wear_in_mm" | "rate_mm_per_min" => parameter.prior_sd,
+            "scale" | "n_per_mm" | "wear_in_mm" | "rate_mm_per_min" => parameter.prior_sd,
             _ => parameter.prior_sd * unit_of_l,
         };
         let treatment = match parameter.fit {

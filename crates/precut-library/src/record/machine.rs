@@ -71,7 +71,11 @@ const TRAVEL: &[Field] = &[
 ];
 
 const CONTROL: &[Field] = &[
-    field("dialect", Form::SourcedWord(&["fanuc", "fanuc_a", "fanuc_c", "siemens", "linuxcnc"]), "How programs are spelled."),
+    field(
+        "dialect",
+        Form::SourcedWord(&["fanuc", "fanuc_a", "fanuc_c", "siemens", "linuxcnc"]),
+        "How programs are spelled.",
+    ),
     field(
         "increment_um",
         Form::Number(quantity("um", "increment", (0.001, 100.0), 1.0)),

@@ -112,7 +112,7 @@ impl Formula {
 
     /// Which of the names it uses.
     pub fn uses(&self, name: usize) -> bool {
-        self.nodes.iter().any(|node| *node == Node::Name(name))
+        self.nodes.contains(&Node::Name(name))
     }
 
     /// Its value, of values of the names in mm, min, N, K and rad; not finite where it has none.
