@@ -40,4 +40,4 @@ CREATE TABLE precut.workers (
     seen_ms bigint NOT NULL
 ) WITH (fillfactor = 50);
 -- Programs before this look for their jobs in a queue that is gone.
-INSERT INTO precut.versions VALUES (8, 8);
+INSERT INTO precut.versions VALUES (9, 9);

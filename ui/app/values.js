@@ -83,7 +83,7 @@ export function flat(schema, value, root, path = [], out = [], names = [], sprea
 }
 
 /** An error of the numbers is known to two digits. */
-export const digitsOf = ({ path }) => (/(^|_)(numerical_error|uncertainty)(_[a-z]+)*$/.test(String(path.at(-1))) ? 2 : 5);
+export const digitsOf = ({ path }) => (/(^|_)(numerical|uncertainty)(_[a-z]+)*$/.test(String(path.at(-1))) ? 2 : 5);
 
 /** Words of results that no schema lists. */
 const SAID = {
