@@ -169,8 +169,9 @@ async fn all_bodies_together_stay_within_their_budget() {
     }
     let took = memory(process, "VmHWM") - at_rest;
     println!("{seen:?}, {:.1} MB of {:.1} MB, {:.1} MB in all", took / MB, BUDGET / MB, (took + at_rest) / MB);
-    // Beside the bodies stand the buffers of eighteen connections, and what the allocator has not given back.
-    assert!(took <= 1.25 * BUDGET, "{:.1} MB of {:.1} MB", took / MB, BUDGET / MB);
+    // Beside the bodies stand the buffers of ten connections, one megabyte each, and what the allocator of every thread has not
+    // given back: 51 to 91 MB were seen, the more the busier the machine. Whole, the bodies at once would take 230 MB.
+    assert!(took <= 1.5 * BUDGET, "{:.1} MB of {:.1} MB", took / MB, BUDGET / MB);
     // What was taken is given back: a large body is read again.
     let (name, path, body, _) = &all[1];
     assert_eq!(sent(&service.client, service.url(path), body.clone()).await.0, 422, "{name}");
