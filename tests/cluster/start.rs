@@ -83,9 +83,12 @@ async fn what_is_wrong_with_the_store_is_said_without_its_credentials() {
         .spawn()
         .unwrap();
     crate::support::address_of(&mut child);
+    // It says where it listens before it writes that down.
+    let log_read = || std::fs::read_to_string(&log).unwrap();
+    until("the last line of the start", async || log_read().contains("serving").then_some(())).await;
     child.kill().unwrap();
     child.wait().unwrap();
-    let said = std::fs::read_to_string(&log).unwrap();
+    let said = log_read();
     assert!(said.contains("serving") && !said.contains("loopback"), "{}", &said[..said.len().min(2000)]);
 }
 
@@ -94,10 +97,10 @@ async fn a_database_of_a_newer_program_or_without_rights_is_refused_and_left_alo
     let Some(database) = Database::start() else { return };
     Member::start(&database, "api", &[]).await.stop();
     let pool = database.pool().await;
-    sqlx::query("INSERT INTO precut.versions VALUES (9, 9)").execute(&pool).await.unwrap();
+    sqlx::query("INSERT INTO precut.versions VALUES (10, 10)").execute(&pool).await.unwrap();
     let (code, said) = refused(&database.address, &[], &[]);
     assert!(code == Some(1) && said.contains("newer precut"), "{said}");
-    sqlx::query("DELETE FROM precut.versions WHERE version = 9").execute(&pool).await.unwrap();
+    sqlx::query("DELETE FROM precut.versions WHERE version = 10").execute(&pool).await.unwrap();
     sqlx::query("ALTER DATABASE postgres SET default_transaction_read_only = on").execute(&pool).await.unwrap();
     let (code, said) = refused(&database.address, &[], &[]);
     assert!(code == Some(1) && said.contains("read-only"), "{said}");
