@@ -495,7 +495,7 @@ pub trait JobStore: Send + Sync + 'static {
     fn waits(&self, short_ms: Option<f64>) -> BoxFuture<'_, Result<bool, StoreError>>;
     /// Takes the next job in line and all equal ones that wait under a lease, and charges them one start.
     fn take(&self, wanted: Wanted) -> BoxFuture<'_, Result<Next, StoreError>>;
-    /// Keeps a suspect from others for [`SILENCE`].
+    /// Keeps a suspect from others for `SILENCE`.
     fn hold(&self, id: JobId) -> BoxFuture<'_, Result<(), StoreError>>;
     /// Takes this job and all equal ones that wait under a lease, and charges them one start; fails them, with
     /// `problem`, if they have been charged `most` already.

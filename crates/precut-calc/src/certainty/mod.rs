@@ -1,8 +1,8 @@
 //! How sure: from what is uncertain in a job to the probability that every limit is kept (`certainty/1` to `certainty/3`).
 //!
 //! A quantity is a factor on what the job states, or an addition to it, drawn from a [`Distribution`] by its standard normal
-//! score. Scores are correlated as the job says ([`Scores`]). The probability is integrated over the real model, exactly
-//! along one line through the scores and by scrambled Sobol points over the others ([`lines`]).
+//! score. Scores are correlated as the job says (`scores`). The probability is integrated over the real model, exactly
+//! along one line through the scores and by scrambled Sobol points over the others (`lines`).
 
 mod answer;
 mod distribution;
