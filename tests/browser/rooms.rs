@@ -168,7 +168,8 @@ fn a_run_is_pinned_compared_and_read() {
     page.press("ArrowRight");
     page.until("document.querySelector('.picture [role=status]').textContent.includes('µm')");
 
-    // Dragging shows a part of it, Escape all of it.
+    // Dragging shows a part of it, Escape all of it. What has the focus may have been moved into view.
+    let middle = page.middle(".stack svg.chart");
     page.drag((middle.0 - 100.0, middle.1), (middle.0 + 50.0, middle.1));
     page.until("!document.querySelector('[aria-label^=\"Show all\"]').disabled");
     page.evaluate("document.querySelector('.plot').focus()");
