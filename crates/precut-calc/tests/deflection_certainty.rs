@@ -6,6 +6,9 @@
 
 use crate::deflection_uncertainty::{cut_with, with_compliance, with_force};
 use crate::draw::Draw;
+use crate::support::prepared;
+use precut_calc::calculator::{Calculator as _, Unwatched};
+use precut_calc::deflection_compensation::DeflectionCompensation;
 use serde_json::{Value, json};
 
 fn solved(job: &Value) -> Value {
@@ -328,4 +331,34 @@ fn what_cannot_be_is_refused_with_what_can() {
         let codes: Vec<&str> = refused(quantities, more).iter().map(|fault| fault.code).collect();
         assert_eq!(codes, [code]);
     }
+}
+
+#[test]
+fn the_uncertainty_along_the_shaft_is_that_of_the_stated_quantities() {
+    let tolerance = json!({ "diameter_um": 40 });
+    let mut percent = job(&json!([]), &tolerance);
+    percent["uncertainty"]["force_percent"] = json!(20);
+    let stated = job(
+        &json!([{ "quantity": "force", "distribution": { "kind": "normal", "standard_uncertainty_percent": 20 } }]),
+        &tolerance,
+    );
+    let [by_percent, by_quantity] =
+        [percent, stated].map(|job| numbers(&solved(&job)["stations"]["diameter_uncertainty_um"]));
+    assert!(by_percent[10] > 1.0);
+    assert_eq!(by_percent, by_quantity);
+}
+
+#[test]
+fn correlated_quantities_have_no_shares_and_none_is_said_to_have_most() {
+    let normal = json!({ "kind": "normal", "standard_uncertainty_percent": 10 });
+    let mut together = job(
+        &json!([{ "quantity": "force", "distribution": normal }, { "quantity": "stiffness", "distribution": normal }]),
+        &json!({ "diameter_um": 40 }),
+    );
+    together["uncertainty"]["correlations"] = json!([{ "between": ["force", "stiffness"], "coefficient": -0.5 }]);
+    let answer = DeflectionCompensation::run(&prepared(together), &Unwatched).unwrap();
+    let told = answer.explanation.iter().find(|message| message.code == "probably_good").unwrap();
+    assert!(told.values.get("quantity").is_none());
+    let contributions = answer.output.conformance.unwrap().contributions;
+    assert!(contributions.iter().all(|one| one.share_of_variance.is_none()));
 }

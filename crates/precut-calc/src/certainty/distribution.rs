@@ -166,6 +166,17 @@ impl Distribution {
         }
     }
 
+    /// Relative standard deviation of a factor, that of its logarithm where that is normal.
+    pub(crate) fn relative(&self) -> f64 {
+        match *self {
+            Self::Normal { standard_uncertainty_percent: Some(percent), .. } => percent / 100.0,
+            Self::Uniform { half_width_percent: Some(percent), .. } => percent / 100.0 / 3.0_f64.sqrt(),
+            Self::Triangular { half_width_percent: Some(percent), .. } => percent / 100.0 / 6.0_f64.sqrt(),
+            Self::Lognormal { log_standard_deviation } => log_standard_deviation,
+            Self::Normal { .. } | Self::Uniform { .. } | Self::Triangular { .. } | Self::StudentT { .. } => 0.0,
+        }
+    }
+
     /// The same with half of its width.
     pub(crate) fn halved(&self) -> Self {
         let half = |width: &mut Option<f64>| *width = width.map(|width| 0.5 * width);

@@ -239,11 +239,12 @@ pub(super) fn explanation(job: &Job, outcome: &Outcome, seen_along: &SeenAlong) 
             _ => Message::new("path_has_gaps").with("stations", without_command(outcome)),
         });
     }
+    let [force, stiffness] = job.uncertainty.of_force_and_stiffness();
     said.push(
         Message::new("uncertain_by")
             .with("uncertainty_um", seen_along.uncertainty_um)
-            .with("force_percent", job.uncertainty.force_percent)
-            .with("stiffness_percent", job.uncertainty.stiffness_percent),
+            .with("force_percent", 100.0 * force)
+            .with("stiffness_percent", 100.0 * stiffness),
     );
     said.extend(worthwhile_rest(job, outcome));
     let overcut =

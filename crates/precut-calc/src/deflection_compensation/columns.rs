@@ -132,7 +132,7 @@ struct Relative {
 
 impl Relative {
     fn of(stated: &Uncertainty) -> Self {
-        let (force, stiffness) = (stated.force_percent / 100.0, stated.stiffness_percent / 100.0);
+        let [force, stiffness] = stated.of_force_and_stiffness();
         Self { force, stiffness, both: force.hypot(stiffness) }
     }
 

@@ -206,6 +206,17 @@ impl Uncertainties {
     }
 }
 
+impl Uncertainty {
+    /// Relative standard uncertainty of force and of stiffness: as a quantity states it, else in percent.
+    pub(super) fn of_force_and_stiffness(&self) -> [f64; 2] {
+        let of = |quantity, percent: f64| {
+            let stated = self.quantities.iter().find(|one| one.quantity == quantity);
+            stated.map_or(percent / 100.0, |one| one.distribution.relative())
+        };
+        [of(DeflectionQuantity::Force, self.force_percent), of(DeflectionQuantity::Stiffness, self.stiffness_percent)]
+    }
+}
+
 /// What is uncertain in every job, as far as it is not stated otherwise.
 fn usual(job: &Job) -> Vec<Uncertain> {
     let Uncertainty { force_percent, stiffness_percent, .. } = job.uncertainty;
