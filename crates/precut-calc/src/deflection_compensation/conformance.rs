@@ -12,11 +12,12 @@ use super::output::ErrorFan;
 use super::rehearsal::Rehearsal;
 use super::uncertain::Uncertainties;
 
-/// Upper and lower limit of size, and form.
-const LIMITS: usize = 3;
+/// Upper and lower limit of size, both together, and form.
+const LIMITS: usize = 4;
 const ABOVE: usize = 0;
 const BELOW: usize = 1;
-const FORM: usize = 2;
+const SIZE: usize = 2;
+const FORM: usize = 3;
 /// A probability is told between these.
 const LEAST: f64 = 1e-6;
 /// Most lines of one scrambling: for a probability, for what something else would make of it on the same points, and for what
@@ -81,6 +82,7 @@ impl<'a> Judged<'a> {
         let mut margins = [f64::INFINITY; LIMITS];
         margins[ABOVE] = self.limits.upper_um.map_or(f64::INFINITY, |upper| upper - largest);
         margins[BELOW] = self.limits.lower_um.map_or(f64::INFINITY, |lower| smallest - lower);
+        margins[SIZE] = margins[ABOVE].min(margins[BELOW]);
         margins[FORM] = self.job.tolerance.form_um.map_or(f64::INFINITY, |form| form - (largest - smallest));
         margins
     }
@@ -301,13 +303,11 @@ impl<'a> Judged<'a> {
         let passed = |limit: usize| bounded(1.0 - found.each[limit].probability);
         let mut kept = Vec::new();
         if let Some(pointer) = self.job.tolerance.size_pointer() {
-            // One place passes one limit of size at a time, but a crooked part may pass both.
-            let both = found.each[ABOVE].probability + found.each[BELOW].probability - 1.0;
             kept.push(LimitKept {
                 limit: "size".to_owned(),
                 pointer: pointer.to_owned(),
-                probability: bounded(both.max(found.joint.probability)),
-                numerical_error: found.each[ABOVE].error + found.each[BELOW].error,
+                probability: bounded(found.each[SIZE].probability),
+                numerical_error: found.each[SIZE].error,
                 probability_above: self.limits.upper_um.map(|_| passed(ABOVE)),
                 probability_below: self.limits.lower_um.map(|_| passed(BELOW)),
             });
@@ -511,7 +511,8 @@ pub(super) fn said(conformance: &Conformance) -> Vec<Message> {
         .with("wanted_percent", 100.0 * joint.wanted)
         .with("met", if joint.met { "yes" } else { "no" })
         .with("common_percent", 100.0 * conformance.setup.share_common_to_all);
-    if let Some(largest) = conformance.contributions.first() {
+    // Where quantities go together none has a share of its own.
+    if let Some(largest) = conformance.contributions.iter().find(|one| one.share_of_variance.is_some()) {
         first = first
             .with("quantity", largest.quantity.clone())
             .with("share_percent", 100.0 * largest.share_of_variance.unwrap_or(0.0));
