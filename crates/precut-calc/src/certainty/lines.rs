@@ -5,21 +5,32 @@
 //! sum of differences of the normal distribution function. What is left over the other directions is smooth: few points give
 //! it, and small risks come out with a small relative error. Scrambled nets: A. Owen, Ann. Statist. 25 (1997) 1541-1562;
 //! points by B. Burley, J. Comput. Graph. Tech. 9 (2020) no. 4.
+//!
+//! Most lines ask a model that is near the real one and costs little; what the real one makes of some of them is added as a
+//! difference, so that the expectation is that of the real one alone (two levels of M. Giles, Oper. Res. 56 (2008) 607-617).
+
+use std::ops::RangeInclusive;
 
 use crate::calculator::{Failure, Monitor, checkpoint};
 
 use super::{normal_below, normal_quantile};
 
 /// Independent scramblings; their spread is the error.
-const SCRAMBLINGS: u32 = 8;
-/// Lines of a scrambling at first.
-const FIRST_LINES: u32 = 8;
+const SCRAMBLINGS: usize = 8;
+/// Lines of a scrambling at first: of the near model, and of the real one.
+const FIRST_LINES: [usize; 2] = [8, 2];
+/// Largest error, of the probability and relative to the smaller of it and its complement.
+const LARGEST_ERROR: [f64; 2] = [0.002, 0.1];
+/// Share of the error that the near model may take of itself.
+const NEAR_SHARE: f64 = 0.5;
+/// An error no larger than this times that of the near model comes of the lines alone.
+const NEAR_IS_ALL: f64 = 1.2;
 /// Ends of a line: beyond them lies less than 1e-10.
 const REACH: f64 = 6.5;
 /// Intervals of a line at first.
 const INTERVALS: usize = 13;
 /// How closely a place is found at which a limit is passed.
-const PLACE: f64 = 1e-5;
+const PLACE: f64 = 1e-4;
 /// Most steps to a place.
 const MOST_STEPS: usize = 24;
 
@@ -29,6 +40,9 @@ pub(crate) type Margins<const K: usize> = [f64; K];
 /// Numbers of independent standard normal scores.
 pub(crate) type Values<'a, const N: usize> = dyn FnMut(&[f64]) -> Result<[f64; N], Failure> + 'a;
 
+/// Limits that are kept together, by their places among the margins.
+pub(crate) type Together = RangeInclusive<usize>;
+
 /// A probability and twice its standard error over the scramblings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Estimate {
@@ -36,14 +50,28 @@ pub(crate) struct Estimate {
     pub error: f64,
 }
 
+impl Estimate {
+    fn of(means: [f64; SCRAMBLINGS]) -> Self {
+        let count = SCRAMBLINGS as f64;
+        let mean = means.iter().sum::<f64>() / count;
+        let variance = means.map(|one| (one - mean).powi(2)).iter().sum::<f64>() / (count - 1.0);
+        Self { probability: mean.clamp(0.0, 1.0), error: 2.0 * (variance / count).sqrt() }
+    }
+
+    /// Whether its error takes no more than a share of what it may be.
+    fn is_enough(self, share: f64) -> bool {
+        let Self { probability, error } = self;
+        error <= share * LARGEST_ERROR[0].min(LARGEST_ERROR[1] * probability.min(1.0 - probability))
+    }
+}
+
 /// What was found.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Found<const K: usize> {
-    /// Of every limit alone.
-    pub each: [Estimate; K],
-    /// Of all together.
-    pub joint: Estimate,
-    pub lines: u32,
+pub(crate) struct Found<const S: usize> {
+    /// Of every set of limits.
+    pub of: [Estimate; S],
+    /// Lines on which the real model was asked.
+    pub lines: usize,
 }
 
 /// How far to go.
@@ -51,12 +79,116 @@ pub(crate) struct Found<const K: usize> {
 pub(crate) struct Effort {
     pub seed: u32,
     /// Most lines of one scrambling; a power of two.
-    pub most_lines: u32,
+    pub most_lines: usize,
+}
+
+/// Where and of what probabilities are wanted: lines along `axis`, sets of limits of which the last decides how far to go.
+pub(crate) struct Question<'a, const S: usize> {
+    pub axis: &'a [f64],
+    pub sets: [Together; S],
+    pub effort: Effort,
+    pub monitor: &'a dyn Monitor,
+}
+
+impl<const S: usize> Question<'_, S> {
+    /// The probabilities by the margins of one model alone.
+    pub(crate) fn of<const K: usize>(&self, margins: &mut Values<'_, K>) -> Result<Found<S>, Failure> {
+        let mut lines = Lines::of(self);
+        lines.until(1.0, margins)?;
+        Ok(lines.found(lines.done()))
+    }
+
+    /// The probabilities by the real model, most lines of which are those of one that is near.
+    pub(crate) fn of_real<const K: usize>(
+        &self,
+        real: &mut Values<'_, K>,
+        near: &mut Values<'_, K>,
+    ) -> Result<Found<S>, Failure> {
+        let mut nearly = Lines::of(self);
+        nearly.until(NEAR_SHARE, near)?;
+        let near_error = nearly.found(nearly.done()).of[S - 1].error;
+        let mut really = Lines::of(self);
+        let mut count = FIRST_LINES[1].min(nearly.done());
+        loop {
+            really.extend(count, real)?;
+            let found = Found {
+                of: std::array::from_fn(|set| {
+                    let (all, asked, more) =
+                        (nearly.means(set, nearly.done()), really.means(set, count), nearly.means(set, count));
+                    Estimate::of(std::array::from_fn(|one| all[one] + asked[one] - more[one]))
+                }),
+                lines: SCRAMBLINGS * count,
+            };
+            let last = found.of[S - 1];
+            // What the lines themselves leave open the real model cannot tell either.
+            if last.is_enough(1.0) || last.error <= NEAR_IS_ALL * near_error || count >= nearly.done() {
+                return Ok(found);
+            }
+            count = (2 * count).min(nearly.done());
+        }
+    }
+}
+
+/// Probabilities of lines, by scrambling.
+struct Lines<'a, const S: usize> {
+    question: &'a Question<'a, S>,
+    frame: Frame,
+    most: usize,
+    of: [Vec<[f64; S]>; SCRAMBLINGS],
+}
+
+impl<'a, const S: usize> Lines<'a, S> {
+    fn of(question: &'a Question<'a, S>) -> Self {
+        let frame = Frame::along(question.axis);
+        let most = if frame.is_a_line() { 1 } else { question.effort.most_lines };
+        Self { question, frame, most, of: std::array::from_fn(|_| Vec::new()) }
+    }
+
+    fn done(&self) -> usize {
+        self.of[0].len()
+    }
+
+    /// Asks up to so many lines of every scrambling.
+    fn extend<const K: usize>(&mut self, count: usize, margins: &mut Values<'_, K>) -> Result<(), Failure> {
+        let Question { sets, effort, monitor, .. } = self.question;
+        for (scrambling, lines) in self.of.iter_mut().enumerate() {
+            for index in lines.len()..count {
+                checkpoint(*monitor)?;
+                let start = self.frame.across(index, effort.scrambled(scrambling));
+                let line = Line::scanned(&mut |place| margins(&self.frame.at(&start, place)))?;
+                lines.push(sets.clone().map(|set| line.probability(set)));
+            }
+        }
+        Ok(())
+    }
+
+    /// Asks lines until the last set is known to a share of the largest error.
+    fn until<const K: usize>(&mut self, share: f64, margins: &mut Values<'_, K>) -> Result<(), Failure> {
+        let mut count = FIRST_LINES[0].min(self.most);
+        loop {
+            self.extend(count, margins)?;
+            if self.found(count).of[S - 1].is_enough(share) || count >= self.most {
+                return Ok(());
+            }
+            count = (2 * count).min(self.most);
+        }
+    }
+
+    /// Means of a set over the first lines of every scrambling.
+    fn means(&self, set: usize, count: usize) -> [f64; SCRAMBLINGS] {
+        std::array::from_fn(|one| self.of[one][..count].iter().map(|line| line[set]).sum::<f64>() / count.max(1) as f64)
+    }
+
+    fn found(&self, count: usize) -> Found<S> {
+        let of = std::array::from_fn(|set| Estimate::of(self.means(set, count)));
+        Found { of, lines: SCRAMBLINGS * count }
+    }
 }
 
 impl Effort {
-    fn scrambled(self, scrambling: u32) -> u32 {
-        self.seed.wrapping_mul(SCRAMBLINGS).wrapping_add(scrambling)
+    #[allow(clippy::cast_possible_truncation)] // fewer than ten
+    fn scrambled(self, scrambling: usize) -> u32 {
+        self.seed.wrapping_mul(SCRAMBLINGS as u32).wrapping_add(scrambling as u32)
     }
 }
 
@@ -77,7 +209,7 @@ impl<const N: usize> Sketch<N> {
         let frame = Frame::along(axis);
         let mut lines = Vec::new();
         for scrambling in 0..SCRAMBLINGS {
-            for index in 0..FIRST_LINES.min(effort.most_lines) {
+            for index in 0..FIRST_LINES[0].min(effort.most_lines) {
                 checkpoint(monitor)?;
                 let start = frame.across(index, effort.scrambled(scrambling));
                 let node = |place: f64| Ok((place, values(&frame.at(&start, place))?));
@@ -87,21 +219,20 @@ impl<const N: usize> Sketch<N> {
         Ok(Self { lines })
     }
 
-    /// The probability that each limit is kept, and that all are, by `margins` of the values.
-    pub(crate) fn kept<const K: usize>(
+    /// The probability of every set of limits, by `margins` of the values.
+    pub(crate) fn kept<const K: usize, const S: usize>(
         &self,
+        sets: &[Together; S],
         margins: &dyn Fn([f64; N]) -> Margins<K>,
-    ) -> Result<([f64; K], f64), Failure> {
-        let mut sums = ([0.0; K], 0.0);
+    ) -> Result<[f64; S], Failure> {
+        let mut sums = [0.0; S];
         for nodes in &self.lines {
             let line = Line::scanned(&mut |place| Ok(margins(between_nodes(nodes, place))))?;
-            for (limit, sum) in sums.0.iter_mut().enumerate() {
-                *sum += line.probability(limit..=limit);
+            for (sum, set) in sums.iter_mut().zip(sets) {
+                *sum += line.probability(set.clone());
             }
-            sums.1 += line.probability(0..=K - 1);
         }
-        let count = self.lines.len().max(1) as f64;
-        Ok((sums.0.map(|sum| sum / count), sums.1 / count))
+        Ok(sums.map(|sum| sum / self.lines.len().max(1) as f64))
     }
 }
 
@@ -118,61 +249,18 @@ fn between_nodes<const N: usize>(nodes: &[(f64, [f64; N])], place: f64) -> [f64;
     std::array::from_fn(|index| before[index] + share * (behind[index] - before[index]))
 }
 
-/// The probability that all limits are kept: `margins` of independent standard normal scores, lines along `axis`.
-pub(crate) fn integrate<const K: usize>(
-    axis: &[f64],
-    effort: Effort,
-    monitor: &dyn Monitor,
-    margins: &mut Values<'_, K>,
-) -> Result<Found<K>, Failure> {
-    let frame = Frame::along(axis);
-    let most_lines = if frame.is_a_line() { 1 } else { effort.most_lines };
-    let mut sums = [[0.0; 2]; SCRAMBLINGS as usize].map(|_| (vec![0.0; K], 0.0));
-    let (mut done, mut wanted) = (0, FIRST_LINES.min(most_lines));
-    loop {
-        for (scrambling, (each, joint)) in (0..SCRAMBLINGS).zip(&mut sums) {
-            for index in done..wanted {
-                checkpoint(monitor)?;
-                let start = frame.across(index, effort.scrambled(scrambling));
-                let line = Line::scanned(&mut |place| margins(&frame.at(&start, place)))?;
-                for (limit, sum) in each.iter_mut().enumerate() {
-                    *sum += line.probability(limit..=limit);
-                }
-                *joint += line.probability(0..=K - 1);
-            }
-        }
-        done = wanted;
-        let found = Found {
-            each: std::array::from_fn(|limit| estimate(sums.iter().map(|(each, _)| each[limit] / f64::from(done)))),
-            joint: estimate(sums.iter().map(|(_, joint)| joint / f64::from(done))),
-            lines: SCRAMBLINGS * done,
-        };
-        let Estimate { probability, error } = found.joint;
-        let is_enough = error <= f64::min(0.002, 0.1 * probability.min(1.0 - probability));
-        if is_enough || done >= most_lines {
-            return Ok(found);
-        }
-        wanted = (2 * done).min(most_lines);
-    }
-}
-
 /// So many points of independent standard normal scores, evenly scattered.
-pub(crate) fn points(count: u32, dimensions: usize, seed: u32) -> impl Iterator<Item = Vec<f64>> {
+pub(crate) fn points(count: usize, dimensions: usize, seed: u32) -> impl Iterator<Item = Vec<f64>> {
     (0..count).map(move |index| (0..).take(dimensions).map(|dimension| score(index, dimension, seed)).collect())
 }
 
 /// The score of a point of a scrambled Sobol sequence.
-fn score(index: u32, dimension: u32, seed: u32) -> f64 {
+#[allow(clippy::cast_possible_truncation)] // far fewer than 2^32
+fn score(index: usize, dimension: u32, seed: u32) -> f64 {
+    let index = index as u32;
     let sample = f64::from(sobol_burley::sample(index, dimension, seed));
     // In the middle of the cells of a number of 24 bits: never 0.
     normal_quantile(sample + 0.5 / f64::from(1 << 24))
-}
-
-fn estimate(means: impl Iterator<Item = f64> + Clone) -> Estimate {
-    let count = f64::from(SCRAMBLINGS);
-    let mean = means.clone().sum::<f64>() / count;
-    let variance = means.map(|one| (one - mean).powi(2)).sum::<f64>() / (count - 1.0);
-    Estimate { probability: mean.clamp(0.0, 1.0), error: 2.0 * (variance / count).sqrt() }
 }
 
 /// An orthonormal frame whose first axis is given: the reflection that takes the first unit vector there.
@@ -201,7 +289,7 @@ impl Frame {
     }
 
     /// Where the line of that index crosses the plane across the axis.
-    fn across(&self, index: u32, seed: u32) -> Vec<f64> {
+    fn across(&self, index: usize, seed: u32) -> Vec<f64> {
         let mut point = vec![0.0; self.axis.len()];
         for (dimension, place) in (0..).zip(point.iter_mut().skip(1)) {
             *place = score(index, dimension, seed);
@@ -260,7 +348,7 @@ impl<const K: usize> Line<K> {
     }
 
     /// The probability that limits are kept together.
-    fn probability(&self, limits: std::ops::RangeInclusive<usize>) -> f64 {
+    fn probability(&self, limits: Together) -> f64 {
         let mut kept = self.begins;
         let mut places: Vec<(f64, usize)> =
             limits.clone().flat_map(|limit| self.passed[limit].iter().map(move |&place| (place, limit))).collect();
@@ -334,8 +422,10 @@ mod tests {
 
     const EFFORT: Effort = Effort { seed: 1, most_lines: 256 };
 
-    fn found<const K: usize>(axis: &[f64], mut margins: impl FnMut(&[f64]) -> Margins<K>) -> Found<K> {
-        integrate(axis, EFFORT, &Unwatched, &mut |g| Ok(margins(g))).unwrap()
+    /// Probabilities of every limit and, last, of all.
+    fn found<const K: usize>(axis: &[f64], mut margins: impl FnMut(&[f64]) -> Margins<K>) -> Found<2> {
+        let question = Question { axis, sets: [0..=0, 0..=K - 1], effort: EFFORT, monitor: &Unwatched };
+        question.of(&mut |g| Ok(margins(g))).unwrap()
     }
 
     #[test]
@@ -343,7 +433,7 @@ mod tests {
         for distance in [-1.0, 0.5, 3.5] {
             let found = found(&[3.0, 4.0, 0.0], |g| [distance - (0.6 * g[0] + 0.8 * g[1])]);
             let risk = normal_below(-distance);
-            assert!((1.0 - found.joint.probability - risk).abs() < 1e-5 * risk.max(1e-4), "{found:?}");
+            assert!((1.0 - found.of[1].probability - risk).abs() < 1e-5 * risk.max(1e-4), "{found:?}");
         }
     }
 
@@ -354,8 +444,8 @@ mod tests {
             let x = 0.6 * g[0] + 0.8 * g[1];
             [1.0 - x, x + 0.5]
         });
-        assert!((found.joint.probability - exact).abs() < 2.0 * found.joint.error + 1e-4, "{found:?} {exact}");
-        assert!((found.each[0].probability - normal_below(1.0)).abs() < 2.0 * found.each[0].error + 1e-4);
+        assert!((found.of[1].probability - exact).abs() < 2.0 * found.of[1].error + 1e-4, "{found:?} {exact}");
+        assert!((found.of[0].probability - normal_below(1.0)).abs() < 2.0 * found.of[0].error + 1e-4);
     }
 
     #[test]
@@ -364,14 +454,37 @@ mod tests {
         for radius in [2.0_f64, 0.3] {
             let found = found(&[1.0, 0.0], |g| [radius * radius - g[0] * g[0] - g[1] * g[1]]);
             let exact = -(-0.5 * radius * radius).exp_m1();
-            assert!((found.joint.probability - exact).abs() < 2.0 * found.joint.error + 1e-4, "{found:?} {exact}");
+            assert!((found.of[1].probability - exact).abs() < 2.0 * found.of[1].error + 1e-4, "{found:?} {exact}");
         }
+    }
+
+    #[test]
+    fn the_real_model_alone_decides() {
+        // The near model is a plane that is somewhat off; the real one is bent.
+        let real = |g: &[f64]| [1.0 - g[0] - 0.1 * g[1] * g[1] + 0.2 * g[2]];
+        let question = Question { axis: &[1.0, 0.0, -0.2], sets: [0..=0], effort: EFFORT, monitor: &Unwatched };
+        let alone = question.of(&mut |g| Ok(real(g))).unwrap();
+        for offset in [0.0, 0.5, -3.0] {
+            let beside =
+                question.of_real(&mut |g| Ok(real(g)), &mut |g| Ok([1.0 + offset - g[0] + 0.2 * g[2]])).unwrap();
+            let [alone, beside] = [alone.of[0], beside.of[0]];
+            let error = alone.error.hypot(beside.error);
+            assert!((alone.probability - beside.probability).abs() < 1.5 * error + 1e-5, "{alone:?} {beside:?}");
+        }
+    }
+
+    #[test]
+    fn a_model_that_is_right_leaves_few_lines_to_the_real_one() {
+        let plane = |g: &[f64]| [1.0 - 0.6 * g[0] - 0.8 * g[1]];
+        let question = Question { axis: &[3.0, 4.0], sets: [0..=0], effort: EFFORT, monitor: &Unwatched };
+        let found = question.of_real(&mut |g| Ok(plane(g)), &mut |g| Ok(plane(g))).unwrap();
+        assert_eq!(found.lines, SCRAMBLINGS * FIRST_LINES[1]);
     }
 
     #[test]
     fn one_quantity_is_one_line() {
         let found = found(&[-2.0], |g| [1.0 + g[0], 2.0 - g[0] * g[0]]);
         let exact = between(-1.0, std::f64::consts::SQRT_2);
-        assert!((found.joint.probability - exact).abs() < 1e-6, "{found:?}");
+        assert!((found.of[1].probability - exact).abs() < 1e-6, "{found:?}");
     }
 }

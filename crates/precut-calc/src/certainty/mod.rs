@@ -8,11 +8,13 @@ mod answer;
 mod distribution;
 pub(crate) mod lines;
 mod scores;
+mod surface;
 
 pub use answer::{Conformance, ConformanceMethod, Contribution, Improvement, JointlyKept, LimitKept, SeveralParts};
 pub(crate) use distribution::{CODES as DISTRIBUTION_CODES, WidthUnit};
 pub use distribution::{Distribution, Level, Source};
 pub(crate) use scores::{Contradiction, Scores};
+pub(crate) use surface::Surface;
 
 /// Probability that a standard normal number is below `x`.
 pub(crate) fn normal_below(x: f64) -> f64 {

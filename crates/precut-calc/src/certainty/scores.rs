@@ -50,6 +50,9 @@ impl Scores {
 
     /// The scores of independent ones.
     pub(crate) fn of(&self, independent: &[f64]) -> Vec<f64> {
+        if self.is_independent {
+            return independent.to_vec();
+        }
         (&self.lower * DVector::from_column_slice(independent)).as_slice().to_vec()
     }
 }

@@ -1,9 +1,9 @@
 //! How probable it is that the shaft is good, and what would raise that (`certainty/4`).
 
 use crate::calculator::{Failure, Finding, Message, Monitor, checkpoint};
-use crate::certainty::lines::{Effort, Estimate, Found, Margins, Sketch, integrate, points};
+use crate::certainty::lines::{Effort, Estimate, Found, Margins, Question, Sketch, Together, points};
 use crate::certainty::{
-    Conformance, ConformanceMethod, Contribution, Improvement, JointlyKept, Level, LimitKept, SeveralParts,
+    Conformance, ConformanceMethod, Contribution, Improvement, JointlyKept, Level, LimitKept, SeveralParts, Surface,
     normal_below,
 };
 
@@ -12,23 +12,29 @@ use super::output::ErrorFan;
 use super::rehearsal::Rehearsal;
 use super::uncertain::Uncertainties;
 
-/// Upper and lower limit of size, both together, and form.
-const LIMITS: usize = 4;
+/// Upper and lower limit of size, and form.
+const LIMITS: usize = 3;
 const ABOVE: usize = 0;
 const BELOW: usize = 1;
-const SIZE: usize = 2;
-const FORM: usize = 3;
+const FORM: usize = 2;
+/// Sets of them of which the probability is asked: each alone, both of size, all.
+const SETS: [Together; 5] = [ABOVE..=ABOVE, BELOW..=BELOW, FORM..=FORM, ABOVE..=BELOW, ABOVE..=FORM];
+const SIZE: usize = 3;
+const JOINT: usize = 4;
 /// A probability is told between these.
 const LEAST: f64 = 1e-6;
-/// Most lines of one scrambling: for a probability, for what something else would make of it on the same points, and for what
-/// a measured part would make of it.
-const MOST_LINES: [u32; 3] = [128, 8, 32];
+/// Most lines of one scrambling: for a probability, for what something else would make of it on the same lines, and for what a
+/// measured part would make of it.
+const MOST_LINES: [usize; 3] = [128, 8, 32];
 /// Standard uncertainty of the gauge with which a first part is measured, um.
 const GAUGE_UM: f64 = 1.0;
 /// Parts of which a fan is made.
-const FAN_PARTS: u32 = 256;
+const FAN_PARTS: usize = 256;
 /// Steps in which the best aim is bracketed, and by which it is narrowed down.
 const AIM_STEPS: [usize; 2] = [16, 16];
+
+/// Step of a shift of the command, where no limits of size say what matters, um.
+const SHIFT_STEP_UM: f64 = 10.0;
 
 /// Codes of what is said here.
 pub(super) const EXPLANATION_CODES: &[&str] = &["probably_good", "first_part_tells", "aim_tells"];
@@ -41,19 +47,60 @@ pub(super) struct Judged<'a> {
     rehearsal: &'a Rehearsal<'a>,
     uncertainties: Uncertainties,
     limits: SizeLimits,
+    near: Near,
     /// Independent scores along which what decides changes fastest.
     axis: Vec<f64>,
-    linear: Linear,
+    slopes: Slopes,
     monitor: &'a dyn Monitor,
 }
 
-/// Errors as they depend on independent scores near the stated values.
-struct Linear {
-    /// At the stated values, um, by station.
-    errors_um: Vec<f64>,
-    /// Change with every independent score, um, by station.
-    slopes_um: Vec<Vec<f64>>,
-    /// Where it is decided.
+/// By what a part is cut.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum By {
+    /// Station by station along the path.
+    Rehearsal,
+    /// A response surface of that.
+    Surface,
+}
+
+/// Errors by station as a response surface of what the quantities come to and of the shift of the command.
+struct Near {
+    surface: Surface,
+    /// What every quantity comes to at its median and how far off it is taken, the shift last.
+    scales: Vec<(f64, f64)>,
+}
+
+impl Near {
+    fn of(
+        rehearsal: &Rehearsal<'_>,
+        uncertainties: &Uncertainties,
+        shift_um: f64,
+        step_um: f64,
+    ) -> Result<Self, Failure> {
+        let mut scales = uncertainties.scales();
+        scales.push((shift_um, step_um));
+        let acts: Vec<bool> = scales.iter().map(|(_, scale)| *scale > 0.0).collect();
+        let count = scales.len() - 1;
+        let surface = Surface::of(&acts, &mut |x| {
+            let at = |i: usize| scales[i].0 + scales[i].1 * x[i];
+            let values: Vec<f64> = (0..count).map(at).collect();
+            rehearsal.errors_um(&uncertainties.draw_of(&values), at(count))
+        })?;
+        Ok(Self { surface, scales })
+    }
+
+    fn coordinates(&self, values: &[f64], shift_um: f64) -> Vec<f64> {
+        let of =
+            |(value, (median, scale)): (f64, &(f64, f64))| if *scale > 0.0 { (value - median) / scale } else { 0.0 };
+        values.iter().copied().chain([shift_um]).zip(&self.scales).map(of).collect()
+    }
+}
+
+/// Errors as they change with independent scores near the stated values.
+struct Slopes {
+    /// By station, um.
+    of_um: Vec<Vec<f64>>,
+    /// The station at which it is decided.
     deciding: usize,
 }
 
@@ -62,7 +109,6 @@ impl<'a> Judged<'a> {
     pub(super) fn of(
         job: &'a Job,
         rehearsal: &'a Rehearsal<'a>,
-        shift_um: f64,
         monitor: &'a dyn Monitor,
     ) -> Result<Option<Self>, Failure> {
         let uncertainties = Uncertainties::of(job)
@@ -71,10 +117,44 @@ impl<'a> Judged<'a> {
             return Ok(None);
         }
         let limits = job.tolerance.size();
-        let linear = Linear::of(rehearsal, &uncertainties, shift_um)?;
-        let mut judged = Self { job, rehearsal, uncertainties, limits, axis: Vec::new(), linear, monitor };
+        let step_um = limits.half_width_um().unwrap_or(SHIFT_STEP_UM);
+        let near = Near::of(rehearsal, &uncertainties, 0.0, step_um)?;
+        let slopes = Slopes { of_um: Vec::new(), deciding: 0 };
+        let mut judged = Self { job, rehearsal, uncertainties, limits, near, axis: Vec::new(), slopes, monitor };
+        judged.slopes.of_um = judged.slopes_um()?;
         judged.axis = judged.deciding();
         Ok(Some(judged))
+    }
+
+    /// Change of the errors with every independent score, by station.
+    fn slopes_um(&self) -> Result<Vec<Vec<f64>>, Failure> {
+        let count = self.uncertainties.of.len();
+        let mut slopes_um = vec![vec![0.0; count]; self.rehearsal.z_mm().len()];
+        for index in 0..count {
+            let at = |score: f64| {
+                let mut independent = vec![0.0; count];
+                independent[index] = score;
+                self.errors_um(By::Surface, &self.uncertainties, &independent, 0.0)
+            };
+            for ((slopes, up), down) in slopes_um.iter_mut().zip(at(0.5)?).zip(at(-0.5)?) {
+                slopes[index] = up - down;
+            }
+        }
+        Ok(slopes_um)
+    }
+
+    /// Errors by station of a part that is cut as independent scores come to.
+    fn errors_um(&self, by: By, of: &Uncertainties, independent: &[f64], shift_um: f64) -> Result<Vec<f64>, Failure> {
+        let values = of.values(independent);
+        match by {
+            By::Rehearsal => self.rehearsal.errors_um(&of.draw_of(&values), shift_um),
+            By::Surface => Ok(self.near.surface.at(&self.near.coordinates(&values, shift_um))),
+        }
+    }
+
+    /// Errors by station as they are stated.
+    fn stated_um(&self) -> &[f64] {
+        self.near.surface.at_point()
     }
 
     /// By how much the limits are kept, um.
@@ -82,37 +162,52 @@ impl<'a> Judged<'a> {
         let mut margins = [f64::INFINITY; LIMITS];
         margins[ABOVE] = self.limits.upper_um.map_or(f64::INFINITY, |upper| upper - largest);
         margins[BELOW] = self.limits.lower_um.map_or(f64::INFINITY, |lower| smallest - lower);
-        margins[SIZE] = margins[ABOVE].min(margins[BELOW]);
         margins[FORM] = self.job.tolerance.form_um.map_or(f64::INFINITY, |form| form - (largest - smallest));
         margins
     }
 
-    /// Margins of a part that is really cut; of one that cannot be cut none is kept.
-    fn cut(&self, of: &Uncertainties, independent: &[f64], shift_um: f64) -> Result<Margins<LIMITS>, Failure> {
-        match self.rehearsal.errors_um(&of.draw(independent), shift_um) {
+    /// Margins of a part that is cut; of one that cannot be cut none is kept.
+    fn cut(&self, by: By, of: &Uncertainties, independent: &[f64], shift_um: f64) -> Result<Margins<LIMITS>, Failure> {
+        match self.errors_um(by, of, independent, shift_um) {
             Ok(errors_um) => Ok(self.margins(self.rehearsal.extremes_um(&errors_um))),
             Err(Failure::OutOfModel(_)) => Ok([f64::NEG_INFINITY; LIMITS]),
             Err(failure) => Err(failure),
         }
     }
 
-    fn found(&self, of: &Uncertainties, shift_um: f64, most_lines: u32) -> Result<Found<LIMITS>, Failure> {
-        let effort = Effort { seed: self.job.uncertainty.seed, most_lines };
-        integrate(&self.axis, effort, self.monitor, &mut |g| self.cut(of, g, shift_um))
+    fn question<'q>(&'q self, axis: &'q [f64], most_lines: usize) -> Question<'q, { SETS.len() }> {
+        Question { axis, sets: SETS, effort: self.effort(most_lines), monitor: self.monitor }
+    }
+
+    fn effort(&self, most_lines: usize) -> Effort {
+        Effort { seed: self.job.uncertainty.seed, most_lines }
+    }
+
+    /// The probabilities of a part that is really cut.
+    fn found(&self, shift_um: f64) -> Result<Found<{ SETS.len() }>, Failure> {
+        let by = |by: By| move |g: &[f64]| self.cut(by, &self.uncertainties, g, shift_um);
+        self.question(&self.axis, MOST_LINES[0]).of_real(&mut by(By::Rehearsal), &mut by(By::Surface))
+    }
+
+    /// The probabilities by the response surface alone, on few lines: for comparisons on the same ones.
+    fn nearly(&self, of: &Uncertainties, shift_um: f64) -> Result<[f64; SETS.len()], Failure> {
+        let question = self.question(&self.axis, MOST_LINES[1]);
+        let found = question.of(&mut |g: &[f64]| self.cut(By::Surface, of, g, shift_um))?;
+        Ok(found.of.map(|one| one.probability))
     }
 
     fn linear_probability(&self) -> Result<f64, Failure> {
-        let effort = Effort { seed: self.job.uncertainty.seed, most_lines: MOST_LINES[1] };
-        let found = integrate(&self.axis, effort, self.monitor, &mut |g| {
-            Ok(self.margins(self.rehearsal.extremes_um(&self.linear.at(g))))
+        let found = self.question(&self.axis, MOST_LINES[1]).of(&mut |g: &[f64]| {
+            let coordinates = self.near.coordinates(&self.uncertainties.values(g), 0.0);
+            Ok(self.margins(self.rehearsal.extremes_um(&self.near.surface.linear_at(&coordinates))))
         })?;
-        Ok(found.joint.probability)
+        Ok(found.of[JOINT].probability)
     }
 
     /// The direction in which the limit that is likeliest passed changes fastest; of form that of the difference of the two
     /// places that move most against each other. Sets where it is decided.
     fn deciding(&mut self) -> Vec<f64> {
-        let Linear { errors_um, slopes_um, .. } = &self.linear;
+        let (errors_um, slopes_um) = (self.stated_um(), &self.slopes.of_um);
         let size = |slopes: &[f64]| slopes.iter().map(|s| s * s).sum::<f64>().sqrt();
         let (mut nearest, mut axis, mut deciding) = (f64::INFINITY, slopes_um[0].clone(), 0);
         let mut meet = |margin: f64, slopes: Vec<f64>, station: usize| {
@@ -137,7 +232,7 @@ impl<'a> Judged<'a> {
                 }
             }
         }
-        self.linear.deciding = deciding;
+        self.slopes.deciding = deciding;
         axis
     }
 
@@ -146,36 +241,31 @@ impl<'a> Judged<'a> {
         match *aim {
             Aim::Nominal {} => Ok(0.0),
             Aim::Middle {} => Ok(self.limits.middle_um().unwrap_or(0.0)),
-            Aim::MostProbable {} => self.best_shift_um(&|_, joint| joint),
-            Aim::LeastLoss { oversize_cost, undersize_cost } => self.best_shift_um(&|each, _| {
-                let lost = |limit: usize, cost: f64| cost * (1.0 - each[limit]);
+            Aim::MostProbable {} => self.best_shift_um(&|kept| kept[JOINT]),
+            Aim::LeastLoss { oversize_cost, undersize_cost } => self.best_shift_um(&|kept| {
+                let lost = |limit: usize, cost: f64| cost * (1.0 - kept[limit]);
                 -lost(ABOVE, oversize_cost) - lost(BELOW, undersize_cost)
             }),
         }
     }
 
-    /// The shift at which `worth`, of the probabilities of each limit and of all, is largest: by steps over what may matter,
-    /// then by golden section, on common points. Errors follow a shift as they do about the stated values.
-    fn best_shift_um(&self, worth: &dyn Fn([f64; LIMITS], f64) -> f64) -> Result<f64, Failure> {
-        let effort = Effort { seed: self.job.uncertainty.seed, most_lines: MOST_LINES[1] };
+    /// The shift at which `worth`, of the probabilities of the sets of limits, is largest: by steps over what may matter, then
+    /// by golden section, on common points of the response surface. Errors follow a shift as they do about the stated values.
+    fn best_shift_um(&self, worth: &dyn Fn([f64; SETS.len()]) -> f64) -> Result<f64, Failure> {
         let extremes = |scores: &[f64], shift_um: f64| -> Result<[f64; 2], Failure> {
-            match self.rehearsal.errors_um(&self.uncertainties.draw(scores), shift_um) {
-                Ok(errors_um) => Ok(self.rehearsal.extremes_um(&errors_um)),
-                Err(Failure::OutOfModel(_)) => Ok([f64::INFINITY, f64::NEG_INFINITY]),
-                Err(failure) => Err(failure),
-            }
+            Ok(self.rehearsal.extremes_um(&self.errors_um(By::Surface, &self.uncertainties, scores, shift_um)?))
         };
+        let effort = self.effort(MOST_LINES[1]);
         let sketch = Sketch::of(&self.axis, effort, self.monitor, &mut |scores| extremes(scores, 0.0))?;
         let stated = vec![0.0; self.axis.len()];
         let [up, down] = [extremes(&stated, 1.0)?, extremes(&stated, -1.0)?];
         let follows: [f64; 2] = std::array::from_fn(|end| 0.5 * (up[end] - down[end]));
         let at = |shift: f64| -> Result<f64, Failure> {
             let shifted = |ends: [f64; 2]| std::array::from_fn(|end| ends[end] + follows[end] * shift);
-            let (each, joint) = sketch.kept(&|ends| self.margins(shifted(ends)))?;
-            Ok(worth(each, joint))
+            Ok(worth(sketch.kept(&SETS, &|ends| self.margins(shifted(ends)))?))
         };
         let middle = self.limits.middle_um().unwrap_or(0.0);
-        let room = self.limits.half_width_um().unwrap_or(0.0) + 3.0 * self.linear.largest_deviation_um();
+        let room = self.limits.half_width_um().unwrap_or(0.0) + 3.0 * self.slopes.largest_deviation_um();
         let step = 2.0 * room / AIM_STEPS[0] as f64;
         let mut best = (0.0, at(0.0)?);
         for index in 0..=AIM_STEPS[0] {
@@ -202,14 +292,11 @@ impl<'a> Judged<'a> {
         }
         let found = if at_inner >= at_outer { (inner, at_inner) } else { (outer, at_outer) };
         let near = if found.1 > best.1 { found.0 } else { best.0 };
-        // The top is flat, and the lines are bent: what is left is found on the real model, by parabolas.
-        let real = |shift: f64| -> Result<f64, Failure> {
-            let found = self.found(&self.uncertainties, shift, MOST_LINES[1])?;
-            Ok(worth(found.each.map(|one| one.probability), found.joint.probability))
-        };
+        // The top is flat, and the lines are bent: what is left is found by parabolas.
+        let bent = |shift: f64| -> Result<f64, Failure> { Ok(worth(self.nearly(&self.uncertainties, shift)?)) };
         let mut top = near;
         for width in [0.5 * step, 0.25 * step] {
-            let [left, here, right] = [real(top - width)?, real(top)?, real(top + width)?];
+            let [left, here, right] = [bent(top - width)?, bent(top)?, bent(top + width)?];
             let curvature = left - 2.0 * here + right;
             let move_by = if curvature < 0.0 { 0.5 * width * (left - right) / curvature } else { 0.0 };
             top += move_by.clamp(-width, width);
@@ -222,7 +309,7 @@ impl<'a> Judged<'a> {
         let mut by_station = vec![Vec::with_capacity(FAN_PARTS as usize); self.rehearsal.z_mm().len()];
         for point in points(FAN_PARTS, self.axis.len(), self.job.uncertainty.seed) {
             checkpoint(self.monitor)?;
-            match self.rehearsal.errors_um(&self.uncertainties.draw(&point), shift_um) {
+            match self.errors_um(By::Rehearsal, &self.uncertainties, &point, shift_um) {
                 Ok(errors) => by_station.iter_mut().zip(errors).for_each(|(all, error)| all.push(error)),
                 Err(Failure::OutOfModel(_)) => {}
                 Err(failure) => return Err(failure),
@@ -245,17 +332,18 @@ impl<'a> Judged<'a> {
     /// The whole block, of a command that is larger by `shift_um` than the exact one.
     pub(super) fn conformance(&self, shift_um: f64) -> Result<Conformance, Failure> {
         let uncertainty = &self.job.uncertainty;
-        let found = self.found(&self.uncertainties, shift_um, MOST_LINES[0])?;
-        // What something else makes of it is compared on the same points.
-        let few = self.found(&self.uncertainties, shift_um, MOST_LINES[1])?.joint.probability;
+        let found = self.found(shift_um)?;
+        let joint = found.of[JOINT];
+        // What something else makes of it is compared on the same lines.
+        let now = self.nearly(&self.uncertainties, shift_um)?[JOINT];
         let told = |of: &Uncertainties| -> Result<f64, Failure> {
-            Ok(bounded(found.joint.probability + self.found(of, shift_um, MOST_LINES[1])?.joint.probability - few))
+            Ok(bounded(joint.probability + self.nearly(of, shift_um)?[JOINT] - now))
         };
         let mut advice: Vec<Improvement> = Vec::new();
-        advice.extend(self.shifted(shift_um, found.joint)?);
-        advice.extend(self.first_part(shift_um, found.joint)?);
+        advice.extend(self.shifted(shift_um, joint)?);
+        advice.extend(self.first_part(shift_um, joint)?);
         advice.sort_by(|a, b| b.gain().total_cmp(&a.gain()));
-        let slopes = &self.linear.slopes_um[self.linear.deciding];
+        let slopes = &self.slopes.of_um[self.slopes.deciding];
         let variance: f64 = slopes.iter().map(|s| s * s).sum();
         let is_independent = self.uncertainties.scores.is_independent();
         let share = |index: usize| if variance > 0.0 { slopes[index] * slopes[index] / variance } else { 0.0 };
@@ -274,12 +362,12 @@ impl<'a> Judged<'a> {
             of(b).total_cmp(&of(a))
         });
         let common = self.common_share();
-        let probability = bounded(found.joint.probability);
+        let probability = bounded(joint.probability);
         Ok(Conformance {
             limits: self.limits_kept(&found),
             joint: JointlyKept {
                 probability,
-                numerical_error: found.joint.error,
+                numerical_error: joint.error,
                 wanted: uncertainty.wanted_probability,
                 met: probability >= uncertainty.wanted_probability,
             },
@@ -292,22 +380,22 @@ impl<'a> Judged<'a> {
             contributions,
             advice,
             method: ConformanceMethod {
-                integrated_lines: found.lines,
+                integrated_lines: u32::try_from(found.lines).unwrap_or(u32::MAX),
                 linear_probability: bounded(self.linear_probability()?),
                 seed: uncertainty.seed,
             },
         })
     }
 
-    fn limits_kept(&self, found: &Found<LIMITS>) -> Vec<LimitKept> {
-        let passed = |limit: usize| bounded(1.0 - found.each[limit].probability);
+    fn limits_kept(&self, found: &Found<{ SETS.len() }>) -> Vec<LimitKept> {
+        let passed = |limit: usize| bounded(1.0 - found.of[limit].probability);
         let mut kept = Vec::new();
         if let Some(pointer) = self.job.tolerance.size_pointer() {
             kept.push(LimitKept {
                 limit: "size".to_owned(),
                 pointer: pointer.to_owned(),
-                probability: bounded(found.each[SIZE].probability),
-                numerical_error: found.each[SIZE].error,
+                probability: bounded(found.of[SIZE].probability),
+                numerical_error: found.of[SIZE].error,
                 probability_above: self.limits.upper_um.map(|_| passed(ABOVE)),
                 probability_below: self.limits.lower_um.map(|_| passed(BELOW)),
             });
@@ -316,8 +404,8 @@ impl<'a> Judged<'a> {
             kept.push(LimitKept {
                 limit: "form".to_owned(),
                 pointer: "/tolerance/form_um".to_owned(),
-                probability: bounded(found.each[FORM].probability),
-                numerical_error: found.each[FORM].error,
+                probability: bounded(found.of[FORM].probability),
+                numerical_error: found.of[FORM].error,
                 probability_above: Some(passed(FORM)),
                 probability_below: None,
             });
@@ -327,7 +415,7 @@ impl<'a> Judged<'a> {
 
     /// Share of the variance of what decides that is the same for all parts of a set-up.
     fn common_share(&self) -> f64 {
-        let slopes = &self.linear.slopes_um[self.linear.deciding];
+        let slopes = &self.slopes.of_um[self.slopes.deciding];
         let of = |level: Option<Level>| {
             let is_of = |one: Level| level.is_none_or(|level| level == one);
             slopes.iter().zip(&self.uncertainties.of).filter(|(_, one)| is_of(one.level)).map(|(s, _)| s * s).sum()
@@ -353,7 +441,7 @@ impl<'a> Judged<'a> {
             return Ok(None);
         }
         let best_um = self.aim_um(&Aim::MostProbable {})?;
-        let then = self.found(&self.uncertainties, best_um, MOST_LINES[0])?.joint;
+        let then = self.found(best_um)?.of[JOINT];
         let gain = then.probability - now.probability;
         Ok((gain > now.error + then.error && (best_um - shift_um).abs() > self.job.path.increment_um)
             .then(|| Improvement::ShiftAim { shift_um: best_um, joint_probability: bounded(then.probability), gain }))
@@ -362,7 +450,7 @@ impl<'a> Judged<'a> {
     /// What a measured first part would make of it: the command is shifted by what the scores that all parts share are to be
     /// expected at, given the reading, to first order; that is tried on the real model (`certainty/4.4`).
     fn first_part(&self, shift_um: f64, now: Estimate) -> Result<Option<Improvement>, Failure> {
-        let Linear { errors_um, slopes_um, .. } = &self.linear;
+        let (errors_um, slopes_um) = (self.stated_um(), &self.slopes.of_um);
         let is_common = |index: usize| self.uncertainties.of[index].level == Level::Setup;
         // Scores of one level that are correlated with the other have no conditional distribution of that form.
         let (true, Some(middle)) = (self.uncertainties.scores.is_independent(), self.limits.middle_um()) else {
@@ -395,7 +483,7 @@ impl<'a> Judged<'a> {
         // Scores that a reading lets expect: along h, as far as it is not scatter.
         let expected = |reading: f64| -> Vec<f64> { h.iter().map(|h| h * reading / total.sqrt()).collect() };
         let centred = |reading: f64| -> Result<f64, Failure> {
-            let errors = self.rehearsal.errors_um(&self.uncertainties.draw(&expected(reading)), 0.0)?;
+            let errors = self.errors_um(By::Rehearsal, &self.uncertainties, &expected(reading), 0.0)?;
             let [largest, smallest] = self.rehearsal.extremes_um(&errors);
             Ok(middle - 0.5 * (largest + smallest))
         };
@@ -403,30 +491,32 @@ impl<'a> Judged<'a> {
         let as_expected = centred(0.0)?;
         // What is advised is tried: on a first part with its own scatter and a gauge with its own, then on a later one.
         let own: Vec<usize> = (0..h.len()).filter(|index| !is_common(*index)).collect();
-        let later = |scores: &[f64]| -> Result<f64, Failure> {
+        let later = |by: By, scores: &[f64]| -> Result<Margins<LIMITS>, Failure> {
             let mut first = scores[..h.len()].to_vec();
             own.iter().zip(&scores[h.len()..]).for_each(|(&index, score)| first[index] = *score);
-            let errors = self.rehearsal.errors_um(&self.uncertainties.draw(&first), shift_um)?;
             let gauge_um = GAUGE_UM * scores[h.len() + own.len()];
-            Ok(as_expected + slope * (errors[station] + gauge_um - errors_um[station]))
+            match self.errors_um(by, &self.uncertainties, &first, shift_um) {
+                Ok(errors) => {
+                    let shift = as_expected + slope * (errors[station] + gauge_um - errors_um[station]);
+                    self.cut(by, &self.uncertainties, &scores[..h.len()], shift)
+                }
+                Err(Failure::OutOfModel(_)) => Ok([f64::NEG_INFINITY; LIMITS]),
+                Err(failure) => Err(failure),
+            }
         };
         let count = h.len() + own.len() + 1;
-        let largest = |index: usize, score: f64| -> Result<f64, Failure> {
-            let mut scores = vec![0.0; count];
-            scores[index] = score;
-            let draw = self.uncertainties.draw(&scores[..h.len()]);
-            Ok(self.rehearsal.extremes_um(&self.rehearsal.errors_um(&draw, later(&scores)?)?)[0])
+        let change = |index: usize| -> Result<f64, Failure> {
+            let at = |score: f64| -> Result<f64, Failure> {
+                let mut scores = vec![0.0; count];
+                scores[index] = score;
+                Ok(later(By::Surface, &scores)?[ABOVE])
+            };
+            Ok(at(0.5)? - at(-0.5)?)
         };
-        let axis = (0..count)
-            .map(|index| Ok(largest(index, 0.5)? - largest(index, -0.5)?))
-            .collect::<Result<Vec<f64>, Failure>>()?;
-        let effort = Effort { seed: self.job.uncertainty.seed, most_lines: MOST_LINES[2] };
-        let then = integrate(&axis, effort, self.monitor, &mut |scores| match later(scores) {
-            Ok(shift) => self.cut(&self.uncertainties, &scores[..h.len()], shift),
-            Err(Failure::OutOfModel(_)) => Ok([f64::NEG_INFINITY; LIMITS]),
-            Err(failure) => Err(failure),
-        })?
-        .joint;
+        let axis = (0..count).map(change).collect::<Result<Vec<f64>, Failure>>()?;
+        let question = self.question(&axis, MOST_LINES[2]);
+        let by = |by: By| move |scores: &[f64]| later(by, scores);
+        let then = question.of_real(&mut by(By::Rehearsal), &mut by(By::Surface))?.of[JOINT];
         let gain = then.probability - now.probability;
         let error = now.error + then.error;
         Ok((gain > error).then(|| Improvement::MeasureFirstPart {
@@ -441,33 +531,11 @@ impl<'a> Judged<'a> {
     }
 }
 
-impl Linear {
-    fn of(rehearsal: &Rehearsal<'_>, of: &Uncertainties, shift_um: f64) -> Result<Self, Failure> {
-        let count = of.of.len();
-        let at = |index: usize, score: f64| {
-            let mut independent = vec![0.0; count];
-            independent[index] = score;
-            rehearsal.errors_um(&of.draw(&independent), shift_um)
-        };
-        let errors_um = rehearsal.errors_um(&of.draw(&vec![0.0; count]), shift_um)?;
-        let mut slopes_um = vec![vec![0.0; count]; errors_um.len()];
-        for index in 0..count {
-            for ((slopes, up), down) in slopes_um.iter_mut().zip(at(index, 0.5)?).zip(at(index, -0.5)?) {
-                slopes[index] = up - down;
-            }
-        }
-        Ok(Self { errors_um, slopes_um, deciding: 0 })
-    }
-
-    fn at(&self, independent: &[f64]) -> Vec<f64> {
-        let moved = |slopes: &Vec<f64>| slopes.iter().zip(independent).map(|(s, g)| s * g).sum::<f64>();
-        self.errors_um.iter().zip(&self.slopes_um).map(|(error, slopes)| error + moved(slopes)).collect()
-    }
-
+impl Slopes {
     /// Largest standard deviation of an error, um.
     fn largest_deviation_um(&self) -> f64 {
         let variance = |slopes: &Vec<f64>| slopes.iter().map(|s| s * s).sum::<f64>();
-        self.slopes_um.iter().map(variance).fold(0.0, f64::max).sqrt()
+        self.of_um.iter().map(variance).fold(0.0, f64::max).sqrt()
     }
 }
 

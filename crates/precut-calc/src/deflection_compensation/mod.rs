@@ -275,7 +275,7 @@ fn aimed<'a>(
     let mut sure = Sure::default();
     if job.aim != (Aim::Nominal {}) {
         let judged = match &driven.rehearsal {
-            Some(rehearsal) => Judged::of(job, rehearsal, 0.0, monitor)?,
+            Some(rehearsal) => Judged::of(job, rehearsal, monitor)?,
             None => None,
         };
         sure.aim_um = match judged {
@@ -286,7 +286,7 @@ fn aimed<'a>(
     }
     if let Some(rehearsal) = &driven.rehearsal {
         // The path of the rehearsal is aimed already.
-        if let Some(judged) = Judged::of(job, rehearsal, 0.0, monitor)? {
+        if let Some(judged) = Judged::of(job, rehearsal, monitor)? {
             sure.conformance = Some(judged.conformance(0.0)?);
             sure.fan = Some(judged.fan(0.0)?);
         }

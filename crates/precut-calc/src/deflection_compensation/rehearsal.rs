@@ -212,11 +212,11 @@ fn chosen(fine: &Grid) -> (Vec<usize>, Vec<Range<usize>>) {
 /// The value at the top or bottom of the parabola through three points, where that lies within them.
 fn top(z: &[f64], e: &[f64]) -> Option<f64> {
     let [z, e]: [[f64; 3]; 2] = [z.try_into().ok()?, e.try_into().ok()?];
-    let (before, after) = (z[1] - z[0], z[2] - z[1]);
-    let (left, right) = ((e[1] - e[0]) / before, (e[2] - e[1]) / after);
-    if left * right >= 0.0 {
+    if (e[1] - e[0]) * (e[2] - e[1]) >= 0.0 {
         return None;
     }
+    let (before, after) = (z[1] - z[0], z[2] - z[1]);
+    let (left, right) = ((e[1] - e[0]) / before, (e[2] - e[1]) / after);
     let curvature = (right - left) / (before + after);
     let slope = (left * after + right * before) / (before + after);
     Some(e[1] - 0.25 * slope * slope / curvature)

@@ -189,13 +189,27 @@ impl Uncertainties {
         Ok(Self { of, scores })
     }
 
-    /// What independent scores come to.
-    pub(super) fn draw(&self, independent: &[f64]) -> Draw {
+    /// What every quantity comes to at independent scores: factors, and additions in um.
+    pub(super) fn values(&self, independent: &[f64]) -> Vec<f64> {
+        self.of.iter().zip(self.scores.of(independent)).map(|(one, score)| one.distribution.at(score)).collect()
+    }
+
+    /// What is cut with where the quantities come to this.
+    pub(super) fn draw_of(&self, values: &[f64]) -> Draw {
         let mut draw = Draw::STATED;
-        for (one, score) in self.of.iter().zip(self.scores.of(independent)) {
-            one.quantity.put(one.distribution.at(score), &mut draw);
+        for (one, value) in self.of.iter().zip(values) {
+            one.quantity.put(*value, &mut draw);
         }
         draw
+    }
+
+    /// Of every quantity what it comes to at its median, and half of what lies between scores of -1 and 1.
+    pub(super) fn scales(&self) -> Vec<(f64, f64)> {
+        let of = |one: &Uncertain| {
+            let at = |score: f64| one.distribution.at(score);
+            (at(0.0), 0.5 * (at(1.0) - at(-1.0)))
+        };
+        self.of.iter().map(of).collect()
     }
 
     /// The same with half of the width of one of them.
