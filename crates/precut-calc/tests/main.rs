@@ -56,6 +56,7 @@ mod feed_effects;
 mod feed_program;
 mod feed_properties;
 mod feed_reference;
+mod feed_risk;
 mod feed_support;
 mod fixture_class_trials;
 mod fixture_classes;

@@ -33,6 +33,7 @@ pub(super) const WARNING_CODES: &[&str] = &[
     "surface_wears_out_its_edge",
     "shares_of_edges_priced",
     "half_fail",
+    "no_scatter_given",
     "spindle_limit_binds",
     "tool_passes_support",
     "tool_reaches_support",
@@ -43,6 +44,7 @@ pub(super) const WARNING_CODES: &[&str] = &[
 /// Codes of the explanations made here.
 pub(super) const EXPLANATION_CODES: &[&str] = &[
     "scheduled",
+    "limits_kept",
     "limit_costs_most",
     "nothing_binds",
     "against_constant_feed",
@@ -99,6 +101,7 @@ pub(super) fn warnings(
     out.extend(made.iter().flat_map(|made| made.encounters(job, outcome)));
     worn_out_inside(case, outcome, &mut out);
     out.extend(scatter::warnings(job, case, outcome));
+    out.extend(scatter::without(job, case));
     if let (Some(whole), false) = (outcome.whole_edge_objective, is_of_whole_edges(job))
         && whole > 1.01 * outcome.objective
     {
@@ -316,9 +319,28 @@ fn unused(job: &Job, out: &mut Vec<Finding>) {
     );
 }
 
+/// How probably the limits are kept, where that is known.
+fn limits_kept(job: &Job, outcome: &Outcome) -> Option<Message> {
+    let conformance = outcome.conformance.as_ref()?;
+    let worst = conformance.limits.first()?;
+    let mut said = Message::new("limits_kept")
+        .with("limit", worst.limit.clone())
+        .with("zone", worst.zone.clone())
+        .with("percent", 100.0 * worst.probability)
+        .with("risk", job.risk.name());
+    if let Some(joint) = conformance.joint_probability {
+        said = said.with("joint_percent", 100.0 * joint);
+    }
+    if let Some(gain) = conformance.gain_percent_per_percent_of_risk {
+        said = said.with("gain_percent", gain).with("objective", job.objective.name());
+    }
+    Some(said)
+}
+
 /// What is to be said of the answer, the most important first.
 pub(super) fn explanation(job: &Job, outcome: &Outcome) -> Vec<Message> {
     let mut out = vec![scheduled(outcome)];
+    out.extend(limits_kept(job, outcome));
     out.extend(costliest(job, outcome));
     if let Some(constant) = &outcome.comparison.constant_feed {
         out.push(

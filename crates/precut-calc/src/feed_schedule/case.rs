@@ -9,6 +9,8 @@ use super::acting::{ActingModel, Bend, Form};
 use super::compliance::Held;
 use super::input::{Goal, Job, Limits, Machine, Reference, UsageScope, Variables, Zone};
 use super::models::Output;
+use super::risk;
+use super::scatter::OUTPUT_LIMITS;
 
 /// What is scheduled.
 #[derive(Debug, Clone)]
@@ -25,6 +27,8 @@ pub(super) struct Case {
     pub couplings: Vec<CouplingCase>,
     /// Time of the passes beside the cut, min.
     pub passes_time_min: f64,
+    /// By how much less of an edge's median life is used at the job's risk, in its logarithm.
+    pub edge_margin: f64,
 }
 
 /// A zone, or one of its passes.
@@ -55,6 +59,8 @@ pub(super) struct ZoneCase {
     pub feed_max_mm_per_rev: f64,
     /// What a limit on the feed's gradient leaves to a zone that was found.
     pub ceiling: Option<Ceiling>,
+    /// By how much limits on outputs are moved in at the job's risk, in the scale of the model; by [`OUTPUT_LIMITS`].
+    pub margins: [f64; OUTPUT_LIMITS.len()],
     /// Whether the next zone touches this one: a link in the chain of feed steps.
     pub touches_next: bool,
     /// Exponent of the depth in the passive force.
@@ -111,6 +117,11 @@ impl ZoneCase {
     /// The acting model of an output.
     pub(super) fn model(&self, output: Output) -> Option<&ActingModel> {
         self.models[output as usize].as_ref()
+    }
+
+    /// By how much a limit is moved in.
+    pub(super) fn margin(&self, limit: &str) -> f64 {
+        OUTPUT_LIMITS.iter().position(|one| one.name == limit).map_or(0.0, |place| self.margins[place])
     }
 
     /// Compliance that bends, um/N; `None` where there is none to speak of.
@@ -206,6 +217,7 @@ impl<'a> Resolver<'a> {
             hardening_depth_max_um: zone.hardening_depth_max_um,
             feed_max_mm_per_rev: zone.feed_max_mm_per_rev.map_or(general, |own| own.min(general)),
             ceiling: None,
+            margins: [0.0; OUTPUT_LIMITS.len()],
             touches_next: next.is_some_and(|next| (next.z_start_mm - zone.z_end_mm).abs() <= TOUCHING_MM),
             force_depth_exponent: self.depth_exponent(depth_mm),
             models: self.models(depth_mm),
@@ -277,6 +289,7 @@ impl Case {
             custom: Vec::new(),
             couplings: Vec::new(),
             passes_time_min: 0.0,
+            edge_margin: 0.0,
         };
         if let (Some(split), Some(plan)) = (split, &job.passes) {
             case.passes_time_min =
@@ -284,6 +297,7 @@ impl Case {
         }
         case.add_custom(job);
         case.add_couplings(job);
+        risk::move_in(&mut case, job);
         Ok(case)
     }
 

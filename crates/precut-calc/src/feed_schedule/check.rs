@@ -9,6 +9,7 @@ use super::effects;
 use super::input::{FeedMode, Goal, Job, Limits, SpeedMode, UsageScope, Zone};
 use super::models::Output;
 use super::plan::{Method, PassPlan};
+use super::risk;
 
 /// Codes of the faults found here.
 pub(super) const CODES: &[&str] = &[
@@ -60,6 +61,7 @@ impl Check for Job {
         check_needs(self, violations);
         check_named(self, violations);
         check_method(self, violations);
+        risk::check(self, violations);
     }
 }
 

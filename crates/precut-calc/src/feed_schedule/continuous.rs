@@ -205,7 +205,7 @@ pub(super) fn add_zone(case: &mut Case, base: &Case, zone: usize, piece: ZoneCas
 /// the edge would not last, slowed by one multiplier. `None` where a limit cannot be met.
 fn explicit(base: &Case, grid: &Grid, held: Option<&Held>, gradient: Option<f64>) -> Option<Field> {
     let case = case_of_points(base, grid, held);
-    let usage_max = base.limits.tool_usage_max;
+    let usage_max = base.limits.tool_usage_max.map(|most| most * (-base.edge_margin).exp());
     let mut local = case.clone();
     local.limits.tool_usage_max = None;
     let built = build(&local, &Variation::default());

@@ -27,10 +27,15 @@ fn order_of(case: &Case) -> Vec<usize> {
     cutting_order(case.direction, case.zones.len(), |i| case.zones[i].is_rough)
 }
 
-/// Share of an edge that may be used, where edges are whole.
+/// Share of an edge's life that may be used, where edges are whole.
 pub(super) fn capacity(case: &Case) -> f64 {
     let most = case.limits.tool_usage_max.filter(|_| case.limits.whole_edges);
     most.unwrap_or(1.0).min(1.0)
+}
+
+/// Share of an edge's median life that is used before it is changed: at the job's risk.
+pub(super) fn used_to(case: &Case) -> f64 {
+    capacity(case) * (-case.edge_margin).exp()
 }
 
 /// Zones that one edge cuts without a change between them, in the order of the cut: those of one surface. A zone that
@@ -122,7 +127,7 @@ pub(super) fn counted(value: f64) -> u32 {
 fn plan(case: &Case, zones: &[ZoneOutcome], parts: Option<u32>) -> Option<Plan> {
     let usage: Vec<f64> = zones.iter().map(|zone| zone.tool_usage).collect::<Option<_>>()?;
     let fresh_always = case.limits.tool_usage_scope == UsageScope::Surface;
-    let most = capacity(case) * (1.0 + KEPT);
+    let most = used_to(case) * (1.0 + KEPT);
     let batch_parts = case.limits.batch_parts;
     let plan = Plan { count: 1, batch_parts, ..Plan::default() };
     let mut filling = Filling { case, most, plan, edge: EdgeUse::default() };

@@ -7,6 +7,7 @@ use utoipa::ToSchema;
 
 use super::models::Models;
 use super::plan::{Compensation, Method, PassPlan, TradeOff};
+use super::risk::Risk;
 use crate::deflection_compensation::ProgramSettings;
 use crate::effects::{MachinabilityConditions, MachinabilityEffect};
 use crate::force::ForceModel;
@@ -61,6 +62,10 @@ pub struct Job {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(extensions(("x-group" = json!("limits"))))]
     pub limits: Option<Limits>,
+    /// With which probability results may pass their limits.
+    #[serde(default)]
+    #[schema(extensions(("x-group" = json!("limits"))))]
+    pub risk: Risk,
     /// What may vary from zone to zone.
     #[serde(default)]
     #[schema(extensions(("x-group" = json!("cut"))))]

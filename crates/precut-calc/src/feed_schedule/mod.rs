@@ -47,6 +47,7 @@ mod plan;
 mod prices;
 mod program;
 mod remainder;
+mod risk;
 mod rule;
 mod run;
 mod scatter;
@@ -65,10 +66,11 @@ pub use measurement::MachinabilityMeasurement;
 pub use models::{FurtherModel, Models, Output};
 pub use output::{
     Binding, Certificate, ChangePlace, Comparison, CompensatedPath, ConstantFeed, Continuous, EdgeUse, EqualDeflection,
-    Looser, NamedValue, NextWhole, Outcome, PassTrial, PassesOutcome, PathOfZone, Price, PriceBasis, SegmentTime,
-    Solver, SurfaceUsage, ToolChange, TradePoint, ZoneOutcome,
+    Looser, NamedValue, NextWhole, Outcome, PassTrial, PassesOutcome, PathOfZone, Price, PriceBasis,
+    ScheduleConformance, ScheduledLimitKept, SegmentTime, Solver, SurfaceUsage, ToolChange, TradePoint, ZoneOutcome,
 };
 pub use plan::{Compensation, EqualTarget, Method, PassPlan, TradeOff, TradedLimit};
+pub use risk::Risk;
 
 use crate::calculator::{
     Answer, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Hallmark, Meta, Monitor, Place, Program,
@@ -102,7 +104,7 @@ impl Calculator for FeedSchedule {
     const META: Meta = Meta {
         id: "feed-schedule",
         kind: CalculatorKind::Calculator,
-        version: 5,
+        version: 6,
         title: "Feed schedule",
         question: "Which feed and speed in which zone: fastest within tolerance, roughness, tool life and power?",
         summary: "From a shaft in its supports, models of force, tool life and surface, and limits: feed and speed of \
@@ -149,7 +151,13 @@ impl Calculator for FeedSchedule {
             Hallmark::Of("/zones/*/deflection_max_um"),
             Hallmark::Of("/zones/*/roughness_max_um"),
         ],
-        study_outputs: &["/objective", "/cutting_time_min", "/tool_usage", "/largest_deflection_um"],
+        study_outputs: &[
+            "/objective",
+            "/cutting_time_min",
+            "/tool_usage",
+            "/largest_deflection_um",
+            "/conformance/joint_probability",
+        ],
         codes: CODES,
         figures: picture::FIGURE_IDS,
         tables: picture::TABLE_IDS,
@@ -209,6 +217,9 @@ impl Calculator for FeedSchedule {
         if job.limits.as_ref().is_some_and(|limits| limits.whole_parts_per_edge) {
             ms *= 10.0;
         }
+        if matches!(job.risk, Risk::Joint { .. }) {
+            ms *= 60.0;
+        }
         if job.limits.as_ref().is_some_and(|limits| limits.whole_edges) {
             ms *= whole::programs(job.zones.len()) as f64 / 8.0;
         }
@@ -238,7 +249,7 @@ impl Calculator for FeedSchedule {
 
 /// Everything that this calculator may utter, from where it is said.
 const CODES: Codes = Codes {
-    faults: &[check::CODES, effects::CODES, forward::CODES, shaft::check::CODES, force::FAULT_CODES],
+    faults: &[check::CODES, risk::CODES, effects::CODES, forward::CODES, shaft::check::CODES, force::FAULT_CODES],
     failures: &[
         &[
             "no_zones",
@@ -253,6 +264,7 @@ const CODES: Codes = Codes {
             "tool_hits_chuck",
         ],
         crate::turning::Proof::CODES,
+        risk::FAILURE_CODES,
     ],
     warnings: &[advice::WARNING_CODES],
     explanations: &[advice::EXPLANATION_CODES],

@@ -74,6 +74,10 @@ pub struct Outcome {
     /// What every number of the job that binds costs, one price for one number, the most costly first; whole numbers last.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub prices: Vec<Price>,
+    /// With which probability limits on outputs that scatter are kept; absent where no model of a limited output states how
+    /// much it scatters.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub conformance: Option<ScheduleConformance>,
     /// How near to the optimum the answer provably is.
     pub certificate: Certificate,
     /// The same part with one feed, and by the source paper's rule.
@@ -96,6 +100,38 @@ pub struct Outcome {
     /// The compensated path, where one was asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub compensated_path: Option<CompensatedPath>,
+}
+
+/// With which probability limits on outputs that scatter are kept.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ScheduleConformance {
+    /// Every limit in the zone where it is passed most often, the worst first; `edge` is an edge that lasts until it is changed.
+    pub limits: Vec<ScheduledLimitKept>,
+    /// That a part keeps all limits in all zones, edges aside, as if they scattered independently of each other: results that go
+    /// together keep them more often. Told from 1e-6 to 1 - 1e-6.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 0.97, extensions(("x-unit" = json!("1"))))]
+    pub joint_probability: Option<f64>,
+    /// What one percent more of the risk that is asked for takes off the objective.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 0.028, extensions(("x-unit" = json!("percent"))))]
+    pub gain_percent_per_percent_of_risk: Option<f64>,
+}
+
+/// A limit and how probably it is kept.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ScheduledLimitKept {
+    /// The limit: `roughness`, `deflection`, ..., or `edge`.
+    #[schema(example = "roughness")]
+    pub limit: String,
+    /// The zone where it is passed most often; of an edge the one after which it is changed.
+    #[schema(example = "z1")]
+    pub zone: String,
+    /// That it is kept there, from 1e-6 to 1 - 1e-6.
+    #[schema(example = 0.99, extensions(("x-unit" = json!("1"))))]
+    pub probability: f64,
 }
 
 /// A zone's feed and speed and what they give.

@@ -313,7 +313,9 @@ fn turned(
     let mut job = again.job.clone();
     let Some(number) = number(&mut job, &price.pointer) else { return Ok(None) };
     *number *= by.exp();
-    let case = Case::of(&job, again.held, again.split.as_ref())?;
+    let mut case = Case::of(&job, again.held, again.split.as_ref())?;
+    // A joint risk stays shared as it is: at the optimum a little of it moved elsewhere changes nothing.
+    case.zones.iter_mut().zip(&as_it_is.zones).for_each(|(zone, is)| zone.margins = is.margins);
     // How far an edge may be used is one of the numbers.
     let further = capacity(&case) / capacity(as_it_is);
     let plans: Vec<Option<EdgeLimits>> = match &solved.whole {

@@ -373,7 +373,8 @@ impl Builder<'_> {
     fn output_limit(&mut self, i: usize, output: Output, limit: Option<f64>, kind: Kind) {
         let (Some(form), Some(limit)) = (self.form(i, output), limit) else { return };
         let bound = if form.log_log { limit.ln() } else { limit };
-        self.row(i, form.speed, form.feed, form.constant - bound, kind, limit, output.unit(), !form.log_log);
+        let constant = form.constant - bound + self.case.zones[i].margin(&kind.name());
+        self.row(i, form.speed, form.feed, constant, kind, limit, output.unit(), !form.log_log);
     }
 
     fn zone(&mut self, i: usize) {
@@ -382,7 +383,8 @@ impl Builder<'_> {
         let (limits, machine) = (&case.limits, &case.machine);
         if let (Some(y), Some(c), Some(limit)) = (self.form(i, Output::ForceY), zone.yields(), zone.deflection_max_um) {
             let kappa = limits.deflection_residual_fraction;
-            self.row(i, y.speed, y.feed, y.constant + (kappa * c / limit).ln(), Kind::Deflection, limit, "um", false);
+            let constant = y.constant + (kappa * c / limit).ln() + zone.margin(&Kind::Deflection.name());
+            self.row(i, y.speed, y.feed, constant, Kind::Deflection, limit, "um", false);
         }
         self.output_limit(i, Output::Roughness, zone.roughness_max_um, Kind::Roughness);
         self.output_limit(i, Output::Hardening, zone.hardening_max_percent, Kind::Hardening);
@@ -390,7 +392,8 @@ impl Builder<'_> {
         self.output_limit(i, Output::ForceZ, limits.force_z_max_n, Kind::ForceZ);
         self.output_limit(i, Output::ForceY, limits.force_y_max_n, Kind::ForceY);
         if let (Some(t), Some(least)) = (self.form(i, Output::ToolLife), limits.tool_life_min_min) {
-            self.row(i, -t.speed, -t.feed, least.ln() - t.constant, Kind::ToolLifeMin, least, "min", false);
+            let constant = least.ln() - t.constant + case.edge_margin;
+            self.row(i, -t.speed, -t.feed, constant, Kind::ToolLifeMin, least, "min", false);
         }
         if let Some(z) = self.form(i, Output::ForceZ) {
             if let Some(power) = machine.power_kw {
@@ -553,7 +556,7 @@ impl Builder<'_> {
         let mut usage = |kind, group: &[usize], place, most: f64| {
             let mut terms = Affines::with_capacity(group.len(), 2 * group.len());
             for &i in group {
-                self.usage_term(&mut terms, i, -most.ln());
+                self.usage_term(&mut terms, i, case.edge_margin - most.ln());
             }
             sums.push(terms);
             labels.push(label(kind, place, most, "1"));

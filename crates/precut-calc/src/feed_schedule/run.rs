@@ -25,7 +25,9 @@ use super::passes;
 use super::plan::{Method, TradeOff, TradedLimit};
 use super::prices::{self, Again};
 use super::program::{Rates, Variation, build};
+use super::risk;
 use super::rule::{self, Target};
+use super::scatter;
 use super::solve::{Solved, Unsolved, solve};
 use super::toolpath::Made;
 
@@ -38,6 +40,8 @@ struct Found {
     continuous: Option<Continuous>,
     smooth: Option<Smooth>,
     passes: Option<PassesOutcome>,
+    /// What a percent of the risk asked for is worth, percent.
+    worth_of_risk: Option<f64>,
 }
 
 /// The answer of a checked and filled job.
@@ -56,6 +60,10 @@ pub(super) fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, F
     }
     let mut outcome = outcome(job, &found, zones);
     edges::recount(&found.case, &mut outcome);
+    outcome.conformance = scatter::conformance(job, &found.case, &outcome);
+    if let Some(conformance) = &mut outcome.conformance {
+        conformance.gain_percent_per_percent_of_risk = found.worth_of_risk;
+    }
     if let Some(solved) = &found.solved {
         let split = found.passes.as_ref().map(|passes| PassSplit {
             roughing_passes: passes.roughing_passes,
@@ -103,14 +111,23 @@ fn by_method(job: &Job, held: Option<&Held>, monitor: &dyn Monitor) -> Result<Fo
             continuous: None,
             smooth: None,
             passes: Some(passes),
+            worth_of_risk: None,
         });
     }
     match &job.method {
         Method::Optimal => {
-            let case = Case::of(job, held, None)?;
-            let solved = solve(&case, true, monitor)?;
+            let (case, solved, worth_of_risk) = risk::solved(Case::of(job, held, None)?, job, held, monitor)?;
             let at = solved.at.clone();
-            Ok(Found { case, solved: Some(solved), at, rule: None, continuous: None, smooth: None, passes: None })
+            Ok(Found {
+                case,
+                solved: Some(solved),
+                at,
+                rule: None,
+                continuous: None,
+                smooth: None,
+                passes: None,
+                worth_of_risk,
+            })
         }
         Method::EqualDeflection { target, target_um, reference_feed_mm_per_rev, speed_m_per_min } => {
             let case = Case::of(job, held, None)?;
@@ -118,7 +135,16 @@ fn by_method(job: &Job, held: Option<&Held>, monitor: &dyn Monitor) -> Result<Fo
             let target = Target::of(*target, *target_um);
             let (at, rule) = rule::equal_deflection(&case, &speeds, *reference_feed_mm_per_rev, target)
                 .ok_or_else(|| Failure::OutOfModel(Finding::new("nothing_bends", "/zones")))?;
-            Ok(Found { case, solved: None, at, rule: Some(rule), continuous: None, smooth: None, passes: None })
+            Ok(Found {
+                case,
+                solved: None,
+                at,
+                rule: Some(rule),
+                continuous: None,
+                smooth: None,
+                passes: None,
+                worth_of_risk: None,
+            })
         }
         Method::Continuous { grid_points, loss_percent, segments_max, feed_gradient_per_mm } => {
             let asked = Asked {
@@ -136,6 +162,7 @@ fn by_method(job: &Job, held: Option<&Held>, monitor: &dyn Monitor) -> Result<Fo
                 continuous: Some(zoned.outcome),
                 smooth: zoned.smooth,
                 passes: None,
+                worth_of_risk: None,
             })
         }
     }
@@ -229,6 +256,7 @@ fn outcome(job: &Job, found: &Found, mut zones: Vec<ZoneOutcome>) -> Outcome {
         roughness_spread: assess::spread(roughnesses()),
         binding: bound,
         prices: Vec::new(),
+        conformance: None,
         certificate: certificate(found.solved.as_ref()),
         comparison: Comparison { constant_feed: None, equal_deflection: None },
         equal_deflection: found.rule.clone(),

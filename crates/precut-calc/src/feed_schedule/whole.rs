@@ -7,7 +7,7 @@
 use crate::calculator::{Failure, Monitor};
 
 use super::case::Case;
-use super::edges::{KEPT, capacity, counted, more_parts, units};
+use super::edges::{KEPT, capacity, counted, more_parts, units, used_to};
 use super::input::UsageScope;
 use super::models::Output;
 use super::program::{EdgeLimits, Rates, Variation};
@@ -33,7 +33,9 @@ pub(super) fn programs(zones: usize) -> usize {
 struct Search<'a> {
     case: &'a Case,
     units: Vec<Vec<usize>>,
+    /// Share of an edge's life that may be used, and of its median life at the job's risk.
     capacity: f64,
+    used_to: f64,
     per_edge: f64,
     programs: usize,
     best: Option<Solved>,
@@ -48,6 +50,7 @@ pub(super) fn edges(case: &Case, why: bool, monitor: &dyn Monitor) -> Result<Sol
         case,
         units: units(case),
         capacity: capacity(case),
+        used_to: used_to(case),
         per_edge: Rates::of(case).map_or(0.0, |rates| rates.per_edge),
         programs: programs(case.zones.len()),
         best: None,
@@ -126,7 +129,7 @@ impl Search<'_> {
 
     /// Borders where every edge is filled as far as it goes; `None` where a unit alone takes more.
     fn filled(&self, usage: &[f64]) -> Option<Vec<usize>> {
-        let most = self.capacity * (1.0 + KEPT);
+        let most = self.used_to * (1.0 + KEPT);
         let (mut borders, mut used) = (vec![0], 0.0);
         for (k, own) in usage.iter().enumerate() {
             if *own > most {
@@ -174,7 +177,7 @@ impl Search<'_> {
         let mut open: Vec<Node> = Vec::new();
         // Edges paid by their share: fewer whole edges than the shares need are only had by slower cutting.
         let first = match &self.best {
-            Some(best) => self.usage(best).iter().sum::<f64>() / self.capacity,
+            Some(best) => self.usage(best).iter().sum::<f64>() / self.used_to,
             None => 1.0,
         };
         // The cost over the number of edges is convex: from the first guess down and up until it rises beyond the best.
@@ -327,8 +330,8 @@ impl Search<'_> {
         }
         let total = before[usage.len()];
         let beyond = |j: usize, at: usize| {
-            let left = total - before[at] - self.capacity * (edges - j - 1) as f64;
-            let right = before[at + 1] - self.capacity * (j + 1) as f64;
+            let left = total - before[at] - self.used_to * (edges - j - 1) as f64;
+            let right = before[at + 1] - self.used_to * (j + 1) as f64;
             left.min(right)
         };
         let mut found: Option<(usize, usize, f64)> = None;

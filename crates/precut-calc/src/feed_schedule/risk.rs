@@ -1,0 +1,374 @@
+//! Schedules at a stated risk (`certainty/5`): limits moved in by so many standard deviations that results pass them no more
+//! often than is accepted; over all limits of a part together where that is what is stated.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::calculator::{Failure, Finding, Monitor, Violations, checkpoint};
+use crate::certainty::{normal_below, normal_quantile};
+use crate::num::gp::{self, Affines, Objective};
+
+use super::case::Case;
+use super::compliance::Held;
+use super::input::Job;
+use super::models::Output;
+use super::plan::Method;
+use super::program::{Kind, Place, Variation, build};
+use super::scatter::{OUTPUT_LIMITS, deviations, scatter};
+use super::solve::{Solved, Unsolved, solve};
+
+/// Codes of the faults found here.
+pub(super) const CODES: &[&str] = &["joint_risk_elsewhere"];
+/// Codes of the failures told here.
+pub(super) const FAILURE_CODES: &[&str] = &["infeasible_at_this_risk"];
+
+/// Largest risk that can be asked for: beyond it a limit would move out.
+const MOST: f64 = 0.5;
+/// Rounds in which a joint risk is shared out, and the relative gap of the objective at which that ends.
+const ROUNDS: u32 = 200;
+const SHARED: f64 = 1e-8;
+/// Halvings in which the least risk is found.
+const HALVINGS: u32 = 30;
+/// Steps in which the largest joint probability is found.
+const STEPS: u32 = 80;
+
+/// With which probability results may pass their limits, because they scatter about their models.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+#[schema(as = ScheduleRisk)]
+pub enum Risk {
+    /// The limits hold for what the models expect: where one binds, every second result passes it.
+    None {},
+    /// Each limit of each zone may be passed with this probability.
+    Each {
+        /// Of an output in a zone.
+        #[schema(exclusive_minimum = 0.0, exclusive_maximum = 50.0, example = 1.0, extensions(("x-unit" = json!("percent")), ("x-symbol" = json!("alpha"))))]
+        risk_percent: f64,
+        /// Of an edge that is worn out before it is changed; not said: edges are used as far as their median life allows.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schema(exclusive_minimum = 0.0, exclusive_maximum = 50.0, example = 2.0, extensions(("x-unit" = json!("percent")), ("x-symbol" = json!("alpha_e"))))]
+        edge_risk_percent: Option<f64>,
+    },
+    /// At least one limit of a part may be passed with this probability: it is shared out as costs least.
+    Joint {
+        /// Of a part.
+        #[schema(exclusive_minimum = 0.0, exclusive_maximum = 50.0, example = 1.0, extensions(("x-unit" = json!("percent")), ("x-symbol" = json!("alpha"))))]
+        risk_percent: f64,
+        /// Of an edge that is worn out before it is changed; not said: edges are used as far as their median life allows.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schema(exclusive_minimum = 0.0, exclusive_maximum = 50.0, example = 2.0, extensions(("x-unit" = json!("percent")), ("x-symbol" = json!("alpha_e"))))]
+        edge_risk_percent: Option<f64>,
+    },
+}
+
+impl Default for Risk {
+    fn default() -> Self {
+        Self::None {}
+    }
+}
+
+impl Risk {
+    /// Its name, as in the contract.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::None {} => "none",
+            Self::Each { .. } => "each",
+            Self::Joint { .. } => "joint",
+        }
+    }
+
+    /// Of the limits of a part, as a share.
+    pub(super) fn of_part(self) -> Option<f64> {
+        match self {
+            Self::None {} => None,
+            Self::Each { risk_percent, .. } | Self::Joint { risk_percent, .. } => Some(risk_percent / 100.0),
+        }
+    }
+
+    /// Of an edge, as a share.
+    pub(super) fn of_edges(self) -> Option<f64> {
+        match self {
+            Self::None {} => None,
+            Self::Each { edge_risk_percent, .. } | Self::Joint { edge_risk_percent, .. } => {
+                Some(edge_risk_percent? / 100.0)
+            }
+        }
+    }
+
+    fn with_part(self, risk: f64) -> Self {
+        let mut changed = self;
+        if let Self::Each { risk_percent, .. } | Self::Joint { risk_percent, .. } = &mut changed {
+            *risk_percent = 100.0 * risk;
+        }
+        changed
+    }
+}
+
+/// Finds a joint risk where it is not shared out.
+pub(super) fn check(job: &Job, violations: &mut Violations) {
+    let is_shared = matches!(job.method, Method::Optimal) && job.passes.is_none();
+    violations.require(is_shared || !matches!(job.risk, Risk::Joint { .. }), || {
+        Finding::new("joint_risk_elsewhere", "/risk/kind")
+    });
+}
+
+/// A limit of a part whose output scatters: its zone, its place among [`OUTPUT_LIMITS`], and the standard deviation.
+#[derive(Debug, Clone, Copy)]
+struct Scattered {
+    zone: usize,
+    limit: usize,
+    deviation: f64,
+}
+
+impl Scattered {
+    fn name(self) -> &'static str {
+        OUTPUT_LIMITS[self.limit].name
+    }
+}
+
+fn scattered(case: &Case, job: &Job) -> Vec<Scattered> {
+    let mut all = Vec::new();
+    for (zone, of) in case.zones.iter().enumerate() {
+        for (place, limit) in OUTPUT_LIMITS.iter().enumerate() {
+            let is_limited = of.model(limit.output).is_some() && (limit.limit)(case, of).is_some();
+            if let (true, Some((deviation, _))) = (is_limited, scatter(job, limit.output)) {
+                all.push(Scattered { zone, limit: place, deviation });
+            }
+        }
+    }
+    all
+}
+
+/// Limits moved in by what the job's risk asks for; a joint one is shared evenly, until it is shared out.
+pub(super) fn move_in(case: &mut Case, job: &Job) {
+    if let (Some(risk), Some((deviation, _))) = (job.risk.of_edges(), scatter(job, Output::ToolLife)) {
+        case.edge_margin = deviations(risk) * deviation;
+    }
+    let Some(risk) = job.risk.of_part() else { return };
+    let all = scattered(case, job);
+    let own = match job.risk {
+        Risk::Joint { .. } => -((-risk).ln_1p() / all.len().max(1) as f64).exp_m1(),
+        _ => risk,
+    };
+    for one in &all {
+        case.zones[one.zone].margins[one.limit] = deviations(own) * one.deviation;
+    }
+}
+
+/// The schedule of a case with its risk shared out, and what a percent of that risk is worth.
+pub(super) fn solved(
+    case: Case,
+    job: &Job,
+    held: Option<&Held>,
+    monitor: &dyn Monitor,
+) -> Result<(Case, Solved, Option<f64>), Unsolved> {
+    let Some(risk) = job.risk.of_part() else {
+        let solved = solve(&case, true, monitor)?;
+        return Ok((case, solved, None));
+    };
+    let all = scattered(&case, job);
+    if matches!(job.risk, Risk::Joint { .. }) && !all.is_empty() {
+        let mut sharing = Sharing { case, all, budget: -(-risk).ln_1p(), monitor };
+        let (solved, worth) = sharing.shared_out(job, held)?;
+        return Ok((sharing.case, solved, Some(worth * risk / (1.0 - risk))));
+    }
+    match solve(&case, true, monitor) {
+        Ok(solved) => {
+            // d ln f/d ln alpha over all limits: each moves by s alpha/phi(q).
+            let slope = risk / density(deviations(risk));
+            let worth = all.iter().map(|one| multiplier(&solved, one) * one.deviation * slope).sum();
+            Ok((case, solved, Some(worth)))
+        }
+        Err(Unsolved::Infeasible(found)) => {
+            let least = least_of_each(job, held, monitor)?;
+            Err(least.map_or(Unsolved::Infeasible(found), |least| at_this_risk(job, least)))
+        }
+        Err(failed) => Err(failed),
+    }
+}
+
+/// Percent of the objective per percent of a limit, or per unit of one that is not in logarithms.
+fn multiplier(solved: &Solved, of: &Scattered) -> f64 {
+    let rows = solved.built.rows.iter().zip(&solved.certificate.row_multipliers);
+    let is_it = |kind: &Kind, place: &Place| *place == Place::Zone(of.zone) && kind.name() == of.name();
+    rows.filter(|(label, _)| is_it(&label.kind, &label.place)).map(|(_, price)| price * solved.elasticity).sum()
+}
+
+fn density(x: f64) -> f64 {
+    (-0.5 * x * x).exp() / (2.0 * std::f64::consts::PI).sqrt()
+}
+
+/// How fast the logarithm of the probability rises with the distance of a limit in deviations.
+fn hazard(t: f64) -> f64 {
+    density(t) / normal_below(t)
+}
+
+fn at_this_risk(job: &Job, least: f64) -> Unsolved {
+    let asked = job.risk.of_part().unwrap_or(0.0);
+    let finding = Finding::new("infeasible_at_this_risk", "/risk/risk_percent")
+        .measured(100.0 * asked, 100.0 * least, "percent")
+        .with("least_risk_percent", 100.0 * least);
+    Unsolved::Failed(Failure::OutOfModel(finding))
+}
+
+/// The least risk of each limit at which there is a schedule; `None` where none is found below a half.
+fn least_of_each(job: &Job, held: Option<&Held>, monitor: &dyn Monitor) -> Result<Option<f64>, Failure> {
+    let is_possible = |risk: f64| -> Result<bool, Failure> {
+        let case = Case::of(&Job { risk: job.risk.with_part(risk), ..job.clone() }, held, None)?;
+        match solve(&case, false, monitor) {
+            Ok(_) => Ok(true),
+            Err(Unsolved::Failed(Failure::Cancelled)) => Err(Failure::Cancelled),
+            Err(_) => Ok(false),
+        }
+    };
+    let (mut no, mut yes) = (deviations(job.risk.of_part().unwrap_or(MOST)), deviations(0.999 * MOST));
+    if !is_possible(normal_below(-yes))? {
+        return Ok(None);
+    }
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (no + yes);
+        if is_possible(normal_below(-middle))? {
+            yes = middle;
+        } else {
+            no = middle;
+        }
+    }
+    Ok(Some(normal_below(-yes)))
+}
+
+/// A joint risk among the limits of a part: with b_k = -ln Phi(t_k) the sum of all b is at most -ln(1 - alpha), exact where
+/// results scatter independently (`certainty/5.3`). The logarithm of the objective is convex over the b, with slopes
+/// -lambda_k s_k/h(t_k); they are equal at the optimum, and how far they are from it bounds what is left to gain.
+struct Sharing<'a> {
+    case: Case,
+    all: Vec<Scattered>,
+    budget: f64,
+    monitor: &'a dyn Monitor,
+}
+
+impl Sharing<'_> {
+    fn deviations_of(shares: &[f64]) -> Vec<f64> {
+        // From the side on which the quantile keeps its digits.
+        shares.iter().map(|b| -normal_quantile(-(-b).exp_m1())).collect()
+    }
+
+    fn at(&mut self, shares: &[f64]) -> Result<(Solved, Vec<f64>), Unsolved> {
+        checkpoint(self.monitor)?;
+        let deviations = Self::deviations_of(shares);
+        for (one, t) in self.all.iter().zip(&deviations) {
+            self.case.zones[one.zone].margins[one.limit] = t * one.deviation;
+        }
+        let solved = solve(&self.case, false, self.monitor)?;
+        let slope = |(one, t): (&Scattered, &f64)| multiplier(&solved, one) * one.deviation / hazard(*t);
+        let slopes = self.all.iter().zip(&deviations).map(slope).collect();
+        Ok((solved, slopes))
+    }
+
+    /// The best shares, and what the budget is worth: d ln(objective) over d budget.
+    fn shared_out(&mut self, job: &Job, held: Option<&Held>) -> Result<(Solved, f64), Unsolved> {
+        let (mut shares, least) = self.safest(job, held)?;
+        if least > self.budget {
+            return Err(at_this_risk(job, -(-least).exp_m1()));
+        }
+        let scale = self.budget / shares.iter().sum::<f64>();
+        shares.iter_mut().for_each(|b| *b *= scale);
+        let (mut solved, mut slopes) = self.at(&shares)?;
+        let mut strength = 0.5;
+        for _ in 0..ROUNDS {
+            let mean = shares.iter().zip(&slopes).map(|(b, g)| b * g).sum::<f64>() / self.budget;
+            let most = slopes.iter().copied().fold(0.0, f64::max);
+            if self.budget * (most - mean) < SHARED || mean <= 0.0 || strength < 1e-3 {
+                break;
+            }
+            let mut next: Vec<f64> =
+                shares.iter().zip(&slopes).map(|(b, g)| b * (g / mean).clamp(0.01, 100.0).powf(strength)).collect();
+            let scale = self.budget / next.iter().sum::<f64>();
+            next.iter_mut().for_each(|b| *b *= scale);
+            match self.at(&next) {
+                Ok((better, of)) if better.objective <= solved.objective => {
+                    (shares, solved, slopes) = (next, better, of);
+                    strength = (1.2 * strength).min(1.0);
+                }
+                Ok(_) | Err(Unsolved::Infeasible(_)) => strength *= 0.5,
+                Err(failed) => return Err(failed),
+            }
+        }
+        // The margins of the case are those of its schedule.
+        let (solved, slopes) = self.at(&shares).or_else(|unsolved| match unsolved {
+            Unsolved::Infeasible(_) => Ok((solved, slopes)),
+            failed => Err(failed),
+        })?;
+        Ok((solved, shares.iter().zip(&slopes).map(|(b, g)| b * g).sum::<f64>() / self.budget))
+    }
+
+    /// The shares of the schedule that most probably keeps all limits, and their sum: by tangents within a shrinking range.
+    fn safest(&mut self, job: &Job, held: Option<&Held>) -> Result<(Vec<f64>, f64), Unsolved> {
+        let plain = Case::of(&Job { risk: Risk::None {}, ..job.clone() }, held, None)?;
+        let mut best = self.shares_at(&plain, solve(&plain, true, self.monitor)?.at);
+        let mut radius = 0.5;
+        for _ in 0..STEPS {
+            checkpoint(self.monitor)?;
+            let Some(next) = self.toward(&plain, &best.0, radius)? else { break };
+            let next = self.shares_at(&plain, next);
+            if next.2 < best.2 {
+                best = next;
+            } else {
+                radius *= 0.4;
+            }
+            if radius < 1e-9 {
+                break;
+            }
+        }
+        Ok((best.1, best.2))
+    }
+
+    /// The shares of a schedule, and their sum.
+    fn shares_at(&self, plain: &Case, at: Vec<(f64, f64)>) -> (Vec<(f64, f64)>, Vec<f64>, f64) {
+        let shares: Vec<f64> =
+            self.rows_at(plain, &at).iter().map(|(_, t)| -(-normal_below(-t)).ln_1p()).map(|b| b.max(1e-300)).collect();
+        let sum = shares.iter().sum();
+        (at, shares, sum)
+    }
+
+    /// The row of every scattered limit in the program about a schedule, and its distance in deviations there.
+    fn rows_at(&self, plain: &Case, at: &[(f64, f64)]) -> Vec<(usize, f64)> {
+        let built = build(plain, &Variation { about: Some((at, f64::INFINITY)), ..Variation::default() });
+        let y = &built.program.start;
+        let row_of = |one: &Scattered| {
+            let is_it =
+                |label: &super::program::Label| label.place == Place::Zone(one.zone) && label.kind.name() == one.name();
+            built.rows.iter().position(is_it).unwrap_or(0)
+        };
+        let of = |one: &Scattered| {
+            let row = row_of(one);
+            (row, -built.program.rows.value(row, y) / one.deviation)
+        };
+        self.all.iter().map(of).collect()
+    }
+
+    /// The schedule within a range of one that is most probable by the tangents there.
+    fn toward(&self, plain: &Case, at: &[(f64, f64)], radius: f64) -> Result<Option<Vec<(f64, f64)>>, Failure> {
+        let variation = Variation { about: Some((at, radius)), ..Variation::default() };
+        let mut built = build(plain, &variation);
+        let mut sums = vec![0.0; built.program.variables()];
+        for (one, (row, t)) in self.all.iter().zip(self.rows_at(plain, at)) {
+            for (variable, a) in built.program.rows.entries(row) {
+                sums[variable] += hazard(t) / one.deviation * a;
+            }
+        }
+        let entries: Vec<(usize, f64)> = sums.into_iter().enumerate().filter(|(_, a)| a.abs() > 0.0).collect();
+        if entries.is_empty() {
+            return Ok(None);
+        }
+        let mut least = Affines::new();
+        least.push(&entries, 0.0);
+        built.program.objective = Objective::Linear(least);
+        let found = gp::minimise(&built.program, &gp::Settings::default())
+            .ok()
+            .or_else(|| [1e-9, 1e-8, 1e-7].iter().find_map(|&most| gp::conic::minimise(&built.program, most).ok()));
+        Ok(found.map(|solution| {
+            let of = |i: usize| (built.speed[i].at(&solution.y), built.feed[i].at(&solution.y));
+            (0..plain.zones.len()).map(of).collect()
+        }))
+    }
+}

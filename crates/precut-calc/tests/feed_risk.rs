@@ -1,0 +1,204 @@
+//! Schedules at a stated risk: against cases that other programs computed, against the plain schedule with limits moved in by
+//! hand, and by drawing the scatter.
+#![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
+
+use crate::draw::Draw;
+use crate::feed_support;
+use precut_calc::calculator::{Calculator as _, Check as _, Failure, Unwatched, Violations};
+use precut_calc::feed_schedule::{FeedSchedule, Job};
+use serde_json::{Value, json};
+
+fn case(name: &str) -> Value {
+    let path = format!("{}/reference/certainty/{name}.json", env!("CARGO_MANIFEST_DIR"));
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+fn answered(job: &Value) -> Result<precut_calc::calculator::Answer<precut_calc::feed_schedule::Outcome>, Failure> {
+    FeedSchedule::run(&feed_support::job(job.clone()), &Unwatched)
+}
+
+fn solved(job: &Value) -> Value {
+    serde_json::to_value(answered(job).unwrap().output).unwrap()
+}
+
+fn number(value: &Value, pointer: &str) -> f64 {
+    value.pointer(pointer).and_then(Value::as_f64).unwrap_or_else(|| panic!("{pointer} in {value}"))
+}
+
+fn near(name: &str, found: f64, expected: f64, relative: f64) {
+    assert!((found / expected - 1.0).abs() <= relative, "{name}: {found}, expected {expected}");
+}
+
+#[test]
+fn references_are_met() {
+    for name in ["f1-each-one-percent", "f2-joint-one-percent"] {
+        let case = case(name);
+        let expected = &case["expected"];
+        let answer = solved(&case["job"]);
+        eprintln!("{name}: {} {}", answer["objective"], answer["conformance"]);
+        near(name, number(&answer, "/objective"), number(expected, "/objective"), 2e-6);
+        let joint = number(&answer, "/conformance/joint_probability");
+        assert!((joint - number(expected, "/probability_joint_monte_carlo")).abs() < 0.002, "{name}: {joint}");
+        let gain = number(&answer, "/conformance/gain_percent_per_percent_of_risk");
+        near(name, gain, number(expected, "/gain_percent_per_percent_of_risk"), 0.01);
+    }
+    let whole = case("f6-whole-edges-risk");
+    let answer = solved(&whole["job"]);
+    near("f6", number(&answer, "/objective"), number(&whole, "/expected/objective"), 2e-6);
+    assert!((number(&answer, "/edges_per_part") - 3.0).abs() < 1e-12);
+    let edge = answer["conformance"]["limits"].as_array().unwrap().iter().find(|one| one["limit"] == "edge").unwrap();
+    assert!(number(edge, "/probability") > 0.95 - 1e-6, "{edge}");
+}
+
+#[test]
+fn a_risk_that_cannot_be_had_is_refused_with_the_least_that_can() {
+    let case = case("f4-infeasible-at-the-risk");
+    let refused = |job: &Value| match answered(job) {
+        Err(Failure::OutOfModel(finding)) => finding,
+        other => panic!("{other:?}"),
+    };
+    for kind in ["joint", "each"] {
+        let mut job = case["job"].clone();
+        job["risk"]["kind"] = json!(kind);
+        let finding = refused(&job);
+        assert_eq!(finding.code, "infeasible_at_this_risk");
+        let least = finding.limit.unwrap_or(f64::NAN);
+        eprintln!("{kind}: {least}");
+        if kind == "joint" {
+            near("least risk", least, number(&case, "/expected/least_risk_percent"), 1e-3);
+        }
+        // What is advised is done; a little less is refused.
+        job["risk"]["risk_percent"] = json!(least * 1.0001);
+        solved(&job);
+        job["risk"]["risk_percent"] = json!(least * 0.999);
+        assert_eq!(refused(&job).code, "infeasible_at_this_risk");
+    }
+}
+
+/// The job without a risk whose limits are moved in by hand: only power laws scatter in it.
+fn by_hand(job: &Value, [of_part, of_edges]: [f64; 2]) -> Value {
+    let mut job = job.clone();
+    let scatter = |name: &str| number(&job, &format!("/models/{name}/residual_scatter"));
+    let [roughness, force, life] = ["roughness", "force_y", "tool_life"].map(scatter);
+    for zone in job["zones"].as_array_mut().unwrap() {
+        for (field, s) in [("roughness_max_um", roughness), ("deflection_max_um", force)] {
+            zone[field] = json!(zone[field].as_f64().unwrap() * (-of_part * s).exp());
+        }
+    }
+    job["limits"]["tool_usage_max"] = json!((-of_edges * life).exp());
+    job["risk"] = json!({ "kind": "none" });
+    job
+}
+
+#[test]
+fn a_risk_of_each_limit_is_the_plain_schedule_with_limits_moved_in() {
+    let job = case("f1-each-one-percent")["job"].clone();
+    // Quantiles of the standard normal distribution at 1 and 2 %.
+    let by_hand = solved(&by_hand(&job, [2.326_347_874_040_841, 2.053_748_910_631_823]));
+    near("objective", number(&solved(&job), "/objective"), number(&by_hand, "/objective"), 1e-7);
+    // At a half the limits are where the models expect their results.
+    let mut half = job;
+    half["risk"] = json!({ "kind": "each", "risk_percent": 49.999_999, "edge_risk_percent": 49.999_999 });
+    let mut plain = half.clone();
+    plain["risk"] = json!({ "kind": "none" });
+    near("a half", number(&solved(&half), "/objective"), number(&solved(&plain), "/objective"), 1e-6);
+}
+
+/// A standard normal number.
+fn normal(draw: &mut Draw) -> f64 {
+    let share = draw.share().clamp(1e-12, 1.0 - 1e-12);
+    -std::f64::consts::SQRT_2 * statrs::function::erf::erfc_inv(2.0 * share)
+}
+
+#[test]
+fn parts_keep_their_limits_as_often_as_said() {
+    for (name, draws) in [("f1-each-one-percent", 20_000), ("f2-joint-one-percent", 20_000)] {
+        let job = case(name)["job"].clone();
+        let answer = solved(&job);
+        let told = number(&answer, "/conformance/joint_probability");
+        let mut draw = Draw::new(23);
+        let scatter = |name: &str| number(&job, &format!("/models/{name}/residual_scatter"));
+        let zones: Vec<(&Value, &Value)> =
+            answer["zones"].as_array().unwrap().iter().zip(job["zones"].as_array().unwrap()).collect();
+        let keeps = |draw: &mut Draw| {
+            zones.iter().all(|(given, asked)| {
+                let rough = number(given, "/roughness_um") * (scatter("roughness") * normal(draw)).exp();
+                let bent = number(given, "/deflection_um") * (scatter("force_y") * normal(draw)).exp();
+                rough <= number(asked, "/roughness_max_um") && bent <= number(asked, "/deflection_max_um")
+            })
+        };
+        let good = (0..draws).filter(|_| keeps(&mut draw)).count();
+        let share = good as f64 / f64::from(draws);
+        let deviation = (told * (1.0 - told) / f64::from(draws)).sqrt();
+        eprintln!("{name}: told {told}, {share} of {draws}");
+        assert!((share - told).abs() < 3.5 * deviation, "{name}: told {told}, {share}");
+        // Edges are worn out no more often than is accepted.
+        let life = scatter("tool_life");
+        let used = number(&answer, "/tool_usage");
+        let worn = (0..draws).filter(|_| used * (-life * normal(&mut draw)).exp() > 1.0).count();
+        let share = worn as f64 / f64::from(draws);
+        assert!(share < 0.02 + 3.5 * (0.02 * 0.98 / f64::from(draws)).sqrt(), "{share}");
+    }
+}
+
+fn codes(job: &Value) -> Vec<&'static str> {
+    answered(job).unwrap().warnings.iter().map(|warning| warning.code).collect()
+}
+
+#[test]
+fn what_the_warning_of_failures_tells_ends_them() {
+    let mut job = case("f1-each-one-percent")["job"].clone();
+    job["risk"] = json!({ "kind": "none" });
+    assert!(codes(&job).contains(&"half_fail"));
+    job["risk"] = json!({ "kind": "each", "risk_percent": 1 });
+    // Edges are still used to their median life.
+    assert!(codes(&job).contains(&"half_fail"));
+    job["risk"]["edge_risk_percent"] = json!(2);
+    assert!(!codes(&job).contains(&"half_fail"));
+    job["risk"]["kind"] = json!("joint");
+    assert!(!codes(&job).contains(&"half_fail"));
+    job["models"]["roughness"].as_object_mut().unwrap().remove("residual_scatter");
+    assert!(codes(&job).contains(&"no_scatter_given"));
+}
+
+#[test]
+fn a_joint_risk_costs_no_more_than_the_same_shared_evenly() {
+    let job = case("f2-joint-one-percent")["job"].clone();
+    let joint = number(&solved(&job), "/objective");
+    // Six limits of three zones scatter.
+    let mut each = job;
+    each["risk"]["kind"] = json!("each");
+    each["risk"]["risk_percent"] = json!(100.0 * -((1.0_f64 - 0.01).ln() / 6.0).exp_m1());
+    let each = number(&solved(&each), "/objective");
+    assert!(joint < each * (1.0 - 1e-3), "{joint} {each}");
+}
+
+#[test]
+fn prices_are_those_of_the_schedule_at_its_risk() {
+    for name in ["f1-each-one-percent", "f2-joint-one-percent"] {
+        let job = case(name)["job"].clone();
+        let answer = solved(&job);
+        let prices = answer["prices"].as_array().unwrap();
+        assert!(!prices.is_empty());
+        for price in prices.iter().take(4) {
+            let pointer = price["pointer"].as_str().unwrap();
+            let mut turned = job.clone();
+            let step = if price["looser"] == "less" { -1e-3 } else { 1e-3_f64 };
+            let value = turned.pointer(pointer).unwrap().as_f64().unwrap();
+            *turned.pointer_mut(pointer).unwrap() = json!(value * step.exp());
+            let gain = (number(&answer, "/objective") / number(&solved(&turned), "/objective")).ln() / step.abs();
+            let told = number(price, "/gain_percent");
+            assert!((gain - told).abs() < 0.02 * told + 1e-4, "{name}: {pointer} {told}, {gain}");
+        }
+    }
+}
+
+#[test]
+fn a_joint_risk_is_shared_only_over_one_pass() {
+    let mut job = case("f2-joint-one-percent")["job"].clone();
+    job["method"] = json!({ "kind": "continuous" });
+    let job: Job = serde_json::from_value(job).unwrap();
+    let mut violations = Violations::default();
+    job.check(&mut violations);
+    assert!(violations.into_vec().iter().any(|fault| fault.code == "joint_risk_elsewhere"));
+}
