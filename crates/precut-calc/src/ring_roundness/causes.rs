@@ -124,13 +124,18 @@ fn switched_off(
         let turned = turn::<Failure>(blank, setting, &mut |_, _| checkpoint(share.monitor))?;
         Ok::<f64, Failure>(roundness_um(&turned.radii_mm, job.filter, share.monitor)?.0)
     };
-    let with_all = run(&scene.setting, &blank)?;
     let variants = variants(job, scene, end, &blank, share.monitor)?;
-    // A setting that cannot be is no alternative.
-    let without = side_by_side(&variants, |variant| or_none(run(&variant.setting, &variant.blank)))?;
+    // With all terms first; a setting that cannot be is no alternative.
+    let cases: Vec<Option<&Variant>> = std::iter::once(None).chain(variants.iter().map(Some)).collect();
+    let mut found = side_by_side(&cases, |case| match case {
+        None => run(&scene.setting, &blank).map(Some),
+        Some(variant) => or_none(run(&variant.setting, &variant.blank)),
+    })?
+    .into_iter();
+    let with_all = found.next().flatten().unwrap_or(0.0);
     let mut told: Vec<CauseOutcome> = variants
         .iter()
-        .zip(without)
+        .zip(found)
         .filter_map(|(variant, without)| {
             let roundness_without_um = without?;
             let share = if with_all > 0.0 { 1.0 - roundness_without_um / with_all } else { 0.0 };

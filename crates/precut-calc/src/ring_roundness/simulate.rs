@@ -102,13 +102,15 @@ pub(super) struct Run {
     pub replay: Option<ReplayOutcome>,
 }
 
-/// Runs the exact method with `n` nodes; `with_history` also follows the surface.
+/// Runs the exact method with `n` nodes; `with_history` also follows the surface. Without a share of the progress nothing is
+/// reported.
 pub(super) fn run_exact(
     job: &Job,
     scene: &Scene,
     n: u32,
     with_history: bool,
-    share: Share<'_>,
+    monitor: &dyn Monitor,
+    progress: Option<Share<'_>>,
 ) -> Result<Run, Failure> {
     let total = scene.setting.revolutions + scene.setting.spark_out_revolutions;
     let blank = scene.blank_mm(job, n as usize).map_err(unevaluable)?;
@@ -117,11 +119,13 @@ pub(super) fn run_exact(
     let frames = if with_history { job.replay_frames } else { 0 };
     follower.recorder = Recorder::new(scene, frames, total);
     let turned = turn::<Failure>(&blank, &scene.setting, &mut |revolution, radii| {
-        checkpoint(share.monitor)?;
+        checkpoint(monitor)?;
         let Some(revolution) = revolution else { return Ok(()) };
         let done = revolution.turned_revolutions;
-        share.report(done / total, stage(done, total));
-        if with_history { follower.follow(revolution, radii, &grid, share.monitor) } else { Ok(()) }
+        if let Some(progress) = &progress {
+            progress.report(done / total, stage(done, total));
+        }
+        if with_history { follower.follow(revolution, radii, &grid, monitor) } else { Ok(()) }
     })?;
     if turned.first_contact_rev.is_none() {
         return Err(Failure::Infeasible(
@@ -132,8 +136,8 @@ pub(super) fn run_exact(
     let radii = scene.unmirrored(turned.radii_mm.clone());
     let blank_mm = scene.unmirrored(blank);
     Ok(Run {
-        surface: of_radii(&radii, job.filter, job.highest_order, share.monitor)?,
-        start: of_radii(&blank_mm, job.filter, job.highest_order, share.monitor)?,
+        surface: of_radii(&radii, job.filter, job.highest_order, monitor)?,
+        start: of_radii(&blank_mm, job.filter, job.highest_order, monitor)?,
         uncut_share: never as f64 / f64::from(n),
         turned: Turned { radii_mm: radii, ..turned },
         blank_mm,
@@ -257,15 +261,19 @@ pub(super) fn simulate(job: &Job, scene: &Scene, end: &Stance, share: Share<'_>)
 
 fn exact(job: &Job, scene: &Scene, end: &Stance, share: Share<'_>) -> Result<SimulationOutcome, Failure> {
     let n = samples_of(job);
-    let (beside, factor, third, split) = match job.error_estimate {
-        ErrorEstimate::HalfSamples => (n / 2, SAFETY, n / 3, 0.3),
-        ErrorEstimate::DoubleSamples => (2 * n, 2.0 * SAFETY, n / 2, 0.6),
+    let (beside, factor, third) = match job.error_estimate {
+        ErrorEstimate::HalfSamples => (n / 2, SAFETY, n / 3),
+        ErrorEstimate::DoubleSamples => (2 * n, 2.0 * SAFETY, n / 2),
     };
     let third = third.next_multiple_of(4);
-    let other = run_exact(job, scene, beside, false, share.part(0.0, split))?;
-    let third = run_exact(job, scene, third, false, share.part(split, split))?;
-    let main = run_exact(job, scene, n, true, share.part(split, 1.0))?;
-    checkpoint(share.monitor)?;
+    let monitor = share.monitor;
+    let without_progress = |n: u32| run_exact(job, scene, n, false, monitor, None);
+    let (main, others) = rayon::join(
+        || run_exact(job, scene, n, true, monitor, Some(share.part(0.0, 1.0))),
+        || Ok::<_, Failure>((without_progress(beside)?, without_progress(third)?)),
+    );
+    let (main, (other, third)): (Run, (Run, Run)) = (main?, others?);
+    checkpoint(monitor)?;
     let others = [(&other.surface, factor), (&third.surface, SAFETY)];
     let error = stated_errors(&main.surface, &others);
     let um = |mm: f64| mm * UM_PER_MM;
@@ -296,7 +304,7 @@ fn exact(job: &Job, scene: &Scene, end: &Stance, share: Share<'_>) -> Result<Sim
 fn nearest(job: &Job, scene: &Scene, end: &Stance, share: Share<'_>) -> Result<SimulationOutcome, Failure> {
     let n = samples_of(job);
     let beside = super::input::DEFAULT_SAMPLES;
-    let exact = run_exact(job, scene, beside, false, share.part(0.0, 0.4))?;
+    let exact = run_exact(job, scene, beside, false, share.monitor, Some(share.part(0.0, 0.4)))?;
     let points = sampled_blank(job, scene, n as usize)?;
     let total = scene.setting.revolutions + scene.setting.spark_out_revolutions;
     let part = share.part(0.4, 1.0);
