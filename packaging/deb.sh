@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Builds the Debian package from a program that is built already, on the Debian that it was built on:
 #
-#   cargo build --release --locked --bin precut
-#   packaging/deb.sh target/release/precut FOLDER [OPTION OF dpkg-deb ...]     prints the package's path
+#   cargo build --profile dist --locked --bin precut
+#   packaging/deb.sh target/dist/precut FOLDER [OPTION OF dpkg-deb ...]     prints the package's path
 set -euo pipefail
 
 precut=$1

@@ -2,6 +2,8 @@
 //! somebody and has revisions that never change.
 
 use futures_util::future::BoxFuture;
+use sqlx::postgres::PgRow;
+use sqlx::sqlite::SqliteRow;
 
 use super::StoreError;
 use super::quota::{Quota, Usage};
@@ -35,12 +37,11 @@ impl Kind {
 }
 
 /// A document as it is kept.
-#[derive(Debug, Clone, PartialEq, Eq, sqlx::FromRow)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct KeptDocument {
     /// Its name.
     pub name: String,
     /// From 1; a revision never changes.
-    #[sqlx(try_from = "i32")]
     pub revision: u32,
     /// What lists are filtered by: the calculator of a model, the kind of a machine or a tool, the group of a material, the
     /// field of a part.
@@ -53,8 +54,11 @@ pub struct KeptDocument {
     pub created_ms: i64,
 }
 
+from_row!(SqliteRow => KeptDocument { name, revision as i32, class, content, sha256, created_ms });
+from_row!(PgRow => KeptDocument { name, revision as i32, class, content, sha256, created_ms });
+
 /// What is searched of a document.
-#[derive(Debug, Clone, PartialEq, Eq, sqlx::FromRow)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Title {
     /// Its name.
     pub name: String,
@@ -63,6 +67,9 @@ pub struct Title {
     /// Title and other names, a line each.
     pub words: String,
 }
+
+from_row!(SqliteRow => Title { name, class, words });
+from_row!(PgRow => Title { name, class, words });
 
 /// The revisions of a name.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -188,13 +195,14 @@ pub trait DocumentStore: DocumentShelf {
 }
 
 /// The newest revision of a name.
-#[derive(sqlx::FromRow)]
 pub(super) struct Newest {
-    #[sqlx(try_from = "i32")]
     pub(super) revision: u32,
     sha256: String,
     created_ms: i64,
 }
+
+from_row!(SqliteRow => Newest { revision as i32, sha256, created_ms });
+from_row!(PgRow => Newest { revision as i32, sha256, created_ms });
 
 impl NewDocuments {
     /// What becomes of a document beside the newest revision of its name: where it is kept already, that; else whether its name

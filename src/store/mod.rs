@@ -1,5 +1,8 @@
 //! Kept results, and jobs. Nothing outside this module speaks SQL.
 
+#[macro_use]
+mod migrations;
+
 pub mod address;
 pub mod backup;
 pub mod callbacks;

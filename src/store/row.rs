@@ -3,8 +3,8 @@
 use std::io;
 
 use bytes::Bytes;
-use sqlx::sqlite::{Sqlite, SqliteConnection};
-use sqlx::{FromRow, QueryBuilder};
+use sqlx::QueryBuilder;
+use sqlx::sqlite::{Sqlite, SqliteConnection, SqliteRow};
 use zstd::zstd_safe::CParameter;
 
 use super::KeptResult;
@@ -42,7 +42,7 @@ impl Packer {
 }
 
 /// The columns that hold the result itself.
-#[derive(Debug, Clone, PartialEq, FromRow)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct ResultRow {
     pub(super) key: Vec<u8>,
     pub(super) calculator: String,
@@ -52,6 +52,8 @@ pub(super) struct ResultRow {
     pub(super) body: Vec<u8>,
     pub(super) checksum: Vec<u8>,
 }
+
+from_row!(SqliteRow => ResultRow { key, calculator, version, engine, input, body, checksum });
 
 impl ResultRow {
     /// What it takes of the disk, about.

@@ -9,7 +9,9 @@ use std::time::Duration;
 use bytes::Bytes;
 use futures_util::future::BoxFuture;
 use sqlx::migrate::{MigrateError, Migrator};
-use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous};
+use sqlx::sqlite::{
+    SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteRow, SqliteSynchronous,
+};
 use sqlx::{Connection, QueryBuilder, Sqlite};
 
 use super::OpenError;
@@ -20,8 +22,12 @@ use super::writer::{LIST_PATIENCE, Limits, Writer};
 use super::{Cursor, KeptResult, Origin, ResultPage, ResultQuery, ResultStore, ResultSummary, StoreError};
 use crate::key::Key;
 
-fn migrations() -> Migrator {
-    sqlx::migrate!("./migrations")
+#[derive(rust_embed::RustEmbed)]
+#[folder = "migrations"]
+struct Migrations;
+
+pub(super) fn migrations() -> Migrator {
+    super::migrations::embedded::<Migrations>()
 }
 
 pub(super) const DATABASE: &str = "precut.db";
@@ -282,7 +288,6 @@ impl ResultStore for SqliteStore {
     }
 }
 
-#[derive(sqlx::FromRow)]
 struct SummaryRow {
     key: Vec<u8>,
     calculator: String,
@@ -291,6 +296,8 @@ struct SummaryRow {
     bytes: i64,
     created_ms: i64,
 }
+
+from_row!(SqliteRow => SummaryRow { key, calculator, version, engine, bytes, created_ms });
 
 impl SummaryRow {
     fn summary(self) -> Option<ResultSummary> {

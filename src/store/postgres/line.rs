@@ -1,6 +1,6 @@
 //! How a job gets into line.
 
-use sqlx::postgres::PgConnection;
+use sqlx::postgres::{PgConnection, PgRow};
 
 use super::record::{Outcome, RecordRow, column, columns, record};
 use super::results::insert;
@@ -12,7 +12,6 @@ use crate::store::sqlite_jobs::pack::Packed;
 use crate::store::sqlite_jobs::record::{parsed, rank};
 
 /// What a new job's place depends on.
-#[derive(sqlx::FromRow)]
 struct Facts {
     lease: Option<String>,
     attempt: Option<i32>,
@@ -22,6 +21,8 @@ struct Facts {
     first: Option<i64>,
     queued: i64,
 }
+
+from_row!(PgRow => Facts { lease, attempt, started_ms, own, first, queued });
 
 /// See the SQLite store for the order of turns.
 async fn facts(connection: &mut PgConnection, job: &NewJob, queue_limit: u64) -> Outcome<Facts> {

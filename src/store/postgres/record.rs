@@ -1,7 +1,6 @@
 //! A job's record as a row.
 
-use sqlx::FromRow;
-use sqlx::postgres::PgConnection;
+use sqlx::postgres::{PgConnection, PgRow};
 
 use crate::key::Key;
 use crate::store::callbacks::Callback;
@@ -22,7 +21,6 @@ pub(super) use columns;
 
 pub(super) type Outcome<T> = Result<T, sqlx::Error>;
 
-#[derive(FromRow)]
 pub(super) struct RecordRow {
     id: String,
     kind: String,
@@ -46,6 +44,11 @@ pub(super) struct RecordRow {
     tracestate: Option<String>,
     callback: Option<String>,
 }
+
+from_row!(PgRow => RecordRow {
+    id, kind, calculator, key, state, stage, progress, attempt, lease, priority, problem, estimate_ms, created_ms,
+    started_ms, finished_ms, deadline_ms, expires_ms, owner, traceparent, tracestate, callback
+});
 
 impl RecordRow {
     pub(super) fn record(self) -> Outcome<JobRecord> {

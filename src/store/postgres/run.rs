@@ -1,7 +1,6 @@
 //! How a job is taken, ended and put back. Whoever does it holds the lock of the job's key.
 
-use sqlx::FromRow;
-use sqlx::postgres::{PgConnection, PgPool};
+use sqlx::postgres::{PgConnection, PgPool, PgRow};
 
 use super::record::{Outcome, column, count, ids, record, texts};
 use super::{lock_job, lock_lease, news, results};
@@ -17,7 +16,6 @@ use crate::store::sqlite_jobs::record::{parsed, unreadable};
 const LOOKED_AT: i64 = 64;
 
 /// A job that was taken, or given up.
-#[derive(FromRow)]
 struct TakenRow {
     id: String,
     state: String,
@@ -33,6 +31,10 @@ struct TakenRow {
     /// Of one of them only: they are equal.
     input: Option<Vec<u8>>,
 }
+
+from_row!(PgRow => TakenRow {
+    id, state, attempt, kind, calculator, priority, turn, owner, created_ms, traceparent, tracestate, input
+});
 
 /// The columns of a [`TakenRow`]; `$1` is the job whose input is wanted.
 macro_rules! taken {

@@ -24,8 +24,12 @@ const TRUSTED_IDLE: Duration = Duration::from_secs(1);
 /// Between two attempts to reach a database at the start.
 const PAUSE: Duration = Duration::from_millis(250);
 
+#[derive(rust_embed::RustEmbed)]
+#[folder = "migrations/postgres"]
+struct Migrations;
+
 pub(super) fn migrations() -> Migrator {
-    let mut migrations = sqlx::migrate!("./migrations/postgres");
+    let mut migrations = crate::store::migrations::embedded::<Migrations>();
     migrations.dangerous_set_table_name("precut._sqlx_migrations");
     migrations.create_schema("precut");
     // What a newer program has added is told by `precut.versions`.

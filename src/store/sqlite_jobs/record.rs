@@ -1,7 +1,6 @@
 //! A job's record as a row.
 
-use sqlx::FromRow;
-use sqlx::sqlite::SqliteConnection;
+use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
 use crate::key::Key;
 use crate::store::callbacks::Callback;
@@ -19,7 +18,6 @@ macro_rules! columns {
 
 pub(super) use columns;
 
-#[derive(FromRow)]
 pub(super) struct RecordRow {
     id: String,
     kind: String,
@@ -43,6 +41,8 @@ pub(super) struct RecordRow {
     tracestate: Option<String>,
     callback: Option<String>,
 }
+
+from_row!(SqliteRow => RecordRow { id, kind, calculator, key, state, stage, progress, attempt, lease, priority, problem, estimate_ms, created_ms, started_ms, finished_ms, deadline_ms, expires_ms, owner, traceparent, tracestate, callback });
 
 impl RecordRow {
     pub(super) fn record(self) -> Result<JobRecord, sqlx::Error> {

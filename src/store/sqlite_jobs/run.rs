@@ -1,7 +1,6 @@
 //! How a job is taken, ended and put back.
 
-use sqlx::FromRow;
-use sqlx::sqlite::SqliteConnection;
+use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
 use super::pack::PackedEnding;
 use super::record::{Outcome, ids, json_list, parsed, record, unreadable};
@@ -11,7 +10,6 @@ use crate::store::jobs::{
 use crate::store::row;
 
 /// A job with what it takes to run it.
-#[derive(FromRow)]
 struct Runnable {
     id: String,
     key: Vec<u8>,
@@ -26,6 +24,8 @@ struct Runnable {
     traceparent: Option<String>,
     tracestate: Option<String>,
 }
+
+from_row!(SqliteRow => Runnable { id, key, kind, calculator, attempt, input, priority, turn, owner, created_ms, traceparent, tracestate });
 
 /// The job of a condition.
 macro_rules! runnable {

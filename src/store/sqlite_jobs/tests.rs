@@ -115,7 +115,7 @@ async fn the_database_of_the_version_before_is_taken_over_with_its_results() {
     let folder = tempfile::tempdir().unwrap();
     let options = SqliteConnectOptions::new().filename(folder.path().join("precut.db")).create_if_missing(true);
     let pool = SqlitePool::connect_with(options).await.unwrap();
-    let mut before = sqlx::migrate!("./migrations");
+    let mut before = crate::store::sqlite::migrations();
     before.migrations = before.migrations.iter().filter(|migration| migration.version == 1).cloned().collect();
     before.run(&pool).await.unwrap();
     let mut packer = crate::store::row::Packer::new().unwrap();
@@ -137,7 +137,7 @@ async fn jobs_that_waited_in_the_queue_of_earlier_programs_are_lost_nowhere() {
     let folder = tempfile::tempdir().unwrap();
     let options = SqliteConnectOptions::new().filename(folder.path().join("precut.db")).create_if_missing(true);
     let pool = SqlitePool::connect_with(options).await.unwrap();
-    let mut before = sqlx::migrate!("./migrations");
+    let mut before = crate::store::sqlite::migrations();
     before.migrations = before.migrations.iter().filter(|migration| migration.version <= 12).cloned().collect();
     before.run(&pool).await.unwrap();
     // As that queue made them, and its list of migrations in ours.
