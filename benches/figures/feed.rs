@@ -105,3 +105,21 @@ pub(crate) fn answer() -> Result<Measured, String> {
     FeedSchedule::run(&job, &Unwatched).map_err(|failure| format!("{failure:?}"))?;
     cpu_time(|| FeedSchedule::run(&job, &Unwatched))
 }
+
+/// Thirty zones at a risk, over the same without one: complete answers.
+pub(crate) fn at_risk(kind: &str) -> Result<Measured, String> {
+    let of = |risk: Value| -> Result<Measured, String> {
+        let mut job = job(30, &json!({ "/risk": risk }))?;
+        for (model, scatter) in
+            [(&mut job.models.roughness, 0.05), (&mut job.models.force_y, 0.1), (&mut job.models.tool_life, 0.3)]
+        {
+            model.as_mut().ok_or("no model")?.residual_scatter = Some(scatter);
+        }
+        FeedSchedule::run(&job, &Unwatched).map_err(|failure| format!("{failure:?}"))?;
+        cpu_time(|| FeedSchedule::run(&job, &Unwatched))
+    };
+    let plain = of(json!({ "kind": "none" }))?;
+    let at_risk = of(json!({ "kind": kind, "risk_percent": 5, "edge_risk_percent": 5 }))?;
+    let over = |time: f64| time / plain.median;
+    Ok(Measured { median: over(at_risk.median), low: over(at_risk.low), high: over(at_risk.high) })
+}

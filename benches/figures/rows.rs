@@ -43,9 +43,13 @@ pub(crate) fn all() -> Vec<Row> {
         row("the same, effects tried by default, its partly turned section acting", Unit::Time, None, None, || {
             deflection::answer(201, "profile", "auto")
         }),
-        row("and with path, comparison and advice (detail: full)", Unit::Time, None, None, || {
-            deflection::answer(201, "full", "auto")
-        }),
+        row(
+            "and with path, comparison, advice and the probability of a good shaft (detail: full)",
+            Unit::Time,
+            us(10_000.0),
+            us(2000.0),
+            || deflection::answer(201, "full", "auto"),
+        ),
         row("fewest-chord tool path, 10,000 stations", Unit::Time, us(10_000.0), us(3000.0), || {
             deflection::chords(10_000)
         }),
@@ -126,6 +130,12 @@ pub(crate) fn all() -> Vec<Row> {
         ),
         row("1000 single zones", Unit::Time, us(10_000.0), us(2000.0), feed::single_zones),
         row("complete feed schedule: six zones with comparison", Unit::Time, None, None, feed::answer),
+        row("thirty zones at a risk of each limit, over none", Unit::Ratio, Some(2.0), Some(1.1), || {
+            feed::at_risk("each")
+        }),
+        row("thirty zones at one risk for all limits, over none", Unit::Ratio, Some(5.0), Some(2.5), || {
+            feed::at_risk("joint")
+        }),
         row("the source paper's table of 28 rows under both laws, each with two steps", Unit::Time, None, None, || {
             fixture::table()
         }),
