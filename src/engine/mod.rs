@@ -12,7 +12,6 @@ mod csv_table;
 mod envelope;
 mod error;
 mod exec;
-mod flight;
 mod generation;
 mod headings;
 pub(crate) mod jobs;
@@ -26,6 +25,7 @@ mod progress;
 mod quota;
 mod read;
 mod settings;
+mod single_flight;
 mod study;
 mod summary;
 mod table;
@@ -69,13 +69,13 @@ use crate::store::{Origin, ResultPage, ResultQuery, ResultStore, Store};
 use asked::Asked;
 use budget::{Budget, Room, paid_beside};
 use exec::{Cores, Slot, guarded};
-use flight::{Boarded, Flights, Landed, Pilot};
 use generation::Generation;
 use jobs::Jobs;
 use memory::{Kept, Known as Recognised, Memory, fingerprint_on};
 use names::{Asks, Names, Remembered};
 use quota::Unwritten;
 use read::{Draft, Ready};
+use single_flight::{Ended, Joined, Leader, SingleFlight};
 use summary::Summaries;
 
 /// Bodies up to this size are read where they arrive, larger ones on the pool: about 1 ms of reading.
@@ -94,7 +94,7 @@ pub(crate) struct Inner {
     registry: Registry,
     settings: EngineSettings,
     memory: Memory,
-    flights: Arc<Flights>,
+    single_flight: Arc<SingleFlight>,
     cores: Cores,
     store: Arc<dyn ResultStore>,
     documents: Arc<dyn DocumentStore>,
@@ -140,7 +140,7 @@ impl Engine {
             .map_err(|error| OpenError::Threads(error.to_string()))?;
         let memory = Memory::new(settings.memory_cache_bytes);
         let closed = AtomicBool::new(false);
-        let flights = Arc::default();
+        let single_flight = Arc::default();
         let jobs = Jobs::new(jobs);
         let host = Arc::new(study::InEngine::default());
         let studies = Arc::new(study::entry(&registry, settings.study_points, Arc::<study::InEngine>::clone(&host)));
@@ -149,7 +149,7 @@ impl Engine {
             registry,
             settings,
             memory,
-            flights,
+            single_flight,
             cores,
             store,
             documents,
@@ -228,36 +228,36 @@ impl Engine {
 
     /// Computes the answer to a job while somebody waits for it.
     async fn solve_directly(&self, ready: Ready, parse: Duration) -> Result<Solved, Error> {
-        let Boarded { seat, pilot } = self.inner.flights.board(ready.key);
-        if let Some(pilot) = pilot {
-            self.depart(pilot, ready);
+        let Joined { waiter, leader } = self.inner.single_flight.join(ready.key);
+        if let Some(leader) = leader {
+            self.begin(leader, ready);
         }
-        let Landed { outcome, timings } = seat.landed().await;
+        let Ended { outcome, timings } = waiter.ended().await;
         Ok(Solved { stored: outcome?, cache: CacheState::Miss, timings: Timings { parse, ..timings } })
     }
 
     /// Sees to it that the calculation runs: here and now if it is short, else on the pool, when there is a slot.
-    fn depart(&self, pilot: Pilot, ready: Ready) {
+    fn begin(&self, leader: Leader, ready: Ready) {
         let inner = &self.inner;
         let queued = Instant::now();
-        let grounded =
-            move |outcome| Landed { outcome, timings: Timings { queue: queued.elapsed(), ..Timings::default() } };
+        let not_run =
+            move |outcome| Ended { outcome, timings: Timings { queue: queued.elapsed(), ..Timings::default() } };
         if let Some(kept) = inner.memory.get(&ready.key) {
-            // The flight before this one landed between the look into the cache and boarding.
-            return pilot.land(grounded(outcome(kept)));
+            // The calculation before this one ended between the look into the cache and joining.
+            return leader.end(not_run(outcome(kept)));
         }
         if ready.prepared.cost.ms <= COMPUTE_AT_ONCE_MS && !ready.entry.is_composed() {
-            return inner.run(pilot, &ready, None, queued);
+            return inner.run(leader, &ready, None, queued);
         }
         match inner.cores.slot_now() {
-            Ok(Some(slot)) => Inner::fly(inner, pilot, ready, slot, queued),
-            Err(error) => pilot.land(grounded(Err(error))),
+            Ok(Some(slot)) => Inner::enqueue(inner, leader, ready, slot, queued),
+            Err(error) => leader.end(not_run(Err(error))),
             Ok(None) => {
                 let inner = Arc::clone(inner);
                 tokio::spawn(async move {
                     match inner.cores.slot().await {
-                        Ok(slot) => Inner::fly(&inner, pilot, ready, slot, queued),
-                        Err(error) => pilot.land(grounded(Err(error))),
+                        Ok(slot) => Inner::enqueue(&inner, leader, ready, slot, queued),
+                        Err(error) => leader.end(not_run(Err(error))),
                     }
                 });
             }
@@ -319,7 +319,7 @@ impl Engine {
         let inner = &self.inner;
         inner.jobs.close().await;
         if !inner.cores.drain(grace).await {
-            inner.flights.cancel_all();
+            inner.single_flight.cancel_all();
         }
         if let Err(error) = inner.unwritten.write(&*inner.jobs.store).await {
             tracing::warn!(%error, "the work of the last answers is not on record");
@@ -425,20 +425,20 @@ impl Inner {
     }
 
     /// Runs the calculation on the pool.
-    fn fly(inner: &Arc<Self>, pilot: Pilot, ready: Ready, slot: Slot, queued: Instant) {
+    fn enqueue(inner: &Arc<Self>, leader: Leader, ready: Ready, slot: Slot, queued: Instant) {
         let this = Arc::clone(inner);
-        slot.line().push(move || this.run(pilot, &ready, Some(slot), queued));
+        slot.line().push(move || this.run(leader, &ready, Some(slot), queued));
     }
 
     /// Runs the calculation, keeps its answer and tells it.
-    fn run(&self, pilot: Pilot, ready: &Ready, slot: Option<Slot>, queued: Instant) {
+    fn run(&self, leader: Leader, ready: &Ready, slot: Option<Slot>, queued: Instant) {
         let (queue, begun) = (queued.elapsed(), Instant::now());
-        let watch = pilot.watch();
+        let watch = leader.watch();
         let outcome = guarded(|| compute(ready, &watch));
         drop(slot);
         let run = begun.elapsed();
         let outcome = self.keep(ready, outcome, run);
-        pilot.land(Landed { outcome, timings: Timings { parse: Duration::ZERO, queue, run } });
+        leader.end(Ended { outcome, timings: Timings { parse: Duration::ZERO, queue, run } });
     }
 
     /// Keeps what would come out again: answers, and failures that follow from the job alone.

@@ -12,8 +12,8 @@ use super::MOST_ATTEMPTS;
 use super::isolated::Isolated;
 use super::running::Running;
 use crate::engine::exec::{Slot, guarded};
-use crate::engine::flight::Boarded;
 use crate::engine::read::Ready;
+use crate::engine::single_flight::Joined;
 use crate::engine::{Error, Inner, Stored, read};
 use crate::registry::Entry;
 use crate::store::jobs::{Claim, JobKind};
@@ -118,26 +118,26 @@ impl Inner {
             // A study whose points were there already says nothing of what points take.
             let teaches = !ready.entry.is_composed();
             let (id, version, cost_ms) = (ready.entry.meta().id, ready.entry.meta().version, ready.prepared.cost.ms);
-            let Boarded { seat, pilot } = engine.flights.board(ready.key);
-            running.follow(seat.progress());
-            let is_mine = pilot.is_some();
-            if let Some(pilot) = pilot
+            let Joined { waiter, leader } = engine.single_flight.join(ready.key);
+            running.follow(waiter.progress());
+            let is_mine = leader.is_some();
+            if let Some(leader) = leader
                 && let Some((ready, slot)) = mine.take()
             {
                 let (this, queued) = (Arc::clone(engine), Instant::now());
-                slot.line().push(move || this.run(pilot, &ready, Some(slot), queued));
+                slot.line().push(move || this.run(leader, &ready, Some(slot), queued));
             }
-            let landed = tokio::select! {
-                landed = seat.landed() => landed,
-                // The seat is left with the future, and the calculation ends when nobody else sits in it.
+            let ended = tokio::select! {
+                ended = waiter.ended() => ended,
+                // The waiter is dropped with the future, and the calculation ends when nobody else waits for it.
                 () = running.cancelled() => return Err(Error::Cancelled),
             };
-            match landed.outcome {
+            match ended.outcome {
                 // A direct answer found no core. A job has one: it computes what was not computed there.
                 Err(Error::Busy { .. } | Error::ShuttingDown) if !is_mine => {}
                 outcome => {
                     if is_mine && teaches && outcome.is_ok() {
-                        engine.jobs.learn(id, version, cost_ms, landed.timings.run).await;
+                        engine.jobs.learn(id, version, cost_ms, ended.timings.run).await;
                     }
                     return outcome;
                 }
