@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod console;
+mod glossary;
 mod markdown;
 mod physics;
 mod shown;
