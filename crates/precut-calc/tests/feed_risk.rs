@@ -202,3 +202,24 @@ fn a_joint_risk_is_shared_only_over_one_pass() {
     job.check(&mut violations);
     assert!(violations.into_vec().iter().any(|fault| fault.code == "joint_risk_elsewhere"));
 }
+
+#[test]
+fn the_risk_that_costs_least_is_where_neither_more_nor_less_of_it_does() {
+    let mut job = case("f2-joint-one-percent")["job"].clone();
+    let scrap_cost = 5.0;
+    job["risk"] = json!({ "kind": "least_cost", "scrap_cost": scrap_cost, "edge_risk_percent": 2 });
+    let answer = solved(&job);
+    let found = number(&answer, "/conformance/risk_percent");
+    let joint = number(&answer, "/conformance/joint_probability");
+    assert!((100.0 * (1.0 - joint) / found - 1.0).abs() < 1e-3, "{joint} {found}");
+    let at = |percent: f64| {
+        let mut job = job.clone();
+        job["risk"] = json!({ "kind": "joint", "risk_percent": percent, "edge_risk_percent": 2 });
+        number(&solved(&job), "/objective") + scrap_cost * percent / 100.0
+    };
+    let best = at(found);
+    eprintln!("{found} %: {best}; {} {}", at(0.7 * found), at(1.4 * found));
+    for factor in [0.3, 0.7, 0.9, 1.1, 1.4, 3.0] {
+        assert!(at(factor * found) > best, "{factor}");
+    }
+}

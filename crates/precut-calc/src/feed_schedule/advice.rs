@@ -331,6 +331,9 @@ fn limits_kept(job: &Job, outcome: &Outcome) -> Option<Message> {
     if let Some(joint) = conformance.joint_probability {
         said = said.with("joint_percent", 100.0 * joint);
     }
+    if let Some(found) = conformance.risk_percent {
+        said = said.with("found_percent", found);
+    }
     if let Some(gain) = conformance.gain_percent_per_percent_of_risk {
         said = said.with("gain_percent", gain).with("objective", job.objective.name());
     }

@@ -151,13 +151,7 @@ impl Calculator for FeedSchedule {
             Hallmark::Of("/zones/*/deflection_max_um"),
             Hallmark::Of("/zones/*/roughness_max_um"),
         ],
-        study_outputs: &[
-            "/objective",
-            "/cutting_time_min",
-            "/tool_usage",
-            "/largest_deflection_um",
-            "/conformance/joint_probability",
-        ],
+        study_outputs: &["/objective", "/cutting_time_min", "/tool_usage", "/largest_deflection_um"],
         codes: CODES,
         figures: picture::FIGURE_IDS,
         tables: picture::TABLE_IDS,
@@ -217,9 +211,11 @@ impl Calculator for FeedSchedule {
         if job.limits.as_ref().is_some_and(|limits| limits.whole_parts_per_edge) {
             ms *= 10.0;
         }
-        if matches!(job.risk, Risk::Joint { .. }) {
-            ms *= 60.0;
-        }
+        ms *= match job.risk {
+            Risk::None {} | Risk::Each { .. } => 1.0,
+            Risk::Joint { .. } => 60.0,
+            Risk::LeastCost { .. } => 1000.0,
+        };
         if job.limits.as_ref().is_some_and(|limits| limits.whole_edges) {
             ms *= whole::programs(job.zones.len()) as f64 / 8.0;
         }

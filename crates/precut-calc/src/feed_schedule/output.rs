@@ -117,6 +117,10 @@ pub struct ScheduleConformance {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(example = 0.028, extensions(("x-unit" = json!("percent"))))]
     pub gain_percent_per_percent_of_risk: Option<f64>,
+    /// The joint risk that was found to cost least, where that was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 0.4, extensions(("x-unit" = json!("percent"))))]
+    pub risk_percent: Option<f64>,
 }
 
 /// A limit and how probably it is kept.

@@ -1,6 +1,8 @@
 //! Schedules at a stated risk (`certainty/5`): limits moved in by so many standard deviations that results pass them no more
 //! often than is accepted; over all limits of a part together where that is what is stated.
 
+use std::borrow::Cow;
+
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -10,7 +12,7 @@ use crate::num::gp::{self, Affines, Objective};
 
 use super::case::Case;
 use super::compliance::Held;
-use super::input::Job;
+use super::input::{Goal, Job};
 use super::models::Output;
 use super::plan::Method;
 use super::program::{Kind, Place, Variation, build};
@@ -18,7 +20,7 @@ use super::scatter::{OUTPUT_LIMITS, deviations, scatter};
 use super::solve::{Solved, Unsolved, solve};
 
 /// Codes of the faults found here.
-pub(super) const CODES: &[&str] = &["joint_risk_elsewhere"];
+pub(super) const CODES: &[&str] = &["joint_risk_elsewhere", "scrap_without_cost"];
 /// Codes of the failures told here.
 pub(super) const FAILURE_CODES: &[&str] = &["infeasible_at_this_risk"];
 
@@ -31,6 +33,8 @@ const SHARED: f64 = 1e-8;
 const HALVINGS: u32 = 30;
 /// Steps in which the largest joint probability is found.
 const STEPS: u32 = 80;
+/// The risk that costs least is looked for between these, and found to this share of itself.
+const COSTS_LEAST: (f64, f64, f64) = (1e-6, 0.3, 1e-4);
 
 /// With which probability results may pass their limits, because they scatter about their models.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -59,6 +63,16 @@ pub enum Risk {
         #[schema(exclusive_minimum = 0.0, exclusive_maximum = 50.0, example = 2.0, extensions(("x-unit" = json!("percent")), ("x-symbol" = json!("alpha_e"))))]
         edge_risk_percent: Option<f64>,
     },
+    /// The joint risk at which the objective and the parts that are lost cost least together.
+    LeastCost {
+        /// What a part that passes a limit costs, in the money of the objective.
+        #[schema(exclusive_minimum = 0.0, maximum = 1e9, example = 30.0, extensions(("x-unit" = json!("money")), ("x-symbol" = json!("k_s"))))]
+        scrap_cost: f64,
+        /// Of an edge that is worn out before it is changed; not said: edges are used as far as their median life allows.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schema(exclusive_minimum = 0.0, exclusive_maximum = 50.0, example = 2.0, extensions(("x-unit" = json!("percent")), ("x-symbol" = json!("alpha_e"))))]
+        edge_risk_percent: Option<f64>,
+    },
 }
 
 impl Default for Risk {
@@ -74,13 +88,14 @@ impl Risk {
             Self::None {} => "none",
             Self::Each { .. } => "each",
             Self::Joint { .. } => "joint",
+            Self::LeastCost { .. } => "least_cost",
         }
     }
 
     /// Of the limits of a part, as a share.
     pub(super) fn of_part(self) -> Option<f64> {
         match self {
-            Self::None {} => None,
+            Self::None {} | Self::LeastCost { .. } => None,
             Self::Each { risk_percent, .. } | Self::Joint { risk_percent, .. } => Some(risk_percent / 100.0),
         }
     }
@@ -89,9 +104,9 @@ impl Risk {
     pub(super) fn of_edges(self) -> Option<f64> {
         match self {
             Self::None {} => None,
-            Self::Each { edge_risk_percent, .. } | Self::Joint { edge_risk_percent, .. } => {
-                Some(edge_risk_percent? / 100.0)
-            }
+            Self::Each { edge_risk_percent, .. }
+            | Self::Joint { edge_risk_percent, .. }
+            | Self::LeastCost { edge_risk_percent, .. } => Some(edge_risk_percent? / 100.0),
         }
     }
 
@@ -107,9 +122,41 @@ impl Risk {
 /// Finds a joint risk where it is not shared out.
 pub(super) fn check(job: &Job, violations: &mut Violations) {
     let is_shared = matches!(job.method, Method::Optimal) && job.passes.is_none();
-    violations.require(is_shared || !matches!(job.risk, Risk::Joint { .. }), || {
+    violations.require(is_shared || !matches!(job.risk, Risk::Joint { .. } | Risk::LeastCost { .. }), || {
         Finding::new("joint_risk_elsewhere", "/risk/kind")
     });
+    let is_money = matches!(job.objective, Goal::Cost { .. });
+    violations.require(is_money || !matches!(job.risk, Risk::LeastCost { .. }), || {
+        Finding::new("scrap_without_cost", "/objective/kind").with("objective", job.objective.name())
+    });
+}
+
+/// The job with the risk that costs least in place of the wish for it: there the objective falls by as much as the parts cost
+/// that are lost, -df/d alpha = scrap cost (`certainty/5.4`).
+pub(super) fn acting<'j>(job: &'j Job, held: Option<&Held>, monitor: &dyn Monitor) -> Result<Cow<'j, Job>, Unsolved> {
+    let Risk::LeastCost { scrap_cost, edge_risk_percent } = job.risk else { return Ok(Cow::Borrowed(job)) };
+    let at = |alpha: f64| {
+        let risk = Risk::Joint { risk_percent: 100.0 * alpha, edge_risk_percent };
+        Job { risk, ..job.clone() }
+    };
+    // How much more the objective falls with a risk than the lost parts cost.
+    let excess = |alpha: f64| -> Result<f64, Unsolved> {
+        let job = at(alpha);
+        let (_, solved, worth) = solved(Case::of(&job, held, None)?, &job, held, monitor)?;
+        Ok(solved.objective * worth.unwrap_or(0.0) / alpha - scrap_cost)
+    };
+    let (mut low, mut high) = (COSTS_LEAST.0.ln(), COSTS_LEAST.1.ln());
+    while high - low > COSTS_LEAST.2 {
+        checkpoint(monitor)?;
+        let middle = 0.5 * (low + high);
+        match excess(middle.exp()) {
+            Ok(excess) if excess < 0.0 => high = middle,
+            // Where no schedule keeps so small a risk, a larger one is needed whatever it costs.
+            Ok(_) | Err(Unsolved::Failed(Failure::OutOfModel(_))) => low = middle,
+            Err(unsolved) => return Err(unsolved),
+        }
+    }
+    Ok(Cow::Owned(at(high.exp())))
 }
 
 /// A limit of a part whose output scatters: its zone, its place among [`OUTPUT_LIMITS`], and the standard deviation.

@@ -1,5 +1,6 @@
 //! From a job to its answer.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 
 use crate::calculator::{
@@ -51,6 +52,10 @@ pub(super) fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, F
         return Err(Failure::OutOfModel(Finding::new("no_zones", "/zones")));
     }
     let held = Held::of(job)?;
+    let is_wanted = |unsolved| worded(unsolved, job);
+    let acting = risk::acting(job, held.as_ref(), monitor).map_err(is_wanted)?;
+    let is_found = matches!(acting, Cow::Owned(_));
+    let job: &Job = &acting;
     let found = by_method(job, held.as_ref(), monitor).map_err(|unsolved| worded(unsolved, job))?;
     monitor.progress(0.7, Message::new("stage_comparison"));
     let zones: Vec<ZoneOutcome> =
@@ -63,6 +68,7 @@ pub(super) fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, F
     outcome.conformance = scatter::conformance(job, &found.case, &outcome);
     if let Some(conformance) = &mut outcome.conformance {
         conformance.gain_percent_per_percent_of_risk = found.worth_of_risk;
+        conformance.risk_percent = job.risk.of_part().filter(|_| is_found).map(|risk| 100.0 * risk);
     }
     if let Some(solved) = &found.solved {
         let split = found.passes.as_ref().map(|passes| PassSplit {

@@ -201,6 +201,7 @@ pub(super) fn conformance(job: &Job, case: &Case, outcome: &Outcome) -> Option<S
         limits,
         joint_probability: (!part.is_empty()).then(|| bounded(joint.exp())),
         gain_percent_per_percent_of_risk: None,
+        risk_percent: None,
     })
 }
 
