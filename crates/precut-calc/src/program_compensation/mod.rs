@@ -64,8 +64,8 @@ impl Calculator for ProgramCompensation {
     fn cost(job: &Job) -> Cost {
         let (bytes, lines) = (job.nc_program.len(), lines_of(&job.nc_program));
         let read_ms = 1.0 + 2e-3 * lines as f64 + 2e-4 * bytes as f64;
-        // Over a blank every move is held against the outline, which grows with the moves before it.
-        let turned_ms = if job.stock.is_some() { 1e-2 * lines as f64 + 5e-4 * (lines as f64).powi(2) } else { 0.0 };
+        // Over a blank a move is held against what it comes near to, however long the program is (measured).
+        let turned_ms = if job.stock.is_some() { 2e-2 * lines as f64 } else { 0.0 };
         Cost {
             ms: read_ms + turned_ms,
             // A line makes four moves at most; cycles over a contour make some more.

@@ -80,6 +80,23 @@ pub(crate) struct Piece {
 }
 
 impl Piece {
+    /// The largest radius, mm.
+    pub(super) fn highest(&self) -> f64 {
+        let ends = self.curve.at(self.x0).max(self.curve.at(self.x1));
+        match self.curve {
+            Curve::Arc { x, r, radius, is_upper: true } if self.x0 < x && x < self.x1 => r + radius,
+            _ => ends,
+        }
+    }
+
+    /// The least radius between two places of the piece, mm.
+    pub(super) fn lowest(&self, a: f64, b: f64) -> f64 {
+        match self.curve {
+            Curve::Arc { x, r, radius, is_upper: false } if a < x && x < b => r - radius,
+            curve => curve.at(a).min(curve.at(b)),
+        }
+    }
+
     /// Length of its path, mm.
     pub(crate) fn length(&self) -> f64 {
         match self.curve {

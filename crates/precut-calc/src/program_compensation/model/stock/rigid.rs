@@ -6,7 +6,7 @@ use crate::calculator::{Failure, Finding, Monitor, Pace};
 
 use super::super::super::job::{Job, ProgramStock, ProgramTool};
 use super::super::reader::{Kind, Nose, Program, ProgramMove};
-use super::chain::{CONTACT_MM, Chain};
+use super::chain::{CONTACT_MM, Chain, step_owner};
 use super::curve::{Curve, Piece};
 use super::sweep::{Shape, Way};
 
@@ -17,8 +17,9 @@ pub(crate) const FAILURE_CODES: &[&str] = &["tool_missing", "nose_compensation_n
 const FINISHES_MM: f64 = 0.3;
 /// An edge this steep is a wall.
 const WALL_DEG: f64 = 90.0;
-/// Multiplications of a move against a part of the outline, about.
-const WORK_OF_PART: usize = 200;
+/// Multiplications of a move, and of it against a part of the outline, about.
+const WORK_OF_MOVE: usize = 500;
+const WORK_OF_PART: usize = 50;
 
 /// What a program leaves.
 #[derive(Debug, Clone)]
@@ -177,7 +178,7 @@ pub(crate) fn turned(
         let (Some(begin), Some(end), Some(shape)) = (begin, one.end.known(), shape) else {
             continue;
         };
-        pace.work(chain.parts().len() * WORK_OF_PART)?;
+        pace.work(WORK_OF_MOVE + chain.take_looked_at() * WORK_OF_PART)?;
         if one.kind == Kind::Rapid {
             let depth_mm = chain.depth_of(&shape, &way(one, begin, end, zero));
             let is_told = turned.in_stock.last().is_some_and(|last| last.line == one.line);
@@ -210,7 +211,7 @@ fn own(chain: &Chain, turned: &mut Turned) {
         if let Some(before) = i.checked_sub(1).and_then(|i| parts.get(i)) {
             let at = part.piece.x0;
             let height = (before.piece.curve.at(at) - part.piece.curve.at(at)).abs();
-            if let Some(owner) = chain.step_owner(i).filter(|_| height > CONTACT_MM) {
+            if let Some(owner) = step_owner(&parts, i).filter(|_| height > CONTACT_MM) {
                 *turned.owned.entry(owner).or_default() += height;
             }
         }
@@ -220,7 +221,7 @@ fn own(chain: &Chain, turned: &mut Turned) {
 
 impl Chain {
     /// How deep a way lies in the work, mm; below 0 it stays clear.
-    fn depth_of(&self, shape: &Shape, way: &Way) -> f64 {
+    fn depth_of(&mut self, shape: &Shape, way: &Way) -> f64 {
         shape.sweep(way).pieces.iter().map(|piece| self.depth(piece)).fold(f64::NEG_INFINITY, f64::max)
     }
 
