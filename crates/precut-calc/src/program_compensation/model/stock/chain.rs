@@ -12,15 +12,15 @@ const MOST: usize = 64;
 const FEW: usize = 16;
 
 /// What a tool comes to within this is its own, mm.
-pub(super) const CONTACT_MM: f64 = 1e-3;
+pub(crate) const CONTACT_MM: f64 = 1e-3;
 
 /// A part of the outline, and the line of the program that made it; none of the blank.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Part {
-    pub(super) piece: Piece,
-    pub(super) owner: Option<usize>,
+pub(crate) struct Part {
+    pub(crate) piece: Piece,
+    pub(crate) owner: Option<usize>,
     /// Who made the step at its left end.
-    pub(super) step_owner: Option<usize>,
+    pub(crate) step_owner: Option<usize>,
 }
 
 /// Neighbouring parts.
@@ -60,7 +60,7 @@ impl Run {
 
 /// The outline.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Chain {
+pub(crate) struct Chain {
     runs: Vec<Run>,
     /// Parts that a curve was held against so far.
     looked_at: usize,
@@ -68,7 +68,7 @@ pub(super) struct Chain {
 
 impl Chain {
     /// Of a blank: rows of place and radius, places never falling.
-    pub(super) fn of(rows: &[[f64; 2]]) -> Self {
+    pub(crate) fn of(rows: &[[f64; 2]]) -> Self {
         let parts = rows.windows(2).filter(|pair| pair[1][0] > pair[0][0]).map(|pair| Part {
             piece: Piece { x0: pair[0][0], x1: pair[1][0], curve: Curve::through(pair[0], pair[1]) },
             owner: None,
@@ -79,14 +79,31 @@ impl Chain {
     }
 
     /// The parts from left to right.
-    pub(super) fn parts(&self) -> Vec<Part> {
+    pub(crate) fn parts(&self) -> Vec<Part> {
         let mut joined = Vec::with_capacity(self.runs.iter().map(|run| run.parts.len()).sum());
         self.runs.iter().flat_map(|run| &run.parts).for_each(|part| join(&mut joined, part));
         joined
     }
 
+    /// The parts that lie between two places, wholly or not.
+    pub(crate) fn parts_between(&self, from: f64, to: f64) -> impl Iterator<Item = &Part> {
+        let runs = &self.runs[self.run_behind(from)..];
+        let parts = runs.iter().take_while(move |run| run.x0() < to).flat_map(|run| &run.parts);
+        parts.filter(move |part| part.piece.x1 > from && part.piece.x0 < to)
+    }
+
+    /// No radius is larger, mm.
+    pub(crate) fn highest(&self) -> f64 {
+        self.runs.iter().map(|run| run.highest_mm).fold(0.0, f64::max)
+    }
+
+    /// Both ends, mm.
+    pub(crate) fn ends(&self) -> [f64; 2] {
+        [self.runs.first().map_or(0.0, Run::x0), self.runs.last().map_or(0.0, Run::x1)]
+    }
+
     /// Parts that a curve was held against since this was asked last, runs that were passed over as well.
-    pub(super) fn take_looked_at(&mut self) -> usize {
+    pub(crate) fn take_looked_at(&mut self) -> usize {
         std::mem::take(&mut self.looked_at)
     }
 
@@ -96,7 +113,7 @@ impl Chain {
     }
 
     /// How deep a curve lies in the work at the most, mm; below 0 it stays clear by so much.
-    pub(super) fn depth(&mut self, piece: &Piece) -> f64 {
+    pub(crate) fn depth(&mut self, piece: &Piece) -> f64 {
         let mut deepest = f64::NEG_INFINITY;
         let first = self.run_behind(piece.x0 + SAME_MM);
         for run in self.runs[first..].iter().take_while(|run| run.x0() < piece.x1 - SAME_MM) {
@@ -120,7 +137,7 @@ impl Chain {
     }
 
     /// Takes away what stands above a curve.
-    pub(super) fn cut(&mut self, piece: &Piece, owner: usize) {
+    pub(crate) fn cut(&mut self, piece: &Piece, owner: usize) {
         let mut at = self.run_behind(piece.x0 + SAME_MM);
         while self.runs.get(at).is_some_and(|run| run.x0() < piece.x1 - SAME_MM) {
             let run = &mut self.runs[at];
@@ -169,7 +186,7 @@ impl Chain {
     }
 
     /// A wall that stands at a place from a radius on: the step there is then its owner's.
-    pub(super) fn touch_wall(&mut self, x: f64, from: f64, owner: usize) {
+    pub(crate) fn touch_wall(&mut self, x: f64, from: f64, owner: usize) {
         let first = self.runs.partition_point(|run| run.x1() < x - CONTACT_MM);
         let mut left = first.checked_sub(1).and_then(|before| self.runs[before].parts.last()).map(|part| part.piece);
         for run in &mut self.runs[first..] {
@@ -245,7 +262,7 @@ fn cut_part(part: &Part, piece: &Piece, owner: usize, made: &mut Vec<Part>) -> b
 }
 
 /// Who made the step at the left end of a part: who touched it last, else who made its lower side.
-pub(super) fn step_owner(parts: &[Part], i: usize) -> Option<usize> {
+pub(crate) fn step_owner(parts: &[Part], i: usize) -> Option<usize> {
     let (left, right) = (parts.get(i.checked_sub(1)?)?, parts.get(i)?);
     let at = right.piece.x0;
     let low = if left.piece.curve.at(at) < right.piece.curve.at(at) { left } else { right };
