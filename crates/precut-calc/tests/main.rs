@@ -85,6 +85,7 @@ mod material_library;
 mod path_chords;
 mod program_reading;
 mod program_stock;
+mod program_yielding;
 mod ring_cases;
 mod ring_clamping;
 mod ring_contract;

@@ -244,6 +244,50 @@ fn a_program_zero_elsewhere_is_told_with_one_that_fits() {
     assert!(warned(&solve(&bar(&deep, 100.0))).contains(&"cut_implausible"));
 }
 
+/// Waves over a bar, every one of so many short moves, and one pass between them.
+fn waves(orders: [usize; 3], moves: u32) -> String {
+    let wave = |turns: f64, phase: f64| {
+        let mut text = "G0 X60.\nZ2.\n".to_owned();
+        for i in 0..=moves {
+            let share = f64::from(i) / f64::from(moves);
+            let x = 34.0 + 2.0 * (turns * share + phase).sin() + 1.2 * (31.0 * turns * share).sin();
+            let _ = writeln!(text, "G1 X{x:.3} Z{:.3}", 1.0 - 90.0 * share);
+        }
+        text + "G1 X45.\n"
+    };
+    let passes = [wave(20.0, 0.0), "G0 X60.\nZ2.\nX34.5\nG1 Z-70.\nX45.\n".to_owned(), wave(33.0, 1.0)];
+    let text: String = orders.iter().map(|&k| passes[k].as_str()).collect();
+    format!("{HEAD}F0.1\n{text}G0 X60.\nM30\n")
+}
+
+/// What stands over the outline is the least of all moves, whichever came first, however many there are.
+#[test]
+fn thousands_of_moves_leave_the_same_in_any_order() {
+    let (first, second) = (solve(&bar(&waves([0, 1, 2], 1500), 100.0)), solve(&bar(&waves([2, 0, 1], 1500), 100.0)));
+    assert!(surface(&first).z_start_mm.len() > 1500);
+    for i in 0..3000 {
+        let z = 9.7 + 0.03 * f64::from(i);
+        let (a, b) = (at(surface(&first), z).0, at(surface(&second), z).0);
+        // Both sides of a step within rounding.
+        assert!((a - b).abs() < 1e-6, "{z}: {a}, {b}");
+    }
+}
+
+/// Every line costs the same, however many stand before it.
+#[test]
+fn ten_thousand_lines_take_a_moment() {
+    let seconds = |moves: u32| {
+        let job = bar(&waves([0, 1, 2], moves), 100.0);
+        let before = cpu_time::ThreadTime::now();
+        let answer = solve(&job);
+        assert!(!surface(&answer).finishing_lines.is_empty());
+        before.elapsed().as_secs_f64()
+    };
+    let (short, long) = (seconds(500), seconds(5000));
+    println!("1000 lines: {short} s, 10 000 lines: {long} s");
+    assert!(long < 1.0 && long < 25.0 * short.max(0.005), "{short}, {long}");
+}
+
 /// Passes in another order leave the same.
 #[test]
 fn the_order_of_passes_changes_who_made_it_and_not_what_is_left() {

@@ -74,6 +74,11 @@ impl ForceChange {
         self.gradient.abs() <= 0.0
     }
 
+    /// Whether the factor changes with the cutting speed.
+    pub(super) fn depends_on_speed(&self) -> bool {
+        self.speed.is_some() || self.built_up_edge.is_some()
+    }
+
     /// Factor on all components at relative station u, feed and speed (`diagnosis/4.10` to `4.15`).
     pub(super) fn factor(&self, u: f64, feed_mm_per_rev: f64, speed_m_per_min: f64) -> f64 {
         let mut factor = self.level * (1.0 + self.gradient * (u - 0.5));

@@ -40,6 +40,20 @@ pub(super) const CODES: &[&str] = &[
     "aim_without_size_limits",
 ];
 
+/// Codes of the faults of effects and of what they depend on alone.
+pub(crate) const EFFECT_CODES: &[&str] = &[
+    "stations_not_ascending",
+    "duplicate_effect",
+    "condition_missing",
+    "effect_beyond_base",
+    "force_falls_with_depth",
+    "effect_without_headstock",
+    "effect_without_tailstock",
+    "effect_without_rest",
+    "effect_of_carrying_rest",
+    "effect_not_with_passes",
+];
+
 impl Check for Job {
     fn check(&self, violations: &mut Violations) {
         shaft::check::shaft(&self.shaft, violations);
@@ -186,7 +200,7 @@ fn check_bore(job: &Job, rows: &[StockRow], violations: &mut Violations) {
     }
 }
 
-fn check_effects(job: &Job, violations: &mut Violations) {
+pub(super) fn check_effects(job: &Job, violations: &mut Violations) {
     for (i, effect) in job.effects.iter().enumerate() {
         let kind = effect.kind();
         let at = |field: &str| format!("/effects/{i}{field}");

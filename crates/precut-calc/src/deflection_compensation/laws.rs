@@ -117,7 +117,7 @@ impl StationLaws {
 
 /// The law at one feed and speed with the effects in it: factors on all components, then the turned
 /// depth exponent, then what is added to the passive force.
-fn law_at(
+pub(super) fn law_at(
     force: &ForceModel,
     feed_mm_per_rev: f64,
     speed_m_per_min: f64,

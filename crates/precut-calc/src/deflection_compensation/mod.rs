@@ -10,7 +10,7 @@
 //! The way of a job: `input` -> `check` -> `grid` (stations), `acting` (effects),
 //! `structure` (beam) -> `model` (opening over depth) -> `cut` -> `stage` (passes) ->
 //! `driven`: `toolpath` and what it gives and meets (`encounters`), `form`, `second_order`, `advice` -> `output`, `picture`.
-//! `forward` gives the same model to the diagnosis.
+//! `forward` gives the same model to the diagnosis, `held` to a program that is there.
 
 mod acting;
 mod advice;
@@ -27,6 +27,7 @@ mod extremes;
 mod form;
 mod forward;
 mod grid;
+mod held;
 mod hypotheses;
 mod input;
 mod laws;
@@ -46,10 +47,12 @@ mod toolpath;
 mod uncertain;
 
 pub use auto::Automatic;
+pub(crate) use check::EFFECT_CODES;
 pub(crate) use encounters::{Reach, chuck_in_the_way, met};
 pub(crate) use equilibrium::{Opening, engage};
 pub use form::{Deviation, Extremum, ExtremumKind, Form, FormClass};
 pub use forward::{DeflectionAllowances, DeflectionPoint, DeflectionRun};
+pub(crate) use held::{Gaps, Held, Holding, Push, Slice, ToolPlace};
 pub use input::{
     Aim, Carriage, Cut, Detail, FeedDirection, Gravity, Include, IncludeMode, Job, Limits, MAX_STATIONS, Pass,
     PathSettings, ProgramSettings, ProgramZero, SafePosition, Section, Segment, Shaft, SpeedDiameter, Stations,

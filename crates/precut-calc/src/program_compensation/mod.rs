@@ -1,15 +1,16 @@
 //! The program that a shop has already (`program`): read as its control reads it.
 //!
-//! The way of a job: `job` -> `model` (the reader: bytes, words, blocks, moves) -> `answer` (moves, pictures, what is said).
+//! The way of a job: `job` -> `model` (the reader: bytes, words, blocks, moves; the blank, rigid and yielding) -> `answer` (moves,
+//! errors, pictures, what is said).
 
 mod answer;
 mod job;
 mod model;
 
-pub use answer::output::{LeftSurface, Outcome, ReadMoves};
+pub use answer::output::{CutsAlong, ErrorAlong, ErrorOfLines, LeftSurface, Outcome, ReadMoves, YieldedWork};
 pub use job::{
-    DecimalPoint, Dialect, Job, Mode, ModeKind, ProgramFeed, ProgramStart, ProgramStock, ProgramTool, ProgramUnits,
-    Reading, StockRow, WordsOfX,
+    DecimalPoint, Dialect, Job, Mode, ModeKind, ProgramFeed, ProgramInclude, ProgramStart, ProgramStock, ProgramTool,
+    ProgramUnits, Reading, StockRow, SupportLines, WordsOfX,
 };
 pub use model::reader::{ContourCycle, CycleKind, Kind, MAX_LINES, MAX_MOVES, Nose};
 
@@ -19,7 +20,7 @@ use crate::calculator::{
 };
 
 use answer::{advice, output, picture};
-use model::{reader, stock};
+use model::{reader, stock, yielding};
 
 /// Reads programs for lathes.
 #[derive(Debug, Clone, Copy)]
@@ -32,7 +33,7 @@ impl Calculator for ProgramCompensation {
     const META: Meta = Meta {
         id: "program-compensation",
         kind: CalculatorKind::Calculator,
-        version: 1,
+        version: 2,
         title: "The program that is there",
         question: "What does this turning program make the machine do, word by word, and what in it is not understood?",
         summary: "A turning program as it is, for Fanuc (G-code systems A, B and C), Siemens or LinuxCNC, is read as its \
@@ -40,17 +41,25 @@ impl Calculator for ProgramCompensation {
                   single cycles, roughing and finishing along a contour are expanded into their moves. What is not \
                   understood is refused with its line, column and word and with what to do, all of it at once; threads and \
                   grooves are passed with a warning. Nothing is guessed. With a blank: the surface that the program leaves on \
-                  work and machine that do not yield, which line makes which part of it, and rapid moves through stock.",
+                  work and machine that do not yield, which line makes which part of it, and rapid moves through stock. With forces \
+                  and supports: what it leaves where they yield.",
         references: &[
             "Fanuc, Operator's manual for lathe systems, G-code systems A, B and C",
             "Siemens, SINUMERIK 840D sl Programming manual, Fundamentals",
             "LinuxCNC, G-code reference",
         ],
-        examples: &[Example {
-            id: "two_diameters",
-            title: "Shaft of two diameters from a bar, roughed and finished, as a Fanuc of system A reads it",
-            job: include_str!("examples/two_diameters.json"),
-        }],
+        examples: &[
+            Example {
+                id: "two_diameters",
+                title: "Shaft of two diameters from a bar, roughed and finished, as a Fanuc of system A reads it",
+                job: include_str!("examples/two_diameters.json"),
+            },
+            Example {
+                id: "slender_shaft",
+                title: "Slender shaft between chuck and centre: what its program leaves where work and machine yield",
+                job: include_str!("examples/slender_shaft.json"),
+            },
+        ],
         hallmarks: &[Hallmark::Of("/dialect"), Hallmark::Of("/mode/kind")],
         study_outputs: &["/feed_moves", "/feed_length_mm"],
         codes: CODES,
@@ -59,15 +68,19 @@ impl Calculator for ProgramCompensation {
         has_program: false,
     };
 
-    fn fill(_job: &mut Job) {}
+    fn fill(job: &mut Job) {
+        job.fill();
+    }
 
     fn cost(job: &Job) -> Cost {
         let (bytes, lines) = (job.nc_program.len(), lines_of(&job.nc_program));
         let read_ms = 1.0 + 2e-3 * lines as f64 + 2e-4 * bytes as f64;
-        // Over a blank every move is held against the outline, which grows with the moves before it.
-        let turned_ms = if job.stock.is_some() { 1e-2 * lines as f64 + 5e-4 * (lines as f64).powi(2) } else { 0.0 };
+        // Over a blank a move is held against what it comes near to, however long the program is (measured).
+        let turned_ms = if job.stock.is_some() { 2e-2 * lines as f64 } else { 0.0 };
+        // Where the work yields, every move bends a beam of as many sections as the outline has parts by then.
+        let yielding_ms = if job.force.is_some() { 0.12 * lines as f64 + 4e-4 * (lines as f64).powi(2) } else { 0.0 };
         Cost {
-            ms: read_ms + turned_ms,
+            ms: read_ms + turned_ms + yielding_ms,
             // A line makes four moves at most; cycles over a contour make some more.
             bytes: 10_000_000 + 1500 * lines as u64 + 2 * bytes as u64,
             driver: "/nc_program",
@@ -93,11 +106,13 @@ impl Calculator for ProgramCompensation {
             }
             None => None,
         };
-        let output = output::outcome(&program, turned.as_ref());
+        let yielded = yielded(&program, job, turned.as_ref(), monitor)?;
+        warnings.extend(yielded.as_ref().and_then(advice::turned_law));
+        warnings.extend(job.force.iter().flat_map(|force| force.cautions("/force")));
+        let output = output::outcome(&program, turned.as_ref(), yielded.as_ref());
         let explanation = advice::explanation(&output);
         monitor.progress(1.0, Message::new("stage_done"));
-        let acting = if turned.is_some() { BASIS } else { &BASIS[..1] };
-        Ok(Answer { output, warnings, explanation, basis: acting.to_vec() })
+        Ok(Answer { output, warnings, explanation, basis: basis(job) })
     }
 
     fn figures(job: &Job, outcome: &Outcome) -> Vec<Figure> {
@@ -109,19 +124,55 @@ impl Calculator for ProgramCompensation {
     }
 }
 
+/// What is left where work and machine yield, of a job that says by which forces.
+fn yielded(
+    program: &reader::Program,
+    job: &Job,
+    turned: Option<&stock::Turned>,
+    monitor: &dyn Monitor,
+) -> Result<Option<yielding::Yielded>, Failure> {
+    let blank = job.stock.as_ref().zip(job.program_zero_z_mm);
+    let (Some(holding), Some(blank), Some(turned)) = (job.holding(), blank, turned) else { return Ok(None) };
+    monitor.progress(0.5, Message::new("stage_yielding"));
+    let finishing = stock::lines_that_finish(turned);
+    yielding::yielding(program, job, &holding, blank, &finishing, monitor).map(Some)
+}
+
 /// The equations that act.
-const BASIS: &[Basis] = &[
-    Basis { equation: "program/2", source: "manuals of the controls" },
-    Basis { equation: "program/3", source: "envelope of segments and arcs" },
-];
+fn basis(job: &Job) -> Vec<Basis> {
+    let mut used = vec![Basis { equation: "program/2", source: "manuals of the controls" }];
+    if job.stock.is_some() {
+        used.push(Basis { equation: "program/3", source: "envelope of segments and arcs" });
+    }
+    if let Some(force) = &job.force {
+        used.push(Basis { equation: "program/4", source: "cut along any direction, equilibrium at the engaged depth" });
+        used.push(Basis { equation: "deflection/3.2", source: "force method, Euler-Bernoulli or Timoshenko beam" });
+        used.extend(force.basis());
+        used.extend(
+            job.effects
+                .iter()
+                .map(|effect| Basis { equation: effect.cause().equation, source: "catalogue of effects" }),
+        );
+    }
+    used
+}
 
 /// Everything that this calculator may utter.
 const CODES: Codes = Codes {
-    faults: &[job::CODES],
-    failures: &[reader::FAULT_CODES, stock::FAILURE_CODES],
-    warnings: &[reader::WARNING_CODES, advice::WARNING_CODES],
+    faults: &[
+        job::CODES,
+        crate::shaft::check::SUPPORT_CODES,
+        crate::deflection_compensation::EFFECT_CODES,
+        crate::force::FAULT_CODES,
+    ],
+    failures: &[reader::FAULT_CODES, stock::FAILURE_CODES, yielding::FAILURE_CODES],
+    warnings: &[
+        reader::WARNING_CODES,
+        advice::WARNING_CODES,
+        &["unconfirmed_force_coefficient", "edge_angle_beyond_table"],
+    ],
     explanations: &[advice::EXPLANATION_CODES],
-    stages: &[&["stage_reading", "stage_turning", "stage_done"]],
+    stages: &[&["stage_reading", "stage_turning", "stage_yielding", "stage_done"]],
     labels: &[picture::LABEL_CODES],
 };
 

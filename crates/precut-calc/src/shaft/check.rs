@@ -17,6 +17,10 @@ pub(crate) const CODES: &[&str] = &[
     "unstable_support",
 ];
 
+/// Codes of the faults of supports alone.
+pub(crate) const SUPPORT_CODES: &[&str] =
+    &["gap_of_two_sided_rest", "support_outside_shaft", "duplicate_support", "unstable_support"];
+
 /// Faults of the shaft, which stands at `/shaft`.
 pub(crate) fn shaft(shaft: &Shaft, violations: &mut Violations) {
     violations.require(!shaft.segments.is_empty(), || Finding::new("no_segments", "/shaft/segments"));

@@ -4,16 +4,20 @@ use crate::calculator::{Finding, Message};
 
 use super::super::job::ProgramStock;
 use super::super::model::stock::{Doubt, Turned, implausible_mm};
+use super::super::model::yielding::Yielded;
 use super::output::Outcome;
 
 /// Rapid moves that are told.
 const MOST_RAPIDS: usize = 100;
+/// Lines that one warning names.
+const MOST_LINES: usize = 20;
 
 /// What may be wrong with a program on its blank.
-pub(crate) const WARNING_CODES: &[&str] = &["rapid_in_stock", "nothing_cut", "cut_implausible"];
+pub(crate) const WARNING_CODES: &[&str] = &["rapid_in_stock", "nothing_cut", "cut_implausible", "force_law_turned"];
 
 /// What an answer may explain.
-pub(crate) const EXPLANATION_CODES: &[&str] = &["program_read", "cycles_expanded", "stretches_passed", "surface_left"];
+pub(crate) const EXPLANATION_CODES: &[&str] =
+    &["program_read", "cycles_expanded", "stretches_passed", "surface_left", "error_along_contour"];
 
 pub(crate) fn explanation(outcome: &Outcome) -> Vec<Message> {
     let mut said = vec![
@@ -33,7 +37,20 @@ pub(crate) fn explanation(outcome: &Outcome) -> Vec<Message> {
     if let Some(surface) = &outcome.surface {
         said.push(Message::new("surface_left").with("lines", surface.finishing_lines.len()));
     }
+    if let Some(yielding) = &outcome.yielding
+        && let Some((smallest, largest)) = yielding.smallest_error_um.zip(yielding.largest_error_um)
+    {
+        said.push(
+            Message::new("error_along_contour").with("smallest_error_um", smallest).with("largest_error_um", largest),
+        );
+    }
     said
+}
+
+/// Lines that cut in another direction than the force law was measured in.
+pub(crate) fn turned_law(yielded: &Yielded) -> Option<Finding> {
+    let lines: Vec<usize> = yielded.turned_lines.iter().copied().take(MOST_LINES).collect();
+    (!lines.is_empty()).then(|| Finding::new("force_law_turned", "/force").with("lines", lines))
 }
 
 /// Rapid moves through stock, and a blank that does not go with the program; `fits` is a program zero that would.

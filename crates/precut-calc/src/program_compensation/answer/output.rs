@@ -5,6 +5,7 @@ use utoipa::ToSchema;
 
 use super::super::model::reader::{ContourCycle, Feed, Kind, Nose, Program, ProgramMove, Speed};
 use super::super::model::stock::{Curve, Turned, lines_that_finish};
+use super::super::model::yielding::{ContourError, CutPlace, Yielded, contour};
 
 /// What a program makes the machine do.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -33,6 +34,148 @@ pub struct Outcome {
     pub moves: ReadMoves,
     /// What the program leaves of the blank on work and machine that do not yield; null without a blank.
     pub surface: Option<LeftSurface>,
+    /// What it leaves where work and machine yield; null without a force law.
+    pub yielding: Option<YieldedWork>,
+}
+
+/// What a program leaves where work and machine yield, and what each of its moves meets.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct YieldedWork {
+    /// Least error of the diameter along the contour; null where nothing is made.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub smallest_error_um: Option<f64>,
+    /// Largest error of the diameter along the contour; null where nothing is made.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub largest_error_um: Option<f64>,
+    /// The error by the lines that make the contour, by columns.
+    pub lines: ErrorOfLines,
+    /// The error along the contour, by columns.
+    pub contour: ErrorAlong,
+    /// What the moves meet, by columns: of every move, or, of more than 20 000 places, of those that make the contour.
+    pub cuts: CutsAlong,
+}
+
+/// The error of the diameter by lines, all of one length.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ErrorOfLines {
+    /// Line that makes the surface, from 1.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub line: Vec<usize>,
+    /// Least error of its surface.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub smallest_error_um: Vec<f64>,
+    /// Largest error of its surface.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub largest_error_um: Vec<f64>,
+}
+
+/// The error of the diameter along the contour, all of one length.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ErrorAlong {
+    /// Place from the headstock end.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub z_mm: Vec<f64>,
+    /// Diameter that the program leaves where nothing yields.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub wanted_diameter_mm: Vec<f64>,
+    /// By how much the diameter comes out larger.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub diameter_error_um: Vec<f64>,
+    /// Line that makes the surface there, from 1.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub line: Vec<usize>,
+}
+
+/// Places of the moves that cut, in their order, all of one length.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct CutsAlong {
+    /// Line of the move, from 1.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub line: Vec<usize>,
+    /// Place of the programmed point, from the headstock end.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub z_mm: Vec<f64>,
+    /// Its diameter.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub diameter_mm: Vec<f64>,
+    /// Engaged depth where nothing yields.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub nominal_depth_mm: Vec<f64>,
+    /// Engaged depth really cut, on what the moves before have left.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub depth_mm: Vec<f64>,
+    /// Angle between the surface that is made and the edge that cuts; 0 where none does.
+    #[schema(extensions(("x-unit" = json!("deg"))))]
+    pub lead_angle_deg: Vec<f64>,
+    /// Compliance at the tool, carriage included.
+    #[schema(extensions(("x-unit" = json!("um/N"))))]
+    pub compliance_um_per_n: Vec<f64>,
+    /// Force on the work across the axis, away from the tool.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub radial_force_n: Vec<f64>,
+    /// By how much the tool comes to stand off its path.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub deflection_um: Vec<f64>,
+}
+
+/// Places above which only those of the contour are told.
+const MOST_PLACES: usize = 20_000;
+const UM_PER_MM: f64 = 1e3;
+
+impl YieldedWork {
+    fn of(yielded: &Yielded, finishing: &[usize]) -> Self {
+        let errors = contour(yielded);
+        let ends = |errors: &mut dyn Iterator<Item = f64>| {
+            errors.fold(None, |ends: Option<(f64, f64)>, error| {
+                Some(ends.map_or((error, error), |(low, high)| (low.min(error), high.max(error))))
+            })
+        };
+        let all = ends(&mut errors.iter().map(|error| error.error_um));
+        let mut lines = ErrorOfLines::default();
+        for &line in finishing {
+            let own = ends(&mut errors.iter().filter(|error| error.line == line).map(|error| error.error_um));
+            if let Some((low, high)) = own {
+                lines.line.push(line);
+                lines.smallest_error_um.push(low);
+                lines.largest_error_um.push(high);
+            }
+        }
+        let mut contour = ErrorAlong::default();
+        errors.iter().for_each(|error| contour.push(error));
+        let mut cuts = CutsAlong::default();
+        let is_told = |line: usize| yielded.places.len() <= MOST_PLACES || finishing.contains(&line);
+        yielded.places.iter().filter(|of| is_told(of.line)).for_each(|of| cuts.push(of.line, &of.place));
+        Self {
+            smallest_error_um: all.map(|(low, _)| low),
+            largest_error_um: all.map(|(_, high)| high),
+            lines,
+            contour,
+            cuts,
+        }
+    }
+}
+
+impl ErrorAlong {
+    fn push(&mut self, error: &ContourError) {
+        self.z_mm.push(error.z_mm);
+        self.wanted_diameter_mm.push(error.diameter_mm);
+        self.diameter_error_um.push(error.error_um);
+        self.line.push(error.line);
+    }
+}
+
+impl CutsAlong {
+    fn push(&mut self, line: usize, place: &CutPlace) {
+        self.line.push(line);
+        self.z_mm.push(place.z_mm);
+        self.diameter_mm.push(2.0 * place.radius_mm);
+        self.nominal_depth_mm.push(place.nominal_depth_mm);
+        self.depth_mm.push(place.depth_mm);
+        self.lead_angle_deg.push(place.lead_rad.to_degrees());
+        self.compliance_um_per_n.push(place.compliance_mm_per_n * UM_PER_MM);
+        self.radial_force_n.push(place.radial_force_n);
+        self.deflection_um.push(place.lift_mm * UM_PER_MM);
+    }
 }
 
 /// The outline that a program leaves, part by part from the headstock end, by columns. A part is straight, or an arc about a
@@ -219,7 +362,8 @@ impl Path {
 }
 
 /// The numbers of a program that is read.
-pub(crate) fn outcome(program: &Program, turned: Option<&Turned>) -> Outcome {
+pub(crate) fn outcome(program: &Program, turned: Option<&Turned>, yielded: Option<&Yielded>) -> Outcome {
+    let finishing = turned.map(lines_that_finish).unwrap_or_default();
     let mut moves = ReadMoves::default();
     program.moves.iter().for_each(|one| moves.push(one));
     let count = |is: fn(Kind) -> bool| moves.kind.iter().filter(|&&kind| is(kind)).count();
@@ -233,5 +377,6 @@ pub(crate) fn outcome(program: &Program, turned: Option<&Turned>) -> Outcome {
         cycles: program.cycles.clone(),
         moves,
         surface: turned.map(LeftSurface::of),
+        yielding: yielded.map(|yielded| YieldedWork::of(yielded, &finishing)),
     }
 }

@@ -6,10 +6,10 @@ use crate::calculator::{Axis, Column, Figure, Frame, Item, Message, Panel, Role,
 
 use super::super::job::{Job, ProgramStock};
 use super::super::model::reader::{CycleKind, Kind};
-use super::output::{LeftSurface, Outcome, Path};
+use super::output::{LeftSurface, Outcome, Path, YieldedWork};
 
-pub(crate) const FIGURE_IDS: &[&str] = &["surface", "program"];
-pub(crate) const TABLE_IDS: &[&str] = &["moves", "cycles", "surface"];
+pub(crate) const FIGURE_IDS: &[&str] = &["surface", "program", "errors"];
+pub(crate) const TABLE_IDS: &[&str] = &["moves", "cycles", "surface", "errors", "cuts"];
 
 /// Codes of titles, axes and legends.
 pub(crate) const LABEL_CODES: &[&str] = &[
@@ -24,6 +24,9 @@ pub(crate) const LABEL_CODES: &[&str] = &[
     "surface_of_blank",
     "surface_of_program",
     "surface_left",
+    "error_along",
+    "error_of_diameter",
+    "error_as_programmed",
 ];
 
 /// Chords of a quarter in the picture.
@@ -59,7 +62,32 @@ pub(crate) fn figures(job: &Job, outcome: &Outcome) -> Vec<Figure> {
     if !items.is_empty() {
         figures.push(one("program", "program_moves", "program_z", "program_diameter", items));
     }
+    if let Some(yielding) = outcome.yielding.as_ref().filter(|yielding| yielding.contour.z_mm.len() > 1) {
+        figures.push(errors(yielding));
+    }
     figures
+}
+
+/// The error along the contour, with gaps where another line goes on.
+fn errors(yielding: &YieldedWork) -> Figure {
+    let along = &yielding.contour;
+    let (mut x, mut y) = (Vec::new(), Vec::new());
+    for (i, (&z, &error)) in along.z_mm.iter().zip(&along.diameter_error_um).enumerate() {
+        if i > 0 && along.line[i - 1] != along.line[i] {
+            x.push(z);
+            y.push(None);
+        }
+        x.push(z);
+        y.push(Some(error));
+    }
+    let items = vec![Item::Line { name: "error_as_programmed", x, y, role: Role::Before }];
+    Figure {
+        id: "errors",
+        title: Message::new("error_along"),
+        frame: Frame::Stacked,
+        x: Axis::linear("surface_z", "mm"),
+        panels: vec![Panel { y: Axis::linear("error_of_diameter", "um"), height: 1.0, items }],
+    }
 }
 
 /// The blank and what is left of it.
@@ -204,5 +232,38 @@ pub(crate) fn tables(outcome: &Outcome) -> Vec<Table> {
             ],
         });
     }
+    if let Some(yielding) = &outcome.yielding {
+        found.extend(tables_of_yielding(yielding));
+    }
     found
+}
+
+fn tables_of_yielding(yielding: &YieldedWork) -> [Table; 2] {
+    let of = |lines: &[usize]| -> Vec<f64> { lines.iter().map(|&line| line as f64).collect() };
+    let (along, cuts) = (&yielding.contour, &yielding.cuts);
+    [
+        Table {
+            id: "errors",
+            columns: vec![
+                Column::numbers("z", "mm", &along.z_mm),
+                Column::numbers("wanted_diameter", "mm", &along.wanted_diameter_mm),
+                Column::numbers("diameter_error", "um", &along.diameter_error_um),
+                Column::numbers("line", "1", &of(&along.line)),
+            ],
+        },
+        Table {
+            id: "cuts",
+            columns: vec![
+                Column::numbers("line", "1", &of(&cuts.line)),
+                Column::numbers("z", "mm", &cuts.z_mm),
+                Column::numbers("diameter", "mm", &cuts.diameter_mm),
+                Column::numbers("nominal_depth", "mm", &cuts.nominal_depth_mm),
+                Column::numbers("depth", "mm", &cuts.depth_mm),
+                Column::numbers("lead_angle", "deg", &cuts.lead_angle_deg),
+                Column::numbers("compliance", "um/N", &cuts.compliance_um_per_n),
+                Column::numbers("radial_force", "N", &cuts.radial_force_n),
+                Column::numbers("deflection", "um", &cuts.deflection_um),
+            ],
+        },
+    ]
 }

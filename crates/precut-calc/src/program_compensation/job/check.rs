@@ -1,6 +1,7 @@
 //! Rules between fields. What is wrong in the program itself is told by its reader.
 
 use crate::calculator::{Check, Finding, Violations};
+use crate::material;
 
 use super::input::Job;
 
@@ -12,6 +13,11 @@ pub(crate) const CODES: &[&str] = &[
     "stock_without_length",
     "duplicate_tool",
     "tip_not_outside",
+    "force_without_stock",
+    "no_such_support",
+    "unknown_material",
+    "elastic_constants_missing",
+    "bad_bore",
 ];
 
 /// Tip directions of turning from outside.
@@ -20,6 +26,7 @@ const OUTSIDE: [u8; 5] = [0, 3, 4, 8, 9];
 impl Check for Job {
     fn check(&self, violations: &mut Violations) {
         self.check_tools(violations);
+        self.check_holding(violations);
         let Some(stock) = &self.stock else { return };
         violations
             .require(self.program_zero_z_mm.is_some(), || Finding::new("program_zero_missing", "/program_zero_z_mm"));
@@ -39,6 +46,43 @@ impl Check for Job {
 }
 
 impl Job {
+    /// What forces and supports ask for.
+    fn check_holding(&self, violations: &mut Violations) {
+        for (i, lines) in self.support_lines.iter().enumerate() {
+            violations.require((lines.support as usize) < self.supports.len(), || {
+                Finding::new("no_such_support", format!("/support_lines/{i}/support"))
+                    .measured(f64::from(lines.support), self.supports.len() as f64, "1")
+                    .with("below", self.supports.len() as f64)
+            });
+        }
+        if self.force.is_none() {
+            return;
+        }
+        let Some(stock) = &self.stock else {
+            return violations.add(Finding::new("force_without_stock", "/stock"));
+        };
+        match &stock.material {
+            Some(id) => violations.require(material::find(id).is_some(), || {
+                Finding::new("unknown_material", "/stock/material")
+                    .with("id", id.clone())
+                    .with("known", material::library().iter().map(|m| m.id).collect::<Vec<_>>())
+            }),
+            None => violations.require(stock.youngs_modulus_n_per_mm2.is_some(), || {
+                Finding::new("elastic_constants_missing", "/stock/youngs_modulus_n_per_mm2")
+            }),
+        }
+        let least = stock.profile.iter().map(|row| row.diameter_mm).fold(f64::INFINITY, f64::min);
+        violations.require(stock.bore_diameter_mm < least, || {
+            Finding::new("bad_bore", "/stock/bore_diameter_mm")
+                .measured(stock.bore_diameter_mm, least, "mm")
+                .with("minimum", 0.0)
+                .with("below", least)
+        });
+        if let Some(holding) = self.holding() {
+            holding.check(violations);
+        }
+    }
+
     fn check_tools(&self, violations: &mut Violations) {
         for (i, tool) in self.tools.iter().enumerate() {
             violations.require(!self.tools[..i].iter().any(|other| other.number == tool.number), || {

@@ -4,6 +4,9 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::calculator::Dialect;
+use crate::deflection_compensation::{Carriage, Gravity, Holding, Segment, Shaft, Support, Theory};
+use crate::effects::{DeflectionConditions, DeflectionEffect};
+use crate::force::ForceModel;
 
 /// A program for a lathe, and what is asked of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -34,6 +37,111 @@ pub struct Job {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schema(max_items = 100, extensions(("x-group" = json!("cut"))))]
     pub tools: Vec<ProgramTool>,
+    /// How cutting forces follow from depth, feed and speed. With it the answer says what the program leaves where work and
+    /// machine yield. Nose and edge of Kienzle's law are those of the tool that cuts.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(extensions(("x-group" = json!("cut"))))]
+    pub force: Option<ForceModel>,
+    /// What holds it, from the headstock on: two centres, a chuck, rests.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schema(max_items = 8, extensions(("x-group" = json!("machine"))))]
+    pub supports: Vec<Support>,
+    /// Supports that act in some lines only: a centre or a rest that comes by an M code.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schema(max_items = 32, extensions(("x-group" = json!("machine")), ("x-advanced" = json!(true))))]
+    pub support_lines: Vec<SupportLines>,
+    /// Compliance of carriage and tool.
+    #[serde(default)]
+    #[schema(extensions(("x-group" = json!("machine"))))]
+    pub carriage: Carriage,
+    /// Which parts of the base physics act beside the passive force.
+    #[serde(default)]
+    #[schema(extensions(("x-group" = json!("numerics"))))]
+    pub include: ProgramInclude,
+    /// Direction and size of gravity, for `include.weight`.
+    #[serde(default)]
+    #[schema(extensions(("x-group" = json!("machine")), ("x-advanced" = json!(true))))]
+    pub gravity: Gravity,
+    /// Named physical effects that act beside the base model; a kind occurs once.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schema(max_items = 22, extensions(("x-group" = json!("effects"))))]
+    pub effects: Vec<DeflectionEffect>,
+    /// The state that effects depend on.
+    #[serde(default)]
+    #[schema(extensions(("x-group" = json!("effects"))))]
+    pub conditions: DeflectionConditions,
+}
+
+impl Job {
+    /// What holds the blank and what pushes it, where the job says by which forces.
+    pub(crate) fn holding(&self) -> Option<Holding> {
+        let (stock, force) = self.stock.as_ref().zip(self.force.as_ref())?;
+        Some(Holding {
+            shaft: stock.shaft(),
+            supports: self.supports.clone(),
+            carriage: self.carriage.clone(),
+            force: force.clone(),
+            tangential: self.include.tangential,
+            axial_moment: self.include.axial_moment,
+            weight: self.include.weight,
+            gravity: self.gravity.clone(),
+            effects: self.effects.clone(),
+            conditions: self.conditions.clone(),
+        })
+    }
+
+    /// Takes the elastic constants of the blank from its material, and what follows from other fields of forces and supports.
+    pub(crate) fn fill(&mut self) {
+        if let Some(stock) = &mut self.stock {
+            let mut shaft = stock.shaft();
+            let is_asked = shaft.material.is_some() || shaft.youngs_modulus_n_per_mm2.is_some();
+            shaft.fill();
+            if is_asked {
+                stock.material = None;
+                stock.youngs_modulus_n_per_mm2 = shaft.youngs_modulus_n_per_mm2;
+                stock.poisson_ratio = shaft.poisson_ratio;
+                stock.density_kg_per_m3 = shaft.density_kg_per_m3;
+            }
+        }
+        if let Some(force) = &mut self.force {
+            force.fill();
+        }
+    }
+}
+
+/// Which parts of the base physics act beside the passive and the feed force across the axis.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ProgramInclude {
+    /// The main force bends the shaft across the radial direction.
+    #[serde(default)]
+    #[schema(default = false, example = true)]
+    pub tangential: bool,
+    /// The axial force bends the shaft by its moment about the axis.
+    #[serde(default)]
+    #[schema(default = false, example = true)]
+    pub axial_moment: bool,
+    /// The shaft sags under its own weight.
+    #[serde(default)]
+    #[schema(default = false, example = true)]
+    pub weight: bool,
+}
+
+/// The lines in which a support acts; what lies before and behind them is cut without it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SupportLines {
+    /// Place of the support in `supports`, from 0.
+    #[schema(minimum = 0, maximum = 7, example = 1, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("i"))))]
+    pub support: u32,
+    /// First line in which it acts.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1, maximum = 200_000, example = 12, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("N_1"))))]
+    pub from_line: Option<u32>,
+    /// Last line in which it acts.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1, maximum = 200_000, example = 40, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("N_2"))))]
+    pub to_line: Option<u32>,
 }
 
 /// The blank.
@@ -43,6 +151,55 @@ pub struct ProgramStock {
     /// Its outline from the headstock end; a place twice is a step.
     #[schema(min_items = 2, max_items = 1000, extensions(("x-code" = json!("stock_without_length"))))]
     pub profile: Vec<StockRow>,
+    /// Diameter of the bore, 0 for solid.
+    #[serde(default)]
+    #[schema(minimum = 0.0, maximum = 10_000.0, default = 0.0, example = 0.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("d_in")), ("x-code" = json!("bad_bore"))))]
+    pub bore_diameter_mm: f64,
+    /// Name in the material library; gives the elastic constants that are not stated. The echoed job has the numbers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = "steel_45", max_length = 64, extensions(("x-library" = json!("materials"))))]
+    pub material: Option<String>,
+    /// Young's modulus; needed where no material is named.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1000.0, maximum = 2_000_000.0, example = 210_000.0, extensions(("x-unit" = json!("N/mm2")), ("x-symbol" = json!("E")), ("x-code" = json!("bad_modulus"))))]
+    pub youngs_modulus_n_per_mm2: Option<f64>,
+    /// Poisson's ratio; of the material, or 0.3. It acts with `theory` Timoshenko.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(exclusive_minimum = -1.0, exclusive_maximum = 0.5, example = 0.3, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("nu")), ("x-code" = json!("bad_poisson"))))]
+    pub poisson_ratio: Option<f64>,
+    /// Density; of the material, or 7850. It acts with `include.weight`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1.0, maximum = 30_000.0, example = 7850.0, extensions(("x-unit" = json!("kg/m3")), ("x-symbol" = json!("rho"))))]
+    pub density_kg_per_m3: Option<f64>,
+    /// Beam theory.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = "euler_bernoulli")]
+    pub theory: Option<Theory>,
+}
+
+impl ProgramStock {
+    /// The blank as a shaft: a segment between any two places of its outline.
+    pub(crate) fn shaft(&self) -> Shaft {
+        let first = self.profile.first().map_or(0.0, |row| row.z_mm);
+        let ends = [(0.0, first)].into_iter().chain(self.profile.windows(2).map(|pair| (pair[0].z_mm, pair[1].z_mm)));
+        let diameter_mm = self.profile.iter().map(|row| row.diameter_mm).fold(f64::INFINITY, f64::min);
+        let segments = ends.filter(|(from, to)| to > from).map(|(from, to)| Segment {
+            length_mm: to - from,
+            diameter_mm,
+            stock_diameter_mm: None,
+            bore_diameter_mm: self.bore_diameter_mm,
+        });
+        Shaft {
+            segments: segments.collect(),
+            material: self.material.clone(),
+            youngs_modulus_n_per_mm2: self.youngs_modulus_n_per_mm2,
+            poisson_ratio: self.poisson_ratio,
+            density_kg_per_m3: self.density_kg_per_m3,
+            yield_strength_n_per_mm2: None,
+            theory: self.theory,
+            section: None,
+        }
+    }
 }
 
 /// A point of the outline of a blank.

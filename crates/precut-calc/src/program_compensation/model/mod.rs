@@ -1,4 +1,5 @@
-//! The model: the program that is read, and what it does to the work.
+//! The model: the program that is read, and what it does to the work, be it rigid or not.
 
 pub(super) mod reader;
 pub(super) mod stock;
+pub(super) mod yielding;

@@ -1,38 +1,49 @@
 //! The outline of the work: radii end to end, with steps between them (`program/3`).
+//!
+//! The parts lie in runs of some tens, each with the largest radius in it. A tool that passes over a run without coming to it is
+//! held against that radius alone: the edge of a tool reaches over all that is turned already, and a program of ten thousand
+//! lines leaves as many parts.
 
 use super::curve::{Curve, Piece, SAME_MM};
 
+/// Most parts of a run.
+const MOST: usize = 64;
+/// Neighbouring runs that have no more parts than this together become one.
+const FEW: usize = 16;
+
 /// What a tool comes to within this is its own, mm.
-pub(super) const CONTACT_MM: f64 = 1e-3;
+pub(crate) const CONTACT_MM: f64 = 1e-3;
 
 /// A part of the outline, and the line of the program that made it; none of the blank.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Part {
-    pub(super) piece: Piece,
-    pub(super) owner: Option<usize>,
+pub(crate) struct Part {
+    pub(crate) piece: Piece,
+    pub(crate) owner: Option<usize>,
     /// Who made the step at its left end.
-    pub(super) step_owner: Option<usize>,
+    pub(crate) step_owner: Option<usize>,
 }
 
-/// The outline.
+/// Neighbouring parts.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Chain {
+struct Run {
+    /// At least one.
     parts: Vec<Part>,
+    /// No radius in it is larger, mm.
+    highest_mm: f64,
 }
 
-impl Chain {
-    /// Of a blank: rows of place and radius, places never falling.
-    pub(super) fn of(rows: &[[f64; 2]]) -> Self {
-        let parts = rows.windows(2).filter(|pair| pair[1][0] > pair[0][0]).map(|pair| Part {
-            piece: Piece { x0: pair[0][0], x1: pair[1][0], curve: Curve::through(pair[0], pair[1]) },
-            owner: None,
-            step_owner: None,
-        });
-        Self { parts: parts.collect() }
+impl Run {
+    fn of(parts: Vec<Part>) -> Self {
+        let highest_mm = parts.iter().map(|part| part.piece.highest()).fold(0.0, f64::max);
+        Self { parts, highest_mm }
     }
 
-    pub(super) fn parts(&self) -> &[Part] {
-        &self.parts
+    fn x0(&self) -> f64 {
+        self.parts.first().map_or(f64::INFINITY, |part| part.piece.x0)
+    }
+
+    fn x1(&self) -> f64 {
+        self.parts.last().map_or(f64::NEG_INFINITY, |part| part.piece.x1)
     }
 
     fn overlapping(&self, piece: &Piece) -> std::ops::Range<usize> {
@@ -41,104 +52,219 @@ impl Chain {
         from..to.max(from)
     }
 
+    /// By how much the run rises above a curve at the most, mm: a bound, not more.
+    fn above_at_most(&self, piece: &Piece) -> f64 {
+        self.highest_mm - piece.lowest(self.x0().max(piece.x0), self.x1().min(piece.x1)).max(0.0)
+    }
+}
+
+/// The outline.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Chain {
+    runs: Vec<Run>,
+    /// Parts that a curve was held against so far.
+    looked_at: usize,
+}
+
+impl Chain {
+    /// Of a blank: rows of place and radius, places never falling.
+    pub(crate) fn of(rows: &[[f64; 2]]) -> Self {
+        let parts = rows.windows(2).filter(|pair| pair[1][0] > pair[0][0]).map(|pair| Part {
+            piece: Piece { x0: pair[0][0], x1: pair[1][0], curve: Curve::through(pair[0], pair[1]) },
+            owner: None,
+            step_owner: None,
+        });
+        let parts: Vec<Part> = parts.collect();
+        Self { runs: parts.chunks(MOST).map(|run| Run::of(run.to_vec())).collect(), looked_at: 0 }
+    }
+
+    /// The parts from left to right.
+    pub(crate) fn parts(&self) -> Vec<Part> {
+        let mut joined = Vec::with_capacity(self.runs.iter().map(|run| run.parts.len()).sum());
+        self.runs.iter().flat_map(|run| &run.parts).for_each(|part| join(&mut joined, part));
+        joined
+    }
+
+    /// The parts that lie between two places, wholly or not.
+    pub(crate) fn parts_between(&self, from: f64, to: f64) -> impl Iterator<Item = &Part> {
+        let runs = &self.runs[self.run_behind(from)..];
+        let parts = runs.iter().take_while(move |run| run.x0() < to).flat_map(|run| &run.parts);
+        parts.filter(move |part| part.piece.x1 > from && part.piece.x0 < to)
+    }
+
+    /// No radius is larger, mm.
+    pub(crate) fn highest(&self) -> f64 {
+        self.runs.iter().map(|run| run.highest_mm).fold(0.0, f64::max)
+    }
+
+    /// Both ends, mm.
+    pub(crate) fn ends(&self) -> [f64; 2] {
+        [self.runs.first().map_or(0.0, Run::x0), self.runs.last().map_or(0.0, Run::x1)]
+    }
+
+    /// Parts that a curve was held against since this was asked last, runs that were passed over as well.
+    pub(crate) fn take_looked_at(&mut self) -> usize {
+        std::mem::take(&mut self.looked_at)
+    }
+
+    /// The first run that goes on behind a place.
+    fn run_behind(&self, x: f64) -> usize {
+        self.runs.partition_point(|run| run.x1() <= x)
+    }
+
     /// How deep a curve lies in the work at the most, mm; below 0 it stays clear by so much.
-    pub(super) fn depth(&self, piece: &Piece) -> f64 {
+    pub(crate) fn depth(&mut self, piece: &Piece) -> f64 {
         let mut deepest = f64::NEG_INFINITY;
-        for part in &self.parts[self.overlapping(piece)] {
-            let (a, b) = (part.piece.x0.max(piece.x0), part.piece.x1.min(piece.x1));
-            for share in [0.0, 0.25, 0.5, 0.75, 1.0] {
-                let at = a + share * (b - a);
-                deepest = deepest.max(part.piece.curve.at(at) - piece.curve.at(at).max(0.0));
+        let first = self.run_behind(piece.x0 + SAME_MM);
+        for run in self.runs[first..].iter().take_while(|run| run.x0() < piece.x1 - SAME_MM) {
+            self.looked_at += 1;
+            if run.above_at_most(piece) <= deepest {
+                continue;
+            }
+            for part in &run.parts[run.overlapping(piece)] {
+                self.looked_at += 1;
+                let (a, b) = (part.piece.x0.max(piece.x0), part.piece.x1.min(piece.x1));
+                if part.piece.highest() - piece.lowest(a, b).max(0.0) <= deepest {
+                    continue;
+                }
+                for share in [0.0, 0.25, 0.5, 0.75, 1.0] {
+                    let at = a + share * (b - a);
+                    deepest = deepest.max(part.piece.curve.at(at) - piece.curve.at(at).max(0.0));
+                }
             }
         }
         deepest
     }
 
     /// Takes away what stands above a curve.
-    pub(super) fn cut(&mut self, piece: &Piece, owner: usize) {
-        let range = self.overlapping(piece);
-        let mut made: Vec<Part> = Vec::new();
-        let mut is_changed = false;
-        let mut at = Vec::new();
-        for part in &self.parts[range.clone()] {
-            let [x0, x1] = [part.piece.x0, part.piece.x1];
-            let (a, b) = (x0.max(piece.x0), x1.min(piece.x1));
-            at.clear();
-            at.extend([x0, x1]);
-            at.extend([a, b].into_iter().filter(|&end| end > x0 + SAME_MM && end < x1 - SAME_MM));
-            for raised in [0.0, CONTACT_MM] {
-                piece.curve.crossings(part.piece.curve, raised, [a, b], &mut at);
+    pub(crate) fn cut(&mut self, piece: &Piece, owner: usize) {
+        let mut at = self.run_behind(piece.x0 + SAME_MM);
+        while self.runs.get(at).is_some_and(|run| run.x0() < piece.x1 - SAME_MM) {
+            let run = &mut self.runs[at];
+            self.looked_at += 1;
+            if run.above_at_most(piece) <= -CONTACT_MM {
+                at += 1;
+                continue;
             }
-            at.sort_by(f64::total_cmp);
-            for (i, ends) in at.windows(2).enumerate() {
-                let [from, to] = [ends[0], ends[1]];
-                if to - from <= SAME_MM {
-                    continue;
-                }
-                let middle = 0.5 * (from + to);
-                let mut own = Part { piece: Piece { x0: from, x1: to, curve: part.piece.curve }, ..*part };
-                if i > 0 {
-                    own.step_owner = None;
-                }
-                if middle > a && middle < b {
-                    let over = part.piece.curve.at(middle) - piece.curve.at(middle);
-                    if over > 0.0 {
-                        own.piece.curve = piece.curve;
-                    }
-                    if over > -CONTACT_MM {
-                        own.owner = Some(owner);
-                        is_changed = true;
-                    }
-                }
-                made.push(own);
+            let range = run.overlapping(piece);
+            self.looked_at += range.len();
+            let mut made: Vec<Part> = Vec::with_capacity(range.len() + 4);
+            let mut is_changed = false;
+            for part in &run.parts[range.clone()] {
+                is_changed |= cut_part(part, piece, owner, &mut made);
             }
-        }
-        if is_changed {
-            self.replace(range, &made);
+            if is_changed {
+                at = self.replace(at, range, &made);
+            }
+            at += 1;
         }
     }
 
-    /// Puts parts in the place of others; those that are one with their neighbour become one.
-    fn replace(&mut self, range: std::ops::Range<usize>, made: &[Part]) {
-        let around = range.start.saturating_sub(1)..(range.end + 1).min(self.parts.len());
-        let before = &self.parts[around.start..range.start];
-        let behind = &self.parts[range.end..around.end];
-        let mut joined: Vec<Part> = Vec::with_capacity(made.len() + 2);
-        for part in before.iter().chain(made).chain(behind) {
-            match joined.last_mut() {
-                Some(last)
-                    if last.owner == part.owner
-                        && last.piece.curve == part.piece.curve
-                        && part.step_owner.is_none() =>
-                {
-                    last.piece.x1 = part.piece.x1;
-                }
-                _ => joined.push(*part),
-            }
+    /// Puts parts of a run in the place of others; those that are one with their neighbour become one. Gives the last run
+    /// that has any of them.
+    fn replace(&mut self, at: usize, range: std::ops::Range<usize>, made: &[Part]) -> usize {
+        let run = &mut self.runs[at];
+        let mut joined: Vec<Part> = Vec::with_capacity(run.parts.len() + made.len());
+        let (before, behind) = (&run.parts[..range.start], &run.parts[range.end..]);
+        before.iter().chain(made).chain(behind).for_each(|part| join(&mut joined, part));
+        if joined.len() > MOST {
+            let behind = joined.split_off(joined.len() / 2);
+            *run = Run::of(joined);
+            self.runs.insert(at + 1, Run::of(behind));
+            return at + 1;
         }
-        self.parts.splice(around, joined);
-    }
-
-    /// Who made the step at the left end of a part: who touched it last, else who made its lower side.
-    pub(super) fn step_owner(&self, i: usize) -> Option<usize> {
-        let (left, right) = (self.parts.get(i.checked_sub(1)?)?, self.parts.get(i)?);
-        let at = right.piece.x0;
-        let low = if left.piece.curve.at(at) < right.piece.curve.at(at) { left } else { right };
-        right.step_owner.or(low.owner)
+        *run = Run::of(joined);
+        let is_few = |pair: &[Run]| pair.iter().map(|run| run.parts.len()).sum::<usize>() <= FEW;
+        if at > 0 && is_few(&self.runs[at - 1..=at]) {
+            let own = self.runs.remove(at);
+            let mut parts = std::mem::take(&mut self.runs[at - 1].parts);
+            own.parts.iter().for_each(|part| join(&mut parts, part));
+            self.runs[at - 1] = Run::of(parts);
+            return at - 1;
+        }
+        at
     }
 
     /// A wall that stands at a place from a radius on: the step there is then its owner's.
-    pub(super) fn touch_wall(&mut self, x: f64, from: f64, owner: usize) {
-        let near = self.parts.partition_point(|part| part.piece.x0 < x - CONTACT_MM).max(1);
-        for i in near..self.parts.len() {
-            let at = self.parts[i].piece.x0;
-            if at > x + CONTACT_MM {
+    pub(crate) fn touch_wall(&mut self, x: f64, from: f64, owner: usize) {
+        let first = self.runs.partition_point(|run| run.x1() < x - CONTACT_MM);
+        let mut left = first.checked_sub(1).and_then(|before| self.runs[before].parts.last()).map(|part| part.piece);
+        for run in &mut self.runs[first..] {
+            if run.x0() > x + CONTACT_MM {
                 break;
             }
-            let (left, right) = (self.parts[i - 1].piece.curve.at(at), self.parts[i].piece.curve.at(at));
-            if (left - right).abs() > CONTACT_MM && left.max(right) > from + CONTACT_MM {
-                self.parts[i].step_owner = Some(owner);
+            let near = run.parts.partition_point(|part| part.piece.x0 < x - CONTACT_MM);
+            if let Some(before) = near.checked_sub(1) {
+                left = Some(run.parts[before].piece);
             }
+            for part in run.parts[near..].iter_mut().take_while(|part| part.piece.x0 <= x + CONTACT_MM) {
+                let at = part.piece.x0;
+                if let Some(left) = left.replace(part.piece) {
+                    let (left, right) = (left.curve.at(at), part.piece.curve.at(at));
+                    if (left - right).abs() > CONTACT_MM && left.max(right) > from + CONTACT_MM {
+                        part.step_owner = Some(owner);
+                    }
+                }
+            }
+            left = run.parts.last().map(|part| part.piece);
         }
     }
+}
+
+/// Adds a part, to the last one where it goes on as that does.
+fn join(parts: &mut Vec<Part>, part: &Part) {
+    match parts.last_mut() {
+        Some(last) if last.owner == part.owner && last.piece.curve == part.piece.curve && part.step_owner.is_none() => {
+            last.piece.x1 = part.piece.x1;
+        }
+        _ => parts.push(*part),
+    }
+}
+
+/// What a curve leaves of a part; whether it comes to it at all.
+fn cut_part(part: &Part, piece: &Piece, owner: usize, made: &mut Vec<Part>) -> bool {
+    let [x0, x1] = [part.piece.x0, part.piece.x1];
+    let (a, b) = (x0.max(piece.x0), x1.min(piece.x1));
+    if part.piece.highest() - piece.lowest(a, b) <= -CONTACT_MM {
+        made.push(*part);
+        return false;
+    }
+    let mut is_changed = false;
+    let mut at = vec![x0, x1];
+    at.extend([a, b].into_iter().filter(|&end| end > x0 + SAME_MM && end < x1 - SAME_MM));
+    for raised in [0.0, CONTACT_MM] {
+        piece.curve.crossings(part.piece.curve, raised, [a, b], &mut at);
+    }
+    at.sort_by(f64::total_cmp);
+    for (i, ends) in at.windows(2).enumerate() {
+        let [from, to] = [ends[0], ends[1]];
+        if to - from <= SAME_MM {
+            continue;
+        }
+        let middle = 0.5 * (from + to);
+        let mut own = Part { piece: Piece { x0: from, x1: to, curve: part.piece.curve }, ..*part };
+        if i > 0 {
+            own.step_owner = None;
+        }
+        if middle > a && middle < b {
+            let over = part.piece.curve.at(middle) - piece.curve.at(middle);
+            if over > 0.0 {
+                own.piece.curve = piece.curve;
+            }
+            if over > -CONTACT_MM {
+                own.owner = Some(owner);
+                is_changed = true;
+            }
+        }
+        made.push(own);
+    }
+    is_changed
+}
+
+/// Who made the step at the left end of a part: who touched it last, else who made its lower side.
+pub(crate) fn step_owner(parts: &[Part], i: usize) -> Option<usize> {
+    let (left, right) = (parts.get(i.checked_sub(1)?)?, parts.get(i)?);
+    let at = right.piece.x0;
+    let low = if left.piece.curve.at(at) < right.piece.curve.at(at) { left } else { right };
+    right.step_owner.or(low.owner)
 }

@@ -1,7 +1,7 @@
 //! Radii over the axis: straight lines and parts of circles.
 
 /// Lengths that are no different, mm.
-pub(super) const SAME_MM: f64 = 1e-9;
+pub(crate) const SAME_MM: f64 = 1e-9;
 
 /// A radius over x, mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,7 +37,7 @@ impl Curve {
     }
 
     /// Places between two others at which it crosses another one raised by so much.
-    pub(super) fn crossings(self, other: Self, raised: f64, within: [f64; 2], into: &mut Vec<f64>) {
+    pub(crate) fn crossings(self, other: Self, raised: f64, within: [f64; 2], into: &mut Vec<f64>) {
         let other = other.raised(raised);
         let candidates = match (self, other) {
             (Self::Line { x, r, slope }, Self::Line { x: x1, r: r1, slope: s1 }) => {
@@ -80,6 +80,23 @@ pub(crate) struct Piece {
 }
 
 impl Piece {
+    /// The largest radius, mm.
+    pub(crate) fn highest(&self) -> f64 {
+        let ends = self.curve.at(self.x0).max(self.curve.at(self.x1));
+        match self.curve {
+            Curve::Arc { x, r, radius, is_upper: true } if self.x0 < x && x < self.x1 => r + radius,
+            _ => ends,
+        }
+    }
+
+    /// The least radius between two places of the piece, mm.
+    pub(crate) fn lowest(&self, a: f64, b: f64) -> f64 {
+        match self.curve {
+            Curve::Arc { x, r, radius, is_upper: false } if a < x && x < b => r - radius,
+            curve => curve.at(a).min(curve.at(b)),
+        }
+    }
+
     /// Length of its path, mm.
     pub(crate) fn length(&self) -> f64 {
         match self.curve {

@@ -8,7 +8,10 @@ mod curve;
 mod rigid;
 mod sweep;
 
-pub(crate) use curve::Curve;
+pub(crate) use chain::{Chain, Part};
+pub(crate) use curve::{Curve, SAME_MM};
 pub(crate) use rigid::{
-    Doubt, FAILURE_CODES, Turned, doubt, implausible_mm, lines_that_finish, turned, zero_that_fits,
+    Doubt, FAILURE_CODES, Stroke, Turned, blank, doubt, implausible_mm, lines_that_finish, strokes, turned,
+    zero_that_fits,
 };
+pub(crate) use sweep::{Shape, Way};

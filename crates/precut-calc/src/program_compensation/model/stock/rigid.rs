@@ -6,7 +6,7 @@ use crate::calculator::{Failure, Finding, Monitor, Pace};
 
 use super::super::super::job::{Job, ProgramStock, ProgramTool};
 use super::super::reader::{Kind, Nose, Program, ProgramMove};
-use super::chain::{CONTACT_MM, Chain};
+use super::chain::{CONTACT_MM, Chain, step_owner};
 use super::curve::{Curve, Piece};
 use super::sweep::{Shape, Way};
 
@@ -17,8 +17,9 @@ pub(crate) const FAILURE_CODES: &[&str] = &["tool_missing", "nose_compensation_n
 const FINISHES_MM: f64 = 0.3;
 /// An edge this steep is a wall.
 const WALL_DEG: f64 = 90.0;
-/// Multiplications of a move against a part of the outline, about.
-const WORK_OF_PART: usize = 200;
+/// Multiplications of a move, and of it against a part of the outline, about.
+const WORK_OF_MOVE: usize = 500;
+const WORK_OF_PART: usize = 50;
 
 /// What a program leaves.
 #[derive(Debug, Clone)]
@@ -145,6 +146,38 @@ fn way(one: &ProgramMove, [x0, z0]: [f64; 2], [x1, z1]: [f64; 2], zero: f64) -> 
     Way::Arc { centre, radius: (a[0] - centre[0]).hypot(a[1] - centre[1]), from: angle(a), turn }
 }
 
+/// A move of a tool between two known places.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Stroke<'p> {
+    /// Which of the program's moves it is.
+    pub(crate) index: usize,
+    pub(crate) one: &'p ProgramMove,
+    pub(crate) tool: &'p ProgramTool,
+    pub(crate) shape: Shape,
+    pub(crate) way: Way,
+}
+
+/// The moves of a program over a blank: those between known places, of tools that are described.
+pub(crate) fn strokes<'p>(program: &'p Program, job: &'p Job, zero: f64) -> impl Iterator<Item = Stroke<'p>> {
+    let tools: Vec<Option<(&ProgramTool, Shape)>> = program
+        .tools
+        .iter()
+        .map(|name| job.tools.iter().find(|tool| tool.number == *name).map(|tool| (tool, shape(tool))))
+        .collect();
+    let mut from = job.reading.start.map(|start| [start.x_diameter_mm, start.z_mm]);
+    program.moves.iter().enumerate().filter_map(move |(index, one)| {
+        let begin = std::mem::replace(&mut from, one.end.known());
+        let (tool, shape) = one.tool.and_then(|tool| tools.get(tool as usize).copied().flatten())?;
+        Some(Stroke { index, one, tool, shape, way: way(one, begin?, one.end.known()?, zero) })
+    })
+}
+
+/// The outline of a blank.
+pub(crate) fn blank(stock: &ProgramStock) -> Chain {
+    let rows: Vec<[f64; 2]> = stock.profile.iter().map(|row| [row.z_mm, 0.5 * row.diameter_mm]).collect();
+    Chain::of(&rows)
+}
+
 /// Drives a program over its blank.
 pub(crate) fn turned(
     program: &Program,
@@ -163,33 +196,23 @@ pub(crate) fn turned(
         let finding = Finding::new("nose_compensation_not_driven", "/nc_program").with("line", one.line);
         return Err(Failure::OutOfModel(finding));
     }
-    let shapes: Vec<Option<Shape>> =
-        program.tools.iter().map(|name| job.tools.iter().find(|tool| tool.number == *name).map(shape)).collect();
-    let rows: Vec<[f64; 2]> = stock.profile.iter().map(|row| [row.z_mm, 0.5 * row.diameter_mm]).collect();
-    let mut chain = Chain::of(&rows);
+    let mut chain = blank(stock);
     let mut turned =
         Turned { parts: Vec::new(), owned: BTreeMap::new(), in_stock: Vec::new(), cuts: false, first_cut: None };
-    let mut from = job.reading.start.map(|start| [start.x_diameter_mm, start.z_mm]);
     let mut pace = Pace::new(monitor);
-    for one in &program.moves {
-        let begin = std::mem::replace(&mut from, one.end.known());
-        let shape = one.tool.and_then(|tool| shapes.get(tool as usize).copied().flatten());
-        let (Some(begin), Some(end), Some(shape)) = (begin, one.end.known(), shape) else {
-            continue;
-        };
-        pace.work(chain.parts().len() * WORK_OF_PART)?;
+    for Stroke { one, shape, way, .. } in strokes(program, job, zero) {
+        pace.work(WORK_OF_MOVE + chain.take_looked_at() * WORK_OF_PART)?;
         if one.kind == Kind::Rapid {
-            let depth_mm = chain.depth_of(&shape, &way(one, begin, end, zero));
+            let depth_mm = chain.depth_of(&shape, &way);
             let is_told = turned.in_stock.last().is_some_and(|last| last.line == one.line);
             if depth_mm > CONTACT_MM && !is_told {
                 turned.in_stock.push(InStock { line: one.line, depth_mm });
             }
         } else if one.kind.is_feed() {
-            let depth_mm = chain.turn(&shape, &way(one, begin, end, zero), one.line);
-            let is_along = (end[1] - begin[1]).abs() >= 0.5 * (end[0] - begin[0]).abs();
+            let depth_mm = chain.turn(&shape, &way, one.line);
             if depth_mm > CONTACT_MM {
                 turned.cuts = true;
-                if is_along {
+                if way.is_along() {
                     turned.first_cut.get_or_insert(Cut { line: one.line, depth_mm });
                 }
             }
@@ -210,7 +233,7 @@ fn own(chain: &Chain, turned: &mut Turned) {
         if let Some(before) = i.checked_sub(1).and_then(|i| parts.get(i)) {
             let at = part.piece.x0;
             let height = (before.piece.curve.at(at) - part.piece.curve.at(at)).abs();
-            if let Some(owner) = chain.step_owner(i).filter(|_| height > CONTACT_MM) {
+            if let Some(owner) = step_owner(&parts, i).filter(|_| height > CONTACT_MM) {
                 *turned.owned.entry(owner).or_default() += height;
             }
         }
@@ -220,12 +243,12 @@ fn own(chain: &Chain, turned: &mut Turned) {
 
 impl Chain {
     /// How deep a way lies in the work, mm; below 0 it stays clear.
-    fn depth_of(&self, shape: &Shape, way: &Way) -> f64 {
+    pub(crate) fn depth_of(&mut self, shape: &Shape, way: &Way) -> f64 {
         shape.sweep(way).pieces.iter().map(|piece| self.depth(piece)).fold(f64::NEG_INFINITY, f64::max)
     }
 
     /// Cuts along a way; how deep the tool went.
-    fn turn(&mut self, shape: &Shape, way: &Way, owner: usize) -> f64 {
+    pub(crate) fn turn(&mut self, shape: &Shape, way: &Way, owner: usize) -> f64 {
         let swept = shape.sweep(way);
         // All of it in the work as it is before.
         let deepest = swept.pieces.iter().map(|piece| self.depth(piece)).fold(f64::NEG_INFINITY, f64::max);

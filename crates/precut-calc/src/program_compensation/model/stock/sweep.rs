@@ -8,34 +8,103 @@ use super::curve::{Curve, Piece};
 
 /// The region of a tool about its programmed point.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Shape {
+pub(crate) struct Shape {
     /// Radius of the nose, mm; 0 for a corner.
-    pub(super) nose: f64,
+    pub(crate) nose: f64,
     /// Slope of the edge on the side of the headstock; none where it is a wall.
-    pub(super) left: Option<f64>,
+    pub(crate) left: Option<f64>,
     /// The same on the other side.
-    pub(super) right: Option<f64>,
+    pub(crate) right: Option<f64>,
     /// From the programmed point to the centre of the nose: along x and r, mm.
-    pub(super) centre: [f64; 2],
+    pub(crate) centre: [f64; 2],
 }
 
 /// A way of the programmed point between two places (x, r), mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Way {
+pub(crate) enum Way {
     /// Straight.
     Line([f64; 2], [f64; 2]),
     /// About a centre, by an angle from +x toward +r at its begin and how far it turns, rad.
     Arc { centre: [f64; 2], radius: f64, from: f64, turn: f64 },
 }
 
+impl Way {
+    /// Both ends.
+    pub(crate) fn ends(&self) -> [[f64; 2]; 2] {
+        [self.at(0.0), self.at(1.0)]
+    }
+
+    /// The place at a share of the way.
+    pub(crate) fn at(&self, share: f64) -> [f64; 2] {
+        match *self {
+            Self::Line(from, to) => [0, 1].map(|k| from[k] + share * (to[k] - from[k])),
+            Self::Arc { centre, radius, from, turn } => {
+                let angle = from + share * turn;
+                [centre[0] + radius * angle.cos(), centre[1] + radius * angle.sin()]
+            }
+        }
+    }
+
+    /// Unit vector along the way at a share of it; none where it has no length.
+    pub(crate) fn direction(&self, share: f64) -> Option<[f64; 2]> {
+        match *self {
+            Self::Line(from, to) => {
+                let (dx, dr) = (to[0] - from[0], to[1] - from[1]);
+                let length = dx.hypot(dr);
+                (length > 0.0).then(|| [dx / length, dr / length])
+            }
+            Self::Arc { from, turn, .. } => {
+                let angle = from + share * turn;
+                Some([-turn.signum() * angle.sin(), turn.signum() * angle.cos()])
+            }
+        }
+    }
+
+    /// Length, mm.
+    pub(crate) fn length_mm(&self) -> f64 {
+        match *self {
+            Self::Line(from, to) => (to[0] - from[0]).hypot(to[1] - from[1]),
+            Self::Arc { radius, turn, .. } => radius * turn.abs(),
+        }
+    }
+
+    /// Whether it goes along the axis more than across it.
+    pub(crate) fn is_along(&self) -> bool {
+        let [from, to] = self.ends();
+        (to[0] - from[0]).abs() >= (to[1] - from[1]).abs()
+    }
+
+    /// The way between two of its places, each lifted off the axis: an arc stays an arc of its radius.
+    pub(crate) fn lifted(&self, [from, to]: [f64; 2], lifts_mm: [f64; 2]) -> Self {
+        let lift = |share: f64, by: f64| {
+            let [x, r] = self.at(share);
+            [x, r + by]
+        };
+        let (a, b) = (lift(from, lifts_mm[0]), lift(to, lifts_mm[1]));
+        let Self::Arc { radius, turn, .. } = *self else { return Self::Line(a, b) };
+        let (dx, dr) = (b[0] - a[0], b[1] - a[1]);
+        let chord = dx.hypot(dr);
+        let height = (radius * radius - 0.25 * chord * chord).max(0.0).sqrt();
+        if chord <= 0.0 || 0.5 * chord >= radius || turn.abs() * (to - from) >= std::f64::consts::PI {
+            return Self::Line(a, b);
+        }
+        // The centre lies to the left of an arc that turns counter-clockwise.
+        let side = height * turn.signum() / chord;
+        let centre = [0.5 * (a[0] + b[0]) - side * dr, 0.5 * (a[1] + b[1]) + side * dx];
+        let angle = |point: [f64; 2]| (point[1] - centre[1]).atan2(point[0] - centre[0]);
+        let half = 2.0 * (0.5 * chord / radius).asin();
+        Self::Arc { centre, radius, from: angle(a), turn: half * turn.signum() }
+    }
+}
+
 /// A wall of the tool: its place, and the radius from which it stands.
-pub(super) type Wall = [f64; 2];
+pub(crate) type Wall = [f64; 2];
 
 /// What a way leaves.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Swept {
-    pub(super) pieces: Vec<Piece>,
-    pub(super) walls: Vec<Wall>,
+pub(crate) struct Swept {
+    pub(crate) pieces: Vec<Piece>,
+    pub(crate) walls: Vec<Wall>,
 }
 
 /// An edge goes on as far as there is work, mm.
@@ -58,7 +127,7 @@ impl Shape {
     }
 
     /// What the way leaves.
-    pub(super) fn sweep(&self, way: &Way) -> Swept {
+    pub(crate) fn sweep(&self, way: &Way) -> Swept {
         let mut swept = Swept::default();
         match *way {
             Way::Line(from, to) => {

@@ -1,0 +1,266 @@
+//! A program driven over a blank that yields: every move on what the moves before have really left.
+
+use std::collections::BTreeSet;
+
+use crate::calculator::{self, Failure, Finding, Monitor};
+use crate::deflection_compensation::{FeedDirection, Holding, ToolPlace};
+use crate::force::ForceModel;
+
+use super::super::super::job::{Job, ProgramStock};
+use super::super::reader::Program;
+use super::super::stock::{Chain, Part, Stroke, Way, blank, strokes};
+use super::cut::{AXIS_MM, CutPlace, Cutting, Pace};
+use super::sections::slices;
+
+/// Why a program is not driven over a blank that yields.
+pub(crate) const FAILURE_CODES: &[&str] = &["speed_missing", "supports_do_not_hold"];
+
+/// How far between two places of a move the path may come off a straight line, mm: of one that finishes, of any other.
+const STRAIGHT_MM: [f64; 2] = [3e-5, 3e-4];
+/// Places stand no farther apart than this at first, mm.
+const APART_MM: f64 = 5.0;
+/// On an arc no farther than by this angle, rad: the edge turns against the surface.
+const APART_RAD: f64 = std::f64::consts::PI / 180.0;
+/// And no nearer than this where the path jumps, mm.
+const NEAREST_MM: f64 = 0.01;
+/// A chip thinner than this is none, mm.
+const CHIP_MM: f64 = 1e-7;
+/// Most places at the beginning, and in all.
+const MOST_AT_FIRST: f64 = 400.0;
+const MOST_PLACES: usize = 4000;
+/// Steps of the stock that get places of their own.
+const MOST_STEPS: usize = 200;
+/// Multiplications for a place of a move.
+const WORK_OF_PLACE: usize = 20_000;
+/// A feed that climbs by more turns a force law that was measured along the axis, rad.
+const TURNED_RAD: f64 = 15.0 * std::f64::consts::PI / 180.0;
+
+/// A place of a move that cuts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PlaceOfMove {
+    /// Line of the move.
+    pub(crate) line: usize,
+    pub(crate) place: CutPlace,
+}
+
+/// What a program leaves where work and machine yield.
+#[derive(Debug, Clone)]
+pub(crate) struct Yielded {
+    /// Places of the moves that cut, in the order of the program.
+    pub(crate) places: Vec<PlaceOfMove>,
+    /// What is left, and what would be, did nothing yield.
+    pub(crate) real: Vec<Part>,
+    pub(crate) nominal: Vec<Part>,
+    /// Lines that cut in another direction than the force law was measured in.
+    pub(crate) turned_lines: BTreeSet<usize>,
+}
+
+/// Path and time in the cut so far.
+#[derive(Debug, Clone, Copy, Default)]
+struct SoFar {
+    path_m: f64,
+    time_min: f64,
+}
+
+/// Drives a program over a blank that yields.
+pub(crate) fn yielding(
+    program: &Program,
+    job: &Job,
+    holding: &Holding,
+    (stock, zero): (&ProgramStock, f64),
+    finishing: &[usize],
+    monitor: &dyn Monitor,
+) -> Result<Yielded, Failure> {
+    let mut nominal = blank(stock);
+    let mut real = blank(stock);
+    let mut yielded =
+        Yielded { places: Vec::new(), real: Vec::new(), nominal: Vec::new(), turned_lines: BTreeSet::new() };
+    let mut so_far = SoFar::default();
+    // The last move that was still cutting when it ended.
+    let mut last_cut: Option<usize> = None;
+    let mut pace = calculator::Pace::new(monitor);
+    for stroke in strokes(program, job, zero).filter(|stroke| stroke.one.kind.is_feed()) {
+        let Stroke { one, shape, way, .. } = &stroke;
+        let before = nominal.clone();
+        nominal.turn(shape, way, one.line);
+        if real.depth_of(shape, way) <= CHIP_MM {
+            continue;
+        }
+        let acts = acts(job, one.line);
+        if !holding.is_held_by(&acts) {
+            return Err(refused("supports_do_not_hold", one.line));
+        }
+        let move_pace = Pace { feed: one.feed, speed: one.speed };
+        if move_pace.speed.is_none() && (holding.force.depends_on_speed() || move_pace.feed_mm_per_rev(1.0).is_none()) {
+            return Err(refused("speed_missing", one.line));
+        }
+        let bore_mm = stock.bore_diameter_mm;
+        let held = holding.hold(&slices(&before, &nominal, bore_mm), &acts, direction(way))?;
+        let cutting = Cutting {
+            stroke: &stroke,
+            held: &held,
+            force: &holding.force,
+            with_main: holding.tangential,
+            nominal: &before,
+            real: &real,
+            goes_on: last_cut == stroke.index.checked_sub(1),
+        };
+        let straight_mm = STRAIGHT_MM[usize::from(!finishing.contains(&one.line))];
+        let from = cutting.meets_from();
+        let along = Along { cutting, way, from, so_far, move_pace, straight_mm };
+        let places = along.places()?;
+        pace.work(places.len() * WORK_OF_PLACE)?;
+        let lifted: Vec<Way> = places
+            .windows(2)
+            .map(|pair| way.lifted([pair[0].share, pair[1].share], [pair[0].lift_mm, pair[1].lift_mm]))
+            .collect();
+        for way in &lifted {
+            real.turn(shape, way, one.line);
+        }
+        so_far = after(so_far, way, move_pace);
+        let is_turned = places.iter().any(|place| place.depth_mm > 0.0) && climbs(way);
+        if is_turned && !matches!(holding.force, ForceModel::Kienzle(_)) {
+            yielded.turned_lines.insert(one.line);
+        }
+        let line = one.line;
+        last_cut = places.last().filter(|place| place.depth_mm > 0.0).map(|_| stroke.index);
+        yielded.places.extend(places.into_iter().map(|place| PlaceOfMove { line, place }));
+    }
+    yielded.real = real.parts();
+    yielded.nominal = nominal.parts();
+    Ok(yielded)
+}
+
+fn refused(code: &'static str, line: usize) -> Failure {
+    Failure::OutOfModel(Finding::new(code, "/nc_program").with("line", line))
+}
+
+/// Which of the supports act in a line.
+fn acts(job: &Job, line: usize) -> Vec<bool> {
+    let is_there = |i: usize| {
+        let mut told = job.support_lines.iter().filter(|told| told.support as usize == i);
+        told.all(|told| {
+            told.from_line.is_none_or(|from| from as usize <= line) && told.to_line.is_none_or(|to| line <= to as usize)
+        })
+    };
+    (0..job.supports.len()).map(is_there).collect()
+}
+
+fn direction(way: &Way) -> FeedDirection {
+    let [from, to] = way.ends();
+    if to[0] > from[0] { FeedDirection::ToTailstock } else { FeedDirection::ToHeadstock }
+}
+
+/// Whether a way leaves the direction of the axis by much.
+fn climbs(way: &Way) -> bool {
+    let steep = |share: f64| way.direction(share).is_some_and(|[x, r]| r.atan2(x.abs()).abs() > TURNED_RAD);
+    [0.0, 0.5, 1.0].into_iter().any(steep)
+}
+
+/// Path and time after a way.
+fn after(so_far: SoFar, way: &Way, pace: Pace) -> SoFar {
+    let radius_mm = way.at(0.5)[1].max(AXIS_MM);
+    let Some(feed) = pace.feed_mm_per_rev(radius_mm) else { return so_far };
+    let turns = way.length_mm() / feed;
+    let time_min = pace.rpm(radius_mm).filter(|rpm| *rpm > 0.0).map_or(0.0, |rpm| turns / rpm);
+    SoFar {
+        path_m: so_far.path_m + 2.0 * std::f64::consts::PI * radius_mm * turns / 1000.0,
+        time_min: so_far.time_min + time_min,
+    }
+}
+
+/// A move along which places are laid.
+struct Along<'a> {
+    cutting: Cutting<'a>,
+    way: &'a Way,
+    /// Share from which on the depth is what the tool meets.
+    from: f64,
+    so_far: SoFar,
+    move_pace: Pace,
+    straight_mm: f64,
+}
+
+impl Along<'_> {
+    /// Places, so close that between them the path is straight.
+    fn places(&self) -> Result<Vec<CutPlace>, Failure> {
+        let mut places = self.at(&self.first_shares())?;
+        // Whether what lies behind a place may still be bent.
+        let mut is_open = vec![true; places.len()];
+        let nearest = NEAREST_MM / self.way.length_mm();
+        while places.len() < MOST_PLACES {
+            let wanted: Vec<usize> = (1..places.len())
+                .filter(|&i| is_open[i - 1] && places[i].share - places[i - 1].share > nearest)
+                .collect();
+            if wanted.is_empty() {
+                break;
+            }
+            let shares: Vec<f64> = wanted.iter().map(|&i| 0.5 * (places[i - 1].share + places[i].share)).collect();
+            let found = self.at(&shares)?;
+            let (mut laid, mut open) = (Vec::new(), Vec::new());
+            let mut next = wanted.iter().zip(&found).peekable();
+            for (i, place) in places.iter().enumerate() {
+                if let Some((_, between)) = next.next_if(|(at, _)| **at == i) {
+                    let before: &CutPlace = &places[i - 1];
+                    let bent = (between.lift_mm - 0.5 * (before.lift_mm + place.lift_mm)).abs() > self.straight_mm;
+                    if let Some(last) = open.last_mut() {
+                        *last = bent;
+                    }
+                    laid.push(*between);
+                    open.push(bent);
+                }
+                laid.push(*place);
+                open.push(is_open[i] && next.peek().is_some_and(|(at, _)| **at == i + 1));
+            }
+            (places, is_open) = (laid, open);
+        }
+        Ok(places)
+    }
+
+    /// Evenly, and on both sides of every step of the stock.
+    fn first_shares(&self) -> Vec<f64> {
+        let length = self.way.length_mm();
+        let turned = if let Way::Arc { turn, .. } = self.way { turn.abs() } else { 0.0 };
+        let count = (length / APART_MM).max(turned / APART_RAD).ceil().clamp(4.0, MOST_AT_FIRST);
+        // At most MOST_AT_FIRST.
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let whole = count as usize;
+        let mut shares: Vec<f64> = (0..=whole).map(|i| i as f64 / count).collect();
+        let [from, to] = self.way.ends();
+        let (low, high) = (from[0].min(to[0]), from[0].max(to[0]));
+        if let Way::Line(..) = self.way
+            && high - low > NEAREST_MM
+        {
+            let stock: &Chain = self.cutting.nominal;
+            let steps = stock.parts_between(low, high).flat_map(|part| [part.piece.x0, part.piece.x1]);
+            for x in steps.take(MOST_STEPS).filter(|x| low < *x && *x < high) {
+                shares.extend([-NEAREST_MM, NEAREST_MM].map(|by| (x + by - from[0]) / (to[0] - from[0])));
+            }
+        }
+        shares.retain(|share| (0.0..=1.0).contains(share));
+        shares.sort_by(f64::total_cmp);
+        let nearest = 0.5 * NEAREST_MM / length;
+        let last = shares.last().copied();
+        shares.dedup_by(|later, kept| *later - *kept <= nearest);
+        if let (Some(kept), Some(last)) = (shares.last_mut(), last) {
+            *kept = last;
+        }
+        shares
+    }
+
+    fn at(&self, shares: &[f64]) -> Result<Vec<CutPlace>, Failure> {
+        let whole = after(self.so_far, self.way, self.move_pace);
+        let between = |from: f64, to: f64, share: f64| from + share * (to - from);
+        let place = |&share: &f64| {
+            let [z_mm, radius_mm] = self.way.at(share);
+            ToolPlace {
+                z_mm,
+                radius_mm: radius_mm.max(AXIS_MM),
+                path_m: between(self.so_far.path_m, whole.path_m, share),
+                time_min: between(self.so_far.time_min, whole.time_min, share),
+            }
+        };
+        let places: Vec<ToolPlace> = shares.iter().map(place).collect();
+        let gaps = self.cutting.held.gaps(&places)?;
+        Ok(shares.iter().enumerate().map(|(i, &share)| self.cutting.at((share, self.from), &gaps, i)).collect())
+    }
+}

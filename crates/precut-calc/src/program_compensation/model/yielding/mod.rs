@@ -1,0 +1,15 @@
+//! What a program leaves of its blank where work and machine yield (`program/4`).
+//!
+//! `outline` (how much of the tool is in the stock) and `sections` (what bends) -> `cut` (the equilibrium at a place) -> `drive`
+//! (along every move, on what the moves before have left) -> `contour` (what comes out against what was meant). Beam, forces and
+//! effects are those of deflection compensation.
+
+mod contour;
+mod cut;
+mod drive;
+mod outline;
+mod sections;
+
+pub(crate) use contour::{ContourError, contour};
+pub(crate) use cut::CutPlace;
+pub(crate) use drive::{FAILURE_CODES, Yielded, yielding};

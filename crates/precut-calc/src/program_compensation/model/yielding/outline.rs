@@ -1,0 +1,218 @@
+//! How much of a tool is in the stock: from the point that makes the surface along nose and edge on the side of the feed to where
+//! they leave the stock (`program/4.2`).
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use super::super::super::job::ProgramTool;
+use super::super::stock::{Chain, Curve, Shape};
+
+/// The outline is laid so far ahead along the feed: what the move before has just made is not stock ahead, mm.
+const AHEAD_MM: f64 = 1e-6;
+/// No edge is longer, mm.
+const LONGEST_MM: f64 = 1e4;
+/// A direction this flat is none, 1.
+const FLAT: f64 = 1e-12;
+
+/// Nose and edge on the side of the feed, for one direction of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Outline {
+    /// Direction of the feed: along x and r.
+    pub(crate) feed: [f64; 2],
+    /// Normal of the surface that is made, into the work.
+    pub(crate) normal: [f64; 2],
+    /// From the normal to the edge on the side of the feed, rad.
+    pub(crate) lead: f64,
+    /// Angle of the normal, rad, and which way the outline turns from there.
+    from: f64,
+    sense: f64,
+    nose: f64,
+    centre: [f64; 2],
+}
+
+/// What of an outline is in the stock.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Engaged {
+    /// Extent against the normal, mm; 0 where nothing is.
+    pub(crate) depth_mm: f64,
+    /// Radius at which it leaves the stock, mm.
+    pub(crate) outer_radius_mm: f64,
+}
+
+fn unit(angle: f64) -> [f64; 2] {
+    [angle.cos(), angle.sin()]
+}
+
+fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[0] + a[1] * b[1]
+}
+
+impl Outline {
+    /// Of a tool that is fed in a direction; none where it does not cut with this side: the edge rubs or stands off.
+    pub(crate) fn of(tool: &ProgramTool, shape: &Shape, feed: [f64; 2]) -> Option<Self> {
+        let is_left_hand = tool.tip_direction == 4;
+        let (leading, trailing) = (tool.cutting_edge_angle_deg.to_radians(), tool.minor_edge_angle_deg.to_radians());
+        let (left, right) = if is_left_hand { (trailing, leading) } else { (leading, trailing) };
+        let normal = normal(feed, tool.tip_direction)?;
+        let mut from = normal[1].atan2(normal[0]);
+        if from > FRAC_PI_2 {
+            from -= 2.0 * PI;
+        }
+        let sense = if normal[0] * feed[1] - normal[1] * feed[0] < 0.0 { -1.0 } else { 1.0 };
+        let lead = if sense < 0.0 { from + FRAC_PI_2 + left } else { right - FRAC_PI_2 - from };
+        (lead > FLAT && lead < PI).then_some(Self {
+            feed,
+            normal,
+            lead,
+            from,
+            sense,
+            nose: shape.nose,
+            centre: shape.centre,
+        })
+    }
+
+    /// What is in the stock with the programmed point at a place.
+    pub(crate) fn engaged(&self, stock: &Chain, [x, r]: [f64; 2]) -> Engaged {
+        let centre = [x + self.centre[0] + AHEAD_MM * self.feed[0], r + self.centre[1] + AHEAD_MM * self.feed[1]];
+        let tip = [centre[0] + self.nose * self.normal[0], centre[1] + self.nose * self.normal[1]];
+        let placed = Placed::of(self, centre, stock);
+        let mut marks = vec![0.0, placed.end];
+        placed.crossings(stock, &mut marks);
+        marks.retain(|mark| (0.0..=placed.end).contains(mark));
+        marks.sort_by(f64::total_cmp);
+        let is_inside = |pair: &&[f64]| {
+            let [px, pr] = placed.at(0.5 * (pair[0] + pair[1]));
+            pair[1] - pair[0] > FLAT && stock_at(stock, px).is_some_and(|radius| pr < radius)
+        };
+        let none = Engaged { depth_mm: 0.0, outer_radius_mm: tip[1].max(0.0) };
+        let Some(last) = marks.windows(2).rev().find(is_inside) else { return none };
+        let out = placed.at(last[1]);
+        let depth_mm = -dot(self.normal, [out[0] - tip[0], out[1] - tip[1]]);
+        Engaged { depth_mm: depth_mm.max(0.0), outer_radius_mm: out[1].max(tip[1]).max(0.0) }
+    }
+}
+
+/// The unit normal with a part toward the axis; of a move straight across the axis that to the side of the tip.
+fn normal(feed: [f64; 2], tip_direction: u8) -> Option<[f64; 2]> {
+    if feed[0].abs() > FLAT {
+        let side = -feed[0].signum();
+        return Some([side * -feed[1], side * feed[0]]).map(|n| if n[1] < 0.0 { n } else { [-n[0], -n[1]] });
+    }
+    match tip_direction {
+        3 => Some([-1.0, 0.0]),
+        4 => Some([1.0, 0.0]),
+        // A nose that plunges makes its surface only at the end.
+        _ => None,
+    }
+}
+
+/// Radius of the stock over a place; none beside it.
+fn stock_at(stock: &Chain, x: f64) -> Option<f64> {
+    let parts = stock.parts_between(x - FLAT, x + FLAT);
+    parts.map(|part| part.piece.curve.at(x)).reduce(f64::max)
+}
+
+/// An outline at a place, by the length along it from the point that makes the surface.
+struct Placed {
+    centre: [f64; 2],
+    nose: f64,
+    from: f64,
+    sense: f64,
+    lead: f64,
+    /// Where the edge begins and which way it goes.
+    edge: [f64; 2],
+    along: [f64; 2],
+    end: f64,
+}
+
+impl Placed {
+    fn of(outline: &Outline, centre: [f64; 2], stock: &Chain) -> Self {
+        let Outline { nose, from, sense, lead, .. } = *outline;
+        let last = from + sense * lead;
+        let at_edge = unit(last);
+        let edge = [centre[0] + nose * at_edge[0], centre[1] + nose * at_edge[1]];
+        let along = [-sense * at_edge[1], sense * at_edge[0]];
+        let [first_x, last_x] = stock.ends();
+        let mut length = LONGEST_MM;
+        if along[1] > FLAT {
+            length = length.min((stock.highest() - edge[1]).max(0.0) / along[1]);
+        }
+        if along[0] > FLAT {
+            length = length.min((last_x - edge[0]).max(0.0) / along[0]);
+        } else if along[0] < -FLAT {
+            length = length.min((first_x - edge[0]).min(0.0) / along[0]);
+        }
+        Self { centre, nose, from, sense, lead, edge, along, end: nose * lead + length + 1e-3 }
+    }
+
+    fn at(&self, length: f64) -> [f64; 2] {
+        let of_nose = self.nose * self.lead;
+        if length < of_nose {
+            let direction = unit(self.from + self.sense * length / self.nose);
+            return [self.centre[0] + self.nose * direction[0], self.centre[1] + self.nose * direction[1]];
+        }
+        let beyond = length - of_nose;
+        [self.edge[0] + beyond * self.along[0], self.edge[1] + beyond * self.along[1]]
+    }
+
+    /// Lengths at which the outline may go into the stock or out of it.
+    fn crossings(&self, stock: &Chain, into: &mut Vec<f64>) {
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for x in [self.edge[0], self.at(self.end)[0]] {
+            (low, high) = (low.min(x), high.max(x));
+        }
+        if self.nose > 0.0 {
+            (low, high) = (low.min(self.centre[0] - self.nose), high.max(self.centre[0] + self.nose));
+        }
+        into.push(self.nose * self.lead);
+        let mut found = Vec::new();
+        for part in stock.parts_between(low - 1e-6, high + 1e-6) {
+            let piece = part.piece;
+            for x in [piece.x0, piece.x1] {
+                self.at_place(x, piece.curve, into);
+            }
+            let within = [piece.x0, piece.x1];
+            if self.nose > 0.0 {
+                for is_upper in [false, true] {
+                    let [x, r] = self.centre;
+                    let half = Curve::Arc { x, r, radius: self.nose, is_upper };
+                    found.clear();
+                    half.crossings(piece.curve, 0.0, within, &mut found);
+                    found.iter().for_each(|&x| self.push_angle([x, piece.curve.at(x)], into));
+                }
+            }
+            if self.along[0].abs() > FLAT {
+                let slope = self.along[1] / self.along[0];
+                let edge = Curve::Line { x: self.edge[0], r: self.edge[1], slope };
+                found.clear();
+                edge.crossings(piece.curve, 0.0, within, &mut found);
+                into.extend(found.iter().map(|x| self.nose * self.lead + (x - self.edge[0]) / self.along[0]));
+            }
+        }
+    }
+
+    /// Where the outline passes a place along the axis, or, of an edge that stands on it, the curve there.
+    fn at_place(&self, x: f64, curve: Curve, into: &mut Vec<f64>) {
+        let beside = x - self.centre[0];
+        if beside.abs() < self.nose {
+            let half = (self.nose * self.nose - beside * beside).sqrt();
+            for r in [self.centre[1] - half, self.centre[1] + half] {
+                self.push_angle([x, r], into);
+            }
+        }
+        let of_nose = self.nose * self.lead;
+        if self.along[0].abs() > FLAT {
+            into.push(of_nose + (x - self.edge[0]) / self.along[0]);
+        }
+        if self.along[1].abs() > FLAT && self.along[0].abs() <= 1e-3 {
+            into.push(of_nose + (curve.at(self.edge[0]) - self.edge[1]) / self.along[1]);
+        }
+    }
+
+    fn push_angle(&self, point: [f64; 2], into: &mut Vec<f64>) {
+        let angle = (point[1] - self.centre[1]).atan2(point[0] - self.centre[0]);
+        let turned = (self.sense * (angle - self.from)).rem_euclid(2.0 * PI);
+        if turned < self.lead {
+            into.push(self.nose * turned);
+        }
+    }
+}
