@@ -5,9 +5,9 @@
 use std::f64::consts::PI;
 
 use crate::support::prepared;
-use precut_calc::calculator::{ForwardModel, Prediction, Rows, Unwatched};
+use precut_calc::calculator::{Calculator, Check, Failure, ForwardModel, Prediction, Rows, Unwatched, Violations};
 use precut_calc::deflection_compensation::{
-    DeflectionCompensation, DeflectionPoint, DeflectionRun, FeedDirection, Job,
+    DeflectionCompensation, DeflectionPoint, DeflectionRun, Detail, FeedDirection, Job,
 };
 use precut_calc::effects::{DEFLECTION_CAUSES, DeflectionEffect, Fit};
 use serde_json::{Value, json};
@@ -260,6 +260,114 @@ fn errors_open_the_gap() {
     });
 }
 
+/// A formula of the user is its arithmetic over where, when and how the tool passes, in whatever units.
+#[test]
+fn a_formula_is_its_arithmetic() {
+    check(&json!({ "kind": "formula", "expression": "k1*1[um]*sin(z_mm/40[mm])", "k1": 5.0 }), &|_| {
+        error_um(|z| 5.0 * (z / 40.0).sin())
+    });
+    let all = "k1*1[um]*ln(diameter_mm/0.02[m])*(depth_mm/500[um])^k2 + feed_mm_per_rev/100 - \
+               k3*0.001[mm]*speed_m_per_min/1[m/s] + 2[um]*tool_path_m/1[km] + 0.3[um/min]*max(warm_time_min, 1[min])";
+    check(&json!({ "kind": "formula", "expression": all, "k1": 2.0, "k2": 0.7, "k3": 0.5 }), &|run| {
+        let run = *run;
+        error_um(move |z| {
+            let path = run.path_at_start + path_m(&run, z);
+            let warm = run.warm_at_start + path_m(&run, z) / run.speed;
+            2.0 * 2.0_f64.ln() * (run.depth / 0.5).powf(0.7) + 1e3 * run.feed / 100.0 - 0.5 * run.speed / 60.0
+                + 2.0 * path / 1000.0
+                + 0.3 * warm.max(1.0)
+        })
+    });
+}
+
+fn faults(effects: &Value, conditions: &Value) -> Vec<(&'static str, String)> {
+    let mut job = job(&json!([]));
+    job.effects = serde_json::from_value(effects.clone()).unwrap();
+    job.conditions = serde_json::from_value(conditions.clone()).unwrap();
+    let mut violations = Violations::default();
+    job.check(&mut violations);
+    violations.into_vec().into_iter().map(|fault| (fault.code, fault.pointer)).collect()
+}
+
+#[test]
+fn a_formula_that_cannot_act_is_a_fault() {
+    let of = |expression: &str| json!([{ "kind": "formula", "expression": expression, "k1": 1.0 }]);
+    for wrong in ["k1*z_mm/1[mm]", "k1", "k1*1[N]", "k4*1[um]", "k1*", "k1*1[um]*sin(z_mm)", "k1*1[inch]", "force_y"] {
+        let found = faults(&of(wrong), &json!({}));
+        assert_eq!(found, [("formula_unreadable", "/effects/0/expression".to_owned())], "{wrong}");
+    }
+    for (condition, expression) in [
+        ("tool_path_at_start_m", "k1*1[um]*tool_path_m/1[km]"),
+        ("warm_time_at_start_min", "k1*1[um]*warm_time_min/1[min]"),
+    ] {
+        let missing = ("condition_missing", format!("/conditions/{condition}"));
+        assert_eq!(faults(&of(expression), &json!({})), [missing]);
+        assert_eq!(faults(&of(expression), &json!({ condition: 0.0 })), []);
+    }
+    // Two of them have two names, or say two things.
+    let two = |one: &str, other: &str, expression: &str| {
+        json!([{ "kind": "formula", "name": one, "expression": "1[um]" },
+               { "kind": "formula", "name": other, "expression": expression }])
+    };
+    assert_eq!(faults(&two("a", "b", "1[um]"), &json!({})), []);
+    assert_eq!(faults(&two("", "", "2[um]"), &json!({})), []);
+    assert_eq!(faults(&two("a", "a", "2[um]"), &json!({})), [("duplicate_effect", "/effects/1/kind".to_owned())]);
+}
+
+/// Where a formula has no value nothing is predicted and no path is told; what the refusal says to do is done.
+#[test]
+fn a_formula_without_a_value_is_no_answer() {
+    let root =
+        |inside: &str| json!([{ "kind": "formula", "name": "root", "expression": format!("4[um]*sqrt({inside})") }]);
+    let of = |inside: &str| job(&root(inside));
+    let short = of("z_mm/300[mm] - 1");
+    let found = predict(&short, &[RUN], &[]);
+    for (z, found) in stations().into_iter().zip(found) {
+        assert_eq!(found.is_ok(), z >= 300.0, "{z}: {found:?}");
+    }
+    let refused = DeflectionCompensation::run(&short, &Unwatched);
+    let Err(Failure::OutOfModel(finding)) = refused else { panic!() };
+    assert_eq!(finding.code, "formula_without_value");
+    assert!(DeflectionCompensation::run(&of("max(z_mm - 300[mm], 0[mm])/300[mm]"), &Unwatched).is_ok());
+    let far = job(&json!([{ "kind": "formula", "expression": "20[mm]*z_mm/660[mm]" }]));
+    assert!(matches!(DeflectionCompensation::run(&far, &Unwatched), Err(Failure::OutOfModel(_))));
+}
+
+/// The path that is compensated with a formula, cut by the equations of this file: what the formula says is taken out of the shaft.
+#[test]
+fn a_path_takes_out_what_a_formula_says() {
+    let effects = json!([{ "kind": "formula", "k1": 6.0, "k2": 5.0,
+        "expression": "k1*1[um]*sin(z_mm/60[mm]) - k2*1[um]*(1 - exp(-tool_path_m/200[m]))" }]);
+    let left_um = |effects: &Value| -> Vec<f64> {
+        let mut job = job(effects);
+        job.detail = Detail::Full;
+        job.path = serde_json::from_value(json!({ "chord_tolerance_um": 0.1, "increment_um": 0.1 })).unwrap();
+        job.stations = serde_json::from_value(json!({ "kind": "per_zone", "count": 129 })).unwrap();
+        let path = DeflectionCompensation::run(&job, &Unwatched).unwrap().output.path.unwrap();
+        let corners = path.zones.iter().flat_map(|zone| zone.z_mm.iter().zip(&zone.commanded_diameter_mm));
+        let corners: Vec<(f64, f64)> = corners.map(|(z, d)| (*z, *d)).collect();
+        let share = |k: u32| f64::from(k) / 8.0;
+        let places = corners.windows(2).flat_map(|pair| {
+            let [(z, d), (next_z, next_d)] = [pair[0], pair[1]];
+            (0..8).map(move |k| (z + share(k) * (next_z - z), d + share(k) * (next_d - d)))
+        });
+        let left = |(z, commanded): (f64, f64)| {
+            let depth = 0.5 * (D + 2.0 - commanded);
+            let run =
+                Run { depth, feed: 0.3, speed: 100.0, to_headstock: true, path_at_start: 0.0, warm_at_start: 0.0 };
+            let error = error_um(move |z| 6.0 * (z / 60.0).sin() - 5.0 * (1.0 - (-path_m(&run, z) / 200.0).exp()));
+            commanded - D + 1e-3 * deviation_um(&run, &error, z)
+        };
+        places.map(|place| 1e3 * left(place)).collect()
+    };
+    let form_um = |left: &[f64]| {
+        left.iter().copied().fold(f64::NEG_INFINITY, f64::max) - left.iter().copied().fold(f64::INFINITY, f64::min)
+    };
+    let [with, without] = [&effects, &json!([])].map(|effects| form_um(&left_um(effects)));
+    // The moves miss the path by 0.1 um on the radius, rounding takes half of that.
+    assert!(with < 0.7 && without > 20.0, "{with} {without}");
+}
+
 #[test]
 fn a_displaced_rest_bends_the_shaft() {
     // Rigid centres: the shape under a force at z_s, phi = G(z, z_s)/G(z_s, z_s) of a simple beam.
@@ -297,8 +405,9 @@ fn a_displaced_rest_bends_the_shaft() {
 
 #[test]
 fn the_catalogue_and_the_effect_objects_agree() {
-    // The shape of a remainder is no number.
-    for (i, cause) in DEFLECTION_CAUSES.iter().enumerate().filter(|(_, cause)| cause.kind != "remainder") {
+    // The shape of a remainder and the text of a formula are no numbers.
+    let has_text = |kind: &str| ["remainder", "formula"].contains(&kind);
+    for (i, cause) in DEFLECTION_CAUSES.iter().enumerate().filter(|(_, cause)| !has_text(cause.kind)) {
         let values: Vec<f64> = cause
             .parameters
             .iter()

@@ -224,3 +224,36 @@ fn places_of_a_remainder_ascend() {
     let found: Vec<(&str, String)> = violations.into_vec().into_iter().map(|one| (one.code, one.pointer)).collect();
     assert_eq!(found, [("stations_not_ascending", "/effects/0/profile/1/z_mm".to_owned())]);
 }
+
+/// The wave of the guideway written down by its user: its height is found as any size is, stored, known again, and taken out
+/// of the path of a later job as the same wave by a profile of places would be.
+#[test]
+fn a_formula_of_the_user_is_fitted_stored_and_taken_out() {
+    let mut request = guideway();
+    // One and a half waves over 570 mm.
+    request["job"]["effects"] = json!([{ "kind": "formula", "name": "ways of lathe 7", "k1_deviation": 8.0,
+        "expression": "k1*1[um]*sin(z_mm/60.479[mm])" }]);
+    let found = diagnosed(&request, json!({}));
+    assert_eq!(found.verdict, VerdictClass::Named, "{:?}", found.likely_sets);
+    let [named] = &found.named[..] else { panic!("{:?}", found.named) };
+    assert_eq!((named.kind.as_str(), named.label.as_str()), ("formula", "ways of lathe 7"));
+    let size = &named.parameters[0];
+    assert_eq!((size.name.as_str(), size.was), ("k1", Some(0.0)));
+    // 9 um on the diameter; a gap that opens by e lightens the cut, which closes it by some hundredths of e.
+    assert!((4.4..4.9).contains(&size.value), "{size:?}");
+    assert!(found.gain.as_ref().unwrap().gain_interval_95[0] > 0.0);
+    let Some(DeflectionEffect::Formula { k1, .. }) = found.effects.last() else { panic!("{:?}", found.effects) };
+    assert!((k1 - size.value).abs() < 1e-12);
+    let open = found.effects_uncertainty.iter().flat_map(|entry| &entry.moves);
+    assert!(open.map(|own| own.parameter.as_str()).eq(["k1"]));
+    let again = diagnosed(&under(&request, &found), json!({ "held_out": false }));
+    assert_eq!(again.verdict, VerdictClass::Adequate, "{:?}", again.named);
+    // Without a number to be fitted there is nothing to be found of it.
+    let mut fixed = request.clone();
+    fixed["job"]["effects"][0]["k1_deviation"] = json!(0.0);
+    let fixed = diagnosed(&fixed, json!({ "held_out": false }));
+    assert!(fixed.not_applicable.iter().any(|own| own.kind == "formula"));
+    // The path that is driven with it leaves what was promised of it.
+    let promised = found.downstream.iter().find(|told| told.outcome == "form_error_um").unwrap();
+    assert!(promised.extended.interval_95[1] < promised.base.interval_95[0], "{promised:?}");
+}

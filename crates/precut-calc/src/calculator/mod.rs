@@ -16,6 +16,7 @@ mod measured;
 mod program;
 mod ranges;
 mod table;
+mod user_formula;
 
 pub use conflict::{Conflict, ConstraintName, ElasticScope, Infeasible, Relaxation};
 pub use consequence::{Allowed, Consequence};
@@ -32,6 +33,7 @@ pub use measured::{Measured, MeasuredRow};
 pub use program::{Block, Dialect, Program, ProgramEnd};
 pub use ranges::{ConditionRange, Ranges};
 pub use table::{Cells, Column, Table};
+pub(crate) use user_formula::{FormulaRoom, values_of_formula};
 
 use serde::{Serialize, de::DeserializeOwned};
 use utoipa::ToSchema;

@@ -2,6 +2,7 @@
 
 use crate::effects::{DeflectionConditions, DeflectionEffect as Effect, ErrorPoint};
 
+use super::formula::Written;
 use super::input::FeedDirection;
 
 /// What the effects of a job change.
@@ -114,6 +115,7 @@ enum ErrorTerm {
     Growth { growth_mm: f64, time_constant_min: f64, warm_at_start_min: f64 },
     Heating { strain: f64, time_constant_min: f64 },
     Profile { scale: f64, profile: Vec<ErrorPoint> },
+    Formula(Written),
 }
 
 /// Where and when the tool passes a station.
@@ -129,6 +131,10 @@ pub(super) struct Passage {
     pub path_m: f64,
     /// Time in the cut before the station, likewise, min.
     pub time_min: f64,
+    /// Depth that is planned to be cut there, mm.
+    pub depth_mm: f64,
+    pub feed_mm_per_rev: f64,
+    pub speed_m_per_min: f64,
 }
 
 const MM_PER_UM: f64 = 1e-3;
@@ -213,6 +219,10 @@ impl Acting {
             Effect::Remainder { scale, ref profile, .. } => {
                 self.errors.push(ErrorTerm::Profile { scale: scale * MM_PER_UM, profile: profile.clone() });
             }
+            Effect::Formula { .. } => {
+                let written = effect.formula().and_then(|own| Written::of(&own, conditions));
+                self.errors.extend(written.map(ErrorTerm::Formula));
+            }
         }
     }
 
@@ -228,7 +238,16 @@ impl Acting {
         set_off || headstock_mm_per_n.abs() + tailstock_mm_per_n.abs() > 0.0
     }
 
-    /// Extra radial error e at a station, mm, positive = oversize; without what supports do that are set off.
+    /// The first formula that has no value at a station: what it is called.
+    pub(super) fn without_value(&self, at: Passage) -> Option<&str> {
+        self.errors.iter().find_map(|term| match term {
+            ErrorTerm::Formula(written) if !written.error_mm(at).is_finite() => Some(written.label()),
+            _ => None,
+        })
+    }
+
+    /// Extra radial error e at a station, mm, positive = oversize; without what supports do that are set off. Not finite where a
+    /// formula of the user has no value.
     pub(super) fn error_mm(&self, at: Passage) -> f64 {
         self.errors.iter().map(|term| term.error_mm(at)).sum()
     }
@@ -250,6 +269,7 @@ impl ErrorTerm {
                 0.5 * at.diameter_mm * strain * (-at.time_min / time_constant_min).exp_m1()
             }
             Self::Profile { scale, ref profile } => scale * error_um(profile, at.z_mm),
+            Self::Formula(ref written) => written.error_mm(at),
         }
     }
 }

@@ -3,6 +3,7 @@
 use crate::calculator::{Check, Finding, Violations};
 use crate::effects::DeflectionEffect as Effect;
 
+use super::formula;
 use super::grid::{interpolate, station_count};
 use super::input::{Aim, Job, MAX_STATIONS, Segment, Stations, StockRow, Support};
 use super::uncertain;
@@ -38,6 +39,7 @@ pub(super) const CODES: &[&str] = &[
     "effect_of_carrying_rest",
     "effect_not_with_passes",
     "aim_without_size_limits",
+    "formula_unreadable",
 ];
 
 /// Codes of the faults of effects and of what they depend on alone.
@@ -204,9 +206,15 @@ pub(super) fn check_effects(job: &Job, violations: &mut Violations) {
     for (i, effect) in job.effects.iter().enumerate() {
         let kind = effect.kind();
         let at = |field: &str| format!("/effects/{i}{field}");
-        violations.require(job.effects[..i].iter().all(|before| before.kind() != kind), || {
+        // Formulas may recur by other names.
+        let label = |effect: &Effect| effect.formula().map(|own| own.label().to_owned());
+        let is_same = |before: &Effect| before.kind() == kind && label(before) == label(effect);
+        violations.require(!job.effects[..i].iter().any(is_same), || {
             Finding::new("duplicate_effect", at("/kind")).with("kind", kind)
         });
+        if let Some(own) = effect.formula() {
+            formula::check(job, &own, &at(""), violations);
+        }
         for condition in effect.cause().conditions {
             let given = match *condition {
                 "tool_path_at_start_m" => job.conditions.tool_path_at_start_m.is_some(),

@@ -6,7 +6,7 @@ use utoipa::ToSchema;
 use crate::calculator::{
     Consequence, Cost, Design, Diagnosable, Example, Failure, Finding, ForwardModel, Hypotheses, Hypothesis,
     JacobianColumn, KnownOver, Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows, Unnamed,
-    checkpoint, values_by_name,
+    checkpoint, values_by_name, values_of_formula,
 };
 use crate::effects::{Cause, DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect, ErrorPoint};
 use crate::num::beam::Profile;
@@ -401,6 +401,9 @@ impl Diagnosable for DeflectionCompensation {
     }
 
     fn values(prepared: &PreparedDeflection, hypothesis: &Hypothesis, effect: &DeflectionEffect) -> Option<Vec<f64>> {
+        if let Some(own) = effect.formula() {
+            return values_of_formula(hypothesis, &own);
+        }
         match effect {
             DeflectionEffect::ChuckRotationalStiffness { ktheta_n_mm_per_rad: k } => {
                 let is_it = hypothesis.cause.kind == effect.kind();
@@ -504,7 +507,7 @@ impl PreparedRun {
         };
         // A run is one cut: its clocks start with the conditions that it states.
         let passages = if acting.has_errors() {
-            passages(&self.job, &self.grid, &self.regime, &Step::default())
+            passages(&self.job, &self.grid, &self.regime, &Step::default(), &self.radii)
         } else {
             Vec::new()
         };
@@ -522,6 +525,11 @@ impl PreparedRun {
         let line = Line::of(&ingredients, profile);
         let mut solver = line.solver();
         for (i, &row) in self.row_of_station.iter().enumerate() {
+            // What a formula of the user says nothing of is not predicted.
+            if !line.has_error_value(i) {
+                out[row] = Err(Missing::NoSolution);
+                continue;
+            }
             let (stock, command) = (self.radii.stock[i], self.command_mm[i]);
             let commanded_depth = stock - command;
             let opening = line.opening_at(i, commanded_depth);

@@ -1,6 +1,7 @@
 //! The causes of the catalogue as they stand for a shaft and its measured runs.
 
 use super::check::passive_exponent;
+use super::formula;
 use super::forward::DeflectionRun;
 use super::input::{Job, Support};
 use super::regime::Regime;
@@ -55,6 +56,7 @@ impl Experiment<'_> {
             "remainder" if !self.held.iter().any(|effect| effect.kind() == cause.kind) => {
                 Some(Inapplicability::NothingToActOn)
             }
+            "formula" if self.formulas(cause).next().is_none() => Some(Inapplicability::NothingToActOn),
             "chuck_rotational_stiffness" if !self.headstock_is_centre() => Some(Inapplicability::NothingToActOn),
             "tailstock_compliance" | "tailstock_offset" if self.tailstock_um_per_n().is_none() => {
                 Some(Inapplicability::NothingToActOn)
@@ -132,6 +134,7 @@ impl Experiment<'_> {
                 let name = self.held.iter().map(remainder_name).collect();
                 vec![of(name, cause.parameters.iter().map(|p| self.variable(cause, p, None)).collect())]
             }
+            "formula" => self.formulas(cause).collect(),
             // C is almost linear in kappa = k/(k + 3 E I/L).
             "chuck_rotational_stiffness" => vec![of(
                 String::new(),
@@ -144,6 +147,11 @@ impl Experiment<'_> {
             )],
             _ => vec![of(String::new(), cause.parameters.iter().map(|p| self.variable(cause, p, None)).collect())],
         }
+    }
+
+    /// Formulas of the user that have numbers to be fitted.
+    fn formulas(&self, cause: &'static Cause) -> impl Iterator<Item = Hypothesis> {
+        self.held.iter().filter_map(move |effect| formula::ROOM.hypothesis(cause, &effect.formula()?))
     }
 
     fn variable(&self, cause: &Cause, parameter: &Parameter, station_mm: Option<f64>) -> Variable {

@@ -25,6 +25,7 @@ mod encounters;
 mod equilibrium;
 mod extremes;
 mod form;
+mod formula;
 mod forward;
 mod grid;
 mod held;
@@ -383,7 +384,14 @@ const CODES: Codes = Codes {
         force::FAULT_CODES,
     ],
     failures: &[
-        &["path_incomplete", "path_not_computed", "pass_without_command", "numbers_out_of_reach", "tool_hits_chuck"],
+        &[
+            "path_incomplete",
+            "path_not_computed",
+            "pass_without_command",
+            "numbers_out_of_reach",
+            "tool_hits_chuck",
+            "formula_without_value",
+        ],
         Proof::CODES,
         force::FAILURE_CODES,
     ],

@@ -106,6 +106,12 @@ pub(super) struct Ingredients<'a> {
 }
 
 impl Line {
+    /// Whether the stated errors are a number at a station; a formula of the user need not have a value.
+    #[inline]
+    pub(super) fn has_error_value(&self, i: usize) -> bool {
+        at(&self.error_mm, i).is_finite()
+    }
+
     /// Everything along the shaft that no depth changes; `profile` holds what [`wanted`] of the job says.
     pub(super) fn of(from: &Ingredients<'_>, profile: Profile) -> Self {
         let Ingredients { job, acting, structure, regime, radii, .. } = *from;

@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use super::acting::Passage;
 use super::grid::Grid;
 use super::input::{Cut, FeedDirection, Job, Pass, Section, Segment, SpeedDiameter};
+use super::model::Radii;
 use super::structure::pass_diameter_mm;
 
 /// Feed, speed and direction of one cut.
@@ -144,8 +145,8 @@ fn along(segments: &[Segment], paces: &[(f64, f64)], range: std::ops::Range<usiz
     })
 }
 
-/// When and where the tool passes every station of a cut (`diagnosis/4`: p and tau).
-pub(super) fn passages(job: &Job, grid: &Grid, regime: &Regime, step: &Step) -> Vec<Passage> {
+/// When and where the tool passes every station of a cut, and what it is to cut there (`diagnosis/4`: p and tau).
+pub(super) fn passages(job: &Job, grid: &Grid, regime: &Regime, step: &Step, radii: &Radii) -> Vec<Passage> {
     let segments = &job.shaft.segments;
     let pace = paces(job, regime, step);
     // Time and path of whole segments before the tool reaches segment i's near end.
@@ -155,10 +156,12 @@ pub(super) fn passages(job: &Job, grid: &Grid, regime: &Regime, step: &Step) -> 
             FeedDirection::ToTailstock => along(segments, &pace, 0..i),
         })
         .collect();
+    let planned = radii.planned().iter().zip(&radii.target);
     grid.z_mm
         .iter()
         .zip(&grid.segment)
-        .map(|(&z, &i)| {
+        .zip(planned)
+        .map(|((&z, &i), (planned_mm, target_mm))| {
             let into = match regime.direction {
                 FeedDirection::ToHeadstock => grid.steps_mm[i + 1] - z,
                 FeedDirection::ToTailstock => z - grid.steps_mm[i],
@@ -169,6 +172,9 @@ pub(super) fn passages(job: &Job, grid: &Grid, regime: &Regime, step: &Step) -> 
                 diameter_mm: pass_diameter_mm(&segments[i], step.pass_mm),
                 time_min: step.time_before_min + before[i].0 + pace[i].0 * into,
                 path_m: step.path_before_m + before[i].1 + pace[i].1 * into,
+                depth_mm: planned_mm - target_mm,
+                feed_mm_per_rev: regime.feed_mm_per_rev,
+                speed_m_per_min: regime.speed_m_per_min(*planned_mm, *target_mm),
             }
         })
         .collect()

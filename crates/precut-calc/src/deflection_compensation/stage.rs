@@ -71,7 +71,7 @@ pub(super) fn line_of(
     radii: &Radii,
 ) -> Result<(Structure, Line), Failure> {
     let structure = Structure::of(job, &variant(job, acting, regime, step.pass_mm))?;
-    let passages = if acting.has_errors() { passages(job, grid, regime, step) } else { Vec::new() };
+    let passages = if acting.has_errors() { passages(job, grid, regime, step, radii) } else { Vec::new() };
     let displaced = structure.displaced(job, &acting.set_off, &grid.z_mm)?;
     let ingredients = Ingredients {
         job,
@@ -84,6 +84,12 @@ pub(super) fn line_of(
         displaced: displaced.as_ref(),
     };
     let line = Line::of(&ingredients, structure.beam.profile(&grid.z_mm, wanted(job)));
+    let mut lacking = passages.iter().enumerate().filter(|(i, _)| !line.has_error_value(*i));
+    if let Some((at, name)) = lacking.find_map(|(_, at)| Some((at, acting.without_value(*at)?))) {
+        return Err(Failure::OutOfModel(
+            Finding::new("formula_without_value", "/effects").with("name", name.to_owned()).with("z_mm", at.z_mm),
+        ));
+    }
     Ok((structure, line))
 }
 

@@ -8,6 +8,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::expression::{Expression, NUMBERS, UserFormula};
 use super::{Cause, Fit, Parameter};
 
 /// A named physical effect on the deflection of a shaft in the lathe.
@@ -193,6 +194,41 @@ pub enum DeflectionEffect {
         #[schema(min_items = 2, max_items = 65)]
         profile: Vec<ErrorPoint>,
     },
+    /// A formula of the user over place and conditions of the cut: e += its value.
+    Formula {
+        /// What the user calls it.
+        #[serde(default, skip_serializing_if = "String::is_empty")]
+        #[schema(max_length = 64, example = "ways of lathe 7")]
+        name: String,
+        /// Numbers, place and conditions of the cut by their fields, `k1`, `k2`, `k3`; + - * / ^ ( ), exp, ln, sqrt, abs, sin, cos, tanh,
+        /// min, max. A unit stands in square brackets behind its number; the value is a length.
+        #[schema(value_type = String, min_length = 1, max_length = 256, example = "k1*1[um]*sin(z_mm/40[mm])")]
+        expression: Expression,
+        /// Its number `k1`.
+        #[serde(default)]
+        #[schema(minimum = -1e6, maximum = 1e6, default = 0.0, example = 0.1, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("k1"))))]
+        k1: f64,
+        /// How far it may lie from that before anything is measured, one standard deviation: a diagnosis fits it. 0: it is as stated.
+        #[serde(default)]
+        #[schema(minimum = 0.0, maximum = 1e6, default = 0.0, example = 0.2, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("s_k1"))))]
+        k1_deviation: f64,
+        /// Its number `k2`.
+        #[serde(default)]
+        #[schema(minimum = -1e6, maximum = 1e6, default = 0.0, example = 0.1, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("k2"))))]
+        k2: f64,
+        /// How far it may lie from that before anything is measured, one standard deviation: a diagnosis fits it. 0: it is as stated.
+        #[serde(default)]
+        #[schema(minimum = 0.0, maximum = 1e6, default = 0.0, example = 0.2, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("s_k2"))))]
+        k2_deviation: f64,
+        /// Its number `k3`.
+        #[serde(default)]
+        #[schema(minimum = -1e6, maximum = 1e6, default = 0.0, example = 0.1, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("k3"))))]
+        k3: f64,
+        /// How far it may lie from that before anything is measured, one standard deviation: a diagnosis fits it. 0: it is as stated.
+        #[serde(default)]
+        #[schema(minimum = 0.0, maximum = 1e6, default = 0.0, example = 0.2, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("s_k3"))))]
+        k3_deviation: f64,
+    },
 }
 
 /// A radial error at a place.
@@ -252,11 +288,21 @@ impl DeflectionEffect {
             Self::UncutSideStiffness {} => 20,
             Self::SpindleScatter { .. } => 21,
             Self::Remainder { .. } => 22,
+            Self::Formula { .. } => 23,
         }
     }
 
-    /// The effect of a cause with the values of its parameters, in the order of the catalogue. A remainder has none: its shape is
-    /// no number.
+    /// It as a formula of the user, where it is one.
+    pub(crate) fn formula(&self) -> Option<UserFormula<'_>> {
+        let Self::Formula { name, expression, k1, k1_deviation, k2, k2_deviation, k3, k3_deviation } = self else {
+            return None;
+        };
+        let (numbers, deviations) = ([*k1, *k2, *k3], [*k1_deviation, *k2_deviation, *k3_deviation]);
+        Some(UserFormula { name, expression, numbers, deviations })
+    }
+
+    /// The effect of a cause with the values of its parameters, in the order of the catalogue. A remainder and a formula have
+    /// none: shape and text are no numbers.
     pub fn from_parameters(cause: &Cause, values: &[f64]) -> Option<Self> {
         Some(match (cause.kind, values) {
             ("headstock_compliance", &[delta_um_per_n]) => Self::HeadstockCompliance { delta_um_per_n },
@@ -479,4 +525,5 @@ pub const CAUSES: &[Cause] = &[
         ..cause("spindle_scatter", "diagnosis/4.22", &[amplitude("sd_um", "um", 2.0, 0.0, 1000.0)], &[])
     },
     cause("remainder", "diagnosis/4.23", &[amplitude("scale", "1", 1.0, -3.0, 3.0)], &[]),
+    cause("formula", "diagnosis/4.24", &NUMBERS, &[]),
 ];

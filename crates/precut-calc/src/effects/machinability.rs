@@ -6,7 +6,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::expression::Expression;
+use super::expression::{Expression, NUMBERS, UserFormula};
 use super::{Cause, Fit, Parameter};
 
 /// A named physical effect on an output of the cut.
@@ -474,6 +474,15 @@ impl MachinabilityEffect {
         }
     }
 
+    /// It as a formula of the user, where it is one.
+    pub(crate) fn formula(&self) -> Option<UserFormula<'_>> {
+        let Self::Formula { name, expression, k1, k1_deviation, k2, k2_deviation, k3, k3_deviation, .. } = self else {
+            return None;
+        };
+        let (numbers, deviations) = ([*k1, *k2, *k3], [*k1_deviation, *k2_deviation, *k3_deviation]);
+        Some(UserFormula { name, expression, numbers, deviations })
+    }
+
     /// Position in [`CAUSES`]; a test holds that each kind stands where this says.
     const fn index(&self) -> usize {
         match self {
@@ -635,11 +644,6 @@ const fn of_job(name: &'static str, unit: &'static str, lower: f64, upper: f64) 
     Parameter { name, unit, fit: Fit::OfJob, prior_sd: 0.0, lower, upper }
 }
 
-/// A number of a formula; the effect itself says how far it may lie from what is stated.
-const fn of_formula(name: &'static str) -> Parameter {
-    amplitude(name, "1", 1.0, -1e6, 1e6)
-}
-
 const REFERENCE_SPEED: Parameter = of_job("reference_speed_m_per_min", "m/min", 0.01, 20_000.0);
 const REFERENCE_FEED: Parameter = of_job("reference_feed_mm_per_rev", "mm/rev", 1e-4, 20.0);
 const REFERENCE_DEPTH: Parameter = of_job("reference_depth_mm", "mm", 1e-4, 1000.0);
@@ -796,5 +800,5 @@ pub const CAUSES: &[Cause] = &[
         &[],
     ),
     cause("remainder", "diagnosis/5.21", &[amplitude("scale", "1", 1.0, -3.0, 3.0)], &[], &[]),
-    cause("formula", "diagnosis/5.22", &[of_formula("k1"), of_formula("k2"), of_formula("k3")], &[], &[]),
+    cause("formula", "diagnosis/5.22", &NUMBERS, &[], &[]),
 ];

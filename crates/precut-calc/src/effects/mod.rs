@@ -12,6 +12,7 @@ mod ring;
 
 pub use deflection::{CAUSES as DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect, ErrorPoint};
 pub use expression::Expression;
+pub(crate) use expression::{NUMBERS as FORMULA_NUMBERS, UserFormula};
 pub use fixture::{CAUSES as FIXTURE_CAUSES, FixtureConditions, FixtureEffect};
 pub use machinability::{
     CAUSES as MACHINABILITY_CAUSES, FactorLevel, MachinabilityConditions, MachinabilityEffect, RemainderPoint,

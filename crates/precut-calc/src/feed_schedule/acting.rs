@@ -189,8 +189,8 @@ impl ActingModel {
                     }
                 }
             }
-            Effect::Formula { expression, k1, k2, k3, .. } => {
-                if let Some(written) = Written::of(expression, [*k1, *k2, *k3], &cut) {
+            Effect::Formula { .. } => {
+                if let Some(written) = effect.formula().and_then(|own| Written::of(&own, &cut)) {
                     match written.constant() {
                         Some(constant) => self.base.constant += constant,
                         None => self.formulas.push(written),

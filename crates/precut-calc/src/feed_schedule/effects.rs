@@ -79,11 +79,13 @@ pub(super) fn check(job: &Job, violations: &mut Violations) {
                 remainder::check(job, profile, &at, violations);
                 format!("{kind} {}", remainder::label("", profile))
             }
-            Effect::Formula { name, expression, .. } => {
-                formula::check(job, expression, &at, violations);
-                format!("{kind} {}", formula::label(name, expression))
-            }
-            _ => kind.to_owned(),
+            _ => match effect.formula() {
+                Some(own) => {
+                    formula::check(job, &own, &at, violations);
+                    format!("{kind} {}", own.label())
+                }
+                None => kind.to_owned(),
+            },
         };
         let key = (identity, output);
         violations.require(!seen.contains(&key), || Finding::new("duplicate_effect", at.clone()).with("kind", kind));

@@ -2,7 +2,7 @@
 
 use crate::calculator::{
     Expansions, Hypotheses, Hypothesis, Inapplicability, Inapplicable, Range, Shape, Treatment, Variable,
-    values_by_name,
+    values_by_name, values_of_formula,
 };
 use crate::effects::{Cause, Fit, MACHINABILITY_CAUSES, MachinabilityEffect as Effect, Parameter};
 use crate::machinability::ModelForm;
@@ -43,7 +43,7 @@ impl PreparedMachinability {
             "wear_in" => self.is_wear(),
             // What was never found has no shape by which it could be known again.
             "remainder" => self.remainders(held).next().is_some(),
-            "formula" => self.formulas(held).next().is_some(),
+            "formula" => self.formulas(held, cause).next().is_some(),
             _ => true,
         };
         if !acts {
@@ -73,13 +73,10 @@ impl PreparedMachinability {
         }
     }
 
-    /// Formulas that act on this output and have numbers to be fitted: their names, and how far each number may be off.
-    fn formulas<'a>(&'a self, held: &'a [Effect]) -> impl Iterator<Item = (&'a str, [f64; 3])> {
-        held.iter().filter(|effect| effect.output().is_none_or(|output| output == self.output)).filter_map(|effect| {
-            let Effect::Formula { name, expression, .. } = effect else { return None };
-            let deviations = formula::deviations(effect).filter(|own| own.iter().any(|deviation| *deviation > 0.0))?;
-            Some((formula::label(name, expression), deviations))
-        })
+    /// Formulas that act on this output and have numbers to be fitted.
+    fn formulas<'a>(&'a self, held: &'a [Effect], cause: &'static Cause) -> impl Iterator<Item = Hypothesis> + 'a {
+        let acts = move |effect: &&Effect| effect.output().is_none_or(|output| output == self.output);
+        held.iter().filter(acts).filter_map(move |effect| formula::ROOM.hypothesis(cause, &effect.formula()?))
     }
 
     /// Why nothing can be said that needs so many factors with levels that differ.
@@ -120,7 +117,7 @@ impl PreparedMachinability {
             return levels.map(|level| of(level.label.clone(), level.weight)).collect();
         }
         if cause.kind == "formula" {
-            return self.formulas(held).map(|(label, deviations)| of_formula(cause, label, deviations)).collect();
+            return self.formulas(held, cause).collect();
         }
         if cause.kind == "remainder" {
             return self.remainders(held).map(|(name, _, profile)| of(remainder::label(name, profile), 1.0)).collect();
@@ -176,16 +173,13 @@ impl PreparedMachinability {
         if effect.output().is_some_and(|output| output != self.output) {
             return None;
         }
-        let is_another = match effect {
-            Effect::Remainder { name, profile, .. } => hypothesis.label != remainder::label(name, profile),
-            Effect::Formula { name, expression, .. } => hypothesis.label != formula::label(name, expression),
-            _ => false,
-        };
-        if is_another {
+        if let Effect::Remainder { name, profile, .. } = effect
+            && hypothesis.label != remainder::label(name, profile)
+        {
             return None;
         }
-        if let Effect::Formula { k1, k2, k3, .. } = effect {
-            return (hypothesis.cause.kind == effect.kind()).then(|| vec![*k1, *k2, *k3]);
+        if let Some(own) = effect.formula() {
+            return values_of_formula(hypothesis, &own);
         }
         match self.level_of(hypothesis) {
             Some(level) => level.shift_in(effect).map(|by| vec![by]),
@@ -202,18 +196,6 @@ impl PreparedMachinability {
         effect.set_output(Some(self.output.clone()));
         Some(vec![effect])
     }
-}
-
-/// A formula of the user, each number as far from what is stated as the effect says.
-fn of_formula(cause: &'static Cause, label: &str, deviations: [f64; 3]) -> Hypothesis {
-    let variable = |(parameter, prior_sd): (&Parameter, f64)| Variable {
-        name: parameter.name,
-        unit: parameter.unit,
-        treatment: if prior_sd > 0.0 { Treatment::Amplitude { prior_sd } } else { Treatment::Stated { value: 0.0 } },
-        range: Range { lower: parameter.lower, upper: parameter.upper },
-    };
-    let variables = cause.parameters.iter().zip(deviations).map(variable).collect();
-    Hypothesis { cause, label: label.to_owned(), variables, prior_weight: 1.0, held: None }
 }
 
 /// Whether a set of named levels varies.
