@@ -1,9 +1,11 @@
 //! Named effects, digested into what they change: the structure, the force, the radial error.
 
+use crate::calculator::{Failure, Finding};
 use crate::effects::{DeflectionConditions, DeflectionEffect as Effect, ErrorPoint};
 
 use super::formula::Written;
 use super::input::FeedDirection;
+use super::model::Line;
 
 /// What the effects of a job change.
 #[derive(Debug, Clone, PartialEq)]
@@ -244,6 +246,23 @@ impl Acting {
             ErrorTerm::Formula(written) if !written.error_mm(at).is_finite() => Some(written.label()),
             _ => None,
         })
+    }
+
+    /// Whether a formula of the user is among the errors.
+    pub(super) fn has_formulas(&self) -> bool {
+        self.errors.iter().any(|term| matches!(term, ErrorTerm::Formula(_)))
+    }
+
+    /// Whether all errors along a line have a value; where a formula of the user has none, which and where.
+    pub(super) fn values(&self, line: &Line, passages: &[Passage]) -> Result<(), Failure> {
+        let mut lacking = passages.iter().enumerate().filter(|(i, _)| !line.has_error_value(*i));
+        match lacking.find_map(|(_, at)| Some((at, self.without_value(*at)?))) {
+            None => Ok(()),
+            Some((at, name)) => {
+                let finding = Finding::new("formula_without_value", "/effects");
+                Err(Failure::OutOfModel(finding.with("name", name.to_owned()).with("z_mm", at.z_mm)))
+            }
+        }
     }
 
     /// Extra radial error e at a station, mm, positive = oversize; without what supports do that are set off. Not finite where a

@@ -51,6 +51,16 @@ pub(crate) struct ToolPlace {
     /// Path and time in the cut before it.
     pub(crate) path_m: f64,
     pub(crate) time_min: f64,
+    /// What a formula of the user may ask for; 0 where none does.
+    pub(crate) planned: Planned,
+}
+
+/// What is planned at a place of the tool.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Planned {
+    pub(crate) depth_mm: f64,
+    pub(crate) feed_mm_per_rev: f64,
+    pub(crate) speed_m_per_min: f64,
 }
 
 /// What the tool does to the work, N.
@@ -179,6 +189,9 @@ impl Held {
             diameter_mm: 2.0 * places[i].radius_mm,
             path_m: places[i].path_m,
             time_min: places[i].time_min,
+            depth_mm: places[i].planned.depth_mm,
+            feed_mm_per_rev: places[i].planned.feed_mm_per_rev,
+            speed_m_per_min: places[i].planned.speed_m_per_min,
         };
         let passages: Vec<Passage> =
             if self.acting.has_errors() { order.iter().map(passage).collect() } else { Vec::new() };
@@ -208,7 +221,14 @@ impl Held {
             passages: &passages,
             displaced: displaced.as_ref(),
         };
-        Ok(Gaps { line: Line::of(&ingredients, profile), direction: self.direction, index })
+        let line = Line::of(&ingredients, profile);
+        self.acting.values(&line, &passages)?;
+        Ok(Gaps { line, direction: self.direction, index })
+    }
+
+    /// Whether a formula of the user asks for what is planned.
+    pub(crate) fn has_formulas(&self) -> bool {
+        self.acting.has_formulas()
     }
 
     /// Whether an effect makes the force depend on the cutting speed.

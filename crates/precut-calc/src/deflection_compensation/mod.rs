@@ -53,7 +53,7 @@ pub(crate) use encounters::{Reach, chuck_in_the_way, met};
 pub(crate) use equilibrium::{Opening, engage};
 pub use form::{Deviation, Extremum, ExtremumKind, Form, FormClass};
 pub use forward::{DeflectionAllowances, DeflectionPoint, DeflectionRun};
-pub(crate) use held::{Gaps, Held, Holding, Push, Slice, ToolPlace};
+pub(crate) use held::{Gaps, Held, Holding, Planned, Push, Slice, ToolPlace};
 pub use input::{
     Aim, Carriage, Cut, Detail, FeedDirection, Gravity, Include, IncludeMode, Job, Limits, MAX_STATIONS, Pass,
     PathSettings, ProgramSettings, ProgramZero, SafePosition, Section, Segment, Shaft, SpeedDiameter, Stations,

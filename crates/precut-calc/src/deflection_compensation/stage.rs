@@ -84,12 +84,7 @@ pub(super) fn line_of(
         displaced: displaced.as_ref(),
     };
     let line = Line::of(&ingredients, structure.beam.profile(&grid.z_mm, wanted(job)));
-    let mut lacking = passages.iter().enumerate().filter(|(i, _)| !line.has_error_value(*i));
-    if let Some((at, name)) = lacking.find_map(|(_, at)| Some((at, acting.without_value(*at)?))) {
-        return Err(Failure::OutOfModel(
-            Finding::new("formula_without_value", "/effects").with("name", name.to_owned()).with("z_mm", at.z_mm),
-        ));
-    }
+    acting.values(&line, &passages)?;
     Ok((structure, line))
 }
 

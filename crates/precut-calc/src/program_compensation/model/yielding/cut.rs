@@ -1,6 +1,6 @@
 //! The equilibrium at a place of a move: the tool is pushed off until the chip that is left pushes no harder (`program/4.7`).
 
-use crate::deflection_compensation::{Gaps, Held, Opening, Push};
+use crate::deflection_compensation::{Gaps, Held, Opening, Planned, Push};
 use crate::force::{Component, DepthLaw, ForceModel};
 
 use super::super::super::job::ProgramTool;
@@ -155,6 +155,22 @@ impl Cutting<'_> {
         let depth_mm = outline.engaged(self.real, beyond).depth_mm;
         let lean = (outline.lead - std::f64::consts::FRAC_PI_2).clamp(0.0, STEEPEST_RAD).tan();
         ((depth_mm * lean + ON_MM) / length_mm).min(1.0)
+    }
+
+    /// Depth, feed and cutting speed that are planned at a share of the move, where a formula of the user may ask for them.
+    pub(crate) fn planned(&self, share: f64, from: f64) -> Planned {
+        if !self.held.has_formulas() {
+            return Planned::default();
+        }
+        let way = &self.stroke.way;
+        let radius_mm = way.at(share)[1];
+        let pace = Pace { feed: self.stroke.one.feed, speed: self.stroke.one.speed };
+        let depth_of = |outline: Outline| outline.engaged(self.nominal, way.at(share.max(from))).depth_mm;
+        Planned {
+            depth_mm: self.outline(share).map_or(0.0, depth_of),
+            feed_mm_per_rev: pace.feed_mm_per_rev(radius_mm).unwrap_or(0.0),
+            speed_m_per_min: 2.0 * std::f64::consts::PI * radius_mm * pace.rpm(radius_mm).unwrap_or(0.0) / 1000.0,
+        }
     }
 
     /// What happens at a share of the move, at the depth that is met from `from` on; `place` is its number among those of the gaps.

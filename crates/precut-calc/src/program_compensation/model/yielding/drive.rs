@@ -13,7 +13,7 @@ use super::cut::{AXIS_MM, CutPlace, Cutting, Pace};
 use super::sections::slices;
 
 /// Why a program is not driven over a blank that yields.
-pub(crate) const FAILURE_CODES: &[&str] = &["speed_missing", "supports_do_not_hold"];
+pub(crate) const FAILURE_CODES: &[&str] = &["speed_missing", "supports_do_not_hold", "formula_without_value"];
 
 /// How far between two places of a move the path may come off a straight line, mm: of one that finishes, of any other.
 const STRAIGHT_MM: [f64; 2] = [3e-5, 3e-4];
@@ -257,6 +257,7 @@ impl Along<'_> {
                 radius_mm: radius_mm.max(AXIS_MM),
                 path_m: between(self.so_far.path_m, whole.path_m, share),
                 time_min: between(self.so_far.time_min, whole.time_min, share),
+                planned: self.cutting.planned(share, self.from),
             }
         };
         let places: Vec<ToolPlace> = shares.iter().map(place).collect();
