@@ -12,6 +12,7 @@ mod fitting;
 mod fixture;
 mod http;
 mod measure;
+mod program;
 mod ring;
 mod roundness;
 mod rows;

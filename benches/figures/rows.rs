@@ -13,6 +13,7 @@ use crate::fitting;
 use crate::fixture;
 use crate::http::{self, Bare, Clock, Exchange};
 use crate::measure::{Measured, Unit, cpu_time};
+use crate::program;
 use crate::ring;
 use crate::roundness;
 
@@ -136,6 +137,8 @@ pub(crate) fn all() -> Vec<Row> {
         row("thirty zones at one risk for all limits, over none", Unit::Ratio, Some(5.0), Some(2.5), || {
             feed::at_risk("joint")
         }),
+        row("a turning program of 10,000 lines read", Unit::Time, us(5000.0), None, || program::read(10_000, false)),
+        row("and turned on its blank, rigid", Unit::Time, us(100_000.0), us(20_000.0), || program::read(10_000, true)),
         row("the source paper's table of 28 rows under both laws, each with two steps", Unit::Time, None, None, || {
             fixture::table()
         }),

@@ -273,21 +273,6 @@ fn thousands_of_moves_leave_the_same_in_any_order() {
     }
 }
 
-/// Every line costs the same, however many stand before it.
-#[test]
-fn ten_thousand_lines_take_a_moment() {
-    let seconds = |moves: u32| {
-        let job = bar(&waves([0, 1, 2], moves), 100.0);
-        let before = cpu_time::ThreadTime::now();
-        let answer = solve(&job);
-        assert!(!surface(&answer).finishing_lines.is_empty());
-        before.elapsed().as_secs_f64()
-    };
-    let (short, long) = (seconds(500), seconds(5000));
-    println!("1000 lines: {short} s, 10 000 lines: {long} s");
-    assert!(long < 1.0 && long < 25.0 * short.max(0.005), "{short}, {long}");
-}
-
 /// Passes in another order leave the same.
 #[test]
 fn the_order_of_passes_changes_who_made_it_and_not_what_is_left() {

@@ -306,7 +306,7 @@ impl<'a> Judged<'a> {
 
     /// How the errors of single parts lie along the shaft: by station, what so many percent of them stay below.
     pub(super) fn fan(&self, shift_um: f64) -> Result<ErrorFan, Failure> {
-        let mut by_station = vec![Vec::with_capacity(FAN_PARTS as usize); self.rehearsal.z_mm().len()];
+        let mut by_station = vec![Vec::with_capacity(FAN_PARTS); self.rehearsal.z_mm().len()];
         for point in points(FAN_PARTS, self.axis.len(), self.job.uncertainty.seed) {
             checkpoint(self.monitor)?;
             match self.errors_um(By::Rehearsal, &self.uncertainties, &point, shift_um) {

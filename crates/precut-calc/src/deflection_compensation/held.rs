@@ -34,6 +34,7 @@ pub(crate) struct Holding {
 
 /// A stretch of the work, from the headstock end on.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(clippy::struct_field_names)] // the unit
 pub(crate) struct Slice {
     pub(crate) length_mm: f64,
     /// Diameter until the tool has passed.
@@ -65,6 +66,7 @@ pub(crate) struct Planned {
 
 /// What the tool does to the work, N.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[allow(clippy::struct_field_names)] // the unit
 pub(crate) struct Push {
     /// Radially, away from the tool.
     pub(crate) radial_n: f64,

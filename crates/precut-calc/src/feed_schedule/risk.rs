@@ -318,7 +318,9 @@ impl Sharing<'_> {
             return Err(at_this_risk(job, -(-least).exp_m1()));
         }
         let scale = self.budget / shares.iter().sum::<f64>();
-        shares.iter_mut().for_each(|b| *b *= scale);
+        for b in &mut shares {
+            *b *= scale;
+        }
         let (mut solved, mut slopes) = self.at(&shares)?;
         let mut strength = 0.5;
         for _ in 0..ROUNDS {
@@ -330,7 +332,9 @@ impl Sharing<'_> {
             let mut next: Vec<f64> =
                 shares.iter().zip(&slopes).map(|(b, g)| b * (g / mean).clamp(0.01, 100.0).powf(strength)).collect();
             let scale = self.budget / next.iter().sum::<f64>();
-            next.iter_mut().for_each(|b| *b *= scale);
+            for b in &mut next {
+                *b *= scale;
+            }
             match self.at(&next) {
                 Ok((better, of)) if better.objective <= solved.objective => {
                     (shares, solved, slopes) = (next, better, of);
@@ -343,7 +347,7 @@ impl Sharing<'_> {
         // The margins of the case are those of its schedule.
         let (solved, slopes) = self.at(&shares).or_else(|unsolved| match unsolved {
             Unsolved::Infeasible(_) => Ok((solved, slopes)),
-            failed => Err(failed),
+            failed @ Unsolved::Failed(_) => Err(failed),
         })?;
         Ok((solved, shares.iter().zip(&slopes).map(|(b, g)| b * g).sum::<f64>() / self.budget))
     }
@@ -355,7 +359,7 @@ impl Sharing<'_> {
         let mut radius = 0.5;
         for _ in 0..STEPS {
             checkpoint(self.monitor)?;
-            let Some(next) = self.toward(&plain, &best.0, radius)? else { break };
+            let Some(next) = self.toward(&plain, &best.0, radius) else { break };
             let next = self.shares_at(&plain, next);
             if next.2 < best.2 {
                 best = next;
@@ -394,7 +398,7 @@ impl Sharing<'_> {
     }
 
     /// The schedule within a range of one that is most probable by the tangents there.
-    fn toward(&self, plain: &Case, at: &[(f64, f64)], radius: f64) -> Result<Option<Vec<(f64, f64)>>, Failure> {
+    fn toward(&self, plain: &Case, at: &[(f64, f64)], radius: f64) -> Option<Vec<(f64, f64)>> {
         let variation = Variation { about: Some((at, radius)), ..Variation::default() };
         let mut built = build(plain, &variation);
         let mut sums = vec![0.0; built.program.variables()];
@@ -405,7 +409,7 @@ impl Sharing<'_> {
         }
         let entries: Vec<(usize, f64)> = sums.into_iter().enumerate().filter(|(_, a)| a.abs() > 0.0).collect();
         if entries.is_empty() {
-            return Ok(None);
+            return None;
         }
         let mut least = Affines::new();
         least.push(&entries, 0.0);
@@ -413,9 +417,9 @@ impl Sharing<'_> {
         let found = gp::minimise(&built.program, &gp::Settings::default())
             .ok()
             .or_else(|| [1e-9, 1e-8, 1e-7].iter().find_map(|&most| gp::conic::minimise(&built.program, most).ok()));
-        Ok(found.map(|solution| {
+        found.map(|solution| {
             let of = |i: usize| (built.speed[i].at(&solution.y), built.feed[i].at(&solution.y));
             (0..plain.zones.len()).map(of).collect()
-        }))
+        })
     }
 }

@@ -10,7 +10,7 @@ use super::lobing::of_order;
 use super::output::{CauseKind, CauseOutcome, CausesOutcome};
 use super::sampling::samples_of;
 use super::scene::Scene;
-use super::simulate::{Run, Share, or_none, side_by_side};
+use super::simulate::{Run, or_none, side_by_side};
 use super::stance::{Stance, through_tip};
 use super::surface::{UM_PER_MM, odd_waves_mm, roundness_um, unevaluable};
 use super::turning::plane::{Vec2, add, angle, direction, norm, scaled, sub};
@@ -28,13 +28,14 @@ const ROUND_UM: f64 = 1e-3;
 /// |a| + |b| above 1 by less than this is the rounding of a drawing's decimals.
 const ON_LINE: f64 = 1e-9;
 
-/// Where the error comes from.
+/// Where the error comes from; `switched_off` is what the run is without its terms.
 pub(super) fn causes(
     job: &Job,
     scene: &Scene,
     end: &Stance,
     run: &Run,
-    share: Share<'_>,
+    switched_off: Vec<CauseOutcome>,
+    monitor: &dyn Monitor,
 ) -> Result<CausesOutcome, Failure> {
     let setting = &scene.setting;
     let teeth_mm = end.radius_per_feed(setting.feed_direction) * setting.feed_mm_per_rev;
@@ -51,16 +52,15 @@ pub(super) fn causes(
         (false, true) => 0.0,
         (false, false) => 1.0,
     };
-    let odd = if end.copying().is_diametral() { Some(odd_causes(job, run, teeth_mm, k, share.monitor)?) } else { None };
-    let nodes = nodes(job);
+    let odd = if end.copying().is_diametral() { Some(odd_causes(job, run, teeth_mm, k, monitor)?) } else { None };
     Ok(CausesOutcome {
         feed_step_um: step_left * teeth_mm * UM_PER_MM,
         teeth_um: teeth_mm * UM_PER_MM,
         first_bite_um: odd.as_ref().map(|odd| odd.first_bite_um),
         odd_lobes_um: odd.as_ref().map(|odd| odd.blank_um),
         growing_lobes_um,
-        samples: nodes,
-        switched_off: switched_off(job, scene, end, nodes, share)?,
+        samples: nodes(job),
+        switched_off,
     })
 }
 
@@ -112,19 +112,19 @@ struct Variant {
     blank: Vec<f64>,
 }
 
-fn switched_off(
+/// What the ring is without each of the terms that make waves.
+pub(super) fn switched_off(
     job: &Job,
     scene: &Scene,
     end: &Stance,
-    nodes: u32,
-    share: Share<'_>,
+    monitor: &dyn Monitor,
 ) -> Result<Vec<CauseOutcome>, Failure> {
-    let blank = scene.blank_mm(job, nodes as usize).map_err(unevaluable)?;
+    let blank = scene.blank_mm(job, nodes(job) as usize).map_err(unevaluable)?;
     let run = |setting: &Setting, blank: &[f64]| {
-        let turned = turn::<Failure>(blank, setting, &mut |_, _| checkpoint(share.monitor))?;
-        Ok::<f64, Failure>(roundness_um(&turned.radii_mm, job.filter, share.monitor)?.0)
+        let turned = turn::<Failure>(blank, setting, &mut |_, _| checkpoint(monitor))?;
+        Ok::<f64, Failure>(roundness_um(&turned.radii_mm, job.filter, monitor)?.0)
     };
-    let variants = variants(job, scene, end, &blank, share.monitor)?;
+    let variants = variants(job, scene, end, &blank, monitor)?;
     // With all terms first; a setting that cannot be is no alternative.
     let cases: Vec<Option<&Variant>> = std::iter::once(None).chain(variants.iter().map(Some)).collect();
     let mut found = side_by_side(&cases, |case| match case {

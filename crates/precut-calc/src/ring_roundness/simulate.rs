@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use crate::calculator::{Failure, Finding, Message, Monitor, Pace, checkpoint};
 use crate::num::roundness::{Grid, Section, least_squares};
 
-use super::causes::causes;
+use super::causes::{causes, switched_off};
 use super::input::{ErrorEstimate, Job, Method};
 use super::output::{
     Evaluated, HistoryColumns, PathColumns, ProfileColumns, ReplayOutcome, SimulationOutcome, SpectrumColumns,
@@ -268,11 +268,16 @@ fn exact(job: &Job, scene: &Scene, end: &Stance, share: Share<'_>) -> Result<Sim
     let third = third.next_multiple_of(4);
     let monitor = share.monitor;
     let without_progress = |n: u32| run_exact(job, scene, n, false, monitor, None);
-    let (main, others) = rayon::join(
+    let (main, (others, switched_off)) = rayon::join(
         || run_exact(job, scene, n, true, monitor, Some(share.part(0.0, 1.0))),
-        || Ok::<_, Failure>((without_progress(beside)?, without_progress(third)?)),
+        || {
+            rayon::join(
+                || Ok::<_, Failure>((without_progress(beside)?, without_progress(third)?)),
+                || switched_off(job, scene, end, monitor),
+            )
+        },
     );
-    let (main, (other, third)): (Run, (Run, Run)) = (main?, others?);
+    let (main, (other, third), switched_off) = (main?, others?, switched_off?);
     checkpoint(monitor)?;
     let others = [(&other.surface, factor), (&third.surface, SAFETY)];
     let error = stated_errors(&main.surface, &others);
@@ -290,7 +295,7 @@ fn exact(job: &Job, scene: &Scene, end: &Stance, share: Share<'_>) -> Result<Sim
         last_air_cut_rev: main.turned.last_air_cut_rev,
         uncut_share: main.uncut_share,
         location_error_um: um(main.turned.unmet_mm),
-        causes: causes(job, scene, end, &main, share)?,
+        causes: causes(job, scene, end, &main, switched_off, monitor)?,
         spectrum: spectrum(job, &main.start, Some((&main.surface, others.as_slice()))),
         profile: profile(job, &main.blank_mm, &main.start, Some((&main.turned.radii_mm, &main.surface))),
         centre_path: path(&main.turned.path, scene.mirrored),
@@ -352,7 +357,7 @@ fn nearest(job: &Job, scene: &Scene, end: &Stance, share: Share<'_>) -> Result<S
         last_air_cut_rev: None,
         uncut_share: 0.0,
         location_error_um: 0.0,
-        causes: causes(job, scene, end, &exact, share)?,
+        causes: causes(job, scene, end, &exact, switched_off(job, scene, end, share.monitor)?, share.monitor)?,
         spectrum: spectrum(job, &start, both),
         profile: profile(job, &blank_mm, &start, after),
         centre_path: PathColumns::default(),

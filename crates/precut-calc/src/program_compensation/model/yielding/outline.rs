@@ -177,7 +177,9 @@ impl Placed {
                     let half = Curve::Arc { x, r, radius: self.nose, is_upper };
                     found.clear();
                     half.crossings(piece.curve, 0.0, within, &mut found);
-                    found.iter().for_each(|&x| self.push_angle([x, piece.curve.at(x)], into));
+                    for &x in &found {
+                        self.push_angle([x, piece.curve.at(x)], into);
+                    }
                 }
             }
             if self.along[0].abs() > FLAT {
