@@ -9,6 +9,7 @@ use super::edges::capacity;
 use super::input::{Goal, Job};
 use super::output::{Looser, NextWhole, Price, PriceBasis};
 use super::program::{EdgeLimits, Kind, Label, Place, Variation};
+use super::risk::{self, Risk};
 use super::solve::{Solved, Unsolved, solve_as};
 
 /// A multiplier up to this is none.
@@ -313,15 +314,21 @@ fn turned(
     let mut job = again.job.clone();
     let Some(number) = number(&mut job, &price.pointer) else { return Ok(None) };
     *number *= by.exp();
-    let mut case = Case::of(&job, again.held, again.split.as_ref())?;
-    // A joint risk stays shared as it is: at the optimum a little of it moved elsewhere changes nothing.
-    case.zones.iter_mut().zip(&as_it_is.zones).for_each(|(zone, is)| zone.margins = is.margins);
+    let case = Case::of(&job, again.held, again.split.as_ref())?;
     // How far an edge may be used is one of the numbers.
     let further = capacity(&case) / capacity(as_it_is);
     let plans: Vec<Option<EdgeLimits>> = match &solved.whole {
         Some((limits, _)) => limits.with_neighbours().iter().map(|limits| Some(limits.used_further(further))).collect(),
         None => vec![None],
     };
+    if matches!(job.risk, Risk::Joint { .. }) {
+        // The risk is shared out anew.
+        return match risk::solved(case, &job, again.held, monitor) {
+            Ok((_, turned, _)) => Ok(Some((turned.objective, turned.certificate.gap))),
+            Err(Unsolved::Failed(Failure::Cancelled)) => Err(Failure::Cancelled),
+            Err(_) => Ok(None),
+        };
+    }
     let mut best: Option<(f64, f64)> = None;
     for edges in &plans {
         let variation = Variation { parts_per_edge: solved.parts_per_edge, edges: edges.as_ref(), about: None };

@@ -7,17 +7,17 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::calculator::{Failure, Finding, Monitor, Violations, checkpoint};
-use crate::certainty::{normal_below, normal_quantile};
-use crate::num::gp::{self, Affines, Objective};
+use crate::certainty::normal_below;
+use crate::num::gp::{self, Affines, Objective, Solution};
 
 use super::case::Case;
 use super::compliance::Held;
 use super::input::{Goal, Job};
 use super::models::Output;
 use super::plan::Method;
-use super::program::{Kind, Place, Variation, build};
+use super::program::{Built, Kind, Place, Variation, build};
 use super::scatter::{OUTPUT_LIMITS, deviations, scatter};
-use super::solve::{Solved, Unsolved, solve};
+use super::solve::{Solved, Unsolved, finish, safer, solve};
 
 /// Codes of the faults found here.
 pub(super) const CODES: &[&str] = &["joint_risk_elsewhere", "scrap_without_cost"];
@@ -26,9 +26,13 @@ pub(super) const FAILURE_CODES: &[&str] = &["infeasible_at_this_risk"];
 
 /// Largest risk that can be asked for: beyond it a limit would move out.
 const MOST: f64 = 0.5;
-/// Rounds in which a joint risk is shared out, and the relative gap of the objective at which that ends.
+/// Most tangents by which a joint risk is held, and by how much of itself it may be passed.
 const ROUNDS: u32 = 200;
-const SHARED: f64 = 1e-8;
+const SHARED: f64 = 1e-6;
+/// Linearisations end at steps of ln V, ln S below this.
+const SETTLED: f64 = 1e-7;
+/// A share of the risk below this is none.
+const NOTHING: f64 = 1e-4;
 /// Halvings in which the least risk is found.
 const HALVINGS: u32 = 30;
 /// Steps in which the largest joint probability is found.
@@ -121,7 +125,8 @@ impl Risk {
 
 /// Finds a joint risk where it is not shared out.
 pub(super) fn check(job: &Job, violations: &mut Violations) {
-    let is_shared = matches!(job.method, Method::Optimal) && job.passes.is_none();
+    let has_whole_edges = job.limits.as_ref().is_some_and(|limits| limits.whole_edges || limits.whole_parts_per_edge);
+    let is_shared = matches!(job.method, Method::Optimal) && job.passes.is_none() && !has_whole_edges;
     violations.require(is_shared || !matches!(job.risk, Risk::Joint { .. } | Risk::LeastCost { .. }), || {
         Finding::new("joint_risk_elsewhere", "/risk/kind")
     });
@@ -241,6 +246,11 @@ fn multiplier(solved: &Solved, of: &Scattered) -> f64 {
     rows.filter(|(label, _)| is_it(&label.kind, &label.place)).map(|(_, price)| price * solved.elasticity).sum()
 }
 
+/// Largest step between two schedules, in logarithms.
+fn furthest(one: &[(f64, f64)], other: &[(f64, f64)]) -> f64 {
+    one.iter().zip(other).map(|(a, b)| (a.0 - b.0).abs().max((a.1 - b.1).abs())).fold(0.0, f64::max)
+}
+
 fn density(x: f64) -> f64 {
     (-0.5 * x * x).exp() / (2.0 * std::f64::consts::PI).sqrt()
 }
@@ -284,8 +294,8 @@ fn least_of_each(job: &Job, held: Option<&Held>, monitor: &dyn Monitor) -> Resul
 }
 
 /// A joint risk among the limits of a part: with b_k = -ln Phi(t_k) the sum of all b is at most -ln(1 - alpha), exact where
-/// results scatter independently (`certainty/5.3`). The logarithm of the objective is convex over the b, with slopes
-/// -lambda_k s_k/h(t_k); they are equal at the optimum, and how far they are from it bounds what is left to gain.
+/// results scatter independently (`certainty/5.3`). That sum is convex over the logarithms of speed and feed: it is held by
+/// tangents, each at the optimum of those before (Kelley 1960), until the optimum keeps it.
 struct Sharing<'a> {
     case: Case,
     all: Vec<Scattered>,
@@ -293,75 +303,117 @@ struct Sharing<'a> {
     monitor: &'a dyn Monitor,
 }
 
+/// What the limits of a part use of a joint risk at a schedule.
+struct Shares {
+    at: Vec<(f64, f64)>,
+    /// Row of every limit in the program, and its distance in deviations.
+    rows: Vec<(usize, f64)>,
+    sum: f64,
+}
+
 impl Sharing<'_> {
-    fn deviations_of(shares: &[f64]) -> Vec<f64> {
-        // From the side on which the quantile keeps its digits.
-        shares.iter().map(|b| -normal_quantile(-(-b).exp_m1())).collect()
-    }
-
-    fn at(&mut self, shares: &[f64]) -> Result<(Solved, Vec<f64>), Unsolved> {
-        checkpoint(self.monitor)?;
-        let deviations = Self::deviations_of(shares);
-        for (one, t) in self.all.iter().zip(&deviations) {
-            self.case.zones[one.zone].margins[one.limit] = t * one.deviation;
-        }
-        let solved = solve(&self.case, false, self.monitor)?;
-        let slope = |(one, t): (&Scattered, &f64)| multiplier(&solved, one) * one.deviation / hazard(*t);
-        let slopes = self.all.iter().zip(&deviations).map(slope).collect();
-        Ok((solved, slopes))
-    }
-
-    /// The best shares, and what the budget is worth: d ln(objective) over d budget.
+    /// The schedule, and what the budget is worth: d ln(objective) over d budget.
     fn shared_out(&mut self, job: &Job, held: Option<&Held>) -> Result<(Solved, f64), Unsolved> {
-        let (mut shares, least) = self.safest(job, held)?;
-        if least > self.budget {
-            return Err(at_this_risk(job, -(-least).exp_m1()));
+        let plain = Case::of(&Job { risk: Risk::None {}, ..job.clone() }, held, None)?;
+        let first = self.shares_at(&plain, solve(&plain, true, self.monitor)?.at);
+        let mut tangents = Affines::new();
+        self.touch(&plain, &first, &mut tangents);
+        let mut about = first.at.clone();
+        let safest = self.safest(&plain, first)?;
+        if safest.sum > self.budget {
+            return Err(at_this_risk(job, -(-safest.sum).exp_m1()));
         }
-        let scale = self.budget / shares.iter().sum::<f64>();
-        for b in &mut shares {
-            *b *= scale;
-        }
-        let (mut solved, mut slopes) = self.at(&shares)?;
-        let mut strength = 0.5;
+        self.touch(&plain, &safest, &mut tangents);
         for _ in 0..ROUNDS {
-            let mean = shares.iter().zip(&slopes).map(|(b, g)| b * g).sum::<f64>() / self.budget;
-            let most = slopes.iter().copied().fold(0.0, f64::max);
-            if self.budget * (most - mean) < SHARED || mean <= 0.0 || strength < 1e-3 {
-                break;
+            checkpoint(self.monitor)?;
+            let (built, solution, conic) = self.within(&plain, &tangents, &about)?;
+            let at = (0..plain.zones.len()).map(|i| (built.speed[i].at(&solution.y), built.feed[i].at(&solution.y)));
+            let shares = self.shares_at(&plain, at.collect());
+            // Models that bend are straight only where they were linearised.
+            let is_there = !plain.bends() || furthest(&shares.at, &about) < SETTLED;
+            if is_there && shares.sum <= self.budget * (1.0 + SHARED) {
+                return Ok(self.settled(&plain, built, solution, shares, conic));
             }
-            let mut next: Vec<f64> =
-                shares.iter().zip(&slopes).map(|(b, g)| b * (g / mean).clamp(0.01, 100.0).powf(strength)).collect();
-            let scale = self.budget / next.iter().sum::<f64>();
-            for b in &mut next {
-                *b *= scale;
-            }
-            match self.at(&next) {
-                Ok((better, of)) if better.objective <= solved.objective => {
-                    (shares, solved, slopes) = (next, better, of);
-                    strength = (1.2 * strength).min(1.0);
-                }
-                Ok(_) | Err(Unsolved::Infeasible(_)) => strength *= 0.5,
-                Err(failed) => return Err(failed),
-            }
+            self.touch(&plain, &shares, &mut tangents);
+            about = shares.at;
         }
-        // The margins of the case are those of its schedule.
-        let (solved, slopes) = self.at(&shares).or_else(|unsolved| match unsolved {
-            Unsolved::Infeasible(_) => Ok((solved, slopes)),
-            failed @ Unsolved::Failed(_) => Err(failed),
-        })?;
-        Ok((solved, shares.iter().zip(&slopes).map(|(b, g)| b * g).sum::<f64>() / self.budget))
+        Err(Unsolved::Failed(Failure::NotConverged {
+            what: "the sharing of the risk",
+            residual: f64::INFINITY,
+            iterations: ROUNDS,
+        }))
     }
 
-    /// The shares of the schedule that most probably keeps all limits, and their sum: by tangents within a shrinking range.
-    fn safest(&mut self, job: &Job, held: Option<&Held>) -> Result<(Vec<f64>, f64), Unsolved> {
-        let plain = Case::of(&Job { risk: Risk::None {}, ..job.clone() }, held, None)?;
-        let mut best = self.shares_at(&plain, solve(&plain, true, self.monitor)?.at);
+    /// Adds the tangent of the sum at a schedule, in units of the budget.
+    fn touch(&self, plain: &Case, at: &Shares, tangents: &mut Affines) {
+        let built = build(plain, &Variation { about: Some((&at.at, f64::INFINITY)), ..Variation::default() });
+        let rows = &built.program.rows;
+        let mut sums = vec![0.0; built.program.variables()];
+        let mut constant = at.sum - self.budget;
+        for (one, (row, t)) in self.all.iter().zip(&at.rows) {
+            let slope = hazard(*t) / one.deviation;
+            constant += slope * (rows.constant(*row) - rows.value(*row, &built.program.start));
+            rows.entries(*row).for_each(|(variable, a)| sums[variable] += slope * a);
+        }
+        let entries: Vec<(usize, f64)> =
+            sums.into_iter().enumerate().filter(|(_, a)| a.abs() > 0.0).map(|(v, a)| (v, a / self.budget)).collect();
+        tangents.push(&entries, constant / self.budget);
+    }
+
+    /// The best schedule within the tangents.
+    fn within(
+        &self,
+        plain: &Case,
+        tangents: &Affines,
+        about: &[(f64, f64)],
+    ) -> Result<(Built, Solution, bool), Failure> {
+        checkpoint(self.monitor)?;
+        let built = build(plain, &Variation { about: Some((about, f64::INFINITY)), ..Variation::default() });
+        let mut program = built.program.clone();
+        for tangent in 0..tangents.len() {
+            program.rows.push(&tangents.entries(tangent).collect::<Vec<_>>(), tangents.constant(tangent));
+        }
+        let (solution, conic) = safer(&program)?.ok_or(Failure::NotConverged {
+            what: "the sharing of the risk",
+            residual: f64::INFINITY,
+            iterations: ROUNDS,
+        })?;
+        Ok((built, solution, conic))
+    }
+
+    /// The schedule as if each limit had been moved in by its share: its multiplier is that of the budget times h/sigma.
+    fn settled(
+        &mut self,
+        plain: &Case,
+        built: Built,
+        mut solution: Solution,
+        shares: Shares,
+        conic: bool,
+    ) -> (Solved, f64) {
+        let count = built.rows.len();
+        let of_tangents: f64 = solution.row_multipliers.drain(count..).sum::<f64>() / self.budget;
+        solution.row_slacks.truncate(count);
+        for (one, (row, t)) in self.all.iter().zip(&shares.rows) {
+            solution.row_multipliers[*row] += of_tangents * hazard(*t) / one.deviation;
+            solution.row_slacks[*row] = 0.0;
+            // Those that take next to nothing of the risk need not stand where they are.
+            let most = deviations(NOTHING * self.budget);
+            self.case.zones[one.zone].margins[one.limit] = t.min(most) * one.deviation;
+        }
+        let solved = finish(plain, built, solution, shares.at, false, &Variation::default(), conic);
+        let worth = of_tangents * solved.elasticity;
+        (solved, worth)
+    }
+
+    /// The schedule that most probably keeps all limits: by tangents within a shrinking range.
+    fn safest(&self, plain: &Case, first: Shares) -> Result<Shares, Unsolved> {
+        let mut best = first;
         let mut radius = 0.5;
         for _ in 0..STEPS {
             checkpoint(self.monitor)?;
-            let Some(next) = self.toward(&plain, &best.0, radius) else { break };
-            let next = self.shares_at(&plain, next);
-            if next.2 < best.2 {
+            let Some(next) = self.toward(plain, &best.at, radius) else { break };
+            let next = self.shares_at(plain, next);
+            if next.sum < best.sum {
                 best = next;
             } else {
                 radius *= 0.4;
@@ -370,15 +422,13 @@ impl Sharing<'_> {
                 break;
             }
         }
-        Ok((best.1, best.2))
+        Ok(best)
     }
 
-    /// The shares of a schedule, and their sum.
-    fn shares_at(&self, plain: &Case, at: Vec<(f64, f64)>) -> (Vec<(f64, f64)>, Vec<f64>, f64) {
-        let shares: Vec<f64> =
-            self.rows_at(plain, &at).iter().map(|(_, t)| -(-normal_below(-t)).ln_1p()).map(|b| b.max(1e-300)).collect();
-        let sum = shares.iter().sum();
-        (at, shares, sum)
+    fn shares_at(&self, plain: &Case, at: Vec<(f64, f64)>) -> Shares {
+        let rows = self.rows_at(plain, &at);
+        let sum = rows.iter().map(|(_, t)| -(-normal_below(-t)).ln_1p()).sum();
+        Shares { at, rows, sum }
     }
 
     /// The row of every scattered limit in the program about a schedule, and its distance in deviations there.

@@ -142,7 +142,7 @@ fn once(case: &Case, variation: &Variation<'_>, why: bool) -> Result<Solved, Uns
     Ok(finish(case, built, certificate, at, second.is_some(), variation, conic))
 }
 
-fn finish(
+pub(super) fn finish(
     case: &Case,
     built: Built,
     certificate: Solution,
@@ -214,7 +214,7 @@ fn fixed(
 
 /// Slower ways, where the interior-point method from the middle of the bounds gave nothing: from a point inside all limits,
 /// then the general solver; and whether that found it. `None` where there is no point.
-fn safer(program: &Program) -> Result<Option<(Solution, bool)>, Failure> {
+pub(super) fn safer(program: &Program) -> Result<Option<(Solution, bool)>, Failure> {
     let rows: Vec<usize> = (0..program.rows.len()).collect();
     let sums: Vec<usize> = (0..program.sums.len()).collect();
     if matches!(gp::feasibility(program, &rows, &sums), Ok(Verdict::Infeasible { .. })) {
