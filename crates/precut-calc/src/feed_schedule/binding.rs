@@ -20,7 +20,7 @@ pub(super) fn binding(case: &Case, solved: &Solved) -> Vec<Binding> {
     let mut found: Vec<Binding> = Vec::new();
     for (row, (label, &price)) in labels.zip(multipliers).enumerate() {
         if price * solved.elasticity > LEAST && label.kind.is_limit() {
-            let degenerate = active.is_known() && !active.settles(&[(row, 1.0)]);
+            let degenerate = !solved.shares_risk && active.is_known() && !active.settles(&[(row, 1.0)]);
             found.push(one(case, solved, label, price, degenerate));
         }
     }

@@ -415,6 +415,7 @@ fn solve_cells(case: &Case, gradient: Option<f64>, monitor: &dyn Monitor) -> Res
         linearisations: 0,
         local: false,
         conic: false,
+        shares_risk: false,
     })
 }
 

@@ -9,7 +9,6 @@ use super::edges::capacity;
 use super::input::{Goal, Job};
 use super::output::{Looser, NextWhole, Price, PriceBasis};
 use super::program::{EdgeLimits, Kind, Label, Place, Variation};
-use super::risk::{self, Risk};
 use super::solve::{Solved, Unsolved, solve_as};
 
 /// A multiplier up to this is none.
@@ -81,7 +80,8 @@ pub(super) fn prices(
     found.sort_by(|a, b| b.0.gain_percent.unwrap_or(0.0).total_cmp(&a.0.gain_percent.unwrap_or(0.0)));
     let mut tries = if active.is_known() { TRIED } else { TRIED / 4 };
     for (price, rows) in &mut found {
-        if active.settles(rows) && !held.contains(&price.pointer) {
+        // Of a shared risk every limit has its part of one multiplier, whichever others bind.
+        if solved.shares_risk || active.settles(rows) && !held.contains(&price.pointer) {
             continue;
         }
         price.basis = PriceBasis::OneOfSeveral;
@@ -321,14 +321,6 @@ fn turned(
         Some((limits, _)) => limits.with_neighbours().iter().map(|limits| Some(limits.used_further(further))).collect(),
         None => vec![None],
     };
-    if matches!(job.risk, Risk::Joint { .. }) {
-        // The risk is shared out anew.
-        return match risk::solved(case, &job, again.held, monitor) {
-            Ok((_, turned, _)) => Ok(Some((turned.objective, turned.certificate.gap))),
-            Err(Unsolved::Failed(Failure::Cancelled)) => Err(Failure::Cancelled),
-            Err(_) => Ok(None),
-        };
-    }
     let mut best: Option<(f64, f64)> = None;
     for edges in &plans {
         let variation = Variation { parts_per_edge: solved.parts_per_edge, edges: edges.as_ref(), about: None };

@@ -400,7 +400,8 @@ impl Sharing<'_> {
             let most = deviations(NOTHING * self.budget);
             self.case.zones[one.zone].margins[one.limit] = t.min(most) * one.deviation;
         }
-        let solved = finish(plain, built, solution, shares.at, false, &Variation::default(), conic);
+        let mut solved = finish(plain, built, solution, shares.at, false, &Variation::default(), conic);
+        solved.shares_risk = true;
         let worth = of_tangents * solved.elasticity;
         (solved, worth)
     }

@@ -14,6 +14,7 @@ use super::whole;
 
 /// The schedule of a case with its certificate.
 #[derive(Debug, Clone)]
+#[allow(clippy::struct_excessive_bools, reason = "facts of a solution, none a state of another")]
 pub(super) struct Solved {
     pub built: Built,
     /// ln V and ln S of every zone.
@@ -39,6 +40,8 @@ pub(super) struct Solved {
     pub local: bool,
     /// Found by the conic solver, where the interior-point method stalled.
     pub conic: bool,
+    /// A joint risk was shared out: its limits give by a multiplier that they have in common.
+    pub shares_risk: bool,
 }
 
 /// Why a case has no schedule.
@@ -183,6 +186,7 @@ pub(super) fn finish(
         linearisations: 0,
         local: false,
         conic,
+        shares_risk: false,
     }
 }
 
