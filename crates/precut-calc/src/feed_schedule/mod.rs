@@ -213,8 +213,8 @@ impl Calculator for FeedSchedule {
         }
         ms *= match job.risk {
             Risk::None {} | Risk::Each { .. } => 1.0,
-            Risk::Joint { .. } => 60.0,
-            Risk::LeastCost { .. } => 1000.0,
+            Risk::Joint { .. } => 600.0,
+            Risk::LeastCost { .. } => 12_000.0,
         };
         if job.limits.as_ref().is_some_and(|limits| limits.whole_edges) {
             ms *= whole::programs(job.zones.len()) as f64 / 8.0;
