@@ -1,4 +1,4 @@
-//! What a program costs that is there already: reading it, and the stock that it leaves.
+//! Times of reading an existing turning program and of turning its blank.
 
 use std::fmt::Write as _;
 

@@ -4,7 +4,7 @@ use super::{Finding, Hypothesis, Range, Treatment, Variable, Violations};
 use crate::effects::{Cause, Expression, FORMULA_NUMBERS as NUMBERS, Parameter, UserFormula};
 use crate::num::formula::{Fault, Formula, Unit};
 
-/// What the formulas of a model may name, and the unit of what they give.
+/// Names that a model's formulas may use, and the unit of their value.
 pub(crate) struct FormulaRoom {
     /// Conditions and places with their units, then the numbers.
     names: Vec<(&'static str, Unit)>,
@@ -30,7 +30,7 @@ impl FormulaRoom {
         self.names.iter().take(self.fields()).map(|(_, unit)| unit.factor)
     }
 
-    /// What an expression says here.
+    /// Reads an expression with these names.
     pub(crate) fn read<'a>(&self, expression: &'a Expression) -> Result<&'a Formula, &'a Fault> {
         expression.formula(&self.names, self.wanted)
     }

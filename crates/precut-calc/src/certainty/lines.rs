@@ -68,7 +68,7 @@ impl Estimate {
 /// What was found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Found<const S: usize> {
-    /// Of every set of limits.
+    /// The probability of every set of limits.
     pub of: [Estimate; S],
     /// Lines on which the real model was asked.
     pub lines: usize,
@@ -120,7 +120,7 @@ impl<const S: usize> Question<'_, S> {
                 lines: SCRAMBLINGS * count,
             };
             let last = found.of[S - 1];
-            // What the lines themselves leave open the real model cannot tell either.
+            // More lines of the real model would not lower an error that both models share.
             if last.is_enough(1.0) || last.error <= NEAR_IS_ALL * near_error || count >= nearly.done() {
                 return Ok(found);
             }

@@ -25,7 +25,7 @@ enum Monomial {
     Product(usize, usize),
 }
 
-/// What a model says at coordinates; none where it cannot be asked.
+/// A model: its values at coordinates. It fails as `OutOfModel` where it has none.
 pub(crate) type Model<'a> = dyn FnMut(&[f64]) -> Result<Vec<f64>, Failure> + 'a;
 
 impl Surface {

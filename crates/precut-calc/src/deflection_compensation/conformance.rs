@@ -71,14 +71,9 @@ struct Near {
 }
 
 impl Near {
-    fn of(
-        rehearsal: &Rehearsal<'_>,
-        uncertainties: &Uncertainties,
-        shift_um: f64,
-        step_um: f64,
-    ) -> Result<Self, Failure> {
+    fn of(rehearsal: &Rehearsal<'_>, uncertainties: &Uncertainties, shift_step_um: f64) -> Result<Self, Failure> {
         let mut scales = uncertainties.scales();
-        scales.push((shift_um, step_um));
+        scales.push((0.0, shift_step_um));
         let acts: Vec<bool> = scales.iter().map(|(_, scale)| *scale > 0.0).collect();
         let count = scales.len() - 1;
         let surface = Surface::of(&acts, &mut |x| {
@@ -118,7 +113,7 @@ impl<'a> Judged<'a> {
         }
         let limits = job.tolerance.size();
         let step_um = limits.half_width_um().unwrap_or(SHIFT_STEP_UM);
-        let near = Near::of(rehearsal, &uncertainties, 0.0, step_um)?;
+        let near = Near::of(rehearsal, &uncertainties, step_um)?;
         let slopes = Slopes { of_um: Vec::new(), deciding: 0 };
         let mut judged = Self { job, rehearsal, uncertainties, limits, near, axis: Vec::new(), slopes, monitor };
         judged.slopes.of_um = judged.slopes_um()?;

@@ -378,6 +378,7 @@ fn basis(job: &Job) -> Vec<Basis> {
 const CODES: Codes = Codes {
     faults: &[
         check::CODES,
+        check::EFFECT_CODES,
         uncertain::CODES,
         certainty::DISTRIBUTION_CODES,
         crate::shaft::check::CODES,
