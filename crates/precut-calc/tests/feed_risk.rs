@@ -194,13 +194,21 @@ fn prices_are_those_of_the_schedule_at_its_risk() {
 }
 
 #[test]
-fn a_joint_risk_is_shared_only_over_one_pass() {
-    let mut job = case("f2-joint-one-percent")["job"].clone();
-    job["method"] = json!({ "kind": "continuous" });
-    let job: Job = serde_json::from_value(job).unwrap();
-    let mut violations = Violations::default();
-    job.check(&mut violations);
-    assert!(violations.into_vec().iter().any(|fault| fault.code == "joint_risk_elsewhere"));
+fn a_joint_risk_is_shared_only_where_all_of_it_is() {
+    let job = case("f2-joint-one-percent")["job"].clone();
+    for (field, value) in [
+        ("/method", json!({ "kind": "continuous" })),
+        ("/limits/whole_edges", json!(true)),
+        ("/trade_off", json!({ "limit": "roughness", "factor_from": 0.8, "factor_to": 1.2, "count": 5 })),
+    ] {
+        let mut job = job.clone();
+        let (parent, name) = field.rsplit_once('/').unwrap();
+        job.pointer_mut(parent).unwrap()[name] = value;
+        let job: Job = serde_json::from_value(job).unwrap();
+        let mut violations = Violations::default();
+        job.check(&mut violations);
+        assert!(violations.into_vec().iter().any(|fault| fault.code == "joint_risk_elsewhere"), "{field}");
+    }
 }
 
 #[test]
@@ -221,5 +229,17 @@ fn the_risk_that_costs_least_is_where_neither_more_nor_less_of_it_does() {
     eprintln!("{found} %: {best}; {} {}", at(0.7 * found), at(1.4 * found));
     for factor in [0.3, 0.7, 0.9, 1.1, 1.4, 3.0] {
         assert!(at(factor * found) > best, "{factor}");
+    }
+}
+
+#[test]
+fn a_risk_at_an_end_is_not_said_to_cost_least() {
+    for scrap_cost in [1e-4, 1e8] {
+        let mut job = case("f2-joint-one-percent")["job"].clone();
+        job["risk"] = json!({ "kind": "least_cost", "scrap_cost": scrap_cost });
+        assert!(codes(&job).contains(&"risk_at_its_end"), "{scrap_cost}");
+        let explanation = answered(&job).unwrap().explanation;
+        let said = explanation.iter().find(|message| message.code == "limits_kept").unwrap();
+        assert!(said.values.get("found_percent").is_none());
     }
 }

@@ -9,6 +9,7 @@ use super::input::{FeedMode, Goal, Job, SpeedMode};
 use super::models::Output;
 use super::output::{ChangePlace, Looser, Outcome, Price, ZoneOutcome};
 use super::plan::Method;
+use super::risk;
 use super::run::broken;
 use super::scatter;
 use super::toolpath::Made;
@@ -34,6 +35,7 @@ pub(super) const WARNING_CODES: &[&str] = &[
     "shares_of_edges_priced",
     "half_fail",
     "no_scatter_given",
+    "risk_at_its_end",
     "spindle_limit_binds",
     "tool_passes_support",
     "tool_reaches_support",
@@ -63,6 +65,8 @@ pub(super) const EXPLANATION_CODES: &[&str] = &[
     "rule_has_no_optimum",
 ];
 
+/// What a percent of the risk takes off is not told below this, percent.
+const LEAST_GAIN_PERCENT: f64 = 1e-4;
 /// Tool lives that trials cover as a rule, min.
 const USUAL_LIFE_MIN: (f64, f64) = (2.0, 240.0);
 /// Wall over radius below which the shell yields locally.
@@ -102,6 +106,10 @@ pub(super) fn warnings(
     worn_out_inside(case, outcome, &mut out);
     out.extend(scatter::warnings(job, case, outcome));
     out.extend(scatter::without(job, case));
+    let found = outcome.conformance.as_ref().and_then(|conformance| conformance.risk_percent);
+    if let Some(percent) = found.filter(|percent| risk::is_at_an_end(*percent)) {
+        out.push(Finding::new("risk_at_its_end", "/risk/scrap_cost").value(percent, "percent"));
+    }
     if let (Some(whole), false) = (outcome.whole_edge_objective, is_of_whole_edges(job))
         && whole > 1.01 * outcome.objective
     {
@@ -331,10 +339,10 @@ fn limits_kept(job: &Job, outcome: &Outcome) -> Option<Message> {
     if let Some(joint) = conformance.joint_probability {
         said = said.with("joint_percent", 100.0 * joint);
     }
-    if let Some(found) = conformance.risk_percent {
+    if let Some(found) = conformance.risk_percent.filter(|found| !risk::is_at_an_end(*found)) {
         said = said.with("found_percent", found);
     }
-    if let Some(gain) = conformance.gain_percent_per_percent_of_risk {
+    if let Some(gain) = conformance.gain_percent_per_percent_of_risk.filter(|gain| *gain > LEAST_GAIN_PERCENT) {
         said = said.with("gain_percent", gain).with("objective", job.objective.name());
     }
     Some(said)

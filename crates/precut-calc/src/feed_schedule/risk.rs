@@ -17,7 +17,7 @@ use super::models::Output;
 use super::plan::Method;
 use super::program::{Built, Kind, Place, Variation, build};
 use super::scatter::{OUTPUT_LIMITS, deviations, scatter};
-use super::solve::{Solved, Unsolved, finish, safer, solve};
+use super::solve::{Solved, Unsolved, convex, finish, safer, solve};
 
 /// Codes of the faults found here.
 pub(super) const CODES: &[&str] = &["joint_risk_elsewhere", "scrap_without_cost"];
@@ -126,7 +126,8 @@ impl Risk {
 /// Finds a joint risk where it is not shared out.
 pub(super) fn check(job: &Job, violations: &mut Violations) {
     let has_whole_edges = job.limits.as_ref().is_some_and(|limits| limits.whole_edges || limits.whole_parts_per_edge);
-    let is_shared = matches!(job.method, Method::Optimal) && job.passes.is_none() && !has_whole_edges;
+    let is_plain = matches!(job.method, Method::Optimal) && job.passes.is_none() && job.trade_off.is_none();
+    let is_shared = is_plain && !has_whole_edges;
     violations.require(is_shared || !matches!(job.risk, Risk::Joint { .. } | Risk::LeastCost { .. }), || {
         Finding::new("joint_risk_elsewhere", "/risk/kind")
     });
@@ -162,6 +163,12 @@ pub(super) fn acting<'j>(job: &'j Job, held: Option<&Held>, monitor: &dyn Monito
         }
     }
     Ok(Cow::Owned(at(high.exp())))
+}
+
+/// Whether a risk that was found to cost least lies at an end of where it was looked for: beyond it another one may cost less.
+pub(super) fn is_at_an_end(percent: f64) -> bool {
+    let near = |end: f64| (0.01 * percent / end).ln().abs() < 2.0 * COSTS_LEAST.2;
+    near(COSTS_LEAST.0) || near(COSTS_LEAST.1)
 }
 
 /// A limit of a part whose output scatters: its zone, its place among [`OUTPUT_LIMITS`], and the standard deviation.
@@ -262,7 +269,7 @@ fn hazard(t: f64) -> f64 {
 
 fn at_this_risk(job: &Job, least: f64) -> Unsolved {
     let asked = job.risk.of_part().unwrap_or(0.0);
-    let finding = Finding::new("infeasible_at_this_risk", "/risk/risk_percent")
+    let finding = Finding::new("infeasible_at_this_risk", "/risk")
         .measured(100.0 * asked, 100.0 * least, "percent")
         .with("least_risk_percent", 100.0 * least);
     Unsolved::Failed(Failure::OutOfModel(finding))
@@ -402,6 +409,7 @@ impl Sharing<'_> {
         }
         let mut solved = finish(plain, built, solution, shares.at, false, &Variation::default(), conic);
         solved.shares_risk = true;
+        solved.local = !convex(plain);
         let worth = of_tangents * solved.elasticity;
         (solved, worth)
     }
@@ -426,6 +434,7 @@ impl Sharing<'_> {
         Ok(best)
     }
 
+    /// What the limits use at a schedule.
     fn shares_at(&self, plain: &Case, at: Vec<(f64, f64)>) -> Shares {
         let rows = self.rows_at(plain, &at);
         let sum = rows.iter().map(|(_, t)| -(-normal_below(-t)).ln_1p()).sum();
@@ -436,6 +445,7 @@ impl Sharing<'_> {
     fn rows_at(&self, plain: &Case, at: &[(f64, f64)]) -> Vec<(usize, f64)> {
         let built = build(plain, &Variation { about: Some((at, f64::INFINITY)), ..Variation::default() });
         let y = &built.program.start;
+        // Every limit that scatters has a row: both follow from the same models and limits.
         let row_of = |one: &Scattered| {
             let is_it =
                 |label: &super::program::Label| label.place == Place::Zone(one.zone) && label.kind.name() == one.name();

@@ -323,6 +323,10 @@ fn certificate(solved: Option<&Solved>) -> Certificate {
 
 /// The best single feed, and the source paper's rule from it.
 fn comparison(found: &Found, time_min: f64, monitor: &dyn Monitor) -> Result<Comparison, Failure> {
+    // With one feed a joint risk would be shared otherwise, and what is not the best is nothing to compare with.
+    if found.solved.as_ref().is_some_and(|solved| solved.shares_risk) {
+        return Ok(Comparison { constant_feed: None, equal_deflection: None });
+    }
     let mut case = found.case.clone();
     let mut constant_feed = None;
     if case.variables.feed != FeedMode::Fixed {

@@ -382,7 +382,7 @@ fn keeps(case: &Case, given: &Variation<'_>, at: &[(f64, f64)]) -> bool {
 }
 
 /// Whether every bent model stands only in limits that stay convex with it.
-fn convex(case: &Case) -> bool {
+pub(super) fn convex(case: &Case) -> bool {
     case.zones.iter().all(|zone| {
         let known = Output::ALL.into_iter().all(|output| {
             let bend = zone.model(output).map_or(Bend::Straight, super::acting::ActingModel::bends);
