@@ -157,6 +157,10 @@ fn what_the_warning_of_failures_tells_ends_them() {
     assert!(!codes(&job).contains(&"half_fail"));
     job["risk"]["kind"] = json!("joint");
     assert!(!codes(&job).contains(&"half_fail"));
+    // What a joint risk refuses is not offered beside it.
+    let warnings = answered(&job).unwrap().warnings;
+    let shares = warnings.iter().find(|warning| warning.code == "shares_of_edges_priced").unwrap();
+    assert!(shares.values.get("risk").is_some());
     job["models"]["roughness"].as_object_mut().unwrap().remove("residual_scatter");
     assert!(codes(&job).contains(&"no_scatter_given"));
 }

@@ -113,12 +113,12 @@ pub(super) fn warnings(
     if let (Some(whole), false) = (outcome.whole_edge_objective, is_of_whole_edges(job))
         && whole > 1.01 * outcome.objective
     {
-        out.push(
-            Finding::new("shares_of_edges_priced", "/limits/whole_edges")
-                .measured(whole, outcome.objective, job.objective.unit())
-                .with("objective", job.objective.name())
-                .with("edges", outcome.edges_per_part.unwrap_or(0.0)),
-        );
+        let found = Finding::new("shares_of_edges_priced", "/limits/whole_edges")
+            .measured(whole, outcome.objective, job.objective.unit())
+            .with("objective", job.objective.name())
+            .with("edges", outcome.edges_per_part.unwrap_or(0.0));
+        // Whole edges do not go together with a joint risk: they are not offered there.
+        out.push(if job.risk.name() == "joint" { found.with("risk", "joint") } else { found });
     }
     if matches!(job.method, Method::EqualDeflection { .. }) {
         for (name, factor) in broken(case, at).into_iter().take(20) {
