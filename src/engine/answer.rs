@@ -144,6 +144,7 @@ impl Stored {
             engine: ENGINE_VERSION.to_owned(),
             input: self.input.clone(),
             body: self.body.clone(),
+            records: names::records_of(&self.input),
         }
     }
     /// The filled job as its calculator has it.

@@ -154,39 +154,67 @@ pub(crate) fn number(value: f64) -> Option<Value> {
     Number::from_f64(value).map(Value::Number)
 }
 
-/// Where in the text of an object, written without white space, the value of a field of its own stands.
-pub(crate) fn top_level_field(object: &[u8], name: &str) -> Option<Range<usize>> {
+/// A field of an object in its text: where it begins, and its value.
+struct Member {
+    begin: usize,
+    value: Range<usize>,
+}
+
+impl Member {
+    fn name<'t>(&self, object: &'t [u8]) -> &'t [u8] {
+        object.get(self.begin + 1..self.value.start - 2).unwrap_or_default()
+    }
+}
+
+/// The fields of an object, written without white space, as they come; up to where it is no object any more.
+fn members(object: &[u8]) -> impl Iterator<Item = Member> {
     let (mut depth, mut in_text, mut escaped) = (0_usize, false, false);
-    // Where the member that is being read begins, and where the value that is looked for does.
-    let (mut member, mut value) = (1, None);
-    for (index, byte) in object.iter().enumerate() {
-        if in_text {
+    // Where the member that is being read begins, and its value.
+    let (mut begin, mut value) = (1, None);
+    object
+        .iter()
+        .enumerate()
+        .map_while(move |(index, byte)| {
+            if in_text {
+                match byte {
+                    _ if escaped => escaped = false,
+                    b'\\' => escaped = true,
+                    b'"' => in_text = false,
+                    _ => {}
+                }
+                return Some(None);
+            }
+            let mut ended = None;
             match byte {
-                _ if escaped => escaped = false,
-                b'\\' => escaped = true,
-                b'"' => in_text = false,
+                b'"' => in_text = true,
+                b'{' | b'[' => depth += 1,
+                b':' if depth == 1 => value = Some(index + 1),
+                b',' | b'}' if depth == 1 => {
+                    ended = value.take().map(|value| Member { begin, value: value..index });
+                    begin = index + 1;
+                }
+                b'}' | b']' => depth = depth.checked_sub(1)?,
                 _ => {}
             }
-            continue;
-        }
-        match byte {
-            b'"' => in_text = true,
-            b'{' | b'[' => depth += 1,
-            b':' if depth == 1 => {
-                let key = object.get(member + 1..index - 1)?;
-                value = (key == name.as_bytes()).then_some(index + 1);
-            }
-            b',' | b'}' if depth == 1 => {
-                if let Some(begin) = value {
-                    return Some(begin..index);
-                }
-                member = index + 1;
-            }
-            b'}' | b']' => depth = depth.checked_sub(1)?,
-            _ => {}
-        }
-    }
-    None
+            Some(ended)
+        })
+        .flatten()
+}
+
+/// Where in the text of an object, written without white space, the value of a field of its own stands.
+pub(crate) fn top_level_field(object: &[u8], name: &str) -> Option<Range<usize>> {
+    members(object).find(|member| member.name(object) == name.as_bytes()).map(|member| member.value)
+}
+
+/// An object in canonical JSON with one field more, which it does not have yet. All names are ASCII.
+pub(crate) fn with_top_level(object: &[u8], name: &str, value: &[u8]) -> Vec<u8> {
+    let next = members(object).find(|member| member.name(object) > name.as_bytes());
+    let (before, after) = match next {
+        Some(next) => (&object[..next.begin], [b",", &object[next.begin..]].concat()),
+        None => (&object[..object.len().saturating_sub(1)], b"}".to_vec()),
+    };
+    let comma: &[u8] = if after[0] == b'}' && before.len() > 1 { b"," } else { b"" };
+    [before, comma, b"\"", name.as_bytes(), b"\":", value, &after].concat()
 }
 
 fn fault(error: &serde_json::Error, code: Option<&'static str>, pointer: String) -> SyntaxFault {
@@ -537,6 +565,7 @@ impl Visitor<'_> for Name<'_> {
 #[allow(clippy::unwrap_used, clippy::panic)]
 mod tests {
     use super::*;
+    use crate::registry::canonical;
     use proptest::prelude::*;
     use serde_json::json;
 
@@ -560,6 +589,20 @@ mod tests {
         }
         for (text, name) in [("{}", "a"), ("{\"a\":{\"b\":1}}", "b"), ("[1,2]", "a"), ("", "a"), ("{\"a\":1", "a")] {
             assert_eq!(top_level_field(text.as_bytes(), name), None, "{text}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn a_field_is_added_where_canonical_json_has_it(names in proptest::collection::btree_set("[a-z_]{1,6}", 0..6)) {
+            let all: serde_json::Map<_, _> = names.iter().map(|name| (name.clone(), json!({ "of": [name, "}\",:"] }))).collect();
+            for name in &names {
+                let mut rest = all.clone();
+                let taken = rest.shift_remove(name).unwrap();
+                let (rest, taken) = (canonical(&rest).unwrap(), canonical(&taken).unwrap());
+                let with = with_top_level(&rest, name, &taken);
+                prop_assert_eq!(String::from_utf8(with).unwrap(), String::from_utf8(canonical(&all).unwrap()).unwrap());
+            }
         }
     }
 

@@ -297,6 +297,11 @@ impl Engine {
         Ok(self.inner.store.list(query).await?)
     }
 
+    /// How many kept answers got a record of that address (`machines/lathe-3@4`): of all, or of one owner.
+    pub async fn uses(&self, record: String, owner: Option<String>) -> Result<u64, Error> {
+        Ok(self.inner.store.uses(record, owner).await?)
+    }
+
     /// Whether it serves: the store answers and nobody has closed it.
     pub async fn ready(&self) -> Result<(), Error> {
         if self.inner.closed.load(Ordering::Relaxed) {

@@ -360,6 +360,9 @@ impl ResultStore for BrokenStore {
     fn list(&self, _query: ResultQuery) -> BoxFuture<'_, Result<ResultPage, StoreError>> {
         Box::pin(async { Err(StoreError::Failed("disk I/O error".to_owned())) })
     }
+    fn uses(&self, _record: String, _owner: Option<String>) -> BoxFuture<'_, Result<u64, StoreError>> {
+        Box::pin(async { Err(StoreError::Failed("disk I/O error".to_owned())) })
+    }
     fn note_asked(&self, _key: Key, _owner: String) -> BoxFuture<'_, Result<(), StoreError>> {
         Box::pin(async { Err(StoreError::Failed("broken".to_owned())) })
     }

@@ -23,11 +23,20 @@ const MOST_CODES: usize = 4096;
 
 /// A record as it is answered, without its revisions.
 pub fn record_said(stored: &StoredRecord, language: Language) -> Value {
-    said(stored, &[], language)
+    said(stored, &Around::default(), language)
+}
+
+/// What the address of one record tells beside it.
+#[derive(Default)]
+pub(super) struct Around {
+    /// The numbers of its revisions.
+    pub(super) revisions: Vec<u32>,
+    /// How many kept results got it; of what no job names, none.
+    pub(super) uses: Option<u64>,
 }
 
 /// A record as it is answered: its fields, each number with its source in words, beside its name and state.
-pub(super) fn said(stored: &StoredRecord, revisions: &[u32], language: Language) -> Value {
+pub(super) fn said(stored: &StoredRecord, around: &Around, language: Language) -> Value {
     let record = &stored.record;
     let mut said = Map::new();
     said.insert("name".to_owned(), record.name.clone().into());
@@ -48,12 +57,12 @@ pub(super) fn said(stored: &StoredRecord, revisions: &[u32], language: Language)
     if let Value::Object(fields) = fields {
         said.extend(fields);
     }
-    state(stored, revisions, &mut said);
+    state(stored, around, &mut said);
     said.into()
 }
 
 /// Number or version, hash, time, addresses.
-fn state(stored: &StoredRecord, revisions: &[u32], said: &mut Map<String, Value>) {
+fn state(stored: &StoredRecord, around: &Around, said: &mut Map<String, Value>) {
     let (name, folder) = (&stored.record.name, stored.record.kind.plural());
     let newest = format!("/v1/{folder}/{name}");
     let this = match stored.revision {
@@ -73,11 +82,13 @@ fn state(stored: &StoredRecord, revisions: &[u32], said: &mut Map<String, Value>
         let created = jiff::Timestamp::from_millisecond(created).unwrap_or_default();
         said.insert("created_at".to_owned(), format!("{created:.3}").into());
     }
-    let revisions: Vec<String> = revisions.iter().map(|revision| format!("{newest}@{revision}")).collect();
-    said.insert(
-        "links".to_owned(),
-        json!({ "self": this, "newest": newest, "comparison": format!("{this}/comparison?with="), "revisions": revisions }),
-    );
+    let revisions: Vec<String> = around.revisions.iter().map(|revision| format!("{newest}@{revision}")).collect();
+    let mut links = json!({ "self": this, "newest": newest, "comparison": format!("{this}/comparison?with="), "revisions": revisions });
+    if let Some(uses) = around.uses {
+        said.insert("uses".to_owned(), uses.into());
+        links["uses"] = format!("/v1/results?record={}", stored.address()).into();
+    }
+    said.insert("links".to_owned(), links);
 }
 
 /// Sources in words, with the address where they can be read, in place of the keys of the data.

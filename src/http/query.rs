@@ -7,6 +7,8 @@ use std::str::FromStr;
 
 use axum::extract::Query as Pairs;
 use axum::http::{StatusCode, Uri};
+use precut_library::Kind;
+use precut_library::record::is_name;
 
 use super::problem::Problem;
 use crate::engine::{Engine, Error};
@@ -52,6 +54,19 @@ impl Query {
             Some(id) if engine.entry(id).is_none() => Err(Error::unknown(engine.registry(), id).into()),
             _ => Ok(id),
         }
+    }
+
+    /// A record that jobs name, of one revision or any: `machines/lathe-3@4`.
+    pub(super) fn record(&mut self) -> Result<Option<String>, Problem> {
+        const NAME: &str = "record";
+        let Some(text) = self.text(NAME) else { return Ok(None) };
+        let is_one = text.split_once('/').is_some_and(|(folder, name)| {
+            let (name, revision) = name.split_once('@').map_or((name, "1"), |(name, revision)| (name, revision));
+            Kind::NAMED.into_iter().any(|kind| kind.plural() == folder)
+                && is_name(name)
+                && revision.parse::<u32>().is_ok_and(|number| number > 0 && number.to_string() == revision)
+        });
+        if is_one { Ok(Some(text)) } else { Err(fault("no_record", NAME).with("received", text)) }
     }
 
     /// A text that cannot be left out.

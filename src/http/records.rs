@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 
 use super::auth::Caller;
 use super::document::Document;
-use super::library::said;
+use super::library::{Around, said};
 use super::problem::Problem;
 use super::query::Query;
 use super::{App, body, gate, negotiate};
@@ -67,7 +67,7 @@ async fn list(
         format!("/v1/{}?limit={limit}{class}{own}&after={}", kind.plural(), last.record.name)
     });
     let language = negotiate::language(&headers);
-    let items: Vec<Value> = page.items.iter().map(|record| said(record, &[], language)).collect();
+    let items: Vec<Value> = page.items.iter().map(|record| said(record, &Around::default(), language)).collect();
     Ok(Document::json(&json!({ "items": items, "next": next }), Some(language)).respond(&headers))
 }
 
@@ -79,14 +79,19 @@ async fn read(
     Path(name): Path<String>,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let (shelf, language) = (caller.shelf(), negotiate::language(&headers));
-    let record = app.engine.record(&shelf, kind, &name).await?;
-    let revisions = app.engine.record_revisions(&shelf, kind, &record.record.name).await?;
-    Ok(document(&record, &revisions, language).respond(&headers))
+    let language = negotiate::language(&headers);
+    let record = app.engine.record(&caller.shelf(), kind, &name).await?;
+    Ok(document(&app, &caller, &record, language).await?.respond(&headers))
 }
 
-fn document(record: &StoredRecord, revisions: &[u32], language: Language) -> Document {
-    Document::json(&said(record, revisions, language), Some(language))
+async fn document(app: &App, caller: &Caller, record: &StoredRecord, language: Language) -> Result<Document, Problem> {
+    let (kind, name) = (record.record.kind, &record.record.name);
+    let revisions = app.engine.record_revisions(&caller.shelf(), kind, name).await?;
+    let uses = match Kind::NAMED.contains(&kind) {
+        true => Some(app.engine.uses(record.address(), caller.shown()).await?),
+        false => None,
+    };
+    Ok(Document::json(&said(record, &Around { revisions, uses }, language), Some(language)))
 }
 
 /// `GET /v1/machines/{name}/comparison`
@@ -120,14 +125,12 @@ async fn store(
     let shelf = caller.shelf();
     let RecordAnswer { record, is_new } =
         app.engine.put_record(&shelf, (kind, &name), &sent, (only_new, owner)).await?;
-    let revisions = app.engine.record_revisions(&shelf, kind, &name).await?;
+    let language = negotiate::language(&headers);
     // A condition on what was there before says nothing of what is answered now.
-    let mut response = document(&record, &revisions, negotiate::language(&headers)).respond(&HeaderMap::new());
+    let mut response = document(&app, &caller, &record, language).await?.respond(&HeaderMap::new());
     *response.status_mut() = if is_new { StatusCode::CREATED } else { StatusCode::OK };
-    if let Some(last) = revisions.last() {
-        let location = HeaderValue::try_from(format!("/v1/{}/{name}@{last}", kind.plural()));
-        response.headers_mut().insert(LOCATION, location.expect("a name is visible ASCII"));
-    }
+    let location = HeaderValue::try_from(format!("/v1/{}", record.address()));
+    response.headers_mut().insert(LOCATION, location.expect("a name is visible ASCII"));
     Ok(response)
 }
 

@@ -80,16 +80,21 @@ pub(super) async fn list(
     uri: Uri,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let mut query = Query::of(&uri, &["calculator", "limit", "after"])?;
+    let mut query = Query::of(&uri, &["calculator", "record", "limit", "after"])?;
     let limit = query.number("limit", &(1..=MOST_ITEMS))?.unwrap_or(DEFAULT_ITEMS);
     let after = query.after::<Cursor>()?;
     let calculator = query.calculator(&app.engine)?;
-    let query = ResultQuery { calculator: calculator.clone(), owner: caller.shown(), limit: Some(limit), after };
+    let record = query.record()?;
+    let filter = [("calculator", &calculator), ("record", &record)]
+        .into_iter()
+        .filter_map(|(name, value)| Some(format!("&{name}={}", value.as_ref()?)))
+        .collect::<String>();
+    let query = ResultQuery { calculator, owner: caller.shown(), record, limit: Some(limit), after };
     let page = app.engine.results(query).await?;
     let asked: Vec<_> = page.items.iter().map(|item| (item.key, item.calculator.clone())).collect();
     let summaries = app.engine.summaries(&asked).await;
     let language = negotiate::language(&headers);
-    let list = page_of(page, &summaries, language, limit, calculator.as_deref());
+    let list = page_of(page, &summaries, language, &format!("limit={limit}{filter}"));
     let headers =
         [(CACHE_CONTROL, "no-store"), (CONTENT_LANGUAGE, language.tag()), (VARY, "Accept-Language, Accept-Encoding")];
     Ok((headers, Json(list)).into_response())
@@ -130,17 +135,10 @@ pub(super) fn absent(name: &str) -> Problem {
     Problem::new(StatusCode::NOT_FOUND, "unknown_result").with("key", name.to_owned())
 }
 
-fn page_of(
-    page: ResultPage,
-    summaries: &HashMap<Key, Summary>,
-    language: Language,
-    limit: u32,
-    calculator: Option<&str>,
-) -> ResultList {
+fn page_of(page: ResultPage, summaries: &HashMap<Key, Summary>, language: Language, asked: &str) -> ResultList {
     let said = |item: &ResultSummary| summaries.get(&item.key).map(|marks| told(language, marks));
-    let filter = calculator.map(|id| format!("&calculator={id}")).unwrap_or_default();
     ResultList {
-        next: page.next.map(|next| format!("/v1/results?limit={limit}{filter}&after={next}")),
+        next: page.next.map(|next| format!("/v1/results?{asked}&after={next}")),
         items: page.items.into_iter().map(|one| item(said(&one), one)).collect(),
     }
 }

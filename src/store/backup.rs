@@ -99,7 +99,7 @@ pub async fn verify(copy: &Path) -> Result<Contents, BackupError> {
     let (mut results, mut bad) = (0, 0_u64);
     {
         let mut rows = sqlx::query_as::<_, ResultRow>(
-            "SELECT key, calculator, version, engine, input, body, checksum FROM results",
+            "SELECT key, calculator, version, engine, input, body, checksum, '' AS records FROM results",
         )
         .fetch(&mut database);
         while let Some(row) = rows.try_next().await.map_err(failed)? {

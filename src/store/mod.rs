@@ -99,6 +99,8 @@ pub trait ResultStore: Send + Sync + 'static {
     fn put(&self, result: KeptResult);
     /// The results, newest first, those just put among them.
     fn list(&self, query: ResultQuery) -> BoxFuture<'_, Result<ResultPage, StoreError>>;
+    /// How many results got a record ([`ResultQuery::record`]): of all, or of those that this owner has asked for.
+    fn uses(&self, record: String, owner: Option<String>) -> BoxFuture<'_, Result<u64, StoreError>>;
     /// Notes that an owner has asked for a result.
     fn note_asked(&self, key: Key, owner: String) -> BoxFuture<'_, Result<(), StoreError>>;
     /// Whether an owner has asked for a result, by a request or a job.
@@ -168,6 +170,8 @@ pub struct KeptResult {
     pub input: Bytes,
     /// The envelope, JSON.
     pub body: Bytes,
+    /// The records that its job got, as `|machines/lathe-3@4|tools/bar-25@1|`; empty where it named none.
+    pub records: String,
 }
 
 /// Where a kept result comes from, beside what it says itself.
@@ -191,6 +195,8 @@ pub struct ResultQuery {
     pub calculator: Option<String>,
     /// Only those that this owner has asked for.
     pub owner: Option<String>,
+    /// Only those whose jobs got this record: `machines/lathe-3@4`, or `machines/lathe-3` of any revision.
+    pub record: Option<String>,
     /// At most so many; [`ResultQuery::LIMIT`] unless told, never above [`ResultQuery::MOST`].
     pub limit: Option<u32>,
     /// Where the page before ended.
@@ -202,6 +208,12 @@ impl ResultQuery {
     pub const LIMIT: u32 = 50;
     /// Never more than so many.
     pub const MOST: u32 = 500;
+
+    /// What stands in [`KeptResult::records`] of those whose jobs got the record.
+    pub(crate) fn mark(record: &str) -> String {
+        let end = if record.contains('@') { '|' } else { '@' };
+        format!("|{record}{end}")
+    }
 }
 
 /// A place in the list of results; opaque in the contract, and written in one way only.

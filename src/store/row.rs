@@ -35,6 +35,7 @@ impl Packer {
             input: self.0.compress(&result.input)?,
             body: self.0.compress(&result.body)?,
             checksum: Vec::new(),
+            records: result.records.clone(),
         };
         row.checksum = row.sum().to_vec();
         Ok(row)
@@ -51,16 +52,18 @@ pub(super) struct ResultRow {
     pub(super) input: Vec<u8>,
     pub(super) body: Vec<u8>,
     pub(super) checksum: Vec<u8>,
+    /// Follows from the input, and is no part of the checksum.
+    pub(super) records: String,
 }
 
-from_row!(SqliteRow => ResultRow { key, calculator, version, engine, input, body, checksum });
+from_row!(SqliteRow => ResultRow { key, calculator, version, engine, input, body, checksum, records });
 
 impl ResultRow {
     /// What it takes of the disk, about.
     pub(super) fn bytes(&self) -> i64 {
         /// Key, checksum, names, times and their copies in the indices.
         const REST: usize = 300;
-        i64::try_from(self.input.len() + self.body.len() + REST).unwrap_or(i64::MAX)
+        i64::try_from(self.input.len() + self.body.len() + self.records.len() + REST).unwrap_or(i64::MAX)
     }
 
     /// The result; `None` if a bit has changed since it was written.
@@ -75,6 +78,7 @@ impl ResultRow {
             calculator: self.calculator,
             version: self.version,
             engine: self.engine,
+            records: self.records,
         })
     }
 
@@ -96,12 +100,12 @@ pub(super) async fn insert(
     connection: &mut SqliteConnection,
 ) -> Result<i64, sqlx::Error> {
     let mut statement = QueryBuilder::<Sqlite>::new(
-        "INSERT INTO results (key, calculator, version, engine, input, body, checksum, bytes, created_ms, used_ms) ",
+        "INSERT INTO results (key, calculator, version, engine, input, body, checksum, bytes, created_ms, used_ms, records) ",
     );
     statement.push_values(rows, |mut values, row| {
         values.push_bind(&row.key).push_bind(&row.calculator).push_bind(row.version).push_bind(&row.engine);
         values.push_bind(&row.input).push_bind(&row.body).push_bind(&row.checksum);
-        values.push_bind(row.bytes()).push_bind(now_ms).push_bind(now_ms);
+        values.push_bind(row.bytes()).push_bind(now_ms).push_bind(now_ms).push_bind(&row.records);
     });
     statement.push(" ON CONFLICT (key) DO NOTHING");
     let done = statement.build().execute(connection).await?;

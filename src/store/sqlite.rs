@@ -145,7 +145,7 @@ impl SqliteStore {
             return Ok(None);
         }
         let row: Option<ResultRow> = sqlx::query_as(
-            "SELECT key, calculator, version, engine, input, body, checksum FROM results WHERE key = ?1",
+            "SELECT key, calculator, version, engine, input, body, checksum, records FROM results WHERE key = ?1",
         )
         .bind(key.as_bytes().as_slice())
         .fetch_optional(&self.readers)
@@ -171,7 +171,11 @@ impl SqliteStore {
         let limit = query.limit.unwrap_or(ResultQuery::LIMIT).clamp(1, ResultQuery::MOST);
         let after = query.after.map(|cursor| (cursor.created_ms, cursor.key.as_bytes().to_vec()));
         let (created_ms, key) = after.unwrap_or((i64::MAX, vec![0xff; 32]));
-        let index = if query.calculator.is_some() { "results_by_calculator" } else { "results_by_time" };
+        let index = match (&query.record, &query.calculator) {
+            (Some(_), _) => "results_with_records",
+            (None, Some(_)) => "results_by_calculator",
+            (None, None) => "results_by_time",
+        };
         let mut statement = QueryBuilder::<Sqlite>::new(
             "SELECT key, calculator, version, engine, bytes, created_ms FROM results INDEXED BY ",
         );
@@ -180,12 +184,7 @@ impl SqliteStore {
         if let Some(calculator) = query.calculator {
             statement.push(" AND calculator = ").push_bind(calculator);
         }
-        if let Some(owner) = query.owner {
-            let of = "EXISTS (SELECT 1 FROM asked WHERE asked.key = results.key AND asked.owner = ";
-            statement.push(" AND (").push(of).push_bind(owner.clone());
-            let of = ") OR EXISTS (SELECT 1 FROM precut_jobs AS job WHERE job.key = results.key AND job.owner = ";
-            statement.push(of).push_bind(owner).push("))");
-        }
+        narrow(&mut statement, query.owner, query.record);
         // One more than asked for tells whether there is another page.
         statement.push(" ORDER BY created_ms DESC, key DESC LIMIT ").push_bind(limit + 1);
         let rows: Vec<SummaryRow> = statement.build_query_as().fetch_all(&self.readers).await?;
@@ -194,6 +193,15 @@ impl SqliteStore {
         items.truncate(limit as usize);
         let next = items.last().filter(|_| more).map(|last| Cursor { created_ms: last.created_ms, key: last.key });
         Ok(ResultPage { items, next })
+    }
+
+    async fn count(&self, record: String, owner: Option<String>) -> Result<u64, StoreError> {
+        self.writer.flush(LIST_PATIENCE).await;
+        let mut statement =
+            QueryBuilder::<Sqlite>::new("SELECT count(*) FROM results INDEXED BY results_with_records WHERE true");
+        narrow(&mut statement, owner, Some(record));
+        let count: i64 = statement.build_query_scalar().fetch_one(&self.readers).await?;
+        Ok(u64::try_from(count).unwrap_or(0))
     }
 
     async fn some_inputs(&self, keys: Vec<Key>, most: usize) -> Result<Vec<(Key, Bytes)>, StoreError> {
@@ -209,6 +217,19 @@ impl SqliteStore {
     }
 }
 
+/// Only results that an owner has asked for, and whose jobs got a record.
+fn narrow(statement: &mut QueryBuilder<Sqlite>, owner: Option<String>, record: Option<String>) {
+    if let Some(owner) = owner {
+        let of = "EXISTS (SELECT 1 FROM asked WHERE asked.key = results.key AND asked.owner = ";
+        statement.push(" AND (").push(of).push_bind(owner.clone());
+        let of = ") OR EXISTS (SELECT 1 FROM precut_jobs AS job WHERE job.key = results.key AND job.owner = ";
+        statement.push(of).push_bind(owner).push("))");
+    }
+    if let Some(record) = record {
+        statement.push(" AND records <> '' AND instr(records, ").push_bind(ResultQuery::mark(&record)).push(") > 0");
+    }
+}
+
 impl ResultStore for SqliteStore {
     fn get(&self, key: Key) -> BoxFuture<'_, Result<Option<KeptResult>, StoreError>> {
         Box::pin(self.read(key))
@@ -218,6 +239,9 @@ impl ResultStore for SqliteStore {
     }
     fn list(&self, query: ResultQuery) -> BoxFuture<'_, Result<ResultPage, StoreError>> {
         Box::pin(self.page(query))
+    }
+    fn uses(&self, record: String, owner: Option<String>) -> BoxFuture<'_, Result<u64, StoreError>> {
+        Box::pin(self.count(record, owner))
     }
     fn note_asked(&self, key: Key, owner: String) -> BoxFuture<'_, Result<(), StoreError>> {
         Box::pin(self.ledger.write(move |connection| {

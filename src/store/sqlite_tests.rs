@@ -15,6 +15,7 @@ fn result(number: u32, calculator: &str) -> KeptResult {
         engine: "0.0.0".to_owned(),
         input: vec![b' '; 100].into(),
         body: body.into(),
+        records: String::new(),
     }
 }
 

@@ -42,6 +42,12 @@ pub struct StoredRecord {
 }
 
 impl StoredRecord {
+    /// Its address within the service: `machines/lathe-3@4`.
+    pub fn address(&self) -> String {
+        let (Revision::Own(number) | Revision::BuiltIn(number)) = self.revision;
+        format!("{}/{}@{number}", self.record.kind.plural(), self.record.name)
+    }
+
     /// One of the engine's own.
     pub(crate) fn built_in(record: &Arc<Record>) -> Self {
         Self {

@@ -16,7 +16,7 @@ use crate::engine::library::{Index, kind_of, of_json};
 use crate::engine::model::{self, FoundModel};
 use crate::engine::{Error, Shelf};
 use crate::registry::{Entry, Registry, canonical};
-use crate::store::documents::{self, DocumentShelf, KeptDocument};
+use crate::store::documents::{self, DocumentShelf};
 
 /// Names that are looked through for one like an unknown name.
 const NEAR_NAMES: u32 = 1000;
@@ -65,26 +65,25 @@ type Wanted = (documents::Kind, String, Option<u32>);
 
 /// Records that were looked up lately, each with the generation that it holds for.
 pub(crate) struct Remembered {
-    records: Cache<Wanted, (u64, Arc<Own>), Bytes>,
+    records: Cache<Wanted, (u64, Arc<Outcome>), Bytes>,
     indices: Cache<(documents::Kind, String), (u64, Arc<Index>), Bytes>,
 }
 
-/// An own record as it is kept.
-struct Own {
-    record: Arc<Record>,
-    revision: u32,
-    sha256: String,
+/// What came of looking for an own record: nothing where there never was one.
+struct Outcome {
+    found: Option<(Lookup, String)>,
+    /// Of its text.
     bytes: usize,
 }
 
 #[derive(Clone)]
 struct Bytes;
 
-impl<K> Weighter<K, (u64, Arc<Own>)> for Bytes {
-    fn weight(&self, _: &K, (_, own): &(u64, Arc<Own>)) -> u64 {
+impl<K> Weighter<K, (u64, Arc<Outcome>)> for Bytes {
+    fn weight(&self, _: &K, (_, outcome): &(u64, Arc<Outcome>)) -> u64 {
         /// A record as a tree takes several times its text.
         const TREE: usize = 4;
-        (256 + TREE * own.bytes) as u64
+        (256 + TREE * outcome.bytes) as u64
     }
 }
 
@@ -175,25 +174,32 @@ impl<S: DocumentShelf + ?Sized> Finder<'_, S> {
         let full = self.shelf.full(name);
         let key = (kind_of(kind), full.clone(), revision);
         if let Some((cache, generation)) = self.remembered
-            && let Some((then, own)) = cache.records.get(&key)
+            && let Some((then, outcome)) = cache.records.get(&key)
             && then == generation
         {
-            return Ok(Some(found(&own)));
+            return Ok(outcome.found.clone());
         }
-        let Some(kept) = self.documents.document(kind_of(kind), full.clone(), revision).await? else {
-            let revisions = self.documents.revisions(kind_of(kind), full).await?;
-            let lookup = match (revisions.there.last(), revisions.last) {
-                (Some(&last), _) => Lookup::UnknownRevision { last },
-                (None, Some(_)) => Lookup::Deleted,
-                (None, None) => return Ok(None),
-            };
-            return Ok(Some((lookup, String::new())));
-        };
-        let own = Arc::new(of_kept(kind, name, &kept)?);
+        let outcome = self.read(kind, name, full, revision).await?;
+        let found = outcome.found.clone();
         if let Some((cache, generation)) = self.remembered {
-            cache.records.insert(key, (generation, Arc::clone(&own)));
+            cache.records.insert(key, (generation, Arc::new(outcome)));
         }
-        Ok(Some(found(&own)))
+        Ok(found)
+    }
+
+    async fn read(&self, kind: Kind, name: &str, full: String, revision: Option<u32>) -> Result<Outcome, Error> {
+        if let Some(kept) = self.documents.document(kind_of(kind), full.clone(), revision).await? {
+            let record = Arc::new(of_json(kind, name, &kept.content)?);
+            let found = Lookup::Found(Resource { record, revision: Revision::Own(kept.revision) });
+            return Ok(Outcome { bytes: kept.content.len(), found: Some((found, kept.sha256)) });
+        }
+        let revisions = self.documents.revisions(kind_of(kind), full).await?;
+        let lookup = match (revisions.there.last(), revisions.last) {
+            (Some(&last), _) => Some(Lookup::UnknownRevision { last }),
+            (None, Some(_)) => Some(Lookup::Deleted),
+            (None, None) => None,
+        };
+        Ok(Outcome { found: lookup.map(|lookup| (lookup, String::new())), bytes: 0 })
     }
 
     /// The material that is called so, or several.
@@ -227,17 +233,6 @@ impl<S: DocumentShelf + ?Sized> Finder<'_, S> {
         }
         Ok(index)
     }
-}
-
-fn found(own: &Own) -> (Lookup, String) {
-    let resource = Resource { record: Arc::clone(&own.record), revision: Revision::Own(own.revision) };
-    (Lookup::Found(resource), own.sha256.clone())
-}
-
-fn of_kept(kind: Kind, name: &str, kept: &KeptDocument) -> Result<Own, Error> {
-    let record = of_json(kind, name, &kept.content)?;
-    let (revision, sha256, bytes) = (kept.revision, kept.sha256.clone(), kept.content.len());
-    Ok(Own { record: Arc::new(record), revision, sha256, bytes })
 }
 
 /// What the engine's own records say of a name.

@@ -13,8 +13,9 @@ use std::borrow::Cow;
 use precut_calc::calculator::{Finding, Message};
 use precut_library::resolve::Revision;
 use precut_library::{Asked, Kind, Lookup, Resolution, Resource};
-use serde_json::{Map, Value, json};
+use serde_json::{Map, Value};
 
+use super::json;
 use super::model::{self, FoundModel};
 use super::study::STUDIES;
 use crate::registry::{Entry, ModelUse, Registry, canonical, takes_names as takes};
@@ -117,7 +118,7 @@ fn asked_by_points(registry: &Registry, study: &Value) -> Vec<Asked> {
         let values = variable.get("values").and_then(Value::as_array).into_iter().flatten();
         for name in values.filter_map(Value::as_str) {
             let Some((_, of)) = place(entry, job) else { continue };
-            found.extend(precut_library::asked(&of, &json!({ kind.name(): name })));
+            found.extend(precut_library::asked(&of, &serde_json::json!({ kind.name(): name })));
         }
     }
     found.sort_by(|one, other| (one.kind, &one.name, one.revision).cmp(&(other.kind, &other.name, other.revision)));
@@ -253,22 +254,38 @@ pub(crate) fn with_drawn(job: &mut Value, drawn: &Drawn) {
 /// A filled job in two forms, as RFC 8785 writes them: as it is kept, and what its key is of. How a material was called is
 /// no part of the key, and sentences follow from the rest.
 pub(crate) fn canonical_with(job: &[u8], drawn: &Drawn) -> Result<(Vec<u8>, Vec<u8>), String> {
-    let unwritable = |error: &dyn std::fmt::Display| format!("a filled job with its records: {error}");
-    let mut job: Value = serde_json::from_slice(job).map_err(|error| unwritable(&error))?;
-    with_drawn(&mut job, drawn);
-    let kept = canonical(&job).map_err(|error| unwritable(&error))?;
+    let text = |value: &Value| canonical(value).map_err(|error| format!("the records of a filled job: {error}"));
+    let kept = json::with_top_level(job, RESOURCES, &text(&kept::drawn(drawn))?);
     let mut resources = drawn.resources.clone();
     for resource in resources.values_mut().filter_map(Value::as_object_mut) {
         resource.shift_remove(ASKED_AS);
     }
-    job[RESOURCES] = json!({ "resources": resources, "origins": drawn.origins });
-    let hashed = canonical(&job).map_err(|error| unwritable(&error))?;
+    let numbers = text(&serde_json::json!({ "resources": resources, "origins": drawn.origins }))?;
+    let hashed = json::with_top_level(job, RESOURCES, &numbers);
     Ok((kept, hashed))
+}
+
+/// The records that a kept job got: `machines/NAME@REVISION` of each, all between bars, so that each can be found in it.
+/// Empty where it got none.
+pub(crate) fn records_of(input: &[u8]) -> String {
+    let Some(place) = json::top_level_field(input, RESOURCES) else { return String::new() };
+    let drawn = &input[place];
+    let resources = json::top_level_field(drawn, "resources")
+        .and_then(|place| serde_json::from_slice::<Map<String, Value>>(&drawn[place]).ok())
+        .unwrap_or_default();
+    let named = resources.iter().filter_map(|(place, resource)| {
+        let kind = Kind::NAMED.into_iter().find(|kind| place.rsplit('_').next() == Some(kind.name()))?;
+        let name = resource.get("name")?.as_str()?;
+        let revision = resource.get("revision").or_else(|| resource.get("data_version"))?.as_u64()?;
+        Some(format!("{}/{name}@{revision}|", kind.plural()))
+    });
+    let all: String = named.collect();
+    if all.is_empty() { all } else { format!("|{all}") }
 }
 
 /// A kept job without what is not the calculator's.
 pub(crate) fn without_drawn(input: &[u8]) -> Cow<'_, [u8]> {
-    if super::json::top_level_field(input, RESOURCES).is_none() {
+    if json::top_level_field(input, RESOURCES).is_none() {
         return Cow::Borrowed(input);
     }
     let Ok(job) = serde_json::from_slice::<Value>(input) else { return Cow::Borrowed(input) };

@@ -100,9 +100,22 @@ fn list_results(registry: &Registry) -> OperationBuilder {
         parts::integer(1, results::MOST_ITEMS, results::DEFAULT_ITEMS),
     ))
     .parameter(query("calculator", "Only those of this calculator.", calculator))
+    .parameter(query(
+        "record",
+        "Only those whose jobs got this machine, tool or material: `machines/lathe-3`, or `machines/lathe-3@4` of one revision.",
+        record(),
+    ))
     .parameter(query("after", "Where the page before ended: taken from its `next`.", cursor()))
     .response("200", json_of("ResultList", "A page of results."));
     parts::guarded(operation, &[400, 404])
+}
+
+fn record() -> utoipa::openapi::Object {
+    use utoipa::openapi::schema::{ObjectBuilder, SchemaType, Type};
+    ObjectBuilder::new()
+        .schema_type(SchemaType::new(Type::String))
+        .pattern(Some("^(machines|tools|materials)/[a-z0-9][a-z0-9_-]{0,63}(@[1-9][0-9]{0,8})?$"))
+        .build()
 }
 
 fn cursor() -> utoipa::openapi::Object {

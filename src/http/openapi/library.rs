@@ -171,7 +171,8 @@ fn record(kind: Kind) -> Value {
             "data_version": { "type": "integer", "minimum": 1, "description": "Of the engine's own: grows with every changed number.", "examples": [1], "x-unit": "1", "x-symbol": "v" },
             "sha256": { "type": "string", "pattern": "^[0-9a-f]{64}$", "description": "SHA-256 of the record in canonical JSON (RFC 8785)." },
             "created_at": { "type": "string", "format": "date-time", "description": "When the revision was stored, UTC.", "examples": ["2026-02-03T10:15:00.123Z"] },
-            "links": { "type": "object", "additionalProperties": true, "description": "Where to go from here: `self`, `newest`, `comparison`, `revisions`." },
+            "uses": { "type": "integer", "minimum": 0, "description": "Kept results whose jobs got this revision; told where one record is asked for.", "examples": [12], "x-unit": "1", "x-symbol": "u" },
+            "links": { "type": "object", "additionalProperties": true, "description": "Where to go from here: `self`, `newest`, `comparison`, `revisions`, and `uses`, the kept results whose jobs got it." },
         },
     })
 }

@@ -37,6 +37,9 @@ impl ResultStore for PostgresStore {
     fn list(&self, query: ResultQuery) -> BoxFuture<'_, Result<ResultPage, StoreError>> {
         Box::pin(self.page(query))
     }
+    fn uses(&self, record: String, owner: Option<String>) -> BoxFuture<'_, Result<u64, StoreError>> {
+        Box::pin(self.uses_of(record, owner))
+    }
     fn note_asked(&self, key: Key, owner: String) -> BoxFuture<'_, Result<(), StoreError>> {
         Box::pin(self.note_asked_in(key, owner))
     }

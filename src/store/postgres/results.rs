@@ -20,7 +20,7 @@ const EVICT_TO_PERCENT: i64 = 90;
 /// The lock of whoever evicts.
 const EVICTION: (i32, i32) = (0x7072_6563, 3);
 
-type Columns = (Vec<u8>, String, i32, String, Vec<u8>, Vec<u8>, Vec<u8>);
+type Columns = (Vec<u8>, String, i32, String, Vec<u8>, Vec<u8>, Vec<u8>, String);
 
 impl PostgresStore {
     pub(super) async fn read(&self, key: Key) -> Result<Option<KeptResult>, StoreError> {
@@ -28,7 +28,7 @@ impl PostgresStore {
             return Ok(Some(KeptResult::clone(&waiting)));
         }
         let row: Option<Columns> = sqlx::query_as(
-            "SELECT key, calculator, version, engine, input, body, checksum FROM precut.results WHERE key = $1",
+            "SELECT key, calculator, version, engine, input, body, checksum, records FROM precut.results WHERE key = $1",
         )
         .bind(key.as_bytes().as_slice())
         .fetch_optional(&self.pool)
@@ -37,8 +37,11 @@ impl PostgresStore {
             tracing::warn!(%key, %error, "a kept result cannot be read");
             metrics::counter!("precut_store_failures_total", "operation" => "read").increment(1);
         })?;
-        let Some((bytes, calculator, version, engine, input, body, checksum)) = row else { return Ok(None) };
-        let row = ResultRow { key: bytes, calculator, version: count(version), engine, input, body, checksum };
+        let Some((key_bytes, calculator, version, engine, input, body, checksum, records)) = row else {
+            return Ok(None);
+        };
+        let version = count(version);
+        let row = ResultRow { key: key_bytes, calculator, version, engine, input, body, checksum, records };
         let result = row.result();
         if result.is_some() {
             self.writer.touch(key);
@@ -63,12 +66,7 @@ impl PostgresStore {
             statement.push(" AND (created_ms, key) < (").push_bind(after.created_ms);
             statement.push(", ").push_bind(after.key.as_bytes().to_vec()).push(")");
         }
-        if let Some(owner) = query.owner {
-            let of = "EXISTS (SELECT FROM precut.asked WHERE asked.key = results.key AND asked.owner = ";
-            statement.push(" AND (").push(of).push_bind(owner.clone());
-            let of = ") OR EXISTS (SELECT FROM precut.jobs AS job WHERE job.key = results.key AND job.owner = ";
-            statement.push(of).push_bind(owner).push("))");
-        }
+        narrow(&mut statement, query.owner, query.record);
         // One more than asked for tells whether there is another page.
         statement.push(" ORDER BY created_ms DESC, key DESC LIMIT ").push_bind(i64::from(limit) + 1);
         let rows: Vec<(Vec<u8>, String, i32, String, i64, i64)> =
@@ -88,6 +86,14 @@ impl PostgresStore {
         items.truncate(limit as usize);
         let next = items.last().filter(|_| more).map(|last| Cursor { created_ms: last.created_ms, key: last.key });
         Ok(ResultPage { items, next })
+    }
+
+    pub(super) async fn uses_of(&self, record: String, owner: Option<String>) -> Result<u64, StoreError> {
+        self.writer.flush(LIST_PATIENCE).await;
+        let mut statement = QueryBuilder::<Postgres>::new("SELECT count(*) FROM precut.results WHERE true");
+        narrow(&mut statement, owner, Some(record));
+        let uses: i64 = statement.build_query_scalar().fetch_one(&self.pool).await?;
+        Ok(u64::try_from(uses).unwrap_or(0))
     }
 
     pub(super) async fn note_asked_in(&self, key: Key, owner: String) -> Result<(), StoreError> {
@@ -136,6 +142,19 @@ impl PostgresStore {
     }
 }
 
+/// Only results that an owner has asked for, and whose jobs got a record.
+fn narrow(statement: &mut QueryBuilder<Postgres>, owner: Option<String>, record: Option<String>) {
+    if let Some(owner) = owner {
+        let of = "EXISTS (SELECT FROM precut.asked WHERE asked.key = results.key AND asked.owner = ";
+        statement.push(" AND (").push(of).push_bind(owner.clone());
+        let of = ") OR EXISTS (SELECT FROM precut.jobs AS job WHERE job.key = results.key AND job.owner = ";
+        statement.push(of).push_bind(owner).push("))");
+    }
+    if let Some(record) = record {
+        statement.push(" AND records <> '' AND strpos(records, ").push_bind(ResultQuery::mark(&record)).push(") > 0");
+    }
+}
+
 /// Adds rows in one statement, those that are there already excepted.
 pub(super) async fn insert(connection: &mut PgConnection, rows: &[ResultRow], now: i64) -> Outcome<()> {
     if rows.is_empty() {
@@ -145,12 +164,12 @@ pub(super) async fn insert(connection: &mut PgConnection, rows: &[ResultRow], no
     // In one order for all: whoever waits for another's row is not waited for by him.
     rows.sort_by(|one, other| one.key.cmp(&other.key));
     let mut statement = QueryBuilder::<Postgres>::new(
-        "INSERT INTO precut.results (key, calculator, version, engine, input, body, checksum, bytes, created_ms, used_ms) ",
+        "INSERT INTO precut.results (key, calculator, version, engine, input, body, checksum, bytes, created_ms, used_ms, records) ",
     );
     statement.push_values(rows, |mut values, row| {
         values.push_bind(&row.key).push_bind(&row.calculator).push_bind(column(row.version)).push_bind(&row.engine);
         values.push_bind(&row.input).push_bind(&row.body).push_bind(&row.checksum);
-        values.push_bind(row.bytes()).push_bind(now).push_bind(now);
+        values.push_bind(row.bytes()).push_bind(now).push_bind(now).push_bind(&row.records);
     });
     statement.push(" ON CONFLICT (key) DO NOTHING");
     statement.build().execute(connection).await?;

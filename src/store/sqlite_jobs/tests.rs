@@ -120,7 +120,21 @@ async fn the_database_of_the_version_before_is_taken_over_with_its_results() {
     before.run(&pool).await.unwrap();
     let mut packer = crate::store::row::Packer::new().unwrap();
     let row = packer.row(&result(1)).unwrap();
-    crate::store::row::insert(&[row], 1, &mut pool.acquire().await.unwrap()).await.unwrap();
+    sqlx::query(
+        "INSERT INTO results (key, calculator, version, engine, input, body, checksum, bytes, created_ms, used_ms)
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, 1, 1)",
+    )
+    .bind(&row.key)
+    .bind(&row.calculator)
+    .bind(row.version)
+    .bind(&row.engine)
+    .bind(&row.input)
+    .bind(&row.body)
+    .bind(&row.checksum)
+    .bind(row.bytes())
+    .execute(&pool)
+    .await
+    .unwrap();
     pool.close().await;
     let place = InFile {
         store: SqliteStore::open(folder.path(), Keep { age: Duration::MAX, ..keep(Duration::from_hours(1)) })

@@ -107,6 +107,7 @@ pub(in crate::store) fn result(number: u32) -> KeptResult {
         engine: "0".to_owned(),
         input: "{}".into(),
         body: format!("{{\"answer\":{number}}}").into(),
+        records: String::new(),
     }
 }
 
@@ -165,6 +166,7 @@ macro_rules! suite {
             what_is_too_much_to_wait_is_not_kept_and_does_no_harm
             a_damaged_row_is_not_served_and_goes_away
             the_list_is_paged_newest_first_and_filtered
+            results_are_found_by_the_records_of_their_jobs
             the_total_stays_below_the_limit_and_the_last_used_stay
             what_is_old_is_forgotten_at_the_next_start
             the_jobs_of_some_results_are_read_at_once

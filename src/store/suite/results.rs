@@ -1,11 +1,12 @@
 //! What every store has to do with results and parts of studies.
 
+use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
 use super::{Place, keep, list};
 use crate::key::Key;
 use crate::store::sqlite::Keep;
-use crate::store::{KeptResult, ResultPage};
+use crate::store::{KeptResult, ResultPage, ResultQuery};
 
 fn result(number: u32, calculator: &str) -> KeptResult {
     let body: Vec<u8> =
@@ -17,6 +18,7 @@ fn result(number: u32, calculator: &str) -> KeptResult {
         engine: "0.0.0".to_owned(),
         input: vec![b' '; 100].into(),
         body: body.into(),
+        records: String::new(),
     }
 }
 
@@ -105,6 +107,46 @@ pub(in crate::store) async fn the_list_is_paged_newest_first_and_filtered<P: Pla
     assert_eq!((odd.items.len(), rest.items.len(), rest.next), (2, 1, None));
     assert!(odd.items.iter().chain(&rest.items).all(|item| item.calculator == "odd"));
     assert_eq!(list(place.store(), Some("none"), 2, None).await, ResultPage::default());
+}
+
+pub(in crate::store) async fn results_are_found_by_the_records_of_their_jobs<P: Place>() {
+    let place = P::new().await;
+    let store = place.store();
+    let named = |number: u32, records: &str| KeptResult { records: records.to_owned(), ..result(number, "a") };
+    let all = [
+        named(1, "|machines/lathe-3@4|tools/bar_25@1|"),
+        named(2, "|machines/lathe-3@41|"),
+        named(3, "|materials/lathe-3@4|tools/barx25@1|"),
+        named(4, ""),
+    ];
+    for result in &all {
+        store.put(result.clone());
+    }
+    listed(&place, all.len()).await;
+    let second = place.again().await;
+    let store = second.store();
+    assert_eq!(store.get(all[0].key).await.unwrap().as_ref(), Some(&all[0]));
+    store.note_asked(all[1].key, "anna".to_owned()).await.unwrap();
+    let cases: [(&str, &[usize]); 6] = [
+        ("machines/lathe-3", &[0, 1]),
+        ("machines/lathe-3@4", &[0]),
+        ("machines/lathe-3@41", &[1]),
+        ("machines/lathe", &[]),
+        // An underscore is no wildcard.
+        ("tools/bar_25", &[0]),
+        ("materials/lathe-3@4", &[2]),
+    ];
+    for (record, expected) in cases {
+        for owner in [None, Some("anna".to_owned())] {
+            let expected: BTreeSet<Key> =
+                expected.iter().filter(|at| owner.is_none() || **at == 1).map(|at| all[*at].key).collect();
+            let query = ResultQuery { record: Some(record.to_owned()), owner: owner.clone(), ..ResultQuery::default() };
+            let found: BTreeSet<Key> = store.list(query).await.unwrap().items.iter().map(|item| item.key).collect();
+            assert_eq!(found, expected, "{record} of {owner:?}");
+            let uses = store.uses(record.to_owned(), owner).await.unwrap();
+            assert_eq!(uses, expected.len() as u64, "{record}");
+        }
+    }
 }
 
 pub(in crate::store) async fn the_total_stays_below_the_limit_and_the_last_used_stay<P: Place>() {
